@@ -1,0 +1,24 @@
+//! Which topics there are. A new protocol is one file here and one line in [`ALL`].
+
+use crate::row::Check;
+
+/// A protocol's folder name and its topics.
+type Protocol = (&'static str, &'static [(&'static str, Check)]);
+
+const ALL: &[Protocol] = &[];
+
+pub(crate) fn names() -> Vec<&'static str> {
+    ALL.iter().map(|(name, _)| *name).collect()
+}
+
+pub(crate) fn topics(protocol: &str) -> Vec<&'static str> {
+    of(protocol).iter().map(|(topic, _)| *topic).collect()
+}
+
+pub(crate) fn check(protocol: &str, topic: &str) -> Option<Check> {
+    of(protocol).iter().find(|(name, _)| *name == topic).map(|(_, check)| *check)
+}
+
+fn of(protocol: &str) -> &'static [(&'static str, Check)] {
+    ALL.iter().find(|(name, _)| *name == protocol).map_or(&[], |(_, topics)| topics)
+}
