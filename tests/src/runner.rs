@@ -57,7 +57,7 @@ pub enum RunError {
     UnknownTopic(PathBuf, &'static str),
     /// The file has no row beside its `about` line.
     NoRows(PathBuf),
-    /// A line is not a JSON object, or has no name.
+    /// A line is not a JSON object, or its name is no text.
     Line(PathBuf, usize, String),
 }
 
@@ -196,7 +196,8 @@ fn parse(path: &Path, line: usize, text: &str) -> Result<Option<Row>, RunError> 
     }
     match keys.remove("name") {
         Some(Value::String(name)) => Ok(Some(Row { line, name, keys })),
-        _ => Err(fault("the row has no \"name\"".to_owned())),
+        None => Ok(Some(Row { line, name: "unnamed".to_owned(), keys })),
+        Some(_) => Err(fault("the \"name\" of the row is no text".to_owned())),
     }
 }
 
