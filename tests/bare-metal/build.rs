@@ -70,13 +70,11 @@ fn window(bits: &str) -> String {
     format!("window({}, {})", line(bits), bits.len())
 }
 
-/// Line bits in time order as arrays of bytes, least and most significant bit first; unused bits are 0.
-fn line_bytes(bits: &str) -> [String; 2] {
+/// Line bits in time order as an array of bytes, each made by `byte` of its eight bits; unused bits are 0.
+fn line_bytes(bits: &str, byte: impl Fn(&str) -> String) -> String {
     let padded = format!("{bits:0<width$}", width = bits.len().next_multiple_of(8));
-    let bytes = || (0..padded.len()).step_by(8).map(|at| &padded[at..at + 8]);
-    let lsb_first: String = bytes().map(|byte| line(byte) + ",").collect();
-    let msb_first: String = bytes().map(|byte| format!("0b{byte},")).collect();
-    [format!("[{lsb_first}]"), format!("[{msb_first}]")]
+    let bytes: String = (0..padded.len()).step_by(8).map(|at| byte(&padded[at..at + 8]) + ",").collect();
+    format!("[{bytes}]")
 }
 
 /// `"start_bit"` as `StartBit`.

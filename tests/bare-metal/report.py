@@ -163,16 +163,17 @@ def judge(kernel, level, count, entry, same_compiler):
     return None, None
 
 
-def record(runs, budget, compiler):
-    """Writes the present figures into budget.toml; limits and comments stay."""
-    text = re.sub(r'^rustc = ".*"$', f'rustc = "{compiler}"', BUDGET.read_text(), flags=re.M)
+def record(runs, compiler):
+    """Writes the present figures into budget.toml, in the order of the image; the limits and the head stay."""
+    text = BUDGET.read_text()
+    limits = tomllib.loads(text)["kernels"]
+    head = re.sub(r'^rustc = ".*"$', f'rustc = "{compiler}"', text[: text.index("[kernels]")], flags=re.M)
+    lines = []
     for kernel in runs["O3"].kernels:
-        figures = ", ".join(f"{level} = {runs[level].kernels[kernel]}" for level in LEVELS)
-        if kernel in budget:
-            text = re.sub(rf"^({kernel} = {{ )O3 = [\d.]+, Os = [\d.]+", rf"\g<1>{figures}", text, flags=re.M)
-        else:
-            text = text.rstrip("\n") + f"\n{kernel} = {{ {figures} }}\n"
-    BUDGET.write_text(text)
+        figures = {level: runs[level].kernels[kernel] for level in LEVELS}
+        figures |= {key: value for key, value in limits.get(kernel, {}).items() if key.startswith("limit_")}
+        lines.append(f"{kernel} = {{ " + ", ".join(f"{key} = {value}" for key, value in figures.items()) + " }\n")
+    BUDGET.write_text(head + "[kernels]\n" + "".join(lines))
 
 
 def table(objdump, folder, recording):
@@ -181,12 +182,13 @@ def table(objdump, folder, recording):
     images = {level: Image(objdump, folder / f"{level}.elf") for level in LEVELS}
     compiler = subprocess.run(["rustc", "--version"], check=True, capture_output=True, text=True).stdout.split()[1]
     if recording:
-        record(runs, tomllib.loads(BUDGET.read_text())["kernels"], compiler)
+        record(runs, compiler)
     budget = tomllib.loads(BUDGET.read_text())
     same_compiler = budget["rustc"] == compiler
 
     faults = [f"{level}: {fault}" for level in LEVELS for fault in runs[level].faults]
-    faults += [f"{kernel}: in budget.toml, but not in the image" for kernel in budget["kernels"].keys() - runs["O3"].kernels]
+    gone = budget["kernels"].keys() - runs["O3"].kernels.keys()
+    faults += [f"{kernel}: in budget.toml, but not in the image" for kernel in sorted(gone)]
     hints = [] if same_compiler else [f"figures are recorded for rustc {budget['rustc']}: only the budgets bind"]
 
     for topic, (passed, failed) in runs["O3"].topics.items():

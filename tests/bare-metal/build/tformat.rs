@@ -2,13 +2,15 @@
 
 use serde_json::Value;
 
-use super::{bytes, line_bytes, number, pascal, table, text, window};
+use super::{bytes, line, line_bytes, number, pascal, table, text, window};
 
 pub(crate) fn tables(rows: &dyn Fn(&str) -> Vec<Value>) -> String {
     let (responses, negatives) = (rows("responses"), rows("negatives"));
+    let full: Vec<&Value> = responses.iter().filter(|row| row["request_id"] == "3").collect();
     [
         table("ANSWERS: &[Answer]", &responses, answer),
-        table("FULL: &[FullAnswer]", responses.iter().filter(|row| row["request_id"] == "3"), full),
+        table("FULL: &[Full]", full.iter().copied(), fields),
+        table("FULL_FORMS: &[FullForms]", full, full_forms),
         table("FLIPS: &[Flip]", negatives.iter().filter(|row| row["kind"] == "bit_flip"), flip),
         table("CHECKS: &[(&str, &[u8], u8)]", &rows("crc"), |row| {
             format!("({:?}, &{}, 0x{})", text(row, "name"), bytes(text(row, "bytes")), text(row, "crc"))
@@ -29,13 +31,13 @@ fn answer(row: &Value) -> String {
     )
 }
 
-fn full(row: &Value) -> String {
-    let [lsb_first, msb_first] = line_bytes(text(row, "wire"));
+fn full_forms(row: &Value) -> String {
+    let bits = text(row, "wire");
     format!(
-        "FullAnswer {{ name: {:?}, bytes: {}, lsb_first: {lsb_first}, msb_first: {msb_first}, want: {} }}",
-        text(row, "name"),
+        "FullForms {{ uart: {}, lsb_first: {}, msb_first: {} }}",
         bytes(text(row, "bytes")),
-        fields(row)
+        line_bytes(bits, line),
+        line_bytes(bits, |byte| format!("0b{byte}"))
     )
 }
 

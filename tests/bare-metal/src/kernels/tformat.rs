@@ -7,7 +7,7 @@ use tformat::{
 };
 
 use super::kernels;
-use crate::self_test::tformat::{ANSWERS, Answer, FULL, FullAnswer};
+use crate::self_test::tformat::{ANSWERS, Answer, FULL, FULL_FORMS, FullForms};
 
 /// One request of each length.
 const REQUESTS: [Request; 3] =
@@ -60,28 +60,28 @@ const SPI16: [u16; 8] = {
 
 kernels! {
     /// The answer to ID 3 from its 110 line bits, least significant bit of a byte first, with all checks.
-    fn tformat_id3_line_lsb(row: &FullAnswer) -> Result<Full, Error> {
+    fn tformat_id3_line_lsb(row: &FullForms) -> Result<Full, Error> {
         Full::parse_line(&row.lsb_first, BitOrder::LsbFirst)
-    } over FULL;
+    } over FULL_FORMS;
 
     /// The same from a shift register, most significant bit first.
-    fn tformat_id3_line_msb(row: &FullAnswer) -> Result<Full, Error> {
+    fn tformat_id3_line_msb(row: &FullForms) -> Result<Full, Error> {
         Full::parse_line(&row.msb_first, BitOrder::MsbFirst)
-    } over FULL;
+    } over FULL_FORMS;
 
     /// The answer to ID 3 from UART bytes.
-    fn tformat_id3_uart(row: &FullAnswer) -> Result<Full, Error> {
-        Full::parse(&row.bytes)
-    } over FULL;
+    fn tformat_id3_uart(row: &FullForms) -> Result<Full, Error> {
+        Full::parse(&row.uart)
+    } over FULL_FORMS;
 
     /// The UART bytes of an answer to ID 3.
-    fn tformat_id3_emit(row: &FullAnswer) -> [u8; Full::FIELDS] {
-        row.want.emit()
+    fn tformat_id3_emit(full: &Full) -> [u8; Full::FIELDS] {
+        full.emit()
     } over FULL;
 
     /// The line bits of an answer to ID 3.
-    fn tformat_id3_emit_line(row: &FullAnswer) -> [u8; Frame::MAX_LINE_BYTES] {
-        row.want.emit_line(BitOrder::LsbFirst)
+    fn tformat_id3_emit_line(full: &Full) -> [u8; Frame::MAX_LINE_BYTES] {
+        full.emit_line(BitOrder::LsbFirst)
     } over FULL;
 
     /// The answers of all IDs from UART bytes.
@@ -146,8 +146,8 @@ kernels! {
     } over [0x17_u8, 0x11, 0x99];
 
     /// The alarms of an error byte, counted, and whether the status says the same.
-    fn tformat_alarms(row: &FullAnswer) -> (usize, bool) {
-        let Full { sf, almc, .. } = row.want;
+    fn tformat_alarms(full: &Full) -> (usize, bool) {
+        let Full { sf, almc, .. } = *full;
         let latched = almc.alarms().filter(|alarm| Alarm::is_latched(*alarm)).count();
         (latched, sf.agrees_with(almc.with(Almc::NONE)) && !StatusField::of_alarms(almc).request_damaged())
     } over FULL;

@@ -16,13 +16,11 @@ pub(crate) struct Answer {
     pub(crate) want: Response,
 }
 
-/// A row of `responses.jsonl` that answers ID 3, in the forms that [`Full`] takes.
-pub(crate) struct FullAnswer {
-    name: &'static str,
-    pub(crate) bytes: [u8; Full::FIELDS],
+/// A row of `responses.jsonl` that answers ID 3, as [`Full`] takes it: UART bytes, line bits in either bit order.
+pub(crate) struct FullForms {
+    pub(crate) uart: [u8; Full::FIELDS],
     pub(crate) lsb_first: [u8; Frame::MAX_LINE_BYTES],
     pub(crate) msb_first: [u8; Frame::MAX_LINE_BYTES],
-    pub(crate) want: Full,
 }
 
 /// A row of `negatives.jsonl` with one wrong bit.
@@ -44,7 +42,7 @@ include!(concat!(env!("OUT_DIR"), "/tformat.rs"));
 
 pub(crate) const TOPICS: &[Topic] = &[
     ("tformat/responses", answers),
-    ("tformat/responses to ID 3", full),
+    ("tformat/responses to ID 3 in three forms", full_forms),
     ("tformat/negatives, single flips", flips),
     ("tformat/crc", checks),
 ];
@@ -71,17 +69,19 @@ fn flips() -> Tally {
     )
 }
 
-fn full() -> Tally {
+/// All forms of an answer give the same; its values are those of [`answers`].
+fn full_forms() -> Tally {
     each(
-        FULL,
-        |row| row.name,
+        FULL_FORMS,
+        |_| "of an answer to ID 3",
         |row| {
             let lines = [(BitOrder::LsbFirst, row.lsb_first), (BitOrder::MsbFirst, row.msb_first)];
-            Full::parse(&row.bytes) == Ok(row.want)
-                && row.want.emit() == row.bytes
-                && lines.iter().all(|(order, line)| {
-                    Full::parse_line(line, *order) == Ok(row.want) && row.want.emit_line(*order) == *line
-                })
+            Full::parse(&row.uart).is_ok_and(|full| {
+                full.emit() == row.uart
+                    && lines.iter().all(|(order, line)| {
+                        Full::parse_line(line, *order) == Ok(full) && full.emit_line(*order) == *line
+                    })
+            })
         },
     )
 }
