@@ -1,0 +1,3 @@
+//! Speed of the decode path over packed samples.
+
+fn main() {}
