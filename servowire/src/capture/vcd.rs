@@ -91,7 +91,9 @@ impl Vcd {
 
     fn broken(&self, error: &io::Error, place: &str) -> Fault {
         if error.kind() == io::ErrorKind::UnexpectedEof {
-            return self.fault(format!("the file ends {place}: it was cut off"));
+            // The line end put behind the file counts as one.
+            let line = At::Line(self.parser.line().saturating_sub(1).max(1));
+            return Fault::new(&self.name, line, format!("the file ends {place}: it was cut off"));
         }
         match error.get_ref().and_then(|e| e.downcast_ref::<ParseError>()) {
             Some(parse) => Fault::new(&self.name, At::Line(parse.line()), format!("not VCD {place}: {}", parse.kind())),

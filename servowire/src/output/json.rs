@@ -2,10 +2,10 @@
 
 use std::io::{self, Write};
 
-use serde_json::{Map, Value as Json, json};
+use serde::ser::{Serialize, SerializeMap, Serializer};
 
 use super::{Printer, Sink};
-use crate::event::{Direction, Event, Place, Value, Verdict};
+use crate::event::{Direction, Event, Field, Place, Position, Refusal, Value, Verdict};
 
 /// Prints for programs.
 pub struct JsonLines<W> {
@@ -22,7 +22,7 @@ impl<W: Write> JsonLines<W> {
 
 impl<W: Write> Sink for JsonLines<W> {
     fn event(&mut self, event: &Event) -> io::Result<()> {
-        serde_json::to_writer(&mut self.out, &object(&self.file, event))?;
+        serde_json::to_writer(&mut self.out, &Object { file: &self.file, event })?;
         self.out.write_all(b"\n")
     }
 }
@@ -38,47 +38,96 @@ impl<W: Write> Printer for JsonLines<W> {
     }
 }
 
-/// An event as the documentation of the tool describes it.
-fn object(file: &str, event: &Event) -> Json {
-    let mut object = Map::new();
-    let mut put = |key: &str, value: Json| drop(object.insert(key.to_owned(), value));
-    put("file", json!(file));
-    match event.place {
-        Place::Time { start, end } => {
-            put("start_ps", json!(start));
-            put("end_ps", json!(end));
-        }
-        Place::Line(line) => put("line", json!(line)),
-    }
-    if let Some(direction) = event.direction {
-        put("direction", json!(if direction == Direction::Request { "request" } else { "answer" }));
-    }
-    put("kind", json!(event.kind));
-    put("fields", Json::Object(event.fields.iter().map(|f| (f.name.to_owned(), value(&f.value))).collect()));
-    if let Some(position) = event.position {
-        put("position", json!({ "counts": position.counts, "turns": position.turns() }));
-    }
-    if let Some(delay) = event.delay {
-        put("delay_ps", json!(delay));
-    }
-    match &event.verdict {
-        Verdict::Ok => put("verdict", json!("ok")),
-        Verdict::Refused(refusal) => {
-            put("verdict", json!(refusal.class));
-            put("reason", json!(refusal.reason));
-            let at = json!({ "field": refusal.field, "bit": refusal.bit, "time_ps": refusal.time });
-            put("at", at);
-            put("cause", json!(refusal.cause));
-        }
-    }
-    Json::Object(object)
+/// An event as the README describes it; keys that say nothing are left out.
+struct Object<'a> {
+    file: &'a str,
+    event: &'a Event,
 }
 
-fn value(value: &Value) -> Json {
-    match value {
-        Value::Number { value, .. } => json!(value),
-        Value::Hex { value, .. } => json!(value),
-        Value::Flags { raw, set, .. } => json!({ "raw": raw, "set": set }),
-        Value::Text(text) => json!(text),
+impl Serialize for Object<'_> {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        let event = self.event;
+        let mut map = serializer.serialize_map(None)?;
+        map.serialize_entry("file", self.file)?;
+        match event.place {
+            Place::Time { start, end } => {
+                map.serialize_entry("start_ps", &start)?;
+                map.serialize_entry("end_ps", &end)?;
+            }
+            Place::Line(line) => map.serialize_entry("line", &line)?,
+        }
+        match event.direction {
+            Some(Direction::Request) => map.serialize_entry("direction", "request")?,
+            Some(Direction::Answer) => map.serialize_entry("direction", "answer")?,
+            None => {}
+        }
+        map.serialize_entry("kind", &event.kind)?;
+        map.serialize_entry("fields", &Fields(&event.fields))?;
+        if let Some(position) = &event.position {
+            map.serialize_entry("position", position)?;
+        }
+        if let Some(delay) = event.delay {
+            map.serialize_entry("delay_ps", &delay)?;
+        }
+        match &event.verdict {
+            Verdict::Ok => map.serialize_entry("verdict", "ok")?,
+            Verdict::Refused(refusal) => {
+                map.serialize_entry("verdict", refusal.class)?;
+                refusal_entries(refusal, &mut map)?;
+            }
+        }
+        map.end()
+    }
+}
+
+fn refusal_entries<M: SerializeMap>(refusal: &Refusal, map: &mut M) -> Result<(), M::Error> {
+    map.serialize_entry("reason", &refusal.reason)?;
+    if let Some(field) = &refusal.field {
+        map.serialize_entry("at_field", field)?;
+    }
+    if let Some(bit) = refusal.bit {
+        map.serialize_entry("at_bit", &bit)?;
+    }
+    if let Some(time) = refusal.time {
+        map.serialize_entry("at_ps", &time)?;
+    }
+    if let Some(cause) = &refusal.cause {
+        map.serialize_entry("cause", cause)?;
+    }
+    Ok(())
+}
+
+struct Fields<'a>(&'a [Field]);
+
+impl Serialize for Fields<'_> {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.collect_map(self.0.iter().map(|field| (field.name, &field.value)))
+    }
+}
+
+impl Serialize for Value {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        match self {
+            Self::Number { value, .. } => serializer.serialize_i64(*value),
+            Self::Hex { value, .. } => serializer.serialize_u64(*value),
+            Self::Text(text) => serializer.serialize_str(text),
+            Self::Flags { raw, set, .. } => {
+                let mut map = serializer.serialize_map(Some(2))?;
+                map.serialize_entry("raw", raw)?;
+                map.serialize_entry("set", set)?;
+                map.end()
+            }
+        }
+    }
+}
+
+impl Serialize for Position {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        let mut map = serializer.serialize_map(None)?;
+        map.serialize_entry("counts", &self.counts)?;
+        if let Some(turns) = self.turns() {
+            map.serialize_entry("turns", &turns)?;
+        }
+        map.end()
     }
 }
