@@ -5,6 +5,7 @@
 #![allow(
     clippy::arithmetic_side_effects,
     clippy::cast_possible_truncation,
+    clippy::cast_possible_wrap,
     clippy::cast_precision_loss,
     clippy::std_instead_of_core,
     clippy::expect_used,
@@ -66,7 +67,7 @@ fn best(mut run: impl FnMut() -> Tally) -> f64 {
 /// An axis that turns; 10 us between transactions.
 fn traffic() -> Vec<bool> {
     let mut samples = Vec::new();
-    let mut idle = |samples: &mut Vec<bool>, bits: usize| samples.extend(std::iter::repeat_n(true, bits * N));
+    let idle = |samples: &mut Vec<bool>, bits: usize| samples.extend(std::iter::repeat_n(true, bits * N));
     let send = |samples: &mut Vec<bool>, bytes: &[u8]| {
         for byte in bytes {
             let bits = [false].into_iter().chain((0..8).map(|k| byte >> k & 1 == 1)).chain([true]);

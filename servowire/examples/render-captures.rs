@@ -59,7 +59,7 @@ fn main() -> Result<(), Box<dyn Error>> {
 }
 
 /// The files by name, with their content.
-fn render(rows: &Path) -> Result<Vec<(&'static str, String)>, Box<dyn Error>> {
+pub(crate) fn render(rows: &Path) -> Result<Vec<(&'static str, String)>, Box<dyn Error>> {
     let rows = logged(&fs::read_to_string(rows)?)?;
     let mut files = Vec::new();
     for capture in &CAPTURES {

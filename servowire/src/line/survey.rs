@@ -19,18 +19,25 @@ pub struct Survey {
     pub setup: Setup,
     /// Name of the channel.
     name: String,
-    /// Bits a second as seen; none where the rate was given and not looked for.
+    /// Bits a second as seen; none where the runs do not tell.
     seen: Option<f64>,
+    /// The level at which the line rests, where it does.
+    idle: Option<bool>,
 }
 
 impl fmt::Display for Survey {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { setup, name, seen } = self;
-        let idle =
-            if setup.inverted { "idles low: inverted (A and B swapped), decoded upside down" } else { "idles high" };
-        write!(f, "channel \"{name}\" {idle}, {} Mbit/s", f64::from(setup.rate) / 1e6)?;
-        match seen {
-            Some(seen) => write!(f, " (seen {:+.2} %)", (seen / f64::from(setup.rate) - 1.0) * 100.0),
+        let Self { setup, name, seen, idle } = self;
+        let rests = match (setup.inverted, idle) {
+            (false, Some(false)) => "taken as idling high, though it idles low (A and B swapped?)",
+            (false, _) => "idles high",
+            (true, Some(true)) => "taken as idling low, though it idles high",
+            (true, _) => "idles low (A and B swapped) and is decoded inverted",
+        };
+        write!(f, "channel \"{name}\" {rests}, {} Mbit/s", f64::from(setup.rate) / 1e6)?;
+        match seen.map(|seen| (seen, (seen / f64::from(setup.rate) - 1.0) * 100.0)) {
+            Some((_, off)) if off.abs() < 10.0 => write!(f, " ({off:+.2} % on the line)"),
+            Some((seen, _)) => write!(f, ", though the runs look like {:.3} Mbit/s", seen / 1e6),
             None => Ok(()),
         }
     }
@@ -47,7 +54,7 @@ pub fn survey<P: StartStop>(
     make: &dyn Fn(i64) -> P,
 ) -> Result<Survey, String> {
     let wanted = options.channel.as_deref().map(|name| find(name, channels)).transpose()?;
-    let mut best: Option<(Survey, (u64, i64, bool))> = None;
+    let mut best: Option<(Survey, (u64, i64, bool, bool))> = None;
     let mut misfits = Vec::new();
     for (channel, name) in (0_u16..).zip(channels) {
         if wanted.is_some_and(|wanted| wanted != channel) {
@@ -56,7 +63,7 @@ pub fn survey<P: StartStop>(
         let own: Vec<(i64, bool)> =
             changes.iter().filter(|c| c.channel == channel).map(|c| (c.time, c.level)).collect();
         let (rate, seen) = match options.bit_rate {
-            Some(rate) => (rate, None),
+            Some(rate) => (rate, bit_rate(&own, &[rate]).seen()),
             None if own.len() < FEWEST => continue,
             None => match bit_rate(&own, P::RATES) {
                 Rate::Nominal { rate, seen } => (rate, Some(seen)),
@@ -73,12 +80,13 @@ pub fn survey<P: StartStop>(
             }
             let setup = Setup { channel, rate, inverted };
             let tally = trial(&own, reached, setup, &mut make(setup.bit()));
-            let idles_so = idle_level(&own, setup.bit()).is_none_or(|idle| idle != inverted);
+            let idle = idle_level(&own, setup.bit());
+            let idles_so = idle.is_none_or(|idle| idle != inverted);
             let second = if tally.ok > 0 { -(tally.refused as i64) } else { own.len() as i64 };
-            let score = (tally.ok, second, idles_so);
-            // With equal marks the first stays: the lower channel, the line that is not inverted.
+            let score = (tally.ok, second, idles_so, !inverted);
+            // With equal marks the first stays.
             if best.as_ref().is_none_or(|(_, mark)| score > *mark) {
-                best = Some((Survey { setup, name: name.clone(), seen }, score));
+                best = Some((Survey { setup, name: name.clone(), seen, idle }, score));
             }
         }
     }
@@ -95,9 +103,10 @@ fn nothing<P: StartStop>(
     let protocol = P::NAME;
     let rates = P::RATES.iter().map(|rate| (f64::from(*rate) / 1e6).to_string()).collect::<Vec<_>>().join(" and ");
     if let Some((name, seen)) = misfits.first() {
+        let digits = (2.0 - (seen / 1e6).log10().floor()).clamp(0.0, 6.0) as usize;
         let mbit = seen / 1e6;
         return format!(
-            "channel \"{name}\" runs at about {mbit:.3} Mbit/s, where {protocol} has {rates} Mbit/s; \
+            "channel \"{name}\" runs at about {mbit:.digits$} Mbit/s, where {protocol} has {rates} Mbit/s; \
              if that is right, say it with --bit-rate"
         );
     }
@@ -148,6 +157,15 @@ enum Rate {
     Unclear,
 }
 
+impl Rate {
+    fn seen(self) -> Option<f64> {
+        match self {
+            Self::Nominal { seen, .. } | Self::Other(seen) => Some(seen),
+            Self::Unclear => None,
+        }
+    }
+}
+
 fn bit_rate(own: &[(i64, bool)], rates: &[u32]) -> Rate {
     let mut lengths: Vec<f64> = runs(own).map(|(_, length)| length as f64).filter(|length| *length > 0.0).collect();
     lengths.sort_by(f64::total_cmp);
@@ -175,7 +193,7 @@ fn mean_bit(lengths: &[f64], bit: f64) -> (f64, usize) {
     let (mut time, mut bits, mut fitting) = (0.0, 0.0, 0);
     for length in lengths.iter().take_while(|length| **length < 9.5 * bit) {
         let count = (length / bit).round();
-        if (length - count * bit).abs() < 0.3 * bit {
+        if count > 0.0 && (length - count * bit).abs() < 0.3 * bit {
             time += length;
             bits += count;
             fitting += 1;

@@ -36,6 +36,9 @@ const TURN_ROUND_BITS: i64 = 4;
 /// An answer begins within this time, nominally 3 us, in picoseconds.
 const ANSWER_TIMEOUT: i64 = 20_000_000;
 
+/// The longest answer, with some pauses in it, in bits.
+const LONGEST_BITS: i64 = 150;
+
 /// More fields without a pause are no frame.
 const MOST_FIELDS: usize = 16;
 
@@ -45,6 +48,10 @@ pub struct Decoder {
     encoder: Encoder,
     /// Begin of the capture, until the first frame has been seen.
     begin: Option<i64>,
+    /// Until when the rest of a frame is passed over in which the capture began.
+    skip: Option<i64>,
+    /// The end of what was passed over.
+    skipped: i64,
     open: Frame,
     pending: Option<Pending>,
 }
@@ -86,7 +93,12 @@ impl Frame {
 
     /// The data ID that the first field asks for or answers.
     fn data_id(&self) -> Result<DataId, Error> {
-        ControlField::parse(self.bytes.first().copied().unwrap_or_default())?.data_id()
+        ControlField::parse(self.first())?.data_id()
+    }
+
+    /// The first field, 0 where there is none.
+    fn first(&self) -> u8 {
+        self.bytes.first().copied().unwrap_or_default()
     }
 
     fn place(&self) -> Place {
@@ -111,13 +123,10 @@ impl Pending {
         }
     }
 
-    /// Fields of the answer that begins with `cf`.
+    /// Fields of the answer that begins with `cf`: as that says, or where it is damaged, as was asked.
     fn answer_fields(&self, cf: u8) -> usize {
-        let id = match self.request {
-            _ if cf == DataId::Id3.control_field().get() => DataId::Id3,
-            Some(request) => request.data_id(),
-            None => DataId::Id3,
-        };
+        let said = ControlField::parse(cf).and_then(ControlField::data_id).ok();
+        let id = said.or(self.request.map(Request::data_id)).unwrap_or(DataId::Id3);
         usize::from(id.response_fields())
     }
 }
@@ -125,23 +134,38 @@ impl Pending {
 impl Decoder {
     /// `bit`: its length in picoseconds.
     pub fn new(bit: i64, settings: Settings) -> Self {
-        Self { bit, encoder: Encoder::new(settings), begin: None, open: Frame::default(), pending: None }
+        Self {
+            bit,
+            encoder: Encoder::new(settings),
+            begin: None,
+            skip: None,
+            skipped: 0,
+            open: Frame::default(),
+            pending: None,
+        }
     }
 
-    /// Whether a pause of this length ends the open frame.
-    fn ends(&self, pause: i64) -> bool {
+    /// Whether the open frame is over before a field that begins at `start`.
+    fn is_over(&self, start: i64) -> bool {
+        let pause = start - self.open.end;
         if pause > FIELD_TIMEOUT_BITS * self.bit {
             return true;
         }
         if pause < TURN_ROUND_BITS * self.bit {
             return false;
         }
-        if self.open.broken.is_some() {
-            return true;
+        match self.pending {
+            // A request is over when its answer may follow.
+            None => {
+                let request_fields = |id: DataId| usize::from(id.request_fields());
+                self.open.broken.is_some() || self.open.fields >= self.open.data_id().map_or(1, request_fields)
+            }
+            // Behind a low delimiter the receiver may have skipped fields: the answer lasts as long as a whole one.
+            Some(pending) => {
+                let whole = 10 * pending.answer_fields(self.open.first()) as i64 - FIELD_TIMEOUT_BITS;
+                self.open.broken.is_some() && start - self.open.start() > whole * self.bit
+            }
         }
-        // An answer is over when it has all its fields, a request when it may be followed by its answer.
-        self.pending.is_none()
-            && self.open.data_id().map_or(true, |id| self.open.fields >= usize::from(id.request_fields()))
     }
 
     /// The open frame is over.
@@ -157,6 +181,8 @@ impl Decoder {
         let at_once = begin.is_some_and(|begin| frame.start() - begin < FIELD_TIMEOUT_BITS * self.bit);
         if at_once && !event.verdict.is_ok() {
             self.pending = None;
+            self.skipped = frame.end;
+            self.skip = begin.map(|begin| begin + LONGEST_BITS * self.bit);
             return out.event(&describe::cut(frame.place(), "the capture begins inside a frame"));
         }
         out.event(&event)
@@ -233,8 +259,16 @@ impl StartStop for Decoder {
     }
 
     fn field(&mut self, field: &LineField, out: &mut dyn Sink) -> io::Result<()> {
-        if self.open.fields > 0 && self.ends(field.start - self.open.end) {
+        if self.open.fields > 0 && self.is_over(field.start) {
             self.close(out)?;
+        }
+        if let Some(until) = self.skip {
+            let pause = field.start - self.skipped;
+            self.skipped = field.end;
+            if field.start < until && pause <= FIELD_TIMEOUT_BITS * self.bit {
+                return Ok(());
+            }
+            self.skip = None;
         }
         if self.open.fields == 0 {
             let due = self.pending.and_then(|pending| pending.end()).map(|end| end.saturating_add(ANSWER_TIMEOUT));
@@ -244,8 +278,7 @@ impl StartStop for Decoder {
         }
         self.open.push(field);
         let whole = self.pending.is_some_and(|pending| {
-            let cf = self.open.bytes.first().copied().unwrap_or_default();
-            self.open.broken.is_none() && self.open.fields == pending.answer_fields(cf)
+            self.open.broken.is_none() && self.open.fields == pending.answer_fields(self.open.first())
         });
         if whole || self.open.fields == MOST_FIELDS { self.close(out) } else { Ok(()) }
     }

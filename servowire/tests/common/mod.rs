@@ -1,4 +1,16 @@
 //! Lines drawn for the tests, written as every capture format, and the program run on them.
+#![allow(
+    clippy::arithmetic_side_effects,
+    clippy::cast_possible_truncation,
+    clippy::cast_possible_wrap,
+    clippy::cast_precision_loss,
+    clippy::cast_sign_loss,
+    clippy::expect_used,
+    clippy::indexing_slicing,
+    clippy::panic,
+    clippy::std_instead_of_core,
+    clippy::unwrap_used
+)]
 #![allow(dead_code, unreachable_pub, reason = "a module of several test programs, each using a part of it")]
 
 use std::fmt::Write as _;
