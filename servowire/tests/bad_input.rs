@@ -171,7 +171,7 @@ fn arbitrary_damage_never_panics() {
     };
     for (name, content, options) in &files {
         for _ in 0..60 {
-            let mut bytes = content[..random(content.len()) + 1].to_vec();
+            let mut bytes = content[..=random(content.len())].to_vec();
             for _ in 0..random(4) {
                 let at = random(bytes.len());
                 bytes[at] = random(256) as u8;

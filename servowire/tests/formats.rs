@@ -121,7 +121,7 @@ fn times_before_the_trigger() {
 fn hex_logs() {
     let bench = Bench::new();
     let log = "# position and turns\n1A\n1A 20 29 C0 3B 17 00 00 00 C8 37\n02 0220b4bd1c37\n0x92,0x92,0x00,0x17,0x85\n\
-        EA 01 EB\nEA 01 5A B1\n02 20 50 A9 78 A3\n";
+        EA 01 EB\nEA 01 5A B1\n02 20 50 A9 78 A3\n# with the echo of the request\n1A\n1A1A2029C03B17000000C837\n";
     let run = bench.decode("log.txt", log, &["--bytes", "--json"]);
     run.is_good();
     let kinds: Vec<String> =
@@ -136,6 +136,8 @@ fn hex_logs() {
         "6 \"request\" \"ID D\"",
         "7 \"answer\" \"ID D\"",
         "8 \"answer\" \"ID 0\"",
+        "10 \"request\" \"ID 3\"",
+        "11 \"answer\" \"ID 3\"",
     ];
     assert_eq!(kinds, want);
 }

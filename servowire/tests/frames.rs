@@ -115,6 +115,7 @@ fn a_wrong_check_field() {
     // Ten fields of 4 us after the beginning of the answer.
     assert_eq!(answer["at_ps"].as_i64(), answer["start_ps"].as_i64().map(|start| start + 40_000_000));
     assert!(answer["fields"].get("ABS").is_none(), "no value beside an error");
+    assert_eq!(answer["cause"], "single bits were disturbed");
 }
 
 #[test]
@@ -135,6 +136,17 @@ fn a_low_delimiter() {
     );
     assert_eq!(run.json().len(), 2, "{}", run.out);
     assert_eq!(run.code, 1);
+}
+
+/// A glitch at the turn-round of the line is taken for a start bit, and the frame is read one bit early.
+#[test]
+fn a_frame_shifted_by_a_glitch() {
+    let run = decode(|wave| {
+        wave.send(&[0x1a]).idle_us(2.6).level(false, 0.4e6).send(&id3(0x12_3456, 1, 0)).idle_us(40.0);
+    });
+    run.fails_with("frames refused");
+    let answer = &run.json()[1];
+    assert!(answer["cause"].as_str().unwrap().contains("the frame begins 1 bit(s) later"), "{answer}");
 }
 
 /// The encoder answers a damaged request with an ID 3 frame.

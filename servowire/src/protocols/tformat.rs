@@ -8,10 +8,11 @@ mod describe;
 
 use std::io;
 
-use tformat::{BitRate, ControlField, DataId, Error, Full, Request, Response};
+use tformat::inspect::{Cause, inspect, inspect_bytes};
+use tformat::{BitRate, ControlField, DataId, Error, Full, Request, Response, Window};
 
 use crate::capture::hexlog::Burst;
-use crate::event::{Event, Place};
+use crate::event::{Event, Place, Verdict};
 use crate::line::{LineField, StartStop};
 use crate::output::Sink;
 use describe::Encoder;
@@ -99,6 +100,25 @@ impl Frame {
     /// The first field, 0 where there is none.
     fn first(&self) -> u8 {
         self.bytes.first().copied().unwrap_or_default()
+    }
+
+    /// The bits of the line from the first start bit on, as far as the fields tell: idle line between them.
+    fn line(&self, bit: i64) -> Option<Window> {
+        let mut bits = u128::MAX;
+        for (byte, start) in self.bytes().iter().zip(&self.starts) {
+            let at = (start - self.start() + bit / 2) / bit.max(1);
+            let ten = 1 << 9 | u128::from(*byte) << 1;
+            let clear = u32::try_from(at).ok().and_then(|at| 0x3ff_u128.checked_shl(at));
+            if let (Some(clear), Ok(at)) = (clear, u32::try_from(at)) {
+                bits = bits & !clear | ten << at;
+            }
+        }
+        if let Some(at) = self.broken.and_then(|field| self.starts.get(usize::from(field))) {
+            let at = (at - self.start() + bit / 2) / bit.max(1) + 9;
+            bits &= !u32::try_from(at).ok().and_then(|at| 1_u128.checked_shl(at)).unwrap_or(0);
+        }
+        let len = ((self.end - self.start()) / bit.max(1)).clamp(0, 128);
+        Window::from_bits(bits, u32::try_from(len).ok()?)
     }
 
     fn place(&self) -> Place {
@@ -198,7 +218,21 @@ impl Decoder {
         };
         let delay = pending.end().map(|end| frame.start() - end);
         let asked = pending.request.map(Request::data_id);
-        self.encoder.answer(frame, asked, result, delay)
+        let mut event = self.encoder.answer(frame, asked, result, delay);
+        if let (Verdict::Refused(refusal), Some(request)) = (&mut event.verdict, pending.request) {
+            refusal.cause = self.cause(request, frame).map(|cause| cause.to_string());
+        }
+        event
+    }
+
+    /// What probably spoilt the answer to a request.
+    fn cause(&self, request: Request, frame: &Frame) -> Option<Cause> {
+        let report = match frame.broken {
+            None => inspect_bytes(request, frame.bytes()),
+            Some(_) => inspect(request, frame.line(self.bit)?),
+        };
+        // That is what its verdict says already.
+        report.cause.filter(|cause| *cause != Cause::RequestRefused)
     }
 
     /// A frame without a request before it: a request, or an answer alone.
@@ -293,7 +327,13 @@ impl StartStop for Decoder {
             if bytes == request && bytes < pending.answer_fields(cf) {
                 self.give_up(out)?;
             } else {
-                return self.take(burst, 0, bytes, out);
+                // A receiver that is always on hears the own request first.
+                let echo = pending.request.map(Request::emit);
+                let heard = echo.and_then(|echo| burst.bytes.strip_prefix(echo.as_bytes()));
+                let answer =
+                    heard.filter(|rest| rest.first().is_some_and(|cf| rest.len() == pending.answer_fields(*cf)));
+                let from = answer.map_or(0, |answer| bytes - answer.len());
+                return self.take(burst, from, bytes - from, out);
             }
         }
         if id.is_ok_and(|id| bytes == usize::from(id.response_fields()) && bytes > request) {
