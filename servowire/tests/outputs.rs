@@ -47,7 +47,7 @@ fn text_of_frames_that_do_not_pair() {
     assert_eq!(run.code, 1);
     let starts: Vec<&str> = run.out.lines().map(|line| line[19..].split("  ").next().unwrap()).collect();
     assert_eq!(starts, ["<>", "<", "<>", "<>", ">"], "{}", run.out);
-    assert!(run.out.contains("NO_RESPONSE: no answer within 20 us (only the request is on the line"), "{}", run.out);
+    assert!(run.out.contains("NO_RESPONSE: no answer within 20.0 us (only the request is on the line"), "{}", run.out);
     assert!(run.out.contains("REJECTED: the encoder refused the request"), "{}", run.out);
     assert!(run.out.contains("PARITY: "), "{}", run.out);
 }
@@ -88,6 +88,11 @@ fn the_vcd_beside() {
     let again = common::decode(&out, &["--json"]);
     again.is_good();
     assert_eq!(again.json().len(), run.json().len());
+    let file = out.to_str().unwrap();
+    assert_eq!(common::decode(&out, &["--vcd", file]).code, 2, "the capture is not overwritten");
+    assert_eq!(std::fs::read(&out).unwrap(), text);
+    let nowhere = bench.path("none").join("out.vcd");
+    bench.decode("a.vcd", wave.vcd(), &["--vcd", nowhere.to_str().unwrap()]).fails_with("cannot be created: ");
     let hex = bench.decode("a.txt", "1A\n", &["--bytes", "--vcd", out.to_str().unwrap()]);
     hex.fails_with("a log of bytes has no times for a VCD");
 }
