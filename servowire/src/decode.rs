@@ -59,7 +59,7 @@ pub(crate) fn run(arguments: &Decode) -> ExitCode {
 fn all(arguments: &Decode, printer: &mut dyn Printer) -> io::Result<bool> {
     let mut good = true;
     for path in &arguments.files {
-        let name = path.display().to_string();
+        let name = if path.as_os_str() == "-" { "standard input".to_owned() } else { path.display().to_string() };
         let opened = capture::open(path, arguments.hints());
         let bar = Bar::new(path);
         good &= match opened {
