@@ -13,12 +13,14 @@ mod encoder_id;
 mod error;
 pub mod frame;
 mod line_code;
+pub mod message;
 mod parameter;
 mod position;
 mod quality;
 pub mod rssi;
 pub mod sampling;
 pub mod symbol;
+pub mod sync;
 mod vframe;
 
 pub use acceleration::{DeltaDelta, OutOfRange};

@@ -2,7 +2,9 @@
 
 mod code;
 mod frame;
+mod message;
 mod position;
+mod sync;
 
 use crate::row::{Check, Fault};
 use hdsl::symbol::{Character, RunningDisparity, Word};
@@ -16,14 +18,18 @@ pub(crate) const TOPICS: &[(&str, Check)] = &[
     ("crc16", code::crc16),
     ("crc5", code::crc5),
     ("edges", frame::edges),
+    ("ext_sync_seed", sync::ext_sync_seed),
     ("fast_position", position::fast_position),
     ("learn", frame::learn),
+    ("long_message", message::long_message),
     ("master_header", frame::master_header),
     ("master_param", code::master_param),
     ("quality_monitor", position::quality_monitor),
     ("rssi", frame::rssi),
     ("sample_edge", frame::sample_edge),
     ("sampled_answer", frame::sampled_answer),
+    ("short_message", message::short_message),
+    ("sync_startup", sync::sync_startup),
     ("vframe", frame::vframe),
 ];
 
