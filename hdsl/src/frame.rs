@@ -231,35 +231,51 @@ pub const FILLER: Window = {
     }
 };
 
+/// How much of TRAILER the master drives.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "arbitrary", derive(arbitrary::Arbitrary))]
+pub enum Trailer {
+    /// All eight bits, in frames without an answer.
+    Whole,
+    /// The last six behind an answer. The line idles during the first two (the specification speaks of five driven
+    /// zeros, the vendor's receiver drives four).
+    AfterAnswer,
+    /// The four zeros only: the vendor's receiver breaks off there when a LEARN frame has failed.
+    Cut,
+}
+
 /// The last part of an H-frame: TRAILER and STUFFING.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "arbitrary", derive(arbitrary::Arbitrary))]
 pub struct Tail {
-    /// Whether all eight bits of TRAILER are driven. Behind an answer the first two are not: the line idles, and the
-    /// driver is switched on for the third (the specification speaks of five driven zeros, the vendor's receiver
-    /// drives four).
-    pub driven: bool,
+    /// How much of TRAILER is driven.
+    pub trailer: Trailer,
     /// Blocks of stuffing, 0..=26.
     pub stuffing: u8,
 }
 
 impl Tail {
     /// Bits of the line time that the tail takes.
-    pub const fn len(self) -> u32 {
-        TRAILER_BITS.wrapping_add(STUFFING_BITS.wrapping_mul(self.stuffing as u32))
-    }
-
-    /// Never: there is always a TRAILER.
-    pub const fn is_empty(self) -> bool {
-        false
+    pub const fn time(self) -> u32 {
+        let trailer = match self.trailer {
+            Trailer::Whole | Trailer::AfterAnswer => TRAILER_BITS,
+            Trailer::Cut => 6,
+        };
+        STUFFING_BITS.wrapping_mul(self.stuffing as u32).wrapping_add(trailer)
     }
 
     /// The driven bits in line order.
     pub fn bits(self) -> impl Iterator<Item = bool> {
-        let first = if self.driven { 0 } else { 2 };
-        let trailer = (first..TRAILER_BITS).map(|at| TRAILER >> at & 1 == 1);
+        let driven = match self.trailer {
+            Trailer::Whole => 0..TRAILER_BITS,
+            Trailer::AfterAnswer => 2..TRAILER_BITS,
+            Trailer::Cut => 2..6,
+        };
+        let trailer = driven.map(|at| TRAILER >> at & 1 == 1);
         let block = (0..STUFFING_BITS).map(|at| SYNC >> at & 1 == 1);
         trailer.chain((0..self.stuffing).flat_map(move |_| block.clone()))
     }
@@ -295,9 +311,10 @@ mod tests {
         let (head, _) = Head::new(byte, None, d);
         assert_eq!(text(window(head.bits()).skip(12).take(4)), "1101");
         assert!(text(window(FILLER)).starts_with("0101") && text(window(FILLER)).ends_with("01"));
-        assert_eq!(text(Tail { driven: true, stuffing: 2 }.bits()), "00000011001011001011");
-        assert_eq!(text(Tail { driven: false, stuffing: 0 }.bits()), "000011");
-        assert_eq!(Tail { driven: false, stuffing: 26 }.len(), 164);
+        assert_eq!(text(Tail { trailer: Trailer::Whole, stuffing: 2 }.bits()), "00000011001011001011");
+        assert_eq!(text(Tail { trailer: Trailer::AfterAnswer, stuffing: 0 }.bits()), "000011");
+        assert_eq!(text(Tail { trailer: Trailer::Cut, stuffing: 0 }.bits()), "0000");
+        assert_eq!(Tail { trailer: Trailer::AfterAnswer, stuffing: 26 }.time(), 164);
     }
 
     /// Every byte with every window at every disparity is read back by the encoder's side.

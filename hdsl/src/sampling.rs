@@ -92,6 +92,20 @@ impl From<SampleIndex> for u8 {
     }
 }
 
+/// How the first falling edge is read from its byte.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "arbitrary", derive(arbitrary::Arbitrary))]
+pub enum EdgeRule {
+    /// The ones in front of the edge count.
+    #[default]
+    Leading,
+    /// All ones of the byte count, as in the vendor's receiver. If the edge falls on the boundary of two bytes and the
+    /// next one comes a sample early, a one from behind it is counted and the pattern is not found.
+    All,
+}
+
 /// What the receiver learns from the answer to a START frame.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -116,10 +130,15 @@ impl Alignment {
     /// # Errors
     /// [`Error::Truncated`] for fewer than 61 bytes, [`Error::NoEdge`] if the line stayed high,
     /// [`Error::PatternNotFound`].
-    pub fn learn(samples: &[u8]) -> Result<Self, Error> {
+    pub fn learn(samples: &[u8], rule: EdgeRule) -> Result<Self, Error> {
         let room = room(samples, 0)?;
         let Some(edge) = samples.iter().find(|byte| **byte != 0xff) else { return Err(Error::NoEdge) };
-        let index = SampleIndex::after_falling_edge(*edge);
+        let edge = match rule {
+            EdgeRule::All => *edge,
+            // Without what comes behind the first zero.
+            EdgeRule::Leading => *edge & !(!*edge).checked_ilog2().map_or(0, |zero| (1_u8 << zero).wrapping_sub(1)),
+        };
+        let index = SampleIndex::after_falling_edge(edge);
         let line = index.bits(samples);
         let found = (0..=room.min(Self::MAX_DELAY)).find(|delay| answer_at(line, *delay) == TEST_PATTERN);
         found.map(|delay| Self { index, delay }).ok_or(Error::PatternNotFound { index: index.0 })
@@ -169,38 +188,52 @@ fn answer_at(line: u128, delay: u8) -> u64 {
     (line >> (delay & 15)) as u64 & MASK
 }
 
+/// The samples of a line that carries an answer `delay` eighths of a bit after reception began, with ones before and
+/// behind: what [`Alignment::bits`] takes apart.
+///
+/// ```
+/// use hdsl::sampling::{Alignment, EdgeRule, TEST_PATTERN, line};
+/// let found = Alignment::learn(&line(TEST_PATTERN, 13), EdgeRule::Leading);
+/// assert_eq!(found.map(|a| (a.index.get(), a.delay)), Ok((1, 2)));
+/// ```
+pub fn line(bits: u64, delay: u32) -> [u8; WINDOW] {
+    // Eight bits at a time: the one under way and the one before it.
+    let bit = |at: u32| if at < ANSWER_BITS { bits >> at & 1 == 1 } else { true };
+    let byte = |at: u32| if bit(at) { 0xff_u8 } else { 0 };
+    let (whole, part) = (delay / 8, delay % 8);
+    core::array::from_fn(|k| {
+        let at = u32::try_from(k).unwrap_or(u32::MAX);
+        let present = at.checked_sub(whole).map_or(0xff, byte);
+        let before = at.checked_sub(whole.saturating_add(1)).map_or(0xff, byte);
+        let pair = u16::from_be_bytes([before, present]);
+        let [_, samples] = (pair >> part).to_be_bytes();
+        samples
+    })
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
     use std::vec::Vec;
 
-    /// A line at eight samples a bit that carries `bits` after `delay` samples, ones before and behind.
-    fn line(bits: u64, delay: usize) -> [u8; WINDOW] {
-        let level = |at: usize| match at.checked_sub(delay) {
-            Some(at) if at / 8 < 61 => bits >> (at / 8) & 1 == 1,
-            _ => true,
-        };
-        core::array::from_fn(|byte| (0..8).fold(0, |b, k| b << 1 | u8::from(level(byte * 8 + k))))
-    }
-
     #[test]
     fn every_delay_of_a_clean_line() {
-        for delay in 0..=100 {
-            let got = Alignment::learn(&line(TEST_PATTERN, delay));
+        for delay in 0..=100_u32 {
+            let got = Alignment::learn(&line(TEST_PATTERN, delay), EdgeRule::All);
             if delay >= 92 {
                 assert!(matches!(got, Err(Error::PatternNotFound { .. })), "{delay}");
                 continue;
             }
             let got = got.unwrap();
-            assert_eq!(usize::from(got.index.get()), (delay + 4) % 8);
-            assert_eq!(usize::from(got.delay), (delay + 4) / 8);
+            assert_eq!(u32::from(got.index.get()), (delay + 4) % 8);
+            assert_eq!(u32::from(got.delay), (delay + 4) / 8);
             assert_eq!(got.rssi(&line(TEST_PATTERN, delay)).get(), 12);
             for bits in [0, 0x0123_4567_89ab_cdef, u64::MAX >> 3] {
                 assert_eq!(got.bits(&line(bits, delay)), Ok(bits & u64::MAX >> 3));
             }
         }
-        assert_eq!(Alignment::learn(&[0xff; 72]), Err(Error::NoEdge));
-        assert_eq!(Alignment::learn(&[0xff; 60]), Err(Error::Truncated { got: 60, want: 61 }));
+        assert_eq!(Alignment::learn(&[0xff; 72], EdgeRule::All), Err(Error::NoEdge));
+        assert_eq!(Alignment::learn(&[0xff; 60], EdgeRule::All), Err(Error::Truncated { got: 60, want: 61 }));
         let late = Alignment { index: SampleIndex(4), delay: 5 };
         assert_eq!(late.bits(&[0; 65]), Err(Error::Truncated { got: 65, want: 66 }));
     }
@@ -210,7 +243,7 @@ mod tests {
     fn a_wrong_bit_of_the_pattern() {
         for at in 0..61 {
             for delay in 0..88 {
-                assert!(Alignment::learn(&line(TEST_PATTERN ^ 1 << at, delay)).is_err());
+                assert!(Alignment::learn(&line(TEST_PATTERN ^ 1 << at, delay), EdgeRule::All).is_err());
             }
         }
     }

@@ -101,6 +101,8 @@ impl ResourceAddress {
     pub const FWDATE: Self = Self(0x086);
     /// "EESIZE".
     pub const EESIZE: Self = Self(0x087);
+    /// First resource of the user data.
+    pub const USER: Self = Self(0x100);
     /// Access key.
     pub const ACCESS_KEY: Self = Self(0x105);
     /// "UWARNING".

@@ -2,7 +2,7 @@
 
 use hdsl::frame::{Extra, Head};
 use hdsl::rssi::{Rssi, edges as edge_byte, longest_gap};
-use hdsl::sampling::{Alignment, SampleIndex};
+use hdsl::sampling::{Alignment, EdgeRule, SampleIndex, TEST_PATTERN};
 use hdsl::symbol::{Character, Reading, Rule};
 use hdsl::{Answer, Content, DeltaDelta, EncoderByte, Error, LineDisparity, ParameterByte, SafeBlock, VFrame};
 use serde::Deserialize;
@@ -204,10 +204,10 @@ pub(super) fn learn(rows: &[Row]) -> Vec<Verdict> {
     each(rows, |row: Learn| {
         let samples = row.samples.0;
         if let (Some(delay), None) = (row.delay_eighths, row.jitter) {
-            let pattern = hdsl::sampling::TEST_PATTERN ^ row.flip.map_or(0, |flip| 1 << flip);
+            let pattern = TEST_PATTERN ^ row.flip.map_or(0, |flip| 1 << flip);
             same("samples", &samples, &sampled(pattern, delay, samples.len()))?;
         }
-        let (index, delay, error) = match Alignment::learn(&samples) {
+        let (index, delay, error) = match Alignment::learn(&samples, EdgeRule::All) {
             Ok(found) => (Some(found.index.get()), Some(found.delay), None),
             Err(Error::PatternNotFound { index }) => (Some(index), None, Some("pattern_not_found")),
             Err(Error::NoEdge) => (None, None, Some("no_edge")),
