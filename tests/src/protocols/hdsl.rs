@@ -1,6 +1,7 @@
 //! HIPERFACE DSL.
 
 mod code;
+mod firmware;
 mod frame;
 mod message;
 mod position;
@@ -20,6 +21,10 @@ pub(crate) const TOPICS: &[(&str, Check)] = &[
     ("edges", frame::edges),
     ("ext_sync_seed", sync::ext_sync_seed),
     ("fast_position", position::fast_position),
+    ("fw_link", firmware::fw_link),
+    ("fw_messages", firmware::fw_messages),
+    ("fw_startup", firmware::fw_startup),
+    ("fw_sync", sync::fw_sync),
     ("learn", frame::learn),
     ("long_message", message::long_message),
     ("master_header", frame::master_header),

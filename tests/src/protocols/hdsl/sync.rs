@@ -1,9 +1,11 @@
 //! External synchronisation.
 
-use hdsl::Error;
+use hdsl::frame::{Extra, H_FRAME_BITS};
 use hdsl::sync::{CoreClock, Es, ExtraWindow, Startup};
+use hdsl::{Error, LineDisparity, MasterSymbol, ParameterByte};
 use serde::Deserialize;
 
+use super::Line;
 use crate::hex::Hex;
 use crate::row::{Fault, Row, Verdict, each, same};
 
@@ -94,5 +96,89 @@ pub(super) fn sync_startup(rows: &[Row]) -> Vec<Verdict> {
         same("extra_edge", &row.extra_edge, &Some(Hex(start.extra_edge.into())))?;
         same("cycles_used", &row.cycles_used, &Some(start.cycles_used))?;
         same("cycles_dropped", &row.cycles_dropped, &Some(start.cycles_dropped))
+    })
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct FwSync {
+    period_cycles: u32,
+    cycles_per_bit: u32,
+    es: u8,
+    startup: FwStartup,
+    /// Of the firmware's own run.
+    #[serde(rename = "qm")]
+    _qm: Hex,
+    resets: u32,
+    columns: Vec<String>,
+    frames: Vec<FwFrame>,
+}
+
+#[derive(Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct FwStartup {
+    extra_size: u32,
+    time_rest: u8,
+    stuffing: u32,
+    extra_remainder: u32,
+    stuffing_remainder: u32,
+}
+
+/// Stuffing blocks before, edge in eighths, equalisation, PARA, edge minus pulse in cycles.
+type FwFrame = (u8, u8, Line, Line, i64);
+
+/// The equalisation goes by the nominal window, PARA gives IDLE with FIRST.
+fn fw_head(frame: &FwFrame, nominal: u32) -> Result<bool, Fault> {
+    let byte = ParameterByte::decode(frame.3.word());
+    let byte = byte.ok_or_else(|| Fault::Unreadable("PARA is in no table".to_owned()))?;
+    same("symbol, FIRST", &(Ok(MasterSymbol::Idle), true), &(byte.symbol(), byte.first()))?;
+    let disparity = LineDisparity::ZERO.with_ones(nominal as u8);
+    same("equalisation", &(frame.2.bits as u8), &disparity.equalisation().0)?;
+    Ok(byte.msync())
+}
+
+/// How much later the edge is than one frame before, against the pulse, as the frame's length says.
+fn fw_spacing(from: &FwFrame, to: &FwFrame, cycles: i64, period: i64) -> Result<i64, Fault> {
+    let extra = |edge| Extra::new(edge).ok_or_else(|| Fault::Unreadable(format!("edge {edge}")));
+    let (before, after) = (extra(from.1)?, extra(to.1)?);
+    let rest = i64::from(before.bits()) * 8 - i64::from(before.edge());
+    let eighths = rest + i64::from(H_FRAME_BITS) * 8 + 48 * i64::from(to.0) + i64::from(after.edge());
+    Ok(eighths * cycles - period)
+}
+
+pub(super) fn fw_sync(rows: &[Row]) -> Vec<Verdict> {
+    each(rows, |row: FwSync| {
+        let columns = ["stuffing_blocks_before", "edge_eighths_after_window_start", "equalisation", "para"];
+        let columns = [&columns[..], &["edge_minus_pulse_cycles"]].concat();
+        same("columns", &row.columns.iter().map(String::as_str).collect(), &columns)?;
+        same("resets", &0, &row.resets)?;
+        let clock = clock(row.cycles_per_bit)?;
+        let start = Startup::new(row.period_cycles, clock, es(row.es)?);
+        let start = start.map_err(|e| Fault::Unreadable(e.to_string()))?;
+        let got = FwStartup {
+            extra_size: start.extra_size,
+            time_rest: start.time_rest,
+            stuffing: start.stuffing,
+            extra_remainder: start.extra_remainder,
+            stuffing_remainder: start.stuffing_remainder,
+        };
+        same("startup", &row.startup, &got)?;
+        let mut msync = Vec::new();
+        for frame in &row.frames {
+            msync.push(fw_head(frame, start.extra_size)?);
+        }
+        let runs: Vec<usize> = msync.chunk_by(|a, b| a == b).map(<[bool]>::len).collect();
+        if let [first, inner @ .., last] = runs.as_slice() {
+            let whole = inner.iter().all(|run| *run == 8) && *first <= 8 && *last <= 8;
+            same("MSYNC changes every 8 frames", &true, &whole)?;
+        }
+        for (from, to) in row.frames.iter().zip(row.frames.iter().skip(1)) {
+            let cycles = i64::from(clock.cycles_per_eighth());
+            let want = fw_spacing(from, to, cycles, row.period_cycles.into())?;
+            // The firmware takes two, sometimes one cycle more for a frame.
+            let overhead = (to.4 - from.4) - want;
+            same("edge spacing within the firmware's overhead", &true, &matches!(overhead, 1 | 2))?;
+        }
+        Ok(())
     })
 }
