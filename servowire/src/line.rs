@@ -111,8 +111,12 @@ impl fmt::Display for Stop {
     }
 }
 
-/// Changes looked at before decoding begins.
+/// Changes looked at before decoding begins, if every channel that moves has enough of them by then.
 const PREVIEW: usize = 1 << 16;
+/// Enough changes of a channel to judge it.
+const ENOUGH: usize = 1 << 8;
+/// Changes looked at when a channel moves seldom beside a busy one.
+const LONGEST_PREVIEW: usize = 1 << 20;
 
 /// Decodes a capture of a start-stop protocol. `make` builds the decoder for a bit length in picoseconds.
 pub fn decode<P: StartStop>(
@@ -185,9 +189,22 @@ impl Preview {
     }
 
     fn read(line: &mut dyn Line) -> Self {
-        let mut changes = Vec::new();
+        let mut changes: Vec<Change> = Vec::new();
         let (mut more, mut fault) = (true, None);
-        while more && changes.len() < PREVIEW {
+        let mut counts = vec![0_usize; line.channels().len()];
+        let mut counted = 0;
+        loop {
+            for change in changes.iter().skip(counted) {
+                if let Some(count) = counts.get_mut(usize::from(change.channel)) {
+                    *count += 1;
+                }
+            }
+            counted = changes.len();
+            // The first change of a channel is only its level at the beginning.
+            let judged = counts.iter().all(|count| *count <= 1 || *count >= ENOUGH);
+            if !more || counted >= if judged { PREVIEW } else { LONGEST_PREVIEW } {
+                break;
+            }
             match line.read(&mut changes) {
                 Ok(again) => more = again,
                 Err(e) => (more, fault) = (false, Some(e)),

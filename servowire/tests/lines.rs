@@ -134,6 +134,23 @@ fn the_channel_that_decodes_is_taken() {
     assert_eq!(run.out, other.out);
 }
 
+/// 64 edges of a clock for one of the line.
+#[test]
+fn a_busy_channel_beside_the_line() {
+    let bench = Bench::new();
+    let mut wave = good_traffic(2.5e6);
+    wave.idle_us(30_000.0);
+    for k in 0..10 {
+        wave.exchange(&[0x1a], &id3(k, 0, 0));
+    }
+    let line = wave.samples(40e6);
+    let raw: Vec<u8> = line.iter().enumerate().map(|(k, &s)| (k % 2) as u8 | u8::from(s) << 5).collect();
+    let run = bench.decode("a.raw", raw, &["--json", "--rate", "40M"]);
+    run.is_good();
+    assert_eq!(run.json().len(), GOOD_FRAMES + 20);
+    assert!(run.err.contains("channel \"5\""), "{}", run.err);
+}
+
 /// A recording that was started and stopped inside a frame is not a fault of the line.
 #[test]
 fn recordings_cut_at_both_ends() {

@@ -53,7 +53,7 @@ fn text_of_frames_that_do_not_pair() {
         run.out
     );
     assert!(run.out.contains("REFUSED rejected: the encoder refused the request"), "{}", run.out);
-    assert!(run.out.contains("REFUSED parity: "), "{}", run.out);
+    assert!(run.out.contains("REFUSED parity in CF bit 8 at "), "{}", run.out);
 }
 
 /// The VCD is read back: the same line, and beside it the strings at the times of the frames.
