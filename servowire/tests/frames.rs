@@ -197,6 +197,18 @@ fn answers_alone() {
     assert!(run.json().iter().all(|e| e["direction"] == "answer" && e.get("delay_ps").is_none()), "{}", run.out);
 }
 
+/// Nothing is passed over: what follows an answer without a pause is a frame of its own.
+#[test]
+fn fields_behind_an_answer() {
+    let run = decode(|wave| {
+        wave.exchange(&[0x02], &[&id0(9)[..], &[0x55, 0x66]].concat());
+        wave.send(&[&id3(7, 0, 0)[..], &[0x55, 0x66]].concat()).idle_us(40.0);
+    });
+    assert_eq!(run.verdicts(), ["ok", "ok", "sink_code", "ok", "sink_code"]);
+    let log = Bench::new().decode("a.txt", "02 02 20 B4 BD 1C 37 55 66\n", &["--bytes", "--json"]);
+    assert_eq!(log.verdicts(), ["ok", "ok", "sink_code", "sink_code"]);
+}
+
 /// Pauses between the fields of an answer, as a UART makes them.
 #[test]
 fn pauses_inside_frames() {

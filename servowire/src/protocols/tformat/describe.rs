@@ -4,7 +4,8 @@ use std::borrow::Cow;
 
 use tformat::{Adf, Almc, DataId, Error, ErrorClass, Full, Memory, Profile, Request, Response, StatusField, U24};
 
-use super::{ANSWER_TIMEOUT, Frame, Settings};
+use super::frame::Frame;
+use super::{ANSWER_TIMEOUT, Settings};
 use crate::event::{Direction, Event, Field, Place, Position, Refusal, Value, Verdict};
 
 /// The fields an event may have.
