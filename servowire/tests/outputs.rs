@@ -121,7 +121,7 @@ fn statistics() {
     let run = common::decode(&file, &["--stats", "--jump", "1000"]);
     assert_eq!(run.code, 1);
     for line in [
-        "  frames        12 requests, 12 answers, 0 others",
+        "  frames        12 requests, 11 answers, 0 others",
         "  verdicts      22 ok, 2 refused",
         "    crc               1",
         "    no_response       1",

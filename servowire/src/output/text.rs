@@ -71,9 +71,7 @@ impl<W: Write> Sink for Text<W> {
     fn event(&mut self, event: &Event) -> io::Result<()> {
         match event.direction {
             Some(Direction::Answer) => match self.held.take() {
-                Some(request) if event.kind == request.kind || event.fields.is_empty() => {
-                    self.print(event, request.place, "<>")
-                }
+                Some(request) if event.kind == request.kind => self.print(event, request.place, "<>"),
                 held => {
                     self.held = held;
                     self.release()?;

@@ -6,7 +6,7 @@ use tformat::{Adf, Almc, DataId, Error, ErrorClass, Full, Memory, Profile, Reque
 
 use super::frame::Frame;
 use super::{ANSWER_TIMEOUT, Settings};
-use crate::event::{Direction, Event, Field, Place, Position, Refusal, Value, Verdict};
+use crate::event::{Direction, Event, Field, NO_RESPONSE, Place, Position, Refusal, Value, Verdict};
 
 /// The fields an event may have.
 pub const FIELDS: &[&str] =
@@ -163,14 +163,8 @@ pub(super) fn silence(request: Request, place: Place, now: i64) -> Event {
         Place::Line(_) => (place, "no answer before the next request".to_owned()),
     };
     let cause = "only the request is on the line: no encoder, A and B exchanged, or not its bit rate";
-    let refusal = Refusal {
-        class: class(ErrorClass::NoResponse),
-        reason,
-        field: None,
-        bit: None,
-        time: None,
-        cause: Some(cause.to_owned()),
-    };
+    let refusal =
+        Refusal { class: NO_RESPONSE, reason, field: None, bit: None, time: None, cause: Some(cause.to_owned()) };
     Event {
         place,
         direction: Some(Direction::Answer),
@@ -327,7 +321,7 @@ fn class(class: ErrorClass) -> &'static str {
         ErrorClass::Crc => "crc",
         ErrorClass::AddressMismatch => "address_mismatch",
         ErrorClass::DataMismatch => "data_mismatch",
-        ErrorClass::NoResponse => "no_response",
+        ErrorClass::NoResponse => NO_RESPONSE,
         _ => "other",
     }
 }
