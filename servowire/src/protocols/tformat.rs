@@ -260,7 +260,7 @@ impl StartStop for Decoder {
             let request = self.pending.is_none()
                 && self.open.data_id().is_ok_and(|id| self.open.fields == usize::from(id.request_fields()));
             if recent && !request {
-                return out.event(&describe::cut(self.open.place(), "the capture ends inside a frame"));
+                return out.event(&describe::cut_off(self.open.place()));
             }
             self.close(out)?;
         }

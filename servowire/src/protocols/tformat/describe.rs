@@ -152,6 +152,14 @@ pub(super) fn cut(place: Place, what: &str) -> Event {
     }
 }
 
+/// A piece of a frame at the end of the capture: what comes then is not known, so it is not sound.
+pub(super) fn cut_off(place: Place) -> Event {
+    let reason = "the capture ends inside a frame".to_owned();
+    let cause = Some("the file was cut off, or recording stopped there".to_owned());
+    let refusal = Refusal { class: "truncated", reason, field: None, bit: None, time: None, cause };
+    Event { fields: Vec::new(), verdict: Verdict::Refused(Box::new(refusal)), ..cut(place, "") }
+}
+
 /// No answer came to the request at `place` until `now`.
 pub(super) fn silence(request: Request, place: Place, now: i64) -> Event {
     let (place, reason) = match place {
