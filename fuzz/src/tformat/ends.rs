@@ -56,10 +56,10 @@ pub fn master(mut data: &[u8]) {
 }
 
 /// A procedure of the master against an encoder on a line that loses and damages answers: it ends after a bounded number
-/// of requests, keeps the spacing, and what it reads is what the encoder has.
+/// of requests, and when it says that it is done, the encoder is as it should be.
 ///
 /// ```text
-/// 0  procedure      1  address      2  data      3  page      4  tries      5..  a fault an answer, 0: none
+/// 0  procedure      1  address      2  data      3  page      4  tries      5..  two bytes a fault, 0: none
 /// ```
 pub fn device(mut data: &[u8]) {
     let (procedure, address, value) = (byte(&mut data), byte(&mut data), byte(&mut data));
@@ -71,17 +71,21 @@ pub fn device(mut data: &[u8]) {
     line.encoder.set_alarm(Alarm::CountingError, true);
     line.encoder.set_alarm(Alarm::CountingError, false);
     match procedure % 5 {
-        0 => drop(line.reset(Reset::clear_errors()).inspect(|()| assert_eq!(line.encoder.almc().raw(), 0))),
-        1 => drop(line.reset(Reset::clear_turns_and_errors())),
-        2 => drop(line.reset(Reset::set_single_turn_zero_and_shift_commutation_angle())),
+        0 => {
+            let done = line.reset(Reset::clear_errors());
+            assert!(!done || line.encoder.almc().raw() == 0);
+        }
+        1 => _ = line.reset(Reset::clear_turns_and_errors()),
+        2 => _ = line.reset(Reset::set_single_turn_zero_and_shift_commutation_angle()),
         3 => {
             let written = line.access(EepromAccess::write(Some(page), address, value, polling), polling);
+            // The encoder has six pages and keeps the one it has when another is named.
             if written.is_ok() && address != Address::PAGE_REGISTER && line.encoder.page() == page.0 {
                 let cells = line.encoder.eeprom_mut()[usize::from(page.0)];
                 assert_eq!(cells[usize::from(address.get())], value);
             }
         }
-        _ => drop(line.access(EepromAccess::read(None, address, polling), polling)),
+        _ => _ = line.access(EepromAccess::read(None, address, polling), polling),
     }
 }
 
@@ -98,7 +102,8 @@ impl<'a> Simulated<'a> {
         Self { encoder: Device::new(0x17, BitRate::Mbit2_5), faults, now_ns: 1_000_000, requests: 0 }
     }
 
-    fn reset(&mut self, mut reset: Reset) -> Option<()> {
+    /// Whether the reset came to its end.
+    fn reset(&mut self, mut reset: Reset) -> bool {
         let mut step = reset.start(self.now_ns);
         while let Step::Send { request, not_before_ns } = step {
             assert_eq!(request.data_id(), reset.data_id());
@@ -106,9 +111,10 @@ impl<'a> Simulated<'a> {
             step = reset.answer(outcome, self.now_ns);
             assert!(self.requests <= u32::from(Reset::MAX_REFUSED) * u32::from(Reset::REQUESTS));
         }
-        matches!(step, Step::Done { .. }).then_some(())
+        matches!(step, Step::Done { .. })
     }
 
+    /// The byte that was read or written.
     fn access(&mut self, mut access: EepromAccess, polling: Polling) -> Result<u8, Error> {
         let mut step = access.start(self.now_ns);
         loop {
