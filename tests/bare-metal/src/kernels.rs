@@ -7,6 +7,7 @@
 mod deliberate_panic;
 mod nrz_line;
 mod tformat;
+mod tformat_ends;
 
 /// An entry point that is measured and walked.
 pub(crate) struct Kernel {
@@ -19,6 +20,7 @@ pub(crate) struct Kernel {
 pub(crate) const ALL: &[&[Kernel]] = &[
     nrz_line::KERNELS,
     tformat::KERNELS,
+    tformat_ends::KERNELS,
     #[cfg(feature = "deliberate-panic")]
     deliberate_panic::KERNELS,
 ];
