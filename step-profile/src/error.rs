@@ -4,6 +4,7 @@
 /// speed too high, speed too low, initial sync_time.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]
 pub enum Error {
     /// A ramp entry has to last one step at least.
@@ -84,6 +85,47 @@ pub enum Error {
     /// No motor is selected to move.
     #[error("no motor is selected")]
     NoMotor,
+}
+
+/// The kind of an [`Error`], for counters and statistics.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[non_exhaustive]
+#[allow(missing_docs, reason = "each stands for the error of the same name")]
+pub enum ErrorClass {
+    ZeroSegmentLength,
+    SegmentTooLong,
+    StepRateTooHigh,
+    StepTimeOverflow,
+    SyncTimeOutOfRange,
+    InvalidRampTable,
+    InvalidMotorMask,
+    InvalidMicrostep,
+    InvalidMode,
+    FrequencyTooLow,
+    Moving,
+    NoMotor,
+}
+
+impl Error {
+    /// The kind of this error.
+    pub const fn class(self) -> ErrorClass {
+        match self {
+            Self::ZeroSegmentLength => ErrorClass::ZeroSegmentLength,
+            Self::SegmentTooLong { .. } => ErrorClass::SegmentTooLong,
+            Self::StepRateTooHigh { .. } => ErrorClass::StepRateTooHigh,
+            Self::StepTimeOverflow { .. } => ErrorClass::StepTimeOverflow,
+            Self::SyncTimeOutOfRange { .. } => ErrorClass::SyncTimeOutOfRange,
+            Self::InvalidRampTable { .. } => ErrorClass::InvalidRampTable,
+            Self::InvalidMotorMask { .. } => ErrorClass::InvalidMotorMask,
+            Self::InvalidMicrostep { .. } => ErrorClass::InvalidMicrostep,
+            Self::InvalidMode { .. } => ErrorClass::InvalidMode,
+            Self::FrequencyTooLow => ErrorClass::FrequencyTooLow,
+            Self::Moving => ErrorClass::Moving,
+            Self::NoMotor => ErrorClass::NoMotor,
+        }
+    }
 }
 
 #[cfg(test)]

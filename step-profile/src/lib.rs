@@ -24,7 +24,7 @@ mod tone;
 pub use arithmetic::{Arithmetic, CYCLE_NS, Interval, StepTime, corrected, step_time_ns};
 pub use axis::{Axes, Axis, Command, Direction};
 pub use dance::{Dance, Note};
-pub use error::Error;
+pub use error::{Error, ErrorClass};
 pub use frequency::{Frequency, Speed};
 pub use group::{Group, Motors};
 pub use microstep::{Microstep, Turn};
