@@ -21,6 +21,7 @@ pub enum Arithmetic {
 
 impl Arithmetic {
     /// The time of a step at ramp entry `entry` and speed constant `speed`, split at the cycle.
+    #[inline]
     pub const fn interval(self, entry: u32, speed: u32) -> Interval {
         let t_step = step_time_ns(entry, speed);
         match self {
@@ -58,6 +59,7 @@ pub struct Interval {
 
 impl Interval {
     /// The pulse that comes this long after one with sync_time `prev`.
+    #[inline]
     pub const fn after(self, prev: u32) -> StepTime {
         let sync = prev.wrapping_add(self.rest);
         if sync >= CYCLE_NS {
@@ -72,6 +74,7 @@ impl Interval {
 ///
 /// `entry` is 1000 / sin², `speed` is 2^16 / f\[MHz\]. Bits above 2^48 of the product are dropped, as on the PRU.
 #[expect(clippy::cast_possible_truncation, reason = "the PRU takes 32 bits out of the middle of the product")]
+#[inline]
 pub const fn step_time_ns(entry: u32, speed: u32) -> u32 {
     ((entry as u64).wrapping_mul(speed as u64) >> 16) as u32
 }
@@ -88,10 +91,12 @@ pub const fn step_time_ns(entry: u32, speed: u32) -> u32 {
 /// // The PRU takes 1526 for the quotient, wraps below zero and never comes back.
 /// assert_eq!(pru_exact::interval(6_103_999).after(0).sync, 4_294_963_295);
 /// ```
+#[inline]
 pub const fn corrected(t_step: u32, prev: u32) -> StepTime {
     split(t_step, 0).after(prev)
 }
 
+#[inline]
 const fn split(t_step: u32, fraction: u32) -> Interval {
     Interval { cnt: t_step / CYCLE_NS, rest: t_step % CYCLE_NS, fraction }
 }

@@ -57,11 +57,13 @@ pub const fn run(entry: u32, speed: u32, prev: u32) -> Registers {
 }
 
 /// The two results alone.
+#[inline]
 pub const fn step(entry: u32, speed: u32, prev: u32) -> StepTime {
     interval(step_time_ns(entry, speed)).after(prev)
 }
 
 /// A step time as whole cycles and the rest; the rest wraps below zero where the quotient is one too large.
+#[inline]
 pub const fn interval(t_step: u32) -> Interval {
     let cnt = ((t_step as u64).wrapping_mul(RECIPROCAL as u64) >> 32) as u32;
     Interval { cnt, rest: t_step.wrapping_sub(cnt.wrapping_mul(CYCLE_NS)), fraction: 0 }
