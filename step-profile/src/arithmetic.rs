@@ -59,6 +59,8 @@ pub struct Interval {
 
 impl Interval {
     /// The pulse that comes this long after one with sync_time `prev`.
+    ///
+    /// [`Arithmetic::Carried`] drops its fraction here; [`Steps`](crate::Steps) is what carries it on.
     #[inline]
     pub const fn after(self, prev: u32) -> StepTime {
         let sync = prev.wrapping_add(self.rest);
@@ -137,7 +139,7 @@ mod tests {
     }
 
     #[test]
-    #[ignore = "2^32 step times, 15 s in a release build: cargo test --release -p step-profile -- --ignored"]
+    #[ignore = "2^32 step times, 5 s: cargo test --release -p step-profile --lib -- --ignored every_step_time"]
     fn every_step_time() {
         let mut too_large = 0_u32;
         let mut largest_deficit = 0;

@@ -148,6 +148,11 @@ impl<'t> Group<'t> {
     pub const fn positions(&self) -> [i64; 4] {
         self.positions
     }
+
+    /// Declares where the motors are, at a reference for instance.
+    pub fn set_positions(&mut self, positions: [i64; 4]) {
+        self.positions = positions;
+    }
 }
 
 #[cfg(test)]
@@ -191,6 +196,8 @@ mod tests {
             group.tick();
         }
         assert_eq!((group.positions(), group.motors()), ([2, 0, 5, 0], Motors::M1));
+        group.set_positions([0; 4]);
+        assert_eq!(group.positions(), [0; 4]);
         group.start(profile, 3, Direction::Reverse).unwrap();
         group.abort();
         assert_eq!(group.state(), MoveState::Idle);

@@ -130,6 +130,11 @@ impl<'t> PositionMode<'t> {
         }
     }
 
+    /// Declares where the motors are: what a turn to the reference position is made for.
+    pub fn set_positions(&mut self, positions: [i64; 4]) {
+        self.group.set_positions(positions);
+    }
+
     /// The motors: selection, positions, ramp state.
     pub const fn group(&self) -> &Group<'t> {
         &self.group
@@ -176,6 +181,7 @@ mod tests {
             mode.abort();
             mode.tick();
             assert_eq!((mode.state(), mode.group().positions()), (PositionState::Wait, [0; 4]));
+            mode.set_positions([0; 4]);
             for _ in 0..PositionMode::REST {
                 mode.tick();
             }
