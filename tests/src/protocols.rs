@@ -1,13 +1,14 @@
 //! Which topics there are. A new protocol is one file here and one line in [`ALL`].
 
 mod step_profile;
+mod tformat;
 
 use crate::row::Check;
 
 /// A protocol's folder name and its topics.
 type Protocol = (&'static str, &'static [(&'static str, Check)]);
 
-const ALL: &[Protocol] = &[("step-profile", step_profile::TOPICS)];
+const ALL: &[Protocol] = &[("step-profile", step_profile::TOPICS), ("tformat", tformat::TOPICS)];
 
 /// Topics whose rows cannot be checked yet: protocol, topic, what they wait for.
 const PENDING: &[(&str, &str, &str)] = &[
