@@ -28,38 +28,42 @@ const CASES: [Case; 3] = [
     Case { name: "shortest ramps alone, 64 steps, ramps of 32", steps: 64, ramp: 32 },
 ];
 
+type Move = fn(&Case) -> u64;
+
+const MOVES: [(&str, Move); 5] = [
+    ("step-profile, steps", corrected),
+    ("step-profile, one axis by the cycle", axis),
+    ("ramp-maker, f32", ramp_maker_f32),
+    ("ramp-maker, 32.32 fixed point", ramp_maker_fixed),
+    ("stepgen", stepgen),
+];
+
 fn main() {
     for case in &CASES {
         println!("{}", case.name);
-        let ours = rate(|| corrected(case));
-        line("step-profile, steps", ours, ours);
-        line("step-profile, one axis by the cycle", rate(|| axis(case)), ours);
-        line("ramp-maker, f32", rate(|| ramp_maker_f32(case)), ours);
-        line("ramp-maker, 32.32 fixed point", rate(|| ramp_maker_fixed(case)), ours);
-        line("stepgen", rate(|| stepgen(case)), ours);
+        // In turn, so that whatever else the machine does meets all of them.
+        let mut rates = [0.0; MOVES.len()];
+        for _ in 0..15 {
+            for (best, (_, whole_move)) in rates.iter_mut().zip(MOVES) {
+                *best = f64::max(*best, rate(|| whole_move(case)));
+            }
+        }
+        let [ours, ..] = rates;
+        for (rate, (name, _)) in rates.iter().zip(MOVES) {
+            let (millions, ns, ratio) = (rate / 1e6, 1e9 / rate, ours / rate);
+            println!("  {name:<38}{millions:>8.1} million steps/s{ns:>8.2} ns a step{ratio:>8.2} times as long");
+        }
     }
 }
 
-fn line(name: &str, rate: f64, ours: f64) {
-    println!(
-        "  {name:<38}{:>8.1} million steps/s{:>8.2} ns a step{:>8.2} times as long",
-        rate / 1e6,
-        1e9 / rate,
-        ours / rate
-    );
-}
-
-/// Steps a second, the best of nine rounds of 100 ms.
-fn rate(mut move_once: impl FnMut() -> u64) -> f64 {
-    let round = |_| {
-        let begin = Instant::now();
-        let mut steps = 0;
-        while begin.elapsed() < Duration::from_millis(100) {
-            steps += move_once();
-        }
-        steps as f64 / begin.elapsed().as_secs_f64()
-    };
-    (0..9).map(round).fold(0.0, f64::max)
+/// Steps a second over 50 ms.
+fn rate(whole_move: impl Fn() -> u64) -> f64 {
+    let begin = Instant::now();
+    let mut steps = 0;
+    while begin.elapsed() < Duration::from_millis(50) {
+        steps += whole_move();
+    }
+    steps as f64 / begin.elapsed().as_secs_f64()
 }
 
 fn profile(case: &Case) -> Profile<'static> {

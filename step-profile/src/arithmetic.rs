@@ -64,10 +64,9 @@ impl Interval {
     #[inline]
     pub const fn after(self, prev: u32) -> StepTime {
         let sync = prev.wrapping_add(self.rest);
-        if sync >= CYCLE_NS {
-            StepTime { cnt: self.cnt.wrapping_add(1), sync: sync.wrapping_sub(CYCLE_NS) }
-        } else {
-            StepTime { cnt: self.cnt, sync }
+        match sync.checked_sub(CYCLE_NS) {
+            Some(sync) => StepTime { cnt: self.cnt.wrapping_add(1), sync },
+            None => StepTime { cnt: self.cnt, sync },
         }
     }
 }
@@ -83,8 +82,7 @@ pub const fn step_time_ns(entry: u32, speed: u32) -> u32 {
 
 /// The pulse that comes `t_step` ns after one with sync_time `prev`, by true division.
 ///
-/// Exact for every `t_step` and every `prev` below 4000: `cnt * 4000 + sync == prev + t_step` and `sync < 4000`.
-/// A `prev` of 4000 or more is brought one cycle nearer, as the PRU does, and no further.
+/// Exact for every pair: `cnt * 4000 + sync == prev + t_step` and `sync < 4000`.
 ///
 /// ```
 /// use step_profile::{corrected, pru_exact};
@@ -95,7 +93,17 @@ pub const fn step_time_ns(entry: u32, speed: u32) -> u32 {
 /// ```
 #[inline]
 pub const fn corrected(t_step: u32, prev: u32) -> StepTime {
-    split(t_step, 0).after(prev)
+    match t_step.checked_add(prev) {
+        Some(sum) => StepTime { cnt: sum / CYCLE_NS, sync: sum % CYCLE_NS },
+        None => corrected_wide(t_step, prev),
+    }
+}
+
+/// The sum has 33 bits: 2^32 ns are 1073741 cycles and 3296 ns, the rest is what wrapping leaves.
+#[cold]
+const fn corrected_wide(t_step: u32, prev: u32) -> StepTime {
+    let StepTime { cnt, sync } = split(t_step.wrapping_add(prev), 0).after(3296);
+    StepTime { cnt: cnt.wrapping_add(1_073_741), sync }
 }
 
 #[inline]
@@ -160,12 +168,22 @@ mod tests {
         assert_eq!((too_large, largest_deficit), (377_419_962, 703));
     }
 
+    /// Any number, and every other time one near the end.
+    fn whole_range() -> impl Strategy<Value = u32> {
+        prop_oneof![any::<u32>(), u32::MAX - 8000..=u32::MAX]
+    }
+
     proptest! {
         #[test]
-        fn corrected_is_true_division(t: u32, prev in 0..4000_u32) {
+        fn corrected_is_true_division(t in whole_range(), prev in whole_range()) {
             let StepTime { cnt, sync } = corrected(t, prev);
             prop_assert!(sync < 4000);
             prop_assert_eq!(u64::from(cnt) * 4000 + u64::from(sync), u64::from(prev) + u64::from(t));
+        }
+
+        #[test]
+        fn an_interval_is_corrected_too(t in whole_range(), prev in 0..4000_u32) {
+            prop_assert_eq!(split(t, 0).after(prev), corrected(t, prev));
         }
 
         #[test]

@@ -1,4 +1,4 @@
-use crate::{Error, MoveState, Profile, Step, Steps};
+use crate::{Error, MoveState, Profile, Steps};
 
 /// The DIR signal of a stepper driver.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
@@ -59,7 +59,7 @@ pub enum Command {
     Pulse {
         /// DIR.
         direction: Direction,
-        /// Start of the pulse in its cycle in ns, 0..=3999; see [`Step::sync_time`].
+        /// Start of the pulse in its cycle in ns, 0..=3999; see [`Step::sync_time`](crate::Step::sync_time).
         sync_time: u32,
     },
 }
@@ -78,8 +78,8 @@ pub enum Command {
 #[derive(Debug, Clone, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Axis<'t> {
-    /// The step whose pulse comes next, and those behind it.
-    ahead: Option<(Step, Steps<'t>)>,
+    /// The move; the last step taken of it is the one whose pulse comes next.
+    steps: Option<Steps<'t>>,
     /// Cycles before the cycle of that pulse.
     wait: u32,
     direction: Direction,
@@ -89,7 +89,7 @@ pub struct Axis<'t> {
 impl<'t> Axis<'t> {
     /// An axis at rest at position 0, DIR = 0.
     pub const fn new() -> Self {
-        Self { ahead: None, wait: 0, direction: Direction::Forward, position: 0 }
+        Self { steps: None, wait: 0, direction: Direction::Forward, position: 0 }
     }
 
     /// Starts a move of `steps` steps. The next [`tick`](Self::tick) is cycle 0 of the move.
@@ -99,14 +99,14 @@ impl<'t> Axis<'t> {
     /// # Errors
     /// [`Error::Moving`] while a move is under way.
     pub fn start(&mut self, profile: Profile<'t>, steps: u32, direction: Direction) -> Result<(), Error> {
-        if self.ahead.is_some() {
+        if self.steps.is_some() {
             return Err(Error::Moving);
         }
         let mut steps = profile.steps(steps);
-        if let Some(first) = steps.next() {
+        if let Some(first) = steps.advance() {
             self.wait = first.cnt;
             self.direction = direction;
-            self.ahead = Some((first, steps));
+            self.steps = Some(steps);
         }
         Ok(())
     }
@@ -115,19 +115,16 @@ impl<'t> Axis<'t> {
     #[inline]
     pub fn tick(&mut self) -> Command {
         let direction = self.direction;
-        let Some((step, rest)) = &mut self.ahead else { return Command::Hold { direction } };
+        let Some(steps) = &mut self.steps else { return Command::Hold { direction } };
         if let Some(wait) = self.wait.checked_sub(1) {
             self.wait = wait;
             return Command::Hold { direction };
         }
-        let sync_time = step.sync_time;
-        match rest.next() {
-            Some(next) => {
-                // The tick that follows is one cycle on.
-                self.wait = next.cnt.saturating_sub(1);
-                *step = next;
-            }
-            None => self.ahead = None,
+        let sync_time = steps.sync_time();
+        match steps.advance() {
+            // The tick that follows is one cycle on.
+            Some(next) => self.wait = next.cnt.saturating_sub(1),
+            None => self.steps = None,
         }
         self.position = direction.advance(self.position);
         Command::Pulse { direction, sync_time }
@@ -138,15 +135,15 @@ impl<'t> Axis<'t> {
     /// The step whose interval has begun keeps its time, since the motor may be anywhere in it; the steps after it
     /// slow down ([`Steps::abort`]). Before the first pulse nothing has moved, and the move ends at once.
     pub fn abort(&mut self) {
-        match &mut self.ahead {
-            Some((step, rest)) if step.index > 0 => rest.abort(),
-            _ => self.ahead = None,
+        match &mut self.steps {
+            Some(steps) if steps.taken() > 1 => steps.abort(),
+            _ => self.steps = None,
         }
     }
 
     /// What the axis is doing: the state of the step under way.
     pub fn state(&self) -> MoveState {
-        self.ahead.as_ref().map_or(MoveState::Idle, |(step, _)| step.state)
+        self.steps.as_ref().map_or(MoveState::Idle, Steps::state)
     }
 
     /// DIR, as held since the last move began.

@@ -108,6 +108,37 @@ impl<'t> Steps<'t> {
         self.down_from = self.down_from.min(self.index);
     }
 
+    /// Steps taken.
+    pub(crate) const fn taken(&self) -> u32 {
+        self.index
+    }
+
+    /// sync_time of the last step taken.
+    pub(crate) const fn sync_time(&self) -> u32 {
+        self.sync
+    }
+
+    /// State of the last step taken.
+    pub(crate) const fn state(&self) -> MoveState {
+        self.state_of(self.index.saturating_sub(1))
+    }
+
+    /// Takes a step. The cycle is counted by [`Iterator::next`] alone; an axis knows it anyway.
+    #[inline]
+    pub(crate) fn advance(&mut self) -> Option<StepTime> {
+        if self.left == 0 {
+            let run = self.runs.next()?;
+            self.begin(run);
+        }
+        let fraction = self.fraction.wrapping_add(self.interval.fraction);
+        self.fraction = fraction & 0xffff;
+        let time = self.interval.after(self.sync.wrapping_add(fraction >> 16));
+        self.sync = time.sync;
+        self.left = self.left.saturating_sub(1);
+        self.index = self.index.saturating_add(1);
+        Some(time)
+    }
+
     fn begin(&mut self, run: Run) {
         let parameters = self.profile.parameters();
         self.entry = run.entry;
@@ -116,10 +147,10 @@ impl<'t> Steps<'t> {
         self.interval = parameters.arithmetic.interval(parameters.table.entry(run.entry), parameters.speed.raw());
     }
 
-    const fn state(&self) -> MoveState {
-        if self.index < self.constant_from {
+    const fn state_of(&self, index: u32) -> MoveState {
+        if index < self.constant_from {
             MoveState::RampUp
-        } else if self.index < self.down_from {
+        } else if index < self.down_from {
             MoveState::Constant
         } else {
             MoveState::RampDown
@@ -132,27 +163,18 @@ impl Iterator for Steps<'_> {
 
     #[inline]
     fn next(&mut self) -> Option<Step> {
-        if self.left == 0 {
-            let run = self.runs.next()?;
-            self.begin(run);
-        }
-        let fraction = self.fraction.wrapping_add(self.interval.fraction);
-        self.fraction = fraction & 0xffff;
-        let StepTime { cnt, sync } = self.interval.after(self.sync.wrapping_add(fraction >> 16));
-        self.sync = sync;
+        let index = self.index;
+        let StepTime { cnt, sync } = self.advance()?;
         self.cycle = self.cycle.wrapping_add(u64::from(cnt));
-        let step = Step {
-            index: self.index,
+        Some(Step {
+            index,
             entry: self.entry,
-            state: self.state(),
+            state: self.state_of(index),
             t_step: self.t_step,
             cnt,
             cycle: self.cycle,
             sync_time: sync,
-        };
-        self.left = self.left.saturating_sub(1);
-        self.index = self.index.saturating_add(1);
-        Some(step)
+        })
     }
 
     fn size_hint(&self) -> (usize, Option<usize>) {

@@ -11,7 +11,7 @@ pub(crate) fn tables(rows: &dyn Fn(&str) -> Vec<Value>) -> String {
     let steps = [rows("step_trace"), rows("step_trace_edge")].concat();
     let moves = rows("profile");
     [
-        table("STEPS: &[Traced]", &steps, traced),
+        table("TRACES: &[Traced]", &steps, traced),
         table("MOVES: &[Move]", moves.iter().filter(|row| number(row, "n") <= LONGEST), whole),
     ]
     .concat()

@@ -9,7 +9,7 @@ use super::{Tally, Topic, each};
 pub(crate) struct Traced {
     why: &'static str,
     /// Ramp entry, speed constant, previous sync_time.
-    pub(crate) given: [u32; 3],
+    given: [u32; 3],
     want: Registers,
     /// The PRU's result is the true one.
     exact: bool,
@@ -18,7 +18,7 @@ pub(crate) struct Traced {
 /// A row of `profile.jsonl`.
 pub(crate) struct Move {
     name: &'static str,
-    pub(crate) steps: u32,
+    steps: u32,
     per_entry: u32,
     speed: u32,
     init_sync: u32,
@@ -32,7 +32,7 @@ pub(crate) const TOPICS: &[Topic] = &[("step-profile/step_trace", steps), ("step
 
 fn steps() -> Tally {
     each(
-        STEPS,
+        TRACES,
         |row| row.why,
         |row| {
             let [entry, speed, prev] = row.given;
