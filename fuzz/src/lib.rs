@@ -5,6 +5,7 @@
 //! [`TARGETS`], a file in `fuzz_targets/` and its `[[bin]]`, and seeds from `examples/seed_corpus.rs`.
 
 pub mod nrz_line;
+pub mod step_profile;
 pub mod tformat;
 
 /// A target.
@@ -13,6 +14,8 @@ pub type Target = fn(&[u8]);
 /// All targets by name.
 pub const TARGETS: &[(&str, Target)] = &[
     ("nrz_receiver", nrz_line::receiver),
+    ("step_profile_step", step_profile::step),
+    ("step_profile_axis", step_profile::axis),
     ("tformat_request", tformat::request),
     ("tformat_response", tformat::response),
     ("tformat_differential", tformat::differential),

@@ -6,6 +6,7 @@
 #[cfg(feature = "deliberate-panic")]
 mod deliberate_panic;
 mod nrz_line;
+mod step_profile;
 mod tformat;
 mod tformat_ends;
 
@@ -19,6 +20,7 @@ pub(crate) struct Kernel {
 
 pub(crate) const ALL: &[&[Kernel]] = &[
     nrz_line::KERNELS,
+    step_profile::KERNELS,
     tformat::KERNELS,
     tformat_ends::KERNELS,
     #[cfg(feature = "deliberate-panic")]
