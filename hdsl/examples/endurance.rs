@@ -8,7 +8,7 @@ use hdsl::line::{Disturbance, Line};
 use hdsl::master::Master;
 use hdsl::{EncoderId, Profile};
 
-fn main() -> Result<(), Box<dyn std::error::Error>> {
+fn main() -> Result<(), Box<dyn core::error::Error>> {
     let frames: u64 = std::env::args().nth(1).map_or(Ok(100_000), |n| n.parse())?;
     // 100 m of cable, every edge up to one sample early or late.
     let mut line = Line::new(Disturbance { jitter: 1, ..Disturbance::cable(100) }, 42);

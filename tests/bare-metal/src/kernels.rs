@@ -5,6 +5,7 @@
 
 #[cfg(feature = "deliberate-panic")]
 mod deliberate_panic;
+mod hdsl;
 mod nrz_line;
 mod step_profile;
 mod tformat;
@@ -19,6 +20,7 @@ pub(crate) struct Kernel {
 }
 
 pub(crate) const ALL: &[&[Kernel]] = &[
+    hdsl::KERNELS,
     nrz_line::KERNELS,
     step_profile::KERNELS,
     tformat::KERNELS,
