@@ -1,11 +1,10 @@
-use nom::error::{ErrorKind, ParseError};
-
 /// Why a block was refused.
 ///
 /// Checks are made in the order of the variants; the first that fails is reported, and nothing is decoded then.
 /// `strict` decoding goes through all of them, lenient decoding stops before [`CodePair`](Self::CodePair).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]
 pub enum Error {
     /// The slice is not one whole block.
@@ -68,51 +67,77 @@ pub enum Error {
         /// Those of its reserved bits that are 1.
         bits: u8,
     },
-    /// A `nom` combinator around the parsers of this crate gave up.
-    #[error("a combinator failed: {0:?}")]
-    Combinator(#[cfg_attr(feature = "defmt", defmt(Debug2Format))] ErrorKind),
+    /// A `nom` combinator of the caller refused the input.
+    #[error("a parser combinator refused the input")]
+    Combinator,
 }
 
-/// What kind of check an [`Error`] comes from.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+/// The kind of an [`Error`], for counters and statistics.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]
+#[allow(missing_docs, reason = "each stands for the error of the same name")]
 pub enum ErrorClass {
-    /// The size of the block, or the end of a stream.
     Length,
-    /// The C/R bit or Sub_Chk: the two bits that have one legal value.
     Direction,
-    /// The MAC-ID.
-    Address,
-    /// A command code that is not defined, or a pair that is not.
-    Code,
-    /// A reserved bit.
+    MacId,
+    CyclicCode,
+    NonCyclicCode,
+    SubChk,
+    SubCommandCode,
+    CodePair,
     Reserved,
+    Combinator,
+}
+
+impl ErrorClass {
+    /// All classes, in the order of the checks.
+    pub const ALL: [Self; 10] = [
+        Self::Length,
+        Self::Direction,
+        Self::MacId,
+        Self::CyclicCode,
+        Self::NonCyclicCode,
+        Self::SubChk,
+        Self::SubCommandCode,
+        Self::CodePair,
+        Self::Reserved,
+        Self::Combinator,
+    ];
 }
 
 impl Error {
-    /// The kind of check that failed.
+    /// The kind of this error.
     pub const fn class(self) -> ErrorClass {
         match self {
-            Self::Length { .. } | Self::Combinator(_) => ErrorClass::Length,
-            Self::Direction { .. } | Self::SubChk { .. } => ErrorClass::Direction,
-            Self::MacId { .. } => ErrorClass::Address,
-            Self::CyclicCode { .. }
-            | Self::NonCyclicCode { .. }
-            | Self::SubCommandCode { .. }
-            | Self::CodePair { .. } => ErrorClass::Code,
+            Self::Length { .. } => ErrorClass::Length,
+            Self::Direction { .. } => ErrorClass::Direction,
+            Self::MacId { .. } => ErrorClass::MacId,
+            Self::CyclicCode { .. } => ErrorClass::CyclicCode,
+            Self::NonCyclicCode { .. } => ErrorClass::NonCyclicCode,
+            Self::SubChk { .. } => ErrorClass::SubChk,
+            Self::SubCommandCode { .. } => ErrorClass::SubCommandCode,
+            Self::CodePair { .. } => ErrorClass::CodePair,
             Self::Reserved { .. } => ErrorClass::Reserved,
+            Self::Combinator => ErrorClass::Combinator,
         }
     }
 }
 
-impl ParseError<&[u8]> for Error {
-    fn from_error_kind(_: &[u8], kind: ErrorKind) -> Self {
-        Self::Combinator(kind)
+impl<I> nom::error::ParseError<I> for Error {
+    fn from_error_kind(_: I, _: nom::error::ErrorKind) -> Self {
+        Self::Combinator
     }
 
-    fn append(_: &[u8], _: ErrorKind, first: Self) -> Self {
-        first
+    fn append(_: I, _: nom::error::ErrorKind, other: Self) -> Self {
+        other
+    }
+}
+
+impl<I> nom::error::FromExternalError<I, Self> for Error {
+    fn from_external_error(_: I, _: nom::error::ErrorKind, error: Self) -> Self {
+        error
     }
 }
 
