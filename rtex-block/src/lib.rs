@@ -11,16 +11,20 @@ mod bits;
 mod code;
 mod command;
 mod control;
+pub mod device;
 mod error;
 mod error_code;
 mod header;
+pub mod master;
 mod narrow;
 pub mod pack;
+pub mod position;
 mod request;
 mod response;
 mod status;
 pub mod stream;
 mod sub;
+pub mod timing;
 pub mod type_code;
 
 pub use answer::{Answer, Execution, Reply};
@@ -41,6 +45,18 @@ pub use type_code::{Nibble, Pr, TypeCode};
 pub const LEN: usize = 16;
 /// Bytes of a block in the 32-byte mode.
 pub const LEN32: usize = 32;
+
+/// Which of the two sizes a drive is set to (by a parameter; Pr7.22 is suspected).
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "arbitrary", derive(arbitrary::Arbitrary))]
+pub enum BlockSize {
+    /// 16 bytes: the main block.
+    Bytes16,
+    /// 32 bytes: main and sub block.
+    Bytes32,
+}
 
 /// TMG_CNT in a command, CMD_Error in a response.
 const CODE_BIT7: u8 = 0x80;

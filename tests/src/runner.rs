@@ -194,9 +194,9 @@ fn parse(path: &Path, line: usize, text: &str) -> Result<Option<Row>, RunError> 
     for prose in PROSE {
         keys.remove(prose);
     }
-    match keys.remove("name") {
+    match keys.remove("name").or_else(|| keys.remove("id")) {
         Some(Value::String(name)) => Ok(Some(Row { line, name, keys })),
-        _ => Err(fault("the row has no \"name\"".to_owned())),
+        _ => Err(fault("the row has no \"name\" or \"id\"".to_owned())),
     }
 }
 
