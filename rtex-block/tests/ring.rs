@@ -20,9 +20,9 @@ use rtex_block::{Alarm, Command, CommandBlock, MacId, Response, TypeCode};
 
 const AXES: usize = 32;
 const LIMIT: u16 = 8;
-/// Update periods from a fault until every servo is off: the limit that notices it, one for the answer to come back,
-/// one for the command to get there, one for the drive to obey.
-const OFF_WITHIN: u32 = LIMIT as u32 + 3;
+/// Update periods from a fault until every servo is off: the limit that notices it, one for the command to get there,
+/// one for the drive to obey.
+const OFF_WITHIN: u32 = LIMIT as u32 + 2;
 
 const CODES: OpenCodes = OpenCodes {
     profile_absolute: 0x10,
