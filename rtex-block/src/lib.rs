@@ -15,6 +15,7 @@ pub mod device;
 mod error;
 mod error_code;
 mod header;
+pub mod inspect;
 pub mod master;
 mod narrow;
 pub mod pack;
