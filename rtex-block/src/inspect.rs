@@ -7,10 +7,10 @@
 //! use rtex_block::inspect::{Cause, inspect};
 //!
 //! // Written as 16-bit words by a host that swaps their bytes
-//! let report = inspect(&[0x20, 0x45, 0x00, 0x80, 0x03, 0xe8, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0]);
+//! let report = inspect(&[0x20, 0x65, 0x00, 0x80, 0x03, 0xe8, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0]);
 //! assert_eq!(report.cause, Some(Cause::SwappedWords16));
 //!
-//! let report = inspect(&[0x45, 0x20, 0x80, 0, 0xe8, 0x03, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0]);
+//! let report = inspect(&[0x65, 0x20, 0x80, 0, 0xe8, 0x03, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0]);
 //! assert_eq!(report.error, None);
 //! assert_eq!(report.fields().find(|f| f.name == "Command_Position").unwrap().value.to_string(), "1000");
 //! ```
