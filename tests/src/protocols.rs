@@ -1,13 +1,14 @@
 //! Which topics there are. A new protocol is one file here and one line in [`ALL`].
 
 mod rtex;
+mod tformat;
 
 use crate::row::Check;
 
 /// A protocol's folder name and its topics.
 type Protocol = (&'static str, &'static [(&'static str, Check)]);
 
-const ALL: &[Protocol] = &[("rtex", rtex::TOPICS)];
+const ALL: &[Protocol] = &[("rtex", rtex::TOPICS), ("tformat", tformat::TOPICS)];
 
 pub(crate) fn names() -> Vec<&'static str> {
     ALL.iter().map(|(name, _)| *name).collect()
