@@ -2,7 +2,7 @@
 
 use std::cell::Cell;
 use std::io::{self, BufWriter, IsTerminal, Write};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::rc::Rc;
 
@@ -25,9 +25,17 @@ const LONG: u64 = 1 << 24;
 /// Decodes all files. 0: all frames good; 1: not so; 2: the options do not go together.
 pub(crate) fn run(arguments: &Decode) -> ExitCode {
     let files = arguments.files.len();
-    if arguments.vcd.is_some() && files != 1 {
-        eprintln!("error: --vcd writes one capture: name one file, not {files}");
-        return ExitCode::from(2);
+    if let Some(out) = &arguments.vcd {
+        if files != 1 {
+            eprintln!("error: --vcd writes one capture: name one file, not {files}");
+            return ExitCode::from(2);
+        }
+        let same =
+            |file: &PathBuf| file.canonicalize().is_ok_and(|file| out.canonicalize().is_ok_and(|out| out == file));
+        if arguments.files.iter().any(same) {
+            eprintln!("error: --vcd would overwrite the capture {}", out.display());
+            return ExitCode::from(2);
+        }
     }
     let out = BufWriter::with_capacity(1 << 16, io::stdout().lock());
     let mut printer: Box<dyn Printer> = match (arguments.stats, arguments.json) {
@@ -51,7 +59,7 @@ pub(crate) fn run(arguments: &Decode) -> ExitCode {
 fn all(arguments: &Decode, printer: &mut dyn Printer) -> io::Result<bool> {
     let mut good = true;
     for path in &arguments.files {
-        let name = path.display().to_string();
+        let name = if path.as_os_str() == "-" { "standard input".to_owned() } else { path.display().to_string() };
         let opened = capture::open(path, arguments.hints());
         let bar = Bar::new(path);
         good &= match opened {
@@ -86,8 +94,14 @@ fn one(
         return Ok(complain(&Fault::new(name, At::File, "a log of bytes has no times for a VCD"), bar));
     }
     let mut vcd = match &arguments.vcd {
-        Some(path) => Some(VcdOut::create(path, protocol.field_names())?),
         None => None,
+        Some(path) => match VcdOut::create(path, protocol.field_names()) {
+            Ok(vcd) => Some(vcd),
+            Err(e) => {
+                let file = path.display().to_string();
+                return Ok(complain(&Fault::new(&file, At::File, format!("cannot be created: {e}")), bar));
+            }
+        },
     };
     printer.begin(name)?;
     let progress = || bar.set(meter.get());

@@ -103,6 +103,15 @@ fn only_the_own_requests() {
         "4 of 8 frames refused: no_response 4 (only the request is on the line: no encoder, A and B exchanged",
     );
     assert_eq!(run.verdicts(), ["ok", "no_response"].repeat(4));
+    // The controller may also be quick to ask again.
+    let mut wave = Wave::new(2.5e6);
+    wave.idle_us(50.0);
+    for pause in [15.0, 12.0, 9.0, 7.0, 100.0] {
+        wave.send(&[0x1a]).idle_us(pause);
+    }
+    let run = bench.decode("echo.vcd", wave.vcd(), &["--json"]);
+    assert_eq!(run.verdicts(), ["ok", "no_response"].repeat(5));
+    assert_eq!(run.json()[3]["reason"], "no answer within 12.0 us");
     let log = bench.decode("echo.txt", "1A\n1A\n", &["--bytes"]);
     log.fails_with("2 of 4 frames refused: no_response 2");
 }

@@ -47,9 +47,13 @@ fn text_of_frames_that_do_not_pair() {
     assert_eq!(run.code, 1);
     let starts: Vec<&str> = run.out.lines().map(|line| line[19..].split("  ").next().unwrap()).collect();
     assert_eq!(starts, ["<>", "<", "<>", "<>", ">"], "{}", run.out);
-    assert!(run.out.contains("NO_RESPONSE: no answer within 20 us (only the request is on the line"), "{}", run.out);
-    assert!(run.out.contains("REJECTED: the encoder refused the request"), "{}", run.out);
-    assert!(run.out.contains("PARITY: "), "{}", run.out);
+    assert!(
+        run.out.contains("REFUSED no_response: no answer within 20.0 us (only the request is on the line"),
+        "{}",
+        run.out
+    );
+    assert!(run.out.contains("REFUSED rejected: the encoder refused the request"), "{}", run.out);
+    assert!(run.out.contains("REFUSED parity: "), "{}", run.out);
 }
 
 /// The VCD is read back: the same line, and beside it the strings at the times of the frames.
@@ -88,6 +92,11 @@ fn the_vcd_beside() {
     let again = common::decode(&out, &["--json"]);
     again.is_good();
     assert_eq!(again.json().len(), run.json().len());
+    let file = out.to_str().unwrap();
+    assert_eq!(common::decode(&out, &["--vcd", file]).code, 2, "the capture is not overwritten");
+    assert_eq!(std::fs::read(&out).unwrap(), text);
+    let nowhere = bench.path("none").join("out.vcd");
+    bench.decode("a.vcd", wave.vcd(), &["--vcd", nowhere.to_str().unwrap()]).fails_with("cannot be created: ");
     let hex = bench.decode("a.txt", "1A\n", &["--bytes", "--vcd", out.to_str().unwrap()]);
     hex.fails_with("a log of bytes has no times for a VCD");
 }
@@ -119,7 +128,7 @@ fn statistics() {
         "  cycle         min 91.000 us, mean 91.545 us, max 93.000 us, jitter 2.000 us peak to peak, 0.934 us rms",
         "  answer delay  min 3.000 us, mean 3.000 us, max 3.000 us, jitter 0.000 us peak to peak, 0.000 us rms",
         "  largest move  899400 counts",
-        "  jumps         2 moves of more than 1000 counts",
+        "  jumps         2 of more than 1000 counts",
         "600 to 900000: +899400",
         "900000 to 800: -899200",
     ] {

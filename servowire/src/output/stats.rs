@@ -173,7 +173,7 @@ impl<W: Write> Stats<W> {
             writeln!(self.out, "  largest move  {} counts", f.largest)?;
         }
         if let Some(limit) = self.limit {
-            writeln!(self.out, "  jumps         {} moves of more than {limit} counts", f.jumps)?;
+            writeln!(self.out, "  jumps         {} of more than {limit} counts", f.jumps)?;
             for Jump { time, from, to, moved } in &f.listed {
                 writeln!(self.out, "    {:>14.3} us  {from} to {to}: {moved:+}", *time as f64 / 1e6)?;
             }

@@ -136,7 +136,7 @@ fn verdict_text(line: &mut String, verdict: &Verdict) {
     match verdict {
         Verdict::Ok => line.push_str("  ok"),
         Verdict::Refused(refusal) => {
-            let _ = write!(line, "  {}: {}", refusal.class.to_uppercase(), refusal.reason);
+            let _ = write!(line, "  REFUSED {}: {}", refusal.class, refusal.reason);
             if let Some(time) = refusal.time {
                 let _ = write!(line, " at {:.3} us", time as f64 / 1e6);
             }

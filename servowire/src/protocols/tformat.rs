@@ -37,6 +37,9 @@ const TURN_ROUND_BITS: i64 = 4;
 /// An answer begins within this time, nominally 3 us, in picoseconds.
 const ANSWER_TIMEOUT: i64 = 20_000_000;
 
+/// Twice the nominal time: what begins later and looks like a request is one, in picoseconds.
+const LATE_ANSWER: i64 = 6_000_000;
+
 /// The longest answer, with some pauses in it, in bits.
 const LONGEST_BITS: i64 = 150;
 
@@ -67,6 +70,8 @@ struct Frame {
     /// The first field whose delimiter read 0.
     broken: Option<u8>,
     spikes: u32,
+    /// The line of a log without times.
+    line: Option<u64>,
 }
 
 impl Frame {
@@ -122,7 +127,10 @@ impl Frame {
     }
 
     fn place(&self) -> Place {
-        Place::Time { start: self.start(), end: self.end }
+        match self.line {
+            Some(line) => Place::Line(line),
+            None => Place::Time { start: self.start(), end: self.end },
+        }
     }
 }
 
@@ -141,6 +149,14 @@ impl Pending {
             Place::Time { end, .. } => Some(end),
             Place::Line(_) => None,
         }
+    }
+
+    /// Whether a frame is not the answer but the next request: it is one, and later than an answer begins.
+    fn is_asked_again(&self, frame: &Frame) -> bool {
+        let late = self.end().is_some_and(|end| frame.start() - end > LATE_ANSWER);
+        late && frame.broken.is_none()
+            && frame.fields < self.answer_fields(frame.first())
+            && frame.data_id().is_ok_and(|id| frame.fields == usize::from(id.request_fields()))
     }
 
     /// Fields of the answer that begins with `cf`: as that says, or where it is damaged, as was asked.
@@ -192,6 +208,9 @@ impl Decoder {
     fn close(&mut self, out: &mut dyn Sink) -> io::Result<()> {
         let frame = std::mem::take(&mut self.open);
         let begin = self.begin.take();
+        if self.pending.is_some_and(|pending| pending.is_asked_again(&frame)) {
+            self.give_up(frame.start(), out)?;
+        }
         if let Some(pending) = self.pending.take() {
             let event = self.answer(&frame, pending);
             return out.event(&event);
@@ -257,28 +276,24 @@ impl Decoder {
     }
 
     /// The answer did not come until `now`.
-    fn give_up(&mut self, out: &mut dyn Sink) -> io::Result<()> {
+    fn give_up(&mut self, now: i64, out: &mut dyn Sink) -> io::Result<()> {
         match self.pending.take() {
             // Nobody owes an answer to a damaged request.
-            Some(Pending { request: Some(request), place }) => out.event(&describe::silence(request, place)),
+            Some(Pending { request: Some(request), place }) => out.event(&describe::silence(request, place, now)),
             _ => Ok(()),
         }
     }
 
     /// Takes the first `fields` of a burst as a frame.
     fn take(&mut self, burst: &Burst, from: usize, fields: usize, out: &mut dyn Sink) -> io::Result<()> {
-        let mut frame = Frame::default();
+        let mut frame = Frame { line: Some(burst.line), ..Frame::default() };
         for &byte in burst.bytes.iter().skip(from).take(fields) {
             frame.push(&LineField { content: byte.into(), delimiter: true, start: 0, end: 0, spikes: 0 });
         }
-        let mut event = match self.pending.take() {
+        let event = match self.pending.take() {
             Some(pending) => self.answer(&frame, pending),
             None => self.unasked(&frame),
         };
-        if let Some(pending) = &mut self.pending {
-            pending.place = Place::Line(burst.line);
-        }
-        event.place = Place::Line(burst.line);
         out.event(&event)
     }
 }
@@ -307,7 +322,7 @@ impl StartStop for Decoder {
         if self.open.fields == 0 {
             let due = self.pending.and_then(|pending| pending.end()).map(|end| end.saturating_add(ANSWER_TIMEOUT));
             if due.is_some_and(|due| field.start > due) {
-                self.give_up(out)?;
+                self.give_up(field.start, out)?;
             }
         }
         self.open.push(field);
@@ -325,7 +340,7 @@ impl StartStop for Decoder {
         let request = id.map_or(bytes.min(1), |id| usize::from(id.request_fields()));
         if let Some(pending) = self.pending {
             if bytes == request && bytes < pending.answer_fields(cf) {
-                self.give_up(out)?;
+                self.give_up(0, out)?;
             } else {
                 // A receiver that is always on hears the own request first.
                 let echo = pending.request.map(Request::emit);
@@ -347,7 +362,7 @@ impl StartStop for Decoder {
     }
 
     fn finish(&mut self, end: Option<i64>, out: &mut dyn Sink) -> io::Result<()> {
-        let Some(end) = end else { return self.give_up(out) };
+        let Some(end) = end else { return self.give_up(0, out) };
         if self.open.fields > 0 {
             let recent = end - self.open.end <= FIELD_TIMEOUT_BITS * self.bit;
             let request = self.pending.is_none()
@@ -358,7 +373,7 @@ impl StartStop for Decoder {
             self.close(out)?;
         }
         match self.pending.and_then(|pending| pending.end()) {
-            Some(asked) if end > asked.saturating_add(ANSWER_TIMEOUT) => self.give_up(out),
+            Some(asked) if end > asked.saturating_add(ANSWER_TIMEOUT) => self.give_up(end, out),
             _ => Ok(()),
         }
     }

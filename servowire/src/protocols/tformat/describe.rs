@@ -149,12 +149,13 @@ pub(super) fn cut(place: Place, what: &str) -> Event {
     }
 }
 
-/// No answer came to the request at `place`.
-pub(super) fn silence(request: Request, place: Place) -> Event {
+/// No answer came to the request at `place` until `now`.
+pub(super) fn silence(request: Request, place: Place, now: i64) -> Event {
     let (place, reason) = match place {
-        Place::Time { end, .. } => {
-            let place = Place::Time { start: end, end: end.saturating_add(ANSWER_TIMEOUT) };
-            (place, format!("no answer within {} us", ANSWER_TIMEOUT / 1_000_000))
+        Place::Time { end: start, .. } => {
+            let end = start.saturating_add(ANSWER_TIMEOUT).min(now);
+            let reason = format!("no answer within {:.1} us", (end - start) as f64 / 1e6);
+            (Place::Time { start, end }, reason)
         }
         Place::Line(_) => (place, "no answer before the next request".to_owned()),
     };
@@ -258,7 +259,7 @@ fn too_wide(error: Error, profile: Profile, fields: &mut Vec<Field>) -> Option<P
 fn verdict(frame: &Frame, error: Option<Error>) -> Verdict {
     let Some(error) = error else { return Verdict::Ok };
     let (field, bit) = place(error, frame);
-    let start = field.and_then(|field| frame.starts.get(field)).copied().filter(|_| frame.end != 0);
+    let start = field.and_then(|field| frame.starts.get(field)).copied().filter(|_| frame.line.is_none());
     Verdict::Refused(Box::new(Refusal {
         class: class(error.class()),
         reason: error.to_string(),
