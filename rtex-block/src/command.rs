@@ -1,3 +1,4 @@
+use crate::error::wrong_direction;
 use crate::{CODE_BIT7, Code, ControlBits, CyclicCode, Error, Header, LEN, MacId, Request, UpdateCounter, exact};
 
 /// A command block, borrowed: what a drive reads out of its reception memory.
@@ -26,7 +27,7 @@ impl<'a> CommandBlock<'a> {
     /// # Errors
     /// [`Error::Direction`] if C/R is 1.
     pub const fn of(block: &'a [u8; LEN]) -> Result<Self, Error> {
-        if block[0] & 0x80 == 0 { Ok(Self(block)) } else { Err(Error::Direction { byte0: block[0] }) }
+        if block[0] & 0x80 == 0 { Ok(Self(block)) } else { Err(wrong_direction(block[0])) }
     }
 
     /// The bytes.

@@ -125,6 +125,13 @@ impl Error {
     }
 }
 
+/// Out of the way of the good path: otherwise its stores are executed, without effect, for every good block.
+#[cold]
+#[inline(never)]
+pub(crate) const fn wrong_direction(byte0: u8) -> Error {
+    Error::Direction { byte0 }
+}
+
 impl<I> nom::error::ParseError<I> for Error {
     fn from_error_kind(_: I, _: nom::error::ErrorKind) -> Self {
         Self::Combinator

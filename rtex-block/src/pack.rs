@@ -37,7 +37,9 @@ pub struct SizeMismatch {
 pub fn to_words32(bytes: &[u8], words: &mut [u32]) -> Result<(), SizeMismatch> {
     check(bytes.len(), words.len(), 4)?;
     for (word, chunk) in words.iter_mut().zip(bytes.chunks_exact(4)) {
-        *word = chunk.iter().rev().fold(0, |word, &byte| word << 8 | u32::from(byte));
+        if let Ok(four) = chunk.try_into() {
+            *word = u32::from_le_bytes(four);
+        }
     }
     Ok(())
 }
@@ -49,7 +51,9 @@ pub fn to_words32(bytes: &[u8], words: &mut [u32]) -> Result<(), SizeMismatch> {
 pub fn to_words16(bytes: &[u8], words: &mut [u16]) -> Result<(), SizeMismatch> {
     check(bytes.len(), words.len(), 2)?;
     for (word, chunk) in words.iter_mut().zip(bytes.chunks_exact(2)) {
-        *word = chunk.iter().rev().fold(0, |word, &byte| word << 8 | u16::from(byte));
+        if let Ok(two) = chunk.try_into() {
+            *word = u16::from_le_bytes(two);
+        }
     }
     Ok(())
 }
@@ -61,7 +65,10 @@ pub fn to_words16(bytes: &[u8], words: &mut [u16]) -> Result<(), SizeMismatch> {
 pub fn from_words32(words: &[u32], bytes: &mut [u8]) -> Result<(), SizeMismatch> {
     check(bytes.len(), words.len(), 4)?;
     for (chunk, word) in bytes.chunks_exact_mut(4).zip(words) {
-        chunk.copy_from_slice(&word.to_le_bytes());
+        if let Ok(four) = chunk.try_into() {
+            let four: &mut [u8; 4] = four;
+            *four = word.to_le_bytes();
+        }
     }
     Ok(())
 }
@@ -73,7 +80,10 @@ pub fn from_words32(words: &[u32], bytes: &mut [u8]) -> Result<(), SizeMismatch>
 pub fn from_words16(words: &[u16], bytes: &mut [u8]) -> Result<(), SizeMismatch> {
     check(bytes.len(), words.len(), 2)?;
     for (chunk, word) in bytes.chunks_exact_mut(2).zip(words) {
-        chunk.copy_from_slice(&word.to_le_bytes());
+        if let Ok(two) = chunk.try_into() {
+            let two: &mut [u8; 2] = two;
+            *two = word.to_le_bytes();
+        }
     }
     Ok(())
 }

@@ -1,3 +1,4 @@
+use crate::error::wrong_direction;
 use crate::{Answer, CODE_BIT7, Code, Error, Header, LEN, MacId, StatusFlags, UpdateCounter, exact};
 
 /// A response block, borrowed: every getter is a load and a mask.
@@ -26,7 +27,7 @@ impl<'a> ResponseBlock<'a> {
     /// # Errors
     /// [`Error::Direction`] if C/R is 0.
     pub const fn of(block: &'a [u8; LEN]) -> Result<Self, Error> {
-        if block[0] & 0x80 != 0 { Ok(Self(block)) } else { Err(Error::Direction { byte0: block[0] }) }
+        if block[0] & 0x80 != 0 { Ok(Self(block)) } else { Err(wrong_direction(block[0])) }
     }
 
     /// The bytes.

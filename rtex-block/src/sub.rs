@@ -176,8 +176,11 @@ pub const fn split32(bytes: &[u8]) -> Result<(&[u8; LEN], &[u8; LEN]), Error> {
 
 fn join32(main: &[u8; LEN], sub: &[u8; LEN]) -> [u8; LEN32] {
     let mut block = [0; LEN32];
-    for (to, from) in block.iter_mut().zip(main.iter().chain(sub)) {
-        *to = *from;
+    if let Some((first, rest)) = block.split_first_chunk_mut() {
+        *first = *main;
+        if let Some(second) = rest.first_chunk_mut() {
+            *second = *sub;
+        }
     }
     block
 }

@@ -49,7 +49,7 @@ impl Generator {
         };
         // The last stretch is made at a crawl, so that rounding of the ramp never leaves the axis short of it.
         if distance <= braking.max(1) && speed > 0 {
-            self.speed_milli = self.speed_milli.max(change(ramp.down).clamp(1, speed.saturating_mul(MILLI)));
+            self.speed_milli = self.speed_milli.max(change(ramp.down).min(speed.saturating_mul(MILLI)).max(1));
         }
         self.fraction_nano = self.fraction_nano.saturating_add(self.speed_milli.saturating_mul(ns) / MILLI);
         let whole = (self.fraction_nano / NANO).min(distance);

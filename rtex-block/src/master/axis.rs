@@ -1,7 +1,7 @@
 use core::num::NonZeroU16;
 
 use super::{ActiveCode, EchoWatch, Handshake, MoveProgress, ProfileMove, Progress, ServoOff, Turn};
-use crate::position::{Gear, is_within_limit, step};
+use crate::position::{Gear, max_step, step};
 use crate::{Answer, Command, ControlBits, ErrorCode, MacId, Request, Response, StatusFlags};
 
 /// Time limits, in update periods.
@@ -136,6 +136,8 @@ enum Service {
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Axis {
     settings: AxisSettings,
+    /// Largest step of the command position.
+    max_step: u32,
     state: AxisState,
     /// Update periods left in the present state.
     left: u32,
@@ -157,6 +159,7 @@ impl Axis {
     pub const fn new(settings: AxisSettings) -> Self {
         Self {
             settings,
+            max_step: max_step(settings.update_ns, settings.gear),
             state: AxisState::Starting,
             left: settings.limits.ready,
             setpoint: 0,
@@ -249,7 +252,7 @@ impl Axis {
             _ => return Err(SetpointError::NotOn),
         }
         let step = step(self.setpoint, position);
-        if !is_within_limit(step, self.settings.update_ns, self.settings.gear) {
+        if step.unsigned_abs() > self.max_step {
             return Err(SetpointError::Step { step });
         }
         self.setpoint = position;

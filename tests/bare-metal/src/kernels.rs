@@ -6,6 +6,7 @@
 #[cfg(feature = "deliberate-panic")]
 mod deliberate_panic;
 mod nrz_line;
+mod rtex;
 mod tformat;
 
 /// An entry point that is measured and walked.
@@ -19,6 +20,7 @@ pub(crate) struct Kernel {
 pub(crate) const ALL: &[&[Kernel]] = &[
     nrz_line::KERNELS,
     tformat::KERNELS,
+    rtex::KERNELS,
     #[cfg(feature = "deliberate-panic")]
     deliberate_panic::KERNELS,
 ];
