@@ -1,5 +1,6 @@
 //! Which topics there are. A new protocol is one file here and one line in [`ALL`].
 
+mod rtex;
 mod step_profile;
 mod tformat;
 
@@ -8,7 +9,8 @@ use crate::row::Check;
 /// A protocol's folder name and its topics.
 type Protocol = (&'static str, &'static [(&'static str, Check)]);
 
-const ALL: &[Protocol] = &[("step-profile", step_profile::TOPICS), ("tformat", tformat::TOPICS)];
+const ALL: &[Protocol] =
+    &[("step-profile", step_profile::TOPICS), ("tformat", tformat::TOPICS), ("rtex", rtex::TOPICS)];
 
 /// Topics whose rows cannot be checked yet: protocol, topic, what they wait for.
 const PENDING: &[(&str, &str, &str)] = &[
