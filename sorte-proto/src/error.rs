@@ -1,0 +1,224 @@
+/// Why bytes, a number or an event were refused.
+///
+/// The checks are made in the order given with each parser; the first that fails is reported. A refusal leaves
+/// every state machine as it was.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[non_exhaustive]
+pub enum Error {
+    /// Fewer bytes than the frame needs.
+    #[error("frame of {got} bytes, at least {need} are needed")]
+    Truncated {
+        /// Bytes given.
+        got: u16,
+        /// Bytes needed.
+        need: u16,
+    },
+    /// The frame check sequence does not fit the bytes before it.
+    #[error("FCS is {got:#010x}, the bytes before it give {want:#010x}")]
+    BadFcs {
+        /// FCS in the frame.
+        got: u32,
+        /// FCS computed.
+        want: u32,
+    },
+    /// DA of a long-header frame is not 255.
+    #[error("destination address {got}, only 255 (all) is in use")]
+    WrongDestination {
+        /// DA in the frame.
+        got: u8,
+    },
+    /// TYPE is not one of 1 to 10.
+    #[error("frame type {got} is not known")]
+    UnknownType {
+        /// TYPE in the frame.
+        got: u8,
+    },
+    /// TYPE is known, but not the one asked for.
+    #[error("frame type {got} instead of {want}")]
+    UnexpectedType {
+        /// TYPE in the frame.
+        got: u8,
+        /// TYPE asked for.
+        want: u8,
+    },
+    /// The frame has not the length of its kind.
+    #[error("frame of {got} bytes, its kind has {want}")]
+    LengthMismatch {
+        /// Bytes given.
+        got: u16,
+        /// Bytes of this kind.
+        want: u16,
+    },
+    /// The CRC-8 of an IO-exchange frame does not fit.
+    #[error("CRC-8 is {got:#04x}, the bytes before it give {want:#04x}")]
+    BadCrc8 {
+        /// CRC-8 in the frame.
+        got: u8,
+        /// CRC-8 computed.
+        want: u8,
+    },
+    /// SA is not 0 in a master frame, or not 1 to 254 in a device frame.
+    #[error("source address {got} does not belong to this kind of frame")]
+    WrongSource {
+        /// SA in the frame.
+        got: u8,
+    },
+    /// The preamble is not 1 to 7 bytes 0x55 followed by 0xD5.
+    #[error("preamble is wrong at byte {at}")]
+    BadPreamble {
+        /// Index of the first byte that does not fit.
+        at: u8,
+    },
+    /// A network of more than 254 devices.
+    #[error("device count {count}, 254 is the maximum")]
+    TooManyDevices {
+        /// Count in the frame.
+        count: u16,
+    },
+    /// The totals of a discovery frame are not the sums of its entries.
+    #[error("total of {got} bytes, the entries sum to {want}")]
+    TableMismatch {
+        /// Total in the frame.
+        got: u16,
+        /// Sum of the entries, saturated.
+        want: u16,
+    },
+    /// A slice of process data lies outside the output bytes.
+    #[error("bytes {offset}..{offset}+{len} are not among the output bytes")]
+    OutsideOutput {
+        /// First byte of the slice.
+        offset: u16,
+        /// Its length.
+        len: u16,
+    },
+    /// The buffer to write a frame into is too small.
+    #[error("buffer of {got} bytes, {need} are needed")]
+    BufferTooSmall {
+        /// Bytes of the buffer.
+        got: u16,
+        /// Bytes of the frame.
+        need: u16,
+    },
+    /// A step's time does not lie in the 4 us cycle.
+    #[error("sync time {ns} ns does not lie in 0..=3999")]
+    SyncTimeOutOfRange {
+        /// The time handed over.
+        ns: u32,
+    },
+    /// A PTO word between 3991 and 0x7FFE, with or without bit 15, or 0xFFFF.
+    #[error("PTO word {raw:#06x} has no meaning")]
+    ReservedPtoValue {
+        /// The word.
+        raw: u16,
+    },
+    /// A motor mask above 15.
+    #[error("motor mask {got:#04x}, four motors exist")]
+    InvalidMotorMask {
+        /// The mask.
+        got: u8,
+    },
+    /// A round trip is shorter than the forwarding time, or too long for the 16-bit sum.
+    #[error("round trip of {rtt_ns} ns cannot be")]
+    ImplausibleRoundTrip {
+        /// The round trip, or the mean of 16.
+        rtt_ns: u32,
+    },
+    /// The time stamp of an IO-exchange frame lies outside the window.
+    #[error("time stamp {got} is not within the window around {want}")]
+    ImplausibleTimeStamp {
+        /// Time stamp in the frame.
+        got: u16,
+        /// Time stamp expected.
+        want: u16,
+    },
+    /// A register field holds a code that the data sheet reserves.
+    #[error("code {code} of DRV8711 register {register} is reserved")]
+    ReservedCode {
+        /// Address of the register.
+        register: u8,
+        /// The code.
+        code: u8,
+    },
+    /// A register reads back other than written.
+    #[error("DRV8711 register {register} reads {got:#05x}, {want:#05x} was written")]
+    ReadBack {
+        /// Address of the register.
+        register: u8,
+        /// Value read, bits that always read 0 left out.
+        got: u16,
+        /// Value written, the same bits left out.
+        want: u16,
+    },
+}
+
+/// The check that failed, without its numbers.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[non_exhaustive]
+pub enum ErrorClass {
+    /// [`Error::Truncated`]
+    Truncated,
+    /// [`Error::BadFcs`]
+    BadFcs,
+    /// [`Error::WrongDestination`]
+    WrongDestination,
+    /// [`Error::UnknownType`]
+    UnknownType,
+    /// [`Error::UnexpectedType`]
+    UnexpectedType,
+    /// [`Error::LengthMismatch`]
+    LengthMismatch,
+    /// [`Error::BadCrc8`]
+    BadCrc8,
+    /// [`Error::WrongSource`]
+    WrongSource,
+    /// [`Error::BadPreamble`]
+    BadPreamble,
+    /// [`Error::TooManyDevices`] and [`Error::TableMismatch`]
+    BadTable,
+    /// [`Error::OutsideOutput`] and [`Error::BufferTooSmall`]
+    Bounds,
+    /// [`Error::SyncTimeOutOfRange`], [`Error::ReservedPtoValue`] and [`Error::InvalidMotorMask`]
+    ProcessData,
+    /// [`Error::ImplausibleRoundTrip`] and [`Error::ImplausibleTimeStamp`]
+    Time,
+    /// [`Error::ReservedCode`] and [`Error::ReadBack`]
+    Drv8711,
+}
+
+impl Error {
+    /// Which check failed.
+    pub const fn class(self) -> ErrorClass {
+        match self {
+            Self::Truncated { .. } => ErrorClass::Truncated,
+            Self::BadFcs { .. } => ErrorClass::BadFcs,
+            Self::WrongDestination { .. } => ErrorClass::WrongDestination,
+            Self::UnknownType { .. } => ErrorClass::UnknownType,
+            Self::UnexpectedType { .. } => ErrorClass::UnexpectedType,
+            Self::LengthMismatch { .. } => ErrorClass::LengthMismatch,
+            Self::BadCrc8 { .. } => ErrorClass::BadCrc8,
+            Self::WrongSource { .. } => ErrorClass::WrongSource,
+            Self::BadPreamble { .. } => ErrorClass::BadPreamble,
+            Self::TooManyDevices { .. } | Self::TableMismatch { .. } => ErrorClass::BadTable,
+            Self::OutsideOutput { .. } | Self::BufferTooSmall { .. } => ErrorClass::Bounds,
+            Self::SyncTimeOutOfRange { .. } | Self::ReservedPtoValue { .. } | Self::InvalidMotorMask { .. } => {
+                ErrorClass::ProcessData
+            }
+            Self::ImplausibleRoundTrip { .. } | Self::ImplausibleTimeStamp { .. } => ErrorClass::Time,
+            Self::ReservedCode { .. } | Self::ReadBack { .. } => ErrorClass::Drv8711,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::Error;
+
+    #[test]
+    fn an_error_is_at_most_two_machine_words() {
+        assert!(size_of::<Error>() <= 16);
+    }
+}
