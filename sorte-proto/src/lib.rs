@@ -6,10 +6,33 @@
 #[cfg(any(test, feature = "std"))]
 extern crate std;
 
-mod error;
-mod payload;
-mod pto;
+pub mod cut_through;
 
+mod crc;
+mod delay_req;
+mod discovery;
+mod error;
+mod exchange;
+mod frame;
+mod param;
+mod payload;
+mod preamble;
+mod pto;
+mod status;
+mod sync;
+
+pub use crc::{crc8, crc8_update, fcs};
+pub use delay_req::DelayReq;
+pub use discovery::{Assignment, Discovery, DiscoveryView, Entry, MAX_DEVICES, Network};
 pub use error::{Error, ErrorClass};
+pub use exchange::{
+    DeviceFrame, DeviceFrameView, MasterFrame, MasterFrameView, PublishedDeviceFrame, STOCK_INPUT, STOCK_OUTPUT,
+    write_master_frame,
+};
+pub use frame::{DeviceAddress, FrameType, LongFrame, MULTICAST};
+pub use param::{CrcKind, CrcMode, Param, ParamView, Parameters, Topology};
 pub use payload::{MotorMask, Payload, Slice};
+pub use preamble::{Preamble, preamble, strip_preamble};
 pub use pto::{Direction, Pto, Reserved, StartTime};
+pub use status::Status;
+pub use sync::{Sync, SyncView, TRANSIT_NS, TRIGGER_TO_CAPTURE_NS};
