@@ -34,6 +34,9 @@ impl Window {
     /// Longest window, in bits.
     pub const MAX_LEN: u32 = 128;
 
+    /// The window without bits.
+    pub const EMPTY: Self = Self { bits: 0, len: 0 };
+
     /// The `len` bits of `bytes` that begin at line bit `offset`.
     ///
     /// # Errors
@@ -100,7 +103,7 @@ impl Window {
     /// The window without its first `count` bits; `None` if it has fewer.
     pub const fn skip(self, count: u32) -> Option<Self> {
         match self.len.checked_sub(count) {
-            Some(0) => Some(Self { bits: 0, len: 0 }),
+            Some(0) => Some(Self::EMPTY),
             Some(len) => Some(Self { bits: self.bits >> count, len }),
             None => None,
         }

@@ -151,46 +151,70 @@ pub enum Error {
         /// Value written, the same bits left out.
         want: u16,
     },
+    /// A `nom` combinator of the caller refused the input.
+    #[error("a parser combinator refused the input")]
+    Combinator,
 }
 
-/// The check that failed, without its numbers.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+/// The kind of an [`Error`], for counters and statistics.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]
+#[allow(missing_docs, reason = "each stands for the error of the same name")]
 pub enum ErrorClass {
-    /// [`Error::Truncated`]
     Truncated,
-    /// [`Error::BadFcs`]
     BadFcs,
-    /// [`Error::WrongDestination`]
     WrongDestination,
-    /// [`Error::UnknownType`]
     UnknownType,
-    /// [`Error::UnexpectedType`]
     UnexpectedType,
-    /// [`Error::LengthMismatch`]
     LengthMismatch,
-    /// [`Error::BadCrc8`]
     BadCrc8,
-    /// [`Error::WrongSource`]
     WrongSource,
-    /// [`Error::BadPreamble`]
     BadPreamble,
-    /// [`Error::TooManyDevices`] and [`Error::TableMismatch`]
-    BadTable,
-    /// [`Error::OutsideOutput`] and [`Error::BufferTooSmall`]
-    Bounds,
-    /// [`Error::SyncTimeOutOfRange`], [`Error::ReservedPtoValue`] and [`Error::InvalidMotorMask`]
-    ProcessData,
-    /// [`Error::ImplausibleRoundTrip`] and [`Error::ImplausibleTimeStamp`]
-    Time,
-    /// [`Error::ReservedCode`] and [`Error::ReadBack`]
-    Drv8711,
+    TooManyDevices,
+    TableMismatch,
+    OutsideOutput,
+    BufferTooSmall,
+    SyncTimeOutOfRange,
+    ReservedPtoValue,
+    InvalidMotorMask,
+    ImplausibleRoundTrip,
+    ImplausibleTimeStamp,
+    ReservedCode,
+    ReadBack,
+    Combinator,
+}
+
+impl ErrorClass {
+    /// All classes.
+    pub const ALL: [Self; 21] = [
+        Self::Truncated,
+        Self::BadFcs,
+        Self::WrongDestination,
+        Self::UnknownType,
+        Self::UnexpectedType,
+        Self::LengthMismatch,
+        Self::BadCrc8,
+        Self::WrongSource,
+        Self::BadPreamble,
+        Self::TooManyDevices,
+        Self::TableMismatch,
+        Self::OutsideOutput,
+        Self::BufferTooSmall,
+        Self::SyncTimeOutOfRange,
+        Self::ReservedPtoValue,
+        Self::InvalidMotorMask,
+        Self::ImplausibleRoundTrip,
+        Self::ImplausibleTimeStamp,
+        Self::ReservedCode,
+        Self::ReadBack,
+        Self::Combinator,
+    ];
 }
 
 impl Error {
-    /// Which check failed.
+    /// The kind of this error.
     pub const fn class(self) -> ErrorClass {
         match self {
             Self::Truncated { .. } => ErrorClass::Truncated,
@@ -202,14 +226,35 @@ impl Error {
             Self::BadCrc8 { .. } => ErrorClass::BadCrc8,
             Self::WrongSource { .. } => ErrorClass::WrongSource,
             Self::BadPreamble { .. } => ErrorClass::BadPreamble,
-            Self::TooManyDevices { .. } | Self::TableMismatch { .. } => ErrorClass::BadTable,
-            Self::OutsideOutput { .. } | Self::BufferTooSmall { .. } => ErrorClass::Bounds,
-            Self::SyncTimeOutOfRange { .. } | Self::ReservedPtoValue { .. } | Self::InvalidMotorMask { .. } => {
-                ErrorClass::ProcessData
-            }
-            Self::ImplausibleRoundTrip { .. } | Self::ImplausibleTimeStamp { .. } => ErrorClass::Time,
-            Self::ReservedCode { .. } | Self::ReadBack { .. } => ErrorClass::Drv8711,
+            Self::TooManyDevices { .. } => ErrorClass::TooManyDevices,
+            Self::TableMismatch { .. } => ErrorClass::TableMismatch,
+            Self::OutsideOutput { .. } => ErrorClass::OutsideOutput,
+            Self::BufferTooSmall { .. } => ErrorClass::BufferTooSmall,
+            Self::SyncTimeOutOfRange { .. } => ErrorClass::SyncTimeOutOfRange,
+            Self::ReservedPtoValue { .. } => ErrorClass::ReservedPtoValue,
+            Self::InvalidMotorMask { .. } => ErrorClass::InvalidMotorMask,
+            Self::ImplausibleRoundTrip { .. } => ErrorClass::ImplausibleRoundTrip,
+            Self::ImplausibleTimeStamp { .. } => ErrorClass::ImplausibleTimeStamp,
+            Self::ReservedCode { .. } => ErrorClass::ReservedCode,
+            Self::ReadBack { .. } => ErrorClass::ReadBack,
+            Self::Combinator => ErrorClass::Combinator,
         }
+    }
+}
+
+impl<I> nom::error::ParseError<I> for Error {
+    fn from_error_kind(_: I, _: nom::error::ErrorKind) -> Self {
+        Self::Combinator
+    }
+
+    fn append(_: I, _: nom::error::ErrorKind, other: Self) -> Self {
+        other
+    }
+}
+
+impl<I> nom::error::FromExternalError<I, Self> for Error {
+    fn from_external_error(_: I, _: nom::error::ErrorKind, error: Self) -> Self {
+        error
     }
 }
 

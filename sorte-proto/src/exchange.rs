@@ -1,8 +1,5 @@
-use nom::IResult;
-use nom::error::{FromExternalError, ParseError};
-
 use crate::discovery::room;
-use crate::frame::{count, fail, missing};
+use crate::frame::count;
 use crate::{DeviceAddress, Error, Status, crc8, crc8_update};
 
 /// Output bytes of the published master: four devices with four bytes each.
@@ -95,17 +92,6 @@ impl<'a> MasterFrameView<'a> {
             return Ok(());
         }
         Err(Error::ImplausibleTimeStamp { got: self.time_stamp, want: expected })
-    }
-
-    /// A streaming `nom` parser for frames of `output_len` output bytes.
-    pub fn streaming<E>(output_len: usize) -> impl Fn(&'a [u8]) -> IResult<&'a [u8], Self, E>
-    where
-        E: ParseError<&'a [u8]> + FromExternalError<&'a [u8], Error>,
-    {
-        move |input| {
-            let (frame, rest) = split(input, output_len.saturating_add(Self::OVERHEAD))?;
-            Ok((rest, Self::new(frame, output_len).map_err(|error| fail(input, error))?))
-        }
     }
 }
 
@@ -218,17 +204,6 @@ impl<'a> DeviceFrameView<'a> {
     pub const fn payload(self) -> &'a [u8] {
         self.payload
     }
-
-    /// A streaming `nom` parser for frames of `payload_len` payload bytes.
-    pub fn streaming<E>(payload_len: usize) -> impl Fn(&'a [u8]) -> IResult<&'a [u8], Self, E>
-    where
-        E: ParseError<&'a [u8]> + FromExternalError<&'a [u8], Error>,
-    {
-        move |input| {
-            let (frame, rest) = split(input, payload_len.saturating_add(Self::OVERHEAD))?;
-            Ok((rest, Self::new(frame, payload_len).map_err(|error| fail(input, error))?))
-        }
-    }
 }
 
 /// The values of a device frame with `P` payload bytes.
@@ -332,10 +307,6 @@ fn wrong_length(got: usize, want: usize) -> Error {
     if got < want { Error::Truncated { got, need: want } } else { Error::LengthMismatch { got, want } }
 }
 
-fn split<E>(input: &[u8], len: usize) -> Result<(&[u8], &[u8]), nom::Err<E>> {
-    input.split_at_checked(len).ok_or_else(|| missing(len.saturating_sub(input.len())))
-}
-
 #[cfg(test)]
 mod tests {
     use proptest::prelude::*;
@@ -423,18 +394,11 @@ mod tests {
 
     proptest! {
         #[test]
-        fn master_frames_come_back(status: u8, output: [u8; 16], time_stamp: u16, tail: [u8; 3]) {
+        fn master_frames_come_back(status: u8, output: [u8; 16], time_stamp: u16) {
             let frame = MasterFrame { status: Status(status), output, time_stamp };
-            let mut bytes = [0; 24];
+            let mut bytes = [0; 21];
             prop_assert_eq!(frame.emit(&mut bytes), Ok(21));
-            prop_assert_eq!(MasterFrame::<16>::parse(&bytes[..21]), Ok(frame));
-            bytes[21..].copy_from_slice(&tail);
-            let parser = MasterFrameView::streaming::<nom::error::Error<_>>(16);
-            let (rest, view) = parser(&bytes).unwrap();
-            prop_assert_eq!((rest, view.output()), (&tail[..], &output[..]));
-            for len in 0..21 {
-                prop_assert!(matches!(parser(&bytes[..len]), Err(nom::Err::Incomplete(_))));
-            }
+            prop_assert_eq!(MasterFrame::<16>::parse(&bytes), Ok(frame));
         }
 
         #[test]

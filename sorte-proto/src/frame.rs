@@ -1,10 +1,5 @@
 //! What all long-header frames share: everything but the IO exchange.
 
-use core::num::NonZeroUsize;
-
-use nom::error::{ErrorKind, FromExternalError, ParseError};
-use nom::{IResult, Needed};
-
 use crate::{Error, Status, fcs};
 
 /// DA of every start-up frame.
@@ -197,20 +192,6 @@ impl<'a> LongFrame<'a> {
             _ => Err(Error::UnexpectedType { got: self.frame_type.code(), want: want.code() }),
         }
     }
-
-    /// The next frame of a byte stream without preambles, as a streaming `nom` parser. The length follows from TYPE,
-    /// so types without a published layout end the stream.
-    pub fn streaming<E>(input: &'a [u8]) -> IResult<&'a [u8], Self, E>
-    where
-        E: ParseError<&'a [u8]> + FromExternalError<&'a [u8], Error>,
-    {
-        let &[_, _, code, ..] = input else { return Err(missing(3_usize.saturating_sub(input.len()))) };
-        let unknown = Error::UnknownType { got: code };
-        let len = FrameType::from_code(code).and_then(FrameType::frame_len).ok_or_else(|| fail(input, unknown))?;
-        let (frame, rest) = input.split_at_checked(len).ok_or_else(|| missing(len.saturating_sub(input.len())))?;
-        let frame = Self::new(frame).map_err(|error| fail(input, error))?;
-        Ok((rest, frame))
-    }
 }
 
 /// Header, payload and FCS as one array; `N` = payload + 8, written by the frames of known length.
@@ -234,17 +215,6 @@ pub(crate) fn refresh_fcs(frame: &mut [u8]) {
 /// A length as the errors carry it.
 pub(crate) fn count(len: usize) -> u16 {
     u16::try_from(len).unwrap_or(u16::MAX)
-}
-
-pub(crate) fn missing<E>(bytes: usize) -> nom::Err<E> {
-    nom::Err::Incomplete(NonZeroUsize::new(bytes).map_or(Needed::Unknown, Needed::Size))
-}
-
-pub(crate) fn fail<'a, E>(input: &'a [u8], error: Error) -> nom::Err<E>
-where
-    E: ParseError<&'a [u8]> + FromExternalError<&'a [u8], Error>,
-{
-    nom::Err::Error(E::from_external_error(input, ErrorKind::Verify, error))
 }
 
 #[cfg(test)]

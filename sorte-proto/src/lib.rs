@@ -19,6 +19,7 @@ mod payload;
 mod preamble;
 mod pto;
 mod status;
+pub mod stream;
 mod sync;
 
 pub use crc::{crc8, crc8_update, fcs};
@@ -32,7 +33,7 @@ pub use exchange::{
 pub use frame::{DeviceAddress, FrameType, LongFrame, MULTICAST};
 pub use param::{CrcKind, CrcMode, Param, ParamView, Parameters, Topology};
 pub use payload::{MotorMask, Payload, Slice};
-pub use preamble::{Preamble, preamble, strip_preamble};
+pub use preamble::{Preamble, strip_preamble};
 pub use pto::{Direction, Pto, Reserved, StartTime};
 pub use status::Status;
 pub use sync::{Sync, SyncView, TRANSIT_NS, TRIGGER_TO_CAPTURE_NS};

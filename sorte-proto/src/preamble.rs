@@ -1,8 +1,4 @@
-use nom::IResult;
-use nom::error::{FromExternalError, ParseError};
-
 use crate::Error;
-use crate::frame::{fail, missing};
 
 const PREAMBLE: u8 = 0x55;
 const SFD: u8 = 0xd5;
@@ -50,25 +46,13 @@ pub fn strip_preamble(wire: &[u8]) -> Result<&[u8], Error> {
     }
 }
 
-/// The same as a streaming `nom` parser: `Incomplete` while only preamble bytes have come.
-pub fn preamble<'a, E>(wire: &'a [u8]) -> IResult<&'a [u8], (), E>
-where
-    E: ParseError<&'a [u8]> + FromExternalError<&'a [u8], Error>,
-{
-    match scan(wire) {
-        Scan::Frame(frame) => Ok((frame, ())),
-        Scan::Bad { at } => Err(fail(wire, Error::BadPreamble { at })),
-        Scan::Ended => Err(missing(1)),
-    }
-}
-
-enum Scan<'a> {
+pub(crate) enum Scan<'a> {
     Frame(&'a [u8]),
     Bad { at: u8 },
     Ended,
 }
 
-fn scan(wire: &[u8]) -> Scan<'_> {
+pub(crate) fn scan(wire: &[u8]) -> Scan<'_> {
     let mut rest = wire;
     for at in 0..=MOST {
         rest = match (at, rest) {
@@ -87,26 +71,21 @@ mod tests {
 
     use super::*;
 
-    type NomError<'a> = nom::error::Error<&'a [u8]>;
-
     #[test]
     fn one_to_seven_preamble_bytes_are_taken() {
         for n in 0..12 {
             let mut wire = vec![0x55; n];
             wire.extend([0xd5, 1, 2, 3]);
-            let streaming = preamble::<NomError>(&wire);
             if (1..=7).contains(&n) {
                 assert_eq!(strip_preamble(&wire), Ok(&[1, 2, 3][..]));
-                assert_eq!(streaming, Ok((&[1, 2, 3][..], ())));
             } else {
                 assert_eq!(strip_preamble(&wire), Err(Error::BadPreamble { at: n.min(7) as u8 }));
-                assert!(matches!(streaming, Err(nom::Err::Error(_))));
             }
         }
     }
 
     #[test]
-    fn a_wrong_byte_is_named_and_an_early_end_is_not_a_wrong_byte() {
+    fn a_wrong_byte_and_an_early_end_are_named() {
         for preamble_bytes in 1..=7 {
             for at in 0..preamble_bytes {
                 let mut wire = vec![0x55; preamble_bytes];
@@ -115,7 +94,6 @@ mod tests {
                 assert_eq!(strip_preamble(&wire), Err(Error::BadPreamble { at: at as u8 }));
             }
             let wire = vec![0x55; preamble_bytes];
-            assert!(matches!(preamble::<NomError>(&wire), Err(nom::Err::Incomplete(_))));
             assert_eq!(strip_preamble(&wire), Err(Error::BadPreamble { at: preamble_bytes as u8 }));
         }
         assert_eq!(strip_preamble(&[]), Err(Error::BadPreamble { at: 0 }));

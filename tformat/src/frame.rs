@@ -1,0 +1,251 @@
+use nrz_line::{BitOrder, Window};
+
+use crate::Error;
+
+/// The fields of one frame, 1 to 11 data bytes.
+///
+/// A field is ten bits on the line, a plain 8N1 character; fields follow each other without a gap
+/// (TIDM-1011, table 2-3).
+///
+/// ```text
+///  line, time →   0 | d0 d1 d2 d3 d4 d5 d6 d7 | 1 | 0 | d0 ...
+///             start        data, LSB first   delimiter
+///  frame bit      0   1                    8   9   10  11        field k begins at bit 10 k
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Frame {
+    bytes: [u8; Frame::MAX_FIELDS],
+    len: u8,
+}
+
+const START: u128 = {
+    let mut mask = 0;
+    let mut field = 0;
+    while field < Frame::MAX_FIELDS {
+        mask |= 1 << (10 * field);
+        field += 1;
+    }
+    mask
+};
+const DELIMITER: u128 = START << 9;
+const _: () = {
+    let data = START * 0x1fe;
+    assert!(
+        START & DELIMITER == 0 && (START | DELIMITER) & data == 0 && START | DELIMITER | data == (1 << 110) - 1,
+        "start bits, data bits and delimiters partition the longest frame"
+    );
+};
+
+impl Frame {
+    /// Fields of the longest frame, the ID 3 response.
+    pub const MAX_FIELDS: usize = 11;
+    /// Bits of one field on the line.
+    pub const FIELD_BITS: u32 = 10;
+    /// Bytes that hold the line bits of the longest frame: 110 bits in 14 bytes.
+    pub const MAX_LINE_BYTES: usize = 14;
+
+    /// A frame of 1 field.
+    pub(crate) const fn of1(a: u8) -> Self {
+        Self { bytes: [a, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0], len: 1 }
+    }
+
+    /// A frame of 3 fields.
+    pub(crate) const fn of3([a, b, c]: [u8; 3]) -> Self {
+        Self { bytes: [a, b, c, 0, 0, 0, 0, 0, 0, 0, 0], len: 3 }
+    }
+
+    /// A frame of 4 fields.
+    pub(crate) const fn of4([a, b, c, d]: [u8; 4]) -> Self {
+        Self { bytes: [a, b, c, d, 0, 0, 0, 0, 0, 0, 0], len: 4 }
+    }
+
+    /// A frame of 6 fields.
+    pub(crate) const fn of6([a, b, c, d, e, f]: [u8; 6]) -> Self {
+        Self { bytes: [a, b, c, d, e, f, 0, 0, 0, 0, 0], len: 6 }
+    }
+
+    /// A frame of 11 fields.
+    pub(crate) const fn of11(bytes: [u8; 11]) -> Self {
+        Self { bytes, len: 11 }
+    }
+
+    /// A frame of these data bytes; `None` if there are none or more than 11.
+    pub fn new(bytes: &[u8]) -> Option<Self> {
+        let len = u8::try_from(bytes.len()).ok().filter(|len| *len > 0)?;
+        let mut frame = Self { bytes: [0; Self::MAX_FIELDS], len };
+        frame.bytes.get_mut(..bytes.len())?.copy_from_slice(bytes);
+        Some(frame)
+    }
+
+    /// The data bytes as a UART sends and receives them, in line order.
+    pub fn as_bytes(&self) -> &[u8] {
+        self.bytes.get(..usize::from(self.len)).unwrap_or(&self.bytes)
+    }
+
+    /// Number of fields, 1..=11.
+    pub const fn fields(self) -> u8 {
+        self.len
+    }
+
+    /// Length on the line in bits, 10 a field.
+    pub const fn line_bits(self) -> u32 {
+        (self.len as u32).wrapping_mul(Self::FIELD_BITS)
+    }
+
+    /// The line bits, start bits and delimiters included, fields back to back.
+    pub const fn line(self) -> Window {
+        let len = self.line_bits();
+        match Window::from_bits(pack(&self.bytes), len) {
+            Some(line) => line,
+            // Never: 11 fields are 110 bits.
+            None => Window::EMPTY,
+        }
+    }
+
+    /// Reads `fields` fields from the beginning of `line`, a grid of ten bits a field, and checks their framing.
+    ///
+    /// # Errors
+    /// The first of [`Error::StartBit`], [`Error::Delimiter`] and [`Error::Truncated`] in the order of the line.
+    pub fn from_line(line: Window, fields: u8) -> Result<Self, Error> {
+        let len = fields.min(11);
+        let bits = u32::from(len).wrapping_mul(Self::FIELD_BITS);
+        if line.len() < bits || !is_framed(line.bits(), bits) {
+            return Err(framing(line, len));
+        }
+        let mut bytes = unpack(line.bits());
+        for unused in bytes.iter_mut().skip(usize::from(len)) {
+            *unused = 0;
+        }
+        Ok(Self { bytes, len })
+    }
+}
+
+/// Whether the start bits and delimiters among the first `bits` bits are right.
+pub(crate) const fn is_framed(line: u128, bits: u32) -> bool {
+    let within = match 1_u128.checked_shl(bits) {
+        Some(one) => one.wrapping_sub(1),
+        None => u128::MAX,
+    };
+    (line ^ DELIMITER) & (START | DELIMITER) & within == 0
+}
+
+/// Whether all 22 start bits and delimiters of an 11-field frame are right.
+pub(crate) const fn is_framed11(line: u128) -> bool {
+    (line ^ DELIMITER) & (START | DELIMITER) == 0
+}
+
+/// The data bytes of eleven fields, each with a constant shift.
+#[expect(clippy::cast_possible_truncation, reason = "each shift brings a field's data bits to bits 0..=7")]
+pub(crate) const fn unpack(line: u128) -> [u8; Frame::MAX_FIELDS] {
+    [
+        (line >> 1) as u8,
+        (line >> 11) as u8,
+        (line >> 21) as u8,
+        (line >> 31) as u8,
+        (line >> 41) as u8,
+        (line >> 51) as u8,
+        (line >> 61) as u8,
+        (line >> 71) as u8,
+        (line >> 81) as u8,
+        (line >> 91) as u8,
+        (line >> 101) as u8,
+    ]
+}
+
+/// The line bits of eleven fields.
+pub(crate) const fn pack(b: &[u8; Frame::MAX_FIELDS]) -> u128 {
+    let [b0, b1, b2, b3, b4, b5, b6, b7, b8, b9, b10] = *b;
+    DELIMITER
+        | (b0 as u128) << 1
+        | (b1 as u128) << 11
+        | (b2 as u128) << 21
+        | (b3 as u128) << 31
+        | (b4 as u128) << 41
+        | (b5 as u128) << 51
+        | (b6 as u128) << 61
+        | (b7 as u128) << 71
+        | (b8 as u128) << 81
+        | (b9 as u128) << 91
+        | (b10 as u128) << 101
+}
+
+/// The line bits in 14 bytes as one integer, first bit in bit 0.
+pub(crate) fn load(bytes: &[u8; Frame::MAX_LINE_BYTES], order: BitOrder) -> u128 {
+    let mut word = [0; 16];
+    for (to, from) in word.iter_mut().zip(bytes) {
+        *to = *from;
+    }
+    match order {
+        BitOrder::LsbFirst => u128::from_le_bytes(word),
+        BitOrder::MsbFirst => u128::from_be_bytes(word).reverse_bits(),
+    }
+}
+
+/// Off the hot path: names the first fault of the framing in a line that should hold `fields` fields.
+#[cold]
+pub(crate) fn framing(line: Window, fields: u8) -> Error {
+    for field in 0..fields {
+        let at = u32::from(field).wrapping_mul(Frame::FIELD_BITS);
+        match (line.get(at), line.get(at.wrapping_add(9))) {
+            (Some(true), _) => return Error::StartBit { field },
+            (_, Some(false)) => return Error::Delimiter { field },
+            (_, None) => return Error::Truncated { got: field, want: fields },
+            _ => {}
+        }
+    }
+    // Never: the caller saw a fault.
+    Error::Truncated { got: fields, want: fields }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    /// Line bits of a frame, field by field and bit by bit.
+    fn slow_line(bytes: &[u8]) -> u128 {
+        let mut line = 0;
+        for (k, byte) in bytes.iter().enumerate() {
+            for bit in 0..8 {
+                line |= u128::from(byte >> bit & 1) << (10 * k + 1 + bit);
+            }
+            line |= 1 << (10 * k + 9);
+        }
+        line
+    }
+
+    proptest! {
+        #[test]
+        fn line_and_back(bytes in prop::collection::vec(any::<u8>(), 1..=11)) {
+            let frame = Frame::new(&bytes).unwrap();
+            prop_assert_eq!(frame.line().bits(), slow_line(&bytes));
+            prop_assert_eq!(frame.line().len() as usize, bytes.len() * 10);
+            prop_assert_eq!(Frame::from_line(frame.line(), frame.fields()), Ok(frame));
+        }
+
+        /// Every framing bit of every field, flipped alone, is named; every length short of the frame is told.
+        #[test]
+        fn framing_faults_are_named(bytes in prop::collection::vec(any::<u8>(), 1..=11)) {
+            let frame = Frame::new(&bytes).unwrap();
+            let (line, len) = (frame.line().bits(), frame.line_bits());
+            for field in 0..frame.fields() {
+                for (bit, want) in [(0, Error::StartBit { field }), (9, Error::Delimiter { field })] {
+                    let bad = Window::from_bits(line ^ 1 << (u32::from(field) * 10 + bit), len).unwrap();
+                    prop_assert_eq!(Frame::from_line(bad, frame.fields()), Err(want));
+                }
+            }
+            for short in 0..len {
+                let cut = Window::from_bits(line, short).unwrap();
+                let want = Error::Truncated { got: (short / 10) as u8, want: frame.fields() };
+                prop_assert_eq!(Frame::from_line(cut, frame.fields()), Err(want));
+            }
+        }
+    }
+
+    #[test]
+    fn sizes() {
+        assert_eq!((Frame::new(&[]), Frame::new(&[0; 12])), (None, None));
+        assert_eq!(Frame::new(&[7; 11]).unwrap().as_bytes(), [7; 11]);
+    }
+}

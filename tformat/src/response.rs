@@ -1,0 +1,520 @@
+use nrz_line::{BitOrder, Window};
+
+use crate::frame::{framing, is_framed11, load, pack, unpack};
+use crate::request::{check_crc, count};
+use crate::{Adf, Almc, ControlField, DataId, Error, Frame, Request, StatusField, U24};
+
+/// Answer to ID 0, 7, 8 and C.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "arbitrary", derive(arbitrary::Arbitrary))]
+pub struct SingleTurn {
+    /// SF.
+    pub sf: StatusField,
+    /// ABS0..ABS2: position in the turn; its width is the encoder's, see [`Profile`](crate::Profile).
+    pub abs: U24,
+}
+
+/// Answer to ID 1.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "arbitrary", derive(arbitrary::Arbitrary))]
+pub struct MultiTurn {
+    /// SF.
+    pub sf: StatusField,
+    /// ABM0..ABM2: turns.
+    pub abm: U24,
+}
+
+/// Answer to ID 2.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "arbitrary", derive(arbitrary::Arbitrary))]
+pub struct EncoderId {
+    /// SF.
+    pub sf: StatusField,
+    /// ENID.
+    pub enid: u8,
+}
+
+/// Answer to ID 3: all that an encoder knows, and also what it answers to a damaged request.
+///
+/// ```text
+///  field  0    1    2    3    4    5     6    7    8    9     10
+///         CF   SF  ABS0 ABS1 ABS2 ENID  ABM0 ABM1 ABM2 ALMC  CRC      TIDM-1011, table 2-5
+///         1a
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "arbitrary", derive(arbitrary::Arbitrary))]
+pub struct Full {
+    /// SF.
+    pub sf: StatusField,
+    /// ABS0..ABS2: position in the turn.
+    pub abs: U24,
+    /// ENID.
+    pub enid: u8,
+    /// ABM0..ABM2: turns.
+    pub abm: U24,
+    /// ALMC: the error byte.
+    pub almc: Almc,
+}
+
+/// Answer to ID 6 and D.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "arbitrary", derive(arbitrary::Arbitrary))]
+pub struct Memory {
+    /// ADF: address, and whether the memory was busy.
+    pub adf: Adf,
+    /// EDF: the byte read, or the written one repeated. Says nothing while the memory is busy.
+    pub edf: u8,
+}
+
+/// What an encoder sends, by the data ID it answers.
+///
+/// ```text
+///  ID 0, 7, 8, C   CF  SF  ABS0 ABS1 ABS2  CRC                                       TIDM-1011,
+///  ID 1            CF  SF  ABM0 ABM1 ABM2  CRC                                       tables 2-5, 2-7
+///  ID 2            CF  SF  ENID  CRC
+///  ID 3            CF  SF  ABS0 ABS1 ABS2  ENID  ABM0 ABM1 ABM2  ALMC  CRC
+///  ID 6, D         CF  ADF  EDF  CRC
+/// ```
+///
+/// ABS and ABM come low byte first. The control field repeats that of the request.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "arbitrary", derive(arbitrary::Arbitrary))]
+pub enum Response {
+    /// Single-turn data.
+    Id0(SingleTurn),
+    /// Multi-turn data.
+    Id1(MultiTurn),
+    /// Encoder ID.
+    Id2(EncoderId),
+    /// Everything.
+    Id3(Full),
+    /// Echo of an EEPROM write.
+    Id6(Memory),
+    /// Single-turn data, after one of ten resets of the errors.
+    Id7(SingleTurn),
+    /// Single-turn data, after one of ten settings of the single-turn zero.
+    Id8(SingleTurn),
+    /// Single-turn data, after one of ten resets of turns and errors.
+    IdC(SingleTurn),
+    /// An EEPROM byte.
+    IdD(Memory),
+}
+
+const CF3: u8 = DataId::Id3.control_field().get();
+
+impl Full {
+    /// Fields of the response.
+    pub const FIELDS: usize = 11;
+
+    /// Decodes the answer to ID 3 from UART bytes; bytes behind it are left alone.
+    ///
+    /// # Errors
+    /// As [`Response::parse`] for ID 3.
+    pub fn parse(bytes: &[u8]) -> Result<Self, Error> {
+        match bytes.first_chunk() {
+            Some(b) if is_sound(b) => Ok(Self::of(b)),
+            _ => Err(refusal(DataId::Id3, bytes)),
+        }
+    }
+
+    /// Decodes the answer to ID 3 from its 110 line bits, the first of them at the beginning of `line`.
+    ///
+    /// For a window at another bit offset see [`Response::parse_line`].
+    ///
+    /// # Errors
+    /// As [`Response::parse_line`] for ID 3.
+    pub fn parse_line(line: &[u8; Frame::MAX_LINE_BYTES], order: BitOrder) -> Result<Self, Error> {
+        let line = load(line, order);
+        if !is_framed11(line) {
+            return Err(Window::from_bits(line, 110).map_or(Error::Combinator, |w| framing(w, 11)));
+        }
+        let b = unpack(line);
+        if is_sound(&b) { Ok(Self::of(&b)) } else { Err(refusal(DataId::Id3, &b)) }
+    }
+
+    /// The fields as UART bytes.
+    pub const fn emit(self) -> [u8; Self::FIELDS] {
+        let ([a0, a1, a2], [m0, m1, m2]) = (self.abs.fields(), self.abm.fields());
+        let (sf, enid, almc) = (self.sf.raw(), self.enid, self.almc.raw());
+        let crc = CF3 ^ sf ^ a0 ^ a1 ^ a2 ^ enid ^ m0 ^ m1 ^ m2 ^ almc;
+        [CF3, sf, a0, a1, a2, enid, m0, m1, m2, almc, crc]
+    }
+
+    /// The 110 line bits in 14 bytes; the two bits behind them are 0.
+    pub const fn emit_line(self, order: BitOrder) -> [u8; Frame::MAX_LINE_BYTES] {
+        let line = pack(&self.emit());
+        let word = match order {
+            BitOrder::LsbFirst => line.to_le_bytes(),
+            BitOrder::MsbFirst => line.reverse_bits().to_be_bytes(),
+        };
+        match word.first_chunk() {
+            Some(bytes) => *bytes,
+            // Never: 14 of 16 bytes.
+            None => [0; Frame::MAX_LINE_BYTES],
+        }
+    }
+
+    const fn of(b: &[u8; Self::FIELDS]) -> Self {
+        let [_, sf, a0, a1, a2, enid, m0, m1, m2, almc, _] = *b;
+        Self {
+            sf: StatusField::new(sf),
+            abs: U24::from_fields(a0, a1, a2),
+            enid,
+            abm: U24::from_fields(m0, m1, m2),
+            almc: Almc::new(almc),
+        }
+    }
+}
+
+/// Whether eleven fields are an ID 3 frame with a good check field: the whole good path in four loads.
+const fn is_sound(b: &[u8; Full::FIELDS]) -> bool {
+    let [b0, b1, b2, b3, b4, b5, b6, b7, b8, b9, b10] = *b;
+    let sum = u32::from_le_bytes([b0, b1, b2, b3])
+        ^ u32::from_le_bytes([b4, b5, b6, b7])
+        ^ u32::from_le_bytes([b8, b9, b10, 0]);
+    let sum = sum ^ sum >> 16;
+    (sum ^ sum >> 8) & 0xff == 0 && b0 == CF3
+}
+
+impl Response {
+    /// Decodes the answer to `request` from UART bytes; bytes behind the answer are left alone.
+    ///
+    /// # Errors
+    /// In this order: [`Error::Truncated`] without any field, [`Error::SinkCode`], [`Error::Parity`],
+    /// [`Error::CfMismatch`], [`Error::Truncated`], [`Error::Crc`], [`Error::AddressMismatch`],
+    /// [`Error::DataMismatch`]. An ID 3 frame that was not asked for has to be complete and sound, then it is
+    /// [`Error::Rejected`].
+    pub fn parse(request: Request, bytes: &[u8]) -> Result<Self, Error> {
+        let id = request.data_id();
+        if id == DataId::Id3 {
+            return Full::parse(bytes).map(Self::Id3);
+        }
+        let response = Self::of(id, check(id, bytes)?)?;
+        if let Self::Id6(memory) | Self::IdD(memory) = response {
+            check_echo(request, memory)?;
+        }
+        Ok(response)
+    }
+
+    /// Decodes the answer to `request` from line bits on a fixed grid: field k begins at bit 10 k of `line`.
+    ///
+    /// # Errors
+    /// [`Error::StartBit`], [`Error::Delimiter`] or [`Error::Truncated`] for the first field that is not framed,
+    /// then as [`parse`](Self::parse).
+    pub fn parse_line(request: Request, line: Window) -> Result<Self, Error> {
+        let id = request.data_id();
+        let fields = match unpack(line.bits()) {
+            [cf, ..] if line.len() >= Frame::FIELD_BITS => expected_fields(id, cf),
+            _ => id.response_fields(),
+        };
+        let frame = Frame::from_line(line, fields)?;
+        Self::parse(request, frame.as_bytes())
+    }
+
+    /// The data ID that is answered.
+    pub const fn data_id(self) -> DataId {
+        match self {
+            Self::Id0(_) => DataId::Id0,
+            Self::Id1(_) => DataId::Id1,
+            Self::Id2(_) => DataId::Id2,
+            Self::Id3(_) => DataId::Id3,
+            Self::Id6(_) => DataId::Id6,
+            Self::Id7(_) => DataId::Id7,
+            Self::Id8(_) => DataId::Id8,
+            Self::IdC(_) => DataId::IdC,
+            Self::IdD(_) => DataId::IdD,
+        }
+    }
+
+    /// The fields to send.
+    pub const fn emit(self) -> Frame {
+        let cf = self.data_id().control_field().get();
+        match self {
+            Self::Id0(v) | Self::Id7(v) | Self::Id8(v) | Self::IdC(v) => Frame::of6(six_fields(cf, v.sf, v.abs)),
+            Self::Id1(v) => Frame::of6(six_fields(cf, v.sf, v.abm)),
+            Self::Id2(v) => Frame::of4([cf, v.sf.raw(), v.enid, cf ^ v.sf.raw() ^ v.enid]),
+            Self::Id3(v) => Frame::of11(v.emit()),
+            Self::Id6(v) | Self::IdD(v) => Frame::of4([cf, v.adf.raw(), v.edf, cf ^ v.adf.raw() ^ v.edf]),
+        }
+    }
+
+    /// SF, which all responses but those of the EEPROM carry.
+    pub const fn status(self) -> Option<StatusField> {
+        match self {
+            Self::Id0(v) | Self::Id7(v) | Self::Id8(v) | Self::IdC(v) => Some(v.sf),
+            Self::Id1(v) => Some(v.sf),
+            Self::Id2(v) => Some(v.sf),
+            Self::Id3(v) => Some(v.sf),
+            Self::Id6(_) | Self::IdD(_) => None,
+        }
+    }
+
+    /// ABS, in the responses that carry it.
+    pub const fn abs(self) -> Option<U24> {
+        match self {
+            Self::Id0(v) | Self::Id7(v) | Self::Id8(v) | Self::IdC(v) => Some(v.abs),
+            Self::Id3(v) => Some(v.abs),
+            _ => None,
+        }
+    }
+
+    /// Fields that were checked, taken apart.
+    fn of(id: DataId, fields: &[u8]) -> Result<Self, Error> {
+        let single = |sf, d0, d1, d2| SingleTurn { sf: StatusField::new(sf), abs: U24::from_fields(d0, d1, d2) };
+        Ok(match (id, fields) {
+            (DataId::Id0, &[_, sf, d0, d1, d2, _]) => Self::Id0(single(sf, d0, d1, d2)),
+            (DataId::Id7, &[_, sf, d0, d1, d2, _]) => Self::Id7(single(sf, d0, d1, d2)),
+            (DataId::Id8, &[_, sf, d0, d1, d2, _]) => Self::Id8(single(sf, d0, d1, d2)),
+            (DataId::IdC, &[_, sf, d0, d1, d2, _]) => Self::IdC(single(sf, d0, d1, d2)),
+            (DataId::Id1, &[_, sf, d0, d1, d2, _]) => {
+                Self::Id1(MultiTurn { sf: StatusField::new(sf), abm: U24::from_fields(d0, d1, d2) })
+            }
+            (DataId::Id2, &[_, sf, enid, _]) => Self::Id2(EncoderId { sf: StatusField::new(sf), enid }),
+            (DataId::Id6, &[_, adf, edf, _]) => Self::Id6(Memory { adf: Adf::new(adf), edf }),
+            (DataId::IdD, &[_, adf, edf, _]) => Self::IdD(Memory { adf: Adf::new(adf), edf }),
+            // ID 3 was decoded before; every other slice has the length of its response.
+            _ => return Err(Error::Truncated { got: count(fields), want: id.response_fields() }),
+        })
+    }
+}
+
+const fn six_fields(cf: u8, sf: StatusField, data: U24) -> [u8; 6] {
+    let (sf, [d0, d1, d2]) = (sf.raw(), data.fields());
+    [cf, sf, d0, d1, d2, cf ^ sf ^ d0 ^ d1 ^ d2]
+}
+
+/// How many fields the answer to a request for `id` has when it begins with `cf`: an ID 3 frame that was not
+/// asked for is the encoder's refusal.
+pub(crate) const fn expected_fields(id: DataId, cf: u8) -> u8 {
+    if cf == CF3 { DataId::Id3.response_fields() } else { id.response_fields() }
+}
+
+/// Control field, length and check field of an answer to `id`; gives its fields.
+fn check(id: DataId, bytes: &[u8]) -> Result<&[u8], Error> {
+    let want = id.response_fields();
+    let Some(&cf) = bytes.first() else { return Err(Error::Truncated { got: 0, want }) };
+    let wanted = id.control_field();
+    if cf != wanted.get() {
+        let got = ControlField::parse(cf)?.get();
+        return Err(if got == CF3 { rejection(bytes) } else { Error::CfMismatch { got, want: wanted.get() } });
+    }
+    let Some(fields) = bytes.get(..usize::from(want)) else { return Err(Error::Truncated { got: count(bytes), want }) };
+    check_crc(fields)?;
+    Ok(fields)
+}
+
+/// What an ID 3 frame that was not asked for means.
+#[cold]
+fn rejection(bytes: &[u8]) -> Error {
+    match Full::parse(bytes) {
+        Ok(full) => Error::Rejected { sf: full.sf },
+        Err(error) => error,
+    }
+}
+
+/// Off the hot path: why an answer to `id` is refused.
+#[cold]
+fn refusal(id: DataId, bytes: &[u8]) -> Error {
+    match check(id, bytes) {
+        Err(error) => error,
+        // Never: the caller saw a fault.
+        Ok(_) => Error::Truncated { got: count(bytes), want: id.response_fields() },
+    }
+}
+
+/// Whether an EEPROM answer speaks of the address that was asked for and, after a write, of the same data.
+///
+/// A busy memory did not do the operation; its data byte says nothing and is not compared.
+fn check_echo(request: Request, memory: Memory) -> Result<(), Error> {
+    let (Request::Id6 { adf, .. } | Request::IdD { adf }) = request else { return Ok(()) };
+    let (got, want) = (memory.adf.address(), adf.address());
+    if got != want {
+        return Err(Error::AddressMismatch { got: got.get(), want: want.get() });
+    }
+    match request {
+        Request::Id6 { edf, .. } if edf != memory.edf && !memory.adf.busy() => {
+            Err(Error::DataMismatch { got: memory.edf, want: edf })
+        }
+        _ => Ok(()),
+    }
+}
+
+#[cfg(test)]
+pub(crate) mod tests {
+    use super::*;
+    use crate::request::tests::requests;
+    use proptest::prelude::*;
+    use std::vec::Vec;
+
+    pub(crate) fn fulls() -> impl Strategy<Value = Full> {
+        (any::<[u8; 3]>(), any::<u32>(), any::<u32>()).prop_map(|([sf, enid, almc], abs, abm)| Full {
+            sf: StatusField::new(sf),
+            abs: U24::truncate(abs),
+            enid,
+            abm: U24::truncate(abm),
+            almc: Almc::new(almc),
+        })
+    }
+
+    /// A request and an answer that a sound encoder may give to it.
+    pub(crate) fn exchanges() -> impl Strategy<Value = (Request, Response)> {
+        (requests(), fulls(), any::<bool>()).prop_map(|(request, full, busy)| (request, answer(request, full, busy)))
+    }
+
+    /// The answer to `request` of an encoder that knows `full`.
+    fn answer(request: Request, full: Full, busy: bool) -> Response {
+        let single = SingleTurn { sf: full.sf, abs: full.abs };
+        match request {
+            Request::Id0 => Response::Id0(single),
+            Request::Id1 => Response::Id1(MultiTurn { sf: full.sf, abm: full.abm }),
+            Request::Id2 => Response::Id2(EncoderId { sf: full.sf, enid: full.enid }),
+            Request::Id3 => Response::Id3(full),
+            Request::Id6 { adf, edf } => Response::Id6(Memory { adf: Adf::of(adf.address(), busy), edf }),
+            Request::Id7 => Response::Id7(single),
+            Request::Id8 => Response::Id8(single),
+            Request::IdC => Response::IdC(single),
+            Request::IdD { adf } => Response::IdD(Memory { adf: Adf::of(adf.address(), busy), edf: full.enid }),
+        }
+    }
+
+    /// The published log of a TS5700N8401.
+    const LOGGED: [u8; 11] = [0x1a, 0x20, 0x29, 0xc0, 0x3b, 0x17, 0x00, 0x00, 0x00, 0xc8, 0x37];
+
+    #[test]
+    fn a_logged_answer_in_every_form() {
+        let full = Full::parse(&LOGGED).unwrap();
+        assert_eq!((full.abs.get(), full.enid, full.abm.get()), (3_915_817, 23, 0));
+        assert_eq!((full.sf.raw(), full.almc.raw()), (0x20, 0xc8));
+        assert!(full.sf.agrees_with(full.almc));
+        assert_eq!(full.emit(), LOGGED);
+        for order in [BitOrder::LsbFirst, BitOrder::MsbFirst] {
+            assert_eq!(Full::parse_line(&full.emit_line(order), order), Ok(full));
+        }
+    }
+
+    proptest! {
+        #[test]
+        fn bytes_and_line_round_trip((request, response) in exchanges()) {
+            let frame = response.emit();
+            prop_assert_eq!(Response::parse(request, frame.as_bytes()), Ok(response));
+            prop_assert_eq!(Response::parse_line(request, frame.line()), Ok(response));
+            prop_assert_eq!(frame.fields(), request.data_id().response_fields());
+        }
+
+        #[test]
+        fn bytes_behind_the_answer_are_left_alone((request, response) in exchanges(), tail: [u8; 4]) {
+            let bytes = [response.emit().as_bytes(), &tail].concat();
+            prop_assert_eq!(Response::parse(request, &bytes), Ok(response));
+        }
+
+        #[test]
+        fn accepted_bytes_are_what_it_would_emit(request in requests(), mut bytes in prop::collection::vec(any::<u8>(), 11)) {
+            let (cf, last) = (request.data_id().control_field().get(), usize::from(request.data_id().response_fields()) - 1);
+            bytes[0] = cf;
+            bytes[last] = crate::crc(&bytes[..last]);
+            if let Ok(response) = Response::parse(request, &bytes) {
+                let frame = response.emit();
+                prop_assert_eq!(frame.as_bytes(), &bytes[..=last]);
+            }
+        }
+
+        /// Every single wrong bit of the line is refused, by the check that covers it.
+        #[test]
+        fn single_flips_on_the_line((request, response) in exchanges()) {
+            let line = response.emit().line();
+            for at in 0..line.len() {
+                let bad = Window::from_bits(line.bits() ^ 1 << at, line.len()).unwrap();
+                let error = Response::parse_line(request, bad).unwrap_err();
+                let field = (at / 10) as u8;
+                let right = match (field, at % 10) {
+                    (_, 0) => error == Error::StartBit { field },
+                    (_, 9) => error == Error::Delimiter { field },
+                    (0, 1..=3) => matches!(error, Error::SinkCode { .. }),
+                    (0, _) => matches!(error, Error::Parity { .. }),
+                    _ => matches!(error, Error::Crc { .. }),
+                };
+                prop_assert!(right, "bit {}: {:?}", at, error);
+            }
+        }
+
+        #[test]
+        fn truncations((request, response) in exchanges()) {
+            let frame = response.emit();
+            let (bytes, want) = (frame.as_bytes(), frame.fields());
+            for got in 0..want {
+                let error = Err(Error::Truncated { got, want });
+                prop_assert_eq!(Response::parse(request, &bytes[..usize::from(got)]), error);
+                for bits in 0..10 {
+                    let short = Window::from_bits(frame.line().bits(), u32::from(got) * 10 + bits).unwrap();
+                    prop_assert_eq!(Response::parse_line(request, short), error);
+                }
+            }
+        }
+
+        /// An ID 3 frame to another request is a refusal, once it is complete and sound.
+        #[test]
+        fn rejections(request in requests(), full in fulls()) {
+            prop_assume!(request != Request::Id3);
+            let bytes = full.emit();
+            let rejected = Err(Error::Rejected { sf: full.sf });
+            prop_assert_eq!(Response::parse(request, &bytes), rejected);
+            prop_assert_eq!(Response::parse_line(request, Frame::of11(bytes).line()), rejected);
+            for got in 1..11 {
+                let cut = Response::parse(request, &bytes[..usize::from(got)]);
+                prop_assert_eq!(cut, Err(Error::Truncated { got, want: 11 }));
+            }
+            let mut bad = bytes;
+            bad[5] ^= 4;
+            let damaged = matches!(Response::parse(request, &bad), Err(Error::Crc { .. }));
+            prop_assert!(damaged);
+        }
+
+        #[test]
+        fn answers_to_other_requests((request, response) in exchanges(), other in requests()) {
+            prop_assume!(request.data_id() != other.data_id() && response.data_id() != DataId::Id3);
+            let error = Response::parse(other, response.emit().as_bytes());
+            let (got, want) = (request.data_id().control_field().get(), other.data_id().control_field().get());
+            prop_assert_eq!(error, Err(Error::CfMismatch { got, want }));
+        }
+
+        #[test]
+        fn eeprom_echo(adf: u8, edf: u8, other: u8) {
+            let (adf, other_adf) = (Adf::of(Adf::new(adf).address(), false), Adf::of(Adf::new(other).address(), false));
+            let write = Request::Id6 { adf, edf };
+            let address = Response::parse(write, Response::Id6(Memory { adf: other_adf, edf }).emit().as_bytes());
+            prop_assert_eq!(address.is_ok(), adf == other_adf);
+            if adf != other_adf {
+                let (got, want) = (other_adf.raw(), adf.raw());
+                prop_assert_eq!(address, Err(Error::AddressMismatch { got, want }));
+            }
+            let data = Response::parse(write, Response::Id6(Memory { adf, edf: other }).emit().as_bytes());
+            prop_assert_eq!(data.err(), (other != edf).then_some(Error::DataMismatch { got: other, want: edf }));
+            // A busy memory did not write; its data byte is not compared.
+            let busy = Memory { adf: Adf::of(adf.address(), true), edf: other };
+            prop_assert_eq!(Response::parse(write, Response::Id6(busy).emit().as_bytes()), Ok(Response::Id6(busy)));
+        }
+    }
+
+    /// Damage that the XOR cannot see is accepted: the limit is documented, not hidden.
+    #[test]
+    fn what_the_check_field_cannot_see_is_accepted() {
+        let mut two_bits = LOGGED;
+        two_bits[2] ^= 1;
+        two_bits[3] ^= 1;
+        assert_eq!(Full::parse(&two_bits).map(|f| f.abs.get()), Ok(0x3b_c029 ^ 0x101));
+        let all_ones: Vec<u8> = std::vec![0xff; 6];
+        assert_eq!(Response::parse(Request::Id0, &all_ones), Err(Error::SinkCode { cf: 0xff }));
+    }
+}
