@@ -8,12 +8,14 @@ extern crate std;
 
 pub mod cut_through;
 
+mod clock;
 mod crc;
 mod delay_req;
 mod discovery;
 mod error;
 mod exchange;
 mod frame;
+mod line_delay;
 mod param;
 mod payload;
 mod preamble;
@@ -21,7 +23,9 @@ mod pto;
 mod status;
 pub mod stream;
 mod sync;
+pub mod timing;
 
+pub use clock::{AVERAGE, Clock, Correction, WRITE_DELAY_NS};
 pub use crc::{crc8, crc8_update, fcs};
 pub use delay_req::DelayReq;
 pub use discovery::{Assignment, Discovery, DiscoveryView, Entry, MAX_DEVICES, Network};
@@ -31,6 +35,7 @@ pub use exchange::{
     write_master_frame,
 };
 pub use frame::{DeviceAddress, FrameType, LongFrame, MULTICAST};
+pub use line_delay::{DelayModel, LineDelay, SAMPLES};
 pub use param::{CrcKind, CrcMode, Param, ParamView, Parameters, Topology};
 pub use payload::{MotorMask, Payload, Slice};
 pub use preamble::{Preamble, strip_preamble};
