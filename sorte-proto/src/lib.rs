@@ -15,6 +15,7 @@ mod discovery;
 mod error;
 mod exchange;
 mod frame;
+pub mod iep;
 mod line_delay;
 mod param;
 mod payload;
@@ -23,6 +24,7 @@ mod pto;
 mod status;
 pub mod stream;
 mod sync;
+pub mod sync0;
 pub mod timing;
 
 pub use clock::{AVERAGE, Clock, Correction, WRITE_DELAY_NS};
