@@ -79,9 +79,13 @@ impl LineDelay {
     }
 
     /// The line delay in ns as the published firmware computes it: everything wraps, and round trips shorter than the
-    /// forwarding time give a huge delay.
+    /// forwarding time give a huge delay. The master halves 16 bits, the device 32 of which it then keeps 16.
     pub const fn published(&self) -> u16 {
-        self.published_mean().wrapping_sub(self.model.forward_ns) >> 1
+        if !self.model.shift_samples {
+            return self.published_mean().wrapping_sub(self.model.forward_ns) >> 1;
+        }
+        let [low, high, ..] = (self.sum.wrapping_sub(self.model.forward_ns as u32) >> 1).to_le_bytes();
+        u16::from_le_bytes([low, high])
     }
 
     /// The line delay in ns.
@@ -119,7 +123,8 @@ mod tests {
         // 360 / 16 is cut to 22 sixteen times: 352 is less than the forwarding time, and the published result wraps.
         let device = of(DelayModel::DEVICE, [360; 16]);
         assert_eq!(device.checked(), Err(Error::ImplausibleRoundTrip { rtt_ns: 352 }));
-        assert_eq!(device.published(), (352u16.wrapping_sub(360)) >> 1);
+        assert_eq!(device.published(), 65532);
+        assert_eq!(of(DelayModel::MASTER, [312; 16]).published(), 32764);
     }
 
     #[test]
