@@ -122,7 +122,7 @@ struct SyncHop {
 pub(super) fn sync(rows: &[Row]) -> Vec<Verdict> {
     crate::row::each(rows, |row: SyncRow| {
         let mut wire = row.master_frame.0;
-        for (index, hop) in row.numbers.into_iter().enumerate() {
+        for (index, hop) in row.hops.into_iter().enumerate() {
             same("hop", &hop.hop, &(index + 1))?;
             same("rx", &hop.rx.0, &wire)?;
             let (line, last, error) = (hop.line_delay_next, hop.is_last, hop.prev_frame_crc_error);
