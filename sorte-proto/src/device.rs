@@ -453,11 +453,11 @@ impl Device {
     /// the cycle at the start of the frame and now. Frames of the other port just pass.
     ///
     /// # Errors
-    /// As [`MasterFrameView::new`] and [`MasterFrameView::slice`]; [`Error::WrongDestination`] if the device is not in
+    /// As [`MasterFrameView::new`] and [`MasterFrameView::slice`]; [`Error::WrongState`] if the device is not in
     /// IO exchange. The frame counts as received even so.
     pub fn exchange<'a>(&mut self, frame: &'a [u8], sof_ns: u32, counter_ns: u32) -> Result<Output<'a>, Error> {
         let (State::Exchange, Some(place), Some((sync, _))) = (self.state(), self.assignment, self.last_sync) else {
-            return Err(Error::WrongDestination { got: 0 });
+            return Err(Error::WrongState);
         };
         self.received = true;
         let output_len = self.config.output_len.or(self.output_total).unwrap_or_default();

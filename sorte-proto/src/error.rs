@@ -1,3 +1,5 @@
+use crate::FrameType;
+
 /// Why bytes, a number or an event were refused.
 ///
 /// The checks are made in the order given with each parser; the first that fails is reported. A refusal leaves
@@ -151,6 +153,50 @@ pub enum Error {
         /// Value written, the same bits left out.
         want: u16,
     },
+    /// A start-up frame was not answered in time.
+    #[error("no answer to {sent:?} frame {frame}")]
+    NoAnswer {
+        /// TYPE of the frame sent.
+        sent: FrameType,
+        /// Its number in this phase, from 0.
+        frame: u16,
+    },
+    /// DISCOVERY found fewer devices than asked for.
+    #[error("{got} devices answered, {want} are needed")]
+    TooFewDevices {
+        /// Devices in the line.
+        got: u8,
+        /// Devices asked for.
+        want: u8,
+    },
+    /// Device frames were missing in too many cycles one after the other.
+    #[error("{count} devices have not answered for {cycles} cycles, the first of them is device {first}")]
+    DevicesMissing {
+        /// Address of the first that is missing.
+        first: u8,
+        /// How many are.
+        count: u8,
+        /// For so many cycles.
+        cycles: u8,
+    },
+    /// Device frames were damaged in too many cycles one after the other.
+    #[error("damaged device frames in {cycles} cycles one after the other")]
+    TooManyCrcErrors {
+        /// For so many cycles.
+        cycles: u8,
+    },
+    /// A device frame comes from beyond the line, or LAST is set or missing where it was not before.
+    #[error("the line has changed: device {address} does not fit what DISCOVERY found")]
+    TopologyChanged {
+        /// Who sent the frame.
+        address: u8,
+    },
+    /// The link of the master is down.
+    #[error("the link is down")]
+    LinkDown,
+    /// The frame does not belong to the present state.
+    #[error("the frame does not belong to the present state")]
+    WrongState,
     /// A `nom` combinator of the caller refused the input.
     #[error("a parser combinator refused the input")]
     Combinator,
@@ -183,12 +229,19 @@ pub enum ErrorClass {
     ImplausibleTimeStamp,
     ReservedCode,
     ReadBack,
+    NoAnswer,
+    TooFewDevices,
+    DevicesMissing,
+    TooManyCrcErrors,
+    TopologyChanged,
+    LinkDown,
+    WrongState,
     Combinator,
 }
 
 impl ErrorClass {
     /// All classes.
-    pub const ALL: [Self; 21] = [
+    pub const ALL: [Self; 28] = [
         Self::Truncated,
         Self::BadFcs,
         Self::WrongDestination,
@@ -209,6 +262,13 @@ impl ErrorClass {
         Self::ImplausibleTimeStamp,
         Self::ReservedCode,
         Self::ReadBack,
+        Self::NoAnswer,
+        Self::TooFewDevices,
+        Self::DevicesMissing,
+        Self::TooManyCrcErrors,
+        Self::TopologyChanged,
+        Self::LinkDown,
+        Self::WrongState,
         Self::Combinator,
     ];
 }
@@ -237,6 +297,13 @@ impl Error {
             Self::ImplausibleTimeStamp { .. } => ErrorClass::ImplausibleTimeStamp,
             Self::ReservedCode { .. } => ErrorClass::ReservedCode,
             Self::ReadBack { .. } => ErrorClass::ReadBack,
+            Self::NoAnswer { .. } => ErrorClass::NoAnswer,
+            Self::TooFewDevices { .. } => ErrorClass::TooFewDevices,
+            Self::DevicesMissing { .. } => ErrorClass::DevicesMissing,
+            Self::TooManyCrcErrors { .. } => ErrorClass::TooManyCrcErrors,
+            Self::TopologyChanged { .. } => ErrorClass::TopologyChanged,
+            Self::LinkDown => ErrorClass::LinkDown,
+            Self::WrongState => ErrorClass::WrongState,
             Self::Combinator => ErrorClass::Combinator,
         }
     }

@@ -19,6 +19,7 @@ mod exchange;
 mod frame;
 pub mod iep;
 mod line_delay;
+pub mod master;
 mod param;
 mod payload;
 mod preamble;

@@ -5,6 +5,7 @@ mod device;
 mod drv8711;
 mod exchange;
 mod frames;
+mod startup;
 mod sync0;
 mod time;
 
@@ -19,6 +20,7 @@ pub(super) const TOPICS: &[(&str, Check)] = &[
     ("ioex_master", exchange::master),
     ("ioex_master_negative", exchange::master_negative),
     ("line_delay", time::line_delay),
+    ("master_startup", startup::master_startup),
     ("negative", frames::negative),
     ("param", frames::param),
     ("process_data_slice", exchange::process_data_slice),
