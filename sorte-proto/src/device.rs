@@ -347,7 +347,7 @@ impl Device {
 
     /// A start-up frame that began with [`begin`](Self::begin) has ended at `port`.
     pub fn end(&mut self, port: PortId, passage: Passage, arrival: Arrival) -> Handled {
-        let Port { state, flags } = *self.port(port);
+        let state = self.port(port).state;
         let path = self.path(port);
         let mut handled = Handled { path, result: Ok(()), trigger: Trigger::None, correction: Correction::None };
         if state == State::Exchange {
@@ -360,7 +360,7 @@ impl Device {
         self.count(handled.result);
         let Ok(learnt) = learnt else { return handled };
         handled.trigger = self.port_mut(port).head(passage.head).trigger;
-        let master = flags.has(PortFlags::MASTER_PORT);
+        let master = self.port(port).flags.has(PortFlags::MASTER_PORT);
         if master && state.waits_for(passage.head) {
             self.alive_ns = arrival.now_ns;
         }

@@ -8,6 +8,8 @@ extern crate std;
 
 pub mod cut_through;
 
+#[cfg(test)]
+mod both_ends;
 mod clock;
 mod crc;
 mod delay_req;

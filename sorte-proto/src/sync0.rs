@@ -353,3 +353,6 @@ impl Sync0 {
         writes.cfg = self.cfg;
     }
 }
+
+#[cfg(test)]
+mod tests;
