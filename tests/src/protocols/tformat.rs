@@ -333,9 +333,8 @@ fn procedures(rows: &[Row]) -> Vec<Verdict> {
             let device = &mut encoder.1;
             let answered = Request::parse(&request.0).map(|asked| device.answer(asked, t_us * 1000));
             same("response", &Ok(response.0), &answered.map(|r| r.emit().as_bytes().to_vec()))?;
-            let memory = match answered {
-                Ok(Response::Id6(memory) | Response::IdD(memory)) => memory,
-                _ => return same("response", &"of the EEPROM", &"another"),
+            let Ok(Response::Id6(memory) | Response::IdD(memory)) = answered else {
+                return same("response", &"of the EEPROM", &"another");
             };
             same("busy", &busy, &memory.adf.busy())?;
             same("adf", &adf, &memory.adf.address().get())?;
