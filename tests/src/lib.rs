@@ -13,6 +13,7 @@
 
 mod hex;
 mod protocols;
+mod pru;
 mod row;
 mod runner;
 

@@ -1,6 +1,7 @@
 //! Which topics there are. A new protocol is one file here and one line in [`ALL`].
 
 mod sorte;
+mod step_profile;
 mod tformat;
 
 use crate::row::Check;
@@ -8,7 +9,8 @@ use crate::row::Check;
 /// A protocol's folder name and its topics.
 type Protocol = (&'static str, &'static [(&'static str, Check)]);
 
-const ALL: &[Protocol] = &[("sorte", sorte::TOPICS), ("tformat", tformat::TOPICS)];
+const ALL: &[Protocol] =
+    &[("sorte", sorte::TOPICS), ("step-profile", step_profile::TOPICS), ("tformat", tformat::TOPICS)];
 
 pub(crate) fn names() -> Vec<&'static str> {
     ALL.iter().map(|(name, _)| *name).collect()

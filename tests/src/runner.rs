@@ -22,6 +22,12 @@ pub struct Topic {
     pub failures: Vec<Failure>,
 }
 
+impl fmt::Display for Topic {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}/{}: {} passed, {} failed", self.protocol, self.topic, self.passed, self.failures.len())
+    }
+}
+
 /// A row that failed.
 #[derive(Debug, Clone)]
 pub struct Failure {

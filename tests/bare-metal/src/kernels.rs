@@ -6,6 +6,7 @@
 #[cfg(feature = "deliberate-panic")]
 mod deliberate_panic;
 mod nrz_line;
+mod step_profile;
 mod tformat;
 
 /// An entry point that is measured and walked.
@@ -18,6 +19,7 @@ pub(crate) struct Kernel {
 
 pub(crate) const ALL: &[&[Kernel]] = &[
     nrz_line::KERNELS,
+    step_profile::KERNELS,
     tformat::KERNELS,
     #[cfg(feature = "deliberate-panic")]
     deliberate_panic::KERNELS,
