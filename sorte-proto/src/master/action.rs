@@ -65,7 +65,7 @@ pub enum Action {
         /// Which.
         frame: Outgoing,
     },
-    /// Send the master frame of a cycle, see [`Master::write_frame`].
+    /// Send the master frame of a cycle, see [`Master::write_frame`](super::Master::write_frame).
     Exchange {
         /// When it is triggered.
         at_ns: u64,
