@@ -5,6 +5,7 @@
 
 pub mod hexlog;
 mod input;
+pub mod pcapng;
 pub mod raw;
 pub mod saleae_binary;
 pub mod saleae_csv;
@@ -53,6 +54,8 @@ pub enum Capture {
     Samples(raw::Raw),
     /// Bytes without time.
     Bytes(hexlog::HexLog),
+    /// Packets of a network.
+    Packets(pcapng::Pcapng),
 }
 
 /// File formats.
@@ -70,6 +73,8 @@ pub enum Format {
     Packed,
     /// Bytes as hex digits, a burst a line.
     Hex,
+    /// Packets of a network capture.
+    Pcapng,
 }
 
 /// What the user said about the files.
@@ -100,6 +105,8 @@ fn known(head: &[u8]) -> Option<Format> {
     let text = head.strip_prefix(b"\xef\xbb\xbf").unwrap_or(head).trim_ascii_start();
     if head.starts_with(b"<SALEAE>") {
         Some(Format::SaleaeBinary)
+    } else if head.starts_with(pcapng::MAGIC) {
+        Some(Format::Pcapng)
     } else if VCD.iter().any(|keyword| text.starts_with(keyword)) {
         Some(Format::Vcd)
     } else if text.get(..4).is_some_and(|word| word.eq_ignore_ascii_case(b"time")) {
@@ -132,6 +139,7 @@ fn decoder(mut input: Input, format: Format, hints: Hints) -> Result<Capture, Fa
             Capture::Samples(raw::Raw::new(input, rate, unit))
         }
         Format::Hex => Capture::Bytes(hexlog::HexLog::new(input)),
+        Format::Pcapng => Capture::Packets(pcapng::Pcapng::new(input)?),
     })
 }
 

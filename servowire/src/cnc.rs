@@ -5,7 +5,7 @@ mod line;
 mod noise;
 mod plot;
 mod program;
-pub(crate) mod record;
+mod record;
 mod report;
 
 use std::error::Error;
@@ -44,8 +44,9 @@ pub struct Arguments {
     /// Length of a move in steps; 51200 are a turn at 1/256.
     #[arg(long, value_name = "N", default_value_t = 51_200)]
     steps: u32,
-    /// Step frequencies in Hz; they take turns from move to move.
-    #[arg(long, value_name = "HZ", value_delimiter = ',', default_value = "250000")]
+    /// Step frequencies in Hz; they take turns from move to move. 250000, or 249000 with --published-sync0: at 250 kHz
+    /// all steps have the same phase, and that machine is at home there.
+    #[arg(long, value_name = "HZ", value_delimiter = ',')]
     freq: Vec<u32>,
     /// Steps that each of the 32 ramp entries lasts.
     #[arg(long, value_name = "N", default_value_t = 1)]
@@ -135,7 +136,9 @@ impl Arguments {
         if self.dance {
             return Program::dance(self.motors(), parameters(Speed::KHZ_100));
         }
-        let speeds = self.freq.iter().map(|hz| Speed::from_frequency(Frequency::from_hz(*hz)));
+        let default = if self.published_sync0 { 249_000 } else { 250_000 };
+        let freq = if self.freq.is_empty() { core::slice::from_ref(&default) } else { self.freq.as_slice() };
+        let speeds = freq.iter().map(|hz| Speed::from_frequency(Frequency::from_hz(*hz)));
         let profiles: Result<Vec<_>, _> = speeds.map(|speed| Profile::new(parameters(speed?))).collect();
         let moves = if self.cycles.is_some() { u64::MAX } else { self.moves };
         Ok(Program::turns(self.motors(), profiles?, self.steps, moves))

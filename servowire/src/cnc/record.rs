@@ -8,7 +8,7 @@ use std::time::Duration;
 
 use pcap_file::DataLink;
 use pcap_file::pcapng::PcapNgWriter;
-use pcap_file::pcapng::blocks::enhanced_packet::EnhancedPacketBlock;
+use pcap_file::pcapng::blocks::enhanced_packet::{EnhancedPacketBlock, EnhancedPacketOption};
 use pcap_file::pcapng::blocks::interface_description::{InterfaceDescriptionBlock, InterfaceDescriptionOption};
 use sorte_proto::{FrameType, Preamble};
 use vcd::{IdCode, TimescaleUnit, VarType, Writer};
@@ -21,8 +21,8 @@ const BYTE_NS: u64 = 80;
 const SHORT: usize = Preamble::Short.bytes().len();
 
 /// Interface of the start-up frames, which are Ethernet frames; and of the others.
-pub(crate) const ETHERNET: u32 = 0;
-pub(crate) const EXCHANGE: u32 = 1;
+const ETHERNET: u32 = 0;
+const EXCHANGE: u32 = 1;
 
 /// Takes what happens, as far as anybody wants it.
 #[derive(Default)]
@@ -86,7 +86,8 @@ impl Recorder {
                 timestamp: Duration::from_nanos(at_ns),
                 original_len: frame.len() as u32,
                 data: Cow::Borrowed(frame),
-                options: Vec::new(),
+                // Bits 0 and 1: inbound, outbound.
+                options: vec![EnhancedPacketOption::Flags(if answer { 1 } else { 2 })],
             });
             self.keep(result.map(|_| ()).map_err(io::Error::other));
         }
