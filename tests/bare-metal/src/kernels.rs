@@ -5,9 +5,13 @@
 
 #[cfg(feature = "deliberate-panic")]
 mod deliberate_panic;
-mod nrz_line;
+#[cfg(feature = "nrz-line")]
+pub(crate) mod nrz_line;
+#[cfg(feature = "step-profile")]
 mod step_profile;
+#[cfg(feature = "tformat")]
 mod tformat;
+#[cfg(feature = "tformat")]
 mod tformat_ends;
 
 /// An entry point that is measured and walked.
@@ -19,9 +23,13 @@ pub(crate) struct Kernel {
 }
 
 pub(crate) const ALL: &[&[Kernel]] = &[
+    #[cfg(feature = "nrz-line")]
     nrz_line::KERNELS,
+    #[cfg(feature = "step-profile")]
     step_profile::KERNELS,
+    #[cfg(feature = "tformat")]
     tformat::KERNELS,
+    #[cfg(feature = "tformat")]
     tformat_ends::KERNELS,
     #[cfg(feature = "deliberate-panic")]
     deliberate_panic::KERNELS,
