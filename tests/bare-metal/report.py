@@ -76,6 +76,8 @@ class Image:
 
     def fault(self, symbol):
         """Why `symbol` cannot be said to be free of panics, as a path of names; None if it is."""
+        if symbol not in self.by_name:
+            return f"{symbol} is no function of the image"
         found = self.reach(symbol)
         for function in found:
             if PANIC.search(function.name):
@@ -86,7 +88,7 @@ class Image:
 
     def size(self, symbol):
         """Bytes of `symbol` and of all that it calls."""
-        return sum(f.end - f.start for f in self.reach(symbol))
+        return sum(f.end - f.start for f in self.reach(symbol)) if symbol in self.by_name else 0
 
 
 def parse(text):
