@@ -120,7 +120,7 @@ def read(function, mnemonic, operands, halves):
         elif half[1] in halves:
             function.pointers.add(halves[half[1]] | int(half[2], 0) << 16)
     elif re.match(r"(blx|bx)\w* r\d+|(blx|bx)\w* (ip|r12)", f"{mnemonic} {operands}") or re.match(
-        r"(ldr|mov)\w* pc,", f"{mnemonic} {operands}"
+        r"(ldr|mov|add)\w* pc,", f"{mnemonic} {operands}"
     ):
         function.indirect.append(f"{mnemonic} {operands}")
     elif target := TARGET.search(operands):
