@@ -10,6 +10,8 @@ use serde_json::Value;
 
 #[path = "seed_corpus/nrz_line.rs"]
 mod nrz_line;
+#[path = "seed_corpus/rtex.rs"]
+mod rtex;
 #[path = "seed_corpus/tformat.rs"]
 mod tformat;
 
@@ -18,7 +20,7 @@ const SEEDS: usize = 15;
 /// A target, the vector file its seeds come from, and the input that a row becomes; `None` for rows of another kind.
 type Source = (&'static str, &'static str, fn(&Value) -> Option<Vec<u8>>);
 
-const SOURCES: &[&[Source]] = &[nrz_line::SOURCES, tformat::SOURCES];
+const SOURCES: &[&[Source]] = &[nrz_line::SOURCES, rtex::SOURCES, tformat::SOURCES];
 
 fn main() -> io::Result<()> {
     let here = Path::new(env!("CARGO_MANIFEST_DIR"));
@@ -39,7 +41,8 @@ fn main() -> io::Result<()> {
 /// Name and input of a row.
 fn seed(line: &str, input: fn(&Value) -> Option<Vec<u8>>) -> Option<(String, Vec<u8>)> {
     let row: Value = serde_json::from_str(line).expect("a vector file holds JSON");
-    Some((row["name"].as_str()?.to_owned(), input(&row)?))
+    let name = row["name"].as_str().or(row["id"].as_str())?;
+    Some((name.to_owned(), input(&row)?))
 }
 
 /// `"0220b4"` as bytes.

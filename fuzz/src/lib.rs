@@ -5,6 +5,7 @@
 //! [`TARGETS`], a file in `fuzz_targets/` and its `[[bin]]`, and seeds from `examples/seed_corpus.rs`.
 
 pub mod nrz_line;
+pub mod rtex;
 pub mod tformat;
 
 /// A target.
@@ -13,6 +14,10 @@ pub type Target = fn(&[u8]);
 /// All targets by name.
 pub const TARGETS: &[(&str, Target)] = &[
     ("nrz_receiver", nrz_line::receiver),
+    ("rtex_block", rtex::block),
+    ("rtex_drive", rtex::drive),
+    ("rtex_log", rtex::log),
+    ("rtex_ring", rtex::ring),
     ("tformat_request", tformat::request),
     ("tformat_response", tformat::response),
     ("tformat_differential", tformat::differential),
