@@ -6,6 +6,7 @@
 
 pub mod nrz_line;
 pub mod rtex;
+pub mod step_profile;
 pub mod tformat;
 
 /// A target.
@@ -18,10 +19,15 @@ pub const TARGETS: &[(&str, Target)] = &[
     ("rtex_drive", rtex::drive),
     ("rtex_log", rtex::log),
     ("rtex_ring", rtex::ring),
+    ("step_profile_step", step_profile::step),
+    ("step_profile_axis", step_profile::axis),
     ("tformat_request", tformat::request),
     ("tformat_response", tformat::response),
     ("tformat_differential", tformat::differential),
     ("tformat_stream", tformat::stream),
+    ("tformat_master", tformat::ends::master),
+    ("tformat_device", tformat::ends::device),
+    ("tformat_inspect", tformat::ends::inspect),
 ];
 
 /// Takes a byte off the front; 0 when none is left.

@@ -120,6 +120,9 @@ pub enum Verdict {
     Refused(Box<Refusal>),
 }
 
+/// The class of an answer that was due and did not come.
+pub const NO_RESPONSE: &str = "no_response";
+
 /// Why a frame was refused.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Refusal {
@@ -141,6 +144,11 @@ impl Verdict {
     /// Whether all checks passed.
     pub fn is_ok(&self) -> bool {
         *self == Self::Ok
+    }
+
+    /// Whether this is no frame but the absence of one.
+    pub fn is_silence(&self) -> bool {
+        matches!(self, Self::Refused(refusal) if refusal.class == NO_RESPONSE)
     }
 }
 

@@ -1,17 +1,19 @@
 //! From a recorded line to start-stop fields: find the channel, the rate and the polarity, then receive.
 
+mod preview;
 mod receive;
 mod survey;
 
 use std::fmt;
 use std::io;
 
+use preview::Preview;
 pub use receive::{EdgeReceiver, SampleReceiver};
 pub use survey::{Survey, survey};
 
 use crate::capture::hexlog::Burst;
 use crate::capture::raw::{Raw, Words};
-use crate::capture::{Capture, Change, Line};
+use crate::capture::{Capture, Line};
 use crate::fault::{At, Fault};
 use crate::output::{Output, Sink};
 
@@ -111,9 +113,6 @@ impl fmt::Display for Stop {
     }
 }
 
-/// Changes looked at before decoding begins.
-const PREVIEW: usize = 1 << 16;
-
 /// Decodes a capture of a start-stop protocol. `make` builds the decoder for a bit length in picoseconds.
 pub fn decode<P: StartStop>(
     file: &str,
@@ -140,7 +139,8 @@ pub fn decode<P: StartStop>(
             let preview = Preview::read(line.as_mut());
             let found = preview.survey(file, line.channels(), options, make)?;
             out.note(&format!("{file}: {found}"));
-            edges(line.as_mut(), preview, found.setup, &mut make(found.setup.bit()), out)
+            edges(line.as_mut(), preview, found.setup, &mut make(found.setup.bit()), out)?;
+            right_way_up(file, options, found.setup)
         }
         Capture::Samples(mut raw) => {
             let preview = Preview::read(&mut raw);
@@ -148,68 +148,34 @@ pub fn decode<P: StartStop>(
             out.note(&format!("{file}: {found}"));
             let setup = found.setup;
             let mut protocol = make(setup.bit());
-            let (rate, bit_rate) = (raw.clock().rate(), u64::from(setup.rate));
-            if rate < 4 * bit_rate {
-                let what = format!(
-                    "{} samples a bit are too few: 4 or more are needed, so sample at {} MHz or faster",
-                    two_digits(rate as f64 / bit_rate as f64),
-                    two_digits(4e-6 * bit_rate as f64)
-                );
+            if let Some(what) = too_coarse(raw.clock().rate(), setup.rate) {
                 return Err(Fault::new(file, At::File, what).into());
             }
             match SampleReceiver::new(raw.clock(), setup, P::CONTENT_BITS) {
                 Some(receiver) if !out.wants_changes() => samples(&mut raw, preview, receiver, &mut protocol, out),
                 _ => edges(&mut raw, preview, setup, &mut protocol, out),
-            }
+            }?;
+            right_way_up(file, options, setup)
         }
     }
 }
 
-fn two_digits(value: f64) -> String {
-    let text = format!("{value:.2}");
-    text.trim_end_matches('0').trim_end_matches('.').to_owned()
+/// A line that was found upside down is decoded, but it is not good: somebody has to look at the wires.
+fn right_way_up(file: &str, options: &Options, setup: Setup) -> Result<(), Stop> {
+    if !setup.inverted || options.inverted.is_some() {
+        return Ok(());
+    }
+    let what = "the line is inverted: exchange A and B, or say that it is meant so with --polarity inverted";
+    Err(Fault::new(file, At::File, what).into())
 }
 
-/// The beginning of a capture, and whether it went wrong there.
-struct Preview {
-    changes: Vec<Change>,
-    more: bool,
-    fault: Option<Fault>,
-    reached: i64,
-}
-
-impl Preview {
-    /// Time of the first change of any channel.
-    fn begin(&self) -> i64 {
-        self.changes.first().map_or(0, |change| change.time)
-    }
-
-    fn read(line: &mut dyn Line) -> Self {
-        let mut changes = Vec::new();
-        let (mut more, mut fault) = (true, None);
-        while more && changes.len() < PREVIEW {
-            match line.read(&mut changes) {
-                Ok(again) => more = again,
-                Err(e) => (more, fault) = (false, Some(e)),
-            }
-        }
-        Self { changes, more, fault, reached: line.reached() }
-    }
-
-    /// With nothing to decode, the fault of the file is the better message.
-    fn survey<P: StartStop>(
-        &self,
-        file: &str,
-        channels: &[String],
-        options: &Options,
-        make: &dyn Fn(i64) -> P,
-    ) -> Result<Survey, Fault> {
-        let found = survey(&self.changes, self.reached, channels, options, make);
-        found.map_err(|what| match &self.fault {
-            Some(fault) => fault.clone(),
-            None => Fault::new(file, At::File, what),
-        })
-    }
+/// Fewer than four samples a bit.
+fn too_coarse(rate: u64, bit_rate: u32) -> Option<String> {
+    let need = 4 * u64::from(bit_rate);
+    let digits = |value: f64| format!("{value:.2}").trim_end_matches('0').trim_end_matches('.').to_owned();
+    let (a_bit, mhz) = (digits(rate as f64 / f64::from(bit_rate)), digits(need as f64 / 1e6));
+    let what = format!("{a_bit} samples a bit are too few: 4 or more are needed, so sample at {mhz} MHz or faster");
+    (rate < need).then_some(what)
 }
 
 /// Decodes changes with their times.

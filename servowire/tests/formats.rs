@@ -121,7 +121,8 @@ fn times_before_the_trigger() {
 fn hex_logs() {
     let bench = Bench::new();
     let log = "# position and turns\n1A\n1A 20 29 C0 3B 17 00 00 00 C8 37\n02 0220b4bd1c37\n0x92,0x92,0x00,0x17,0x85\n\
-        EA 01 EB\nEA 01 5A B1\n02 20 50 A9 78 A3\n# with the echo of the request\n1A\n1A1A2029C03B17000000C837\n";
+        EA 01 EB\nEA 01 5A B1\n02 20 50 A9 78 A3\n# with the echo of the request\n1A\n1A1A2029C03B17000000C837\n\
+        # two exchanges on a line\n020220b4bd1c37 020220b4bd1c37\n";
     let run = bench.decode("log.txt", log, &["--bytes", "--json"]);
     run.is_good();
     let kinds: Vec<String> =
@@ -138,6 +139,10 @@ fn hex_logs() {
         "8 \"answer\" \"ID 0\"",
         "10 \"request\" \"ID 3\"",
         "11 \"answer\" \"ID 3\"",
+        "13 \"request\" \"ID 0\"",
+        "13 \"answer\" \"ID 0\"",
+        "13 \"request\" \"ID 0\"",
+        "13 \"answer\" \"ID 0\"",
     ];
     assert_eq!(kinds, want);
 }

@@ -110,7 +110,7 @@ fn a_wrong_check_field() {
     });
     run.fails_with("1 of 6 frames refused: crc 1");
     let answer = &run.json()[1];
-    assert_eq!((&answer["verdict"], &answer["at_field"]), (&json!("crc"), &json!("field 10")));
+    assert_eq!((&answer["verdict"], &answer["at_field"]), (&json!("crc"), &json!("CRC")));
     assert!(answer["reason"].as_str().unwrap().contains("computed 0x50"), "{answer}");
     // Ten fields of 4 us after the beginning of the answer.
     assert_eq!(answer["at_ps"].as_i64(), answer["start_ps"].as_i64().map(|start| start + 40_000_000));
@@ -132,7 +132,7 @@ fn a_low_delimiter() {
     let answer = &run.json()[1];
     assert_eq!(
         (&answer["verdict"], &answer["at_field"], &answer["at_bit"]),
-        (&json!("delimiter"), &json!("field 3"), &json!(9))
+        (&json!("delimiter"), &json!("ABS1"), &json!(9))
     );
     assert_eq!(run.json().len(), 2, "{}", run.out);
     assert_eq!(run.code, 1);
@@ -178,7 +178,11 @@ fn answers_that_are_too_short_or_missing() {
         wave.exchange(&[0x92], &sealed(&[0x8a, 0, 0, 0, 0]));
     });
     assert_eq!(run.verdicts(), ["ok", "truncated", "ok", "truncated", "ok", "no_response", "ok", "cf_mismatch"]);
-    assert!(run.json()[1]["reason"].as_str().unwrap().contains("7 of 11 fields"));
+    let short = &run.json()[1];
+    assert!(short["reason"].as_str().unwrap().contains("7 of 11 fields"));
+    assert_eq!((&short["at_field"], &short["at_ps"]), (&json!("ABM1"), &short["end_ps"]));
+    // ID 1 (8A) for ID 2 (92): bits 3 and 4 of the byte differ.
+    assert_eq!((&run.json()[7]["at_field"], &run.json()[7]["at_bit"]), (&json!("CF"), &json!(4)));
 }
 
 #[test]
@@ -191,6 +195,18 @@ fn answers_alone() {
     let run = Bench::new().decode("rx.vcd", wave.vcd(), &["--json"]);
     run.is_good();
     assert!(run.json().iter().all(|e| e["direction"] == "answer" && e.get("delay_ps").is_none()), "{}", run.out);
+}
+
+/// Nothing is passed over: what follows an answer without a pause is a frame of its own.
+#[test]
+fn fields_behind_an_answer() {
+    let run = decode(|wave| {
+        wave.exchange(&[0x02], &[&id0(9)[..], &[0x55, 0x66]].concat());
+        wave.send(&[&id3(7, 0, 0)[..], &[0x55, 0x66]].concat()).idle_us(40.0);
+    });
+    assert_eq!(run.verdicts(), ["ok", "ok", "sink_code", "ok", "sink_code"]);
+    let log = Bench::new().decode("a.txt", "02 02 20 B4 BD 1C 37 55 66\n", &["--bytes", "--json"]);
+    assert_eq!(log.verdicts(), ["ok", "ok", "sink_code", "sink_code"]);
 }
 
 /// Pauses between the fields of an answer, as a UART makes them.

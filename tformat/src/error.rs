@@ -175,6 +175,28 @@ impl ErrorClass {
         Self::UpperBits,
         Self::Combinator,
     ];
+
+    /// The name in lower case, as logs and test vectors spell it.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::StartBit => "start_bit",
+            Self::Delimiter => "delimiter",
+            Self::Truncated => "truncated",
+            Self::SinkCode => "sink_code",
+            Self::Parity => "parity",
+            Self::UnknownDataId => "unknown_data_id",
+            Self::CfMismatch => "cf_mismatch",
+            Self::Rejected => "rejected",
+            Self::Crc => "crc",
+            Self::AddressMismatch => "address_mismatch",
+            Self::DataMismatch => "data_mismatch",
+            Self::EchoMismatch => "echo_mismatch",
+            Self::NoResponse => "no_response",
+            Self::Busy => "busy",
+            Self::UpperBits => "upper_bits",
+            Self::Combinator => "combinator",
+        }
+    }
 }
 
 impl Error {
@@ -198,6 +220,18 @@ impl Error {
             Self::UpperBits { .. } => ErrorClass::UpperBits,
             Self::Combinator => ErrorClass::Combinator,
         }
+    }
+}
+
+impl nrz_line::Classified for ErrorClass {
+    fn class_index(&self) -> usize {
+        *self as usize
+    }
+}
+
+impl nrz_line::Classified for Error {
+    fn class_index(&self) -> usize {
+        self.class().class_index()
     }
 }
 
@@ -226,6 +260,12 @@ mod tests {
     fn an_error_fits_two_words_of_a_32_bit_core_and_a_half() {
         assert!(size_of::<Error>() <= 2 * size_of::<u64>());
         assert!(size_of::<Result<(), Error>>() <= 2 * size_of::<u64>());
+    }
+
+    #[test]
+    fn every_class_has_a_place_of_its_own() {
+        use nrz_line::Classified;
+        assert!(ErrorClass::ALL.iter().enumerate().all(|(k, class)| class.class_index() == k));
     }
 
     #[test]

@@ -100,6 +100,7 @@ impl Spread {
 impl Figures {
     fn add(&mut self, event: &Event, limit: Option<u64>) {
         match event.direction {
+            _ if event.verdict.is_silence() => {}
             Some(Direction::Request) => self.requests += 1,
             Some(Direction::Answer) => self.answers += 1,
             None => self.others += 1,
@@ -118,6 +119,9 @@ impl Figures {
             self.delay.add(delay);
         }
         let Place::Time { start, .. } = event.place else { return };
+        if event.verdict.is_silence() {
+            return;
+        }
         self.keep_cycle(event.direction, start);
         if let Some(position) = event.position {
             self.follow(start, position, limit);

@@ -71,9 +71,7 @@ impl<W: Write> Sink for Text<W> {
     fn event(&mut self, event: &Event) -> io::Result<()> {
         match event.direction {
             Some(Direction::Answer) => match self.held.take() {
-                Some(request) if event.kind == request.kind || event.fields.is_empty() => {
-                    self.print(event, request.place, "<>")
-                }
+                Some(request) if event.kind == request.kind => self.print(event, request.place, "<>"),
                 held => {
                     self.held = held;
                     self.release()?;
@@ -136,10 +134,17 @@ fn verdict_text(line: &mut String, verdict: &Verdict) {
     match verdict {
         Verdict::Ok => line.push_str("  ok"),
         Verdict::Refused(refusal) => {
-            let _ = write!(line, "  REFUSED {}: {}", refusal.class, refusal.reason);
+            let _ = write!(line, "  REFUSED {}", refusal.class);
+            if let Some(field) = &refusal.field {
+                let _ = write!(line, " in {field}");
+            }
+            if let Some(bit) = refusal.bit {
+                let _ = write!(line, " bit {bit}");
+            }
             if let Some(time) = refusal.time {
                 let _ = write!(line, " at {:.3} us", time as f64 / 1e6);
             }
+            let _ = write!(line, ": {}", refusal.reason);
             if let Some(cause) = &refusal.cause {
                 let _ = write!(line, " ({cause})");
             }

@@ -5,17 +5,19 @@
 //! answer whose request was not recorded.
 
 mod describe;
+mod frame;
 
 use std::io;
 
 use tformat::inspect::{Cause, inspect, inspect_bytes};
-use tformat::{BitRate, ControlField, DataId, Error, Full, Request, Response, Window};
+use tformat::{BitRate, ControlField, DataId, Error, Full, Request, Response};
 
 use crate::capture::hexlog::Burst;
-use crate::event::{Event, Place, Verdict};
+use crate::event::{Event, Verdict};
 use crate::line::{LineField, StartStop};
 use crate::output::Sink;
 use describe::Encoder;
+use frame::{Frame, MOST_FIELDS, Pending};
 
 pub use describe::FIELDS;
 
@@ -37,14 +39,8 @@ const TURN_ROUND_BITS: i64 = 4;
 /// An answer begins within this time, nominally 3 us, in picoseconds.
 const ANSWER_TIMEOUT: i64 = 20_000_000;
 
-/// Twice the nominal time: what begins later and looks like a request is one, in picoseconds.
-const LATE_ANSWER: i64 = 6_000_000;
-
 /// The longest answer, with some pauses in it, in bits.
 const LONGEST_BITS: i64 = 150;
-
-/// More fields without a pause are no frame.
-const MOST_FIELDS: usize = 16;
 
 /// Finds the frames among the fields of a line.
 pub struct Decoder {
@@ -58,113 +54,6 @@ pub struct Decoder {
     skipped: i64,
     open: Frame,
     pending: Option<Pending>,
-}
-
-/// Fields that followed each other.
-#[derive(Debug, Clone, Copy, Default)]
-struct Frame {
-    bytes: [u8; MOST_FIELDS],
-    starts: [i64; MOST_FIELDS],
-    fields: usize,
-    end: i64,
-    /// The first field whose delimiter read 0.
-    broken: Option<u8>,
-    spikes: u32,
-    /// The line of a log without times.
-    line: Option<u64>,
-}
-
-impl Frame {
-    fn bytes(&self) -> &[u8] {
-        self.bytes.get(..self.fields).unwrap_or_default()
-    }
-
-    fn start(&self) -> i64 {
-        self.starts.first().copied().unwrap_or_default()
-    }
-
-    fn push(&mut self, field: &LineField) {
-        let k = self.fields.min(MOST_FIELDS - 1);
-        if let (Some(byte), Some(start)) = (self.bytes.get_mut(k), self.starts.get_mut(k)) {
-            *byte = (field.content & 0xff) as u8;
-            *start = field.start;
-        }
-        if !field.delimiter && self.broken.is_none() {
-            self.broken = u8::try_from(k).ok();
-        }
-        self.spikes = self.spikes.saturating_add(field.spikes);
-        self.end = field.end;
-        self.fields = k + 1;
-    }
-
-    /// The data ID that the first field asks for or answers.
-    fn data_id(&self) -> Result<DataId, Error> {
-        ControlField::parse(self.first())?.data_id()
-    }
-
-    /// The first field, 0 where there is none.
-    fn first(&self) -> u8 {
-        self.bytes.first().copied().unwrap_or_default()
-    }
-
-    /// The bits of the line from the first start bit on, as far as the fields tell: idle line between them.
-    fn line(&self, bit: i64) -> Option<Window> {
-        let mut bits = u128::MAX;
-        for (byte, start) in self.bytes().iter().zip(&self.starts) {
-            let at = (start - self.start() + bit / 2) / bit.max(1);
-            let ten = 1 << 9 | u128::from(*byte) << 1;
-            let clear = u32::try_from(at).ok().and_then(|at| 0x3ff_u128.checked_shl(at));
-            if let (Some(clear), Ok(at)) = (clear, u32::try_from(at)) {
-                bits = bits & !clear | ten << at;
-            }
-        }
-        if let Some(at) = self.broken.and_then(|field| self.starts.get(usize::from(field))) {
-            let at = (at - self.start() + bit / 2) / bit.max(1) + 9;
-            bits &= !u32::try_from(at).ok().and_then(|at| 1_u128.checked_shl(at)).unwrap_or(0);
-        }
-        let len = ((self.end - self.start()) / bit.max(1)).clamp(0, 128);
-        Window::from_bits(bits, u32::try_from(len).ok()?)
-    }
-
-    fn place(&self) -> Place {
-        match self.line {
-            Some(line) => Place::Line(line),
-            None => Place::Time { start: self.start(), end: self.end },
-        }
-    }
-}
-
-/// A request that waits for its answer.
-#[derive(Debug, Clone, Copy)]
-struct Pending {
-    /// None where the request was damaged.
-    request: Option<Request>,
-    place: Place,
-}
-
-impl Pending {
-    /// When it ended; none in a log without times.
-    fn end(&self) -> Option<i64> {
-        match self.place {
-            Place::Time { end, .. } => Some(end),
-            Place::Line(_) => None,
-        }
-    }
-
-    /// Whether a frame is not the answer but the next request: it is one, and later than an answer begins.
-    fn is_asked_again(&self, frame: &Frame) -> bool {
-        let late = self.end().is_some_and(|end| frame.start() - end > LATE_ANSWER);
-        late && frame.broken.is_none()
-            && frame.fields < self.answer_fields(frame.first())
-            && frame.data_id().is_ok_and(|id| frame.fields == usize::from(id.request_fields()))
-    }
-
-    /// Fields of the answer that begins with `cf`: as that says, or where it is damaged, as was asked.
-    fn answer_fields(&self, cf: u8) -> usize {
-        let said = ControlField::parse(cf).and_then(ControlField::data_id).ok();
-        let id = said.or(self.request.map(Request::data_id)).unwrap_or(DataId::Id3);
-        usize::from(id.response_fields())
-    }
 }
 
 impl Decoder {
@@ -202,6 +91,13 @@ impl Decoder {
                 self.open.broken.is_some() && start - self.open.start() > whole * self.bit
             }
         }
+    }
+
+    /// Whether the open frame is whole as an answer and too long for a request.
+    fn is_answer_alone(&self) -> bool {
+        let Ok(id) = self.open.data_id() else { return false };
+        let (request, answer) = (usize::from(id.request_fields()), usize::from(id.response_fields()));
+        self.pending.is_none() && self.open.broken.is_none() && self.open.fields == answer && answer > request
     }
 
     /// The open frame is over.
@@ -260,7 +156,7 @@ impl Decoder {
         let longer = |id: DataId| frame.fields > usize::from(id.request_fields());
         // More fields than any request has are an answer whatever they hold.
         if asked.map_or(frame.fields > 4, longer) {
-            let result = match (frame.broken, alone(frame)) {
+            let result = match (frame.broken, Request::answered_by(frame.bytes())) {
                 (Some(field), _) => Err(Error::Delimiter { field }),
                 (None, Ok(request)) => Response::parse(request, frame.bytes()),
                 (None, Err(error)) => Err(error),
@@ -284,12 +180,9 @@ impl Decoder {
         }
     }
 
-    /// Takes the first `fields` of a burst as a frame.
-    fn take(&mut self, burst: &Burst, from: usize, fields: usize, out: &mut dyn Sink) -> io::Result<()> {
-        let mut frame = Frame { line: Some(burst.line), ..Frame::default() };
-        for &byte in burst.bytes.iter().skip(from).take(fields) {
-            frame.push(&LineField { content: byte.into(), delimiter: true, start: 0, end: 0, spikes: 0 });
-        }
+    /// A frame of a log.
+    fn take(&mut self, line: u64, bytes: &[u8], out: &mut dyn Sink) -> io::Result<()> {
+        let frame = Frame::of_log(line, bytes);
         let event = match self.pending.take() {
             Some(pending) => self.answer(&frame, pending),
             None => self.unasked(&frame),
@@ -329,34 +222,33 @@ impl StartStop for Decoder {
         let whole = self.pending.is_some_and(|pending| {
             self.open.broken.is_none() && self.open.fields == pending.answer_fields(self.open.first())
         });
-        if whole || self.open.fields == MOST_FIELDS { self.close(out) } else { Ok(()) }
+        if whole || self.is_answer_alone() || self.open.fields == MOST_FIELDS { self.close(out) } else { Ok(()) }
     }
 
-    /// A line of a log: a request, its answer, or both.
+    /// A line of a log: requests and answers, one behind the other.
     fn burst(&mut self, burst: &Burst, out: &mut dyn Sink) -> io::Result<()> {
-        let bytes = burst.bytes.len();
-        let cf = burst.bytes.first().copied().unwrap_or_default();
-        let id = ControlField::parse(cf).and_then(ControlField::data_id);
-        let request = id.map_or(bytes.min(1), |id| usize::from(id.request_fields()));
-        if let Some(pending) = self.pending {
-            if bytes == request && bytes < pending.answer_fields(cf) {
-                self.give_up(0, out)?;
-            } else {
-                // A receiver that is always on hears the own request first.
-                let echo = pending.request.map(Request::emit);
-                let heard = echo.and_then(|echo| burst.bytes.strip_prefix(echo.as_bytes()));
-                let answer =
-                    heard.filter(|rest| rest.first().is_some_and(|cf| rest.len() == pending.answer_fields(*cf)));
-                let from = answer.map_or(0, |answer| bytes - answer.len());
-                return self.take(burst, from, bytes - from, out);
-            }
+        let mut rest = burst.bytes.as_slice();
+        let id = |bytes: &[u8]| ControlField::parse(bytes.first().copied().unwrap_or_default())?.data_id();
+        // The line is nothing but a request, or nothing but an answer.
+        let is_request = id(rest).is_ok_and(|id| rest.len() == usize::from(id.request_fields()));
+        let is_answer = id(rest).is_ok_and(|id| rest.len() == usize::from(id.response_fields())) && !is_request;
+        if self.pending.is_some_and(|pending| is_request && rest.len() < pending.answer_fields_of(rest)) {
+            self.give_up(0, out)?;
         }
-        if id.is_ok_and(|id| bytes == usize::from(id.response_fields()) && bytes > request) {
-            return self.take(burst, 0, bytes, out);
+        if is_answer && self.pending.is_none() {
+            return self.take(burst.line, rest, out);
         }
-        self.take(burst, 0, request.min(bytes), out)?;
-        if bytes > request {
-            self.take(burst, request, bytes - request, out)?;
+        while !rest.is_empty() {
+            let fields = match self.pending {
+                Some(pending) => {
+                    rest = pending.without_echo(rest);
+                    pending.answer_fields_of(rest)
+                }
+                None => id(rest).map_or(1, |id| usize::from(id.request_fields())),
+            };
+            let (frame, behind) = rest.split_at_checked(fields).unwrap_or((rest, &[]));
+            self.take(burst.line, frame, out)?;
+            rest = behind;
         }
         Ok(())
     }
@@ -368,7 +260,7 @@ impl StartStop for Decoder {
             let request = self.pending.is_none()
                 && self.open.data_id().is_ok_and(|id| self.open.fields == usize::from(id.request_fields()));
             if recent && !request {
-                return out.event(&describe::cut(self.open.place(), "the capture ends inside a frame"));
+                return out.event(&describe::cut_off(self.open.place()));
             }
             self.close(out)?;
         }
@@ -377,21 +269,4 @@ impl StartStop for Decoder {
             _ => Ok(()),
         }
     }
-}
-
-/// The request that a frame would answer, from the frame itself.
-fn alone(frame: &Frame) -> Result<Request, Error> {
-    let field = |k: usize| frame.bytes().get(k).copied().unwrap_or_default();
-    let address = tformat::Adf::new(field(1) & 0x7f);
-    Ok(match frame.data_id()? {
-        DataId::Id0 => Request::Id0,
-        DataId::Id1 => Request::Id1,
-        DataId::Id2 => Request::Id2,
-        DataId::Id3 => Request::Id3,
-        DataId::Id6 => Request::Id6 { adf: address, edf: field(2) },
-        DataId::Id7 => Request::Id7,
-        DataId::Id8 => Request::Id8,
-        DataId::IdC => Request::IdC,
-        DataId::IdD => Request::IdD { adf: address },
-    })
 }

@@ -7,7 +7,9 @@
 mod deliberate_panic;
 mod nrz_line;
 mod rtex;
+mod step_profile;
 mod tformat;
+mod tformat_ends;
 
 /// An entry point that is measured and walked.
 pub(crate) struct Kernel {
@@ -19,7 +21,9 @@ pub(crate) struct Kernel {
 
 pub(crate) const ALL: &[&[Kernel]] = &[
     nrz_line::KERNELS,
+    step_profile::KERNELS,
     tformat::KERNELS,
+    tformat_ends::KERNELS,
     rtex::KERNELS,
     #[cfg(feature = "deliberate-panic")]
     deliberate_panic::KERNELS,

@@ -2,10 +2,11 @@
 
 use std::borrow::Cow;
 
-use tformat::{Adf, Almc, DataId, Error, ErrorClass, Full, Memory, Profile, Request, Response, StatusField, U24};
+use tformat::{Adf, Almc, DataId, Error, Full, Memory, Profile, Request, Response, StatusField, U24};
 
-use super::{ANSWER_TIMEOUT, Frame, Settings};
-use crate::event::{Direction, Event, Field, Place, Position, Refusal, Value, Verdict};
+use super::frame::Frame;
+use super::{ANSWER_TIMEOUT, Settings};
+use crate::event::{Direction, Event, Field, NO_RESPONSE, Place, Position, Refusal, Value, Verdict};
 
 /// The fields an event may have.
 pub const FIELDS: &[&str] =
@@ -21,7 +22,8 @@ pub(super) fn request(frame: &Frame, id: Option<DataId>, result: Result<Request,
         Err(_) => fields.push(bytes(frame)),
     }
     fields.extend(spikes(frame));
-    event(frame, Direction::Request, id, fields, verdict(frame, result.err()))
+    let names = id.map_or(&["CF"][..], request_names);
+    event(frame, Direction::Request, id, fields, verdict(frame, names, result.err()))
 }
 
 /// What is known of the encoder.
@@ -60,7 +62,8 @@ impl Encoder {
             fields.extend(frame.bytes().last().map(|crc| hex("CRC", *crc)));
         }
         fields.extend(spikes(frame));
-        let mut event = event(frame, Direction::Answer, id, fields, verdict(frame, result.err()));
+        let names = frame.data_id().ok().or(id).map_or(&["CF"][..], answer_names);
+        let mut event = event(frame, Direction::Answer, id, fields, verdict(frame, names, result.err()));
         event.position = position;
         event.delay = delay;
         event
@@ -149,6 +152,14 @@ pub(super) fn cut(place: Place, what: &str) -> Event {
     }
 }
 
+/// A piece of a frame at the end of the capture: what comes then is not known, so it is not sound.
+pub(super) fn cut_off(place: Place) -> Event {
+    let reason = "the capture ends inside a frame".to_owned();
+    let cause = Some("the file was cut off, or recording stopped there".to_owned());
+    let refusal = Refusal { class: "truncated", reason, field: None, bit: None, time: None, cause };
+    Event { fields: Vec::new(), verdict: Verdict::Refused(Box::new(refusal)), ..cut(place, "") }
+}
+
 /// No answer came to the request at `place` until `now`.
 pub(super) fn silence(request: Request, place: Place, now: i64) -> Event {
     let (place, reason) = match place {
@@ -160,14 +171,8 @@ pub(super) fn silence(request: Request, place: Place, now: i64) -> Event {
         Place::Line(_) => (place, "no answer before the next request".to_owned()),
     };
     let cause = "only the request is on the line: no encoder, A and B exchanged, or not its bit rate";
-    let refusal = Refusal {
-        class: class(ErrorClass::NoResponse),
-        reason,
-        field: None,
-        bit: None,
-        time: None,
-        cause: Some(cause.to_owned()),
-    };
+    let refusal =
+        Refusal { class: NO_RESPONSE, reason, field: None, bit: None, time: None, cause: Some(cause.to_owned()) };
     Event {
         place,
         direction: Some(Direction::Answer),
@@ -256,51 +261,56 @@ fn too_wide(error: Error, profile: Profile, fields: &mut Vec<Field>) -> Option<P
     None
 }
 
-fn verdict(frame: &Frame, error: Option<Error>) -> Verdict {
+/// Fields of a request.
+fn request_names(id: DataId) -> &'static [&'static str] {
+    match id {
+        DataId::Id6 => &["CF", "ADF", "EDF", "CRC"],
+        DataId::IdD => &["CF", "ADF", "CRC"],
+        _ => &["CF"],
+    }
+}
+
+/// Fields of an answer.
+fn answer_names(id: DataId) -> &'static [&'static str] {
+    match id {
+        DataId::Id0 | DataId::Id7 | DataId::Id8 | DataId::IdC => &["CF", "SF", "ABS0", "ABS1", "ABS2", "CRC"],
+        DataId::Id1 => &["CF", "SF", "ABM0", "ABM1", "ABM2", "CRC"],
+        DataId::Id2 => &["CF", "SF", "ENID", "CRC"],
+        DataId::Id3 => &["CF", "SF", "ABS0", "ABS1", "ABS2", "ENID", "ABM0", "ABM1", "ABM2", "ALMC", "CRC"],
+        DataId::Id6 | DataId::IdD => &["CF", "ADF", "EDF", "CRC"],
+    }
+}
+
+fn verdict(frame: &Frame, names: &[&'static str], error: Option<Error>) -> Verdict {
     let Some(error) = error else { return Verdict::Ok };
     let (field, bit) = place(error, frame);
-    let start = field.and_then(|field| frame.starts.get(field)).copied().filter(|_| frame.line.is_none());
+    // A field that is missing should have begun where the frame ends.
+    let start = field.map(|field| frame.bytes().get(field).and(frame.starts.get(field)).copied().unwrap_or(frame.end));
+    let start = start.filter(|_| frame.line.is_none());
     Verdict::Refused(Box::new(Refusal {
-        class: class(error.class()),
+        class: error.class().name(),
         reason: error.to_string(),
-        field: field.map(|field| format!("field {field}")),
+        field: field.and_then(|field| names.get(field)).map(|name| (*name).to_owned()),
         bit,
         time: start,
         cause: None,
     }))
 }
 
-/// The field and the bit in which an error shows.
+/// The field in which an error shows, and the first bit of it that is wrong: 0 is the start bit.
 fn place(error: Error, frame: &Frame) -> (Option<usize>, Option<u32>) {
-    let last = frame.fields.saturating_sub(1);
+    let differs = |got: u8, want: u8| Some(1 + (got ^ want).trailing_zeros()).filter(|bit| *bit < 9);
     match error {
         Error::StartBit { field } => (Some(field.into()), Some(0)),
         Error::Delimiter { field } => (Some(field.into()), Some(9)),
-        Error::SinkCode { .. } => (Some(0), Some(1)),
+        Error::Truncated { got, .. } => (Some(got.into()), None),
+        Error::SinkCode { cf } => (Some(0), differs(cf & 0b111, 0b010)),
         Error::Parity { .. } => (Some(0), Some(8)),
-        Error::UnknownDataId { .. } | Error::CfMismatch { .. } => (Some(0), Some(4)),
-        Error::Crc { .. } => (Some(last), None),
-        Error::AddressMismatch { .. } => (Some(1), None),
-        Error::DataMismatch { .. } => (Some(2), None),
+        Error::UnknownDataId { .. } => (Some(0), None),
+        Error::CfMismatch { got, want } => (Some(0), differs(got, want)),
+        Error::Crc { .. } => (Some(frame.fields.saturating_sub(1)), None),
+        Error::AddressMismatch { got, want } => (Some(1), differs(got, want)),
+        Error::DataMismatch { got, want } => (Some(2), differs(got, want)),
         _ => (None, None),
-    }
-}
-
-/// Names for statistics, as in the reference vectors.
-fn class(class: ErrorClass) -> &'static str {
-    match class {
-        ErrorClass::StartBit => "start_bit",
-        ErrorClass::Delimiter => "delimiter",
-        ErrorClass::Truncated => "truncated",
-        ErrorClass::SinkCode => "sink_code",
-        ErrorClass::Parity => "parity",
-        ErrorClass::UnknownDataId => "unknown_data_id",
-        ErrorClass::CfMismatch => "cf_mismatch",
-        ErrorClass::Rejected => "rejected",
-        ErrorClass::Crc => "crc",
-        ErrorClass::AddressMismatch => "address_mismatch",
-        ErrorClass::DataMismatch => "data_mismatch",
-        ErrorClass::NoResponse => "no_response",
-        _ => "other",
     }
 }
