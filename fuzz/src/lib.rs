@@ -20,6 +20,9 @@ pub const TARGETS: &[(&str, Target)] = &[
     ("tformat_response", tformat::response),
     ("tformat_differential", tformat::differential),
     ("tformat_stream", tformat::stream),
+    ("tformat_master", tformat::ends::master),
+    ("tformat_device", tformat::ends::device),
+    ("tformat_inspect", tformat::ends::inspect),
 ];
 
 /// Takes a byte off the front; 0 when none is left.

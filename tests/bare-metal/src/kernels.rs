@@ -8,6 +8,7 @@ mod deliberate_panic;
 mod nrz_line;
 mod step_profile;
 mod tformat;
+mod tformat_ends;
 
 /// An entry point that is measured and walked.
 pub(crate) struct Kernel {
@@ -21,6 +22,7 @@ pub(crate) const ALL: &[&[Kernel]] = &[
     nrz_line::KERNELS,
     step_profile::KERNELS,
     tformat::KERNELS,
+    tformat_ends::KERNELS,
     #[cfg(feature = "deliberate-panic")]
     deliberate_panic::KERNELS,
 ];
