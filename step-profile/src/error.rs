@@ -76,6 +76,9 @@ pub enum Error {
         /// The last: 4.
         limit: u32,
     },
+    /// A frequency is a fraction with a denominator of 1 or more.
+    #[error("a frequency with denominator 0")]
+    ZeroDenominator,
     /// The speed constant of this frequency does not fit 32 bits.
     #[error("step frequency below 15.26 Hz: its speed constant does not fit 32 bits")]
     FrequencyTooLow,
@@ -103,6 +106,7 @@ pub enum ErrorClass {
     InvalidMotorMask,
     InvalidMicrostep,
     InvalidMode,
+    ZeroDenominator,
     FrequencyTooLow,
     Moving,
     NoMotor,
@@ -121,6 +125,7 @@ impl Error {
             Self::InvalidMotorMask { .. } => ErrorClass::InvalidMotorMask,
             Self::InvalidMicrostep { .. } => ErrorClass::InvalidMicrostep,
             Self::InvalidMode { .. } => ErrorClass::InvalidMode,
+            Self::ZeroDenominator => ErrorClass::ZeroDenominator,
             Self::FrequencyTooLow => ErrorClass::FrequencyTooLow,
             Self::Moving => ErrorClass::Moving,
             Self::NoMotor => ErrorClass::NoMotor,
