@@ -4,6 +4,7 @@
 //! variant of [`Protocol`], and a line in each of its methods. A start-stop protocol implements
 //! [`StartStop`](crate::line::StartStop) and is done; another kind takes the [`Capture`] itself.
 
+pub mod rtex;
 pub mod tformat;
 
 use crate::capture::Capture;
@@ -15,6 +16,8 @@ use crate::output::Output;
 pub enum Protocol {
     /// Tamagawa T-Format.
     Tformat,
+    /// Panasonic RTEX data blocks, from logs of bytes.
+    Rtex,
 }
 
 /// What the user said about line and protocol.
@@ -24,6 +27,8 @@ pub struct Settings {
     pub line: line::Options,
     /// About T-Format.
     pub tformat: tformat::Settings,
+    /// About RTEX.
+    pub rtex: rtex::Settings,
 }
 
 impl Protocol {
@@ -31,6 +36,8 @@ impl Protocol {
     pub fn field_names(self) -> &'static [&'static str] {
         match self {
             Self::Tformat => tformat::FIELDS,
+            // A log of blocks has no times, so there is no VCD to hold its fields.
+            Self::Rtex => &[],
         }
     }
 
@@ -41,6 +48,7 @@ impl Protocol {
                 let make = |bit| tformat::Decoder::new(bit, settings.tformat);
                 line::decode(file, capture, &settings.line, &make, out)
             }
+            Self::Rtex => rtex::decode(file, capture, &settings.rtex, out),
         }
     }
 }

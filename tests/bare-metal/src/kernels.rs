@@ -6,6 +6,7 @@
 #[cfg(feature = "deliberate-panic")]
 mod deliberate_panic;
 mod nrz_line;
+mod rtex;
 mod step_profile;
 mod tformat;
 mod tformat_ends;
@@ -23,6 +24,7 @@ pub(crate) const ALL: &[&[Kernel]] = &[
     step_profile::KERNELS,
     tformat::KERNELS,
     tformat_ends::KERNELS,
+    rtex::KERNELS,
     #[cfg(feature = "deliberate-panic")]
     deliberate_panic::KERNELS,
 ];
