@@ -4,7 +4,9 @@
 //! `fuzz_targets/` hands them to the fuzzer. A new target is a function in the file of its protocol, a line in
 //! [`TARGETS`], a file in `fuzz_targets/` and its `[[bin]]`, and seeds from `examples/seed_corpus.rs`.
 
+pub mod hdsl;
 pub mod nrz_line;
+pub mod rtex;
 pub mod step_profile;
 pub mod tformat;
 
@@ -13,7 +15,19 @@ pub type Target = fn(&[u8]);
 
 /// All targets by name.
 pub const TARGETS: &[(&str, Target)] = &[
+    ("hdsl_symbol", hdsl::symbol),
+    ("hdsl_answer", hdsl::answer),
+    ("hdsl_head", hdsl::head),
+    ("hdsl_message", hdsl::message),
+    ("hdsl_learn", hdsl::learn),
+    ("hdsl_position", hdsl::position),
+    ("hdsl_master", hdsl::master),
+    ("hdsl_link", hdsl::link),
     ("nrz_receiver", nrz_line::receiver),
+    ("rtex_block", rtex::block),
+    ("rtex_drive", rtex::drive),
+    ("rtex_log", rtex::log),
+    ("rtex_ring", rtex::ring),
     ("step_profile_step", step_profile::step),
     ("step_profile_axis", step_profile::axis),
     ("tformat_request", tformat::request),
