@@ -4,6 +4,7 @@
 //! variant of [`Protocol`], and a line in each of its methods. A start-stop protocol implements
 //! [`StartStop`](crate::line::StartStop) and is done; another kind takes the [`Capture`] itself.
 
+pub mod hdsl;
 pub mod rtex;
 pub mod sorte;
 pub mod tformat;
@@ -22,6 +23,8 @@ pub enum Protocol {
     Rtex,
     /// TI SORTE, from a network capture.
     Sorte,
+    /// HIPERFACE DSL, from edges or samples of the pair.
+    Hdsl,
 }
 
 /// What the user said about line and protocol.
@@ -43,6 +46,7 @@ impl Protocol {
             // A log of blocks has no times, so there is no VCD to hold its fields.
             Self::Rtex => &[],
             Self::Sorte => sorte::FIELDS,
+            Self::Hdsl => hdsl::FIELDS,
         }
     }
 
@@ -56,6 +60,7 @@ impl Protocol {
                 let make = |bit| tformat::Decoder::new(bit, settings.tformat);
                 line::decode(file, capture, &settings.line, &make, out)
             }
+            (Self::Hdsl, capture) => hdsl::decode(file, capture, &settings.line, out),
             (Self::Rtex, capture) => rtex::decode(file, capture, &settings.rtex, out),
         }
     }
