@@ -75,14 +75,15 @@ impl<'a> CommandBlock<'a> {
     /// Whether this block makes its drive switch the servo off.
     ///
     /// Servo_On is 0, **and** the code is one with which the drive looks at Servo_On. A NOP is not: a block of
-    /// zeros leaves the servo as it is.
+    /// zeros leaves the servo as it is. Nor is a block that the drive refuses for its code.
     pub const fn is_servo_off(self) -> bool {
         !self.control().servo_on() && self.obeys_control()
     }
 
-    /// Whether a drive takes Control_Bits from this block: both codes are defined and the cyclic one is not NOP.
+    /// Whether a drive surely takes Control_Bits from this block: its codes go together
+    /// ([`Code::is_allowed`]), and they are not the NOP command.
     pub const fn obeys_control(self) -> bool {
-        matches!(self.code().pair(), Ok((cyclic, _)) if !matches!(cyclic, CyclicCode::Nop))
+        self.code().is_allowed() && self.code().get() != Code::NOP.get()
     }
 
     /// Everything at once.

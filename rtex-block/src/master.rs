@@ -18,7 +18,7 @@ mod slaves;
 pub use axis::{Axis, AxisSettings, AxisState, Limits, SetpointError, StopReason};
 pub use check::{Expected, Reception};
 pub use counter::{CommandCounter, Turn};
-pub use echo::EchoWatch;
+pub use echo::{EchoWatch, ReceiveWatchdog};
 pub use handshake::{Handshake, Progress};
 pub use led::{Led, Pattern, led, pattern};
 pub use phase::{Asic, Fault, Inputs, Phase, PhaseControl};

@@ -125,7 +125,7 @@ mod tests {
                 prop_assert_eq!(word & 0xff, u32::from(bytes[4 * k]));
                 prop_assert_eq!(u32::from(narrow[2 * k + 1]) << 16 | u32::from(narrow[2 * k]), *word);
             }
-            let mut image = bytes.as_chunks::<4>().0.iter().map(|c| u32::from_ne_bytes(*c)).collect::<std::vec::Vec<_>>();
+            let mut image = bytes.chunks(4).map(|c| u32::from_ne_bytes(c.try_into().unwrap())).collect::<std::vec::Vec<_>>();
             image_to_words32(&mut image);
             prop_assert_eq!(image, wide);
         }

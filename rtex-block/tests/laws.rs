@@ -202,7 +202,7 @@ proptest! {
         prop_assert_eq!((view.mac_id(), view.update_counter()), (command.mac_id, command.update_counter));
         prop_assert_eq!((view.code(), view.tmg_cnt()), (command.code(), command.tmg_cnt));
         prop_assert_eq!((view.control(), view.command_data1()), (command.control, command.command_data1));
-        let off = command.cyclic != CyclicCode::Nop && !command.control.servo_on();
+        let off = command.cyclic != CyclicCode::Nop && command.code().is_allowed() && !command.control.servo_on();
         prop_assert_eq!(view.is_servo_off(), off);
     }
 }

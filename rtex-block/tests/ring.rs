@@ -69,6 +69,9 @@ struct Bench {
     lines: [Line; AXES],
     responses: [Option<Response>; AXES],
     commands: [Command; AXES],
+    /// Responses come one update period later, as when an exchange misses the start of its frame.
+    late: bool,
+    held: [Option<Response>; AXES],
     started: bool,
     now: u64,
 }
@@ -82,6 +85,8 @@ impl Bench {
             lines: [Line::Good; AXES],
             responses: [None; AXES],
             commands: core::array::from_fn(|k| Command::nop(MacId::new(number(k)).unwrap())),
+            late: false,
+            held: [None; AXES],
             started: false,
             now: 0,
         }
@@ -89,7 +94,8 @@ impl Bench {
 
     /// One update period: the master reads and writes, then the frame goes round.
     fn update(&mut self) {
-        self.commands = self.ring.update(&self.responses);
+        let responses = if self.late { core::mem::replace(&mut self.held, self.responses) } else { self.responses };
+        self.commands = self.ring.update(&responses);
         self.frame();
     }
 
@@ -187,6 +193,17 @@ impl Draw {
 #[test]
 fn starts_moves_and_stops() {
     let mut bench = Bench::new(20);
+    start_move_and_stop(&mut bench);
+}
+
+#[test]
+fn one_more_period_of_delay_is_no_fault() {
+    let mut bench = Bench::new(3);
+    bench.late = true;
+    start_move_and_stop(&mut bench);
+}
+
+fn start_move_and_stop(bench: &mut Bench) {
     bench.switch_on();
     for _ in 0..2_000 {
         bench.command_motion();

@@ -5,6 +5,7 @@
 
 pub mod hexlog;
 mod input;
+pub mod pcapng;
 pub mod raw;
 pub mod records;
 pub mod saleae_binary;
@@ -54,6 +55,8 @@ pub enum Capture {
     Samples(raw::Raw),
     /// Bytes without time.
     Bytes(ByteLog),
+    /// Packets of a network.
+    Packets(pcapng::Pcapng),
 }
 
 /// Bytes without time, in bursts.
@@ -91,6 +94,8 @@ pub enum Format {
     Hex,
     /// Binary records of one size (--record-size), a burst each.
     Records,
+    /// Packets of a network capture.
+    Pcapng,
 }
 
 /// What the user said about the files.
@@ -124,6 +129,8 @@ fn known(head: &[u8]) -> Option<Format> {
     let text = head.strip_prefix(b"\xef\xbb\xbf").unwrap_or(head).trim_ascii_start();
     if head.starts_with(b"<SALEAE>") {
         Some(Format::SaleaeBinary)
+    } else if head.starts_with(pcapng::MAGIC) {
+        Some(Format::Pcapng)
     } else if VCD.iter().any(|keyword| text.starts_with(keyword)) {
         Some(Format::Vcd)
     } else if text.get(..4).is_some_and(|word| word.eq_ignore_ascii_case(b"time")) {
@@ -162,6 +169,7 @@ fn decoder(mut input: Input, format: Format, hints: Hints) -> Result<Capture, Fa
             };
             Capture::Bytes(ByteLog::Records(records::Records::new(input, size)))
         }
+        Format::Pcapng => Capture::Packets(pcapng::Pcapng::new(input)?),
     })
 }
 

@@ -7,7 +7,7 @@ use clap::{Args, Parser, Subcommand, ValueEnum};
 
 use crate::capture::{Format, Hints};
 use crate::protocols::{Protocol, Settings, rtex, tformat};
-use crate::{decode, line, profile};
+use crate::{cnc, decode, line, profile};
 
 /// Decodes what servo drives, controllers and encoders say to each other.
 #[derive(Debug, Parser)]
@@ -23,6 +23,8 @@ enum Command {
     Decode(Decode),
     /// Times of the steps of a move on a 4 us cycle.
     Profile(profile::Arguments),
+    /// The reference machine: SORTE master, four devices, four motors.
+    Cnc(cnc::Arguments),
 }
 
 impl Cli {
@@ -31,6 +33,7 @@ impl Cli {
         match self.command {
             Command::Decode(arguments) => decode::run(&arguments),
             Command::Profile(arguments) => arguments.run(),
+            Command::Cnc(arguments) => arguments.run(),
         }
     }
 }

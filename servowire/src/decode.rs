@@ -90,8 +90,13 @@ fn one(
     printer: &mut dyn Printer,
 ) -> io::Result<bool> {
     let protocol = arguments.protocol;
-    if arguments.vcd.is_some() && matches!(capture, Capture::Bytes(_)) {
-        return Ok(complain(&Fault::new(name, At::File, "a log of bytes has no times for a VCD"), bar));
+    let flat = match capture {
+        Capture::Bytes(_) => Some("a log of bytes has no times for a VCD"),
+        Capture::Packets(_) => Some("a network capture has no levels for a VCD"),
+        Capture::Edges(_) | Capture::Samples(_) => None,
+    };
+    if let (Some(_), Some(what)) = (&arguments.vcd, flat) {
+        return Ok(complain(&Fault::new(name, At::File, what), bar));
     }
     let mut vcd = match &arguments.vcd {
         None => None,

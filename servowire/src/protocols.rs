@@ -5,9 +5,11 @@
 //! [`StartStop`](crate::line::StartStop) and is done; another kind takes the [`Capture`] itself.
 
 pub mod rtex;
+pub mod sorte;
 pub mod tformat;
 
 use crate::capture::Capture;
+use crate::fault::{At, Fault};
 use crate::line::{self, Stop};
 use crate::output::Output;
 
@@ -18,6 +20,8 @@ pub enum Protocol {
     Tformat,
     /// Panasonic RTEX data blocks, from logs of bytes.
     Rtex,
+    /// TI SORTE, from a network capture.
+    Sorte,
 }
 
 /// What the user said about line and protocol.
@@ -38,17 +42,21 @@ impl Protocol {
             Self::Tformat => tformat::FIELDS,
             // A log of blocks has no times, so there is no VCD to hold its fields.
             Self::Rtex => &[],
+            Self::Sorte => sorte::FIELDS,
         }
     }
 
     /// Decodes a capture to its end. What comes out before a fault has been given to `out`.
     pub fn decode(self, file: &str, capture: Capture, settings: &Settings, out: &mut Output<'_>) -> Result<(), Stop> {
-        match self {
-            Self::Tformat => {
+        match (self, capture) {
+            // Whatever was asked for: the only protocol that has packets.
+            (_, Capture::Packets(packets)) => sorte::decode(packets, out),
+            (Self::Sorte, _) => Err(Fault::new(file, At::File, "SORTE is decoded from a pcapng file").into()),
+            (Self::Tformat, capture) => {
                 let make = |bit| tformat::Decoder::new(bit, settings.tformat);
                 line::decode(file, capture, &settings.line, &make, out)
             }
-            Self::Rtex => rtex::decode(file, capture, &settings.rtex, out),
+            (Self::Rtex, capture) => rtex::decode(file, capture, &settings.rtex, out),
         }
     }
 }

@@ -146,6 +146,7 @@ pub struct Axis {
     actual: i32,
     status: StatusFlags,
     control: ControlBits,
+    feed_forward: i32,
     watch: EchoWatch,
     /// Consecutive responses with CMD_Error.
     refused: u16,
@@ -166,6 +167,7 @@ impl Axis {
             actual: 0,
             status: StatusFlags::empty(),
             control: ControlBits::empty(),
+            feed_forward: 0,
             watch: EchoWatch::new(settings.limits.echo),
             refused: 0,
             service: Service::Idle,
@@ -239,6 +241,12 @@ impl Axis {
     /// Control bits other than Servo_On, which the state decides.
     pub const fn set_control(&mut self, control: ControlBits) {
         self.control = control.without(ControlBits::SERVO_ON);
+    }
+
+    /// Command_Data3 of the normal command: velocity or torque feed-forward by Pr7.35. With Pr7.35 = 0 it must stay 0,
+    /// or the drive answers 0032h. A request carries its own data instead.
+    pub const fn set_feed_forward(&mut self, value: i32) {
+        self.feed_forward = value;
     }
 
     /// The next command position, in CP.
@@ -364,7 +372,7 @@ impl Axis {
         let request = match (&self.service, &self.profile) {
             (Service::Asking(handshake), _) => handshake.request(),
             (_, Some(profile)) => profile.request(),
-            _ => Request::IDLE,
+            _ => Request::Normal { command_data2: 0, command_data3: self.feed_forward },
         };
         let command_data1 = match &self.profile {
             Some(profile) => profile.target_position(),

@@ -50,9 +50,59 @@ impl EchoWatch {
     }
 }
 
+/// Notices that receptions stop, where the receive interrupt (XINTRX) is used.
+///
+/// Its handler calls [`received`](Self::received), the NC interrupt [`tick`](Self::tick). In the internal-timer system the
+/// receive interrupt must have the lower priority of the two, in the external-timer system the higher. System Design
+/// Guide for Master, chapters 1 and 2.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct ReceiveWatchdog {
+    limit: NonZeroU16,
+    ticks: u16,
+}
+
+impl ReceiveWatchdog {
+    /// A watchdog that trips at the `limit`-th tick without a reception.
+    pub const fn new(limit: NonZeroU16) -> Self {
+        Self { limit, ticks: 0 }
+    }
+
+    /// A frame was received. A watchdog that has tripped stays so.
+    pub const fn received(&mut self) {
+        if !self.is_tripped() {
+            self.ticks = 0;
+        }
+    }
+
+    /// An update period has passed; gives whether the watchdog is tripped.
+    pub const fn tick(&mut self) -> bool {
+        self.ticks = self.ticks.saturating_add(1);
+        self.is_tripped()
+    }
+
+    /// Whether the limit was reached.
+    pub const fn is_tripped(&self) -> bool {
+        self.ticks >= self.limit.get()
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn receptions_hold_the_watchdog_off_until_it_trips() {
+        let mut watchdog = ReceiveWatchdog::new(NonZeroU16::new(2).unwrap());
+        for _ in 0..5 {
+            assert!(!watchdog.tick());
+            watchdog.received();
+        }
+        assert!(!watchdog.tick());
+        assert!(watchdog.tick());
+        watchdog.received();
+        assert!(watchdog.is_tripped() && watchdog.tick());
+    }
 
     #[test]
     fn a_drive_that_never_answers_trips_too() {

@@ -2,8 +2,13 @@
 
 use cortex_m_semihosting::hprintln;
 
+#[cfg(feature = "nrz-line")]
+mod nrz_line;
+#[cfg(feature = "rtex-block")]
 pub(crate) mod rtex;
+#[cfg(feature = "step-profile")]
 pub(crate) mod step_profile;
+#[cfg(feature = "tformat")]
 pub(crate) mod tformat;
 
 /// How the rows of a topic fared.
@@ -16,7 +21,16 @@ pub(crate) struct Tally {
 /// A topic's name and what runs its rows.
 pub(crate) type Topic = (&'static str, fn() -> Tally);
 
-pub(crate) const ALL: &[&[Topic]] = &[step_profile::TOPICS, tformat::TOPICS, rtex::TOPICS];
+pub(crate) const ALL: &[&[Topic]] = &[
+    #[cfg(feature = "nrz-line")]
+    nrz_line::TOPICS,
+    #[cfg(feature = "rtex-block")]
+    rtex::TOPICS,
+    #[cfg(feature = "step-profile")]
+    step_profile::TOPICS,
+    #[cfg(feature = "tformat")]
+    tformat::TOPICS,
+];
 
 /// Runs every row; a row that fails is named.
 fn each<T>(rows: &[T], name: impl Fn(&T) -> &str, good: impl Fn(&T) -> bool) -> Tally {

@@ -4,7 +4,7 @@ use core::num::NonZeroU16;
 
 use rtex_block::device;
 use rtex_block::master::{CommandCounter, EchoWatch, Expected, Handshake, Progress, Reception, ServoOff, Turn};
-use rtex_block::{BlockSize, Command, CommandBlock, Error, MacId, NonCyclicCode, Request, Response};
+use rtex_block::{BlockSize, Command, CommandBlock, ControlBits, Error, MacId, NonCyclicCode, Request, Response};
 use serde::Deserialize;
 
 use super::fields::{code, counter, mac_id, size, unreadable};
@@ -124,7 +124,8 @@ fn fault(main: &[u8], sub: &[u8], size: BlockSize, own: MacId) -> &'static str {
             Ok(_) => {}
         }
     }
-    if matches!(block.check_strict(), Err(Error::Reserved { byte: 2 | 3, .. })) {
+    let [_, _, two, three, ..] = *block.bytes();
+    if ControlBits::reserved([two, three]) != [0, 0] {
         return "reserved_control_bit_set";
     }
     "none"
