@@ -6,6 +6,7 @@
 #[cfg(feature = "deliberate-panic")]
 mod deliberate_panic;
 mod nrz_line;
+mod sorte;
 mod step_profile;
 mod tformat;
 mod tformat_ends;
@@ -20,6 +21,7 @@ pub(crate) struct Kernel {
 
 pub(crate) const ALL: &[&[Kernel]] = &[
     nrz_line::KERNELS,
+    sorte::KERNELS,
     step_profile::KERNELS,
     tformat::KERNELS,
     tformat_ends::KERNELS,
