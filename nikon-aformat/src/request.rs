@@ -238,7 +238,7 @@ impl Request {
     /// let request = Request::new(EncoderAddress::ZERO, Operation::EepromRead { address: 0xf6 });
     /// let frames = request.emit();
     /// let words = frames.as_slice().iter().map(|frame| frame.word(BitOrder::MsbFirst));
-    /// assert!(words.eq([0x40b0, 0x5b79]));
+    /// assert!(words.eq([0x40b0, 0x5b78]));
     /// ```
     pub const fn emit(self) -> Frames {
         let cdf = RequestFrame::cdf(self.operation.frame_code(), self.ea, self.command().code());
@@ -389,7 +389,7 @@ impl Frames {
     /// let mut line = [0xff; 6];
     /// let bits = request.emit().write_line(&mut line, 0, gap, BitOrder::MsbFirst)?;
     /// assert_eq!((gap, bits), (3, 39));
-    /// assert_eq!(line, [0x20, 0x58, 0x79, 0x6d, 0xe5, 0xff]);
+    /// assert_eq!(line, [0x20, 0x58, 0x79, 0x6d, 0xe3, 0xff]);
     /// # Ok::<(), nrz_line::OutOfBounds>(())
     /// ```
     ///
