@@ -33,13 +33,6 @@ impl<'de> Deserialize<'de> for Hex {
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) struct Bits(pub(crate) Vec<bool>);
 
-impl Bits {
-    /// The bits as bytes, the first line bit in bit 0 of the first byte.
-    pub(crate) fn lsb_first(&self) -> Vec<u8> {
-        self.0.chunks(8).map(|c| c.iter().rev().fold(0, |byte, &bit| byte << 1 | u8::from(bit))).collect()
-    }
-}
-
 impl<'de> Deserialize<'de> for Bits {
     fn deserialize<D: Deserializer<'de>>(from: D) -> Result<Self, D::Error> {
         let text = String::deserialize(from)?;

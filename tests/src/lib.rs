@@ -4,7 +4,12 @@
 //! `requests` of T-Format. What a row means is said in `tests/vectors/README.md`; how it is checked, in one
 //! file per protocol under `protocols/`. Rows are read into structs that refuse unknown keys, so a key that
 //! nobody looks at is a failure and not a silent pass.
-#![allow(clippy::arithmetic_side_effects, clippy::cast_possible_truncation, clippy::std_instead_of_core)]
+#![allow(
+    clippy::arithmetic_side_effects,
+    clippy::cast_possible_truncation,
+    clippy::needless_pass_by_value,
+    clippy::std_instead_of_core
+)]
 
 mod hex;
 mod protocols;

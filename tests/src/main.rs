@@ -32,7 +32,7 @@ fn main() -> ExitCode {
             println!("    {failure}");
         }
         if topic.failures.len() > arguments.show {
-            println!("    ... and {} more", topic.failures.len() - arguments.show);
+            println!("    ... and {} more", topic.failures.len().saturating_sub(arguments.show));
         }
     }
     for error in &report.errors {

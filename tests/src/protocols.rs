@@ -1,11 +1,13 @@
 //! Which topics there are. A new protocol is one file here and one line in [`ALL`].
 
+mod tformat;
+
 use crate::row::Check;
 
 /// A protocol's folder name and its topics.
 type Protocol = (&'static str, &'static [(&'static str, Check)]);
 
-const ALL: &[Protocol] = &[];
+const ALL: &[Protocol] = &[("tformat", tformat::TOPICS)];
 
 pub(crate) fn names() -> Vec<&'static str> {
     ALL.iter().map(|(name, _)| *name).collect()

@@ -42,6 +42,15 @@ impl Row {
     pub(crate) fn read<T: DeserializeOwned>(&self) -> Result<T, Fault> {
         serde_json::from_value(Value::Object(self.keys.clone())).map_err(|e| Fault::Unreadable(e.to_string()))
     }
+
+    /// The row as two structs: the keys in `first` make up the one, all others the other. (Flattening one into the
+    /// other would let unknown keys pass.)
+    pub(crate) fn read_parts<A: DeserializeOwned, B: DeserializeOwned>(&self, first: &[&str]) -> Result<(A, B), Fault> {
+        let (mut these, mut others) = (self.clone(), self.clone());
+        these.keys.retain(|key, _| first.contains(&key.as_str()));
+        others.keys.retain(|key, _| !first.contains(&key.as_str()));
+        Ok((these.read()?, others.read()?))
+    }
 }
 
 /// Checks rows that do not depend on each other.
@@ -50,7 +59,7 @@ pub(crate) fn each<T: DeserializeOwned>(rows: &[Row], check: impl Fn(T) -> Verdi
 }
 
 /// One statement of a row against what the crate gave.
-pub(crate) fn same<T: PartialEq + Debug>(what: &'static str, expected: &T, real: &T) -> Verdict {
+pub(crate) fn same<T: PartialEq + Debug + ?Sized>(what: &'static str, expected: &T, real: &T) -> Verdict {
     if expected == real {
         return Ok(());
     }

@@ -6,10 +6,14 @@
 #[cfg(any(test, feature = "std"))]
 extern crate std;
 
+pub mod clb;
 mod control;
 mod crc;
+pub mod device;
 mod error;
 mod frame;
+pub mod inspect;
+pub mod master;
 mod number;
 mod profile;
 mod request;

@@ -1,6 +1,6 @@
 use nrz_line::{BitOrder, Window};
 
-use crate::frame::{framing, is_framed11, load, pack, unpack};
+use crate::frame::{faults11, framing, is_framed, load, pack, unpack};
 use crate::request::{check_crc, count};
 use crate::{Adf, Almc, ControlField, DataId, Error, Frame, Request, StatusField, U24};
 
@@ -122,6 +122,7 @@ impl Full {
     ///
     /// # Errors
     /// As [`Response::parse`] for ID 3.
+    #[inline]
     pub fn parse(bytes: &[u8]) -> Result<Self, Error> {
         match bytes.first_chunk() {
             Some(b) if is_sound(b) => Ok(Self::of(b)),
@@ -135,13 +136,11 @@ impl Full {
     ///
     /// # Errors
     /// As [`Response::parse_line`] for ID 3.
+    #[inline(always)]
     pub fn parse_line(line: &[u8; Frame::MAX_LINE_BYTES], order: BitOrder) -> Result<Self, Error> {
         let line = load(line, order);
-        if !is_framed11(line) {
-            return Err(Window::from_bits(line, 110).map_or(Error::Combinator, |w| framing(w, 11)));
-        }
-        let b = unpack(line);
-        if is_sound(&b) { Ok(Self::of(&b)) } else { Err(refusal(DataId::Id3, &b)) }
+        let b @ [cf, ..] = unpack(line);
+        if faults11(line) | u32::from(cf ^ CF3) == 0 { Ok(Self::of(&b)) } else { Err(line_refusal(line)) }
     }
 
     /// The fields as UART bytes.
@@ -324,8 +323,21 @@ fn rejection(bytes: &[u8]) -> Error {
     }
 }
 
+/// Off the hot path: why the line bits of an answer to ID 3 are refused.
+///
+/// It takes the bits and not the fields, or the good path would have to write the fields down.
+#[cold]
+#[inline(never)]
+fn line_refusal(line: u128) -> Error {
+    match Window::from_bits(line, 110) {
+        Some(window) if !is_framed(line, 110) => framing(window, 11),
+        _ => refusal(DataId::Id3, &unpack(line)),
+    }
+}
+
 /// Off the hot path: why an answer to `id` is refused.
 #[cold]
+#[inline(never)]
 fn refusal(id: DataId, bytes: &[u8]) -> Error {
     match check(id, bytes) {
         Err(error) => error,

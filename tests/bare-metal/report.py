@@ -1,0 +1,235 @@
+#!/usr/bin/env python3
+"""What run.sh says about an image: instruction counts against budget.toml, code size, paths to a panic.
+
+    report.py table OBJDUMP IMAGES [--record]   the table; exit code 1 when something is over budget or can panic
+    report.py walk  OBJDUMP IMAGE SYMBOL        the path from SYMBOL to a panic; exit code 1 when there is one
+
+IMAGES holds O3.elf, O3.txt, Os.elf and Os.txt: each image and what it printed.
+"""
+
+import pathlib
+import re
+import subprocess
+import sys
+import tomllib
+
+HERE = pathlib.Path(__file__).parent
+BUDGET = HERE / "budget.toml"
+LEVELS = ("O3", "Os")
+BAND = 0.02
+# SysTick counts 40 instructions a tick: over 2048 calls nothing finer can be told.
+GRAIN = 0.2
+
+FUNCTION = re.compile(r"^([0-9a-f]+) <(.+)>:$")
+INSTRUCTION = re.compile(r"^\s*([0-9a-f]+):\s+(?:[0-9a-f]{2} )*\s*(\S+)\s*(.*)$")
+TARGET = re.compile(r"\b0x([0-9a-f]+) <")
+HALF = re.compile(r"^(\w+), #(0x[0-9a-f]+|\d+)")
+PANIC = re.compile(r"\bpanicking\b|rust_begin_unwind|panic_(fmt|handler|bounds|const)")
+
+
+class Function:
+    """A function of the image, from the disassembly."""
+
+    def __init__(self, name, start):
+        self.name, self.start, self.end = name, start, start
+        self.targets = set()  # addresses that it branches to or calls
+        self.pointers = set()  # addresses of code that it forms in registers or keeps in its literal pool
+        self.indirect = []  # calls and branches through a register
+
+
+class Image:
+    """The call graph of an image."""
+
+    def __init__(self, objdump, path):
+        command = [objdump, "--disassemble", "--demangle", "--no-show-raw-insn", str(path)]
+        text = subprocess.run(command, check=True, capture_output=True, text=True).stdout
+        self.functions = list(parse(text))
+        self.by_start = {f.start: f for f in self.functions}
+        self.by_name = {f.name: f for f in self.functions}
+
+    def callees(self, function):
+        """The functions that `function` can continue in: calls, tail calls, and code whose address it takes."""
+        for target in function.targets:
+            callee = self.at(target)
+            if callee and callee is not function:
+                yield callee
+        for pointer in function.pointers:
+            callee = self.by_start.get(pointer & ~1) if pointer & 1 else None
+            if callee and callee is not function:
+                yield callee
+
+    def at(self, address):
+        """The function that holds `address`: a call goes to its start, a tail of it may be shared."""
+        return self.by_start.get(address) or next((f for f in self.functions if f.start <= address < f.end), None)
+
+    def reach(self, symbol):
+        """Everything that can run in `symbol`, as {function: its caller}."""
+        found = {self.by_name[symbol]: None}
+        todo = list(found)
+        while todo:
+            function = todo.pop()
+            for callee in self.callees(function):
+                if callee not in found:
+                    found[callee] = function
+                    todo.append(callee)
+        return found
+
+    def fault(self, symbol):
+        """Why `symbol` cannot be said to be free of panics, as a path of names; None if it is."""
+        found = self.reach(symbol)
+        for function in found:
+            if PANIC.search(function.name):
+                return path_to(found, function)
+            if function.indirect:
+                return path_to(found, function) + f" -> ({function.indirect[0]}: not known where to)"
+        return None
+
+    def size(self, symbol):
+        """Bytes of `symbol` and of all that it calls."""
+        return sum(f.end - f.start for f in self.reach(symbol))
+
+
+def parse(text):
+    """The functions of a disassembly."""
+    function, halves = None, {}
+    for line in text.splitlines():
+        if head := FUNCTION.match(line):
+            start = int(head[1], 16)
+            if function:
+                function.end = min(start, function.end + 4)
+                yield function
+            function, halves = Function(head[2], start), {}
+        elif function and (body := INSTRUCTION.match(line)):
+            function.end = int(body[1], 16)
+            read(function, body[2], body[3], halves)
+    if function:
+        function.end += 4
+        yield function
+
+
+def read(function, mnemonic, operands, halves):
+    """Notes where one instruction can lead. `halves` are the low halves of constants being formed."""
+    mnemonic = mnemonic.removesuffix(".w")
+    if mnemonic == ".word":
+        function.pointers.add(int(operands.split()[0], 0))
+    elif mnemonic in ("movw", "movt") and (half := HALF.match(operands)):
+        if mnemonic == "movw":
+            halves[half[1]] = int(half[2], 0)
+        elif half[1] in halves:
+            function.pointers.add(halves[half[1]] | int(half[2], 0) << 16)
+    elif re.match(r"(blx|bx)\w* r\d+|(blx|bx)\w* (ip|r12)", f"{mnemonic} {operands}") or re.match(
+        r"(ldr|mov)\w* pc,", f"{mnemonic} {operands}"
+    ):
+        function.indirect.append(f"{mnemonic} {operands}")
+    elif target := TARGET.search(operands):
+        function.targets.add(int(target[1], 16))
+
+
+def path_to(found, function):
+    """The names from the kernel down to `function`."""
+    names = []
+    while function:
+        names.append(re.sub(r"::h[0-9a-f]{16}$", "", function.name))
+        function = found[function]
+    return " -> ".join(reversed(names))
+
+
+class Run:
+    """What an image printed."""
+
+    def __init__(self, path):
+        lines = [line.split("\t") for line in path.read_text().splitlines()]
+        self.topics = {line[1]: (int(line[2]), int(line[3])) for line in lines if line[0] == "self-test"}
+        self.kernels = {line[1]: float(line[2]) for line in lines if line[0] == "kernel"}
+        self.faults = [f"self-test {t}: {bad} rows differ" for t, (_, bad) in self.topics.items() if bad]
+        if lines[-1:] != [["end"]]:
+            self.faults.append("the image did not come to its end: " + " ".join(lines[-1] if lines else ["no output"]))
+        if not self.topics or not self.kernels:
+            self.faults.append("nothing was tested")
+
+
+def judge(kernel, level, count, entry, same_compiler):
+    """(fault, hint) about one figure."""
+    if not entry:
+        return f"{kernel}: not in budget.toml; run.sh --record enters it", None
+    recorded, limit = entry[level], entry.get(f"limit_{level}")
+    band = max(recorded * BAND, GRAIN)
+    if limit and count > limit:
+        return f"{kernel}: {count} instructions at {level}, the budget is {limit}", None
+    if count > recorded + band and same_compiler:
+        return f"{kernel}: {count} instructions at {level}, {recorded} are recorded", None
+    if abs(count - recorded) > band:
+        return None, f"{kernel}: {count} instructions at {level}, {recorded} are recorded: run.sh --record"
+    return None, None
+
+
+def record(runs, compiler):
+    """Writes the present figures into budget.toml, in the order of the image; the limits and the head stay."""
+    text = BUDGET.read_text()
+    limits = tomllib.loads(text)["kernels"]
+    head = re.sub(r'^rustc = ".*"$', f'rustc = "{compiler}"', text[: text.index("[kernels]")], flags=re.M)
+    lines = []
+    for kernel in runs["O3"].kernels:
+        figures = {level: runs[level].kernels[kernel] for level in LEVELS}
+        figures |= {key: value for key, value in limits.get(kernel, {}).items() if key.startswith("limit_")}
+        lines.append(f"{kernel} = {{ " + ", ".join(f"{key} = {value}" for key, value in figures.items()) + " }\n")
+    BUDGET.write_text(head + "[kernels]\n" + "".join(lines))
+
+
+def table(objdump, folder, recording):
+    """Prints the table; whether all is well."""
+    runs = {level: Run(folder / f"{level}.txt") for level in LEVELS}
+    images = {level: Image(objdump, folder / f"{level}.elf") for level in LEVELS}
+    compiler = subprocess.run(["rustc", "--version"], check=True, capture_output=True, text=True).stdout.split()[1]
+    if recording:
+        record(runs, compiler)
+    budget = tomllib.loads(BUDGET.read_text())
+    same_compiler = budget["rustc"] == compiler
+
+    faults = [f"{level}: {fault}" for level in LEVELS for fault in runs[level].faults]
+    gone = budget["kernels"].keys() - runs["O3"].kernels.keys()
+    faults += [f"{kernel}: in budget.toml, but not in the image" for kernel in sorted(gone)]
+    hints = [] if same_compiler else [f"figures are recorded for rustc {budget['rustc']}: only the budgets bind"]
+
+    for topic, (passed, failed) in runs["O3"].topics.items():
+        print(f"self-test {topic}: {passed} passed, {failed} failed")
+    print()
+    print("instructions on a Cortex-M4 without those of an empty call; bytes of the function and all that it calls")
+    row = "{:34} {:>8} {:>8} {:>11} {:>7} {:>7}  {}"
+    print(row.format("kernel", "O3", "Os", "budget", "bytes", "Os", "panic path"))
+    for kernel in runs["O3"].kernels:
+        entry = budget["kernels"].get(kernel, {})
+        paths = {level: images[level].fault(kernel) for level in LEVELS}
+        for level in LEVELS:
+            fault, hint = judge(kernel, level, runs[level].kernels[kernel], entry, same_compiler)
+            faults += [fault] if fault else []
+            hints += [hint] if hint else []
+            faults += [f"{kernel} can panic at {level}: {paths[level]}"] if paths[level] else []
+        counts = [runs[level].kernels[kernel] for level in LEVELS]
+        sizes = [images[level].size(kernel) for level in LEVELS]
+        limits = [str(entry.get(f"limit_{level}", "-")) for level in LEVELS]
+        bound = " / ".join(limits) if any(l != "-" for l in limits) else "-"
+        print(row.format(kernel, *counts, bound, *sizes, "YES" if any(paths.values()) else "no"))
+    print()
+    for hint in hints:
+        print(f"note: {hint}")
+    for fault in faults:
+        print(f"FAILED: {fault}")
+    return not faults
+
+
+def main():
+    match sys.argv[1:]:
+        case ["table", objdump, folder]:
+            return table(objdump, pathlib.Path(folder), recording=False)
+        case ["table", objdump, folder, "--record"]:
+            return table(objdump, pathlib.Path(folder), recording=True)
+        case ["walk", objdump, image, symbol]:
+            fault = Image(objdump, image).fault(symbol)
+            print(fault or f"{symbol}: no path to a panic")
+            return not fault
+    sys.exit(__doc__)
+
+
+if __name__ == "__main__":
+    sys.exit(0 if main() else 1)

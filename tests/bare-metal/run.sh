@@ -1,0 +1,56 @@
+#!/usr/bin/env bash
+# Builds the image at opt-level 3 and s, runs it under QEMU, and checks: vector rows, instruction counts against
+# budget.toml, and that no panic can be reached from any kernel.
+#
+#   run.sh             check
+#   run.sh --record    the same, and write the measured figures into budget.toml
+set -euo pipefail
+cd "$(dirname "$0")"
+
+target=thumbv7em-none-eabihf
+images=target/images
+
+fail() {
+    echo "$(basename "$0"): $1" >&2
+    exit 1
+}
+
+need() {
+    command -v "$1" >/dev/null || fail "$1 is missing: $2"
+}
+
+# build PROFILE IMAGE [FLAGS...]: the image as $images/IMAGE.elf
+build() {
+    cargo build --locked --quiet --target "$target" --profile "$1" "${@:3}"
+    cp "target/$target/$1/bare-metal" "$images/$2.elf"
+}
+
+# run IMAGE: what it prints as $images/IMAGE.txt; report.py judges it
+run() {
+    timeout 300 qemu-system-arm -machine mps2-an386 -display none -serial none -monitor none \
+        -icount shift=0 -semihosting-config enable=on,target=native -kernel "$images/$1.elf" \
+        >"$images/$1.txt" || echo "$1: QEMU ended with code $?" >&2
+}
+
+need cargo "install Rust from https://rustup.rs"
+need qemu-system-arm "apt-get install qemu-system-arm"
+need python3 "apt-get install python3"
+python3 -c 'import tomllib' 2>/dev/null || fail "python3 is older than 3.11"
+[ -d "$(rustc --print target-libdir --target "$target")" ] || fail "target missing: rustup target add $target"
+objdump=$(dirname "$(rustc --print target-libdir)")/bin/llvm-objdump
+[ -x "$objdump" ] || fail "llvm-objdump is missing: rustup component add llvm-tools"
+
+mkdir -p "$images"
+# First, that the walk can fail: a kernel that indexes out of bounds is found in either image.
+for level in O3:release Os:small; do
+    build "${level#*:}" deliberate-panic --features deliberate-panic
+    if python3 report.py walk "$objdump" "$images/deliberate-panic.elf" deliberate_panic >"$images/walk.txt"; then
+        fail "the panic of the kernel deliberate_panic was not found at ${level%:*}"
+    fi
+    echo "self-check ${level%:*}: $(cat "$images/walk.txt")"
+done
+build release O3
+build small Os
+run O3
+run Os
+python3 report.py table "$objdump" "$images" "$@"

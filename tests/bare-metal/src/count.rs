@@ -1,0 +1,52 @@
+//! Instructions of a call.
+//!
+//! Under QEMU with `-icount shift=0` every instruction takes 1 ns of virtual time, and the SysTick of the board runs
+//! at 25 MHz: a tick is 40 instructions. Over thousands of calls that gives tenths of an instruction, the same ones on
+//! every run and every machine.
+
+use core::hint::black_box;
+use core::mem::MaybeUninit;
+
+use cortex_m::peripheral::SYST;
+use cortex_m::peripheral::syst::SystClkSource;
+
+const INSTRUCTIONS_PER_TICK: u64 = 40;
+
+/// Calls of a kernel, at least.
+const CALLS: usize = 2048;
+
+/// SysTick counts 24 bits down.
+const RELOAD: u32 = 0x00ff_ffff;
+
+/// Starts the timer.
+pub(crate) fn start(mut timer: SYST) {
+    timer.set_clock_source(SystClkSource::Core);
+    timer.set_reload(RELOAD);
+    timer.clear_current();
+    timer.enable_counter();
+}
+
+/// Instructions of one call of `kernel`, in tenths and as the mean over `inputs`, without those of an empty call.
+pub(crate) fn tenths<I, O>(kernel: fn(&'static I) -> O, inputs: &'static [I]) -> u32 {
+    let rounds = CALLS.div_ceil(inputs.len());
+    let ticks = ticks(kernel, inputs, rounds).saturating_sub(ticks(nothing::<I, O>, inputs, rounds));
+    (u64::from(ticks) * INSTRUCTIONS_PER_TICK * 10 / (rounds * inputs.len()) as u64) as u32
+}
+
+#[inline(never)]
+fn ticks<I, O>(kernel: fn(&'static I) -> O, inputs: &'static [I], rounds: usize) -> u32 {
+    let kernel = black_box(kernel);
+    let begin = SYST::get_current();
+    for _ in 0..rounds {
+        for input in inputs {
+            black_box(&kernel(input));
+        }
+    }
+    begin.wrapping_sub(SYST::get_current()) & RELOAD
+}
+
+/// The empty call: takes and gives the same as a kernel and does nothing.
+#[inline(never)]
+fn nothing<I, O>(_: &'static I) -> MaybeUninit<O> {
+    MaybeUninit::uninit()
+}

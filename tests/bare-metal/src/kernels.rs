@@ -1,0 +1,52 @@
+//! The kernels: one function for each public entry point that firmware calls.
+//!
+//! Each is a symbol of its own, so that `run.sh` finds it in the image and walks what it calls. A protocol is one file
+//! here, one line in [`ALL`], and its figures in `budget.toml` (`run.sh --record` adds them).
+
+#[cfg(feature = "deliberate-panic")]
+mod deliberate_panic;
+mod nrz_line;
+mod tformat;
+
+/// An entry point that is measured and walked.
+pub(crate) struct Kernel {
+    /// Its symbol.
+    pub(crate) name: &'static str,
+    /// Instructions of one call, in tenths.
+    pub(crate) tenths: fn() -> u32,
+}
+
+pub(crate) const ALL: &[&[Kernel]] = &[
+    nrz_line::KERNELS,
+    tformat::KERNELS,
+    #[cfg(feature = "deliberate-panic")]
+    deliberate_panic::KERNELS,
+];
+
+/// Defines `KERNELS`: functions that stay functions under their own names, with the inputs they are measured over.
+///
+/// ```text
+/// kernels! {
+///     /// What it does.
+///     fn protocol_name(input: &Input) -> Output { ... } over INPUTS;
+/// }
+/// ```
+macro_rules! kernels {
+    ($($(#[$doc:meta])* fn $name:ident($input:tt: &$from:ty) -> $to:ty $body:block over $inputs:expr;)*) => {
+        $(
+            $(#[$doc])*
+            #[expect(unsafe_code, reason = "the symbol is how run.sh finds the kernel")]
+            #[inline(never)]
+            #[unsafe(no_mangle)]
+            fn $name($input: &'static $from) -> $to $body
+        )*
+
+        pub(crate) const KERNELS: &[$crate::kernels::Kernel] = &[
+            $($crate::kernels::Kernel {
+                name: stringify!($name),
+                tenths: || $crate::count::tenths($name, const { &$inputs }),
+            },)*
+        ];
+    };
+}
+use kernels;

@@ -1,0 +1,203 @@
+//! T-Format: requests and answers in every form.
+
+use nom::{IResult, Parser};
+use tformat::{
+    Adf, Alarm, Almc, BitOrder, BitRate, ControlField, DataId, Error, Frame, Full, Hint, Position, Profile, Request,
+    Response, StatusField, U24, VendorCommand, crc, spi, stream,
+};
+
+use super::kernels;
+use crate::self_test::tformat::{ANSWERS, Answer, FULL, FULL_FORMS, FullForms};
+
+/// One request of each length.
+const REQUESTS: [Request; 3] =
+    [Request::Id3, Request::IdD { adf: Adf::new(0x35) }, Request::Id6 { adf: Adf::new(0x7f), edf: 1 }];
+
+/// Their fields, and how many there are.
+const SENT: [([u8; 4], usize); 3] = [([0x1a, 0, 0, 0], 1), ([0xea, 0x35, 0xdf, 0], 3), ([0x32, 0x7f, 0x01, 0x4c], 4)];
+
+/// An encoder of 23 and 16 bits with signed turns, one of 17 and 16 with unsigned ones; ABS and ABM of each.
+const POSITIONS: [(Profile, U24, U24); 2] = [
+    (profile(23, 16), U24::truncate(0x3b_c029), U24::truncate(0xfffe)),
+    (profile(17, 16).unsigned_turns(), U24::truncate(0x1_c029), U24::truncate(7)),
+];
+
+const fn profile(abs_bits: u8, abm_bits: u8) -> Profile {
+    match Profile::new(abs_bits, abm_bits) {
+        Ok(profile) => profile,
+        Err(_) => panic!("no such widths"),
+    }
+}
+
+/// A logged answer to ID 3.
+const LOGGED: [u8; 11] = [0x1a, 0x20, 0x29, 0xc0, 0x3b, 0x17, 0x00, 0x00, 0x00, 0xc8, 0x37];
+
+/// It as 10-bit SPI words: delimiter of the field before, start bit, data bits.
+const SPI10: [u16; 11] = {
+    let (mut words, mut field) = ([0; 11], 0);
+    while field < 11 {
+        words[field] = 0x200 | LOGGED[field].reverse_bits() as u16;
+        field += 1;
+    }
+    words
+};
+
+/// It as the 16-bit words of the whole transaction, the first line bit in bit 15: 18 idle bits, then the frame.
+const SPI16: [u16; 8] = {
+    let (mut stream, mut words) = ((1_u128 << 18) - 1, [0; 8]);
+    let mut at = 0;
+    while at < 11 {
+        stream = stream << 10 | (LOGGED[at].reverse_bits() as u128) << 1 | 1;
+        at += 1;
+    }
+    at = 0;
+    while at < 8 {
+        words[at] = (stream >> (112 - 16 * at)) as u16;
+        at += 1;
+    }
+    words
+};
+
+kernels! {
+    /// The answer to ID 3 from its 110 line bits, least significant bit of a byte first, with all checks.
+    fn tformat_id3_line_lsb(row: &FullForms) -> Result<Full, Error> {
+        Full::parse_line(&row.lsb_first, BitOrder::LsbFirst)
+    } over FULL_FORMS;
+
+    /// The same from a shift register, most significant bit first.
+    fn tformat_id3_line_msb(row: &FullForms) -> Result<Full, Error> {
+        Full::parse_line(&row.msb_first, BitOrder::MsbFirst)
+    } over FULL_FORMS;
+
+    /// The answer to ID 3 from UART bytes.
+    fn tformat_id3_uart(row: &FullForms) -> Result<Full, Error> {
+        Full::parse(&row.uart)
+    } over FULL_FORMS;
+
+    /// The UART bytes of an answer to ID 3.
+    fn tformat_id3_emit(full: &Full) -> [u8; Full::FIELDS] {
+        full.emit()
+    } over FULL;
+
+    /// The line bits of an answer to ID 3.
+    fn tformat_id3_emit_line(full: &Full) -> [u8; Frame::MAX_LINE_BYTES] {
+        full.emit_line(BitOrder::LsbFirst)
+    } over FULL;
+
+    /// The answers of all IDs from UART bytes.
+    fn tformat_response_parse(row: &Answer) -> Result<Response, Error> {
+        Response::parse(row.request, row.bytes)
+    } over ANSWERS;
+
+    /// The answers of all IDs from line bits.
+    fn tformat_response_parse_line(row: &Answer) -> Result<Response, Error> {
+        Response::parse_line(row.request, row.line)
+    } over ANSWERS;
+
+    /// The fields of the answers of all IDs.
+    fn tformat_response_emit(row: &Answer) -> Frame {
+        row.want.emit()
+    } over ANSWERS;
+
+    /// The fields of a request.
+    fn tformat_request_emit(request: &Request) -> Frame {
+        request.emit()
+    } over REQUESTS;
+
+    /// A request as an encoder receives it.
+    fn tformat_request_parse((bytes, len): &([u8; 4], usize)) -> Result<Request, Error> {
+        Request::parse(bytes.get(..*len).unwrap_or(bytes))
+    } over SENT;
+
+    /// A control field to its data ID.
+    fn tformat_control_field(cf: &u8) -> Result<DataId, Error> {
+        ControlField::parse(*cf).and_then(ControlField::data_id)
+    } over [0x1a_u8, 0xba, 0x7a];
+
+    /// A frame of any bytes.
+    fn tformat_frame_new((bytes, len): &([u8; 4], usize)) -> Option<Frame> {
+        Frame::new(bytes.get(..*len).unwrap_or(bytes))
+    } over SENT;
+
+    /// The line bits of a frame, and its fields back from them.
+    fn tformat_frame_line(request: &Request) -> Result<Frame, Error> {
+        let frame = request.emit();
+        Frame::from_line(frame.line(), frame.fields())
+    } over REQUESTS;
+
+    /// The check field over as many bytes as there are.
+    fn tformat_crc(row: &Answer) -> u8 {
+        crc(row.bytes)
+    } over ANSWERS;
+
+    /// ABS and ABM as one position.
+    fn tformat_position((profile, abs, abm): &(Profile, U24, U24)) -> Result<Position, Error> {
+        profile.position(*abs, *abm)
+    } over POSITIONS;
+
+    /// The fraction of a turn, and the way from there to the zero point.
+    fn tformat_fraction((profile, abs, _): &(Profile, U24, U24)) -> Result<(u32, i32), Error> {
+        Ok((profile.fraction(*abs)?, profile.difference(profile.single_turn(*abs)?, 0)))
+    } over POSITIONS;
+
+    /// What an encoder ID suggests.
+    fn tformat_from_enid(enid: &u8) -> Option<Hint> {
+        Profile::from_enid(*enid)
+    } over [0x17_u8, 0x11, 0x99];
+
+    /// The alarms of an error byte, counted, and whether the status says the same.
+    fn tformat_alarms(full: &Full) -> (usize, bool) {
+        let Full { sf, almc, .. } = *full;
+        let latched = almc.alarms().filter(|alarm| Alarm::is_latched(*alarm)).count();
+        (latched, sf.agrees_with(almc.with(Almc::NONE)) && !StatusField::of_alarms(almc).request_damaged())
+    } over FULL;
+
+    /// How long a transaction takes on the line.
+    fn tformat_transaction_time((rate, request): &(BitRate, Request)) -> u32 {
+        rate.transaction_ns(request.data_id())
+    } over [(BitRate::Mbit2_5, Request::Id3), (BitRate::Mbit5, Request::Id0)];
+
+    /// A request as 10-bit SPI words.
+    fn tformat_spi10_words(request: &Request) -> [u16; 4] {
+        let mut words = [spi::SPI10_IDLE; 4];
+        words.iter_mut().zip(spi::spi10_words(&request.emit())).for_each(|(to, from)| *to = from);
+        words
+    } over REQUESTS;
+
+    /// The answer to ID 3 from 10-bit SPI words.
+    fn tformat_spi10_parse((words, len): &([u16; 11], usize)) -> Result<Response, Error> {
+        spi::parse_spi10(Request::Id3, words.get(..*len).unwrap_or(words))
+    } over [(SPI10, SPI10.len())];
+
+    /// The transmitted stream of a transaction in 16-bit words.
+    fn tformat_spi16_words(request: &Request) -> [u16; spi::SPI16_MAX_WORDS] {
+        let mut words = [u16::MAX; spi::SPI16_MAX_WORDS];
+        words.iter_mut().zip(spi::spi16_words(*request)).for_each(|(to, from)| *to = from);
+        words
+    } over REQUESTS;
+
+    /// The answer to ID 3 from the received stream in 16-bit words.
+    fn tformat_spi16_parse((words, len): &([u16; 8], usize)) -> Result<Response, Error> {
+        spi::parse_spi16(Request::Id3, words.get(..*len).unwrap_or(words))
+    } over [(SPI16, SPI16.len())];
+
+    /// A request off the front of a stream.
+    fn tformat_stream_request((bytes, len): &([u8; 4], usize)) -> IResult<&'static [u8], Request, Error> {
+        stream::request(bytes.get(..*len).unwrap_or(bytes))
+    } over SENT;
+
+    /// An answer off the front of a stream.
+    fn tformat_stream_response(row: &Answer) -> IResult<&'static [u8], Response, Error> {
+        stream::response(row.request).parse(row.bytes)
+    } over ANSWERS;
+
+    /// A vendor's own request with a body of two bytes.
+    fn tformat_vendor_emit((command, body): &(VendorCommand, [u8; 2])) -> Option<Frame> {
+        command.emit(body)
+    } over [(VendorCommand { cf: 0x2a, response_fields: 5 }, [0x11, 0x22])];
+
+    /// The answer to a vendor's own request.
+    fn tformat_vendor_parse((command, bytes): &(VendorCommand, [u8; 5])) -> Result<&'static [u8], Error> {
+        command.parse(bytes)
+    } over [(VendorCommand { cf: 0x2a, response_fields: 5 }, [0x2a, 0x11, 0x22, 0x33, 0x2a])];
+}

@@ -1,0 +1,31 @@
+//! Vector rows, decoded again on the target. A protocol is one file here and one line in [`ALL`].
+
+use cortex_m_semihosting::hprintln;
+
+pub(crate) mod tformat;
+
+/// How the rows of a topic fared.
+#[derive(Default)]
+pub(crate) struct Tally {
+    pub(crate) passed: u32,
+    pub(crate) failed: u32,
+}
+
+/// A topic's name and what runs its rows.
+pub(crate) type Topic = (&'static str, fn() -> Tally);
+
+pub(crate) const ALL: &[&[Topic]] = &[tformat::TOPICS];
+
+/// Runs every row; a row that fails is named.
+fn each<T>(rows: &[T], name: impl Fn(&T) -> &str, good: impl Fn(&T) -> bool) -> Tally {
+    let mut tally = Tally::default();
+    for row in rows {
+        if good(row) {
+            tally.passed += 1;
+        } else {
+            tally.failed += 1;
+            hprintln!("row {} differs", name(row));
+        }
+    }
+    tally
+}

@@ -1,0 +1,383 @@
+//! T-Format: `tests/vectors/tformat`.
+
+mod clb;
+mod response;
+
+use serde::Deserialize;
+
+use nrz_line::{Format, Receiver};
+use tformat::device::Device;
+use tformat::master::{Reset, Step};
+use tformat::{BitRate, ControlField, DataId, Error, ErrorClass, Frame, Profile, Request, Response, U24, spi};
+
+use crate::hex::{Bits, Bytes, Hex};
+use crate::row::{Check, Row, Verdict, each, same};
+
+pub(crate) const TOPICS: &[(&str, Check)] = &[
+    ("clb_fsm", clb::rows),
+    ("control_field", |rows| each(rows, control_field)),
+    ("crc", |rows| each(rows, crc)),
+    ("negatives", |rows| each(rows, response::negative)),
+    ("oversampled", |rows| each(rows, oversampled)),
+    ("position", |rows| each(rows, position)),
+    ("procedures", procedures),
+    ("request_decode", |rows| each(rows, request_decode)),
+    ("requests", |rows| each(rows, request)),
+    ("responses", response::responses),
+    ("uart_echo", response::uart_echoes),
+];
+
+/// The rows' name of an error.
+fn class(error: Error) -> &'static str {
+    match error.class() {
+        ErrorClass::StartBit => "start_bit",
+        ErrorClass::Delimiter => "delimiter",
+        ErrorClass::Truncated => "truncated",
+        ErrorClass::SinkCode => "sink_code",
+        ErrorClass::Parity => "parity",
+        ErrorClass::UnknownDataId => "unknown_data_id",
+        ErrorClass::CfMismatch => "cf_mismatch",
+        ErrorClass::Rejected => "rejected",
+        ErrorClass::Crc => "crc",
+        ErrorClass::AddressMismatch => "address_mismatch",
+        ErrorClass::DataMismatch => "data_mismatch",
+        ErrorClass::EchoMismatch => "echo_mismatch",
+        ErrorClass::NoResponse => "no_response",
+        _ => "not in the vectors",
+    }
+}
+
+/// The rows' name of an outcome: `ok` or the class of the error.
+fn outcome<T>(result: &Result<T, Error>) -> String {
+    result.as_ref().map_or_else(|error| class(*error), |_| "ok").to_owned()
+}
+
+/// A data ID as the rows write it, one hex digit.
+fn data_id(Hex(code): Hex) -> DataId {
+    // A row with another ID is answered by a mismatch, not by a panic.
+    DataId::from_code(code as u8).unwrap_or(DataId::Id0)
+}
+
+fn line_of(frame: Frame) -> String {
+    let line = frame.line();
+    (0..line.len()).map(|at| if line.get(at) == Some(true) { '1' } else { '0' }).collect()
+}
+
+fn bits_of(bits: &Bits) -> String {
+    bits.0.iter().map(|bit| if *bit { '1' } else { '0' }).collect()
+}
+
+#[derive(Deserialize)]
+#[serde(tag = "kind", rename_all = "snake_case", deny_unknown_fields)]
+enum ControlFieldRow {
+    Id {
+        data_id: Hex,
+        documented: bool,
+        parity: u8,
+        cf: Hex,
+        cf_bit_reversed: Hex,
+        wire: Bits,
+        request_fields: Option<u8>,
+        response_fields: Option<u8>,
+    },
+    Classify {
+        cf: Hex,
+        result: String,
+        data_id: Option<Hex>,
+    },
+}
+
+fn control_field(row: ControlFieldRow) -> Verdict {
+    match row {
+        ControlFieldRow::Id {
+            data_id,
+            documented,
+            parity,
+            cf,
+            cf_bit_reversed,
+            wire,
+            request_fields,
+            response_fields,
+        } => {
+            let composed = ControlField::compose(data_id.0 as u8);
+            let byte = composed.get();
+            let known = composed.data_id().ok();
+            same("cf", &cf.0, &byte.into())?;
+            same("cf_bit_reversed", &cf_bit_reversed.0, &byte.reverse_bits().into())?;
+            same("parity", &parity, &(byte >> 7))?;
+            same("documented", &documented, &known.is_some())?;
+            let frame = Frame::new(&[byte]).map(line_of);
+            same("wire", &Some(bits_of(&wire)), &frame)?;
+            same("request_fields", &request_fields, &known.map(DataId::request_fields))?;
+            same("response_fields", &response_fields, &known.map(DataId::response_fields))
+        }
+        ControlFieldRow::Classify { cf, result, data_id } => {
+            let parsed = ControlField::parse(cf.0 as u8);
+            let known = parsed.and_then(ControlField::data_id);
+            same("result", &result, &outcome(&known))?;
+            if let Some(code) = data_id {
+                same("data_id", &Ok(code.0), &parsed.map(|cf| cf.code().into()))?;
+            }
+            Ok(())
+        }
+    }
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct CrcRow {
+    bytes: Bytes,
+    crc: Hex,
+    lfsr_wire: Hex,
+}
+
+fn crc(row: CrcRow) -> Verdict {
+    same("crc", &row.crc.0, &tformat::crc(&row.bytes.0).into())?;
+    let mut register = tformat::clb::SerialCrc::new();
+    for byte in &row.bytes.0 {
+        register.field(*byte);
+    }
+    same("lfsr_wire", &row.lfsr_wire.0, &register.register().into())
+}
+
+/// A request by its data ID and, for the EEPROM, address and data.
+fn compose(id: DataId, adf: Option<u8>, edf: Option<u8>) -> Request {
+    let adf = tformat::Adf::new(adf.unwrap_or(0));
+    match id {
+        DataId::Id0 => Request::Id0,
+        DataId::Id1 => Request::Id1,
+        DataId::Id2 => Request::Id2,
+        DataId::Id3 => Request::Id3,
+        DataId::Id6 => Request::Id6 { adf, edf: edf.unwrap_or(0) },
+        DataId::Id7 => Request::Id7,
+        DataId::Id8 => Request::Id8,
+        DataId::IdC => Request::IdC,
+        DataId::IdD => Request::IdD { adf },
+    }
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct RequestRow {
+    data_id: Hex,
+    adf: Option<u8>,
+    edf: Option<u8>,
+    bytes: Bytes,
+    wire: Bits,
+    bits: u32,
+    #[serde(rename = "ns_2M5")]
+    ns_2m5: u32,
+    #[serde(rename = "ns_5M")]
+    ns_5m: u32,
+    response_fields: u8,
+    spi10_words: Vec<Hex>,
+    pru_tx_bytes: Bytes,
+}
+
+fn request(row: RequestRow) -> Verdict {
+    let id = data_id(row.data_id);
+    let request = compose(id, row.adf, row.edf);
+    let frame = request.emit();
+    same("bytes", &row.bytes.0[..], frame.as_bytes())?;
+    same("wire", &bits_of(&row.wire), &line_of(frame))?;
+    same("bits", &row.bits, &frame.line_bits())?;
+    same("ns_2M5", &row.ns_2m5, &BitRate::Mbit2_5.fields_ns(frame.fields()))?;
+    same("ns_5M", &row.ns_5m, &BitRate::Mbit5.fields_ns(frame.fields()))?;
+    same("response_fields", &row.response_fields, &id.response_fields())?;
+    let words: Vec<u64> = row.spi10_words.iter().map(|w| w.0).collect();
+    same("spi10_words", &words, &spi::spi10_words(&frame).map(u64::from).collect())?;
+    let packed = frame.line().to_bytes(tformat::BitOrder::MsbFirst);
+    let packed = packed.get(..frame.line_bits().div_ceil(8) as usize).unwrap_or(&packed);
+    same("pru_tx_bytes", &row.pru_tx_bytes.0[..], packed)?;
+    same("decoded", &Ok(request), &Request::parse(frame.as_bytes()))
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct RequestDecodeRow {
+    bytes: Bytes,
+    /// Which bit was damaged: says how the row was made.
+    #[serde(rename = "flipped_bit")]
+    _flipped_bit: Option<u32>,
+    expect: String,
+    error: Option<String>,
+    data_id: Option<Hex>,
+    adf: Option<u8>,
+    busy_bit: Option<bool>,
+    edf: Option<u8>,
+}
+
+fn request_decode(row: RequestDecodeRow) -> Verdict {
+    let parsed = Request::parse(&row.bytes.0);
+    let expected = if row.expect == "ok" { row.expect } else { row.error.unwrap_or_default() };
+    same("outcome", &expected, &outcome(&parsed))?;
+    let Ok(request) = parsed else { return Ok(()) };
+    same("data_id", &row.data_id.map(|id| id.0 as u8), &Some(request.data_id().code()))?;
+    let (adf, edf) = match request {
+        Request::Id6 { adf, edf } => (Some(adf), Some(edf)),
+        Request::IdD { adf } => (Some(adf), None),
+        _ => (None, None),
+    };
+    same("adf", &row.adf, &adf.map(|adf| adf.address().get()))?;
+    same("busy_bit", &row.busy_bit, &adf.map(tformat::Adf::busy))?;
+    same("edf", &row.edf, &edf)
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct PositionRow {
+    abs: u32,
+    abm: u32,
+    abs_bits: u8,
+    abm_bits: u8,
+    high_bits_nonzero: bool,
+    combined_unsigned: Option<i64>,
+    turns_signed: Option<i32>,
+    combined_signed: Option<i64>,
+    fraction32: Option<u32>,
+}
+
+fn position(row: PositionRow) -> Verdict {
+    let Ok(profile) = Profile::new(row.abs_bits, row.abm_bits) else {
+        return same("widths", &"possible", &"refused");
+    };
+    let (abs, abm) = (U24::truncate(row.abs), U24::truncate(row.abm));
+    let signed = profile.position(abs, abm);
+    same("high_bits_nonzero", &row.high_bits_nonzero, &matches!(signed, Err(Error::UpperBits { .. })))?;
+    if row.high_bits_nonzero {
+        return Ok(());
+    }
+    let unsigned = profile.unsigned_turns().position(abs, abm).ok();
+    same("combined_unsigned", &row.combined_unsigned, &unsigned.map(|p| p.combined))?;
+    same("turns_signed", &row.turns_signed, &signed.ok().map(|p| p.turns))?;
+    same("combined_signed", &row.combined_signed, &signed.ok().map(|p| p.combined))?;
+    same("fraction32", &row.fraction32, &profile.fraction(abs).ok())
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct OversampledRow {
+    n: u32,
+    /// How the line was made; the samples are what counts.
+    #[serde(rename = "baud_ppm")]
+    _baud_ppm: i32,
+    #[serde(rename = "jitter")]
+    _jitter: f64,
+    #[serde(rename = "gaps")]
+    gaps: Option<Vec<f64>>,
+    #[serde(rename = "phase")]
+    _phase: f64,
+    #[serde(rename = "spikes")]
+    _spikes: serde_json::Value,
+    first: u8,
+    runs: Vec<u64>,
+    expect: String,
+    expect_bytes: Bytes,
+    start_samples: Option<Vec<u64>>,
+    spikes_dropped: u32,
+    bits: Option<Bits>,
+}
+
+fn oversampled(row: OversampledRow) -> Verdict {
+    let Ok(format) = Format::new(row.n, 8) else { return same("n", &"possible", &"refused") };
+    let mut receiver = Receiver::new(format);
+    let levels = (0..).map(|k| (k % 2 == 0) == (row.first == 1));
+    let fields: Vec<_> = levels.zip(&row.runs).filter_map(|(level, &len)| receiver.run(level, len)).collect();
+    let framed = fields.iter().all(|f| f.delimiter);
+    same("expect", &row.expect.as_str(), &if framed { "ok" } else { "framing" })?;
+    same("expect_bytes", &row.expect_bytes.0, &fields.iter().map(|f| f.content as u8).collect())?;
+    if let Some(starts) = row.start_samples {
+        same("start_samples", &starts, &fields.iter().map(|f| f.start).collect())?;
+    }
+    same("spikes_dropped", &row.spikes_dropped, &fields.iter().map(|f| f.spikes).sum())?;
+    match (row.bits, row.gaps) {
+        // The free-running rule and the receiver take the same bits from fields without gaps.
+        (Some(bits), None) => same("bits", &Some(bits_of(&bits)), &Frame::new(&row.expect_bytes.0).map(line_of)),
+        _ => Ok(()),
+    }
+}
+
+#[derive(Deserialize)]
+#[serde(tag = "kind", rename_all = "snake_case", deny_unknown_fields)]
+enum ProcedureRow {
+    Reset {
+        data_id: Hex,
+        effect: String,
+        request: Bytes,
+        count: u8,
+        min_gap_us: u32,
+        response_delay_us: u32,
+        earliest_start_us: Vec<u64>,
+        wait_after_us: u64,
+    },
+    Eeprom {
+        run: u32,
+        t_us: u64,
+        request: Bytes,
+        response: Bytes,
+        busy: bool,
+        adf: u8,
+        edf: Option<u8>,
+        page: u8,
+    },
+}
+
+/// Rows of one EEPROM run follow each other on the same encoder.
+fn procedures(rows: &[Row]) -> Vec<Verdict> {
+    let mut encoder = (None, Device::<6>::new(0x17, BitRate::Mbit2_5));
+    let mut check = |row: &Row| match row.read()? {
+        ProcedureRow::Eeprom { run, t_us, request, response, busy, adf, edf, page } => {
+            if encoder.0 != Some(run) {
+                encoder = (Some(run), Device::new(0x17, BitRate::Mbit2_5));
+            }
+            let device = &mut encoder.1;
+            let answered = Request::parse(&request.0).map(|asked| device.answer(asked, t_us * 1000));
+            same("response", &Ok(response.0), &answered.map(|r| r.emit().as_bytes().to_vec()))?;
+            let Ok(Response::Id6(memory) | Response::IdD(memory)) = answered else {
+                return same("response", &"of the EEPROM", &"another");
+            };
+            same("busy", &busy, &memory.adf.busy())?;
+            same("adf", &adf, &memory.adf.address().get())?;
+            if let Some(edf) = edf {
+                same("edf", &edf, &memory.edf)?;
+            }
+            same("page", &page, &device.page())
+        }
+        ProcedureRow::Reset {
+            data_id,
+            effect,
+            request,
+            count,
+            min_gap_us,
+            response_delay_us,
+            earliest_start_us,
+            wait_after_us,
+        } => {
+            let (mut reset, does) = match self::data_id(data_id) {
+                DataId::Id7 => (Reset::clear_errors(), "all errors"),
+                DataId::Id8 => {
+                    (Reset::set_single_turn_zero_and_shift_commutation_angle(), "single turn data (zero position)")
+                }
+                _ => (Reset::clear_turns_and_errors(), "multi turn data and all errors"),
+            };
+            same("effect", &effect.as_str(), &does)?;
+            same("min_gap_us", &min_gap_us, &(Reset::SPACING_NS / 1000))?;
+            same("response_delay_us", &response_delay_us, &(tformat::RESPONSE_DELAY_NS / 1000))?;
+            same("count", &count, &Reset::REQUESTS)?;
+            let mut device = Device::<6>::new(0x17, BitRate::Mbit2_5);
+            let transaction = u64::from(BitRate::Mbit2_5.transaction_ns(reset.data_id()));
+            let (mut starts, mut end) = (Vec::new(), 0);
+            let mut step = reset.start(0);
+            while let Step::Send { request: asked, not_before_ns } = step {
+                same("request", &request.0[..], asked.emit().as_bytes())?;
+                starts.push(not_before_ns / 1000);
+                end = not_before_ns + transaction;
+                step = reset.answer(Ok(device.answer(asked, not_before_ns)), end);
+            }
+            same("earliest_start_us", &earliest_start_us, &starts)?;
+            let Step::Done { not_before_ns, .. } = step else { return same("end", &"done", &"failed") };
+            same("wait_after_us", &wait_after_us, &((not_before_ns - end) / 1000))
+        }
+    };
+    rows.iter().map(&mut check).collect()
+}

@@ -1,0 +1,294 @@
+//! The receive logic of TI's configurable logic block (CLB) design, for people who build it in an FPGA or a CLB.
+//!
+//! TIDM-1011, section 2.3.6, aligns the clock of an SPI peripheral to the line with one state machine, two counters and
+//! two look-up tables. The printed text lost some negations (LUT_0, LUT_1) and names a state bit s2 that does not exist;
+//! the equations here are those of the tables, of the vendor's configuration files, and of each other.
+//!
+//! ```text
+//!             START_OPERATION        tx clocks done        falling edge of the response
+//!    IDLE ───────────────▶ TRANSMIT_DATA ────────▶ WAIT_FOR_START ────────▶ RECEIVE_DATA ──┐
+//!     00  ◀────────────────── 01 ─────────────────────── 10 ────────────────── 11 ─────────┘
+//!                                                                    rx clocks done
+//! ```
+//!
+//! [`State`], [`lut0`] and [`lut1`] are the equations; [`Tile`] runs them cycle by cycle; [`SerialCrc`] is the check
+//! register that is clocked with the line bits.
+
+#![expect(clippy::needless_bitwise_bool, reason = "the equations as they are wired")]
+
+/// State (s1, s0) of FRAME_STATE, TIDM-1011 tables 2-13 and 2-14.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum State {
+    /// 00: nothing happens.
+    Idle,
+    /// 01: the request is sent.
+    TransmitData,
+    /// 10: the request is out, the answer has not begun.
+    WaitForStart,
+    /// 11: the answer is received.
+    ReceiveData,
+}
+
+impl State {
+    /// From the two state bits.
+    pub const fn from_bits(s1: bool, s0: bool) -> Self {
+        match (s1, s0) {
+            (false, false) => Self::Idle,
+            (false, true) => Self::TransmitData,
+            (true, false) => Self::WaitForStart,
+            (true, true) => Self::ReceiveData,
+        }
+    }
+
+    /// State bit s1: the answer is waited for or received.
+    pub const fn s1(self) -> bool {
+        matches!(self, Self::WaitForStart | Self::ReceiveData)
+    }
+
+    /// State bit s0: bits are clocked.
+    pub const fn s0(self) -> bool {
+        matches!(self, Self::TransmitData | Self::ReceiveData)
+    }
+
+    /// Output of the state machine, s1 | s0: an operation is going on.
+    pub const fn is_active(self) -> bool {
+        self.s1() | self.s0()
+    }
+
+    /// The next state. `e1` is CLOCK_COUNT_COMPLETE, `e0` is TRANSMIT_OR_RECEIVE_STARTED.
+    pub const fn next(self, e1: bool, e0: bool) -> Self {
+        let (s1, s0) = (self.s1(), self.s0());
+        let next_s0 = (!s1 & !s0 & e0) | (!s1 & s0 & !e1) | (s1 & s0 & !e1) | (s1 & !s0 & e0);
+        let next_s1 = (!s1 & s0 & e1) | (s1 & s0 & !e1) | (s1 & !s0);
+        Self::from_bits(next_s1, next_s0)
+    }
+}
+
+/// LUT_0: resets the bit counter. i3 | (i0 & s1), with i3 = the counter reached a full bit and i0 = any edge of the
+/// response.
+pub const fn lut0(full_bit: bool, any_edge: bool, state: State) -> bool {
+    full_bit | (any_edge & state.s1())
+}
+
+/// LUT_1: gives e0. i0 | (i1 & !s0 & s1), with i0 = rising edge of START_OPERATION and i1 = falling edge of the
+/// response.
+pub const fn lut1(start: bool, falling_edge: bool, state: State) -> bool {
+    start | (falling_edge & !state.s0() & state.s1())
+}
+
+/// The check register that is clocked with the data bits of the line: rotate left, XOR the bit into bit 0.
+///
+/// Fed with fields least significant bit first, as they come, it ends as the *bit-reversed* check field, which is how
+/// the SPI shows a field too.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct SerialCrc(u8);
+
+impl SerialCrc {
+    /// A register of 0.
+    pub const fn new() -> Self {
+        Self(0)
+    }
+
+    /// Takes one data bit, not a start bit or delimiter.
+    pub const fn bit(&mut self, bit: bool) {
+        self.0 = self.0.rotate_left(1) ^ bit as u8;
+    }
+
+    /// Takes the eight data bits of a field in line order.
+    pub const fn field(&mut self, byte: u8) {
+        let mut rest = byte;
+        let mut k = 0_u8;
+        while k < 8 {
+            self.bit(rest & 1 == 1);
+            rest >>= 1;
+            k = k.wrapping_add(1);
+        }
+    }
+
+    /// The register: the bit-reversed check field.
+    pub const fn register(self) -> u8 {
+        self.0
+    }
+}
+
+/// What the tile puts out in one cycle.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Outputs {
+    /// State of FRAME_STATE in this cycle.
+    pub state: State,
+    /// Clock of the SPI; it idles high.
+    pub clock: bool,
+    /// Whether the clock rises in this cycle: the SPI samples the line.
+    pub clock_rises: bool,
+    /// Driver enable of the transceiver.
+    pub transmit_enable: bool,
+}
+
+/// The tile, cycle by cycle: FRAME_STATE, the bit counter (COUNTER_0) and the clock counter (COUNTER_1).
+///
+/// ```text
+///  COUNTER_0   0 ............ d-1 ............ 2d-1     d = CLB clock / (2 x bit rate)
+///  SPI clock   low            rises            (full bit)    20 at 100 MHz, 24 at 120 MHz
+/// ```
+///
+/// The response passes a synchroniser of two cycles, so a bit is sampled d + 2 cycles after its edge.
+///
+/// The design assumes, and this model too, that START_OPERATION comes only in IDLE and never together with an edge.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Tile {
+    divider: u16,
+    tx_clocks: u16,
+    rx_clocks: u16,
+    state: State,
+    counter0: u16,
+    clock_high: bool,
+    counter1: u16,
+    match2: u16,
+    transmit_enable: bool,
+    /// The response as the edge detector sees it: this cycle's value and the one before.
+    seen: bool,
+    seen_before: bool,
+}
+
+impl Tile {
+    /// `divider` is d, half a bit in CLB cycles; `tx_clocks` is 1 + 10 a field of the request, `rx_clocks` is 10 a
+    /// field of the answer.
+    pub const fn new(divider: u16, tx_clocks: u16, rx_clocks: u16) -> Self {
+        Self {
+            divider,
+            tx_clocks,
+            rx_clocks,
+            state: State::Idle,
+            counter0: 0,
+            clock_high: true,
+            counter1: 0,
+            match2: tx_clocks,
+            transmit_enable: false,
+            seen: true,
+            seen_before: true,
+        }
+    }
+
+    /// COUNTER_0 match 1: the count at which the clock is made to rise, d - 1.
+    pub const fn match1(&self) -> u16 {
+        self.divider.saturating_sub(1)
+    }
+
+    /// COUNTER_0 match 2: the count of a full bit, 2d - 1.
+    pub const fn full_bit(&self) -> u16 {
+        self.divider.saturating_mul(2).saturating_sub(1)
+    }
+
+    /// One CLB cycle: the outputs in it, then the registers for the next one. `start` is a pulse of START_OPERATION,
+    /// `response` the level of the receiver's pin.
+    pub const fn cycle(&mut self, start: bool, response: bool) -> Outputs {
+        let rising = self.state.s0() && self.counter0 == self.divider;
+        let outputs = Outputs {
+            state: self.state,
+            clock: !(self.state.s0() && self.state.is_active()) || self.clock_high,
+            clock_rises: rising,
+            transmit_enable: self.transmit_enable,
+        };
+        self.advance(start, response);
+        outputs
+    }
+
+    const fn advance(&mut self, start: bool, response: bool) {
+        let edge = self.seen != self.seen_before;
+        let falling = edge && !self.seen;
+        let at_match1 = self.state.s0() && self.counter0 == self.match1();
+        let e1 = self.counter1 == self.match2 && self.counter1 != 0;
+        let e0 = lut1(start, falling, self.state);
+        let next = self.state.next(e1, e0);
+        self.transmit_enable = match (self.state, next) {
+            (State::Idle, State::TransmitData) => true,
+            (State::TransmitData, State::TransmitData) => self.transmit_enable,
+            _ => false,
+        };
+        self.counter1 = match (self.state, next) {
+            (State::Idle, _) | (State::WaitForStart, State::ReceiveData) => 0,
+            _ if at_match1 => self.counter1.wrapping_add(1),
+            _ => self.counter1,
+        };
+        self.match2 = if next.s1() { self.rx_clocks } else { self.tx_clocks };
+        let reset = !self.state.is_active() || lut0(self.counter0 == self.full_bit(), edge, self.state);
+        self.clock_high = if reset { false } else { self.clock_high || at_match1 };
+        self.counter0 = if reset { 0 } else { self.counter0.wrapping_add(1) };
+        self.state = next;
+        self.seen_before = self.seen;
+        self.seen = response;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::crc;
+    use State::{Idle, ReceiveData, TransmitData, WaitForStart};
+
+    /// TIDM-1011, table 2-14: columns e1,e0 = 00, 01, 11, 10.
+    #[test]
+    fn the_whole_state_table() {
+        let table = [
+            (Idle, [Idle, TransmitData, TransmitData, Idle]),
+            (TransmitData, [TransmitData, TransmitData, WaitForStart, WaitForStart]),
+            (ReceiveData, [ReceiveData, ReceiveData, Idle, Idle]),
+            (WaitForStart, [WaitForStart, ReceiveData, ReceiveData, WaitForStart]),
+        ];
+        for (state, next) in table {
+            let got = [(false, false), (false, true), (true, true), (true, false)].map(|(e1, e0)| state.next(e1, e0));
+            assert_eq!(got, next, "{state:?}");
+            assert_eq!(State::from_bits(state.s1(), state.s0()), state);
+        }
+    }
+
+    #[test]
+    fn the_register_ends_as_the_reversed_check_field() {
+        for (a, b) in (0..=255_u8).zip((0..=255_u8).rev()) {
+            let mut register = SerialCrc::new();
+            for byte in [a, b, 0x5a] {
+                register.field(byte);
+            }
+            assert_eq!(register.register(), crc(&[a, b, 0x5a]).reverse_bits());
+        }
+    }
+
+    /// A readout of ID 0 at 100 MHz, d = 20: the cycles at which the states are entered, by the arithmetic of the design.
+    #[test]
+    fn a_transaction_cycle_by_cycle() {
+        let (d, tx, rx) = (20_u64, 11_u64, 60_u64);
+        let mut tile = Tile::new(20, 11, 60);
+        let mut entered = std::vec![(0, Idle)];
+        let (mut rises, mut sampled, mut falls) = (0, std::vec::Vec::new(), u64::MAX);
+        for cycle in 0..4000_u64 {
+            let bit = cycle.checked_sub(falls).map(|since| since / (2 * d));
+            let level = bit.is_none_or(|bit| bit % 3 != 0);
+            let out = tile.cycle(cycle == 59, level);
+            if entered.last().unwrap().1 != out.state {
+                entered.push((cycle, out.state));
+                if out.state == WaitForStart {
+                    falls = cycle + d - 1 + 300;
+                }
+            }
+            assert_eq!(out.transmit_enable, out.state == TransmitData);
+            rises += u64::from(out.clock_rises);
+            if out.clock_rises && out.state == ReceiveData {
+                assert_eq!((cycle - falls) % (2 * d), d + 2);
+                sampled.push(level);
+            }
+        }
+        let wait = 60 + (tx - 1) * 2 * d + d + 1;
+        let receive = wait + 300 + d + 1;
+        let idle = receive + (rx - 1) * 2 * d + d + 1;
+        assert_eq!(
+            entered,
+            [(0, Idle), (60, TransmitData), (wait, WaitForStart), (receive, ReceiveData), (idle, Idle)]
+        );
+        assert_eq!(rises, tx + rx);
+        assert!(sampled.iter().enumerate().all(|(k, level)| *level == (k % 3 != 0)));
+    }
+}

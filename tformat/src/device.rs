@@ -1,0 +1,610 @@
+//! The encoder's side without I/O: what a simulator or a test bench runs.
+//!
+//! A [`Device`] takes a request byte by byte or bit by bit and says what it answers and when. Position, turns and alarms
+//! are set from outside; the EEPROM, the ten-fold resets and the reaction to damaged requests are its own. Faults can
+//! be switched on to see what a master makes of them.
+//!
+//! What the documents leave open is decided here as follows: a damaged or unknown request is answered with ID 3, with
+//! ca0 for a parity error, ca1 for a delimiter error and neither for a wrong check field or data ID; a wrong sink code
+//! is not answered. A write makes the EEPROM busy for 18 ms, in which writes are ignored and every access is answered
+//! with the busy flag, after a read with data 0. Selecting a page takes no time. After power-on the page is 0 and
+//! unwritten bytes are 0xff.
+//!
+//! ```
+//! use tformat::device::Device;
+//! use tformat::{BitRate, U24};
+//!
+//! let mut encoder = Device::<6>::new(0x17, BitRate::Mbit2_5);
+//! encoder.set_position(U24::truncate(0x12_3456), U24::truncate(7));
+//! // the request for ID 3, its delimiter at 4 us
+//! let reply = encoder.byte(0x1a, 4_000).expect("an answer");
+//! assert_eq!(reply.at_ns, 7_000);
+//! assert_eq!(reply.frame.as_bytes()[2..9], [0x56, 0x34, 0x12, 0x17, 0x07, 0x00, 0x00]);
+//! ```
+
+use nrz_line::{Format, Receiver, Window};
+
+use crate::{
+    Address, Adf, Alarm, Almc, BitRate, DataId, EncoderId, Error, Frame, Full, Memory, MultiTurn, RESPONSE_DELAY_NS,
+    Request, Response, SingleTurn, StatusField, U24, master::Reset,
+};
+
+/// A fault that the encoder or its line is made to have.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "arbitrary", derive(arbitrary::Arbitrary))]
+pub enum Fault {
+    /// None.
+    #[default]
+    None,
+    /// It does not answer.
+    Silent,
+    /// Bit `at` of the answer's line bits is inverted; nothing happens if the answer is shorter.
+    FlipBit {
+        /// Index, 0..=109.
+        at: u8,
+    },
+    /// The answer ends after this many fields.
+    CutAfter {
+        /// Fields that are sent, 1 or more.
+        fields: u8,
+    },
+    /// The answer's check field is inverted.
+    BadCrc,
+    /// Every request is taken for a damaged one.
+    RejectAll,
+}
+
+/// What an encoder sends, and when its start bit begins.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Reply {
+    /// The fields as a UART sends them. A fault in a start bit or delimiter is only in [`line`](Self::line).
+    pub frame: Frame,
+    /// The line bits.
+    pub line: Window,
+    /// Time of the first start bit.
+    pub at_ns: u64,
+}
+
+/// Time for which a write keeps the EEPROM busy.
+pub const EEPROM_BUSY_NS: u64 = 18_000_000;
+
+/// An encoder with `PAGES` pages of EEPROM (6 in Tamagawa's).
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Device<const PAGES: usize> {
+    rate: BitRate,
+    enid: u8,
+    abs: U24,
+    zero: U24,
+    abm: U24,
+    /// Alarms that are set, and those whose cause is still there.
+    almc: Almc,
+    causes: Almc,
+    fault: Fault,
+    eeprom: [[u8; 127]; PAGES],
+    page: u8,
+    busy_until_ns: u64,
+    repeated: Option<DataId>,
+    repeats: u8,
+    last_request_ns: u64,
+    received: [u8; 4],
+    len: u8,
+    /// A request was judged and no pause has come since.
+    deaf: bool,
+    last_byte_ns: u64,
+    bits: Receiver,
+}
+
+/// Line bits at one sample each, for [`Device::bit`].
+const PLAIN_BITS: Format = match Format::new(1, 8) {
+    Ok(format) => format,
+    Err(_) => panic!(),
+};
+
+impl<const PAGES: usize> Device<PAGES> {
+    /// An encoder at position 0 without alarms, as after power-on.
+    pub const fn new(enid: u8, rate: BitRate) -> Self {
+        Self {
+            rate,
+            enid,
+            abs: U24::truncate(0),
+            zero: U24::truncate(0),
+            abm: U24::truncate(0),
+            almc: Almc::NONE,
+            causes: Almc::NONE,
+            fault: Fault::None,
+            eeprom: [[0xff; 127]; PAGES],
+            page: 0,
+            busy_until_ns: 0,
+            repeated: None,
+            repeats: 0,
+            last_request_ns: 0,
+            received: [0; 4],
+            len: 0,
+            deaf: false,
+            last_byte_ns: 0,
+            bits: Receiver::new(PLAIN_BITS),
+        }
+    }
+
+    /// Turns the shaft: ABS before the single-turn zero is applied, and ABM.
+    pub const fn set_position(&mut self, abs: U24, abm: U24) {
+        self.abs = abs;
+        self.abm = abm;
+    }
+
+    /// The cause of an alarm comes or goes. A latched alarm stays set until a reset finds its cause gone.
+    pub const fn set_alarm(&mut self, alarm: Alarm, present: bool) {
+        if present {
+            self.causes = self.causes.with(Almc::of(alarm));
+            self.almc = self.almc.with(Almc::of(alarm));
+        } else {
+            self.causes = self.causes.without(Almc::of(alarm));
+            if !alarm.is_latched() {
+                self.almc = self.almc.without(Almc::of(alarm));
+            }
+        }
+    }
+
+    /// Switches a fault on or, with [`Fault::None`], off.
+    pub const fn set_fault(&mut self, fault: Fault) {
+        self.fault = fault;
+    }
+
+    /// The error byte as it would be answered now.
+    pub const fn almc(&self) -> Almc {
+        self.almc
+    }
+
+    /// The EEPROM page that is selected.
+    pub const fn page(&self) -> u8 {
+        self.page
+    }
+
+    /// The EEPROM, page by page, for preparing and inspecting it.
+    pub const fn eeprom_mut(&mut self) -> &mut [[u8; 127]; PAGES] {
+        &mut self.eeprom
+    }
+
+    /// A byte was received without framing error, its delimiter at `now_ns`. Gives the answer once a request is
+    /// complete.
+    pub fn byte(&mut self, byte: u8, now_ns: u64) -> Option<Reply> {
+        if self.is_deaf(now_ns) {
+            return None;
+        }
+        *self.received.get_mut(usize::from(self.len))? = byte;
+        self.len = self.len.saturating_add(1);
+        let received = self.received;
+        let request = Request::parse(received.get(..usize::from(self.len))?);
+        let answer = match request {
+            Err(Error::Truncated { .. }) => return None,
+            Ok(_) if self.fault == Fault::RejectAll => Some(self.rejection(false, false)),
+            Ok(request) => Some(self.answer(request, now_ns)),
+            Err(error) => {
+                self.repeated = None;
+                match error {
+                    Error::SinkCode { .. } => None,
+                    Error::Parity { .. } => Some(self.rejection(true, false)),
+                    _ => Some(self.rejection(false, false)),
+                }
+            }
+        };
+        self.deaf = true;
+        self.reply(answer?, now_ns)
+    }
+
+    /// A byte was received with a framing error: the request is damaged.
+    pub fn framing_error(&mut self, now_ns: u64) -> Option<Reply> {
+        if self.is_deaf(now_ns) {
+            return None;
+        }
+        self.deaf = true;
+        self.repeated = None;
+        self.reply(self.rejection(false, true), now_ns)
+    }
+
+    /// Whether what arrives now is the rest of a request that was already judged. A pause of half a field begins a new
+    /// request, so that nothing behind a damaged control field is ever taken for another command.
+    fn is_deaf(&mut self, now_ns: u64) -> bool {
+        let patience = u64::from(self.rate.fields_ns(1)).saturating_mul(3) / 2;
+        if now_ns.saturating_sub(self.last_byte_ns) > patience {
+            self.len = 0;
+            self.deaf = false;
+        }
+        self.last_byte_ns = now_ns;
+        self.deaf
+    }
+
+    /// One line bit was received, at `now_ns`; the line idles high.
+    pub fn bit(&mut self, level: bool, now_ns: u64) -> Option<Reply> {
+        let field = self.bits.push(level)?;
+        let [byte, _] = field.content.to_le_bytes();
+        if field.delimiter { self.byte(byte, now_ns) } else { self.framing_error(now_ns) }
+    }
+
+    /// What a sound request does, and the answer to it.
+    pub fn answer(&mut self, request: Request, now_ns: u64) -> Response {
+        self.count_resets(request.data_id(), now_ns);
+        let single = SingleTurn { sf: self.sf(), abs: self.single_turn() };
+        match request {
+            Request::Id0 => Response::Id0(single),
+            Request::Id1 => Response::Id1(MultiTurn { sf: self.sf(), abm: self.abm }),
+            Request::Id2 => Response::Id2(EncoderId { sf: self.sf(), enid: self.enid }),
+            Request::Id3 => Response::Id3(self.full(self.sf())),
+            Request::Id6 { adf, edf } => Response::Id6(self.write(adf.address(), edf, now_ns)),
+            Request::Id7 => Response::Id7(single),
+            Request::Id8 => Response::Id8(single),
+            Request::IdC => Response::IdC(single),
+            Request::IdD { adf } => Response::IdD(self.read(adf.address(), now_ns)),
+        }
+    }
+
+    fn sf(&self) -> StatusField {
+        StatusField::of_alarms(self.almc)
+    }
+
+    /// ABS from the zero that ID 8 set, in the width that the encoder ID names (24 bits for an unknown ID).
+    fn single_turn(&self) -> U24 {
+        let bits = crate::Profile::from_enid(self.enid).map_or(24, |hint| hint.profile.abs_bits());
+        let mask = 1_u32.wrapping_shl(bits.into()).wrapping_sub(1);
+        U24::truncate(self.abs.get().wrapping_sub(self.zero.get()) & mask)
+    }
+
+    fn full(&self, sf: StatusField) -> Full {
+        Full { sf, abs: self.single_turn(), enid: self.enid, abm: self.abm, almc: self.almc }
+    }
+
+    /// The ID 3 frame that answers a damaged request.
+    fn rejection(&self, parity: bool, delimiter: bool) -> Response {
+        Response::Id3(self.full(self.sf().with_request_errors(parity, delimiter)))
+    }
+
+    /// Ten equal reset requests in a row, 40 us apart or more, do their work; any other request starts the count again.
+    fn count_resets(&mut self, id: DataId, now_ns: u64) {
+        let since = now_ns.saturating_sub(self.last_request_ns);
+        self.last_request_ns = now_ns;
+        if !matches!(id, DataId::Id7 | DataId::Id8 | DataId::IdC) {
+            self.repeated = None;
+            return;
+        }
+        let continues = self.repeated == Some(id) && since >= u64::from(Reset::SPACING_NS);
+        self.repeats = if continues { self.repeats.saturating_add(1) } else { 1 };
+        self.repeated = Some(id);
+        if self.repeats < Reset::REQUESTS {
+            return;
+        }
+        self.repeated = None;
+        match id {
+            DataId::Id8 => self.zero = self.abs,
+            DataId::IdC => {
+                self.abm = U24::truncate(0);
+                self.almc = self.causes;
+            }
+            _ => self.almc = self.causes,
+        }
+    }
+
+    fn write(&mut self, address: Address, edf: u8, now_ns: u64) -> Memory {
+        let busy = now_ns < self.busy_until_ns;
+        if !busy && address == Address::PAGE_REGISTER {
+            if usize::from(edf) < PAGES {
+                self.page = edf;
+            }
+        } else if !busy {
+            self.busy_until_ns = now_ns.saturating_add(EEPROM_BUSY_NS);
+            let page = self.eeprom.get_mut(usize::from(self.page));
+            if let Some(cell) = page.and_then(|page| page.get_mut(usize::from(address.get()))) {
+                *cell = edf;
+            }
+        }
+        Memory { adf: Adf::of(address, busy), edf }
+    }
+
+    fn read(&self, address: Address, now_ns: u64) -> Memory {
+        if now_ns < self.busy_until_ns {
+            return Memory { adf: Adf::of(address, true), edf: 0 };
+        }
+        let page = self.eeprom.get(usize::from(self.page));
+        let cell = page.and_then(|page| page.get(usize::from(address.get())));
+        Memory { adf: Adf::of(address, false), edf: cell.copied().unwrap_or(self.page) }
+    }
+
+    /// The answer as it leaves, with the fault that is switched on.
+    fn reply(&self, response: Response, now_ns: u64) -> Option<Reply> {
+        let sound = response.emit();
+        let line = sound.line();
+        let line = match self.fault {
+            Fault::Silent => return None,
+            Fault::FlipBit { at } if u32::from(at) < line.len() => flipped(line, 1_u128.wrapping_shl(at.into()))?,
+            Fault::BadCrc => flipped(line, 0x1fe_u128.wrapping_shl(line.len().saturating_sub(Frame::FIELD_BITS)))?,
+            Fault::CutAfter { fields } if (1..sound.fields()).contains(&fields) => {
+                Window::from_bits(line.bits(), u32::from(fields).saturating_mul(Frame::FIELD_BITS))?
+            }
+            _ => line,
+        };
+        let fields = u8::try_from(line.len() / Frame::FIELD_BITS).ok()?;
+        let frame = Frame::from_line(line, fields).unwrap_or(sound);
+        Some(Reply { frame, line, at_ns: now_ns.saturating_add(RESPONSE_DELAY_NS.into()) })
+    }
+}
+
+const fn flipped(line: Window, bits: u128) -> Option<Window> {
+    Window::from_bits(line.bits() ^ bits, line.len())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::master::{EepromAccess, Line, Page, Polling, Progress, Step, Transaction};
+    use crate::request::tests::requests;
+    use nrz_line::Wave;
+    use proptest::prelude::*;
+    use std::vec::Vec;
+
+    fn encoder() -> Device<6> {
+        let mut device = Device::new(0x17, BitRate::Mbit2_5);
+        device.set_position(U24::truncate(0x51_2345), U24::truncate(0xfffe));
+        device
+    }
+
+    /// Sends a request by bytes and gives the reply.
+    fn send(device: &mut Device<6>, bytes: &[u8], now_ns: u64) -> Option<Reply> {
+        (1..).zip(bytes).fold(None, |reply, (k, byte)| device.byte(*byte, now_ns + 4_000 * k).or(reply))
+    }
+
+    /// One transaction over UARTs that hear each other; the outcome and the time it ended.
+    fn transact(device: &mut Device<6>, request: Request, now_ns: u64) -> (Result<Response, Error>, u64) {
+        let mut master = Transaction::start(request, Line::new(BitRate::Mbit2_5).with_echo(), now_ns);
+        let sent = request.emit();
+        for (k, byte) in (1..).zip(sent.as_bytes()) {
+            let _ = master.byte(*byte, now_ns + 4_000 * k);
+        }
+        if let Some(reply) = send(device, sent.as_bytes(), now_ns) {
+            for (k, byte) in (1..).zip(reply.frame.as_bytes()) {
+                let _ = master.byte(*byte, reply.at_ns + 4_000 * k);
+            }
+        }
+        match master.progress() {
+            Progress::Done(response) => (Ok(response), now_ns + 60_000),
+            Progress::Failed(error) => (Err(error), now_ns + 60_000),
+            Progress::Waiting { until_ns } => match master.poll(until_ns + 1) {
+                Progress::Failed(error) => (Err(error), until_ns),
+                other => panic!("{other:?}"),
+            },
+        }
+    }
+
+    /// Runs a procedure to its end.
+    macro_rules! run {
+        ($procedure:expr, $device:expr, $now:expr) => {{
+            let mut procedure = $procedure;
+            let mut step = procedure.start($now);
+            loop {
+                match step {
+                    Step::Send { request, not_before_ns } => {
+                        let (outcome, end) = transact($device, request, not_before_ns);
+                        step = procedure.answer(outcome, end);
+                    }
+                    Step::Done { value, not_before_ns } => break (Ok(value), not_before_ns),
+                    Step::Failed { error, not_before_ns } => break (Err(error), not_before_ns),
+                }
+            }
+        }};
+    }
+
+    proptest! {
+        #[test]
+        fn every_request_is_answered_in_kind(request in requests()) {
+            let mut device = encoder();
+            let request = match request {
+                Request::Id6 { adf, edf } => Request::write_eeprom(adf.address(), edf),
+                Request::IdD { adf } => Request::read_eeprom(adf.address()),
+                other => other,
+            };
+            let (outcome, _) = transact(&mut device, request, 100_000);
+            prop_assert_eq!(outcome.map(Response::data_id), Ok(request.data_id()));
+        }
+
+        /// No damaged request moves anything in the encoder.
+        #[test]
+        fn damaged_requests_change_nothing(request in requests(), bit in 0..32usize) {
+            let mut device = encoder();
+            let mut bytes = request.emit().as_bytes().to_vec();
+            let bit = bit % (bytes.len() * 8);
+            bytes[bit / 8] ^= 1 << (bit % 8);
+            let before = device;
+            let reply = send(&mut device, &bytes, 0);
+            prop_assert_eq!((device.eeprom, device.page, device.zero, device.abm), (before.eeprom, before.page, before.zero, before.abm));
+            if let Some(reply) = reply {
+                prop_assert_eq!(Full::parse(reply.frame.as_bytes()).map(|f| f.sf.request_delimiter_error()), Ok(false));
+            }
+        }
+
+        /// Whatever arrives, in whatever rhythm, the encoder takes it.
+        #[test]
+        fn any_bytes(bytes in prop::collection::vec((any::<u8>(), 0..9_000_u64, any::<bool>()), 0..60)) {
+            let mut device = encoder();
+            let mut now_ns = 0;
+            for (byte, gap, framed) in bytes {
+                now_ns += gap;
+                let _ = if framed { device.byte(byte, now_ns) } else { device.framing_error(now_ns) };
+            }
+        }
+    }
+
+    #[test]
+    fn damage_is_told_in_the_status() {
+        let mut device = encoder();
+        let sf = |reply: Option<Reply>| reply.map(|r| Full::parse(r.frame.as_bytes()).unwrap().sf.raw());
+        assert_eq!(sf(send(&mut device, &[0x12], 0)), Some(0x40));
+        assert_eq!(sf(send(&mut device, &[0xa2], 100_000)), Some(0x00));
+        assert_eq!(sf(send(&mut device, &[0xea, 0x01, 0xea], 200_000)), Some(0x00));
+        assert_eq!(sf(device.framing_error(300_000)), Some(0x80));
+        assert_eq!(send(&mut device, &[0x1b], 400_000), None);
+        // A request that stops half way is forgotten.
+        assert_eq!(send(&mut device, &[0xea, 0x01], 500_000), None);
+        assert_eq!(sf(send(&mut device, &[0x1a], 600_000)), Some(0x00));
+    }
+
+    #[test]
+    fn resets_do_what_the_table_says() {
+        let mut device = encoder();
+        device.set_alarm(Alarm::BatteryError, true);
+        device.set_alarm(Alarm::OverHeat, true);
+        device.set_alarm(Alarm::BatteryError, false);
+        assert_eq!(device.almc().raw(), 0x50);
+        let (done, now_ns) = run!(Reset::clear_errors(), &mut device, 0);
+        assert!(done.is_ok());
+        // The cause of the over-heat is still there; position and turns are as before.
+        assert_eq!((device.almc().raw(), device.single_turn().get(), device.abm.get()), (0x10, 0x51_2345, 0xfffe));
+        let (done, now_ns) = run!(Reset::set_single_turn_zero_and_shift_commutation_angle(), &mut device, now_ns);
+        assert!(done.is_ok());
+        assert_eq!((device.single_turn().get(), device.abm.get()), (0, 0xfffe));
+        device.set_alarm(Alarm::OverHeat, false);
+        let (done, _) = run!(Reset::clear_turns_and_errors(), &mut device, now_ns);
+        assert!(done.is_ok());
+        assert_eq!((device.almc().raw(), device.abm.get()), (0, 0));
+    }
+
+    #[test]
+    fn another_request_or_a_short_pause_starts_the_count_again() {
+        for disturb in [true, false] {
+            let mut device = encoder();
+            for k in 0..10 {
+                let now_ns = k * 80_000;
+                let _ = device.answer(Request::IdC, now_ns);
+                if disturb && k == 5 {
+                    let _ = device.answer(Request::Id0, now_ns + 40_000);
+                }
+            }
+            assert_eq!(device.abm.get(), if disturb { 0xfffe } else { 0 });
+        }
+        let mut hasty = encoder();
+        for k in 0..10 {
+            let _ = hasty.answer(Request::IdC, k * 39_999);
+        }
+        assert_eq!(hasty.abm.get(), 0xfffe);
+    }
+
+    #[test]
+    fn the_whole_eeprom_is_written_and_read_back() {
+        let mut device = encoder();
+        let mut now_ns = 0;
+        for index in (0..762).step_by(31) {
+            let (page, address) = Page::locate(index, 6).unwrap();
+            let data = (index % 251) as u8;
+            let (value, end) =
+                run!(EepromAccess::write(Some(page), address, data, Polling::default()), &mut device, now_ns);
+            assert_eq!(value, Ok(data));
+            now_ns = end;
+        }
+        for index in (0..762).step_by(31) {
+            let (page, address) = Page::locate(index, 6).unwrap();
+            let (value, end) = run!(EepromAccess::read(Some(page), address, Polling::default()), &mut device, now_ns);
+            assert_eq!(value, Ok((index % 251) as u8));
+            now_ns = end;
+        }
+        assert_eq!(device.eeprom_mut()[0][1], 0xff);
+    }
+
+    #[test]
+    fn faults_are_seen_by_the_master() {
+        let mut device = encoder();
+        let mut now_ns = 0;
+        let mut outcome = |fault| {
+            device.set_fault(fault);
+            now_ns += 1_000_000;
+            transact(&mut device, Request::Id0, now_ns).0
+        };
+        assert_eq!(outcome(Fault::Silent), Err(Error::NoResponse { echo: true }));
+        assert!(matches!(outcome(Fault::BadCrc), Err(Error::Crc { .. })));
+        assert_eq!(outcome(Fault::CutAfter { fields: 4 }), Err(Error::Truncated { got: 4, want: 6 }));
+        assert!(matches!(outcome(Fault::FlipBit { at: 23 }), Err(Error::Crc { .. })));
+        assert!(matches!(outcome(Fault::FlipBit { at: 5 }), Err(Error::Parity { .. })));
+        assert!(matches!(outcome(Fault::RejectAll), Err(Error::Rejected { .. })));
+        assert!(outcome(Fault::None).is_ok());
+        device.set_fault(Fault::FlipBit { at: 9 });
+        let reply = send(&mut device, &[0x02], 20_000_000).unwrap();
+        assert_eq!(Response::parse_line(Request::Id0, reply.line), Err(Error::Delimiter { field: 0 }));
+    }
+
+    /// xorshift: the noise of the line must be the same in every run.
+    fn next(seed: &mut u64) -> u64 {
+        *seed ^= *seed << 13;
+        *seed ^= *seed >> 7;
+        *seed ^= *seed << 17;
+        *seed
+    }
+
+    /// One way over the line: rendered at 16 samples a bit with rate error, jitter of every edge by up to two samples
+    /// and now and then a wrong bit, received by the oversampling receiver. Gives the bytes with their framing.
+    fn over_the_line(line: Window, seed: &mut u64, wrong_bits: bool) -> Vec<(u8, bool)> {
+        let wave = Wave::new(16, (next(seed) % 20_000) as i32 - 10_000, next(seed) as u32);
+        let flip = if wrong_bits { next(seed) % u64::from(line.len()) } else { u64::MAX };
+        let mut edge = |bit: u64| wave.first_sample(bit + 2) + next(seed) % 5;
+        let mut receiver = Receiver::new(Format::new(16, 8).unwrap());
+        let mut fields = Vec::new();
+        let mut from = edge(0);
+        fields.extend(receiver.run(true, from));
+        for bit in 0..u64::from(line.len()) {
+            let to = edge(bit + 1);
+            fields.extend(receiver.run(line.get(bit as u32).unwrap() != (bit == flip), to - from));
+            from = to;
+        }
+        fields.extend(receiver.run(true, 200));
+        fields.iter().map(|f| (f.content as u8, f.delimiter)).collect()
+    }
+
+    /// Master and encoder over a line with delay, jitter, rate error and, in a third of the answers, one wrong bit:
+    /// clean answers always arrive, no answer with a single wrong bit is ever taken for a good one.
+    #[test]
+    fn both_ends_over_a_poor_line() {
+        let mut device = encoder();
+        let mut seed = 0x5eed_0123_4567_89ab;
+        let mut refused = 0;
+        for k in 0..3_000_u64 {
+            let abs = U24::truncate(next(&mut seed) as u32 & 0x7f_ffff);
+            device.set_position(abs, U24::truncate(k as u32));
+            let (request, now_ns) = ([Request::Id0, Request::Id3][(k % 2) as usize], k * 1_000_000);
+            let mut master = Transaction::start(request, Line::new(BitRate::Mbit2_5), now_ns);
+            let heard = over_the_line(master.frame().line(), &mut seed, false);
+            assert_eq!(heard, [(request.emit().as_bytes()[0], true)]);
+            let reply = device.byte(heard[0].0, now_ns + 4_000).unwrap();
+            let damaged = next(&mut seed) % 3 == 0;
+            let cable_ns = next(&mut seed) % 1_000;
+            for (n, (byte, framed)) in (1..).zip(over_the_line(reply.line, &mut seed, damaged)) {
+                let at_ns = reply.at_ns + cable_ns + 4_000 * n;
+                let _ = if framed { master.byte(byte, at_ns) } else { master.framing_error(at_ns) };
+            }
+            match master.poll(now_ns + 900_000) {
+                Progress::Done(response) => {
+                    assert!(!damaged, "a wrong bit was not seen");
+                    assert_eq!(response.abs(), Some(abs));
+                }
+                Progress::Failed(_) => {
+                    assert!(damaged);
+                    refused += 1;
+                }
+                Progress::Waiting { .. } => panic!("the time-out did not end it"),
+            }
+        }
+        assert!((900..1_100).contains(&refused), "{refused}");
+    }
+
+    #[test]
+    fn bit_by_bit_is_the_same() {
+        let request = Request::write_eeprom(Address::new(9).unwrap(), 0x5a);
+        let mut by_bits = encoder();
+        let line = request.emit().line();
+        let mut reply = None;
+        for at in 0..line.len() {
+            let now_ns = 400 * u64::from(at + 1);
+            reply = by_bits.bit(line.get(at).unwrap(), now_ns).or(reply);
+        }
+        let mut by_bytes = encoder();
+        assert_eq!(reply, send(&mut by_bytes, request.emit().as_bytes(), 0));
+        assert!(reply.is_some());
+    }
+}

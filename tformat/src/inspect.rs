@@ -1,0 +1,457 @@
+//! For tools: looks at a line that was refused, lists every fault and guesses the cause.
+//!
+//! Decoders stop at the first fault and give no value; that is right for a drive and unhelpful at a bench. Here all
+//! fields are read whatever their framing, and the usual mistakes (wires exchanged, wrong bit order, one bit early or
+//! late, own echo, wrong rate, wrong data ID) are undone one by one: the one that makes the frame sound is the cause.
+//!
+//! ```
+//! use tformat::inspect::{Cause, inspect};
+//! use tformat::{Request, Response, SingleTurn, StatusField, U24};
+//!
+//! let answer = Response::Id0(SingleTurn { sf: StatusField::new(0), abs: U24::truncate(0x1d4b) });
+//! // A and B exchanged: every level is inverted
+//! let report = inspect(Request::Id0, answer.emit().line().inverted());
+//! assert_eq!(report.cause, Some(Cause::LineInverted));
+//! assert_eq!(report.response, Some(answer));
+//! ```
+
+use core::fmt;
+
+use nrz_line::{BitOrder, Window};
+
+use crate::{ControlField, DataId, Error, ErrorClass, Frame, Request, Response, crc};
+
+/// One field, read without judging it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct RawField {
+    /// The data bits.
+    pub byte: u8,
+    /// Whether the start bit reads 0.
+    pub start_ok: bool,
+    /// Whether the delimiter reads 1.
+    pub delimiter_ok: bool,
+}
+
+/// What most likely went wrong.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[non_exhaustive]
+pub enum Cause {
+    /// Every level is inverted: A and B are exchanged, or the receiver's polarity is wrong.
+    LineInverted,
+    /// The frame was taken `bits` bits too early (negative: too late), as after a glitch at the turn-round.
+    Shifted {
+        /// Idle bits in front of the frame; negative: bits of the frame that are missing.
+        bits: i8,
+    },
+    /// Bits are packed most significant first and were read least significant first, or the other way round.
+    WrongBitOrder,
+    /// The own request came back, and an answer behind it.
+    OwnEcho,
+    /// Only the own request came back: no encoder, or A and B are exchanged on a half-duplex line.
+    OnlyEcho,
+    /// The line was sampled twice a bit: the real rate is half of the assumed one.
+    HalfRate,
+    /// A sound answer to another data ID.
+    OtherDataId {
+        /// What was answered.
+        answered: DataId,
+    },
+    /// A sound ID 3 frame that was not asked for: the encoder found the request damaged.
+    RequestRefused,
+    /// The line does not move from 0: short circuit, driver stuck, or no supply.
+    StuckLow,
+    /// The line does not move from 1: nobody answers.
+    StuckHigh,
+    /// Everything is right but the check field: single bits were disturbed.
+    Disturbed,
+}
+
+impl fmt::Display for Cause {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::LineInverted => f.write_str("the line is inverted: exchange A and B, or the polarity of the input"),
+            Self::Shifted { bits } if *bits > 0 => write!(f, "the frame begins {bits} bit(s) later than it was taken"),
+            Self::Shifted { bits } => {
+                write!(f, "{} bit(s) at the beginning of the frame are missing", bits.unsigned_abs())
+            }
+            Self::WrongBitOrder => f.write_str("the bits of each byte are in the other order"),
+            Self::OwnEcho => f.write_str("the own request came back before the answer: remove the echo"),
+            Self::OnlyEcho => f.write_str("only the own request came back: no encoder, or A and B are exchanged"),
+            Self::HalfRate => f.write_str("the line runs at half the assumed bit rate"),
+            Self::OtherDataId { answered } => write!(f, "this is a sound answer to ID {:X}", answered.code()),
+            Self::RequestRefused => f.write_str("the encoder found the request damaged and answered with ID 3"),
+            Self::StuckLow => f.write_str("the line stays at 0"),
+            Self::StuckHigh => f.write_str("the line stays at 1: nobody answers"),
+            Self::Disturbed => f.write_str("single bits were disturbed"),
+        }
+    }
+}
+
+/// The kinds of faults found, as a set.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Findings(u32);
+
+impl Findings {
+    /// Whether a fault of this kind was found.
+    pub const fn has(self, class: ErrorClass) -> bool {
+        self.0 >> class as u32 & 1 == 1
+    }
+
+    /// Whether none was found.
+    pub const fn is_empty(self) -> bool {
+        self.0 == 0
+    }
+
+    /// The kinds that were found, in the order of the checks.
+    pub fn classes(self) -> impl Iterator<Item = ErrorClass> {
+        ErrorClass::ALL.into_iter().filter(move |class| self.has(*class))
+    }
+
+    const fn add(&mut self, class: ErrorClass) {
+        self.0 |= 1 << class as u32;
+    }
+}
+
+/// What there is to say about a line.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Report {
+    fields: [RawField; Frame::MAX_FIELDS],
+    len: u8,
+    /// Every kind of fault in the line as it was given.
+    pub findings: Findings,
+    /// The fault that a decoder reports.
+    pub error: Option<Error>,
+    /// The most likely cause of it.
+    pub cause: Option<Cause>,
+    /// The answer, as it is if nothing is wrong, or as it would be without the cause. For showing to a person only.
+    pub response: Option<Response>,
+    /// Whether SF and ALMC of an ID 3 answer contradict each other. Compatible encoders leave SF at 0.
+    pub status_contradicts_alarms: bool,
+}
+
+impl Report {
+    /// The whole fields of the line on its grid, at most as many as the answer has.
+    pub fn fields(&self) -> &[RawField] {
+        self.fields.get(..usize::from(self.len)).unwrap_or(&self.fields)
+    }
+}
+
+/// Looks at line bits that should hold the answer to `request`.
+pub fn inspect(request: Request, line: Window) -> Report {
+    let outcome = Response::parse_line(request, line);
+    let (cause, response) = match outcome {
+        Ok(response) => (None, Some(response)),
+        Err(error) => diagnose(request, line, error),
+    };
+    let (fields, len) = raw_fields(line, request.data_id().response_fields());
+    let mut report = Report {
+        fields,
+        len,
+        findings: Findings::default(),
+        error: outcome.err(),
+        cause,
+        response,
+        status_contradicts_alarms: contradicts(response),
+    };
+    report.findings = findings(request, &report);
+    report
+}
+
+/// Looks at UART bytes that should hold the answer to `request`.
+pub fn inspect_bytes(request: Request, bytes: &[u8]) -> Report {
+    let end = bytes.len().min(Frame::MAX_FIELDS);
+    let line = bytes.get(..end).and_then(Frame::new).map_or(Window::EMPTY, Frame::line);
+    let mut report = inspect(request, line);
+    // An echo in front pushes the end of the answer out of the eleven fields.
+    if let Ok(response) = crate::master::parse_echoed(request, bytes) {
+        report.cause = Some(Cause::OwnEcho);
+        report.response = Some(response);
+    }
+    report
+}
+
+fn contradicts(response: Option<Response>) -> bool {
+    matches!(response, Some(Response::Id3(full)) if !full.sf.agrees_with(full.almc))
+}
+
+/// Undoes the usual mistakes one by one; the first that gives a sound answer is the cause.
+fn diagnose(request: Request, line: Window, error: Error) -> (Option<Cause>, Option<Response>) {
+    let all_ones = line.inverted().bits() == 0;
+    match error {
+        Error::Rejected { .. } => {
+            let response = Response::parse_line(Request::Id3, line).ok();
+            return (Some(Cause::RequestRefused), response);
+        }
+        _ if line.is_empty() || all_ones => return (Some(Cause::StuckHigh), None),
+        _ if line.bits() == 0 => return (Some(Cause::StuckLow), None),
+        _ => {}
+    }
+    let sound = |line: Option<Window>| line.and_then(|line| Response::parse_line(request, line).ok());
+    let attempts = [
+        (Cause::LineInverted, sound(Some(line.inverted()))),
+        (Cause::WrongBitOrder, sound(reordered(line))),
+        (Cause::OwnEcho, echo(request, line).and_then(|answer| sound(Some(answer)))),
+        (Cause::HalfRate, half_rate(request, line)),
+    ];
+    for (cause, response) in attempts {
+        if response.is_some() {
+            return (Some(cause), response);
+        }
+    }
+    if let Some((bits, response)) = shifted(request, line) {
+        return (Some(Cause::Shifted { bits }), Some(response));
+    }
+    if echo(request, line).is_some_and(Window::is_empty) {
+        return (Some(Cause::OnlyEcho), None);
+    }
+    if let Some((answered, response)) = other_data_id(request, line) {
+        return (Some(Cause::OtherDataId { answered }), Some(response));
+    }
+    let disturbed = matches!(error, Error::Crc { .. } | Error::Parity { .. } | Error::SinkCode { .. });
+    (disturbed.then_some(Cause::Disturbed), None)
+}
+
+/// The line with the bits of every byte in the other order.
+fn reordered(line: Window) -> Option<Window> {
+    Window::read(&line.to_bytes(BitOrder::LsbFirst), 0, line.len(), BitOrder::MsbFirst).ok()
+}
+
+/// What follows the own request and the turn-round, if the line begins with the request; nothing is left if nobody answers.
+fn echo(request: Request, line: Window) -> Option<Window> {
+    let sent = request.emit().line();
+    let rest = line.skip(sent.len())?;
+    let same = (line.bits() ^ sent.bits()) & !u128::MAX.wrapping_shl(sent.len()) == 0;
+    // The turn-round is idle line; the first 0 is the start bit of the answer.
+    let turn_round = (!rest.bits()).trailing_zeros();
+    if same { rest.skip(turn_round) } else { None }
+}
+
+/// The answer if every second bit of the line is one bit of it: as far as the window reaches, 64 bits.
+fn half_rate(request: Request, line: Window) -> Option<Response> {
+    let mut bits = 0_u128;
+    let len = line.len() / 2;
+    for at in 0..len {
+        let (first, second) = (line.get(at.wrapping_mul(2))?, line.get(at.wrapping_mul(2).wrapping_add(1))?);
+        if first != second {
+            return None;
+        }
+        bits |= u128::from(first) << at;
+    }
+    Response::parse_line(request, Window::from_bits(bits, len)?).ok()
+}
+
+/// How far the frame is from where it was looked for. Missing bits are completed with idle line at the end.
+fn shifted(request: Request, line: Window) -> Option<(i8, Response)> {
+    let need = u32::from(request.data_id().response_fields()).wrapping_mul(Frame::FIELD_BITS);
+    for bits in 1..=9_i8 {
+        let by = u32::from(bits.unsigned_abs());
+        let late = line.skip(by).and_then(|late| padded(late, need));
+        if let Some(response) = late.and_then(|late| Response::parse_line(request, late).ok()) {
+            return Some((bits, response));
+        }
+    }
+    // One bit missing: it was the start bit.
+    let early = Window::from_bits(line.bits() << 1, line.len().wrapping_add(1).min(Window::MAX_LEN))?;
+    Response::parse_line(request, early).ok().map(|response| (-1, response))
+}
+
+/// The line followed by idle bits up to `len`.
+fn padded(line: Window, len: u32) -> Option<Window> {
+    if line.len() >= len {
+        return Some(line);
+    }
+    Window::from_bits(line.bits() | u128::MAX.checked_shl(line.len())?, len)
+}
+
+/// A sound answer to something else.
+fn other_data_id(request: Request, line: Window) -> Option<(DataId, Response)> {
+    let cf = Frame::from_line(line, 1).ok()?;
+    let answered = ControlField::parse(*cf.as_bytes().first()?).ok()?.data_id().ok()?;
+    let frame = Frame::from_line(line, answered.response_fields()).ok()?;
+    let asked = as_asked(answered, frame.as_bytes())?;
+    let response = Response::parse(asked, frame.as_bytes()).ok()?;
+    (answered != request.data_id()).then_some((answered, response))
+}
+
+/// A request that the answer would fit.
+fn as_asked(id: DataId, answer: &[u8]) -> Option<Request> {
+    let adf = crate::Adf::new(answer.get(1)? & 0x7f);
+    Some(match id {
+        DataId::Id0 => Request::Id0,
+        DataId::Id1 => Request::Id1,
+        DataId::Id2 => Request::Id2,
+        DataId::Id3 => Request::Id3,
+        DataId::Id6 => Request::Id6 { adf, edf: *answer.get(2)? },
+        DataId::Id7 => Request::Id7,
+        DataId::Id8 => Request::Id8,
+        DataId::IdC => Request::IdC,
+        DataId::IdD => Request::IdD { adf },
+    })
+}
+
+fn raw_fields(line: Window, want: u8) -> ([RawField; Frame::MAX_FIELDS], u8) {
+    let mut fields = [RawField { byte: 0, start_ok: false, delimiter_ok: false }; Frame::MAX_FIELDS];
+    let mut len = 0;
+    for (field, raw) in (0..want).zip(fields.iter_mut()) {
+        let at = u32::from(field).wrapping_mul(Frame::FIELD_BITS);
+        let (Some(start), Some(delimiter)) = (line.get(at), line.get(at.wrapping_add(9))) else { break };
+        let [byte, ..] = (line.bits() >> at.wrapping_add(1)).to_le_bytes();
+        *raw = RawField { byte, start_ok: !start, delimiter_ok: delimiter };
+        len = field.wrapping_add(1);
+    }
+    (fields, len)
+}
+
+/// Every kind of fault that the fields show.
+fn findings(request: Request, report: &Report) -> Findings {
+    let mut found = Findings::default();
+    if let Some(error) = report.error {
+        found.add(error.class());
+    }
+    let mut bytes = [0; Frame::MAX_FIELDS];
+    for (byte, field) in bytes.iter_mut().zip(report.fields()) {
+        *byte = field.byte;
+        if !field.start_ok {
+            found.add(ErrorClass::StartBit);
+        }
+        if !field.delimiter_ok {
+            found.add(ErrorClass::Delimiter);
+        }
+    }
+    let bytes = bytes.get(..usize::from(report.len)).unwrap_or(&bytes);
+    let id = request.data_id();
+    match bytes.first().map(|cf| (*cf, ControlField::parse(*cf))) {
+        Some((_, Err(error))) => found.add(error.class()),
+        Some((cf, Ok(_))) if cf != id.control_field().get() => found.add(ErrorClass::CfMismatch),
+        _ => {}
+    }
+    if report.len < id.response_fields() {
+        found.add(ErrorClass::Truncated);
+    } else if crc(bytes) != 0 {
+        found.add(ErrorClass::Crc);
+    }
+    found
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::response::tests::exchanges;
+    use proptest::prelude::*;
+    use std::string::ToString;
+
+    fn window(bits: u128, len: u32) -> Window {
+        Window::from_bits(bits, len).unwrap()
+    }
+
+    /// The line in its own length, then idle up to `len`.
+    fn idle_after(line: Window, len: u32) -> Window {
+        padded(line, len).unwrap()
+    }
+
+    proptest! {
+        #[test]
+        fn a_sound_answer_has_no_cause((request, response) in exchanges()) {
+            let report = inspect(request, response.emit().line());
+            prop_assert!(report.findings.is_empty());
+            prop_assert_eq!((report.error, report.cause, report.response), (None, None, Some(response)));
+            let bytes = response.emit();
+            prop_assert_eq!(report.fields().len(), bytes.as_bytes().len());
+            prop_assert!(report.fields().iter().zip(bytes.as_bytes()).all(|(f, b)| f.byte == *b && f.start_ok && f.delimiter_ok));
+        }
+
+        #[test]
+        fn the_usual_mistakes_are_found((request, response) in exchanges(), shift in 1..=9_u32) {
+            let line = response.emit().line();
+            let late = idle_after(window(line.bits() << shift | ((1 << shift) - 1), line.len() + shift), line.len() + 10);
+            let early = idle_after(line.skip(1).unwrap(), line.len());
+            let cases = [
+                (line.inverted(), Cause::LineInverted),
+                (reordered(idle_after(line, line.len().next_multiple_of(8))).unwrap(), Cause::WrongBitOrder),
+                (late, Cause::Shifted { bits: shift as i8 }),
+                (early, Cause::Shifted { bits: -1 }),
+            ];
+            for (line, cause) in cases {
+                let report = inspect(request, line);
+                prop_assert!(report.error.is_some());
+                prop_assert_eq!((report.cause, report.response), (Some(cause), Some(response)));
+            }
+        }
+
+        #[test]
+        fn echoes_are_found((request, response) in exchanges()) {
+            let (sent, line) = (request.emit().line(), response.emit().line());
+            let only = inspect(request, idle_after(sent, line.len().max(sent.len() + 10)));
+            // The echo of a write to the EEPROM is what its answer looks like.
+            if request.data_id() != DataId::Id6 {
+                prop_assert_eq!(only.cause, Some(Cause::OnlyEcho));
+                let bytes = [request.emit().as_bytes(), response.emit().as_bytes()].concat();
+                let both = inspect_bytes(request, &bytes);
+                prop_assert_eq!((both.cause, both.response), (Some(Cause::OwnEcho), Some(response)));
+            }
+        }
+
+        #[test]
+        fn half_the_rate((request, response) in exchanges()) {
+            let line = response.emit().line();
+            prop_assume!(line.len() <= 60);
+            let doubled = (0..line.len()).fold(0, |bits, at| bits | ((line.bits() >> at & 1) * 3) << (2 * at));
+            let report = inspect(request, window(doubled, 2 * line.len()));
+            prop_assert_eq!((report.cause, report.response), (Some(Cause::HalfRate), Some(response)));
+        }
+
+        #[test]
+        fn answers_to_something_else((asked, response) in exchanges(), (other, _) in exchanges()) {
+            prop_assume!(asked.data_id() != other.data_id());
+            let report = inspect(other, idle_after(response.emit().line(), 120));
+            let want = match response {
+                Response::Id3(_) => Cause::RequestRefused,
+                _ => Cause::OtherDataId { answered: asked.data_id() },
+            };
+            prop_assert_eq!((report.cause, report.response), (Some(want), Some(response)));
+        }
+
+        /// Any line at all gives a report.
+        #[test]
+        fn any_line(bits: u128, len in 0..=128_u32, (request, _) in exchanges()) {
+            let report = inspect(request, window(bits, len));
+            prop_assert_eq!(report.error.is_some(), !report.findings.is_empty());
+        }
+    }
+
+    #[test]
+    fn stuck_lines() {
+        assert_eq!(inspect(Request::Id0, window(0, 110)).cause, Some(Cause::StuckLow));
+        assert_eq!(inspect(Request::Id0, window(u128::MAX, 110)).cause, Some(Cause::StuckHigh));
+        assert_eq!(inspect(Request::Id0, Window::EMPTY).cause, Some(Cause::StuckHigh));
+    }
+
+    #[test]
+    fn all_faults_are_listed() {
+        let mut line = Frame::new(&[0x02, 0x20, 0xb4, 0xbd, 0x1c, 0x36]).unwrap().line().bits();
+        line ^= 1 << 20 | 1 << 39;
+        let report = inspect(Request::Id0, window(line, 60));
+        assert!(report.findings.classes().eq([ErrorClass::StartBit, ErrorClass::Delimiter, ErrorClass::Crc]));
+        assert_eq!(report.error, Some(Error::StartBit { field: 2 }));
+        assert!(!report.fields()[2].start_ok && !report.fields()[3].delimiter_ok);
+    }
+
+    #[test]
+    fn status_that_contradicts_the_alarms() {
+        let mut answer = [0x1a, 0x00, 0, 0, 0, 0x17, 0, 0, 0, 0xc8, 0];
+        answer[10] = crc(&answer);
+        assert!(inspect_bytes(Request::Id3, &answer).status_contradicts_alarms);
+    }
+
+    #[test]
+    fn causes_are_sentences() {
+        assert_eq!(Cause::Shifted { bits: -1 }.to_string(), "1 bit(s) at the beginning of the frame are missing");
+        assert_eq!(Cause::OtherDataId { answered: DataId::IdC }.to_string(), "this is a sound answer to ID C");
+    }
+}
