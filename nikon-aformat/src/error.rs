@@ -132,8 +132,8 @@ pub enum Error {
         got: u32,
     },
     /// No reply within the time-out.
-    #[error("no reply")]
-    NoReply,
+    #[error("no response")]
+    NoResponse,
     /// The memory stayed busy after all tries.
     #[error("the encoder was still busy after {tries} requests")]
     Busy {
@@ -214,7 +214,7 @@ pub enum ErrorClass {
     UnsupportedInVersion,
     AddressRange,
     DataRange,
-    NoReply,
+    NoResponse,
     Busy,
     Interrupted,
     UpperBits,
@@ -241,7 +241,7 @@ impl ErrorClass {
         Self::UnsupportedInVersion,
         Self::AddressRange,
         Self::DataRange,
-        Self::NoReply,
+        Self::NoResponse,
         Self::Busy,
         Self::Interrupted,
         Self::UpperBits,
@@ -270,7 +270,7 @@ impl Error {
             Self::UnsupportedInVersion { .. } => ErrorClass::UnsupportedInVersion,
             Self::AddressRange { .. } => ErrorClass::AddressRange,
             Self::DataRange { .. } => ErrorClass::DataRange,
-            Self::NoReply => ErrorClass::NoReply,
+            Self::NoResponse => ErrorClass::NoResponse,
             Self::Busy { .. } => ErrorClass::Busy,
             Self::Interrupted { .. } => ErrorClass::Interrupted,
             Self::UpperBits { .. } => ErrorClass::UpperBits,

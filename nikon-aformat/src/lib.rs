@@ -6,14 +6,17 @@
 #[cfg(any(test, feature = "std"))]
 extern crate std;
 
+pub mod bus;
 mod command;
 mod crc;
 mod error;
 mod expected;
 mod frame;
 mod layout;
+pub mod master;
 mod number;
 mod profile;
+pub mod reception;
 mod reply;
 mod request;
 mod response;

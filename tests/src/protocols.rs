@@ -1,5 +1,6 @@
 //! Which topics there are. A new protocol is one file here and one line in [`ALL`].
 
+mod nikon;
 mod tformat;
 
 use crate::row::Check;
@@ -7,7 +8,7 @@ use crate::row::Check;
 /// A protocol's folder name and its topics.
 type Protocol = (&'static str, &'static [(&'static str, Check)]);
 
-const ALL: &[Protocol] = &[("tformat", tformat::TOPICS)];
+const ALL: &[Protocol] = &[("nikon", nikon::TOPICS), ("tformat", tformat::TOPICS)];
 
 pub(crate) fn names() -> Vec<&'static str> {
     ALL.iter().map(|(name, _)| *name).collect()

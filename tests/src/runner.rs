@@ -27,14 +27,18 @@ pub struct Topic {
 pub struct Failure {
     /// Line in the file, from 1.
     pub line: usize,
-    /// The row's name.
+    /// The row's name; empty if it has none.
     pub name: String,
     fault: Fault,
 }
 
 impl fmt::Display for Failure {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "line {}, {}: ", self.line, self.name)?;
+        write!(f, "line {}", self.line)?;
+        if !self.name.is_empty() {
+            write!(f, ", {}", self.name)?;
+        }
+        f.write_str(": ")?;
         match &self.fault {
             Fault::Unreadable(why) => write!(f, "row cannot be read: {why}"),
             Fault::Differs { what, expected, real } => {
@@ -57,7 +61,7 @@ pub enum RunError {
     UnknownTopic(PathBuf, &'static str),
     /// The file has no row beside its `about` line.
     NoRows(PathBuf),
-    /// A line is not a JSON object, or has no name.
+    /// A line is not a JSON object, or its name is not a string.
     Line(PathBuf, usize, String),
 }
 
@@ -196,7 +200,8 @@ fn parse(path: &Path, line: usize, text: &str) -> Result<Option<Row>, RunError> 
     }
     match keys.remove("name") {
         Some(Value::String(name)) => Ok(Some(Row { line, name, keys })),
-        _ => Err(fault("the row has no \"name\"".to_owned())),
+        None => Ok(Some(Row { line, name: String::new(), keys })),
+        Some(other) => Err(fault(format!("the name {other} is not a string"))),
     }
 }
 
