@@ -9,6 +9,7 @@ extern crate std;
 pub mod bus;
 mod command;
 mod crc;
+pub mod device;
 mod error;
 mod expected;
 mod frame;
@@ -21,6 +22,7 @@ mod reply;
 mod request;
 mod response;
 mod status;
+pub mod stream;
 mod temperature;
 mod timing;
 

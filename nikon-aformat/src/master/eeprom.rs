@@ -57,6 +57,11 @@ impl EepromRead {
         Self { request: Request::new(ea, Operation::EepromReadBank { bank, address }), polling, tries: 0 }
     }
 
+    /// The encoder that is asked.
+    pub const fn ea(&self) -> EncoderAddress {
+        self.request.ea
+    }
+
     /// The first request, at once.
     pub const fn start(&mut self, now_ns: u64) -> Step<u16> {
         self.tries = 0;
