@@ -6,13 +6,17 @@
 #[cfg(any(test, feature = "std"))]
 extern crate std;
 
+mod health;
 mod order;
+mod procedure;
 mod receiver;
 mod samples;
 mod wave;
 mod window;
 
+pub use health::{Classified, Counters, ErrorRate};
 pub use order::BitOrder;
+pub use procedure::{Polling, Step};
 pub use receiver::{Field, Format, FormatError, Receiver};
 pub use samples::Samples;
 pub use wave::Wave;

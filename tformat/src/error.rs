@@ -201,6 +201,18 @@ impl Error {
     }
 }
 
+impl nrz_line::Classified for ErrorClass {
+    fn class_index(&self) -> usize {
+        *self as usize
+    }
+}
+
+impl nrz_line::Classified for Error {
+    fn class_index(&self) -> usize {
+        self.class().class_index()
+    }
+}
+
 impl<I> nom::error::ParseError<I> for Error {
     fn from_error_kind(_: I, _: nom::error::ErrorKind) -> Self {
         Self::Combinator
@@ -226,6 +238,12 @@ mod tests {
     fn an_error_fits_two_words_of_a_32_bit_core_and_a_half() {
         assert!(size_of::<Error>() <= 2 * size_of::<u64>());
         assert!(size_of::<Result<(), Error>>() <= 2 * size_of::<u64>());
+    }
+
+    #[test]
+    fn every_class_has_a_place_of_its_own() {
+        use nrz_line::Classified;
+        assert!(ErrorClass::ALL.iter().enumerate().all(|(k, class)| class.class_index() == k));
     }
 
     #[test]

@@ -25,44 +25,19 @@
 //! assert_eq!(single.abs.get(), 1_883_572);
 //! ```
 
-mod counters;
 mod eeprom;
 mod reset;
 mod transaction;
 
-pub use counters::{Counters, ErrorRate};
-pub use eeprom::{EepromAccess, Page, Polling};
+pub use eeprom::{EepromAccess, Page};
+pub use nrz_line::{ErrorRate, Polling};
 pub use reset::Reset;
 pub use transaction::{Line, Progress, Transaction, parse_echoed};
 
-use crate::{Error, Request};
+use crate::{Error, ErrorClass, Request};
 
 /// What a procedure of several transactions wants next.
-///
-/// A refused answer is passed on as it is; the procedure decides whether to try again.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[must_use]
-pub enum Step<T> {
-    /// Do this transaction and report its outcome.
-    Send {
-        /// What to send.
-        request: Request,
-        /// Not before this time.
-        not_before_ns: u64,
-    },
-    /// The procedure has succeeded.
-    Done {
-        /// What it was made for.
-        value: T,
-        /// The encoder is ready for other requests from this time on.
-        not_before_ns: u64,
-    },
-    /// The procedure has failed.
-    Failed {
-        /// Why.
-        error: Error,
-        /// The encoder is ready for other requests from this time on.
-        not_before_ns: u64,
-    },
-}
+pub type Step<T> = nrz_line::Step<Request, T, Error>;
+
+/// How many transactions went well, and how many failed with which [`ErrorClass`].
+pub type Counters = nrz_line::Counters<{ ErrorClass::ALL.len() }>;

@@ -1,24 +1,8 @@
+use nrz_line::Polling;
+
 use super::Step;
 use super::reset::mismatch;
 use crate::{Address, Error, Request, Response};
-
-/// How often a busy memory is asked, and how many times at the most.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub struct Polling {
-    /// Time from the end of one answer to the next request, in ns.
-    pub interval_ns: u32,
-    /// Requests without success after which the access fails; 0 counts as 1.
-    pub max_tries: u16,
-}
-
-impl Default for Polling {
-    /// Every millisecond, 40 times: twice the 18 ms that a write takes.
-    fn default() -> Self {
-        Self { interval_ns: 1_000_000, max_tries: 40 }
-    }
-}
 
 /// A page of the EEPROM.
 ///

@@ -1,0 +1,147 @@
+//! A bench on the host: the encoder model of `tformat` behind a UART whose time runs by the byte.
+
+use core::cell::{Cell, RefCell};
+use core::convert::Infallible;
+
+use embedded_hal::digital::{ErrorType as PinErrorType, OutputPin};
+use embedded_io::{ErrorType, Read, ReadReady, Write};
+use tformat::device::{Device, Fault};
+use tformat::{BitRate, U24};
+
+use crate::tformat_uart::Clock;
+
+/// Time of one field at 2.5 Mbit/s.
+const FIELD_NS: u64 = 4_000;
+
+/// The encoder and the time that master and encoder share.
+#[derive(Debug)]
+pub struct Bench {
+    encoder: RefCell<Device<6>>,
+    now_ns: Cell<u64>,
+    /// Bytes on their way to the master, each with the time of its end.
+    line: RefCell<Line>,
+}
+
+#[derive(Debug, Default)]
+struct Line {
+    bytes: [(u64, u8); 16],
+    head: usize,
+    tail: usize,
+}
+
+impl Line {
+    fn put(&mut self, at_ns: u64, byte: u8) {
+        if let Some(place) = self.bytes.get_mut(self.tail % 16) {
+            *place = (at_ns, byte);
+            self.tail = self.tail.wrapping_add(1);
+        }
+    }
+
+    fn next(&self) -> Option<(u64, u8)> {
+        if self.head == self.tail { None } else { self.bytes.get(self.head % 16).copied() }
+    }
+}
+
+impl Bench {
+    /// An encoder with this encoder ID.
+    pub fn new(enid: u8) -> Self {
+        let encoder = RefCell::new(Device::new(enid, BitRate::Mbit2_5));
+        Self { encoder, now_ns: Cell::new(0), line: RefCell::default() }
+    }
+
+    /// Turns the shaft.
+    pub fn turn_to(&self, abs: U24, abm: U24) {
+        self.encoder.borrow_mut().set_position(abs, abm);
+    }
+
+    /// Switches a fault on.
+    pub fn break_it(&self, fault: Fault) {
+        self.encoder.borrow_mut().set_fault(fault);
+    }
+
+    fn pass(&self, ns: u64) -> u64 {
+        self.now_ns.set(self.now_ns.get().wrapping_add(ns));
+        self.now_ns.get()
+    }
+}
+
+impl Clock for &Bench {
+    /// Every look at the clock costs 100 ns, so that waiting ends.
+    fn now_ns(&mut self) -> u64 {
+        self.pass(100)
+    }
+}
+
+/// The master's UART; it hears itself.
+#[derive(Debug)]
+pub struct Uart<'a>(&'a Bench);
+
+impl<'a> Uart<'a> {
+    /// The UART at this bench, after a pause on the line.
+    pub fn new(bench: &'a Bench) -> Self {
+        bench.pass(100_000);
+        Self(bench)
+    }
+}
+
+impl ErrorType for Uart<'_> {
+    type Error = Infallible;
+}
+
+impl Write for Uart<'_> {
+    fn write(&mut self, bytes: &[u8]) -> Result<usize, Infallible> {
+        for byte in bytes {
+            let now_ns = self.0.pass(FIELD_NS);
+            let mut line = self.0.line.borrow_mut();
+            line.put(now_ns, *byte);
+            if let Some(reply) = self.0.encoder.borrow_mut().byte(*byte, now_ns) {
+                for (k, byte) in (1..).zip(reply.frame.as_bytes()) {
+                    line.put(reply.at_ns.wrapping_add(FIELD_NS.wrapping_mul(k)), *byte);
+                }
+            }
+        }
+        Ok(bytes.len())
+    }
+
+    fn flush(&mut self) -> Result<(), Infallible> {
+        Ok(())
+    }
+}
+
+impl ReadReady for Uart<'_> {
+    fn read_ready(&mut self) -> Result<bool, Infallible> {
+        Ok(self.0.line.borrow().next().is_some_and(|(at_ns, _)| at_ns <= self.0.now_ns.get()))
+    }
+}
+
+impl Read for Uart<'_> {
+    fn read(&mut self, bytes: &mut [u8]) -> Result<usize, Infallible> {
+        let mut line = self.0.line.borrow_mut();
+        match (bytes.first_mut(), line.next()) {
+            (Some(place), Some((_, byte))) => {
+                *place = byte;
+                line.head = line.head.wrapping_add(1);
+                Ok(1)
+            }
+            _ => Ok(0),
+        }
+    }
+}
+
+/// A driver-enable pin that is not there.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Pin;
+
+impl PinErrorType for Pin {
+    type Error = Infallible;
+}
+
+impl OutputPin for Pin {
+    fn set_low(&mut self) -> Result<(), Infallible> {
+        Ok(())
+    }
+
+    fn set_high(&mut self) -> Result<(), Infallible> {
+        Ok(())
+    }
+}

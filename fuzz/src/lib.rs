@@ -1,0 +1,27 @@
+//! What the fuzz targets do: each takes any bytes and panics when a law is broken.
+//!
+//! The bodies are ordinary functions that build on stable, so that the tests of the workspace replay the corpora;
+//! `fuzz_targets/` hands them to the fuzzer. A new target is a function in the file of its protocol, a line in
+//! [`TARGETS`], a file in `fuzz_targets/` and its `[[bin]]`, and seeds from `examples/seed_corpus.rs`.
+
+pub mod nrz_line;
+pub mod tformat;
+
+/// A target.
+pub type Target = fn(&[u8]);
+
+/// All targets by name.
+pub const TARGETS: &[(&str, Target)] = &[
+    ("nrz_receiver", nrz_line::receiver),
+    ("tformat_request", tformat::request),
+    ("tformat_response", tformat::response),
+    ("tformat_differential", tformat::differential),
+    ("tformat_stream", tformat::stream),
+];
+
+/// Takes a byte off the front; 0 when none is left.
+fn byte(data: &mut &[u8]) -> u8 {
+    let Some((first, rest)) = data.split_first() else { return 0 };
+    *data = rest;
+    *first
+}

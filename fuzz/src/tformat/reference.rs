@@ -1,0 +1,103 @@
+//! A decoder of answers as one would write it from the text: bit by bit, check by check.
+
+use tformat::{
+    Adf, Almc, DataId, EncoderId, Error, Full, Memory, MultiTurn, Request, Response, SingleTurn, StatusField, U24,
+};
+
+/// The control field of ID 3, with which an encoder answers a damaged request too.
+const CF3: u8 = 0x1a;
+
+pub(crate) fn response(request: Request, bits: &[bool]) -> Result<Response, Error> {
+    let id = request.data_id();
+    let refusal_length = bits.len() >= 10 && data_bits(&bits[1..9]) == CF3;
+    let want = if refusal_length { 11 } else { usize::from(id.response_fields()) };
+    let fields = framed(bits, want)?;
+    let cf = fields[0];
+    if cf & 0x07 != 0x02 {
+        return Err(Error::SinkCode { cf });
+    }
+    if (3..8).filter(|bit| cf >> bit & 1 == 1).count() % 2 == 1 {
+        return Err(Error::Parity { cf });
+    }
+    let asked = id.control_field().get();
+    if cf != asked && cf != CF3 {
+        return Err(Error::CfMismatch { got: cf, want: asked });
+    }
+    let (got, before) = fields.split_last().expect("three fields at least");
+    let sum = before.iter().fold(0, |sum, byte| sum ^ byte);
+    if *got != sum {
+        return Err(Error::Crc { got: *got, want: sum });
+    }
+    if cf != asked {
+        return Err(Error::Rejected { sf: StatusField::new(fields[1]) });
+    }
+    let response = values(id, &fields);
+    echoed(request, response)?;
+    Ok(response)
+}
+
+/// `want` fields of ten bits, or the first fault of their framing.
+fn framed(bits: &[bool], want: usize) -> Result<Vec<u8>, Error> {
+    let mut fields = Vec::new();
+    for field in 0..want {
+        let truncated = Error::Truncated { got: field as u8, want: want as u8 };
+        let field = field as u8;
+        let bit = |at: usize| bits.get(usize::from(field) * 10 + at).copied();
+        if bit(0) == Some(true) {
+            return Err(Error::StartBit { field });
+        }
+        if bit(9) == Some(false) {
+            return Err(Error::Delimiter { field });
+        }
+        let data: Option<Vec<bool>> = (1..9).map(bit).collect();
+        match (bit(0), data, bit(9)) {
+            (Some(_), Some(data), Some(_)) => fields.push(data_bits(&data)),
+            _ => return Err(truncated),
+        }
+    }
+    Ok(fields)
+}
+
+/// Eight bits, the first of the line the least significant.
+fn data_bits(bits: &[bool]) -> u8 {
+    bits.iter().rev().fold(0, |byte, bit| byte << 1 | u8::from(*bit))
+}
+
+fn values(id: DataId, f: &[u8]) -> Response {
+    let number =
+        |at: usize| U24::truncate(u32::from(f[at]) + 256 * u32::from(f[at + 1]) + 65536 * u32::from(f[at + 2]));
+    let sf = StatusField::new(f[1]);
+    let single = || SingleTurn { sf, abs: number(2) };
+    let memory = || Memory { adf: Adf::new(f[1]), edf: f[2] };
+    match id {
+        DataId::Id0 => Response::Id0(single()),
+        DataId::Id1 => Response::Id1(MultiTurn { sf, abm: number(2) }),
+        DataId::Id2 => Response::Id2(EncoderId { sf, enid: f[2] }),
+        DataId::Id3 => Response::Id3(Full { sf, abs: number(2), enid: f[5], abm: number(6), almc: Almc::new(f[9]) }),
+        DataId::Id6 => Response::Id6(memory()),
+        DataId::Id7 => Response::Id7(single()),
+        DataId::Id8 => Response::Id8(single()),
+        DataId::IdC => Response::IdC(single()),
+        DataId::IdD => Response::IdD(memory()),
+    }
+}
+
+/// EEPROM answers repeat the address and, after a write that was done, the data.
+fn echoed(request: Request, response: Response) -> Result<(), Error> {
+    let (Response::Id6(memory) | Response::IdD(memory)) = response else { return Ok(()) };
+    let (asked, written) = match request {
+        Request::Id6 { adf, edf } => (adf, Some(edf)),
+        Request::IdD { adf } => (adf, None),
+        _ => return Ok(()),
+    };
+    let (got, want) = (memory.adf.raw() & 0x7f, asked.raw() & 0x7f);
+    if got != want {
+        return Err(Error::AddressMismatch { got, want });
+    }
+    match written {
+        Some(want) if memory.adf.raw() & 0x80 == 0 && memory.edf != want => {
+            Err(Error::DataMismatch { got: memory.edf, want })
+        }
+        _ => Ok(()),
+    }
+}

@@ -1,0 +1,156 @@
+//! Capture files: what a logic analyser, a simulator or a serial port recorded.
+//!
+//! One file per format under `capture/`. Every reader streams with fixed buffers and gives the same thing: level
+//! changes of named channels with the time in picoseconds ([`Line`]), or bytes ([`hexlog::HexLog`]).
+
+pub mod hexlog;
+mod input;
+pub mod raw;
+pub mod saleae_binary;
+pub mod saleae_csv;
+pub mod time;
+pub mod vcd;
+
+use std::cell::Cell;
+use std::path::Path;
+use std::rc::Rc;
+
+pub use input::Input;
+
+use crate::fault::{At, Fault};
+
+/// A channel takes a level.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Change {
+    /// When, in picoseconds of the capture's own time (negative before its trigger).
+    pub time: i64,
+    /// Index into [`Line::channels`].
+    pub channel: u16,
+    /// The level from here on.
+    pub level: bool,
+}
+
+/// A recording of lines.
+pub trait Line {
+    /// The channels by name. A change refers to them by index.
+    fn channels(&self) -> &[String];
+
+    /// Appends the next changes, in the order of time, and says whether there may be more.
+    ///
+    /// The first change of a channel is its level at the beginning. With a fault, the changes before it were
+    /// appended; no more will come.
+    fn read(&mut self, changes: &mut Vec<Change>) -> Result<bool, Fault>;
+
+    /// The time up to which the recording was read, in picoseconds.
+    fn reached(&self) -> i64;
+}
+
+/// An opened file.
+pub enum Capture {
+    /// Changes with their times: VCD, Saleae.
+    Edges(Box<dyn Line>),
+    /// Samples at a fixed rate.
+    Samples(raw::Raw),
+    /// Bytes without time.
+    Bytes(hexlog::HexLog),
+}
+
+/// File formats.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+pub enum Format {
+    /// Value change dump (IEEE 1364).
+    Vcd,
+    /// Saleae Logic 2 digital CSV export.
+    SaleaeCsv,
+    /// Saleae Logic 2 binary export, version 0.
+    SaleaeBinary,
+    /// One sample in one or more whole bytes, a bit a channel (sigrok-cli -O binary).
+    Raw,
+    /// One channel, eight samples a byte, the oldest in bit 0.
+    Packed,
+    /// Bytes as hex digits, a burst a line.
+    Hex,
+}
+
+/// What the user said about the files.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct Hints {
+    /// The format; otherwise it is found from the content and the name.
+    pub format: Option<Format>,
+    /// Samples a second of a raw file.
+    pub sample_rate: Option<u64>,
+    /// Bytes a sample of a raw file.
+    pub unit_size: usize,
+}
+
+/// Opens a file, finding its format. The number beside it counts the bytes read, for a progress bar.
+pub fn open(path: &Path, hints: Hints) -> Result<(Capture, Rc<Cell<u64>>), Fault> {
+    let mut input = Input::open(path)?;
+    let meter = input.meter();
+    let format = match hints.format {
+        Some(format) => format,
+        None if hints.sample_rate.is_some() => Format::Raw,
+        None => guess(&mut input, path)?,
+    };
+    Ok((decoder(input, format, hints)?, meter))
+}
+
+/// Opens bytes that are part of the program.
+pub fn open_embedded(name: &str, bytes: &'static [u8]) -> Result<Capture, Fault> {
+    decoder(Input::embedded(name, bytes), Format::Vcd, Hints::default())
+}
+
+fn decoder(mut input: Input, format: Format, hints: Hints) -> Result<Capture, Fault> {
+    if input.peek()?.is_empty() {
+        return Err(input.fault(At::File, "the file is empty"));
+    }
+    Ok(match format {
+        Format::Vcd => Capture::Edges(Box::new(vcd::Vcd::new(input)?)),
+        Format::SaleaeCsv => Capture::Edges(Box::new(saleae_csv::SaleaeCsv::new(input)?)),
+        Format::SaleaeBinary => Capture::Edges(Box::new(saleae_binary::SaleaeBinary::new(input)?)),
+        Format::Raw | Format::Packed => {
+            let Some(rate) = hints.sample_rate else {
+                return Err(
+                    input.fault(At::File, "raw samples carry no rate: say it with --rate, for example --rate 24M")
+                );
+            };
+            let unit = if format == Format::Packed { raw::Unit::Bit } else { raw::Unit::Bytes(hints.unit_size.max(1)) };
+            Capture::Samples(raw::Raw::new(input, rate, unit))
+        }
+        Format::Hex => Capture::Bytes(hexlog::HexLog::new(input)),
+    })
+}
+
+/// The format from the first bytes, else from the name.
+fn guess(input: &mut Input, path: &Path) -> Result<Format, Fault> {
+    let head = input.peek()?;
+    if head.is_empty() {
+        return Err(input.fault(At::File, "the file is empty"));
+    }
+    if head.starts_with(b"<SALEAE>") {
+        return Ok(Format::SaleaeBinary);
+    }
+    if head.starts_with(b"PK\x03\x04") {
+        return Err(input.fault(
+            At::File,
+            "this is a sigrok session (.sr) or a Saleae capture (.sal); export it as VCD, or as CSV from Logic 2",
+        ));
+    }
+    let text = head.strip_prefix(b"\xef\xbb\xbf").unwrap_or(head).trim_ascii_start();
+    if text.first() == Some(&b'$') {
+        return Ok(Format::Vcd);
+    }
+    if text.get(..4).is_some_and(|word| word.eq_ignore_ascii_case(b"time")) {
+        return Ok(Format::SaleaeCsv);
+    }
+    let extension = path.extension().and_then(|e| e.to_str()).unwrap_or_default().to_ascii_lowercase();
+    match extension.as_str() {
+        "vcd" => Ok(Format::Vcd),
+        "csv" => Ok(Format::SaleaeCsv),
+        "hex" => Ok(Format::Hex),
+        _ => Err(input.fault(
+            At::File,
+            "neither VCD nor a Saleae export; for raw samples give --rate, for a log of hex bytes --bytes, else --format",
+        )),
+    }
+}

@@ -1,0 +1,111 @@
+//! Times in picoseconds, out of what the formats write.
+
+/// Picoseconds in a second.
+pub const SECOND: i64 = 1_000_000_000_000;
+
+/// Decimal seconds (`-0.000012345`, `1.5e-6`) in picoseconds; digits beyond are dropped.
+pub fn from_decimal(text: &str) -> Option<i64> {
+    let text = text.trim();
+    let (negative, digits) = match text.strip_prefix('-') {
+        Some(rest) => (true, rest),
+        None => (false, text.strip_prefix('+').unwrap_or(text)),
+    };
+    let (whole, part) = digits.split_once('.').unwrap_or((digits, ""));
+    let all_digits = |s: &str| s.bytes().all(|b| b.is_ascii_digit());
+    if whole.is_empty() && part.is_empty() {
+        return None;
+    }
+    if !all_digits(whole) || !all_digits(part) {
+        // Only an exponent is left as a legal form.
+        return if text.contains(['e', 'E']) { from_seconds(text.parse().ok()?) } else { None };
+    }
+    let whole: i64 = if whole.is_empty() { 0 } else { whole.parse().ok()? };
+    let part = part.bytes().chain(std::iter::repeat(b'0')).take(12).fold(0_i64, |n, b| n * 10 + i64::from(b - b'0'));
+    let time = whole.checked_mul(SECOND)?.checked_add(part)?;
+    Some(if negative { -time } else { time })
+}
+
+/// Seconds as a floating point number in picoseconds; nothing for what no capture can hold.
+pub fn from_seconds(seconds: f64) -> Option<i64> {
+    let time = (seconds * 1e12).round();
+    // 9e18 ps are 104 days.
+    (time.abs() < 9e18).then_some(time as i64)
+}
+
+/// Sample indices in picoseconds and back.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Clock {
+    rate: u64,
+    /// Picoseconds a sample where that is a whole number, else 0.
+    period: i64,
+}
+
+impl Clock {
+    /// `rate` in samples a second, 1 to 10^12.
+    pub fn new(rate: u64) -> Self {
+        let rate = rate.clamp(1, SECOND as u64);
+        let period = if SECOND as u64 % rate == 0 { SECOND / rate as i64 } else { 0 };
+        Self { rate, period }
+    }
+
+    /// Samples a second.
+    pub fn rate(self) -> u64 {
+        self.rate
+    }
+
+    /// When sample `index` was taken.
+    pub fn time(self, index: u64) -> i64 {
+        if self.period != 0 {
+            return (index as i64).saturating_mul(self.period);
+        }
+        let time = (u128::from(index) * SECOND as u128 + u128::from(self.rate) / 2) / u128::from(self.rate);
+        i64::try_from(time).unwrap_or(i64::MAX)
+    }
+
+    /// The sample nearest to a time that is not negative.
+    pub fn index(self, time: i64) -> u64 {
+        let time = time.max(0) as u64;
+        if self.period != 0 {
+            return (time + self.period as u64 / 2) / self.period as u64;
+        }
+        let index = (u128::from(time) * u128::from(self.rate) + SECOND as u128 / 2) / SECOND as u128;
+        u64::try_from(index).unwrap_or(u64::MAX)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    #[test]
+    fn decimal_seconds() {
+        for (text, want) in [
+            ("0", Some(0)),
+            ("0.000000000", Some(0)),
+            ("-0.000012345", Some(-12_345_000)),
+            (" 1.5 ", Some(1_500_000_000_000)),
+            (".25", Some(250_000_000_000)),
+            ("0.0000000000019", Some(1)),
+            ("4.8e-07", Some(480_000)),
+            ("1.2.3", None),
+            ("", None),
+            (".", None),
+            ("one", None),
+            ("2021-05-12T10:00:00", None),
+            ("9999999999999999", None),
+            ("1e300", None),
+        ] {
+            assert_eq!(from_decimal(text), want, "{text:?}");
+        }
+    }
+
+    proptest! {
+        #[test]
+        fn a_sample_has_one_time(rate in 1..=1_000_000_000_u64, index in 0..1_u64 << 40) {
+            let clock = Clock::new(rate);
+            prop_assume!(u128::from(index) * SECOND as u128 / u128::from(rate) < 9_000_000_000_000_000_000);
+            prop_assert_eq!(clock.index(clock.time(index)), index);
+        }
+    }
+}

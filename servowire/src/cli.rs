@@ -1,0 +1,191 @@
+//! The command line.
+
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+use clap::{Args, Parser, Subcommand, ValueEnum};
+
+use crate::capture::{Format, Hints};
+use crate::protocols::{Protocol, Settings, tformat};
+use crate::{decode, line};
+
+/// Decodes what servo drives, controllers and encoders say to each other.
+#[derive(Debug, Parser)]
+#[command(version)]
+pub struct Cli {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Debug, Subcommand)]
+enum Command {
+    /// Decode captures of a line.
+    Decode(Decode),
+}
+
+impl Cli {
+    /// Does what was asked. 0: all frames good; 1: a frame was refused, or a file could not be decoded.
+    pub fn run(self) -> ExitCode {
+        match self.command {
+            Command::Decode(arguments) => decode::run(&arguments),
+        }
+    }
+}
+
+/// Decode captures of a line.
+///
+/// Prints a transaction a line: `<>` a request with its answer, `>` a request, `<` an answer alone. Format, channel,
+/// polarity and bit rate are found from the capture; what was found is said on the error output. Exit code 0: all
+/// frames good; 1: a frame was refused or a file could not be decoded; 2: wrong use.
+#[derive(Debug, Args)]
+pub struct Decode {
+    /// VCD, Saleae CSV, Saleae binary (version 0); raw samples with --rate; hex bytes with --bytes; - for the standard
+    /// input. Without a file the captures that come with the program are decoded.
+    pub files: Vec<PathBuf>,
+    /// What is spoken on the line.
+    #[arg(short, long, value_enum, default_value_t = Protocol::Tformat)]
+    pub protocol: Protocol,
+    /// JSON Lines, an object a frame; times in picoseconds.
+    #[arg(long)]
+    pub json: bool,
+    /// Figures instead of frames: errors by class, cycle time, answer delay, largest move of the position.
+    #[arg(long)]
+    pub stats: bool,
+    /// With --stats, list moves of the position by more than this from one frame to the next.
+    #[arg(long, value_name = "COUNTS", requires = "stats")]
+    pub jump: Option<u64>,
+    /// Write the capture as VCD, with the decoded fields beside it as strings.
+    #[arg(long, value_name = "OUT")]
+    pub vcd: Option<PathBuf>,
+    /// How the file is to be read.
+    #[command(flatten)]
+    pub file: FileArgs,
+    /// How the line is to be taken.
+    #[command(flatten)]
+    pub line: LineArgs,
+    /// What T-Format frames do not tell.
+    #[command(flatten)]
+    pub tformat: TformatArgs,
+}
+
+/// How the file is to be read.
+#[derive(Debug, Clone, Copy, Args)]
+#[command(next_help_heading = "File")]
+pub struct FileArgs {
+    /// File format, where the content does not tell it.
+    #[arg(long, value_enum)]
+    pub format: Option<Format>,
+    /// Samples a second of a raw file, as 24000000 or 24M; a file given with it is raw unless --format says otherwise.
+    #[arg(long, value_name = "HZ", value_parser = frequency)]
+    pub rate: Option<u64>,
+    /// Bytes a sample of a raw file.
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u8).range(1..=8))]
+    pub unit_size: u8,
+    /// The files are logs of bytes as hex digits, a burst a line.
+    #[arg(long, conflicts_with_all = ["format", "rate"])]
+    pub bytes: bool,
+}
+
+/// How the line is to be taken.
+#[derive(Debug, Args)]
+#[command(next_help_heading = "Line")]
+pub struct LineArgs {
+    /// Channel by name or number; otherwise the one that decodes best.
+    #[arg(long, value_name = "NAME")]
+    pub channel: Option<String>,
+    /// Bits a second, as 2500000 or 2.5M; otherwise found from the lengths of the runs.
+    #[arg(long, value_name = "HZ", value_parser = bit_rate)]
+    pub bit_rate: Option<u32>,
+    /// Whether the line idles high (normal) or low; otherwise the one that decodes best.
+    #[arg(long, value_enum)]
+    pub polarity: Option<Polarity>,
+}
+
+/// Which way up a line is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum Polarity {
+    /// Idles high.
+    Normal,
+    /// Idles low: A and B swapped.
+    Inverted,
+}
+
+/// What T-Format frames do not tell.
+#[derive(Debug, Clone, Copy, Args)]
+#[command(next_help_heading = "T-Format")]
+pub struct TformatArgs {
+    /// Bits of a turn; otherwise from the encoder ID seen on the line.
+    #[arg(long, value_name = "BITS", value_parser = clap::value_parser!(u8).range(1..=24))]
+    pub single_turn_bits: Option<u8>,
+    /// Bits that count turns; otherwise from the encoder ID, else 16.
+    #[arg(long, value_name = "BITS", value_parser = clap::value_parser!(u8).range(0..=24))]
+    pub multi_turn_bits: Option<u8>,
+}
+
+impl Decode {
+    /// What was said about the files.
+    pub(crate) fn hints(&self) -> Hints {
+        let format = if self.file.bytes { Some(Format::Hex) } else { self.file.format };
+        Hints { format, sample_rate: self.file.rate, unit_size: usize::from(self.file.unit_size) }
+    }
+
+    /// What was said about line and protocol.
+    pub(crate) fn settings(&self) -> Settings {
+        Settings {
+            line: line::Options {
+                channel: self.line.channel.clone(),
+                bit_rate: self.line.bit_rate,
+                inverted: self.line.polarity.map(|polarity| polarity == Polarity::Inverted),
+            },
+            tformat: tformat::Settings {
+                single_turn_bits: self.tformat.single_turn_bits,
+                multi_turn_bits: self.tformat.multi_turn_bits,
+            },
+        }
+    }
+}
+
+/// Frequencies as people write them: `24000000`, `24M`, `2.5MHz`, `100k`.
+fn frequency(text: &str) -> Result<u64, String> {
+    let bare = text.trim().trim_end_matches("Hz").trim_end();
+    let (digits, factor) = match bare.chars().last() {
+        Some('k' | 'K') => (bare.get(..bare.len() - 1), 1e3),
+        Some('M' | 'm') => (bare.get(..bare.len() - 1), 1e6),
+        Some('G' | 'g') => (bare.get(..bare.len() - 1), 1e9),
+        _ => (Some(bare), 1.0),
+    };
+    let hertz = digits.and_then(|d| d.trim().parse::<f64>().ok()).map(|number| (number * factor).round());
+    match hertz {
+        Some(hertz) if (1.0..=1e12).contains(&hertz) => Ok(hertz as u64),
+        _ => Err(format!("\"{text}\" is not a frequency from 1 to 10^12 Hz, as 24M or 2500000")),
+    }
+}
+
+/// Rates for which the receiver's grid of 80 samples a bit can be laid.
+fn bit_rate(text: &str) -> Result<u32, String> {
+    match frequency(text)? {
+        rate @ 1..=1_000_000_000 => Ok(rate as u32),
+        rate => Err(format!("{rate} bits a second are more than 10^9")),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn frequencies() {
+        for (text, want) in [("24000000", 24_000_000), ("24M", 24_000_000), ("2.5 MHz", 2_500_000), ("100k", 100_000)] {
+            assert_eq!(frequency(text), Ok(want), "{text}");
+        }
+        for text in ["", "M", "fast", "-1", "0", "1e13", "inf", "NaN"] {
+            assert!(frequency(text).is_err(), "{text}");
+        }
+    }
+
+    #[test]
+    fn the_command_line_is_consistent() {
+        use clap::CommandFactory;
+        Cli::command().debug_assert();
+    }
+}

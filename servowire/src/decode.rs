@@ -1,0 +1,170 @@
+//! `servowire decode`: files in, frames out.
+
+use std::cell::Cell;
+use std::io::{self, BufWriter, IsTerminal, Write};
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+use std::rc::Rc;
+
+use indicatif::{ProgressBar, ProgressStyle};
+
+use crate::bundled;
+use crate::capture::{self, Capture};
+use crate::cli::Decode;
+use crate::fault::{At, Fault};
+use crate::line::Stop;
+use crate::output::json::JsonLines;
+use crate::output::stats::Stats;
+use crate::output::text::Text;
+use crate::output::vcd::VcdOut;
+use crate::output::{Output, Printer};
+
+/// Files from this size on have a progress bar.
+const LONG: u64 = 1 << 24;
+
+/// Decodes all files. 0: all frames good; 1: not so; 2: the options do not go together.
+pub(crate) fn run(arguments: &Decode) -> ExitCode {
+    let files = arguments.files.len();
+    if let Some(out) = &arguments.vcd {
+        if files != 1 {
+            eprintln!("error: --vcd writes one capture: name one file, not {files}");
+            return ExitCode::from(2);
+        }
+        let same =
+            |file: &PathBuf| file.canonicalize().is_ok_and(|file| out.canonicalize().is_ok_and(|out| out == file));
+        if arguments.files.iter().any(same) {
+            eprintln!("error: --vcd would overwrite the capture {}", out.display());
+            return ExitCode::from(2);
+        }
+    }
+    let out = BufWriter::with_capacity(1 << 16, io::stdout().lock());
+    let mut printer: Box<dyn Printer> = match (arguments.stats, arguments.json) {
+        (true, json) => Box::new(Stats::new(out, json, arguments.jump)),
+        (false, true) => Box::new(JsonLines::new(out)),
+        (false, false) => Box::new(Text::new(out, files != 1)),
+    };
+    match all(arguments, printer.as_mut()) {
+        Ok(true) => ExitCode::SUCCESS,
+        Ok(false) => ExitCode::FAILURE,
+        // The reader has seen enough.
+        Err(e) if e.kind() == io::ErrorKind::BrokenPipe => ExitCode::SUCCESS,
+        Err(e) => {
+            eprintln!("error: cannot write: {e}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+/// Whether all files were good.
+fn all(arguments: &Decode, printer: &mut dyn Printer) -> io::Result<bool> {
+    let mut good = true;
+    for path in &arguments.files {
+        let name = if path.as_os_str() == "-" { "standard input".to_owned() } else { path.display().to_string() };
+        let opened = capture::open(path, arguments.hints());
+        let bar = Bar::new(path);
+        good &= match opened {
+            Ok((capture, meter)) => one(arguments, &name, capture, &bar, &meter, printer)?,
+            Err(fault) => complain(&fault, &bar),
+        };
+        bar.finish();
+    }
+    if arguments.files.is_empty() {
+        for (name, bytes) in bundled::CAPTURES {
+            let bar = Bar { bar: None };
+            good &= match capture::open_embedded(name, bytes) {
+                Ok(capture) => one(arguments, name, capture, &bar, &Rc::default(), printer)?,
+                Err(fault) => complain(&fault, &bar),
+            };
+        }
+    }
+    Ok(good)
+}
+
+/// Decodes one file; whether it was good.
+fn one(
+    arguments: &Decode,
+    name: &str,
+    capture: Capture,
+    bar: &Bar,
+    meter: &Rc<Cell<u64>>,
+    printer: &mut dyn Printer,
+) -> io::Result<bool> {
+    let protocol = arguments.protocol;
+    if arguments.vcd.is_some() && matches!(capture, Capture::Bytes(_)) {
+        return Ok(complain(&Fault::new(name, At::File, "a log of bytes has no times for a VCD"), bar));
+    }
+    let mut vcd = match &arguments.vcd {
+        None => None,
+        Some(path) => match VcdOut::create(path, protocol.field_names()) {
+            Ok(vcd) => Some(vcd),
+            Err(e) => {
+                let file = path.display().to_string();
+                return Ok(complain(&Fault::new(&file, At::File, format!("cannot be created: {e}")), bar));
+            }
+        },
+    };
+    printer.begin(name)?;
+    let progress = || bar.set(meter.get());
+    let notes = |text: &str| bar.say(text);
+    let mut out = Output::new(printer, vcd.as_mut(), &progress, &notes);
+    let end = protocol.decode(name, capture, &arguments.settings(), &mut out);
+    let (tally, refusals) = (out.tally, out.refusals());
+    printer.end()?;
+    if let Some(vcd) = &mut vcd {
+        vcd.finish()?;
+    }
+    if let Some(refusals) = &refusals {
+        bar.say(&format!("error: {name}: {refusals}"));
+    }
+    match end {
+        Ok(()) if tally.ok == 0 && tally.refused == 0 => {
+            Ok(complain(&Fault::new(name, At::File, "no frame in it: the line is idle, or not of this protocol"), bar))
+        }
+        Ok(()) => Ok(refusals.is_none()),
+        Err(Stop::Fault(fault)) => Ok(complain(&fault, bar)),
+        Err(Stop::Output(error)) => Err(error),
+    }
+}
+
+/// Says what is wrong; the file is not good.
+fn complain(fault: &Fault, bar: &Bar) -> bool {
+    bar.say(&format!("error: {fault}"));
+    false
+}
+
+/// The progress bar, on a terminal and for a long file.
+struct Bar {
+    bar: Option<ProgressBar>,
+}
+
+impl Bar {
+    fn new(path: &Path) -> Self {
+        let size = path.metadata().map_or(0, |file| file.len());
+        if size < LONG || !io::stderr().is_terminal() {
+            return Self { bar: None };
+        }
+        let style = ProgressStyle::with_template("{bytes}/{total_bytes} [{bar:40}] {bytes_per_sec}, {eta} left");
+        Self { bar: Some(ProgressBar::new(size).with_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()))) }
+    }
+
+    fn set(&self, bytes: u64) {
+        if let Some(bar) = &self.bar {
+            bar.set_position(bytes);
+        }
+    }
+
+    /// A line on the error output, above the bar.
+    fn say(&self, text: &str) {
+        let print = || drop(writeln!(io::stderr(), "{text}"));
+        match &self.bar {
+            Some(bar) => bar.suspend(print),
+            None => print(),
+        }
+    }
+
+    fn finish(&self) {
+        if let Some(bar) = &self.bar {
+            bar.finish_and_clear();
+        }
+    }
+}

@@ -1,0 +1,169 @@
+//! What was said on a line: the one form into which every protocol decodes and from which every output prints.
+
+use std::borrow::Cow;
+
+/// A frame, or the absence of one that was due.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Event {
+    /// Where in the capture.
+    pub place: Place,
+    /// Who spoke.
+    pub direction: Option<Direction>,
+    /// The kind of frame in the protocol's own words, as "ID 3".
+    pub kind: Cow<'static, str>,
+    /// The fields in the order of the line.
+    pub fields: Vec<Field>,
+    /// The position that the frame carries.
+    pub position: Option<Position>,
+    /// For an answer: time since the end of its request, in picoseconds.
+    pub delay: Option<i64>,
+    /// Whether the frame holds.
+    pub verdict: Verdict,
+}
+
+/// Where in a capture.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Place {
+    /// In picoseconds of the capture's time.
+    Time {
+        /// The first edge.
+        start: i64,
+        /// The end of the last bit.
+        end: i64,
+    },
+    /// A line of a log without times.
+    Line(u64),
+}
+
+/// Who spoke on a line with two ends.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Direction {
+    /// The controller.
+    Request,
+    /// The encoder or drive.
+    Answer,
+}
+
+/// A field of a frame.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Field {
+    /// As the protocol's documents spell it.
+    pub name: &'static str,
+    /// What it held.
+    pub value: Value,
+}
+
+/// A value with what is needed to print it.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Value {
+    /// A number; the unit may be empty.
+    Number {
+        /// The number.
+        value: i64,
+        /// Its unit.
+        unit: &'static str,
+    },
+    /// A code or check value, printed in hex.
+    Hex {
+        /// The value.
+        value: u64,
+        /// Hex digits to print.
+        digits: usize,
+    },
+    /// Named bits.
+    Flags {
+        /// All bits.
+        raw: u64,
+        /// Hex digits to print.
+        digits: usize,
+        /// Names of the bits that are set.
+        set: Vec<&'static str>,
+    },
+    /// Anything else.
+    Text(String),
+}
+
+/// A position.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Position {
+    /// Counts, turns included where the frame carries them.
+    pub counts: i64,
+    /// Counts after which the value begins again, where it does.
+    pub span: Option<u64>,
+    /// Counts of a turn, where the resolution is known and the axis turns.
+    pub per_turn: Option<u64>,
+}
+
+impl Position {
+    /// In turns, where the resolution is known.
+    pub fn turns(&self) -> Option<f64> {
+        self.per_turn.map(|counts| self.counts as f64 / counts as f64)
+    }
+
+    /// The way from `before`, the shorter one where the value wraps.
+    pub fn moved_from(&self, before: &Self) -> i64 {
+        let way = self.counts.wrapping_sub(before.counts);
+        let Some(span) = self.span.and_then(|span| i64::try_from(span).ok()).filter(|span| *span > 0) else {
+            return way;
+        };
+        let way = way.rem_euclid(span);
+        if way > span / 2 { way - span } else { way }
+    }
+}
+
+/// Whether a frame holds.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Verdict {
+    /// All checks passed.
+    Ok,
+    /// A check failed.
+    Refused(Box<Refusal>),
+}
+
+/// The class of an answer that was due and did not come.
+pub const NO_RESPONSE: &str = "no_response";
+
+/// Why a frame was refused.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Refusal {
+    /// The class of the check, for statistics: `crc`, `delimiter`, `no_response` ...
+    pub class: &'static str,
+    /// A sentence with what came and what was due.
+    pub reason: String,
+    /// The field by its name.
+    pub field: Option<String>,
+    /// The bit of that field, in the order of the line.
+    pub bit: Option<u32>,
+    /// When that was, in picoseconds.
+    pub time: Option<i64>,
+    /// What probably caused it.
+    pub cause: Option<String>,
+}
+
+impl Verdict {
+    /// Whether all checks passed.
+    pub fn is_ok(&self) -> bool {
+        *self == Self::Ok
+    }
+
+    /// Whether this is no frame but the absence of one.
+    pub fn is_silence(&self) -> bool {
+        matches!(self, Self::Refused(refusal) if refusal.class == NO_RESPONSE)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_shorter_way_round() {
+        let at = |counts| Position { counts, span: Some(100), per_turn: None };
+        assert_eq!(at(1).moved_from(&at(99)), 2);
+        assert_eq!(at(99).moved_from(&at(1)), -2);
+        assert_eq!(at(50).moved_from(&at(0)), 50);
+        assert_eq!(at(-1).moved_from(&at(0)), -1);
+        let linear = |counts| Position { counts, span: None, per_turn: None };
+        assert_eq!(linear(-70).moved_from(&linear(99)), -169);
+    }
+}

@@ -1,0 +1,125 @@
+//! Where events go: text, JSON Lines, a VCD beside, statistics.
+
+pub mod json;
+pub mod stats;
+pub mod text;
+pub mod vcd;
+
+use std::collections::BTreeMap;
+use std::io;
+
+use crate::capture::Change;
+use crate::event::{Event, Verdict};
+
+/// Takes events in the order of the line.
+pub trait Sink {
+    /// The next event.
+    fn event(&mut self, event: &Event) -> io::Result<()>;
+}
+
+/// A form of output that is written file by file.
+pub trait Printer: Sink {
+    /// A file begins.
+    fn begin(&mut self, file: &str) -> io::Result<()>;
+
+    /// The file is at its end.
+    fn end(&mut self) -> io::Result<()>;
+}
+
+/// Counts events by their verdict.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct Tally {
+    /// Events that hold.
+    pub ok: u64,
+    /// Events refused.
+    pub refused: u64,
+}
+
+impl Sink for Tally {
+    fn event(&mut self, event: &Event) -> io::Result<()> {
+        match event.verdict {
+            Verdict::Ok => self.ok += 1,
+            Verdict::Refused(_) => self.refused += 1,
+        }
+        Ok(())
+    }
+}
+
+/// All outputs of one file together.
+pub struct Output<'a> {
+    printer: &'a mut dyn Printer,
+    vcd: Option<&'a mut vcd::VcdOut>,
+    /// Called after every block that was read.
+    progress: &'a dyn Fn(),
+    /// Takes what the user should know but did not ask for.
+    notes: &'a dyn Fn(&str),
+    /// Frames so far.
+    pub tally: Tally,
+    /// Refused frames by class, with the first cause that was given.
+    refused: BTreeMap<&'static str, (u64, Option<String>)>,
+}
+
+impl<'a> Output<'a> {
+    /// `printer` gets all events, `vcd` events and changes.
+    pub fn new(
+        printer: &'a mut dyn Printer,
+        vcd: Option<&'a mut vcd::VcdOut>,
+        progress: &'a dyn Fn(),
+        notes: &'a dyn Fn(&str),
+    ) -> Self {
+        Self { printer, vcd, progress, notes, tally: Tally::default(), refused: BTreeMap::new() }
+    }
+
+    /// Whether the changes of the line have a taker.
+    pub fn wants_changes(&self) -> bool {
+        self.vcd.is_some()
+    }
+
+    /// The channels of the capture and the one that is decoded.
+    pub fn channels(&mut self, channels: &[String], decoded: u16) -> io::Result<()> {
+        self.vcd.as_mut().map_or(Ok(()), |vcd| vcd.channels(channels, decoded))
+    }
+
+    /// A change of any channel.
+    pub fn change(&mut self, change: &Change) -> io::Result<()> {
+        self.vcd.as_mut().map_or(Ok(()), |vcd| vcd.change(change))
+    }
+
+    /// A block was read.
+    pub fn tick(&self) {
+        (self.progress)();
+    }
+
+    /// The refused frames in a sentence; none where all hold.
+    pub fn refusals(&self) -> Option<String> {
+        let Tally { ok, refused } = self.tally;
+        let one = |(class, (count, cause)): (&&str, &(u64, Option<String>))| match cause {
+            Some(cause) => format!("{class} {count} ({cause})"),
+            None => format!("{class} {count}"),
+        };
+        let classes = self.refused.iter().map(one).collect::<Vec<_>>().join("; ");
+        (refused > 0).then(|| format!("{refused} of {} frames refused: {classes}", ok + refused))
+    }
+
+    /// Something the user should know.
+    pub fn note(&self, text: &str) {
+        (self.notes)(text);
+    }
+}
+
+impl Sink for Output<'_> {
+    fn event(&mut self, event: &Event) -> io::Result<()> {
+        self.tally.event(event)?;
+        if let Verdict::Refused(refusal) = &event.verdict {
+            let (count, cause) = self.refused.entry(refusal.class).or_default();
+            *count += 1;
+            if cause.is_none() {
+                cause.clone_from(&refusal.cause);
+            }
+        }
+        if let Some(vcd) = &mut self.vcd {
+            vcd.event(event);
+        }
+        self.printer.event(event)
+    }
+}

@@ -1,0 +1,46 @@
+//! The protocols that can be decoded.
+//!
+//! To add one: a file below `protocols/` that turns what its line delivers into [`Event`](crate::event::Event)s, a
+//! variant of [`Protocol`], and a line in each of its methods. A start-stop protocol implements
+//! [`StartStop`](crate::line::StartStop) and is done; another kind takes the [`Capture`] itself.
+
+pub mod tformat;
+
+use crate::capture::Capture;
+use crate::line::{self, Stop};
+use crate::output::Output;
+
+/// A protocol by its name on the command line.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+pub enum Protocol {
+    /// Tamagawa T-Format.
+    Tformat,
+}
+
+/// What the user said about line and protocol.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct Settings {
+    /// About the line.
+    pub line: line::Options,
+    /// About T-Format.
+    pub tformat: tformat::Settings,
+}
+
+impl Protocol {
+    /// The names of all fields that its events may have.
+    pub fn field_names(self) -> &'static [&'static str] {
+        match self {
+            Self::Tformat => tformat::FIELDS,
+        }
+    }
+
+    /// Decodes a capture to its end. What comes out before a fault has been given to `out`.
+    pub fn decode(self, file: &str, capture: Capture, settings: &Settings, out: &mut Output<'_>) -> Result<(), Stop> {
+        match self {
+            Self::Tformat => {
+                let make = |bit| tformat::Decoder::new(bit, settings.tformat);
+                line::decode(file, capture, &settings.line, &make, out)
+            }
+        }
+    }
+}

@@ -1,0 +1,289 @@
+//! Tamagawa T-Format: fields of a half-duplex line into requests and answers.
+//!
+//! Requests and answers look alike on the line: both begin with the control field. They are told apart by their
+//! place. After a request comes its answer; any other frame is a request if it has the length of one, and else an
+//! answer whose request was not recorded.
+
+mod describe;
+mod frame;
+
+use std::io;
+
+use tformat::inspect::{Cause, inspect, inspect_bytes};
+use tformat::{BitRate, ControlField, DataId, Error, Full, Request, Response};
+
+use crate::capture::hexlog::Burst;
+use crate::event::{Event, Verdict};
+use crate::line::{LineField, StartStop};
+use crate::output::Sink;
+use describe::Encoder;
+use frame::{Frame, MOST_FIELDS, Pending};
+
+pub use describe::FIELDS;
+
+/// What the frames do not tell.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct Settings {
+    /// Bits of a turn; otherwise by the encoder ID.
+    pub single_turn_bits: Option<u8>,
+    /// Bits that count turns; otherwise by the encoder ID.
+    pub multi_turn_bits: Option<u8>,
+}
+
+/// A pause inside a frame that ends it, in bits: one and a half fields.
+const FIELD_TIMEOUT_BITS: i64 = 15;
+
+/// The shortest pause for the change of direction, in bits. Fields of one frame follow closer.
+const TURN_ROUND_BITS: i64 = 4;
+
+/// An answer begins within this time, nominally 3 us, in picoseconds.
+const ANSWER_TIMEOUT: i64 = 20_000_000;
+
+/// The longest answer, with some pauses in it, in bits.
+const LONGEST_BITS: i64 = 150;
+
+/// Finds the frames among the fields of a line.
+pub struct Decoder {
+    bit: i64,
+    encoder: Encoder,
+    /// Begin of the capture, until the first frame has been seen.
+    begin: Option<i64>,
+    /// Until when the rest of a frame is passed over in which the capture began.
+    skip: Option<i64>,
+    /// The end of what was passed over.
+    skipped: i64,
+    open: Frame,
+    pending: Option<Pending>,
+}
+
+impl Decoder {
+    /// `bit`: its length in picoseconds.
+    pub fn new(bit: i64, settings: Settings) -> Self {
+        Self {
+            bit,
+            encoder: Encoder::new(settings),
+            begin: None,
+            skip: None,
+            skipped: 0,
+            open: Frame::default(),
+            pending: None,
+        }
+    }
+
+    /// Whether the open frame is over before a field that begins at `start`.
+    fn is_over(&self, start: i64) -> bool {
+        let pause = start - self.open.end;
+        if pause > FIELD_TIMEOUT_BITS * self.bit {
+            return true;
+        }
+        if pause < TURN_ROUND_BITS * self.bit {
+            return false;
+        }
+        match self.pending {
+            // A request is over when its answer may follow.
+            None => {
+                let request_fields = |id: DataId| usize::from(id.request_fields());
+                self.open.broken.is_some() || self.open.fields >= self.open.data_id().map_or(1, request_fields)
+            }
+            // Behind a low delimiter the receiver may have skipped fields: the answer lasts as long as a whole one.
+            Some(pending) => {
+                let whole = 10 * pending.answer_fields(self.open.first()) as i64 - FIELD_TIMEOUT_BITS;
+                self.open.broken.is_some() && start - self.open.start() > whole * self.bit
+            }
+        }
+    }
+
+    /// Whether the open frame is whole as an answer and too long for a request.
+    fn is_answer_alone(&self) -> bool {
+        let Ok(id) = self.open.data_id() else { return false };
+        let (request, answer) = (usize::from(id.request_fields()), usize::from(id.response_fields()));
+        self.pending.is_none() && self.open.broken.is_none() && self.open.fields == answer && answer > request
+    }
+
+    /// The open frame is over.
+    fn close(&mut self, out: &mut dyn Sink) -> io::Result<()> {
+        let frame = std::mem::take(&mut self.open);
+        let begin = self.begin.take();
+        if self.pending.is_some_and(|pending| pending.is_asked_again(&frame)) {
+            self.give_up(frame.start(), out)?;
+        }
+        if let Some(pending) = self.pending.take() {
+            let event = self.answer(&frame, pending);
+            return out.event(&event);
+        }
+        let event = self.unasked(&frame);
+        // With no idle line before it, a bad first frame is only the end of one.
+        let at_once = begin.is_some_and(|begin| frame.start() - begin < FIELD_TIMEOUT_BITS * self.bit);
+        if at_once && !event.verdict.is_ok() {
+            self.pending = None;
+            self.skipped = frame.end;
+            self.skip = begin.map(|begin| begin + LONGEST_BITS * self.bit);
+            return out.event(&describe::cut(frame.place(), "the capture begins inside a frame"));
+        }
+        out.event(&event)
+    }
+
+    /// A frame that follows a request.
+    fn answer(&mut self, frame: &Frame, pending: Pending) -> Event {
+        let result = match (frame.broken, pending.request) {
+            (Some(field), _) => Err(Error::Delimiter { field }),
+            (None, Some(request)) => Response::parse(request, frame.bytes()),
+            // The encoder refuses a damaged request with an ID 3 frame.
+            (None, None) => Full::parse(frame.bytes()).and_then(|full| Err(Error::Rejected { sf: full.sf })),
+        };
+        let delay = pending.end().map(|end| frame.start() - end);
+        let asked = pending.request.map(Request::data_id);
+        let mut event = self.encoder.answer(frame, asked, result, delay);
+        if let (Verdict::Refused(refusal), Some(request)) = (&mut event.verdict, pending.request) {
+            refusal.cause = self.cause(request, frame).map(|cause| cause.to_string());
+        }
+        event
+    }
+
+    /// What probably spoilt the answer to a request.
+    fn cause(&self, request: Request, frame: &Frame) -> Option<Cause> {
+        let report = match frame.broken {
+            None => inspect_bytes(request, frame.bytes()),
+            Some(_) => inspect(request, frame.line(self.bit)?),
+        };
+        // That is what its verdict says already.
+        report.cause.filter(|cause| *cause != Cause::RequestRefused)
+    }
+
+    /// A frame without a request before it: a request, or an answer alone.
+    fn unasked(&mut self, frame: &Frame) -> Event {
+        let asked = frame.data_id().ok();
+        let longer = |id: DataId| frame.fields > usize::from(id.request_fields());
+        // More fields than any request has are an answer whatever they hold.
+        if asked.map_or(frame.fields > 4, longer) {
+            let result = match (frame.broken, alone(frame)) {
+                (Some(field), _) => Err(Error::Delimiter { field }),
+                (None, Ok(request)) => Response::parse(request, frame.bytes()),
+                (None, Err(error)) => Err(error),
+            };
+            return self.encoder.answer(frame, asked, result, None);
+        }
+        let result = match frame.broken {
+            Some(field) => Err(Error::Delimiter { field }),
+            None => Request::parse(frame.bytes()),
+        };
+        self.pending = Some(Pending { request: result.ok(), place: frame.place() });
+        describe::request(frame, asked, result)
+    }
+
+    /// The answer did not come until `now`.
+    fn give_up(&mut self, now: i64, out: &mut dyn Sink) -> io::Result<()> {
+        match self.pending.take() {
+            // Nobody owes an answer to a damaged request.
+            Some(Pending { request: Some(request), place }) => out.event(&describe::silence(request, place, now)),
+            _ => Ok(()),
+        }
+    }
+
+    /// A frame of a log.
+    fn take(&mut self, line: u64, bytes: &[u8], out: &mut dyn Sink) -> io::Result<()> {
+        let frame = Frame::of_log(line, bytes);
+        let event = match self.pending.take() {
+            Some(pending) => self.answer(&frame, pending),
+            None => self.unasked(&frame),
+        };
+        out.event(&event)
+    }
+}
+
+impl StartStop for Decoder {
+    const NAME: &'static str = "T-Format";
+    const RATES: &'static [u32] = &[BitRate::Mbit2_5.bits_per_second(), BitRate::Mbit5.bits_per_second()];
+    const CONTENT_BITS: u32 = 8;
+
+    fn begin(&mut self, start: i64) {
+        self.begin = Some(start);
+    }
+
+    fn field(&mut self, field: &LineField, out: &mut dyn Sink) -> io::Result<()> {
+        if self.open.fields > 0 && self.is_over(field.start) {
+            self.close(out)?;
+        }
+        if let Some(until) = self.skip {
+            let pause = field.start - self.skipped;
+            self.skipped = field.end;
+            if field.start < until && pause <= FIELD_TIMEOUT_BITS * self.bit {
+                return Ok(());
+            }
+            self.skip = None;
+        }
+        if self.open.fields == 0 {
+            let due = self.pending.and_then(|pending| pending.end()).map(|end| end.saturating_add(ANSWER_TIMEOUT));
+            if due.is_some_and(|due| field.start > due) {
+                self.give_up(field.start, out)?;
+            }
+        }
+        self.open.push(field);
+        let whole = self.pending.is_some_and(|pending| {
+            self.open.broken.is_none() && self.open.fields == pending.answer_fields(self.open.first())
+        });
+        if whole || self.is_answer_alone() || self.open.fields == MOST_FIELDS { self.close(out) } else { Ok(()) }
+    }
+
+    /// A line of a log: requests and answers, one behind the other.
+    fn burst(&mut self, burst: &Burst, out: &mut dyn Sink) -> io::Result<()> {
+        let mut rest = burst.bytes.as_slice();
+        let id = |bytes: &[u8]| ControlField::parse(bytes.first().copied().unwrap_or_default())?.data_id();
+        // The line is nothing but a request, or nothing but an answer.
+        let is_request = id(rest).is_ok_and(|id| rest.len() == usize::from(id.request_fields()));
+        let is_answer = id(rest).is_ok_and(|id| rest.len() == usize::from(id.response_fields())) && !is_request;
+        if self.pending.is_some_and(|pending| is_request && rest.len() < pending.answer_fields_of(rest)) {
+            self.give_up(0, out)?;
+        }
+        if is_answer && self.pending.is_none() {
+            return self.take(burst.line, rest, out);
+        }
+        while !rest.is_empty() {
+            let fields = match self.pending {
+                Some(pending) => {
+                    rest = pending.without_echo(rest);
+                    pending.answer_fields_of(rest)
+                }
+                None => id(rest).map_or(1, |id| usize::from(id.request_fields())),
+            };
+            let (frame, behind) = rest.split_at_checked(fields).unwrap_or((rest, &[]));
+            self.take(burst.line, frame, out)?;
+            rest = behind;
+        }
+        Ok(())
+    }
+
+    fn finish(&mut self, end: Option<i64>, out: &mut dyn Sink) -> io::Result<()> {
+        let Some(end) = end else { return self.give_up(0, out) };
+        if self.open.fields > 0 {
+            let recent = end - self.open.end <= FIELD_TIMEOUT_BITS * self.bit;
+            let request = self.pending.is_none()
+                && self.open.data_id().is_ok_and(|id| self.open.fields == usize::from(id.request_fields()));
+            if recent && !request {
+                return out.event(&describe::cut(self.open.place(), "the capture ends inside a frame"));
+            }
+            self.close(out)?;
+        }
+        match self.pending.and_then(|pending| pending.end()) {
+            Some(asked) if end > asked.saturating_add(ANSWER_TIMEOUT) => self.give_up(end, out),
+            _ => Ok(()),
+        }
+    }
+}
+
+/// The request that a frame would answer, from the frame itself.
+fn alone(frame: &Frame) -> Result<Request, Error> {
+    let field = |k: usize| frame.bytes().get(k).copied().unwrap_or_default();
+    let address = tformat::Adf::new(field(1) & 0x7f);
+    Ok(match frame.data_id()? {
+        DataId::Id0 => Request::Id0,
+        DataId::Id1 => Request::Id1,
+        DataId::Id2 => Request::Id2,
+        DataId::Id3 => Request::Id3,
+        DataId::Id6 => Request::Id6 { adf: address, edf: field(2) },
+        DataId::Id7 => Request::Id7,
+        DataId::Id8 => Request::Id8,
+        DataId::IdC => Request::IdC,
+        DataId::IdD => Request::IdD { adf: address },
+    })
+}

@@ -1,0 +1,141 @@
+//! Fields that make a frame, and the request that waits for one.
+
+use tformat::{ControlField, DataId, Error, Request, Window};
+
+use crate::event::Place;
+use crate::line::LineField;
+
+/// More fields without a pause are no frame.
+pub(super) const MOST_FIELDS: usize = 16;
+
+/// Twice the nominal time: what begins later and looks like a request is one, in picoseconds.
+const LATE_ANSWER: i64 = 6_000_000;
+
+/// Fields that followed each other.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Frame {
+    pub(super) bytes: [u8; MOST_FIELDS],
+    pub(super) starts: [i64; MOST_FIELDS],
+    pub(super) fields: usize,
+    pub(super) end: i64,
+    /// The first field whose delimiter read 0.
+    pub(super) broken: Option<u8>,
+    pub(super) spikes: u32,
+    /// The line of a log without times.
+    pub(super) line: Option<u64>,
+}
+
+impl Frame {
+    pub(super) fn bytes(&self) -> &[u8] {
+        self.bytes.get(..self.fields).unwrap_or_default()
+    }
+
+    pub(super) fn start(&self) -> i64 {
+        self.starts.first().copied().unwrap_or_default()
+    }
+
+    /// Bytes without times.
+    pub(super) fn of_log(line: u64, bytes: &[u8]) -> Self {
+        let mut frame = Self { line: Some(line), ..Self::default() };
+        for &byte in bytes {
+            frame.push(&LineField { content: byte.into(), delimiter: true, start: 0, end: 0, spikes: 0 });
+        }
+        frame
+    }
+
+    /// Takes a field; beyond the most it replaces the last one.
+    pub(super) fn push(&mut self, field: &LineField) {
+        let k = self.fields.min(MOST_FIELDS - 1);
+        if let (Some(byte), Some(start)) = (self.bytes.get_mut(k), self.starts.get_mut(k)) {
+            *byte = (field.content & 0xff) as u8;
+            *start = field.start;
+        }
+        if !field.delimiter && self.broken.is_none() {
+            self.broken = u8::try_from(k).ok();
+        }
+        self.spikes = self.spikes.saturating_add(field.spikes);
+        self.end = field.end;
+        self.fields = k + 1;
+    }
+
+    /// The data ID that the first field asks for or answers.
+    pub(super) fn data_id(&self) -> Result<DataId, Error> {
+        ControlField::parse(self.first())?.data_id()
+    }
+
+    /// The first field, 0 where there is none.
+    pub(super) fn first(&self) -> u8 {
+        self.bytes.first().copied().unwrap_or_default()
+    }
+
+    /// The bits of the line from the first start bit on, as far as the fields tell: idle line between them.
+    pub(super) fn line(&self, bit: i64) -> Option<Window> {
+        let mut bits = u128::MAX;
+        for (byte, start) in self.bytes().iter().zip(&self.starts) {
+            let at = (start - self.start() + bit / 2) / bit.max(1);
+            let ten = 1 << 9 | u128::from(*byte) << 1;
+            let clear = u32::try_from(at).ok().and_then(|at| 0x3ff_u128.checked_shl(at));
+            if let (Some(clear), Ok(at)) = (clear, u32::try_from(at)) {
+                bits = bits & !clear | ten << at;
+            }
+        }
+        if let Some(at) = self.broken.and_then(|field| self.starts.get(usize::from(field))) {
+            let at = (at - self.start() + bit / 2) / bit.max(1) + 9;
+            bits &= !u32::try_from(at).ok().and_then(|at| 1_u128.checked_shl(at)).unwrap_or(0);
+        }
+        let len = ((self.end - self.start()) / bit.max(1)).clamp(0, 128);
+        Window::from_bits(bits, u32::try_from(len).ok()?)
+    }
+
+    pub(super) fn place(&self) -> Place {
+        match self.line {
+            Some(line) => Place::Line(line),
+            None => Place::Time { start: self.start(), end: self.end },
+        }
+    }
+}
+
+/// A request that waits for its answer.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Pending {
+    /// None where the request was damaged.
+    pub(super) request: Option<Request>,
+    pub(super) place: Place,
+}
+
+impl Pending {
+    /// When it ended; none in a log without times.
+    pub(super) fn end(&self) -> Option<i64> {
+        match self.place {
+            Place::Time { end, .. } => Some(end),
+            Place::Line(_) => None,
+        }
+    }
+
+    /// Whether a frame is not the answer but the next request: it is one, and later than an answer begins.
+    pub(super) fn is_asked_again(&self, frame: &Frame) -> bool {
+        let late = self.end().is_some_and(|end| frame.start() - end > LATE_ANSWER);
+        late && frame.broken.is_none()
+            && frame.fields < self.answer_fields(frame.first())
+            && frame.data_id().is_ok_and(|id| frame.fields == usize::from(id.request_fields()))
+    }
+
+    /// Fields of the answer that begins with these bytes.
+    pub(super) fn answer_fields_of(&self, bytes: &[u8]) -> usize {
+        self.answer_fields(bytes.first().copied().unwrap_or_default())
+    }
+
+    /// The answer alone, if these bytes are it behind the request: a receiver that is always on hears that first.
+    pub(super) fn without_echo<'a>(&self, bytes: &'a [u8]) -> &'a [u8] {
+        let echo = self.request.map(Request::emit);
+        let rest = echo.and_then(|echo| bytes.strip_prefix(echo.as_bytes()));
+        rest.filter(|rest| rest.len() == self.answer_fields_of(rest)).unwrap_or(bytes)
+    }
+
+    /// Fields of the answer that begins with `cf`: as that says, or where it is damaged, as was asked.
+    pub(super) fn answer_fields(&self, cf: u8) -> usize {
+        let said = ControlField::parse(cf).and_then(ControlField::data_id).ok();
+        let id = said.or(self.request.map(Request::data_id)).unwrap_or(DataId::Id3);
+        usize::from(id.response_fields())
+    }
+}

@@ -1,0 +1,171 @@
+//! Broken files end in a sentence and exit code 1, with what came before the break decoded.
+#![allow(
+    clippy::arithmetic_side_effects,
+    clippy::cast_possible_truncation,
+    clippy::cast_possible_wrap,
+    clippy::cast_precision_loss,
+    clippy::cast_sign_loss,
+    clippy::expect_used,
+    clippy::indexing_slicing,
+    clippy::panic,
+    clippy::std_instead_of_core,
+    clippy::unwrap_used
+)]
+
+mod common;
+
+use common::{Bench, GOOD_FRAMES, good_traffic};
+
+#[test]
+fn no_file_and_no_content() {
+    let bench = Bench::new();
+    common::decode(&bench.path("missing.vcd"), &[]).fails_with("cannot be opened: no such file or directory");
+    common::decode(&bench.path(""), &[]).fails_with("is a folder");
+    for options in [&[][..], &["--rate", "24M"], &["--bytes"], &["--format", "vcd"]] {
+        bench.decode("empty.vcd", "", options).fails_with("empty.vcd: the file is empty");
+    }
+}
+
+#[test]
+fn unknown_formats() {
+    let bench = Bench::new();
+    bench.decode("noise.dat", [0xaa; 100], &[]).fails_with("for raw samples give --rate");
+    bench.decode("session.sr", b"PK\x03\x04....", &[]).fails_with("export it as VCD");
+    bench.decode("a.raw", [0; 100], &["--format", "packed"]).fails_with("say it with --rate");
+}
+
+#[test]
+fn vcd_cut_off() {
+    let bench = Bench::new();
+    let text = good_traffic(2.5e6).vcd();
+    let header = &text[..60];
+    bench.decode("header.vcd", header, &[]).fails_with("line 3: the file ends in the header: it was cut off");
+    bench.decode("header.vcd", &text[..text.find("$enddef").unwrap()], &[]).fails_with("before $enddefinitions");
+    // Behind the value of a change, before its code.
+    let middle = text.rfind("1!").unwrap() + 1;
+    let run = bench.decode("change.vcd", &text[..middle], &["--json"]);
+    run.fails_with("the file ends in the middle of a value change");
+    assert!(run.json().len() >= GOOD_FRAMES - 2, "{}", run.out);
+    // Between two changes nothing is missing.
+    let half = text[..text.len() / 2].rfind('#').unwrap();
+    bench.decode("half.vcd", &text[..half], &["--json"]).is_good();
+}
+
+#[test]
+fn vcd_damaged() {
+    let bench = Bench::new();
+    let text = good_traffic(2.5e6).vcd();
+    let run = bench.decode("a.vcd", text.replacen("1!\n#", "Q!\n#", 5), &[]);
+    run.fails_with("not VCD in the middle of a value change: unexpected character");
+    let back = text.replace("#49000000\n", "#5\n");
+    assert!(back != text);
+    bench.decode("back.vcd", back, &["--json"]).fails_with("time goes back from #");
+    bench.decode("a.vcd", text.replace("$var wire 1", "$var wire 4"), &[]).fails_with("no variable of one bit");
+    bench
+        .decode("a.vcd", text.replace("$enddefinitions $end", ""), &[])
+        .fails_with("value changes before $enddefinitions");
+    bench
+        .decode("a.vcd", text.replace("$timescale 1 ps", "$timescale 1 parsec"), &[])
+        .fails_with("not VCD in the header");
+    let deep = format!("{}{}", "$scope module m $end\n".repeat(200_000), "$enddefinitions $end\n");
+    bench.decode("deep.vcd", deep, &[]).fails_with("no variable of one bit");
+    bench.decode("a.vcd", text.replace("#30000000\n", "#99999999999999999999\n"), &[]).fails_with("not VCD");
+    bench.decode("a.vcd", text.replace("1 ps", "1 s"), &[]).fails_with("is too large");
+}
+
+#[test]
+fn channels_that_are_not_there() {
+    let bench = Bench::new();
+    let run = bench.decode("a.vcd", good_traffic(2.5e6).vcd(), &["--channel", "RX"]);
+    run.fails_with("no channel \"RX\"; the file has \"line\"");
+    let run = bench.decode("a.csv", good_traffic(2.5e6).saleae_csv(), &["--channel", "5"]);
+    run.fails_with("no channel \"5\"; the file has \"Channel 0\"");
+}
+
+#[test]
+fn csv_damaged() {
+    let bench = Bench::new();
+    let text = good_traffic(2.5e6).saleae_csv();
+    let rows: Vec<&str> = text.lines().collect();
+    let with = |k: usize, row: &str| {
+        let mut rows = rows.clone();
+        rows[k] = row;
+        rows.join("\n")
+    };
+    for (row, sentence) in [
+        ("oops,1", "line 300: \"oops\" is not a time in seconds"),
+        ("0.001,x", "line 300: column \"Channel 0\" holds \"x\", where a level is 0 or 1"),
+        ("0.001", "line 300: the row has 1 columns, the heading 2"),
+        ("0.0000001,1", "line 300: time goes back from"),
+    ] {
+        let run = bench.decode("a.csv", with(299, row), &["--json"]);
+        run.fails_with(sentence);
+        assert!(run.json().len() > 5, "what came before is decoded: {}", run.out);
+    }
+    bench.decode("a.csv", with(0, "a,b"), &[]).fails_with("the heading of a Logic 2 export");
+    bench.decode("a.csv", with(0, "Time [s]"), &[]).fails_with("the heading of a Logic 2 export");
+    bench.decode("a.csv", "Time [s],Channel 0\n", &[]).fails_with("no traffic");
+    bench.decode("a.csv", with(5, "2024-01-01T00:00:00,1"), &[]).fails_with("is not a time in seconds");
+}
+
+#[test]
+fn saleae_binary_damaged() {
+    let bench = Bench::new();
+    let good = good_traffic(2.5e6).saleae_binary();
+    let run = bench.decode("a.bin", &good[..good.len() - 100], &["--json"]);
+    run.fails_with("it was cut off");
+    assert!(run.json().len() > 10);
+    bench.decode("a.bin", &good[..30], &[]).fails_with("byte 30: ends in its header of 44 bytes");
+    let with = |at: usize, bytes: &[u8]| {
+        let mut out = good.clone();
+        out[at..at + bytes.len()].copy_from_slice(bytes);
+        out
+    };
+    bench.decode("a.bin", with(8, &[1, 0, 0, 0]), &[]).fails_with("is of version 1, and only 0 is known");
+    bench.decode("a.bin", with(12, &[1, 0, 0, 0]), &[]).fails_with("is not a digital channel");
+    bench.decode("a.bin", with(20, &f64::NAN.to_le_bytes()), &[]).fails_with("begin or end is not a time");
+    bench.decode("a.bin", with(44 + 80, &f64::INFINITY.to_le_bytes()), &[]).fails_with("byte 124: transition is not");
+    bench.decode("a.bin", with(44 + 80, &0_f64.to_le_bytes()), &[]).fails_with("byte 124: time goes back");
+}
+
+#[test]
+fn raw_damaged() {
+    let bench = Bench::new();
+    let raw = good_traffic(2.5e6).raw(20e6, 0);
+    let odd = &raw[..raw.len() / 2 * 2 - 1];
+    bench
+        .decode("a.raw", odd, &["--rate", "20M", "--unit-size", "2"])
+        .fails_with("1 bytes are left, where a sample has 2");
+    let slow = good_traffic(2.5e6).raw(8e6, 0);
+    bench.decode("slow.raw", slow, &["--rate", "8M"]).fails_with("3.2 samples a bit are too few");
+    bench
+        .decode("flat.raw", [0xff; 5000], &["--rate", "20M"])
+        .fails_with("no traffic: at most 0 edges on any of 8 channels");
+}
+
+#[test]
+fn hex_damaged() {
+    let bench = Bench::new();
+    let run = bench.decode("a.txt", "1A\n1A 20 29 C0 3B 17 00 00 00 C8 37\n1G\n", &["--bytes", "--json"]);
+    run.fails_with("line 3: \"1G\" is not bytes in hex");
+    assert_eq!(run.json().len(), 2);
+    bench.decode("a.txt", "A".repeat(100_000), &["--bytes"]).fails_with("a line of more than 65536 characters");
+    bench.decode("a.txt", "# nothing\n", &["--bytes"]).fails_with("no frame in it");
+}
+
+#[test]
+fn wrong_use() {
+    let bench = Bench::new();
+    let wave = good_traffic(2.5e6);
+    for options in [
+        &["--rate", "fast"][..],
+        &["--jump", "10"],
+        &["--unit-size", "9"],
+        &["--nonsense"],
+        &["--bytes", "--rate", "1M"],
+        &["--protocol", "morse"],
+    ] {
+        assert_eq!(bench.decode("a.vcd", wave.vcd(), options).code, 2, "{options:?}");
+    }
+    assert_eq!(common::servowire(&["decode", "--vcd", "out.vcd"]).code, 2);
+}

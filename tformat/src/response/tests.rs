@@ -1,0 +1,164 @@
+use super::*;
+use crate::request::tests::requests;
+use proptest::prelude::*;
+use std::vec::Vec;
+
+pub(crate) fn fulls() -> impl Strategy<Value = Full> {
+    (any::<[u8; 3]>(), any::<u32>(), any::<u32>()).prop_map(|([sf, enid, almc], abs, abm)| Full {
+        sf: StatusField::new(sf),
+        abs: U24::truncate(abs),
+        enid,
+        abm: U24::truncate(abm),
+        almc: Almc::new(almc),
+    })
+}
+
+/// A request and an answer that a sound encoder may give to it.
+pub(crate) fn exchanges() -> impl Strategy<Value = (Request, Response)> {
+    (requests(), fulls(), any::<bool>()).prop_map(|(request, full, busy)| (request, answer(request, full, busy)))
+}
+
+/// The answer to `request` of an encoder that knows `full`.
+fn answer(request: Request, full: Full, busy: bool) -> Response {
+    let single = SingleTurn { sf: full.sf, abs: full.abs };
+    match request {
+        Request::Id0 => Response::Id0(single),
+        Request::Id1 => Response::Id1(MultiTurn { sf: full.sf, abm: full.abm }),
+        Request::Id2 => Response::Id2(EncoderId { sf: full.sf, enid: full.enid }),
+        Request::Id3 => Response::Id3(full),
+        Request::Id6 { adf, edf } => Response::Id6(Memory { adf: Adf::of(adf.address(), busy), edf }),
+        Request::Id7 => Response::Id7(single),
+        Request::Id8 => Response::Id8(single),
+        Request::IdC => Response::IdC(single),
+        Request::IdD { adf } => Response::IdD(Memory { adf: Adf::of(adf.address(), busy), edf: full.enid }),
+    }
+}
+
+/// The published log of a TS5700N8401.
+const LOGGED: [u8; 11] = [0x1a, 0x20, 0x29, 0xc0, 0x3b, 0x17, 0x00, 0x00, 0x00, 0xc8, 0x37];
+
+#[test]
+fn a_logged_answer_in_every_form() {
+    let full = Full::parse(&LOGGED).unwrap();
+    assert_eq!((full.abs.get(), full.enid, full.abm.get()), (3_915_817, 23, 0));
+    assert_eq!((full.sf.raw(), full.almc.raw()), (0x20, 0xc8));
+    assert!(full.sf.agrees_with(full.almc));
+    assert_eq!(full.emit(), LOGGED);
+    for order in [BitOrder::LsbFirst, BitOrder::MsbFirst] {
+        assert_eq!(Full::parse_line(&full.emit_line(order), order), Ok(full));
+    }
+}
+
+proptest! {
+    #[test]
+    fn bytes_and_line_round_trip((request, response) in exchanges()) {
+        let frame = response.emit();
+        prop_assert_eq!(Response::parse(request, frame.as_bytes()), Ok(response));
+        prop_assert_eq!(Response::parse_line(request, frame.line()), Ok(response));
+        prop_assert_eq!(frame.fields(), request.data_id().response_fields());
+    }
+
+    #[test]
+    fn bytes_behind_the_answer_are_left_alone((request, response) in exchanges(), tail: [u8; 4]) {
+        let bytes = [response.emit().as_bytes(), &tail].concat();
+        prop_assert_eq!(Response::parse(request, &bytes), Ok(response));
+    }
+
+    #[test]
+    fn accepted_bytes_are_what_it_would_emit(request in requests(), mut bytes in prop::collection::vec(any::<u8>(), 11)) {
+        let (cf, last) = (request.data_id().control_field().get(), usize::from(request.data_id().response_fields()) - 1);
+        bytes[0] = cf;
+        bytes[last] = crate::crc(&bytes[..last]);
+        if let Ok(response) = Response::parse(request, &bytes) {
+            let frame = response.emit();
+            prop_assert_eq!(frame.as_bytes(), &bytes[..=last]);
+        }
+    }
+
+    /// Every single wrong bit of the line is refused, by the check that covers it.
+    #[test]
+    fn single_flips_on_the_line((request, response) in exchanges()) {
+        let line = response.emit().line();
+        for at in 0..line.len() {
+            let bad = Window::from_bits(line.bits() ^ 1 << at, line.len()).unwrap();
+            let error = Response::parse_line(request, bad).unwrap_err();
+            let field = (at / 10) as u8;
+            let right = match (field, at % 10) {
+                (_, 0) => error == Error::StartBit { field },
+                (_, 9) => error == Error::Delimiter { field },
+                (0, 1..=3) => matches!(error, Error::SinkCode { .. }),
+                (0, _) => matches!(error, Error::Parity { .. }),
+                _ => matches!(error, Error::Crc { .. }),
+            };
+            prop_assert!(right, "bit {}: {:?}", at, error);
+        }
+    }
+
+    #[test]
+    fn truncations((request, response) in exchanges()) {
+        let frame = response.emit();
+        let (bytes, want) = (frame.as_bytes(), frame.fields());
+        for got in 0..want {
+            let error = Err(Error::Truncated { got, want });
+            prop_assert_eq!(Response::parse(request, &bytes[..usize::from(got)]), error);
+            for bits in 0..10 {
+                let short = Window::from_bits(frame.line().bits(), u32::from(got) * 10 + bits).unwrap();
+                prop_assert_eq!(Response::parse_line(request, short), error);
+            }
+        }
+    }
+
+    /// An ID 3 frame to another request is a refusal, once it is complete and sound.
+    #[test]
+    fn rejections(request in requests(), full in fulls()) {
+        prop_assume!(request != Request::Id3);
+        let bytes = full.emit();
+        let rejected = Err(Error::Rejected { sf: full.sf });
+        prop_assert_eq!(Response::parse(request, &bytes), rejected);
+        prop_assert_eq!(Response::parse_line(request, Frame::of11(bytes).line()), rejected);
+        for got in 1..11 {
+            let cut = Response::parse(request, &bytes[..usize::from(got)]);
+            prop_assert_eq!(cut, Err(Error::Truncated { got, want: 11 }));
+        }
+        let mut bad = bytes;
+        bad[5] ^= 4;
+        let damaged = matches!(Response::parse(request, &bad), Err(Error::Crc { .. }));
+        prop_assert!(damaged);
+    }
+
+    #[test]
+    fn answers_to_other_requests((request, response) in exchanges(), other in requests()) {
+        prop_assume!(request.data_id() != other.data_id() && response.data_id() != DataId::Id3);
+        let error = Response::parse(other, response.emit().as_bytes());
+        let (got, want) = (request.data_id().control_field().get(), other.data_id().control_field().get());
+        prop_assert_eq!(error, Err(Error::CfMismatch { got, want }));
+    }
+
+    #[test]
+    fn eeprom_echo(adf: u8, edf: u8, other: u8) {
+        let (adf, other_adf) = (Adf::of(Adf::new(adf).address(), false), Adf::of(Adf::new(other).address(), false));
+        let write = Request::Id6 { adf, edf };
+        let address = Response::parse(write, Response::Id6(Memory { adf: other_adf, edf }).emit().as_bytes());
+        prop_assert_eq!(address.is_ok(), adf == other_adf);
+        if adf != other_adf {
+            let (got, want) = (other_adf.raw(), adf.raw());
+            prop_assert_eq!(address, Err(Error::AddressMismatch { got, want }));
+        }
+        let data = Response::parse(write, Response::Id6(Memory { adf, edf: other }).emit().as_bytes());
+        prop_assert_eq!(data.err(), (other != edf).then_some(Error::DataMismatch { got: other, want: edf }));
+        // A busy memory did not write; its data byte is not compared.
+        let busy = Memory { adf: Adf::of(adf.address(), true), edf: other };
+        prop_assert_eq!(Response::parse(write, Response::Id6(busy).emit().as_bytes()), Ok(Response::Id6(busy)));
+    }
+}
+
+/// Damage that the XOR cannot see is accepted: the limit is documented, not hidden.
+#[test]
+fn what_the_check_field_cannot_see_is_accepted() {
+    let mut two_bits = LOGGED;
+    two_bits[2] ^= 1;
+    two_bits[3] ^= 1;
+    assert_eq!(Full::parse(&two_bits).map(|f| f.abs.get()), Ok(0x3b_c029 ^ 0x101));
+    let all_ones: Vec<u8> = std::vec![0xff; 6];
+    assert_eq!(Response::parse(Request::Id0, &all_ones), Err(Error::SinkCode { cf: 0xff }));
+}
