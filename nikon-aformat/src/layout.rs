@@ -1,5 +1,6 @@
 use core::fmt;
 
+use crate::Command;
 use crate::frame::FRAME_BITS;
 
 /// What a reply carries between its information field and its CRC-8.
@@ -136,8 +137,53 @@ impl Layout {
     }
 }
 
+impl Command {
+    /// The two layouts in which the command may be answered, the one of version 2.1 first: for tools that have no request and
+    /// no profile at hand. Twice the same where there is but one.
+    pub const fn layouts(self) -> [Layout; 2] {
+        let only = match self {
+            Self::Abs24Low | Self::Abs24LowMt => return [Layout::Abs24, Layout::Abs40Vel],
+            Self::ClearStatus
+            | Self::ClearMultiturn
+            | Self::ClearStatusMultiturn
+            | Self::SetAddress1
+            | Self::ZeroPreset => return [Layout::Status, Layout::Abs24],
+            Self::EepromRead | Self::EepromWrite => return [Layout::Eeprom, Layout::EepromBank],
+            Self::IdRead1 | Self::IdWrite1 => return [Layout::Id, Layout::Coefficient],
+            Self::Abs40 | Self::Abs40Mt => Layout::Abs40,
+            Self::Abs24High | Self::Abs24HighMt => Layout::Abs24High,
+            Self::Status | Self::StatusMt => Layout::Status,
+            Self::Temperature => Layout::Temperature,
+            Self::IdRead2 | Self::IdWrite2 | Self::SetAddress2 => Layout::Id,
+            Self::Abs17 | Self::Abs17Mt => Layout::Abs17,
+            Self::Abs24Vel | Self::Abs24VelMt => Layout::Abs24Vel,
+            Self::Abs24VelAcc | Self::Abs24VelAccMt => Layout::Abs24VelAcc,
+            Self::Abs24Status | Self::Abs24StatusMt => Layout::Abs24Status,
+            Self::Abs24Temp | Self::Abs24TempMt => Layout::Abs24Temp,
+        };
+        [only, only]
+    }
+}
+
 impl fmt::Display for Layout {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(self.name())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::request::tests::every;
+    use crate::{EncoderAddress, Profile, Request};
+
+    /// Every operation is answered in one of the layouts of its command, whatever the factory setting.
+    #[test]
+    fn the_layouts_of_a_command_are_those_of_its_operations() {
+        let odd = Profile::default().low_with_velocity().resets_with_position();
+        for operation in every(0, 0, 0, 0) {
+            let request = Request::new(EncoderAddress::ZERO, operation);
+            let layouts = request.command().layouts();
+            assert!(layouts.contains(&request.layout(Profile::default())) && layouts.contains(&request.layout(odd)));
+        }
     }
 }

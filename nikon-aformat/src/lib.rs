@@ -13,6 +13,7 @@ pub mod device;
 mod error;
 mod expected;
 mod frame;
+pub mod inspect;
 mod layout;
 pub mod master;
 mod number;
