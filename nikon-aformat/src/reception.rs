@@ -31,7 +31,7 @@ use crate::{Error, Layout, Reply};
 pub struct LineReceiver {
     receiver: Receiver,
     layout: Layout,
-    max_gap_bits: Option<u32>,
+    on_bus: bool,
     contents: [u16; Reply::MAX_FRAMES],
     got: u8,
     /// Index of the first sample behind the last frame.
@@ -47,8 +47,8 @@ const PLAIN_BITS: Format = match Format::new(1, 16) {
 };
 
 impl LineReceiver {
-    /// Idle bits that separate two replies on a bus, by default: the shortest gap that masters allow for is 7.5 bits.
-    pub const BUS_GAP_BITS: u32 = 5;
+    /// Idle bits that separate two replies on a bus. The shortest gap that masters allow for is 7.5 bits.
+    const BUS_GAP_BITS: u64 = 5;
 
     /// A receiver of `samples_per_bit` samples a bit, 4 to 80, that takes any gap between frames.
     ///
@@ -68,17 +68,21 @@ impl LineReceiver {
         Self::of(PLAIN_BITS, layout)
     }
 
-    /// The same, but `max_gap_bits` idle bits and more between two frames end a reply: on a bus, a reply that lost a
-    /// frame does not swallow the first frame of the next one.
-    pub const fn with_max_gap(self, max_gap_bits: u32) -> Self {
-        Self { max_gap_bits: Some(max_gap_bits), ..self }
+    /// The same for a bus, where the frames of a reply follow each other without idle bits and five idle bits or more separate
+    /// two replies.
+    ///
+    /// A frame that begins a bit or more late has lost its start bit, and a later edge was taken for it: without this
+    /// rule, one such frame in 256 at the end of a reply passes the CRC-8. And a reply that lost a frame does not swallow
+    /// the first frame of the next one.
+    pub const fn on_bus(self) -> Self {
+        Self { on_bus: true, ..self }
     }
 
     const fn of(format: Format, layout: Layout) -> Self {
         Self {
             receiver: Receiver::new(format),
             layout,
-            max_gap_bits: None,
+            on_bus: false,
             contents: [0; Reply::MAX_FRAMES],
             got: 0,
             end: 0,
@@ -119,23 +123,32 @@ impl LineReceiver {
         let begun = (self.got > 0 || self.receiver.is_receiving()) && !self.broken;
         let error = self.truncation();
         let format = self.receiver.format();
-        *self = Self { max_gap_bits: self.max_gap_bits, ..Self::of(format, self.layout) };
+        *self = Self { on_bus: self.on_bus, ..Self::of(format, self.layout) };
         begun.then_some(error)
     }
 
-    /// One frame more. A gap before it ends the reply that was begun; then this frame begins the next one.
+    /// One frame more. On a bus, a gap before it ends the reply that was begun, and the frame begins the next one.
     fn take(&mut self, field: Field) -> Option<Result<Reply, Error>> {
-        let ended = self.is_after_gap(field).then(|| self.gap()).flatten();
         let samples = u64::from(self.receiver.format().samples_per_bit());
+        // The end of a frame is known to half a bit.
+        let idle = field.start.saturating_sub(self.end).saturating_add(samples / 2);
         self.end = field.start.saturating_add(samples.saturating_mul(FRAME_BITS.into()));
+        let mut ended = None;
+        if self.on_bus {
+            if idle >= samples.saturating_mul(Self::BUS_GAP_BITS) {
+                self.broken = false;
+                ended = (self.got > 0).then(|| Err(self.truncation()));
+                self.got = 0;
+            } else if self.got > 0 && idle >= samples {
+                return Some(Err(self.break_off(Error::StartBit { frame: self.got })));
+            }
+        }
         if self.broken {
             return ended;
         }
         if !field.delimiter {
-            let frame = self.got;
-            self.got = 0;
-            self.broken = self.max_gap_bits.is_some();
-            return ended.or(Some(Err(Error::Delimiter { frame })));
+            let error = self.break_off(Error::Delimiter { frame: self.got });
+            return ended.or(Some(Err(error)));
         }
         if let Some(content) = self.contents.get_mut(usize::from(self.got)) {
             *content = field.content;
@@ -145,27 +158,15 @@ impl LineReceiver {
             return ended;
         }
         self.got = 0;
-        let mut contents = [0; Reply::MAX_FRAMES];
-        for (to, from) in contents.iter_mut().zip(self.contents).take(usize::from(self.layout.frames())) {
-            *to = from;
-        }
-        Some(Ok(Reply::of(contents, self.layout)))
+        Some(Ok(Reply::of(core::mem::take(&mut self.contents), self.layout)))
     }
 
-    fn is_after_gap(&self, field: Field) -> bool {
-        let samples = u64::from(self.receiver.format().samples_per_bit());
-        self.max_gap_bits.is_some_and(|max| {
-            // The end of a frame is known to half a bit.
-            let gap = field.start.saturating_sub(self.end).saturating_add(samples / 2);
-            gap >= samples.saturating_mul(max.into())
-        })
-    }
-
-    fn gap(&mut self) -> Option<Result<Reply, Error>> {
-        self.broken = false;
-        let cut = (self.got > 0).then(|| Err(self.truncation()));
+    /// A reply is given up; on a bus, its rest is passed over.
+    fn break_off(&mut self, error: Error) -> Error {
         self.got = 0;
-        cut
+        self.contents = [0; Reply::MAX_FRAMES];
+        self.broken = self.on_bus;
+        error
     }
 
     fn truncation(&self) -> Error {
@@ -212,9 +213,23 @@ mod tests {
             prop_assert_eq!(receiver.finish(), None);
         }
 
+        /// On a bus, a frame that begins one to four bits late is refused: its start bit was lost.
+        #[test]
+        fn a_late_frame_lost_its_start_bit((_, expected, response) in exchanges(), frame in 1..6_u8, late in 1..5_usize) {
+            let reply = response.emit();
+            let frame = 1 + frame % (reply.frames() - 1);
+            let mut bits: Vec<bool> = bits_of(reply.line()).collect();
+            let at = usize::from(frame) * 18;
+            bits.splice(at..at, repeat_n(true, late));
+            let mut receiver = LineReceiver::bits(expected.layout()).on_bus();
+            let got: Vec<_> = bits.into_iter().filter_map(|bit| receiver.push(bit)).collect();
+            prop_assert_eq!(got, [Err(Error::StartBit { frame })]);
+            prop_assert_eq!(receiver.finish(), None);
+        }
+
         /// A reply that loses frames costs only itself: the next one behind a gap arrives.
         #[test]
-        fn a_gap_ends_a_reply((_, expected, response) in exchanges(), kept in 0..108_usize, gap in 6..40_usize) {
+        fn a_gap_ends_a_reply((_, expected, response) in exchanges(), kept in 0..108_usize, gap in 5..40_usize) {
             let reply = response.emit();
             let frames = usize::from(reply.frames());
             let kept = kept % (frames * 18);
@@ -224,7 +239,7 @@ mod tests {
             bits.truncate(whole * 18);
             bits.extend(repeat_n(true, gap));
             bits.extend(bits_of(reply.line()));
-            let mut receiver = LineReceiver::bits(expected.layout()).with_max_gap(LineReceiver::BUS_GAP_BITS);
+            let mut receiver = LineReceiver::bits(expected.layout()).on_bus();
             let got: Vec<_> = bits.into_iter().filter_map(|bit| receiver.push(bit)).collect();
             let cut = Error::Truncated { got: whole as u16 * 18, want: frames as u16 * 18 };
             if whole == 0 {

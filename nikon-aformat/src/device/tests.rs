@@ -253,7 +253,7 @@ fn one_fault_costs_one_reply() {
             if whole == 8 {
                 continue;
             }
-            let mut receiver = LineReceiver::bits(Layout::Abs40).with_max_gap(LineReceiver::BUS_GAP_BITS);
+            let mut receiver = LineReceiver::bits(Layout::Abs40).on_bus();
             let bus = hear(&mut receiver, &answers, transaction.bus());
             assert!(transaction.poll(u64::MAX));
             for address in EncoderAddress::ALL {
