@@ -1,7 +1,7 @@
 //! Writes the seeds of the corpora from the reference vectors: `cargo run --no-default-features --example seed_corpus`.
 //!
-//! At most [`SEEDS`] from a file, evenly spread over its rows, each named after its row. Findings that are kept beside them
-//! have names of their own and are left alone.
+//! At most [`SEEDS`] from a file, evenly spread over its rows, each named after its row or its line. Findings that are kept
+//! beside them have names of their own and are left alone.
 
 use std::path::Path;
 use std::{fs, io};
@@ -10,6 +10,8 @@ use serde_json::Value;
 
 #[path = "seed_corpus/nrz_line.rs"]
 mod nrz_line;
+#[path = "seed_corpus/step_profile.rs"]
+mod step_profile;
 #[path = "seed_corpus/tformat.rs"]
 mod tformat;
 
@@ -18,7 +20,7 @@ const SEEDS: usize = 15;
 /// A target, the vector file its seeds come from, and the input that a row becomes; `None` for rows of another kind.
 type Source = (&'static str, &'static str, fn(&Value) -> Option<Vec<u8>>);
 
-const SOURCES: &[&[Source]] = &[nrz_line::SOURCES, tformat::SOURCES];
+const SOURCES: &[&[Source]] = &[nrz_line::SOURCES, step_profile::SOURCES, tformat::SOURCES];
 
 fn main() -> io::Result<()> {
     let here = Path::new(env!("CARGO_MANIFEST_DIR"));
@@ -26,7 +28,8 @@ fn main() -> io::Result<()> {
         let folder = here.join("corpus").join(target);
         fs::create_dir_all(&folder)?;
         let rows = fs::read_to_string(here.join("../tests/vectors").join(file))?;
-        let seeds: Vec<(String, Vec<u8>)> = rows.lines().filter_map(|line| seed(line, *input)).collect();
+        let seeds: Vec<(String, Vec<u8>)> =
+            (1..).zip(rows.lines()).filter_map(|(at, line)| seed(file, at, line, *input)).collect();
         let step = seeds.len().div_ceil(SEEDS).max(1);
         for (name, bytes) in seeds.iter().step_by(step) {
             fs::write(folder.join(name).with_extension("seed"), bytes)?;
@@ -36,10 +39,12 @@ fn main() -> io::Result<()> {
     Ok(())
 }
 
-/// Name and input of a row.
-fn seed(line: &str, input: fn(&Value) -> Option<Vec<u8>>) -> Option<(String, Vec<u8>)> {
+/// Name and input of a row. A row without a name is called after its file and line.
+fn seed(file: &str, at: usize, line: &str, input: fn(&Value) -> Option<Vec<u8>>) -> Option<(String, Vec<u8>)> {
     let row: Value = serde_json::from_str(line).expect("a vector file holds JSON");
-    Some((row["name"].as_str()?.to_owned(), input(&row)?))
+    let name = row["name"].as_str().map_or_else(|| format!("{file}-{at:04}"), str::to_owned);
+    let name = name.replace(|c: char| !c.is_ascii_alphanumeric() && c != '_', "-");
+    Some((name, input(&row)?))
 }
 
 /// `"0220b4"` as bytes.

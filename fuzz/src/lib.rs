@@ -5,6 +5,7 @@
 //! [`TARGETS`], a file in `fuzz_targets/` and its `[[bin]]`, and seeds from `examples/seed_corpus.rs`.
 
 pub mod nrz_line;
+pub mod step_profile;
 pub mod tformat;
 
 /// A target.
@@ -13,10 +14,15 @@ pub type Target = fn(&[u8]);
 /// All targets by name.
 pub const TARGETS: &[(&str, Target)] = &[
     ("nrz_receiver", nrz_line::receiver),
+    ("step_profile_step", step_profile::step),
+    ("step_profile_axis", step_profile::axis),
     ("tformat_request", tformat::request),
     ("tformat_response", tformat::response),
     ("tformat_differential", tformat::differential),
     ("tformat_stream", tformat::stream),
+    ("tformat_master", tformat::ends::master),
+    ("tformat_device", tformat::ends::device),
+    ("tformat_inspect", tformat::ends::inspect),
 ];
 
 /// Takes a byte off the front; 0 when none is left.

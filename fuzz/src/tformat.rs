@@ -5,6 +5,7 @@ use tformat::{Adf, BitOrder, ControlField, DataId, Error, Frame, Full, Request, 
 
 use crate::byte;
 
+pub mod ends;
 mod reference;
 
 /// The request that the first three bytes choose: kind, ADF, EDF.
@@ -37,8 +38,9 @@ pub fn request(data: &[u8]) {
         Err(Error::Parity { cf }) => assert!(cf == data[0] && (cf >> 3).count_ones() % 2 == 1),
         Err(Error::UnknownDataId { code }) => assert_eq!(ControlField::compose(code).get(), data[0]),
         Err(Error::Crc { got, want }) => {
-            let at = data[1..].iter().position(|b| *b == got).expect("the field that was received");
-            assert!(got != want && at >= 1);
+            let id = ControlField::parse(data[0]).and_then(ControlField::data_id).expect("a known request");
+            let last = usize::from(id.request_fields()) - 1;
+            assert!(got == data[last] && want == crc(&data[..last]) && got != want);
         }
         Err(error) => panic!("{error} is not an error of a request"),
     }

@@ -248,6 +248,34 @@ impl ErrorClass {
         Self::NotCarried,
         Self::Combinator,
     ];
+
+    /// The name in lower case, as logs and test vectors spell it.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Truncated => "truncated",
+            Self::StartBit => "start_bit",
+            Self::Delimiter => "delimiter",
+            Self::Crc => "crc",
+            Self::Crc3 => "crc3",
+            Self::SyncCode => "sync_code",
+            Self::FixedBit => "fixed_bit",
+            Self::AddressMismatch => "address_mismatch",
+            Self::CommandMismatch => "command_mismatch",
+            Self::BankError => "bank_error",
+            Self::EchoMismatch => "echo_mismatch",
+            Self::FrameCode => "frame_code",
+            Self::UnknownCommand => "unknown_command",
+            Self::UnsupportedInVersion => "unsupported_in_version",
+            Self::AddressRange => "address_range",
+            Self::DataRange => "data_range",
+            Self::NoResponse => "no_response",
+            Self::Busy => "busy",
+            Self::Interrupted => "interrupted",
+            Self::UpperBits => "upper_bits",
+            Self::NotCarried => "not_carried",
+            Self::Combinator => "combinator",
+        }
+    }
 }
 
 impl Error {

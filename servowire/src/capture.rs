@@ -89,10 +89,24 @@ pub fn open(path: &Path, hints: Hints) -> Result<(Capture, Rc<Cell<u64>>), Fault
     let meter = input.meter();
     let format = match hints.format {
         Some(format) => format,
-        None if hints.sample_rate.is_some() => Format::Raw,
-        None => guess(&mut input, path)?,
+        None => guess(&mut input, path, hints.sample_rate.is_some())?,
     };
     Ok((decoder(input, format, hints)?, meter))
+}
+
+/// The format that the first bytes show beyond doubt.
+fn known(head: &[u8]) -> Option<Format> {
+    const VCD: [&[u8]; 7] = [b"$comment", b"$date", b"$enddefinitions", b"$scope", b"$timescale", b"$var", b"$version"];
+    let text = head.strip_prefix(b"\xef\xbb\xbf").unwrap_or(head).trim_ascii_start();
+    if head.starts_with(b"<SALEAE>") {
+        Some(Format::SaleaeBinary)
+    } else if VCD.iter().any(|keyword| text.starts_with(keyword)) {
+        Some(Format::Vcd)
+    } else if text.get(..4).is_some_and(|word| word.eq_ignore_ascii_case(b"time")) {
+        Some(Format::SaleaeCsv)
+    } else {
+        None
+    }
 }
 
 /// Opens bytes that are part of the program.
@@ -121,27 +135,25 @@ fn decoder(mut input: Input, format: Format, hints: Hints) -> Result<Capture, Fa
     })
 }
 
-/// The format from the first bytes, else from the name.
-fn guess(input: &mut Input, path: &Path) -> Result<Format, Fault> {
+/// The format from the first bytes, else from what was said and from the name.
+fn guess(input: &mut Input, path: &Path, has_rate: bool) -> Result<Format, Fault> {
     let head = input.peek()?;
     if head.is_empty() {
         return Err(input.fault(At::File, "the file is empty"));
     }
-    if head.starts_with(b"<SALEAE>") {
-        return Ok(Format::SaleaeBinary);
+    if let Some(format) = known(head) {
+        let what =
+            "the file says its times itself: --rate is for raw samples; for the rate of the line there is --bit-rate";
+        return if has_rate { Err(input.fault(At::File, what)) } else { Ok(format) };
+    }
+    if has_rate {
+        return Ok(Format::Raw);
     }
     if head.starts_with(b"PK\x03\x04") {
         return Err(input.fault(
             At::File,
             "this is a sigrok session (.sr) or a Saleae capture (.sal); export it as VCD, or as CSV from Logic 2",
         ));
-    }
-    let text = head.strip_prefix(b"\xef\xbb\xbf").unwrap_or(head).trim_ascii_start();
-    if text.first() == Some(&b'$') {
-        return Ok(Format::Vcd);
-    }
-    if text.get(..4).is_some_and(|word| word.eq_ignore_ascii_case(b"time")) {
-        return Ok(Format::SaleaeCsv);
     }
     let extension = path.extension().and_then(|e| e.to_str()).unwrap_or_default().to_ascii_lowercase();
     match extension.as_str() {

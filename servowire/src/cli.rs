@@ -7,7 +7,7 @@ use clap::{Args, Parser, Subcommand, ValueEnum};
 
 use crate::capture::{Format, Hints};
 use crate::protocols::{Protocol, Settings, tformat};
-use crate::{decode, line};
+use crate::{decode, line, profile};
 
 /// Decodes what servo drives, controllers and encoders say to each other.
 #[derive(Debug, Parser)]
@@ -21,6 +21,8 @@ pub struct Cli {
 enum Command {
     /// Decode captures of a line.
     Decode(Decode),
+    /// Times of the steps of a move on a 4 us cycle.
+    Profile(profile::Arguments),
 }
 
 impl Cli {
@@ -28,6 +30,7 @@ impl Cli {
     pub fn run(self) -> ExitCode {
         match self.command {
             Command::Decode(arguments) => decode::run(&arguments),
+            Command::Profile(arguments) => arguments.run(),
         }
     }
 }

@@ -16,4 +16,5 @@ pub mod event;
 pub mod fault;
 pub mod line;
 pub mod output;
+pub mod profile;
 pub mod protocols;

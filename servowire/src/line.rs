@@ -139,7 +139,8 @@ pub fn decode<P: StartStop>(
             let preview = Preview::read(line.as_mut());
             let found = preview.survey(file, line.channels(), options, make)?;
             out.note(&format!("{file}: {found}"));
-            edges(line.as_mut(), preview, found.setup, &mut make(found.setup.bit()), out)
+            edges(line.as_mut(), preview, found.setup, &mut make(found.setup.bit()), out)?;
+            right_way_up(file, options, found.setup)
         }
         Capture::Samples(mut raw) => {
             let preview = Preview::read(&mut raw);
@@ -153,9 +154,19 @@ pub fn decode<P: StartStop>(
             match SampleReceiver::new(raw.clock(), setup, P::CONTENT_BITS) {
                 Some(receiver) if !out.wants_changes() => samples(&mut raw, preview, receiver, &mut protocol, out),
                 _ => edges(&mut raw, preview, setup, &mut protocol, out),
-            }
+            }?;
+            right_way_up(file, options, setup)
         }
     }
+}
+
+/// A line that was found upside down is decoded, but it is not good: somebody has to look at the wires.
+fn right_way_up(file: &str, options: &Options, setup: Setup) -> Result<(), Stop> {
+    if !setup.inverted || options.inverted.is_some() {
+        return Ok(());
+    }
+    let what = "the line is inverted: exchange A and B, or say that it is meant so with --polarity inverted";
+    Err(Fault::new(file, At::File, what).into())
 }
 
 /// Fewer than four samples a bit.

@@ -35,6 +35,13 @@ fn unknown_formats() {
 }
 
 #[test]
+fn a_sample_rate_for_a_file_that_has_times() {
+    let bench = Bench::new();
+    let run = bench.decode("a.vcd", good_traffic(2.5e6).vcd(), &["--rate", "5M"]);
+    run.fails_with("--rate is for raw samples; for the rate of the line there is --bit-rate");
+}
+
+#[test]
 fn vcd_cut_off() {
     let bench = Bench::new();
     let text = good_traffic(2.5e6).vcd();
@@ -46,9 +53,11 @@ fn vcd_cut_off() {
     let run = bench.decode("change.vcd", &text[..middle], &["--json"]);
     run.fails_with("the file ends in the middle of a value change");
     assert!(run.json().len() >= GOOD_FRAMES - 2, "{}", run.out);
-    // Between two changes nothing is missing.
+    // Between two changes the file is sound, but not the frame.
     let half = text[..text.len() / 2].rfind('#').unwrap();
-    bench.decode("half.vcd", &text[..half], &["--json"]).is_good();
+    bench
+        .decode("half.vcd", &text[..half], &["--json"])
+        .fails_with("truncated 1 (the file was cut off, or recording stopped there)");
 }
 
 #[test]

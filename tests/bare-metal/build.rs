@@ -6,13 +6,15 @@ use std::{env, io};
 
 use serde_json::Value;
 
+#[path = "build/step_profile.rs"]
+mod step_profile;
 #[path = "build/tformat.rs"]
 mod tformat;
 
 /// A protocol's folder under `tests/vectors` and what makes its tables, from a reader of topics.
 type Protocol = (&'static str, fn(&dyn Fn(&str) -> Vec<Value>) -> String);
 
-const PROTOCOLS: &[Protocol] = &[("tformat", tformat::tables)];
+const PROTOCOLS: &[Protocol] = &[("step-profile", step_profile::tables), ("tformat", tformat::tables)];
 
 fn main() -> io::Result<()> {
     let here = PathBuf::from(env::var_os("CARGO_MANIFEST_DIR").expect("cargo sets it"));

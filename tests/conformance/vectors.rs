@@ -10,7 +10,7 @@ fn all_vectors_pass() {
         eprintln!("{error}");
     }
     for topic in &report.topics {
-        println!("{}/{}: {} passed, {} failed", topic.protocol, topic.topic, topic.passed, topic.failures.len());
+        println!("{topic}");
         for failure in &topic.failures {
             eprintln!("{failure}");
         }

@@ -13,7 +13,8 @@
 
 mod hex;
 mod protocols;
+mod pru;
 mod row;
 mod runner;
 
-pub use runner::{Failure, Report, RunError, Topic, run_all, run_protocol};
+pub use runner::{Failure, Pending, Report, RunError, Topic, run_all, run_protocol};

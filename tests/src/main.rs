@@ -27,7 +27,7 @@ fn main() -> ExitCode {
         None => conformance::run_all(&arguments.dir),
     };
     for topic in &report.topics {
-        println!("{}/{}: {} passed, {} failed", topic.protocol, topic.topic, topic.passed, topic.failures.len());
+        println!("{topic}");
         for failure in topic.failures.iter().take(arguments.show) {
             println!("    {failure}");
         }

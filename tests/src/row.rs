@@ -10,7 +10,7 @@ use serde_json::{Map, Value};
 pub(crate) struct Row {
     /// Line in the file, from 1.
     pub(crate) line: usize,
-    /// The row's own name.
+    /// The row's own name; empty if it has none.
     pub(crate) name: String,
     /// All other keys.
     pub(crate) keys: Map<String, Value>,

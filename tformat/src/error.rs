@@ -175,6 +175,28 @@ impl ErrorClass {
         Self::UpperBits,
         Self::Combinator,
     ];
+
+    /// The name in lower case, as logs and test vectors spell it.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::StartBit => "start_bit",
+            Self::Delimiter => "delimiter",
+            Self::Truncated => "truncated",
+            Self::SinkCode => "sink_code",
+            Self::Parity => "parity",
+            Self::UnknownDataId => "unknown_data_id",
+            Self::CfMismatch => "cf_mismatch",
+            Self::Rejected => "rejected",
+            Self::Crc => "crc",
+            Self::AddressMismatch => "address_mismatch",
+            Self::DataMismatch => "data_mismatch",
+            Self::EchoMismatch => "echo_mismatch",
+            Self::NoResponse => "no_response",
+            Self::Busy => "busy",
+            Self::UpperBits => "upper_bits",
+            Self::Combinator => "combinator",
+        }
+    }
 }
 
 impl Error {

@@ -274,25 +274,9 @@ fn other_data_id(request: Request, line: Window) -> Option<(DataId, Response)> {
     let cf = Frame::from_line(line, 1).ok()?;
     let answered = ControlField::parse(*cf.as_bytes().first()?).ok()?.data_id().ok()?;
     let frame = Frame::from_line(line, answered.response_fields()).ok()?;
-    let asked = as_asked(answered, frame.as_bytes())?;
+    let asked = Request::answered_by(frame.as_bytes()).ok()?;
     let response = Response::parse(asked, frame.as_bytes()).ok()?;
     (answered != request.data_id()).then_some((answered, response))
-}
-
-/// A request that the answer would fit.
-fn as_asked(id: DataId, answer: &[u8]) -> Option<Request> {
-    let adf = crate::Adf::new(answer.get(1)? & 0x7f);
-    Some(match id {
-        DataId::Id0 => Request::Id0,
-        DataId::Id1 => Request::Id1,
-        DataId::Id2 => Request::Id2,
-        DataId::Id3 => Request::Id3,
-        DataId::Id6 => Request::Id6 { adf, edf: *answer.get(2)? },
-        DataId::Id7 => Request::Id7,
-        DataId::Id8 => Request::Id8,
-        DataId::IdC => Request::IdC,
-        DataId::IdD => Request::IdD { adf },
-    })
 }
 
 fn raw_fields(line: Window, want: u8) -> ([RawField; Frame::MAX_FIELDS], u8) {

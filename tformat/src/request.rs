@@ -132,6 +132,30 @@ impl Request {
         Self::Id6 { adf: Adf::of(address, false), edf }
     }
 
+    /// A request that an answer would fit, from the answer itself: for tools that did not see the request.
+    ///
+    /// An EEPROM answer repeats address and data; fields that are missing count as 0.
+    ///
+    /// # Errors
+    /// Those of the control field: [`Error::Truncated`] without any field, [`Error::SinkCode`], [`Error::Parity`],
+    /// [`Error::UnknownDataId`].
+    pub fn answered_by(answer: &[u8]) -> Result<Self, Error> {
+        let Some(&cf) = answer.first() else { return Err(Error::Truncated { got: 0, want: 1 }) };
+        let field = |at: usize| answer.get(at).copied().unwrap_or(0);
+        let adf = Adf::of(Adf(field(1)).address(), false);
+        Ok(match ControlField::parse(cf)?.data_id()? {
+            DataId::Id0 => Self::Id0,
+            DataId::Id1 => Self::Id1,
+            DataId::Id2 => Self::Id2,
+            DataId::Id3 => Self::Id3,
+            DataId::Id6 => Self::Id6 { adf, edf: field(2) },
+            DataId::Id7 => Self::Id7,
+            DataId::Id8 => Self::Id8,
+            DataId::IdC => Self::IdC,
+            DataId::IdD => Self::IdD { adf },
+        })
+    }
+
     /// The data ID.
     pub const fn data_id(self) -> DataId {
         match self {

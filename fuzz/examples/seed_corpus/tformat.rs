@@ -11,6 +11,9 @@ pub(crate) const SOURCES: &[Source] = &[
     ("tformat_differential", "tformat/responses.jsonl", line),
     ("tformat_differential", "tformat/negatives.jsonl", line),
     ("tformat_stream", "tformat/responses.jsonl", stream),
+    ("tformat_master", "tformat/uart_echo.jsonl", transaction),
+    ("tformat_device", "tformat/procedures.jsonl", procedure),
+    ("tformat_inspect", "tformat/negatives.jsonl", inspected),
 ];
 
 fn request(row: &Value) -> Option<Vec<u8>> {
@@ -47,4 +50,30 @@ fn line(row: &Value) -> Option<Vec<u8>> {
 /// The answer twice, three bytes at a time.
 fn stream(row: &Value) -> Option<Vec<u8>> {
     answer(row, 2, &hex(row["bytes"].as_str()?).repeat(2))
+}
+
+/// With echo at 2.5 Mbit/s, a byte every ten bits.
+fn transaction(row: &Value) -> Option<Vec<u8>> {
+    let request = hex(row["request"].as_str()?);
+    let kind =
+        [0x02, 0x8a, 0x92, 0x1a, 0x32, 0xba, 0xc2, 0x62, 0xea].iter().position(|cf| Some(cf) == request.first())?;
+    let mut input = vec![kind as u8, *request.get(1).unwrap_or(&0), *request.get(2).unwrap_or(&0), 1];
+    for byte in hex(row["rx"].as_str()?) {
+        input.extend([10 << 2 | 2, byte]);
+    }
+    Some(input)
+}
+
+/// The procedure, address, data, page 2 and 40 tries; the third answer is damaged.
+fn procedure(row: &Value) -> Option<Vec<u8>> {
+    let request = hex(row["request"].as_str()?);
+    let kind = [0xba, 0x62, 0xc2, 0x32, 0xea].iter().position(|cf| Some(cf) == request.first())?;
+    let field = |at: usize| request.get(at).copied().unwrap_or(0);
+    Some(vec![kind as u8, field(1), field(2), 2, 40, 0, 0, 0, 0, 0x60, 21])
+}
+
+/// The line, whole.
+fn inspected(row: &Value) -> Option<Vec<u8>> {
+    let bits = row["wire"].as_str()?.len();
+    answer(row, u8::try_from(bits).ok()?, &wire(row)?)
 }

@@ -156,7 +156,7 @@ impl Decoder {
         let longer = |id: DataId| frame.fields > usize::from(id.request_fields());
         // More fields than any request has are an answer whatever they hold.
         if asked.map_or(frame.fields > 4, longer) {
-            let result = match (frame.broken, alone(frame)) {
+            let result = match (frame.broken, Request::answered_by(frame.bytes())) {
                 (Some(field), _) => Err(Error::Delimiter { field }),
                 (None, Ok(request)) => Response::parse(request, frame.bytes()),
                 (None, Err(error)) => Err(error),
@@ -260,7 +260,7 @@ impl StartStop for Decoder {
             let request = self.pending.is_none()
                 && self.open.data_id().is_ok_and(|id| self.open.fields == usize::from(id.request_fields()));
             if recent && !request {
-                return out.event(&describe::cut(self.open.place(), "the capture ends inside a frame"));
+                return out.event(&describe::cut_off(self.open.place()));
             }
             self.close(out)?;
         }
@@ -269,21 +269,4 @@ impl StartStop for Decoder {
             _ => Ok(()),
         }
     }
-}
-
-/// The request that a frame would answer, from the frame itself.
-fn alone(frame: &Frame) -> Result<Request, Error> {
-    let field = |k: usize| frame.bytes().get(k).copied().unwrap_or_default();
-    let address = tformat::Adf::new(field(1) & 0x7f);
-    Ok(match frame.data_id()? {
-        DataId::Id0 => Request::Id0,
-        DataId::Id1 => Request::Id1,
-        DataId::Id2 => Request::Id2,
-        DataId::Id3 => Request::Id3,
-        DataId::Id6 => Request::Id6 { adf: address, edf: field(2) },
-        DataId::Id7 => Request::Id7,
-        DataId::Id8 => Request::Id8,
-        DataId::IdC => Request::IdC,
-        DataId::IdD => Request::IdD { adf: address },
-    })
 }

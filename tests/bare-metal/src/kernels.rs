@@ -6,7 +6,9 @@
 #[cfg(feature = "deliberate-panic")]
 mod deliberate_panic;
 mod nrz_line;
+mod step_profile;
 mod tformat;
+mod tformat_ends;
 
 /// An entry point that is measured and walked.
 pub(crate) struct Kernel {
@@ -18,7 +20,9 @@ pub(crate) struct Kernel {
 
 pub(crate) const ALL: &[&[Kernel]] = &[
     nrz_line::KERNELS,
+    step_profile::KERNELS,
     tformat::KERNELS,
+    tformat_ends::KERNELS,
     #[cfg(feature = "deliberate-panic")]
     deliberate_panic::KERNELS,
 ];

@@ -8,7 +8,7 @@ use serde::Deserialize;
 use nrz_line::{Format, Receiver};
 use tformat::device::Device;
 use tformat::master::{Reset, Step};
-use tformat::{BitRate, ControlField, DataId, Error, ErrorClass, Frame, Profile, Request, Response, U24, spi};
+use tformat::{BitRate, ControlField, DataId, Error, Frame, Profile, Request, Response, U24, spi};
 
 use crate::hex::{Bits, Bytes, Hex};
 use crate::row::{Check, Row, Verdict, each, same};
@@ -27,24 +27,9 @@ pub(crate) const TOPICS: &[(&str, Check)] = &[
     ("uart_echo", response::uart_echoes),
 ];
 
-/// The rows' name of an error.
+/// The rows' name of an error: the crate's own.
 fn class(error: Error) -> &'static str {
-    match error.class() {
-        ErrorClass::StartBit => "start_bit",
-        ErrorClass::Delimiter => "delimiter",
-        ErrorClass::Truncated => "truncated",
-        ErrorClass::SinkCode => "sink_code",
-        ErrorClass::Parity => "parity",
-        ErrorClass::UnknownDataId => "unknown_data_id",
-        ErrorClass::CfMismatch => "cf_mismatch",
-        ErrorClass::Rejected => "rejected",
-        ErrorClass::Crc => "crc",
-        ErrorClass::AddressMismatch => "address_mismatch",
-        ErrorClass::DataMismatch => "data_mismatch",
-        ErrorClass::EchoMismatch => "echo_mismatch",
-        ErrorClass::NoResponse => "no_response",
-        _ => "not in the vectors",
-    }
+    error.class().name()
 }
 
 /// The rows' name of an outcome: `ok` or the class of the error.

@@ -56,6 +56,8 @@ proptest! {
         prop_assert_eq!(Response::parse(request, frame.as_bytes()), Ok(response));
         prop_assert_eq!(Response::parse_line(request, frame.line()), Ok(response));
         prop_assert_eq!(frame.fields(), request.data_id().response_fields());
+        let fits = Request::answered_by(frame.as_bytes()).unwrap();
+        prop_assert_eq!(Response::parse(fits, frame.as_bytes()), Ok(response));
     }
 
     #[test]

@@ -2,7 +2,7 @@
 
 use std::borrow::Cow;
 
-use tformat::{Adf, Almc, DataId, Error, ErrorClass, Full, Memory, Profile, Request, Response, StatusField, U24};
+use tformat::{Adf, Almc, DataId, Error, Full, Memory, Profile, Request, Response, StatusField, U24};
 
 use super::frame::Frame;
 use super::{ANSWER_TIMEOUT, Settings};
@@ -152,6 +152,14 @@ pub(super) fn cut(place: Place, what: &str) -> Event {
     }
 }
 
+/// A piece of a frame at the end of the capture: what comes then is not known, so it is not sound.
+pub(super) fn cut_off(place: Place) -> Event {
+    let reason = "the capture ends inside a frame".to_owned();
+    let cause = Some("the file was cut off, or recording stopped there".to_owned());
+    let refusal = Refusal { class: "truncated", reason, field: None, bit: None, time: None, cause };
+    Event { fields: Vec::new(), verdict: Verdict::Refused(Box::new(refusal)), ..cut(place, "") }
+}
+
 /// No answer came to the request at `place` until `now`.
 pub(super) fn silence(request: Request, place: Place, now: i64) -> Event {
     let (place, reason) = match place {
@@ -280,7 +288,7 @@ fn verdict(frame: &Frame, names: &[&'static str], error: Option<Error>) -> Verdi
     let start = field.map(|field| frame.bytes().get(field).and(frame.starts.get(field)).copied().unwrap_or(frame.end));
     let start = start.filter(|_| frame.line.is_none());
     Verdict::Refused(Box::new(Refusal {
-        class: class(error.class()),
+        class: error.class().name(),
         reason: error.to_string(),
         field: field.and_then(|field| names.get(field)).map(|name| (*name).to_owned()),
         bit,
@@ -304,24 +312,5 @@ fn place(error: Error, frame: &Frame) -> (Option<usize>, Option<u32>) {
         Error::AddressMismatch { got, want } => (Some(1), differs(got, want)),
         Error::DataMismatch { got, want } => (Some(2), differs(got, want)),
         _ => (None, None),
-    }
-}
-
-/// Names for statistics, as in the reference vectors.
-fn class(class: ErrorClass) -> &'static str {
-    match class {
-        ErrorClass::StartBit => "start_bit",
-        ErrorClass::Delimiter => "delimiter",
-        ErrorClass::Truncated => "truncated",
-        ErrorClass::SinkCode => "sink_code",
-        ErrorClass::Parity => "parity",
-        ErrorClass::UnknownDataId => "unknown_data_id",
-        ErrorClass::CfMismatch => "cf_mismatch",
-        ErrorClass::Rejected => "rejected",
-        ErrorClass::Crc => "crc",
-        ErrorClass::AddressMismatch => "address_mismatch",
-        ErrorClass::DataMismatch => "data_mismatch",
-        ErrorClass::NoResponse => NO_RESPONSE,
-        _ => "other",
     }
 }

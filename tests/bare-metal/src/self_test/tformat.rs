@@ -26,8 +26,8 @@ pub(crate) struct FullForms {
 /// A row of `negatives.jsonl` with one wrong bit.
 pub(crate) struct Flip {
     name: &'static str,
-    request: Request,
-    line: Window,
+    pub(crate) request: Request,
+    pub(crate) line: Window,
     want: ErrorClass,
 }
 

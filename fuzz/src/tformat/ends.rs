@@ -1,0 +1,215 @@
+//! Both ends of the line, driven by any events at any time.
+
+use tformat::device::{Device, Fault};
+use tformat::inspect::{Cause, inspect as look};
+use tformat::master::{EepromAccess, Line, Page, Polling, Progress, Reset, Step, Transaction};
+use tformat::{Address, Alarm, BitRate, Error, Frame, Request, Response, U24, Window};
+
+use super::{byte, chosen};
+
+/// A transaction under any bytes, framing errors and pauses: it ends once and for all, in time, and with what
+/// `Response::parse` makes of the same bytes.
+///
+/// ```text
+/// 0..3  request      3  echo (bit 0), rate (bit 1)      4..  events: 0 poll, 1 framing error, other: a byte follows;
+///                                                            the high bits are the time since the event before
+/// ```
+pub fn master(mut data: &[u8]) {
+    let request = chosen(&mut data);
+    let options = byte(&mut data);
+    let rate = if options & 2 == 0 { BitRate::Mbit2_5 } else { BitRate::Mbit5 };
+    let line = if options & 1 == 0 { Line::new(rate) } else { Line::new(rate).with_echo() };
+    let mut transaction = Transaction::start(request, line, 0);
+    let (mut now, mut received, mut clean) = (0, Vec::new(), true);
+    while let (Progress::Waiting { until_ns }, false) = (transaction.progress(), data.is_empty()) {
+        let event = byte(&mut data);
+        now += u64::from(event >> 2) * u64::from(rate.bit_ns());
+        let in_time = now <= until_ns;
+        match event & 3 {
+            0 => _ = transaction.poll(now),
+            1 => {
+                _ = transaction.framing_error(now);
+                clean &= !in_time;
+            }
+            _ => {
+                let value = byte(&mut data);
+                _ = transaction.byte(value, now);
+                received.extend(in_time.then_some(value));
+            }
+        }
+        assert!(in_time || !matches!(transaction.progress(), Progress::Waiting { .. }));
+    }
+    let end = match transaction.progress() {
+        Progress::Waiting { until_ns } => transaction.poll(until_ns + 1),
+        end => end,
+    };
+    assert_eq!(transaction.byte(0x1a, now), end);
+    assert_eq!(transaction.poll(u64::MAX), end);
+    if clean {
+        let want = match received.as_slice() {
+            bytes if line.echo => tformat::master::parse_echoed(request, bytes),
+            [] => Err(Error::NoResponse { echo: false }),
+            bytes => Response::parse(request, bytes),
+        };
+        assert_eq!(end, want.map_or_else(Progress::Failed, Progress::Done));
+    }
+}
+
+/// A procedure of the master against an encoder on a line that loses and damages answers: it ends after a bounded number
+/// of requests, and when it says that it is done, the encoder is as it should be.
+///
+/// ```text
+/// 0  procedure      1  address      2  data      3  page      4  tries      5..  two bytes a fault, 0: none
+/// ```
+pub fn device(mut data: &[u8]) {
+    let (procedure, address, value) = (byte(&mut data), byte(&mut data), byte(&mut data));
+    let page = Page(byte(&mut data) % 8);
+    let polling = Polling { interval_ns: 1_000_000, max_tries: u16::from(byte(&mut data)) };
+    let address = Address::new(address & 0x7f).expect("seven bits");
+    let mut line = Simulated::new(data);
+    line.encoder.set_position(U24::truncate(u32::from(value) << 9), U24::truncate(7));
+    line.encoder.set_alarm(Alarm::CountingError, true);
+    line.encoder.set_alarm(Alarm::CountingError, false);
+    match procedure % 5 {
+        0 => {
+            let done = line.reset(Reset::clear_errors());
+            assert!(!done || line.encoder.almc().raw() == 0);
+        }
+        1 => _ = line.reset(Reset::clear_turns_and_errors()),
+        2 => _ = line.reset(Reset::set_single_turn_zero_and_shift_commutation_angle()),
+        3 => {
+            let written = line.access(EepromAccess::write(Some(page), address, value, polling), polling);
+            // The encoder has six pages and keeps the one it has when another is named.
+            if written.is_ok() && address != Address::PAGE_REGISTER && line.encoder.page() == page.0 {
+                let cells = line.encoder.eeprom_mut()[usize::from(page.0)];
+                assert_eq!(cells[usize::from(address.get())], value);
+            }
+        }
+        _ => _ = line.access(EepromAccess::read(None, address, polling), polling),
+    }
+}
+
+/// An encoder, and the faults of its answers.
+struct Simulated<'a> {
+    encoder: Device<6>,
+    faults: &'a [u8],
+    now_ns: u64,
+    requests: u32,
+}
+
+impl<'a> Simulated<'a> {
+    fn new(faults: &'a [u8]) -> Self {
+        Self { encoder: Device::new(0x17, BitRate::Mbit2_5), faults, now_ns: 1_000_000, requests: 0 }
+    }
+
+    /// Whether the reset came to its end.
+    fn reset(&mut self, mut reset: Reset) -> bool {
+        let mut step = reset.start(self.now_ns);
+        while let Step::Send { request, not_before_ns } = step {
+            assert_eq!(request.data_id(), reset.data_id());
+            let outcome = self.transact(request, not_before_ns);
+            step = reset.answer(outcome, self.now_ns);
+            assert!(self.requests <= u32::from(Reset::MAX_REFUSED) * u32::from(Reset::REQUESTS));
+        }
+        matches!(step, Step::Done { .. })
+    }
+
+    /// The byte that was read or written.
+    fn access(&mut self, mut access: EepromAccess, polling: Polling) -> Result<u8, Error> {
+        let mut step = access.start(self.now_ns);
+        loop {
+            match step {
+                Step::Send { request, not_before_ns } => {
+                    let outcome = self.transact(request, not_before_ns);
+                    step = access.answer(outcome, self.now_ns);
+                    // Three phases, each with its own tries.
+                    assert!(self.requests <= 3 * u32::from(polling.max_tries.max(1)));
+                }
+                Step::Done { value, .. } => return Ok(value),
+                Step::Failed { error, .. } => return Err(error),
+            }
+        }
+    }
+
+    /// One request over the line, bit by bit, and its answer byte by byte.
+    fn transact(&mut self, request: Request, not_before_ns: u64) -> Result<Response, Error> {
+        assert!(not_before_ns >= self.now_ns);
+        self.now_ns = not_before_ns + 100_000;
+        self.requests += 1;
+        self.encoder.set_fault(match (byte(&mut self.faults), byte(&mut self.faults)) {
+            (0x40..=0x5f, _) => Fault::Silent,
+            (0x60..=0x8f, at) => Fault::FlipBit { at: at % 128 },
+            (0x90..=0xaf, fields) => Fault::CutAfter { fields: fields % 12 },
+            (0xb0..=0xdf, _) => Fault::BadCrc,
+            (0xe0..=0xff, _) => Fault::RejectAll,
+            _ => Fault::None,
+        });
+        let mut transaction = Transaction::start(request, Line::new(BitRate::Mbit2_5), self.now_ns);
+        let sent = transaction.frame().line();
+        let mut reply = None;
+        for level in (0..sent.len()).filter_map(|at| sent.get(at)) {
+            self.now_ns += 400;
+            reply = reply.or(self.encoder.bit(level, self.now_ns));
+        }
+        if let Some(reply) = reply {
+            assert!(reply.at_ns > self.now_ns);
+            self.now_ns = reply.at_ns;
+            self.receive(&mut transaction, reply.line);
+        }
+        let end = loop {
+            match transaction.progress() {
+                Progress::Waiting { until_ns } => {
+                    self.now_ns = self.now_ns.max(until_ns + 1);
+                    let _ = transaction.poll(self.now_ns);
+                }
+                Progress::Done(response) => break Ok(response),
+                Progress::Failed(error) => break Err(error),
+            }
+        };
+        assert!(end.is_err() || end.is_ok_and(|response| response.data_id() == request.data_id()));
+        end
+    }
+
+    /// What a UART makes of the line bits of an answer.
+    fn receive(&mut self, transaction: &mut Transaction, line: Window) {
+        for field in 0..line.len() / Frame::FIELD_BITS {
+            self.now_ns += 4_000;
+            let at = field * Frame::FIELD_BITS;
+            let [byte, ..] = (line.bits() >> (at + 1)).to_le_bytes();
+            let _ = match (line.get(at), line.get(at + 9)) {
+                (Some(false), Some(true)) => transaction.byte(byte, self.now_ns),
+                _ => transaction.framing_error(self.now_ns),
+            };
+        }
+    }
+}
+
+/// The tool's view of any line: it agrees with the decoder, and a cause explains a refusal and nothing else.
+///
+/// ```text
+/// 0..3  request      3  length in bits (0..=127)      4..  line bits, LSB first
+/// ```
+pub fn inspect(mut data: &[u8]) {
+    let request = chosen(&mut data);
+    let len = u32::from(byte(&mut data) & 127);
+    let mut bits = [0; 16];
+    bits.iter_mut().zip(data).for_each(|(to, from)| *to = *from);
+    let line = Window::from_bits(u128::from_le_bytes(bits), len).expect("128 bits at most");
+    let report = look(request, line);
+    match Response::parse_line(request, line) {
+        Ok(response) => {
+            assert_eq!((report.error, report.cause, report.response), (None, None, Some(response)));
+            assert!(report.findings.is_empty());
+        }
+        Err(error) => {
+            assert_eq!(report.error, Some(error));
+            assert!(report.findings.has(error.class()));
+        }
+    }
+    assert!(report.fields().len() <= usize::from(request.data_id().response_fields()));
+    if let Some(Cause::LineInverted) = report.cause {
+        assert_eq!(Response::parse_line(request, line.inverted()).ok(), report.response);
+    }
+    let _ = report.cause.map(|cause| cause.to_string());
+    let _ = tformat::inspect::inspect_bytes(request, data);
+}

@@ -1,0 +1,488 @@
+//! `servowire profile`: a move of a stepper axis, step by step.
+
+use std::error::Error;
+use std::io::{self, BufWriter, Write};
+use std::ops::Range;
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+
+use clap::{Args, ValueEnum};
+use plotters::prelude::*;
+use serde_json::json;
+use step_profile::{Arithmetic, Frequency, MoveState, Parameters, Profile, Speed, Step, Tone};
+
+/// Times of the steps of a move on a 4 us cycle.
+///
+/// The sin² ramp and the integers of the 250 kHz motion controller of TIDEP0061: for every step the cycle of its pulse
+/// and the start of the pulse in that cycle. Without an output option a summary and a table of the ramp.
+#[derive(Debug, Args)]
+pub struct Arguments {
+    /// Step frequency at full speed, as 94570 or 94.57kHz.
+    #[arg(long, value_name = "HZ", value_parser = frequency, required_unless_present = "tone")]
+    freq: Option<Frequency>,
+    /// A tone of Table 3 instead of a frequency: cis, E, fis, G, gis, A, H, cis2, D2, fis2.
+    #[arg(long, value_name = "NAME", value_parser = tone, conflicts_with = "freq")]
+    tone: Option<Tone>,
+    /// Length of the move.
+    #[arg(long, value_name = "N")]
+    steps: u32,
+    /// Steps that each of the 32 ramp entries lasts.
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    k: u32,
+    /// sync_time before the first step in ns, 0 to 3999.
+    #[arg(long, value_name = "NS", default_value_t = Parameters::INIT_SYNC)]
+    init_sync: u32,
+    /// How cycles and sync_times are computed.
+    #[arg(long, value_enum, default_value_t = Mode::Corrected)]
+    arithmetic: Mode,
+    /// A line a step, with a header.
+    #[arg(long, group = "output")]
+    csv: bool,
+    /// JSON Lines, an object a step.
+    #[arg(long, group = "output")]
+    json: bool,
+    /// Draw speed, acceleration and step time over time into this file.
+    #[arg(long, group = "output", value_name = "OUT")]
+    svg: Option<PathBuf>,
+}
+
+/// [`Arithmetic`] as the command line spells it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum Mode {
+    /// By true division.
+    Corrected,
+    /// Bit for bit as the PRU, wrap-arounds included.
+    PruExact,
+    /// By true division, fractions of a nanosecond carried on.
+    Carried,
+}
+
+impl Arguments {
+    /// Does it. 0: done; 1: cannot write; 2: the move is not possible.
+    pub(crate) fn run(&self) -> ExitCode {
+        let profile = match self.profile() {
+            Ok(profile) => profile,
+            Err(e) => {
+                eprintln!("error: {e}");
+                return ExitCode::from(2);
+            }
+        };
+        match self.write(profile, &mut BufWriter::new(io::stdout().lock())) {
+            Ok(()) => ExitCode::SUCCESS,
+            // The reader has seen enough.
+            Err(e) if is_broken_pipe(e.as_ref()) => ExitCode::SUCCESS,
+            Err(e) => {
+                eprintln!("error: cannot write: {e}");
+                ExitCode::FAILURE
+            }
+        }
+    }
+
+    fn profile(&self) -> Result<Profile<'static>, step_profile::Error> {
+        let speed = match (self.tone, self.freq) {
+            (Some(tone), _) => tone.speed(),
+            (None, frequency) => Speed::from_frequency(frequency.unwrap_or(Frequency::from_hz(0)))?,
+        };
+        let arithmetic = match self.arithmetic {
+            Mode::Corrected => Arithmetic::Corrected,
+            Mode::PruExact => Arithmetic::PruExact,
+            Mode::Carried => Arithmetic::Carried,
+        };
+        Profile::new(Parameters {
+            steps_per_entry: self.k,
+            init_sync: self.init_sync,
+            arithmetic,
+            ..Parameters::at(speed)
+        })
+    }
+
+    fn write(&self, profile: Profile<'_>, out: &mut dyn Write) -> Result<(), Box<dyn Error>> {
+        let steps = self.steps;
+        if self.csv {
+            csv(profile, steps, &mut *out)?;
+        } else if self.json {
+            for step in profile.steps(steps) {
+                serde_json::to_writer(&mut *out, &object(step))?;
+                writeln!(out)?;
+            }
+        } else {
+            summary(profile, steps, out)?;
+            match &self.svg {
+                Some(path) => draw(profile, steps, path)?,
+                None => table(profile, steps, out)?,
+            }
+        }
+        Ok(out.flush()?)
+    }
+}
+
+fn is_broken_pipe(error: &(dyn Error + 'static)) -> bool {
+    let io = error.downcast_ref::<io::Error>().map(io::Error::kind);
+    let json = error.downcast_ref::<serde_json::Error>().and_then(serde_json::Error::io_error_kind);
+    let csv = error.downcast_ref::<csv::Error>().and_then(|e| match e.kind() {
+        csv::ErrorKind::Io(e) => Some(e.kind()),
+        _ => None,
+    });
+    io.or(json).or(csv) == Some(io::ErrorKind::BrokenPipe)
+}
+
+/// Whole millihertz: finer than the speed constant anywhere in its range.
+fn frequency(text: &str) -> Result<Frequency, String> {
+    let bare = text.trim().trim_end_matches("Hz").trim_end();
+    let (digits, factor) = match bare.strip_suffix(['k', 'K']) {
+        Some(digits) => (digits.trim_end(), 1e6),
+        None => (bare, 1e3),
+    };
+    let millihertz = digits.parse::<f64>().map_or(f64::NAN, |number| (number * factor).round());
+    if (1.0..=f64::from(u32::MAX)).contains(&millihertz) {
+        Frequency::from_ratio(millihertz as u32, 1000).ok_or_else(String::new)
+    } else {
+        Err(format!("\"{text}\" is not a step frequency, as 94570 or 94.57kHz"))
+    }
+}
+
+fn tone(text: &str) -> Result<Tone, String> {
+    Tone::from_name(text).ok_or_else(|| {
+        let names: Vec<_> = Tone::ALL.iter().map(|tone| tone.name()).collect();
+        format!("\"{text}\" is none of {}", names.join(", "))
+    })
+}
+
+fn state(state: MoveState) -> &'static str {
+    match state {
+        MoveState::Idle => "idle",
+        MoveState::RampUp => "ramp-up",
+        MoveState::Constant => "constant",
+        MoveState::RampDown => "ramp-down",
+    }
+}
+
+/// End of the step's interval, which is its pulse, in ns after the start of cycle 0.
+fn pulse_ns(step: Step) -> u64 {
+    step.cycle * u64::from(step_profile::CYCLE_NS) + u64::from(step.sync_time)
+}
+
+fn object(step: Step) -> serde_json::Value {
+    json!({
+        "step": step.index, "state": state(step.state), "entry": step.entry, "t_step_ns": step.t_step,
+        "cycle": step.cycle, "sync_time_ns": step.sync_time, "time_ns": pulse_ns(step),
+    })
+}
+
+fn csv(profile: Profile<'_>, steps: u32, out: &mut dyn Write) -> Result<(), csv::Error> {
+    let mut csv = csv::Writer::from_writer(out);
+    csv.write_record(["step", "state", "entry", "t_step_ns", "cycle", "sync_time_ns", "time_ns"])?;
+    for step in profile.steps(steps) {
+        csv.write_record([
+            step.index.to_string(),
+            state(step.state).to_owned(),
+            step.entry.to_string(),
+            step.t_step.to_string(),
+            step.cycle.to_string(),
+            step.sync_time.to_string(),
+            pulse_ns(step).to_string(),
+        ])?;
+    }
+    Ok(csv.flush()?)
+}
+
+fn summary(profile: Profile<'_>, steps: u32, out: &mut dyn Write) -> io::Result<()> {
+    let parameters = profile.parameters();
+    let full = f64::from(profile.step_time_ns(31));
+    let exact = f64::from(parameters.speed.raw()) * 1000.0 / 65536.0;
+    let (mut zero, mut late) = (0_u32, 0_u32);
+    for step in profile.steps(steps) {
+        zero += u32::from(step.sync_time == 0);
+        late += u32::from(step.sync_time > 3990);
+    }
+    let shape = profile.shape(steps);
+    let proved = if profile.pru_is_exact() { "exact" } else { "outside its proved domain (68.045 kHz and above)" };
+    writeln!(out, "speed constant  {}, a step each {exact:.3} ns ({:.3} kHz)", parameters.speed.raw(), 1e6 / exact)?;
+    match parameters.arithmetic {
+        Arithmetic::Carried => writeln!(out, "full speed      on average as asked, fractions of a ns are carried on")?,
+        _ => writeln!(out, "full speed      a step each {full} ns, {:.1} ppm fast", (exact - full) / full * 1e6)?,
+    }
+    writeln!(
+        out,
+        "move            {steps} steps in {:.6} ms: {} up, {} at full speed, {} down",
+        profile.duration_ns(steps) as f64 / 1e6,
+        shape.accelerating,
+        shape.constant,
+        shape.decelerating
+    )?;
+    writeln!(out, "PRU arithmetic  {proved}")?;
+    writeln!(out, "on the wire     {zero} pulses at sync_time 0 (sent as 1 ns), {late} above 3990 ns (sent as 3990 ns)")
+}
+
+/// Steps at the same ramp entry.
+struct Stretch {
+    first: Step,
+    last: Step,
+    /// Start of its first interval and end of its last.
+    ms: Range<f64>,
+}
+
+impl Stretch {
+    fn khz(&self) -> f64 {
+        1e6 / f64::from(self.first.t_step)
+    }
+
+    /// Numbers of its steps.
+    fn steps(&self) -> Range<f64> {
+        f64::from(self.first.index)..f64::from(self.last.index) + 1.0
+    }
+}
+
+fn stretches(profile: Profile<'_>, steps: u32) -> Vec<Stretch> {
+    let mut all: Vec<Stretch> = Vec::new();
+    let mut now = 0.0;
+    for step in profile.steps(steps) {
+        let end = now + f64::from(step.t_step) / 1e6;
+        match all.last_mut() {
+            Some(stretch) if (stretch.first.entry, stretch.first.state) == (step.entry, step.state) => {
+                stretch.last = step;
+                stretch.ms.end = end;
+            }
+            _ => all.push(Stretch { first: step, last: step, ms: now..end }),
+        }
+        now = end;
+    }
+    all
+}
+
+fn table(profile: Profile<'_>, steps: u32, out: &mut dyn Write) -> io::Result<()> {
+    writeln!(out, "\n  first    last  state      entry   t_step/ns   rate/kHz  ends in cycle  at ns        ms")?;
+    for stretch in stretches(profile, steps) {
+        let Stretch { first, last, .. } = stretch;
+        writeln!(
+            out,
+            "{:>7} {:>7}  {:<9} {:>6} {:>11} {:>10.3} {:>14} {:>6} {:>9.3}",
+            first.index,
+            last.index,
+            state(first.state),
+            first.entry,
+            first.t_step,
+            stretch.khz(),
+            last.cycle,
+            last.sync_time,
+            pulse_ns(last) as f64 / 1e6
+        )?;
+    }
+    Ok(())
+}
+
+type Points = Vec<(f64, f64)>;
+
+/// What a drawing has along: milliseconds or steps.
+type Along = fn(&Stretch) -> Range<f64>;
+
+fn speed(stretches: &[Stretch], along: Along) -> Points {
+    let level = |s: &Stretch| [(along(s).start, s.khz()), (along(s).end, s.khz())];
+    let end = stretches.last().map_or(0.0, |last| along(last).end);
+    [(0.0, 0.0)].into_iter().chain(stretches.iter().flat_map(level)).chain([(end, 0.0)]).collect()
+}
+
+fn step_time(stretches: &[Stretch], along: Along) -> Points {
+    let us = |s: &Stretch| f64::from(s.first.t_step) / 1e3;
+    stretches.iter().flat_map(|s| [(along(s).start, us(s)), (along(s).end, us(s))]).collect()
+}
+
+/// In 10³ steps/s², from the middle of a ramp entry to the middle of the next. Full speed counts as an entry at either
+/// end, and as no acceleration between them.
+fn acceleration(stretches: &[Stretch], k: u32, along: Along) -> Points {
+    // Half an entry, in the unit of `range`.
+    let half = |s: &Stretch, range: &Range<f64>| {
+        let steps = s.steps();
+        (range.end - range.start) * f64::min(1.0, f64::from(k) / (steps.end - steps.start)) / 2.0
+    };
+    let mut points = Points::new();
+    let (mut left, mut left_ms, mut khz) = (0.0, 0.0, 0.0);
+    // kHz / ms = 10⁶ steps/s²
+    let mut slope =
+        |from: f64, to: f64, rise: f64, ms: f64| points.extend([(from, rise / ms * 1e3), (to, rise / ms * 1e3)]);
+    for stretch in stretches {
+        let range = along(stretch);
+        let (half, half_ms) = (half(stretch, &range), half(stretch, &stretch.ms));
+        slope(left, range.start + half, stretch.khz() - khz, stretch.ms.start + half_ms - left_ms);
+        if stretch.first.state == MoveState::Constant {
+            slope(range.start + half, range.end - half, 0.0, 1.0);
+        }
+        (left, left_ms, khz) = (range.end - half, stretch.ms.end - half_ms, stretch.khz());
+    }
+    if let Some(last) = stretches.last() {
+        slope(left, along(last).end, -khz, last.ms.end - left_ms);
+    }
+    points
+}
+
+/// The whole move over time on the left, the ramp up over its steps on the right.
+fn draw(profile: Profile<'_>, steps: u32, path: &Path) -> Result<(), Box<dyn Error>> {
+    let stretches = stretches(profile, steps);
+    let k = profile.parameters().steps_per_entry;
+    let title = format!(
+        "{steps} steps at {:.3} kHz, {k} steps a ramp entry: {:.3} ms",
+        65_536_000.0 / f64::from(profile.parameters().speed.raw()),
+        profile.duration_ns(steps) as f64 / 1e6
+    );
+    let root = SVGBackend::new(path, (1200, 1000)).into_drawing_area();
+    root.fill(&WHITE)?;
+    let (left, right) = root.titled(&title, ("sans-serif", 22))?.split_horizontally(640);
+    let end = stretches.last().map_or(1.0, |last| last.ms.end);
+    let up = f64::from(profile.shape(steps).accelerating.max(1)) * 1.05;
+    let sides: [(_, Along, _, _); 2] = [
+        (left, |stretch| stretch.ms.clone(), end, "time [ms]"),
+        (right, Stretch::steps, f64::min(up, f64::from(steps.max(1))), "ramp up [steps]"),
+    ];
+    for (side, along, until, x) in sides {
+        let areas = side.split_evenly((3, 1));
+        let [top, middle, bottom] = areas.as_slice() else { continue };
+        plot(top, (x, "speed [kHz]"), speed(&stretches, along), until, false)?;
+        plot(middle, (x, "acceleration [10³ steps/s²]"), acceleration(&stretches, k, along), until, false)?;
+        plot(bottom, (x, "step time [µs]"), step_time(&stretches, along), until, true)?;
+    }
+    Ok(root.present()?)
+}
+
+type Area<'a> = DrawingArea<SVGBackend<'a>, plotters::coord::Shift>;
+
+/// `points` up to `until`.
+fn plot(
+    area: &Area<'_>,
+    (x, y): (&str, &str),
+    mut points: Points,
+    until: f64,
+    logarithmic: bool,
+) -> Result<(), Box<dyn Error>> {
+    points.retain(|(at, _)| *at <= until);
+    if let Some((_, value)) = points.last().copied() {
+        points.push((until, value));
+    }
+    let values = || points.iter().map(|(_, value)| *value);
+    let (low, high) = (values().fold(f64::MAX, f64::min), values().fold(1e-3, f64::max));
+    let mut chart = ChartBuilder::on(area);
+    chart.margin(12).x_label_area_size(38).y_label_area_size(76);
+    let line = LineSeries::new(points, BLUE.stroke_width(2));
+    // The two kinds of axes are of different types, so the few calls are there twice.
+    if logarithmic {
+        let mut chart = chart.build_cartesian_2d(0.0..until, (low.min(high) * 0.8..high * 1.25).log_scale())?;
+        chart.configure_mesh().max_light_lines(0).x_desc(x).y_desc(y).label_style(("sans-serif", 13)).draw()?;
+        chart.draw_series(line)?;
+    } else {
+        let mut chart = chart.build_cartesian_2d(0.0..until, low.min(0.0) * 1.08..high * 1.08)?;
+        chart.configure_mesh().max_light_lines(0).x_desc(x).y_desc(y).label_style(("sans-serif", 13)).draw()?;
+        chart.draw_series(line)?;
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use clap::Parser;
+
+    #[derive(Parser)]
+    struct Line {
+        #[command(flatten)]
+        arguments: Arguments,
+    }
+
+    fn arguments(line: &str) -> Arguments {
+        Line::try_parse_from(line.split(' ')).unwrap().arguments
+    }
+
+    fn output(line: &str) -> String {
+        let arguments = arguments(line);
+        let mut out = Vec::new();
+        arguments.write(arguments.profile().unwrap(), &mut out).unwrap();
+        String::from_utf8(out).unwrap()
+    }
+
+    #[test]
+    fn frequencies() {
+        for (text, want) in
+            [("94.57kHz", 94_570_000), ("250k", 250_000_000), ("112935.83", 112_935_830), ("1 Hz", 1000)]
+        {
+            assert_eq!(frequency(text), Ok(Frequency::from_ratio(want, 1000).unwrap()), "{text}");
+        }
+        for text in ["", "k", "fast", "-1", "0", "5MHz", "5e9", "NaN", "inf"] {
+            assert!(frequency(text).is_err(), "{text}");
+        }
+    }
+
+    /// A tone of Table 3 whose steps are known from the PRU.
+    #[test]
+    fn csv_and_json_of_a_tone() {
+        let line = "profile --tone cis --steps 8781 --init-sync 0 --arithmetic pru-exact";
+        let csv = output(&format!("{line} --csv"));
+        let rows: Vec<_> = csv.lines().collect();
+        assert_eq!(rows[0], "step,state,entry,t_step_ns,cycle,sync_time_ns,time_ns");
+        assert_eq!(rows[2], "1,ramp-up,1,1481648,1848,1963,7393963");
+        assert_eq!(rows[8781], "8780,ramp-down,0,5912315,35880,2362,143522362");
+        let json = output(&format!("{line} --json"));
+        let second: serde_json::Value = serde_json::from_str(json.lines().nth(1).unwrap()).unwrap();
+        assert_eq!(
+            (&second["cycle"], &second["sync_time_ns"], &second["state"]),
+            (&json!(1848), &json!(1963), &json!("ramp-up"))
+        );
+        assert_eq!(json.lines().count(), 8781);
+    }
+
+    #[test]
+    fn the_summary_shows_the_trap_of_phase_0() {
+        let text = output("profile --freq 250kHz --steps 51200 --init-sync 0");
+        assert!(text.contains("51200 steps in 210.008000 ms: 32 up, 51136 at full speed, 32 down"), "{text}");
+        assert!(text.contains("51140 pulses at sync_time 0"), "{text}");
+        assert_eq!(text.lines().count(), 5 + 2 + 65);
+        assert!(output("profile --freq 20k --steps 5").contains("outside its proved domain"));
+        assert!(output("profile --freq 20k --steps 5 --arithmetic carried").contains("on average as asked"));
+        assert!(output("profile --freq 20k --steps 0").contains("0 steps in 0.000000 ms"));
+    }
+
+    #[test]
+    fn every_move_can_be_drawn() {
+        let dir = tempfile::tempdir().unwrap();
+        for (name, line) in [
+            ("long", "--freq 94.57kHz --steps 23642 --k 20"),
+            ("one", "--freq 100 --steps 1"),
+            ("none", "--freq 1k --steps 0"),
+        ] {
+            let path = dir.path().join(name);
+            output(&format!("profile {line} --svg {}", path.display()));
+            let svg = std::fs::read_to_string(path).unwrap();
+            assert!(svg.starts_with("<svg") && svg.trim_end().ends_with("</svg>"), "{name}");
+            assert!(!svg.contains("NaN") && !svg.contains("inf"), "{name}");
+            for text in ["speed [kHz]", "acceleration", "step time", "ramp up"] {
+                assert!(svg.contains(text), "{name}: {text}");
+            }
+        }
+    }
+
+    /// The area under the acceleration is the speed: nothing in between, as much down as up.
+    #[test]
+    fn accelerations_add_up() {
+        let profile = arguments("profile --freq 94.57kHz --steps 9000 --k 20").profile().unwrap();
+        let stretches = stretches(profile, 9000);
+        let area = |points: &[(f64, f64)]| points.windows(2).map(|w| (w[1].0 - w[0].0) * w[0].1 / 1e3).sum::<f64>();
+        let points = acceleration(&stretches, 20, |stretch| stretch.ms.clone());
+        let up: Points = points.iter().copied().take_while(|p| p.1 >= 0.0).collect();
+        assert!((area(&up) - 94.57).abs() < 0.1, "{}", area(&up));
+        assert!(area(&points).abs() < 1e-6, "{}", area(&points));
+    }
+
+    #[test]
+    fn refusals() {
+        assert!(Line::try_parse_from(["profile", "--steps", "5"]).is_err());
+        assert!(Line::try_parse_from(["profile", "--steps", "5", "--tone", "h"]).is_err());
+        assert!(Line::try_parse_from("profile --freq 1k --steps 5 --csv --json".split(' ')).is_err());
+        for (line, want) in [
+            ("--freq 250001 --steps 5", "above 250 kHz"),
+            ("--freq 96 --steps 5", "longer than 2^32 ns"),
+            ("--freq 10 --steps 5", "below 15.26 Hz"),
+            ("--freq 1k --steps 5 --k 0", "at least 1"),
+            ("--freq 1k --steps 5 --init-sync 4000", "at most 3999"),
+        ] {
+            let error = arguments(&format!("profile {line}")).profile().unwrap_err().to_string();
+            assert!(error.contains(want), "{line}: {error}");
+        }
+    }
+}

@@ -1,0 +1,260 @@
+use crate::{Error, MoveState, Profile, Steps};
+
+/// The DIR signal of a stepper driver.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "arbitrary", derive(arbitrary::Arbitrary))]
+pub enum Direction {
+    /// DIR = 0; positions count upwards.
+    #[default]
+    Forward,
+    /// DIR = 1; positions count downwards.
+    Reverse,
+}
+
+impl Direction {
+    /// The level of DIR: bit 15 of the PTO word (TIDEP0061, section 2.4.2).
+    pub const fn dir(self) -> bool {
+        matches!(self, Self::Reverse)
+    }
+
+    /// The direction of a level of DIR.
+    pub const fn from_dir(dir: bool) -> Self {
+        if dir { Self::Reverse } else { Self::Forward }
+    }
+
+    /// `position` one step on.
+    pub(crate) const fn advance(self, position: i64) -> i64 {
+        match self {
+            Self::Forward => position.wrapping_add(1),
+            Self::Reverse => position.wrapping_sub(1),
+        }
+    }
+}
+
+/// What a motor is told in one cycle: all that a PTO word says.
+///
+/// | command | PTO word (TIDEP0061, section 2.4.2) |
+/// |---|---|
+/// | `Disable` | 0x7FFF |
+/// | `Hold` | 0x0000, with DIR in bit 15 |
+/// | `Pulse` | start time 1..=3990 ns, with DIR in bit 15 |
+///
+/// The word itself is made by the crate that speaks the wire. It has to send sync_time 0 as 1 and 3991..=3999 as
+/// 3990: 0 would be read as "no pulse", a lost step.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "arbitrary", derive(arbitrary::Arbitrary))]
+pub enum Command {
+    /// Switch the motor current off.
+    Disable,
+    /// No pulse in this cycle; DIR is held.
+    Hold {
+        /// DIR.
+        direction: Direction,
+    },
+    /// A pulse in this cycle.
+    Pulse {
+        /// DIR.
+        direction: Direction,
+        /// Start of the pulse in its cycle in ns, 0..=3999; see [`Step::sync_time`](crate::Step::sync_time).
+        sync_time: u32,
+    },
+}
+
+/// One axis, driven by a call each cycle.
+///
+/// ```
+/// use step_profile::{Axis, Command, Direction, Parameters, Profile, Speed};
+/// let profile = Profile::new(Parameters::at(Speed::KHZ_250))?;
+/// let mut axis = Axis::new();
+/// axis.start(profile, 3, Direction::Reverse)?;
+/// let pulses = (0..1000).filter(|_| matches!(axis.tick(), Command::Pulse { .. })).count();
+/// assert_eq!((pulses, axis.position()), (3, -3));
+/// # Ok::<_, step_profile::Error>(())
+/// ```
+#[derive(Debug, Clone, Default)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Axis<'t> {
+    /// The move; the last step taken of it is the one whose pulse comes next.
+    steps: Option<Steps<'t>>,
+    /// Cycles before the cycle of that pulse.
+    wait: u32,
+    direction: Direction,
+    position: i64,
+}
+
+impl<'t> Axis<'t> {
+    /// An axis at rest at position 0, DIR = 0.
+    pub const fn new() -> Self {
+        Self { steps: None, wait: 0, direction: Direction::Forward, position: 0 }
+    }
+
+    /// Starts a move of `steps` steps. The next [`tick`](Self::tick) is cycle 0 of the move.
+    ///
+    /// A move of 0 steps does nothing, not even to DIR.
+    ///
+    /// # Errors
+    /// [`Error::Moving`] while a move is under way.
+    pub fn start(&mut self, profile: Profile<'t>, steps: u32, direction: Direction) -> Result<(), Error> {
+        if self.steps.is_some() {
+            return Err(Error::Moving);
+        }
+        let mut steps = profile.steps(steps);
+        if let Some(first) = steps.advance() {
+            self.wait = first.cnt;
+            self.direction = direction;
+            self.steps = Some(steps);
+        }
+        Ok(())
+    }
+
+    /// The next cycle: at most one pulse.
+    #[inline]
+    pub fn tick(&mut self) -> Command {
+        let direction = self.direction;
+        let Some(steps) = &mut self.steps else { return Command::Hold { direction } };
+        if let Some(wait) = self.wait.checked_sub(1) {
+            self.wait = wait;
+            return Command::Hold { direction };
+        }
+        let sync_time = steps.sync_time();
+        match steps.advance() {
+            // The tick that follows is one cycle on.
+            Some(next) => self.wait = next.cnt.saturating_sub(1),
+            None => self.steps = None,
+        }
+        self.position = direction.advance(self.position);
+        Command::Pulse { direction, sync_time }
+    }
+
+    /// Gives up the move, with the ramp down.
+    ///
+    /// The step whose interval has begun keeps its time, since the motor may be anywhere in it; the steps after it
+    /// slow down ([`Steps::abort`]). Before the first pulse nothing has moved, and the move ends at once.
+    pub fn abort(&mut self) {
+        match &mut self.steps {
+            Some(steps) if steps.taken() > 1 => steps.abort(),
+            _ => self.steps = None,
+        }
+    }
+
+    /// What the axis is doing: the state of the step under way.
+    pub fn state(&self) -> MoveState {
+        self.steps.as_ref().map_or(MoveState::Idle, Steps::state)
+    }
+
+    /// DIR, as held since the last move began.
+    pub const fn direction(&self) -> Direction {
+        self.direction
+    }
+
+    /// Steps made forward less steps made in reverse.
+    pub const fn position(&self) -> i64 {
+        self.position
+    }
+
+    /// Declares the present position to be `position`, a reference for instance.
+    pub fn set_position(&mut self, position: i64) {
+        self.position = position;
+    }
+}
+
+/// Four independent axes, one a motor (TIDEP0061, section 2.3.2: four times the calculation of one).
+#[derive(Debug, Clone, Default)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Axes<'t>(pub [Axis<'t>; 4]);
+
+impl Axes<'_> {
+    /// The next cycle of all four.
+    #[inline]
+    pub fn tick(&mut self) -> [Command; 4] {
+        self.0.each_mut().map(Axis::tick)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{Parameters, Speed};
+    use proptest::prelude::*;
+    use std::vec::Vec;
+
+    fn profile(speed: u32, steps_per_entry: u32, init_sync: u32) -> Profile<'static> {
+        let at = Parameters::at(Speed::from_raw(speed));
+        Profile::new(Parameters { steps_per_entry, init_sync, ..at }).unwrap()
+    }
+
+    /// Cycle and sync_time of all pulses in the next `cycles` cycles.
+    fn pulses(axis: &mut Axis<'_>, cycles: u64) -> Vec<(u64, u32)> {
+        let pulse = |cycle| match axis.tick() {
+            Command::Pulse { sync_time, .. } => Some((cycle, sync_time)),
+            _ => None,
+        };
+        (0..cycles).filter_map(pulse).collect()
+    }
+
+    proptest! {
+        #[test]
+        fn ticks_are_the_steps_in_time(speed in 262_144..1_000_000_u32, k in 1..4_u32, init in 0..4000_u32, n in 0..300_u32) {
+            let profile = profile(speed, k, init);
+            let steps: Vec<_> = profile.steps(n).map(|s| (s.cycle, s.sync_time)).collect();
+            let end = steps.last().map_or(5, |last| last.0 + 5);
+            let mut axis = Axis::new();
+            axis.start(profile, n, Direction::Forward).unwrap();
+            prop_assert_eq!(pulses(&mut axis, end), steps);
+            prop_assert_eq!((axis.position(), axis.state()), (i64::from(n), MoveState::Idle));
+        }
+
+        /// Every move that is given up ends at standstill, within the steps it had.
+        #[test]
+        fn abort_in_any_cycle(n in 1..200_u32, k in 1..3_u32, at in 0..3000_u64) {
+            let profile = profile(262_144, k, 1000);
+            let mut axis = Axis::new();
+            axis.start(profile, n, Direction::Forward).unwrap();
+            let before = pulses(&mut axis, at).len();
+            axis.abort();
+            let after = pulses(&mut axis, 10_000).len();
+            prop_assert_eq!(axis.state(), MoveState::Idle);
+            prop_assert!(before + after <= n as usize);
+            prop_assert!(before > 0 || after == 0);
+            prop_assert_eq!(axis.position(), i64::try_from(before + after).unwrap());
+        }
+    }
+
+    #[test]
+    fn dir_is_held_and_a_refused_start_changes_nothing() {
+        let profile = profile(262_144, 1, 1000);
+        let mut axis = Axis::new();
+        axis.set_position(10);
+        axis.start(profile, 3, Direction::Reverse).unwrap();
+        for _ in 0..500 {
+            assert_eq!(axis.start(profile, 9, Direction::Forward), Err(Error::Moving));
+            assert!(!matches!(axis.tick(), Command::Hold { direction: Direction::Forward }));
+        }
+        assert_eq!(axis.state(), MoveState::RampUp);
+        assert_eq!(pulses(&mut axis, 1000).len(), 2);
+        assert_eq!((axis.position(), axis.direction()), (7, Direction::Reverse));
+        axis.start(profile, 0, Direction::Forward).unwrap();
+        assert_eq!(axis.tick(), Command::Hold { direction: Direction::Reverse });
+        assert_eq!(Direction::from_dir(axis.direction().dir()), Direction::Reverse);
+    }
+
+    #[test]
+    fn four_axes_at_four_speeds() {
+        let mut axes = Axes::default();
+        for (axis, speed) in axes.0.iter_mut().zip([262_144, 300_000, 400_000, 655_360]) {
+            axis.start(profile(speed, 1, 1000), 100, Direction::Forward).unwrap();
+        }
+        let mut counts = [0; 4];
+        for _ in 0..5000 {
+            for (count, command) in counts.iter_mut().zip(axes.tick()) {
+                *count += i64::from(matches!(command, Command::Pulse { .. }));
+            }
+        }
+        assert_eq!(counts, [100; 4]);
+        assert!(axes.0.iter().all(|axis| axis.position() == 100));
+    }
+}

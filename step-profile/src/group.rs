@@ -1,0 +1,205 @@
+use crate::{Axis, Command, Direction, Error, MoveState, Profile};
+
+/// Which of the four motors move.
+///
+/// The start bits of TI's `sorte_master_cfg.inc`: M1 = 1, M2 = 2, M3 = 4, M4 = 8, all = 0xF, off = 0.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(try_from = "u32", into = "u32"))]
+pub struct Motors(u8);
+
+impl Motors {
+    /// No motor: the current of all four is switched off.
+    pub const NONE: Self = Self(0);
+    /// The first device on the line.
+    pub const M1: Self = Self(1);
+    /// The second.
+    pub const M2: Self = Self(2);
+    /// The third.
+    pub const M3: Self = Self(4);
+    /// The fourth.
+    pub const M4: Self = Self(8);
+    /// All four.
+    pub const ALL: Self = Self(0xf);
+
+    /// The selection of a mask.
+    ///
+    /// # Errors
+    /// [`Error::InvalidMotorMask`] above 15.
+    pub const fn from_mask(mask: u32) -> Result<Self, Error> {
+        match mask.to_le_bytes() {
+            [low @ 0..=0xf, 0, 0, 0] => Ok(Self(low)),
+            _ => Err(Error::InvalidMotorMask { mask, limit: 0xf }),
+        }
+    }
+
+    /// The mask, 0..=15.
+    pub const fn mask(self) -> u8 {
+        self.0
+    }
+
+    /// Motor by motor whether it is selected.
+    pub const fn selected(self) -> [bool; 4] {
+        [self.0 & 1 != 0, self.0 & 2 != 0, self.0 & 4 != 0, self.0 & 8 != 0]
+    }
+
+    /// One command for all selected motors: the others hold with the same DIR, and without any selected motor all
+    /// four are switched off.
+    pub fn distribute(self, command: Command) -> [Command; 4] {
+        let idle = match command {
+            _ if self == Self::NONE => return [Command::Disable; 4],
+            Command::Disable => Command::Disable,
+            Command::Hold { direction } | Command::Pulse { direction, .. } => Command::Hold { direction },
+        };
+        self.selected().map(|selected| if selected { command } else { idle })
+    }
+}
+
+impl TryFrom<u32> for Motors {
+    type Error = Error;
+
+    fn try_from(mask: u32) -> Result<Self, Error> {
+        Self::from_mask(mask)
+    }
+}
+
+impl From<Motors> for u32 {
+    fn from(motors: Motors) -> Self {
+        motors.0.into()
+    }
+}
+
+#[cfg(feature = "arbitrary")]
+#[cfg_attr(docsrs, doc(cfg(feature = "arbitrary")))]
+impl<'a> arbitrary::Arbitrary<'a> for Motors {
+    fn arbitrary(u: &mut arbitrary::Unstructured<'a>) -> arbitrary::Result<Self> {
+        Ok(Self(u.int_in_range(0..=0xf)?))
+    }
+}
+
+/// Four motors that execute exactly the same sequence, as the firmware of TIDEP0061 does it (section 2.3.2).
+#[derive(Debug, Clone)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Group<'t> {
+    axis: Axis<'t>,
+    motors: Motors,
+    positions: [i64; 4],
+}
+
+impl<'t> Group<'t> {
+    /// The selected motors at rest, all four at position 0.
+    pub const fn new(motors: Motors) -> Self {
+        Self { axis: Axis::new(), motors, positions: [0; 4] }
+    }
+
+    /// Selects other motors.
+    ///
+    /// # Errors
+    /// [`Error::Moving`] while a move is under way: the motors would start or stop without a ramp.
+    pub fn select(&mut self, motors: Motors) -> Result<(), Error> {
+        if self.state() != MoveState::Idle {
+            return Err(Error::Moving);
+        }
+        self.motors = motors;
+        Ok(())
+    }
+
+    /// Starts a move of the selected motors.
+    ///
+    /// # Errors
+    /// [`Error::NoMotor`] if none is selected, [`Error::Moving`] while a move is under way.
+    pub fn start(&mut self, profile: Profile<'t>, steps: u32, direction: Direction) -> Result<(), Error> {
+        if self.motors == Motors::NONE {
+            return Err(Error::NoMotor);
+        }
+        self.axis.start(profile, steps, direction)
+    }
+
+    /// The next cycle: the commands of the four motors.
+    pub fn tick(&mut self) -> [Command; 4] {
+        let command = self.axis.tick();
+        if let Command::Pulse { direction, .. } = command {
+            for (position, selected) in self.positions.iter_mut().zip(self.motors.selected()) {
+                if selected {
+                    *position = direction.advance(*position);
+                }
+            }
+        }
+        self.motors.distribute(command)
+    }
+
+    /// Gives up the move, with the ramp down; see [`Axis::abort`].
+    pub fn abort(&mut self) {
+        self.axis.abort();
+    }
+
+    /// What the motors are doing.
+    pub fn state(&self) -> MoveState {
+        self.axis.state()
+    }
+
+    /// The selected motors.
+    pub const fn motors(&self) -> Motors {
+        self.motors
+    }
+
+    /// Motor by motor, steps made forward less steps made in reverse.
+    pub const fn positions(&self) -> [i64; 4] {
+        self.positions
+    }
+
+    /// Declares where the motors are, at a reference for instance.
+    pub fn set_positions(&mut self, positions: [i64; 4]) {
+        self.positions = positions;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{Parameters, Speed};
+
+    #[test]
+    fn every_mask_distributes_every_command() {
+        let direction = Direction::Reverse;
+        let hold = Command::Hold { direction };
+        for mask in 0..16 {
+            let motors = Motors::from_mask(mask).unwrap();
+            assert_eq!(u32::from(motors.mask()), mask);
+            for command in [Command::Disable, hold, Command::Pulse { direction, sync_time: 7 }] {
+                let idle = if mask == 0 || command == Command::Disable { Command::Disable } else { hold };
+                let want = [0, 1, 2, 3].map(|m| if mask >> m & 1 == 1 { command } else { idle });
+                assert_eq!(motors.distribute(command), want);
+            }
+        }
+        for mask in [16, 0x100, 0x10000, u32::MAX] {
+            assert_eq!(Motors::from_mask(mask), Err(Error::InvalidMotorMask { mask, limit: 15 }));
+        }
+    }
+
+    #[test]
+    fn only_selected_motors_count() {
+        let profile = Profile::new(Parameters::at(Speed::KHZ_250)).unwrap();
+        let mut group = Group::new(Motors::NONE);
+        assert_eq!(group.start(profile, 5, Direction::Forward), Err(Error::NoMotor));
+        assert_eq!(group.tick(), [Command::Disable; 4]);
+        group.select(Motors::from_mask(0b0101).unwrap()).unwrap();
+        group.start(profile, 5, Direction::Forward).unwrap();
+        assert_eq!(group.select(Motors::ALL), Err(Error::Moving));
+        for _ in 0..2000 {
+            group.tick();
+        }
+        group.select(Motors::M1).unwrap();
+        group.start(profile, 3, Direction::Reverse).unwrap();
+        for _ in 0..2000 {
+            group.tick();
+        }
+        assert_eq!((group.positions(), group.motors()), ([2, 0, 5, 0], Motors::M1));
+        group.set_positions([0; 4]);
+        assert_eq!(group.positions(), [0; 4]);
+        group.start(profile, 3, Direction::Reverse).unwrap();
+        group.abort();
+        assert_eq!(group.state(), MoveState::Idle);
+    }
+}

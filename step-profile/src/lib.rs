@@ -1,0 +1,35 @@
+#![doc = include_str!("../README.md")]
+#![no_std]
+#![cfg_attr(docsrs, feature(doc_cfg))]
+#![cfg_attr(test, allow(clippy::arithmetic_side_effects, clippy::cast_possible_truncation))]
+
+#[cfg(any(test, feature = "std"))]
+extern crate std;
+
+mod arithmetic;
+mod axis;
+mod dance;
+mod error;
+mod frequency;
+mod group;
+mod microstep;
+mod position;
+mod profile;
+pub mod pru_exact;
+mod ramp;
+mod runs;
+mod steps;
+mod tone;
+
+pub use arithmetic::{Arithmetic, CYCLE_NS, Interval, StepTime, corrected, step_time_ns};
+pub use axis::{Axes, Axis, Command, Direction};
+pub use dance::{Dance, Note};
+pub use error::{Error, ErrorClass};
+pub use frequency::{Frequency, Speed};
+pub use group::{Group, Motors};
+pub use microstep::{Microstep, Turn};
+pub use position::{OperatingMode, PositionMode, PositionState};
+pub use profile::{Parameters, Profile, Shape};
+pub use ramp::RampTable;
+pub use steps::{MoveState, Step, Steps};
+pub use tone::Tone;

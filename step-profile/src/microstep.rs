@@ -1,0 +1,115 @@
+use crate::Error;
+
+/// Micro-step profile of a DRV8711 with a 1.8° motor: 200 full steps a turn, 1/1 to 1/256 step.
+///
+/// TIDEP0061, section 2.1; profile codes 0..=8 of TI's `sorte_master_cfg.inc`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "arbitrary", derive(arbitrary::Arbitrary))]
+#[repr(u8)]
+pub enum Microstep {
+    /// 200 steps a turn.
+    Full = 0,
+    /// 400 steps a turn.
+    Half = 1,
+    /// 800 steps a turn.
+    Quarter = 2,
+    /// 1600 steps a turn.
+    Div8 = 3,
+    /// 3200 steps a turn.
+    Div16 = 4,
+    /// 6400 steps a turn.
+    Div32 = 5,
+    /// 12800 steps a turn.
+    Div64 = 6,
+    /// 25600 steps a turn.
+    Div128 = 7,
+    /// 51200 steps a turn. (Section 2.3.1 prints 512000, section 2.1 has it right: 200 · 256.)
+    Div256 = 8,
+}
+
+impl Microstep {
+    /// All profiles in the order of their codes.
+    pub const ALL: [Self; 9] = [
+        Self::Full,
+        Self::Half,
+        Self::Quarter,
+        Self::Div8,
+        Self::Div16,
+        Self::Div32,
+        Self::Div64,
+        Self::Div128,
+        Self::Div256,
+    ];
+
+    /// The profile of a code.
+    ///
+    /// # Errors
+    /// [`Error::InvalidMicrostep`] above 8.
+    pub fn from_code(code: u32) -> Result<Self, Error> {
+        let known = usize::try_from(code).ok().and_then(|at| Self::ALL.get(at));
+        known.copied().ok_or(Error::InvalidMicrostep { code, limit: 8 })
+    }
+
+    /// The profile code, 0..=8; also the value of MODE in the DRV8711's CTRL register.
+    pub const fn code(self) -> u8 {
+        self as u8
+    }
+
+    /// MODE in its place in the CTRL register, bits 6..3 (DRV8711 data sheet SLVSC40, CTRL register).
+    pub const fn ctrl_field(self) -> u16 {
+        (self as u16) << 3
+    }
+
+    /// Micro-steps a full step: 1, 2, 4, .. 256.
+    pub const fn microsteps(self) -> u32 {
+        1 << self as u32
+    }
+
+    /// Steps a turn: 200, 400, .. 51200.
+    pub const fn steps_per_turn(self) -> u32 {
+        200 << self as u32
+    }
+
+    /// Steps of one of the turns of position mode.
+    pub const fn steps(self, turn: Turn) -> u32 {
+        match turn {
+            Turn::Quarter => 50 << self as u32,
+            Turn::Full => self.steps_per_turn(),
+            Turn::Ten => 2000 << self as u32,
+        }
+    }
+}
+
+/// The moves of position mode in TI's `sorte_master_cfg.inc`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "arbitrary", derive(arbitrary::Arbitrary))]
+pub enum Turn {
+    /// 90°.
+    Quarter,
+    /// 360°.
+    Full,
+    /// 3600°.
+    Ten,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn codes_and_turns() {
+        for (code, profile) in (0..).zip(Microstep::ALL) {
+            assert_eq!(Microstep::from_code(code), Ok(profile));
+            assert_eq!(u32::from(profile.code()), code);
+            assert_eq!(profile.steps(Turn::Full), profile.steps(Turn::Quarter) * 4);
+            assert_eq!(profile.steps(Turn::Ten), profile.steps(Turn::Full) * 10);
+            assert_eq!(profile.steps_per_turn(), 200 * profile.microsteps());
+        }
+        assert_eq!(Microstep::Div256.steps_per_turn(), 51_200);
+        assert_eq!(Microstep::from_code(9), Err(Error::InvalidMicrostep { code: 9, limit: 8 }));
+    }
+}

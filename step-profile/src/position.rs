@@ -1,0 +1,205 @@
+use crate::{Command, Direction, Error, Group, Microstep, Motors, MoveState, Profile, Turn};
+
+/// The operating modes of TI's `sorte_master_cfg.inc`.
+///
+/// TIDEP0061 describes position and dance, and so does this crate; the others are numbers alone.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[repr(u8)]
+pub enum OperatingMode {
+    /// Turns by a number of steps: [`PositionMode`].
+    Position = 0,
+    /// Not described.
+    Speed = 1,
+    /// Not described.
+    Ramp = 2,
+    /// Tones: [`Dance`](crate::Dance).
+    Dance = 3,
+    /// Not described.
+    Manual = 4,
+}
+
+impl OperatingMode {
+    /// The mode of a code.
+    ///
+    /// # Errors
+    /// [`Error::InvalidMode`] above 4.
+    pub const fn from_code(code: u32) -> Result<Self, Error> {
+        Ok(match code {
+            0 => Self::Position,
+            1 => Self::Speed,
+            2 => Self::Ramp,
+            3 => Self::Dance,
+            4 => Self::Manual,
+            _ => return Err(Error::InvalidMode { code, limit: 4 }),
+        })
+    }
+}
+
+/// The states of position mode, numbered as in TI's `sorte_master_cfg.inc`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[repr(u8)]
+pub enum PositionState {
+    /// Ready for the next turn.
+    Idle = 0,
+    /// One second of rest after a turn.
+    Wait = 1,
+    /// A quarter turn is under way.
+    QuarterTurn = 2,
+    /// A full turn is under way.
+    FullTurn = 3,
+    /// Ten turns are under way.
+    TenTurns = 4,
+}
+
+/// Position mode: the selected motors turn by a quarter, once or ten times, and rest for a second after it.
+///
+/// TIDEP0061, section 2.3.3: any single motor, all, or none, to bring the motors to a reference position by hand.
+/// The states are TI's; that the rest follows the turn is this crate's reading of them.
+#[derive(Debug, Clone)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct PositionMode<'t> {
+    group: Group<'t>,
+    microstep: Microstep,
+    turn: Option<Turn>,
+    /// Cycles of rest left.
+    rest: u32,
+}
+
+impl<'t> PositionMode<'t> {
+    /// The rest after a turn in cycles: 1 s.
+    pub const REST: u32 = 250_000;
+
+    /// The selected motors at rest.
+    pub const fn new(motors: Motors, microstep: Microstep) -> Self {
+        Self { group: Group::new(motors), microstep, turn: None, rest: 0 }
+    }
+
+    /// Selects other motors.
+    ///
+    /// # Errors
+    /// [`Error::Moving`] before the last turn and the rest after it are over.
+    pub fn select(&mut self, motors: Motors) -> Result<(), Error> {
+        if self.state() != PositionState::Idle {
+            return Err(Error::Moving);
+        }
+        self.group.select(motors)
+    }
+
+    /// Starts a turn of the selected motors.
+    ///
+    /// # Errors
+    /// [`Error::Moving`] before the last turn and the rest after it are over, [`Error::NoMotor`] if no motor is
+    /// selected.
+    pub fn start(&mut self, profile: Profile<'t>, turn: Turn, direction: Direction) -> Result<(), Error> {
+        if self.state() != PositionState::Idle {
+            return Err(Error::Moving);
+        }
+        self.group.start(profile, self.microstep.steps(turn), direction)?;
+        self.turn = Some(turn);
+        Ok(())
+    }
+
+    /// The next cycle: the commands of the four motors.
+    pub fn tick(&mut self) -> [Command; 4] {
+        self.rest = self.rest.saturating_sub(1);
+        let commands = self.group.tick();
+        if self.turn.is_some() && self.group.state() == MoveState::Idle {
+            self.turn = None;
+            self.rest = Self::REST;
+        }
+        commands
+    }
+
+    /// Gives up the turn, with the ramp down and the rest; see [`Axis::abort`](crate::Axis::abort).
+    pub fn abort(&mut self) {
+        self.group.abort();
+    }
+
+    /// What is under way.
+    pub const fn state(&self) -> PositionState {
+        match self.turn {
+            Some(Turn::Quarter) => PositionState::QuarterTurn,
+            Some(Turn::Full) => PositionState::FullTurn,
+            Some(Turn::Ten) => PositionState::TenTurns,
+            None if self.rest > 0 => PositionState::Wait,
+            None => PositionState::Idle,
+        }
+    }
+
+    /// Declares where the motors are: what a turn to the reference position is made for.
+    pub fn set_positions(&mut self, positions: [i64; 4]) {
+        self.group.set_positions(positions);
+    }
+
+    /// The motors: selection, positions, ramp state.
+    pub const fn group(&self) -> &Group<'t> {
+        &self.group
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{Parameters, Speed};
+
+    #[test]
+    fn a_quarter_turn_and_its_second_of_rest() {
+        let profile = Profile::new(Parameters::at(Speed::KHZ_250)).unwrap();
+        let mut mode = PositionMode::new(Motors::M2, Microstep::Div256);
+        mode.start(profile, Turn::Quarter, Direction::Reverse).unwrap();
+        let end = profile.steps(12_800).last().unwrap().cycle;
+        for _ in 0..end {
+            mode.tick();
+            assert_eq!(mode.state(), PositionState::QuarterTurn);
+        }
+        let [_, last, ..] = mode.tick();
+        assert!(matches!(last, Command::Pulse { .. }));
+        assert_eq!(mode.group().positions(), [0, -12_800, 0, 0]);
+        for _ in 0..PositionMode::REST {
+            assert_eq!(mode.state(), PositionState::Wait);
+            assert_eq!(mode.select(Motors::ALL), Err(Error::Moving));
+            assert_eq!(mode.start(profile, Turn::Full, Direction::Forward), Err(Error::Moving));
+            mode.tick();
+        }
+        assert_eq!(mode.state(), PositionState::Idle);
+        mode.select(Motors::NONE).unwrap();
+        assert_eq!(mode.start(profile, Turn::Full, Direction::Forward), Err(Error::NoMotor));
+        assert_eq!((mode.state(), mode.tick()), (PositionState::Idle, [Command::Disable; 4]));
+    }
+
+    #[test]
+    fn an_abort_before_the_first_pulse_rests_too() {
+        let profile = Profile::new(Parameters::at(Speed::KHZ_250)).unwrap();
+        let mut mode = PositionMode::new(Motors::ALL, Microstep::Full);
+        for (turn, state) in [(Turn::Full, PositionState::FullTurn), (Turn::Ten, PositionState::TenTurns)] {
+            mode.start(profile, turn, Direction::Forward).unwrap();
+            assert_eq!(mode.state(), state);
+            mode.abort();
+            mode.tick();
+            assert_eq!((mode.state(), mode.group().positions()), (PositionState::Wait, [0; 4]));
+            mode.set_positions([0; 4]);
+            for _ in 0..PositionMode::REST {
+                mode.tick();
+            }
+        }
+    }
+
+    #[test]
+    fn modes_by_their_numbers() {
+        let codes = [
+            OperatingMode::Position,
+            OperatingMode::Speed,
+            OperatingMode::Ramp,
+            OperatingMode::Dance,
+            OperatingMode::Manual,
+        ];
+        for (code, mode) in (0..).zip(codes) {
+            assert_eq!(OperatingMode::from_code(code), Ok(mode));
+        }
+        assert_eq!(OperatingMode::from_code(5), Err(Error::InvalidMode { code: 5, limit: 4 }));
+    }
+}

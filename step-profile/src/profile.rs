@@ -1,0 +1,220 @@
+use crate::arithmetic::{Arithmetic, CYCLE_NS, step_time_ns};
+use crate::pru_exact;
+use crate::runs::Runs;
+use crate::{Error, RampTable, Speed, Steps};
+
+/// What a speed profile is made of.
+///
+/// ```
+/// use step_profile::{Parameters, Profile, Speed};
+/// let profile = Profile::new(Parameters { steps_per_entry: 16, ..Parameters::at(Speed::KHZ_100) })?;
+/// assert_eq!(profile.steps(51_200).count(), 51_200);
+/// # Ok::<_, step_profile::Error>(())
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Parameters<'t> {
+    /// Full speed.
+    pub speed: Speed,
+    /// Steps that one ramp entry lasts (K), 1..=134217727.
+    pub steps_per_entry: u32,
+    /// sync_time before the first step, 0..=3999 ns.
+    pub init_sync: u32,
+    /// The ramp, for acceleration and deceleration alike.
+    pub table: &'t RampTable,
+    /// The arithmetic of the steps.
+    pub arithmetic: Arithmetic,
+}
+
+impl Parameters<'static> {
+    /// Default initial sync_time in ns: a pulse of 2 µs stays inside the cycle, and the time is a whole number of
+    /// 5 ns ticks. 0 would be the worst choice; see the crate's front page.
+    pub const INIT_SYNC: u32 = 1000;
+
+    /// The defaults at this speed: one step a ramp entry, initial sync_time 1000 ns, the sin² ramp, corrected
+    /// arithmetic.
+    pub const fn at(speed: Speed) -> Self {
+        Self {
+            speed,
+            steps_per_entry: 1,
+            init_sync: Self::INIT_SYNC,
+            table: RampTable::SIN2,
+            arithmetic: Arithmetic::Corrected,
+        }
+    }
+}
+
+/// How many steps of a move accelerate, keep the speed, and decelerate.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct Shape {
+    /// Steps of the ramp up.
+    pub accelerating: u32,
+    /// Steps at full speed between the ramps.
+    pub constant: u32,
+    /// Steps of the ramp down.
+    pub decelerating: u32,
+}
+
+/// Parameters that passed all checks.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Profile<'t>(Parameters<'t>);
+
+impl<'t> Profile<'t> {
+    /// Longest ramp entry in steps: 2^27 - 1, so that 32 of them fit 32 bits.
+    pub const MAX_STEPS_PER_ENTRY: u32 = (1 << 27) - 1;
+
+    /// The largest speed constant whose default ramp lies wholly in the domain in which the PRU arithmetic is proved
+    /// exact: 963131, or 68.045 kHz.
+    pub const MAX_PROVED_SPEED: Speed = Speed::from_raw(963_131);
+
+    /// Checks the parameters.
+    ///
+    /// # Errors
+    /// In this order: [`Error::ZeroSegmentLength`], [`Error::SegmentTooLong`], [`Error::StepRateTooHigh`],
+    /// [`Error::StepTimeOverflow`], [`Error::SyncTimeOutOfRange`].
+    pub const fn new(parameters: Parameters<'t>) -> Result<Self, Error> {
+        let Parameters { speed, steps_per_entry, init_sync, table, .. } = parameters;
+        if steps_per_entry == 0 {
+            return Err(Error::ZeroSegmentLength);
+        }
+        if steps_per_entry > Self::MAX_STEPS_PER_ENTRY {
+            return Err(Error::SegmentTooLong { steps_per_entry, limit: Self::MAX_STEPS_PER_ENTRY });
+        }
+        if speed.raw() < Speed::KHZ_250.raw() {
+            return Err(Error::StepRateTooHigh { speed: speed.raw(), limit: Speed::KHZ_250.raw() });
+        }
+        if let Err(limit) = fits(table.first(), speed.raw()) {
+            return Err(Error::StepTimeOverflow { speed: speed.raw(), limit });
+        }
+        if init_sync >= CYCLE_NS {
+            return Err(Error::SyncTimeOutOfRange { sync_time: init_sync, limit: 3999 });
+        }
+        Ok(Self(parameters))
+    }
+
+    /// The parameters.
+    pub const fn parameters(self) -> Parameters<'t> {
+        self.0
+    }
+
+    /// Whether no step of this profile leaves the domain in which the PRU arithmetic is proved exact, so that
+    /// [`Arithmetic::PruExact`] and [`Arithmetic::Corrected`] give the same pulses.
+    ///
+    /// With the default ramp: up to speed constant 963131, at 68.045 kHz and above.
+    pub const fn pru_is_exact(self) -> bool {
+        step_time_ns(self.0.table.first(), self.0.speed.raw()) < pru_exact::EXACT_BELOW
+    }
+
+    /// Time of a step at ramp entry `entry` (0..=31) in ns.
+    pub fn step_time_ns(self, entry: u8) -> u32 {
+        step_time_ns(self.0.table.entry(entry), self.0.speed.raw())
+    }
+
+    /// How a move of `steps` steps is divided.
+    pub const fn shape(self, steps: u32) -> Shape {
+        let ramp = self.0.steps_per_entry.saturating_mul(32);
+        let lower = steps / 2;
+        let upper = steps.saturating_sub(lower);
+        let accelerating = if ramp < upper { ramp } else { upper };
+        let decelerating = if ramp < lower { ramp } else { lower };
+        let constant = steps.saturating_sub(accelerating).saturating_sub(decelerating);
+        Shape { accelerating, constant, decelerating }
+    }
+
+    /// From the start of a move of `steps` steps to its last pulse, in ns.
+    ///
+    /// True for [`Arithmetic::PruExact`] only as long as that one is exact.
+    pub fn duration_ns(self, steps: u32) -> u64 {
+        let (mut ns, mut fractions) = (0_u64, 0_u64);
+        for run in Runs::new(steps, self.0.steps_per_entry) {
+            let time = self.0.arithmetic.interval(self.0.table.entry(run.entry), self.0.speed.raw());
+            ns = ns.saturating_add(u64::from(run.len).saturating_mul(u64::from(self.step_time_ns(run.entry))));
+            fractions = fractions.saturating_add(u64::from(run.len).saturating_mul(u64::from(time.fraction)));
+        }
+        ns.saturating_add(fractions >> 16)
+    }
+
+    /// The steps of a move of `steps` steps, from standstill to standstill.
+    pub const fn steps(self, steps: u32) -> Steps<'t> {
+        Steps::new(self, steps)
+    }
+}
+
+/// Whether the first step time, bits 47..16 of `entry * speed`, keeps all its bits; the largest speed that does.
+#[expect(clippy::cast_possible_truncation, reason = "2^48 / 1000 and less is compared, then cut to 32 bits")]
+const fn fits(entry: u32, speed: u32) -> Result<(), u32> {
+    if (entry as u64).saturating_mul(speed as u64) < 1 << 48 {
+        return Ok(());
+    }
+    match ((1_u64 << 48).saturating_sub(1)).checked_div(entry as u64) {
+        Some(limit) if limit < u32::MAX as u64 => Err(limit as u32),
+        _ => Err(u32::MAX),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    fn with(speed: u32, k: u32, init_sync: u32) -> Result<Profile<'static>, Error> {
+        let speed = Speed::from_raw(speed);
+        Profile::new(Parameters { steps_per_entry: k, init_sync, ..Parameters::at(speed) })
+    }
+
+    #[test]
+    fn limits_and_their_order() {
+        assert_eq!(with(0, 0, 4000), Err(Error::ZeroSegmentLength));
+        assert_eq!(with(0, 1 << 27, 4000), Err(Error::SegmentTooLong { steps_per_entry: 1 << 27, limit: 134_217_727 }));
+        assert_eq!(with(262_143, 1, 4000), Err(Error::StepRateTooHigh { speed: 262_143, limit: 262_144 }));
+        let slow = Error::StepTimeOverflow { speed: 677_689_576, limit: 677_689_575 };
+        assert_eq!(with(677_689_576, 1, 4000), Err(slow));
+        assert_eq!(with(677_689_575, 1, 4000), Err(Error::SyncTimeOutOfRange { sync_time: 4000, limit: 3999 }));
+        assert!(with(677_689_575, (1 << 27) - 1, 3999).is_ok());
+    }
+
+    #[test]
+    fn a_flat_table_takes_every_slow_speed_and_a_steep_one_none() {
+        let flat = RampTable::new([1000; 32]).unwrap();
+        let slowest = Parameters { table: &flat, ..Parameters::at(Speed::from_raw(u32::MAX)) };
+        assert!(Profile::new(slowest).is_ok());
+        let mut entries = [1000; 32];
+        entries[0] = u32::MAX;
+        let steep = RampTable::new(entries).unwrap();
+        let fastest = Parameters { table: &steep, ..Parameters::at(Speed::KHZ_250) };
+        assert_eq!(Profile::new(fastest), Err(Error::StepTimeOverflow { speed: 262_144, limit: 65_536 }));
+    }
+
+    #[test]
+    fn the_proved_domain_of_the_default_ramp() {
+        let last = Profile::new(Parameters::at(Profile::MAX_PROVED_SPEED)).unwrap();
+        let next = Speed::from_raw(Profile::MAX_PROVED_SPEED.raw() + 1);
+        assert!(last.pru_is_exact());
+        assert!(!Profile::new(Parameters::at(next)).unwrap().pru_is_exact());
+        assert!(Speed::from_hz(68_045).unwrap() <= Profile::MAX_PROVED_SPEED);
+        assert!(Speed::from_hz(68_044).unwrap() > Profile::MAX_PROVED_SPEED);
+    }
+
+    #[test]
+    fn durations_of_a_full_turn() {
+        let profile = with(262_144, 1, 0).unwrap();
+        assert_eq!(profile.duration_ns(51_200), 210_008_000);
+        assert_eq!(profile.shape(51_200), Shape { accelerating: 32, constant: 51_136, decelerating: 32 });
+        assert_eq!(profile.duration_ns(0), 0);
+        assert_eq!(with(262_144, 67_108_863, 0).unwrap().shape(u32::MAX).constant, 63);
+    }
+
+    proptest! {
+        #[test]
+        fn the_shape_is_the_whole_move(steps: u32, k in 1..=Profile::MAX_STEPS_PER_ENTRY) {
+            let shape = with(262_144, k, 0).unwrap().shape(steps);
+            let sum = u64::from(shape.accelerating) + u64::from(shape.constant) + u64::from(shape.decelerating);
+            prop_assert_eq!(sum, u64::from(steps));
+            prop_assert!(shape.accelerating - shape.decelerating <= 1);
+            prop_assert!(shape.accelerating <= 32 * k);
+        }
+    }
+}

@@ -1,0 +1,135 @@
+//! T-Format: master, encoder, inspection and the receive logic of the CLB design.
+
+use tformat::clb::{Outputs, SerialCrc, Tile};
+use tformat::device::{Device, Fault, Reply};
+use tformat::inspect::{Report, inspect, inspect_bytes};
+use tformat::master::{
+    Counters, EepromAccess, ErrorRate, Line, Page, Polling, Progress, Reset, Step, Transaction, parse_echoed,
+};
+use tformat::{Address, Alarm, BitRate, Error, ErrorClass, Request, Response, SingleTurn, U24, Window};
+
+use super::kernels;
+use crate::self_test::tformat::{ANSWERS, Answer, FLIPS, Flip};
+
+const LINE: Line = Line::new(BitRate::Mbit2_5);
+
+/// Request bytes as an encoder receives them: read everything, read the EEPROM, write it.
+type Sent = &'static [u8];
+const SENT: [Sent; 3] = [&[0x1a], &[0xea, 0x35, 0xdf], &[0x32, 0x7f, 0x01, 0x4c]];
+
+/// Requests and whether they come back on the line.
+type Echoed = (Request, bool, &'static [u8]);
+const ECHOED: [Echoed; 2] = [
+    (Request::Id0, false, &[0x02, 0x20, 0xb4, 0xbd, 0x1c, 0x37]),
+    (Request::Id0, true, &[0x02, 0x02, 0x20, 0xb4, 0xbd, 0x1c, 0x37]),
+];
+
+kernels! {
+    /// A transaction from its start to the last byte of the answer.
+    fn tformat_transaction((request, echo, bytes): &Echoed) -> Progress {
+        let line = if *echo { LINE.with_echo() } else { LINE };
+        let mut transaction = Transaction::start(*request, line, 0);
+        let mut now_ns = 4_000;
+        for byte in *bytes {
+            now_ns += 4_000;
+            transaction.byte(*byte, now_ns);
+        }
+        transaction.progress()
+    } over ECHOED;
+
+    /// A transaction that ends with a framing error or a time-out.
+    fn tformat_transaction_fails((request, echo, bytes): &Echoed) -> Progress {
+        let mut transaction = Transaction::start(*request, LINE, 0);
+        for byte in *bytes {
+            transaction.byte(*byte, 4_000);
+        }
+        if *echo { transaction.framing_error(8_000) } else { transaction.poll(1_000_000) }
+    } over ECHOED;
+
+    /// What a UART received since the request began.
+    fn tformat_parse_echoed((request, _, bytes): &Echoed) -> Result<Response, Error> {
+        parse_echoed(*request, bytes)
+    } over ECHOED;
+
+    /// A reset, from its start to the step after one answer.
+    fn tformat_reset(row: &Answer) -> Step<SingleTurn> {
+        let mut reset = Reset::clear_errors();
+        let first = reset.start(0);
+        match first {
+            Step::Send { .. } => reset.answer(Ok(row.want), 100_000),
+            end => end,
+        }
+    } over ANSWERS;
+
+    /// EEPROM access, from its start to the step after one answer.
+    fn tformat_eeprom(row: &Answer) -> Step<u8> {
+        let (page, address) = Page::locate(300, Page::COUNT).unwrap_or((Page(0), Address::PAGE_REGISTER));
+        let mut access = EepromAccess::write(Some(page), address, row.bytes.len() as u8, Polling::default());
+        match access.start(0) {
+            Step::Send { .. } => access.answer(Ok(row.want), 100_000),
+            end => end,
+        }
+    } over ANSWERS;
+
+    /// An outcome counted, and what that makes of the line.
+    fn tformat_counters(row: &Flip) -> (u32, u32, bool) {
+        let mut counters = Counters::new();
+        let mut rate = ErrorRate::new(100, 250);
+        let outcome = Response::parse_line(row.request, row.line);
+        counters.record(&outcome);
+        let exceeded = rate.record(&outcome);
+        (counters.of(ErrorClass::Crc), counters.errors_per_million(), exceeded)
+    } over FLIPS;
+
+    /// A new encoder with an alarm receives a request byte by byte and answers.
+    fn tformat_device_byte(sent: &Sent) -> Option<Reply> {
+        let mut encoder = Device::<1>::new(0x17, BitRate::Mbit2_5);
+        encoder.set_position(U24::truncate(0x12_3456), U24::truncate(7));
+        encoder.set_alarm(Alarm::CountingError, !sent.is_empty());
+        encoder.set_fault(Fault::FlipBit { at: sent.len() as u8 });
+        let mut now_ns = 0;
+        sent.iter().fold(None, |reply, byte| {
+            now_ns += 4_000;
+            encoder.byte(*byte, now_ns).or(reply)
+        })
+    } over SENT;
+
+    /// A new encoder receives a request bit by bit and answers.
+    fn tformat_device_bit(row: &Flip) -> Option<Reply> {
+        let mut encoder = Device::<1>::new(0x17, BitRate::Mbit2_5);
+        let mut now_ns = 0;
+        (0..row.line.len()).filter_map(|at| row.line.get(at)).fold(None, |reply, level| {
+            now_ns += 400;
+            encoder.bit(level, now_ns).or(reply)
+        })
+    } over FLIPS;
+
+    /// What is wrong with line bits.
+    fn tformat_inspect(row: &Flip) -> Report {
+        inspect(row.request, row.line)
+    } over FLIPS;
+
+    /// What is wrong with UART bytes, and which kinds of faults that are.
+    fn tformat_inspect_bytes((request, _, bytes): &Echoed) -> (Report, usize) {
+        let report = inspect_bytes(*request, bytes);
+        (report, report.findings.classes().count() + report.fields().len())
+    } over ECHOED;
+
+    /// A cycle of the tile.
+    fn tformat_clb_cycle((tile, start, response): &(Tile, bool, bool)) -> (Outputs, Tile) {
+        let mut tile = *tile;
+        (tile.cycle(*start, *response), tile)
+    } over [(Tile::new(20, 11, 110), true, true), (Tile::new(24, 11, 60), false, false)];
+
+    /// The check register over the fields of an answer.
+    fn tformat_clb_crc(row: &Answer) -> u8 {
+        let mut crc = SerialCrc::new();
+        row.bytes.iter().for_each(|byte| crc.field(*byte));
+        crc.register()
+    } over ANSWERS;
+
+    /// A line taken apart and put together again.
+    fn tformat_line_inverted(row: &Flip) -> Option<Window> {
+        row.line.inverted().skip(10)
+    } over FLIPS;
+}
