@@ -69,7 +69,7 @@ fn all(arguments: &Decode, printer: &mut dyn Printer) -> io::Result<bool> {
         bar.finish();
     }
     if arguments.files.is_empty() {
-        for (name, bytes) in bundled::CAPTURES {
+        for (name, bytes) in bundled::of(arguments.protocol) {
             let bar = Bar { bar: None };
             good &= match capture::open_embedded(name, bytes) {
                 Ok(capture) => one(arguments, name, capture, &bar, &Rc::default(), printer)?,

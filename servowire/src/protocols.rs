@@ -4,6 +4,7 @@
 //! variant of [`Protocol`], and a line in each of its methods. A start-stop protocol implements
 //! [`StartStop`](crate::line::StartStop) and is done; another kind takes the [`Capture`] itself.
 
+pub mod nikon;
 pub mod tformat;
 
 use crate::capture::Capture;
@@ -15,6 +16,8 @@ use crate::output::Output;
 pub enum Protocol {
     /// Tamagawa T-Format.
     Tformat,
+    /// Nikon A-format.
+    Nikon,
 }
 
 /// What the user said about line and protocol.
@@ -24,6 +27,8 @@ pub struct Settings {
     pub line: line::Options,
     /// About T-Format.
     pub tformat: tformat::Settings,
+    /// About A-format.
+    pub nikon: nikon::Settings,
 }
 
 impl Protocol {
@@ -31,6 +36,7 @@ impl Protocol {
     pub fn field_names(self) -> &'static [&'static str] {
         match self {
             Self::Tformat => tformat::FIELDS,
+            Self::Nikon => nikon::FIELDS,
         }
     }
 
@@ -39,6 +45,10 @@ impl Protocol {
         match self {
             Self::Tformat => {
                 let make = |bit| tformat::Decoder::new(bit, settings.tformat);
+                line::decode(file, capture, &settings.line, &make, out)
+            }
+            Self::Nikon => {
+                let make = |bit| nikon::Decoder::new(bit, settings.nikon);
                 line::decode(file, capture, &settings.line, &make, out)
             }
         }
