@@ -6,6 +6,7 @@
 #[cfg(any(test, feature = "std"))]
 extern crate std;
 
+mod abs40;
 pub mod bus;
 mod command;
 mod crc;
@@ -27,6 +28,7 @@ pub mod stream;
 mod temperature;
 mod timing;
 
+pub use abs40::Abs40;
 pub use command::{Command, Version};
 pub use crc::{Crc3, Crc8, crc3, crc8};
 pub use error::{EchoField, Error, ErrorClass};

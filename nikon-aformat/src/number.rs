@@ -79,6 +79,11 @@ impl U40 {
         self.0
     }
 
+    /// From five bytes, the lowest first.
+    pub(crate) const fn from_bytes([a, b, c, d, e]: [u8; 5]) -> Self {
+        Self(u64::from_le_bytes([a, b, c, d, e, 0, 0, 0]))
+    }
+
     /// Bits 0..=23, what ABS24 replies carry.
     #[expect(clippy::cast_possible_truncation, reason = "the low bits are meant")]
     pub const fn low24(self) -> U24 {

@@ -6,6 +6,8 @@ use std::{env, io};
 
 use serde_json::Value;
 
+#[path = "build/nikon.rs"]
+mod nikon;
 #[path = "build/step_profile.rs"]
 mod step_profile;
 #[path = "build/tformat.rs"]
@@ -14,7 +16,8 @@ mod tformat;
 /// A protocol's folder under `tests/vectors` and what makes its tables, from a reader of topics.
 type Protocol = (&'static str, fn(&dyn Fn(&str) -> Vec<Value>) -> String);
 
-const PROTOCOLS: &[Protocol] = &[("step-profile", step_profile::tables), ("tformat", tformat::tables)];
+const PROTOCOLS: &[Protocol] =
+    &[("nikon", nikon::tables), ("step-profile", step_profile::tables), ("tformat", tformat::tables)];
 
 fn main() -> io::Result<()> {
     let here = PathBuf::from(env::var_os("CARGO_MANIFEST_DIR").expect("cargo sets it"));

@@ -5,6 +5,8 @@
 
 #[cfg(feature = "deliberate-panic")]
 mod deliberate_panic;
+mod nikon;
+mod nikon_ends;
 mod nrz_line;
 mod step_profile;
 mod tformat;
@@ -19,6 +21,8 @@ pub(crate) struct Kernel {
 }
 
 pub(crate) const ALL: &[&[Kernel]] = &[
+    nikon::KERNELS,
+    nikon_ends::KERNELS,
     nrz_line::KERNELS,
     step_profile::KERNELS,
     tformat::KERNELS,

@@ -2,6 +2,7 @@
 
 use cortex_m_semihosting::hprintln;
 
+pub(crate) mod nikon;
 pub(crate) mod step_profile;
 pub(crate) mod tformat;
 
@@ -15,7 +16,7 @@ pub(crate) struct Tally {
 /// A topic's name and what runs its rows.
 pub(crate) type Topic = (&'static str, fn() -> Tally);
 
-pub(crate) const ALL: &[&[Topic]] = &[step_profile::TOPICS, tformat::TOPICS];
+pub(crate) const ALL: &[&[Topic]] = &[nikon::TOPICS, step_profile::TOPICS, tformat::TOPICS];
 
 /// Runs every row; a row that fails is named.
 fn each<T>(rows: &[T], name: impl Fn(&T) -> &str, good: impl Fn(&T) -> bool) -> Tally {
