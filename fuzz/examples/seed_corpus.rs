@@ -8,6 +8,8 @@ use std::{fs, io};
 
 use serde_json::Value;
 
+#[path = "seed_corpus/nikon.rs"]
+mod nikon;
 #[path = "seed_corpus/nrz_line.rs"]
 mod nrz_line;
 #[path = "seed_corpus/rtex.rs"]
@@ -22,7 +24,8 @@ const SEEDS: usize = 15;
 /// A target, the vector file its seeds come from, and the input that a row becomes; `None` for rows of another kind.
 type Source = (&'static str, &'static str, fn(&Value) -> Option<Vec<u8>>);
 
-const SOURCES: &[&[Source]] = &[nrz_line::SOURCES, rtex::SOURCES, step_profile::SOURCES, tformat::SOURCES];
+const SOURCES: &[&[Source]] =
+    &[nikon::SOURCES, nrz_line::SOURCES, rtex::SOURCES, step_profile::SOURCES, tformat::SOURCES];
 
 fn main() -> io::Result<()> {
     let here = Path::new(env!("CARGO_MANIFEST_DIR"));

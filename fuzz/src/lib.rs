@@ -4,6 +4,7 @@
 //! `fuzz_targets/` hands them to the fuzzer. A new target is a function in the file of its protocol, a line in
 //! [`TARGETS`], a file in `fuzz_targets/` and its `[[bin]]`, and seeds from `examples/seed_corpus.rs`.
 
+pub mod nikon;
 pub mod nrz_line;
 pub mod rtex;
 pub mod step_profile;
@@ -14,6 +15,12 @@ pub type Target = fn(&[u8]);
 
 /// All targets by name.
 pub const TARGETS: &[(&str, Target)] = &[
+    ("nikon_request", nikon::request),
+    ("nikon_reply", nikon::reply),
+    ("nikon_reception", nikon::reception),
+    ("nikon_master", nikon::master),
+    ("nikon_device", nikon::device),
+    ("nikon_inspect", nikon::inspect),
     ("nrz_receiver", nrz_line::receiver),
     ("rtex_block", rtex::block),
     ("rtex_drive", rtex::drive),

@@ -5,8 +5,8 @@ use crate::{EncoderAddress, Error, crc3};
 /// Bits of one frame on the line, in both directions: start bit 0, 16 content bits, delimiter 1.
 pub const FRAME_BITS: u32 = 18;
 
-const START: u128 = 1 | 1 << 18 | 1 << 36 | 1 << 54 | 1 << 72 | 1 << 90;
-const DELIMITER: u128 = START << 17;
+pub(crate) const START: u128 = 1 | 1 << 18 | 1 << 36 | 1 << 54 | 1 << 72 | 1 << 90;
+pub(crate) const DELIMITER: u128 = START << 17;
 const _: () = {
     let content = START * 0x1_fffe;
     assert!(

@@ -6,6 +6,7 @@
 #[cfg(any(test, feature = "std"))]
 extern crate std;
 
+mod abs40;
 pub mod bus;
 mod command;
 mod crc;
@@ -27,6 +28,7 @@ pub mod stream;
 mod temperature;
 mod timing;
 
+pub use abs40::Abs40;
 pub use command::{Command, Version};
 pub use crc::{Crc3, Crc8, crc3, crc8};
 pub use error::{EchoField, Error, ErrorClass};
@@ -34,7 +36,8 @@ pub use expected::{Echo, Expected};
 pub use frame::{FRAME_BITS, FrameCode, RequestFrame};
 pub use layout::Layout;
 pub use nrz_line::{BitOrder, Window};
-pub use number::{EncoderAddress, TooWide, U10, U17, U19, U24, U40, Unsigned, UserAddress};
+pub use nrz_line::{TooWide, Unsigned};
+pub use number::{EncoderAddress, U10, U17, U19, U24, U40, UserAddress};
 pub use profile::{Battery, Multiturn, Position, Profile, TypeWord, WidthError};
 pub use reply::Reply;
 pub use request::{Frames, Operation, Request};

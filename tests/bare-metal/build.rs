@@ -6,6 +6,8 @@ use std::{env, io};
 
 use serde_json::Value;
 
+#[path = "build/nikon.rs"]
+mod nikon;
 #[path = "build/rtex.rs"]
 mod rtex;
 #[path = "build/sorte.rs"]
@@ -19,6 +21,7 @@ mod tformat;
 type Protocol = (&'static str, fn(&dyn Fn(&str) -> Vec<Value>) -> String);
 
 const PROTOCOLS: &[Protocol] = &[
+    ("nikon", nikon::tables),
     ("rtex", rtex::tables),
     ("sorte", sorte::tables),
     ("step-profile", step_profile::tables),

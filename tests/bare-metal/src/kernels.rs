@@ -5,6 +5,8 @@
 
 #[cfg(feature = "deliberate-panic")]
 mod deliberate_panic;
+#[cfg(feature = "nikon-aformat")]
+mod nikon;
 #[cfg(feature = "nrz-line")]
 pub(crate) mod nrz_line;
 #[cfg(feature = "rtex-block")]
@@ -29,6 +31,8 @@ pub(crate) struct Kernel {
 pub(crate) const ALL: &[&[Kernel]] = &[
     #[cfg(feature = "nrz-line")]
     nrz_line::KERNELS,
+    #[cfg(feature = "nikon-aformat")]
+    nikon::KERNELS,
     #[cfg(feature = "rtex-block")]
     rtex::KERNELS,
     #[cfg(feature = "sorte-proto")]

@@ -2,6 +2,8 @@
 
 use cortex_m_semihosting::hprintln;
 
+#[cfg(feature = "nikon-aformat")]
+pub(crate) mod nikon;
 #[cfg(feature = "nrz-line")]
 mod nrz_line;
 #[cfg(feature = "rtex-block")]
@@ -26,6 +28,8 @@ pub(crate) type Topic = (&'static str, fn() -> Tally);
 pub(crate) const ALL: &[&[Topic]] = &[
     #[cfg(feature = "nrz-line")]
     nrz_line::TOPICS,
+    #[cfg(feature = "nikon-aformat")]
+    nikon::TOPICS,
     #[cfg(feature = "rtex-block")]
     rtex::TOPICS,
     #[cfg(feature = "sorte-proto")]
