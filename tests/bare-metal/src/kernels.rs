@@ -7,6 +7,8 @@
 mod deliberate_panic;
 #[cfg(feature = "nikon-aformat")]
 mod nikon;
+#[cfg(feature = "nikon-aformat")]
+mod nikon_ends;
 #[cfg(feature = "nrz-line")]
 pub(crate) mod nrz_line;
 #[cfg(feature = "rtex-block")]
@@ -33,6 +35,8 @@ pub(crate) const ALL: &[&[Kernel]] = &[
     nrz_line::KERNELS,
     #[cfg(feature = "nikon-aformat")]
     nikon::KERNELS,
+    #[cfg(feature = "nikon-aformat")]
+    nikon_ends::KERNELS,
     #[cfg(feature = "rtex-block")]
     rtex::KERNELS,
     #[cfg(feature = "sorte-proto")]
