@@ -6,6 +6,7 @@
 
 pub mod nikon;
 pub mod nrz_line;
+pub mod rtex;
 pub mod step_profile;
 pub mod tformat;
 
@@ -21,6 +22,10 @@ pub const TARGETS: &[(&str, Target)] = &[
     ("nikon_device", nikon::device),
     ("nikon_inspect", nikon::inspect),
     ("nrz_receiver", nrz_line::receiver),
+    ("rtex_block", rtex::block),
+    ("rtex_drive", rtex::drive),
+    ("rtex_log", rtex::log),
+    ("rtex_ring", rtex::ring),
     ("step_profile_step", step_profile::step),
     ("step_profile_axis", step_profile::axis),
     ("tformat_request", tformat::request),

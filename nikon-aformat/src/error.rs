@@ -308,6 +308,18 @@ impl Error {
     }
 }
 
+impl nrz_line::Classified for ErrorClass {
+    fn class_index(&self) -> usize {
+        *self as usize
+    }
+}
+
+impl nrz_line::Classified for Error {
+    fn class_index(&self) -> usize {
+        self.class().class_index()
+    }
+}
+
 impl<I> nom::error::ParseError<I> for Error {
     fn from_error_kind(_: I, _: nom::error::ErrorKind) -> Self {
         Self::Combinator

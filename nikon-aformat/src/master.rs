@@ -7,46 +7,23 @@
 //! * [`Cycle`] repeats a readout at a fixed period.
 //! * [`Counters`] and [`ErrorRate`] keep account of what was refused.
 
-mod counters;
 mod cycle;
 mod detection;
 mod eeprom;
 mod reset;
 mod transaction;
 
-pub use counters::{Counters, ErrorRate};
 pub use cycle::{Cycle, PeriodTooShort};
 pub use detection::{Detected, Detection};
 pub use eeprom::{EepromRead, Polling, Write};
+pub use nrz_line::ErrorRate;
 pub use reset::Reset;
 pub use transaction::{BusTransaction, Line, Progress, Transaction};
 
-use crate::{Error, Request};
+use crate::{Error, ErrorClass, Request};
 
 /// What a procedure of several transactions wants next.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[must_use]
-pub enum Step<T> {
-    /// Do this transaction and report its outcome.
-    Send {
-        /// What to send.
-        request: Request,
-        /// Not before this time.
-        not_before_ns: u64,
-    },
-    /// The procedure has succeeded.
-    Done {
-        /// What it was made for.
-        value: T,
-        /// The encoder is ready for other requests from this time on.
-        not_before_ns: u64,
-    },
-    /// The procedure has failed.
-    Failed {
-        /// Why.
-        error: Error,
-        /// The encoder is ready for other requests from this time on.
-        not_before_ns: u64,
-    },
-}
+pub type Step<T> = nrz_line::Step<Request, T, Error>;
+
+/// How many transactions went well, and how many failed with which [`ErrorClass`].
+pub type Counters = nrz_line::Counters<{ ErrorClass::ALL.len() }>;

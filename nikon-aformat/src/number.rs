@@ -1,10 +1,6 @@
-use crate::Error;
+use nrz_line::{TooWide, Unsigned};
 
-/// A number of `BITS` bits, at most 32: a field that is not whole bytes wide.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Default)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(try_from = "u32", into = "u32"))]
-pub struct Unsigned<const BITS: u32>(u32);
+use crate::Error;
 
 /// The 10 bits of a temperature.
 pub type U10 = Unsigned<10>;
@@ -15,50 +11,11 @@ pub type U19 = Unsigned<19>;
 /// The 24 bits of a position part or of an identification code.
 pub type U24 = Unsigned<24>;
 
-impl<const BITS: u32> Unsigned<BITS> {
-    /// The largest value, 2^BITS - 1.
-    pub const MAX: Self = Self(u32::MAX >> (32_u32.saturating_sub(BITS)));
-
-    /// `None` if `value` needs more than `BITS` bits.
-    pub const fn new(value: u32) -> Option<Self> {
-        if value > Self::MAX.0 { None } else { Some(Self(value)) }
-    }
-
-    /// The low `BITS` bits of `value`.
-    pub const fn truncate(value: u32) -> Self {
-        Self(value & Self::MAX.0)
-    }
-
-    /// The value.
-    pub const fn get(self) -> u32 {
-        self.0
-    }
-}
-
-impl<const BITS: u32> TryFrom<u32> for Unsigned<BITS> {
-    type Error = Error;
-
-    fn try_from(value: u32) -> Result<Self, Error> {
-        Self::new(value).ok_or(Error::DataRange { got: value })
-    }
-}
-
-impl<const BITS: u32> From<Unsigned<BITS>> for u32 {
-    fn from(value: Unsigned<BITS>) -> Self {
-        value.get()
-    }
-}
-
 /// The 40 bits of ABS40: single turn below, turns above.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(try_from = "u64", into = "u64"))]
 pub struct U40(u64);
-
-/// A number of more than 40 bits.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
-#[error("{0} does not fit 40 bits")]
-pub struct TooWide(pub u64);
 
 impl U40 {
     /// The largest value, 2^40 - 1.
@@ -112,10 +69,10 @@ impl U40 {
     /// assert_eq!(U40::from_halves(abs.low24(), abs.high24()), Some(abs));
     /// ```
     pub const fn from_halves(low: U24, high: U24) -> Option<Self> {
-        if low.0 >> 16 != high.0 & 0xff {
+        if low.get() >> 16 != high.get() & 0xff {
             return None;
         }
-        Some(Self((high.0 as u64) << 16 | (low.0 & 0xffff) as u64))
+        Some(Self((high.get() as u64) << 16 | (low.get() & 0xffff) as u64))
     }
 }
 
@@ -123,7 +80,7 @@ impl TryFrom<u64> for U40 {
     type Error = TooWide;
 
     fn try_from(value: u64) -> Result<Self, TooWide> {
-        Self::new(value).ok_or(TooWide(value))
+        Self::new(value).ok_or(TooWide { got: value, bits: 40 })
     }
 }
 

@@ -305,7 +305,9 @@ impl Request {
             }
             (Command::EepromWrite, true) => Operation::EepromWriteBank { bank: byte(2), address: byte(3), data },
             (Command::IdWrite1, false) => Operation::IdWrite1 { id: U24::truncate(three) },
-            (Command::IdWrite1, true) => Operation::CoefficientWrite { coefficient: U19::try_from(three)? },
+            (Command::IdWrite1, true) => {
+                Operation::CoefficientWrite { coefficient: U19::new(three).ok_or(Error::DataRange { got: three })? }
+            }
             (Command::IdWrite2, _) => Operation::IdWrite2 { id: U24::truncate(three) },
             (Command::SetAddress2, _) => Operation::SetAddress2 { id: U24::truncate(three) },
             (Command::IdRead1, true) => Operation::CoefficientRead,

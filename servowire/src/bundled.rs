@@ -10,6 +10,7 @@ pub fn of(protocol: Protocol) -> &'static [Capture] {
     match protocol {
         Protocol::Tformat => &CAPTURES,
         Protocol::Nikon => &NIKON,
+        Protocol::Rtex | Protocol::Sorte => &[],
     }
 }
 

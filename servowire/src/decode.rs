@@ -25,6 +25,10 @@ const LONG: u64 = 1 << 24;
 /// Decodes all files. 0: all frames good; 1: not so; 2: the options do not go together.
 pub(crate) fn run(arguments: &Decode) -> ExitCode {
     let files = arguments.files.len();
+    if files == 0 && bundled::of(arguments.protocol).is_empty() {
+        eprintln!("error: no captures of this protocol come with the program: name a file");
+        return ExitCode::from(2);
+    }
     if let Some(out) = &arguments.vcd {
         if files != 1 {
             eprintln!("error: --vcd writes one capture: name one file, not {files}");
@@ -90,8 +94,13 @@ fn one(
     printer: &mut dyn Printer,
 ) -> io::Result<bool> {
     let protocol = arguments.protocol;
-    if arguments.vcd.is_some() && matches!(capture, Capture::Bytes(_)) {
-        return Ok(complain(&Fault::new(name, At::File, "a log of bytes has no times for a VCD"), bar));
+    let flat = match capture {
+        Capture::Bytes(_) => Some("a log of bytes has no times for a VCD"),
+        Capture::Packets(_) => Some("a network capture has no levels for a VCD"),
+        Capture::Edges(_) | Capture::Samples(_) => None,
+    };
+    if let (Some(_), Some(what)) = (&arguments.vcd, flat) {
+        return Ok(complain(&Fault::new(name, At::File, what), bar));
     }
     let mut vcd = match &arguments.vcd {
         None => None,

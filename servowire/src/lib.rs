@@ -11,6 +11,7 @@
 pub mod bundled;
 pub mod capture;
 pub mod cli;
+pub mod cnc;
 mod decode;
 pub mod event;
 pub mod fault;

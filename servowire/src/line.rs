@@ -135,6 +135,7 @@ pub fn decode<P: StartStop>(
             protocol.finish(None, out)?;
             Ok(end?)
         }
+        Capture::Packets(_) => Err(Fault::new(file, At::File, "packets of a network are no start-stop line").into()),
         Capture::Edges(mut line) => {
             let preview = Preview::read(line.as_mut());
             let found = preview.survey(file, line.channels(), options, make)?;

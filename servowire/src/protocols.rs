@@ -5,9 +5,12 @@
 //! [`StartStop`](crate::line::StartStop) and is done; another kind takes the [`Capture`] itself.
 
 pub mod nikon;
+pub mod rtex;
+pub mod sorte;
 pub mod tformat;
 
 use crate::capture::Capture;
+use crate::fault::{At, Fault};
 use crate::line::{self, Stop};
 use crate::output::Output;
 
@@ -16,6 +19,10 @@ use crate::output::Output;
 pub enum Protocol {
     /// Tamagawa T-Format.
     Tformat,
+    /// Panasonic RTEX data blocks, from logs of bytes.
+    Rtex,
+    /// TI SORTE, from a network capture.
+    Sorte,
     /// Nikon A-format.
     Nikon,
 }
@@ -27,6 +34,8 @@ pub struct Settings {
     pub line: line::Options,
     /// About T-Format.
     pub tformat: tformat::Settings,
+    /// About RTEX.
+    pub rtex: rtex::Settings,
     /// About A-format.
     pub nikon: nikon::Settings,
 }
@@ -36,18 +45,25 @@ impl Protocol {
     pub fn field_names(self) -> &'static [&'static str] {
         match self {
             Self::Tformat => tformat::FIELDS,
+            // A log of blocks has no times, so there is no VCD to hold its fields.
+            Self::Rtex => &[],
+            Self::Sorte => sorte::FIELDS,
             Self::Nikon => nikon::FIELDS,
         }
     }
 
     /// Decodes a capture to its end. What comes out before a fault has been given to `out`.
     pub fn decode(self, file: &str, capture: Capture, settings: &Settings, out: &mut Output<'_>) -> Result<(), Stop> {
-        match self {
-            Self::Tformat => {
+        match (self, capture) {
+            // Whatever was asked for: the only protocol that has packets.
+            (_, Capture::Packets(packets)) => sorte::decode(packets, out),
+            (Self::Sorte, _) => Err(Fault::new(file, At::File, "SORTE is decoded from a pcapng file").into()),
+            (Self::Tformat, capture) => {
                 let make = |bit| tformat::Decoder::new(bit, settings.tformat);
                 line::decode(file, capture, &settings.line, &make, out)
             }
-            Self::Nikon => {
+            (Self::Rtex, capture) => rtex::decode(file, capture, &settings.rtex, out),
+            (Self::Nikon, capture) => {
                 let make = |bit| nikon::Decoder::new(bit, settings.nikon);
                 line::decode(file, capture, &settings.line, &make, out)
             }

@@ -17,4 +17,4 @@ mod pru;
 mod row;
 mod runner;
 
-pub use runner::{Failure, Pending, Report, RunError, Topic, run_all, run_protocol};
+pub use runner::{Failure, Report, RunError, Topic, run_all, run_protocol};

@@ -1,6 +1,8 @@
 //! Which topics there are. A new protocol is one file here and one line in [`ALL`].
 
 mod nikon;
+mod rtex;
+mod sorte;
 mod step_profile;
 mod tformat;
 
@@ -9,18 +11,13 @@ use crate::row::Check;
 /// A protocol's folder name and its topics.
 type Protocol = (&'static str, &'static [(&'static str, Check)]);
 
-const ALL: &[Protocol] =
-    &[("nikon", nikon::TOPICS), ("step-profile", step_profile::TOPICS), ("tformat", tformat::TOPICS)];
-
-/// Topics whose rows cannot be checked yet: protocol, topic, what they wait for.
-const PENDING: &[(&str, &str, &str)] = &[
-    ("step-profile", "payload", "the crate sorte-proto, which makes the PTO words"),
-    ("step-profile", "pto_word", "the crate sorte-proto, which makes the PTO words"),
+const ALL: &[Protocol] = &[
+    ("nikon", nikon::TOPICS),
+    ("rtex", rtex::TOPICS),
+    ("sorte", sorte::TOPICS),
+    ("step-profile", step_profile::TOPICS),
+    ("tformat", tformat::TOPICS),
 ];
-
-pub(crate) fn pending(protocol: &str, topic: &str) -> Option<&'static str> {
-    PENDING.iter().find(|(p, t, _)| (*p, *t) == (protocol, topic)).map(|(_, _, reason)| *reason)
-}
 
 pub(crate) fn names() -> Vec<&'static str> {
     ALL.iter().map(|(name, _)| *name).collect()

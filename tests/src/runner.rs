@@ -20,26 +20,11 @@ pub struct Topic {
     pub passed: usize,
     /// Rows that failed.
     pub failures: Vec<Failure>,
-    /// Rows that nobody can check yet.
-    pub pending: Option<Pending>,
-}
-
-/// Rows that were read but not checked.
-#[derive(Debug, Clone, Copy)]
-pub struct Pending {
-    /// How many.
-    pub rows: usize,
-    /// What they wait for.
-    pub reason: &'static str,
 }
 
 impl fmt::Display for Topic {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{}/{}: ", self.protocol, self.topic)?;
-        match self.pending {
-            Some(Pending { rows, reason }) => write!(f, "{rows} PENDING, not checked: they wait for {reason}"),
-            None => write!(f, "{} passed, {} failed", self.passed, self.failures.len()),
-        }
+        write!(f, "{}/{}: {} passed, {} failed", self.protocol, self.topic, self.passed, self.failures.len())
     }
 }
 
@@ -192,10 +177,9 @@ fn entries(dir: &Path) -> Result<Vec<PathBuf>, RunError> {
 
 fn run_file(protocol: &'static str, path: &Path) -> Result<Topic, RunError> {
     let topic = path.file_stem().map(|s| s.to_string_lossy().into_owned()).unwrap_or_default();
-    let (check, pending) = (protocols::check(protocol, &topic), protocols::pending(protocol, &topic));
-    if check.is_none() && pending.is_none() {
+    let Some(check) = protocols::check(protocol, &topic) else {
         return Err(RunError::UnknownTopic(path.to_owned(), protocol));
-    }
+    };
     let text = fs::read_to_string(path).map_err(|e| RunError::Io(path.to_owned(), e))?;
     let mut rows = Vec::new();
     for (line, text) in (1..).zip(text.lines()).filter(|(_, text)| !text.trim().is_empty()) {
@@ -204,10 +188,6 @@ fn run_file(protocol: &'static str, path: &Path) -> Result<Topic, RunError> {
     if rows.is_empty() {
         return Err(RunError::NoRows(path.to_owned()));
     }
-    let Some(check) = check else {
-        let pending = pending.map(|reason| Pending { rows: rows.len(), reason });
-        return Ok(Topic { protocol, topic, passed: 0, failures: Vec::new(), pending });
-    };
     let verdicts = check(&rows);
     assert_eq!(verdicts.len(), rows.len(), "{protocol}/{topic}: a verdict a row");
     Ok(count(protocol, topic, rows, verdicts))
@@ -224,7 +204,7 @@ fn parse(path: &Path, line: usize, text: &str) -> Result<Option<Row>, RunError> 
     for prose in PROSE {
         keys.remove(prose);
     }
-    match keys.remove("name") {
+    match keys.remove("name").or_else(|| keys.remove("id")) {
         Some(Value::String(name)) => Ok(Some(Row { line, name, keys })),
         None => Ok(Some(Row { line, name: String::new(), keys })),
         Some(other) => Err(fault(format!("the name {other} is not a string"))),
@@ -232,7 +212,7 @@ fn parse(path: &Path, line: usize, text: &str) -> Result<Option<Row>, RunError> 
 }
 
 fn count(protocol: &'static str, topic: String, rows: Vec<Row>, verdicts: Vec<Verdict>) -> Topic {
-    let mut result = Topic { protocol, topic, passed: 0, failures: Vec::new(), pending: None };
+    let mut result = Topic { protocol, topic, passed: 0, failures: Vec::new() };
     for (row, verdict) in rows.into_iter().zip(verdicts) {
         match verdict {
             Ok(()) => result.passed += 1,

@@ -5,11 +5,19 @@
 
 #[cfg(feature = "deliberate-panic")]
 mod deliberate_panic;
+#[cfg(feature = "nikon-aformat")]
 mod nikon;
-mod nikon_ends;
-mod nrz_line;
+#[cfg(feature = "nrz-line")]
+pub(crate) mod nrz_line;
+#[cfg(feature = "rtex-block")]
+mod rtex;
+#[cfg(feature = "sorte-proto")]
+mod sorte;
+#[cfg(feature = "step-profile")]
 mod step_profile;
+#[cfg(feature = "tformat")]
 mod tformat;
+#[cfg(feature = "tformat")]
 mod tformat_ends;
 
 /// An entry point that is measured and walked.
@@ -21,11 +29,19 @@ pub(crate) struct Kernel {
 }
 
 pub(crate) const ALL: &[&[Kernel]] = &[
-    nikon::KERNELS,
-    nikon_ends::KERNELS,
+    #[cfg(feature = "nrz-line")]
     nrz_line::KERNELS,
+    #[cfg(feature = "nikon-aformat")]
+    nikon::KERNELS,
+    #[cfg(feature = "rtex-block")]
+    rtex::KERNELS,
+    #[cfg(feature = "sorte-proto")]
+    sorte::KERNELS,
+    #[cfg(feature = "step-profile")]
     step_profile::KERNELS,
+    #[cfg(feature = "tformat")]
     tformat::KERNELS,
+    #[cfg(feature = "tformat")]
     tformat_ends::KERNELS,
     #[cfg(feature = "deliberate-panic")]
     deliberate_panic::KERNELS,

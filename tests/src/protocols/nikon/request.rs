@@ -140,9 +140,11 @@ pub(super) fn range(_: &str, row: RangeRow) -> Verdict {
             let data = u16::try_from(data).map(|_| ()).map_err(|_| "data_range");
             (expect_error, address.and(data))
         }
-        RangeRow::IdWrite { ident, expect_error } => (expect_error, U24::try_from(ident).map(|_| ()).map_err(class)),
+        RangeRow::IdWrite { ident, expect_error } => {
+            (expect_error, U24::try_from(ident).map(|_| ()).map_err(|_| "data_range"))
+        }
         RangeRow::VelocityCoefficientWrite { coef, expect_error } => {
-            (expect_error, U19::try_from(coef).map(|_| ()).map_err(class))
+            (expect_error, U19::try_from(coef).map(|_| ()).map_err(|_| "data_range"))
         }
     };
     same("expect_error", &want.as_deref(), &got.err())

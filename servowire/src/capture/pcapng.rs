@@ -1,0 +1,100 @@
+//! Packets of a network capture (pcapng), as Wireshark and `servowire cnc` write them.
+
+use std::borrow::Cow;
+
+use pcap_file::pcapng::blocks::Block;
+use pcap_file::pcapng::blocks::enhanced_packet::EnhancedPacketOption;
+use pcap_file::pcapng::blocks::interface_description::InterfaceDescriptionOption;
+use pcap_file::pcapng::{PcapNgReader, blocks::interface_description::InterfaceDescriptionBlock};
+use pcap_file::{DataLink, PcapError};
+
+use super::Input;
+use crate::fault::{At, Fault};
+
+/// What a pcapng file begins with.
+pub(super) const MAGIC: &[u8] = b"\x0a\x0d\x0d\x0a";
+
+/// Units of time in a second, as a power of ten, where the interface does not say it.
+const MICROSECONDS: u8 = 6;
+
+/// A network capture.
+pub struct Pcapng {
+    name: String,
+    reader: PcapNgReader<Input>,
+    packets: u64,
+}
+
+/// A packet as it was on the network.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Packet {
+    /// When, in picoseconds.
+    pub time: i64,
+    /// Link type of its interface.
+    pub link: DataLink,
+    /// To the capturing side (`Some(true)`) or from it, where the file says so.
+    pub inbound: Option<bool>,
+    /// Its bytes.
+    pub bytes: Vec<u8>,
+}
+
+impl Pcapng {
+    /// A capture from its beginning.
+    pub fn new(input: Input) -> Result<Self, Fault> {
+        let name = input.name().to_owned();
+        let reader = PcapNgReader::new(input).map_err(|e| Fault::new(&name, At::File, say(&e)))?;
+        Ok(Self { name, reader, packets: 0 })
+    }
+
+    /// The next packet; none at the end.
+    pub fn packet(&mut self) -> Result<Option<Packet>, Fault> {
+        loop {
+            let packet = match self.reader.next_block() {
+                None => return Ok(None),
+                Some(Err(error)) => return Err(self.fault(&say(&error))),
+                Some(Ok(Block::EnhancedPacket(packet))) => packet.into_owned(),
+                Some(Ok(_)) => continue,
+            };
+            self.packets += 1;
+            let Some(interface) = self.reader.packet_interface(&packet) else {
+                return Err(self.fault("its interface is not described"));
+            };
+            let inbound = packet.options.iter().find_map(|option| match option {
+                EnhancedPacketOption::Flags(flags) if flags & 3 != 0 => Some(flags & 3 == 1),
+                _ => None,
+            });
+            // The reader gives the file's units of time as if they were nanoseconds.
+            let units = packet.timestamp.as_nanos();
+            let time = picoseconds(units, interface).ok_or_else(|| self.fault("its time cannot be"))?;
+            let bytes = match packet.data {
+                Cow::Owned(bytes) => bytes,
+                Cow::Borrowed(bytes) => bytes.to_vec(),
+            };
+            return Ok(Some(Packet { time, link: interface.linktype, inbound, bytes }));
+        }
+    }
+
+    fn fault(&self, what: &str) -> Fault {
+        Fault::new(&self.name, At::File, format!("behind packet {}: {what}", self.packets))
+    }
+}
+
+fn picoseconds(units: u128, interface: &InterfaceDescriptionBlock<'_>) -> Option<i64> {
+    let resolution = interface.options.iter().find_map(|option| match option {
+        InterfaceDescriptionOption::IfTsResol(resolution) => Some(*resolution),
+        _ => None,
+    });
+    let resolution = resolution.unwrap_or(MICROSECONDS);
+    let exponent = u32::from(resolution & 0x7f);
+    let second = 1_000_000_000_000u128;
+    let per_second =
+        if resolution & 0x80 == 0 { 10u128.checked_pow(exponent)? } else { 1u128.checked_shl(exponent)? };
+    i64::try_from(units.checked_mul(second)?.checked_div(per_second)?).ok()
+}
+
+fn say(error: &PcapError) -> String {
+    match error {
+        PcapError::IncompleteBuffer => "the file ends inside a block".to_owned(),
+        PcapError::IoError(error) => format!("cannot be read: {error}"),
+        other => format!("not pcapng as it should be: {other}"),
+    }
+}

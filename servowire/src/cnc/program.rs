@@ -1,0 +1,87 @@
+//! What the axes are to do: turns there and back, or the tune.
+
+use sorte_proto::{Direction, Pto};
+use step_profile::{Command, Dance, Group, Motors, MoveState, Note, Parameters, Profile, Tone};
+
+/// The tune of `--dance`: up and down the tones of Table 3, this project's own.
+const SONG: [Note; 16] = [
+    Note::p250(Tone::Cis, 2500),
+    Note::p250(Tone::E, 2500),
+    Note::p250(Tone::Gis, 2500),
+    Note::p250(Tone::Cis2, 2500),
+    Note::p125(Tone::H, 2500),
+    Note::p125(Tone::A, 2500),
+    Note::p250(Tone::Gis, 12_500),
+    Note::p250(Tone::Fis, 2500),
+    Note::p250(Tone::A, 2500),
+    Note::p250(Tone::D2, 2500),
+    Note::p250(Tone::Fis2, 2500),
+    Note::p125(Tone::D2, 2500),
+    Note::p125(Tone::Cis2, 2500),
+    Note::p250(Tone::H, 2500),
+    Note::p125(Tone::Gis, 2500),
+    Note::p250(Tone::Cis, 2500),
+];
+
+/// One cycle after the other.
+pub(super) enum Program {
+    /// Moves of the same length, each in the other direction.
+    Turns {
+        group: Group<'static>,
+        profiles: Vec<Profile<'static>>,
+        steps: u32,
+        done: u64,
+        moves: u64,
+    },
+    Dance(Box<Dance<'static>>),
+}
+
+impl Program {
+    /// `moves`: how many; the speeds of `profiles` take turns.
+    pub(super) fn turns(motors: Motors, profiles: Vec<Profile<'static>>, steps: u32, moves: u64) -> Self {
+        Self::Turns { group: Group::new(motors), profiles, steps, done: 0, moves }
+    }
+
+    pub(super) fn dance(motors: Motors, parameters: Parameters<'static>) -> Result<Self, step_profile::Error> {
+        let direction = step_profile::Direction::Forward;
+        Dance::new(motors, parameters, direction, &SONG).map(|dance| Self::Dance(Box::new(dance)))
+    }
+
+    /// The words of the next cycle.
+    pub(super) fn next(&mut self) -> [Pto; 4] {
+        let commands = match self {
+            Self::Dance(dance) => dance.tick(),
+            Self::Turns { group, profiles, steps, done, moves } => {
+                if group.state() == MoveState::Idle && done < moves {
+                    let direction = step_profile::Direction::from_dir(*done % 2 == 1);
+                    let profile = profiles.get((*done % profiles.len().max(1) as u64) as usize);
+                    // The group is idle and has motors, so the move begins.
+                    if let Some(profile) = profile {
+                        let _: Result<_, _> = group.start(*profile, *steps, direction);
+                    }
+                    *done += 1;
+                }
+                group.tick()
+            }
+        };
+        commands.map(word)
+    }
+
+    pub(super) fn is_over(&self) -> bool {
+        match self {
+            Self::Dance(dance) => dance.is_over(),
+            Self::Turns { group, done, moves, .. } => done >= moves && group.state() == MoveState::Idle,
+        }
+    }
+}
+
+/// A command as the wire carries it.
+fn word(command: Command) -> Pto {
+    match command {
+        Command::Disable => Pto::DriverOff,
+        Command::Hold { direction } => Pto::NoPulse { direction: Direction::from(direction.dir()) },
+        Command::Pulse { direction, sync_time } => {
+            Pto::from_step(sync_time, Direction::from(direction.dir())).unwrap_or_default()
+        }
+    }
+}

@@ -1,0 +1,197 @@
+//! TI SORTE: the frames of a network capture, an event a packet.
+//!
+//! Packets of an Ethernet interface are start-up frames with their FCS; packets of another interface are frames of the
+//! IO exchange, which have neither type nor addresses: the one with SA 0 is the master's.
+
+use std::fmt::Write as _;
+
+use pcap_file::DataLink;
+use sorte_proto::{
+    DeviceFrameView, DiscoveryView, Error, ErrorClass, FrameType, LongFrame, MasterFrameView, ParamView, Pto, Slice,
+    Status, SyncView,
+};
+
+use crate::capture::pcapng::{Packet, Pcapng};
+use crate::event::{Direction, Event, Field, Place, Refusal, Value, Verdict};
+use crate::line::Stop;
+use crate::output::{Output, Sink};
+
+/// The names of all fields.
+pub const FIELDS: &[&str] = &[
+    "STATUS",
+    "devices",
+    "in",
+    "out",
+    "cycle_time",
+    "delay_burst",
+    "ipg",
+    "crc_mode",
+    "time stamp",
+    "delay",
+    "SA",
+    "data",
+    "PTO 1",
+    "PTO 2",
+    "PTO 3",
+    "PTO 4",
+];
+const PTO: [&str; 4] = ["PTO 1", "PTO 2", "PTO 3", "PTO 4"];
+
+/// One byte at 100 Mbit/s, in picoseconds.
+const BYTE: i64 = 80_000;
+
+/// Decodes a capture to its end.
+pub(super) fn decode(mut capture: Pcapng, out: &mut Output<'_>) -> Result<(), Stop> {
+    while let Some(packet) = capture.packet()? {
+        out.event(&event(&packet))?;
+        out.tick();
+    }
+    Ok(())
+}
+
+fn event(packet: &Packet) -> Event {
+    let frame = if packet.link == DataLink::ETHERNET { long(&packet.bytes) } else { exchange(&packet.bytes) };
+    let (kind, fields, verdict) = match frame {
+        Ok((kind, fields)) => (kind, fields, Verdict::Ok),
+        Err(error) => (guess(packet), Vec::new(), refused(error)),
+    };
+    let direction = match (packet.link, packet.inbound) {
+        (DataLink::ETHERNET, Some(true)) => Some(Direction::Answer),
+        (DataLink::ETHERNET, Some(false)) => Some(Direction::Request),
+        _ => None,
+    };
+    let end = packet.time.saturating_add(BYTE.saturating_mul(packet.bytes.len() as i64));
+    let place = Place::Time { start: packet.time, end };
+    Event { place, direction, kind: kind.into(), fields, position: None, delay: None, verdict }
+}
+
+/// What a refused packet was meant to be.
+fn guess(packet: &Packet) -> &'static str {
+    let code = packet.bytes.get(2).copied().and_then(FrameType::from_code);
+    match (packet.link, packet.bytes.first()) {
+        (DataLink::ETHERNET, _) => code.map_or("?", name),
+        (_, Some(0)) => "master",
+        _ => "device",
+    }
+}
+
+const fn name(frame_type: FrameType) -> &'static str {
+    match frame_type {
+        FrameType::Discovery => "DISCOVERY",
+        FrameType::Param => "PARAM",
+        FrameType::DelayReq => "DELAY_REQ",
+        FrameType::DelayResp => "DELAY_RESP",
+        FrameType::Sync => "SYNC",
+        FrameType::Out => "OUT",
+        FrameType::In => "IN",
+        FrameType::Alarm => "ALARM",
+        FrameType::Diag => "DIAG",
+        FrameType::Recon => "RECON",
+    }
+}
+
+type Decoded = Result<(&'static str, Vec<Field>), Error>;
+
+fn long(bytes: &[u8]) -> Decoded {
+    let frame = LongFrame::new(bytes)?;
+    let mut fields = vec![status(frame.status())];
+    match frame.frame_type() {
+        FrameType::Discovery => {
+            let view = DiscoveryView::of(frame)?;
+            fields.push(number("devices", view.count(), ""));
+            fields.push(number("in", view.input_total(), ""));
+            fields.push(number("out", view.output_total(), ""));
+        }
+        FrameType::Param => {
+            let parameters = ParamView::of(frame)?.parameters();
+            fields.push(number("cycle_time", parameters.cycle_time_ns, "ns"));
+            fields.push(number("delay_burst", parameters.delay_burst, ""));
+            fields.push(number("ipg", i64::from(parameters.ipg_5ns) * 5, "ns"));
+            fields.push(hex("crc_mode", parameters.crc_mode.0.into(), 2));
+        }
+        FrameType::Sync => {
+            let view = SyncView::of(frame)?;
+            fields.push(number("time stamp", view.time_stamp_ns(), "ns"));
+            fields.push(number("delay", view.delay_ns(), "ns"));
+        }
+        FrameType::DelayReq | FrameType::DelayResp => {}
+        _ => fields.push(data(frame.payload())),
+    }
+    Ok((name(frame.frame_type()), fields))
+}
+
+fn exchange(bytes: &[u8]) -> Decoded {
+    if bytes.first() == Some(&0) {
+        let view = MasterFrameView::new(bytes, bytes.len().saturating_sub(MasterFrameView::OVERHEAD))?;
+        let mut fields = vec![status(view.status())];
+        // Four bytes a device is the CNC machine; anything else is shown as it is.
+        if view.output().len() % 4 == 0 && view.output().len() <= 16 {
+            let slices = view.output().chunks_exact(4).filter_map(|bytes| bytes.first_chunk());
+            fields.extend(PTO.into_iter().zip(slices).map(|(name, bytes)| text(name, word(Slice::parse(*bytes).pto))));
+        } else {
+            fields.push(data(view.output()));
+        }
+        fields.push(number("time stamp", view.time_stamp(), "ns"));
+        return Ok(("master", fields));
+    }
+    let view = DeviceFrameView::new(bytes, bytes.len().saturating_sub(DeviceFrameView::OVERHEAD))?;
+    Ok(("device", vec![number("SA", view.address().get(), ""), status(view.status()), data(view.payload())]))
+}
+
+/// A PTO word as people say it: `+1234`, `-1`, `.` for no pulse.
+fn word(pto: Pto) -> String {
+    let sign = |high: bool| if high { '-' } else { '+' };
+    match pto {
+        Pto::NoPulse { direction } => format!("{}.", sign(direction.is_high())),
+        Pto::Pulse { start, direction } => format!("{}{}", sign(direction.is_high()), start.ns()),
+        Pto::DriverOff => "off".to_owned(),
+        Pto::Reserved(word) => format!("{:04X}?", word.word()),
+    }
+}
+
+fn number(name: &'static str, value: impl Into<i64>, unit: &'static str) -> Field {
+    Field { name, value: Value::Number { value: value.into(), unit } }
+}
+
+fn hex(name: &'static str, value: u64, digits: usize) -> Field {
+    Field { name, value: Value::Hex { value, digits } }
+}
+
+fn text(name: &'static str, text: String) -> Field {
+    Field { name, value: Value::Text(text) }
+}
+
+fn data(bytes: &[u8]) -> Field {
+    let mut digits = String::new();
+    for byte in bytes {
+        // A String takes everything.
+        let _ = write!(digits, "{byte:02X}");
+    }
+    text("data", digits)
+}
+
+fn status(status: Status) -> Field {
+    let bits = [
+        (Status::LAST, "LAST"),
+        (Status::DONE, "DONE"),
+        (Status::ERROR, "ERROR"),
+        (Status::STATE_CHANGE, "STATE_CHANGE"),
+    ];
+    let set = bits.into_iter().filter(|(bit, _)| status.has(*bit)).map(|(_, name)| name).collect();
+    Field { name: "STATUS", value: Value::Flags { raw: status.0.into(), digits: 2, set } }
+}
+
+fn refused(error: Error) -> Verdict {
+    let class = match error.class() {
+        ErrorClass::Truncated => "truncated",
+        ErrorClass::BadFcs => "bad_fcs",
+        ErrorClass::WrongDestination => "wrong_destination",
+        ErrorClass::UnknownType => "unknown_type",
+        ErrorClass::LengthMismatch => "length_mismatch",
+        ErrorClass::BadCrc8 => "bad_crc8",
+        ErrorClass::WrongSource => "wrong_source",
+        _ => "other",
+    };
+    let reason = error.to_string();
+    Verdict::Refused(Box::new(Refusal { class, reason, field: None, bit: None, time: None, cause: None }))
+}

@@ -1,0 +1,26 @@
+//! What fits into a cycle: end times for lines of 1 to 12 devices, and how long the cycle has to be.
+//!
+//! `cargo run -p sorte-proto --example line -- [line delay in ns]`
+
+use sorte_proto::timing::{CNC_CYCLE_NS, Limit, Timing};
+
+fn main() {
+    let line_delay = std::env::args().nth(1).and_then(|text| text.parse().ok()).unwrap_or(85);
+    println!("line delay {line_delay} ns between any two; 4 output bytes and 3 payload bytes a device\n");
+    println!("devices  master frame at the last  last frame at the master  shortest cycle  limited by");
+    for devices in (1..=12).chain([32, 100, 254]) {
+        let output_len = u16::from(devices) * 4;
+        let budget = Timing { line_delays_ns: &[line_delay], devices, output_len, payload_len: 3 }.budget();
+        let limit = match budget.limit() {
+            Limit::MasterFrame => "the way out",
+            Limit::DeviceFrames => "the way back",
+        };
+        println!(
+            "{devices:7}  {:21} ns  {:21} ns  {:11} ns  {limit}{}",
+            budget.master_frame_at_last_ns,
+            budget.device_frames_at_master_ns,
+            budget.min_cycle_ns(),
+            if budget.fits(CNC_CYCLE_NS) { ", fits 4 us" } else { "" },
+        );
+    }
+}

@@ -1,0 +1,127 @@
+//! The two checks of SORTE: CRC-8 for the IO exchange, the Ethernet FCS for everything else.
+
+use crc::{CRC_8_SMBUS, CRC_32_ISO_HDLC, Crc, Table};
+
+static CRC8: Crc<u8, Table<1>> = Crc::<u8, Table<1>>::new(&CRC_8_SMBUS);
+static CRC32: Crc<u32, Table<1>> = Crc::<u32, Table<1>>::new(&CRC_32_ISO_HDLC);
+
+/// CRC-8 of `bytes`: polynomial 0x07, start value 0, nothing reflected, nothing inverted.
+///
+/// The start value 0 makes leading zero bytes invisible. Within 127 bits every single and double bit error is found;
+/// of the 19 protected bytes of the stock master frame, the 25 bit pairs at a distance of 127 pass.
+///
+/// ```
+/// assert_eq!(sorte_proto::crc8(b"123456789"), 0xf4);
+/// ```
+pub fn crc8(bytes: &[u8]) -> u8 {
+    CRC8.checksum(bytes)
+}
+
+/// CRC-8 of more bytes: `crc8_update(crc8(a), b)` is the CRC-8 of `a` followed by `b`.
+pub fn crc8_update(crc: u8, bytes: &[u8]) -> u8 {
+    let mut digest = CRC8.digest_with_initial(crc);
+    digest.update(bytes);
+    digest.finalize()
+}
+
+/// CRC-8 of one more byte, for loops that do something else beside.
+#[inline]
+pub(crate) fn crc8_step(crc: u8, byte: u8) -> u8 {
+    let [table] = CRC8.table();
+    table.get(usize::from(crc ^ byte)).copied().unwrap_or(0)
+}
+
+/// The Ethernet frame check sequence over DA to the last payload byte: CRC-32, polynomial 0x04C11DB7, start value all
+/// ones, reflected, inverted. Sent least significant byte first.
+///
+/// ```
+/// assert_eq!(sorte_proto::fcs(b"123456789"), 0xcbf4_3926);
+/// ```
+pub fn fcs(bytes: &[u8]) -> u32 {
+    CRC32.checksum(bytes)
+}
+
+/// The FCS of bytes that come one by one: four bytes of state.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub(crate) struct RunningFcs(u32);
+
+impl RunningFcs {
+    pub(crate) const START: Self = Self(u32::MAX);
+
+    pub(crate) fn push(&mut self, byte: u8) {
+        let [table] = CRC32.table();
+        let [low, ..] = self.0.to_le_bytes();
+        let entry = table.get(usize::from(low ^ byte)).copied().unwrap_or(0);
+        self.0 = entry ^ self.0 >> 8;
+    }
+
+    pub(crate) const fn value(self) -> u32 {
+        !self.0
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+    use std::collections::BTreeSet;
+    use std::vec;
+
+    use super::*;
+
+    /// The definition of the polynomial, a bit at a time.
+    fn bitwise(bytes: &[u8]) -> u8 {
+        bytes
+            .iter()
+            .fold(0, |crc, byte| (0..8).fold(crc ^ byte, |c: u8, _| if c & 0x80 == 0 { c << 1 } else { c << 1 ^ 0x07 }))
+    }
+
+    #[test]
+    fn every_byte_value_matches_the_polynomial() {
+        for byte in 0..=u8::MAX {
+            assert_eq!(crc8(&[byte]), bitwise(&[byte]));
+        }
+    }
+
+    /// Every single and every double bit error of the 19 protected bytes; what passes is named.
+    #[test]
+    fn twenty_five_bit_pairs_of_the_stock_master_frame_pass() {
+        let syndrome = |bit: usize| {
+            let mut error = [0u8; 19];
+            error[bit / 8] = 0x80 >> (bit % 8);
+            crc8(&error[..18]) ^ error[18]
+        };
+        assert!((0..152).all(|bit| syndrome(bit) != 0));
+        let pairs: BTreeSet<_> = (0..152)
+            .flat_map(|a| (a + 1..152).map(move |b| (a, b)))
+            .filter(|&(a, b)| syndrome(a) == syndrome(b))
+            .collect();
+        assert_eq!(pairs, (0..25).map(|a| (a, a + 127)).collect());
+    }
+
+    proptest! {
+        #[test]
+        fn crc8_is_the_polynomial(bytes in proptest::collection::vec(any::<u8>(), 0..64)) {
+            prop_assert_eq!(crc8(&bytes), bitwise(&bytes));
+        }
+
+        #[test]
+        fn both_may_be_split_anywhere(bytes in proptest::collection::vec(any::<u8>(), 0..64), at: proptest::sample::Index) {
+            let at = at.index(bytes.len() + 1);
+            let (a, b) = bytes.split_at(at);
+            prop_assert_eq!(crc8_update(crc8(a), b), crc8(&bytes));
+            let mut running = RunningFcs::START;
+            for &byte in &bytes {
+                running.push(byte);
+            }
+            prop_assert_eq!(running.value(), fcs(&bytes));
+        }
+
+        #[test]
+        fn leading_zeros_do_not_show_in_crc8(bytes in proptest::collection::vec(any::<u8>(), 0..16), zeros in 0usize..16) {
+            let mut longer = vec![0; zeros];
+            longer.extend(&bytes);
+            prop_assert_eq!(crc8(&longer), crc8(&bytes));
+        }
+    }
+}

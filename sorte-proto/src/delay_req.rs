@@ -1,0 +1,79 @@
+use crate::frame::{FrameType, LongFrame, emit};
+use crate::{Error, Status};
+
+/// A line-delay request. The neighbour's port sends it back after a fixed time; there is no answer of its own.
+///
+/// ```text
+///  byte 0    1   2   3       4
+///       255  SA  3   STATUS  FCS
+/// ```
+///
+/// The frame is its header, so this is view and value in one.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "arbitrary", derive(arbitrary::Arbitrary))]
+pub struct DelayReq {
+    /// SA, 0 in everything the published firmware sends.
+    pub source: u8,
+    /// STATUS.
+    pub status: Status,
+}
+
+impl DelayReq {
+    /// Bytes from DA to FCS.
+    pub const LEN: usize = LongFrame::OVERHEAD;
+
+    /// As the master sends it to the first device.
+    pub const fn of_master(last: bool) -> Self {
+        Self { source: 0, status: if last { Status::FINAL } else { Status::DELAY_REQ } }
+    }
+
+    /// As a device sends it to the next one.
+    pub const fn of_device(last: bool) -> Self {
+        Self { source: 0, status: if last { Status::FINAL_DEVICE_DELAY_REQ } else { Status::DELAY_REQ } }
+    }
+
+    /// Checks as [`LongFrame::new`], then that TYPE is 3.
+    ///
+    /// # Errors
+    /// As [`LongFrame::new`]; [`Error::UnexpectedType`].
+    pub fn parse(bytes: &[u8]) -> Result<Self, Error> {
+        Self::of(LongFrame::new(bytes)?)
+    }
+
+    /// Checks that TYPE is 3.
+    ///
+    /// # Errors
+    /// [`Error::UnexpectedType`]
+    pub fn of(frame: LongFrame<'_>) -> Result<Self, Error> {
+        frame.of_type::<0>(FrameType::DelayReq)?;
+        Ok(Self { source: frame.source(), status: frame.status() })
+    }
+
+    /// The frame from DA to FCS.
+    pub fn emit(&self) -> [u8; Self::LEN] {
+        emit(self.source, FrameType::DelayReq, self.status, &[])
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_header_gives_itself_back() {
+        for source in 0..=u8::MAX {
+            for status in (0..=u8::MAX).map(Status) {
+                let frame = DelayReq { source, status };
+                assert_eq!(DelayReq::parse(&frame.emit()), Ok(frame));
+            }
+        }
+    }
+
+    #[test]
+    fn a_response_is_not_a_request() {
+        let bytes: [u8; 8] = emit(0, FrameType::DelayResp, Status::DELAY_RESP, &[]);
+        assert_eq!(DelayReq::parse(&bytes), Err(Error::UnexpectedType { got: 4, want: 3 }));
+    }
+}

@@ -1,0 +1,480 @@
+//! The device's side: two ports, and what a device learns from the frames that pass.
+//!
+//! Sans-IO. The caller moves bytes between the ports as [`Handled::path`] says, sends the delay requests and device
+//! frames that are asked for, and writes the corrections into its counter. A frame in a buffer goes through
+//! [`Device::frame`]; a port that forwards byte by byte takes a [`Passage`].
+//!
+//! Data are used only after their checksum was found right. (The published device uses them in any case.)
+
+mod passage;
+mod port;
+
+pub use passage::Passage;
+pub use port::{Port, PortFlags, Seen, State, Trigger};
+
+use passage::{Kind, Learnt};
+
+use crate::cut_through::{DiscoveryRewriter, SyncRewriter};
+use crate::timing::published_send_time_ns;
+use crate::{
+    Assignment, Clock, Correction, DelayModel, DelayReq, DeviceFrame, Entry, Error, LineDelay, LongFrame,
+    MasterFrameView, Parameters, Status, Sync,
+};
+
+/// One of the two ports.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum PortId {
+    /// The first.
+    A,
+    /// The second.
+    B,
+}
+
+impl PortId {
+    /// The other one.
+    pub const fn other(self) -> Self {
+        match self {
+            Self::A => Self::B,
+            Self::B => Self::A,
+        }
+    }
+}
+
+/// Where a frame goes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum Path {
+    /// Out of the other port.
+    Forward,
+    /// Out of the port it came in.
+    Reflect,
+    /// Nowhere.
+    Absorb,
+}
+
+/// Times of a frame's reception.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Arrival {
+    /// The device's counter at the start of the frame, in ns.
+    pub sof_ns: u32,
+    /// The device's counter now, in ns.
+    pub counter_ns: u32,
+    /// A clock for the time-outs that nobody sets, in ns.
+    pub now_ns: u64,
+}
+
+/// What came of a frame.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Handled {
+    /// Where it goes.
+    pub path: Path,
+    /// Whether it was good, and if not, why it was not used.
+    pub result: Result<(), Error>,
+    /// Delay request to send on the reverse port; a last device sends none.
+    pub trigger: Trigger,
+    /// What to do to the counter.
+    pub correction: Correction,
+}
+
+/// What the IO exchange gave a device.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Output<'a> {
+    /// Its output bytes.
+    pub data: &'a [u8],
+    /// The master's time at the start of the frame, seen here, in ns.
+    pub reference_ns: u32,
+    /// What to do to the counter.
+    pub correction: Correction,
+}
+
+/// What a device is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Config {
+    /// Its process data.
+    pub lengths: Entry,
+    /// Output bytes of the master frame; `None`: as many as DISCOVERY counted.
+    pub output_len: Option<u16>,
+    /// Start of its own frame in ns of the common time; `None`: as published, by its address.
+    pub send_time_ns: Option<u32>,
+    /// How the line to the next device is measured.
+    pub delay_model: DelayModel,
+    /// Cycle starts without a frame that a device in IO exchange bears.
+    pub missed_frames: u8,
+    /// How long a start-up state waits for its frame, in ns.
+    pub start_up_timeout_ns: u64,
+}
+
+impl Default for Config {
+    /// The reference design's; the start-up time-out is this crate's, the published device has none.
+    fn default() -> Self {
+        Self {
+            lengths: Entry::STOCK,
+            output_len: Some(16),
+            send_time_ns: None,
+            delay_model: DelayModel::DEVICE,
+            missed_frames: 5,
+            start_up_timeout_ns: 20_000_000,
+        }
+    }
+}
+
+/// What a device counts.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct Counters {
+    /// Frames that were good.
+    pub good_frames: u32,
+    /// Frames with a wrong checksum.
+    pub crc_errors: u32,
+    /// Frames refused for another reason.
+    pub format_errors: u32,
+    /// How often it went back to IDLE.
+    pub retrains: u32,
+}
+
+/// A device with two ports.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Device {
+    config: Config,
+    a: Port,
+    b: Port,
+    counters: Counters,
+    /// Goes into the next STATUS byte the device writes.
+    error: bool,
+    assignment: Option<Assignment>,
+    output_total: Option<u16>,
+    parameters: Option<[u8; Parameters::LEN]>,
+    line: LineDelay,
+    clock: Clock,
+    last_sync: Option<(Sync, u32)>,
+    received: bool,
+    missed: u8,
+    /// When a frame of the present state came last.
+    alive_ns: u64,
+}
+
+impl Device {
+    /// A device without links.
+    pub const fn new(config: Config) -> Self {
+        const PORT: Port = Port { state: State::Idle, flags: PortFlags(0) };
+        Self {
+            config,
+            a: PORT,
+            b: PORT,
+            counters: Counters { good_frames: 0, crc_errors: 0, format_errors: 0, retrains: 0 },
+            error: false,
+            assignment: None,
+            output_total: None,
+            parameters: None,
+            line: LineDelay::new(config.delay_model),
+            clock: Clock::new(),
+            last_sync: None,
+            received: false,
+            missed: 0,
+            alive_ns: 0,
+        }
+    }
+
+    /// The counters.
+    pub const fn counters(&self) -> Counters {
+        self.counters
+    }
+
+    /// A port's handler.
+    pub const fn port(&self, port: PortId) -> &Port {
+        match port {
+            PortId::A => &self.a,
+            PortId::B => &self.b,
+        }
+    }
+
+    const fn port_mut(&mut self, port: PortId) -> &mut Port {
+        match port {
+            PortId::A => &mut self.a,
+            PortId::B => &mut self.b,
+        }
+    }
+
+    /// The port that faces the master, once it is known.
+    pub const fn master_port(&self) -> Option<PortId> {
+        if self.a.flags.has(PortFlags::MASTER_PORT) {
+            Some(PortId::A)
+        } else if self.b.flags.has(PortFlags::MASTER_PORT) {
+            Some(PortId::B)
+        } else {
+            None
+        }
+    }
+
+    /// State of the port that faces the master.
+    pub fn state(&self) -> State {
+        self.master_port().map_or(State::Idle, |port| self.port(port).state)
+    }
+
+    /// Whether only one port is linked.
+    pub const fn is_last(&self) -> bool {
+        self.a.flags.has(PortFlags::LAST_DEVICE) || self.b.flags.has(PortFlags::LAST_DEVICE)
+    }
+
+    /// Address and offsets, from the last DISCOVERY.
+    pub const fn assignment(&self) -> Option<Assignment> {
+        self.assignment
+    }
+
+    /// What the master told all devices.
+    pub fn parameters(&self) -> Option<Parameters> {
+        self.parameters.as_ref().map(Parameters::parse)
+    }
+
+    /// The line to the next device in ns, once it is measured; 0 for a last device.
+    ///
+    /// # Errors
+    /// [`Error::ImplausibleRoundTrip`]; with 0 ns if round trips are missing.
+    pub const fn line_delay_next_ns(&self) -> Result<u16, Error> {
+        if self.is_last() {
+            return Ok(0);
+        }
+        if self.line.is_complete() { self.line.checked() } else { Err(Error::ImplausibleRoundTrip { rtt_ns: 0 }) }
+    }
+
+    /// The SYNC frame received last and the own counter at its start.
+    pub const fn last_sync(&self) -> Option<(Sync, u32)> {
+        self.last_sync
+    }
+
+    /// Own counter at the start of the first cycle of the IO exchange as the published device sets it: 10 us after the
+    /// last SYNC frame.
+    pub fn cycle_zero_ns(&self) -> Option<u32> {
+        self.last_sync.map(|(_, sof_ns)| sof_ns.wrapping_add(10_000))
+    }
+
+    /// When to send the own frame, in ns of the common time.
+    pub fn send_time_ns(&self) -> Option<u32> {
+        let published = self.assignment.map(|a| published_send_time_ns(a.address));
+        self.config.send_time_ns.or(published)
+    }
+
+    /// The links have changed. With one link the device is the last one, and that port faces the master. A device that
+    /// loses the link to the master starts again.
+    pub fn links(&mut self, a: bool, b: bool) {
+        let master_lost = match self.master_port() {
+            Some(PortId::A) => !a,
+            Some(PortId::B) => !b,
+            None => false,
+        };
+        if master_lost {
+            self.restart();
+        }
+        let only = match (a, b) {
+            (true, false) => Some(PortId::A),
+            (false, true) => Some(PortId::B),
+            _ => None,
+        };
+        for port in [PortId::A, PortId::B] {
+            let handler = self.port_mut(port);
+            handler.flags = PortFlags(handler.flags.0 & !PortFlags::LAST_DEVICE.0);
+            if only == Some(port) {
+                handler.flags |= PortFlags::LAST_DEVICE | PortFlags::MASTER_PORT;
+            } else if handler.state == State::Idle {
+                handler.flags = PortFlags(0);
+            }
+        }
+    }
+
+    /// Back to IDLE: address, clock and line delay are forgotten.
+    fn restart(&mut self) {
+        let last_device = |port: Port| {
+            let linked = port.flags.has(PortFlags::LAST_DEVICE);
+            PortFlags(if linked { PortFlags::LAST_DEVICE.0 | PortFlags::MASTER_PORT.0 } else { 0 })
+        };
+        let (a, b) = (last_device(self.a), last_device(self.b));
+        let retrains = self.counters.retrains.saturating_add(1);
+        let counters = Counters { retrains, ..self.counters };
+        *self = Self { counters, error: self.error, alive_ns: self.alive_ns, ..Self::new(self.config) };
+        (self.a.flags, self.b.flags) = (a, b);
+    }
+
+    /// Looks at the time: a start-up state that has waited too long for its frame gives up. Returns whether it has.
+    pub fn poll(&mut self, now_ns: u64) -> bool {
+        let waits = !matches!(self.state(), State::Idle | State::Exchange);
+        let late = waits && now_ns.saturating_sub(self.alive_ns) > self.config.start_up_timeout_ns;
+        if late {
+            self.restart();
+        }
+        late
+    }
+
+    /// A cycle of the IO exchange begins. The sixth without a frame since the one before makes the device start again;
+    /// returns whether it has.
+    pub fn cycle_start(&mut self) -> bool {
+        self.missed = if self.received { 0 } else { self.missed.saturating_add(1) };
+        self.received = false;
+        let lost = self.missed > self.config.missed_frames;
+        if lost {
+            self.restart();
+        }
+        lost
+    }
+
+    /// Cycle starts without a frame since the last frame.
+    pub const fn missed_frames(&self) -> u8 {
+        self.missed
+    }
+
+    /// A start-up frame begins at `port`. Its bytes go through the [`Passage`], then to [`end`](Self::end).
+    pub fn begin(&self, port: PortId) -> Passage {
+        let handler = self.port(port);
+        let master = handler.flags.has(PortFlags::MASTER_PORT);
+        let kind = match (handler.state, self.line_delay_next_ns()) {
+            (State::Idle, _) if handler.flags.has(PortFlags::LAST_DEVICE) => self.discovery(),
+            (State::Discovery, _) if master => self.discovery(),
+            (State::Sync, Ok(line)) if master => Kind::Sync(SyncRewriter::new(line, self.is_last(), self.error)),
+            _ => Kind::Plain,
+        };
+        Passage::new(kind)
+    }
+
+    const fn discovery(&self) -> Kind {
+        Kind::Discovery(DiscoveryRewriter::new(self.config.lengths, self.is_last(), self.error))
+    }
+
+    /// A start-up frame that began with [`begin`](Self::begin) has ended at `port`.
+    pub fn end(&mut self, port: PortId, passage: Passage, arrival: Arrival) -> Handled {
+        let state = self.port(port).state;
+        let path = self.path(port);
+        let mut handled = Handled { path, result: Ok(()), trigger: Trigger::None, correction: Correction::None };
+        if state == State::Exchange {
+            return handled;
+        }
+        // A STATUS byte has been written, so the error has been reported.
+        self.error &= matches!(passage.kind, Kind::Plain);
+        let learnt = passage.learnt();
+        handled.result = learnt.map(|_| ());
+        self.count(handled.result);
+        let Ok(learnt) = learnt else { return handled };
+        handled.trigger = self.port_mut(port).head(passage.head).trigger;
+        let master = self.port(port).flags.has(PortFlags::MASTER_PORT);
+        if master && state.waits_for(passage.head) {
+            self.alive_ns = arrival.now_ns;
+        }
+        match learnt {
+            Learnt::Place(assignment) => self.assignment = Some(assignment),
+            Learnt::Sync(sync) => {
+                self.last_sync = Some((sync, arrival.sof_ns));
+                handled.correction = self.clock.frame(sync.time_stamp_ns, arrival.sof_ns, arrival.counter_ns);
+            }
+            Learnt::Parameters(bytes) if master && state == State::Param => {
+                self.parameters = Some(bytes);
+                self.line = LineDelay::new(self.config.delay_model);
+            }
+            Learnt::Parameters(_) | Learnt::Nothing => {}
+        }
+        if passage.is_discovery() && (self.is_last() || Status(passage.head[3]).is_last()) {
+            self.output_total = Some(passage.output_total());
+        }
+        if state == State::Idle && self.is_last() && self.port(port).state == State::Idle {
+            handled.path = Path::Absorb;
+        }
+        self.port_mut(port).end_of_frame();
+        if master && state == State::Sync && matches!(passage.kind, Kind::Plain) {
+            handled.result = self.line_delay_next_ns().map(|_| ());
+            self.restart();
+        }
+        handled
+    }
+
+    /// A whole start-up frame in a buffer, which is rewritten as it will be sent on.
+    pub fn frame(&mut self, port: PortId, frame: &mut [u8], arrival: Arrival) -> Handled {
+        let mut passage = self.begin(port);
+        for byte in frame.iter_mut() {
+            *byte = passage.byte(*byte);
+        }
+        self.end(port, passage, arrival)
+    }
+
+    fn count(&mut self, result: Result<(), Error>) {
+        let counters = &mut self.counters;
+        match result {
+            Ok(()) => counters.good_frames = counters.good_frames.saturating_add(1),
+            Err(Error::BadFcs { .. } | Error::BadCrc8 { .. }) => {
+                counters.crc_errors = counters.crc_errors.saturating_add(1);
+                self.error = true;
+            }
+            Err(_) => counters.format_errors = counters.format_errors.saturating_add(1),
+        }
+    }
+
+    fn path(&self, port: PortId) -> Path {
+        let handler = self.port(port);
+        let master = handler.flags.has(PortFlags::MASTER_PORT);
+        match handler.state {
+            State::LineDelay if master => Path::Reflect,
+            State::LineDelay => Path::Absorb,
+            State::Exchange if self.is_last() => Path::Absorb,
+            _ if self.is_last() => Path::Reflect,
+            _ => Path::Forward,
+        }
+    }
+
+    /// The delay request to send for a trigger.
+    pub const fn delay_request(trigger: Trigger) -> Option<DelayReq> {
+        match trigger {
+            Trigger::None => None,
+            Trigger::Normal => Some(DelayReq::of_device(false)),
+            Trigger::Last => Some(DelayReq::of_device(true)),
+        }
+    }
+
+    /// The own request has come back to the reverse port after `rtt_ns`. `trigger`: what had started it.
+    ///
+    /// # Errors
+    /// As [`LongFrame::new`] and [`DelayReq::of`]; the round trip is then not used.
+    pub fn delay_reflection(&mut self, frame: &[u8], rtt_ns: u32, trigger: Trigger) -> Result<(), Error> {
+        let result = LongFrame::new(frame).and_then(DelayReq::of).map(|_| ());
+        self.count(result);
+        result?;
+        self.line.add(rtt_ns);
+        let reverse = self.master_port().map(PortId::other);
+        if let (Trigger::Last, Some(port)) = (trigger, reverse) {
+            self.port_mut(port).enter(State::Sync);
+            self.port_mut(port).end_of_frame();
+        }
+        Ok(())
+    }
+
+    /// A master frame of the IO exchange at the port that faces the master. `sof_ns`, `counter_ns`: the counter within
+    /// the cycle at the start of the frame and now. Frames of the other port just pass.
+    ///
+    /// # Errors
+    /// As [`MasterFrameView::new`] and [`MasterFrameView::slice`]; [`Error::WrongState`] if the device is not in
+    /// IO exchange. The frame counts as received even so.
+    pub fn exchange<'a>(&mut self, frame: &'a [u8], sof_ns: u32, counter_ns: u32) -> Result<Output<'a>, Error> {
+        let (State::Exchange, Some(place), Some((sync, _))) = (self.state(), self.assignment, self.last_sync) else {
+            return Err(Error::WrongState);
+        };
+        self.received = true;
+        let output_len = self.config.output_len.or(self.output_total).unwrap_or_default();
+        let taken = MasterFrameView::new(frame, output_len.into()).and_then(|view| {
+            Ok((view.slice(place.out_offset, self.config.lengths.output)?, view.reference_ns(sync.delay_ns)))
+        });
+        self.count(taken.map(|_| ()));
+        let (data, reference_ns) = taken?;
+        // Start 500 ns into the cycle, and the way here.
+        let expected = u32::from(sync.delay_ns).saturating_add(crate::timing::TRIGGER_NS);
+        Ok(Output { data, reference_ns, correction: self.clock.frame(expected, sof_ns, counter_ns) })
+    }
+
+    /// The own frame of the IO exchange; reports an error once.
+    pub fn answer<const P: usize>(&mut self, payload: [u8; P]) -> Option<DeviceFrame<P>> {
+        let (State::Exchange, Some(place)) = (self.state(), self.assignment) else { return None };
+        let status = Status::of_device(self.is_last(), core::mem::take(&mut self.error));
+        Some(DeviceFrame { address: place.address, status, payload })
+    }
+}

@@ -1,0 +1,220 @@
+//! One port's handler: what the head of a frame does to its state.
+
+use core::ops::{BitOr, BitOrAssign};
+
+use crate::frame::MULTICAST;
+use crate::{FrameType, Status};
+
+/// State of a device, by the published codes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[repr(u8)]
+pub enum State {
+    /// 0: waits for DISCOVERY.
+    #[default]
+    Idle = 0,
+    /// 1: gets address and offsets.
+    Discovery = 1,
+    /// 2: gets the parameters.
+    Param = 2,
+    /// 3: measures the line to the next device.
+    LineDelay = 3,
+    /// 4: sets its clock.
+    Sync = 4,
+    /// 5: IOEX, the IO exchange.
+    Exchange = 5,
+}
+
+impl State {
+    /// Whether this is the head of a frame the state acts on.
+    pub(super) fn waits_for(self, [da, _, code, _]: [u8; 4]) -> bool {
+        da == MULTICAST && self.frame_type().is_some_and(|t| t.code() == code)
+    }
+
+    const fn frame_type(self) -> Option<FrameType> {
+        match self {
+            Self::Idle | Self::Discovery => Some(FrameType::Discovery),
+            Self::Param => Some(FrameType::Param),
+            Self::LineDelay => Some(FrameType::DelayReq),
+            Self::Sync => Some(FrameType::Sync),
+            Self::Exchange => None,
+        }
+    }
+}
+
+/// Flags of a port's handler, with the published names.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct PortFlags(pub u8);
+
+impl PortFlags {
+    /// LAST_DEVICE: no other port is linked.
+    pub const LAST_DEVICE: Self = Self(1 << 0);
+    /// MASTER_PORT: this port faces the master.
+    pub const MASTER_PORT: Self = Self(1 << 1);
+    /// IGNORE_TO_EOF: the frame has been looked at; its rest is of no interest.
+    pub const IGNORE_TO_EOF: Self = Self(1 << 2);
+    /// SWITCH_PORT_CONFIG: the state has changed, so the forwarding has to change at the end of the frame.
+    pub const SWITCH_PORT_CONFIG: Self = Self(1 << 3);
+    /// NEW_SYNC_FRAME: a SYNC frame for the clock.
+    pub const NEW_SYNC_FRAME: Self = Self(1 << 4);
+
+    /// Whether all of `flags` are set.
+    pub const fn has(self, flags: Self) -> bool {
+        self.0 & flags.0 == flags.0
+    }
+
+    const fn without(self, flags: Self) -> Self {
+        Self(self.0 & !flags.0)
+    }
+}
+
+impl BitOr for PortFlags {
+    type Output = Self;
+
+    fn bitor(self, other: Self) -> Self {
+        Self(self.0 | other.0)
+    }
+}
+
+impl BitOrAssign for PortFlags {
+    fn bitor_assign(&mut self, other: Self) {
+        self.0 |= other.0;
+    }
+}
+
+/// Measurement that a delay request on the master port starts on the other port.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum Trigger {
+    /// None.
+    #[default]
+    None = 0,
+    /// 1: one of the sixteen.
+    Normal = 1,
+    /// 2: the last; its request carries STATE_CHANGE.
+    Last = 2,
+}
+
+/// What a handler found out from the head of a frame.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Seen {
+    /// The frame is sent on with changes.
+    pub modifies: bool,
+    /// Measurement to start.
+    pub trigger: Trigger,
+}
+
+/// Handler of one port.
+///
+/// ```text
+///  IDLE --DISCOVERY--> DISCOVERY --STATE_CHANGE--> PARAM --STATE_CHANGE--> LINE_DELAY
+///                                                   IOEX <--STATE_CHANGE-- SYNC <--+ STATE_CHANGE
+/// ```
+///
+/// The state changes with the head of the frame; forwarding changes at its end. A frame of another TYPE or with
+/// another DA than the state waits for is ignored.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Port {
+    /// State.
+    pub state: State,
+    /// Flags.
+    pub flags: PortFlags,
+}
+
+impl Port {
+    /// Takes DA, SA, TYPE and STATUS of a frame.
+    pub fn head(&mut self, head: [u8; 4]) -> Seen {
+        if self.flags.has(PortFlags::IGNORE_TO_EOF) {
+            return Seen::default();
+        }
+        self.flags |= PortFlags::IGNORE_TO_EOF;
+        let master = self.flags.has(PortFlags::MASTER_PORT);
+        // The reverse port does not see requests in LINE_DELAY, only its own one reflected.
+        if !self.state.waits_for(head) || self.state == State::LineDelay && !master {
+            return Seen::default();
+        }
+        let [_, _, _, status] = head.map(Status);
+        let change = status.is_state_change();
+        let seen = match self.state {
+            State::Idle => return self.first(status),
+            State::Discovery => Seen { modifies: master, ..Seen::default() },
+            State::LineDelay if change => Seen { trigger: Trigger::Last, ..Seen::default() },
+            State::LineDelay => Seen { trigger: Trigger::Normal, ..Seen::default() },
+            State::Sync => {
+                if master {
+                    self.flags |= PortFlags::NEW_SYNC_FRAME;
+                }
+                Seen { modifies: master, ..Seen::default() }
+            }
+            State::Param | State::Exchange => Seen::default(),
+        };
+        if change {
+            self.enter(match self.state {
+                State::Idle | State::Discovery => State::Param,
+                State::Param => State::LineDelay,
+                State::LineDelay => State::Sync,
+                State::Sync | State::Exchange => State::Exchange,
+            });
+        }
+        seen
+    }
+
+    /// The first DISCOVERY tells which way the master is. A last device handles even this one.
+    fn first(&mut self, status: Status) -> Seen {
+        if !status.is_last() {
+            self.flags |= PortFlags::MASTER_PORT;
+        }
+        self.enter(State::Discovery);
+        Seen { modifies: self.flags.has(PortFlags::LAST_DEVICE), ..Seen::default() }
+    }
+
+    pub(super) fn enter(&mut self, state: State) {
+        self.state = state;
+        self.flags |= PortFlags::SWITCH_PORT_CONFIG;
+    }
+
+    /// The frame has ended: the next one is looked at again.
+    pub fn end_of_frame(&mut self) {
+        self.flags =
+            self.flags.without(PortFlags::IGNORE_TO_EOF | PortFlags::SWITCH_PORT_CONFIG | PortFlags::NEW_SYNC_FRAME);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Every state, role, TYPE and STATUS: one step forward at most, and only for the frame the state waits for.
+    #[test]
+    fn every_head_moves_one_step_at_most() {
+        let states = [State::Idle, State::Discovery, State::Param, State::LineDelay, State::Sync, State::Exchange];
+        for state in states {
+            for flags in (0..32).map(PortFlags) {
+                for code in 0..=u8::MAX {
+                    for status in 0..=u8::MAX {
+                        let before = Port { state, flags };
+                        let mut port = before;
+                        let seen = port.head([255, 0, code, status]);
+                        let step = port.state as u8 - before.state as u8;
+                        assert!(step <= 1);
+                        if step == 1 {
+                            assert_eq!(code, if state as u8 == 0 { 1 } else { [1, 2, 3, 5][state as usize - 1] });
+                            assert!(status & 8 != 0 || state == State::Idle);
+                            assert!(port.flags.has(PortFlags::SWITCH_PORT_CONFIG));
+                        }
+                        if flags.has(PortFlags::IGNORE_TO_EOF) {
+                            assert_eq!((port, seen), (before, Seen::default()));
+                        }
+                        let mut other = before;
+                        assert_eq!(other.head([254, 0, code, status]), Seen::default());
+                        assert_eq!(other.state, state);
+                    }
+                }
+            }
+        }
+    }
+}

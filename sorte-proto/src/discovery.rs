@@ -1,0 +1,408 @@
+use crate::frame::{FrameType, LongFrame, count, emit};
+use crate::{DeviceAddress, Error, Status};
+
+/// Devices that a discovery frame has room for.
+pub const MAX_DEVICES: usize = 254;
+const TABLE: usize = MAX_DEVICES * 4;
+const PAYLOAD: usize = 6 + TABLE;
+
+/// Process data of one device: its entry in the table of a discovery frame.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "arbitrary", derive(arbitrary::Arbitrary))]
+pub struct Entry {
+    /// Bytes from the device to the master.
+    pub input: u16,
+    /// Bytes from the master to the device.
+    pub output: u16,
+}
+
+impl Entry {
+    /// What the published device announces: 4 bytes each way.
+    pub const STOCK: Self = Self { input: 4, output: 4 };
+
+    const fn parse([i0, i1, o0, o1]: [u8; 4]) -> Self {
+        Self { input: u16::from_le_bytes([i0, i1]), output: u16::from_le_bytes([o0, o1]) }
+    }
+
+    const fn emit(self) -> [u8; 4] {
+        let ([i0, i1], [o0, o1]) = (self.input.to_le_bytes(), self.output.to_le_bytes());
+        [i0, i1, o0, o1]
+    }
+}
+
+/// A discovery frame in a buffer.
+///
+/// ```text
+///  byte 0    1   2   3       4      6            8             10 + 4 (a-1)           1026
+///       255  SA  1   STATUS  count  input total  output total  entry of device a      FCS
+///                            u16    u16          u16           input u16, output u16
+/// ```
+///
+/// Only the first `count` entries have a meaning. The rest is whatever the master filled in: the published master
+/// sends a debug pattern there.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct DiscoveryView<'a> {
+    frame: LongFrame<'a>,
+    fields: &'a [u8; PAYLOAD],
+}
+
+impl<'a> DiscoveryView<'a> {
+    /// Checks as [`LongFrame::new`], then that TYPE is 1.
+    ///
+    /// # Errors
+    /// As [`LongFrame::new`]; [`Error::UnexpectedType`].
+    pub fn new(bytes: &'a [u8]) -> Result<Self, Error> {
+        Self::of(LongFrame::new(bytes)?)
+    }
+
+    /// Checks that TYPE is 1.
+    ///
+    /// # Errors
+    /// [`Error::UnexpectedType`]
+    pub fn of(frame: LongFrame<'a>) -> Result<Self, Error> {
+        Ok(Self { frame, fields: frame.of_type(FrameType::Discovery)? })
+    }
+
+    /// SA.
+    pub const fn source(self) -> u8 {
+        self.frame.source()
+    }
+
+    /// STATUS.
+    pub const fn status(self) -> Status {
+        self.frame.status()
+    }
+
+    /// Devices that the frame has passed; above 254 the line is too long.
+    pub const fn count(self) -> u16 {
+        let [c0, c1, ..] = self.fields;
+        u16::from_le_bytes([*c0, *c1])
+    }
+
+    /// Input bytes of these devices.
+    pub const fn input_total(self) -> u16 {
+        let [_, _, i0, i1, ..] = self.fields;
+        u16::from_le_bytes([*i0, *i1])
+    }
+
+    /// Output bytes of these devices.
+    pub const fn output_total(self) -> u16 {
+        let [_, _, _, _, o0, o1, ..] = self.fields;
+        u16::from_le_bytes([*o0, *o1])
+    }
+
+    /// The entries of the devices counted, in the order of their addresses.
+    pub fn entries(self) -> impl Iterator<Item = Entry> + 'a {
+        self.table().take(usize::from(self.count()))
+    }
+
+    /// Entry of one of the devices counted.
+    pub fn entry(self, address: DeviceAddress) -> Option<Entry> {
+        self.entries().nth(usize::from(address.hops_before()))
+    }
+
+    fn table(self) -> impl Iterator<Item = Entry> + 'a {
+        let (_, table) = self.fields.split_at(6);
+        table.chunks_exact(4).map(|e| e.first_chunk().map_or(Entry::default(), |e| Entry::parse(*e)))
+    }
+
+    /// The values.
+    pub fn to_owned(self) -> Discovery {
+        let mut entries = [Entry::default(); MAX_DEVICES];
+        entries.iter_mut().zip(self.table()).for_each(|(to, from)| *to = from);
+        Discovery {
+            source: self.source(),
+            status: self.status(),
+            count: self.count(),
+            input_total: self.input_total(),
+            output_total: self.output_total(),
+            entries,
+        }
+    }
+}
+
+/// The values of a discovery frame, all 254 entries with what is in them.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "arbitrary", derive(arbitrary::Arbitrary))]
+pub struct Discovery {
+    /// SA, 0 in everything the published firmware sends.
+    pub source: u8,
+    /// STATUS.
+    pub status: Status,
+    /// Devices that the frame has passed.
+    pub count: u16,
+    /// Input bytes of these devices.
+    pub input_total: u16,
+    /// Output bytes of these devices.
+    pub output_total: u16,
+    /// Entries of the devices 1 to 254.
+    pub entries: [Entry; MAX_DEVICES],
+}
+
+impl Discovery {
+    /// Bytes from DA to FCS.
+    pub const LEN: usize = PAYLOAD + LongFrame::OVERHEAD;
+
+    /// As a master sends it, with zeros where the devices will write. `last`: the last DISCOVERY of the start-up.
+    pub const fn request(last: bool) -> Self {
+        Self {
+            source: 0,
+            status: if last { Status::FINAL } else { Status::DISCOVERY },
+            count: 0,
+            input_total: 0,
+            output_total: 0,
+            entries: [Entry { input: 0, output: 0 }; MAX_DEVICES],
+        }
+    }
+
+    /// As the published master sends it: its table is filled with a debug pattern, 31 blocks of 32 bytes holding the
+    /// words 16, 48, 80, ... and then 0xBEEF.
+    pub fn published_request(last: bool) -> Self {
+        let mut frame = Self::request(last);
+        for (index, entry) in (0u16..).zip(&mut frame.entries) {
+            // The pattern starts with the frame's table, eight entries a block.
+            let word = if index < 248 { (index >> 3 << 5).saturating_add(16) } else { 0xbeef };
+            *entry = Entry { input: word, output: word };
+        }
+        frame
+    }
+
+    /// Checks as [`DiscoveryView::new`].
+    ///
+    /// # Errors
+    /// As [`DiscoveryView::new`].
+    pub fn parse(bytes: &[u8]) -> Result<Self, Error> {
+        Ok(DiscoveryView::new(bytes)?.to_owned())
+    }
+
+    /// The frame from DA to FCS.
+    pub fn emit(&self) -> [u8; Self::LEN] {
+        let mut payload = [0; PAYLOAD];
+        let (head, table) = payload.split_at_mut(6);
+        let ([c0, c1], [i0, i1]) = (self.count.to_le_bytes(), self.input_total.to_le_bytes());
+        let [o0, o1] = self.output_total.to_le_bytes();
+        head.iter_mut().zip([c0, c1, i0, i1, o0, o1]).for_each(|(to, from)| *to = from);
+        for (to, entry) in table.chunks_exact_mut(4).zip(&self.entries) {
+            to.iter_mut().zip(entry.emit()).for_each(|(to, from)| *to = from);
+        }
+        emit(self.source, FrameType::Discovery, self.status, &payload)
+    }
+
+    /// What a device does to the frame that passes: it takes the next address and the present totals as its offsets,
+    /// adds its lengths, and sets its STATUS bits. [`cut_through`](crate::cut_through) does the same byte by byte.
+    ///
+    /// A device that finds 254 devices before it, or more, makes the count 255 and takes nothing: the master then
+    /// refuses the network.
+    ///
+    /// # Errors
+    /// [`Error::TooManyDevices`]
+    pub fn pass(&mut self, lengths: Entry, last: bool, error: bool) -> Result<Assignment, Error> {
+        self.status |= Status::of_device(last, error);
+        let before = usize::from(self.count);
+        let (Some(entry), Some(address)) = (self.entries.get_mut(before), next_address(self.count)) else {
+            let count = self.count.saturating_add(1);
+            self.count = count_after(self.count);
+            return Err(Error::TooManyDevices { count });
+        };
+        let assignment = Assignment { address, in_offset: self.input_total, out_offset: self.output_total };
+        *entry = lengths;
+        self.count = count_after(self.count);
+        self.input_total = self.input_total.wrapping_add(lengths.input);
+        self.output_total = self.output_total.wrapping_add(lengths.output);
+        Ok(assignment)
+    }
+}
+
+/// What a device knows of itself after DISCOVERY.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct Assignment {
+    /// Its place in the line.
+    pub address: DeviceAddress,
+    /// Input bytes of the devices before it.
+    pub in_offset: u16,
+    /// Output bytes of the devices before it: where its own output bytes begin.
+    pub out_offset: u16,
+}
+
+/// The device count behind one more device. A passing frame shows its low byte first, so a carry cannot reach the high
+/// one: 254 and 255 both become 255.
+pub(crate) fn count_after(before: u16) -> u16 {
+    let [low, high] = before.to_le_bytes();
+    u16::from_le_bytes([low.saturating_add(1), high])
+}
+
+pub(crate) fn next_address(devices_before: u16) -> Option<DeviceAddress> {
+    u8::try_from(devices_before.checked_add(1)?).ok().and_then(DeviceAddress::new)
+}
+
+/// The line as the master knows it from the last discovery answer.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Network {
+    devices: u8,
+    input_total: u16,
+    output_total: u16,
+    entries: [Entry; MAX_DEVICES],
+}
+
+impl Network {
+    /// A line without devices.
+    pub const EMPTY: Self =
+        Self { devices: 0, input_total: 0, output_total: 0, entries: [Entry { input: 0, output: 0 }; MAX_DEVICES] };
+
+    /// Checks that there are at most 254 devices and that the totals are the sums of the entries.
+    ///
+    /// # Errors
+    /// [`Error::TooManyDevices`], [`Error::TableMismatch`]
+    pub fn new(answer: DiscoveryView<'_>) -> Result<Self, Error> {
+        let devices = answer.count();
+        let mut network = Self::EMPTY;
+        network.devices = match u8::try_from(devices) {
+            Ok(n) if usize::from(n) <= MAX_DEVICES => n,
+            _ => return Err(Error::TooManyDevices { count: devices }),
+        };
+        let (mut input, mut output) = (0u16, 0u16);
+        for (to, entry) in network.entries.iter_mut().zip(answer.entries()) {
+            *to = entry;
+            (input, output) = (input.saturating_add(entry.input), output.saturating_add(entry.output));
+        }
+        for (got, want) in [(answer.input_total(), input), (answer.output_total(), output)] {
+            // A sum that reached the end of u16 is not a sum any more.
+            if got != want || want == u16::MAX {
+                return Err(Error::TableMismatch { got, want });
+            }
+        }
+        (network.input_total, network.output_total) = (input, output);
+        Ok(network)
+    }
+
+    /// Devices in the line, 0..=254.
+    pub const fn devices(&self) -> u8 {
+        self.devices
+    }
+
+    /// Input bytes of all devices.
+    pub const fn input_total(&self) -> u16 {
+        self.input_total
+    }
+
+    /// Output bytes of all devices.
+    pub const fn output_total(&self) -> u16 {
+        self.output_total
+    }
+
+    /// The devices' lengths in the order of their addresses.
+    pub fn entries(&self) -> &[Entry] {
+        self.entries.get(..usize::from(self.devices)).unwrap_or(&[])
+    }
+
+    /// Address, lengths and offsets of each device.
+    pub fn assignments(&self) -> impl Iterator<Item = (Assignment, Entry)> + '_ {
+        let start = (0u16, 0u16);
+        self.entries().iter().zip(1..=u8::MAX).scan(start, |(input, output), (&entry, address)| {
+            let assignment =
+                Assignment { address: DeviceAddress::new(address)?, in_offset: *input, out_offset: *output };
+            *input = input.saturating_add(entry.input);
+            *output = output.saturating_add(entry.output);
+            Some((assignment, entry))
+        })
+    }
+}
+
+/// Checks the length of a buffer that a frame is to be written into.
+pub(crate) fn room(into: &mut [u8], need: usize) -> Result<&mut [u8], Error> {
+    let got = count(into.len());
+    into.get_mut(..need).ok_or(Error::BufferTooSmall { got, need: count(need) })
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+    use std::vec::Vec;
+
+    use super::*;
+    use crate::frame::refresh_fcs;
+
+    fn pass_all(lengths: &[Entry]) -> Discovery {
+        let mut frame = Discovery::request(false);
+        for (k, entry) in lengths.iter().enumerate() {
+            frame.pass(*entry, k + 1 == lengths.len(), false).unwrap();
+        }
+        frame
+    }
+
+    #[test]
+    fn a_full_line_ends_exactly_at_the_fcs() {
+        let frame = pass_all(&[Entry::STOCK; 254]);
+        let bytes = frame.emit();
+        assert_eq!(bytes.len(), 1030);
+        assert_eq!(&bytes[1022..1026], &[4, 0, 4, 0]);
+        let network = Network::new(DiscoveryView::new(&bytes).unwrap()).unwrap();
+        assert_eq!((network.devices(), network.input_total(), network.output_total()), (254, 1016, 1016));
+        assert_eq!(network.assignments().last().unwrap().0.out_offset, 1012);
+    }
+
+    #[test]
+    fn the_255th_device_is_an_error_that_the_master_sees() {
+        let mut frame = pass_all(&[Entry::STOCK; 254]);
+        for _ in 0..2 {
+            assert!(matches!(frame.pass(Entry::STOCK, true, false), Err(Error::TooManyDevices { .. })));
+            let bytes = frame.emit();
+            let answer = DiscoveryView::new(&bytes).unwrap();
+            assert_eq!(Network::new(answer), Err(Error::TooManyDevices { count: 255 }));
+            assert_eq!(frame.output_total, 1016);
+        }
+    }
+
+    #[test]
+    fn totals_that_are_not_the_sums_are_refused() {
+        let frame = pass_all(&[Entry { input: 2, output: 6 }, Entry { input: 1, output: 1 }]);
+        let good = frame.emit();
+        assert!(DiscoveryView::new(&good).and_then(Network::new).is_ok());
+        for (at, want) in [(6, 3), (8, 7)] {
+            let mut bytes = good;
+            bytes[at] += 1;
+            refresh_fcs(&mut bytes);
+            let error = Error::TableMismatch { got: want + 1, want };
+            assert_eq!(DiscoveryView::new(&bytes).and_then(Network::new), Err(error));
+        }
+        let huge = pass_all(&[Entry { input: 0xffff, output: 0 }, Entry { input: 0xffff, output: 0 }]).emit();
+        assert!(matches!(DiscoveryView::new(&huge).and_then(Network::new), Err(Error::TableMismatch { .. })));
+    }
+
+    fn entries() -> impl Strategy<Value = Vec<Entry>> {
+        proptest::collection::vec((0u16..200, 0u16..200).prop_map(|(input, output)| Entry { input, output }), 0..=254)
+    }
+
+    proptest! {
+        #[test]
+        fn offsets_are_running_sums(lengths in entries()) {
+            let frame = pass_all(&lengths);
+            let network = Network::new(DiscoveryView::new(&frame.emit()).unwrap()).unwrap();
+            let mut sums = (0, 0);
+            for ((assignment, entry), want) in network.assignments().zip(&lengths) {
+                prop_assert_eq!((assignment.in_offset, assignment.out_offset), sums);
+                prop_assert_eq!(entry, *want);
+                sums = (sums.0 + entry.input, sums.1 + entry.output);
+            }
+            prop_assert_eq!((network.input_total(), network.output_total()), sums);
+            prop_assert_eq!(network.assignments().count(), lengths.len());
+        }
+
+        #[test]
+        fn what_was_emitted_is_parsed_and_back(source: u8, status: u8, count: u16, lengths in entries()) {
+            let mut frame = pass_all(&lengths);
+            (frame.source, frame.status, frame.count) = (source, Status(status), count);
+            let bytes = frame.emit();
+            let back = Discovery::parse(&bytes).unwrap();
+            prop_assert_eq!(back, frame);
+            prop_assert_eq!(back.emit(), bytes);
+        }
+    }
+}

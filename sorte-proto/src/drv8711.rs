@@ -1,0 +1,192 @@
+//! The stepper driver DRV8711: registers, SPI words, and the sequence that sets it up. Data in, words out; the SPI
+//! itself is the caller's.
+//!
+//! ```text
+//!  bit 15    14 13 12  11 ............ 0
+//!      read  address   data               MSB first, SPI mode 0, chip select high, taken when it falls
+//! ```
+//!
+//! From the DRV8711 data sheet (SLVSC40), section 7.6, and the design guide of the 4-axis CNC router (TIDEP-0061),
+//! section 2.1.
+//!
+//! ```
+//! use sorte_proto::drv8711::{Configuration, Ctrl, Register, StepMode};
+//! let mut setup = Configuration::default();
+//! setup.ctrl = Ctrl { enable: true, mode: StepMode::Div256, ..setup.ctrl };
+//! assert_eq!(setup.value(Register::Ctrl), 0xc41);
+//! assert_eq!(Register::Ctrl.write(setup.value(Register::Ctrl)).bits(), 0x0c41);
+//! ```
+
+mod apply;
+mod codes;
+mod current;
+mod fields;
+mod registers;
+
+pub use apply::{Apply, Next};
+pub use codes::{
+    DeadTime, DecayMode, DriveTime, IsGain, OcpDeglitch, OcpThreshold, SampleThreshold, SinkCurrent, SourceCurrent,
+    StallCount, StallDivider, StepMode,
+};
+pub use current::{full_scale_microamps, torque_for_microamps};
+pub use fields::Field;
+pub use registers::{Blank, Configuration, Ctrl, Decay, Drive, Off, Stall, Status, Torque};
+
+/// The eight registers by their addresses.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "arbitrary", derive(arbitrary::Arbitrary))]
+#[repr(u8)]
+pub enum Register {
+    /// CTRL
+    Ctrl = 0,
+    /// TORQUE
+    Torque = 1,
+    /// OFF
+    Off = 2,
+    /// BLANK
+    Blank = 3,
+    /// DECAY
+    Decay = 4,
+    /// STALL
+    Stall = 5,
+    /// DRIVE
+    Drive = 6,
+    /// STATUS
+    Status = 7,
+}
+
+impl Register {
+    /// All, by address.
+    pub const ALL: [Self; 8] =
+        [Self::Ctrl, Self::Torque, Self::Off, Self::Blank, Self::Decay, Self::Stall, Self::Drive, Self::Status];
+
+    /// The address, 0..=7.
+    pub const fn address(self) -> u8 {
+        self as u8
+    }
+
+    /// The register at this address, 0..=7.
+    pub const fn at(address: u8) -> Option<Self> {
+        Some(match address {
+            0 => Self::Ctrl,
+            1 => Self::Torque,
+            2 => Self::Off,
+            3 => Self::Blank,
+            4 => Self::Decay,
+            5 => Self::Stall,
+            6 => Self::Drive,
+            7 => Self::Status,
+            _ => return None,
+        })
+    }
+
+    /// The data sheet's name.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Ctrl => "CTRL",
+            Self::Torque => "TORQUE",
+            Self::Off => "OFF",
+            Self::Blank => "BLANK",
+            Self::Decay => "DECAY",
+            Self::Stall => "STALL",
+            Self::Drive => "DRIVE",
+            Self::Status => "STATUS",
+        }
+    }
+
+    /// Value after power-up.
+    pub const fn reset_value(self) -> u16 {
+        match self {
+            Self::Ctrl => 0xc10,
+            Self::Torque => 0x1ff,
+            Self::Off => 0x030,
+            Self::Blank => 0x080,
+            Self::Decay => 0x110,
+            Self::Stall => 0x040,
+            Self::Drive => 0xa59,
+            Self::Status => 0x000,
+        }
+    }
+
+    /// Bits that read back as written. Bit 10 of TORQUE, the top of SMPLTH, is taken but always reads 0, so a driver has
+    /// to remember what it wrote.
+    pub const fn read_back_mask(self) -> u16 {
+        match self {
+            Self::Torque => 0xfff & !(1 << 10),
+            _ => 0xfff,
+        }
+    }
+
+    /// The word that writes the low 12 bits of `value`.
+    pub const fn write(self, value: u16) -> Word {
+        Word((self.address() as u16) << 12 | value & 0xfff)
+    }
+
+    /// The word that reads it. The answer comes in the same transfer.
+    pub const fn read(self) -> Word {
+        Word(0x8000 | (self.address() as u16) << 12)
+    }
+
+    /// Whether `read` may be what a register that holds `written` reads.
+    ///
+    /// # Errors
+    /// [`Error::ReadBack`](crate::Error::ReadBack)
+    pub const fn verify(self, written: u16, read: u16) -> Result<(), crate::Error> {
+        let mask = self.read_back_mask();
+        let (got, want) = (read & mask, written & mask);
+        if got == want { Ok(()) } else { Err(crate::Error::ReadBack { register: self.address(), got, want }) }
+    }
+}
+
+/// One SPI word.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Word(u16);
+
+impl Word {
+    /// The 16 bits.
+    pub const fn bits(self) -> u16 {
+        self.0
+    }
+
+    /// The bytes in the order they are sent.
+    pub const fn to_bytes(self) -> [u8; 2] {
+        self.0.to_be_bytes()
+    }
+
+    /// Data in the answer to a read. Its upper four bits are undefined.
+    pub const fn answer(miso: [u8; 2]) -> u16 {
+        u16::from_be_bytes(miso) & 0xfff
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn words_carry_address_and_data() {
+        for register in Register::ALL {
+            assert_eq!(Register::at(register.address()), Some(register));
+            assert_eq!(register.read().bits(), 0x8000 | u16::from(register.address()) << 12);
+            for value in 0..=u16::MAX {
+                let word = register.write(value).bits();
+                assert_eq!(word, u16::from(register.address()) << 12 | value & 0xfff);
+                assert_eq!(Word::answer(value.to_be_bytes()), value & 0xfff);
+            }
+        }
+        assert_eq!(Register::at(8), None);
+    }
+
+    #[test]
+    fn only_bit_10_of_torque_may_differ() {
+        for register in Register::ALL {
+            for bit in 0..12 {
+                let good = register.verify(0xfff, 0xfff & !(1 << bit)).is_ok();
+                assert_eq!(good, register == Register::Torque && bit == 10);
+            }
+        }
+    }
+}

@@ -1,0 +1,150 @@
+//! The sequence that writes a configuration and makes sure that it arrived.
+
+use super::{Configuration, Register, Word};
+use crate::Error;
+
+/// TORQUE, OFF, BLANK, DECAY, DRIVE, STALL, and CTRL last because it holds ENBL.
+const ORDER: [Register; 7] = [
+    Register::Torque,
+    Register::Off,
+    Register::Blank,
+    Register::Decay,
+    Register::Drive,
+    Register::Stall,
+    Register::Ctrl,
+];
+
+/// What the caller does next.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum Next {
+    /// Send this word, and hand the two bytes received to [`Apply::answer`].
+    Transfer(Word),
+    /// Everything is written and reads back.
+    Done,
+}
+
+/// Writes each register and reads it back before the next one. CTRL, which switches the motor on, is written only if
+/// all others are right.
+///
+/// ```
+/// use sorte_proto::drv8711::{Apply, Configuration, Next};
+/// let mut chip = [0u16; 8]; // stands for the SPI
+/// let mut apply = Apply::new(Configuration::default());
+/// while let Next::Transfer(word) = apply.next() {
+///     let register = usize::from(word.bits() >> 12 & 7);
+///     if word.bits() & 0x8000 == 0 {
+///         chip[register] = word.bits() & 0xfff;
+///     }
+///     apply.answer(chip[register].to_be_bytes())?;
+/// }
+/// assert_eq!(chip[0], 0xc10);
+/// # Ok::<(), sorte_proto::Error>(())
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Apply {
+    configuration: Configuration,
+    /// Registers that are written and checked.
+    done: u8,
+    /// Whether the present one is written.
+    written: bool,
+}
+
+impl Apply {
+    /// RSTEP is written as it is, so it should be clear: it clears itself and would not read back.
+    pub const fn new(configuration: Configuration) -> Self {
+        Self { configuration, done: 0, written: false }
+    }
+
+    fn register(&self) -> Option<Register> {
+        ORDER.get(usize::from(self.done)).copied()
+    }
+
+    /// What to do next.
+    pub fn next(&self) -> Next {
+        match self.register() {
+            None => Next::Done,
+            Some(register) if self.written => Next::Transfer(register.read()),
+            Some(register) => Next::Transfer(register.write(self.configuration.value(register))),
+        }
+    }
+
+    /// The two bytes that came back while the word was sent.
+    ///
+    /// # Errors
+    /// [`Error::ReadBack`]; the same register is then written again.
+    pub fn answer(&mut self, miso: [u8; 2]) -> Result<(), Error> {
+        let Some(register) = self.register() else { return Ok(()) };
+        if !self.written {
+            self.written = true;
+            return Ok(());
+        }
+        self.written = false;
+        register.verify(self.configuration.value(register), Word::answer(miso))?;
+        self.done = self.done.saturating_add(1);
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::vec::Vec;
+
+    use super::*;
+    use crate::drv8711::{SampleThreshold, Torque};
+
+    /// A chip that loses writes to one register.
+    fn run(configuration: Configuration, dead: Option<Register>) -> (Result<(), Error>, Vec<u16>) {
+        let mut chip = Register::ALL.map(Register::reset_value);
+        let (mut apply, mut written) = (Apply::new(configuration), Vec::new());
+        while let Next::Transfer(word) = apply.next() {
+            let register = Register::at((word.bits() >> 12 & 7) as u8).unwrap();
+            let place = &mut chip[usize::from(register.address())];
+            if word.bits() & 0x8000 == 0 {
+                written.push(word.bits());
+                if dead != Some(register) {
+                    *place = word.bits() & 0xfff;
+                }
+            }
+            // The upper nibble is undefined.
+            let answer = 0xa000 | *place & register.read_back_mask();
+            if let Err(error) = apply.answer(answer.to_be_bytes()) {
+                return (Err(error), written);
+            }
+        }
+        (Ok(()), written)
+    }
+
+    fn other_everywhere() -> Configuration {
+        let read = |register: Register| register.reset_value() ^ 1;
+        Configuration {
+            ctrl: crate::drv8711::Ctrl::parse(read(Register::Ctrl)).unwrap(),
+            torque: Torque { torque: 1, sample_threshold: SampleThreshold::Us400 },
+            off: crate::drv8711::Off::parse(read(Register::Off)).unwrap(),
+            blank: crate::drv8711::Blank::parse(read(Register::Blank)).unwrap(),
+            decay: crate::drv8711::Decay::parse(read(Register::Decay)).unwrap(),
+            stall: crate::drv8711::Stall::parse(read(Register::Stall)).unwrap(),
+            drive: crate::drv8711::Drive::parse(read(Register::Drive)).unwrap(),
+        }
+    }
+
+    #[test]
+    fn ctrl_is_written_last() {
+        let (result, written) = run(other_everywhere(), None);
+        assert_eq!(result, Ok(()));
+        let addresses: Vec<_> = written.iter().map(|word| word >> 12).collect();
+        assert_eq!(addresses, [1, 2, 3, 4, 6, 5, 0]);
+    }
+
+    #[test]
+    fn a_register_that_does_not_take_its_value_stops_before_the_motor_is_on() {
+        for dead in
+            [Register::Torque, Register::Off, Register::Blank, Register::Decay, Register::Stall, Register::Drive]
+        {
+            let (result, written) = run(other_everywhere(), Some(dead));
+            assert!(matches!(result, Err(Error::ReadBack { register, .. }) if register == dead.address()));
+            assert!(written.iter().all(|word| word >> 12 != 0));
+        }
+    }
+}

@@ -1,0 +1,287 @@
+//! An ideal IEP timer with its SYNC0 output and a [`Sync0`] handler, for test benches and simulators.
+//!
+//! The counter runs in ticks of 5 ns: 0, 5, .. 3995, 0. A compare fires in the tick in which the counter reaches or
+//! passes its value, if it is enabled then. The handler runs a fixed time after the first event that is not yet
+//! served, after the compares of that tick, and serves all that has fired by then.
+//!
+//! Nothing is simulated between the events, so a cycle costs a handful of steps and not 800.
+//!
+//! ```
+//! use sorte_proto::StartTime;
+//! use sorte_proto::iep::{Channel, Edge};
+//! use sorte_proto::sync0::Variant;
+//! let mut axis = Channel::new(Variant::Lossless, 2000, 300);
+//! axis.set_start(StartTime::new(600)); // for the cycle after this one
+//! assert_eq!(axis.next_edge(8000), Some(Edge { ns: 4595, high: true }));
+//! assert_eq!(axis.next_edge(8000), Some(Edge { ns: 6595, high: false }));
+//! ```
+
+use crate::StartTime;
+use crate::sync0::{PULSE_NS, Register, Sync0, Variant, Write, Writes};
+
+/// One tick of the counter in ns.
+pub const TICK_NS: u64 = 5;
+/// Ticks of one cycle.
+const CYCLE: u64 = 800;
+/// CMP0 in ticks.
+const WRAP: u64 = 799;
+const PULSE: u64 = PULSE_NS as u64 / TICK_NS;
+const NEVER: u64 = u64::MAX;
+
+/// A change of the SYNC0 output.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Edge {
+    /// When, in ns since the start.
+    pub ns: u64,
+    /// To which level.
+    pub high: bool,
+}
+
+/// Events that wait for the handler.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Events {
+    /// The pulse is over.
+    pub cmp6: bool,
+    /// The counter has wrapped.
+    pub cmp0: bool,
+    /// New data.
+    pub cmp7: bool,
+}
+
+/// One run of the handler.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Served {
+    /// When, in ns since the start.
+    pub ns: u64,
+    /// What it served.
+    pub events: Events,
+    /// What CMP6, CMP0 and CMP7 wrote.
+    pub writes: [Option<Writes>; 3],
+}
+
+/// What happens next.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum Happening {
+    /// SYNC0 changes.
+    Edge(Edge),
+    /// The handler has run.
+    Served(Served),
+}
+
+/// One axis: timer, SYNC0 output and handler.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Channel {
+    sync0: Sync0,
+    start: Option<StartTime>,
+    latency: u64,
+    /// The last tick that has been dealt with.
+    now: u64,
+    /// Ticks of the next events.
+    cmp0: u64,
+    cmp1: u64,
+    cmp6: u64,
+    cmp7: u64,
+    serve: u64,
+    rise: u64,
+    fall: u64,
+    /// Registers.
+    cmp1_ns: u16,
+    cmp6_ns: u16,
+    cfg: u16,
+    sync_start: u16,
+    armed: bool,
+    pending: Events,
+}
+
+impl Channel {
+    /// A timer at 0. `cmp7_ns`: when new data are taken, 2000 in the reference design; `latency_ns`: from an event to
+    /// its handler, rounded up to ticks.
+    pub const fn new(variant: Variant, cmp7_ns: u16, latency_ns: u16) -> Self {
+        Self {
+            sync0: Sync0::new(variant),
+            start: None,
+            latency: (latency_ns as u64).div_ceil(TICK_NS),
+            now: 0,
+            cmp0: WRAP,
+            cmp1: NEVER,
+            cmp6: NEVER,
+            cmp7: (cmp7_ns as u64).div_ceil(TICK_NS),
+            serve: NEVER,
+            rise: NEVER,
+            fall: NEVER,
+            cmp1_ns: 0,
+            cmp6_ns: 0,
+            cfg: crate::sync0::CMP_CFG_IDLE,
+            sync_start: 0,
+            armed: true,
+            pending: Events { cmp6: false, cmp0: false, cmp7: false },
+        }
+    }
+
+    /// The word in the output buffer: what CMP7 will find.
+    pub const fn set_start(&mut self, start: Option<StartTime>) {
+        self.start = start;
+    }
+
+    /// The handler's state.
+    pub const fn sync0(&self) -> &Sync0 {
+        &self.sync0
+    }
+
+    /// A register as it was written last.
+    pub const fn register(&self, register: Register) -> u16 {
+        match register {
+            Register::CmpCfg => self.cfg,
+            Register::Cmp1 => self.cmp1_ns,
+            Register::Cmp6 => self.cmp6_ns,
+            Register::SyncStart => self.sync_start,
+            Register::SyncCtrl => {
+                if self.armed {
+                    3
+                } else {
+                    2
+                }
+            }
+        }
+    }
+
+    /// The next edge before `until_ns`.
+    pub fn next_edge(&mut self, until_ns: u64) -> Option<Edge> {
+        loop {
+            if let Happening::Edge(edge) = self.next(until_ns)? {
+                return Some(edge);
+            }
+        }
+    }
+
+    /// The next edge or run of the handler before `until_ns`.
+    pub fn next(&mut self, until_ns: u64) -> Option<Happening> {
+        loop {
+            let compare = self.cmp0.min(self.cmp1).min(self.cmp6).min(self.cmp7);
+            let edge = self.rise.min(self.fall);
+            let at = compare.min(edge).min(self.serve);
+            if at.saturating_mul(TICK_NS) >= until_ns {
+                return None;
+            }
+            self.now = at;
+            if compare == at {
+                self.compare();
+            } else if edge == at {
+                return Some(Happening::Edge(self.edge()));
+            } else {
+                return Some(self.run_handler());
+            }
+        }
+    }
+
+    fn compare(&mut self) {
+        let at = self.now;
+        let next = at.saturating_add(CYCLE);
+        if self.cmp1 == at {
+            self.cmp1 = next;
+            if self.armed {
+                self.armed = false;
+                self.rise = at.saturating_add(u64::from(self.sync_start)).saturating_add(1);
+            }
+        }
+        let interrupt = self.cmp0 == at || self.cmp6 == at || self.cmp7 == at;
+        if self.cmp0 == at {
+            self.cmp0 = next;
+            self.pending.cmp0 = true;
+        }
+        if self.cmp6 == at {
+            self.cmp6 = next;
+            self.pending.cmp6 = true;
+        }
+        if self.cmp7 == at {
+            self.cmp7 = next;
+            self.pending.cmp7 = true;
+        }
+        if interrupt && self.serve == NEVER {
+            self.serve = at.saturating_add(self.latency);
+        }
+    }
+
+    fn edge(&mut self) -> Edge {
+        let high = self.rise == self.now;
+        if high {
+            self.rise = NEVER;
+            self.fall = self.now.saturating_add(PULSE);
+        } else {
+            self.fall = NEVER;
+        }
+        self.at(high)
+    }
+
+    const fn at(&self, high: bool) -> Edge {
+        Edge { ns: self.now.saturating_mul(TICK_NS), high }
+    }
+
+    /// A cut pulse falls right behind the handler, in the same tick.
+    fn run_handler(&mut self) -> Happening {
+        let events = core::mem::take(&mut self.pending);
+        self.serve = NEVER;
+        let mut writes = [None; 3];
+        let [six, zero, seven] = &mut writes;
+        if events.cmp6 {
+            *six = Some(self.sync0.cmp6());
+            self.apply(*six);
+        }
+        if events.cmp0 {
+            *zero = Some(self.sync0.cmp0());
+            self.apply(*zero);
+        }
+        if events.cmp7 {
+            *seven = Some(self.sync0.cmp7(self.start));
+            self.apply(*seven);
+        }
+        Happening::Served(Served { ns: self.now.saturating_mul(TICK_NS), events, writes })
+    }
+
+    fn apply(&mut self, writes: Option<Writes>) {
+        for write in writes.into_iter().flatten() {
+            self.write(write);
+        }
+    }
+
+    fn write(&mut self, Write { register, value }: Write) {
+        match register {
+            Register::CmpCfg => self.cfg = value,
+            Register::Cmp1 => self.cmp1_ns = value,
+            Register::Cmp6 => self.cmp6_ns = value,
+            Register::SyncStart => self.sync_start = value,
+            Register::SyncCtrl if value == 2 => {
+                self.armed = false;
+                self.rise = NEVER;
+                self.fall = if self.fall == NEVER { NEVER } else { self.now };
+            }
+            Register::SyncCtrl => self.armed = true,
+        }
+        match register {
+            Register::CmpCfg => {
+                self.cmp1 = self.next_match(2, self.cmp1_ns);
+                self.cmp6 = self.next_match(7, self.cmp6_ns);
+            }
+            Register::Cmp1 => self.cmp1 = self.next_match(2, value),
+            Register::Cmp6 => self.cmp6 = self.next_match(7, value),
+            Register::SyncStart | Register::SyncCtrl => {}
+        }
+    }
+
+    /// The next tick after this one in which the counter reaches `value_ns`, if bit `enable` of CMP_CFG is set.
+    fn next_match(&self, enable: u8, value_ns: u16) -> u64 {
+        let tick = u64::from(value_ns).div_ceil(TICK_NS);
+        if self.cfg >> enable & 1 == 0 || tick > WRAP {
+            return NEVER;
+        }
+        let in_cycle = self.now.checked_rem(CYCLE).unwrap_or(0);
+        let start = self.now.saturating_sub(in_cycle);
+        let wait = if tick > in_cycle { tick } else { tick.saturating_add(CYCLE) };
+        start.saturating_add(wait)
+    }
+}

@@ -1,0 +1,51 @@
+#![doc = include_str!("../README.md")]
+#![no_std]
+#![cfg_attr(docsrs, feature(doc_cfg))]
+#![cfg_attr(test, allow(clippy::arithmetic_side_effects, clippy::cast_possible_truncation))]
+
+#[cfg(any(test, feature = "std"))]
+extern crate std;
+
+pub mod cut_through;
+
+#[cfg(test)]
+mod both_ends;
+mod clock;
+mod crc;
+mod delay_req;
+pub mod device;
+mod discovery;
+pub mod drv8711;
+mod error;
+mod exchange;
+mod frame;
+pub mod iep;
+mod line_delay;
+pub mod master;
+mod param;
+mod payload;
+mod preamble;
+mod pto;
+mod status;
+pub mod stream;
+mod sync;
+pub mod sync0;
+pub mod timing;
+
+pub use clock::{AVERAGE, Clock, Correction, WRITE_DELAY_NS};
+pub use crc::{crc8, crc8_update, fcs};
+pub use delay_req::DelayReq;
+pub use discovery::{Assignment, Discovery, DiscoveryView, Entry, MAX_DEVICES, Network};
+pub use error::{Error, ErrorClass};
+pub use exchange::{
+    DeviceFrame, DeviceFrameView, MasterFrame, MasterFrameView, PublishedDeviceFrame, STOCK_INPUT, STOCK_OUTPUT,
+    write_master_frame,
+};
+pub use frame::{DeviceAddress, FrameType, LongFrame, MULTICAST};
+pub use line_delay::{DelayModel, LineDelay, SAMPLES};
+pub use param::{CrcKind, CrcMode, Param, ParamView, Parameters, Topology};
+pub use payload::{MotorMask, Payload, Slice};
+pub use preamble::{Preamble, strip_preamble};
+pub use pto::{Direction, Pto, Reserved, StartTime};
+pub use status::Status;
+pub use sync::{Sync, SyncView, TRANSIT_NS, TRIGGER_TO_CAPTURE_NS};

@@ -1,0 +1,157 @@
+use crate::Error;
+
+/// Round trips that make one measurement.
+pub const SAMPLES: u8 = 16;
+
+/// How round trips become a line delay. The vendor's master and device do it differently; so does this crate.
+///
+/// | | sum | line delay |
+/// |---|---|---|
+/// | master | of the round trips, modulo 2^16, then divided by 16 | (mean - 320) / 2 |
+/// | device | of the round trips divided by 16 each, which is up to 15 ns lower | (mean - 360) / 2 |
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct DelayModel {
+    /// Time between the reception of the request and its reflection, in ns.
+    pub forward_ns: u16,
+    /// Whether every round trip is divided by 16 before it is added, and not only the sum.
+    pub shift_samples: bool,
+}
+
+impl DelayModel {
+    /// The published master's.
+    pub const MASTER: Self = Self { forward_ns: 320, shift_samples: false };
+    /// The published device's, for the line to the next device.
+    pub const DEVICE: Self = Self { forward_ns: 360, shift_samples: true };
+}
+
+/// Line delay from round trips.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct LineDelay {
+    model: DelayModel,
+    count: u8,
+    sum: u32,
+    min: u32,
+    max: u32,
+}
+
+impl LineDelay {
+    /// No round trip yet.
+    pub const fn new(model: DelayModel) -> Self {
+        Self { model, count: 0, sum: 0, min: u32::MAX, max: 0 }
+    }
+
+    /// Takes one round trip in ns: start of the reflection received minus start of the request sent. Round trips
+    /// beyond the sixteenth are left out.
+    pub fn add(&mut self, rtt_ns: u32) {
+        if self.is_complete() {
+            return;
+        }
+        let term = if self.model.shift_samples { rtt_ns >> 4 } else { rtt_ns };
+        self.sum = self.sum.saturating_add(term);
+        self.count = self.count.saturating_add(1);
+        self.min = self.min.min(rtt_ns);
+        self.max = self.max.max(rtt_ns);
+    }
+
+    /// Round trips taken.
+    pub const fn count(&self) -> u8 {
+        self.count
+    }
+
+    /// Whether sixteen have been taken.
+    pub const fn is_complete(&self) -> bool {
+        self.count >= SAMPLES
+    }
+
+    /// Shortest and longest round trip in ns.
+    pub const fn extremes(&self) -> Option<(u32, u32)> {
+        if self.count == 0 { None } else { Some((self.min, self.max)) }
+    }
+
+    /// Mean round trip in ns as the published registers hold it, modulo 2^16 (master: 2^12).
+    pub const fn published_mean(&self) -> u16 {
+        let [low, high, ..] = self.sum.to_le_bytes();
+        let sum = u16::from_le_bytes([low, high]);
+        if self.model.shift_samples { sum } else { sum >> 4 }
+    }
+
+    /// The line delay in ns as the published firmware computes it: everything wraps, and round trips shorter than the
+    /// forwarding time give a huge delay. The master halves 16 bits, the device 32 of which it then keeps 16.
+    pub const fn published(&self) -> u16 {
+        if !self.model.shift_samples {
+            return self.published_mean().wrapping_sub(self.model.forward_ns) >> 1;
+        }
+        let [low, high, ..] = (self.sum.wrapping_sub(self.model.forward_ns as u32) >> 1).to_le_bytes();
+        u16::from_le_bytes([low, high])
+    }
+
+    /// The line delay in ns.
+    ///
+    /// # Errors
+    /// [`Error::ImplausibleRoundTrip`] with the mean if it is shorter than the forwarding time, or if the sum does not
+    /// fit the published 16 bits (4096 ns, some 350 m of cable).
+    pub const fn checked(&self) -> Result<u16, Error> {
+        let mean = if self.model.shift_samples { self.sum } else { self.sum >> 4 };
+        match mean.checked_sub(self.model.forward_ns as u32) {
+            #[expect(clippy::cast_possible_truncation, reason = "below 4096")]
+            Some(twice) if mean < 4096 => Ok((twice >> 1) as u16),
+            _ => Err(Error::ImplausibleRoundTrip { rtt_ns: mean }),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+
+    fn of(model: DelayModel, rtt: [u32; 16]) -> LineDelay {
+        let mut delay = LineDelay::new(model);
+        for ns in rtt {
+            delay.add(ns);
+        }
+        delay
+    }
+
+    #[test]
+    fn a_cable_of_no_length_has_no_delay() {
+        assert_eq!(of(DelayModel::MASTER, [320; 16]).checked(), Ok(0));
+        // 360 / 16 is cut to 22 sixteen times: 352 is less than the forwarding time, and the published result wraps.
+        let device = of(DelayModel::DEVICE, [360; 16]);
+        assert_eq!(device.checked(), Err(Error::ImplausibleRoundTrip { rtt_ns: 352 }));
+        assert_eq!(device.published(), 65532);
+        assert_eq!(of(DelayModel::MASTER, [312; 16]).published(), 32764);
+    }
+
+    #[test]
+    fn more_than_sixteen_are_left_out() {
+        let mut delay = of(DelayModel::MASTER, [500; 16]);
+        let before = delay;
+        delay.add(4000);
+        assert_eq!(delay, before);
+        assert_eq!((delay.count(), delay.extremes()), (16, Some((500, 500))));
+    }
+
+    proptest! {
+        #[test]
+        fn checked_and_published_agree_in_the_range_of_the_registers(rtt in proptest::array::uniform16(300u32..5000)) {
+            for model in [DelayModel::MASTER, DelayModel::DEVICE] {
+                let delay = of(model, rtt);
+                let mean = rtt.iter().sum::<u32>() / 16;
+                match delay.checked() {
+                    Ok(ns) => {
+                        prop_assert_eq!(ns, delay.published());
+                        // The device's rounding: up to 15 ns of round trip.
+                        let exact = mean.saturating_sub(model.forward_ns.into()) / 2;
+                        prop_assert!(u32::from(ns) <= exact && exact <= u32::from(ns) + 8);
+                    }
+                    Err(_) => prop_assert!(mean >= 4096 || mean < u32::from(model.forward_ns) + 16),
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,403 @@
+//! The controller's side: the start-up sequence, then the IO exchange.
+//!
+//! Sans-IO. [`Master::poll`] says what to send and when; [`Master::received`] takes what comes back. Every wait ends:
+//! an answer that does not come, devices that fall silent or a line that changes take the master back to IDLE with an
+//! [`Action::Restart`] that says why, and after a pause it starts again. (The published master waits for ever.)
+//!
+//! ```text
+//!  IDLE -> DISCOVERY -> PARAM -> LINE_DELAY -> SYNC -> IO_EXCHANGE
+//!           10 x 1 ms   10 x 1 ms  16 x 1 ms  1024 x 10 us   every 4 us
+//! ```
+
+mod action;
+mod config;
+mod cycle;
+
+pub use action::{Action, Outgoing};
+pub use config::{Config, Counters, State};
+use cycle::Cycle;
+
+use crate::timing::TRIGGER_NS;
+use crate::{
+    DelayReq, DeviceFrameView, DiscoveryView, Error, FrameType, LineDelay, Network, Param, ParamView, Sync,
+    write_master_frame,
+};
+
+/// A master with one port.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Master {
+    config: Config,
+    state: State,
+    link: bool,
+    enabled: bool,
+    counters: Counters,
+    network: Network,
+    line: LineDelay,
+    /// Number of the next frame of this phase, and its time.
+    frame: u16,
+    next_ns: u64,
+    /// PARAM: answers still needed, frames without one.
+    remaining: u16,
+    unanswered: u16,
+    /// LINE_DELAY: start of the request that is on its way.
+    asked_ns: Option<u64>,
+    /// DISCOVERY, SYNC: the answer that is needed has come.
+    answered: bool,
+    /// Where the master's time is 0.
+    epoch_ns: u64,
+    pending: Option<Error>,
+    cycle: Cycle,
+}
+
+impl Master {
+    /// A master in IDLE, without link, enabled.
+    pub const fn new(config: Config) -> Self {
+        Self {
+            config,
+            state: State::Idle,
+            link: false,
+            enabled: true,
+            counters: Counters {
+                cycles: 0,
+                crc_errors: 0,
+                timing_errors: 0,
+                format_errors: 0,
+                device_errors: 0,
+                retrains: 0,
+            },
+            network: Network::EMPTY,
+            line: LineDelay::new(config.delay_model),
+            frame: 0,
+            next_ns: 0,
+            remaining: 0,
+            unanswered: 0,
+            asked_ns: None,
+            answered: false,
+            epoch_ns: 0,
+            pending: None,
+            cycle: Cycle::NEW,
+        }
+    }
+
+    /// State.
+    pub const fn state(&self) -> State {
+        self.state
+    }
+
+    /// The counters.
+    pub const fn counters(&self) -> Counters {
+        self.counters
+    }
+
+    /// The line as the last DISCOVERY answer told it.
+    pub const fn network(&self) -> &Network {
+        &self.network
+    }
+
+    /// Round trips to the first device.
+    pub const fn line_delay(&self) -> &LineDelay {
+        &self.line
+    }
+
+    /// Where the master's time, which SYNC gives to the devices, is 0.
+    pub const fn epoch_ns(&self) -> u64 {
+        self.epoch_ns
+    }
+
+    /// Output bytes of the master frame.
+    pub fn output_len(&self) -> u16 {
+        self.network.output_total().max(self.config.min_output_len)
+    }
+
+    /// The link is up or down. Losing it ends whatever is going on.
+    pub fn link(&mut self, up: bool) {
+        if !up && self.state != State::Idle {
+            self.fail(Error::LinkDown);
+        }
+        self.link = up;
+    }
+
+    /// The host's enable bit. Taking it away ends whatever is going on.
+    pub fn enable(&mut self, enabled: bool) {
+        if !enabled {
+            self.state = State::Idle;
+        }
+        self.enabled = enabled;
+    }
+
+    /// Back to IDLE; [`poll`](Self::poll) reports why.
+    fn fail(&mut self, error: Error) {
+        self.state = State::Idle;
+        self.counters.retrains = self.counters.retrains.saturating_add(1);
+        self.pending = Some(error);
+    }
+
+    /// What to do now. Call it again at once after anything but [`Action::Wait`].
+    pub fn poll(&mut self, now_ns: u64) -> Action {
+        if let Some(error) = self.pending.take() {
+            self.next_ns = now_ns.saturating_add(self.config.restart_pause_ns);
+            return Action::Restart { error };
+        }
+        if self.state == State::Idle {
+            if !(self.link && self.enabled) {
+                return Action::Wait { until_ns: u64::MAX };
+            }
+            if now_ns >= self.next_ns {
+                self.enter(State::Discovery, now_ns);
+            }
+        }
+        if self.state == State::LineDelay {
+            if let Some(asked) = self.asked_ns {
+                return self.await_reflection(asked, now_ns);
+            }
+        }
+        if now_ns < self.next_ns {
+            return Action::Wait { until_ns: self.next_ns };
+        }
+        match self.state {
+            State::Idle => Action::Wait { until_ns: self.next_ns },
+            State::Discovery => self.discovery(now_ns),
+            State::Param => self.param(now_ns),
+            State::LineDelay => self.delay(now_ns),
+            State::Sync => self.sync(now_ns),
+            State::Exchange => self.exchange(now_ns),
+        }
+    }
+
+    fn enter(&mut self, state: State, now_ns: u64) {
+        self.state = state;
+        self.frame = 0;
+        self.next_ns = now_ns;
+        self.answered = false;
+        match state {
+            State::Discovery => self.network = Network::EMPTY,
+            State::Param => (self.remaining, self.unanswered) = (self.config.param_frames, 0),
+            State::LineDelay => (self.line, self.asked_ns) = (LineDelay::new(self.config.delay_model), None),
+            State::Sync => {
+                self.epoch_ns = now_ns;
+                self.next_ns = now_ns.saturating_add(TRIGGER_NS.into());
+            }
+            State::Exchange => self.cycle = Cycle::NEW,
+            State::Idle => {}
+        }
+    }
+
+    /// One start-up frame at `next_ns`, and the time of the one after it.
+    fn send(&mut self, frame: Outgoing, period_ns: u64) -> Action {
+        let at_ns = self.next_ns;
+        self.frame = self.frame.saturating_add(1);
+        self.next_ns = at_ns.saturating_add(period_ns);
+        Action::Send { at_ns, frame }
+    }
+
+    fn is_last(&self, frames: u16) -> bool {
+        self.frame.saturating_add(1) >= frames
+    }
+
+    fn discovery(&mut self, now_ns: u64) -> Action {
+        let frames = self.config.discovery_frames;
+        if self.frame < frames {
+            let last = self.is_last(frames);
+            return self.send(Outgoing::Discovery { last }, self.config.frame_period_ns);
+        }
+        let (got, want) = (self.network.devices(), self.config.min_devices.max(1));
+        if !self.answered {
+            self.fail(Error::NoAnswer { sent: FrameType::Discovery, frame: self.frame.saturating_sub(1) });
+        } else if got < want {
+            self.fail(Error::TooFewDevices { got, want });
+        } else {
+            self.enter(State::Param, now_ns);
+        }
+        self.poll(now_ns)
+    }
+
+    fn param(&mut self, now_ns: u64) -> Action {
+        if self.remaining == 0 {
+            self.enter(State::LineDelay, now_ns);
+        } else if self.unanswered < self.config.param_tries {
+            self.unanswered = self.unanswered.saturating_add(1);
+            let frame = Param::request(self.config.parameters, self.remaining == 1);
+            return self.send(Outgoing::Param(frame), self.config.frame_period_ns);
+        } else {
+            self.fail(Error::NoAnswer { sent: FrameType::Param, frame: self.frame.saturating_sub(1) });
+        }
+        self.poll(now_ns)
+    }
+
+    fn delay(&mut self, now_ns: u64) -> Action {
+        if !self.line.is_complete() {
+            let last = self.is_last(crate::SAMPLES.into());
+            self.asked_ns = Some(self.next_ns);
+            return self.send(Outgoing::DelayReq(DelayReq::of_master(last)), self.config.frame_period_ns);
+        }
+        match self.line.checked() {
+            Ok(_) => self.enter(State::Sync, now_ns),
+            Err(error) => self.fail(error),
+        }
+        self.poll(now_ns)
+    }
+
+    fn await_reflection(&mut self, asked_ns: u64, now_ns: u64) -> Action {
+        let until_ns = asked_ns.saturating_add(self.config.answer_timeout_ns);
+        if now_ns < until_ns {
+            return Action::Wait { until_ns };
+        }
+        self.fail(Error::NoAnswer { sent: FrameType::DelayReq, frame: self.frame.saturating_sub(1) });
+        self.poll(now_ns)
+    }
+
+    fn sync(&mut self, now_ns: u64) -> Action {
+        let frames = self.config.sync_frames;
+        let period = u64::from(self.config.sync_period_ns);
+        if self.frame < frames {
+            let line = self.line.checked().unwrap_or_default();
+            let frame = Sync::of_master(self.time_ns(self.next_ns), line, self.is_last(frames));
+            // Half a period after the last trigger the answers are looked at.
+            let gap = if self.is_last(frames) { period / 2 } else { period };
+            return self.send(Outgoing::Sync(frame), gap);
+        }
+        if self.answered {
+            // The exchange goes on in the raster of the SYNC frames.
+            self.enter(State::Exchange, self.next_ns.saturating_add(period.saturating_sub(period / 2)));
+        } else {
+            self.fail(Error::NoAnswer { sent: FrameType::Sync, frame: frames.saturating_sub(1) });
+        }
+        self.poll(now_ns)
+    }
+
+    /// The master's time, modulo 2^32.
+    fn time_ns(&self, at_ns: u64) -> u32 {
+        let [a, b, c, d, ..] = at_ns.wrapping_sub(self.epoch_ns).to_le_bytes();
+        u32::from_le_bytes([a, b, c, d])
+    }
+
+    fn exchange(&mut self, now_ns: u64) -> Action {
+        if let Err(error) = self.close_cycle() {
+            self.fail(error);
+            return self.poll(now_ns);
+        }
+        let (at_ns, cycle) = (self.next_ns, self.counters.cycles);
+        self.counters.cycles = cycle.saturating_add(1);
+        self.next_ns = at_ns.saturating_add(self.config.cycle_ns.into());
+        let [low, high, ..] = self.time_ns(at_ns).to_le_bytes();
+        Action::Exchange { at_ns, time_stamp: u16::from_le_bytes([low, high]), cycle }
+    }
+
+    /// The cycle is over: who has not answered?
+    fn close_cycle(&mut self) -> Result<(), Error> {
+        let Cycle { open, damaged, damaged_in_a_row, silent_in_a_row, .. } = self.cycle;
+        let missing = u32::from(self.network.devices()).saturating_sub(self.cycle.count());
+        let silent = open && missing > 0;
+        let next = Cycle {
+            open: true,
+            damaged_in_a_row: if damaged { damaged_in_a_row.saturating_add(1) } else { 0 },
+            silent_in_a_row: if silent { silent_in_a_row.saturating_add(1) } else { 0 },
+            ..Cycle::NEW
+        };
+        let before = core::mem::replace(&mut self.cycle, next);
+        if silent {
+            self.counters.timing_errors = self.counters.timing_errors.saturating_add(1);
+        }
+        let limit = self.config.retrain_crc_errors;
+        if limit != 0 && next.damaged_in_a_row >= limit {
+            return Err(Error::TooManyCrcErrors { cycles: next.damaged_in_a_row });
+        }
+        let limit = self.config.retrain_timing_errors;
+        if limit != 0 && next.silent_in_a_row >= limit {
+            let first = (1..=self.network.devices()).find(|a| !before.has(*a)).unwrap_or_default();
+            let count = u8::try_from(missing).unwrap_or(u8::MAX);
+            return Err(Error::DevicesMissing { first, count, cycles: next.silent_in_a_row });
+        }
+        Ok(())
+    }
+
+    /// Writes the master frame for an [`Action::Exchange`] and gives its length. Output bytes that are not given are 0.
+    ///
+    /// # Errors
+    /// [`Error::LengthMismatch`] if `output` has not [`output_len`](Self::output_len) bytes; [`Error::BufferTooSmall`].
+    pub fn write_frame(&self, output: &[u8], time_stamp: u16, into: &mut [u8]) -> Result<usize, Error> {
+        let (got, want) = (u16::try_from(output.len()).unwrap_or(u16::MAX), self.output_len());
+        if got != want {
+            return Err(Error::LengthMismatch { got, want });
+        }
+        write_master_frame(into, output, time_stamp)
+    }
+
+    /// A start-up frame has come back; `sof_ns`: its start.
+    ///
+    /// # Errors
+    /// What the frame is refused for; [`Error::WrongState`] in IDLE and IO exchange. A bad DISCOVERY answer takes the
+    /// master back to IDLE, everything else just does not count as an answer.
+    pub fn received(&mut self, frame: &[u8], sof_ns: u64) -> Result<(), Error> {
+        let result = match self.state {
+            State::Idle | State::Exchange => return Err(Error::WrongState),
+            State::Discovery => self.discovery_answer(frame),
+            State::Param => ParamView::new(frame).map(|_| {
+                (self.remaining, self.unanswered) = (self.remaining.saturating_sub(1), 0);
+            }),
+            State::LineDelay => DelayReq::parse(frame).map(|_| {
+                if let Some(asked) = self.asked_ns.take() {
+                    self.line.add(u32::try_from(sof_ns.saturating_sub(asked)).unwrap_or(u32::MAX));
+                }
+            }),
+            State::Sync => Sync::parse(frame).map(|answer| {
+                self.answered |= answer.status.is_last() && answer.status.is_state_change();
+            }),
+        };
+        if let Err(error) = result {
+            self.count(error);
+            if self.state == State::Discovery {
+                self.fail(error);
+            }
+        }
+        result
+    }
+
+    fn discovery_answer(&mut self, frame: &[u8]) -> Result<(), Error> {
+        let answer = DiscoveryView::new(frame)?;
+        if answer.status().is_last() {
+            self.network = Network::new(answer)?;
+            self.answered = true;
+        }
+        Ok(())
+    }
+
+    fn count(&mut self, error: Error) {
+        let counter = match error {
+            Error::BadFcs { .. } | Error::BadCrc8 { .. } => &mut self.counters.crc_errors,
+            _ => &mut self.counters.format_errors,
+        };
+        *counter = counter.saturating_add(1);
+    }
+
+    /// A device frame of the IO exchange has come. Its payload may be used only if this accepts it.
+    ///
+    /// # Errors
+    /// As [`DeviceFrameView::new`]; [`Error::TopologyChanged`], which takes the master back to IDLE;
+    /// [`Error::WrongState`] outside the IO exchange.
+    pub fn device_frame<'a>(&mut self, frame: &'a [u8]) -> Result<DeviceFrameView<'a>, Error> {
+        if self.state != State::Exchange {
+            return Err(Error::WrongState);
+        }
+        let view = match DeviceFrameView::new(frame, self.config.payload_len.into()) {
+            Ok(view) => view,
+            Err(error) => {
+                self.cycle.damaged = true;
+                self.count(error);
+                return Err(error);
+            }
+        };
+        let (address, last) = (view.address().get(), self.network.devices());
+        if address > last || view.status().is_last() != (address == last) {
+            let error = Error::TopologyChanged { address };
+            self.fail(error);
+            return Err(error);
+        }
+        self.cycle.mark(address);
+        if view.status().is_error() {
+            self.counters.device_errors = self.counters.device_errors.saturating_add(1);
+        }
+        Ok(view)
+    }
+}

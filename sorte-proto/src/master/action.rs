@@ -1,0 +1,82 @@
+//! What the master wants done.
+
+use crate::discovery::room;
+use crate::{DelayReq, Discovery, Error, Param, Preamble, Sync};
+
+/// A start-up frame to send.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum Outgoing {
+    /// DISCOVERY; see [`Discovery::request`].
+    Discovery {
+        /// The last of this phase.
+        last: bool,
+    },
+    /// PARAM
+    Param(Param),
+    /// DELAY_REQ
+    DelayReq(DelayReq),
+    /// SYNC
+    Sync(Sync),
+}
+
+impl Outgoing {
+    /// What goes before it.
+    pub const fn preamble(&self) -> Preamble {
+        match self {
+            Self::Sync(_) => Preamble::Middle,
+            _ => Preamble::Long,
+        }
+    }
+
+    /// Writes the frame from DA to FCS and gives its length.
+    ///
+    /// # Errors
+    /// [`Error::BufferTooSmall`]; [`Discovery::LEN`] is always enough.
+    pub fn write(&self, into: &mut [u8]) -> Result<usize, Error> {
+        match self {
+            Self::Discovery { last } => put(into, &Discovery::request(*last).emit()),
+            Self::Param(frame) => put(into, &frame.emit()),
+            Self::DelayReq(frame) => put(into, &frame.emit()),
+            Self::Sync(frame) => put(into, &frame.emit()),
+        }
+    }
+}
+
+fn put(into: &mut [u8], frame: &[u8]) -> Result<usize, Error> {
+    room(into, frame.len())?.iter_mut().zip(frame).for_each(|(to, from)| *to = *from);
+    Ok(frame.len())
+}
+
+/// What to do now.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[must_use]
+pub enum Action {
+    /// Nothing before `until_ns`, unless something comes.
+    Wait {
+        /// `u64::MAX`: until link and enable are there.
+        until_ns: u64,
+    },
+    /// Send a start-up frame.
+    Send {
+        /// When it is triggered.
+        at_ns: u64,
+        /// Which.
+        frame: Outgoing,
+    },
+    /// Send the master frame of a cycle, see [`Master::write_frame`](super::Master::write_frame).
+    Exchange {
+        /// When it is triggered.
+        at_ns: u64,
+        /// Low 16 bits of the master's time then.
+        time_stamp: u16,
+        /// Number of the cycle, from 0.
+        cycle: u64,
+    },
+    /// The master has gone back to IDLE.
+    Restart {
+        /// Why.
+        error: Error,
+    },
+}

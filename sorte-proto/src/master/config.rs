@@ -1,0 +1,104 @@
+//! States, settings and counters of the master.
+
+use crate::{DelayModel, Parameters};
+
+/// State of the master, by the codes that the published one shows to its host.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[repr(u8)]
+pub enum State {
+    /// Waits for link and enable, or until the pause after a failure is over.
+    #[default]
+    Idle = 0,
+    /// 1: counts the devices.
+    Discovery = 1,
+    /// 2: tells them the parameters.
+    Param = 2,
+    /// 3: measures the line to the first device.
+    LineDelay = 3,
+    /// 4: sets the devices' clocks.
+    Sync = 4,
+    /// 5: exchanges data.
+    Exchange = 5,
+}
+
+/// How a master behaves. The counts are those of the published image; the time-outs are this crate's.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Config {
+    /// DISCOVERY frames, 2 at least: devices take part from the second on.
+    pub discovery_frames: u16,
+    /// PARAM frames that must be answered.
+    pub param_frames: u16,
+    /// SYNC frames.
+    pub sync_frames: u16,
+    /// Period of DISCOVERY, PARAM and DELAY_REQ frames in ns.
+    pub frame_period_ns: u64,
+    /// Period of SYNC frames in ns.
+    pub sync_period_ns: u32,
+    /// Period of the IO exchange in ns.
+    pub cycle_ns: u32,
+    /// How long a delay request may take to come back, in ns.
+    pub answer_timeout_ns: u64,
+    /// PARAM frames in a row that may stay without an answer.
+    pub param_tries: u16,
+    /// Pause after a failure in ns, so that the devices' start-up states time out.
+    pub restart_pause_ns: u64,
+    /// Devices that DISCOVERY must find.
+    pub min_devices: u8,
+    /// Output bytes of the master frame at least; 16 keeps all axes in the same cycle whatever their number.
+    pub min_output_len: u16,
+    /// Payload bytes of a device frame.
+    pub payload_len: u8,
+    /// What the devices are told.
+    pub parameters: Parameters,
+    /// How the line to the first device is measured.
+    pub delay_model: DelayModel,
+    /// Cycles in a row with a damaged device frame that make the master start again; 0: never.
+    pub retrain_crc_errors: u8,
+    /// Cycles in a row with a device frame missing that make the master start again; 0: never.
+    pub retrain_timing_errors: u8,
+}
+
+impl Default for Config {
+    fn default() -> Self {
+        Self {
+            discovery_frames: 10,
+            param_frames: 10,
+            sync_frames: 1024,
+            frame_period_ns: 1_000_000,
+            sync_period_ns: 10_000,
+            cycle_ns: 4000,
+            answer_timeout_ns: 1_000_000,
+            param_tries: 10,
+            restart_pause_ns: 30_000_000,
+            min_devices: 1,
+            min_output_len: 16,
+            payload_len: 3,
+            parameters: Parameters::STOCK,
+            delay_model: DelayModel::MASTER,
+            retrain_crc_errors: 3,
+            retrain_timing_errors: 3,
+        }
+    }
+}
+
+/// What the master counts.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct Counters {
+    /// Cycles of the IO exchange.
+    pub cycles: u64,
+    /// Frames with a wrong checksum.
+    pub crc_errors: u32,
+    /// Cycles in which a device frame was missing.
+    pub timing_errors: u32,
+    /// Frames refused for another reason.
+    pub format_errors: u32,
+    /// Device frames with the ERROR bit: a device has seen a wrong checksum.
+    pub device_errors: u32,
+    /// How often it went back to IDLE.
+    pub retrains: u32,
+}

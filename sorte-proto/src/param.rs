@@ -1,0 +1,353 @@
+use crate::frame::{FrameType, LongFrame, emit};
+use crate::{Error, Status};
+
+/// Shape of the network, a byte of PARAM. Only the line is implemented by the vendor.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(from = "u8", into = "u8"))]
+pub enum Topology {
+    /// 0: a line.
+    #[default]
+    Line,
+    /// 1: a ring.
+    Ring,
+    /// 2: a redundant ring.
+    RedundantRing,
+    /// Any other code.
+    Unknown(u8),
+}
+
+impl From<u8> for Topology {
+    fn from(code: u8) -> Self {
+        match code {
+            0 => Self::Line,
+            1 => Self::Ring,
+            2 => Self::RedundantRing,
+            code => Self::Unknown(code),
+        }
+    }
+}
+
+impl From<Topology> for u8 {
+    fn from(topology: Topology) -> Self {
+        match topology {
+            Topology::Line => 0,
+            Topology::Ring => 1,
+            Topology::RedundantRing => 2,
+            Topology::Unknown(code) => code,
+        }
+    }
+}
+
+/// Check of the IO-exchange frames, a nibble of `crc_mode`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum CrcKind {
+    /// 0: no check.
+    None,
+    /// 1: CRC-32.
+    Crc32,
+    /// 2: CRC-16; the polynomial is not published.
+    Crc16,
+    /// 3: CRC-8, the only one the vendor implements.
+    Crc8,
+    /// 4: CRC-32 with the Castagnoli polynomial.
+    Castagnoli,
+    /// Any other code.
+    Unknown(u8),
+}
+
+/// `crc_mode` of PARAM: low nibble for master frames, high nibble for device frames.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "arbitrary", derive(arbitrary::Arbitrary))]
+pub struct CrcMode(pub u8);
+
+impl CrcMode {
+    /// CRC-8 both ways.
+    pub const CRC8: Self = Self(0x33);
+
+    /// Check of master frames.
+    pub const fn out(self) -> CrcKind {
+        Self::kind(self.0 & 15)
+    }
+
+    /// Check of device frames.
+    pub const fn input(self) -> CrcKind {
+        Self::kind(self.0 >> 4)
+    }
+
+    const fn kind(code: u8) -> CrcKind {
+        match code {
+            0 => CrcKind::None,
+            1 => CrcKind::Crc32,
+            2 => CrcKind::Crc16,
+            3 => CrcKind::Crc8,
+            4 => CrcKind::Castagnoli,
+            code => CrcKind::Unknown(code),
+        }
+    }
+}
+
+/// What PARAM tells the devices. The published device stores the 32 bytes and acts on none of them.
+///
+/// ```text
+///  byte 0 ...  4           8           12            14           15         16
+///       header cycle_time  sync_cycle  delay_period  delay_burst  delay_gap  delay_fwd_time ...
+///              u32         u32         u16           u8           u8         u32
+///  byte 20   24    28     32        33           34     35        36
+///       ipg  t_in  t_out  topology  diagnostics  alarm  crc_mode  FCS
+///       u32  u32   u32    u8        u8           u8     u8
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct Parameters {
+    /// Cycle time in ns.
+    pub cycle_time_ns: u32,
+    /// 0: no synchronisation; 1..=1000: every so many cycles; above: its own period in units of 5 ns.
+    pub sync_cycle: u32,
+    /// Time between line-delay measurements in ms.
+    pub delay_period_ms: u16,
+    /// Measurements in a burst.
+    pub delay_burst: u8,
+    /// Time between the measurements of a burst in ms.
+    pub delay_gap_ms: u8,
+    /// Time from the reception of a delay request to its reflection in ns.
+    pub delay_fwd_time_ns: u32,
+    /// Inter-packet gap in units of 5 ns.
+    pub ipg_5ns: u32,
+    /// Application input time before the cycle start in ns.
+    pub t_in_ns: u32,
+    /// Application output time in ns.
+    pub t_out_ns: u32,
+    /// Shape of the network.
+    pub topology: Topology,
+    /// 0: diagnostics in the payload; 1: in a frame of their own.
+    pub diagnostics: u8,
+    /// 1: an alarm resets the network.
+    pub alarm: u8,
+    /// Checks of the IO-exchange frames.
+    pub crc_mode: CrcMode,
+}
+
+impl Default for Parameters {
+    fn default() -> Self {
+        Self::STOCK
+    }
+}
+
+impl Parameters {
+    /// Length in bytes.
+    pub const LEN: usize = 32;
+
+    /// What the published master sends. Its cycle time says 10 us although it exchanges data every 4 us.
+    pub const STOCK: Self = Self {
+        cycle_time_ns: 10_000,
+        sync_cycle: 0,
+        delay_period_ms: 1000,
+        delay_burst: 16,
+        delay_gap_ms: 1,
+        delay_fwd_time_ns: 320,
+        ipg_5ns: 52,
+        t_in_ns: 0,
+        t_out_ns: 0,
+        topology: Topology::Line,
+        diagnostics: 0,
+        alarm: 0,
+        crc_mode: CrcMode::CRC8,
+    };
+
+    /// [`STOCK`](Self::STOCK) with the cycle time of the CNC machine, 4 us.
+    pub const CNC: Self = Self { cycle_time_ns: 4000, ..Self::STOCK };
+
+    /// Any 32 bytes are parameters.
+    #[rustfmt::skip]
+    pub fn parse(bytes: &[u8; Self::LEN]) -> Self {
+        let [
+            c0, c1, c2, c3, s0, s1, s2, s3, p0, p1, delay_burst, delay_gap_ms, f0, f1, f2, f3,
+            g0, g1, g2, g3, i0, i1, i2, i3, o0, o1, o2, o3, topology, diagnostics, alarm, crc_mode,
+        ] = *bytes;
+        Self {
+            cycle_time_ns: u32::from_le_bytes([c0, c1, c2, c3]),
+            sync_cycle: u32::from_le_bytes([s0, s1, s2, s3]),
+            delay_period_ms: u16::from_le_bytes([p0, p1]),
+            delay_burst,
+            delay_gap_ms,
+            delay_fwd_time_ns: u32::from_le_bytes([f0, f1, f2, f3]),
+            ipg_5ns: u32::from_le_bytes([g0, g1, g2, g3]),
+            t_in_ns: u32::from_le_bytes([i0, i1, i2, i3]),
+            t_out_ns: u32::from_le_bytes([o0, o1, o2, o3]),
+            topology: topology.into(),
+            diagnostics,
+            alarm,
+            crc_mode: CrcMode(crc_mode),
+        }
+    }
+
+    /// The bytes in wire order.
+    pub fn emit(&self) -> [u8; Self::LEN] {
+        let [c0, c1, c2, c3] = self.cycle_time_ns.to_le_bytes();
+        let [s0, s1, s2, s3] = self.sync_cycle.to_le_bytes();
+        let [p0, p1] = self.delay_period_ms.to_le_bytes();
+        let [f0, f1, f2, f3] = self.delay_fwd_time_ns.to_le_bytes();
+        let [g0, g1, g2, g3] = self.ipg_5ns.to_le_bytes();
+        let [i0, i1, i2, i3] = self.t_in_ns.to_le_bytes();
+        let [o0, o1, o2, o3] = self.t_out_ns.to_le_bytes();
+        let (burst, gap, topology) = (self.delay_burst, self.delay_gap_ms, u8::from(self.topology));
+        [
+            c0,
+            c1,
+            c2,
+            c3,
+            s0,
+            s1,
+            s2,
+            s3,
+            p0,
+            p1,
+            burst,
+            gap,
+            f0,
+            f1,
+            f2,
+            f3,
+            g0,
+            g1,
+            g2,
+            g3,
+            i0,
+            i1,
+            i2,
+            i3,
+            o0,
+            o1,
+            o2,
+            o3,
+            topology,
+            self.diagnostics,
+            self.alarm,
+            self.crc_mode.0,
+        ]
+    }
+}
+
+/// A PARAM frame in a buffer.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct ParamView<'a> {
+    frame: LongFrame<'a>,
+    bytes: &'a [u8; Parameters::LEN],
+}
+
+impl<'a> ParamView<'a> {
+    /// Checks as [`LongFrame::new`], then that TYPE is 2.
+    ///
+    /// # Errors
+    /// As [`LongFrame::new`]; [`Error::UnexpectedType`].
+    pub fn new(bytes: &'a [u8]) -> Result<Self, Error> {
+        Self::of(LongFrame::new(bytes)?)
+    }
+
+    /// Checks that TYPE is 2.
+    ///
+    /// # Errors
+    /// [`Error::UnexpectedType`]
+    pub fn of(frame: LongFrame<'a>) -> Result<Self, Error> {
+        Ok(Self { frame, bytes: frame.of_type(FrameType::Param)? })
+    }
+
+    /// SA.
+    pub const fn source(self) -> u8 {
+        self.frame.source()
+    }
+
+    /// STATUS.
+    pub const fn status(self) -> Status {
+        self.frame.status()
+    }
+
+    /// The 32 bytes that a device stores.
+    pub const fn bytes(self) -> &'a [u8; Parameters::LEN] {
+        self.bytes
+    }
+
+    /// The parameters.
+    pub fn parameters(self) -> Parameters {
+        Parameters::parse(self.bytes)
+    }
+}
+
+/// The values of a PARAM frame.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct Param {
+    /// SA, 0 in everything the published firmware sends.
+    pub source: u8,
+    /// STATUS.
+    pub status: Status,
+    /// What the devices are told.
+    pub parameters: Parameters,
+}
+
+impl Param {
+    /// Bytes from DA to FCS.
+    pub const LEN: usize = Parameters::LEN + LongFrame::OVERHEAD;
+
+    /// As a master sends it. `last`: the last PARAM of the start-up.
+    pub const fn request(parameters: Parameters, last: bool) -> Self {
+        Self { source: 0, status: if last { Status::FINAL_PARAM } else { Status::PARAM }, parameters }
+    }
+
+    /// Checks as [`ParamView::new`].
+    ///
+    /// # Errors
+    /// As [`ParamView::new`].
+    pub fn parse(bytes: &[u8]) -> Result<Self, Error> {
+        let view = ParamView::new(bytes)?;
+        Ok(Self { source: view.source(), status: view.status(), parameters: view.parameters() })
+    }
+
+    /// The frame from DA to FCS.
+    pub fn emit(&self) -> [u8; Self::LEN] {
+        emit(self.source, FrameType::Param, self.status, &self.parameters.emit())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+
+    proptest! {
+        #[test]
+        fn any_32_bytes_give_themselves_back(bytes: [u8; 32]) {
+            prop_assert_eq!(Parameters::parse(&bytes).emit(), bytes);
+        }
+
+        #[test]
+        fn what_was_emitted_is_parsed_and_back(source: u8, status: u8, bytes: [u8; 32]) {
+            let frame = Param { source, status: Status(status), parameters: Parameters::parse(&bytes) };
+            let wire = frame.emit();
+            prop_assert_eq!(&wire[4..36], &bytes);
+            prop_assert_eq!(Param::parse(&wire), Ok(frame));
+        }
+    }
+
+    #[test]
+    fn every_crc_mode_splits_into_two_kinds() {
+        for raw in 0..=u8::MAX {
+            let (out, input) = (CrcMode(raw).out(), CrcMode(raw).input());
+            assert_eq!(out == CrcKind::Crc8, raw & 15 == 3);
+            assert_eq!(input, CrcMode(raw >> 4).out());
+            assert_eq!(out, CrcMode(raw & 15).out());
+        }
+        for code in 0..=u8::MAX {
+            assert_eq!(u8::from(Topology::from(code)), code);
+        }
+    }
+}

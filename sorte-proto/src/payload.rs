@@ -1,0 +1,187 @@
+use crate::{Direction, Error, Pto};
+
+/// A device's share of the master frame in the CNC application: four bytes.
+///
+/// ```text
+///  byte  0      1       2          3
+///        PTO (LSB first) command (LSB first; reserved, 0)
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "arbitrary", derive(arbitrary::Arbitrary))]
+pub struct Slice {
+    /// What the axis does in the next cycle.
+    pub pto: Pto,
+    /// Reserved; the reference design sends 0.
+    pub command: u16,
+}
+
+impl Slice {
+    /// Length in bytes.
+    pub const LEN: usize = 4;
+
+    /// Any four bytes are a slice.
+    pub const fn parse([p0, p1, c0, c1]: [u8; Self::LEN]) -> Self {
+        Self { pto: Pto::from_word(u16::from_le_bytes([p0, p1])), command: u16::from_le_bytes([c0, c1]) }
+    }
+
+    /// The bytes in wire order.
+    pub const fn emit(self) -> [u8; Self::LEN] {
+        let ([p0, p1], [c0, c1]) = (self.pto.word().to_le_bytes(), self.command.to_le_bytes());
+        [p0, p1, c0, c1]
+    }
+}
+
+impl From<Pto> for Slice {
+    fn from(pto: Pto) -> Self {
+        Self { pto, command: 0 }
+    }
+}
+
+/// Which of the four motors take part: bit 0 is motor 1 (device 1), 0..=15.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(try_from = "u8", into = "u8"))]
+pub struct MotorMask(u8);
+
+impl MotorMask {
+    /// No motor: all drivers off.
+    pub const NONE: Self = Self(0);
+    /// All four motors.
+    pub const ALL: Self = Self(15);
+
+    /// `mask`: 0..=15.
+    pub const fn new(mask: u8) -> Option<Self> {
+        if mask <= Self::ALL.0 { Some(Self(mask)) } else { None }
+    }
+
+    /// The mask.
+    pub const fn get(self) -> u8 {
+        self.0
+    }
+
+    /// Whether motor `index` (0..=3) takes part.
+    pub const fn has(self, index: u8) -> bool {
+        index < 4 && self.0 >> index & 1 == 1
+    }
+}
+
+impl TryFrom<u8> for MotorMask {
+    type Error = Error;
+
+    fn try_from(mask: u8) -> Result<Self, Error> {
+        Self::new(mask).ok_or(Error::InvalidMotorMask { got: mask })
+    }
+}
+
+impl From<MotorMask> for u8 {
+    fn from(mask: MotorMask) -> Self {
+        mask.0
+    }
+}
+
+/// The 16 output bytes of the reference machine, device 1 first.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "arbitrary", derive(arbitrary::Arbitrary))]
+pub struct Payload(pub [Slice; 4]);
+
+impl Payload {
+    /// Length in bytes.
+    pub const LEN: usize = 16;
+
+    /// Four axes with a word each, commands 0.
+    pub const fn independent(words: [Pto; 4]) -> Self {
+        let [a, b, c, d] = words;
+        Self([
+            Slice { pto: a, command: 0 },
+            Slice { pto: b, command: 0 },
+            Slice { pto: c, command: 0 },
+            Slice { pto: d, command: 0 },
+        ])
+    }
+
+    /// The same word for every motor of `motors`. The others get a no-pulse word with the same DIR level, so that
+    /// their drivers stay on; without any motor, all four get driver off (TIDEP-0061 section 2.3.3).
+    pub const fn shared(pto: Pto, motors: MotorMask) -> Self {
+        let rest = match (motors, pto.direction()) {
+            (MotorMask::NONE, _) => Pto::DriverOff,
+            (_, Some(direction)) => Pto::NoPulse { direction },
+            (_, None) => Pto::NoPulse { direction: Direction::Low },
+        };
+        Self::independent([
+            if motors.has(0) { pto } else { rest },
+            if motors.has(1) { pto } else { rest },
+            if motors.has(2) { pto } else { rest },
+            if motors.has(3) { pto } else { rest },
+        ])
+    }
+
+    /// Any 16 bytes are a payload.
+    pub const fn parse(bytes: [u8; Self::LEN]) -> Self {
+        let [a0, a1, a2, a3, b0, b1, b2, b3, c0, c1, c2, c3, d0, d1, d2, d3] = bytes;
+        Self([
+            Slice::parse([a0, a1, a2, a3]),
+            Slice::parse([b0, b1, b2, b3]),
+            Slice::parse([c0, c1, c2, c3]),
+            Slice::parse([d0, d1, d2, d3]),
+        ])
+    }
+
+    /// The bytes in wire order.
+    pub const fn emit(self) -> [u8; Self::LEN] {
+        let [a, b, c, d] = self.0;
+        let ([a0, a1, a2, a3], [b0, b1, b2, b3]) = (a.emit(), b.emit());
+        let ([c0, c1, c2, c3], [d0, d1, d2, d3]) = (c.emit(), d.emit());
+        [a0, a1, a2, a3, b0, b1, b2, b3, c0, c1, c2, c3, d0, d1, d2, d3]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+
+    #[test]
+    fn masks_are_four_bits() {
+        for mask in 0..=u8::MAX {
+            assert_eq!(MotorMask::new(mask).map(MotorMask::get), (mask < 16).then_some(mask));
+            assert_eq!(MotorMask::try_from(mask).is_err(), mask > 15);
+        }
+    }
+
+    #[test]
+    fn each_motor_of_the_mask_gets_the_word() {
+        let pto = Pto::from_word(0x89ab);
+        for mask in 0..16 {
+            let Payload(slices) = Payload::shared(pto, MotorMask::new(mask).unwrap());
+            for (index, slice) in slices.iter().enumerate() {
+                let want = match (mask, mask >> index & 1) {
+                    (0, _) => 0x7fff,
+                    (_, 1) => 0x89ab,
+                    _ => 0x8000,
+                };
+                assert_eq!((slice.pto.word(), slice.command), (want, 0));
+            }
+        }
+    }
+
+    proptest! {
+        #[test]
+        fn bytes_give_themselves_back(bytes: [u8; 16]) {
+            prop_assert_eq!(Payload::parse(bytes).emit(), bytes);
+        }
+
+        #[test]
+        fn a_slice_is_two_little_endian_words(bytes: [u8; 4]) {
+            let slice = Slice::parse(bytes);
+            prop_assert_eq!(slice.pto.word(), u16::from(bytes[0]) | u16::from(bytes[1]) << 8);
+            prop_assert_eq!(slice.command, u16::from(bytes[2]) | u16::from(bytes[3]) << 8);
+            prop_assert_eq!(slice.emit(), bytes);
+        }
+    }
+}

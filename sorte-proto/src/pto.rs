@@ -1,0 +1,288 @@
+use crate::Error;
+
+/// Level of the DIR output of an axis, bit 15 of the PTO word.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "arbitrary", derive(arbitrary::Arbitrary))]
+pub enum Direction {
+    /// DIR = 0.
+    #[default]
+    Low,
+    /// DIR = 1.
+    High,
+}
+
+impl Direction {
+    /// Whether DIR is high.
+    pub const fn is_high(self) -> bool {
+        matches!(self, Self::High)
+    }
+
+    const fn of(word: u16) -> Self {
+        if word & DIR == 0 { Self::Low } else { Self::High }
+    }
+
+    const fn bit(self) -> u16 {
+        match self {
+            Self::Low => 0,
+            Self::High => DIR,
+        }
+    }
+}
+
+impl From<bool> for Direction {
+    fn from(high: bool) -> Self {
+        if high { Self::High } else { Self::Low }
+    }
+}
+
+/// When the pulse starts: nanoseconds after the start of the next cycle, 1..=3990.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(try_from = "u16", into = "u16"))]
+pub struct StartTime(u16);
+
+impl StartTime {
+    /// The earliest start the wire can carry.
+    pub const MIN: Self = Self(1);
+    /// The latest start the wire can carry.
+    pub const MAX: Self = Self(3990);
+
+    /// `ns`: 1..=3990.
+    pub const fn new(ns: u16) -> Option<Self> {
+        if ns >= Self::MIN.0 && ns <= Self::MAX.0 { Some(Self(ns)) } else { None }
+    }
+
+    /// Nanoseconds after the start of the cycle.
+    pub const fn ns(self) -> u16 {
+        self.0
+    }
+
+    /// Whole 5 ns ticks in it, 0..=798: what the SYNC0 START register takes.
+    pub const fn ticks(self) -> u16 {
+        self.0 / 5
+    }
+}
+
+impl TryFrom<u16> for StartTime {
+    type Error = Error;
+
+    fn try_from(ns: u16) -> Result<Self, Error> {
+        Self::new(ns).ok_or(Error::ReservedPtoValue { raw: ns })
+    }
+}
+
+impl From<StartTime> for u16 {
+    fn from(start: StartTime) -> Self {
+        start.0
+    }
+}
+
+/// A PTO word without a meaning: 3991..=0x7FFE, the same with bit 15, or 0xFFFF.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Reserved(u16);
+
+impl Reserved {
+    /// The word.
+    pub const fn word(self) -> u16 {
+        self.0
+    }
+
+    /// Its low 15 bits, 3991..=0x7FFF.
+    pub const fn time(self) -> u16 {
+        self.0 & TIME
+    }
+
+    /// Its bit 15.
+    pub const fn direction(self) -> Direction {
+        Direction::of(self.0)
+    }
+}
+
+const TIME: u16 = 0x7fff;
+const DIR: u16 = 0x8000;
+const DRIVER_OFF: u16 = 0x7fff;
+
+/// The PTO word: what one axis does in the next cycle.
+///
+/// ```text
+///  bit 15   14 ........................ 0
+///      DIR  start time in ns, 1..=3990     a pulse
+///      DIR  0                              no pulse
+///      0    0x7FFF                         driver off; any other word keeps it on
+///           3991..=0x7FFE, and 0xFFFF      reserved: driver on, no pulse
+/// ```
+///
+/// Every 16-bit word is a `Pto` and gives itself back. From the design guide of the 4-axis CNC router with 250-kHz
+/// control loop (TIDEP-0061), section 2.4.2. A device holds its DIR level through a driver-off word.
+///
+/// All of the word is about the next cycle, DIR too: a device that sets DIR as soon as it takes the word turns the
+/// direction of a pulse that is still to come. It belongs to the wrap at the start of that cycle.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(from = "u16", into = "u16"))]
+pub enum Pto {
+    /// No pulse in the next cycle.
+    NoPulse {
+        /// DIR level.
+        direction: Direction,
+    },
+    /// One pulse in the next cycle.
+    Pulse {
+        /// When it starts.
+        start: StartTime,
+        /// DIR level.
+        direction: Direction,
+    },
+    /// The motor driver is switched off to save power.
+    DriverOff,
+    /// A word without a meaning.
+    Reserved(Reserved),
+}
+
+impl Default for Pto {
+    fn default() -> Self {
+        Self::NoPulse { direction: Direction::Low }
+    }
+}
+
+impl Pto {
+    /// Any word is one of the four.
+    pub const fn from_word(word: u16) -> Self {
+        let direction = Direction::of(word);
+        match StartTime::new(word & TIME) {
+            Some(start) => Self::Pulse { start, direction },
+            None if word & TIME == 0 => Self::NoPulse { direction },
+            None if word == DRIVER_OFF => Self::DriverOff,
+            None => Self::Reserved(Reserved(word)),
+        }
+    }
+
+    /// The word; low byte first on the wire.
+    pub const fn word(self) -> u16 {
+        match self {
+            Self::NoPulse { direction } => direction.bit(),
+            Self::Pulse { start, direction } => start.ns() | direction.bit(),
+            Self::DriverOff => DRIVER_OFF,
+            Self::Reserved(raw) => raw.word(),
+        }
+    }
+
+    /// A step at `sync_ns` of a cycle (0..=3999) as the wire can carry it: 0 becomes 1 because 0 means no pulse, and
+    /// 3991..=3999 become 3990. The shift is +1 ns or at most -9 ns and does not accumulate, as long as the caller
+    /// keeps the exact time for its next step.
+    ///
+    /// # Errors
+    /// [`Error::SyncTimeOutOfRange`] above 3999.
+    pub const fn from_step(sync_ns: u32, direction: Direction) -> Result<Self, Error> {
+        let start = match sync_ns {
+            0 => StartTime::MIN,
+            3991..=3999 => StartTime::MAX,
+            #[expect(clippy::cast_possible_truncation, reason = "at most 3990")]
+            1..=3990 => StartTime(sync_ns as u16),
+            ns => return Err(Error::SyncTimeOutOfRange { ns }),
+        };
+        Ok(Self::Pulse { start, direction })
+    }
+
+    /// The word, unless it is reserved.
+    ///
+    /// # Errors
+    /// [`Error::ReservedPtoValue`]
+    pub const fn checked(word: u16) -> Result<Self, Error> {
+        match Self::from_word(word) {
+            Self::Reserved(_) => Err(Error::ReservedPtoValue { raw: word }),
+            pto => Ok(pto),
+        }
+    }
+
+    /// Start of the pulse, if the word asks for one.
+    pub const fn start(self) -> Option<StartTime> {
+        match self {
+            Self::Pulse { start, .. } => Some(start),
+            _ => None,
+        }
+    }
+
+    /// DIR level the word asks for; `None` for driver off, which leaves DIR as it is.
+    pub const fn direction(self) -> Option<Direction> {
+        match self {
+            Self::NoPulse { direction } | Self::Pulse { direction, .. } => Some(direction),
+            Self::DriverOff => None,
+            Self::Reserved(raw) => Some(raw.direction()),
+        }
+    }
+
+    /// Whether the driver is on: in every word but one.
+    pub const fn driver_enabled(self) -> bool {
+        !matches!(self, Self::DriverOff)
+    }
+}
+
+impl From<u16> for Pto {
+    fn from(word: u16) -> Self {
+        Self::from_word(word)
+    }
+}
+
+impl From<Pto> for u16 {
+    fn from(pto: Pto) -> Self {
+        pto.word()
+    }
+}
+
+#[cfg(feature = "arbitrary")]
+impl arbitrary::Arbitrary<'_> for Pto {
+    fn arbitrary(u: &mut arbitrary::Unstructured<'_>) -> arbitrary::Result<Self> {
+        u16::arbitrary(u).map(Self::from_word)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_word_gives_itself_back_and_falls_into_its_class() {
+        for word in 0..=u16::MAX {
+            let pto = Pto::from_word(word);
+            assert_eq!(pto.word(), word);
+            let high = word >= 0x8000;
+            match word & 0x7fff {
+                0 => assert_eq!(pto, Pto::NoPulse { direction: high.into() }),
+                1..=3990 => assert_eq!(pto.start().map(StartTime::ns), Some(word & 0x7fff)),
+                _ if word == 0x7fff => assert_eq!(pto, Pto::DriverOff),
+                time => assert!(matches!(pto, Pto::Reserved(r) if r.time() == time)),
+            }
+            assert_eq!(pto.driver_enabled(), word != 0x7fff);
+            assert_eq!(pto.direction(), (word != 0x7fff).then_some(high.into()));
+            assert_eq!(Pto::checked(word).is_err(), matches!(pto, Pto::Reserved(_)));
+        }
+    }
+
+    #[test]
+    fn a_step_moves_by_one_up_or_nine_down_at_most() {
+        for ns in 0..4000 {
+            for direction in [Direction::Low, Direction::High] {
+                let pto = Pto::from_step(ns, direction).unwrap();
+                let sent = u32::from(pto.start().unwrap().ns());
+                assert_eq!(sent, ns.clamp(1, 3990));
+                assert_eq!(pto.direction(), Some(direction));
+            }
+        }
+        for ns in [4000, 4001, 0x7fff, 0x8000, 0x1_0001, u32::MAX] {
+            assert_eq!(Pto::from_step(ns, Direction::Low), Err(Error::SyncTimeOutOfRange { ns }));
+        }
+    }
+
+    #[test]
+    fn ticks_are_whole_five_nanoseconds() {
+        for ns in 0..=u16::MAX {
+            assert_eq!(StartTime::new(ns).map(StartTime::ticks), (1..=3990).contains(&ns).then(|| (ns + 5) / 5 - 1));
+        }
+    }
+}

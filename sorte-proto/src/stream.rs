@@ -1,0 +1,153 @@
+//! The decoders as `nom` streaming parsers, for frames that arrive as a stream of bytes.
+//!
+//! Missing bytes give `Incomplete` with the number that is wanted; every other fault is an `Error`. With
+//! [`sorte_proto::Error`](crate::Error) as the error type the reason is kept; any other type that implements
+//! `FromExternalError` works too.
+
+use core::num::NonZeroUsize;
+
+use nom::error::{ErrorKind, FromExternalError, ParseError};
+use nom::{Err, IResult, Needed, Parser};
+
+use crate::preamble::{Scan, scan};
+use crate::{DeviceFrameView, Error, FrameType, LongFrame, MasterFrameView};
+
+/// Takes preamble and start delimiter off the front, as [`strip_preamble`](crate::strip_preamble).
+///
+/// # Errors
+/// [`Error::BadPreamble`]; `Incomplete` while only preamble bytes have come.
+pub fn preamble<'a, E>(wire: &'a [u8]) -> IResult<&'a [u8], (), E>
+where
+    E: ParseError<&'a [u8]> + FromExternalError<&'a [u8], Error>,
+{
+    match scan(wire) {
+        Scan::Frame(frame) => Ok((frame, ())),
+        Scan::Bad { at } => Err(refused(wire, Error::BadPreamble { at })),
+        Scan::Ended => Err(missing(1)),
+    }
+}
+
+/// Takes a long-header frame off the front, as [`LongFrame::new`]. The length follows from TYPE.
+///
+/// ```
+/// use nom::Parser;
+/// use sorte_proto::{DelayReq, Error, FrameType, Preamble, stream};
+/// let mut wire = Preamble::Middle.bytes().to_vec();
+/// wire.extend(DelayReq::of_device(false).emit());
+/// let (rest, ((), frame)) = (stream::preamble::<Error>, stream::long_frame).parse(&wire[..]).unwrap();
+/// assert!(rest.is_empty());
+/// assert_eq!(frame.frame_type(), FrameType::DelayReq);
+/// ```
+///
+/// # Errors
+/// As [`LongFrame::new`], with `Incomplete` in place of [`Error::Truncated`]; [`Error::UnknownType`] also for the types
+/// without a published layout, whose end nobody knows.
+pub fn long_frame<'a, E>(input: &'a [u8]) -> IResult<&'a [u8], LongFrame<'a>, E>
+where
+    E: ParseError<&'a [u8]> + FromExternalError<&'a [u8], Error>,
+{
+    let &[_, _, code, ..] = input else { return Err(missing(3_usize.saturating_sub(input.len()))) };
+    let unknown = Error::UnknownType { got: code };
+    let len = FrameType::from_code(code).and_then(FrameType::frame_len).ok_or_else(|| refused(input, unknown))?;
+    take(input, len, LongFrame::new)
+}
+
+/// Takes a master frame of the IO exchange with `output_len` output bytes off the front.
+///
+/// # Errors
+/// As [`MasterFrameView::new`], with `Incomplete` in place of [`Error::Truncated`].
+pub fn master_frame<'a, E>(output_len: usize) -> impl Parser<&'a [u8], Output = MasterFrameView<'a>, Error = E>
+where
+    E: ParseError<&'a [u8]> + FromExternalError<&'a [u8], Error>,
+{
+    let len = output_len.saturating_add(MasterFrameView::OVERHEAD);
+    move |input: &'a [u8]| take(input, len, |frame| MasterFrameView::new(frame, output_len))
+}
+
+/// Takes a device frame of the IO exchange with `payload_len` payload bytes off the front.
+///
+/// # Errors
+/// As [`DeviceFrameView::new`], with `Incomplete` in place of [`Error::Truncated`].
+pub fn device_frame<'a, E>(payload_len: usize) -> impl Parser<&'a [u8], Output = DeviceFrameView<'a>, Error = E>
+where
+    E: ParseError<&'a [u8]> + FromExternalError<&'a [u8], Error>,
+{
+    let len = payload_len.saturating_add(DeviceFrameView::OVERHEAD);
+    move |input: &'a [u8]| take(input, len, |frame| DeviceFrameView::new(frame, payload_len))
+}
+
+fn take<'a, T, E>(input: &'a [u8], len: usize, parse: impl Fn(&'a [u8]) -> Result<T, Error>) -> IResult<&'a [u8], T, E>
+where
+    E: ParseError<&'a [u8]> + FromExternalError<&'a [u8], Error>,
+{
+    let (frame, rest) = input.split_at_checked(len).ok_or_else(|| missing(len.saturating_sub(input.len())))?;
+    Ok((rest, parse(frame).map_err(|error| refused(input, error))?))
+}
+
+fn missing<E>(bytes: usize) -> Err<E> {
+    Err::Incomplete(NonZeroUsize::new(bytes).map_or(Needed::Unknown, Needed::Size))
+}
+
+fn refused<'a, E>(input: &'a [u8], error: Error) -> Err<E>
+where
+    E: ParseError<&'a [u8]> + FromExternalError<&'a [u8], Error>,
+{
+    Err::Error(E::from_external_error(input, ErrorKind::MapRes, error))
+}
+
+#[cfg(test)]
+mod tests {
+    use std::vec::Vec;
+
+    use super::*;
+    use crate::{DelayReq, Discovery, Param, Parameters, Preamble, Status, Sync, strip_preamble, write_master_frame};
+
+    fn stream() -> Vec<u8> {
+        let frames: [(Preamble, Vec<u8>); 4] = [
+            (Preamble::Long, Discovery::request(false).emit().to_vec()),
+            (Preamble::Long, Param::request(Parameters::STOCK, true).emit().to_vec()),
+            (Preamble::Middle, DelayReq::of_device(true).emit().to_vec()),
+            (Preamble::Middle, Sync::of_master(500, 76, true).emit().to_vec()),
+        ];
+        frames.iter().flat_map(|(preamble, frame)| preamble.bytes().iter().chain(frame)).copied().collect()
+    }
+
+    #[test]
+    fn a_stream_of_frames_may_be_split_anywhere() {
+        let wire = stream();
+        let mut whole = Vec::new();
+        let mut rest = &wire[..];
+        while !rest.is_empty() {
+            let (behind, ((), frame)) = (preamble::<Error>, long_frame).parse(rest).unwrap();
+            whole.push(frame.frame_type());
+            for cut in 0..rest.len() - behind.len() {
+                let part = (preamble::<Error>, long_frame).parse(&rest[..cut]);
+                assert!(part.is_err_and(|e| e.is_incomplete()), "{cut}");
+            }
+            rest = behind;
+        }
+        assert_eq!(whole, [FrameType::Discovery, FrameType::Param, FrameType::DelayReq, FrameType::Sync]);
+    }
+
+    #[test]
+    fn the_exchange_is_a_stream_too() {
+        let mut wire = [0; 24];
+        let len = write_master_frame(&mut wire, &[0x11; 16], 0x2233).unwrap();
+        let (rest, view) = master_frame::<Error>(16).parse(&wire).unwrap();
+        assert_eq!((rest, view.output(), view.status()), (&[0; 3][..], &[0x11; 16][..], Status::EXCHANGE));
+        for cut in 0..len {
+            let needed = Err::Incomplete(Needed::new(len - cut));
+            assert_eq!(master_frame::<Error>(16).parse(&wire[..cut]).map(|_| ()), Err(needed));
+        }
+        let refusal = Err::Error(Error::WrongSource { got: 0 });
+        assert_eq!(device_frame::<Error>(0).parse(&[0, 0, 0]).map(|_| ()), Err(refusal));
+    }
+
+    #[test]
+    fn the_reason_is_kept() {
+        assert_eq!(preamble::<Error>(&[0x55, 0x54]), Err(Err::Error(Error::BadPreamble { at: 1 })));
+        assert_eq!(strip_preamble(&[0x55, 0x54]), Err(Error::BadPreamble { at: 1 }));
+        let alarm = long_frame::<Error>(&[255, 0, 8, 0]).map(|_| ());
+        assert_eq!(alarm, Err(Err::Error(Error::UnknownType { got: 8 })));
+    }
+}

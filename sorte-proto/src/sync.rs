@@ -1,0 +1,157 @@
+use crate::frame::{FrameType, LongFrame, emit};
+use crate::{Error, Status};
+
+/// From the trigger of a SYNC frame to the capture of its start at the receiver without the cable: 280 ns, which is
+/// 3.5 byte times of preamble (coded as 100 + 180 in the published master).
+pub const TRIGGER_TO_CAPTURE_NS: u32 = 280;
+
+/// What one device adds to the way of a SYNC frame beside the cable: 320 ns until its port starts to send, and 35 ns
+/// of hardware latency.
+pub const TRANSIT_NS: u16 = 355;
+
+/// A SYNC frame in a buffer.
+///
+/// ```text
+///  byte 0    1   2   3       4           8      10
+///       255  SA  5   STATUS  time stamp  delay  FCS
+///                            u32         u16
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct SyncView<'a> {
+    frame: LongFrame<'a>,
+    fields: &'a [u8; 6],
+}
+
+impl<'a> SyncView<'a> {
+    /// Checks as [`LongFrame::new`], then that TYPE is 5.
+    ///
+    /// # Errors
+    /// As [`LongFrame::new`]; [`Error::UnexpectedType`].
+    pub fn new(bytes: &'a [u8]) -> Result<Self, Error> {
+        Self::of(LongFrame::new(bytes)?)
+    }
+
+    /// Checks that TYPE is 5.
+    ///
+    /// # Errors
+    /// [`Error::UnexpectedType`]
+    pub fn of(frame: LongFrame<'a>) -> Result<Self, Error> {
+        Ok(Self { frame, fields: frame.of_type(FrameType::Sync)? })
+    }
+
+    /// SA.
+    pub const fn source(self) -> u8 {
+        self.frame.source()
+    }
+
+    /// STATUS.
+    pub const fn status(self) -> Status {
+        self.frame.status()
+    }
+
+    /// Master time in ns at which the start of this frame is expected at the receiver.
+    pub const fn time_stamp_ns(self) -> u32 {
+        let &[t0, t1, t2, t3, ..] = self.fields;
+        u32::from_le_bytes([t0, t1, t2, t3])
+    }
+
+    /// Delay from the master to the receiver in ns.
+    pub const fn delay_ns(self) -> u16 {
+        let &[_, _, _, _, d0, d1] = self.fields;
+        u16::from_le_bytes([d0, d1])
+    }
+}
+
+/// The values of a SYNC frame.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "arbitrary", derive(arbitrary::Arbitrary))]
+pub struct Sync {
+    /// SA, 0 in everything the published firmware sends.
+    pub source: u8,
+    /// STATUS.
+    pub status: Status,
+    /// Master time in ns at which the start of this frame is expected at the receiver.
+    pub time_stamp_ns: u32,
+    /// Delay from the master to the receiver in ns.
+    pub delay_ns: u16,
+}
+
+impl Sync {
+    /// Bytes from DA to FCS.
+    pub const LEN: usize = 6 + LongFrame::OVERHEAD;
+
+    /// As the master sends it: triggered at `trigger_ns` of its time, over a line of `line_delay_ns` to the first device.
+    pub const fn of_master(trigger_ns: u32, line_delay_ns: u16, last: bool) -> Self {
+        Self {
+            source: 0,
+            status: if last { Status::FINAL } else { Status::SYNC },
+            time_stamp_ns: trigger_ns.wrapping_add(line_delay_ns as u32).wrapping_add(TRIGGER_TO_CAPTURE_NS),
+            delay_ns: line_delay_ns,
+        }
+    }
+
+    /// Checks as [`SyncView::new`].
+    ///
+    /// # Errors
+    /// As [`SyncView::new`].
+    pub fn parse(bytes: &[u8]) -> Result<Self, Error> {
+        let view = SyncView::new(bytes)?;
+        Ok(Self {
+            source: view.source(),
+            status: view.status(),
+            time_stamp_ns: view.time_stamp_ns(),
+            delay_ns: view.delay_ns(),
+        })
+    }
+
+    /// The frame from DA to FCS.
+    pub fn emit(&self) -> [u8; Self::LEN] {
+        let ([t0, t1, t2, t3], [d0, d1]) = (self.time_stamp_ns.to_le_bytes(), self.delay_ns.to_le_bytes());
+        emit(self.source, FrameType::Sync, self.status, &[t0, t1, t2, t3, d0, d1])
+    }
+
+    /// What a device does to the frame that passes: its own transit and the line to the next device are added to both
+    /// times, which wrap, and its STATUS bits are set. [`cut_through`](crate::cut_through) does the same byte by byte.
+    pub fn pass(&mut self, line_delay_next_ns: u16, last: bool, error: bool) {
+        let hop = hop_ns(line_delay_next_ns);
+        self.status |= Status::of_device(last, error);
+        self.time_stamp_ns = self.time_stamp_ns.wrapping_add(hop);
+        let [low, high, ..] = hop.to_le_bytes();
+        self.delay_ns = self.delay_ns.wrapping_add(u16::from_le_bytes([low, high]));
+    }
+}
+
+/// Way from one device's receiver to the next one's in ns.
+pub(crate) const fn hop_ns(line_delay_next_ns: u16) -> u32 {
+    // Two 16-bit numbers: the sum cannot pass u32.
+    (line_delay_next_ns as u32).saturating_add(TRANSIT_NS as u32)
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+
+    proptest! {
+        #[test]
+        fn what_was_emitted_is_parsed_and_back(source: u8, status: u8, time_stamp_ns: u32, delay_ns: u16) {
+            let frame = Sync { source, status: Status(status), time_stamp_ns, delay_ns };
+            let bytes = frame.emit();
+            prop_assert_eq!(Sync::parse(&bytes), Ok(frame));
+            prop_assert_eq!(Sync::parse(&bytes).unwrap().emit(), bytes);
+        }
+
+        #[test]
+        fn both_times_grow_by_the_hop(time_stamp_ns: u32, delay_ns: u16, line: u16, last: bool, error: bool) {
+            let mut frame = Sync { source: 0, status: Status::SYNC, time_stamp_ns, delay_ns };
+            frame.pass(line, last, error);
+            prop_assert_eq!(frame.time_stamp_ns, (u64::from(time_stamp_ns) + u64::from(line) + 355) as u32);
+            prop_assert_eq!(frame.delay_ns, (u64::from(delay_ns) + u64::from(line) + 355) as u16);
+            prop_assert_eq!((frame.status.is_last(), frame.status.is_error()), (last, error));
+        }
+    }
+}

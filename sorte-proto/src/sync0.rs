@@ -1,0 +1,360 @@
+//! Step pulses from PTO words: the interrupt handler that programs the SYNC0 output of the IEP timer.
+//!
+//! The IEP counts 0, 5, .. 3995 ns and starts again. A compare event CMP1 starts the SYNC0 unit: `START + 1` ticks of
+//! 5 ns later the output rises and stays high for 2000 ns. It does so once; then it must be armed again by writing
+//! SYNC_CTRL, which also cuts a pulse that is still high. Three events call the handler:
+//!
+//! ```text
+//!  CMP0  3995 ns  the counter wraps
+//!  CMP7  2000 ns  new data: the PTO word for the next cycle
+//!  CMP6  moved    the pulse is over: disable CMP1 and CMP6, arm again
+//!
+//!  cycle n            cycle n+1          cycle n+2
+//!  |-------CMP7------|------------------|---
+//!          |  `late`: CMP1 = 3990, START = PTO / 5
+//!          |         CMP1 ____pulse____
+//!          |             |             |CMP6
+//! ```
+//!
+//! A pulse is normally programmed *late* in the cycle before it. If the pulse before is still running, it has to be
+//! programmed in its own cycle, by CMP0 or CMP6 (*now*: CMP1 = PTO).
+//!
+//! [`Variant::Published`] does what the published device does, register write for register write; with steps 4 us
+//! apart and random phases some 5 to 7 % of them come a cycle late or not at all. [`Variant::Lossless`] keeps every
+//! step, as long as the handler runs within 590 ns and steps are at least 4000 ns apart.
+//!
+//! Events that are pending together are served in the order CMP6, CMP0, CMP7.
+//!
+//! ```
+//! use sorte_proto::StartTime;
+//! use sorte_proto::sync0::{Register, Sync0, Write};
+//! let mut sync0 = Sync0::default();
+//! let writes: Vec<Write> = sync0.cmp7(StartTime::new(600)).into_iter().collect();
+//! assert_eq!(writes, [
+//!     Write { register: Register::SyncStart, value: 120 },
+//!     Write { register: Register::Cmp6, value: 2600 },
+//!     Write { register: Register::Cmp1, value: 3990 },
+//!     Write { register: Register::CmpCfg, value: 0x107 },
+//! ]);
+//! ```
+
+use core::ops::{BitOr, BitOrAssign};
+
+use crate::StartTime;
+
+/// Width of the pulse in ns: PWIDTH = 399.
+pub const PULSE_NS: u16 = 2000;
+/// CMP7: when the handler takes new data, in ns.
+pub const CMP7_NS: u16 = 2000;
+/// CMP1 of a pulse programmed late, in ns: two ticks before the next cycle.
+pub const LATE_CMP1_NS: u16 = 3990;
+/// The longest time from an event to its handler for which [`Variant::Lossless`] is proved, in ns.
+pub const MAX_LATENCY_NS: u16 = 590;
+
+/// CMP_CFG of an idle output: CMP0 resets the counter, CMP0 and CMP7 are enabled. Bit n+1 enables CMPn.
+pub const CMP_CFG_IDLE: u16 = 0x103;
+const CMP1_ENABLED: u16 = 1 << 2;
+const CMP6_ENABLED: u16 = 1 << 7;
+
+/// A pulse that ends at or after this time overlaps the next cycle, as the machine sees it.
+const OVERLAP_NS: u16 = 3390;
+/// The lossless machine does not place CMP6 before this time: CMP0's handler must have enabled it.
+const EARLIEST_CMP6_NS: u16 = 600;
+
+/// Which machine.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "arbitrary", derive(arbitrary::Arbitrary))]
+pub enum Variant {
+    /// The published device's, with its losses.
+    Published,
+    /// This crate's.
+    #[default]
+    Lossless,
+}
+
+/// Flags between the events, by the bits of the published status word. Its bits 4 to 6 are the events themselves.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Flags(pub u16);
+
+impl Flags {
+    /// PENDING_PULSE: a pulse is programmed and not yet over.
+    pub const PENDING: Self = Self(1 << 0);
+    /// ACTIVE_PULSE: a pulse has been ordered and is not yet programmed.
+    pub const ACTIVE: Self = Self(1 << 1);
+    /// DELAYED_CMP6_ACTIVATED: the coming wrap must not yet enable CMP6.
+    pub const DELAYED: Self = Self(1 << 3);
+    /// SYNC_PULSE_OVERLAP: the pulse ordered last ends in the cycle after its own.
+    pub const OVERLAP: Self = Self(1 << 7);
+    /// PREV_SYNC_PULSE_OVERLAP: so does the pulse programmed last.
+    pub const PREV_OVERLAP: Self = Self(1 << 8);
+
+    /// Whether all of `flags` are set.
+    pub const fn has(self, flags: Self) -> bool {
+        self.0 & flags.0 == flags.0
+    }
+
+    const fn set(&mut self, flag: Self, on: bool) {
+        if on {
+            self.0 |= flag.0;
+        } else {
+            self.0 &= !flag.0;
+        }
+    }
+}
+
+impl BitOr for Flags {
+    type Output = Self;
+
+    fn bitor(self, other: Self) -> Self {
+        Self(self.0 | other.0)
+    }
+}
+
+impl BitOrAssign for Flags {
+    fn bitor_assign(&mut self, other: Self) {
+        self.0 |= other.0;
+    }
+}
+
+/// A register of the IEP.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum Register {
+    /// CMP_CFG: which compare events are enabled.
+    CmpCfg,
+    /// CMP1 in ns: starts SYNC0.
+    Cmp1,
+    /// CMP6 in ns: the end of the pulse.
+    Cmp6,
+    /// START of SYNC0 in ticks of 5 ns after CMP1, less one.
+    SyncStart,
+    /// SYNC_CTRL: 2 stops SYNC0, 3 arms it.
+    SyncCtrl,
+}
+
+/// A value for a register.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Write {
+    /// Where.
+    pub register: Register,
+    /// What.
+    pub value: u16,
+}
+
+/// What comes first.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+enum Prelude {
+    Nothing,
+    /// CMP_CFG only.
+    Enable,
+    /// CMP_CFG, then SYNC_CTRL 2 and 3.
+    Rearm,
+}
+
+/// How the pulse is programmed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+enum Program {
+    Nothing,
+    /// START, CMP6, CMP1, CMP_CFG: for the next cycle.
+    Late,
+    /// CMP6, CMP1, START, CMP_CFG: for the running cycle.
+    Now,
+}
+
+/// The register writes of one event, in the order in which they must be made; at most seven.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[must_use = "the registers have to be written"]
+#[repr(align(4))] // copied in words
+pub struct Writes {
+    prelude: Prelude,
+    program: Program,
+    first_cfg: u16,
+    start: u16,
+    cmp6: u16,
+    cmp1: u16,
+    cfg: u16,
+}
+
+impl Writes {
+    const NONE: Self =
+        Self { prelude: Prelude::Nothing, program: Program::Nothing, first_cfg: 0, start: 0, cmp6: 0, cmp1: 0, cfg: 0 };
+}
+
+impl IntoIterator for Writes {
+    type Item = Write;
+    type IntoIter = WriteIter;
+
+    fn into_iter(self) -> WriteIter {
+        WriteIter { writes: self, at: 0 }
+    }
+}
+
+/// The writes one by one.
+#[derive(Debug, Clone)]
+pub struct WriteIter {
+    writes: Writes,
+    at: u8,
+}
+
+impl Iterator for WriteIter {
+    type Item = Write;
+
+    fn next(&mut self) -> Option<Write> {
+        let writes = &self.writes;
+        let write = |register, value| Some(Write { register, value });
+        let prelude = match writes.prelude {
+            Prelude::Nothing => 0,
+            Prelude::Enable => 1,
+            Prelude::Rearm => 3,
+        };
+        let next = match (self.at.checked_sub(prelude), writes.program) {
+            (None, _) if self.at == 0 => write(Register::CmpCfg, writes.first_cfg),
+            (None, _) if self.at == 1 => write(Register::SyncCtrl, 2),
+            (None, _) => write(Register::SyncCtrl, 3),
+            (Some(0), Program::Late) | (Some(2), Program::Now) => write(Register::SyncStart, writes.start),
+            (Some(1), Program::Late) | (Some(0), Program::Now) => write(Register::Cmp6, writes.cmp6),
+            (Some(2), Program::Late) | (Some(1), Program::Now) => write(Register::Cmp1, writes.cmp1),
+            (Some(3), Program::Late | Program::Now) => write(Register::CmpCfg, writes.cfg),
+            _ => return None,
+        };
+        self.at = self.at.saturating_add(1);
+        next
+    }
+}
+
+/// The SYNC0 generator: flags, the pulse on order, and CMP_CFG as it was written last.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[repr(align(4))] // copied in words
+pub struct Sync0 {
+    variant: Variant,
+    flags: Flags,
+    /// Start of the pulse ordered last in ns, its register value, and its CMP6.
+    pto: u16,
+    ticks: u16,
+    new6: u16,
+    cfg: u16,
+}
+
+impl Default for Sync0 {
+    fn default() -> Self {
+        Self::new(Variant::Lossless)
+    }
+}
+
+impl Sync0 {
+    /// An idle output: CMP_CFG holds [`CMP_CFG_IDLE`], SYNC0 is armed.
+    pub const fn new(variant: Variant) -> Self {
+        Self { variant, flags: Flags(0), pto: 0, ticks: 0, new6: 0, cfg: CMP_CFG_IDLE }
+    }
+
+    /// Which machine it is.
+    pub const fn variant(&self) -> Variant {
+        self.variant
+    }
+
+    /// The flags.
+    pub const fn flags(&self) -> Flags {
+        self.flags
+    }
+
+    /// The pulse is over.
+    pub const fn cmp6(&mut self) -> Writes {
+        self.cfg &= !(CMP1_ENABLED | CMP6_ENABLED);
+        self.flags.set(Flags::PENDING, false);
+        let mut writes = Writes { prelude: Prelude::Rearm, first_cfg: self.cfg, ..Writes::NONE };
+        if self.flags.has(Flags::ACTIVE) {
+            if self.flags.has(Flags::PREV_OVERLAP) {
+                self.program_now(&mut writes);
+            } else if matches!(self.variant, Variant::Lossless) {
+                self.program_late(&mut writes);
+            }
+        }
+        writes
+    }
+
+    /// The counter wraps.
+    pub const fn cmp0(&mut self) -> Writes {
+        let mut writes = Writes::NONE;
+        if self.flags.has(Flags::DELAYED) {
+            self.flags.set(Flags::DELAYED, false);
+        } else if self.flags.has(Flags::PENDING) {
+            self.cfg |= CMP6_ENABLED;
+            writes.prelude = Prelude::Enable;
+            writes.first_cfg = self.cfg;
+        }
+        let deferred = self.flags.has(Flags::ACTIVE) && !self.flags.has(Flags::PREV_OVERLAP);
+        if deferred && matches!(self.variant, Variant::Published) {
+            self.program_now(&mut writes);
+        }
+        writes
+    }
+
+    /// New data: the start of the pulse in the next cycle, [`Pto::start`](crate::Pto::start) of the device's word.
+    pub const fn cmp7(&mut self, start: Option<StartTime>) -> Writes {
+        let mut writes = Writes::NONE;
+        let Some(start) = start else {
+            if matches!(self.variant, Variant::Published) {
+                self.flags.set(Flags::PREV_OVERLAP, false);
+            }
+            return writes;
+        };
+        self.flags.set(Flags::ACTIVE, true);
+        self.pto = start.ns();
+        self.ticks = start.ticks();
+        // At most 3990 + 2000.
+        let end = self.pto.wrapping_add(PULSE_NS);
+        self.flags.set(Flags::OVERLAP, end >= OVERLAP_NS);
+        self.new6 = match (self.variant, end >= OVERLAP_NS) {
+            (_, false) => end,
+            // Never 0: that event would be lost in the wrap.
+            (Variant::Published, true) if end == OVERLAP_NS => 10,
+            (Variant::Published, true) => end.wrapping_sub(OVERLAP_NS),
+            (Variant::Lossless, true) if end < LATE_CMP1_NS + EARLIEST_CMP6_NS => EARLIEST_CMP6_NS,
+            (Variant::Lossless, true) => end.wrapping_sub(LATE_CMP1_NS),
+        };
+        if !self.flags.has(Flags::PENDING) {
+            self.program_late(&mut writes);
+        }
+        writes
+    }
+
+    /// A pulse for the next cycle.
+    const fn program_late(&mut self, writes: &mut Writes) {
+        let overlap = self.flags.has(Flags::OVERLAP);
+        self.flags.set(Flags::PREV_OVERLAP, overlap);
+        if overlap {
+            self.flags.set(Flags::DELAYED, true);
+        }
+        self.cfg |= CMP1_ENABLED;
+        self.programmed(writes, Program::Late, self.ticks, LATE_CMP1_NS);
+    }
+
+    /// A pulse for the running cycle.
+    const fn program_now(&mut self, writes: &mut Writes) {
+        let overlap = self.flags.has(Flags::OVERLAP);
+        self.flags.set(Flags::PREV_OVERLAP, overlap);
+        self.cfg |= if overlap { CMP1_ENABLED } else { CMP1_ENABLED | CMP6_ENABLED };
+        self.programmed(writes, Program::Now, 0, self.pto);
+    }
+
+    const fn programmed(&mut self, writes: &mut Writes, program: Program, start: u16, cmp1: u16) {
+        self.flags.set(Flags::ACTIVE, false);
+        self.flags.set(Flags::PENDING, true);
+        writes.program = program;
+        writes.start = start;
+        writes.cmp6 = self.new6;
+        writes.cmp1 = cmp1;
+        writes.cfg = self.cfg;
+    }
+}
+
+#[cfg(test)]
+mod tests;

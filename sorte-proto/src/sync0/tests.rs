@@ -1,0 +1,213 @@
+use std::vec;
+use std::vec::Vec;
+
+use proptest::prelude::*;
+
+use super::*;
+use crate::iep::{Channel, Edge, Happening};
+
+/// Rise and fall of every pulse for the words given, and three cycles more.
+fn pulses(mut axis: Channel, words: &[u16]) -> Vec<(u64, u64)> {
+    let mut pulses = Vec::new();
+    let mut up = None;
+    for (end, &word) in (1..).map(|n| n * 4000).zip(words.iter().chain(&[0; 3])) {
+        axis.set_start(StartTime::new(word));
+        while let Some(edge) = axis.next_edge(end) {
+            match edge {
+                Edge { ns, high: true } => assert_eq!(up.replace(ns), None),
+                Edge { ns, high: false } => pulses.push((up.take().unwrap(), ns)),
+            }
+        }
+    }
+    pulses
+}
+
+fn requested(words: &[u16]) -> Vec<u64> {
+    (1..).zip(words).filter(|(_, word)| **word != 0).map(|(n, &word)| n * 4000 + u64::from(word)).collect()
+}
+
+/// Steps at least 4 us apart, as words for consecutive cycles.
+fn legal_words(gaps: &[u32]) -> Vec<u16> {
+    let mut words = Vec::new();
+    let mut at = 0u64;
+    for &gap in gaps {
+        at += u64::from(gap);
+        let (mut cycle, mut ns) = (at / 4000, at % 4000);
+        // The wire carries 1 to 3990; the shift must not bring two steps closer than 4 us.
+        if ns == 0 || ns > 3990 {
+            at += 4000 - ns + 1;
+            (cycle, ns) = (at / 4000, at % 4000);
+        }
+        words.resize(cycle as usize, 0);
+        words.push(ns as u16);
+    }
+    words
+}
+
+fn steps() -> impl Strategy<Value = Vec<u32>> {
+    let gap = prop_oneof![Just(4000u32), 4000..4010u32, 4000..4200u32, 4000..8000u32, 4000..40_000u32];
+    proptest::collection::vec(gap, 1..60)
+}
+
+fn assert_lossless(words: &[u16], latency: u16) {
+    let real = pulses(Channel::new(Variant::Lossless, CMP7_NS, latency), words);
+    let want = requested(words);
+    assert_eq!(real.len(), want.len(), "{words:?} at {latency} ns");
+    for ((rise, fall), want) in real.into_iter().zip(want) {
+        assert!(rise.abs_diff(want) < 10, "{rise} for {want} in {words:?} at {latency} ns");
+        assert_eq!(fall - rise, u64::from(PULSE_NS), "{words:?} at {latency} ns");
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 4000, ..ProptestConfig::default() })]
+
+    #[test]
+    fn lossless_keeps_every_step(gaps in steps(), latency in 0u16..=MAX_LATENCY_NS) {
+        assert_lossless(&legal_words(&gaps), latency);
+    }
+
+    /// The two machines differ only in when, never in what a write may be.
+    #[test]
+    fn writes_stay_in_range(events in proptest::collection::vec((0u8..3, 0u16..4000), 0..200), published: bool) {
+        let mut sync0 = Sync0::new(if published { Variant::Published } else { Variant::Lossless });
+        for (event, ns) in events {
+            let writes = match event {
+                0 => sync0.cmp6(),
+                1 => sync0.cmp0(),
+                _ => sync0.cmp7(StartTime::new(ns)),
+            };
+            let mut count = 0;
+            for Write { register, value } in writes {
+                count += 1;
+                match register {
+                    Register::CmpCfg => prop_assert_eq!(value & !0x084, CMP_CFG_IDLE),
+                    Register::Cmp1 => prop_assert!((1..=3990).contains(&value)),
+                    Register::Cmp6 => prop_assert!((1..=3990).contains(&value)),
+                    Register::SyncStart => prop_assert!(value <= 798),
+                    Register::SyncCtrl => prop_assert!(value == 2 || value == 3),
+                }
+            }
+            prop_assert!(count <= 7);
+        }
+    }
+}
+
+/// Every pair of phases, one cycle after the other, at every fifth latency: the second not before 4 us after the first.
+#[test]
+fn lossless_keeps_every_pair_of_phases() {
+    let phases: Vec<u16> = (1..=3990).step_by(133).chain(1380..=1400).chain([3389, 3390, 3990]).collect();
+    for &first in &phases {
+        for &second in phases.iter().filter(|&&second| second >= first) {
+            for latency in [0, 100, 300, 590] {
+                assert_lossless(&[first, second, second, 0, second], latency);
+            }
+        }
+    }
+}
+
+/// What the module promises of the published machine: some steps are late or lost, and none is without reason.
+#[test]
+fn the_published_machine_loses_some_steps_in_a_hundred() {
+    let mut state = 1u32;
+    let mut random = |below: u32| {
+        state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+        ((u64::from(state) * u64::from(below)) >> 32) as u32
+    };
+    let (mut asked, mut on_time) = (0, 0);
+    for _ in 0..400 {
+        let gaps: Vec<u32> = (0..50).map(|_| 4000 + if random(2) == 0 { random(60) } else { random(8000) }).collect();
+        let words = legal_words(&gaps);
+        let real = pulses(Channel::new(Variant::Published, CMP7_NS, 300), &words);
+        let want = requested(&words);
+        asked += want.len();
+        on_time += want.iter().filter(|want| real.iter().any(|(rise, _)| rise.abs_diff(**want) < 10)).count();
+    }
+    let missed = 100 * (asked - on_time) / asked;
+    assert!((1..=15).contains(&missed), "{missed} %");
+}
+
+/// The event-driven timer against one that looks at every tick.
+#[test]
+fn the_timer_is_the_one_that_looks_at_every_tick() {
+    for words in [vec![600, 0, 0], vec![500, 520, 540, 560, 0], vec![2500, 2520, 2540, 2560], vec![3990, 0, 1, 1, 1390]]
+    {
+        for variant in [Variant::Published, Variant::Lossless] {
+            for latency in [0, 5, 100, 300, 590] {
+                let fast = pulses(Channel::new(variant, CMP7_NS, latency), &words);
+                assert_eq!(fast, tick_by_tick(variant, latency, &words), "{variant:?} {latency} {words:?}");
+            }
+        }
+    }
+}
+
+/// The ideal timer as it is described: one look at every 5 ns.
+fn tick_by_tick(variant: Variant, latency: u16, words: &[u16]) -> Vec<(u64, u64)> {
+    let mut sync0 = Sync0::new(variant);
+    let (mut cmp1, mut cmp6, mut start, mut cfg) = (0u16, 0u16, 0u64, CMP_CFG_IDLE);
+    let (mut armed, mut rise, mut fall, mut serve) = (true, None, None, None);
+    let (mut p0, mut p6, mut p7) = (false, false, false);
+    let (mut pulses, mut up) = (Vec::new(), 0);
+    for tick in 0..800 * (words.len() as u64 + 3) {
+        let count = tick % 800 * 5;
+        let hit = |value: u16| u64::from(value) <= count && u64::from(value) + 5 > count;
+        if cfg & 4 != 0 && hit(cmp1) && armed {
+            (armed, rise) = (false, Some(tick + start + 1));
+        }
+        let (e0, e6, e7) = (count == 3995, cfg & 0x80 != 0 && hit(cmp6), count == 2000);
+        (p0, p6, p7) = (p0 || e0, p6 || e6, p7 || e7);
+        if e0 || e6 || e7 {
+            serve = serve.or(Some(tick + u64::from(latency) / 5));
+        }
+        if rise == Some(tick) {
+            (rise, up, fall) = (None, tick * 5, Some(tick + 400));
+        }
+        if fall == Some(tick) {
+            fall = None;
+            pulses.push((up, tick * 5));
+        }
+        if serve != Some(tick) {
+            continue;
+        }
+        serve = None;
+        let mut writes = Vec::new();
+        if core::mem::take(&mut p6) {
+            writes.extend(sync0.cmp6());
+        }
+        if core::mem::take(&mut p0) {
+            writes.extend(sync0.cmp0());
+        }
+        if core::mem::take(&mut p7) {
+            writes.extend(sync0.cmp7(words.get(tick as usize / 800).and_then(|&word| StartTime::new(word))));
+        }
+        for Write { register, value } in writes {
+            match register {
+                Register::CmpCfg => cfg = value,
+                Register::Cmp1 => cmp1 = value,
+                Register::Cmp6 => cmp6 = value,
+                Register::SyncStart => start = value.into(),
+                Register::SyncCtrl if value == 3 => armed = true,
+                Register::SyncCtrl => {
+                    (armed, rise) = (false, None);
+                    if fall.take().is_some() {
+                        pulses.push((up, tick * 5));
+                    }
+                }
+            }
+        }
+    }
+    pulses
+}
+
+#[test]
+fn the_handler_never_runs_without_an_event() {
+    let mut axis = Channel::new(Variant::Lossless, CMP7_NS, 100);
+    let mut served = 0;
+    while let Some(happening) = axis.next(40_000) {
+        if let Happening::Served(run) = happening {
+            assert!(run.events.cmp0 || run.events.cmp6 || run.events.cmp7);
+            served += 1;
+        }
+    }
+    assert_eq!(served, 19);
+}

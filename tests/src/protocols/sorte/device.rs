@@ -1,0 +1,182 @@
+//! State machine of a device.
+
+use serde::Deserialize;
+use sorte_proto::device::{Arrival, Config, Device, Port, PortFlags, PortId, State, Trigger};
+use sorte_proto::{DelayReq, Discovery, Param, Parameters, Sync};
+
+use super::Origin;
+use crate::hex::Bytes;
+use crate::row::{Fault, Row, Verdict, each, same};
+
+#[derive(Deserialize)]
+#[serde(untagged)]
+enum DeviceRow {
+    Frame(FrameRow),
+    Monitor(MonitorRow),
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct FrameRow {
+    #[serde(rename = "origin")]
+    _origin: Origin,
+    #[serde(rename = "case")]
+    _case: String,
+    state: String,
+    flags: Vec<String>,
+    frame_head: Option<Bytes>,
+    state_after: String,
+    flags_after: Vec<String>,
+    forwards_modified_copy: bool,
+    line_delay_trigger: u8,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct MonitorRow {
+    #[serde(rename = "origin")]
+    _origin: Origin,
+    #[serde(rename = "case")]
+    _case: String,
+    cycles: Vec<Cycle>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Cycle {
+    #[serde(rename = "cycle")]
+    number: usize,
+    frame_received: bool,
+    missed_count: u8,
+    restart: bool,
+}
+
+const STATES: [(State, &str); 6] = [
+    (State::Idle, "IDLE"),
+    (State::Discovery, "DISCOVERY"),
+    (State::Param, "PARAM"),
+    (State::LineDelay, "LINE_DELAY"),
+    (State::Sync, "SYNC"),
+    (State::Exchange, "IOEX"),
+];
+
+const FLAGS: [(PortFlags, &str); 5] = [
+    (PortFlags::LAST_DEVICE, "LAST_DEVICE"),
+    (PortFlags::MASTER_PORT, "MASTER_PORT"),
+    (PortFlags::IGNORE_TO_EOF, "IGNORE_TO_EOF"),
+    (PortFlags::SWITCH_PORT_CONFIG, "SWITCH_PORT_CONFIG"),
+    (PortFlags::NEW_SYNC_FRAME, "NEW_SYNC_FRAME"),
+];
+
+fn name(state: State) -> String {
+    STATES.iter().find(|(s, _)| *s == state).map_or("?", |(_, name)| name).to_owned()
+}
+
+fn flags(names: &[String]) -> Result<PortFlags, Fault> {
+    let of = |name: &String| FLAGS.iter().find(|(_, n)| n == name).map(|(flag, _)| flag.0);
+    let mut bits = names.iter().map(|name| of(name).ok_or_else(|| Fault::Unreadable(format!("flag {name}"))));
+    bits.try_fold(0, |all, bit| Ok(all | bit?)).map(PortFlags)
+}
+
+pub(super) fn device_state(rows: &[Row]) -> Vec<Verdict> {
+    each(rows, |row: DeviceRow| match row {
+        DeviceRow::Frame(row) => {
+            let state = STATES.iter().find(|(_, name)| *name == row.state).map(|(state, _)| *state);
+            let state = state.ok_or_else(|| Fault::Unreadable(format!("state {}", row.state)))?;
+            let mut port = Port { state, flags: flags(&row.flags)? };
+            let head = match &row.frame_head {
+                None => None,
+                Some(Bytes(bytes)) => match bytes[..] {
+                    [da, sa, code, status, ..] => Some([da, sa, code, status]),
+                    _ => return Err(Fault::Unreadable("frame_head".to_owned())),
+                },
+            };
+            let seen = head.map(|head| port.head(head)).unwrap_or_default();
+            same("state_after", &row.state_after, &name(port.state))?;
+            same("flags_after", &flags(&row.flags_after)?, &port.flags)?;
+            same("forwards_modified_copy", &row.forwards_modified_copy, &seen.modifies)?;
+            same("line_delay_trigger", &row.line_delay_trigger, &(seen.trigger as u8))
+        }
+        DeviceRow::Monitor(row) => {
+            let mut device = taken_to(State::Exchange, true);
+            // The first cycle start after the last SYNC frame finds a frame before it.
+            let _: Result<_, _> = device.exchange(&[], 0, 0);
+            device.cycle_start();
+            for (index, cycle) in row.cycles.into_iter().enumerate() {
+                same("cycle", &cycle.number, &(index + 1))?;
+                if cycle.frame_received {
+                    // Whatever it is, it counts.
+                    let _: Result<_, _> = device.exchange(&[], 0, 0);
+                }
+                let before = device.missed_frames();
+                let restart = device.cycle_start();
+                let missed = if restart { before + 1 } else { device.missed_frames() };
+                same("missed_count", &cycle.missed_count, &missed)?;
+                same("restart", &cycle.restart, &restart)?;
+                same("state", &restart, &(device.state() == State::Idle))?;
+            }
+            Ok(())
+        }
+    })
+}
+
+/// A device, last in the line or not, taken to `state` by good frames.
+fn taken_to(state: State, last: bool) -> Device {
+    let mut device = Device::new(Config::default());
+    device.links(true, !last);
+    let frames = [
+        Discovery::request(false).emit().to_vec(),
+        Discovery::request(true).emit().to_vec(),
+        Param::request(Parameters::STOCK, true).emit().to_vec(),
+        DelayReq::of_master(true).emit().to_vec(),
+        Sync::of_master(500, 76, true).emit().to_vec(),
+    ];
+    for mut frame in frames {
+        if device.state() == State::LineDelay && !last {
+            measure(&mut device);
+        }
+        if device.state() != state {
+            let handled = device.frame(PortId::A, &mut frame, arrival(0));
+            assert_eq!(handled.result, Ok(()));
+        }
+    }
+    assert_eq!(device.state(), state);
+    device
+}
+
+/// Sixteen round trips to the next device.
+fn measure(device: &mut Device) {
+    for n in 1..=16 {
+        let trigger = if n == 16 { Trigger::Last } else { Trigger::Normal };
+        let request = Device::delay_request(trigger).map(|request| request.emit()).unwrap_or_default();
+        assert_eq!(device.delay_reflection(&request, 560, trigger), Ok(()));
+    }
+}
+
+fn arrival(sof_ns: u32) -> Arrival {
+    Arrival { sof_ns, counter_ns: sof_ns, now_ns: 0 }
+}
+
+/// State after a DISCOVERY frame.
+pub(super) fn after_discovery(frame: &[u8], last: bool) -> String {
+    let mut device = taken_to(State::Discovery, last);
+    let handled = device.frame(PortId::A, &mut frame.to_vec(), arrival(0));
+    assert_eq!(handled.result, Ok(()));
+    name(device.state())
+}
+
+/// State after a PARAM frame, and the 32 bytes that the device has stored.
+pub(super) fn after_param(frame: &[u8]) -> (String, Option<[u8; 32]>) {
+    let mut device = taken_to(State::Param, true);
+    let mut passed = frame.to_vec();
+    device.frame(PortId::A, &mut passed, arrival(0));
+    assert_eq!(passed, frame, "PARAM is not changed");
+    (name(device.state()), device.parameters().map(|parameters| parameters.emit()))
+}
+
+/// State after a SYNC frame, and the receive time that the device has stored.
+pub(super) fn after_sync(frame: &[u8], last: bool, sof_ns: u32) -> (String, Option<u32>) {
+    let mut device = taken_to(State::Sync, last);
+    device.frame(PortId::A, &mut frame.to_vec(), arrival(sof_ns));
+    (name(device.state()), device.last_sync().map(|(_, sof_ns)| sof_ns))
+}
