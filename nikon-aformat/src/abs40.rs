@@ -1,7 +1,7 @@
 use nrz_line::{BitOrder, Window};
 
-use crate::crc::mirrored;
-use crate::frame::{DELIMITER, START, unpack};
+use crate::crc::mirrored8;
+use crate::frame::{DELIMITER, START};
 use crate::{Data, EncoderAddress, EncoderStatus, Error, Expected, Layout, Reply, Response, U40};
 
 /// The reply with the whole position, decoded from its line bits in the fewest instructions: for the interrupt of a drive.
@@ -23,10 +23,15 @@ pub struct Abs40 {
     pub abs: U40,
 }
 
-/// Start bits, delimiters and all bits of four frames.
-const START4: u128 = START & ALL4;
-const DELIMITER4: u128 = DELIMITER & ALL4;
-const ALL4: u128 = (1 << 72) - 1;
+/// The start bits and delimiters of four frames, and what they have to be, in the three words of a 32-bit core.
+const FRAMING: [u32; 3] = words((START | DELIMITER) & ALL);
+const FRAMED: [u32; 3] = words(DELIMITER & ALL);
+const ALL: u128 = (1 << 72) - 1;
+
+#[expect(clippy::cast_possible_truncation, reason = "the number is taken apart")]
+const fn words(bits: u128) -> [u32; 3] {
+    [bits as u32, (bits >> 32) as u32, (bits >> 64) as u32]
+}
 
 impl Abs40 {
     /// Bytes that hold the line bits of the reply.
@@ -39,19 +44,29 @@ impl Abs40 {
     ///
     /// # Errors
     /// As [`Response::parse_line`].
+    #[inline(always)]
     pub fn parse_line(line: &[u8; Self::LINE_BYTES], order: BitOrder, expected: &Expected) -> Result<Self, Error> {
-        let bits = load(line, order);
-        let framed = bits & (START4 | DELIMITER4) == DELIMITER4;
-        let [c0, c1, c2, c3, ..] = unpack(bits);
-        let ([b0, b1], [b2, b3]) = (c0.to_le_bytes(), c1.to_le_bytes());
-        let ([b4, b5], [b6, b7]) = (c2.to_le_bytes(), c3.to_le_bytes());
-        let sound = mirrored(&[b0, b1, b2, b3, b4, b5, b6, b7]) == 0;
-        if !framed || !sound || !expected.fits_first(c0) {
-            return Err(refusal(bits, expected));
+        let [w0, w1, w2] = load(line, order);
+        let ([m0, m1, m2], [f0, f1, f2]) = (FRAMING, FRAMED);
+        let framing = (w0 & m0 ^ f0) | (w1 & m1 ^ f1) | (w2 & m2 ^ f2);
+        let b = [
+            byte(w0 >> 1),
+            byte(w0 >> 9),
+            byte(w0 >> 19),
+            byte(w0 >> 27 | w1 << 5),
+            byte(w1 >> 5),
+            byte(w1 >> 13),
+            byte(w1 >> 23),
+            byte(w1 >> 31 | w2 << 1),
+        ];
+        let [b0, b1, b2, b3, b4, b5, b6, _] = b;
+        // All checks at once: a branch for each would cost more than it saves.
+        let first = expected.differs_first(u16::from_le_bytes([b0, b1]));
+        if framing | u32::from(mirrored8(b)) | u32::from(first) != 0 {
+            return Err(refusal(line, order, expected));
         }
-        let [ea, es] = [c0 >> 3, c0 >> 12].map(u16::to_le_bytes).map(|[low, _]| low);
-        let abs = U40::from_bytes([b2, b3, b4, b5, b6]);
-        Ok(Self { ea: EncoderAddress::truncate(ea), es: EncoderStatus::new(es), abs })
+        let (ea, es) = (EncoderAddress::truncate(b0 >> 3), EncoderStatus::new(b1 >> 4));
+        Ok(Self { ea, es, abs: U40::from_bytes([b2, b3, b4, b5, b6]) })
     }
 
     /// The 72 line bits of the reply to the command that `expected` names.
@@ -65,20 +80,29 @@ impl Abs40 {
     }
 }
 
-/// The line bits as one integer, the first in bit 0.
-fn load(line: &[u8; Abs40::LINE_BYTES], order: BitOrder) -> u128 {
-    let [a, b, c, d, e, f, g, h, i] = match order {
-        BitOrder::LsbFirst => *line,
-        BitOrder::MsbFirst => line.map(u8::reverse_bits),
-    };
-    let low = u64::from_le_bytes([a, b, c, d, e, f, g, h]);
-    u128::from(low) | u128::from(i) << 64
+/// The line bits as three words, the first bit in bit 0 of the first.
+#[inline(always)]
+fn load(line: &[u8; Abs40::LINE_BYTES], order: BitOrder) -> [u32; 3] {
+    let mut word = [0; 16];
+    if let Some(head) = word.first_chunk_mut() {
+        *head = *line;
+    }
+    words(match order {
+        BitOrder::LsbFirst => u128::from_le_bytes(word),
+        BitOrder::MsbFirst => u128::from_be_bytes(word).reverse_bits(),
+    })
+}
+
+#[expect(clippy::cast_possible_truncation, reason = "the low eight bits are meant")]
+const fn byte(word: u32) -> u8 {
+    word as u8
 }
 
 /// Off the hot path: why a reply is refused.
 #[cold]
-fn refusal(bits: u128, expected: &Expected) -> Error {
-    let line = Window::from_bits(bits, Layout::Abs40.line_bits()).unwrap_or(Window::EMPTY);
+#[inline(never)]
+fn refusal(line: &[u8; Abs40::LINE_BYTES], order: BitOrder, expected: &Expected) -> Error {
+    let line = Window::read(line, 0, Layout::Abs40.line_bits(), order).unwrap_or(Window::EMPTY);
     match Reply::from_line(line, Layout::Abs40) {
         Ok(reply) => expected.refusal(&reply),
         Err(error) => error,

@@ -108,14 +108,16 @@ impl Expected {
         self.ea
     }
 
-    /// Whether the known bits of the first frame are right.
-    pub(crate) const fn fits_first(&self, content: u16) -> bool {
-        content & self.mask == self.value
+    /// The known bits of the first frame that are wrong.
+    #[inline(always)]
+    pub(crate) const fn differs_first(&self, content: u16) -> u16 {
+        content & self.mask ^ self.value
     }
 
     /// Whether length and first frame are right.
     pub(crate) fn fits(&self, reply: &Reply) -> bool {
-        reply.frames() == self.layout.frames() && reply.contents().first().is_some_and(|first| self.fits_first(*first))
+        reply.frames() == self.layout.frames()
+            && reply.contents().first().is_some_and(|first| self.differs_first(*first) == 0)
     }
 
     /// Off the hot path: why a reply is refused that is not sound or does not fit.
