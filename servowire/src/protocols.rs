@@ -4,6 +4,7 @@
 //! variant of [`Protocol`], and a line in each of its methods. A start-stop protocol implements
 //! [`StartStop`](crate::line::StartStop) and is done; another kind takes the [`Capture`] itself.
 
+pub mod nikon;
 pub mod rtex;
 pub mod sorte;
 pub mod tformat;
@@ -22,6 +23,8 @@ pub enum Protocol {
     Rtex,
     /// TI SORTE, from a network capture.
     Sorte,
+    /// Nikon A-format.
+    Nikon,
 }
 
 /// What the user said about line and protocol.
@@ -33,6 +36,8 @@ pub struct Settings {
     pub tformat: tformat::Settings,
     /// About RTEX.
     pub rtex: rtex::Settings,
+    /// About A-format.
+    pub nikon: nikon::Settings,
 }
 
 impl Protocol {
@@ -43,6 +48,7 @@ impl Protocol {
             // A log of blocks has no times, so there is no VCD to hold its fields.
             Self::Rtex => &[],
             Self::Sorte => sorte::FIELDS,
+            Self::Nikon => nikon::FIELDS,
         }
     }
 
@@ -57,6 +63,10 @@ impl Protocol {
                 line::decode(file, capture, &settings.line, &make, out)
             }
             (Self::Rtex, capture) => rtex::decode(file, capture, &settings.rtex, out),
+            (Self::Nikon, capture) => {
+                let make = |bit| nikon::Decoder::new(bit, settings.nikon);
+                line::decode(file, capture, &settings.line, &make, out)
+            }
         }
     }
 }

@@ -1,5 +1,6 @@
 //! Which topics there are. A new protocol is one file here and one line in [`ALL`].
 
+mod nikon;
 mod rtex;
 mod sorte;
 mod step_profile;
@@ -11,6 +12,7 @@ use crate::row::Check;
 type Protocol = (&'static str, &'static [(&'static str, Check)]);
 
 const ALL: &[Protocol] = &[
+    ("nikon", nikon::TOPICS),
     ("rtex", rtex::TOPICS),
     ("sorte", sorte::TOPICS),
     ("step-profile", step_profile::TOPICS),

@@ -9,6 +9,8 @@ mod deliberate_panic;
 pub(crate) mod nrz_line;
 #[cfg(feature = "rtex-block")]
 mod rtex;
+#[cfg(feature = "sorte-proto")]
+mod sorte;
 #[cfg(feature = "step-profile")]
 mod step_profile;
 #[cfg(feature = "tformat")]
@@ -27,14 +29,16 @@ pub(crate) struct Kernel {
 pub(crate) const ALL: &[&[Kernel]] = &[
     #[cfg(feature = "nrz-line")]
     nrz_line::KERNELS,
+    #[cfg(feature = "rtex-block")]
+    rtex::KERNELS,
+    #[cfg(feature = "sorte-proto")]
+    sorte::KERNELS,
     #[cfg(feature = "step-profile")]
     step_profile::KERNELS,
     #[cfg(feature = "tformat")]
     tformat::KERNELS,
     #[cfg(feature = "tformat")]
     tformat_ends::KERNELS,
-    #[cfg(feature = "rtex-block")]
-    rtex::KERNELS,
     #[cfg(feature = "deliberate-panic")]
     deliberate_panic::KERNELS,
 ];

@@ -6,6 +6,8 @@ use cortex_m_semihosting::hprintln;
 mod nrz_line;
 #[cfg(feature = "rtex-block")]
 pub(crate) mod rtex;
+#[cfg(feature = "sorte-proto")]
+pub(crate) mod sorte;
 #[cfg(feature = "step-profile")]
 pub(crate) mod step_profile;
 #[cfg(feature = "tformat")]
@@ -26,6 +28,8 @@ pub(crate) const ALL: &[&[Topic]] = &[
     nrz_line::TOPICS,
     #[cfg(feature = "rtex-block")]
     rtex::TOPICS,
+    #[cfg(feature = "sorte-proto")]
+    sorte::TOPICS,
     #[cfg(feature = "step-profile")]
     step_profile::TOPICS,
     #[cfg(feature = "tformat")]
