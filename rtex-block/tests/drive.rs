@@ -377,7 +377,7 @@ fn a_counter_that_stands_still_raises_err86_2() {
 
 #[test]
 fn sub_blocks() {
-    let mut drive = Drive::new(Settings { size: rtex_block::BlockSize::Bytes32, ..Settings::new(mac_id(), CODES) });
+    let mut drive = Drive::new(Settings::new(mac_id(), CODES));
     let mut counter = UpdateCounter::ZERO;
     let mut exchange = |sub: SubCommand, spoil: u8| {
         let mut seen = None;
