@@ -10,6 +10,8 @@ use serde_json::Value;
 
 #[path = "seed_corpus/nrz_line.rs"]
 mod nrz_line;
+#[path = "seed_corpus/rtex.rs"]
+mod rtex;
 #[path = "seed_corpus/step_profile.rs"]
 mod step_profile;
 #[path = "seed_corpus/tformat.rs"]
@@ -20,7 +22,7 @@ const SEEDS: usize = 15;
 /// A target, the vector file its seeds come from, and the input that a row becomes; `None` for rows of another kind.
 type Source = (&'static str, &'static str, fn(&Value) -> Option<Vec<u8>>);
 
-const SOURCES: &[&[Source]] = &[nrz_line::SOURCES, step_profile::SOURCES, tformat::SOURCES];
+const SOURCES: &[&[Source]] = &[nrz_line::SOURCES, rtex::SOURCES, step_profile::SOURCES, tformat::SOURCES];
 
 fn main() -> io::Result<()> {
     let here = Path::new(env!("CARGO_MANIFEST_DIR"));
@@ -42,7 +44,7 @@ fn main() -> io::Result<()> {
 /// Name and input of a row. A row without a name is called after its file and line.
 fn seed(file: &str, at: usize, line: &str, input: fn(&Value) -> Option<Vec<u8>>) -> Option<(String, Vec<u8>)> {
     let row: Value = serde_json::from_str(line).expect("a vector file holds JSON");
-    let name = row["name"].as_str().map_or_else(|| format!("{file}-{at:04}"), str::to_owned);
+    let name = row["name"].as_str().or(row["id"].as_str()).map_or_else(|| format!("{file}-{at:04}"), str::to_owned);
     let name = name.replace(|c: char| !c.is_ascii_alphanumeric() && c != '_', "-");
     Some((name, input(&row)?))
 }

@@ -5,6 +5,7 @@
 //! [`TARGETS`], a file in `fuzz_targets/` and its `[[bin]]`, and seeds from `examples/seed_corpus.rs`.
 
 pub mod nrz_line;
+pub mod rtex;
 pub mod step_profile;
 pub mod tformat;
 
@@ -14,6 +15,10 @@ pub type Target = fn(&[u8]);
 /// All targets by name.
 pub const TARGETS: &[(&str, Target)] = &[
     ("nrz_receiver", nrz_line::receiver),
+    ("rtex_block", rtex::block),
+    ("rtex_drive", rtex::drive),
+    ("rtex_log", rtex::log),
+    ("rtex_ring", rtex::ring),
     ("step_profile_step", step_profile::step),
     ("step_profile_axis", step_profile::axis),
     ("tformat_request", tformat::request),

@@ -1,12 +1,13 @@
 //! Capture files: what a logic analyser, a simulator or a serial port recorded.
 //!
 //! One file per format under `capture/`. Every reader streams with fixed buffers and gives the same thing: level
-//! changes of named channels with the time in picoseconds ([`Line`]), or bytes ([`hexlog::HexLog`]).
+//! changes of named channels with the time in picoseconds ([`Line`]), or bytes ([`ByteLog`]).
 
 pub mod hexlog;
 mod input;
 pub mod pcapng;
 pub mod raw;
+pub mod records;
 pub mod saleae_binary;
 pub mod saleae_csv;
 pub mod time;
@@ -53,9 +54,27 @@ pub enum Capture {
     /// Samples at a fixed rate.
     Samples(raw::Raw),
     /// Bytes without time.
-    Bytes(hexlog::HexLog),
+    Bytes(ByteLog),
     /// Packets of a network.
     Packets(pcapng::Pcapng),
+}
+
+/// Bytes without time, in bursts.
+pub enum ByteLog {
+    /// Hex digits, a burst a line.
+    Hex(hexlog::HexLog),
+    /// Records of one size.
+    Records(records::Records),
+}
+
+impl ByteLog {
+    /// The next burst; none at the end.
+    pub fn burst(&mut self) -> Result<Option<hexlog::Burst>, Fault> {
+        match self {
+            Self::Hex(log) => log.burst(),
+            Self::Records(log) => log.burst(),
+        }
+    }
 }
 
 /// File formats.
@@ -73,6 +92,8 @@ pub enum Format {
     Packed,
     /// Bytes as hex digits, a burst a line.
     Hex,
+    /// Binary records of one size (--record-size), a burst each.
+    Records,
     /// Packets of a network capture.
     Pcapng,
 }
@@ -86,6 +107,8 @@ pub struct Hints {
     pub sample_rate: Option<u64>,
     /// Bytes a sample of a raw file.
     pub unit_size: usize,
+    /// Bytes of a record.
+    pub record_size: Option<usize>,
 }
 
 /// Opens a file, finding its format. The number beside it counts the bytes read, for a progress bar.
@@ -94,6 +117,7 @@ pub fn open(path: &Path, hints: Hints) -> Result<(Capture, Rc<Cell<u64>>), Fault
     let meter = input.meter();
     let format = match hints.format {
         Some(format) => format,
+        None if hints.record_size.is_some() => Format::Records,
         None => guess(&mut input, path, hints.sample_rate.is_some())?,
     };
     Ok((decoder(input, format, hints)?, meter))
@@ -138,7 +162,13 @@ fn decoder(mut input: Input, format: Format, hints: Hints) -> Result<Capture, Fa
             let unit = if format == Format::Packed { raw::Unit::Bit } else { raw::Unit::Bytes(hints.unit_size.max(1)) };
             Capture::Samples(raw::Raw::new(input, rate, unit))
         }
-        Format::Hex => Capture::Bytes(hexlog::HexLog::new(input)),
+        Format::Hex => Capture::Bytes(ByteLog::Hex(hexlog::HexLog::new(input))),
+        Format::Records => {
+            let Some(size) = hints.record_size else {
+                return Err(input.fault(At::File, "binary records need their size: say it with --record-size"));
+            };
+            Capture::Bytes(ByteLog::Records(records::Records::new(input, size)))
+        }
         Format::Pcapng => Capture::Packets(pcapng::Pcapng::new(input)?),
     })
 }

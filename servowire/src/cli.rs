@@ -6,7 +6,7 @@ use std::process::ExitCode;
 use clap::{Args, Parser, Subcommand, ValueEnum};
 
 use crate::capture::{Format, Hints};
-use crate::protocols::{Protocol, Settings, tformat};
+use crate::protocols::{Protocol, Settings, rtex, tformat};
 use crate::{cnc, decode, line, profile};
 
 /// Decodes what servo drives, controllers and encoders say to each other.
@@ -72,6 +72,9 @@ pub struct Decode {
     /// What T-Format frames do not tell.
     #[command(flatten)]
     pub tformat: TformatArgs,
+    /// What RTEX blocks do not tell.
+    #[command(flatten)]
+    pub rtex: RtexArgs,
 }
 
 /// How the file is to be read.
@@ -90,6 +93,9 @@ pub struct FileArgs {
     /// The files are logs of bytes as hex digits, a burst a line.
     #[arg(long, conflicts_with_all = ["format", "rate"])]
     pub bytes: bool,
+    /// The files are binary records of this many bytes, a burst each.
+    #[arg(long, value_name = "BYTES", value_parser = clap::value_parser!(u16).range(1..), conflicts_with_all = ["rate", "bytes"])]
+    pub record_size: Option<u16>,
 }
 
 /// How the line is to be taken.
@@ -128,11 +134,36 @@ pub struct TformatArgs {
     pub multi_turn_bits: Option<u8>,
 }
 
+/// What RTEX blocks do not tell.
+#[derive(Debug, Clone, Copy, Args)]
+#[command(next_help_heading = "RTEX")]
+pub struct RtexArgs {
+    /// Bytes of a block, 16 or 32: a line or record may hold several blocks.
+    #[arg(long, value_name = "BYTES", default_value_t = 16, value_parser = block_size)]
+    pub block_size: u8,
+    /// Only the blocks of this drive.
+    #[arg(long, value_name = "ID", value_parser = clap::value_parser!(u8).range(0..=31))]
+    pub mac_id: Option<u8>,
+}
+
+fn block_size(text: &str) -> Result<u8, String> {
+    match text {
+        "16" => Ok(16),
+        "32" => Ok(32),
+        _ => Err(format!("\"{text}\" is neither 16 nor 32")),
+    }
+}
+
 impl Decode {
     /// What was said about the files.
     pub(crate) fn hints(&self) -> Hints {
         let format = if self.file.bytes { Some(Format::Hex) } else { self.file.format };
-        Hints { format, sample_rate: self.file.rate, unit_size: usize::from(self.file.unit_size) }
+        Hints {
+            format,
+            sample_rate: self.file.rate,
+            unit_size: usize::from(self.file.unit_size),
+            record_size: self.file.record_size.map(usize::from),
+        }
     }
 
     /// What was said about line and protocol.
@@ -147,6 +178,7 @@ impl Decode {
                 single_turn_bits: self.tformat.single_turn_bits,
                 multi_turn_bits: self.tformat.multi_turn_bits,
             },
+            rtex: rtex::Settings { block_size: usize::from(self.rtex.block_size), mac_id: self.rtex.mac_id },
         }
     }
 }

@@ -1,14 +1,16 @@
 //! `servowire profile`: a move of a stepper axis, step by step.
 
+mod drawing;
+
 use std::error::Error;
+use std::fs;
 use std::io::{self, BufWriter, Write};
 use std::ops::Range;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::process::ExitCode;
 
 use clap::{Args, ValueEnum};
-use plotters::prelude::*;
-use serde_json::json;
+use serde::Serialize;
 use step_profile::{Arithmetic, Frequency, MoveState, Parameters, Profile, Speed, Step, Tone};
 
 /// Times of the steps of a move on a 4 us cycle.
@@ -99,16 +101,20 @@ impl Arguments {
     fn write(&self, profile: Profile<'_>, out: &mut dyn Write) -> Result<(), Box<dyn Error>> {
         let steps = self.steps;
         if self.csv {
-            csv(profile, steps, &mut *out)?;
+            let mut csv = csv::Writer::from_writer(&mut *out);
+            profile.steps(steps).try_for_each(|step| csv.serialize(Record::from(step)))?;
+            csv.flush()?;
         } else if self.json {
             for step in profile.steps(steps) {
-                serde_json::to_writer(&mut *out, &object(step))?;
+                serde_json::to_writer(&mut *out, &Record::from(step))?;
                 writeln!(out)?;
             }
         } else {
             summary(profile, steps, out)?;
             match &self.svg {
-                Some(path) => draw(profile, steps, path)?,
+                Some(path) => {
+                    fs::write(path, drawing::svg(profile, steps)?).map_err(|e| format!("{}: {e}", path.display()))?;
+                }
                 None => table(profile, steps, out)?,
             }
         }
@@ -162,28 +168,30 @@ fn pulse_ns(step: Step) -> u64 {
     step.cycle * u64::from(step_profile::CYCLE_NS) + u64::from(step.sync_time)
 }
 
-fn object(step: Step) -> serde_json::Value {
-    json!({
-        "step": step.index, "state": state(step.state), "entry": step.entry, "t_step_ns": step.t_step,
-        "cycle": step.cycle, "sync_time_ns": step.sync_time, "time_ns": pulse_ns(step),
-    })
+/// A step as CSV and JSON have it.
+#[derive(Serialize)]
+struct Record {
+    step: u32,
+    state: &'static str,
+    entry: u8,
+    t_step_ns: u32,
+    cycle: u64,
+    sync_time_ns: u32,
+    time_ns: u64,
 }
 
-fn csv(profile: Profile<'_>, steps: u32, out: &mut dyn Write) -> Result<(), csv::Error> {
-    let mut csv = csv::Writer::from_writer(out);
-    csv.write_record(["step", "state", "entry", "t_step_ns", "cycle", "sync_time_ns", "time_ns"])?;
-    for step in profile.steps(steps) {
-        csv.write_record([
-            step.index.to_string(),
-            state(step.state).to_owned(),
-            step.entry.to_string(),
-            step.t_step.to_string(),
-            step.cycle.to_string(),
-            step.sync_time.to_string(),
-            pulse_ns(step).to_string(),
-        ])?;
+impl From<Step> for Record {
+    fn from(step: Step) -> Self {
+        Self {
+            step: step.index,
+            state: state(step.state),
+            entry: step.entry,
+            t_step_ns: step.t_step,
+            cycle: step.cycle,
+            sync_time_ns: step.sync_time,
+            time_ns: pulse_ns(step),
+        }
     }
-    Ok(csv.flush()?)
 }
 
 fn summary(profile: Profile<'_>, steps: u32, out: &mut dyn Write) -> io::Result<()> {
@@ -271,114 +279,11 @@ fn table(profile: Profile<'_>, steps: u32, out: &mut dyn Write) -> io::Result<()
     Ok(())
 }
 
-type Points = Vec<(f64, f64)>;
-
-/// What a drawing has along: milliseconds or steps.
-type Along = fn(&Stretch) -> Range<f64>;
-
-fn speed(stretches: &[Stretch], along: Along) -> Points {
-    let level = |s: &Stretch| [(along(s).start, s.khz()), (along(s).end, s.khz())];
-    let end = stretches.last().map_or(0.0, |last| along(last).end);
-    [(0.0, 0.0)].into_iter().chain(stretches.iter().flat_map(level)).chain([(end, 0.0)]).collect()
-}
-
-fn step_time(stretches: &[Stretch], along: Along) -> Points {
-    let us = |s: &Stretch| f64::from(s.first.t_step) / 1e3;
-    stretches.iter().flat_map(|s| [(along(s).start, us(s)), (along(s).end, us(s))]).collect()
-}
-
-/// In 10³ steps/s², from the middle of a ramp entry to the middle of the next. Full speed counts as an entry at either
-/// end, and as no acceleration between them.
-fn acceleration(stretches: &[Stretch], k: u32, along: Along) -> Points {
-    // Half an entry, in the unit of `range`.
-    let half = |s: &Stretch, range: &Range<f64>| {
-        let steps = s.steps();
-        (range.end - range.start) * f64::min(1.0, f64::from(k) / (steps.end - steps.start)) / 2.0
-    };
-    let mut points = Points::new();
-    let (mut left, mut left_ms, mut khz) = (0.0, 0.0, 0.0);
-    // kHz / ms = 10⁶ steps/s²
-    let mut slope =
-        |from: f64, to: f64, rise: f64, ms: f64| points.extend([(from, rise / ms * 1e3), (to, rise / ms * 1e3)]);
-    for stretch in stretches {
-        let range = along(stretch);
-        let (half, half_ms) = (half(stretch, &range), half(stretch, &stretch.ms));
-        slope(left, range.start + half, stretch.khz() - khz, stretch.ms.start + half_ms - left_ms);
-        if stretch.first.state == MoveState::Constant {
-            slope(range.start + half, range.end - half, 0.0, 1.0);
-        }
-        (left, left_ms, khz) = (range.end - half, stretch.ms.end - half_ms, stretch.khz());
-    }
-    if let Some(last) = stretches.last() {
-        slope(left, along(last).end, -khz, last.ms.end - left_ms);
-    }
-    points
-}
-
-/// The whole move over time on the left, the ramp up over its steps on the right.
-fn draw(profile: Profile<'_>, steps: u32, path: &Path) -> Result<(), Box<dyn Error>> {
-    let stretches = stretches(profile, steps);
-    let k = profile.parameters().steps_per_entry;
-    let title = format!(
-        "{steps} steps at {:.3} kHz, {k} steps a ramp entry: {:.3} ms",
-        65_536_000.0 / f64::from(profile.parameters().speed.raw()),
-        profile.duration_ns(steps) as f64 / 1e6
-    );
-    let root = SVGBackend::new(path, (1200, 1000)).into_drawing_area();
-    root.fill(&WHITE)?;
-    let (left, right) = root.titled(&title, ("sans-serif", 22))?.split_horizontally(640);
-    let end = stretches.last().map_or(1.0, |last| last.ms.end);
-    let up = f64::from(profile.shape(steps).accelerating.max(1)) * 1.05;
-    let sides: [(_, Along, _, _); 2] = [
-        (left, |stretch| stretch.ms.clone(), end, "time [ms]"),
-        (right, Stretch::steps, f64::min(up, f64::from(steps.max(1))), "ramp up [steps]"),
-    ];
-    for (side, along, until, x) in sides {
-        let areas = side.split_evenly((3, 1));
-        let [top, middle, bottom] = areas.as_slice() else { continue };
-        plot(top, (x, "speed [kHz]"), speed(&stretches, along), until, false)?;
-        plot(middle, (x, "acceleration [10³ steps/s²]"), acceleration(&stretches, k, along), until, false)?;
-        plot(bottom, (x, "step time [µs]"), step_time(&stretches, along), until, true)?;
-    }
-    Ok(root.present()?)
-}
-
-type Area<'a> = DrawingArea<SVGBackend<'a>, plotters::coord::Shift>;
-
-/// `points` up to `until`.
-fn plot(
-    area: &Area<'_>,
-    (x, y): (&str, &str),
-    mut points: Points,
-    until: f64,
-    logarithmic: bool,
-) -> Result<(), Box<dyn Error>> {
-    points.retain(|(at, _)| *at <= until);
-    if let Some((_, value)) = points.last().copied() {
-        points.push((until, value));
-    }
-    let values = || points.iter().map(|(_, value)| *value);
-    let (low, high) = (values().fold(f64::MAX, f64::min), values().fold(1e-3, f64::max));
-    let mut chart = ChartBuilder::on(area);
-    chart.margin(12).x_label_area_size(38).y_label_area_size(76);
-    let line = LineSeries::new(points, BLUE.stroke_width(2));
-    // The two kinds of axes are of different types, so the few calls are there twice.
-    if logarithmic {
-        let mut chart = chart.build_cartesian_2d(0.0..until, (low.min(high) * 0.8..high * 1.25).log_scale())?;
-        chart.configure_mesh().max_light_lines(0).x_desc(x).y_desc(y).label_style(("sans-serif", 13)).draw()?;
-        chart.draw_series(line)?;
-    } else {
-        let mut chart = chart.build_cartesian_2d(0.0..until, low.min(0.0) * 1.08..high * 1.08)?;
-        chart.configure_mesh().max_light_lines(0).x_desc(x).y_desc(y).label_style(("sans-serif", 13)).draw()?;
-        chart.draw_series(line)?;
-    }
-    Ok(())
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
     use clap::Parser;
+    use serde_json::json;
 
     #[derive(Parser)]
     struct Line {
@@ -439,34 +344,15 @@ mod tests {
     }
 
     #[test]
-    fn every_move_can_be_drawn() {
-        let dir = tempfile::tempdir().unwrap();
-        for (name, line) in [
-            ("long", "--freq 94.57kHz --steps 23642 --k 20"),
-            ("one", "--freq 100 --steps 1"),
-            ("none", "--freq 1k --steps 0"),
-        ] {
-            let path = dir.path().join(name);
-            output(&format!("profile {line} --svg {}", path.display()));
-            let svg = std::fs::read_to_string(path).unwrap();
-            assert!(svg.starts_with("<svg") && svg.trim_end().ends_with("</svg>"), "{name}");
-            assert!(!svg.contains("NaN") && !svg.contains("inf"), "{name}");
-            for text in ["speed [kHz]", "acceleration", "step time", "ramp up"] {
-                assert!(svg.contains(text), "{name}: {text}");
-            }
-        }
-    }
-
-    /// The area under the acceleration is the speed: nothing in between, as much down as up.
-    #[test]
-    fn accelerations_add_up() {
-        let profile = arguments("profile --freq 94.57kHz --steps 9000 --k 20").profile().unwrap();
-        let stretches = stretches(profile, 9000);
-        let area = |points: &[(f64, f64)]| points.windows(2).map(|w| (w[1].0 - w[0].0) * w[0].1 / 1e3).sum::<f64>();
-        let points = acceleration(&stretches, 20, |stretch| stretch.ms.clone());
-        let up: Points = points.iter().copied().take_while(|p| p.1 >= 0.0).collect();
-        assert!((area(&up) - 94.57).abs() < 0.1, "{}", area(&up));
-        assert!(area(&points).abs() < 1e-6, "{}", area(&points));
+    fn a_drawing_goes_into_its_file() {
+        let path = tempfile::tempdir().unwrap().keep().join("move.svg");
+        let line = format!("profile --freq 1k --steps 9 --svg {}", path.display());
+        assert!(output(&line).contains("9 steps in"));
+        assert!(fs::read_to_string(&path).unwrap().contains("1.000 kHz"));
+        fs::remove_dir_all(path.parent().unwrap()).unwrap();
+        let arguments = arguments(&line);
+        let error = arguments.write(arguments.profile().unwrap(), &mut Vec::new()).unwrap_err();
+        assert!(error.to_string().contains("move.svg"), "{error}");
     }
 
     #[test]

@@ -4,6 +4,7 @@
 //! variant of [`Protocol`], and a line in each of its methods. A start-stop protocol implements
 //! [`StartStop`](crate::line::StartStop) and is done; another kind takes the [`Capture`] itself.
 
+pub mod rtex;
 pub mod sorte;
 pub mod tformat;
 
@@ -17,6 +18,8 @@ use crate::output::Output;
 pub enum Protocol {
     /// Tamagawa T-Format.
     Tformat,
+    /// Panasonic RTEX data blocks, from logs of bytes.
+    Rtex,
     /// TI SORTE, from a network capture.
     Sorte,
 }
@@ -28,6 +31,8 @@ pub struct Settings {
     pub line: line::Options,
     /// About T-Format.
     pub tformat: tformat::Settings,
+    /// About RTEX.
+    pub rtex: rtex::Settings,
 }
 
 impl Protocol {
@@ -35,6 +40,8 @@ impl Protocol {
     pub fn field_names(self) -> &'static [&'static str] {
         match self {
             Self::Tformat => tformat::FIELDS,
+            // A log of blocks has no times, so there is no VCD to hold its fields.
+            Self::Rtex => &[],
             Self::Sorte => sorte::FIELDS,
         }
     }
@@ -49,6 +56,7 @@ impl Protocol {
                 let make = |bit| tformat::Decoder::new(bit, settings.tformat);
                 line::decode(file, capture, &settings.line, &make, out)
             }
+            (Self::Rtex, capture) => rtex::decode(file, capture, &settings.rtex, out),
         }
     }
 }

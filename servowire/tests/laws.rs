@@ -23,7 +23,7 @@ use servowire::capture::raw::{Raw, Unit};
 use servowire::capture::saleae_binary::SaleaeBinary;
 use servowire::capture::saleae_csv::SaleaeCsv;
 use servowire::capture::vcd::Vcd;
-use servowire::capture::{Capture, Input};
+use servowire::capture::{ByteLog, Capture, Input};
 use servowire::event::{Direction, Event};
 use servowire::output::{Output, Printer, Sink};
 use servowire::protocols::{Protocol, Settings};
@@ -146,7 +146,7 @@ proptest! {
             0 => Vcd::new(input(file)).map(|file| Capture::Edges(Box::new(file))),
             1 => SaleaeCsv::new(input(file)).map(|file| Capture::Edges(Box::new(file))),
             2 => SaleaeBinary::new(input(file)).map(|file| Capture::Edges(Box::new(file))),
-            _ => Ok(Capture::Bytes(HexLog::new(input(file)))),
+            _ => Ok(Capture::Bytes(ByteLog::Hex(HexLog::new(input(file))))),
         };
         if let Ok(capture) = capture {
             let _ = decode(capture);

@@ -171,7 +171,8 @@ impl Axes<'_> {
     /// The next cycle of all four.
     #[inline]
     pub fn tick(&mut self) -> [Command; 4] {
-        self.0.each_mut().map(Axis::tick)
+        let [a, b, c, d] = &mut self.0;
+        [a.tick(), b.tick(), c.tick(), d.tick()]
     }
 }
 

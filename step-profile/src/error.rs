@@ -76,6 +76,9 @@ pub enum Error {
         /// The last: 4.
         limit: u32,
     },
+    /// A frequency is a fraction with a denominator of 1 or more.
+    #[error("a frequency with denominator 0")]
+    ZeroDenominator,
     /// The speed constant of this frequency does not fit 32 bits.
     #[error("step frequency below 15.26 Hz: its speed constant does not fit 32 bits")]
     FrequencyTooLow,
@@ -103,9 +106,48 @@ pub enum ErrorClass {
     InvalidMotorMask,
     InvalidMicrostep,
     InvalidMode,
+    ZeroDenominator,
     FrequencyTooLow,
     Moving,
     NoMotor,
+}
+
+impl ErrorClass {
+    /// All classes; the first five in the order of [`Profile::new`](crate::Profile::new).
+    pub const ALL: [Self; 13] = [
+        Self::ZeroSegmentLength,
+        Self::SegmentTooLong,
+        Self::StepRateTooHigh,
+        Self::StepTimeOverflow,
+        Self::SyncTimeOutOfRange,
+        Self::InvalidRampTable,
+        Self::InvalidMotorMask,
+        Self::InvalidMicrostep,
+        Self::InvalidMode,
+        Self::ZeroDenominator,
+        Self::FrequencyTooLow,
+        Self::Moving,
+        Self::NoMotor,
+    ];
+
+    /// The name as logs and test vectors spell it.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::ZeroSegmentLength => "ZeroSegmentLength",
+            Self::SegmentTooLong => "SegmentTooLong",
+            Self::StepRateTooHigh => "StepRateTooHigh",
+            Self::StepTimeOverflow => "StepTimeOverflow",
+            Self::SyncTimeOutOfRange => "SyncTimeOutOfRange",
+            Self::InvalidRampTable => "InvalidRampTable",
+            Self::InvalidMotorMask => "InvalidMotorMask",
+            Self::InvalidMicrostep => "InvalidMicrostep",
+            Self::InvalidMode => "InvalidMode",
+            Self::ZeroDenominator => "ZeroDenominator",
+            Self::FrequencyTooLow => "FrequencyTooLow",
+            Self::Moving => "Moving",
+            Self::NoMotor => "NoMotor",
+        }
+    }
 }
 
 impl Error {
@@ -121,6 +163,7 @@ impl Error {
             Self::InvalidMotorMask { .. } => ErrorClass::InvalidMotorMask,
             Self::InvalidMicrostep { .. } => ErrorClass::InvalidMicrostep,
             Self::InvalidMode { .. } => ErrorClass::InvalidMode,
+            Self::ZeroDenominator => ErrorClass::ZeroDenominator,
             Self::FrequencyTooLow => ErrorClass::FrequencyTooLow,
             Self::Moving => ErrorClass::Moving,
             Self::NoMotor => ErrorClass::NoMotor,
@@ -131,6 +174,7 @@ impl Error {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::format;
     use std::string::ToString;
 
     #[test]
@@ -138,5 +182,14 @@ mod tests {
         assert!(size_of::<Error>() <= 16);
         let error = Error::StepRateTooHigh { speed: 1, limit: 262_144 };
         assert_eq!(error.to_string(), "speed constant 1 is above 250 kHz, at least 262144 needed");
+        assert_eq!(error.class(), ErrorClass::StepRateTooHigh);
+    }
+
+    #[test]
+    fn classes_are_called_what_they_are() {
+        for (at, class) in ErrorClass::ALL.into_iter().enumerate() {
+            assert_eq!(class.name(), format!("{class:?}"));
+            assert_eq!(class as usize, at);
+        }
     }
 }

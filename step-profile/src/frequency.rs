@@ -52,10 +52,10 @@ impl Frequency {
 }
 
 impl TryFrom<(u32, u16)> for Frequency {
-    type Error = &'static str;
+    type Error = Error;
 
-    fn try_from((numerator, denominator): (u32, u16)) -> Result<Self, Self::Error> {
-        Self::from_ratio(numerator, denominator).ok_or("a frequency with denominator 0")
+    fn try_from((numerator, denominator): (u32, u16)) -> Result<Self, Error> {
+        Self::from_ratio(numerator, denominator).ok_or(Error::ZeroDenominator)
     }
 }
 

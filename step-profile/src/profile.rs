@@ -207,6 +207,15 @@ mod tests {
         assert_eq!(with(262_144, 67_108_863, 0).unwrap().shape(u32::MAX).constant, 63);
     }
 
+    /// The ramp costs as much as 683 K steps at full speed, in place of 32 K.
+    #[test]
+    fn the_time_of_a_full_profile_at_whole_cycles() {
+        for (k, n) in [(1, 64), (1, 51_200), (16, 512_000), (100, 51_200)] {
+            let periods = u64::from(2 * 683 * k + n - 64 * k);
+            assert_eq!(with(262_144, k, 0).unwrap().duration_ns(n), periods * 4000, "{n} steps, {k} an entry");
+        }
+    }
+
     proptest! {
         #[test]
         fn the_shape_is_the_whole_move(steps: u32, k in 1..=Profile::MAX_STEPS_PER_ENTRY) {

@@ -11,10 +11,23 @@
 //! if R29 >= 4000 { R29 -= 4000; 4us_cnt += 1 }
 //! ```
 //!
-//! The reciprocal is a little above 2^32 / 4000, so the quotient is exact for t_step < [`EXACT_BELOW`] and now
-//! and then one too large from there on. A quotient that is one too large makes the difference negative when the
-//! previous sync_time is small; the unsigned comparison then takes the wrapped value for a late one, and the
-//! move never recovers. [`corrected`](crate::corrected) does not have this limit.
+//! # Where it is exact
+//!
+//! The reciprocal is a little too large: 1073742 · 4000 = 2^32 + 704. With t_step = 4000 m + r and d = 4000 - r, the
+//! time left to the next whole cycle,
+//!
+//! ```text
+//! t_step · 1073742 / 2^32  =  m + 1 + (704 (m + 1) - 1073742 d) / 2^32
+//! ```
+//!
+//! For 32-bit step times the last term lies in -1..1, so the quotient is m, or m + 1 if 1073742 d <= 704 (m + 1). That
+//! is so for d = 1 from m = 1525 on, which makes the quotient exact for t_step < [`EXACT_BELOW`], and never for d above
+//! 703.
+//!
+//! A quotient that is one too large makes the difference -d instead of r. When the previous sync_time is d or more, the
+//! sum is right again: the carry only came earlier. When it is less, the sum wraps, the unsigned comparison takes it for
+//! a late one, and 4us_cnt ends two above the true one with a sync_time near 2^32: the move never recovers.
+//! [`corrected`](crate::corrected) does not have this limit.
 
 use crate::arithmetic::{CYCLE_NS, Interval, StepTime, step_time_ns};
 

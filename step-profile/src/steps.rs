@@ -299,6 +299,23 @@ mod tests {
         assert_eq!(steps.collect::<Vec<_>>(), once[1..]);
     }
 
+    /// From phase 0 and with K = 1 the PRU leaves the right path at 90 of all whole frequencies below its proved domain,
+    /// and at none of TI's named speeds.
+    #[test]
+    fn where_the_pru_goes_wrong_on_the_ramp() {
+        let wrong = |speed: Speed| {
+            let given = (speed.raw(), 1, 0);
+            let ramp = |arithmetic| profile(arithmetic, given).steps(64).take(32);
+            !ramp(Arithmetic::PruExact).eq(ramp(Arithmetic::Corrected))
+        };
+        let frequencies: Vec<u32> = (100..68_100).filter(|&hz| wrong(Speed::from_hz(hz).unwrap())).collect();
+        assert_eq!(frequencies.len(), 90);
+        for hz in [59_848, 56_959, 47_006, 31_456, 29_924, 23_503, 23_044, 21_135, 20_880] {
+            assert!(frequencies.contains(&hz), "{hz}");
+        }
+        assert!(Speed::NAMED.iter().all(|&(_, speed)| !wrong(speed)));
+    }
+
     #[test]
     fn the_trap_of_phase_0() {
         let silent = |init| {

@@ -6,6 +6,8 @@ use std::{env, io};
 
 use serde_json::Value;
 
+#[path = "build/rtex.rs"]
+mod rtex;
 #[path = "build/sorte.rs"]
 mod sorte;
 #[path = "build/step_profile.rs"]
@@ -16,8 +18,12 @@ mod tformat;
 /// A protocol's folder under `tests/vectors` and what makes its tables, from a reader of topics.
 type Protocol = (&'static str, fn(&dyn Fn(&str) -> Vec<Value>) -> String);
 
-const PROTOCOLS: &[Protocol] =
-    &[("sorte", sorte::tables), ("step-profile", step_profile::tables), ("tformat", tformat::tables)];
+const PROTOCOLS: &[Protocol] = &[
+    ("rtex", rtex::tables),
+    ("sorte", sorte::tables),
+    ("step-profile", step_profile::tables),
+    ("tformat", tformat::tables),
+];
 
 fn main() -> io::Result<()> {
     let here = PathBuf::from(env::var_os("CARGO_MANIFEST_DIR").expect("cargo sets it"));

@@ -4,7 +4,7 @@
     report.py table OBJDUMP IMAGES [--record]   the table; exit code 1 when something is over budget or can panic
     report.py walk  OBJDUMP IMAGE SYMBOL        the path from SYMBOL to a panic; exit code 1 when there is one
 
-IMAGES holds O3.elf, O3.txt, Os.elf and Os.txt: each image and what it printed.
+IMAGES holds PROTOCOL-O3.elf, PROTOCOL-O3.txt and the same for Os: each image and what it printed.
 """
 
 import pathlib
@@ -76,6 +76,8 @@ class Image:
 
     def fault(self, symbol):
         """Why `symbol` cannot be said to be free of panics, as a path of names; None if it is."""
+        if symbol not in self.by_name:
+            return f"{symbol} is no function of the image"
         found = self.reach(symbol)
         for function in found:
             if PANIC.search(function.name):
@@ -86,7 +88,7 @@ class Image:
 
     def size(self, symbol):
         """Bytes of `symbol` and of all that it calls."""
-        return sum(f.end - f.start for f in self.reach(symbol))
+        return sum(f.end - f.start for f in self.reach(symbol)) if symbol in self.by_name else 0
 
 
 def parse(text):
@@ -118,7 +120,7 @@ def read(function, mnemonic, operands, halves):
         elif half[1] in halves:
             function.pointers.add(halves[half[1]] | int(half[2], 0) << 16)
     elif re.match(r"(blx|bx)\w* r\d+|(blx|bx)\w* (ip|r12)", f"{mnemonic} {operands}") or re.match(
-        r"(ldr|mov)\w* pc,", f"{mnemonic} {operands}"
+        r"(ldr|mov|add)\w* pc,", f"{mnemonic} {operands}"
     ):
         function.indirect.append(f"{mnemonic} {operands}")
     elif target := TARGET.search(operands):
@@ -135,13 +137,14 @@ def path_to(found, function):
 
 
 class Run:
-    """What an image printed."""
+    """An image and what it printed."""
 
-    def __init__(self, path):
+    def __init__(self, objdump, path):
+        self.name, self.image = path.stem, Image(objdump, path.with_suffix(".elf"))
         lines = [line.split("\t") for line in path.read_text().splitlines()]
         self.topics = {line[1]: (int(line[2]), int(line[3])) for line in lines if line[0] == "self-test"}
         self.kernels = {line[1]: float(line[2]) for line in lines if line[0] == "kernel"}
-        self.faults = [f"self-test {t}: {bad} rows differ" for t, (_, bad) in self.topics.items() if bad]
+        self.faults = [f"self-test {topic}: {bad} rows differ" for topic, (_, bad) in self.topics.items() if bad]
         if lines[-1:] != [["end"]]:
             self.faults.append("the image did not come to its end: " + " ".join(lines[-1] if lines else ["no output"]))
         if not self.topics or not self.kernels:
@@ -163,53 +166,71 @@ def judge(kernel, level, count, entry, same_compiler):
     return None, None
 
 
-def record(runs, compiler):
-    """Writes the present figures into budget.toml, in the order of the image; the limits and the head stay."""
+class Level:
+    """All images at one opt-level."""
+
+    def __init__(self, objdump, folder, name):
+        self.runs = [Run(objdump, path) for path in sorted(folder.glob(f"*-{name}.txt"))]
+        self.kernels = {kernel: count for run in self.runs for kernel, count in run.kernels.items()}
+        self.images = {kernel: run.image for run in self.runs for kernel in run.kernels}
+        self.faults = [f"{run.name}: {fault}" for run in self.runs for fault in run.faults]
+
+
+def record(levels, compiler):
+    """Writes the present figures into budget.toml, in the order of the images; the limits and the head stay."""
     text = BUDGET.read_text()
     limits = tomllib.loads(text)["kernels"]
     head = re.sub(r'^rustc = ".*"$', f'rustc = "{compiler}"', text[: text.index("[kernels]")], flags=re.M)
     lines = []
-    for kernel in runs["O3"].kernels:
-        figures = {level: runs[level].kernels[kernel] for level in LEVELS}
+    for kernel in levels["O3"].kernels:
+        figures = {name: level.kernels[kernel] for name, level in levels.items()}
         figures |= {key: value for key, value in limits.get(kernel, {}).items() if key.startswith("limit_")}
         lines.append(f"{kernel} = {{ " + ", ".join(f"{key} = {value}" for key, value in figures.items()) + " }\n")
     BUDGET.write_text(head + "[kernels]\n" + "".join(lines))
 
 
+ROW = "{:34} {:>8} {:>8} {:>11} {:>7} {:>7}  {}"
+
+
+def line(kernel, levels, entry, panics):
+    """A line of the table."""
+    counts = [level.kernels[kernel] for level in levels.values()]
+    sizes = [level.images[kernel].size(kernel) for level in levels.values()]
+    limits = [str(entry.get(f"limit_{name}", "-")) for name in levels]
+    bound = " / ".join(limits) if limits != ["-", "-"] else "-"
+    return ROW.format(kernel, *counts, bound, *sizes, "YES" if panics else "no")
+
+
 def table(objdump, folder, recording):
     """Prints the table; whether all is well."""
-    runs = {level: Run(folder / f"{level}.txt") for level in LEVELS}
-    images = {level: Image(objdump, folder / f"{level}.elf") for level in LEVELS}
+    levels = {name: Level(objdump, folder, name) for name in LEVELS}
     compiler = subprocess.run(["rustc", "--version"], check=True, capture_output=True, text=True).stdout.split()[1]
     if recording:
-        record(runs, compiler)
+        record(levels, compiler)
     budget = tomllib.loads(BUDGET.read_text())
     same_compiler = budget["rustc"] == compiler
+    kernels = levels["O3"].kernels
 
-    faults = [f"{level}: {fault}" for level in LEVELS for fault in runs[level].faults]
-    gone = budget["kernels"].keys() - runs["O3"].kernels.keys()
+    faults = [f"{name}: {fault}" for name, level in levels.items() for fault in level.faults]
+    gone = budget["kernels"].keys() - kernels.keys()
     faults += [f"{kernel}: in budget.toml, but not in the image" for kernel in sorted(gone)]
     hints = [] if same_compiler else [f"figures are recorded for rustc {budget['rustc']}: only the budgets bind"]
 
-    for topic, (passed, failed) in runs["O3"].topics.items():
-        print(f"self-test {topic}: {passed} passed, {failed} failed")
+    for run in levels["O3"].runs:
+        for topic, (passed, failed) in run.topics.items():
+            print(f"self-test {topic}: {passed} passed, {failed} failed")
     print()
     print("instructions on a Cortex-M4 without those of an empty call; bytes of the function and all that it calls")
-    row = "{:34} {:>8} {:>8} {:>11} {:>7} {:>7}  {}"
-    print(row.format("kernel", "O3", "Os", "budget", "bytes", "Os", "panic path"))
-    for kernel in runs["O3"].kernels:
-        entry = budget["kernels"].get(kernel, {})
-        paths = {level: images[level].fault(kernel) for level in LEVELS}
-        for level in LEVELS:
-            fault, hint = judge(kernel, level, runs[level].kernels[kernel], entry, same_compiler)
+    print(ROW.format("kernel", "O3", "Os", "budget", "bytes", "Os", "panic path"))
+    for kernel in kernels:
+        entry = budget["kernels"].get(kernel)
+        paths = {name: level.images[kernel].fault(kernel) for name, level in levels.items()}
+        faults += [f"{kernel} can panic at {name}: {path}" for name, path in paths.items() if path]
+        for name, level in levels.items():
+            fault, hint = judge(kernel, name, level.kernels[kernel], entry, same_compiler)
             faults += [fault] if fault else []
             hints += [hint] if hint else []
-            faults += [f"{kernel} can panic at {level}: {paths[level]}"] if paths[level] else []
-        counts = [runs[level].kernels[kernel] for level in LEVELS]
-        sizes = [images[level].size(kernel) for level in LEVELS]
-        limits = [str(entry.get(f"limit_{level}", "-")) for level in LEVELS]
-        bound = " / ".join(limits) if any(l != "-" for l in limits) else "-"
-        print(row.format(kernel, *counts, bound, *sizes, "YES" if any(paths.values()) else "no"))
+        print(line(kernel, levels, entry or {}, any(paths.values())))
     print()
     for hint in hints:
         print(f"note: {hint}")

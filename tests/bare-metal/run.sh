@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Builds the image at opt-level 3 and s, runs it under QEMU, and checks: vector rows, instruction counts against
+# Builds an image for each protocol at opt-level 3 and s, runs it under QEMU, and checks: vector rows, instruction counts against
 # budget.toml, and that no panic can be reached from any kernel.
 #
 #   run.sh             check
@@ -9,6 +9,8 @@ cd "$(dirname "$0")"
 
 target=thumbv7em-none-eabihf
 images=target/images
+# The default features are the protocols.
+protocols=$(sed -n 's/^default = \[\(.*\)\]$/\1/p' Cargo.toml | tr -d '",')
 
 fail() {
     echo "$(basename "$0"): $1" >&2
@@ -19,10 +21,12 @@ need() {
     command -v "$1" >/dev/null || fail "$1 is missing: $2"
 }
 
-# build PROFILE IMAGE [FLAGS...]: the image as $images/IMAGE.elf
+# build LEVEL FEATURES IMAGE: the image as $images/IMAGE.elf
 build() {
-    cargo build --locked --quiet --target "$target" --profile "$1" "${@:3}"
-    cp "target/$target/$1/bare-metal" "$images/$2.elf"
+    local profile=release
+    [ "$1" = O3 ] || profile=small
+    cargo build --locked --quiet --target "$target" --profile "$profile" --no-default-features --features "$2"
+    cp "target/$target/$profile/bare-metal" "$images/$3.elf"
 }
 
 # run IMAGE: what it prints as $images/IMAGE.txt; report.py judges it
@@ -40,18 +44,19 @@ python3 -c 'import tomllib' 2>/dev/null || fail "python3 is older than 3.11"
 objdump=$(dirname "$(rustc --print target-libdir)")/bin/llvm-objdump
 [ -x "$objdump" ] || fail "llvm-objdump is missing: rustup component add llvm-tools"
 
+rm -rf "$images"
 mkdir -p "$images"
-# First, that the walk can fail: the kernels of src/kernels/deliberate_panic.rs are found at either level.
-for level in O3:release Os:small; do
-    build "${level#*:}" deliberate-panic --features deliberate-panic
+for level in O3 Os; do
+    # First, that the walk can fail: the kernels of src/kernels/deliberate_panic.rs are found at either level.
+    build "$level" deliberate-panic,nrz-line "panics-$level"
     for kernel in panic_{index,range,unwrap,division,copy,pointer}; do
-        path=$(python3 report.py walk "$objdump" "$images/deliberate-panic.elf" "$kernel" || true)
-        [[ $path == "$kernel -> "* ]] || fail "the walk does not see that $kernel can panic at ${level%:*}"
-        echo "self-check ${level%:*}: $path"
+        path=$(python3 report.py walk "$objdump" "$images/panics-$level.elf" "$kernel" || true)
+        [[ $path == "$kernel -> "* ]] || fail "the walk does not see that $kernel can panic at $level"
+        echo "self-check $level: $path"
+    done
+    for protocol in $protocols; do
+        build "$level" "$protocol" "$protocol-$level"
+        run "$protocol-$level"
     done
 done
-build release O3
-build small Os
-run O3
-run Os
 python3 report.py table "$objdump" "$images" "$@"

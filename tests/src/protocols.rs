@@ -1,5 +1,6 @@
 //! Which topics there are. A new protocol is one file here and one line in [`ALL`].
 
+mod rtex;
 mod sorte;
 mod step_profile;
 mod tformat;
@@ -9,8 +10,12 @@ use crate::row::Check;
 /// A protocol's folder name and its topics.
 type Protocol = (&'static str, &'static [(&'static str, Check)]);
 
-const ALL: &[Protocol] =
-    &[("sorte", sorte::TOPICS), ("step-profile", step_profile::TOPICS), ("tformat", tformat::TOPICS)];
+const ALL: &[Protocol] = &[
+    ("rtex", rtex::TOPICS),
+    ("sorte", sorte::TOPICS),
+    ("step-profile", step_profile::TOPICS),
+    ("tformat", tformat::TOPICS),
+];
 
 pub(crate) fn names() -> Vec<&'static str> {
     ALL.iter().map(|(name, _)| *name).collect()

@@ -204,7 +204,7 @@ fn parse(path: &Path, line: usize, text: &str) -> Result<Option<Row>, RunError> 
     for prose in PROSE {
         keys.remove(prose);
     }
-    match keys.remove("name") {
+    match keys.remove("name").or_else(|| keys.remove("id")) {
         Some(Value::String(name)) => Ok(Some(Row { line, name, keys })),
         None => Ok(Some(Row { line, name: String::new(), keys })),
         Some(other) => Err(fault(format!("the name {other} is not a string"))),

@@ -5,10 +5,17 @@
 
 #[cfg(feature = "deliberate-panic")]
 mod deliberate_panic;
-mod nrz_line;
+#[cfg(feature = "nrz-line")]
+pub(crate) mod nrz_line;
+#[cfg(feature = "rtex-block")]
+mod rtex;
+#[cfg(feature = "sorte-proto")]
 mod sorte;
+#[cfg(feature = "step-profile")]
 mod step_profile;
+#[cfg(feature = "tformat")]
 mod tformat;
+#[cfg(feature = "tformat")]
 mod tformat_ends;
 
 /// An entry point that is measured and walked.
@@ -20,10 +27,17 @@ pub(crate) struct Kernel {
 }
 
 pub(crate) const ALL: &[&[Kernel]] = &[
+    #[cfg(feature = "nrz-line")]
     nrz_line::KERNELS,
+    #[cfg(feature = "rtex-block")]
+    rtex::KERNELS,
+    #[cfg(feature = "sorte-proto")]
     sorte::KERNELS,
+    #[cfg(feature = "step-profile")]
     step_profile::KERNELS,
+    #[cfg(feature = "tformat")]
     tformat::KERNELS,
+    #[cfg(feature = "tformat")]
     tformat_ends::KERNELS,
     #[cfg(feature = "deliberate-panic")]
     deliberate_panic::KERNELS,

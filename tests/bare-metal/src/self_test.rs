@@ -2,8 +2,15 @@
 
 use cortex_m_semihosting::hprintln;
 
+#[cfg(feature = "nrz-line")]
+mod nrz_line;
+#[cfg(feature = "rtex-block")]
+pub(crate) mod rtex;
+#[cfg(feature = "sorte-proto")]
 pub(crate) mod sorte;
+#[cfg(feature = "step-profile")]
 pub(crate) mod step_profile;
+#[cfg(feature = "tformat")]
 pub(crate) mod tformat;
 
 /// How the rows of a topic fared.
@@ -16,7 +23,18 @@ pub(crate) struct Tally {
 /// A topic's name and what runs its rows.
 pub(crate) type Topic = (&'static str, fn() -> Tally);
 
-pub(crate) const ALL: &[&[Topic]] = &[sorte::TOPICS, step_profile::TOPICS, tformat::TOPICS];
+pub(crate) const ALL: &[&[Topic]] = &[
+    #[cfg(feature = "nrz-line")]
+    nrz_line::TOPICS,
+    #[cfg(feature = "rtex-block")]
+    rtex::TOPICS,
+    #[cfg(feature = "sorte-proto")]
+    sorte::TOPICS,
+    #[cfg(feature = "step-profile")]
+    step_profile::TOPICS,
+    #[cfg(feature = "tformat")]
+    tformat::TOPICS,
+];
 
 /// Runs every row; a row that fails is named.
 fn each<T>(rows: &[T], name: impl Fn(&T) -> &str, good: impl Fn(&T) -> bool) -> Tally {

@@ -5,20 +5,23 @@ use nrz_line::{BitOrder, Field, Format, OutOfBounds, Receiver, Samples, Wave, Wi
 use super::kernels;
 
 /// 20 bytes, and the bit at which a window begins.
-type Buffer = ([u8; 20], usize);
+pub(crate) type Buffer = ([u8; 20], usize);
 
-const BUFFERS: [Buffer; 3] = [([0x5a; 20], 0), ([0x35; 20], 13), ([0xc6; 20], 50)];
+pub(crate) const BUFFERS: [Buffer; 3] = [([0x5a; 20], 0), ([0x35; 20], 13), ([0xc6; 20], 50)];
 
 /// A receiver at rest, and 96 samples: idle line, a field with the content 0x35, idle line.
 type Line<Samples> = (Receiver, Samples);
 
-const RECEIVER: Receiver = match Format::new(8, 8) {
+pub(crate) const RECEIVER: Receiver = match Format::new(8, 8) {
     Ok(format) => Receiver::new(format),
     Err(_) => panic!("8 samples a bit are possible"),
 };
 
-/// Levels of start bit, content and delimiter, the first in bit 0, behind an idle bit.
-const BITS: u32 = 1 << 10 | 0x35 << 2 | 1;
+/// The content of the field.
+pub(crate) const CONTENT: u16 = 0x35;
+
+/// An idle bit, start bit, content and delimiter, the first in bit 0.
+const BITS: u32 = 1 << 10 | (CONTENT as u32) << 2 | 1;
 
 /// The samples, the oldest in bit 0.
 const SAMPLES: u128 = {
@@ -32,9 +35,9 @@ const SAMPLES: u128 = {
     samples
 };
 
-const WORDS: [u64; 2] = [SAMPLES as u64, (SAMPLES >> 64) as u64];
+pub(crate) const WORDS: [u64; 2] = [SAMPLES as u64, (SAMPLES >> 64) as u64];
 
-const LEVELS: [bool; 96] = {
+pub(crate) const LEVELS: [bool; 96] = {
     let mut levels = [true; 96];
     let mut at = 0;
     while at < 96 {
@@ -45,7 +48,7 @@ const LEVELS: [bool; 96] = {
 };
 
 /// Idle line, the edges of the field, idle line.
-const RUNS: [(bool, u64); 8] =
+pub(crate) const RUNS: [(bool, u64); 8] =
     [(true, 8), (false, 8), (true, 8), (false, 8), (true, 8), (false, 8), (true, 16), (false, 16)];
 
 kernels! {

@@ -36,6 +36,11 @@ fn profile((arithmetic, speed, steps_per_entry, init_sync): &Given) -> Result<Pr
     Profile::new(Parameters { steps_per_entry, init_sync, arithmetic, ..Parameters::at(Speed::from_raw(*speed)) })
 }
 
+/// Takes from a step what a sender needs.
+fn mix(sum: u32, step: Step) -> u32 {
+    sum ^ step.cnt ^ step.sync_time
+}
+
 kernels! {
     /// The next step of one axis with the arithmetic of the PRU.
     fn step_profile_pru_exact([entry, speed, prev]: &[u32; 3]) -> StepTime {
@@ -68,21 +73,21 @@ kernels! {
     } over GIVEN;
 
     /// A move of 64 steps, all of them on the ramps, step by step.
-    fn step_profile_move_64(given: &Given) -> Option<Step> {
-        profile(given).ok().and_then(|profile| profile.steps(RAMPS).last())
+    fn step_profile_move_64(given: &Given) -> u32 {
+        profile(given).map_or(0, |profile| profile.steps(RAMPS).fold(0, mix))
     } over GIVEN;
 
     /// A move of 1024 steps: the ramps and 960 steps at full speed.
-    fn step_profile_move_1024(given: &Given) -> Option<Step> {
-        profile(given).ok().and_then(|profile| profile.steps(1024).last())
+    fn step_profile_move_1024(given: &Given) -> u32 {
+        profile(given).map_or(0, |profile| profile.steps(1024).fold(0, mix))
     } over GIVEN;
 
     /// A move that is given up after 40 steps: 31 more.
-    fn step_profile_abort_move(given: &Given) -> Option<Step> {
-        let mut steps = profile(given).ok()?.steps(1024);
-        steps.nth(39);
+    fn step_profile_abort_move(given: &Given) -> Result<u32, Error> {
+        let mut steps = profile(given)?.steps(1024);
+        let sum = steps.by_ref().take(40).fold(0, mix);
         steps.abort();
-        steps.last()
+        Ok(steps.fold(sum, mix))
     } over GIVEN;
 
     /// One axis for 1000 cycles: 317 pulses at 250 kHz.

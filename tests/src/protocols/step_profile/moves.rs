@@ -2,9 +2,11 @@
 
 use serde::Deserialize;
 use sha2::{Digest, Sha256};
+use sorte_proto::Pto;
 use step_profile::{Arithmetic, Axis, Command, Direction, Parameters, Profile, RampTable, Shape, Speed, Step};
 
 use super::tables::profile as checked;
+use super::words;
 use crate::hex::{Bytes, Hex};
 use crate::row::{Fault, Row, Verdict, each, same};
 
@@ -223,7 +225,7 @@ fn stream(row: &StreamRow, profile: Profile<'_>) -> Verdict {
             Command::Hold { .. } if row.n == 0 => Command::Hold { direction },
             command => command,
         };
-        let word = word(command, row.guard);
+        let word = word(command, row.guard)?;
         if cycle < 64 {
             first.extend(word.to_le_bytes());
         }
@@ -232,20 +234,16 @@ fn stream(row: &StreamRow, profile: Profile<'_>) -> Verdict {
         }
         hashes.add(&word.to_le_bytes());
     }
-    same("idle_word", &row.idle_word, &Hex(word(Command::Hold { direction }, row.guard).into()))?;
+    same("idle_word", &row.idle_word, &Hex(word(Command::Hold { direction }, row.guard)?.into()))?;
     same("pulses", &row.pulses, &pulses)?;
     same("first_64_words_le", &row.first_64_words_le, &Bytes(first))?;
     hashes.check(row.fnv1a64, &row.sha256)
 }
 
 /// The PTO word; without the guard the sync_time goes into it as it is.
-fn word(command: Command, guard: bool) -> u16 {
+fn word(command: Command, guard: bool) -> Result<u16, Fault> {
     match command {
-        Command::Disable => 0x7fff,
-        Command::Hold { direction } => u16::from(direction.dir()) << 15,
-        Command::Pulse { direction, sync_time } => {
-            let time = if guard { sync_time.clamp(1, 3990) } else { sync_time };
-            u16::from(direction.dir()) << 15 | time as u16
-        }
+        Command::Pulse { direction, sync_time } if !guard => Ok(u16::from(direction.dir()) << 15 | sync_time as u16),
+        command => words::pto(command).map(Pto::word).map_err(|e| Fault::Unreadable(format!("no PTO word: {e}"))),
     }
 }

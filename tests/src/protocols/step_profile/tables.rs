@@ -174,7 +174,7 @@ pub(super) fn params(rows: &[Row]) -> Vec<Verdict> {
             init_sync: row.init_sync,
             ..Parameters::at(Speed::from_raw(row.speed))
         });
-        same("error", &row.error, &profile.err().map(|e| format!("{:?}", e.class())))?;
+        same("error", &row.error.as_deref(), &profile.err().map(|e| e.class().name()))?;
         let Ok(profile) = profile else { return Ok(()) };
         let flag = profile.pru_is_exact();
         same("pru_exact", &row.pru_exact.unwrap_or(flag), &flag)?;

@@ -2,9 +2,30 @@
 
 use serde::Deserialize;
 use sorte_proto::{Direction, MotorMask, Payload, Pto, Slice, StartTime};
+use step_profile::{Command, Motors};
 
 use crate::hex::{Bytes, Hex};
 use crate::row::{Fault, Row, Verdict, each, same};
+
+/// The word of a motor's command.
+pub(super) fn pto(command: Command) -> Result<Pto, sorte_proto::Error> {
+    match command {
+        Command::Disable => Ok(Pto::DriverOff),
+        Command::Hold { direction } => Ok(Pto::NoPulse { direction: direction.dir().into() }),
+        Command::Pulse { direction, sync_time } => Pto::from_step(sync_time, direction.dir().into()),
+    }
+}
+
+/// The command of a word; `None` for a reserved one.
+fn command(pto: Pto) -> Option<Command> {
+    let direction = step_profile::Direction::from_dir(pto.direction().is_some_and(Direction::is_high));
+    match pto {
+        Pto::DriverOff => Some(Command::Disable),
+        Pto::NoPulse { .. } => Some(Command::Hold { direction }),
+        Pto::Pulse { start, .. } => Some(Command::Pulse { direction, sync_time: start.ns().into() }),
+        Pto::Reserved(_) => None,
+    }
+}
 
 #[derive(Deserialize)]
 #[serde(tag = "op", rename_all = "snake_case", deny_unknown_fields)]
@@ -31,7 +52,8 @@ enum Word {
 pub(super) fn pto_word(rows: &[Row]) -> Vec<Verdict> {
     each(rows, |row: Word| match row {
         Word::Encode { sync, dir, word, wire_le, shifted_ns, error } => {
-            let pto = Pto::from_step(sync, Direction::from(dir != 0));
+            let direction = step_profile::Direction::from_dir(dir != 0);
+            let pto = pto(Command::Pulse { direction, sync_time: sync });
             same("error", &error, &pto.err().map(|error| format!("{:?}", error.class())))?;
             let pto = pto.ok();
             same("word", &word.map(|word| word.0), &pto.map(|pto| pto.word().into()))?;
@@ -84,7 +106,13 @@ pub(super) fn payload(rows: &[Row]) -> Vec<Verdict> {
             (None, None, true) => Payload::independent(row.device_words.map(pto)),
             _ => return Err(Fault::Unreadable("neither a mask with a word nor four words".to_owned())),
         };
-        same("device_words", &row.device_words.map(pto), &payload.0.map(|slice| slice.pto))?;
+        let words = row.device_words.map(pto);
+        same("device_words", &words, &payload.0.map(|slice| slice.pto))?;
+        if let (Some(mask), Some(command)) = (row.mask, row.word.and_then(|word| command(pto(word)))) {
+            let motors = Motors::from_mask(mask.into()).map_err(|e| Fault::Unreadable(e.to_string()))?;
+            let commanded = motors.distribute(command).into_iter().map(self::pto).collect::<Result<Vec<_>, _>>();
+            same("device_words, by the commands", &Ok(words.to_vec()), &commanded)?;
+        }
         same("payload", &row.payload.0, &payload.emit().to_vec())?;
         let back = row.payload.0.try_into().map(Payload::parse);
         same("parsed", &Ok(payload), &back)

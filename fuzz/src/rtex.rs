@@ -1,0 +1,256 @@
+//! RTEX blocks, the master around them, and the drive model.
+
+use core::num::NonZeroU16;
+
+use rtex_block::device::{Drive, OpenCodes, Settings};
+use rtex_block::inspect::inspect;
+use rtex_block::master::{ActiveCode, Axis, AxisSettings, AxisState, Limits, Ring};
+use rtex_block::position::Gear;
+use rtex_block::{
+    Alarm, Answer, BlockSize, Command, Command32, CommandBlock, Error, MacId, NonCyclicCode, Request, Response,
+    Response32, TypeCode, stream,
+};
+
+use crate::byte;
+
+mod reference;
+
+/// A block of either size and direction: what is accepted is what would be sent again, what is refused fails the check
+/// that is named, and a decoder that takes bit after bit says the same.
+pub fn block(data: &[u8]) {
+    let report = inspect(data);
+    assert_eq!(report.changes(&report).count(), 0);
+    let response = data.first().is_some_and(|byte0| byte0 & 0x80 != 0);
+    let usable = match (response, data.len() > 16) {
+        (false, false) => command16(data),
+        (false, true) => command32(data),
+        (true, false) => response16(data),
+        (true, true) => response32(data),
+    };
+    assert_eq!(report.is_usable, usable);
+    assert_eq!(report.is_response, data.first().map(|_| response));
+}
+
+fn command16(data: &[u8]) -> bool {
+    let strict = Command::parse_strict(data);
+    let lenient = Command::parse(data);
+    match lenient {
+        Ok(command) => {
+            let emitted = command.emit();
+            assert_eq!(Command::parse_strict(&emitted).is_ok(), command.code().is_allowed());
+            // Strict decoding takes a block only if it is what an encoder writes.
+            assert_eq!(strict.is_ok(), emitted == data && command.code().is_allowed());
+            reference::command(&emitted, &command);
+            let view = CommandBlock::new(data).expect("it was decoded");
+            assert_eq!(view.is_servo_off(), view.obeys_control() && !command.control.servo_on());
+        }
+        Err(error) => refused(data, 16, error),
+    }
+    if strict.is_ok() {
+        assert_eq!(strict, lenient);
+    }
+    lenient.is_ok()
+}
+
+fn command32(data: &[u8]) -> bool {
+    match Command32::parse(data) {
+        Ok(command) => {
+            assert_eq!(Command32::parse(&command.emit()), Ok(command));
+            assert_eq!(Command::parse(&data[..16]), Ok(command.main));
+            true
+        }
+        Err(error) => {
+            refused(data, 32, error);
+            false
+        }
+    }
+}
+
+fn response16(data: &[u8]) -> bool {
+    match Response::parse(data) {
+        Ok(response) => {
+            assert_eq!(response.emit(), data);
+            let answer = response.answer();
+            assert_eq!(matches!(answer, Answer::CommandError(_)), response.cmd_error);
+            let again = response.with_answer(&answer);
+            assert_eq!(again.answer(), answer);
+            // An answer that is written again differs from what came in reserved bits only.
+            assert!(again == response || Response::parse_strict(data).is_err());
+            reference::response(data, &response);
+            true
+        }
+        Err(error) => {
+            refused(data, 16, error);
+            false
+        }
+    }
+}
+
+fn response32(data: &[u8]) -> bool {
+    match Response32::parse(data) {
+        Ok(response) => {
+            assert_eq!(response.emit(), data);
+            true
+        }
+        Err(error) => {
+            refused(data, 32, error);
+            false
+        }
+    }
+}
+
+/// The reason of a refusal is so.
+fn refused(data: &[u8], want: usize, error: Error) {
+    match error {
+        Error::Length { got, want: said } => assert!(got == data.len() && got != want && usize::from(said) == want),
+        Error::CyclicCode { code } => assert!(code == data[1] >> 4 & 7 && code > 4),
+        Error::NonCyclicCode { code } => assert!(code == data[1] & 15 && NonCyclicCode::new(code).is_none()),
+        Error::SubChk { byte16 } => assert!(byte16 == data[16] && byte16 < 0x80),
+        Error::SubCommandCode { code } => assert!(code == data[16] & 15 && ![0, 2, 10].contains(&code)),
+        error => panic!("{error} is not an error of this block"),
+    }
+}
+
+/// Blocks in a row: the parsers take them one by one, as if each were alone, and wait for the rest of the last.
+pub fn log(mut data: &[u8]) {
+    while data.len() >= 16 {
+        let alone = Response::parse(&data[..16]);
+        match stream::response(data) {
+            Ok((rest, response)) => {
+                assert_eq!((Ok(response), rest.len()), (alone, data.len() - 16));
+            }
+            Err(nom::Err::Error(error)) => assert_eq!(Err(error), alone),
+            Err(error) => panic!("{error:?} with a whole block there"),
+        }
+        data = &data[16..];
+    }
+    assert!(matches!(stream::response(data), Err(nom::Err::Incomplete(_))));
+}
+
+const LIMIT: u16 = 4;
+
+const CODES: OpenCodes = OpenCodes {
+    profile_absolute: 0x10,
+    parameter_read: TypeCode::short(0x10),
+    parameter_store: TypeCode::short(0x21),
+    alarm_active: TypeCode::short(0x01),
+    alarm_history: TypeCode::short(0x02),
+    alarm_clear: TypeCode::short(0x03),
+    communication_lost: Alarm { main: 80, sub: 0 },
+};
+
+/// A master and two drives on a line that the input spoils: no NOP once started, nothing but servo-off after a failure, and
+/// when all is well again the ring can be switched on.
+///
+/// ```text
+/// two bytes an update period: what happens (low nibble) and to which drive (bit 4), its argument
+/// ```
+pub fn ring(mut data: &[u8]) {
+    let limit = NonZeroU16::new(LIMIT).expect("not 0");
+    let limits = Limits { echo: limit, ready: 60, active: 20, inactive: 20, answer: 20, command_errors: limit };
+    let mac_id = |place| MacId::new(place).expect("below 32");
+    let axis = |place| {
+        let mode = ActiveCode::CyclicPosition;
+        Axis::new(AxisSettings { mac_id: mac_id(place), mode, update_ns: 500_000, gear: Gear::UNITY, limits })
+    };
+    let drive =
+        |place| Drive::new(Settings { fault_limit: LIMIT, lost_limit: LIMIT, ..Settings::new(mac_id(place), CODES) });
+    let mut ring = Ring::new([axis(0), axis(1)], 2);
+    let mut drives = [drive(0), drive(1)];
+    let mut responses = [None; 2];
+    let mut started = false;
+    for _ in 0..256 {
+        if data.is_empty() {
+            break;
+        }
+        let (event, argument) = (byte(&mut data), byte(&mut data));
+        let place = usize::from(event >> 4 & 1);
+        act(event & 15, argument, &mut ring, place, &mut drives[place]);
+        let commands = ring.update(&responses);
+        for (k, command) in commands.iter().enumerate() {
+            let mut sent = command.emit();
+            let view = CommandBlock::of(&sent).expect("a command");
+            started |= view.obeys_control();
+            assert_eq!(view.obeys_control(), started);
+            assert!(ring.failure().is_none() || view.is_servo_off());
+            responses[k] = match event & 15 {
+                1 if k == place => {
+                    drives[k].miss();
+                    None
+                }
+                2 if k == place => {
+                    sent[usize::from(argument >> 3 & 15)] ^= 1 << (argument & 7);
+                    Response::parse(&drives[k].exchange(&sent)).ok()
+                }
+                3 if k == place => {
+                    let mut received = drives[k].exchange(&sent);
+                    received[usize::from(argument >> 3 & 15)] ^= 1 << (argument & 7);
+                    Response::parse(&received).ok()
+                }
+                _ => Response::parse(&drives[k].exchange(&sent)).ok(),
+            };
+        }
+    }
+    recover(&mut ring, &mut drives, responses);
+}
+
+fn act(event: u8, argument: u8, ring: &mut Ring<2>, place: usize, drive: &mut Drive) {
+    let [first, second] = ring.axes_mut();
+    let axis = if place == 0 { first } else { second };
+    match event {
+        4 => _ = ring.switch_on(),
+        5 => ring.switch_off(),
+        6 => ring.clear(),
+        7 => drive.raise(Alarm { main: argument, sub: 0 }),
+        8 => drive.clear_alarm(),
+        9 => drive.set_main_power(argument & 1 == 1),
+        10 => _ = axis.set_position(axis.setpoint().wrapping_add(i32::from(argument) << 11)),
+        11 => {
+            let code = NonCyclicCode::ALL[usize::from(argument) % 8];
+            let _ = axis.ask(Request::from_bytes(code, [argument >> 3, 0, 0, 0, 0, 0, 0, 0]));
+        }
+        12 => _ = axis.take_outcome(),
+        _ => {}
+    }
+}
+
+/// With a good line, no alarms and power, every axis comes on within its limits.
+fn recover(ring: &mut Ring<2>, drives: &mut [Drive; 2], mut responses: [Option<Response>; 2]) {
+    for round in 0..120 {
+        if round % 60 == 0 {
+            for drive in drives.iter_mut() {
+                drive.clear_alarm();
+                drive.set_main_power(true);
+            }
+            ring.clear();
+        }
+        ring.switch_on();
+        let commands = ring.update(&responses);
+        for (k, command) in commands.iter().enumerate() {
+            responses[k] = Response::parse(&drives[k].exchange(&command.emit())).ok();
+        }
+    }
+    assert!(ring.all_are(AxisState::On), "{:?}", ring.failure());
+    assert!(drives.iter().all(Drive::is_active));
+}
+
+/// Any blocks to a drive of either size: it never stops answering under its own address, and echoes the counter.
+pub fn drive(data: &[u8]) {
+    let mac_id = MacId::new(5).expect("below 32");
+    let settings = Settings { sync_exchanges: 2, servo_on_updates: 1, ..Settings::new(mac_id, CODES) };
+    let mut short = Drive::new(settings);
+    let mut long = Drive::new(Settings { size: BlockSize::Bytes32, ..settings });
+    for block in data.chunks_exact(16).filter_map(|block| block.first_chunk()) {
+        let response = Response::parse_strict(&short.exchange(block));
+        let response = response.expect("an undefined code is echoed with CMD_Error only, reserved bits are 0");
+        assert_eq!(response.mac_id, mac_id);
+        assert_eq!(response.update_counter_echo.get(), block[0] >> 5 & 3);
+        if short.is_active() {
+            assert!(short.alarm().is_none());
+        }
+    }
+    for block in data.chunks_exact(32).filter_map(|block| block.first_chunk()) {
+        let response = Response32::parse_strict(&long.exchange32(block)).expect("a drive writes no reserved bits");
+        assert_eq!(response.main.mac_id, mac_id);
+    }
+}

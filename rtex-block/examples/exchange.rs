@@ -1,0 +1,69 @@
+//! One drive from power-up to a short move, block by block.
+//!
+//! `cargo run -p rtex-block --example exchange`
+
+use core::num::NonZeroU16;
+
+use rtex_block::device::{Drive, OpenCodes, Settings};
+use rtex_block::inspect::inspect;
+use rtex_block::master::{ActiveCode, Axis, AxisSettings, AxisState, Limits, Ring};
+use rtex_block::position::Gear;
+use rtex_block::{Alarm, MacId, Response, TypeCode};
+
+/// Numbers that the documents at hand do not confirm; a model needs some.
+const CODES: OpenCodes = OpenCodes {
+    profile_absolute: 0x10,
+    parameter_read: TypeCode::short(0x10),
+    parameter_store: TypeCode::short(0x21),
+    alarm_active: TypeCode::short(0x01),
+    alarm_history: TypeCode::short(0x02),
+    alarm_clear: TypeCode::short(0x03),
+    communication_lost: Alarm { main: 80, sub: 0 },
+};
+
+fn main() {
+    let mac_id = MacId::new(5).unwrap_or_default();
+    let some = NonZeroU16::MIN.saturating_add(7);
+    let axis = Axis::new(AxisSettings {
+        mac_id,
+        mode: ActiveCode::CyclicPosition,
+        update_ns: 500_000,
+        gear: Gear::UNITY,
+        limits: Limits { echo: some, ready: 200, active: 50, inactive: 50, answer: 50, command_errors: some },
+    });
+    let mut ring = Ring::new([axis], 2);
+    let mut drive = Drive::new(Settings { sync_exchanges: 4, servo_on_updates: 2, ..Settings::new(mac_id, CODES) });
+    let mut response = None;
+    let mut before = None;
+    for _ in 0..16 {
+        let [command] = ring.update(&[response]);
+        let received = drive.exchange(&command.emit());
+        response = Response::parse(&received).ok();
+
+        println!("{} -> {}   {:?}", hex(&command.emit()), hex(&received), ring.axes()[0].state());
+        let report = inspect(&received);
+        if let Some(before) = &before {
+            for (field, old) in report.changes(before).filter(|(field, _)| field.name != "Update_Counter_Echo") {
+                println!(
+                    "{:36}{}: {} -> {}",
+                    "",
+                    field.name,
+                    old.map_or(String::new(), |v| v.to_string()),
+                    field.value
+                );
+            }
+        }
+        before = Some(report);
+
+        ring.switch_on();
+        let [axis] = ring.axes_mut();
+        if axis.state() == AxisState::On {
+            let next = axis.setpoint().wrapping_add(1_000);
+            axis.set_position(next).unwrap_or_else(|refused| println!("{refused}"));
+        }
+    }
+}
+
+fn hex(block: &[u8; 16]) -> String {
+    format!("{:032x}", u128::from_be_bytes(*block))
+}

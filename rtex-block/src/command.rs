@@ -1,0 +1,220 @@
+use crate::error::wrong_direction;
+use crate::{CODE_BIT7, Code, ControlBits, CyclicCode, Error, Header, LEN, MacId, Request, UpdateCounter, exact};
+
+/// A command block, borrowed: what a drive reads out of its reception memory.
+///
+/// ```text
+/// byte 0        1                 2   3         4 .. 7          8 .. 15
+///      header   TMG_CNT | code    Control_Bits  Command_Data1   by the non-cyclic code: [`Request`]
+/// ```
+/// The constructor checks length and direction, after that no getter can fail; codes are given as they are,
+/// defined or not. System Design Guide for Master, "Data structure"; SX-DSV02310, "Command data block".
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct CommandBlock<'a>(&'a [u8; LEN]);
+
+impl<'a> CommandBlock<'a> {
+    /// # Errors
+    /// [`Error::Length`] unless there are 16 bytes, [`Error::Direction`] if C/R is 1.
+    pub const fn new(bytes: &'a [u8]) -> Result<Self, Error> {
+        match exact(bytes) {
+            Ok(block) => Self::of(block),
+            Err(e) => Err(e),
+        }
+    }
+
+    /// As [`new`](Self::new), for a block of the right size.
+    ///
+    /// # Errors
+    /// [`Error::Direction`] if C/R is 1.
+    pub const fn of(block: &'a [u8; LEN]) -> Result<Self, Error> {
+        if block[0] & 0x80 == 0 { Ok(Self(block)) } else { Err(wrong_direction(block[0])) }
+    }
+
+    /// The bytes.
+    pub const fn bytes(self) -> &'a [u8; LEN] {
+        self.0
+    }
+
+    /// Byte 0 bits 4-0: the drive that is addressed.
+    pub const fn mac_id(self) -> MacId {
+        Header::from_byte(self.0[0]).mac_id
+    }
+
+    /// Byte 0 bits 6-5.
+    pub const fn update_counter(self) -> UpdateCounter {
+        Header::from_byte(self.0[0]).update_counter
+    }
+
+    /// Byte 1 bit 7, used in the inter-axis full-synchronous mode only.
+    pub const fn tmg_cnt(self) -> bool {
+        self.0[1] & CODE_BIT7 != 0
+    }
+
+    /// Byte 1 bits 6-0.
+    pub const fn code(self) -> Code {
+        Code::from_byte(self.0[1])
+    }
+
+    /// Bytes 2-3 without the reserved bits.
+    pub const fn control(self) -> ControlBits {
+        ControlBits::from_bytes([self.0[2], self.0[3]])
+    }
+
+    /// Bytes 4-7, by the cyclic code.
+    pub const fn command_data1(self) -> i32 {
+        let [_, _, _, _, a, b, c, d, ..] = *self.0;
+        i32::from_le_bytes([a, b, c, d])
+    }
+
+    /// Bytes 8-15, by the non-cyclic code.
+    pub const fn noncyclic_bytes(self) -> [u8; 8] {
+        let [_, _, _, _, _, _, _, _, tail @ ..] = *self.0;
+        tail
+    }
+
+    /// Whether this block makes its drive switch the servo off.
+    ///
+    /// Servo_On is 0, **and** the code is one with which the drive looks at Servo_On. A NOP is not: a block of
+    /// zeros leaves the servo as it is. Nor is a block that the drive refuses for its code.
+    pub const fn is_servo_off(self) -> bool {
+        !self.control().servo_on() && self.obeys_control()
+    }
+
+    /// Whether a drive surely takes Control_Bits from this block: its codes go together
+    /// ([`Code::is_allowed`]), and they are not the NOP command.
+    pub const fn obeys_control(self) -> bool {
+        self.code().is_allowed() && self.code().get() != Code::NOP.get()
+    }
+
+    /// Everything at once.
+    ///
+    /// # Errors
+    /// [`Error::CyclicCode`] or [`Error::NonCyclicCode`] for a code that is not defined.
+    pub const fn to_owned(self) -> Result<Command, Error> {
+        match self.code().pair() {
+            Ok((cyclic, noncyclic)) => Ok(Command {
+                mac_id: self.mac_id(),
+                update_counter: self.update_counter(),
+                tmg_cnt: self.tmg_cnt(),
+                cyclic,
+                control: self.control(),
+                command_data1: self.command_data1(),
+                request: Request::from_bytes(noncyclic, self.noncyclic_bytes()),
+            }),
+            Err(e) => Err(e),
+        }
+    }
+
+    /// What strict decoding checks beyond [`to_owned`](Self::to_owned).
+    ///
+    /// # Errors
+    /// [`Error::CyclicCode`], [`Error::NonCyclicCode`], [`Error::CodePair`] or the first [`Error::Reserved`].
+    pub const fn check_strict(self) -> Result<(), Error> {
+        let code = self.code();
+        let noncyclic = match code.pair() {
+            Ok((_, noncyclic)) => noncyclic,
+            Err(e) => return Err(e),
+        };
+        if !code.is_allowed() {
+            return Err(Error::CodePair { code: code.get() });
+        }
+        match ControlBits::reserved([self.0[2], self.0[3]]) {
+            [0, 0] => Request::check_reserved(noncyclic, self.noncyclic_bytes()),
+            [0, bits] => Err(Error::Reserved { byte: 3, bits }),
+            [bits, _] => Err(Error::Reserved { byte: 2, bits }),
+        }
+    }
+}
+
+/// A command as values. Any value of this type can be emitted, and reserved bits go out as 0.
+///
+/// ```
+/// use rtex_block::*;
+/// let command = Command {
+///     control: ControlBits::SERVO_ON,
+///     command_data1: 1_000,
+///     ..Command::idle(MacId::new(5).unwrap(), UpdateCounter::new(2).unwrap())
+/// };
+/// assert_eq!(command.emit(), [0x45, 0x20, 0x80, 0, 0xe8, 0x03, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0]);
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "arbitrary", derive(arbitrary::Arbitrary))]
+pub struct Command {
+    /// The drive that is addressed.
+    pub mac_id: MacId,
+    /// Counts update periods.
+    pub update_counter: UpdateCounter,
+    /// TMG_CNT: `false` outside the inter-axis full-synchronous mode.
+    pub tmg_cnt: bool,
+    /// What Command_Data1 is.
+    pub cyclic: CyclicCode,
+    /// Servo_On and its neighbours.
+    pub control: ControlBits,
+    /// Position, speed or torque by [`cyclic`](Self::cyclic).
+    pub command_data1: i32,
+    /// Bytes 8-15, and with them the non-cyclic code.
+    pub request: Request,
+}
+
+impl Command {
+    /// 20h with Servo_On = 0 and all data 0: what a master sends to a drive it does not move.
+    pub const fn idle(mac_id: MacId, update_counter: UpdateCounter) -> Self {
+        Self {
+            mac_id,
+            update_counter,
+            tmg_cnt: false,
+            cyclic: CyclicCode::CyclicPosition,
+            control: ControlBits::empty(),
+            command_data1: 0,
+            request: Request::IDLE,
+        }
+    }
+
+    /// 00h, the invalid data that go out with counter 0 before the first valid command.
+    pub const fn nop(mac_id: MacId) -> Self {
+        Self { cyclic: CyclicCode::Nop, ..Self::idle(mac_id, UpdateCounter::ZERO) }
+    }
+
+    /// Byte 1 without TMG_CNT.
+    pub const fn code(&self) -> Code {
+        Code::of(self.cyclic, self.request.code())
+    }
+
+    /// Decodes one block as leniently as a drive does: reserved bits are ignored.
+    ///
+    /// # Errors
+    /// [`Error::Length`], [`Error::Direction`], [`Error::CyclicCode`], [`Error::NonCyclicCode`], in this order.
+    pub const fn parse(bytes: &[u8]) -> Result<Self, Error> {
+        match CommandBlock::new(bytes) {
+            Ok(block) => block.to_owned(),
+            Err(e) => Err(e),
+        }
+    }
+
+    /// Decodes one block and refuses what an encoder must not write.
+    ///
+    /// # Errors
+    /// As [`parse`](Self::parse), then [`Error::CodePair`] and [`Error::Reserved`].
+    pub const fn parse_strict(bytes: &[u8]) -> Result<Self, Error> {
+        let block = match CommandBlock::new(bytes) {
+            Ok(block) => block,
+            Err(e) => return Err(e),
+        };
+        match block.check_strict() {
+            Ok(()) => block.to_owned(),
+            Err(e) => Err(e),
+        }
+    }
+
+    /// The block.
+    pub const fn emit(&self) -> [u8; LEN] {
+        let header = Header { response: false, update_counter: self.update_counter, mac_id: self.mac_id };
+        let [c2, c3] = self.control.to_bytes();
+        let [d4, d5, d6, d7] = self.command_data1.to_le_bytes();
+        let [d8, d9, d10, d11, d12, d13, d14, d15] = self.request.to_bytes();
+        let one = (self.tmg_cnt as u8) << 7 | self.code().get();
+        [header.to_byte(), one, c2, c3, d4, d5, d6, d7, d8, d9, d10, d11, d12, d13, d14, d15]
+    }
+}

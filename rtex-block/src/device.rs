@@ -1,0 +1,16 @@
+//! The drive's side: what a simulator or a test bench runs.
+//!
+//! [`Drive`] answers commands block by block and moves a simple axis; 32 of them make a ring. [`check`] alone is the
+//! part of it that looks at header, codes and sub block.
+
+mod check;
+mod drive;
+mod motion;
+mod parameters;
+mod profile;
+mod service;
+mod settings;
+
+pub use check::{Verdict, check};
+pub use drive::Drive;
+pub use settings::{OpenCodes, Settings};

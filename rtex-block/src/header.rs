@@ -1,0 +1,111 @@
+/// Address of a drive on the ring, 0..=31 (MAC-ID).
+///
+/// A drive takes it from its rotary switches when it powers up. SX-DSV02310, "Command header".
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Default)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(try_from = "u8", into = "u8"))]
+pub struct MacId(u8);
+
+impl MacId {
+    /// How many addresses there are, and so the largest number of drives on a ring.
+    pub const COUNT: usize = 32;
+
+    /// `None` above 31.
+    pub const fn new(value: u8) -> Option<Self> {
+        if value < 32 { Some(Self(value)) } else { None }
+    }
+
+    /// The number, 0..=31.
+    pub const fn get(self) -> u8 {
+        self.0
+    }
+}
+
+/// Update_Counter, 0..=3: the master adds 1 modulo 4 in every update period.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Default)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(try_from = "u8", into = "u8"))]
+pub struct UpdateCounter(u8);
+
+impl UpdateCounter {
+    /// Goes out with the invalid data (00h) before the first valid block.
+    pub const ZERO: Self = Self(0);
+
+    /// `None` above 3.
+    pub const fn new(value: u8) -> Option<Self> {
+        if value < 4 { Some(Self(value)) } else { None }
+    }
+
+    /// The number, 0..=3.
+    pub const fn get(self) -> u8 {
+        self.0
+    }
+
+    /// The counter of the next update period; after 3 comes 0.
+    #[must_use]
+    pub const fn next(self) -> Self {
+        Self(self.0.wrapping_add(1) & 3)
+    }
+}
+
+/// Byte 0 of either block.
+///
+/// ```text
+///   7    6     5    4    3    2    1    0
+/// ┌─────┬──────────┬────────────────────────┐
+/// │ C/R │  counter │         MAC-ID         │   C/R: 0 command, 1 response
+/// └─────┴──────────┴────────────────────────┘
+/// ```
+/// In a response the counter is Update_Counter_Echo, and the MAC-ID is Actual_MAC-ID: not an echo but what
+/// the drive read from its switches. System Design Guide for Master, "Data structure"; SX-DSV02310, "Command
+/// header" and "Response header".
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "arbitrary", derive(arbitrary::Arbitrary))]
+pub struct Header {
+    /// C/R: `true` in a response.
+    pub response: bool,
+    /// Update_Counter or its echo.
+    pub update_counter: UpdateCounter,
+    /// MAC-ID or Actual_MAC-ID.
+    pub mac_id: MacId,
+}
+
+impl Header {
+    /// Takes byte 0 apart; every value is a header.
+    pub const fn from_byte(byte0: u8) -> Self {
+        Self { response: byte0 & 0x80 != 0, update_counter: UpdateCounter(byte0 >> 5 & 3), mac_id: MacId(byte0 & 0x1f) }
+    }
+
+    /// Byte 0.
+    pub const fn to_byte(self) -> u8 {
+        (self.response as u8) << 7 | self.update_counter.0 << 5 | self.mac_id.0
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_byte() {
+        for byte in 0..=255 {
+            let header = Header::from_byte(byte);
+            assert_eq!(header.to_byte(), byte);
+            assert_eq!(header.response, byte >= 0x80);
+            assert_eq!(
+                u32::from(header.update_counter.get()) * 32 + u32::from(header.mac_id.get()),
+                u32::from(byte % 128)
+            );
+        }
+    }
+
+    #[test]
+    fn narrow_numbers() {
+        assert_eq!((0..=255).filter_map(MacId::new).count(), MacId::COUNT);
+        assert_eq!((0..=255).filter_map(UpdateCounter::new).count(), 4);
+        let walk = core::iter::successors(Some(UpdateCounter::ZERO), |c| Some(c.next()));
+        assert!(walk.take(9).map(UpdateCounter::get).eq([0, 1, 2, 3, 0, 1, 2, 3, 0]));
+    }
+}

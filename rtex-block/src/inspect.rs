@@ -1,0 +1,282 @@
+//! For tools: decodes all that can be decoded, lists every finding and guesses the cause.
+//!
+//! A block has no check sum, so nothing here proves that it came over unharmed. What can be said is whether it is
+//! one that an encoder may write: length, C/R, defined codes, a pair that goes together, reserved bits 0.
+//!
+//! ```
+//! use rtex_block::inspect::{Cause, inspect};
+//!
+//! // Written as 16-bit words by a host that swaps their bytes
+//! let report = inspect(&[0x20, 0x65, 0x00, 0x80, 0x03, 0xe8, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0]);
+//! assert_eq!(report.cause, Some(Cause::SwappedWords16));
+//!
+//! let report = inspect(&[0x65, 0x20, 0x80, 0, 0xe8, 0x03, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0]);
+//! assert_eq!(report.error, None);
+//! assert_eq!(report.fields().find(|f| f.name == "Command_Position").unwrap().value.to_string(), "1000");
+//! ```
+
+mod fields;
+
+use core::fmt;
+
+pub use fields::{Field, Fields, Value};
+
+use crate::{Code, Command, Command32, CommandBlock, Error, LEN, LEN32, Response, Response32};
+
+/// What most likely went wrong.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[non_exhaustive]
+pub enum Cause {
+    /// All bytes are 0: memory that nothing was written to. As a command it is a NOP, not a servo-off.
+    AllZero,
+    /// All bytes are FFh: a bus without a device behind it.
+    AllOnes,
+    /// The two bytes of each 16-bit word are exchanged.
+    SwappedWords16,
+    /// The four bytes of each 32-bit word are in the other order.
+    SwappedWords32,
+    /// A 32-byte block in a log of 16-byte blocks, or the other way round.
+    OtherSize,
+}
+
+impl fmt::Display for Cause {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::AllZero => "all bytes are 0: nothing was written here (as a command: a NOP, not a servo-off)",
+            Self::AllOnes => "all bytes are FFh: nothing answers on this bus",
+            Self::SwappedWords16 => "the bytes of each 16-bit word are exchanged: pack with shifts",
+            Self::SwappedWords32 => "the bytes of each 32-bit word are in the other order: pack with shifts",
+            Self::OtherSize => "the size is neither 16 nor 32 bytes",
+        })
+    }
+}
+
+/// Something about a sound block that its reader should know.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[non_exhaustive]
+pub enum Note {
+    /// Servo_On is 1 in a NOP: the drive does not look at it.
+    ServoOnIgnored,
+    /// Servo_On is 0 in a NOP: this does not switch the servo off.
+    NopIsNotServoOff,
+    /// CMD_Error or Sub_CMD_Err: a command was not accepted.
+    NotAccepted,
+    /// ERR or Sub_ERR: a command failed while it was executed.
+    FailedToExecute,
+    /// Alarm is 1.
+    Alarm,
+}
+
+impl fmt::Display for Note {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::ServoOnIgnored => "Servo_On in a NOP is ignored",
+            Self::NopIsNotServoOff => "a NOP does not switch the servo off",
+            Self::NotAccepted => "command not accepted",
+            Self::FailedToExecute => "command failed while executing",
+            Self::Alarm => "alarm",
+        })
+    }
+}
+
+/// What there is to say about a block.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Report {
+    /// Whether C/R says response; `None` if there is no byte.
+    pub is_response: Option<bool>,
+    /// The fault that strict decoding reports.
+    pub error: Option<Error>,
+    /// Whether lenient decoding, and so a drive, takes the block.
+    pub is_usable: bool,
+    /// The most likely cause of the fault, or of a suspicious block.
+    pub cause: Option<Cause>,
+    notes: [Option<Note>; 4],
+    fields: Fields,
+}
+
+impl Report {
+    /// Every field, in the order of the block; as far as the bytes go.
+    pub fn fields(&self) -> impl Iterator<Item = Field> {
+        self.fields.iter()
+    }
+
+    /// What the reader should know.
+    pub fn notes(&self) -> impl Iterator<Item = Note> {
+        self.notes.into_iter().flatten()
+    }
+
+    /// The fields that are new or have another value than in `before`, each with the value it had.
+    ///
+    /// Blocks of opposite direction have no field in common but those of bytes 0 and 1.
+    pub fn changes(&self, before: &Self) -> impl Iterator<Item = (Field, Option<Value>)> {
+        self.fields.iter().filter_map(move |field| {
+            let old = before.fields.iter().find(|old| old.name == field.name).map(|old| old.value);
+            (old != Some(field.value)).then_some((field, old))
+        })
+    }
+}
+
+/// Looks at a block of either direction and either size.
+pub fn inspect(bytes: &[u8]) -> Report {
+    let is_response = bytes.first().map(|byte0| byte0 & 0x80 != 0);
+    let error = strict(bytes).err();
+    Report {
+        is_response,
+        error,
+        is_usable: lenient(bytes).is_ok(),
+        cause: cause(bytes, error),
+        notes: notes(bytes),
+        fields: Fields::of(bytes),
+    }
+}
+
+fn is_response(bytes: &[u8]) -> bool {
+    bytes.first().is_some_and(|byte0| byte0 & 0x80 != 0)
+}
+
+fn strict(bytes: &[u8]) -> Result<(), Error> {
+    match (is_response(bytes), bytes.len() > LEN) {
+        (false, false) => Command::parse_strict(bytes).map(drop),
+        (false, true) => Command32::parse_strict(bytes).map(drop),
+        (true, false) => Response::parse_strict(bytes).map(drop),
+        (true, true) => Response32::parse_strict(bytes).map(drop),
+    }
+}
+
+fn lenient(bytes: &[u8]) -> Result<(), Error> {
+    match (is_response(bytes), bytes.len() > LEN) {
+        (false, false) => Command::parse(bytes).map(drop),
+        (false, true) => Command32::parse(bytes).map(drop),
+        (true, false) => Response::parse(bytes).map(drop),
+        (true, true) => Response32::parse(bytes).map(drop),
+    }
+}
+
+fn cause(bytes: &[u8], error: Option<Error>) -> Option<Cause> {
+    let size = bytes.len();
+    if size != LEN && size != LEN32 {
+        return Some(Cause::OtherSize);
+    }
+    if bytes.iter().all(|&b| b == 0) {
+        return Some(Cause::AllZero);
+    }
+    if bytes.iter().all(|&b| b == 0xff) {
+        return Some(Cause::AllOnes);
+    }
+    error?;
+    let sound = |width| {
+        let mut turned = [0; LEN32];
+        let turned = turned.get_mut(..size)?;
+        for (to, from) in turned.chunks_exact_mut(width).zip(bytes.chunks_exact(width)) {
+            for (to, from) in to.iter_mut().zip(from.iter().rev()) {
+                *to = *from;
+            }
+        }
+        // A NOP is too little to go by: it is mostly zeros, whatever their order.
+        let nop = turned.get(1).is_some_and(|byte1| Code::from_byte(*byte1) == Code::NOP);
+        strict(turned).ok().filter(|()| !nop)
+    };
+    match (sound(2), sound(4)) {
+        (Some(()), None) => Some(Cause::SwappedWords16),
+        (None, Some(())) => Some(Cause::SwappedWords32),
+        _ => None,
+    }
+}
+
+fn notes(bytes: &[u8]) -> [Option<Note>; 4] {
+    let Some(main) = bytes.first_chunk::<LEN>() else { return [None; 4] };
+    let when = |condition: bool, note| condition.then_some(note);
+    if let Ok(command) = CommandBlock::of(main) {
+        let nop = command.code() == Code::NOP;
+        let on = command.control().servo_on();
+        return [when(nop && on, Note::ServoOnIgnored), when(nop && !on, Note::NopIsNotServoOff), None, None];
+    }
+    let Ok(response) = Response::parse(main) else { return [None; 4] };
+    let sub = Response32::parse(bytes).ok().map(|r| r.sub);
+    let failed = response.answer().execution().is_some_and(|e| e.err) || sub.is_some_and(|s| s.execution.err);
+    [
+        when(response.cmd_error || sub.is_some_and(|s| s.cmd_error), Note::NotAccepted),
+        when(failed, Note::FailedToExecute),
+        when(response.status.alarm(), Note::Alarm),
+        None,
+    ]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{ControlBits, MacId, UpdateCounter};
+    use proptest::prelude::*;
+    use std::string::ToString;
+    use std::vec::Vec;
+
+    fn swapped(bytes: &[u8], width: usize) -> Vec<u8> {
+        bytes.chunks(width).flat_map(|c| c.iter().rev().copied()).collect()
+    }
+
+    #[test]
+    fn causes() {
+        let command = Command { command_data1: 1_000, ..Command::idle(MacId::new(5).unwrap(), UpdateCounter::ZERO) };
+        let block = Command { control: ControlBits::SERVO_ON, ..command }.emit();
+        assert_eq!(inspect(&block).cause, None);
+        assert_eq!(inspect(&swapped(&block, 2)).cause, Some(Cause::SwappedWords16));
+        assert_eq!(inspect(&swapped(&block, 4)).cause, Some(Cause::SwappedWords32));
+        assert_eq!(inspect(&[0; 16]).cause, Some(Cause::AllZero));
+        assert_eq!(inspect(&[0xff; 32]).cause, Some(Cause::AllOnes));
+        for size in (0..40).filter(|n| ![16, 32].contains(n)) {
+            let report = inspect(&[0x20; 40][..size]);
+            assert_eq!(report.cause, Some(Cause::OtherSize));
+            assert!(matches!(report.error, Some(Error::Length { .. })) && !report.is_usable);
+        }
+    }
+
+    #[test]
+    fn changes_from_block_to_block() {
+        let first = Command { command_data1: 1_000, ..Command::idle(MacId::new(5).unwrap(), UpdateCounter::ZERO) };
+        let second = Command {
+            command_data1: 1_010,
+            control: ControlBits::SERVO_ON,
+            update_counter: first.update_counter.next(),
+            ..first
+        };
+        let (before, after) = (inspect(&first.emit()), inspect(&second.emit()));
+        let changes: Vec<_> =
+            after.changes(&before).map(|(f, old)| (f.name, old.unwrap().to_string(), f.value.to_string())).collect();
+        let text: Vec<_> = changes.iter().map(|(n, a, b)| (*n, a.as_str(), b.as_str())).collect();
+        assert_eq!(text, [("Update_Counter", "0", "1"), ("Servo_On", "0", "1"), ("Command_Position", "1000", "1010")]);
+        assert_eq!(after.changes(&after).count(), 0);
+        assert_eq!(inspect(&[0; 16]).notes().collect::<Vec<_>>(), [Note::NopIsNotServoOff]);
+    }
+
+    /// The longest list: a profile answer with a sub block.
+    #[test]
+    fn no_field_is_left_out() {
+        let mut block = [0; 32];
+        block[0] = 0x80;
+        block[1] = 0x17;
+        let report = inspect(&block);
+        assert_eq!((report.fields().count(), report.fields().last().unwrap().name), (42, "Sub_Response_Data3"));
+    }
+
+    proptest! {
+        /// Never fails, and agrees with the decoders.
+        #[test]
+        fn any_bytes(bytes in proptest::collection::vec(any::<u8>(), 0..48)) {
+            let report = inspect(&bytes);
+            prop_assert_eq!(report.error, strict(&bytes).err());
+            prop_assert!(report.is_usable || report.error.is_some());
+            prop_assert_eq!(report.changes(&report).count(), 0);
+            if bytes.len() >= LEN {
+                prop_assert!(report.fields().count() >= 5);
+            }
+            for field in report.fields() {
+                prop_assert!(usize::from(field.last) < bytes.len() && field.first <= field.last);
+            }
+        }
+    }
+}

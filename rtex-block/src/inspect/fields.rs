@@ -1,0 +1,302 @@
+use core::fmt;
+
+use crate::{
+    Alarm, Answer, Arguments, Code, CommandBlock, CyclicCode, ErrorCode, Execution, Header, LEN, NonCyclicCode, Reply,
+    Request, ResponseBlock, SubResponse, split32,
+};
+
+/// A value of a field.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum Value {
+    /// A number, shown in decimal.
+    Number(i64),
+    /// A code, shown as hex digits with an `h`.
+    Hex(u16),
+    /// A flag.
+    Bit(bool),
+    /// Bits 6-0 of byte 1.
+    Code(Code),
+    /// Error_Code or Sub_Error_Code.
+    Error(ErrorCode),
+    /// An alarm.
+    Alarm(Alarm),
+    /// Four characters of a text.
+    Text([u8; 4]),
+}
+
+impl fmt::Display for Value {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match *self {
+            Self::Number(number) => write!(f, "{number}"),
+            Self::Hex(code) => write!(f, "{code:02X}h"),
+            Self::Bit(bit) => write!(f, "{}", u8::from(bit)),
+            Self::Code(code) => {
+                write!(f, "{:02X}h {} / ", code.get(), code.cyclic().map_or("undefined", CyclicCode::name))?;
+                f.write_str(code.noncyclic().map_or("undefined", NonCyclicCode::name))
+            }
+            Self::Error(code) => match code.meaning() {
+                Some(meaning) => write!(f, "{code} ({meaning})"),
+                None => write!(f, "{code}"),
+            },
+            Self::Alarm(alarm) => write!(f, "{alarm}"),
+            Self::Text(group) => write!(f, "\"{}\"", group.as_slice().escape_ascii()),
+        }
+    }
+}
+
+/// A field of a block.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Field {
+    /// Its name in the vendor documents.
+    pub name: &'static str,
+    /// Its first byte in the block.
+    pub first: u8,
+    /// Its last byte in the block.
+    pub last: u8,
+    /// What it says.
+    pub value: Value,
+}
+
+/// The most that a block has: 4 of bytes 0-1, 16 flags, 1, 11 of a profile answer, 10 of the sub block.
+const MOST: usize = 42;
+
+/// The fields of a block, in its order.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Fields([Option<Field>; MOST]);
+
+impl Fields {
+    pub(super) fn iter(&self) -> impl Iterator<Item = Field> {
+        self.0.into_iter().flatten()
+    }
+
+    pub(super) fn of(bytes: &[u8]) -> Self {
+        let mut list = List { fields: [None; MOST], len: 0 };
+        let (main, sub) = match split32(bytes) {
+            Ok((main, sub)) => (Some(main), Some(sub)),
+            Err(_) => (bytes.first_chunk::<LEN>(), None),
+        };
+        if let Some(main) = main {
+            if let Ok(block) = CommandBlock::of(main) {
+                list.command(block);
+                if let Some(sub) = sub {
+                    list.sub_command(sub);
+                }
+            } else if let Ok(block) = ResponseBlock::of(main) {
+                list.response(block);
+                if let Some(sub) = sub {
+                    list.sub_response(sub);
+                }
+            }
+        }
+        Self(list.fields)
+    }
+}
+
+struct List {
+    fields: [Option<Field>; MOST],
+    len: usize,
+}
+
+impl List {
+    fn add(&mut self, name: &'static str, first: u8, last: u8, value: Value) {
+        if let Some(place) = self.fields.get_mut(self.len) {
+            *place = Some(Field { name, first, last, value });
+            self.len = self.len.saturating_add(1);
+        }
+    }
+
+    fn word(&mut self, name: &'static str, first: u8, value: i32) {
+        self.add(name, first, first.saturating_add(3), Value::Number(value.into()));
+    }
+
+    fn byte(&mut self, name: &'static str, at: u8, value: u8) {
+        self.add(name, at, at, Value::Hex(value.into()));
+    }
+
+    fn bit(&mut self, name: &'static str, at: u8, value: bool) {
+        self.add(name, at, at, Value::Bit(value));
+    }
+
+    fn header(&mut self, byte0: u8, counter: &'static str, mac_id: &'static str) {
+        let header = Header::from_byte(byte0);
+        self.add(counter, 0, 0, Value::Number(header.update_counter.get().into()));
+        self.add(mac_id, 0, 0, Value::Number(header.mac_id.get().into()));
+    }
+
+    fn command(&mut self, block: CommandBlock<'_>) {
+        self.header(block.bytes()[0], "Update_Counter", "MAC-ID");
+        self.bit("TMG_CNT", 1, block.tmg_cnt());
+        self.add("Command_Code", 1, 1, Value::Code(block.code()));
+        for (bit, name) in crate::ControlBits::NAMED {
+            let [low, _] = bit.to_bytes();
+            self.bit(name, if low == 0 { 3 } else { 2 }, block.control().contains(*bit));
+        }
+        let name = match block.code().cyclic() {
+            Some(CyclicCode::ProfilePosition) => "Target_Position",
+            Some(CyclicCode::CyclicPosition) => "Command_Position",
+            Some(CyclicCode::CyclicVelocity) => "Command_Speed",
+            Some(CyclicCode::CyclicTorque) => "Command_Torque",
+            Some(CyclicCode::Nop) | None => "Command_Data1",
+        };
+        self.word(name, 4, block.command_data1());
+        if let Some(code) = block.code().noncyclic() {
+            self.request(&Request::from_bytes(code, block.noncyclic_bytes()));
+        }
+    }
+
+    fn request(&mut self, request: &Request) {
+        match *request {
+            Request::Normal { command_data2, command_data3 } => {
+                self.word("Command_Data2", 8, command_data2);
+                self.word("Command_Data3", 12, command_data3);
+            }
+            Request::Reset(a) | Request::SystemId(a) | Request::Alarm(a) | Request::Monitor(a) => {
+                self.arguments(a, "Command_Data3");
+            }
+            Request::Parameter(a) => self.arguments(a, "Setting_Data"),
+            Request::Homing { type_code, latch_sel1, latch_sel2, monitor_sel, setting_data } => {
+                self.byte("Type_Code", 8, type_code);
+                self.byte("Latch_Sel1", 10, latch_sel1.get());
+                self.byte("Latch_Sel2", 10, latch_sel2.get());
+                self.byte("Monitor_Sel", 11, monitor_sel);
+                self.word("Setting_Data", 12, setting_data);
+            }
+            Request::Profile { type_code, latch_sel1, monitor_sel, target_speed } => {
+                self.byte("Type_Code", 8, type_code);
+                self.byte("Latch_Sel1", 10, latch_sel1.get());
+                self.byte("Monitor_Sel", 11, monitor_sel);
+                self.word("Target_Speed", 12, target_speed);
+            }
+        }
+    }
+
+    fn arguments(&mut self, a: Arguments, data: &'static str) {
+        self.add("Type_Code", 8, 9, Value::Hex(a.type_code.get()));
+        self.add("Index", 10, 11, Value::Hex(a.index));
+        self.word(data, 12, a.data);
+    }
+
+    fn response(&mut self, block: ResponseBlock<'_>) {
+        self.header(block.bytes()[0], "Update_Counter_Echo", "Actual_MAC-ID");
+        self.bit("CMD_Error", 1, block.cmd_error());
+        self.add("Command_Code_Echo", 1, 1, Value::Code(block.code()));
+        for (bit, name) in crate::StatusFlags::NAMED {
+            let [low, _] = bit.to_bytes();
+            self.bit(name, if low == 0 { 3 } else { 2 }, block.status().contains(*bit));
+        }
+        self.word("Response_Data1", 4, block.response_data1());
+        self.answer(&block.answer());
+    }
+
+    fn answer(&mut self, answer: &Answer) {
+        match *answer {
+            Answer::CommandError(code) => self.add("Error_Code", 8, 9, Value::Error(code)),
+            Answer::Normal { response_data2, response_data3 } => {
+                self.word("Response_Data2", 8, response_data2);
+                self.word("Response_Data3", 12, response_data3);
+            }
+            Answer::Reset(r) | Answer::Parameter(r) | Answer::Monitor(r) => {
+                self.reply(r);
+                self.word("Monitor_Data", 12, r.data);
+            }
+            Answer::SystemId(r) => {
+                self.reply(r);
+                self.add("ASCII", 12, 15, Value::Text(r.characters()));
+            }
+            Answer::Alarm(r) => {
+                let (alarm, warning) = r.alarm();
+                self.reply(r);
+                self.add("Alarm_Code", 12, 13, Value::Alarm(alarm));
+                self.add("Warning_Code", 14, 15, Value::Hex(warning));
+            }
+            Answer::Homing {
+                execution,
+                type_code,
+                latch_comp1,
+                latch_comp2,
+                latch_sel1,
+                latch_sel2,
+                monitor_sel,
+                monitor_data,
+            } => {
+                self.byte("Type_Code_Echo", 8, type_code);
+                self.execution(execution);
+                self.bit("Latch_Comp2", 9, latch_comp2);
+                self.bit("Latch_Comp1", 9, latch_comp1);
+                self.byte("Latch_Sel2_Echo", 10, latch_sel2.get());
+                self.byte("Latch_Sel1_Echo", 10, latch_sel1.get());
+                self.byte("Monitor_Sel_Echo", 11, monitor_sel);
+                self.word("Monitor_Data", 12, monitor_data);
+            }
+            Answer::Profile {
+                execution,
+                type_code,
+                psl,
+                nsl,
+                near,
+                latch_comp1,
+                latch_sel1,
+                monitor_sel,
+                monitor_data,
+            } => {
+                self.byte("Type_Code_Echo", 8, type_code);
+                self.execution(execution);
+                self.bit("PSL", 9, psl);
+                self.bit("NSL", 9, nsl);
+                self.bit("NEAR", 9, near);
+                self.bit("Latch_Comp1", 9, latch_comp1);
+                self.byte("Latch_Sel1_Echo", 10, latch_sel1.get());
+                self.byte("Monitor_Sel_Echo", 11, monitor_sel);
+                self.word("Monitor_Data", 12, monitor_data);
+            }
+            Answer::Undefined { bytes: [b8, b9, b10, b11, data @ ..], .. } => {
+                self.word("bytes 8-11", 8, i32::from_le_bytes([b8, b9, b10, b11]));
+                self.word("bytes 12-15", 12, i32::from_le_bytes(data));
+            }
+        }
+    }
+
+    fn reply(&mut self, reply: Reply) {
+        self.add("Type_Code_Echo", 8, 9, Value::Hex(reply.type_code.get()));
+        self.execution(reply.execution);
+        self.add("Index_Echo", 10, 11, Value::Hex(reply.index));
+    }
+
+    fn execution(&mut self, execution: Execution) {
+        self.bit("ERR", 9, execution.err);
+        self.bit("WNG", 9, execution.wng);
+        self.bit("Busy", 9, execution.busy);
+    }
+
+    fn sub_command(&mut self, sub: &[u8; LEN]) {
+        let like = SubResponse::from_bytes(sub);
+        // The flags of a response are where a command has Sub_Chk and reserved bits.
+        self.bit("Sub_Chk", 16, like.cmd_error);
+        self.byte("Sub_Command_Code", 16, like.code.get());
+        self.byte("Sub_Type_Code", 17, like.type_code);
+        self.add("Sub_Index", 18, 19, Value::Hex(like.index));
+        self.word("Sub_Command_Data1", 20, like.data1);
+        self.word("Sub_Command_Data2", 24, like.data2);
+        self.word("Sub_Command_Data3", 28, like.data3);
+    }
+
+    fn sub_response(&mut self, sub: &[u8; LEN]) {
+        let sub = SubResponse::from_bytes(sub);
+        self.bit("Sub_CMD_Err", 16, sub.cmd_error);
+        self.bit("Sub_ERR", 16, sub.execution.err);
+        self.bit("Sub_WNG", 16, sub.execution.wng);
+        self.bit("Sub_Busy", 16, sub.execution.busy);
+        self.byte("Sub_Command_Code_Echo", 16, sub.code.get());
+        self.byte("Sub_Type_Code_Echo", 17, sub.type_code);
+        match sub.error_code() {
+            Some(code) => self.add("Sub_Error_Code", 18, 19, Value::Error(code)),
+            None => self.add("Sub_Index_Echo", 18, 19, Value::Hex(sub.index)),
+        }
+        self.word("Sub_Response_Data1", 20, sub.data1);
+        self.word("Sub_Response_Data2", 24, sub.data2);
+        self.word("Sub_Response_Data3", 28, sub.data3);
+    }
+}

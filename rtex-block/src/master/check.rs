@@ -1,0 +1,69 @@
+use crate::{BlockSize, Code, Error, ErrorCode, MacId, Response, UpdateCounter, split32};
+
+/// What the response to a command should say.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Expected {
+    /// 16- or 32-byte blocks.
+    pub size: BlockSize,
+    /// The drive.
+    pub mac_id: MacId,
+    /// Counter of the command last sent.
+    pub update_counter: UpdateCounter,
+    /// Code of the command last sent.
+    pub code: Code,
+}
+
+/// What a response of the right drive tells about the command last sent.
+///
+/// The first two are no faults by themselves: the counter comes back with the next reception, the code one
+/// command later, so the usual pair is (code N - 1, counter N). SX-DSV02310, "Update timing".
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub enum Reception {
+    /// The counter is not the one last sent.
+    CounterNotEchoed,
+    /// The code is not the one last sent.
+    CodeNotYetEchoed,
+    /// CMD_Error: the command was not accepted.
+    CommandError(ErrorCode),
+    /// All echoes are there and the command was accepted.
+    Accepted,
+}
+
+impl Expected {
+    /// Makes the checks that a master can make, in this order: length, C/R, MAC-ID; then counter, code, CMD_Error.
+    ///
+    /// There is no check sum in a block. A flipped bit anywhere but in these fields is not noticed: of a 16-byte
+    /// response that is 112 of 128 bits.
+    ///
+    /// # Errors
+    /// [`Error::Length`], [`Error::Direction`] or [`Error::MacId`]: nothing of such a block may be used.
+    pub const fn check(&self, bytes: &[u8]) -> Result<(Response, Reception), Error> {
+        let parsed = match self.size {
+            BlockSize::Bytes16 => Response::parse(bytes),
+            BlockSize::Bytes32 => match split32(bytes) {
+                Ok((main, _)) => Response::parse(main),
+                Err(e) => Err(e),
+            },
+        };
+        let response = match parsed {
+            Ok(response) => response,
+            Err(e) => return Err(e),
+        };
+        if response.mac_id.get() != self.mac_id.get() {
+            return Err(Error::MacId { got: response.mac_id.get(), want: self.mac_id.get() });
+        }
+        let reception = if response.update_counter_echo.get() != self.update_counter.get() {
+            Reception::CounterNotEchoed
+        } else if response.code.get() != self.code.get() {
+            Reception::CodeNotYetEchoed
+        } else if let crate::Answer::CommandError(code) = response.answer() {
+            Reception::CommandError(code)
+        } else {
+            Reception::Accepted
+        };
+        Ok((response, reception))
+    }
+}

@@ -1,0 +1,80 @@
+use crate::{Command, ControlBits, CyclicCode, LEN, MacId, UpdateCounter};
+
+/// The cyclic codes with which a drive looks at Servo_On: all but NOP.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "arbitrary", derive(arbitrary::Arbitrary))]
+pub enum ActiveCode {
+    /// PP.
+    ProfilePosition,
+    /// CP.
+    CyclicPosition,
+    /// CV.
+    CyclicVelocity,
+    /// CT.
+    CyclicTorque,
+}
+
+impl ActiveCode {
+    /// As a cyclic code.
+    pub const fn cyclic(self) -> CyclicCode {
+        match self {
+            Self::ProfilePosition => CyclicCode::ProfilePosition,
+            Self::CyclicPosition => CyclicCode::CyclicPosition,
+            Self::CyclicVelocity => CyclicCode::CyclicVelocity,
+            Self::CyclicTorque => CyclicCode::CyclicTorque,
+        }
+    }
+}
+
+/// A command that switches a servo off, whatever the drive did before.
+///
+/// A block of zeros does not: its code is NOP, with which a drive ignores Servo_On and goes on with the command
+/// before it. A value of this type always has Servo_On = 0 and a code of the drive's modes, so clearing the
+/// transmit memory can be replaced by sending one of these to each axis. SX-DSV02310, "NOP command".
+///
+/// ```
+/// use rtex_block::{Command, CommandBlock, ControlBits, CyclicCode, MacId, UpdateCounter, master::ServoOff};
+/// let mac_id = MacId::new(5).unwrap();
+/// let before = Command { control: ControlBits::SERVO_ON, ..Command::idle(mac_id, UpdateCounter::ZERO) };
+/// let off = ServoOff::after(&before).unwrap();
+/// assert_eq!(off.emit()[..4], [0x25, 0x20, 0x00, 0x00]);
+///
+/// assert_eq!(ServoOff::after(&Command::nop(mac_id)), None);
+/// assert!(!CommandBlock::of(&[0; 16]).unwrap().is_servo_off());
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct ServoOff(Command);
+
+impl ServoOff {
+    /// Servo off with nothing else in the block.
+    pub const fn new(mac_id: MacId, update_counter: UpdateCounter, code: ActiveCode) -> Self {
+        Self(Command { cyclic: code.cyclic(), ..Command::idle(mac_id, update_counter) })
+    }
+
+    /// The command after `before`: counter one on, Servo_On cleared, everything else kept.
+    ///
+    /// `None` if a drive would not look at Servo_On in it: the code is NOP, or a pair it does not accept.
+    pub const fn after(before: &Command) -> Option<Self> {
+        if matches!(before.cyclic, CyclicCode::Nop) || !before.code().is_allowed() {
+            return None;
+        }
+        Some(Self(Command {
+            update_counter: before.update_counter.next(),
+            control: before.control.without(ControlBits::SERVO_ON),
+            ..*before
+        }))
+    }
+
+    /// As a command.
+    pub const fn command(&self) -> &Command {
+        &self.0
+    }
+
+    /// The block.
+    pub const fn emit(&self) -> [u8; LEN] {
+        self.0.emit()
+    }
+}

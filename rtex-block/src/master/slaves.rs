@@ -1,0 +1,80 @@
+use crate::MacId;
+
+/// One entry of the slave information table.
+///
+/// That it holds the MAC-ID and the kind of slave follows from the name of the error; the vendor's layout and
+/// its values of the kind could not be read, so the kind is a plain number that is only compared.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "arbitrary", derive(arbitrary::Arbitrary))]
+pub struct Slave {
+    /// Its address.
+    pub mac_id: MacId,
+    /// What it is.
+    pub kind: u16,
+}
+
+/// Outcome of the comparison of the slaves found with the table.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "arbitrary", derive(arbitrary::Arbitrary))]
+pub enum SlaveInfo {
+    /// All as in the table.
+    Match,
+    /// One is missing, too many, of another kind, or a MAC-ID is there twice.
+    Mismatch,
+}
+
+/// Whether the order along the ring matters; the guide does not say.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum Order {
+    /// The table lists the slaves in the order of the ring.
+    Ring,
+    /// The slaves may be wired in any order.
+    Any,
+}
+
+/// Compares the slaves found on the ring with the table.
+pub fn compare(table: &[Slave], found: &[Slave], order: Order) -> SlaveInfo {
+    let mut seen = 0_u32;
+    let unique = found.iter().all(|slave| {
+        let bit = 1_u32.wrapping_shl(slave.mac_id.get().into());
+        let new = seen & bit == 0;
+        seen |= bit;
+        new
+    });
+    let same = table.len() == found.len()
+        && match order {
+            Order::Ring => table == found,
+            Order::Any => table.iter().all(|slave| found.contains(slave)),
+        };
+    if unique && same { SlaveInfo::Match } else { SlaveInfo::Mismatch }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn slave(mac_id: u8, kind: u16) -> Slave {
+        Slave { mac_id: MacId::new(mac_id).unwrap(), kind }
+    }
+
+    #[test]
+    fn every_difference_is_a_mismatch() {
+        let table = [slave(0, 1), slave(31, 1), slave(7, 2)];
+        let turned = [table[2], table[0], table[1]];
+        assert_eq!(compare(&table, &table, Order::Ring), SlaveInfo::Match);
+        assert_eq!(compare(&table, &turned, Order::Ring), SlaveInfo::Mismatch);
+        assert_eq!(compare(&table, &turned, Order::Any), SlaveInfo::Match);
+        for found in [&table[..2], &[table[0], table[1], table[1]], &[table[0], table[1], slave(7, 3)]] {
+            for order in [Order::Ring, Order::Any] {
+                assert_eq!(compare(&table, found, order), SlaveInfo::Mismatch, "{found:?}");
+            }
+        }
+        let twice = [table[0], table[0]];
+        assert_eq!(compare(&twice, &twice, Order::Any), SlaveInfo::Mismatch);
+    }
+}

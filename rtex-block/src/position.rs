@@ -1,0 +1,79 @@
+//! Command positions: 32-bit numbers that wrap.
+
+/// Step from one position to the next, the short way round: 7FFFFFFFh to 80000000h is a step of +1.
+///
+/// SX-DSV02310, "Command error protection".
+pub const fn step(old: i32, new: i32) -> i32 {
+    new.wrapping_sub(old)
+}
+
+/// Electronic gear: encoder pulses a command unit.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Gear {
+    numerator: u32,
+    denominator: u32,
+}
+
+impl Gear {
+    /// 1/1.
+    pub const UNITY: Self = Self { numerator: 1, denominator: 1 };
+
+    /// `None` if either is 0.
+    pub const fn new(numerator: u32, denominator: u32) -> Option<Self> {
+        if numerator == 0 || denominator == 0 { None } else { Some(Self { numerator, denominator }) }
+    }
+}
+
+/// Largest rate of command pulses behind the electronic gear, pulses per second.
+pub const MAX_PULSES_PER_S: u32 = 400_000_000;
+
+/// Largest step of the command position in an update period, command units, rounded down.
+///
+/// A larger one is alarm Err27.4; so is one above the over-speed level of the drive, which is lower as a rule.
+/// At gear 1/1 and 0.5 ms it is 200 000. SX-DSV02310, "Command error protection".
+#[expect(clippy::cast_possible_truncation, reason = "clamped just before")]
+pub const fn max_step(update_ns: u32, gear: Gear) -> u32 {
+    // 400 M pulse/s x update_ns / 1e9 is update_ns x 2/5; 33 + 32 bits.
+    let pulses = (update_ns as u128).wrapping_mul(2).wrapping_mul(gear.denominator as u128);
+    let per_unit = (gear.numerator as u128).wrapping_mul(5);
+    let Some(steps) = pulses.checked_div(per_unit) else { return 0 };
+    if steps > u32::MAX as u128 { u32::MAX } else { steps as u32 }
+}
+
+/// Whether a step stays within [`max_step`].
+pub const fn is_within_limit(step: i32, update_ns: u32, gear: Gear) -> bool {
+    step.unsigned_abs() <= max_step(update_ns, gear)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    #[test]
+    fn published_figures() {
+        for (update_ns, want) in [(62_500, 25_000), (500_000, 200_000), (4_000_000, 1_600_000)] {
+            assert_eq!(max_step(update_ns, Gear::UNITY), want);
+        }
+        assert_eq!(max_step(500_000, Gear::new(2, 1).unwrap()), 100_000);
+        assert_eq!(max_step(u32::MAX, Gear::new(1, u32::MAX).unwrap()), u32::MAX);
+        assert_eq!(Gear::new(0, 1), None);
+        assert_eq!(Gear::new(1, 0), None);
+    }
+
+    proptest! {
+        #[test]
+        fn steps_add_up(old: i32, by: i32) {
+            prop_assert_eq!(step(old, old.wrapping_add(by)), by);
+        }
+
+        /// By the definition of the limit, in rationals.
+        #[test]
+        fn limit_by_definition(s: i32, update_ns in 1u32..10_000_000, n in 1u32..1000, d in 1u32..1000) {
+            let left = u128::from(s.unsigned_abs()) * u128::from(n) * 1_000_000_000;
+            let right = u128::from(MAX_PULSES_PER_S) * u128::from(update_ns) * u128::from(d);
+            prop_assert_eq!(is_within_limit(s, update_ns, Gear::new(n, d).unwrap()), left <= right);
+        }
+    }
+}

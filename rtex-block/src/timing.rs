@@ -1,0 +1,190 @@
+//! Periods, timers and the time a frame takes.
+
+/// A pair of communication and update period with the drive parameters that choose it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Periods {
+    /// Communication period: one exchange of frames, ns.
+    pub com_ns: u32,
+    /// Update period of the commands, ns: one or two communication periods.
+    pub update_ns: u32,
+    /// Whether the pair works with the internal-timer system, which needs one communication period an update.
+    pub internal_timer: bool,
+}
+
+impl Periods {
+    const fn of(com_ns: u32, per_update: u32, internal_timer: bool) -> Self {
+        Self { com_ns, update_ns: com_ns.wrapping_mul(per_update), internal_timer }
+    }
+
+    /// Communication periods in an update period, Pr7.21.
+    pub const fn communications(&self) -> u32 {
+        match self.update_ns.checked_div(self.com_ns) {
+            Some(n) => n,
+            None => 0,
+        }
+    }
+
+    /// Pr7.20, Pr7.21 and Pr7.91 of an A6N drive for this pair: -1, the communications an update, and the
+    /// communication period in ns.
+    pub const fn a6n_parameters(&self) -> (i32, u32, u32) {
+        (-1, self.communications(), self.com_ns)
+    }
+
+    /// The pair that an A6N drive uses with these parameters; `None` if the guide's table does not list it.
+    ///
+    /// Not listed does not mean known to be bad. Pr7.91 is looked at only if Pr7.20 is -1 (inferred; the table
+    /// gives Pr7.20 = 3 and 6 without it).
+    pub fn from_a6n(pr7_20: i32, pr7_21: i32, pr7_91: Option<i64>) -> Option<Self> {
+        let com_ns = match (pr7_20, pr7_21) {
+            (-1, _) => u32::try_from(pr7_91?).ok()?,
+            (3, 1 | 2) => 500_000,
+            (6, 1) => 1_000_000,
+            _ => return None,
+        };
+        let per_update = u32::try_from(pr7_21).ok()?;
+        A6N.into_iter().find(|p| p.com_ns == com_ns && p.communications() == per_update)
+    }
+}
+
+/// The period table of the A6N family, from the longest update period. System Design Guide for Master, "Setting of
+/// the communication period and the update period".
+pub const A6N: [Periods; 11] = [
+    Periods::of(2_000_000, 2, false),
+    Periods::of(2_000_000, 1, true),
+    Periods::of(1_000_000, 2, false),
+    Periods::of(1_000_000, 1, true),
+    Periods::of(500_000, 2, false),
+    Periods::of(500_000, 1, true),
+    Periods::of(250_000, 2, false),
+    Periods::of(250_000, 1, true),
+    Periods::of(125_000, 2, false),
+    Periods::of(125_000, 1, true),
+    Periods::of(62_500, 2, false),
+];
+
+/// Who gives the rhythm.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum TimerSystem {
+    /// A timer of the host drives XTXTIM at the communication period and, divided, the NC interrupt at the update
+    /// period. The receive interrupt (XINTRX) switches the memory bank and has priority **above** the NC interrupt.
+    External,
+    /// The ASIC's own timer; the NC interrupt comes from XSYNC at the start of transmission. The receive interrupt,
+    /// if used, clears a watchdog and has priority **below** it.
+    Internal,
+}
+
+impl TimerSystem {
+    /// Whether a pair of periods works with this system.
+    pub const fn allows(self, periods: &Periods) -> bool {
+        match self {
+            Self::External => true,
+            Self::Internal => periods.internal_timer,
+        }
+    }
+
+    /// Whether the receive interrupt goes before the NC interrupt.
+    pub const fn reception_first(self) -> bool {
+        matches!(self, Self::External)
+    }
+}
+
+/// Reload value of a timer that counts `timer_hz` and starts again after `period_ns`: ticks less one.
+///
+/// `None` if the period is not a whole number of ticks, or the value exceeds 32 bits. 50 MHz and 0.5 ms give
+/// 24999, the guide's own example.
+pub fn timer_reload(timer_hz: u32, period_ns: u32) -> Option<u32> {
+    const NS_PER_S: u64 = 1_000_000_000;
+    let scaled = u64::from(timer_hz).checked_mul(period_ns.into())?;
+    if scaled.checked_rem(NS_PER_S)? != 0 {
+        return None;
+    }
+    u32::try_from(scaled.checked_div(NS_PER_S)?.checked_sub(1)?).ok()
+}
+
+/// An estimate of how long a frame takes, as a straight line through two points.
+///
+/// The guide publishes about 11 us with one axis and about 300 us with 32; everything between is an assumption,
+/// the vendor's own limits of axes per period are not known, and blocks of 32 bytes take longer. Put in measured
+/// times where there are any.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct FrameTime {
+    /// With one axis, ns.
+    pub one_ns: u32,
+    /// With 32 axes, ns.
+    pub full_ns: u32,
+}
+
+impl FrameTime {
+    /// The guide's two figures.
+    pub const GUIDE: Self = Self { one_ns: 11_000, full_ns: 300_000 };
+    /// Axes on a full ring.
+    const FULL: u32 = 32;
+    /// Steps from one axis to a full ring.
+    const STEPS: u64 = 31;
+
+    /// Estimated time with `axes` axes, ns, rounded; axes count from 1 to 32 and are held at the ends.
+    pub fn estimate_ns(self, axes: u32) -> u64 {
+        let more = u64::from(axes.clamp(1, Self::FULL).saturating_sub(1));
+        let rise = more.saturating_mul(self.rise()).saturating_mul(2).saturating_add(Self::STEPS);
+        u64::from(self.one_ns).saturating_add(rise.checked_div(2 * Self::STEPS).unwrap_or(0))
+    }
+
+    /// Axes that fit a communication period by this line, at most 32; 0 if not even one does.
+    pub fn axes_within(self, com_ns: u32) -> u32 {
+        let Some(room) = com_ns.checked_sub(self.one_ns) else { return 0 };
+        let steps = u64::from(room).saturating_mul(Self::STEPS).checked_div(self.rise()).unwrap_or(u64::MAX);
+        u32::try_from(steps).unwrap_or(u32::MAX).saturating_add(1).min(Self::FULL)
+    }
+
+    fn rise(self) -> u64 {
+        u64::from(self.full_ns.saturating_sub(self.one_ns))
+    }
+}
+
+impl Default for FrameTime {
+    fn default() -> Self {
+        Self::GUIDE
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_table_agrees_with_its_parameters() {
+        for periods in A6N {
+            let (pr7_20, pr7_21, pr7_91) = periods.a6n_parameters();
+            assert_eq!(Periods::from_a6n(pr7_20, i32::try_from(pr7_21).unwrap(), Some(pr7_91.into())), Some(periods));
+            assert_eq!(periods.update_ns, periods.com_ns * pr7_21);
+            assert_eq!(TimerSystem::Internal.allows(&periods), pr7_21 == 1);
+        }
+        assert_eq!(Periods::from_a6n(3, 2, None).map(|p| p.update_ns), Some(1_000_000));
+        assert_eq!(Periods::from_a6n(6, 2, None), None);
+        assert_eq!(Periods::from_a6n(-1, 1, None), None);
+        assert_eq!(Periods::from_a6n(-1, 1, Some(62_500)), None);
+    }
+
+    #[test]
+    fn the_guides_timer_example() {
+        assert_eq!(timer_reload(50_000_000, 500_000), Some(0x61a7));
+        assert_eq!(timer_reload(25_000_000, 62_500), None);
+        assert_eq!(timer_reload(0, 500_000), None);
+        assert_eq!(timer_reload(u32::MAX, u32::MAX), None);
+    }
+
+    /// The line goes through its two points and never decreases; the inverse agrees with it.
+    #[test]
+    fn frame_time_line() {
+        let line = FrameTime::GUIDE;
+        assert_eq!((line.estimate_ns(1), line.estimate_ns(32), line.estimate_ns(99)), (11_000, 300_000, 300_000));
+        for com_ns in [0, 10_999, 11_000, 62_500, 83_333, 125_000, 166_666, 250_000, 299_999, 300_000, u32::MAX] {
+            let axes = line.axes_within(com_ns);
+            assert!(axes == 0 || line.estimate_ns(axes) <= u64::from(com_ns));
+            assert!(axes == 32 || line.estimate_ns(axes + 1) > u64::from(com_ns) || axes == 0);
+        }
+    }
+}

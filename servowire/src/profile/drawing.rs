@@ -1,0 +1,149 @@
+//! Speed, acceleration and step time of a move as SVG.
+
+use std::error::Error;
+use std::ops::Range;
+
+use plotters::prelude::*;
+use step_profile::{MoveState, Profile};
+
+use super::{Stretch, stretches};
+
+type Points = Vec<(f64, f64)>;
+
+/// What a drawing has along: milliseconds or steps.
+type Along = fn(&Stretch) -> Range<f64>;
+
+fn speed(stretches: &[Stretch], along: Along) -> Points {
+    let level = |s: &Stretch| [(along(s).start, s.khz()), (along(s).end, s.khz())];
+    let end = stretches.last().map_or(0.0, |last| along(last).end);
+    [(0.0, 0.0)].into_iter().chain(stretches.iter().flat_map(level)).chain([(end, 0.0)]).collect()
+}
+
+fn step_time(stretches: &[Stretch], along: Along) -> Points {
+    let us = |s: &Stretch| f64::from(s.first.t_step) / 1e3;
+    stretches.iter().flat_map(|s| [(along(s).start, us(s)), (along(s).end, us(s))]).collect()
+}
+
+/// In 10³ steps/s², from the middle of a ramp entry to the middle of the next. Full speed counts as an entry at either
+/// end, and as no acceleration between them.
+fn acceleration(stretches: &[Stretch], k: u32, along: Along) -> Points {
+    // Half an entry, in the unit of `range`.
+    let half = |s: &Stretch, range: &Range<f64>| {
+        let steps = s.steps();
+        (range.end - range.start) * f64::min(1.0, f64::from(k) / (steps.end - steps.start)) / 2.0
+    };
+    let mut points = Points::new();
+    let (mut left, mut left_ms, mut khz) = (0.0, 0.0, 0.0);
+    // kHz / ms = 10⁶ steps/s²
+    let mut slope =
+        |from: f64, to: f64, rise: f64, ms: f64| points.extend([(from, rise / ms * 1e3), (to, rise / ms * 1e3)]);
+    for stretch in stretches {
+        let range = along(stretch);
+        let (half, half_ms) = (half(stretch, &range), half(stretch, &stretch.ms));
+        slope(left, range.start + half, stretch.khz() - khz, stretch.ms.start + half_ms - left_ms);
+        if stretch.first.state == MoveState::Constant {
+            slope(range.start + half, range.end - half, 0.0, 1.0);
+        }
+        (left, left_ms, khz) = (range.end - half, stretch.ms.end - half_ms, stretch.khz());
+    }
+    if let Some(last) = stretches.last() {
+        slope(left, along(last).end, -khz, last.ms.end - left_ms);
+    }
+    points
+}
+
+/// The whole move over time on the left, the ramp up over its steps on the right.
+pub(super) fn svg(profile: Profile<'_>, steps: u32) -> Result<String, Box<dyn Error>> {
+    let stretches = stretches(profile, steps);
+    let k = profile.parameters().steps_per_entry;
+    let title = format!(
+        "{steps} steps at {:.3} kHz, {k} steps a ramp entry: {:.3} ms",
+        65_536_000.0 / f64::from(profile.parameters().speed.raw()),
+        profile.duration_ns(steps) as f64 / 1e6
+    );
+    let mut drawing = String::new();
+    let root = SVGBackend::with_string(&mut drawing, (1200, 1000)).into_drawing_area();
+    root.fill(&WHITE)?;
+    let (left, right) = root.titled(&title, ("sans-serif", 22))?.split_horizontally(640);
+    let end = stretches.last().map_or(1.0, |last| last.ms.end);
+    let up = f64::from(profile.shape(steps).accelerating.max(1)) * 1.05;
+    let sides: [(_, Along, _, _); 2] = [
+        (left, |stretch| stretch.ms.clone(), end, "time [ms]"),
+        (right, Stretch::steps, f64::min(up, f64::from(steps.max(1))), "ramp up [steps]"),
+    ];
+    for (side, along, until, x) in sides {
+        let areas = side.split_evenly((3, 1));
+        let [top, middle, bottom] = areas.as_slice() else { continue };
+        plot(top, (x, "speed [kHz]"), speed(&stretches, along), until, false)?;
+        plot(middle, (x, "acceleration [10³ steps/s²]"), acceleration(&stretches, k, along), until, false)?;
+        plot(bottom, (x, "step time [µs]"), step_time(&stretches, along), until, true)?;
+    }
+    root.present()?;
+    drop(root);
+    Ok(drawing)
+}
+
+type Area<'a> = DrawingArea<SVGBackend<'a>, plotters::coord::Shift>;
+
+/// `points` up to `until`.
+fn plot(
+    area: &Area<'_>,
+    (x, y): (&str, &str),
+    mut points: Points,
+    until: f64,
+    logarithmic: bool,
+) -> Result<(), Box<dyn Error>> {
+    points.retain(|(at, _)| *at <= until);
+    if let Some((_, value)) = points.last().copied() {
+        points.push((until, value));
+    }
+    let values = || points.iter().map(|(_, value)| *value);
+    let (low, high) = (values().fold(f64::MAX, f64::min), values().fold(1e-3, f64::max));
+    let mut chart = ChartBuilder::on(area);
+    chart.margin(12).x_label_area_size(38).y_label_area_size(76);
+    let line = LineSeries::new(points, BLUE.stroke_width(2));
+    // The two kinds of axes are of different types, so the few calls are there twice.
+    if logarithmic {
+        let mut chart = chart.build_cartesian_2d(0.0..until, (low.min(high) * 0.8..high * 1.25).log_scale())?;
+        chart.configure_mesh().max_light_lines(0).x_desc(x).y_desc(y).label_style(("sans-serif", 13)).draw()?;
+        chart.draw_series(line)?;
+    } else {
+        let mut chart = chart.build_cartesian_2d(0.0..until, low.min(0.0) * 1.08..high * 1.08)?;
+        chart.configure_mesh().max_light_lines(0).x_desc(x).y_desc(y).label_style(("sans-serif", 13)).draw()?;
+        chart.draw_series(line)?;
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use step_profile::{Parameters, Speed};
+
+    fn profile(hz: u32, steps_per_entry: u32) -> Profile<'static> {
+        Profile::new(Parameters { steps_per_entry, ..Parameters::at(Speed::from_hz(hz).unwrap()) }).unwrap()
+    }
+
+    #[test]
+    fn every_move_can_be_drawn() {
+        for (hz, k, steps) in [(94_570, 20, 23_642), (250_000, 1, 64), (100, 1, 1), (1000, 1, 0)] {
+            let svg = svg(profile(hz, k), steps).unwrap();
+            assert!(svg.starts_with("<svg") && svg.trim_end().ends_with("</svg>"), "{steps} steps");
+            assert!(!svg.contains("NaN") && !svg.contains("inf"), "{steps} steps");
+            for text in ["speed [kHz]", "acceleration", "step time", "ramp up"] {
+                assert!(svg.contains(text), "{steps} steps: {text}");
+            }
+        }
+    }
+
+    /// The area under the acceleration is the speed: nothing in between, as much down as up.
+    #[test]
+    fn accelerations_add_up() {
+        let stretches = stretches(profile(94_570, 20), 9000);
+        let area = |points: &[(f64, f64)]| points.windows(2).map(|w| (w[1].0 - w[0].0) * w[0].1 / 1e3).sum::<f64>();
+        let points = acceleration(&stretches, 20, |stretch| stretch.ms.clone());
+        let up: Points = points.iter().copied().take_while(|p| p.1 >= 0.0).collect();
+        assert!((area(&up) - 94.57).abs() < 0.1, "{}", area(&up));
+        assert!(area(&points).abs() < 1e-6, "{}", area(&points));
+    }
+}

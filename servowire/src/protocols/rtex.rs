@@ -1,0 +1,193 @@
+//! Panasonic RTEX: logs of data blocks, command and response.
+//!
+//! The first block of a drive is shown whole (flags that are 0 and numbers that are 0 left out), of each later one what
+//! changed since the block of the same drive and direction before it. The counter is only mentioned where it does
+//! not stand still or go on by one.
+
+use std::borrow::Cow;
+use std::collections::HashMap;
+
+use rtex_block::inspect::{self, Report, inspect};
+use rtex_block::{Error, ErrorClass, Header};
+
+use crate::capture::Capture;
+use crate::capture::hexlog::Burst;
+use crate::event::{Direction, Event, Field, Place, Position, Refusal, Value, Verdict};
+use crate::fault::{At, Fault};
+use crate::line::Stop;
+use crate::output::{Output, Sink};
+
+/// What the blocks do not tell.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Settings {
+    /// Bytes of a block, 16 or 32.
+    pub block_size: usize,
+    /// Only the blocks of this drive.
+    pub mac_id: Option<u8>,
+}
+
+impl Default for Settings {
+    fn default() -> Self {
+        Self { block_size: rtex_block::LEN, mac_id: None }
+    }
+}
+
+/// Decodes a log of blocks.
+pub(super) fn decode(file: &str, capture: Capture, settings: &Settings, out: &mut Output<'_>) -> Result<(), Stop> {
+    let Capture::Bytes(mut log) = capture else {
+        let what = "RTEX blocks are read from logs of bytes: hex digits with --bytes, binary with --record-size";
+        return Err(Fault::new(file, At::File, what).into());
+    };
+    let mut decoder = Decoder { settings: *settings, last: HashMap::new() };
+    while let Some(burst) = log.burst()? {
+        out.tick();
+        for block in burst.bytes.chunks(settings.block_size.max(1)) {
+            if let Some(event) = decoder.block(&burst, block) {
+                out.event(&event)?;
+            }
+        }
+    }
+    Ok(())
+}
+
+struct Decoder {
+    settings: Settings,
+    /// The last block of a direction and a MAC-ID: byte 0 without the counter.
+    last: HashMap<u8, Report>,
+}
+
+impl Decoder {
+    fn block(&mut self, burst: &Burst, block: &[u8]) -> Option<Event> {
+        let header = Header::from_byte(block.first().copied()?);
+        if self.settings.mac_id.is_some_and(|only| only != header.mac_id.get()) {
+            return None;
+        }
+        let report = inspect(block);
+        let mut fields = Vec::new();
+        if report.is_usable {
+            let before = self.last.insert(header.to_byte() & 0x9f, report);
+            match before {
+                Some(before) => changed(&report, &before, &mut fields),
+                None => whole(&report, block, &mut fields),
+            }
+            notes(&report, &mut fields);
+        } else {
+            let text = block.iter().map(|byte| format!("{byte:02X}")).collect::<Vec<_>>().join(" ");
+            fields.push(Field { name: "bytes", value: Value::Text(text) });
+        }
+        let (direction, word) = if header.response { (Direction::Answer, "rsp") } else { (Direction::Request, "cmd") };
+        Some(Event {
+            place: Place::Line(burst.line),
+            direction: Some(direction),
+            kind: Cow::Owned(format!("{word} {}", header.mac_id)),
+            fields,
+            position: self.position(&report),
+            delay: None,
+            verdict: verdict(&report),
+        })
+    }
+
+    /// The actual position, where only one drive is looked at: the figures are made for one axis.
+    fn position(&self, report: &Report) -> Option<Position> {
+        self.settings.mac_id?;
+        let field = report.fields().find(|field| field.name == "Response_Data1")?;
+        match field.value {
+            inspect::Value::Number(counts) if report.is_usable => {
+                Some(Position { counts, span: Some(1 << 32), per_turn: None })
+            }
+            _ => None,
+        }
+    }
+}
+
+/// The code, then all that is not 0.
+fn whole(report: &Report, block: &[u8], fields: &mut Vec<Field>) {
+    let (flags, others): (Vec<_>, Vec<_>) = report.fields().partition(is_flag);
+    let shown = |field: &inspect::Field| {
+        !matches!(field.value, inspect::Value::Bit(false) | inspect::Value::Number(0) | inspect::Value::Hex(0))
+            && field.first != 0
+    };
+    let (codes, data): (Vec<_>, Vec<_>) = others.into_iter().filter(shown).partition(|field| field.first == 1);
+    fields.extend(codes.iter().map(field));
+    let name = if report.is_response == Some(true) { "Status_Flags" } else { "Control_Bits" };
+    fields.push(flag_field(&flags, block, name));
+    fields.extend(data.iter().map(field));
+}
+
+/// The code, and what changed.
+fn changed(report: &Report, before: &Report, fields: &mut Vec<Field>) {
+    let code = report.fields().find(|field| matches!(field.value, inspect::Value::Code(_)));
+    fields.extend(code.as_ref().map(field));
+    for (new, old) in report.changes(before).filter(|(new, _)| !matches!(new.value, inspect::Value::Code(_))) {
+        match (new.value, old) {
+            (inspect::Value::Number(counter), Some(inspect::Value::Number(last))) if new.first == 0 => {
+                if counter != (last + 1) % 4 {
+                    let text = format!("{last} -> {counter}: not the next");
+                    fields.push(Field { name: new.name, value: Value::Text(text) });
+                }
+            }
+            _ => fields.push(field(&new)),
+        }
+    }
+}
+
+fn notes(report: &Report, fields: &mut Vec<Field>) {
+    let said = report.notes().map(|note| note.to_string());
+    let strict = report.error.map(|error| error.to_string());
+    let cause = report.cause.map(|cause| cause.to_string());
+    let text = said.chain(strict).chain(cause).collect::<Vec<_>>().join("; ");
+    if !text.is_empty() {
+        fields.push(Field { name: "note", value: Value::Text(text) });
+    }
+}
+
+fn is_flag(field: &inspect::Field) -> bool {
+    matches!(field.first, 2 | 3)
+}
+
+/// Bytes 2-3 as one field.
+fn flag_field(flags: &[inspect::Field], block: &[u8], name: &'static str) -> Field {
+    let raw = block.get(2..4).map_or(0, |bytes| bytes.iter().rev().fold(0, |raw, &byte| raw << 8 | u64::from(byte)));
+    let set = flags.iter().filter(|f| f.value == inspect::Value::Bit(true)).map(|f| f.name).collect();
+    Field { name, value: Value::Flags { raw, digits: 4, set } }
+}
+
+fn field(field: &inspect::Field) -> Field {
+    let value = match field.value {
+        inspect::Value::Number(value) => Value::Number { value, unit: "" },
+        inspect::Value::Bit(bit) => Value::Number { value: bit.into(), unit: "" },
+        inspect::Value::Hex(value) => Value::Hex { value: value.into(), digits: if value > 0xff { 4 } else { 2 } },
+        other => Value::Text(other.to_string()),
+    };
+    Field { name: field.name, value }
+}
+
+/// A block that a drive takes is good; what strict decoding says of it is a note.
+fn verdict(report: &Report) -> Verdict {
+    let Some(error) = report.error.filter(|_| !report.is_usable) else { return Verdict::Ok };
+    let at = match error {
+        Error::Direction { .. } | Error::MacId { .. } => Some(0),
+        Error::CyclicCode { .. } | Error::NonCyclicCode { .. } => Some(1),
+        Error::SubChk { .. } | Error::SubCommandCode { .. } => Some(16),
+        _ => None,
+    };
+    Verdict::Refused(Box::new(Refusal {
+        class: class(error.class()),
+        reason: error.to_string(),
+        field: at.map(|byte: u8| format!("byte {byte}")),
+        bit: None,
+        time: None,
+        cause: report.cause.map(|cause| cause.to_string()),
+    }))
+}
+
+fn class(class: ErrorClass) -> &'static str {
+    match class {
+        ErrorClass::Length => "length",
+        ErrorClass::CyclicCode => "cyclic_code",
+        ErrorClass::NonCyclicCode => "noncyclic_code",
+        ErrorClass::SubChk => "sub_chk",
+        ErrorClass::SubCommandCode => "sub_command_code",
+        _ => "other",
+    }
+}

@@ -1,0 +1,118 @@
+//! RTEX blocks from logs of hex lines and binary records.
+#![allow(
+    clippy::arithmetic_side_effects,
+    clippy::cast_possible_truncation,
+    clippy::indexing_slicing,
+    clippy::std_instead_of_core,
+    clippy::unwrap_used
+)]
+
+mod common;
+
+use std::fmt::Write as _;
+
+use common::Bench;
+use rtex_block::{Command, ControlBits, MacId, Response, StatusFlags, UpdateCounter};
+
+/// Commands and responses of a drive that moves on by 10 in every exchange.
+fn exchanges() -> Vec<([u8; 16], [u8; 16])> {
+    let mac_id = MacId::new(5).unwrap();
+    let mut counter = UpdateCounter::ZERO;
+    (0..6)
+        .map(|k| {
+            counter = counter.next();
+            let control = if k < 2 { ControlBits::empty() } else { ControlBits::SERVO_ON };
+            let command = Command { control, command_data1: 1_000 + 10 * k, ..Command::idle(mac_id, counter) };
+            let response = Response {
+                mac_id,
+                update_counter_echo: counter,
+                cmd_error: false,
+                code: command.code(),
+                status: StatusFlags::SERVO_READY,
+                response_data1: 990 + 10 * k,
+                response_data2: 20_000,
+                response_data3: 0,
+            };
+            (command.emit(), response.emit())
+        })
+        .collect()
+}
+
+fn hex_log(exchanges: &[([u8; 16], [u8; 16])]) -> String {
+    let mut text = "# command, response\n".to_owned();
+    for (command, response) in exchanges {
+        for block in [command, response] {
+            writeln!(text, "{:032x}", u128::from_be_bytes(*block)).unwrap();
+        }
+    }
+    text
+}
+
+#[test]
+fn hex_lines_show_what_changed() {
+    let bench = Bench::new();
+    let run = bench.decode("log.txt", hex_log(&exchanges()), &["--protocol", "rtex", "--bytes", "--json"]);
+    run.is_good();
+    let events = run.json();
+    assert_eq!(events.len(), 12);
+    assert_eq!(events[0]["kind"], "cmd 5");
+    assert_eq!(events[0]["fields"]["Command_Position"], 1_000);
+    assert_eq!(events[1]["fields"]["Response_Data2"], 20_000);
+    assert_eq!(events[1]["fields"]["Status_Flags"]["set"][0], "Servo_Ready");
+    // The servo is switched on in the third command; everything that stays is left out.
+    assert_eq!(events[4]["fields"]["Servo_On"], 1);
+    assert_eq!(events[4]["fields"]["Command_Position"], 1_020);
+    assert_eq!(events[4]["fields"].as_object().unwrap().len(), 3);
+    assert!(events[5]["fields"].get("Response_Data2").is_none());
+}
+
+#[test]
+fn binary_records_say_the_same() {
+    let bench = Bench::new();
+    let all = exchanges();
+    let binary: Vec<u8> = all.iter().flat_map(|(c, r)| [*c, *r].concat()).collect();
+    let options = |size: &'static str| ["--protocol", "rtex", "--record-size", size, "--json"];
+    let fields = |run: &common::Run| run.json().iter().map(|e| e["fields"].clone()).collect::<Vec<_>>();
+    let text = bench.decode("log.txt", hex_log(&all), &["--protocol", "rtex", "--bytes", "--json"]);
+    for size in ["16", "32"] {
+        let run = bench.decode("log.bin", &binary, &options(size));
+        assert_eq!(fields(run.is_good()), fields(&text));
+    }
+    bench.decode("cut.bin", &binary[..40], &options("16")).fails_with("the last record has 8 of 16 bytes");
+}
+
+#[test]
+fn one_drive_of_many() {
+    let bench = Bench::new();
+    let mut both = exchanges();
+    // Another drive, far away, in between.
+    for (k, (mut command, mut response)) in exchanges().into_iter().enumerate() {
+        (command[0], response[0], response[7]) = (command[0] ^ 1, response[0] ^ 1, 0x40);
+        both.insert(2 * k + 1, (command, response));
+    }
+    let options = ["--protocol", "rtex", "--bytes", "--mac-id", "5", "--stats"];
+    let run = bench.decode("log.txt", hex_log(&both), &options);
+    assert!(run.is_good().out.contains("6 requests, 6 answers"), "{}", run.out);
+    let run = bench.decode("log.txt", hex_log(&both), &["--protocol", "rtex", "--bytes", "--mac-id", "5", "--json"]);
+    let positions: Vec<_> = run.json().iter().filter_map(|e| e["position"]["counts"].as_i64()).collect();
+    assert_eq!(positions, [990, 1_000, 1_010, 1_020, 1_030, 1_040]);
+}
+
+#[test]
+fn faults_and_notes() {
+    let bench = Bench::new();
+    let options = ["--protocol", "rtex", "--bytes", "--json"];
+    let run = bench.decode("log.txt", "45507000000000000000000000000000\n4520800000\n", &options);
+    assert_eq!(run.verdicts(), ["cyclic_code", "length"]);
+    assert_eq!(run.code, 1);
+    let run = bench.decode("log.txt", "00000000000000000000000000000000\n45208300000000000000000000000000\n", &options);
+    let notes: Vec<_> = run.json().iter().map(|e| e["fields"]["note"].as_str().unwrap().to_owned()).collect();
+    assert!(notes[0].contains("a NOP does not switch the servo off"), "{notes:?}");
+    assert!(notes[1].contains("byte 2 has reserved bits 0x03 set"), "{notes:?}");
+    // A counter that stands still is normal (two communications an update); one that skips is not.
+    let stands = "25200000000000000000000000000000\n25200000000000000000000000000000\n";
+    let run = bench.decode("log.txt", format!("{stands}65200000000000000000000000000000\n"), &options);
+    let counters: Vec<_> = run.json().iter().map(|e| e["fields"].get("Update_Counter").is_some()).collect();
+    assert_eq!(counters, [false, false, true]);
+    bench.decode("a.vcd", common::good_traffic(2.5e6).vcd(), &["--protocol", "rtex"]).fails_with("--record-size");
+}
