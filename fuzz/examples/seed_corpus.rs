@@ -12,6 +12,8 @@ use serde_json::Value;
 mod nrz_line;
 #[path = "seed_corpus/rtex.rs"]
 mod rtex;
+#[path = "seed_corpus/sorte.rs"]
+mod sorte;
 #[path = "seed_corpus/step_profile.rs"]
 mod step_profile;
 #[path = "seed_corpus/tformat.rs"]
@@ -22,7 +24,8 @@ const SEEDS: usize = 15;
 /// A target, the vector file its seeds come from, and the input that a row becomes; `None` for rows of another kind.
 type Source = (&'static str, &'static str, fn(&Value) -> Option<Vec<u8>>);
 
-const SOURCES: &[&[Source]] = &[nrz_line::SOURCES, rtex::SOURCES, step_profile::SOURCES, tformat::SOURCES];
+const SOURCES: &[&[Source]] =
+    &[nrz_line::SOURCES, rtex::SOURCES, sorte::SOURCES, step_profile::SOURCES, tformat::SOURCES];
 
 fn main() -> io::Result<()> {
     let here = Path::new(env!("CARGO_MANIFEST_DIR"));
