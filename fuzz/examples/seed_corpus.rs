@@ -14,6 +14,8 @@ mod nikon;
 mod nrz_line;
 #[path = "seed_corpus/rtex.rs"]
 mod rtex;
+#[path = "seed_corpus/sorte.rs"]
+mod sorte;
 #[path = "seed_corpus/step_profile.rs"]
 mod step_profile;
 #[path = "seed_corpus/tformat.rs"]
@@ -25,7 +27,7 @@ const SEEDS: usize = 15;
 type Source = (&'static str, &'static str, fn(&Value) -> Option<Vec<u8>>);
 
 const SOURCES: &[&[Source]] =
-    &[nikon::SOURCES, nrz_line::SOURCES, rtex::SOURCES, step_profile::SOURCES, tformat::SOURCES];
+    &[nikon::SOURCES, nrz_line::SOURCES, rtex::SOURCES, sorte::SOURCES, step_profile::SOURCES, tformat::SOURCES];
 
 fn main() -> io::Result<()> {
     let here = Path::new(env!("CARGO_MANIFEST_DIR"));

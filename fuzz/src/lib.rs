@@ -7,6 +7,7 @@
 pub mod nikon;
 pub mod nrz_line;
 pub mod rtex;
+pub mod sorte;
 pub mod step_profile;
 pub mod tformat;
 
@@ -26,6 +27,10 @@ pub const TARGETS: &[(&str, Target)] = &[
     ("rtex_drive", rtex::drive),
     ("rtex_log", rtex::log),
     ("rtex_ring", rtex::ring),
+    ("sorte_frame", sorte::frame),
+    ("sorte_cut_through", sorte::cut_through),
+    ("sorte_device", sorte::device),
+    ("sorte_sync0", sorte::sync0),
     ("step_profile_step", step_profile::step),
     ("step_profile_axis", step_profile::axis),
     ("tformat_request", tformat::request),
