@@ -5,6 +5,8 @@
 
 #[cfg(feature = "deliberate-panic")]
 mod deliberate_panic;
+#[cfg(feature = "hdsl")]
+mod hdsl;
 #[cfg(feature = "nikon-aformat")]
 mod nikon;
 #[cfg(feature = "nikon-aformat")]
@@ -33,6 +35,8 @@ pub(crate) struct Kernel {
 pub(crate) const ALL: &[&[Kernel]] = &[
     #[cfg(feature = "nrz-line")]
     nrz_line::KERNELS,
+    #[cfg(feature = "hdsl")]
+    hdsl::KERNELS,
     #[cfg(feature = "nikon-aformat")]
     nikon::KERNELS,
     #[cfg(feature = "nikon-aformat")]
