@@ -5,8 +5,10 @@
 //! [`TARGETS`], a file in `fuzz_targets/` and its `[[bin]]`, and seeds from `examples/seed_corpus.rs`.
 
 pub mod hdsl;
+pub mod nikon;
 pub mod nrz_line;
 pub mod rtex;
+pub mod sorte;
 pub mod step_profile;
 pub mod tformat;
 
@@ -23,11 +25,21 @@ pub const TARGETS: &[(&str, Target)] = &[
     ("hdsl_position", hdsl::position),
     ("hdsl_master", hdsl::master),
     ("hdsl_link", hdsl::link),
+    ("nikon_request", nikon::request),
+    ("nikon_reply", nikon::reply),
+    ("nikon_reception", nikon::reception),
+    ("nikon_master", nikon::master),
+    ("nikon_device", nikon::device),
+    ("nikon_inspect", nikon::inspect),
     ("nrz_receiver", nrz_line::receiver),
     ("rtex_block", rtex::block),
     ("rtex_drive", rtex::drive),
     ("rtex_log", rtex::log),
     ("rtex_ring", rtex::ring),
+    ("sorte_frame", sorte::frame),
+    ("sorte_cut_through", sorte::cut_through),
+    ("sorte_device", sorte::device),
+    ("sorte_sync0", sorte::sync0),
     ("step_profile_step", step_profile::step),
     ("step_profile_axis", step_profile::axis),
     ("tformat_request", tformat::request),

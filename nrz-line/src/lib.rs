@@ -7,6 +7,7 @@
 extern crate std;
 
 mod health;
+mod number;
 mod order;
 mod procedure;
 mod receiver;
@@ -15,6 +16,7 @@ mod wave;
 mod window;
 
 pub use health::{Classified, Counters, ErrorRate};
+pub use number::{TooWide, Unsigned};
 pub use order::BitOrder;
 pub use procedure::{Polling, Step};
 pub use receiver::{Field, Format, FormatError, Receiver};

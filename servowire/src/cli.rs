@@ -6,7 +6,7 @@ use std::process::ExitCode;
 use clap::{Args, Parser, Subcommand, ValueEnum};
 
 use crate::capture::{Format, Hints};
-use crate::protocols::{Protocol, Settings, rtex, tformat};
+use crate::protocols::{Protocol, Settings, nikon, rtex, tformat};
 use crate::{cnc, decode, line, profile};
 
 /// Decodes what servo drives, controllers and encoders say to each other.
@@ -69,7 +69,7 @@ pub struct Decode {
     /// How the line is to be taken.
     #[command(flatten)]
     pub line: LineArgs,
-    /// What T-Format frames do not tell.
+    /// What the frames of encoders do not tell.
     #[command(flatten)]
     pub tformat: TformatArgs,
     /// What RTEX blocks do not tell.
@@ -122,14 +122,14 @@ pub enum Polarity {
     Inverted,
 }
 
-/// What T-Format frames do not tell.
+/// What the frames of encoders do not tell.
 #[derive(Debug, Clone, Copy, Args)]
-#[command(next_help_heading = "T-Format")]
+#[command(next_help_heading = "Encoder (T-Format, A-format)")]
 pub struct TformatArgs {
-    /// Bits of a turn; otherwise from the encoder ID seen on the line.
+    /// Bits of a turn; otherwise from the encoder ID or type word seen on the line.
     #[arg(long, value_name = "BITS", value_parser = clap::value_parser!(u8).range(1..=24))]
     pub single_turn_bits: Option<u8>,
-    /// Bits that count turns; otherwise from the encoder ID, else 16.
+    /// Bits that count turns; otherwise from the encoder ID or type word, else 16.
     #[arg(long, value_name = "BITS", value_parser = clap::value_parser!(u8).range(0..=24))]
     pub multi_turn_bits: Option<u8>,
 }
@@ -179,6 +179,10 @@ impl Decode {
                 multi_turn_bits: self.tformat.multi_turn_bits,
             },
             rtex: rtex::Settings { block_size: usize::from(self.rtex.block_size), mac_id: self.rtex.mac_id },
+            nikon: nikon::Settings {
+                single_turn_bits: self.tformat.single_turn_bits,
+                multi_turn_bits: self.tformat.multi_turn_bits,
+            },
         }
     }
 }

@@ -25,6 +25,10 @@ const LONG: u64 = 1 << 24;
 /// Decodes all files. 0: all frames good; 1: not so; 2: the options do not go together.
 pub(crate) fn run(arguments: &Decode) -> ExitCode {
     let files = arguments.files.len();
+    if files == 0 && bundled::of(arguments.protocol).is_empty() {
+        eprintln!("error: no captures of this protocol come with the program: name a file");
+        return ExitCode::from(2);
+    }
     if let Some(out) = &arguments.vcd {
         if files != 1 {
             eprintln!("error: --vcd writes one capture: name one file, not {files}");
@@ -69,7 +73,7 @@ fn all(arguments: &Decode, printer: &mut dyn Printer) -> io::Result<bool> {
         bar.finish();
     }
     if arguments.files.is_empty() {
-        for (name, bytes) in bundled::CAPTURES {
+        for (name, bytes) in bundled::of(arguments.protocol) {
             let bar = Bar { bar: None };
             good &= match capture::open_embedded(name, bytes) {
                 Ok(capture) => one(arguments, name, capture, &bar, &Rc::default(), printer)?,

@@ -5,6 +5,7 @@
 //! [`StartStop`](crate::line::StartStop) and is done; another kind takes the [`Capture`] itself.
 
 pub mod hdsl;
+pub mod nikon;
 pub mod rtex;
 pub mod sorte;
 pub mod tformat;
@@ -25,6 +26,8 @@ pub enum Protocol {
     Sorte,
     /// HIPERFACE DSL, from edges or samples of the pair.
     Hdsl,
+    /// Nikon A-format.
+    Nikon,
 }
 
 /// What the user said about line and protocol.
@@ -36,6 +39,8 @@ pub struct Settings {
     pub tformat: tformat::Settings,
     /// About RTEX.
     pub rtex: rtex::Settings,
+    /// About A-format.
+    pub nikon: nikon::Settings,
 }
 
 impl Protocol {
@@ -47,6 +52,7 @@ impl Protocol {
             Self::Rtex => &[],
             Self::Sorte => sorte::FIELDS,
             Self::Hdsl => hdsl::FIELDS,
+            Self::Nikon => nikon::FIELDS,
         }
     }
 
@@ -62,6 +68,10 @@ impl Protocol {
             }
             (Self::Hdsl, capture) => hdsl::decode(file, capture, &settings.line, out),
             (Self::Rtex, capture) => rtex::decode(file, capture, &settings.rtex, out),
+            (Self::Nikon, capture) => {
+                let make = |bit| nikon::Decoder::new(bit, settings.nikon);
+                line::decode(file, capture, &settings.line, &make, out)
+            }
         }
     }
 }

@@ -24,6 +24,13 @@ pub fn crc8_update(crc: u8, bytes: &[u8]) -> u8 {
     digest.finalize()
 }
 
+/// CRC-8 of one more byte, for loops that do something else beside.
+#[inline]
+pub(crate) fn crc8_step(crc: u8, byte: u8) -> u8 {
+    let [table] = CRC8.table();
+    table.get(usize::from(crc ^ byte)).copied().unwrap_or(0)
+}
+
 /// The Ethernet frame check sequence over DA to the last payload byte: CRC-32, polynomial 0x04C11DB7, start value all
 /// ones, reflected, inverted. Sent least significant byte first.
 ///

@@ -1,6 +1,7 @@
+use crate::crc::crc8_step;
 use crate::discovery::room;
 use crate::frame::count;
-use crate::{DeviceAddress, Error, Status, crc8, crc8_update};
+use crate::{DeviceAddress, Error, Status, crc8_update};
 
 /// Output bytes of the published master: four devices with four bytes each.
 pub const STOCK_OUTPUT: usize = 16;
@@ -287,7 +288,7 @@ impl PublishedDeviceFrame {
 
 #[inline]
 fn check(source: u8, status: u8, data: &[u8], got: u8) -> Result<(), Error> {
-    let want = crc8_update(crc8(&[source, status]), data);
+    let want = crc8_update(crc8_step(crc8_step(0, source), status), data);
     if got == want { Ok(()) } else { Err(Error::BadCrc8 { got, want }) }
 }
 
@@ -296,8 +297,12 @@ fn check(source: u8, status: u8, data: &[u8], got: u8) -> Result<(), Error> {
 fn seal(frame: &mut [u8], source: u8, status: Status, data: &[u8]) {
     if let [sa, flags, rest @ .., crc] = frame {
         (*sa, *flags) = (source, status.0);
-        rest.iter_mut().zip(data).for_each(|(to, from)| *to = *from);
-        *crc = crc8_update(crc8(&[source, status.0]), data);
+        let mut check = crc8_step(crc8_step(0, source), status.0);
+        for (to, from) in rest.iter_mut().zip(data) {
+            *to = *from;
+            check = crc8_step(check, *from);
+        }
+        *crc = check;
     }
 }
 
@@ -314,6 +319,7 @@ mod tests {
     use std::vec::Vec;
 
     use super::*;
+    use crate::crc8;
 
     fn master(output: &[u8], time_stamp: u16) -> Vec<u8> {
         let mut bytes = vec![0; output.len() + 5];

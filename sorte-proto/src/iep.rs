@@ -226,19 +226,27 @@ impl Channel {
     fn run_handler(&mut self) -> Happening {
         let events = core::mem::take(&mut self.pending);
         self.serve = NEVER;
-        let mut run = |go: bool, event: fn(&mut Sync0, Option<StartTime>) -> Writes| {
-            let writes = go.then(|| event(&mut self.sync0, self.start));
-            for write in writes.into_iter().flatten() {
-                self.write(write);
-            }
-            writes
-        };
-        let writes = [
-            run(events.cmp6, |sync0, _| sync0.cmp6()),
-            run(events.cmp0, |sync0, _| sync0.cmp0()),
-            run(events.cmp7, Sync0::cmp7),
-        ];
+        let mut writes = [None; 3];
+        let [six, zero, seven] = &mut writes;
+        if events.cmp6 {
+            *six = Some(self.sync0.cmp6());
+            self.apply(*six);
+        }
+        if events.cmp0 {
+            *zero = Some(self.sync0.cmp0());
+            self.apply(*zero);
+        }
+        if events.cmp7 {
+            *seven = Some(self.sync0.cmp7(self.start));
+            self.apply(*seven);
+        }
         Happening::Served(Served { ns: self.now.saturating_mul(TICK_NS), events, writes })
+    }
+
+    fn apply(&mut self, writes: Option<Writes>) {
+        for write in writes.into_iter().flatten() {
+            self.write(write);
+        }
     }
 
     fn write(&mut self, Write { register, value }: Write) {

@@ -118,6 +118,9 @@ const DRIVER_OFF: u16 = 0x7fff;
 ///
 /// Every 16-bit word is a `Pto` and gives itself back. From the design guide of the 4-axis CNC router with 250-kHz
 /// control loop (TIDEP-0061), section 2.4.2. A device holds its DIR level through a driver-off word.
+///
+/// All of the word is about the next cycle, DIR too: a device that sets DIR as soon as it takes the word turns the
+/// direction of a pulse that is still to come. It belongs to the wrap at the start of that cycle.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]

@@ -171,6 +171,7 @@ enum Program {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[must_use = "the registers have to be written"]
+#[repr(align(4))] // copied in words
 pub struct Writes {
     prelude: Prelude,
     program: Program,
@@ -231,6 +232,7 @@ impl Iterator for WriteIter {
 /// The SYNC0 generator: flags, the pulse on order, and CMP_CFG as it was written last.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[repr(align(4))] // copied in words
 pub struct Sync0 {
     variant: Variant,
     flags: Flags,

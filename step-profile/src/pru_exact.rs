@@ -24,9 +24,9 @@
 //! is so for d = 1 from m = 1525 on, which makes the quotient exact for t_step < [`EXACT_BELOW`], and never for d above
 //! 703.
 //!
-//! A quotient that is one too large makes the difference -d instead of r. When the previous sync_time is d or more, the sum
-//! is right again: the carry only came earlier. When it is less, the sum wraps, the unsigned comparison takes it for a
-//! late one, and 4us_cnt ends two above the true one with a sync_time near 2^32: the move never recovers.
+//! A quotient that is one too large makes the difference -d instead of r. When the previous sync_time is d or more, the
+//! sum is right again: the carry only came earlier. When it is less, the sum wraps, the unsigned comparison takes it for
+//! a late one, and 4us_cnt ends two above the true one with a sync_time near 2^32: the move never recovers.
 //! [`corrected`](crate::corrected) does not have this limit.
 
 use crate::arithmetic::{CYCLE_NS, Interval, StepTime, step_time_ns};

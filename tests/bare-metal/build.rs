@@ -8,8 +8,12 @@ use serde_json::Value;
 
 #[path = "build/hdsl.rs"]
 mod hdsl;
+#[path = "build/nikon.rs"]
+mod nikon;
 #[path = "build/rtex.rs"]
 mod rtex;
+#[path = "build/sorte.rs"]
+mod sorte;
 #[path = "build/step_profile.rs"]
 mod step_profile;
 #[path = "build/tformat.rs"]
@@ -20,9 +24,11 @@ type Protocol = (&'static str, fn(&dyn Fn(&str) -> Vec<Value>) -> String);
 
 const PROTOCOLS: &[Protocol] = &[
     ("hdsl", hdsl::tables),
+    ("nikon", nikon::tables),
+    ("rtex", rtex::tables),
+    ("sorte", sorte::tables),
     ("step-profile", step_profile::tables),
     ("tformat", tformat::tables),
-    ("rtex", rtex::tables),
 ];
 
 fn main() -> io::Result<()> {

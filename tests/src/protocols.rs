@@ -1,6 +1,7 @@
 //! Which topics there are. A new protocol is one file here and one line in [`ALL`].
 
 mod hdsl;
+mod nikon;
 mod rtex;
 mod sorte;
 mod step_profile;
@@ -13,6 +14,7 @@ type Protocol = (&'static str, &'static [(&'static str, Check)]);
 
 const ALL: &[Protocol] = &[
     ("hdsl", hdsl::TOPICS),
+    ("nikon", nikon::TOPICS),
     ("rtex", rtex::TOPICS),
     ("sorte", sorte::TOPICS),
     ("step-profile", step_profile::TOPICS),

@@ -14,7 +14,6 @@ mod error;
 mod frame;
 pub mod inspect;
 pub mod master;
-mod number;
 mod profile;
 mod request;
 mod response;
@@ -28,11 +27,13 @@ pub use control::{ControlField, DataId};
 pub use crc::crc;
 pub use error::{Error, ErrorClass};
 pub use frame::Frame;
-pub use nrz_line::{BitOrder, Window};
-pub use number::{TooWide, U24};
+pub use nrz_line::{BitOrder, TooWide, Window};
 pub use profile::{Hint, Position, Profile, WidthError};
 pub use request::{Address, Adf, NotAnAddress, Request};
 pub use response::{EncoderId, Full, Memory, MultiTurn, Response, SingleTurn};
 pub use status::{Alarm, Almc, StatusField};
 pub use timing::{BitRate, RESPONSE_DELAY_NS};
 pub use vendor::VendorCommand;
+
+/// A 24-bit data field: ABS (single-turn) or ABM (multi-turn) as it comes, low byte first on the line.
+pub type U24 = nrz_line::Unsigned<24>;

@@ -145,7 +145,7 @@ impl Full {
 
     /// The fields as UART bytes.
     pub const fn emit(self) -> [u8; Self::FIELDS] {
-        let ([a0, a1, a2], [m0, m1, m2]) = (self.abs.fields(), self.abm.fields());
+        let ([a0, a1, a2], [m0, m1, m2]) = (self.abs.to_le_bytes(), self.abm.to_le_bytes());
         let (sf, enid, almc) = (self.sf.raw(), self.enid, self.almc.raw());
         let crc = CF3 ^ sf ^ a0 ^ a1 ^ a2 ^ enid ^ m0 ^ m1 ^ m2 ^ almc;
         [CF3, sf, a0, a1, a2, enid, m0, m1, m2, almc, crc]
@@ -169,9 +169,9 @@ impl Full {
         let [_, sf, a0, a1, a2, enid, m0, m1, m2, almc, _] = *b;
         Self {
             sf: StatusField::new(sf),
-            abs: U24::from_fields(a0, a1, a2),
+            abs: U24::from_le_bytes([a0, a1, a2]),
             enid,
-            abm: U24::from_fields(m0, m1, m2),
+            abm: U24::from_le_bytes([m0, m1, m2]),
             almc: Almc::new(almc),
         }
     }
@@ -271,14 +271,14 @@ impl Response {
 
     /// Fields that were checked, taken apart.
     fn of(id: DataId, fields: &[u8]) -> Result<Self, Error> {
-        let single = |sf, d0, d1, d2| SingleTurn { sf: StatusField::new(sf), abs: U24::from_fields(d0, d1, d2) };
+        let single = |sf, d0, d1, d2| SingleTurn { sf: StatusField::new(sf), abs: U24::from_le_bytes([d0, d1, d2]) };
         Ok(match (id, fields) {
             (DataId::Id0, &[_, sf, d0, d1, d2, _]) => Self::Id0(single(sf, d0, d1, d2)),
             (DataId::Id7, &[_, sf, d0, d1, d2, _]) => Self::Id7(single(sf, d0, d1, d2)),
             (DataId::Id8, &[_, sf, d0, d1, d2, _]) => Self::Id8(single(sf, d0, d1, d2)),
             (DataId::IdC, &[_, sf, d0, d1, d2, _]) => Self::IdC(single(sf, d0, d1, d2)),
             (DataId::Id1, &[_, sf, d0, d1, d2, _]) => {
-                Self::Id1(MultiTurn { sf: StatusField::new(sf), abm: U24::from_fields(d0, d1, d2) })
+                Self::Id1(MultiTurn { sf: StatusField::new(sf), abm: U24::from_le_bytes([d0, d1, d2]) })
             }
             (DataId::Id2, &[_, sf, enid, _]) => Self::Id2(EncoderId { sf: StatusField::new(sf), enid }),
             (DataId::Id6, &[_, adf, edf, _]) => Self::Id6(Memory { adf: Adf::new(adf), edf }),
@@ -290,7 +290,7 @@ impl Response {
 }
 
 const fn six_fields(cf: u8, sf: StatusField, data: U24) -> [u8; 6] {
-    let (sf, [d0, d1, d2]) = (sf.raw(), data.fields());
+    let (sf, [d0, d1, d2]) = (sf.raw(), data.to_le_bytes());
     [cf, sf, d0, d1, d2, cf ^ sf ^ d0 ^ d1 ^ d2]
 }
 

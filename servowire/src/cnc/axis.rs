@@ -42,6 +42,8 @@ pub(super) struct Axis {
     cycle: u64,
     /// Times of the steps that are under way.
     expected: VecDeque<u64>,
+    /// The word of the cycle before, which is about this one.
+    taken: Option<Pto>,
     dir: bool,
     enabled: bool,
     pub(super) position: i64,
@@ -55,6 +57,7 @@ impl Axis {
             latency_ns: latency_ns.into(),
             cycle: 0,
             expected: VecDeque::new(),
+            taken: None,
             dir: false,
             enabled: true,
             position: 0,
@@ -72,26 +75,25 @@ impl Axis {
             self.tally.carried += 1;
         }
         self.channel.set_start(start);
-        // DIR and the enable follow the word when the handler takes it.
-        let taken = u64::from(CMP7_NS) + self.latency_ns;
-        self.edges(begin, begin + taken, seen.as_deref_mut());
-        if let Some(word) = word {
-            let mut note = |change| {
-                if let Some(seen) = &mut seen {
-                    seen.push((taken, change));
-                }
-            };
-            let dir = word.direction().map_or(self.dir, Direction::is_high);
-            if dir != self.dir {
-                note(Seen::Dir(dir));
-            }
-            if word.driver_enabled() != self.enabled {
-                note(Seen::Enable(word.driver_enabled()));
-            }
-            (self.dir, self.enabled) = (dir, word.driver_enabled());
+        // A word is about the next cycle, DIR and the enable too: they follow at the wrap, behind the last pulse.
+        self.edges(begin, begin + self.latency_ns, seen.as_deref_mut());
+        if let Some(word) = core::mem::replace(&mut self.taken, word) {
+            self.outputs(word, seen.as_deref_mut());
         }
         self.edges(begin, begin + CYCLE_NS, seen);
         self.cycle += 1;
+    }
+
+    /// DIR and the enable as the word says; a driver-off word leaves DIR.
+    fn outputs(&mut self, word: Pto, seen: Option<&mut Vec<(u64, Seen)>>) {
+        let dir = word.direction().map_or(self.dir, Direction::is_high);
+        let enabled = word.driver_enabled();
+        if let Some(seen) = seen {
+            let at = self.latency_ns;
+            seen.extend((dir != self.dir).then_some((at, Seen::Dir(dir))));
+            seen.extend((enabled != self.enabled).then_some((at, Seen::Enable(enabled))));
+        }
+        (self.dir, self.enabled) = (dir, enabled);
     }
 
     fn edges(&mut self, begin: u64, until: u64, mut seen: Option<&mut Vec<(u64, Seen)>>) {

@@ -29,8 +29,10 @@ const EXCHANGE: u32 = 1;
 pub(super) struct Recorder {
     vcd: Option<Trace>,
     packets: Option<PcapNgWriter<BufWriter<File>>>,
-    /// Cycles still to be recorded.
+    /// Cycles still to be recorded, the present one among them.
     cycles: u64,
+    /// A cycle has begun.
+    running: bool,
     /// The first thing that could not be written.
     failure: Option<io::Error>,
 }
@@ -40,7 +42,7 @@ impl Recorder {
     pub(super) fn new(devices: usize, vcd: Option<&Path>, pcapng: Option<&Path>, cycles: u64) -> io::Result<Self> {
         let vcd = vcd.map(|path| Trace::create(path, devices)).transpose()?;
         let packets = pcapng.map(open).transpose()?;
-        Ok(Self { vcd, packets, cycles, failure: None })
+        Ok(Self { vcd, packets, cycles, running: false, failure: None })
     }
 
     fn wants(&self) -> bool {
@@ -64,13 +66,14 @@ impl Recorder {
 
     /// A frame of the IO exchange at the master. The master's own begins a cycle.
     pub(super) fn exchange(&mut self, at_ns: u64, frame: &[u8], answer: bool) {
+        if !answer {
+            self.cycles = self.cycles.saturating_sub(u64::from(self.running));
+            self.running = true;
+        }
         if !self.wants() {
             return;
         }
         self.frame(at_ns, SHORT, frame, answer, if answer { "device" } else { "master" }, EXCHANGE);
-        if !answer {
-            self.cycles -= 1;
-        }
     }
 
     fn frame(&mut self, at_ns: u64, preamble: usize, frame: &[u8], answer: bool, name: &'static str, interface: u32) {

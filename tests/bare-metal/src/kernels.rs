@@ -7,10 +7,16 @@
 mod deliberate_panic;
 #[cfg(feature = "hdsl")]
 mod hdsl;
+#[cfg(feature = "nikon-aformat")]
+mod nikon;
+#[cfg(feature = "nikon-aformat")]
+mod nikon_ends;
 #[cfg(feature = "nrz-line")]
 pub(crate) mod nrz_line;
 #[cfg(feature = "rtex-block")]
 mod rtex;
+#[cfg(feature = "sorte-proto")]
+mod sorte;
 #[cfg(feature = "step-profile")]
 mod step_profile;
 #[cfg(feature = "tformat")]
@@ -27,18 +33,24 @@ pub(crate) struct Kernel {
 }
 
 pub(crate) const ALL: &[&[Kernel]] = &[
-    #[cfg(feature = "hdsl")]
-    hdsl::KERNELS,
     #[cfg(feature = "nrz-line")]
     nrz_line::KERNELS,
+    #[cfg(feature = "hdsl")]
+    hdsl::KERNELS,
+    #[cfg(feature = "nikon-aformat")]
+    nikon::KERNELS,
+    #[cfg(feature = "nikon-aformat")]
+    nikon_ends::KERNELS,
+    #[cfg(feature = "rtex-block")]
+    rtex::KERNELS,
+    #[cfg(feature = "sorte-proto")]
+    sorte::KERNELS,
     #[cfg(feature = "step-profile")]
     step_profile::KERNELS,
     #[cfg(feature = "tformat")]
     tformat::KERNELS,
     #[cfg(feature = "tformat")]
     tformat_ends::KERNELS,
-    #[cfg(feature = "rtex-block")]
-    rtex::KERNELS,
     #[cfg(feature = "deliberate-panic")]
     deliberate_panic::KERNELS,
 ];

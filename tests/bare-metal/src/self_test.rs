@@ -4,10 +4,14 @@ use cortex_m_semihosting::hprintln;
 
 #[cfg(feature = "hdsl")]
 pub(crate) mod hdsl;
+#[cfg(feature = "nikon-aformat")]
+pub(crate) mod nikon;
 #[cfg(feature = "nrz-line")]
 mod nrz_line;
 #[cfg(feature = "rtex-block")]
 pub(crate) mod rtex;
+#[cfg(feature = "sorte-proto")]
+pub(crate) mod sorte;
 #[cfg(feature = "step-profile")]
 pub(crate) mod step_profile;
 #[cfg(feature = "tformat")]
@@ -24,12 +28,16 @@ pub(crate) struct Tally {
 pub(crate) type Topic = (&'static str, fn() -> Tally);
 
 pub(crate) const ALL: &[&[Topic]] = &[
-    #[cfg(feature = "hdsl")]
-    hdsl::TOPICS,
     #[cfg(feature = "nrz-line")]
     nrz_line::TOPICS,
+    #[cfg(feature = "hdsl")]
+    hdsl::TOPICS,
+    #[cfg(feature = "nikon-aformat")]
+    nikon::TOPICS,
     #[cfg(feature = "rtex-block")]
     rtex::TOPICS,
+    #[cfg(feature = "sorte-proto")]
+    sorte::TOPICS,
     #[cfg(feature = "step-profile")]
     step_profile::TOPICS,
     #[cfg(feature = "tformat")]

@@ -1,0 +1,299 @@
+//! Several encoders answering one request.
+//!
+//! ```text
+//!  line, time →   request | reply of encoder 0 | gap | reply of encoder 1 | gap | ...
+//! ```
+//!
+//! Every encoder sends a whole reply with a CRC-8 of its own, one behind the other. Ascending order is what everybody
+//! assumes and no document says, so a reply is taken for the encoder that its information field names. A reply
+//! that is missing, damaged, doubled or uncalled for is reported and costs nothing but itself.
+//!
+//! ```
+//! use nikon_aformat::bus::{Addresses, Answer, Bus};
+//! use nikon_aformat::{Command, Data, EncoderAddress, EncoderStatus, Expected, Layout, Response, U24};
+//!
+//! let [first, second, ..] = EncoderAddress::ALL;
+//! let mut bus = Bus::new(Expected::new(Layout::Abs24, Command::Abs24LowMt), Addresses::first(2));
+//! let data = Data::Abs24 { abs: U24::truncate(77) };
+//! let reply = Response::new(first, Command::Abs24LowMt, EncoderStatus::NONE, data);
+//! bus.push(Ok(reply.emit()));
+//! assert_eq!(bus.of(first), Answer::Good(reply));
+//! assert_eq!(bus.of(second), Answer::Missing);
+//! ```
+
+use crate::{EncoderAddress, Error, Expected, Reply, Response};
+
+/// A set of encoder addresses.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "arbitrary", derive(arbitrary::Arbitrary))]
+pub struct Addresses(u8);
+
+impl Addresses {
+    /// No address.
+    pub const NONE: Self = Self(0);
+
+    /// All eight.
+    pub const ALL: Self = Self(0xff);
+
+    /// A set from its bits, address 0 in bit 0.
+    pub const fn from_bits(bits: u8) -> Self {
+        Self(bits)
+    }
+
+    /// The bits, address 0 in bit 0.
+    pub const fn bits(self) -> u8 {
+        self.0
+    }
+
+    /// The `count` lowest addresses; all eight above 7.
+    pub const fn first(count: u8) -> Self {
+        match 1_u8.checked_shl(count as u32) {
+            Some(bit) => Self(bit.wrapping_sub(1)),
+            None => Self::ALL,
+        }
+    }
+
+    /// Whether the address is in the set.
+    pub const fn has(self, ea: EncoderAddress) -> bool {
+        self.0 >> ea.get() & 1 == 1
+    }
+
+    /// With the address.
+    pub const fn with(self, ea: EncoderAddress) -> Self {
+        Self(self.0 | 1_u8.wrapping_shl(ea.get() as u32))
+    }
+
+    /// Without the addresses of another set.
+    pub const fn without(self, others: Self) -> Self {
+        Self(self.0 & !others.0)
+    }
+
+    /// How many there are.
+    #[expect(clippy::cast_possible_truncation, reason = "at most 8")]
+    pub const fn len(self) -> u8 {
+        self.0.count_ones() as u8
+    }
+
+    /// Whether there is none.
+    pub const fn is_empty(self) -> bool {
+        self.0 == 0
+    }
+
+    /// The highest address.
+    #[expect(clippy::cast_possible_truncation, reason = "at most 7")]
+    pub const fn highest(self) -> Option<EncoderAddress> {
+        match self.0.checked_ilog2() {
+            Some(bit) => EncoderAddress::new(bit as u8),
+            None => None,
+        }
+    }
+
+    /// The addresses from the lowest up.
+    pub fn iter(self) -> impl Iterator<Item = EncoderAddress> {
+        EncoderAddress::ALL.into_iter().filter(move |ea| self.has(*ea))
+    }
+}
+
+/// What came from one address.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum Answer {
+    /// Nothing good, and nothing was asked for.
+    NotAsked,
+    /// One good reply.
+    Good(Response),
+    /// A good reply from an address that was not asked.
+    Extra(Response),
+    /// Two good replies or more: two encoders have the same address, or one has been given a wrong one.
+    Duplicate {
+        /// The first of them.
+        first: Response,
+    },
+    /// No good reply. If damaged ones came, one of them may have been this encoder's: see [`Bus::damaged`].
+    Missing,
+}
+
+/// What was made of one reply.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Arrival {
+    /// The reply, all checks passed, or why it was refused.
+    pub outcome: Result<Response, Error>,
+    /// Whether a good reply from this address came before.
+    pub duplicate: bool,
+    /// Whether this address was not asked.
+    pub extra: bool,
+}
+
+/// The replies to one multi-response request, as they arrive.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Bus {
+    expected: Expected,
+    asked: Addresses,
+    good: [Option<Response>; 8],
+    doubled: Addresses,
+    arrived: u8,
+    damaged: u8,
+}
+
+impl Bus {
+    /// Replies of this kind are expected from these addresses.
+    pub const fn new(expected: Expected, asked: Addresses) -> Self {
+        let expected = expected.any_address();
+        Self { expected, asked, good: [None; 8], doubled: Addresses::NONE, arrived: 0, damaged: 0 }
+    }
+
+    /// A reply has arrived, or was cut or broken.
+    pub fn push(&mut self, reply: Result<Reply, Error>) -> Arrival {
+        self.arrived = self.arrived.saturating_add(1);
+        let outcome = reply.and_then(|reply| Response::parse(&reply, &self.expected));
+        let (mut duplicate, mut extra) = (false, false);
+        match outcome {
+            Ok(response) => {
+                extra = !self.asked.has(response.ea);
+                if let Some(place) = self.good.get_mut(usize::from(response.ea.get())) {
+                    duplicate = place.is_some();
+                    *place = place.or(Some(response));
+                }
+                if duplicate {
+                    self.doubled = self.doubled.with(response.ea);
+                }
+            }
+            Err(_) => self.damaged = self.damaged.saturating_add(1),
+        }
+        Arrival { outcome, duplicate, extra }
+    }
+
+    /// What came from this address.
+    pub fn of(&self, ea: EncoderAddress) -> Answer {
+        match self.good.get(usize::from(ea.get())).copied().flatten() {
+            Some(first) if self.doubled.has(ea) => Answer::Duplicate { first },
+            Some(response) if self.asked.has(ea) => Answer::Good(response),
+            Some(response) => Answer::Extra(response),
+            None if self.asked.has(ea) => Answer::Missing,
+            None => Answer::NotAsked,
+        }
+    }
+
+    /// The good reply of this address, if there is exactly one and it was asked for.
+    pub fn response(&self, ea: EncoderAddress) -> Option<Response> {
+        match self.of(ea) {
+            Answer::Good(response) => Some(response),
+            _ => None,
+        }
+    }
+
+    /// The addresses that were asked.
+    pub const fn asked(&self) -> Addresses {
+        self.asked
+    }
+
+    /// The addresses that were asked and sent nothing good.
+    pub fn missing(&self) -> Addresses {
+        self.select(|answer| answer == Answer::Missing)
+    }
+
+    /// The addresses that sent two good replies or more.
+    pub const fn duplicates(&self) -> Addresses {
+        self.doubled
+    }
+
+    /// The addresses that sent a good reply and were not asked.
+    pub fn extra(&self) -> Addresses {
+        let good = self.select(|answer| matches!(answer, Answer::Extra(_) | Answer::Duplicate { .. }));
+        good.without(self.asked)
+    }
+
+    /// Replies that arrived, good or not.
+    pub const fn arrived(&self) -> u8 {
+        self.arrived
+    }
+
+    /// Replies that were refused; their address cannot be trusted.
+    pub const fn damaged(&self) -> u8 {
+        self.damaged
+    }
+
+    /// How many fewer replies arrived than were asked for, good or not: so many never started.
+    pub const fn not_started(&self) -> u8 {
+        self.asked.len().saturating_sub(self.arrived)
+    }
+
+    /// Whether as many replies arrived as were asked for, so that there is nothing left to wait for.
+    pub const fn is_complete(&self) -> bool {
+        self.not_started() == 0
+    }
+
+    fn select(&self, wanted: impl Fn(Answer) -> bool) -> Addresses {
+        EncoderAddress::ALL.into_iter().filter(|ea| wanted(self.of(*ea))).fold(Addresses::NONE, Addresses::with)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{Command, Data, EncoderStatus, Layout, U24};
+    use proptest::prelude::*;
+
+    const COMMAND: Command = Command::Abs24LowMt;
+
+    fn response(ea: u8, abs: u32) -> Response {
+        let data = Data::Abs24 { abs: U24::truncate(abs) };
+        Response::new(EncoderAddress::truncate(ea), COMMAND, EncoderStatus::NONE, data)
+    }
+
+    fn bus(asked: Addresses) -> Bus {
+        Bus::new(Expected::new(Layout::Abs24, COMMAND), asked)
+    }
+
+    #[test]
+    fn address_sets() {
+        assert_eq!(Addresses::first(0), Addresses::NONE);
+        assert_eq!(
+            (Addresses::first(3).bits(), Addresses::first(8), Addresses::first(9)),
+            (7, Addresses::ALL, Addresses::ALL)
+        );
+        assert_eq!((Addresses::NONE.highest(), Addresses::first(5).highest()), (None, EncoderAddress::new(4)));
+    }
+
+    #[test]
+    fn missing_doubled_damaged_and_uncalled_for() {
+        let mut bus = bus(Addresses::first(4));
+        let [a0, a1, a2, _, _, a5, ..] = EncoderAddress::ALL;
+        assert_eq!(bus.push(Ok(response(0, 1).emit())).outcome, Ok(response(0, 1)));
+        assert!(bus.push(Ok(response(5, 2).emit())).extra);
+        assert!(!bus.is_complete());
+        let mut damaged = response(1, 3).emit().words(crate::BitOrder::LsbFirst).collect::<std::vec::Vec<_>>();
+        damaged[1] ^= 1;
+        let damaged = Reply::from_words(&damaged, crate::BitOrder::LsbFirst, Layout::Abs24);
+        assert!(matches!(bus.push(damaged).outcome, Err(Error::Crc { .. })));
+        let twice = bus.push(Ok(response(0, 9).emit()));
+        assert!(twice.duplicate && twice.outcome == Ok(response(0, 9)));
+        assert!(bus.is_complete());
+        assert_eq!(bus.of(a0), Answer::Duplicate { first: response(0, 1) });
+        assert_eq!((bus.response(a0), bus.of(a1), bus.of(a2)), (None, Answer::Missing, Answer::Missing));
+        assert_eq!(bus.of(a5), Answer::Extra(response(5, 2)));
+        assert_eq!(bus.missing().bits(), 0b1110);
+        assert_eq!((bus.duplicates().bits(), bus.extra().bits()), (1, 0b10_0000));
+        assert_eq!((bus.arrived(), bus.damaged(), bus.not_started()), (4, 1, 0));
+    }
+
+    proptest! {
+        /// In whatever order replies come, each is found under its own address.
+        #[test]
+        fn order_does_not_matter(asked: u8, order in Just([0_u8, 1, 2, 3, 4, 5, 6, 7]).prop_shuffle()) {
+            let mut bus = bus(Addresses::from_bits(asked));
+            for ea in order.into_iter().filter(|ea| asked >> ea & 1 == 1) {
+                prop_assert!(!bus.is_complete());
+                bus.push(Ok(response(ea, u32::from(ea) * 1000).emit()));
+            }
+            prop_assert!(bus.is_complete() && bus.missing().is_empty() && bus.extra().is_empty());
+            for ea in bus.asked().iter() {
+                prop_assert_eq!(bus.response(ea), Some(response(ea.get(), u32::from(ea.get()) * 1000)));
+            }
+        }
+    }
+}

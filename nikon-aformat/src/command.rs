@@ -1,0 +1,283 @@
+use core::fmt;
+
+use crate::Error;
+
+/// What a request asks for: the command codes (CC) 0 to 30. Code 31 is unassigned.
+///
+/// MT in the names is "multiple transmission", several encoders answer one request; it has nothing to do with turns.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "arbitrary", derive(arbitrary::Arbitrary))]
+#[repr(u8)]
+pub enum Command {
+    /// Reads the whole position, single turn and turns.
+    Abs40 = 0,
+    /// Reads the low 24 bits of the position.
+    Abs24Low = 1,
+    /// Reads bits 16 to 39 of the position.
+    Abs24High = 2,
+    /// Reads the alarms.
+    Status = 3,
+    /// [`Abs40`](Self::Abs40) of several encoders.
+    Abs40Mt = 4,
+    /// [`Abs24Low`](Self::Abs24Low) of several encoders.
+    Abs24LowMt = 5,
+    /// [`Abs24High`](Self::Abs24High) of several encoders.
+    Abs24HighMt = 6,
+    /// [`Status`](Self::Status) of several encoders.
+    StatusMt = 7,
+    /// Clears the alarms. Takes effect after eight requests in succession.
+    ClearStatus = 8,
+    /// Clears the turns. Takes effect after eight requests in succession.
+    ClearMultiturn = 9,
+    /// Clears alarms and turns. Takes effect after eight requests in succession.
+    ClearStatusMultiturn = 10,
+    /// Gives the only encoder on the line the address in EA. Takes effect after eight requests in succession.
+    SetAddress1 = 11,
+    /// Makes the present position the single-turn zero. **Shifts the commutation angle of the motor.** Takes effect after
+    /// eight requests in succession.
+    ZeroPreset = 12,
+    /// Reads an EEPROM word.
+    EepromRead = 13,
+    /// Writes an EEPROM word.
+    EepromWrite = 14,
+    /// Reads the temperature.
+    Temperature = 15,
+    /// Reads the identification code; with frame code 3 (version 3.0) the velocity coefficient.
+    IdRead1 = 16,
+    /// Reads the identification code of the only encoder on the line, whatever its address.
+    IdRead2 = 17,
+    /// Writes the identification code; with frame code 3 (version 3.0) the velocity coefficient.
+    IdWrite1 = 18,
+    /// Writes the identification code of the only encoder on the line, whatever its address.
+    IdWrite2 = 19,
+    /// Gives the encoder with a certain identification code the address in EA; all others stay silent.
+    SetAddress2 = 20,
+    /// Reads the low 17 bits of the position, the shortest reply.
+    Abs17 = 21,
+    /// [`Abs17`](Self::Abs17) of several encoders.
+    Abs17Mt = 22,
+    /// Reads the low 24 bits of the position and the velocity. Version 3.0.
+    Abs24Vel = 23,
+    /// [`Abs24Vel`](Self::Abs24Vel) of several encoders. Version 3.0.
+    Abs24VelMt = 24,
+    /// Reads the low 24 bits of the position, velocity and acceleration. Version 3.0.
+    Abs24VelAcc = 25,
+    /// [`Abs24VelAcc`](Self::Abs24VelAcc) of several encoders. Version 3.0.
+    Abs24VelAccMt = 26,
+    /// Reads the low 24 bits of the position and the alarms.
+    Abs24Status = 27,
+    /// [`Abs24Status`](Self::Abs24Status) of several encoders.
+    Abs24StatusMt = 28,
+    /// Reads the low 24 bits of the position and the temperature.
+    Abs24Temp = 29,
+    /// [`Abs24Temp`](Self::Abs24Temp) of several encoders.
+    Abs24TempMt = 30,
+}
+
+impl Command {
+    /// All 31, in the order of their codes.
+    pub const ALL: [Self; 31] = [
+        Self::Abs40,
+        Self::Abs24Low,
+        Self::Abs24High,
+        Self::Status,
+        Self::Abs40Mt,
+        Self::Abs24LowMt,
+        Self::Abs24HighMt,
+        Self::StatusMt,
+        Self::ClearStatus,
+        Self::ClearMultiturn,
+        Self::ClearStatusMultiturn,
+        Self::SetAddress1,
+        Self::ZeroPreset,
+        Self::EepromRead,
+        Self::EepromWrite,
+        Self::Temperature,
+        Self::IdRead1,
+        Self::IdRead2,
+        Self::IdWrite1,
+        Self::IdWrite2,
+        Self::SetAddress2,
+        Self::Abs17,
+        Self::Abs17Mt,
+        Self::Abs24Vel,
+        Self::Abs24VelMt,
+        Self::Abs24VelAcc,
+        Self::Abs24VelAccMt,
+        Self::Abs24Status,
+        Self::Abs24StatusMt,
+        Self::Abs24Temp,
+        Self::Abs24TempMt,
+    ];
+
+    /// The command code, 0..=30.
+    pub const fn code(self) -> u8 {
+        self as u8
+    }
+
+    /// The command with this code.
+    ///
+    /// # Errors
+    /// [`Error::UnknownCommand`] for 31 and all numbers above.
+    pub fn from_code(code: u8) -> Result<Self, Error> {
+        Self::ALL.get(usize::from(code)).copied().ok_or(Error::UnknownCommand { code })
+    }
+
+    /// The command, if encoders of `version` know it.
+    ///
+    /// # Errors
+    /// [`Error::UnsupportedInVersion`].
+    pub const fn in_version(self, version: Version) -> Result<Self, Error> {
+        match (self.min_version(), version) {
+            (Version::V3_0, Version::V2_1) => Err(Error::UnsupportedInVersion { command: self, version }),
+            _ => Ok(self),
+        }
+    }
+
+    /// The first version that has this command.
+    pub const fn min_version(self) -> Version {
+        match self {
+            Self::Abs24Vel | Self::Abs24VelMt | Self::Abs24VelAcc | Self::Abs24VelAccMt => Version::V3_0,
+            _ => Version::V2_1,
+        }
+    }
+
+    /// Whether several encoders answer one request, each with a reply of its own.
+    pub const fn is_multi_response(self) -> bool {
+        matches!(
+            self,
+            Self::Abs40Mt
+                | Self::Abs24LowMt
+                | Self::Abs24HighMt
+                | Self::StatusMt
+                | Self::Abs17Mt
+                | Self::Abs24VelMt
+                | Self::Abs24VelAccMt
+                | Self::Abs24StatusMt
+                | Self::Abs24TempMt
+        )
+    }
+
+    /// Whether the command takes effect only after eight requests in succession.
+    pub const fn is_reset(self) -> bool {
+        matches!(
+            self,
+            Self::ClearStatus
+                | Self::ClearMultiturn
+                | Self::ClearStatusMultiturn
+                | Self::SetAddress1
+                | Self::ZeroPreset
+        )
+    }
+
+    /// How often the request is sent: 8 for the resets, else 1.
+    pub const fn repeats(self) -> u8 {
+        if self.is_reset() { 8 } else { 1 }
+    }
+
+    /// Whether the reply comes from the encoder that the request addresses.
+    ///
+    /// Not so for the multi-response commands, for those that any encoder on a one-to-one line answers (17, 19), and
+    /// for those that change the address (11, 20): whether their reply shows the old or the new one is not documented.
+    pub const fn answers_with_own_address(self) -> bool {
+        !self.is_multi_response()
+            && !matches!(self, Self::SetAddress1 | Self::IdRead2 | Self::IdWrite2 | Self::SetAddress2)
+    }
+
+    /// Whether the reply carries neither the command code nor the four status bits: commands 21 and 22.
+    pub const fn has_short_information(self) -> bool {
+        matches!(self, Self::Abs17 | Self::Abs17Mt)
+    }
+
+    /// The name in capitals, as vendor tools print it.
+    pub const fn mnemonic(self) -> &'static str {
+        match self {
+            Self::Abs40 => "ABS40",
+            Self::Abs24Low => "ABS24_LOW",
+            Self::Abs24High => "ABS24_HIGH",
+            Self::Status => "STATUS",
+            Self::Abs40Mt => "ABS40_MT",
+            Self::Abs24LowMt => "ABS24_LOW_MT",
+            Self::Abs24HighMt => "ABS24_HIGH_MT",
+            Self::StatusMt => "STATUS_MT",
+            Self::ClearStatus => "CLEAR_STATUS",
+            Self::ClearMultiturn => "CLEAR_MULTITURN",
+            Self::ClearStatusMultiturn => "CLEAR_STATUS_MULTITURN",
+            Self::SetAddress1 => "SET_ADDRESS_1",
+            Self::ZeroPreset => "ZERO_PRESET",
+            Self::EepromRead => "EEPROM_READ",
+            Self::EepromWrite => "EEPROM_WRITE",
+            Self::Temperature => "TEMPERATURE",
+            Self::IdRead1 => "ID_READ_1",
+            Self::IdRead2 => "ID_READ_2",
+            Self::IdWrite1 => "ID_WRITE_1",
+            Self::IdWrite2 => "ID_WRITE_2",
+            Self::SetAddress2 => "SET_ADDRESS_2",
+            Self::Abs17 => "ABS17",
+            Self::Abs17Mt => "ABS17_MT",
+            Self::Abs24Vel => "ABS24_VEL",
+            Self::Abs24VelMt => "ABS24_VEL_MT",
+            Self::Abs24VelAcc => "ABS24_VEL_ACC",
+            Self::Abs24VelAccMt => "ABS24_VEL_ACC_MT",
+            Self::Abs24Status => "ABS24_STATUS",
+            Self::Abs24StatusMt => "ABS24_STATUS_MT",
+            Self::Abs24Temp => "ABS24_TEMP",
+            Self::Abs24TempMt => "ABS24_TEMP_MT",
+        }
+    }
+}
+
+impl fmt::Display for Command {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.mnemonic())
+    }
+}
+
+/// Version of the protocol that an encoder speaks.
+///
+/// Version 3.0 adds velocity, acceleration, EEPROM banks, predictive maintenance and a second sensor unit. It is known
+/// from one vendor's driver sources alone; no capture of it was published.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "arbitrary", derive(arbitrary::Arbitrary))]
+pub enum Version {
+    /// Version 2.1.
+    V2_1,
+    /// Version 3.0.
+    V3_0,
+}
+
+impl fmt::Display for Version {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::V2_1 => "2.1",
+            Self::V3_0 => "3.0",
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn codes_and_commands() {
+        for code in 0..=255 {
+            match Command::from_code(code) {
+                Ok(command) => assert_eq!(command.code(), code),
+                Err(error) => assert!(code > 30 && error == Error::UnknownCommand { code }),
+            }
+        }
+        let multi = Command::ALL.into_iter().filter(|c| c.is_multi_response()).map(Command::code);
+        assert!(multi.eq([4, 5, 6, 7, 22, 24, 26, 28, 30]));
+        let new = Command::ALL.into_iter().filter(|c| c.in_version(Version::V2_1).is_err()).map(Command::code);
+        assert!(new.eq(23..=26));
+        assert!(Command::ALL.into_iter().filter(|c| c.repeats() == 8).map(Command::code).eq(8..=12));
+        for command in Command::ALL {
+            assert_eq!(command.mnemonic().ends_with("_MT"), command.is_multi_response());
+        }
+    }
+}

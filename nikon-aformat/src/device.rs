@@ -1,0 +1,461 @@
+//! The encoder's side without I/O: what a simulator or a test bench runs.
+//!
+//! A [`Device`] takes a request frame by frame and says what it answers and when; an [`Encoders`] is several of them on
+//! one line. Position, alarms, temperature and the rest are set from outside; EEPROM, addresses, eight-fold resets and
+//! busy times are its own. Faults can be switched on to see what a master makes of them.
+//!
+//! What the documents leave open is decided here as follows. A damaged request, a command of a later version and a write to
+//! the maker's addresses are not answered. In a multi-response request EA is the highest address that answers; encoder k
+//! answers in slot k, whoever else is there. A reset takes effect with the eighth request in succession, and any other
+//! request on the line starts the count again. The replies to commands 11 and 20 show the new address. The first reply to
+//! an EEPROM read has ES0 set and data 0. While the encoder is busy, writes are repeated in the reply but not done. The
+//! EEPROM without bank is bank 0.
+//!
+//! ```
+//! use nikon_aformat::device::Device;
+//! use nikon_aformat::{BitRate, EncoderAddress, Operation, Profile, Request};
+//!
+//! let mut encoder = Device::<1>::new(EncoderAddress::ZERO, Profile::default(), BitRate::Mbit4);
+//! encoder.set_position(0x1_2345, 7);
+//! let request = Request::new(EncoderAddress::ZERO, Operation::Abs40);
+//! let frames = request.emit();
+//! let [cdf] = frames.as_slice() else { panic!("one frame") };
+//! // the delimiter of the frame at 4.5 us
+//! let answer = encoder.frame(cdf.content(), 4_500).expect("an answer");
+//! assert_eq!(answer.at_ns, 4_500 + 2_800);
+//! assert_eq!(answer.reply.frames(), 4);
+//! ```
+
+mod memory;
+#[cfg(test)]
+mod tests;
+
+use nrz_line::Window;
+
+use crate::device::memory::Memory;
+use crate::{
+    Alarm, Alm, BitRate, Command, Data, EncoderAddress, EncoderStatus, Error, Frames, Operation, PmAlm, Profile, Reply,
+    Request, RequestFrame, Response, Temperature, TypeWord, U10, U19, U24, WRITE_BUSY_NS,
+};
+
+/// Time from the end of a request to the reply. Not documented; one vendor's simulated encoder waits so long.
+pub const TURN_AROUND_NS: u32 = 2_800;
+
+/// A pause after which a frame begins a new request. No upper limit is documented for the gap between the frames of a
+/// request; early drivers left 10 us.
+pub const MAX_FRAME_GAP_NS: u32 = 20_000;
+
+/// A fault that the encoder or its line is made to have.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "arbitrary", derive(arbitrary::Arbitrary))]
+pub enum Fault {
+    /// None.
+    #[default]
+    None,
+    /// It does not answer.
+    Silent,
+    /// Bit `at` of the reply's line bits is inverted; nothing happens if the reply is shorter.
+    FlipBit {
+        /// Index, 0..=107.
+        at: u8,
+    },
+    /// The line ends after this many bits of the reply.
+    CutAfter {
+        /// Bits that are sent.
+        bits: u8,
+    },
+    /// The CRC-8 of the reply is inverted.
+    BadCrc,
+}
+
+/// What an encoder sends, and when its start bit begins.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Answer {
+    /// The frames as they were meant.
+    pub reply: Reply,
+    /// The line bits, with the fault.
+    pub line: Window,
+    /// Time of the first start bit.
+    pub at_ns: u64,
+}
+
+/// An encoder with `BANKS` banks of 256 EEPROM words; one bank is what version 2.1 has.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Device<const BANKS: usize> {
+    ea: EncoderAddress,
+    profile: Profile,
+    rate: BitRate,
+    id: U24,
+    single_turn: u32,
+    turns: u32,
+    /// Subtracted from the position: what the resets have set to 0.
+    zero: u32,
+    turns_zero: u32,
+    velocity: i32,
+    acceleration: i16,
+    coefficient: U19,
+    temperature: Temperature,
+    /// Alarms that are set, and those whose cause is still there.
+    alm: Alm,
+    causes: Alm,
+    pm_alm: PmAlm,
+    memory: Memory<BANKS>,
+    fault: Fault,
+    repeated: Option<Request>,
+    repeats: u8,
+    received: [RequestFrame; Frames::MAX],
+    len: u8,
+    /// A request was judged and no pause has come since.
+    deaf: bool,
+    last_frame_ns: u64,
+}
+
+impl<const BANKS: usize> Device<BANKS> {
+    /// An encoder at position 0 without alarms, 25 degrees warm, with the type word of its profile.
+    pub const fn new(ea: EncoderAddress, profile: Profile, rate: BitRate) -> Self {
+        let mut memory = Memory::new();
+        memory.set(0, TypeWord::EEPROM_ADDRESS, type_word(profile).0);
+        Self {
+            ea,
+            profile,
+            rate,
+            id: U24::truncate(0),
+            single_turn: 0,
+            turns: 0,
+            zero: 0,
+            turns_zero: 0,
+            velocity: 0,
+            acceleration: 0,
+            coefficient: U19::truncate(0),
+            temperature: Temperature(U10::truncate(100)),
+            alm: Alm::NONE,
+            causes: Alm::NONE,
+            pm_alm: PmAlm::new(0),
+            memory,
+            fault: Fault::None,
+            repeated: None,
+            repeats: 0,
+            received: [RequestFrame::mdf(crate::FrameCode::Fc0, 0); Frames::MAX],
+            len: 0,
+            deaf: false,
+            last_frame_ns: 0,
+        }
+    }
+
+    /// Its address.
+    pub const fn ea(&self) -> EncoderAddress {
+        self.ea
+    }
+
+    /// Turns the shaft; counts and turns before the resets are applied.
+    pub const fn set_position(&mut self, single_turn: u32, turns: u32) {
+        self.single_turn = single_turn;
+        self.turns = turns;
+    }
+
+    /// Velocity and acceleration of version 3.0.
+    pub const fn set_motion(&mut self, velocity: i32, acceleration: i16) {
+        self.velocity = velocity;
+        self.acceleration = acceleration;
+    }
+
+    /// The temperature, which EEPROM word 0xf9 shows too.
+    pub const fn set_temperature(&mut self, temperature: Temperature) {
+        self.temperature = temperature;
+        let [low, high, ..] = temperature.raw().to_le_bytes();
+        self.memory.set(0, Temperature::EEPROM_ADDRESS, u16::from_le_bytes([low, high]));
+    }
+
+    /// The identification code.
+    pub const fn set_id(&mut self, id: U24) {
+        self.id = id;
+    }
+
+    /// The predictive maintenance notices of version 3.0.
+    pub const fn set_pm_alm(&mut self, pm_alm: PmAlm) {
+        self.pm_alm = pm_alm;
+    }
+
+    /// The cause of an alarm comes or goes. An alarm stays set until a reset finds its cause gone; BUSY clears by itself.
+    pub const fn set_alarm(&mut self, alarm: Alarm, present: bool) {
+        self.causes = self.causes.with(alarm, present);
+        if present || matches!(alarm, Alarm::Busy | Alarm::BusyS) {
+            self.alm = self.alm.with(alarm, present);
+        }
+    }
+
+    /// Switches a fault on or, with [`Fault::None`], off.
+    pub const fn set_fault(&mut self, fault: Fault) {
+        self.fault = fault;
+    }
+
+    /// The alarms as they would be answered at `now_ns`.
+    pub const fn alm(&self, now_ns: u64) -> Alm {
+        self.alm.with(Alarm::MemBusy, self.memory.is_busy(now_ns))
+    }
+
+    /// A word of the EEPROM, for inspecting it.
+    pub const fn eeprom(&self, bank: u8, address: u8) -> Option<u16> {
+        self.memory.get(bank, address)
+    }
+
+    /// Sets a word of the EEPROM, for preparing it.
+    pub const fn set_eeprom(&mut self, bank: u8, address: u8, data: u16) {
+        self.memory.set(bank, address, data);
+    }
+
+    /// The position as a reply carries it.
+    pub const fn abs(&self) -> crate::U40 {
+        self.profile.compose(self.single_turn.wrapping_sub(self.zero), self.turns.wrapping_sub(self.turns_zero))
+    }
+
+    /// A frame was received with start bit and delimiter in order, its delimiter at `now_ns`; `content` are its bits, the first
+    /// of the line in bit 0. Gives the answer once a request is complete.
+    pub fn frame(&mut self, content: u16, now_ns: u64) -> Option<Answer> {
+        let frame = RequestFrame::from_content(content);
+        if self.is_deaf(now_ns) {
+            return None;
+        }
+        let Ok(frame) = frame else {
+            self.misheard();
+            return None;
+        };
+        *self.received.get_mut(usize::from(self.len))? = frame;
+        self.len = self.len.saturating_add(1);
+        match Request::parse(self.received.get(..usize::from(self.len))?) {
+            Err(Error::Truncated { .. }) => None,
+            Err(_) => {
+                self.misheard();
+                None
+            }
+            Ok(request) => {
+                self.deaf = true;
+                let response = self.answer(request, now_ns)?;
+                self.send(request, response, now_ns)
+            }
+        }
+    }
+
+    /// A frame was received whose delimiter reads 0: the request is damaged.
+    pub fn framing_error(&mut self, now_ns: u64) {
+        if !self.is_deaf(now_ns) {
+            self.misheard();
+        }
+    }
+
+    fn misheard(&mut self) {
+        self.deaf = true;
+        self.repeated = None;
+        self.repeats = 0;
+    }
+
+    /// Whether what arrives now is the rest of a request that was already judged.
+    fn is_deaf(&mut self, now_ns: u64) -> bool {
+        let patience = self.rate.bits_ns(crate::FRAME_BITS).saturating_add(MAX_FRAME_GAP_NS);
+        let pause = now_ns.saturating_sub(self.last_frame_ns);
+        // A complete request is followed by the next one after any pause; a broken one only after a long one.
+        let complete = self.deaf && self.repeated.is_some();
+        if complete || pause > patience.into() {
+            self.len = 0;
+            self.deaf = false;
+        }
+        self.last_frame_ns = now_ns;
+        self.deaf
+    }
+
+    /// What a sound request does, and the answer to it; `None` if it is for another encoder or not understood.
+    pub fn answer(&mut self, request: Request, now_ns: u64) -> Option<Response> {
+        self.count(request);
+        if request.check(self.profile).is_err() || !self.is_meant(request) {
+            return None;
+        }
+        self.reset(request, now_ns);
+        let es = EncoderStatus::of_alarms(self.alm(now_ns));
+        let layout = request.layout(self.profile);
+        let abs = self.abs();
+        let (velocity, alm, temperature) = (self.velocity, self.alm(now_ns), self.temperature);
+        let status = Data::Status { alm, pm_alm: self.pm_alm };
+        let data = match request.operation {
+            Operation::Abs17 | Operation::Abs17Mt => return Some(Response::abs17(self.ea, es, abs.low17())),
+            Operation::Abs40 | Operation::Abs40Mt => Data::Abs40 { abs },
+            Operation::Abs24Low | Operation::Abs24LowMt => match layout {
+                crate::Layout::Abs40Vel => Data::Abs40Vel { abs, velocity },
+                _ => Data::Abs24 { abs: abs.low24() },
+            },
+            Operation::Abs24High | Operation::Abs24HighMt => Data::Abs24High { abs: abs.high24() },
+            Operation::Status | Operation::StatusMt => status,
+            Operation::ClearStatus
+            | Operation::ClearMultiturn
+            | Operation::ClearStatusMultiturn
+            | Operation::SetAddress1
+            | Operation::ZeroPreset => match layout {
+                crate::Layout::Abs24 => Data::Abs24 { abs: abs.low24() },
+                _ => status,
+            },
+            Operation::Temperature => Data::Temperature { temperature },
+            Operation::Abs24Vel | Operation::Abs24VelMt => Data::Abs24Vel { abs: abs.low24(), velocity },
+            Operation::Abs24VelAcc | Operation::Abs24VelAccMt => {
+                Data::Abs24VelAcc { abs: abs.low24(), velocity, acceleration: self.acceleration }
+            }
+            Operation::Abs24Status | Operation::Abs24StatusMt => Data::Abs24Status { abs: abs.low24(), alm },
+            Operation::Abs24Temp | Operation::Abs24TempMt => Data::Abs24Temp { abs: abs.low24(), temperature },
+            memory => self.access(memory, request.ea, now_ns)?,
+        };
+        // An access makes the memory busy, and its reply shows it.
+        let es = EncoderStatus::of_alarms(self.alm(now_ns));
+        Some(Response::new(self.ea, request.command(), es, data))
+    }
+
+    /// Whether this encoder is asked.
+    fn is_meant(&self, request: Request) -> bool {
+        match request.operation {
+            Operation::SetAddress1 | Operation::IdRead2 | Operation::IdWrite2 { .. } => true,
+            Operation::SetAddress2 { id } => id == self.id,
+            _ if request.command().is_multi_response() => self.ea <= request.ea,
+            _ => self.ea == request.ea,
+        }
+    }
+
+    /// Counts how often the same request came in succession.
+    fn count(&mut self, request: Request) {
+        if self.repeated != Some(request) {
+            self.repeats = 0;
+        }
+        self.repeated = Some(request);
+        self.repeats = self.repeats.saturating_add(1);
+    }
+
+    /// The effect of the eighth request of a reset.
+    fn reset(&mut self, request: Request, now_ns: u64) {
+        let command = request.command();
+        if !command.is_reset() || self.repeats != command.repeats() {
+            return;
+        }
+        self.repeats = 0;
+        self.memory.busy(now_ns, WRITE_BUSY_NS);
+        match command {
+            Command::ZeroPreset => self.zero = self.single_turn,
+            Command::SetAddress1 => self.ea = request.ea,
+            _ => {}
+        }
+        if matches!(command, Command::ClearMultiturn | Command::ClearStatusMultiturn) {
+            self.turns_zero = self.turns;
+        }
+        if matches!(command, Command::ClearStatus | Command::ClearStatusMultiturn) {
+            self.alm = self.causes;
+        }
+    }
+
+    /// EEPROM, identification code, address and coefficient.
+    fn access(&mut self, operation: Operation, ea: EncoderAddress, now_ns: u64) -> Option<Data> {
+        let busy = self.memory.is_busy(now_ns);
+        Some(match operation {
+            Operation::EepromRead { address } => {
+                Data::Eeprom { data: self.memory.read(0, address, now_ns).unwrap_or(0), address }
+            }
+            Operation::EepromReadBank { bank, address } => {
+                let bank_error = !Memory::<BANKS>::has(bank);
+                let data = self.memory.read(bank, address, now_ns).unwrap_or(0);
+                Data::EepromBank { data, bank, address, bank_error }
+            }
+            Operation::EepromWrite { address, data } => {
+                self.memory.write(0, address.get(), data, now_ns);
+                Data::Eeprom { data, address: address.get() }
+            }
+            Operation::EepromWriteBank { bank, address, data } => {
+                self.memory.write(bank, address, data, now_ns);
+                Data::EepromBank { data, bank, address, bank_error: !Memory::<BANKS>::has(bank) }
+            }
+            Operation::IdRead1 | Operation::IdRead2 => Data::Id { id: self.id },
+            Operation::IdWrite1 { id } | Operation::IdWrite2 { id } => {
+                if !busy {
+                    self.id = id;
+                    self.memory.busy(now_ns, WRITE_BUSY_NS);
+                }
+                Data::Id { id }
+            }
+            Operation::SetAddress2 { id } => {
+                if !busy {
+                    self.ea = ea;
+                    self.memory.busy(now_ns, WRITE_BUSY_NS);
+                }
+                Data::Id { id }
+            }
+            Operation::CoefficientRead => Data::Coefficient { coefficient: self.coefficient },
+            Operation::CoefficientWrite { coefficient } => {
+                if !busy {
+                    self.coefficient = coefficient;
+                    self.memory.busy(now_ns, WRITE_BUSY_NS);
+                }
+                Data::Coefficient { coefficient }
+            }
+            // Never: the caller has answered all others.
+            _ => return None,
+        })
+    }
+
+    /// The line bits of an answer with the fault that is switched on.
+    fn send(&self, request: Request, response: Response, now_ns: u64) -> Option<Answer> {
+        let reply = response.emit();
+        let good = reply.line();
+        let crc = 0xff << good.len().saturating_sub(9);
+        let line = match self.fault {
+            Fault::Silent => None,
+            Fault::FlipBit { at } if u32::from(at) < good.len() => {
+                Window::from_bits(good.bits() ^ 1_u128.wrapping_shl(at.into()), good.len())
+            }
+            Fault::None | Fault::FlipBit { .. } => Some(good),
+            Fault::CutAfter { bits } => Window::from_bits(good.bits(), good.len().min(bits.into())),
+            Fault::BadCrc => Window::from_bits(good.bits() ^ crc, good.len()),
+        };
+        let slot = if request.command().is_multi_response() { self.ea.get() } else { 0 };
+        let slot_ns = self.rate.bits_ns(good.len()).saturating_add(self.rate.reply_gap_ns());
+        let wait = TURN_AROUND_NS.saturating_add(slot_ns.saturating_mul(slot.into()));
+        Some(Answer { reply, line: line?, at_ns: now_ns.saturating_add(wait.into()) })
+    }
+}
+
+/// The type word of an encoder with these widths; for widths that have no code, an unknown one.
+const fn type_word(profile: Profile) -> TypeWord {
+    let resolution = match profile.st_bits() {
+        17 => 0,
+        20 => 1,
+        22 => 2,
+        24 => 3,
+        _ => 7,
+    };
+    let multiturn = match profile.mt_bits() {
+        0 => 0,
+        16 => 2,
+        _ => 3,
+    };
+    TypeWord(resolution | multiturn << 3)
+}
+
+/// Several encoders on one line.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Encoders<const N: usize, const BANKS: usize> {
+    /// The encoders, in any order.
+    pub all: [Device<BANKS>; N],
+}
+
+impl<const N: usize, const BANKS: usize> Encoders<N, BANKS> {
+    /// A frame was received by all of them; gives what each answers.
+    pub fn frame(&mut self, content: u16, now_ns: u64) -> [Option<Answer>; N] {
+        let mut answers = [None; N];
+        for (answer, device) in answers.iter_mut().zip(&mut self.all) {
+            *answer = device.frame(content, now_ns);
+        }
+        answers
+    }
+
+    /// A frame was received whose delimiter reads 0.
+    pub fn framing_error(&mut self, now_ns: u64) {
+        for device in &mut self.all {
+            device.framing_error(now_ns);
+        }
+    }
+}

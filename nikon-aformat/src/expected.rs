@@ -1,0 +1,245 @@
+use crate::frame::truncated;
+use crate::{
+    Command, Data, EchoField, EncoderAddress, Error, Layout, Operation, Profile, Reply, Request, Response, U19, U24,
+    Version,
+};
+
+/// What is known about a reply before it comes: its layout, the command, the address, the arguments that it repeats.
+///
+/// [`Request::expected`] makes it from a request; [`Expected::new`] serves captures whose request is not at hand.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Expected {
+    layout: Layout,
+    command: Command,
+    ea: Option<EncoderAddress>,
+    echo: Echo,
+    /// The bits of the first frame that are known, and their values.
+    mask: u16,
+    value: u16,
+}
+
+/// The arguments of a request that its reply repeats.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "arbitrary", derive(arbitrary::Arbitrary))]
+pub enum Echo {
+    /// None, or they are not compared.
+    #[default]
+    None,
+    /// EEPROM access: checked in the order address, bank, data.
+    Eeprom {
+        /// Address.
+        address: u8,
+        /// Bank, in version 3.0.
+        bank: Option<u8>,
+        /// Data of a write.
+        data: Option<u16>,
+    },
+    /// Identification code, written or used to choose an encoder.
+    Id(U24),
+    /// Velocity coefficient, written.
+    Coefficient(U19),
+}
+
+impl Echo {
+    /// What the reply to `operation` repeats.
+    pub const fn of(operation: Operation) -> Self {
+        match operation {
+            Operation::EepromRead { address } => Self::Eeprom { address, bank: None, data: None },
+            Operation::EepromWrite { address, data } => {
+                Self::Eeprom { address: address.get(), bank: None, data: Some(data) }
+            }
+            Operation::EepromReadBank { bank, address } => Self::Eeprom { address, bank: Some(bank), data: None },
+            Operation::EepromWriteBank { bank, address, data } => {
+                Self::Eeprom { address, bank: Some(bank), data: Some(data) }
+            }
+            Operation::IdWrite1 { id } | Operation::IdWrite2 { id } | Operation::SetAddress2 { id } => Self::Id(id),
+            Operation::CoefficientWrite { coefficient } => Self::Coefficient(coefficient),
+            _ => Self::None,
+        }
+    }
+}
+
+const SYNC: u16 = 0b111;
+const EA: u16 = 0b111 << 3;
+const CC: u16 = 0b1_1111 << 6;
+const FIXED: u16 = 1 << 11;
+
+impl Expected {
+    /// A reply of this layout to this command, from any address.
+    pub const fn new(layout: Layout, command: Command) -> Self {
+        let sync = Response::SYNC_CODE as u16;
+        let (mask, value) = match layout {
+            Layout::Abs17 => (SYNC, sync),
+            _ => (SYNC | CC | FIXED, sync | (command.code() as u16) << 6),
+        };
+        Self { layout, command, ea: None, echo: Echo::None, mask, value }
+    }
+
+    /// The same from this address only.
+    pub const fn from_address(self, ea: EncoderAddress) -> Self {
+        Self { ea: Some(ea), mask: self.mask | EA, value: self.value & !EA | (ea.get() as u16) << 3, ..self }
+    }
+
+    /// The same from any address.
+    pub const fn any_address(self) -> Self {
+        Self { ea: None, mask: self.mask & !EA, value: self.value & !EA, ..self }
+    }
+
+    /// The same with these arguments repeated.
+    pub const fn echoing(self, echo: Echo) -> Self {
+        Self { echo, ..self }
+    }
+
+    /// The layout.
+    pub const fn layout(&self) -> Layout {
+        self.layout
+    }
+
+    /// The command.
+    pub const fn command(&self) -> Command {
+        self.command
+    }
+
+    /// The address, if it is checked.
+    pub const fn ea(&self) -> Option<EncoderAddress> {
+        self.ea
+    }
+
+    /// The known bits of the first frame that are wrong.
+    #[inline(always)]
+    pub(crate) const fn differs_first(&self, content: u16) -> u16 {
+        content & self.mask ^ self.value
+    }
+
+    /// Whether length and first frame are right.
+    pub(crate) fn fits(&self, reply: &Reply) -> bool {
+        reply.frames() == self.layout.frames()
+            && reply.contents().first().is_some_and(|first| self.differs_first(*first) == 0)
+    }
+
+    /// Off the hot path: why a reply is refused that is not sound or does not fit.
+    #[cold]
+    pub(crate) fn refusal(&self, reply: &Reply) -> Error {
+        let want = self.layout.line_bits();
+        if reply.frames() != self.layout.frames() {
+            return truncated(u32::from(reply.frames()).wrapping_mul(18), want);
+        }
+        let (got, computed) = reply.crc();
+        if got != computed {
+            return Error::Crc { got, want: computed };
+        }
+        let first = reply.contents().first().copied().unwrap_or(0);
+        let sync = (first & SYNC) as u8;
+        if sync != Response::SYNC_CODE {
+            return Error::SyncCode { got: sync };
+        }
+        if first & FIXED & self.mask != 0 {
+            return Error::FixedBit;
+        }
+        let ea = (first >> 3 & 7) as u8;
+        match self.ea {
+            Some(want) if want.get() != ea => Error::AddressMismatch { got: ea, want: want.get() },
+            _ => Error::CommandMismatch { got: (first >> 6 & 31) as u8, want: self.command.code() },
+        }
+    }
+
+    /// Bank error and repeated arguments.
+    pub(crate) fn check_memory(&self, data: Data) -> Result<(), Error> {
+        if let Data::EepromBank { bank_error: true, .. } = data {
+            return Err(Error::BankError);
+        }
+        match (self.echo, data) {
+            (Echo::Eeprom { address, bank, data }, Data::Eeprom { address: a, data: d }) => {
+                same(EchoField::Address, a, address)?;
+                // A reply without bank to a request with one: nothing to compare.
+                let _ = bank;
+                data.map_or(Ok(()), |want| same(EchoField::Data, d, want))
+            }
+            (Echo::Eeprom { address, bank, data }, Data::EepromBank { address: a, bank: b, data: d, .. }) => {
+                same(EchoField::Address, a, address)?;
+                bank.map_or(Ok(()), |want| same(EchoField::Bank, b, want))?;
+                data.map_or(Ok(()), |want| same(EchoField::Data, d, want))
+            }
+            (Echo::Id(want), Data::Id { id }) => same(EchoField::Id, id, want),
+            (Echo::Coefficient(want), Data::Coefficient { coefficient }) => {
+                same(EchoField::Coefficient, coefficient, want)
+            }
+            _ => Ok(()),
+        }
+    }
+}
+
+fn same<T: Into<u32>>(field: EchoField, got: T, want: T) -> Result<(), Error> {
+    let (got, want) = (got.into(), want.into());
+    if got == want { Ok(()) } else { Err(Error::EchoMismatch { field, got, want }) }
+}
+
+impl Request {
+    /// The layout of the reply, from an encoder of this profile.
+    ///
+    /// The same request can have different replies: version 3.0 encoders may be set in the factory to answer commands 1
+    /// and 5 with [`Layout::Abs40Vel`], and the resets with [`Layout::Abs24`]. The line does not tell it.
+    pub const fn layout(self, profile: Profile) -> Layout {
+        match self.operation {
+            Operation::Abs40 | Operation::Abs40Mt => Layout::Abs40,
+            Operation::Abs24Low | Operation::Abs24LowMt => {
+                if profile.has_low_with_velocity() {
+                    Layout::Abs40Vel
+                } else {
+                    Layout::Abs24
+                }
+            }
+            Operation::Abs24High | Operation::Abs24HighMt => Layout::Abs24High,
+            Operation::Status | Operation::StatusMt => Layout::Status,
+            Operation::ClearStatus
+            | Operation::ClearMultiturn
+            | Operation::ClearStatusMultiturn
+            | Operation::SetAddress1
+            | Operation::ZeroPreset => {
+                if profile.has_resets_with_position() {
+                    Layout::Abs24
+                } else {
+                    Layout::Status
+                }
+            }
+            Operation::EepromRead { .. } | Operation::EepromWrite { .. } => Layout::Eeprom,
+            Operation::EepromReadBank { .. } | Operation::EepromWriteBank { .. } => Layout::EepromBank,
+            Operation::Temperature => Layout::Temperature,
+            Operation::IdRead1
+            | Operation::IdRead2
+            | Operation::IdWrite1 { .. }
+            | Operation::IdWrite2 { .. }
+            | Operation::SetAddress2 { .. } => Layout::Id,
+            Operation::CoefficientRead | Operation::CoefficientWrite { .. } => Layout::Coefficient,
+            Operation::Abs17 | Operation::Abs17Mt => Layout::Abs17,
+            Operation::Abs24Vel | Operation::Abs24VelMt => Layout::Abs24Vel,
+            Operation::Abs24VelAcc | Operation::Abs24VelAccMt => Layout::Abs24VelAcc,
+            Operation::Abs24Status | Operation::Abs24StatusMt => Layout::Abs24Status,
+            Operation::Abs24Temp | Operation::Abs24TempMt => Layout::Abs24Temp,
+        }
+    }
+
+    /// What the reply of an encoder of this profile has to be.
+    ///
+    /// The address is checked where [`Command::answers_with_own_address`] says so.
+    pub const fn expected(self, profile: Profile) -> Expected {
+        let command = self.command();
+        let expected = Expected::new(self.layout(profile), command).echoing(Echo::of(self.operation));
+        if command.answers_with_own_address() { expected.from_address(self.ea) } else { expected }
+    }
+
+    /// The request itself, if encoders of this profile understand it.
+    ///
+    /// # Errors
+    /// [`Error::UnsupportedInVersion`].
+    pub fn check(self, profile: Profile) -> Result<Self, Error> {
+        let (command, version) = (self.command().in_version(profile.version())?, profile.version());
+        if version < Version::V3_0 && self.operation.needs_version_3() {
+            return Err(Error::UnsupportedInVersion { command, version });
+        }
+        Ok(self)
+    }
+}

@@ -1,0 +1,435 @@
+//! For tools: looks at a line that was refused, lists every fault and guesses the cause.
+//!
+//! Decoders stop at the first fault and give no value; that is right for a drive and unhelpful at a bench. Here all
+//! frames are read whatever their framing, and the usual mistakes (wires exchanged, wrong bit order, some bits early or
+//! late, own echo, wrong rate, other encoder, other command, other layout) are undone one by one: the one that makes the
+//! reply sound is the cause.
+//!
+//! ```
+//! use nikon_aformat::inspect::{Cause, inspect};
+//! use nikon_aformat::{Data, EncoderAddress, EncoderStatus, Operation, Profile, Request, Response, U24};
+//!
+//! let request = Request::new(EncoderAddress::ZERO, Operation::Abs24Low);
+//! let data = Data::Abs24 { abs: U24::truncate(0x12_3456) };
+//! let answer = Response::new(EncoderAddress::ZERO, request.command(), EncoderStatus::NONE, data);
+//! // A and B exchanged: every level is inverted
+//! let report = inspect(request, Profile::default(), answer.emit().line().inverted());
+//! assert_eq!(report.cause, Some(Cause::LineInverted));
+//! assert_eq!(report.response, Some(answer));
+//! ```
+
+use core::fmt;
+
+use nrz_line::{BitOrder, Window};
+
+use crate::{
+    Command, EncoderAddress, Error, ErrorClass, Expected, FRAME_BITS, Layout, Profile, Reply, Request, RequestFrame,
+    Response,
+};
+
+/// One frame, read without judging it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct RawFrame {
+    /// The content bits, the first of the line in bit 0.
+    pub content: u16,
+    /// Whether the start bit reads 0.
+    pub start_ok: bool,
+    /// Whether the delimiter reads 1.
+    pub delimiter_ok: bool,
+}
+
+/// What a frame is by its sync code.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub enum Kind {
+    /// A frame of a request.
+    Request,
+    /// The first frame of a reply.
+    Reply,
+    /// Neither: a later frame of a reply, or a damaged one.
+    Other,
+}
+
+impl Kind {
+    /// By the content bits of a frame, the first of the line in bit 0. Later frames of a reply hold anything, so ask only
+    /// where a request or a reply can begin.
+    pub const fn of(content: u16) -> Self {
+        match content & 7 {
+            2 => Self::Request,
+            4 => Self::Reply,
+            _ => Self::Other,
+        }
+    }
+}
+
+/// What most likely went wrong.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[non_exhaustive]
+pub enum Cause {
+    /// Every level is inverted: A and B are exchanged, or the receiver's polarity is wrong.
+    LineInverted,
+    /// The reply was taken `bits` bits too early (negative: too late).
+    Shifted {
+        /// Idle bits in front of the reply; negative: bits of it that are missing.
+        bits: i8,
+    },
+    /// Bits are packed most significant first and were read least significant first, or the other way round.
+    WrongBitOrder,
+    /// The own request came back, and the reply behind it.
+    OwnEcho,
+    /// Only the own request came back: no encoder, or A and B are exchanged on a half-duplex line.
+    OnlyEcho,
+    /// The line was sampled twice a bit: the real rate is half of the assumed one.
+    HalfRate,
+    /// A sound reply of another encoder.
+    OtherEncoder {
+        /// Who answered.
+        ea: EncoderAddress,
+    },
+    /// A sound reply to another command.
+    OtherCommand {
+        /// What was answered.
+        answered: Command,
+    },
+    /// A sound reply to this command in another layout: the profile does not know the factory setting of the encoder.
+    OtherLayout {
+        /// How it was answered.
+        layout: Layout,
+    },
+    /// The line does not move from 0: short circuit, driver stuck, or no supply.
+    StuckLow,
+    /// The line does not move from 1: nobody answers.
+    StuckHigh,
+    /// Everything is right but the CRC-8: single bits were disturbed.
+    Disturbed,
+}
+
+impl fmt::Display for Cause {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::LineInverted => f.write_str("the line is inverted: exchange A and B, or the polarity of the input"),
+            Self::Shifted { bits } if *bits > 0 => write!(f, "the reply begins {bits} bit(s) later than it was taken"),
+            Self::Shifted { bits } => {
+                write!(f, "{} bit(s) at the beginning of the reply are missing", bits.unsigned_abs())
+            }
+            Self::WrongBitOrder => f.write_str("the bits of each byte are in the other order"),
+            Self::OwnEcho => f.write_str("the own request came back before the reply: remove the echo"),
+            Self::OnlyEcho => f.write_str("only the own request came back: no encoder, or A and B are exchanged"),
+            Self::HalfRate => f.write_str("the line runs at half the assumed bit rate"),
+            Self::OtherEncoder { ea } => write!(f, "this is a sound reply of encoder {ea}"),
+            Self::OtherCommand { answered } => {
+                write!(f, "this is a sound reply to command {}, {answered}", answered.code())
+            }
+            Self::OtherLayout { layout } => {
+                write!(f, "this is a sound reply in layout {layout}: the encoder's factory setting differs")
+            }
+            Self::StuckLow => f.write_str("the line stays at 0"),
+            Self::StuckHigh => f.write_str("the line stays at 1: nobody answers"),
+            Self::Disturbed => f.write_str("single bits were disturbed"),
+        }
+    }
+}
+
+/// The kinds of faults found, as a set.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Findings(u32);
+
+impl Findings {
+    /// Whether a fault of this kind was found.
+    pub const fn has(self, class: ErrorClass) -> bool {
+        self.0 >> class as u32 & 1 == 1
+    }
+
+    /// Whether none was found.
+    pub const fn is_empty(self) -> bool {
+        self.0 == 0
+    }
+
+    /// The kinds that were found, in the order of the checks.
+    pub fn classes(self) -> impl Iterator<Item = ErrorClass> {
+        ErrorClass::ALL.into_iter().filter(move |class| self.has(*class))
+    }
+
+    const fn add(&mut self, class: ErrorClass, found: bool) {
+        self.0 |= (found as u32) << class as u32;
+    }
+}
+
+/// What there is to say about a line.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Report {
+    frames: [RawFrame; Reply::MAX_FRAMES],
+    len: u8,
+    /// Every kind of fault in the line as it was given.
+    pub findings: Findings,
+    /// The fault that a decoder reports.
+    pub error: Option<Error>,
+    /// The most likely cause of it.
+    pub cause: Option<Cause>,
+    /// The reply, as it is if nothing is wrong, or as it would be without the cause. For showing to a person only.
+    pub response: Option<Response>,
+    /// Received and computed CRC-8, if the line holds all frames.
+    pub crc: Option<(u8, u8)>,
+}
+
+impl Report {
+    /// The whole frames of the line on its grid, at most as many as the reply has.
+    pub fn frames(&self) -> &[RawFrame] {
+        self.frames.get(..usize::from(self.len)).unwrap_or(&self.frames)
+    }
+}
+
+/// Looks at line bits that should hold the reply to `request`.
+pub fn inspect(request: Request, profile: Profile, line: Window) -> Report {
+    let expected = request.expected(profile);
+    let outcome = Response::parse_line(line, &expected);
+    let (cause, response) = match outcome {
+        Ok(response) => (None, Some(response)),
+        Err(error) => diagnose(request, &expected, line, error),
+    };
+    let (frames, len) = raw_frames(line, expected.layout());
+    let reply = whole(&frames, len, expected.layout());
+    let crc = reply.map(|reply| reply.crc());
+    let error = outcome.err();
+    let mut report = Report { frames, len, findings: Findings::default(), error, cause, response, crc };
+    report.findings = findings(&report, &expected);
+    report
+}
+
+/// Undoes the usual mistakes one by one; the first that gives a sound reply is the cause.
+fn diagnose(request: Request, expected: &Expected, line: Window, error: Error) -> (Option<Cause>, Option<Response>) {
+    if line.inverted().bits() == 0 {
+        return (Some(Cause::StuckHigh), None);
+    }
+    if line.bits() == 0 {
+        return (Some(Cause::StuckLow), None);
+    }
+    if let Some((cause, response)) = other_party(expected, line) {
+        return (Some(cause), Some(response));
+    }
+    let sound = |line: Option<Window>| line.and_then(|line| Response::parse_line(line, expected).ok());
+    let attempts = [
+        (Cause::LineInverted, sound(Some(line.inverted()))),
+        (Cause::WrongBitOrder, sound(reordered(line))),
+        (Cause::OwnEcho, sound(behind_echo(request, line))),
+        (Cause::HalfRate, half_rate(expected, line)),
+    ];
+    for (cause, response) in attempts {
+        if response.is_some() {
+            return (Some(cause), response);
+        }
+    }
+    if let Some((bits, response)) = shifted(expected, line) {
+        return (Some(Cause::Shifted { bits }), Some(response));
+    }
+    if behind_echo(request, line).is_some_and(Window::is_empty) {
+        return (Some(Cause::OnlyEcho), None);
+    }
+    (matches!(error, Error::Crc { .. }).then_some(Cause::Disturbed), None)
+}
+
+/// A sound reply from somebody else, to something else or in another layout. The CRC-8 is checked in any case.
+fn other_party(expected: &Expected, line: Window) -> Option<(Cause, Response)> {
+    let any = expected.any_address();
+    if let Ok(response) = Response::parse_line(line, &any) {
+        return Some((Cause::OtherEncoder { ea: response.ea }, response));
+    }
+    let code = line.bits() >> 7 & 31;
+    let answered = u8::try_from(code).ok().and_then(|code| Command::from_code(code).ok())?;
+    answered.layouts().into_iter().find_map(|layout| {
+        // The short form does not say what it answers.
+        let layout = Some(layout).filter(|layout| *layout != Layout::Abs17)?;
+        let response = Response::parse_line(line, &Expected::new(layout, answered)).ok()?;
+        let same = answered == expected.command();
+        let cause = if same { Cause::OtherLayout { layout } } else { Cause::OtherCommand { answered } };
+        Some((cause, response))
+    })
+}
+
+/// The line with the bits of every byte in the other order.
+fn reordered(line: Window) -> Option<Window> {
+    Window::read(&line.to_bytes(BitOrder::LsbFirst), 0, line.len(), BitOrder::MsbFirst).ok()
+}
+
+/// What follows the own request and the turn-round, if the line begins with the request's only frame; nothing is left if
+/// nobody answers.
+fn behind_echo(request: Request, line: Window) -> Option<Window> {
+    let frames = request.emit();
+    let [frame] = frames.as_slice() else { return None };
+    let rest = line.skip(FRAME_BITS)?;
+    if RequestFrame::from_line(line) != Ok(*frame) {
+        return None;
+    }
+    rest.skip(rest.bits().trailing_ones().min(rest.len()))
+}
+
+/// Every second bit, if the line shows each twice.
+fn half_rate(expected: &Expected, line: Window) -> Option<Response> {
+    let mut bits = 0_u128;
+    for at in 0..line.len() / 2 {
+        let (a, b) = (line.get(at.wrapping_mul(2)), line.get(at.wrapping_mul(2).wrapping_add(1)));
+        if a != b {
+            return None;
+        }
+        bits |= u128::from(a == Some(true)) << at;
+    }
+    Response::parse_line(Window::from_bits(bits, line.len() / 2)?, expected).ok()
+}
+
+/// The reply some bits later, or with some bits lost in front that are put back as idle start.
+fn shifted(expected: &Expected, line: Window) -> Option<(i8, Response)> {
+    for bits in 1..=20_i8 {
+        let later = line.skip(bits.unsigned_abs().into());
+        let response = later.and_then(|line| Response::parse_line(line, expected).ok());
+        if let Some(response) = response {
+            return Some((bits, response));
+        }
+    }
+    // The first bits are a start bit and two bits of the sync code, all 0, so up to three can be put back.
+    for bits in 1..=3_u32 {
+        let earlier = line
+            .bits()
+            .checked_shl(bits)
+            .and_then(|all| Window::from_bits(all, line.len().saturating_add(bits).min(128)));
+        let response = earlier.and_then(|line| Response::parse_line(line, expected).ok());
+        if let (Some(response), Ok(bits)) = (response, i8::try_from(bits)) {
+            return Some((bits.wrapping_neg(), response));
+        }
+    }
+    None
+}
+
+#[expect(clippy::cast_possible_truncation, reason = "sixteen bits")]
+fn raw_frames(line: Window, layout: Layout) -> ([RawFrame; Reply::MAX_FRAMES], u8) {
+    let mut frames = [RawFrame { content: 0, start_ok: false, delimiter_ok: false }; Reply::MAX_FRAMES];
+    let mut len = 0_u8;
+    for frame in frames.iter_mut().take(usize::from(layout.frames())) {
+        let at = u32::from(len).wrapping_mul(FRAME_BITS);
+        let Some(delimiter) = line.get(at.wrapping_add(17)) else { break };
+        let content = (line.bits() >> at.wrapping_add(1)) as u16;
+        *frame = RawFrame { content, start_ok: line.get(at) == Some(false), delimiter_ok: delimiter };
+        len = len.wrapping_add(1);
+    }
+    (frames, len)
+}
+
+/// The frames as a reply, whatever their framing.
+fn whole(frames: &[RawFrame; Reply::MAX_FRAMES], len: u8, layout: Layout) -> Option<Reply> {
+    let words = frames.map(|frame| frame.content);
+    let words = words.get(..usize::from(len))?;
+    Reply::from_words(words, BitOrder::LsbFirst, layout).ok()
+}
+
+fn findings(report: &Report, expected: &Expected) -> Findings {
+    let mut found = Findings::default();
+    found.add(ErrorClass::Truncated, report.len < expected.layout().frames());
+    found.add(ErrorClass::StartBit, report.frames().iter().any(|frame| !frame.start_ok));
+    found.add(ErrorClass::Delimiter, report.frames().iter().any(|frame| !frame.delimiter_ok));
+    found.add(ErrorClass::Crc, report.crc.is_some_and(|(got, want)| got != want));
+    if let Some(first) = report.frames().first().map(|frame| frame.content) {
+        let full = expected.layout() != Layout::Abs17;
+        let (ea, code) = (first >> 3 & 7, first >> 6 & 31);
+        found.add(ErrorClass::SyncCode, Kind::of(first) != Kind::Reply);
+        found.add(ErrorClass::FixedBit, full && first >> 11 & 1 == 1);
+        found.add(ErrorClass::AddressMismatch, expected.ea().is_some_and(|want| u16::from(want.get()) != ea));
+        found.add(ErrorClass::CommandMismatch, full && u16::from(expected.command().code()) != code);
+    }
+    if let Some(error @ (Error::BankError | Error::EchoMismatch { .. })) = report.error {
+        found.add(error.class(), true);
+    }
+    found
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::response::tests::exchanges;
+    use proptest::prelude::*;
+    use std::string::ToString;
+
+    fn cause(request: Request, line: Window) -> Option<Cause> {
+        inspect(request, Profile::default(), line).cause
+    }
+
+    fn plain() -> impl Strategy<Value = (Request, Response)> {
+        exchanges().prop_filter_map("as the default profile answers", |(request, expected, response)| {
+            (request.expected(Profile::default()) == expected).then_some((request, response))
+        })
+    }
+
+    fn window(bits: u128, len: u32) -> Window {
+        Window::from_bits(bits, len.min(128)).unwrap()
+    }
+
+    proptest! {
+        #[test]
+        fn a_good_reply_has_no_findings((request, response) in plain()) {
+            let report = inspect(request, Profile::default(), response.emit().line());
+            prop_assert!(report.findings.is_empty() && report.error.is_none() && report.cause.is_none());
+            prop_assert_eq!(report.response, Some(response));
+            prop_assert_eq!(report.frames().len(), usize::from(response.layout().frames()));
+        }
+
+        #[test]
+        fn usual_mistakes_are_named((request, response) in plain(), idle in 1..20_u32) {
+            let line = response.emit().line();
+            prop_assert_eq!(cause(request, line.inverted()), Some(Cause::LineInverted));
+            let late = window(line.bits() << idle | ((1 << idle) - 1), line.len() + idle);
+            prop_assert_eq!(cause(request, late), Some(Cause::Shifted { bits: idle as i8 }));
+            let early = line.skip(2).unwrap();
+            prop_assert_eq!(cause(request, window(early.bits() | u128::MAX << early.len(), line.len())), Some(Cause::Shifted { bits: -2 }));
+            for at in 1..17 {
+                let report = inspect(request, Profile::default(), window(line.bits() ^ 1 << at, line.len()));
+                prop_assert!(report.findings.has(ErrorClass::Crc));
+            }
+        }
+
+        #[test]
+        fn other_parties((request, response) in plain()) {
+            prop_assume!(request.expected(Profile::default()).ea().is_some());
+            let ea = EncoderAddress::truncate(request.ea.get() + 1);
+            let other = Response { ea, ..response };
+            let report = inspect(request, Profile::default(), other.emit().line());
+            prop_assert_eq!((report.cause, report.response), (Some(Cause::OtherEncoder { ea }), Some(other)));
+        }
+
+        /// Whatever is on the line, there is a report, and a value in it only with a sound CRC-8.
+        #[test]
+        fn anything_goes((request, _) in plain(), bits: u128, len in 0..=128_u32) {
+            let report = inspect(request, Profile::default(), window(bits, len));
+            prop_assert_eq!(report.error.is_none(), report.cause.is_none() && report.response.is_some());
+        }
+    }
+
+    #[test]
+    fn echo_layout_and_dead_lines() {
+        use crate::{Data, EncoderStatus, Operation, U24, U40};
+        let request = Request::new(EncoderAddress::ZERO, Operation::Abs24Low);
+        let answer =
+            |data| Response::new(EncoderAddress::ZERO, request.command(), EncoderStatus::NONE, data).emit().line();
+        let line = answer(Data::Abs24 { abs: U24::truncate(77) });
+        let frames = request.emit();
+        let echo = frames.as_slice()[0].line();
+        let both = echo.bits() | 0b1_1111 << 18 | line.bits() << 23;
+        assert_eq!(cause(request, window(both, 77)), Some(Cause::OwnEcho));
+        assert_eq!(cause(request, window(echo.bits() | u128::MAX << 18, 60)), Some(Cause::OnlyEcho));
+        let wide = answer(Data::Abs40Vel { abs: U40::truncate(5), velocity: -1 });
+        assert_eq!(cause(request, wide), Some(Cause::OtherLayout { layout: Layout::Abs40Vel }));
+        assert_eq!(cause(request, window(0, 54)), Some(Cause::StuckLow));
+        assert_eq!(cause(request, window(u128::MAX, 54)), Some(Cause::StuckHigh));
+        let double = (0..54).fold(0_u128, |bits, at| bits | ((line.bits() >> at & 1) * 3) << (2 * at));
+        assert_eq!(cause(request, window(double, 108)), Some(Cause::HalfRate));
+        assert!(Cause::OtherEncoder { ea: EncoderAddress::MAX }.to_string().ends_with("encoder 7"));
+        assert_eq!(
+            (Kind::of(echo.bits() as u16 >> 1), Kind::of(line.bits() as u16 >> 1)),
+            (Kind::Request, Kind::Reply)
+        );
+    }
+}

@@ -1,0 +1,86 @@
+use super::{EepromRead, Polling, Step};
+use crate::{EncoderAddress, Error, Operation, Profile, Request, Response, TypeWord};
+
+/// Finds an encoder and its widths: command 4, then the type word of the EEPROM.
+///
+/// The bit rate is part of the encoder's order code and has to be tried out by the caller: no reply means another rate.
+/// One drive maker tries 4 Mbit/s first, then 2.5.
+///
+/// On a line with several encoders ask each by its address with [`Detection::of`].
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Detection {
+    ea: Option<EncoderAddress>,
+    reading: Option<EepromRead>,
+}
+
+/// An encoder that was found.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Detected {
+    /// Its address.
+    pub ea: EncoderAddress,
+    /// Its type word.
+    pub type_word: TypeWord,
+    /// Its widths, if the type word is one of the known ones, in a profile of version 2.1: nothing on the line tells the
+    /// version.
+    pub profile: Option<Profile>,
+}
+
+impl Detection {
+    /// Finds the only encoder on the line, whatever its address.
+    pub const fn search() -> Self {
+        Self { ea: None, reading: None }
+    }
+
+    /// Asks the encoder with this address.
+    pub const fn of(ea: EncoderAddress) -> Self {
+        Self { ea: Some(ea), reading: None }
+    }
+
+    /// The first request, at once: command 4 to the highest address, which any encoder answers, or the type word.
+    pub const fn start(&mut self, now_ns: u64) -> Step<Detected> {
+        self.reading = None;
+        match self.ea {
+            Some(ea) => self.read(ea, now_ns),
+            None => {
+                Step::Send { request: Request::new(EncoderAddress::MAX, Operation::Abs40Mt), not_before_ns: now_ns }
+            }
+        }
+    }
+
+    /// A transaction ended at `now_ns` with this outcome.
+    pub fn answer(&mut self, outcome: Result<Response, Error>, now_ns: u64) -> Step<Detected> {
+        let Some(mut reading) = self.reading else {
+            let soon = now_ns.saturating_add(crate::REQUEST_GAP_NS.into());
+            return match outcome {
+                Ok(response) => self.read(response.ea, soon),
+                Err(error) => Step::Failed { error, not_before_ns: soon },
+            };
+        };
+        let step = reading.answer(outcome, now_ns);
+        self.reading = Some(reading);
+        match step {
+            Step::Send { request, not_before_ns } => Step::Send { request, not_before_ns },
+            Step::Failed { error, not_before_ns } => Step::Failed { error, not_before_ns },
+            Step::Done { value, not_before_ns } => {
+                let type_word = TypeWord(value);
+                let value = Detected { ea: reading.ea(), type_word, profile: type_word.profile() };
+                Step::Done { value, not_before_ns }
+            }
+        }
+    }
+
+    const fn read(&mut self, ea: EncoderAddress, not_before_ns: u64) -> Step<Detected> {
+        let mut reading = EepromRead::new(ea, TypeWord::EEPROM_ADDRESS, Polling::READ);
+        let first = reading.start(not_before_ns);
+        self.reading = Some(reading);
+        match first {
+            Step::Send { request, not_before_ns } => Step::Send { request, not_before_ns },
+            // Never: a read begins with a request.
+            Step::Done { not_before_ns, .. } | Step::Failed { not_before_ns, .. } => {
+                Step::Failed { error: Error::NoResponse, not_before_ns }
+            }
+        }
+    }
+}

@@ -1,0 +1,565 @@
+use nrz_line::{BitOrder, OutOfBounds, Window};
+
+use crate::frame::{FRAME_BITS, truncated};
+use crate::{Command, EncoderAddress, Error, FrameCode, RequestFrame, U19, U24, UserAddress, Version};
+
+/// What a master asks one encoder for, or with a multi-response command several.
+///
+/// ```text
+///  all others                      CDF
+///  EepromRead                      CDF  MDF2 address
+///  EepromWrite                     CDF  MDF0 data low  MDF1 data high  MDF2 address
+///  IdWrite1, IdWrite2, SetAddress2 CDF  MDF0 id 0..=7  MDF1 id 8..=15  MDF2 id 16..=23
+///  EepromReadBank                  CDF, frame code 3   MDF3 bank       MDF2 address              version 3.0
+///  EepromWriteBank                 CDF, frame code 3   MDF0 data low   MDF1 data high  MDF3 bank  MDF2 address
+///  CoefficientRead                 CDF, frame code 3
+///  CoefficientWrite                CDF, frame code 3   MDF0 0..=7      MDF1 8..=15     MDF2 16..=18
+/// ```
+///
+/// In a multi-response request EA is best read as the highest address that is asked to answer; no document says it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "arbitrary", derive(arbitrary::Arbitrary))]
+pub struct Request {
+    /// EA: the encoder; for [`Operation::SetAddress1`] and [`Operation::SetAddress2`] its new address.
+    pub ea: EncoderAddress,
+    /// What it shall do.
+    pub operation: Operation,
+}
+
+/// A command with its arguments. See [`Command`] for what each does.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "arbitrary", derive(arbitrary::Arbitrary))]
+#[allow(missing_docs, reason = "those without a comment are the commands of the same name")]
+pub enum Operation {
+    Abs40,
+    Abs24Low,
+    Abs24High,
+    Status,
+    Abs40Mt,
+    Abs24LowMt,
+    Abs24HighMt,
+    StatusMt,
+    ClearStatus,
+    ClearMultiturn,
+    ClearStatusMultiturn,
+    SetAddress1,
+    ZeroPreset,
+    /// Reads an EEPROM word.
+    EepromRead {
+        /// Any address.
+        address: u8,
+    },
+    /// Writes an EEPROM word.
+    EepromWrite {
+        /// 0x00..=0xef.
+        address: UserAddress,
+        /// The word.
+        data: u16,
+    },
+    Temperature,
+    IdRead1,
+    IdRead2,
+    /// Writes the identification code of the encoder with this address.
+    IdWrite1 {
+        /// The new code.
+        id: U24,
+    },
+    /// Writes the identification code of the only encoder on the line.
+    IdWrite2 {
+        /// The new code.
+        id: U24,
+    },
+    /// Gives the encoder with this identification code the address in EA.
+    SetAddress2 {
+        /// Whom it concerns.
+        id: U24,
+    },
+    Abs17,
+    Abs17Mt,
+    Abs24Vel,
+    Abs24VelMt,
+    Abs24VelAcc,
+    Abs24VelAccMt,
+    Abs24Status,
+    Abs24StatusMt,
+    Abs24Temp,
+    Abs24TempMt,
+    /// Reads an EEPROM word of a bank. Version 3.0.
+    EepromReadBank {
+        /// Bank.
+        bank: u8,
+        /// Any address.
+        address: u8,
+    },
+    /// Writes an EEPROM word of a bank. Version 3.0.
+    EepromWriteBank {
+        /// Bank.
+        bank: u8,
+        /// Any address.
+        address: u8,
+        /// The word.
+        data: u16,
+    },
+    /// Reads the velocity coefficient. Version 3.0.
+    CoefficientRead,
+    /// Writes the velocity coefficient. Version 3.0.
+    CoefficientWrite {
+        /// 19 bits; unit and meaning are not documented.
+        coefficient: U19,
+    },
+}
+
+impl Operation {
+    /// The command.
+    pub const fn command(self) -> Command {
+        match self {
+            Self::Abs40 => Command::Abs40,
+            Self::Abs24Low => Command::Abs24Low,
+            Self::Abs24High => Command::Abs24High,
+            Self::Status => Command::Status,
+            Self::Abs40Mt => Command::Abs40Mt,
+            Self::Abs24LowMt => Command::Abs24LowMt,
+            Self::Abs24HighMt => Command::Abs24HighMt,
+            Self::StatusMt => Command::StatusMt,
+            Self::ClearStatus => Command::ClearStatus,
+            Self::ClearMultiturn => Command::ClearMultiturn,
+            Self::ClearStatusMultiturn => Command::ClearStatusMultiturn,
+            Self::SetAddress1 => Command::SetAddress1,
+            Self::ZeroPreset => Command::ZeroPreset,
+            Self::EepromRead { .. } | Self::EepromReadBank { .. } => Command::EepromRead,
+            Self::EepromWrite { .. } | Self::EepromWriteBank { .. } => Command::EepromWrite,
+            Self::Temperature => Command::Temperature,
+            Self::IdRead1 | Self::CoefficientRead => Command::IdRead1,
+            Self::IdRead2 => Command::IdRead2,
+            Self::IdWrite1 { .. } | Self::CoefficientWrite { .. } => Command::IdWrite1,
+            Self::IdWrite2 { .. } => Command::IdWrite2,
+            Self::SetAddress2 { .. } => Command::SetAddress2,
+            Self::Abs17 => Command::Abs17,
+            Self::Abs17Mt => Command::Abs17Mt,
+            Self::Abs24Vel => Command::Abs24Vel,
+            Self::Abs24VelMt => Command::Abs24VelMt,
+            Self::Abs24VelAcc => Command::Abs24VelAcc,
+            Self::Abs24VelAccMt => Command::Abs24VelAccMt,
+            Self::Abs24Status => Command::Abs24Status,
+            Self::Abs24StatusMt => Command::Abs24StatusMt,
+            Self::Abs24Temp => Command::Abs24Temp,
+            Self::Abs24TempMt => Command::Abs24TempMt,
+        }
+    }
+
+    /// The operation of a command that takes no argument; `None` for the five that do (13, 14, 18, 19, 20).
+    pub const fn without_arguments(command: Command) -> Option<Self> {
+        Some(match command {
+            Command::Abs40 => Self::Abs40,
+            Command::Abs24Low => Self::Abs24Low,
+            Command::Abs24High => Self::Abs24High,
+            Command::Status => Self::Status,
+            Command::Abs40Mt => Self::Abs40Mt,
+            Command::Abs24LowMt => Self::Abs24LowMt,
+            Command::Abs24HighMt => Self::Abs24HighMt,
+            Command::StatusMt => Self::StatusMt,
+            Command::ClearStatus => Self::ClearStatus,
+            Command::ClearMultiturn => Self::ClearMultiturn,
+            Command::ClearStatusMultiturn => Self::ClearStatusMultiturn,
+            Command::SetAddress1 => Self::SetAddress1,
+            Command::ZeroPreset => Self::ZeroPreset,
+            Command::Temperature => Self::Temperature,
+            Command::IdRead1 => Self::IdRead1,
+            Command::IdRead2 => Self::IdRead2,
+            Command::Abs17 => Self::Abs17,
+            Command::Abs17Mt => Self::Abs17Mt,
+            Command::Abs24Vel => Self::Abs24Vel,
+            Command::Abs24VelMt => Self::Abs24VelMt,
+            Command::Abs24VelAcc => Self::Abs24VelAcc,
+            Command::Abs24VelAccMt => Self::Abs24VelAccMt,
+            Command::Abs24Status => Self::Abs24Status,
+            Command::Abs24StatusMt => Self::Abs24StatusMt,
+            Command::Abs24Temp => Self::Abs24Temp,
+            Command::Abs24TempMt => Self::Abs24TempMt,
+            Command::EepromRead
+            | Command::EepromWrite
+            | Command::IdWrite1
+            | Command::IdWrite2
+            | Command::SetAddress2 => return None,
+        })
+    }
+
+    /// The frame code of the command data frame: 3 for banks and the velocity coefficient, else 0.
+    pub const fn frame_code(self) -> FrameCode {
+        match self {
+            Self::EepromReadBank { .. }
+            | Self::EepromWriteBank { .. }
+            | Self::CoefficientRead
+            | Self::CoefficientWrite { .. } => FrameCode::Fc3,
+            _ => FrameCode::Fc0,
+        }
+    }
+
+    /// Whether only encoders of version 3.0 understand it.
+    pub const fn needs_version_3(self) -> bool {
+        matches!(self.frame_code(), FrameCode::Fc3) || matches!(self.command().min_version(), Version::V3_0)
+    }
+
+    /// Whether the encoder changes something that outlives the request: EEPROM, identification code, address, zero
+    /// point, turns, alarms.
+    pub const fn writes(self) -> bool {
+        self.command().is_reset()
+            || matches!(
+                self,
+                Self::EepromWrite { .. }
+                    | Self::EepromWriteBank { .. }
+                    | Self::IdWrite1 { .. }
+                    | Self::IdWrite2 { .. }
+                    | Self::SetAddress2 { .. }
+                    | Self::CoefficientWrite { .. }
+            )
+    }
+}
+
+impl Request {
+    /// A request of `operation` to the encoder `ea`.
+    pub const fn new(ea: EncoderAddress, operation: Operation) -> Self {
+        Self { ea, operation }
+    }
+
+    /// The command.
+    pub const fn command(self) -> Command {
+        self.operation.command()
+    }
+
+    /// The frames to send.
+    ///
+    /// ```
+    /// use nikon_aformat::{BitOrder, EncoderAddress, Operation, Request};
+    /// let request = Request::new(EncoderAddress::ZERO, Operation::EepromRead { address: 0xf6 });
+    /// let frames = request.emit();
+    /// let words = frames.as_slice().iter().map(|frame| frame.word(BitOrder::MsbFirst));
+    /// assert!(words.eq([0x40b0, 0x5b78]));
+    /// ```
+    pub const fn emit(self) -> Frames {
+        let cdf = RequestFrame::cdf(self.operation.frame_code(), self.ea, self.command().code());
+        match self.operation {
+            Operation::EepromRead { address } => Frames::of([cdf, mdf2(address), cdf, cdf, cdf], 2),
+            Operation::EepromWrite { address, data } => {
+                let [low, high] = data.to_le_bytes();
+                Frames::of([cdf, mdf0(low), mdf1(high), mdf2(address.get()), cdf], 4)
+            }
+            Operation::EepromReadBank { bank, address } => Frames::of([cdf, mdf3(bank), mdf2(address), cdf, cdf], 3),
+            Operation::EepromWriteBank { bank, address, data } => {
+                let [low, high] = data.to_le_bytes();
+                Frames::of([cdf, mdf0(low), mdf1(high), mdf3(bank), mdf2(address)], 5)
+            }
+            Operation::IdWrite1 { id } | Operation::IdWrite2 { id } | Operation::SetAddress2 { id } => {
+                Frames::of_three_bytes(cdf, id.get())
+            }
+            Operation::CoefficientWrite { coefficient } => Frames::of_three_bytes(cdf, coefficient.get()),
+            _ => Frames::of([cdf; 5], 1),
+        }
+    }
+
+    /// How many frames a request has that begins with this command data frame.
+    ///
+    /// # Errors
+    /// [`Error::FrameCode`] for a frame code that no request with this command begins with, [`Error::UnknownCommand`].
+    pub fn expected_frames(cdf: RequestFrame) -> Result<u8, Error> {
+        let command = Command::from_code(cdf.code());
+        match (cdf.frame_code(), command) {
+            (FrameCode::Fc0, Ok(Command::EepromRead)) => Ok(2),
+            (FrameCode::Fc0, Ok(Command::EepromWrite | Command::IdWrite2 | Command::SetAddress2))
+            | (FrameCode::Fc0 | FrameCode::Fc3, Ok(Command::IdWrite1)) => Ok(4),
+            (FrameCode::Fc3, Ok(Command::EepromRead)) => Ok(3),
+            (FrameCode::Fc3, Ok(Command::EepromWrite)) => Ok(5),
+            (FrameCode::Fc0, Ok(_)) | (FrameCode::Fc3, Ok(Command::IdRead1)) => Ok(1),
+            (FrameCode::Fc0, Err(error)) => Err(error),
+            (got, _) => Err(Error::FrameCode { frame: 0, got: got.get(), want: 0 }),
+        }
+    }
+
+    /// What an encoder makes of received frames. Frames behind the request are left alone.
+    ///
+    /// # Errors
+    /// [`Error::Truncated`], [`Error::FrameCode`], [`Error::UnknownCommand`]; [`Error::AddressRange`] for a write to
+    /// the maker's addresses, [`Error::DataRange`] for a coefficient above 19 bits.
+    pub fn parse(frames: &[RequestFrame]) -> Result<Self, Error> {
+        let Some(cdf) = frames.first() else { return Err(truncated(0, FRAME_BITS)) };
+        let (ea, want) = (cdf.ea(), Self::expected_frames(*cdf)?);
+        let command = Command::from_code(cdf.code())?;
+        let Some(memory) = frames.get(1..usize::from(want)) else {
+            let got = u32::try_from(frames.len()).unwrap_or(u32::MAX);
+            return Err(truncated(got.saturating_mul(FRAME_BITS), u32::from(want).wrapping_mul(FRAME_BITS)));
+        };
+        let bank = cdf.frame_code() == FrameCode::Fc3;
+        check_order(memory)?;
+        let byte = |at| memory.get(at).copied().map_or(0, RequestFrame::byte);
+        let data = u16::from_le_bytes([byte(0), byte(1)]);
+        let three = u32::from_le_bytes([byte(0), byte(1), byte(2), 0]);
+        let operation = match (command, bank) {
+            (Command::EepromRead, false) => Operation::EepromRead { address: byte(0) },
+            (Command::EepromRead, true) => Operation::EepromReadBank { bank: byte(0), address: byte(1) },
+            (Command::EepromWrite, false) => {
+                Operation::EepromWrite { address: UserAddress::try_from(u32::from(byte(2)))?, data }
+            }
+            (Command::EepromWrite, true) => Operation::EepromWriteBank { bank: byte(2), address: byte(3), data },
+            (Command::IdWrite1, false) => Operation::IdWrite1 { id: U24::truncate(three) },
+            (Command::IdWrite1, true) => {
+                Operation::CoefficientWrite { coefficient: U19::new(three).ok_or(Error::DataRange { got: three })? }
+            }
+            (Command::IdWrite2, _) => Operation::IdWrite2 { id: U24::truncate(three) },
+            (Command::SetAddress2, _) => Operation::SetAddress2 { id: U24::truncate(three) },
+            (Command::IdRead1, true) => Operation::CoefficientRead,
+            (other, _) => Operation::without_arguments(other).ok_or(Error::UnknownCommand { code: other.code() })?,
+        };
+        Ok(Self { ea, operation })
+    }
+}
+
+const fn mdf0(byte: u8) -> RequestFrame {
+    RequestFrame::mdf(FrameCode::Fc1, byte)
+}
+
+const fn mdf1(byte: u8) -> RequestFrame {
+    RequestFrame::mdf(FrameCode::Fc2, byte)
+}
+
+const fn mdf2(byte: u8) -> RequestFrame {
+    RequestFrame::mdf(FrameCode::Fc3, byte)
+}
+
+const fn mdf3(byte: u8) -> RequestFrame {
+    RequestFrame::mdf(FrameCode::Fc0, byte)
+}
+
+/// Whether memory frames come in the order of a request: MDF0, MDF1, MDF3, MDF2, those that it has.
+fn check_order(memory: &[RequestFrame]) -> Result<(), Error> {
+    let order: &[FrameCode] = match memory.len() {
+        1 => &[FrameCode::Fc3],
+        2 => &[FrameCode::Fc0, FrameCode::Fc3],
+        3 => &[FrameCode::Fc1, FrameCode::Fc2, FrameCode::Fc3],
+        _ => &[FrameCode::Fc1, FrameCode::Fc2, FrameCode::Fc0, FrameCode::Fc3],
+    };
+    for (frame, (got, want)) in (1..).zip(memory.iter().zip(order)) {
+        if got.frame_code() != *want {
+            return Err(Error::FrameCode { frame, got: got.frame_code().get(), want: want.get() });
+        }
+    }
+    Ok(())
+}
+
+/// The frames of one request, 1 to 5, in the order of the line.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Frames {
+    frames: [RequestFrame; 5],
+    len: u8,
+}
+
+impl Frames {
+    /// Most frames of a request.
+    pub const MAX: usize = 5;
+
+    const fn of(frames: [RequestFrame; 5], len: u8) -> Self {
+        Self { frames, len }
+    }
+
+    const fn of_three_bytes(cdf: RequestFrame, value: u32) -> Self {
+        let [low, middle, high, _] = value.to_le_bytes();
+        Self::of([cdf, mdf0(low), mdf1(middle), mdf2(high), cdf], 4)
+    }
+
+    /// The frames.
+    pub fn as_slice(&self) -> &[RequestFrame] {
+        self.frames.get(..usize::from(self.len)).unwrap_or(&self.frames)
+    }
+
+    /// Line bits from the first start bit to the last delimiter, with `gap_bits` idle bits between two frames.
+    pub const fn line_bits(self, gap_bits: u32) -> u32 {
+        let gaps = (self.len as u32).saturating_sub(1);
+        (self.len as u32).wrapping_mul(FRAME_BITS).saturating_add(gaps.saturating_mul(gap_bits))
+    }
+
+    /// Writes the line bits over those of `bytes` that begin at bit `offset`, with `gap_bits` idle bits between two
+    /// frames (see [`BitRate::bits`](crate::BitRate::bits)); gives the number of bits.
+    ///
+    /// ```
+    /// use nikon_aformat::{BitOrder, BitRate, EncoderAddress, FRAME_GAP_NS, Operation, Request};
+    /// let request = Request::new(EncoderAddress::ZERO, Operation::EepromRead { address: 0xf6 });
+    /// let gap = BitRate::Mbit2_5.bits(FRAME_GAP_NS);
+    /// let mut line = [0xff; 6];
+    /// let bits = request.emit().write_line(&mut line, 0, gap, BitOrder::MsbFirst)?;
+    /// assert_eq!((gap, bits), (3, 39));
+    /// assert_eq!(line, [0x20, 0x58, 0x79, 0x6d, 0xe3, 0xff]);
+    /// # Ok::<(), nrz_line::OutOfBounds>(())
+    /// ```
+    ///
+    /// # Errors
+    /// [`OutOfBounds`] if `bytes` ends earlier; nothing is written then.
+    pub fn write_line(
+        self,
+        bytes: &mut [u8],
+        offset: usize,
+        gap_bits: u32,
+        order: BitOrder,
+    ) -> Result<u32, OutOfBounds> {
+        let len = self.line_bits(gap_bits);
+        let available = bytes.len().saturating_mul(8).saturating_sub(offset);
+        if len as usize > available {
+            return Err(OutOfBounds { offset, len, available });
+        }
+        let mut at = offset;
+        for (k, frame) in self.as_slice().iter().enumerate() {
+            let mut idle = if k == 0 { 0 } else { gap_bits };
+            while idle > 0 {
+                let run = idle.min(Window::MAX_LEN);
+                Window::from_bits(u128::MAX, run).unwrap_or(Window::EMPTY).write(bytes, at, order)?;
+                at = at.saturating_add(run as usize);
+                idle = idle.saturating_sub(run);
+            }
+            frame.line().write(bytes, at, order)?;
+            at = at.saturating_add(FRAME_BITS as usize);
+        }
+        Ok(len)
+    }
+}
+
+#[cfg(test)]
+pub(crate) mod tests {
+    use super::*;
+    use proptest::prelude::*;
+    use std::vec::Vec;
+
+    /// One operation of each kind.
+    pub(crate) fn every(address: u8, bank: u8, data: u16, wide: u32) -> Vec<Operation> {
+        let (id, coefficient) = (U24::truncate(wide), U19::truncate(wide));
+        let mut all: Vec<_> = Command::ALL.into_iter().filter_map(Operation::without_arguments).collect();
+        all.extend([
+            Operation::EepromRead { address },
+            Operation::EepromWrite { address: UserAddress::new(address).unwrap_or_default(), data },
+            Operation::IdWrite1 { id },
+            Operation::IdWrite2 { id },
+            Operation::SetAddress2 { id },
+            Operation::EepromReadBank { bank, address },
+            Operation::EepromWriteBank { bank, address, data },
+            Operation::CoefficientRead,
+            Operation::CoefficientWrite { coefficient },
+        ]);
+        all
+    }
+
+    pub(crate) fn requests() -> impl Strategy<Value = Request> {
+        (0..8_u8, any::<prop::sample::Index>(), any::<(u8, u8, u16, u32)>()).prop_map(|(ea, which, (a, b, d, w))| {
+            let all = every(a, b, d, w);
+            Request::new(EncoderAddress::truncate(ea), all[which.index(all.len())])
+        })
+    }
+
+    /// The command data frames of all 31 commands to all eight encoders, as published drivers send them.
+    #[test]
+    fn all_command_data_frames() {
+        let to_encoder_0 = [
+            0x4000, 0x4081, 0x4045, 0x40c4, 0x4027, 0x40a6, 0x4062, 0x40e3, 0x4016, 0x4097, 0x4053, 0x40d2, 0x4031,
+            0x40b0, 0x4074, 0x40f5, 0x400b, 0x408a, 0x404e, 0x40cf, 0x402c, 0x40ad, 0x4069, 0x40e8, 0x401d, 0x409c,
+            0x4058, 0x40d9, 0x403a, 0x40bb, 0x407f,
+        ];
+        for (command, word) in Command::ALL.into_iter().zip(to_encoder_0) {
+            for ea in EncoderAddress::ALL {
+                let cdf = RequestFrame::cdf(FrameCode::Fc0, ea, command.code());
+                assert_eq!((cdf.ea(), cdf.code()), (ea, command.code()));
+                if ea == EncoderAddress::ZERO {
+                    assert_eq!(cdf.word(BitOrder::MsbFirst), word);
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn every_operation_has_its_command() {
+        for operation in every(1, 2, 3, 4) {
+            let arguments = Operation::without_arguments(operation.command());
+            let plain = operation.frame_code() == FrameCode::Fc0 && arguments.is_some();
+            assert!(!plain || arguments == Some(operation));
+        }
+        assert_eq!(Command::ALL.into_iter().filter_map(Operation::without_arguments).count(), 26);
+    }
+
+    /// What no request begins with is refused: frame codes 1 and 2, code 31, frame code 3 with other commands.
+    #[test]
+    fn all_beginnings_are_judged() {
+        for frame_code in FrameCode::MDF {
+            for code in 0..32 {
+                let cdf = RequestFrame::cdf(frame_code, EncoderAddress::ZERO, code);
+                let got = Request::expected_frames(cdf);
+                let refused = Error::FrameCode { frame: 0, got: frame_code.get(), want: 0 };
+                match (frame_code, code) {
+                    (FrameCode::Fc0, 31) => assert_eq!(got, Err(Error::UnknownCommand { code })),
+                    (FrameCode::Fc0, _) | (FrameCode::Fc3, 13 | 14 | 16 | 18) => assert!(matches!(got, Ok(1..=5))),
+                    _ => assert_eq!(got, Err(refused)),
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn arguments_out_of_range() {
+        let cdf = |fc, code| RequestFrame::cdf(fc, EncoderAddress::MAX, code);
+        let write = [cdf(FrameCode::Fc0, 14), mdf0(1), mdf1(2), mdf2(0xf0)];
+        assert_eq!(Request::parse(&write), Err(Error::AddressRange { got: 0xf0 }));
+        let coefficient = [cdf(FrameCode::Fc3, 18), mdf0(0), mdf1(0), mdf2(8)];
+        assert_eq!(Request::parse(&coefficient), Err(Error::DataRange { got: 0x8_0000 }));
+    }
+
+    proptest! {
+        #[test]
+        fn round_trip(request in requests(), tail in any::<u8>()) {
+            let frames = request.emit();
+            let frames = frames.as_slice();
+            prop_assert_eq!(Request::parse(frames), Ok(request));
+            prop_assert_eq!(Request::expected_frames(frames[0]).map(usize::from), Ok(frames.len()));
+            let mut more = frames.to_vec();
+            more.push(mdf2(tail));
+            prop_assert_eq!(Request::parse(&more), Ok(request));
+            for short in 0..frames.len() {
+                let want = if short == 0 { 18 } else { frames.len() as u16 * 18 };
+                let error = Error::Truncated { got: short as u16 * 18, want };
+                prop_assert_eq!(Request::parse(&frames[..short]), Err(error));
+            }
+        }
+
+        #[test]
+        fn accepted_frames_are_what_it_would_emit(codes in prop::collection::vec((0..4_usize, any::<u8>()), 1..6)) {
+            let frames: Vec<_> = codes.iter().map(|(k, b)| RequestFrame::mdf(FrameCode::MDF[*k], *b)).collect();
+            if let Ok(request) = Request::parse(&frames) {
+                let emitted = request.emit();
+                prop_assert_eq!(emitted.as_slice(), &frames[..emitted.as_slice().len()]);
+            }
+        }
+
+        #[test]
+        fn lines_with_any_gap(request in requests(), gap in 0..300_u32, offset in 0..9_usize, lsb: bool) {
+            let order = if lsb { BitOrder::LsbFirst } else { BitOrder::MsbFirst };
+            let frames = request.emit();
+            let mut bytes = [0; 200];
+            let bits = frames.write_line(&mut bytes, offset, gap, order).unwrap();
+            prop_assert_eq!(bits, frames.line_bits(gap));
+            let mut at = offset;
+            for (k, frame) in frames.as_slice().iter().enumerate() {
+                if k > 0 {
+                    let idle = (0..gap as usize).all(|g| Window::read(&bytes, at + g, 1, order).unwrap().bits() == 1);
+                    prop_assert!(idle);
+                    at += gap as usize;
+                }
+                let line = Window::read(&bytes, at, 18, order).unwrap();
+                prop_assert_eq!(RequestFrame::from_line(line), Ok(*frame));
+                at += 18;
+            }
+            prop_assert_eq!(at, offset + bits as usize);
+            let mut short = std::vec![0x5a; (offset + bits as usize).div_ceil(8) - 1];
+            let before = short.clone();
+            prop_assert!(frames.write_line(&mut short, offset, gap, order).is_err());
+            prop_assert_eq!(short, before);
+        }
+    }
+}

@@ -1,0 +1,302 @@
+//! Nikon A-format: frames of a half-duplex line into requests and replies.
+//!
+//! Requests and replies begin with different sync codes. A command data frame says how many memory data frames follow;
+//! the frames of a reply follow each other without a pause, and how many they are tells the layout where the command
+//! leaves it open. A multi-response request is followed by the replies of several encoders.
+
+mod describe;
+
+use std::io;
+
+use nikon_aformat::inspect::Kind;
+use nikon_aformat::{
+    BitOrder, BitRate, Command, Echo, Error, Expected, FRAME_BITS, Layout, Profile, Reply, Request, RequestFrame,
+    Response,
+};
+
+use crate::capture::hexlog::Burst;
+use crate::event::{Event, Place};
+use crate::line::{LineField, StartStop};
+use crate::output::Sink;
+use describe::Encoder;
+
+pub use describe::FIELDS;
+
+/// What the frames do not tell.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct Settings {
+    /// Bits of a turn; otherwise by the type word, if the line carries it.
+    pub single_turn_bits: Option<u8>,
+    /// Bits that count turns; otherwise by the type word, else 16.
+    pub multi_turn_bits: Option<u8>,
+}
+
+/// A pause that ends a reply, in bits. Replies of two encoders are 7 bits apart or more.
+const PAUSE_BITS: i64 = 4;
+
+/// A pause that ends a request whose memory data frames do not come, in picoseconds: drivers leave 1 to 10 us.
+const MEMORY_PAUSE: i64 = 50_000_000;
+
+/// A reply begins within this time, in bits. The turn-around time is not documented.
+const REPLY_TIMEOUT_BITS: i64 = 1_000;
+
+/// Frames that belong together.
+#[derive(Debug, Clone, Default)]
+struct Group {
+    contents: Vec<u16>,
+    starts: Vec<i64>,
+    end: i64,
+    /// The first frame whose delimiter read 0.
+    broken: Option<u8>,
+    spikes: u32,
+    /// The line of a log without times.
+    line: Option<u64>,
+}
+
+impl Group {
+    fn push(&mut self, field: &LineField) {
+        if !field.delimiter && self.broken.is_none() {
+            self.broken = u8::try_from(self.contents.len()).ok();
+        }
+        self.contents.push(field.content);
+        self.starts.push(field.start);
+        self.spikes = self.spikes.saturating_add(field.spikes);
+        self.end = field.end;
+    }
+
+    fn start(&self) -> i64 {
+        self.starts.first().copied().unwrap_or_default()
+    }
+
+    fn place(&self) -> Place {
+        match self.line {
+            Some(line) => Place::Line(line),
+            None => Place::Time { start: self.start(), end: self.end },
+        }
+    }
+
+    fn is_empty(&self) -> bool {
+        self.contents.is_empty()
+    }
+
+    /// By its first frame.
+    fn kind(&self) -> Kind {
+        self.contents.first().map_or(Kind::Other, |first| Kind::of(*first))
+    }
+
+    /// The frames of the request, as far as they are there.
+    fn request(&self) -> Result<Request, Error> {
+        let mut frames = Vec::with_capacity(self.contents.len());
+        for (frame, content) in (0..).zip(&self.contents) {
+            if self.broken == Some(frame) {
+                return Err(Error::Delimiter { frame });
+            }
+            frames.push(RequestFrame::from_content(*content)?);
+        }
+        Request::parse(&frames)
+    }
+
+    /// Frames of the whole request, as its first frame has it.
+    fn request_frames(&self) -> usize {
+        let first = self.contents.first().map(|content| RequestFrame::from_content(*content));
+        let expected = first.and_then(Result::ok).map(Request::expected_frames);
+        expected.and_then(Result::ok).map_or(1, usize::from)
+    }
+}
+
+/// A request that waits for its reply.
+#[derive(Debug, Clone, Copy)]
+struct Pending {
+    request: Request,
+    place: Place,
+    /// Replies so far.
+    replies: u32,
+}
+
+impl Pending {
+    /// When it ended; none in a log without times.
+    fn end(&self) -> Option<i64> {
+        match self.place {
+            Place::Time { end, .. } => Some(end),
+            Place::Line(_) => None,
+        }
+    }
+}
+
+/// Finds requests and replies among the frames of a line.
+pub struct Decoder {
+    bit: i64,
+    encoder: Encoder,
+    /// Begin of the capture, until the first group has been seen.
+    begin: Option<i64>,
+    open: Group,
+    pending: Option<Pending>,
+}
+
+impl Decoder {
+    /// `bit`: its length in picoseconds.
+    pub fn new(bit: i64, settings: Settings) -> Self {
+        Self { bit, encoder: Encoder::new(settings), begin: None, open: Group::default(), pending: None }
+    }
+
+    /// Whether the open group is over before a frame that begins at `start`.
+    fn is_over(&self, start: i64) -> bool {
+        let pause = start - self.open.end;
+        match self.open.kind() {
+            Kind::Request => pause > MEMORY_PAUSE,
+            _ => pause > PAUSE_BITS * self.bit,
+        }
+    }
+
+    /// The open group is over.
+    fn close(&mut self, out: &mut dyn Sink) -> io::Result<()> {
+        let group = std::mem::take(&mut self.open);
+        let begin = self.begin.take();
+        let event = match group.kind() {
+            Kind::Request => self.request(&group, out)?,
+            _ => self.reply(&group),
+        };
+        // With no idle line before it, a bad first group is only the end of one.
+        let at_once = begin.is_some_and(|begin| group.start() - begin < i64::from(FRAME_BITS) * self.bit);
+        if at_once && !event.verdict.is_ok() {
+            return out.event(&describe::cut(group.place(), "the capture begins inside a frame"));
+        }
+        out.event(&event)
+    }
+
+    fn request(&mut self, group: &Group, out: &mut dyn Sink) -> io::Result<Event> {
+        self.give_up(group.start(), out)?;
+        let result = group.request();
+        self.pending = result.ok().map(|request| Pending { request, place: group.place(), replies: 0 });
+        Ok(describe::request(group, result))
+    }
+
+    fn reply(&mut self, group: &Group) -> Event {
+        let pending = self.pending.as_mut().map(|pending| {
+            pending.replies += 1;
+            *pending
+        });
+        let asked = pending.map(|pending| pending.request);
+        if let Some(pending) = pending.filter(|pending| !pending.request.command().is_multi_response()) {
+            self.pending = None;
+            return self.answer(group, asked, pending.end());
+        }
+        let first = pending.filter(|pending| pending.replies == 1);
+        self.answer(group, asked, first.and_then(|pending| pending.end()))
+    }
+
+    fn answer(&mut self, group: &Group, asked: Option<Request>, asked_end: Option<i64>) -> Event {
+        let delay = asked_end.map(|end| group.start() - end);
+        let expected = expected(group, asked);
+        let result = match (group.broken, expected) {
+            (Some(frame), _) => Err(Error::Delimiter { frame }),
+            (None, Ok(expected)) => {
+                let reply = Reply::from_words(&group.contents, BitOrder::LsbFirst, expected.layout());
+                reply.and_then(|reply| Response::parse(&reply, &expected))
+            }
+            (None, Err(error)) => Err(error),
+        };
+        self.encoder.answer(group, expected.ok(), result, delay)
+    }
+
+    /// No reply came until `now`.
+    fn give_up(&mut self, now: i64, out: &mut dyn Sink) -> io::Result<()> {
+        match self.pending.take() {
+            Some(pending) if pending.replies == 0 => {
+                out.event(&describe::silence(pending.request, pending.place, REPLY_TIMEOUT_BITS * self.bit, now))
+            }
+            _ => Ok(()),
+        }
+    }
+}
+
+/// What a reply has to be: as asked, in the layout that has so many frames; without a request, as it says itself.
+fn expected(group: &Group, asked: Option<Request>) -> Result<Expected, Error> {
+    let frames = group.contents.len();
+    let fits = |layout: &Layout| usize::from(layout.frames()) == frames;
+    let Some(request) = asked else {
+        if frames == usize::from(Layout::Abs17.frames()) {
+            return Ok(Expected::new(Layout::Abs17, Command::Abs17));
+        }
+        let code = group.contents.first().map_or(31, |first| first >> 6 & 31);
+        let command = Command::from_code(u8::try_from(code).unwrap_or(31))?;
+        let [standard, _] = command.layouts();
+        return Ok(Expected::new(command.layouts().into_iter().find(fits).unwrap_or(standard), command));
+    };
+    let expected = request.expected(Profile::default());
+    if fits(&expected.layout()) {
+        return Ok(expected);
+    }
+    let command = request.command();
+    let Some(layout) = command.layouts().into_iter().find(fits) else { return Ok(expected) };
+    let other = Expected::new(layout, command).echoing(Echo::of(request.operation));
+    Ok(if command.answers_with_own_address() { other.from_address(request.ea) } else { other })
+}
+
+impl StartStop for Decoder {
+    const NAME: &'static str = "A-format";
+    const RATES: &'static [u32] = &[
+        BitRate::Mbit2_5.bits_per_second(),
+        BitRate::Mbit4.bits_per_second(),
+        BitRate::Mbit6_67.bits_per_second(),
+        BitRate::Mbit8.bits_per_second(),
+        BitRate::Mbit16.bits_per_second(),
+    ];
+    const CONTENT_BITS: u32 = 16;
+
+    fn begin(&mut self, start: i64) {
+        self.begin = Some(start);
+    }
+
+    fn field(&mut self, field: &LineField, out: &mut dyn Sink) -> io::Result<()> {
+        if !self.open.is_empty() && self.is_over(field.start) {
+            self.close(out)?;
+        }
+        self.open.push(field);
+        let whole = match self.open.kind() {
+            Kind::Request => self.open.request_frames(),
+            _ => Reply::MAX_FRAMES,
+        };
+        if self.open.contents.len() >= whole { self.close(out) } else { Ok(()) }
+    }
+
+    /// A line of a log, two bytes a frame, the first bit of the line in bit 7 of the first: a request, a reply, or both.
+    fn burst(&mut self, burst: &Burst, out: &mut dyn Sink) -> io::Result<()> {
+        let words = burst.bytes.chunks(2).map(|pair| match *pair {
+            [high, low] => u16::from_be_bytes([high, low]),
+            [high] => u16::from_be_bytes([high, 0]),
+            _ => 0,
+        });
+        self.open.line = Some(burst.line);
+        for word in words {
+            let line = Some(burst.line);
+            self.open.line = line;
+            let content = word.reverse_bits();
+            self.field(&LineField { content, delimiter: true, start: 0, end: 0, spikes: 0 }, out)?;
+        }
+        if self.open.is_empty() {
+            self.open.line = None;
+            return Ok(());
+        }
+        self.close(out)
+    }
+
+    fn finish(&mut self, end: Option<i64>, out: &mut dyn Sink) -> io::Result<()> {
+        if !self.open.is_empty() {
+            let recent = end.is_some_and(|end| end - self.open.end <= PAUSE_BITS * self.bit);
+            let short = match self.open.kind() {
+                Kind::Request => self.open.contents.len() < self.open.request_frames(),
+                _ => expected(&self.open, self.pending.map(|pending| pending.request))
+                    .is_ok_and(|expected| self.open.contents.len() < usize::from(expected.layout().frames())),
+            };
+            if recent && short {
+                return out.event(&describe::cut_off(self.open.place()));
+            }
+            self.close(out)?;
+        }
+        match (end, self.pending.and_then(|pending| pending.end())) {
+            (Some(end), Some(asked)) if end - asked < REPLY_TIMEOUT_BITS * self.bit => Ok(()),
+            (end, _) => self.give_up(end.unwrap_or_default(), out),
+        }
+    }
+}

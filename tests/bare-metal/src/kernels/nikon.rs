@@ -1,0 +1,190 @@
+//! A-format: requests and replies in every form.
+
+use nikon_aformat::{
+    Abs40, Alarm, Alm, BitOrder, BitRate, Command, Crc3, Crc8, EncoderAddress, EncoderStatus, Error, Expected, Frames,
+    Operation, Position, Profile, Reply, Request, RequestFrame, Response, TypeWord, U24, U40, UserAddress, Version,
+    Window, crc3, crc8, stream,
+};
+use nom::{IResult, Parser};
+
+use super::kernels;
+use crate::self_test::nikon::{REPLIES, Replied, WHOLE, Whole};
+
+/// One request of each length.
+const REQUESTS: [Request; 5] = [
+    request(Operation::Abs40),
+    request(Operation::EepromRead { address: 0xf6 }),
+    request(Operation::EepromReadBank { bank: 1, address: 2 }),
+    request(Operation::EepromWrite { address: user(0x21), data: 0xbeef }),
+    request(Operation::EepromWriteBank { bank: 1, address: 2, data: 0xbeef }),
+];
+
+const fn request(operation: Operation) -> Request {
+    Request::new(EncoderAddress::MAX, operation)
+}
+
+const fn user(address: u8) -> UserAddress {
+    match UserAddress::new(address) {
+        Some(address) => address,
+        None => panic!("no such address"),
+    }
+}
+
+const fn profile(st_bits: u8, mt_bits: u8) -> Profile {
+    match Profile::new(st_bits, mt_bits) {
+        Ok(profile) => profile,
+        Err(_) => panic!("no such widths"),
+    }
+}
+
+/// Profiles and positions.
+const POSITIONS: [(Profile, u64, u8); 3] =
+    [(profile(17, 16), 0x1_9000_526f, 40), (profile(20, 16), 0xfb_f700, 24), (profile(24, 0), 0x1_ffff, 17)];
+
+/// The bytes of a request, two a frame, and how many.
+const SENT: [([u8; 4], usize); 2] = [([0x44, 0x03, 0, 0], 2), ([0x40, 0xb0, 0x5b, 0x78], 4)];
+
+kernels! {
+    /// The reply with the whole position from its 72 line bits, least significant bit of a byte first, all checks.
+    fn nikon_abs40_line_lsb(row: &Whole) -> Result<Abs40, Error> {
+        Abs40::parse_line(&row.lsb_first, BitOrder::LsbFirst, &row.expected)
+    } over WHOLE;
+
+    /// The same from a shift register, most significant bit first.
+    fn nikon_abs40_line_msb(row: &Whole) -> Result<Abs40, Error> {
+        Abs40::parse_line(&row.msb_first, BitOrder::MsbFirst, &row.expected)
+    } over WHOLE;
+
+    /// Replies of all layouts from line bits.
+    fn nikon_response_parse_line(row: &Replied) -> Result<Response, Error> {
+        Response::parse_line(row.line, &row.expected)
+    } over REPLIES;
+
+    /// Replies of all layouts from words.
+    fn nikon_response_parse_words(row: &Replied) -> Result<Response, Error> {
+        Response::parse_words(row.words, BitOrder::MsbFirst, &row.expected)
+    } over REPLIES;
+
+    /// The frames of the replies of all layouts.
+    fn nikon_response_emit(row: &Emitted) -> Reply {
+        row.emit()
+    } over EMITTED;
+
+    /// The line bits of an ABS40 reply.
+    fn nikon_abs40_emit_line(row: &Whole) -> [u8; Abs40::LINE_BYTES] {
+        let reply = Abs40 { ea: EncoderAddress::ZERO, es: EncoderStatus::NONE, abs: U40::truncate(row.lsb_first.len() as u64) };
+        reply.emit_line(BitOrder::LsbFirst, &row.expected)
+    } over WHOLE;
+
+    /// Frames of a reply, their check field and line bits.
+    fn nikon_reply(row: &Replied) -> Option<((u8, u8), Window, u16)> {
+        let reply = Reply::from_words(row.words, BitOrder::MsbFirst, row.expected.layout()).ok()?;
+        Some((reply.crc(), reply.line(), reply.words(BitOrder::MsbFirst).fold(0, |all, word| all ^ word)))
+    } over REPLIES;
+
+    /// The frames of a request.
+    fn nikon_request_emit(request: &Request) -> Frames {
+        request.emit()
+    } over REQUESTS;
+
+    /// A request as an encoder receives it.
+    fn nikon_request_parse(request: &Request) -> Result<Request, Error> {
+        Request::parse(request.emit().as_slice())
+    } over REQUESTS;
+
+    /// A request as line bits with gaps.
+    fn nikon_request_line(request: &Request) -> Option<([u8; 24], u32)> {
+        let mut bytes = [0xff; 24];
+        let bits = request.emit().write_line(&mut bytes, 3, BitRate::Mbit8.bits(1000), BitOrder::MsbFirst).ok()?;
+        Some((bytes, bits))
+    } over REQUESTS;
+
+    /// What the reply to a request has to be.
+    fn nikon_expected(request: &Request) -> Result<Expected, Error> {
+        request.check(Profile::default()).map(|request| request.expected(profile(17, 16)))
+    } over REQUESTS;
+
+    /// A request frame from line bits, and its transmit word.
+    fn nikon_request_frame(line: &Window) -> Result<u32, Error> {
+        RequestFrame::from_line(*line).map(RequestFrame::transmit_word)
+    } over LINES;
+
+    /// A command from its code, in a version.
+    fn nikon_command(code: &u8) -> Result<Command, Error> {
+        Command::from_code(*code)?.in_version(Version::V2_1)
+    } over [0_u8, 24, 31];
+
+    /// CRC-8 of a whole reply's bytes, by bit, byte and word, and a CRC-3.
+    fn nikon_crc(bytes: &[u8; 7]) -> (u8, u8, u8) {
+        let [a, b, c, ..] = *bytes;
+        let mixed = Crc8::new().bit(a & 1 == 1).byte(b).word(u16::from_be_bytes([b, c])).get();
+        (crc8(bytes), mixed, crc3(u16::from(a)) ^ Crc3::new().bit(b & 1 == 1).get())
+    } over [[0x20, 0x85, 0xf6, 0x4a, 0x80, 0x09, 0x80]];
+
+    /// Single turn, turns and angle of a position.
+    fn nikon_position((profile, abs, bits): &(Profile, u64, u8)) -> Result<(Position, u32, u32, i32), Error> {
+        let position = profile.position(*abs, *bits)?;
+        let single = position.single_turn;
+        Ok((position, profile.fraction(single), profile.milli_degrees(single), profile.difference(single, 0)))
+    } over POSITIONS;
+
+    /// The type word as a profile.
+    fn nikon_type_word(word: &u16) -> Option<Profile> {
+        TypeWord(*word).profile()
+    } over [0x0011_u16, 0x0007];
+
+    /// The alarms of an alarm field, counted, and their summary.
+    fn nikon_alarms(raw: &u16) -> (usize, EncoderStatus) {
+        let alm = Alm::new(*raw).with(Alarm::Batt, true);
+        (alm.alarms(Version::V3_0).count(), EncoderStatus::of_alarms(alm))
+    } over [0_u16, 0x0755];
+
+    /// The halves of a position joined.
+    fn nikon_halves((low, high): &(u32, u32)) -> Option<U40> {
+        U40::from_halves(U24::truncate(*low), U24::truncate(*high))
+    } over [(0x48_0000, 0x00_7048), (1, 0xff)];
+
+    /// How long a transaction takes on the line.
+    fn nikon_times(rate: &BitRate) -> (u32, u32) {
+        (rate.transaction_ns(nikon_aformat::Layout::Abs40, 8), rate.bits(1000))
+    } over BitRate::ALL;
+
+    /// A request off the front of a stream.
+    fn nikon_stream_request((bytes, len): &([u8; 4], usize)) -> IResult<&'static [u8], Request, Error> {
+        stream::request(BitOrder::MsbFirst).parse(bytes.get(..*len).unwrap_or(bytes))
+    } over SENT;
+
+    /// A reply off the front of a packed line.
+    fn nikon_stream_line(row: &Whole) -> IResult<stream::Bits<'static>, Response, Error> {
+        stream::line_response(row.expected, BitOrder::LsbFirst).parse((&row.lsb_first, 0))
+    } over WHOLE;
+}
+
+/// Something to send.
+type Emitted = Response;
+
+const EMITTED: [Response; 3] = [
+    Response::new(
+        EncoderAddress::MAX,
+        Command::Abs40,
+        EncoderStatus::NONE,
+        nikon_aformat::Data::Abs40 { abs: U40::truncate(0x1_2345_6789) },
+    ),
+    Response::new(
+        EncoderAddress::MAX,
+        Command::Abs24VelAcc,
+        EncoderStatus::NONE,
+        nikon_aformat::Data::Abs24VelAcc { abs: U24::truncate(77), velocity: -5, acceleration: 9 },
+    ),
+    Response::abs17(EncoderAddress::ZERO, EncoderStatus::NONE, nikon_aformat::U17::truncate(0x1_5555)),
+];
+
+/// The line bits of request frames, the last one damaged.
+const LINES: [Window; 3] = [window(0x2_0004), window(0x2_e028), window(0x2_0014)];
+
+const fn window(bits: u128) -> Window {
+    match Window::from_bits(bits, 18) {
+        Some(window) => window,
+        None => panic!("18 bits fit"),
+    }
+}

@@ -1,0 +1,352 @@
+//! SORTE: frames, both ends, time, the step pulse, the motor driver.
+
+use core::hint::black_box;
+
+use nom::{IResult, Parser};
+use sorte_proto::cut_through::{DiscoveryRewriter, SyncRewriter};
+use sorte_proto::device::{self, Arrival, Device, Handled, PortId};
+use sorte_proto::drv8711::{
+    self, Apply, Configuration, IsGain, Next, Register, full_scale_microamps, torque_for_microamps,
+};
+use sorte_proto::iep::{Channel, Edge};
+use sorte_proto::master::{self, Action, Master, Outgoing};
+use sorte_proto::sync0::{Sync0, Variant, Write, Writes};
+use sorte_proto::timing::{Budget, Timing};
+use sorte_proto::{
+    Assignment, Clock, Correction, DelayModel, DelayReq, DeviceAddress, DeviceFrame, DeviceFrameView, Direction,
+    Discovery, DiscoveryView, Entry, Error, LineDelay, LongFrame, MasterFrameView, MotorMask, Network, Param,
+    Parameters, Payload, Pto, Slice, StartTime, Status, Sync, crc8, fcs, stream, strip_preamble, write_master_frame,
+};
+
+use super::kernels;
+
+/// Room for a master frame of four devices, in whole words.
+#[repr(align(4))]
+struct Buffer([u8; 24]);
+
+/// Output bytes and time stamps.
+const OUTPUTS: [([u8; 16], u16); 2] = [([0x5a; 16], 0x1234), ([0; 16], 0xffff)];
+
+/// A good master frame and two with a flip.
+const FRAMES: [[u8; 21]; 3] = [
+    [
+        0x00, 0x30, 0x3f, 0xd7, 0x8e, 0x73, 0x62, 0xf2, 0xd6, 0x20, 0x2c, 0x0d, 0x9f, 0x07, 0x91, 0x3a, 0xa0, 0x15,
+        0xdd, 0xee, 0x4d,
+    ],
+    [
+        0x00, 0x30, 0x3f, 0xd7, 0x8e, 0x73, 0x62, 0xf2, 0xd6, 0x20, 0x2c, 0x0d, 0x9f, 0x07, 0x91, 0x3a, 0xa1, 0x15,
+        0xdd, 0xee, 0x4d,
+    ],
+    [
+        0x00, 0x30, 0x0d, 0x04, 0x8a, 0x6e, 0x35, 0x33, 0xe1, 0xc3, 0xfd, 0x1c, 0xaf, 0x75, 0x4a, 0x33, 0x66, 0xa2,
+        0x5b, 0xfa, 0x56,
+    ],
+];
+
+const DEVICE_FRAMES: [[u8; 6]; 2] = [[0x01, 0x04, 0x3d, 0, 0, 0x4a], [0xfa, 0x04, 0xc8, 0x76, 0x91, 0x72]];
+
+/// SYNC and DELAY_REQ as the published master sends them.
+const SYNC: [u8; 14] = [0xff, 0, 5, 0x40, 0x58, 3, 0, 0, 0x4c, 0, 0x3c, 0x34, 0x97, 0xf5];
+const DELAY_REQ: [u8; 8] = [0xff, 0, 3, 0x20, 0xe6, 0xaa, 0x02, 0xef];
+
+const START: Option<StartTime> = StartTime::new(1234);
+const OVERLAPPING: Option<StartTime> = StartTime::new(2600);
+
+/// The generator idle, with a pulse programmed, with one programmed and one deferred, and the same with overlaps.
+const GENERATORS: [Sync0; 10] = {
+    let states = generators(Variant::Lossless);
+    let published = generators(Variant::Published);
+    [
+        states[0],
+        states[1],
+        states[2],
+        states[3],
+        states[4],
+        published[0],
+        published[1],
+        published[2],
+        published[3],
+        published[4],
+    ]
+};
+
+const fn generators(variant: Variant) -> [Sync0; 5] {
+    let idle = Sync0::new(variant);
+    let mut pending = idle;
+    let _ = pending.cmp7(START);
+    let mut deferred = pending;
+    let _ = deferred.cmp7(START);
+    let mut overlapping = idle;
+    let _ = overlapping.cmp7(OVERLAPPING);
+    let mut both = overlapping;
+    let _ = both.cmp7(OVERLAPPING);
+    [idle, pending, deferred, overlapping, both]
+}
+
+kernels! {
+    /// The master frame of four devices, into a buffer as firmware has it.
+    fn sorte_master_frame_build((output, time_stamp): &([u8; 16], u16)) -> Buffer {
+        let mut buffer = Buffer([0; 24]);
+        let _ = write_master_frame(&mut buffer.0, output, *time_stamp);
+        buffer
+    } over OUTPUTS;
+
+    /// The check of a master frame, the slice of device 3, and the reference time.
+    fn sorte_master_frame_check(frame: &[u8; 21]) -> Result<([u8; 4], u32), Error> {
+        let view = MasterFrameView::new(frame, 16)?;
+        match view.slice(8, 4)?.first_chunk() {
+            Some(slice) => Ok((*slice, view.reference_ns(440))),
+            None => Err(Error::OutsideOutput { offset: 8, len: 4 }),
+        }
+    } over FRAMES;
+
+    /// A device frame.
+    fn sorte_device_frame_build(payload: &[u8; 3]) -> [u8; 6] {
+        let mut frame = [0; 6];
+        let _ = DeviceFrame { address: DeviceAddress::FIRST, status: Status::LAST, payload: *payload }.emit(&mut frame);
+        frame
+    } over [[1, 2, 3], [0, 0, 0]];
+
+    /// The check of a device frame.
+    fn sorte_device_frame_check(frame: &[u8; 6]) -> Result<DeviceFrameView<'static>, Error> {
+        DeviceFrameView::new(frame, 3)
+    } over DEVICE_FRAMES;
+
+    /// CMP6 of the step pulse generator, from all of its states.
+    fn sorte_sync0_cmp6(generator: &Sync0) -> (Sync0, Writes) {
+        let mut generator = *generator;
+        let writes = generator.cmp6();
+        (generator, writes)
+    } over GENERATORS;
+
+    /// CMP0.
+    fn sorte_sync0_cmp0(generator: &Sync0) -> (Sync0, Writes) {
+        let mut generator = *generator;
+        let writes = generator.cmp0();
+        (generator, writes)
+    } over GENERATORS;
+
+    /// CMP7 with a pulse.
+    fn sorte_sync0_cmp7(generator: &Sync0) -> (Sync0, Writes) {
+        let mut generator = *generator;
+        let writes = generator.cmp7(START);
+        (generator, writes)
+    } over GENERATORS;
+
+    /// CMP6 with its register writes in order.
+    fn sorte_sync0_writes(generator: &Sync0) -> [Option<Write>; 7] {
+        let mut generator = *generator;
+        let mut writes = [None; 7];
+        writes.iter_mut().zip(generator.cmp6()).for_each(|(to, write)| *to = Some(write));
+        writes
+    } over GENERATORS;
+
+    /// A word to its meaning and back, and a step to a word.
+    fn sorte_pto(word: &u16) -> (Pto, u16, Result<Pto, Error>) {
+        let pto = Pto::from_word(*word);
+        (pto, pto.word(), Pto::from_step(u32::from(*word), Direction::High))
+    } over [0_u16, 1234, 0x89ab, 0x7fff, 0xffff];
+
+    /// The payload of four motors with one sequence.
+    fn sorte_payload((word, mask): &(u16, u8)) -> [u8; 16] {
+        Payload::shared(Pto::from_word(*word), MotorMask::new(*mask).unwrap_or_default()).emit()
+    } over [(0x89ab_u16, 5_u8), (1234, 15), (1, 0)];
+
+    /// A payload taken apart.
+    fn sorte_payload_parse((bytes, _): &([u8; 16], u16)) -> [Slice; 4] {
+        Payload::parse(*bytes).0
+    } over OUTPUTS;
+
+    /// SYNC through a device, byte by byte.
+    fn sorte_sync_rewrite(frame: &[u8; 14]) -> ([u8; 14], Result<Sync, Error>) {
+        let mut rewriter = SyncRewriter::new(76, false, true);
+        let passed = frame.map(|byte| rewriter.byte(byte));
+        (passed, rewriter.finish())
+    } over [SYNC];
+
+    /// 64 bytes of DISCOVERY through a device.
+    fn sorte_discovery_rewrite(frame: &[u8; 64]) -> ([u8; 64], Result<(Status, Assignment), Error>) {
+        let mut rewriter = DiscoveryRewriter::new(Entry::STOCK, true, false);
+        let passed = frame.map(|byte| rewriter.byte(byte));
+        (passed, rewriter.finish())
+    } over [[0xff; 64], {
+        let mut head = [0; 64];
+        head[0] = 0xff;
+        head[2] = 1;
+        head
+    }];
+
+    /// A long-header frame with its checks.
+    fn sorte_long_frame(frame: &[u8; 14]) -> Result<LongFrame<'static>, Error> {
+        LongFrame::new(frame)
+    } over [SYNC];
+
+    /// SYNC read and written.
+    fn sorte_sync_frame(frame: &[u8; 14]) -> Result<[u8; 14], Error> {
+        let mut sync = Sync::parse(frame)?;
+        sync.pass(85, true, false);
+        Ok(sync.emit())
+    } over [SYNC];
+
+    /// DELAY_REQ read and written.
+    fn sorte_delay_req(frame: &[u8; 8]) -> Result<[u8; 8], Error> {
+        DelayReq::parse(frame).map(|request| request.emit())
+    } over [DELAY_REQ];
+
+    /// PARAM written, and what a device takes of it.
+    fn sorte_param(parameters: &Parameters) -> Result<Param, Error> {
+        Param::parse(&Param::request(*parameters, true).emit())
+    } over [Parameters::STOCK, Parameters::CNC];
+
+    /// DISCOVERY of one device: written, passed, read, and the network it tells.
+    fn sorte_discovery(lengths: &Entry) -> Result<(u8, u16), Error> {
+        let mut frame = Discovery::request(true);
+        frame.pass(*lengths, true, false)?;
+        let bytes = frame.emit();
+        let network = Network::new(DiscoveryView::new(&bytes)?)?;
+        let last = network.assignments().last().map_or(0, |(assignment, _)| assignment.out_offset);
+        Ok((network.devices(), network.output_total().saturating_add(last)))
+    } over [Entry::STOCK];
+
+    /// Preamble and a frame off the front of a stream.
+    fn sorte_stream(wire: &[u8; 12]) -> IResult<&'static [u8], LongFrame<'static>, Error> {
+        let (rest, ((), frame)) = (stream::preamble, stream::long_frame).parse(wire.as_slice())?;
+        Ok((rest, frame))
+    } over [[0x55, 0x55, 0x55, 0xd5, 0xff, 0, 3, 0x20, 0xe6, 0xaa, 0x02, 0xef]];
+
+    /// Both frames of the exchange off the front of a stream.
+    fn sorte_stream_exchange(frame: &[u8; 21]) -> (bool, bool) {
+        let master = stream::master_frame::<Error>(16).parse(frame.as_slice()).is_ok();
+        (master, stream::device_frame::<Error>(3).parse(frame.as_slice()).is_ok())
+    } over FRAMES;
+
+    /// The bytes behind a preamble, and both checks over them.
+    fn sorte_checks(wire: &[u8; 12]) -> Result<(u8, u32), Error> {
+        strip_preamble(wire).map(|frame| (crc8(frame), fcs(frame)))
+    } over [[0x55, 0xd5, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10]];
+
+    /// Sixteen round trips to a line delay, as master and as device.
+    fn sorte_line_delay(rtt_ns: &[u32; 16]) -> (Result<u16, Error>, u16) {
+        let mut measured = [DelayModel::MASTER, DelayModel::DEVICE].map(LineDelay::new);
+        for ns in rtt_ns {
+            for delay in &mut measured {
+                delay.add(*ns);
+            }
+        }
+        let [master, device] = measured;
+        (master.checked(), device.published())
+    } over [[472; 16]];
+
+    /// The clock takes a frame.
+    fn sorte_clock((stamp, sof): &(u32, u32)) -> (Correction, Correction) {
+        let mut clock = black_box(Clock::new());
+        (clock.frame(*stamp, *sof, *sof), clock.frame(*stamp, *sof, *sof))
+    } over [(10_856, 10_860)];
+
+    /// What fits into a cycle.
+    fn sorte_timing((devices, delays): &(u8, [u16; 4])) -> (Budget, i64) {
+        let line = Timing { line_delays_ns: delays, devices: *devices, output_len: 16, payload_len: 3 };
+        (line.budget(), line.send_time_ns(DeviceAddress::MAX))
+    } over [(4_u8, [85_u16; 4])];
+
+    /// The master from IDLE to its first frame, and an answer that does not fit.
+    fn sorte_master((frame, sof_ns): &([u8; 14], u64)) -> (Action, Result<(), Error>, usize) {
+        let mut master = Master::new(master::Config::default());
+        master.link(true);
+        let first = master.poll(0);
+        let mut buffer = [0; 64];
+        let written = match first {
+            Action::Send { frame: Outgoing::Discovery { .. }, .. } => Outgoing::Sync(Sync::of_master(500, 76, true)),
+            _ => Outgoing::Discovery { last: true },
+        };
+        let len = written.write(&mut buffer).unwrap_or_default();
+        let answer = master.received(frame, *sof_ns);
+        let _ = master.poll(*sof_ns);
+        let _ = master.device_frame(frame);
+        let _ = master.write_frame(frame, 0, &mut buffer);
+        (first, answer, len)
+    } over [(SYNC, 3130_u64)];
+
+    /// A device in IDLE takes a start-up frame.
+    fn sorte_device((frame, port): &([u8; 14], PortId)) -> (Handled, bool) {
+        let mut device = Device::new(device::Config::default());
+        device.links(true, false);
+        let mut frame = *frame;
+        let handled = device.frame(*port, &mut frame, Arrival { sof_ns: 0, counter_ns: 0, now_ns: 0 });
+        let restarted = device.poll(u64::MAX) | device.cycle_start();
+        let _ = device.delay_reflection(&frame, 500, handled.trigger);
+        let _ = device.answer([0; 3]);
+        let _ = (device.line_delay_next_ns(), device.cycle_zero_ns(), device.send_time_ns(), device.parameters());
+        (handled, restarted)
+    } over [(SYNC, PortId::A), (SYNC, PortId::B)];
+
+    /// A device refuses an exchange it is not in.
+    fn sorte_device_exchange(frame: &[u8; 21]) -> bool {
+        // A device in any state.
+        let mut device = black_box(Device::new(device::Config::default()));
+        device.exchange(frame, 940, 1640).is_ok()
+    } over FRAMES;
+
+    /// Ten cycles of the timer model with a pulse each.
+    fn sorte_iep(start: &u16) -> (u32, Option<Edge>) {
+        let mut axis = Channel::new(Variant::Lossless, 2000, 300);
+        axis.set_start(StartTime::new(*start));
+        let (mut edges, mut last) = (0_u32, None);
+        while let Some(edge) = axis.next_edge(40_000) {
+            (edges, last) = (edges.saturating_add(1), Some(edge));
+        }
+        (edges, last)
+    } over [1000_u16, 2600];
+
+    /// A configuration of the motor driver to its first two words, and a refusal.
+    fn sorte_drv8711_apply(configuration: &Configuration) -> (Next, Next, bool) {
+        let mut apply = Apply::new(*configuration);
+        let first = apply.next();
+        let _ = apply.answer([0, 0]);
+        let second = apply.next();
+        (first, second, apply.answer([0xff, 0xff]).is_ok())
+    } over [CONFIGURATION];
+
+    /// The registers from their values.
+    fn sorte_drv8711_parse(value: &u16) -> (u16, u16, u16, bool) {
+        let codes = |register: Register| register.fields().iter().map(|field| field.get(*value)).sum();
+        let ctrl = drv8711::Ctrl::parse(*value).map_or(0, drv8711::Ctrl::value);
+        let decay = drv8711::Decay::parse(*value).map_or(0, drv8711::Decay::value);
+        let status = drv8711::Status::from_byte(value.to_le_bytes()[0]);
+        (ctrl, decay, codes(Register::Drive), status.is_fault() | status.looks_unpowered())
+    } over [0xc10_u16, 0xfff, 0x110];
+
+    /// Current and torque.
+    fn sorte_drv8711_current((torque, microamps): &(u8, u32)) -> (Option<u32>, Option<u8>) {
+        (full_scale_microamps(*torque, IsGain::X10, 50), torque_for_microamps(*microamps, IsGain::X10, 50))
+    } over [(255_u8, 1_500_000_u32)];
+}
+
+const CONFIGURATION: Configuration = Configuration {
+    ctrl: drv8711::Ctrl {
+        enable: true,
+        reverse_direction: false,
+        step: false,
+        mode: drv8711::StepMode::Div256,
+        external_stall: false,
+        gain: IsGain::X10,
+        dead_time: drv8711::DeadTime::Ns850,
+    },
+    torque: drv8711::Torque { torque: 0x70, sample_threshold: drv8711::SampleThreshold::Us400 },
+    off: drv8711::Off { off_time: 0x30, bypass_indexer: false },
+    blank: drv8711::Blank { blank_time: 0x80, adaptive: true },
+    decay: drv8711::Decay { decay_time: 0x10, mode: drv8711::DecayMode::AutoMixed },
+    stall: drv8711::Stall {
+        threshold: 0x40,
+        count: drv8711::StallCount::Steps1,
+        divider: drv8711::StallDivider::Div32,
+    },
+    drive: drv8711::Drive {
+        ocp_threshold: drv8711::OcpThreshold::Mv500,
+        ocp_deglitch: drv8711::OcpDeglitch::Us4,
+        sink_time: drv8711::DriveTime::Ns500,
+        source_time: drv8711::DriveTime::Ns500,
+        sink_current: drv8711::SinkCurrent::Ma300,
+        source_current: drv8711::SourceCurrent::Ma150,
+    },
+};

@@ -1,0 +1,239 @@
+//! Check values, positions, alarms, temperatures, times.
+
+use nikon_aformat::{
+    Alarm, Alm, Battery, BitRate, Crc3, Crc8, EncoderStatus, PmAlarm, PmAlm, Profile, Temperature, TypeWord, U10, U40,
+    Version, crc3,
+};
+use serde::Deserialize;
+
+use super::{RowVersion, layout, or_unreadable};
+use crate::hex::{Bits, Hex};
+use crate::row::{Fault, Verdict, same};
+
+/// The rows' names of the alarms that are set.
+pub(super) fn alarm_names(alm: Alm, version: Version) -> Vec<String> {
+    let name = |alarm| match alarm {
+        Alarm::Batt => "batt",
+        Alarm::MtErr => "mt_err",
+        Alarm::OvFlow => "ov_flow",
+        Alarm::OvSpd => "ov_spd",
+        Alarm::MemErr => "mem_err",
+        Alarm::StErr => "st_err",
+        Alarm::PsErr => "ps_err",
+        Alarm::Busy => "busy",
+        Alarm::MemBusy => "mem_busy",
+        Alarm::OvTemp => "ov_temp",
+        Alarm::IncErr => "inc_err",
+        Alarm::OvSpdS => "ov_spd_s",
+        Alarm::StErrS => "st_err_s",
+        Alarm::PsErrS => "ps_err_s",
+        Alarm::BusyS => "busy_s",
+        Alarm::IncErrS => "inc_err_s",
+    };
+    alm.alarms(version).map(name).map(str::to_owned).collect()
+}
+
+/// The rows' names of the maintenance notices that are set.
+pub(super) fn notice_names(pm_alm: PmAlm) -> Vec<String> {
+    let name = |alarm| match alarm {
+        PmAlarm::IncW1 => "incw_1",
+        PmAlarm::IncW2 => "incw_2",
+        PmAlarm::IfW1 => "ifw_1",
+        PmAlarm::IfW2 => "ifw_2",
+    };
+    pm_alm.alarms().map(name).map(str::to_owned).collect()
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct AlarmRow {
+    alm: u16,
+    version: RowVersion,
+    set: Vec<String>,
+    summary_es: u8,
+    wire_order_bits: Bits,
+}
+
+pub(super) fn alarm(_: &str, row: AlarmRow) -> Verdict {
+    let alm = Alm::new(row.alm);
+    same("set", &row.set, &alarm_names(alm, row.version.0))?;
+    same("summary_es", &row.summary_es, &EncoderStatus::of_alarms(alm).raw())?;
+    same("wire_order_bits", &row.wire_order_bits.0, &(0..16).map(|k| alm.raw() >> k & 1 == 1).collect())
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct CrcRow {
+    crc: String,
+    input_ascii: Option<String>,
+    bit_order: Option<String>,
+    wire_bits: Option<Bits>,
+    expect: String,
+}
+
+/// The CRC-3 of the rows is written in binary, or in hex for the check value.
+pub(super) fn crc(_: &str, row: CrcRow) -> Verdict {
+    let bits = match (&row.wire_bits, &row.input_ascii, row.bit_order.as_deref()) {
+        (Some(bits), None, None) => bits.0.clone(),
+        (None, Some(text), Some(order)) => {
+            let bit = |byte: u8, k: u8| byte >> if order == "msb_first_per_byte" { 7 - k } else { k } & 1 == 1;
+            text.bytes().flat_map(|byte| (0..8).map(move |k| (byte, k))).map(|(byte, k)| bit(byte, k)).collect()
+        }
+        _ => return Err(Fault::Unreadable("neither bits nor a text with an order".to_owned())),
+    };
+    match row.crc.as_str() {
+        "crc8" => {
+            let whole = bits.iter().fold(Crc8::new(), |crc, bit| crc.bit(*bit)).get();
+            same("crc8", &row.expect, &format!("{whole:02x}"))?;
+            let packed = |bits: &[bool]| bits.iter().fold(0_u16, |word, bit| word << 1 | u16::from(*bit));
+            let (bytes, words) = (bits.chunks_exact(8), bits.chunks_exact(16));
+            if bytes.remainder().is_empty() {
+                let bytes: Vec<u8> = bytes.map(|bits| packed(bits) as u8).collect();
+                same("crc8 of bytes", &whole, &nikon_aformat::crc8(&bytes))?;
+            }
+            if words.remainder().is_empty() {
+                same("crc8 by words", &whole, &words.fold(Crc8::new(), |crc, bits| crc.word(packed(bits))).get())?;
+            }
+            Ok(())
+        }
+        "crc3" => {
+            let serial = bits.iter().fold(Crc3::new(), |crc, bit| crc.bit(*bit)).get();
+            let want = match row.input_ascii {
+                Some(_) => or_unreadable(u8::from_str_radix(&row.expect, 16))?,
+                None => or_unreadable(u8::from_str_radix(&row.expect, 2))?,
+            };
+            same("crc3", &want, &serial)?;
+            if bits.len() == 10 {
+                let word = bits.iter().rev().fold(0, |word, bit| word << 1 | u16::from(*bit));
+                same("crc3 of ten bits", &want, &crc3(word))?;
+            }
+            Ok(())
+        }
+        other => Err(Fault::Unreadable(format!("no check {other:?}"))),
+    }
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct MathRow {
+    st_bits: u8,
+    mt_bits: u8,
+    abs40: u64,
+    abs24_low: u32,
+    abs24_high: u32,
+    abs17: u32,
+    single_turn: u32,
+    turns: u32,
+    turns_signed: Option<i16>,
+    angle_deg_f64: f64,
+    angle_deg_f32_bits: Hex,
+    angle_milli_deg_floor: u32,
+    abs40_from_high_and_low: u64,
+}
+
+pub(super) fn decode_math(_: &str, row: MathRow) -> Verdict {
+    let profile = or_unreadable(Profile::new(row.st_bits, row.mt_bits))?;
+    let abs = or_unreadable(U40::try_from(row.abs40))?;
+    same("abs24_low", &row.abs24_low, &abs.low24().get())?;
+    same("abs24_high", &row.abs24_high, &abs.high24().get())?;
+    same("abs17", &row.abs17, &abs.low17().get())?;
+    let joined = U40::from_halves(abs.low24(), abs.high24()).map(U40::get);
+    same("abs40_from_high_and_low", &Some(row.abs40_from_high_and_low), &joined)?;
+    let position = or_unreadable(profile.position(row.abs40, 40))?;
+    same("single_turn", &row.single_turn, &position.single_turn)?;
+    same("turns", &row.turns, &position.turns)?;
+    same("turns_signed", &row.turns_signed, &position.signed_turns())?;
+    same("angle_deg_f64", &row.angle_deg_f64, &profile.degrees(position.single_turn))?;
+    let single = u64::from(profile.degrees_f32(position.single_turn).to_bits());
+    same("angle_deg_f32_bits", &row.angle_deg_f32_bits.0, &single)?;
+    same("angle_milli_deg_floor", &row.angle_milli_deg_floor, &profile.milli_degrees(position.single_turn))?;
+    same("composed", &abs, &profile.compose(position.single_turn, position.turns))
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct TypeWordRow {
+    word: u16,
+    resolution_code: u8,
+    st_bits: Option<u8>,
+    multi_turn_code: u16,
+    mt_bits: Option<u8>,
+    battery_code: u16,
+    battery: Option<String>,
+}
+
+pub(super) fn type_word(_: &str, row: TypeWordRow) -> Verdict {
+    let word = TypeWord(row.word);
+    same("resolution_code", &row.resolution_code, &word.resolution_code())?;
+    same("st_bits", &row.st_bits, &word.st_bits())?;
+    same("multi_turn_code", &row.multi_turn_code, &(row.word >> 3 & 3))?;
+    same("mt_bits", &row.mt_bits, &word.mt_bits())?;
+    same("battery_code", &row.battery_code, &(row.word >> 5 & 3))?;
+    let battery = match word.battery() {
+        Battery::None => Some("none"),
+        Battery::Separate => Some("separate"),
+        Battery::Common => Some("common"),
+        Battery::Unknown(_) => None,
+    };
+    same("battery", &row.battery.as_deref(), &battery)?;
+    same("profile", &(row.st_bits.is_some() && row.mt_bits.is_some()), &word.profile().is_some())
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct TemperatureRow {
+    temp_raw: u32,
+    milli_celsius_unsigned: u32,
+    whole_celsius_truncated: u32,
+    milli_celsius_if_twos_complement: i32,
+}
+
+pub(super) fn temperature(_: &str, row: TemperatureRow) -> Verdict {
+    let temperature = Temperature(or_unreadable(U10::try_from(row.temp_raw))?);
+    same("milli_celsius_unsigned", &row.milli_celsius_unsigned, &temperature.milli_celsius())?;
+    same("whole_celsius_truncated", &row.whole_celsius_truncated, &(temperature.milli_celsius() / 1000))?;
+    let signed = temperature.signed_milli_celsius();
+    same("milli_celsius_if_twos_complement", &row.milli_celsius_if_twos_complement, &signed)
+}
+
+/// The crate counts in whole nanoseconds and rounds up.
+#[expect(clippy::cast_sign_loss, reason = "no time is negative")]
+fn whole(ns: f64) -> u32 {
+    ns.ceil() as u32
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct TimingRow {
+    mbps: String,
+    bit_ns: f64,
+    layout: String,
+    response_frames: u8,
+    response_bits: u32,
+    response_ns: f64,
+    one_frame_ns: f64,
+    request_plus_response_ns_without_turnaround: f64,
+    bus_gap_ns: u32,
+    eight_encoders_ns_without_turnaround: f64,
+}
+
+pub(super) fn timing(_: &str, row: TimingRow) -> Verdict {
+    let layout = layout(&row.layout)?;
+    let rate = match row.mbps.as_str() {
+        "2.5" => BitRate::Mbit2_5,
+        "4" => BitRate::Mbit4,
+        "6.67" => BitRate::Mbit6_67,
+        "8" => BitRate::Mbit8,
+        "16" => BitRate::Mbit16,
+        other => return Err(Fault::Unreadable(format!("no rate {other:?}"))),
+    };
+    same("bit_ns", &row.bit_ns, &(f64::from(rate.bit_ps()) / 1000.0))?;
+    same("response size", &(row.response_frames, row.response_bits), &(layout.frames(), layout.line_bits()))?;
+    same("response_ns", &whole(row.response_ns), &rate.reply_ns(layout))?;
+    same("one_frame_ns", &whole(row.one_frame_ns), &rate.bits_ns(nikon_aformat::FRAME_BITS))?;
+    let one = whole(row.request_plus_response_ns_without_turnaround);
+    same("request_plus_response_ns_without_turnaround", &one, &rate.transaction_ns(layout, 1))?;
+    same("bus_gap_ns", &row.bus_gap_ns, &rate.reply_gap_ns())?;
+    let eight = whole(row.eight_encoders_ns_without_turnaround);
+    same("eight_encoders_ns_without_turnaround", &eight, &rate.transaction_ns(layout, 8))
+}
