@@ -433,7 +433,7 @@ mod tests {
     fn every_period_and_every_es() {
         for es in 1..=10 {
             let periods = 120 * i64::from(es)..=270 * i64::from(es);
-            for tenths_of_us in periods.step_by(if es > 4 { 3 } else { 1 }) {
+            for tenths_of_us in periods {
                 // 0.1 us is 7.5 eighths.
                 let worst = worst(tenths_of_us * 75, es, 0, 60, 0, || 0);
                 assert!(worst <= 10, "{tenths_of_us} {es}: {worst}");

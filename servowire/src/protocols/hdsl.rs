@@ -78,12 +78,15 @@ fn run(file: &str, line: &mut dyn Line, options: &line::Options, out: &mut Outpu
     decoder.take(&mut bits, Head::BITS as usize, out)
 }
 
-/// The channel asked for by its name, or the one with the most changes at first.
+/// The channel asked for by name or number, or the one with the most changes at first.
 fn channel(file: &str, names: &[String], options: &line::Options, changes: &[Change]) -> Result<u16, Fault> {
     let all = 0..u16::try_from(names.len()).unwrap_or(u16::MAX);
     if let Some(wanted) = &options.channel {
-        let found = all.zip(names).find(|(_, name)| *name == wanted).map(|(channel, _)| channel);
-        return found.ok_or_else(|| Fault::new(file, At::File, format!("there is no channel {wanted:?}")));
+        let named = all.clone().zip(names).find(|(_, name)| *name == wanted).map(|(channel, _)| channel);
+        let numbered = || wanted.parse().ok().filter(|number| all.contains(number));
+        return named
+            .or_else(numbered)
+            .ok_or_else(|| Fault::new(file, At::File, format!("there is no channel {wanted:?}")));
     }
     let busy = |channel: &u16| changes.iter().filter(|change| change.channel == *channel).count();
     all.max_by_key(busy).ok_or_else(|| Fault::new(file, At::File, "there is no channel"))
