@@ -8,12 +8,16 @@ use std::{fs, io};
 
 use serde_json::Value;
 
+#[path = "seed_corpus/hdsl.rs"]
+mod hdsl;
 #[path = "seed_corpus/nikon.rs"]
 mod nikon;
 #[path = "seed_corpus/nrz_line.rs"]
 mod nrz_line;
 #[path = "seed_corpus/rtex.rs"]
 mod rtex;
+#[path = "seed_corpus/sorte.rs"]
+mod sorte;
 #[path = "seed_corpus/step_profile.rs"]
 mod step_profile;
 #[path = "seed_corpus/tformat.rs"]
@@ -24,8 +28,15 @@ const SEEDS: usize = 15;
 /// A target, the vector file its seeds come from, and the input that a row becomes; `None` for rows of another kind.
 type Source = (&'static str, &'static str, fn(&Value) -> Option<Vec<u8>>);
 
-const SOURCES: &[&[Source]] =
-    &[nikon::SOURCES, nrz_line::SOURCES, rtex::SOURCES, step_profile::SOURCES, tformat::SOURCES];
+const SOURCES: &[&[Source]] = &[
+    hdsl::SOURCES,
+    nikon::SOURCES,
+    nrz_line::SOURCES,
+    rtex::SOURCES,
+    sorte::SOURCES,
+    step_profile::SOURCES,
+    tformat::SOURCES,
+];
 
 fn main() -> io::Result<()> {
     let here = Path::new(env!("CARGO_MANIFEST_DIR"));

@@ -4,9 +4,11 @@
 //! `fuzz_targets/` hands them to the fuzzer. A new target is a function in the file of its protocol, a line in
 //! [`TARGETS`], a file in `fuzz_targets/` and its `[[bin]]`, and seeds from `examples/seed_corpus.rs`.
 
+pub mod hdsl;
 pub mod nikon;
 pub mod nrz_line;
 pub mod rtex;
+pub mod sorte;
 pub mod step_profile;
 pub mod tformat;
 
@@ -15,6 +17,14 @@ pub type Target = fn(&[u8]);
 
 /// All targets by name.
 pub const TARGETS: &[(&str, Target)] = &[
+    ("hdsl_symbol", hdsl::symbol),
+    ("hdsl_answer", hdsl::answer),
+    ("hdsl_head", hdsl::head),
+    ("hdsl_message", hdsl::message),
+    ("hdsl_learn", hdsl::learn),
+    ("hdsl_position", hdsl::position),
+    ("hdsl_master", hdsl::master),
+    ("hdsl_link", hdsl::link),
     ("nikon_request", nikon::request),
     ("nikon_reply", nikon::reply),
     ("nikon_reception", nikon::reception),
@@ -26,6 +36,10 @@ pub const TARGETS: &[(&str, Target)] = &[
     ("rtex_drive", rtex::drive),
     ("rtex_log", rtex::log),
     ("rtex_ring", rtex::ring),
+    ("sorte_frame", sorte::frame),
+    ("sorte_cut_through", sorte::cut_through),
+    ("sorte_device", sorte::device),
+    ("sorte_sync0", sorte::sync0),
     ("step_profile_step", step_profile::step),
     ("step_profile_axis", step_profile::axis),
     ("tformat_request", tformat::request),

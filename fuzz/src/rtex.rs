@@ -7,8 +7,8 @@ use rtex_block::inspect::inspect;
 use rtex_block::master::{ActiveCode, Axis, AxisSettings, AxisState, Limits, Ring};
 use rtex_block::position::Gear;
 use rtex_block::{
-    Alarm, Answer, BlockSize, Command, Command32, CommandBlock, Error, MacId, NonCyclicCode, Request, Response,
-    Response32, TypeCode, stream,
+    Alarm, Answer, Command, Command32, CommandBlock, Error, MacId, NonCyclicCode, Request, Response, Response32,
+    TypeCode, stream,
 };
 
 use crate::byte;
@@ -238,8 +238,7 @@ fn recover(ring: &mut Ring<2>, drives: &mut [Drive; 2], mut responses: [Option<R
 pub fn drive(data: &[u8]) {
     let mac_id = MacId::new(5).expect("below 32");
     let settings = Settings { sync_exchanges: 2, servo_on_updates: 1, ..Settings::new(mac_id, CODES) };
-    let mut short = Drive::new(settings);
-    let mut long = Drive::new(Settings { size: BlockSize::Bytes32, ..settings });
+    let (mut short, mut long) = (Drive::new(settings), Drive::new(settings));
     for block in data.chunks_exact(16).filter_map(|block| block.first_chunk()) {
         let response = Response::parse_strict(&short.exchange(block));
         let response = response.expect("an undefined code is echoed with CMD_Error only, reserved bits are 0");

@@ -11,7 +11,7 @@
 //! assert_eq!(report.cause, Some(Cause::SwappedWords16));
 //!
 //! let report = inspect(&[0x65, 0x20, 0x80, 0, 0xe8, 0x03, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0]);
-//! assert_eq!(report.error, None);
+//! assert_eq!(report.error(), None);
 //! assert_eq!(report.fields().find(|f| f.name == "Command_Position").unwrap().value.to_string(), "1000");
 //! ```
 
@@ -89,17 +89,30 @@ impl fmt::Display for Note {
 pub struct Report {
     /// Whether C/R says response; `None` if there is no byte.
     pub is_response: Option<bool>,
-    /// The fault that strict decoding reports.
-    pub error: Option<Error>,
     /// Whether lenient decoding, and so a drive, takes the block.
     pub is_usable: bool,
     /// The most likely cause of the fault, or of a suspicious block.
     pub cause: Option<Cause>,
+    findings: [Option<Error>; MOST_FINDINGS],
     notes: [Option<Note>; 4],
     fields: Fields,
 }
 
+/// A command of 32 bytes: two codes, bytes 2, 3, 9 and 10, Sub_Chk and the sub code, byte 16. A response: a code, six bytes
+/// of an error answer, five of a refused sub-command.
+const MOST_FINDINGS: usize = 12;
+
 impl Report {
+    /// The fault that strict decoding reports: the first of the findings.
+    pub const fn error(&self) -> Option<Error> {
+        self.findings[0]
+    }
+
+    /// Every fault of the block, in the order of the checks: each as if the ones before it were mended.
+    pub fn findings(&self) -> impl Iterator<Item = Error> {
+        self.findings.into_iter().flatten()
+    }
+
     /// Every field, in the order of the block; as far as the bytes go.
     pub fn fields(&self) -> impl Iterator<Item = Field> {
         self.fields.iter()
@@ -124,12 +137,12 @@ impl Report {
 /// Looks at a block of either direction and either size.
 pub fn inspect(bytes: &[u8]) -> Report {
     let is_response = bytes.first().map(|byte0| byte0 & 0x80 != 0);
-    let error = strict(bytes).err();
+    let findings = findings(bytes);
     Report {
         is_response,
-        error,
         is_usable: lenient(bytes).is_ok(),
-        cause: cause(bytes, error),
+        cause: cause(bytes, findings[0]),
+        findings,
         notes: notes(bytes),
         fields: Fields::of(bytes),
     }
@@ -157,6 +170,45 @@ fn lenient(bytes: &[u8]) -> Result<(), Error> {
     }
 }
 
+/// Decodes strictly, mends what is reported, and decodes again.
+fn findings(bytes: &[u8]) -> [Option<Error>; MOST_FINDINGS] {
+    let mut copy = [0; LEN32];
+    let mut found = [None; MOST_FINDINGS];
+    let Some(block) = copy.get_mut(..bytes.len()) else {
+        found[0] = strict(bytes).err();
+        return found;
+    };
+    block.copy_from_slice(bytes);
+    for place in &mut found {
+        let Err(error) = strict(block) else { break };
+        *place = Some(error);
+        if !mend(block, error) {
+            break;
+        }
+    }
+    found
+}
+
+/// Changes the bits that an error names, so that the check passes and no other layout applies than must.
+fn mend(block: &mut [u8], error: Error) -> bool {
+    let (byte, clear, set) = match error {
+        Error::Reserved { byte, bits } => (byte, bits, 0),
+        // With PP every non-cyclic code is allowed; the normal command has no reserved bits.
+        Error::CyclicCode { .. } | Error::CodePair { .. } => (1, 0x70, 0x10),
+        Error::NonCyclicCode { .. } => (1, 0x0f, 0),
+        Error::SubChk { .. } => (16, 0, 0x80),
+        Error::SubCommandCode { .. } => (16, 0x0f, 0),
+        _ => return false,
+    };
+    match block.get_mut(usize::from(byte)) {
+        Some(byte) => {
+            *byte = *byte & !clear | set;
+            true
+        }
+        None => false,
+    }
+}
+
 fn cause(bytes: &[u8], error: Option<Error>) -> Option<Cause> {
     let size = bytes.len();
     if size != LEN && size != LEN32 {
@@ -169,6 +221,11 @@ fn cause(bytes: &[u8], error: Option<Error>) -> Option<Cause> {
         return Some(Cause::AllOnes);
     }
     error?;
+    // A stray bit in a command with sense is no reason to doubt its order.
+    let nop = bytes.get(1).is_some_and(|byte1| Code::from_byte(*byte1).cyclic_bits() == 0);
+    if lenient(bytes).is_ok() && !nop {
+        return None;
+    }
     let sound = |width| {
         let mut turned = [0; LEN32];
         let turned = turned.get_mut(..size)?;
@@ -226,13 +283,34 @@ mod tests {
         assert_eq!(inspect(&block).cause, None);
         assert_eq!(inspect(&swapped(&block, 2)).cause, Some(Cause::SwappedWords16));
         assert_eq!(inspect(&swapped(&block, 4)).cause, Some(Cause::SwappedWords32));
+        let mut stray = block;
+        stray[2] |= 0x03;
+        assert_eq!(inspect(&stray).cause, None);
         assert_eq!(inspect(&[0; 16]).cause, Some(Cause::AllZero));
         assert_eq!(inspect(&[0xff; 32]).cause, Some(Cause::AllOnes));
         for size in (0..40).filter(|n| ![16, 32].contains(n)) {
             let report = inspect(&[0x20; 40][..size]);
             assert_eq!(report.cause, Some(Cause::OtherSize));
-            assert!(matches!(report.error, Some(Error::Length { .. })) && !report.is_usable);
+            assert!(matches!(report.error(), Some(Error::Length { .. })) && !report.is_usable);
         }
+    }
+
+    #[test]
+    fn every_finding_is_listed() {
+        let mut block = [0; 32];
+        block[..4].copy_from_slice(&[0x05, 0x52, 0x02, 0x10]);
+        block[9] = 0x30;
+        block[16] = 0x41;
+        let want = [
+            Error::CyclicCode { code: 5 },
+            Error::SubChk { byte16: 0x41 },
+            Error::SubCommandCode { code: 1 },
+            Error::Reserved { byte: 2, bits: 0x02 },
+            Error::Reserved { byte: 3, bits: 0x10 },
+            Error::Reserved { byte: 9, bits: 0x30 },
+            Error::Reserved { byte: 16, bits: 0x40 },
+        ];
+        assert!(inspect(&block).findings().eq(want));
     }
 
     #[test]
@@ -268,8 +346,10 @@ mod tests {
         #[test]
         fn any_bytes(bytes in proptest::collection::vec(any::<u8>(), 0..48)) {
             let report = inspect(&bytes);
-            prop_assert_eq!(report.error, strict(&bytes).err());
-            prop_assert!(report.is_usable || report.error.is_some());
+            prop_assert_eq!(report.error(), strict(&bytes).err());
+            prop_assert!(report.is_usable || report.error().is_some());
+            // The list is long enough: one place is always left.
+            prop_assert!(report.findings().count() < MOST_FINDINGS);
             prop_assert_eq!(report.changes(&report).count(), 0);
             if bytes.len() >= LEN {
                 prop_assert!(report.fields().count() >= 5);

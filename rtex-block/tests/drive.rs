@@ -267,6 +267,26 @@ fn a_step_that_is_too_large_is_refused_and_changes_nothing() {
     assert_eq!(pair.drive.alarm(), None);
 }
 
+/// Positions are numbers that wrap: from 7FFFFFFFh one step on is 80000000h.
+#[test]
+fn a_move_across_the_wrap() {
+    let mut pair = Pair::new(ActiveCode::CyclicPosition);
+    pair.until(|pair| pair.axis.state() == AxisState::Off);
+    pair.value(Request::Homing {
+        type_code: homing::SET_ACTUAL_POSITION,
+        latch_sel1: Nibble::ZERO,
+        latch_sel2: Nibble::ZERO,
+        monitor_sel: 0,
+        setting_data: i32::MAX - 5,
+    });
+    pair.update();
+    assert!(pair.axis.switch_on());
+    pair.until(|pair| pair.axis.state() == AxisState::On);
+    pair.axis.set_position(i32::MIN + 100).unwrap();
+    pair.until(|pair| pair.drive.position() == i32::MIN + 100);
+    assert_eq!(pair.drive.alarm(), None);
+}
+
 /// The counter of command N comes with the code of command N - 1; with two communications an update the second
 /// response has both.
 #[test]
@@ -357,7 +377,7 @@ fn a_counter_that_stands_still_raises_err86_2() {
 
 #[test]
 fn sub_blocks() {
-    let mut drive = Drive::new(Settings { size: rtex_block::BlockSize::Bytes32, ..Settings::new(mac_id(), CODES) });
+    let mut drive = Drive::new(Settings::new(mac_id(), CODES));
     let mut counter = UpdateCounter::ZERO;
     let mut exchange = |sub: SubCommand, spoil: u8| {
         let mut seen = None;

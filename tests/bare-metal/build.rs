@@ -6,6 +6,8 @@ use std::{env, io};
 
 use serde_json::Value;
 
+#[path = "build/hdsl.rs"]
+mod hdsl;
 #[path = "build/nikon.rs"]
 mod nikon;
 #[path = "build/rtex.rs"]
@@ -21,6 +23,7 @@ mod tformat;
 type Protocol = (&'static str, fn(&dyn Fn(&str) -> Vec<Value>) -> String);
 
 const PROTOCOLS: &[Protocol] = &[
+    ("hdsl", hdsl::tables),
     ("nikon", nikon::tables),
     ("rtex", rtex::tables),
     ("sorte", sorte::tables),

@@ -1,5 +1,6 @@
 //! Which topics there are. A new protocol is one file here and one line in [`ALL`].
 
+mod hdsl;
 mod nikon;
 mod rtex;
 mod sorte;
@@ -12,6 +13,7 @@ use crate::row::Check;
 type Protocol = (&'static str, &'static [(&'static str, Check)]);
 
 const ALL: &[Protocol] = &[
+    ("hdsl", hdsl::TOPICS),
     ("nikon", nikon::TOPICS),
     ("rtex", rtex::TOPICS),
     ("sorte", sorte::TOPICS),

@@ -1,5 +1,5 @@
 use crate::position::Gear;
-use crate::{Alarm, BlockSize, MacId, TypeCode};
+use crate::{Alarm, MacId, TypeCode};
 
 /// Numbers that a drive has and that no document at hand confirms; whoever models a drive must choose them.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -28,8 +28,6 @@ pub struct OpenCodes {
 pub struct Settings {
     /// What its switches say.
     pub mac_id: MacId,
-    /// 16- or 32-byte blocks.
-    pub size: BlockSize,
     /// Update period, ns.
     pub update_ns: u32,
     /// Communication periods in an update period, 1 or 2.
@@ -61,11 +59,10 @@ pub struct Settings {
 }
 
 impl Settings {
-    /// A drive with 16-byte blocks, 0.5 ms, one communication an update, gear 1/1 and 2^20 units a revolution.
+    /// A drive at 0.5 ms, one communication an update, gear 1/1 and 2^20 units a revolution.
     pub const fn new(mac_id: MacId, codes: OpenCodes) -> Self {
         Self {
             mac_id,
-            size: BlockSize::Bytes16,
             update_ns: 500_000,
             communications: 1,
             sync_exchanges: 16,

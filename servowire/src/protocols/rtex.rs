@@ -133,7 +133,7 @@ fn changed(report: &Report, before: &Report, fields: &mut Vec<Field>) {
 
 fn notes(report: &Report, fields: &mut Vec<Field>) {
     let said = report.notes().map(|note| note.to_string());
-    let strict = report.error.map(|error| error.to_string());
+    let strict = report.findings().map(|error| error.to_string());
     let cause = report.cause.map(|cause| cause.to_string());
     let text = said.chain(strict).chain(cause).collect::<Vec<_>>().join("; ");
     if !text.is_empty() {
@@ -164,7 +164,7 @@ fn field(field: &inspect::Field) -> Field {
 
 /// A block that a drive takes is good; what strict decoding says of it is a note.
 fn verdict(report: &Report) -> Verdict {
-    let Some(error) = report.error.filter(|_| !report.is_usable) else { return Verdict::Ok };
+    let Some(error) = report.error().filter(|_| !report.is_usable) else { return Verdict::Ok };
     let at = match error {
         Error::Direction { .. } | Error::MacId { .. } => Some(0),
         Error::CyclicCode { .. } | Error::NonCyclicCode { .. } => Some(1),

@@ -5,8 +5,12 @@
 
 #[cfg(feature = "deliberate-panic")]
 mod deliberate_panic;
+#[cfg(feature = "hdsl")]
+mod hdsl;
 #[cfg(feature = "nikon-aformat")]
 mod nikon;
+#[cfg(feature = "nikon-aformat")]
+mod nikon_ends;
 #[cfg(feature = "nrz-line")]
 pub(crate) mod nrz_line;
 #[cfg(feature = "rtex-block")]
@@ -31,8 +35,12 @@ pub(crate) struct Kernel {
 pub(crate) const ALL: &[&[Kernel]] = &[
     #[cfg(feature = "nrz-line")]
     nrz_line::KERNELS,
+    #[cfg(feature = "hdsl")]
+    hdsl::KERNELS,
     #[cfg(feature = "nikon-aformat")]
     nikon::KERNELS,
+    #[cfg(feature = "nikon-aformat")]
+    nikon_ends::KERNELS,
     #[cfg(feature = "rtex-block")]
     rtex::KERNELS,
     #[cfg(feature = "sorte-proto")]

@@ -2,6 +2,8 @@
 
 use cortex_m_semihosting::hprintln;
 
+#[cfg(feature = "hdsl")]
+pub(crate) mod hdsl;
 #[cfg(feature = "nikon-aformat")]
 pub(crate) mod nikon;
 #[cfg(feature = "nrz-line")]
@@ -28,6 +30,8 @@ pub(crate) type Topic = (&'static str, fn() -> Tally);
 pub(crate) const ALL: &[&[Topic]] = &[
     #[cfg(feature = "nrz-line")]
     nrz_line::TOPICS,
+    #[cfg(feature = "hdsl")]
+    hdsl::TOPICS,
     #[cfg(feature = "nikon-aformat")]
     nikon::TOPICS,
     #[cfg(feature = "rtex-block")]

@@ -1,0 +1,206 @@
+//! SORTE: frames against their own emission, the rewriters against the buffered form, a device against its laws, the
+//! lossless step generator against what was asked of it.
+
+use nom::Parser;
+use sorte_proto::cut_through::{DiscoveryRewriter, SyncRewriter};
+use sorte_proto::device::{Arrival, Config, Device, PortId, State, Trigger};
+use sorte_proto::iep::Channel;
+use sorte_proto::sync0::{CMP7_NS, MAX_LATENCY_NS, PULSE_NS, Variant};
+use sorte_proto::{
+    DelayReq, DeviceFrame, DeviceFrameView, Discovery, Entry, Error, FrameType, LongFrame, MasterFrame,
+    MasterFrameView, Param, Parameters, StartTime, Status, Sync, fcs, stream, strip_preamble,
+};
+
+use crate::byte;
+
+/// Any bytes as every kind of frame: what is accepted gives itself back, and the streaming parsers agree.
+pub fn frame(data: &[u8]) {
+    let body = strip_preamble(data);
+    let streamed = stream::preamble::<Error>(data);
+    assert_eq!(body.ok(), streamed.ok().map(|(rest, ())| rest));
+
+    let frame = LongFrame::new(data);
+    if let Ok(frame) = frame {
+        let known = frame.frame_type().frame_len().is_some();
+        assert_eq!(stream::long_frame::<Error>(data).is_ok(), known);
+        assert_eq!(frame.fcs(), fcs(&data[..data.len() - 4]));
+        match frame.frame_type() {
+            FrameType::Discovery => assert_eq!(Discovery::parse(data).map(|f| f.emit().to_vec()), Ok(data.to_vec())),
+            FrameType::Param => assert_eq!(Param::parse(data).map(|f| f.emit().to_vec()), Ok(data.to_vec())),
+            FrameType::DelayReq => assert_eq!(DelayReq::parse(data).map(|f| f.emit().to_vec()), Ok(data.to_vec())),
+            FrameType::Sync => assert_eq!(Sync::parse(data).map(|f| f.emit().to_vec()), Ok(data.to_vec())),
+            _ => {}
+        }
+    } else {
+        assert!(Discovery::parse(data).is_err() && Param::parse(data).is_err());
+        assert!(DelayReq::parse(data).is_err() && Sync::parse(data).is_err());
+    }
+
+    if let Ok(frame) = MasterFrame::<16>::parse(data) {
+        let mut again = [0; 21];
+        assert_eq!((frame.emit(&mut again), &again[..]), (Ok(21), data));
+    }
+    if let Ok(frame) = DeviceFrame::<3>::parse(data) {
+        let mut again = [0; 6];
+        assert_eq!((frame.emit(&mut again), &again[..]), (Ok(6), data));
+    }
+    for len in [0, 3, 16] {
+        let whole = data.len() == len + MasterFrameView::OVERHEAD;
+        let streamed = stream::master_frame::<Error>(len).parse(data).is_ok();
+        assert!(!whole || streamed == MasterFrameView::new(data, len).is_ok());
+        let whole = data.len() == len + DeviceFrameView::OVERHEAD;
+        let streamed = stream::device_frame::<Error>(len).parse(data).is_ok();
+        assert!(!whole || streamed == DeviceFrameView::new(data, len).is_ok());
+    }
+}
+
+/// A frame through both rewriters: a good one comes out as the buffered form has it, a bad one stays bad.
+///
+/// ```text
+/// 0  bit 0 last, bit 1 error, bit 2 a right FCS is put in     1  lengths, line delay     2..  the frame
+/// ```
+pub fn cut_through(mut data: &[u8]) {
+    let (flags, number) = (byte(&mut data), byte(&mut data));
+    let (last, error) = (flags & 1 != 0, flags & 2 != 0);
+    let mut frame = data.to_vec();
+    if let (true, Some((body, trailer))) = (flags & 4 != 0, frame.split_last_chunk_mut()) {
+        *trailer = fcs(body).to_le_bytes();
+    }
+    let lengths = Entry { input: number.into(), output: u16::from(number) << 8 | 1 };
+    let mut rewriter = DiscoveryRewriter::new(lengths, last, error);
+    let passed: Vec<u8> = frame.iter().map(|byte| rewriter.byte(*byte)).collect();
+    if let Ok(mut buffered) = Discovery::parse(&frame) {
+        let assignment = buffered.pass(lengths, last, error);
+        // A device says nothing about SA.
+        assert_eq!(rewriter.finish().map(|(_, assignment)| assignment), assignment);
+        assert_eq!(passed, buffered.emit());
+    } else {
+        assert!(rewriter.finish().is_err() && Discovery::parse(&passed).is_err());
+    }
+
+    let mut rewriter = SyncRewriter::new(number.into(), last, error);
+    let passed: Vec<u8> = frame.iter().map(|byte| rewriter.byte(*byte)).collect();
+    if let Ok(mut buffered) = Sync::parse(&frame) {
+        assert_eq!(rewriter.finish(), Ok(buffered));
+        buffered.pass(number.into(), last, error);
+        assert_eq!(passed, buffered.emit());
+    } else {
+        assert!(rewriter.finish().is_err() && Sync::parse(&passed).is_err());
+    }
+}
+
+/// A device and a series of frames and times.
+///
+/// ```text
+/// 0  bit 0 last in the line     then commands of two bytes: what, and with which number
+/// ```
+pub fn device(mut data: &[u8]) {
+    let last = byte(&mut data) & 1 != 0;
+    let mut device = Device::new(Config::default());
+    device.links(true, !last);
+    let mut now_ns = 0;
+    while let [command, value, rest @ ..] = data {
+        data = rest;
+        let change = value & 1 != 0;
+        let frame = match command & 7 {
+            0 => Discovery::request(change).emit().to_vec(),
+            1 => Param::request(Parameters::STOCK, change).emit().to_vec(),
+            2 => DelayReq::of_master(change).emit().to_vec(),
+            3 => Sync::of_master(u32::from(*value) * 10_000, 76, change).emit().to_vec(),
+            4 => {
+                now_ns += u64::from(*value) * 1_000_000;
+                device.poll(now_ns);
+                continue;
+            }
+            5 => {
+                device.cycle_start();
+                continue;
+            }
+            6 => {
+                let request = DelayReq::of_device(change).emit();
+                let trigger = if change { Trigger::Last } else { Trigger::Normal };
+                assert_eq!(device.delay_reflection(&request, 360 + u32::from(*value), trigger), Ok(()));
+                continue;
+            }
+            _ => {
+                exchange(&mut device, *value);
+                continue;
+            }
+        };
+        let port = if command & 8 == 0 { PortId::A } else { PortId::B };
+        let arrival = Arrival { sof_ns: now_ns as u32, counter_ns: now_ns as u32, now_ns };
+        if command & 16 != 0 {
+            damaged(device, port, frame.clone(), *value, arrival);
+        }
+        let before = device.port(port).state as u8;
+        let (length, mut passed) = (frame.len(), frame);
+        device.frame(port, &mut passed, arrival);
+        assert_eq!(passed.len(), length);
+        let after = device.port(port).state as u8;
+        assert!(after == before || after == before + 1 || after == 0, "{before} to {after}");
+    }
+}
+
+/// A flip is refused, is not sent on as good, and changes nothing but counters.
+fn damaged(mut device: Device, port: PortId, mut frame: Vec<u8>, value: u8, arrival: Arrival) {
+    let known = |device: &Device| {
+        (device.port(PortId::A).state, device.port(PortId::B).state, device.assignment(), device.last_sync())
+    };
+    let before = known(&device);
+    let bit = usize::from(value) * 31 % (frame.len() * 8);
+    frame[bit / 8] ^= 1 << (bit % 8);
+    let exchange = device.port(port).state == State::Exchange;
+    let handled = device.frame(port, &mut frame, arrival);
+    assert!(exchange || handled.result.is_err());
+    assert!(exchange || LongFrame::new(&frame).is_err());
+    // A line that was never measured makes a device give up at the first SYNC, whatever it is.
+    assert!(known(&device) == before || device.state() == State::Idle);
+}
+
+fn exchange(device: &mut Device, value: u8) {
+    let frame = MasterFrame { status: Status::EXCHANGE, output: [value; 16], time_stamp: value.into() };
+    let mut bytes = [0; 21];
+    assert_eq!(frame.emit(&mut bytes), Ok(21));
+    let good = device.exchange(&bytes, 585, 585).map(|output| output.data.to_vec());
+    // A device at a far place owns none of the 16 bytes.
+    assert!(good.is_err() || good == Ok(vec![value; 4]));
+    assert_eq!(good.is_ok(), device.answer([value; 3]).is_some() && device.assignment().is_some());
+    bytes[2] ^= 1;
+    assert!(device.exchange(&bytes, 585, 585).is_err());
+}
+
+/// Legal steps through the lossless generator: all of them, on time, at full width.
+///
+/// ```text
+/// 0, 1  handler latency     then two bytes for each step: how much later than 4 us after the one before
+/// ```
+pub fn sync0(mut data: &[u8]) {
+    let latency = u16::from_le_bytes([byte(&mut data), byte(&mut data)]) % (MAX_LATENCY_NS + 1);
+    let (mut at, mut words) = (0u64, Vec::new());
+    while let [low, high, rest @ ..] = data {
+        data = rest;
+        at += 4000 + u64::from(u16::from_le_bytes([*low, *high])) % 12_000;
+        // The wire carries 1 to 3990.
+        if at % 4000 == 0 || at % 4000 > 3990 {
+            at = (at / 4000 + u64::from(at % 4000 > 3990)) * 4000 + 1;
+        }
+        words.resize((at / 4000) as usize, 0);
+        words.push((at % 4000) as u16);
+    }
+    let mut axis = Channel::new(Variant::Lossless, CMP7_NS, latency);
+    let mut wanted = (1..).zip(&words).filter(|(_, word)| **word != 0).map(|(n, word)| n * 4000 + u64::from(*word));
+    let mut up = 0;
+    for (end, word) in (1..).map(|n| n * 4000).zip(words.iter().chain(&[0; 3])) {
+        axis.set_start(StartTime::new(*word));
+        while let Some(edge) = axis.next_edge(end) {
+            if edge.high {
+                let wanted = wanted.next().expect("no more pulses than steps");
+                assert!(edge.ns.abs_diff(wanted) < 10, "{} for {wanted}", edge.ns);
+                up = edge.ns;
+            } else {
+                assert_eq!(edge.ns - up, u64::from(PULSE_NS));
+            }
+        }
+    }
+    assert_eq!(wanted.next(), None);
+}

@@ -1,0 +1,33 @@
+//! A receiver and an encoder on a line with jitter, for as many H-frames as you like:
+//! `cargo run --release -p hdsl --example endurance -- 10000000`.
+//!
+//! Ten million H-frames are two minutes of a free-running link.
+
+use hdsl::device::Device;
+use hdsl::line::{Disturbance, Line};
+use hdsl::master::Master;
+use hdsl::{EncoderId, Profile};
+
+fn main() -> Result<(), Box<dyn core::error::Error>> {
+    let frames: u64 = std::env::args().nth(1).map_or(Ok(100_000), |n| n.parse())?;
+    // 100 m of cable, every edge up to one sample early or late.
+    let mut line = Line::new(Disturbance { jitter: 1, ..Disturbance::cable(100) }, 42);
+    let mut master = Master::new(Profile::SICK);
+    let mut encoder = Device::new(EncoderId::new(0x00153).ok_or("an identifier has 20 bits")?);
+
+    let mut position = 0_u64;
+    for frame in 0..frames {
+        // To and fro, within the 32 bits of the encoder.
+        position = if frame & 0x8000 == 0 { position.wrapping_add(3) } else { position.wrapping_sub(3) };
+        let head = line.down(master.transmission().head.bits());
+        let samples = line.up(encoder.answer(head, position));
+        let report = master.finish(&samples, None)?;
+        if let Some(cause) = report.restarted {
+            println!("frame {frame}: link started anew: {cause:?}");
+        }
+    }
+    let (map, counters) = (master.registers(), master.counters());
+    println!("{frames} H-frames: {counters:?}");
+    println!("position {} (encoder {position}), quality {}", map.position(), map.quality());
+    Ok(())
+}

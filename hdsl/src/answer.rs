@@ -1,0 +1,260 @@
+//! The encoder's answer: 61 bits, six words and the switch bit.
+
+use nrz_line::Window;
+
+use crate::frame::ANSWER_BITS;
+use crate::symbol::{Character, Control, Reading, Rule, RunningDisparity, Word};
+use crate::{DeltaDelta, EncoderByte, Error};
+
+/// An answer as received: each channel is judged alone, a bad word in one does not touch the others.
+///
+/// ```text
+///  bit   0         10          20      30              50  51        61
+///        vertical | parameter | pipe | acc hi | acc lo | s | secondary
+///                                                       inverse of bit 49
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Answer {
+    vertical: Reading,
+    parameter: Reading,
+    pipe: Reading,
+    acceleration: [Reading; 2],
+    secondary: Reading,
+    switch_ok: bool,
+}
+
+impl Answer {
+    /// Reads the 61 low bits of `line`, the first line bit in bit 0.
+    pub const fn from_bits(line: u64, rule: Rule) -> Self {
+        Self {
+            vertical: Word::truncate(line).read(rule),
+            parameter: Word::truncate(line >> 10).read(rule),
+            pipe: Word::truncate(line >> 20).read(rule),
+            acceleration: [Word::truncate(line >> 30).read(rule), Word::truncate(line >> 40).read(rule)],
+            secondary: Word::truncate(line >> 51).read(rule).in_secondary(rule),
+            switch_ok: (line >> 49 ^ line >> 50) & 1 == 1,
+        }
+    }
+
+    /// Reads an answer from the beginning of `line`.
+    ///
+    /// # Errors
+    /// [`Error::Truncated`].
+    #[expect(clippy::cast_possible_truncation, reason = "61 of the bits are taken")]
+    pub const fn parse(line: Window, rule: Rule) -> Result<Self, Error> {
+        if line.len() < ANSWER_BITS {
+            return Err(Error::Truncated { got: line.len() as u16, want: ANSWER_BITS as u16 });
+        }
+        Ok(Self::from_bits(line.bits() as u64, rule))
+    }
+
+    /// The byte of the V-frame.
+    pub const fn vertical(self) -> Reading {
+        self.vertical
+    }
+
+    /// The word of the parameters channel.
+    pub const fn parameter_word(self) -> Reading {
+        self.parameter
+    }
+
+    /// The parameter byte.
+    ///
+    /// # Errors
+    /// [`Error::InvalidWord`]. A special character is taken by its value, as the vendor's receiver does.
+    pub const fn parameter(self) -> Result<EncoderByte, Error> {
+        match self.parameter.byte() {
+            Ok(byte) => Ok(EncoderByte::new(byte)),
+            Err(e) => Err(e),
+        }
+    }
+
+    /// The word of the pipe (SensorHub) channel.
+    pub const fn pipe(self) -> Reading {
+        self.pipe
+    }
+
+    /// The two words of the acceleration channel, high byte first.
+    pub const fn acceleration_words(self) -> [Reading; 2] {
+        self.acceleration
+    }
+
+    /// The word of safe channel 2.
+    pub const fn secondary(self) -> Reading {
+        self.secondary
+    }
+
+    /// Whether the switch bit is the inverse of the bit before it. A wrong one is worth a note, no more.
+    pub const fn switch_ok(self) -> bool {
+        self.switch_ok
+    }
+
+    /// All six words in line order.
+    pub const fn words(self) -> [Reading; 6] {
+        let [high, low] = self.acceleration;
+        [self.vertical, self.parameter, self.pipe, high, low, self.secondary]
+    }
+
+    /// The second difference of the position.
+    ///
+    /// # Errors
+    /// In this order: [`Error::InvalidWord`] for either word, [`Error::EncoderError`] for K29.7 K29.7,
+    /// [`Error::AccelerationCrc`].
+    #[inline]
+    pub const fn delta_delta(self) -> Result<DeltaDelta, Error> {
+        let [high, low] = self.acceleration;
+        let (high_byte, low_byte) = match (high.byte(), low.byte()) {
+            (Ok(high), Ok(low)) => (high, low),
+            (Err(e), _) | (_, Err(e)) => return Err(e),
+        };
+        if high.is(Control::K29_7) && low.is(Control::K29_7) {
+            return Err(Error::EncoderError);
+        }
+        DeltaDelta::from_word(u16::from_be_bytes([high_byte, low_byte]))
+    }
+}
+
+/// What an encoder puts into an answer.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "arbitrary", derive(arbitrary::Arbitrary))]
+pub struct Content {
+    /// Byte of the V-frame.
+    pub vertical: Character,
+    /// Parameter byte.
+    pub parameter: EncoderByte,
+    /// SensorHub data; K30.7 for none.
+    pub pipe: Character,
+    /// The acceleration word, high byte first; `None` is sent as K29.7 K29.7.
+    pub acceleration: Option<DeltaDelta>,
+    /// Byte of safe channel 2.
+    pub secondary: Character,
+}
+
+impl Content {
+    /// The line bits, first bit in bit 0, and the running disparity behind them. The switch bit does not count.
+    ///
+    /// ```
+    /// use hdsl::symbol::{Character, Control, Rule, RunningDisparity};
+    /// use hdsl::{Answer, Content, DeltaDelta, EncoderByte, EncoderSymbol};
+    ///
+    /// let content = Content {
+    ///     vertical: Character::data(0x42),
+    ///     parameter: EncoderByte::of(EncoderSymbol::Idle, false),
+    ///     pipe: Character::control(Control::K30_7),
+    ///     acceleration: DeltaDelta::new(-3),
+    ///     secondary: Character::data(0x17),
+    /// };
+    /// let (bits, _) = content.emit(RunningDisparity::Minus);
+    /// let answer = Answer::from_bits(bits, Rule::Strict);
+    /// assert_eq!(answer.vertical().byte(), Ok(0x42));
+    /// assert_eq!(answer.delta_delta(), Ok(DeltaDelta::new(-3).unwrap()));
+    /// ```
+    pub fn emit(self, rd: RunningDisparity) -> (u64, RunningDisparity) {
+        let acceleration = match self.acceleration {
+            Some(value) => value.to_word().to_be_bytes().map(Character::data),
+            None => [Character::control(Control::K29_7); 2],
+        };
+        let parameter = Character::data(self.parameter.raw());
+        emit([self.vertical, parameter, self.pipe, acceleration[0], acceleration[1], self.secondary], rd)
+    }
+}
+
+/// Six characters as an answer.
+pub(crate) fn emit(characters: [Character; 6], rd: RunningDisparity) -> (u64, RunningDisparity) {
+    let (mut bits, mut rd) = (0_u64, rd);
+    for (k, character) in (0_u32..).zip(characters) {
+        let (word, after) = character.encode(rd);
+        let at = k.wrapping_mul(Word::BITS).wrapping_add(u32::from(k == 5));
+        bits |= u64::from(word.bits()) << at;
+        rd = after;
+    }
+    (bits | (!bits >> 49 & 1) << 50, rd)
+}
+
+#[cfg(test)]
+pub(crate) mod tests {
+    use super::*;
+    use crate::EncoderSymbol;
+    use proptest::prelude::*;
+
+    pub(crate) fn characters() -> impl Strategy<Value = Character> {
+        prop_oneof![
+            4 => any::<u8>().prop_map(Character::data),
+            1 => (0..12usize).prop_map(|k| Character::control(Control::ALL[k])),
+        ]
+    }
+
+    pub(crate) fn contents() -> impl Strategy<Value = Content> {
+        (characters(), any::<u8>(), characters(), prop::option::of(-1024..=1023_i16), characters()).prop_map(
+            |(vertical, parameter, pipe, dd, secondary)| Content {
+                vertical,
+                parameter: EncoderByte::new(parameter),
+                pipe,
+                acceleration: dd.map(|dd| DeltaDelta::new(dd).unwrap()),
+                secondary,
+            },
+        )
+    }
+
+    fn column(plus: bool) -> RunningDisparity {
+        if plus { RunningDisparity::Plus } else { RunningDisparity::Minus }
+    }
+
+    proptest! {
+        #[test]
+        fn answers_come_back(content in contents(), plus: bool) {
+            let (bits, _) = content.emit(column(plus));
+            let answer = Answer::from_bits(bits, Rule::Strict);
+            let is = |r: Reading, c: Character| r.word().decode() == Some(c) && r.byte() == Ok(c.byte());
+            prop_assert!(is(answer.vertical(), content.vertical) && is(answer.pipe(), content.pipe));
+            prop_assert!(is(answer.secondary(), content.secondary) && answer.switch_ok());
+            prop_assert_eq!(answer.parameter(), Ok(content.parameter));
+            prop_assert_eq!(answer.delta_delta(), content.acceleration.ok_or(Error::EncoderError));
+            // The reduced rule gives the same values, control characters of column RD+ outside the secondary aside.
+            let reduced = Answer::from_bits(bits, Rule::Reduced);
+            prop_assert_eq!(reduced.secondary().raw(), content.secondary.byte());
+            prop_assert_eq!(reduced.parameter(), Ok(content.parameter));
+        }
+
+        /// The kernel against taking the answer apart bit by bit.
+        #[test]
+        fn any_bits_against_a_slow_reader(bits: u64) {
+            let answer = Answer::from_bits(bits, Rule::Strict);
+            for (k, reading) in answer.words().into_iter().enumerate() {
+                let from = if k == 5 { 51 } else { 10 * k };
+                let word = (0..10).fold(0, |w, i| w | ((bits >> (from + i) & 1) as u16) << i);
+                prop_assert_eq!(reading, Word::new(word).unwrap().read(Rule::Strict));
+            }
+            prop_assert_eq!(answer.switch_ok(), bits >> 49 & 1 != bits >> 50 & 1);
+        }
+
+        /// One flipped bit is seen in the word it is in and in no other, or gives another good word there.
+        #[test]
+        fn a_flip_stays_in_its_word(content in contents(), plus: bool, at in 0..61_u32) {
+            let (bits, _) = content.emit(column(plus));
+            let (good, bad) = (Answer::from_bits(bits, Rule::Strict), Answer::from_bits(bits ^ 1 << at, Rule::Strict));
+            let differ = good.words().iter().zip(bad.words()).filter(|(a, b)| *a != b).count();
+            prop_assert_eq!(differ, usize::from(at != 50));
+            prop_assert_eq!(bad.switch_ok(), !matches!(at, 49 | 50));
+            // D28.y and K28.y differ in one bit and have the same value.
+            let k28 = bad.acceleration_words().iter().any(|word| word.is_special());
+            if matches!(at, 30..50) && content.acceleration.is_some() && !k28 {
+                prop_assert_ne!(bad.delta_delta(), good.delta_delta());
+            }
+        }
+    }
+
+    #[test]
+    fn truncations() {
+        for len in 0..61 {
+            let line = Window::from_bits(u128::MAX, len).unwrap();
+            assert_eq!(Answer::parse(line, Rule::Strict), Err(Error::Truncated { got: len as u16, want: 61 }));
+        }
+        let line = Window::from_bits(u128::MAX, 61).unwrap();
+        assert!(Answer::parse(line, Rule::Strict).unwrap().vertical().is_byte_error());
+        assert_eq!(EncoderSymbol::Idle.bits(), 0x10);
+    }
+}

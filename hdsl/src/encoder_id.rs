@@ -1,0 +1,215 @@
+use crate::answer::emit;
+use crate::symbol::{Character, RunningDisparity};
+use crate::{Answer, Error};
+
+/// The encoder identifier ENC_ID, 20 bits (SICK manual, p. 44).
+///
+/// ```text
+///  bit  19         18:16      15:12        11         10       9:4                      3:0
+///       continue | reserved | user index | reserved | sign  | position bits - acc bits | acc bits - 8
+/// ```
+///
+/// The sign bit is 1 for a signed position; the register list of the Motor Control SDK prints the opposite.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(try_from = "u32", into = "u32"))]
+pub struct EncoderId(u32);
+
+impl EncoderId {
+    /// `None` above 20 bits.
+    pub const fn new(id: u32) -> Option<Self> {
+        if id < 1 << 20 { Some(Self(id)) } else { None }
+    }
+
+    /// The 20 bits.
+    pub const fn raw(self) -> u32 {
+        self.0
+    }
+
+    /// Width of the acceleration value, 8..=23 bits.
+    pub const fn acceleration_bits(self) -> u8 {
+        (self.byte(0) & 15).wrapping_add(8)
+    }
+
+    /// Width of the position, 8..=86 bits as coded; see [`PositionBits`] for what is possible.
+    pub const fn position_bits(self) -> u8 {
+        let [low, high, ..] = self.0.to_le_bytes();
+        let more = low >> 4 | (high & 3) << 4;
+        self.acceleration_bits().wrapping_add(more)
+    }
+
+    /// Whether the position is signed.
+    pub const fn is_signed(self) -> bool {
+        self.0 >> 10 & 1 == 1
+    }
+
+    /// The user-defined index, 0..=15.
+    pub const fn user_index(self) -> u8 {
+        self.byte(1) >> 4
+    }
+
+    /// Whether the identifier is longer than 20 bits.
+    pub const fn continues(self) -> bool {
+        self.0 >> 19 & 1 == 1
+    }
+
+    const fn byte(self, at: usize) -> u8 {
+        let [low, middle, high, _] = self.0.to_le_bytes();
+        match at {
+            0 => low,
+            1 => middle,
+            _ => high,
+        }
+    }
+
+    /// The width of the position, if this receiver can work with the encoder: acceleration of 11 bits, position of
+    /// 8..=40 bits, no continuation.
+    ///
+    /// # Errors
+    /// [`Error::UnsupportedEncoder`].
+    pub const fn check(self) -> Result<PositionBits, Error> {
+        let refuse = Error::UnsupportedEncoder { id: self.0 };
+        if self.acceleration_bits() != 11 || self.continues() {
+            return Err(refuse);
+        }
+        match PositionBits::new(self.position_bits()) {
+            Some(bits) => Ok(bits),
+            None => Err(refuse),
+        }
+    }
+
+    /// Takes the identifier out of the answer to IDREQ, which carries it twice.
+    ///
+    /// ```text
+    ///  vertical   parameter   pipe                  acc high   acc low
+    ///  ID 7:0     ID 15:8     ID 19:16, ID 19:16    ID 15:8    ID 7:0
+    /// ```
+    ///
+    /// # Errors
+    /// [`Error::EncoderIdMismatch`] if the two copies differ. There is no other check on this answer.
+    pub fn from_answer(answer: Answer) -> Result<Self, Error> {
+        let [vertical, parameter, pipe, high, low, _] = answer.words().map(|word| u32::from(word.raw()));
+        let first = vertical | parameter << 8 | pipe >> 4 << 16;
+        let second = low | high << 8 | (pipe & 15) << 16;
+        if first != second {
+            return Err(Error::EncoderIdMismatch { first, second });
+        }
+        Ok(Self(second))
+    }
+
+    /// The answer to IDREQ. The secondary word is not used; the caller may fill it.
+    pub fn to_answer(self, secondary: Character, rd: RunningDisparity) -> (u64, RunningDisparity) {
+        let [low, middle, high, _] = self.0.to_le_bytes().map(Character::data);
+        let pipe = Character::data(high.byte() << 4 | high.byte());
+        emit([low, middle, pipe, middle, low, secondary], rd)
+    }
+}
+
+impl TryFrom<u32> for EncoderId {
+    type Error = Error;
+
+    fn try_from(id: u32) -> Result<Self, Error> {
+        Self::new(id).ok_or(Error::UnsupportedEncoder { id })
+    }
+}
+
+impl From<EncoderId> for u32 {
+    fn from(id: EncoderId) -> Self {
+        id.0
+    }
+}
+
+/// Width of the position, 8..=40 bits.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(try_from = "u8", into = "u8"))]
+pub struct PositionBits(u8);
+
+impl PositionBits {
+    /// 40 bits, all that the safe position has.
+    pub const MAX: Self = Self(40);
+
+    /// `None` outside 8..=40.
+    pub const fn new(bits: u8) -> Option<Self> {
+        if bits < 8 || bits > Self::MAX.0 { None } else { Some(Self(bits)) }
+    }
+
+    /// The number of bits.
+    pub const fn get(self) -> u8 {
+        self.0
+    }
+
+    /// As many ones.
+    pub const fn mask(self) -> u64 {
+        match 1_u64.checked_shl(self.0 as u32) {
+            Some(one) => one.wrapping_sub(1),
+            None => u64::MAX,
+        }
+    }
+}
+
+impl TryFrom<u8> for PositionBits {
+    type Error = Error;
+
+    fn try_from(bits: u8) -> Result<Self, Error> {
+        Self::new(bits).ok_or(Error::UnsupportedEncoder { id: u32::from(bits) })
+    }
+}
+
+impl From<PositionBits> for u8 {
+    fn from(bits: PositionBits) -> Self {
+        bits.0
+    }
+}
+
+#[cfg(feature = "arbitrary")]
+impl<'a> arbitrary::Arbitrary<'a> for EncoderId {
+    fn arbitrary(from: &mut arbitrary::Unstructured<'a>) -> arbitrary::Result<Self> {
+        Ok(Self(u32::arbitrary(from)? & 0xf_ffff))
+    }
+}
+
+#[cfg(feature = "arbitrary")]
+impl<'a> arbitrary::Arbitrary<'a> for PositionBits {
+    fn arbitrary(from: &mut arbitrary::Unstructured<'a>) -> arbitrary::Result<Self> {
+        from.int_in_range(8..=40).map(Self)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::symbol::Rule;
+
+    #[test]
+    fn the_documented_widths() {
+        for (id, bits) in [(0x00153, 32), (0x00133, 30), (0x000d3, 24)] {
+            let id = EncoderId::new(id).unwrap();
+            assert_eq!((id.acceleration_bits(), id.check()), (11, Ok(PositionBits(bits))));
+        }
+        for low in 0..16 {
+            assert_eq!(EncoderId::new(low).unwrap().acceleration_bits(), 8 + low as u8);
+        }
+        for refused in [0x00150, 0x80153, 0x001e3] {
+            assert_eq!(EncoderId::new(refused).unwrap().check(), Err(Error::UnsupportedEncoder { id: refused }));
+        }
+        assert_eq!((PositionBits::new(40).unwrap().mask(), PositionBits(8).mask()), (0xff_ffff_ffff, 0xff));
+    }
+
+    /// Every identifier comes back; a flip of a line bit is seen unless it is in the pipe word, the only one that
+    /// carries both copies.
+    #[test]
+    fn answers() {
+        for raw in (0..1 << 20).step_by(97) {
+            let id = EncoderId::new(raw).unwrap();
+            let (bits, _) = id.to_answer(Character::data(0), RunningDisparity::Plus);
+            let read = |bits| EncoderId::from_answer(Answer::from_bits(bits, Rule::Strict));
+            assert_eq!(read(bits), Ok(id));
+            for at in 0..50 {
+                if let Ok(other) = read(bits ^ 1 << at) {
+                    assert!(other == id || matches!(at, 20..30) && (other.raw() ^ raw) & 0xffff == 0);
+                }
+            }
+        }
+    }
+}

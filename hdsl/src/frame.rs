@@ -1,0 +1,377 @@
+//! The H-frame: what the master sends, as bits and as oversampled bytes.
+//!
+//! ```text
+//!  bit    0      6    9             9+E    12+E  16+E    26+E 27+E      88+E    100+E    108+E
+//!         | SYNC | 11 | EXTRA | 0 | 110 | EQUAL | PARA |  | answer | reserve | TRAILER | STUFFING
+//!         001011       1...10                             released   for the   00000011   N x 001011
+//!                          ^ the encoder samples          1 bit      cable
+//! ```
+//!
+//! The falling edge inside SAMPLE is the instant for which the encoder gives its position. Free running there is no
+//! EXTRA window and no stuffing, and a frame has 108 bits or 11.52 us; in sync mode the window of 4..=9 bits and
+//! 0..=26 stuffing blocks stretch it (HDSL Protocol Design; SICK manual, p. 31).
+
+use nrz_line::Window;
+
+use crate::symbol::Word;
+use crate::{Error, LineDisparity, ParameterByte};
+
+/// Line rate in bits a second.
+pub const BIT_RATE: u32 = 9_375_000;
+/// Samples a bit at 75 MHz.
+pub const SAMPLES_PER_BIT: u32 = 8;
+/// Bits of a free-running H-frame.
+pub const H_FRAME_BITS: u32 = 108;
+/// H-frames of a V-frame.
+pub const V_FRAME: u8 = 8;
+/// Bits of the encoder's answer.
+pub const ANSWER_BITS: u32 = 61;
+/// Bits kept free behind the answer for the delay of the cable.
+pub const DELAY_RESERVE_BITS: u32 = 12;
+/// Bits of TRAILER; the first two are left to the idle line.
+pub const TRAILER_BITS: u32 = 8;
+/// Bits of a stuffing block.
+pub const STUFFING_BITS: u32 = 6;
+/// Most stuffing blocks in a frame.
+pub const MAX_STUFFING: u8 = 26;
+
+/// SYNC and a stuffing block, first line bit in bit 0: 0 0 1 0 1 1.
+const SYNC: u128 = 0b11_0100;
+/// TRAILER: 0 0 0 0 0 0 1 1.
+const TRAILER: u8 = 0b1100_0000;
+
+/// The EXTRA window of sync mode: the level is high for 24..=72 eighths of a bit, then low to the end of the bit.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(try_from = "u8", into = "u8"))]
+pub struct Extra(u8);
+
+impl Extra {
+    /// The shortest window.
+    pub const MIN: Self = Self(24);
+    /// The longest window.
+    pub const MAX: Self = Self(72);
+
+    /// `edge` is the place of the falling edge in eighths of a bit after the start of the window; `None` outside
+    /// 24..=72.
+    pub const fn new(edge: u8) -> Option<Self> {
+        if edge < Self::MIN.0 || edge > Self::MAX.0 { None } else { Some(Self(edge)) }
+    }
+
+    /// Place of the falling edge, in eighths of a bit after the start of the window.
+    pub const fn edge(self) -> u8 {
+        self.0
+    }
+
+    /// Bits that the window occupies, 3..=9.
+    pub const fn bits(self) -> u8 {
+        self.0.div_ceil(8)
+    }
+
+    /// EXTRA_EDGE: the samples of the last bit, the first of them in bit 7. 00h means a whole bit of ones.
+    ///
+    /// ```
+    /// # use hdsl::frame::Extra;
+    /// assert_eq!(Extra::new(60).map(Extra::edge_register), Some(0xf0));
+    /// assert_eq!(Extra::new(64).map(Extra::edge_register), Some(0x00));
+    /// ```
+    pub const fn edge_register(self) -> u8 {
+        edge_register(self.0 % 8)
+    }
+
+    /// The samples of the last bit as they are on the line.
+    const fn last_bit(self) -> u8 {
+        if self.0 % 8 == 0 { 0xff } else { self.edge_register() }
+    }
+}
+
+/// EXTRA_EDGE for TIME_REST (0..=7): that many ones from bit 7 down.
+pub(crate) const fn edge_register(time_rest: u8) -> u8 {
+    match 0xff_u8.checked_shr(time_rest as u32) {
+        Some(zeros) => !zeros,
+        None => 0xff,
+    }
+}
+
+impl TryFrom<u8> for Extra {
+    type Error = Error;
+
+    fn try_from(edge: u8) -> Result<Self, Error> {
+        Self::new(edge).ok_or(Error::ExtraOutOfRange { extra: u32::from(edge.div_ceil(8)) })
+    }
+}
+
+impl From<Extra> for u8 {
+    fn from(extra: Extra) -> Self {
+        extra.0
+    }
+}
+
+/// The first part of an H-frame, from SYNC to PARA.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct Head {
+    byte: ParameterByte,
+    extra: Option<Extra>,
+    equalisation: u8,
+    para: Word,
+}
+
+impl Head {
+    /// Bits without an EXTRA window.
+    pub const BITS: u32 = 26;
+
+    /// The head for a parameter byte, and the line disparity behind it. `before` is the disparity in front of
+    /// EQUALISATION, so with the ones of the EXTRA window if there is one (the partly high last bit counts as a one).
+    pub const fn new(byte: ParameterByte, extra: Option<Extra>, before: LineDisparity) -> (Self, LineDisparity) {
+        let (equalisation, d) = before.equalisation();
+        let (para, d) = d.encode(byte);
+        (Self { byte, extra, equalisation, para }, d)
+    }
+
+    /// The parameter byte.
+    pub const fn byte(self) -> ParameterByte {
+        self.byte
+    }
+
+    /// The EXTRA window; `None` when free running.
+    pub const fn extra(self) -> Option<Extra> {
+        self.extra
+    }
+
+    /// The four EQUALISATION bits, first line bit in bit 0.
+    pub const fn equalisation(self) -> u8 {
+        self.equalisation
+    }
+
+    /// The word of the parameter byte.
+    pub const fn para(self) -> Word {
+        self.para
+    }
+
+    const fn extra_bits(self) -> u32 {
+        match self.extra {
+            Some(extra) => extra.bits() as u32,
+            None => 0,
+        }
+    }
+
+    /// The line bits; the last bit of an EXTRA window is a one also when its edge lies inside.
+    pub fn bits(self) -> Window {
+        let extra = self.extra_bits();
+        // SYNC, the two ones of SAMPLE and the window.
+        let ones = (1_u128 << extra.wrapping_add(2)).wrapping_sub(1);
+        let rest = 0b0110_u128 | u128::from(self.equalisation) << 4 | u128::from(self.para.bits()) << 8;
+        let bits = SYNC | ones << 6 | rest << extra.wrapping_add(8);
+        Window::from_bits(bits, Self::BITS.wrapping_add(extra)).unwrap_or(Window::EMPTY)
+    }
+
+    /// The line at eight samples a bit: a byte each, its first sample in bit 7.
+    pub fn samples(self) -> impl Iterator<Item = u8> {
+        let bits = self.bits();
+        let edge = self.extra.map(|extra| (self.extra_bits().wrapping_add(7), extra.last_bit()));
+        (0..bits.len()).map(move |at| match (edge, bits.get(at)) {
+            (Some((last, samples)), _) if last == at => samples,
+            (_, Some(true)) => 0xff,
+            _ => 0x00,
+        })
+    }
+
+    /// What an encoder reads from the line bits of a head. The EQUALISATION bits are not looked at.
+    ///
+    /// # Errors
+    /// [`Error::Truncated`], [`Error::Framing`], and [`Error::InvalidWord`] for a parameter word that is in no table.
+    pub fn parse(line: Window) -> Result<Received, Error> {
+        let bits = line.bits();
+        let truncated = |want: u32| Error::Truncated { got: low16(line.len()), want: low16(want) };
+        if line.len() < Self::BITS {
+            return Err(truncated(Self::BITS));
+        }
+        // Ones behind SYNC: two of SAMPLE and those of the window.
+        let extra = (bits >> 8).trailing_ones();
+        if bits & 0xff != SYNC | 0xc0 || extra > 10 || bits >> extra.wrapping_add(8) & 0b1111 != 0b0110 {
+            return Err(Error::Framing);
+        }
+        let len = Self::BITS.wrapping_add(extra);
+        if line.len() < len {
+            return Err(truncated(len));
+        }
+        let (at, [low, high, ..]) = (extra.wrapping_add(16), (bits >> extra.wrapping_add(16)).to_le_bytes());
+        let word = Word::truncate(u64::from(u16::from_le_bytes([low, high])));
+        let byte = ParameterByte::decode(word).ok_or(Error::InvalidWord { word: word.bits() })?;
+        Ok(Received { byte, extra_bits: extra, len: at.wrapping_add(Word::BITS) })
+    }
+}
+
+/// What an encoder reads from the head of an H-frame.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Received {
+    /// The parameter byte.
+    pub byte: ParameterByte,
+    /// Bits of the EXTRA window; 0 free running.
+    pub extra_bits: u32,
+    /// Bits of the whole head.
+    pub len: u32,
+}
+
+#[expect(clippy::cast_possible_truncation, reason = "lengths of a window are below 129")]
+const fn low16(len: u32) -> u16 {
+    len as u16
+}
+
+/// What the master sends in the place of an answer that nobody gives (frames with RESET and SYNC): a 0 for the
+/// switch bit, then 1 0 1 0 ... 1 over the 73 bits of the answer and its reserve.
+pub const FILLER: Window = {
+    let len = 1 + ANSWER_BITS + DELAY_RESERVE_BITS;
+    match Window::from_bits(0xaaaa_aaaa_aaaa_aaaa_aaaa, len) {
+        Some(window) => window,
+        None => Window::EMPTY,
+    }
+};
+
+/// How much of TRAILER the master drives.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "arbitrary", derive(arbitrary::Arbitrary))]
+pub enum Trailer {
+    /// All eight bits, in frames without an answer.
+    Whole,
+    /// The last six behind an answer. The line idles during the first two (the specification speaks of five driven
+    /// zeros, the vendor's receiver drives four).
+    AfterAnswer,
+    /// The four zeros only: the vendor's receiver breaks off there when a LEARN frame has failed.
+    Cut,
+}
+
+/// The last part of an H-frame: TRAILER and STUFFING.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "arbitrary", derive(arbitrary::Arbitrary))]
+pub struct Tail {
+    /// How much of TRAILER is driven.
+    pub trailer: Trailer,
+    /// Blocks of stuffing, 0..=26.
+    pub stuffing: u8,
+}
+
+impl Tail {
+    /// Bits of the line time that the tail takes.
+    pub const fn time(self) -> u32 {
+        let trailer = match self.trailer {
+            Trailer::Whole | Trailer::AfterAnswer => TRAILER_BITS,
+            Trailer::Cut => 6,
+        };
+        STUFFING_BITS.wrapping_mul(self.stuffing as u32).wrapping_add(trailer)
+    }
+
+    /// The driven bits in line order.
+    pub fn bits(self) -> impl Iterator<Item = bool> {
+        let driven = match self.trailer {
+            Trailer::Whole => 0..TRAILER_BITS,
+            Trailer::AfterAnswer => 2..TRAILER_BITS,
+            Trailer::Cut => 2..6,
+        };
+        let trailer = driven.map(|at| TRAILER >> at & 1 == 1);
+        let block = (0..STUFFING_BITS).map(|at| SYNC >> at & 1 == 1);
+        trailer.chain((0..self.stuffing).flat_map(move |_| block.clone()))
+    }
+}
+
+#[cfg(feature = "arbitrary")]
+impl<'a> arbitrary::Arbitrary<'a> for Extra {
+    fn arbitrary(from: &mut arbitrary::Unstructured<'a>) -> arbitrary::Result<Self> {
+        from.int_in_range(Self::MIN.0..=Self::MAX.0).map(Self)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::MasterSymbol;
+    use std::string::String;
+
+    fn text(bits: impl Iterator<Item = bool>) -> String {
+        bits.map(|b| if b { '1' } else { '0' }).collect()
+    }
+
+    fn window(w: Window) -> impl Iterator<Item = bool> {
+        (0..w.len()).map(move |at| w.get(at).unwrap())
+    }
+
+    #[test]
+    fn the_frame_adds_up() {
+        assert_eq!(Head::BITS + FILLER.len() + TRAILER_BITS, H_FRAME_BITS);
+        let byte = ParameterByte::of(MasterSymbol::Reset, false, false);
+        let (head, d) = Head::new(byte, None, LineDisparity::ZERO);
+        assert_eq!(text(window(head.bits())), "00101111011000000101001011");
+        let (head, _) = Head::new(byte, None, d);
+        assert_eq!(text(window(head.bits()).skip(12).take(4)), "1101");
+        assert!(text(window(FILLER)).starts_with("0101") && text(window(FILLER)).ends_with("01"));
+        assert_eq!(text(Tail { trailer: Trailer::Whole, stuffing: 2 }.bits()), "00000011001011001011");
+        assert_eq!(text(Tail { trailer: Trailer::AfterAnswer, stuffing: 0 }.bits()), "000011");
+        assert_eq!(text(Tail { trailer: Trailer::Cut, stuffing: 0 }.bits()), "0000");
+        assert_eq!(Tail { trailer: Trailer::AfterAnswer, stuffing: 26 }.time(), 164);
+    }
+
+    /// Every byte with every window at every disparity is read back by the encoder's side.
+    #[test]
+    fn heads_come_back() {
+        for raw in 0..=255 {
+            for edge in 23..=72 {
+                for d in -5..=5 {
+                    let (byte, extra) = (ParameterByte::new(raw), Extra::new(edge));
+                    let (head, _) = Head::new(byte, extra, LineDisparity(d));
+                    let got = Head::parse(head.bits()).unwrap();
+                    assert_eq!((got.byte, got.len), (byte, head.bits().len()));
+                    assert_eq!(got.extra_bits, extra.map_or(0, |e| u32::from(e.bits())));
+                    if let Some(extra) = extra {
+                        let high: u32 = head
+                            .samples()
+                            .skip(8)
+                            .take(9)
+                            .map(u8::leading_ones)
+                            .scan(true, |go, n| {
+                                let take = go.then_some(n);
+                                *go = n == 8;
+                                take
+                            })
+                            .sum();
+                        assert_eq!(high, u32::from(extra.edge()));
+                    }
+                }
+            }
+        }
+    }
+
+    /// Every wrong bit of the fixed pattern is refused, every shorter line too.
+    #[test]
+    fn flips_and_truncations() {
+        let (head, _) = Head::new(ParameterByte::new(0xd0), None, LineDisparity::ZERO);
+        let good = head.bits();
+        for at in 0..12 {
+            let bad = Window::from_bits(good.bits() ^ 1 << at, 26).unwrap();
+            assert!(matches!(Head::parse(bad), Err(Error::Framing | Error::Truncated { .. })), "{at}");
+        }
+        for len in 0..26 {
+            let cut = Window::from_bits(good.bits(), len).unwrap();
+            assert_eq!(Head::parse(cut), Err(Error::Truncated { got: len as u16, want: 26 }));
+        }
+        // A stuffing block is no beginning of a frame: it is followed by zeros.
+        assert_eq!(
+            Head::parse(Window::from_bits(SYNC | SYNC << 6 | good.bits() << 12, 38).unwrap()),
+            Err(Error::Framing)
+        );
+    }
+
+    #[test]
+    fn the_edge_register() {
+        let all: [u8; 8] = core::array::from_fn(|t| edge_register(t as u8));
+        assert_eq!(all, [0x00, 0x80, 0xc0, 0xe0, 0xf0, 0xf8, 0xfc, 0xfe]);
+        assert_eq!((Extra::new(23), Extra::new(73)), (None, None));
+        assert_eq!((Extra::MIN.bits(), Extra::MAX.bits(), Extra::new(25).unwrap().bits()), (3, 9, 4));
+    }
+}

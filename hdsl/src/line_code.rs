@@ -1,0 +1,140 @@
+//! The master's part of the line balance: EQUALISATION, and the parameter byte with its polarity chosen by the
+//! line disparity instead of a running disparity.
+
+use crate::ParameterByte;
+use crate::symbol::{FOUR_MORE_ZEROS, SIX_MORE_ZEROS, Word};
+
+/// Ones minus zeros that the master has sent, as its receiver counts them.
+///
+/// The count is the vendor's book-keeping and not exact: SYNC, SAMPLE and CYCLE RESET are taken as neutral, and so
+/// is an EQUALISATION of 0000 for a disparity of -1..=1. It starts at 0 and returns to 0 with the TRAILER of every
+/// answered frame; in frames without an answer it is carried on.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "arbitrary", derive(arbitrary::Arbitrary))]
+pub struct LineDisparity(pub i8);
+
+impl LineDisparity {
+    /// Balanced.
+    pub const ZERO: Self = Self(0);
+
+    const fn plus(self, difference: i8) -> Self {
+        Self(self.0.saturating_add(difference))
+    }
+
+    /// The count after an EXTRA window with this many ones.
+    pub const fn with_ones(self, ones: u8) -> Self {
+        self.plus(if ones > 127 { 127 } else { i8::from_le_bytes([ones]) })
+    }
+
+    /// The four EQUALISATION bits, first line bit in bit 0, and the disparity that counts afterwards.
+    ///
+    /// ```text
+    ///  disparity   bits sent   afterwards
+    ///   -1..=1      0000        d
+    ///    2, 3       0010        d - 2
+    ///    4..        0000        d - 4
+    ///   -3, -2      1101        d + 2
+    ///   ..=-4       1111        d + 4
+    /// ```
+    ///
+    /// An encoder does not interpret these bits.
+    pub const fn equalisation(self) -> (u8, Self) {
+        match self.0 {
+            -1..=1 => (0b0000, self),
+            2..=3 => (0b0100, self.plus(-2)),
+            4.. => (0b0000, self.plus(-4)),
+            -3..=-2 => (0b1011, self.plus(2)),
+            ..=-4 => (0b1111, self.plus(4)),
+        }
+    }
+
+    /// The word for the parameter byte, and the disparity afterwards.
+    ///
+    /// 1. the 6-bit block of bits 4:0 (28 gives that of K.28): a neutral block as tabulated (7 always 000111),
+    ///    otherwise the version with more zeros while d >= 0, its inverse while d < 0; d takes up its balance;
+    /// 2. the 4-bit block of bits 7:5 in the same way (3 always 0011), by the new d, which it does not change.
+    #[expect(clippy::indexing_slicing, reason = "five bits are below 32, three below 8")]
+    pub const fn encode(self, byte: ParameterByte) -> (Word, Self) {
+        let raw = byte.raw();
+        let six = polarity(SIX_MORE_ZEROS[(raw & 31) as usize], 6, self.0);
+        let after = match six.count_ones() {
+            2 => self.plus(-2),
+            4 => self.plus(2),
+            _ => self,
+        };
+        let four = polarity(FOUR_MORE_ZEROS[(raw >> 5) as usize], 4, after.0);
+        (Word::truncate(six as u64 | (four as u64) << 6), after)
+    }
+}
+
+/// The block itself if it is neutral or `d` wants zeros, else its inverse.
+const fn polarity(block: u8, len: u32, d: i8) -> u8 {
+    let mask = if len == 6 { 0x3f } else { 0x0f };
+    if d >= 0 || block.count_ones().wrapping_mul(2) == len { block } else { block ^ mask }
+}
+
+impl ParameterByte {
+    /// The byte that a word from [`LineDisparity::encode`] stands for, whatever the disparity was; `None` if a
+    /// sub-block is in no table.
+    pub const fn decode(word: Word) -> Option<Self> {
+        // The sub-block look-ups disregard polarity, as an encoder has to.
+        let reading = word.read(crate::Rule::Reduced);
+        let raw = reading.raw();
+        // FFh also marks a failed look-up; the real FFh has x = 31 and y = 7.
+        if raw == 0xff && !is_ff(word.bits()) { None } else { Some(Self::new(raw)) }
+    }
+}
+
+/// Whether the word is one of those that stand for FFh: 101011 or its inverse, then y = 7.
+const fn is_ff(bits: u16) -> bool {
+    let six = matches!(bits & 0x3f, 0b11_0101 | 0b00_1010);
+    six && matches!(bits >> 6, 0b0111 | 0b1000 | 0b1110 | 0b0001)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_byte_at_every_disparity_comes_back() {
+        for raw in 0..=255 {
+            for d in i8::MIN..=i8::MAX {
+                let (word, after) = LineDisparity(d).encode(ParameterByte::new(raw));
+                assert_eq!(ParameterByte::decode(word), Some(ParameterByte::new(raw)), "{raw:02x} {d}");
+                assert!(after.0.abs_diff(d) <= 2);
+            }
+        }
+    }
+
+    #[test]
+    fn the_documented_words() {
+        let bits = |text: &str| text.bytes().rev().fold(0, |b, c| b << 1 | u16::from(c == b'1'));
+        for (raw, text) in [
+            (0x1f, "0101001011"),
+            (0x19, "1001100100"),
+            (0x1a, "0101100100"),
+            (0x1b, "0010011011"),
+            (0x1c, "1100001011"),
+            (0x1d, "0100011011"),
+            (0x9e, "1000011101"),
+            (0x90, "1001001101"),
+            (0xd0, "1001000110"),
+        ] {
+            assert_eq!(LineDisparity::ZERO.encode(ParameterByte::new(raw)).0.bits(), bits(text), "{raw:02x}");
+        }
+    }
+
+    #[test]
+    fn words_outside_the_tables_are_no_parameter_byte() {
+        let good = (0..1024).filter(|w| ParameterByte::decode(Word::new(*w).unwrap()).is_some()).count();
+        // 47 six-bit blocks (18 + 2 * 13 + both of 7 + both of K28, 7 counted once) times 14 four-bit blocks.
+        let six = (0..64_u16)
+            .filter(|s| Word::new(s | 0b1001 << 6).unwrap().read(crate::Rule::Reduced).raw() != 0xff)
+            .count();
+        assert_eq!(good, six * 14);
+        assert_eq!(LineDisparity::ZERO.with_ones(9), LineDisparity(9));
+        assert_eq!(LineDisparity(127).with_ones(200), LineDisparity(127));
+    }
+}

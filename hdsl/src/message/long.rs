@@ -1,0 +1,429 @@
+use super::{MessageBytes, checked};
+use crate::Error;
+
+/// LLEN: how many data bytes a long message carries or asks for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Default)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "arbitrary", derive(arbitrary::Arbitrary))]
+#[repr(u8)]
+#[allow(missing_docs, reason = "the name says how many")]
+pub enum Length {
+    #[default]
+    None = 0,
+    Two = 1,
+    Four = 2,
+    Eight = 3,
+}
+
+impl Length {
+    /// From the two bits LLEN.
+    pub const fn from_code(code: u8) -> Self {
+        match code & 3 {
+            0 => Self::None,
+            1 => Self::Two,
+            2 => Self::Four,
+            _ => Self::Eight,
+        }
+    }
+
+    /// The two bits LLEN.
+    pub const fn code(self) -> u8 {
+        self as u8
+    }
+
+    /// 0, 2, 4 or 8.
+    pub const fn bytes(self) -> usize {
+        match self {
+            Self::None => 0,
+            Self::Two => 2,
+            Self::Four => 4,
+            Self::Eight => 8,
+        }
+    }
+}
+
+/// 0, 2, 4 or 8 bytes of data.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct Data {
+    bytes: [u8; 8],
+    length: Length,
+}
+
+impl Data {
+    /// No data.
+    pub const NONE: Self = Self { bytes: [0; 8], length: Length::None };
+
+    /// A copy of `bytes`.
+    ///
+    /// # Errors
+    /// [`Error::DataLength`] unless there are 0, 2, 4 or 8.
+    pub fn new(bytes: &[u8]) -> Result<Self, Error> {
+        let length = match bytes.len() {
+            0 => Length::None,
+            2 => Length::Two,
+            4 => Length::Four,
+            8 => Length::Eight,
+            other => return Err(Error::DataLength { len: u8::try_from(other).unwrap_or(u8::MAX) }),
+        };
+        let mut data = Self { bytes: [0; 8], length };
+        for (to, from) in data.bytes.iter_mut().zip(bytes) {
+            *to = *from;
+        }
+        Ok(data)
+    }
+
+    /// LLEN.
+    pub const fn length(&self) -> Length {
+        self.length
+    }
+
+    /// The bytes.
+    pub fn as_bytes(&self) -> &[u8] {
+        self.bytes.get(..self.length.bytes()).unwrap_or(&self.bytes)
+    }
+}
+
+/// Address of a resource, 10 bits.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(try_from = "u16", into = "u16"))]
+pub struct ResourceAddress(u16);
+
+impl ResourceAddress {
+    /// "ROOT".
+    pub const ROOT: Self = Self(0x000);
+    /// "RESOLUTN": steps a turn, 4 bytes.
+    pub const RESOLUTN: Self = Self(0x081);
+    /// Date of the firmware.
+    pub const FWDATE: Self = Self(0x086);
+    /// "EESIZE".
+    pub const EESIZE: Self = Self(0x087);
+    /// First resource of the user data.
+    pub const USER: Self = Self(0x100);
+    /// Access key.
+    pub const ACCESS_KEY: Self = Self(0x105);
+    /// "UWARNING".
+    pub const UWARNING: Self = Self(0x107);
+
+    /// `None` above 3FFh.
+    pub const fn new(address: u16) -> Option<Self> {
+        if address < 1 << 10 { Some(Self(address)) } else { None }
+    }
+
+    /// The address, 0..=3FFh.
+    pub const fn get(self) -> u16 {
+        self.0
+    }
+}
+
+impl TryFrom<u16> for ResourceAddress {
+    type Error = Error;
+
+    fn try_from(address: u16) -> Result<Self, Error> {
+        Self::new(address).ok_or(Error::Header { got: address, want: 0x3ff })
+    }
+}
+
+impl From<ResourceAddress> for u16 {
+    fn from(address: ResourceAddress) -> Self {
+        address.0
+    }
+}
+
+/// Offset within a resource, 15 bits.
+///
+/// In direct reads it selects an attribute (SICK manual, p. 87): 0 name, 1 data size, 2 read level, 3 write level,
+/// 4 time-out in ms (255: more than 254), 5 data type.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(try_from = "u16", into = "u16"))]
+pub struct Offset(u16);
+
+impl Offset {
+    /// `None` above 7FFFh.
+    pub const fn new(offset: u16) -> Option<Self> {
+        if offset < 1 << 15 { Some(Self(offset)) } else { None }
+    }
+
+    /// The offset, 0..=7FFFh.
+    pub const fn get(self) -> u16 {
+        self.0
+    }
+}
+
+impl TryFrom<u16> for Offset {
+    type Error = Error;
+
+    fn try_from(offset: u16) -> Result<Self, Error> {
+        Self::new(offset).ok_or(Error::Header { got: offset, want: 0x7fff })
+    }
+}
+
+impl From<Offset> for u16 {
+    fn from(offset: Offset) -> Self {
+        offset.0
+    }
+}
+
+/// What a long message wants.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "arbitrary", derive(arbitrary::Arbitrary))]
+pub enum Access {
+    /// Read this many bytes.
+    Read(Length),
+    /// Write these bytes.
+    Write(Data),
+}
+
+/// A long message to the encoder: access to one of its resources.
+///
+/// ```text
+///  ADD_H   1 | LRW | LOFF | LIND | LLEN1 LLEN0 | A9 A8      LRW 1 read, LIND 1 indirect
+///  ADD_L   A7 ... A0
+///  OFF_H   1 | offset 14:8                                  only with LOFF = 1
+///  OFF_L   offset 7:0
+///  data    only in a write
+/// ```
+///
+/// ```
+/// use hdsl::message::{Access, Length, LongRequest, ResourceAddress};
+/// let request = LongRequest {
+///     address: ResourceAddress::RESOLUTN,
+///     indirect: false,
+///     offset: None,
+///     access: Access::Read(Length::Eight),
+/// };
+/// assert_eq!(request.emit().as_bytes(), [0xcc, 0x81, 0xc1, 0x0b]);
+/// let answer = request.parse_answer(b"\xcc\x81RESOLUTN\xdb\x8c");
+/// assert_eq!(answer.map(|data| data.as_bytes() == b"RESOLUTN"), Ok(true));
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "arbitrary", derive(arbitrary::Arbitrary))]
+pub struct LongRequest {
+    /// Which resource.
+    pub address: ResourceAddress,
+    /// LIND: indirect access, through the resource's node.
+    pub indirect: bool,
+    /// Offset; an offset of 0 is not the same as none.
+    pub offset: Option<Offset>,
+    /// What to do.
+    pub access: Access,
+}
+
+const MARK: u8 = 0x80;
+const LRW: u8 = 0x40;
+const LOFF: u8 = 0x20;
+const LIND: u8 = 0x10;
+
+const fn header(address: ResourceAddress, read: bool, off: bool, indirect: bool, length: Length) -> [u8; 2] {
+    let [high, low] = address.0.to_be_bytes();
+    let flags = if read { LRW } else { 0 } | if off { LOFF } else { 0 } | if indirect { LIND } else { 0 };
+    [MARK | flags | length.code() << 2 | high, low]
+}
+
+const fn address(first: u8, second: u8) -> ResourceAddress {
+    ResourceAddress(u16::from_be_bytes([first & 3, second]))
+}
+
+/// Bytes of a long request that begins with this byte.
+pub(super) const fn request_len(first: u8) -> usize {
+    let offset = if first & LOFF != 0 { 2 } else { 0 };
+    let data = if first & LRW == 0 { Length::from_code(first >> 2).bytes() } else { 0 };
+    4_usize.saturating_add(offset).saturating_add(data)
+}
+
+/// Bytes of a long answer that begins with this byte: the acknowledgement of a write has no data whatever its LLEN.
+pub(super) const fn answer_len(first: u8) -> usize {
+    let has_data = first & (LRW | LOFF) != 0;
+    4_usize.saturating_add(if has_data { Length::from_code(first >> 2).bytes() } else { 0 })
+}
+
+fn long_start(bytes: &[u8]) -> Result<u8, Error> {
+    match bytes.first() {
+        None => Err(Error::Truncated { got: 0, want: 4 }),
+        Some(first) if first & MARK == 0 => Err(Error::ShortMessageStart { first: *first }),
+        Some(first) => Ok(*first),
+    }
+}
+
+impl LongRequest {
+    const fn is_read(&self) -> bool {
+        matches!(self.access, Access::Read(_))
+    }
+
+    /// The bytes to send.
+    pub fn emit(&self) -> MessageBytes {
+        let length = match &self.access {
+            Access::Read(length) => *length,
+            Access::Write(data) => data.length,
+        };
+        let mut bytes = MessageBytes::EMPTY;
+        bytes.push(&header(self.address, self.is_read(), self.offset.is_some(), self.indirect, length));
+        if let Some(offset) = self.offset {
+            bytes.push(&(offset.0 | 0x8000).to_be_bytes());
+        }
+        if let Access::Write(data) = &self.access {
+            bytes.push(data.as_bytes());
+        }
+        bytes.sealed()
+    }
+
+    /// What an encoder makes of received bytes. Bytes behind the message are left alone.
+    ///
+    /// # Errors
+    /// [`Error::Truncated`], [`Error::ShortMessageStart`], [`Error::Crc`], and [`Error::ShortMessageStart`] for an
+    /// OFF_H without its marker bit.
+    pub fn parse(bytes: &[u8]) -> Result<Self, Error> {
+        let first = long_start(bytes)?;
+        let covered = checked(bytes, request_len(first))?;
+        let (Some([_, low]), Some(mut rest)) = (covered.first_chunk(), covered.get(2..)) else {
+            return Err(Error::Truncated { got: 0, want: 2 });
+        };
+        let mut offset = None;
+        if let (true, Some(([high, low], behind))) = (first & LOFF != 0, rest.split_first_chunk()) {
+            if high & MARK == 0 {
+                return Err(Error::ShortMessageStart { first: *high });
+            }
+            offset = Some(Offset(u16::from_be_bytes([high & 0x7f, *low])));
+            rest = behind;
+        }
+        let access = if first & LRW != 0 {
+            Access::Read(Length::from_code(first >> 2))
+        } else {
+            Access::Write(Data::new(rest)?)
+        };
+        Ok(Self { address: address(first, *low), indirect: first & LIND != 0, offset, access })
+    }
+
+    /// The data in the answer to this request; none after a write.
+    ///
+    /// # Errors
+    /// In this order: [`Error::Truncated`], [`Error::ShortMessageStart`], [`Error::Crc`], [`Error::Header`] if a
+    /// sound answer is for another request, [`Error::Resource`] if the encoder refused.
+    pub fn parse_answer(&self, bytes: &[u8]) -> Result<Data, Error> {
+        let answer = LongAnswer::parse(bytes)?;
+        let want = header(self.address, self.is_read(), false, self.indirect, Length::None);
+        let got = header(answer.address, answer.read, false, answer.indirect, Length::None);
+        if got != want {
+            return Err(Error::Header { got: u16::from_be_bytes(got), want: u16::from_be_bytes(want) });
+        }
+        answer.result.map_err(|ResourceError { class, detail }| Error::Resource { class, detail })
+    }
+}
+
+/// Why an encoder refuses a long message (SICK manual, p. 85). On the line the detail comes first.
+///
+/// | class | |
+/// |---|---|
+/// | 40h | resource and address errors, details 10h..16h |
+/// | 41h | access errors, 10h..14h |
+/// | 42h | data errors, 10h..12h |
+/// | 43h | internal errors, 11h..17h |
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "arbitrary", derive(arbitrary::Arbitrary))]
+pub struct ResourceError {
+    /// Class.
+    pub class: u8,
+    /// Detail, within its class.
+    pub detail: u8,
+}
+
+/// The encoder's answer to a long message. LOFF = 1 marks an error; then two bytes of error code follow.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "arbitrary", derive(arbitrary::Arbitrary))]
+pub struct LongAnswer {
+    /// Which resource.
+    pub address: ResourceAddress,
+    /// Whether it answers a read.
+    pub read: bool,
+    /// LIND.
+    pub indirect: bool,
+    /// The data read, nothing after a write, or why not.
+    pub result: Result<Data, ResourceError>,
+}
+
+impl LongAnswer {
+    /// The answer to a request.
+    pub const fn to(request: &LongRequest, result: Result<Data, ResourceError>) -> Self {
+        Self { address: request.address, read: request.is_read(), indirect: request.indirect, result }
+    }
+
+    /// The bytes to send. Data of an acknowledged write are not sent.
+    pub fn emit(&self) -> MessageBytes {
+        let mut bytes = MessageBytes::EMPTY;
+        match &self.result {
+            Ok(data) => {
+                let data = if self.read { *data } else { Data::NONE };
+                bytes.push(&header(self.address, self.read, false, self.indirect, data.length));
+                bytes.push(data.as_bytes());
+            }
+            Err(error) => {
+                bytes.push(&header(self.address, self.read, true, self.indirect, Length::Two));
+                bytes.push(&[error.detail, error.class]);
+            }
+        }
+        bytes.sealed()
+    }
+
+    /// Reads an answer. Bytes behind it are left alone.
+    ///
+    /// # Errors
+    /// [`Error::Truncated`], [`Error::ShortMessageStart`], [`Error::Crc`]; [`Error::DataLength`] for an error answer
+    /// without its two bytes.
+    pub fn parse(bytes: &[u8]) -> Result<Self, Error> {
+        let first = long_start(bytes)?;
+        let covered = checked(bytes, answer_len(first))?;
+        let (Some([_, low]), Some(rest)) = (covered.first_chunk(), covered.get(2..)) else {
+            return Err(Error::Truncated { got: 0, want: 2 });
+        };
+        let result = match (first & LOFF != 0, rest) {
+            (false, data) => Ok(Data::new(data)?),
+            (true, [detail, class, ..]) => Err(ResourceError { class: *class, detail: *detail }),
+            (true, _) => return Err(Error::DataLength { len: 0 }),
+        };
+        Ok(Self { address: address(first, *low), read: first & LRW != 0, indirect: first & LIND != 0, result })
+    }
+}
+
+#[cfg(feature = "arbitrary")]
+mod any {
+    use super::{Data, Length, Offset, ResourceAddress};
+    use arbitrary::{Arbitrary, Result, Unstructured};
+
+    impl<'a> Arbitrary<'a> for ResourceAddress {
+        fn arbitrary(from: &mut Unstructured<'a>) -> Result<Self> {
+            Ok(Self(u16::arbitrary(from)? & 0x3ff))
+        }
+    }
+
+    impl<'a> Arbitrary<'a> for Offset {
+        fn arbitrary(from: &mut Unstructured<'a>) -> Result<Self> {
+            Ok(Self(u16::arbitrary(from)? & 0x7fff))
+        }
+    }
+
+    impl<'a> Arbitrary<'a> for Data {
+        fn arbitrary(from: &mut Unstructured<'a>) -> Result<Self> {
+            let length = Length::arbitrary(from)?;
+            let mut bytes = [0; 8];
+            for byte in bytes.iter_mut().take(length.bytes()) {
+                *byte = u8::arbitrary(from)?;
+            }
+            Ok(Self { bytes, length })
+        }
+    }
+}
+
+#[cfg(test)]
+pub(crate) mod tests;

@@ -1,0 +1,94 @@
+use super::*;
+use proptest::prelude::*;
+use std::vec::Vec;
+
+fn data() -> impl Strategy<Value = Data> {
+    (0..4_u8, any::<[u8; 8]>()).prop_map(|(code, bytes)| Data::new(&bytes[..Length::from_code(code).bytes()]).unwrap())
+}
+
+pub(crate) fn requests() -> impl Strategy<Value = LongRequest> {
+    let access =
+        prop_oneof![(0..4_u8).prop_map(|code| Access::Read(Length::from_code(code))), data().prop_map(Access::Write),];
+    (0..1024_u16, any::<bool>(), prop::option::of(0..1_u16 << 15), access).prop_map(
+        |(address, indirect, offset, access)| LongRequest {
+            address: ResourceAddress(address),
+            indirect,
+            offset: offset.map(Offset),
+            access,
+        },
+    )
+}
+
+proptest! {
+    #[test]
+    fn requests_come_back(request in requests()) {
+        let bytes = request.emit();
+        prop_assert_eq!(LongRequest::parse(bytes.as_bytes()), Ok(request));
+        prop_assert_eq!(bytes.as_bytes().len(), request_len(bytes.as_bytes()[0]));
+        for len in 0..bytes.as_bytes().len() {
+            let cut = matches!(LongRequest::parse(&bytes.as_bytes()[..len]), Err(Error::Truncated { .. }));
+            prop_assert!(cut);
+        }
+    }
+
+    #[test]
+    fn answers_come_back(request in requests(), data in data(), code in prop::option::of(any::<[u8; 2]>())) {
+        let result = match code {
+            Some([class, detail]) => Err(ResourceError { class, detail }),
+            None => Ok(data),
+        };
+        let answer = LongAnswer::to(&request, result);
+        let bytes = answer.emit();
+        let want = match result {
+            Err(ResourceError { class, detail }) => Err(Error::Resource { class, detail }),
+            Ok(data) => Ok(if request.is_read() { data } else { Data::NONE }),
+        };
+        prop_assert_eq!(request.parse_answer(bytes.as_bytes()), want);
+        let good: Vec<u8> = bytes.as_bytes().to_vec();
+        for bit in 0..good.len() * 8 {
+            let mut bad = good.clone();
+            bad[bit / 8] ^= 0x80 >> (bit % 8);
+            let error = request.parse_answer(&bad).unwrap_err();
+            match bit {
+                0 => prop_assert_eq!(error, Error::ShortMessageStart { first: bad[0] }),
+                // Direction, error flag and length decide how long the message is.
+                1 | 2 | 4 | 5 => {
+                    let seen = matches!(error, Error::Crc { .. } | Error::Truncated { .. });
+                    prop_assert!(seen, "{}", error);
+                }
+                _ => {
+                    let crc = matches!(error, Error::Crc { .. });
+                    prop_assert!(crc, "{} {}", bit, error);
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn accepted_requests_are_what_it_would_emit(bytes in prop::collection::vec(any::<u8>(), 2..12)) {
+        let mut bytes = bytes;
+        bytes[0] |= MARK;
+        let crc = crate::crc16(&bytes);
+        bytes.extend(crc.to_be_bytes());
+        if let Ok(request) = LongRequest::parse(&bytes) {
+            let emitted = request.emit();
+            prop_assert_eq!(emitted.as_bytes(), &bytes[..emitted.as_bytes().len()]);
+        }
+    }
+}
+
+#[test]
+fn the_documented_examples() {
+    let request = LongRequest {
+        address: ResourceAddress::RESOLUTN,
+        indirect: false,
+        offset: Offset::new(3),
+        access: Access::Read(Length::Two),
+    };
+    assert_eq!(request.emit().as_bytes(), [0xe4, 0x81, 0x80, 0x03, 0x14, 0x13]);
+    let refused = LongRequest { address: ResourceAddress(0x200), offset: None, ..request };
+    let answer = [0xe6, 0x00, 0x10, 0x40, 0x38, 0x7b];
+    assert_eq!(refused.parse_answer(&answer), Err(Error::Resource { class: 0x40, detail: 0x10 }));
+    assert!(matches!(request.parse_answer(&answer), Err(Error::Header { .. })));
+    assert_eq!(Data::new(&[0; 3]), Err(Error::DataLength { len: 3 }));
+}

@@ -1,0 +1,442 @@
+use super::{Collector, LongAnswer, LongRequest, MessageBytes, ShortAnswer, ShortRequest, answer_len};
+use crate::{EncoderSymbol, Error, MasterSymbol};
+
+/// The master's side of the parameters channel: one short and one long message can be under way.
+///
+/// A short message goes before a long one, and may be sent while the long one waits for its answer; requests are
+/// never mixed nibble by nibble. A short message that is answered with SNAK or not at all is sent again, up to the
+/// limit of tries. A long one is not repeated: LNAK or a wrong CRC end it, and the application decides.
+///
+/// In every H-frame [`transmit`](Self::transmit) gives the symbol to send and [`receive`](Self::receive) takes the
+/// symbol that came back.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Requester {
+    limits: Limits,
+    collector: Collector,
+    short: Slot<ShortRequest>,
+    long: Slot<LongRequest>,
+    sending: Option<Sending>,
+    reset: bool,
+}
+
+/// How often and how long the requester tries.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "arbitrary", derive(arbitrary::Arbitrary))]
+pub struct Limits {
+    /// Times a short message is sent; 0 counts as 1.
+    pub short_tries: u8,
+    /// H-frames without an answer after which a short message is sent again.
+    pub short_frames: u32,
+    /// H-frames without an answer after which a long message fails.
+    pub long_frames: u32,
+}
+
+impl Limits {
+    /// Three tries of 64 H-frames for a short message; 32000 H-frames for a long one, 369 ms free running and more
+    /// than the 254 ms that a resource can state as its time-out.
+    pub const DEFAULT: Self = Self { short_tries: 3, short_frames: 64, long_frames: 32_000 };
+}
+
+impl Default for Limits {
+    fn default() -> Self {
+        Self::DEFAULT
+    }
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+enum Slot<T> {
+    Free,
+    /// Not sent yet; `tries` times before.
+    Queued {
+        request: T,
+        tries: u8,
+    },
+    Sending {
+        request: T,
+        tries: u8,
+    },
+    Waiting {
+        request: T,
+        tries: u8,
+        frames: u32,
+    },
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+struct Sending {
+    bytes: MessageBytes,
+    at: u8,
+}
+
+/// What came to its end in an H-frame.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Finished {
+    /// The short message.
+    pub short: Option<Result<ShortAnswer, Error>>,
+    /// The long message. An answer by which the encoder refuses is an answer.
+    pub long: Option<Result<LongAnswer, Error>>,
+}
+
+impl<T: Copy> Slot<T> {
+    const fn is_free(&self) -> bool {
+        matches!(self, Self::Free)
+    }
+}
+
+impl Requester {
+    /// With nothing under way.
+    pub const fn new(limits: Limits) -> Self {
+        Self { limits, collector: Collector::new(), short: Slot::Free, long: Slot::Free, sending: None, reset: false }
+    }
+
+    /// FRES: no short message is under way.
+    pub const fn is_short_free(&self) -> bool {
+        self.short.is_free()
+    }
+
+    /// FREL: no long message is under way.
+    pub const fn is_long_free(&self) -> bool {
+        self.long.is_free()
+    }
+
+    /// Starts a short message.
+    ///
+    /// # Errors
+    /// [`Error::Busy`].
+    pub const fn start_short(&mut self, request: ShortRequest) -> Result<(), Error> {
+        if !self.short.is_free() {
+            return Err(Error::Busy);
+        }
+        self.short = Slot::Queued { request, tries: 0 };
+        Ok(())
+    }
+
+    /// Starts a long message.
+    ///
+    /// # Errors
+    /// [`Error::Busy`].
+    pub const fn start_long(&mut self, request: LongRequest) -> Result<(), Error> {
+        if !self.long.is_free() {
+            return Err(Error::Busy);
+        }
+        self.long = Slot::Queued { request, tries: 0 };
+        Ok(())
+    }
+
+    /// MRST: drops all messages and sends INIT once, upon which the encoder drops its own and answers INIT.
+    /// What was under way ends with [`Error::Dropped`].
+    pub fn reset(&mut self) -> Finished {
+        let dropped = self.drop_all();
+        self.reset = true;
+        dropped
+    }
+
+    /// Drops all messages without telling the encoder: the link is being started anew.
+    pub fn drop_all(&mut self) -> Finished {
+        let finished = Finished {
+            short: (!self.short.is_free()).then_some(Err(Error::Dropped)),
+            long: (!self.long.is_free()).then_some(Err(Error::Dropped)),
+        };
+        *self = Self::new(self.limits);
+        finished
+    }
+
+    /// The symbol for the next H-frame.
+    pub fn transmit(&mut self) -> MasterSymbol {
+        if core::mem::take(&mut self.reset) {
+            return MasterSymbol::Init;
+        }
+        if let Some(sending) = &mut self.sending {
+            let nibble = sending.bytes.nibble(sending.at);
+            sending.at = sending.at.saturating_add(1);
+            if let Some(nibble) = nibble {
+                return MasterSymbol::Data(nibble);
+            }
+            // One IDLE at least before the next message.
+            self.sending = None;
+            self.sent();
+            return MasterSymbol::Idle;
+        }
+        match self.next() {
+            Some(bytes) => {
+                self.sending = Some(Sending { bytes, at: 1 });
+                bytes.nibble(0).map_or(MasterSymbol::Idle, MasterSymbol::Data)
+            }
+            None => MasterSymbol::Idle,
+        }
+    }
+
+    fn next(&mut self) -> Option<MessageBytes> {
+        if let Slot::Queued { request, tries } = self.short {
+            self.short = Slot::Sending { request, tries: tries.saturating_add(1) };
+            return Some(request.emit());
+        }
+        if let Slot::Queued { request, tries } = self.long {
+            self.long = Slot::Sending { request, tries: tries.saturating_add(1) };
+            return Some(request.emit());
+        }
+        None
+    }
+
+    fn sent(&mut self) {
+        if let Slot::Sending { request, tries } = self.short {
+            self.short = Slot::Waiting { request, tries, frames: 0 };
+        }
+        if let Slot::Sending { request, tries } = self.long {
+            self.long = Slot::Waiting { request, tries, frames: 0 };
+        }
+    }
+
+    /// Takes the symbol of an answer; `None` if it was no good.
+    pub fn receive(&mut self, symbol: Option<EncoderSymbol>) -> Finished {
+        let mut finished = Finished::default();
+        match symbol {
+            Some(EncoderSymbol::Data(nibble)) => {
+                if let Some(message) = self.collector.nibble(nibble, answer_len) {
+                    self.complete(&message, &mut finished);
+                }
+            }
+            Some(EncoderSymbol::Idle | EncoderSymbol::Init) => self.collector.idle(),
+            Some(EncoderSymbol::Snak) => {
+                self.collector.idle();
+                if let Slot::Waiting { request, tries, .. } = self.short {
+                    finished.short = self.again(request, tries, Error::NotAccepted { tries });
+                }
+            }
+            Some(EncoderSymbol::Lnak) => {
+                self.collector.idle();
+                if let Slot::Waiting { tries, .. } = self.long {
+                    self.long = Slot::Free;
+                    finished.long = Some(Err(Error::NotAccepted { tries }));
+                }
+            }
+            // A hole in a message: what follows it is no message.
+            None => {
+                self.collector.finish();
+            }
+        }
+        self.count(&mut finished);
+        finished
+    }
+
+    fn complete(&mut self, message: &MessageBytes, finished: &mut Finished) {
+        let bytes = message.as_bytes();
+        let is_long = bytes.first().is_some_and(|first| first & 0x80 != 0);
+        if let (true, Slot::Waiting { request, .. }) = (is_long, self.long) {
+            self.long = Slot::Free;
+            finished.long = Some(match request.parse_answer(bytes) {
+                Ok(_) | Err(Error::Resource { .. }) => LongAnswer::parse(bytes),
+                Err(e) => Err(e),
+            });
+        }
+        if let (false, Slot::Waiting { request, .. }) = (is_long, self.short) {
+            // A wrong one is passed over: the time-out sends the request again.
+            if let Ok(answer) = request.parse_answer(bytes) {
+                self.short = Slot::Free;
+                finished.short = Some(Ok(answer));
+            }
+        }
+    }
+
+    /// Counts the frames of waiting.
+    fn count(&mut self, finished: &mut Finished) {
+        if let Slot::Waiting { request, tries, frames } = self.short {
+            if frames >= self.limits.short_frames {
+                finished.short = self.again(request, tries, Error::NoAnswer { tries });
+            } else {
+                self.short = Slot::Waiting { request, tries, frames: frames.saturating_add(1) };
+            }
+        }
+        if let Slot::Waiting { request, tries, frames } = self.long {
+            if frames >= self.limits.long_frames {
+                self.long = Slot::Free;
+                finished.long = Some(Err(Error::NoAnswer { tries }));
+            } else {
+                self.long = Slot::Waiting { request, tries, frames: frames.saturating_add(1) };
+            }
+        }
+    }
+
+    /// Queues a short message again, or gives up.
+    const fn again(&mut self, request: ShortRequest, tries: u8, error: Error) -> Option<Result<ShortAnswer, Error>> {
+        if tries < self.limits.short_tries {
+            self.short = Slot::Queued { request, tries };
+            None
+        } else {
+            self.short = Slot::Free;
+            Some(Err(error))
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::*;
+    use super::*;
+    use crate::Nibble;
+    use proptest::prelude::*;
+    use std::vec::Vec;
+
+    fn read(register: RemoteRegister) -> ShortRequest {
+        ShortRequest::Read(register)
+    }
+
+    /// Lets both sides talk for `frames`; `change` may spoil what the encoder says.
+    fn talk(
+        master: &mut Requester,
+        encoder: &mut Responder,
+        frames: usize,
+        mut change: impl FnMut(usize, EncoderSymbol) -> Option<EncoderSymbol>,
+    ) -> (Vec<MasterSymbol>, Finished) {
+        let mut all = Finished::default();
+        let mut sent = Vec::new();
+        for k in 0..frames {
+            let symbol = master.transmit();
+            sent.push(symbol);
+            if let Some(request) = encoder.receive(symbol) {
+                match request {
+                    Request::Short(request) => {
+                        let data = matches!(request, ShortRequest::Read(_)).then_some(0x55);
+                        encoder.answer_short(ShortAnswer { register: request.register(), data });
+                    }
+                    Request::Long(request) => {
+                        encoder.answer_long(&LongAnswer::to(&request, Ok(resolution())));
+                    }
+                }
+            }
+            let done = master.receive(change(k, encoder.transmit()));
+            all.short = all.short.or(done.short);
+            all.long = all.long.or(done.long);
+        }
+        (sent, all)
+    }
+
+    fn resolution() -> Data {
+        Data::new(b"RESOLUTN").unwrap()
+    }
+
+    fn long() -> LongRequest {
+        LongRequest {
+            address: ResourceAddress::RESOLUTN,
+            indirect: false,
+            offset: None,
+            access: Access::Read(Length::Eight),
+        }
+    }
+
+    #[test]
+    fn a_short_goes_before_a_long_and_both_are_answered() {
+        let (mut master, mut encoder) = (Requester::new(Limits::DEFAULT), Responder::new());
+        master.start_long(long()).unwrap();
+        master.start_short(read(RemoteRegister::PING)).unwrap();
+        assert_eq!(master.start_short(read(RemoteRegister::PING)), Err(Error::Busy));
+        assert_eq!(master.start_long(long()), Err(Error::Busy));
+        let (sent, done) = talk(&mut master, &mut encoder, 60, |_, s| Some(s));
+        // 7F, its CRC, an IDLE, CC 81, its CRC
+        assert_eq!(sent[0], MasterSymbol::Data(Nibble::truncate(7)));
+        assert_eq!(sent[6], MasterSymbol::Idle);
+        assert_eq!(sent[7], MasterSymbol::Data(Nibble::truncate(12)));
+        assert_eq!(done.short.unwrap().unwrap().data, Some(0x55));
+        assert_eq!(done.long.unwrap().unwrap().result, Ok(resolution()));
+        assert!(master.is_short_free() && master.is_long_free());
+    }
+
+    #[test]
+    fn a_short_passes_while_a_long_waits() {
+        let (mut master, mut encoder) = (Requester::new(Limits::DEFAULT), Responder::new());
+        master.start_long(long()).unwrap();
+        // The encoder's answer to the long message is held back.
+        for _ in 0..40 {
+            let symbol = master.transmit();
+            encoder.receive(symbol);
+            master.receive(Some(encoder.transmit()));
+        }
+        master.start_short(read(RemoteRegister::SRSSI)).unwrap();
+        let (_, done) = talk(&mut master, &mut encoder, 40, |_, s| Some(s));
+        assert!(done.short.unwrap().is_ok() && done.long.is_none());
+        encoder.answer_long(&LongAnswer::to(&long(), Ok(resolution())));
+        let (_, done) = talk(&mut master, &mut encoder, 40, |_, s| Some(s));
+        assert!(done.long.unwrap().is_ok());
+    }
+
+    #[test]
+    fn a_silent_encoder_gets_the_message_again_up_to_the_limit() {
+        let (mut master, mut encoder) = (Requester::new(Limits::DEFAULT), Responder::new());
+        master.start_short(read(RemoteRegister::PING)).unwrap();
+        let (sent, done) = talk(&mut master, &mut encoder, 300, |_, _| Some(EncoderSymbol::Idle));
+        let starts = sent.windows(2).filter(|w| w[0] == MasterSymbol::Idle && w[1] != MasterSymbol::Idle).count();
+        assert_eq!((starts + 1, done.short), (3, Some(Err(Error::NoAnswer { tries: 3 }))));
+        // SNAK does the same without waiting.
+        master.start_short(read(RemoteRegister::PING)).unwrap();
+        let (sent, done) = talk(&mut master, &mut encoder, 40, |_, _| Some(EncoderSymbol::Snak));
+        assert_eq!(sent.iter().filter(|s| **s != MasterSymbol::Idle).count(), 18);
+        assert_eq!(done.short, Some(Err(Error::NotAccepted { tries: 3 })));
+        master.start_long(long()).unwrap();
+        let (_, done) = talk(&mut master, &mut encoder, 40, |_, _| Some(EncoderSymbol::Lnak));
+        assert_eq!(done.long, Some(Err(Error::NotAccepted { tries: 1 })));
+        let mut master = Requester::new(Limits { long_frames: 20, ..Limits::DEFAULT });
+        master.start_long(long()).unwrap();
+        let (_, done) = talk(&mut master, &mut encoder, 40, |_, _| Some(EncoderSymbol::Idle));
+        assert_eq!(done.long, Some(Err(Error::NoAnswer { tries: 1 })));
+    }
+
+    #[test]
+    fn a_reset_drops_both_sides() {
+        let (mut master, mut encoder) = (Requester::new(Limits::DEFAULT), Responder::new());
+        master.start_long(long()).unwrap();
+        master.start_short(read(RemoteRegister::PING)).unwrap();
+        talk(&mut master, &mut encoder, 4, |_, s| Some(s));
+        let dropped = master.reset();
+        assert_eq!((dropped.short, dropped.long), (Some(Err(Error::Dropped)), Some(Err(Error::Dropped))));
+        assert_eq!(master.transmit(), MasterSymbol::Init);
+        encoder.receive(MasterSymbol::Init);
+        assert_eq!((encoder.transmit(), encoder.transmit()), (EncoderSymbol::Init, EncoderSymbol::Idle));
+        assert_eq!(master.transmit(), MasterSymbol::Idle);
+        master.start_short(read(RemoteRegister::PING)).unwrap();
+        assert!(talk(&mut master, &mut encoder, 40, |_, s| Some(s)).1.short.unwrap().is_ok());
+    }
+
+    proptest! {
+        /// Whatever noise does to the channel, a message ends with the right data or with an error, and the channel
+        /// is usable afterwards.
+        #[test]
+        fn noise_gives_no_wrong_data(bad in prop::collection::btree_set(0..200_usize, 0..30)) {
+            let (mut master, mut encoder) = (Requester::new(Limits { long_frames: 60, ..Limits::DEFAULT }), Responder::new());
+            master.start_long(long()).unwrap();
+            master.start_short(read(RemoteRegister::PING)).unwrap();
+            let (_, done) = talk(&mut master, &mut encoder, 400, |k, s| (!bad.contains(&k)).then_some(s));
+            prop_assert!(master.is_short_free() && master.is_long_free());
+            if let Ok(answer) = done.short.unwrap() {
+                prop_assert_eq!(answer.data, Some(0x55));
+            }
+            if let Ok(answer) = done.long.unwrap() {
+                prop_assert_eq!(answer.result, Ok(resolution()));
+            }
+        }
+    }
+
+    /// Back to back requests for a long time: the channel never hangs.
+    #[test]
+    fn continuous_messages() {
+        let (mut master, mut encoder) = (Requester::new(Limits::DEFAULT), Responder::new());
+        let (mut shorts, mut longs) = (0, 0);
+        for _ in 0..20_000 {
+            if master.is_short_free() {
+                master.start_short(read(RemoteRegister::PING)).unwrap();
+            }
+            if master.is_long_free() {
+                master.start_long(long()).unwrap();
+            }
+            let (_, done) = talk(&mut master, &mut encoder, 1, |_, s| Some(s));
+            shorts += u32::from(done.short.is_some_and(|s| s.is_ok()));
+            longs += u32::from(done.long.is_some_and(|l| l.is_ok()));
+        }
+        assert!(shorts > 400 && longs > 100, "{shorts} {longs}");
+    }
+}

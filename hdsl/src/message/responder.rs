@@ -1,0 +1,135 @@
+use super::{Collector, LongAnswer, LongRequest, MessageBytes, ShortAnswer, ShortRequest, request_len};
+use crate::{EncoderSymbol, MasterSymbol};
+
+/// A sound request that an encoder received.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum Request {
+    /// Access to a register.
+    Short(ShortRequest),
+    /// Access to a resource.
+    Long(LongRequest),
+}
+
+/// The encoder's side of the parameters channel.
+///
+/// In every H-frame [`receive`](Self::receive) takes the master's symbol and [`transmit`](Self::transmit) gives the
+/// symbol of the answer. A request that is not understood is answered with SNAK or LNAK here; all others are given
+/// to the caller, who answers whenever it can.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Responder {
+    collector: Collector,
+    short: Option<MessageBytes>,
+    long: Option<MessageBytes>,
+    /// SNAK, LNAK or INIT, to be sent between messages.
+    signal: Option<EncoderSymbol>,
+    sending: Option<(MessageBytes, u8)>,
+}
+
+impl Default for Responder {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+impl Responder {
+    /// With nothing under way.
+    pub const fn new() -> Self {
+        Self { collector: Collector::new(), short: None, long: None, signal: None, sending: None }
+    }
+
+    /// Takes the master's symbol.
+    pub fn receive(&mut self, symbol: MasterSymbol) -> Option<Request> {
+        let nibble = match symbol {
+            MasterSymbol::Data(nibble) => nibble,
+            MasterSymbol::Init => {
+                *self = Self { signal: Some(EncoderSymbol::Init), ..Self::new() };
+                return None;
+            }
+            _ => {
+                self.collector.idle();
+                return None;
+            }
+        };
+        let message = self.collector.nibble(nibble, request_len)?;
+        let bytes = message.as_bytes();
+        if bytes.first().is_some_and(|first| first & 0x80 != 0) {
+            if let Ok(request) = LongRequest::parse(bytes) {
+                return Some(Request::Long(request));
+            }
+            self.signal = Some(EncoderSymbol::Lnak);
+        } else {
+            if let Ok(request) = ShortRequest::parse(bytes) {
+                return Some(Request::Short(request));
+            }
+            self.signal = Some(EncoderSymbol::Snak);
+        }
+        None
+    }
+
+    /// A symbol of the master was not readable: a message that was being received is lost.
+    pub const fn receive_nothing(&mut self) {
+        self.collector.finish();
+    }
+
+    /// Sends the answer to a short message as soon as the channel is free.
+    pub fn answer_short(&mut self, answer: ShortAnswer) {
+        self.short = Some(answer.emit());
+    }
+
+    /// Sends the answer to a long message as soon as the channel is free and no short answer is waiting.
+    pub fn answer_long(&mut self, answer: &LongAnswer) {
+        self.long = Some(answer.emit());
+    }
+
+    /// The symbol for the answer.
+    pub fn transmit(&mut self) -> EncoderSymbol {
+        if let Some((bytes, at)) = &mut self.sending {
+            let nibble = bytes.nibble(*at);
+            *at = at.saturating_add(1);
+            if let Some(nibble) = nibble {
+                return EncoderSymbol::Data(nibble);
+            }
+            self.sending = None;
+            return EncoderSymbol::Idle;
+        }
+        if let Some(signal) = self.signal.take() {
+            return signal;
+        }
+        match self.short.take().or_else(|| self.long.take()) {
+            Some(bytes) => {
+                self.sending = Some((bytes, 1));
+                bytes.nibble(0).map_or(EncoderSymbol::Idle, EncoderSymbol::Data)
+            }
+            None => EncoderSymbol::Idle,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::message::RemoteRegister;
+
+    /// Every single wrong nibble of a request is answered with SNAK or makes the message look longer.
+    #[test]
+    fn a_damaged_request_is_refused() {
+        let bytes = ShortRequest::Write(RemoteRegister::PING, 0xa5).emit();
+        for at in 0..8 {
+            for flip in 1..16 {
+                let mut encoder = Responder::new();
+                let mut requests = 0;
+                for k in 0..8 {
+                    let value = bytes.nibble(k).unwrap().get() ^ if k == at { flip } else { 0 };
+                    requests += u8::from(encoder.receive(MasterSymbol::Data(crate::Nibble::truncate(value))).is_some());
+                }
+                encoder.receive(MasterSymbol::Idle);
+                assert_eq!(requests, 0);
+                let looks_longer = at == 0 && flip & 8 != 0;
+                let refused = matches!(encoder.transmit(), EncoderSymbol::Snak | EncoderSymbol::Lnak);
+                assert!(refused || looks_longer, "{at} {flip}");
+            }
+        }
+    }
+}

@@ -1,0 +1,286 @@
+//! The parameters channel: one byte an H-frame in each direction.
+
+use crate::Error;
+
+/// Half a byte, 0..=15: one symbol of a message.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(try_from = "u8", into = "u8"))]
+pub struct Nibble(u8);
+
+impl Nibble {
+    /// `None` above 15.
+    pub const fn new(value: u8) -> Option<Self> {
+        if value < 16 { Some(Self(value)) } else { None }
+    }
+
+    /// The four low bits.
+    pub const fn truncate(value: u8) -> Self {
+        Self(value & 15)
+    }
+
+    /// The value, 0..=15.
+    pub const fn get(self) -> u8 {
+        self.0
+    }
+}
+
+impl TryFrom<u8> for Nibble {
+    type Error = Error;
+
+    fn try_from(value: u8) -> Result<Self, Error> {
+        Self::new(value).ok_or(Error::UndefinedSymbol { symbol: value })
+    }
+}
+
+impl From<Nibble> for u8 {
+    fn from(nibble: Nibble) -> Self {
+        nibble.0
+    }
+}
+
+/// What the master says in bits 4:0 of its parameter byte.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "arbitrary", derive(arbitrary::Arbitrary))]
+pub enum MasterSymbol {
+    /// 00h..0Fh: four bits of a message.
+    Data(Nibble),
+    /// 10h: nothing to say.
+    Idle,
+    /// 19h: synchronise; no answer.
+    Sync,
+    /// 1Ah: answer with the test pattern, the delay is being searched.
+    Start,
+    /// 1Bh: answer with the test pattern at the learned delay.
+    Learn,
+    /// 1Ch: line check, answer with the test pattern.
+    Check,
+    /// 1Dh: answer with the encoder identifier.
+    IdReq,
+    /// 1Eh: drop all messages; in the start-up also wait for VSYNC.
+    Init,
+    /// 1Fh: reset the link; no answer.
+    Reset,
+}
+
+impl MasterSymbol {
+    /// The five bits.
+    pub const fn bits(self) -> u8 {
+        match self {
+            Self::Data(nibble) => nibble.0,
+            Self::Idle => 0x10,
+            Self::Sync => 0x19,
+            Self::Start => 0x1a,
+            Self::Learn => 0x1b,
+            Self::Check => 0x1c,
+            Self::IdReq => 0x1d,
+            Self::Init => 0x1e,
+            Self::Reset => 0x1f,
+        }
+    }
+
+    /// From bits 4:0 of `bits`.
+    ///
+    /// # Errors
+    /// [`Error::UndefinedSymbol`] for 11h..18h.
+    pub const fn from_bits(bits: u8) -> Result<Self, Error> {
+        Ok(match bits & 31 {
+            nibble @ 0..=15 => Self::Data(Nibble(nibble)),
+            0x10 => Self::Idle,
+            0x19 => Self::Sync,
+            0x1a => Self::Start,
+            0x1b => Self::Learn,
+            0x1c => Self::Check,
+            0x1d => Self::IdReq,
+            0x1e => Self::Init,
+            0x1f => Self::Reset,
+            symbol => return Err(Error::UndefinedSymbol { symbol }),
+        })
+    }
+
+    /// Whether an encoder answers a frame with this symbol.
+    pub const fn is_answered(self) -> bool {
+        !matches!(self, Self::Reset | Self::Sync)
+    }
+}
+
+/// The parameter byte of the master.
+///
+/// ```text
+///  bit    7       6       5       4 3 2 1 0
+///       FIRST | MSYNC | reserved | symbol
+///         |       |        0
+///         |       inverted from V-frame to V-frame, 1 in the first one
+///         0 during the start-up up to IDREQ, then 1
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "arbitrary", derive(arbitrary::Arbitrary))]
+pub struct ParameterByte(u8);
+
+impl ParameterByte {
+    const FIRST: u8 = 0x80;
+    const MSYNC: u8 = 0x40;
+
+    /// Any byte.
+    pub const fn new(raw: u8) -> Self {
+        Self(raw)
+    }
+
+    /// The byte for a symbol, reserved bit 0.
+    pub const fn of(symbol: MasterSymbol, first: bool, msync: bool) -> Self {
+        let first = if first { Self::FIRST } else { 0 };
+        let msync = if msync { Self::MSYNC } else { 0 };
+        Self(symbol.bits() | first | msync)
+    }
+
+    /// The byte.
+    pub const fn raw(self) -> u8 {
+        self.0
+    }
+
+    /// FIRST: 0 from RESET to IDREQ, 1 in all frames after that.
+    pub const fn first(self) -> bool {
+        self.0 & Self::FIRST != 0
+    }
+
+    /// MSYNC: constant during the eight frames of a V-frame.
+    pub const fn msync(self) -> bool {
+        self.0 & Self::MSYNC != 0
+    }
+
+    /// The symbol.
+    ///
+    /// # Errors
+    /// [`Error::UndefinedSymbol`].
+    pub const fn symbol(self) -> Result<MasterSymbol, Error> {
+        MasterSymbol::from_bits(self.0)
+    }
+}
+
+/// What the encoder says in bits 4:0 of its parameter byte.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "arbitrary", derive(arbitrary::Arbitrary))]
+pub enum EncoderSymbol {
+    /// 00h..0Fh: four bits of a message.
+    Data(Nibble),
+    /// 10h: nothing to say.
+    Idle,
+    /// 15h: the short message was not understood.
+    Snak,
+    /// 1Ah: the long message was not understood.
+    Lnak,
+    /// 1Fh: the message state was reset.
+    Init,
+}
+
+impl EncoderSymbol {
+    /// The five bits.
+    pub const fn bits(self) -> u8 {
+        match self {
+            Self::Data(nibble) => nibble.0,
+            Self::Idle => 0x10,
+            Self::Snak => 0x15,
+            Self::Lnak => 0x1a,
+            Self::Init => 0x1f,
+        }
+    }
+
+    /// From bits 4:0 of `bits`.
+    ///
+    /// # Errors
+    /// [`Error::UndefinedSymbol`].
+    pub const fn from_bits(bits: u8) -> Result<Self, Error> {
+        Ok(match bits & 31 {
+            nibble @ 0..=15 => Self::Data(Nibble(nibble)),
+            0x10 => Self::Idle,
+            0x15 => Self::Snak,
+            0x1a => Self::Lnak,
+            0x1f => Self::Init,
+            symbol => return Err(Error::UndefinedSymbol { symbol }),
+        })
+    }
+}
+
+/// The parameter byte of the encoder.
+///
+/// ```text
+///  bit    7      6 5    4 3 2 1 0
+///       VSYNC |  0 0  |  symbol
+/// ```
+///
+/// VSYNC is 1 in the last of the eight answers of a V-frame. Bits 6:5 are not documented; this crate sends 0 and
+/// ignores them.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "arbitrary", derive(arbitrary::Arbitrary))]
+pub struct EncoderByte(u8);
+
+impl EncoderByte {
+    const VSYNC: u8 = 0x80;
+
+    /// Any byte.
+    pub const fn new(raw: u8) -> Self {
+        Self(raw)
+    }
+
+    /// The byte for a symbol.
+    pub const fn of(symbol: EncoderSymbol, vsync: bool) -> Self {
+        Self(symbol.bits() | if vsync { Self::VSYNC } else { 0 })
+    }
+
+    /// The byte.
+    pub const fn raw(self) -> u8 {
+        self.0
+    }
+
+    /// VSYNC.
+    pub const fn vsync(self) -> bool {
+        self.0 & Self::VSYNC != 0
+    }
+
+    /// The symbol.
+    ///
+    /// # Errors
+    /// [`Error::UndefinedSymbol`].
+    pub const fn symbol(self) -> Result<EncoderSymbol, Error> {
+        EncoderSymbol::from_bits(self.0)
+    }
+}
+
+#[cfg(feature = "arbitrary")]
+impl<'a> arbitrary::Arbitrary<'a> for Nibble {
+    fn arbitrary(from: &mut arbitrary::Unstructured<'a>) -> arbitrary::Result<Self> {
+        Ok(Self::truncate(u8::arbitrary(from)?))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_byte_of_both_directions() {
+        let (mut master, mut encoder) = (0, 0);
+        for raw in 0..=255 {
+            let byte = ParameterByte::new(raw);
+            assert_eq!((byte.first(), byte.msync()), (raw >= 128, raw & 64 != 0));
+            if let Ok(symbol) = byte.symbol() {
+                assert_eq!(ParameterByte::of(symbol, byte.first(), byte.msync()).raw(), raw & 0xdf);
+                master += 1;
+            }
+            let byte = EncoderByte::new(raw);
+            if let Ok(symbol) = byte.symbol() {
+                assert_eq!(EncoderByte::of(symbol, byte.vsync()).raw(), raw & 0x9f);
+                encoder += 1;
+            }
+        }
+        assert_eq!((master / 8, encoder / 8), (24, 20));
+    }
+}

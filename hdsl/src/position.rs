@@ -1,0 +1,340 @@
+//! The fast position: the second differences of the acceleration channel integrated twice, aligned with the safe
+//! position once a V-frame.
+
+use crate::{DeltaDelta, PositionBits};
+
+const POSITION: u64 = 0xff_ffff_ffff;
+const VELOCITY: u32 = 0xff_ffff;
+
+/// What stands in for an acceleration word that cannot be used.
+///
+/// Both give last + (16 d0 + 8 d1 + 4 d2 + 2 d3 + d4) / 32 (HDSL Protocol Design), rounded towards minus infinity,
+/// with `last` the value before and d0..d4 its five newest differences.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "arbitrary", derive(arbitrary::Arbitrary))]
+pub enum Estimator {
+    /// Calculated without overflow and limited to the 11 bits of a real value.
+    #[default]
+    Clamped,
+    /// As the Motor Control SDK calculates it: in 16 bits that wrap, and added to the velocity with its sign only if
+    /// bit 10 is set. The same as [`Clamped`](Self::Clamped) as long as nothing wraps and the result has 11 bits.
+    Wrapping16,
+}
+
+/// How far the fast position is aligned with the safe position; it advances once a V-frame.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Default)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "arbitrary", derive(arbitrary::Arbitrary))]
+#[repr(u8)]
+pub enum Phase {
+    /// 0: the position is not known; the next safe position is taken over.
+    #[default]
+    Position = 0,
+    /// 1: the next safe position gives the error of the velocity.
+    Velocity = 1,
+    /// 2: one V-frame with right values has to pass.
+    Settle = 2,
+    /// 3: aligned; every safe position is compared.
+    Check = 3,
+}
+
+/// Integrates the acceleration words to velocity and position.
+///
+/// All arithmetic is modulo the width: 24 bits of velocity in steps an H-frame, 40 bits of position.
+///
+/// ```
+/// use hdsl::{DeltaDelta, PositionBits, PositionTracker};
+/// let mut tracker = PositionTracker::new(PositionBits::MAX);
+/// tracker.align(1000);
+/// for _ in 0..3 {
+///     tracker.step(DeltaDelta::new(2));
+/// }
+/// assert_eq!((tracker.velocity(), tracker.position()), (6, 1000 + 2 + 4 + 6));
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct PositionTracker {
+    bits: PositionBits,
+    estimator: Estimator,
+    position: u64,
+    velocity: u32,
+    /// Sum of the velocities since the last safe position.
+    relative: i32,
+    last: i16,
+    /// Differences between successive values, the newest first.
+    history: [i16; 5],
+    /// Position of phase 0, from which phase 1 learns the error of the velocity.
+    reference: u64,
+    phase: Phase,
+    unreliable: bool,
+    errors: u32,
+}
+
+impl PositionTracker {
+    /// At standstill at position 0, not aligned.
+    pub const fn new(bits: PositionBits) -> Self {
+        Self::with_estimator(bits, Estimator::Clamped)
+    }
+
+    /// The same with a choice of the estimator.
+    pub const fn with_estimator(bits: PositionBits, estimator: Estimator) -> Self {
+        Self {
+            bits,
+            estimator,
+            position: 0,
+            velocity: 0,
+            relative: 0,
+            last: 0,
+            history: [0; 5],
+            reference: 0,
+            phase: Phase::Position,
+            unreliable: false,
+            errors: 0,
+        }
+    }
+
+    /// Takes the acceleration of one H-frame; `None` if it cannot be used, so that it is estimated.
+    pub fn step(&mut self, value: Option<DeltaDelta>) {
+        if let Some(value) = value {
+            let value = value.get();
+            self.errors = 0;
+            self.integrate(i32::from(value), value);
+        } else {
+            self.errors = self.errors.saturating_add(1);
+            self.phase = Phase::Position;
+            self.unreliable = true;
+            let (added, kept) = self.estimate();
+            self.integrate(added, kept);
+        }
+    }
+
+    /// `added` goes into the velocity, `kept` into the history.
+    fn integrate(&mut self, added: i32, kept: i16) {
+        self.velocity = self.velocity.wrapping_add_signed(added) & VELOCITY;
+        let [d0, d1, d2, d3, _] = self.history;
+        self.history = [kept.wrapping_sub(self.last), d0, d1, d2, d3];
+        self.last = kept;
+        let signed = self.velocity();
+        self.position = self.position.wrapping_add_signed(i64::from(signed)) & self.bits.mask();
+        self.relative = self.relative.wrapping_add(signed);
+    }
+
+    fn estimate(&self) -> (i32, i16) {
+        let weights = [16, 8, 4, 2, 1];
+        let terms = self.history.iter().zip(weights).map(|(d, w)| i32::from(*d).wrapping_mul(w));
+        let sum = terms.fold(0, i32::wrapping_add);
+        match self.estimator {
+            Estimator::Clamped => {
+                let value = DeltaDelta::clamp(i64::from(self.last).wrapping_add(i64::from(sum >> 5))).get();
+                (i32::from(value), value)
+            }
+            Estimator::Wrapping16 => {
+                let [low, high, ..] = sum.to_le_bytes();
+                let sum = i16::from_le_bytes([low, high]) >> 5;
+                let value = self.last.wrapping_add(sum);
+                if value & 0x400 != 0 {
+                    let value = value | -0x800;
+                    (i32::from(value), value)
+                } else {
+                    // Added without its sign.
+                    (i32::from(value) & 0xffff, value)
+                }
+            }
+        }
+    }
+
+    /// Compares or aligns with the safe position, after the last H-frame of a V-frame.
+    ///
+    /// `safe` is the position at the sampling instant before the V-frame, 40 bits.
+    ///
+    /// ```text
+    ///  phase 0   pos = safe + relative; x = pos                             -> 1
+    ///  phase 1   x = safe - x is 8 times the error of the velocity:
+    ///            vel += x / 8; pos += 2 x                                   -> 2
+    ///  phase 2                                                              -> 3
+    ///  phase 3   safe + relative = pos: aligned; otherwise                  -> 0
+    /// ```
+    ///
+    /// The difference x of phase 1 is not reduced to the width of the position, as in the vendor's receiver: if the
+    /// position went over its end in between, phase 3 finds that out and the alignment starts again.
+    pub fn align(&mut self, safe: u64) {
+        let relative = i64::from(self.relative);
+        let expected = safe.wrapping_add_signed(relative) & POSITION;
+        match self.phase {
+            Phase::Position => {
+                self.position = expected;
+                self.reference = expected;
+                self.phase = Phase::Velocity;
+            }
+            Phase::Velocity => {
+                let x = sign_extend_40(safe.wrapping_sub(self.reference));
+                let [v0, v1, v2, v3, ..] = (x >> 3).to_le_bytes();
+                self.velocity = self.velocity.wrapping_add(u32::from_le_bytes([v0, v1, v2, v3])) & VELOCITY;
+                self.position = self.position.wrapping_add_signed(x.wrapping_mul(2)) & POSITION;
+                self.phase = Phase::Settle;
+            }
+            Phase::Settle => self.phase = Phase::Check,
+            Phase::Check if (expected ^ self.position) & self.bits.mask() == 0 => self.unreliable = false,
+            Phase::Check => {
+                self.phase = Phase::Position;
+                self.unreliable = true;
+            }
+        }
+        self.relative = 0;
+    }
+
+    /// In place of [`align`](Self::align) when the V-frame brought no safe position.
+    pub const fn no_safe_position(&mut self) {
+        self.phase = Phase::Position;
+        self.unreliable = true;
+        self.relative = 0;
+    }
+
+    /// Marks the position as unreliable until an alignment succeeds.
+    pub const fn doubt(&mut self) {
+        self.unreliable = true;
+    }
+
+    /// The position, 40 bits. Right after phases 0 and 1 it can have bits above the width of the encoder; the next
+    /// step takes them away.
+    pub const fn position(&self) -> u64 {
+        self.position
+    }
+
+    /// The velocity in steps an H-frame, 24 bits.
+    pub const fn velocity(&self) -> i32 {
+        i32::from_le_bytes((self.velocity << 8).to_le_bytes()) >> 8
+    }
+
+    /// How far the alignment is.
+    pub const fn phase(&self) -> Phase {
+        self.phase
+    }
+
+    /// The flag POS: an estimated value is in the position, or the last check failed.
+    pub const fn is_unreliable(&self) -> bool {
+        self.unreliable
+    }
+
+    /// ACC_ERR_CNT: unusable words since the last usable one.
+    pub const fn errors(&self) -> u32 {
+        self.errors
+    }
+}
+
+const fn sign_extend_40(value: u64) -> i64 {
+    i64::from_le_bytes((value << 24).to_le_bytes()) >> 24
+}
+
+#[cfg(test)]
+#[allow(clippy::cast_sign_loss)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    fn dd(value: i64) -> Option<DeltaDelta> {
+        DeltaDelta::new(value as i16)
+    }
+
+    /// Drives a tracker with a real motion and gives it the safe position after every eighth frame.
+    fn follow(
+        tracker: &mut PositionTracker,
+        start: i64,
+        accelerations: &[i64],
+        speed: i64,
+        lost: impl Fn(usize) -> bool,
+    ) -> i64 {
+        let (mut position, mut velocity, mut before) = (start, speed, start);
+        for (k, a) in accelerations.iter().enumerate() {
+            velocity += a;
+            position += velocity;
+            tracker.step(if lost(k) { None } else { dd(*a) });
+            if k % 8 == 7 {
+                tracker.align(before.rem_euclid(1 << 40) as u64 & tracker.bits.mask());
+                before = position;
+            }
+        }
+        position
+    }
+
+    proptest! {
+        /// Whatever the encoder did before, four V-frames later the position is exact and stays so.
+        #[test]
+        fn aligns_in_four_v_frames(start in 0..1_i64 << 31, speed in -3000..3000_i64, a in prop::collection::vec(-40..40_i64, 48)) {
+            let mut tracker = PositionTracker::new(PositionBits::new(40).unwrap());
+            let end = follow(&mut tracker, start + (1 << 33), &a, speed, |_| false);
+            prop_assert_eq!(tracker.phase(), Phase::Check);
+            prop_assert!(!tracker.is_unreliable());
+            prop_assert_eq!(tracker.position(), end.rem_euclid(1 << 40) as u64);
+        }
+
+        /// A lost word is found out and repaired, at the latest in the second round: the first learns a wrong error
+        /// of the velocity if the word was lost in the middle of a V-frame.
+        #[test]
+        fn repairs_after_lost_words(speed in -3000..3000_i64, a in prop::collection::vec(-40..40_i64, 128), lost in 33..48_usize) {
+            let mut tracker = PositionTracker::new(PositionBits::new(36).unwrap());
+            let end = follow(&mut tracker, 1 << 33, &a, speed, |k| k == lost || k == lost + 2);
+            prop_assert!(!tracker.is_unreliable());
+            prop_assert_eq!(tracker.position(), end.rem_euclid(1 << 40) as u64 & tracker.bits.mask());
+        }
+
+        /// As long as nothing wraps both estimators agree.
+        #[test]
+        fn the_estimators_agree_without_wrap(a in prop::collection::vec(prop::option::of(-200..200_i16), 40)) {
+            let bits = PositionBits::MAX;
+            let mut one = PositionTracker::new(bits);
+            let mut two = PositionTracker::with_estimator(bits, Estimator::Wrapping16);
+            for value in a {
+                let value = value.map(|v| DeltaDelta::new(v).unwrap());
+                one.step(value);
+                two.step(value);
+                if matches!(one.last, -1024 | 1023) {
+                    return Ok(());
+                }
+                prop_assert_eq!((one.position(), one.velocity()), (two.position(), two.velocity()));
+            }
+        }
+
+        /// An estimate never leaves the range of a real value.
+        #[test]
+        fn the_clamped_estimate_has_eleven_bits(a in prop::collection::vec(prop::option::of(-1024..=1023_i16), 60)) {
+            let mut tracker = PositionTracker::new(PositionBits::MAX);
+            for value in a {
+                let before = tracker.velocity();
+                tracker.step(value.map(|v| DeltaDelta::new(v).unwrap()));
+                prop_assert!((-1024..=1023).contains(&(tracker.velocity() - before)));
+                prop_assert_eq!(tracker.errors() > 0, value.is_none());
+            }
+        }
+    }
+
+    /// At constant acceleration, speed 0 or not, the estimate is exact.
+    #[test]
+    fn constant_acceleration_needs_no_words() {
+        for a in [-7, 0, 7] {
+            let mut tracker = PositionTracker::new(PositionBits::MAX);
+            for k in 1..100 {
+                tracker.step(if (20..30).contains(&k) { None } else { dd(a) });
+                assert_eq!(i64::from(tracker.velocity()), a * k);
+            }
+            assert!(tracker.is_unreliable());
+        }
+    }
+
+    #[test]
+    fn standstill_stays_exact() {
+        let mut tracker = PositionTracker::new(PositionBits::new(24).unwrap());
+        for frame in 0..8000 {
+            tracker.step(dd(0));
+            if frame % 8 == 7 {
+                tracker.align(0xff_ffff);
+                assert_eq!(tracker.position(), 0xff_ffff);
+            }
+        }
+        tracker.no_safe_position();
+        assert_eq!((tracker.phase(), tracker.is_unreliable()), (Phase::Position, true));
+    }
+}

@@ -1,0 +1,159 @@
+//! Signal quality from the places of the edges in the sample byte.
+
+/// Received signal strength of an answer, 0..=12: how far apart the edges in a bit time are.
+///
+/// 12 with no or one edge, else 2 (G - 2) for the longest gap G between neighbouring edges, counted round the eight
+/// sample periods; 0 for G <= 2.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "arbitrary", derive(arbitrary::Arbitrary))]
+pub struct Rssi(u8);
+
+impl Rssi {
+    /// The best.
+    pub const MAX: Self = Self(12);
+
+    /// Of an edge byte, see [`edges`].
+    ///
+    /// ```
+    /// use hdsl::rssi::{Rssi, edges};
+    /// // previous sample 1, samples 10000001: edges before sample 1 and before sample 7
+    /// assert_eq!(edges(true, 0b1000_0001), 0b0100_0001);
+    /// assert_eq!(Rssi::of_edges(0b0100_0001).get(), 8);
+    /// ```
+    #[expect(clippy::indexing_slicing, reason = "a byte is below 256")]
+    pub const fn of_edges(edges: u8) -> Self {
+        Self(RSSI[edges as usize])
+    }
+
+    /// As the table of the Motor Control SDK has it: there a longest gap of one or two sample periods counts as 12,
+    /// so that many edges look perfect.
+    pub const fn of_edges_ti(edges: u8) -> Self {
+        match longest_gap(edges) {
+            Some(1..=2) => Self::MAX,
+            _ => Self::of_edges(edges),
+        }
+    }
+
+    /// The value, 0..=12.
+    pub const fn get(self) -> u8 {
+        self.0
+    }
+}
+
+/// Where the level changes in a byte of samples: bit 7 for a change before the first sample.
+pub const fn edges(previous: bool, samples: u8) -> u8 {
+    samples ^ (samples >> 1 | (previous as u8) << 7)
+}
+
+/// The longest distance between neighbouring edges, counted round the byte: 8 with one edge, `None` without.
+pub const fn longest_gap(edges: u8) -> Option<u8> {
+    if edges == 0 {
+        return None;
+    }
+    let mut longest = 0;
+    let mut at: u32 = 0;
+    while at < 8 {
+        if edges.rotate_left(at) & 0x80 != 0 {
+            // From this edge to the next one, at the latest to itself.
+            let gap = edges.rotate_left(at.wrapping_add(1)).leading_zeros().wrapping_add(1);
+            if gap > longest {
+                longest = gap;
+            }
+        }
+        at = at.wrapping_add(1);
+    }
+    // At most 8.
+    Some(longest.to_le_bytes()[0])
+}
+
+#[expect(clippy::indexing_slicing, clippy::cast_possible_truncation, reason = "runs at compile time")]
+static RSSI: [u8; 256] = {
+    let mut table = [0; 256];
+    let mut edges = 0;
+    while edges < 256 {
+        table[edges] = match longest_gap(edges as u8) {
+            None | Some(8..) => 12,
+            Some(gap) if gap > 2 => 2 * (gap - 2),
+            Some(_) => 0,
+        };
+        edges += 1;
+    }
+    table
+};
+
+/// Collects edges over bit times: for [`Rssi`] and the register EDGES (SICK manual, p. 41).
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct EdgeWatch {
+    previous: bool,
+    seen: u8,
+    lowest: Rssi,
+}
+
+impl EdgeWatch {
+    /// `previous` is the level of the sample before the first byte.
+    pub const fn new(previous: bool) -> Self {
+        Self { previous, seen: 0, lowest: Rssi::MAX }
+    }
+
+    /// Takes the samples of one bit time.
+    pub fn step(&mut self, samples: u8) {
+        let edges = edges(self.previous, samples);
+        self.previous = samples & 1 == 1;
+        self.seen |= edges;
+        self.lowest = self.lowest.min(Rssi::of_edges(edges));
+    }
+
+    /// The lowest RSSI of the bits so far.
+    pub const fn rssi(self) -> Rssi {
+        self.lowest
+    }
+
+    /// Sample periods in which an edge was seen, by the bits of the register EDGES: bit n stands for period n.
+    pub const fn edges(self) -> u8 {
+        self.seen.reverse_bits()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn histogram_of_the_table() {
+        let mut count = [0; 13];
+        let mut vendor = [0; 13];
+        for edges in 0..=255 {
+            count[usize::from(Rssi::of_edges(edges).get())] += 1;
+            vendor[usize::from(Rssi::of_edges_ti(edges).get())] += 1;
+        }
+        assert_eq!(count, [47, 0, 84, 0, 60, 0, 32, 0, 16, 0, 8, 0, 9]);
+        assert_eq!(vendor, [0, 0, 84, 0, 60, 0, 32, 0, 16, 0, 8, 0, 56]);
+    }
+
+    #[test]
+    fn gaps_by_walking_round() {
+        for edges in 1..=255_u8 {
+            let on = |k: usize| edges >> (7 - k % 8) & 1 == 1;
+            let gap = (0..8).filter(|k| on(*k)).map(|k| (1..=8).find(|d| on(k + d)).unwrap()).max().unwrap();
+            assert_eq!(longest_gap(edges), Some(gap as u8));
+        }
+        assert_eq!(longest_gap(0), None);
+    }
+
+    #[test]
+    fn edges_of_a_bit() {
+        for previous in [false, true] {
+            for samples in 0..=255_u8 {
+                let line: u16 = u16::from(previous) << 8 | u16::from(samples);
+                let want = (0..8).fold(0, |e, k| e | u8::from(line >> k & 1 != line >> (k + 1) & 1) << k);
+                assert_eq!(edges(previous, samples), want);
+            }
+        }
+        let mut watch = EdgeWatch::new(true);
+        watch.step(0b0000_1111);
+        assert_eq!((watch.edges(), watch.rssi().get()), (0b0001_0001, 4));
+    }
+}

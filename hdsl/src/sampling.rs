@@ -1,0 +1,258 @@
+//! From 75 MHz samples to bits: where to sample, how long the cable delays the answer, how good the edges are.
+//!
+//! Reception begins one bit after the end of PARA. A byte holds the eight samples of one bit time of the master, the
+//! first of them in bit 7. The line is high until the encoder drives it.
+
+use crate::Error;
+use crate::frame::ANSWER_BITS;
+use crate::rssi::{EdgeWatch, Rssi};
+
+/// Bytes of samples that a receiver takes in for one answer: 61 bits and room for a delay of up to 11.
+pub const WINDOW: usize = 72;
+
+/// The test pattern that the encoder answers during START, LEARN and CHECK, first line bit in bit 0.
+///
+/// ```text
+/// 0100110011001000000100010101110111111011001100110100010011001
+/// ```
+#[expect(clippy::indexing_slicing, reason = "runs at compile time")]
+pub const TEST_PATTERN: u64 = {
+    let text = b"0100110011001000000100010101110111111011001100110100010011001";
+    let mut bits = 0;
+    let mut at = 0;
+    while at < text.len() {
+        if text[at] == b'1' {
+            bits |= 1 << at;
+        }
+        at += 1;
+    }
+    bits
+};
+
+/// The place in every byte of samples where the bit is taken, 0..=7; 0 is the first sample in time.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(try_from = "u8", into = "u8"))]
+pub struct SampleIndex(u8);
+
+impl SampleIndex {
+    /// `None` above 7.
+    pub const fn new(index: u8) -> Option<Self> {
+        if index < 8 { Some(Self(index)) } else { None }
+    }
+
+    /// E = (4 + n) mod 8 with n ones in the byte that holds a falling edge (HDSL Protocol Design): the middle of the
+    /// bits that begin at that edge.
+    ///
+    /// ```
+    /// use hdsl::sampling::SampleIndex;
+    /// // The bit begins at sample 5; its middle is sample 1 of the next byte.
+    /// assert_eq!(SampleIndex::after_falling_edge(0b1111_1000).get(), 1);
+    /// ```
+    #[expect(clippy::cast_possible_truncation, reason = "at most eight ones")]
+    pub const fn after_falling_edge(byte: u8) -> Self {
+        Self((byte.count_ones() as u8).wrapping_add(4) % 8)
+    }
+
+    /// The same for a byte that holds a rising edge, as the design document draws it: there the formula counts from
+    /// the last sample.
+    pub const fn after_rising_edge(byte: u8) -> Self {
+        Self(7_u8.wrapping_sub(Self::after_falling_edge(byte).0))
+    }
+
+    /// The index, 0..=7.
+    pub const fn get(self) -> u8 {
+        self.0
+    }
+
+    /// The bit that a byte of samples stands for.
+    #[inline]
+    pub const fn bit(self, samples: u8) -> bool {
+        samples >> (7 & !self.0) & 1 == 1
+    }
+
+    /// The first 128 bits of a line, the first of them in bit 0.
+    pub fn bits(self, samples: &[u8]) -> u128 {
+        let take = |bits: u128, (at, byte): (u32, &u8)| bits | u128::from(self.bit(*byte)) << at;
+        (0..128).zip(samples).fold(0, take)
+    }
+}
+
+impl TryFrom<u8> for SampleIndex {
+    type Error = Error;
+
+    fn try_from(index: u8) -> Result<Self, Error> {
+        Self::new(index).ok_or(Error::PatternNotFound { index })
+    }
+}
+
+impl From<SampleIndex> for u8 {
+    fn from(index: SampleIndex) -> Self {
+        index.0
+    }
+}
+
+/// How the first falling edge is read from its byte.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "arbitrary", derive(arbitrary::Arbitrary))]
+pub enum EdgeRule {
+    /// The ones in front of the edge count.
+    #[default]
+    Leading,
+    /// All ones of the byte count, as in the vendor's receiver. If the edge falls on the boundary of two bytes and the
+    /// next one comes a sample early, a one from behind it is counted and the pattern is not found.
+    All,
+}
+
+/// What the receiver learns from the answer to a START frame.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct Alignment {
+    /// Where to sample.
+    pub index: SampleIndex,
+    /// Bits in front of the answer, 0..=11: the delay of the cable, about 100 ns or 10 m each.
+    pub delay: u8,
+}
+
+impl Alignment {
+    /// Largest delay at which an answer fits into the window.
+    pub const MAX_DELAY: u8 = 11;
+
+    /// Finds the sampling index from the first falling edge, and the delay from the place of the test pattern.
+    ///
+    /// The vendor's receiver begins at a delay of 1; at 0 m encoder and transceivers need most of a bit anyway.
+    ///
+    /// `samples` holds a byte a bit time, the first sample in bit 7; [`WINDOW`] of them allow every delay.
+    ///
+    /// # Errors
+    /// [`Error::Truncated`] for fewer than 61 bytes, [`Error::NoEdge`] if the line stayed high,
+    /// [`Error::PatternNotFound`].
+    pub fn learn(samples: &[u8], rule: EdgeRule) -> Result<Self, Error> {
+        let room = room(samples, 0)?;
+        let Some(edge) = samples.iter().find(|byte| **byte != 0xff) else { return Err(Error::NoEdge) };
+        let edge = match rule {
+            EdgeRule::All => *edge,
+            // Without what comes behind the first zero.
+            EdgeRule::Leading => *edge & !(!*edge).checked_ilog2().map_or(0, |zero| (1_u8 << zero).wrapping_sub(1)),
+        };
+        let index = SampleIndex::after_falling_edge(edge);
+        let line = index.bits(samples);
+        let found = (0..=room.min(Self::MAX_DELAY)).find(|delay| answer_at(line, *delay) == TEST_PATTERN);
+        found.map(|delay| Self { index, delay }).ok_or(Error::PatternNotFound { index: index.0 })
+    }
+
+    /// The 61 bits of an answer, the first in bit 0.
+    ///
+    /// # Errors
+    /// [`Error::Truncated`] if the samples end before the answer.
+    pub fn bits(self, samples: &[u8]) -> Result<u64, Error> {
+        room(samples, self.delay)?;
+        Ok(answer_at(self.index.bits(samples), self.delay))
+    }
+
+    /// RSSI of the answer: the smallest over its bits (HDSL Protocol Design).
+    pub fn rssi(self, samples: &[u8]) -> Rssi {
+        self.edges(samples).rssi()
+    }
+
+    /// All edges of the answer, by sample period.
+    pub fn edges(self, samples: &[u8]) -> EdgeWatch {
+        let from = usize::from(self.delay);
+        let before = from.checked_sub(1).and_then(|at| samples.get(at)).is_none_or(|byte| byte & 1 == 1);
+        let mut watch = EdgeWatch::new(before);
+        for byte in samples.iter().skip(from).take(ANSWER_BITS as usize) {
+            watch.step(*byte);
+        }
+        watch
+    }
+}
+
+/// How many bytes there are beyond those of an answer that begins after `delay`; 255 at most.
+fn room(samples: &[u8], delay: u8) -> Result<u8, Error> {
+    let want = usize::from(delay).saturating_add(ANSWER_BITS as usize);
+    match samples.len().checked_sub(want) {
+        Some(rest) => Ok(u8::try_from(rest).unwrap_or(u8::MAX)),
+        None => Err(Error::Truncated {
+            got: u16::try_from(samples.len()).unwrap_or(u16::MAX),
+            want: u16::try_from(want).unwrap_or(u16::MAX),
+        }),
+    }
+}
+
+#[expect(clippy::cast_possible_truncation, reason = "masked to 61 bits")]
+fn answer_at(line: u128, delay: u8) -> u64 {
+    const MASK: u64 = (1 << ANSWER_BITS) - 1;
+    (line >> (delay & 15)) as u64 & MASK
+}
+
+/// The samples of a line that carries an answer `delay` eighths of a bit after reception began, with ones before and
+/// behind: what [`Alignment::bits`] takes apart.
+///
+/// ```
+/// use hdsl::sampling::{Alignment, EdgeRule, TEST_PATTERN, line};
+/// let found = Alignment::learn(&line(TEST_PATTERN, 13), EdgeRule::Leading);
+/// assert_eq!(found.map(|a| (a.index.get(), a.delay)), Ok((1, 2)));
+/// ```
+pub fn line(bits: u64, delay: u32) -> [u8; WINDOW] {
+    // Eight bits at a time: the one under way and the one before it.
+    let bit = |at: u32| if at < ANSWER_BITS { bits >> at & 1 == 1 } else { true };
+    let byte = |at: u32| if bit(at) { 0xff_u8 } else { 0 };
+    let (whole, part) = (delay / 8, delay % 8);
+    core::array::from_fn(|k| {
+        let at = u32::try_from(k).unwrap_or(u32::MAX);
+        let present = at.checked_sub(whole).map_or(0xff, byte);
+        let before = at.checked_sub(whole.saturating_add(1)).map_or(0xff, byte);
+        let pair = u16::from_be_bytes([before, present]);
+        let [_, samples] = (pair >> part).to_be_bytes();
+        samples
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::vec::Vec;
+
+    #[test]
+    fn every_delay_of_a_clean_line() {
+        for delay in 0..=100_u32 {
+            let got = Alignment::learn(&line(TEST_PATTERN, delay), EdgeRule::All);
+            if delay >= 92 {
+                assert!(matches!(got, Err(Error::PatternNotFound { .. })), "{delay}");
+                continue;
+            }
+            let got = got.unwrap();
+            assert_eq!(u32::from(got.index.get()), (delay + 4) % 8);
+            assert_eq!(u32::from(got.delay), (delay + 4) / 8);
+            assert_eq!(got.rssi(&line(TEST_PATTERN, delay)).get(), 12);
+            for bits in [0, 0x0123_4567_89ab_cdef, u64::MAX >> 3] {
+                assert_eq!(got.bits(&line(bits, delay)), Ok(bits & u64::MAX >> 3));
+            }
+        }
+        assert_eq!(Alignment::learn(&[0xff; 72], EdgeRule::All), Err(Error::NoEdge));
+        assert_eq!(Alignment::learn(&[0xff; 60], EdgeRule::All), Err(Error::Truncated { got: 60, want: 61 }));
+        let late = Alignment { index: SampleIndex(4), delay: 5 };
+        assert_eq!(late.bits(&[0; 65]), Err(Error::Truncated { got: 65, want: 66 }));
+    }
+
+    /// Every wrong bit of the pattern is refused.
+    #[test]
+    fn a_wrong_bit_of_the_pattern() {
+        for at in 0..61 {
+            for delay in 0..88 {
+                assert!(Alignment::learn(&line(TEST_PATTERN ^ 1 << at, delay), EdgeRule::All).is_err());
+            }
+        }
+    }
+
+    #[test]
+    fn both_kinds_of_edge() {
+        let falling: Vec<u8> = (0..=8).map(|n| SampleIndex::after_falling_edge(!(0xff_u16 >> n) as u8).get()).collect();
+        assert_eq!(falling, [4, 5, 6, 7, 0, 1, 2, 3, 4]);
+        assert_eq!(SampleIndex::after_rising_edge(0b0001_1111).get(), 6);
+        assert_eq!(SampleIndex::new(8), None);
+    }
+}

@@ -1,0 +1,421 @@
+//! 8b/10b words: what every byte of the link is sent as.
+//!
+//! The word goes out in the order `a b c d e i f g h j`; `a` belongs to bit 0 of the byte (HDSL Protocol Design).
+//! A [`Word`] holds it with `a` in bit 0, so that nothing is ever reversed.
+//!
+//! ```text
+//!  byte   7 6 5   4 3 2 1 0            word   9 8 7 6   5 4 3 2 1 0
+//!         H G F   E D C B A                   j h g f   i e d c b a   ← first on the line
+//!           y         x                       4-bit     6-bit block
+//! ```
+//!
+//! Two rules of decoding are offered, see [`Rule`]. The running disparity is a diagnostic only: whether an encoder
+//! carries it from one frame to the next is not documented.
+
+mod table;
+
+use table::{CONTROL, CONTROLS, DATA, DECODE, INVALID, MINUS, PLUS, SPECIAL};
+pub(crate) use table::{FOUR_MORE_ZEROS, SIX_MORE_ZEROS};
+
+use crate::Error;
+
+/// Ten bits of the line, the first of them (`a`) in bit 0.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(try_from = "u16", into = "u16"))]
+pub struct Word(u16);
+
+impl Word {
+    /// Bits of a word.
+    pub const BITS: u32 = 10;
+
+    /// `None` above 10 bits.
+    pub const fn new(bits: u16) -> Option<Self> {
+        if bits < 1 << Self::BITS { Some(Self(bits)) } else { None }
+    }
+
+    /// The ten lowest bits of `bits`.
+    pub const fn truncate(bits: u64) -> Self {
+        Self((bits & 0x3ff) as u16)
+    }
+
+    /// The bits, `a` in bit 0.
+    pub const fn bits(self) -> u16 {
+        self.0
+    }
+
+    /// Ones minus zeros, -10..=10.
+    pub const fn disparity(self) -> i8 {
+        let [ones, ..] = self.0.count_ones().to_le_bytes();
+        i8::from_le_bytes([ones]).wrapping_mul(2).wrapping_sub(10)
+    }
+
+    /// What the word stands for by the tables of the code; `None` if it is in neither column.
+    ///
+    /// ```
+    /// use hdsl::symbol::{Character, Control, Word};
+    /// let word = Word::new(0b01_0111_1100); // 001111 1010 on the line
+    /// assert_eq!(word.and_then(Word::decode), Some(Character::control(Control::K28_5)));
+    /// ```
+    pub const fn decode(self) -> Option<Character> {
+        let entry = self.entry();
+        if entry & INVALID != 0 { None } else { Some(Character(entry & 0x1ff)) }
+    }
+
+    /// Whether the word is in the column for this running disparity.
+    pub const fn is_in(self, column: RunningDisparity) -> bool {
+        self.entry() & column.flag() != 0
+    }
+
+    /// What a receiver makes of the word by `rule`.
+    pub const fn read(self, rule: Rule) -> Reading {
+        match rule {
+            Rule::Strict => Reading { entry: self.entry() & 0x3ff, word: self },
+            Rule::Reduced => Reading { entry: self.reduced(), word: self },
+        }
+    }
+
+    #[inline]
+    #[expect(clippy::indexing_slicing, reason = "a word has ten bits, the table 1024 entries")]
+    const fn entry(self) -> u16 {
+        DECODE[(self.0 & 0x3ff) as usize]
+    }
+
+    const fn reduced(self) -> u16 {
+        let bits = self.0;
+        let run_abcd = matches!(bits & 0b1111, 0 | 0b1111);
+        // e i f g h are bits 4..=8.
+        let run_eifgh = matches!(bits >> 4 & 0b1_1111, 0 | 0b1_1111);
+        let run_cdei = matches!(bits >> 2 & 0b1111, 0 | 0b1111);
+        // e in bit 4, i g h j in bits 5, 7, 8, 9.
+        let eighj = bits & 0b11_1011_0000;
+        let special = run_cdei || eighj == 0b11_1010_0000 || eighj == 0b00_0001_0000;
+        let mut entry = table::sub_blocks(bits) as u16;
+        if run_abcd || run_eifgh {
+            entry |= INVALID;
+        }
+        if special {
+            entry |= SPECIAL;
+        }
+        entry
+    }
+}
+
+impl TryFrom<u16> for Word {
+    type Error = Error;
+
+    fn try_from(bits: u16) -> Result<Self, Error> {
+        Self::new(bits).ok_or(Error::InvalidWord { word: bits })
+    }
+}
+
+impl From<Word> for u16 {
+    fn from(word: Word) -> Self {
+        word.0
+    }
+}
+
+/// The sign of the running disparity: which column of the tables the next block is taken from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "arbitrary", derive(arbitrary::Arbitrary))]
+pub enum RunningDisparity {
+    /// RD-: more zeros than ones so far.
+    Minus,
+    /// RD+: more ones than zeros so far.
+    Plus,
+}
+
+impl RunningDisparity {
+    const fn flag(self) -> u16 {
+        match self {
+            Self::Minus => MINUS,
+            Self::Plus => PLUS,
+        }
+    }
+
+    /// The other one.
+    pub const fn other(self) -> Self {
+        match self {
+            Self::Minus => Self::Plus,
+            Self::Plus => Self::Minus,
+        }
+    }
+
+    const fn after(self, word: Word) -> Self {
+        if word.disparity() == 0 { self } else { self.other() }
+    }
+}
+
+/// The twelve special characters of the code.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "arbitrary", derive(arbitrary::Arbitrary))]
+#[repr(u8)]
+#[allow(non_camel_case_types, reason = "the names of the code")]
+#[allow(missing_docs, reason = "the name says which")]
+pub enum Control {
+    K28_0 = 0x1c,
+    K28_1 = 0x3c,
+    K28_2 = 0x5c,
+    K28_3 = 0x7c,
+    K28_4 = 0x9c,
+    K28_5 = 0xbc,
+    K28_6 = 0xdc,
+    K28_7 = 0xfc,
+    K23_7 = 0xf7,
+    /// Safe channel 2 has no position (SICK manual, safe position 2).
+    K27_7 = 0xfb,
+    /// The encoder has no value: acceleration and safe channel 1 (SICK manual).
+    K29_7 = 0xfd,
+    /// The pipe channel has no data in this frame (SICK manual, PIPE_D).
+    K30_7 = 0xfe,
+}
+
+impl Control {
+    /// All twelve.
+    pub const ALL: [Self; 12] = [
+        Self::K28_0,
+        Self::K28_1,
+        Self::K28_2,
+        Self::K28_3,
+        Self::K28_4,
+        Self::K28_5,
+        Self::K28_6,
+        Self::K28_7,
+        Self::K23_7,
+        Self::K27_7,
+        Self::K29_7,
+        Self::K30_7,
+    ];
+}
+
+/// A data byte or a special character.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(
+    feature = "serde",
+    derive(serde::Serialize, serde::Deserialize),
+    serde(try_from = "(u8, bool)", into = "(u8, bool)")
+)]
+pub struct Character(u16);
+
+impl Character {
+    /// The data character D.x.y of a byte.
+    pub const fn data(byte: u8) -> Self {
+        Self(byte as u16)
+    }
+
+    /// A special character.
+    pub const fn control(control: Control) -> Self {
+        Self(control as u16 | SPECIAL)
+    }
+
+    /// Byte and kind; `None` if `k` is set and there is no such special character.
+    pub fn new(byte: u8, k: bool) -> Option<Self> {
+        match (k, CONTROLS.contains(&byte)) {
+            (false, _) => Some(Self::data(byte)),
+            (true, true) => Some(Self(u16::from(byte) | SPECIAL)),
+            (true, false) => None,
+        }
+    }
+
+    /// The value.
+    pub const fn byte(self) -> u8 {
+        self.0.to_le_bytes()[0]
+    }
+
+    /// Whether it is a special character.
+    pub const fn is_control(self) -> bool {
+        self.0 & SPECIAL != 0
+    }
+
+    /// The word in the column of `rd`, and the running disparity after it.
+    ///
+    /// ```
+    /// use hdsl::symbol::{Character, RunningDisparity};
+    /// let (word, after) = Character::data(0x00).encode(RunningDisparity::Minus);
+    /// assert_eq!(word.bits(), 0b00_1011_1001); // 100111 0100 on the line
+    /// assert_eq!(after, RunningDisparity::Minus);
+    /// ```
+    #[expect(clippy::indexing_slicing, reason = "a byte is below 256, a column below 2")]
+    pub fn encode(self, rd: RunningDisparity) -> (Word, RunningDisparity) {
+        let column = usize::from(rd == RunningDisparity::Plus);
+        let bits = if self.is_control() {
+            let place = CONTROLS.iter().position(|c| *c == self.byte()).unwrap_or(0);
+            CONTROL[column].get(place).copied().unwrap_or(0)
+        } else {
+            DATA[column][usize::from(self.byte())]
+        };
+        let word = Word(bits);
+        (word, rd.after(word))
+    }
+}
+
+impl TryFrom<(u8, bool)> for Character {
+    type Error = Error;
+
+    fn try_from((byte, k): (u8, bool)) -> Result<Self, Error> {
+        Self::new(byte, k).ok_or(Error::WrongKind { byte })
+    }
+}
+
+impl From<Character> for (u8, bool) {
+    fn from(character: Character) -> Self {
+        (character.byte(), character.is_control())
+    }
+}
+
+/// How a receiver judges a word.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "arbitrary", derive(arbitrary::Arbitrary))]
+pub enum Rule {
+    /// By the tables: 464 of the 1024 words are good, each stands for one character.
+    #[default]
+    Strict,
+    /// As the receiver firmware of the AM243x Motor Control SDK does it, which looks at runs of equal bits only.
+    ///
+    /// * byte error: a = b = c = d, or e = i = f = g = h;
+    /// * special: c = d = e = i, or e, i, g, h, j = 0, 1, 1, 1, 1 or 1, 0, 0, 0, 0;
+    /// * value: both sub-blocks looked up without regard to disparity, FFh if either is in no table.
+    ///
+    /// Words that are in no table can pass, and some good words read as special.
+    Reduced,
+}
+
+/// What a receiver makes of a word.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Reading {
+    entry: u16,
+    word: Word,
+}
+
+impl Reading {
+    /// The word.
+    pub const fn word(self) -> Word {
+        self.word
+    }
+
+    /// Whether the word is no good by the rule it was read with.
+    #[inline]
+    pub const fn is_byte_error(self) -> bool {
+        self.entry & INVALID != 0
+    }
+
+    /// Whether the rule takes the word for a special character.
+    #[inline]
+    pub const fn is_special(self) -> bool {
+        self.entry & SPECIAL != 0
+    }
+
+    /// The value that the look-ups give, also for a bad word: FFh if a sub-block is in no table.
+    ///
+    /// Registers of the receiver take this value; for anything else see [`byte`](Self::byte).
+    #[inline]
+    pub const fn raw(self) -> u8 {
+        self.entry.to_le_bytes()[0]
+    }
+
+    /// The value.
+    ///
+    /// # Errors
+    /// [`Error::InvalidWord`].
+    pub const fn byte(self) -> Result<u8, Error> {
+        if self.is_byte_error() { Err(Error::InvalidWord { word: self.word.0 }) } else { Ok(self.raw()) }
+    }
+
+    /// Whether the word is this special character.
+    pub const fn is(self, control: Control) -> bool {
+        self.entry == control as u16 | SPECIAL
+    }
+
+    /// The same word read in the secondary channel, where the reduced rule puts K28.1, 2, 5 and 6 of column RD+
+    /// right. By the strict rule nothing is to be put right.
+    pub(crate) const fn in_secondary(self, rule: Rule) -> Self {
+        let bits = self.word.0;
+        let k28_plus = bits & 63 == 0b00_0011;
+        // fghj = 0110, 1010, 0101, 1001: balanced and not two pairs; symmetric to line order.
+        let crossed = matches!(bits >> 6, 0b0110 | 0b1010 | 0b0101 | 0b1001);
+        if matches!(rule, Rule::Reduced) && k28_plus && crossed {
+            return Self { entry: self.entry ^ 0b1110_0000, word: self.word };
+        }
+        self
+    }
+}
+
+/// The verdict of a [`DisparityCheck`] on a word.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub enum DisparityStatus {
+    /// In the column of the present running disparity.
+    Ok,
+    /// Only in the other column.
+    Disparity,
+    /// In no column.
+    Invalid,
+}
+
+/// Follows the running disparity through a stream of words, for diagnosis.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct DisparityCheck {
+    rd: RunningDisparity,
+}
+
+impl DisparityCheck {
+    /// Begins with this running disparity.
+    pub const fn new(rd: RunningDisparity) -> Self {
+        Self { rd }
+    }
+
+    /// The running disparity after the words so far.
+    pub const fn disparity(self) -> RunningDisparity {
+        self.rd
+    }
+
+    /// Judges the next word. After a word of the other column it goes on from that column's result; after a word
+    /// of none the sign of the word's own disparity counts, if it has one.
+    pub fn step(&mut self, word: Word) -> DisparityStatus {
+        let other = self.rd.other();
+        if word.is_in(self.rd) {
+            self.rd = self.rd.after(word);
+            DisparityStatus::Ok
+        } else if word.is_in(other) {
+            self.rd = other.after(word);
+            DisparityStatus::Disparity
+        } else {
+            self.rd = match word.disparity() {
+                0 => self.rd,
+                ..0 => RunningDisparity::Minus,
+                1.. => RunningDisparity::Plus,
+            };
+            DisparityStatus::Invalid
+        }
+    }
+}
+
+#[cfg(feature = "arbitrary")]
+impl<'a> arbitrary::Arbitrary<'a> for Word {
+    fn arbitrary(from: &mut arbitrary::Unstructured<'a>) -> arbitrary::Result<Self> {
+        Ok(Self(u16::arbitrary(from)? & 0x3ff))
+    }
+}
+
+#[cfg(feature = "arbitrary")]
+impl<'a> arbitrary::Arbitrary<'a> for Character {
+    fn arbitrary(from: &mut arbitrary::Unstructured<'a>) -> arbitrary::Result<Self> {
+        if bool::arbitrary(from)? {
+            return Ok(Self::data(u8::arbitrary(from)?));
+        }
+        Control::arbitrary(from).map(Self::control)
+    }
+}
+
+#[cfg(test)]
+mod tests;

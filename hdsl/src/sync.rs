@@ -1,0 +1,476 @@
+//! Synchronising the H-frames with an external pulse.
+//!
+//! The rising edge of the pulse and the falling edge inside the EXTRA window shall coincide, in every ES-th frame. The
+//! master reaches that with eighths of a bit in the window and, where those do not suffice, with stuffing blocks of
+//! six bits.
+//!
+//! ```text
+//!                     b eighths
+//!           |<------------------>|
+//!  ... 1 1  | 1   1   1   1   1  1___ 0 | 1 1 0 ...
+//!           |<------ E + 1 bits ------->|
+//! ```
+//!
+//! * [`ExtraWindow`] is the step from one frame to the next (HDSL Protocol Design);
+//! * [`Startup`] is the start-up arithmetic of the Motor Control SDK;
+//! * [`Synchroniser`] puts both together for any ES and corrects by the measured time between pulse and edge.
+
+use crate::Error;
+use crate::frame::{Extra, H_FRAME_BITS, MAX_STUFFING, STUFFING_BITS, edge_register};
+
+/// Eighths of a bit in a stuffing block.
+const BLOCK: i32 = 48;
+/// Eighths of a bit in a frame without EXTRA and stuffing.
+const FRAME: u32 = H_FRAME_BITS * 8;
+const _: () = assert!(STUFFING_BITS == 6 && FRAME == 864);
+
+/// The EXTRA window and the stuffing of the next frame, and how they follow from the present ones.
+///
+/// With b the place of the edge in eighths, t = b reduced to 1..=8 and W the constant TIME_EXTRA_WINDOW, the next edge
+/// is at W - (8 - t). If that is outside 24..=71 eighths, six bits move between the window and the stuffing.
+///
+/// 48 N + W never changes, and the time from edge to edge is 864 + 48 N + W eighths. For that the limiter has to act
+/// before the stuffing of the present frame is sent: see [`Synchroniser::next`].
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct ExtraWindow {
+    edge: Extra,
+    stuffing: u8,
+    window: i16,
+}
+
+impl ExtraWindow {
+    /// `window` is TIME_EXTRA_WINDOW in eighths; the window of the first frame has its edge at `edge`.
+    ///
+    /// # Errors
+    /// [`Error::ExtraOutOfRange`] for more than 26 stuffing blocks.
+    pub const fn new(edge: Extra, stuffing: u8, window: i16) -> Result<Self, Error> {
+        if stuffing > MAX_STUFFING {
+            return Err(Error::ExtraOutOfRange { extra: edge.bits() as u32 });
+        }
+        Ok(Self { edge, stuffing, window })
+    }
+
+    /// The start state from the vendor's register values: EXTRA_SIZE is the number of bits less one here, also when
+    /// TIME_REST is 0.
+    ///
+    /// # Errors
+    /// [`Error::ExtraOutOfRange`].
+    pub const fn from_registers(extra_size: u8, time_rest: u8, stuffing: u8, window: i16) -> Result<Self, Error> {
+        let t = if time_rest == 0 { 8 } else { time_rest };
+        let edge = extra_size.saturating_mul(8).saturating_add(t);
+        match Extra::new(edge) {
+            Some(edge) => Self::new(edge, stuffing, window),
+            None => Err(Error::ExtraOutOfRange { extra: extra_size as u32 }),
+        }
+    }
+
+    /// The window of the frame.
+    pub const fn extra(self) -> Extra {
+        self.edge
+    }
+
+    /// NUM_STUFFING: blocks behind the frame before this window.
+    pub const fn stuffing(self) -> u8 {
+        self.stuffing
+    }
+
+    /// TIME_EXTRA_WINDOW in eighths.
+    pub const fn window(self) -> i16 {
+        self.window
+    }
+
+    /// EXTRA_SIZE after a step.
+    pub const fn extra_size(self) -> u8 {
+        self.edge.edge() / 8
+    }
+
+    /// TIME_REST after a step.
+    pub const fn time_rest(self) -> u8 {
+        self.edge.edge() % 8
+    }
+
+    /// EXTRA_EDGE after a step.
+    pub const fn extra_edge(self) -> u8 {
+        edge_register(self.time_rest())
+    }
+
+    /// Edge and stuffing after a step of `adjust` eighths, before any check of the range.
+    const fn raw_step(self, adjust: i16) -> (i32, i32, i32) {
+        let t = (self.edge.edge().saturating_sub(1) % 8) as i32;
+        let window = self.window as i32;
+        // t counts from 0 here, so 1 is added to it.
+        let edge = window.saturating_sub(7).saturating_add(t).saturating_add(adjust as i32);
+        let stuffing = self.stuffing as i32;
+        match edge.div_euclid(8) {
+            ..3 => (edge.saturating_add(BLOCK), stuffing.saturating_sub(1), window.saturating_add(BLOCK)),
+            3..=8 => (edge, stuffing, window),
+            9.. => (edge.saturating_sub(BLOCK), stuffing.saturating_add(1), window.saturating_sub(BLOCK)),
+        }
+    }
+
+    /// Goes on to the next frame; its edge comes `adjust` eighths later than without.
+    ///
+    /// # Errors
+    /// [`Error::ExtraOutOfRange`] if one stuffing block does not bring the window into its range, or there is none to
+    /// take away or no room for one more. The state stays as it was.
+    pub fn step(&mut self, adjust: i16) -> Result<(), Error> {
+        let (edge, stuffing, window) = self.raw_step(adjust);
+        let refuse = || Error::ExtraOutOfRange { extra: edge.unsigned_abs() / 8 };
+        let extra = u8::try_from(edge).ok().and_then(Extra::new).ok_or_else(refuse)?;
+        let stuffing = u8::try_from(stuffing).ok().filter(|n| *n <= MAX_STUFFING).ok_or_else(refuse)?;
+        let window = i16::try_from(window).map_err(|_| refuse())?;
+        *self = Self { edge: extra, stuffing, window };
+        Ok(())
+    }
+}
+
+/// ES: how many H-frames there are for one pulse, 1..=10.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(try_from = "u8", into = "u8"))]
+pub struct Es(u8);
+
+impl Es {
+    /// A frame for every pulse.
+    pub const ONE: Self = Self(1);
+
+    /// `None` outside 1..=10.
+    pub const fn new(es: u8) -> Option<Self> {
+        if es == 0 || es > 10 { None } else { Some(Self(es)) }
+    }
+
+    /// The number.
+    pub const fn get(self) -> u8 {
+        self.0
+    }
+}
+
+impl TryFrom<u8> for Es {
+    type Error = Error;
+
+    fn try_from(es: u8) -> Result<Self, Error> {
+        Self::new(es).ok_or(Error::ExtraOutOfRange { extra: u32::from(es) })
+    }
+}
+
+impl From<Es> for u8 {
+    fn from(es: Es) -> Self {
+        es.0
+    }
+}
+
+/// The clock of the vendor's core.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "arbitrary", derive(arbitrary::Arbitrary))]
+pub enum CoreClock {
+    /// 225 MHz: 24 cycles a bit, 3 an eighth.
+    Mhz225,
+    /// 300 MHz: 32 cycles a bit, 4 an eighth.
+    Mhz300,
+}
+
+impl CoreClock {
+    /// Cycles an eighth of a bit.
+    pub const fn cycles_per_eighth(self) -> u32 {
+        match self {
+            Self::Mhz225 => 3,
+            Self::Mhz300 => 4,
+        }
+    }
+}
+
+/// What the start-up arithmetic of the Motor Control SDK makes of a pulse period.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct Startup {
+    /// Whole bits of the EXTRA window in every frame.
+    pub extra_size: u32,
+    /// Frames of a pulse group whose window has one bit more.
+    pub extra_remainder: u32,
+    /// Stuffing blocks in every frame.
+    pub stuffing: u32,
+    /// Frames of a pulse group with one block more.
+    pub stuffing_remainder: u32,
+    /// TIME_REST: eighths that are left, 0..=7.
+    pub time_rest: u8,
+    /// EXTRA_EDGE for TIME_REST.
+    pub extra_edge: u8,
+    /// Cycles of the period that the frames fill.
+    pub cycles_used: u32,
+    /// Cycles that are less than an eighth; the correction by the measured time takes care of them.
+    pub cycles_dropped: u32,
+}
+
+impl Startup {
+    /// Bits of a frame with the shortest window, 4 bits.
+    const SHORTEST: u32 = H_FRAME_BITS + 4;
+
+    /// Divides a pulse period, in cycles of the core, into `es` frames.
+    ///
+    /// ```
+    /// use hdsl::sync::{CoreClock, Es, Startup};
+    /// let start = Startup::new(6001, CoreClock::Mhz300, Es::ONE)?;
+    /// assert_eq!((start.extra_size, start.time_rest, start.stuffing), (7, 4, 12));
+    /// assert_eq!((start.extra_edge, start.cycles_used), (0xf0, 6000));
+    /// # Ok::<(), hdsl::Error>(())
+    /// ```
+    ///
+    /// # Errors
+    /// [`Error::PeriodTooShort`].
+    #[expect(clippy::arithmetic_side_effects, reason = "divisors are constants or an ES, which is not 0")]
+    pub fn new(period: u32, clock: CoreClock, es: Es) -> Result<Self, Error> {
+        let eighth = clock.cycles_per_eighth();
+        let bit = eighth * 8;
+        let es = u32::from(es.0);
+        let shortest = Self::SHORTEST * es * bit;
+        let Some(left) = period.checked_sub(shortest) else {
+            return Err(Error::PeriodTooShort { missing: (shortest - period).div_ceil(bit) });
+        };
+        let rest = left % bit / eighth;
+        let add = left / bit;
+        let mut stuffing = add / 6;
+        let mut extra = add % 6 + 4 * es;
+        let most = u32::from(MAX_STUFFING) * es;
+        if stuffing > most {
+            extra = extra.saturating_add((stuffing - most).saturating_mul(6));
+            stuffing = most;
+        }
+        let time_rest = rest.to_le_bytes()[0];
+        let cycles_dropped = left % bit % eighth;
+        Ok(Self {
+            extra_size: extra / es,
+            extra_remainder: extra % es,
+            stuffing: stuffing / es,
+            stuffing_remainder: stuffing % es,
+            time_rest,
+            extra_edge: edge_register(time_rest),
+            cycles_used: period - cycles_dropped,
+            cycles_dropped,
+        })
+    }
+
+    /// Refuses a period that the frames cannot fill.
+    ///
+    /// # Errors
+    /// [`Error::ExtraOutOfRange`] unless the window has 4..=9 bits.
+    pub const fn check(&self) -> Result<(), Error> {
+        if self.extra_size >= 4 && self.extra_size <= 9 {
+            Ok(())
+        } else {
+            Err(Error::ExtraOutOfRange { extra: self.extra_size })
+        }
+    }
+}
+
+/// What comes next on the line.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Next {
+    /// Stuffing blocks behind the present frame.
+    pub stuffing: u8,
+    /// EXTRA window of the next frame.
+    pub extra: Extra,
+}
+
+/// Keeps the sampling edge of every ES-th frame on the pulse.
+///
+/// The period of the pulse need not be a multiple of anything: whole eighths are spread evenly over the frames of a
+/// pulse, and what is less than an eighth is taken care of by the correction.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Synchroniser {
+    state: ExtraWindow,
+    es: Es,
+    /// Eighths to be spread over the frames of a pulse, less than ES.
+    remainder: u8,
+    /// Number of the present frame in its pulse group, 0 for the one on the pulse.
+    frame: u8,
+    /// Eighths times ES that are due; begins in the middle, so that the edges are at most half an eighth off.
+    spread: u8,
+}
+
+impl Synchroniser {
+    /// Largest correction in one frame, in eighths: as in the vendor's receiver.
+    pub const MAX_CORRECTION: i16 = 6;
+
+    /// For a pulse every `period` eighths of a bit (13.333 ns each) and `es` frames for each of them.
+    ///
+    /// # Errors
+    /// [`Error::PeriodTooShort`], [`Error::ExtraOutOfRange`] for more than 26 stuffing blocks.
+    #[expect(clippy::arithmetic_side_effects, reason = "an ES is not 0")]
+    pub fn new(period: u32, es: Es) -> Result<Self, Error> {
+        let divisor = u32::from(es.0);
+        let (frame, remainder) = (period / divisor, period % divisor);
+        // Window of 25..=72 eighths: 4..=9 bits.
+        let Some(left) = frame.checked_sub(FRAME + 25) else {
+            return Err(Error::PeriodTooShort { missing: (FRAME + 25).abs_diff(frame).div_ceil(8) });
+        };
+        let refuse = Error::ExtraOutOfRange { extra: left / 8 };
+        let window = 25_u8.saturating_add((left % 48).to_le_bytes()[0]);
+        let stuffing = u8::try_from(left / 48).map_err(|_| refuse)?;
+        let edge = Extra::new(window).ok_or(refuse)?;
+        let state = ExtraWindow::new(edge, stuffing, i16::from(window))?;
+        Ok(Self { state, es, remainder: remainder.to_le_bytes()[0], frame: 0, spread: es.0 / 2 })
+    }
+
+    /// Eighths from the start of the first frame to its sampling edge: start that long before a pulse.
+    pub fn lead(&self) -> u32 {
+        // SYNC, the two ones of SAMPLE, then the window.
+        u32::from(self.state.edge.edge()).saturating_add(64)
+    }
+
+    /// The window of the present frame.
+    pub const fn extra(&self) -> Extra {
+        self.state.edge
+    }
+
+    /// Whether the edge of the present frame belongs to a pulse.
+    pub const fn is_on_pulse(&self) -> bool {
+        self.frame == 0
+    }
+
+    /// Stuffing behind the present frame and the window of the next one; to be asked before the stuffing is sent, so
+    /// that an exchange between both does not move the edge.
+    ///
+    /// `late` is time(pulse) - time(edge) in eighths, rounded, if the present frame is on a pulse and the pulse was
+    /// seen: a later pulse makes the next edge later, by [`MAX_CORRECTION`](Self::MAX_CORRECTION) at most. Without
+    /// a pulse the frames run on with the period as it was given.
+    pub fn next(&mut self, late: Option<i16>) -> Next {
+        self.spread = self.spread.saturating_add(self.remainder);
+        let mut adjust = 0;
+        if self.spread >= self.es.0 {
+            self.spread = self.spread.saturating_sub(self.es.0);
+            adjust = 1;
+        }
+        let limit = Self::MAX_CORRECTION;
+        adjust = late.map_or(0, |late| late.clamp(limit.saturating_neg(), limit)).saturating_add(adjust);
+        // At the shortest and longest frames there is no block to give or take: the window stays within its range.
+        while self.state.step(adjust).is_err() && adjust != 0 {
+            adjust = adjust.saturating_sub(adjust.signum());
+        }
+        self.frame = if self.frame.saturating_add(1) >= self.es.0 { 0 } else { self.frame.saturating_add(1) };
+        Next { stuffing: self.state.stuffing, extra: self.state.edge }
+    }
+}
+
+#[cfg(feature = "arbitrary")]
+impl<'a> arbitrary::Arbitrary<'a> for Es {
+    fn arbitrary(from: &mut arbitrary::Unstructured<'a>) -> arbitrary::Result<Self> {
+        from.int_in_range(1..=10).map(Self)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    /// Eighths from the edge of one frame to that of the next.
+    fn distance(before: Extra, next: Next) -> i64 {
+        let rest = i64::from(before.bits()) * 8 - i64::from(before.edge());
+        rest + 864 + 48 * i64::from(next.stuffing) + i64::from(next.extra.edge())
+    }
+
+    proptest! {
+        /// 48 N + W is constant, the edge stays in range and comes after a constant time, limiter or not.
+        #[test]
+        fn invariants(edge in 25..=72_u8, n in 1..26_u8, window in 25..=72_i16, adjust in prop::collection::vec(-2..=2_i16, 60)) {
+            let mut state = ExtraWindow::new(Extra::new(edge).unwrap(), n, window).unwrap();
+            let sum = 48 * i64::from(n) + i64::from(window);
+            let mut t = i64::from((edge - 1) % 8 + 1);
+            for a in adjust {
+                let before = state.extra();
+                if state.step(a).is_err() {
+                    break;
+                }
+                prop_assert_eq!(48 * i64::from(state.stuffing()) + i64::from(state.window()), sum);
+                let next = Next { stuffing: state.stuffing(), extra: state.extra() };
+                prop_assert_eq!(distance(before, next), 864 + sum + i64::from(a));
+                t = (t + i64::from(window) + i64::from(a) - 1).rem_euclid(8) + 1;
+                prop_assert_eq!(i64::from((state.extra().edge() - 1) % 8 + 1), t);
+            }
+        }
+
+        #[test]
+        fn a_refused_step_changes_nothing(edge in 24..=72_u8, n in 0..=26_u8, window in -300..300_i16, adjust in -300..300_i16) {
+            let before = ExtraWindow::new(Extra::new(edge).unwrap(), n, window).unwrap();
+            let mut after = before;
+            if after.step(adjust).is_err() {
+                prop_assert_eq!(after, before);
+            }
+        }
+    }
+
+    /// Runs `pulses` pulses of `period` (in tenths of an eighth) and gives the largest distance of an edge from its
+    /// ideal place after the first `settle` pulses. `jitter` moves the measured pulse.
+    fn worst(period: i64, es: u8, start: i64, pulses: i64, settle: i64, mut jitter: impl FnMut() -> i64) -> i64 {
+        let es_ = Es::new(es).unwrap();
+        let mut sync = Synchroniser::new(u32::try_from(period / 10).unwrap(), es_).unwrap();
+        let mut edge = start;
+        let mut worst = 0;
+        for pulse in 0..pulses {
+            for k in 0..i64::from(es) {
+                let ideal = pulse * period + k * period / i64::from(es);
+                if pulse >= settle {
+                    worst = worst.max((edge - ideal).abs());
+                }
+                assert_eq!(sync.is_on_pulse(), k == 0);
+                let late = ideal + jitter() - edge;
+                let late = (k == 0).then_some((late + 5).div_euclid(10) as i16);
+                let before = sync.extra();
+                edge += 10 * distance(before, sync.next(late));
+            }
+        }
+        worst
+    }
+
+    /// Every 0.1 us of the period from 12 to 27 us a frame and every ES: within an eighth of a bit of the ideal place.
+    #[test]
+    fn every_period_and_every_es() {
+        for es in 1..=10 {
+            let periods = 120 * i64::from(es)..=270 * i64::from(es);
+            for tenths_of_us in periods.step_by(if es > 4 { 3 } else { 1 }) {
+                // 0.1 us is 7.5 eighths.
+                let worst = worst(tenths_of_us * 75, es, 0, 60, 0, || 0);
+                assert!(worst <= 10, "{tenths_of_us} {es}: {worst}");
+            }
+        }
+    }
+
+    /// From any phase the edge is pulled to the pulse, six eighths a frame, also at the ends of the range.
+    #[test]
+    fn pulls_in_from_anywhere() {
+        for (us10, es) in [(120, 1), (121, 1), (200, 1), (270, 1), (250, 2), (625, 5), (1250, 10)] {
+            for start in [-4000, -70, 0, 70, 4000] {
+                assert!(worst(us10 * 75, es, start, 200, 150, || 0) <= 10, "{us10} {es} {start}");
+            }
+        }
+    }
+
+    /// Jitter of the pulse moves the edge by no more than the jitter and an eighth.
+    #[test]
+    fn jitter_is_not_amplified() {
+        let mut seed = 1_u32;
+        let mut noise = move || {
+            seed = seed.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            i64::from(seed >> 16) % 41 - 20
+        };
+        for (us10, es) in [(120, 1), (160, 1), (253, 2), (1250, 10)] {
+            assert!(worst(us10 * 75, es, 0, 2000, 10, &mut noise) <= 31, "{us10} {es}");
+        }
+    }
+
+    #[test]
+    fn outside_the_range() {
+        assert!(matches!(Synchroniser::new(888, Es::ONE), Err(Error::PeriodTooShort { missing: 1 })));
+        assert!(Synchroniser::new(889, Es::ONE).is_ok());
+        assert!(Synchroniser::new(864 + 72 + 26 * 48, Es::ONE).is_ok());
+        assert!(Synchroniser::new(864 + 73 + 26 * 48, Es::ONE).is_err());
+        assert_eq!(Startup::new(1000, CoreClock::Mhz300, Es::ONE), Err(Error::PeriodTooShort { missing: 81 }));
+        assert_eq!((Es::new(0), Es::new(11)), (None, None));
+    }
+}

@@ -1,0 +1,200 @@
+//! The V-frame: eight H-frames carry the two safe channels, a byte each in every answer.
+
+use crate::symbol::{Control, Reading, Rule, Word};
+use crate::{Answer, Error, crc16};
+
+/// The eight bytes of a safe channel.
+///
+/// ```text
+///  H-frame     0          1 ... 5              6, 7
+///  vertical    SUMMARY    VPOS4 ... VPOS0      CRC, high byte first
+///  secondary   STATUS2    VPOS24 ... VPOS20    CRC2          STATUS2 goes as a K28 character
+/// ```
+///
+/// VPOS of a V-frame is the position at the sampling instant of the last H-frame before it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct SafeBlock {
+    bytes: [u8; 8],
+    bad: Option<Word>,
+    top_is_mark: bool,
+}
+
+impl SafeBlock {
+    /// Takes the word of H-frame `at`, 0..=7.
+    pub(crate) fn put(&mut self, at: u8, reading: Reading, mark: Control, rule: Rule) {
+        if at == 0 {
+            *self = Self::default();
+        }
+        if let Some(byte) = self.bytes.get_mut(usize::from(at)) {
+            *byte = reading.raw();
+        }
+        if at == 1 {
+            // The vendor's receiver looks at the value only.
+            self.top_is_mark = match rule {
+                Rule::Strict => reading.is(mark),
+                Rule::Reduced => reading.raw() == mark as u8,
+            };
+        }
+        if reading.is_byte_error() && self.bad.is_none() {
+            self.bad = Some(reading.word());
+        }
+    }
+
+    /// The byte of H-frame 0 as received: SUMMARY of channel 1, STATUS2 of channel 2.
+    pub const fn status(self) -> u8 {
+        let [status, ..] = self.bytes;
+        status
+    }
+
+    /// The position as received, good or not.
+    pub const fn raw_position(self) -> u64 {
+        let [_, p4, p3, p2, p1, p0, ..] = self.bytes;
+        u64::from_be_bytes([0, 0, 0, p4, p3, p2, p1, p0])
+    }
+
+    /// The CRC as received.
+    pub const fn raw_crc(self) -> u16 {
+        let [.., high, low] = self.bytes;
+        u16::from_be_bytes([high, low])
+    }
+
+    /// Whether a word of the block was no good.
+    pub const fn has_byte_error(self) -> bool {
+        self.bad.is_some()
+    }
+
+    /// Whether the CRC of the bytes as received is right.
+    pub fn crc_ok(self) -> bool {
+        let [covered @ .., _, _] = &self.bytes;
+        crc16(covered) == self.raw_crc()
+    }
+
+    /// The safe position, 40 bits.
+    ///
+    /// # Errors
+    /// In this order: [`Error::InvalidWord`] for the first bad word, [`Error::Crc`], [`Error::PositionInvalid`] if the
+    /// encoder has no position: five K29.7 in channel 1, K27.7 first in channel 2. By [`Rule::Reduced`] the value of
+    /// the top byte alone decides that.
+    pub fn position(self) -> Result<u64, Error> {
+        if let Some(word) = self.bad {
+            return Err(Error::InvalidWord { word: word.bits() });
+        }
+        let [covered @ .., _, _] = &self.bytes;
+        let (got, want) = (self.raw_crc(), crc16(covered));
+        if got != want {
+            return Err(Error::Crc { got, want });
+        }
+        if self.top_is_mark {
+            let [_, mark, ..] = self.bytes;
+            return Err(Error::PositionInvalid { mark });
+        }
+        Ok(self.raw_position())
+    }
+}
+
+/// Both safe channels of a V-frame.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct VFrame {
+    /// Vertical channel. Its status byte is SUMMARY: bit n sums up the encoder status register ENC_STn.
+    pub safe1: SafeBlock,
+    /// Secondary channel. Its status byte is STATUS2: TOG2, TEST2, ERR2, FIX2 = 11100b.
+    pub safe2: SafeBlock,
+}
+
+impl VFrame {
+    /// Takes the answer of H-frame `at`, 0..=7; 0 begins anew.
+    pub fn put(&mut self, at: u8, answer: Answer, rule: Rule) {
+        self.safe1.put(at, answer.vertical(), Control::K29_7, rule);
+        self.safe2.put(at, answer.secondary(), Control::K27_7, rule);
+    }
+
+    /// The V-frame of eight answers.
+    pub fn of(answers: &[Answer; 8], rule: Rule) -> Self {
+        let mut frame = Self::default();
+        for (at, answer) in (0..).zip(answers) {
+            frame.put(at, *answer, rule);
+        }
+        frame
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::symbol::{Character, RunningDisparity};
+    use crate::{Content, DeltaDelta, EncoderByte, EncoderSymbol};
+    use proptest::prelude::*;
+
+    fn answers(block1: [Character; 8], block2: [Character; 8]) -> [u64; 8] {
+        let mut rd = RunningDisparity::Minus;
+        core::array::from_fn(|at| {
+            let content = Content {
+                vertical: block1[at],
+                parameter: EncoderByte::of(EncoderSymbol::Idle, at == 7),
+                pipe: Character::control(Control::K30_7),
+                acceleration: Some(DeltaDelta::ZERO),
+                secondary: block2[at],
+            };
+            let (bits, after) = content.emit(rd);
+            rd = after;
+            bits
+        })
+    }
+
+    fn block(first: Character, position: [Character; 5]) -> [Character; 8] {
+        let mut all = [first; 8];
+        all[1..6].copy_from_slice(&position);
+        let bytes: [u8; 6] = core::array::from_fn(|k| all[k].byte());
+        let [high, low] = crc16(&bytes).to_be_bytes().map(Character::data);
+        all[6..].copy_from_slice(&[high, low]);
+        all
+    }
+
+    fn data(position: u64) -> [Character; 5] {
+        let [_, _, _, bytes @ ..] = position.to_be_bytes();
+        bytes.map(Character::data)
+    }
+
+    proptest! {
+        #[test]
+        fn positions_come_back_and_every_flip_is_seen(p1 in 0..1_u64 << 40, p2 in 0..1_u64 << 40, summary: u8, frame in 0..8usize, bit in 0..10_u32, second: bool) {
+            let b1 = block(Character::data(summary), data(p1));
+            let b2 = block(Character::control(Control::K28_4), data(p2));
+            let mut bits = answers(b1, b2);
+            let read = |bits: &[u64; 8]| VFrame::of(&bits.map(|b| Answer::from_bits(b, Rule::Strict)), Rule::Strict);
+            let good = read(&bits);
+            prop_assert_eq!((good.safe1.position(), good.safe1.status()), (Ok(p1), summary));
+            prop_assert_eq!((good.safe2.position(), good.safe2.status()), (Ok(p2), 0x9c));
+            bits[frame] ^= 1 << (bit + if second { 51 } else { 0 });
+            let bad = read(&bits);
+            let (hit, other) = if second { (bad.safe2, bad.safe1) } else { (bad.safe1, bad.safe2) };
+            prop_assert!(other.position().is_ok());
+            // A flip of one line bit changes up to five bits of one byte: in the covered bytes the CRC sees it, and
+            // a changed kind (data or special) of the same value changes nothing.
+            if let Ok(position) = hit.position() {
+                prop_assert_eq!(position, if second { p2 } else { p1 });
+            }
+        }
+    }
+
+    #[test]
+    fn marks_for_no_position() {
+        let b1 = block(Character::data(1), [Character::control(Control::K29_7); 5]);
+        let mut none2 = data(0);
+        none2[0] = Character::control(Control::K27_7);
+        let b2 = block(Character::control(Control::K28_0), none2);
+        let bits = answers(b1, b2);
+        for rule in [Rule::Strict, Rule::Reduced] {
+            let frame = VFrame::of(&bits.map(|b| Answer::from_bits(b, rule)), rule);
+            assert_eq!(frame.safe1.position(), Err(Error::PositionInvalid { mark: 0xfd }));
+            assert_eq!(frame.safe2.position(), Err(Error::PositionInvalid { mark: 0xfb }));
+        }
+        // A signed position may begin with FDh: by the tables that is no mark.
+        let bits = answers(block(Character::data(0), data(0xfd_0000_0001)), b2);
+        let frame = |rule| VFrame::of(&bits.map(|b| Answer::from_bits(b, rule)), rule).safe1.position();
+        assert_eq!(frame(Rule::Strict), Ok(0xfd_0000_0001));
+        assert_eq!(frame(Rule::Reduced), Err(Error::PositionInvalid { mark: 0xfd }));
+    }
+}

@@ -1,0 +1,248 @@
+//! HIPERFACE DSL: symbols, answers, checks, position, messages, sync, and both machines.
+
+use hdsl::device::Device;
+use hdsl::frame::{Extra, Head, Received};
+use hdsl::line::{Disturbance, Line};
+use hdsl::master::{Counters, Master};
+use hdsl::message::{Access, Data, Length, LongRequest, RemoteRegister, ResourceAddress, ShortAnswer, ShortRequest};
+use hdsl::registers::{Event, EventS, Register};
+use hdsl::rssi::Rssi;
+use hdsl::sampling::{Alignment, EdgeRule, TEST_PATTERN, WINDOW};
+use hdsl::symbol::{Character, DisparityCheck, DisparityStatus, Reading, RunningDisparity, Word};
+use hdsl::sync::{CoreClock, Es, Next, Startup, Synchroniser};
+use hdsl::{
+    Answer, Content, DeltaDelta, EncoderByte, EncoderId, EncoderSymbol, Error, Estimator, LineDisparity, MasterSymbol,
+    ParameterByte, PositionBits, PositionTracker, Profile, QualityEvent, QualityMonitor, QualityRule, Rule, VFrame,
+    crc16,
+};
+
+use super::kernels;
+use crate::self_test::hdsl::{ANSWERS, WORDS};
+
+/// Words of the code and others.
+const SYMBOLS: [u64; 8] = {
+    let mut words = [0; 8];
+    let mut at = 0;
+    while at < 8 {
+        words[at] = WORDS[at * 117].word;
+        at += 1;
+    }
+    words
+};
+
+/// Undamaged answers.
+const LINES: [u64; 8] = {
+    let mut lines = [0; 8];
+    let mut at = 0;
+    while at < 8 {
+        lines[at] = ANSWERS[at].bits;
+        at += 1;
+    }
+    lines
+};
+
+/// Two groups of answers for a V-frame.
+const GROUPS: [[u64; 8]; 2] = [LINES, [LINES[3]; 8]];
+
+/// Message bytes: 32 of them.
+const BLOCKS: [[u8; 32]; 2] = [[0xa5; 32], *b"ROOT RESOLUTN EESIZE UWARNING   "];
+
+/// The samples of an answer after a delay, in eighths.
+const fn samples(bits: u64, delay: usize) -> [u8; WINDOW] {
+    let mut all = [0xff; WINDOW];
+    let mut at = 0;
+    while at < WINDOW * 8 {
+        if at >= delay && (at - delay) / 8 < 61 && bits >> ((at - delay) / 8) & 1 == 0 {
+            all[at / 8] &= !(0x80 >> (at % 8));
+        }
+        at += 1;
+    }
+    all
+}
+
+const PATTERNS: [[u8; WINDOW]; 3] = [samples(TEST_PATTERN, 5), samples(TEST_PATTERN, 42), samples(LINES[0], 20)];
+
+/// Values of the acceleration channel, present or not.
+const ACCELERATIONS: [[Option<i16>; 4]; 2] =
+    [[Some(0), Some(-5), Some(1023), Some(7)], [Some(300), None, None, Some(-1024)]];
+
+/// Parameter byte, EXTRA edge, line disparity.
+const HEADS: [(u8, u8, i8); 4] = [(0xd0, 0, 0), (0x1f, 0, -2), (0x90, 40, 5), (0x8c, 71, 9)];
+
+const PERIODS: [(u32, u8); 4] = [(900, 1), (1500, 2), (20_000, 10), (5, 1)];
+
+/// Frames of a whole link.
+const LINKS: [u32; 1] = [130];
+
+fn content(word: u64) -> Content {
+    Content {
+        vertical: Character::data(word.to_le_bytes()[0]),
+        parameter: EncoderByte::of(EncoderSymbol::Idle, word & 1 == 1),
+        pipe: Character::control(hdsl::symbol::Control::K30_7),
+        acceleration: Some(DeltaDelta::clamp(i64::from(word.to_le_bytes()[1]))),
+        secondary: Character::data(word.to_le_bytes()[2]),
+    }
+}
+
+kernels! {
+    /// A word by the strict tables.
+    fn hdsl_symbol(word: &u64) -> Reading {
+        Word::truncate(*word).read(Rule::Strict)
+    } over SYMBOLS;
+
+    /// A word by the reduced rule.
+    fn hdsl_symbol_reduced(word: &u64) -> Reading {
+        Word::truncate(*word).read(Rule::Reduced)
+    } over SYMBOLS;
+
+    /// A byte to a word.
+    fn hdsl_symbol_encode(word: &u64) -> (Word, RunningDisparity) {
+        Character::data(word.to_le_bytes()[0]).encode(RunningDisparity::Plus)
+    } over SYMBOLS;
+
+    /// The running disparity of a word.
+    fn hdsl_disparity(word: &u64) -> DisparityStatus {
+        DisparityCheck::new(RunningDisparity::Minus).step(Word::truncate(*word))
+    } over SYMBOLS;
+
+    /// 61 bits to six judged words and the checked acceleration.
+    fn hdsl_answer(line: &u64) -> (Answer, Result<DeltaDelta, Error>) {
+        let answer = Answer::from_bits(*line, Rule::Strict);
+        (answer, answer.delta_delta())
+    } over LINES;
+
+    /// An answer to send.
+    fn hdsl_answer_emit(word: &u64) -> (u64, RunningDisparity) {
+        content(*word).emit(RunningDisparity::Minus)
+    } over LINES;
+
+    /// Eight answers to both safe positions.
+    fn hdsl_v_frame(lines: &[u64; 8]) -> (Result<u64, Error>, Result<u64, Error>) {
+        let frame = VFrame::of(&lines.map(|line| Answer::from_bits(line, Rule::Strict)), Rule::Strict);
+        (frame.safe1.position(), frame.safe2.position())
+    } over GROUPS;
+
+    /// The identifier of an encoder.
+    fn hdsl_encoder_id(line: &u64) -> Result<PositionBits, Error> {
+        EncoderId::from_answer(Answer::from_bits(*line, Rule::Strict)).and_then(EncoderId::check)
+    } over LINES;
+
+    /// CRC-16 over 32 bytes.
+    fn hdsl_crc16_32(bytes: &[u8; 32]) -> u16 {
+        crc16(bytes)
+    } over BLOCKS;
+
+    /// Four steps of the position and an alignment.
+    fn hdsl_position(values: &[Option<i16>; 4]) -> (u64, i32) {
+        let mut tracker = PositionTracker::new(PositionBits::MAX);
+        for value in values {
+            tracker.step(value.and_then(DeltaDelta::new));
+        }
+        tracker.align(12_345);
+        (tracker.position(), tracker.velocity())
+    } over ACCELERATIONS;
+
+    /// The same with the estimator of the SDK.
+    fn hdsl_position_ti(values: &[Option<i16>; 4]) -> (u64, i32) {
+        let mut tracker = PositionTracker::with_estimator(PositionBits::MAX, Estimator::Wrapping16);
+        for value in values {
+            tracker.step(value.and_then(DeltaDelta::new));
+        }
+        tracker.no_safe_position();
+        (tracker.position(), tracker.velocity())
+    } over ACCELERATIONS;
+
+    /// One event of the quality monitor.
+    fn hdsl_quality(word: &u64) -> u8 {
+        let mut monitor = QualityMonitor::new(QualityRule::Sick);
+        monitor.count(if word & 1 == 1 { QualityEvent::VsyncOk } else { QualityEvent::Safe1Error });
+        monitor.value()
+    } over SYMBOLS;
+
+    /// The head of a frame, and what an encoder reads of it.
+    fn hdsl_head((byte, edge, disparity): &(u8, u8, i8)) -> Result<Received, Error> {
+        let (head, _) = Head::new(ParameterByte::new(*byte), Extra::new(*edge), LineDisparity(*disparity));
+        Head::parse(head.bits())
+    } over HEADS;
+
+    /// The head as samples.
+    fn hdsl_head_samples((byte, edge, disparity): &(u8, u8, i8)) -> u8 {
+        let (head, _) = Head::new(ParameterByte::new(*byte), Extra::new(*edge), LineDisparity(*disparity));
+        head.samples().fold(0, |all, byte| all ^ byte)
+    } over HEADS;
+
+    /// Sampling index and delay from the test pattern.
+    fn hdsl_learn(samples: &[u8; WINDOW]) -> Result<Alignment, Error> {
+        Alignment::learn(samples, EdgeRule::Leading)
+    } over PATTERNS;
+
+    /// The bits and the RSSI of an answer at a learned place.
+    fn hdsl_sampled(samples: &[u8; WINDOW]) -> (Result<u64, Error>, Option<Rssi>) {
+        let place = Alignment::learn(&PATTERNS[0], EdgeRule::All);
+        (place.and_then(|place| place.bits(samples)), place.ok().map(|place| place.rssi(samples)))
+    } over PATTERNS;
+
+    /// A short message there and back.
+    fn hdsl_short(word: &u64) -> Result<ShortAnswer, Error> {
+        let request = ShortRequest::Read(RemoteRegister::of_index(word.to_le_bytes()[0]));
+        let request = ShortRequest::parse(request.emit().as_bytes())?;
+        let answer = ShortAnswer { register: request.register(), data: Some(word.to_le_bytes()[1]) };
+        request.parse_answer(answer.emit().as_bytes())
+    } over SYMBOLS;
+
+    /// A long message there and its answer.
+    fn hdsl_long(bytes: &[u8; 32]) -> Result<Data, Error> {
+        let access = Access::Write(Data::new(&bytes[..8])?);
+        let request = LongRequest { address: ResourceAddress::USER, indirect: true, offset: None, access };
+        LongRequest::parse(request.emit().as_bytes())?.parse_answer(bytes)
+    } over BLOCKS;
+
+    /// Ten frames in sync mode.
+    fn hdsl_sync((period, es): &(u32, u8)) -> Result<Next, Error> {
+        let mut sync = Synchroniser::new(*period, Es::try_from(*es)?)?;
+        for late in 0..9 {
+            sync.next(Some(late));
+        }
+        Ok(sync.next(None))
+    } over PERIODS;
+
+    /// The start-up arithmetic of sync mode.
+    fn hdsl_sync_startup((period, es): &(u32, u8)) -> Result<Startup, Error> {
+        Startup::new(*period * 4, CoreClock::Mhz300, Es::try_from(*es)?)
+    } over PERIODS;
+
+    /// A whole link from RESET to two V-frames after lock, with messages: master, line and encoder.
+    fn hdsl_link(frames: &u32) -> Result<(Counters, u64), Error> {
+        let mut master = Master::new(Profile::SICK);
+        let mut encoder = Device::new(EncoderId::try_from(0x00153)?);
+        let mut line = Line::new(Disturbance { jitter: 1, ..Disturbance::cable(10) }, 1);
+        for frame in 0..*frames {
+            let head = line.down(master.transmission().head.bits());
+            let samples = line.up(encoder.answer(head, u64::from(frame)));
+            if frame == 80 {
+                let _ = master.start_short(ShortRequest::Read(RemoteRegister::PING));
+                let access = Access::Read(Length::Eight);
+                let address = ResourceAddress::RESOLUTN;
+                let _ = master.start_long(LongRequest { address, indirect: false, offset: None, access });
+            }
+            let _ = master.finish(&samples, None)?;
+        }
+        Ok((master.counters(), master.registers().position()))
+    } over LINKS;
+
+    /// What an application does with registers.
+    fn hdsl_registers(word: &u64) -> (Event, EventS, Option<u8>) {
+        let mut master = Master::new(Profile::TI);
+        let [address, value, ..] = word.to_le_bytes();
+        let _ = master.write(address, value);
+        let _ = master.write(Register::SysCtrl as u8, 0xc0);
+        let (event, event_s) = master.take_events();
+        (event, event_s, master.registers().byte(address))
+    } over SYMBOLS;
+
+    /// Symbols of both directions.
+    fn hdsl_parameter(word: &u64) -> (Result<MasterSymbol, Error>, Result<EncoderSymbol, Error>) {
+        let [byte, ..] = word.to_le_bytes();
+        (ParameterByte::new(byte).symbol(), EncoderByte::new(byte).symbol())
+    } over SYMBOLS;
+}

@@ -1,0 +1,323 @@
+//! Frames, answers, V-frames and sampling.
+
+use hdsl::frame::{Extra, Head};
+use hdsl::rssi::{Rssi, edges as edge_byte, longest_gap};
+use hdsl::sampling::{Alignment, EdgeRule, SampleIndex, TEST_PATTERN};
+use hdsl::symbol::{Character, Reading, Rule};
+use hdsl::{Answer, Content, DeltaDelta, EncoderByte, Error, LineDisparity, ParameterByte, SafeBlock, VFrame};
+use serde::Deserialize;
+
+use super::{Line, Pair, character, disparity, sign};
+use crate::hex::{Bytes, Hex};
+use crate::row::{Row, Verdict, each, same};
+
+#[derive(Deserialize)]
+#[serde(tag = "kind", rename_all = "snake_case", deny_unknown_fields)]
+enum MasterHeader {
+    Equalisation { d_in: i8, eq: Line, d_out: i8 },
+    Free { param: Hex, d_in: i8, bits: Line, d_out: i8 },
+    Sync { param: Hex, edge_eighths: u8, window_bits: u8, eq: Line, para: Line, samples: Bytes },
+}
+
+pub(super) fn master_header(rows: &[Row]) -> Vec<Verdict> {
+    each(rows, |row: MasterHeader| match row {
+        MasterHeader::Equalisation { d_in, eq, d_out } => {
+            same("eq and d_out", &(eq.bits as u8, LineDisparity(d_out)), &LineDisparity(d_in).equalisation())
+        }
+        MasterHeader::Free { param, d_in, bits, d_out } => {
+            let byte = ParameterByte::new(param.0 as u8);
+            let (head, after) = Head::new(byte, None, LineDisparity(d_in));
+            same("bits", &bits.window(), &head.bits())?;
+            same("d_out", &LineDisparity(d_out), &after)?;
+            same("param", &Ok(byte), &Head::parse(bits.window()).map(|got| got.byte))
+        }
+        MasterHeader::Sync { param, edge_eighths, window_bits, eq, para, samples } => {
+            let byte = ParameterByte::new(param.0 as u8);
+            let extra = Extra::new(edge_eighths);
+            same("window_bits", &Some(window_bits), &extra.map(Extra::bits))?;
+            let (head, _) = Head::new(byte, extra, LineDisparity::ZERO.with_ones(window_bits));
+            same("eq", &(eq.bits as u8), &head.equalisation())?;
+            same("para", &para.word(), &head.para())?;
+            same("samples", &samples.0, &head.samples().collect())?;
+            let got = Head::parse(head.bits()).map(|got| (got.byte, got.extra_bits));
+            same("param", &Ok((byte, u32::from(window_bits))), &got)
+        }
+    })
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct AnswerRow {
+    bits: Line,
+    switch_ok: Option<bool>,
+    fields: Option<Vec<Field>>,
+    acc: Option<String>,
+    dd: Option<i16>,
+    rd_in: Option<i8>,
+    sent: Option<Sent>,
+    rd_out: Option<i8>,
+    flip: Option<u32>,
+    #[serde(default)]
+    truncated: bool,
+    error: Option<String>,
+}
+
+#[derive(Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Field {
+    strict: Option<Pair>,
+    byte: Hex,
+    byte_error: bool,
+    special: bool,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Sent {
+    vertical: Hex,
+    parameter: Hex,
+    pipe: Pair,
+    acc: Hex,
+    acc_k: bool,
+    secondary: Pair,
+}
+
+fn field(strict: Reading, reduced: Reading) -> Field {
+    Field {
+        strict: strict.byte().ok().map(|byte| (Hex(byte.into()), strict.is_special())),
+        byte: Hex(reduced.raw().into()),
+        byte_error: reduced.is_byte_error(),
+        special: reduced.is_special(),
+    }
+}
+
+fn acceleration_class(answer: Answer) -> &'static str {
+    match answer.delta_delta() {
+        Ok(_) => "ok",
+        Err(Error::InvalidWord { .. }) => "byte_error",
+        Err(Error::EncoderError) => "encoder_error",
+        Err(Error::AccelerationCrc { .. }) => "crc_error",
+        Err(_) => "unexpected",
+    }
+}
+
+pub(super) fn answer(rows: &[Row]) -> Vec<Verdict> {
+    each(rows, |row: AnswerRow| {
+        let line = row.bits.window();
+        if row.truncated {
+            let error = match Answer::parse(line, Rule::Strict) {
+                Err(Error::Truncated { .. }) => Some("truncated".to_owned()),
+                _ => None,
+            };
+            return same("error", &row.error, &error);
+        }
+        let (Ok(strict), Ok(reduced)) = (Answer::parse(line, Rule::Strict), Answer::parse(line, Rule::Reduced)) else {
+            return same("accepted", &true, &false);
+        };
+        same("error", &row.error, &None)?;
+        let fields: Vec<_> = strict.words().into_iter().zip(reduced.words()).map(|(s, r)| field(s, r)).collect();
+        same("fields", &row.fields, &Some(fields))?;
+        same("switch_ok", &row.switch_ok, &Some(strict.switch_ok()))?;
+        same("acc", &row.acc.as_deref(), &Some(acceleration_class(reduced)))?;
+        same("dd", &row.dd, &reduced.delta_delta().ok().map(DeltaDelta::get))?;
+        if let (Some(sent), Some(rd_in)) = (&row.sent, row.rd_in) {
+            let dd = if sent.acc_k { None } else { DeltaDelta::from_word(sent.acc.0 as u16).ok() };
+            let content = Content {
+                vertical: Character::data(sent.vertical.0 as u8),
+                parameter: EncoderByte::new(sent.parameter.0 as u8),
+                pipe: character(sent.pipe)?,
+                acceleration: dd,
+                secondary: character(sent.secondary)?,
+            };
+            let (bits, rd) = content.emit(disparity(rd_in));
+            let bits = bits ^ row.flip.map_or(0, |flip| 1 << flip);
+            same("bits", &row.bits.bits, &bits.into())?;
+            same("rd_out", &row.rd_out, &Some(sign(rd)))?;
+        }
+        Ok(())
+    })
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct VFrameRow {
+    frames: Vec<Line>,
+    safe1: String,
+    summary: Hex,
+    vpos: Hex,
+    crc1: Hex,
+    safe2: String,
+    status2: Hex,
+    vpos2: Hex,
+    crc2: Hex,
+    vsync: Vec<Option<bool>>,
+}
+
+fn safe_class(block: SafeBlock) -> &'static str {
+    match block.position() {
+        Ok(_) => "ok",
+        Err(Error::InvalidWord { .. }) => "byte_error",
+        Err(Error::Crc { .. }) => "crc_error",
+        Err(Error::PositionInvalid { .. }) => "position_invalid",
+        Err(_) => "unexpected",
+    }
+}
+
+fn safe_bytes(block: SafeBlock) -> [Hex; 3] {
+    [Hex(block.status().into()), Hex(block.raw_position()), Hex(block.raw_crc().into())]
+}
+
+pub(super) fn vframe(rows: &[Row]) -> Vec<Verdict> {
+    each(rows, |row: VFrameRow| {
+        let answers: Vec<_> = row.frames.iter().map(|f| Answer::from_bits(f.bits as u64, Rule::Reduced)).collect();
+        let Ok(answers) = <[Answer; 8]>::try_from(answers) else { return same("frames", &8, &row.frames.len()) };
+        let frame = VFrame::of(&answers, Rule::Reduced);
+        same("safe1", &row.safe1.as_str(), &safe_class(frame.safe1))?;
+        same("summary, vpos, crc1", &[row.summary, row.vpos, row.crc1], &safe_bytes(frame.safe1))?;
+        same("safe2", &row.safe2.as_str(), &safe_class(frame.safe2))?;
+        same("status2, vpos2, crc2", &[row.status2, row.vpos2, row.crc2], &safe_bytes(frame.safe2))?;
+        same("vsync", &row.vsync, &answers.iter().map(|a| a.parameter().ok().map(EncoderByte::vsync)).collect())
+    })
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Learn {
+    #[serde(rename = "kind")]
+    _kind: String,
+    samples: Bytes,
+    time_index: Option<u8>,
+    delay: Option<u8>,
+    error: Option<String>,
+    delay_eighths: Option<u32>,
+    jitter: Option<u32>,
+    flip: Option<u32>,
+}
+
+/// A line at eight samples a bit that carries `bits` after `delay` eighths, ones before and behind.
+fn sampled(bits: u64, delay: u32, bytes: usize) -> Vec<u8> {
+    let level = |at: u32| at.checked_sub(delay).filter(|at| at / 8 < 61).is_none_or(|at| bits >> (at / 8) & 1 == 1);
+    (0..bytes as u32).map(|byte| (0..8).fold(0, |b, k| b << 1 | u8::from(level(byte * 8 + k)))).collect()
+}
+
+pub(super) fn learn(rows: &[Row]) -> Vec<Verdict> {
+    each(rows, |row: Learn| {
+        let samples = row.samples.0;
+        if let (Some(delay), None) = (row.delay_eighths, row.jitter) {
+            let pattern = TEST_PATTERN ^ row.flip.map_or(0, |flip| 1 << flip);
+            same("samples", &samples, &sampled(pattern, delay, samples.len()))?;
+        }
+        let (index, delay, error) = match Alignment::learn(&samples, EdgeRule::All) {
+            Ok(found) => (Some(found.index.get()), Some(found.delay), None),
+            Err(Error::PatternNotFound { index }) => (Some(index), None, Some("pattern_not_found")),
+            Err(Error::NoEdge) => (None, None, Some("no_edge")),
+            Err(_) => (None, None, Some("unexpected")),
+        };
+        same("error", &row.error.as_deref(), &error)?;
+        same("time_index", &row.time_index, &index)?;
+        same("delay", &row.delay, &delay)
+    })
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct SampledAnswer {
+    delay_eighths: u32,
+    jitter: u32,
+    glitches: Vec<u32>,
+    time_index: u8,
+    delay: u8,
+    samples: Bytes,
+    sent: Line,
+    bits: Line,
+    bit_errors: u32,
+    rssi: u8,
+}
+
+pub(super) fn sampled_answer(rows: &[Row]) -> Vec<Verdict> {
+    each(rows, |row: SampledAnswer| {
+        let samples = row.samples.0;
+        if row.jitter == 0 && row.glitches.is_empty() {
+            same("samples", &samples, &sampled(row.sent.bits as u64, row.delay_eighths, samples.len()))?;
+        }
+        let index = SampleIndex::new(row.time_index);
+        let Some(index) = index else { return same("time_index", &true, &false) };
+        let alignment = Alignment { index, delay: row.delay };
+        let Ok(bits) = alignment.bits(&samples) else { return same("complete", &true, &false) };
+        same("bits", &row.bits.bits, &bits.into())?;
+        same("bit_errors", &row.bit_errors, &(u128::from(bits) ^ row.sent.bits).count_ones())?;
+        same("rssi", &row.rssi, &alignment.rssi(&samples).get())
+    })
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct RssiRow {
+    edges: Hex,
+    longest: Option<u8>,
+    rssi: u8,
+    ti_lut: u8,
+}
+
+pub(super) fn rssi(rows: &[Row]) -> Vec<Verdict> {
+    each(rows, |row: RssiRow| {
+        let edges = row.edges.0 as u8;
+        same("longest", &row.longest, &longest_gap(edges))?;
+        same("rssi", &row.rssi, &Rssi::of_edges(edges).get())?;
+        same("ti_lut", &row.ti_lut, &Rssi::of_edges_ti(edges).get())
+    })
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Edges {
+    prev_last_sample: u8,
+    samples: Hex,
+    #[serde(rename = "edges")]
+    edge_byte: Hex,
+    rssi: u8,
+}
+
+pub(super) fn edges(rows: &[Row]) -> Vec<Verdict> {
+    each(rows, |row: Edges| {
+        let edges = edge_byte(row.prev_last_sample == 1, row.samples.0 as u8);
+        same("edges", &row.edge_byte, &Hex(edges.into()))?;
+        same("rssi", &row.rssi, &Rssi::of_edges(edges).get())
+    })
+}
+
+#[derive(Deserialize)]
+#[serde(tag = "kind", rename_all = "snake_case")]
+enum SampleEdge {
+    Falling(Edge),
+    Rising(Edge),
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Edge {
+    samples: Hex,
+    ones: u32,
+    #[serde(rename = "E")]
+    e: u8,
+    time_index: u8,
+    lsb_index: u8,
+}
+
+pub(super) fn sample_edge(rows: &[Row]) -> Vec<Verdict> {
+    each(rows, |row: SampleEdge| {
+        let (edge, index, e) = match row {
+            SampleEdge::Falling(edge) => {
+                let index = SampleIndex::after_falling_edge(edge.samples.0 as u8);
+                (edge, index, index.get())
+            }
+            SampleEdge::Rising(edge) => {
+                let index = SampleIndex::after_rising_edge(edge.samples.0 as u8);
+                (edge, index, 7 - index.get())
+            }
+        };
+        same("ones", &edge.ones, &(edge.samples.0 as u8).count_ones())?;
+        same("E", &edge.e, &e)?;
+        same("time_index, lsb_index", &(edge.time_index, edge.lsb_index), &(index.get(), 7 - index.get()))
+    })
+}
