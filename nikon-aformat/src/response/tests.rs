@@ -169,3 +169,31 @@ proptest! {
         prop_assert_eq!(got, want);
     }
 }
+
+/// Every single wrong bit and every truncation of the reply to every operation: all fifteen layouts.
+#[test]
+fn every_flip_and_truncation_of_every_layout() {
+    let odd = Profile::default().low_with_velocity().resets_with_position();
+    let mut seen = Vec::new();
+    for profile in [Profile::default(), odd] {
+        for operation in crate::request::tests::every(0x5a, 3, 0xbeef, 0x12_3456) {
+            let request = Request::new(EncoderAddress::truncate(5), operation);
+            let (expected, es) = (request.expected(profile), EncoderStatus::new(9));
+            let line = answer(request, profile, es, 0x0123_4567_89ab_cdef, 0xfedc_ba98_7654_3210).emit().line();
+            seen.push(expected.layout());
+            for at in 0..line.len() {
+                let error = Response::parse_line(flipped(line, at), &expected).unwrap_err();
+                let frame = (at / 18) as u8;
+                match at % 18 {
+                    0 => assert_eq!(error, Error::StartBit { frame }),
+                    17 => assert_eq!(error, Error::Delimiter { frame }),
+                    _ => assert!(matches!(error, Error::Crc { .. }), "{operation:?}, bit {at}: {error}"),
+                }
+                let short = Window::from_bits(line.bits(), at).unwrap();
+                let want = Error::Truncated { got: at as u16, want: line.len() as u16 };
+                assert_eq!(Response::parse_line(short, &expected), Err(want));
+            }
+        }
+    }
+    assert!(Layout::ALL.into_iter().all(|layout| seen.contains(&layout)));
+}
