@@ -1,0 +1,199 @@
+use super::*;
+use crate::request::tests::requests;
+use crate::{Echo, Operation, Profile, Request};
+use proptest::prelude::*;
+use std::vec::Vec;
+
+/// Data of `layout` out of random numbers, never a bank error; `None` for the short form.
+pub(crate) fn data(layout: Layout, a: u64, b: u64) -> Option<Data> {
+    match Data::from_bits(layout, u128::from(a) | u128::from(b) << 64) {
+        Some(Data::EepromBank { data, bank, address, .. }) => {
+            Some(Data::EepromBank { data, bank, address, bank_error: false })
+        }
+        other => other,
+    }
+}
+
+/// The response of a sound encoder to `request`, its data out of random numbers and the arguments repeated.
+pub(crate) fn answer(request: Request, profile: Profile, es: EncoderStatus, a: u64, b: u64) -> Response {
+    let layout = request.layout(profile);
+    let Some(data) = data(layout, a, b) else {
+        return Response::abs17(request.ea, es, U17::truncate(a as u32));
+    };
+    let data = match (request.operation, data) {
+        (Operation::EepromRead { address }, Data::Eeprom { data, .. }) => Data::Eeprom { data, address },
+        (Operation::EepromWrite { address, data }, _) => Data::Eeprom { data, address: address.get() },
+        (Operation::EepromReadBank { bank, address }, Data::EepromBank { data, .. })
+        | (Operation::EepromWriteBank { bank, address, data }, _) => {
+            Data::EepromBank { data, bank, address, bank_error: false }
+        }
+        (Operation::IdWrite1 { id } | Operation::IdWrite2 { id } | Operation::SetAddress2 { id }, _) => Data::Id { id },
+        (Operation::CoefficientWrite { coefficient }, _) => Data::Coefficient { coefficient },
+        (_, data) => data,
+    };
+    Response::new(request.ea, request.command(), es, data)
+}
+
+pub(crate) fn profiles() -> impl Strategy<Value = Profile> {
+    any::<[bool; 2]>().prop_map(|[low, reset]| {
+        let profile = Profile::default();
+        let profile = if low { profile.low_with_velocity() } else { profile };
+        if reset { profile.resets_with_position() } else { profile }
+    })
+}
+
+/// A request, what is expected and an answer that a sound encoder may give.
+pub(crate) fn exchanges() -> impl Strategy<Value = (Request, Expected, Response)> {
+    (requests(), profiles(), any::<(u8, u64, u64)>()).prop_map(|(request, profile, (es, a, b))| {
+        let response = answer(request, profile, EncoderStatus::new(es), a, b);
+        (request, request.expected(profile), response)
+    })
+}
+
+fn flipped(line: Window, at: u32) -> Window {
+    Window::from_bits(line.bits() ^ 1 << at, line.len()).unwrap()
+}
+
+/// Single-turn position, turns and CRC-8 of 16 replies to command 0 that a vendor's sample program logged
+/// (20 + 20 bits, the turns 0x8888 in all). The log prints the CRC-8 least significant bit first.
+const LOGGED: [(u64, u8); 2] = [(0xf_ffa5, 0x63), (0xf_ffb4, 0x49)];
+
+#[test]
+fn published_replies() {
+    let expected = Expected::new(Layout::Abs24, Command::Abs24Low);
+    let reply = Response::parse_words(&[0x3e03, 0x00ef, 0xdf35], BitOrder::MsbFirst, &expected).unwrap();
+    assert_eq!((reply.ea.get(), reply.abs(), reply.es().map(EncoderStatus::raw)), (7, Some(0xfb_f700), Some(0xc)));
+    let expected = Expected::new(Layout::Abs40, Command::Abs40Mt);
+    let reply = Response::parse_words(&[0x2085, 0xf64a, 0x8009, 0x80a1], BitOrder::MsbFirst, &expected).unwrap();
+    assert_eq!((reply.ea.get(), reply.es().map(EncoderStatus::raw)), (0, Some(0xa)));
+    assert_eq!(reply.abs(), Some(51_200 << 17 | 0x1_526f));
+    for (single, printed) in LOGGED {
+        let data = Data::Abs40 { abs: U40::truncate(0x8888 << 20 | single) };
+        let response = Response::new(EncoderAddress::ZERO, Command::Abs40, EncoderStatus::NONE, data);
+        assert_eq!(response.emit().crc().0.reverse_bits(), printed, "{single:x}");
+    }
+}
+
+proptest! {
+    #[test]
+    fn words_and_line_round_trip((request, expected, response) in exchanges(), tail: u16) {
+        let reply = response.emit();
+        prop_assert_eq!(Response::parse(&reply, &expected), Ok(response));
+        prop_assert_eq!(reply.frames(), response.layout().frames());
+        prop_assert_eq!(response.layout(), expected.layout());
+        prop_assert_eq!(response.ea, request.ea);
+        let line = reply.line();
+        let behind = Window::from_bits(line.bits() | u128::from(tail) << line.len(), (line.len() + 16).min(128)).unwrap();
+        prop_assert_eq!(Response::parse_line(behind, &expected), Ok(response));
+        for order in [BitOrder::LsbFirst, BitOrder::MsbFirst] {
+            let mut words: Vec<_> = reply.words(order).collect();
+            words.push(tail);
+            prop_assert_eq!(Response::parse_words(&words, order, &expected), Ok(response));
+        }
+    }
+
+    /// What is accepted is what would be sent, but for unused bits.
+    #[test]
+    fn accepted_words_are_what_it_would_emit((_, expected, response) in exchanges(), noise: [u16; 6]) {
+        let good = response.emit();
+        let mut contents = [0; 6];
+        for (k, to) in contents.iter_mut().enumerate().take(good.contents().len()) {
+            *to = if k == 0 { good.contents()[0] } else { noise[k] };
+        }
+        let reply = Reply::of(contents, expected.layout()).sealed();
+        let expected = expected.any_address().echoing(Echo::None);
+        match Response::parse(&reply, &expected) {
+            Ok(got) => {
+                let again = got.emit();
+                prop_assert_eq!(Response::parse(&again, &expected), Ok(got));
+                let unused = [Layout::Temperature, Layout::Coefficient, Layout::Abs24Temp, Layout::EepromBank];
+                prop_assert!(again == reply || unused.contains(&expected.layout()));
+            }
+            Err(error) => prop_assert_eq!(error, Error::BankError),
+        }
+    }
+
+    /// Every single wrong bit of the line is refused, by the check that covers it.
+    #[test]
+    fn single_flips_on_the_line((_, expected, response) in exchanges()) {
+        let line = response.emit().line();
+        for at in 0..line.len() {
+            let error = Response::parse_line(flipped(line, at), &expected).unwrap_err();
+            let frame = (at / 18) as u8;
+            let right = match at % 18 {
+                0 => error == Error::StartBit { frame },
+                17 => error == Error::Delimiter { frame },
+                _ => matches!(error, Error::Crc { .. }),
+            };
+            prop_assert!(right, "bit {}: {:?}", at, error);
+        }
+    }
+
+    #[test]
+    fn truncations((_, expected, response) in exchanges()) {
+        let reply = response.emit();
+        let line = reply.line();
+        for got in 0..line.len() {
+            let short = Window::from_bits(line.bits(), got).unwrap();
+            let error = Error::Truncated { got: got as u16, want: line.len() as u16 };
+            prop_assert_eq!(Response::parse_line(short, &expected), Err(error));
+        }
+        for got in 0..reply.frames() {
+            let error = Error::Truncated { got: u16::from(got) * 18, want: line.len() as u16 };
+            let words = &reply.contents()[..usize::from(got)];
+            prop_assert_eq!(Response::parse_words(words, BitOrder::LsbFirst, &expected), Err(error));
+        }
+    }
+
+    /// Wrong sync code, fixed bit, address or command under a good CRC-8, in the order of the checks.
+    #[test]
+    fn wrong_information_fields((_, expected, response) in exchanges(), first: u16) {
+        let mut contents = [0; 6];
+        contents[..usize::from(expected.layout().frames())].copy_from_slice(response.emit().contents());
+        contents[0] = first;
+        let reply = Reply::of(contents, expected.layout()).sealed();
+        let full = expected.layout() != Layout::Abs17;
+        let (sync, ea, cc) = ((first & 7) as u8, (first >> 3 & 7) as u8, (first >> 6 & 31) as u8);
+        let got = Response::parse(&reply, &expected).err();
+        let want = if sync != 4 {
+            Some(Error::SyncCode { got: sync })
+        } else if full && first >> 11 & 1 == 1 {
+            Some(Error::FixedBit)
+        } else if expected.ea().is_some_and(|want| want.get() != ea) {
+            Some(Error::AddressMismatch { got: ea, want: response.ea.get() })
+        } else if full && cc != expected.command().code() {
+            Some(Error::CommandMismatch { got: cc, want: expected.command().code() })
+        } else {
+            None
+        };
+        prop_assert_eq!(got, want);
+    }
+}
+
+/// Every single wrong bit and every truncation of the reply to every operation: all fifteen layouts.
+#[test]
+fn every_flip_and_truncation_of_every_layout() {
+    let odd = Profile::default().low_with_velocity().resets_with_position();
+    let mut seen = Vec::new();
+    for profile in [Profile::default(), odd] {
+        for operation in crate::request::tests::every(0x5a, 3, 0xbeef, 0x12_3456) {
+            let request = Request::new(EncoderAddress::truncate(5), operation);
+            let (expected, es) = (request.expected(profile), EncoderStatus::new(9));
+            let line = answer(request, profile, es, 0x0123_4567_89ab_cdef, 0xfedc_ba98_7654_3210).emit().line();
+            seen.push(expected.layout());
+            for at in 0..line.len() {
+                let error = Response::parse_line(flipped(line, at), &expected).unwrap_err();
+                let frame = (at / 18) as u8;
+                match at % 18 {
+                    0 => assert_eq!(error, Error::StartBit { frame }),
+                    17 => assert_eq!(error, Error::Delimiter { frame }),
+                    _ => assert!(matches!(error, Error::Crc { .. }), "{operation:?}, bit {at}: {error}"),
+                }
+                let short = Window::from_bits(line.bits(), at).unwrap();
+                let want = Error::Truncated { got: at as u16, want: line.len() as u16 };
+                assert_eq!(Response::parse_line(short, &expected), Err(want));
+            }
+        }
+    }
+    assert!(Layout::ALL.into_iter().all(|layout| seen.contains(&layout)));
+}
