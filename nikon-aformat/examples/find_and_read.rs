@@ -1,4 +1,4 @@
-//! A controller finds an encoder and reads it: `cargo run -p nikon-aformat --example read_position`.
+//! A controller finds an encoder and reads it: `cargo run -p nikon-aformat --example find_and_read`.
 //!
 //! The encoder is simulated, so that the example runs anywhere; on a board its part is played by a shift register.
 #![allow(clippy::arithmetic_side_effects, reason = "a program on a host")]
