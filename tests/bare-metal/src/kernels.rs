@@ -5,14 +5,14 @@
 
 #[cfg(feature = "deliberate-panic")]
 mod deliberate_panic;
-#[cfg(feature = "nrz-line")]
-pub(crate) mod nrz_line;
 #[cfg(feature = "hdsl")]
 mod hdsl;
 #[cfg(feature = "nikon-aformat")]
 mod nikon;
 #[cfg(feature = "nikon-aformat")]
 mod nikon_ends;
+#[cfg(feature = "nrz-line")]
+pub(crate) mod nrz_line;
 #[cfg(feature = "rtex-block")]
 mod rtex;
 #[cfg(feature = "sorte-proto")]

@@ -2,12 +2,12 @@
 
 use cortex_m_semihosting::hprintln;
 
-#[cfg(feature = "nrz-line")]
-mod nrz_line;
 #[cfg(feature = "hdsl")]
 pub(crate) mod hdsl;
 #[cfg(feature = "nikon-aformat")]
 pub(crate) mod nikon;
+#[cfg(feature = "nrz-line")]
+mod nrz_line;
 #[cfg(feature = "rtex-block")]
 pub(crate) mod rtex;
 #[cfg(feature = "sorte-proto")]
