@@ -141,7 +141,7 @@ pub fn decode<P: StartStop>(
             let found = preview.survey(file, line.channels(), options, make)?;
             out.note(&format!("{file}: {found}"));
             edges(line.as_mut(), preview, found.setup, &mut make(found.setup.bit()), out)?;
-            right_way_up(file, options, found.setup)
+            right_way_up(file, options, found.setup, out)
         }
         Capture::Samples(mut raw) => {
             let preview = Preview::read(&mut raw);
@@ -156,14 +156,15 @@ pub fn decode<P: StartStop>(
                 Some(receiver) if !out.wants_changes() => samples(&mut raw, preview, receiver, &mut protocol, out),
                 _ => edges(&mut raw, preview, setup, &mut protocol, out),
             }?;
-            right_way_up(file, options, setup)
+            right_way_up(file, options, setup, out)
         }
     }
 }
 
-/// A line that was found upside down is decoded, but it is not good: somebody has to look at the wires.
-fn right_way_up(file: &str, options: &Options, setup: Setup) -> Result<(), Stop> {
-    if !setup.inverted || options.inverted.is_some() {
+/// A line that was found upside down is decoded, but it is not good: somebody has to look at the wires. Where hardly
+/// anything could be decoded, the polarity was only a guess and says nothing.
+fn right_way_up(file: &str, options: &Options, setup: Setup, out: &Output<'_>) -> Result<(), Stop> {
+    if !setup.inverted || options.inverted.is_some() || out.tally.ok <= out.tally.refused {
         return Ok(());
     }
     let what = "the line is inverted: exchange A and B, or say that it is meant so with --polarity inverted";

@@ -65,6 +65,7 @@ fn a_rate_that_was_given_wrong() {
     let bench = Bench::new();
     let run = bench.decode("a.vcd", good_traffic(2.5e6).vcd(), &["--bit-rate", "5M"]);
     run.fails_with("frames refused").fails_with("5 Mbit/s, though the runs look like 2.500 Mbit/s");
+    assert!(!run.err.contains("exchange A and B"), "{}", run.err);
 }
 
 #[test]
