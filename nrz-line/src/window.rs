@@ -100,6 +100,34 @@ impl Window {
         Self { bits: !self.bits & Self::mask(self.len), len: self.len }
     }
 
+    /// The same line with the bits of each byte in the other order, as if it had been packed in one order and read in the
+    /// other. Bits behind the last whole byte are those that the other order finds there: padding, read as 0.
+    pub const fn reordered(self) -> Self {
+        Self { bits: self.bits.swap_bytes().reverse_bits() & Self::mask(self.len), len: self.len }
+    }
+
+    /// Every second bit, the first one included: a line that was sampled twice a bit. Half as long, rounded up.
+    pub const fn decimated(self) -> Self {
+        // Pairs of bits move together, then fours, eights ...
+        let mut bits = self.bits & (u128::MAX / 3);
+        bits = (bits | bits >> 1) & (u128::MAX / 5);
+        bits = (bits | bits >> 2) & (u128::MAX / 17);
+        bits = (bits | bits >> 4) & (u128::MAX / 257);
+        bits = (bits | bits >> 8) & (u128::MAX / 65_537);
+        bits = (bits | bits >> 16) & (u128::MAX / ((1 << 32) + 1));
+        bits = (bits | bits >> 32) & u64::MAX as u128;
+        Self { bits, len: self.len.div_ceil(2) }
+    }
+
+    /// The window followed by idle line (1) up to `len` bits; as it is if it has as many. `None` if `len` exceeds
+    /// [`Self::MAX_LEN`].
+    pub const fn padded(self, len: u32) -> Option<Self> {
+        if self.len >= len {
+            return Some(self);
+        }
+        Self::from_bits(self.bits | !Self::mask(self.len), len)
+    }
+
     /// The window without its first `count` bits; `None` if it has fewer.
     pub const fn skip(self, count: u32) -> Option<Self> {
         match self.len.checked_sub(count) {
@@ -269,6 +297,37 @@ mod tests {
         assert_eq!(window.skip(5), None);
         assert_eq!((window.get(1), window.get(3), window.get(4)), (Some(false), Some(true), None));
         assert_eq!(window.inverted().bits(), 0b0010);
+    }
+
+    #[test]
+    fn a_line_read_in_the_wrong_order() {
+        let line = Window::from_bits(0b0000_0001_1101_0011, 16).unwrap();
+        assert_eq!(line.reordered(), Window::from_bits(0b1000_0000_1100_1011, 16).unwrap());
+        // Five bits are the low end of one byte; the other order finds them at its high end.
+        assert_eq!(
+            Window::from_bits(0b1_0011, 5).unwrap().reordered(),
+            Window::from_bits(0b0_1000, 5).unwrap_or(Window::EMPTY)
+        );
+        assert_eq!(line.reordered().reordered(), line);
+    }
+
+    #[test]
+    fn a_line_sampled_twice_a_bit() {
+        let twice = Window::from_bits(0b11_00_11_11_00, 10).unwrap();
+        assert_eq!(twice.decimated(), Window::from_bits(0b1_0110, 5).unwrap());
+        assert_eq!(Window::from_bits(0b101, 3).unwrap().decimated(), Window::from_bits(0b11, 2).unwrap());
+        assert_eq!(
+            Window::from_bits(u128::MAX, 128).unwrap().decimated(),
+            Window::from_bits(u64::MAX.into(), 64).unwrap()
+        );
+    }
+
+    #[test]
+    fn a_line_that_goes_idle() {
+        let line = Window::from_bits(0b01, 2).unwrap();
+        assert_eq!(line.padded(5), Window::from_bits(0b1_1101, 5));
+        assert_eq!((line.padded(1), line.padded(129)), (Some(line), None));
+        assert_eq!(Window::EMPTY.padded(128), Window::from_bits(u128::MAX, 128));
     }
 
     #[cfg(feature = "bitvec")]

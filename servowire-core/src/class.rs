@@ -1,0 +1,30 @@
+use core::fmt::Debug;
+
+/// The kind of an error: what counters count and statistics list. [`errors!`](crate::errors) makes one for each crate.
+pub trait Class: Copy + Eq + Debug + 'static {
+    /// All classes, in the order of the checks.
+    const ALL: &'static [Self];
+
+    /// Place in [`ALL`](Self::ALL), from 0.
+    fn index(self) -> usize;
+
+    /// The name in `snake_case`, as logs and test vectors spell it.
+    fn name(self) -> &'static str;
+}
+
+/// An error that belongs to a [`Class`].
+pub trait Classified: Copy {
+    /// The classes there are.
+    type Class: Class;
+
+    /// The class of this error.
+    fn class(self) -> Self::Class;
+}
+
+impl<C: Class> Classified for C {
+    type Class = C;
+
+    fn class(self) -> C {
+        self
+    }
+}

@@ -1,0 +1,102 @@
+use crate::{Class, Classified};
+
+/// How many transactions went well, and how many failed in which of `N` ways.
+///
+/// Each crate names its own: `type Counters = servowire_core::Counters<{ ErrorClass::ALL.len() }>`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Counters<const N: usize> {
+    good: u64,
+    errors: [u64; N],
+}
+
+impl<const N: usize> Counters<N> {
+    /// All at 0.
+    pub const fn new() -> Self {
+        Self { good: 0, errors: [0; N] }
+    }
+
+    /// Counts the outcome of a transaction; counters stop at their maximum.
+    pub fn record<T, E: Classified>(&mut self, outcome: &Result<T, E>) {
+        let counter = match outcome {
+            Ok(_) => Some(&mut self.good),
+            Err(error) => self.errors.get_mut(error.class().index()),
+        };
+        if let Some(counter) = counter {
+            *counter = counter.saturating_add(1);
+        }
+    }
+
+    /// Transactions with a sound answer.
+    pub const fn good(&self) -> u64 {
+        self.good
+    }
+
+    /// Transactions that failed in this way.
+    pub fn of(&self, class: impl Class) -> u64 {
+        self.errors.get(class.index()).copied().unwrap_or(0)
+    }
+
+    /// Transactions that failed.
+    pub fn errors(&self) -> u64 {
+        self.errors.iter().fold(0, |sum, n| sum.saturating_add(*n))
+    }
+
+    /// Failed transactions in a million; 0 before the first one.
+    pub fn errors_per_million(&self) -> u32 {
+        let errors = u128::from(self.errors());
+        let all = errors.saturating_add(self.good.into());
+        let rate = errors.saturating_mul(1_000_000).checked_div(all).unwrap_or(0);
+        u32::try_from(rate).unwrap_or(u32::MAX)
+    }
+}
+
+impl<const N: usize> Default for Counters<N> {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+    struct Kind(usize);
+
+    impl Class for Kind {
+        const ALL: &'static [Self] = &[Self(0), Self(1), Self(2), Self(3)];
+
+        fn index(self) -> usize {
+            self.0
+        }
+
+        fn name(self) -> &'static str {
+            "kind"
+        }
+    }
+
+    #[test]
+    fn every_class_has_its_counter() {
+        let mut counters = Counters::<4>::new();
+        assert_eq!(counters.errors_per_million(), 0);
+        for _ in 0..3 {
+            counters.record::<_, Kind>(&Ok(()));
+        }
+        counters.record::<(), _>(&Err(Kind(2)));
+        // A class that has no place is not counted as another one.
+        counters.record::<(), _>(&Err(Kind(4)));
+        assert_eq!([0, 1, 2, 3, 4].map(|k| counters.of(Kind(k))), [0, 0, 1, 0, 0]);
+        assert_eq!((counters.good(), counters.errors(), counters.errors_per_million()), (3, 1, 250_000));
+    }
+
+    #[test]
+    fn the_rate_is_right_after_years() {
+        let mut counters = Counters::<4> { good: u64::MAX - 1, errors: [0, 0, u64::MAX, 0] };
+        assert_eq!(counters.errors_per_million(), 500_000);
+        for _ in 0..3 {
+            counters.record::<_, Kind>(&Ok(()));
+        }
+        assert_eq!(counters.good(), u64::MAX);
+    }
+}

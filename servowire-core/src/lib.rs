@@ -1,0 +1,35 @@
+#![doc = include_str!("../README.md")]
+#![no_std]
+#![cfg_attr(docsrs, feature(doc_cfg))]
+#![cfg_attr(test, allow(clippy::arithmetic_side_effects, clippy::cast_possible_truncation))]
+
+#[cfg(any(test, feature = "std"))]
+extern crate std;
+
+mod class;
+mod counters;
+mod error_rate;
+mod errors;
+mod findings;
+mod flags;
+mod number;
+mod procedure;
+mod range;
+pub mod stream;
+
+pub use class::{Class, Classified};
+pub use counters::Counters;
+pub use error_rate::ErrorRate;
+pub use findings::Findings;
+pub use flags::write_names;
+pub use number::U24;
+pub use procedure::{Polling, Progress, Step};
+pub use range::OutOfRange;
+
+/// What the macros of this crate name; not for use by hand.
+#[doc(hidden)]
+pub mod private {
+    pub use crate::errors::{Snake, snake_case};
+    pub use arbitrary_int::{UInt, traits::Integer};
+    pub use nom;
+}

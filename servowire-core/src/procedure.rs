@@ -1,0 +1,70 @@
+/// How far a procedure is.
+///
+/// `T` is what it was made for, `E` why it failed. Both ends say from when on the line is free for the next request:
+/// until then an answer that was given up may still be talking, or the encoder is at work.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[must_use]
+pub enum Progress<T, E> {
+    /// Not finished. Poll at this time, if nothing is received before.
+    Pending {
+        /// When the wait is over, in ns.
+        until_ns: u64,
+    },
+    /// Finished.
+    Done {
+        /// What it was made for.
+        value: T,
+        /// The line is free for the next request from this time on, in ns.
+        ready_ns: u64,
+    },
+    /// Failed.
+    Failed {
+        /// Why.
+        error: E,
+        /// The line is free for the next request from this time on, in ns.
+        ready_ns: u64,
+    },
+}
+
+/// What a procedure of several transactions wants next: a master's reset, EEPROM access or detection.
+///
+/// `R` is the request, `T` what the procedure is made for, `E` why it fails. The outcome of each transaction, refused
+/// answers included, is handed to the procedure as it is; the procedure decides whether to try again.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[must_use]
+pub enum Step<R, T, E> {
+    /// Do this transaction and report its outcome.
+    Send {
+        /// What to send.
+        request: R,
+        /// Not before this time, in ns.
+        not_before_ns: u64,
+    },
+    /// The procedure has succeeded.
+    Done {
+        /// What it was made for.
+        value: T,
+        /// The encoder is ready for other requests from this time on, in ns.
+        ready_ns: u64,
+    },
+    /// The procedure has failed.
+    Failed {
+        /// Why.
+        error: E,
+        /// The encoder is ready for other requests from this time on, in ns.
+        ready_ns: u64,
+    },
+}
+
+/// How often something that is busy is asked, and how many times at the most.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct Polling {
+    /// Time from the end of one answer to the next request, in ns.
+    pub interval_ns: u32,
+    /// Requests without success after which the access fails; 0 counts as 1.
+    pub max_tries: u16,
+}

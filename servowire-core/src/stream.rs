@@ -1,0 +1,69 @@
+//! What the `nom` parsers of the crates have in common.
+
+use core::num::NonZeroUsize;
+
+use nom::error::{ErrorKind, FromExternalError, ParseError};
+use nom::{Err, IResult, Needed};
+
+/// A decoder's refusal as an error of `nom`.
+pub fn refused<I, E, F>(input: I, error: F) -> Err<E>
+where
+    E: FromExternalError<I, F>,
+{
+    Err::Error(E::from_external_error(input, ErrorKind::Verify, error))
+}
+
+/// `Incomplete`, with the number of bytes (or bits) that are missing; 0 stands for an unknown number.
+pub const fn missing<E>(count: usize) -> Err<E> {
+    Err::Incomplete(match NonZeroUsize::new(count) {
+        Some(count) => Needed::Size(count),
+        None => Needed::Unknown,
+    })
+}
+
+/// Takes a unit of `len` bytes off the front and decodes it.
+///
+/// # Errors
+/// `Incomplete` with the number of missing bytes; what `parse` refuses, as an `Error`.
+pub fn unit<'a, T, E, F>(
+    input: &'a [u8],
+    len: usize,
+    parse: impl FnOnce(&'a [u8]) -> Result<T, F>,
+) -> IResult<&'a [u8], T, E>
+where
+    E: ParseError<&'a [u8]> + FromExternalError<&'a [u8], F>,
+{
+    let Some((unit, rest)) = input.split_at_checked(len) else {
+        return Err(missing(len.saturating_sub(input.len())));
+    };
+    match parse(unit) {
+        Ok(value) => Ok((rest, value)),
+        Err(error) => Err(refused(input, error)),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+    enum Fault {
+        Odd(u8),
+        Combinator,
+    }
+
+    crate::nom_error!(Fault);
+
+    fn even(bytes: &[u8]) -> Result<u8, Fault> {
+        let first = bytes.first().copied().unwrap_or(0);
+        if first & 1 == 0 { Ok(first) } else { Err(Fault::Odd(first)) }
+    }
+
+    #[test]
+    fn a_unit_is_taken_awaited_or_refused() {
+        assert_eq!(unit::<_, Fault, _>(&[4, 5, 6], 2, even), Ok((&[6][..], 4)));
+        assert_eq!(unit::<_, Fault, _>(&[4], 3, even), Err(Err::Incomplete(Needed::new(2))));
+        assert_eq!(unit::<_, Fault, _>(&[5, 5], 1, even), Err(Err::Error(Fault::Odd(5))));
+        assert_eq!(missing::<Fault>(0), Err::Incomplete(Needed::Unknown));
+    }
+}
