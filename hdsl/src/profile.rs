@@ -1,6 +1,6 @@
 use crate::message::Limits;
 use crate::sampling::EdgeRule;
-use crate::{Estimator, QualityRule, Rule};
+use crate::{PositionRule, QualityRule, Rule};
 
 /// Where receivers differ, and which way to go.
 ///
@@ -18,7 +18,7 @@ pub struct Profile {
     /// Penalties of the quality monitor, and when the link is lost.
     pub quality: QualityRule,
     /// What stands in for an acceleration word that cannot be used.
-    pub estimator: Estimator,
+    pub position: PositionRule,
     /// A V-frame without a good safe position is aligned with the last good one. Otherwise it makes the position
     /// unreliable and starts the alignment anew.
     pub stale_position: bool,
@@ -41,7 +41,7 @@ impl Profile {
         rule: Rule::Strict,
         edge: EdgeRule::Leading,
         quality: QualityRule::Sick,
-        estimator: Estimator::Clamped,
+        position: PositionRule::Sick,
         stale_position: false,
         doubt_at_lock: true,
         restart_on_acceleration_errors: false,
@@ -55,7 +55,7 @@ impl Profile {
         rule: Rule::Reduced,
         edge: EdgeRule::All,
         quality: QualityRule::Ti,
-        estimator: Estimator::Wrapping16,
+        position: PositionRule::Ti,
         stale_position: true,
         doubt_at_lock: false,
         restart_on_acceleration_errors: true,

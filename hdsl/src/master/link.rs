@@ -32,7 +32,7 @@ pub(super) struct Link {
 
 impl Link {
     pub(super) fn new(profile: &Profile, bits: PositionBits) -> Self {
-        let mut tracker = PositionTracker::with_estimator(bits, profile.estimator);
+        let mut tracker = PositionTracker::with_rule(bits, profile.position);
         if profile.doubt_at_lock {
             tracker.doubt();
         }

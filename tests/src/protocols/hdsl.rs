@@ -21,6 +21,7 @@ pub(crate) const TOPICS: &[(&str, Check)] = &[
     ("edges", frame::edges),
     ("ext_sync_seed", sync::ext_sync_seed),
     ("fast_position", position::fast_position),
+    ("fast_position_wrap", position::fast_position_wrap),
     ("fw_link", firmware::fw_link),
     ("fw_messages", firmware::fw_messages),
     ("fw_startup", firmware::fw_startup),

@@ -11,7 +11,7 @@ use hdsl::sampling::{Alignment, EdgeRule, TEST_PATTERN, WINDOW};
 use hdsl::symbol::{Character, DisparityCheck, DisparityStatus, Reading, RunningDisparity, Word};
 use hdsl::sync::{CoreClock, Es, Next, Startup, Synchroniser};
 use hdsl::{
-    Answer, Content, DeltaDelta, EncoderByte, EncoderId, EncoderSymbol, Error, Estimator, LineDisparity, MasterSymbol,
+    Answer, Content, DeltaDelta, EncoderByte, EncoderId, EncoderSymbol, Error, PositionRule, LineDisparity, MasterSymbol,
     ParameterByte, PositionBits, PositionTracker, Profile, QualityEvent, QualityMonitor, QualityRule, Rule, VFrame,
     crc16,
 };
@@ -142,9 +142,9 @@ kernels! {
         (tracker.position(), tracker.velocity())
     } over ACCELERATIONS;
 
-    /// The same with the estimator of the SDK.
+    /// The same with the position of the SDK.
     fn hdsl_position_ti(values: &[Option<i16>; 4]) -> (u64, i32) {
-        let mut tracker = PositionTracker::with_estimator(PositionBits::MAX, Estimator::Wrapping16);
+        let mut tracker = PositionTracker::with_rule(PositionBits::MAX, PositionRule::Ti);
         for value in values {
             tracker.step(value.and_then(DeltaDelta::new));
         }
