@@ -278,7 +278,7 @@ const fn sign_extend(value: u64, mask: u64) -> i64 {
 }
 
 #[cfg(test)]
-#[allow(clippy::cast_sign_loss)]
+#[allow(clippy::cast_sign_loss, clippy::cast_possible_wrap)]
 mod tests {
     use super::*;
     use proptest::prelude::*;

@@ -1,5 +1,6 @@
 //! HIPERFACE DSL.
 
+mod bench;
 mod code;
 mod firmware;
 mod frame;
@@ -56,7 +57,7 @@ impl Line {
     }
 
     fn word(&self) -> Word {
-        Word::truncate(self.bits as u64)
+        Word::truncate(self.bits as u16)
     }
 }
 
