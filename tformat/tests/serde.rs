@@ -2,7 +2,7 @@
 #![cfg(feature = "serde")]
 #![allow(clippy::expect_used, clippy::unwrap_used, reason = "a test")]
 
-use std::fmt::Debug;
+use core::fmt::Debug;
 
 use serde::Serialize;
 use serde::de::DeserializeOwned;
@@ -15,7 +15,7 @@ fn refused<T: DeserializeOwned + Debug>(json: &str) -> String {
     serde_json::from_str::<T>(json).expect_err("an illegal value").to_string()
 }
 
-fn round_trip<T: Serialize + DeserializeOwned + PartialEq + Debug>(value: T) {
+fn round_trip<T: Serialize + DeserializeOwned + PartialEq + Debug + Copy>(value: T) {
     let json = serde_json::to_string(&value).unwrap();
     assert_eq!(serde_json::from_str::<T>(&json).unwrap(), value, "{json}");
 }
@@ -76,6 +76,10 @@ fn legal_values_come_back() {
     round_trip(Response::ReadAll(AllData::parse(&[0x1a, 0x20, 0x29, 0xc0, 0x3b, 0x17, 0, 0, 0, 0xc8, 0x37]).unwrap()));
     round_trip(Resolution::new(17, 16).unwrap().with_unsigned_turns().with_upper_bits_ignored());
     round_trip(Error::Rejected { sf: StatusField::CA0 });
-    ErrorClass::ALL.iter().for_each(|class| round_trip(*class));
-    BitRate::ALL.iter().for_each(|rate| round_trip(*rate));
+    for class in ErrorClass::ALL {
+        round_trip(*class);
+    }
+    for rate in BitRate::ALL {
+        round_trip(rate);
+    }
 }
