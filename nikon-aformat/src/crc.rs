@@ -198,7 +198,8 @@ mod tests {
     /// The undetected shares that the documentation states, counted.
     #[test]
     fn crc8_strength() {
-        for (bits, missed3) in [(32, 0.36), (48, 0.50), (64, 0.48), (96, 0.41)] {
+        let sizes = [(32, 0.36), (48, 0.50), (64, 0.48), (96, 0.41)];
+        for (bits, missed3) in sizes.into_iter().take(if cfg!(miri) { 1 } else { 4 }) {
             let syndrome: std::vec::Vec<u8> =
                 (0..bits).map(|at| (0..bits).fold(Crc8::new(), |crc, k| crc.bit(k == at)).get()).collect();
             let (mut two, mut three, mut triples) = (0, 0, 0);

@@ -194,7 +194,7 @@ mod tests {
         let es = |alarm| EncoderStatus::of_alarms(alarm).bits();
         let want = [2, 8, 0, 4, 4, 8, 8, 1, 1, 4, 8, 0, 0, 0, 0, 0];
         assert_eq!(core::array::from_fn(|bit| es(Alm::from_bits_retain(1 << bit))), want);
-        for raw in 0..=u16::MAX {
+        for raw in (0..=u16::MAX).step_by(crate::STRIDE) {
             let alm = Alm::from_bits_retain(raw);
             assert_eq!(es(alm), alm.iter().fold(0, |sum, alarm| sum | es(alarm)));
         }

@@ -139,7 +139,7 @@ mod tests {
     #[test]
     fn bits_last_at_least_as_long() {
         for rate in BitRate::ALL {
-            for ns in (0..40_000).step_by(7) {
+            for ns in (0..40_000).step_by(7 * crate::STRIDE) {
                 let bits = rate.bits(ns);
                 assert!(rate.bits_ns(bits) >= ns);
                 assert!(

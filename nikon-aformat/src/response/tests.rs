@@ -184,7 +184,7 @@ fn every_flip_and_truncation_of_every_layout() {
             let (expected, es) = (request.expected(resolution), EncoderStatus::from_bits_truncate(9));
             let line = answer(request, resolution, es, 0x0123_4567_89ab_cdef, 0xfedc_ba98_7654_3210).emit().line();
             seen.push(expected.layout());
-            for at in 0..line.len() {
+            for at in (0..line.len()).step_by(if cfg!(miri) { 17 } else { 1 }) {
                 let error = Response::parse_line(&expected, flipped(line, at)).unwrap_err();
                 let frame = (at / 18) as u8;
                 match at % 18 {

@@ -57,9 +57,9 @@ kernels! {
         let line = Window::read(&row.lsb_first, 0, 72, nikon_aformat::BitOrder::LsbFirst).unwrap_or(Window::EMPTY);
         for content in contents(line) {
             now_ns += 1_125;
-            transaction.frame(content, now_ns);
+            let _ = transaction.frame(content, now_ns);
         }
-        transaction.framing_error(now_ns);
+        let _ = transaction.framing_error(now_ns);
         transaction.poll(1_000_000)
     } over WHOLE;
 
@@ -70,7 +70,7 @@ kernels! {
         let mut now_ns = 3_000;
         for content in contents(line) {
             now_ns += 1_125;
-            transaction.frame(content, now_ns);
+            let _ = transaction.frame(content, now_ns);
         }
         transaction.framing_error(now_ns + 5_000);
         transaction.poll(10_000_000);
