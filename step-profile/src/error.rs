@@ -77,6 +77,12 @@ servowire_core::errors! {
             /// The most: 2^31 - 1.
             limit: u32,
         },
+        /// No room for another line.
+        #[error("the queue of lines is full")]
+        QueueFull,
+        /// An axis with 0 steps a metre.
+        #[error("an axis with 0 steps a metre")]
+        NoScale,
         /// A target lies outside the soft limits.
         #[error("target {target} is outside the soft limits")]
         SoftLimit {

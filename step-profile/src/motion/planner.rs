@@ -210,6 +210,15 @@ fn top(from: Real, goal: Goal, bounds: &Bounds) -> Result<Real, Real> {
     Ok(crossing(low, high, n, need))
 }
 
+/// The greatest speed from which `to` can be reached within `n`, or the greatest that can be reached from it.
+pub(super) fn greatest(to: Real, n: Real, bounds: &Bounds) -> Real {
+    let most = (to.squared() + (bounds.a * n).scaled(1)).sqrt().min(bounds.v).max(to);
+    match bounds.jerk {
+        None => most,
+        Some(_) => crossing(to, most, n, |v| distance(v, to, bounds)),
+    }
+}
+
 /// The largest argument between `low` and `high`, as near as it matters, at which `need` is not above `n`. It is not at
 /// `low`. False position, with the end that stays weighed less (Illinois) and halving in between.
 fn crossing(low: Real, high: Real, n: Real, need: impl Fn(Real) -> Real) -> Real {
