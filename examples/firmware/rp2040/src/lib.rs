@@ -1,0 +1,7 @@
+#![doc = include_str!("../README.md")]
+#![no_std]
+
+pub mod board;
+pub mod clock;
+pub mod port;
+pub mod programs;
