@@ -109,7 +109,7 @@ pub(super) fn payload(rows: &[Row]) -> Vec<Verdict> {
         let words = row.device_words.map(pto);
         same("device_words", &words, &payload.0.map(|slice| slice.pto))?;
         if let (Some(mask), Some(command)) = (row.mask, row.word.and_then(|word| command(pto(word)))) {
-            let motors = Motors::from_mask(mask.into()).map_err(|e| Fault::Unreadable(e.to_string()))?;
+            let motors = Motors::try_from(mask).map_err(|e| Fault::Unreadable(e.to_string()))?;
             let commanded = motors.distribute(command).into_iter().map(self::pto).collect::<Result<Vec<_>, _>>();
             same("device_words, by the commands", &Ok(words.to_vec()), &commanded)?;
         }
