@@ -4,7 +4,7 @@ import { fileURLToPath } from 'node:url';
 import { Chip } from './chip.mjs';
 import { Wire, units } from './wire.mjs';
 
-const IMAGES = fileURLToPath(
+export const IMAGES = fileURLToPath(
   new URL('../../examples/firmware/rp2040/target/thumbv6m-none-eabi/release/', import.meta.url),
 );
 export const HZ = 120e6;
