@@ -8,7 +8,7 @@ use std::borrow::Cow;
 use std::collections::HashMap;
 
 use rtex_block::inspect::{self, Report, inspect};
-use rtex_block::{Error, ErrorClass, Header};
+use rtex_block::{Error, Header};
 
 use crate::capture::Capture;
 use crate::capture::hexlog::Burst;
@@ -172,22 +172,11 @@ fn verdict(report: &Report) -> Verdict {
         _ => None,
     };
     Verdict::Refused(Box::new(Refusal {
-        class: class(error.class()),
+        class: error.class().name(),
         reason: error.to_string(),
         field: at.map(|byte: u8| format!("byte {byte}")),
         bit: None,
         time: None,
         cause: report.cause.map(|cause| cause.to_string()),
     }))
-}
-
-fn class(class: ErrorClass) -> &'static str {
-    match class {
-        ErrorClass::Length => "length",
-        ErrorClass::CyclicCode => "cyclic_code",
-        ErrorClass::NonCyclicCode => "noncyclic_code",
-        ErrorClass::SubChk => "sub_chk",
-        ErrorClass::SubCommandCode => "sub_command_code",
-        _ => "other",
-    }
 }

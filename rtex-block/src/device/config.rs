@@ -1,5 +1,8 @@
+use crate::builder::builder;
+use crate::error_code::Alarm;
+use crate::header::MacId;
 use crate::position::Gear;
-use crate::{Alarm, MacId, TypeCode};
+use crate::type_code::TypeCode;
 
 /// Numbers that a drive has and that no document at hand confirms; whoever models a drive must choose them.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -25,7 +28,9 @@ pub struct OpenCodes {
 /// How a modelled drive is set up.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub struct Settings {
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[non_exhaustive]
+pub struct DriveConfig {
     /// What its switches say.
     pub mac_id: MacId,
     /// Update period, ns.
@@ -58,7 +63,7 @@ pub struct Settings {
     pub codes: OpenCodes,
 }
 
-impl Settings {
+impl DriveConfig {
     /// A drive at 0.5 ms, one communication an update, gear 1/1 and 2^20 units a revolution.
     pub const fn new(mac_id: MacId, codes: OpenCodes) -> Self {
         Self {
@@ -78,5 +83,21 @@ impl Settings {
             near: 2_000,
             codes,
         }
+    }
+
+    builder! {
+        with_update_ns: update_ns, u32;
+        with_communications: communications, u8;
+        with_sync_exchanges: sync_exchanges, u16;
+        with_servo_on_updates: servo_on_updates, u16;
+        with_busy_exchanges: busy_exchanges, u16;
+        with_fault_limit: fault_limit, u16;
+        with_counter_limit: counter_limit, u16;
+        with_lost_limit: lost_limit, u16;
+        with_follow: follow, u8;
+        with_gear: gear, Gear;
+        with_units_per_rev: units_per_rev, u32;
+        with_in_position: in_position, u32;
+        with_near: near, u32;
     }
 }

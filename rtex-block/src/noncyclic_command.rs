@@ -1,4 +1,9 @@
-use crate::{Error, Nibble, NonCyclicCode, TypeCode};
+use core::fmt;
+
+use crate::block::join;
+use crate::code::NonCyclicCode;
+use crate::error::Error;
+use crate::type_code::{Nibble, TypeCode};
 
 /// Bytes 8-15 of a command with the layout that five non-cyclic commands share.
 ///
@@ -27,7 +32,7 @@ pub struct Arguments {
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "arbitrary", derive(arbitrary::Arbitrary))]
-pub enum Request {
+pub enum NonCyclicCommand {
     /// 0h: nothing is asked.
     Normal {
         /// Bytes 8-11, free.
@@ -71,7 +76,7 @@ pub enum Request {
     Monitor(Arguments),
 }
 
-impl Request {
+impl NonCyclicCommand {
     /// Nothing is asked and nothing fed forward.
     pub const IDLE: Self = Self::Normal { command_data2: 0, command_data3: 0 };
 
@@ -112,7 +117,7 @@ impl Request {
         let [b8, b9, b10, b11, d @ ..] = bytes;
         let data = i32::from_le_bytes(d);
         let arguments = Arguments {
-            type_code: TypeCode::low(u32::from_le_bytes([b8, b9, 0, 0])),
+            type_code: TypeCode::truncate(u16::from_le_bytes([b8, b9])),
             index: u16::from_le_bytes([b10, b11]),
             data,
         };
@@ -124,15 +129,15 @@ impl Request {
             NonCyclicCode::SystemId => Self::SystemId(arguments),
             NonCyclicCode::Homing => Self::Homing {
                 type_code: b8,
-                latch_sel1: Nibble::low(b10),
-                latch_sel2: Nibble::low(b10 >> 4),
+                latch_sel1: Nibble::truncate(b10),
+                latch_sel2: Nibble::truncate(b10 >> 4),
                 monitor_sel: b11,
                 setting_data: data,
             },
             NonCyclicCode::Alarm => Self::Alarm(arguments),
             NonCyclicCode::Parameter => Self::Parameter(arguments),
             NonCyclicCode::Profile => {
-                Self::Profile { type_code: b8, latch_sel1: Nibble::low(b10), monitor_sel: b11, target_speed: data }
+                Self::Profile { type_code: b8, latch_sel1: Nibble::truncate(b10), monitor_sel: b11, target_speed: data }
             }
             NonCyclicCode::Monitor => Self::Monitor(arguments),
         }
@@ -155,8 +160,23 @@ impl Request {
     }
 }
 
-/// Two four-byte halves.
-pub(crate) const fn join([b8, b9, b10, b11]: [u8; 4], data: i32) -> [u8; 8] {
-    let [b12, b13, b14, b15] = data.to_le_bytes();
-    [b8, b9, b10, b11, b12, b13, b14, b15]
+impl fmt::Display for Arguments {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "type {:02X}h index {} data {}", self.type_code.get(), self.index, self.data)
+    }
+}
+
+impl fmt::Display for NonCyclicCommand {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Normal { command_data2, command_data3 } => write!(f, "{command_data2} {command_data3}"),
+            Self::Reset(a) | Self::SystemId(a) | Self::Alarm(a) | Self::Monitor(a) => a.fmt(f),
+            Self::Parameter(a) => {
+                let pr = crate::type_code::Pr::from_index(a.index);
+                write!(f, "type {:02X}h {pr} data {}", a.type_code.get(), a.data)
+            }
+            Self::Homing { type_code, setting_data, .. } => write!(f, "type {type_code:02X}h data {setting_data}"),
+            Self::Profile { type_code, target_speed, .. } => write!(f, "type {type_code:02X}h speed {target_speed}"),
+        }
+    }
 }

@@ -1,33 +1,11 @@
-use crate::request::join;
-use crate::{Alarm, Error, ErrorCode, Nibble, NonCyclicCode, TypeCode};
+use core::fmt;
 
-/// How far a non-cyclic command has come: bits 7, 6 and 4 of byte 9 of a response.
-///
-/// SX-DSV02310, "Response of non-cyclic commands".
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-#[cfg_attr(feature = "arbitrary", derive(arbitrary::Arbitrary))]
-pub struct Execution {
-    /// ERR: the command was accepted and failed while it was executed.
-    pub err: bool,
-    /// WNG: executed with a restriction.
-    pub wng: bool,
-    /// Busy: still executing.
-    pub busy: bool,
-}
-
-impl Execution {
-    /// Bits 7, 6 and 4 of a byte.
-    pub const fn from_byte(byte: u8) -> Self {
-        Self { err: byte & 0x80 != 0, wng: byte & 0x40 != 0, busy: byte & 0x10 != 0 }
-    }
-
-    /// The three bits in their places.
-    pub const fn to_byte(self) -> u8 {
-        (self.err as u8) << 7 | (self.wng as u8) << 6 | (self.busy as u8) << 4
-    }
-}
+use crate::block::join;
+use crate::code::NonCyclicCode;
+use crate::error::Error;
+use crate::error_code::{Alarm, ErrorCode};
+use crate::execution::{Execution, LatchFlags, ProfileFlags};
+use crate::type_code::{Nibble, TypeCode};
 
 /// Bytes 8-15 of a response with the layout that reset, system ID, parameter and monitor share.
 ///
@@ -40,18 +18,18 @@ impl Execution {
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "arbitrary", derive(arbitrary::Arbitrary))]
-pub struct Reply {
+pub struct Results {
     /// How far the command has come.
     pub execution: Execution,
     /// Echo of the type code.
     pub type_code: TypeCode,
     /// Index_Echo.
     pub index: u16,
-    /// Monitor_Data; of a system ID see [`Reply::characters`].
+    /// Monitor_Data; of a system ID see [`Results::characters`].
     pub data: i32,
 }
 
-impl Reply {
+impl Results {
     /// The four characters of a system ID answer, byte 12 first.
     pub const fn characters(&self) -> [u8; 4] {
         self.data.to_le_bytes()
@@ -79,7 +57,7 @@ impl Reply {
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "arbitrary", derive(arbitrary::Arbitrary))]
-pub enum Answer {
+pub enum NonCyclicResponse {
     /// CMD_Error: the command was not accepted. Bytes 8-9 are Error_Code, bytes 10-15 are 0.
     CommandError(ErrorCode),
     /// 0h: normal.
@@ -90,19 +68,17 @@ pub enum Answer {
         response_data3: i32,
     },
     /// 1h: reset.
-    Reset(Reply),
+    Reset(Results),
     /// 2h: four characters.
-    SystemId(Reply),
+    SystemId(Results),
     /// 4h: homing, position setting, latch.
     Homing {
         /// Byte 9 bits 7, 6, 4.
         execution: Execution,
         /// Echo of byte 8.
         type_code: u8,
-        /// Byte 9 bit 0: latch 1 has caught a position; before that LPOS1 is undefined.
-        latch_comp1: bool,
-        /// Byte 9 bit 1: latch 2 has caught a position; before that LPOS2 is undefined.
-        latch_comp2: bool,
+        /// Byte 9 bits 1 and 0: which latches have caught a position.
+        latch: LatchFlags,
         /// Echo of byte 10 bits 3-0.
         latch_sel1: Nibble,
         /// Echo of byte 10 bits 7-4.
@@ -112,24 +88,18 @@ pub enum Answer {
         /// Bytes 12-15: the monitor value chosen by Monitor_Sel.
         monitor_data: i32,
     },
-    /// 5h: alarm; see [`Reply::alarm`].
-    Alarm(Reply),
+    /// 5h: alarm; see [`Results::alarm`].
+    Alarm(Results),
     /// 6h: parameter.
-    Parameter(Reply),
+    Parameter(Results),
     /// 7h: profile motion.
     Profile {
         /// Byte 9 bits 7, 6, 4.
         execution: Execution,
         /// Echo of byte 8.
         type_code: u8,
-        /// Byte 9 bit 3: positive software limit (exchangeable with NSL by parameter).
-        psl: bool,
-        /// Byte 9 bit 2: negative software limit (exchangeable with PSL by parameter).
-        nsl: bool,
-        /// Byte 9 bit 1: inside the near window.
-        near: bool,
-        /// Byte 9 bit 0: latch 1 has caught a position.
-        latch_comp1: bool,
+        /// Byte 9 bits 3-0: software limits, near window, latch.
+        flags: ProfileFlags,
         /// Echo of byte 10 bits 3-0.
         latch_sel1: Nibble,
         /// Echo of byte 11.
@@ -138,7 +108,7 @@ pub enum Answer {
         monitor_data: i32,
     },
     /// Ah: monitor.
-    Monitor(Reply),
+    Monitor(Results),
     /// The echo of a code that is not defined, without CMD_Error.
     Undefined {
         /// Bits 3-0 of byte 1.
@@ -148,7 +118,7 @@ pub enum Answer {
     },
 }
 
-impl Answer {
+impl NonCyclicResponse {
     /// Reads bytes 8-15 by CMD_Error and the echoed code; reserved bits are not looked at.
     pub const fn from_bytes(cmd_error: bool, noncyclic_bits: u8, bytes: [u8; 8]) -> Self {
         let [b8, b9, b10, b11, d @ ..] = bytes;
@@ -156,10 +126,10 @@ impl Answer {
             return Self::CommandError(ErrorCode(u16::from_le_bytes([b8, b9])));
         }
         let data = i32::from_le_bytes(d);
-        let execution = Execution::from_byte(b9);
-        let reply = Reply {
+        let execution = Execution::from_bits_truncate(b9);
+        let results = Results {
             execution,
-            type_code: TypeCode::low(u32::from_le_bytes([b8, b9, 0, 0])),
+            type_code: TypeCode::truncate(u16::from_le_bytes([b8, b9])),
             index: u16::from_le_bytes([b10, b11]),
             data,
         };
@@ -170,32 +140,28 @@ impl Answer {
             NonCyclicCode::Normal => {
                 Self::Normal { response_data2: i32::from_le_bytes([b8, b9, b10, b11]), response_data3: data }
             }
-            NonCyclicCode::Reset => Self::Reset(reply),
-            NonCyclicCode::SystemId => Self::SystemId(reply),
+            NonCyclicCode::Reset => Self::Reset(results),
+            NonCyclicCode::SystemId => Self::SystemId(results),
             NonCyclicCode::Homing => Self::Homing {
                 execution,
                 type_code: b8,
-                latch_comp1: b9 & 1 != 0,
-                latch_comp2: b9 & 2 != 0,
-                latch_sel1: Nibble::low(b10),
-                latch_sel2: Nibble::low(b10 >> 4),
+                latch: LatchFlags::from_bits_truncate(b9),
+                latch_sel1: Nibble::truncate(b10),
+                latch_sel2: Nibble::truncate(b10 >> 4),
                 monitor_sel: b11,
                 monitor_data: data,
             },
-            NonCyclicCode::Alarm => Self::Alarm(reply),
-            NonCyclicCode::Parameter => Self::Parameter(reply),
+            NonCyclicCode::Alarm => Self::Alarm(results),
+            NonCyclicCode::Parameter => Self::Parameter(results),
             NonCyclicCode::Profile => Self::Profile {
                 execution,
                 type_code: b8,
-                psl: b9 & 8 != 0,
-                nsl: b9 & 4 != 0,
-                near: b9 & 2 != 0,
-                latch_comp1: b9 & 1 != 0,
-                latch_sel1: Nibble::low(b10),
+                flags: ProfileFlags::from_bits_truncate(b9),
+                latch_sel1: Nibble::truncate(b10),
                 monitor_sel: b11,
                 monitor_data: data,
             },
-            NonCyclicCode::Monitor => Self::Monitor(reply),
+            NonCyclicCode::Monitor => Self::Monitor(results),
         }
     }
 
@@ -212,34 +178,26 @@ impl Answer {
                 let [index_low, index_high] = r.index.to_le_bytes();
                 join([type_low, r.execution.to_byte() | type_high, index_low, index_high], r.data)
             }
-            Self::Homing {
-                execution,
-                type_code,
-                latch_comp1,
-                latch_comp2,
-                latch_sel1,
-                latch_sel2,
-                monitor_sel,
-                monitor_data,
-            } => {
-                let nine = execution.to_byte() | (latch_comp2 as u8) << 1 | latch_comp1 as u8;
-                join([type_code, nine, latch_sel2.get() << 4 | latch_sel1.get(), monitor_sel], monitor_data)
+            Self::Homing { execution, type_code, latch, latch_sel1, latch_sel2, monitor_sel, monitor_data } => {
+                let selections = latch_sel2.get() << 4 | latch_sel1.get();
+                join([type_code, execution.to_byte() | latch.to_byte(), selections, monitor_sel], monitor_data)
             }
-            Self::Profile {
-                execution,
-                type_code,
-                psl,
-                nsl,
-                near,
-                latch_comp1,
-                latch_sel1,
-                monitor_sel,
-                monitor_data,
-            } => {
-                let low = (psl as u8) << 3 | (nsl as u8) << 2 | (near as u8) << 1 | latch_comp1 as u8;
-                join([type_code, execution.to_byte() | low, latch_sel1.get(), monitor_sel], monitor_data)
+            Self::Profile { execution, type_code, flags, latch_sel1, monitor_sel, monitor_data } => {
+                let nine = execution.to_byte() | flags.to_byte();
+                join([type_code, nine, latch_sel1.get(), monitor_sel], monitor_data)
             }
             Self::Undefined { bytes, .. } => bytes,
+        }
+    }
+
+    /// Bytes 12-15; `None` for an error and for the echo of an undefined code.
+    pub const fn data(&self) -> Option<i32> {
+        match self {
+            Self::Reset(r) | Self::SystemId(r) | Self::Alarm(r) | Self::Parameter(r) | Self::Monitor(r) => Some(r.data),
+            Self::Homing { monitor_data: data, .. }
+            | Self::Profile { monitor_data: data, .. }
+            | Self::Normal { response_data3: data, .. } => Some(*data),
+            Self::CommandError(_) | Self::Undefined { .. } => None,
         }
     }
 
@@ -270,4 +228,47 @@ impl Answer {
         }
         Ok(())
     }
+}
+
+impl fmt::Display for Results {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "type {:02X}h index {} data {}", self.type_code.get(), self.index, self.data)?;
+        suffix(f, &self.execution)
+    }
+}
+
+impl fmt::Display for NonCyclicResponse {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::CommandError(code) => write!(f, "not accepted: {code}"),
+            Self::Normal { response_data2, response_data3 } => write!(f, "{response_data2} {response_data3}"),
+            Self::Alarm(r) => {
+                let (alarm, warning) = r.alarm();
+                write!(f, "type {:02X}h index {} {alarm} warning {warning:X}h", r.type_code.get(), r.index)?;
+                suffix(f, &r.execution)
+            }
+            Self::SystemId(r) => {
+                let text = r.characters();
+                write!(f, "type {:02X}h index {} \"{}\"", r.type_code.get(), r.index, text.escape_ascii())?;
+                suffix(f, &r.execution)
+            }
+            Self::Reset(r) | Self::Parameter(r) | Self::Monitor(r) => r.fmt(f),
+            Self::Homing { execution, type_code, latch, monitor_data, .. } => {
+                write!(f, "type {type_code:02X}h data {monitor_data}")?;
+                suffix(f, execution)?;
+                suffix(f, latch)
+            }
+            Self::Profile { execution, type_code, flags, monitor_data, .. } => {
+                write!(f, "type {type_code:02X}h data {monitor_data}")?;
+                suffix(f, execution)?;
+                suffix(f, flags)
+            }
+            Self::Undefined { code, .. } => write!(f, "echo of {code:X}h, which is not defined"),
+        }
+    }
+}
+
+/// Flags after a blank, if any is set.
+fn suffix(f: &mut fmt::Formatter<'_>, flags: &(impl fmt::Display + bitflags::Flags)) -> fmt::Result {
+    if flags.is_empty() { Ok(()) } else { write!(f, " {flags}") }
 }

@@ -1,17 +1,22 @@
 //! Execution of non-cyclic commands.
 
-use super::drive::Drive;
-use super::motion::MAX_TORQUE;
-use super::parameters::FEED_FORWARD;
-use super::profile::Generator;
-use crate::type_code::{Pr, homing, monitor, parameter, profile, reset, system_id};
-use crate::{Answer, Arguments, Code, ErrorCode, Execution, Reply, Request, TypeCode};
+use super::Drive;
+use crate::code::Code;
+use crate::device::motion::MAX_TORQUE;
+use crate::device::parameters::FEED_FORWARD;
+use crate::device::profile::Generator;
+use crate::error_code::{Alarm, ErrorCode};
+use crate::execution::{Execution, LatchFlags, ProfileFlags};
+use crate::noncyclic_command::{Arguments, NonCyclicCommand};
+use crate::noncyclic_response::{NonCyclicResponse, Results};
+use crate::position::step;
+use crate::type_code::{Pr, TypeCode, homing, monitor, parameter, profile, reset, system_id};
 
 /// A command that is being executed, or was and is still held by the master.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub(super) struct Job {
-    request: Request,
+    request: NonCyclicCommand,
     busy: u16,
     outcome: Outcome,
 }
@@ -38,7 +43,7 @@ const TEXTS: [(TypeCode, &[u8]); 6] = [
 
 impl Drive {
     /// Takes the non-cyclic half of an accepted command; `before` is the code of the command before it.
-    pub(super) fn serve(&mut self, request: Request, before: Code) -> Result<(), ErrorCode> {
+    pub(super) fn serve(&mut self, request: NonCyclicCommand, before: Code) -> Result<(), ErrorCode> {
         self.check_feed_forward(&request)?;
         if let Some(job) = &mut self.job {
             if is_same(&job.request, &request) {
@@ -49,31 +54,31 @@ impl Drive {
         }
         self.job = None;
         let outcome = match request {
-            Request::Normal { .. } => return Ok(()),
-            Request::Reset(a) => self.reset(a)?,
-            Request::SystemId(a) => Outcome::Value(text(a.type_code, a.index)?),
-            Request::Homing { type_code, setting_data, .. } => self.home(type_code, setting_data)?,
-            Request::Alarm(a) => self.alarms(a)?,
-            Request::Parameter(a) => self.parameter(a)?,
-            Request::Profile { type_code, .. } => self.start(type_code, before)?,
-            Request::Monitor(a) => {
+            NonCyclicCommand::Normal { .. } => return Ok(()),
+            NonCyclicCommand::Reset(a) => self.reset(a)?,
+            NonCyclicCommand::SystemId(a) => Outcome::Value(text(a.type_code, a.index)?),
+            NonCyclicCommand::Homing { type_code, setting_data, .. } => self.home(type_code, setting_data)?,
+            NonCyclicCommand::Alarm(a) => self.alarms(a)?,
+            NonCyclicCommand::Parameter(a) => self.parameter(a)?,
+            NonCyclicCommand::Profile { type_code, .. } => self.start(type_code, before)?,
+            NonCyclicCommand::Monitor(a) => {
                 self.monitor(a.type_code, a.index)?;
                 Outcome::Live(a.type_code)
             }
         };
-        let slow = matches!(request, Request::Reset(_) | Request::Parameter(_));
-        self.job = Some(Job { request, busy: if slow { self.settings.busy_exchanges } else { 0 }, outcome });
+        let slow = matches!(request, NonCyclicCommand::Reset(_) | NonCyclicCommand::Parameter(_));
+        self.job = Some(Job { request, busy: if slow { self.config.busy_exchanges } else { 0 }, outcome });
         Ok(())
     }
 
     /// What bytes 8-15 of the response say.
-    pub(super) fn answer(&self) -> Answer {
+    pub(super) fn noncyclic(&self) -> NonCyclicResponse {
         if let Some(code) = self.error {
-            return Answer::CommandError(code);
+            return NonCyclicResponse::CommandError(code);
         }
         let Some(job) = &self.job else {
             let [_, response_data2, response_data3] = self.response_data();
-            return Answer::Normal { response_data2, response_data3 };
+            return NonCyclicResponse::Normal { response_data2, response_data3 };
         };
         let busy = job.busy > 0;
         let (err, data) = match job.outcome {
@@ -82,35 +87,34 @@ impl Drive {
             Outcome::Live(code) => (false, self.monitor(code, 0).unwrap_or(0)),
             Outcome::Failed => (true, 0),
         };
-        let execution = Execution { err, wng: false, busy };
-        let reply = |a: Arguments| Reply { execution, type_code: a.type_code, index: a.index, data };
+        let flags = |on: bool, flag| if on { flag } else { Execution::empty() };
+        let execution = flags(err, Execution::ERR) | flags(busy, Execution::BUSY);
+        let results = |a: Arguments| Results { execution, type_code: a.type_code, index: a.index, data };
         let selected = |code: u8| self.monitor(TypeCode::short(code), 0).unwrap_or(0);
         match job.request {
-            Request::Normal { command_data2, command_data3 } => {
-                Answer::Normal { response_data2: command_data2, response_data3: command_data3 }
+            NonCyclicCommand::Normal { command_data2, command_data3 } => {
+                NonCyclicResponse::Normal { response_data2: command_data2, response_data3: command_data3 }
             }
-            Request::Reset(a) => Answer::Reset(reply(a)),
-            Request::SystemId(a) => Answer::SystemId(reply(a)),
-            Request::Alarm(a) => Answer::Alarm(reply(a)),
-            Request::Parameter(a) => Answer::Parameter(reply(a)),
-            Request::Monitor(a) => Answer::Monitor(reply(a)),
-            Request::Homing { type_code, latch_sel1, latch_sel2, monitor_sel, .. } => Answer::Homing {
-                execution,
+            NonCyclicCommand::Reset(a) => NonCyclicResponse::Reset(results(a)),
+            NonCyclicCommand::SystemId(a) => NonCyclicResponse::SystemId(results(a)),
+            NonCyclicCommand::Alarm(a) => NonCyclicResponse::Alarm(results(a)),
+            NonCyclicCommand::Parameter(a) => NonCyclicResponse::Parameter(results(a)),
+            NonCyclicCommand::Monitor(a) => NonCyclicResponse::Monitor(results(a)),
+            NonCyclicCommand::Homing { type_code, latch_sel1, latch_sel2, monitor_sel, .. } => {
+                NonCyclicResponse::Homing {
+                    execution,
+                    type_code,
+                    latch: self.latch_flags(),
+                    latch_sel1,
+                    latch_sel2,
+                    monitor_sel,
+                    monitor_data: selected(monitor_sel),
+                }
+            }
+            NonCyclicCommand::Profile { type_code, latch_sel1, monitor_sel, .. } => NonCyclicResponse::Profile {
+                execution: flags(err, Execution::ERR) | flags(self.motion.profile.is_some(), Execution::BUSY),
                 type_code,
-                latch_comp1: self.latches[0].is_some(),
-                latch_comp2: self.latches[1].is_some(),
-                latch_sel1,
-                latch_sel2,
-                monitor_sel,
-                monitor_data: selected(monitor_sel),
-            },
-            Request::Profile { type_code, latch_sel1, monitor_sel, .. } => Answer::Profile {
-                execution: Execution { err, wng: false, busy: self.motion.profile.is_some() },
-                type_code,
-                psl: false,
-                nsl: false,
-                near: self.is_near(),
-                latch_comp1: self.latches[0].is_some(),
+                flags: self.profile_flags(),
                 latch_sel1,
                 monitor_sel,
                 monitor_data: selected(monitor_sel),
@@ -118,12 +122,32 @@ impl Drive {
         }
     }
 
-    fn check_feed_forward(&self, request: &Request) -> Result<(), ErrorCode> {
+    fn latch_flags(&self) -> LatchFlags {
+        let [one, two] = self.latches.map(|latch| latch.is_some());
+        let mut flags = LatchFlags::empty();
+        flags.set(LatchFlags::LATCH_COMP1, one);
+        flags.set(LatchFlags::LATCH_COMP2, two);
+        flags
+    }
+
+    fn profile_flags(&self) -> ProfileFlags {
+        let mut flags = ProfileFlags::empty();
+        flags.set(ProfileFlags::NEAR, self.is_near());
+        flags.set(ProfileFlags::LATCH_COMP1, self.latches[0].is_some());
+        flags
+    }
+
+    fn check_feed_forward(&self, request: &NonCyclicCommand) -> Result<(), ErrorCode> {
         let data3 = match request {
-            Request::Normal { command_data3, .. } => *command_data3,
-            Request::Reset(a) | Request::SystemId(a) | Request::Alarm(a) | Request::Monitor(a) => a.data,
+            NonCyclicCommand::Normal { command_data3, .. } => *command_data3,
+            NonCyclicCommand::Reset(a)
+            | NonCyclicCommand::SystemId(a)
+            | NonCyclicCommand::Alarm(a)
+            | NonCyclicCommand::Monitor(a) => a.data,
             // These use bytes 12-15 themselves, or may.
-            Request::Parameter(_) | Request::Homing { .. } | Request::Profile { .. } => return Ok(()),
+            NonCyclicCommand::Parameter(_) | NonCyclicCommand::Homing { .. } | NonCyclicCommand::Profile { .. } => {
+                return Ok(());
+            }
         };
         match self.parameters.value(FEED_FORWARD) {
             0 if data3 != 0 => Err(ErrorCode::ARGUMENT),
@@ -164,15 +188,15 @@ impl Drive {
     }
 
     fn alarms(&mut self, a: Arguments) -> Outcomes {
-        let codes = self.settings.codes;
-        let none = crate::Alarm { main: 0, sub: 0 };
+        let codes = self.config.codes;
+        let none = Alarm { main: 0, sub: 0 };
         if a.type_code == codes.alarm_active {
-            return Ok(Outcome::Value(Reply::alarm_data(self.alarm.unwrap_or(none), self.warning)));
+            return Ok(Outcome::Value(Results::alarm_data(self.alarm.unwrap_or(none), self.warning)));
         }
         if a.type_code == codes.alarm_history {
             let entry = usize::from(a.index).checked_sub(1).and_then(|k| self.history.get(k));
             let alarm = entry.ok_or(ErrorCode::ARGUMENT)?;
-            return Ok(Outcome::Value(Reply::alarm_data(alarm.unwrap_or(none), 0)));
+            return Ok(Outcome::Value(Results::alarm_data(alarm.unwrap_or(none), 0)));
         }
         if a.type_code == codes.alarm_clear {
             self.clear_alarm();
@@ -183,7 +207,7 @@ impl Drive {
 
     fn parameter(&mut self, a: Arguments) -> Outcomes {
         let pr = Pr::from_index(a.index);
-        let codes = self.settings.codes;
+        let codes = self.config.codes;
         let value = self.parameters.get(pr).ok_or(ErrorCode::ARGUMENT);
         if a.type_code == parameter::WRITE {
             return if self.parameters.set(pr, a.data) { Ok(Outcome::Value(a.data)) } else { Err(ErrorCode::ARGUMENT) };
@@ -198,8 +222,8 @@ impl Drive {
     fn start(&mut self, type_code: u8, before: Code) -> Outcomes {
         let distance = if type_code == profile::RELATIVE {
             self.data1
-        } else if type_code == self.settings.codes.profile_absolute {
-            crate::position::step(self.motion.command, self.data1)
+        } else if type_code == self.config.codes.profile_absolute {
+            step(self.motion.command, self.data1)
         } else {
             return Err(ErrorCode::TYPE_CODE);
         };
@@ -241,10 +265,12 @@ pub(super) fn text(code: TypeCode, index: u16) -> Result<i32, ErrorCode> {
 }
 
 /// Whether the master holds a command rather than asks for another. Target speed and feed-forward may change meanwhile.
-fn is_same(old: &Request, new: &Request) -> bool {
+fn is_same(old: &NonCyclicCommand, new: &NonCyclicCommand) -> bool {
     match (old, new) {
-        (Request::Profile { type_code: a, .. }, Request::Profile { type_code: b, .. }) => a == b,
-        (Request::Monitor(a), Request::Monitor(b)) => a.type_code == b.type_code && a.index == b.index,
+        (NonCyclicCommand::Profile { type_code: a, .. }, NonCyclicCommand::Profile { type_code: b, .. }) => a == b,
+        (NonCyclicCommand::Monitor(a), NonCyclicCommand::Monitor(b)) => {
+            a.type_code == b.type_code && a.index == b.index
+        }
         _ => old == new,
     }
 }
