@@ -12,6 +12,8 @@ import { RP2040, ConsoleLogger, LogLevel } from 'rp2040js';
 const FLASH = 0x10000000;
 const BOOT2_RAM = 0x20041f00;
 const BOOT2_BYTES = 256;
+/** Where an image's stack begins: the end of its RAM in memory.x. */
+const STACK_TOP = 0x20040000;
 const PT_LOAD = 1;
 const DMA_CHAN_ABORT = 0x444;
 const EXEC_STALLED = 0x80000000;
@@ -95,6 +97,7 @@ export class Chip {
     this.name = name;
     this.ns = 1e9 / hz;
     this.instructions = 0;
+    this.deepest = STACK_TOP;
     this.busy = 0; // clocks that the present instruction still takes
     this.synchroniser = new Map();
     const chip = (this.chip = new RP2040());
@@ -138,10 +141,16 @@ export class Chip {
     } else if (!chip.core.waiting || chip.core.interruptsUpdated) {
       this.busy = chip.core.executeInstruction() - 1;
       this.instructions++;
+      if (chip.core.SP < this.deepest) this.deepest = chip.core.SP;
     }
     for (const scheduled of this.machines) if (scheduled.machine.enabled) scheduled.clock();
     chip.clock.tick(this.ns);
     for (const pio of chip.pio) pio.checkChangedPins();
+  }
+
+  /** The most stack that was in use so far, in bytes. */
+  get stack() {
+    return STACK_TOP - this.deepest;
   }
 
   /** Whether the pin is driven high. */

@@ -9,11 +9,12 @@ for tool in node npm python3; do
 done
 rustup target list --installed | grep -qx thumbv6m-none-eabi || rustup target add thumbv6m-none-eabi
 (cd ../../examples/firmware/rp2040 && cargo build --release --locked --bins)
+python3 size.py ../../examples/firmware/rp2040/target/thumbv6m-none-eabi/release/{t,a}format-{master,encoder}
 [ -d node_modules/rp2040js ] || npm ci --silent --no-audit --no-fund
 [ -x .venv/bin/python ] || python3 -m venv .venv
 .venv/bin/python -c 'import pioemu' 2>/dev/null || .venv/bin/pip install --quiet rp2040-pio-emulator==0.88.0
 
 node --test --test-reporter=spec
-for image in tformat-master tformat-encoder; do
+for image in tformat-master tformat-encoder-5m aformat-master aformat-encoder-2m5; do
     node waveform.mjs "$image" | .venv/bin/python compare.py
 done

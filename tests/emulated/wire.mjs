@@ -18,7 +18,7 @@ export class Wire {
     // What the encoder wanted to drive: bit 0 the level, bit 1 whether at all.
     this.past = new Uint8Array(PAST).fill(1);
     this.delay = 0; // clocks by which the encoder's driver is late
-    this.silent = false; // the encoder is disconnected
+    this.deaf = false; // the encoder hears nothing, so it is silent
     this.disturb = null; // (clocks since the request began, level) => level
     this.onRequest = () => {};
   }
@@ -30,7 +30,7 @@ export class Wire {
     const masterOn = master.output(DE);
     this.past[t % PAST] = (encoder.output(DE) ? 2 : 0) | (encoder.output(DI) ? 1 : 0);
     const wanted = this.past[(t + PAST - this.delay) % PAST];
-    const encoderOn = wanted > 1 && !this.silent;
+    const encoderOn = wanted > 1;
     if (masterOn && encoderOn) this.clashes++;
     let level = masterOn ? master.output(DI) : encoderOn ? (wanted & 1) === 1 : true;
     this.driver(0, masterOn);
@@ -40,7 +40,7 @@ export class Wire {
     this.level = level;
     // A receiver that is off gives 1, by the pull-up at its output.
     master.input(RO, masterOn || level);
-    encoder.input(RO, encoderOn || level);
+    encoder.input(RO, encoderOn || this.deaf || level);
     this.t++;
   }
 

@@ -9,6 +9,7 @@ use rp2040_hal::pio::{
     PIO, PIOBuilder, PinDir, PinState, Rx, SM0, SM1, ShiftDirection, StateMachine, Stopped, Tx, UninitStateMachine,
 };
 
+use crate::clock::Clock;
 use crate::programs::{self, Rate};
 
 /// DI of the transceiver.
@@ -156,6 +157,26 @@ impl RingReceiver {
         Some(Unit::of(word, self.bits))
     }
 }
+
+impl RingReceiver {
+    /// Waits until `from_ns`, and longer while somebody is still talking: until nothing has come for `quiet_ns`. Throws away
+    /// what comes. A line that never becomes quiet is given up after 1 ms.
+    pub fn settle(&mut self, clock: &mut Clock, from_ns: u64, quiet_ns: u64) {
+        let begin_ns = clock.now_ns();
+        let mut until_ns = from_ns;
+        loop {
+            let now_ns = clock.now_ns();
+            if self.take().is_some() {
+                until_ns = until_ns.max(now_ns + quiet_ns);
+            } else if now_ns >= until_ns || now_ns - begin_ns > GIVE_UP_NS {
+                return;
+            }
+        }
+    }
+}
+
+/// Longer than any response.
+const GIVE_UP_NS: u64 = 1_000_000;
 
 /// CHn_CTRL: enabled, words, the write address runs in a ring of 256 bytes, at the pace of the receiver; chained to itself,
 /// that is to none.
