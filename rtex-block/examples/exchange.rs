@@ -4,10 +4,9 @@
 
 use core::num::NonZeroU16;
 
-use rtex_block::device::{Drive, OpenCodes, Settings};
+use rtex_block::device::{Drive, DriveConfig, OpenCodes};
 use rtex_block::inspect::inspect;
-use rtex_block::master::{ActiveCode, Axis, AxisSettings, AxisState, Limits, Ring};
-use rtex_block::position::Gear;
+use rtex_block::master::{ActiveCode, Axis, AxisConfig, AxisState, Limits, Ring};
 use rtex_block::{Alarm, MacId, Response, TypeCode};
 
 /// Numbers that the documents at hand do not confirm; a model needs some.
@@ -24,15 +23,10 @@ const CODES: OpenCodes = OpenCodes {
 fn main() {
     let mac_id = MacId::new(5).unwrap_or_default();
     let some = NonZeroU16::MIN.saturating_add(7);
-    let axis = Axis::new(AxisSettings {
-        mac_id,
-        mode: ActiveCode::CyclicPosition,
-        update_ns: 500_000,
-        gear: Gear::UNITY,
-        limits: Limits { echo: some, ready: 200, active: 50, inactive: 50, answer: 50, command_errors: some },
-    });
+    let limits = Limits::new(some, 50).with_ready(200);
+    let axis = Axis::new(AxisConfig::new(mac_id, ActiveCode::CyclicPosition, 500_000, limits));
     let mut ring = Ring::new([axis], 2);
-    let mut drive = Drive::new(Settings { sync_exchanges: 4, servo_on_updates: 2, ..Settings::new(mac_id, CODES) });
+    let mut drive = Drive::new(DriveConfig::new(mac_id, CODES).with_sync_exchanges(4).with_servo_on_updates(2));
     let mut response = None;
     let mut before = None;
     for _ in 0..16 {

@@ -1,5 +1,7 @@
 //! Command positions: 32-bit numbers that wrap.
 
+use servowire_core::OutOfRange;
+
 /// Step from one position to the next, the short way round: 7FFFFFFFh to 80000000h is a step of +1.
 ///
 /// SX-DSV02310, "Command error protection".
@@ -10,6 +12,11 @@ pub const fn step(old: i32, new: i32) -> i32 {
 /// Electronic gear: encoder pulses a command unit.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(
+    feature = "serde",
+    derive(serde::Serialize, serde::Deserialize),
+    serde(try_from = "(u32, u32)", into = "(u32, u32)")
+)]
 pub struct Gear {
     numerator: u32,
     denominator: u32,
@@ -25,7 +32,22 @@ impl Gear {
     }
 }
 
-/// Largest rate of command pulses behind the electronic gear, pulses per second.
+impl TryFrom<(u32, u32)> for Gear {
+    type Error = OutOfRange;
+
+    /// Numerator and denominator.
+    fn try_from((numerator, denominator): (u32, u32)) -> Result<Self, OutOfRange> {
+        Self::new(numerator, denominator).ok_or(OutOfRange { got: 0, max: 1 })
+    }
+}
+
+impl From<Gear> for (u32, u32) {
+    fn from(gear: Gear) -> Self {
+        (gear.numerator, gear.denominator)
+    }
+}
+
+/// Largest rate of command pulses after the electronic gear, pulses per second.
 pub const MAX_PULSES_PER_S: u32 = 400_000_000;
 
 /// Largest step of the command position in an update period, command units, rounded down.

@@ -13,9 +13,9 @@
 
 use core::num::NonZeroU16;
 
-use rtex_block::device::{Drive, OpenCodes, Settings};
-use rtex_block::master::{ActiveCode, Axis, AxisSettings, AxisState, Limits, Ring};
-use rtex_block::position::{Gear, step};
+use rtex_block::device::{Drive, DriveConfig, OpenCodes};
+use rtex_block::master::{ActiveCode, Axis, AxisConfig, AxisState, Limits, Ring};
+use rtex_block::position::step;
 use rtex_block::{Alarm, Command, CommandBlock, MacId, Response, TypeCode};
 
 const AXES: usize = 32;
@@ -36,13 +36,8 @@ const CODES: OpenCodes = OpenCodes {
 
 fn axis(number: u8) -> Axis {
     let limit = NonZeroU16::new(LIMIT).unwrap();
-    Axis::new(AxisSettings {
-        mac_id: MacId::new(number).unwrap(),
-        mode: ActiveCode::CyclicPosition,
-        update_ns: 500_000,
-        gear: Gear::UNITY,
-        limits: Limits { echo: limit, ready: 200, active: 50, inactive: 10, answer: 50, command_errors: limit },
-    })
+    let limits = Limits::new(limit, 50).with_ready(200).with_inactive(10);
+    Axis::new(AxisConfig::new(MacId::new(number).unwrap(), ActiveCode::CyclicPosition, 500_000, limits))
 }
 
 /// What the line does to one axis.
@@ -81,7 +76,7 @@ impl Bench {
         let number = |k: usize| k as u8;
         Self {
             ring: Ring::new(core::array::from_fn(|k| axis(number(k))), invalid),
-            drives: core::array::from_fn(|k| Drive::new(Settings::new(MacId::new(number(k)).unwrap(), CODES))),
+            drives: core::array::from_fn(|k| Drive::new(DriveConfig::new(MacId::new(number(k)).unwrap(), CODES))),
             lines: [Line::Good; AXES],
             responses: [None; AXES],
             commands: core::array::from_fn(|k| Command::nop(MacId::new(number(k)).unwrap())),

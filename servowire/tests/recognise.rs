@@ -3,7 +3,7 @@
 //! A handful of captures each, so that it stays short; `cargo run --release -p servowire --example recognition-table`
 //! draws as many as one likes.
 
-#![allow(clippy::unwrap_used)]
+#![allow(clippy::std_instead_of_core, clippy::unwrap_used)]
 
 mod random;
 

@@ -1,4 +1,9 @@
-use crate::{Alarm, BlockSize, CommandBlock, CyclicCode, ErrorCode, LEN, MacId, NonCyclicCode, SubCode, split32};
+use crate::block::{BlockSize, LEN, exact};
+use crate::code::{CyclicCode, NonCyclicCode};
+use crate::command::CommandBlock;
+use crate::error_code::{Alarm, ErrorCode};
+use crate::header::MacId;
+use crate::sub::{SubCode, split32};
 
 /// What a drive finds wrong with the header, the codes and the sub block of a command.
 ///
@@ -30,7 +35,7 @@ impl Verdict {
 pub fn check(bytes: &[u8], size: BlockSize, mac_id: MacId) -> Verdict {
     let fault = |error, alarm| Verdict { error: Some(error), sub_error: None, alarm };
     let (main, sub): (&[u8; LEN], Option<&[u8; LEN]>) = match size {
-        BlockSize::Bytes16 => match crate::exact(bytes) {
+        BlockSize::Bytes16 => match exact(bytes) {
             Ok(main) => (main, None),
             Err(_) => return fault(ErrorCode::MAC_ID, Some(Alarm::CYCLIC_DATA)),
         },

@@ -1,13 +1,24 @@
+mod service;
+
+use service::{Job, text};
+
 use super::check::{Verdict, check};
+use super::config::DriveConfig;
 use super::motion::{Drivemode, Motion};
 use super::parameters::{ACCELERATION, DECELERATION, Parameters, RESPONSE_DATA, SPEED_UNIT, SUB_RESPONSE_DATA};
 use super::profile::Ramp;
-use super::service::{Job, text};
-use super::settings::Settings;
-use crate::{
-    Alarm, BlockSize, Code, CommandBlock, ControlBits, CyclicCode, ErrorCode, Execution, Header, LEN, LEN32, Nibble,
-    Request, Response, Response32, StatusFlags, SubCode, SubCommand, SubResponse, TypeCode, UpdateCounter, split32,
-};
+use crate::block::{BlockSize, LEN, LEN32};
+use crate::code::{Code, CyclicCode};
+use crate::command::CommandBlock;
+use crate::control::ControlBits;
+use crate::error_code::{Alarm, ErrorCode};
+use crate::execution::Execution;
+use crate::header::{Header, UpdateCounter};
+use crate::noncyclic_command::NonCyclicCommand;
+use crate::response::Response;
+use crate::status::StatusFlags;
+use crate::sub::{Response32, SubCode, SubCommand, SubResponse, split32};
+use crate::type_code::{Nibble, Pr, TypeCode};
 
 /// A model of a drive: every exchange takes a command block and gives a response block.
 ///
@@ -19,25 +30,25 @@ use crate::{
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Drive {
-    pub(super) settings: Settings,
-    pub(super) parameters: Parameters,
-    pub(super) motion: Motion,
-    pub(super) alarm: Option<Alarm>,
-    pub(super) history: [Option<Alarm>; 14],
-    pub(super) warning: u16,
-    pub(super) homed: bool,
-    pub(super) latches: [Option<i32>; 2],
+    config: DriveConfig,
+    parameters: Parameters,
+    motion: Motion,
+    alarm: Option<Alarm>,
+    history: [Option<Alarm>; 14],
+    warning: u16,
+    homed: bool,
+    latches: [Option<i32>; 2],
     main_power: bool,
     inputs: StatusFlags,
     /// The command in force.
     cyclic: CyclicCode,
     control: ControlBits,
-    pub(super) data1: i32,
+    data1: i32,
     target_speed: i32,
     /// What the next response echoes.
     echo: Code,
-    pub(super) error: Option<ErrorCode>,
-    pub(super) job: Option<Job>,
+    error: Option<ErrorCode>,
+    job: Option<Job>,
     sub: SubResponse,
     /// Supervision.
     exchanges: u16,
@@ -51,9 +62,9 @@ pub struct Drive {
 
 impl Drive {
     /// A drive that has just got control power; main power is on, and nothing has been received.
-    pub const fn new(settings: Settings) -> Self {
+    pub const fn new(config: DriveConfig) -> Self {
         Self {
-            settings,
+            config,
             parameters: Parameters::DEFAULT,
             motion: Motion::new(),
             alarm: None,
@@ -72,7 +83,7 @@ impl Drive {
             job: None,
             sub: SubResponse {
                 cmd_error: false,
-                execution: Execution { err: false, wng: false, busy: false },
+                execution: Execution::empty(),
                 code: Nibble::ZERO,
                 type_code: 0,
                 index: 0,
@@ -109,8 +120,8 @@ impl Drive {
     /// A communication period in which no frame came.
     pub fn miss(&mut self) {
         self.lost = self.lost.saturating_add(1);
-        if self.lost == self.settings.lost_limit {
-            self.raise(self.settings.codes.communication_lost);
+        if self.lost == self.config.lost_limit {
+            self.raise(self.config.codes.communication_lost);
             self.exchanges = 0;
             self.counter = None;
         }
@@ -133,8 +144,8 @@ impl Drive {
     }
 
     /// How it was set up.
-    pub const fn settings(&self) -> &Settings {
-        &self.settings
+    pub const fn config(&self) -> &DriveConfig {
+        &self.config
     }
 
     /// Raises an alarm: the motor is released at once. An alarm that is already there stays.
@@ -185,12 +196,12 @@ impl Drive {
 
     /// Servo_Ready: main power, no alarm, synchronised.
     pub const fn is_ready(&self) -> bool {
-        self.main_power && self.alarm.is_none() && self.exchanges >= self.settings.sync_exchanges
+        self.main_power && self.alarm.is_none() && self.exchanges >= self.config.sync_exchanges
     }
 
     fn status(&self) -> StatusFlags {
         let progress = self.motion.profile.is_some();
-        let settled = self.motion.deviation().unsigned_abs() <= self.settings.in_position;
+        let settled = self.motion.deviation().unsigned_abs() <= self.config.in_position;
         let set = [
             (StatusFlags::SERVO_ACTIVE, self.is_active()),
             (StatusFlags::SERVO_READY, self.is_ready()),
@@ -201,14 +212,14 @@ impl Drive {
             (StatusFlags::IN_PROGRESS, progress),
             (StatusFlags::IN_POSITION, settled && !progress),
         ];
-        set.into_iter().fold(self.inputs, |all, (flag, on)| if on { all.with(flag) } else { all })
+        set.into_iter().fold(self.inputs, |all, (flag, on)| if on { all.union(flag) } else { all })
     }
 
     /// The response while the block with this byte 0 comes in: its counter, everything else as it was before.
     fn response(&self, byte0: u8) -> Response {
         let [response_data1, ..] = self.response_data();
         Response {
-            mac_id: self.settings.mac_id,
+            mac_id: self.config.mac_id,
             update_counter_echo: Header::from_byte(byte0).update_counter,
             cmd_error: false,
             code: self.echo,
@@ -217,17 +228,17 @@ impl Drive {
             response_data2: 0,
             response_data3: 0,
         }
-        .with_answer(&self.answer())
+        .with_noncyclic(&self.noncyclic())
     }
 
     /// Response_Data1 to 3 as Pr7.29 to 7.31 select them.
-    pub(super) fn response_data(&self) -> [i32; 3] {
+    fn response_data(&self) -> [i32; 3] {
         let defaults = [self.motion.actual, self.speed(self.motion.actual_step), self.motion.torque];
         let [one, two, three] = RESPONSE_DATA;
         [self.selected(one, defaults[0]), self.selected(two, defaults[1]), self.selected(three, defaults[2])]
     }
 
-    fn selected(&self, pr: crate::Pr, default: i32) -> i32 {
+    fn selected(&self, pr: Pr, default: i32) -> i32 {
         match u8::try_from(self.parameters.value(pr)) {
             Ok(0) => default,
             Ok(code) => self.monitor(TypeCode::short(code), 0).unwrap_or(0),
@@ -236,10 +247,10 @@ impl Drive {
     }
 
     /// A step per update period as a speed in the unit of Pr7.25.
-    pub(super) fn speed(&self, step: i32) -> i32 {
+    fn speed(&self, step: i32) -> i32 {
         let scale = if self.parameters.value(SPEED_UNIT) == 0 { 60_000_000_000 } else { 1_000_000_000 };
-        let per = if self.parameters.value(SPEED_UNIT) == 0 { self.settings.units_per_rev } else { 1 };
-        let divisor = i128::from(self.settings.update_ns).saturating_mul(per.into());
+        let per = if self.parameters.value(SPEED_UNIT) == 0 { self.config.units_per_rev } else { 1 };
+        let divisor = i128::from(self.config.update_ns).saturating_mul(per.into());
         let speed = i128::from(step).saturating_mul(scale).checked_div(divisor).unwrap_or(0);
         i32::try_from(speed).unwrap_or(if speed < 0 { i32::MIN } else { i32::MAX })
     }
@@ -248,21 +259,21 @@ impl Drive {
     fn units_per_second(&self, speed: i32) -> i64 {
         let speed = i64::from(speed);
         if self.parameters.value(SPEED_UNIT) == 0 {
-            speed.saturating_mul(self.settings.units_per_rev.into()) / 60
+            speed.saturating_mul(self.config.units_per_rev.into()) / 60
         } else {
             speed
         }
     }
 
-    pub(super) fn is_near(&self) -> bool {
+    fn is_near(&self) -> bool {
         let to_go = self.motion.profile.map_or(0, |generator| generator.distance_to_go());
-        to_go.unsigned_abs() <= self.settings.near.into()
+        to_go.unsigned_abs() <= self.config.near.into()
     }
 
     fn receive(&mut self, bytes: &[u8], size: BlockSize) {
         self.lost = 0;
         self.exchanges = self.exchanges.saturating_add(1);
-        let verdict = check(bytes, size, self.settings.mac_id);
+        let verdict = check(bytes, size, self.config.mac_id);
         if let Some(alarm) = verdict.alarm {
             self.discard(bytes, verdict, alarm);
         } else if let Some(main) = bytes.first_chunk::<LEN>() {
@@ -279,7 +290,7 @@ impl Drive {
     /// The block is thrown away; an undefined code is echoed as it came.
     fn discard(&mut self, bytes: &[u8], verdict: Verdict, alarm: Alarm) {
         if let (Some(_), Some(&byte1)) = (verdict.error, bytes.get(1)) {
-            self.echo = Code::from_byte(byte1);
+            self.echo = Code::truncate(byte1);
             self.error = verdict.error;
         }
         if let (Some(code), Ok((_, sub))) = (verdict.sub_error, split32(bytes)) {
@@ -290,7 +301,7 @@ impl Drive {
 
     fn count_fault(&mut self, alarm: Alarm) {
         self.faults = self.faults.saturating_add(1);
-        if self.faults >= self.settings.fault_limit && self.exchanges >= self.settings.sync_exchanges {
+        if self.faults >= self.config.fault_limit && self.exchanges >= self.config.sync_exchanges {
             self.raise(alarm);
         }
     }
@@ -313,10 +324,10 @@ impl Drive {
         self.cyclic = cyclic;
         self.control = block.control();
         self.data1 = block.command_data1();
-        self.motion.request(self.control.servo_on() && self.is_ready(), &self.settings);
+        self.motion.request(self.control.contains(ControlBits::SERVO_ON) && self.is_ready(), &self.config);
         let Some(noncyclic) = block.code().noncyclic() else { return };
-        let request = Request::from_bytes(noncyclic, block.noncyclic_bytes());
-        if let Request::Profile { target_speed, .. } = request {
+        let request = NonCyclicCommand::from_bytes(noncyclic, block.noncyclic_bytes());
+        if let NonCyclicCommand::Profile { target_speed, .. } = request {
             self.target_speed = target_speed;
         }
         self.error = self.serve(request, before).err();
@@ -325,7 +336,7 @@ impl Drive {
     /// The counter adds 1 in every update period; with two communications in it every value comes twice.
     fn supervise(&mut self, counter: UpdateCounter) {
         let last = self.counter.replace(counter);
-        let allowed = self.settings.communications.saturating_sub(1);
+        let allowed = self.config.communications.saturating_sub(1);
         let good = match last {
             None => true,
             Some(last) if counter == last => self.repeats < allowed,
@@ -333,7 +344,7 @@ impl Drive {
         };
         self.repeats = if last == Some(counter) { self.repeats.saturating_add(1) } else { 0 };
         self.wrong_counts = if good { 0 } else { self.wrong_counts.saturating_add(1) };
-        if self.wrong_counts >= self.settings.counter_limit && self.exchanges >= self.settings.sync_exchanges {
+        if self.wrong_counts >= self.config.counter_limit && self.exchanges >= self.config.sync_exchanges {
             self.raise(Alarm::UPDATE_COUNTER);
         }
     }
@@ -353,7 +364,7 @@ impl Drive {
             Ok(data1) => {
                 self.sub = SubResponse {
                     cmd_error: false,
-                    code: Nibble::low(command.code as u8),
+                    code: Nibble::truncate(command.code as u8),
                     type_code: command.type_code,
                     index: command.index,
                     data1,
@@ -367,7 +378,7 @@ impl Drive {
     fn refuse_sub(&mut self, sub: &[u8; LEN], code: ErrorCode) {
         self.sub = SubResponse {
             cmd_error: true,
-            code: Nibble::low(sub[0]),
+            code: Nibble::truncate(sub[0]),
             type_code: 0,
             index: code.0,
             data1: 0,
@@ -378,14 +389,14 @@ impl Drive {
     /// The end of a communication period; at the end of an update period the axis moves.
     fn tick(&mut self) {
         self.communication = self.communication.saturating_add(1);
-        if self.communication < self.settings.communications {
+        if self.communication < self.config.communications {
             return;
         }
         self.communication = 0;
         let acceleration = |pr| i64::from(self.parameters.value(pr).max(1)).saturating_mul(10_000);
         let ramp = Ramp { up: acceleration(ACCELERATION), down: acceleration(DECELERATION) };
         let per_update = |speed: i32| {
-            let units = self.units_per_second(speed).saturating_mul(self.settings.update_ns.into()) / 1_000_000_000;
+            let units = self.units_per_second(speed).saturating_mul(self.config.update_ns.into()) / 1_000_000_000;
             i32::try_from(units).unwrap_or(if units < 0 { i32::MIN } else { i32::MAX })
         };
         let mode = match self.cyclic {
@@ -394,12 +405,17 @@ impl Drive {
             CyclicCode::CyclicVelocity => Drivemode::Velocity(per_update(self.data1)),
             CyclicCode::CyclicTorque => Drivemode::Torque(self.data1),
         };
-        let (hard, smooth) = (self.control.hard_stop(), self.control.smooth_stop());
+        let (hard, smooth) =
+            (self.control.contains(ControlBits::HARD_STOP), self.control.contains(ControlBits::SMOOTH_STOP));
         if mode == Drivemode::Profile && (hard || smooth) && self.motion.is_active() {
-            return self.motion.stop_profile(!hard, ramp, &self.settings);
+            return self.motion.stop_profile(!hard, ramp, &self.config);
         }
-        let speed = if self.control.pause() { 0 } else { self.units_per_second(self.target_speed).saturating_abs() };
-        if !self.motion.update(mode, ramp, speed, &self.settings) {
+        let speed = if self.control.contains(ControlBits::PAUSE) {
+            0
+        } else {
+            self.units_per_second(self.target_speed).saturating_abs()
+        };
+        if !self.motion.update(mode, ramp, speed, &self.config) {
             self.raise(Alarm::COMMAND_STEP);
         }
     }

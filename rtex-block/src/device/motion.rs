@@ -1,5 +1,6 @@
+use super::config::DriveConfig;
 use super::profile::{Generator, Ramp};
-use super::settings::Settings;
+
 use crate::position::{is_within_limit, step};
 
 /// Largest torque, 0.1 % of rated.
@@ -86,10 +87,10 @@ impl Motion {
     }
 
     /// Servo_On as the drive sees it.
-    pub(super) fn request(&mut self, servo_on: bool, settings: &Settings) {
+    pub(super) fn request(&mut self, servo_on: bool, config: &DriveConfig) {
         match (servo_on, self.power) {
             (false, _) => self.release(),
-            (true, Power::Off) => self.power = Power::SwitchingOn { left: settings.servo_on_updates },
+            (true, Power::Off) => self.power = Power::SwitchingOn { left: config.servo_on_updates },
             (true, _) => {}
         }
     }
@@ -101,7 +102,7 @@ impl Motion {
     }
 
     /// One update period; `false` if the position command makes too large a step.
-    pub(super) fn update(&mut self, mode: Drivemode, ramp: Ramp, profile_speed: i64, settings: &Settings) -> bool {
+    pub(super) fn update(&mut self, mode: Drivemode, ramp: Ramp, profile_speed: i64, config: &DriveConfig) -> bool {
         match self.power {
             Power::Off => self.rest(),
             Power::SwitchingOn { left } => {
@@ -119,30 +120,30 @@ impl Motion {
                     self.power = Power::Off;
                 }
             }
-            Power::On => return self.drive(mode, ramp, profile_speed, settings),
+            Power::On => return self.drive(mode, ramp, profile_speed, config),
         }
         true
     }
 
-    fn drive(&mut self, mode: Drivemode, ramp: Ramp, profile_speed: i64, settings: &Settings) -> bool {
+    fn drive(&mut self, mode: Drivemode, ramp: Ramp, profile_speed: i64, config: &DriveConfig) -> bool {
         let last = self.actual_step;
         match mode {
             Drivemode::Position(target) => {
                 self.profile = None;
                 self.command_step = step(self.command, target);
-                if !is_within_limit(self.command_step, settings.update_ns, settings.gear) {
+                if !is_within_limit(self.command_step, config.update_ns, config.gear) {
                     return false;
                 }
                 self.command = target;
-                self.follow(settings);
+                self.follow(config);
             }
             Drivemode::Profile => {
                 let advance = match &mut self.profile {
-                    Some(generator) => generator.step(profile_speed, ramp, settings.update_ns),
+                    Some(generator) => generator.step(profile_speed, ramp, config.update_ns),
                     None => (0, true),
                 };
                 self.advance(advance);
-                self.follow(settings);
+                self.follow(config);
             }
             Drivemode::Velocity(speed) => {
                 self.profile = None;
@@ -165,13 +166,13 @@ impl Motion {
     }
 
     /// One update period of a profile motion that is being stopped.
-    pub(super) fn stop_profile(&mut self, smooth: bool, ramp: Ramp, settings: &Settings) {
+    pub(super) fn stop_profile(&mut self, smooth: bool, ramp: Ramp, config: &DriveConfig) {
         let advance = match &mut self.profile {
-            Some(generator) if smooth => generator.brake(ramp, settings.update_ns),
+            Some(generator) if smooth => generator.brake(ramp, config.update_ns),
             _ => (0, true),
         };
         self.advance(advance);
-        self.follow(settings);
+        self.follow(config);
     }
 
     fn advance(&mut self, (by, done): (i32, bool)) {
@@ -182,9 +183,9 @@ impl Motion {
         }
     }
 
-    fn follow(&mut self, settings: &Settings) {
+    fn follow(&mut self, config: &DriveConfig) {
         let deviation = self.deviation();
-        let part = deviation >> settings.follow.min(15);
+        let part = deviation >> config.follow.min(15);
         // A shift rounds down: the last units are made one by one from above.
         self.turn(if part == 0 { deviation.signum() } else { part });
     }

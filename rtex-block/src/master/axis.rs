@@ -1,13 +1,27 @@
 use core::num::NonZeroU16;
 
-use super::{ActiveCode, EchoWatch, Handshake, MoveProgress, ProfileMove, Progress, ServoOff, Turn};
+use super::counter::Turn;
+use super::echo::EchoWatch;
+use super::handshake::Handshake;
+use super::profile_move::{CommandEnded, ProfileMove};
+use super::progress::Progress;
+use super::servo_off::{ActiveCode, ServoOff};
+use crate::builder::builder;
+use crate::command::Command;
+use crate::control::ControlBits;
+use crate::error_code::ErrorCode;
+use crate::header::MacId;
+use crate::noncyclic_command::NonCyclicCommand;
+use crate::noncyclic_response::NonCyclicResponse;
 use crate::position::{Gear, max_step, step};
-use crate::{Answer, Command, ControlBits, ErrorCode, MacId, Request, Response, StatusFlags};
+use crate::response::Response;
+use crate::status::StatusFlags;
 
 /// Time limits, in update periods.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[non_exhaustive]
 pub struct Limits {
     /// Unchanged echoes of the counter that count as a time-out.
     pub echo: NonZeroU16,
@@ -24,10 +38,28 @@ pub struct Limits {
     pub command_errors: NonZeroU16,
 }
 
+impl Limits {
+    /// `echo` for the echo of the counter and for command errors, `wait` for everything that is waited for. The vendor's
+    /// times are not known, so there is no default.
+    pub const fn new(echo: NonZeroU16, wait: u32) -> Self {
+        Self { echo, ready: wait, active: wait, inactive: wait, answer: wait, command_errors: echo }
+    }
+
+    builder! {
+        with_ready: ready, u32;
+        with_active: active, u32;
+        with_inactive: inactive, u32;
+        with_answer: answer, u32;
+        with_command_errors: command_errors, NonZeroU16;
+    }
+}
+
 /// What an axis is set up with.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub struct AxisSettings {
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[non_exhaustive]
+pub struct AxisConfig {
     /// The drive's address.
     pub mac_id: MacId,
     /// What it does when it is switched on.
@@ -38,6 +70,17 @@ pub struct AxisSettings {
     pub gear: Gear,
     /// Time limits.
     pub limits: Limits,
+}
+
+impl AxisConfig {
+    /// With electronic gear 1/1.
+    pub const fn new(mac_id: MacId, mode: ActiveCode, update_ns: u32, limits: Limits) -> Self {
+        Self { mac_id, mode, update_ns, gear: Gear::UNITY, limits }
+    }
+
+    builder! {
+        with_gear: gear, Gear;
+    }
 }
 
 /// Why an axis was stopped.
@@ -135,7 +178,7 @@ enum Service {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Axis {
-    settings: AxisSettings,
+    config: AxisConfig,
     /// Largest step of the command position.
     max_step: u32,
     state: AxisState,
@@ -151,24 +194,24 @@ pub struct Axis {
     /// Consecutive responses with CMD_Error.
     refused: u16,
     service: Service,
-    outcome: Option<Progress>,
+    outcome: Option<Progress<NonCyclicResponse>>,
     profile: Option<ProfileMove>,
 }
 
 impl Axis {
     /// An axis whose drive has not answered yet.
-    pub const fn new(settings: AxisSettings) -> Self {
+    pub const fn new(config: AxisConfig) -> Self {
         Self {
-            settings,
-            max_step: max_step(settings.update_ns, settings.gear),
+            config,
+            max_step: max_step(config.update_ns, config.gear),
             state: AxisState::Starting,
-            left: settings.limits.ready,
+            left: config.limits.ready,
             setpoint: 0,
             actual: 0,
             status: StatusFlags::empty(),
             control: ControlBits::empty(),
             feed_forward: 0,
-            watch: EchoWatch::new(settings.limits.echo),
+            watch: EchoWatch::new(config.limits.echo),
             refused: 0,
             service: Service::Idle,
             outcome: None,
@@ -177,8 +220,8 @@ impl Axis {
     }
 
     /// How it was set up.
-    pub const fn settings(&self) -> &AxisSettings {
-        &self.settings
+    pub const fn config(&self) -> &AxisConfig {
+        &self.config
     }
 
     /// The present state.
@@ -203,14 +246,14 @@ impl Axis {
 
     /// Whether the servo is off, and the drive ready to switch it on.
     pub const fn can_switch_on(&self) -> bool {
-        matches!(self.state, AxisState::Off) && self.status.servo_ready()
+        matches!(self.state, AxisState::Off) && self.status.contains(StatusFlags::SERVO_READY)
     }
 
     /// Switches the servo on, from `Off`; gives whether it did anything.
     pub fn switch_on(&mut self) -> bool {
         let able = self.can_switch_on();
         if able {
-            self.enter(AxisState::SwitchingOn, self.settings.limits.active);
+            self.enter(AxisState::SwitchingOn, self.config.limits.active);
         }
         able
     }
@@ -218,7 +261,7 @@ impl Axis {
     /// Switches the servo off. A stopped axis stays stopped.
     pub fn switch_off(&mut self) {
         if matches!(self.state, AxisState::SwitchingOn | AxisState::On) {
-            self.enter(AxisState::SwitchingOff, self.settings.limits.inactive);
+            self.enter(AxisState::SwitchingOff, self.config.limits.inactive);
         }
     }
 
@@ -234,13 +277,13 @@ impl Axis {
         if matches!(self.state, AxisState::Stopped(_)) {
             self.watch.reset();
             self.refused = 0;
-            self.enter(AxisState::Starting, self.settings.limits.ready);
+            self.enter(AxisState::Starting, self.config.limits.ready);
         }
     }
 
     /// Control bits other than Servo_On, which the state decides.
     pub const fn set_control(&mut self, control: ControlBits) {
-        self.control = control.without(ControlBits::SERVO_ON);
+        self.control = control.difference(ControlBits::SERVO_ON);
     }
 
     /// Command_Data3 of the normal command: velocity or torque feed-forward by Pr7.35. With Pr7.35 = 0 it must stay 0,
@@ -254,7 +297,7 @@ impl Axis {
     /// # Errors
     /// [`SetpointError`]; the position before is kept then.
     pub const fn set_position(&mut self, position: i32) -> Result<(), SetpointError> {
-        match (self.state, self.settings.mode) {
+        match (self.state, self.config.mode) {
             (AxisState::On, ActiveCode::CyclicPosition) => {}
             (AxisState::On, _) => return Err(SetpointError::Mode),
             _ => return Err(SetpointError::NotOn),
@@ -272,7 +315,7 @@ impl Axis {
     /// # Errors
     /// [`SetpointError`]; the value before is kept then.
     pub const fn set_rate(&mut self, rate: i32) -> Result<(), SetpointError> {
-        match (self.state, self.settings.mode) {
+        match (self.state, self.config.mode) {
             (AxisState::On, ActiveCode::CyclicVelocity | ActiveCode::CyclicTorque) => {
                 self.setpoint = rate;
                 Ok(())
@@ -287,7 +330,7 @@ impl Axis {
     /// # Errors
     /// [`SetpointError`]; a motion under way goes on then.
     pub const fn start_move(&mut self, type_code: u8, target: i32, speed: i32) -> Result<(), SetpointError> {
-        match (self.state, self.settings.mode) {
+        match (self.state, self.config.mode) {
             (AxisState::On, ActiveCode::ProfilePosition) => {}
             (AxisState::On, _) => return Err(SetpointError::Mode),
             _ => return Err(SetpointError::NotOn),
@@ -295,8 +338,8 @@ impl Axis {
         if self.profile.is_some() || !matches!(self.service, Service::Idle) {
             return Err(SetpointError::Moving);
         }
-        let limit = self.settings.limits.answer;
-        self.profile = Some(ProfileMove::new(self.settings.mac_id, type_code, target, speed, limit));
+        let limit = self.config.limits.answer;
+        self.profile = Some(ProfileMove::new(self.config.mac_id, type_code, target, speed, limit));
         Ok(())
     }
 
@@ -307,23 +350,28 @@ impl Axis {
         }
     }
 
+    /// The profile motion under way, or ended and not taken yet.
+    pub const fn profile(&self) -> Option<&ProfileMove> {
+        self.profile.as_ref()
+    }
+
     /// How far the profile motion is; once it has ended this gives its end and forgets it.
-    pub const fn take_move(&mut self) -> Option<MoveProgress> {
+    pub const fn take_move(&mut self) -> Option<Progress<CommandEnded>> {
         let Some(profile) = &self.profile else { return None };
         let progress = profile.progress();
-        if !matches!(progress, MoveProgress::Preparing | MoveProgress::Starting | MoveProgress::Moving { .. }) {
+        if !progress.is_pending() {
             self.profile = None;
         }
         Some(progress)
     }
 
     /// Sends a non-cyclic command; `false` if one is under way, or the request is none of the kind.
-    pub const fn ask(&mut self, request: Request) -> bool {
-        let (cyclic, limit) = (self.settings.mode.cyclic(), self.settings.limits.answer);
+    pub const fn ask(&mut self, request: NonCyclicCommand) -> bool {
+        let (cyclic, limit) = (self.config.mode.cyclic(), self.config.limits.answer);
         if !matches!(self.service, Service::Idle) || self.profile.is_some() {
             return false;
         }
-        match Handshake::new(self.settings.mac_id, cyclic, request, limit) {
+        match Handshake::new(self.config.mac_id, cyclic, request, limit) {
             Some(handshake) => {
                 self.service = Service::Asking(handshake);
                 self.outcome = None;
@@ -334,14 +382,14 @@ impl Axis {
     }
 
     /// The outcome of the last request, once.
-    pub const fn take_outcome(&mut self) -> Option<Progress> {
+    pub const fn take_outcome(&mut self) -> Option<Progress<NonCyclicResponse>> {
         self.outcome.take()
     }
 
     /// Takes what an update period brought: the drive's response to what was `sent`, `None` if there was none or it
     /// was refused. While invalid data go out no limit runs.
     pub fn receive(&mut self, sent: Turn, response: Option<&Response>) {
-        let response = response.filter(|response| response.mac_id == self.settings.mac_id);
+        let response = response.filter(|response| response.mac_id == self.config.mac_id);
         if sent != Turn::Invalid {
             if self.watch.sample(response.map(|r| r.update_counter_echo)) {
                 self.stop(StopReason::EchoTimeout);
@@ -357,51 +405,59 @@ impl Axis {
             self.actual = response.response_data1;
         }
         if self.state != AxisState::On {
-            self.setpoint = if self.settings.mode == ActiveCode::CyclicPosition { self.actual } else { 0 };
+            self.setpoint = if self.config.mode == ActiveCode::CyclicPosition { self.actual } else { 0 };
         }
     }
 
     /// What to send in this update period.
     pub const fn send(&self, turn: Turn) -> Command {
-        let mac_id = self.settings.mac_id;
+        let mac_id = self.config.mac_id;
         let counter = match turn {
             Turn::Invalid => return Command::nop(mac_id),
             Turn::Valid(counter) => counter,
         };
-        let off = *ServoOff::new(mac_id, counter, self.settings.mode).command();
+        let off = *ServoOff::new(mac_id, counter, self.config.mode).command();
         let request = match (&self.service, &self.profile) {
             (Service::Asking(handshake), _) => handshake.request(),
             (_, Some(profile)) => profile.request(),
-            _ => Request::Normal { command_data2: 0, command_data3: self.feed_forward },
+            _ => NonCyclicCommand::Normal { command_data2: 0, command_data3: self.feed_forward },
         };
         let command_data1 = match &self.profile {
             Some(profile) => profile.target_position(),
             None => self.setpoint,
         };
         let control = match self.state {
-            AxisState::SwitchingOn | AxisState::On => self.control.with(ControlBits::SERVO_ON),
+            AxisState::SwitchingOn | AxisState::On => self.control.union(ControlBits::SERVO_ON),
             _ => self.control,
         };
-        Command { control, command_data1, request, ..off }
+        Command { control, command_data1, noncyclic: request, ..off }
     }
 
     /// Alarm, readiness and activity by the state.
     fn look(&mut self, response: &Response) {
         let status = response.status;
         match self.state {
-            AxisState::Starting if status.servo_ready() && !status.servo_active() => self.enter(AxisState::Off, 0),
-            AxisState::SwitchingOff if !status.servo_active() => self.enter(AxisState::Off, 0),
-            AxisState::SwitchingOn | AxisState::On if status.alarm() => self.stop(StopReason::Alarm),
-            AxisState::SwitchingOn | AxisState::On if !status.servo_ready() => self.stop(StopReason::NotReady),
-            AxisState::SwitchingOn if status.servo_active() => self.enter(AxisState::On, 0),
-            AxisState::On if !status.servo_active() => self.stop(StopReason::NotActive),
+            AxisState::Starting
+                if status.contains(StatusFlags::SERVO_READY) && !status.contains(StatusFlags::SERVO_ACTIVE) =>
+            {
+                self.enter(AxisState::Off, 0);
+            }
+            AxisState::SwitchingOff if !status.contains(StatusFlags::SERVO_ACTIVE) => self.enter(AxisState::Off, 0),
+            AxisState::SwitchingOn | AxisState::On if status.contains(StatusFlags::ALARM) => {
+                self.stop(StopReason::Alarm);
+            }
+            AxisState::SwitchingOn | AxisState::On if !status.contains(StatusFlags::SERVO_READY) => {
+                self.stop(StopReason::NotReady);
+            }
+            AxisState::SwitchingOn if status.contains(StatusFlags::SERVO_ACTIVE) => self.enter(AxisState::On, 0),
+            AxisState::On if !status.contains(StatusFlags::SERVO_ACTIVE) => self.stop(StopReason::NotActive),
             _ => {}
         }
         let asked = matches!(self.service, Service::Asking(_)) || self.profile.is_some();
-        match response.answer() {
-            Answer::CommandError(code) if !asked => {
+        match response.noncyclic() {
+            NonCyclicResponse::CommandError(code) if !asked => {
                 self.refused = self.refused.saturating_add(1);
-                if self.refused >= self.settings.limits.command_errors.get() {
+                if self.refused >= self.config.limits.command_errors.get() {
                     self.stop(StopReason::CommandError(code));
                 }
             }
@@ -412,16 +468,16 @@ impl Axis {
     /// Requests and profile motion.
     fn poll(&mut self, response: Option<&Response>) {
         if let Some(profile) = &mut self.profile {
-            profile.poll(response);
+            let _ = profile.receive(response);
         }
         let released = response.is_some_and(|r| r.code.noncyclic_bits() == 0);
         match &mut self.service {
             Service::Idle => {}
             Service::Asking(handshake) => {
-                let progress = handshake.poll(response);
-                if progress != Progress::Pending {
+                let progress = handshake.receive(response);
+                if !progress.is_pending() {
                     self.outcome = Some(progress);
-                    self.service = Service::Releasing { left: self.settings.limits.answer };
+                    self.service = Service::Releasing { left: self.config.limits.answer };
                 }
             }
             Service::Releasing { left } => match left.checked_sub(1) {

@@ -1,4 +1,4 @@
-use super::SlaveInfo;
+use super::slaves::SlaveInfo;
 
 /// State of the communication ASIC, as the guide names it (INITIAL and READY are inferred names).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]

@@ -1,5 +1,7 @@
-use super::{Axis, AxisState, CommandCounter, StopReason, Turn};
-use crate::{Command, Response};
+use super::axis::{Axis, AxisState, StopReason};
+use super::counter::{CommandCounter, Turn};
+use crate::command::Command;
+use crate::response::Response;
 
 /// All axes of a ring, in step: one call in every update period.
 ///

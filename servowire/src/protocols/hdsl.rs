@@ -9,7 +9,7 @@ use std::io;
 
 use hdsl::frame::{ANSWER_BITS, BIT_RATE, H_FRAME_BITS, Head, Received};
 use hdsl::message::{LongAnswer, Request, Responder, ShortRequest};
-use hdsl::sampling::{Alignment, TEST_PATTERN};
+use hdsl::sampling::{Delay, TEST_PATTERN};
 use hdsl::symbol::{RunningDisparity, Word};
 use hdsl::{
     Answer, EncoderByte, EncoderId, EncoderSymbol, Error, MasterSymbol, Phase, PositionBits, PositionTracker,
@@ -275,8 +275,8 @@ impl Decoder {
     }
 
     fn identifier(&mut self, window: Window, place: Place, out: &mut dyn Sink) -> io::Result<()> {
-        let id = Answer::parse(window, Rule::Strict).and_then(EncoderId::from_answer);
-        let fields = id.map_or_else(|_| Vec::new(), |id| vec![hex("ENC_ID", id.raw().into(), 5)]);
+        let id = Answer::parse(Rule::Strict, window).and_then(EncoderId::from_answer);
+        let fields = id.map_or_else(|_| Vec::new(), |id| vec![hex("ENC_ID", id.get().into(), 5)]);
         if let Ok(bits) = id.and_then(EncoderId::check) {
             *self = Self {
                 delay: self.delay,
@@ -293,7 +293,7 @@ impl Decoder {
     }
 
     fn normal(&mut self, window: Window, place: Place, out: &mut dyn Sink) -> io::Result<()> {
-        let Ok(answer) = Answer::parse(window, Rule::Strict) else { return Ok(()) };
+        let Ok(answer) = Answer::parse(Rule::Strict, window) else { return Ok(()) };
         let dd = answer.delta_delta();
         self.tracker.step(dd.ok());
         let parameter = answer.parameter();
@@ -326,7 +326,7 @@ impl Decoder {
 
     fn v_frame(&mut self, answer: Answer, vsync: bool, place: Place, out: &mut dyn Sink) -> io::Result<()> {
         if let Some(at) = self.at {
-            self.frame.put(at, answer, Rule::Strict);
+            self.frame.put(Rule::Strict, at, answer);
             if at == 7 {
                 self.quality.count(if vsync { QualityEvent::VsyncOk } else { QualityEvent::VsyncMissing });
                 self.end_v_frame(place, out)?;
@@ -393,7 +393,7 @@ impl Decoder {
             }),
             Request::Long(_) => LongAnswer::parse(&bytes).map(|answer| match answer.result {
                 Ok(data) => format!("resource {:03X}h: {:02X?}", answer.address.get(), data.as_bytes()),
-                Err(error) => format!("refused, class {:02X}h, detail {:02X}h", error.class, error.detail),
+                Err(error) => format!("refused, class {:02X}h, detail {:02X}h", error.class_code(), error.detail()),
             }),
         };
         let fields = result.as_ref().map_or_else(|_| Vec::new(), |what| vec![text("message", what.clone())]);
@@ -404,7 +404,7 @@ impl Decoder {
 
 /// The delay at which most of the answers behind the next heads hold.
 fn usual_delay(bits: &Bits, from: u64) -> u32 {
-    let delays = 0..=u32::from(Alignment::MAX_DELAY) + 1;
+    let delays = 0..=u32::from(Delay::MAX.get()) + 1;
     let mut sums = vec![0; delays.clone().count()];
     let (mut at, mut heard) = (from, 0);
     while heard < LEARNED && at + u64::from(ANSWER_BITS) < bits.end() {
@@ -432,7 +432,7 @@ fn usual_delay(bits: &Bits, from: u64) -> u32 {
 
 /// How well an answer stands here: good words, switch bit, check of the acceleration; most for the test pattern.
 fn score(line: Window) -> usize {
-    let Ok(answer) = Answer::parse(line, Rule::Strict) else { return 0 };
+    let Ok(answer) = Answer::parse(Rule::Strict, line) else { return 0 };
     if line.bits() as u64 & ((1 << ANSWER_BITS) - 1) == TEST_PATTERN {
         return 20;
     }
@@ -444,7 +444,7 @@ fn score(line: Window) -> usize {
 /// Whether the running disparity holds from word to word of an answer, whatever it was before.
 fn disparity_holds(line: Window) -> bool {
     let bits = line.bits();
-    let words = [0, 10, 20, 30, 40, 51].map(|at| Word::truncate((bits >> at) as u64));
+    let words = [0, 10, 20, 30, 40, 51].map(|at| Word::truncate((bits >> at) as u16));
     [RunningDisparity::Minus, RunningDisparity::Plus].into_iter().any(|before| {
         let mut rd = before;
         words.into_iter().all(|word| {

@@ -9,7 +9,7 @@ use std::collections::HashMap;
 use std::io;
 
 use rtex_block::inspect::{self, Report, inspect};
-use rtex_block::{Error, ErrorClass, Header};
+use rtex_block::{Error, Header};
 
 use crate::capture::hexlog::Burst;
 use crate::event::{Direction, Event, Field, Place, Position, Refusal, Value, Verdict};
@@ -171,22 +171,11 @@ fn verdict(report: &Report) -> Verdict {
         _ => None,
     };
     Verdict::Refused(Box::new(Refusal {
-        class: class(error.class()),
+        class: error.class().name(),
         reason: error.to_string(),
         field: at.map(|byte: u8| format!("byte {byte}")),
         bit: None,
         time: None,
         cause: report.cause.map(|cause| cause.to_string()),
     }))
-}
-
-fn class(class: ErrorClass) -> &'static str {
-    match class {
-        ErrorClass::Length => "length",
-        ErrorClass::CyclicCode => "cyclic_code",
-        ErrorClass::NonCyclicCode => "noncyclic_code",
-        ErrorClass::SubChk => "sub_chk",
-        ErrorClass::SubCommandCode => "sub_command_code",
-        _ => "other",
-    }
 }

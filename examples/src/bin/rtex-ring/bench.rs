@@ -2,9 +2,8 @@
 
 use core::f64::consts::TAU;
 
-use rtex_block::device::{Drive, OpenCodes, Settings};
-use rtex_block::master::{ActiveCode, Axis, AxisSettings, Limits, Ring, SetpointError, Slave, StopReason};
-use rtex_block::position::Gear;
+use rtex_block::device::{Drive, DriveConfig, OpenCodes};
+use rtex_block::master::{ActiveCode, Axis, AxisConfig, Limits, Ring, SetpointError, Slave, StopReason};
 use rtex_block::{Alarm, MacId, Response, TypeCode};
 
 pub(crate) const AXES: usize = 32;
@@ -53,13 +52,11 @@ fn mac_id(place: usize) -> MacId {
 
 impl Bench {
     pub(crate) fn new(mode: ActiveCode, limits: Limits) -> Self {
-        let axis = |place| {
-            Axis::new(AxisSettings { mac_id: mac_id(place), mode, update_ns: UPDATE_NS, gear: Gear::UNITY, limits })
-        };
+        let axis = |place| Axis::new(AxisConfig::new(mac_id(place), mode, UPDATE_NS, limits));
         // Drives do not get ready at the same moment.
         let drive = |place: usize| {
             let sync_exchanges = 20 + u16::try_from(place).unwrap_or(0) * 3;
-            Drive::new(Settings { sync_exchanges, ..Settings::new(mac_id(place), CODES) })
+            Drive::new(DriveConfig::new(mac_id(place), CODES).with_sync_exchanges(sync_exchanges))
         };
         Self {
             ring: Ring::new(core::array::from_fn(axis), INVALID),
@@ -74,7 +71,7 @@ impl Bench {
 
     /// What the ring configuration finds.
     pub(crate) fn slaves(&self) -> impl Iterator<Item = Slave> {
-        self.drives.iter().map(|drive| Slave { mac_id: drive.settings().mac_id, kind: 0 })
+        self.drives.iter().map(|drive| Slave { mac_id: drive.config().mac_id, kind: 0 })
     }
 
     /// One update period: the master reads and writes, then the frame goes round.
