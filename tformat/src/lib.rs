@@ -8,6 +8,7 @@ extern crate std;
 
 mod address;
 pub mod clb;
+mod count;
 mod crc;
 mod data_id;
 pub mod device;
@@ -27,6 +28,7 @@ mod timing;
 mod vendor;
 
 pub use address::{Address, Adf, Page};
+pub use count::{Abm, Abs};
 pub use crc::crc;
 pub use data_id::{ControlField, DataId};
 pub use error::{Error, ErrorClass};
@@ -36,7 +38,7 @@ pub use nrz_line::{BitOrder, Window};
 pub use request::Request;
 pub use resolution::{Hint, Position, Resolution};
 pub use response::Response;
-pub use servowire_core::{OutOfRange, U24};
+pub use servowire_core::OutOfRange;
 pub use status::{Almc, StatusField};
 pub use timing::{BitRate, RESPONSE_DELAY_NS};
 pub use vendor::VendorCommand;
