@@ -12,12 +12,16 @@
 //! Each byte goes high nibble first, and at least one IDLE is between two messages. How long an encoder takes for an
 //! answer is not limited.
 
+mod access;
+mod file;
 mod long;
 mod requester;
 mod resource;
 mod responder;
 mod short;
 
+pub use access::AccessLevel;
+pub use file::{FileName, FileStatus};
 pub use long::{Access, Data, Length, LongAnswer, LongRequest};
 pub use requester::{Finished, Limits, Requester};
 pub use resource::{Offset, ResourceAddress, ResourceError, ResourceErrorClass};
