@@ -152,8 +152,11 @@ impl Collector {
     }
 
     /// Something that is no nibble ends what was being gathered.
+    #[inline]
     const fn idle(&mut self) {
-        *self = Self::new();
+        if !self.ready || self.high.is_some() || self.bytes.len != 0 {
+            *self = Self::new();
+        }
     }
 
     /// The message is complete; the next one begins after an IDLE.
