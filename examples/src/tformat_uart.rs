@@ -57,9 +57,9 @@ impl<U: Read + ReadReady + Write, D: OutputPin, C: Clock> Encoder<U, D, C> {
                 None => transaction.poll(self.clock.now_ns()),
             };
             match progress {
-                Progress::Waiting { .. } => {}
-                Progress::Done(response) => return Ok(response),
-                Progress::Failed(error) => return Err(Failure::Protocol(error)),
+                Progress::Pending { .. } => {}
+                Progress::Done { value, .. } => return Ok(value),
+                Progress::Failed { error, .. } => return Err(Failure::Protocol(error)),
             }
         }
     }
@@ -96,10 +96,10 @@ mod tests {
         let mut encoder = encoder(&bench);
         for position in [0, 1, 0x7f_ffff] {
             bench.turn_to(U24::truncate(position), U24::truncate(3));
-            let answer = encoder.transact(Request::Id0).unwrap();
+            let answer = encoder.transact(Request::ReadSingleTurn).unwrap();
             assert_eq!(answer.abs(), Some(U24::truncate(position)));
-            let Ok(Response::Id3(full)) = encoder.transact(Request::Id3) else { panic!() };
-            assert_eq!((full.abm.get(), full.enid), (3, 0x17));
+            let Ok(Response::ReadAll(data)) = encoder.transact(Request::ReadAll) else { panic!() };
+            assert_eq!((data.abm.get(), data.enid), (3, 0x17));
         }
     }
 
@@ -108,10 +108,13 @@ mod tests {
         let bench = Bench::new(0x11);
         let mut encoder = encoder(&bench);
         bench.break_it(Fault::Silent);
-        assert_eq!(encoder.transact(Request::Id0), Err(Failure::Protocol(Error::NoResponse { echo: true })));
+        assert_eq!(encoder.transact(Request::ReadSingleTurn), Err(Failure::Protocol(Error::NoResponse { echo: true })));
         bench.break_it(Fault::CutAfter { fields: 2 });
-        assert_eq!(encoder.transact(Request::Id0), Err(Failure::Protocol(Error::Truncated { got: 2, want: 6 })));
+        assert_eq!(
+            encoder.transact(Request::ReadSingleTurn),
+            Err(Failure::Protocol(Error::Truncated { got: 2, want: 6 }))
+        );
         bench.break_it(Fault::None);
-        assert!(encoder.transact(Request::Id0).is_ok());
+        assert!(encoder.transact(Request::ReadSingleTurn).is_ok());
     }
 }

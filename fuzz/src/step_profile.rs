@@ -1,7 +1,7 @@
 //! step-profile: single steps against wider integers, an axis against the steps of its moves.
 
 use step_profile::{
-    Arithmetic, Axis, Command, Direction, Error, MoveState, Parameters, Profile, RampTable, Speed, Step, Steps,
+    Arithmetic, Axis, Command, Direction, Error, MoveState, Parameters, Profile, RampTable, Speed, RampStep, RampSteps,
     corrected, pru_exact, step_time_ns,
 };
 
@@ -37,8 +37,8 @@ pub fn step(mut data: &[u8]) {
 
 /// What an axis should do, from the steps of its move alone.
 struct Model<'t> {
-    steps: Steps<'t>,
-    next: Option<Step>,
+    steps: RampSteps<'t>,
+    next: Option<RampStep>,
     cycle: u64,
     direction: Direction,
 }
@@ -56,13 +56,11 @@ pub fn axis(mut data: &[u8]) {
         [Arithmetic::Corrected, Arithmetic::PruExact, Arithmetic::Carried][usize::from(byte(&mut data)) % 3];
     let ramp = byte(&mut data);
     let flat = RampTable::new([1000 + u32::from(ramp) * 50; RampTable::LEN]).expect("no entry is below 1000");
-    let parameters = Parameters {
-        speed: Speed::from_raw(speed),
-        steps_per_entry: k.into(),
-        init_sync: u16::from_le_bytes([low, high]).into(),
-        table: if ramp == 0 { RampTable::SIN2 } else { &flat },
-        arithmetic,
-    };
+    let parameters = Parameters::at(Speed::from_raw(speed))
+        .with_steps_per_entry(k.into())
+        .with_init_sync(u16::from_le_bytes([low, high]).into())
+        .with_table(if ramp == 0 { RampTable::SIN2 } else { &flat })
+        .with_arithmetic(arithmetic);
     let Some(profile) = checked(parameters) else { return };
     let mut axis = Axis::new();
     let mut position = 0;

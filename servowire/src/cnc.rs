@@ -128,11 +128,11 @@ impl Arguments {
     }
 
     fn motors(&self) -> Motors {
-        Motors::from_mask((1 << self.devices) - 1).unwrap_or(Motors::NONE)
+        Motors::new((1 << self.devices) - 1).unwrap_or(Motors::NONE)
     }
 
     fn program(&self) -> Result<Program, step_profile::Error> {
-        let parameters = |speed| Parameters { steps_per_entry: self.k, ..Parameters::at(speed) };
+        let parameters = |speed| Parameters::at(speed).with_steps_per_entry(self.k);
         if self.dance {
             return Program::dance(self.motors(), parameters(Speed::KHZ_100));
         }

@@ -11,7 +11,7 @@ use std::process::ExitCode;
 
 use clap::{Args, ValueEnum};
 use serde::Serialize;
-use step_profile::{Arithmetic, Frequency, MoveState, Parameters, Profile, Speed, Step, Tone};
+use step_profile::{Arithmetic, Frequency, Parameters, Profile, RampStep, Speed, Tone};
 
 /// Times of the steps of a move on a 4 us cycle.
 ///
@@ -90,12 +90,12 @@ impl Arguments {
             Mode::PruExact => Arithmetic::PruExact,
             Mode::Carried => Arithmetic::Carried,
         };
-        Profile::new(Parameters {
-            steps_per_entry: self.k,
-            init_sync: self.init_sync,
-            arithmetic,
-            ..Parameters::at(speed)
-        })
+        Profile::new(
+            Parameters::at(speed)
+                .with_steps_per_entry(self.k)
+                .with_init_sync(self.init_sync)
+                .with_arithmetic(arithmetic),
+        )
     }
 
     fn write(&self, profile: Profile<'_>, out: &mut dyn Write) -> Result<(), Box<dyn Error>> {
@@ -154,17 +154,8 @@ fn tone(text: &str) -> Result<Tone, String> {
     })
 }
 
-fn state(state: MoveState) -> &'static str {
-    match state {
-        MoveState::Idle => "idle",
-        MoveState::RampUp => "ramp-up",
-        MoveState::Constant => "constant",
-        MoveState::RampDown => "ramp-down",
-    }
-}
-
 /// End of the step's interval, which is its pulse, in ns after the start of cycle 0.
-fn pulse_ns(step: Step) -> u64 {
+fn pulse_ns(step: RampStep) -> u64 {
     step.cycle * u64::from(step_profile::CYCLE_NS) + u64::from(step.sync_time)
 }
 
@@ -172,7 +163,7 @@ fn pulse_ns(step: Step) -> u64 {
 #[derive(Serialize)]
 struct Record {
     step: u32,
-    state: &'static str,
+    state: String,
     entry: u8,
     t_step_ns: u32,
     cycle: u64,
@@ -180,11 +171,11 @@ struct Record {
     time_ns: u64,
 }
 
-impl From<Step> for Record {
-    fn from(step: Step) -> Self {
+impl From<RampStep> for Record {
+    fn from(step: RampStep) -> Self {
         Self {
             step: step.index,
-            state: state(step.state),
+            state: step.state.to_string(),
             entry: step.entry,
             t_step_ns: step.t_step,
             cycle: step.cycle,
@@ -224,8 +215,8 @@ fn summary(profile: Profile<'_>, steps: u32, out: &mut dyn Write) -> io::Result<
 
 /// Steps at the same ramp entry.
 struct Stretch {
-    first: Step,
-    last: Step,
+    first: RampStep,
+    last: RampStep,
     /// Start of its first interval and end of its last.
     ms: Range<f64>,
 }
@@ -267,7 +258,7 @@ fn table(profile: Profile<'_>, steps: u32, out: &mut dyn Write) -> io::Result<()
             "{:>7} {:>7}  {:<9} {:>6} {:>11} {:>10.3} {:>14} {:>6} {:>9.3}",
             first.index,
             last.index,
-            state(first.state),
+            first.state,
             first.entry,
             first.t_step,
             stretch.khz(),

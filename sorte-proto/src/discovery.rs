@@ -1,5 +1,10 @@
-use crate::frame::{FrameType, LongFrame, count, emit};
-use crate::{DeviceAddress, Error, Status};
+use core::fmt;
+
+use crate::address::DeviceAddress;
+use crate::error::Error;
+use crate::frame::{LongFrame, count, emit};
+use crate::frame_type::FrameType;
+use crate::status::Status;
 
 /// Devices that a discovery frame has room for.
 pub const MAX_DEVICES: usize = 254;
@@ -43,7 +48,6 @@ impl Entry {
 /// Only the first `count` entries have a meaning. The rest is whatever the master filled in: the published master
 /// sends a debug pattern there.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct DiscoveryView<'a> {
     frame: LongFrame<'a>,
     fields: &'a [u8; PAYLOAD],
@@ -126,7 +130,6 @@ impl<'a> DiscoveryView<'a> {
 
 /// The values of a discovery frame, all 254 entries with what is in them.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "arbitrary", derive(arbitrary::Arbitrary))]
 pub struct Discovery {
     /// SA, 0 in everything the published firmware sends.
@@ -243,7 +246,6 @@ pub(crate) fn next_address(devices_before: u16) -> Option<DeviceAddress> {
 
 /// The line as the master knows it from the last discovery answer.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Network {
     devices: u8,
     input_total: u16,
@@ -316,9 +318,76 @@ impl Network {
 }
 
 /// Checks the length of a buffer that a frame is to be written into.
-pub(crate) fn room(into: &mut [u8], need: usize) -> Result<&mut [u8], Error> {
+pub(crate) fn room(into: &mut [u8], want: usize) -> Result<&mut [u8], Error> {
     let got = count(into.len());
-    into.get_mut(..need).ok_or(Error::BufferTooSmall { got, need: count(need) })
+    into.get_mut(..want).ok_or(Error::BufferTooSmall { got, want: count(want) })
+}
+
+impl fmt::Display for Discovery {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(
+            f,
+            "DISCOVERY {} devices, in {}, out {}, STATUS {}",
+            self.count, self.input_total, self.output_total, self.status
+        )
+    }
+}
+
+#[cfg(feature = "defmt")]
+#[cfg_attr(docsrs, doc(cfg(feature = "defmt")))]
+impl defmt::Format for Discovery {
+    fn format(&self, f: defmt::Formatter<'_>) {
+        defmt::write!(
+            f,
+            "DISCOVERY {=u16} devices, in {=u16}, out {=u16}, STATUS {}",
+            self.count,
+            self.input_total,
+            self.output_total,
+            self.status
+        );
+    }
+}
+
+impl fmt::Display for DiscoveryView<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(
+            f,
+            "DISCOVERY {} devices, in {}, out {}, STATUS {}",
+            self.count(),
+            self.input_total(),
+            self.output_total(),
+            self.status()
+        )
+    }
+}
+
+#[cfg(feature = "defmt")]
+#[cfg_attr(docsrs, doc(cfg(feature = "defmt")))]
+impl defmt::Format for DiscoveryView<'_> {
+    fn format(&self, f: defmt::Formatter<'_>) {
+        defmt::write!(
+            f,
+            "DISCOVERY {=u16} devices, in {=u16}, out {=u16}, STATUS {}",
+            self.count(),
+            self.input_total(),
+            self.output_total(),
+            self.status()
+        );
+    }
+}
+
+impl fmt::Display for Network {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{} devices, in {}, out {}", self.devices, self.input_total, self.output_total)
+    }
+}
+
+#[cfg(feature = "defmt")]
+#[cfg_attr(docsrs, doc(cfg(feature = "defmt")))]
+impl defmt::Format for Network {
+    fn format(&self, f: defmt::Formatter<'_>) {
+        defmt::write!(f, "{=u8} devices, in {=u16}, out {=u16}", self.devices, self.input_total, self.output_total);
+    }
 }
 
 #[cfg(test)]
@@ -398,7 +467,7 @@ mod tests {
         #[test]
         fn what_was_emitted_is_parsed_and_back(source: u8, status: u8, count: u16, lengths in entries()) {
             let mut frame = pass_all(&lengths);
-            (frame.source, frame.status, frame.count) = (source, Status(status), count);
+            (frame.source, frame.status, frame.count) = (source, Status::from_bits_retain(status), count);
             let bytes = frame.emit();
             let back = Discovery::parse(&bytes).unwrap();
             prop_assert_eq!(back, frame);

@@ -16,7 +16,7 @@
 //! assert_eq!(axis.next_edge(8000), Some(Edge { ns: 6595, high: false }));
 //! ```
 
-use crate::StartTime;
+use crate::pto::StartTime;
 use crate::sync0::{PULSE_NS, Register, Sync0, Variant, Write, Writes};
 
 /// One tick of the counter in ns.

@@ -1,6 +1,6 @@
 //! The controller's side: the start-up sequence, then the IO exchange.
 //!
-//! Sans-IO. [`Master::poll`] says what to send and when; [`Master::received`] takes what comes back. Every wait ends:
+//! Sans-IO. [`Master::poll`] says what to send and when; [`Master::receive`] takes what comes back. Every wait ends:
 //! an answer that does not come, devices that fall silent or a line that changes take the master back to IDLE with an
 //! [`Action::Restart`] that says why, and after a pause it starts again. (The published master waits for ever.)
 //!
@@ -17,11 +17,17 @@ pub use action::{Action, Outgoing};
 pub use config::{Config, Counters, State};
 use cycle::Cycle;
 
+use crate::delay_req::DelayReq;
+use crate::discovery::{DiscoveryView, Network};
+use crate::error::Error;
+use crate::exchange::{DeviceFrameView, write_master_frame};
+use crate::frame::LongFrame;
+use crate::frame_type::FrameType;
+use crate::line_delay::{LineDelay, SAMPLES};
+use crate::param::{Param, ParamView};
+use crate::status::Status;
+use crate::sync::Sync;
 use crate::timing::TRIGGER_NS;
-use crate::{
-    DelayReq, DeviceFrameView, DiscoveryView, Error, FrameType, LineDelay, Network, Param, ParamView, Sync,
-    write_master_frame,
-};
 
 /// A master with one port.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -227,7 +233,7 @@ impl Master {
 
     fn delay(&mut self, now_ns: u64) -> Action {
         if !self.line.is_complete() {
-            let last = self.is_last(crate::SAMPLES.into());
+            let last = self.is_last(SAMPLES.into());
             self.asked_ns = Some(self.next_ns);
             return self.send(Outgoing::DelayReq(DelayReq::of_master(last)), self.config.frame_period_ns);
         }
@@ -315,13 +321,13 @@ impl Master {
     /// Writes the master frame for an [`Action::Exchange`] and gives its length. Output bytes that are not given are 0.
     ///
     /// # Errors
-    /// [`Error::LengthMismatch`] if `output` has not [`output_len`](Self::output_len) bytes; [`Error::BufferTooSmall`].
+    /// [`Error::OutputLength`] if `output` has not [`output_len`](Self::output_len) bytes; [`Error::BufferTooSmall`].
     pub fn write_frame(&self, output: &[u8], time_stamp: u16, into: &mut [u8]) -> Result<usize, Error> {
         let (got, want) = (u16::try_from(output.len()).unwrap_or(u16::MAX), self.output_len());
         if got != want {
-            return Err(Error::LengthMismatch { got, want });
+            return Err(Error::OutputLength { got, want });
         }
-        write_master_frame(into, output, time_stamp)
+        write_master_frame(output, time_stamp, into)
     }
 
     /// A start-up frame has come back; `sof_ns`: its start.
@@ -329,20 +335,16 @@ impl Master {
     /// # Errors
     /// What the frame is refused for; [`Error::WrongState`] in IDLE and IO exchange. A bad DISCOVERY answer takes the
     /// master back to IDLE, everything else just does not count as an answer.
-    pub fn received(&mut self, frame: &[u8], sof_ns: u64) -> Result<(), Error> {
+    pub fn receive(&mut self, frame: &[u8], sof_ns: u64) -> Result<(), Error> {
         let result = match self.state {
             State::Idle | State::Exchange => return Err(Error::WrongState),
             State::Discovery => self.discovery_answer(frame),
             State::Param => ParamView::new(frame).map(|_| {
                 (self.remaining, self.unanswered) = (self.remaining.saturating_sub(1), 0);
             }),
-            State::LineDelay => DelayReq::parse(frame).map(|_| {
-                if let Some(asked) = self.asked_ns.take() {
-                    self.line.add(u32::try_from(sof_ns.saturating_sub(asked)).unwrap_or(u32::MAX));
-                }
-            }),
+            State::LineDelay => self.delay_answer(frame, sof_ns),
             State::Sync => Sync::parse(frame).map(|answer| {
-                self.answered |= answer.status.is_last() && answer.status.is_state_change();
+                self.answered |= answer.status.contains(Status::LAST | Status::STATE_CHANGE);
             }),
         };
         if let Err(error) = result {
@@ -354,9 +356,22 @@ impl Master {
         result
     }
 
+    /// The vendor defines DELAY_RESP and sends the request back instead: a response tells nothing.
+    fn delay_answer(&mut self, frame: &[u8], sof_ns: u64) -> Result<(), Error> {
+        let frame = LongFrame::new(frame)?;
+        if frame.frame_type() == FrameType::DelayResp {
+            return Ok(());
+        }
+        DelayReq::of(frame)?;
+        if let Some(asked) = self.asked_ns.take() {
+            self.line.add(u32::try_from(sof_ns.saturating_sub(asked)).unwrap_or(u32::MAX));
+        }
+        Ok(())
+    }
+
     fn discovery_answer(&mut self, frame: &[u8]) -> Result<(), Error> {
         let answer = DiscoveryView::new(frame)?;
-        if answer.status().is_last() {
+        if answer.status().contains(Status::LAST) {
             self.network = Network::new(answer)?;
             self.answered = true;
         }
@@ -380,7 +395,7 @@ impl Master {
         if self.state != State::Exchange {
             return Err(Error::WrongState);
         }
-        let view = match DeviceFrameView::new(frame, self.config.payload_len.into()) {
+        let view = match DeviceFrameView::new(self.config.payload_len.into(), frame) {
             Ok(view) => view,
             Err(error) => {
                 self.cycle.damaged = true;
@@ -389,13 +404,13 @@ impl Master {
             }
         };
         let (address, last) = (view.address().get(), self.network.devices());
-        if address > last || view.status().is_last() != (address == last) {
+        if address > last || view.status().contains(Status::LAST) != (address == last) {
             let error = Error::TopologyChanged { address };
             self.fail(error);
             return Err(error);
         }
         self.cycle.mark(address);
-        if view.status().is_error() {
+        if view.status().contains(Status::ERROR) {
             self.counters.device_errors = self.counters.device_errors.saturating_add(1);
         }
         Ok(view)

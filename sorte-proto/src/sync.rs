@@ -1,5 +1,9 @@
-use crate::frame::{FrameType, LongFrame, emit};
-use crate::{Error, Status};
+use core::fmt;
+
+use crate::error::Error;
+use crate::frame::{LongFrame, emit};
+use crate::frame_type::FrameType;
+use crate::status::Status;
 
 /// From the trigger of a SYNC frame to the capture of its start at the receiver without the cable: 280 ns, which is
 /// 3.5 byte times of preamble (coded as 100 + 180 in the published master).
@@ -17,7 +21,6 @@ pub const TRANSIT_NS: u16 = 355;
 ///                            u32         u16
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct SyncView<'a> {
     frame: LongFrame<'a>,
     fields: &'a [u8; 6],
@@ -65,7 +68,6 @@ impl<'a> SyncView<'a> {
 
 /// The values of a SYNC frame.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "arbitrary", derive(arbitrary::Arbitrary))]
 pub struct Sync {
@@ -130,6 +132,46 @@ pub(crate) const fn hop_ns(line_delay_next_ns: u16) -> u32 {
     (line_delay_next_ns as u32).saturating_add(TRANSIT_NS as u32)
 }
 
+impl fmt::Display for Sync {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "SYNC at {} ns, delay {} ns, STATUS {}", self.time_stamp_ns, self.delay_ns, self.status)
+    }
+}
+
+#[cfg(feature = "defmt")]
+#[cfg_attr(docsrs, doc(cfg(feature = "defmt")))]
+impl defmt::Format for Sync {
+    fn format(&self, f: defmt::Formatter<'_>) {
+        defmt::write!(
+            f,
+            "SYNC at {=u32} ns, delay {=u16} ns, STATUS {}",
+            self.time_stamp_ns,
+            self.delay_ns,
+            self.status
+        );
+    }
+}
+
+impl fmt::Display for SyncView<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "SYNC at {} ns, delay {} ns, STATUS {}", self.time_stamp_ns(), self.delay_ns(), self.status())
+    }
+}
+
+#[cfg(feature = "defmt")]
+#[cfg_attr(docsrs, doc(cfg(feature = "defmt")))]
+impl defmt::Format for SyncView<'_> {
+    fn format(&self, f: defmt::Formatter<'_>) {
+        defmt::write!(
+            f,
+            "SYNC at {=u32} ns, delay {=u16} ns, STATUS {}",
+            self.time_stamp_ns(),
+            self.delay_ns(),
+            self.status()
+        );
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use proptest::prelude::*;
@@ -139,7 +181,7 @@ mod tests {
     proptest! {
         #[test]
         fn what_was_emitted_is_parsed_and_back(source: u8, status: u8, time_stamp_ns: u32, delay_ns: u16) {
-            let frame = Sync { source, status: Status(status), time_stamp_ns, delay_ns };
+            let frame = Sync { source, status: Status::from_bits_retain(status), time_stamp_ns, delay_ns };
             let bytes = frame.emit();
             prop_assert_eq!(Sync::parse(&bytes), Ok(frame));
             prop_assert_eq!(Sync::parse(&bytes).unwrap().emit(), bytes);
@@ -151,7 +193,7 @@ mod tests {
             frame.pass(line, last, error);
             prop_assert_eq!(frame.time_stamp_ns, (u64::from(time_stamp_ns) + u64::from(line) + 355) as u32);
             prop_assert_eq!(frame.delay_ns, (u64::from(delay_ns) + u64::from(line) + 355) as u16);
-            prop_assert_eq!((frame.status.is_last(), frame.status.is_error()), (last, error));
+            prop_assert_eq!((frame.status.contains(Status::LAST), frame.status.contains(Status::ERROR)), (last, error));
         }
     }
 }

@@ -1,7 +1,8 @@
 //! What fits into a cycle of the IO exchange.
 
+use crate::address::DeviceAddress;
+use crate::discovery::MAX_DEVICES;
 use crate::sync::TRANSIT_NS;
-use crate::{DeviceAddress, MAX_DEVICES};
 
 /// One byte at 100 Mbit/s, in ns.
 pub const BYTE_NS: u32 = 80;

@@ -67,8 +67,8 @@ fn rate(whole_move: impl Fn() -> u64) -> f64 {
 }
 
 fn profile(case: &Case) -> Profile<'static> {
-    let parameters = Parameters { steps_per_entry: case.ramp / 32, ..Parameters::at(Speed::KHZ_100) };
-    Profile::new(Parameters { arithmetic: black_box(Arithmetic::Corrected), ..parameters }).unwrap()
+    let parameters = Parameters::at(Speed::KHZ_100).with_steps_per_entry(case.ramp / 32);
+    Profile::new(parameters.with_arithmetic(black_box(Arithmetic::Corrected))).unwrap()
 }
 
 fn corrected(case: &Case) -> u64 {

@@ -14,7 +14,7 @@ fn main() -> Result<(), Error> {
     println!("     speed  initial sync_time      0 (read as no pulse)  3991..=3999 (reserved)");
     for (hz, speed) in Speed::NAMED {
         for init_sync in [0, Parameters::INIT_SYNC] {
-            let profile = Profile::new(Parameters { init_sync, ..Parameters::at(speed) })?;
+            let profile = Profile::new(Parameters::at(speed).with_init_sync(init_sync))?;
             let (mut silent, mut reserved) = (0, 0);
             for step in profile.steps(51_200) {
                 silent += u32::from(step.sync_time == 0);

@@ -8,7 +8,7 @@ use step_profile::{Command, Dance, Direction, Error, Motors, Note, Parameters, T
 fn main() -> Result<(), Error> {
     // 10 ms between the notes.
     let song = [Tone::Cis, Tone::E, Tone::Fis, Tone::A, Tone::H, Tone::Cis2].map(|tone| Note::p125(tone, 2500));
-    let parameters = Parameters { steps_per_entry: 2, ..Parameters::at(Tone::A.speed()) };
+    let parameters = Parameters::at(Tone::A.speed()).with_steps_per_entry(2);
     let mut dance = Dance::new(Motors::ALL, parameters, Direction::Forward, &song)?;
 
     // What would be sent: four commands every 4 us.

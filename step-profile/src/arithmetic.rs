@@ -1,7 +1,5 @@
+use crate::interval::{CYCLE_NS, Interval, StepTime, step_time_ns};
 use crate::pru_exact;
-
-/// Length of a SORTE cycle in ns.
-pub const CYCLE_NS: u32 = 4000;
 
 /// Which arithmetic turns step times into cycles and sync_times.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -30,54 +28,6 @@ impl Arithmetic {
             Self::Carried => split(t_step, entry.wrapping_mul(speed) & 0xffff),
         }
     }
-}
-
-/// Where a pulse lies: in which cycle after the one of the previous pulse, and when in that cycle.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub struct StepTime {
-    /// 4us_cnt: cycles from the cycle of the previous pulse to the cycle of this one.
-    pub cnt: u32,
-    /// sync_time: start of the pulse in its cycle, in ns.
-    pub sync: u32,
-}
-
-/// A step time split at the cycle: `cnt` cycles and `rest` ns.
-///
-/// It is the same for all steps of a ramp entry, so it is computed once for each of them; what is left for every
-/// step is an addition and a comparison.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub struct Interval {
-    pub(crate) cnt: u32,
-    /// Below 4000, or a little below 2^32 in the PRU's arithmetic.
-    pub(crate) rest: u32,
-    /// In 2^-16 ns, below 2^16; 0 unless carried.
-    pub(crate) fraction: u32,
-}
-
-impl Interval {
-    /// The pulse that comes this long after one with sync_time `prev`.
-    ///
-    /// [`Arithmetic::Carried`] drops its fraction here; [`Steps`](crate::Steps) is what carries it on.
-    #[inline]
-    pub const fn after(self, prev: u32) -> StepTime {
-        let sync = prev.wrapping_add(self.rest);
-        match sync.checked_sub(CYCLE_NS) {
-            Some(sync) => StepTime { cnt: self.cnt.wrapping_add(1), sync },
-            None => StepTime { cnt: self.cnt, sync },
-        }
-    }
-}
-
-/// Equation 1 of TIDEP0061, section 2.3.2: the time of a step in ns, product bits 47..16.
-///
-/// `entry` is 1000 / sin², `speed` is 2^16 / f\[MHz\]. Bits above 2^48 of the product are dropped, as on the PRU.
-#[expect(clippy::cast_possible_truncation, reason = "the PRU takes 32 bits out of the middle of the product")]
-#[inline]
-pub const fn step_time_ns(entry: u32, speed: u32) -> u32 {
-    ((entry as u64).wrapping_mul(speed as u64) >> 16) as u32
 }
 
 /// The pulse that comes `t_step` ns after one with sync_time `prev`, by true division.

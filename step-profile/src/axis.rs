@@ -1,4 +1,8 @@
-use crate::{Error, MoveState, Profile, Steps};
+use core::fmt;
+
+use crate::error::Error;
+use crate::profile::Profile;
+use crate::ramp_steps::{MoveState, RampSteps};
 
 /// The DIR signal of a stepper driver.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
@@ -33,6 +37,15 @@ impl Direction {
     }
 }
 
+impl fmt::Display for Direction {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.pad(match self {
+            Self::Forward => "forward",
+            Self::Reverse => "reverse",
+        })
+    }
+}
+
 /// What a motor is told in one cycle: all that a PTO word says.
 ///
 /// | command | PTO word (TIDEP0061, section 2.4.2) |
@@ -59,9 +72,20 @@ pub enum Command {
     Pulse {
         /// DIR.
         direction: Direction,
-        /// Start of the pulse in its cycle in ns, 0..=3999; see [`Step::sync_time`](crate::Step::sync_time).
+        /// Start of the pulse in its cycle in ns, 0..=3999; see [`RampStep::sync_time`](crate::RampStep::sync_time).
         sync_time: u32,
     },
+}
+
+/// `pulse forward at 1000 ns`.
+impl fmt::Display for Command {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Disable => f.pad("current off"),
+            Self::Hold { direction } => write!(f, "hold {direction}"),
+            Self::Pulse { direction, sync_time } => write!(f, "pulse {direction} at {sync_time} ns"),
+        }
+    }
 }
 
 /// One axis, driven by a call each cycle.
@@ -79,7 +103,7 @@ pub enum Command {
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Axis<'t> {
     /// The move; the last step taken of it is the one whose pulse comes next.
-    steps: Option<Steps<'t>>,
+    steps: Option<RampSteps<'t>>,
     /// Cycles before the cycle of that pulse.
     wait: u32,
     direction: Direction,
@@ -133,7 +157,7 @@ impl<'t> Axis<'t> {
     /// Gives up the move, with the ramp down.
     ///
     /// The step whose interval has begun keeps its time, since the motor may be anywhere in it; the steps after it
-    /// slow down ([`Steps::abort`]). Before the first pulse nothing has moved, and the move ends at once.
+    /// slow down ([`RampSteps::abort`]). Before the first pulse nothing has moved, and the move ends at once.
     pub fn abort(&mut self) {
         match &mut self.steps {
             Some(steps) if steps.taken() > 1 => steps.abort(),
@@ -143,7 +167,7 @@ impl<'t> Axis<'t> {
 
     /// What the axis is doing: the state of the step under way.
     pub fn state(&self) -> MoveState {
-        self.steps.as_ref().map_or(MoveState::Idle, Steps::state)
+        self.steps.as_ref().map_or(MoveState::Idle, RampSteps::state)
     }
 
     /// DIR, as held since the last move began.
@@ -179,7 +203,8 @@ impl Axes<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{Parameters, Speed};
+    use crate::frequency::Speed;
+    use crate::profile::Parameters;
     use proptest::prelude::*;
     use std::vec::Vec;
 

@@ -1,4 +1,10 @@
-use crate::{Command, Direction, Error, Group, Motors, MoveState, Parameters, Profile, Speed, Tone};
+use crate::axis::{Command, Direction};
+use crate::error::Error;
+use crate::frequency::Speed;
+use crate::group::{Group, Motors};
+use crate::profile::{Parameters, Profile};
+use crate::ramp_steps::MoveState;
+use crate::tone::Tone;
 
 /// An entry of the tone table: step time, duration, pause (TIDEP0061, section 2.3.3).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]

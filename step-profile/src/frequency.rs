@@ -1,4 +1,6 @@
-use crate::Error;
+use core::fmt;
+
+use crate::error::Error;
 
 /// A step frequency as a fraction in Hz.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -48,6 +50,16 @@ impl Frequency {
         let thousandfold = (self.numerator as u64).saturating_mul(ms as u64);
         let steps = round(thousandfold, (self.denominator as u64).saturating_mul(1000));
         if steps > u32::MAX as u64 { u32::MAX } else { steps as u32 }
+    }
+}
+
+/// `94570 Hz`, or `13136900/187 Hz`.
+impl fmt::Display for Frequency {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self.denominator {
+            1 => write!(f, "{} Hz", self.numerator),
+            denominator => write!(f, "{}/{denominator} Hz", self.numerator),
+        }
     }
 }
 
@@ -150,6 +162,13 @@ impl Speed {
     }
 }
 
+/// The constant: `262144`.
+impl fmt::Display for Speed {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        self.0.fmt(f)
+    }
+}
+
 /// `dividend / divisor` rounded half up; the largest number for a divisor of 0.
 const fn round(dividend: u64, divisor: u64) -> u64 {
     match (dividend.checked_div(divisor), dividend.checked_rem(divisor)) {
@@ -165,6 +184,7 @@ const fn round(dividend: u64, divisor: u64) -> u64 {
 mod tests {
     use super::*;
     use proptest::prelude::*;
+    use std::string::ToString;
 
     #[test]
     fn named_speeds_are_exact() {
@@ -172,6 +192,23 @@ mod tests {
             assert_eq!(u64::from(speed.raw()) * u64::from(hz), 65_536_000_000);
             assert_eq!(Speed::from_hz(hz), Ok(speed));
         }
+    }
+
+    /// Half a step counts as one, a little less does not.
+    #[test]
+    fn steps_are_rounded_half_up() {
+        let steps = |numerator, denominator, ms| Frequency::from_ratio(numerator, denominator).unwrap().steps_in(ms);
+        assert_eq!([steps(1, 1, 499), steps(1, 1, 500), steps(1, 1, 501)], [0, 1, 1]);
+        assert_eq!([steps(3, 1, 500), steps(5, 3, 300), steps(4999, 10_000, 1000), steps(1, 2, 1000)], [2, 1, 0, 1]);
+        // An odd divisor has no half: 3·333/1000 is below it by little, 334/333 above 1 by little.
+        assert_eq!([steps(1, 999, 499), steps(334, 333, 1000)], [0, 1]);
+    }
+
+    #[test]
+    fn frequencies_are_printed_in_hertz() {
+        assert_eq!(Frequency::from_hz(94_570).to_string(), "94570 Hz");
+        assert_eq!(Frequency::of_tone(2771).unwrap().to_string(), "13136900/187 Hz");
+        assert_eq!(Speed::KHZ_250.to_string(), "262144");
     }
 
     #[test]

@@ -1,47 +1,33 @@
-use crate::{Axis, Command, Direction, Error, MoveState, Profile};
+use crate::axis::{Axis, Command, Direction};
+use crate::error::Error;
+use crate::profile::Profile;
+use crate::ramp_steps::MoveState;
 
-/// Which of the four motors move.
-///
-/// The start bits of TI's `sorte_master_cfg.inc`: M1 = 1, M2 = 2, M3 = 4, M4 = 8, all = 0xF, off = 0.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-#[cfg_attr(feature = "serde", serde(try_from = "u32", into = "u32"))]
-pub struct Motors(u8);
+servowire_core::number! {
+    /// Which of the four motors move, a bit each.
+    ///
+    /// The start bits of TI's `sorte_master_cfg.inc`: M1 = 1, M2 = 2, M3 = 4, M4 = 8, all = 0xF, off = 0.
+    pub struct Motors(u8, 4);
+}
 
 impl Motors {
     /// No motor: the current of all four is switched off.
-    pub const NONE: Self = Self(0);
+    pub const NONE: Self = Self::truncate(0);
     /// The first device on the line.
-    pub const M1: Self = Self(1);
+    pub const M1: Self = Self::truncate(1);
     /// The second.
-    pub const M2: Self = Self(2);
+    pub const M2: Self = Self::truncate(2);
     /// The third.
-    pub const M3: Self = Self(4);
+    pub const M3: Self = Self::truncate(4);
     /// The fourth.
-    pub const M4: Self = Self(8);
+    pub const M4: Self = Self::truncate(8);
     /// All four.
-    pub const ALL: Self = Self(0xf);
-
-    /// The selection of a mask.
-    ///
-    /// # Errors
-    /// [`Error::InvalidMotorMask`] above 15.
-    pub const fn from_mask(mask: u32) -> Result<Self, Error> {
-        match mask.to_le_bytes() {
-            [low @ 0..=0xf, 0, 0, 0] => Ok(Self(low)),
-            _ => Err(Error::InvalidMotorMask { mask, limit: 0xf }),
-        }
-    }
-
-    /// The mask, 0..=15.
-    pub const fn mask(self) -> u8 {
-        self.0
-    }
+    pub const ALL: Self = Self::MAX;
 
     /// Motor by motor whether it is selected.
     pub const fn selected(self) -> [bool; 4] {
-        [self.0 & 1 != 0, self.0 & 2 != 0, self.0 & 4 != 0, self.0 & 8 != 0]
+        let mask = self.get();
+        [mask & 1 != 0, mask & 2 != 0, mask & 4 != 0, mask & 8 != 0]
     }
 
     /// One command for all selected motors: the others hold with the same DIR, and without any selected motor all
@@ -53,28 +39,6 @@ impl Motors {
             Command::Hold { direction } | Command::Pulse { direction, .. } => Command::Hold { direction },
         };
         self.selected().map(|selected| if selected { command } else { idle })
-    }
-}
-
-impl TryFrom<u32> for Motors {
-    type Error = Error;
-
-    fn try_from(mask: u32) -> Result<Self, Error> {
-        Self::from_mask(mask)
-    }
-}
-
-impl From<Motors> for u32 {
-    fn from(motors: Motors) -> Self {
-        motors.0.into()
-    }
-}
-
-#[cfg(feature = "arbitrary")]
-#[cfg_attr(docsrs, doc(cfg(feature = "arbitrary")))]
-impl<'a> arbitrary::Arbitrary<'a> for Motors {
-    fn arbitrary(u: &mut arbitrary::Unstructured<'a>) -> arbitrary::Result<Self> {
-        Ok(Self(u.int_in_range(0..=0xf)?))
     }
 }
 
@@ -158,24 +122,23 @@ impl<'t> Group<'t> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{Parameters, Speed};
+    use crate::frequency::Speed;
+    use crate::profile::Parameters;
 
     #[test]
     fn every_mask_distributes_every_command() {
         let direction = Direction::Reverse;
         let hold = Command::Hold { direction };
         for mask in 0..16 {
-            let motors = Motors::from_mask(mask).unwrap();
-            assert_eq!(u32::from(motors.mask()), mask);
+            let motors = Motors::new(mask).unwrap();
+            assert_eq!(motors.get(), mask);
             for command in [Command::Disable, hold, Command::Pulse { direction, sync_time: 7 }] {
                 let idle = if mask == 0 || command == Command::Disable { Command::Disable } else { hold };
                 let want = [0, 1, 2, 3].map(|m| if mask >> m & 1 == 1 { command } else { idle });
                 assert_eq!(motors.distribute(command), want);
             }
         }
-        for mask in [16, 0x100, 0x10000, u32::MAX] {
-            assert_eq!(Motors::from_mask(mask), Err(Error::InvalidMotorMask { mask, limit: 15 }));
-        }
+        assert_eq!((Motors::new(16), Motors::ALL.get()), (None, 15));
     }
 
     #[test]
@@ -184,7 +147,7 @@ mod tests {
         let mut group = Group::new(Motors::NONE);
         assert_eq!(group.start(profile, 5, Direction::Forward), Err(Error::NoMotor));
         assert_eq!(group.tick(), [Command::Disable; 4]);
-        group.select(Motors::from_mask(0b0101).unwrap()).unwrap();
+        group.select(Motors::new(0b0101).unwrap()).unwrap();
         group.start(profile, 5, Direction::Forward).unwrap();
         assert_eq!(group.select(Motors::ALL), Err(Error::Moving));
         for _ in 0..2000 {

@@ -1,4 +1,6 @@
-use crate::Error;
+use core::fmt;
+
+use servowire_core::OutOfRange;
 
 /// Micro-step profile of a DRV8711 with a 1.8° motor: 200 full steps a turn, 1/1 to 1/256 step.
 ///
@@ -43,13 +45,20 @@ impl Microstep {
         Self::Div256,
     ];
 
-    /// The profile of a code.
-    ///
-    /// # Errors
-    /// [`Error::InvalidMicrostep`] above 8.
-    pub fn from_code(code: u32) -> Result<Self, Error> {
-        let known = usize::try_from(code).ok().and_then(|at| Self::ALL.get(at));
-        known.copied().ok_or(Error::InvalidMicrostep { code, limit: 8 })
+    /// The profile of a code; `None` above 8.
+    pub const fn new(code: u8) -> Option<Self> {
+        Some(match code {
+            0 => Self::Full,
+            1 => Self::Half,
+            2 => Self::Quarter,
+            3 => Self::Div8,
+            4 => Self::Div16,
+            5 => Self::Div32,
+            6 => Self::Div64,
+            7 => Self::Div128,
+            8 => Self::Div256,
+            _ => return None,
+        })
     }
 
     /// The profile code, 0..=8; also the value of MODE in the DRV8711's CTRL register.
@@ -82,6 +91,21 @@ impl Microstep {
     }
 }
 
+impl TryFrom<u8> for Microstep {
+    type Error = OutOfRange;
+
+    fn try_from(code: u8) -> Result<Self, OutOfRange> {
+        Self::new(code).ok_or_else(|| OutOfRange::above(code.into(), Self::Div256.code().into()))
+    }
+}
+
+/// `1/256`.
+impl fmt::Display for Microstep {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "1/{}", self.microsteps())
+    }
+}
+
 /// The moves of position mode in TI's `sorte_master_cfg.inc`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -99,17 +123,19 @@ pub enum Turn {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::string::ToString;
 
     #[test]
     fn codes_and_turns() {
         for (code, profile) in (0..).zip(Microstep::ALL) {
-            assert_eq!(Microstep::from_code(code), Ok(profile));
-            assert_eq!(u32::from(profile.code()), code);
+            assert_eq!(Microstep::new(code), Some(profile));
+            assert_eq!(profile.code(), code);
             assert_eq!(profile.steps(Turn::Full), profile.steps(Turn::Quarter) * 4);
             assert_eq!(profile.steps(Turn::Ten), profile.steps(Turn::Full) * 10);
             assert_eq!(profile.steps_per_turn(), 200 * profile.microsteps());
         }
         assert_eq!(Microstep::Div256.steps_per_turn(), 51_200);
-        assert_eq!(Microstep::from_code(9), Err(Error::InvalidMicrostep { code: 9, limit: 8 }));
+        assert_eq!(Microstep::try_from(9), Err(OutOfRange { got: 9, max: 8 }));
+        assert_eq!(Microstep::Div256.to_string(), "1/256");
     }
 }

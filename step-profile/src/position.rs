@@ -1,4 +1,13 @@
-use crate::{Command, Direction, Error, Group, Microstep, Motors, MoveState, Profile, Turn};
+use core::fmt;
+
+use servowire_core::OutOfRange;
+
+use crate::axis::{Command, Direction};
+use crate::error::Error;
+use crate::group::{Group, Motors};
+use crate::microstep::{Microstep, Turn};
+use crate::profile::Profile;
+use crate::ramp_steps::MoveState;
 
 /// The operating modes of TI's `sorte_master_cfg.inc`.
 ///
@@ -21,18 +30,40 @@ pub enum OperatingMode {
 }
 
 impl OperatingMode {
-    /// The mode of a code.
-    ///
-    /// # Errors
-    /// [`Error::InvalidMode`] above 4.
-    pub const fn from_code(code: u32) -> Result<Self, Error> {
-        Ok(match code {
+    /// The mode of a code; `None` above 4.
+    pub const fn new(code: u8) -> Option<Self> {
+        Some(match code {
             0 => Self::Position,
             1 => Self::Speed,
             2 => Self::Ramp,
             3 => Self::Dance,
             4 => Self::Manual,
-            _ => return Err(Error::InvalidMode { code, limit: 4 }),
+            _ => return None,
+        })
+    }
+
+    /// The code, 0..=4.
+    pub const fn code(self) -> u8 {
+        self as u8
+    }
+}
+
+impl TryFrom<u8> for OperatingMode {
+    type Error = OutOfRange;
+
+    fn try_from(code: u8) -> Result<Self, OutOfRange> {
+        Self::new(code).ok_or_else(|| OutOfRange::above(code.into(), Self::Manual.code().into()))
+    }
+}
+
+impl fmt::Display for OperatingMode {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.pad(match self {
+            Self::Position => "position",
+            Self::Speed => "speed",
+            Self::Ramp => "ramp",
+            Self::Dance => "dance",
+            Self::Manual => "manual",
         })
     }
 }
@@ -53,6 +84,25 @@ pub enum PositionState {
     FullTurn = 3,
     /// Ten turns are under way.
     TenTurns = 4,
+}
+
+impl PositionState {
+    /// The number of the state, 0..=4.
+    pub const fn code(self) -> u8 {
+        self as u8
+    }
+}
+
+impl fmt::Display for PositionState {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.pad(match self {
+            Self::Idle => "idle",
+            Self::Wait => "wait",
+            Self::QuarterTurn => "quarter turn",
+            Self::FullTurn => "full turn",
+            Self::TenTurns => "ten turns",
+        })
+    }
 }
 
 /// Position mode: the selected motors turn by a quarter, once or ten times, and rest for a second after it.
@@ -144,7 +194,8 @@ impl<'t> PositionMode<'t> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{Parameters, Speed};
+    use crate::frequency::Speed;
+    use crate::profile::Parameters;
 
     #[test]
     fn a_quarter_turn_and_its_second_of_rest() {
@@ -198,8 +249,25 @@ mod tests {
             OperatingMode::Manual,
         ];
         for (code, mode) in (0..).zip(codes) {
-            assert_eq!(OperatingMode::from_code(code), Ok(mode));
+            assert_eq!(OperatingMode::new(code), Some(mode));
         }
-        assert_eq!(OperatingMode::from_code(5), Err(Error::InvalidMode { code: 5, limit: 4 }));
+        assert_eq!(OperatingMode::try_from(5), Err(OutOfRange { got: 5, max: 4 }));
+        assert_eq!(OperatingMode::Manual.code(), 4);
+        let states = [
+            (PositionState::Idle, 0),
+            (PositionState::Wait, 1),
+            (PositionState::QuarterTurn, 2),
+            (PositionState::FullTurn, 3),
+            (PositionState::TenTurns, 4),
+        ];
+        for (state, code) in states {
+            assert_eq!(state.code(), code, "{state}");
+        }
+    }
+
+    /// 1 s of 4 µs cycles.
+    #[test]
+    fn the_rest_lasts_a_second() {
+        assert_eq!(PositionMode::REST, 250_000);
     }
 }

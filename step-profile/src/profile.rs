@@ -1,18 +1,23 @@
-use crate::arithmetic::{Arithmetic, CYCLE_NS, step_time_ns};
+use crate::arithmetic::Arithmetic;
+use crate::error::Error;
+use crate::frequency::Speed;
+use crate::interval::{CYCLE_NS, step_time_ns};
 use crate::pru_exact;
+use crate::ramp::RampTable;
+use crate::ramp_steps::RampSteps;
 use crate::runs::Runs;
-use crate::{Error, RampTable, Speed, Steps};
 
 /// What a speed profile is made of.
 ///
 /// ```
 /// use step_profile::{Parameters, Profile, Speed};
-/// let profile = Profile::new(Parameters { steps_per_entry: 16, ..Parameters::at(Speed::KHZ_100) })?;
+/// let profile = Profile::new(Parameters::at(Speed::KHZ_100).with_steps_per_entry(16))?;
 /// assert_eq!(profile.steps(51_200).count(), 51_200);
 /// # Ok::<_, step_profile::Error>(())
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[non_exhaustive]
 pub struct Parameters<'t> {
     /// Full speed.
     pub speed: Speed,
@@ -41,6 +46,31 @@ impl Parameters<'static> {
             table: RampTable::SIN2,
             arithmetic: Arithmetic::Corrected,
         }
+    }
+}
+
+impl<'t> Parameters<'t> {
+    /// With `steps` steps a ramp entry (K), 1..=134217727.
+    pub const fn with_steps_per_entry(self, steps: u32) -> Self {
+        Self { steps_per_entry: steps, ..self }
+    }
+
+    /// With a sync_time before the first step, 0..=3999 ns.
+    pub const fn with_init_sync(self, ns: u32) -> Self {
+        Self { init_sync: ns, ..self }
+    }
+
+    /// With a ramp of one's own.
+    pub const fn with_table<'a>(self, table: &'a RampTable) -> Parameters<'a>
+    where
+        't: 'a,
+    {
+        Parameters { table, ..self }
+    }
+
+    /// With another arithmetic of the steps.
+    pub const fn with_arithmetic(self, arithmetic: Arithmetic) -> Self {
+        Self { arithmetic, ..self }
     }
 }
 
@@ -138,8 +168,8 @@ impl<'t> Profile<'t> {
     }
 
     /// The steps of a move of `steps` steps, from standstill to standstill.
-    pub const fn steps(self, steps: u32) -> Steps<'t> {
-        Steps::new(self, steps)
+    pub const fn steps(self, steps: u32) -> RampSteps<'t> {
+        RampSteps::new(self, steps)
     }
 }
 
@@ -186,6 +216,17 @@ mod tests {
         let steep = RampTable::new(entries).unwrap();
         let fastest = Parameters { table: &steep, ..Parameters::at(Speed::KHZ_250) };
         assert_eq!(Profile::new(fastest), Err(Error::StepTimeOverflow { speed: 262_144, limit: 65_536 }));
+    }
+
+    /// The product is cut above bit 47: 2^48 is the first that loses a bit.
+    #[test]
+    fn a_step_time_of_2_to_the_48_is_refused() {
+        let mut entries = [1000; 32];
+        entries[0] = 1 << 20;
+        let table = RampTable::new(entries).unwrap();
+        let at = |speed| Profile::new(Parameters::at(Speed::from_raw(speed)).with_table(&table));
+        assert_eq!(at(1 << 28), Err(Error::StepTimeOverflow { speed: 1 << 28, limit: (1 << 28) - 1 }));
+        assert!(at((1 << 28) - 1).is_ok());
     }
 
     #[test]

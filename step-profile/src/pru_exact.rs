@@ -29,7 +29,7 @@
 //! a late one, and 4us_cnt ends two above the true one with a sync_time near 2^32: the move never recovers.
 //! [`corrected`](crate::corrected) does not have this limit.
 
-use crate::arithmetic::{CYCLE_NS, Interval, StepTime, step_time_ns};
+use crate::interval::{CYCLE_NS, Interval, StepTime, step_time_ns};
 
 /// 2^32 / 4000 rounded up: `FOUR_US_P32_CONST` of TI's `sorte_master_cfg.inc`.
 pub const RECIPROCAL: u32 = 1_073_742;

@@ -1,6 +1,6 @@
 use core::f64::consts::FRAC_PI_2;
 
-use crate::Error;
+use crate::error::Error;
 
 /// The acceleration ramp: 32 intervals from zero to full speed, each stored as 1000 / sin²(x).
 ///

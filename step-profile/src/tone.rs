@@ -1,4 +1,6 @@
-use crate::{Frequency, Speed};
+use core::fmt;
+
+use crate::frequency::{Frequency, Speed};
 
 /// The ten tones of Table 3 in TIDEP0061, section 2.3.3, in the German names printed there.
 ///
@@ -37,6 +39,13 @@ struct Row {
     speed: u32,
     p125: u32,
     p250: u32,
+}
+
+/// Its name in Table 3.
+impl fmt::Display for Tone {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.pad(self.name())
+    }
 }
 
 impl Tone {

@@ -26,7 +26,8 @@ fn values_are_plain() {
 
 #[test]
 fn illegal_values_are_refused() {
-    assert!(from_str::<Motors>("16").is_err());
+    assert!(from_str::<Motors>("16").is_err() && from_str::<Motors>("-1").is_err());
+    assert!(from_str::<Microstep>(r#""Div512""#).is_err() && from_str::<Tone>(r#""B""#).is_err());
     assert!(from_str::<Frequency>("[1,0]").is_err());
     let mut entries = *RampTable::SIN2.entries();
     entries[31] = 999;

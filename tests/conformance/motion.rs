@@ -56,7 +56,7 @@ fn every_tone() {
 #[test]
 fn the_trap_of_phase_0_loses_no_step() {
     for init_sync in [0, 1, 3990, 3991, 3999] {
-        let profile = Profile::new(Parameters { init_sync, ..Parameters::at(Speed::KHZ_250) }).unwrap();
+        let profile = Profile::new(Parameters::at(Speed::KHZ_250).with_init_sync(init_sync)).unwrap();
         run(profile, 5000, 0).unwrap();
         run(profile, 5000, MAX_LATENCY_NS).unwrap();
     }
@@ -70,7 +70,7 @@ proptest! {
     ) {
         let arithmetic = if carried { Arithmetic::Carried } else { Arithmetic::Corrected };
         let at = Parameters::at(Speed::from_raw(speed));
-        let profile = Profile::new(Parameters { steps_per_entry: k, init_sync, arithmetic, ..at }).unwrap();
+        let profile = Profile::new(at.with_steps_per_entry(k).with_init_sync(init_sync).with_arithmetic(arithmetic)).unwrap();
         run(profile, steps, latency)?;
     }
 }

@@ -17,17 +17,26 @@
 //! let mut encoder = Device::<6>::new(0x17, BitRate::Mbit2_5);
 //! encoder.set_position(U24::truncate(0x12_3456), U24::truncate(7));
 //! // the request for ID 3, its delimiter at 4 us
-//! let reply = encoder.byte(0x1a, 4_000).expect("an answer");
-//! assert_eq!(reply.at_ns, 7_000);
-//! assert_eq!(reply.frame.as_bytes()[2..9], [0x56, 0x34, 0x12, 0x17, 0x07, 0x00, 0x00]);
+//! let sent = encoder.byte(0x1a, 4_000).expect("a response");
+//! assert_eq!(sent.at_ns, 7_000);
+//! assert_eq!(sent.frame.as_bytes()[2..9], [0x56, 0x34, 0x12, 0x17, 0x07, 0x00, 0x00]);
 //! ```
 
 use nrz_line::{Format, Receiver, Window};
 
-use crate::{
-    Address, Adf, Alarm, Almc, BitRate, DataId, EncoderId, Error, Frame, Full, Memory, MultiTurn, RESPONSE_DELAY_NS,
-    Request, Response, SingleTurn, StatusField, U24, master::Reset,
-};
+use servowire_core::U24;
+
+use crate::address::{Address, Adf};
+use crate::data_id::DataId;
+use crate::error::Error;
+use crate::frame::Frame;
+use crate::master::Reset;
+use crate::message::{AllData, Identification, Memory, MultiTurn, SingleTurn};
+use crate::request::Request;
+use crate::resolution::Resolution;
+use crate::response::Response;
+use crate::status::{Almc, StatusField};
+use crate::timing::{BitRate, RESPONSE_DELAY_NS};
 
 /// A fault that the encoder or its line is made to have.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
@@ -56,10 +65,10 @@ pub enum Fault {
     RejectAll,
 }
 
-/// What an encoder sends, and when its start bit begins.
+/// What an encoder sends, and when.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub struct Reply {
+pub struct Transmission {
     /// The fields as a UART sends them. A fault in a start bit or delimiter is only in [`line`](Self::line).
     pub frame: Frame,
     /// The line bits.
@@ -112,8 +121,8 @@ impl<const PAGES: usize> Device<PAGES> {
             abs: U24::truncate(0),
             zero: U24::truncate(0),
             abm: U24::truncate(0),
-            almc: Almc::NONE,
-            causes: Almc::NONE,
+            almc: Almc::empty(),
+            causes: Almc::empty(),
             fault: Fault::None,
             eeprom: [[0xff; 127]; PAGES],
             page: 0,
@@ -135,16 +144,14 @@ impl<const PAGES: usize> Device<PAGES> {
         self.abm = abm;
     }
 
-    /// The cause of an alarm comes or goes. A latched alarm stays set until a reset finds its cause gone.
-    pub const fn set_alarm(&mut self, alarm: Alarm, present: bool) {
+    /// The cause of alarms comes or goes. A latched alarm stays set until a reset finds its cause gone.
+    pub const fn set_alarms(&mut self, alarms: Almc, present: bool) {
         if present {
-            self.causes = self.causes.with(Almc::of(alarm));
-            self.almc = self.almc.with(Almc::of(alarm));
+            self.causes = self.causes.union(alarms);
+            self.almc = self.almc.union(alarms);
         } else {
-            self.causes = self.causes.without(Almc::of(alarm));
-            if !alarm.is_latched() {
-                self.almc = self.almc.without(Almc::of(alarm));
-            }
+            self.causes = self.causes.difference(alarms);
+            self.almc = self.almc.difference(alarms.difference(Almc::LATCHED));
         }
     }
 
@@ -156,6 +163,16 @@ impl<const PAGES: usize> Device<PAGES> {
     /// The error byte as it would be answered now.
     pub const fn almc(&self) -> Almc {
         self.almc
+    }
+
+    /// ABS as it would be answered now: from the zero that ID 8 set, in the width that the encoder ID names.
+    pub const fn abs(&self) -> U24 {
+        self.single_turn()
+    }
+
+    /// ABM as it would be answered now.
+    pub const fn abm(&self) -> U24 {
+        self.abm
     }
 
     /// The EEPROM page that is selected.
@@ -170,7 +187,7 @@ impl<const PAGES: usize> Device<PAGES> {
 
     /// A byte was received without framing error, its delimiter at `now_ns`. Gives the answer once a request is
     /// complete.
-    pub fn byte(&mut self, byte: u8, now_ns: u64) -> Option<Reply> {
+    pub fn byte(&mut self, byte: u8, now_ns: u64) -> Option<Transmission> {
         if self.is_deaf(now_ns) {
             return None;
         }
@@ -192,21 +209,21 @@ impl<const PAGES: usize> Device<PAGES> {
             }
         };
         self.deaf = true;
-        self.reply(answer?, now_ns)
+        self.transmission(answer?, now_ns)
     }
 
     /// A byte was received with a framing error: the request is damaged.
-    pub fn framing_error(&mut self, now_ns: u64) -> Option<Reply> {
+    pub fn framing_error(&mut self, now_ns: u64) -> Option<Transmission> {
         if self.is_deaf(now_ns) {
             return None;
         }
         self.deaf = true;
         self.repeated = None;
-        self.reply(self.rejection(false, true), now_ns)
+        self.transmission(self.rejection(false, true), now_ns)
     }
 
     /// Whether what arrives now is the rest of a request that was already judged. A pause of half a field begins a new
-    /// request, so that nothing behind a damaged control field is ever taken for another command.
+    /// request, so that nothing after a damaged control field is ever taken for another command.
     fn is_deaf(&mut self, now_ns: u64) -> bool {
         let patience = u64::from(self.rate.fields_ns(1)).saturating_mul(3) / 2;
         if now_ns.saturating_sub(self.last_byte_ns) > patience {
@@ -218,7 +235,7 @@ impl<const PAGES: usize> Device<PAGES> {
     }
 
     /// One line bit was received, at `now_ns`; the line idles high.
-    pub fn bit(&mut self, level: bool, now_ns: u64) -> Option<Reply> {
+    pub fn bit(&mut self, level: bool, now_ns: u64) -> Option<Transmission> {
         let field = self.bits.push(level)?;
         let [byte, _] = field.content.to_le_bytes();
         if field.delimiter { self.byte(byte, now_ns) } else { self.framing_error(now_ns) }
@@ -229,15 +246,15 @@ impl<const PAGES: usize> Device<PAGES> {
         self.count_resets(request.data_id(), now_ns);
         let single = SingleTurn { sf: self.sf(), abs: self.single_turn() };
         match request {
-            Request::Id0 => Response::Id0(single),
-            Request::Id1 => Response::Id1(MultiTurn { sf: self.sf(), abm: self.abm }),
-            Request::Id2 => Response::Id2(EncoderId { sf: self.sf(), enid: self.enid }),
-            Request::Id3 => Response::Id3(self.full(self.sf())),
-            Request::Id6 { adf, edf } => Response::Id6(self.write(adf.address(), edf, now_ns)),
-            Request::Id7 => Response::Id7(single),
-            Request::Id8 => Response::Id8(single),
-            Request::IdC => Response::IdC(single),
-            Request::IdD { adf } => Response::IdD(self.read(adf.address(), now_ns)),
+            Request::ReadSingleTurn => Response::ReadSingleTurn(single),
+            Request::ReadMultiTurn => Response::ReadMultiTurn(MultiTurn { sf: self.sf(), abm: self.abm }),
+            Request::ReadEncoderId => Response::ReadEncoderId(Identification { sf: self.sf(), enid: self.enid }),
+            Request::ReadAll => Response::ReadAll(self.all_data(self.sf())),
+            Request::WriteEeprom { adf, edf } => Response::WriteEeprom(self.write(adf.address(), edf, now_ns)),
+            Request::ResetErrors => Response::ResetErrors(single),
+            Request::SetSingleTurnZero => Response::SetSingleTurnZero(single),
+            Request::ResetTurnsAndErrors => Response::ResetTurnsAndErrors(single),
+            Request::ReadEeprom { adf } => Response::ReadEeprom(self.read(adf.address(), now_ns)),
         }
     }
 
@@ -246,26 +263,32 @@ impl<const PAGES: usize> Device<PAGES> {
     }
 
     /// ABS from the zero that ID 8 set, in the width that the encoder ID names (24 bits for an unknown ID).
-    fn single_turn(&self) -> U24 {
-        let bits = crate::Profile::from_enid(self.enid).map_or(24, |hint| hint.profile.abs_bits());
-        let mask = 1_u32.wrapping_shl(bits.into()).wrapping_sub(1);
+    const fn single_turn(&self) -> U24 {
+        let bits = match Resolution::from_enid(self.enid) {
+            Some(hint) => hint.resolution.abs_bits(),
+            None => 24,
+        };
+        let mask = 1_u32.wrapping_shl(bits as u32).wrapping_sub(1);
         U24::truncate(self.abs.get().wrapping_sub(self.zero.get()) & mask)
     }
 
-    fn full(&self, sf: StatusField) -> Full {
-        Full { sf, abs: self.single_turn(), enid: self.enid, abm: self.abm, almc: self.almc }
+    fn all_data(&self, sf: StatusField) -> AllData {
+        AllData { sf, abs: self.single_turn(), enid: self.enid, abm: self.abm, almc: self.almc }
     }
 
     /// The ID 3 frame that answers a damaged request.
     fn rejection(&self, parity: bool, delimiter: bool) -> Response {
-        Response::Id3(self.full(self.sf().with_request_errors(parity, delimiter)))
+        let mut sf = self.sf();
+        sf.set(StatusField::CA0, parity);
+        sf.set(StatusField::CA1, delimiter);
+        Response::ReadAll(self.all_data(sf))
     }
 
     /// Ten equal reset requests in a row, 40 us apart or more, do their work; any other request starts the count again.
     fn count_resets(&mut self, id: DataId, now_ns: u64) {
         let since = now_ns.saturating_sub(self.last_request_ns);
         self.last_request_ns = now_ns;
-        if !matches!(id, DataId::Id7 | DataId::Id8 | DataId::IdC) {
+        if !matches!(id, DataId::ResetErrors | DataId::SetSingleTurnZero | DataId::ResetTurnsAndErrors) {
             self.repeated = None;
             return;
         }
@@ -277,8 +300,8 @@ impl<const PAGES: usize> Device<PAGES> {
         }
         self.repeated = None;
         match id {
-            DataId::Id8 => self.zero = self.abs,
-            DataId::IdC => {
+            DataId::SetSingleTurnZero => self.zero = self.abs,
+            DataId::ResetTurnsAndErrors => {
                 self.abm = U24::truncate(0);
                 self.almc = self.causes;
             }
@@ -312,7 +335,7 @@ impl<const PAGES: usize> Device<PAGES> {
     }
 
     /// The answer as it leaves, with the fault that is switched on.
-    fn reply(&self, response: Response, now_ns: u64) -> Option<Reply> {
+    fn transmission(&self, response: Response, now_ns: u64) -> Option<Transmission> {
         let sound = response.emit();
         let line = sound.line();
         let line = match self.fault {
@@ -326,7 +349,7 @@ impl<const PAGES: usize> Device<PAGES> {
         };
         let fields = u8::try_from(line.len() / Frame::FIELD_BITS).ok()?;
         let frame = Frame::from_line(line, fields).unwrap_or(sound);
-        Some(Reply { frame, line, at_ns: now_ns.saturating_add(RESPONSE_DELAY_NS.into()) })
+        Some(Transmission { frame, line, at_ns: now_ns.saturating_add(RESPONSE_DELAY_NS.into()) })
     }
 }
 

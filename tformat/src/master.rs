@@ -10,7 +10,7 @@
 //! use tformat::{BitRate, Request, Response};
 //!
 //! let line = Line::new(BitRate::Mbit2_5).with_echo();
-//! let mut transaction = Transaction::start(Request::Id0, line, 0);
+//! let mut transaction = Transaction::start(Request::ReadSingleTurn, line, 0);
 //! assert_eq!(transaction.frame().as_bytes(), [0x02]);
 //!
 //! // the UART receives the own request and, 3 us later, the six fields of the answer, 4 us each
@@ -21,7 +21,7 @@
 //!     now_ns += 4_000;
 //!     progress = transaction.byte(byte, now_ns);
 //! }
-//! let Progress::Done(Response::Id0(single)) = progress else { panic!("{progress:?}") };
+//! let Progress::Done { value: Response::ReadSingleTurn(single), .. } = progress else { panic!("{progress:?}") };
 //! assert_eq!(single.abs.get(), 1_883_572);
 //! ```
 
@@ -29,15 +29,20 @@ mod eeprom;
 mod reset;
 mod transaction;
 
-pub use eeprom::{EepromAccess, Page};
-pub use nrz_line::{ErrorRate, Polling};
+use crate::error::{Error, ErrorClass};
+use crate::request::Request;
+
+pub use eeprom::EepromAccess;
 pub use reset::Reset;
+pub use servowire_core::{ErrorRate, Polling};
 pub use transaction::{Line, Progress, Transaction, parse_echoed};
 
-use crate::{Error, ErrorClass, Request};
-
 /// What a procedure of several transactions wants next.
-pub type Step<T> = nrz_line::Step<Request, T, Error>;
+pub type Step<T> = servowire_core::Step<Request, T, Error>;
 
 /// How many transactions went well, and how many failed with which [`ErrorClass`].
-pub type Counters = nrz_line::Counters<{ ErrorClass::ALL.len() }>;
+pub type Counters = servowire_core::Counters<{ ErrorClass::ALL.len() }>;
+
+/// How often a busy EEPROM is asked: every millisecond, 40 times, which is twice the 18 ms that an encoder takes to write
+/// a byte.
+pub const EEPROM_POLLING: Polling = Polling { interval_ns: 1_000_000, max_tries: 40 };

@@ -2,8 +2,8 @@
 
 use tformat::device::{Device, Fault};
 use tformat::inspect::{Cause, inspect as look};
-use tformat::master::{EepromAccess, Line, Page, Polling, Progress, Reset, Step, Transaction};
-use tformat::{Address, Alarm, BitRate, Error, Frame, Request, Response, U24, Window};
+use tformat::master::{EepromAccess, Line, Polling, Progress, Reset, Step, Transaction};
+use tformat::{Address, Almc, BitRate, Error, Frame, Page, Request, Response, U24, Window};
 
 use super::{byte, chosen};
 
@@ -21,7 +21,7 @@ pub fn master(mut data: &[u8]) {
     let line = if options & 1 == 0 { Line::new(rate) } else { Line::new(rate).with_echo() };
     let mut transaction = Transaction::start(request, line, 0);
     let (mut now, mut received, mut clean) = (0, Vec::new(), true);
-    while let (Progress::Waiting { until_ns }, false) = (transaction.progress(), data.is_empty()) {
+    while let (Progress::Pending { until_ns }, false) = (transaction.progress(), data.is_empty()) {
         let event = byte(&mut data);
         now += u64::from(event >> 2) * u64::from(rate.bit_ns());
         let in_time = now <= until_ns;
@@ -37,10 +37,10 @@ pub fn master(mut data: &[u8]) {
                 received.extend(in_time.then_some(value));
             }
         }
-        assert!(in_time || !matches!(transaction.progress(), Progress::Waiting { .. }));
+        assert!(in_time || !matches!(transaction.progress(), Progress::Pending { .. }));
     }
     let end = match transaction.progress() {
-        Progress::Waiting { until_ns } => transaction.poll(until_ns + 1),
+        Progress::Pending { until_ns } => transaction.poll(until_ns + 1),
         end => end,
     };
     assert_eq!(transaction.byte(0x1a, now), end);
@@ -51,7 +51,11 @@ pub fn master(mut data: &[u8]) {
             [] => Err(Error::NoResponse { echo: false }),
             bytes => Response::parse(request, bytes),
         };
-        assert_eq!(end, want.map_or_else(Progress::Failed, Progress::Done));
+        match end {
+            Progress::Done { value, .. } => assert_eq!(want, Ok(value)),
+            Progress::Failed { error, .. } => assert_eq!(want, Err(error)),
+            Progress::Pending { .. } => panic!("the time-out did not end it"),
+        }
     }
 }
 
@@ -63,25 +67,25 @@ pub fn master(mut data: &[u8]) {
 /// ```
 pub fn device(mut data: &[u8]) {
     let (procedure, address, value) = (byte(&mut data), byte(&mut data), byte(&mut data));
-    let page = Page(byte(&mut data) % 8);
+    let page = Page::truncate(byte(&mut data));
     let polling = Polling { interval_ns: 1_000_000, max_tries: u16::from(byte(&mut data)) };
     let address = Address::new(address & 0x7f).expect("seven bits");
     let mut line = Simulated::new(data);
     line.encoder.set_position(U24::truncate(u32::from(value) << 9), U24::truncate(7));
-    line.encoder.set_alarm(Alarm::CountingError, true);
-    line.encoder.set_alarm(Alarm::CountingError, false);
+    line.encoder.set_alarms(Almc::CE, true);
+    line.encoder.set_alarms(Almc::CE, false);
     match procedure % 5 {
         0 => {
             let done = line.reset(Reset::clear_errors());
-            assert!(!done || line.encoder.almc().raw() == 0);
+            assert!(!done || line.encoder.almc().bits() == 0);
         }
         1 => _ = line.reset(Reset::clear_turns_and_errors()),
         2 => _ = line.reset(Reset::set_single_turn_zero_and_shift_commutation_angle()),
         3 => {
             let written = line.access(EepromAccess::write(Some(page), address, value, polling), polling);
             // The encoder has six pages and keeps the one it has when another is named.
-            if written.is_ok() && address != Address::PAGE_REGISTER && line.encoder.page() == page.0 {
-                let cells = line.encoder.eeprom_mut()[usize::from(page.0)];
+            if written.is_ok() && address != Address::PAGE_REGISTER && line.encoder.page() == page.get() {
+                let cells = line.encoder.eeprom_mut()[usize::from(page.get())];
                 assert_eq!(cells[usize::from(address.get())], value);
             }
         }
@@ -108,7 +112,7 @@ impl<'a> Simulated<'a> {
         while let Step::Send { request, not_before_ns } = step {
             assert_eq!(request.data_id(), reset.data_id());
             let outcome = self.transact(request, not_before_ns);
-            step = reset.answer(outcome, self.now_ns);
+            step = reset.receive(outcome, self.now_ns);
             assert!(self.requests <= u32::from(Reset::MAX_REFUSED) * u32::from(Reset::REQUESTS));
         }
         matches!(step, Step::Done { .. })
@@ -121,7 +125,7 @@ impl<'a> Simulated<'a> {
             match step {
                 Step::Send { request, not_before_ns } => {
                     let outcome = self.transact(request, not_before_ns);
-                    step = access.answer(outcome, self.now_ns);
+                    step = access.receive(outcome, self.now_ns);
                     // Three phases, each with its own tries.
                     assert!(self.requests <= 3 * u32::from(polling.max_tries.max(1)));
                 }
@@ -158,12 +162,12 @@ impl<'a> Simulated<'a> {
         }
         let end = loop {
             match transaction.progress() {
-                Progress::Waiting { until_ns } => {
+                Progress::Pending { until_ns } => {
                     self.now_ns = self.now_ns.max(until_ns + 1);
                     let _ = transaction.poll(self.now_ns);
                 }
-                Progress::Done(response) => break Ok(response),
-                Progress::Failed(error) => break Err(error),
+                Progress::Done { value, .. } => break Ok(value),
+                Progress::Failed { error, .. } => break Err(error),
             }
         };
         assert!(end.is_err() || end.is_ok_and(|response| response.data_id() == request.data_id()));
@@ -203,7 +207,7 @@ pub fn inspect(mut data: &[u8]) {
         }
         Err(error) => {
             assert_eq!(report.error, Some(error));
-            assert!(report.findings.has(error.class()));
+            assert!(report.findings.contains(error.class()));
         }
     }
     assert!(report.fields().len() <= usize::from(request.data_id().response_fields()));

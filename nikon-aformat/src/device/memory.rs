@@ -1,4 +1,4 @@
-use crate::{READ_BUSY_NS, WRITE_BUSY_NS};
+use crate::timing::{READ_BUSY_NS, WRITE_BUSY_NS};
 
 /// The EEPROM of an encoder and the time for which it is busy.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

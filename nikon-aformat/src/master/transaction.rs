@@ -1,79 +1,18 @@
+use super::{Line, Progress};
 use crate::bus::{Addresses, Bus};
-use crate::frame::{FRAME_BITS, truncated};
-use crate::{BitRate, Error, Expected, FRAME_GAP_NS, Frames, Profile, REQUEST_GAP_NS, Reply, Request, Response};
+use crate::error::Error;
+use crate::expected::Expected;
+use crate::frame::truncated;
+use crate::layout::FRAME_BITS;
+use crate::raw_response::RawResponse;
+use crate::request::{Frames, Request};
+use crate::resolution::Resolution;
+use crate::response::Response;
+use crate::timing::REQUEST_GAP_NS;
 
-/// How a controller is connected, and how long it waits.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub struct Line {
-    /// Bit rate.
-    pub rate: BitRate,
-    /// Idle time between two frames of a request, in ns. Default [`FRAME_GAP_NS`].
-    pub frame_gap_ns: u32,
-    /// Longest wait from the end of the request to the *start bit* of the reply, in ns. The turn-around time is not
-    /// documented; the default is 1000 bits, as one maker's master has it. Others wait 3 ms and 35 ms.
-    pub reply_timeout_ns: u32,
-    /// Longest idle time between two frames of a reply, in ns. Default four bits.
-    pub idle_in_reply_ns: u32,
-    /// Longest idle time between two replies on a bus, in ns. Default twice [`BitRate::reply_gap_ns`].
-    pub idle_between_replies_ns: u32,
-}
-
-impl Line {
-    /// A line with the default time-outs.
-    pub const fn new(rate: BitRate) -> Self {
-        Self {
-            rate,
-            frame_gap_ns: FRAME_GAP_NS,
-            reply_timeout_ns: rate.bits_ns(1000),
-            idle_in_reply_ns: rate.bits_ns(4),
-            idle_between_replies_ns: rate.reply_gap_ns().saturating_mul(2),
-        }
-    }
-
-    /// The same with another wait for the reply.
-    pub const fn with_reply_timeout_ns(self, reply_timeout_ns: u32) -> Self {
-        Self { reply_timeout_ns, ..self }
-    }
-
-    /// Line time of a request in ns, its gaps included.
-    pub fn request_ns(&self, request: Request) -> u32 {
-        self.rate.bits_ns(request.emit().line_bits(self.rate.bits(self.frame_gap_ns)))
-    }
-
-    /// The time after which a transaction with `encoders` encoders is over in any case, in ns from its start.
-    pub fn longest_ns(&self, request: Request, expected: &Expected, encoders: u8) -> u32 {
-        let reply = self.rate.reply_ns(expected.layout()).saturating_add(self.idle_in_reply_ns);
-        let replies = reply.saturating_add(self.idle_between_replies_ns).saturating_mul(encoders.into());
-        self.request_ns(request).saturating_add(self.reply_timeout_ns).saturating_add(replies)
-    }
-
-    /// Shortest period in which a request to `encoders` encoders can be repeated even if nobody answers, in ns: the
-    /// longest transaction and [`REQUEST_GAP_NS`].
-    pub fn min_cycle_ns(&self, request: Request, expected: &Expected, encoders: u8) -> u32 {
-        self.longest_ns(request, expected, encoders).saturating_add(REQUEST_GAP_NS)
-    }
-}
-
-/// How far a transaction is.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub enum Progress {
-    /// More frames are to come; at the time given, call [`Transaction::poll`].
-    Waiting {
-        /// When the wait is over.
-        until_ns: u64,
-    },
-    /// The reply, with all checks passed.
-    Done(Response),
-    /// No reply, or a refused one.
-    Failed(Error),
-}
-
-/// One request and its reply, frame by frame as a shift register receives them.
+/// One request and its response, frame by frame as a shift register receives them.
 ///
-/// Once done or failed it stays so. Of a multi-response request it takes the first reply; [`BusTransaction`] takes all.
+/// Once done or failed it stays so. Of a multi-response request it takes the first response; [`BusTransaction`] takes all.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Transaction {
@@ -83,23 +22,25 @@ pub struct Transaction {
     collector: Collector,
     until_ns: u64,
     end: Option<Result<Response, Error>>,
+    ready_ns: u64,
 }
 
 impl Transaction {
-    /// Begins a transaction with an encoder of this profile; the first start bit of the request is at `now_ns`.
+    /// Begins a transaction with an encoder of this resolution; the first start bit of the request is at `now_ns`.
     ///
     /// A request that encoders of this version do not understand fails at once with
     /// [`Error::UnsupportedInVersion`] and is not to be sent.
-    pub fn start(request: Request, profile: Profile, line: Line, now_ns: u64) -> Self {
+    pub fn start(request: Request, resolution: Resolution, line: Line, now_ns: u64) -> Self {
         let frame = line.rate.bits_ns(FRAME_BITS);
-        let first = line.request_ns(request).saturating_add(line.reply_timeout_ns).saturating_add(frame);
+        let first = line.request_ns(request).saturating_add(line.response_timeout_ns).saturating_add(frame);
         Self {
             request,
-            expected: request.expected(profile),
+            expected: request.expected(resolution),
             line,
             collector: Collector::EMPTY,
             until_ns: now_ns.saturating_add(first.into()),
-            end: request.check(profile).err().map(Err),
+            end: request.check(resolution).err().map(Err),
+            ready_ns: now_ns,
         }
     }
 
@@ -110,50 +51,58 @@ impl Transaction {
 
     /// A frame was received with start bit and delimiter in order, its delimiter at `now_ns`; `content` are its bits, the first
     /// of the line in bit 0.
-    pub fn frame(&mut self, content: u16, now_ns: u64) -> Progress {
-        if let Progress::Waiting { .. } = self.poll(now_ns) {
+    pub fn frame(&mut self, content: u16, now_ns: u64) -> Progress<Response> {
+        if let Progress::Pending { .. } = self.poll(now_ns) {
             self.until_ns = now_ns.saturating_add(self.patience_ns());
-            if let Some(reply) = self.collector.frame(content, now_ns, &self.expected) {
-                self.end = Some(Response::parse(&reply, &self.expected));
+            if let Some(raw) = self.collector.frame(content, now_ns, &self.expected) {
+                self.finish(Response::parse(&self.expected, &raw), now_ns);
             }
         }
         self.progress()
     }
 
     /// A frame was received whose delimiter reads 0.
-    pub fn framing_error(&mut self, now_ns: u64) -> Progress {
-        if let Progress::Waiting { .. } = self.poll(now_ns) {
-            self.end = Some(Err(Error::Delimiter { frame: self.collector.got }));
+    pub fn framing_error(&mut self, now_ns: u64) -> Progress<Response> {
+        if let Progress::Pending { .. } = self.poll(now_ns) {
+            self.finish(Err(Error::Delimiter { frame: self.collector.got }), now_ns);
         }
         self.progress()
     }
 
     /// Ends the transaction if its time is over.
-    pub fn poll(&mut self, now_ns: u64) -> Progress {
+    pub fn poll(&mut self, now_ns: u64) -> Progress<Response> {
         if self.end.is_none() && now_ns > self.until_ns {
             let nothing = self.collector.got == 0;
-            self.end = Some(Err(if nothing { Error::NoResponse } else { self.collector.truncation(&self.expected) }));
+            self.finish(
+                Err(if nothing { Error::NoResponse } else { self.collector.truncation(&self.expected) }),
+                now_ns,
+            );
         }
         self.progress()
     }
 
     /// Where the transaction stands.
-    pub const fn progress(&self) -> Progress {
+    pub const fn progress(&self) -> Progress<Response> {
         match self.end {
-            None => Progress::Waiting { until_ns: self.until_ns },
-            Some(Ok(response)) => Progress::Done(response),
-            Some(Err(error)) => Progress::Failed(error),
+            None => Progress::Pending { until_ns: self.until_ns },
+            Some(Ok(value)) => Progress::Done { value, ready_ns: self.ready_ns },
+            Some(Err(error)) => Progress::Failed { error, ready_ns: self.ready_ns },
         }
     }
 
+    fn finish(&mut self, end: Result<Response, Error>, now_ns: u64) {
+        self.end = Some(end);
+        self.ready_ns = now_ns.saturating_add(REQUEST_GAP_NS.into());
+    }
+
     fn patience_ns(&self) -> u64 {
-        u64::from(self.line.rate.bits_ns(FRAME_BITS)).saturating_add(self.line.idle_in_reply_ns.into())
+        u64::from(self.line.rate.bits_ns(FRAME_BITS)).saturating_add(self.line.idle_in_response_ns.into())
     }
 }
 
-/// A multi-response request and the replies of all encoders, frame by frame.
+/// A multi-response request and the responses of all encoders, frame by frame.
 ///
-/// It ends when as many replies have arrived as encoders were asked, good or not, or when its time is over; what is
+/// It ends when as many responses have arrived as encoders were asked, good or not, or when its time is over; what is
 /// missing then is said by [`Bus`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -165,17 +114,17 @@ pub struct BusTransaction {
     bus: Bus,
     until_ns: u64,
     ended: bool,
-    /// A frame was broken; the rest of its reply is passed over.
+    /// A frame was broken; the rest of its response is passed over.
     broken: bool,
 }
 
 impl BusTransaction {
-    /// Begins a transaction with encoders of this profile; the first start bit of the request is at `now_ns`.
+    /// Begins a transaction with encoders of this resolution; the first start bit of the request is at `now_ns`.
     ///
     /// What EA of the request means to the encoders is not documented. [`Addresses::highest`] of those that are asked is
     /// the most likely reading.
-    pub fn start(request: Request, profile: Profile, asked: Addresses, line: Line, now_ns: u64) -> Self {
-        let expected = request.expected(profile).any_address();
+    pub fn start(request: Request, resolution: Resolution, asked: Addresses, line: Line, now_ns: u64) -> Self {
+        let expected = request.expected(resolution).any_address();
         let longest = line.longest_ns(request, &expected, asked.len());
         Self {
             request,
@@ -200,9 +149,9 @@ impl BusTransaction {
         if self.poll(now_ns) {
             return true;
         }
-        self.begin_reply(now_ns);
-        if let Some(reply) = self.collector.frame(content, now_ns, &self.expected).filter(|_| !self.broken) {
-            self.bus.push(Ok(reply));
+        self.begin_response(now_ns);
+        if let Some(raw) = self.collector.frame(content, now_ns, &self.expected).filter(|_| !self.broken) {
+            self.bus.push(Ok(raw));
         }
         self.close_if_complete()
     }
@@ -212,7 +161,7 @@ impl BusTransaction {
         if self.poll(now_ns) {
             return true;
         }
-        self.begin_reply(now_ns);
+        self.begin_response(now_ns);
         if !self.broken {
             self.bus.push(Err(Error::Delimiter { frame: self.collector.got }));
         }
@@ -240,9 +189,9 @@ impl BusTransaction {
         &self.bus
     }
 
-    /// A frame behind a pause is the first of the next reply.
-    fn begin_reply(&mut self, now_ns: u64) {
-        let whole = u64::from(self.line.rate.bits_ns(FRAME_BITS)).saturating_add(self.line.idle_in_reply_ns.into());
+    /// A frame behind a pause is the first of the next response.
+    fn begin_response(&mut self, now_ns: u64) {
+        let whole = u64::from(self.line.rate.bits_ns(FRAME_BITS)).saturating_add(self.line.idle_in_response_ns.into());
         if now_ns.saturating_sub(self.collector.last_ns) > whole {
             self.cut();
         }
@@ -256,26 +205,26 @@ impl BusTransaction {
         self.collector.got = 0;
     }
 
-    /// A broken reply is over when its last frame has passed, which only a pause tells.
+    /// A broken response is over when its last frame has passed, which only a pause tells.
     fn close_if_complete(&mut self) -> bool {
         self.ended = self.bus.is_complete() && !self.broken;
         self.ended
     }
 }
 
-/// Frames of one reply.
+/// Frames of one response.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 struct Collector {
-    contents: [u16; Reply::MAX_FRAMES],
+    contents: [u16; RawResponse::MAX_FRAMES],
     got: u8,
     last_ns: u64,
 }
 
 impl Collector {
-    const EMPTY: Self = Self { contents: [0; Reply::MAX_FRAMES], got: 0, last_ns: 0 };
+    const EMPTY: Self = Self { contents: [0; RawResponse::MAX_FRAMES], got: 0, last_ns: 0 };
 
-    fn frame(&mut self, content: u16, now_ns: u64, expected: &Expected) -> Option<Reply> {
+    fn frame(&mut self, content: u16, now_ns: u64, expected: &Expected) -> Option<RawResponse> {
         self.last_ns = now_ns;
         if let Some(place) = self.contents.get_mut(usize::from(self.got)) {
             *place = content;
@@ -285,7 +234,7 @@ impl Collector {
             return None;
         }
         self.got = 0;
-        Some(Reply::of(core::mem::take(&mut self.contents), expected.layout()))
+        Some(RawResponse::of(core::mem::take(&mut self.contents), expected.layout()))
     }
 
     fn truncation(&self, expected: &Expected) -> Error {
@@ -296,39 +245,44 @@ impl Collector {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::command::{Command, Version};
+    use crate::data::Data;
+    use crate::number::EncoderAddress;
+    use crate::operation::Operation;
     use crate::response::tests::exchanges;
-    use crate::{Command, Data, EncoderAddress, EncoderStatus, Operation, U24, Version};
+    use crate::status::EncoderStatus;
     use proptest::prelude::*;
+    use servowire_core::U24;
 
-    const LINE: Line = Line::new(BitRate::Mbit16);
+    const LINE: Line = Line::new(crate::timing::BitRate::Mbit16);
     const FRAME_NS: u64 = 1_125;
 
     proptest! {
         #[test]
-        fn a_reply_arrives_or_its_absence_is_told((request, expected, response) in exchanges(), cut in 0..7_usize) {
-            let profile = if response.layout() == crate::Layout::Abs40Vel { Profile::default().low_with_velocity() } else { Profile::default() };
-            let profile = if request.command().is_reset() && response.layout() == crate::Layout::Abs24 { profile.resets_with_position() } else { profile };
-            let mut transaction = Transaction::start(request, profile, LINE, 0);
+        fn a_response_arrives_or_its_absence_is_told((request, expected, response) in exchanges(), cut in 0..7_usize) {
+            let resolution = if response.layout() == crate::layout::Layout::Abs40Vel { Resolution::default().low_with_velocity() } else { Resolution::default() };
+            let resolution = if request.command().is_reset() && response.layout() == crate::layout::Layout::Abs24 { resolution.resets_with_position() } else { resolution };
+            let mut transaction = Transaction::start(request, resolution, LINE, 0);
             prop_assert_eq!(transaction.frames(), request.emit());
-            let reply = response.emit();
+            let raw = response.emit();
             let mut now_ns = u64::from(LINE.request_ns(request)) + 3_000;
-            for content in reply.contents().iter().take(cut) {
+            for content in raw.contents().iter().take(cut) {
                 now_ns += FRAME_NS;
                 let _ = transaction.frame(*content, now_ns);
             }
-            let frames = usize::from(reply.frames());
+            let frames = usize::from(raw.frames());
             if cut >= frames {
-                prop_assert_eq!(transaction.progress(), Progress::Done(response));
+                prop_assert_eq!(transaction.progress(), Progress::Done { value: response, ready_ns: now_ns + 10_000 });
                 let ended = transaction;
                 let _ = (transaction.frame(7, now_ns), transaction.framing_error(now_ns), transaction.poll(u64::MAX));
                 prop_assert_eq!(transaction, ended);
             } else {
-                let Progress::Waiting { until_ns } = transaction.progress() else { panic!() };
-                prop_assert_eq!(transaction.poll(until_ns), Progress::Waiting { until_ns });
+                let Progress::Pending { until_ns } = transaction.progress() else { panic!() };
+                prop_assert_eq!(transaction.poll(until_ns), Progress::Pending { until_ns });
                 let want = if cut == 0 { Error::NoResponse } else {
                     Error::Truncated { got: cut as u16 * 18, want: expected.layout().line_bits() as u16 }
                 };
-                prop_assert_eq!(transaction.poll(until_ns + 1), Progress::Failed(want));
+                prop_assert_eq!(transaction.poll(until_ns + 1), Progress::Failed { error: want, ready_ns: until_ns + 10_001 });
                 prop_assert!(until_ns <= u64::from(LINE.longest_ns(request, &expected, 1)));
             }
         }
@@ -337,26 +291,26 @@ mod tests {
     #[test]
     fn what_an_old_encoder_does_not_know_is_not_sent() {
         let request = Request::new(EncoderAddress::ZERO, Operation::Abs24Vel);
-        let profile = Profile::default().with_version(Version::V2_1);
-        let progress = Transaction::start(request, profile, LINE, 0).progress();
+        let resolution = Resolution::default().with_version(Version::V2_1);
+        let progress = Transaction::start(request, resolution, LINE, 0).progress();
         let error = Error::UnsupportedInVersion { command: Command::Abs24Vel, version: Version::V2_1 };
-        assert_eq!(progress, Progress::Failed(error));
+        assert_eq!(progress, Progress::Failed { error, ready_ns: 0 });
     }
 
-    fn reply(ea: u8) -> Reply {
+    fn raw(ea: u8) -> RawResponse {
         let data = Data::Abs24 { abs: U24::truncate(u32::from(ea) << 8) };
-        Response::new(EncoderAddress::truncate(ea), Command::Abs24LowMt, EncoderStatus::NONE, data).emit()
+        Response::new(EncoderAddress::truncate(ea), Command::Abs24LowMt, EncoderStatus::empty(), data).emit()
     }
 
     /// Three encoders; the second one loses its last frame, breaks a delimiter or is silent.
     #[test]
-    fn one_bad_reply_costs_only_itself() {
+    fn one_bad_response_costs_only_itself() {
         let request = Request::new(EncoderAddress::truncate(2), Operation::Abs24LowMt);
         for fault in 0..4 {
-            let mut bus = BusTransaction::start(request, Profile::default(), Addresses::first(3), LINE, 0);
+            let mut bus = BusTransaction::start(request, Resolution::default(), Addresses::first(3), LINE, 0);
             let mut now_ns = 10_000;
             for ea in 0..3 {
-                for (k, content) in reply(ea).contents().iter().enumerate() {
+                for (k, content) in raw(ea).contents().iter().enumerate() {
                     now_ns += FRAME_NS;
                     let over = match (ea, fault, k) {
                         (1, 1, 2) | (1, 3, _) => false,

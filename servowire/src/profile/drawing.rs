@@ -121,7 +121,7 @@ mod tests {
     use step_profile::{Parameters, Speed};
 
     fn profile(hz: u32, steps_per_entry: u32) -> Profile<'static> {
-        Profile::new(Parameters { steps_per_entry, ..Parameters::at(Speed::from_hz(hz).unwrap()) }).unwrap()
+        Profile::new(Parameters::at(Speed::from_hz(hz).unwrap()).with_steps_per_entry(steps_per_entry)).unwrap()
     }
 
     #[test]

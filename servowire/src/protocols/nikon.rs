@@ -10,8 +10,8 @@ use std::io;
 
 use nikon_aformat::inspect::Kind;
 use nikon_aformat::{
-    BitOrder, BitRate, Command, Echo, Error, Expected, FRAME_BITS, Layout, Profile, Reply, Request, RequestFrame,
-    Response,
+    BitOrder, BitRate, Command, Echo, Error, Expected, FRAME_BITS, Layout, RawResponse, Request, RequestFrame,
+    Resolution, Response,
 };
 
 use crate::capture::hexlog::Burst;
@@ -191,8 +191,8 @@ impl Decoder {
         let result = match (group.broken, expected) {
             (Some(frame), _) => Err(Error::Delimiter { frame }),
             (None, Ok(expected)) => {
-                let reply = Reply::from_words(&group.contents, BitOrder::LsbFirst, expected.layout());
-                reply.and_then(|reply| Response::parse(&reply, &expected))
+                let reply = RawResponse::from_words(expected.layout(), &group.contents, BitOrder::LsbFirst);
+                reply.and_then(|reply| Response::parse(&expected, &reply))
             }
             (None, Err(error)) => Err(error),
         };
@@ -219,11 +219,12 @@ fn expected(group: &Group, asked: Option<Request>) -> Result<Expected, Error> {
             return Ok(Expected::new(Layout::Abs17, Command::Abs17));
         }
         let code = group.contents.first().map_or(31, |first| first >> 6 & 31);
-        let command = Command::from_code(u8::try_from(code).unwrap_or(31))?;
+        let code = u8::try_from(code).unwrap_or(31);
+        let command = Command::from_code(code).ok_or(Error::UnknownCommand { code })?;
         let [standard, _] = command.layouts();
         return Ok(Expected::new(command.layouts().into_iter().find(fits).unwrap_or(standard), command));
     };
-    let expected = request.expected(Profile::default());
+    let expected = request.expected(Resolution::default());
     if fits(&expected.layout()) {
         return Ok(expected);
     }
@@ -255,7 +256,7 @@ impl StartStop for Decoder {
         self.open.push(field);
         let whole = match self.open.kind() {
             Kind::Request => self.open.request_frames(),
-            _ => Reply::MAX_FRAMES,
+            _ => RawResponse::MAX_FRAMES,
         };
         if self.open.contents.len() >= whole { self.close(out) } else { Ok(()) }
     }

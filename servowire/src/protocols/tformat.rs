@@ -10,7 +10,7 @@ mod frame;
 use std::io;
 
 use tformat::inspect::{Cause, inspect, inspect_bytes};
-use tformat::{BitRate, ControlField, DataId, Error, Full, Request, Response};
+use tformat::{AllData, BitRate, ControlField, DataId, Error, Request, Response};
 
 use crate::capture::hexlog::Burst;
 use crate::event::{Event, Verdict};
@@ -129,7 +129,7 @@ impl Decoder {
             (Some(field), _) => Err(Error::Delimiter { field }),
             (None, Some(request)) => Response::parse(request, frame.bytes()),
             // The encoder refuses a damaged request with an ID 3 frame.
-            (None, None) => Full::parse(frame.bytes()).and_then(|full| Err(Error::Rejected { sf: full.sf })),
+            (None, None) => AllData::parse(frame.bytes()).and_then(|full| Err(Error::Rejected { sf: full.sf })),
         };
         let delay = pending.end().map(|end| frame.start() - end);
         let asked = pending.request.map(Request::data_id);

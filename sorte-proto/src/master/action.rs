@@ -1,7 +1,12 @@
 //! What the master wants done.
 
+use crate::delay_req::DelayReq;
+use crate::discovery::Discovery;
 use crate::discovery::room;
-use crate::{DelayReq, Discovery, Error, Param, Preamble, Sync};
+use crate::error::Error;
+use crate::param::Param;
+use crate::preamble::Preamble;
+use crate::sync::Sync;
 
 /// A start-up frame to send.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -33,7 +38,7 @@ impl Outgoing {
     ///
     /// # Errors
     /// [`Error::BufferTooSmall`]; [`Discovery::LEN`] is always enough.
-    pub fn write(&self, into: &mut [u8]) -> Result<usize, Error> {
+    pub fn emit_into(&self, into: &mut [u8]) -> Result<usize, Error> {
         match self {
             Self::Discovery { last } => put(into, &Discovery::request(*last).emit()),
             Self::Param(frame) => put(into, &frame.emit()),

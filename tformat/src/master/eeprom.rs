@@ -1,43 +1,11 @@
-use nrz_line::Polling;
+use servowire_core::Polling;
 
 use super::Step;
 use super::reset::mismatch;
-use crate::{Address, Error, Request, Response};
-
-/// A page of the EEPROM.
-///
-/// ```text
-///  address   0 ............ 126 | 127
-///            data of the page   | page register
-/// ```
-///
-/// Tamagawa's encoders have six pages of 127 bytes (762 in all), a compatible one eight.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-#[cfg_attr(feature = "arbitrary", derive(arbitrary::Arbitrary))]
-pub struct Page(pub u8);
-
-impl Page {
-    /// Data bytes in a page.
-    pub const LEN: u16 = 127;
-    /// Pages of Tamagawa's encoders.
-    pub const COUNT: u8 = 6;
-
-    /// Page and address of the byte `index` of the whole memory of `pages` pages; `None` behind its end.
-    pub const fn locate(index: u16, pages: u8) -> Option<(Self, Address)> {
-        let (page, offset) = (index / Self::LEN, index % Self::LEN);
-        if page >= pages as u16 {
-            return None;
-        }
-        let [page, _] = page.to_le_bytes();
-        let [offset, _] = offset.to_le_bytes();
-        match Address::new(offset) {
-            Some(address) => Some((Self(page), address)),
-            None => None,
-        }
-    }
-}
+use crate::address::{Address, Page};
+use crate::error::Error;
+use crate::request::Request;
+use crate::response::Response;
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -88,9 +56,9 @@ impl EepromAccess {
     }
 
     /// A transaction ended at `now_ns` with this outcome.
-    pub fn answer(&mut self, outcome: Result<Response, Error>, now_ns: u64) -> Step<u8> {
+    pub fn receive(&mut self, outcome: Result<Response, Error>, now_ns: u64) -> Step<u8> {
         let memory = match outcome {
-            Ok(Response::Id6(memory) | Response::IdD(memory)) => memory,
+            Ok(Response::WriteEeprom(memory) | Response::ReadEeprom(memory)) => memory,
             Ok(other) => return self.retry(mismatch(other, self.request()), now_ns),
             Err(error) => return self.retry(error, now_ns),
         };
@@ -102,16 +70,16 @@ impl EepromAccess {
             (Phase::SelectPage, _) => Phase::Operate,
             (Phase::Operate, Some(_)) => Phase::ReadBack,
             (Phase::ReadBack, Some(want)) if memory.edf != want => {
-                return Step::Failed { error: Error::DataMismatch { got: memory.edf, want }, not_before_ns: now_ns };
+                return Step::Failed { error: Error::DataMismatch { got: memory.edf, want }, ready_ns: now_ns };
             }
-            (Phase::Operate | Phase::ReadBack, _) => return Step::Done { value: memory.edf, not_before_ns: now_ns },
+            (Phase::Operate | Phase::ReadBack, _) => return Step::Done { value: memory.edf, ready_ns: now_ns },
         };
         Step::Send { request: self.request(), not_before_ns: now_ns }
     }
 
     const fn request(&self) -> Request {
         match (self.phase, self.page, self.write) {
-            (Phase::SelectPage, Some(Page(page)), _) => Request::write_eeprom(Address::PAGE_REGISTER, page),
+            (Phase::SelectPage, Some(page), _) => Request::write_eeprom(Address::PAGE_REGISTER, page.get()),
             (Phase::Operate, _, Some(data)) => Request::write_eeprom(self.address, data),
             _ => Request::read_eeprom(self.address),
         }
@@ -121,7 +89,7 @@ impl EepromAccess {
         self.tries = self.tries.saturating_add(1);
         let not_before_ns = now_ns.saturating_add(self.polling.interval_ns.into());
         if self.tries >= self.polling.max_tries {
-            return Step::Failed { error, not_before_ns };
+            return Step::Failed { error, ready_ns: not_before_ns };
         }
         Step::Send { request: self.request(), not_before_ns }
     }
@@ -130,7 +98,8 @@ impl EepromAccess {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{Adf, Memory};
+    use crate::address::Adf;
+    use crate::message::Memory;
 
     const ADDRESS: Address = match Address::new(5) {
         Some(address) => address,
@@ -148,43 +117,35 @@ mod tests {
 
     #[test]
     fn a_write_selects_the_page_writes_and_reads_back() {
-        let mut access = EepromAccess::write(Some(Page(2)), ADDRESS, 0x5a, POLLING);
+        let mut access = EepromAccess::write(Page::new(2), ADDRESS, 0x5a, POLLING);
         assert_eq!(access.start(0), send(Request::write_eeprom(Address::PAGE_REGISTER, 2), 0));
-        let step = access.answer(Ok(Response::Id6(memory(Address::PAGE_REGISTER, false, 2))), 10);
+        let step = access.receive(Ok(Response::WriteEeprom(memory(Address::PAGE_REGISTER, false, 2))), 10);
         assert_eq!(step, send(Request::write_eeprom(ADDRESS, 0x5a), 10));
-        let step = access.answer(Ok(Response::Id6(memory(ADDRESS, false, 0x5a))), 20);
+        let step = access.receive(Ok(Response::WriteEeprom(memory(ADDRESS, false, 0x5a))), 20);
         assert_eq!(step, send(Request::read_eeprom(ADDRESS), 20));
-        let step = access.answer(Ok(Response::IdD(memory(ADDRESS, true, 0))), 30);
+        let step = access.receive(Ok(Response::ReadEeprom(memory(ADDRESS, true, 0))), 30);
         assert_eq!(step, send(Request::read_eeprom(ADDRESS), 1030));
-        let step = access.answer(Ok(Response::IdD(memory(ADDRESS, false, 0x5a))), 1040);
-        assert_eq!(step, Step::Done { value: 0x5a, not_before_ns: 1040 });
+        let step = access.receive(Ok(Response::ReadEeprom(memory(ADDRESS, false, 0x5a))), 1040);
+        assert_eq!(step, Step::Done { value: 0x5a, ready_ns: 1040 });
     }
 
     #[test]
     fn a_byte_that_did_not_stick_is_an_error() {
         let mut access = EepromAccess::write(None, ADDRESS, 0x5a, POLLING);
         let _ = access.start(0);
-        let _ = access.answer(Ok(Response::Id6(memory(ADDRESS, false, 0x5a))), 0);
-        let step = access.answer(Ok(Response::IdD(memory(ADDRESS, false, 0xff))), 7);
+        let _ = access.receive(Ok(Response::WriteEeprom(memory(ADDRESS, false, 0x5a))), 0);
+        let step = access.receive(Ok(Response::ReadEeprom(memory(ADDRESS, false, 0xff))), 7);
         let error = Error::DataMismatch { got: 0xff, want: 0x5a };
-        assert_eq!(step, Step::Failed { error, not_before_ns: 7 });
+        assert_eq!(step, Step::Failed { error, ready_ns: 7 });
     }
 
     #[test]
     fn polling_is_bounded() {
         let mut access = EepromAccess::read(None, ADDRESS, POLLING);
         let _ = access.start(0);
-        let busy = Ok(Response::IdD(memory(ADDRESS, true, 0)));
-        let _ = access.answer(busy, 0);
-        let _ = access.answer(Err(Error::NoResponse { echo: false }), 0);
-        assert_eq!(access.answer(busy, 0), Step::Failed { error: Error::Busy { tries: 3 }, not_before_ns: 1000 });
-    }
-
-    #[test]
-    fn the_whole_memory_is_located() {
-        assert_eq!(Page::locate(0, 6), Some((Page(0), Address::new(0).unwrap())));
-        assert_eq!(Page::locate(761, 6), Some((Page(5), Address::new(126).unwrap())));
-        assert_eq!(Page::locate(762, 6), None);
-        assert_eq!(Page::locate(762, 8), Some((Page(6), Address::new(0).unwrap())));
+        let busy = Ok(Response::ReadEeprom(memory(ADDRESS, true, 0)));
+        let _ = access.receive(busy, 0);
+        let _ = access.receive(Err(Error::NoResponse { echo: false }), 0);
+        assert_eq!(access.receive(busy, 0), Step::Failed { error: Error::Busy { tries: 3 }, ready_ns: 1000 });
     }
 }

@@ -1,5 +1,9 @@
 use super::Step;
-use crate::{DataId, Error, Request, Response, SingleTurn};
+use crate::data_id::DataId;
+use crate::error::Error;
+use crate::message::SingleTurn;
+use crate::request::Request;
+use crate::response::Response;
 
 /// A reset: the same one-field request ten times, at least 40 us apart, with no other request in between.
 ///
@@ -29,12 +33,12 @@ impl Reset {
 
     /// ID 7: clears all latched errors. Position and turns stay.
     pub const fn clear_errors() -> Self {
-        Self::of(Request::Id7)
+        Self::of(Request::ResetErrors)
     }
 
     /// ID C: sets the turns to 0 and clears all errors. **The multi-turn reference of the machine is lost.**
     pub const fn clear_turns_and_errors() -> Self {
-        Self::of(Request::IdC)
+        Self::of(Request::ResetTurnsAndErrors)
     }
 
     /// ID 8: makes the present position the zero of the turn. **This shifts the commutation angle of the motor.**
@@ -42,7 +46,7 @@ impl Reset {
     /// A drive that uses the encoder for commutation will then drive the current into the wrong phases; drive manuals
     /// forbid it on a motor in service. It is for encoders that are being fitted.
     pub const fn set_single_turn_zero_and_shift_commutation_angle() -> Self {
-        Self::of(Request::Id8)
+        Self::of(Request::SetSingleTurnZero)
     }
 
     const fn of(request: Request) -> Self {
@@ -67,14 +71,18 @@ impl Reset {
     }
 
     /// A transaction ended at `now_ns` with this outcome.
-    pub fn answer(&mut self, outcome: Result<Response, Error>, now_ns: u64) -> Step<SingleTurn> {
+    pub fn receive(&mut self, outcome: Result<Response, Error>, now_ns: u64) -> Step<SingleTurn> {
         let not_before_ns = now_ns.saturating_add(Self::SPACING_NS.into());
         match outcome {
-            Ok(Response::Id7(value) | Response::Id8(value) | Response::IdC(value)) => {
+            Ok(
+                Response::ResetErrors(value)
+                | Response::SetSingleTurnZero(value)
+                | Response::ResetTurnsAndErrors(value),
+            ) => {
                 self.answered = self.answered.saturating_add(1);
                 if self.answered >= Self::REQUESTS {
-                    let wait = if self.request.data_id() == DataId::Id8 { Self::ZERO_WAIT_NS } else { 0 };
-                    return Step::Done { value, not_before_ns: now_ns.saturating_add(wait.into()) };
+                    let wait = if self.request.data_id() == DataId::SetSingleTurnZero { Self::ZERO_WAIT_NS } else { 0 };
+                    return Step::Done { value, ready_ns: now_ns.saturating_add(wait.into()) };
                 }
             }
             Ok(other) => return self.refuse(mismatch(other, self.request), not_before_ns),
@@ -87,7 +95,7 @@ impl Reset {
         self.answered = 0;
         self.refused = self.refused.saturating_add(1);
         if self.refused >= Self::MAX_REFUSED {
-            return Step::Failed { error, not_before_ns };
+            return Step::Failed { error, ready_ns: not_before_ns };
         }
         Step::Send { request: self.request, not_before_ns }
     }
@@ -102,17 +110,23 @@ pub(super) fn mismatch(response: Response, request: Request) -> Error {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{BitRate, StatusField, U24};
+    use crate::status::StatusField;
+    use crate::timing::BitRate;
+    use servowire_core::U24;
     use std::vec::Vec;
 
-    const SINGLE: SingleTurn = SingleTurn { sf: StatusField::new(0), abs: U24::MAX };
+    const SINGLE: SingleTurn = SingleTurn { sf: StatusField::from_bits_retain(0), abs: U24::MAX };
 
     #[test]
     fn ten_requests_40_us_after_each_answer() {
         for (mut reset, response, wait) in [
-            (Reset::clear_errors(), Response::Id7(SINGLE), 0),
-            (Reset::set_single_turn_zero_and_shift_commutation_angle(), Response::Id8(SINGLE), 18_000_000),
-            (Reset::clear_turns_and_errors(), Response::IdC(SINGLE), 0),
+            (Reset::clear_errors(), Response::ResetErrors(SINGLE), 0),
+            (
+                Reset::set_single_turn_zero_and_shift_commutation_angle(),
+                Response::SetSingleTurnZero(SINGLE),
+                18_000_000,
+            ),
+            (Reset::clear_turns_and_errors(), Response::ResetTurnsAndErrors(SINGLE), 0),
         ] {
             let transaction = u64::from(BitRate::Mbit2_5.transaction_ns(reset.data_id()));
             let mut step = reset.start(0);
@@ -120,10 +134,10 @@ mod tests {
             while let Step::Send { request, not_before_ns } = step {
                 assert_eq!(request.data_id(), response.data_id());
                 starts.push(not_before_ns / 1000);
-                step = reset.answer(Ok(response), not_before_ns + transaction);
+                step = reset.receive(Ok(response), not_before_ns + transaction);
             }
             assert_eq!(starts, [0, 71, 142, 213, 284, 355, 426, 497, 568, 639]);
-            assert_eq!(step, Step::Done { value: SINGLE, not_before_ns: 670_000 + wait });
+            assert_eq!(step, Step::Done { value: SINGLE, ready_ns: 670_000 + wait });
         }
     }
 
@@ -132,12 +146,12 @@ mod tests {
         let mut reset = Reset::clear_errors();
         let _ = reset.start(0);
         for _ in 0..9 {
-            let _ = reset.answer(Ok(Response::Id7(SINGLE)), 0);
+            let _ = reset.receive(Ok(Response::ResetErrors(SINGLE)), 0);
         }
-        let _ = reset.answer(Err(Error::NoResponse { echo: false }), 0);
+        let _ = reset.receive(Err(Error::NoResponse { echo: false }), 0);
         assert_eq!(reset.answered(), 0);
-        let _ = reset.answer(Ok(Response::Id0(SINGLE)), 0);
-        let end = reset.answer(Err(Error::Crc { got: 0, want: 1 }), 5);
-        assert_eq!(end, Step::Failed { error: Error::Crc { got: 0, want: 1 }, not_before_ns: 40_005 });
+        let _ = reset.receive(Ok(Response::ReadSingleTurn(SINGLE)), 0);
+        let end = reset.receive(Err(Error::Crc { got: 0, want: 1 }), 5);
+        assert_eq!(end, Step::Failed { error: Error::Crc { got: 0, want: 1 }, ready_ns: 40_005 });
     }
 }

@@ -1,10 +1,14 @@
-use crate::response::expected_fields;
-use crate::{BitRate, Error, Frame, RESPONSE_DELAY_NS, Request, Response};
+use crate::error::Error;
+use crate::frame::Frame;
+use crate::request::Request;
+use crate::response::{Response, expected_fields};
+use crate::timing::BitRate;
 
 /// How a controller is connected, and how long it waits.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[non_exhaustive]
 pub struct Line {
     /// Bit rate.
     pub rate: BitRate,
@@ -23,26 +27,24 @@ impl Line {
         Self { rate, echo: false, response_timeout_ns: 10_000, field_timeout_ns: rate.bit_ns().saturating_mul(15) }
     }
 
-    /// The same with the receiver always on.
+    /// With the receiver always on.
     pub const fn with_echo(self) -> Self {
         Self { echo: true, ..self }
+    }
+
+    /// With another wait for the start bit of the response.
+    pub const fn with_response_timeout(self, ns: u32) -> Self {
+        Self { response_timeout_ns: ns, ..self }
+    }
+
+    /// With another wait for the next field.
+    pub const fn with_field_timeout(self, ns: u32) -> Self {
+        Self { field_timeout_ns: ns, ..self }
     }
 }
 
 /// How far a transaction is.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub enum Progress {
-    /// More bytes are to come; at the time given, call [`Transaction::poll`].
-    Waiting {
-        /// When the wait is over.
-        until_ns: u64,
-    },
-    /// The answer, with all checks passed.
-    Done(Response),
-    /// No answer, or a refused one.
-    Failed(Error),
-}
+pub type Progress = servowire_core::Progress<Response, Error>;
 
 /// Longest request and longest answer in bytes.
 const MAX_BYTES: usize = 4 + Frame::MAX_FIELDS;
@@ -59,7 +61,9 @@ pub struct Transaction {
     received: [u8; MAX_BYTES],
     len: u8,
     until_ns: u64,
-    end: Option<Result<Response, Error>>,
+    /// When the longest response to this request has ended, however late it began.
+    drained_ns: u64,
+    end: Option<(Result<Response, Error>, u64)>,
 }
 
 impl Transaction {
@@ -68,7 +72,9 @@ impl Transaction {
         let sending = line.rate.fields_ns(request.data_id().request_fields());
         let first = sending.saturating_add(line.response_timeout_ns).saturating_add(line.rate.fields_ns(1));
         let until_ns = now_ns.saturating_add(first.into());
-        Self { request, line, received: [0; MAX_BYTES], len: 0, until_ns, end: None }
+        let rest = line.field_timeout_ns.saturating_mul(10);
+        let drained_ns = until_ns.saturating_add(rest.into());
+        Self { request, line, received: [0; MAX_BYTES], len: 0, until_ns, drained_ns, end: None }
     }
 
     /// The fields to send.
@@ -78,7 +84,7 @@ impl Transaction {
 
     /// A byte was received, its delimiter at `now_ns`.
     pub fn byte(&mut self, byte: u8, now_ns: u64) -> Progress {
-        if let Progress::Waiting { .. } = self.poll(now_ns) {
+        if let Progress::Pending { .. } = self.poll(now_ns) {
             self.take(byte, now_ns);
         }
         self.progress()
@@ -88,14 +94,15 @@ impl Transaction {
     ///
     /// Ends the transaction with [`Error::Delimiter`]; in the echo, with [`Error::EchoMismatch`] of the byte.
     pub fn framing_error(&mut self, now_ns: u64) -> Progress {
-        if let Progress::Waiting { .. } = self.poll(now_ns) {
+        if let Progress::Pending { .. } = self.poll(now_ns) {
             let field = self.len.saturating_sub(self.skip());
             let sent = self.frame();
             let echoed = sent.as_bytes().get(usize::from(self.len)).filter(|_| self.line.echo);
-            self.end = Some(Err(match echoed {
+            let error = match echoed {
                 Some(&want) => Error::EchoMismatch { at: self.len, got: 0, want },
                 None => Error::Delimiter { field },
-            }));
+            };
+            self.end = Some((Err(error), self.drained_ns));
         }
         self.progress()
     }
@@ -103,7 +110,7 @@ impl Transaction {
     /// Ends the transaction if its time is over.
     pub fn poll(&mut self, now_ns: u64) -> Progress {
         if self.end.is_none() && now_ns > self.until_ns {
-            self.end = Some(self.evaluate());
+            self.end = Some((self.evaluate(), self.until_ns));
         }
         self.progress()
     }
@@ -111,9 +118,9 @@ impl Transaction {
     /// Where the transaction stands.
     pub const fn progress(&self) -> Progress {
         match self.end {
-            None => Progress::Waiting { until_ns: self.until_ns },
-            Some(Ok(response)) => Progress::Done(response),
-            Some(Err(error)) => Progress::Failed(error),
+            None => Progress::Pending { until_ns: self.until_ns },
+            Some((Ok(value), ready_ns)) => Progress::Done { value, ready_ns },
+            Some((Err(error), ready_ns)) => Progress::Failed { error, ready_ns },
         }
     }
 
@@ -130,7 +137,9 @@ impl Transaction {
         self.until_ns = now_ns.saturating_add(self.line.field_timeout_ns.into());
         let cf = self.received.get(usize::from(skip)).copied().unwrap_or(0);
         if self.len >= skip.saturating_add(expected_fields(id, cf)) {
-            self.end = Some(self.evaluate());
+            // A whole response ends the talk; one that is refused may be a longer one, damaged.
+            let outcome = self.evaluate();
+            self.end = Some((outcome, if outcome.is_ok() { now_ns } else { self.drained_ns.max(now_ns) }));
         }
     }
 
@@ -165,14 +174,11 @@ pub fn parse_echoed(request: Request, bytes: &[u8]) -> Result<Response, Error> {
     }
     match (bytes, bytes.get(usize::from(sent.fields())..)) {
         ([], _) => Err(Error::NoResponse { echo: false }),
-        (_, None) => Err(Error::Truncated { got: 0, want: request.data_id().response_fields() }),
+        (_, None) => Err(Error::Truncated { got: 0, want: request.data_id().response_fields().into() }),
         (_, Some([])) => Err(Error::NoResponse { echo: true }),
         (_, Some(answer)) => Response::parse(request, answer),
     }
 }
-
-/// The default time-out leaves the nominal delay and 100 m of cable well behind.
-const _: () = assert!(Line::new(BitRate::Mbit2_5).response_timeout_ns > RESPONSE_DELAY_NS * 2);
 
 #[cfg(test)]
 mod tests {
@@ -183,7 +189,7 @@ mod tests {
     const LINE: Line = Line::new(BitRate::Mbit2_5);
 
     /// Feeds an answer after the nominal delay; `echo` first if the line has one.
-    fn run(request: Request, line: Line, echo: &[u8], answer: &[u8]) -> Progress {
+    fn run(request: Request, line: Line, echo: &[u8], answer: &[u8]) -> Result<Response, Error> {
         let mut transaction = Transaction::start(request, line, 1_000);
         let mut now_ns = 1_000;
         for byte in echo {
@@ -195,12 +201,14 @@ mod tests {
             now_ns += 4_000;
             let _ = transaction.byte(*byte, now_ns);
         }
+        if let Progress::Pending { until_ns } = transaction.progress() {
+            assert_eq!(transaction.poll(until_ns), Progress::Pending { until_ns });
+            let _ = transaction.poll(until_ns + 1);
+        }
         match transaction.progress() {
-            Progress::Waiting { until_ns } => {
-                assert_eq!(transaction.poll(until_ns), Progress::Waiting { until_ns });
-                transaction.poll(until_ns + 1)
-            }
-            done => done,
+            Progress::Done { value, .. } => Ok(value),
+            Progress::Failed { error, .. } => Err(error),
+            Progress::Pending { .. } => panic!("the time-out did not end it"),
         }
     }
 
@@ -208,8 +216,8 @@ mod tests {
         #[test]
         fn answers_arrive_with_and_without_echo((request, response) in exchanges()) {
             let (sent, answer) = (request.emit(), response.emit());
-            prop_assert_eq!(run(request, LINE, &[], answer.as_bytes()), Progress::Done(response));
-            prop_assert_eq!(run(request, LINE.with_echo(), sent.as_bytes(), answer.as_bytes()), Progress::Done(response));
+            prop_assert_eq!(run(request, LINE, &[], answer.as_bytes()), Ok(response));
+            prop_assert_eq!(run(request, LINE.with_echo(), sent.as_bytes(), answer.as_bytes()), Ok(response));
         }
 
         #[test]
@@ -218,10 +226,10 @@ mod tests {
             let cut = cut.min(answer.as_bytes().len() - 1);
             let want = answer.fields();
             let part = &answer.as_bytes()[..cut];
-            let plain = if cut == 0 { Error::NoResponse { echo: false } } else { Error::Truncated { got: cut as u8, want } };
-            prop_assert_eq!(run(request, LINE, &[], part), Progress::Failed(plain));
+            let plain = if cut == 0 { Error::NoResponse { echo: false } } else { Error::Truncated { got: cut as u16, want: want.into() } };
+            prop_assert_eq!(run(request, LINE, &[], part), Err(plain));
             let echoed = if cut == 0 { Error::NoResponse { echo: true } } else { plain };
-            prop_assert_eq!(run(request, LINE.with_echo(), sent.as_bytes(), part), Progress::Failed(echoed));
+            prop_assert_eq!(run(request, LINE.with_echo(), sent.as_bytes(), part), Err(echoed));
         }
 
         /// What has ended does not change any more, whatever comes.
@@ -232,7 +240,7 @@ mod tests {
                 let _ = transaction.byte(*byte, 10_000);
             }
             let ended = transaction;
-            prop_assert_eq!(ended.progress(), Progress::Done(response));
+            prop_assert_eq!(ended.progress(), Progress::Done { value: response, ready_ns: 10_000 });
             for byte in more {
                 let _ = transaction.byte(byte, 10_000);
                 let _ = transaction.framing_error(10_000);
@@ -246,33 +254,35 @@ mod tests {
     fn the_echo_must_be_what_was_sent() {
         let request = Request::write_eeprom(crate::Address::PAGE_REGISTER, 1);
         let wrong = run(request, LINE.with_echo(), &[0x32, 0x7f, 0x03, 0x4c], &[0x32, 0x7f, 0x01, 0x4c]);
-        assert_eq!(wrong, Progress::Failed(Error::EchoMismatch { at: 2, got: 3, want: 1 }));
+        assert_eq!(wrong, Err(Error::EchoMismatch { at: 2, got: 3, want: 1 }));
         let half = run(request, LINE.with_echo(), &[0x32, 0x7f], &[]);
-        assert_eq!(half, Progress::Failed(Error::Truncated { got: 0, want: 4 }));
-        assert_eq!(run(request, LINE.with_echo(), &[], &[]), Progress::Failed(Error::NoResponse { echo: false }));
+        assert_eq!(half, Err(Error::Truncated { got: 0, want: 4 }));
+        assert_eq!(run(request, LINE.with_echo(), &[], &[]), Err(Error::NoResponse { echo: false }));
     }
 
     #[test]
     fn a_refusal_is_received_whole() {
         let refusal = [0x1a, 0x40, 0xeb, 0x3b, 0x1c, 0x17, 0x04, 0x27, 0x00, 0x00, 0xa2];
-        let progress = run(Request::Id0, LINE, &[], &refusal);
-        let Progress::Failed(Error::Rejected { sf }) = progress else { panic!("{progress:?}") };
-        assert!(sf.request_parity_error());
+        let progress = run(Request::ReadSingleTurn, LINE, &[], &refusal);
+        let Err(Error::Rejected { sf }) = progress else { panic!("{progress:?}") };
+        assert!(sf.contains(crate::status::StatusField::CA0));
     }
 
     #[test]
     fn framing_errors_of_the_uart() {
-        let mut plain = Transaction::start(Request::Id0, LINE, 0);
+        let mut plain = Transaction::start(Request::ReadSingleTurn, LINE, 0);
         let _ = plain.byte(0x02, 11_000);
-        assert_eq!(plain.framing_error(15_000), Progress::Failed(Error::Delimiter { field: 1 }));
-        let mut echoed = Transaction::start(Request::Id0, LINE.with_echo(), 0);
-        assert_eq!(echoed.framing_error(4_000), Progress::Failed(Error::EchoMismatch { at: 0, got: 0, want: 2 }));
+        assert!(matches!(plain.framing_error(15_000), Progress::Failed { error: Error::Delimiter { field: 1 }, .. }));
+        let mut echoed = Transaction::start(Request::ReadSingleTurn, LINE.with_echo(), 0);
+        let error = Error::EchoMismatch { at: 0, got: 0, want: 2 };
+        assert!(matches!(echoed.framing_error(4_000), Progress::Failed { error: got, .. } if got == error));
     }
 
     #[test]
     fn late_bytes_do_not_count() {
-        let mut transaction = Transaction::start(Request::Id0, LINE, 0);
-        assert_eq!(transaction.progress(), Progress::Waiting { until_ns: 18_000 });
-        assert_eq!(transaction.byte(0x02, 18_001), Progress::Failed(Error::NoResponse { echo: false }));
+        let mut transaction = Transaction::start(Request::ReadSingleTurn, LINE, 0);
+        assert_eq!(transaction.progress(), Progress::Pending { until_ns: 18_000 });
+        let late = transaction.byte(0x02, 18_001);
+        assert!(matches!(late, Progress::Failed { error: Error::NoResponse { echo: false }, ready_ns: 18_000 }));
     }
 }

@@ -2,7 +2,7 @@
 
 use step_profile::{
     Arithmetic, Axes, Axis, Command, Dance, Direction, Error, Frequency, Group, Microstep, Motors, MoveState, Note,
-    OperatingMode, Parameters, PositionMode, PositionState, Profile, RampTable, Shape, Speed, Step, StepTime, Tone,
+    OperatingMode, Parameters, PositionMode, PositionState, Profile, RampTable, Shape, Speed, RampStep, StepTime, Tone,
     Turn, corrected, pru_exact, step_time_ns,
 };
 
@@ -33,11 +33,16 @@ const RAMPS: u32 = 64;
 
 fn profile((arithmetic, speed, steps_per_entry, init_sync): &Given) -> Result<Profile<'static>, Error> {
     let (arithmetic, steps_per_entry, init_sync) = (*arithmetic, *steps_per_entry, *init_sync);
-    Profile::new(Parameters { steps_per_entry, init_sync, arithmetic, ..Parameters::at(Speed::from_raw(*speed)) })
+    Profile::new(
+        Parameters::at(Speed::from_raw(*speed))
+            .with_steps_per_entry(steps_per_entry)
+            .with_init_sync(init_sync)
+            .with_arithmetic(arithmetic),
+    )
 }
 
 /// Takes from a step what a sender needs.
-fn mix(sum: u32, step: Step) -> u32 {
+fn mix(sum: u32, step: RampStep) -> u32 {
     sum ^ step.cnt ^ step.sync_time
 }
 
@@ -119,7 +124,7 @@ kernels! {
     /// A cycle of four motors that share a sequence, its start and its end.
     fn step_profile_group(given: &Given) -> Result<([Command; 4], [i64; 4]), Error> {
         let mut group = Group::new(Motors::NONE);
-        group.select(Motors::from_mask(given.2)?)?;
+        group.select(Motors::new(given.2.to_le_bytes()[0]).ok_or(Error::NoMotor)?)?;
         group.start(profile(given)?, RAMPS, Direction::Forward)?;
         let commands = group.tick();
         group.abort();
@@ -128,7 +133,7 @@ kernels! {
 
     /// A turn of position mode, given up.
     fn step_profile_position_mode(given: &Given) -> Result<([Command; 4], PositionState), Error> {
-        let mut mode = PositionMode::new(Motors::ALL, Microstep::from_code(given.2)?);
+        let mut mode = PositionMode::new(Motors::ALL, Microstep::new(given.2.to_le_bytes()[0]).ok_or(Error::NoMotor)?);
         mode.select(Motors::M2)?;
         mode.start(profile(given)?, Turn::Ten, Direction::Reverse)?;
         mode.abort();
@@ -166,8 +171,8 @@ kernels! {
     } over ["cis", "fis2", "B"];
 
     /// Micro-step profile and operating mode from their codes.
-    fn step_profile_codes(code: &u32) -> Result<(u16, u32, OperatingMode), Error> {
-        let profile = Microstep::from_code(*code)?;
-        Ok((profile.ctrl_field(), profile.steps(Turn::Quarter), OperatingMode::from_code(*code)?))
+    fn step_profile_codes(code: &u8) -> Option<(u16, u32, OperatingMode)> {
+        let profile = Microstep::new(*code)?;
+        Some((profile.ctrl_field(), profile.steps(Turn::Quarter), OperatingMode::new(*code)?))
     } over [0, 4, 8, 9];
 }

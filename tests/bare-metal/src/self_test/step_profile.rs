@@ -1,7 +1,7 @@
 //! Single steps register by register, and whole moves by their hash.
 
 use step_profile::pru_exact::{self, Registers};
-use step_profile::{Arithmetic, Parameters, Profile, Speed, Step, corrected};
+use step_profile::{Arithmetic, Parameters, Profile, Speed, RampStep, corrected};
 
 use super::{Tally, Topic, each};
 
@@ -50,12 +50,10 @@ fn moves() -> Tally {
         |row| row.name,
         |row| {
             let speed = Speed::from_raw(row.speed);
-            let parameters = Parameters {
-                steps_per_entry: row.per_entry,
-                init_sync: row.init_sync,
-                arithmetic: Arithmetic::PruExact,
-                ..Parameters::at(speed)
-            };
+            let parameters = Parameters::at(speed)
+                .with_steps_per_entry(row.per_entry)
+                .with_init_sync(row.init_sync)
+                .with_arithmetic(Arithmetic::PruExact);
             Profile::new(parameters).is_ok_and(|profile| {
                 profile.duration_ns(row.steps) == row.ns
                     && profile.steps(row.steps).fold(0xcbf2_9ce4_8422_2325, hash) == row.fnv1a64
@@ -65,7 +63,7 @@ fn moves() -> Tally {
 }
 
 /// FNV-1a over cycle (four bytes) and sync_time (two).
-fn hash(hash: u64, step: Step) -> u64 {
+fn hash(hash: u64, step: RampStep) -> u64 {
     let ([c0, c1, c2, c3, ..], [s0, s1, ..]) = (step.cycle.to_le_bytes(), step.sync_time.to_le_bytes());
     [c0, c1, c2, c3, s0, s1]
         .into_iter()

@@ -3,7 +3,7 @@
 use serde::Deserialize;
 use sha2::{Digest, Sha256};
 use sorte_proto::Pto;
-use step_profile::{Arithmetic, Axis, Command, Direction, Parameters, Profile, RampTable, Shape, Speed, Step};
+use step_profile::{Arithmetic, Axis, Command, Direction, Parameters, Profile, RampStep, RampTable, Shape, Speed};
 
 use super::tables::profile as checked;
 use super::words;
@@ -13,7 +13,7 @@ use crate::row::{Fault, Row, Verdict, each, same};
 /// Ramp index, step time, cycle, sync_time.
 type Line = (u8, u32, u64, u32);
 
-fn line(step: Step) -> Line {
+fn line(step: RampStep) -> Line {
     (step.entry, step.t_step, step.cycle, step.sync_time)
 }
 
@@ -99,21 +99,19 @@ struct ProfileRow {
 
 pub(super) fn profile(rows: &[Row]) -> Vec<Verdict> {
     each(rows, |row: ProfileRow| {
-        let parameters = Parameters {
-            steps_per_entry: row.k,
-            init_sync: row.init_sync,
-            arithmetic: Arithmetic::PruExact,
-            ..Parameters::at(Speed::from_raw(row.speed))
-        };
+        let parameters = Parameters::at(Speed::from_raw(row.speed))
+            .with_steps_per_entry(row.k)
+            .with_init_sync(row.init_sync)
+            .with_arithmetic(Arithmetic::PruExact);
         let pru = checked(parameters)?;
         let ProfileRow { ref head, ref tail, last, total_ns, fnv1a64, ref sha256, .. } = row;
         Move { head, tail, last, total_ns, fnv1a64, sha256 }.check(pru, row.n)?;
         let shape = Shape { accelerating: row.accel_steps, constant: row.const_steps, decelerating: row.decel_steps };
         same("shape", &shape, &pru.shape(row.n))?;
-        let count = |what: fn(&Step) -> bool| pru.steps(row.n).filter(what).count();
+        let count = |what: fn(&RampStep) -> bool| pru.steps(row.n).filter(what).count();
         same("zero_sync", &row.zero_sync, &count(|step| step.sync_time == 0))?;
         same("above_3990", &row.above_3990, &count(|step| step.sync_time > 3990))?;
-        let corrected = checked(Parameters { arithmetic: Arithmetic::Corrected, ..parameters })?;
+        let corrected = checked(parameters.with_arithmetic(Arithmetic::Corrected))?;
         let exact = pru.steps(row.n).eq(corrected.steps(row.n));
         same("exact", &row.exact, &exact)?;
         same("exact, by the flag of the profile", &true, &(exact || !pru.pru_is_exact()))
@@ -140,13 +138,13 @@ struct TableRow {
 pub(super) fn profile_alt_table(rows: &[Row]) -> Vec<Verdict> {
     each(rows, |row: TableRow| {
         let table = RampTable::new(row.table).map_err(|e| Fault::Unreadable(format!("the table is refused: {e}")))?;
-        let profile = checked(Parameters {
-            steps_per_entry: row.k,
-            init_sync: row.init_sync,
-            arithmetic: Arithmetic::PruExact,
-            table: &table,
-            ..Parameters::at(Speed::from_raw(row.speed))
-        })?;
+        let profile = checked(
+            Parameters::at(Speed::from_raw(row.speed))
+                .with_steps_per_entry(row.k)
+                .with_init_sync(row.init_sync)
+                .with_arithmetic(Arithmetic::PruExact)
+                .with_table(&table),
+        )?;
         let TableRow { ref head, last, total_ns, fnv1a64, ref sha256, .. } = row;
         Move { head, tail: &[], last, total_ns, fnv1a64, sha256 }.check(profile, row.n)
     })
@@ -169,12 +167,12 @@ pub(super) fn profile_inexact(rows: &[Row]) -> Vec<Verdict> {
         for (what, arithmetic, want) in
             [("pru", Arithmetic::PruExact, &row.pru), ("corrected", Arithmetic::Corrected, &row.corrected)]
         {
-            let profile = checked(Parameters {
-                steps_per_entry: row.k,
-                init_sync: row.init_sync,
-                arithmetic,
-                ..Parameters::at(Speed::from_raw(row.speed))
-            })?;
+            let profile = checked(
+                Parameters::at(Speed::from_raw(row.speed))
+                    .with_steps_per_entry(row.k)
+                    .with_init_sync(row.init_sync)
+                    .with_arithmetic(arithmetic),
+            )?;
             same("inside the proved domain", &false, &profile.pru_is_exact())?;
             same(what, want, &profile.steps(row.n).map(line).collect())?;
         }
@@ -201,13 +199,10 @@ struct StreamRow {
 
 pub(super) fn cycle_stream(rows: &[Row]) -> Vec<Verdict> {
     each(rows, |row: StreamRow| {
-        let parameters = Parameters {
-            steps_per_entry: row.k,
-            init_sync: row.init_sync,
-            ..Parameters::at(Speed::from_raw(row.speed))
-        };
+        let parameters =
+            Parameters::at(Speed::from_raw(row.speed)).with_steps_per_entry(row.k).with_init_sync(row.init_sync);
         // Executed by the PRU; the corrected arithmetic is the same in its domain.
-        stream(&row, checked(Parameters { arithmetic: Arithmetic::PruExact, ..parameters })?)?;
+        stream(&row, checked(parameters.with_arithmetic(Arithmetic::PruExact))?)?;
         let corrected = checked(parameters)?;
         if corrected.pru_is_exact() { stream(&row, corrected) } else { Ok(()) }
     })

@@ -94,7 +94,7 @@ fn tone(name: &str, row: &ToneRow) -> Verdict {
     same("p125", &(row.p125, row.p125), &(tone.p125(), frequency.steps_in(125)))?;
     same("p250", &(row.p250, row.p250), &(tone.p250(), frequency.steps_in(250)))?;
 
-    let profile = profile(Parameters { init_sync: 0, ..Parameters::at(tone.speed()) })?;
+    let profile = profile(Parameters::at(tone.speed()).with_init_sync(0))?;
     let full = profile.step_time_ns(31);
     same("t_step_ns_full_speed", &row.t_step_ns_full_speed, &full)?;
     let exact = 1000.0 * f64::from(row.speed_const) / 65536.0;
@@ -133,7 +133,7 @@ pub(super) fn profile(parameters: Parameters<'_>) -> Result<Profile<'_>, Fault> 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct MicrostepRow {
-    profile_code: u32,
+    profile_code: u8,
     microsteps: u32,
     steps_per_rev: u32,
     quarter_turn: u32,
@@ -144,7 +144,7 @@ struct MicrostepRow {
 
 pub(super) fn microstep(rows: &[Row]) -> Vec<Verdict> {
     each(rows, |row: MicrostepRow| {
-        let profile = Microstep::from_code(row.profile_code)
+        let profile = Microstep::try_from(row.profile_code)
             .map_err(|e| Fault::Unreadable(format!("the profile code is refused: {e}")))?;
         same("microsteps", &row.microsteps, &profile.microsteps())?;
         same("steps_per_rev", &row.steps_per_rev, &profile.steps_per_turn())?;
@@ -169,12 +169,10 @@ struct ParametersRow {
 
 pub(super) fn params(rows: &[Row]) -> Vec<Verdict> {
     each(rows, |row: ParametersRow| {
-        let profile = Profile::new(Parameters {
-            steps_per_entry: row.k,
-            init_sync: row.init_sync,
-            ..Parameters::at(Speed::from_raw(row.speed))
-        });
-        same("error", &row.error.as_deref(), &profile.err().map(|e| e.class().name()))?;
+        let profile = Profile::new(
+            Parameters::at(Speed::from_raw(row.speed)).with_steps_per_entry(row.k).with_init_sync(row.init_sync),
+        );
+        same("error", &row.error, &profile.err().map(|e| format!("{:?}", e.class())))?;
         let Ok(profile) = profile else { return Ok(()) };
         let flag = profile.pru_is_exact();
         same("pru_exact", &row.pru_exact.unwrap_or(flag), &flag)?;

@@ -1,24 +1,28 @@
+use core::fmt;
+
 use nrz_line::{BitOrder, Window};
 
 use crate::crc::mirrored;
-use crate::frame::{FRAME_BITS, MAX_FRAMES, contents, pack, truncated};
-use crate::{Error, Layout};
+use crate::error::Error;
+use crate::frame::{MAX_FRAMES, contents, pack, truncated};
+use crate::layout::FRAME_BITS;
+use crate::layout::Layout;
+use crate::text::write_words;
 
-/// The frames of one reply, 2 to 6: their content bits, framing checked and removed, nothing else judged.
+/// The frames of one response, 2 to 6: their content bits, framing checked and removed, nothing else judged.
 ///
 /// ```text
 ///  line, time →   0 | 16 content bits | 1 | 0 | 16 content bits | 1 | ...
 ///  line bit       0   1            16  17  18   19           34  35        frame k begins at bit 18 k
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub struct Reply {
+pub struct RawResponse {
     contents: [u16; MAX_FRAMES as usize],
     frames: u8,
 }
 
-impl Reply {
-    /// Most frames of a reply.
+impl RawResponse {
+    /// Most frames of a response.
     pub const MAX_FRAMES: usize = MAX_FRAMES as usize;
 
     /// `contents` are 0 behind the frames of the layout.
@@ -26,19 +30,19 @@ impl Reply {
         Self { contents, frames: layout.frames() }
     }
 
-    /// The reply at the beginning of a piece of line, its frames back to back; bits behind it are left alone.
+    /// The response at the beginning of a piece of line, its frames back to back; bits behind it are left alone.
     ///
     /// # Errors
     /// [`Error::Truncated`], [`Error::StartBit`], [`Error::Delimiter`].
-    pub fn from_line(line: Window, layout: Layout) -> Result<Self, Error> {
+    pub fn from_line(layout: Layout, line: Window) -> Result<Self, Error> {
         contents(line, u32::from(layout.frames())).map(|contents| Self::of(contents, layout))
     }
 
-    /// A reply from the content bits of its frames, one word each; words behind it are left alone.
+    /// A response from the content bits of its frames, one word each; words behind it are left alone.
     ///
     /// # Errors
     /// [`Error::Truncated`].
-    pub fn from_words(words: &[u16], order: BitOrder, layout: Layout) -> Result<Self, Error> {
+    pub fn from_words(layout: Layout, words: &[u16], order: BitOrder) -> Result<Self, Error> {
         let Some(words) = words.get(..usize::from(layout.frames())) else {
             let got = u32::try_from(words.len()).unwrap_or(u32::MAX);
             return Err(truncated(got.saturating_mul(FRAME_BITS), layout.line_bits()));
@@ -89,7 +93,17 @@ impl Reply {
         (got.reverse_bits(), mirrored(covered).reverse_bits())
     }
 
-    /// The same with the CRC-8 that its other bits demand.
+    /// The frames of all content bits but the CRC-8, the first of the line in bit 0; the CRC-8 is added.
+    #[expect(clippy::cast_possible_truncation, reason = "each shift brings a frame to the low bits")]
+    pub(crate) fn of_payload(payload: u128, layout: Layout) -> Self {
+        let mut contents = [0; Self::MAX_FRAMES];
+        for (content, at) in contents.iter_mut().zip((0_u32..).step_by(16)) {
+            *content = payload.wrapping_shr(at) as u16;
+        }
+        Self::of(contents, layout).sealed()
+    }
+
+    /// The frames with the CRC-8 that their other bits demand.
     pub(crate) fn sealed(mut self) -> Self {
         let (_, crc) = self.crc();
         if let Some(last) = self.contents.get_mut(usize::from(self.frames).wrapping_sub(1)) {
@@ -119,3 +133,11 @@ const fn bytes(contents: [u16; MAX_FRAMES as usize]) -> [u8; 2 * MAX_FRAMES as u
     let ([g, h], [i, j], [k, l]) = (c3.to_le_bytes(), c4.to_le_bytes(), c5.to_le_bytes());
     [a, b, c, d, e, f, g, h, i, j, k, l]
 }
+
+impl fmt::Display for RawResponse {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write_words(f, self.words(BitOrder::MsbFirst))
+    }
+}
+
+crate::text::format_as_displayed!(RawResponse);

@@ -1,13 +1,18 @@
 //! Master and devices on a simulated line.
 
-use std::vec;
-use std::vec::Vec;
+#![allow(
+    clippy::arithmetic_side_effects,
+    clippy::cast_possible_truncation,
+    clippy::indexing_slicing,
+    clippy::panic,
+    clippy::std_instead_of_core,
+    clippy::unwrap_used
+)]
 
 use proptest::prelude::*;
-
-use crate::device::{self, Arrival, Device, Handled, Path, PortId, Trigger};
-use crate::master::{self, Action, Master};
-use crate::*;
+use sorte_proto::device::{self, Arrival, Device, Handled, Path, PortId, Trigger};
+use sorte_proto::master::{self, Action, Master};
+use sorte_proto::{Correction, Discovery, Error, ErrorClass, FrameType, Parameters};
 
 /// A device's counter: right after SYNC it should read the master's time.
 #[derive(Clone, Copy)]
@@ -48,9 +53,9 @@ struct Line {
 impl Line {
     fn new(cables: Vec<u64>) -> Self {
         let n = cables.len();
-        let config = device::Config { send_time_ns: None, ..device::Config::default() };
+        let config = device::Config::new();
         let mut line = Self {
-            master: Master::new(master::Config { sync_frames: 64, ..master::Config::default() }),
+            master: Master::new(master::Config::new().with_sync_frames(64)),
             devices: vec![Device::new(config); n],
             counters: (0..n).map(|k| Counter { ahead: 123_456_789 * i64::try_from(k).unwrap() }).collect(),
             cables,
@@ -134,7 +139,7 @@ impl Line {
         }
         if handled.path == Path::Reflect {
             let rtt = 2 * self.cables[k + 1] as u32 + 360;
-            assert_eq!(self.devices[k].delay_reflection(&frame, rtt, trigger), Ok(()));
+            assert_eq!(self.devices[k].delay_reflection(trigger, &frame, rtt), Ok(()));
         }
     }
 
@@ -161,7 +166,7 @@ impl Line {
             self.devices[k].cycle_start();
             if let Some(answer) = self.devices[k].answer([k as u8, 0, 0]) {
                 let mut bytes = [0; 6];
-                answer.emit(&mut bytes).unwrap();
+                answer.emit_into(&mut bytes).unwrap();
                 let _: Result<_, _> = self.master.device_frame(&bytes);
             }
         }
@@ -177,9 +182,9 @@ impl Line {
                 Action::Exchange { at_ns, time_stamp, .. } => return Ok((at_ns, time_stamp)),
                 Action::Send { at_ns, frame } => {
                     let mut buffer = [0; Discovery::LEN];
-                    let len = frame.write(&mut buffer).unwrap();
+                    let len = frame.emit_into(&mut buffer).unwrap();
                     if let Some((answer, sof_ns)) = self.carry(&buffer[..len], at_ns) {
-                        let _: Result<_, _> = self.master.received(&answer, sof_ns);
+                        let _: Result<_, _> = self.master.receive(&answer, sof_ns);
                     }
                 }
             }
@@ -238,7 +243,7 @@ fn lines_of_all_lengths_start_and_exchange() {
 fn a_line_of_254_devices_starts() {
     let mut line = Line::new(vec![10; 254]);
     for device in &mut line.devices {
-        *device = Device::new(device::Config { output_len: None, ..device::Config::default() });
+        *device = Device::new(device::Config::new().with_output_len(None));
     }
     line.plug(254);
     let first = line.start_up().unwrap();
@@ -299,9 +304,9 @@ proptest! {
                     line.flip = (sent == frame).then_some(bit);
                     sent += 1;
                     let mut buffer = [0; Discovery::LEN];
-                    let len = outgoing.write(&mut buffer).unwrap();
+                    let len = outgoing.emit_into(&mut buffer).unwrap();
                     if let Some((answer, sof_ns)) = line.carry(&buffer[..len], at_ns) {
-                        let _: Result<_, _> = line.master.received(&answer, sof_ns);
+                        let _: Result<_, _> = line.master.receive(&answer, sof_ns);
                     }
                 }
             }

@@ -1,4 +1,8 @@
-use crate::{Error, U40, Version};
+use core::fmt;
+
+use crate::command::Version;
+use crate::error::Error;
+use crate::number::U40;
 
 /// What the line does not say about an encoder: its widths, its version and its factory settings.
 ///
@@ -7,13 +11,12 @@ use crate::{Error, U40, Version};
 ///         unused, 0       turns                single turn
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(
     feature = "serde",
     derive(serde::Serialize, serde::Deserialize),
     serde(try_from = "Written", into = "Written")
 )]
-pub struct Profile {
+pub struct Resolution {
     st_bits: u8,
     mt_bits: u8,
     version: Version,
@@ -34,16 +37,15 @@ pub struct WidthError {
     pub mt_bits: u8,
 }
 
-/// Where the shaft is, in the units of a [`Profile`].
+/// Where the shaft is, in the units of a [`Resolution`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Position {
     /// Counts in the turn.
     pub single_turn: u32,
-    /// Turns, from 0 up, as far as the reply shows them.
+    /// Turns, from 0 up, as far as the response shows them.
     pub turns: u32,
-    /// How many bits of the turns the reply shows: all, fewer in 24 bits, none in 17.
+    /// How many bits of the turns the response shows: all, fewer in 24 bits, none in 17.
     pub turns_bits: u8,
 }
 
@@ -60,14 +62,14 @@ impl Position {
     }
 }
 
-impl Default for Profile {
-    /// 20 + 16 bits, version 3.0, replies as in version 2.1.
+impl Default for Resolution {
+    /// 20 + 16 bits, version 3.0, responses as in version 2.1.
     fn default() -> Self {
         Self { st_bits: 20, mt_bits: 16, version: Version::V3_0, low_with_velocity: false, resets_with_position: false }
     }
 }
 
-impl Profile {
+impl Resolution {
     /// Widths of the single turn (encoders have 17, 20, 22 or 24 bits) and of the turns (16, or 0 without a counter), for
     /// an encoder of version 2.1.
     ///
@@ -128,12 +130,12 @@ impl Profile {
         1_u64.wrapping_shl(self.st_bits as u32)
     }
 
-    /// Takes the position of a reply apart. `abs` and `abs_bits` are what the reply shows from bit 0 up, see
-    /// [`Response::abs`](crate::Response::abs) and [`Layout::abs_bits`](crate::Layout::abs_bits).
+    /// Takes the position of a response apart. `abs` and `abs_bits` are what the response shows from bit 0 up, see
+    /// [`Response::abs`](crate::Response::abs) and [`Layout::abs_bits`](crate::layout::Layout::abs_bits).
     ///
     /// # Errors
-    /// [`Error::NotCarried`] if the reply shows less than a whole turn, as 17 bits do of a 20-bit encoder;
-    /// [`Error::UpperBits`] if bits are set above the widths of the profile.
+    /// [`Error::NotCarried`] if the response shows less than a whole turn, as 17 bits do of a 20-bit encoder;
+    /// [`Error::UpperBits`] if bits are set above the widths of the resolution.
     #[expect(clippy::cast_possible_truncation, reason = "both parts are masked to 32 bits at most")]
     pub const fn position(self, abs: u64, abs_bits: u8) -> Result<Position, Error> {
         if abs_bits < self.st_bits {
@@ -191,118 +193,7 @@ impl Profile {
     }
 }
 
-/// EEPROM word 0xf6: what kind of encoder it is.
-///
-/// ```text
-///  bit  15 ... 7 | 6   5      | 4   3       | 2 1 0
-///       unknown  | battery    | turns       | resolution
-///                | 0 none     | 0 none      | 0  17 bits
-///                | 1 separate | 1 magnetic  | 1  20 bits
-///                | 2 common   | 2 optical   | 2  22 bits
-///                |            |             | 3  24 bits
-/// ```
-///
-/// Known from one drive maker's firmware alone; other codes have no known meaning.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-#[cfg_attr(feature = "arbitrary", derive(arbitrary::Arbitrary))]
-pub struct TypeWord(pub u16);
-
-/// How an encoder counts turns.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-#[cfg_attr(feature = "arbitrary", derive(arbitrary::Arbitrary))]
-pub enum Multiturn {
-    /// Not at all.
-    None,
-    /// Magnetically, 16 bits.
-    Magnetic,
-    /// Optically, 16 bits.
-    Optical,
-    /// A code without known meaning.
-    Unknown(u8),
-}
-
-/// How the battery is connected.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-#[cfg_attr(feature = "arbitrary", derive(arbitrary::Arbitrary))]
-pub enum Battery {
-    /// There is none.
-    None,
-    /// By a line of its own.
-    Separate,
-    /// By a line that several encoders share.
-    Common,
-    /// A code without known meaning.
-    Unknown(u8),
-}
-
-impl TypeWord {
-    /// Its EEPROM address.
-    pub const EEPROM_ADDRESS: u8 = 0xf6;
-
-    /// Code of the resolution, 0..=7.
-    pub const fn resolution_code(self) -> u8 {
-        (self.0 & 7) as u8
-    }
-
-    /// Single-turn bits; `None` for a code without known meaning.
-    pub const fn st_bits(self) -> Option<u8> {
-        match self.resolution_code() {
-            0 => Some(17),
-            1 => Some(20),
-            2 => Some(22),
-            3 => Some(24),
-            _ => None,
-        }
-    }
-
-    /// How turns are counted.
-    pub const fn multiturn(self) -> Multiturn {
-        match (self.0 >> 3 & 3) as u8 {
-            0 => Multiturn::None,
-            1 => Multiturn::Magnetic,
-            2 => Multiturn::Optical,
-            code => Multiturn::Unknown(code),
-        }
-    }
-
-    /// Bits of the turns; `None` for a code without known meaning.
-    pub const fn mt_bits(self) -> Option<u8> {
-        match self.multiturn() {
-            Multiturn::None => Some(0),
-            Multiturn::Magnetic | Multiturn::Optical => Some(16),
-            Multiturn::Unknown(_) => None,
-        }
-    }
-
-    /// How the battery is connected.
-    pub const fn battery(self) -> Battery {
-        match (self.0 >> 5 & 3) as u8 {
-            0 => Battery::None,
-            1 => Battery::Separate,
-            2 => Battery::Common,
-            code => Battery::Unknown(code),
-        }
-    }
-
-    /// The widths as a profile of version 2.1; `None` for codes without known meaning. The word does not tell the version.
-    pub const fn profile(self) -> Option<Profile> {
-        match (self.st_bits(), self.mt_bits()) {
-            (Some(st_bits), Some(mt_bits)) => match Profile::new(st_bits, mt_bits) {
-                Ok(profile) => Some(profile),
-                Err(_) => None,
-            },
-            _ => None,
-        }
-    }
-}
-
-/// A profile as it is written down.
+/// A resolution as it is written down.
 #[cfg(feature = "serde")]
 #[derive(serde::Serialize, serde::Deserialize)]
 struct Written {
@@ -314,26 +205,26 @@ struct Written {
 }
 
 #[cfg(feature = "serde")]
-impl TryFrom<Written> for Profile {
+impl TryFrom<Written> for Resolution {
     type Error = WidthError;
 
     fn try_from(written: Written) -> Result<Self, WidthError> {
-        let profile = Self::new(written.st_bits, written.mt_bits)?.with_version(written.version);
-        let profile = if written.low_with_velocity { profile.low_with_velocity() } else { profile };
-        Ok(if written.resets_with_position { profile.resets_with_position() } else { profile })
+        let resolution = Self::new(written.st_bits, written.mt_bits)?.with_version(written.version);
+        let resolution = if written.low_with_velocity { resolution.low_with_velocity() } else { resolution };
+        Ok(if written.resets_with_position { resolution.resets_with_position() } else { resolution })
     }
 }
 
 #[cfg(feature = "serde")]
-impl From<Profile> for Written {
-    fn from(profile: Profile) -> Self {
-        let Profile { st_bits, mt_bits, version, low_with_velocity, resets_with_position } = profile;
+impl From<Resolution> for Written {
+    fn from(resolution: Resolution) -> Self {
+        let Resolution { st_bits, mt_bits, version, low_with_velocity, resets_with_position } = resolution;
         Self { st_bits, mt_bits, version, low_with_velocity, resets_with_position }
     }
 }
 
 #[cfg(feature = "arbitrary")]
-impl<'a> arbitrary::Arbitrary<'a> for Profile {
+impl<'a> arbitrary::Arbitrary<'a> for Resolution {
     fn arbitrary(from: &mut arbitrary::Unstructured<'a>) -> arbitrary::Result<Self> {
         let st_bits = *from.choose(&[17, 20, 22, 24])?;
         let mt_bits = *from.choose(&[0, 16])?;
@@ -342,6 +233,23 @@ impl<'a> arbitrary::Arbitrary<'a> for Profile {
     }
 }
 
+impl fmt::Display for Resolution {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{} + {} bits, version {}", self.st_bits, self.mt_bits, self.version)
+    }
+}
+
+impl fmt::Display for Position {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        if self.turns_bits == 0 {
+            return write!(f, "{} counts", self.single_turn);
+        }
+        write!(f, "turn {}, {} counts", self.turns, self.single_turn)
+    }
+}
+
+crate::text::format_as_displayed!(Resolution, Position);
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -349,56 +257,44 @@ mod tests {
 
     #[test]
     fn every_width_is_taken_or_refused() {
-        for st_bits in 0..=255_u8 {
+        for st_bits in (0..=255_u8).step_by(crate::STRIDE) {
             for mt_bits in 0..=255_u8 {
                 let possible = (1..=32).contains(&st_bits) && mt_bits <= 32 && st_bits + mt_bits <= 40;
-                assert_eq!(Profile::new(st_bits, mt_bits).is_ok(), possible);
+                assert_eq!(Resolution::new(st_bits, mt_bits).is_ok(), possible);
             }
         }
     }
 
     #[test]
-    fn what_a_reply_shows() {
-        let profile = Profile::new(20, 16).unwrap();
-        let abs = profile.compose(0xabcde, 0x8001);
-        let at = |bits: u8| profile.position(abs.get() & ((1 << bits) - 1), bits);
+    fn what_a_response_shows() {
+        let resolution = Resolution::new(20, 16).unwrap();
+        let abs = resolution.compose(0xabcde, 0x8001);
+        let at = |bits: u8| resolution.position(abs.get() & ((1 << bits) - 1), bits);
         assert_eq!(at(40), Ok(Position { single_turn: 0xabcde, turns: 0x8001, turns_bits: 16 }));
         assert_eq!(at(40).unwrap().signed_turns(), Some(-32_767));
         assert_eq!(at(24), Ok(Position { single_turn: 0xabcde, turns: 1, turns_bits: 4 }));
         assert_eq!(at(24).unwrap().signed_turns(), None);
         assert_eq!(at(17), Err(Error::NotCarried));
-        assert_eq!(profile.position(1 << 36, 40), Err(Error::UpperBits { width: 36 }));
-    }
-
-    #[test]
-    fn all_type_words() {
-        for raw in 0..=u16::MAX {
-            let word = TypeWord(raw);
-            let known = raw & 7 < 4 && raw >> 3 & 3 < 3;
-            assert_eq!(word.profile().is_some(), known);
-        }
-        let word = TypeWord(0b011_0001);
-        assert_eq!(word.profile(), Some(Profile::new(20, 16).unwrap()));
-        assert_eq!((word.multiturn(), word.battery()), (Multiturn::Optical, Battery::Separate));
+        assert_eq!(resolution.position(1 << 36, 40), Err(Error::UpperBits { width: 36 }));
     }
 
     proptest! {
         #[test]
         fn position_is_the_inverse_of_compose(st in 1..=24_u8, mt in 0..=16_u8, single: u32, turns: u32) {
-            let profile = Profile::new(st, mt).unwrap();
+            let resolution = Resolution::new(st, mt).unwrap();
             let (single, turns) = (single & ((1 << st) - 1), turns & ((1 << mt) - 1));
-            let abs = profile.compose(single, turns);
-            prop_assert_eq!(profile.position(abs.get(), 40), Ok(Position { single_turn: single, turns, turns_bits: mt }));
-            prop_assert!(profile.milli_degrees(single) < 360_000);
-            prop_assert_eq!(profile.fraction(single) >> (32 - st), single);
-            prop_assert!((profile.degrees(single) * 1000.0 - f64::from(profile.milli_degrees(single))).abs() < 1.001);
+            let abs = resolution.compose(single, turns);
+            prop_assert_eq!(resolution.position(abs.get(), 40), Ok(Position { single_turn: single, turns, turns_bits: mt }));
+            prop_assert!(resolution.milli_degrees(single) < 360_000);
+            prop_assert_eq!(resolution.fraction(single) >> (32 - st), single);
+            prop_assert!((resolution.degrees(single) * 1000.0 - f64::from(resolution.milli_degrees(single))).abs() < 1.001);
         }
 
         #[test]
         fn difference_wraps(st in 1..=32_u8, from: u32, to: u32) {
-            let profile = Profile::new(st, 0).unwrap();
+            let resolution = Resolution::new(st, 0).unwrap();
             let turn = 1_i64 << st;
-            let d = i64::from(profile.difference(from, to));
+            let d = i64::from(resolution.difference(from, to));
             prop_assert!(-turn / 2 <= d && d < (turn + 1) / 2);
             prop_assert_eq!((i64::from(to) - i64::from(from) - d).rem_euclid(turn), 0);
         }

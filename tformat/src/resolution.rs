@@ -1,6 +1,9 @@
-use crate::{Error, U24};
+use servowire_core::{OutOfRange, U24};
 
-/// The data widths of an encoder, as data: what the wire does not say.
+use crate::address::{Address, Page};
+use crate::error::Error;
+
+/// The widths of an encoder's data, and the size of its memory: what the wire does not say.
 ///
 /// ```text
 ///  ABS  |23 ... abs_bits| abs_bits-1 ... 0|      upper bits 0, position in the turn
@@ -8,30 +11,23 @@ use crate::{Error, U24};
 /// ```
 ///
 /// The check field does not protect against a wrong width; the upper bits do, so a set one is refused.
+///
+/// It prints as the widths: `23 + 16 bits`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(
     feature = "serde",
     derive(serde::Serialize, serde::Deserialize),
     serde(try_from = "Widths", into = "Widths")
 )]
-pub struct Profile {
+pub struct Resolution {
     abs_bits: u8,
     abm_bits: u8,
     signed_turns: bool,
     checks_upper_bits: bool,
+    pages: u8,
 }
 
-/// Widths that no encoder can have: ABS has 1 to 24 bits, ABM 0 to 24.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[error("{abs_bits} single-turn and {abm_bits} multi-turn bits: 1 to 24 and 0 to 24 are possible")]
-pub struct WidthError {
-    /// Single-turn bits asked for.
-    pub abs_bits: u8,
-    /// Multi-turn bits asked for.
-    pub abm_bits: u8,
-}
+crate::show::one_line!(Resolution { Self { abs_bits, abm_bits, .. } => "{} + {} bits", abs_bits, abm_bits; });
 
 /// What an encoder ID suggests.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -39,15 +35,14 @@ pub struct WidthError {
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Hint {
     /// The widths.
-    pub profile: Profile,
+    pub resolution: Resolution,
     /// Whether a document or a log of a real encoder shows this ID with these widths; otherwise they follow from
     /// the rule that all known IDs obey.
     pub documented: bool,
 }
 
-/// Where the shaft is, in the units of a [`Profile`].
+/// Where the shaft is, in the units of a [`Resolution`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Position {
     /// Counts in the turn, 0..2^abs_bits.
@@ -58,26 +53,41 @@ pub struct Position {
     pub combined: i64,
 }
 
-impl Profile {
-    /// Widths of ABS (1..=24) and ABM (0..=24); turns are signed, upper bits are checked.
+crate::show::one_line!(Position { Self { abs, turns, .. } => "turn {}, {} counts", turns, abs; });
+
+impl Resolution {
+    /// Widths of ABS (1..=24) and ABM (0..=24). Turns are signed, upper bits are checked, the EEPROM has six pages.
     ///
     /// # Errors
-    /// [`WidthError`] for other widths.
-    pub const fn new(abs_bits: u8, abm_bits: u8) -> Result<Self, WidthError> {
-        if abs_bits == 0 || abs_bits > 24 || abm_bits > 24 {
-            return Err(WidthError { abs_bits, abm_bits });
+    /// [`OutOfRange`] with the limit that a width passes.
+    pub const fn new(abs_bits: u8, abm_bits: u8) -> Result<Self, OutOfRange> {
+        match (within(abs_bits, 1, 24), within(abm_bits, 0, 24)) {
+            (Ok(abs_bits), Ok(abm_bits)) => {
+                Ok(Self { abs_bits, abm_bits, signed_turns: true, checks_upper_bits: true, pages: Page::COUNT })
+            }
+            (Err(error), _) | (_, Err(error)) => Err(error),
         }
-        Ok(Self { abs_bits, abm_bits, signed_turns: true, checks_upper_bits: true })
     }
 
-    /// The same with turns counted from 0 up.
-    pub const fn unsigned_turns(self) -> Self {
+    /// With turns counted from 0 up.
+    pub const fn with_unsigned_turns(self) -> Self {
         Self { signed_turns: false, ..self }
     }
 
-    /// The same for an encoder that puts something else into the upper bits: they are cut off, not checked.
-    pub const fn ignoring_upper_bits(self) -> Self {
+    /// For an encoder that puts something else into the upper bits: they are cut off, not checked.
+    pub const fn with_upper_bits_ignored(self) -> Self {
         Self { checks_upper_bits: false, ..self }
+    }
+
+    /// With another number of EEPROM pages, 1..=8: six in Tamagawa's encoders, eight in a compatible one.
+    ///
+    /// # Errors
+    /// [`OutOfRange`].
+    pub const fn with_pages(self, pages: u8) -> Result<Self, OutOfRange> {
+        match within(pages, 1, 8) {
+            Ok(pages) => Ok(Self { pages, ..self }),
+            Err(error) => Err(error),
+        }
     }
 
     /// What ENID suggests. In all known cases it is the number of single-turn bits.
@@ -102,7 +112,7 @@ impl Profile {
             _ => return None,
         };
         match Self::new(enid, abm_bits) {
-            Ok(profile) => Some(Hint { profile, documented }),
+            Ok(resolution) => Some(Hint { resolution, documented }),
             Err(_) => None,
         }
     }
@@ -122,6 +132,21 @@ impl Profile {
         self.signed_turns
     }
 
+    /// Pages of the EEPROM, 1..=8.
+    pub const fn pages(self) -> u8 {
+        self.pages
+    }
+
+    /// The page with this number; `None` if the encoder does not have it.
+    pub const fn page(self, number: u8) -> Option<Page> {
+        if number < self.pages { Page::new(number) } else { None }
+    }
+
+    /// Page and address of the byte `index` of the whole EEPROM; `None` after its end.
+    pub const fn locate(self, index: u16) -> Option<(Page, Address)> {
+        Page::locate(index, self.pages)
+    }
+
     /// Counts in a turn.
     pub const fn counts_per_turn(self) -> u32 {
         1_u32.wrapping_shl(self.abs_bits as u32)
@@ -132,7 +157,7 @@ impl Profile {
     /// # Errors
     /// [`Error::UpperBits`].
     pub const fn single_turn(self, abs: U24) -> Result<u32, Error> {
-        self.within(abs, self.abs_bits)
+        self.cut(abs, self.abs_bits)
     }
 
     /// The number of turns.
@@ -141,7 +166,7 @@ impl Profile {
     /// [`Error::UpperBits`].
     #[expect(clippy::cast_possible_wrap, reason = "24 bits fit")]
     pub const fn turns(self, abm: U24) -> Result<i32, Error> {
-        match self.within(abm, self.abm_bits) {
+        match self.cut(abm, self.abm_bits) {
             Ok(turns) if self.signed_turns => Ok(sign_extend(turns, self.abm_bits)),
             Ok(turns) => Ok(turns as i32),
             Err(error) => Err(error),
@@ -179,7 +204,7 @@ impl Profile {
         sign_extend(to.wrapping_sub(from), self.abs_bits)
     }
 
-    const fn within(self, field: U24, bits: u8) -> Result<u32, Error> {
+    const fn cut(self, field: U24, bits: u8) -> Result<u32, Error> {
         let value = field.get();
         let mask = 1_u32.wrapping_shl(bits as u32).wrapping_sub(1);
         let excess = value & !mask;
@@ -188,6 +213,15 @@ impl Profile {
         }
         Ok(value & mask)
     }
+}
+
+/// A setting, if it lies in its range.
+const fn within(value: u8, min: u8, max: u8) -> Result<u8, OutOfRange> {
+    if value < min || value > max {
+        let limit = if value < min { min } else { max };
+        return Err(OutOfRange { got: value as i64, max: limit as i64 });
+    }
+    Ok(value)
 }
 
 /// The low `bits` (0..=24) of `value` as two's complement.
@@ -200,7 +234,7 @@ const fn sign_extend(value: u32, bits: u8) -> i32 {
     (value.wrapping_shl(unused) as i32).wrapping_shr(unused)
 }
 
-/// A profile as it is written down.
+/// A resolution as it is written down. The number of pages may be missing: then it is six.
 #[cfg(feature = "serde")]
 #[derive(serde::Serialize, serde::Deserialize)]
 struct Widths {
@@ -208,26 +242,30 @@ struct Widths {
     abm_bits: u8,
     signed_turns: bool,
     checks_upper_bits: bool,
+    #[serde(default = "six")]
+    pages: u8,
 }
 
 #[cfg(feature = "serde")]
-impl TryFrom<Widths> for Profile {
-    type Error = WidthError;
+const fn six() -> u8 {
+    Page::COUNT
+}
 
-    fn try_from(w: Widths) -> Result<Self, WidthError> {
-        Self::new(w.abs_bits, w.abm_bits).map(|profile| Self {
-            signed_turns: w.signed_turns,
-            checks_upper_bits: w.checks_upper_bits,
-            ..profile
-        })
+#[cfg(feature = "serde")]
+impl TryFrom<Widths> for Resolution {
+    type Error = OutOfRange;
+
+    fn try_from(w: Widths) -> Result<Self, OutOfRange> {
+        let resolution = Self::new(w.abs_bits, w.abm_bits)?.with_pages(w.pages)?;
+        Ok(Self { signed_turns: w.signed_turns, checks_upper_bits: w.checks_upper_bits, ..resolution })
     }
 }
 
 #[cfg(feature = "serde")]
-impl From<Profile> for Widths {
-    fn from(p: Profile) -> Self {
-        let Profile { abs_bits, abm_bits, signed_turns, checks_upper_bits } = p;
-        Self { abs_bits, abm_bits, signed_turns, checks_upper_bits }
+impl From<Resolution> for Widths {
+    fn from(p: Resolution) -> Self {
+        let Resolution { abs_bits, abm_bits, signed_turns, checks_upper_bits, pages } = p;
+        Self { abs_bits, abm_bits, signed_turns, checks_upper_bits, pages }
     }
 }
 
@@ -235,9 +273,10 @@ impl From<Profile> for Widths {
 mod tests {
     use super::*;
     use proptest::prelude::*;
+    use std::string::ToString;
 
-    const P17: Profile = match Profile::new(17, 16) {
-        Ok(profile) => profile,
+    const P17: Resolution = match Resolution::new(17, 16) {
+        Ok(resolution) => resolution,
         Err(_) => panic!(),
     };
 
@@ -249,7 +288,7 @@ mod tests {
     fn position_of_a_17_bit_encoder() {
         let position = P17.position(u24(131_071), u24(0xffff)).unwrap();
         assert_eq!(position, Position { abs: 131_071, turns: -1, combined: -1 });
-        let unsigned = P17.unsigned_turns().position(u24(131_071), u24(0xffff)).unwrap();
+        let unsigned = P17.with_unsigned_turns().position(u24(131_071), u24(0xffff)).unwrap();
         assert_eq!((unsigned.turns, unsigned.combined), (65_535, 8_589_934_591));
         assert_eq!(P17.fraction(u24(65_536)), Ok(1 << 31));
     }
@@ -258,29 +297,46 @@ mod tests {
     fn upper_bits_are_refused_or_cut_off() {
         assert_eq!(P17.single_turn(u24(0x2_0001)), Err(Error::UpperBits { value: 0x2_0001, excess: 0x2_0000 }));
         assert_eq!(P17.turns(u24(0x1_0000)), Err(Error::UpperBits { value: 0x1_0000, excess: 0x1_0000 }));
-        assert_eq!(P17.ignoring_upper_bits().single_turn(u24(0x2_0001)), Ok(1));
-        let single = Profile::new(21, 0).unwrap();
+        assert_eq!(P17.with_upper_bits_ignored().single_turn(u24(0x2_0001)), Ok(1));
+        let single = Resolution::new(21, 0).unwrap();
         assert_eq!(single.turns(u24(0)), Ok(0));
         assert!(single.turns(u24(1)).is_err());
     }
 
     #[test]
     fn every_width_is_taken_or_refused() {
-        for abs_bits in 0..=255 {
-            for abm_bits in 0..=255 {
+        // Interpreted, some of the pairs have to do.
+        let stride = if cfg!(miri) { 5 } else { 1 };
+        for abs_bits in (0..=255).step_by(stride) {
+            for abm_bits in (0..=255).step_by(stride) {
                 let possible = (1..=24).contains(&abs_bits) && abm_bits <= 24;
-                assert_eq!(Profile::new(abs_bits, abm_bits).is_ok(), possible);
+                assert_eq!(Resolution::new(abs_bits, abm_bits).is_ok(), possible);
             }
         }
+        assert_eq!(Resolution::new(0, 16), Err(OutOfRange { got: 0, max: 1 }));
+        assert_eq!(Resolution::new(25, 16), Err(OutOfRange { got: 25, max: 24 }));
+        assert_eq!(Resolution::new(17, 25), Err(OutOfRange { got: 25, max: 24 }));
+        assert_eq!(P17.to_string(), "17 + 16 bits");
+    }
+
+    /// Six pages unless told otherwise, and no page that the encoder does not have.
+    #[test]
+    fn pages() {
+        assert_eq!((P17.pages(), P17.page(5), P17.page(6)), (6, Page::new(5), None));
+        let eight = P17.with_pages(8).unwrap();
+        assert_eq!((eight.page(7), eight.page(8), eight.pages()), (Page::new(7), None, 8));
+        assert_eq!((P17.locate(761).is_some(), P17.locate(762), eight.locate(1015).is_some()), (true, None, true));
+        assert_eq!(P17.with_pages(9), Err(OutOfRange { got: 9, max: 8 }));
+        assert_eq!(P17.with_pages(0), Err(OutOfRange { got: 0, max: 1 }));
     }
 
     #[test]
     fn hints_follow_the_number_of_bits() {
         for enid in 0..=255 {
-            let hint = Profile::from_enid(enid);
+            let hint = Resolution::from_enid(enid);
             assert_eq!(hint.is_some(), [11, 17, 20, 21, 23, 24].contains(&enid));
             if let Some(hint) = hint {
-                assert_eq!(hint.profile.abs_bits(), enid);
+                assert_eq!(hint.resolution.abs_bits(), enid);
                 assert_eq!(hint.documented, enid != 20 && enid != 24);
             }
         }
@@ -289,10 +345,10 @@ mod tests {
     proptest! {
         #[test]
         fn combined_is_turns_and_counts(abs_bits in 1..=24_u8, abm_bits in 0..=24_u8, abs: u32, abm: u32, signed: bool) {
-            let profile = Profile::new(abs_bits, abm_bits).unwrap();
-            let profile = if signed { profile } else { profile.unsigned_turns() };
+            let resolution = Resolution::new(abs_bits, abm_bits).unwrap();
+            let resolution = if signed { resolution } else { resolution.with_unsigned_turns() };
             let (abs, abm) = (abs & ((1 << abs_bits) - 1), abm & ((1 << abm_bits) - 1));
-            let position = profile.position(u24(abs), u24(abm)).unwrap();
+            let position = resolution.position(u24(abs), u24(abm)).unwrap();
             let full = 1_i64 << abm_bits;
             let turns = if signed && i64::from(abm) * 2 >= full && abm_bits > 0 { i64::from(abm) - full } else { i64::from(abm) };
             prop_assert_eq!(i64::from(position.turns), turns);
@@ -301,9 +357,9 @@ mod tests {
 
         #[test]
         fn difference_wraps(abs_bits in 1..=24_u8, from: u32, to: u32) {
-            let profile = Profile::new(abs_bits, 0).unwrap();
+            let resolution = Resolution::new(abs_bits, 0).unwrap();
             let turn = 1_i64 << abs_bits;
-            let d = i64::from(profile.difference(from, to));
+            let d = i64::from(resolution.difference(from, to));
             prop_assert!(-turn / 2 <= d && d < (turn + 1) / 2);
             prop_assert_eq!((i64::from(to) - i64::from(from) - d).rem_euclid(turn), 0);
         }

@@ -1,7 +1,8 @@
+use core::fmt;
 use core::iter::FusedIterator;
 
-use crate::Profile;
-use crate::arithmetic::{Interval, StepTime};
+use crate::interval::{Interval, StepTime};
+use crate::profile::Profile;
 use crate::runs::{Run, Runs};
 
 /// What a move is doing.
@@ -22,11 +23,22 @@ pub enum MoveState {
     RampDown,
 }
 
+impl fmt::Display for MoveState {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.pad(match self {
+            Self::Idle => "idle",
+            Self::RampUp => "ramp-up",
+            Self::Constant => "constant",
+            Self::RampDown => "ramp-down",
+        })
+    }
+}
+
 /// One step of a move. The interval `t_step` lies before its pulse.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub struct Step {
+pub struct RampStep {
     /// Number of the step in its move, from 0.
     pub index: u32,
     /// Ramp entry, 0..=31.
@@ -47,10 +59,18 @@ pub struct Step {
     pub sync_time: u32,
 }
 
+/// `step 0 ramp-up: cycle 415 at 2380 ns`.
+impl fmt::Display for RampStep {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { index, state, cycle, sync_time, .. } = self;
+        write!(f, "step {index} {state}: cycle {cycle} at {sync_time} ns")
+    }
+}
+
 /// The steps of a move, one after the other.
 #[derive(Debug, Clone)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub struct Steps<'t> {
+pub struct RampSteps<'t> {
     profile: Profile<'t>,
     runs: Runs,
     entry: u8,
@@ -69,7 +89,7 @@ pub struct Steps<'t> {
     fraction: u32,
 }
 
-impl<'t> Steps<'t> {
+impl<'t> RampSteps<'t> {
     pub(crate) const fn new(profile: Profile<'t>, steps: u32) -> Self {
         let shape = profile.shape(steps);
         Self {
@@ -158,15 +178,15 @@ impl<'t> Steps<'t> {
     }
 }
 
-impl Iterator for Steps<'_> {
-    type Item = Step;
+impl Iterator for RampSteps<'_> {
+    type Item = RampStep;
 
     #[inline]
-    fn next(&mut self) -> Option<Step> {
+    fn next(&mut self) -> Option<RampStep> {
         let index = self.index;
         let StepTime { cnt, sync } = self.advance()?;
         self.cycle = self.cycle.wrapping_add(u64::from(cnt));
-        Some(Step {
+        Some(RampStep {
             index,
             entry: self.entry,
             state: self.state_of(index),
@@ -183,13 +203,18 @@ impl Iterator for Steps<'_> {
     }
 }
 
-impl FusedIterator for Steps<'_> {}
+impl FusedIterator for RampSteps<'_> {}
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{Arithmetic, Parameters, RampTable, Speed, corrected, pru_exact};
+    use crate::arithmetic::{Arithmetic, corrected};
+    use crate::frequency::Speed;
+    use crate::profile::Parameters;
+    use crate::pru_exact;
+    use crate::ramp::RampTable;
     use proptest::prelude::*;
+    use std::string::ToString;
     use std::vec::Vec;
 
     fn parameters() -> impl Strategy<Value = (u32, u32, u32)> {
@@ -237,7 +262,7 @@ mod tests {
             let steps = profile(Arithmetic::Corrected, given).steps(n).zip(profile(Arithmetic::Carried, given).steps(n));
             for (corrected, carried) in steps {
                 exact += u64::from(RampTable::SIN2.entry(corrected.entry)) * u64::from(speed);
-                let time = |s: Step| s.cycle * 4000 + u64::from(s.sync_time);
+                let time = |s: RampStep| s.cycle * 4000 + u64::from(s.sync_time);
                 prop_assert_eq!(time(carried), exact >> 16);
                 prop_assert!(time(corrected) <= exact >> 16);
                 prop_assert!(exact >> 16 < time(corrected) + u64::from(corrected.index) + 2);
@@ -266,12 +291,12 @@ mod tests {
             let after = after.min(n);
             let profile = profile(Arithmetic::Corrected, given);
             let mut steps = profile.steps(n);
-            let done: Vec<Step> = steps.by_ref().take(after as usize).collect();
+            let done: Vec<RampStep> = steps.by_ref().take(after as usize).collect();
             steps.abort();
             let depth = after.saturating_sub(1).min(n - after).min(32 * given.1 - 1);
             prop_assert_eq!(steps.remaining(), depth);
             prop_assert_eq!(steps.size_hint(), (depth as usize, Some(depth as usize)));
-            let rest: Vec<Step> = steps.collect();
+            let rest: Vec<RampStep> = steps.collect();
             prop_assert_eq!(rest.len() as u32, depth);
             let mut before = done.last().copied();
             for step in rest {
@@ -293,7 +318,7 @@ mod tests {
         assert_eq!(steps.by_ref().take(100).count(), 100);
         steps.abort();
         assert_eq!(steps.remaining(), 63);
-        let once: Vec<Step> = steps.clone().collect();
+        let once: Vec<RampStep> = steps.clone().collect();
         assert_eq!(steps.next(), Some(once[0]));
         steps.abort();
         assert_eq!(steps.collect::<Vec<_>>(), once[1..]);
@@ -314,6 +339,12 @@ mod tests {
             assert!(frequencies.contains(&hz), "{hz}");
         }
         assert!(Speed::NAMED.iter().all(|&(_, speed)| !wrong(speed)));
+    }
+
+    #[test]
+    fn a_step_is_printed_in_a_line() {
+        let step = profile(Arithmetic::Corrected, (262_144, 1, 1000)).steps(5).next().unwrap();
+        assert_eq!(step.to_string(), "step 0 ramp-up: cycle 415 at 2380 ns");
     }
 
     #[test]

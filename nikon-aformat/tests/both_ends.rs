@@ -1,15 +1,21 @@
 //! Both ends talk to each other.
+#![allow(missing_docs, clippy::arithmetic_side_effects, clippy::cast_possible_truncation, clippy::indexing_slicing)]
+#![allow(clippy::unwrap_used, clippy::panic)]
 
-use super::*;
-use crate::bus::Addresses;
-use crate::master::{
-    BusTransaction, Detected, Detection, EepromRead, Line, Polling, Progress, Reset, Step, Transaction, Write,
+mod common;
+
+use common::every;
+use nikon_aformat::bus::{Addresses, Bus};
+use nikon_aformat::device::{Device, Encoders, Fault, Transmission};
+use nikon_aformat::master::{
+    BusTransaction, Detected, Detection, EepromRead, Line, Progress, Reset, Step, Transaction, Write,
 };
-use crate::reception::LineReceiver;
-use crate::request::tests::every;
-use crate::{Layout, UserAddress, Version};
+use nikon_aformat::reception::LineReceiver;
+use nikon_aformat::{
+    Alm, BitRate, EncoderAddress, EncoderId, Error, Layout, Operation, Request, Resolution, Response, UserAddress,
+    Version, Window,
+};
 use proptest::prelude::*;
-use std::vec::Vec;
 
 const RATE: BitRate = BitRate::Mbit16;
 const LINE: Line = Line::new(RATE);
@@ -18,12 +24,12 @@ fn ea(address: u8) -> EncoderAddress {
     EncoderAddress::truncate(address)
 }
 
-fn eight(profile: Profile) -> Encoders<8, 2> {
+fn eight(resolution: Resolution) -> Encoders<8, 2> {
     Encoders {
         all: EncoderAddress::ALL.map(|ea| {
-            let mut device = Device::new(ea, profile, RATE);
+            let mut device = Device::new(ea, resolution, RATE);
             device.set_position(u32::from(ea.get()) * 1111, u32::from(ea.get()) + 3);
-            device.set_id(U24::truncate(0x10_0000 + u32::from(ea.get())));
+            device.set_id(EncoderId::truncate(0x10_0000 + u32::from(ea.get())));
             device
         }),
     }
@@ -34,7 +40,7 @@ fn send<const N: usize, const B: usize>(
     encoders: &mut Encoders<N, B>,
     request: Request,
     now_ns: u64,
-) -> (u64, Vec<Answer>) {
+) -> (u64, Vec<Transmission>) {
     let frame_ns = u64::from(RATE.bits_ns(18));
     let mut at = now_ns;
     let mut answers = Vec::new();
@@ -50,10 +56,10 @@ fn send<const N: usize, const B: usize>(
 fn transact<const N: usize, const B: usize>(
     encoders: &mut Encoders<N, B>,
     request: Request,
-    profile: Profile,
+    resolution: Resolution,
     now_ns: u64,
 ) -> (Result<Response, Error>, u64) {
-    let mut transaction = Transaction::start(request, profile, LINE, now_ns);
+    let mut transaction = Transaction::start(request, resolution, LINE, now_ns);
     let (_, answers) = send(encoders, request, now_ns);
     for answer in answers {
         for frame in 0..answer.line.len() / 18 {
@@ -63,26 +69,26 @@ fn transact<const N: usize, const B: usize>(
             let _ =
                 if framed { transaction.frame((bits >> 1) as u16, now_ns) } else { transaction.framing_error(now_ns) };
             match transaction.progress() {
-                Progress::Waiting { .. } => {}
-                Progress::Done(response) => return (Ok(response), now_ns),
-                Progress::Failed(error) => return (Err(error), now_ns),
+                Progress::Pending { .. } => {}
+                Progress::Done { value, .. } => return (Ok(value), now_ns),
+                Progress::Failed { error, .. } => return (Err(error), now_ns),
             }
         }
     }
     match transaction.progress() {
-        Progress::Waiting { until_ns } => match transaction.poll(until_ns + 1) {
-            Progress::Failed(error) => (Err(error), until_ns + 1),
+        Progress::Pending { until_ns } => match transaction.poll(until_ns + 1) {
+            Progress::Failed { error, .. } => (Err(error), until_ns + 1),
             other => panic!("{other:?}"),
         },
-        Progress::Done(response) => (Ok(response), now_ns),
-        Progress::Failed(error) => (Err(error), now_ns),
+        Progress::Done { value, .. } => (Ok(value), now_ns),
+        Progress::Failed { error, .. } => (Err(error), now_ns),
     }
 }
 
 /// Drives a procedure to its end; the result, the requests sent and when it ended.
 fn drive<T: core::fmt::Debug, const N: usize, const B: usize>(
     encoders: &mut Encoders<N, B>,
-    profile: Profile,
+    resolution: Resolution,
     first: Step<T>,
     mut answer: impl FnMut(Result<Response, Error>, u64) -> Step<T>,
 ) -> (Result<T, Error>, Vec<Request>, u64) {
@@ -91,23 +97,23 @@ fn drive<T: core::fmt::Debug, const N: usize, const B: usize>(
         match step {
             Step::Send { request, not_before_ns } => {
                 sent.push(request);
-                let (outcome, end) = transact(encoders, request, profile, not_before_ns);
+                let (outcome, end) = transact(encoders, request, resolution, not_before_ns);
                 step = answer(outcome, end);
             }
-            Step::Done { value, not_before_ns } => return (Ok(value), sent, not_before_ns),
-            Step::Failed { error, not_before_ns } => return (Err(error), sent, not_before_ns),
+            Step::Done { value, ready_ns } => return (Ok(value), sent, ready_ns),
+            Step::Failed { error, ready_ns } => return (Err(error), sent, ready_ns),
         }
         assert!(sent.len() < 100);
     }
 }
 
-/// Every operation to every encoder is answered by it alone, in the layout that the profile says, and accepted.
+/// Every operation to every encoder is answered by it alone, in the layout that the resolution says, and accepted.
 #[test]
 fn every_operation_to_every_encoder() {
-    for profile in [Profile::default(), Profile::default().low_with_velocity().resets_with_position()] {
+    for resolution in [Resolution::default(), Resolution::default().low_with_velocity().resets_with_position()] {
         for operation in every(0x21, 1, 0xbeef, 0x10_0003) {
             for to in EncoderAddress::ALL {
-                let mut encoders = eight(profile);
+                let mut encoders = eight(resolution);
                 let request = Request::new(to, operation);
                 let (_, answers) = send(&mut encoders, request, 0);
                 let want = match operation {
@@ -117,9 +123,9 @@ fn every_operation_to_every_encoder() {
                     _ => 1,
                 };
                 assert_eq!(answers.len(), want, "{operation:?}");
-                let expected = request.expected(profile);
+                let expected = request.expected(resolution);
                 for answer in answers {
-                    assert!(Response::parse(&answer.reply, &expected).is_ok(), "{operation:?} {to}");
+                    assert!(Response::parse(&expected, &answer.raw).is_ok(), "{operation:?} {to}");
                 }
             }
         }
@@ -128,54 +134,53 @@ fn every_operation_to_every_encoder() {
 
 #[test]
 fn version_2_1_does_not_understand_3_0() {
-    let profile = Profile::new(20, 16).unwrap();
+    let resolution = Resolution::new(20, 16).unwrap();
     for operation in every(0x21, 1, 0xbeef, 5) {
-        let (_, answers) = send(&mut eight(profile), Request::new(ea(0), operation), 0);
+        let (_, answers) = send(&mut eight(resolution), Request::new(ea(0), operation), 0);
         let understood = !operation.needs_version_3();
         // No encoder has the identification code 5.
         let meant = !matches!(operation, Operation::SetAddress2 { .. });
         assert_eq!(!answers.is_empty(), understood && meant, "{operation:?}");
-        assert_eq!(profile.version(), Version::V2_1);
+        assert_eq!(resolution.version(), Version::V2_1);
     }
 }
 
 #[test]
 fn eeprom_written_once_and_read_back() {
-    let profile = Profile::default();
-    let mut encoders = eight(profile);
+    let resolution = Resolution::default();
+    let mut encoders = eight(resolution);
     let mut write = Write::eeprom(ea(3), UserAddress::new(0x42).unwrap(), 0x1234);
     let first = write.start(0);
-    let (end, sent, now_ns) = drive(&mut encoders, profile, first, |o, t| write.answer(o, t));
+    let (end, sent, now_ns) = drive(&mut encoders, resolution, first, |o, t| write.receive(o, t));
     assert!(end.is_ok());
     assert_eq!(sent.iter().filter(|r| r.operation.writes()).count(), 1);
     assert_eq!(encoders.all[3].eeprom(0, 0x42), Some(0x1234));
     assert_eq!(encoders.all[2].eeprom(0, 0x42), Some(0xffff));
-    let mut read = EepromRead::new(ea(3), 0x42, Polling::READ);
+    let mut read = EepromRead::new(ea(3), 0x42);
     let first = read.start(now_ns);
-    let (end, sent, now_ns) = drive(&mut encoders, profile, first, |o, t| read.answer(o, t));
+    let (end, sent, now_ns) = drive(&mut encoders, resolution, first, |o, t| read.receive(o, t));
     assert_eq!((end, sent.len()), (Ok(0x1234), 2));
-    let mut read = EepromRead::of_bank(ea(3), 2, 0x42, Polling::READ);
+    let mut read = EepromRead::of_bank(ea(3), 2, 0x42);
     let first = read.start(now_ns);
-    let (end, ..) = drive(&mut encoders, profile, first, |o, t| read.answer(o, t));
+    let (end, ..) = drive(&mut encoders, resolution, first, |o, t| read.receive(o, t));
     assert_eq!(end, Err(Error::BankError));
 }
 
 #[test]
 fn resets_take_effect_with_the_eighth_request() {
-    let profile = Profile::default();
-    let mut encoders = eight(profile);
-    encoders.all[5].set_alarm(Alarm::Batt, true);
-    encoders.all[5].set_alarm(Alarm::Batt, false);
-    encoders.all[5].set_alarm(Alarm::OvTemp, true);
+    let resolution = Resolution::default();
+    let mut encoders = eight(resolution);
+    encoders.all[5].set_alarms(Alm::BATT | Alm::OVTEMP, true);
+    encoders.all[5].set_alarms(Alm::BATT, false);
     let mut reset = Reset::clear_status_and_multiturn(ea(5));
     let first = reset.start(0);
-    let (end, sent, now_ns) = drive(&mut encoders, profile, first, |o, t| reset.answer(o, t));
+    let (end, sent, now_ns) = drive(&mut encoders, resolution, first, |o, t| reset.receive(o, t));
     let status = end.unwrap();
-    assert_eq!((sent.len(), status.alm()), (9, Some(Alm::of(Alarm::OvTemp))));
-    assert_eq!(encoders.all[5].abs(), profile.compose(5555, 0));
+    assert_eq!((sent.len(), status.alm()), (9, Some(Alm::OVTEMP)));
+    assert_eq!(encoders.all[5].abs(), resolution.compose(5555, 0));
     let mut reset = Reset::set_single_turn_zero_and_shift_commutation_angle(ea(5));
     let first = reset.start(now_ns);
-    let (end, ..) = drive(&mut encoders, profile, first, |o, t| reset.answer(o, t));
+    let (end, ..) = drive(&mut encoders, resolution, first, |o, t| reset.receive(o, t));
     assert!(end.is_ok());
     assert_eq!(encoders.all[5].abs().get(), 0);
 }
@@ -183,8 +188,8 @@ fn resets_take_effect_with_the_eighth_request() {
 /// A request for another encoder between the eight starts the count again.
 #[test]
 fn an_intervening_request_starts_the_count_again() {
-    let profile = Profile::default();
-    let mut encoders = eight(profile);
+    let resolution = Resolution::default();
+    let mut encoders = eight(resolution);
     let reset = Request::new(ea(5), Operation::ClearMultiturn);
     let mut now_ns = 0;
     for k in 0..15 {
@@ -194,23 +199,23 @@ fn an_intervening_request_starts_the_count_again() {
             let _ = send(&mut encoders, Request::new(ea(1), Operation::Abs17), now_ns);
             now_ns += 50_000;
         }
-        assert_eq!(encoders.all[5].abs() == profile.compose(5555, 0), k == 14, "after {}", k + 1);
+        assert_eq!(encoders.all[5].abs() == resolution.compose(5555, 0), k == 14, "after {}", k + 1);
     }
 }
 
 #[test]
 fn addresses_are_given_by_wire_and_by_id() {
-    let profile = Profile::default();
-    let mut one = Encoders::<1, 1> { all: [Device::new(ea(0), profile, RATE)] };
+    let resolution = Resolution::default();
+    let mut one = Encoders::<1, 1> { all: [Device::new(ea(0), resolution, RATE)] };
     let mut reset = Reset::set_address_of_the_only_encoder(ea(6));
     let first = reset.start(0);
-    let (end, ..) = drive(&mut one, profile, first, |o, t| reset.answer(o, t));
+    let (end, ..) = drive(&mut one, resolution, first, |o, t| reset.receive(o, t));
     assert_eq!((end.map(|status| status.ea), one.all[0].ea()), (Ok(ea(6)), ea(6)));
-    let mut encoders = eight(profile);
-    let mut write = Write::address(U24::truncate(0x10_0002), ea(7));
+    let mut encoders = eight(resolution);
+    let mut write = Write::address(EncoderId::truncate(0x10_0002), ea(7));
     let first = write.start(0);
-    let (end, ..) = drive(&mut encoders, profile, first, |o, t| write.answer(o, t));
-    // Encoder 7 is there already: both answer STATUS, and the first reply is taken.
+    let (end, ..) = drive(&mut encoders, resolution, first, |o, t| write.receive(o, t));
+    // Encoder 7 is there already: both answer STATUS, and the first response is taken.
     assert!(end.is_ok());
     assert_eq!(encoders.all[2].ea(), ea(7));
     let (_, answers) = send(&mut encoders, Request::new(ea(7), Operation::Status), 1_000_000_000);
@@ -220,36 +225,36 @@ fn addresses_are_given_by_wire_and_by_id() {
 #[test]
 fn detection_finds_address_and_widths() {
     for (st_bits, mt_bits) in [(17, 0), (20, 16), (22, 16), (24, 0)] {
-        let profile = Profile::new(st_bits, mt_bits).unwrap();
-        let mut one = Encoders::<1, 1> { all: [Device::new(ea(4), profile, RATE)] };
+        let resolution = Resolution::new(st_bits, mt_bits).unwrap();
+        let mut one = Encoders::<1, 1> { all: [Device::new(ea(4), resolution, RATE)] };
         let mut detection = Detection::search();
         let first = detection.start(0);
-        let (end, sent, _) = drive(&mut one, profile, first, |o, t| detection.answer(o, t));
-        let Ok(Detected { ea: found, profile: got, .. }) = end else { panic!("{end:?}") };
-        assert_eq!((found, got, sent.len()), (ea(4), Some(profile), 3));
+        let (end, sent, _) = drive(&mut one, resolution, first, |o, t| detection.receive(o, t));
+        let Ok(Detected { ea: found, resolution: got, .. }) = end else { panic!("{end:?}") };
+        assert_eq!((found, got, sent.len()), (ea(4), Some(resolution), 3));
         one.all[0].set_fault(Fault::Silent);
         let mut detection = Detection::of(ea(4));
         let first = detection.start(0);
-        let (end, ..) = drive(&mut one, profile, first, |o, t| detection.answer(o, t));
+        let (end, ..) = drive(&mut one, resolution, first, |o, t| detection.receive(o, t));
         assert_eq!(end.unwrap_err(), Error::NoResponse);
     }
 }
 
-/// Every fault of every encoder on the bus costs its own reply and no other.
+/// Every fault of every encoder on the bus costs its own response and no other.
 #[test]
-fn one_fault_costs_one_reply() {
-    let profile = Profile::default();
-    let mut faults = std::vec![Fault::Silent, Fault::BadCrc];
+fn one_fault_costs_one_response() {
+    let resolution = Resolution::default();
+    let mut faults = vec![Fault::Silent, Fault::BadCrc];
     faults.extend((0..72).map(|at| Fault::FlipBit { at }));
     faults.extend((1..72).step_by(5).map(|bits| Fault::CutAfter { bits }));
     let request = Request::new(ea(7), Operation::Abs40Mt);
     for fault in faults {
         for bad in 0..8 {
-            let mut encoders = eight(profile);
+            let mut encoders = eight(resolution);
             encoders.all[usize::from(bad)].set_fault(fault);
-            let mut transaction = BusTransaction::start(request, profile, Addresses::ALL, LINE, 0);
+            let mut transaction = BusTransaction::start(request, resolution, Addresses::ALL, LINE, 0);
             let (_, answers) = send(&mut encoders, request, 0);
-            let whole = answers.iter().filter(|a| ends_like(a.line, a.reply.line())).count();
+            let whole = answers.iter().filter(|a| ends_like(a.line, a.raw.line())).count();
             if whole == 8 {
                 continue;
             }
@@ -269,11 +274,11 @@ fn ends_like(cut: Window, whole: Window) -> bool {
 }
 
 /// The bus as a receiver of the sampled line hears it.
-fn hear(receiver: &mut LineReceiver, answers: &[Answer], empty: &crate::bus::Bus) -> crate::bus::Bus {
+fn hear(receiver: &mut LineReceiver, answers: &[Transmission], empty: &Bus) -> Bus {
     let mut bus = *empty;
     for level in render(answers) {
-        if let Some(reply) = receiver.push(level) {
-            bus.push(reply);
+        if let Some(raw) = receiver.push(level) {
+            bus.push(raw);
         }
     }
     if let Some(error) = receiver.finish() {
@@ -283,7 +288,7 @@ fn hear(receiver: &mut LineReceiver, answers: &[Answer], empty: &crate::bus::Bus
 }
 
 /// Answers as one line, one sample a bit, beginning with the first start bit; idle line behind the last.
-fn render(answers: &[Answer]) -> Vec<bool> {
+fn render(answers: &[Transmission]) -> Vec<bool> {
     let Some(first) = answers.first() else { return Vec::new() };
     let mut line = Vec::new();
     for answer in answers {
@@ -296,23 +301,23 @@ fn render(answers: &[Answer]) -> Vec<bool> {
 }
 
 proptest! {
-    /// Whatever frames arrive, an encoder answers nothing or a sound reply, and later understands a good request.
+    /// Whatever frames arrive, an encoder answers nothing or a sound response, and later understands a good request.
     #[test]
     fn noise_does_not_lock_it_up(contents in prop::collection::vec((any::<u16>(), 0..100_000_u64, any::<bool>()), 0..40)) {
-        let mut encoders = eight(Profile::default());
+        let mut encoders = eight(Resolution::default());
         let mut now_ns = 0;
         for (content, pause, framed) in contents {
             now_ns += pause;
             if framed {
                 for answer in encoders.frame(content, now_ns).into_iter().flatten() {
-                    prop_assert_eq!(answer.reply.crc().0, answer.reply.crc().1);
+                    prop_assert_eq!(answer.raw.crc().0, answer.raw.crc().1);
                 }
             } else {
                 encoders.framing_error(now_ns);
             }
         }
         now_ns += 1_000_000_000;
-        let (outcome, _) = transact(&mut encoders, Request::new(ea(1), Operation::Abs40), Profile::default(), now_ns);
+        let (outcome, _) = transact(&mut encoders, Request::new(ea(1), Operation::Abs40), Resolution::default(), now_ns);
         prop_assert!(outcome.is_ok());
     }
 }
