@@ -10,11 +10,16 @@ use nrz_line::Window;
 
 pub use resources::{Resource, Resources};
 
+use crate::acceleration::DeltaDelta;
+use crate::answer::Content;
+use crate::crc::crc16;
+use crate::encoder_id::{EncoderId, PositionBits};
+use crate::error::Error;
 use crate::frame::{Head, V_FRAME};
 use crate::message::{LongAnswer, Request, Responder};
+use crate::parameter::{EncoderByte, MasterSymbol};
 use crate::sampling::TEST_PATTERN;
 use crate::symbol::{Character, Control, RunningDisparity};
-use crate::{Content, DeltaDelta, EncoderByte, EncoderId, Error, MasterSymbol, PositionBits, crc16};
 
 /// What an encoder can be made to do wrong.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]

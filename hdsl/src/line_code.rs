@@ -1,8 +1,10 @@
 //! The master's part of the line balance: EQUALISATION, and the parameter byte with its polarity chosen by the
 //! line disparity instead of a running disparity.
 
-use crate::ParameterByte;
-use crate::symbol::{FOUR_MORE_ZEROS, SIX_MORE_ZEROS, Word};
+use core::fmt;
+
+use crate::parameter::ParameterByte;
+use crate::symbol::{FOUR_MORE_ZEROS, Rule, SIX_MORE_ZEROS, Word};
 
 /// Ones minus zeros that the master has sent, as its receiver counts them.
 ///
@@ -13,11 +15,21 @@ use crate::symbol::{FOUR_MORE_ZEROS, SIX_MORE_ZEROS, Word};
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "arbitrary", derive(arbitrary::Arbitrary))]
-pub struct LineDisparity(pub i8);
+pub struct LineDisparity(i8);
 
 impl LineDisparity {
     /// Balanced.
     pub const ZERO: Self = Self(0);
+
+    /// With this count.
+    pub const fn new(ones_minus_zeros: i8) -> Self {
+        Self(ones_minus_zeros)
+    }
+
+    /// Ones minus zeros.
+    pub const fn get(self) -> i8 {
+        self.0
+    }
 
     const fn plus(self, difference: i8) -> Self {
         Self(self.0.saturating_add(difference))
@@ -65,7 +77,7 @@ impl LineDisparity {
             _ => self,
         };
         let four = polarity(FOUR_MORE_ZEROS[(raw >> 5) as usize], 4, after.0);
-        (Word::truncate(six as u64 | (four as u64) << 6), after)
+        (Word::truncate(six as u16 | (four as u16) << 6), after)
     }
 }
 
@@ -80,10 +92,10 @@ impl ParameterByte {
     /// sub-block is in no table.
     pub const fn decode(word: Word) -> Option<Self> {
         // The sub-block look-ups disregard polarity, as an encoder has to.
-        let reading = word.read(crate::Rule::Reduced);
+        let reading = word.read(Rule::Reduced);
         let raw = reading.raw();
         // FFh also marks a failed look-up; the real FFh has x = 31 and y = 7.
-        if raw == 0xff && !is_ff(word.bits()) { None } else { Some(Self::new(raw)) }
+        if raw == 0xff && !is_ff(word.get()) { None } else { Some(Self::new(raw)) }
     }
 }
 
@@ -91,6 +103,12 @@ impl ParameterByte {
 const fn is_ff(bits: u16) -> bool {
     let six = matches!(bits & 0x3f, 0b11_0101 | 0b00_1010);
     six && matches!(bits >> 6, 0b0111 | 0b1000 | 0b1110 | 0b0001)
+}
+
+impl fmt::Display for LineDisparity {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        fmt::Display::fmt(&self.0, f)
+    }
 }
 
 #[cfg(test)]
@@ -122,7 +140,7 @@ mod tests {
             (0x90, "1001001101"),
             (0xd0, "1001000110"),
         ] {
-            assert_eq!(LineDisparity::ZERO.encode(ParameterByte::new(raw)).0.bits(), bits(text), "{raw:02x}");
+            assert_eq!(LineDisparity::ZERO.encode(ParameterByte::new(raw)).0.get(), bits(text), "{raw:02x}");
         }
     }
 
@@ -130,9 +148,7 @@ mod tests {
     fn words_outside_the_tables_are_no_parameter_byte() {
         let good = (0..1024).filter(|w| ParameterByte::decode(Word::new(*w).unwrap()).is_some()).count();
         // 47 six-bit blocks (18 + 2 * 13 + both of 7 + both of K28, 7 counted once) times 14 four-bit blocks.
-        let six = (0..64_u16)
-            .filter(|s| Word::new(s | 0b1001 << 6).unwrap().read(crate::Rule::Reduced).raw() != 0xff)
-            .count();
+        let six = (0..64_u16).filter(|s| Word::new(s | 0b1001 << 6).unwrap().read(Rule::Reduced).raw() != 0xff).count();
         assert_eq!(good, six * 14);
         assert_eq!(LineDisparity::ZERO.with_ones(9), LineDisparity(9));
         assert_eq!(LineDisparity(127).with_ones(200), LineDisparity(127));

@@ -1,19 +1,16 @@
 //! Signal quality from the places of the edges in the sample byte.
 
-/// Received signal strength of an answer, 0..=12: how far apart the edges in a bit time are.
-///
-/// 12 with no or one edge, else 2 (G - 2) for the longest gap G between neighbouring edges, counted round the eight
-/// sample periods; 0 for G <= 2.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-#[cfg_attr(feature = "arbitrary", derive(arbitrary::Arbitrary))]
-pub struct Rssi(u8);
+use crate::ranged::ranged;
+
+ranged! {
+    /// Received signal strength of an answer, 0..=12: how far apart the edges in a bit time are.
+    ///
+    /// 12 with no or one edge, else 2 (G - 2) for the longest gap G between neighbouring edges, counted round the eight
+    /// sample periods; 0 for G <= 2.
+    pub struct Rssi(0..=12);
+}
 
 impl Rssi {
-    /// The best.
-    pub const MAX: Self = Self(12);
-
     /// Of an edge byte, see [`edges`].
     ///
     /// ```
@@ -34,11 +31,6 @@ impl Rssi {
             Some(1..=2) => Self::MAX,
             _ => Self::of_edges(edges),
         }
-    }
-
-    /// The value, 0..=12.
-    pub const fn get(self) -> u8 {
-        self.0
     }
 }
 

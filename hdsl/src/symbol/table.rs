@@ -188,3 +188,28 @@ pub(crate) static FOUR_MORE_ZEROS: [u8; 8] = {
     }
     table
 };
+
+/// All words by the reduced rule: value, [`INVALID`] and [`SPECIAL`].
+pub(super) static REDUCED: [u16; 1024] = {
+    let mut table = [0; 1024];
+    let mut bits: u16 = 0;
+    while bits < 1024 {
+        let run_abcd = matches!(bits & 0b1111, 0 | 0b1111);
+        // e i f g h are bits 4..=8.
+        let run_eifgh = matches!(bits >> 4 & 0b1_1111, 0 | 0b1_1111);
+        let run_cdei = matches!(bits >> 2 & 0b1111, 0 | 0b1111);
+        // e in bit 4, i g h j in bits 5, 7, 8, 9.
+        let eighj = bits & 0b11_1011_0000;
+        let special = run_cdei || eighj == 0b11_1010_0000 || eighj == 0b00_0001_0000;
+        let mut entry = sub_blocks(bits) as u16;
+        if run_abcd || run_eifgh {
+            entry |= INVALID;
+        }
+        if special {
+            entry |= SPECIAL;
+        }
+        table[bits as usize] = entry;
+        bits += 1;
+    }
+    table
+};

@@ -7,7 +7,7 @@ use std::ops::Range;
 
 use hdsl::frame::{ANSWER_BITS, BIT_RATE, Head, Received};
 use hdsl::message::{LongAnswer, Request, Responder, ShortRequest};
-use hdsl::sampling::{Alignment, TEST_PATTERN};
+use hdsl::sampling::{Delay, TEST_PATTERN};
 use hdsl::{
     Answer, EncoderByte, EncoderId, EncoderSymbol, Error, MasterSymbol, Phase, PositionBits, PositionTracker,
     QualityEvent, QualityMonitor, QualityRule, Rule, VFrame, Window,
@@ -198,7 +198,7 @@ impl Decoder {
         out: &mut Output<'_>,
     ) -> Result<usize, Stop> {
         let line = |delay: u32| bits.window(from + delay as usize);
-        let delays = self.delay.into_iter().chain(0..=u32::from(Alignment::MAX_DELAY) + 1);
+        let delays = self.delay.into_iter().chain(0..=u32::from(Delay::MAX.get()) + 1);
         let Some((delay, score)) = delays.map(|d| (d, score(line(d)))).rev().max_by_key(|(_, score)| *score) else {
             return Ok(from);
         };
@@ -236,8 +236,8 @@ impl Decoder {
     }
 
     fn identifier(&mut self, window: Window, place: Place, out: &mut Output<'_>) -> Result<(), Stop> {
-        let id = Answer::parse(window, Rule::Strict).and_then(EncoderId::from_answer);
-        let fields = id.map_or_else(|_| Vec::new(), |id| vec![hex("ENC_ID", id.raw().into(), 5)]);
+        let id = Answer::parse(Rule::Strict, window).and_then(EncoderId::from_answer);
+        let fields = id.map_or_else(|_| Vec::new(), |id| vec![hex("ENC_ID", id.get().into(), 5)]);
         if let Ok(bits) = id.and_then(EncoderId::check) {
             *self = Self { delay: self.delay, tracker: PositionTracker::new(bits), ..Self::new() };
         }
@@ -246,7 +246,7 @@ impl Decoder {
     }
 
     fn normal(&mut self, window: Window, place: Place, out: &mut Output<'_>) -> Result<(), Stop> {
-        let Ok(answer) = Answer::parse(window, Rule::Strict) else { return Ok(()) };
+        let Ok(answer) = Answer::parse(Rule::Strict, window) else { return Ok(()) };
         let dd = answer.delta_delta();
         self.tracker.step(dd.ok());
         let parameter = answer.parameter();
@@ -274,7 +274,7 @@ impl Decoder {
 
     fn v_frame(&mut self, answer: Answer, vsync: bool, place: Place, out: &mut Output<'_>) -> Result<(), Stop> {
         if let Some(at) = self.at {
-            self.frame.put(at, answer, Rule::Strict);
+            self.frame.put(Rule::Strict, at, answer);
             if at == 7 {
                 self.quality.count(if vsync { QualityEvent::VsyncOk } else { QualityEvent::VsyncMissing });
                 self.end_v_frame(place, out)?;
@@ -346,7 +346,7 @@ impl Decoder {
             }),
             Request::Long(_) => LongAnswer::parse(&bytes).map(|answer| match answer.result {
                 Ok(data) => format!("resource {:03X}h: {:02X?}", answer.address.get(), data.as_bytes()),
-                Err(error) => format!("refused, class {:02X}h, detail {:02X}h", error.class, error.detail),
+                Err(error) => format!("refused, class {:02X}h, detail {:02X}h", error.class_code(), error.detail()),
             }),
         };
         let fields = result.as_ref().map_or_else(|_| Vec::new(), |what| vec![text("message", what.clone())]);
@@ -357,7 +357,7 @@ impl Decoder {
 
 /// How well an answer stands here: good words, switch bit, check of the acceleration; most for the test pattern.
 fn score(line: Window) -> usize {
-    let Ok(answer) = Answer::parse(line, Rule::Strict) else { return 0 };
+    let Ok(answer) = Answer::parse(Rule::Strict, line) else { return 0 };
     if line.bits() as u64 & ((1 << ANSWER_BITS) - 1) == TEST_PATTERN {
         return 20;
     }

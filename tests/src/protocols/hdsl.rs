@@ -1,5 +1,6 @@
 //! HIPERFACE DSL.
 
+mod bench;
 mod code;
 mod firmware;
 mod frame;
@@ -21,6 +22,7 @@ pub(crate) const TOPICS: &[(&str, Check)] = &[
     ("edges", frame::edges),
     ("ext_sync_seed", sync::ext_sync_seed),
     ("fast_position", position::fast_position),
+    ("fast_position_wrap", position::fast_position_wrap),
     ("fw_link", firmware::fw_link),
     ("fw_messages", firmware::fw_messages),
     ("fw_startup", firmware::fw_startup),
@@ -55,7 +57,7 @@ impl Line {
     }
 
     fn word(&self) -> Word {
-        Word::truncate(self.bits as u64)
+        Word::truncate(self.bits as u16)
     }
 }
 

@@ -2,7 +2,7 @@
 
 use hdsl::frame::{Extra, Head};
 use hdsl::rssi::{Rssi, edges as edge_byte, longest_gap};
-use hdsl::sampling::{Alignment, EdgeRule, SampleIndex, TEST_PATTERN};
+use hdsl::sampling::{Alignment, Delay, EdgeRule, SampleIndex, TEST_PATTERN};
 use hdsl::symbol::{Character, Reading, Rule};
 use hdsl::{Answer, Content, DeltaDelta, EncoderByte, Error, LineDisparity, ParameterByte, SafeBlock, VFrame};
 use serde::Deserialize;
@@ -22,13 +22,13 @@ enum MasterHeader {
 pub(super) fn master_header(rows: &[Row]) -> Vec<Verdict> {
     each(rows, |row: MasterHeader| match row {
         MasterHeader::Equalisation { d_in, eq, d_out } => {
-            same("eq and d_out", &(eq.bits as u8, LineDisparity(d_out)), &LineDisparity(d_in).equalisation())
+            same("eq and d_out", &(eq.bits as u8, LineDisparity::new(d_out)), &LineDisparity::new(d_in).equalisation())
         }
         MasterHeader::Free { param, d_in, bits, d_out } => {
             let byte = ParameterByte::new(param.0 as u8);
-            let (head, after) = Head::new(byte, None, LineDisparity(d_in));
+            let (head, after) = Head::new(byte, None, LineDisparity::new(d_in));
             same("bits", &bits.window(), &head.bits())?;
-            same("d_out", &LineDisparity(d_out), &after)?;
+            same("d_out", &LineDisparity::new(d_out), &after)?;
             same("param", &Ok(byte), &Head::parse(bits.window()).map(|got| got.byte))
         }
         MasterHeader::Sync { param, edge_eighths, window_bits, eq, para, samples } => {
@@ -105,13 +105,13 @@ pub(super) fn answer(rows: &[Row]) -> Vec<Verdict> {
     each(rows, |row: AnswerRow| {
         let line = row.bits.window();
         if row.truncated {
-            let error = match Answer::parse(line, Rule::Strict) {
+            let error = match Answer::parse(Rule::Strict, line) {
                 Err(Error::Truncated { .. }) => Some("truncated".to_owned()),
                 _ => None,
             };
             return same("error", &row.error, &error);
         }
-        let (Ok(strict), Ok(reduced)) = (Answer::parse(line, Rule::Strict), Answer::parse(line, Rule::Reduced)) else {
+        let (Ok(strict), Ok(reduced)) = (Answer::parse(Rule::Strict, line), Answer::parse(Rule::Reduced, line)) else {
             return same("accepted", &true, &false);
         };
         same("error", &row.error, &None)?;
@@ -169,9 +169,9 @@ fn safe_bytes(block: SafeBlock) -> [Hex; 3] {
 
 pub(super) fn vframe(rows: &[Row]) -> Vec<Verdict> {
     each(rows, |row: VFrameRow| {
-        let answers: Vec<_> = row.frames.iter().map(|f| Answer::from_bits(f.bits as u64, Rule::Reduced)).collect();
+        let answers: Vec<_> = row.frames.iter().map(|f| Answer::from_bits(Rule::Reduced, f.bits as u64)).collect();
         let Ok(answers) = <[Answer; 8]>::try_from(answers) else { return same("frames", &8, &row.frames.len()) };
-        let frame = VFrame::of(&answers, Rule::Reduced);
+        let frame = VFrame::of(Rule::Reduced, &answers);
         same("safe1", &row.safe1.as_str(), &safe_class(frame.safe1))?;
         same("summary, vpos, crc1", &[row.summary, row.vpos, row.crc1], &safe_bytes(frame.safe1))?;
         same("safe2", &row.safe2.as_str(), &safe_class(frame.safe2))?;
@@ -207,8 +207,8 @@ pub(super) fn learn(rows: &[Row]) -> Vec<Verdict> {
             let pattern = TEST_PATTERN ^ row.flip.map_or(0, |flip| 1 << flip);
             same("samples", &samples, &sampled(pattern, delay, samples.len()))?;
         }
-        let (index, delay, error) = match Alignment::learn(&samples, EdgeRule::All) {
-            Ok(found) => (Some(found.index.get()), Some(found.delay), None),
+        let (index, delay, error) = match Alignment::learn(EdgeRule::All, &samples) {
+            Ok(found) => (Some(found.index.get()), Some(found.delay.get()), None),
             Err(Error::PatternNotFound { index }) => (Some(index), None, Some("pattern_not_found")),
             Err(Error::NoEdge) => (None, None, Some("no_edge")),
             Err(_) => (None, None, Some("unexpected")),
@@ -241,8 +241,10 @@ pub(super) fn sampled_answer(rows: &[Row]) -> Vec<Verdict> {
             same("samples", &samples, &sampled(row.sent.bits as u64, row.delay_eighths, samples.len()))?;
         }
         let index = SampleIndex::new(row.time_index);
-        let Some(index) = index else { return same("time_index", &true, &false) };
-        let alignment = Alignment { index, delay: row.delay };
+        let (Some(index), Some(delay)) = (index, Delay::new(row.delay)) else {
+            return same("time_index, delay", &true, &false);
+        };
+        let alignment = Alignment { index, delay };
         let Ok(bits) = alignment.bits(&samples) else { return same("complete", &true, &false) };
         same("bits", &row.bits.bits, &bits.into())?;
         same("bit_errors", &row.bit_errors, &(u128::from(bits) ^ row.sent.bits).count_ones())?;

@@ -1,4 +1,4 @@
-//! A simulated line between master and encoder: delay, jitter, glitches, bit errors and the encoder's clock.
+//! A simulated cable between master and encoder: delay, jitter, glitches, bit errors and the encoder's clock.
 
 use nrz_line::Window;
 
@@ -25,22 +25,22 @@ pub struct Disturbance {
 
 impl Disturbance {
     /// A clean line of `metres`: 5 ns a metre each way, and most of a bit for encoder and transceivers.
-    pub const fn cable(metres: u32) -> Self {
+    pub const fn metres(metres: u32) -> Self {
         let delay = metres.saturating_mul(10).saturating_mul(3) / 40;
         Self { delay: delay.saturating_add(7), jitter: 0, glitches: 0, bit_errors: 0, clock_ppm: 0 }
     }
 }
 
-/// The line with its source of noise. The same seed gives the same noise.
+/// The cable with its source of noise. A seed gives always the same noise.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub struct Line {
+pub struct Cable {
     /// What happens to what passes.
     pub disturbance: Disturbance,
     noise: Noise,
 }
 
-impl Line {
+impl Cable {
     /// With a seed for the noise.
     pub const fn new(disturbance: Disturbance, seed: u64) -> Self {
         Self { disturbance, noise: Noise(seed.wrapping_mul(2).wrapping_add(1)) }
@@ -89,7 +89,7 @@ impl Line {
 
     /// Marks the samples at which the level changes, the first sample in bit 63 of the first word.
     fn edges(&mut self, bits: u64, words: &mut [u64; WORDS]) {
-        // Ones before and behind the answer.
+        // Ones before and after the answer.
         let line = u128::from(bits) << 1 | 1 | u128::MAX << ANSWER_BITS.wrapping_add(1);
         let mut changes = (line ^ line >> 1) & (1_u128 << ANSWER_BITS.wrapping_add(1)).wrapping_sub(1);
         let scale = i64::from(self.disturbance.clock_ppm).saturating_add(1_000_000);
@@ -166,7 +166,7 @@ mod tests {
     proptest! {
         #[test]
         fn a_clean_line_only_delays(bits in 0..1_u64 << 61, delay in 0..88_u32) {
-            let mut simulated = Line::new(Disturbance { delay, ..Disturbance::default() }, 1);
+            let mut simulated = Cable::new(Disturbance { delay, ..Disturbance::default() }, 1);
             prop_assert_eq!(simulated.up(Some(bits)), line(bits, delay));
             prop_assert_eq!(simulated.up(None), [0xff; WINDOW]);
         }
@@ -174,25 +174,25 @@ mod tests {
         /// Jitter of one sample never makes a bit error, wherever the receiver learned to sample.
         #[test]
         fn one_sample_of_jitter(bits in 0..1_u64 << 61, delay in 0..84_u32, seed: u64) {
-            let mut simulated = Line::new(Disturbance { delay, jitter: 1, ..Disturbance::default() }, seed);
-            let learned = Alignment::learn(&simulated.up(Some(TEST_PATTERN)), EdgeRule::Leading);
+            let mut simulated = Cable::new(Disturbance { delay, jitter: 1, ..Disturbance::default() }, seed);
+            let learned = Alignment::learn(EdgeRule::Leading, &simulated.up(Some(TEST_PATTERN)));
             prop_assert_eq!(learned.unwrap().bits(&simulated.up(Some(bits))), Ok(bits));
         }
 
         /// An encoder whose clock is 2000 ppm off is still read.
         #[test]
         fn clock_offset(bits in 0..1_u64 << 61, ppm in -2000..2000, seed: u64) {
-            let mut simulated = Line::new(Disturbance { delay: 20, clock_ppm: ppm, jitter: 1, ..Disturbance::default() }, seed);
-            let learned = Alignment::learn(&simulated.up(Some(TEST_PATTERN)), EdgeRule::Leading);
+            let mut simulated = Cable::new(Disturbance { delay: 20, clock_ppm: ppm, jitter: 1, ..Disturbance::default() }, seed);
+            let learned = Alignment::learn(EdgeRule::Leading, &simulated.up(Some(TEST_PATTERN)));
             prop_assert_eq!(learned.unwrap().bits(&simulated.up(Some(bits))), Ok(bits));
         }
     }
 
     #[test]
     fn rates_are_as_asked_for() {
-        let mut simulated = Line::new(Disturbance { bit_errors: 10_000, ..Disturbance::default() }, 7);
+        let mut simulated = Cable::new(Disturbance { bit_errors: 10_000, ..Disturbance::default() }, 7);
         let wrong: u32 = (0..2000).map(|_| (simulated.spoilt(0)).count_ones()).sum();
         assert!((1000..1450).contains(&wrong), "{wrong}");
-        assert_eq!(Disturbance::cable(100).delay, 82);
+        assert_eq!(Disturbance::metres(100).delay, 82);
     }
 }
