@@ -289,7 +289,8 @@ fn cmd_error_during_a_motion() {
 /// Blocks of another drive in this one's place are named, and so is a memory that holds no responses.
 #[test]
 fn why_the_echo_stands_still() {
-    let cases: [(fn(&mut Received), StopReason); 3] = [
+    type Spoil = fn(&mut Received);
+    let cases: [(Spoil, StopReason); 3] = [
         (|r| *r = Received::Nothing, StopReason::EchoTimeout),
         (
             |r| {
