@@ -193,6 +193,7 @@ impl core::fmt::Display for Feedback {
 }
 
 #[cfg(test)]
+#[allow(clippy::cast_sign_loss)]
 mod tests {
     use proptest::prelude::*;
     use std::vec::Vec;
