@@ -2,7 +2,7 @@
 
 use step_profile::{
     Arithmetic, Axes, Axis, Command, Dance, Direction, Error, Frequency, Group, Microstep, Motors, MoveState, Note,
-    OperatingMode, Parameters, PositionMode, PositionState, Profile, RampTable, Shape, Speed, RampStep, StepTime, Tone,
+    OperatingMode, Parameters, PositionMode, PositionState, Profile, RampStep, RampTable, Shape, Speed, StepTime, Tone,
     Turn, corrected, pru_exact, step_time_ns,
 };
 
