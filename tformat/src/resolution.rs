@@ -133,6 +133,11 @@ impl Resolution {
         self.signed_turns
     }
 
+    /// Whether bits above the widths are refused.
+    pub const fn checks_upper_bits(self) -> bool {
+        self.checks_upper_bits
+    }
+
     /// Pages of the EEPROM, 1..=8.
     pub const fn pages(self) -> u8 {
         self.pages
@@ -178,6 +183,14 @@ impl Resolution {
     ///
     /// # Errors
     /// [`Error::UpperBits`] of ABS, then of ABM.
+    ///
+    /// ABS and ABM are types of their own: exchanging them does not compile.
+    ///
+    /// ```compile_fail
+    /// # let (resolution, abs, abm) = (tformat::Resolution::new(17, 16)?, tformat::Abs::MAX, tformat::Abm::MAX);
+    /// resolution.position(abm, abs);
+    /// # Ok::<(), tformat::OutOfRange>(())
+    /// ```
     pub const fn position(self, abs: Abs, abm: Abm) -> Result<Position, Error> {
         match (self.single_turn(abs), self.turns(abm)) {
             (Ok(abs), Ok(turns)) => {

@@ -192,12 +192,12 @@ mod tests {
         Memory { adf: Adf::of(address, busy), edf }
     }
 
-    fn wrote(busy: bool, edf: u8) -> Result<Response, Error> {
-        Ok(Response::WriteEeprom(memory(ADDRESS, busy, edf)))
+    const fn wrote(busy: bool, edf: u8) -> Response {
+        Response::WriteEeprom(Memory { adf: Adf::of(ADDRESS, busy), edf })
     }
 
-    fn read(busy: bool, edf: u8) -> Result<Response, Error> {
-        Ok(Response::ReadEeprom(memory(ADDRESS, busy, edf)))
+    const fn read(busy: bool, edf: u8) -> Response {
+        Response::ReadEeprom(Memory { adf: Adf::of(ADDRESS, busy), edf })
     }
 
     fn send(request: Request, not_before_ns: u64) -> Step<u8> {
@@ -217,9 +217,9 @@ mod tests {
         assert_eq!(access.receive(selected, 10), send(CHECK, 10));
         let page = Ok(Response::ReadEeprom(memory(Address::PAGE_REGISTER, false, 2)));
         assert_eq!(access.receive(page, 15), send(WRITE, 15));
-        assert_eq!(access.receive(wrote(false, 0x5a), 20), send(READ, 20));
-        assert_eq!(access.receive(read(true, 0), 30), send(READ, 1030));
-        assert_eq!(access.receive(read(false, 0x5a), 1040), Step::Done { value: 0x5a, ready_ns: 1040 });
+        assert_eq!(access.receive(Ok(wrote(false, 0x5a)), 20), send(READ, 20));
+        assert_eq!(access.receive(Ok(read(true, 0)), 30), send(READ, 1030));
+        assert_eq!(access.receive(Ok(read(false, 0x5a)), 1040), Step::Done { value: 0x5a, ready_ns: 1040 });
     }
 
     /// An encoder that has no such page answers the selection and keeps another: nothing is written.
@@ -247,8 +247,8 @@ mod tests {
     fn a_byte_that_did_not_stick_is_an_error() {
         let mut access = EepromAccess::write(None, ADDRESS, 0x5a, POLLING);
         assert_eq!(access.start(0), send(WRITE, 0));
-        let _ = access.receive(wrote(false, 0x5a), 0);
-        let step = access.receive(read(false, 0xff), 7);
+        let _ = access.receive(Ok(wrote(false, 0x5a)), 0);
+        let step = access.receive(Ok(read(false, 0xff)), 7);
         assert_eq!(step, Step::Failed { error: Error::DataMismatch { got: 0xff, want: 0x5a }, ready_ns: 7 });
     }
 
@@ -259,7 +259,7 @@ mod tests {
             let mut access = EepromAccess::write(None, ADDRESS, 0x5a, POLLING);
             let _ = access.start(0);
             assert_eq!(access.receive(LOST, 0), send(READ, 1000));
-            let step = access.receive(read(false, holds), 1000);
+            let step = access.receive(Ok(read(false, holds)), 1000);
             let want = if holds == 0x5a { Step::Done { value: 0x5a, ready_ns: 1000 } } else { send(WRITE, 1000) };
             assert_eq!(step, want);
         }
@@ -278,15 +278,15 @@ mod tests {
 
         let mut access = EepromAccess::read(None, ADDRESS, POLLING);
         let _ = access.start(0);
-        let _ = access.receive(read(true, 0), 0);
+        let _ = access.receive(Ok(read(true, 0)), 0);
         let _ = access.receive(LOST, 0);
-        let end = access.receive(read(true, 0), 0);
+        let end = access.receive(Ok(read(true, 0)), 0);
         assert_eq!(end, Step::Failed { error: Error::Busy { tries: 3 }, ready_ns: 1000 });
 
         // A write to a busy memory was not taken.
         let mut access = EepromAccess::write(None, ADDRESS, 0x5a, Polling { max_tries: 1, ..POLLING });
         let _ = access.start(0);
-        let end = access.receive(wrote(true, 0x5a), 0);
+        let end = access.receive(Ok(wrote(true, 0x5a)), 0);
         assert_eq!(end, Step::Failed { error: Error::Busy { tries: 1 }, ready_ns: 1000 });
     }
 
@@ -301,7 +301,7 @@ mod tests {
         assert_eq!(access.receive(page, 0), send(READ, 0));
         let _ = access.receive(LOST, 0);
         let _ = access.receive(LOST, 0);
-        assert_eq!(access.receive(read(false, 7), 9), Step::Done { value: 7, ready_ns: 9 });
+        assert_eq!(access.receive(Ok(read(false, 7)), 9), Step::Done { value: 7, ready_ns: 9 });
     }
 
     /// A read is never taken for the answer to a write, nor the other way round.
@@ -309,7 +309,7 @@ mod tests {
     fn responses_of_the_other_kind_are_refused() {
         let mut access = EepromAccess::write(None, ADDRESS, 0x5a, POLLING);
         let _ = access.start(0);
-        assert_eq!(access.receive(read(false, 0x5a), 0), send(READ, 1000));
-        assert_eq!(access.receive(wrote(false, 0x5a), 0), send(READ, 1000));
+        assert_eq!(access.receive(Ok(read(false, 0x5a)), 0), send(READ, 1000));
+        assert_eq!(access.receive(Ok(wrote(false, 0x5a)), 0), send(READ, 1000));
     }
 }
