@@ -45,6 +45,12 @@ pub trait Line {
 
     /// The time up to which the recording was read, in picoseconds.
     fn reached(&self) -> i64;
+
+    /// Where the recording goes on, if there is a hole in it behind what was read last: nothing is known of the lines
+    /// from there to this time, in picoseconds.
+    fn gap(&mut self) -> Option<i64> {
+        None
+    }
 }
 
 /// An opened file.
