@@ -23,7 +23,7 @@ use servowire::talk::link::{Fault, Link};
 use servowire::talk::simulate;
 use servowire_world::{Cable, Kind, Rates, Scenario, Tally};
 use tformat::device::Device;
-use tformat::{Address, Almc, BitRate, Request, Response, U24};
+use tformat::{Abm, Abs, Address, Almc, BitRate, Request, Response};
 
 /// An encoder in a thread of its own at the other end of a pseudo-terminal.
 struct Bench {
@@ -87,7 +87,7 @@ fn hurt(scenario: Scenario, echo: bool) -> (Bench, TTYPort) {
                     master.write_all(&[*byte]).unwrap();
                 }
                 shaft += 1;
-                device.set_position(U24::truncate(shaft), U24::truncate(2));
+                device.set_position(Abs::truncate(shaft), Abm::truncate(2));
                 if let Some(answer) = device.byte(*byte, now_ns) {
                     for arrival in line.carry(answer.frame.as_bytes(), 0) {
                         thread::sleep(Duration::from_nanos(arrival.at_ns));

@@ -6,7 +6,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
 use tformat::device::Device;
-use tformat::{BitRate, Resolution, U24};
+use tformat::{Abm, Abs, BitRate, Resolution};
 
 use super::link::Fault;
 use super::port::Port;
@@ -54,7 +54,7 @@ pub fn run<P: Port>(mut port: P, encoder: Encoder, stop: Option<&AtomicBool>) ->
         let elapsed = begin.elapsed();
         let turned = elapsed.as_secs_f64() * rpm / 60.0 * f64::from(1_u32 << bits.min(24));
         let counts = turned as i64;
-        device.set_position(U24::truncate(counts as u32), U24::truncate((counts >> bits) as u32));
+        device.set_position(Abs::truncate(counts as u32), Abm::truncate((counts >> bits) as u32));
         if Instant::now() > echo_until {
             echo.clear();
         }
