@@ -48,8 +48,9 @@ impl Cli {
 /// frames good; 1: a frame was refused or a file could not be decoded; 2: wrong use.
 #[derive(Debug, Args)]
 pub struct Decode {
-    /// VCD, Saleae CSV, Saleae binary (version 0); raw samples with --rate; hex bytes with --bytes; - for the standard
-    /// input. Without a file the captures that come with the program are decoded.
+    /// VCD, FST, sigrok and DSView sessions, Saleae exports, CSV of analysers and oscilloscopes, pcapng, also packed by
+    /// gzip or zstd; raw samples with --rate; hex bytes with --bytes; - for the standard input. Without a file, what
+    /// comes through a pipe, else the captures that come with the program.
     pub files: Vec<PathBuf>,
     /// What is spoken on the line; otherwise every protocol is tried on every channel, and each line found is decoded.
     #[arg(short, long, value_enum, default_value_t = Protocol::Auto)]
@@ -99,6 +100,9 @@ pub struct FileArgs {
     /// The files are binary records of this many bytes, a burst each.
     #[arg(long, value_name = "BYTES", value_parser = clap::value_parser!(u16).range(1..), conflicts_with_all = ["rate", "bytes"])]
     pub record_size: Option<u16>,
+    /// Voltage above which a column of an oscilloscope's table is high; otherwise half-way between its levels.
+    #[arg(long, value_name = "VOLTS", allow_negative_numbers = true)]
+    pub threshold: Option<f64>,
 }
 
 /// How the line is to be taken.
@@ -172,6 +176,7 @@ impl Decode {
             sample_rate: self.file.rate,
             unit_size: usize::from(self.file.unit_size),
             record_size: self.file.record_size.map(usize::from),
+            threshold: self.file.threshold,
         }
     }
 

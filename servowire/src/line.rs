@@ -126,10 +126,10 @@ pub fn decode(
                 false
             }
         };
-        watch.changes(&changes, out)?;
         if let Some(time) = line.gap() {
             watch.gap(time, out)?;
         }
+        watch.changes(&changes, out)?;
         out.tick();
         if !more {
             break;

@@ -87,7 +87,8 @@ impl<P: StartStop> LineDecoder for StartStopLine<P> {
 
     fn gap(&mut self, time: i64, out: &mut dyn Sink) -> io::Result<()> {
         self.finish(time, out)?;
-        self.protocol.begin(time);
+        self.receiver = EdgeReceiver::new(self.bit as f64, P::CONTENT_BITS);
+        self.begun = false;
         Ok(())
     }
 
@@ -119,14 +120,10 @@ impl Wires {
         Self { taps: taps.to_vec(), levels: vec![None; taps.len()], level: None }
     }
 
-    /// The taps.
-    pub fn taps(&self) -> &[Tap] {
-        &self.taps
-    }
-
-    /// Whether a channel belongs here.
-    pub fn has(&self, channel: u16) -> bool {
-        self.taps.iter().any(|tap| tap.channel == channel)
+    /// Nothing is known of the levels any more.
+    pub fn forget(&mut self) {
+        self.levels.fill(None);
+        self.level = None;
     }
 
     /// The level of the line behind a change of a channel, where it changes.

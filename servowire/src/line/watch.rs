@@ -153,6 +153,7 @@ impl<'a> Watch<'a> {
         for (line, running) in self.lines.iter_mut().enumerate() {
             out.lane(line)?;
             running.decoder.gap(time, out)?;
+            running.wires.forget();
         }
         Ok(())
     }
