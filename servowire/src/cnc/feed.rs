@@ -43,13 +43,13 @@ impl Feed {
 
     /// The words of the next cycle.
     pub(super) fn next(&mut self, program: &mut Program, words: &mut [Pto]) {
-        if self.rate == 1.0 && self.target == 1.0 && self.done == 0.0 {
+        if self.rate >= 1.0 && self.target >= 1.0 && self.done == 0.0 {
             program.next(words);
             return;
         }
         let before = self.rate;
         self.rate += (self.target - before).clamp(-SLOPE, SLOPE);
-        let rate = (before + self.rate) / 2.0;
+        let rate = f64::midpoint(before, self.rate);
         for (to, word) in words.iter_mut().zip(&self.words) {
             *to = rest(*word);
         }

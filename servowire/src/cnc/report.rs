@@ -48,7 +48,7 @@ pub(super) fn start_up(out: &mut dyn Write, line: &Line) -> io::Result<()> {
     let budget = line.setup.timing().budget();
     let limit = match budget.limit() {
         Limit::MasterFrame => "the master frame's way out",
-        _ => "the device frames' way back",
+        Limit::DeviceFrames => "the device frames' way back",
     };
     writeln!(
         out,
