@@ -6,6 +6,7 @@ pub const AVERAGE: u8 = 16;
 /// What the device does to its counter. The IEP counter adds 5 each 5 ns tick, so it counts nanoseconds.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum Correction {
     /// Nothing.
     None,

@@ -163,7 +163,7 @@ impl Line {
                     self.start_up(frame, at_ns, record);
                     return Some(Progress::StartUp);
                 }
-                Action::Exchange { at_ns, time_stamp, cycle } => {
+                Action::Exchange { at_ns, time_stamp, cycle, .. } => {
                     self.first_cycle_ns.get_or_insert(at_ns);
                     self.cycle(at_ns, time_stamp, cycle, words(), record);
                     return Some(Progress::Cycle);
@@ -207,13 +207,13 @@ impl Line {
             *sent += 1;
         }
         let mut buffer = [0; Discovery::LEN];
-        let len = frame.write(&mut buffer).unwrap_or_default();
+        let len = frame.emit_into(&mut buffer).unwrap_or_default();
         let bytes = buffer.get(..len).unwrap_or_default();
         record.start_up(at_ns, frame.preamble(), bytes, false);
         if let Some((answer, sof_ns)) = self.carry(bytes, at_ns) {
             record.start_up(sof_ns, frame.preamble(), &answer, true);
             // What the master refuses, it counts.
-            let _: Result<_, _> = self.master.received(&answer, sof_ns);
+            let _: Result<_, _> = self.master.receive(&answer, sof_ns);
         }
     }
 
@@ -280,7 +280,7 @@ impl Line {
             // Both captures are on the 5 ns grid, so the measured time varies by a tick.
             let sent = node.counter.read(at_ns);
             let rtt = node.counter.read(at_ns + 2 * cable + DEVICE_REFLECTION_NS).wrapping_sub(sent);
-            let _: Result<_, _> = node.device.delay_reflection(&frame, rtt, trigger);
+            let _: Result<_, _> = node.device.delay_reflection(trigger, &frame, rtt);
         }
     }
 
@@ -345,7 +345,7 @@ impl Line {
                 continue;
             };
             let mut frame = [0; DeviceFrame::<3>::LEN];
-            if answer.emit(&mut frame).is_err() {
+            if answer.emit_into(&mut frame).is_err() {
                 continue;
             }
             for _ in 0..=k {

@@ -60,7 +60,7 @@ impl Recorder {
         if !self.wants() {
             return;
         }
-        let name = frame.get(2).copied().and_then(FrameType::from_code).map_or("?", name);
+        let name = frame.get(2).copied().and_then(FrameType::from_code).map_or("?", FrameType::name);
         self.frame(at_ns, preamble.bytes().len(), frame, answer, name, ETHERNET);
     }
 
@@ -115,16 +115,6 @@ impl Recorder {
             self.keep(result);
         }
         self.failure.map_or(Ok(()), Err)
-    }
-}
-
-const fn name(frame_type: FrameType) -> &'static str {
-    match frame_type {
-        FrameType::Discovery => "DISCOVERY",
-        FrameType::Param => "PARAM",
-        FrameType::DelayReq => "DELAY_REQ",
-        FrameType::Sync => "SYNC",
-        _ => "other",
     }
 }
 

@@ -85,7 +85,7 @@ pub(super) fn end(out: &mut dyn Write, line: &Line) -> io::Result<()> {
             100.0 * bad as f64 / asked.max(1) as f64
         )?;
     }
-    let refused: u64 = line.nodes.iter().map(|node| u64::from(node.device.counters().crc_errors)).sum();
+    let refused: u64 = line.nodes.iter().map(|node| node.device.counters().crc_errors).sum();
     let stamps: u64 = line.nodes.iter().map(|node| node.bad_stamps).sum();
     let undetected: u64 = line.nodes.iter().map(|node| node.undetected).sum();
     writeln!(
