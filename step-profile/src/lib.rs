@@ -14,6 +14,7 @@ mod frequency;
 mod group;
 mod interval;
 mod microstep;
+pub mod motion;
 mod position;
 mod profile;
 pub mod pru_exact;

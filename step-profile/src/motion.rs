@@ -1,0 +1,21 @@
+//! Motion that a machine can use: trapezoids and S-curves within limits of speed, acceleration and jerk, in integers.
+
+mod curve;
+mod cycle;
+mod homing;
+mod limits;
+mod mover;
+mod path;
+mod phases;
+mod plan;
+mod planner;
+mod real;
+mod slope;
+mod stepper;
+
+pub use cycle::{PtoMover, Reload, Reloads};
+pub use homing::{Homing, HomingConfig, HomingState};
+pub use limits::{Clock, Limits};
+pub use mover::{Mover, Pulse};
+pub use path::{AxisPulse, AxisSetup, LinePulses, Path};
+pub use plan::{Plan, Pulses, State};

@@ -1,0 +1,136 @@
+//! Pieces of constant jerk, one after the other.
+
+use super::real::{Real, THIRD};
+use super::slope::Slope;
+
+/// What the acceleration of a piece does.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Bend {
+    /// It grows from its start.
+    Growing,
+    /// It keeps its size, maybe 0.
+    Flat,
+    /// It becomes less.
+    Fading,
+}
+
+/// A piece of constant jerk: its state at its begin.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Piece {
+    /// Begin, on the curve's time.
+    pub(super) time: Real,
+    /// Distance from the begin of the curve.
+    pub(super) p: Real,
+    pub(super) v: Real,
+    /// Size of the acceleration.
+    pub(super) a: Real,
+    /// Size of the jerk.
+    pub(super) j: Real,
+    /// The acceleration speeds up.
+    pub(super) up: bool,
+    pub(super) bend: Bend,
+}
+
+impl Piece {
+    /// Speed and distance `t` before the begin, as if the piece had begun then. `t` is less than a tick.
+    pub(super) fn before(&self, t: Real) -> (Real, Real) {
+        let Self { v, a, j, up, bend, .. } = *self;
+        let shrinking = bend == Bend::Fading;
+        let dv = (a * t).along(j * t.squared().half(), shrinking);
+        let bow = (a.half().along(j * t * THIRD.half(), shrinking)) * t.squared();
+        (v.along(dv, !up), (v * t).along(bow, !up))
+    }
+
+    /// The state `t` after the begin.
+    pub(super) fn after(&self, t: Real) -> Self {
+        let Self { time, p, v, a, j, up, bend } = *self;
+        let growing = bend != Bend::Fading;
+        let speed = a * t;
+        let bent = j * t.squared().half();
+        let dv = speed.along(bent, growing);
+        let dp = (speed.half().along(bent * THIRD, growing)) * t;
+        Self {
+            time: time + t,
+            p: p + (v * t).along(dp, up),
+            v: v.along(dv, up),
+            a: a.along(j * t, growing),
+            j,
+            up,
+            bend,
+        }
+    }
+}
+
+/// Up to eight pieces: back to acceleration 0, a slope, a cruise, a slope.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Curve {
+    pieces: [Piece; Curve::MAX],
+    len: usize,
+    /// Where the next piece begins.
+    pub(super) time: Real,
+    pub(super) p: Real,
+    /// Time of the curve that was over before it was planned, and the distance made in it.
+    pub(super) skipped: (Real, Real),
+}
+
+impl Curve {
+    pub(super) const MAX: usize = 8;
+
+    pub(super) const fn new() -> Self {
+        let none = Piece {
+            time: Real::ZERO,
+            p: Real::ZERO,
+            v: Real::ZERO,
+            a: Real::ZERO,
+            j: Real::ZERO,
+            up: true,
+            bend: Bend::Flat,
+        };
+        Self { pieces: [none; Self::MAX], len: 0, time: Real::ZERO, p: Real::ZERO, skipped: (Real::ZERO, Real::ZERO) }
+    }
+
+    pub(super) fn pieces(&self) -> &[Piece] {
+        self.pieces.get(..self.len).unwrap_or(&[])
+    }
+
+    /// Adds a piece; one without duration is left out.
+    pub(super) fn push(&mut self, lasts: Real, [v, a, j]: [Real; 3], up: bool, bend: Bend) {
+        if lasts.is_zero() {
+            return;
+        }
+        let piece = Piece { time: self.time, p: self.p, v, a, j, up, bend };
+        let end = piece.after(lasts);
+        if let Some(place) = self.pieces.get_mut(self.len) {
+            *place = piece;
+            self.len = self.len.saturating_add(1);
+        }
+        (self.time, self.p) = (end.time, end.p);
+    }
+
+    /// Adds a change of speed.
+    pub(super) fn slope(&mut self, slope: &Slope) {
+        let Slope { from, to, edge, flat } = *slope;
+        let (up, dv) = (to > from, from.distance(to));
+        if dv.is_zero() {
+            return;
+        }
+        let end = self.p + slope.distance();
+        let a = dv / (edge + flat);
+        let j = if edge.is_zero() { Real::ZERO } else { a / edge };
+        let bent = (a * edge).half();
+        self.push(edge, [from, Real::ZERO, j], up, Bend::Growing);
+        self.push(flat, [from.along(bent, up), a, Real::ZERO], up, Bend::Flat);
+        self.push(edge, [to.along(bent, !up), a, j], up, Bend::Fading);
+        self.p = end;
+    }
+
+    /// Adds a stretch at constant speed.
+    pub(super) fn cruise(&mut self, v: Real, distance: Real) {
+        if distance.is_zero() || v.is_zero() {
+            return;
+        }
+        let end = self.p + distance;
+        self.push(distance / v, [v, Real::ZERO, Real::ZERO], true, Bend::Flat);
+        self.p = end;
+    }
+}

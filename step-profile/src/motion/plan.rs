@@ -1,0 +1,182 @@
+//! A move that is planned as a whole.
+
+use core::fmt;
+use core::iter::FusedIterator;
+
+use super::limits::{Bounds, Clock, Limits};
+use super::phases::{self, Frame, Phases, steps};
+use super::planner::{Goal, Motion, plan};
+use super::real::Real;
+use super::stepper::Stepper;
+use crate::error::Error;
+
+/// A move of a number of steps: the fastest within its limits.
+///
+/// ```
+/// use step_profile::motion::{Clock, Limits, Plan};
+/// let limits = Limits::new(250_000, 2_000_000)?.with_jerk(40_000_000)?;
+/// let plan = Plan::new(Clock::MICROSECONDS, limits, 51_200)?;
+/// assert_eq!(plan.duration(), 379_800); // µs
+/// assert_eq!(plan.pulses().count(), 51_200);
+/// # Ok::<_, Box<dyn std::error::Error>>(())
+/// ```
+#[derive(Debug, Clone)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Plan {
+    clock: Clock,
+    phases: Phases,
+}
+
+impl Plan {
+    /// From rest to rest.
+    ///
+    /// # Errors
+    /// [`Error::SpeedAboveClock`] if two steps could fall into one tick, [`Error::TooManySteps`] above 2^31 - 1.
+    pub fn new(clock: Clock, limits: Limits, steps: u32) -> Result<Self, Error> {
+        Self::between(clock, limits, steps, 0, 0)
+    }
+
+    /// From an entry speed to an exit speed, in steps/s; each at most the greatest speed. Acceleration is 0 at both ends.
+    ///
+    /// A speed that is not 0 at a standstill (a *start speed*) shortens the first step; the motor has to be able to
+    /// follow it without a ramp.
+    ///
+    /// # Errors
+    /// As [`new`](Self::new), and [`Error::TooShort`] if the change of speed needs more steps.
+    pub fn between(clock: Clock, limits: Limits, steps: u32, entry: u32, exit: u32) -> Result<Self, Error> {
+        let bounds = checked(clock, limits)?;
+        let to = position(steps)?;
+        let speed = |hz: u32| (Real::new(hz.into()) / Real::new(clock.moments().into())).min(bounds.v);
+        let goal = Goal::At(Real::new(steps.into()), speed(exit));
+        let curve = plan(Motion::steady(speed(entry)), goal, &bounds).map_err(|need| too_short(steps, need))?;
+        let frame = Frame {
+            begin: 0,
+            from: 0,
+            to: Some(to),
+            grid: clock.grid(),
+            offset: Real::ZERO,
+            scale: Real::new(1),
+            endless: false,
+        };
+        Ok(Self { clock, phases: Phases::new(&curve, &frame) })
+    }
+
+    /// The clock of the ticks.
+    pub const fn clock(&self) -> Clock {
+        self.clock
+    }
+
+    /// From the start to the standstill (or the exit speed), in ticks.
+    pub const fn duration(&self) -> u64 {
+        self.clock.tick(self.phases.end())
+    }
+
+    /// The steps.
+    pub fn steps(&self) -> u32 {
+        steps(self.phases.last())
+    }
+
+    /// The ticks of the steps, the first one first.
+    pub fn pulses(&self) -> Pulses<'_> {
+        Pulses { plan: self, stepper: Stepper::new(self.clock.grid()) }
+    }
+
+    /// Where the move is and how fast, at a tick after its start.
+    pub fn at(&self, tick: u64) -> State {
+        State::new(self.clock, self.phases.at(self.clock.moment(tick)))
+    }
+
+    /// Begins of the phases of constant jerk, and the end, in ticks.
+    pub fn corners(&self) -> impl Iterator<Item = u64> {
+        let ticks = self.phases.all().iter().map(|phase| self.clock.tick(phase.since));
+        ticks.chain([self.duration()])
+    }
+}
+
+/// The ticks of the steps of a [`Plan`], counted from its start. Step k falls where the position passes k - 1/2.
+#[derive(Debug, Clone)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Pulses<'p> {
+    plan: &'p Plan,
+    stepper: Stepper,
+}
+
+impl Iterator for Pulses<'_> {
+    type Item = u64;
+
+    #[inline]
+    fn next(&mut self) -> Option<u64> {
+        self.stepper.next(&self.plan.phases).map(|moment| self.plan.clock.tick(moment))
+    }
+
+    fn size_hint(&self) -> (usize, Option<usize>) {
+        let left = self.plan.steps().saturating_sub(self.stepper.count());
+        let left = usize::try_from(left).ok();
+        (left.unwrap_or(usize::MAX), left)
+    }
+}
+
+impl FusedIterator for Pulses<'_> {}
+
+/// Position, speed, acceleration and jerk at a tick.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct State {
+    /// In 2^-32 steps.
+    pub position: i64,
+    /// In 2^-16 steps/s.
+    pub speed: i64,
+    /// In 2^-16 steps/s².
+    pub acceleration: i64,
+    /// In 2^-16 steps/s³.
+    pub jerk: i64,
+}
+
+impl State {
+    pub(super) fn new(clock: Clock, state: phases::State) -> Self {
+        let second = Real::new(clock.moments().into());
+        let unit = |x: i64, bits: i32, per: Real| {
+            let size = (Real::fixed(x.unsigned_abs(), bits) * per).to_fixed(16);
+            let size = i64::try_from(size).unwrap_or(i64::MAX);
+            if x < 0 { size.wrapping_neg() } else { size }
+        };
+        Self {
+            position: state.p,
+            speed: unit(state.v, phases::V, second),
+            acceleration: unit(state.a, phases::A, second.squared()),
+            jerk: unit(state.j6, phases::J, Real::new(6) * second.squared() * second),
+        }
+    }
+}
+
+/// `12.250 steps, 800 steps/s, -4000 steps/s²`.
+impl fmt::Display for State {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let thousandths = i128::from(self.position).saturating_mul(1000) >> 32;
+        let (sign, size) = (if thousandths < 0 { "-" } else { "" }, thousandths.unsigned_abs());
+        let (whole, part) = (size / 1000, size % 1000);
+        let (speed, acceleration) = (self.speed >> 16, self.acceleration >> 16);
+        write!(f, "{sign}{whole}.{part:03} steps, {speed} steps/s, {acceleration} steps/s²")
+    }
+}
+
+/// Half the clock at most, so that each tick has one step.
+pub(super) fn checked(clock: Clock, limits: Limits) -> Result<Bounds, Error> {
+    let limit = clock.hz() / 2;
+    if limits.speed() > limit {
+        return Err(Error::SpeedAboveClock { speed: limits.speed(), limit });
+    }
+    Ok(limits.bounds(clock))
+}
+
+/// A number of steps as a position.
+pub(super) fn position(steps: u32) -> Result<i64, Error> {
+    let limit = u32::MAX / 2;
+    if steps > limit { Err(Error::TooManySteps { steps, limit }) } else { Ok(i64::from(steps) << 32) }
+}
+
+pub(super) fn too_short(steps: u32, need: Real) -> Error {
+    let whole = (need - Real::fixed(1, 16)).to_fixed(0).saturating_add(1);
+    Error::TooShort { steps, needed: u32::try_from(whole).unwrap_or(u32::MAX) }
+}

@@ -1,0 +1,252 @@
+//! The fastest curve from a state to a speed, over a distance or without end.
+//!
+//! All curves are made of slopes between speeds at acceleration 0. A state with an acceleration lies on a slope that began
+//! earlier, at its *virtual start*, so a curve may begin in the middle of a slope. Only where the acceleration has to change
+//! its sign it is brought to 0 first.
+
+use super::curve::{Bend, Curve};
+use super::limits::{Bounds, Jerk};
+use super::real::{Real, THIRD};
+use super::slope::{Slope, distance};
+
+/// Speed and acceleration.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Motion {
+    pub(super) v: Real,
+    /// Size of the acceleration.
+    pub(super) a: Real,
+    /// The acceleration speeds up.
+    pub(super) up: bool,
+}
+
+impl Motion {
+    pub(super) const fn steady(v: Real) -> Self {
+        Self { v, a: Real::ZERO, up: true }
+    }
+}
+
+/// Where a curve leads.
+#[derive(Debug, Clone, Copy)]
+pub(super) enum Goal {
+    /// This far, with this speed at the end.
+    At(Real, Real),
+    /// To this speed, wherever that is.
+    Speed(Real),
+}
+
+/// Distances may be this much too short, in steps: what rounding leaves.
+const SLACK: Real = Real::fixed(1, 16);
+
+/// The speed at which an endless curve ends is cruised for this many moments.
+pub(super) const ENDLESS: Real = Real::fixed(1, -60);
+
+/// The curve; or the least distance that is needed, if there is not as much.
+pub(super) fn plan(start: Motion, goal: Goal, bounds: &Bounds) -> Result<Curve, Real> {
+    match bounds.jerk {
+        Some(jerk) if !start.a.is_zero() => {
+            let bend = Bent::new(start, jerk);
+            if start.up { rising(start, &bend, goal, bounds) } else { falling(start, &bend, goal, bounds) }
+        }
+        _ => {
+            let mut curve = Curve::new();
+            steady(&mut curve, start.v, goal, bounds).map(|()| curve)
+        }
+    }
+}
+
+/// What an acceleration under way means.
+struct Bent {
+    jerk: Jerk,
+    /// Time since the virtual start, and time until the acceleration is back at 0.
+    edge: Real,
+    /// Speed and distance back to the virtual start.
+    base: (Real, Real),
+    /// Speed and distance ahead when the acceleration is back at 0.
+    coast: (Real, Real),
+}
+
+impl Bent {
+    fn new(Motion { v, a, up }: Motion, jerk: Jerk) -> Self {
+        let edge = a / jerk.j;
+        let dv = (a * edge).half();
+        let bow = a * edge.squared() * THIRD;
+        let (base, coast) = (v.along(dv, !up), v.along(dv, up));
+        Self {
+            jerk,
+            edge,
+            base: (base, (base * edge).along(bow.half(), up)),
+            coast: (coast, (v * edge).along(bow, up)),
+        }
+    }
+
+    /// A curve that has begun at the virtual start.
+    fn on_the_slope(&self) -> Curve {
+        let mut curve = Curve::new();
+        curve.skipped = (self.edge, self.base.1);
+        curve
+    }
+
+    /// A curve that brings the acceleration to 0.
+    fn coasting(&self, start: Motion) -> Curve {
+        let mut curve = Curve::new();
+        curve.push(self.edge, [start.v, start.a, self.jerk.j], start.up, Bend::Fading);
+        curve.p = self.coast.1;
+        curve
+    }
+}
+
+/// Further up the slope if the goal asks for it, else back to acceleration 0 and on from there.
+fn rising(start: Motion, bent: &Bent, goal: Goal, bounds: &Bounds) -> Result<Curve, Real> {
+    let from_base = match goal {
+        Goal::At(n, exit) => Goal::At(n + bent.base.1, exit),
+        speed @ Goal::Speed(_) => speed,
+    };
+    if let Ok(top) = top(bent.base.0, from_base, bounds) {
+        if top >= bent.coast.0 {
+            let mut curve = bent.on_the_slope();
+            return steady(&mut curve, bent.base.0, from_base, bounds).map(|()| curve);
+        }
+    }
+    coast(start, bent, goal, bounds)
+}
+
+fn coast(start: Motion, bent: &Bent, goal: Goal, bounds: &Bounds) -> Result<Curve, Real> {
+    let mut curve = bent.coasting(start);
+    let rest = match goal {
+        Goal::At(n, _) if n + SLACK < bent.coast.1 => {
+            return Err(bent.coast.1 + distance(bent.coast.0, Real::ZERO, bounds));
+        }
+        Goal::At(n, exit) => Goal::At(n - bent.coast.1, exit),
+        speed @ Goal::Speed(_) => speed,
+    };
+    steady(&mut curve, bent.coast.0, rest, bounds).map_err(|need| need + bent.coast.1)?;
+    Ok(curve)
+}
+
+/// Off the slope if the goal leaves room for it, else further down it: at least to the speed that the brake has reached,
+/// and as little below as the distance allows.
+fn falling(start: Motion, bent: &Bent, goal: Goal, bounds: &Bounds) -> Result<Curve, Real> {
+    let ((base, back), (low, _)) = (bent.base, bent.coast);
+    let (target, exit) = match goal {
+        Goal::Speed(v) if v < low => {
+            let mut curve = bent.on_the_slope();
+            steady(&mut curve, base, goal, bounds)?;
+            return Ok(curve);
+        }
+        Goal::At(n, exit) => (n + back, exit),
+        Goal::Speed(_) => return coast(start, bent, goal, bounds),
+    };
+    if bounds.v >= low {
+        if let Ok(curve) = coast(start, bent, goal, bounds) {
+            return Ok(curve);
+        }
+    }
+    let least = distance(base, exit, bounds);
+    if least > target + SLACK {
+        return Err(least - back);
+    }
+    let need = |v| distance(base, v, bounds) + distance(v, exit, bounds);
+    let high = low.min(bounds.v).max(exit);
+    let v = crossing(exit, high, target, need);
+    let mut curve = bent.on_the_slope();
+    finish(&mut curve, [base, v, exit], target, bounds);
+    Ok(curve)
+}
+
+/// Slope, cruise, slope.
+fn finish(curve: &mut Curve, [from, top, exit]: [Real; 3], n: Real, bounds: &Bounds) {
+    let (up, down) = (Slope::new(from, top, bounds), Slope::new(top, exit, bounds));
+    curve.slope(&up);
+    curve.cruise(top, n - (up.distance() + down.distance()));
+    curve.slope(&down);
+}
+
+/// From a speed at acceleration 0.
+fn steady(curve: &mut Curve, from: Real, goal: Goal, bounds: &Bounds) -> Result<(), Real> {
+    match goal {
+        Goal::At(n, exit) => {
+            let top = top(from, goal, bounds)?;
+            finish(curve, [from, top, exit], n, bounds);
+        }
+        Goal::Speed(v) => {
+            curve.slope(&Slope::new(from, v, bounds));
+            curve.cruise(v, v * ENDLESS);
+        }
+    }
+    Ok(())
+}
+
+/// The speed between the two slopes.
+fn top(from: Real, goal: Goal, bounds: &Bounds) -> Result<Real, Real> {
+    let (n, exit) = match goal {
+        Goal::At(n, exit) => (n, exit),
+        Goal::Speed(v) => return Ok(v),
+    };
+    let least = distance(from, exit, bounds);
+    if least > n + SLACK {
+        return Err(least);
+    }
+    let need = |v| distance(from, v, bounds) + distance(v, exit, bounds);
+    if need(bounds.v) <= n {
+        return Ok(bounds.v);
+    }
+    let low = from.max(exit);
+    if low >= bounds.v {
+        return Ok(low);
+    }
+    // Without a jerk limit: v² = a n + (v0² + v1²) / 2. With one it is less.
+    let sum = bounds.a * n + (from.squared() + exit.squared()).half();
+    let Some(jerk) = bounds.jerk else { return Ok(sum.sqrt().min(bounds.v).max(low)) };
+    // Both slopes reach the greatest acceleration: v² + (a²/j) v = sum - (v0 + v1) a²/2j.
+    let knee = jerk.knee.half();
+    let rest = sum - (from + exit) * knee;
+    let v = rest / (knee + (knee.squared() + rest).sqrt());
+    if v >= low + jerk.knee {
+        return Ok(v);
+    }
+    // Each slope takes at least dv sqrt(dv / j), both together just n if they begin and end at rest and only jerk.
+    let steep = (n.squared() * jerk.j).scaled(-2).cbrt();
+    let high = (low + steep).min(sum.sqrt()).min(bounds.v);
+    Ok(crossing(low, high, n, need))
+}
+
+/// The greatest speed from which `to` can be reached within `n`, or the greatest that can be reached from it.
+pub(super) fn greatest(to: Real, n: Real, bounds: &Bounds) -> Real {
+    let most = (to.squared() + (bounds.a * n).scaled(1)).sqrt().min(bounds.v).max(to);
+    match bounds.jerk {
+        None => most,
+        Some(_) => crossing(to, most, n, |v| distance(v, to, bounds)),
+    }
+}
+
+/// The largest argument between `low` and `high`, as near as it matters, at which `need` is not above `n`. It is not at
+/// `low`. False position, with the end that stays weighed less (Illinois) and halving in between.
+fn crossing(low: Real, high: Real, n: Real, need: impl Fn(Real) -> Real) -> Real {
+    let top = need(high);
+    if top <= n {
+        return high;
+    }
+    let (mut low, mut high) = (low, high);
+    let mut left = n - need(low);
+    let (mut below, mut above) = (left, top - n);
+    for round in 0..40_u8 {
+        let width = high - low;
+        if left.scaled(14) <= n || width.scaled(40) <= high {
+            break;
+        }
+        let part = if round % 4 == 3 { width.half() } else { width * (below / (below + above)) };
+        let middle = low + part;
+        let got = need(middle);
+        if got <= n {
+            left = n - got;
+            below = left;
+            low = middle;
+            above = above.half();
+        } else {
+            above = got - n;
+            high = middle;
+            below = below.half();
+        }
+    }
+    low
+}

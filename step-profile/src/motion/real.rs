@@ -1,0 +1,294 @@
+//! Numbers for planning: what a float is, in integers alone.
+
+use core::cmp::Ordering;
+use core::ops::{Add, Div, Mul, Sub};
+
+/// A number from 0 upwards with 64 significant bits: `m · 2^e`, the top bit of `m` set, or 0.
+///
+/// Results keep 60 bits at least. A difference below 0 is 0, and a quotient by 0 is 2^1000; nothing
+/// can overflow or panic.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub(super) struct Real {
+    m: u64,
+    e: i32,
+}
+
+impl Real {
+    pub(super) const ZERO: Self = Self { m: 0, e: 0 };
+    /// Larger than anything a plan knows.
+    pub(super) const HUGE: Self = Self { m: 1 << 63, e: 937 };
+
+    /// A whole number.
+    pub(super) const fn new(n: u64) -> Self {
+        Self::fixed(n, 0)
+    }
+
+    /// `n · 2^-bits`.
+    pub(super) const fn fixed(n: u64, bits: i32) -> Self {
+        if n == 0 {
+            return Self::ZERO;
+        }
+        let zeros = n.leading_zeros();
+        Self { m: n << zeros, e: 0_i32.saturating_sub_unsigned(zeros).saturating_sub(bits) }
+    }
+
+    /// In units of `2^-bits`, truncated; the largest number if it does not fit.
+    pub(super) const fn to_fixed(self, bits: i32) -> u64 {
+        let shift = self.e.saturating_add(bits);
+        match shift {
+            _ if self.m == 0 => 0,
+            0 => self.m,
+            1.. => u64::MAX,
+            _ => match self.m.checked_shr(shift.unsigned_abs()) {
+                Some(n) => n,
+                None => 0,
+            },
+        }
+    }
+
+    pub(super) const fn is_zero(self) -> bool {
+        self.m == 0
+    }
+
+    /// Times 2^`by`.
+    pub(super) const fn scaled(self, by: i32) -> Self {
+        if self.m == 0 { self } else { Self { m: self.m, e: self.e.saturating_add(by) } }
+    }
+
+    pub(super) const fn half(self) -> Self {
+        self.scaled(-1)
+    }
+
+    pub(super) fn squared(self) -> Self {
+        self * self
+    }
+
+    pub(super) fn min(self, other: Self) -> Self {
+        if other < self { other } else { self }
+    }
+
+    pub(super) fn max(self, other: Self) -> Self {
+        if other > self { other } else { self }
+    }
+
+    /// What is above the whole number below.
+    pub(super) fn fraction(self) -> Self {
+        self - Self::new(self.to_fixed(0))
+    }
+
+    /// The root of the upper bits, and two of Heron's steps.
+    pub(super) fn sqrt(self) -> Self {
+        if self.m == 0 {
+            return self;
+        }
+        let (m, e) = if self.e & 1 == 0 { (self.m, self.e) } else { (self.m >> 1, self.e.saturating_add(1)) };
+        let upper = (m >> 32) as u32;
+        let root = Self::fixed(upper.isqrt().into(), -16).scaled(e >> 1);
+        let root = (root + self / root).half();
+        (root + self / root).half()
+    }
+
+    /// Newton's steps from the power of 2 above; from there they come down.
+    pub(super) fn cbrt(self) -> Self {
+        if self.m == 0 {
+            return self;
+        }
+        let mut root = Self::new(1).scaled(self.e.saturating_add(66).div_euclid(3));
+        for _ in 0..6 {
+            root = (root + root + self / root.squared()) * THIRD;
+        }
+        root
+    }
+
+    /// `self + by` or `self - by`.
+    pub(super) fn along(self, by: Self, up: bool) -> Self {
+        if up { self + by } else { self - by }
+    }
+
+    /// `|self - other|`.
+    pub(super) fn distance(self, other: Self) -> Self {
+        if self > other { self - other } else { other - self }
+    }
+}
+
+/// 1/3.
+pub(super) const THIRD: Real = Real { m: 0xaaaa_aaaa_aaaa_aaab, e: -65 };
+
+impl PartialOrd for Real {
+    fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
+        Some(self.cmp(other))
+    }
+}
+
+impl Ord for Real {
+    fn cmp(&self, other: &Self) -> Ordering {
+        match (self.m, other.m) {
+            (0, 0) => Ordering::Equal,
+            (0, _) => Ordering::Less,
+            (_, 0) => Ordering::Greater,
+            _ => (self.e, self.m).cmp(&(other.e, other.m)),
+        }
+    }
+}
+
+impl Add for Real {
+    type Output = Self;
+
+    fn add(self, other: Self) -> Self {
+        let (a, b) = if self < other { (other, self) } else { (self, other) };
+        let down = a.e.saturating_sub(b.e).unsigned_abs();
+        let (sum, carry) = a.m.overflowing_add(if b.m == 0 { 0 } else { b.m.checked_shr(down).unwrap_or(0) });
+        if carry { Self { m: sum >> 1 | 1 << 63, e: a.e.saturating_add(1) } } else { Self { m: sum, e: a.e } }
+    }
+}
+
+/// 0 for a difference below 0.
+impl Sub for Real {
+    type Output = Self;
+
+    fn sub(self, other: Self) -> Self {
+        if self <= other {
+            return Self::ZERO;
+        }
+        if other.m == 0 {
+            return self;
+        }
+        let down = self.e.saturating_sub(other.e).unsigned_abs();
+        let rest = self.m.wrapping_sub(other.m.checked_shr(down).unwrap_or(0));
+        Self::fixed(rest, 0).scaled(self.e)
+    }
+}
+
+impl Mul for Real {
+    type Output = Self;
+
+    fn mul(self, other: Self) -> Self {
+        let (high, low) = product(self.m, other.m);
+        let e = self.e.saturating_add(other.e);
+        match high {
+            0 => Self::ZERO,
+            _ if high >> 63 == 1 => Self { m: high, e: e.saturating_add(64) },
+            _ => Self { m: high << 1 | low >> 63, e: e.saturating_add(63) },
+        }
+    }
+}
+
+/// 2^1000 for a quotient by 0.
+impl Div for Real {
+    type Output = Self;
+
+    fn div(self, by: Self) -> Self {
+        if self.m == 0 {
+            return self;
+        }
+        if by.m == 0 {
+            return Self::HUGE;
+        }
+        let (quotient, _) = product(self.m, reciprocal(by.m));
+        Self::fixed(quotient, 0).scaled(self.e.saturating_sub(by.e).saturating_sub(63))
+    }
+}
+
+/// Both halves of a product of 128 bits, in multiplications that a 32-bit core has.
+#[expect(clippy::cast_possible_truncation, reason = "halves of a wider number")]
+#[inline]
+const fn product(a: u64, b: u64) -> (u64, u64) {
+    let (a1, a0, b1, b0) = (a >> 32, a as u32 as u64, b >> 32, b as u32 as u64);
+    let low = a0.wrapping_mul(b0);
+    let middle = a1.wrapping_mul(b0).wrapping_add(low >> 32);
+    let other = a0.wrapping_mul(b1).wrapping_add(middle as u32 as u64);
+    let high = a1.wrapping_mul(b1).wrapping_add(middle >> 32).wrapping_add(other >> 32);
+    (high, other << 32 | low as u32 as u64)
+}
+
+/// `2^127 / d` for a `d` with its top bit set, to 60 bits at least: 16 bits by division, then twice as many and twice as
+/// many again by Newton's steps x (2 - d x).
+#[expect(
+    clippy::cast_possible_wrap,
+    clippy::cast_sign_loss,
+    reason = "the upper half of a number; a difference in two's complement"
+)]
+#[inline]
+const fn reciprocal(d: u64) -> u64 {
+    let upper = (d >> 32) as u32;
+    // 2^63 / upper, a little too small or too large.
+    let rough = match u32::MAX.checked_div(upper >> 16) {
+        Some(rough) => (rough as u64) << 15,
+        None => 1 << 31,
+    };
+    let off = (1_u64 << 63).wrapping_sub(rough.wrapping_mul(upper as u64)) as i64;
+    let better = rough.wrapping_add(((rough as i64).wrapping_mul(off >> 18) >> 45) as u64);
+    let x = if better >> 32 == 0 { better << 32 } else { u64::MAX };
+    let (whole, _) = product(x, d);
+    if whole < 1 << 63 {
+        let (more, _) = product(x, (1_u64 << 63).wrapping_sub(whole) << 1);
+        x.saturating_add(more)
+    } else {
+        let (less, _) = product(x, whole.wrapping_sub(1 << 63) << 1);
+        x.wrapping_sub(less)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    #[expect(clippy::cast_precision_loss, reason = "compared within 2^-50")]
+    fn float(x: Real) -> f64 {
+        x.m as f64 * f64::from(x.e).exp2()
+    }
+
+    fn near(got: Real, want: f64) {
+        assert!((float(got) - want).abs() <= want.abs() * 1e-15 * 4.0, "{} for {want}", float(got));
+    }
+
+    fn any_real() -> impl Strategy<Value = Real> {
+        (any::<u64>(), -100..100_i32).prop_map(|(n, bits)| Real::fixed(n, bits))
+    }
+
+    proptest! {
+        #[test]
+        fn as_with_floats(a in any_real(), b in any_real()) {
+            let (x, y) = (float(a), float(b));
+            near(a + b, x + y);
+            near(a * b, x * y);
+            near(a.sqrt(), x.sqrt());
+            near(a.cbrt(), x.cbrt());
+            prop_assert!(a.cmp(&b) == b.cmp(&a).reverse() && (x - y).abs() <= x * 1e-15 || (a < b) == (x < y));
+            if b.m > 0 {
+                near(a / b, x / y);
+                let wide = ((u128::from(u64::MAX) << 63) / u128::from(b.m)) as u64;
+                prop_assert!(reciprocal(b.m).abs_diff(wide) <= 16, "{} for {wide}", reciprocal(b.m));
+            }
+            let (high, low) = if a > b { (a, b) } else { (b, a) };
+            prop_assert!((float(high - low) - (x - y).abs()).abs() <= x.max(y) * 1e-15);
+            prop_assert_eq!(low - high, Real::ZERO);
+            prop_assert!(high >= low && high.max(low) == high && high.min(low) == low);
+        }
+
+        #[test]
+        fn there_and_back(n: u64, bits in -10..60_i32) {
+            prop_assert_eq!(Real::fixed(n, bits).to_fixed(bits), n);
+            prop_assert_eq!(Real::new(n).to_fixed(0), n);
+            prop_assert_eq!(Real::fixed(n, 7).to_fixed(0), n >> 7);
+            prop_assert_eq!(Real::fixed(n, 7).fraction(), Real::fixed(n & 127, 7));
+        }
+    }
+
+    #[test]
+    fn the_edges() {
+        let (zero, one) = (Real::ZERO, Real::new(1));
+        assert_eq!(
+            (zero + one, one - one, zero * one, zero / one, zero.sqrt(), zero.cbrt()),
+            (one, zero, zero, zero, zero, zero)
+        );
+        assert_eq!((one / zero, zero - one, one + zero, one - zero), (Real::HUGE, zero, one, one));
+        assert_eq!((Real::HUGE.to_fixed(0), Real::HUGE.to_fixed(-2000)), (u64::MAX, 0));
+        near(Real::new(9).sqrt(), 3.0);
+        assert!(reciprocal(1 << 63) > u64::MAX - 16);
+        assert_eq!(one.along(one, false), zero);
+        near(THIRD, 1.0 / 3.0);
+    }
+}

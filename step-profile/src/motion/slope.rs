@@ -1,0 +1,44 @@
+//! One change of speed.
+
+use super::limits::Bounds;
+use super::real::Real;
+
+/// From one speed to another in the least time: jerk, constant acceleration, jerk back; without a jerk limit the middle
+/// alone.
+///
+/// With dv the change of speed, a² / j <= dv reaches the greatest acceleration and takes dv / a + a / j. A smaller one
+/// takes 2 sqrt(dv / j) and has no middle. The distance is the mean of both speeds times the time in either case.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Slope {
+    pub(super) from: Real,
+    pub(super) to: Real,
+    /// Time of either jerk.
+    pub(super) edge: Real,
+    /// Time at constant acceleration.
+    pub(super) flat: Real,
+}
+
+impl Slope {
+    pub(super) fn new(from: Real, to: Real, bounds: &Bounds) -> Self {
+        let dv = from.distance(to);
+        let (edge, flat) = match bounds.jerk {
+            None => (Real::ZERO, dv / bounds.a),
+            Some(jerk) if dv < jerk.knee => ((dv / jerk.j).sqrt(), Real::ZERO),
+            Some(jerk) => (jerk.edge, dv / bounds.a - jerk.edge),
+        };
+        Self { from, to, edge, flat }
+    }
+
+    pub(super) fn time(&self) -> Real {
+        self.edge.scaled(1) + self.flat
+    }
+
+    pub(super) fn distance(&self) -> Real {
+        (self.from + self.to).half() * self.time()
+    }
+}
+
+/// The least distance of a change of speed.
+pub(super) fn distance(from: Real, to: Real, bounds: &Bounds) -> Real {
+    Slope::new(from, to, bounds).distance()
+}

@@ -1,0 +1,229 @@
+//! Requests at any moment: no jump, no limit passed, no step lost, at rest at the target.
+#![allow(missing_docs, clippy::arithmetic_side_effects, clippy::cast_precision_loss, clippy::unwrap_used)]
+
+use proptest::prelude::*;
+use step_profile::motion::{Clock, Limits, Mover, State};
+use step_profile::{Direction, Error};
+
+#[derive(Debug, Clone, Copy)]
+enum Request {
+    MoveTo(i64),
+    Run(bool, u32),
+    Override(u16),
+    Hold,
+    Resume,
+    Stop,
+}
+
+fn request() -> impl Strategy<Value = Request> {
+    prop_oneof![
+        4 => (-3000..3000_i64).prop_map(Request::MoveTo),
+        2 => (any::<bool>(), 0..30_000_u32).prop_map(|(way, speed)| Request::Run(way, speed)),
+        2 => (0..120_u16).prop_map(Request::Override),
+        2 => Just(Request::Hold),
+        2 => Just(Request::Resume),
+        1 => Just(Request::Stop),
+    ]
+}
+
+struct Watched {
+    mover: Mover,
+    limits: Limits,
+    hz: f64,
+    last: Option<u64>,
+    position: i64,
+    now: u64,
+}
+
+impl Watched {
+    fn new(limits: Limits, hz: u32) -> Self {
+        let mover = Mover::new(Clock::new(hz).unwrap(), limits).unwrap();
+        Self { mover, limits, hz: hz.into(), last: None, position: 0, now: 0 }
+    }
+
+    fn limits_hold(&self, s: State) -> Result<(), TestCaseError> {
+        let within = |value: i64, limit: f64| (value as f64 / 65536.0).abs() <= limit * (1.0 + 1e-6) + 0.01;
+        let (a, j) = (f64::from(self.limits.acceleration()), self.limits.jerk().map_or(0.0, |j| j as f64));
+        prop_assert!(within(s.speed, f64::from(self.limits.speed()) + a * 1e-9), "{s:?}");
+        prop_assert!(within(s.acceleration, a + j * 2e-9), "{s:?} {}", self.limits);
+        prop_assert!(within(s.jerk, j), "{s:?} {}", self.limits);
+        Ok(())
+    }
+
+    /// Takes all steps before `until`.
+    fn run_until(&mut self, until: u64) -> Result<(), TestCaseError> {
+        let mut count = 0;
+        while let Some(due) = self.mover.due().filter(|due| *due < until) {
+            let before = self.mover.at(due);
+            let pulse = self.mover.pulse().unwrap();
+            prop_assert_eq!(pulse.tick, due);
+            prop_assert!(self.last.is_none_or(|last| pulse.tick > last), "{pulse:?} after {:?}", self.last);
+            self.position += if pulse.direction == Direction::Forward { 1 } else { -1 };
+            prop_assert_eq!(self.mover.position(), self.position);
+            self.limits_hold(before)?;
+            // The position of the plan is within half a step of the motor, and of a tick.
+            let off = (before.position - (self.position << 32)).abs() as f64 / 2_f64.powi(32);
+            let tick = (before.speed as f64 / 65536.0).abs() / self.hz;
+            prop_assert!(off <= 0.5 + tick + 1e-3, "{before:?} at {}", self.position);
+            self.last = Some(pulse.tick);
+            self.now = pulse.tick;
+            count += 1;
+            prop_assert!(count < 2_000_000, "never at rest");
+        }
+        self.now = self.now.max(until);
+        Ok(())
+    }
+
+    fn tell(&mut self, request: Request) -> Result<(), TestCaseError> {
+        let before = self.mover.at(self.now);
+        let direction = self.mover.direction();
+        match request {
+            Request::MoveTo(target) => self.mover.move_to(target, self.now).unwrap(),
+            Request::Run(way, speed) => self.mover.run(Direction::from_dir(way), speed, self.now).unwrap(),
+            Request::Override(percent) => self.mover.set_override(percent, self.now),
+            Request::Hold => self.mover.hold(self.now),
+            Request::Resume => self.mover.resume(self.now),
+            Request::Stop => self.mover.stop(self.now),
+        }
+        let after = self.mover.at(self.now);
+        self.limits_hold(after)?;
+        if before.speed != 0 && direction == self.mover.direction() {
+            // No jump: in position, in speed, and with a jerk limit in acceleration.
+            let off = |a: i64, b: i64| (a - b).abs() as f64 / 65536.0;
+            let jerk = self.limits.jerk().map_or(0.0, |j| j as f64);
+            let (a, v) = (f64::from(self.limits.acceleration()), f64::from(self.limits.speed()));
+            prop_assert!(
+                (before.position - after.position).abs() as f64 <= 64.0 + v / 1e9 * 2_f64.powi(33),
+                "{before:?} {after:?}"
+            );
+            prop_assert!(off(before.speed, after.speed) <= 0.01 + a * 3e-9 + v * 1e-6, "{before:?} {after:?}");
+            if jerk > 0.0 {
+                let small = off(before.acceleration, after.acceleration) <= a * 1e-3 + jerk * 3e-9;
+                prop_assert!(small, "{request:?}: {before:?} {after:?}");
+            }
+        }
+        Ok(())
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 500, ..ProptestConfig::default() })]
+
+    #[test]
+    fn requests_at_any_moment(
+        v in 200..30_000_u32,
+        a in 2000..500_000_u32,
+        j in prop_oneof![Just(0_u64), 50_000..50_000_000_u64],
+        requests in prop::collection::vec((request(), 0..200_000_u64), 1..12),
+        target in -3000..3000_i64,
+        hz in prop_oneof![Just(1_000_000_u32), Just(72_000_000)],
+    ) {
+        let limits = Limits::new(v, a).unwrap();
+        let limits = if j == 0 { limits } else { limits.with_jerk(j).unwrap() };
+        let mut watched = Watched::new(limits, hz);
+        for (request, wait) in requests {
+            watched.tell(request)?;
+            let until = watched.now + wait * u64::from(hz / 1_000_000);
+            watched.run_until(until)?;
+        }
+        // In the end it goes where it is told, at rest.
+        watched.tell(Request::Override(100))?;
+        watched.tell(Request::Resume)?;
+        watched.tell(Request::MoveTo(target))?;
+        watched.run_until(u64::MAX)?;
+        prop_assert_eq!(watched.position, target);
+        prop_assert_eq!(watched.mover.due(), None);
+        let end = 1 << 50;
+        prop_assert!(watched.mover.is_at_rest(end));
+        prop_assert_eq!((watched.mover.at(end).position, watched.mover.at(end).speed), (target << 32, 0));
+    }
+}
+
+fn mover() -> Mover {
+    Mover::new(Clock::MICROSECONDS, Limits::new(10_000, 100_000).unwrap().with_jerk(2_000_000).unwrap()).unwrap()
+}
+
+#[test]
+fn a_change_takes_effect_within_a_long_interval() {
+    let mut mover = mover();
+    mover.run(Direction::Forward, 1, 0).unwrap();
+    let first = mover.due().unwrap();
+    assert!(first > 400_000);
+    mover.pulse();
+    assert!(mover.due().unwrap() > first + 900_000);
+    mover.run(Direction::Forward, 10_000, first + 1000).unwrap();
+    assert!(mover.due().unwrap() < first + 100_000, "{:?}", mover.due());
+}
+
+#[test]
+fn held_twice_resumed_while_stopping_and_told_to_stay() {
+    let mut mover = mover();
+    mover.move_to(2000, 0).unwrap();
+    let mut now = 0;
+    for _ in 0..500 {
+        now = mover.pulse().unwrap().tick;
+    }
+    mover.hold(now);
+    mover.hold(now);
+    for _ in 0..10 {
+        now = mover.pulse().unwrap().tick;
+    }
+    mover.resume(now);
+    mover.hold(now);
+    while let Some(pulse) = mover.pulse() {
+        now = pulse.tick;
+    }
+    let stopped = mover.position();
+    assert!((510..1700).contains(&stopped), "{stopped}");
+    now += 1_000_000;
+    assert!(mover.is_at_rest(now));
+    mover.move_to(stopped, now).unwrap();
+    mover.resume(now);
+    assert_eq!(mover.due(), None);
+    mover.move_to(2000, now).unwrap();
+    while mover.pulse().is_some() {}
+    assert_eq!(mover.position(), 2000);
+}
+
+#[test]
+fn soft_limits_a_halt_and_a_quick_stop() {
+    let mut mover = mover().with_soft_limits(-100, 900).with_reversal_pause(5000);
+    assert_eq!(mover.move_to(901, 0), Err(Error::SoftLimit { target: 901 }));
+    mover.run(Direction::Forward, 8000, 0).unwrap();
+    let mut now = 0;
+    while let Some(pulse) = mover.pulse() {
+        now = pulse.tick;
+    }
+    assert_eq!(mover.position(), 900);
+    let turned = mover.due();
+    assert_eq!(turned, None);
+    let rest = now + 1_000_000;
+    mover.move_to(-50, rest).unwrap();
+    assert!(mover.due().unwrap() > rest + 5000);
+    for _ in 0..300 {
+        now = mover.pulse().unwrap().tick;
+    }
+    let hard = Limits::new(10_000, 1_000_000).unwrap();
+    mover.quick_stop(hard, now);
+    assert_eq!(mover.move_to(0, now), Err(Error::Moving));
+    let mut steps = 0;
+    while let Some(pulse) = mover.pulse() {
+        now = pulse.tick;
+        steps += 1;
+    }
+    assert!(steps <= 50, "{steps} steps of v²/2a");
+    now += 100_000;
+    mover.move_to(0, now).unwrap();
+    for _ in 0..200 {
+        now = mover.pulse().unwrap().tick;
+    }
+    let position = mover.position();
+    assert_eq!(mover.set_position(0, now), Err(Error::Moving));
+    mover.halt(now);
+    assert_eq!((mover.position(), mover.due(), mover.is_halted()), (position, None, true));
+    mover.set_position(0, now + 1).unwrap();
+    mover.move_to(10, now + 1).unwrap();
+    assert!(!mover.is_halted());
+    while mover.pulse().is_some() {}
+    assert_eq!(mover.position(), 10);
+}
