@@ -6,7 +6,7 @@ use core::convert::Infallible;
 use embedded_hal::digital::{ErrorType as PinErrorType, OutputPin};
 use embedded_io::{ErrorType, Read, ReadReady, Write};
 use tformat::device::{Device, Fault};
-use tformat::{BitRate, U24};
+use tformat::{Abm, Abs, BitRate};
 
 use crate::tformat_uart::Clock;
 
@@ -50,7 +50,7 @@ impl Bench {
     }
 
     /// Turns the shaft.
-    pub fn turn_to(&self, abs: U24, abm: U24) {
+    pub fn turn_to(&self, abs: Abs, abm: Abm) {
         self.encoder.borrow_mut().set_position(abs, abm);
     }
 

@@ -53,12 +53,12 @@ impl<U: Read + ReadReady + Write, D: OutputPin, C: Clock> Encoder<U, D, C> {
         sent?;
         loop {
             let progress = match self.receive()? {
-                Some(byte) => transaction.byte(byte, self.clock.now_ns()),
+                Some(byte) => transaction.bytes(&[byte], self.clock.now_ns()),
                 None => transaction.poll(self.clock.now_ns()),
             };
             match progress {
                 Progress::Pending { .. } => {}
-                Progress::Done { value, .. } => return Ok(value),
+                Progress::Done { value, .. } => return Ok(value.response),
                 Progress::Failed { error, .. } => return Err(Failure::Protocol(error)),
             }
         }
@@ -84,7 +84,7 @@ mod tests {
     use super::*;
     use crate::simulated_uart::{Bench, Pin, Uart};
     use tformat::device::Fault;
-    use tformat::{BitRate, U24};
+    use tformat::{Abm, Abs, BitRate};
 
     fn encoder(bench: &Bench) -> Encoder<Uart<'_>, Pin, &Bench> {
         Encoder::new(Uart::new(bench), Pin, bench, Line::new(BitRate::Mbit2_5).with_echo())
@@ -95,9 +95,9 @@ mod tests {
         let bench = Bench::new(0x17);
         let mut encoder = encoder(&bench);
         for position in [0, 1, 0x7f_ffff] {
-            bench.turn_to(U24::truncate(position), U24::truncate(3));
+            bench.turn_to(Abs::truncate(position), Abm::truncate(3));
             let answer = encoder.transact(Request::ReadSingleTurn).unwrap();
-            assert_eq!(answer.abs(), Some(U24::truncate(position)));
+            assert_eq!(answer.abs(), Some(Abs::truncate(position)));
             let Ok(Response::ReadAll(data)) = encoder.transact(Request::ReadAll) else { panic!() };
             assert_eq!((data.abm.get(), data.enid), (3, 0x17));
         }

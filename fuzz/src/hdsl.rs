@@ -93,7 +93,7 @@ pub fn learn(data: &[u8]) {
         match Alignment::learn(rule, data) {
             Ok(place) => {
                 assert_eq!(place.bits(data), Ok(TEST_PATTERN));
-                assert!(place.rssi(data).get() <= 12);
+                assert!(place.rssi(data).is_ok());
             }
             Err(Error::Truncated { got, want: 61 }) => assert!(usize::from(got) == data.len() && got < 61),
             Err(Error::NoEdge) => assert!(data.iter().all(|byte| *byte == 0xff)),

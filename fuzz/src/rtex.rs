@@ -4,7 +4,7 @@ use core::num::NonZeroU16;
 
 use rtex_block::device::{Drive, DriveConfig, OpenCodes};
 use rtex_block::inspect::inspect;
-use rtex_block::master::{ActiveCode, Axis, AxisConfig, AxisState, Limits, Ring};
+use rtex_block::master::{ActiveCode, Axis, AxisConfig, AxisState, Limits, Received, Ring};
 use rtex_block::{
     Alarm, Command, Command32, CommandBlock, ControlBits, Error, MacId, NonCyclicCode, NonCyclicCommand,
     NonCyclicResponse, Response, Response32, TypeCode, stream,
@@ -140,6 +140,10 @@ const CODES: OpenCodes = OpenCodes {
     alarm_active: TypeCode::short(0x01),
     alarm_history: TypeCode::short(0x02),
     alarm_clear: TypeCode::short(0x03),
+    alarm_attributes: TypeCode::short(0x76),
+    parameter_initial: TypeCode::short(0x77),
+    latch_arm: 0x78,
+    homing: 0x79,
     communication_lost: Alarm { main: 80, sub: 0 },
 };
 
@@ -159,9 +163,9 @@ pub fn ring(mut data: &[u8]) {
     };
     let drive =
         |place| Drive::new(DriveConfig::new(mac_id(place), CODES).with_fault_limit(LIMIT).with_lost_limit(LIMIT));
-    let mut ring = Ring::new([axis(0), axis(1)], 2);
+    let mut ring = Ring::new([axis(0), axis(1)], 2).expect("two addresses");
     let mut drives = [drive(0), drive(1)];
-    let mut responses = [None; 2];
+    let mut responses = [Received::Nothing; 2];
     let mut started = false;
     for _ in 0..256 {
         if data.is_empty() {
@@ -172,7 +176,7 @@ pub fn ring(mut data: &[u8]) {
         act(event & 15, argument, &mut ring, place, &mut drives[place]);
         let commands = ring.update(&responses);
         for (k, command) in commands.iter().enumerate() {
-            let mut sent = command.emit();
+            let mut sent = command.main.emit();
             let view = CommandBlock::of(&sent).expect("a command");
             started |= view.obeys_control();
             assert_eq!(view.obeys_control(), started);
@@ -180,18 +184,18 @@ pub fn ring(mut data: &[u8]) {
             responses[k] = match event & 15 {
                 1 if k == place => {
                     drives[k].miss();
-                    None
+                    Received::Nothing
                 }
                 2 if k == place => {
                     sent[usize::from(argument >> 3 & 15)] ^= 1 << (argument & 7);
-                    Response::parse(&drives[k].exchange(&sent)).ok()
+                    Response::parse(&drives[k].exchange(&sent)).into()
                 }
                 3 if k == place => {
                     let mut received = drives[k].exchange(&sent);
                     received[usize::from(argument >> 3 & 15)] ^= 1 << (argument & 7);
-                    Response::parse(&received).ok()
+                    Response::parse(&received).into()
                 }
-                _ => Response::parse(&drives[k].exchange(&sent)).ok(),
+                _ => Response::parse(&drives[k].exchange(&sent)).into(),
             };
         }
     }
@@ -219,7 +223,7 @@ fn act(event: u8, argument: u8, ring: &mut Ring<2>, place: usize, drive: &mut Dr
 }
 
 /// With a good line, no alarms and power, every axis comes on within its limits.
-fn recover(ring: &mut Ring<2>, drives: &mut [Drive; 2], mut responses: [Option<Response>; 2]) {
+fn recover(ring: &mut Ring<2>, drives: &mut [Drive; 2], mut responses: [Received; 2]) {
     for round in 0..120 {
         if round % 60 == 0 {
             for drive in drives.iter_mut() {
@@ -231,7 +235,7 @@ fn recover(ring: &mut Ring<2>, drives: &mut [Drive; 2], mut responses: [Option<R
         ring.switch_on();
         let commands = ring.update(&responses);
         for (k, command) in commands.iter().enumerate() {
-            responses[k] = Response::parse(&drives[k].exchange(&command.emit())).ok();
+            responses[k] = Response::parse(&drives[k].exchange(&command.main.emit())).into();
         }
     }
     assert!(ring.all_are(AxisState::On), "{:?}", ring.failure());

@@ -7,6 +7,7 @@ use crate::byte;
 
 pub mod ends;
 mod reference;
+pub mod world;
 
 /// The request that the first three bytes choose: kind, ADF, EDF.
 fn chosen(data: &mut &[u8]) -> Request {

@@ -152,6 +152,9 @@ servowire_core::errors! {
             /// Bits that are missing, rounded up.
             missing: u32,
         },
+        /// The name of a user file is none: 1 to 8 characters 20h..=7Eh, then 00h.
+        #[error("this is no name of a user file")]
+        FileName,
         /// No pulse period is known that the frames could be synchronised with.
         #[error("no pulse period was given")]
         NoPulse,

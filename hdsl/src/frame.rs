@@ -38,6 +38,8 @@ pub const STUFFING_BITS: u32 = 6;
 
 /// SYNC and a stuffing block, first line bit in bit 0: 0 0 1 0 1 1.
 const SYNC: u128 = 0b11_0100;
+/// SYNC and the two ones of SAMPLE.
+const FIXED: u32 = 0b1111_0100;
 /// TRAILER: 0 0 0 0 0 0 1 1.
 const TRAILER: u8 = 0b1100_0000;
 
@@ -134,12 +136,18 @@ impl Head {
 
     /// The line bits; the last bit of an EXTRA window is a one also when its edge lies inside.
     pub fn bits(self) -> Window {
-        let extra = self.extra_bits();
-        // SYNC, the two ones of SAMPLE and the window.
-        let ones = (1_u128 << extra.wrapping_add(2)).wrapping_sub(1);
-        let rest = 0b0110_u128 | u128::from(self.equalisation) << 4 | u128::from(self.para.get()) << 8;
-        let bits = SYNC | ones << 6 | rest << extra.wrapping_add(8);
-        Window::from_bits(bits, Self::BITS.wrapping_add(extra)).unwrap_or(Window::EMPTY)
+        // SYNC, the two ones of SAMPLE and those of the window: at most 17 bits, then 18 more.
+        let rest = 0b0110 | u32::from(self.equalisation) << 4 | u32::from(self.para.get()) << 8;
+        let (bits, extra) = match self.extra {
+            None => (u64::from(FIXED | rest << 8), 0),
+            Some(extra) => {
+                let extra = u32::from(extra.bits());
+                // Ones up to the end of the window, over those of FIXED.
+                let ones = FIXED | (1_u32 << extra.wrapping_add(8)).wrapping_sub(1) & !0xff;
+                (u64::from(ones) | u64::from(rest) << extra.wrapping_add(8), extra)
+            }
+        };
+        Window::from_bits(bits.into(), Self::BITS.wrapping_add(extra)).unwrap_or(Window::EMPTY)
     }
 
     /// The line at eight samples a bit: a byte each, its first sample in bit 7.

@@ -4,7 +4,7 @@
 use core::fmt;
 
 use crate::parameter::ParameterByte;
-use crate::symbol::{FOUR_MORE_ZEROS, Rule, SIX_MORE_ZEROS, Word};
+use crate::symbol::{FOUR_MORE_ZEROS, NEUTRAL, Rule, SIX_MORE_ZEROS, Word};
 
 /// Ones minus zeros that the master has sent, as its receiver counts them.
 ///
@@ -67,24 +67,55 @@ impl LineDisparity {
     /// 1. the 6-bit block of bits 4:0 (28 gives that of K.28): a neutral block as tabulated (7 always 000111),
     ///    otherwise the version with more zeros while d >= 0, its inverse while d < 0; d takes up its balance;
     /// 2. the 4-bit block of bits 7:5 in the same way (3 always 0011), by the new d, which it does not change.
-    #[expect(clippy::indexing_slicing, reason = "five bits are below 32, three below 8")]
+    #[inline]
+    #[expect(clippy::indexing_slicing, reason = "a byte is below 256")]
     pub const fn encode(self, byte: ParameterByte) -> (Word, Self) {
+        if self.0 != 0 {
+            return self.encode_unbalanced(byte);
+        }
+        let entry = BALANCED[byte.raw() as usize];
+        (Word::truncate(entry & 0x3ff), Self(if entry & MORE_ZEROS != 0 { -2 } else { 0 }))
+    }
+
+    #[expect(clippy::indexing_slicing, reason = "five bits are below 32, three below 8")]
+    const fn encode_unbalanced(self, byte: ParameterByte) -> (Word, Self) {
         let raw = byte.raw();
-        let six = polarity(SIX_MORE_ZEROS[(raw & 31) as usize], 6, self.0);
-        let after = match six.count_ones() {
-            2 => self.plus(-2),
-            4 => self.plus(2),
-            _ => self,
-        };
-        let four = polarity(FOUR_MORE_ZEROS[(raw >> 5) as usize], 4, after.0);
+        let (six, balance) = polarity(SIX_MORE_ZEROS[(raw & 31) as usize], 0x3f, self.0);
+        let after = self.plus(balance);
+        let (four, _) = polarity(FOUR_MORE_ZEROS[(raw >> 5) as usize], 0x0f, after.0);
         (Word::truncate(six as u16 | (four as u16) << 6), after)
     }
 }
 
-/// The block itself if it is neutral or `d` wants zeros, else its inverse.
-const fn polarity(block: u8, len: u32, d: i8) -> u8 {
-    let mask = if len == 6 { 0x3f } else { 0x0f };
-    if d >= 0 || block.count_ones().wrapping_mul(2) == len { block } else { block ^ mask }
+/// The 6-bit block of the word has more zeros.
+const MORE_ZEROS: u16 = 0x8000;
+
+/// The words of all bytes for a balanced line, as it is before every answered frame of a free-running link.
+#[expect(clippy::indexing_slicing, clippy::arithmetic_side_effects, reason = "runs at compile time")]
+static BALANCED: [u16; 256] = {
+    let mut table = [0; 256];
+    let mut raw: u8 = 0;
+    loop {
+        let (word, after) = LineDisparity::ZERO.encode_unbalanced(ParameterByte::new(raw));
+        table[raw as usize] = word.get() | if after.0 < 0 { MORE_ZEROS } else { 0 };
+        if raw == 255 {
+            break;
+        }
+        raw += 1;
+    }
+    table
+};
+
+/// The block itself if it is neutral or `d` wants zeros, else its inverse; and its balance. Neutral blocks are marked in the
+/// tables.
+const fn polarity(block: u8, mask: u8, d: i8) -> (u8, i8) {
+    if block & NEUTRAL != 0 {
+        (block & mask, 0)
+    } else if d >= 0 {
+        (block, -2)
+    } else {
+        (block ^ mask, 2)
+    }
 }
 
 impl ParameterByte {

@@ -12,12 +12,16 @@
 //! Each byte goes high nibble first, and at least one IDLE is between two messages. How long an encoder takes for an
 //! answer is not limited.
 
+mod access;
+mod file;
 mod long;
 mod requester;
 mod resource;
 mod responder;
 mod short;
 
+pub use access::AccessLevel;
+pub use file::{FileName, FileStatus};
 pub use long::{Access, Data, Length, LongAnswer, LongRequest};
 pub use requester::{Finished, Limits, Requester};
 pub use resource::{Offset, ResourceAddress, ResourceError, ResourceErrorClass};
@@ -148,8 +152,11 @@ impl Collector {
     }
 
     /// Something that is no nibble ends what was being gathered.
+    #[inline]
     const fn idle(&mut self) {
-        *self = Self::new();
+        if !self.ready || self.high.is_some() || self.bytes.len != 0 {
+            *self = Self::new();
+        }
     }
 
     /// The message is complete; the next one begins after an IDLE.

@@ -6,7 +6,7 @@
 use crate::error::Error;
 use crate::frame::ANSWER_BITS;
 use crate::ranged::ranged;
-use crate::rssi::{EdgeWatch, Rssi};
+use crate::rssi::{EdgeWatch, Rssi, WordWatch};
 
 /// Bytes of samples that a receiver takes in for one answer: 61 bits and room for a delay of up to 11.
 pub const WINDOW: usize = 72;
@@ -68,8 +68,74 @@ impl SampleIndex {
 
     /// The first 128 bits of a line, the first of them in bit 0.
     pub fn bits(self, samples: &[u8]) -> u128 {
-        let take = |bits: u128, (at, byte): (u32, &u8)| bits | u128::from(self.bit(*byte)) << at;
-        (0..128).zip(samples).fold(0, take)
+        let mut parts = [0; 4];
+        for (part, bytes) in parts.iter_mut().zip(samples.chunks(32)) {
+            *part = self.word(bytes);
+        }
+        let [a, b, c, d] = parts.map(u128::from);
+        a | b << 32 | c << 64 | d << 96
+    }
+
+    /// The bits of up to 32 bytes, the first in bit 0.
+    #[inline]
+    fn word(self, samples: &[u8]) -> u32 {
+        let mut words = samples.chunks_exact(4);
+        let gather = Gather::new(self);
+        let mut bits = 0;
+        let mut len = 0_u32;
+        for word in &mut words {
+            let [a, b, c, d] = *word else { break };
+            bits = bits >> 4 | gather.four(u32::from_le_bytes([a, b, c, d]));
+            len = len.saturating_add(4);
+        }
+        // The newest bits are at the top; at most eight words have come.
+        let whole = bits.checked_shr(32_u32.saturating_sub(len)).unwrap_or(0);
+        let rest = (len..).zip(words.remainder());
+        rest.fold(whole, |bits, (at, byte)| bits | u32::from(self.bit(*byte)).wrapping_shl(at))
+    }
+}
+
+/// Takes one bit of each of four bytes at a time.
+///
+/// The mask leaves bits s, s + 8, s + 16 and s + 24; the product moves them next to each other, and no two of its other
+/// terms meet.
+#[derive(Clone, Copy)]
+struct Gather {
+    mask: u32,
+    factor: u32,
+}
+
+impl Gather {
+    const fn new(index: SampleIndex) -> Self {
+        let shift = 7 & !index.get();
+        Self { mask: 0x0101_0101 << shift, factor: (1 << 28 | 1 << 21 | 1 << 14 | 1 << 7) >> shift }
+    }
+
+    /// Four bits more at the top of `bits`.
+    #[inline(always)]
+    fn next(self, bits: u32, samples: [u8; 4], watch: &mut WordWatch) -> u32 {
+        let word = u32::from_le_bytes(samples);
+        watch.step(word);
+        bits >> 4 | self.four(word)
+    }
+
+    /// The bits of up to 32 bytes, a multiple of four, at the top.
+    #[inline(always)]
+    fn all(self, samples: &[u8], watch: &mut WordWatch) -> u32 {
+        let mut bits = 0;
+        let mut pairs = samples.chunks_exact(8);
+        for pair in &mut pairs {
+            let Some((a, b)) = pair.split_first_chunk() else { break };
+            bits = self.next(bits, *a, watch);
+            bits = b.first_chunk().map_or(bits, |b| self.next(bits, *b, watch));
+        }
+        pairs.remainder().first_chunk().map_or(bits, |last| self.next(bits, *last, watch))
+    }
+
+    /// The bits of four bytes, the first of them in the low byte, in bits 31:28.
+    #[inline]
+    const fn four(self, samples: u32) -> u32 {
+        (samples & self.mask).wrapping_mul(self.factor) & 0xf000_0000
     }
 }
 
@@ -127,8 +193,7 @@ impl Alignment {
     /// # Errors
     /// [`Error::Truncated`] if the samples end before the answer.
     pub fn bits(self, samples: &[u8]) -> Result<u64, Error> {
-        room(samples, self.delay)?;
-        Ok(answer_at(self.index.bits(samples), self.delay))
+        self.read(samples).map(|(bits, _)| bits)
     }
 
     /// Bits and edges of the answer.
@@ -136,35 +201,47 @@ impl Alignment {
     /// # Errors
     /// [`Error::Truncated`] if the samples end before the answer.
     pub fn read(self, samples: &[u8]) -> Result<(u64, EdgeWatch), Error> {
-        Ok((self.bits(samples)?, self.edges(samples)))
+        let from = usize::from(self.delay.get());
+        let Some((before, answer)) = samples.split_at_checked(from) else { return Err(short(samples, self.delay)) };
+        let Some(answer) = answer.first_chunk::<{ ANSWER_BITS as usize }>() else {
+            return Err(short(samples, self.delay));
+        };
+        // The line is high before the first byte.
+        let mut watch = WordWatch::new(before.last().is_none_or(|byte| byte & 1 == 1));
+        let gather = Gather::new(self.index);
+        // Eight and seven words, then one byte.
+        let Some((first, rest)) = answer.split_at_checked(32) else { return Err(short(samples, self.delay)) };
+        let Some((last, second)) = rest.split_last() else { return Err(short(samples, self.delay)) };
+        let low = gather.all(first, &mut watch);
+        let high = gather.all(second, &mut watch);
+        let mut watch = watch.finish();
+        watch.step(*last);
+        let high = high >> 4 | u32::from(self.index.bit(*last)) << 28;
+        Ok((u64::from(low) | u64::from(high) << 32, watch))
     }
 
     /// RSSI of the answer: the smallest over its bits (HDSL Protocol Design).
-    pub fn rssi(self, samples: &[u8]) -> Rssi {
-        self.edges(samples).rssi()
-    }
-
-    /// All edges of the answer, by sample period.
-    pub fn edges(self, samples: &[u8]) -> EdgeWatch {
-        let from = usize::from(self.delay.get());
-        let before = from.checked_sub(1).and_then(|at| samples.get(at)).is_none_or(|byte| byte & 1 == 1);
-        let mut watch = EdgeWatch::new(before);
-        for byte in samples.iter().skip(from).take(ANSWER_BITS as usize) {
-            watch.step(*byte);
-        }
-        watch
+    ///
+    /// # Errors
+    /// [`Error::Truncated`] if the samples end before the answer.
+    pub fn rssi(self, samples: &[u8]) -> Result<Rssi, Error> {
+        self.read(samples).map(|(_, watch)| watch.rssi())
     }
 }
 
 /// How many bytes there are beyond those of an answer that begins after `delay`; 255 at most.
 fn room(samples: &[u8], delay: Delay) -> Result<u8, Error> {
     let want = usize::from(delay.get()).saturating_add(ANSWER_BITS as usize);
-    match samples.len().checked_sub(want) {
-        Some(rest) => Ok(u8::try_from(rest).unwrap_or(u8::MAX)),
-        None => Err(Error::Truncated {
-            got: u16::try_from(samples.len()).unwrap_or(u16::MAX),
-            want: u16::try_from(want).unwrap_or(u16::MAX),
-        }),
+    let rest = samples.len().checked_sub(want).ok_or_else(|| short(samples, delay))?;
+    Ok(u8::try_from(rest).unwrap_or(u8::MAX))
+}
+
+#[cold]
+fn short(samples: &[u8], delay: Delay) -> Error {
+    let want = usize::from(delay.get()).saturating_add(ANSWER_BITS as usize);
+    Error::Truncated {
+        got: u16::try_from(samples.len()).unwrap_or(u16::MAX),
+        want: u16::try_from(want).unwrap_or(u16::MAX),
     }
 }
 
@@ -213,7 +290,7 @@ mod tests {
             let got = got.unwrap();
             assert_eq!(u32::from(got.index.get()), (delay + 4) % 8);
             assert_eq!(u32::from(got.delay.get()), (delay + 4) / 8);
-            assert_eq!(got.rssi(&line(TEST_PATTERN, delay)).get(), 12);
+            assert_eq!(got.rssi(&line(TEST_PATTERN, delay)).map(Rssi::get), Ok(12));
             for bits in [0, 0x0123_4567_89ab_cdef, u64::MAX >> 3] {
                 assert_eq!(got.bits(&line(bits, delay)), Ok(bits & u64::MAX >> 3));
             }
@@ -222,6 +299,37 @@ mod tests {
         assert_eq!(Alignment::learn(EdgeRule::All, &[0xff; 60]), Err(Error::Truncated { got: 60, want: 61 }));
         let late = Alignment { index: SampleIndex::truncate(4), delay: Delay(5) };
         assert_eq!(late.bits(&[0; 65]), Err(Error::Truncated { got: 65, want: 66 }));
+    }
+
+    /// Four bytes at a time against one by one, at all indices and delays, with edges anywhere.
+    #[test]
+    fn words_equal_bytes() {
+        let mut seed = 1_u32;
+        let mut noise = || {
+            seed = seed.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            (seed >> 24) as u8
+        };
+        for round in 0..if cfg!(miri) { 2 } else { 200 } {
+            let mut samples = line(0x0f0f_3355_1234_5678, 3 + round % 40);
+            for byte in &mut samples {
+                // From clean to nothing but noise.
+                *byte ^= if u32::from(noise()) < round { noise() } else { 0 };
+            }
+            for index in 0..8 {
+                let index = SampleIndex::truncate(index);
+                let slow = (0..72).fold(0_u128, |bits, at| bits | u128::from(index.bit(samples[at])) << at);
+                assert_eq!(index.bits(&samples), slow);
+                for delay in (0..=11).map_while(Delay::new) {
+                    let from = usize::from(delay.get());
+                    let mut watch = EdgeWatch::new(from == 0 || samples[from - 1] & 1 == 1);
+                    for byte in &samples[from..from + 61] {
+                        watch.step(*byte);
+                    }
+                    let bits = (slow >> from) as u64 & (u64::MAX >> 3);
+                    assert_eq!(Alignment { index, delay }.read(&samples), Ok((bits, watch)));
+                }
+            }
+        }
     }
 
     /// Every wrong bit of the pattern is refused.

@@ -15,7 +15,7 @@
 mod table;
 
 use table::{CONTROL, CONTROLS, DATA, DECODE, INVALID, MINUS, PLUS, REDUCED, SPECIAL};
-pub(crate) use table::{FOUR_MORE_ZEROS, SIX_MORE_ZEROS};
+pub(crate) use table::{FOUR_MORE_ZEROS, NEUTRAL, SIX_MORE_ZEROS};
 
 use core::fmt;
 

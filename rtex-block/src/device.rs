@@ -6,6 +6,8 @@
 mod check;
 mod config;
 mod drive;
+mod literals;
+mod manners;
 mod motion;
 mod parameters;
 mod profile;
@@ -13,3 +15,4 @@ mod profile;
 pub use check::{Verdict, check};
 pub use config::{DriveConfig, OpenCodes};
 pub use drive::Drive;
+pub use manners::Manners;

@@ -3,7 +3,7 @@ use core::fmt;
 use crate::block::join;
 use crate::code::NonCyclicCode;
 use crate::error::Error;
-use crate::type_code::{Nibble, TypeCode};
+use crate::type_code::{Nibble, TypeCode, homing, parameter};
 
 /// Bytes 8-15 of a command with the layout that five non-cyclic commands share.
 ///
@@ -91,6 +91,39 @@ impl NonCyclicCommand {
             Self::Parameter(_) => NonCyclicCode::Parameter,
             Self::Profile { .. } => NonCyclicCode::Profile,
             Self::Monitor(_) => NonCyclicCode::Monitor,
+        }
+    }
+
+    /// Whether bytes 12-15 belong to the command itself, so that no feed-forward can be sent: homing types 21h and 22h,
+    /// parameter write (011h), profile. SX-DSV02310, "Feed-forward".
+    pub const fn needs_data3(&self) -> bool {
+        match self {
+            Self::Homing { type_code: homing::SET_ACTUAL_POSITION | homing::SET_COMMAND_POSITION, .. }
+            | Self::Profile { .. } => true,
+            Self::Parameter(a) => a.type_code.get() == parameter::WRITE.get(),
+            _ => false,
+        }
+    }
+
+    /// With a feed-forward in bytes 12-15, unless it is 0 or the command needs them itself.
+    #[must_use]
+    pub fn with_feed_forward(self, value: i32) -> Self {
+        if value == 0 || self.needs_data3() {
+            return self;
+        }
+        let with = |a: Arguments| Arguments { data: value, ..a };
+        match self {
+            Self::Normal { command_data2, .. } => Self::Normal { command_data2, command_data3: value },
+            Self::Reset(a) => Self::Reset(with(a)),
+            Self::SystemId(a) => Self::SystemId(with(a)),
+            Self::Alarm(a) => Self::Alarm(with(a)),
+            Self::Parameter(a) => Self::Parameter(with(a)),
+            Self::Monitor(a) => Self::Monitor(with(a)),
+            Self::Homing { type_code, latch_sel1, latch_sel2, monitor_sel, .. } => {
+                Self::Homing { type_code, latch_sel1, latch_sel2, monitor_sel, setting_data: value }
+            }
+            // Never: it needs them itself.
+            Self::Profile { .. } => self,
         }
     }
 

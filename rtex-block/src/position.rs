@@ -63,6 +63,27 @@ pub const fn max_step(update_ns: u32, gear: Gear) -> u32 {
     if steps > u32::MAX as u128 { u32::MAX } else { steps as u32 }
 }
 
+/// Largest step of the command position in an update period at a speed, command units, rounded down: for the over-speed
+/// level of a drive, given in command units per second.
+#[expect(clippy::cast_possible_truncation, reason = "compared just before")]
+pub const fn max_step_at(units_per_s: u32, update_ns: u32) -> u32 {
+    let nano_units = (units_per_s as u64).saturating_mul(update_ns as u64);
+    let steps = nano_units / 1_000_000_000;
+    if steps > u32::MAX as u64 { u32::MAX } else { steps as u32 }
+}
+
+/// Largest torque command in 0.1 % of rated, rounded down, from the parameters of a linear drive: `peak` is Pr9.07 (peak
+/// current) and `rated` Pr9.06 (rated current, r.m.s.), both in 0.1 A. `None` if `rated` is 0.
+///
+/// 100 % x Pr9.07 / (Pr9.06 x sqrt 2). SX-DSV02310, "Command torque"; the root sign is lost in the text at hand and follows
+/// from a peak over an r.m.s. value.
+pub fn max_torque(peak: u16, rated: u16) -> Option<u32> {
+    let thousandfold = u128::from(peak).saturating_mul(1_000);
+    let squared = thousandfold.saturating_mul(thousandfold);
+    let root = squared.checked_div(u128::from(rated).saturating_mul(rated.into()).saturating_mul(2))?.isqrt();
+    u32::try_from(root).ok()
+}
+
 /// Whether a step stays within [`max_step`].
 pub const fn is_within_limit(step: i32, update_ns: u32, gear: Gear) -> bool {
     step.unsigned_abs() <= max_step(update_ns, gear)
@@ -82,6 +103,25 @@ mod tests {
         assert_eq!(max_step(u32::MAX, Gear::new(1, u32::MAX).unwrap()), u32::MAX);
         assert_eq!(Gear::new(0, 1), None);
         assert_eq!(Gear::new(1, 0), None);
+    }
+
+    /// The formula of SX-DSV02310, section "Command torque", by hand: 100 % x 141.4 A / (100.0 A x 1.41421) = 99.98 %.
+    #[test]
+    fn torque_limit() {
+        assert_eq!(max_torque(1_414, 1_000), Some(999));
+        assert_eq!(max_torque(1_415, 1_000), Some(1_000));
+        assert_eq!(max_torque(6_000, 1_414), Some(3_000));
+        assert_eq!(max_torque(0, 5), Some(0));
+        assert_eq!(max_torque(5, 0), None);
+        assert_eq!(max_torque(u16::MAX, 1), Some(46_340_242));
+    }
+
+    #[test]
+    fn steps_at_a_speed() {
+        assert_eq!(max_step_at(400_000_000, 500_000), 200_000);
+        assert_eq!(max_step_at(1_999, 500_000), 0);
+        assert_eq!(max_step_at(2_000, 500_000), 1);
+        assert_eq!(max_step_at(u32::MAX, u32::MAX), u32::MAX);
     }
 
     proptest! {

@@ -54,9 +54,10 @@ fn names_and_pairs_hold_what_is_defined() {
         refused::<Gear>(gear);
     }
     assert_eq!(serde_json::from_str::<Gear>("[3,2]").ok(), Gear::new(3, 2));
-    refused::<Limits>(r#"{"echo":0,"ready":1,"active":1,"inactive":1,"answer":1,"command_errors":1}"#);
+    refused::<Limits>(r#"{"echo":0,"ready":1,"active":1,"inactive":1,"answer":1,"stop":1,"command_errors":1}"#);
     let config = r#"{"mac_id":ID,"mode":"CyclicPosition","update_ns":500000,"gear":[1,1],
-        "limits":{"echo":1,"ready":1,"active":1,"inactive":1,"answer":1,"command_errors":1}}"#;
+        "over_speed":null,"max_speed":null,"max_torque":5,"stop":{"Decelerate":{"per_update":5}},
+        "limits":{"echo":1,"ready":1,"active":1,"inactive":1,"answer":1,"stop":1,"command_errors":1}}"#;
     assert!(serde_json::from_str::<AxisConfig>(&config.replace("ID", "31")).is_ok());
     refused::<AxisConfig>(&config.replace("ID", "32"));
 }

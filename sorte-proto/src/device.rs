@@ -27,7 +27,7 @@ use crate::frame_type::FrameType;
 use crate::line_delay::LineDelay;
 use crate::param::Parameters;
 use crate::status::Status;
-use crate::sync::Sync;
+use crate::sync::{Sync, TRIGGER_TO_CAPTURE_NS};
 use crate::timing::{TRIGGER_NS, published_send_time_ns};
 
 /// One of the two ports.
@@ -120,6 +120,8 @@ pub struct Device {
     line: LineDelay,
     clock: Clock,
     last_sync: Option<(Sync, u32)>,
+    /// Delay from the master in ns.
+    way_ns: Option<u32>,
     received: bool,
     missed: u8,
     /// When a frame of the present state came last.
@@ -142,6 +144,7 @@ impl Device {
             line: LineDelay::new(config.delay_model),
             clock: Clock::new(),
             last_sync: None,
+            way_ns: None,
             received: false,
             missed: 0,
             alive_ns: 0,
@@ -221,10 +224,32 @@ impl Device {
         self.last_sync.map(|(_, sof_ns)| sof_ns.wrapping_add(10_000))
     }
 
+    /// Own counter at the start of the first cycle of the IO exchange, in the common time: the master triggers its first
+    /// frame one SYNC period of 10 us after the last SYNC frame, and a cycle begins 500 ns before its trigger.
+    pub fn first_cycle_ns(&self) -> Option<u32> {
+        let ((sync, _), delay_ns) = (self.last_sync?, self.way_ns?);
+        let sent_ns = sync.time_stamp_ns.wrapping_sub(TRIGGER_TO_CAPTURE_NS).wrapping_sub(delay_ns);
+        Some(sent_ns.wrapping_add(10_000).wrapping_sub(TRIGGER_NS))
+    }
+
     /// When to send the own frame, in ns of the common time.
     pub fn send_time_ns(&self) -> Option<u32> {
-        let published = self.assignment.map(|a| published_send_time_ns(a.address));
-        self.config.send_time_ns.or(published)
+        let address = self.assignment?.address;
+        let slot = self.config.slot_ns.map(|slot| {
+            let slots = slot.saturating_mul(address.hops_before().into());
+            TRIGGER_NS.saturating_add(slots).saturating_sub(self.delay_ns().unwrap_or_default())
+        });
+        self.config.send_time_ns.or(slot).or_else(|| Some(published_send_time_ns(address)))
+    }
+
+    /// Delay from the master in ns, from the last SYNC frame; beyond 65,535 ns only if the master tells the period of its
+    /// SYNC frames, see [`Sync::long_delay_ns`].
+    pub fn delay_ns(&self) -> Option<u32> {
+        let (sync, _) = self.last_sync?;
+        // PARAM: a period of its own, in ticks of 5 ns.
+        let ticks = self.parameters().map(|parameters| parameters.sync_cycle).filter(|ticks| *ticks > 1000);
+        let long = ticks.and_then(|ticks| sync.long_delay_ns(ticks.saturating_mul(5)));
+        Some(long.unwrap_or(sync.delay_ns.into()))
     }
 
     /// The links have changed. With one link the device is the last one, and that port faces the master. A device that
@@ -336,6 +361,7 @@ impl Device {
             Learnt::Place(assignment) => self.assignment = Some(assignment),
             Learnt::Sync(sync) => {
                 self.last_sync = Some((sync, arrival.sof_ns));
+                self.way_ns = self.delay_ns();
                 handled.correction = self.clock.frame(sync.time_stamp_ns, arrival.sof_ns, arrival.counter_ns);
             }
             Learnt::Parameters(bytes) if master && state == State::Param => {
@@ -429,18 +455,18 @@ impl Device {
     /// As [`MasterFrameView::new`] and [`MasterFrameView::slice`]; [`Error::WrongState`] if the device is not in
     /// IO exchange. The frame counts as received even so.
     pub fn exchange<'a>(&mut self, frame: &'a [u8], sof_ns: u32, counter_ns: u32) -> Result<Output<'a>, Error> {
-        let (State::Exchange, Some(place), Some((sync, _))) = (self.state(), self.assignment, self.last_sync) else {
+        let (State::Exchange, Some(place), Some(delay_ns)) = (self.state(), self.assignment, self.way_ns) else {
             return Err(Error::WrongState);
         };
         self.received = true;
         let output_len = self.config.output_len.or(self.output_total).unwrap_or_default();
         let taken = MasterFrameView::new(output_len.into(), frame).and_then(|view| {
-            Ok((view.slice(place.out_offset, self.config.lengths.output)?, view.reference_ns(sync.delay_ns)))
+            Ok((view.slice(place.out_offset, self.config.lengths.output)?, view.reference_ns(delay_ns)))
         });
         self.count(taken.map(|_| ()));
         let (data, reference_ns) = taken?;
         // Start 500 ns into the cycle, and the way here.
-        let expected = u32::from(sync.delay_ns).saturating_add(TRIGGER_NS);
+        let expected = delay_ns.saturating_add(TRIGGER_NS);
         Ok(Output { data, reference_ns, correction: self.clock.frame(expected, sof_ns, counter_ns) })
     }
 

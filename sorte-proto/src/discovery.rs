@@ -2,7 +2,7 @@ use core::fmt;
 
 use crate::address::DeviceAddress;
 use crate::error::Error;
-use crate::frame::{LongFrame, count, emit};
+use crate::frame::{LongFrame, MULTICAST, count, emit, refresh_fcs};
 use crate::frame_type::FrameType;
 use crate::status::Status;
 
@@ -162,6 +162,21 @@ impl Discovery {
         }
     }
 
+    /// [`request`](Self::request) written into a buffer, without a frame of its own on the stack; gives its length.
+    ///
+    /// # Errors
+    /// [`Error::BufferTooSmall`]
+    pub fn write_request(last: bool, into: &mut [u8]) -> Result<usize, Error> {
+        let frame = room(into, Self::LEN)?;
+        frame.fill(0);
+        let status = if last { Status::FINAL } else { Status::DISCOVERY };
+        if let [da, _, code, flags, ..] = frame {
+            (*da, *code, *flags) = (MULTICAST, FrameType::Discovery.code(), status.bits());
+        }
+        refresh_fcs(frame);
+        Ok(Self::LEN)
+    }
+
     /// As the published master sends it: its table is filled with a debug pattern, 31 blocks of 32 bytes holding the
     /// words 16, 48, 80, ... and then 0xBEEF.
     pub fn published_request(last: bool) -> Self {
@@ -263,15 +278,23 @@ impl Network {
     /// # Errors
     /// [`Error::TooManyDevices`], [`Error::TableMismatch`]
     pub fn new(answer: DiscoveryView<'_>) -> Result<Self, Error> {
-        let devices = answer.count();
         let mut network = Self::EMPTY;
-        network.devices = match u8::try_from(devices) {
+        network.take(answer)?;
+        Ok(network)
+    }
+
+    /// The same in place: a kilobyte that is not copied. A refusal leaves the network as it was.
+    ///
+    /// # Errors
+    /// As [`new`](Self::new).
+    pub fn take(&mut self, answer: DiscoveryView<'_>) -> Result<(), Error> {
+        let count = answer.count();
+        let devices = match u8::try_from(count) {
             Ok(n) if usize::from(n) <= MAX_DEVICES => n,
-            _ => return Err(Error::TooManyDevices { count: devices }),
+            _ => return Err(Error::TooManyDevices { count }),
         };
         let (mut input, mut output) = (0u16, 0u16);
-        for (to, entry) in network.entries.iter_mut().zip(answer.entries()) {
-            *to = entry;
+        for entry in answer.entries() {
             (input, output) = (input.saturating_add(entry.input), output.saturating_add(entry.output));
         }
         for (got, want) in [(answer.input_total(), input), (answer.output_total(), output)] {
@@ -280,8 +303,9 @@ impl Network {
                 return Err(Error::TableMismatch { got, want });
             }
         }
-        (network.input_total, network.output_total) = (input, output);
-        Ok(network)
+        self.entries.iter_mut().zip(answer.entries()).for_each(|(to, entry)| *to = entry);
+        (self.devices, self.input_total, self.output_total) = (devices, input, output);
+        Ok(())
     }
 
     /// Devices in the line, 0..=254.
@@ -396,7 +420,6 @@ mod tests {
     use std::vec::Vec;
 
     use super::*;
-    use crate::frame::refresh_fcs;
 
     fn pass_all(lengths: &[Entry]) -> Discovery {
         let mut frame = Discovery::request(false);
@@ -415,6 +438,17 @@ mod tests {
         let network = Network::new(DiscoveryView::new(&bytes).unwrap()).unwrap();
         assert_eq!((network.devices(), network.input_total(), network.output_total()), (254, 1016, 1016));
         assert_eq!(network.assignments().last().unwrap().0.out_offset, 1012);
+    }
+
+    #[test]
+    fn a_request_without_a_copy_is_the_same() {
+        for last in [false, true] {
+            let mut buffer = [0x55; 1031];
+            assert_eq!(Discovery::write_request(last, &mut buffer), Ok(1030));
+            assert_eq!((&buffer[..1030], buffer[1030]), (&Discovery::request(last).emit()[..], 0x55));
+        }
+        let error = Error::BufferTooSmall { got: 1029, want: 1030 };
+        assert_eq!(Discovery::write_request(true, &mut [0; 1029]), Err(error));
     }
 
     #[test]

@@ -184,6 +184,20 @@ servowire_core::errors! {
             /// Who sent the frame.
             address: u8,
         },
+        /// The last device is further away than the 16 bits of the delay in SYNC can say.
+        #[error("the last device is {delay_ns} ns away, the delay field of SYNC ends at 65535 ns")]
+        LineTooLong {
+            /// Its delay from the master.
+            delay_ns: u32,
+        },
+        /// The cycle is too short for the line.
+        #[error("the cycle is too short from device {device} on, which needs {needs_ns} ns")]
+        CycleTooShort {
+            /// The first device that does not fit.
+            device: u8,
+            /// The cycle that it needs.
+            needs_ns: u32,
+        },
         /// The link of the master is down.
         #[error("the link is down")]
         LinkDown,

@@ -81,9 +81,8 @@ impl<'a> MasterFrameView<'a> {
     }
 
     /// The master's time at the start of the frame as the device at a distance of `delay_ns` sees it.
-    pub const fn reference_ns(self, delay_ns: u16) -> u32 {
-        // Two 16-bit numbers: the sum cannot pass u32.
-        (self.time_stamp as u32).saturating_add(delay_ns as u32)
+    pub const fn reference_ns(self, delay_ns: u32) -> u32 {
+        (self.time_stamp as u32).saturating_add(delay_ns)
     }
 
     /// Whether the time stamp is at most `window_ns` from `expected` (both wrap): the only check it can have.

@@ -21,7 +21,8 @@
 //!
 //! [`Variant::Published`] does what the published device does, register write for register write; with steps 4 us
 //! apart and random phases some 5 to 7 % of them come a cycle late or not at all. [`Variant::Lossless`] keeps every
-//! step, as long as the handler runs within 590 ns and steps are at least 4000 ns apart.
+//! step, as long as the last register write of an event is made within less than 600 ns and steps are at least 4000 ns
+//! apart. The CMP6 handler with a deferred pulse has the most, seven: with `w` ns for each, latency + 7 w < 600.
 //!
 //! Events that are pending together are served in the order CMP6, CMP0, CMP7.
 //!
@@ -47,7 +48,11 @@ pub const PULSE_NS: u16 = 2000;
 pub const CMP7_NS: u16 = 2000;
 /// CMP1 of a pulse programmed late, in ns: two ticks before the next cycle.
 pub const LATE_CMP1_NS: u16 = 3990;
-/// The longest time from an event to its handler for which [`Variant::Lossless`] is proved, in ns.
+/// The longest time from an event to the last of its register writes for which [`Variant::Lossless`] is proved, in ns.
+///
+/// The proof is a walk over all phases of a step at every latency in ticks of 5 ns, over pairs of phases, and over writes
+/// of 0 to 60 ns as events of their own, against the timer of [`iep`](crate::iep). At 600 ns the same walk loses steps: a
+/// pulse that ends 3386 ns into the cycle leaves 604 ns until CMP1 of the one deferred behind it.
 pub const MAX_LATENCY_NS: u16 = 590;
 
 /// CMP_CFG of an idle output: CMP0 resets the counter, CMP0 and CMP7 are enabled. Bit n+1 enables CMPn.

@@ -3,6 +3,7 @@
 #![allow(
     clippy::arithmetic_side_effects,
     clippy::cast_possible_truncation,
+    clippy::cast_possible_wrap,
     clippy::indexing_slicing,
     clippy::panic,
     clippy::std_instead_of_core,
@@ -12,7 +13,7 @@
 use proptest::prelude::*;
 use sorte_proto::device::{self, Arrival, Device, Handled, Path, PortId, Trigger};
 use sorte_proto::master::{self, Action, Master};
-use sorte_proto::{Correction, Discovery, Error, ErrorClass, FrameType, Parameters};
+use sorte_proto::{Correction, Discovery, Entry, Error, ErrorClass, FrameType, Parameters};
 
 /// A device's counter: right after SYNC it should read the master's time.
 #[derive(Clone, Copy)]
@@ -199,7 +200,8 @@ impl Line {
             let taken = self.exchange(&output, at_ns, time_stamp);
             for (k, data) in taken.into_iter().enumerate() {
                 // A device that was plugged in just now is not in the exchange.
-                let own = output[4 * k..4 * k + 4].to_vec();
+                let entry = self.master.network().entries().get(k).map_or(4, |entry| usize::from(entry.output));
+                let own = output[entry * k..entry * (k + 1)].to_vec();
                 assert_eq!(data, if self.devices[k].assignment().is_some() { Ok(own) } else { Err(Error::WrongState) });
             }
             loop {
@@ -239,18 +241,127 @@ fn lines_of_all_lengths_start_and_exchange() {
     }
 }
 
-#[test]
-fn a_line_of_254_devices_starts() {
-    let mut line = Line::new(vec![10; 254]);
-    for device in &mut line.devices {
-        *device = Device::new(device::Config::new().with_output_len(None));
-    }
+/// 254 devices of which each has 85 ns of cable in front of it, and a byte of process data.
+fn full_line(config: master::Config) -> Line {
+    let mut line = Line::new(vec![85; 254]);
+    line.master = Master::new(config.with_sync_frames(64));
+    line.master.link(true);
+    let entry = Entry { input: 4, output: 1 };
+    let config = device::Config::new().with_output_len(None).with_lengths(entry).with_slot_ns(Some(880));
+    line.devices.fill(Device::new(config));
     line.plug(254);
+    line
+}
+
+#[test]
+fn a_line_that_the_delay_field_cannot_hold_is_refused_with_its_length() {
+    let mut line = full_line(master::Config::new().with_cycle_ns(224_000));
+    // 253 hops of 355 + 85 ns, less what the measurement of a hop loses, and the cable of the first.
+    let delay_ns = match line.start_up() {
+        Err(Error::LineTooLong { delay_ns }) => delay_ns,
+        other => panic!("{other:?}"),
+    };
+    assert!((253 * 430..=253 * 440 + 85).contains(&delay_ns), "{delay_ns}");
+}
+
+#[test]
+fn a_cycle_that_is_too_short_names_the_device_that_breaks_it() {
+    let mut line = full_line(master::Config::new().with_cycle_ns(40_000).with_long_line(true));
+    // The master frame of 261 bytes ends at 500 + 20,880 + 85 + 440 (a - 1) ns: above 40 us from a = 44 on, with 1 ns a hop
+    // lost in the measurement.
+    assert_eq!(line.start_up(), Err(Error::CycleTooShort { device: 44, needs_ns: 40_342 }));
+    let mut line = Line::new(vec![10; 5]);
+    assert_eq!(line.start_up(), Err(Error::CycleTooShort { device: 5, needs_ns: 4670 }));
+}
+
+/// The clocks agree at the end of the start-up and after ten thousand cycles, but for what the published measurement of
+/// the line delay loses: up to 8 ns a device.
+#[test]
+fn a_line_of_254_devices_keeps_its_time() {
+    let mut line = full_line(master::Config::new().with_cycle_ns(224_000).with_long_line(true));
     let first = line.start_up().unwrap();
     assert_eq!(line.master.network().devices(), 254);
-    assert_eq!(line.master.output_len(), 1016);
-    assert_eq!(line.devices.last().unwrap().assignment().unwrap().out_offset, 1012);
-    assert_eq!(line.cycles(first, 3), None);
+    assert_eq!(line.master.output_len(), 254);
+    assert_eq!(line.devices.last().unwrap().assignment().unwrap().out_offset, 253);
+    assert!(line.devices.last().unwrap().delay_ns().unwrap() > 65_535);
+    let check = |line: &Line, now_ns: u64| {
+        for (k, counter) in line.counters.iter().enumerate() {
+            let master_ns = now_ns - line.master.epoch_ns();
+            let error = i64::from(counter.at(now_ns).wrapping_sub(master_ns as u32) as i32);
+            assert!((-8 * k as i64 - 1..=1).contains(&error), "device {}: {error} ns", k + 1);
+        }
+    };
+    check(&line, first.0);
+    assert_eq!(line.cycles(first, 10_000), None);
+    check(&line, line.now_ns);
+    let slots: Vec<u32> = line.devices.iter().map(|device| device.send_time_ns().unwrap()).collect();
+    // 500 + 880 (a - 1) ns, less the way: back to back at the master.
+    for (k, slot) in slots.iter().enumerate() {
+        let arrival = i64::from(*slot) + 85 + 440 * k as i64;
+        assert!((arrival - (500 + 880 * k as i64)).abs() <= 8 * k as i64 + 1, "device {}", k + 1);
+    }
+}
+
+#[test]
+fn the_axes_may_come_to_rest_before_the_master_starts_again() {
+    let mut line = Line::new(vec![50; 2]);
+    line.master = Master::new(master::Config::new().with_sync_frames(64).with_stop_cycles(1000));
+    line.master.link(true);
+    for halt in [None, Some(30)] {
+        line.plug(2);
+        let mut first = line.start_up().unwrap();
+        assert_eq!(line.cycles(first, 10), None);
+        line.plug(1);
+        let (mut stopping, mut error) = (0, None);
+        for _ in 0..2000 {
+            let output = vec![0; usize::from(line.master.output_len())];
+            line.exchange(&output, first.0, first.1);
+            if halt == Some(stopping) {
+                line.master.halted();
+            }
+            loop {
+                match line.master.poll(line.now_ns) {
+                    Action::Wait { until_ns } => line.now_ns = until_ns,
+                    Action::Exchange { at_ns, time_stamp, stop, .. } => {
+                        assert!(stop || stopping == 0);
+                        stopping += u32::from(stop);
+                        first = (at_ns, time_stamp);
+                        break;
+                    }
+                    Action::Restart { error: why } => {
+                        error = Some(why);
+                        break;
+                    }
+                    Action::Send { .. } => panic!("start-up in the exchange"),
+                }
+            }
+            if error.is_some() {
+                break;
+            }
+        }
+        assert_eq!(error, Some(Error::TopologyChanged { address: 1 }));
+        assert_eq!(stopping, halt.unwrap_or(999));
+        line.now_ns += 30_000_000;
+        line.wait(line.now_ns + 1);
+    }
+}
+
+#[test]
+fn a_master_that_fails_again_and_again_stays_in_error() {
+    let mut line = Line::new(vec![50; 2]);
+    line.master = Master::new(master::Config::new().with_max_failures(3));
+    line.master.link(true);
+    line.plug(0);
+    for n in 1..=3 {
+        assert!(line.start_up().is_err());
+        assert_eq!(line.master.state() == master::State::Error, n == 3);
+    }
+    assert_eq!(line.master.poll(u64::MAX - 1), Action::Wait { until_ns: u64::MAX });
+    assert_eq!(line.master.receive(&[], 0), Err(Error::WrongState));
+    line.master.enable(false);
+    line.master.enable(true);
+    line.plug(2);
+    assert!(line.start_up().is_ok());
 }
 
 #[test]

@@ -2,6 +2,7 @@
 
 mod curve;
 mod cycle;
+mod homing;
 mod limits;
 mod mover;
 mod path;
@@ -13,6 +14,7 @@ mod slope;
 mod stepper;
 
 pub use cycle::{PtoMover, Reload, Reloads};
+pub use homing::{Homing, HomingConfig, HomingState};
 pub use limits::{Clock, Limits};
 pub use mover::{Mover, Pulse};
 pub use path::{AxisPulse, AxisSetup, LinePulses, Path};

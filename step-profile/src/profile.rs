@@ -55,6 +55,30 @@ impl<'t> Parameters<'t> {
         Self { steps_per_entry: steps, ..self }
     }
 
+    /// With the shortest ramp whose acceleration stays within `acceleration` in steps/s²: it sets the steps a ramp entry.
+    ///
+    /// The acceleration is that from the middle of a ramp entry to the middle of the next. Within it the speed jumps from entry
+    /// to entry, and the mean over the ramp is far below it; [`motion`](crate::motion) uses an acceleration fully. Call it
+    /// after [`with_table`](Self::with_table). An acceleration of 0, or one that needs longer entries than there are, is
+    /// refused by [`Profile::new`].
+    pub fn with_acceleration(self, acceleration: u32) -> Self {
+        // Hz · R = 65536·10^6. Speed at an entry s: 1000 f / s, time of it: K s / 1000 f.
+        let hz_squared = 65_536_000_000_u128.pow(2);
+        let constant = u128::from(self.speed.raw()).saturating_mul(self.speed.raw().into());
+        let needed = self.table.entries().windows(2).map(|pair| match *pair {
+            [slow, fast] => {
+                let (slow, fast) = (u128::from(slow), u128::from(fast));
+                let gain = slow.saturating_sub(fast).saturating_mul(2_000_000).saturating_mul(hz_squared);
+                let over = slow.saturating_mul(fast).saturating_mul(slow.saturating_add(fast)).saturating_mul(constant);
+                let steps = gain.checked_div(over.max(1)).unwrap_or(0).saturating_add(1);
+                steps.div_ceil(u128::from(acceleration).max(1))
+            }
+            _ => 0,
+        });
+        let steps = needed.max().and_then(|steps| u32::try_from(steps).ok()).unwrap_or(u32::MAX);
+        self.with_steps_per_entry(if acceleration == 0 { u32::MAX } else { steps.max(1) })
+    }
+
     /// With a sync_time before the first step, 0..=3999 ns.
     pub const fn with_init_sync(self, ns: u32) -> Self {
         Self { init_sync: ns, ..self }
@@ -216,6 +240,30 @@ mod tests {
         let steep = RampTable::new(entries).unwrap();
         let fastest = Parameters { table: &steep, ..Parameters::at(Speed::KHZ_250) };
         assert_eq!(Profile::new(fastest), Err(Error::StepTimeOverflow { speed: 262_144, limit: 65_536 }));
+    }
+
+    /// Between the middles of neighbouring entries, the acceleration is just within the limit.
+    #[test]
+    fn the_shortest_ramp_within_an_acceleration() {
+        let peak = |parameters: Parameters<'_>| {
+            let profile = Profile::new(parameters).unwrap();
+            let seconds = |entry| f64::from(profile.step_time_ns(entry)) / 1e9;
+            let k = f64::from(parameters.steps_per_entry);
+            let between = |entry| {
+                let (slow, fast) = (seconds(entry), seconds(entry + 1));
+                (1.0 / fast - 1.0 / slow) / (k * (slow + fast) / 2.0)
+            };
+            (0..31).map(between).fold(0.0, f64::max)
+        };
+        for (speed, limit) in [(Speed::KHZ_100, 1_000_000), (Speed::KHZ_250, 77_777), (Speed::KHZ_5, 50_000)] {
+            let parameters = Parameters::at(speed).with_acceleration(limit);
+            assert!(peak(parameters) <= f64::from(limit) * 1.000_01, "{} at {limit}", peak(parameters));
+            let k = parameters.steps_per_entry;
+            let one_less = parameters.with_steps_per_entry(k - 1);
+            assert!(k == 1 || peak(one_less) > f64::from(limit) * 0.999, "{k}");
+        }
+        let never = Profile::new(Parameters::at(Speed::KHZ_250).with_acceleration(0));
+        assert!(matches!(never, Err(Error::SegmentTooLong { .. })));
     }
 
     /// The product is cut above bit 47: 2^48 is the first that loses a bit.

@@ -5,7 +5,7 @@
 
 use tformat::device::{Device, Fault};
 use tformat::master::{Counters, Line, Progress, Transaction};
-use tformat::{Almc, BitRate, Error, Request, Resolution, Response, U24};
+use tformat::{Abm, Abs, Almc, BitRate, Error, Request, Resolution, Response};
 
 /// Time of one field at 2.5 Mbit/s.
 const FIELD_NS: u64 = 4_000;
@@ -17,7 +17,7 @@ fn main() -> Result<(), Error> {
 
     for cycle in 0..6_u32 {
         let now_ns = u64::from(cycle) * 125_000;
-        encoder.set_position(U24::truncate(0x7f_fff0 + cycle * 5), U24::truncate(41));
+        encoder.set_position(Abs::truncate(0x7f_fff0 + cycle * 5), Abm::truncate(41));
         // The cable is bad in the fourth cycle.
         encoder.set_fault(if cycle == 3 { Fault::FlipBit { at: 37 } } else { Fault::None });
 
@@ -48,11 +48,11 @@ fn read(encoder: &mut Device<6>, now_ns: u64) -> Result<Response, Error> {
     }
     if let Some(sent) = sent {
         for (k, byte) in (1..).zip(sent.frame.as_bytes()) {
-            let _ = transaction.byte(*byte, sent.at_ns + FIELD_NS * k);
+            let _ = transaction.bytes(&[*byte], sent.at_ns + FIELD_NS * k);
         }
     }
     match transaction.poll(now_ns + 100_000) {
-        Progress::Done { value, .. } => Ok(value),
+        Progress::Done { value, .. } => Ok(value.response),
         Progress::Failed { error, .. } => Err(error),
         Progress::Pending { .. } => unreachable!("100 us are longer than any time-out"),
     }

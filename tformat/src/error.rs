@@ -114,6 +114,20 @@ servowire_core::errors! {
             /// Requests made.
             tries: u16,
         },
+        /// The act was not done: fewer requests than it needs can have been taken, or the read-back shows it.
+        #[error("not done, after {sent} requests: {because}")]
+        NotDone {
+            /// Requests that the encoder may have taken.
+            sent: u8,
+            /// How it failed.
+            because: ErrorClass,
+        },
+        /// Whether the act was done is not known. Read back what can be read before it is tried again.
+        #[error("whether it was done is not known: {because}")]
+        EffectUnknown {
+            /// How it failed.
+            because: ErrorClass,
+        },
         /// A data field has bits set above the width of the encoder: the wrong resolution, or a damaged frame.
         #[error("data field {value:#08x} has bits set that this encoder leaves 0: {excess:#08x}")]
         UpperBits {

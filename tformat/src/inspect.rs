@@ -6,9 +6,9 @@
 //!
 //! ```
 //! use tformat::inspect::{Cause, inspect};
-//! use tformat::{Request, Response, SingleTurn, StatusField, U24};
+//! use tformat::{Abs, Request, Response, SingleTurn, StatusField};
 //!
-//! let answer = Response::ReadSingleTurn(SingleTurn { sf: StatusField::from_bits_retain(0), abs: U24::truncate(0x1d4b) });
+//! let answer = Response::ReadSingleTurn(SingleTurn { sf: StatusField::empty(), abs: Abs::truncate(0x1d4b) });
 //! // A and B exchanged: every level is inverted
 //! let report = inspect(Request::ReadSingleTurn, answer.emit().line().inverted());
 //! assert_eq!(report.cause, Some(Cause::LineInverted));

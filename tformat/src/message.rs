@@ -1,9 +1,9 @@
 //! What the responses carry.
 
 use nrz_line::{BitOrder, Window};
-use servowire_core::U24;
 
 use crate::address::Adf;
+use crate::count::{Abm, Abs};
 use crate::crc::check;
 use crate::data_id::{ControlField, DataId};
 use crate::error::Error;
@@ -18,7 +18,7 @@ pub struct SingleTurn {
     /// SF.
     pub sf: StatusField,
     /// ABS0..ABS2: position in the turn; its width is the encoder's, see [`Resolution`](crate::Resolution).
-    pub abs: U24,
+    pub abs: Abs,
 }
 
 /// The response to ID 1.
@@ -29,7 +29,7 @@ pub struct MultiTurn {
     /// SF.
     pub sf: StatusField,
     /// ABM0..ABM2: turns.
-    pub abm: U24,
+    pub abm: Abm,
 }
 
 /// The response to ID 2.
@@ -57,11 +57,11 @@ pub struct AllData {
     /// SF.
     pub sf: StatusField,
     /// ABS0..ABS2: position in the turn.
-    pub abs: U24,
+    pub abs: Abs,
     /// ENID.
     pub enid: u8,
     /// ABM0..ABM2: turns.
-    pub abm: U24,
+    pub abm: Abm,
     /// ALMC: the error byte.
     pub almc: Almc,
 }
@@ -148,9 +148,9 @@ impl AllData {
         let [_, sf, a0, a1, a2, enid, m0, m1, m2, almc, _] = *b;
         Self {
             sf: StatusField::from_bits_retain(sf),
-            abs: U24::from_le_bytes([a0, a1, a2]),
+            abs: Abs::from_le_bytes([a0, a1, a2]),
             enid,
-            abm: U24::from_le_bytes([m0, m1, m2]),
+            abm: Abm::from_le_bytes([m0, m1, m2]),
             almc: Almc::from_bits_retain(almc),
         }
     }

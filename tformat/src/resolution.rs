@@ -1,6 +1,7 @@
-use servowire_core::{OutOfRange, U24};
+use servowire_core::OutOfRange;
 
 use crate::address::{Address, Page};
+use crate::count::{Abm, Abs};
 use crate::error::Error;
 
 /// The widths of an encoder's data, and the size of its memory: what the wire does not say.
@@ -132,6 +133,11 @@ impl Resolution {
         self.signed_turns
     }
 
+    /// Whether bits above the widths are refused.
+    pub const fn checks_upper_bits(self) -> bool {
+        self.checks_upper_bits
+    }
+
     /// Pages of the EEPROM, 1..=8.
     pub const fn pages(self) -> u8 {
         self.pages
@@ -156,8 +162,8 @@ impl Resolution {
     ///
     /// # Errors
     /// [`Error::UpperBits`].
-    pub const fn single_turn(self, abs: U24) -> Result<u32, Error> {
-        self.cut(abs, self.abs_bits)
+    pub const fn single_turn(self, abs: Abs) -> Result<u32, Error> {
+        self.cut(abs.get(), self.abs_bits)
     }
 
     /// The number of turns.
@@ -165,8 +171,8 @@ impl Resolution {
     /// # Errors
     /// [`Error::UpperBits`].
     #[expect(clippy::cast_possible_wrap, reason = "24 bits fit")]
-    pub const fn turns(self, abm: U24) -> Result<i32, Error> {
-        match self.cut(abm, self.abm_bits) {
+    pub const fn turns(self, abm: Abm) -> Result<i32, Error> {
+        match self.cut(abm.get(), self.abm_bits) {
             Ok(turns) if self.signed_turns => Ok(sign_extend(turns, self.abm_bits)),
             Ok(turns) => Ok(turns as i32),
             Err(error) => Err(error),
@@ -177,7 +183,15 @@ impl Resolution {
     ///
     /// # Errors
     /// [`Error::UpperBits`] of ABS, then of ABM.
-    pub const fn position(self, abs: U24, abm: U24) -> Result<Position, Error> {
+    ///
+    /// ABS and ABM are types of their own: exchanging them does not compile.
+    ///
+    /// ```compile_fail
+    /// # let (resolution, abs, abm) = (tformat::Resolution::new(17, 16)?, tformat::Abs::MAX, tformat::Abm::MAX);
+    /// resolution.position(abm, abs);
+    /// # Ok::<(), tformat::OutOfRange>(())
+    /// ```
+    pub const fn position(self, abs: Abs, abm: Abm) -> Result<Position, Error> {
         match (self.single_turn(abs), self.turns(abm)) {
             (Ok(abs), Ok(turns)) => {
                 let combined = (turns as i64).wrapping_shl(self.abs_bits as u32) | abs as i64;
@@ -191,7 +205,7 @@ impl Resolution {
     ///
     /// # Errors
     /// [`Error::UpperBits`].
-    pub const fn fraction(self, abs: U24) -> Result<u32, Error> {
+    pub const fn fraction(self, abs: Abs) -> Result<u32, Error> {
         match self.single_turn(abs) {
             Ok(counts) => Ok(counts.wrapping_shl(32_u32.wrapping_sub(self.abs_bits as u32))),
             Err(error) => Err(error),
@@ -204,8 +218,7 @@ impl Resolution {
         sign_extend(to.wrapping_sub(from), self.abs_bits)
     }
 
-    const fn cut(self, field: U24, bits: u8) -> Result<u32, Error> {
-        let value = field.get();
+    const fn cut(self, value: u32, bits: u8) -> Result<u32, Error> {
         let mask = 1_u32.wrapping_shl(bits as u32).wrapping_sub(1);
         let excess = value & !mask;
         if excess != 0 && self.checks_upper_bits {
@@ -280,27 +293,31 @@ mod tests {
         Err(_) => panic!(),
     };
 
-    fn u24(value: u32) -> U24 {
-        U24::new(value).unwrap()
+    fn abs(value: u32) -> Abs {
+        Abs::new(value).unwrap()
+    }
+
+    fn abm(value: u32) -> Abm {
+        Abm::new(value).unwrap()
     }
 
     #[test]
     fn position_of_a_17_bit_encoder() {
-        let position = P17.position(u24(131_071), u24(0xffff)).unwrap();
+        let position = P17.position(abs(131_071), abm(0xffff)).unwrap();
         assert_eq!(position, Position { abs: 131_071, turns: -1, combined: -1 });
-        let unsigned = P17.with_unsigned_turns().position(u24(131_071), u24(0xffff)).unwrap();
+        let unsigned = P17.with_unsigned_turns().position(abs(131_071), abm(0xffff)).unwrap();
         assert_eq!((unsigned.turns, unsigned.combined), (65_535, 8_589_934_591));
-        assert_eq!(P17.fraction(u24(65_536)), Ok(1 << 31));
+        assert_eq!(P17.fraction(abs(65_536)), Ok(1 << 31));
     }
 
     #[test]
     fn upper_bits_are_refused_or_cut_off() {
-        assert_eq!(P17.single_turn(u24(0x2_0001)), Err(Error::UpperBits { value: 0x2_0001, excess: 0x2_0000 }));
-        assert_eq!(P17.turns(u24(0x1_0000)), Err(Error::UpperBits { value: 0x1_0000, excess: 0x1_0000 }));
-        assert_eq!(P17.with_upper_bits_ignored().single_turn(u24(0x2_0001)), Ok(1));
+        assert_eq!(P17.single_turn(abs(0x2_0001)), Err(Error::UpperBits { value: 0x2_0001, excess: 0x2_0000 }));
+        assert_eq!(P17.turns(abm(0x1_0000)), Err(Error::UpperBits { value: 0x1_0000, excess: 0x1_0000 }));
+        assert_eq!(P17.with_upper_bits_ignored().single_turn(abs(0x2_0001)), Ok(1));
         let single = Resolution::new(21, 0).unwrap();
-        assert_eq!(single.turns(u24(0)), Ok(0));
-        assert!(single.turns(u24(1)).is_err());
+        assert_eq!(single.turns(abm(0)), Ok(0));
+        assert!(single.turns(abm(1)).is_err());
     }
 
     #[test]
@@ -344,15 +361,15 @@ mod tests {
 
     proptest! {
         #[test]
-        fn combined_is_turns_and_counts(abs_bits in 1..=24_u8, abm_bits in 0..=24_u8, abs: u32, abm: u32, signed: bool) {
+        fn combined_is_turns_and_counts(abs_bits in 1..=24_u8, abm_bits in 0..=24_u8, low: u32, high: u32, signed: bool) {
             let resolution = Resolution::new(abs_bits, abm_bits).unwrap();
             let resolution = if signed { resolution } else { resolution.with_unsigned_turns() };
-            let (abs, abm) = (abs & ((1 << abs_bits) - 1), abm & ((1 << abm_bits) - 1));
-            let position = resolution.position(u24(abs), u24(abm)).unwrap();
+            let (low, high) = (low & ((1 << abs_bits) - 1), high & ((1 << abm_bits) - 1));
+            let position = resolution.position(abs(low), abm(high)).unwrap();
             let full = 1_i64 << abm_bits;
-            let turns = if signed && i64::from(abm) * 2 >= full && abm_bits > 0 { i64::from(abm) - full } else { i64::from(abm) };
+            let turns = if signed && i64::from(high) * 2 >= full && abm_bits > 0 { i64::from(high) - full } else { i64::from(high) };
             prop_assert_eq!(i64::from(position.turns), turns);
-            prop_assert_eq!(position.combined, turns * (1 << abs_bits) + i64::from(abs));
+            prop_assert_eq!(position.combined, turns * (1 << abs_bits) + i64::from(low));
         }
 
         #[test]

@@ -1,7 +1,7 @@
 use nrz_line::Window;
-use servowire_core::U24;
 
 use crate::address::Adf;
+use crate::count::{Abm, Abs};
 use crate::data_id::DataId;
 use crate::error::Error;
 use crate::frame::{Frame, faults4, faults6, unpack};
@@ -133,8 +133,8 @@ impl Response {
             Self::ReadSingleTurn(v)
             | Self::ResetErrors(v)
             | Self::SetSingleTurnZero(v)
-            | Self::ResetTurnsAndErrors(v) => Frame::of6(six_fields(cf, v.sf, v.abs)),
-            Self::ReadMultiTurn(v) => Frame::of6(six_fields(cf, v.sf, v.abm)),
+            | Self::ResetTurnsAndErrors(v) => Frame::of6(six_fields(cf, v.sf, v.abs.to_le_bytes())),
+            Self::ReadMultiTurn(v) => Frame::of6(six_fields(cf, v.sf, v.abm.to_le_bytes())),
             Self::ReadEncoderId(v) => Frame::of4([cf, v.sf.bits(), v.enid, cf ^ v.sf.bits() ^ v.enid]),
             Self::ReadAll(v) => Frame::of11(v.emit()),
             Self::WriteEeprom(v) | Self::ReadEeprom(v) => {
@@ -158,7 +158,7 @@ impl Response {
     }
 
     /// ABS, in the responses that carry it.
-    pub const fn abs(self) -> Option<U24> {
+    pub const fn abs(self) -> Option<Abs> {
         match self {
             Self::ReadAll(v) => Some(v.abs),
             Self::ReadMultiTurn(_) | Self::ReadEncoderId(_) | Self::WriteEeprom(_) | Self::ReadEeprom(_) => None,
@@ -193,10 +193,10 @@ impl Response {
     /// A response of six fields that were checked.
     #[inline]
     const fn of6(id: DataId, [_, sf, d0, d1, d2, _]: [u8; 6]) -> Self {
-        let (sf, data) = (StatusField::from_bits_retain(sf), U24::from_le_bytes([d0, d1, d2]));
-        let single = SingleTurn { sf, abs: data };
+        let (sf, data) = (StatusField::from_bits_retain(sf), [d0, d1, d2]);
+        let single = SingleTurn { sf, abs: Abs::from_le_bytes(data) };
         match id {
-            DataId::ReadMultiTurn => Self::ReadMultiTurn(MultiTurn { sf, abm: data }),
+            DataId::ReadMultiTurn => Self::ReadMultiTurn(MultiTurn { sf, abm: Abm::from_le_bytes(data) }),
             DataId::ResetErrors => Self::ResetErrors(single),
             DataId::SetSingleTurnZero => Self::SetSingleTurnZero(single),
             DataId::ResetTurnsAndErrors => Self::ResetTurnsAndErrors(single),
@@ -205,8 +205,8 @@ impl Response {
     }
 }
 
-const fn six_fields(cf: u8, sf: StatusField, data: U24) -> [u8; 6] {
-    let (sf, [d0, d1, d2]) = (sf.bits(), data.to_le_bytes());
+const fn six_fields(cf: u8, sf: StatusField, [d0, d1, d2]: [u8; 3]) -> [u8; 6] {
+    let sf = sf.bits();
     [cf, sf, d0, d1, d2, cf ^ sf ^ d0 ^ d1 ^ d2]
 }
 

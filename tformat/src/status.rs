@@ -148,6 +148,8 @@ mod tests {
         assert_eq!(names, ["OS", "FS", "CE", "OF", "OH", "ME", "BE", "BA"]);
         let latched: Vec<_> = Almc::LATCHED.iter_names().map(|(name, _)| name).collect();
         assert_eq!(latched, ["OS", "CE", "OF", "OH", "ME", "BE"]);
+        // SmartInc encoders have the full absolute status and the counting error.
+        assert_eq!(Almc::SMART_INC.to_string(), "FS CE");
         assert_eq!(Almc::from_bits_retain(0xc8).to_string(), "OF BE BA");
         assert_eq!(StatusField::from_bits_retain(0x51).to_string(), "DD0 EA0 CA0");
     }

@@ -6,11 +6,11 @@ use nrz_line::{Format, Receiver, Wave};
 use proptest::prelude::*;
 use tformat::device::{Device, Fault, Transmission};
 use tformat::master::{EEPROM_POLLING, EepromAccess, Line, Progress, Reset, Step, Transaction};
-use tformat::{Adf, Almc, BitRate, DataId, Error, Page, Request, Response, U24, Window};
+use tformat::{Abm, Abs, Adf, Almc, BitRate, DataId, Error, Page, Request, Response, Window};
 
 fn encoder() -> Device<6> {
     let mut device = Device::new(0x17, BitRate::Mbit2_5);
-    device.set_position(U24::truncate(0x51_2345), U24::truncate(0xfffe));
+    device.set_position(Abs::truncate(0x51_2345), Abm::truncate(0xfffe));
     device
 }
 
@@ -24,15 +24,15 @@ fn transact(device: &mut Device<6>, request: Request, now_ns: u64) -> (Result<Re
     let mut master = Transaction::start(request, Line::new(BitRate::Mbit2_5).with_echo(), now_ns);
     let sent = request.emit();
     for (k, byte) in (1..).zip(sent.as_bytes()) {
-        let _ = master.byte(*byte, now_ns + 4_000 * k);
+        let _ = master.bytes(&[*byte], now_ns + 4_000 * k);
     }
     if let Some(answer) = send(device, sent.as_bytes(), now_ns) {
         for (k, byte) in (1..).zip(answer.frame.as_bytes()) {
-            let _ = master.byte(*byte, answer.at_ns + 4_000 * k);
+            let _ = master.bytes(&[*byte], answer.at_ns + 4_000 * k);
         }
     }
     match master.progress() {
-        Progress::Done { value: response, .. } => (Ok(response), now_ns + 60_000),
+        Progress::Done { value, .. } => (Ok(value.response), now_ns + 60_000),
         Progress::Failed { error, .. } => (Err(error), now_ns + 60_000),
         Progress::Pending { until_ns } => match master.poll(until_ns + 1) {
             Progress::Failed { error, .. } => (Err(error), until_ns),
@@ -83,7 +83,7 @@ fn resets_do_what_the_table_says() {
     assert!(done.is_ok());
     assert_eq!((device.abs().get(), device.abm().get()), (0, 0xfffe));
     device.set_alarms(Almc::OH, false);
-    let (done, _) = run!(Reset::clear_turns_and_errors(), &mut device, now_ns);
+    let (done, _) = run!(Reset::clear_turns_and_lose_multi_turn_reference(), &mut device, now_ns);
     assert!(done.is_ok());
     assert_eq!((device.almc().bits(), device.abm().get()), (0, 0));
 }
@@ -164,8 +164,8 @@ fn both_ends_over_a_poor_line() {
     let mut seed = 0x5eed_0123_4567_89ab;
     let mut refused = 0;
     for k in 0..3_000_u64 {
-        let abs = U24::truncate(next(&mut seed) as u32 & 0x7f_ffff);
-        device.set_position(abs, U24::truncate(k as u32));
+        let abs = Abs::truncate(next(&mut seed) as u32 & 0x7f_ffff);
+        device.set_position(abs, Abm::truncate(k as u32));
         let (request, now_ns) = ([Request::ReadSingleTurn, Request::ReadAll][(k % 2) as usize], k * 1_000_000);
         let mut master = Transaction::start(request, Line::new(BitRate::Mbit2_5), now_ns);
         let heard = over_the_line(master.frame().line(), &mut seed, false);
@@ -175,12 +175,12 @@ fn both_ends_over_a_poor_line() {
         let cable_ns = next(&mut seed) % 1_000;
         for (n, (byte, framed)) in (1..).zip(over_the_line(reply.line, &mut seed, damaged)) {
             let at_ns = reply.at_ns + cable_ns + 4_000 * n;
-            let _ = if framed { master.byte(byte, at_ns) } else { master.framing_error(at_ns) };
+            let _ = if framed { master.bytes(&[byte], at_ns) } else { master.framing_error(at_ns) };
         }
         match master.poll(now_ns + 900_000) {
-            Progress::Done { value: response, .. } => {
+            Progress::Done { value, .. } => {
                 assert!(!damaged, "a wrong bit was not seen");
-                assert_eq!(response.abs(), Some(abs));
+                assert_eq!(value.response.abs(), Some(abs));
             }
             Progress::Failed { .. } => {
                 assert!(damaged);

@@ -7,8 +7,8 @@ use core::fmt::Debug;
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 use tformat::{
-    Address, Adf, AllData, Almc, BitRate, ControlField, DataId, Error, ErrorClass, Page, Request, Resolution, Response,
-    StatusField, U24, VendorCommand,
+    Abm, Abs, Address, Adf, AllData, Almc, BitRate, ControlField, DataId, Error, ErrorClass, Page, Request, Resolution,
+    Response, StatusField, VendorCommand,
 };
 
 fn refused<T: DeserializeOwned + Debug>(json: &str) -> String {
@@ -24,7 +24,8 @@ fn round_trip<T: Serialize + DeserializeOwned + PartialEq + Debug + Copy>(value:
 fn numbers_outside_their_range_are_refused() {
     assert!(refused::<Address>("128").contains("128 is out of range, the limit is 127"));
     assert!(refused::<Page>("8").contains("8 is out of range, the limit is 7"));
-    assert!(refused::<U24>("16777216").contains("out of range"));
+    assert!(refused::<Abs>("16777216").contains("out of range"));
+    assert!(refused::<Abm>("16777216").contains("out of range"));
     let inside = [serde_json::from_str::<Address>("127").is_ok(), serde_json::from_str::<Page>("7").is_ok()];
     assert_eq!(inside, [true, true]);
 }

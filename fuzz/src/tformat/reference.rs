@@ -1,8 +1,8 @@
 //! A decoder of answers as one would write it from the text: bit by bit, check by check.
 
 use tformat::{
-    Adf, AllData, Almc, DataId, Error, Identification, Memory, MultiTurn, Request, Response, SingleTurn, StatusField,
-    U24,
+    Abm, Abs, Adf, AllData, Almc, DataId, Error, Identification, Memory, MultiTurn, Request, Response, SingleTurn,
+    StatusField,
 };
 
 /// The control field of ID 3, with which an encoder answers a damaged request too.
@@ -65,20 +65,19 @@ fn data_bits(bits: &[bool]) -> u8 {
 }
 
 fn values(id: DataId, f: &[u8]) -> Response {
-    let number =
-        |at: usize| U24::truncate(u32::from(f[at]) + 256 * u32::from(f[at + 1]) + 65536 * u32::from(f[at + 2]));
+    let number = |at: usize| u32::from(f[at]) + 256 * u32::from(f[at + 1]) + 65536 * u32::from(f[at + 2]);
     let sf = StatusField::from_bits_retain(f[1]);
-    let single = || SingleTurn { sf, abs: number(2) };
+    let single = || SingleTurn { sf, abs: Abs::truncate(number(2)) };
     let memory = || Memory { adf: Adf::from_bits(f[1]), edf: f[2] };
     match id {
         DataId::ReadSingleTurn => Response::ReadSingleTurn(single()),
-        DataId::ReadMultiTurn => Response::ReadMultiTurn(MultiTurn { sf, abm: number(2) }),
+        DataId::ReadMultiTurn => Response::ReadMultiTurn(MultiTurn { sf, abm: Abm::truncate(number(2)) }),
         DataId::ReadEncoderId => Response::ReadEncoderId(Identification { sf, enid: f[2] }),
         DataId::ReadAll => Response::ReadAll(AllData {
             sf,
-            abs: number(2),
+            abs: Abs::truncate(number(2)),
             enid: f[5],
-            abm: number(6),
+            abm: Abm::truncate(number(6)),
             almc: Almc::from_bits_retain(f[9]),
         }),
         DataId::WriteEeprom => Response::WriteEeprom(memory()),

@@ -81,6 +81,11 @@ impl Data {
         Ok(data)
     }
 
+    /// Eight bytes.
+    pub const fn eight(bytes: [u8; 8]) -> Self {
+        Self { bytes, length: Length::Eight }
+    }
+
     /// All eight bytes, 0 after the data.
     pub const fn padded(&self) -> [u8; 8] {
         self.bytes

@@ -193,6 +193,7 @@ impl Requester {
         None
     }
 
+    #[cold]
     fn sent(&mut self) {
         if let Slot::Sending { request, tries } = self.short {
             self.short = Slot::Waiting { request, tries, frames: 0 };
@@ -259,20 +260,22 @@ impl Requester {
     }
 
     /// Counts the frames of waiting.
+    #[inline]
     fn count(&mut self, finished: &mut Finished) {
-        if let Slot::Waiting { request, tries, frames } = self.short {
-            if frames >= self.limits.short_frames {
+        if let Slot::Waiting { request, tries, frames } = &mut self.short {
+            if *frames >= self.limits.short_frames {
+                let (request, tries) = (*request, *tries);
                 finished.short = self.again(request, tries, Error::NoAnswer { tries });
             } else {
-                self.short = Slot::Waiting { request, tries, frames: frames.saturating_add(1) };
+                *frames = frames.saturating_add(1);
             }
         }
-        if let Slot::Waiting { request, tries, frames } = self.long {
-            if frames >= self.limits.long_frames {
+        if let Slot::Waiting { tries, frames, .. } = &mut self.long {
+            if *frames >= self.limits.long_frames {
+                finished.long = Some(Err(Error::NoAnswer { tries: *tries }));
                 self.long = Slot::Free;
-                finished.long = Some(Err(Error::NoAnswer { tries }));
             } else {
-                self.long = Slot::Waiting { request, tries, frames: frames.saturating_add(1) };
+                *frames = frames.saturating_add(1);
             }
         }
     }

@@ -1,3 +1,4 @@
+use super::manners::Manners;
 use crate::builder::builder;
 use crate::error_code::Alarm;
 use crate::header::MacId;
@@ -21,6 +22,14 @@ pub struct OpenCodes {
     pub alarm_history: TypeCode,
     /// Alarm: clear.
     pub alarm_clear: TypeCode,
+    /// Alarm: attributes of the one that is being issued, with Index 0.
+    pub alarm_attributes: TypeCode,
+    /// Parameter: read the initial value.
+    pub parameter_initial: TypeCode,
+    /// Homing: arm both latches.
+    pub latch_arm: u8,
+    /// Homing: a motion of the drive to its origin.
+    pub homing: u8,
     /// The alarm when no frame comes any more.
     pub communication_lost: Alarm,
 }
@@ -59,12 +68,18 @@ pub struct DriveConfig {
     pub in_position: u32,
     /// Near window of profile motion, command units.
     pub near: u32,
+    /// Attributes that it gives for every alarm.
+    pub alarm_attributes: i32,
+    /// How far the origin is from where homing starts, command units.
+    pub homing_distance: i32,
     /// What is not confirmed.
     pub codes: OpenCodes,
+    /// How impolite it is.
+    pub manners: Manners,
 }
 
 impl DriveConfig {
-    /// A drive at 0.5 ms, one communication an update, gear 1/1 and 2^20 units a revolution.
+    /// A polite drive at 0.5 ms, one communication an update, gear 1/1 and 2^20 units a revolution.
     pub const fn new(mac_id: MacId, codes: OpenCodes) -> Self {
         Self {
             mac_id,
@@ -81,7 +96,10 @@ impl DriveConfig {
             units_per_rev: 1 << 20,
             in_position: 20,
             near: 2_000,
+            alarm_attributes: 1,
+            homing_distance: -5_000,
             codes,
+            manners: Manners::POLITE,
         }
     }
 
@@ -99,5 +117,8 @@ impl DriveConfig {
         with_units_per_rev: units_per_rev, u32;
         with_in_position: in_position, u32;
         with_near: near, u32;
+        with_alarm_attributes: alarm_attributes, i32;
+        with_homing_distance: homing_distance, i32;
+        with_manners: manners, Manners;
     }
 }

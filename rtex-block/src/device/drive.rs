@@ -1,24 +1,30 @@
-mod service;
+mod execute;
+mod sub_block;
 
-use service::{Job, text};
+use execute::Job;
 
 use super::check::{Verdict, check};
 use super::config::DriveConfig;
+use super::literals::{
+    CP, CT, CV, ERR27_4, ERR86_2, ERR91_1, HARD_STOP, NOP, PAUSE, PP, PROFILE, PROFILE_IDLE, SERVO_ON, SMOOTH_STOP,
+    WRONG_MODE,
+};
 use super::motion::{Drivemode, Motion};
 use super::parameters::{ACCELERATION, DECELERATION, Parameters, RESPONSE_DATA, SPEED_UNIT, SUB_RESPONSE_DATA};
 use super::profile::Ramp;
 use crate::block::{BlockSize, LEN, LEN32};
-use crate::code::{Code, CyclicCode};
-use crate::command::CommandBlock;
-use crate::control::ControlBits;
+use crate::code::{Code, NonCyclicCode};
 use crate::error_code::{Alarm, ErrorCode};
 use crate::execution::Execution;
 use crate::header::{Header, UpdateCounter};
 use crate::noncyclic_command::NonCyclicCommand;
 use crate::response::Response;
 use crate::status::StatusFlags;
-use crate::sub::{Response32, SubCode, SubCommand, SubResponse, split32};
-use crate::type_code::{Nibble, Pr, TypeCode};
+use crate::sub::{Response32, SubResponse, split32};
+use crate::type_code::{Nibble, Pr};
+
+/// Command units per second.
+const HOMING_SPEED: i64 = 1_000_000;
 
 /// A model of a drive: every exchange takes a command block and gives a response block.
 ///
@@ -26,7 +32,8 @@ use crate::type_code::{Nibble, Pr, TypeCode};
 /// so the echo of a code comes one command later than the echo of the counter. Blocks with a fault in header or
 /// cyclic code are thrown away and the command before stays in force; if that lasts the drive raises Err86.
 ///
-/// The motor follows its command position as a first-order lag; that is a model for tests, not for tuning.
+/// It shares no number with the master, and is as late, forgetful and literal as its [`Manners`](super::Manners) say. The motor
+/// follows its command position as a first-order lag; that is a model for tests, not for tuning.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Drive {
@@ -38,18 +45,25 @@ pub struct Drive {
     warning: u16,
     homed: bool,
     latches: [Option<i32>; 2],
+    armed: [bool; 2],
+    homing: bool,
+    feed_forward: i32,
     main_power: bool,
     inputs: StatusFlags,
-    /// The command in force.
-    cyclic: CyclicCode,
-    control: ControlBits,
+    /// The command in force: cyclic code, Control_Bits, Command_Data1.
+    cyclic: u8,
+    control: u16,
     data1: i32,
     target_speed: i32,
     /// What the next response echoes.
-    echo: Code,
+    echo: u8,
     error: Option<ErrorCode>,
     job: Option<Job>,
+    /// The request before, whose echoes linger, and for how many answers.
+    stale: Option<(NonCyclicCommand, u16)>,
     sub: SubResponse,
+    /// Responses that are not out yet.
+    pending: [Response; 3],
     /// Supervision.
     exchanges: u16,
     faults: u16,
@@ -63,6 +77,26 @@ pub struct Drive {
 impl Drive {
     /// A drive that has just got control power; main power is on, and nothing has been received.
     pub const fn new(config: DriveConfig) -> Self {
+        let silent = Response {
+            mac_id: config.mac_id,
+            update_counter_echo: UpdateCounter::ZERO,
+            cmd_error: false,
+            code: Code::truncate(NOP),
+            status: StatusFlags::empty(),
+            response_data1: 0,
+            response_data2: 0,
+            response_data3: 0,
+        };
+        let sub = SubResponse {
+            cmd_error: false,
+            execution: Execution::empty(),
+            code: Nibble::ZERO,
+            type_code: 0,
+            index: 0,
+            data1: 0,
+            data2: 0,
+            data3: 0,
+        };
         Self {
             config,
             parameters: Parameters::DEFAULT,
@@ -70,27 +104,23 @@ impl Drive {
             alarm: None,
             history: [None; 14],
             warning: 0,
-            homed: false,
+            homed: config.manners.homed_at_start,
             latches: [None; 2],
+            armed: [false; 2],
+            homing: false,
+            feed_forward: 0,
             main_power: true,
             inputs: StatusFlags::empty(),
-            cyclic: CyclicCode::Nop,
-            control: ControlBits::empty(),
+            cyclic: NOP,
+            control: 0,
             data1: 0,
             target_speed: 0,
-            echo: Code::NOP,
+            echo: NOP,
             error: None,
             job: None,
-            sub: SubResponse {
-                cmd_error: false,
-                execution: Execution::empty(),
-                code: Nibble::ZERO,
-                type_code: 0,
-                index: 0,
-                data1: 0,
-                data2: 0,
-                data3: 0,
-            },
+            stale: None,
+            sub,
+            pending: [silent; 3],
             exchanges: 0,
             faults: 0,
             lost: 0,
@@ -128,7 +158,7 @@ impl Drive {
         self.tick();
     }
 
-    /// Servo_Active: the motor is energised.
+    /// The motor is energised. Servo_Active may say so for longer.
     pub const fn is_active(&self) -> bool {
         self.motion.is_active()
     }
@@ -136,6 +166,11 @@ impl Drive {
     /// APOS, command units.
     pub const fn position(&self) -> i32 {
         self.motion.actual
+    }
+
+    /// The feed-forward in force, from Command_Data3.
+    pub const fn feed_forward(&self) -> i32 {
+        self.feed_forward
     }
 
     /// The active alarm.
@@ -148,6 +183,11 @@ impl Drive {
         &self.config
     }
 
+    /// Other manners from now on.
+    pub const fn set_config(&mut self, config: DriveConfig) {
+        self.config = config;
+    }
+
     /// Raises an alarm: the motor is released at once. An alarm that is already there stays.
     pub fn raise(&mut self, alarm: Alarm) {
         if self.alarm.is_none() {
@@ -155,7 +195,7 @@ impl Drive {
             self.history.rotate_right(1);
             self.history[0] = Some(alarm);
         }
-        self.motion.release();
+        self.motion.release(0);
     }
 
     /// Clears the active alarm and the counts that lead to the next.
@@ -169,8 +209,13 @@ impl Drive {
     pub fn set_main_power(&mut self, on: bool) {
         self.main_power = on;
         if !on {
-            self.motion.release();
+            self.motion.release(0);
         }
+    }
+
+    /// The motor is released without an alarm, and Servo_Ready stays 1.
+    pub fn drop_servo(&mut self) {
+        self.motion.release(0);
     }
 
     /// Puts a warning; 0 for none.
@@ -184,14 +229,14 @@ impl Drive {
         self.inputs = StatusFlags::from_bytes([0, high]);
     }
 
-    /// Catches the actual position in LPOS1, as the trigger of latch 1 does.
-    pub const fn catch_latch1(&mut self) {
-        self.latches[0] = Some(self.motion.actual);
-    }
-
-    /// Catches the actual position in LPOS2, as the trigger of latch 2 does.
-    pub const fn catch_latch2(&mut self) {
-        self.latches[1] = Some(self.motion.actual);
+    /// The trigger of latch 1 or 2: catches the actual position, if the latch is armed.
+    pub fn trigger(&mut self, latch: usize) {
+        let actual = self.motion.actual;
+        let places = self.armed.iter_mut().zip(&mut self.latches);
+        if let Some((armed, caught)) = places.take(latch).last().filter(|(armed, _)| **armed) {
+            *armed = false;
+            *caught = Some(actual);
+        }
     }
 
     /// Servo_Ready: main power, no alarm, synchronised.
@@ -200,35 +245,46 @@ impl Drive {
     }
 
     fn status(&self) -> StatusFlags {
-        let progress = self.motion.profile.is_some();
+        let progress = self.motion.in_progress();
         let settled = self.motion.deviation().unsigned_abs() <= self.config.in_position;
         let set = [
-            (StatusFlags::SERVO_ACTIVE, self.is_active()),
+            (StatusFlags::SERVO_ACTIVE, self.motion.says_active()),
             (StatusFlags::SERVO_READY, self.is_ready()),
             (StatusFlags::ALARM, self.alarm.is_some()),
             (StatusFlags::WARNING, self.warning != 0),
             (StatusFlags::TORQUE_LIMITED, self.motion.torque_limited),
             (StatusFlags::HOMING_COMPLETE, self.homed),
             (StatusFlags::IN_PROGRESS, progress),
-            (StatusFlags::IN_POSITION, settled && !progress),
+            (StatusFlags::IN_POSITION, settled && !progress || self.config.manners.always_in_position),
         ];
-        set.into_iter().fold(self.inputs, |all, (flag, on)| if on { all.union(flag) } else { all })
+        set.into_iter().fold(self.inputs, |all, (flag, on)| if on { all | flag } else { all })
     }
 
     /// The response while the block with this byte 0 comes in: its counter, everything else as it was before.
-    fn response(&self, byte0: u8) -> Response {
+    fn response(&mut self, byte0: u8) -> Response {
         let [response_data1, ..] = self.response_data();
-        Response {
+        let present = Response {
             mac_id: self.config.mac_id,
-            update_counter_echo: Header::from_byte(byte0).update_counter,
+            update_counter_echo: UpdateCounter::ZERO,
             cmd_error: false,
-            code: self.echo,
+            code: Code::truncate(self.echo),
             status: self.status(),
             response_data1,
             response_data2: 0,
             response_data3: 0,
         }
-        .with_noncyclic(&self.noncyclic())
+        .with_noncyclic(&self.noncyclic());
+        self.pending.rotate_right(1);
+        let out = match usize::from(self.config.manners.echo_lag).checked_sub(1) {
+            None => present,
+            // What is rotated to the front is the oldest; shorter lags take a younger one.
+            Some(lag) => {
+                let [oldest, younger @ ..] = self.pending;
+                younger.get(lag).copied().unwrap_or(oldest)
+            }
+        };
+        self.pending[0] = present;
+        Response { update_counter_echo: Header::from_byte(byte0).update_counter, ..out }
     }
 
     /// Response_Data1 to 3 as Pr7.29 to 7.31 select them.
@@ -241,7 +297,7 @@ impl Drive {
     fn selected(&self, pr: Pr, default: i32) -> i32 {
         match u8::try_from(self.parameters.value(pr)) {
             Ok(0) => default,
-            Ok(code) => self.monitor(TypeCode::short(code), 0).unwrap_or(0),
+            Ok(code) => self.monitor(code.into(), 0).unwrap_or(0),
             Err(_) => 0,
         }
     }
@@ -265,11 +321,6 @@ impl Drive {
         }
     }
 
-    fn is_near(&self) -> bool {
-        let to_go = self.motion.profile.map_or(0, |generator| generator.distance_to_go());
-        to_go.unsigned_abs() <= self.config.near.into()
-    }
-
     fn receive(&mut self, bytes: &[u8], size: BlockSize) {
         self.lost = 0;
         self.exchanges = self.exchanges.saturating_add(1);
@@ -277,9 +328,7 @@ impl Drive {
         if let Some(alarm) = verdict.alarm {
             self.discard(bytes, verdict, alarm);
         } else if let Some(main) = bytes.first_chunk::<LEN>() {
-            if let Ok(block) = CommandBlock::of(main) {
-                self.accept(block, verdict.error);
-            }
+            self.accept(main, verdict.error);
             if let Ok((_, sub)) = split32(bytes) {
                 self.serve_sub(sub, verdict.sub_error);
             }
@@ -290,7 +339,7 @@ impl Drive {
     /// The block is thrown away; an undefined code is echoed as it came.
     fn discard(&mut self, bytes: &[u8], verdict: Verdict, alarm: Alarm) {
         if let (Some(_), Some(&byte1)) = (verdict.error, bytes.get(1)) {
-            self.echo = Code::truncate(byte1);
+            self.echo = byte1;
             self.error = verdict.error;
         }
         if let (Some(code), Ok((_, sub))) = (verdict.sub_error, split32(bytes)) {
@@ -306,31 +355,35 @@ impl Drive {
         }
     }
 
-    fn accept(&mut self, block: CommandBlock<'_>, error: Option<ErrorCode>) {
-        let before = core::mem::replace(&mut self.echo, block.code());
+    fn accept(&mut self, block: &[u8; LEN], error: Option<ErrorCode>) {
+        let [byte0, byte1, c2, c3, d4, d5, d6, d7, noncyclic @ ..] = *block;
+        let (cyclic, code) = (byte1 >> 4 & 7, byte1 & 0x0f);
+        let before = core::mem::replace(&mut self.echo, byte1);
         self.error = error;
-        let Some(cyclic) = block.code().cyclic() else { return };
-        if error.is_none() && !block.code().is_allowed() {
-            self.error = Some(ErrorCode::CYCLIC_MODE);
-            return self.count_fault(Alarm::COMMAND);
+        let goes_together = if cyclic == NOP { code == 0 } else { code != PROFILE || cyclic == PP };
+        if error.is_none() && !goes_together {
+            self.error = Some(ErrorCode(WRONG_MODE));
+            let (main, sub) = ERR91_1;
+            return self.count_fault(Alarm { main, sub });
         }
         self.faults = 0;
-        if cyclic == CyclicCode::Nop {
+        if cyclic == NOP {
             // The command before stays in force; Control_Bits are not looked at.
             self.job = None;
             return;
         }
-        self.supervise(block.update_counter());
+        self.supervise(UpdateCounter::truncate(byte0 >> 5));
         self.cyclic = cyclic;
-        self.control = block.control();
-        self.data1 = block.command_data1();
-        self.motion.request(self.control.contains(ControlBits::SERVO_ON) && self.is_ready(), &self.config);
-        let Some(noncyclic) = block.code().noncyclic() else { return };
-        let request = NonCyclicCommand::from_bytes(noncyclic, block.noncyclic_bytes());
+        self.control = u16::from_le_bytes([c2, c3]);
+        self.data1 = i32::from_le_bytes([d4, d5, d6, d7]);
+        let servo_on = self.control & SERVO_ON != 0 && self.is_ready();
+        self.motion.request(servo_on, &self.config);
+        let Some(code) = NonCyclicCode::new(code) else { return };
+        let request = NonCyclicCommand::from_bytes(code, noncyclic);
         if let NonCyclicCommand::Profile { target_speed, .. } = request {
             self.target_speed = target_speed;
         }
-        self.error = self.serve(request, before).err();
+        self.error = self.serve(request, before & 0x7f == PROFILE_IDLE).err().map(ErrorCode);
     }
 
     /// The counter adds 1 in every update period; with two communications in it every value comes twice.
@@ -340,50 +393,14 @@ impl Drive {
         let good = match last {
             None => true,
             Some(last) if counter == last => self.repeats < allowed,
-            Some(last) => counter == last.next(),
+            Some(last) => counter.get() == last.get().wrapping_add(1) & 3,
         };
         self.repeats = if last == Some(counter) { self.repeats.saturating_add(1) } else { 0 };
         self.wrong_counts = if good { 0 } else { self.wrong_counts.saturating_add(1) };
         if self.wrong_counts >= self.config.counter_limit && self.exchanges >= self.config.sync_exchanges {
-            self.raise(Alarm::UPDATE_COUNTER);
+            let (main, sub) = ERR86_2;
+            self.raise(Alarm { main, sub });
         }
-    }
-
-    fn serve_sub(&mut self, sub: &[u8; LEN], error: Option<ErrorCode>) {
-        if let Some(code) = error {
-            return self.refuse_sub(sub, code);
-        }
-        let Ok(command) = SubCommand::from_bytes(sub) else { return };
-        let [data, ..] = SUB_RESPONSE_DATA.map(|pr| self.selected(pr, 0));
-        let result = match command.code {
-            SubCode::Normal => Ok(data),
-            SubCode::SystemId => text(TypeCode::short(command.type_code), command.index),
-            SubCode::Monitor => self.monitor(TypeCode::short(command.type_code), command.index),
-        };
-        match result {
-            Ok(data1) => {
-                self.sub = SubResponse {
-                    cmd_error: false,
-                    code: Nibble::truncate(command.code as u8),
-                    type_code: command.type_code,
-                    index: command.index,
-                    data1,
-                    ..self.sub
-                }
-            }
-            Err(code) => self.refuse_sub(sub, code),
-        }
-    }
-
-    fn refuse_sub(&mut self, sub: &[u8; LEN], code: ErrorCode) {
-        self.sub = SubResponse {
-            cmd_error: true,
-            code: Nibble::truncate(sub[0]),
-            type_code: 0,
-            index: code.0,
-            data1: 0,
-            ..self.sub
-        };
     }
 
     /// The end of a communication period; at the end of an update period the axis moves.
@@ -400,23 +417,27 @@ impl Drive {
             i32::try_from(units).unwrap_or(if units < 0 { i32::MIN } else { i32::MAX })
         };
         let mode = match self.cyclic {
-            CyclicCode::Nop | CyclicCode::ProfilePosition => Drivemode::Profile,
-            CyclicCode::CyclicPosition => Drivemode::Position(self.data1),
-            CyclicCode::CyclicVelocity => Drivemode::Velocity(per_update(self.data1)),
-            CyclicCode::CyclicTorque => Drivemode::Torque(self.data1),
+            CP => Drivemode::Position(self.data1),
+            CV => Drivemode::Velocity(per_update(self.data1)),
+            CT => Drivemode::Torque(self.data1),
+            _ => Drivemode::Profile,
         };
-        let (hard, smooth) =
-            (self.control.contains(ControlBits::HARD_STOP), self.control.contains(ControlBits::SMOOTH_STOP));
+        let (hard, smooth) = (self.control & HARD_STOP != 0, self.control & SMOOTH_STOP != 0);
         if mode == Drivemode::Profile && (hard || smooth) && self.motion.is_active() {
             return self.motion.stop_profile(!hard, ramp, &self.config);
         }
-        let speed = if self.control.contains(ControlBits::PAUSE) {
-            0
-        } else {
-            self.units_per_second(self.target_speed).saturating_abs()
-        };
+        let pause = self.control & PAUSE != 0;
+        let target = if self.homing { HOMING_SPEED } else { self.units_per_second(self.target_speed) };
+        let speed = if pause { 0 } else { target.saturating_abs() };
         if !self.motion.update(mode, ramp, speed, &self.config) {
-            self.raise(Alarm::COMMAND_STEP);
+            let (main, sub) = ERR27_4;
+            self.raise(Alarm { main, sub });
+        }
+        // The origin becomes 0.
+        if self.homing && self.motion.profile.is_none() {
+            self.homing = false;
+            self.homed = self.motion.is_active();
+            self.motion.shift(self.motion.command.wrapping_neg());
         }
     }
 }

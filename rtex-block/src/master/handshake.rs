@@ -2,9 +2,10 @@ use super::progress::{Failure, Progress};
 use crate::code::{Code, CyclicCode};
 use crate::execution::Execution;
 use crate::header::MacId;
-use crate::noncyclic_command::NonCyclicCommand;
+use crate::noncyclic_command::{Arguments, NonCyclicCommand};
 use crate::noncyclic_response::NonCyclicResponse;
 use crate::response::Response;
+use crate::type_code::TypeCode;
 
 /// One non-cyclic command from the request to its answer.
 ///
@@ -13,7 +14,8 @@ use crate::response::Response;
 ///      each response:  C/R or MAC-ID wrong           discard
 ///                      code echo not this code       pending
 ///                      CMD_Error                     rejected
-///                      type or index echo differs    pending: answer to an older request
+///                      echo of type, index or        pending: answer to an older request
+///                        selections differs
 ///                      ERR                           failed
 ///                      Busy                          pending
 ///                      else                          done
@@ -29,6 +31,8 @@ pub struct Handshake {
     code: Code,
     request: NonCyclicCommand,
     left: u32,
+    /// The index echo is part of the answer.
+    any_index: bool,
 }
 
 impl Handshake {
@@ -39,13 +43,31 @@ impl Handshake {
     pub const fn new(mac_id: MacId, cyclic: CyclicCode, request: NonCyclicCommand, limit: u32) -> Option<Self> {
         match request {
             NonCyclicCommand::Normal { .. } | NonCyclicCommand::Profile { .. } => None,
-            _ => Some(Self { mac_id, code: Code::of(cyclic, request.code()), request, left: limit }),
+            _ => {
+                let code = Code::of(cyclic, request.code());
+                Some(Self { mac_id, code, request, left: limit, any_index: false })
+            }
         }
+    }
+
+    /// A handshake for reading the attributes of the alarm that is being issued: Index 0, `type_code` as the drive's manual
+    /// gives it for attributes.
+    ///
+    /// The answer carries the alarm as Index_Echo and its attributes in bytes 12-15, so the echo of the type code alone is
+    /// compared. SX-DSV02310, "Alarm command".
+    pub const fn alarm_attributes(mac_id: MacId, cyclic: CyclicCode, type_code: TypeCode, limit: u32) -> Self {
+        let request = NonCyclicCommand::Alarm(Arguments { type_code, index: 0, data: 0 });
+        Self { mac_id, code: Code::of(cyclic, request.code()), request, left: limit, any_index: true }
     }
 
     /// What to send while the handshake is pending.
     pub const fn request(&self) -> NonCyclicCommand {
         self.request
+    }
+
+    /// Update periods until it times out.
+    pub const fn left(&self) -> u32 {
+        self.left
     }
 
     /// Takes what one update period brought: the drive's response, `None` if there was none or it was refused.
@@ -82,7 +104,7 @@ impl Handshake {
         }
     }
 
-    /// Whether type code and index are those of the request.
+    /// Whether type code and index, or the selections of a latch, are those of the request.
     fn is_echo(&self, response: &NonCyclicResponse) -> bool {
         match (self.request, *response) {
             (NonCyclicCommand::Reset(sent), NonCyclicResponse::Reset(results))
@@ -90,11 +112,12 @@ impl Handshake {
             | (NonCyclicCommand::Alarm(sent), NonCyclicResponse::Alarm(results))
             | (NonCyclicCommand::Parameter(sent), NonCyclicResponse::Parameter(results))
             | (NonCyclicCommand::Monitor(sent), NonCyclicResponse::Monitor(results)) => {
-                results.type_code == sent.type_code && results.index == sent.index
+                results.type_code == sent.type_code && (self.any_index || results.index == sent.index)
             }
-            (NonCyclicCommand::Homing { type_code: sent, .. }, NonCyclicResponse::Homing { type_code, .. }) => {
-                type_code == sent
-            }
+            (
+                NonCyclicCommand::Homing { type_code, latch_sel1, latch_sel2, monitor_sel, .. },
+                NonCyclicResponse::Homing { type_code: a, latch_sel1: b, latch_sel2: c, monitor_sel: d, .. },
+            ) => (a, b, c, d) == (type_code, latch_sel1, latch_sel2, monitor_sel),
             _ => false,
         }
     }

@@ -50,7 +50,10 @@ pub struct ProfileMove {
     target_speed: i32,
     stage: MoveStage,
     progress: Progress<CommandEnded>,
-    near: bool,
+    latch_sel1: Nibble,
+    monitor_sel: u8,
+    flags: ProfileFlags,
+    monitor_data: i32,
 }
 
 impl ProfileMove {
@@ -68,8 +71,17 @@ impl ProfileMove {
             target_speed,
             stage: MoveStage::Preparing,
             progress: Progress::Pending { left: limit },
-            near: false,
+            latch_sel1: Nibble::ZERO,
+            monitor_sel: 0,
+            flags: ProfileFlags::empty(),
+            monitor_data: 0,
         }
+    }
+
+    /// With Latch_Sel1 and Monitor_Sel, which the drive echoes; an answer with other ones is an older one.
+    #[must_use]
+    pub const fn with_latch(self, latch_sel1: Nibble, monitor_sel: u8) -> Self {
+        Self { latch_sel1, monitor_sel, ..self }
     }
 
     /// Another target speed, valid at once.
@@ -87,8 +99,8 @@ impl ProfileMove {
         match self.stage {
             MoveStage::Starting | MoveStage::Moving => NonCyclicCommand::Profile {
                 type_code: self.type_code,
-                latch_sel1: Nibble::ZERO,
-                monitor_sel: 0,
+                latch_sel1: self.latch_sel1,
+                monitor_sel: self.monitor_sel,
                 target_speed: self.target_speed,
             },
             MoveStage::Preparing | MoveStage::Ended => NonCyclicCommand::IDLE,
@@ -105,9 +117,26 @@ impl ProfileMove {
         self.stage
     }
 
-    /// NEAR of the last answer: inside the near window.
-    pub const fn is_near(&self) -> bool {
-        self.near
+    /// Whether In_Progress was 1 and the end has not come.
+    pub const fn is_moving(&self) -> bool {
+        matches!(self.stage, MoveStage::Moving)
+    }
+
+    /// NEAR, PSL, NSL and Latch_Comp1 of the last answer.
+    pub const fn flags(&self) -> ProfileFlags {
+        self.flags
+    }
+
+    /// Monitor_Data of the last answer: the value chosen by Monitor_Sel. LPOS1 counts once Latch_Comp1 is set.
+    pub const fn monitor_data(&self) -> i32 {
+        self.monitor_data
+    }
+
+    /// Ends it without the drive's doing.
+    pub(super) const fn abandon(&mut self, error: Failure) {
+        if self.progress.is_pending() {
+            self.fail(error);
+        }
     }
 
     /// Takes what one update period brought: the drive's response, `None` if there was none or it was refused.
@@ -126,23 +155,32 @@ impl ProfileMove {
     }
 
     fn read(&mut self, response: &Response) {
-        match response.noncyclic() {
-            NonCyclicResponse::CommandError(code) => self.fail(Failure::CommandError(code)),
-            NonCyclicResponse::Profile { execution, type_code, flags, .. } if type_code == self.type_code => {
-                self.near = flags.contains(ProfileFlags::NEAR);
-                let moves = execution.contains(Execution::BUSY) || response.status.contains(StatusFlags::IN_PROGRESS);
-                if execution.contains(Execution::ERR) {
-                    self.fail(Failure::Execution);
-                } else if moves {
-                    self.stage = MoveStage::Moving;
-                } else if self.stage == MoveStage::Moving {
-                    let in_position = response.status.contains(StatusFlags::IN_POSITION);
-                    let warning = execution.contains(Execution::WNG);
-                    self.progress = Progress::Done { value: CommandEnded { in_position, warning } };
-                    self.stage = MoveStage::Ended;
-                }
-            }
-            _ => {}
+        let NonCyclicResponse::Profile { execution, type_code, flags, latch_sel1, monitor_sel, monitor_data } =
+            response.noncyclic()
+        else {
+            return self.refuse(response);
+        };
+        if (type_code, latch_sel1, monitor_sel) != (self.type_code, self.latch_sel1, self.monitor_sel) {
+            return;
+        }
+        (self.flags, self.monitor_data) = (flags, monitor_data);
+        let moves = execution.contains(Execution::BUSY) || response.status.contains(StatusFlags::IN_PROGRESS);
+        if execution.contains(Execution::ERR) {
+            self.fail(Failure::Execution);
+        } else if moves {
+            self.stage = MoveStage::Moving;
+        } else if self.stage == MoveStage::Moving {
+            let in_position = response.status.contains(StatusFlags::IN_POSITION);
+            let warning = execution.contains(Execution::WNG);
+            self.progress = Progress::Done { value: CommandEnded { in_position, warning } };
+            self.stage = MoveStage::Ended;
+        }
+    }
+
+    /// CMD_Error refuses the start. During the motion it is the damage of one frame: the drive moves on.
+    fn refuse(&mut self, response: &Response) {
+        if let (MoveStage::Starting, NonCyclicResponse::CommandError(code)) = (self.stage, response.noncyclic()) {
+            self.fail(Failure::CommandError(code));
         }
     }
 
@@ -159,7 +197,7 @@ impl ProfileMove {
         }
     }
 
-    fn fail(&mut self, error: Failure) {
+    const fn fail(&mut self, error: Failure) {
         self.progress = Progress::Failed { error };
         self.stage = MoveStage::Ended;
     }

@@ -1,6 +1,8 @@
 use core::fmt;
 
+use super::state::AskError;
 use crate::error_code::ErrorCode;
+use crate::type_code::Pr;
 
 /// How far a procedure is. Its time is counted in update periods.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -46,6 +48,14 @@ pub enum Failure {
     TimedOut,
     /// A profile motion: the drive answered the start and did not set In_Progress within the caller's limit. It may start yet.
     NotStarted,
+    /// The servo was switched off.
+    ServoOff,
+    /// The axis did not take the request of a procedure.
+    NotSent(AskError),
+    /// The axis is not in the mode that the procedure needs.
+    Mode,
+    /// The parameter has another value than was written to it.
+    Differs(Pr),
 }
 
 impl fmt::Display for Failure {
@@ -54,6 +64,10 @@ impl fmt::Display for Failure {
             Self::Execution => f.write_str("failed while it was executed (ERR)"),
             Self::CommandError(code) => write!(f, "not accepted: {code}"),
             Self::TimedOut => f.write_str("no answer in time"),
+            Self::ServoOff => f.write_str("the servo was switched off"),
+            Self::NotSent(error) => write!(f, "not sent: {error}"),
+            Self::Mode => f.write_str("the axis is in another mode"),
+            Self::Differs(pr) => write!(f, "{pr} did not take its value"),
             Self::NotStarted => f.write_str("the motion did not start in time"),
         }
     }

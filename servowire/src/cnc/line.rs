@@ -163,7 +163,7 @@ impl Line {
                     self.start_up(frame, at_ns, record);
                     return Some(Progress::StartUp);
                 }
-                Action::Exchange { at_ns, time_stamp, cycle } => {
+                Action::Exchange { at_ns, time_stamp, cycle, .. } => {
                     self.first_cycle_ns.get_or_insert(at_ns);
                     self.cycle(at_ns, time_stamp, cycle, words(), record);
                     return Some(Progress::Cycle);

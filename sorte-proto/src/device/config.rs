@@ -16,6 +16,10 @@ pub struct Config {
     pub output_len: Option<u16>,
     /// Start of its own frame in ns of the common time; `None`: as published, by its address.
     pub send_time_ns: Option<u32>,
+    /// Spacing of the device frames at the master in ns: the own frame starts 500 ns and so many slots into the cycle, less
+    /// the way to the master. `None`: as published, or as [`send_time_ns`](Self::send_time_ns) says. 880 fits 3 payload bytes
+    /// and cables of up to 525 ns.
+    pub slot_ns: Option<u32>,
     /// How the line to the next device is measured.
     pub delay_model: DelayModel,
     /// Cycle starts without a frame that a device in IO exchange bears.
@@ -31,6 +35,7 @@ impl Config {
             lengths: Entry::STOCK,
             output_len: Some(16),
             send_time_ns: None,
+            slot_ns: None,
             delay_model: DelayModel::DEVICE,
             missed_frames: 5,
             start_up_timeout_ns: 20_000_000,
@@ -40,6 +45,7 @@ impl Config {
         with_lengths lengths: Entry,
         with_output_len output_len: Option<u16>,
         with_send_time_ns send_time_ns: Option<u32>,
+        with_slot_ns slot_ns: Option<u32>,
         with_delay_model delay_model: DelayModel,
         with_missed_frames missed_frames: u8,
         with_start_up_timeout_ns start_up_timeout_ns: u64,

@@ -24,6 +24,8 @@ pub enum State {
     Sync = 4,
     /// 5: exchanges data.
     Exchange = 5,
+    /// 6: has failed too often and waits for the host to take the enable bit away and give it again.
+    Error = 6,
 }
 
 /// How a master behaves. The counts are those of the published image; the time-outs are this crate's.
@@ -64,6 +66,15 @@ pub struct Config {
     pub retrain_crc_errors: u8,
     /// Cycles in a row with a device frame missing that make the master start again; 0: never.
     pub retrain_timing_errors: u8,
+    /// Cycles of the IO exchange that are left for the axes to come to rest before the master starts again; 0: it starts
+    /// at once, and motors that run stop dead.
+    pub stop_cycles: u32,
+    /// Failures in a row, without an IO exchange of 1000 cycles between them, after which the master stays in
+    /// [`State::Error`]; 0: it tries for ever.
+    pub max_failures: u16,
+    /// The line may be longer than the delay field of SYNC can say: an extension of this crate, see
+    /// [`Sync::long_delay_ns`](crate::Sync::long_delay_ns). The master tells its SYNC period in PARAM then.
+    pub long_line: bool,
 }
 
 impl Config {
@@ -86,6 +97,9 @@ impl Config {
             delay_model: DelayModel::MASTER,
             retrain_crc_errors: 3,
             retrain_timing_errors: 3,
+            stop_cycles: 0,
+            max_failures: 0,
+            long_line: false,
         }
     }
 
@@ -106,6 +120,9 @@ impl Config {
         with_delay_model delay_model: DelayModel,
         with_retrain_crc_errors retrain_crc_errors: u8,
         with_retrain_timing_errors retrain_timing_errors: u8,
+        with_stop_cycles stop_cycles: u32,
+        with_max_failures max_failures: u16,
+        with_long_line long_line: bool,
     }
 }
 

@@ -32,6 +32,15 @@ pub(super) struct Piece {
 }
 
 impl Piece {
+    /// Speed and distance `t` before the begin, as if the piece had begun then. `t` is less than a tick.
+    pub(super) fn before(&self, t: Real) -> (Real, Real) {
+        let Self { v, a, j, up, bend, .. } = *self;
+        let shrinking = bend == Bend::Fading;
+        let dv = (a * t).along(j * t.squared().half(), shrinking);
+        let bow = (a.half().along(j * t * THIRD.half(), shrinking)) * t.squared();
+        (v.along(dv, !up), (v * t).along(bow, !up))
+    }
+
     /// The state `t` after the begin.
     pub(super) fn after(&self, t: Real) -> Self {
         let Self { time, p, v, a, j, up, bend } = *self;
@@ -42,7 +51,7 @@ impl Piece {
         let dp = (speed.half().along(bent * THIRD, growing)) * t;
         Self {
             time: time + t,
-            p: p.along(Real::ZERO, true) + (v * t).along(dp, up),
+            p: p + (v * t).along(dp, up),
             v: v.along(dv, up),
             a: a.along(j * t, growing),
             j,

@@ -40,6 +40,17 @@ impl Clock {
         self.0.leading_zeros().saturating_sub(1)
     }
 
+    /// Half a tick, in moments: how exactly steps are found, for the tick is rounded from it.
+    pub(super) const fn grid(self) -> u32 {
+        1 << self.shift().saturating_sub(1)
+    }
+
+    /// The next half tick.
+    pub(super) const fn aligned(self, moment: u64) -> u64 {
+        let mask = (self.grid() as u64).wrapping_sub(1);
+        moment.saturating_add(mask) & !mask
+    }
+
     /// Moments a second: 2^30 to 2^31.
     pub(super) const fn moments(self) -> u32 {
         self.0 << self.shift()

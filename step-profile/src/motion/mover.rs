@@ -91,7 +91,7 @@ impl Mover {
             limits,
             bounds: checked(clock, limits)?,
             phases: Phases::rest(0, 0),
-            stepper: Stepper::new(0),
+            stepper: Stepper::new(clock.grid()),
             direction: Direction::Forward,
             origin: 0,
             position: 0,
@@ -302,7 +302,7 @@ impl Mover {
     fn rest(&mut self, moment: u64) {
         self.origin = self.position;
         self.phases = Phases::rest(moment, 0);
-        self.stepper = Stepper::new(0);
+        self.stepper = Stepper::new(self.clock.grid());
     }
 
     /// A plan is over: on to the aim if that is somewhere else.
@@ -346,7 +346,7 @@ impl Mover {
         self.due = None;
         if let Some(phases) = next {
             self.origin = self.position;
-            self.stepper = Stepper::new(0);
+            self.stepper = Stepper::new(self.clock.grid());
             self.due = self.stepper.next(&phases).map(|due| due.max(self.free).max(phases.begin()));
             self.phases = phases;
         }
@@ -362,7 +362,15 @@ impl Mover {
             a: Real::fixed(state.a.unsigned_abs(), phases::A),
             up: state.a >= 0,
         };
-        let mut frame = Frame { begin: moment, from: p, to: None, scale: Real::new(1), endless: false };
+        let mut frame = Frame {
+            begin: moment,
+            from: p,
+            to: None,
+            grid: self.clock.grid(),
+            offset: Real::ZERO,
+            scale: Real::new(1),
+            endless: false,
+        };
         let curve = self.goal(self.direction, bounds).and_then(|(goal, bounds)| match goal {
             Want::At(target) => {
                 let left = ahead(self.position, target, self.direction)?;
@@ -401,7 +409,15 @@ impl Mover {
             begin = begin.saturating_add(self.clock.moment(self.pause.into()));
             self.direction = direction;
         }
-        let mut frame = Frame { begin, from: 0, to: None, scale: Real::new(1), endless: false };
+        let mut frame = Frame {
+            begin: self.clock.aligned(begin),
+            from: 0,
+            to: None,
+            grid: self.clock.grid(),
+            offset: Real::ZERO,
+            scale: Real::new(1),
+            endless: false,
+        };
         let start = Motion::steady(Real::ZERO);
         let curve = self.goal(direction, bounds).and_then(|(goal, bounds)| match goal {
             Want::At(target) => {

@@ -76,6 +76,8 @@ pub struct Path<const N: usize, const M: usize> {
     /// Speed at which the next line begins, in units a moment.
     speed: Real,
     moment: u64,
+    /// What it begins later than that, less than half a tick.
+    offset: Real,
 }
 
 impl<const N: usize, const M: usize> Path<N, M> {
@@ -104,6 +106,7 @@ impl<const N: usize, const M: usize> Path<N, M> {
             target: [0; N],
             speed: Real::ZERO,
             moment: 0,
+            offset: Real::ZERO,
         })
     }
 
@@ -166,9 +169,17 @@ impl<const N: usize, const M: usize> Path<N, M> {
         let exit = self.exit().min(greatest(self.speed, line.length, &line.bounds));
         let goal = Goal::At(line.length, exit);
         let curve = plan(Motion::steady(self.speed), goal, &line.bounds).unwrap_or_else(|_| stop(&line, self.speed));
-        let pulses = LinePulses::new(self.clock, &curve, &line, self.moment);
+        let pulses = LinePulses::new(self.clock, &curve, &line, (self.moment, self.offset));
+        // Between lines in motion the time goes on exactly; after a rest with half a tick.
+        let grid = u64::from(self.clock.grid());
+        let time = self.offset + curve.time;
+        let whole = time.to_fixed(0) & grid.wrapping_neg();
+        self.moment = self.moment.saturating_add(whole);
+        self.offset = time - Real::new(whole);
+        if exit.is_zero() && !self.offset.is_zero() {
+            (self.moment, self.offset) = (self.moment.saturating_add(grid), Real::ZERO);
+        }
         self.speed = exit;
-        self.moment = pulses.end;
         if let Some(place) = self.lines.get_mut(self.first) {
             *place = None;
         }
@@ -295,12 +306,15 @@ pub struct LinePulses<const N: usize> {
 }
 
 impl<const N: usize> LinePulses<N> {
-    fn new(clock: Clock, curve: &Curve, line: &Line<N>, begin: u64) -> Self {
+    fn new(clock: Clock, curve: &Curve, line: &Line<N>, (begin, offset): (u64, Real)) -> Self {
         let axes = line.steps.map(|steps| {
             let steps = steps.unsigned_abs();
             let scale = Real::new(steps.into()) / line.length;
             let to = Some(i64::from(steps) << 32);
-            (Phases::new(curve, &Frame { begin, from: 0, to, scale, endless: false }), Stepper::new(0))
+            (
+                Phases::new(curve, &Frame { begin, from: 0, to, grid: clock.grid(), offset, scale, endless: false }),
+                Stepper::new(clock.grid()),
+            )
         });
         let end = axes.first().map_or(begin, |(phases, _)| phases.end());
         let directions = line.steps.map(|steps| Direction::from_dir(steps < 0));

@@ -18,8 +18,10 @@ pub(super) const J: i32 = 121;
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub(super) struct Phase {
-    /// Moment that the numbers are of.
+    /// Moment that the numbers are of: the last half tick before the phase.
     pub(super) begin: u64,
+    /// Moment at which the phase begins.
+    pub(super) since: u64,
     /// Position.
     pub(super) p: i64,
     /// Speed, and the word below.
@@ -61,7 +63,8 @@ pub(super) struct State {
 }
 
 impl Phase {
-    const NONE: Self = Self { begin: 0, p: 0, v: 0, v_low: 0, kind: Kind::Slope { a: 0, a_low: 0, j6: 0 }, until: 0 };
+    const NONE: Self =
+        Self { begin: 0, since: 0, p: 0, v: 0, v_low: 0, kind: Kind::Slope { a: 0, a_low: 0, j6: 0 }, until: 0 };
 
     /// The state `t` moments after the begin.
     fn after(&self, t: u64) -> State {
@@ -120,6 +123,10 @@ pub(super) struct Frame {
     pub(super) from: i64,
     /// Position at which it ends, if that is known; else where the curve leads.
     pub(super) to: Option<i64>,
+    /// Phases begin at multiples of this many moments.
+    pub(super) grid: u32,
+    /// What the curve begins later than `begin`, less than half a tick.
+    pub(super) offset: Real,
     /// Steps of an axis in a unit of the curve.
     pub(super) scale: Real,
     /// The last piece has no end.
@@ -149,9 +156,9 @@ impl Phases {
                 continue;
             }
             let piece = if piece.time < over { piece.after(over - piece.time) } else { *piece };
-            new.push(phase(&piece, piece.time - over, &position, frame, steps(position(end_p))));
+            new.push(phase(&piece, frame.offset + (piece.time - over), &position, frame, steps(position(end_p))));
         }
-        new.end = frame.begin.saturating_add((curve.time - over).to_fixed(0));
+        new.end = frame.begin.saturating_add((frame.offset + (curve.time - over)).to_fixed(0));
         new.last = frame.to.unwrap_or_else(|| position(curve.p));
         new.close();
         new
@@ -186,7 +193,7 @@ impl Phases {
 
     /// Begin of the phase after `at`, or the end of the last one.
     pub(super) fn end_of(&self, at: u8) -> u64 {
-        self.get(at.saturating_add(1)).map_or(self.end, |next| next.begin.saturating_add(1))
+        self.get(at.saturating_add(1)).map_or(self.end, |next| next.since)
     }
 
     pub(super) const fn begin(&self) -> u64 {
@@ -207,7 +214,7 @@ impl Phases {
 
     /// The state at a moment; at rest after the end.
     pub(super) fn at(&self, moment: u64) -> State {
-        let phase = self.all().iter().rev().find(|phase| phase.begin <= moment);
+        let phase = self.all().iter().rev().find(|phase| phase.since <= moment);
         match phase.or(self.all().first()) {
             Some(phase) if self.endless || moment < self.end => phase.after(moment.saturating_sub(phase.begin)),
             _ => State { p: self.last, v: 0, a: 0, j6: 0 },
@@ -218,10 +225,12 @@ impl Phases {
 /// A piece that begins at `time`, around the moment before.
 #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "the low word")]
 fn phase(piece: &Piece, time: Real, position: &impl Fn(Real) -> i64, frame: &Frame, until: u32) -> Phase {
-    let rest = time.fraction();
-    let (v, a, j) = (piece.v * frame.scale, piece.a * frame.scale, piece.j * frame.scale);
+    let begin = time.to_fixed(0) & !u64::from(frame.grid.saturating_sub(1));
+    let rest = time - Real::new(begin);
+    let (v, p) = piece.before(rest);
+    let (v, a, j) = (v * frame.scale, piece.a * frame.scale, piece.j * frame.scale);
     let growing = piece.bend != Bend::Fading;
-    let before = signed((v * rest).to_fixed(P));
+    let before = signed((p * frame.scale).to_fixed(P));
     let kind = if a.is_zero() && j.is_zero() {
         let period = Real::new(1) / v;
         Kind::Cruise { interval: period.to_fixed(0), part: period.fraction().to_fixed(64) }
@@ -232,9 +241,10 @@ fn phase(piece: &Piece, time: Real, position: &impl Fn(Real) -> i64, frame: &Fra
         let j6 = if piece.up == growing { j6 } else { j6.wrapping_neg() };
         Kind::Slope { a: narrow(a >> 32), a_low: a as u32, j6 }
     };
-    let speed = v.along(a * rest, !piece.up);
+    let speed = v;
     Phase {
-        begin: frame.begin.saturating_add(time.to_fixed(0)),
+        begin: frame.begin.saturating_add(begin),
+        since: frame.begin.saturating_add(time.to_fixed(0)),
         p: position(piece.p).saturating_sub(before),
         v: signed(speed.to_fixed(V)),
         v_low: below(speed, V),

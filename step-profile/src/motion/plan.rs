@@ -49,7 +49,15 @@ impl Plan {
         let speed = |hz: u32| (Real::new(hz.into()) / Real::new(clock.moments().into())).min(bounds.v);
         let goal = Goal::At(Real::new(steps.into()), speed(exit));
         let curve = plan(Motion::steady(speed(entry)), goal, &bounds).map_err(|need| too_short(steps, need))?;
-        let frame = Frame { begin: 0, from: 0, to: Some(to), scale: Real::new(1), endless: false };
+        let frame = Frame {
+            begin: 0,
+            from: 0,
+            to: Some(to),
+            grid: clock.grid(),
+            offset: Real::ZERO,
+            scale: Real::new(1),
+            endless: false,
+        };
         Ok(Self { clock, phases: Phases::new(&curve, &frame) })
     }
 
@@ -70,7 +78,7 @@ impl Plan {
 
     /// The ticks of the steps, the first one first.
     pub fn pulses(&self) -> Pulses<'_> {
-        Pulses { plan: self, stepper: Stepper::new(0) }
+        Pulses { plan: self, stepper: Stepper::new(self.clock.grid()) }
     }
 
     /// Where the move is and how fast, at a tick after its start.
@@ -80,7 +88,7 @@ impl Plan {
 
     /// Begins of the phases of constant jerk, and the end, in ticks.
     pub fn corners(&self) -> impl Iterator<Item = u64> {
-        let ticks = self.phases.all().iter().map(|phase| self.clock.tick(phase.begin));
+        let ticks = self.phases.all().iter().map(|phase| self.clock.tick(phase.since));
         ticks.chain([self.duration()])
     }
 }

@@ -5,7 +5,7 @@ use core::ops::{Add, Div, Mul, Sub};
 
 /// A number from 0 upwards with 64 significant bits: `m · 2^e`, the top bit of `m` set, or 0.
 ///
-/// Results are truncated (a root may be one bit high). A difference below 0 is 0, and a quotient by 0 is 2^1000; nothing
+/// Results keep 60 bits at least. A difference below 0 is 0, and a quotient by 0 is 2^1000; nothing
 /// can overflow or panic.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -77,13 +77,15 @@ impl Real {
         self - Self::new(self.to_fixed(0))
     }
 
-    /// The root of the upper half, and a step of Heron's for the lower.
+    /// The root of the upper bits, and two of Heron's steps.
     pub(super) fn sqrt(self) -> Self {
         if self.m == 0 {
             return self;
         }
         let (m, e) = if self.e & 1 == 0 { (self.m, self.e) } else { (self.m >> 1, self.e.saturating_add(1)) };
-        let root = Self::fixed(m.isqrt(), 0).scaled(e >> 1);
+        let upper = (m >> 32) as u32;
+        let root = Self::fixed(upper.isqrt().into(), -16).scaled(e >> 1);
+        let root = (root + self / root).half();
         (root + self / root).half()
     }
 
@@ -183,30 +185,48 @@ impl Div for Real {
         if by.m == 0 {
             return Self::HUGE;
         }
-        let e = self.e.saturating_sub(by.e);
-        if self.m >= by.m {
-            Self { m: quotient(self.m >> 1, self.m << 63, by.m), e: e.saturating_sub(63) }
-        } else {
-            Self { m: quotient(self.m, 0, by.m), e: e.saturating_sub(64) }
-        }
+        let (quotient, _) = product(self.m, reciprocal(by.m));
+        Self::fixed(quotient, 0).scaled(self.e.saturating_sub(by.e).saturating_sub(63))
     }
 }
 
-/// Both halves of a product of 128 bits.
+/// Both halves of a product of 128 bits, in multiplications that a 32-bit core has.
 #[expect(clippy::cast_possible_truncation, reason = "halves of a wider number")]
 #[inline]
 const fn product(a: u64, b: u64) -> (u64, u64) {
-    let wide = (a as u128).wrapping_mul(b as u128);
-    ((wide >> 64) as u64, wide as u64)
+    let (a1, a0, b1, b0) = (a >> 32, a as u32 as u64, b >> 32, b as u32 as u64);
+    let low = a0.wrapping_mul(b0);
+    let middle = a1.wrapping_mul(b0).wrapping_add(low >> 32);
+    let other = a0.wrapping_mul(b1).wrapping_add(middle as u32 as u64);
+    let high = a1.wrapping_mul(b1).wrapping_add(middle >> 32).wrapping_add(other >> 32);
+    (high, other << 32 | low as u32 as u64)
 }
 
-/// `(high · 2^64 + low) / by`, for `high` below `by` and the top bit of `by` set.
-#[expect(clippy::cast_possible_truncation, reason = "the quotient has 64 bits, since high < by")]
-const fn quotient(high: u64, low: u64, by: u64) -> u64 {
-    let wide = (high as u128) << 64 | low as u128;
-    match wide.checked_div(by as u128) {
-        Some(quotient) => quotient as u64,
-        None => u64::MAX,
+/// `2^127 / d` for a `d` with its top bit set, to 60 bits at least: 16 bits by division, then twice as many and twice as
+/// many again by Newton's steps x (2 - d x).
+#[expect(
+    clippy::cast_possible_wrap,
+    clippy::cast_sign_loss,
+    reason = "the upper half of a number; a difference in two's complement"
+)]
+#[inline]
+const fn reciprocal(d: u64) -> u64 {
+    let upper = (d >> 32) as u32;
+    // 2^63 / upper, a little too small or too large.
+    let rough = match u32::MAX.checked_div(upper >> 16) {
+        Some(rough) => (rough as u64) << 15,
+        None => 1 << 31,
+    };
+    let off = (1_u64 << 63).wrapping_sub(rough.wrapping_mul(upper as u64)) as i64;
+    let better = rough.wrapping_add(((rough as i64).wrapping_mul(off >> 18) >> 45) as u64);
+    let x = if better >> 32 == 0 { better << 32 } else { u64::MAX };
+    let (whole, _) = product(x, d);
+    if whole < 1 << 63 {
+        let (more, _) = product(x, (1_u64 << 63).wrapping_sub(whole) << 1);
+        x.saturating_add(more)
+    } else {
+        let (less, _) = product(x, whole.wrapping_sub(1 << 63) << 1);
+        x.wrapping_sub(less)
     }
 }
 
@@ -239,6 +259,8 @@ mod tests {
             prop_assert!(a.cmp(&b) == b.cmp(&a).reverse() && (x - y).abs() <= x * 1e-15 || (a < b) == (x < y));
             if b.m > 0 {
                 near(a / b, x / y);
+                let wide = ((u128::from(u64::MAX) << 63) / u128::from(b.m)) as u64;
+                prop_assert!(reciprocal(b.m).abs_diff(wide) <= 16, "{} for {wide}", reciprocal(b.m));
             }
             let (high, low) = if a > b { (a, b) } else { (b, a) };
             prop_assert!((float(high - low) - (x - y).abs()).abs() <= x.max(y) * 1e-15);
@@ -264,7 +286,8 @@ mod tests {
         );
         assert_eq!((one / zero, zero - one, one + zero, one - zero), (Real::HUGE, zero, one, one));
         assert_eq!((Real::HUGE.to_fixed(0), Real::HUGE.to_fixed(-2000)), (u64::MAX, 0));
-        assert_eq!(Real::new(9).sqrt(), Real::new(3));
+        near(Real::new(9).sqrt(), 3.0);
+        assert!(reciprocal(1 << 63) > u64::MAX - 16);
         assert_eq!(one.along(one, false), zero);
         near(THIRD, 1.0 / 3.0);
     }

@@ -12,69 +12,85 @@ use super::phases::{Kind, Phase, Phases};
 const STEP: i64 = 1 << 57;
 /// From positions to residuals.
 const WIDEN: u32 = 25;
+/// Newton's steps at most; three are rare.
+const ROUNDS: u8 = 64;
+
+/// A number with a word below its last bit.
+type Wide = (i64, u32);
 
 /// Makes the steps of phases, one after the other.
 ///
-/// Step k falls at the moment at which the position passes k - 1/2. What is left between the position at the whole moment
-/// and there is kept exactly, so that roundings do not add up.
+/// Step k falls at the moment at which the position passes k - 1/2, rounded down to half a tick. What is left between the
+/// position then and there is kept exactly, so that roundings do not add up.
 #[derive(Debug, Clone)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub(super) struct Stepper {
-    /// Number of the next phase.
-    phase: u8,
+    /// Moment of the last step, and the position that is left to it.
+    t: u64,
+    rest: i64,
+    v: Wide,
+    a: Wide,
+    /// A sixth of the jerk.
+    j6: i64,
+    /// Last interval and its last change.
+    last: u32,
+    change: i32,
+    /// Moments in half a tick.
+    grid: u32,
     /// Steps left in this phase.
     left: u32,
     /// Steps made, counted from the origin of the positions.
     count: u32,
-    /// Moment of the last step, and the position that is left to it.
-    t: u64,
-    rest: i64,
-    v: i64,
-    a: i64,
-    j6: i64,
-    /// Speed and acceleration below their last bits: 2^-89 and 2^-121, so that they are summed exactly.
-    v_low: u32,
-    a_low: u32,
-    /// Last interval and its last change.
+    mode: Mode,
+    /// Number of the next phase.
+    phase: u8,
+    /// At constant speed: the interval, and below a moment in 2^-64 that of the last step and the interval's.
     interval: u64,
-    change: i64,
-    /// At constant speed: the moment's part of the last step, and that of the interval, in 2^-64.
     part: u64,
-    period_part: u64,
-    cruise: bool,
+    period: u64,
     /// Moment at which the phase is over.
     end: u64,
 }
 
-/// The position that a time adds, and the state after it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+enum Mode {
+    Cruise,
+    /// Constant acceleration.
+    Slope,
+    /// Constant jerk.
+    Bend,
+}
+
+/// What a time adds.
 struct Ahead {
+    /// Position.
     dp: i64,
-    v: i64,
-    /// A sixth of the acceleration that is added.
-    da6: (i64, u32),
-    /// The low word of the speed that is added.
-    low: u32,
+    /// Speed after it.
+    v: Wide,
+    /// A sixth of the acceleration.
+    da6: Wide,
 }
 
 impl Stepper {
-    /// With `count` steps made.
-    pub(super) const fn new(count: u32) -> Self {
+    /// With no step made; `grid` moments in half a tick.
+    pub(super) const fn new(grid: u32) -> Self {
         Self {
-            phase: 0,
-            left: 0,
-            count,
             t: 0,
             rest: 0,
-            v: 0,
-            a: 0,
+            v: (0, 0),
+            a: (0, 0),
             j6: 0,
-            v_low: 0,
-            a_low: 0,
-            interval: 0,
+            last: 0,
             change: 0,
+            grid,
+            left: 0,
+            count: 0,
+            mode: Mode::Cruise,
+            phase: 0,
+            interval: 0,
             part: 0,
-            period_part: 0,
-            cruise: false,
+            period: 0,
             end: 0,
         }
     }
@@ -89,12 +105,16 @@ impl Stepper {
     pub(super) fn next(&mut self, phases: &Phases) -> Option<u64> {
         if self.left == 0 {
             self.begin(phases)?;
-        } else if self.cruise {
-            let (part, carry) = self.part.overflowing_add(self.period_part);
-            self.part = part;
-            self.t = self.t.wrapping_add(self.interval).wrapping_add(carry.into());
         } else {
-            self.ramp();
+            match self.mode {
+                Mode::Cruise => {
+                    let (part, carry) = self.part.overflowing_add(self.period);
+                    self.part = part;
+                    self.t = self.t.wrapping_add(self.interval).wrapping_add(carry.into());
+                }
+                Mode::Slope => self.slope(),
+                Mode::Bend => self.bend(),
+            }
         }
         self.left = self.left.wrapping_sub(1);
         self.count = self.count.wrapping_add(1);
@@ -102,6 +122,8 @@ impl Stepper {
     }
 
     /// The first step of the next phase that has one.
+    #[cold]
+    #[inline(never)]
     fn begin(&mut self, phases: &Phases) -> Option<()> {
         loop {
             let phase = phases.get(self.phase)?;
@@ -124,15 +146,19 @@ impl Stepper {
                 let period = u128::from(interval) << 32 | u128::from(part >> 32);
                 let wait = period.wrapping_mul(ahead.unsigned_abs().into()) >> 32;
                 self.t = self.t.wrapping_add((wait >> 32) as u64);
-                (self.part, self.interval, self.period_part) = ((wait as u64) << 32, interval, part);
-                self.cruise = true;
+                (self.part, self.interval, self.period) = ((wait as u64) << 32, interval, part);
+                self.mode = Mode::Cruise;
             }
             Kind::Slope { a, a_low, j6 } => {
-                (self.rest, self.v, self.a, self.j6) = (ahead << WIDEN, phase.v, a, j6);
-                (self.v_low, self.a_low, self.change, self.cruise) = (phase.v_low, a_low, 0, false);
+                // A step of nothing left of the one before: `rest` is what is there still to the next one.
+                self.rest = (ahead << WIDEN).wrapping_sub(STEP);
+                (self.v, self.a, self.j6) = ((phase.v, phase.v_low), (a, a_low), j6);
+                self.mode = if j6 == 0 { Mode::Slope } else { Mode::Bend };
                 self.end = end;
-                let first = self.first_guess();
-                self.solve(self.rest, first);
+                let guess = self.first_guess() & self.mask();
+                self.last = guess;
+                self.newton(guess);
+                self.change = 0;
             }
         }
     }
@@ -140,18 +166,19 @@ impl Stepper {
     /// From above where the speed grows, from below where it falls: Newton's steps then come nearer from one side.
     fn first_guess(&self) -> u32 {
         let bits = |x: i64| 64_u32.wrapping_sub(x.leading_zeros());
-        let need = bits(self.rest);
+        let ahead = self.rest.wrapping_add(STEP);
+        let (need, (v, _), (a, _)) = (bits(ahead), self.v, self.a);
         let mut guess = u32::MAX;
-        let slowing = self.a < 0 || (self.a == 0 && self.j6 < 0);
-        if self.v > 0 && (slowing || self.j6 < 0 || bits(self.v).wrapping_add(32) > need) {
-            guess = u32::try_from(self.rest.checked_div(self.v).unwrap_or(0)).unwrap_or(u32::MAX);
+        let slowing = a < 0 || (a == 0 && self.j6 < 0);
+        if v > 0 && (slowing || self.j6 < 0 || bits(v).wrapping_add(32) > need) {
+            guess = u32::try_from(ahead.checked_div(v).unwrap_or(0)).unwrap_or(u32::MAX);
             if slowing {
                 return guess.min(self.left_of_phase());
             }
         }
         let power = |exponent: u32| 1_u32.checked_shl(exponent).unwrap_or(u32::MAX);
-        if self.a > 0 && self.j6 >= 0 {
-            guess = guess.min(power(need.saturating_add(33).saturating_sub(bits(self.a)).div_ceil(2)));
+        if a > 0 && self.j6 >= 0 {
+            guess = guess.min(power(need.saturating_add(33).saturating_sub(bits(a)).div_ceil(2)));
         }
         if self.j6 > 0 {
             guess = guess.min(power(need.saturating_add(65).saturating_sub(bits(self.j6)).div_ceil(3)));
@@ -164,97 +191,139 @@ impl Stepper {
         u32::try_from(self.end.saturating_sub(self.t)).unwrap_or(u32::MAX)
     }
 
-    /// The next step within a slope. The interval changes about as it did before.
-    #[inline]
-    fn ramp(&mut self) {
-        let last = self.interval as u32;
-        let guess = last.saturating_add_signed(self.change as i32).max(last >> 1);
-        self.solve(self.rest.wrapping_add(STEP), guess);
-        self.change = self.interval.wrapping_sub(u64::from(last)) as i64;
+    /// Down to a multiple of half a tick.
+    const fn mask(&self) -> u32 {
+        self.grid.wrapping_neg()
     }
 
-    /// The last whole moment at which the position is not past `ahead`: Newton's steps from a guess.
+    /// The interval changes about as it did before.
     #[inline]
-    fn solve(&mut self, ahead: i64, guess: u32) {
-        let mut time = guess;
-        let mut there = self.ahead(time);
-        let mut rest = ahead.wrapping_sub(there.dp);
-        for _ in 0..64 {
-            if rest >= 0 && rest < there.v {
-                break;
-            }
-            let Some(by) = quotient(rest, there.v) else { break };
-            time = time.saturating_add_signed(by).min(self.left_of_phase());
-            there = self.ahead(time);
-            let new = ahead.wrapping_sub(there.dp);
-            if new == rest {
-                break;
-            }
-            rest = new;
+    fn guess(&self) -> u32 {
+        (self.last.saturating_add_signed(self.change).max(self.last >> 1)) & self.mask()
+    }
+
+    /// The next step at constant acceleration.
+    #[inline]
+    fn slope(&mut self) {
+        let time = self.guess();
+        let ahead = self.ahead_of_slope(time);
+        if !self.take(time, &ahead) {
+            self.newton(time);
         }
-        self.t = self.t.wrapping_add(u64::from(time));
+    }
+
+    /// The next step at constant jerk.
+    #[inline]
+    fn bend(&mut self) {
+        let time = self.guess();
+        let ahead = self.ahead_of_bend(time);
+        if !self.take(time, &ahead) {
+            self.newton(time);
+        }
+    }
+
+    /// Takes the step after `time`, if that is the last half tick before the position is there.
+    #[inline]
+    fn take(&mut self, time: u32, ahead: &Ahead) -> bool {
+        let rest = self.rest.wrapping_add(STEP).wrapping_sub(ahead.dp);
+        let there = rest as u64 >= (ahead.v.0 as u64).wrapping_mul(self.grid.into());
+        if !there {
+            self.commit(time, rest, ahead);
+        }
+        !there
+    }
+
+    #[inline]
+    fn commit(&mut self, time: u32, rest: i64, ahead: &Ahead) {
+        self.t = self.t.wrapping_add(time.into());
         self.rest = rest;
-        let (low, carry) = self.v_low.overflowing_add(there.low);
-        self.v_low = low;
-        self.v = there.v.wrapping_add(i64::from(carry));
-        if self.j6 != 0 {
-            (self.a, self.a_low) = self.grown(there.da6, 6);
+        self.v = ahead.v;
+        if self.mode == Mode::Bend {
+            self.a = self.grown(ahead.da6, 6);
         }
-        self.interval = u64::from(time);
+        self.change = time.wrapping_sub(self.last) as i32;
+        self.last = time;
     }
 
-    /// `(v + bow / 2) · t`, each with its low word.
-    #[inline]
-    fn distance(&self, (bow, low): (i64, u32), t: u32) -> i64 {
-        let wide = i64::from(t);
-        let bow = bow.wrapping_mul(wide).wrapping_add(high_word(low, t)) >> 1;
-        self.v.wrapping_mul(wide).wrapping_add(high_word(self.v_low, t)).wrapping_add(bow)
-    }
-
-    /// The acceleration and `times` times a sixth of what is added to it.
-    #[inline]
-    fn grown(&self, (high, low): (i64, u32), times: u8) -> (i64, u32) {
-        let low = u64::from(low).wrapping_mul(times.into()).wrapping_add(self.a_low.into());
-        let high = self.a.wrapping_add(high.wrapping_mul(times.into()));
-        (high.wrapping_add((low >> 32) as i64), low as u32)
+    /// Newton's steps from a guess.
+    #[cold]
+    #[inline(never)]
+    fn newton(&mut self, guess: u32) {
+        let mut time = guess;
+        let mut ahead = self.ahead(time);
+        let mut rest = self.rest.wrapping_add(STEP).wrapping_sub(ahead.dp);
+        for _ in 0..ROUNDS {
+            let cell = ahead.v.0.wrapping_mul(self.grid.into());
+            if rest >= 0 && rest < cell {
+                break;
+            }
+            let Some(by) = quotient(rest, ahead.v.0) else { break };
+            let by = by & self.mask() as i32;
+            // Less than half a tick, says the quotient, and it is rounded down.
+            let by = if by == 0 { self.grid as i32 } else { by };
+            let next = time.saturating_add_signed(by).min(self.left_of_phase()) & self.mask();
+            if next == time {
+                break;
+            }
+            time = next;
+            ahead = self.ahead(time);
+            rest = self.rest.wrapping_add(STEP).wrapping_sub(ahead.dp);
+        }
+        self.commit(time, rest, &ahead);
     }
 
     #[inline]
     fn ahead(&self, time: u32) -> Ahead {
-        if self.j6 == 0 {
-            let dv = wide_times((self.a, self.a_low), time);
-            return Ahead { dp: self.distance(dv, time), v: self.v.wrapping_add(dv.0), da6: (0, 0), low: dv.1 };
-        }
-        let da6 = times(self.j6, time);
-        let bow = wide_times(self.grown(da6, 2), time);
-        let dv = wide_times(self.grown(da6, 3), time);
-        Ahead { dp: self.distance(bow, time), v: self.v.wrapping_add(dv.0), da6, low: dv.1 }
+        if self.mode == Mode::Bend { self.ahead_of_bend(time) } else { self.ahead_of_slope(time) }
+    }
+
+    /// (v0 + v1) / 2 · t.
+    #[inline]
+    fn ahead_of_slope(&self, time: u32) -> Ahead {
+        let v = sum(self.v, times(self.a, time));
+        Ahead { dp: distance(sum(self.v, v), time) >> 1, v, da6: (0, 0) }
+    }
+
+    /// (v + (a + j t / 3) t / 2) · t.
+    #[inline]
+    fn ahead_of_bend(&self, time: u32) -> Ahead {
+        let low = u64::from(self.j6 as u32).wrapping_mul(time.into());
+        let da6 = ((self.j6 >> 32).wrapping_mul(time.into()).wrapping_add((low >> 32) as i64), low as u32);
+        let v = sum(self.v, times(self.grown(da6, 3), time));
+        let bow = sum(self.v, sum(self.v, times(self.grown(da6, 2), time)));
+        Ahead { dp: distance(bow, time) >> 1, v, da6 }
+    }
+
+    /// The acceleration and `times` times a sixth of what is added to it.
+    #[inline]
+    fn grown(&self, (high, low): Wide, times: u32) -> Wide {
+        let low = u64::from(low).wrapping_mul(times.into()).wrapping_add(self.a.1.into());
+        let high = self.a.0.wrapping_add(high.wrapping_mul(times.into()));
+        (high.wrapping_add((low >> 32) as i64), low as u32)
     }
 }
 
-/// `x · t` in units of 2^32, and the word below.
+/// `x · t` in units of 2^32.
 #[inline]
-fn times(x: i64, t: u32) -> (i64, u32) {
-    let low = u64::from(x as u32).wrapping_mul(u64::from(t));
-    ((x >> 32).wrapping_mul(i64::from(t)).wrapping_add((low >> 32) as i64), low as u32)
+fn times((high, low): Wide, t: u32) -> Wide {
+    let below = u64::from(low).wrapping_mul(t.into()) >> 32;
+    let middle = u64::from(high as u32).wrapping_mul(t.into()).wrapping_add(below);
+    ((high >> 32).wrapping_mul(t.into()).wrapping_add((middle >> 32) as i64), middle as u32)
 }
 
-/// The same of a number with a word more below.
+/// `x · t`, without the word below.
 #[inline]
-fn wide_times((high, low): (i64, u32), t: u32) -> (i64, u32) {
-    let below = u64::from(low).wrapping_mul(u64::from(t)) >> 32;
-    let middle = u64::from(high as u32).wrapping_mul(u64::from(t)).wrapping_add(below);
-    ((high >> 32).wrapping_mul(i64::from(t)).wrapping_add((middle >> 32) as i64), middle as u32)
+fn distance((high, low): Wide, t: u32) -> i64 {
+    high.wrapping_mul(t.into()).wrapping_add((u64::from(low).wrapping_mul(t.into()) >> 32) as i64)
 }
 
-/// The high word of a product.
 #[inline]
-fn high_word(a: u32, b: u32) -> i64 {
-    (u64::from(a).wrapping_mul(u64::from(b)) >> 32) as i64
+fn sum((a, a_low): Wide, (b, b_low): Wide) -> Wide {
+    let (low, carry) = a_low.overflowing_add(b_low);
+    (a.wrapping_add(b).wrapping_add(carry.into()), low)
 }
 
-/// `rest / v` to 14 bits, at least 1 away from 0 where it is not 0; rounded down. `None` at a standstill.
-#[inline]
+/// `rest / v` to 14 bits, rounded down. `None` at a standstill.
 fn quotient(rest: i64, v: i64) -> Option<i32> {
     if v <= 0 {
         return None;

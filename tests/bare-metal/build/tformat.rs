@@ -69,17 +69,18 @@ fn variant(row: &Value) -> &'static str {
 /// The decoded values of an answer as a value of the crate.
 fn fields(row: &Value) -> String {
     let sf = || format!("sf: StatusField::from_bits_retain({})", number(&row["sf"], "raw"));
-    let data = |key| format!("{key}: U24::truncate({})", number(row, key));
+    let abs = || format!("abs: Abs::truncate({})", number(row, "abs"));
+    let abm = || format!("abm: Abm::truncate({})", number(row, "abm"));
     match text(row, "request_id") {
-        "0" | "7" | "8" | "C" => format!("SingleTurn {{ {}, {} }}", sf(), data("abs")),
-        "1" => format!("MultiTurn {{ {}, {} }}", sf(), data("abm")),
+        "0" | "7" | "8" | "C" => format!("SingleTurn {{ {}, {} }}", sf(), abs()),
+        "1" => format!("MultiTurn {{ {}, {} }}", sf(), abm()),
         "2" => format!("Identification {{ {}, enid: {} }}", sf(), number(row, "enid")),
         "3" => format!(
             "AllData {{ {}, {}, enid: {}, {}, almc: Almc::from_bits_retain({}) }}",
             sf(),
-            data("abs"),
+            abs(),
             number(row, "enid"),
-            data("abm"),
+            abm(),
             number(&row["almc"], "raw")
         ),
         _ => {

@@ -8,7 +8,7 @@ use serde::Deserialize;
 use nrz_line::{Format, Receiver};
 use tformat::device::Device;
 use tformat::master::{Reset, Step};
-use tformat::{Adf, BitRate, ControlField, DataId, Error, Frame, Request, Resolution, Response, U24, spi};
+use tformat::{Abm, Abs, Adf, Almc, BitRate, ControlField, DataId, Error, Frame, Request, Resolution, Response, spi};
 
 use crate::hex::{Bits, Bytes, Hex};
 use crate::row::{Check, Row, Verdict, each, same};
@@ -215,7 +215,7 @@ fn position(row: PositionRow) -> Verdict {
     let Ok(resolution) = Resolution::new(row.abs_bits, row.abm_bits) else {
         return same("widths", &"possible", &"refused");
     };
-    let (abs, abm) = (U24::truncate(row.abs), U24::truncate(row.abm));
+    let (abs, abm) = (Abs::truncate(row.abs), Abm::truncate(row.abm));
     let signed = resolution.position(abs, abm);
     same("high_bits_nonzero", &row.high_bits_nonzero, &matches!(signed, Err(Error::UpperBits { .. })))?;
     if row.high_bits_nonzero {
@@ -259,14 +259,15 @@ fn oversampled(row: OversampledRow) -> Verdict {
     let fields: Vec<_> = levels.zip(&row.runs).filter_map(|(level, &len)| receiver.run(level, len)).collect();
     let framed = fields.iter().all(|f| f.delimiter);
     same("expect", &row.expect.as_str(), &if framed { "ok" } else { "framing" })?;
-    same("expect_bytes", &row.expect_bytes.0, &fields.iter().map(|f| f.content as u8).collect())?;
+    let received: Vec<u8> = fields.iter().map(|f| f.content as u8).collect();
+    same("expect_bytes", &row.expect_bytes.0, &received)?;
     if let Some(starts) = row.start_samples {
         same("start_samples", &starts, &fields.iter().map(|f| f.start).collect())?;
     }
     same("spikes_dropped", &row.spikes_dropped, &fields.iter().map(|f| f.spikes).sum())?;
     match (row.bits, row.gaps) {
         // The free-running rule and the receiver take the same bits from fields without gaps.
-        (Some(bits), None) => same("bits", &Some(bits_of(&bits)), &Frame::new(&row.expect_bytes.0).map(line_of)),
+        (Some(bits), None) => same("bits", &Some(bits_of(&bits)), &Frame::new(&received).map(line_of)),
         _ => Ok(()),
     }
 }
@@ -327,17 +328,17 @@ fn procedures(rows: &[Row]) -> Vec<Verdict> {
             earliest_start_us,
             wait_after_us,
         } => {
-            let (mut reset, does) = match self::data_id(data_id) {
-                DataId::ResetErrors => (Reset::clear_errors(), "all errors"),
-                DataId::SetSingleTurnZero => {
-                    (Reset::set_single_turn_zero_and_shift_commutation_angle(), "single turn data (zero position)")
-                }
-                _ => (Reset::clear_turns_and_errors(), "multi turn data and all errors"),
+            let mut reset = match self::data_id(data_id) {
+                DataId::ResetErrors => Reset::clear_errors(),
+                DataId::SetSingleTurnZero => Reset::set_single_turn_zero_and_shift_commutation_angle(),
+                _ => Reset::clear_turns_and_lose_multi_turn_reference(),
             };
-            same("effect", &effect.as_str(), &does)?;
             same("min_gap_us", &min_gap_us, &(Reset::SPACING_NS / 1000))?;
             same("count", &count, &Reset::REQUESTS)?;
             let mut device = Device::<6>::new(0x17, BitRate::Mbit2_5);
+            device.set_position(Abs::truncate(5), Abm::truncate(7));
+            device.set_alarms(Almc::CE, true);
+            device.set_alarms(Almc::CE, false);
             // A field takes 4 us; the response has six of them and begins when this encoder likes.
             let transaction_ns = u64::from(4 + response_delay_us + 24) * 1000;
             let (mut starts, mut end) = (Vec::new(), 0);
@@ -349,6 +350,14 @@ fn procedures(rows: &[Row]) -> Vec<Verdict> {
                 step = reset.receive(Ok(device.answer(asked, not_before_ns)), end);
             }
             same("earliest_start_us", &earliest_start_us, &starts)?;
+            // What the encoder has done: to the position, the turns, the errors.
+            let does = match (device.abs().get(), device.abm().get(), device.almc().is_empty()) {
+                (5, 7, true) => "all errors",
+                (0, 7, false) => "single turn data (zero position)",
+                (5, 0, true) => "multi turn data and all errors",
+                _ => "something else",
+            };
+            same("effect", &effect.as_str(), &does)?;
             let Step::Done { ready_ns, .. } = step else { return same("end", &"done", &"failed") };
             same("wait_after_us", &wait_after_us, &((ready_ns - end) / 1000))
         }

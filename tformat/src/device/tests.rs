@@ -4,7 +4,7 @@ use proptest::prelude::*;
 
 fn encoder() -> Device<6> {
     let mut device = Device::new(0x17, BitRate::Mbit2_5);
-    device.set_position(U24::truncate(0x51_2345), U24::truncate(0xfffe));
+    device.set_position(Abs::truncate(0x51_2345), Abm::truncate(0xfffe));
     device
 }
 
@@ -55,24 +55,144 @@ fn damage_is_told_in_the_status() {
     assert_eq!(sf(send(&mut device, &[0x1a], 600_000)), Some(0x00));
 }
 
-#[test]
-fn another_request_or_a_short_pause_starts_the_count_again() {
-    for disturb in [true, false] {
-        let mut device = encoder();
-        for k in 0..10 {
-            let now_ns = k * 80_000;
-            let _ = device.answer(Request::ResetTurnsAndErrors, now_ns);
-            if disturb && k == 5 {
-                let _ = device.answer(Request::ReadSingleTurn, now_ns + 40_000);
-            }
+/// Ten requests for ID C whose starts are `interval` apart, `disturb` after the sixth; whether they had their effect.
+fn resets(config: Config, interval: u64, disturb: impl Fn(&mut Device<6>, u64)) -> bool {
+    let mut device = encoder().with_config(config);
+    for k in 1..=10 {
+        let now_ns = k * interval;
+        let _ = send(&mut device, &[0x62], now_ns);
+        if k == 6 {
+            disturb(&mut device, now_ns + interval / 2);
         }
-        assert_eq!(device.abm.get(), if disturb { 0xfffe } else { 0 });
     }
-    let mut hasty = encoder();
-    for k in 0..10 {
-        let _ = hasty.answer(Request::ResetTurnsAndErrors, k * 39_999);
+    assert_eq!(device.effects(), u32::from(device.abm.get() == 0));
+    device.abm.get() == 0
+}
+
+/// 40 us or more, from start to start or from the end of the response (3 us and six fields after the request).
+#[test]
+fn the_spacing_of_resets() {
+    let nothing = |_: &mut Device<6>, _| {};
+    let start = Config::new();
+    let end = Config { reset_interval: Interval::EndToStart, ..start };
+    assert!(resets(start, 40_000, nothing) && !resets(start, 39_999, nothing));
+    assert!(resets(end, 71_000, nothing) && !resets(end, 70_999, nothing));
+}
+
+/// Whether another request, or a damaged one, starts the count again is a switch each.
+#[test]
+fn what_starts_the_count_of_resets_again() {
+    let other = |device: &mut Device<6>, now_ns| _ = send(device, &[0x02], now_ns);
+    let damaged = |device: &mut Device<6>, now_ns| _ = send(device, &[0x12], now_ns);
+    let framing = |device: &mut Device<6>, now_ns| _ = device.framing_error(now_ns);
+    let another_reset = |device: &mut Device<6>, now_ns| _ = send(device, &[0xba], now_ns);
+    let strict = Config::new();
+    let lax = Config { others_restart_count: false, damage_restarts_count: false, ..strict };
+    assert!(!resets(strict, 100_000, other) && resets(lax, 100_000, other));
+    assert!(!resets(strict, 100_000, damaged) && resets(lax, 100_000, damaged));
+    assert!(!resets(strict, 100_000, framing) && resets(lax, 100_000, framing));
+    assert!(!resets(lax, 100_000, another_reset));
+}
+
+/// The tenth response shows the position before, or the one after; then the zero is stored for 18 ms.
+#[test]
+fn the_tenth_response_and_storing() {
+    for (shows, silent) in [(false, false), (true, true)] {
+        let config = Config { tenth_shows_effect: shows, silent_while_storing: silent, ..Config::new() };
+        let mut device = encoder().with_config(config);
+        let mut tenth = None;
+        for k in 1..=10 {
+            tenth = send(&mut device, &[0xc2], k * 100_000);
+        }
+        let tenth = Response::parse(Request::SetSingleTurnZero, tenth.unwrap().frame.as_bytes()).unwrap();
+        assert_eq!(tenth.abs().map(Abs::get), Some(if shows { 0 } else { 0x51_2345 }));
+        // The request for ID 0 ends 1 ns before the 18 ms are over, and then.
+        let mut earlier = device;
+        assert_eq!(send(&mut earlier, &[0x02], 18_999_999).is_none(), silent);
+        assert!(send(&mut device, &[0x02], 19_000_000).is_some());
     }
-    assert_eq!(hasty.abm.get(), 0xfffe);
+}
+
+/// A write keeps the memory busy until 18 ms after its request; then it can be written again.
+#[test]
+fn the_memory_is_busy_for_18_ms() {
+    for (data, config) in [
+        (0x00, Config::new()),
+        (0xff, Config { busy_data: BusyData::Ones, ..Config::new() }),
+        (0x5a, Config { busy_data: BusyData::Cell, ..Config::new() }),
+    ] {
+        let mut device = encoder().with_config(config);
+        let address = Address::truncate(5);
+        let memory = |busy, edf| Memory { adf: Adf::of(address, busy), edf };
+        let write = |edf| Request::write_eeprom(address, edf);
+        assert_eq!(device.answer(write(0x5a), 100), Response::WriteEeprom(memory(false, 0x5a)));
+        let read = Request::read_eeprom(address);
+        assert_eq!(device.answer(read, 18_000_099), Response::ReadEeprom(memory(true, data)));
+        assert_eq!(device.answer(write(0x77), 18_000_099), Response::WriteEeprom(memory(true, 0x77)));
+        assert_eq!(device.answer(read, 18_000_100), Response::ReadEeprom(memory(false, 0x5a)));
+        assert_eq!(device.answer(write(0x77), 18_000_100), Response::WriteEeprom(memory(false, 0x77)));
+        assert_eq!(device.eeprom_mut()[0][5], 0x77);
+    }
+}
+
+#[test]
+fn the_page_register() {
+    let select = |page| Request::write_eeprom(Address::PAGE_REGISTER, page);
+    for (absent, page) in [(AbsentPage::Ignored, 2), (AbsentPage::Wrapped, 3)] {
+        let mut device = encoder().with_config(Config { absent_page: absent, ..Config::new() });
+        let _ = device.answer(select(2), 100);
+        assert_eq!(device.page(), 2);
+        let _ = device.answer(select(9), 200);
+        assert_eq!(device.page(), page);
+        // Selecting takes no time; while the memory is busy it is ignored.
+        let _ = device.answer(Request::write_eeprom(Address::truncate(0), 1), 300);
+        let memory = Memory { adf: Adf::of(Address::PAGE_REGISTER, true), edf: 4 };
+        assert_eq!(device.answer(select(4), 400), Response::WriteEeprom(memory));
+        assert_eq!(device.page(), page);
+    }
+    let mut slow = encoder().with_config(Config { page_select_is_busy: true, ..Config::new() });
+    let _ = slow.answer(select(2), 100);
+    let answered = slow.answer(Request::read_eeprom(Address::PAGE_REGISTER), 200);
+    assert!(matches!(answered, Response::ReadEeprom(memory) if memory.adf.busy()));
+}
+
+/// What follows a request that was judged is not heard until the line has been idle for half a field.
+#[test]
+fn deaf_time() {
+    for (gap, heard) in [(6_000, false), (6_001, true)] {
+        let mut device = encoder();
+        assert!(device.byte(0x12, 4_000).is_some());
+        assert_eq!(device.byte(0x02, 4_000 + gap).is_some(), heard);
+    }
+}
+
+#[test]
+fn what_is_not_answered_is_a_switch() {
+    let usual = Config::new();
+    let unusual =
+        Config { answers_wrong_sink: true, answers_delimiter_error: false, leaves_status_zero: true, ..usual };
+    for (config, sink, delimiter, status) in [(usual, false, true, 0x20), (unusual, true, false, 0x00)] {
+        let mut device = encoder().with_config(config);
+        device.set_alarms(Almc::BA, true);
+        assert_eq!(send(&mut device, &[0x1b], 100_000).is_some(), sink);
+        assert_eq!(device.framing_error(200_000).is_some(), delimiter);
+        let response =
+            Response::parse(Request::ReadSingleTurn, send(&mut device, &[0x02], 300_000).unwrap().frame.as_bytes());
+        assert_eq!(response.unwrap().status().map(|sf| sf.bits()), Some(status));
+    }
+}
+
+/// The documents' numbers: 3 us, six fields of 4 us, or of 2 us at the fast rate.
+#[test]
+fn the_response_begins_3_us_after_the_request() {
+    let mut device = encoder();
+    assert_eq!(send(&mut device, &[0x02], 0).map(|sent| sent.at_ns), Some(7_000));
+    let mut late = encoder().with_config(Config::new().with_response_delay(9_000));
+    assert_eq!(send(&mut late, &[0x02], 0).map(|sent| sent.at_ns), Some(13_000));
+    for number in 0..Config::NUMBERED {
+        assert!((1_700..=9_000).contains(&Config::numbered(number).response_delay_ns));
+    }
+    assert_eq!(Config::numbered(0), Config::default());
 }
 
 #[test]

@@ -8,9 +8,9 @@ use std::vec::Vec;
 pub(crate) fn fulls() -> impl Strategy<Value = AllData> {
     (any::<[u8; 3]>(), any::<u32>(), any::<u32>()).prop_map(|([sf, enid, almc], abs, abm)| AllData {
         sf: StatusField::from_bits_retain(sf),
-        abs: U24::truncate(abs),
+        abs: Abs::truncate(abs),
         enid,
-        abm: U24::truncate(abm),
+        abm: Abm::truncate(abm),
         almc: Almc::from_bits_retain(almc),
     })
 }
@@ -18,6 +18,13 @@ pub(crate) fn fulls() -> impl Strategy<Value = AllData> {
 /// A request and an answer that a sound encoder may give to it.
 pub(crate) fn exchanges() -> impl Strategy<Value = (Request, Response)> {
     (requests(), fulls(), any::<bool>()).prop_map(|(request, full, busy)| (request, answer(request, full, busy)))
+}
+
+/// As [`exchanges`], with the information bits of SF at 0, as they are documented.
+pub(crate) fn plain_exchanges() -> impl Strategy<Value = (Request, Response)> {
+    let plain =
+        fulls().prop_map(|data| AllData { sf: data.sf.intersection(StatusField::from_bits_retain(0xf0)), ..data });
+    (requests(), plain, any::<bool>()).prop_map(|(request, data, busy)| (request, answer(request, data, busy)))
 }
 
 /// The answer to `request` of an encoder that knows `full`.

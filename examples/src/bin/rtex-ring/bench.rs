@@ -3,7 +3,9 @@
 use core::f64::consts::TAU;
 
 use rtex_block::device::{Drive, DriveConfig, OpenCodes};
-use rtex_block::master::{ActiveCode, Axis, AxisConfig, Limits, Ring, SetpointError, Slave, StopReason};
+use rtex_block::master::{
+    ActiveCode, Axis, AxisConfig, Limits, Received, Ring, SameMacId, SetpointError, Slave, StopReason,
+};
 use rtex_block::{Alarm, MacId, Response, TypeCode};
 
 pub(crate) const AXES: usize = 32;
@@ -24,6 +26,10 @@ const CODES: OpenCodes = OpenCodes {
     alarm_active: TypeCode::short(0x01),
     alarm_history: TypeCode::short(0x02),
     alarm_clear: TypeCode::short(0x03),
+    alarm_attributes: TypeCode::short(0x76),
+    parameter_initial: TypeCode::short(0x77),
+    latch_arm: 0x78,
+    homing: 0x79,
     communication_lost: Alarm { main: 80, sub: 0 },
 };
 
@@ -38,7 +44,7 @@ pub(crate) struct Bench {
     silent: [bool; AXES],
     /// When each servo went off.
     off_at: [Option<u64>; AXES],
-    responses: [Option<Response>; AXES],
+    responses: [Received; AXES],
 }
 
 /// Time of an update period.
@@ -51,22 +57,22 @@ fn mac_id(place: usize) -> MacId {
 }
 
 impl Bench {
-    pub(crate) fn new(mode: ActiveCode, limits: Limits) -> Self {
+    pub(crate) fn new(mode: ActiveCode, limits: Limits) -> Result<Self, SameMacId> {
         let axis = |place| Axis::new(AxisConfig::new(mac_id(place), mode, UPDATE_NS, limits));
         // Drives do not get ready at the same moment.
         let drive = |place: usize| {
             let sync_exchanges = 20 + u16::try_from(place).unwrap_or(0) * 3;
             Drive::new(DriveConfig::new(mac_id(place), CODES).with_sync_exchanges(sync_exchanges))
         };
-        Self {
-            ring: Ring::new(core::array::from_fn(axis), INVALID),
+        Ok(Self {
+            ring: Ring::new(core::array::from_fn(axis), INVALID)?,
             now: 0,
             history: Vec::new(),
             drives: core::array::from_fn(drive),
             silent: [false; AXES],
             off_at: [None; AXES],
-            responses: [None; AXES],
-        }
+            responses: [Received::Nothing; AXES],
+        })
     }
 
     /// What the ring configuration finds.
@@ -82,10 +88,10 @@ impl Bench {
             let was_active = drive.is_active();
             let silent = self.silent.get(place) == Some(&true);
             let received = match commands.get(place) {
-                Some(command) if !silent => Response::parse(&drive.exchange(&command.emit())).ok(),
+                Some(command) if !silent => Response::parse(&drive.exchange(&command.main.emit())).into(),
                 _ => {
                     drive.miss();
-                    None
+                    Received::Nothing
                 }
             };
             if let Some(response) = self.responses.get_mut(place) {

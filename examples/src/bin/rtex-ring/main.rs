@@ -39,7 +39,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let out = std::env::args().nth(1).unwrap_or_else(|| "rtex-ring.svg".to_owned());
     check_periods()?;
 
-    let mut bench = Bench::new(ActiveCode::CyclicPosition, LIMITS);
+    let mut bench = Bench::new(ActiveCode::CyclicPosition, LIMITS)?;
     let mut phases = PhaseControl::new();
     start_communication(&mut bench, &mut phases);
 

@@ -2,7 +2,7 @@
 
 use std::borrow::Cow;
 
-use tformat::{Adf, AllData, Almc, DataId, Error, Memory, Request, Resolution, Response, StatusField, U24};
+use tformat::{Abs, Adf, AllData, Almc, DataId, Error, Memory, Request, Resolution, Response, StatusField};
 
 use super::frame::Frame;
 use super::{ANSWER_TIMEOUT, Settings};
@@ -79,7 +79,7 @@ impl Encoder {
                 position
             }
             Response::ReadMultiTurn(v) => {
-                fields.push(number("ABM", v.abm));
+                fields.push(number("ABM", v.abm.get()));
                 None
             }
             Response::ReadEncoderId(v) => {
@@ -98,9 +98,9 @@ impl Encoder {
     }
 
     fn full(&mut self, full: AllData, fields: &mut Vec<Field>) -> Option<Position> {
-        fields.push(number("ABS", full.abs));
+        fields.push(number("ABS", full.abs.get()));
         self.identify(full.enid, fields);
-        fields.push(number("ABM", full.abm));
+        fields.push(number("ABM", full.abm.get()));
         fields.push(alarms(full.almc));
         let resolution = self.resolution()?;
         match resolution.position(full.abs, full.abm) {
@@ -113,8 +113,8 @@ impl Encoder {
         }
     }
 
-    fn single_turn(&self, abs: U24, fields: &mut Vec<Field>) -> Option<Position> {
-        fields.push(number("ABS", abs));
+    fn single_turn(&self, abs: Abs, fields: &mut Vec<Field>) -> Option<Position> {
+        fields.push(number("ABS", abs.get()));
         let Some(resolution) = self.resolution() else {
             return Some(Position { counts: abs.get().into(), span: None, per_turn: None });
         };
@@ -230,8 +230,8 @@ fn address(adf: Adf) -> Field {
     Field { name: "ADF", value: Value::Flags { raw: adf.bits().into(), digits: 2, set } }
 }
 
-fn number(name: &'static str, value: U24) -> Field {
-    Field { name, value: Value::Number { value: value.get().into(), unit: "" } }
+fn number(name: &'static str, value: u32) -> Field {
+    Field { name, value: Value::Number { value: value.into(), unit: "" } }
 }
 
 fn hex(name: &'static str, byte: u8) -> Field {

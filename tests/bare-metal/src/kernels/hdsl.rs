@@ -6,8 +6,8 @@ use hdsl::frame::{Extra, Head, Received};
 use hdsl::master::{Counters, Master};
 use hdsl::message::{Access, Data, Length, LongRequest, RemoteRegister, ResourceAddress, ShortAnswer, ShortRequest};
 use hdsl::registers::{Event, EventS, Register, Registers};
-use hdsl::rssi::Rssi;
-use hdsl::sampling::{Alignment, EdgeRule, TEST_PATTERN, WINDOW};
+use hdsl::rssi::EdgeWatch;
+use hdsl::sampling::{Alignment, Delay, EdgeRule, SampleIndex, TEST_PATTERN, WINDOW};
 use hdsl::symbol::{Character, DisparityCheck, DisparityStatus, Reading, RunningDisparity, Word};
 use hdsl::sync::{CoreClock, Es, Next, Startup, Synchroniser};
 use hdsl::{
@@ -61,6 +61,9 @@ const fn samples(bits: u64, delay: usize) -> [u8; WINDOW] {
 }
 
 const PATTERNS: [[u8; WINDOW]; 3] = [samples(TEST_PATTERN, 5), samples(TEST_PATTERN, 42), samples(LINES[0], 20)];
+
+/// Where to sample.
+const PLACE: Alignment = Alignment { index: SampleIndex::truncate(1), delay: Delay::MIN };
 
 /// Values of the acceleration channel, present or not.
 const ACCELERATIONS: [[Option<i16>; 4]; 2] =
@@ -180,10 +183,9 @@ kernels! {
         Alignment::learn(EdgeRule::Leading, samples)
     } over PATTERNS;
 
-    /// The bits and the RSSI of an answer at a learned place.
-    fn hdsl_sampled(samples: &[u8; WINDOW]) -> (Result<u64, Error>, Option<Rssi>) {
-        let place = Alignment::learn(EdgeRule::All, &PATTERNS[0]);
-        (place.and_then(|place| place.bits(samples)), place.ok().map(|place| place.rssi(samples)))
+    /// The bits, the edges and the RSSI of an answer at a learned place.
+    fn hdsl_read(samples: &[u8; WINDOW]) -> Result<(u64, EdgeWatch), Error> {
+        PLACE.read(samples)
     } over PATTERNS;
 
     /// A short message there and back.

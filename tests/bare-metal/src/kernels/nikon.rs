@@ -2,8 +2,8 @@
 
 use nikon_aformat::{
     Abs40, Alm, BitOrder, BitRate, Command, Crc3, Crc8, EncoderAddress, EncoderStatus, Error, Expected, Frames,
-    Operation, Position, Resolution, RawResponse, Request, RequestFrame, Response, TypeWord, U24, U40, UserAddress, Version,
-    Window, crc3, crc8, stream,
+    Operation, Position, RawResponse, Request, RequestFrame, Resolution, Response, TypeWord, U24, U40, UserAddress,
+    Version, Window, crc3, crc8, stream,
 };
 use nom::{IResult, Parser};
 

@@ -1,7 +1,7 @@
 //! A-format: reception, bus, master, encoder, inspection.
 
 use nikon_aformat::bus::{Addresses, Bus};
-use nikon_aformat::device::{Transmission, Device};
+use nikon_aformat::device::{Device, Transmission};
 use nikon_aformat::inspect::{Report, inspect};
 use nikon_aformat::master::{
     BusTransaction, Counters, Cycle, Detected, Detection, EepromRead, ErrorRate, Line, Progress, Reset, Step,
@@ -9,7 +9,8 @@ use nikon_aformat::master::{
 };
 use nikon_aformat::reception::LineReceiver;
 use nikon_aformat::{
-    Alm, BitRate, EncoderAddress, EncoderId, Error, ErrorClass, Operation, Resolution, RawResponse, Request, Response, Window,
+    Alm, BitRate, EncoderAddress, EncoderId, Error, ErrorClass, Operation, RawResponse, Request, Resolution, Response,
+    Window,
 };
 use nrz_line::Samples;
 

@@ -7,7 +7,8 @@ use rtex_block::device::{self, Drive, DriveConfig, OpenCodes};
 use rtex_block::inspect::{self, Report};
 use rtex_block::master::{
     ActiveCode, Asic, Axis, AxisConfig, CommandCounter, EchoWatch, Expected, Fault, Handshake, Inputs, Led, Limits,
-    Order, Phase, PhaseControl, ProfileMove, Progress, Reception, Ring, ServoOff, Slave, SlaveInfo, Turn, compare, led,
+    Order, Phase, PhaseControl, ProfileMove, Progress, Received, Reception, Ring, ServoOff, Slave, SlaveInfo, Turn,
+    compare, led,
 };
 use rtex_block::position::{self, Gear};
 use rtex_block::timing::{FrameTime, Periods, timer_reload};
@@ -48,7 +49,12 @@ const EXPECTED: Expected =
 
 const LIMIT: NonZeroU16 = NonZeroU16::MIN.saturating_add(7);
 
-const AXIS: Axis = Axis::new(AxisConfig::new(MAC_ID, ActiveCode::CyclicPosition, 500_000, Limits::new(LIMIT, 100)));
+const AXIS: Axis = axis(5);
+
+const fn axis(mac_id: u8) -> Axis {
+    let limits = Limits::new(LIMIT, 100);
+    Axis::new(AxisConfig::new(MacId::truncate(mac_id), ActiveCode::CyclicPosition, 500_000, limits))
+}
 
 const HANDSHAKE: Handshake =
     match Handshake::new(MAC_ID, CyclicCode::CyclicPosition, NonCyclicCommand::Monitor(READ), 100) {
@@ -63,6 +69,10 @@ const CODES: OpenCodes = OpenCodes {
     alarm_active: TypeCode::short(0x01),
     alarm_history: TypeCode::short(0x02),
     alarm_clear: TypeCode::short(0x03),
+    alarm_attributes: TypeCode::short(0x76),
+    parameter_initial: TypeCode::short(0x77),
+    latch_arm: 0x78,
+    homing: 0x79,
     communication_lost: Alarm { main: 80, sub: 0 },
 };
 
@@ -195,19 +205,19 @@ kernels! {
     } over [(ProfileMove::new(MAC_ID, 0x11, 1_000, 500, 100), RESPONSE)];
 
     /// An update period of one axis: response in, command out.
-    fn rtex_axis((axis, response): &(Axis, Option<Response>)) -> Command {
+    fn rtex_axis((axis, received): &(Axis, Received)) -> Command32 {
         let mut axis = *axis;
-        axis.receive(Turn::Valid(COUNTER), response.as_ref());
+        axis.receive(Turn::Valid(COUNTER), received);
         let _ = axis.set_position(1_010);
         axis.send(Turn::Valid(COUNTER))
-    } over [(AXIS, Some(RESPONSE)), (AXIS, None)];
+    } over [(AXIS, Received::Main(RESPONSE)), (AXIS, Received::Nothing)];
 
     /// An update period of a ring of four axes.
-    fn rtex_ring((ring, responses): &(Ring<4>, [Option<Response>; 4])) -> [Command; 4] {
-        let mut ring = *ring;
+    fn rtex_ring((axes, received): &([Axis; 4], [Received; 4])) -> Option<[Command32; 4]> {
+        let mut ring = Ring::new(*axes, 0).ok()?;
         ring.switch_on();
-        ring.update(responses)
-    } over [(Ring::new([AXIS; 4], 0), [Some(RESPONSE); 4])];
+        Some(ring.update(received))
+    } over [([axis(5), axis(6), axis(7), axis(8)], [Received::Main(RESPONSE); 4])];
 
     /// An exchange with the drive model.
     fn rtex_drive((drive, command): &(Drive, Command)) -> [u8; 16] {

@@ -14,8 +14,9 @@ use sorte_proto::sync0::{Sync0, Variant, Write, Writes};
 use sorte_proto::timing::{Budget, Timing};
 use sorte_proto::{
     Assignment, Clock, Correction, DelayModel, DelayReq, DeviceAddress, DeviceFrame, DeviceFrameView, Direction,
-    Discovery, DiscoveryView, Entry, Error, LineDelay, LongFrame, MasterFrameView, MotorMask, Network, OutOfRange, Param,
-    Parameters, Payload, Pto, Slice, StartTime, Status, Sync, crc8, fcs, stream, strip_preamble, write_master_frame,
+    Discovery, DiscoveryView, Entry, Error, LineDelay, LongFrame, MasterFrameView, MotorMask, Network, OutOfRange,
+    Param, Parameters, Payload, Pto, Slice, StartTime, Status, Sync, crc8, fcs, stream, strip_preamble,
+    write_master_frame,
 };
 
 use super::kernels;

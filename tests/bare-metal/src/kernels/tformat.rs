@@ -2,8 +2,8 @@
 
 use nom::{IResult, Parser};
 use tformat::{
-    Adf, AllData, Almc, BitOrder, BitRate, ControlField, DataId, Error, Frame, Hint, Position, Request, Resolution,
-    Response, StatusField, U24, VendorCommand, Window, crc, spi, stream,
+    Abm, Abs, Adf, AllData, Almc, BitOrder, BitRate, ControlField, DataId, Error, Frame, Hint, Position, Request,
+    Resolution, Response, StatusField, VendorCommand, Window, crc, spi, stream,
 };
 
 use super::kernels;
@@ -20,9 +20,9 @@ const REQUESTS: [Request; 3] = [
 const SENT: [([u8; 4], usize); 3] = [([0x1a, 0, 0, 0], 1), ([0xea, 0x35, 0xdf, 0], 3), ([0x32, 0x7f, 0x01, 0x4c], 4)];
 
 /// An encoder of 23 and 16 bits with signed turns, one of 17 and 16 with unsigned ones; ABS and ABM of each.
-const POSITIONS: [(Resolution, U24, U24); 2] = [
-    (resolution(23, 16), U24::truncate(0x3b_c029), U24::truncate(0xfffe)),
-    (resolution(17, 16).with_unsigned_turns(), U24::truncate(0x1_c029), U24::truncate(7)),
+const POSITIONS: [(Resolution, Abs, Abm); 2] = [
+    (resolution(23, 16), Abs::truncate(0x3b_c029), Abm::truncate(0xfffe)),
+    (resolution(17, 16).with_unsigned_turns(), Abs::truncate(0x1_c029), Abm::truncate(7)),
 ];
 
 const fn resolution(abs_bits: u8, abm_bits: u8) -> Resolution {
@@ -158,12 +158,12 @@ kernels! {
     } over ANSWERS;
 
     /// ABS and ABM as one position.
-    fn tformat_position((resolution, abs, abm): &(Resolution, U24, U24)) -> Result<Position, Error> {
+    fn tformat_position((resolution, abs, abm): &(Resolution, Abs, Abm)) -> Result<Position, Error> {
         resolution.position(*abs, *abm)
     } over POSITIONS;
 
     /// The fraction of a turn, and the way from there to the zero point.
-    fn tformat_fraction((resolution, abs, _): &(Resolution, U24, U24)) -> Result<(u32, i32), Error> {
+    fn tformat_fraction((resolution, abs, _): &(Resolution, Abs, Abm)) -> Result<(u32, i32), Error> {
         Ok((resolution.fraction(*abs)?, resolution.difference(resolution.single_turn(*abs)?, 0)))
     } over POSITIONS;
 

@@ -6,7 +6,7 @@ use tformat::inspect::{Report, inspect, inspect_bytes};
 use tformat::master::{
     Counters, EEPROM_POLLING, EepromAccess, ErrorRate, Line, Progress, Reset, Step, Transaction, parse_echoed,
 };
-use tformat::{Address, Almc, BitRate, Error, ErrorClass, Page, Request, Response, SingleTurn, U24, Window};
+use tformat::{Abm, Abs, Address, Almc, BitRate, Error, ErrorClass, Page, Request, Response, SingleTurn, Window};
 
 use super::kernels;
 use crate::self_test::tformat::{ANSWERS, Answer, FLIPS, Flip};
@@ -32,16 +32,21 @@ kernels! {
         let mut now_ns = 4_000;
         for byte in *bytes {
             now_ns += 4_000;
-            let _ = transaction.byte(*byte, now_ns);
+            let _ = transaction.bytes(&[*byte], now_ns);
         }
         transaction.progress()
+    } over ECHOED;
+
+    /// A transaction whose whole answer comes in one block.
+    fn tformat_transaction_block((request, _, bytes): &Echoed) -> Progress {
+        Transaction::start(*request, LINE, 0).bytes(bytes, 31_000)
     } over ECHOED;
 
     /// A transaction that ends with a framing error or a time-out.
     fn tformat_transaction_fails((request, echo, bytes): &Echoed) -> Progress {
         let mut transaction = Transaction::start(*request, LINE, 0);
         for byte in *bytes {
-            let _ = transaction.byte(*byte, 4_000);
+            let _ = transaction.bytes(&[*byte], 40_000);
         }
         if *echo { transaction.framing_error(8_000) } else { transaction.poll(1_000_000) }
     } over ECHOED;
@@ -84,7 +89,7 @@ kernels! {
     /// A new encoder with an alarm receives a request byte by byte and answers.
     fn tformat_device_byte(sent: &Sent) -> Option<Transmission> {
         let mut encoder = Device::<1>::new(0x17, BitRate::Mbit2_5);
-        encoder.set_position(U24::truncate(0x12_3456), U24::truncate(7));
+        encoder.set_position(Abs::truncate(0x12_3456), Abm::truncate(7));
         encoder.set_alarms(Almc::CE, !sent.is_empty());
         encoder.set_fault(Fault::FlipBit { at: sent.len() as u8 });
         let mut now_ns = 0;

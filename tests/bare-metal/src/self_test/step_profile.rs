@@ -1,7 +1,7 @@
 //! Single steps register by register, and whole moves by their hash.
 
 use step_profile::pru_exact::{self, Registers};
-use step_profile::{Arithmetic, Parameters, Profile, Speed, RampStep, corrected};
+use step_profile::{Arithmetic, Parameters, Profile, RampStep, Speed, corrected};
 
 use super::{Tally, Topic, each};
 

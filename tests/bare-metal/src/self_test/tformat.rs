@@ -1,8 +1,8 @@
 //! Answers from bytes and from line bits in both orders, refused single flips, check fields.
 
 use tformat::{
-    Adf, AllData, Almc, BitOrder, ErrorClass, Frame, Identification, Memory, MultiTurn, Request, Response, SingleTurn,
-    StatusField, U24, Window, crc,
+    Abm, Abs, Adf, AllData, Almc, BitOrder, ErrorClass, Frame, Identification, Memory, MultiTurn, Request, Response,
+    SingleTurn, StatusField, Window, crc,
 };
 
 use super::{Tally, Topic, each};

@@ -95,16 +95,27 @@ pub(super) fn fw_startup(rows: &[Row]) -> Vec<Verdict> {
             identified |= bench.master.state() == State::WaitVsync;
             if report.restarted.is_some() && report.tail.trailer != Trailer::Cut {
                 // A row of its own for what was sent when the master gave up, with the registers before that.
-                let Some(gave_up) = frames.next() else { return Ok(()) };
+                let Some(gave_up) = frames.next() else { return learned(&row, &bench) };
                 same("gave up", &None, &gave_up.0)?;
                 same("master bits", &gave_up.2.0, &sent)?;
                 startup_registers(gave_up, &before, identified)?;
                 sent.clear();
             }
         }
-        let id = bench.master.encoder_id().map(EncoderId::get);
-        same("encoder_id", &row.encoder_id, &Hex(id.map_or(row.encoder_id.0, u64::from)))
+        learned(&row, &bench)
     })
+}
+
+/// The last entry shows ENC_ID with the nibble of ENC_ID2 doubled if the receiver locked, and 0 if it learned none.
+fn learned(row: &Startup, bench: &Bench) -> Verdict {
+    let shown = row.frames.last().map_or(0, |frame| frame.7.0);
+    let id = bench.master.encoder_id().map(EncoderId::get).map(u64::from);
+    if shown == 0 {
+        return same("encoder_id", &None, &id);
+    }
+    let nibble = row.encoder_id.0 >> 16;
+    same("ENC_ID of the row", &shown, &(row.encoder_id.0 & 0xffff | nibble << 20 | nibble << 16))?;
+    same("encoder_id", &Some(row.encoder_id.0), &id)
 }
 
 /// Sends frames until one is answered, and gives its row.
@@ -195,19 +206,59 @@ pub(super) fn fw_link(rows: &[Row]) -> Vec<Verdict> {
     each(rows, |row: Link| {
         columns(&row.columns, &names)?;
         let mut bench = locked(Dialect::TI, row.pos_bits)?;
+        let (last, len) = (row.frames.len().saturating_sub(1), row.frames.len());
         for (at, frame) in row.frames.into_iter().enumerate() {
             if frame.first().is_some_and(|first| first == "LINK_LOST") {
-                // The answer that caused the loss is not in the row.
-                continue;
+                // The answer that caused the loss is not in the row: nothing can follow.
+                same("entry of the loss", &last, &at)?;
+                return same("values of the loss", &10, &frame.len());
             }
-            let frame: LinkFrame =
-                serde_json::from_value(frame.into()).map_err(|e| Fault::Unreadable(format!("frame {at}: {e}")))?;
-            let report = bench.feed(frame.0.bits as u64)?;
-            same("restarted", &None, &report.restarted)?;
-            link_registers(&frame, &bench, row.flip_probability > 0.0).map_err(|fault| at_frame(at, fault))?;
+            link_frame(&mut bench, at, frame, row.flip_probability > 0.0)?;
+        }
+        same("frames", &true, &(len > 0))
+    })
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct SickLink {
+    pos_bits: u8,
+    #[serde(rename = "kind")]
+    _kind: String,
+    columns: Vec<String>,
+    frames: Vec<Vec<serde_json::Value>>,
+}
+
+pub(super) fn link_sick(rows: &[Row]) -> Vec<Verdict> {
+    let names = ["answer", "MASTER_QM", "POS", "VEL", "ONLINE_STATUS_D/1/2", "ACC_ERR_CNT", "align_phase", "VPOS+CRC"];
+    let names = [&names[..], &["SAFE_SUM", "STATUS2+VPOS2+CRC2"]].concat();
+    each(rows, |row: SickLink| {
+        columns(&row.columns, &names)?;
+        let mut bench = locked(Dialect::SICK, row.pos_bits)?;
+        let last = row.frames.len().saturating_sub(1);
+        for (at, frame) in row.frames.into_iter().enumerate() {
+            if frame.first().is_some_and(|first| first == "LINK_LOST") {
+                same("entry of the loss", &last, &at)?;
+                let (_, answer): (String, Line) = read_frame(at, frame)?;
+                let report = bench.feed(answer.bits as u64)?;
+                same("restarted", &Some(Cause::Quality), &report.restarted)?;
+                return same("LINK", &false, &bench.map.link());
+            }
+            link_frame(&mut bench, at, frame, false)?;
         }
         Ok(())
     })
+}
+
+fn read_frame<T: serde::de::DeserializeOwned>(at: usize, frame: Vec<serde_json::Value>) -> Result<T, Fault> {
+    serde_json::from_value(frame.into()).map_err(|e| Fault::Unreadable(format!("frame {at}: {e}")))
+}
+
+fn link_frame(bench: &mut Bench, at: usize, frame: Vec<serde_json::Value>, noise: bool) -> Verdict {
+    let frame: LinkFrame = read_frame(at, frame)?;
+    let report = bench.feed(frame.0.bits as u64)?;
+    same("restarted", &None, &report.restarted)?;
+    link_registers(&frame, bench, noise).map_err(|fault| at_frame(at, fault))
 }
 
 /// Says in which frame of a trace the difference is.
@@ -247,8 +298,8 @@ struct Messages {
     data: Option<Bytes>,
 }
 
-/// Starts the message of a row and gives how many bytes of PC_BUFFER belong to it.
-fn trigger(row: &Messages, bench: &mut Bench) -> Result<usize, Fault> {
+/// Starts the message of a row.
+fn trigger(row: &Messages, bench: &mut Bench) -> Verdict {
     let missing = || Fault::Unreadable("a key of this kind of row is missing".to_owned());
     if row.kind == "long" {
         let (Some(addr), Some(read), Some(indirect), Some(llen), Some(data)) =
@@ -259,8 +310,7 @@ fn trigger(row: &Messages, bench: &mut Bench) -> Result<usize, Fault> {
         let request = super::message::request(addr, read, indirect, llen, row.offset, data)?;
         same("request", &row.request.0, &request.emit().as_bytes().to_vec())?;
         let header = row.request.0.first_chunk().copied().unwrap_or([0; 2]);
-        bench.long(header, request.offset, &request.access)?;
-        return Ok(data.0.len());
+        return bench.long(header, request.offset, &request.access);
     }
     let register = super::message::register(row.reg.ok_or_else(missing)?)?;
     let request = match (row.kind.as_str(), row.value) {
@@ -269,44 +319,63 @@ fn trigger(row: &Messages, bench: &mut Bench) -> Result<usize, Fault> {
         _ => return Err(missing()),
     };
     same("request", &row.request.0, &request.emit().as_bytes().to_vec())?;
-    bench.short(request)?;
-    Ok(0)
+    bench.short(request)
 }
 
-pub(super) fn fw_messages(rows: &[Row]) -> Vec<Verdict> {
-    each(rows, |row: Messages| {
-        let mut bench = locked(Dialect::TI, 32)?;
-        let mut answers = Encoder::default();
-        // One V-frame has to pass before messages are sent; the rows begin in the next but one frame boundary.
+/// A receiver and its encoder, kept from row to row.
+struct Session {
+    bench: Bench,
+    answers: Encoder,
+}
+
+impl Session {
+    fn new() -> Result<Self, Fault> {
+        let mut session = Self { bench: locked(Dialect::TI, 32)?, answers: Encoder::default() };
+        // One V-frame has to pass before messages are sent.
         for _ in 0..15 {
-            let _ = bench.feed(answers.next(EncoderSymbol::Idle))?;
+            session.bench.feed(session.answers.next(EncoderSymbol::Idle))?;
         }
-        let mut written = 0;
+        Ok(session)
+    }
+
+    fn row(&mut self, row: &Messages) -> Verdict {
         let mut sent = Vec::new();
         for (at, symbol) in row.encoder_symbols.iter().enumerate() {
             if at == 1 {
-                written = trigger(&row, &mut bench)?;
+                trigger(row, &mut self.bench)?;
             }
-            let byte = bench.master.transmission().head.byte();
+            let byte = self.bench.master.transmission().head.byte();
             sent.push(byte.symbol().map_or(0xff, MasterSymbol::bits));
             let symbol = EncoderSymbol::from_bits(*symbol).map_err(|e| Fault::Unreadable(e.to_string()))?;
-            let report = bench.feed(answers.next(symbol))?;
-            if let Some(Ok(answer)) = report.finished.long {
-                written = written.max(answer.result.map_or(2, |data| data.as_bytes().len()));
-            }
+            self.bench.feed(self.answers.next(symbol))?;
         }
         same("master_symbols", &row.master_symbols, &sent)?;
-        let map = &bench.map;
-        if row.kind == "long" {
-            same("PC_ADD", &row.pc_add, &Hex(bytes::<2>(map, Register::PcAdd)))?;
-            let buffer: [u8; 8] = map.get(Register::PcBuffer);
-            same("PC_BUFFER", &row.pc_buffer.0.get(..written), &buffer.get(..written))?;
-        } else {
-            same("S_PC_DATA", &row.s_pc_data, &Hex(bytes::<1>(map, Register::SPcData)))?;
-        }
+        let map = &self.bench.map;
+        same("PC_ADD", &row.pc_add, &Hex(bytes::<2>(map, Register::PcAdd)))?;
+        same("PC_BUFFER", &row.pc_buffer.0, &map.get::<8>(Register::PcBuffer).to_vec())?;
+        same("S_PC_DATA", &row.s_pc_data, &Hex(bytes::<1>(map, Register::SPcData)))?;
         same("EVENT", &row.event, &Hex(map.event().bits().into()))?;
         same("EVENT_S", &row.event_s, &Hex(map.event_s().bits().into()))
-    })
+    }
+}
+
+/// Rows are sessions in order: a short message with nothing in PC_BUFFER after a row with something begins a new one.
+pub(super) fn fw_messages(rows: &[Row]) -> Vec<Verdict> {
+    let mut session: Option<Session> = None;
+    let mut used = false;
+    let mut check = |row: &Row| -> Verdict {
+        let row: Messages = row.read()?;
+        let empty = row.pc_buffer.0.iter().all(|byte| *byte == 0);
+        if row.kind != "long" && empty && used {
+            session = None;
+        }
+        used = !empty || used && session.is_some();
+        match &mut session {
+            Some(session) => session.row(&row),
+            none => none.insert(Session::new()?).row(&row),
+        }
+    };
+    rows.iter().map(&mut check).collect()
 }
 
 /// An encoder at standstill that says what it is told to.

@@ -82,7 +82,7 @@ pub(super) fn master(rows: &[Row]) -> Vec<Verdict> {
                 same(
                     "master_ts_plus_delay",
                     &device.master_ts_plus_delay,
-                    &view.reference_ns(device.line_delay_previous),
+                    &view.reference_ns(device.line_delay_previous.into()),
                 )?;
                 same("address", &usize::from(device.address), &(index + 1))?;
             }

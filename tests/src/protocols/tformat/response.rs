@@ -3,7 +3,7 @@
 use serde::Deserialize;
 
 use tformat::master::parse_echoed;
-use tformat::{AllData, Almc, DataId, Error, Request, Resolution, Response, StatusField, Window};
+use tformat::{AllData, Almc, Error, Request, Resolution, Response, StatusField, Window};
 
 use super::{bits_of, class, compose, data_id, line_of, outcome};
 use crate::hex::{Bits, Bytes, Hex};
@@ -95,14 +95,14 @@ fn check_content(want: &Content, response: Response) -> Verdict {
     same("cf", &want.cf, &frame.as_bytes().first().copied())?;
     same("crc", &want.crc, &frame.as_bytes().last().copied())?;
     check_status(want.sf.as_ref(), response.status())?;
-    same("abs", &want.abs, &response.abs().map(tformat::U24::get))?;
+    same("abs", &want.abs, &response.abs().map(tformat::Abs::get))?;
     let (abm, enid, almc) = match response {
         Response::ReadMultiTurn(v) => (Some(v.abm), None, None),
         Response::ReadEncoderId(v) => (None, Some(v.enid), None),
         Response::ReadAll(v) => (Some(v.abm), Some(v.enid), Some(v.almc)),
         _ => (None, None, None),
     };
-    same("abm", &want.abm, &abm.map(tformat::U24::get))?;
+    same("abm", &want.abm, &abm.map(tformat::Abm::get))?;
     same("enid", &want.enid, &enid)?;
     check_alarms(want.almc.as_ref(), almc)?;
     if let Some(width) = &want.width {
@@ -161,8 +161,7 @@ fn response(row: &ResponseRow, content: &Content) -> Verdict {
 #[serde(deny_unknown_fields)]
 pub(super) struct NegativeRow {
     /// How the frame was damaged.
-    #[serde(rename = "kind")]
-    _kind: String,
+    kind: String,
     level: Level,
     request_id: Hex,
     adf: Option<u8>,
@@ -192,16 +191,16 @@ enum Level {
 pub(super) fn negative(row: NegativeRow) -> Verdict {
     let id = data_id(row.request_id);
     let bytes = row.bytes.map(|b| b.0).unwrap_or_default();
-    // A row that says nothing of the EEPROM request means one that the answer would fit.
-    let echoed = |at| bytes.get(at).copied();
-    let adf = row.adf.or_else(|| echoed(1).map(|adf| adf & 0x7f));
-    let request = compose(id, adf, row.edf.or_else(|| echoed(2)));
+    // Rows about damage that the check field does not see, and about trailing bytes, leave the EEPROM request open: it is
+    // one that the answer fits. All other rows are refused before the address is looked at, or say what was asked.
+    let fits = row.kind.starts_with("crc_blind") || row.kind == "trailing_bytes";
+    let request = match Request::answered_by(&bytes) {
+        Ok(request) if fits => request,
+        _ => compose(id, row.adf, row.edf),
+    };
     let parsed = match (&row.level, &row.wire) {
         (Level::Bytes, _) => Response::parse(request, &bytes),
-        (Level::Wire, Some(wire)) => {
-            let line = window(wire);
-            Response::parse_line(asked_on(id, line, row.adf, row.edf), line)
-        }
+        (Level::Wire, Some(wire)) => Response::parse_line(request, window(wire)),
         (Level::Wire, None) => return same("wire", &"line bits", &"none"),
     };
     same("error", &row.error.as_deref().unwrap_or("ok"), &parsed.as_ref().map_or_else(|e| class(*e), |_| "ok"))?;
@@ -216,12 +215,6 @@ pub(super) fn negative(row: NegativeRow) -> Verdict {
         (_, None) => Ok(()),
         (_, Some(_)) => same("sf", &"a status", &"none"),
     }
-}
-
-/// The request of a line row: what the row says, or one that the answer would fit.
-fn asked_on(id: DataId, line: Window, adf: Option<u8>, edf: Option<u8>) -> Request {
-    let byte = |field: u32| (line.bits() >> (10 * field + 1)) as u8;
-    compose(id, adf.or(Some(byte(1) & 0x7f)), edf.or(Some(byte(2))))
 }
 
 #[derive(Deserialize)]
