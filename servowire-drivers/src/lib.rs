@@ -9,7 +9,9 @@ extern crate std;
 mod clock;
 mod direction;
 mod error;
-#[cfg(feature = "tformat")]
+#[cfg(feature = "nikon")]
+pub mod nikon;
+#[cfg(any(feature = "nikon", feature = "tformat"))]
 mod quiet;
 #[cfg(all(feature = "async", feature = "tformat"))]
 mod race;
