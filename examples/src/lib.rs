@@ -1,7 +1,4 @@
-//! Driver sketches over the embedded traits: what a firmware writes around the protocol crates.
-//!
-//! They are generic over the traits of `embedded-hal` and `embedded-io`, run on a host against the simulated devices of
-//! the protocol crates, and are meant to be copied and cut to the board.
+//! Small programs that teach. Firmware for real boards is in `firmware/`, each image a workspace of its own.
 #![no_std]
 #![cfg_attr(test, allow(clippy::arithmetic_side_effects, clippy::cast_possible_truncation))]
 
@@ -9,4 +6,3 @@
 extern crate std;
 
 pub mod simulated_uart;
-pub mod tformat_uart;

@@ -5,10 +5,9 @@ use core::convert::Infallible;
 
 use embedded_hal::digital::{ErrorType as PinErrorType, OutputPin};
 use embedded_io::{ErrorType, Read, ReadReady, Write};
+use servowire_drivers::Clock;
 use tformat::device::{Device, Fault};
 use tformat::{Abm, Abs, BitRate};
-
-use crate::tformat_uart::Clock;
 
 /// Time of one field at 2.5 Mbit/s.
 const FIELD_NS: u64 = 4_000;
@@ -143,5 +142,31 @@ impl OutputPin for Pin {
 
     fn set_high(&mut self) -> Result<(), Infallible> {
         Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use servowire_drivers::tformat::blocking::Encoder;
+    use servowire_drivers::{DriverEnable, Error};
+    use tformat::master::Line;
+
+    #[test]
+    fn positions_arrive_and_a_fault_is_over_with_the_next_call() {
+        let bench = Bench::new(0x17);
+        let line = Line::new(BitRate::Mbit2_5);
+        let mut encoder = Encoder::new(Uart::new(&bench), DriverEnable(Pin), &bench, line);
+        for position in [0, 1, 0x7f_ffff] {
+            bench.turn_to(Abs::truncate(position), Abm::truncate(3));
+            let all = encoder.read_all().unwrap();
+            assert_eq!((all.abs.get(), all.abm.get(), all.enid), (position, 3, 0x17));
+        }
+        bench.break_it(Fault::Silent);
+        assert_eq!(encoder.read_all(), Err(Error::Protocol(tformat::Error::NoResponse { echo: true })));
+        bench.break_it(Fault::CutAfter { fields: 2 });
+        assert!(encoder.read_all().is_err());
+        bench.break_it(Fault::None);
+        assert!(encoder.read_all().is_ok());
     }
 }

@@ -1,7 +1,15 @@
 #![doc = include_str!("../README.md")]
 #![no_std]
 #![cfg_attr(docsrs, feature(doc_cfg))]
-#![cfg_attr(test, allow(clippy::arithmetic_side_effects, clippy::unwrap_used))]
+#![cfg_attr(
+    test,
+    allow(
+        clippy::arithmetic_side_effects,
+        clippy::cast_possible_truncation,
+        clippy::indexing_slicing,
+        clippy::unwrap_used
+    )
+)]
 
 #[cfg(test)]
 extern crate std;
@@ -9,10 +17,13 @@ extern crate std;
 mod clock;
 mod direction;
 mod error;
-#[cfg(feature = "tformat")]
+#[cfg(feature = "nikon")]
+pub mod nikon;
+#[cfg(any(feature = "nikon", feature = "tformat"))]
 mod quiet;
 #[cfg(all(feature = "async", feature = "tformat"))]
 mod race;
+pub mod samples;
 #[cfg(feature = "tformat")]
 pub mod tformat;
 

@@ -1,24 +1,20 @@
-//! Polls a simulated encoder through the driver sketch: `cargo run -p servowire-examples --bin tformat-uart`.
+//! Polls a simulated encoder through the driver: `cargo run -p servowire-examples --bin tformat-uart`.
 
+use servowire_drivers::DriverEnable;
+use servowire_drivers::tformat::blocking::Encoder;
 use servowire_examples::simulated_uart::{Bench, Pin, Uart};
-use servowire_examples::tformat_uart::Encoder;
 use tformat::master::Line;
-use tformat::{Abm, Abs, BitRate, Request, Resolution, Response};
+use tformat::{Abm, Abs, BitRate, Policy, Resolution};
 
 fn main() {
     let bench = Bench::new(0x17);
-    let line = Line::new(BitRate::Mbit2_5).with_echo();
-    let mut encoder = Encoder::new(Uart::new(&bench), Pin, &bench, line);
+    let Ok(resolution) = Resolution::new(23, 16) else { return };
+    let mut encoder = Encoder::new(Uart::new(&bench), DriverEnable(Pin), &bench, Line::new(BitRate::Mbit2_5));
     for k in 0..5_u32 {
         bench.turn_to(Abs::truncate(k.wrapping_mul(0x11_1111)), Abm::truncate(k));
-        match encoder.transact(Request::ReadAll) {
-            Ok(Response::ReadAll(data)) => {
-                match Resolution::from_enid(data.enid).map(|hint| hint.resolution.position(data.abs, data.abm)) {
-                    Some(Ok(position)) => println!("{position}"),
-                    other => println!("{data}: {other:?}"),
-                }
-            }
-            other => println!("{other:?}"),
+        match encoder.read_position(resolution, Policy::STRICT) {
+            Ok(sample) => println!("{}, sampled at {} ns", sample.position, sample.sampled_ns),
+            Err(error) => println!("{error:?}"),
         }
     }
 }

@@ -12,8 +12,10 @@ use crate::programs::Rate;
 
 /// From the end of one transaction to the beginning of the next, on top of what the protocol wants.
 const PAUSE_NS: u64 = 20_000;
-/// How long this processor may take over one frame while the next ones wait in the ring.
-const LATENCY_NS: u32 = 8_000;
+/// By how much the end time of a block may be late: how long this processor may take over a frame.
+const LATENCY_NS: u32 = 2_000;
+/// Frames of the longest response, and some noise.
+const MOST_FRAMES: usize = 8;
 /// Longest wait for the response: encoders answer after some microseconds.
 const RESPONSE_TIMEOUT_NS: u32 = 20_000;
 
@@ -36,8 +38,7 @@ pub fn master(rate: BitRate) -> ! {
     let port = rate_of(rate).expect("a rate of this port");
     let Board { mut console, mut clock, mut transmitter, receiver, channel } = Board::new(port, 16);
     let mut receiver = RingReceiver::new(channel, receiver);
-    let mut line = Line::new(rate).with_response_timeout_ns(RESPONSE_TIMEOUT_NS);
-    line.idle_in_response_ns += LATENCY_NS;
+    let line = Line::new(rate).with_response_timeout_ns(RESPONSE_TIMEOUT_NS).with_latency_ns(LATENCY_NS);
     let resolution = Resolution::default();
     let request = Request::new(EncoderAddress::ZERO, Operation::Abs40);
     let message = message(Operation::Abs40);
@@ -48,17 +49,29 @@ pub fn master(rate: BitRate) -> ! {
         let began_ns = clock.now_ns();
         let mut transaction = Transaction::start(request, resolution, line, began_ns);
         transmitter.send(&message);
-        let mut last_ns = None;
+        // The receiver is on again from the end of the request on, so nothing that comes is older.
+        let since_ns = began_ns + u64::from(line.request_ns(request));
+        let (mut frames, mut count, mut last_ns) = ([None; MOST_FRAMES], 0, 0);
         let (end, ready_ns) = loop {
-            // Frames that wait in the ring have come one after the other.
             let unit = receiver.take();
-            let at_ns = last_ns.map_or_else(|| clock.now_ns(), |last_ns| last_ns + frame_ns);
+            let now_ns = clock.now_ns();
             let progress = match unit {
-                Some(Unit { content, framed: true }) => transaction.frame(content, at_ns),
-                Some(_) => transaction.framing_error(at_ns),
-                None => transaction.poll(clock.now_ns()),
+                Some(Unit { content, framed }) => {
+                    if let Some(place) = frames.get_mut(count) {
+                        *place = framed.then_some(content);
+                        count += 1;
+                    }
+                    last_ns = now_ns;
+                    transaction.progress()
+                }
+                // The line is quiet again: what has come is a block.
+                None if count > 0 && now_ns > last_ns + frame_ns + frame_ns / 2 => {
+                    let block = &frames[..count];
+                    count = 0;
+                    transaction.block(block, since_ns, last_ns)
+                }
+                None => transaction.poll(now_ns),
             };
-            last_ns = unit.map(|_| at_ns).or(last_ns);
             match progress {
                 Progress::Pending { .. } => {}
                 Progress::Done { value, ready_ns } => break (Ok(value), ready_ns),
@@ -66,7 +79,7 @@ pub fn master(rate: BitRate) -> ! {
             }
         };
         let took_ns = clock.now_ns() - began_ns;
-        match end.map(|response| response.abs40()) {
+        match end.map(|reading| reading.response.abs40()) {
             Ok(Some(abs)) => {
                 good += 1;
                 if good % 16 == 1 {
