@@ -4,6 +4,13 @@
 //!
 //! `cargo run -p sorte-proto --example machine`
 
+#![allow(
+    clippy::arithmetic_side_effects,
+    clippy::cast_possible_truncation,
+    clippy::indexing_slicing,
+    reason = "a simulation on a host"
+)]
+
 use sorte_proto::device::{self, Arrival, Device, Path, PortId, Trigger};
 use sorte_proto::follow::{Asked, Feedback, Follower};
 use sorte_proto::master::{self, Action, Master};
