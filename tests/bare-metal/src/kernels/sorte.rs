@@ -178,7 +178,7 @@ kernels! {
         head
     }];
 
-    /// 64 bytes of DISCOVERY through a device that the frame passes, as its port sees them; 45 instructions a byte.
+    /// 64 bytes of DISCOVERY through a device that the frame passes, as its port sees them, and the passage made before.
     fn sorte_passage(frame: &[u8; 64]) -> ([u8; 64], Option<Path>) {
         let mut device = Device::new(device::Config::new());
         device.links(true, false);
