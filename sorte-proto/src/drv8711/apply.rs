@@ -147,4 +147,23 @@ mod tests {
             assert!(written.iter().all(|word| word >> 12 != 0));
         }
     }
+
+    /// After a read-back that differs, the same register is written again, not only read.
+    #[test]
+    fn a_register_that_did_not_take_its_value_is_written_again() {
+        let mut apply = Apply::new(other_everywhere());
+        for _ in 0..3 {
+            let Next::Transfer(word) = apply.next() else { panic!("done") };
+            // TORQUE 1, SMPLTH code 4.
+            assert_eq!(word.bits(), 0x1401);
+            assert_eq!(apply.answer([0, 0]), Ok(()));
+            let Next::Transfer(word) = apply.next() else { panic!("done") };
+            assert_eq!(word.bits(), 0x9000);
+            assert!(apply.answer([0, 0]).is_err());
+        }
+        assert_eq!(apply.next(), Next::Transfer(Register::Torque.write(0x401)));
+        apply.answer([0, 0]).unwrap();
+        assert_eq!(apply.answer([0xf0, 0x01]), Ok(()), "bit 10 reads 0");
+        assert_eq!(apply.next(), Next::Transfer(Register::Off.write(0x031)));
+    }
 }

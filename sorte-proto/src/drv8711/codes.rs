@@ -284,4 +284,28 @@ mod tests {
             assert_eq!(SampleThreshold::from_code(code).map(SampleThreshold::code), (code <= 7).then_some(code));
         }
     }
+
+    /// The data sheet's tables, written down once more: a name is what its code does.
+    #[test]
+    fn every_name_has_the_code_of_the_data_sheet() {
+        let dead_times = [DeadTime::Ns400, DeadTime::Ns450, DeadTime::Ns650, DeadTime::Ns850];
+        assert_eq!(dead_times.map(DeadTime::code), [0, 1, 2, 3]);
+        assert_eq!([0, 1, 2, 3].map(|code| IsGain::from_code(code).unwrap().factor()), [5, 10, 20, 40]);
+        let drive = [DriveTime::Ns250, DriveTime::Ns500, DriveTime::Ns1000, DriveTime::Ns2000];
+        assert_eq!(drive.map(DriveTime::code), [0, 1, 2, 3]);
+        let sink = [SinkCurrent::Ma100, SinkCurrent::Ma200, SinkCurrent::Ma300, SinkCurrent::Ma400];
+        assert_eq!(sink.map(SinkCurrent::code), [0, 1, 2, 3]);
+        let source = [SourceCurrent::Ma50, SourceCurrent::Ma100, SourceCurrent::Ma150, SourceCurrent::Ma200];
+        assert_eq!(source.map(SourceCurrent::code), [0, 1, 2, 3]);
+        let ocp = [OcpThreshold::Mv250, OcpThreshold::Mv500, OcpThreshold::Mv750, OcpThreshold::Mv1000];
+        assert_eq!(ocp.map(OcpThreshold::code), [0, 1, 2, 3]);
+        let deglitch = [OcpDeglitch::Us1, OcpDeglitch::Us2, OcpDeglitch::Us4, OcpDeglitch::Us8];
+        assert_eq!(deglitch.map(OcpDeglitch::code), [0, 1, 2, 3]);
+        let stall = [StallCount::Steps1, StallCount::Steps2, StallCount::Steps4, StallCount::Steps8];
+        assert_eq!(stall.map(StallCount::code), [0, 1, 2, 3]);
+        let divider = [StallDivider::Div32, StallDivider::Div16, StallDivider::Div8, StallDivider::Div4];
+        assert_eq!(divider.map(StallDivider::code), [0, 1, 2, 3]);
+        assert_eq!((StepMode::Full.code(), StepMode::Div256.code()), (0, 8));
+        assert_eq!((DecayMode::Slow.code(), DecayMode::AutoMixed.code()), (0, 5));
+    }
 }

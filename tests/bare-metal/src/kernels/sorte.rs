@@ -4,10 +4,11 @@ use core::hint::black_box;
 
 use nom::{IResult, Parser};
 use sorte_proto::cut_through::{DiscoveryRewriter, SyncRewriter};
-use sorte_proto::device::{self, Arrival, Device, Handled, PortId};
+use sorte_proto::device::{self, Arrival, Device, Handled, Path, PortId};
 use sorte_proto::drv8711::{
     self, Apply, Configuration, IsGain, Next, Register, full_scale_microamps, torque_for_microamps,
 };
+use sorte_proto::follow::{Asked, Feedback, Follower};
 use sorte_proto::iep::{Channel, Edge};
 use sorte_proto::master::{self, Action, Master, Outgoing};
 use sorte_proto::sync0::{Sync0, Variant, Write, Writes};
@@ -176,6 +177,31 @@ kernels! {
         head[2] = 1;
         head
     }];
+
+    /// 64 bytes of DISCOVERY through a device that the frame passes, as its port sees them, and the passage made before.
+    fn sorte_passage(frame: &[u8; 64]) -> ([u8; 64], Option<Path>) {
+        let mut device = Device::new(device::Config::new());
+        device.links(true, false);
+        let mut passage = device.begin(PortId::A);
+        (frame.map(|byte| passage.byte(byte)), passage.path())
+    } over [{
+        let mut head = [0; 64];
+        head[0] = 0xff;
+        head[2] = 1;
+        head
+    }];
+
+    /// A word with its position, done by a device that has missed one before it.
+    fn sorte_follow(words: &[u16; 3]) -> (Pto, i16, [u8; 3]) {
+        let (mut asked, mut follower) = (Asked::new(), Follower::new(128));
+        let mut last = Pto::DriverOff;
+        for (word, lost) in words.iter().zip([false, true, false]) {
+            let slice = asked.slice(Pto::from_word(*word));
+            last = follower.next((!lost).then_some(slice));
+        }
+        let feedback = Feedback { position: follower.position(), ..Feedback::default() };
+        (last, asked.lag(Feedback::parse(feedback.emit()).position), feedback.emit())
+    } over [[0_u16, 1000, 0], [1000, 2000, 3000], [1000, 0x8001, 0x7fff]];
 
     /// A long-header frame with its checks.
     fn sorte_long_frame(frame: &[u8; 14]) -> Result<LongFrame<'static>, Error> {

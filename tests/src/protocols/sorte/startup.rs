@@ -92,8 +92,8 @@ struct HostView {
 }
 
 /// The default master with `devices` stock devices, whose delay requests come back after the times of `rtt_ns`: all
-/// frames until the first of the exchange, by their type.
-fn start_up(devices: u8, rtt_ns: &[u32]) -> (Vec<Outgoing>, Master) {
+/// frames until the first of the exchange, with the times at which they are triggered.
+fn start_up(devices: u8, rtt_ns: &[u32]) -> (Vec<(u64, Outgoing)>, Master) {
     let mut master = Master::new(Config::default());
     master.link(true);
     let (mut sent, mut now_ns, mut rtt) = (Vec::new(), 0, rtt_ns.iter());
@@ -101,7 +101,7 @@ fn start_up(devices: u8, rtt_ns: &[u32]) -> (Vec<Outgoing>, Master) {
         match master.poll(now_ns) {
             Action::Wait { until_ns } => now_ns = until_ns,
             Action::Send { at_ns, frame } => {
-                sent.push(frame);
+                sent.push((at_ns, frame));
                 let answer = answer(frame, devices);
                 let after = if let Outgoing::DelayReq(_) = frame { rtt.next().copied().unwrap_or(400) } else { 400 };
                 assert_eq!(master.receive(&answer, at_ns + u64::from(after)), Ok(()));
@@ -163,23 +163,26 @@ pub(super) fn master_startup(rows: &[Row]) -> Vec<Verdict> {
     let summary = rows.iter().find_map(|row| row.read::<SummaryRow>().ok());
     let (devices, rtt_ns) = summary.map_or((4, vec![472; 16]), |row| (row.devices, row.rtt_ns));
     let (sent, master) = start_up(devices, &rtt_ns);
-    let of_type = |t: FrameType| -> Vec<&Outgoing> { sent.iter().filter(|frame| kind(frame) == t).collect() };
+    let of_type =
+        |t: FrameType| -> Vec<&(u64, Outgoing)> { sent.iter().filter(|(_, frame)| kind(frame) == t).collect() };
     each(rows, |row: StartupRow| match row {
         StartupRow::Frame(row) => {
             let frames = of_type(code(&row.frame)?);
             same("of", &usize::from(row.of), &frames.len())?;
-            same("wire", &Some(row.wire.0), &frames.get(usize::from(row.index)).map(|frame| wire(frame)))
+            same("wire", &Some(row.wire.0), &frames.get(usize::from(row.index)).map(|(_, frame)| wire(frame)))
         }
         StartupRow::Sync(row) => {
             let frames = of_type(code(&row.frame)?);
             same("of", &usize::from(row.of), &frames.len())?;
-            same("cmp3_ns", &row.cmp3_ns, &(500 + 10_000 * u32::from(row.index)))?;
+            // When our master triggers it, on its own time.
+            let triggered = frames.get(usize::from(row.index)).map(|(at_ns, _)| at_ns.wrapping_sub(master.epoch_ns()));
+            same("cmp3_ns", &Some(u64::from(row.cmp3_ns)), &triggered)?;
             let last = row.index + 1 == row.of;
             let frame = Sync::of_master(row.cmp3_ns, row.line_delay_ns, last);
             same("timestamp_ns", &row.timestamp_ns, &frame.time_stamp_ns)?;
             same("wire", &row.wire.0, &on_wire(Preamble::Middle, &frame.emit()))?;
             if master.line_delay().checked() == Ok(row.line_delay_ns) {
-                same("sent", &Some(row.wire.0), &frames.get(usize::from(row.index)).map(|frame| wire(frame)))?;
+                same("sent", &Some(row.wire.0), &frames.get(usize::from(row.index)).map(|(_, frame)| wire(frame)))?;
             }
             Ok(())
         }
@@ -196,7 +199,7 @@ pub(super) fn master_startup(rows: &[Row]) -> Vec<Verdict> {
             let (sent, master) = start_up(row.devices, &row.rtt_ns);
             for (name, count) in row.counts {
                 let code = code(&name)?;
-                same("counts", &usize::from(count), &sent.iter().filter(|frame| kind(frame) == code).count())?;
+                same("counts", &usize::from(count), &sent.iter().filter(|(_, frame)| kind(frame) == code).count())?;
             }
             let line: &LineDelay = master.line_delay();
             same("devices", &row.devices, &master.network().devices())?;

@@ -1,0 +1,141 @@
+//! A master and three devices on a simulated line, from link-up to steps: what a firmware does around both state machines.
+//!
+//! The line is ideal: cables of 50 ns, counters that run alike. `servowire cnc` has the one that is not.
+//!
+//! `cargo run -p sorte-proto --example machine`
+
+#![allow(
+    clippy::arithmetic_side_effects,
+    clippy::cast_possible_truncation,
+    clippy::indexing_slicing,
+    reason = "a simulation on a host"
+)]
+
+use sorte_proto::device::{self, Arrival, Device, Path, PortId, Trigger};
+use sorte_proto::follow::{Asked, Feedback, Follower};
+use sorte_proto::master::{self, Action, Master};
+use sorte_proto::{Correction, Direction, Discovery, Error, Pto, Slice, TRANSIT_NS};
+
+const CABLE_NS: u64 = 50;
+const DEVICES: usize = 3;
+
+/// A device with its counter and its axis.
+struct Node {
+    device: Device,
+    /// What the counter is ahead of the line's time.
+    ahead_ns: u64,
+    follower: Follower,
+}
+
+impl Node {
+    /// A start-up frame at a port; the hardware captures its start 280 ns after its trigger.
+    fn pass(&mut self, port: PortId, frame: &mut [u8], sof_ns: u64) -> device::Handled {
+        let counter = |ns: u64, ahead: u64| (ns.wrapping_add(ahead) & 0xffff_ffff) as u32;
+        let seen_ns = sof_ns + 280;
+        let (sof, now) = (counter(seen_ns, self.ahead_ns), counter(seen_ns + 700, self.ahead_ns));
+        let handled = self.device.frame(port, frame, Arrival { sof_ns: sof, counter_ns: now, now_ns: sof_ns });
+        if let Correction::Set { counter_ns } = handled.correction {
+            // The write takes effect 135 ns later.
+            self.ahead_ns = u64::from(counter_ns).wrapping_sub(seen_ns + 700 + 135);
+        }
+        handled
+    }
+}
+
+/// Out to the last device and back; what comes to the master, and when.
+fn carry(nodes: &mut [Node], frame: &[u8], at_ns: u64) -> Option<(Vec<u8>, u64)> {
+    let (mut frame, mut sof_ns) = (frame.to_vec(), at_ns);
+    for k in 0..nodes.len() {
+        sof_ns += CABLE_NS;
+        let handled = nodes.get_mut(k)?.pass(PortId::A, &mut frame, sof_ns);
+        measure(nodes.get_mut(k..)?, handled.trigger, sof_ns);
+        match handled.path {
+            Path::Forward => sof_ns += u64::from(TRANSIT_NS),
+            Path::Absorb => return None,
+            Path::Reflect => {
+                sof_ns += 320 + CABLE_NS;
+                for node in nodes.get_mut(..k)?.iter_mut().rev() {
+                    node.pass(PortId::B, &mut frame, sof_ns);
+                    sof_ns += u64::from(TRANSIT_NS) + CABLE_NS;
+                }
+                return Some((frame, sof_ns));
+            }
+        }
+    }
+    None
+}
+
+/// The first of `nodes` measures the cable to the second, which does the same to the third.
+fn measure(nodes: &mut [Node], trigger: Trigger, at_ns: u64) {
+    let (Some(request), [first, rest @ ..]) = (Device::delay_request(trigger), nodes) else { return };
+    let mut frame = request.emit();
+    let Some(next) = rest.first_mut() else { return };
+    let handled = next.pass(PortId::A, &mut frame, at_ns + CABLE_NS);
+    measure(rest, handled.trigger, at_ns);
+    // There and back, and 360 ns in the neighbour; 15 ns are what the published rounding loses.
+    let result = first.device.delay_reflection(trigger, &frame, 2 * CABLE_NS as u32 + 375);
+    assert_eq!(result, Ok(()));
+}
+
+fn main() -> Result<(), Error> {
+    let mut nodes: Vec<Node> = (0..DEVICES as u64)
+        .map(|k| Node {
+            device: Device::new(device::Config::new()),
+            ahead_ns: k * 123_456_789,
+            follower: Follower::new(128),
+        })
+        .collect();
+    for (k, node) in nodes.iter_mut().enumerate() {
+        node.device.links(true, k + 1 < DEVICES);
+    }
+    let mut master = Master::new(master::Config::new());
+    master.link(true);
+    let mut axes = [Asked::new(); DEVICES];
+    let (mut now_ns, mut cycles) = (0, 0);
+    while cycles < 1000 {
+        match master.poll(now_ns) {
+            Action::Wait { until_ns } => now_ns = until_ns,
+            Action::Restart { error } => return Err(error),
+            Action::Send { at_ns, frame } => {
+                let mut buffer = [0; Discovery::LEN];
+                let len = frame.emit_into(&mut buffer)?;
+                if let Some((answer, sof_ns)) = carry(&mut nodes, &buffer[..len], at_ns) {
+                    master.receive(&answer, sof_ns)?;
+                }
+            }
+            Action::Exchange { at_ns, time_stamp, .. } => {
+                // Each axis steps in every cycle, the second one backwards.
+                let mut output = vec![0; master.output_len().into()];
+                for ((k, axis), bytes) in axes.iter_mut().enumerate().zip(output.chunks_exact_mut(4)) {
+                    let step = Pto::from_step(1000, Direction::from(k == 1)).unwrap_or_default();
+                    bytes.copy_from_slice(&axis.slice(step).emit());
+                }
+                let mut frame = [0; 64];
+                let len = master.write_frame(&output, time_stamp, &mut frame)?;
+                for node in &mut nodes {
+                    let arrival = 500 + node.device.delay_ns().unwrap_or_default();
+                    let taken = node.device.exchange(&frame[..len], arrival, arrival)?;
+                    let slice = taken.data.first_chunk().map(|bytes| Slice::parse(*bytes));
+                    // The word for the SYNC0 generator.
+                    let _word = node.follower.next(slice);
+                    node.device.cycle_start();
+                    let payload = Feedback { position: node.follower.position(), ..Feedback::default() }.emit();
+                    let mut bytes = [0; 6];
+                    if let Some(answer) = node.device.answer(payload) {
+                        answer.emit_into(&mut bytes)?;
+                        master.device_frame(&bytes)?;
+                    }
+                }
+                (now_ns, cycles) = (at_ns, cycles + 1);
+            }
+        }
+    }
+    println!("{}; {} cycles from {} ns of the master's time on", master.network(), cycles, now_ns - master.epoch_ns());
+    for (axis, node) in axes.iter().zip(&nodes) {
+        let address = node.device.assignment().map_or(0, |place| place.address.get());
+        let (asked, lag) = (axis.position(), axis.lag(node.follower.position()));
+        println!("device {address}: {:?}, asked to {asked}, {lag} steps behind", node.device.state());
+        assert_eq!(lag, 0);
+    }
+    Ok(())
+}
