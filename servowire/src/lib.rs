@@ -19,4 +19,5 @@ pub mod line;
 pub mod output;
 pub mod profile;
 pub mod protocols;
+pub mod talk;
 pub mod timing;
