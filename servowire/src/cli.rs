@@ -7,7 +7,7 @@ use clap::{Args, Parser, Subcommand, ValueEnum};
 
 use crate::capture::{Format, Hints, time};
 use crate::protocols::{Protocol, Settings, nikon, rtex, tformat};
-use crate::{cnc, decode, line, profile, talk};
+use crate::{cnc, decode, line, profile, talk, timing};
 
 /// Decodes what servo drives, controllers and encoders say to each other.
 #[derive(Debug, Parser)]
@@ -27,6 +27,8 @@ enum Command {
     Cnc(cnc::Arguments),
     /// Talk to a T-Format encoder at a USB-RS485 adapter, or be one.
     Talk(talk::Arguments),
+    /// Who is on an encoder's line when: shortest cycle, worst fault.
+    Timing(timing::Arguments),
 }
 
 impl Cli {
@@ -37,6 +39,7 @@ impl Cli {
             Command::Profile(arguments) => arguments.run(),
             Command::Cnc(arguments) => arguments.run(),
             Command::Talk(arguments) => arguments.run(),
+            Command::Timing(arguments) => arguments.run(),
         }
     }
 }

@@ -20,3 +20,4 @@ pub mod output;
 pub mod profile;
 pub mod protocols;
 pub mod talk;
+pub mod timing;

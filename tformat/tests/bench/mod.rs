@@ -223,6 +223,11 @@ impl Bench {
                 assert!(!intact, "the response {response} was never sent");
                 self.seen.undetected += 1;
             }
+            // Damage that happens to make an old value: nothing of that answer was handed over since.
+            Verdict::Old { of } if truth.handed_since(id).all(|handed| handed.origin.transmission != of) => {
+                assert!(!truth.undisturbed(id) || truth.intact_answers(id).next().is_none(), "invented: {response}");
+                self.seen.undetected += 1;
+            }
             Verdict::Old { of } => {
                 let of = truth.transmission(of);
                 // Where the request is on the line twice, the encoder answers the first.

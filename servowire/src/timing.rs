@@ -1,0 +1,86 @@
+//! `servowire timing`: who is on the line when, how short a cycle can be, and what the worst fault costs.
+
+mod drawing;
+mod tformat;
+
+use std::error::Error;
+use std::fmt;
+use std::fs;
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+use clap::{Args, Subcommand};
+
+/// Who is on the line when: the shortest cycle and the worst fault of an exchange with an encoder.
+#[derive(Debug, Args)]
+pub struct Arguments {
+    #[command(subcommand)]
+    protocol: Protocol,
+    /// Draw the cycle into this file.
+    #[arg(long, global = true, value_name = "OUT")]
+    svg: Option<PathBuf>,
+}
+
+#[derive(Debug, Subcommand)]
+enum Protocol {
+    /// One Tamagawa T-Format encoder.
+    Tformat(tformat::Arguments),
+}
+
+impl Arguments {
+    /// Prints the plan, or draws it. 2: it could not be made or written.
+    pub fn run(&self) -> ExitCode {
+        match self.try_run() {
+            Ok(()) => ExitCode::SUCCESS,
+            Err(error) => {
+                eprintln!("servowire timing: {error}");
+                ExitCode::from(2)
+            }
+        }
+    }
+
+    fn try_run(&self) -> Result<(), Box<dyn Error>> {
+        let plan = match &self.protocol {
+            Protocol::Tformat(arguments) => arguments.plan(),
+        };
+        if let Some(path) = &self.svg {
+            fs::write(path, drawing::svg(&plan)).map_err(|error| format!("{}: {error}", path.display()))?;
+        } else {
+            print!("{plan}");
+        }
+        Ok(())
+    }
+}
+
+/// Something that somebody does, in ns from the start of the request.
+#[derive(Debug, Clone, PartialEq, Eq)]
+struct Bar {
+    who: &'static str,
+    what: String,
+    start_ns: i64,
+    end_ns: i64,
+}
+
+/// One cycle of an exchange.
+#[derive(Debug, Clone, PartialEq, Eq)]
+struct Plan {
+    title: String,
+    bars: Vec<Bar>,
+    /// From the start of one request to the start of the next, at the least.
+    cycle_ns: u64,
+    /// From the start of a request that fails to the start of the next, at the most.
+    fault_ns: u64,
+}
+
+impl fmt::Display for Plan {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let us = |ns: i64| ns as f64 / 1000.0;
+        writeln!(f, "{}", self.title)?;
+        for Bar { who, what, start_ns, end_ns } in &self.bars {
+            writeln!(f, "  {who:<10}  {:>7.2} .. {:>6.2} us  {what}", us(*start_ns), us(*end_ns))?;
+        }
+        let (cycle, fault) = (us(self.cycle_ns as i64), us(self.fault_ns as i64));
+        writeln!(f, "shortest cycle {cycle:.2} us, {:.1} kHz", 1000.0 / cycle)?;
+        writeln!(f, "after the worst fault the line is free {fault:.2} us after the start of the request")
+    }
+}

@@ -1,0 +1,107 @@
+//! T-Format: one encoder, one request after the other.
+
+use clap::Args;
+use tformat::master::{Line, Progress, Transaction};
+use tformat::{Adf, BitRate, DataId, Request};
+
+use super::{Bar, Plan};
+
+/// One Tamagawa T-Format encoder.
+#[derive(Debug, Args)]
+pub(super) struct Arguments {
+    /// Bit rate in Mbit/s.
+    #[arg(long, value_name = "RATE", default_value = "2.5", value_parser = rate)]
+    rate: BitRate,
+    /// What is asked for, one hex digit: 0 position, 1 turns, 2 encoder ID, 3 all, 6 and D EEPROM, 7, 8 and C reset.
+    #[arg(long, value_name = "ID", default_value = "3", value_parser = data_id)]
+    id: DataId,
+    /// Length of the cable in metres, 5 ns a metre each way.
+    #[arg(long, value_name = "M", default_value_t = 0)]
+    cable: u16,
+    /// From the end of the request to the response, at the encoder, in ns.
+    #[arg(long, value_name = "NS", default_value_t = tformat::RESPONSE_DELAY_NS)]
+    turn_around: u32,
+    /// From the end of the response to its hand-over to the program, in ns.
+    #[arg(long, value_name = "NS", default_value_t = 0)]
+    latency: u32,
+}
+
+fn rate(text: &str) -> Result<BitRate, String> {
+    match text {
+        "2.5" => Ok(BitRate::Mbit2_5),
+        "5" => Ok(BitRate::Mbit5),
+        _ => Err("2.5 or 5".to_owned()),
+    }
+}
+
+fn data_id(text: &str) -> Result<DataId, String> {
+    let code = u8::from_str_radix(text, 16).map_err(|error| error.to_string())?;
+    DataId::from_code(code).map_err(|error| error.to_string())
+}
+
+impl Arguments {
+    pub(super) fn plan(&self) -> Plan {
+        let Self { rate, id, cable, turn_around, latency } = *self;
+        let line = Line::new(rate).with_hand_over(latency);
+        let way_ns = 5 * i64::from(cable);
+        let (request, response) = id.layout();
+        let asked_ns = i64::from(rate.fields_ns(id.request_fields()));
+        // As the controller sees it: the request travels there, the response back.
+        let answer_ns = asked_ns + 2 * way_ns + i64::from(turn_around);
+        let end_ns = answer_ns + i64::from(rate.fields_ns(id.response_fields()));
+        let handed_ns = end_ns + i64::from(latency);
+        let lead_ns = i64::from(line.driver_lead_ns);
+        let bar = |who, what, start_ns, end_ns| Bar { who, what, start_ns, end_ns };
+        let bars = vec![
+            bar("controller", "driver on".to_owned(), -lead_ns, 0),
+            bar("controller", format!("request {}", request.join(" ")), 0, asked_ns),
+            bar("line", format!("turn-around, {cable} m of cable there and back"), asked_ns, answer_ns),
+            bar("encoder", format!("response {}", response.join(" ")), answer_ns, end_ns),
+            bar("controller", "hand-over".to_owned(), end_ns, handed_ns),
+        ];
+        let mut lost = Transaction::start(Request::of(id, Adf::from_bits(0), 0), line, 0);
+        let fault_ns = match lost.poll(u64::MAX) {
+            Progress::Failed { ready_ns, .. } => ready_ns,
+            _ => 0,
+        };
+        let title = format!("T-Format, {id} at {rate}");
+        // The driver of the next request may be switched on when the response is over.
+        let cycle_ns = u64::try_from(handed_ns + lead_ns).unwrap_or(0);
+        Plan { title, bars, cycle_ns, fault_ns }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn plan(rate: BitRate, id: DataId, cable: u16) -> Plan {
+        Arguments { rate, id, cable, turn_around: 3_000, latency: 0 }.plan()
+    }
+
+    /// The end of the response, in us, with 3 us of turn-around: IDs 0, 1, 2, 3, 6, 7, 8, C, D.
+    #[test]
+    fn responses_end_as_the_tables_say() {
+        let ends = |rate| DataId::ALL.map(|id| plan(rate, id, 0).bars[3].end_ns / 1000);
+        assert_eq!(ends(BitRate::Mbit2_5), [31, 31, 23, 51, 35, 31, 31, 31, 31]);
+        assert_eq!(ends(BitRate::Mbit5), [17, 17, 13, 27, 19, 17, 17, 17, 17]);
+        // 100 m of cable add 1 us.
+        assert_eq!(plan(BitRate::Mbit2_5, DataId::ReadAll, 100).bars[3].end_ns, 52_000);
+    }
+
+    /// 4 us, 10 us to the start bit, 44 us: the longest response that may come.
+    #[test]
+    fn cycle_and_worst_fault() {
+        let plan = plan(BitRate::Mbit2_5, DataId::ReadAll, 0);
+        assert_eq!((plan.cycle_ns, plan.fault_ns), (52_000, 58_000));
+        let text = plan.to_string();
+        assert!(text.contains("shortest cycle 52.00 us, 19.2 kHz"), "{text}");
+        assert!(text.contains("  encoder        7.00 ..  51.00 us  response CF SF ABS0"), "{text}");
+    }
+
+    #[test]
+    fn wrong_use_is_refused() {
+        assert!(rate("3").is_err() && data_id("4").is_err() && data_id("g").is_err());
+        assert_eq!((rate("5"), data_id("C")), (Ok(BitRate::Mbit5), Ok(DataId::ResetTurnsAndErrors)));
+    }
+}
