@@ -125,7 +125,7 @@ const fn resource(address: ResourceAddress, name: [u8; 8], size: u8, write_level
 }
 
 impl Resource {
-    /// Up to `length` bytes of `bytes` from `offset` on, zeros behind them.
+    /// Up to `length` bytes of `bytes` from `offset` on, zeros after them.
     fn cut(bytes: &[u8], offset: u16, length: Length) -> Data {
         let mut out = [0; 8];
         for (to, from) in out.iter_mut().zip(bytes.iter().skip(usize::from(offset))) {

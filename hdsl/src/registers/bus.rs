@@ -44,7 +44,7 @@ impl<E: fmt::Display> fmt::Display for BusError<E> {
     }
 }
 
-/// A receiver behind a [`RegisterBus`], for example the firmware of the Motor Control SDK or the SICK IP core in the map of
+/// A receiver that is reached over a [`RegisterBus`], for example the firmware of the Motor Control SDK or the SICK IP core in the map of
 /// the SDK.
 ///
 /// Messages are started with `start_...` and asked for with `poll_...` until they give something; their ends are known by

@@ -13,9 +13,9 @@ pub enum Register {
     SyncCtrl = 0x01,
     /// MASTER_QM: bit 7 LINK, bits 3:0 quality monitor.
     MasterQm = 0x03,
-    /// EVENT_H, see [`Event`].
+    /// EVENT_H, see [`Event`](super::Event).
     EventH = 0x04,
-    /// EVENT_L, see [`Event`].
+    /// EVENT_L, see [`Event`](super::Event).
     EventL = 0x05,
     /// MASK_H: which events interrupt.
     MaskH = 0x06,
@@ -62,7 +62,7 @@ pub enum Register {
     SPcData = 0x37,
     /// ACC_ERR_CNT: acceleration words in a row that could not be used; stops at 31 in the SICK core.
     AccErrCnt = 0x38,
-    /// EVENT_S, see [`EventS`].
+    /// EVENT_S, see [`EventS`](super::EventS).
     EventS = 0x3d,
     /// MASK_S: which safe events interrupt.
     MaskS = 0x3e,
@@ -81,10 +81,10 @@ pub enum Register {
     VPosCrc2 = 0x4c,
     /// POSTX: 0 request sent, 2 fast position ready, 3 safe positions ready.
     PosTx = 0x4e,
-    /// ONLINE_STATUS_D_H, see [`OnlineD`].
+    /// ONLINE_STATUS_D_H, see [`OnlineD`](super::OnlineD).
     OnlineStatusD = 0x50,
-    /// ONLINE_STATUS_1_H, see [`Online1`].
+    /// ONLINE_STATUS_1_H, see [`Online1`](super::Online1).
     OnlineStatus1 = 0x52,
-    /// ONLINE_STATUS_2_H, see [`Online2`].
+    /// ONLINE_STATUS_2_H, see [`Online2`](super::Online2).
     OnlineStatus2 = 0x54,
 }

@@ -11,7 +11,7 @@ struct Entry {
     flags: u8,
 }
 
-/// The FIFO of eight bytes behind PIPE_S and PIPE_D (SICK manual, p. 52-53).
+/// The FIFO of eight bytes that PIPE_S and PIPE_D read (SICK manual, p. 52-53).
 ///
 /// K30.7 means "no data" and is not stored. If the FIFO is full the oldest entry goes and POVR is set.
 ///

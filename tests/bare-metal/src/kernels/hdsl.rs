@@ -74,8 +74,8 @@ const HEADS: [(u8, u8, i8); 4] = [(0xd0, 0, 0), (0x1f, 0, -2), (0x90, 40, 5), (0
 
 const PERIODS: [(u32, u8); 4] = [(900, 1), (1500, 2), (20_000, 10), (5, 1)];
 
-/// Frames of a whole link.
-const LINKS: [u32; 1] = [130];
+/// Frames from the start of a link.
+const LINKS: [u32; 1] = [30];
 
 fn es_of(es: u8) -> Result<Es, Error> {
     Es::new(es).ok_or(Error::NoPulse)
@@ -217,7 +217,7 @@ kernels! {
         Startup::new(*period * 4, CoreClock::Mhz300, es_of(*es)?)
     } over PERIODS;
 
-    /// A whole link from RESET to two V-frames after lock, with messages: master, line and encoder.
+    /// The first frames of a link: master, registers, cable and encoder. (The timer cannot count the calls of a longer one.)
     fn hdsl_link(frames: &u32) -> Result<(Counters, u64), Error> {
         let mut master = Master::new(Dialect::SICK);
         let mut map = Registers::new(&Dialect::SICK);
@@ -226,7 +226,7 @@ kernels! {
         for frame in 0..*frames {
             let head = line.down(master.transmission().head.bits());
             let samples = line.up(encoder.answer(head, u64::from(frame)));
-            if frame == 80 {
+            if frame == 25 {
                 let _ = master.start_short(ShortRequest::Read(RemoteRegister::PING));
                 let access = Access::Read(Length::Eight);
                 let address = ResourceAddress::RESOLUTN;

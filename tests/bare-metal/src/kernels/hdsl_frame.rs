@@ -114,40 +114,32 @@ fn with_registers(link: &mut Link, samples: &[u8; WINDOW], _: u64) -> Window {
     link.master.transmission().head.bits()
 }
 
-macro_rules! worst {
-    ($($name:ident = $step:expr, $dialect:expr;)*) => {
+/// A kernel under a name of its own that does what another one does.
+macro_rules! named {
+    ($($name:ident = $step:expr;)*) => {
         $(
             #[expect(unsafe_code, reason = "the symbol is how run.sh finds the kernel")]
             #[inline(never)]
             #[unsafe(no_mangle)]
-            fn $name() -> u32 {
-                measure($dialect, $step).1 * 10
+            fn $name(link: &mut Link, samples: &[u8; WINDOW], bits: u64) -> Window {
+                $step(link, samples, bits)
             }
         )*
     };
 }
 
-worst! {
-    hdsl_frame_worst = hdsl_frame, Dialect::SICK;
-    hdsl_frame_bits_worst = hdsl_frame_bits, Dialect::SICK;
-}
-
-/// The TI dialect, samples to the next head.
-#[expect(unsafe_code, reason = "the symbol is how run.sh finds the kernel")]
-#[inline(never)]
-#[unsafe(no_mangle)]
-fn hdsl_frame_ti() -> u32 {
-    measure(Dialect::TI, hdsl_frame).0
+named! {
+    hdsl_frame_worst = hdsl_frame;
+    hdsl_frame_bits_worst = hdsl_frame_bits;
 }
 
 pub(crate) const KERNELS: &[Kernel] = &[
     Kernel { name: "hdsl_frame", tenths: || measure(Dialect::SICK, hdsl_frame).0 },
-    Kernel { name: "hdsl_frame_worst", tenths: hdsl_frame_worst },
+    Kernel { name: "hdsl_frame_worst", tenths: || measure(Dialect::SICK, hdsl_frame_worst).1 * 10 },
     Kernel { name: "hdsl_frame_bits", tenths: || measure(Dialect::SICK, hdsl_frame_bits).0 },
-    Kernel { name: "hdsl_frame_bits_worst", tenths: hdsl_frame_bits_worst },
+    Kernel { name: "hdsl_frame_bits_worst", tenths: || measure(Dialect::SICK, hdsl_frame_bits_worst).1 * 10 },
     Kernel {
         name: "hdsl_frame_registers",
         tenths: || measure(Dialect::SICK, with_registers).0.saturating_sub(measure(Dialect::SICK, hdsl_frame).0),
     },
-    Kernel { name: "hdsl_frame_ti", tenths: hdsl_frame_ti },
 ];
