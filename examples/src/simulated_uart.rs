@@ -6,7 +6,7 @@ use core::convert::Infallible;
 use embedded_hal::digital::{ErrorType as PinErrorType, OutputPin};
 use embedded_io::{ErrorType, Read, ReadReady, Write};
 use tformat::device::{Device, Fault};
-use tformat::{BitRate, U24};
+use tformat::{Abm, Abs, BitRate};
 
 use crate::tformat_uart::Clock;
 
@@ -50,7 +50,7 @@ impl Bench {
     }
 
     /// Turns the shaft.
-    pub fn turn_to(&self, abs: U24, abm: U24) {
+    pub fn turn_to(&self, abs: Abs, abm: Abm) {
         self.encoder.borrow_mut().set_position(abs, abm);
     }
 
@@ -94,9 +94,9 @@ impl Write for Uart<'_> {
             let now_ns = self.0.pass(FIELD_NS);
             let mut line = self.0.line.borrow_mut();
             line.put(now_ns, *byte);
-            if let Some(reply) = self.0.encoder.borrow_mut().byte(*byte, now_ns) {
-                for (k, byte) in (1..).zip(reply.frame.as_bytes()) {
-                    line.put(reply.at_ns.wrapping_add(FIELD_NS.wrapping_mul(k)), *byte);
+            if let Some(sent) = self.0.encoder.borrow_mut().byte(*byte, now_ns) {
+                for (k, byte) in (1..).zip(sent.frame.as_bytes()) {
+                    line.put(sent.at_ns.wrapping_add(FIELD_NS.wrapping_mul(k)), *byte);
                 }
             }
         }

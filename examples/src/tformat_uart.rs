@@ -53,13 +53,13 @@ impl<U: Read + ReadReady + Write, D: OutputPin, C: Clock> Encoder<U, D, C> {
         sent?;
         loop {
             let progress = match self.receive()? {
-                Some(byte) => transaction.byte(byte, self.clock.now_ns()),
+                Some(byte) => transaction.bytes(&[byte], self.clock.now_ns()),
                 None => transaction.poll(self.clock.now_ns()),
             };
             match progress {
-                Progress::Waiting { .. } => {}
-                Progress::Done(response) => return Ok(response),
-                Progress::Failed(error) => return Err(Failure::Protocol(error)),
+                Progress::Pending { .. } => {}
+                Progress::Done { value, .. } => return Ok(value.response),
+                Progress::Failed { error, .. } => return Err(Failure::Protocol(error)),
             }
         }
     }
@@ -84,7 +84,7 @@ mod tests {
     use super::*;
     use crate::simulated_uart::{Bench, Pin, Uart};
     use tformat::device::Fault;
-    use tformat::{BitRate, U24};
+    use tformat::{Abm, Abs, BitRate};
 
     fn encoder(bench: &Bench) -> Encoder<Uart<'_>, Pin, &Bench> {
         Encoder::new(Uart::new(bench), Pin, bench, Line::new(BitRate::Mbit2_5).with_echo())
@@ -95,11 +95,11 @@ mod tests {
         let bench = Bench::new(0x17);
         let mut encoder = encoder(&bench);
         for position in [0, 1, 0x7f_ffff] {
-            bench.turn_to(U24::truncate(position), U24::truncate(3));
-            let answer = encoder.transact(Request::Id0).unwrap();
-            assert_eq!(answer.abs(), Some(U24::truncate(position)));
-            let Ok(Response::Id3(full)) = encoder.transact(Request::Id3) else { panic!() };
-            assert_eq!((full.abm.get(), full.enid), (3, 0x17));
+            bench.turn_to(Abs::truncate(position), Abm::truncate(3));
+            let answer = encoder.transact(Request::ReadSingleTurn).unwrap();
+            assert_eq!(answer.abs(), Some(Abs::truncate(position)));
+            let Ok(Response::ReadAll(data)) = encoder.transact(Request::ReadAll) else { panic!() };
+            assert_eq!((data.abm.get(), data.enid), (3, 0x17));
         }
     }
 
@@ -108,10 +108,13 @@ mod tests {
         let bench = Bench::new(0x11);
         let mut encoder = encoder(&bench);
         bench.break_it(Fault::Silent);
-        assert_eq!(encoder.transact(Request::Id0), Err(Failure::Protocol(Error::NoResponse { echo: true })));
+        assert_eq!(encoder.transact(Request::ReadSingleTurn), Err(Failure::Protocol(Error::NoResponse { echo: true })));
         bench.break_it(Fault::CutAfter { fields: 2 });
-        assert_eq!(encoder.transact(Request::Id0), Err(Failure::Protocol(Error::Truncated { got: 2, want: 6 })));
+        assert_eq!(
+            encoder.transact(Request::ReadSingleTurn),
+            Err(Failure::Protocol(Error::Truncated { got: 2, want: 6 }))
+        );
         bench.break_it(Fault::None);
-        assert!(encoder.transact(Request::Id0).is_ok());
+        assert!(encoder.transact(Request::ReadSingleTurn).is_ok());
     }
 }

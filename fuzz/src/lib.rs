@@ -49,6 +49,7 @@ pub const TARGETS: &[(&str, Target)] = &[
     ("tformat_master", tformat::ends::master),
     ("tformat_device", tformat::ends::device),
     ("tformat_inspect", tformat::ends::inspect),
+    ("tformat_world", tformat::world::hostile),
 ];
 
 /// Takes a byte off the front; 0 when none is left.

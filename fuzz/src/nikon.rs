@@ -6,8 +6,8 @@ use nikon_aformat::inspect::inspect as report;
 use nikon_aformat::master::{BusTransaction, Line, Progress, Transaction};
 use nikon_aformat::reception::LineReceiver;
 use nikon_aformat::{
-    BitOrder, BitRate, Command, Crc8, EncoderAddress, Error, Expected, Layout, Operation, Profile, Reply, Request,
-    RequestFrame, Response, U19, U24, UserAddress, Window, stream as parsers,
+    BitOrder, BitRate, Command, Crc8, EncoderAddress, EncoderId, Error, Expected, Layout, Operation, RawResponse,
+    Request, RequestFrame, Resolution, Response, U19, UserAddress, Window, stream as parsers,
 };
 use nom::{Err, Parser};
 use nrz_line::Samples;
@@ -19,7 +19,7 @@ fn chosen(data: &mut &[u8]) -> Request {
     let (kind, low, high) = (byte(data), byte(data), byte(data));
     let ea = EncoderAddress::truncate(kind);
     let wide = u32::from_le_bytes([low, high, low ^ high, 0]);
-    let (id, word) = (U24::truncate(wide), u16::from_le_bytes([low, high]));
+    let (id, word) = (EncoderId::truncate(wide), u16::from_le_bytes([low, high]));
     let user = UserAddress::new(low).unwrap_or_default();
     let operation = match kind >> 3 {
         31 => Operation::CoefficientWrite { coefficient: U19::truncate(wide) },
@@ -72,7 +72,7 @@ pub fn request(data: &[u8]) {
 
 /// A reply by bits, one after the other, as the text has it.
 fn by_the_text(request: Request, bits: &[bool]) -> Result<(), Error> {
-    let expected = request.expected(Profile::default());
+    let expected = request.expected(Resolution::default());
     let (layout, command) = (expected.layout(), expected.command());
     let want = layout.line_bits() as usize;
     if bits.len() < want {
@@ -126,21 +126,21 @@ pub fn reply(mut data: &[u8]) {
     let len = (data.len() * 8).saturating_sub(offset).min(128) as u32;
     let Ok(line) = Window::read(data, offset, len, order) else { return };
     let bits: Vec<bool> = (0..line.len()).filter_map(|at| line.get(at)).collect();
-    let expected = request.expected(Profile::default());
-    let got = Response::parse_line(line, &expected);
+    let expected = request.expected(Resolution::default());
+    let got = Response::parse_line(&expected, line);
     if !matches!(got, Err(Error::EchoMismatch { .. })) {
         assert_eq!(got.map(|_| ()), by_the_text(request, &bits));
     }
     if let Ok(response) = got {
         assert_eq!(response.layout(), expected.layout());
-        assert_eq!(Response::parse(&response.emit(), &expected), Ok(response));
+        assert_eq!(Response::parse(&expected, &response.emit()), Ok(response));
     }
 }
 
-/// Reception by samples and by words of samples gives the same, on a bus and alone, and the bus accounts for all of it.
+/// Reception by samples and by words of samples gives the same, strict and tolerant, and the bus accounts for all of it.
 ///
 /// ```text
-/// 0  layout      1  samples a bit, and whether on a bus (bit 7)      2..  samples, LSB first
+/// 0  layout      1  samples a bit, and whether idle bits may stand between frames (bit 7)      2..  samples, LSB first
 /// ```
 pub fn reception(mut data: &[u8]) {
     let layout = Layout::ALL[usize::from(byte(&mut data)) % Layout::ALL.len()];
@@ -152,7 +152,7 @@ pub fn reception(mut data: &[u8]) {
             Err(_) => return,
         },
     };
-    let receiver = if how & 0x80 == 0 { receiver } else { receiver.on_bus() };
+    let receiver = if how & 0x80 == 0 { receiver } else { receiver.allowing_idle_between_frames() };
     let (mut by_sample, mut by_word) = (receiver, receiver);
     let mut bus = Bus::new(Expected::new(layout, Command::Abs40Mt), Addresses::ALL);
     let mut one = Vec::new();
@@ -190,36 +190,43 @@ pub fn reception(mut data: &[u8]) {
 pub fn master(mut data: &[u8]) {
     let request = chosen(&mut data);
     let line = Line::new(BitRate::Mbit8);
-    let profile = Profile::default();
-    let mut single = Transaction::start(request, profile, line, 0);
-    let mut bus = BusTransaction::start(request, profile, Addresses::first(3), line, 0);
+    let resolution = Resolution::default();
+    let mut single = Transaction::start(request, resolution, line, 0);
+    let mut bus = BusTransaction::start(request, resolution, Addresses::first(3), line, 0);
     let mut now_ns = 0;
     for event in data.chunks_exact(4) {
         now_ns += u64::from(event[3]) * 100;
         let before = single.progress();
         let content = u16::from_le_bytes([event[0], event[1]]);
+        // The lowest bits say how many frames come at once, and since when.
+        let block = [Some(content), None, Some(!content), Some(content)];
+        let block = &block[..usize::from(event[2] >> 3 & 3) + 1];
+        let since_ns = if event[2] & 0x80 == 0 { 0 } else { now_ns };
         let after = match event[2] {
             0 => single.framing_error(now_ns),
             1 => single.poll(now_ns),
+            2 => single.block(block, since_ns, now_ns),
             _ => single.frame(content, now_ns),
         };
-        if !matches!(before, Progress::Waiting { .. }) {
+        if !matches!(before, Progress::Pending { .. }) {
             assert_eq!(before, after);
         }
-        let over = bus.poll(now_ns);
+        let over = !matches!(bus.poll(now_ns), Progress::Pending { .. });
         let heard = *bus.bus();
-        match event[2] {
+        let _ = match event[2] {
             0 => bus.framing_error(now_ns),
+            2 => bus.block(block, since_ns, now_ns),
             _ => bus.frame(content, now_ns),
         };
         if over {
             assert_eq!(heard, *bus.bus());
         }
     }
-    assert!(!matches!(single.poll(u64::MAX), Progress::Waiting { .. }));
-    assert!(bus.poll(u64::MAX));
-    if let Progress::Done(response) = single.progress() {
-        assert_eq!(Response::parse(&response.emit(), &request.expected(profile)), Ok(response));
+    assert!(!matches!(single.poll(u64::MAX), Progress::Pending { .. }));
+    assert!(!matches!(bus.poll(u64::MAX), Progress::Pending { .. }));
+    if let Progress::Done { value: response, .. } = single.progress() {
+        assert_eq!(Response::parse(&request.expected(resolution), &response.response.emit()), Ok(response.response));
+        assert!(response.sampled.latest_ns >= response.sampled.earliest_ns);
     }
 }
 
@@ -229,9 +236,10 @@ pub fn master(mut data: &[u8]) {
 /// four bytes an event: a frame's content, what it is, time since the last
 /// ```
 pub fn device(data: &[u8]) {
-    let profile = Profile::default();
-    let mut encoders =
-        Encoders { all: [0, 1, 7].map(|ea| Device::<2>::new(EncoderAddress::truncate(ea), profile, BitRate::Mbit4)) };
+    let resolution = Resolution::default();
+    let mut encoders = Encoders {
+        all: [0, 1, 7].map(|ea| Device::<2>::new(EncoderAddress::truncate(ea), resolution, BitRate::Mbit4)),
+    };
     let mut now_ns = 0;
     for event in data.chunks_exact(4) {
         now_ns += u64::from(event[3]) * 1000;
@@ -240,10 +248,10 @@ pub fn device(data: &[u8]) {
             continue;
         }
         for answer in encoders.frame(u16::from_le_bytes([event[0], event[1]]), now_ns).into_iter().flatten() {
-            let (got, want) = answer.reply.crc();
+            let (got, want) = answer.raw.crc();
             assert_eq!(got, want);
-            assert!(answer.at_ns > now_ns && answer.line == answer.reply.line());
-            assert!(Reply::from_line(answer.line, Layout::Abs17).is_ok());
+            assert!(answer.at_ns > now_ns && answer.line == answer.raw.line());
+            assert!(RawResponse::from_line(Layout::Abs17, answer.line).is_ok());
         }
     }
     now_ns += 1_000_000_000;
@@ -263,8 +271,8 @@ pub fn inspect(mut data: &[u8]) {
     let mut bytes = [0; 16];
     bytes.iter_mut().zip(data).for_each(|(to, from)| *to = *from);
     let line = Window::from_bits(u128::from_le_bytes(bytes), len).expect("128 bits at most");
-    let report = report(request, Profile::default(), line);
-    let parsed = Response::parse_line(line, &request.expected(Profile::default()));
+    let report = report(request, Resolution::default(), line);
+    let parsed = Response::parse_line(&request.expected(Resolution::default()), line);
     assert_eq!(report.error, parsed.err());
     assert_eq!(report.error.is_none(), report.response.is_some() && report.cause.is_none());
     assert!(parsed.is_err() || report.findings.is_empty());

@@ -2,13 +2,12 @@
 
 use core::num::NonZeroU16;
 
-use rtex_block::device::{Drive, OpenCodes, Settings};
+use rtex_block::device::{Drive, DriveConfig, OpenCodes};
 use rtex_block::inspect::inspect;
-use rtex_block::master::{ActiveCode, Axis, AxisSettings, AxisState, Limits, Ring};
-use rtex_block::position::Gear;
+use rtex_block::master::{ActiveCode, Axis, AxisConfig, AxisState, Limits, Received, Ring};
 use rtex_block::{
-    Alarm, Answer, Command, Command32, CommandBlock, Error, MacId, NonCyclicCode, Request, Response, Response32,
-    TypeCode, stream,
+    Alarm, Command, Command32, CommandBlock, ControlBits, Error, MacId, NonCyclicCode, NonCyclicCommand,
+    NonCyclicResponse, Response, Response32, TypeCode, stream,
 };
 
 use crate::byte;
@@ -42,7 +41,7 @@ fn command16(data: &[u8]) -> bool {
             assert_eq!(strict.is_ok(), emitted == data && command.code().is_allowed());
             reference::command(&emitted, &command);
             let view = CommandBlock::new(data).expect("it was decoded");
-            assert_eq!(view.is_servo_off(), view.obeys_control() && !command.control.servo_on());
+            assert_eq!(view.is_servo_off(), view.obeys_control() && !command.control.contains(ControlBits::SERVO_ON));
         }
         Err(error) => refused(data, 16, error),
     }
@@ -70,10 +69,10 @@ fn response16(data: &[u8]) -> bool {
     match Response::parse(data) {
         Ok(response) => {
             assert_eq!(response.emit(), data);
-            let answer = response.answer();
-            assert_eq!(matches!(answer, Answer::CommandError(_)), response.cmd_error);
-            let again = response.with_answer(&answer);
-            assert_eq!(again.answer(), answer);
+            let noncyclic = response.noncyclic();
+            assert_eq!(matches!(noncyclic, NonCyclicResponse::CommandError(_)), response.cmd_error);
+            let again = response.with_noncyclic(&noncyclic);
+            assert_eq!(again.noncyclic(), noncyclic);
             // An answer that is written again differs from what came in reserved bits only.
             assert!(again == response || Response::parse_strict(data).is_err());
             reference::response(data, &response);
@@ -102,7 +101,12 @@ fn response32(data: &[u8]) -> bool {
 /// The reason of a refusal is so.
 fn refused(data: &[u8], want: usize, error: Error) {
     match error {
-        Error::Length { got, want: said } => assert!(got == data.len() && got != want && usize::from(said) == want),
+        Error::Truncated { got, want: said } => {
+            assert!(usize::from(got) == data.len() && usize::from(got) < want && usize::from(said) == want);
+        }
+        Error::TooLong { got, want: said } => {
+            assert!(usize::from(got) == data.len().min(0xffff) && data.len() > want && usize::from(said) == want);
+        }
         Error::CyclicCode { code } => assert!(code == data[1] >> 4 & 7 && code > 4),
         Error::NonCyclicCode { code } => assert!(code == data[1] & 15 && NonCyclicCode::new(code).is_none()),
         Error::SubChk { byte16 } => assert!(byte16 == data[16] && byte16 < 0x80),
@@ -115,7 +119,7 @@ fn refused(data: &[u8], want: usize, error: Error) {
 pub fn log(mut data: &[u8]) {
     while data.len() >= 16 {
         let alone = Response::parse(&data[..16]);
-        match stream::response(data) {
+        match stream::response::<Error>(data) {
             Ok((rest, response)) => {
                 assert_eq!((Ok(response), rest.len()), (alone, data.len() - 16));
             }
@@ -124,7 +128,7 @@ pub fn log(mut data: &[u8]) {
         }
         data = &data[16..];
     }
-    assert!(matches!(stream::response(data), Err(nom::Err::Incomplete(_))));
+    assert!(matches!(stream::response::<Error>(data), Err(nom::Err::Incomplete(_))));
 }
 
 const LIMIT: u16 = 4;
@@ -136,6 +140,10 @@ const CODES: OpenCodes = OpenCodes {
     alarm_active: TypeCode::short(0x01),
     alarm_history: TypeCode::short(0x02),
     alarm_clear: TypeCode::short(0x03),
+    alarm_attributes: TypeCode::short(0x76),
+    parameter_initial: TypeCode::short(0x77),
+    latch_arm: 0x78,
+    homing: 0x79,
     communication_lost: Alarm { main: 80, sub: 0 },
 };
 
@@ -147,17 +155,17 @@ const CODES: OpenCodes = OpenCodes {
 /// ```
 pub fn ring(mut data: &[u8]) {
     let limit = NonZeroU16::new(LIMIT).expect("not 0");
-    let limits = Limits { echo: limit, ready: 60, active: 20, inactive: 20, answer: 20, command_errors: limit };
+    let limits = Limits::new(limit, 20).with_ready(60);
     let mac_id = |place| MacId::new(place).expect("below 32");
     let axis = |place| {
         let mode = ActiveCode::CyclicPosition;
-        Axis::new(AxisSettings { mac_id: mac_id(place), mode, update_ns: 500_000, gear: Gear::UNITY, limits })
+        Axis::new(AxisConfig::new(mac_id(place), mode, 500_000, limits))
     };
     let drive =
-        |place| Drive::new(Settings { fault_limit: LIMIT, lost_limit: LIMIT, ..Settings::new(mac_id(place), CODES) });
-    let mut ring = Ring::new([axis(0), axis(1)], 2);
+        |place| Drive::new(DriveConfig::new(mac_id(place), CODES).with_fault_limit(LIMIT).with_lost_limit(LIMIT));
+    let mut ring = Ring::new([axis(0), axis(1)], 2).expect("two addresses");
     let mut drives = [drive(0), drive(1)];
-    let mut responses = [None; 2];
+    let mut responses = [Received::Nothing; 2];
     let mut started = false;
     for _ in 0..256 {
         if data.is_empty() {
@@ -168,7 +176,7 @@ pub fn ring(mut data: &[u8]) {
         act(event & 15, argument, &mut ring, place, &mut drives[place]);
         let commands = ring.update(&responses);
         for (k, command) in commands.iter().enumerate() {
-            let mut sent = command.emit();
+            let mut sent = command.main.emit();
             let view = CommandBlock::of(&sent).expect("a command");
             started |= view.obeys_control();
             assert_eq!(view.obeys_control(), started);
@@ -176,18 +184,18 @@ pub fn ring(mut data: &[u8]) {
             responses[k] = match event & 15 {
                 1 if k == place => {
                     drives[k].miss();
-                    None
+                    Received::Nothing
                 }
                 2 if k == place => {
                     sent[usize::from(argument >> 3 & 15)] ^= 1 << (argument & 7);
-                    Response::parse(&drives[k].exchange(&sent)).ok()
+                    Response::parse(&drives[k].exchange(&sent)).into()
                 }
                 3 if k == place => {
                     let mut received = drives[k].exchange(&sent);
                     received[usize::from(argument >> 3 & 15)] ^= 1 << (argument & 7);
-                    Response::parse(&received).ok()
+                    Response::parse(&received).into()
                 }
-                _ => Response::parse(&drives[k].exchange(&sent)).ok(),
+                _ => Response::parse(&drives[k].exchange(&sent)).into(),
             };
         }
     }
@@ -207,7 +215,7 @@ fn act(event: u8, argument: u8, ring: &mut Ring<2>, place: usize, drive: &mut Dr
         10 => _ = axis.set_position(axis.setpoint().wrapping_add(i32::from(argument) << 11)),
         11 => {
             let code = NonCyclicCode::ALL[usize::from(argument) % 8];
-            let _ = axis.ask(Request::from_bytes(code, [argument >> 3, 0, 0, 0, 0, 0, 0, 0]));
+            let _ = axis.ask(NonCyclicCommand::from_bytes(code, [argument >> 3, 0, 0, 0, 0, 0, 0, 0]));
         }
         12 => _ = axis.take_outcome(),
         _ => {}
@@ -215,7 +223,7 @@ fn act(event: u8, argument: u8, ring: &mut Ring<2>, place: usize, drive: &mut Dr
 }
 
 /// With a good line, no alarms and power, every axis comes on within its limits.
-fn recover(ring: &mut Ring<2>, drives: &mut [Drive; 2], mut responses: [Option<Response>; 2]) {
+fn recover(ring: &mut Ring<2>, drives: &mut [Drive; 2], mut responses: [Received; 2]) {
     for round in 0..120 {
         if round % 60 == 0 {
             for drive in drives.iter_mut() {
@@ -227,7 +235,7 @@ fn recover(ring: &mut Ring<2>, drives: &mut [Drive; 2], mut responses: [Option<R
         ring.switch_on();
         let commands = ring.update(&responses);
         for (k, command) in commands.iter().enumerate() {
-            responses[k] = Response::parse(&drives[k].exchange(&command.emit())).ok();
+            responses[k] = Response::parse(&drives[k].exchange(&command.main.emit())).into();
         }
     }
     assert!(ring.all_are(AxisState::On), "{:?}", ring.failure());
@@ -237,8 +245,8 @@ fn recover(ring: &mut Ring<2>, drives: &mut [Drive; 2], mut responses: [Option<R
 /// Any blocks to a drive of either size: it never stops answering under its own address, and echoes the counter.
 pub fn drive(data: &[u8]) {
     let mac_id = MacId::new(5).expect("below 32");
-    let settings = Settings { sync_exchanges: 2, servo_on_updates: 1, ..Settings::new(mac_id, CODES) };
-    let (mut short, mut long) = (Drive::new(settings), Drive::new(settings));
+    let config = DriveConfig::new(mac_id, CODES).with_sync_exchanges(2).with_servo_on_updates(1);
+    let (mut short, mut long) = (Drive::new(config), Drive::new(config));
     for block in data.chunks_exact(16).filter_map(|block| block.first_chunk()) {
         let response = Response::parse_strict(&short.exchange(block));
         let response = response.expect("an undefined code is echoed with CMD_Error only, reserved bits are 0");

@@ -38,19 +38,19 @@ pub fn frame(data: &[u8]) {
 
     if let Ok(frame) = MasterFrame::<16>::parse(data) {
         let mut again = [0; 21];
-        assert_eq!((frame.emit(&mut again), &again[..]), (Ok(21), data));
+        assert_eq!((frame.emit_into(&mut again), &again[..]), (Ok(21), data));
     }
     if let Ok(frame) = DeviceFrame::<3>::parse(data) {
         let mut again = [0; 6];
-        assert_eq!((frame.emit(&mut again), &again[..]), (Ok(6), data));
+        assert_eq!((frame.emit_into(&mut again), &again[..]), (Ok(6), data));
     }
     for len in [0, 3, 16] {
         let whole = data.len() == len + MasterFrameView::OVERHEAD;
         let streamed = stream::master_frame::<Error>(len).parse(data).is_ok();
-        assert!(!whole || streamed == MasterFrameView::new(data, len).is_ok());
+        assert!(!whole || streamed == MasterFrameView::new(len, data).is_ok());
         let whole = data.len() == len + DeviceFrameView::OVERHEAD;
         let streamed = stream::device_frame::<Error>(len).parse(data).is_ok();
-        assert!(!whole || streamed == DeviceFrameView::new(data, len).is_ok());
+        assert!(!whole || streamed == DeviceFrameView::new(len, data).is_ok());
     }
 }
 
@@ -96,7 +96,7 @@ pub fn cut_through(mut data: &[u8]) {
 /// ```
 pub fn device(mut data: &[u8]) {
     let last = byte(&mut data) & 1 != 0;
-    let mut device = Device::new(Config::default());
+    let mut device = Device::new(Config::new());
     device.links(true, !last);
     let mut now_ns = 0;
     while let [command, value, rest @ ..] = data {
@@ -119,7 +119,7 @@ pub fn device(mut data: &[u8]) {
             6 => {
                 let request = DelayReq::of_device(change).emit();
                 let trigger = if change { Trigger::Last } else { Trigger::Normal };
-                assert_eq!(device.delay_reflection(&request, 360 + u32::from(*value), trigger), Ok(()));
+                assert_eq!(device.delay_reflection(trigger, &request, 360 + u32::from(*value)), Ok(()));
                 continue;
             }
             _ => {
@@ -160,7 +160,7 @@ fn damaged(mut device: Device, port: PortId, mut frame: Vec<u8>, value: u8, arri
 fn exchange(device: &mut Device, value: u8) {
     let frame = MasterFrame { status: Status::EXCHANGE, output: [value; 16], time_stamp: value.into() };
     let mut bytes = [0; 21];
-    assert_eq!(frame.emit(&mut bytes), Ok(21));
+    assert_eq!(frame.emit_into(&mut bytes), Ok(21));
     let good = device.exchange(&bytes, 585, 585).map(|output| output.data.to_vec());
     // A device at a far place owns none of the 16 bytes.
     assert!(good.is_err() || good == Ok(vec![value; 4]));

@@ -1,7 +1,7 @@
 //! step-profile: single steps against wider integers, an axis against the steps of its moves.
 
 use step_profile::{
-    Arithmetic, Axis, Command, Direction, Error, MoveState, Parameters, Profile, RampTable, Speed, RampStep, RampSteps,
+    Arithmetic, Axis, Command, Direction, Error, MoveState, Parameters, Profile, RampStep, RampSteps, RampTable, Speed,
     corrected, pru_exact, step_time_ns,
 };
 

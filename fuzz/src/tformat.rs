@@ -1,27 +1,18 @@
 //! T-Format.
 
 use nom::{Err, Parser};
-use tformat::{Adf, BitOrder, ControlField, DataId, Error, Frame, Full, Request, Response, Window, crc};
+use tformat::{Adf, AllData, BitOrder, ControlField, DataId, Error, Frame, Request, Response, Window, crc};
 
 use crate::byte;
 
 pub mod ends;
 mod reference;
+pub mod world;
 
 /// The request that the first three bytes choose: kind, ADF, EDF.
 fn chosen(data: &mut &[u8]) -> Request {
-    let (kind, adf, edf) = (byte(data), Adf::new(byte(data)), byte(data));
-    match DataId::ALL[usize::from(kind) % 9] {
-        DataId::Id0 => Request::Id0,
-        DataId::Id1 => Request::Id1,
-        DataId::Id2 => Request::Id2,
-        DataId::Id3 => Request::Id3,
-        DataId::Id6 => Request::Id6 { adf, edf },
-        DataId::Id7 => Request::Id7,
-        DataId::Id8 => Request::Id8,
-        DataId::IdC => Request::IdC,
-        DataId::IdD => Request::IdD { adf },
-    }
+    let (kind, adf, edf) = (byte(data), Adf::from_bits(byte(data)), byte(data));
+    Request::of(DataId::ALL[usize::from(kind) % 9], adf, edf)
 }
 
 /// A request as an encoder receives it: what is accepted would be sent again, what is refused fails the check that is
@@ -84,7 +75,7 @@ fn refused(request: Request, error: Error) {
         Error::SinkCode { cf } => assert_ne!(cf & 7, 2),
         Error::Parity { cf } => assert_eq!((cf >> 3).count_ones() % 2, 1),
         Error::CfMismatch { got, want } => assert!(got != want && want == request.data_id().control_field().get()),
-        Error::Rejected { .. } => assert_ne!(request, Request::Id3),
+        Error::Rejected { .. } => assert_ne!(request, Request::ReadAll),
         Error::Crc { got, want } | Error::AddressMismatch { got, want } | Error::DataMismatch { got, want } => {
             assert_ne!(got, want);
         }
@@ -109,10 +100,10 @@ pub fn differential(mut data: &[u8]) {
     // The kernel for the longest frame has 110 bits in 14 bytes in either order.
     let lsb: [u8; Frame::MAX_LINE_BYTES] = *bytes.first_chunk().expect("14 of 16 bytes");
     let bits: Vec<bool> = (0..110).map(|at| lsb[at / 8] >> (at % 8) & 1 == 1).collect();
-    let want = reference::response(Request::Id3, &bits);
-    assert_eq!(Full::parse_line(&lsb, BitOrder::LsbFirst).map(Response::Id3), want);
-    assert_eq!(Full::parse_line(&lsb.map(u8::reverse_bits), BitOrder::MsbFirst).map(Response::Id3), want);
-    if let Ok(Response::Id3(full)) = want {
+    let want = reference::response(Request::ReadAll, &bits);
+    assert_eq!(AllData::parse_line(&lsb, BitOrder::LsbFirst).map(Response::ReadAll), want);
+    assert_eq!(AllData::parse_line(&lsb.map(u8::reverse_bits), BitOrder::MsbFirst).map(Response::ReadAll), want);
+    if let Ok(Response::ReadAll(full)) = want {
         assert_eq!(crc(&full.emit()), 0);
         let unused = [0xff_u8, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0x3f];
         let sent = full.emit_line(BitOrder::LsbFirst);

@@ -3,31 +3,31 @@
 //!
 //! Ten million H-frames are two minutes of a free-running link.
 
+use hdsl::cable::{Cable, Disturbance};
 use hdsl::device::Device;
-use hdsl::line::{Disturbance, Line};
 use hdsl::master::Master;
-use hdsl::{EncoderId, Profile};
+use hdsl::{Dialect, EncoderId};
 
 fn main() -> Result<(), Box<dyn core::error::Error>> {
     let frames: u64 = std::env::args().nth(1).map_or(Ok(100_000), |n| n.parse())?;
     // 100 m of cable, every edge up to one sample early or late.
-    let mut line = Line::new(Disturbance { jitter: 1, ..Disturbance::cable(100) }, 42);
-    let mut master = Master::new(Profile::SICK);
-    let mut encoder = Device::new(EncoderId::new(0x00153).ok_or("an identifier has 20 bits")?);
+    let mut cable = Cable::new(Disturbance { jitter: 1, ..Disturbance::metres(100) }, 42);
+    let mut master = Master::new(Dialect::SICK);
+    let mut encoder = Device::new(EncoderId::try_from(0x00153)?);
 
     let mut position = 0_u64;
     for frame in 0..frames {
         // To and fro, within the 32 bits of the encoder.
         position = if frame & 0x8000 == 0 { position.wrapping_add(3) } else { position.wrapping_sub(3) };
-        let head = line.down(master.transmission().head.bits());
-        let samples = line.up(encoder.answer(head, position));
+        let head = cable.down(master.transmission().head.bits());
+        let samples = cable.up(encoder.answer(head, position));
         let report = master.finish(&samples, None)?;
         if let Some(cause) = report.restarted {
-            println!("frame {frame}: link started anew: {cause:?}");
+            println!("frame {frame}: link started anew: {cause}");
         }
     }
-    let (map, counters) = (master.registers(), master.counters());
+    let (fast, counters) = (master.fast()?, master.counters());
     println!("{frames} H-frames: {counters:?}");
-    println!("position {} (encoder {position}), quality {}", map.position(), map.quality());
+    println!("position {} (encoder {position}), quality {}", fast.position, master.report().quality);
     Ok(())
 }

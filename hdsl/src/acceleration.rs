@@ -1,5 +1,9 @@
-use crate::Error;
+use core::fmt;
+
+use servowire_core::OutOfRange;
+
 use crate::crc::crc5;
+use crate::error::Error;
 
 /// The second difference of the position between sampling instants, 11 bits in two's complement: -1024..=1023 steps.
 ///
@@ -9,16 +13,10 @@ use crate::crc::crc5;
 /// ```
 ///
 /// The line carries the two bytes as 8b/10b words, high byte first. It is a difference of positions between
-/// H-frames and not a physical acceleration: in sync mode the frames have different lengths.
+/// H-frames; in sync mode these have different lengths, so that it is proportional to no physical acceleration.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Default)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(try_from = "i16", into = "i16"))]
 pub struct DeltaDelta(i16);
-
-/// A number outside -1024..=1023.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
-#[error("{0} does not fit the 11 bits of the acceleration word")]
-pub struct OutOfRange(pub i16);
 
 impl DeltaDelta {
     /// 1023.
@@ -80,7 +78,14 @@ impl TryFrom<i16> for DeltaDelta {
     type Error = OutOfRange;
 
     fn try_from(value: i16) -> Result<Self, OutOfRange> {
-        Self::new(value).ok_or(OutOfRange(value))
+        let max = if value < 0 { Self::MIN } else { Self::MAX };
+        Self::new(value).ok_or(OutOfRange { got: value.into(), max: max.0.into() })
+    }
+}
+
+impl fmt::Display for DeltaDelta {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        fmt::Display::fmt(&self.0, f)
     }
 }
 
@@ -89,6 +94,8 @@ impl From<DeltaDelta> for i16 {
         value.0
     }
 }
+
+crate::ranged::format_as_displayed!(DeltaDelta);
 
 #[cfg(feature = "arbitrary")]
 impl<'a> arbitrary::Arbitrary<'a> for DeltaDelta {

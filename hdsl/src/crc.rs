@@ -42,13 +42,14 @@ impl RunningCrc16 {
     }
 
     /// Takes one more byte.
+    #[inline]
     pub fn update(&mut self, byte: u8) {
         let mut digest = TABLE.digest_with_initial(self.0);
         digest.update(&[byte]);
         self.0 = digest.finalize() ^ CRC_16.xorout;
     }
 
-    /// The CRC to be sent behind the bytes so far.
+    /// The CRC to be sent after the bytes so far.
     pub const fn finish(self) -> u16 {
         self.0 ^ CRC_16.xorout
     }

@@ -1,228 +1,175 @@
-/// Why something received was refused, or something asked for cannot be done.
-///
-/// An answer is judged channel by channel, each in this order, and the first check that fails is the one reported:
-///
-/// 1. length: [`Truncated`](Self::Truncated);
-/// 2. the 8b/10b words of the channel: [`InvalidWord`](Self::InvalidWord);
-/// 3. the mark for "the encoder has no value": [`EncoderError`](Self::EncoderError) in the acceleration channel;
-/// 4. the check bits: [`AccelerationCrc`](Self::AccelerationCrc), [`Crc`](Self::Crc);
-/// 5. the contents: [`PositionInvalid`](Self::PositionInvalid), [`UndefinedSymbol`](Self::UndefinedSymbol),
-///    [`Header`](Self::Header) and the like.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-#[non_exhaustive]
-pub enum Error {
-    /// Fewer bits, samples or bytes than the unit has.
-    #[error("{got} of {want} are there")]
-    Truncated {
-        /// How many there are.
-        got: u16,
-        /// How many the unit has.
-        want: u16,
-    },
-    /// A 10-bit word stands in neither column of the 8b/10b tables.
-    #[error("{word:#05x} (a in bit 0) is no 8b/10b word")]
-    InvalidWord {
-        /// The word, first line bit in bit 0.
-        word: u16,
-    },
-    /// A special character came where only data may be, or data where a special character must be.
-    #[error("character {byte:#04x} is of the wrong kind here")]
-    WrongKind {
-        /// Value of the character.
-        byte: u8,
-    },
-    /// The acceleration channel carries K29.7 K29.7: the encoder has no value for this frame.
-    #[error("the encoder reports that it has no acceleration value")]
-    EncoderError,
-    /// The CRC-5 of the acceleration word is wrong.
-    #[error("the acceleration word has check bits {got:#04x}, computed {want:#04x}")]
-    AccelerationCrc {
-        /// Received.
-        got: u8,
-        /// Computed.
-        want: u8,
-    },
-    /// The CRC-16 of a safe position or a message is wrong.
-    #[error("the CRC is {got:#06x}, computed {want:#06x}")]
-    Crc {
-        /// Received.
-        got: u16,
-        /// Computed over the received bytes.
-        want: u16,
-    },
-    /// The block is sound, but the encoder cannot deliver a position.
-    #[error("the encoder cannot deliver a position (mark {mark:#04x})")]
-    PositionInvalid {
-        /// FDh in safe channel 1, FBh in safe channel 2.
-        mark: u8,
-    },
-    /// The five symbol bits of a parameter byte have no meaning in this direction.
-    #[error("{symbol:#04x} is no symbol of the parameters channel in this direction")]
-    UndefinedSymbol {
-        /// Bits 4:0 of the byte.
-        symbol: u8,
-    },
-    /// The line stayed high: no encoder answered.
-    #[error("no falling edge: nobody answered")]
-    NoEdge,
-    /// The test pattern of the start-up is at none of the delays.
-    #[error("the test pattern is at none of the delays, sampled at index {index}")]
-    PatternNotFound {
-        /// Sampling index that the first edge gave, 0..=7.
-        index: u8,
-    },
-    /// The bits on the line are not the beginning of an H-frame.
-    #[error("no SYNC, SAMPLE and CYCLE RESET at the beginning of the frame")]
-    Framing,
-    /// The two copies of the encoder identifier differ.
-    #[error("the identifier came as {first:#07x} and as {second:#07x}")]
-    EncoderIdMismatch {
-        /// From the vertical, parameter and pipe words.
-        first: u32,
-        /// From the acceleration words and the other nibble of the pipe word.
-        second: u32,
-    },
-    /// The identifier asks for something this receiver does not do.
-    #[error("encoder identifier {id:#07x} is not supported")]
-    UnsupportedEncoder {
-        /// The 20 bits.
-        id: u32,
-    },
-    /// The answer to a short message begins like a long one.
-    #[error("first byte {first:#04x} begins a long message")]
-    LongMessageStart {
-        /// First byte of the answer.
-        first: u8,
-    },
-    /// The answer to a long message begins like a short one, or a header byte lacks its marker bit.
-    #[error("first byte {first:#04x} begins a short message")]
-    ShortMessageStart {
-        /// The byte.
-        first: u8,
-    },
-    /// A sound message speaks of another register or address, or of the other direction.
-    #[error("the answer begins with {got:#06x}, expected {want:#06x}")]
-    Header {
-        /// Received header.
-        got: u16,
-        /// Header that belongs to the request.
-        want: u16,
-    },
-    /// The encoder answered a long message with an error.
-    #[error("the encoder refused the long message: class {class:#04x}, detail {detail:#04x}")]
-    Resource {
-        /// Error class, 40h..43h are documented.
-        class: u8,
-        /// Detail, its meaning depends on the class.
-        detail: u8,
-    },
-    /// The encoder did not accept the message (SNAK or LNAK) in any of the tries.
-    #[error("the encoder did not accept the message, {tries} tries")]
-    NotAccepted {
-        /// Times the message was sent.
-        tries: u8,
-    },
-    /// No sound answer within the time-out in any of the tries.
-    #[error("no answer to the message, {tries} tries")]
-    NoAnswer {
-        /// Times the message was sent.
-        tries: u8,
-    },
-    /// The message was dropped by a message reset or a restart of the link.
-    #[error("the message was dropped by a reset")]
-    Dropped,
-    /// A message of this kind is already under way.
-    #[error("a message of this kind is under way")]
-    Busy,
-    /// The link is not in the state that the operation needs.
-    #[error("the link is not up")]
-    NotLocked,
-    /// The number of data bytes is none of 0, 2, 4 and 8.
-    #[error("{len} data bytes: a long message carries 0, 2, 4 or 8")]
-    DataLength {
-        /// Bytes given.
-        len: u8,
-    },
-    /// The period is shorter than the frames that shall fit into it.
-    #[error("the period lacks {missing} line bits for the shortest frames")]
-    PeriodTooShort {
-        /// Bits that are missing, rounded up.
-        missing: u32,
-    },
-    /// The EXTRA window of the start-up arithmetic is outside 4..=9 bits.
-    #[error("the EXTRA window would be {extra} bits, 4 to 9 are allowed")]
-    ExtraOutOfRange {
-        /// Whole bits a frame.
-        extra: u32,
-    },
-}
+use crate::message::ResourceError;
 
-/// The kind of an [`Error`], for counters and statistics.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-#[non_exhaustive]
-#[allow(missing_docs, reason = "each stands for the error of the same name")]
-pub enum ErrorClass {
-    Truncated,
-    InvalidWord,
-    WrongKind,
-    EncoderError,
-    AccelerationCrc,
-    Crc,
-    PositionInvalid,
-    UndefinedSymbol,
-    NoEdge,
-    PatternNotFound,
-    Framing,
-    EncoderIdMismatch,
-    UnsupportedEncoder,
-    LongMessageStart,
-    ShortMessageStart,
-    Header,
-    Resource,
-    NotAccepted,
-    NoAnswer,
-    Dropped,
-    Busy,
-    NotLocked,
-    DataLength,
-    PeriodTooShort,
-    ExtraOutOfRange,
-}
-
-impl Error {
-    /// The kind of this error.
-    pub const fn class(self) -> ErrorClass {
-        match self {
-            Self::Truncated { .. } => ErrorClass::Truncated,
-            Self::InvalidWord { .. } => ErrorClass::InvalidWord,
-            Self::WrongKind { .. } => ErrorClass::WrongKind,
-            Self::EncoderError => ErrorClass::EncoderError,
-            Self::AccelerationCrc { .. } => ErrorClass::AccelerationCrc,
-            Self::Crc { .. } => ErrorClass::Crc,
-            Self::PositionInvalid { .. } => ErrorClass::PositionInvalid,
-            Self::UndefinedSymbol { .. } => ErrorClass::UndefinedSymbol,
-            Self::NoEdge => ErrorClass::NoEdge,
-            Self::PatternNotFound { .. } => ErrorClass::PatternNotFound,
-            Self::Framing => ErrorClass::Framing,
-            Self::EncoderIdMismatch { .. } => ErrorClass::EncoderIdMismatch,
-            Self::UnsupportedEncoder { .. } => ErrorClass::UnsupportedEncoder,
-            Self::LongMessageStart { .. } => ErrorClass::LongMessageStart,
-            Self::ShortMessageStart { .. } => ErrorClass::ShortMessageStart,
-            Self::Header { .. } => ErrorClass::Header,
-            Self::Resource { .. } => ErrorClass::Resource,
-            Self::NotAccepted { .. } => ErrorClass::NotAccepted,
-            Self::NoAnswer { .. } => ErrorClass::NoAnswer,
-            Self::Dropped => ErrorClass::Dropped,
-            Self::Busy => ErrorClass::Busy,
-            Self::NotLocked => ErrorClass::NotLocked,
-            Self::DataLength { .. } => ErrorClass::DataLength,
-            Self::PeriodTooShort { .. } => ErrorClass::PeriodTooShort,
-            Self::ExtraOutOfRange { .. } => ErrorClass::ExtraOutOfRange,
-        }
+servowire_core::errors! {
+    /// Why something received was refused, or something asked for cannot be done.
+    ///
+    /// An answer is judged channel by channel, each in this order, and the first check that fails is the one reported:
+    ///
+    /// 1. length: [`Truncated`](Self::Truncated);
+    /// 2. the 8b/10b words of the channel: [`InvalidWord`](Self::InvalidWord);
+    /// 3. the mark for "the encoder has no value": [`EncoderError`](Self::EncoderError) in the acceleration channel, then
+    ///    other special characters there: [`WrongKind`](Self::WrongKind);
+    /// 4. the check bits: [`AccelerationCrc`](Self::AccelerationCrc), [`Crc`](Self::Crc);
+    /// 5. the contents: [`PositionInvalid`](Self::PositionInvalid), [`UndefinedSymbol`](Self::UndefinedSymbol),
+    ///    [`Header`](Self::Header) and the like.
+    pub enum Error {
+        /// Fewer bits, samples or bytes than the unit has.
+        #[error("{got} of {want} are there")]
+        Truncated {
+            /// How many there are.
+            got: u16,
+            /// How many the unit has.
+            want: u16,
+        },
+        /// A 10-bit word stands in neither column of the 8b/10b tables.
+        #[error("{word:#05x} (a in bit 0) is no 8b/10b word")]
+        InvalidWord {
+            /// The word, first line bit in bit 0.
+            word: u16,
+        },
+        /// A special character came where only data may be, or data where a special character must be.
+        #[error("character {byte:#04x} is of the wrong kind here")]
+        WrongKind {
+            /// Value of the character.
+            byte: u8,
+        },
+        /// The acceleration channel carries K29.7 K29.7: the encoder has no value for this frame.
+        #[error("the encoder reports that it has no acceleration value")]
+        EncoderError,
+        /// The CRC-5 of the acceleration word is wrong.
+        #[error("the acceleration word has check bits {got:#04x}, computed {want:#04x}")]
+        AccelerationCrc {
+            /// Received.
+            got: u8,
+            /// Computed.
+            want: u8,
+        },
+        /// The CRC-16 of a safe position or a message is wrong.
+        #[error("the CRC is {got:#06x}, computed {want:#06x}")]
+        Crc {
+            /// Received.
+            got: u16,
+            /// Computed over the received bytes.
+            want: u16,
+        },
+        /// The block is sound, but the encoder cannot deliver a position.
+        #[error("the encoder cannot deliver a position (mark {mark:#04x})")]
+        PositionInvalid {
+            /// FDh in safe channel 1, FBh in safe channel 2.
+            mark: u8,
+        },
+        /// The five symbol bits of a parameter byte have no meaning in this direction.
+        #[error("{symbol:#04x} is no symbol of the parameters channel in this direction")]
+        UndefinedSymbol {
+            /// Bits 4:0 of the byte.
+            symbol: u8,
+        },
+        /// The line stayed high: no encoder answered.
+        #[error("no falling edge: nobody answered")]
+        NoEdge,
+        /// The test pattern of the start-up is at none of the delays.
+        #[error("the test pattern is at none of the delays, sampled at index {index}")]
+        PatternNotFound {
+            /// Sampling index that the first edge gave, 0..=7.
+            index: u8,
+        },
+        /// The answer is not the test pattern of the start-up.
+        #[error("the answer is not the test pattern")]
+        Pattern,
+        /// The bits on the line are not the beginning of an H-frame.
+        #[error("no SYNC, SAMPLE and CYCLE RESET at the beginning of the frame")]
+        Framing,
+        /// The two copies of the encoder identifier differ.
+        #[error("the identifier came as {first:#07x} and as {second:#07x}")]
+        EncoderIdMismatch {
+            /// From the vertical, parameter and pipe words.
+            first: u32,
+            /// From the acceleration words and the other nibble of the pipe word.
+            second: u32,
+        },
+        /// The identifier asks for something this receiver does not do.
+        #[error("encoder identifier {id:#07x} is not supported")]
+        UnsupportedEncoder {
+            /// The 20 bits.
+            id: u32,
+        },
+        /// The answer to a short message begins like a long one.
+        #[error("first byte {first:#04x} begins a long message")]
+        LongMessageStart {
+            /// First byte of the answer.
+            first: u8,
+        },
+        /// The answer to a long message begins like a short one, or a header byte lacks its marker bit.
+        #[error("first byte {first:#04x} begins a short message")]
+        ShortMessageStart {
+            /// The byte.
+            first: u8,
+        },
+        /// A sound message speaks of another register or address, or of the other direction.
+        #[error("the answer begins with {got:#06x}, expected {want:#06x}")]
+        Header {
+            /// Received header.
+            got: u16,
+            /// Header that belongs to the request.
+            want: u16,
+        },
+        /// The encoder answered a long message with an error.
+        #[error("the encoder refused the long message: {error}")]
+        Resource {
+            /// Why.
+            error: ResourceError,
+        },
+        /// The encoder did not accept the message (SNAK or LNAK) in any of the tries.
+        #[error("the encoder did not accept the message, {tries} tries")]
+        NotAccepted {
+            /// Times the message was sent.
+            tries: u8,
+        },
+        /// No sound answer within the time-out in any of the tries.
+        #[error("no answer to the message, {tries} tries")]
+        NoAnswer {
+            /// Times the message was sent.
+            tries: u8,
+        },
+        /// The message was dropped by a message reset or a restart of the link.
+        #[error("the message was dropped by a reset")]
+        Dropped,
+        /// A message of this kind is already under way.
+        #[error("a message of this kind is under way")]
+        Busy,
+        /// The link is not in the state that the operation needs.
+        #[error("the link is not up")]
+        NotLocked,
+        /// The number of data bytes is none of 0, 2, 4 and 8.
+        #[error("{len} data bytes: a long message carries 0, 2, 4 or 8")]
+        DataLength {
+            /// Bytes given.
+            len: u8,
+        },
+        /// The period is shorter than the frames that shall fit into it.
+        #[error("the period lacks {missing} line bits for the shortest frames")]
+        PeriodTooShort {
+            /// Bits that are missing, rounded up.
+            missing: u32,
+        },
+        /// The name of a user file is none: 1 to 8 characters 20h..=7Eh, then 00h.
+        #[error("this is no name of a user file")]
+        FileName,
+        /// No pulse period is known that the frames could be synchronised with.
+        #[error("no pulse period was given")]
+        NoPulse,
+        /// The register map has no register at this address.
+        #[error("there is no register {address:#04x}")]
+        NoRegister {
+            /// The address.
+            address: u8,
+        },
+        /// The EXTRA window of the start-up arithmetic is outside 4..=9 bits.
+        #[error("the EXTRA window would be {extra} bits, 4 to 9 are allowed")]
+        ExtraOutOfRange {
+            /// Whole bits a frame.
+            extra: u32,
+        },
     }
 }
 
@@ -230,12 +177,6 @@ impl Error {
 mod tests {
     use super::*;
     use std::string::ToString;
-
-    #[test]
-    fn an_error_is_small() {
-        assert!(size_of::<Error>() <= 2 * size_of::<u64>());
-        assert!(size_of::<Result<(), Error>>() <= 2 * size_of::<u64>());
-    }
 
     #[test]
     fn messages_are_sentences_for_a_person() {

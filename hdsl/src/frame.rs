@@ -13,8 +13,11 @@
 
 use nrz_line::Window;
 
+use crate::error::Error;
+use crate::line_code::LineDisparity;
+use crate::parameter::ParameterByte;
+use crate::ranged::ranged;
 use crate::symbol::Word;
-use crate::{Error, LineDisparity, ParameterByte};
 
 /// Line rate in bits a second.
 pub const BIT_RATE: u32 = 9_375_000;
@@ -26,43 +29,32 @@ pub const H_FRAME_BITS: u32 = 108;
 pub const V_FRAME: u8 = 8;
 /// Bits of the encoder's answer.
 pub const ANSWER_BITS: u32 = 61;
-/// Bits kept free behind the answer for the delay of the cable.
+/// Bits kept free after the answer for the delay of the cable.
 pub const DELAY_RESERVE_BITS: u32 = 12;
 /// Bits of TRAILER; the first two are left to the idle line.
 pub const TRAILER_BITS: u32 = 8;
 /// Bits of a stuffing block.
 pub const STUFFING_BITS: u32 = 6;
-/// Most stuffing blocks in a frame.
-pub const MAX_STUFFING: u8 = 26;
 
 /// SYNC and a stuffing block, first line bit in bit 0: 0 0 1 0 1 1.
 const SYNC: u128 = 0b11_0100;
+/// SYNC and the two ones of SAMPLE.
+const FIXED: u32 = 0b1111_0100;
 /// TRAILER: 0 0 0 0 0 0 1 1.
 const TRAILER: u8 = 0b1100_0000;
 
-/// The EXTRA window of sync mode: the level is high for 24..=72 eighths of a bit, then low to the end of the bit.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(try_from = "u8", into = "u8"))]
-pub struct Extra(u8);
+ranged! {
+    /// The EXTRA window of sync mode: the level is high for 24..=72 eighths of a bit, then low to the end of the bit. The
+    /// number is the place of the falling edge, in eighths after the start of the window.
+    pub struct Extra(24..=72);
+}
+
+ranged! {
+    /// Blocks of stuffing after a frame, 0..=26.
+    pub struct Stuffing(0..=26);
+}
 
 impl Extra {
-    /// The shortest window.
-    pub const MIN: Self = Self(24);
-    /// The longest window.
-    pub const MAX: Self = Self(72);
-
-    /// `edge` is the place of the falling edge in eighths of a bit after the start of the window; `None` outside
-    /// 24..=72.
-    pub const fn new(edge: u8) -> Option<Self> {
-        if edge < Self::MIN.0 || edge > Self::MAX.0 { None } else { Some(Self(edge)) }
-    }
-
-    /// Place of the falling edge, in eighths of a bit after the start of the window.
-    pub const fn edge(self) -> u8 {
-        self.0
-    }
-
     /// Bits that the window occupies, 3..=9.
     pub const fn bits(self) -> u8 {
         self.0.div_ceil(8)
@@ -93,24 +85,9 @@ pub(crate) const fn edge_register(time_rest: u8) -> u8 {
     }
 }
 
-impl TryFrom<u8> for Extra {
-    type Error = Error;
-
-    fn try_from(edge: u8) -> Result<Self, Error> {
-        Self::new(edge).ok_or(Error::ExtraOutOfRange { extra: u32::from(edge.div_ceil(8)) })
-    }
-}
-
-impl From<Extra> for u8 {
-    fn from(extra: Extra) -> Self {
-        extra.0
-    }
-}
-
 /// The first part of an H-frame, from SYNC to PARA.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Head {
     byte: ParameterByte,
     extra: Option<Extra>,
@@ -122,7 +99,7 @@ impl Head {
     /// Bits without an EXTRA window.
     pub const BITS: u32 = 26;
 
-    /// The head for a parameter byte, and the line disparity behind it. `before` is the disparity in front of
+    /// The head for a parameter byte, and the line disparity after it. `before` is the disparity before
     /// EQUALISATION, so with the ones of the EXTRA window if there is one (the partly high last bit counts as a one).
     pub const fn new(byte: ParameterByte, extra: Option<Extra>, before: LineDisparity) -> (Self, LineDisparity) {
         let (equalisation, d) = before.equalisation();
@@ -159,12 +136,18 @@ impl Head {
 
     /// The line bits; the last bit of an EXTRA window is a one also when its edge lies inside.
     pub fn bits(self) -> Window {
-        let extra = self.extra_bits();
-        // SYNC, the two ones of SAMPLE and the window.
-        let ones = (1_u128 << extra.wrapping_add(2)).wrapping_sub(1);
-        let rest = 0b0110_u128 | u128::from(self.equalisation) << 4 | u128::from(self.para.bits()) << 8;
-        let bits = SYNC | ones << 6 | rest << extra.wrapping_add(8);
-        Window::from_bits(bits, Self::BITS.wrapping_add(extra)).unwrap_or(Window::EMPTY)
+        // SYNC, the two ones of SAMPLE and those of the window: at most 17 bits, then 18 more.
+        let rest = 0b0110 | u32::from(self.equalisation) << 4 | u32::from(self.para.get()) << 8;
+        let (bits, extra) = match self.extra {
+            None => (u64::from(FIXED | rest << 8), 0),
+            Some(extra) => {
+                let extra = u32::from(extra.bits());
+                // Ones up to the end of the window, over those of FIXED.
+                let ones = FIXED | (1_u32 << extra.wrapping_add(8)).wrapping_sub(1) & !0xff;
+                (u64::from(ones) | u64::from(rest) << extra.wrapping_add(8), extra)
+            }
+        };
+        Window::from_bits(bits.into(), Self::BITS.wrapping_add(extra)).unwrap_or(Window::EMPTY)
     }
 
     /// The line at eight samples a bit: a byte each, its first sample in bit 7.
@@ -188,7 +171,7 @@ impl Head {
         if line.len() < Self::BITS {
             return Err(truncated(Self::BITS));
         }
-        // Ones behind SYNC: two of SAMPLE and those of the window.
+        // Ones after SYNC: two of SAMPLE and those of the window.
         let extra = (bits >> 8).trailing_ones();
         if bits & 0xff != SYNC | 0xc0 || extra > 10 || bits >> extra.wrapping_add(8) & 0b1111 != 0b0110 {
             return Err(Error::Framing);
@@ -198,8 +181,8 @@ impl Head {
             return Err(truncated(len));
         }
         let (at, [low, high, ..]) = (extra.wrapping_add(16), (bits >> extra.wrapping_add(16)).to_le_bytes());
-        let word = Word::truncate(u64::from(u16::from_le_bytes([low, high])));
-        let byte = ParameterByte::decode(word).ok_or(Error::InvalidWord { word: word.bits() })?;
+        let word = Word::truncate(u16::from_le_bytes([low, high]));
+        let byte = ParameterByte::decode(word).ok_or(Error::InvalidWord { word: word.get() })?;
         Ok(Received { byte, extra_bits: extra, len: at.wrapping_add(Word::BITS) })
     }
 }
@@ -239,7 +222,7 @@ pub const FILLER: Window = {
 pub enum Trailer {
     /// All eight bits, in frames without an answer.
     Whole,
-    /// The last six behind an answer. The line idles during the first two (the specification speaks of five driven
+    /// The last six after an answer. The line idles during the first two (the specification speaks of five driven
     /// zeros, the vendor's receiver drives four).
     AfterAnswer,
     /// The four zeros only: the vendor's receiver breaks off there when a LEARN frame has failed.
@@ -254,8 +237,8 @@ pub enum Trailer {
 pub struct Tail {
     /// How much of TRAILER is driven.
     pub trailer: Trailer,
-    /// Blocks of stuffing, 0..=26.
-    pub stuffing: u8,
+    /// Blocks of stuffing.
+    pub stuffing: Stuffing,
 }
 
 impl Tail {
@@ -265,7 +248,7 @@ impl Tail {
             Trailer::Whole | Trailer::AfterAnswer => TRAILER_BITS,
             Trailer::Cut => 6,
         };
-        STUFFING_BITS.wrapping_mul(self.stuffing as u32).wrapping_add(trailer)
+        STUFFING_BITS.wrapping_mul(self.stuffing.0 as u32).wrapping_add(trailer)
     }
 
     /// The driven bits in line order.
@@ -277,14 +260,7 @@ impl Tail {
         };
         let trailer = driven.map(|at| TRAILER >> at & 1 == 1);
         let block = (0..STUFFING_BITS).map(|at| SYNC >> at & 1 == 1);
-        trailer.chain((0..self.stuffing).flat_map(move |_| block.clone()))
-    }
-}
-
-#[cfg(feature = "arbitrary")]
-impl<'a> arbitrary::Arbitrary<'a> for Extra {
-    fn arbitrary(from: &mut arbitrary::Unstructured<'a>) -> arbitrary::Result<Self> {
-        from.int_in_range(Self::MIN.0..=Self::MAX.0).map(Self)
+        trailer.chain((0..self.stuffing.0).flat_map(move |_| block.clone()))
     }
 }
 
@@ -311,10 +287,10 @@ mod tests {
         let (head, _) = Head::new(byte, None, d);
         assert_eq!(text(window(head.bits()).skip(12).take(4)), "1101");
         assert!(text(window(FILLER)).starts_with("0101") && text(window(FILLER)).ends_with("01"));
-        assert_eq!(text(Tail { trailer: Trailer::Whole, stuffing: 2 }.bits()), "00000011001011001011");
-        assert_eq!(text(Tail { trailer: Trailer::AfterAnswer, stuffing: 0 }.bits()), "000011");
-        assert_eq!(text(Tail { trailer: Trailer::Cut, stuffing: 0 }.bits()), "0000");
-        assert_eq!(Tail { trailer: Trailer::AfterAnswer, stuffing: 26 }.time(), 164);
+        assert_eq!(text(Tail { trailer: Trailer::Whole, stuffing: Stuffing(2) }.bits()), "00000011001011001011");
+        assert_eq!(text(Tail { trailer: Trailer::AfterAnswer, stuffing: Stuffing::MIN }.bits()), "000011");
+        assert_eq!(text(Tail { trailer: Trailer::Cut, stuffing: Stuffing::MIN }.bits()), "0000");
+        assert_eq!(Tail { trailer: Trailer::AfterAnswer, stuffing: Stuffing::MAX }.time(), 164);
     }
 
     /// Every byte with every window at every disparity is read back by the encoder's side.
@@ -324,7 +300,7 @@ mod tests {
             for edge in 23..=72 {
                 for d in -5..=5 {
                     let (byte, extra) = (ParameterByte::new(raw), Extra::new(edge));
-                    let (head, _) = Head::new(byte, extra, LineDisparity(d));
+                    let (head, _) = Head::new(byte, extra, LineDisparity::new(d));
                     let got = Head::parse(head.bits()).unwrap();
                     assert_eq!((got.byte, got.len), (byte, head.bits().len()));
                     assert_eq!(got.extra_bits, extra.map_or(0, |e| u32::from(e.bits())));
@@ -340,7 +316,7 @@ mod tests {
                                 take
                             })
                             .sum();
-                        assert_eq!(high, u32::from(extra.edge()));
+                        assert_eq!(high, u32::from(extra.get()));
                     }
                 }
             }

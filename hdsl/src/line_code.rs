@@ -1,8 +1,10 @@
 //! The master's part of the line balance: EQUALISATION, and the parameter byte with its polarity chosen by the
 //! line disparity instead of a running disparity.
 
-use crate::ParameterByte;
-use crate::symbol::{FOUR_MORE_ZEROS, SIX_MORE_ZEROS, Word};
+use core::fmt;
+
+use crate::parameter::ParameterByte;
+use crate::symbol::{FOUR_MORE_ZEROS, NEUTRAL, Rule, SIX_MORE_ZEROS, Word};
 
 /// Ones minus zeros that the master has sent, as its receiver counts them.
 ///
@@ -13,11 +15,21 @@ use crate::symbol::{FOUR_MORE_ZEROS, SIX_MORE_ZEROS, Word};
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "arbitrary", derive(arbitrary::Arbitrary))]
-pub struct LineDisparity(pub i8);
+pub struct LineDisparity(i8);
 
 impl LineDisparity {
     /// Balanced.
     pub const ZERO: Self = Self(0);
+
+    /// With this count.
+    pub const fn new(ones_minus_zeros: i8) -> Self {
+        Self(ones_minus_zeros)
+    }
+
+    /// Ones minus zeros.
+    pub const fn get(self) -> i8 {
+        self.0
+    }
 
     const fn plus(self, difference: i8) -> Self {
         Self(self.0.saturating_add(difference))
@@ -55,24 +67,55 @@ impl LineDisparity {
     /// 1. the 6-bit block of bits 4:0 (28 gives that of K.28): a neutral block as tabulated (7 always 000111),
     ///    otherwise the version with more zeros while d >= 0, its inverse while d < 0; d takes up its balance;
     /// 2. the 4-bit block of bits 7:5 in the same way (3 always 0011), by the new d, which it does not change.
-    #[expect(clippy::indexing_slicing, reason = "five bits are below 32, three below 8")]
+    #[inline]
+    #[expect(clippy::indexing_slicing, reason = "a byte is below 256")]
     pub const fn encode(self, byte: ParameterByte) -> (Word, Self) {
+        if self.0 != 0 {
+            return self.encode_unbalanced(byte);
+        }
+        let entry = BALANCED[byte.raw() as usize];
+        (Word::truncate(entry & 0x3ff), Self(if entry & MORE_ZEROS != 0 { -2 } else { 0 }))
+    }
+
+    #[expect(clippy::indexing_slicing, reason = "five bits are below 32, three below 8")]
+    const fn encode_unbalanced(self, byte: ParameterByte) -> (Word, Self) {
         let raw = byte.raw();
-        let six = polarity(SIX_MORE_ZEROS[(raw & 31) as usize], 6, self.0);
-        let after = match six.count_ones() {
-            2 => self.plus(-2),
-            4 => self.plus(2),
-            _ => self,
-        };
-        let four = polarity(FOUR_MORE_ZEROS[(raw >> 5) as usize], 4, after.0);
-        (Word::truncate(six as u64 | (four as u64) << 6), after)
+        let (six, balance) = polarity(SIX_MORE_ZEROS[(raw & 31) as usize], 0x3f, self.0);
+        let after = self.plus(balance);
+        let (four, _) = polarity(FOUR_MORE_ZEROS[(raw >> 5) as usize], 0x0f, after.0);
+        (Word::truncate(six as u16 | (four as u16) << 6), after)
     }
 }
 
-/// The block itself if it is neutral or `d` wants zeros, else its inverse.
-const fn polarity(block: u8, len: u32, d: i8) -> u8 {
-    let mask = if len == 6 { 0x3f } else { 0x0f };
-    if d >= 0 || block.count_ones().wrapping_mul(2) == len { block } else { block ^ mask }
+/// The 6-bit block of the word has more zeros.
+const MORE_ZEROS: u16 = 0x8000;
+
+/// The words of all bytes for a balanced line, as it is before every answered frame of a free-running link.
+#[expect(clippy::indexing_slicing, reason = "runs at compile time")]
+static BALANCED: [u16; 256] = {
+    let mut table = [0; 256];
+    let mut raw: u8 = 0;
+    loop {
+        let (word, after) = LineDisparity::ZERO.encode_unbalanced(ParameterByte::new(raw));
+        table[raw as usize] = word.get() | if after.0 < 0 { MORE_ZEROS } else { 0 };
+        if raw == 255 {
+            break;
+        }
+        raw += 1;
+    }
+    table
+};
+
+/// The block itself if it is neutral or `d` wants zeros, else its inverse; and its balance. Neutral blocks are marked in the
+/// tables.
+const fn polarity(block: u8, mask: u8, d: i8) -> (u8, i8) {
+    if block & NEUTRAL != 0 {
+        (block & mask, 0)
+    } else if d >= 0 {
+        (block, -2)
+    } else {
+        (block ^ mask, 2)
+    }
 }
 
 impl ParameterByte {
@@ -80,10 +123,10 @@ impl ParameterByte {
     /// sub-block is in no table.
     pub const fn decode(word: Word) -> Option<Self> {
         // The sub-block look-ups disregard polarity, as an encoder has to.
-        let reading = word.read(crate::Rule::Reduced);
+        let reading = word.read(Rule::Reduced);
         let raw = reading.raw();
         // FFh also marks a failed look-up; the real FFh has x = 31 and y = 7.
-        if raw == 0xff && !is_ff(word.bits()) { None } else { Some(Self::new(raw)) }
+        if raw == 0xff && !is_ff(word.get()) { None } else { Some(Self::new(raw)) }
     }
 }
 
@@ -91,6 +134,12 @@ impl ParameterByte {
 const fn is_ff(bits: u16) -> bool {
     let six = matches!(bits & 0x3f, 0b11_0101 | 0b00_1010);
     six && matches!(bits >> 6, 0b0111 | 0b1000 | 0b1110 | 0b0001)
+}
+
+impl fmt::Display for LineDisparity {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        fmt::Display::fmt(&self.0, f)
+    }
 }
 
 #[cfg(test)]
@@ -122,7 +171,7 @@ mod tests {
             (0x90, "1001001101"),
             (0xd0, "1001000110"),
         ] {
-            assert_eq!(LineDisparity::ZERO.encode(ParameterByte::new(raw)).0.bits(), bits(text), "{raw:02x}");
+            assert_eq!(LineDisparity::ZERO.encode(ParameterByte::new(raw)).0.get(), bits(text), "{raw:02x}");
         }
     }
 
@@ -130,9 +179,7 @@ mod tests {
     fn words_outside_the_tables_are_no_parameter_byte() {
         let good = (0..1024).filter(|w| ParameterByte::decode(Word::new(*w).unwrap()).is_some()).count();
         // 47 six-bit blocks (18 + 2 * 13 + both of 7 + both of K28, 7 counted once) times 14 four-bit blocks.
-        let six = (0..64_u16)
-            .filter(|s| Word::new(s | 0b1001 << 6).unwrap().read(crate::Rule::Reduced).raw() != 0xff)
-            .count();
+        let six = (0..64_u16).filter(|s| Word::new(s | 0b1001 << 6).unwrap().read(Rule::Reduced).raw() != 0xff).count();
         assert_eq!(good, six * 14);
         assert_eq!(LineDisparity::ZERO.with_ones(9), LineDisparity(9));
         assert_eq!(LineDisparity(127).with_ones(200), LineDisparity(127));

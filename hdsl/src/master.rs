@@ -1,8 +1,11 @@
 //! The receiver as a machine without I/O.
 //!
 //! Every H-frame has two halves. [`Master::transmission`] says what to send from SYNC to PARA and whether an encoder
-//! answers; [`Master::finish`] takes the samples of the answer and says how the frame ends. Everything that was
-//! learned is in the [`Registers`] and in the [`Report`].
+//! answers; [`Master::finish`] takes the samples of the answer and says how the frame ends. What it brought is in the
+//! [`Report`], from which [`Registers::apply`](crate::registers::Registers::apply) makes the register map.
+//!
+//! A position to control with comes from [`Master::fast`], the safe one from [`Master::safe`]; both give a number only
+//! when it may be used.
 //!
 //! ```text
 //!  RESET -> SYNC -> START -> LEARN -> CHECK -> IDREQ -> WAIT VSYNC -> RX0 ... RX7
@@ -17,10 +20,10 @@
 //! use hdsl::device::Device;
 //! use hdsl::master::{Master, State};
 //! use hdsl::sampling::line;
-//! use hdsl::{EncoderId, Profile};
+//! use hdsl::{Dialect, EncoderId};
 //!
-//! let mut master = Master::new(Profile::SICK);
-//! let mut encoder = Device::new(EncoderId::new(0x00153).ok_or("20 bits")?);
+//! let mut master = Master::new(Dialect::SICK);
+//! let mut encoder = Device::new(EncoderId::try_from(0x00153)?);
 //! for frame in 0..150_u64 {
 //!     let answer = encoder.answer(master.transmission().head.bits(), 7 * frame);
 //!     // a cable that delays the answer by 11 eighths of a bit
@@ -28,19 +31,31 @@
 //!     master.finish(&samples, None)?;
 //! }
 //! assert_eq!(master.state(), State::Running);
-//! assert_eq!((master.registers().velocity(), master.registers().position()), (7, 7 * 149));
+//! let fast = master.fast()?;
+//! assert_eq!((fast.velocity, fast.position), (7, 7 * 149));
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
 mod control;
 mod link;
+mod report;
 
-use crate::frame::{Extra, Head, MAX_STUFFING, Tail, Trailer};
+pub use report::{Counters, Fast, Report, Safe, Signal};
+
+use core::fmt;
+
+use crate::answer::Answer;
+use crate::dialect::Dialect;
+use crate::encoder_id::{EncoderId, PositionBits};
+use crate::error::Error;
+use crate::frame::{Extra, Head, Stuffing, Tail, Trailer};
+use crate::line_code::LineDisparity;
 use crate::message::{Finished, Requester};
-use crate::registers::{Event, EventS, Interrupts, Online1, Online2, OnlineD, Register, Registers};
+use crate::parameter::{EncoderByte, MasterSymbol, ParameterByte};
+use crate::position::Phase;
+use crate::rssi::EdgeWatch;
 use crate::sampling::{Alignment, TEST_PATTERN, WINDOW};
 use crate::sync::Synchroniser;
-use crate::{Answer, EncoderByte, EncoderId, Error, LineDisparity, MasterSymbol, ParameterByte, Phase, Profile};
 use link::Link;
 
 /// Where the receiver is.
@@ -105,7 +120,7 @@ pub enum Cause {
     Pattern,
     /// The identifier was damaged or is of an encoder that this receiver does not support.
     Identifier(Error),
-    /// No VSYNC within the frames that [`Profile::vsync_frames`] allows.
+    /// No VSYNC within the frames that [`Dialect::vsync_frames`] allows.
     NoVsync,
     /// The quality monitor has run out.
     Quality,
@@ -113,105 +128,103 @@ pub enum Cause {
     AccelerationErrors,
 }
 
+impl fmt::Display for State {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.pad(match self {
+            Self::Reset => "RESET",
+            Self::Sync => "SYNC",
+            Self::Start => "START",
+            Self::Learn => "LEARN",
+            Self::Check => "CHECK",
+            Self::IdReq => "IDREQ",
+            Self::WaitVsync => "WAIT VSYNC",
+            Self::Running => "RUNNING",
+        })
+    }
+}
+
+impl fmt::Display for Cause {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Requested => f.write_str("asked for"),
+            Self::Learn(error) | Self::Identifier(error) => error.fmt(f),
+            Self::Pattern => f.write_str("the test pattern came with a wrong bit"),
+            Self::NoVsync => f.write_str("no VSYNC after INIT"),
+            Self::Quality => f.write_str("the quality monitor has run out"),
+            Self::AccelerationErrors => f.write_str("too many acceleration words in a row could not be used"),
+        }
+    }
+}
+
 /// What to send from the start of an H-frame.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Transmission {
-    /// Zeros in front of the frame: 16 after a restart, no need of the protocol.
+    /// Zeros before the frame: 16 after a restart, no need of the protocol.
     pub lead_in: u8,
     /// SYNC to PARA.
     pub head: Head,
-    /// Whether an encoder answers: then the line is released behind PARA, reception begins one bit later and takes
+    /// Whether an encoder answers: then the line is released after PARA, reception begins one bit later and takes
     /// [`WINDOW`] bits. Otherwise [`FILLER`](crate::frame::FILLER) is sent.
     pub answered: bool,
-}
-
-/// How an H-frame ended.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[must_use]
-pub struct Report {
-    /// What to send behind the answer.
-    pub tail: Tail,
-    /// Messages that came to their end.
-    pub finished: Finished,
-    /// Set if the next frame begins a new start-up.
-    pub restarted: Option<Cause>,
-    /// Interrupt lines that became or are active.
-    pub interrupts: Interrupts,
-}
-
-/// What was counted since the machine was made.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub struct Counters {
-    /// H-frames.
-    pub frames: u64,
-    /// Restarts.
-    pub restarts: u32,
-    /// Bad words in answers, all channels.
-    pub words: u32,
-    /// Acceleration words that could not be used.
-    pub acceleration: u32,
-    /// V-frames without a good safe channel 1.
-    pub safe1: u32,
-    /// V-frames without a good safe channel 2.
-    pub safe2: u32,
-    /// Answers with a wrong switch bit.
-    pub switch_bits: u32,
 }
 
 /// The receiver.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Master {
-    profile: Profile,
+    dialect: Dialect,
     sync: Option<Synchroniser>,
+    /// Eighths from pulse to pulse, once known.
+    pulse: Option<u32>,
     state: State,
     /// Frames of the state that are done.
     done: u8,
     disparity: LineDisparity,
     present: Transmission,
     alignment: Option<Alignment>,
+    /// Sample periods with edges of the test pattern, since LEARN.
+    edges: u8,
     encoder: Option<EncoderId>,
     link: Link,
     requester: Requester,
-    registers: Registers,
+    report: Report,
     counters: Counters,
+    /// ACC_ERR_CNT_THRESH.
+    threshold: u8,
     restart: bool,
 }
 
 impl Master {
     /// A free-running receiver at the beginning of the start-up.
-    pub fn new(profile: Profile) -> Self {
-        Self::start(profile, None)
+    pub fn new(dialect: Dialect) -> Self {
+        Self::start(dialect, None)
     }
 
     /// A receiver that keeps its frames on an external pulse.
-    pub fn synchronised(profile: Profile, sync: Synchroniser) -> Self {
-        Self::start(profile, Some(sync))
+    pub fn synchronised(dialect: Dialect, sync: Synchroniser) -> Self {
+        Self::start(dialect, Some(sync))
     }
 
-    fn start(profile: Profile, sync: Option<Synchroniser>) -> Self {
+    fn start(dialect: Dialect, sync: Option<Synchroniser>) -> Self {
         let extra = sync.map(|sync| sync.extra());
         let (present, disparity) = transmission(State::Reset, MasterSymbol::Reset, false, extra, LineDisparity::ZERO);
-        let mut registers = Registers::new();
-        registers.raise(Event::PRST.with(Event::QMLW));
-        registers.raise_s(EventS::PRST.with(EventS::QMLW));
         Self {
-            profile,
+            dialect,
             sync,
+            pulse: sync.map(|sync| sync.period()),
             state: State::Reset,
             done: 0,
             disparity,
             present,
             alignment: None,
+            edges: 0,
             encoder: None,
-            link: Link::new(&profile, crate::PositionBits::MAX),
-            requester: Requester::new(profile.messages),
-            registers,
+            link: Link::new(&dialect, PositionBits::MAX),
+            requester: Requester::new(dialect.messages),
+            report: Report::START,
             counters: Counters::default(),
+            threshold: 0x1f,
             restart: false,
         }
     }
@@ -234,9 +247,9 @@ impl Master {
         }
     }
 
-    /// The register map.
-    pub const fn registers(&self) -> &Registers {
-        &self.registers
+    /// What the last H-frame brought.
+    pub const fn report(&self) -> &Report {
+        &self.report
     }
 
     /// What was counted.
@@ -271,48 +284,87 @@ impl Master {
     ///
     /// # Errors
     /// [`Error::Truncated`] for fewer than [`WINDOW`] bytes of samples of an answer; nothing has changed then.
-    pub fn finish(&mut self, samples: &[u8], late: Option<i16>) -> Result<Report, Error> {
+    pub fn finish(&mut self, samples: &[u8], late: Option<i16>) -> Result<&Report, Error> {
         if self.present.answered && samples.len() < WINDOW {
             let got = u16::try_from(samples.len()).unwrap_or(u16::MAX);
             return Err(Error::Truncated { got, want: 72 });
         }
-        let before = self.state;
+        if self.state == State::Start {
+            self.edges = 0;
+            return Ok(match Alignment::learn(self.dialect.edge, samples) {
+                Ok(found) => {
+                    self.alignment = Some(found);
+                    self.end(TEST_PATTERN, None, late)
+                }
+                Err(error) => {
+                    self.report.begin(self.state, None);
+                    self.end_with(Err(Cause::Learn(error)), late)
+                }
+            });
+        }
+        let (Some(alignment), true) = (self.alignment, self.present.answered) else {
+            return Ok(self.end(u64::MAX, None, late));
+        };
+        // Never refused: the window has room for every delay.
+        let (bits, watch) = alignment.read(samples).unwrap_or((u64::MAX, EdgeWatch::new(true)));
+        if matches!(self.state, State::Learn | State::Check) {
+            self.edges |= watch.edges();
+        }
+        let signal = Signal { rssi: watch.rssi(), delay: alignment.delay, edges: self.edges };
+        Ok(self.end(bits, Some(signal), late))
+    }
+
+    /// Takes the 61 bits of the answer, the first in bit 0, from a front end that finds them itself (an FPGA, a PRU), and
+    /// ends the H-frame. `signal` is what that front end knows about the quality of the line; without it RSSI does not
+    /// count. In START frames too the bits have to be the test pattern.
+    ///
+    /// For a frame without an answer the bits are not looked at.
+    pub fn finish_bits(&mut self, bits: u64, signal: Option<Signal>, late: Option<i16>) -> &Report {
+        self.end(bits, signal, late)
+    }
+
+    fn end(&mut self, bits: u64, signal: Option<Signal>, late: Option<i16>) -> &Report {
+        let bits = bits & (u64::MAX >> 3);
+        self.report.begin(self.state, signal);
+        let outcome = self.receive(bits);
+        self.end_with(outcome, late)
+    }
+
+    fn end_with(&mut self, mut outcome: Result<(), Cause>, late: Option<i16>) -> &Report {
         self.counters.frames = self.counters.frames.wrapping_add(1);
-        let mut finished = Finished::default();
-        let mut outcome = self.receive(samples, &mut finished);
         if core::mem::take(&mut self.restart) {
             outcome = Err(Cause::Requested);
         }
         let restarted = outcome.err();
+        let was = self.report.was;
         if restarted.is_some() {
-            let dropped = self.restart();
-            finished.short = finished.short.or(dropped.short);
-            finished.long = finished.long.or(dropped.long);
+            self.begin_again();
         }
         let next = self.sync.as_mut().map(|sync| sync.next(late));
-        let tail = Tail {
-            trailer: trailer(before, restarted),
-            stuffing: next.map_or_else(|| self.search_time(before, restarted), |next| next.stuffing),
+        self.report.tail = Tail {
+            trailer: trailer(was, restarted),
+            stuffing: next.map_or_else(|| self.search_time(was, restarted), |next| next.stuffing),
         };
-        self.prepare(before, next.map(|next| next.extra), restarted.is_some());
-        let mut interrupts = self.registers.masked_events();
-        if before == State::Running {
-            interrupts = interrupts.with(Interrupts::H_FRAME).with(self.link.news());
-        }
-        Ok(Report { tail, finished, restarted, interrupts })
+        self.prepare(was, next.map(|next| next.extra), restarted.is_some());
+        self.report.restarted = restarted;
+        self.report.state = self.state;
+        self.report.long_free = self.state == State::Running && self.requester.is_long_free();
+        self.report.short_free = self.state == State::Running && self.requester.is_short_free();
+        &self.report
     }
 
-    /// Stuffing behind a START frame: time for the search.
-    fn search_time(&self, before: State, restarted: Option<Cause>) -> u8 {
-        match (before, restarted, self.alignment) {
+    /// Stuffing after a START frame: time for the search.
+    fn search_time(&self, was: State, restarted: Option<Cause>) -> Stuffing {
+        let blocks = match (was, restarted, self.alignment) {
             (State::Start, Some(_), _) => 16,
-            (State::Start, None, Some(found)) => found.delay.saturating_sub(1).saturating_add(4).min(MAX_STUFFING),
+            (State::Start, None, Some(found)) => found.delay.get().saturating_sub(1).saturating_add(4),
             _ => 0,
-        }
+        };
+        Stuffing::new(blocks).unwrap_or(Stuffing::MAX)
     }
 
     /// The head of the next frame.
-    fn prepare(&mut self, before: State, extra: Option<Extra>, restarted: bool) {
+    fn prepare(&mut self, was: State, extra: Option<Extra>, restarted: bool) {
         let symbol = match self.state {
             State::Reset => MasterSymbol::Reset,
             State::Sync => MasterSymbol::Sync,
@@ -325,7 +377,7 @@ impl Master {
             State::Running => MasterSymbol::Idle,
         };
         // The disparity goes on only from frames without an answer.
-        let carried = matches!(before, State::Reset | State::Sync) && !restarted;
+        let carried = matches!(was, State::Reset | State::Sync) && !restarted;
         let disparity = if carried { self.disparity } else { LineDisparity::ZERO };
         let msync = self.state == State::Running && self.link.msync();
         (self.present, self.disparity) = transmission(self.state, symbol, msync, extra, disparity);
@@ -334,25 +386,16 @@ impl Master {
         }
     }
 
-    fn receive(&mut self, samples: &[u8], finished: &mut Finished) -> Result<(), Cause> {
+    fn receive(&mut self, bits: u64) -> Result<(), Cause> {
         match self.state {
-            State::Reset | State::Sync => {}
-            State::Start => self.alignment = Some(Alignment::learn(samples, self.profile.edge).map_err(Cause::Learn)?),
-            State::Learn => {
-                self.expect_pattern(samples)?;
-                self.show_delay(samples);
+            State::Start if bits != TEST_PATTERN => {
+                return Err(Cause::Learn(if bits == u64::MAX >> 3 { Error::NoEdge } else { Error::Pattern }));
             }
-            State::Check => {
-                self.expect_pattern(samples)?;
-                if self.done == 15 {
-                    self.registers.set_d(OnlineD::PRST, false);
-                    self.registers.set_1(Online1::PRST, false);
-                    self.registers.set_2(Online2::PRST, false);
-                }
-            }
-            State::IdReq => self.identify(samples).map_err(Cause::Identifier)?,
-            State::WaitVsync => return self.wait_for_vsync(samples),
-            State::Running => return self.run(samples, finished),
+            State::Learn | State::Check if bits != TEST_PATTERN => return Err(Cause::Pattern),
+            State::Reset | State::Sync | State::Start | State::Learn | State::Check => {}
+            State::IdReq => self.identify(bits).map_err(Cause::Identifier)?,
+            State::WaitVsync => return self.wait_for_vsync(bits),
+            State::Running => return self.run(bits),
         }
         self.done = self.done.saturating_add(1);
         if self.state.frames() == Some(self.done) {
@@ -361,66 +404,43 @@ impl Master {
         Ok(())
     }
 
-    /// The 61 bits of the answer.
-    fn bits(&self, samples: &[u8]) -> u64 {
-        // Without an alignment no answer is expected.
-        self.alignment.and_then(|alignment| alignment.bits(samples).ok()).unwrap_or(u64::MAX)
-    }
-
-    fn expect_pattern(&self, samples: &[u8]) -> Result<(), Cause> {
-        if self.bits(samples) == TEST_PATTERN { Ok(()) } else { Err(Cause::Pattern) }
-    }
-
-    fn show_delay(&mut self, samples: &[u8]) {
-        if let Some(alignment) = self.alignment {
-            let edges = alignment.edges(samples);
-            self.registers.put(Register::Delay, [edges.rssi().get() << 4 | alignment.delay]);
-            self.registers.put(Register::Edges, [edges.edges()]);
-        }
-    }
-
-    fn identify(&mut self, samples: &[u8]) -> Result<(), Error> {
-        let answer = Answer::from_bits(self.bits(samples), self.profile.rule);
+    fn identify(&mut self, bits: u64) -> Result<(), Error> {
+        let answer = Answer::from_bits(self.dialect.rule, bits);
         let id = EncoderId::from_answer(answer)?;
         let bits = id.check()?;
         self.encoder = Some(id);
-        self.link = Link::new(&self.profile, bits);
-        let [_, high, middle, low] = id.raw().to_be_bytes();
-        self.registers.put(Register::EncId, [high << 4 | high, middle, low]);
-        self.registers.put(Register::MasterQm, [0x88]);
+        self.link = Link::new(&self.dialect, bits);
+        self.report.encoder = Some(id);
         Ok(())
     }
 
-    fn wait_for_vsync(&mut self, samples: &[u8]) -> Result<(), Cause> {
-        let answer = Answer::from_bits(self.bits(samples), self.profile.rule);
+    fn wait_for_vsync(&mut self, bits: u64) -> Result<(), Cause> {
+        let answer = Answer::from_bits(self.dialect.rule, bits);
         self.done = self.done.saturating_add(1);
         if answer.parameter().is_ok_and(EncoderByte::vsync) {
             (self.state, self.done) = (State::Running, 0);
-            self.registers.set_d(OnlineD::FREL, true);
-            self.registers.set_1(Online1::FRES, true);
-            self.registers.raise(Event::FREL);
-            self.registers.raise_s(EventS::FRES);
-            self.registers.set_d(OnlineD::POS, self.profile.doubt_at_lock);
-        } else if self.profile.vsync_frames != 0 && self.done >= self.profile.vsync_frames {
+            self.report.doubtful = self.dialect.doubt_at_lock;
+        } else if self.dialect.vsync_frames != 0 && self.done >= self.dialect.vsync_frames {
             return Err(Cause::NoVsync);
         }
         Ok(())
     }
 
     /// Begins the start-up again. Messages under way end.
-    fn restart(&mut self) -> Finished {
+    fn begin_again(&mut self) {
+        let was = self.report.was;
         self.counters.restarts = self.counters.restarts.wrapping_add(1);
         (self.state, self.done) = (State::Reset, 0);
-        self.link = Link::new(&self.profile, crate::PositionBits::MAX);
+        self.link = Link::new(&self.dialect, PositionBits::MAX);
         self.encoder = None;
-        self.registers.restarted();
-        self.registers.raise(Event::PRST.with(Event::QMLW));
-        self.registers.raise_s(EventS::PRST.with(EventS::QMLW));
-        for control in [Register::SysCtrl, Register::SafeCtrl] {
-            self.registers.put(control, [0]);
-        }
-        self.registers.put(Register::PcCtrl, [0]);
-        self.requester.drop_all()
+        let finished = self.report.finished;
+        let dropped = self.requester.drop_all();
+        self.report = Report {
+            was,
+            signal: self.report.signal,
+            finished: Finished { short: finished.short.or(dropped.short), long: finished.long.or(dropped.long) },
+            ..Report::START
+        };
     }
 }
 

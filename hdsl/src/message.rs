@@ -12,17 +12,25 @@
 //! Each byte goes high nibble first, and at least one IDLE is between two messages. How long an encoder takes for an
 //! answer is not limited.
 
+mod access;
+mod file;
 mod long;
 mod requester;
+mod resource;
 mod responder;
 mod short;
 
-pub use long::{Access, Data, Length, LongAnswer, LongRequest, Offset, ResourceAddress, ResourceError};
+pub use access::AccessLevel;
+pub use file::{FileName, FileStatus};
+pub use long::{Access, Data, Length, LongAnswer, LongRequest};
 pub use requester::{Finished, Limits, Requester};
+pub use resource::{Offset, ResourceAddress, ResourceError, ResourceErrorClass};
 pub use responder::{Request, Responder};
 pub use short::{RemoteRegister, ShortAnswer, ShortRequest};
 
-use crate::{Error, Nibble, crc16};
+use crate::crc::{RunningCrc16, crc16};
+use crate::error::Error;
+use crate::parameter::Nibble;
 
 /// The bytes of a message with its CRC, at most 14.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -47,7 +55,7 @@ impl MessageBytes {
         }
     }
 
-    /// The same with its CRC behind it.
+    /// The message with its CRC.
     fn sealed(mut self) -> Self {
         let crc = crc16(self.as_bytes());
         self.push(&crc.to_be_bytes());
@@ -59,7 +67,7 @@ impl MessageBytes {
         self.bytes.get(..usize::from(self.len)).unwrap_or(&self.bytes)
     }
 
-    /// Nibble `at` in the order sent; `None` behind the end.
+    /// Nibble `at` in the order sent; `None` after the end.
     pub fn nibble(&self, at: u8) -> Option<Nibble> {
         let byte = self.as_bytes().get(usize::from(at / 2))?;
         Some(Nibble::truncate(if at % 2 == 0 { byte >> 4 } else { *byte }))
@@ -76,11 +84,63 @@ fn checked(bytes: &[u8], len: usize) -> Result<&[u8], Error> {
     if got == want { Ok(covered) } else { Err(Error::Crc { got, want }) }
 }
 
+/// A message on its way out: one nibble an H-frame, its CRC grows along.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+struct Sender {
+    body: MessageBytes,
+    crc: RunningCrc16,
+    at: u8,
+}
+
+impl Sender {
+    const fn new(body: MessageBytes) -> Self {
+        Self { body, crc: RunningCrc16::new(), at: 0 }
+    }
+
+    /// The next nibble; `None` after the last one of the CRC.
+    fn next(&mut self) -> Option<Nibble> {
+        let at = self.at / 2;
+        let [high, low] = self.crc.finish().to_be_bytes();
+        let byte = match self.body.as_bytes().get(usize::from(at)) {
+            Some(byte) => *byte,
+            None if at == self.body.len => high,
+            None if at == self.body.len.saturating_add(1) => low,
+            None => return None,
+        };
+        let second = self.at % 2 == 1;
+        if second && at < self.body.len {
+            self.crc.update(byte);
+        }
+        self.at = self.at.saturating_add(1);
+        Some(Nibble::truncate(if second { byte } else { byte >> 4 }))
+    }
+}
+
+/// A message that is complete.
+struct Gathered {
+    bytes: MessageBytes,
+    sound: bool,
+}
+
+impl Gathered {
+    /// The bytes before the CRC if it is right.
+    fn covered(&self) -> Option<&[u8]> {
+        let (covered, _) = self.bytes.as_bytes().split_last_chunk::<2>()?;
+        self.sound.then_some(covered)
+    }
+
+    fn is_long(&self) -> bool {
+        self.bytes.as_bytes().first().is_some_and(|first| first & 0x80 != 0)
+    }
+}
+
 /// Gathers the nibbles of one message; the length follows from the first byte.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 struct Collector {
     bytes: MessageBytes,
+    crc: RunningCrc16,
     high: Option<Nibble>,
     /// An IDLE was seen since the last message.
     ready: bool,
@@ -88,29 +148,36 @@ struct Collector {
 
 impl Collector {
     const fn new() -> Self {
-        Self { bytes: MessageBytes::EMPTY, high: None, ready: true }
+        Self { bytes: MessageBytes::EMPTY, crc: RunningCrc16::new(), high: None, ready: true }
     }
 
     /// Something that is no nibble ends what was being gathered.
+    #[inline]
     const fn idle(&mut self) {
-        *self = Self::new();
+        if !self.ready || self.high.is_some() || self.bytes.len != 0 {
+            *self = Self::new();
+        }
     }
 
     /// The message is complete; the next one begins after an IDLE.
-    const fn finish(&mut self) -> MessageBytes {
-        let bytes = self.bytes;
-        *self = Self { bytes: MessageBytes::EMPTY, high: None, ready: false };
-        bytes
+    const fn finish(&mut self) -> Gathered {
+        let gathered = Gathered { bytes: self.bytes, sound: self.crc.is_residue() };
+        *self = Self { ready: false, ..Self::new() };
+        gathered
     }
 
     /// Takes a nibble. Gives the message when `length`, told the first byte, says that it is complete.
-    fn nibble(&mut self, nibble: Nibble, length: impl Fn(u8) -> usize) -> Option<MessageBytes> {
+    fn nibble(&mut self, nibble: Nibble, length: impl Fn(u8) -> usize) -> Option<Gathered> {
         if !self.ready {
             return None;
         }
         match self.high.take() {
             None => self.high = Some(nibble),
-            Some(high) => self.bytes.push(&[high.get() << 4 | nibble.get()]),
+            Some(high) => {
+                let byte = high.get() << 4 | nibble.get();
+                self.crc.update(byte);
+                self.bytes.push(&[byte]);
+            }
         }
         let first = self.bytes.as_bytes().first()?;
         let complete = self.high.is_none() && usize::from(self.bytes.len) >= length(*first).min(MessageBytes::MAX);

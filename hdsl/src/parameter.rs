@@ -1,47 +1,16 @@
 //! The parameters channel: one byte an H-frame in each direction.
 
-use crate::Error;
+use core::fmt;
 
-/// Half a byte, 0..=15: one symbol of a message.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(try_from = "u8", into = "u8"))]
-pub struct Nibble(u8);
+use crate::error::Error;
 
-impl Nibble {
-    /// `None` above 15.
-    pub const fn new(value: u8) -> Option<Self> {
-        if value < 16 { Some(Self(value)) } else { None }
-    }
-
-    /// The four low bits.
-    pub const fn truncate(value: u8) -> Self {
-        Self(value & 15)
-    }
-
-    /// The value, 0..=15.
-    pub const fn get(self) -> u8 {
-        self.0
-    }
-}
-
-impl TryFrom<u8> for Nibble {
-    type Error = Error;
-
-    fn try_from(value: u8) -> Result<Self, Error> {
-        Self::new(value).ok_or(Error::UndefinedSymbol { symbol: value })
-    }
-}
-
-impl From<Nibble> for u8 {
-    fn from(nibble: Nibble) -> Self {
-        nibble.0
-    }
+servowire_core::number! {
+    /// Half a byte, 0..=15: one symbol of a message.
+    pub struct Nibble(u8, 4);
 }
 
 /// What the master says in bits 4:0 of its parameter byte.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "arbitrary", derive(arbitrary::Arbitrary))]
 pub enum MasterSymbol {
@@ -69,7 +38,7 @@ impl MasterSymbol {
     /// The five bits.
     pub const fn bits(self) -> u8 {
         match self {
-            Self::Data(nibble) => nibble.0,
+            Self::Data(nibble) => nibble.get(),
             Self::Idle => 0x10,
             Self::Sync => 0x19,
             Self::Start => 0x1a,
@@ -87,7 +56,7 @@ impl MasterSymbol {
     /// [`Error::UndefinedSymbol`] for 11h..18h.
     pub const fn from_bits(bits: u8) -> Result<Self, Error> {
         Ok(match bits & 31 {
-            nibble @ 0..=15 => Self::Data(Nibble(nibble)),
+            nibble @ 0..=15 => Self::Data(Nibble::truncate(nibble)),
             0x10 => Self::Idle,
             0x19 => Self::Sync,
             0x1a => Self::Start,
@@ -116,7 +85,6 @@ impl MasterSymbol {
 ///         0 during the start-up up to IDREQ, then 1
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "arbitrary", derive(arbitrary::Arbitrary))]
 pub struct ParameterByte(u8);
@@ -163,7 +131,6 @@ impl ParameterByte {
 
 /// What the encoder says in bits 4:0 of its parameter byte.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "arbitrary", derive(arbitrary::Arbitrary))]
 pub enum EncoderSymbol {
@@ -183,7 +150,7 @@ impl EncoderSymbol {
     /// The five bits.
     pub const fn bits(self) -> u8 {
         match self {
-            Self::Data(nibble) => nibble.0,
+            Self::Data(nibble) => nibble.get(),
             Self::Idle => 0x10,
             Self::Snak => 0x15,
             Self::Lnak => 0x1a,
@@ -197,7 +164,7 @@ impl EncoderSymbol {
     /// [`Error::UndefinedSymbol`].
     pub const fn from_bits(bits: u8) -> Result<Self, Error> {
         Ok(match bits & 31 {
-            nibble @ 0..=15 => Self::Data(Nibble(nibble)),
+            nibble @ 0..=15 => Self::Data(Nibble::truncate(nibble)),
             0x10 => Self::Idle,
             0x15 => Self::Snak,
             0x1a => Self::Lnak,
@@ -217,7 +184,6 @@ impl EncoderSymbol {
 /// VSYNC is 1 in the last of the eight answers of a V-frame. Bits 6:5 are not documented; this crate sends 0 and
 /// ignores them.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "arbitrary", derive(arbitrary::Arbitrary))]
 pub struct EncoderByte(u8);
@@ -254,16 +220,77 @@ impl EncoderByte {
     }
 }
 
-#[cfg(feature = "arbitrary")]
-impl<'a> arbitrary::Arbitrary<'a> for Nibble {
-    fn arbitrary(from: &mut arbitrary::Unstructured<'a>) -> arbitrary::Result<Self> {
-        Ok(Self::truncate(u8::arbitrary(from)?))
+impl fmt::Display for MasterSymbol {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Data(nibble) => return write!(f, "{:X}", nibble.get()),
+            Self::Idle => "IDLE",
+            Self::Sync => "SYNC",
+            Self::Start => "START",
+            Self::Learn => "LEARN",
+            Self::Check => "CHECK",
+            Self::IdReq => "IDREQ",
+            Self::Init => "INIT",
+            Self::Reset => "RESET",
+        })
     }
 }
+
+impl fmt::Display for EncoderSymbol {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Data(nibble) => return write!(f, "{:X}", nibble.get()),
+            Self::Idle => "IDLE",
+            Self::Snak => "SNAK",
+            Self::Lnak => "LNAK",
+            Self::Init => "INIT",
+        })
+    }
+}
+
+/// The symbol, or the five bits of one without a meaning.
+fn write_symbol<S: fmt::Display>(f: &mut fmt::Formatter<'_>, symbol: Result<S, Error>, raw: u8) -> fmt::Result {
+    match symbol {
+        Ok(symbol) => symbol.fmt(f),
+        Err(_) => write!(f, "{:02X}h", raw & 31),
+    }
+}
+
+impl fmt::Display for ParameterByte {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write_symbol(f, self.symbol(), self.raw())?;
+        f.write_str(if self.first() { " FIRST" } else { "" })?;
+        f.write_str(if self.msync() { " MSYNC" } else { "" })
+    }
+}
+
+impl fmt::Display for EncoderByte {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write_symbol(f, self.symbol(), self.raw())?;
+        f.write_str(if self.vsync() { " VSYNC" } else { "" })
+    }
+}
+
+crate::ranged::format_as_displayed!(MasterSymbol, EncoderSymbol, ParameterByte, EncoderByte);
 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn as_a_log_shows_them() {
+        use std::string::ToString;
+        assert_eq!(ParameterByte::new(0xd0).to_string(), "IDLE FIRST MSYNC");
+        assert_eq!(ParameterByte::new(0x1f).to_string(), "RESET");
+        assert_eq!(
+            (ParameterByte::new(0x8a).to_string(), ParameterByte::new(0x12).to_string()),
+            ("A FIRST".into(), "12h".into())
+        );
+        assert_eq!(
+            (EncoderByte::new(0x95).to_string(), EncoderByte::new(0x1a).to_string()),
+            ("SNAK VSYNC".into(), "LNAK".into())
+        );
+    }
 
     #[test]
     fn every_byte_of_both_directions() {

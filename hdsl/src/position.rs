@@ -1,26 +1,34 @@
 //! The fast position: the second differences of the acceleration channel integrated twice, aligned with the safe
 //! position once a V-frame.
 
-use crate::{DeltaDelta, PositionBits};
+use crate::acceleration::DeltaDelta;
+use crate::doubt::Doubt;
+use crate::encoder_id::PositionBits;
 
 const POSITION: u64 = 0xff_ffff_ffff;
 const VELOCITY: u32 = 0xff_ffff;
 
-/// What stands in for an acceleration word that cannot be used.
+/// How velocity and position are calculated.
 ///
-/// Both give last + (16 d0 + 8 d1 + 4 d2 + 2 d3 + d4) / 32 (HDSL Protocol Design), rounded towards minus infinity,
-/// with `last` the value before and d0..d4 its five newest differences.
+/// Either way last + (16 d0 + 8 d1 + 4 d2 + 2 d3 + d4) / 32 stands in for an acceleration word that cannot be used (HDSL
+/// Protocol Design), rounded towards minus infinity, with `last` the value before and d0..d4 its five newest differences.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "arbitrary", derive(arbitrary::Arbitrary))]
-pub enum Estimator {
-    /// Calculated without overflow and limited to the 11 bits of a real value.
+pub enum PositionRule {
+    /// The estimate is limited to the 11 bits of a real value. Positions and their differences are taken modulo the
+    /// width of the position (SICK manual, p. 44).
     #[default]
-    Clamped,
-    /// As the Motor Control SDK calculates it: in 16 bits that wrap, and added to the velocity with its sign only if
-    /// bit 10 is set. The same as [`Clamped`](Self::Clamped) as long as nothing wraps and the result has 11 bits.
-    Wrapping16,
+    Sick,
+    /// As the firmware of the Motor Control SDK does it.
+    ///
+    /// * The estimate wraps at 16 bits, and goes into the velocity with its sign only if bit 10 is set. While nothing
+    ///   wraps both rules estimate the same.
+    /// * The alignment subtracts positions as 40-bit numbers whatever the width. If the position passes the end of its
+    ///   range in the V-frame of phase 0, the velocity is then wrong by an eighth of the range, and so is the position
+    ///   of seven frames in eight, without any flag.
+    Ti,
 }
 
 /// How far the fast position is aligned with the safe position; it advances once a V-frame.
@@ -58,7 +66,7 @@ pub enum Phase {
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct PositionTracker {
     bits: PositionBits,
-    estimator: Estimator,
+    rule: PositionRule,
     position: u64,
     velocity: u32,
     /// Sum of the velocities since the last safe position.
@@ -71,19 +79,21 @@ pub struct PositionTracker {
     phase: Phase,
     unreliable: bool,
     errors: u32,
+    /// Safe positions in a row that agreed with the tracked one, in phases 2 and 3.
+    agreed: u8,
 }
 
 impl PositionTracker {
     /// At standstill at position 0, not aligned.
     pub const fn new(bits: PositionBits) -> Self {
-        Self::with_estimator(bits, Estimator::Clamped)
+        Self::with_rule(bits, PositionRule::Sick)
     }
 
-    /// The same with a choice of the estimator.
-    pub const fn with_estimator(bits: PositionBits, estimator: Estimator) -> Self {
+    /// The same by a rule.
+    pub const fn with_rule(bits: PositionBits, rule: PositionRule) -> Self {
         Self {
             bits,
-            estimator,
+            rule,
             position: 0,
             velocity: 0,
             relative: 0,
@@ -93,6 +103,7 @@ impl PositionTracker {
             phase: Phase::Position,
             unreliable: false,
             errors: 0,
+            agreed: 0,
         }
     }
 
@@ -105,6 +116,7 @@ impl PositionTracker {
         } else {
             self.errors = self.errors.saturating_add(1);
             self.phase = Phase::Position;
+            self.agreed = 0;
             self.unreliable = true;
             let (added, kept) = self.estimate();
             self.integrate(added, kept);
@@ -126,12 +138,12 @@ impl PositionTracker {
         let weights = [16, 8, 4, 2, 1];
         let terms = self.history.iter().zip(weights).map(|(d, w)| i32::from(*d).wrapping_mul(w));
         let sum = terms.fold(0, i32::wrapping_add);
-        match self.estimator {
-            Estimator::Clamped => {
+        match self.rule {
+            PositionRule::Sick => {
                 let value = DeltaDelta::clamp(i64::from(self.last).wrapping_add(i64::from(sum >> 5))).get();
                 (i32::from(value), value)
             }
-            Estimator::Wrapping16 => {
+            PositionRule::Ti => {
                 let [low, high, ..] = sum.to_le_bytes();
                 let sum = i16::from_le_bytes([low, high]) >> 5;
                 let value = self.last.wrapping_add(sum);
@@ -158,11 +170,16 @@ impl PositionTracker {
     ///  phase 3   safe + relative = pos: aligned; otherwise                  -> 0
     /// ```
     ///
-    /// The difference x of phase 1 is not reduced to the width of the position, as in the vendor's receiver: if the
-    /// position went over its end in between, phase 3 finds that out and the alignment starts again.
+    /// One V-frame tells the speed modulo an eighth of the range only. The alignment is right for speeds of up to a
+    /// sixteenth of the range a frame; see [`fast`](Self::fast).
     pub fn align(&mut self, safe: u64) {
         let relative = i64::from(self.relative);
-        let expected = safe.wrapping_add_signed(relative) & POSITION;
+        let mask = match self.rule {
+            PositionRule::Sick => self.bits.mask(),
+            PositionRule::Ti => POSITION,
+        };
+        let expected = safe.wrapping_add_signed(relative) & mask;
+        let agrees = (expected ^ self.position) & self.bits.mask() == 0;
         match self.phase {
             Phase::Position => {
                 self.position = expected;
@@ -170,25 +187,54 @@ impl PositionTracker {
                 self.phase = Phase::Velocity;
             }
             Phase::Velocity => {
-                let x = sign_extend_40(safe.wrapping_sub(self.reference));
+                let x = sign_extend(safe.wrapping_sub(self.reference), mask);
                 let [v0, v1, v2, v3, ..] = (x >> 3).to_le_bytes();
                 self.velocity = self.velocity.wrapping_add(u32::from_le_bytes([v0, v1, v2, v3])) & VELOCITY;
-                self.position = self.position.wrapping_add_signed(x.wrapping_mul(2)) & POSITION;
+                self.position = self.position.wrapping_add_signed(x.wrapping_mul(2)) & mask;
                 self.phase = Phase::Settle;
             }
             Phase::Settle => self.phase = Phase::Check,
-            Phase::Check if (expected ^ self.position) & self.bits.mask() == 0 => self.unreliable = false,
+            Phase::Check if agrees => self.unreliable = false,
             Phase::Check => {
                 self.phase = Phase::Position;
                 self.unreliable = true;
             }
         }
+        self.agreed = match self.phase {
+            Phase::Check if agrees => self.agreed.saturating_add(1),
+            _ => 0,
+        };
         self.relative = 0;
+    }
+
+    /// Position and velocity, if they may be used.
+    ///
+    /// That is more than the flag POS being clear: two safe positions in a row have to agree, since a velocity that is
+    /// wrong by a sixteenth of the range passes one comparison; and the velocity has to be below a sixteenth of the range
+    /// a frame, since one that is wrong by an eighth of the range passes all of them. So what is given is the truth as
+    /// long as the real speed is below that limit, which is above 300 000 revolutions a minute for an encoder that
+    /// counts one turn.
+    ///
+    /// # Errors
+    /// [`Doubt::Estimated`], [`Doubt::Alignment`], [`Doubt::Speed`].
+    pub fn fast(&self) -> Result<(u64, i32), Doubt> {
+        let velocity = self.velocity();
+        let limit = 1_i32.checked_shl(u32::from(self.bits.get()).saturating_sub(4)).unwrap_or(i32::MAX);
+        if self.errors > 0 {
+            Err(Doubt::Estimated)
+        } else if self.unreliable || self.agreed < 2 {
+            Err(Doubt::Alignment)
+        } else if velocity < limit.wrapping_neg() || velocity >= limit {
+            Err(Doubt::Speed)
+        } else {
+            Ok((self.position & self.bits.mask(), velocity))
+        }
     }
 
     /// In place of [`align`](Self::align) when the V-frame brought no safe position.
     pub const fn no_safe_position(&mut self) {
         self.phase = Phase::Position;
+        self.agreed = 0;
         self.unreliable = true;
         self.relative = 0;
     }
@@ -198,13 +244,13 @@ impl PositionTracker {
         self.unreliable = true;
     }
 
-    /// The position, 40 bits. Right after phases 0 and 1 it can have bits above the width of the encoder; the next
-    /// step takes them away.
+    /// The position, usable or not. By [`PositionRule::Ti`] it can have bits above the width of the encoder right after
+    /// phases 0 and 1; the next step takes them away.
     pub const fn position(&self) -> u64 {
         self.position
     }
 
-    /// The velocity in steps an H-frame, 24 bits.
+    /// The velocity in steps an H-frame, 24 bits, usable or not.
     pub const fn velocity(&self) -> i32 {
         i32::from_le_bytes((self.velocity << 8).to_le_bytes()) >> 8
     }
@@ -225,12 +271,14 @@ impl PositionTracker {
     }
 }
 
-const fn sign_extend_40(value: u64) -> i64 {
-    i64::from_le_bytes((value << 24).to_le_bytes()) >> 24
+/// The low bits that `mask` selects, with the sign of the highest of them.
+const fn sign_extend(value: u64, mask: u64) -> i64 {
+    let unused = mask.leading_zeros();
+    i64::from_le_bytes((value << unused).to_le_bytes()) >> unused
 }
 
 #[cfg(test)]
-#[allow(clippy::cast_sign_loss)]
+#[allow(clippy::cast_sign_loss, clippy::cast_possible_wrap)]
 mod tests {
     use super::*;
     use proptest::prelude::*;
@@ -286,7 +334,7 @@ mod tests {
         fn the_estimators_agree_without_wrap(a in prop::collection::vec(prop::option::of(-200..200_i16), 40)) {
             let bits = PositionBits::MAX;
             let mut one = PositionTracker::new(bits);
-            let mut two = PositionTracker::with_estimator(bits, Estimator::Wrapping16);
+            let mut two = PositionTracker::with_rule(bits, PositionRule::Ti);
             for value in a {
                 let value = value.map(|v| DeltaDelta::new(v).unwrap());
                 one.step(value);
@@ -307,6 +355,67 @@ mod tests {
                 tracker.step(value.map(|v| DeltaDelta::new(v).unwrap()));
                 prop_assert!((-1024..=1023).contains(&(tracker.velocity() - before)));
                 prop_assert_eq!(tracker.errors() > 0, value.is_none());
+            }
+        }
+    }
+
+    /// Small ranges pass often, the speed is anything up to a sixteenth of the range a frame, words and safe positions are
+    /// lost: in every frame the position given is the truth, or none is given.
+    fn truth_or_nothing(rule: PositionRule, bits: u8, start: u64, speed: i64, steps: &[(i64, u8)]) -> (u32, u32) {
+        let bits = PositionBits::new(bits).unwrap();
+        let limit = 1_i64 << (bits.get() - 4);
+        let modulo = |p: i64| p.rem_euclid(1 << bits.get()) as u64;
+        let mut tracker = PositionTracker::with_rule(bits, rule);
+        let (mut position, mut velocity) = (start as i64, speed.rem_euclid(2 * limit) - limit);
+        let (mut before, mut given, mut wrong) = (position, 0, 0);
+        for (k, (a, lost)) in steps.iter().enumerate() {
+            let next = (velocity + a.clamp(&-1024, &1023)).clamp(-limit, limit - 1);
+            let value = dd(next - velocity);
+            velocity = next;
+            position += velocity;
+            tracker.step(if *lost == 0 { None } else { value });
+            if k % 8 == 7 {
+                if *lost == 1 {
+                    tracker.no_safe_position();
+                } else {
+                    tracker.align(modulo(before));
+                }
+                before = position;
+            }
+            if let Ok(fast) = tracker.fast() {
+                given += 1;
+                wrong += u32::from(fast != (modulo(position), velocity as i32));
+            }
+        }
+        (given, wrong)
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(2000))]
+        #[test]
+        fn the_position_given_is_the_truth(
+            ti: bool, bits in 8..=40_u8, start: u64, speed: i64,
+            a in prop::collection::vec((-1100..1100_i64, prop_oneof![1 => 0..2_u8, 60 => Just(9)]), 160)
+        ) {
+            let rule = if ti { PositionRule::Ti } else { PositionRule::Sick };
+            let (_, wrong) = truth_or_nothing(rule, bits, start & 0xff_ffff_ffff, speed, &a);
+            prop_assert_eq!(wrong, 0);
+        }
+    }
+
+    /// The range is passed in every V-frame: the position is given all the time nevertheless, and it is right.
+    #[test]
+    fn passing_the_range_does_no_harm() {
+        for bits in 8..=26 {
+            for speed in [-(1 << (bits - 4)), -3, 3, (1 << (bits - 4)) - 1] {
+                let (given, wrong) = truth_or_nothing(
+                    PositionRule::Sick,
+                    bits,
+                    (1 << bits) - 5,
+                    speed + (1 << (bits - 4)),
+                    &[(0, 9); 100],
+                );
+                assert_eq!((given, wrong), (100 - 31, 0), "{bits} {speed}");
             }
         }
     }

@@ -65,7 +65,6 @@ impl QualityRule {
 /// The quality monitor QM, 0..=15.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct QualityMonitor {
     rule: QualityRule,
     value: u8,

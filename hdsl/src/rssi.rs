@@ -1,19 +1,16 @@
 //! Signal quality from the places of the edges in the sample byte.
 
-/// Received signal strength of an answer, 0..=12: how far apart the edges in a bit time are.
-///
-/// 12 with no or one edge, else 2 (G - 2) for the longest gap G between neighbouring edges, counted round the eight
-/// sample periods; 0 for G <= 2.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-#[cfg_attr(feature = "arbitrary", derive(arbitrary::Arbitrary))]
-pub struct Rssi(u8);
+use crate::ranged::ranged;
+
+ranged! {
+    /// Received signal strength of an answer, 0..=12: how far apart the edges in a bit time are.
+    ///
+    /// 12 with no or one edge, else 2 (G - 2) for the longest gap G between neighbouring edges, counted round the eight
+    /// sample periods; 0 for G <= 2.
+    pub struct Rssi(0..=12);
+}
 
 impl Rssi {
-    /// The best.
-    pub const MAX: Self = Self(12);
-
     /// Of an edge byte, see [`edges`].
     ///
     /// ```
@@ -34,11 +31,6 @@ impl Rssi {
             Some(1..=2) => Self::MAX,
             _ => Self::of_edges(edges),
         }
-    }
-
-    /// The value, 0..=12.
-    pub const fn get(self) -> u8 {
-        self.0
     }
 }
 
@@ -115,6 +107,48 @@ impl EdgeWatch {
     pub const fn edges(self) -> u8 {
         self.seen.reverse_bits()
     }
+}
+
+/// An [`EdgeWatch`] over four bit times at once.
+#[derive(Clone, Copy)]
+pub(crate) struct WordWatch {
+    previous: u32,
+    seen: u32,
+    lowest: Rssi,
+}
+
+impl WordWatch {
+    /// `previous` is the level of the sample before the first byte.
+    pub(crate) const fn new(previous: bool) -> Self {
+        Self { previous: (previous as u32) << 24, seen: 0, lowest: Rssi::MAX }
+    }
+
+    /// Takes the samples of four bit times, the first of them in the low byte.
+    #[inline]
+    pub(crate) fn step(&mut self, samples: u32) {
+        // The sample before each one: within the byte, and the last of the byte before.
+        let within = samples >> 1 & 0x7f7f_7f7f;
+        let across = (samples << 8 | self.previous >> 24) & 0x0101_0101;
+        let edges = samples ^ (within | across << 7);
+        self.previous = samples;
+        self.seen |= edges;
+        // In each byte, the lowest of bits 6:0 taken away: nothing is left of a single edge, which is the best signal.
+        if edges & (edges | 0x8080_8080).wrapping_sub(0x0101_0101) != 0 {
+            self.lowest = lowest(self.lowest, edges);
+        }
+    }
+
+    pub(crate) const fn finish(self) -> EdgeWatch {
+        let [a, b, c, d] = self.seen.to_le_bytes();
+        EdgeWatch { previous: self.previous >> 24 & 1 == 1, seen: a | b | c | d, lowest: self.lowest }
+    }
+}
+
+/// The RSSI of four bit times by the table.
+#[cold]
+#[inline(never)]
+fn lowest(lowest: Rssi, edges: u32) -> Rssi {
+    edges.to_le_bytes().into_iter().map(Rssi::of_edges).fold(lowest, Ord::min)
 }
 
 #[cfg(test)]

@@ -3,9 +3,10 @@
 //! Reception begins one bit after the end of PARA. A byte holds the eight samples of one bit time of the master, the
 //! first of them in bit 7. The line is high until the encoder drives it.
 
-use crate::Error;
+use crate::error::Error;
 use crate::frame::ANSWER_BITS;
-use crate::rssi::{EdgeWatch, Rssi};
+use crate::ranged::ranged;
+use crate::rssi::{EdgeWatch, Rssi, WordWatch};
 
 /// Bytes of samples that a receiver takes in for one answer: 61 bits and room for a delay of up to 11.
 pub const WINDOW: usize = 72;
@@ -29,18 +30,17 @@ pub const TEST_PATTERN: u64 = {
     bits
 };
 
-/// The place in every byte of samples where the bit is taken, 0..=7; 0 is the first sample in time.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(try_from = "u8", into = "u8"))]
-pub struct SampleIndex(u8);
+servowire_core::number! {
+    /// The place in every byte of samples where the bit is taken, 0..=7; 0 is the first sample in time.
+    pub struct SampleIndex(u8, 3);
+}
+
+ranged! {
+    /// Bits before an answer, 0..=11: the delay of the cable there and back, about 100 ns or 10 m each.
+    pub struct Delay(0..=11);
+}
 
 impl SampleIndex {
-    /// `None` above 7.
-    pub const fn new(index: u8) -> Option<Self> {
-        if index < 8 { Some(Self(index)) } else { None }
-    }
-
     /// E = (4 + n) mod 8 with n ones in the byte that holds a falling edge (HDSL Protocol Design): the middle of the
     /// bits that begin at that edge.
     ///
@@ -51,44 +51,91 @@ impl SampleIndex {
     /// ```
     #[expect(clippy::cast_possible_truncation, reason = "at most eight ones")]
     pub const fn after_falling_edge(byte: u8) -> Self {
-        Self((byte.count_ones() as u8).wrapping_add(4) % 8)
+        Self::truncate((byte.count_ones() as u8).wrapping_add(4))
     }
 
     /// The same for a byte that holds a rising edge, as the design document draws it: there the formula counts from
     /// the last sample.
     pub const fn after_rising_edge(byte: u8) -> Self {
-        Self(7_u8.wrapping_sub(Self::after_falling_edge(byte).0))
-    }
-
-    /// The index, 0..=7.
-    pub const fn get(self) -> u8 {
-        self.0
+        Self::truncate(7_u8.wrapping_sub(Self::after_falling_edge(byte).get()))
     }
 
     /// The bit that a byte of samples stands for.
     #[inline]
     pub const fn bit(self, samples: u8) -> bool {
-        samples >> (7 & !self.0) & 1 == 1
+        samples >> (7 & !self.get()) & 1 == 1
     }
 
     /// The first 128 bits of a line, the first of them in bit 0.
     pub fn bits(self, samples: &[u8]) -> u128 {
-        let take = |bits: u128, (at, byte): (u32, &u8)| bits | u128::from(self.bit(*byte)) << at;
-        (0..128).zip(samples).fold(0, take)
+        let mut parts = [0; 4];
+        for (part, bytes) in parts.iter_mut().zip(samples.chunks(32)) {
+            *part = self.word(bytes);
+        }
+        let [a, b, c, d] = parts.map(u128::from);
+        a | b << 32 | c << 64 | d << 96
+    }
+
+    /// The bits of up to 32 bytes, the first in bit 0.
+    #[inline]
+    fn word(self, samples: &[u8]) -> u32 {
+        let mut words = samples.chunks_exact(4);
+        let gather = Gather::new(self);
+        let mut bits = 0;
+        let mut len = 0_u32;
+        for word in &mut words {
+            let [a, b, c, d] = *word else { break };
+            bits = bits >> 4 | gather.four(u32::from_le_bytes([a, b, c, d]));
+            len = len.saturating_add(4);
+        }
+        // The newest bits are at the top; at most eight words have come.
+        let whole = bits.checked_shr(32_u32.saturating_sub(len)).unwrap_or(0);
+        let rest = (len..).zip(words.remainder());
+        rest.fold(whole, |bits, (at, byte)| bits | u32::from(self.bit(*byte)).wrapping_shl(at))
     }
 }
 
-impl TryFrom<u8> for SampleIndex {
-    type Error = Error;
-
-    fn try_from(index: u8) -> Result<Self, Error> {
-        Self::new(index).ok_or(Error::PatternNotFound { index })
-    }
+/// Takes one bit of each of four bytes at a time.
+///
+/// The mask leaves bits s, s + 8, s + 16 and s + 24; the product moves them next to each other, and no two of its other
+/// terms meet.
+#[derive(Clone, Copy)]
+struct Gather {
+    mask: u32,
+    factor: u32,
 }
 
-impl From<SampleIndex> for u8 {
-    fn from(index: SampleIndex) -> Self {
-        index.0
+impl Gather {
+    const fn new(index: SampleIndex) -> Self {
+        let shift = 7 & !index.get();
+        Self { mask: 0x0101_0101 << shift, factor: (1 << 28 | 1 << 21 | 1 << 14 | 1 << 7) >> shift }
+    }
+
+    /// Four bits more at the top of `bits`.
+    #[inline(always)]
+    fn next(self, bits: u32, samples: [u8; 4], watch: &mut WordWatch) -> u32 {
+        let word = u32::from_le_bytes(samples);
+        watch.step(word);
+        bits >> 4 | self.four(word)
+    }
+
+    /// The bits of up to 32 bytes, a multiple of four, at the top.
+    #[inline(always)]
+    fn all(self, samples: &[u8], watch: &mut WordWatch) -> u32 {
+        let mut bits = 0;
+        let mut pairs = samples.chunks_exact(8);
+        for pair in &mut pairs {
+            let Some((a, b)) = pair.split_first_chunk() else { break };
+            bits = self.next(bits, *a, watch);
+            bits = b.first_chunk().map_or(bits, |b| self.next(bits, *b, watch));
+        }
+        pairs.remainder().first_chunk().map_or(bits, |last| self.next(bits, *last, watch))
+    }
+
+    /// The bits of four bytes, the first of them in the low byte, in bits 31:28.
+    #[inline]
+    const fn four(self, samples: u32) -> u32 {
+        (samples & self.mask).wrapping_mul(self.factor) & 0xf000_0000
     }
 }
 
@@ -98,11 +145,11 @@ impl From<SampleIndex> for u8 {
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "arbitrary", derive(arbitrary::Arbitrary))]
 pub enum EdgeRule {
-    /// The ones in front of the edge count.
+    /// The ones before the edge count.
     #[default]
     Leading,
     /// All ones of the byte count, as in the vendor's receiver. If the edge falls on the boundary of two bytes and the
-    /// next one comes a sample early, a one from behind it is counted and the pattern is not found.
+    /// next one comes a sample early, a one from after it is counted and the pattern is not found.
     All,
 }
 
@@ -113,14 +160,11 @@ pub enum EdgeRule {
 pub struct Alignment {
     /// Where to sample.
     pub index: SampleIndex,
-    /// Bits in front of the answer, 0..=11: the delay of the cable, about 100 ns or 10 m each.
-    pub delay: u8,
+    /// Bits before the answer.
+    pub delay: Delay,
 }
 
 impl Alignment {
-    /// Largest delay at which an answer fits into the window.
-    pub const MAX_DELAY: u8 = 11;
-
     /// Finds the sampling index from the first falling edge, and the delay from the place of the test pattern.
     ///
     /// The vendor's receiver begins at a delay of 1; at 0 m encoder and transceivers need most of a bit anyway.
@@ -130,18 +174,18 @@ impl Alignment {
     /// # Errors
     /// [`Error::Truncated`] for fewer than 61 bytes, [`Error::NoEdge`] if the line stayed high,
     /// [`Error::PatternNotFound`].
-    pub fn learn(samples: &[u8], rule: EdgeRule) -> Result<Self, Error> {
-        let room = room(samples, 0)?;
+    pub fn learn(rule: EdgeRule, samples: &[u8]) -> Result<Self, Error> {
+        let room = room(samples, Delay::MIN)?;
         let Some(edge) = samples.iter().find(|byte| **byte != 0xff) else { return Err(Error::NoEdge) };
         let edge = match rule {
             EdgeRule::All => *edge,
-            // Without what comes behind the first zero.
+            // Without what comes after the first zero.
             EdgeRule::Leading => *edge & !(!*edge).checked_ilog2().map_or(0, |zero| (1_u8 << zero).wrapping_sub(1)),
         };
         let index = SampleIndex::after_falling_edge(edge);
         let line = index.bits(samples);
-        let found = (0..=room.min(Self::MAX_DELAY)).find(|delay| answer_at(line, *delay) == TEST_PATTERN);
-        found.map(|delay| Self { index, delay }).ok_or(Error::PatternNotFound { index: index.0 })
+        let found = (0..=room).map_while(Delay::new).find(|delay| answer_at(line, *delay) == TEST_PATTERN);
+        found.map(|delay| Self { index, delay }).ok_or(Error::PatternNotFound { index: index.get() })
     }
 
     /// The 61 bits of an answer, the first in bit 0.
@@ -149,52 +193,71 @@ impl Alignment {
     /// # Errors
     /// [`Error::Truncated`] if the samples end before the answer.
     pub fn bits(self, samples: &[u8]) -> Result<u64, Error> {
-        room(samples, self.delay)?;
-        Ok(answer_at(self.index.bits(samples), self.delay))
+        self.read(samples).map(|(bits, _)| bits)
+    }
+
+    /// Bits and edges of the answer.
+    ///
+    /// # Errors
+    /// [`Error::Truncated`] if the samples end before the answer.
+    pub fn read(self, samples: &[u8]) -> Result<(u64, EdgeWatch), Error> {
+        let from = usize::from(self.delay.get());
+        let Some((before, answer)) = samples.split_at_checked(from) else { return Err(short(samples, self.delay)) };
+        let Some(answer) = answer.first_chunk::<{ ANSWER_BITS as usize }>() else {
+            return Err(short(samples, self.delay));
+        };
+        // The line is high before the first byte.
+        let mut watch = WordWatch::new(before.last().is_none_or(|byte| byte & 1 == 1));
+        let gather = Gather::new(self.index);
+        // Eight and seven words, then one byte.
+        let Some((first, rest)) = answer.split_at_checked(32) else { return Err(short(samples, self.delay)) };
+        let Some((last, second)) = rest.split_last() else { return Err(short(samples, self.delay)) };
+        let low = gather.all(first, &mut watch);
+        let high = gather.all(second, &mut watch);
+        let mut watch = watch.finish();
+        watch.step(*last);
+        let high = high >> 4 | u32::from(self.index.bit(*last)) << 28;
+        Ok((u64::from(low) | u64::from(high) << 32, watch))
     }
 
     /// RSSI of the answer: the smallest over its bits (HDSL Protocol Design).
-    pub fn rssi(self, samples: &[u8]) -> Rssi {
-        self.edges(samples).rssi()
-    }
-
-    /// All edges of the answer, by sample period.
-    pub fn edges(self, samples: &[u8]) -> EdgeWatch {
-        let from = usize::from(self.delay);
-        let before = from.checked_sub(1).and_then(|at| samples.get(at)).is_none_or(|byte| byte & 1 == 1);
-        let mut watch = EdgeWatch::new(before);
-        for byte in samples.iter().skip(from).take(ANSWER_BITS as usize) {
-            watch.step(*byte);
-        }
-        watch
+    ///
+    /// # Errors
+    /// [`Error::Truncated`] if the samples end before the answer.
+    pub fn rssi(self, samples: &[u8]) -> Result<Rssi, Error> {
+        self.read(samples).map(|(_, watch)| watch.rssi())
     }
 }
 
 /// How many bytes there are beyond those of an answer that begins after `delay`; 255 at most.
-fn room(samples: &[u8], delay: u8) -> Result<u8, Error> {
-    let want = usize::from(delay).saturating_add(ANSWER_BITS as usize);
-    match samples.len().checked_sub(want) {
-        Some(rest) => Ok(u8::try_from(rest).unwrap_or(u8::MAX)),
-        None => Err(Error::Truncated {
-            got: u16::try_from(samples.len()).unwrap_or(u16::MAX),
-            want: u16::try_from(want).unwrap_or(u16::MAX),
-        }),
+fn room(samples: &[u8], delay: Delay) -> Result<u8, Error> {
+    let want = usize::from(delay.get()).saturating_add(ANSWER_BITS as usize);
+    let rest = samples.len().checked_sub(want).ok_or_else(|| short(samples, delay))?;
+    Ok(u8::try_from(rest).unwrap_or(u8::MAX))
+}
+
+#[cold]
+fn short(samples: &[u8], delay: Delay) -> Error {
+    let want = usize::from(delay.get()).saturating_add(ANSWER_BITS as usize);
+    Error::Truncated {
+        got: u16::try_from(samples.len()).unwrap_or(u16::MAX),
+        want: u16::try_from(want).unwrap_or(u16::MAX),
     }
 }
 
 #[expect(clippy::cast_possible_truncation, reason = "masked to 61 bits")]
-fn answer_at(line: u128, delay: u8) -> u64 {
+fn answer_at(line: u128, delay: Delay) -> u64 {
     const MASK: u64 = (1 << ANSWER_BITS) - 1;
-    (line >> (delay & 15)) as u64 & MASK
+    (line >> delay.get()) as u64 & MASK
 }
 
 /// The samples of a line that carries an answer `delay` eighths of a bit after reception began, with ones before and
-/// behind: what [`Alignment::bits`] takes apart.
+/// after it: what [`Alignment::bits`] takes apart.
 ///
 /// ```
 /// use hdsl::sampling::{Alignment, EdgeRule, TEST_PATTERN, line};
-/// let found = Alignment::learn(&line(TEST_PATTERN, 13), EdgeRule::Leading);
-/// assert_eq!(found.map(|a| (a.index.get(), a.delay)), Ok((1, 2)));
+/// let found = Alignment::learn(EdgeRule::Leading, &line(TEST_PATTERN, 13));
+/// assert_eq!(found.map(|a| (a.index.get(), a.delay.get())), Ok((1, 2)));
 /// ```
 pub fn line(bits: u64, delay: u32) -> [u8; WINDOW] {
     // Eight bits at a time: the one under way and the one before it.
@@ -219,23 +282,54 @@ mod tests {
     #[test]
     fn every_delay_of_a_clean_line() {
         for delay in 0..=100_u32 {
-            let got = Alignment::learn(&line(TEST_PATTERN, delay), EdgeRule::All);
+            let got = Alignment::learn(EdgeRule::All, &line(TEST_PATTERN, delay));
             if delay >= 92 {
                 assert!(matches!(got, Err(Error::PatternNotFound { .. })), "{delay}");
                 continue;
             }
             let got = got.unwrap();
             assert_eq!(u32::from(got.index.get()), (delay + 4) % 8);
-            assert_eq!(u32::from(got.delay), (delay + 4) / 8);
-            assert_eq!(got.rssi(&line(TEST_PATTERN, delay)).get(), 12);
+            assert_eq!(u32::from(got.delay.get()), (delay + 4) / 8);
+            assert_eq!(got.rssi(&line(TEST_PATTERN, delay)).map(Rssi::get), Ok(12));
             for bits in [0, 0x0123_4567_89ab_cdef, u64::MAX >> 3] {
                 assert_eq!(got.bits(&line(bits, delay)), Ok(bits & u64::MAX >> 3));
             }
         }
-        assert_eq!(Alignment::learn(&[0xff; 72], EdgeRule::All), Err(Error::NoEdge));
-        assert_eq!(Alignment::learn(&[0xff; 60], EdgeRule::All), Err(Error::Truncated { got: 60, want: 61 }));
-        let late = Alignment { index: SampleIndex(4), delay: 5 };
+        assert_eq!(Alignment::learn(EdgeRule::All, &[0xff; 72]), Err(Error::NoEdge));
+        assert_eq!(Alignment::learn(EdgeRule::All, &[0xff; 60]), Err(Error::Truncated { got: 60, want: 61 }));
+        let late = Alignment { index: SampleIndex::truncate(4), delay: Delay(5) };
         assert_eq!(late.bits(&[0; 65]), Err(Error::Truncated { got: 65, want: 66 }));
+    }
+
+    /// Four bytes at a time against one by one, at all indices and delays, with edges anywhere.
+    #[test]
+    fn words_equal_bytes() {
+        let mut seed = 1_u32;
+        let mut noise = || {
+            seed = seed.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            (seed >> 24) as u8
+        };
+        for round in 0..if cfg!(miri) { 2 } else { 200 } {
+            let mut samples = line(0x0f0f_3355_1234_5678, 3 + round % 40);
+            for byte in &mut samples {
+                // From clean to nothing but noise.
+                *byte ^= if u32::from(noise()) < round { noise() } else { 0 };
+            }
+            for index in 0..8 {
+                let index = SampleIndex::truncate(index);
+                let slow = (0..72).fold(0_u128, |bits, at| bits | u128::from(index.bit(samples[at])) << at);
+                assert_eq!(index.bits(&samples), slow);
+                for delay in (0..=11).map_while(Delay::new) {
+                    let from = usize::from(delay.get());
+                    let mut watch = EdgeWatch::new(from == 0 || samples[from - 1] & 1 == 1);
+                    for byte in &samples[from..from + 61] {
+                        watch.step(*byte);
+                    }
+                    let bits = (slow >> from) as u64 & (u64::MAX >> 3);
+                    assert_eq!(Alignment { index, delay }.read(&samples), Ok((bits, watch)));
+                }
+            }
+        }
     }
 
     /// Every wrong bit of the pattern is refused.
@@ -243,7 +337,7 @@ mod tests {
     fn a_wrong_bit_of_the_pattern() {
         for at in 0..61 {
             for delay in 0..88 {
-                assert!(Alignment::learn(&line(TEST_PATTERN ^ 1 << at, delay), EdgeRule::All).is_err());
+                assert!(Alignment::learn(EdgeRule::All, &line(TEST_PATTERN ^ 1 << at, delay)).is_err());
             }
         }
     }

@@ -14,39 +14,22 @@
 
 mod table;
 
-use table::{CONTROL, CONTROLS, DATA, DECODE, INVALID, MINUS, PLUS, SPECIAL};
-pub(crate) use table::{FOUR_MORE_ZEROS, SIX_MORE_ZEROS};
+use table::{CONTROL, CONTROLS, DATA, DECODE, INVALID, MINUS, PLUS, REDUCED, SPECIAL};
+pub(crate) use table::{FOUR_MORE_ZEROS, NEUTRAL, SIX_MORE_ZEROS};
 
-use crate::Error;
+use core::fmt;
 
-/// Ten bits of the line, the first of them (`a`) in bit 0.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(try_from = "u16", into = "u16"))]
-pub struct Word(u16);
+use crate::error::Error;
+
+servowire_core::number! {
+    /// Ten bits of the line, the first of them (`a`) in bit 0.
+    pub struct Word(u16, 10);
+}
 
 impl Word {
-    /// Bits of a word.
-    pub const BITS: u32 = 10;
-
-    /// `None` above 10 bits.
-    pub const fn new(bits: u16) -> Option<Self> {
-        if bits < 1 << Self::BITS { Some(Self(bits)) } else { None }
-    }
-
-    /// The ten lowest bits of `bits`.
-    pub const fn truncate(bits: u64) -> Self {
-        Self((bits & 0x3ff) as u16)
-    }
-
-    /// The bits, `a` in bit 0.
-    pub const fn bits(self) -> u16 {
-        self.0
-    }
-
     /// Ones minus zeros, -10..=10.
     pub const fn disparity(self) -> i8 {
-        let [ones, ..] = self.0.count_ones().to_le_bytes();
+        let [ones, ..] = self.get().count_ones().to_le_bytes();
         i8::from_le_bytes([ones]).wrapping_mul(2).wrapping_sub(10)
     }
 
@@ -78,40 +61,13 @@ impl Word {
     #[inline]
     #[expect(clippy::indexing_slicing, reason = "a word has ten bits, the table 1024 entries")]
     const fn entry(self) -> u16 {
-        DECODE[(self.0 & 0x3ff) as usize]
+        DECODE[(self.get() & 0x3ff) as usize]
     }
 
+    #[inline]
+    #[expect(clippy::indexing_slicing, reason = "a word has ten bits, the table 1024 entries")]
     const fn reduced(self) -> u16 {
-        let bits = self.0;
-        let run_abcd = matches!(bits & 0b1111, 0 | 0b1111);
-        // e i f g h are bits 4..=8.
-        let run_eifgh = matches!(bits >> 4 & 0b1_1111, 0 | 0b1_1111);
-        let run_cdei = matches!(bits >> 2 & 0b1111, 0 | 0b1111);
-        // e in bit 4, i g h j in bits 5, 7, 8, 9.
-        let eighj = bits & 0b11_1011_0000;
-        let special = run_cdei || eighj == 0b11_1010_0000 || eighj == 0b00_0001_0000;
-        let mut entry = table::sub_blocks(bits) as u16;
-        if run_abcd || run_eifgh {
-            entry |= INVALID;
-        }
-        if special {
-            entry |= SPECIAL;
-        }
-        entry
-    }
-}
-
-impl TryFrom<u16> for Word {
-    type Error = Error;
-
-    fn try_from(bits: u16) -> Result<Self, Error> {
-        Self::new(bits).ok_or(Error::InvalidWord { word: bits })
-    }
-}
-
-impl From<Word> for u16 {
-    fn from(word: Word) -> Self {
-        word.0
+        REDUCED[(self.get() & 0x3ff) as usize]
     }
 }
 
@@ -143,7 +99,7 @@ impl RunningDisparity {
         }
     }
 
-    const fn after(self, word: Word) -> Self {
+    pub(crate) const fn after(self, word: Word) -> Self {
         if word.disparity() == 0 { self } else { self.other() }
     }
 }
@@ -194,7 +150,6 @@ impl Control {
 
 /// A data byte or a special character.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(
     feature = "serde",
     derive(serde::Serialize, serde::Deserialize),
@@ -237,7 +192,7 @@ impl Character {
     /// ```
     /// use hdsl::symbol::{Character, RunningDisparity};
     /// let (word, after) = Character::data(0x00).encode(RunningDisparity::Minus);
-    /// assert_eq!(word.bits(), 0b00_1011_1001); // 100111 0100 on the line
+    /// assert_eq!(word.get(), 0b00_1011_1001); // 100111 0100 on the line
     /// assert_eq!(after, RunningDisparity::Minus);
     /// ```
     #[expect(clippy::indexing_slicing, reason = "a byte is below 256, a column below 2")]
@@ -249,7 +204,7 @@ impl Character {
         } else {
             DATA[column][usize::from(self.byte())]
         };
-        let word = Word(bits);
+        let word = Word::truncate(bits);
         (word, rd.after(word))
     }
 }
@@ -267,6 +222,16 @@ impl From<Character> for (u8, bool) {
         (character.byte(), character.is_control())
     }
 }
+
+/// `D28.5`, `K28.5`.
+impl fmt::Display for Character {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let kind = if self.is_control() { 'K' } else { 'D' };
+        write!(f, "{kind}{}.{}", self.byte() & 31, self.byte() >> 5)
+    }
+}
+
+crate::ranged::format_as_displayed!(Character);
 
 /// How a receiver judges a word.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
@@ -321,12 +286,30 @@ impl Reading {
         self.entry.to_le_bytes()[0]
     }
 
+    /// Byte error and special character: 0 for a data character.
+    #[inline]
+    pub(crate) const fn flags(self) -> u16 {
+        self.entry & (INVALID | SPECIAL)
+    }
+
+    /// The character.
+    ///
+    /// # Errors
+    /// [`Error::InvalidWord`].
+    pub const fn character(self) -> Result<Character, Error> {
+        if self.is_byte_error() {
+            Err(Error::InvalidWord { word: self.word.get() })
+        } else {
+            Ok(Character(self.entry & 0x1ff))
+        }
+    }
+
     /// The value.
     ///
     /// # Errors
     /// [`Error::InvalidWord`].
     pub const fn byte(self) -> Result<u8, Error> {
-        if self.is_byte_error() { Err(Error::InvalidWord { word: self.word.0 }) } else { Ok(self.raw()) }
+        if self.is_byte_error() { Err(Error::InvalidWord { word: self.word.get() }) } else { Ok(self.raw()) }
     }
 
     /// Whether the word is this special character.
@@ -337,7 +320,7 @@ impl Reading {
     /// The same word read in the secondary channel, where the reduced rule puts K28.1, 2, 5 and 6 of column RD+
     /// right. By the strict rule nothing is to be put right.
     pub(crate) const fn in_secondary(self, rule: Rule) -> Self {
-        let bits = self.word.0;
+        let bits = self.word.get();
         let k28_plus = bits & 63 == 0b00_0011;
         // fghj = 0110, 1010, 0101, 1001: balanced and not two pairs; symmetric to line order.
         let crossed = matches!(bits >> 6, 0b0110 | 0b1010 | 0b0101 | 0b1001);
@@ -397,13 +380,6 @@ impl DisparityCheck {
             };
             DisparityStatus::Invalid
         }
-    }
-}
-
-#[cfg(feature = "arbitrary")]
-impl<'a> arbitrary::Arbitrary<'a> for Word {
-    fn arbitrary(from: &mut arbitrary::Unstructured<'a>) -> arbitrary::Result<Self> {
-        Ok(Self(u16::arbitrary(from)? & 0x3ff))
     }
 }
 

@@ -15,8 +15,9 @@
 //! * [`Startup`] is the start-up arithmetic of the Motor Control SDK;
 //! * [`Synchroniser`] puts both together for any ES and corrects by the measured time between pulse and edge.
 
-use crate::Error;
-use crate::frame::{Extra, H_FRAME_BITS, MAX_STUFFING, STUFFING_BITS, edge_register};
+use crate::error::Error;
+use crate::frame::{Extra, H_FRAME_BITS, STUFFING_BITS, Stuffing, edge_register};
+use crate::ranged::ranged;
 
 /// Eighths of a bit in a stuffing block.
 const BLOCK: i32 = 48;
@@ -35,20 +36,14 @@ const _: () = assert!(STUFFING_BITS == 6 && FRAME == 864);
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct ExtraWindow {
     edge: Extra,
-    stuffing: u8,
+    stuffing: Stuffing,
     window: i16,
 }
 
 impl ExtraWindow {
     /// `window` is TIME_EXTRA_WINDOW in eighths; the window of the first frame has its edge at `edge`.
-    ///
-    /// # Errors
-    /// [`Error::ExtraOutOfRange`] for more than 26 stuffing blocks.
-    pub const fn new(edge: Extra, stuffing: u8, window: i16) -> Result<Self, Error> {
-        if stuffing > MAX_STUFFING {
-            return Err(Error::ExtraOutOfRange { extra: edge.bits() as u32 });
-        }
-        Ok(Self { edge, stuffing, window })
+    pub const fn new(edge: Extra, stuffing: Stuffing, window: i16) -> Self {
+        Self { edge, stuffing, window }
     }
 
     /// The start state from the vendor's register values: EXTRA_SIZE is the number of bits less one here, also when
@@ -56,11 +51,11 @@ impl ExtraWindow {
     ///
     /// # Errors
     /// [`Error::ExtraOutOfRange`].
-    pub const fn from_registers(extra_size: u8, time_rest: u8, stuffing: u8, window: i16) -> Result<Self, Error> {
+    pub const fn from_registers(extra_size: u8, time_rest: u8, stuffing: Stuffing, window: i16) -> Result<Self, Error> {
         let t = if time_rest == 0 { 8 } else { time_rest };
         let edge = extra_size.saturating_mul(8).saturating_add(t);
         match Extra::new(edge) {
-            Some(edge) => Self::new(edge, stuffing, window),
+            Some(edge) => Ok(Self::new(edge, stuffing, window)),
             None => Err(Error::ExtraOutOfRange { extra: extra_size as u32 }),
         }
     }
@@ -70,8 +65,8 @@ impl ExtraWindow {
         self.edge
     }
 
-    /// NUM_STUFFING: blocks behind the frame before this window.
-    pub const fn stuffing(self) -> u8 {
+    /// NUM_STUFFING: blocks after the frame before this window.
+    pub const fn stuffing(self) -> Stuffing {
         self.stuffing
     }
 
@@ -82,12 +77,12 @@ impl ExtraWindow {
 
     /// EXTRA_SIZE after a step.
     pub const fn extra_size(self) -> u8 {
-        self.edge.edge() / 8
+        self.edge.get() / 8
     }
 
     /// TIME_REST after a step.
     pub const fn time_rest(self) -> u8 {
-        self.edge.edge() % 8
+        self.edge.get() % 8
     }
 
     /// EXTRA_EDGE after a step.
@@ -97,11 +92,11 @@ impl ExtraWindow {
 
     /// Edge and stuffing after a step of `adjust` eighths, before any check of the range.
     const fn raw_step(self, adjust: i16) -> (i32, i32, i32) {
-        let t = (self.edge.edge().saturating_sub(1) % 8) as i32;
+        let t = (self.edge.get().saturating_sub(1) % 8) as i32;
         let window = self.window as i32;
         // t counts from 0 here, so 1 is added to it.
         let edge = window.saturating_sub(7).saturating_add(t).saturating_add(adjust as i32);
-        let stuffing = self.stuffing as i32;
+        let stuffing = self.stuffing.get() as i32;
         match edge.div_euclid(8) {
             ..3 => (edge.saturating_add(BLOCK), stuffing.saturating_sub(1), window.saturating_add(BLOCK)),
             3..=8 => (edge, stuffing, window),
@@ -118,46 +113,21 @@ impl ExtraWindow {
         let (edge, stuffing, window) = self.raw_step(adjust);
         let refuse = || Error::ExtraOutOfRange { extra: edge.unsigned_abs() / 8 };
         let extra = u8::try_from(edge).ok().and_then(Extra::new).ok_or_else(refuse)?;
-        let stuffing = u8::try_from(stuffing).ok().filter(|n| *n <= MAX_STUFFING).ok_or_else(refuse)?;
+        let stuffing = u8::try_from(stuffing).ok().and_then(Stuffing::new).ok_or_else(refuse)?;
         let window = i16::try_from(window).map_err(|_| refuse())?;
         *self = Self { edge: extra, stuffing, window };
         Ok(())
     }
 }
 
-/// ES: how many H-frames there are for one pulse, 1..=10.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(try_from = "u8", into = "u8"))]
-pub struct Es(u8);
+ranged! {
+    /// ES: how many H-frames there are for one pulse, 1..=10.
+    pub struct Es(1..=10);
+}
 
 impl Es {
     /// A frame for every pulse.
-    pub const ONE: Self = Self(1);
-
-    /// `None` outside 1..=10.
-    pub const fn new(es: u8) -> Option<Self> {
-        if es == 0 || es > 10 { None } else { Some(Self(es)) }
-    }
-
-    /// The number.
-    pub const fn get(self) -> u8 {
-        self.0
-    }
-}
-
-impl TryFrom<u8> for Es {
-    type Error = Error;
-
-    fn try_from(es: u8) -> Result<Self, Error> {
-        Self::new(es).ok_or(Error::ExtraOutOfRange { extra: u32::from(es) })
-    }
-}
-
-impl From<Es> for u8 {
-    fn from(es: Es) -> Self {
-        es.0
-    }
+    pub const ONE: Self = Self::MIN;
 }
 
 /// The clock of the vendor's core.
@@ -185,7 +155,8 @@ impl CoreClock {
 /// What the start-up arithmetic of the Motor Control SDK makes of a pulse period.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
+#[non_exhaustive]
 pub struct Startup {
     /// Whole bits of the EXTRA window in every frame.
     pub extra_size: u32,
@@ -225,7 +196,7 @@ impl Startup {
     pub fn new(period: u32, clock: CoreClock, es: Es) -> Result<Self, Error> {
         let eighth = clock.cycles_per_eighth();
         let bit = eighth * 8;
-        let es = u32::from(es.0);
+        let es = u32::from(es.get()).max(1);
         let shortest = Self::SHORTEST * es * bit;
         let Some(left) = period.checked_sub(shortest) else {
             return Err(Error::PeriodTooShort { missing: (shortest - period).div_ceil(bit) });
@@ -234,7 +205,7 @@ impl Startup {
         let add = left / bit;
         let mut stuffing = add / 6;
         let mut extra = add % 6 + 4 * es;
-        let most = u32::from(MAX_STUFFING) * es;
+        let most = u32::from(Stuffing::MAX.get()) * es;
         if stuffing > most {
             extra = extra.saturating_add((stuffing - most).saturating_mul(6));
             stuffing = most;
@@ -270,8 +241,8 @@ impl Startup {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Next {
-    /// Stuffing blocks behind the present frame.
-    pub stuffing: u8,
+    /// Stuffing blocks after the present frame.
+    pub stuffing: Stuffing,
     /// EXTRA window of the next frame.
     pub extra: Extra,
 }
@@ -283,6 +254,8 @@ pub struct Next {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Synchroniser {
+    /// Eighths from pulse to pulse.
+    period: u32,
     state: ExtraWindow,
     es: Es,
     /// Eighths to be spread over the frames of a pulse, less than ES.
@@ -303,7 +276,8 @@ impl Synchroniser {
     /// [`Error::PeriodTooShort`], [`Error::ExtraOutOfRange`] for more than 26 stuffing blocks.
     #[expect(clippy::arithmetic_side_effects, reason = "an ES is not 0")]
     pub fn new(period: u32, es: Es) -> Result<Self, Error> {
-        let divisor = u32::from(es.0);
+        // An ES is not 0; that is said where it divides, so that no panic is reachable.
+        let divisor = u32::from(es.get()).max(1);
         let (frame, remainder) = (period / divisor, period % divisor);
         // Window of 25..=72 eighths: 4..=9 bits.
         let Some(left) = frame.checked_sub(FRAME + 25) else {
@@ -311,16 +285,21 @@ impl Synchroniser {
         };
         let refuse = Error::ExtraOutOfRange { extra: left / 8 };
         let window = 25_u8.saturating_add((left % 48).to_le_bytes()[0]);
-        let stuffing = u8::try_from(left / 48).map_err(|_| refuse)?;
+        let stuffing = u8::try_from(left / 48).ok().and_then(Stuffing::new).ok_or(refuse)?;
         let edge = Extra::new(window).ok_or(refuse)?;
-        let state = ExtraWindow::new(edge, stuffing, i16::from(window))?;
-        Ok(Self { state, es, remainder: remainder.to_le_bytes()[0], frame: 0, spread: es.0 / 2 })
+        let state = ExtraWindow::new(edge, stuffing, i16::from(window));
+        Ok(Self { period, state, es, remainder: remainder.to_le_bytes()[0], frame: 0, spread: es.get() / 2 })
+    }
+
+    /// Eighths of a bit from pulse to pulse.
+    pub const fn period(&self) -> u32 {
+        self.period
     }
 
     /// Eighths from the start of the first frame to its sampling edge: start that long before a pulse.
     pub fn lead(&self) -> u32 {
         // SYNC, the two ones of SAMPLE, then the window.
-        u32::from(self.state.edge.edge()).saturating_add(64)
+        u32::from(self.state.edge.get()).saturating_add(64)
     }
 
     /// The window of the present frame.
@@ -333,7 +312,7 @@ impl Synchroniser {
         self.frame == 0
     }
 
-    /// Stuffing behind the present frame and the window of the next one; to be asked before the stuffing is sent, so
+    /// Stuffing after the present frame and the window of the next one; to be asked before the stuffing is sent, so
     /// that an exchange between both does not move the edge.
     ///
     /// `late` is time(pulse) - time(edge) in eighths, rounded, if the present frame is on a pulse and the pulse was
@@ -342,8 +321,8 @@ impl Synchroniser {
     pub fn next(&mut self, late: Option<i16>) -> Next {
         self.spread = self.spread.saturating_add(self.remainder);
         let mut adjust = 0;
-        if self.spread >= self.es.0 {
-            self.spread = self.spread.saturating_sub(self.es.0);
+        if self.spread >= self.es.get() {
+            self.spread = self.spread.saturating_sub(self.es.get());
             adjust = 1;
         }
         let limit = Self::MAX_CORRECTION;
@@ -352,15 +331,8 @@ impl Synchroniser {
         while self.state.step(adjust).is_err() && adjust != 0 {
             adjust = adjust.saturating_sub(adjust.signum());
         }
-        self.frame = if self.frame.saturating_add(1) >= self.es.0 { 0 } else { self.frame.saturating_add(1) };
+        self.frame = if self.frame.saturating_add(1) >= self.es.get() { 0 } else { self.frame.saturating_add(1) };
         Next { stuffing: self.state.stuffing, extra: self.state.edge }
-    }
-}
-
-#[cfg(feature = "arbitrary")]
-impl<'a> arbitrary::Arbitrary<'a> for Es {
-    fn arbitrary(from: &mut arbitrary::Unstructured<'a>) -> arbitrary::Result<Self> {
-        from.int_in_range(1..=10).map(Self)
     }
 }
 
@@ -371,15 +343,15 @@ mod tests {
 
     /// Eighths from the edge of one frame to that of the next.
     fn distance(before: Extra, next: Next) -> i64 {
-        let rest = i64::from(before.bits()) * 8 - i64::from(before.edge());
-        rest + 864 + 48 * i64::from(next.stuffing) + i64::from(next.extra.edge())
+        let rest = i64::from(before.bits()) * 8 - i64::from(before.get());
+        rest + 864 + 48 * i64::from(next.stuffing.get()) + i64::from(next.extra.get())
     }
 
     proptest! {
         /// 48 N + W is constant, the edge stays in range and comes after a constant time, limiter or not.
         #[test]
         fn invariants(edge in 25..=72_u8, n in 1..26_u8, window in 25..=72_i16, adjust in prop::collection::vec(-2..=2_i16, 60)) {
-            let mut state = ExtraWindow::new(Extra::new(edge).unwrap(), n, window).unwrap();
+            let mut state = ExtraWindow::new(Extra::new(edge).unwrap(), Stuffing::new(n).unwrap(), window);
             let sum = 48 * i64::from(n) + i64::from(window);
             let mut t = i64::from((edge - 1) % 8 + 1);
             for a in adjust {
@@ -387,17 +359,17 @@ mod tests {
                 if state.step(a).is_err() {
                     break;
                 }
-                prop_assert_eq!(48 * i64::from(state.stuffing()) + i64::from(state.window()), sum);
+                prop_assert_eq!(48 * i64::from(state.stuffing().get()) + i64::from(state.window()), sum);
                 let next = Next { stuffing: state.stuffing(), extra: state.extra() };
                 prop_assert_eq!(distance(before, next), 864 + sum + i64::from(a));
                 t = (t + i64::from(window) + i64::from(a) - 1).rem_euclid(8) + 1;
-                prop_assert_eq!(i64::from((state.extra().edge() - 1) % 8 + 1), t);
+                prop_assert_eq!(i64::from((state.extra().get() - 1) % 8 + 1), t);
             }
         }
 
         #[test]
         fn a_refused_step_changes_nothing(edge in 24..=72_u8, n in 0..=26_u8, window in -300..300_i16, adjust in -300..300_i16) {
-            let before = ExtraWindow::new(Extra::new(edge).unwrap(), n, window).unwrap();
+            let before = ExtraWindow::new(Extra::new(edge).unwrap(), Stuffing::new(n).unwrap(), window);
             let mut after = before;
             if after.step(adjust).is_err() {
                 prop_assert_eq!(after, before);

@@ -1,7 +1,9 @@
 //! The V-frame: eight H-frames carry the two safe channels, a byte each in every answer.
 
+use crate::answer::Answer;
+use crate::crc::RunningCrc16;
+use crate::error::Error;
 use crate::symbol::{Control, Reading, Rule, Word};
-use crate::{Answer, Error, crc16};
 
 /// The eight bytes of a safe channel.
 ///
@@ -16,18 +18,29 @@ use crate::{Answer, Error, crc16};
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct SafeBlock {
     bytes: [u8; 8],
+    /// Of the bytes before the CRC.
+    crc: RunningCrc16,
+    /// Words taken in order.
+    len: u8,
     bad: Option<Word>,
     top_is_mark: bool,
 }
 
 impl SafeBlock {
-    /// Takes the word of H-frame `at`, 0..=7.
-    pub(crate) fn put(&mut self, at: u8, reading: Reading, mark: Control, rule: Rule) {
+    /// Takes the word of H-frame `at`, 0..=7; only in order.
+    fn put(&mut self, rule: Rule, at: u8, reading: Reading, mark: Control) {
         if at == 0 {
             *self = Self::default();
         }
+        if at != self.len {
+            return;
+        }
+        self.len = self.len.saturating_add(1);
         if let Some(byte) = self.bytes.get_mut(usize::from(at)) {
             *byte = reading.raw();
+        }
+        if at < 6 {
+            self.crc.update(reading.raw());
         }
         if at == 1 {
             // The vendor's receiver looks at the value only.
@@ -65,23 +78,29 @@ impl SafeBlock {
     }
 
     /// Whether the CRC of the bytes as received is right.
-    pub fn crc_ok(self) -> bool {
-        let [covered @ .., _, _] = &self.bytes;
-        crc16(covered) == self.raw_crc()
+    pub const fn crc_ok(self) -> bool {
+        self.crc.finish() == self.raw_crc()
+    }
+
+    /// Whether words and CRC are good; whether the encoder has a position is another matter.
+    pub fn is_sound(self) -> bool {
+        matches!(self.position(), Ok(_) | Err(Error::PositionInvalid { .. }))
     }
 
     /// The safe position, 40 bits.
     ///
     /// # Errors
-    /// In this order: [`Error::InvalidWord`] for the first bad word, [`Error::Crc`], [`Error::PositionInvalid`] if the
-    /// encoder has no position: five K29.7 in channel 1, K27.7 first in channel 2. By [`Rule::Reduced`] the value of
-    /// the top byte alone decides that.
-    pub fn position(self) -> Result<u64, Error> {
-        if let Some(word) = self.bad {
-            return Err(Error::InvalidWord { word: word.bits() });
+    /// In this order: [`Error::Truncated`] before all eight words are there, [`Error::InvalidWord`] for the first bad word,
+    /// [`Error::Crc`], [`Error::PositionInvalid`] if the encoder has no position: five K29.7 in channel 1,
+    /// K27.7 first in channel 2. By [`Rule::Reduced`] the value of the top byte alone decides that.
+    pub const fn position(self) -> Result<u64, Error> {
+        if self.len != 8 {
+            return Err(Error::Truncated { got: self.len as u16, want: 8 });
         }
-        let [covered @ .., _, _] = &self.bytes;
-        let (got, want) = (self.raw_crc(), crc16(covered));
+        if let Some(word) = self.bad {
+            return Err(Error::InvalidWord { word: word.get() });
+        }
+        let (got, want) = (self.raw_crc(), self.crc.finish());
         if got != want {
             return Err(Error::Crc { got, want });
         }
@@ -104,17 +123,17 @@ pub struct VFrame {
 }
 
 impl VFrame {
-    /// Takes the answer of H-frame `at`, 0..=7; 0 begins anew.
-    pub fn put(&mut self, at: u8, answer: Answer, rule: Rule) {
-        self.safe1.put(at, answer.vertical(), Control::K29_7, rule);
-        self.safe2.put(at, answer.secondary(), Control::K27_7, rule);
+    /// Takes the answer of H-frame `at`, 0..=7, in order; 0 begins anew.
+    pub fn put(&mut self, rule: Rule, at: u8, answer: Answer) {
+        self.safe1.put(rule, at, answer.vertical(), Control::K29_7);
+        self.safe2.put(rule, at, answer.secondary(), Control::K27_7);
     }
 
     /// The V-frame of eight answers.
-    pub fn of(answers: &[Answer; 8], rule: Rule) -> Self {
+    pub fn of(rule: Rule, answers: &[Answer; 8]) -> Self {
         let mut frame = Self::default();
         for (at, answer) in (0..).zip(answers) {
-            frame.put(at, *answer, rule);
+            frame.put(rule, at, *answer);
         }
         frame
     }
@@ -123,8 +142,11 @@ impl VFrame {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::acceleration::DeltaDelta;
+    use crate::answer::Content;
+    use crate::crc::crc16;
+    use crate::parameter::{EncoderByte, EncoderSymbol};
     use crate::symbol::{Character, RunningDisparity};
-    use crate::{Content, DeltaDelta, EncoderByte, EncoderSymbol};
     use proptest::prelude::*;
 
     fn answers(block1: [Character; 8], block2: [Character; 8]) -> [u64; 8] {
@@ -163,7 +185,7 @@ mod tests {
             let b1 = block(Character::data(summary), data(p1));
             let b2 = block(Character::control(Control::K28_4), data(p2));
             let mut bits = answers(b1, b2);
-            let read = |bits: &[u64; 8]| VFrame::of(&bits.map(|b| Answer::from_bits(b, Rule::Strict)), Rule::Strict);
+            let read = |bits: &[u64; 8]| VFrame::of(Rule::Strict, &bits.map(|b| Answer::from_bits(Rule::Strict, b)));
             let good = read(&bits);
             prop_assert_eq!((good.safe1.position(), good.safe1.status()), (Ok(p1), summary));
             prop_assert_eq!((good.safe2.position(), good.safe2.status()), (Ok(p2), 0x9c));
@@ -187,13 +209,13 @@ mod tests {
         let b2 = block(Character::control(Control::K28_0), none2);
         let bits = answers(b1, b2);
         for rule in [Rule::Strict, Rule::Reduced] {
-            let frame = VFrame::of(&bits.map(|b| Answer::from_bits(b, rule)), rule);
+            let frame = VFrame::of(rule, &bits.map(|b| Answer::from_bits(rule, b)));
             assert_eq!(frame.safe1.position(), Err(Error::PositionInvalid { mark: 0xfd }));
             assert_eq!(frame.safe2.position(), Err(Error::PositionInvalid { mark: 0xfb }));
         }
         // A signed position may begin with FDh: by the tables that is no mark.
         let bits = answers(block(Character::data(0), data(0xfd_0000_0001)), b2);
-        let frame = |rule| VFrame::of(&bits.map(|b| Answer::from_bits(b, rule)), rule).safe1.position();
+        let frame = |rule| VFrame::of(rule, &bits.map(|b| Answer::from_bits(rule, b))).safe1.position();
         assert_eq!(frame(Rule::Strict), Ok(0xfd_0000_0001));
         assert_eq!(frame(Rule::Reduced), Err(Error::PositionInvalid { mark: 0xfd }));
     }

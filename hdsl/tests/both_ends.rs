@@ -5,29 +5,31 @@
 mod bench;
 
 use bench::Bench;
+use hdsl::cable::Disturbance;
+use hdsl::device::{Complement, Disparity, Overload};
 use hdsl::frame::Extra;
-use hdsl::line::Disturbance;
 use hdsl::master::{Cause, Master, State};
-use hdsl::message::{Access, Data, Length, LongRequest, RemoteRegister, ResourceAddress, ShortRequest};
-use hdsl::registers::{Interrupts, Online1, Online2, OnlineD, Register};
+use hdsl::message::{Access, Data, Length, LongRequest, RemoteRegister, ResourceAddress, ResourceError, ShortRequest};
+use hdsl::registers::{BusError, Event, Interrupts, Online1, Online2, OnlineD, Register, RegisterBus, RemoteReceiver};
+use hdsl::symbol::RunningDisparity;
 use hdsl::sync::{Es, Synchroniser};
-use hdsl::{Error, Profile};
+use hdsl::{Channel2Findings, Channel2Monitor, Dialect, Error};
 
-const PROFILES: [Profile; 2] = [Profile::SICK, Profile::TI];
+const DIALECTS: [Dialect; 2] = [Dialect::SICK, Dialect::TI];
 
 /// The link comes up in the documented number of frames, and position and speed are exact from then on.
 #[test]
 fn comes_up_at_every_length() {
-    for profile in PROFILES {
+    for dialect in DIALECTS {
         for (metres, delay) in [(0, 1), (10, 2), (50, 6), (100, 10)] {
-            let mut bench = Bench::on_cable(profile, metres);
+            let mut bench = Bench::on_cable(dialect, metres);
             bench.speed = -1234;
             // 2 RESET, 16 SYNC, 9 START, 9 LEARN, 16 CHECK, IDREQ, 8 INIT, 4 V-frames
             bench.frames(2 + 16 + 9 + 9 + 16 + 1 + 8);
             assert_eq!(bench.master.state(), State::Running);
             bench.frames(4 * 8);
             assert!(bench.aligned());
-            let map = bench.master.registers();
+            let map = bench.map;
             assert_eq!((map.velocity(), map.quality(), map.link()), (-1234, 15, true));
             assert_eq!(map.get::<1>(Register::Delay)[0] & 15, delay, "{metres} m");
             for _ in 0..1000 {
@@ -42,7 +44,7 @@ fn comes_up_at_every_length() {
 /// More than 11 bits of delay do not fit between the answer and the next frame.
 #[test]
 fn a_cable_that_is_too_long() {
-    let mut bench = Bench::on_cable(Profile::SICK, 130);
+    let mut bench = Bench::on_cable(Dialect::SICK, 130);
     bench.frames(18);
     let report = bench.frame();
     assert!(matches!(report.restarted, Some(Cause::Learn(Error::PatternNotFound { .. }))));
@@ -54,7 +56,7 @@ fn a_cable_that_is_too_long() {
 fn one_sample_of_jitter() {
     for eighths in 0..8 {
         let disturbance = Disturbance { delay: 16 + eighths, jitter: 1, ..Disturbance::default() };
-        let mut bench = Bench::new(Profile::SICK, 0x00153, disturbance);
+        let mut bench = Bench::new(Dialect::SICK, 0x00153, disturbance);
         bench.speed = 77;
         bench.lock();
         bench.frames(50_000);
@@ -67,46 +69,48 @@ fn one_sample_of_jitter() {
 /// Noise takes the quality down until the link is given up; without the noise it comes back by itself.
 #[test]
 fn noise_loses_the_link_and_silence_regains_it() {
-    for profile in PROFILES {
-        let mut bench = Bench::on_cable(profile, 20);
+    for dialect in DIALECTS {
+        let mut bench = Bench::on_cable(dialect, 20);
         bench.lock();
-        bench.line.disturbance.bit_errors = 20_000;
+        bench.cable.disturbance.bit_errors = 20_000;
         let mut lost = None;
         for _ in 0..5000 {
-            let before = *bench.master.registers();
+            let before = bench.map;
             if let Some(cause) = bench.frame().restarted {
                 lost = Some(cause);
-                assert!(before.link() && !bench.master.registers().link());
+                assert!(before.link() && !bench.map.link());
                 break;
             }
         }
         assert_eq!(lost, Some(Cause::Quality));
-        let map = bench.master.registers();
+        let map = bench.map;
         assert!(
-            map.online_d().has(OnlineD::PRST) && map.online_1().has(Online1::PRST) && map.online_2().has(Online2::PRST)
+            map.online_d().contains(OnlineD::PRST)
+                && map.online_1().contains(Online1::PRST)
+                && map.online_2().contains(Online2::PRST)
         );
         bench.frames(500);
-        bench.line.disturbance.bit_errors = 0;
+        bench.cable.disturbance.bit_errors = 0;
         bench.lock();
-        assert!(!bench.master.registers().online_d().has(OnlineD::PRST.with(OnlineD::POS).with(OnlineD::QMLW)));
+        assert!(!bench.map.online_d().intersects(OnlineD::PRST | OnlineD::POS | OnlineD::QMLW));
     }
 }
 
 /// Under moderate noise the link holds, and what it shows as aligned is right.
 #[test]
 fn moderate_noise_gives_no_wrong_safe_position() {
-    let mut bench = Bench::on_cable(Profile::SICK, 20);
+    let mut bench = Bench::on_cable(Dialect::SICK, 20);
     bench.speed = 5;
     bench.lock();
-    bench.line.disturbance.bit_errors = 200;
+    bench.cable.disturbance.bit_errors = 200;
     let mut shown = 0;
     for _ in 0..40_000 {
-        let report = bench.frame();
-        if report.interrupts.has(Interrupts::VPOS) {
+        let _ = bench.frame();
+        if bench.interrupts.contains(Interrupts::VPOS) {
             // That of the sampling edge before the V-frame, which ended one frame ago; a head that the encoder could
             // not read makes the V-frame longer.
             shown += 1;
-            let age = bench.position - bench.master.registers().safe_position() as i64;
+            let age = bench.position - bench.map.safe_position() as i64;
             assert!(age % 5 == 0 && (9 * 5..=16 * 5).contains(&age), "{age}");
         }
     }
@@ -114,7 +118,7 @@ fn moderate_noise_gives_no_wrong_safe_position() {
 }
 
 fn write_and_read() -> [LongRequest; 2] {
-    let address = ResourceAddress::USER;
+    let address = ResourceAddress::RWFILE;
     let write = Access::Write(Data::new(b"MOTOR 42").unwrap());
     let read = Access::Read(Length::Eight);
     [write, read].map(|access| LongRequest { address, indirect: true, offset: None, access })
@@ -123,8 +127,8 @@ fn write_and_read() -> [LongRequest; 2] {
 /// A short and a long message complete while the position keeps running.
 #[test]
 fn messages_while_the_position_runs() {
-    for profile in PROFILES {
-        let mut bench = Bench::on_cable(profile, 50);
+    for dialect in DIALECTS {
+        let mut bench = Bench::on_cable(dialect, 50);
         bench.speed = 3;
         bench.lock();
         for request in write_and_read() {
@@ -140,17 +144,17 @@ fn messages_while_the_position_runs() {
             }
             assert!(short.unwrap().is_ok() && long.unwrap().unwrap().result.is_ok());
         }
-        let map = bench.master.registers();
+        let map = bench.map;
         assert_eq!(&map.get::<8>(Register::PcBuffer), b"MOTOR 42");
         assert_eq!(bench.device.resources.register(RemoteRegister::PING), 0xa5);
     }
 }
 
-/// The order of the two error bytes in PC_BUFFER is the profile's; the typed result has names.
+/// The order of the two error bytes in PC_BUFFER is the dialect's; the typed result has names.
 #[test]
 fn a_refused_long_message() {
-    for (profile, bytes) in [(Profile::SICK, [0x10, 0x40]), (Profile::TI, [0x40, 0x10])] {
-        let mut bench = Bench::on_cable(profile, 0);
+    for (dialect, bytes) in [(Dialect::SICK, [0x10, 0x40]), (Dialect::TI, [0x40, 0x10])] {
+        let mut bench = Bench::on_cable(dialect, 0);
         bench.lock();
         let [_, read] = write_and_read();
         let unknown = LongRequest { address: ResourceAddress::new(0x200).unwrap(), ..read };
@@ -160,55 +164,55 @@ fn a_refused_long_message() {
             result = result.or(bench.frame().finished.long);
         }
         let refusal = result.unwrap().unwrap().result.unwrap_err();
-        assert_eq!((refusal.class, refusal.detail), (0x40, 0x10));
-        assert_eq!(bench.master.registers().get::<2>(Register::PcBuffer), bytes);
-        assert_eq!(bench.master.registers().get::<2>(Register::PcAdd), [0xf6, 0x00]);
+        assert_eq!(refusal, ResourceError::NOT_THERE);
+        assert_eq!(bench.map.get::<2>(Register::PcBuffer), bytes);
+        assert_eq!(bench.map.get::<2>(Register::PcAdd), [0xf6, 0x00]);
     }
 }
 
 /// What the encoder can do wrong, and what the receiver makes of it.
 #[test]
 fn faults_of_the_encoder() {
-    let faulty = |profile, change: fn(&mut hdsl::device::Faults)| {
-        let mut bench = Bench::on_cable(profile, 0);
+    let faulty = |dialect, change: fn(&mut hdsl::device::Faults)| {
+        let mut bench = Bench::on_cable(dialect, 0);
         bench.lock();
         change(&mut bench.device.faults);
         let mut cause = None;
         for _ in 0..100 {
             cause = cause.or(bench.frame().restarted);
         }
-        (cause, *bench.master.registers())
+        (cause, bench.map)
     };
-    for profile in PROFILES {
-        assert_eq!(faulty(profile, |f| f.silent = true).0, Some(Cause::Quality));
-        assert_eq!(faulty(profile, |f| f.no_vsync = true).0, Some(Cause::Quality));
-        let (cause, map) = faulty(profile, |f| f.no_position = true);
-        assert!(cause.is_none() && map.online_1().has(Online1::VPOS) && map.online_d().has(OnlineD::POS));
-        let (cause, map) = faulty(profile, |f| f.no_position_2 = true);
-        assert!(cause.is_none() && map.online_2().has(Online2::VPOS2) && !map.online_d().has(OnlineD::POS));
-        let (_, map) = faulty(profile, |f| f.bad_crc = true);
-        assert!(map.event_s().has(hdsl::registers::EventS::SCE));
+    for dialect in DIALECTS {
+        assert_eq!(faulty(dialect, |f| f.silent = true).0, Some(Cause::Quality));
+        assert_eq!(faulty(dialect, |f| f.no_vsync = true).0, Some(Cause::Quality));
+        let (cause, map) = faulty(dialect, |f| f.no_position = true);
+        assert!(cause.is_none() && map.online_1().contains(Online1::VPOS) && map.online_d().contains(OnlineD::POS));
+        let (cause, map) = faulty(dialect, |f| f.no_position_2 = true);
+        assert!(cause.is_none() && map.online_2().contains(Online2::VPOS2) && !map.online_d().contains(OnlineD::POS));
+        let (_, map) = faulty(dialect, |f| f.bad_crc = true);
+        assert!(map.event_s().contains(hdsl::registers::EventS::SCE));
     }
     // The manual counts a wrong CRC of channel 2, the SDK counts TEST2.
-    assert_eq!(faulty(Profile::SICK, |f| f.bad_crc_2 = true).0, Some(Cause::Quality));
-    let (cause, map) = faulty(Profile::TI, |f| f.bad_crc_2 = true);
-    assert!(cause.is_none() && map.online_2().has(Online2::SCE2));
-    let (cause, map) = faulty(Profile::SICK, |f| f.test_2 = true);
-    assert!(cause.is_none() && map.online_2().has(Online2::SUM2));
-    assert_eq!(faulty(Profile::TI, |f| f.test_2 = true).0, Some(Cause::Quality));
+    assert_eq!(faulty(Dialect::SICK, |f| f.bad_crc_2 = true).0, Some(Cause::Quality));
+    let (cause, map) = faulty(Dialect::TI, |f| f.bad_crc_2 = true);
+    assert!(cause.is_none() && map.online_2().contains(Online2::SCE2));
+    let (cause, map) = faulty(Dialect::SICK, |f| f.test_2 = true);
+    assert!(cause.is_none() && map.online_2().contains(Online2::SUM2));
+    assert_eq!(faulty(Dialect::TI, |f| f.test_2 = true).0, Some(Cause::Quality));
     // No acceleration: the SDK restarts after 31 words, the manual stops counting there.
-    assert_eq!(faulty(Profile::TI, |f| f.no_acceleration = true).0, Some(Cause::AccelerationErrors));
-    let (cause, map) = faulty(Profile::SICK, |f| f.no_acceleration = true);
+    assert_eq!(faulty(Dialect::TI, |f| f.no_acceleration = true).0, Some(Cause::AccelerationErrors));
+    let (cause, map) = faulty(Dialect::SICK, |f| f.no_acceleration = true);
     assert_eq!((cause, map.get::<1>(Register::AccErrCnt)), (None, [31]));
 }
 
 #[test]
 fn an_encoder_without_vsync() {
-    let mut bench = Bench::on_cable(Profile::SICK, 0);
+    let mut bench = Bench::on_cable(Dialect::SICK, 0);
     bench.device.faults.no_vsync = true;
     bench.frames(53 + 15);
     assert_eq!(bench.frame().restarted, Some(Cause::NoVsync));
-    let mut bench = Bench::on_cable(Profile::TI, 0);
+    let mut bench = Bench::on_cable(Dialect::TI, 0);
     bench.device.faults.no_vsync = true;
     bench.frames(1000);
     assert_eq!((bench.master.state(), bench.master.counters().restarts), (State::WaitVsync, 0));
@@ -217,7 +221,7 @@ fn an_encoder_without_vsync() {
 #[test]
 fn an_encoder_that_is_not_supported() {
     for id in [0x00150, 0x80153, 0x001f3] {
-        let mut bench = Bench::new(Profile::SICK, id, Disturbance::cable(0));
+        let mut bench = Bench::new(Dialect::SICK, id, Disturbance::metres(0));
         bench.frames(52);
         assert_eq!(bench.frame().restarted, Some(Cause::Identifier(Error::UnsupportedEncoder { id })));
     }
@@ -225,7 +229,7 @@ fn an_encoder_that_is_not_supported() {
 
 #[test]
 fn too_few_samples_change_nothing() {
-    let mut bench = Bench::on_cable(Profile::SICK, 0);
+    let mut bench = Bench::on_cable(Dialect::SICK, 0);
     bench.lock();
     let before = bench.master;
     for len in 0..72 {
@@ -237,13 +241,13 @@ fn too_few_samples_change_nothing() {
 
 /// Brings a synchronised link up against a pulse and gives the largest distance of the edge from it, in tenths of an
 /// eighth, after the link runs.
-fn synchronised(profile: Profile, period: i64, es: u8, metres: u32) -> i64 {
+fn synchronised(dialect: Dialect, period: i64, es: u8, metres: u32) -> i64 {
     let sync = Synchroniser::new((period / 10) as u32, Es::new(es).unwrap()).unwrap();
-    let mut bench = Bench::on_cable(profile, metres);
-    bench.master = Master::synchronised(profile, sync);
+    let mut bench = Bench::on_cable(dialect, metres);
+    bench.master = Master::synchronised(dialect, sync);
     bench.speed = 9;
     let (mut edge, mut pulse, mut worst) = (37_i64, 0_i64, 0);
-    let extra = |bench: &Bench| bench.master.transmission().head.extra().map_or(0, Extra::edge);
+    let extra = |bench: &Bench| bench.master.transmission().head.extra().map_or(0, Extra::get);
     for _ in 0..2000 {
         let on_pulse = bench.master.is_on_pulse();
         let late = on_pulse.then(|| (pulse - edge + 5).div_euclid(10) as i16);
@@ -256,7 +260,7 @@ fn synchronised(profile: Profile, period: i64, es: u8, metres: u32) -> i64 {
         let before = extra(&bench);
         let report = bench.frame_with(late);
         let rest = i64::from(before.div_ceil(8)) * 8 - i64::from(before);
-        let frame = rest + 864 + 48 * i64::from(report.tail.stuffing) + i64::from(extra(&bench));
+        let frame = rest + 864 + 48 * i64::from(report.tail.stuffing.get()) + i64::from(extra(&bench));
         edge += 10 * frame;
         assert!(report.restarted.is_none());
     }
@@ -266,14 +270,190 @@ fn synchronised(profile: Profile, period: i64, es: u8, metres: u32) -> i64 {
 
 #[test]
 fn synchronised_to_a_pulse() {
-    for profile in PROFILES {
+    for dialect in DIALECTS {
         for (tenths_of_us, es) in
             [(120, 1), (121, 1), (160, 1), (200, 1), (253, 1), (270, 1), (250, 2), (625, 5), (1250, 10)]
         {
             for metres in [0, 100] {
-                let worst = synchronised(profile, tenths_of_us * 75, es, metres);
+                let worst = synchronised(dialect, tenths_of_us * 75, es, metres);
                 assert!(worst <= 10, "{tenths_of_us} {es} {metres}: {worst}");
             }
         }
+    }
+}
+
+/// Everything that the documents leave to the encoder, in all combinations of extremes: the link comes up, position and
+/// messages are right.
+#[test]
+fn whatever_the_encoder_makes_of_open_points() {
+    for combination in 0..256_u32 {
+        let on = |bit: u32| combination >> bit & 1 == 1;
+        let mut bench = Bench::on_cable(DIALECTS[usize::from(on(0))], 10);
+        let behaviour = &mut bench.device.behaviour;
+        behaviour.overload = if on(1) { Overload::NoValue } else { Overload::Saturated };
+        behaviour.complement = if on(2) { Complement::Twos } else { Complement::Ones };
+        behaviour.second_shift = if on(2) { 8 } else { 0 };
+        behaviour.disparity = if on(3) { Disparity::EachAnswer(RunningDisparity::Plus) } else { Disparity::CarriedOn };
+        behaviour.reserved_bits = if on(4) { 3 } else { 0 };
+        behaviour.sync_frames = if on(5) { 16 } else { 1 };
+        behaviour.first_place = if on(6) { 5 } else { 0 };
+        behaviour.stalls_on_bad_head = on(7);
+        behaviour.latency = if on(7) { 300 } else { 0 };
+        bench.speed = -321;
+        bench.lock();
+        bench.master.start_short(ShortRequest::Write(RemoteRegister::PING, 0x5a)).unwrap();
+        let mut monitor = Channel2Monitor::new();
+        let mut answered = false;
+        for _ in 0..if on(7) { 500 } else { 60 } {
+            let report = bench.frame();
+            answered |= report.finished.short.is_some_and(|result| result.is_ok());
+            assert_eq!(bench.master.fast().map(|fast| (fast.position, fast.velocity)), Ok((bench.position, -321)));
+            let safe = bench.master.safe().unwrap();
+            assert_eq!(safe.position, bench.position + 321 * i64::from(safe.age), "{combination}");
+            if let Some(frame) = report.v_frame {
+                assert_eq!(monitor.v_frame(&frame), Channel2Findings::empty());
+            }
+        }
+        // A latency beyond 64 frames is a message that is not answered in time, and sent again.
+        assert!(answered != on(7) || bench.device.resources.register(RemoteRegister::PING) == 0x5a, "{combination}");
+    }
+}
+
+/// The safe position is the true one also while the acceleration channel is overloaded and the fast position lags.
+#[test]
+fn an_overload_is_no_wrong_position() {
+    for overload in [Overload::Saturated, Overload::NoValue] {
+        let mut bench = Bench::on_cable(Dialect::SICK, 0);
+        bench.device.behaviour.overload = overload;
+        bench.lock();
+        let mut positions = [bench.position; 16];
+        for frame in 0..400 {
+            // Jerks of ten thousand steps a frame, now and then.
+            bench.speed = if frame % 100 == 3 { 10_000 } else { 0 };
+            let _ = bench.frame();
+            positions.rotate_right(1);
+            positions[0] = bench.position;
+            if let Ok(safe) = bench.master.safe() {
+                assert_eq!(safe.position, positions[usize::from(safe.age)], "{frame}");
+            }
+            if overload == Overload::NoValue {
+                let fast = bench.master.fast();
+                assert!(fast.is_err() || fast.unwrap().position == bench.position, "{frame}");
+            }
+        }
+    }
+}
+
+/// An encoder that was not synchronised is silent; one that forgets requests is asked again.
+#[test]
+fn an_impolite_encoder() {
+    let mut bench = Bench::on_cable(Dialect::SICK, 0);
+    bench.device.behaviour.sync_frames = 17;
+    bench.frames(18);
+    assert_eq!(bench.frame().restarted, Some(Cause::Learn(Error::NoEdge)));
+
+    let mut bench = Bench::on_cable(Dialect::SICK, 0);
+    bench.lock();
+    bench.device.behaviour.forgets_every = 2;
+    for _ in 0..6 {
+        bench.master.start_short(ShortRequest::Read(RemoteRegister::PING)).unwrap();
+        let answered = (0..200).any(|_| bench.frame().finished.short.is_some_and(|result| result.is_ok()));
+        assert!(answered);
+    }
+}
+
+/// What the monitor of channel 2 says about each fault of it.
+#[test]
+fn channel_2_is_watched() {
+    type Change = fn(&mut hdsl::device::Faults);
+    let cases: [(Change, Channel2Findings); 6] = [
+        (|_| {}, Channel2Findings::empty()),
+        (|f| f.test_2 = true, Channel2Findings::TEST2),
+        (|f| f.error_2 = true, Channel2Findings::ERR2),
+        (|f| f.stuck_toggle = true, Channel2Findings::TOG2),
+        (|f| f.no_position_2 = true, Channel2Findings::VPOS2),
+        (|f| f.bad_crc_2 = true, Channel2Findings::STALE),
+    ];
+    for (change, want) in cases {
+        let mut bench = Bench::on_cable(Dialect::SICK, 0);
+        bench.lock();
+        change(&mut bench.device.faults);
+        let mut monitor = Channel2Monitor::new();
+        let mut all = Channel2Findings::empty();
+        for _ in 0..40 {
+            if let Some(frame) = bench.frame().v_frame {
+                all |= monitor.v_frame(&frame);
+            }
+        }
+        assert_eq!(all, want, "{want}");
+    }
+}
+
+/// Signed positions come with their sign.
+#[test]
+fn signed_positions() {
+    // 00153h with bit 10: 32 bits, signed.
+    let mut bench = Bench::new(Dialect::SICK, 0x00553, Disturbance::metres(0));
+    bench.position = 1000;
+    bench.speed = -7;
+    while bench.position > -5000 {
+        let _ = bench.frame();
+        if let Ok(fast) = bench.master.fast() {
+            assert_eq!(fast.position, bench.position);
+        }
+    }
+    let safe = bench.master.safe().unwrap();
+    assert_eq!(safe.position, bench.position + 7 * i64::from(safe.age));
+    assert!(bench.master.fast().unwrap().position < 0 && safe.position < 0);
+}
+
+/// The registers of a bench as a bus to a receiver elsewhere: every access lets some frames pass.
+impl RegisterBus for Bench {
+    type Error = Error;
+
+    fn read(&mut self, address: u8, bytes: &mut [u8]) -> Result<(), Error> {
+        self.frames(3);
+        for (at, byte) in (address..).zip(bytes) {
+            *byte = self.map.read(at).ok_or(Error::NoRegister { address: at })?;
+        }
+        Ok(())
+    }
+
+    fn write(&mut self, address: u8, bytes: &[u8]) -> Result<(), Error> {
+        self.frames(1);
+        (address..).zip(bytes).try_for_each(|(at, byte)| self.map.write(&mut self.master, at, *byte))
+    }
+}
+
+/// Typed messages, events and positions of a receiver that is reached through its registers only.
+#[test]
+fn a_receiver_behind_a_bus() {
+    for dialect in DIALECTS {
+        let mut bench = Bench::on_cable(dialect, 10);
+        bench.speed = 4;
+        bench.lock();
+        let mut remote = RemoteReceiver::new(dialect, bench);
+        remote.start_short(ShortRequest::Write(RemoteRegister::PING, 0x77)).unwrap();
+        assert_eq!(remote.start_short(ShortRequest::Read(RemoteRegister::PING)), Err(BusError::Link(Error::Busy)));
+        while remote.poll_short().unwrap().is_none() {}
+        remote.start_short(ShortRequest::Read(RemoteRegister::PING)).unwrap();
+        let data = (0..100).find_map(|_| remote.poll_short().unwrap());
+        assert_eq!(data, Some(0x77));
+
+        let [write, read] = write_and_read();
+        for (request, want) in [(write, &b""[..]), (read, b"MOTOR 42")] {
+            remote.start_long(&request).unwrap();
+            assert_eq!(remote.start_long(&request), Err(BusError::Link(Error::Busy)));
+            let data = (0..100).find_map(|_| remote.poll_long().unwrap()).unwrap();
+            assert_eq!(data.as_bytes(), want);
+        }
+        remote.start_long(&LongRequest::read(ResourceAddress::new(0x3ff).unwrap(), Length::Two)).unwrap();
+        let refused = (0..100).find_map(|_| remote.poll_long().err());
+        assert_eq!(refused, Some(BusError::Link(Error::Resource { error: ResourceError::NOT_THERE })));
+
+        let map = remote.registers().unwrap();
+        assert_eq!((map.velocity(), map.quality(), map.link()), (4, 15, true));
+        let _ = remote.take_events().unwrap();
+        assert!(!remote.take_events().unwrap().0.intersects(Event::FREL | Event::PRST));
     }
 }

@@ -5,18 +5,20 @@
 
 use nikon_aformat::device::{Device, Fault};
 use nikon_aformat::master::{Counters, Detection, Line, Progress, Step, Transaction};
-use nikon_aformat::{Alarm, BitRate, EncoderAddress, Error, FRAME_BITS, Operation, Profile, Request, Response, Window};
+use nikon_aformat::{
+    Alm, BitRate, EncoderAddress, Error, FRAME_BITS, Operation, Request, Resolution, Response, Window,
+};
 
 const RATE: BitRate = BitRate::Mbit4;
 
 fn main() -> Result<(), Error> {
     let address = EncoderAddress::truncate(2);
-    let optical = Profile::new(22, 16).unwrap_or_default();
+    let optical = Resolution::new(22, 16).unwrap_or_default();
     let mut encoder = Device::<1>::new(address, optical, RATE);
-    encoder.set_alarm(Alarm::Batt, true);
+    encoder.set_alarms(Alm::BATT, true);
 
-    let (ea, profile, mut now_ns) = find(&mut encoder)?;
-    println!("encoder {ea}: {} + {} bits", profile.st_bits(), profile.mt_bits());
+    let (ea, resolution, mut now_ns) = find(&mut encoder)?;
+    println!("encoder {ea}: {} + {} bits", resolution.st_bits(), resolution.mt_bits());
 
     let mut counters = Counters::new();
     let request = Request::new(ea, Operation::Abs40);
@@ -25,9 +27,9 @@ fn main() -> Result<(), Error> {
         encoder.set_position(0x3f_fff0 + cycle * 5, 41);
         // The cable is bad in the fourth cycle.
         encoder.set_fault(if cycle == 3 { Fault::FlipBit { at: 37 } } else { Fault::None });
-        let outcome = transact(&mut encoder, request, profile, now_ns);
+        let outcome = transact(&mut encoder, request, resolution, now_ns);
         counters.record(&outcome);
-        match outcome.and_then(|reply| Ok((profile.position(reply.abs().unwrap_or(0), 40)?, reply.es()))) {
+        match outcome.and_then(|raw| Ok((resolution.position(raw.abs().unwrap_or(0), 40)?, raw.es()))) {
             Ok((position, es)) => {
                 let es = es.unwrap_or_default();
                 println!("{cycle}: turn {:>3}, {:>7} counts, status {es}", position.turns, position.single_turn);
@@ -40,29 +42,29 @@ fn main() -> Result<(), Error> {
 }
 
 /// Address and widths of the only encoder on the line, and when that was known.
-fn find(encoder: &mut Device<1>) -> Result<(EncoderAddress, Profile, u64), Error> {
+fn find(encoder: &mut Device<1>) -> Result<(EncoderAddress, Resolution, u64), Error> {
     let mut detection = Detection::search();
     let mut step = detection.start(0);
     loop {
         match step {
             Step::Send { request, not_before_ns } => {
                 println!("   {} to encoder {}", request.command(), request.ea);
-                let outcome = transact(encoder, request, Profile::default(), not_before_ns);
-                step = detection.answer(outcome, not_before_ns + 100_000);
+                let outcome = transact(encoder, request, Resolution::default(), not_before_ns);
+                step = detection.receive(outcome, not_before_ns + 100_000);
             }
-            Step::Done { value, not_before_ns } => {
-                let profile = value.profile.ok_or(Error::NotCarried)?;
-                return Ok((value.ea, profile, not_before_ns));
+            Step::Done { value, ready_ns } => {
+                let resolution = value.resolution.ok_or(Error::NotCarried)?;
+                return Ok((value.ea, resolution, ready_ns));
             }
             Step::Failed { error, .. } => return Err(error),
         }
     }
 }
 
-/// One request and its reply, the frames carried from one end to the other.
-fn transact(encoder: &mut Device<1>, request: Request, profile: Profile, now_ns: u64) -> Result<Response, Error> {
+/// One request and its response, the frames carried from one end to the other.
+fn transact(encoder: &mut Device<1>, request: Request, resolution: Resolution, now_ns: u64) -> Result<Response, Error> {
     let line = Line::new(RATE);
-    let mut transaction = Transaction::start(request, profile, line, now_ns);
+    let mut transaction = Transaction::start(request, resolution, line, now_ns);
     let frame_ns = u64::from(RATE.bits_ns(FRAME_BITS));
     let mut at_ns = now_ns;
     let mut answer = None;
@@ -83,9 +85,9 @@ fn transact(encoder: &mut Device<1>, request: Request, profile: Profile, now_ns:
         }
     }
     match transaction.poll(now_ns + 10_000_000) {
-        Progress::Done(response) => Ok(response),
-        Progress::Failed(error) => Err(error),
-        Progress::Waiting { .. } => unreachable!("10 ms are longer than any time-out"),
+        Progress::Done { value, .. } => Ok(value.response),
+        Progress::Failed { error, .. } => Err(error),
+        Progress::Pending { .. } => unreachable!("10 ms are longer than any time-out"),
     }
 }
 

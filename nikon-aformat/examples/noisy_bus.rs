@@ -6,11 +6,11 @@
 #![allow(clippy::cast_precision_loss, clippy::cast_sign_loss, unreachable_pub)]
 
 use nikon_aformat::bus::{Addresses, Bus};
-use nikon_aformat::device::{Answer, Device, Encoders};
+use nikon_aformat::device::{Device, Encoders, Transmission};
 use nikon_aformat::reception::LineReceiver;
 use nikon_aformat::{
-    BitOrder, BitRate, EncoderAddress, Error, FRAME_BITS, Layout, Operation, Profile, Reply, Request, RequestFrame,
-    Window,
+    BitOrder, BitRate, EncoderAddress, Error, FRAME_BITS, Layout, Operation, RawResponse, Request, RequestFrame,
+    Resolution, Window,
 };
 use nrz_line::Samples;
 
@@ -22,7 +22,7 @@ fn main() {
     println!("{transactions} transactions with 8 encoders, {per_million} wrong bits in a million");
     println!("{tally:#?}");
     println!(
-        "wrong and accepted: {} of {} replies. Those on the grid have three wrong bits or more that make a multiple of the\n\
+        "wrong and accepted: {} of {} raws. Those on the grid have three wrong bits or more that make a multiple of the\n\
          generator; the others were put together from frames that begin at a wrong edge, and 1 in 256 of such passes\n\
          any 8-bit check.",
         tally.unseen_by_crc + tally.slipped,
@@ -30,10 +30,10 @@ fn main() {
     );
 }
 
-/// What became of the replies.
+/// What became of the responses.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct Tally {
-    /// Replies that the encoders sent.
+    /// Responses that the encoders sent.
     pub sent: u64,
     /// Accepted and as sent.
     pub good: u64,
@@ -41,23 +41,24 @@ pub struct Tally {
     pub lost: u64,
     /// Requests that no encoder understood.
     pub unheard: u64,
-    /// Accepted and not as sent, on the grid of the reply: three wrong content bits or more.
+    /// Accepted and not as sent, on the grid of the response: three wrong content bits or more.
     pub unseen_by_crc: u64,
-    /// Fewest wrong content bits of those; no reply with one or two is ever accepted.
+    /// Fewest wrong content bits of those; no response with one or two is ever accepted.
     pub fewest_bits: Option<u32>,
-    /// Accepted from a place where no reply was: a wrong edge was taken for a start bit.
+    /// Accepted from a place where no response was: a wrong edge was taken for a start bit.
     pub slipped: u64,
 }
 
-/// Idle line before the first reply and behind the last.
+/// Idle line before the first response and behind the last.
 const MARGIN: usize = 30;
 
 /// A million transactions take some seconds in release.
 pub fn run(transactions: u64, per_million: u64, seed: u64) -> Tally {
-    let profile = Profile::default();
+    let resolution = Resolution::default();
     let request = Request::new(EncoderAddress::MAX, Operation::Abs40Mt);
-    let expected = request.expected(profile);
-    let mut encoders = Encoders { all: EncoderAddress::ALL.map(|ea| Device::<1>::new(ea, profile, BitRate::Mbit16)) };
+    let expected = request.expected(resolution);
+    let mut encoders =
+        Encoders { all: EncoderAddress::ALL.map(|ea| Device::<1>::new(ea, resolution, BitRate::Mbit16)) };
     let mut noise = Noise::new(seed, per_million);
     let mut tally = Tally::default();
     for cycle in 0..transactions {
@@ -71,15 +72,15 @@ pub fn run(transactions: u64, per_million: u64, seed: u64) -> Tally {
         let mut line = Line::of(&answers);
         line.disturb(&mut noise);
         let mut bus = Bus::new(expected, Addresses::ALL);
-        let mut receiver = LineReceiver::bits(Layout::Abs40).on_bus();
+        let mut receiver = LineReceiver::bits(Layout::Abs40);
         let mut good = 0;
         for word in &line.words {
             let mut samples = Samples::new(*word);
             while !samples.is_empty() {
-                let Some(reply) = receiver.feed(&mut samples) else { continue };
-                let arrival = bus.push(reply);
-                if let (Ok(reply), Ok(_)) = (reply, arrival.outcome) {
-                    good += u64::from(line.judge(&reply, &answers, &mut tally));
+                let Some(raw) = receiver.feed(&mut samples) else { continue };
+                let arrival = bus.push(raw);
+                if let (Ok(raw), Ok(_)) = (raw, arrival.outcome) {
+                    good += u64::from(line.judge(&raw, &answers, &mut tally));
                 }
             }
         }
@@ -92,7 +93,7 @@ pub fn run(transactions: u64, per_million: u64, seed: u64) -> Tally {
 }
 
 /// Sends the request, noise included, and gives what the encoders answer.
-fn ask(encoders: &mut Encoders<8, 1>, request: Request, noise: &mut Noise, now_ns: u64) -> [Option<Answer>; 8] {
+fn ask(encoders: &mut Encoders<8, 1>, request: Request, noise: &mut Noise, now_ns: u64) -> [Option<Transmission>; 8] {
     let mut answers = [None; 8];
     for frame in request.emit().as_slice() {
         let bits = noise.flips(FRAME_BITS as usize).fold(frame.line().bits(), |bits, at| bits ^ 1 << at);
@@ -108,14 +109,14 @@ fn ask(encoders: &mut Encoders<8, 1>, request: Request, noise: &mut Noise, now_n
 /// The answers on one line, a bit a sample.
 struct Line {
     words: Vec<u64>,
-    /// Where the replies begin.
+    /// Where the responses begin.
     starts: [Option<usize>; 8],
 }
 
 impl Line {
-    fn of(answers: &[Option<Answer>; 8]) -> Self {
+    fn of(answers: &[Option<Transmission>; 8]) -> Self {
         let first_ns = answers.iter().flatten().map(|answer| answer.at_ns).min().unwrap_or(0);
-        let place = |answer: &Answer| {
+        let place = |answer: &Transmission| {
             MARGIN + ((answer.at_ns - first_ns) * 1000 / u64::from(BitRate::Mbit16.bit_ps())) as usize
         };
         let starts = answers.map(|answer| answer.as_ref().map(place));
@@ -139,25 +140,25 @@ impl Line {
         }
     }
 
-    /// The line bits as they were received, at the place of a reply.
+    /// The line bits as they were received, at the place of a response.
     fn received(&self, start: usize) -> Window {
         let bytes: Vec<u8> = self.words.iter().flat_map(|word| word.to_le_bytes()).collect();
         Window::read(&bytes, start, Layout::Abs40.line_bits(), BitOrder::LsbFirst).unwrap_or(Window::EMPTY)
     }
 
-    /// Whether an accepted reply is one that was sent; if not, counts why it was accepted.
-    fn judge(&self, reply: &Reply, answers: &[Option<Answer>; 8], tally: &mut Tally) -> bool {
-        let sent = answers.iter().flatten().map(|answer| answer.reply);
-        if sent.clone().any(|sent| sent == *reply) {
+    /// Whether an accepted response is one that was sent; if not, counts why it was accepted.
+    fn judge(&self, raw: &RawResponse, answers: &[Option<Transmission>; 8], tally: &mut Tally) -> bool {
+        let sent = answers.iter().flatten().map(|answer| answer.raw);
+        if sent.clone().any(|sent| sent == *raw) {
             return true;
         }
-        let on_grid = |start: &usize| Reply::from_line(self.received(*start), Layout::Abs40) == Ok(*reply);
+        let on_grid = |start: &usize| RawResponse::from_line(Layout::Abs40, self.received(*start)) == Ok(*raw);
         let place = self.starts.iter().position(|start| start.as_ref().is_some_and(on_grid));
         let Some(sent) = place.and_then(|place| answers.get(place).copied().flatten()) else {
             tally.slipped += 1;
             return false;
         };
-        let wrong = (sent.reply.line().bits() ^ reply.line().bits()).count_ones();
+        let wrong = (sent.raw.line().bits() ^ raw.line().bits()).count_ones();
         tally.unseen_by_crc += 1;
         tally.fewest_bits = Some(tally.fewest_bits.map_or(wrong, |fewest| fewest.min(wrong)));
         false

@@ -1,17 +1,23 @@
+use core::fmt;
+
 use nrz_line::{BitOrder, Window};
 
 use crate::crc::mirrored8;
+use crate::error::Error;
+use crate::expected::{Expected, SYNC_CODE};
 use crate::frame::{DELIMITER, START};
-use crate::{Data, EncoderAddress, EncoderStatus, Error, Expected, Layout, Reply, Response, U40};
+use crate::layout::Layout;
+use crate::number::{EncoderAddress, U40};
+use crate::raw_response::RawResponse;
+use crate::status::EncoderStatus;
 
-/// The reply with the whole position, decoded from its line bits in the fewest instructions: for the interrupt of a drive.
+/// The response with the whole position, decoded from its line bits in the fewest instructions: for the interrupt of a drive.
 ///
 /// ```text
 ///  line bits  0 ........ 17 | 18 ....... 35 | 36 ....... 53 | 54 ....... 71
 ///             IF             | abs 0..=15    | abs 16..=31   | abs 32..=39, CRC-8
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "arbitrary", derive(arbitrary::Arbitrary))]
 pub struct Abs40 {
@@ -28,16 +34,18 @@ const FRAMING: [u32; 3] = words((START | DELIMITER) & ALL);
 const FRAMED: [u32; 3] = words(DELIMITER & ALL);
 const ALL: u128 = (1 << 72) - 1;
 
+/// The 72 lowest bits in the three words of a 32-bit core.
+#[inline(always)]
 #[expect(clippy::cast_possible_truncation, reason = "the number is taken apart")]
-const fn words(bits: u128) -> [u32; 3] {
+pub(crate) const fn words(bits: u128) -> [u32; 3] {
     [bits as u32, (bits >> 32) as u32, (bits >> 64) as u32]
 }
 
 impl Abs40 {
-    /// Bytes that hold the line bits of the reply.
+    /// Bytes that hold the line bits of the response.
     pub const LINE_BYTES: usize = 9;
 
-    /// Decodes the reply from its 72 line bits, the first of them at the beginning of `line`. `expected` is of layout
+    /// Decodes the response from its 72 line bits, the first of them at the beginning of `line`. `expected` is of layout
     /// [`Layout::Abs40`]; its address and command are checked.
     ///
     /// For a window at another bit offset see [`Response::parse_line`], which gives the same.
@@ -45,8 +53,16 @@ impl Abs40 {
     /// # Errors
     /// As [`Response::parse_line`].
     #[inline(always)]
-    pub fn parse_line(line: &[u8; Self::LINE_BYTES], order: BitOrder, expected: &Expected) -> Result<Self, Error> {
-        let [w0, w1, w2] = load(line, order);
+    pub fn parse_line(expected: &Expected, line: &[u8; Self::LINE_BYTES], order: BitOrder) -> Result<Self, Error> {
+        match Self::of_words(expected, load(line, order)) {
+            Some(value) => Ok(value),
+            None => Err(refusal(expected, line, order)),
+        }
+    }
+
+    /// The line bits as three words, the first bit in bit 0 of the first; `None` if any check fails.
+    #[inline(always)]
+    pub(crate) fn of_words(expected: &Expected, [w0, w1, w2]: [u32; 3]) -> Option<Self> {
         let ([m0, m1, m2], [f0, f1, f2]) = (FRAMING, FRAMED);
         let framing = (w0 & m0 ^ f0) | (w1 & m1 ^ f1) | (w2 & m2 ^ f2);
         let b = [
@@ -59,20 +75,34 @@ impl Abs40 {
             byte(w1 >> 23),
             byte(w1 >> 31 | w2 << 1),
         ];
-        let [b0, b1, b2, b3, b4, b5, b6, _] = b;
         // All checks at once: a branch for each would cost more than it saves.
-        let first = expected.differs_first(u16::from_le_bytes([b0, b1]));
-        if framing | u32::from(mirrored8(b)) | u32::from(first) != 0 {
-            return Err(refusal(line, order, expected));
-        }
-        let (ea, es) = (EncoderAddress::truncate(b0 >> 3), EncoderStatus::new(b1 >> 4));
-        Ok(Self { ea, es, abs: U40::from_bytes([b2, b3, b4, b5, b6]) })
+        Self::of_bytes(expected, b, framing)
     }
 
-    /// The 72 line bits of the reply to the command that `expected` names.
+    /// From the content bits of the four frames; `None` if any check fails.
+    #[inline(always)]
+    pub(crate) fn of_contents(expected: &Expected, [c0, c1, c2, c3]: [u16; 4]) -> Option<Self> {
+        let ([b0, b1], [b2, b3]) = (c0.to_le_bytes(), c1.to_le_bytes());
+        let ([b4, b5], [b6, b7]) = (c2.to_le_bytes(), c3.to_le_bytes());
+        Self::of_bytes(expected, [b0, b1, b2, b3, b4, b5, b6, b7], 0)
+    }
+
+    #[inline(always)]
+    fn of_bytes(expected: &Expected, bytes: [u8; 8], framing: u32) -> Option<Self> {
+        let [b0, b1, b2, b3, b4, b5, b6, _] = bytes;
+        let first = expected.differs_first(u16::from_le_bytes([b0, b1]));
+        if framing | u32::from(mirrored8(bytes)) | u32::from(first) != 0 {
+            return None;
+        }
+        let (ea, es) = (EncoderAddress::truncate(b0 >> 3), EncoderStatus::from_bits_truncate(b1 >> 4));
+        Some(Self { ea, es, abs: U40::from_le_bytes([b2, b3, b4, b5, b6]) })
+    }
+
+    /// The 72 line bits of the response to the command that `expected` names.
     pub fn emit_line(self, order: BitOrder, expected: &Expected) -> [u8; Self::LINE_BYTES] {
-        let response = Response::new(self.ea, expected.command(), self.es, Data::Abs40 { abs: self.abs });
-        match response.emit().line().to_bytes(order).first_chunk() {
+        let head = u128::from(SYNC_CODE) | u128::from(self.ea.get()) << 3 | u128::from(expected.command().code()) << 6;
+        let payload = head | u128::from(self.es.bits() & 0xf) << 12 | u128::from(self.abs.get()) << 16;
+        match RawResponse::of_payload(payload, Layout::Abs40).line().to_bytes(order).first_chunk() {
             Some(bytes) => *bytes,
             // Never: 9 of 16 bytes.
             None => [0; Self::LINE_BYTES],
@@ -98,21 +128,30 @@ const fn byte(word: u32) -> u8 {
     word as u8
 }
 
-/// Off the hot path: why a reply is refused.
+/// Off the hot path: why a response is refused.
 #[cold]
 #[inline(never)]
-fn refusal(line: &[u8; Abs40::LINE_BYTES], order: BitOrder, expected: &Expected) -> Error {
+fn refusal(expected: &Expected, line: &[u8; Abs40::LINE_BYTES], order: BitOrder) -> Error {
     let line = Window::read(line, 0, Layout::Abs40.line_bits(), order).unwrap_or(Window::EMPTY);
-    match Reply::from_line(line, Layout::Abs40) {
-        Ok(reply) => expected.refusal(&reply),
+    match RawResponse::from_line(Layout::Abs40, line) {
+        Ok(raw) => expected.refusal(&raw),
         Err(error) => error,
     }
 }
 
+impl fmt::Display for Abs40 {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "from {}: ES {} ABS {:#012x}", self.ea, self.es, self.abs.get())
+    }
+}
+
+crate::text::format_as_displayed!(Abs40);
+
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::Command;
+    use crate::command::Command;
+    use crate::response::Response;
     use proptest::prelude::*;
 
     proptest! {
@@ -123,25 +162,25 @@ mod tests {
             let expected = Expected::new(Layout::Abs40, Command::Abs40).from_address(EncoderAddress::truncate(ea));
             let same = |line: [u8; 9]| {
                 let window = Window::read(&line, 0, 72, order).unwrap();
-                let whole = Response::parse_line(window, &expected).map(|response| Abs40 {
+                let whole = Response::parse_line(&expected, window).map(|response| Abs40 {
                     ea: response.ea,
                     es: response.es().unwrap(),
                     abs: response.abs40().unwrap(),
                 });
-                prop_assert_eq!(Abs40::parse_line(&line, order, &expected), whole);
+                prop_assert_eq!(Abs40::parse_line(&expected, &line, order), whole);
                 Ok(())
             };
             same(line)?;
-            let reply = Abs40 { ea: EncoderAddress::truncate(ea), es: EncoderStatus::new(es), abs: U40::truncate(value) };
-            let mut good = reply.emit_line(order, &expected);
-            prop_assert_eq!(Abs40::parse_line(&good, order, &expected), Ok(reply));
+            let raw = Abs40 { ea: EncoderAddress::truncate(ea), es: EncoderStatus::from_bits_truncate(es), abs: U40::truncate(value) };
+            let mut good = raw.emit_line(order, &expected);
+            prop_assert_eq!(Abs40::parse_line(&expected, &good, order), Ok(raw));
             if let Some(byte) = good.get_mut(damage as usize / 8) {
                 *byte ^= 1 << (damage % 8);
             }
             same(good)?;
-            let other = Abs40 { ea: EncoderAddress::truncate(ea + 1), ..reply };
+            let other = Abs40 { ea: EncoderAddress::truncate(ea + 1), ..raw };
             same(other.emit_line(order, &expected))?;
-            same(reply.emit_line(order, &Expected::new(Layout::Abs40, Command::Abs40Mt)))?;
+            same(raw.emit_line(order, &Expected::new(Layout::Abs40, Command::Abs40Mt)))?;
         }
     }
 }

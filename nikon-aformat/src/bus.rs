@@ -1,27 +1,31 @@
 //! Several encoders answering one request.
 //!
 //! ```text
-//!  line, time →   request | reply of encoder 0 | gap | reply of encoder 1 | gap | ...
+//!  line, time →   request | response of encoder 0 | gap | response of encoder 1 | gap | ...
 //! ```
 //!
-//! Every encoder sends a whole reply with a CRC-8 of its own, one behind the other. Ascending order is what everybody
-//! assumes and no document says, so a reply is taken for the encoder that its information field names. A reply
+//! Every encoder sends a whole response with a CRC-8 of its own, one behind the other. Ascending order is what everybody
+//! assumes and no document says, so a response is taken for the encoder that its information field names. A response
 //! that is missing, damaged, doubled or uncalled for is reported and costs nothing but itself.
 //!
 //! ```
-//! use nikon_aformat::bus::{Addresses, Answer, Bus};
+//! use nikon_aformat::bus::{Addresses, Outcome, Bus};
 //! use nikon_aformat::{Command, Data, EncoderAddress, EncoderStatus, Expected, Layout, Response, U24};
 //!
 //! let [first, second, ..] = EncoderAddress::ALL;
 //! let mut bus = Bus::new(Expected::new(Layout::Abs24, Command::Abs24LowMt), Addresses::first(2));
 //! let data = Data::Abs24 { abs: U24::truncate(77) };
-//! let reply = Response::new(first, Command::Abs24LowMt, EncoderStatus::NONE, data);
-//! bus.push(Ok(reply.emit()));
-//! assert_eq!(bus.of(first), Answer::Good(reply));
-//! assert_eq!(bus.of(second), Answer::Missing);
+//! let raw = Response::new(first, Command::Abs24LowMt, EncoderStatus::empty(), data);
+//! bus.push(Ok(raw.emit()));
+//! assert_eq!(bus.of(first), Outcome::Good(raw));
+//! assert_eq!(bus.of(second), Outcome::Missing);
 //! ```
 
-use crate::{EncoderAddress, Error, Expected, Reply, Response};
+use crate::error::Error;
+use crate::expected::Expected;
+use crate::number::EncoderAddress;
+use crate::raw_response::RawResponse;
+use crate::response::Response;
 
 /// A set of encoder addresses.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
@@ -99,35 +103,35 @@ impl Addresses {
 /// What came from one address.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub enum Answer {
+pub enum Outcome {
     /// Nothing good, and nothing was asked for.
     NotAsked,
-    /// One good reply.
+    /// One good response.
     Good(Response),
-    /// A good reply from an address that was not asked.
+    /// A good response from an address that was not asked.
     Extra(Response),
-    /// Two good replies or more: two encoders have the same address, or one has been given a wrong one.
+    /// Two good responses or more: two encoders have the same address, or one has been given a wrong one.
     Duplicate {
         /// The first of them.
         first: Response,
     },
-    /// No good reply. If damaged ones came, one of them may have been this encoder's: see [`Bus::damaged`].
+    /// No good response. If damaged ones came, one of them may have been this encoder's: see [`Bus::damaged`].
     Missing,
 }
 
-/// What was made of one reply.
+/// What was made of one response.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Arrival {
-    /// The reply, all checks passed, or why it was refused.
+    /// The response, all checks passed, or why it was refused.
     pub outcome: Result<Response, Error>,
-    /// Whether a good reply from this address came before.
+    /// Whether a good response from this address came before.
     pub duplicate: bool,
     /// Whether this address was not asked.
     pub extra: bool,
 }
 
-/// The replies to one multi-response request, as they arrive.
+/// The responses to one multi-response request, as they arrive.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Bus {
@@ -140,16 +144,20 @@ pub struct Bus {
 }
 
 impl Bus {
-    /// Replies of this kind are expected from these addresses.
+    /// Responses of this kind are expected from these addresses.
     pub const fn new(expected: Expected, asked: Addresses) -> Self {
         let expected = expected.any_address();
         Self { expected, asked, good: [None; 8], doubled: Addresses::NONE, arrived: 0, damaged: 0 }
     }
 
-    /// A reply has arrived, or was cut or broken.
-    pub fn push(&mut self, reply: Result<Reply, Error>) -> Arrival {
+    /// A response has arrived, or was cut or broken.
+    pub fn push(&mut self, raw: Result<RawResponse, Error>) -> Arrival {
+        self.take(raw.and_then(|raw| Response::parse(&self.expected, &raw)))
+    }
+
+    /// A response that was judged already.
+    pub(crate) fn take(&mut self, outcome: Result<Response, Error>) -> Arrival {
         self.arrived = self.arrived.saturating_add(1);
-        let outcome = reply.and_then(|reply| Response::parse(&reply, &self.expected));
         let (mut duplicate, mut extra) = (false, false);
         match outcome {
             Ok(response) => {
@@ -168,20 +176,20 @@ impl Bus {
     }
 
     /// What came from this address.
-    pub fn of(&self, ea: EncoderAddress) -> Answer {
+    pub fn of(&self, ea: EncoderAddress) -> Outcome {
         match self.good.get(usize::from(ea.get())).copied().flatten() {
-            Some(first) if self.doubled.has(ea) => Answer::Duplicate { first },
-            Some(response) if self.asked.has(ea) => Answer::Good(response),
-            Some(response) => Answer::Extra(response),
-            None if self.asked.has(ea) => Answer::Missing,
-            None => Answer::NotAsked,
+            Some(first) if self.doubled.has(ea) => Outcome::Duplicate { first },
+            Some(response) if self.asked.has(ea) => Outcome::Good(response),
+            Some(response) => Outcome::Extra(response),
+            None if self.asked.has(ea) => Outcome::Missing,
+            None => Outcome::NotAsked,
         }
     }
 
-    /// The good reply of this address, if there is exactly one and it was asked for.
+    /// The good response of this address, if there is exactly one and it was asked for.
     pub fn response(&self, ea: EncoderAddress) -> Option<Response> {
         match self.of(ea) {
-            Answer::Good(response) => Some(response),
+            Outcome::Good(response) => Some(response),
             _ => None,
         }
     }
@@ -193,41 +201,41 @@ impl Bus {
 
     /// The addresses that were asked and sent nothing good.
     pub fn missing(&self) -> Addresses {
-        self.select(|answer| answer == Answer::Missing)
+        self.select(|answer| answer == Outcome::Missing)
     }
 
-    /// The addresses that sent two good replies or more.
+    /// The addresses that sent two good responses or more.
     pub const fn duplicates(&self) -> Addresses {
         self.doubled
     }
 
-    /// The addresses that sent a good reply and were not asked.
+    /// The addresses that sent a good response and were not asked.
     pub fn extra(&self) -> Addresses {
-        let good = self.select(|answer| matches!(answer, Answer::Extra(_) | Answer::Duplicate { .. }));
+        let good = self.select(|answer| matches!(answer, Outcome::Extra(_) | Outcome::Duplicate { .. }));
         good.without(self.asked)
     }
 
-    /// Replies that arrived, good or not.
+    /// Responses that arrived, good or not.
     pub const fn arrived(&self) -> u8 {
         self.arrived
     }
 
-    /// Replies that were refused; their address cannot be trusted.
+    /// Responses that were refused; their address cannot be trusted.
     pub const fn damaged(&self) -> u8 {
         self.damaged
     }
 
-    /// How many fewer replies arrived than were asked for, good or not: so many never started.
+    /// How many fewer responses arrived than were asked for, good or not: so many never started.
     pub const fn not_started(&self) -> u8 {
         self.asked.len().saturating_sub(self.arrived)
     }
 
-    /// Whether as many replies arrived as were asked for, so that there is nothing left to wait for.
-    pub const fn is_complete(&self) -> bool {
-        self.not_started() == 0
+    /// Whether every address that was asked has sent a good response.
+    pub fn heard_all(&self) -> bool {
+        self.missing().is_empty()
     }
 
-    fn select(&self, wanted: impl Fn(Answer) -> bool) -> Addresses {
+    fn select(&self, wanted: impl Fn(Outcome) -> bool) -> Addresses {
         EncoderAddress::ALL.into_iter().filter(|ea| wanted(self.of(*ea))).fold(Addresses::NONE, Addresses::with)
     }
 }
@@ -235,14 +243,18 @@ impl Bus {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{Command, Data, EncoderStatus, Layout, U24};
+    use crate::command::Command;
+    use crate::data::Data;
+    use crate::layout::Layout;
+    use crate::status::EncoderStatus;
     use proptest::prelude::*;
+    use servowire_core::U24;
 
     const COMMAND: Command = Command::Abs24LowMt;
 
     fn response(ea: u8, abs: u32) -> Response {
         let data = Data::Abs24 { abs: U24::truncate(abs) };
-        Response::new(EncoderAddress::truncate(ea), COMMAND, EncoderStatus::NONE, data)
+        Response::new(EncoderAddress::truncate(ea), COMMAND, EncoderStatus::empty(), data)
     }
 
     fn bus(asked: Addresses) -> Bus {
@@ -265,32 +277,33 @@ mod tests {
         let [a0, a1, a2, _, _, a5, ..] = EncoderAddress::ALL;
         assert_eq!(bus.push(Ok(response(0, 1).emit())).outcome, Ok(response(0, 1)));
         assert!(bus.push(Ok(response(5, 2).emit())).extra);
-        assert!(!bus.is_complete());
+        assert!(!bus.heard_all());
         let mut damaged = response(1, 3).emit().words(crate::BitOrder::LsbFirst).collect::<std::vec::Vec<_>>();
         damaged[1] ^= 1;
-        let damaged = Reply::from_words(&damaged, crate::BitOrder::LsbFirst, Layout::Abs24);
+        let damaged = RawResponse::from_words(Layout::Abs24, &damaged, crate::BitOrder::LsbFirst);
         assert!(matches!(bus.push(damaged).outcome, Err(Error::Crc { .. })));
         let twice = bus.push(Ok(response(0, 9).emit()));
         assert!(twice.duplicate && twice.outcome == Ok(response(0, 9)));
-        assert!(bus.is_complete());
-        assert_eq!(bus.of(a0), Answer::Duplicate { first: response(0, 1) });
-        assert_eq!((bus.response(a0), bus.of(a1), bus.of(a2)), (None, Answer::Missing, Answer::Missing));
-        assert_eq!(bus.of(a5), Answer::Extra(response(5, 2)));
+        // As many responses as were asked for, and two of them are still missing.
+        assert!(!bus.heard_all());
+        assert_eq!(bus.of(a0), Outcome::Duplicate { first: response(0, 1) });
+        assert_eq!((bus.response(a0), bus.of(a1), bus.of(a2)), (None, Outcome::Missing, Outcome::Missing));
+        assert_eq!(bus.of(a5), Outcome::Extra(response(5, 2)));
         assert_eq!(bus.missing().bits(), 0b1110);
         assert_eq!((bus.duplicates().bits(), bus.extra().bits()), (1, 0b10_0000));
         assert_eq!((bus.arrived(), bus.damaged(), bus.not_started()), (4, 1, 0));
     }
 
     proptest! {
-        /// In whatever order replies come, each is found under its own address.
+        /// In whatever order responses come, each is found under its own address.
         #[test]
         fn order_does_not_matter(asked: u8, order in Just([0_u8, 1, 2, 3, 4, 5, 6, 7]).prop_shuffle()) {
             let mut bus = bus(Addresses::from_bits(asked));
             for ea in order.into_iter().filter(|ea| asked >> ea & 1 == 1) {
-                prop_assert!(!bus.is_complete());
+                prop_assert!(!bus.heard_all());
                 bus.push(Ok(response(ea, u32::from(ea) * 1000).emit()));
             }
-            prop_assert!(bus.is_complete() && bus.missing().is_empty() && bus.extra().is_empty());
+            prop_assert!(bus.heard_all() && bus.missing().is_empty() && bus.extra().is_empty());
             for ea in bus.asked().iter() {
                 prop_assert_eq!(bus.response(ea), Some(response(ea.get(), u32::from(ea.get()) * 1000)));
             }

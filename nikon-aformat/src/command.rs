@@ -1,6 +1,6 @@
 use core::fmt;
 
-use crate::Error;
+use crate::layout::Layout;
 
 /// What a request asks for: the command codes (CC) 0 to 30. Code 31 is unassigned.
 ///
@@ -10,6 +10,7 @@ use crate::Error;
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "arbitrary", derive(arbitrary::Arbitrary))]
 #[repr(u8)]
+#[non_exhaustive]
 pub enum Command {
     /// Reads the whole position, single turn and turns.
     Abs40 = 0,
@@ -54,7 +55,7 @@ pub enum Command {
     IdWrite2 = 19,
     /// Gives the encoder with a certain identification code the address in EA; all others stay silent.
     SetAddress2 = 20,
-    /// Reads the low 17 bits of the position, the shortest reply.
+    /// Reads the low 17 bits of the position, the shortest response.
     Abs17 = 21,
     /// [`Abs17`](Self::Abs17) of several encoders.
     Abs17Mt = 22,
@@ -117,23 +118,14 @@ impl Command {
         self as u8
     }
 
-    /// The command with this code.
-    ///
-    /// # Errors
-    /// [`Error::UnknownCommand`] for 31 and all numbers above.
-    pub fn from_code(code: u8) -> Result<Self, Error> {
-        Self::ALL.get(usize::from(code)).copied().ok_or(Error::UnknownCommand { code })
+    /// The command with this code; `None` for 31 and all numbers above.
+    pub fn from_code(code: u8) -> Option<Self> {
+        Self::ALL.get(usize::from(code)).copied()
     }
 
-    /// The command, if encoders of `version` know it.
-    ///
-    /// # Errors
-    /// [`Error::UnsupportedInVersion`].
-    pub const fn in_version(self, version: Version) -> Result<Self, Error> {
-        match (self.min_version(), version) {
-            (Version::V3_0, Version::V2_1) => Err(Error::UnsupportedInVersion { command: self, version }),
-            _ => Ok(self),
-        }
+    /// Whether encoders of `version` know the command.
+    pub fn is_in(self, version: Version) -> bool {
+        self.min_version() <= version
     }
 
     /// The first version that has this command.
@@ -144,7 +136,7 @@ impl Command {
         }
     }
 
-    /// Whether several encoders answer one request, each with a reply of its own.
+    /// Whether several encoders answer one request, each with a response of its own.
     pub const fn is_multi_response(self) -> bool {
         matches!(
             self,
@@ -177,16 +169,16 @@ impl Command {
         if self.is_reset() { 8 } else { 1 }
     }
 
-    /// Whether the reply comes from the encoder that the request addresses.
+    /// Whether the response comes from the encoder that the request addresses.
     ///
     /// Not so for the multi-response commands, for those that any encoder on a one-to-one line answers (17, 19), and
-    /// for those that change the address (11, 20): whether their reply shows the old or the new one is not documented.
+    /// for those that change the address (11, 20): whether their response shows the old or the new one is not documented.
     pub const fn answers_with_own_address(self) -> bool {
         !self.is_multi_response()
             && !matches!(self, Self::SetAddress1 | Self::IdRead2 | Self::IdWrite2 | Self::SetAddress2)
     }
 
-    /// Whether the reply carries neither the command code nor the four status bits: commands 21 and 22.
+    /// Whether the response carries neither the command code nor the four status bits: commands 21 and 22.
     pub const fn has_short_information(self) -> bool {
         matches!(self, Self::Abs17 | Self::Abs17Mt)
     }
@@ -227,6 +219,32 @@ impl Command {
             Self::Abs24TempMt => "ABS24_TEMP_MT",
         }
     }
+
+    /// The two layouts in which the command may be answered, the one of version 2.1 first: for tools that have no request and
+    /// no resolution at hand. Twice the same where there is but one.
+    pub const fn layouts(self) -> [Layout; 2] {
+        let only = match self {
+            Self::Abs24Low | Self::Abs24LowMt => return [Layout::Abs24, Layout::Abs40Vel],
+            Self::ClearStatus
+            | Self::ClearMultiturn
+            | Self::ClearStatusMultiturn
+            | Self::SetAddress1
+            | Self::ZeroPreset => return [Layout::Status, Layout::Abs24],
+            Self::EepromRead | Self::EepromWrite => return [Layout::Eeprom, Layout::EepromBank],
+            Self::IdRead1 | Self::IdWrite1 => return [Layout::Id, Layout::Coefficient],
+            Self::Abs40 | Self::Abs40Mt => Layout::Abs40,
+            Self::Abs24High | Self::Abs24HighMt => Layout::Abs24High,
+            Self::Status | Self::StatusMt => Layout::Status,
+            Self::Temperature => Layout::Temperature,
+            Self::IdRead2 | Self::IdWrite2 | Self::SetAddress2 => Layout::Id,
+            Self::Abs17 | Self::Abs17Mt => Layout::Abs17,
+            Self::Abs24Vel | Self::Abs24VelMt => Layout::Abs24Vel,
+            Self::Abs24VelAcc | Self::Abs24VelAccMt => Layout::Abs24VelAcc,
+            Self::Abs24Status | Self::Abs24StatusMt => Layout::Abs24Status,
+            Self::Abs24Temp | Self::Abs24TempMt => Layout::Abs24Temp,
+        };
+        [only, only]
+    }
 }
 
 impl fmt::Display for Command {
@@ -243,6 +261,7 @@ impl fmt::Display for Command {
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "arbitrary", derive(arbitrary::Arbitrary))]
+#[non_exhaustive]
 pub enum Version {
     /// Version 2.1.
     V2_1,
@@ -266,14 +285,11 @@ mod tests {
     #[test]
     fn codes_and_commands() {
         for code in 0..=255 {
-            match Command::from_code(code) {
-                Ok(command) => assert_eq!(command.code(), code),
-                Err(error) => assert!(code > 30 && error == Error::UnknownCommand { code }),
-            }
+            assert_eq!(Command::from_code(code).map(Command::code), (code < 31).then_some(code));
         }
         let multi = Command::ALL.into_iter().filter(|c| c.is_multi_response()).map(Command::code);
         assert!(multi.eq([4, 5, 6, 7, 22, 24, 26, 28, 30]));
-        let new = Command::ALL.into_iter().filter(|c| c.in_version(Version::V2_1).is_err()).map(Command::code);
+        let new = Command::ALL.into_iter().filter(|c| !c.is_in(Version::V2_1)).map(Command::code);
         assert!(new.eq(23..=26));
         assert!(Command::ALL.into_iter().filter(|c| c.repeats() == 8).map(Command::code).eq(8..=12));
         for command in Command::ALL {

@@ -1,6 +1,6 @@
 use crc::{Algorithm, Crc, Table};
 
-/// CRC-8 of the replies in the form that suits words whose first line bit is bit 0: everything mirrored.
+/// CRC-8 of the responses in the form that suits words whose first line bit is bit 0: everything mirrored.
 ///
 /// The check field travels most significant bit first, all other fields least significant bit first. With the
 /// register mirrored (generator 0x1D read backwards, 0xB8) both are "first line bit in bit 0".
@@ -28,18 +28,18 @@ fn next(register: u8) -> u8 {
     table[usize::from(register)]
 }
 
-/// The CRC-8 of a reply, taken in as the reply comes: bit by bit, byte by byte or word by word.
+/// The CRC-8 of a response, taken in as the response comes: bit by bit, byte by byte or word by word.
 ///
 /// Generator x^8 + x^4 + x^3 + x^2 + 1 (0x1D), initial value 0, no final XOR; bits enter in the order of the line.
 /// It covers all content bits of all frames, the information field with its sync code included, but neither start
 /// bits nor delimiters, and is sent most significant bit first (AM243x Motor Control SDK, "Nikon Protocol Design").
 ///
-/// The generator is primitive, of order 255. In replies of 32 to 96 content bits every error of one or two bits and
+/// The generator is primitive, of order 255. In responses of 32 to 96 content bits every error of one or two bits and
 /// every burst of up to eight content bits is seen. Of three wrong bits 0.36 to 0.50 % pass, of four 0.39 %.
 ///
 /// ```
 /// use nikon_aformat::Crc8;
-/// // a reply to command 1 as a vendor manual prints it: 3E03 00EF DF35, the last byte is the CRC
+/// // a raw to command 1 as a vendor manual prints it: 3E03 00EF DF35, the last byte is the CRC
 /// let by_word = Crc8::new().word(0x3e03).word(0x00ef).byte(0xdf);
 /// assert_eq!(by_word.get(), 0x35);
 /// assert_eq!(by_word.byte(0x35).get(), 0);
@@ -73,7 +73,7 @@ impl Crc8 {
         self.byte(first).byte(second)
     }
 
-    /// The check value. Over a whole reply with its check field it is 0.
+    /// The check value. Over a whole response with its check field it is 0.
     pub const fn get(self) -> u8 {
         self.0
     }
@@ -198,7 +198,8 @@ mod tests {
     /// The undetected shares that the documentation states, counted.
     #[test]
     fn crc8_strength() {
-        for (bits, missed3) in [(32, 0.36), (48, 0.50), (64, 0.48), (96, 0.41)] {
+        let sizes = [(32, 0.36), (48, 0.50), (64, 0.48), (96, 0.41)];
+        for (bits, missed3) in sizes.into_iter().take(if cfg!(miri) { 1 } else { 4 }) {
             let syndrome: std::vec::Vec<u8> =
                 (0..bits).map(|at| (0..bits).fold(Crc8::new(), |crc, k| crc.bit(k == at)).get()).collect();
             let (mut two, mut three, mut triples) = (0, 0, 0);

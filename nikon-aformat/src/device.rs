@@ -4,18 +4,16 @@
 //! one line. Position, alarms, temperature and the rest are set from outside; EEPROM, addresses, eight-fold resets and
 //! busy times are its own. Faults can be switched on to see what a master makes of them.
 //!
-//! What the documents leave open is decided here as follows. A damaged request, a command of a later version and a write to
-//! the maker's addresses are not answered. In a multi-response request EA is the highest address that answers; encoder k
-//! answers in slot k, whoever else is there. A reset takes effect with the eighth request in succession, and any other
-//! request on the line starts the count again. The replies to commands 11 and 20 show the new address. The first reply to
-//! an EEPROM read has ES0 set and data 0. While the encoder is busy, writes are repeated in the reply but not done. The
-//! EEPROM without bank is bank 0.
+//! What the documents leave open is a [`Behaviour`]. A damaged request, a command of a later version and a write to the
+//! maker's addresses are not answered. A reset takes effect with the eighth request in succession, and any other request on
+//! the line starts the count again; the responses of other encoders do not. While the encoder is busy, writes are repeated in
+//! the response but not done. The EEPROM without bank is bank 0.
 //!
 //! ```
 //! use nikon_aformat::device::Device;
-//! use nikon_aformat::{BitRate, EncoderAddress, Operation, Profile, Request};
+//! use nikon_aformat::{BitRate, EncoderAddress, Operation, Resolution, Request};
 //!
-//! let mut encoder = Device::<1>::new(EncoderAddress::ZERO, Profile::default(), BitRate::Mbit4);
+//! let mut encoder = Device::<1>::new(EncoderAddress::ZERO, Resolution::default(), BitRate::Mbit4);
 //! encoder.set_position(0x1_2345, 7);
 //! let request = Request::new(EncoderAddress::ZERO, Operation::Abs40);
 //! let frames = request.emit();
@@ -23,59 +21,75 @@
 //! // the delimiter of the frame at 4.5 us
 //! let answer = encoder.frame(cdf.content(), 4_500).expect("an answer");
 //! assert_eq!(answer.at_ns, 4_500 + 2_800);
-//! assert_eq!(answer.reply.frames(), 4);
+//! assert_eq!(answer.raw.frames(), 4);
 //! ```
 
+mod behaviour;
 mod memory;
-#[cfg(test)]
-mod tests;
+
+pub use behaviour::{Behaviour, Ea, Shows};
 
 use nrz_line::Window;
 
+use crate::command::Command;
+use crate::data::Data;
 use crate::device::memory::Memory;
-use crate::{
-    Alarm, Alm, BitRate, Command, Data, EncoderAddress, EncoderStatus, Error, Frames, Operation, PmAlm, Profile, Reply,
-    Request, RequestFrame, Response, Temperature, TypeWord, U10, U19, U24, WRITE_BUSY_NS,
-};
-
-/// Time from the end of a request to the reply. Not documented; one vendor's simulated encoder waits so long.
-pub const TURN_AROUND_NS: u32 = 2_800;
+use crate::error::Error;
+use crate::frame::RequestFrame;
+use crate::layout::FRAME_BITS;
+use crate::number::{EncoderAddress, EncoderId, U10, U19};
+use crate::operation::Operation;
+use crate::raw_response::RawResponse;
+use crate::request::{Frames, Request};
+use crate::resolution::Resolution;
+use crate::response::Response;
+use crate::status::{Alm, EncoderStatus, PmAlm};
+use crate::temperature::Temperature;
+use crate::timing::BitRate;
+use crate::type_word::TypeWord;
 
 /// A pause after which a frame begins a new request. No upper limit is documented for the gap between the frames of a
 /// request; early drivers left 10 us.
 pub const MAX_FRAME_GAP_NS: u32 = 20_000;
+
+/// How long an encoder is busy with a write, an address setting or a reset: the longest time of "Nikon Protocol Design".
+const BUSY_NS: u32 = 30_000_000;
+
+/// The frames of another encoder's response follow each other within this many bits.
+const RESPONSE_PAUSE_BITS: u32 = 4;
 
 /// A fault that the encoder or its line is made to have.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "arbitrary", derive(arbitrary::Arbitrary))]
+#[non_exhaustive]
 pub enum Fault {
     /// None.
     #[default]
     None,
     /// It does not answer.
     Silent,
-    /// Bit `at` of the reply's line bits is inverted; nothing happens if the reply is shorter.
+    /// Bit `at` of the response's line bits is inverted; nothing happens if the response is shorter.
     FlipBit {
         /// Index, 0..=107.
         at: u8,
     },
-    /// The line ends after this many bits of the reply.
+    /// The line ends after this many bits of the response.
     CutAfter {
         /// Bits that are sent.
         bits: u8,
     },
-    /// The CRC-8 of the reply is inverted.
+    /// The CRC-8 of the response is inverted.
     BadCrc,
 }
 
 /// What an encoder sends, and when its start bit begins.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub struct Answer {
+pub struct Transmission {
     /// The frames as they were meant.
-    pub reply: Reply,
+    pub raw: RawResponse,
     /// The line bits, with the fault.
     pub line: Window,
     /// Time of the first start bit.
@@ -86,9 +100,9 @@ pub struct Answer {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Device<const BANKS: usize> {
     ea: EncoderAddress,
-    profile: Profile,
+    resolution: Resolution,
     rate: BitRate,
-    id: U24,
+    id: EncoderId,
     single_turn: u32,
     turns: u32,
     /// Subtracted from the position: what the resets have set to 0.
@@ -104,25 +118,26 @@ pub struct Device<const BANKS: usize> {
     pm_alm: PmAlm,
     memory: Memory<BANKS>,
     fault: Fault,
+    behaviour: Behaviour,
     repeated: Option<Request>,
     repeats: u8,
     received: [RequestFrame; Frames::MAX],
     len: u8,
-    /// A request was judged and no pause has come since.
-    deaf: bool,
+    /// What follows without a longer pause than this, in ns from delimiter to delimiter, is not judged.
+    deaf_ns: Option<u32>,
     last_frame_ns: u64,
 }
 
 impl<const BANKS: usize> Device<BANKS> {
-    /// An encoder at position 0 without alarms, 25 degrees warm, with the type word of its profile.
-    pub const fn new(ea: EncoderAddress, profile: Profile, rate: BitRate) -> Self {
+    /// An encoder at position 0 without alarms, 25 degrees warm, with the type word of its resolution.
+    pub const fn new(ea: EncoderAddress, resolution: Resolution, rate: BitRate) -> Self {
         let mut memory = Memory::new();
-        memory.set(0, TypeWord::EEPROM_ADDRESS, type_word(profile).0);
+        memory.set(0, TypeWord::EEPROM_ADDRESS, type_word(resolution).0);
         Self {
             ea,
-            profile,
+            resolution,
             rate,
-            id: U24::truncate(0),
+            id: EncoderId::truncate(0),
             single_turn: 0,
             turns: 0,
             zero: 0,
@@ -131,16 +146,17 @@ impl<const BANKS: usize> Device<BANKS> {
             acceleration: 0,
             coefficient: U19::truncate(0),
             temperature: Temperature(U10::truncate(100)),
-            alm: Alm::NONE,
-            causes: Alm::NONE,
-            pm_alm: PmAlm::new(0),
+            alm: Alm::empty(),
+            causes: Alm::empty(),
+            pm_alm: PmAlm::empty(),
             memory,
             fault: Fault::None,
+            behaviour: Behaviour::new(),
             repeated: None,
             repeats: 0,
-            received: [RequestFrame::mdf(crate::FrameCode::Fc0, 0); Frames::MAX],
+            received: [RequestFrame::mdf(crate::frame::FrameCode::Fc0, 0); Frames::MAX],
             len: 0,
-            deaf: false,
+            deaf_ns: None,
             last_frame_ns: 0,
         }
     }
@@ -165,12 +181,11 @@ impl<const BANKS: usize> Device<BANKS> {
     /// The temperature, which EEPROM word 0xf9 shows too.
     pub const fn set_temperature(&mut self, temperature: Temperature) {
         self.temperature = temperature;
-        let [low, high, ..] = temperature.raw().to_le_bytes();
-        self.memory.set(0, Temperature::EEPROM_ADDRESS, u16::from_le_bytes([low, high]));
+        self.memory.set(0, Temperature::EEPROM_ADDRESS, temperature.raw());
     }
 
     /// The identification code.
-    pub const fn set_id(&mut self, id: U24) {
+    pub const fn set_id(&mut self, id: EncoderId) {
         self.id = id;
     }
 
@@ -179,12 +194,21 @@ impl<const BANKS: usize> Device<BANKS> {
         self.pm_alm = pm_alm;
     }
 
-    /// The cause of an alarm comes or goes. An alarm stays set until a reset finds its cause gone; BUSY clears by itself.
-    pub const fn set_alarm(&mut self, alarm: Alarm, present: bool) {
-        self.causes = self.causes.with(alarm, present);
-        if present || matches!(alarm, Alarm::Busy | Alarm::BusyS) {
-            self.alm = self.alm.with(alarm, present);
+    /// The causes of alarms come or go. An alarm stays set until a reset finds its cause gone; BUSY clears by itself.
+    pub const fn set_alarms(&mut self, alarms: Alm, present: bool) {
+        let by_itself = alarms.intersection(Alm::BUSY.union(Alm::BUSY_S));
+        if present {
+            self.causes = self.causes.union(alarms);
+            self.alm = self.alm.union(alarms);
+        } else {
+            self.causes = self.causes.difference(alarms);
+            self.alm = self.alm.difference(by_itself);
         }
+    }
+
+    /// Decides what the documents leave open.
+    pub const fn set_behaviour(&mut self, behaviour: Behaviour) {
+        self.behaviour = behaviour;
     }
 
     /// Switches a fault on or, with [`Fault::None`], off.
@@ -194,7 +218,7 @@ impl<const BANKS: usize> Device<BANKS> {
 
     /// The alarms as they would be answered at `now_ns`.
     pub const fn alm(&self, now_ns: u64) -> Alm {
-        self.alm.with(Alarm::MemBusy, self.memory.is_busy(now_ns))
+        if self.memory.is_busy(now_ns) { self.alm.union(Alm::MEMBUSY) } else { self.alm.difference(Alm::MEMBUSY) }
     }
 
     /// A word of the EEPROM, for inspecting it.
@@ -207,19 +231,28 @@ impl<const BANKS: usize> Device<BANKS> {
         self.memory.set(bank, address, data);
     }
 
-    /// The position as a reply carries it.
-    pub const fn abs(&self) -> crate::U40 {
-        self.profile.compose(self.single_turn.wrapping_sub(self.zero), self.turns.wrapping_sub(self.turns_zero))
+    /// What the resets have set to 0: counts in the turn, and turns.
+    pub const fn zero(&self) -> (u32, u32) {
+        (self.zero, self.turns_zero)
+    }
+
+    /// The position as a response carries it.
+    pub const fn abs(&self) -> crate::number::U40 {
+        self.resolution.compose(self.single_turn.wrapping_sub(self.zero), self.turns.wrapping_sub(self.turns_zero))
     }
 
     /// A frame was received with start bit and delimiter in order, its delimiter at `now_ns`; `content` are its bits, the first
     /// of the line in bit 0. Gives the answer once a request is complete.
-    pub fn frame(&mut self, content: u16, now_ns: u64) -> Option<Answer> {
-        let frame = RequestFrame::from_content(content);
+    pub fn frame(&mut self, content: u16, now_ns: u64) -> Option<Transmission> {
         if self.is_deaf(now_ns) {
             return None;
         }
-        let Ok(frame) = frame else {
+        if content & 7 == u16::from(Response::SYNC_CODE) && self.len == 0 {
+            // Another encoder speaks.
+            self.deaf_ns = Some(self.rate.bits_ns(FRAME_BITS.saturating_add(RESPONSE_PAUSE_BITS)));
+            return None;
+        }
+        let Ok(frame) = RequestFrame::from_content(content) else {
             self.misheard();
             return None;
         };
@@ -232,7 +265,7 @@ impl<const BANKS: usize> Device<BANKS> {
                 None
             }
             Ok(request) => {
-                self.deaf = true;
+                self.len = 0;
                 let response = self.answer(request, now_ns)?;
                 self.send(request, response, now_ns)
             }
@@ -246,35 +279,51 @@ impl<const BANKS: usize> Device<BANKS> {
         }
     }
 
+    /// The rest of a damaged request is not judged, and the count of a reset starts again.
     fn misheard(&mut self) {
-        self.deaf = true;
+        self.deaf_ns = Some(self.rate.bits_ns(FRAME_BITS).saturating_add(MAX_FRAME_GAP_NS));
         self.repeated = None;
         self.repeats = 0;
+        self.len = 0;
     }
 
-    /// Whether what arrives now is the rest of a request that was already judged.
+    /// Whether what arrives now belongs to what is not judged.
     fn is_deaf(&mut self, now_ns: u64) -> bool {
-        let patience = self.rate.bits_ns(crate::FRAME_BITS).saturating_add(MAX_FRAME_GAP_NS);
-        let pause = now_ns.saturating_sub(self.last_frame_ns);
-        // A complete request is followed by the next one after any pause; a broken one only after a long one.
-        let complete = self.deaf && self.repeated.is_some();
-        if complete || pause > patience.into() {
-            self.len = 0;
-            self.deaf = false;
-        }
+        let pause_ns = now_ns.saturating_sub(self.last_frame_ns);
         self.last_frame_ns = now_ns;
-        self.deaf
+        if self.deaf_ns.is_some_and(|deaf_ns| pause_ns <= deaf_ns.into()) {
+            return true;
+        }
+        self.deaf_ns = None;
+        let patience_ns = self.rate.bits_ns(FRAME_BITS).saturating_add(MAX_FRAME_GAP_NS);
+        if pause_ns > patience_ns.into() {
+            self.len = 0;
+        }
+        false
     }
 
     /// What a sound request does, and the answer to it; `None` if it is for another encoder or not understood.
     pub fn answer(&mut self, request: Request, now_ns: u64) -> Option<Response> {
         self.count(request);
-        if request.check(self.profile).is_err() || !self.is_meant(request) {
+        if request.check(self.resolution).is_err() || !self.is_meant(request) {
             return None;
         }
-        self.reset(request, now_ns);
+        let old = self.ea;
+        let takes_effect = request.command().is_reset() && self.repeats == request.command().repeats();
+        if takes_effect && self.behaviour.reset_shows == Shows::Eighth {
+            self.reset(request, now_ns);
+        }
+        let response = self.respond(request, old, now_ns);
+        if takes_effect && self.behaviour.reset_shows == Shows::Ninth {
+            self.reset(request, now_ns);
+        }
+        response
+    }
+
+    fn respond(&mut self, request: Request, old: EncoderAddress, now_ns: u64) -> Option<Response> {
+        let is_first_read = request.command() == Command::EepromRead && !self.memory.is_busy(now_ns);
         let es = EncoderStatus::of_alarms(self.alm(now_ns));
-        let layout = request.layout(self.profile);
+        let layout = request.layout(self.resolution);
         let abs = self.abs();
         let (velocity, alm, temperature) = (self.velocity, self.alm(now_ns), self.temperature);
         let status = Data::Status { alm, pm_alm: self.pm_alm };
@@ -282,7 +331,7 @@ impl<const BANKS: usize> Device<BANKS> {
             Operation::Abs17 | Operation::Abs17Mt => return Some(Response::abs17(self.ea, es, abs.low17())),
             Operation::Abs40 | Operation::Abs40Mt => Data::Abs40 { abs },
             Operation::Abs24Low | Operation::Abs24LowMt => match layout {
-                crate::Layout::Abs40Vel => Data::Abs40Vel { abs, velocity },
+                crate::layout::Layout::Abs40Vel => Data::Abs40Vel { abs, velocity },
                 _ => Data::Abs24 { abs: abs.low24() },
             },
             Operation::Abs24High | Operation::Abs24HighMt => Data::Abs24High { abs: abs.high24() },
@@ -292,7 +341,7 @@ impl<const BANKS: usize> Device<BANKS> {
             | Operation::ClearStatusMultiturn
             | Operation::SetAddress1
             | Operation::ZeroPreset => match layout {
-                crate::Layout::Abs24 => Data::Abs24 { abs: abs.low24() },
+                crate::layout::Layout::Abs24 => Data::Abs24 { abs: abs.low24() },
                 _ => status,
             },
             Operation::Temperature => Data::Temperature { temperature },
@@ -304,9 +353,15 @@ impl<const BANKS: usize> Device<BANKS> {
             Operation::Abs24Temp | Operation::Abs24TempMt => Data::Abs24Temp { abs: abs.low24(), temperature },
             memory => self.access(memory, request.ea, now_ns)?,
         };
-        // An access makes the memory busy, and its reply shows it.
-        let es = EncoderStatus::of_alarms(self.alm(now_ns));
-        Some(Response::new(self.ea, request.command(), es, data))
+        // An access makes the memory busy, and its response shows it.
+        let hidden = is_first_read && !self.behaviour.busy_in_first_read;
+        let alm = if hidden { self.alm } else { self.alm(now_ns) };
+        let ea = match request.command() {
+            Command::SetAddress1 | Command::SetAddress2 if self.behaviour.shows_new_address => request.ea,
+            Command::SetAddress1 | Command::SetAddress2 => old,
+            _ => self.ea,
+        };
+        Some(Response::new(ea, request.command(), EncoderStatus::of_alarms(alm), data))
     }
 
     /// Whether this encoder is asked.
@@ -314,7 +369,7 @@ impl<const BANKS: usize> Device<BANKS> {
         match request.operation {
             Operation::SetAddress1 | Operation::IdRead2 | Operation::IdWrite2 { .. } => true,
             Operation::SetAddress2 { id } => id == self.id,
-            _ if request.command().is_multi_response() => self.ea <= request.ea,
+            _ if request.command().is_multi_response() => self.behaviour.ea == Ea::All || self.ea <= request.ea,
             _ => self.ea == request.ea,
         }
     }
@@ -331,11 +386,8 @@ impl<const BANKS: usize> Device<BANKS> {
     /// The effect of the eighth request of a reset.
     fn reset(&mut self, request: Request, now_ns: u64) {
         let command = request.command();
-        if !command.is_reset() || self.repeats != command.repeats() {
-            return;
-        }
         self.repeats = 0;
-        self.memory.busy(now_ns, WRITE_BUSY_NS);
+        self.memory.busy(now_ns, BUSY_NS);
         match command {
             Command::ZeroPreset => self.zero = self.single_turn,
             Command::SetAddress1 => self.ea = request.ea,
@@ -353,12 +405,13 @@ impl<const BANKS: usize> Device<BANKS> {
     fn access(&mut self, operation: Operation, ea: EncoderAddress, now_ns: u64) -> Option<Data> {
         let busy = self.memory.is_busy(now_ns);
         Some(match operation {
-            Operation::EepromRead { address } => {
-                Data::Eeprom { data: self.memory.read(0, address, now_ns).unwrap_or(0), address }
-            }
+            Operation::EepromRead { address } => Data::Eeprom {
+                data: self.memory.read(0, address, now_ns).unwrap_or(self.behaviour.undetermined),
+                address,
+            },
             Operation::EepromReadBank { bank, address } => {
                 let bank_error = !Memory::<BANKS>::has(bank);
-                let data = self.memory.read(bank, address, now_ns).unwrap_or(0);
+                let data = self.memory.read(bank, address, now_ns).unwrap_or(self.behaviour.undetermined);
                 Data::EepromBank { data, bank, address, bank_error }
             }
             Operation::EepromWrite { address, data } => {
@@ -373,14 +426,14 @@ impl<const BANKS: usize> Device<BANKS> {
             Operation::IdWrite1 { id } | Operation::IdWrite2 { id } => {
                 if !busy {
                     self.id = id;
-                    self.memory.busy(now_ns, WRITE_BUSY_NS);
+                    self.memory.busy(now_ns, BUSY_NS);
                 }
                 Data::Id { id }
             }
             Operation::SetAddress2 { id } => {
                 if !busy {
                     self.ea = ea;
-                    self.memory.busy(now_ns, WRITE_BUSY_NS);
+                    self.memory.busy(now_ns, BUSY_NS);
                 }
                 Data::Id { id }
             }
@@ -388,7 +441,7 @@ impl<const BANKS: usize> Device<BANKS> {
             Operation::CoefficientWrite { coefficient } => {
                 if !busy {
                     self.coefficient = coefficient;
-                    self.memory.busy(now_ns, WRITE_BUSY_NS);
+                    self.memory.busy(now_ns, BUSY_NS);
                 }
                 Data::Coefficient { coefficient }
             }
@@ -398,9 +451,9 @@ impl<const BANKS: usize> Device<BANKS> {
     }
 
     /// The line bits of an answer with the fault that is switched on.
-    fn send(&self, request: Request, response: Response, now_ns: u64) -> Option<Answer> {
-        let reply = response.emit();
-        let good = reply.line();
+    fn send(&self, request: Request, response: Response, now_ns: u64) -> Option<Transmission> {
+        let raw = response.emit();
+        let good = raw.line();
         let crc = 0xff << good.len().saturating_sub(9);
         let line = match self.fault {
             Fault::Silent => None,
@@ -411,28 +464,29 @@ impl<const BANKS: usize> Device<BANKS> {
             Fault::CutAfter { bits } => Window::from_bits(good.bits(), good.len().min(bits.into())),
             Fault::BadCrc => Window::from_bits(good.bits() ^ crc, good.len()),
         };
-        let slot = if request.command().is_multi_response() { self.ea.get() } else { 0 };
-        let slot_ns = self.rate.bits_ns(good.len()).saturating_add(self.rate.reply_gap_ns());
-        let wait = TURN_AROUND_NS.saturating_add(slot_ns.saturating_mul(slot.into()));
-        Some(Answer { reply, line: line?, at_ns: now_ns.saturating_add(wait.into()) })
+        let place = self.behaviour.place.unwrap_or(self.ea.get());
+        let slot = if request.command().is_multi_response() { place } else { 0 };
+        let slot_ns = self.rate.bits_ns(good.len()).saturating_add(self.rate.response_gap_ns());
+        let wait = self.behaviour.turn_around_ns.saturating_add(slot_ns.saturating_mul(slot.into()));
+        Some(Transmission { raw, line: line?, at_ns: now_ns.saturating_add(wait.into()) })
     }
 }
 
 /// The type word of an encoder with these widths; for widths that have no code, an unknown one.
-const fn type_word(profile: Profile) -> TypeWord {
-    let resolution = match profile.st_bits() {
+const fn type_word(resolution: Resolution) -> TypeWord {
+    let code = match resolution.st_bits() {
         17 => 0,
         20 => 1,
         22 => 2,
         24 => 3,
         _ => 7,
     };
-    let multiturn = match profile.mt_bits() {
+    let multiturn = match resolution.mt_bits() {
         0 => 0,
         16 => 2,
         _ => 3,
     };
-    TypeWord(resolution | multiturn << 3)
+    TypeWord(code | multiturn << 3)
 }
 
 /// Several encoders on one line.
@@ -444,7 +498,7 @@ pub struct Encoders<const N: usize, const BANKS: usize> {
 
 impl<const N: usize, const BANKS: usize> Encoders<N, BANKS> {
     /// A frame was received by all of them; gives what each answers.
-    pub fn frame(&mut self, content: u16, now_ns: u64) -> [Option<Answer>; N] {
+    pub fn frame(&mut self, content: u16, now_ns: u64) -> [Option<Transmission>; N] {
         let mut answers = [None; N];
         for (answer, device) in answers.iter_mut().zip(&mut self.all) {
             *answer = device.frame(content, now_ns);

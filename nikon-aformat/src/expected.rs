@@ -1,10 +1,16 @@
+use crate::command::Command;
+use crate::data::Data;
+use crate::error::{EchoField, Error};
 use crate::frame::truncated;
-use crate::{
-    Command, Data, EchoField, EncoderAddress, Error, Layout, Operation, Profile, Reply, Request, Response, U19, U24,
-    Version,
-};
+use crate::layout::{FRAME_BITS, Layout};
+use crate::number::{EncoderAddress, EncoderId, U19};
+use crate::operation::Operation;
+use crate::raw_response::RawResponse;
 
-/// What is known about a reply before it comes: its layout, the command, the address, the arguments that it repeats.
+/// Value of the sync code that begins a response.
+pub(crate) const SYNC_CODE: u8 = 4;
+
+/// What is known about a response before it comes: its layout, the command, the address, the arguments that it repeats.
 ///
 /// [`Request::expected`] makes it from a request; [`Expected::new`] serves captures whose request is not at hand.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -19,11 +25,12 @@ pub struct Expected {
     value: u16,
 }
 
-/// The arguments of a request that its reply repeats.
+/// The arguments of a request that its response repeats.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "arbitrary", derive(arbitrary::Arbitrary))]
+#[non_exhaustive]
 pub enum Echo {
     /// None, or they are not compared.
     #[default]
@@ -38,13 +45,13 @@ pub enum Echo {
         data: Option<u16>,
     },
     /// Identification code, written or used to choose an encoder.
-    Id(U24),
+    Id(EncoderId),
     /// Velocity coefficient, written.
     Coefficient(U19),
 }
 
 impl Echo {
-    /// What the reply to `operation` repeats.
+    /// What the response to `operation` repeats.
     pub const fn of(operation: Operation) -> Self {
         match operation {
             Operation::EepromRead { address } => Self::Eeprom { address, bank: None, data: None },
@@ -68,9 +75,9 @@ const CC: u16 = 0b1_1111 << 6;
 const FIXED: u16 = 1 << 11;
 
 impl Expected {
-    /// A reply of this layout to this command, from any address.
+    /// A response of this layout to this command, from any address.
     pub const fn new(layout: Layout, command: Command) -> Self {
-        let sync = Response::SYNC_CODE as u16;
+        let sync = SYNC_CODE as u16;
         let (mask, value) = match layout {
             Layout::Abs17 => (SYNC, sync),
             _ => (SYNC | CC | FIXED, sync | (command.code() as u16) << 6),
@@ -115,25 +122,25 @@ impl Expected {
     }
 
     /// Whether length and first frame are right.
-    pub(crate) fn fits(&self, reply: &Reply) -> bool {
-        reply.frames() == self.layout.frames()
-            && reply.contents().first().is_some_and(|first| self.differs_first(*first) == 0)
+    pub(crate) fn fits(&self, raw: &RawResponse) -> bool {
+        raw.frames() == self.layout.frames()
+            && raw.contents().first().is_some_and(|first| self.differs_first(*first) == 0)
     }
 
-    /// Off the hot path: why a reply is refused that is not sound or does not fit.
+    /// Off the hot path: why a response is refused that is not sound or does not fit.
     #[cold]
-    pub(crate) fn refusal(&self, reply: &Reply) -> Error {
+    pub(crate) fn refusal(&self, raw: &RawResponse) -> Error {
         let want = self.layout.line_bits();
-        if reply.frames() != self.layout.frames() {
-            return truncated(u32::from(reply.frames()).wrapping_mul(18), want);
+        if raw.frames() != self.layout.frames() {
+            return truncated(u32::from(raw.frames()).wrapping_mul(FRAME_BITS), want);
         }
-        let (got, computed) = reply.crc();
+        let (got, computed) = raw.crc();
         if got != computed {
             return Error::Crc { got, want: computed };
         }
-        let first = reply.contents().first().copied().unwrap_or(0);
+        let first = raw.contents().first().copied().unwrap_or(0);
         let sync = (first & SYNC) as u8;
-        if sync != Response::SYNC_CODE {
+        if sync != SYNC_CODE {
             return Error::SyncCode { got: sync };
         }
         if first & FIXED & self.mask != 0 {
@@ -154,7 +161,7 @@ impl Expected {
         match (self.echo, data) {
             (Echo::Eeprom { address, bank, data }, Data::Eeprom { address: a, data: d }) => {
                 same(EchoField::Address, a, address)?;
-                // A reply without bank to a request with one: nothing to compare.
+                // A response without bank to a request with one: nothing to compare.
                 let _ = bank;
                 data.map_or(Ok(()), |want| same(EchoField::Data, d, want))
             }
@@ -175,71 +182,4 @@ impl Expected {
 fn same<T: Into<u32>>(field: EchoField, got: T, want: T) -> Result<(), Error> {
     let (got, want) = (got.into(), want.into());
     if got == want { Ok(()) } else { Err(Error::EchoMismatch { field, got, want }) }
-}
-
-impl Request {
-    /// The layout of the reply, from an encoder of this profile.
-    ///
-    /// The same request can have different replies: version 3.0 encoders may be set in the factory to answer commands 1
-    /// and 5 with [`Layout::Abs40Vel`], and the resets with [`Layout::Abs24`]. The line does not tell it.
-    pub const fn layout(self, profile: Profile) -> Layout {
-        match self.operation {
-            Operation::Abs40 | Operation::Abs40Mt => Layout::Abs40,
-            Operation::Abs24Low | Operation::Abs24LowMt => {
-                if profile.has_low_with_velocity() {
-                    Layout::Abs40Vel
-                } else {
-                    Layout::Abs24
-                }
-            }
-            Operation::Abs24High | Operation::Abs24HighMt => Layout::Abs24High,
-            Operation::Status | Operation::StatusMt => Layout::Status,
-            Operation::ClearStatus
-            | Operation::ClearMultiturn
-            | Operation::ClearStatusMultiturn
-            | Operation::SetAddress1
-            | Operation::ZeroPreset => {
-                if profile.has_resets_with_position() {
-                    Layout::Abs24
-                } else {
-                    Layout::Status
-                }
-            }
-            Operation::EepromRead { .. } | Operation::EepromWrite { .. } => Layout::Eeprom,
-            Operation::EepromReadBank { .. } | Operation::EepromWriteBank { .. } => Layout::EepromBank,
-            Operation::Temperature => Layout::Temperature,
-            Operation::IdRead1
-            | Operation::IdRead2
-            | Operation::IdWrite1 { .. }
-            | Operation::IdWrite2 { .. }
-            | Operation::SetAddress2 { .. } => Layout::Id,
-            Operation::CoefficientRead | Operation::CoefficientWrite { .. } => Layout::Coefficient,
-            Operation::Abs17 | Operation::Abs17Mt => Layout::Abs17,
-            Operation::Abs24Vel | Operation::Abs24VelMt => Layout::Abs24Vel,
-            Operation::Abs24VelAcc | Operation::Abs24VelAccMt => Layout::Abs24VelAcc,
-            Operation::Abs24Status | Operation::Abs24StatusMt => Layout::Abs24Status,
-            Operation::Abs24Temp | Operation::Abs24TempMt => Layout::Abs24Temp,
-        }
-    }
-
-    /// What the reply of an encoder of this profile has to be.
-    ///
-    /// The address is checked where [`Command::answers_with_own_address`] says so.
-    pub const fn expected(self, profile: Profile) -> Expected {
-        let command = self.command();
-        let expected = Expected::new(self.layout(profile), command).echoing(Echo::of(self.operation));
-        if command.answers_with_own_address() { expected.from_address(self.ea) } else { expected }
-    }
-
-    /// The request itself, if encoders of this profile understand it.
-    ///
-    /// # Errors
-    /// [`Error::UnsupportedInVersion`].
-    pub fn check(self, profile: Profile) -> Result<Self, Error> {
-        let (command, version) = (self.command().in_version(profile.version())?, profile.version());
-        if version < Version::V3_0 && self.operation.needs_version_3() {
-            return Err(Error::UnsupportedInVersion { command, version });
-        }
-        Ok(self)
-    }
 }

@@ -1,9 +1,12 @@
+use core::fmt;
+
 use nrz_line::{BitOrder, Window};
 
-use crate::{EncoderAddress, Error, crc3};
-
-/// Bits of one frame on the line, in both directions: start bit 0, 16 content bits, delimiter 1.
-pub const FRAME_BITS: u32 = 18;
+use crate::crc::crc3;
+use crate::error::Error;
+use crate::layout::FRAME_BITS;
+use crate::number::EncoderAddress;
+use crate::text::write_words;
 
 pub(crate) const START: u128 = 1 | 1 << 18 | 1 << 36 | 1 << 54 | 1 << 72 | 1 << 90;
 pub(crate) const DELIMITER: u128 = START << 17;
@@ -13,11 +16,11 @@ const _: () = {
         START & DELIMITER == 0
             && (START | DELIMITER) & content == 0
             && START | DELIMITER | content == (1 << (18 * MAX_FRAMES)) - 1,
-        "start bits, content bits and delimiters partition the longest reply"
+        "start bits, content bits and delimiters partition the longest response"
     );
 };
 
-/// Frames of the longest reply.
+/// Frames of the longest response.
 pub(crate) const MAX_FRAMES: u32 = 6;
 
 /// One frame of a request: a command data frame (CDF) or one of the memory data frames MDF0 to MDF3.
@@ -34,7 +37,6 @@ pub(crate) const MAX_FRAMES: u32 = 6;
 /// access, and 0 for MDF3. So only the place in the request tells what a frame is.
 /// Every field travels least significant bit first, the CRC-3 most significant bit first.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(try_from = "u16", into = "u16"))]
 pub struct RequestFrame(u16);
 
@@ -266,6 +268,14 @@ pub(crate) fn framing(line: Window, frames: u32) -> Error {
     truncated(line.len(), frames.wrapping_mul(FRAME_BITS))
 }
 
+impl fmt::Display for RequestFrame {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write_words(f, [self.word(BitOrder::MsbFirst)])
+    }
+}
+
+crate::text::format_as_displayed!(RequestFrame);
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -291,7 +301,7 @@ mod tests {
     #[test]
     fn all_1024_frames_in_every_form() {
         for fc in 0..4_u16 {
-            for byte in 0..=255 {
+            for byte in (0..=255).step_by(crate::STRIDE) {
                 let frame = RequestFrame::mdf(FrameCode::truncate(fc), byte);
                 let want = slow_line(fc as u8, byte);
                 let line = frame.line();
@@ -316,7 +326,7 @@ mod tests {
     fn every_content_is_judged() {
         let accepted = (0..=u16::MAX).filter_map(|c| RequestFrame::from_content(c).ok().map(|f| (c, f)));
         assert_eq!(accepted.inspect(|(c, f)| assert_eq!(f.content(), *c)).count(), 1024);
-        for byte in 0..=255 {
+        for byte in (0..=255).step_by(crate::STRIDE) {
             let frame = RequestFrame::mdf(FrameCode::Fc2, byte);
             for at in 0..18 {
                 let bad = Window::from_bits(frame.line().bits() ^ 1 << at, 18).unwrap();

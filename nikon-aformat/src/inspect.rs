@@ -3,17 +3,17 @@
 //! Decoders stop at the first fault and give no value; that is right for a drive and unhelpful at a bench. Here all
 //! frames are read whatever their framing, and the usual mistakes (wires exchanged, wrong bit order, some bits early or
 //! late, own echo, wrong rate, other encoder, other command, other layout) are undone one by one: the one that makes the
-//! reply sound is the cause.
+//! response sound is the cause.
 //!
 //! ```
 //! use nikon_aformat::inspect::{Cause, inspect};
-//! use nikon_aformat::{Data, EncoderAddress, EncoderStatus, Operation, Profile, Request, Response, U24};
+//! use nikon_aformat::{Data, EncoderAddress, EncoderStatus, Operation, Resolution, Request, Response, U24};
 //!
 //! let request = Request::new(EncoderAddress::ZERO, Operation::Abs24Low);
 //! let data = Data::Abs24 { abs: U24::truncate(0x12_3456) };
-//! let answer = Response::new(EncoderAddress::ZERO, request.command(), EncoderStatus::NONE, data);
+//! let answer = Response::new(EncoderAddress::ZERO, request.command(), EncoderStatus::empty(), data);
 //! // A and B exchanged: every level is inverted
-//! let report = inspect(request, Profile::default(), answer.emit().line().inverted());
+//! let report = inspect(request, Resolution::default(), answer.emit().line().inverted());
 //! assert_eq!(report.cause, Some(Cause::LineInverted));
 //! assert_eq!(report.response, Some(answer));
 //! ```
@@ -22,10 +22,16 @@ use core::fmt;
 
 use nrz_line::{BitOrder, Window};
 
-use crate::{
-    Command, EncoderAddress, Error, ErrorClass, Expected, FRAME_BITS, Layout, Profile, Reply, Request, RequestFrame,
-    Response,
-};
+use crate::command::Command;
+use crate::error::{Error, ErrorClass};
+use crate::expected::Expected;
+use crate::frame::RequestFrame;
+use crate::layout::{FRAME_BITS, Layout};
+use crate::number::EncoderAddress;
+use crate::raw_response::RawResponse;
+use crate::request::Request;
+use crate::resolution::Resolution;
+use crate::response::Response;
 
 /// One frame, read without judging it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -47,19 +53,19 @@ pub struct RawFrame {
 pub enum Kind {
     /// A frame of a request.
     Request,
-    /// The first frame of a reply.
-    Reply,
-    /// Neither: a later frame of a reply, or a damaged one.
+    /// The first frame of a response.
+    Response,
+    /// Neither: a later frame of a response, or a damaged one.
     Other,
 }
 
 impl Kind {
-    /// By the content bits of a frame, the first of the line in bit 0. Later frames of a reply hold anything, so ask only
-    /// where a request or a reply can begin.
+    /// By the content bits of a frame, the first of the line in bit 0. Later frames of a response hold anything, so ask only
+    /// where a request or a response can begin.
     pub const fn of(content: u16) -> Self {
         match content & 7 {
             2 => Self::Request,
-            4 => Self::Reply,
+            4 => Self::Response,
             _ => Self::Other,
         }
     }
@@ -73,30 +79,30 @@ impl Kind {
 pub enum Cause {
     /// Every level is inverted: A and B are exchanged, or the receiver's polarity is wrong.
     LineInverted,
-    /// The reply was taken `bits` bits too early (negative: too late).
+    /// The response was taken `bits` bits too early (negative: too late).
     Shifted {
-        /// Idle bits in front of the reply; negative: bits of it that are missing.
+        /// Idle bits in front of the response; negative: bits of it that are missing.
         bits: i8,
     },
     /// Bits are packed most significant first and were read least significant first, or the other way round.
     WrongBitOrder,
-    /// The own request came back, and the reply behind it.
+    /// The own request came back, and the response behind it.
     OwnEcho,
     /// Only the own request came back: no encoder, or A and B are exchanged on a half-duplex line.
     OnlyEcho,
     /// The line was sampled twice a bit: the real rate is half of the assumed one.
     HalfRate,
-    /// A sound reply of another encoder.
+    /// A sound response of another encoder.
     OtherEncoder {
         /// Who answered.
         ea: EncoderAddress,
     },
-    /// A sound reply to another command.
+    /// A sound response to another command.
     OtherCommand {
         /// What was answered.
         answered: Command,
     },
-    /// A sound reply to this command in another layout: the profile does not know the factory setting of the encoder.
+    /// A sound response to this command in another layout: the resolution does not know the factory setting of the encoder.
     OtherLayout {
         /// How it was answered.
         layout: Layout,
@@ -113,20 +119,22 @@ impl fmt::Display for Cause {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::LineInverted => f.write_str("the line is inverted: exchange A and B, or the polarity of the input"),
-            Self::Shifted { bits } if *bits > 0 => write!(f, "the reply begins {bits} bit(s) later than it was taken"),
+            Self::Shifted { bits } if *bits > 0 => {
+                write!(f, "the response begins {bits} bit(s) later than it was taken")
+            }
             Self::Shifted { bits } => {
-                write!(f, "{} bit(s) at the beginning of the reply are missing", bits.unsigned_abs())
+                write!(f, "{} bit(s) at the beginning of the response are missing", bits.unsigned_abs())
             }
             Self::WrongBitOrder => f.write_str("the bits of each byte are in the other order"),
-            Self::OwnEcho => f.write_str("the own request came back before the reply: remove the echo"),
+            Self::OwnEcho => f.write_str("the own request came back before the response: remove the echo"),
             Self::OnlyEcho => f.write_str("only the own request came back: no encoder, or A and B are exchanged"),
             Self::HalfRate => f.write_str("the line runs at half the assumed bit rate"),
-            Self::OtherEncoder { ea } => write!(f, "this is a sound reply of encoder {ea}"),
+            Self::OtherEncoder { ea } => write!(f, "this is a sound response of encoder {ea}"),
             Self::OtherCommand { answered } => {
-                write!(f, "this is a sound reply to command {}, {answered}", answered.code())
+                write!(f, "this is a sound response to command {}, {answered}", answered.code())
             }
             Self::OtherLayout { layout } => {
-                write!(f, "this is a sound reply in layout {layout}: the encoder's factory setting differs")
+                write!(f, "this is a sound response in layout {layout}: the encoder's factory setting differs")
             }
             Self::StuckLow => f.write_str("the line stays at 0"),
             Self::StuckHigh => f.write_str("the line stays at 1: nobody answers"),
@@ -136,36 +144,13 @@ impl fmt::Display for Cause {
 }
 
 /// The kinds of faults found, as a set.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub struct Findings(u32);
-
-impl Findings {
-    /// Whether a fault of this kind was found.
-    pub const fn has(self, class: ErrorClass) -> bool {
-        self.0 >> class as u32 & 1 == 1
-    }
-
-    /// Whether none was found.
-    pub const fn is_empty(self) -> bool {
-        self.0 == 0
-    }
-
-    /// The kinds that were found, in the order of the checks.
-    pub fn classes(self) -> impl Iterator<Item = ErrorClass> {
-        ErrorClass::ALL.into_iter().filter(move |class| self.has(*class))
-    }
-
-    const fn add(&mut self, class: ErrorClass, found: bool) {
-        self.0 |= (found as u32) << class as u32;
-    }
-}
+pub type Findings = servowire_core::Findings<ErrorClass>;
 
 /// What there is to say about a line.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Report {
-    frames: [RawFrame; Reply::MAX_FRAMES],
+    frames: [RawFrame; RawResponse::MAX_FRAMES],
     len: u8,
     /// Every kind of fault in the line as it was given.
     pub findings: Findings,
@@ -173,37 +158,37 @@ pub struct Report {
     pub error: Option<Error>,
     /// The most likely cause of it.
     pub cause: Option<Cause>,
-    /// The reply, as it is if nothing is wrong, or as it would be without the cause. For showing to a person only.
+    /// The response, as it is if nothing is wrong, or as it would be without the cause. For showing to a person only.
     pub response: Option<Response>,
     /// Received and computed CRC-8, if the line holds all frames.
     pub crc: Option<(u8, u8)>,
 }
 
 impl Report {
-    /// The whole frames of the line on its grid, at most as many as the reply has.
+    /// The whole frames of the line on its grid, at most as many as the response has.
     pub fn frames(&self) -> &[RawFrame] {
         self.frames.get(..usize::from(self.len)).unwrap_or(&self.frames)
     }
 }
 
-/// Looks at line bits that should hold the reply to `request`.
-pub fn inspect(request: Request, profile: Profile, line: Window) -> Report {
-    let expected = request.expected(profile);
-    let outcome = Response::parse_line(line, &expected);
+/// Looks at line bits that should hold the response to `request`.
+pub fn inspect(request: Request, resolution: Resolution, line: Window) -> Report {
+    let expected = request.expected(resolution);
+    let outcome = Response::parse_line(&expected, line);
     let (cause, response) = match outcome {
         Ok(response) => (None, Some(response)),
         Err(error) => diagnose(request, &expected, line, error),
     };
     let (frames, len) = raw_frames(line, expected.layout());
-    let reply = whole(&frames, len, expected.layout());
-    let crc = reply.map(|reply| reply.crc());
+    let raw = whole(&frames, len, expected.layout());
+    let crc = raw.map(|raw| raw.crc());
     let error = outcome.err();
     let mut report = Report { frames, len, findings: Findings::default(), error, cause, response, crc };
     report.findings = findings(&report, &expected);
     report
 }
 
-/// Undoes the usual mistakes one by one; the first that gives a sound reply is the cause.
+/// Undoes the usual mistakes one by one; the first that gives a sound response is the cause.
 fn diagnose(request: Request, expected: &Expected, line: Window, error: Error) -> (Option<Cause>, Option<Response>) {
     if line.inverted().bits() == 0 {
         return (Some(Cause::StuckHigh), None);
@@ -214,10 +199,10 @@ fn diagnose(request: Request, expected: &Expected, line: Window, error: Error) -
     if let Some((cause, response)) = other_party(expected, line) {
         return (Some(cause), Some(response));
     }
-    let sound = |line: Option<Window>| line.and_then(|line| Response::parse_line(line, expected).ok());
+    let sound = |line: Option<Window>| line.and_then(|line| Response::parse_line(expected, line).ok());
     let attempts = [
         (Cause::LineInverted, sound(Some(line.inverted()))),
-        (Cause::WrongBitOrder, sound(reordered(line))),
+        (Cause::WrongBitOrder, sound(Some(line.reordered()))),
         (Cause::OwnEcho, sound(behind_echo(request, line))),
         (Cause::HalfRate, half_rate(expected, line)),
     ];
@@ -235,27 +220,22 @@ fn diagnose(request: Request, expected: &Expected, line: Window, error: Error) -
     (matches!(error, Error::Crc { .. }).then_some(Cause::Disturbed), None)
 }
 
-/// A sound reply from somebody else, to something else or in another layout. The CRC-8 is checked in any case.
+/// A sound response from somebody else, to something else or in another layout. The CRC-8 is checked in any case.
 fn other_party(expected: &Expected, line: Window) -> Option<(Cause, Response)> {
     let any = expected.any_address();
-    if let Ok(response) = Response::parse_line(line, &any) {
+    if let Ok(response) = Response::parse_line(&any, line) {
         return Some((Cause::OtherEncoder { ea: response.ea }, response));
     }
     let code = line.bits() >> 7 & 31;
-    let answered = u8::try_from(code).ok().and_then(|code| Command::from_code(code).ok())?;
+    let answered = u8::try_from(code).ok().and_then(Command::from_code)?;
     answered.layouts().into_iter().find_map(|layout| {
         // The short form does not say what it answers.
         let layout = Some(layout).filter(|layout| *layout != Layout::Abs17)?;
-        let response = Response::parse_line(line, &Expected::new(layout, answered)).ok()?;
+        let response = Response::parse_line(&Expected::new(layout, answered), line).ok()?;
         let same = answered == expected.command();
         let cause = if same { Cause::OtherLayout { layout } } else { Cause::OtherCommand { answered } };
         Some((cause, response))
     })
-}
-
-/// The line with the bits of every byte in the other order.
-fn reordered(line: Window) -> Option<Window> {
-    Window::read(&line.to_bytes(BitOrder::LsbFirst), 0, line.len(), BitOrder::MsbFirst).ok()
 }
 
 /// What follows the own request and the turn-round, if the line begins with the request's only frame; nothing is left if
@@ -272,22 +252,20 @@ fn behind_echo(request: Request, line: Window) -> Option<Window> {
 
 /// Every second bit, if the line shows each twice.
 fn half_rate(expected: &Expected, line: Window) -> Option<Response> {
-    let mut bits = 0_u128;
     for at in 0..line.len() / 2 {
         let (a, b) = (line.get(at.wrapping_mul(2)), line.get(at.wrapping_mul(2).wrapping_add(1)));
         if a != b {
             return None;
         }
-        bits |= u128::from(a == Some(true)) << at;
     }
-    Response::parse_line(Window::from_bits(bits, line.len() / 2)?, expected).ok()
+    Response::parse_line(expected, line.decimated()).ok()
 }
 
-/// The reply some bits later, or with some bits lost in front that are put back as idle start.
+/// The response some bits later, or with some bits lost in front that are put back as idle start.
 fn shifted(expected: &Expected, line: Window) -> Option<(i8, Response)> {
     for bits in 1..=20_i8 {
         let later = line.skip(bits.unsigned_abs().into());
-        let response = later.and_then(|line| Response::parse_line(line, expected).ok());
+        let response = later.and_then(|line| Response::parse_line(expected, line).ok());
         if let Some(response) = response {
             return Some((bits, response));
         }
@@ -298,7 +276,7 @@ fn shifted(expected: &Expected, line: Window) -> Option<(i8, Response)> {
             .bits()
             .checked_shl(bits)
             .and_then(|all| Window::from_bits(all, line.len().saturating_add(bits).min(128)));
-        let response = earlier.and_then(|line| Response::parse_line(line, expected).ok());
+        let response = earlier.and_then(|line| Response::parse_line(expected, line).ok());
         if let (Some(response), Ok(bits)) = (response, i8::try_from(bits)) {
             return Some((bits.wrapping_neg(), response));
         }
@@ -307,8 +285,8 @@ fn shifted(expected: &Expected, line: Window) -> Option<(i8, Response)> {
 }
 
 #[expect(clippy::cast_possible_truncation, reason = "sixteen bits")]
-fn raw_frames(line: Window, layout: Layout) -> ([RawFrame; Reply::MAX_FRAMES], u8) {
-    let mut frames = [RawFrame { content: 0, start_ok: false, delimiter_ok: false }; Reply::MAX_FRAMES];
+fn raw_frames(line: Window, layout: Layout) -> ([RawFrame; RawResponse::MAX_FRAMES], u8) {
+    let mut frames = [RawFrame { content: 0, start_ok: false, delimiter_ok: false }; RawResponse::MAX_FRAMES];
     let mut len = 0_u8;
     for frame in frames.iter_mut().take(usize::from(layout.frames())) {
         let at = u32::from(len).wrapping_mul(FRAME_BITS);
@@ -320,31 +298,36 @@ fn raw_frames(line: Window, layout: Layout) -> ([RawFrame; Reply::MAX_FRAMES], u
     (frames, len)
 }
 
-/// The frames as a reply, whatever their framing.
-fn whole(frames: &[RawFrame; Reply::MAX_FRAMES], len: u8, layout: Layout) -> Option<Reply> {
+/// The frames as a response, whatever their framing.
+fn whole(frames: &[RawFrame; RawResponse::MAX_FRAMES], len: u8, layout: Layout) -> Option<RawResponse> {
     let words = frames.map(|frame| frame.content);
     let words = words.get(..usize::from(len))?;
-    Reply::from_words(words, BitOrder::LsbFirst, layout).ok()
+    RawResponse::from_words(layout, words, BitOrder::LsbFirst).ok()
 }
 
 fn findings(report: &Report, expected: &Expected) -> Findings {
-    let mut found = Findings::default();
-    found.add(ErrorClass::Truncated, report.len < expected.layout().frames());
-    found.add(ErrorClass::StartBit, report.frames().iter().any(|frame| !frame.start_ok));
-    found.add(ErrorClass::Delimiter, report.frames().iter().any(|frame| !frame.delimiter_ok));
-    found.add(ErrorClass::Crc, report.crc.is_some_and(|(got, want)| got != want));
+    let mut set = Findings::default();
+    let mut add = |class, found: bool| {
+        if found {
+            set.insert(class);
+        }
+    };
+    add(ErrorClass::Truncated, report.len < expected.layout().frames());
+    add(ErrorClass::StartBit, report.frames().iter().any(|frame| !frame.start_ok));
+    add(ErrorClass::Delimiter, report.frames().iter().any(|frame| !frame.delimiter_ok));
+    add(ErrorClass::Crc, report.crc.is_some_and(|(got, want)| got != want));
     if let Some(first) = report.frames().first().map(|frame| frame.content) {
         let full = expected.layout() != Layout::Abs17;
         let (ea, code) = (first >> 3 & 7, first >> 6 & 31);
-        found.add(ErrorClass::SyncCode, Kind::of(first) != Kind::Reply);
-        found.add(ErrorClass::FixedBit, full && first >> 11 & 1 == 1);
-        found.add(ErrorClass::AddressMismatch, expected.ea().is_some_and(|want| u16::from(want.get()) != ea));
-        found.add(ErrorClass::CommandMismatch, full && u16::from(expected.command().code()) != code);
+        add(ErrorClass::SyncCode, Kind::of(first) != Kind::Response);
+        add(ErrorClass::FixedBit, full && first >> 11 & 1 == 1);
+        add(ErrorClass::AddressMismatch, expected.ea().is_some_and(|want| u16::from(want.get()) != ea));
+        add(ErrorClass::CommandMismatch, full && u16::from(expected.command().code()) != code);
     }
     if let Some(error @ (Error::BankError | Error::EchoMismatch { .. })) = report.error {
-        found.add(error.class(), true);
+        add(error.class(), true);
     }
-    found
+    set
 }
 
 #[cfg(test)]
@@ -355,12 +338,12 @@ mod tests {
     use std::string::ToString;
 
     fn cause(request: Request, line: Window) -> Option<Cause> {
-        inspect(request, Profile::default(), line).cause
+        inspect(request, Resolution::default(), line).cause
     }
 
     fn plain() -> impl Strategy<Value = (Request, Response)> {
-        exchanges().prop_filter_map("as the default profile answers", |(request, expected, response)| {
-            (request.expected(Profile::default()) == expected).then_some((request, response))
+        exchanges().prop_filter_map("as the default resolution answers", |(request, expected, response)| {
+            (request.expected(Resolution::default()) == expected).then_some((request, response))
         })
     }
 
@@ -370,8 +353,8 @@ mod tests {
 
     proptest! {
         #[test]
-        fn a_good_reply_has_no_findings((request, response) in plain()) {
-            let report = inspect(request, Profile::default(), response.emit().line());
+        fn a_good_response_has_no_findings((request, response) in plain()) {
+            let report = inspect(request, Resolution::default(), response.emit().line());
             prop_assert!(report.findings.is_empty() && report.error.is_none() && report.cause.is_none());
             prop_assert_eq!(report.response, Some(response));
             prop_assert_eq!(report.frames().len(), usize::from(response.layout().frames()));
@@ -386,34 +369,38 @@ mod tests {
             let early = line.skip(2).unwrap();
             prop_assert_eq!(cause(request, window(early.bits() | u128::MAX << early.len(), line.len())), Some(Cause::Shifted { bits: -2 }));
             for at in 1..17 {
-                let report = inspect(request, Profile::default(), window(line.bits() ^ 1 << at, line.len()));
-                prop_assert!(report.findings.has(ErrorClass::Crc));
+                let report = inspect(request, Resolution::default(), window(line.bits() ^ 1 << at, line.len()));
+                prop_assert!(report.findings.contains(ErrorClass::Crc));
             }
         }
 
         #[test]
         fn other_parties((request, response) in plain()) {
-            prop_assume!(request.expected(Profile::default()).ea().is_some());
+            prop_assume!(request.expected(Resolution::default()).ea().is_some());
             let ea = EncoderAddress::truncate(request.ea.get() + 1);
             let other = Response { ea, ..response };
-            let report = inspect(request, Profile::default(), other.emit().line());
+            let report = inspect(request, Resolution::default(), other.emit().line());
             prop_assert_eq!((report.cause, report.response), (Some(Cause::OtherEncoder { ea }), Some(other)));
         }
 
         /// Whatever is on the line, there is a report, and a value in it only with a sound CRC-8.
         #[test]
         fn anything_goes((request, _) in plain(), bits: u128, len in 0..=128_u32) {
-            let report = inspect(request, Profile::default(), window(bits, len));
+            let report = inspect(request, Resolution::default(), window(bits, len));
             prop_assert_eq!(report.error.is_none(), report.cause.is_none() && report.response.is_some());
         }
     }
 
     #[test]
     fn echo_layout_and_dead_lines() {
-        use crate::{Data, EncoderStatus, Operation, U24, U40};
+        use crate::data::Data;
+        use crate::number::U40;
+        use crate::operation::Operation;
+        use crate::status::EncoderStatus;
+        use servowire_core::U24;
         let request = Request::new(EncoderAddress::ZERO, Operation::Abs24Low);
         let answer =
-            |data| Response::new(EncoderAddress::ZERO, request.command(), EncoderStatus::NONE, data).emit().line();
+            |data| Response::new(EncoderAddress::ZERO, request.command(), EncoderStatus::empty(), data).emit().line();
         let line = answer(Data::Abs24 { abs: U24::truncate(77) });
         let frames = request.emit();
         let echo = frames.as_slice()[0].line();
@@ -429,7 +416,7 @@ mod tests {
         assert!(Cause::OtherEncoder { ea: EncoderAddress::MAX }.to_string().ends_with("encoder 7"));
         assert_eq!(
             (Kind::of(echo.bits() as u16 >> 1), Kind::of(line.bits() as u16 >> 1)),
-            (Kind::Request, Kind::Reply)
+            (Kind::Request, Kind::Response)
         );
     }
 }

@@ -1,9 +1,9 @@
 use core::fmt;
 
-use crate::Command;
-use crate::frame::FRAME_BITS;
+/// Bits of one frame on the line, in both directions: start bit 0, 16 content bits, delimiter 1.
+pub const FRAME_BITS: u32 = 18;
 
-/// What a reply carries between its information field and its CRC-8.
+/// What a response carries between its information field and its CRC-8.
 ///
 /// ```text
 ///  layout          frames  data, in the order of the line
@@ -30,6 +30,7 @@ use crate::frame::FRAME_BITS;
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "arbitrary", derive(arbitrary::Arbitrary))]
+#[non_exhaustive]
 pub enum Layout {
     /// ABS40.
     Abs40,
@@ -83,7 +84,7 @@ impl Layout {
         Self::Abs40Vel,
     ];
 
-    /// Frames of the reply, 2..=6.
+    /// Frames of the response, 2..=6.
     pub const fn frames(self) -> u8 {
         match self {
             Self::Abs17 => 2,
@@ -100,12 +101,12 @@ impl Layout {
         }
     }
 
-    /// Line bits of the reply, 18 a frame.
+    /// Line bits of the response, 18 a frame.
     pub const fn line_bits(self) -> u32 {
         (self.frames() as u32).wrapping_mul(FRAME_BITS)
     }
 
-    /// Position bits that the reply carries from bit 0 up, 0 if it has none or only the upper ones.
+    /// Position bits that the response carries from bit 0 up, 0 if it has none or only the upper ones.
     pub const fn abs_bits(self) -> u8 {
         match self {
             Self::Abs40 | Self::Abs40Vel => 40,
@@ -137,53 +138,8 @@ impl Layout {
     }
 }
 
-impl Command {
-    /// The two layouts in which the command may be answered, the one of version 2.1 first: for tools that have no request and
-    /// no profile at hand. Twice the same where there is but one.
-    pub const fn layouts(self) -> [Layout; 2] {
-        let only = match self {
-            Self::Abs24Low | Self::Abs24LowMt => return [Layout::Abs24, Layout::Abs40Vel],
-            Self::ClearStatus
-            | Self::ClearMultiturn
-            | Self::ClearStatusMultiturn
-            | Self::SetAddress1
-            | Self::ZeroPreset => return [Layout::Status, Layout::Abs24],
-            Self::EepromRead | Self::EepromWrite => return [Layout::Eeprom, Layout::EepromBank],
-            Self::IdRead1 | Self::IdWrite1 => return [Layout::Id, Layout::Coefficient],
-            Self::Abs40 | Self::Abs40Mt => Layout::Abs40,
-            Self::Abs24High | Self::Abs24HighMt => Layout::Abs24High,
-            Self::Status | Self::StatusMt => Layout::Status,
-            Self::Temperature => Layout::Temperature,
-            Self::IdRead2 | Self::IdWrite2 | Self::SetAddress2 => Layout::Id,
-            Self::Abs17 | Self::Abs17Mt => Layout::Abs17,
-            Self::Abs24Vel | Self::Abs24VelMt => Layout::Abs24Vel,
-            Self::Abs24VelAcc | Self::Abs24VelAccMt => Layout::Abs24VelAcc,
-            Self::Abs24Status | Self::Abs24StatusMt => Layout::Abs24Status,
-            Self::Abs24Temp | Self::Abs24TempMt => Layout::Abs24Temp,
-        };
-        [only, only]
-    }
-}
-
 impl fmt::Display for Layout {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(self.name())
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use crate::request::tests::every;
-    use crate::{EncoderAddress, Profile, Request};
-
-    /// Every operation is answered in one of the layouts of its command, whatever the factory setting.
-    #[test]
-    fn the_layouts_of_a_command_are_those_of_its_operations() {
-        let odd = Profile::default().low_with_velocity().resets_with_position();
-        for operation in every(0, 0, 0, 0) {
-            let request = Request::new(EncoderAddress::ZERO, operation);
-            let layouts = request.command().layouts();
-            assert!(layouts.contains(&request.layout(Profile::default())) && layouts.contains(&request.layout(odd)));
-        }
     }
 }

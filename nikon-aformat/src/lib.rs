@@ -6,10 +6,15 @@
 #[cfg(any(test, feature = "std"))]
 extern crate std;
 
+/// Sweeps are thinned under an interpreter.
+#[cfg(test)]
+const STRIDE: usize = if cfg!(miri) { 97 } else { 1 };
+
 mod abs40;
 pub mod bus;
 mod command;
 mod crc;
+mod data;
 pub mod device;
 mod error;
 mod expected;
@@ -18,30 +23,36 @@ pub mod inspect;
 mod layout;
 pub mod master;
 mod number;
-mod profile;
+mod operation;
+mod raw_response;
 pub mod reception;
-mod reply;
 mod request;
+mod resolution;
 mod response;
 mod status;
 pub mod stream;
 mod temperature;
+mod text;
 mod timing;
+mod type_word;
 
 pub use abs40::Abs40;
 pub use command::{Command, Version};
 pub use crc::{Crc3, Crc8, crc3, crc8};
+pub use data::Data;
 pub use error::{EchoField, Error, ErrorClass};
 pub use expected::{Echo, Expected};
-pub use frame::{FRAME_BITS, FrameCode, RequestFrame};
-pub use layout::Layout;
+pub use frame::{FrameCode, RequestFrame};
+pub use layout::{FRAME_BITS, Layout};
 pub use nrz_line::{BitOrder, Window};
-pub use nrz_line::{TooWide, Unsigned};
-pub use number::{EncoderAddress, U10, U17, U19, U24, U40, UserAddress};
-pub use profile::{Battery, Multiturn, Position, Profile, TypeWord, WidthError};
-pub use reply::Reply;
-pub use request::{Frames, Operation, Request};
-pub use response::{Body, Data, Response};
-pub use status::{Alarm, Alm, EncoderStatus, PmAlarm, PmAlm};
+pub use number::{EncoderAddress, EncoderId, U10, U17, U19, U40, UserAddress};
+pub use operation::Operation;
+pub use raw_response::RawResponse;
+pub use request::{Frames, Request};
+pub use resolution::{Position, Resolution, WidthError};
+pub use response::{Body, Response};
+pub use servowire_core::{OutOfRange, U24};
+pub use status::{Alm, EncoderStatus, PmAlm};
 pub use temperature::Temperature;
 pub use timing::{BitRate, FRAME_GAP_NS, POWER_UP_NS, READ_BUSY_NS, REQUEST_GAP_NS, WRITE_BUSY_NS};
+pub use type_word::{Battery, Multiturn, TypeWord};

@@ -1,7 +1,7 @@
 //! The controller's side as state machines without I/O: they are told what arrived and what time it is, and say what
 //! to do next. Time is a count of nanoseconds from any origin.
 //!
-//! * [`Transaction`] takes one request to its reply, [`BusTransaction`] to the replies of several encoders: time-outs and all
+//! * [`Transaction`] takes one request to its response, [`BusTransaction`] to the responses of several encoders: time-outs and all
 //!   checks.
 //! * [`Reset`], [`EepromRead`], [`Write`] and [`Detection`] are made of several transactions and drive them by [`Step`].
 //! * [`Cycle`] repeats a readout at a fixed period.
@@ -10,20 +10,33 @@
 mod cycle;
 mod detection;
 mod eeprom;
+mod guarded;
+mod hunt;
+mod line;
 mod reset;
 mod transaction;
+mod verified;
+mod write;
 
 pub use cycle::{Cycle, PeriodTooShort};
 pub use detection::{Detected, Detection};
-pub use eeprom::{EepromRead, Polling, Write};
-pub use nrz_line::ErrorRate;
+pub use eeprom::{EepromRead, READ_POLLING, WRITE_POLLING};
+pub use guarded::GuardedReset;
+pub use line::Line;
 pub use reset::Reset;
-pub use transaction::{BusTransaction, Line, Progress, Transaction};
+pub use servowire_core::{ErrorRate, Polling};
+pub use transaction::{BusTransaction, Reading, Sampled, Transaction};
+pub use verified::VerifiedWrite;
+pub use write::Write;
 
-use crate::{Error, ErrorClass, Request};
+use crate::error::{Error, ErrorClass};
+use crate::request::Request;
 
 /// What a procedure of several transactions wants next.
-pub type Step<T> = nrz_line::Step<Request, T, Error>;
+pub type Step<T> = servowire_core::Step<Request, T, Error>;
+
+/// How far a transaction is.
+pub type Progress<T> = servowire_core::Progress<T, Error>;
 
 /// How many transactions went well, and how many failed with which [`ErrorClass`].
-pub type Counters = nrz_line::Counters<{ ErrorClass::ALL.len() }>;
+pub type Counters = servowire_core::Counters<{ ErrorClass::ALL.len() }>;

@@ -1,67 +1,63 @@
-use nrz_line::{TooWide, Unsigned};
+use servowire_core::{OutOfRange, U24, number};
 
-use crate::Error;
+number! {
+    /// The 10 bits of a temperature.
+    pub struct U10(u16, 10);
+}
 
-/// The 10 bits of a temperature.
-pub type U10 = Unsigned<10>;
-/// The 17 bits of ABS17.
-pub type U17 = Unsigned<17>;
-/// The 19 bits of the velocity coefficient.
-pub type U19 = Unsigned<19>;
-/// The 24 bits of a position part or of an identification code.
-pub type U24 = Unsigned<24>;
+number! {
+    /// The 17 bits of ABS17.
+    pub struct U17(u32, 17);
+}
 
-/// The 40 bits of ABS40: single turn below, turns above.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Default)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(try_from = "u64", into = "u64"))]
-pub struct U40(u64);
+number! {
+    /// The 19 bits of the velocity coefficient.
+    pub struct U19(u32, 19);
+}
+
+number! {
+    /// The 40 bits of ABS40: single turn below, turns above.
+    pub struct U40(u64, 40);
+}
+
+number! {
+    /// EA, the address of an encoder on the bus, 0..=7. Vendor tools call them ENC1 to ENC8.
+    pub struct EncoderAddress(u8, 3);
+}
+
+number! {
+    /// The identification code of an encoder, 24 bits: what commands 16 to 20 read, write and choose an encoder by.
+    pub struct EncoderId(u32, 24);
+}
 
 impl U40 {
-    /// The largest value, 2^40 - 1.
-    pub const MAX: Self = Self(0xff_ffff_ffff);
-
-    /// `None` above 2^40 - 1.
-    pub const fn new(value: u64) -> Option<Self> {
-        if value > Self::MAX.0 { None } else { Some(Self(value)) }
-    }
-
-    /// The low 40 bits of `value`.
-    pub const fn truncate(value: u64) -> Self {
-        Self(value & Self::MAX.0)
-    }
-
-    /// The value.
-    pub const fn get(self) -> u64 {
-        self.0
-    }
-
     /// From five bytes, the lowest first.
-    pub(crate) const fn from_bytes([a, b, c, d, e]: [u8; 5]) -> Self {
-        Self(u64::from_le_bytes([a, b, c, d, e, 0, 0, 0]))
+    #[inline(always)]
+    pub(crate) const fn from_le_bytes([a, b, c, d, e]: [u8; 5]) -> Self {
+        Self::truncate(u64::from_le_bytes([a, b, c, d, e, 0, 0, 0]))
     }
 
-    /// Bits 0..=23, what ABS24 replies carry.
+    /// Bits 0..=23, what ABS24 responses carry.
     #[expect(clippy::cast_possible_truncation, reason = "the low bits are meant")]
     pub const fn low24(self) -> U24 {
-        U24::truncate(self.0 as u32)
+        U24::truncate(self.get() as u32)
     }
 
-    /// Bits 16..=39, what the upper ABS24 replies carry.
+    /// Bits 16..=39, what the upper ABS24 responses carry.
     #[expect(clippy::cast_possible_truncation, reason = "24 bits are left")]
     pub const fn high24(self) -> U24 {
-        U24::truncate((self.0 >> 16) as u32)
+        U24::truncate((self.get() >> 16) as u32)
     }
 
-    /// Bits 0..=16, what ABS17 replies carry.
+    /// Bits 0..=16, what ABS17 responses carry.
     #[expect(clippy::cast_possible_truncation, reason = "the low bits are meant")]
     pub const fn low17(self) -> U17 {
-        U17::truncate(self.0 as u32)
+        U17::truncate(self.get() as u32)
     }
 
     /// Puts the two 24-bit halves together again, if their common bits 16..=23 agree.
     ///
-    /// The halves come from two replies; at speed the position moved in between, and the common bits may differ.
+    /// The halves come from two responses; at speed the position moved in between, and the common bits may differ.
     ///
     /// ```
     /// use nikon_aformat::U40;
@@ -72,74 +68,25 @@ impl U40 {
         if low.get() >> 16 != high.get() & 0xff {
             return None;
         }
-        Some(Self((high.get() as u64) << 16 | (low.get() & 0xffff) as u64))
+        Some(Self::truncate((high.get() as u64) << 16 | (low.get() & 0xffff) as u64))
     }
 }
-
-impl TryFrom<u64> for U40 {
-    type Error = TooWide;
-
-    fn try_from(value: u64) -> Result<Self, TooWide> {
-        Self::new(value).ok_or(TooWide { got: value, bits: 40 })
-    }
-}
-
-impl From<U40> for u64 {
-    fn from(value: U40) -> Self {
-        value.get()
-    }
-}
-
-/// EA, the address of an encoder on the bus, 0..=7. Vendor tools call them ENC1 to ENC8.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Default)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(try_from = "u32", into = "u32"))]
-pub struct EncoderAddress(u8);
 
 impl EncoderAddress {
     /// All eight.
-    pub const ALL: [Self; 8] = [Self(0), Self(1), Self(2), Self(3), Self(4), Self(5), Self(6), Self(7)];
+    pub const ALL: [Self; 8] = [
+        Self::truncate(0),
+        Self::truncate(1),
+        Self::truncate(2),
+        Self::truncate(3),
+        Self::truncate(4),
+        Self::truncate(5),
+        Self::truncate(6),
+        Self::truncate(7),
+    ];
 
     /// Address 0, that of a single encoder as delivered.
-    pub const ZERO: Self = Self(0);
-
-    /// The highest address.
-    pub const MAX: Self = Self(7);
-
-    /// `None` above 7.
-    pub const fn new(address: u8) -> Option<Self> {
-        if address > 7 { None } else { Some(Self(address)) }
-    }
-
-    /// The three low bits of `address`.
-    pub const fn truncate(address: u8) -> Self {
-        Self(address & 7)
-    }
-
-    /// The number, 0..=7.
-    pub const fn get(self) -> u8 {
-        self.0
-    }
-}
-
-impl TryFrom<u32> for EncoderAddress {
-    type Error = Error;
-
-    fn try_from(address: u32) -> Result<Self, Error> {
-        u8::try_from(address).ok().and_then(Self::new).ok_or(Error::AddressRange { got: address })
-    }
-}
-
-impl From<EncoderAddress> for u32 {
-    fn from(address: EncoderAddress) -> Self {
-        Self::from(address.0)
-    }
-}
-
-impl core::fmt::Display for EncoderAddress {
-    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
-        write!(f, "{}", self.0)
-    }
+    pub const ZERO: Self = Self::truncate(0);
 }
 
 /// An EEPROM address that a request without bank may write, 0x00..=0xef.
@@ -148,7 +95,7 @@ impl core::fmt::Display for EncoderAddress {
 /// [type word](crate::TypeWord) and the temperature.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(try_from = "u32", into = "u32"))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(try_from = "u8", into = "u8"))]
 pub struct UserAddress(u8);
 
 impl UserAddress {
@@ -166,41 +113,30 @@ impl UserAddress {
     }
 }
 
-impl TryFrom<u32> for UserAddress {
-    type Error = Error;
+impl TryFrom<u8> for UserAddress {
+    type Error = OutOfRange;
 
-    fn try_from(address: u32) -> Result<Self, Error> {
-        u8::try_from(address).ok().and_then(Self::new).ok_or(Error::AddressRange { got: address })
+    fn try_from(address: u8) -> Result<Self, OutOfRange> {
+        Self::new(address).ok_or(OutOfRange::above(address.into(), Self::MAX.0.into()))
     }
 }
 
-impl From<UserAddress> for u32 {
+impl From<UserAddress> for u8 {
     fn from(address: UserAddress) -> Self {
-        Self::from(address.0)
+        address.0
+    }
+}
+
+impl core::fmt::Display for UserAddress {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        write!(f, "{:#04x}", self.0)
     }
 }
 
 #[cfg(feature = "arbitrary")]
-mod arbitrary_impls {
-    use super::{EncoderAddress, U40, UserAddress};
-    use arbitrary::{Arbitrary, Result, Unstructured};
-
-    impl<'a> Arbitrary<'a> for U40 {
-        fn arbitrary(from: &mut Unstructured<'a>) -> Result<Self> {
-            Ok(Self::truncate(from.arbitrary()?))
-        }
-    }
-
-    impl<'a> Arbitrary<'a> for EncoderAddress {
-        fn arbitrary(from: &mut Unstructured<'a>) -> Result<Self> {
-            Ok(Self::truncate(from.arbitrary()?))
-        }
-    }
-
-    impl<'a> Arbitrary<'a> for UserAddress {
-        fn arbitrary(from: &mut Unstructured<'a>) -> Result<Self> {
-            Ok(Self(from.int_in_range(0..=Self::MAX.0)?))
-        }
+impl<'a> arbitrary::Arbitrary<'a> for UserAddress {
+    fn arbitrary(from: &mut arbitrary::Unstructured<'a>) -> arbitrary::Result<Self> {
+        Ok(Self(from.int_in_range(0..=Self::MAX.0)?))
     }
 }
 
@@ -212,12 +148,11 @@ mod tests {
     #[test]
     fn limits() {
         assert_eq!((U10::MAX.get(), U17::MAX.get(), U19::MAX.get()), (1023, 131_071, 524_287));
-        assert_eq!(U24::new(0xff_ffff), Some(U24::MAX));
-        assert_eq!(U24::try_from(0x100_0000), Err(TooWide { got: 0x100_0000, bits: 24 }));
-        assert_eq!(EncoderAddress::try_from(8), Err(Error::AddressRange { got: 8 }));
-        assert_eq!(UserAddress::try_from(0xf0), Err(Error::AddressRange { got: 0xf0 }));
+        assert_eq!((EncoderAddress::MAX.get(), EncoderId::MAX.get(), U40::MAX.get()), (7, 0xff_ffff, 0xff_ffff_ffff));
+        assert_eq!(EncoderAddress::try_from(8), Err(OutOfRange { got: 8, max: 7 }));
+        assert_eq!(UserAddress::try_from(0xf0), Err(OutOfRange { got: 0xf0, max: 0xef }));
         assert_eq!(UserAddress::new(0xef), Some(UserAddress::MAX));
-        assert_eq!(U40::try_from(1 << 40), Err(TooWide { got: 1 << 40, bits: 40 }));
+        assert_eq!(U40::try_from(1 << 40), Err(OutOfRange { got: 1 << 40, max: (1 << 40) - 1 }));
     }
 
     proptest! {

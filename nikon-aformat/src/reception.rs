@@ -1,42 +1,48 @@
-//! Reception of replies from a sampled line: oversampled, or as a plain bit stream at any bit offset.
+//! Reception of responses from a sampled line: oversampled, or as a plain bit stream at any bit offset.
 //!
-//! Every start bit is searched anew and the clock is recovered from every edge, so idle bits may stand between the
-//! frames of a reply, and the rate error counts over one frame of 18 bits only. Over six frames of 108 bits one per
-//! cent would already be more than a bit.
+//! Every start bit is searched anew and the clock is recovered from every edge, so the rate error counts over one frame of 18
+//! bits only. Over six frames of 108 bits one per cent would already be more than a bit.
+//!
+//! The frames of a response follow each other without idle bits, and five idle bits or more separate two responses. A frame that
+//! begins a bit or more late has lost its start bit, and its response is refused.
 //!
 //! ```
 //! use nikon_aformat::reception::LineReceiver;
-//! use nikon_aformat::{BitOrder, Command, Expected, Layout, Reply, Response};
+//! use nikon_aformat::{BitOrder, Command, Expected, Layout, RawResponse, Response};
 //! use nrz_line::Samples;
 //!
-//! // three idle bits, then the reply to command 1 that a vendor's manual shows
-//! let line = Reply::from_words(&[0x3e03, 0x00ef, 0xdf35], BitOrder::MsbFirst, Layout::Abs24)?.line();
+//! // three idle bits, then the raw to command 1 that a vendor's manual shows
+//! let line = RawResponse::from_words(Layout::Abs24, &[0x3e03, 0x00ef, 0xdf35], BitOrder::MsbFirst)?.line();
 //! let mut samples = Samples::partial((line.bits() << 3 | 0b111) as u64, line.len() + 3);
 //!
 //! let mut receiver = LineReceiver::bits(Layout::Abs24);
-//! let reply = receiver.feed(&mut samples).expect("a reply")?;
-//! let response = Response::parse(&reply, &Expected::new(Layout::Abs24, Command::Abs24Low))?;
+//! let raw = receiver.feed(&mut samples).expect("a raw")?;
+//! let response = Response::parse(&Expected::new(Layout::Abs24, Command::Abs24Low), &raw)?;
 //! assert_eq!(response.abs(), Some(0xfb_f700));
 //! # Ok::<(), nikon_aformat::Error>(())
 //! ```
 
 use nrz_line::{Field, Format, FormatError, Receiver, Samples};
 
-use crate::frame::{FRAME_BITS, truncated};
-use crate::{Error, Layout, Reply};
+use crate::error::Error;
+use crate::frame::truncated;
+use crate::layout::FRAME_BITS;
+use crate::layout::Layout;
+use crate::raw_response::RawResponse;
 
-/// A piece of line that holds replies of one layout, one behind the other, as a sampler sees it.
+/// A piece of line that holds responses of one layout, one behind the other, as a sampler sees it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct LineReceiver {
     receiver: Receiver,
     layout: Layout,
-    on_bus: bool,
-    contents: [u16; Reply::MAX_FRAMES],
+    /// Whether idle bits may stand between the frames of a response.
+    idle_allowed: bool,
+    contents: [u16; RawResponse::MAX_FRAMES],
     got: u8,
     /// Index of the first sample behind the last frame.
     end: u64,
-    /// A frame was broken; the rest of its reply is passed over.
+    /// A frame was broken; the rest of its response is passed over.
     broken: bool,
 }
 
@@ -47,10 +53,10 @@ const PLAIN_BITS: Format = match Format::new(1, 16) {
 };
 
 impl LineReceiver {
-    /// Idle bits that separate two replies on a bus. The shortest gap that masters allow for is 7.5 bits.
+    /// Idle bits that separate two responses on a bus. The shortest gap that masters allow for is 7.5 bits.
     const BUS_GAP_BITS: u64 = 5;
 
-    /// A receiver of `samples_per_bit` samples a bit, 4 to 80, that takes any gap between frames.
+    /// A receiver of `samples_per_bit` samples a bit, 4 to 80.
     ///
     /// The vendor's receivers use 4, 5, 6 or 8.
     ///
@@ -63,27 +69,26 @@ impl LineReceiver {
         }
     }
 
-    /// A receiver of a plain bit stream, as a shift register packs it, that takes any gap between frames.
+    /// A receiver of a plain bit stream, as a shift register packs it.
     pub const fn bits(layout: Layout) -> Self {
         Self::of(PLAIN_BITS, layout)
     }
 
-    /// The same for a bus, where the frames of a reply follow each other without idle bits and five idle bits or more separate
-    /// two replies.
+    /// Takes any gap between the frames of a response, for a line on which idle bits stand between them.
     ///
-    /// A frame that begins a bit or more late has lost its start bit, and a later edge was taken for it: without this
-    /// rule, one such frame in 256 at the end of a reply passes the CRC-8. And a reply that lost a frame does not swallow
-    /// the first frame of the next one.
-    pub const fn on_bus(self) -> Self {
-        Self { on_bus: true, ..self }
+    /// **One wrong bit can then give a wrong position**: where the start bit of a frame is lost, a later edge is taken for it, and
+    /// one such frame in 256 at the end of a response passes the CRC-8. And a response that lost a frame swallows the
+    /// first frame of the next one.
+    pub const fn allowing_idle_between_frames(self) -> Self {
+        Self { idle_allowed: true, ..self }
     }
 
     const fn of(format: Format, layout: Layout) -> Self {
         Self {
             receiver: Receiver::new(format),
             layout,
-            on_bus: false,
-            contents: [0; Reply::MAX_FRAMES],
+            idle_allowed: false,
+            contents: [0; RawResponse::MAX_FRAMES],
             got: 0,
             end: 0,
             broken: false,
@@ -95,20 +100,20 @@ impl LineReceiver {
         self.receiver.position()
     }
 
-    /// Takes one sample; gives a reply when the delimiter of its last frame was sampled, or the fault that ended one.
-    pub fn push(&mut self, sample: bool) -> Option<Result<Reply, Error>> {
+    /// Takes one sample; gives a response when the delimiter of its last frame was sampled, or the fault that ended one.
+    pub fn push(&mut self, sample: bool) -> Option<Result<RawResponse, Error>> {
         let field = self.receiver.push(sample)?;
         self.take(field)
     }
 
     /// Takes `len` samples of the same level.
-    pub fn run(&mut self, level: bool, len: u64) -> Option<Result<Reply, Error>> {
+    pub fn run(&mut self, level: bool, len: u64) -> Option<Result<RawResponse, Error>> {
         let field = self.receiver.run(level, len)?;
         self.take(field)
     }
 
-    /// Takes samples off the front of `samples` until a reply ends or none are left.
-    pub fn feed(&mut self, samples: &mut Samples) -> Option<Result<Reply, Error>> {
+    /// Takes samples off the front of `samples` until a response ends or none are left.
+    pub fn feed(&mut self, samples: &mut Samples) -> Option<Result<RawResponse, Error>> {
         while let Some(field) = self.receiver.feed(samples) {
             let ended = self.take(field);
             if ended.is_some() {
@@ -118,23 +123,23 @@ impl LineReceiver {
         None
     }
 
-    /// The line has ended, or the time for the reply is over: the fault of a reply that had begun.
+    /// The line has ended, or the time for the response is over: the fault of a response that had begun.
     pub fn finish(&mut self) -> Option<Error> {
         let begun = (self.got > 0 || self.receiver.is_receiving()) && !self.broken;
         let error = self.truncation();
         let format = self.receiver.format();
-        *self = Self { on_bus: self.on_bus, ..Self::of(format, self.layout) };
+        *self = Self { idle_allowed: self.idle_allowed, ..Self::of(format, self.layout) };
         begun.then_some(error)
     }
 
-    /// One frame more. On a bus, a gap before it ends the reply that was begun, and the frame begins the next one.
-    fn take(&mut self, field: Field) -> Option<Result<Reply, Error>> {
+    /// One frame more. A gap before it ends the response that was begun, and the frame begins the next one.
+    fn take(&mut self, field: Field) -> Option<Result<RawResponse, Error>> {
         let samples = u64::from(self.receiver.format().samples_per_bit());
         // The end of a frame is known to half a bit.
         let idle = field.start.saturating_sub(self.end).saturating_add(samples / 2);
         self.end = field.start.saturating_add(samples.saturating_mul(FRAME_BITS.into()));
         let mut ended = None;
-        if self.on_bus {
+        if !self.idle_allowed {
             if idle >= samples.saturating_mul(Self::BUS_GAP_BITS) {
                 self.broken = false;
                 ended = (self.got > 0).then(|| Err(self.truncation()));
@@ -158,14 +163,14 @@ impl LineReceiver {
             return ended;
         }
         self.got = 0;
-        Some(Ok(Reply::of(core::mem::take(&mut self.contents), self.layout)))
+        Some(Ok(RawResponse::of(core::mem::take(&mut self.contents), self.layout)))
     }
 
-    /// A reply is given up; on a bus, its rest is passed over.
+    /// A response is given up, and its rest passed over.
     fn break_off(&mut self, error: Error) -> Error {
         self.got = 0;
-        self.contents = [0; Reply::MAX_FRAMES];
-        self.broken = self.on_bus;
+        self.contents = [0; RawResponse::MAX_FRAMES];
+        self.broken = !self.idle_allowed;
         error
     }
 
@@ -177,7 +182,12 @@ impl LineReceiver {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::command::Command;
+    use crate::expected::Expected;
+    use crate::number::{EncoderAddress, U17};
+    use crate::response::Response;
     use crate::response::tests::exchanges;
+    use crate::status::EncoderStatus;
     use core::iter::repeat_n;
     use nrz_line::{Wave, Window};
     use proptest::prelude::*;
@@ -192,70 +202,105 @@ mod tests {
         (0..line.len()).map(move |at| line.get(at) == Some(true))
     }
 
+    /// ABS17 of encoder 7, position 96964, with one wrong bit: the start bit of the second frame reads 1.
+    #[test]
+    fn one_wrong_bit_gives_no_position_but_with_idle_allowed() {
+        let line = "111000111110010001101110111101100100111";
+        let hear = |mut receiver: LineReceiver| {
+            let bits = line.chars().map(|c| c == '1').chain(repeat_n(true, 40));
+            bits.filter_map(|bit| receiver.push(bit)).collect::<Vec<_>>()
+        };
+        let receiver = LineReceiver::bits(Layout::Abs17);
+        assert_eq!(hear(receiver), [Err(Error::StartBit { frame: 1 })]);
+        let expected = Expected::new(Layout::Abs17, Command::Abs17).from_address(EncoderAddress::MAX);
+        let tolerant = hear(receiver.allowing_idle_between_frames());
+        let wrong = tolerant[0].and_then(|raw| Response::parse(&expected, &raw));
+        assert_eq!(wrong.map(|response| response.abs()), Ok(Some(57_028)));
+    }
+
+    /// Every single wrong bit of every position in a sweep: nothing wrong is ever accepted.
+    #[test]
+    fn no_single_flip_passes() {
+        let expected = Expected::new(Layout::Abs17, Command::Abs17).from_address(EncoderAddress::MAX);
+        for abs in (0..=0x1_ffff).step_by(if cfg!(miri) { 10_007 } else { 11 }) {
+            let sent = Response::abs17(EncoderAddress::MAX, EncoderStatus::empty(), U17::truncate(abs));
+            let line = sent.emit().line();
+            for at in 0..line.len() {
+                let flipped = Window::from_bits(line.bits() ^ 1 << at, line.len()).unwrap();
+                let mut receiver = LineReceiver::bits(Layout::Abs17);
+                let bits = repeat_n(true, 3).chain(bits_of(flipped)).chain(repeat_n(true, 40));
+                for raw in bits.filter_map(|bit| receiver.push(bit)).flatten() {
+                    let read = Response::parse(&expected, &raw);
+                    assert!(read.is_err(), "{abs}, bit {at}: {read:?}");
+                }
+            }
+        }
+    }
+
     proptest! {
         /// Any gap between frames, any phase, one per cent of clock error either way.
         #[test]
-        fn oversampled_replies(
+        fn oversampled_responses(
             (_, expected, response) in exchanges(), samples in prop::sample::select(&[4_u32, 5, 6, 8][..]),
             ppm in -10_000..=10_000_i32, phase: u32, gaps: [u8; 6],
         ) {
-            let reply = response.emit();
+            let raw = response.emit();
             let mut bits = std::vec![true; 3];
-            for (frame, gap) in gaps.iter().enumerate().take(usize::from(reply.frames())) {
+            for (frame, gap) in gaps.iter().enumerate().take(usize::from(raw.frames())) {
                 bits.extend(repeat_n(true, usize::from(gap % 4)));
-                bits.extend(bits_of(reply.line()).skip(frame * 18).take(18));
+                bits.extend(bits_of(raw.line()).skip(frame * 18).take(18));
             }
             bits.push(true);
-            let mut receiver = LineReceiver::oversampled(samples, expected.layout()).unwrap();
+            let mut receiver = LineReceiver::oversampled(samples, expected.layout()).unwrap().allowing_idle_between_frames();
             let got: Vec<_> = render(&bits, Wave::new(samples, ppm, phase)).into_iter()
                 .filter_map(|(level, len)| receiver.run(level, len)).collect();
-            prop_assert_eq!(got, [Ok(reply)]);
+            prop_assert_eq!(got, [Ok(raw)]);
             prop_assert_eq!(receiver.finish(), None);
         }
 
-        /// On a bus, a frame that begins one to four bits late is refused: its start bit was lost.
+        /// A frame that begins one to four bits late is refused: its start bit was lost.
         #[test]
         fn a_late_frame_lost_its_start_bit((_, expected, response) in exchanges(), frame in 1..6_u8, late in 1..5_usize) {
-            let reply = response.emit();
-            let frame = 1 + frame % (reply.frames() - 1);
-            let mut bits: Vec<bool> = bits_of(reply.line()).collect();
+            let raw = response.emit();
+            let frame = 1 + frame % (raw.frames() - 1);
+            let mut bits: Vec<bool> = bits_of(raw.line()).collect();
             let at = usize::from(frame) * 18;
             bits.splice(at..at, repeat_n(true, late));
-            let mut receiver = LineReceiver::bits(expected.layout()).on_bus();
+            let mut receiver = LineReceiver::bits(expected.layout());
             let got: Vec<_> = bits.into_iter().filter_map(|bit| receiver.push(bit)).collect();
             prop_assert_eq!(got, [Err(Error::StartBit { frame })]);
             prop_assert_eq!(receiver.finish(), None);
         }
 
-        /// A reply that loses frames costs only itself: the next one behind a gap arrives.
+        /// A response that loses frames costs only itself: the next one behind a gap arrives.
         #[test]
-        fn a_gap_ends_a_reply((_, expected, response) in exchanges(), kept in 0..108_usize, gap in 5..40_usize) {
-            let reply = response.emit();
-            let frames = usize::from(reply.frames());
+        fn a_gap_ends_a_response((_, expected, response) in exchanges(), kept in 0..108_usize, gap in 5..40_usize) {
+            let raw = response.emit();
+            let frames = usize::from(raw.frames());
             let kept = kept % (frames * 18);
-            let mut bits: Vec<bool> = bits_of(reply.line()).take(kept).collect();
+            let mut bits: Vec<bool> = bits_of(raw.line()).take(kept).collect();
             let whole = kept / 18;
             // What is left of a cut frame would run into the gap.
             bits.truncate(whole * 18);
             bits.extend(repeat_n(true, gap));
-            bits.extend(bits_of(reply.line()));
-            let mut receiver = LineReceiver::bits(expected.layout()).on_bus();
+            bits.extend(bits_of(raw.line()));
+            let mut receiver = LineReceiver::bits(expected.layout());
             let got: Vec<_> = bits.into_iter().filter_map(|bit| receiver.push(bit)).collect();
             let cut = Error::Truncated { got: whole as u16 * 18, want: frames as u16 * 18 };
             if whole == 0 {
-                prop_assert_eq!(got, [Ok(reply)]);
+                prop_assert_eq!(got, [Ok(raw)]);
             } else {
-                prop_assert_eq!(got, [Err(cut), Ok(reply)]);
+                prop_assert_eq!(got, [Err(cut), Ok(raw)]);
             }
         }
 
         #[test]
         fn cut_lines((_, expected, response) in exchanges(), cut in 1..108_usize) {
-            let reply = response.emit();
-            let cut = cut % (usize::from(reply.frames()) * 18 - 1) + 1;
+            let raw = response.emit();
+            let cut = cut % (usize::from(raw.frames()) * 18 - 1) + 1;
             let mut receiver = LineReceiver::bits(expected.layout());
-            prop_assert!(bits_of(reply.line()).take(cut).all(|bit| receiver.push(bit).is_none()));
-            let want = Error::Truncated { got: cut as u16 / 18 * 18, want: u16::from(reply.frames()) * 18 };
+            prop_assert!(bits_of(raw.line()).take(cut).all(|bit| receiver.push(bit).is_none()));
+            let want = Error::Truncated { got: cut as u16 / 18 * 18, want: u16::from(raw.frames()) * 18 };
             prop_assert_eq!(receiver.finish(), Some(want));
             prop_assert_eq!(receiver.finish(), None);
         }

@@ -1,7 +1,18 @@
+use core::fmt;
+
 use nrz_line::{BitOrder, OutOfBounds, Window};
 
-use crate::frame::{FRAME_BITS, truncated};
-use crate::{Command, EncoderAddress, Error, FrameCode, RequestFrame, U19, U24, UserAddress, Version};
+use crate::command::{Command, Version};
+use crate::error::Error;
+use crate::expected::{Echo, Expected};
+use crate::frame::truncated;
+use crate::frame::{FrameCode, RequestFrame};
+use crate::layout::FRAME_BITS;
+use crate::layout::Layout;
+use crate::number::{EncoderAddress, EncoderId, U19, UserAddress};
+use crate::operation::Operation;
+use crate::resolution::Resolution;
+use crate::text::write_words;
 
 #[cfg(test)]
 pub(crate) mod tests;
@@ -21,7 +32,6 @@ pub(crate) mod tests;
 ///
 /// In a multi-response request EA is best read as the highest address that is asked to answer; no document says it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "arbitrary", derive(arbitrary::Arbitrary))]
 pub struct Request {
@@ -29,198 +39,6 @@ pub struct Request {
     pub ea: EncoderAddress,
     /// What it shall do.
     pub operation: Operation,
-}
-
-/// A command with its arguments. See [`Command`] for what each does.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-#[cfg_attr(feature = "arbitrary", derive(arbitrary::Arbitrary))]
-#[allow(missing_docs, reason = "those without a comment are the commands of the same name")]
-pub enum Operation {
-    Abs40,
-    Abs24Low,
-    Abs24High,
-    Status,
-    Abs40Mt,
-    Abs24LowMt,
-    Abs24HighMt,
-    StatusMt,
-    ClearStatus,
-    ClearMultiturn,
-    ClearStatusMultiturn,
-    SetAddress1,
-    ZeroPreset,
-    /// Reads an EEPROM word.
-    EepromRead {
-        /// Any address.
-        address: u8,
-    },
-    /// Writes an EEPROM word.
-    EepromWrite {
-        /// 0x00..=0xef.
-        address: UserAddress,
-        /// The word.
-        data: u16,
-    },
-    Temperature,
-    IdRead1,
-    IdRead2,
-    /// Writes the identification code of the encoder with this address.
-    IdWrite1 {
-        /// The new code.
-        id: U24,
-    },
-    /// Writes the identification code of the only encoder on the line.
-    IdWrite2 {
-        /// The new code.
-        id: U24,
-    },
-    /// Gives the encoder with this identification code the address in EA.
-    SetAddress2 {
-        /// Whom it concerns.
-        id: U24,
-    },
-    Abs17,
-    Abs17Mt,
-    Abs24Vel,
-    Abs24VelMt,
-    Abs24VelAcc,
-    Abs24VelAccMt,
-    Abs24Status,
-    Abs24StatusMt,
-    Abs24Temp,
-    Abs24TempMt,
-    /// Reads an EEPROM word of a bank. Version 3.0.
-    EepromReadBank {
-        /// Bank.
-        bank: u8,
-        /// Any address.
-        address: u8,
-    },
-    /// Writes an EEPROM word of a bank. Version 3.0.
-    EepromWriteBank {
-        /// Bank.
-        bank: u8,
-        /// Any address.
-        address: u8,
-        /// The word.
-        data: u16,
-    },
-    /// Reads the velocity coefficient. Version 3.0.
-    CoefficientRead,
-    /// Writes the velocity coefficient. Version 3.0.
-    CoefficientWrite {
-        /// 19 bits; unit and meaning are not documented.
-        coefficient: U19,
-    },
-}
-
-impl Operation {
-    /// The command.
-    pub const fn command(self) -> Command {
-        match self {
-            Self::Abs40 => Command::Abs40,
-            Self::Abs24Low => Command::Abs24Low,
-            Self::Abs24High => Command::Abs24High,
-            Self::Status => Command::Status,
-            Self::Abs40Mt => Command::Abs40Mt,
-            Self::Abs24LowMt => Command::Abs24LowMt,
-            Self::Abs24HighMt => Command::Abs24HighMt,
-            Self::StatusMt => Command::StatusMt,
-            Self::ClearStatus => Command::ClearStatus,
-            Self::ClearMultiturn => Command::ClearMultiturn,
-            Self::ClearStatusMultiturn => Command::ClearStatusMultiturn,
-            Self::SetAddress1 => Command::SetAddress1,
-            Self::ZeroPreset => Command::ZeroPreset,
-            Self::EepromRead { .. } | Self::EepromReadBank { .. } => Command::EepromRead,
-            Self::EepromWrite { .. } | Self::EepromWriteBank { .. } => Command::EepromWrite,
-            Self::Temperature => Command::Temperature,
-            Self::IdRead1 | Self::CoefficientRead => Command::IdRead1,
-            Self::IdRead2 => Command::IdRead2,
-            Self::IdWrite1 { .. } | Self::CoefficientWrite { .. } => Command::IdWrite1,
-            Self::IdWrite2 { .. } => Command::IdWrite2,
-            Self::SetAddress2 { .. } => Command::SetAddress2,
-            Self::Abs17 => Command::Abs17,
-            Self::Abs17Mt => Command::Abs17Mt,
-            Self::Abs24Vel => Command::Abs24Vel,
-            Self::Abs24VelMt => Command::Abs24VelMt,
-            Self::Abs24VelAcc => Command::Abs24VelAcc,
-            Self::Abs24VelAccMt => Command::Abs24VelAccMt,
-            Self::Abs24Status => Command::Abs24Status,
-            Self::Abs24StatusMt => Command::Abs24StatusMt,
-            Self::Abs24Temp => Command::Abs24Temp,
-            Self::Abs24TempMt => Command::Abs24TempMt,
-        }
-    }
-
-    /// The operation of a command that takes no argument; `None` for the five that do (13, 14, 18, 19, 20).
-    pub const fn without_arguments(command: Command) -> Option<Self> {
-        Some(match command {
-            Command::Abs40 => Self::Abs40,
-            Command::Abs24Low => Self::Abs24Low,
-            Command::Abs24High => Self::Abs24High,
-            Command::Status => Self::Status,
-            Command::Abs40Mt => Self::Abs40Mt,
-            Command::Abs24LowMt => Self::Abs24LowMt,
-            Command::Abs24HighMt => Self::Abs24HighMt,
-            Command::StatusMt => Self::StatusMt,
-            Command::ClearStatus => Self::ClearStatus,
-            Command::ClearMultiturn => Self::ClearMultiturn,
-            Command::ClearStatusMultiturn => Self::ClearStatusMultiturn,
-            Command::SetAddress1 => Self::SetAddress1,
-            Command::ZeroPreset => Self::ZeroPreset,
-            Command::Temperature => Self::Temperature,
-            Command::IdRead1 => Self::IdRead1,
-            Command::IdRead2 => Self::IdRead2,
-            Command::Abs17 => Self::Abs17,
-            Command::Abs17Mt => Self::Abs17Mt,
-            Command::Abs24Vel => Self::Abs24Vel,
-            Command::Abs24VelMt => Self::Abs24VelMt,
-            Command::Abs24VelAcc => Self::Abs24VelAcc,
-            Command::Abs24VelAccMt => Self::Abs24VelAccMt,
-            Command::Abs24Status => Self::Abs24Status,
-            Command::Abs24StatusMt => Self::Abs24StatusMt,
-            Command::Abs24Temp => Self::Abs24Temp,
-            Command::Abs24TempMt => Self::Abs24TempMt,
-            Command::EepromRead
-            | Command::EepromWrite
-            | Command::IdWrite1
-            | Command::IdWrite2
-            | Command::SetAddress2 => return None,
-        })
-    }
-
-    /// The frame code of the command data frame: 3 for banks and the velocity coefficient, else 0.
-    pub const fn frame_code(self) -> FrameCode {
-        match self {
-            Self::EepromReadBank { .. }
-            | Self::EepromWriteBank { .. }
-            | Self::CoefficientRead
-            | Self::CoefficientWrite { .. } => FrameCode::Fc3,
-            _ => FrameCode::Fc0,
-        }
-    }
-
-    /// Whether only encoders of version 3.0 understand it.
-    pub const fn needs_version_3(self) -> bool {
-        matches!(self.frame_code(), FrameCode::Fc3) || matches!(self.command().min_version(), Version::V3_0)
-    }
-
-    /// Whether the encoder changes something that outlives the request: EEPROM, identification code, address, zero
-    /// point, turns, alarms.
-    pub const fn writes(self) -> bool {
-        self.command().is_reset()
-            || matches!(
-                self,
-                Self::EepromWrite { .. }
-                    | Self::EepromWriteBank { .. }
-                    | Self::IdWrite1 { .. }
-                    | Self::IdWrite2 { .. }
-                    | Self::SetAddress2 { .. }
-                    | Self::CoefficientWrite { .. }
-            )
-    }
 }
 
 impl Request {
@@ -271,13 +89,13 @@ impl Request {
     pub fn expected_frames(cdf: RequestFrame) -> Result<u8, Error> {
         let command = Command::from_code(cdf.code());
         match (cdf.frame_code(), command) {
-            (FrameCode::Fc0, Ok(Command::EepromRead)) => Ok(2),
-            (FrameCode::Fc0, Ok(Command::EepromWrite | Command::IdWrite2 | Command::SetAddress2))
-            | (FrameCode::Fc0 | FrameCode::Fc3, Ok(Command::IdWrite1)) => Ok(4),
-            (FrameCode::Fc3, Ok(Command::EepromRead)) => Ok(3),
-            (FrameCode::Fc3, Ok(Command::EepromWrite)) => Ok(5),
-            (FrameCode::Fc0, Ok(_)) | (FrameCode::Fc3, Ok(Command::IdRead1)) => Ok(1),
-            (FrameCode::Fc0, Err(error)) => Err(error),
+            (FrameCode::Fc0, Some(Command::EepromRead)) => Ok(2),
+            (FrameCode::Fc0, Some(Command::EepromWrite | Command::IdWrite2 | Command::SetAddress2))
+            | (FrameCode::Fc0 | FrameCode::Fc3, Some(Command::IdWrite1)) => Ok(4),
+            (FrameCode::Fc3, Some(Command::EepromRead)) => Ok(3),
+            (FrameCode::Fc3, Some(Command::EepromWrite)) => Ok(5),
+            (FrameCode::Fc0, Some(_)) | (FrameCode::Fc3, Some(Command::IdRead1)) => Ok(1),
+            (FrameCode::Fc0, None) => Err(Error::UnknownCommand { code: cdf.code() }),
             (got, _) => Err(Error::FrameCode { frame: 0, got: got.get(), want: 0 }),
         }
     }
@@ -290,7 +108,7 @@ impl Request {
     pub fn parse(frames: &[RequestFrame]) -> Result<Self, Error> {
         let Some(cdf) = frames.first() else { return Err(truncated(0, FRAME_BITS)) };
         let (ea, want) = (cdf.ea(), Self::expected_frames(*cdf)?);
-        let command = Command::from_code(cdf.code())?;
+        let command = Command::from_code(cdf.code()).ok_or(Error::UnknownCommand { code: cdf.code() })?;
         let Some(memory) = frames.get(1..usize::from(want)) else {
             let got = u32::try_from(frames.len()).unwrap_or(u32::MAX);
             return Err(truncated(got.saturating_mul(FRAME_BITS), u32::from(want).wrapping_mul(FRAME_BITS)));
@@ -304,19 +122,85 @@ impl Request {
             (Command::EepromRead, false) => Operation::EepromRead { address: byte(0) },
             (Command::EepromRead, true) => Operation::EepromReadBank { bank: byte(0), address: byte(1) },
             (Command::EepromWrite, false) => {
-                Operation::EepromWrite { address: UserAddress::try_from(u32::from(byte(2)))?, data }
+                let got = u32::from(byte(2));
+                Operation::EepromWrite { address: UserAddress::new(byte(2)).ok_or(Error::AddressRange { got })?, data }
             }
             (Command::EepromWrite, true) => Operation::EepromWriteBank { bank: byte(2), address: byte(3), data },
-            (Command::IdWrite1, false) => Operation::IdWrite1 { id: U24::truncate(three) },
+            (Command::IdWrite1, false) => Operation::IdWrite1 { id: EncoderId::truncate(three) },
             (Command::IdWrite1, true) => {
                 Operation::CoefficientWrite { coefficient: U19::new(three).ok_or(Error::DataRange { got: three })? }
             }
-            (Command::IdWrite2, _) => Operation::IdWrite2 { id: U24::truncate(three) },
-            (Command::SetAddress2, _) => Operation::SetAddress2 { id: U24::truncate(three) },
+            (Command::IdWrite2, _) => Operation::IdWrite2 { id: EncoderId::truncate(three) },
+            (Command::SetAddress2, _) => Operation::SetAddress2 { id: EncoderId::truncate(three) },
             (Command::IdRead1, true) => Operation::CoefficientRead,
             (other, _) => Operation::without_arguments(other).ok_or(Error::UnknownCommand { code: other.code() })?,
         };
         Ok(Self { ea, operation })
+    }
+
+    /// The layout of the response, from an encoder of this resolution.
+    ///
+    /// The same request can have different responses: version 3.0 encoders may be set in the factory to answer commands 1
+    /// and 5 with [`Layout::Abs40Vel`], and the resets with [`Layout::Abs24`]. The line does not tell it.
+    pub const fn layout(self, resolution: Resolution) -> Layout {
+        match self.operation {
+            Operation::Abs40 | Operation::Abs40Mt => Layout::Abs40,
+            Operation::Abs24Low | Operation::Abs24LowMt => {
+                if resolution.has_low_with_velocity() {
+                    Layout::Abs40Vel
+                } else {
+                    Layout::Abs24
+                }
+            }
+            Operation::Abs24High | Operation::Abs24HighMt => Layout::Abs24High,
+            Operation::Status | Operation::StatusMt => Layout::Status,
+            Operation::ClearStatus
+            | Operation::ClearMultiturn
+            | Operation::ClearStatusMultiturn
+            | Operation::SetAddress1
+            | Operation::ZeroPreset => {
+                if resolution.has_resets_with_position() {
+                    Layout::Abs24
+                } else {
+                    Layout::Status
+                }
+            }
+            Operation::EepromRead { .. } | Operation::EepromWrite { .. } => Layout::Eeprom,
+            Operation::EepromReadBank { .. } | Operation::EepromWriteBank { .. } => Layout::EepromBank,
+            Operation::Temperature => Layout::Temperature,
+            Operation::IdRead1
+            | Operation::IdRead2
+            | Operation::IdWrite1 { .. }
+            | Operation::IdWrite2 { .. }
+            | Operation::SetAddress2 { .. } => Layout::Id,
+            Operation::CoefficientRead | Operation::CoefficientWrite { .. } => Layout::Coefficient,
+            Operation::Abs17 | Operation::Abs17Mt => Layout::Abs17,
+            Operation::Abs24Vel | Operation::Abs24VelMt => Layout::Abs24Vel,
+            Operation::Abs24VelAcc | Operation::Abs24VelAccMt => Layout::Abs24VelAcc,
+            Operation::Abs24Status | Operation::Abs24StatusMt => Layout::Abs24Status,
+            Operation::Abs24Temp | Operation::Abs24TempMt => Layout::Abs24Temp,
+        }
+    }
+
+    /// What the response of an encoder of this resolution has to be.
+    ///
+    /// The address is checked where [`Command::answers_with_own_address`] says so.
+    pub const fn expected(self, resolution: Resolution) -> Expected {
+        let command = self.command();
+        let expected = Expected::new(self.layout(resolution), command).echoing(Echo::of(self.operation));
+        if command.answers_with_own_address() { expected.from_address(self.ea) } else { expected }
+    }
+
+    /// The request itself, if encoders of this resolution understand it.
+    ///
+    /// # Errors
+    /// [`Error::UnsupportedInVersion`].
+    pub fn check(self, resolution: Resolution) -> Result<Self, Error> {
+        let (command, version) = (self.command(), resolution.version());
+        if version < Version::V3_0 && self.operation.needs_version_3() {
+            return Err(Error::UnsupportedInVersion { command, version });
+        }
+        Ok(self)
     }
 }
 
@@ -354,7 +238,6 @@ fn check_order(memory: &[RequestFrame]) -> Result<(), Error> {
 
 /// The frames of one request, 1 to 5, in the order of the line.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Frames {
     frames: [RequestFrame; 5],
     len: u8,
@@ -385,7 +268,7 @@ impl Frames {
     }
 
     /// Writes the line bits over those of `bytes` that begin at bit `offset`, with `gap_bits` idle bits between two
-    /// frames (see [`BitRate::bits`](crate::BitRate::bits)); gives the number of bits.
+    /// frames (see [`BitRate::bits`](crate::timing::BitRate::bits)); gives the number of bits.
     ///
     /// ```
     /// use nikon_aformat::{BitOrder, BitRate, EncoderAddress, FRAME_GAP_NS, Operation, Request};
@@ -427,3 +310,17 @@ impl Frames {
         Ok(len)
     }
 }
+
+impl fmt::Display for Request {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "to {}: {}", self.ea, self.operation)
+    }
+}
+
+impl fmt::Display for Frames {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write_words(f, self.as_slice().iter().map(|frame| frame.word(BitOrder::MsbFirst)))
+    }
+}
+
+crate::text::format_as_displayed!(Request, Frames);

@@ -11,7 +11,13 @@ use nom::error::{ErrorKind, FromExternalError, ParseError};
 use nom::{Err, Needed, Parser};
 use nrz_line::{BitOrder, Window};
 
-use crate::{Error, Expected, FRAME_BITS, Frames, Reply, Request, RequestFrame, Response};
+use crate::error::Error;
+use crate::expected::Expected;
+use crate::frame::RequestFrame;
+use crate::layout::FRAME_BITS;
+use crate::raw_response::RawResponse;
+use crate::request::{Frames, Request};
+use crate::response::Response;
 
 /// Takes one request off the front, as an encoder receives it: two bytes a frame.
 ///
@@ -36,7 +42,7 @@ where
     }
 }
 
-/// Takes an expected reply off the front: two bytes a frame, 16 content bits in the given order.
+/// Takes an expected response off the front: two bytes a frame, 16 content bits in the given order.
 ///
 /// ```
 /// use nikon_aformat::{BitOrder, Command, Error, Expected, Layout, stream};
@@ -58,13 +64,13 @@ where
         if let Some(more) = NonZeroUsize::new(want.saturating_sub(input.len())) {
             return Err(Err::Incomplete(Needed::Size(more)));
         }
-        let mut words = [0; Reply::MAX_FRAMES];
+        let mut words = [0; RawResponse::MAX_FRAMES];
         let mut rest = input;
         for to in words.iter_mut().take(want / 2) {
             *to = word(rest, order)?;
             rest = rest.get(2..).unwrap_or(&[]);
         }
-        let parsed = Response::parse_words(&words, order, &expected);
+        let parsed = Response::parse_words(&expected, &words, order);
         parsed.map(|response| (rest, response)).map_err(|error| refuse(input, error))
     }
 }
@@ -72,10 +78,10 @@ where
 /// A packed line and the bit at which to begin.
 pub type Bits<'a> = (&'a [u8], usize);
 
-/// Passes over idle bits and takes an expected reply off the front of a packed line; `Incomplete` counts bits.
+/// Passes over idle bits and takes an expected response off the front of a packed line; `Incomplete` counts bits.
 ///
 /// # Errors
-/// As [`Response::parse_line`], with `Incomplete` for a line that ends in the reply or before it.
+/// As [`Response::parse_line`], with `Incomplete` for a line that ends in the response or before it.
 pub fn line_response<'a, E>(expected: Expected, order: BitOrder) -> impl Parser<Bits<'a>, Output = Response, Error = E>
 where
     E: ParseError<Bits<'a>> + FromExternalError<Bits<'a>, Error>,
@@ -92,7 +98,7 @@ where
         };
         let end = start.saturating_add(bits as usize);
         let rest = (bytes.get(end / 8..).unwrap_or(&[]), end % 8);
-        match Response::parse_line(line, &expected) {
+        match Response::parse_line(&expected, line) {
             Ok(response) => Ok((rest, response)),
             Err(error) => Err(Err::Error(E::from_external_error((bytes, offset), ErrorKind::MapRes, error))),
         }
@@ -146,7 +152,7 @@ mod tests {
     }
 
     proptest! {
-        /// However the bytes are split, the reply comes when its last byte is there, and not before.
+        /// However the bytes are split, the response comes when its last byte is there, and not before.
         #[test]
         fn any_split((asked, expected, answer) in exchanges(), cut in 0..12_usize, lsb: bool) {
             let order = if lsb { BitOrder::LsbFirst } else { BitOrder::MsbFirst };
@@ -166,7 +172,7 @@ mod tests {
             }
         }
 
-        /// Two replies on one packed line, behind any number of idle bits.
+        /// Two responses on one packed line, behind any number of idle bits.
         #[test]
         fn a_packed_line((_, expected, answer) in exchanges(), idle in 0..70_usize, gap in 0..30_usize, lsb: bool) {
             let order = if lsb { BitOrder::LsbFirst } else { BitOrder::MsbFirst };

@@ -1,4 +1,6 @@
-use crate::U10;
+use core::fmt;
+
+use crate::number::U10;
 
 /// A temperature, 10 bits of 0.25 degrees Celsius.
 ///
@@ -11,7 +13,6 @@ use crate::U10;
 /// assert_eq!(temperature.milli_celsius(), 77_500);
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Default)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "arbitrary", derive(arbitrary::Arbitrary))]
 pub struct Temperature(pub U10);
@@ -22,21 +23,20 @@ impl Temperature {
 
     /// From EEPROM word 0xf9.
     pub const fn from_eeprom(word: u16) -> Self {
-        Self(U10::truncate(word as u32))
+        Self(U10::truncate(word))
     }
 
     /// The ten bits, 0..=1023.
-    pub const fn raw(self) -> u32 {
+    pub const fn raw(self) -> u16 {
         self.0.get()
     }
 
     /// Thousandths of a degree Celsius with the ten bits as an unsigned number, 0..=255 750.
     pub const fn milli_celsius(self) -> u32 {
-        self.raw().wrapping_mul(250)
+        (self.raw() as u32).wrapping_mul(250)
     }
 
     /// Thousandths of a degree Celsius with the ten bits as two's complement, -128 000..=127 750.
-    #[expect(clippy::cast_possible_wrap, reason = "ten bits")]
     pub const fn signed_milli_celsius(self) -> i32 {
         let raw = self.raw() as i32;
         let signed = if raw > 511 { raw.wrapping_sub(1024) } else { raw };
@@ -44,16 +44,26 @@ impl Temperature {
     }
 }
 
+/// The unsigned reading in degrees Celsius, `77.50 C`.
+impl fmt::Display for Temperature {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let raw = self.raw();
+        write!(f, "{}.{:02} C", raw >> 2, (raw & 3).wrapping_mul(25))
+    }
+}
+
+crate::text::format_as_displayed!(Temperature);
+
 #[cfg(test)]
 mod tests {
     use super::*;
 
     #[test]
     fn all_1024() {
-        for raw in 0..1024_u32 {
-            let temperature = Temperature::from_eeprom(raw as u16 | 0xfc00);
+        for raw in 0..1024_u16 {
+            let temperature = Temperature::from_eeprom(raw | 0xfc00);
             assert_eq!(temperature.raw(), raw);
-            assert_eq!(temperature.milli_celsius(), raw * 1000 / 4);
+            assert_eq!(temperature.milli_celsius(), u32::from(raw) * 1000 / 4);
             let wrapped = temperature.signed_milli_celsius();
             assert_eq!(i64::from(wrapped).rem_euclid(256_000), i64::from(temperature.milli_celsius()));
             assert!((-128_000..128_000).contains(&wrapped));

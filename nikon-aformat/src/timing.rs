@@ -1,5 +1,5 @@
-use crate::Layout;
-use crate::frame::FRAME_BITS;
+use crate::layout::FRAME_BITS;
+use crate::layout::Layout;
 
 /// The five bit rates of A-format encoders; which one an encoder uses is part of its order code and cannot be changed
 /// over the line.
@@ -83,10 +83,10 @@ impl BitRate {
         })
     }
 
-    /// The gap between the replies of two encoders to a multi-response request, in ns.
+    /// The gap between the responses of two encoders to a multi-response request, in ns.
     ///
     /// The value that the AM243x Motor Control SDK waits before it looks for the next start bit, so a lower bound.
-    pub const fn reply_gap_ns(self) -> u32 {
+    pub const fn response_gap_ns(self) -> u32 {
         match self {
             Self::Mbit2_5 => 3_000,
             Self::Mbit4 | Self::Mbit6_67 => 2_000,
@@ -94,17 +94,17 @@ impl BitRate {
         }
     }
 
-    /// Line time of a reply in ns, rounded up.
-    pub const fn reply_ns(self, layout: Layout) -> u32 {
+    /// Line time of a response in ns, rounded up.
+    pub const fn response_ns(self, layout: Layout) -> u32 {
         self.bits_ns(layout.line_bits())
     }
 
-    /// Line time of a request of one frame, `encoders` replies and the gaps between them, in ns, rounded up. The
+    /// Line time of a request of one frame, `encoders` responses and the gaps between them, in ns, rounded up. The
     /// turn-around of the encoders and the cable (5 ns a metre each way) come on top.
     pub const fn transaction_ns(self, layout: Layout, encoders: u8) -> u32 {
         let bits = layout.line_bits().wrapping_mul(encoders as u32).wrapping_add(FRAME_BITS);
         let gaps = (encoders as u32).saturating_sub(1);
-        self.bits_ns(bits).saturating_add(gaps.wrapping_mul(self.reply_gap_ns()))
+        self.bits_ns(bits).saturating_add(gaps.wrapping_mul(self.response_gap_ns()))
     }
 
     /// Shortest cycle in which a multi-response command with this layout can be repeated: the transaction, the turn-around
@@ -123,7 +123,7 @@ const fn narrow(value: u64) -> u32 {
 mod tests {
     use super::*;
 
-    /// Request and reply on the line, without turn-around, as the tables of the protocol have them.
+    /// Request and response on the line, without turn-around, as the tables of the protocol have them.
     #[test]
     fn line_times() {
         let ns = |layout| BitRate::ALL.map(|rate| rate.transaction_ns(layout, 1));
@@ -139,7 +139,7 @@ mod tests {
     #[test]
     fn bits_last_at_least_as_long() {
         for rate in BitRate::ALL {
-            for ns in (0..40_000).step_by(7) {
+            for ns in (0..40_000).step_by(7 * crate::STRIDE) {
                 let bits = rate.bits(ns);
                 assert!(rate.bits_ns(bits) >= ns);
                 assert!(

@@ -13,12 +13,12 @@ fn without_noise_everything_arrives() {
     assert_eq!((tally.sent, tally.good, tally.lost), (16_000, 16_000, 0));
 }
 
-/// Two wrong bits in a thousand: one reply in eight is hit.
+/// Two wrong bits in a thousand: one response in eight is hit.
 #[test]
 fn through_noise_only_the_unseen_pass() {
     let tally = run(30_000, 2_000, 1);
     assert!(tally.lost > tally.sent / 20 && tally.good > tally.sent / 2, "{tally:?}");
-    // Expected are 41 664 triples of bits x (2e-3)^3 x 0.48 % = 1.6e-6 a reply, so 0.4 here.
+    // Expected are 41 664 triples of bits x (2e-3)^3 x 0.48 % = 1.6e-6 a response, so 0.4 here.
     assert!(tally.unseen_by_crc <= 5, "{tally:?}");
     assert!(tally.fewest_bits.is_none_or(|bits| bits >= 3), "{tally:?}");
     assert_eq!(tally.slipped, 0, "{tally:?}");

@@ -6,19 +6,13 @@
 #[cfg(any(test, feature = "std"))]
 extern crate std;
 
-mod health;
-mod number;
 mod order;
-mod procedure;
 mod receiver;
 mod samples;
 mod wave;
 mod window;
 
-pub use health::{Classified, Counters, ErrorRate};
-pub use number::{TooWide, Unsigned};
 pub use order::BitOrder;
-pub use procedure::{Polling, Step};
 pub use receiver::{Field, Format, FormatError, Receiver};
 pub use samples::Samples;
 pub use wave::Wave;

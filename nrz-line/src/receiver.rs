@@ -298,7 +298,7 @@ mod tests {
     /// All contents that stress the clock: every 8-bit content; for 16 bits all with one or two runs and their neighbours.
     fn worst(content_bits: u32) -> Vec<u16> {
         if content_bits == 8 {
-            return (0..=255).collect();
+            return (0..=255).step_by(if cfg!(miri) { 51 } else { 1 }).collect();
         }
         let mut out: Vec<u16> = (0..=16)
             .flat_map(|k| {
@@ -315,7 +315,7 @@ mod tests {
     fn survives(samples: u32, content_bits: u32, ppm: i32) -> bool {
         let format = Format::new(samples, content_bits).unwrap();
         worst(content_bits).iter().all(|&content| {
-            (0..32).all(|phase| {
+            (0..32).step_by(if cfg!(miri) { 31 } else { 1 }).all(|phase| {
                 let wave = Wave::new(samples, ppm, phase << 27);
                 let fields = [content, content, !content];
                 let got = receive(format, &render(&line(content_bits, &fields), wave));
@@ -341,8 +341,8 @@ mod tests {
 
     #[test]
     fn rate_tolerance_reaches_the_limits_and_ends_there() {
-        for (samples, content_bits, fast, slow) in LIMITS {
-            for ppm in (-slow * 1000 + 500..=fast * 1000 - 500).step_by(3500) {
+        for (samples, content_bits, fast, slow) in LIMITS.into_iter().take(if cfg!(miri) { 1 } else { LIMITS.len() }) {
+            for ppm in (-slow * 1000 + 500..=fast * 1000 - 500).step_by(if cfg!(miri) { 80_000 } else { 3500 }) {
                 assert!(survives(samples, content_bits, ppm), "N {samples}, K {content_bits}, {ppm} ppm");
             }
             for ppm in [fast * 1000 - 500, -slow * 1000 + 500] {

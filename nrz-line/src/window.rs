@@ -242,8 +242,8 @@ mod tests {
     fn reads_every_offset_and_length() {
         let bytes: Vec<u8> = (0..20u8).map(|k| k.wrapping_mul(157).wrapping_add(91)).collect();
         for order in [BitOrder::LsbFirst, BitOrder::MsbFirst] {
-            for offset in 0..=161usize {
-                for len in 0..=129u32 {
+            for offset in (0..=161usize).step_by(if cfg!(miri) { 23 } else { 1 }) {
+                for len in (0..=129u32).step_by(if cfg!(miri) { 16 } else { 1 }) {
                     let got = Window::read(&bytes, offset, len, order);
                     if len > 128 || offset + len as usize > 160 {
                         assert_eq!(got, Err(OutOfBounds { offset, len, available: 160usize.saturating_sub(offset) }));

@@ -4,11 +4,10 @@
 
 use core::num::NonZeroU16;
 
-use rtex_block::device::{Drive, OpenCodes, Settings};
+use rtex_block::device::{Drive, DriveConfig, OpenCodes};
 use rtex_block::inspect::inspect;
-use rtex_block::master::{ActiveCode, Axis, AxisSettings, AxisState, Limits, Ring};
-use rtex_block::position::Gear;
-use rtex_block::{Alarm, MacId, Response, TypeCode};
+use rtex_block::master::{ActiveCode, Axis, AxisConfig, AxisState, Limits, Received, Ring, SameMacId};
+use rtex_block::{Alarm, Command32, MacId, Response, TypeCode};
 
 /// Numbers that the documents at hand do not confirm; a model needs some.
 const CODES: OpenCodes = OpenCodes {
@@ -18,30 +17,29 @@ const CODES: OpenCodes = OpenCodes {
     alarm_active: TypeCode::short(0x01),
     alarm_history: TypeCode::short(0x02),
     alarm_clear: TypeCode::short(0x03),
+    alarm_attributes: TypeCode::short(0x76),
+    parameter_initial: TypeCode::short(0x77),
+    latch_arm: 0x78,
+    homing: 0x79,
     communication_lost: Alarm { main: 80, sub: 0 },
 };
 
-fn main() {
+fn main() -> Result<(), SameMacId> {
     let mac_id = MacId::new(5).unwrap_or_default();
     let some = NonZeroU16::MIN.saturating_add(7);
-    let axis = Axis::new(AxisSettings {
-        mac_id,
-        mode: ActiveCode::CyclicPosition,
-        update_ns: 500_000,
-        gear: Gear::UNITY,
-        limits: Limits { echo: some, ready: 200, active: 50, inactive: 50, answer: 50, command_errors: some },
-    });
-    let mut ring = Ring::new([axis], 2);
-    let mut drive = Drive::new(Settings { sync_exchanges: 4, servo_on_updates: 2, ..Settings::new(mac_id, CODES) });
-    let mut response = None;
+    let limits = Limits::new(some, 50).with_ready(200);
+    let axis = Axis::new(AxisConfig::new(mac_id, ActiveCode::CyclicPosition, 500_000, limits));
+    let mut ring = Ring::new([axis], 2)?;
+    let mut drive = Drive::new(DriveConfig::new(mac_id, CODES).with_sync_exchanges(4).with_servo_on_updates(2));
+    let mut received = Received::Nothing;
     let mut before = None;
     for _ in 0..16 {
-        let [command] = ring.update(&[response]);
-        let received = drive.exchange(&command.emit());
-        response = Response::parse(&received).ok();
+        let [Command32 { main: command, .. }] = ring.update(&[received]);
+        let block = drive.exchange(&command.emit());
+        received = Response::parse(&block).into();
 
-        println!("{} -> {}   {:?}", hex(&command.emit()), hex(&received), ring.axes()[0].state());
-        let report = inspect(&received);
+        println!("{} -> {}   {}", hex(&command.emit()), hex(&block), ring.axes()[0].state());
+        let report = inspect(&block);
         if let Some(before) = &before {
             for (field, old) in report.changes(before).filter(|(field, _)| field.name != "Update_Counter_Echo") {
                 println!(
@@ -62,6 +60,7 @@ fn main() {
             axis.set_position(next).unwrap_or_else(|refused| println!("{refused}"));
         }
     }
+    Ok(())
 }
 
 fn hex(block: &[u8; 16]) -> String {

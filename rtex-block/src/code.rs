@@ -1,4 +1,7 @@
-use crate::{Error, ErrorCode};
+use core::fmt;
+
+use crate::error::Error;
+use crate::error_code::ErrorCode;
 
 /// Cyclic command code, bits 6-4 of byte 1: what bytes 4-7 of a command mean.
 ///
@@ -121,57 +124,53 @@ impl NonCyclicCode {
     }
 }
 
-/// Bits 6-0 of byte 1, defined or not: a drive echoes an undefined code unchanged.
-///
-/// ```text
-///    7      6    5    4    3    2    1    0
-/// ┌──────┬──────────────┬───────────────────┐
-/// │  *   │    cyclic    │    non-cyclic     │   * TMG_CNT in a command, CMD_Error in a response
-/// └──────┴──────────────┴───────────────────┘
-/// ```
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(try_from = "u8", into = "u8"))]
-pub struct Code(u8);
+impl fmt::Display for CyclicCode {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.pad(self.name())
+    }
+}
+
+impl fmt::Display for NonCyclicCode {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.pad(self.name())
+    }
+}
+
+servowire_core::number! {
+    /// Bits 6-0 of byte 1, defined or not: a drive echoes an undefined code unchanged.
+    ///
+    /// ```text
+    ///    7      6    5    4    3    2    1    0
+    /// ┌──────┬──────────────┬───────────────────┐
+    /// │  *   │    cyclic    │    non-cyclic     │   * TMG_CNT in a command, CMD_Error in a response
+    /// └──────┴──────────────┴───────────────────┘
+    /// ```
+    pub struct Code(u8, 7);
+}
 
 impl Code {
     /// 00h, the NOP command.
-    pub const NOP: Self = Self(0x00);
+    pub const NOP: Self = Self::truncate(0x00);
     /// 10h, profile position, idle.
-    pub const PROFILE_IDLE: Self = Self(0x10);
+    pub const PROFILE_IDLE: Self = Self::truncate(0x10);
     /// 17h, profile position, start.
-    pub const PROFILE_START: Self = Self(0x17);
+    pub const PROFILE_START: Self = Self::truncate(0x17);
     /// 20h, cyclic position.
-    pub const CYCLIC_POSITION: Self = Self(0x20);
-
-    /// `None` above 7Fh.
-    pub const fn new(value: u8) -> Option<Self> {
-        if value < 0x80 { Some(Self(value)) } else { None }
-    }
-
-    /// The code in byte 1; bit 7 is not part of it.
-    pub const fn from_byte(byte1: u8) -> Self {
-        Self(byte1 & 0x7f)
-    }
+    pub const CYCLIC_POSITION: Self = Self::truncate(0x20);
 
     /// The code of a pair.
     pub const fn of(cyclic: CyclicCode, noncyclic: NonCyclicCode) -> Self {
-        Self((cyclic as u8) << 4 | noncyclic as u8)
-    }
-
-    /// The number, 0..=7Fh.
-    pub const fn get(self) -> u8 {
-        self.0
+        Self::truncate((cyclic as u8) << 4 | noncyclic as u8)
     }
 
     /// Bits 6-4, 0..=7.
     pub const fn cyclic_bits(self) -> u8 {
-        self.0 >> 4
+        self.get() >> 4
     }
 
     /// Bits 3-0, 0..=15.
     pub const fn noncyclic_bits(self) -> u8 {
-        self.0 & 15
+        self.get() & 15
     }
 
     /// The cyclic code; `None` if it is not defined.
@@ -194,6 +193,13 @@ impl Code {
             return Err(Error::NonCyclicCode { code: self.noncyclic_bits() });
         };
         Ok((cyclic, noncyclic))
+    }
+
+    /// The names of both codes with the number, `CP monitor (2Ah)`.
+    pub(crate) fn write(self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let cyclic = self.cyclic().map_or("undefined", CyclicCode::name);
+        let noncyclic = self.noncyclic().map_or("undefined", NonCyclicCode::name);
+        write!(f, "{cyclic} {noncyclic} ({:02X}h)", self.get())
     }
 
     /// What a drive reports for an undefined code: 0021h before 0022h; `None` if both are defined.
@@ -227,7 +233,7 @@ mod tests {
     #[test]
     fn every_byte_1() {
         for byte in 0..=255u8 {
-            let code = Code::from_byte(byte);
+            let code = Code::truncate(byte);
             let (high, low) = (byte >> 4 & 7, byte & 15);
             assert_eq!(code.cyclic().is_some(), high <= 4);
             assert_eq!(code.noncyclic().is_some(), [0, 1, 2, 4, 5, 6, 7, 10].contains(&low));
@@ -241,7 +247,7 @@ mod tests {
 
     #[test]
     fn allowed_pairs() {
-        let allowed: std::vec::Vec<u8> = (0..0x80).filter(|&c| Code::from_byte(c).is_allowed()).collect();
+        let allowed: std::vec::Vec<u8> = (0..0x80).filter(|&c| Code::truncate(c).is_allowed()).collect();
         // NOP alone; eight codes with PP; seven with each of CP, CV, CT.
         assert_eq!(allowed.len(), 1 + 8 + 3 * 7);
         for code in [0x00, 0x10, 0x17, 0x20, 0x25, 0x2a, 0x30, 0x40] {

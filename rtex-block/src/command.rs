@@ -1,11 +1,17 @@
-use crate::error::wrong_direction;
-use crate::{CODE_BIT7, Code, ControlBits, CyclicCode, Error, Header, LEN, MacId, Request, UpdateCounter, exact};
+use core::fmt;
+
+use crate::block::{CODE_BIT7, LEN, exact};
+use crate::code::{Code, CyclicCode};
+use crate::control::ControlBits;
+use crate::error::{Error, wrong_direction};
+use crate::header::{Header, MacId, UpdateCounter};
+use crate::noncyclic_command::NonCyclicCommand;
 
 /// A command block, borrowed: what a drive reads out of its reception memory.
 ///
 /// ```text
 /// byte 0        1                 2   3         4 .. 7          8 .. 15
-///      header   TMG_CNT | code    Control_Bits  Command_Data1   by the non-cyclic code: [`Request`]
+///      header   TMG_CNT | code    Control_Bits  Command_Data1   by the non-cyclic code: [`NonCyclicCommand`]
 /// ```
 /// The constructor checks length and direction, after that no getter can fail; codes are given as they are,
 /// defined or not. System Design Guide for Master, "Data structure"; SX-DSV02310, "Command data block".
@@ -14,7 +20,7 @@ pub struct CommandBlock<'a>(&'a [u8; LEN]);
 
 impl<'a> CommandBlock<'a> {
     /// # Errors
-    /// [`Error::Length`] unless there are 16 bytes, [`Error::Direction`] if C/R is 1.
+    /// [`Error::Truncated`] or [`Error::TooLong`] unless there are exactly 16 bytes, [`Error::Direction`] if C/R is 1.
     pub const fn new(bytes: &'a [u8]) -> Result<Self, Error> {
         match exact(bytes) {
             Ok(block) => Self::of(block),
@@ -52,7 +58,7 @@ impl<'a> CommandBlock<'a> {
 
     /// Byte 1 bits 6-0.
     pub const fn code(self) -> Code {
-        Code::from_byte(self.0[1])
+        Code::truncate(self.0[1])
     }
 
     /// Bytes 2-3 without the reserved bits.
@@ -77,7 +83,7 @@ impl<'a> CommandBlock<'a> {
     /// Servo_On is 0, **and** the code is one with which the drive looks at Servo_On. A NOP is not: a block of
     /// zeros leaves the servo as it is. Nor is a block that the drive refuses for its code.
     pub const fn is_servo_off(self) -> bool {
-        !self.control().servo_on() && self.obeys_control()
+        !self.control().contains(ControlBits::SERVO_ON) && self.obeys_control()
     }
 
     /// Whether a drive surely takes Control_Bits from this block: its codes go together
@@ -99,7 +105,7 @@ impl<'a> CommandBlock<'a> {
                 cyclic,
                 control: self.control(),
                 command_data1: self.command_data1(),
-                request: Request::from_bytes(noncyclic, self.noncyclic_bytes()),
+                noncyclic: NonCyclicCommand::from_bytes(noncyclic, self.noncyclic_bytes()),
             }),
             Err(e) => Err(e),
         }
@@ -119,7 +125,7 @@ impl<'a> CommandBlock<'a> {
             return Err(Error::CodePair { code: code.get() });
         }
         match ControlBits::reserved([self.0[2], self.0[3]]) {
-            [0, 0] => Request::check_reserved(noncyclic, self.noncyclic_bytes()),
+            [0, 0] => NonCyclicCommand::check_reserved(noncyclic, self.noncyclic_bytes()),
             [0, bits] => Err(Error::Reserved { byte: 3, bits }),
             [bits, _] => Err(Error::Reserved { byte: 2, bits }),
         }
@@ -155,7 +161,7 @@ pub struct Command {
     /// Position, speed or torque by [`cyclic`](Self::cyclic).
     pub command_data1: i32,
     /// Bytes 8-15, and with them the non-cyclic code.
-    pub request: Request,
+    pub noncyclic: NonCyclicCommand,
 }
 
 impl Command {
@@ -168,7 +174,7 @@ impl Command {
             cyclic: CyclicCode::CyclicPosition,
             control: ControlBits::empty(),
             command_data1: 0,
-            request: Request::IDLE,
+            noncyclic: NonCyclicCommand::IDLE,
         }
     }
 
@@ -179,13 +185,13 @@ impl Command {
 
     /// Byte 1 without TMG_CNT.
     pub const fn code(&self) -> Code {
-        Code::of(self.cyclic, self.request.code())
+        Code::of(self.cyclic, self.noncyclic.code())
     }
 
-    /// Decodes one block as leniently as a drive does: reserved bits are ignored.
+    /// Decodes a slice that is exactly one block, as leniently as a drive does: reserved bits are ignored.
     ///
     /// # Errors
-    /// [`Error::Length`], [`Error::Direction`], [`Error::CyclicCode`], [`Error::NonCyclicCode`], in this order.
+    /// [`Error::Truncated`], [`Error::TooLong`], [`Error::Direction`], [`Error::CyclicCode`], [`Error::NonCyclicCode`], in this order.
     pub const fn parse(bytes: &[u8]) -> Result<Self, Error> {
         match CommandBlock::new(bytes) {
             Ok(block) => block.to_owned(),
@@ -193,7 +199,7 @@ impl Command {
         }
     }
 
-    /// Decodes one block and refuses what an encoder must not write.
+    /// Decodes a slice that is exactly one block and refuses what an encoder must not write.
     ///
     /// # Errors
     /// As [`parse`](Self::parse), then [`Error::CodePair`] and [`Error::Reserved`].
@@ -213,8 +219,17 @@ impl Command {
         let header = Header { response: false, update_counter: self.update_counter, mac_id: self.mac_id };
         let [c2, c3] = self.control.to_bytes();
         let [d4, d5, d6, d7] = self.command_data1.to_le_bytes();
-        let [d8, d9, d10, d11, d12, d13, d14, d15] = self.request.to_bytes();
+        let [d8, d9, d10, d11, d12, d13, d14, d15] = self.noncyclic.to_bytes();
         let one = (self.tmg_cnt as u8) << 7 | self.code().get();
         [header.to_byte(), one, c2, c3, d4, d5, d6, d7, d8, d9, d10, d11, d12, d13, d14, d15]
+    }
+}
+
+impl fmt::Display for Command {
+    /// `to 5 #2 CP normal (20h) [SERVO_ON] 1000, 0 0`: drive, counter, codes, Control_Bits, Command_Data1, bytes 8-15.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "to {} #{} ", self.mac_id, self.update_counter)?;
+        self.code().write(f)?;
+        write!(f, " [{}] {}, {}", self.control, self.command_data1, self.noncyclic)
     }
 }

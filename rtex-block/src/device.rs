@@ -4,13 +4,15 @@
 //! part of it that looks at header, codes and sub block.
 
 mod check;
+mod config;
 mod drive;
+mod literals;
+mod manners;
 mod motion;
 mod parameters;
 mod profile;
-mod service;
-mod settings;
 
 pub use check::{Verdict, check};
+pub use config::{DriveConfig, OpenCodes};
 pub use drive::Drive;
-pub use settings::{OpenCodes, Settings};
+pub use manners::Manners;

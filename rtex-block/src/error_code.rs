@@ -46,7 +46,11 @@ impl ErrorCode {
 
 impl fmt::Display for ErrorCode {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{:04X}h", self.0)
+        write!(f, "{:04X}h", self.0)?;
+        match self.meaning() {
+            Some(meaning) => write!(f, " ({meaning})"),
+            None => Ok(()),
+        }
     }
 }
 

@@ -1,50 +1,30 @@
-/// Address of a drive on the ring, 0..=31 (MAC-ID).
-///
-/// A drive takes it from its rotary switches when it powers up. SX-DSV02310, "Command header".
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Default)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(try_from = "u8", into = "u8"))]
-pub struct MacId(u8);
+use core::fmt;
+
+servowire_core::number! {
+    /// Address of a drive on the ring, 0..=31 (MAC-ID).
+    ///
+    /// A drive takes it from its rotary switches when it powers up. SX-DSV02310, "Command header".
+    pub struct MacId(u8, 5);
+}
 
 impl MacId {
     /// How many addresses there are, and so the largest number of drives on a ring.
     pub const COUNT: usize = 32;
-
-    /// `None` above 31.
-    pub const fn new(value: u8) -> Option<Self> {
-        if value < 32 { Some(Self(value)) } else { None }
-    }
-
-    /// The number, 0..=31.
-    pub const fn get(self) -> u8 {
-        self.0
-    }
 }
 
-/// Update_Counter, 0..=3: the master adds 1 modulo 4 in every update period.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Default)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(try_from = "u8", into = "u8"))]
-pub struct UpdateCounter(u8);
+servowire_core::number! {
+    /// Update_Counter, 0..=3: the master adds 1 modulo 4 in every update period.
+    pub struct UpdateCounter(u8, 2);
+}
 
 impl UpdateCounter {
     /// Goes out with the invalid data (00h) before the first valid block.
-    pub const ZERO: Self = Self(0);
-
-    /// `None` above 3.
-    pub const fn new(value: u8) -> Option<Self> {
-        if value < 4 { Some(Self(value)) } else { None }
-    }
-
-    /// The number, 0..=3.
-    pub const fn get(self) -> u8 {
-        self.0
-    }
+    pub const ZERO: Self = Self::truncate(0);
 
     /// The counter of the next update period; after 3 comes 0.
     #[must_use]
     pub const fn next(self) -> Self {
-        Self(self.0.wrapping_add(1) & 3)
+        Self::truncate(self.get().wrapping_add(1))
     }
 }
 
@@ -75,12 +55,22 @@ pub struct Header {
 impl Header {
     /// Takes byte 0 apart; every value is a header.
     pub const fn from_byte(byte0: u8) -> Self {
-        Self { response: byte0 & 0x80 != 0, update_counter: UpdateCounter(byte0 >> 5 & 3), mac_id: MacId(byte0 & 0x1f) }
+        Self {
+            response: byte0 & 0x80 != 0,
+            update_counter: UpdateCounter::truncate(byte0 >> 5),
+            mac_id: MacId::truncate(byte0),
+        }
     }
 
     /// Byte 0.
     pub const fn to_byte(self) -> u8 {
-        (self.response as u8) << 7 | self.update_counter.0 << 5 | self.mac_id.0
+        (self.response as u8) << 7 | self.update_counter.get() << 5 | self.mac_id.get()
+    }
+}
+
+impl fmt::Display for Header {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{} {} #{}", if self.response { "from" } else { "to" }, self.mac_id, self.update_counter)
     }
 }
 

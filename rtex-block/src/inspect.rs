@@ -16,12 +16,22 @@
 //! ```
 
 mod fields;
+mod log;
 
 use core::fmt;
 
 pub use fields::{Field, Fields, Value};
+pub use log::{LogAnalysis, LogFinding, LogShape};
 
-use crate::{Code, Command, Command32, CommandBlock, Error, LEN, LEN32, Response, Response32};
+use crate::block::{LEN, LEN32};
+use crate::code::Code;
+use crate::command::{Command, CommandBlock};
+use crate::control::ControlBits;
+use crate::error::Error;
+use crate::execution::Execution;
+use crate::response::Response;
+use crate::status::StatusFlags;
+use crate::sub::{Command32, Response32};
 
 /// What most likely went wrong.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -222,7 +232,7 @@ fn cause(bytes: &[u8], error: Option<Error>) -> Option<Cause> {
     }
     error?;
     // A stray bit in a command with sense is no reason to doubt its order.
-    let nop = bytes.get(1).is_some_and(|byte1| Code::from_byte(*byte1).cyclic_bits() == 0);
+    let nop = bytes.get(1).is_some_and(|byte1| Code::truncate(*byte1).cyclic_bits() == 0);
     if lenient(bytes).is_ok() && !nop {
         return None;
     }
@@ -235,7 +245,7 @@ fn cause(bytes: &[u8], error: Option<Error>) -> Option<Cause> {
             }
         }
         // A NOP is too little to go by: it is mostly zeros, whatever their order.
-        let nop = turned.get(1).is_some_and(|byte1| Code::from_byte(*byte1) == Code::NOP);
+        let nop = turned.get(1).is_some_and(|byte1| Code::truncate(*byte1) == Code::NOP);
         strict(turned).ok().filter(|()| !nop)
     };
     match (sound(2), sound(4)) {
@@ -250,16 +260,17 @@ fn notes(bytes: &[u8]) -> [Option<Note>; 4] {
     let when = |condition: bool, note| condition.then_some(note);
     if let Ok(command) = CommandBlock::of(main) {
         let nop = command.code() == Code::NOP;
-        let on = command.control().servo_on();
+        let on = command.control().contains(ControlBits::SERVO_ON);
         return [when(nop && on, Note::ServoOnIgnored), when(nop && !on, Note::NopIsNotServoOff), None, None];
     }
     let Ok(response) = Response::parse(main) else { return [None; 4] };
     let sub = Response32::parse(bytes).ok().map(|r| r.sub);
-    let failed = response.answer().execution().is_some_and(|e| e.err) || sub.is_some_and(|s| s.execution.err);
+    let failed = response.noncyclic().execution().is_some_and(|e| e.contains(Execution::ERR))
+        || sub.is_some_and(|s| s.execution.contains(Execution::ERR));
     [
         when(response.cmd_error || sub.is_some_and(|s| s.cmd_error), Note::NotAccepted),
         when(failed, Note::FailedToExecute),
-        when(response.status.alarm(), Note::Alarm),
+        when(response.status.contains(StatusFlags::ALARM), Note::Alarm),
         None,
     ]
 }
@@ -267,7 +278,7 @@ fn notes(bytes: &[u8]) -> [Option<Note>; 4] {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{ControlBits, MacId, UpdateCounter};
+    use crate::header::{MacId, UpdateCounter};
     use proptest::prelude::*;
     use std::string::ToString;
     use std::vec::Vec;
@@ -291,7 +302,9 @@ mod tests {
         for size in (0..40).filter(|n| ![16, 32].contains(n)) {
             let report = inspect(&[0x20; 40][..size]);
             assert_eq!(report.cause, Some(Cause::OtherSize));
-            assert!(matches!(report.error(), Some(Error::Length { .. })) && !report.is_usable);
+            assert!(
+                matches!(report.error(), Some(Error::Truncated { .. } | Error::TooLong { .. })) && !report.is_usable
+            );
         }
     }
 
@@ -326,7 +339,7 @@ mod tests {
         let changes: Vec<_> =
             after.changes(&before).map(|(f, old)| (f.name, old.unwrap().to_string(), f.value.to_string())).collect();
         let text: Vec<_> = changes.iter().map(|(n, a, b)| (*n, a.as_str(), b.as_str())).collect();
-        assert_eq!(text, [("Update_Counter", "0", "1"), ("Servo_On", "0", "1"), ("Command_Position", "1000", "1010")]);
+        assert_eq!(text, [("Update_Counter", "0", "1"), ("SERVO_ON", "0", "1"), ("Command_Position", "1000", "1010")]);
         assert_eq!(after.changes(&after).count(), 0);
         assert_eq!(inspect(&[0; 16]).notes().collect::<Vec<_>>(), [Note::NopIsNotServoOff]);
     }

@@ -1,28 +1,42 @@
 //! The controller's side: what has to happen around the blocks, without any input or output of its own.
 //!
-//! The pieces work alone or together. [`Ring`] joins them: it takes the responses of all drives once per update
-//! period and gives the commands of the next. Time is counted in update periods.
+//! The pieces work alone or together. [`Ring`] joins the axes: it takes the responses of all drives once per update period
+//! and gives the commands of the next. [`Master`] adds the phases, the watchdog and the memory of the ASIC. Time is
+//! counted in update periods.
 
 mod axis;
 mod check;
+mod config;
 mod counter;
 mod echo;
 mod handshake;
 mod led;
 mod phase;
+pub mod procedure;
 mod profile_move;
+mod progress;
+mod received;
 mod ring;
+mod service;
 mod servo_off;
 mod slaves;
+mod state;
+mod sub_handshake;
 
-pub use axis::{Axis, AxisSettings, AxisState, Limits, SetpointError, StopReason};
+pub use axis::Axis;
 pub use check::{Expected, Reception};
+pub use config::{AxisConfig, Limits, StopPolicy};
 pub use counter::{CommandCounter, Turn};
 pub use echo::{EchoWatch, ReceiveWatchdog};
-pub use handshake::{Handshake, Progress};
+pub use handshake::Handshake;
 pub use led::{Led, Pattern, led, pattern};
 pub use phase::{Asic, Fault, Inputs, Phase, PhaseControl};
-pub use profile_move::{MoveProgress, ProfileMove};
-pub use ring::Ring;
+pub use profile_move::{CommandEnded, MoveStage, ProfileMove};
+pub use progress::{Failure, Progress};
+pub use received::Received;
+pub use ring::{Ring, SameMacId};
+pub use service::{Master, MasterConfig, SetupError};
 pub use servo_off::{ActiveCode, ServoOff};
 pub use slaves::{Order, Slave, SlaveInfo, compare};
+pub use state::{AskError, AxisState, SetpointError, StopReason};
+pub use sub_handshake::SubHandshake;

@@ -9,6 +9,10 @@
 //! 16-bit word k                           byte 2k+1 | byte 2k
 //! ```
 //!
+//! Three things that a host has to see to itself: the memory of the ASIC must not be cached, and a write buffer must be
+//! emptied before the ASIC is told to go on; on a host whose addresses count 16-bit units (TMS320F28388) every address of the
+//! ASIC, which the vendor gives in bytes, is halved. System Design Guide for Master, notes on the host.
+//!
 //! The words are written to where the caller wants them, for one block or for the memory of a whole ring. Where
 //! the bytes already lie in that memory ([`image_to_words32`]), they are turned in place.
 

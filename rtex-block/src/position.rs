@@ -1,5 +1,7 @@
 //! Command positions: 32-bit numbers that wrap.
 
+use servowire_core::OutOfRange;
+
 /// Step from one position to the next, the short way round: 7FFFFFFFh to 80000000h is a step of +1.
 ///
 /// SX-DSV02310, "Command error protection".
@@ -10,6 +12,11 @@ pub const fn step(old: i32, new: i32) -> i32 {
 /// Electronic gear: encoder pulses a command unit.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(
+    feature = "serde",
+    derive(serde::Serialize, serde::Deserialize),
+    serde(try_from = "(u32, u32)", into = "(u32, u32)")
+)]
 pub struct Gear {
     numerator: u32,
     denominator: u32,
@@ -25,7 +32,22 @@ impl Gear {
     }
 }
 
-/// Largest rate of command pulses behind the electronic gear, pulses per second.
+impl TryFrom<(u32, u32)> for Gear {
+    type Error = OutOfRange;
+
+    /// Numerator and denominator.
+    fn try_from((numerator, denominator): (u32, u32)) -> Result<Self, OutOfRange> {
+        Self::new(numerator, denominator).ok_or(OutOfRange { got: 0, max: 1 })
+    }
+}
+
+impl From<Gear> for (u32, u32) {
+    fn from(gear: Gear) -> Self {
+        (gear.numerator, gear.denominator)
+    }
+}
+
+/// Largest rate of command pulses after the electronic gear, pulses per second.
 pub const MAX_PULSES_PER_S: u32 = 400_000_000;
 
 /// Largest step of the command position in an update period, command units, rounded down.
@@ -39,6 +61,27 @@ pub const fn max_step(update_ns: u32, gear: Gear) -> u32 {
     let per_unit = (gear.numerator as u128).wrapping_mul(5);
     let Some(steps) = pulses.checked_div(per_unit) else { return 0 };
     if steps > u32::MAX as u128 { u32::MAX } else { steps as u32 }
+}
+
+/// Largest step of the command position in an update period at a speed, command units, rounded down: for the over-speed
+/// level of a drive, given in command units per second.
+#[expect(clippy::cast_possible_truncation, reason = "compared just before")]
+pub const fn max_step_at(units_per_s: u32, update_ns: u32) -> u32 {
+    let nano_units = (units_per_s as u64).saturating_mul(update_ns as u64);
+    let steps = nano_units / 1_000_000_000;
+    if steps > u32::MAX as u64 { u32::MAX } else { steps as u32 }
+}
+
+/// Largest torque command in 0.1 % of rated, rounded down, from the parameters of a linear drive: `peak` is Pr9.07 (peak
+/// current) and `rated` Pr9.06 (rated current, r.m.s.), both in 0.1 A. `None` if `rated` is 0.
+///
+/// 100 % x Pr9.07 / (Pr9.06 x sqrt 2). SX-DSV02310, "Command torque"; the root sign is lost in the text at hand and follows
+/// from a peak over an r.m.s. value.
+pub fn max_torque(peak: u16, rated: u16) -> Option<u32> {
+    let thousandfold = u128::from(peak).saturating_mul(1_000);
+    let squared = thousandfold.saturating_mul(thousandfold);
+    let root = squared.checked_div(u128::from(rated).saturating_mul(rated.into()).saturating_mul(2))?.isqrt();
+    u32::try_from(root).ok()
 }
 
 /// Whether a step stays within [`max_step`].
@@ -60,6 +103,25 @@ mod tests {
         assert_eq!(max_step(u32::MAX, Gear::new(1, u32::MAX).unwrap()), u32::MAX);
         assert_eq!(Gear::new(0, 1), None);
         assert_eq!(Gear::new(1, 0), None);
+    }
+
+    /// The formula of SX-DSV02310, section "Command torque", by hand: 100 % x 141.4 A / (100.0 A x 1.41421) = 99.98 %.
+    #[test]
+    fn torque_limit() {
+        assert_eq!(max_torque(1_414, 1_000), Some(999));
+        assert_eq!(max_torque(1_415, 1_000), Some(1_000));
+        assert_eq!(max_torque(6_000, 1_414), Some(3_000));
+        assert_eq!(max_torque(0, 5), Some(0));
+        assert_eq!(max_torque(5, 0), None);
+        assert_eq!(max_torque(u16::MAX, 1), Some(46_340_242));
+    }
+
+    #[test]
+    fn steps_at_a_speed() {
+        assert_eq!(max_step_at(400_000_000, 500_000), 200_000);
+        assert_eq!(max_step_at(1_999, 500_000), 0);
+        assert_eq!(max_step_at(2_000, 500_000), 1);
+        assert_eq!(max_step_at(u32::MAX, u32::MAX), u32::MAX);
     }
 
     proptest! {

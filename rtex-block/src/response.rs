@@ -1,11 +1,17 @@
-use crate::error::wrong_direction;
-use crate::{Answer, CODE_BIT7, Code, Error, Header, LEN, MacId, StatusFlags, UpdateCounter, exact};
+use core::fmt;
+
+use crate::block::{CODE_BIT7, LEN, exact};
+use crate::code::Code;
+use crate::error::{Error, wrong_direction};
+use crate::header::{Header, MacId, UpdateCounter};
+use crate::noncyclic_response::NonCyclicResponse;
+use crate::status::StatusFlags;
 
 /// A response block, borrowed: every getter is a load and a mask.
 ///
 /// ```text
 /// byte 0        1                   2   3         4 .. 7           8 .. 15
-///      header   CMD_Error | code    Status_Flags  Response_Data1   by CMD_Error, then the code: [`Answer`]
+///      header   CMD_Error | code    Status_Flags  Response_Data1   by CMD_Error, then the code: [`NonCyclicResponse`]
 /// ```
 /// The constructor checks length and direction, after that no getter can fail. System Design Guide for Master,
 /// "Data structure"; SX-DSV02310, "Response data block".
@@ -14,7 +20,7 @@ pub struct ResponseBlock<'a>(&'a [u8; LEN]);
 
 impl<'a> ResponseBlock<'a> {
     /// # Errors
-    /// [`Error::Length`] unless there are 16 bytes, [`Error::Direction`] if C/R is 0.
+    /// [`Error::Truncated`] or [`Error::TooLong`] unless there are exactly 16 bytes, [`Error::Direction`] if C/R is 0.
     pub const fn new(bytes: &'a [u8]) -> Result<Self, Error> {
         match exact(bytes) {
             Ok(block) => Self::of(block),
@@ -52,7 +58,7 @@ impl<'a> ResponseBlock<'a> {
 
     /// Echo of the code, defined or not.
     pub const fn code(self) -> Code {
-        Code::from_byte(self.0[1])
+        Code::truncate(self.0[1])
     }
 
     /// Status_Flags.
@@ -73,8 +79,8 @@ impl<'a> ResponseBlock<'a> {
     }
 
     /// What bytes 8-15 say.
-    pub const fn answer(self) -> Answer {
-        Answer::from_bytes(self.cmd_error(), self.code().noncyclic_bits(), self.noncyclic_bytes())
+    pub const fn noncyclic(self) -> NonCyclicResponse {
+        NonCyclicResponse::from_bytes(self.cmd_error(), self.code().noncyclic_bits(), self.noncyclic_bytes())
     }
 
     /// Everything at once.
@@ -100,13 +106,13 @@ impl<'a> ResponseBlock<'a> {
         if !self.cmd_error() {
             self.code().pair()?;
         }
-        Answer::check_reserved(self.cmd_error(), self.code().noncyclic_bits(), self.noncyclic_bytes())
+        NonCyclicResponse::check_reserved(self.cmd_error(), self.code().noncyclic_bits(), self.noncyclic_bytes())
     }
 }
 
 /// A response as values, one for one with the 128 bits: `emit` after `parse` gives back the same bytes.
 ///
-/// Bytes 8-15 stay two words, which is what they are in the cyclic case; [`answer`](Self::answer) reads them by
+/// Bytes 8-15 stay two words, which is what they are in the cyclic case; [`noncyclic`](Self::noncyclic) reads them by
 /// CMD_Error and code.
 ///
 /// ```
@@ -114,7 +120,7 @@ impl<'a> ResponseBlock<'a> {
 /// let block = [0xc5, 0x20, 0xc1, 0, 0xe8, 0x03, 0, 0, 0, 0, 0, 0, 0x9c, 0xff, 0xff, 0xff];
 /// let response = Response::parse(&block)?;
 /// assert_eq!((response.mac_id.get(), response.update_counter_echo.get()), (5, 2));
-/// assert!(response.status.servo_active() && response.status.servo_ready() && response.status.in_position());
+/// assert!(response.status.contains(StatusFlags::SERVO_ACTIVE | StatusFlags::SERVO_READY | StatusFlags::IN_POSITION));
 /// assert_eq!((response.response_data1, response.response_data3), (1_000, -100));
 /// # Ok::<(), Error>(())
 /// ```
@@ -135,26 +141,26 @@ pub struct Response {
     pub status: StatusFlags,
     /// Actual position, command units, or the value chosen by Pr7.29.
     pub response_data1: i32,
-    /// With the normal command: actual speed, or the value chosen by Pr7.30. Otherwise see [`answer`](Self::answer).
+    /// With the normal command: actual speed, or the value chosen by Pr7.30. Otherwise see [`noncyclic`](Self::noncyclic).
     pub response_data2: i32,
     /// With the normal command: torque in 0.1 % of rated, or the value chosen by Pr7.31. Otherwise see
-    /// [`answer`](Self::answer).
+    /// [`noncyclic`](Self::noncyclic).
     pub response_data3: i32,
 }
 
 impl Response {
     /// What bytes 8-15 say.
-    pub const fn answer(&self) -> Answer {
-        Answer::from_bytes(self.cmd_error, self.code.noncyclic_bits(), self.noncyclic_bytes())
+    pub const fn noncyclic(&self) -> NonCyclicResponse {
+        NonCyclicResponse::from_bytes(self.cmd_error, self.code.noncyclic_bits(), self.noncyclic_bytes())
     }
 
-    /// With other bytes 8-15. CMD_Error is set by [`Answer::CommandError`] and cleared by every other answer,
+    /// With other bytes 8-15. CMD_Error is set by [`NonCyclicResponse::CommandError`] and cleared by every other value,
     /// whose layout must be the one of [`code`](Self::code).
     #[must_use]
-    pub const fn with_answer(self, answer: &Answer) -> Self {
-        let [d8, d9, d10, d11, d12, d13, d14, d15] = answer.to_bytes();
+    pub const fn with_noncyclic(self, noncyclic: &NonCyclicResponse) -> Self {
+        let [d8, d9, d10, d11, d12, d13, d14, d15] = noncyclic.to_bytes();
         Self {
-            cmd_error: matches!(answer, Answer::CommandError(_)),
+            cmd_error: matches!(noncyclic, NonCyclicResponse::CommandError(_)),
             response_data2: i32::from_le_bytes([d8, d9, d10, d11]),
             response_data3: i32::from_le_bytes([d12, d13, d14, d15]),
             ..self
@@ -167,10 +173,10 @@ impl Response {
         [d8, d9, d10, d11, d12, d13, d14, d15]
     }
 
-    /// Decodes one block.
+    /// Decodes a slice that is exactly one block.
     ///
     /// # Errors
-    /// [`Error::Length`], [`Error::Direction`], in this order.
+    /// [`Error::Truncated`], [`Error::TooLong`], [`Error::Direction`], in this order.
     pub const fn parse(bytes: &[u8]) -> Result<Self, Error> {
         match ResponseBlock::new(bytes) {
             Ok(block) => Ok(block.to_owned()),
@@ -178,7 +184,7 @@ impl Response {
         }
     }
 
-    /// Decodes one block and refuses what no drive should send.
+    /// Decodes a slice that is exactly one block and refuses what no drive should send.
     ///
     /// # Errors
     /// As [`parse`](Self::parse), then [`Error::CyclicCode`] or [`Error::NonCyclicCode`] (without CMD_Error) and
@@ -197,5 +203,15 @@ impl Response {
         let [d8, d9, d10, d11, d12, d13, d14, d15] = self.noncyclic_bytes();
         let one = (self.cmd_error as u8) << 7 | self.code.get();
         [header.to_byte(), one, s2, s3, d4, d5, d6, d7, d8, d9, d10, d11, d12, d13, d14, d15]
+    }
+}
+
+impl fmt::Display for Response {
+    /// `from 5 #2 CP normal (20h) [SERVO_ACTIVE] 998, 10000 -100`: drive, counter, codes, Status_Flags, Response_Data1,
+    /// bytes 8-15.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "from {} #{} ", self.mac_id, self.update_counter_echo)?;
+        self.code.write(f)?;
+        write!(f, " [{}] {}, {}", self.status, self.response_data1, self.noncyclic())
     }
 }

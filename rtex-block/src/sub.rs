@@ -1,6 +1,14 @@
 //! Bytes 16-31 of the 32-byte mode.
 
-use crate::{Command, CommandBlock, Error, ErrorCode, Execution, LEN, LEN32, Response, ResponseBlock};
+use core::fmt;
+
+use crate::block::{LEN, LEN32};
+use crate::command::{Command, CommandBlock};
+use crate::error::{Error, wrong_length};
+use crate::error_code::ErrorCode;
+use crate::execution::Execution;
+use crate::response::{Response, ResponseBlock};
+use crate::type_code::Nibble;
 
 /// Sub_Command_Code, bits 3-0 of byte 16.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -26,6 +34,15 @@ impl SubCode {
             10 => Self::Monitor,
             _ => return None,
         })
+    }
+
+    /// The name of the vendor documents, in lower case.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Normal => "normal",
+            Self::SystemId => "system ID",
+            Self::Monitor => "monitor",
+        }
     }
 }
 
@@ -100,7 +117,7 @@ pub struct SubResponse {
     /// Sub_ERR, Sub_WNG, Sub_Busy.
     pub execution: Execution,
     /// Echo of the code, defined or not.
-    pub code: crate::Nibble,
+    pub code: Nibble,
     /// Echo of Sub_Type_Code; 0 with Sub_CMD_Err.
     pub type_code: u8,
     /// Echo of Sub_Index; with Sub_CMD_Err see [`error_code`](Self::error_code).
@@ -120,9 +137,8 @@ impl SubResponse {
         let flags = bytes[0];
         Self {
             cmd_error: flags & 0x80 != 0,
-            // The same three flags as in byte 9, one place lower except for Busy.
-            execution: Execution { err: flags & 0x40 != 0, wng: flags & 0x20 != 0, busy: flags & 0x10 != 0 },
-            code: crate::Nibble::low(flags),
+            execution: Execution::from_sub(flags),
+            code: Nibble::truncate(flags),
             type_code: bytes[1],
             index: u16::from_le_bytes([bytes[2], bytes[3]]),
             data1,
@@ -133,8 +149,7 @@ impl SubResponse {
 
     /// Bytes 16-31.
     pub const fn to_bytes(&self) -> [u8; LEN] {
-        let Execution { err, wng, busy } = self.execution;
-        let flags = (self.cmd_error as u8) << 7 | (err as u8) << 6 | (wng as u8) << 5 | (busy as u8) << 4;
+        let flags = (self.cmd_error as u8) << 7 | self.execution.to_sub();
         bytes(flags | self.code.get(), self.type_code, self.index, [self.data1, self.data2, self.data3])
     }
 
@@ -164,14 +179,14 @@ const fn bytes(b16: u8, type_code: u8, index: u16, data: [i32; 3]) -> [u8; LEN] 
 /// Main and sub block of one 32-byte block.
 ///
 /// # Errors
-/// [`Error::Length`] unless there are 32 bytes.
+/// [`Error::Truncated`] or [`Error::TooLong`] unless there are exactly 32 bytes.
 pub const fn split32(bytes: &[u8]) -> Result<(&[u8; LEN], &[u8; LEN]), Error> {
-    let refuse = Error::Length { got: bytes.len(), want: 32 };
-    let Some((main, sub)) = bytes.split_first_chunk::<LEN>() else { return Err(refuse) };
-    match sub.split_first_chunk::<LEN>() {
-        Some((sub, [])) => Ok((main, sub)),
-        _ => Err(refuse),
+    if let Some((main, sub)) = bytes.split_first_chunk::<LEN>() {
+        if let Some((sub, [])) = sub.split_first_chunk::<LEN>() {
+            return Ok((main, sub));
+        }
     }
+    Err(wrong_length(bytes.len(), 32))
 }
 
 fn join32(main: &[u8; LEN], sub: &[u8; LEN]) -> [u8; LEN32] {
@@ -198,10 +213,10 @@ pub struct Command32 {
 }
 
 impl Command32 {
-    /// Decodes one block; reserved bits are ignored.
+    /// Decodes a slice that is exactly one block; reserved bits are ignored.
     ///
     /// # Errors
-    /// [`Error::Length`], then those of [`Command::parse`], [`Error::SubChk`], [`Error::SubCommandCode`].
+    /// [`Error::Truncated`], [`Error::TooLong`], then those of [`Command::parse`], [`Error::SubChk`], [`Error::SubCommandCode`].
     pub const fn parse(bytes: &[u8]) -> Result<Self, Error> {
         let (main, sub) = match split32(bytes) {
             Ok(halves) => halves,
@@ -213,7 +228,7 @@ impl Command32 {
         }
     }
 
-    /// Decodes one block and refuses what an encoder must not write.
+    /// Decodes a slice that is exactly one block and refuses what an encoder must not write.
     ///
     /// # Errors
     /// As [`parse`](Self::parse), then [`Error::CodePair`] and [`Error::Reserved`].
@@ -246,10 +261,10 @@ pub struct Response32 {
 }
 
 impl Response32 {
-    /// Decodes one block.
+    /// Decodes a slice that is exactly one block.
     ///
     /// # Errors
-    /// [`Error::Length`], [`Error::Direction`], in this order.
+    /// [`Error::Truncated`], [`Error::TooLong`], [`Error::Direction`], in this order.
     pub const fn parse(bytes: &[u8]) -> Result<Self, Error> {
         let (main, sub) = match split32(bytes) {
             Ok(halves) => halves,
@@ -261,7 +276,7 @@ impl Response32 {
         }
     }
 
-    /// Decodes one block and refuses what no drive should send.
+    /// Decodes a slice that is exactly one block and refuses what no drive should send.
     ///
     /// # Errors
     /// As [`parse`](Self::parse), then those of [`Response::parse_strict`], then [`Error::Reserved`] for the bytes
@@ -286,5 +301,43 @@ impl Response32 {
     /// The block.
     pub fn emit(&self) -> [u8; LEN32] {
         join32(&self.main.emit(), &self.sub.to_bytes())
+    }
+}
+
+impl fmt::Display for SubCode {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.pad(self.name())
+    }
+}
+
+impl fmt::Display for SubCommand {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "sub {} type {:02X}h index {}, ", self.code, self.type_code, self.index)?;
+        write!(f, "{} {} {}", self.data1, self.data2, self.data3)
+    }
+}
+
+impl fmt::Display for SubResponse {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("sub ")?;
+        f.write_str(SubCode::new(self.code.get()).map_or("undefined", SubCode::name))?;
+        match self.error_code() {
+            Some(code) => write!(f, " not accepted: {code}")?,
+            None => write!(f, " type {:02X}h index {}", self.type_code, self.index)?,
+        }
+        write!(f, ", {} {} {}", self.data1, self.data2, self.data3)?;
+        if self.execution.is_empty() { Ok(()) } else { write!(f, " {}", self.execution) }
+    }
+}
+
+impl fmt::Display for Command32 {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}; {}", self.main, self.sub)
+    }
+}
+
+impl fmt::Display for Response32 {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}; {}", self.main, self.sub)
     }
 }

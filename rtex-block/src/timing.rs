@@ -31,6 +31,26 @@ impl Periods {
         (-1, self.communications(), self.com_ns)
     }
 
+    /// Communication periods by which new commands go out late, if the exchange that writes them ends `end_ns` after the
+    /// start of the frame that began its update period (the falling edge of XSYNC).
+    ///
+    /// 0 as long as the exchange is over before the next frame starts. At the falling edge of XSYNC a frame that is under way
+    /// puts off the switch of the memory banks, so anything later waits for one more frame. System Design Guide for Master,
+    /// "2 communications per calculation".
+    pub const fn frames_late(&self, end_ns: u32) -> u32 {
+        match end_ns.checked_div(self.com_ns) {
+            Some(late) => late,
+            None => 0,
+        }
+    }
+
+    /// The pair that an A5NL drive uses with these parameters; `None` if SX-DSV02310 does not show it.
+    ///
+    /// Pr7.20 = 3 is 0.5 ms, 0 is 1/12 ms; that 1/6 ms is Pr7.20 = 1 is inferred.
+    pub fn from_a5nl(pr7_20: i32, pr7_21: i32) -> Option<Self> {
+        A5NL.into_iter().find(|(a, b, _)| (*a, *b) == (pr7_20, pr7_21)).map(|(_, _, periods)| periods)
+    }
+
     /// The pair that an A6N drive uses with these parameters; `None` if the guide's table does not list it.
     ///
     /// Not listed does not mean known to be bad. Pr7.91 is looked at only if Pr7.20 is -1 (inferred; the table
@@ -61,6 +81,15 @@ pub const A6N: [Periods; 11] = [
     Periods::of(125_000, 2, false),
     Periods::of(125_000, 1, true),
     Periods::of(62_500, 2, false),
+];
+
+/// The pairs that SX-DSV02310 shows for the A5NL family, with Pr7.20 and Pr7.21; periods in whole ns, rounded down. Whether they
+/// work with the internal-timer system is not said: here those with one communication an update do.
+pub const A5NL: [(i32, i32, Periods); 4] = [
+    (3, 2, Periods::of(500_000, 2, false)),
+    (3, 1, Periods::of(500_000, 1, true)),
+    (1, 1, Periods::of(166_666, 1, true)),
+    (0, 2, Periods::of(83_333, 2, false)),
 ];
 
 /// Who gives the rhythm.
@@ -166,6 +195,23 @@ mod tests {
         assert_eq!(Periods::from_a6n(6, 2, None), None);
         assert_eq!(Periods::from_a6n(-1, 1, None), None);
         assert_eq!(Periods::from_a6n(-1, 1, Some(62_500)), None);
+    }
+
+    /// The figures of SX-DSV02310, pages 10 and 11.
+    #[test]
+    fn periods_of_the_a5nl() {
+        let of = |a, b| Periods::from_a5nl(a, b).map(|p| (p.com_ns, p.update_ns));
+        assert_eq!(of(3, 1), Some((500_000, 500_000)));
+        assert_eq!(of(3, 2), Some((500_000, 1_000_000)));
+        assert_eq!(of(0, 2), Some((83_333, 166_666)));
+        assert_eq!(of(1, 1), Some((166_666, 166_666)));
+        assert_eq!([of(0, 1), of(1, 2), of(6, 1), of(-1, 1)], [None; 4]);
+    }
+
+    #[test]
+    fn an_exchange_that_runs_into_the_next_frame_is_late() {
+        let periods = Periods::from_a6n(3, 1, None).unwrap();
+        assert_eq!([0, 499_999, 500_000, 999_999, 1_000_000].map(|end| periods.frames_late(end)), [0, 0, 1, 1, 2]);
     }
 
     #[test]

@@ -3,70 +3,39 @@
 //! A type code says what a non-cyclic command is about. Every number can be sent and received; constants exist
 //! for those that SX-DSV02310 confirms. The A5N and A6N families have more of them.
 
-/// Type_Code of the commands with the common layout, 12 bits.
-///
-/// Codes up to FFh are the new ones and work in the sub block too; longer ones are the conventional
-/// (A4N-compatible) codes and belong to the main block. SX-DSV02310, "System ID command".
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Default)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(try_from = "u16", into = "u16"))]
-pub struct TypeCode(u16);
+use core::fmt;
+
+servowire_core::number! {
+    /// Type_Code of the commands with the common layout, 12 bits.
+    ///
+    /// Codes up to FFh are the new ones and work in the sub block too; longer ones are the conventional
+    /// (A4N-compatible) codes and belong to the main block. SX-DSV02310, "System ID command".
+    pub struct TypeCode(u16, 12);
+}
 
 impl TypeCode {
-    /// `None` above FFFh.
-    pub const fn new(value: u16) -> Option<Self> {
-        if value <= 0xfff { Some(Self(value)) } else { None }
-    }
-
     /// A code of 8 bits.
     pub const fn short(value: u8) -> Self {
-        Self(value as u16)
-    }
-
-    /// The low 12 bits of a word.
-    pub(crate) const fn low(word: u32) -> Self {
-        let [low, high, ..] = word.to_le_bytes();
-        Self(u16::from_le_bytes([low, high & 15]))
-    }
-
-    /// The number, 0..=FFFh.
-    pub const fn get(self) -> u16 {
-        self.0
+        Self::truncate(value as u16)
     }
 
     /// The code as it goes into a sub block; `None` for a conventional code.
     pub const fn sub(self) -> Option<u8> {
-        match self.0.to_le_bytes() {
+        match self.get().to_le_bytes() {
             [code, 0] => Some(code),
             _ => None,
         }
     }
 }
 
-/// Four bits: a Latch_Sel field.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Default)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(try_from = "u8", into = "u8"))]
-pub struct Nibble(u8);
+servowire_core::number! {
+    /// Four bits: a Latch_Sel field.
+    pub struct Nibble(u8, 4);
+}
 
 impl Nibble {
     /// 0: outside latch mode.
-    pub const ZERO: Self = Self(0);
-
-    /// `None` above 15.
-    pub const fn new(value: u8) -> Option<Self> {
-        if value < 16 { Some(Self(value)) } else { None }
-    }
-
-    /// The low 4 bits.
-    pub(crate) const fn low(value: u8) -> Self {
-        Self(value & 15)
-    }
-
-    /// The number, 0..=15.
-    pub const fn get(self) -> u8 {
-        self.0
-    }
+    pub const ZERO: Self = Self::truncate(0);
 }
 
 /// Type codes of the reset command (1h). SX-DSV02310, "Reset command".
@@ -74,9 +43,9 @@ pub mod reset {
     use super::TypeCode;
 
     /// Software reset of the drive. Switch the servo off first.
-    pub const SOFTWARE: TypeCode = TypeCode(0x001);
+    pub const SOFTWARE: TypeCode = TypeCode::truncate(0x001);
     /// Makes parameters of attribute C valid without a reset.
-    pub const ATTRIBUTE_C: TypeCode = TypeCode(0x011);
+    pub const ATTRIBUTE_C: TypeCode = TypeCode::truncate(0x011);
 }
 
 /// Type codes of the system ID command (2h). SX-DSV02310, "System ID command".
@@ -84,31 +53,31 @@ pub mod system_id {
     use super::TypeCode;
 
     /// Vendor name.
-    pub const VENDOR_NAME: TypeCode = TypeCode(0x01);
+    pub const VENDOR_NAME: TypeCode = TypeCode::truncate(0x01);
     /// Kind of device, one of a table of characters: `1` servo, `2` stepping, ...
-    pub const DEVICE_TYPE: TypeCode = TypeCode(0x05);
+    pub const DEVICE_TYPE: TypeCode = TypeCode::truncate(0x05);
     /// Model name of the drive.
-    pub const MODEL: TypeCode = TypeCode(0x12);
+    pub const MODEL: TypeCode = TypeCode::truncate(0x12);
     /// Serial number of the drive.
-    pub const SERIAL_NUMBER: TypeCode = TypeCode(0x13);
+    pub const SERIAL_NUMBER: TypeCode = TypeCode::truncate(0x13);
     /// Software version of the drive.
-    pub const SOFTWARE_VERSION: TypeCode = TypeCode(0x14);
+    pub const SOFTWARE_VERSION: TypeCode = TypeCode::truncate(0x14);
     /// Type of the drive.
-    pub const DRIVER_TYPE: TypeCode = TypeCode(0x15);
+    pub const DRIVER_TYPE: TypeCode = TypeCode::truncate(0x15);
     /// Vendor of the external scale.
-    pub const SCALE_VENDOR_ID: TypeCode = TypeCode(0x31);
+    pub const SCALE_VENDOR_ID: TypeCode = TypeCode::truncate(0x31);
     /// Model of the external scale.
-    pub const SCALE_MODEL_ID: TypeCode = TypeCode(0x32);
+    pub const SCALE_MODEL_ID: TypeCode = TypeCode::truncate(0x32);
 
     /// The conventional code for the same text: ten hex times the new one. Only for the codes above.
     pub const fn conventional(code: TypeCode) -> Option<TypeCode> {
-        match code.0 {
-            0x01 | 0x05 | 0x12..=0x15 | 0x31 | 0x32 => Some(TypeCode(code.0 << 4)),
+        match code.get() {
+            0x01 | 0x05 | 0x12..=0x15 | 0x31 | 0x32 => Some(TypeCode::truncate(code.get() << 4)),
             _ => None,
         }
     }
 
-    /// Group `index` of a text: four ASCII characters, filled with NUL behind the end.
+    /// Group `index` of a text: four ASCII characters, filled with NUL after the end.
     ///
     /// ```
     /// use rtex_block::type_code::system_id::group;
@@ -160,7 +129,7 @@ pub mod parameter {
     use super::TypeCode;
 
     /// Write.
-    pub const WRITE: TypeCode = TypeCode(0x011);
+    pub const WRITE: TypeCode = TypeCode::truncate(0x011);
 }
 
 /// Type codes of the profile command (7h). SX-DSV02310, "Profile command".
@@ -174,32 +143,32 @@ pub mod monitor {
     use super::TypeCode;
 
     /// PERR, position deviation, command units.
-    pub const PERR: TypeCode = TypeCode(0x01);
-    /// MPOS, command position behind the filter, command units.
-    pub const MPOS: TypeCode = TypeCode(0x04);
+    pub const PERR: TypeCode = TypeCode::truncate(0x01);
+    /// MPOS, command position after the filter, command units.
+    pub const MPOS: TypeCode = TypeCode::truncate(0x04);
     /// ASPD, actual speed, unit by Pr7.25.
-    pub const ASPD: TypeCode = TypeCode(0x05);
+    pub const ASPD: TypeCode = TypeCode::truncate(0x05);
     /// TRQ, torque, 0.1 % of rated.
-    pub const TRQ: TypeCode = TypeCode(0x06);
+    pub const TRQ: TypeCode = TypeCode::truncate(0x06);
     /// APOS, actual position, command units.
-    pub const APOS: TypeCode = TypeCode(0x07);
+    pub const APOS: TypeCode = TypeCode::truncate(0x07);
     /// IPOS, command position before the filter, command units.
-    pub const IPOS: TypeCode = TypeCode(0x08);
+    pub const IPOS: TypeCode = TypeCode::truncate(0x08);
     /// LPOS1, position caught by latch 1.
-    pub const LPOS1: TypeCode = TypeCode(0x09);
+    pub const LPOS1: TypeCode = TypeCode::truncate(0x09);
     /// LPOS2, position caught by latch 2.
-    pub const LPOS2: TypeCode = TypeCode(0x0a);
-    /// MSPD, command speed behind the filter, unit by Pr7.25.
-    pub const MSPD: TypeCode = TypeCode(0x0c);
+    pub const LPOS2: TypeCode = TypeCode::truncate(0x0a);
+    /// MSPD, command speed after the filter, unit by Pr7.25.
+    pub const MSPD: TypeCode = TypeCode::truncate(0x0c);
     /// Regenerative load ratio, 0.1 %.
-    pub const REGENERATIVE_LOAD: TypeCode = TypeCode(0x11);
+    pub const REGENERATIVE_LOAD: TypeCode = TypeCode::truncate(0x11);
     /// Overload ratio, 0.1 %.
-    pub const OVERLOAD: TypeCode = TypeCode(0x12);
+    pub const OVERLOAD: TypeCode = TypeCode::truncate(0x12);
 
     /// The conventional code for the same value: 100h more. The codes 07h to 0Ch have none.
     pub const fn conventional(code: TypeCode) -> Option<TypeCode> {
-        match code.0 {
-            0x01 | 0x02 | 0x04..=0x06 | 0x11 | 0x12 => Some(TypeCode(code.0 | 0x100)),
+        match code.get() {
+            0x01 | 0x02 | 0x04..=0x06 | 0x11 | 0x12 => Some(TypeCode::truncate(code.get() | 0x100)),
             _ => None,
         }
     }
@@ -233,8 +202,14 @@ pub mod monitor {
 pub struct Pr {
     /// Number before the point.
     pub class: u8,
-    /// Number behind the point.
+    /// Number after the point.
     pub number: u8,
+}
+
+impl fmt::Display for Pr {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "Pr{}.{:02}", self.class, self.number)
+    }
 }
 
 impl Pr {
@@ -279,6 +254,6 @@ mod tests {
         for index in 0..=u16::MAX {
             assert_eq!(Pr::from_index(index).index(), index);
         }
-        assert!((0..=u16::MAX).filter_map(TypeCode::new).eq((0..0x1000).map(TypeCode)));
+        assert!((0..=u16::MAX).filter_map(TypeCode::new).eq((0..0x1000).map(TypeCode::truncate)));
     }
 }

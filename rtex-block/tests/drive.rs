@@ -10,16 +10,16 @@
 
 use core::num::NonZeroU16;
 
-use rtex_block::device::{Drive, OpenCodes, Settings};
+use rtex_block::device::{Drive, DriveConfig, OpenCodes};
 use rtex_block::master::{
-    ActiveCode, Axis, AxisSettings, AxisState, CommandCounter, Limits, MoveProgress, Progress, SetpointError,
-    StopReason,
+    ActiveCode, AskError, Axis, AxisConfig, AxisState, CommandCounter, Failure, Limits, MoveStage, Progress, Received,
+    SetpointError, StopReason,
 };
-use rtex_block::position::Gear;
 use rtex_block::type_code::{homing, monitor, parameter, profile, system_id};
 use rtex_block::{
-    Alarm, Answer, Arguments, Command, Command32, ControlBits, CyclicCode, ErrorCode, MacId, Nibble, Pr, Reply,
-    Request, Response, Response32, StatusFlags, SubCode, SubCommand, TypeCode, UpdateCounter,
+    Alarm, Arguments, Command, Command32, ControlBits, CyclicCode, ErrorCode, Execution, MacId, Nibble,
+    NonCyclicCommand, NonCyclicResponse, Pr, ProfileFlags, Response, Response32, Results, StatusFlags, SubCode,
+    SubCommand, TypeCode, UpdateCounter,
 };
 
 const CODES: OpenCodes = OpenCodes {
@@ -29,6 +29,10 @@ const CODES: OpenCodes = OpenCodes {
     alarm_active: TypeCode::short(0x73),
     alarm_history: TypeCode::short(0x74),
     alarm_clear: TypeCode::short(0x75),
+    alarm_attributes: TypeCode::short(0x76),
+    parameter_initial: TypeCode::short(0x77),
+    latch_arm: 0x78,
+    homing: 0x79,
     communication_lost: Alarm { main: 80, sub: 0 },
 };
 
@@ -47,11 +51,11 @@ struct Pair {
 impl Pair {
     fn new(mode: ActiveCode) -> Self {
         let some = NonZeroU16::new(6).unwrap();
-        let limits = Limits { echo: some, ready: 100, active: 40, inactive: 40, answer: 40, command_errors: some };
-        let settings = AxisSettings { mac_id: mac_id(), mode, update_ns: 500_000, gear: Gear::UNITY, limits };
+        let limits = Limits::new(some, 40).with_ready(100);
+        let config = AxisConfig::new(mac_id(), mode, 500_000, limits);
         Self {
-            axis: Axis::new(settings),
-            drive: Drive::new(Settings::new(mac_id(), CODES)),
+            axis: Axis::new(config),
+            drive: Drive::new(DriveConfig::new(mac_id(), CODES)),
             counter: CommandCounter::new(3),
             sent: rtex_block::master::Turn::Invalid,
             response: None,
@@ -67,9 +71,10 @@ impl Pair {
     }
 
     fn update(&mut self) {
-        self.axis.receive(self.sent, self.response.as_ref());
+        let received = self.response.map_or(Received::Nothing, Received::Main);
+        self.axis.receive(self.sent, &received);
         self.sent = self.counter.next();
-        let block = self.drive.exchange(&self.axis.send(self.sent).emit());
+        let block = self.drive.exchange(&self.axis.send(self.sent).main.emit());
         self.response = Some(Response::parse_strict(&block).unwrap());
     }
 
@@ -83,8 +88,8 @@ impl Pair {
         panic!("{:?}, {:?}", self.axis.state(), self.drive.alarm());
     }
 
-    fn ask(&mut self, request: Request) -> Progress {
-        while !self.axis.ask(request) {
+    fn ask(&mut self, request: NonCyclicCommand) -> Progress<NonCyclicResponse> {
+        while self.axis.ask(request).is_err() {
             self.update();
         }
         for _ in 0..100 {
@@ -96,9 +101,9 @@ impl Pair {
         panic!("no outcome");
     }
 
-    fn value(&mut self, request: Request) -> i32 {
+    fn value(&mut self, request: NonCyclicCommand) -> i32 {
         match self.ask(request) {
-            Progress::Done { data, warning: false } => data,
+            Progress::Done { value } if value.execution() == Some(Execution::empty()) => value.data().unwrap(),
             other => panic!("{other:?}"),
         }
     }
@@ -115,7 +120,7 @@ fn requests_of_every_kind() {
 
     let mut name = Vec::new();
     for group in 0.. {
-        let four = pair.value(Request::SystemId(about(system_id::VENDOR_NAME, group, 0))).to_le_bytes();
+        let four = pair.value(NonCyclicCommand::SystemId(about(system_id::VENDOR_NAME, group, 0))).to_le_bytes();
         name.extend_from_slice(system_id::text(&four));
         if four[3] == 0 {
             break;
@@ -124,12 +129,12 @@ fn requests_of_every_kind() {
     assert_eq!(name, b"Panasonic");
 
     let speed_unit = Pr { class: 7, number: 25 }.index();
-    assert_eq!(pair.value(Request::Parameter(about(CODES.parameter_read, speed_unit, 0))), 1);
-    assert_eq!(pair.value(Request::Parameter(about(parameter::WRITE, speed_unit, 0))), 0);
-    assert_eq!(pair.value(Request::Parameter(about(CODES.parameter_read, speed_unit, 0))), 0);
-    pair.value(Request::Parameter(about(CODES.parameter_store, speed_unit, 0)));
+    assert_eq!(pair.value(NonCyclicCommand::Parameter(about(CODES.parameter_read, speed_unit, 0))), 1);
+    assert_eq!(pair.value(NonCyclicCommand::Parameter(about(parameter::WRITE, speed_unit, 0))), 0);
+    assert_eq!(pair.value(NonCyclicCommand::Parameter(about(CODES.parameter_read, speed_unit, 0))), 0);
+    pair.value(NonCyclicCommand::Parameter(about(CODES.parameter_store, speed_unit, 0)));
 
-    let set = |position| Request::Homing {
+    let set = |position| NonCyclicCommand::Homing {
         type_code: homing::SET_ACTUAL_POSITION,
         latch_sel1: Nibble::ZERO,
         latch_sel2: Nibble::ZERO,
@@ -137,28 +142,30 @@ fn requests_of_every_kind() {
         setting_data: position,
     };
     pair.value(set(-77_000));
-    assert_eq!(pair.value(Request::Monitor(about(monitor::APOS, 0, 0))), -77_000);
+    assert_eq!(pair.value(NonCyclicCommand::Monitor(about(monitor::APOS, 0, 0))), -77_000);
     pair.update();
-    assert_eq!((pair.axis.setpoint(), pair.axis.status().homing_complete()), (-77_000, true));
-    pair.drive.catch_latch1();
-    assert_eq!(pair.value(Request::Monitor(about(monitor::LPOS1, 0, 0))), -77_000);
+    assert_eq!((pair.axis.setpoint(), pair.axis.status().contains(StatusFlags::HOMING_COMPLETE)), (-77_000, true));
 
     let rejected = |pair: &mut Pair, request| pair.ask(request);
     let unknown = TypeCode::short(0xee);
     for (request, code) in [
-        (Request::Monitor(about(unknown, 0, 0)), ErrorCode::TYPE_CODE),
-        (Request::Monitor(about(monitor::APOS, 1, 0)), ErrorCode::ARGUMENT),
-        (Request::Monitor(about(monitor::APOS, 0, 5)), ErrorCode::ARGUMENT),
-        (Request::Parameter(about(parameter::WRITE, 0xffff, 0)), ErrorCode::ARGUMENT),
-        (Request::SystemId(about(system_id::MODEL, 99, 0)), ErrorCode::ARGUMENT),
-        (Request::Reset(about(rtex_block::type_code::reset::SOFTWARE, 1, 0)), ErrorCode::ARGUMENT),
+        (NonCyclicCommand::Monitor(about(unknown, 0, 0)), ErrorCode::TYPE_CODE),
+        (NonCyclicCommand::Monitor(about(monitor::APOS, 1, 0)), ErrorCode::ARGUMENT),
+        (NonCyclicCommand::Monitor(about(monitor::APOS, 0, 5)), ErrorCode::ARGUMENT),
+        (NonCyclicCommand::Parameter(about(parameter::WRITE, 0xffff, 0)), ErrorCode::ARGUMENT),
+        (NonCyclicCommand::SystemId(about(system_id::MODEL, 99, 0)), ErrorCode::ARGUMENT),
+        (NonCyclicCommand::Reset(about(rtex_block::type_code::reset::SOFTWARE, 1, 0)), ErrorCode::ARGUMENT),
     ] {
-        assert_eq!(rejected(&mut pair, request), Progress::Rejected(code), "{request:?}");
+        assert_eq!(
+            rejected(&mut pair, request),
+            Progress::Failed { error: Failure::CommandError(code) },
+            "{request:?}"
+        );
     }
     assert_eq!(pair.axis.state(), AxisState::Off);
-    // With the servo on the same command is accepted and fails.
+    // With the servo on the set-point would stay in the old coordinates, so the master does not send it.
     let mut pair = Pair::on(ActiveCode::CyclicPosition);
-    assert_eq!(pair.ask(set(0)), Progress::Failed);
+    assert_eq!(pair.axis.ask(set(0)), Err(AskError::ServoOn));
     assert_eq!(pair.axis.state(), AxisState::On);
 }
 
@@ -171,11 +178,11 @@ fn alarms_stop_the_axis_and_can_be_read_and_cleared() {
     assert_eq!(pair.axis.state(), AxisState::Stopped(StopReason::Alarm));
     assert_eq!(pair.axis.set_position(0), Err(SetpointError::NotOn));
     // Requests work while the axis is stopped.
-    let data = pair.value(Request::Alarm(about(CODES.alarm_active, 0, 0)));
-    assert_eq!(data, Reply::alarm_data(Alarm { main: 38, sub: 1 }, 0xa0));
-    let history = pair.value(Request::Alarm(about(CODES.alarm_history, 1, 0)));
-    assert_eq!(history, Reply::alarm_data(Alarm { main: 38, sub: 1 }, 0));
-    pair.value(Request::Alarm(about(CODES.alarm_clear, 0, 0)));
+    let data = pair.value(NonCyclicCommand::Alarm(about(CODES.alarm_active, 0, 0)));
+    assert_eq!(data, Results::alarm_data(Alarm { main: 38, sub: 1 }, 0xa0));
+    let history = pair.value(NonCyclicCommand::Alarm(about(CODES.alarm_history, 1, 0)));
+    assert_eq!(history, Results::alarm_data(Alarm { main: 38, sub: 1 }, 0));
+    pair.value(NonCyclicCommand::Alarm(about(CODES.alarm_clear, 0, 0)));
     assert_eq!(pair.drive.alarm(), None);
     assert!(!pair.axis.switch_on());
     pair.axis.clear();
@@ -191,25 +198,27 @@ fn profile_motion() {
         [(profile::RELATIVE, 30_000, 30_000), (profile::RELATIVE, -10_000, 20_000), (CODES.profile_absolute, -5, -5)]
     {
         pair.axis.start_move(type_code, target, 400_000).unwrap();
-        assert_eq!(pair.axis.start_move(type_code, target, 1), Err(SetpointError::Moving));
+        assert_eq!(pair.axis.start_move(type_code, target, 1), Err(SetpointError::Busy));
         let mut seen = Vec::new();
         loop {
             pair.update();
-            let progress = pair.axis.take_move().unwrap();
-            seen.push(progress);
-            if progress == MoveProgress::Done {
+            seen.push(
+                pair.axis.profile().map(|profile| (profile.stage(), profile.flags().contains(ProfileFlags::NEAR))),
+            );
+            if let Progress::Done { .. } = pair.axis.take_move().unwrap() {
                 break;
             }
             assert!(seen.len() < 10_000);
         }
-        assert!(seen.contains(&MoveProgress::Starting) && seen.contains(&MoveProgress::Moving { near: true }));
-        pair.until(|pair| pair.axis.status().in_position());
+        assert!(seen.contains(&Some((MoveStage::Starting, false))) && seen.contains(&Some((MoveStage::Moving, true))));
+        pair.until(|pair| pair.axis.status().contains(StatusFlags::IN_POSITION));
         assert!((pair.drive.position() - want).abs() <= 20, "{}", pair.drive.position());
     }
     // An unknown type is rejected, and the axis goes on.
     pair.axis.start_move(0xee, 5, 5).unwrap();
-    pair.until(|pair| pair.axis.clone().take_move() == Some(MoveProgress::Rejected(ErrorCode::TYPE_CODE)));
-    assert_eq!(pair.axis.take_move(), Some(MoveProgress::Rejected(ErrorCode::TYPE_CODE)));
+    let rejected = Some(Progress::Failed { error: Failure::CommandError(ErrorCode::TYPE_CODE) });
+    pair.until(|pair| pair.axis.clone().take_move() == rejected);
+    assert_eq!(pair.axis.take_move(), rejected);
     assert_eq!(pair.axis.take_move(), None);
     assert_eq!(pair.axis.state(), AxisState::On);
 }
@@ -221,24 +230,24 @@ fn profile_motion_paused_and_stopped() {
         let mut pair = Pair::on(ActiveCode::ProfilePosition);
         pair.axis.start_move(profile::RELATIVE, 3_000_000, 400_000).unwrap();
         (0..200).for_each(|_| pair.update());
-        assert!(pair.axis.status().in_progress());
+        assert!(pair.axis.status().contains(StatusFlags::IN_PROGRESS));
         pair.axis.set_control(bit);
         (0..400).for_each(|_| pair.update());
         let stands = pair.drive.position();
         (0..20).for_each(|_| pair.update());
         assert_eq!(pair.drive.position(), stands);
-        assert_eq!(pair.axis.status().in_progress(), !ends, "{bit:?}");
-        assert_eq!(pair.axis.take_move() == Some(MoveProgress::Done), ends, "{bit:?}");
+        assert_eq!(pair.axis.status().contains(StatusFlags::IN_PROGRESS), !ends, "{bit:?}");
+        assert_eq!(matches!(pair.axis.take_move(), Some(Progress::Done { .. })), ends, "{bit:?}");
         assert_eq!(pair.axis.state(), AxisState::On);
     }
     let mut pair = Pair::on(ActiveCode::ProfilePosition);
     pair.axis.start_move(profile::RELATIVE, 100_000, 400_000).unwrap();
     (0..100).for_each(|_| pair.update());
-    pair.axis.set_move_speed(0);
+    pair.axis.set_move_speed(0).unwrap();
     (0..400).for_each(|_| pair.update());
-    assert!(pair.axis.status().in_progress());
-    pair.axis.set_move_speed(800_000);
-    pair.until(|pair| pair.axis.clone().take_move() == Some(MoveProgress::Done));
+    assert!(pair.axis.status().contains(StatusFlags::IN_PROGRESS));
+    pair.axis.set_move_speed(800_000).unwrap();
+    pair.until(|pair| matches!(pair.axis.clone().take_move(), Some(Progress::Done { .. })));
 }
 
 #[test]
@@ -272,7 +281,7 @@ fn a_step_that_is_too_large_is_refused_and_changes_nothing() {
 fn a_move_across_the_wrap() {
     let mut pair = Pair::new(ActiveCode::CyclicPosition);
     pair.until(|pair| pair.axis.state() == AxisState::Off);
-    pair.value(Request::Homing {
+    pair.value(NonCyclicCommand::Homing {
         type_code: homing::SET_ACTUAL_POSITION,
         latch_sel1: Nibble::ZERO,
         latch_sel2: Nibble::ZERO,
@@ -291,14 +300,14 @@ fn a_move_across_the_wrap() {
 /// response has both.
 #[test]
 fn pipeline_of_the_echoes() {
-    let command = |counter, request| Command { request, ..Command::idle(mac_id(), counter) };
-    let ask = Request::Monitor(about(monitor::APOS, 0, 0));
-    let mut drive = Drive::new(Settings { communications: 2, ..Settings::new(mac_id(), CODES) });
+    let command = |counter, noncyclic| Command { noncyclic, ..Command::idle(mac_id(), counter) };
+    let ask = NonCyclicCommand::Monitor(about(monitor::APOS, 0, 0));
+    let mut drive = Drive::new(DriveConfig::new(mac_id(), CODES).with_communications(2));
     let mut counter = UpdateCounter::ZERO;
     let mut last_code = 0x00;
     for k in 0..40 {
         counter = counter.next();
-        let sent = command(counter, if k % 3 == 0 { ask } else { Request::IDLE });
+        let sent = command(counter, if k % 3 == 0 { ask } else { NonCyclicCommand::IDLE });
         let code = sent.code().get();
         let first = Response::parse(&drive.exchange(&sent.emit())).unwrap();
         let second = Response::parse(&drive.exchange(&sent.emit())).unwrap();
@@ -319,7 +328,7 @@ fn zeros_do_not_switch_off() {
         pair.drive.exchange(&zeros);
     }
     assert!(pair.drive.is_active());
-    let off = pair.axis.send(pair.sent);
+    let off = pair.axis.send(pair.sent).main;
     pair.drive.exchange(&Command { control: ControlBits::empty(), ..off }.emit());
     assert!(!pair.drive.is_active());
 }
@@ -335,14 +344,14 @@ fn lasting_faults_raise_alarms() {
     ];
     for (spoil, error, alarm) in cases {
         let mut pair = Pair::on(ActiveCode::CyclicPosition);
-        let mut block = pair.axis.send(pair.sent).emit();
+        let mut block = pair.axis.send(pair.sent).main.emit();
         spoil(&mut block);
-        let limit = pair.drive.settings().fault_limit;
+        let limit = pair.drive.config().fault_limit;
         for k in 1..=limit {
             assert!(pair.drive.is_active());
             let response = Response::parse(&pair.drive.exchange(&block)).unwrap();
             if k > 1 {
-                assert_eq!(response.answer(), Answer::CommandError(error));
+                assert_eq!(response.noncyclic(), NonCyclicResponse::CommandError(error));
                 assert_eq!(response.code.get(), block[1] & 0x7f);
             }
         }
@@ -359,15 +368,18 @@ fn lasting_faults_raise_alarms() {
         pair.drive.exchange(&block);
     }
     let response = Response::parse(&pair.drive.exchange(&[9; 16])).unwrap();
-    assert_eq!((response.code.get(), response.answer()), (0x23, Answer::CommandError(ErrorCode::NON_CYCLIC_CODE)));
+    assert_eq!(
+        (response.code.get(), response.noncyclic()),
+        (0x23, NonCyclicResponse::CommandError(ErrorCode::NON_CYCLIC_CODE))
+    );
     assert!(pair.drive.is_active());
 }
 
 #[test]
 fn a_counter_that_stands_still_raises_err86_2() {
     let mut pair = Pair::on(ActiveCode::CyclicPosition);
-    let block = pair.axis.send(pair.sent).emit();
-    let limit = pair.drive.settings().counter_limit;
+    let block = pair.axis.send(pair.sent).main.emit();
+    let limit = pair.drive.config().counter_limit;
     for _ in 0..limit {
         assert_eq!(pair.drive.alarm(), None);
         pair.drive.exchange(&block);
@@ -377,7 +389,7 @@ fn a_counter_that_stands_still_raises_err86_2() {
 
 #[test]
 fn sub_blocks() {
-    let mut drive = Drive::new(Settings::new(mac_id(), CODES));
+    let mut drive = Drive::new(DriveConfig::new(mac_id(), CODES));
     let mut counter = UpdateCounter::ZERO;
     let mut exchange = |sub: SubCommand, spoil: u8| {
         let mut seen = None;
@@ -401,21 +413,25 @@ fn sub_blocks() {
 
 #[test]
 fn a_pair_of_codes_that_does_not_go_together() {
-    let mut drive = Drive::new(Settings::new(mac_id(), CODES));
+    let mut drive = Drive::new(DriveConfig::new(mac_id(), CODES));
     let mut block = Command::idle(mac_id(), UpdateCounter::ZERO.next()).emit();
     block[1] = 0x27;
     drive.exchange(&block);
     let response = Response::parse(&drive.exchange(&block)).unwrap();
-    assert_eq!(response.answer(), Answer::CommandError(ErrorCode::CYCLIC_MODE));
+    assert_eq!(response.noncyclic(), NonCyclicResponse::CommandError(ErrorCode::CYCLIC_MODE));
     assert_eq!(response.code.cyclic(), Some(CyclicCode::CyclicPosition));
 }
 
 #[test]
 fn inputs_and_power_show_in_the_status() {
     let mut pair = Pair::on(ActiveCode::CyclicPosition);
-    pair.drive.set_inputs(StatusFlags::POT.with(StatusFlags::SI_MON2).with(StatusFlags::ALARM));
+    pair.drive.set_inputs(StatusFlags::POT.union(StatusFlags::SI_MON2).union(StatusFlags::ALARM));
     (0..3).for_each(|_| pair.update());
-    assert!(pair.axis.status().pot() && pair.axis.status().si_mon2() && !pair.axis.status().alarm());
+    assert!(
+        pair.axis.status().contains(StatusFlags::POT)
+            && pair.axis.status().contains(StatusFlags::SI_MON2)
+            && !pair.axis.status().contains(StatusFlags::ALARM)
+    );
     pair.drive.set_main_power(false);
     pair.until(|pair| pair.axis.state() != AxisState::On);
     assert_eq!(pair.axis.state(), AxisState::Stopped(StopReason::NotReady));
@@ -430,7 +446,7 @@ fn limits_of_the_states() {
     assert_eq!(pair.axis.state(), AxisState::Stopped(StopReason::ReadyTimeout));
     // Servo_Active never comes.
     let mut pair = Pair::new(ActiveCode::CyclicPosition);
-    pair.drive = Drive::new(Settings { servo_on_updates: u16::MAX, ..*pair.drive.settings() });
+    pair.drive = Drive::new(pair.drive.config().with_servo_on_updates(u16::MAX));
     pair.until(|pair| pair.axis.state() == AxisState::Off);
     assert!(pair.axis.switch_on());
     pair.until(|pair| pair.axis.state() != AxisState::SwitchingOn);
@@ -438,15 +454,15 @@ fn limits_of_the_states() {
     // A request is never answered.
     let mut pair = Pair::new(ActiveCode::CyclicPosition);
     pair.until(|pair| pair.axis.state() == AxisState::Off);
-    pair.drive = Drive::new(Settings { busy_exchanges: u16::MAX, ..*pair.drive.settings() });
-    let read = Request::Parameter(about(CODES.parameter_read, 0x0719, 0));
-    assert_eq!(pair.ask(read), Progress::TimedOut);
+    pair.drive = Drive::new(pair.drive.config().with_busy_exchanges(u16::MAX));
+    let read = NonCyclicCommand::Parameter(about(CODES.parameter_read, 0x0719, 0));
+    assert_eq!(pair.ask(read), Progress::Failed { error: Failure::TimedOut });
     // Commands are refused for the limit.
     let mut pair = Pair::on(ActiveCode::CyclicPosition);
     for _ in 0..10 {
         pair.update();
         let response = pair.response.unwrap();
-        pair.response = Some(response.with_answer(&Answer::CommandError(ErrorCode::ARGUMENT)));
+        pair.response = Some(response.with_noncyclic(&NonCyclicResponse::CommandError(ErrorCode::ARGUMENT)));
     }
     pair.update();
     assert_eq!(pair.axis.state(), AxisState::Stopped(StopReason::CommandError(ErrorCode::ARGUMENT)));

@@ -4,9 +4,9 @@
 use proptest::prelude::*;
 use rtex_block::master::{Expected, Reception};
 use rtex_block::{
-    Alarm, Answer, Arguments, BlockSize, Code, Command, Command32, CommandBlock, ControlBits, CyclicCode, Error,
-    ErrorCode, Execution, MacId, Nibble, NonCyclicCode, Reply, Request, Response, Response32, ResponseBlock,
-    StatusFlags, SubCode, SubCommand, SubResponse, TypeCode, UpdateCounter,
+    Alarm, Arguments, BlockSize, Code, Command, Command32, CommandBlock, ControlBits, CyclicCode, Error, ErrorCode,
+    Execution, LatchFlags, MacId, Nibble, NonCyclicCode, NonCyclicCommand, NonCyclicResponse, ProfileFlags, Response,
+    Response32, ResponseBlock, Results, StatusFlags, SubCode, SubCommand, SubResponse, TypeCode, UpdateCounter,
 };
 
 fn mac_id() -> impl Strategy<Value = MacId> {
@@ -26,7 +26,7 @@ fn type_code() -> impl Strategy<Value = TypeCode> {
 }
 
 fn execution() -> impl Strategy<Value = Execution> {
-    any::<(bool, bool, bool)>().prop_map(|(err, wng, busy)| Execution { err, wng, busy })
+    any::<u8>().prop_map(Execution::from_bits_truncate)
 }
 
 fn arguments() -> impl Strategy<Value = Arguments> {
@@ -34,22 +34,22 @@ fn arguments() -> impl Strategy<Value = Arguments> {
 }
 
 /// A request by its code: any bytes, read by the layout, make one.
-fn request() -> impl Strategy<Value = Request> {
+fn request() -> impl Strategy<Value = NonCyclicCommand> {
     (proptest::sample::select(&NonCyclicCode::ALL[..]), any::<[u8; 8]>())
-        .prop_map(|(code, bytes)| Request::from_bytes(code, bytes))
+        .prop_map(|(code, bytes)| NonCyclicCommand::from_bytes(code, bytes))
 }
 
 fn command() -> impl Strategy<Value = Command> {
     let cyclic = proptest::sample::select(&CyclicCode::ALL[..]);
     (mac_id(), counter(), any::<bool>(), cyclic, any::<u16>(), any::<i32>(), request()).prop_map(
-        |(mac_id, update_counter, tmg_cnt, cyclic, control, command_data1, request)| Command {
+        |(mac_id, update_counter, tmg_cnt, cyclic, control, command_data1, noncyclic)| Command {
             mac_id,
             update_counter,
             tmg_cnt,
             cyclic,
-            control: control.into(),
+            control: ControlBits::from_bits_truncate(control),
             command_data1,
-            request,
+            noncyclic,
         },
     )
 }
@@ -61,9 +61,9 @@ fn sub_command() -> impl Strategy<Value = SubCommand> {
     )
 }
 
-fn answer() -> impl Strategy<Value = Answer> {
+fn answer() -> impl Strategy<Value = NonCyclicResponse> {
     let reply = || {
-        (execution(), arguments()).prop_map(|(execution, Arguments { type_code, index, data })| Reply {
+        (execution(), arguments()).prop_map(|(execution, Arguments { type_code, index, data })| Results {
             execution,
             type_code,
             index,
@@ -71,21 +71,21 @@ fn answer() -> impl Strategy<Value = Answer> {
         })
     };
     prop_oneof![
-        any::<u16>().prop_map(|code| Answer::CommandError(ErrorCode(code))),
+        any::<u16>().prop_map(|code| NonCyclicResponse::CommandError(ErrorCode(code))),
         any::<(i32, i32)>()
-            .prop_map(|(response_data2, response_data3)| Answer::Normal { response_data2, response_data3 }),
-        reply().prop_map(Answer::Reset),
-        reply().prop_map(Answer::SystemId),
-        reply().prop_map(Answer::Alarm),
-        reply().prop_map(Answer::Parameter),
-        reply().prop_map(Answer::Monitor),
-        (execution(), any::<(u8, bool, bool)>(), nibble(), nibble(), any::<u8>(), any::<i32>()).prop_map(
-            |(execution, (type_code, latch_comp1, latch_comp2), latch_sel1, latch_sel2, monitor_sel, monitor_data)| {
-                Answer::Homing {
+            .prop_map(|(response_data2, response_data3)| NonCyclicResponse::Normal { response_data2, response_data3 }),
+        reply().prop_map(NonCyclicResponse::Reset),
+        reply().prop_map(NonCyclicResponse::SystemId),
+        reply().prop_map(NonCyclicResponse::Alarm),
+        reply().prop_map(NonCyclicResponse::Parameter),
+        reply().prop_map(NonCyclicResponse::Monitor),
+        (execution(), any::<(u8, u8)>(), nibble(), nibble(), any::<u8>(), any::<i32>()).prop_map(
+            |(execution, (type_code, latch), latch_sel1, latch_sel2, monitor_sel, monitor_data)| {
+                let latch = LatchFlags::from_bits_truncate(latch);
+                NonCyclicResponse::Homing {
                     execution,
                     type_code,
-                    latch_comp1,
-                    latch_comp2,
+                    latch,
                     latch_sel1,
                     latch_sel2,
                     monitor_sel,
@@ -93,34 +93,27 @@ fn answer() -> impl Strategy<Value = Answer> {
                 }
             }
         ),
-        (execution(), any::<u8>(), any::<(bool, bool, bool, bool)>(), nibble(), any::<u8>(), any::<i32>()).prop_map(
-            |(execution, type_code, (psl, nsl, near, latch_comp1), latch_sel1, monitor_sel, monitor_data)| {
-                Answer::Profile {
-                    execution,
-                    type_code,
-                    psl,
-                    nsl,
-                    near,
-                    latch_comp1,
-                    latch_sel1,
-                    monitor_sel,
-                    monitor_data,
-                }
+        (execution(), any::<(u8, u8)>(), nibble(), any::<u8>(), any::<i32>()).prop_map(
+            |(execution, (type_code, flags), latch_sel1, monitor_sel, monitor_data)| {
+                let flags = ProfileFlags::from_bits_truncate(flags);
+                NonCyclicResponse::Profile { execution, type_code, flags, latch_sel1, monitor_sel, monitor_data }
             }
         ),
     ]
 }
 
-fn noncyclic_of(answer: &Answer) -> NonCyclicCode {
+fn noncyclic_of(answer: &NonCyclicResponse) -> NonCyclicCode {
     match answer {
-        Answer::CommandError(_) | Answer::Normal { .. } | Answer::Undefined { .. } => NonCyclicCode::Normal,
-        Answer::Reset(_) => NonCyclicCode::Reset,
-        Answer::SystemId(_) => NonCyclicCode::SystemId,
-        Answer::Homing { .. } => NonCyclicCode::Homing,
-        Answer::Alarm(_) => NonCyclicCode::Alarm,
-        Answer::Parameter(_) => NonCyclicCode::Parameter,
-        Answer::Profile { .. } => NonCyclicCode::Profile,
-        Answer::Monitor(_) => NonCyclicCode::Monitor,
+        NonCyclicResponse::CommandError(_) | NonCyclicResponse::Normal { .. } | NonCyclicResponse::Undefined { .. } => {
+            NonCyclicCode::Normal
+        }
+        NonCyclicResponse::Reset(_) => NonCyclicCode::Reset,
+        NonCyclicResponse::SystemId(_) => NonCyclicCode::SystemId,
+        NonCyclicResponse::Homing { .. } => NonCyclicCode::Homing,
+        NonCyclicResponse::Alarm(_) => NonCyclicCode::Alarm,
+        NonCyclicResponse::Parameter(_) => NonCyclicCode::Parameter,
+        NonCyclicResponse::Profile { .. } => NonCyclicCode::Profile,
+        NonCyclicResponse::Monitor(_) => NonCyclicCode::Monitor,
     }
 }
 
@@ -143,10 +136,10 @@ proptest! {
     #[test]
     fn command_bytes_come_back_without_reserved_bits(block: [u8; 16]) {
         let Ok(command) = Command::parse(&block) else { return Ok(()) };
-        let (nine, ten) = match command.request {
-            Request::Normal { .. } => (0xff, 0xff),
-            Request::Homing { .. } => (0x00, 0xff),
-            Request::Profile { .. } => (0x00, 0x0f),
+        let (nine, ten) = match command.noncyclic {
+            NonCyclicCommand::Normal { .. } => (0xff, 0xff),
+            NonCyclicCommand::Homing { .. } => (0x00, 0xff),
+            NonCyclicCommand::Profile { .. } => (0x00, 0x0f),
             _ => (0x0f, 0xff),
         };
         let mut want = block;
@@ -180,17 +173,17 @@ proptest! {
             update_counter_echo: counter,
             cmd_error: false,
             code: Code::of(CyclicCode::ProfilePosition, noncyclic_of(&answer)),
-            status: StatusFlags::from(status),
+            status: StatusFlags::from_bits_retain(status),
             response_data1: data,
             response_data2: 0,
             response_data3: 0,
         };
-        let response = blank.with_answer(&answer);
+        let response = blank.with_noncyclic(&answer);
         let block = response.emit();
         prop_assert_eq!(Response::parse_strict(&block), Ok(response));
-        prop_assert_eq!(response.answer(), answer);
+        prop_assert_eq!(response.noncyclic(), answer);
         let view = ResponseBlock::new(&block).unwrap();
-        prop_assert_eq!((view.answer(), view.to_owned(), view.status()), (answer, response, response.status));
+        prop_assert_eq!((view.noncyclic(), view.to_owned(), view.status()), (answer, response, response.status));
     }
 
     /// A view gives what the owned form holds.
@@ -202,7 +195,7 @@ proptest! {
         prop_assert_eq!((view.mac_id(), view.update_counter()), (command.mac_id, command.update_counter));
         prop_assert_eq!((view.code(), view.tmg_cnt()), (command.code(), command.tmg_cnt));
         prop_assert_eq!((view.control(), view.command_data1()), (command.control, command.command_data1));
-        let off = command.cyclic != CyclicCode::Nop && command.code().is_allowed() && !command.control.servo_on();
+        let off = command.cyclic != CyclicCode::Nop && command.code().is_allowed() && !command.control.contains(ControlBits::SERVO_ON);
         prop_assert_eq!(view.is_servo_off(), off);
     }
 }
@@ -230,7 +223,7 @@ fn all_values_of_bytes_0_and_1() {
             Ok(response) => {
                 accepted.1 += 1;
                 assert_eq!(response.emit(), block);
-                assert_eq!(matches!(response.answer(), Answer::CommandError(_)), one >= 0x80);
+                assert_eq!(matches!(response.noncyclic(), NonCyclicResponse::CommandError(_)), one >= 0x80);
             }
             Err(e) => assert_eq!((e, zero < 0x80), (Error::Direction { byte0: zero }, true)),
         }
@@ -241,18 +234,54 @@ fn all_values_of_bytes_0_and_1() {
 
 #[test]
 fn every_wrong_length_is_refused() {
-    let bytes = [0x80; 64];
-    for got in 0..=64 {
+    let bytes = vec![0x80; 70_000];
+    let refusal = |got: usize, want: u16| match u16::try_from(got) {
+        Ok(got) if got < want => Error::Truncated { got, want },
+        Ok(got) => Error::TooLong { got, want },
+        Err(_) => Error::TooLong { got: 65_535, want },
+    };
+    for got in (0..=64).chain([65_535, 65_536, 70_000]) {
         let slice = &bytes[..got];
         if got != 16 {
-            assert_eq!(Response::parse(slice), Err(Error::Length { got, want: 16 }));
-            assert_eq!(Command::parse(slice), Err(Error::Length { got, want: 16 }));
+            assert_eq!(Response::parse(slice), Err(refusal(got, 16)));
+            assert_eq!(Command::parse(slice), Err(refusal(got, 16)));
         }
         if got != 32 {
-            assert_eq!(Response32::parse(slice), Err(Error::Length { got, want: 32 }));
-            assert_eq!(Command32::parse(slice), Err(Error::Length { got, want: 32 }));
+            assert_eq!(Response32::parse(slice), Err(refusal(got, 32)));
+            assert_eq!(Command32::parse(slice), Err(refusal(got, 32)));
         }
     }
+}
+
+/// One line for each message, with what a person looks for in a log.
+#[test]
+fn messages_print_in_one_line() {
+    let block = [0xc5, 0x20, 0xc1, 0, 0xe6, 0x03, 0, 0, 0x10, 0x27, 0, 0, 0x9c, 0xff, 0xff, 0xff];
+    let response = Response::parse(&block).unwrap();
+    assert_eq!(
+        response.to_string(),
+        "from 5 #2 CP normal (20h) [SERVO_ACTIVE SERVO_READY IN_POSITION] 998, 10000 -100"
+    );
+    let refused = response.with_noncyclic(&NonCyclicResponse::CommandError(ErrorCode::ARGUMENT));
+    assert!(refused.to_string().ends_with("998, not accepted: 0032h (index or data out of range)"), "{refused}");
+    let alarm = Results {
+        execution: Execution::WNG,
+        type_code: TypeCode::short(1),
+        index: 2,
+        data: Results::alarm_data(Alarm { main: 86, sub: 1 }, 0xa0),
+    };
+    assert_eq!(
+        NonCyclicResponse::Alarm(alarm).to_string(),
+        "type 01h index 2 Err86.1 warning A0h (or attributes 00A00156h) WNG"
+    );
+    let arguments = Arguments { type_code: TypeCode::short(0x11), index: 0x0714, data: -1 };
+    let idle = Command::idle(MacId::MAX, UpdateCounter::MAX);
+    let write = Command { noncyclic: NonCyclicCommand::Parameter(arguments), control: ControlBits::SERVO_ON, ..idle };
+    assert_eq!(write.to_string(), "to 31 #3 CP parameter (26h) [SERVO_ON] 0, type 11h Pr7.20 data -1");
+    let whole = Command32 { main: idle, sub: SubCommand::IDLE };
+    assert_eq!(whole.to_string(), "to 31 #3 CP normal (20h) [] 0, 0 0; sub normal type 00h index 0, 0 0 0");
+    let sub = SubResponse::from_bytes(&[0xca, 0, 0x22, 0, 0, 0, 0, 0, 1, 0, 0, 0, 2, 0, 0, 0]);
+    assert_eq!(sub.to_string(), "sub monitor not accepted: 0022h (non-cyclic code not defined), 0 1 2 ERR");
 }
 
 /// Each reserved bit of a command is ignored leniently and named strictly.
@@ -260,7 +289,7 @@ fn every_wrong_length_is_refused() {
 fn reserved_bits_of_a_command() {
     let arguments = Arguments { type_code: TypeCode::short(7), index: 0, data: 0 };
     let idle = Command::idle(MacId::default(), UpdateCounter::ZERO);
-    let clean = Command { request: Request::Monitor(arguments), ..idle };
+    let clean = Command { noncyclic: NonCyclicCommand::Monitor(arguments), ..idle };
     for (byte, mask) in [(2, 0x63), (3, 0x14), (9, 0xf0)] {
         for bit in (0..8).map(|k| 1 << k).filter(|bit| mask & bit != 0) {
             let mut block = clean.emit();
@@ -327,11 +356,14 @@ fn flips_that_can_be_noticed() {
 #[test]
 fn alarm_data_come_back() {
     let alarm = Alarm { main: 86, sub: 1 };
-    let data = Reply::alarm_data(alarm, 0xa5c3);
+    let data = Results::alarm_data(alarm, 0xa5c3);
     assert_eq!(data.to_le_bytes(), [86, 1, 0xc3, 0xa5]);
-    let reply = Reply { execution: Execution::default(), type_code: TypeCode::short(0), index: 0, data };
+    let reply = Results { execution: Execution::default(), type_code: TypeCode::short(0), index: 0, data };
     assert_eq!(reply.alarm(), (alarm, 0xa5c3));
-    assert_eq!(format!("{alarm} {}", ErrorCode::CYCLIC_MODE), "Err86.1 002Eh");
+    assert_eq!(
+        format!("{alarm} {}", ErrorCode::CYCLIC_MODE),
+        "Err86.1 002Eh (cyclic command not possible in this mode)"
+    );
 }
 
 #[test]

@@ -44,9 +44,11 @@ impl<const N: usize> Counters<N> {
 
     /// Failed transactions in a million; 0 before the first one.
     pub fn errors_per_million(&self) -> u32 {
-        let errors = u128::from(self.errors());
-        let all = errors.saturating_add(self.good.into());
-        let rate = errors.saturating_mul(1_000_000).checked_div(all).unwrap_or(0);
+        let errors = self.errors();
+        let all = errors.saturating_add(self.good);
+        // A million has 20 bits: numbers that leave no room for it lose their low bits, which the rate does not show.
+        let excess = 20_u32.saturating_sub(all.leading_zeros());
+        let rate = (errors >> excess).saturating_mul(1_000_000).checked_div(all >> excess).unwrap_or(0);
         u32::try_from(rate).unwrap_or(u32::MAX)
     }
 }
@@ -92,8 +94,17 @@ mod tests {
 
     #[test]
     fn the_rate_is_right_after_years() {
-        let mut counters = Counters::<4> { good: u64::MAX - 1, errors: [0, 0, u64::MAX, 0] };
-        assert_eq!(counters.errors_per_million(), 500_000);
+        // Nearly 2^43 transactions, the last count that needs no shift, and the first ones that do.
+        for (good, errors, rate) in [
+            (6 << 40, 2 << 40, 250_000),
+            ((3 << 41) + 7, 1 << 41, 249_999),
+            (3 << 42, 1 << 42, 250_000),
+            (3 << 60, 1 << 60, 250_000),
+        ] {
+            assert_eq!(Counters::<4> { good, errors: [0, errors, 0, 0] }.errors_per_million(), rate, "{good} {errors}");
+        }
+        let mut counters = Counters::<4> { good: u64::MAX - 1, errors: [0, 0, 3, 0] };
+        assert_eq!(counters.errors_per_million(), 0);
         for _ in 0..3 {
             counters.record::<_, Kind>(&Ok(()));
         }

@@ -9,7 +9,7 @@ use std::fmt::Write as _;
 use std::fs;
 use std::path::Path;
 
-use nikon_aformat::{BitOrder, Command, EncoderAddress, Layout, Operation, Reply, Request, Window};
+use nikon_aformat::{BitOrder, Command, EncoderAddress, Layout, Operation, RawResponse, Request, Window};
 
 /// A capture that the package carries, and how the `source` of its rows begins.
 struct Capture {
@@ -88,8 +88,8 @@ fn published(line: &str) -> Result<Row, Box<dyn Error>> {
     let words = words.collect::<Result<Vec<_>, _>>()?;
     let name = row.get("layout").and_then(serde_json::Value::as_str).unwrap_or_default();
     let layout = Layout::ALL.into_iter().find(|layout| layout.name() == name).ok_or("no such layout")?;
-    let reply = Reply::from_words(&words, BitOrder::MsbFirst, layout)?.line();
-    let command = Command::from_code(u8::try_from(number(row.get("cmd")))?)?;
+    let reply = RawResponse::from_words(layout, &words, BitOrder::MsbFirst)?.line();
+    let command = Command::from_code(u8::try_from(number(row.get("cmd")))?).ok_or("no such command")?;
     let ea = row.get("expect").and_then(|expect| expect.get("ea"));
     let ea = EncoderAddress::new(u8::try_from(number(ea))?).ok_or("no such address")?;
     let operation = Operation::without_arguments(command).ok_or("a command with arguments")?;

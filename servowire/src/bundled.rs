@@ -9,7 +9,7 @@ type Capture = (&'static str, &'static [u8]);
 /// The captures of a protocol.
 pub fn of(protocol: Protocol) -> &'static [Capture] {
     match protocol {
-        Protocol::Tformat => &CAPTURES,
+        Protocol::Auto | Protocol::Tformat => &CAPTURES,
         Protocol::Nikon => &NIKON,
         Protocol::Hdsl => &HDSL,
         Protocol::Rtex | Protocol::Sorte => &[],

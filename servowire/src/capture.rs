@@ -3,13 +3,16 @@
 //! One file per format under `capture/`. Every reader streams with fixed buffers and gives the same thing: level
 //! changes of named channels with the time in picoseconds ([`Line`]), or bytes ([`ByteLog`]).
 
+pub mod archive;
+pub mod fst;
 pub mod hexlog;
 mod input;
 pub mod pcapng;
 pub mod raw;
 pub mod records;
 pub mod saleae_binary;
-pub mod saleae_csv;
+pub mod sigrok_text;
+pub mod table;
 pub mod time;
 pub mod vcd;
 
@@ -45,6 +48,12 @@ pub trait Line {
 
     /// The time up to which the recording was read, in picoseconds.
     fn reached(&self) -> i64;
+
+    /// Where the recording goes on, if there is a hole in it before what was read last: nothing is known of the lines
+    /// up to this time, in picoseconds.
+    fn gap(&mut self) -> Option<i64> {
+        None
+    }
 }
 
 /// An opened file.
@@ -82,10 +91,17 @@ impl ByteLog {
 pub enum Format {
     /// Value change dump (IEEE 1364).
     Vcd,
-    /// Saleae Logic 2 digital CSV export.
-    SaleaeCsv,
-    /// Saleae Logic 2 binary export, version 0.
+    /// A table of a logic analyser or an oscilloscope.
+    #[value(alias = "saleae-csv")]
+    Csv,
+    /// Saleae Logic 2 binary export.
     SaleaeBinary,
+    /// A session of sigrok, PulseView (.sr) or DSView (.dsl).
+    Session,
+    /// FST, as GTKWave and Verilator write it.
+    Fst,
+    /// Text of sigrok-cli -O bits or -O hex.
+    SigrokText,
     /// One sample in one or more whole bytes, a bit a channel (sigrok-cli -O binary).
     Raw,
     /// One channel, eight samples a byte, the oldest in bit 0.
@@ -99,7 +115,7 @@ pub enum Format {
 }
 
 /// What the user said about the files.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Hints {
     /// The format; otherwise it is found from the content and the name.
     pub format: Option<Format>,
@@ -109,12 +125,15 @@ pub struct Hints {
     pub unit_size: usize,
     /// Bytes of a record.
     pub record_size: Option<usize>,
+    /// The voltage above which a column of a table is high; otherwise half-way between its levels.
+    pub threshold: Option<f64>,
 }
 
 /// Opens a file, finding its format. The number beside it counts the bytes read, for a progress bar.
 pub fn open(path: &Path, hints: Hints) -> Result<(Capture, Rc<Cell<u64>>), Fault> {
-    let mut input = Input::open(path)?;
+    let input = Input::open(path)?;
     let meter = input.meter();
+    let mut input = if hints.format.is_none_or(Format::is_text) { input.unpacked()? } else { input };
     let format = match hints.format {
         Some(format) => format,
         None if hints.record_size.is_some() => Format::Records,
@@ -127,18 +146,61 @@ pub fn open(path: &Path, hints: Hints) -> Result<(Capture, Rc<Cell<u64>>), Fault
 fn known(head: &[u8]) -> Option<Format> {
     const VCD: [&[u8]; 7] = [b"$comment", b"$date", b"$enddefinitions", b"$scope", b"$timescale", b"$var", b"$version"];
     let text = head.strip_prefix(b"\xef\xbb\xbf").unwrap_or(head).trim_ascii_start();
+    let begins = |words: &[&[u8]]| {
+        words.iter().any(|word| text.get(..word.len()).is_some_and(|start| start.eq_ignore_ascii_case(word)))
+    };
     if head.starts_with(b"<SALEAE>") {
         Some(Format::SaleaeBinary)
     } else if head.starts_with(pcapng::MAGIC) {
         Some(Format::Pcapng)
+    } else if head.starts_with(b"PK\x03\x04") {
+        Some(Format::Session)
+    } else if head.starts_with(FST) || head.first() == Some(&0xfe) && head.get(17..19) == Some(&[0x1f, 0x8b]) {
+        Some(Format::Fst)
     } else if VCD.iter().any(|keyword| text.starts_with(keyword)) {
         Some(Format::Vcd)
-    } else if text.get(..4).is_some_and(|word| word.eq_ignore_ascii_case(b"time")) {
-        Some(Format::SaleaeCsv)
+    } else if text.starts_with(b"libsigrok ") {
+        Some(Format::SigrokText)
+    } else if begins(TABLES) {
+        Some(Format::Csv)
     } else {
         None
     }
 }
+
+/// What an FST file begins with: a header block of 329 bytes.
+const FST: &[u8] = &[0, 0, 0, 0, 0, 0, 0, 1, 0x49];
+
+/// What the tables of analysers and oscilloscopes begin with.
+const TABLES: &[&[u8]] = &[
+    b"time",
+    b"zeit",
+    b"trigger [s]",
+    b"; csv",
+    b"#digilent",
+    b"x,ch",
+    b"x-axis",
+    b"record length",
+    b"model,",
+    b"source,",
+    b"ch1(v)",
+    b"ch1v",
+    b"in s,",
+    b"nanoseconds",
+    b"microseconds",
+    b"milliseconds",
+];
+
+impl Format {
+    /// Text may be packed; of the others the first bytes are the format's own.
+    fn is_text(self) -> bool {
+        matches!(self, Self::Vcd | Self::Csv | Self::SigrokText | Self::Hex)
+    }
+}
+
+/// Packed files that are not unpacked, by their first bytes.
+const PACKED: &[(&[u8], &str)] =
+    &[(b"BZh", "bzip2"), (b"\xfd7zXZ\0", "xz"), (b"\x04\x22\x4d\x18", "lz4"), (b"7z\xbc\xaf", "7z")];
 
 /// Opens bytes that are part of the program.
 pub fn open_embedded(name: &str, bytes: &'static [u8]) -> Result<Capture, Fault> {
@@ -151,7 +213,10 @@ fn decoder(mut input: Input, format: Format, hints: Hints) -> Result<Capture, Fa
     }
     Ok(match format {
         Format::Vcd => Capture::Edges(Box::new(vcd::Vcd::new(input)?)),
-        Format::SaleaeCsv => Capture::Edges(Box::new(saleae_csv::SaleaeCsv::new(input)?)),
+        Format::Csv => Capture::Edges(Box::new(table::Table::new(input, hints.threshold)?)),
+        Format::Session => archive::open(input)?,
+        Format::Fst => Capture::Edges(Box::new(fst::Fst::new(input)?)),
+        Format::SigrokText => Capture::Edges(Box::new(sigrok_text::SigrokText::new(input)?)),
         Format::SaleaeBinary => Capture::Edges(Box::new(saleae_binary::SaleaeBinary::new(input)?)),
         Format::Raw | Format::Packed => {
             let Some(rate) = hints.sample_rate else {
@@ -187,20 +252,17 @@ fn guess(input: &mut Input, path: &Path, has_rate: bool) -> Result<Format, Fault
     if has_rate {
         return Ok(Format::Raw);
     }
-    if head.starts_with(b"PK\x03\x04") {
-        return Err(input.fault(
-            At::File,
-            "this is a sigrok session (.sr) or a Saleae capture (.sal); export it as VCD, or as CSV from Logic 2",
-        ));
+    if let Some((_, name)) = PACKED.iter().find(|(magic, _)| head.starts_with(magic)) {
+        return Err(input.fault(At::File, format!("packed by {name}: unpack it first")));
     }
     let extension = path.extension().and_then(|e| e.to_str()).unwrap_or_default().to_ascii_lowercase();
     match extension.as_str() {
         "vcd" => Ok(Format::Vcd),
-        "csv" => Ok(Format::SaleaeCsv),
+        "csv" => Ok(Format::Csv),
         "hex" => Ok(Format::Hex),
         _ => Err(input.fault(
             At::File,
-            "neither VCD nor a Saleae export; for raw samples give --rate, for a log of hex bytes --bytes, else --format",
+            "no format that is known; for raw samples give --rate, for a log of hex bytes --bytes, else --format",
         )),
     }
 }

@@ -5,9 +5,9 @@ use std::process::ExitCode;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
 
-use crate::capture::{Format, Hints};
+use crate::capture::{Format, Hints, time};
 use crate::protocols::{Protocol, Settings, nikon, rtex, tformat};
-use crate::{cnc, decode, line, profile};
+use crate::{cnc, decode, line, profile, talk};
 
 /// Decodes what servo drives, controllers and encoders say to each other.
 #[derive(Debug, Parser)]
@@ -25,6 +25,8 @@ enum Command {
     Profile(profile::Arguments),
     /// The reference machine: SORTE master, four devices, four motors.
     Cnc(cnc::Arguments),
+    /// Talk to a T-Format encoder at a USB-RS485 adapter, or be one.
+    Talk(talk::Arguments),
 }
 
 impl Cli {
@@ -34,6 +36,7 @@ impl Cli {
             Command::Decode(arguments) => decode::run(&arguments),
             Command::Profile(arguments) => arguments.run(),
             Command::Cnc(arguments) => arguments.run(),
+            Command::Talk(arguments) => arguments.run(),
         }
     }
 }
@@ -45,11 +48,12 @@ impl Cli {
 /// frames good; 1: a frame was refused or a file could not be decoded; 2: wrong use.
 #[derive(Debug, Args)]
 pub struct Decode {
-    /// VCD, Saleae CSV, Saleae binary (version 0); raw samples with --rate; hex bytes with --bytes; - for the standard
-    /// input. Without a file the captures that come with the program are decoded.
+    /// VCD, FST, sigrok and DSView sessions, Saleae exports, CSV of analysers and oscilloscopes, pcapng, also packed by
+    /// gzip or zstd; raw samples with --rate; hex bytes with --bytes; - for the standard input. Without a file, what
+    /// comes through a pipe, else the captures that come with the program.
     pub files: Vec<PathBuf>,
-    /// What is spoken on the line.
-    #[arg(short, long, value_enum, default_value_t = Protocol::Tformat)]
+    /// What is spoken on the line; otherwise every protocol is tried on every channel, and each line found is decoded.
+    #[arg(short, long, value_enum, default_value_t = Protocol::Auto)]
     pub protocol: Protocol,
     /// JSON Lines, an object a frame; times in picoseconds.
     #[arg(long)]
@@ -96,6 +100,9 @@ pub struct FileArgs {
     /// The files are binary records of this many bytes, a burst each.
     #[arg(long, value_name = "BYTES", value_parser = clap::value_parser!(u16).range(1..), conflicts_with_all = ["rate", "bytes"])]
     pub record_size: Option<u16>,
+    /// Voltage above which a column of an oscilloscope's table is high; otherwise half-way between its levels.
+    #[arg(long, value_name = "VOLTS", allow_negative_numbers = true)]
+    pub threshold: Option<f64>,
 }
 
 /// How the line is to be taken.
@@ -105,6 +112,12 @@ pub struct LineArgs {
     /// Channel by name or number; otherwise the one that decodes best.
     #[arg(long, value_name = "NAME")]
     pub channel: Option<String>,
+    /// Channel of the requests, where the answers are on another one.
+    #[arg(long, value_name = "NAME", requires = "rx", conflicts_with = "channel")]
+    pub tx: Option<String>,
+    /// Channel of the answers.
+    #[arg(long, value_name = "NAME", requires = "tx", conflicts_with = "channel")]
+    pub rx: Option<String>,
     /// Bits a second, as 2500000 or 2.5M; otherwise found from the lengths of the runs.
     #[arg(long, value_name = "HZ", value_parser = bit_rate)]
     pub bit_rate: Option<u32>,
@@ -163,6 +176,7 @@ impl Decode {
             sample_rate: self.file.rate,
             unit_size: usize::from(self.file.unit_size),
             record_size: self.file.record_size.map(usize::from),
+            threshold: self.file.threshold,
         }
     }
 
@@ -171,6 +185,7 @@ impl Decode {
         Settings {
             line: line::Options {
                 channel: self.line.channel.clone(),
+                pair: self.line.tx.clone().zip(self.line.rx.clone()),
                 bit_rate: self.line.bit_rate,
                 inverted: self.line.polarity.map(|polarity| polarity == Polarity::Inverted),
             },
@@ -187,18 +202,10 @@ impl Decode {
     }
 }
 
-/// Frequencies as people write them: `24000000`, `24M`, `2.5MHz`, `100k`.
-fn frequency(text: &str) -> Result<u64, String> {
-    let bare = text.trim().trim_end_matches("Hz").trim_end();
-    let (digits, factor) = match bare.chars().last() {
-        Some('k' | 'K') => (bare.get(..bare.len() - 1), 1e3),
-        Some('M' | 'm') => (bare.get(..bare.len() - 1), 1e6),
-        Some('G' | 'g') => (bare.get(..bare.len() - 1), 1e9),
-        _ => (Some(bare), 1.0),
-    };
-    let hertz = digits.and_then(|d| d.trim().parse::<f64>().ok()).map(|number| (number * factor).round());
-    match hertz {
-        Some(hertz) if (1.0..=1e12).contains(&hertz) => Ok(hertz as u64),
+/// Frequencies as people write them: `24000000`, `24M`, `2.5MHz`, `100 kHz`.
+pub(crate) fn frequency(text: &str) -> Result<u64, String> {
+    match time::frequency(text) {
+        Some(hertz) if (1.0..=1e12).contains(&hertz.round()) => Ok(hertz.round() as u64),
         _ => Err(format!("\"{text}\" is not a frequency from 1 to 10^12 Hz, as 24M or 2500000")),
     }
 }
@@ -217,7 +224,13 @@ mod tests {
 
     #[test]
     fn frequencies() {
-        for (text, want) in [("24000000", 24_000_000), ("24M", 24_000_000), ("2.5 MHz", 2_500_000), ("100k", 100_000)] {
+        for (text, want) in [
+            ("24000000", 24_000_000),
+            ("24M", 24_000_000),
+            ("2.5 MHz", 2_500_000),
+            ("100k", 100_000),
+            ("1MHz", 1_000_000),
+        ] {
             assert_eq!(frequency(text), Ok(want), "{text}");
         }
         for text in ["", "M", "fast", "-1", "0", "1e13", "inf", "NaN"] {

@@ -104,7 +104,7 @@ fn one(
     }
     let mut vcd = match &arguments.vcd {
         None => None,
-        Some(path) => match VcdOut::create(path, protocol.field_names()) {
+        Some(path) => match VcdOut::create(path) {
             Ok(vcd) => Some(vcd),
             Err(e) => {
                 let file = path.display().to_string();

@@ -141,6 +141,13 @@ pub struct Refusal {
 }
 
 impl Verdict {
+    /// The capture ends inside the frame: what comes then is not known, so it is not sound.
+    pub fn cut_off() -> Self {
+        let reason = "the capture ends inside a frame".to_owned();
+        let cause = Some("the file was cut off, or recording stopped there".to_owned());
+        Self::Refused(Box::new(Refusal { class: "truncated", reason, field: None, bit: None, time: None, cause }))
+    }
+
     /// Whether all checks passed.
     pub fn is_ok(&self) -> bool {
         *self == Self::Ok

@@ -1,21 +1,29 @@
-//! From a recorded line to start-stop fields: find the channel, the rate and the polarity, then receive.
+//! From a recorded line to what is said on it: find the channels, the protocol, the rate and the polarity, then receive.
 
-mod preview;
+mod evidence;
+mod lane;
 mod receive;
+mod report;
+mod spikes;
 mod survey;
+mod watch;
 
 use std::fmt;
 use std::io;
 
-use preview::Preview;
-pub use receive::{EdgeReceiver, SampleReceiver};
-pub use survey::{Survey, survey};
+pub use evidence::Weights;
+pub use lane::{LineDecoder, StartStopLine, Tap, Wires};
+pub use receive::{EdgeReceiver, Rates};
+pub(crate) use spikes::Spikes;
+use survey::{Candidates, Found};
+use watch::Watch;
 
+use crate::capture::Line;
 use crate::capture::hexlog::Burst;
-use crate::capture::raw::{Raw, Words};
-use crate::capture::{Capture, Line};
+use crate::capture::raw::Raw;
 use crate::fault::{At, Fault};
 use crate::output::{Output, Sink};
+use crate::protocols::{Protocol, Settings};
 
 /// A field of a start-stop line with its place in the capture.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -26,36 +34,14 @@ pub struct LineField {
     pub delimiter: bool,
     /// The edge of the start bit, in picoseconds.
     pub start: i64,
-    /// The end of the delimiter at the nominal rate.
+    /// The end of the delimiter at the speaker's rate.
     pub end: i64,
-    /// Spikes that were dropped before it.
+    /// Spikes that were dropped before it or in it.
     pub spikes: u32,
-}
-
-/// What is known of the line before decoding.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Setup {
-    /// The channel.
-    pub channel: u16,
-    /// Bits a second.
-    pub rate: u32,
-    /// Whether the line idles low.
-    pub inverted: bool,
-}
-
-impl Setup {
-    /// Length of a bit in picoseconds.
-    pub fn bit(&self) -> i64 {
-        crate::capture::time::SECOND / i64::from(self.rate.max(1))
-    }
 }
 
 /// A protocol on a start-stop line: takes fields, gives events.
 pub trait StartStop {
-    /// The name of the protocol for messages.
-    const NAME: &'static str;
-    /// Nominal bit rates.
-    const RATES: &'static [u32];
     /// Content bits of a field: 8 or 16.
     const CONTENT_BITS: u32;
 
@@ -77,6 +63,8 @@ pub trait StartStop {
 pub struct Options {
     /// The channel by name or number.
     pub channel: Option<String>,
+    /// The channels of the requests and of the answers, where they are two.
+    pub pair: Option<(String, String)>,
     /// Bits a second.
     pub bit_rate: Option<u32>,
     /// Whether the line idles low.
@@ -113,58 +101,78 @@ impl fmt::Display for Stop {
     }
 }
 
-/// Decodes a capture of a start-stop protocol. `make` builds the decoder for a bit length in picoseconds.
-pub fn decode<P: StartStop>(
+/// Decodes what is said on the lines of a capture.
+pub fn decode(
     file: &str,
-    capture: Capture,
-    options: &Options,
-    make: &dyn Fn(i64) -> P,
+    line: &mut dyn Line,
+    protocol: Protocol,
+    settings: &Settings,
     out: &mut Output<'_>,
 ) -> Result<(), Stop> {
-    match capture {
-        Capture::Bytes(mut log) => {
-            let mut protocol = make(0);
-            let end = loop {
-                out.tick();
-                match log.burst() {
-                    Ok(Some(burst)) => protocol.burst(&burst, out)?,
-                    Ok(None) => break Ok(()),
-                    Err(fault) => break Err(fault),
-                }
-            };
-            protocol.finish(None, out)?;
-            Ok(end?)
-        }
-        Capture::Packets(_) => Err(Fault::new(file, At::File, "packets of a network are no start-stop line").into()),
-        Capture::Edges(mut line) => {
-            let preview = Preview::read(line.as_mut());
-            let found = preview.survey(file, line.channels(), options, make)?;
-            out.note(&format!("{file}: {found}"));
-            edges(line.as_mut(), preview, found.setup, &mut make(found.setup.bit()), out)?;
-            right_way_up(file, options, found.setup, out)
-        }
-        Capture::Samples(mut raw) => {
-            let preview = Preview::read(&mut raw);
-            let found = preview.survey(file, raw.channels(), options, make)?;
-            out.note(&format!("{file}: {found}"));
-            let setup = found.setup;
-            let mut protocol = make(setup.bit());
-            if let Some(what) = too_coarse(raw.clock().rate(), setup.rate) {
-                return Err(Fault::new(file, At::File, what).into());
+    let names = line.channels().to_vec();
+    let only = wanted(&settings.line, &names).map_err(|what| Fault::new(file, At::File, what))?;
+    let pair = match only.as_deref() {
+        Some([requests, answers]) => Some([*requests, *answers]),
+        _ => None,
+    };
+    let mut watch = Watch::new(file, &names, Candidates::new(protocol, settings, pair), only.as_deref());
+    let (mut changes, mut fault) = (Vec::new(), None);
+    loop {
+        changes.clear();
+        let more = match line.read(&mut changes) {
+            Ok(more) => more,
+            Err(e) => {
+                fault = Some(e);
+                false
             }
-            match SampleReceiver::new(raw.clock(), setup, P::CONTENT_BITS) {
-                Some(receiver) if !out.wants_changes() => samples(&mut raw, preview, receiver, &mut protocol, out),
-                _ => edges(&mut raw, preview, setup, &mut protocol, out),
-            }?;
-            right_way_up(file, options, setup, out)
+        };
+        if let Some(time) = line.gap() {
+            watch.gap(time, out)?;
         }
+        watch.changes(&changes, out)?;
+        out.tick();
+        if !more {
+            break;
+        }
+        if watch.is_due() {
+            watch.survey(false, out)?;
+        }
+        watch.reach(line.reached(), out)?;
     }
+    let end = line.reached();
+    watch.survey(true, out)?;
+    watch.finish(end, out)?;
+    if let Some(fault) = fault {
+        return Err(fault.into());
+    }
+    if watch.found.is_empty() {
+        let what = report::nothing(&watch, protocol, &names, only.as_deref());
+        return Err(Fault::new(file, At::File, what).into());
+    }
+    right_way_up(file, settings, &watch.found, out)
+}
+
+/// Decodes samples at a fixed rate.
+pub fn samples(
+    file: &str,
+    raw: &mut Raw,
+    protocol: Protocol,
+    settings: &Settings,
+    out: &mut Output<'_>,
+) -> Result<(), Stop> {
+    let rate = raw.clock().rate();
+    let slowest = protocol.of_lines().iter().flat_map(|protocol| protocol.rates()).min().copied().unwrap_or(1);
+    if let Some(what) = too_coarse(rate, settings.line.bit_rate.unwrap_or(slowest)) {
+        return Err(Fault::new(file, At::File, what).into());
+    }
+    decode(file, raw, protocol, settings, out)
 }
 
 /// A line that was found upside down is decoded, but it is not good: somebody has to look at the wires. Where hardly
 /// anything could be decoded, the polarity was only a guess and says nothing.
-fn right_way_up(file: &str, options: &Options, setup: Setup, out: &Output<'_>) -> Result<(), Stop> {
-    if !setup.inverted || options.inverted.is_some() || out.tally.ok <= out.tally.refused {
+fn right_way_up(file: &str, settings: &Settings, found: &[Found], out: &Output<'_>) -> Result<(), Stop> {
+    let inverted = found.iter().any(Found::is_inverted);
+    if !inverted || settings.line.inverted.is_some() || out.tally.ok <= out.tally.refused {
         return Ok(());
     }
     let what = "the line is inverted: exchange A and B, or say that it is meant so with --polarity inverted";
@@ -173,6 +181,7 @@ fn right_way_up(file: &str, options: &Options, setup: Setup, out: &Output<'_>) -
 
 /// Fewer than four samples a bit.
 fn too_coarse(rate: u64, bit_rate: u32) -> Option<String> {
+    // A line may be a little faster than its name.
     let need = 4 * u64::from(bit_rate);
     let digits = |value: f64| format!("{value:.2}").trim_end_matches('0').trim_end_matches('.').to_owned();
     let (a_bit, mhz) = (digits(rate as f64 / f64::from(bit_rate)), digits(need as f64 / 1e6));
@@ -180,80 +189,25 @@ fn too_coarse(rate: u64, bit_rate: u32) -> Option<String> {
     (rate < need).then_some(what)
 }
 
-/// Decodes changes with their times.
-fn edges<P: StartStop>(
-    line: &mut dyn Line,
-    preview: Preview,
-    setup: Setup,
-    protocol: &mut P,
-    out: &mut Output<'_>,
-) -> Result<(), Stop> {
-    protocol.begin(preview.begin());
-    let Preview { mut changes, mut more, mut fault, .. } = preview;
-    let mut receiver = EdgeReceiver::new(setup, P::CONTENT_BITS);
-    out.channels(line.channels(), setup.channel)?;
-    let tap = out.wants_changes();
-    loop {
-        for change in &changes {
-            if tap {
-                out.change(change)?;
-            }
-            if change.channel == setup.channel {
-                if let Some(field) = receiver.change(change.time, change.level) {
-                    protocol.field(&field, out)?;
-                }
-            }
-        }
-        out.tick();
-        if !more {
-            break;
-        }
-        changes.clear();
-        match line.read(&mut changes) {
-            Ok(again) => more = again,
-            Err(e) => (more, fault) = (false, Some(e)),
-        }
+/// The channels that the user named.
+fn wanted(options: &Options, names: &[String]) -> Result<Option<Vec<u16>>, String> {
+    match (&options.pair, &options.channel) {
+        (Some((requests, answers)), _) => Ok(Some(vec![find(requests, names)?, find(answers, names)?])),
+        (None, Some(channel)) => Ok(Some(vec![find(channel, names)?])),
+        (None, None) => Ok(None),
     }
-    let end = line.reached();
-    if let Some(field) = receiver.finish(end) {
-        protocol.field(&field, out)?;
-    }
-    protocol.finish(Some(end), out)?;
-    fault.map_or(Ok(()), |fault| Err(fault.into()))
 }
 
-/// Decodes packed samples, the fast way.
-fn samples<P: StartStop>(
-    raw: &mut Raw,
-    preview: Preview,
-    mut receiver: SampleReceiver,
-    protocol: &mut P,
-    out: &mut Output<'_>,
-) -> Result<(), Stop> {
-    protocol.begin(preview.begin());
-    let Preview { changes, more, mut fault, .. } = preview;
-    let channel = receiver.channel();
-    for change in changes.iter().filter(|change| change.channel == channel) {
-        if let Some(field) = receiver.change(change.time, change.level) {
-            protocol.field(&field, out)?;
-        }
-    }
-    if let Some(field) = receiver.reach(raw.samples()) {
-        protocol.field(&field, out)?;
-    }
-    drop(changes);
-    let mut block = Words::default();
-    while more && fault.is_none() {
-        out.tick();
-        match raw.words(channel, &mut block) {
-            Ok(true) => receiver.words(&block, |field| protocol.field(field, out))?,
-            Ok(false) => break,
-            Err(e) => fault = Some(e),
-        }
-    }
-    if let Some(field) = receiver.finish() {
-        protocol.field(&field, out)?;
-    }
-    protocol.finish(Some(raw.reached()), out)?;
-    fault.map_or(Ok(()), |fault| Err(fault.into()))
+/// A channel by its name, or by its number from 0.
+fn find(name: &str, channels: &[String]) -> Result<u16, String> {
+    let by_name = channels.iter().position(|c| c == name).or_else(|| {
+        let last = |c: &String| c.rsplit('.').next().is_some_and(|end| end == name);
+        channels.iter().position(last)
+    });
+    let by_number = || name.parse().ok().filter(|&n: &usize| n < channels.len());
+    by_name.or_else(by_number).and_then(|index| u16::try_from(index).ok()).ok_or_else(|| {
+        let shown = channels.iter().take(20).map(|c| format!("\"{c}\"")).collect::<Vec<_>>().join(", ");
+        let more = if channels.len() > 20 { ", ..." } else { "" };
+        format!("no channel \"{name}\"; the file has {shown}{more}")
+    })
 }

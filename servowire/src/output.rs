@@ -10,6 +10,7 @@ use std::io;
 
 use crate::capture::Change;
 use crate::event::{Event, Verdict};
+use crate::protocols::Protocol;
 
 /// Takes events in the order of the line.
 pub trait Sink {
@@ -17,10 +18,31 @@ pub trait Sink {
     fn event(&mut self, event: &Event) -> io::Result<()>;
 }
 
+/// A line of a capture that is decoded.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Lane {
+    /// The name of its channel, or of its two.
+    pub channel: String,
+    /// Its channels by index.
+    pub channels: Vec<u16>,
+    /// What is spoken on it.
+    pub protocol: Protocol,
+    /// Bits a second, as the protocol has it.
+    pub rate: u32,
+}
+
 /// A form of output that is written file by file.
 pub trait Printer: Sink {
     /// A file begins.
     fn begin(&mut self, file: &str) -> io::Result<()>;
+
+    /// A further line was found; it has the next number, from 0.
+    fn begin_lane(&mut self, _lane: &Lane) -> io::Result<()> {
+        Ok(())
+    }
+
+    /// The events that follow are of this line.
+    fn lane(&mut self, _lane: usize) {}
 
     /// The file is at its end.
     fn end(&mut self) -> io::Result<()>;
@@ -57,6 +79,7 @@ pub struct Output<'a> {
     pub tally: Tally,
     /// Refused frames by class, with the first cause that was given.
     refused: BTreeMap<&'static str, (u64, Option<String>)>,
+    lane: Option<usize>,
 }
 
 impl<'a> Output<'a> {
@@ -67,7 +90,7 @@ impl<'a> Output<'a> {
         progress: &'a dyn Fn(),
         notes: &'a dyn Fn(&str),
     ) -> Self {
-        Self { printer, vcd, progress, notes, tally: Tally::default(), refused: BTreeMap::new() }
+        Self { printer, vcd, progress, notes, tally: Tally::default(), refused: BTreeMap::new(), lane: None }
     }
 
     /// Whether the changes of the line have a taker.
@@ -75,9 +98,30 @@ impl<'a> Output<'a> {
         self.vcd.is_some()
     }
 
-    /// The channels of the capture and the one that is decoded.
-    pub fn channels(&mut self, channels: &[String], decoded: u16) -> io::Result<()> {
-        self.vcd.as_mut().map_or(Ok(()), |vcd| vcd.channels(channels, decoded))
+    /// The channels of the capture. The lines found so far are decoded.
+    pub fn channels(&mut self, channels: &[String]) -> io::Result<()> {
+        self.vcd.as_mut().map_or(Ok(()), |vcd| vcd.channels(channels))
+    }
+
+    /// A further line is decoded; it has the next number, from 0.
+    pub fn begin_lane(&mut self, lane: Lane) -> io::Result<()> {
+        self.printer.begin_lane(&lane)?;
+        if let Some(vcd) = &mut self.vcd {
+            vcd.begin_lane(lane);
+        }
+        Ok(())
+    }
+
+    /// The events that follow are of this line.
+    pub fn lane(&mut self, lane: usize) -> io::Result<()> {
+        if self.lane != Some(lane) {
+            self.lane = Some(lane);
+            self.printer.lane(lane);
+            if let Some(vcd) = &mut self.vcd {
+                vcd.lane(lane);
+            }
+        }
+        Ok(())
     }
 
     /// A change of any channel.

@@ -2,8 +2,10 @@
 //!
 //! To add one: a file below `protocols/` that turns what its line delivers into [`Event`](crate::event::Event)s, a
 //! variant of [`Protocol`], and a line in each of its methods. A start-stop protocol implements
-//! [`StartStop`](crate::line::StartStop) and is done; another kind takes the [`Capture`] itself.
+//! [`StartStop`](crate::line::StartStop), another one on a pair of wires [`LineDecoder`]; the survey then finds it by
+//! itself. Another kind takes the [`Capture`].
 
+mod bytes;
 pub mod hdsl;
 pub mod nikon;
 pub mod rtex;
@@ -12,12 +14,14 @@ pub mod tformat;
 
 use crate::capture::Capture;
 use crate::fault::{At, Fault};
-use crate::line::{self, Stop};
+use crate::line::{self, LineDecoder, StartStopLine, Stop, Weights};
 use crate::output::Output;
 
 /// A protocol by its name on the command line.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
 pub enum Protocol {
+    /// Whatever the capture holds.
+    Auto,
     /// Tamagawa T-Format.
     Tformat,
     /// Panasonic RTEX data blocks, from logs of bytes.
@@ -44,12 +48,70 @@ pub struct Settings {
 }
 
 impl Protocol {
+    /// The name as people write it.
+    pub fn title(self) -> &'static str {
+        match self {
+            Self::Auto => "any protocol",
+            Self::Tformat => "T-Format",
+            Self::Rtex => "RTEX",
+            Self::Sorte => "SORTE",
+            Self::Hdsl => "HIPERFACE DSL",
+            Self::Nikon => "A-format",
+        }
+    }
+
+    /// The protocols of recorded lines that are meant.
+    pub fn of_lines(self) -> &'static [Self] {
+        match self {
+            Self::Auto => &[Self::Tformat, Self::Nikon, Self::Hdsl],
+            Self::Tformat => &[Self::Tformat],
+            Self::Nikon => &[Self::Nikon],
+            Self::Hdsl => &[Self::Hdsl],
+            Self::Rtex | Self::Sorte => &[],
+        }
+    }
+
+    /// Its nominal bit rates on a recorded line.
+    pub fn rates(self) -> &'static [u32] {
+        match self {
+            Self::Tformat => tformat::RATES,
+            Self::Nikon => nikon::RATES,
+            Self::Hdsl => hdsl::RATES,
+            Self::Auto | Self::Rtex | Self::Sorte => &[],
+        }
+    }
+
+    /// What its frames prove on a recorded line.
+    pub(crate) fn weights(self) -> Weights {
+        match self {
+            // 9 of 256 control fields; with the echo and the check field of the answer.
+            Self::Tformat => Weights { request: 4, answer: 24, alone: 16 },
+            // Sync and frame code, CRC-3; sync code, fixed bit, echo and CRC-8.
+            Self::Nikon => Weights { request: 6, answer: 22, alone: 14 },
+            // Twelve fixed bits and a word of the code; six words and two checks.
+            _ => Weights { request: 8, answer: 16, alone: 16 },
+        }
+    }
+
+    /// A decoder for one idle-high line at `rate` bits a second; none where it has no line.
+    pub(crate) fn line_decoder(self, rate: u32, settings: &Settings) -> Option<Box<dyn LineDecoder>> {
+        let bit = 1e12 / f64::from(rate.max(1));
+        match self {
+            Self::Tformat => {
+                Some(Box::new(StartStopLine::new(bit, tformat::Decoder::new(bit as i64, settings.tformat))))
+            }
+            Self::Nikon => Some(Box::new(StartStopLine::new(bit, nikon::Decoder::new(bit as i64, settings.nikon)))),
+            Self::Hdsl => Some(Box::new(hdsl::DslLine::new(bit))),
+            Self::Auto | Self::Rtex | Self::Sorte => None,
+        }
+    }
+
     /// The names of all fields that its events may have.
     pub fn field_names(self) -> &'static [&'static str] {
         match self {
             Self::Tformat => tformat::FIELDS,
             // A log of blocks has no times, so there is no VCD to hold its fields.
-            Self::Rtex => &[],
+            Self::Auto | Self::Rtex => &[],
             Self::Sorte => sorte::FIELDS,
             Self::Hdsl => hdsl::FIELDS,
             Self::Nikon => nikon::FIELDS,
@@ -62,16 +124,10 @@ impl Protocol {
             // Whatever was asked for: the only protocol that has packets.
             (_, Capture::Packets(packets)) => sorte::decode(packets, out),
             (Self::Sorte, _) => Err(Fault::new(file, At::File, "SORTE is decoded from a pcapng file").into()),
-            (Self::Tformat, capture) => {
-                let make = |bit| tformat::Decoder::new(bit, settings.tformat);
-                line::decode(file, capture, &settings.line, &make, out)
-            }
-            (Self::Hdsl, capture) => hdsl::decode(file, capture, &settings.line, out),
-            (Self::Rtex, capture) => rtex::decode(file, capture, &settings.rtex, out),
-            (Self::Nikon, capture) => {
-                let make = |bit| nikon::Decoder::new(bit, settings.nikon);
-                line::decode(file, capture, &settings.line, &make, out)
-            }
+            (_, Capture::Bytes(log)) => bytes::decode(file, log, self, settings, out),
+            (Self::Rtex, _) => Err(Fault::new(file, At::File, rtex::NO_LINE).into()),
+            (_, Capture::Edges(mut line)) => line::decode(file, line.as_mut(), self, settings, out),
+            (_, Capture::Samples(mut raw)) => line::samples(file, &mut raw, self, settings, out),
         }
     }
 }

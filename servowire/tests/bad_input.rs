@@ -30,7 +30,8 @@ fn no_file_and_no_content() {
 fn unknown_formats() {
     let bench = Bench::new();
     bench.decode("noise.dat", [0xaa; 100], &[]).fails_with("for raw samples give --rate");
-    bench.decode("session.sr", b"PK\x03\x04....", &[]).fails_with("export it as VCD");
+    bench.decode("session.sr", b"PK\x03\x04....", &[]).fails_with("not a whole zip file");
+    bench.decode("a.csv.xz", b"\xfd7zXZ\0....", &[]).fails_with("packed by xz: unpack it first");
     bench.decode("a.raw", [0; 100], &["--format", "packed"]).fails_with("say it with --rate");
 }
 
@@ -102,8 +103,8 @@ fn csv_damaged() {
         rows.join("\n")
     };
     for (row, sentence) in [
-        ("oops,1", "line 300: \"oops\" is not a time in seconds"),
-        ("0.001,x", "line 300: column \"Channel 0\" holds \"x\", where a level is 0 or 1"),
+        ("oops,1", "line 300: \"oops\" is not a time; this row was left out"),
+        ("0.001,y", "line 300: \"y\", where a level is 0 or 1"),
         ("0.001", "line 300: the row has 1 columns, the heading 2"),
         ("0.0000001,1", "line 300: time goes back from"),
     ] {
@@ -111,10 +112,12 @@ fn csv_damaged() {
         run.fails_with(sentence);
         assert!(run.json().len() > 5, "what came before is decoded: {}", run.out);
     }
-    bench.decode("a.csv", with(0, "a,b"), &[]).fails_with("the heading of a Logic 2 export");
-    bench.decode("a.csv", with(0, "Time [s]"), &[]).fails_with("the heading of a Logic 2 export");
-    bench.decode("a.csv", "Time [s],Channel 0\n", &[]).fails_with("no traffic");
-    bench.decode("a.csv", with(5, "2024-01-01T00:00:00,1"), &[]).fails_with("is not a time in seconds");
+    bench.decode("a.csv", with(0, "a,b"), &[]).fails_with("no table with times or a sample rate");
+    bench.decode("a.csv", "Time [s],Channel 0\n", &[]).fails_with("no column of levels");
+    bench.decode("a.csv", with(5, "2024-01-01T00:00:00,1"), &[]).fails_with("is not a time; this row was left out");
+    // Two rows are two rows, and all others are read.
+    let two = with(5, "oops,1").replacen(rows[9], "oops,0", 1);
+    bench.decode("a.csv", two, &[]).fails_with("line 6: \"oops\" is not a time; 2 rows were left out");
 }
 
 #[test]
@@ -124,13 +127,16 @@ fn saleae_binary_damaged() {
     let run = bench.decode("a.bin", &good[..good.len() - 100], &["--json"]);
     run.fails_with("it was cut off");
     assert!(run.json().len() > 10);
-    bench.decode("a.bin", &good[..30], &[]).fails_with("byte 30: ends in its header of 44 bytes");
+    bench
+        .decode("a.bin", &good[..30], &[])
+        .fails_with("byte 30: ends in the header of its transitions: it was cut off");
     let with = |at: usize, bytes: &[u8]| {
         let mut out = good.clone();
         out[at..at + bytes.len()].copy_from_slice(bytes);
         out
     };
-    bench.decode("a.bin", with(8, &[1, 0, 0, 0]), &[]).fails_with("is of version 1, and only 0 is known");
+    bench.decode("a.bin", with(8, &[2, 0, 0, 0]), &[]).fails_with("is of version 2, and only 0 and 1 are known");
+    bench.decode("a.bin", with(12, &[100, 0, 0, 0]), &[]).fails_with("is the inside of a .sal capture");
     bench.decode("a.bin", with(12, &[1, 0, 0, 0]), &[]).fails_with("is not a digital channel");
     bench.decode("a.bin", with(20, &f64::NAN.to_le_bytes()), &[]).fails_with("begin or end is not a time");
     bench.decode("a.bin", with(44 + 80, &f64::INFINITY.to_le_bytes()), &[]).fails_with("byte 124: transition is not");

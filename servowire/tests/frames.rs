@@ -41,7 +41,7 @@ fn values_of_an_id_3_answer() {
     assert_eq!(
         answer["fields"],
         json!({
-            "SF": { "raw": 0x20, "set": ["ea1"] }, "ABS": 3_915_817, "ENID": 23, "ABM": 2,
+            "SF": { "raw": 0x20, "set": ["EA1"] }, "ABS": 3_915_817, "ENID": 23, "ABM": 2,
             "ALMC": { "raw": 0xc8, "set": ["OF", "BE", "BA"] }, "CRC": 0x35,
         })
     );
@@ -166,7 +166,7 @@ fn damaged_requests() {
         wave.exchange(&[0x92], &refusal);
     });
     assert_eq!(good_request.verdicts(), ["ok", "rejected"]);
-    assert_eq!(good_request.json()[1]["fields"]["SF"]["set"], json!(["ca0"]));
+    assert_eq!(good_request.json()[1]["fields"]["SF"]["set"], json!(["CA0"]));
 }
 
 #[test]

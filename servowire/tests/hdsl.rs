@@ -23,7 +23,7 @@ use hdsl::master::Master;
 use hdsl::message::{RemoteRegister, ShortRequest};
 use hdsl::sampling::line;
 use hdsl::sync::{Es, Synchroniser};
-use hdsl::{EncoderId, Profile};
+use hdsl::{Dialect, EncoderId};
 
 fn capture() -> (std::path::PathBuf, String) {
     let package = Path::new(env!("CARGO_MANIFEST_DIR"));
@@ -58,7 +58,7 @@ fn the_start_up_of_the_firmware() {
 /// Samples of a link in sync mode: EXTRA windows with edges between the bits, stuffing, a message, a running position.
 fn sampled() -> Vec<u8> {
     let sync = Synchroniser::new(1333, Es::ONE).unwrap();
-    let mut master = Master::synchronised(Profile::SICK, sync);
+    let mut master = Master::synchronised(Dialect::SICK, sync);
     let mut encoder = Device::new(EncoderId::new(0x00153).unwrap());
     let level = |bit: bool| if bit { 0xff_u8 } else { 0 };
     let mut samples = vec![0xff; 20];

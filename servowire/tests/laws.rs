@@ -21,7 +21,7 @@ use proptest::prelude::*;
 use servowire::capture::hexlog::HexLog;
 use servowire::capture::raw::{Raw, Unit};
 use servowire::capture::saleae_binary::SaleaeBinary;
-use servowire::capture::saleae_csv::SaleaeCsv;
+use servowire::capture::table::Table;
 use servowire::capture::vcd::Vcd;
 use servowire::capture::{ByteLog, Capture, Input};
 use servowire::event::{Direction, Event};
@@ -144,7 +144,7 @@ proptest! {
         }
         let capture = match format {
             0 => Vcd::new(input(file)).map(|file| Capture::Edges(Box::new(file))),
-            1 => SaleaeCsv::new(input(file)).map(|file| Capture::Edges(Box::new(file))),
+            1 => Table::new(input(file), None).map(|file| Capture::Edges(Box::new(file))),
             2 => SaleaeBinary::new(input(file)).map(|file| Capture::Edges(Box::new(file))),
             _ => Ok(Capture::Bytes(ByteLog::Hex(HexLog::new(input(file))))),
         };

@@ -43,14 +43,14 @@ fn other_rates_are_named() {
     for (rate, seen) in [
         (1e6, "1.00"),
         (1.25e6, "1.25"),
-        (2.3e6, "2.30"),
-        (2.7e6, "2.70"),
+        (2.0e6, "2.00"),
+        (3.2e6, "3.20"),
         (4e6, "4.00"),
         (10e6, "10.0"),
         (115_200.0, "0.115"),
     ] {
         let run = bench.decode("a.vcd", good_traffic(rate).vcd(), &[]);
-        let sentence = format!("channel \"line\" runs at about {seen} Mbit/s, where T-Format has 2.5 and 5 Mbit/s");
+        let sentence = format!("channel \"line\" runs at about {seen} Mbit/s");
         run.fails_with(&sentence);
         assert!(run.out.is_empty());
     }
@@ -132,7 +132,7 @@ fn the_channel_that_decodes_is_taken() {
     assert!(run.err.contains("channel \"A\" idles high"), "{}", run.err);
     let other = bench.decode("a.csv", &text, &["--json", "--channel", "B"]);
     other.fails_with("the line is inverted");
-    assert_eq!(run.out, other.out);
+    assert_eq!(run.out, other.out.replace("\"channel\":\"B\"", "\"channel\":\"A\""));
 }
 
 /// 64 edges of a clock for one of the line.
@@ -181,7 +181,7 @@ fn recordings_cut_at_both_ends() {
         let verdicts = run.verdicts();
         let (last, before) = verdicts.split_last().unwrap();
         assert!(before.iter().all(|verdict| verdict == "ok"), "{}", run.out);
-        assert_eq!(run.code, i32::from(last == "truncated"), "{}", run.out);
+        assert_eq!(run.code, i32::from(last == "truncated"), "{end}: {}\n{}", run.err, run.out);
     }
 }
 

@@ -20,7 +20,7 @@ use std::path::Path;
 
 use common::{Bench, Run, Wave};
 use nikon_aformat::device::{Device, Encoders, Fault};
-use nikon_aformat::{BitRate, EncoderAddress, Operation, Profile, Request, TypeWord, Window};
+use nikon_aformat::{BitRate, EncoderAddress, Operation, Request, Resolution, TypeWord, Window};
 
 const RATES: [(BitRate, f64); 5] = [
     (BitRate::Mbit2_5, 2.5e6),
@@ -37,7 +37,7 @@ fn ea(address: u8) -> EncoderAddress {
 fn encoders(rate: BitRate) -> Encoders<8, 1> {
     Encoders {
         all: EncoderAddress::ALL.map(|ea| {
-            let mut device = Device::new(ea, Profile::new(20, 16).unwrap(), rate);
+            let mut device = Device::new(ea, Resolution::new(20, 16).unwrap(), rate);
             device.set_position(u32::from(ea.get()) * 100_000 + 0x5_1234, 17);
             device
         }),

@@ -58,9 +58,9 @@ fn hex_lines_show_what_changed() {
     assert_eq!(events[0]["kind"], "cmd 5");
     assert_eq!(events[0]["fields"]["Command_Position"], 1_000);
     assert_eq!(events[1]["fields"]["Response_Data2"], 20_000);
-    assert_eq!(events[1]["fields"]["Status_Flags"]["set"][0], "Servo_Ready");
+    assert_eq!(events[1]["fields"]["Status_Flags"]["set"][0], "SERVO_READY");
     // The servo is switched on in the third command; everything that stays is left out.
-    assert_eq!(events[4]["fields"]["Servo_On"], 1);
+    assert_eq!(events[4]["fields"]["SERVO_ON"], 1);
     assert_eq!(events[4]["fields"]["Command_Position"], 1_020);
     assert_eq!(events[4]["fields"].as_object().unwrap().len(), 3);
     assert!(events[5]["fields"].get("Response_Data2").is_none());
@@ -103,7 +103,7 @@ fn faults_and_notes() {
     let bench = Bench::new();
     let options = ["--protocol", "rtex", "--bytes", "--json"];
     let run = bench.decode("log.txt", "45507000000000000000000000000000\n4520800000\n", &options);
-    assert_eq!(run.verdicts(), ["cyclic_code", "length"]);
+    assert_eq!(run.verdicts(), ["cyclic_code", "truncated"]);
     assert_eq!(run.code, 1);
     let run = bench.decode("log.txt", "00000000000000000000000000000000\n45208300000000000000000000000000\n", &options);
     let notes: Vec<_> = run.json().iter().map(|e| e["fields"]["note"].as_str().unwrap().to_owned()).collect();

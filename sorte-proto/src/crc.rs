@@ -49,6 +49,7 @@ pub(crate) struct RunningFcs(u32);
 impl RunningFcs {
     pub(crate) const START: Self = Self(u32::MAX);
 
+    #[inline]
     pub(crate) fn push(&mut self, byte: u8) {
         let [table] = CRC32.table();
         let [low, ..] = self.0.to_le_bytes();
@@ -58,6 +59,23 @@ impl RunningFcs {
 
     pub(crate) const fn value(self) -> u32 {
         !self.0
+    }
+
+    /// The FCS of all bytes but the last four, which were `trailer`. All of them went through [`push`](Self::push).
+    ///
+    /// Nothing is held back on the way: the four steps are undone here.
+    pub(crate) fn before(self, trailer: u32) -> u32 {
+        const POLYNOMIAL: u32 = 0xedb8_8320;
+        let undone = (0..32).fold(self.0, |register, _| {
+            // A step shifts right and adds the polynomial, whose top bit is set, for each bit that falls out.
+            if register & 1 << 31 == 0 { register << 1 } else { (register ^ POLYNOMIAL) << 1 | 1 }
+        });
+        !(undone ^ trailer)
+    }
+
+    /// Whether the bytes end with the FCS of those before it: the register then always holds the same.
+    pub(crate) const fn is_whole(self) -> bool {
+        self.0 == 0xdebb_20e3
     }
 }
 
@@ -115,6 +133,13 @@ mod tests {
                 running.push(byte);
             }
             prop_assert_eq!(running.value(), fcs(&bytes));
+            // Any four bytes after them: the FCS of what was before is still known.
+            let trailer = at as u32 ^ fcs(&bytes);
+            for byte in trailer.to_le_bytes() {
+                running.push(byte);
+            }
+            prop_assert_eq!(running.before(trailer), fcs(&bytes));
+            prop_assert_eq!(running.is_whole(), trailer == fcs(&bytes));
         }
 
         #[test]

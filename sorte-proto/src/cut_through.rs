@@ -7,95 +7,36 @@
 //! If the incoming FCS turns out wrong, the last byte is sent inverted: the new FCS must not heal the error. (The
 //! vendor's hardware does.) A frame of another TYPE or with another DA passes unchanged.
 
-use crate::crc::RunningFcs;
-use crate::discovery::{count_after, next_address};
-use crate::frame::{FrameType, MULTICAST};
-use crate::sync::hop_ns;
-use crate::{Assignment, Discovery, Entry, Error, Status, Sync};
+mod transit;
 
-/// The part both share: where in the frame we are, and both checksums.
+use crate::crc::RunningFcs;
+use crate::discovery::{Assignment, Discovery, Entry, count_after, next_address};
+use crate::error::Error;
+use crate::frame_type::FrameType;
+use crate::status::Status;
+use crate::sync::{Sync, hop_ns};
+
+pub(crate) use transit::Transit;
+
+/// What both rewriters send: STATUS, FCS and the inverted last byte of a frame that came in wrong.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
-struct Passage {
-    at: u16,
-    /// DA or TYPE is another, so nothing is touched.
-    foreign: bool,
-    destination: u8,
-    source: u8,
-    code: u8,
-    status: Status,
-    received: RunningFcs,
+struct Sender {
+    transit: Transit,
     sent: RunningFcs,
-    /// FCS in the frame, byte by byte as it comes.
-    trailer: u32,
+    add: Status,
 }
 
-impl Passage {
-    const START: Self = Self {
-        at: 0,
-        foreign: false,
-        destination: 0,
-        source: 0,
-        code: 0,
-        status: Status(0),
-        received: RunningFcs::START,
-        sent: RunningFcs::START,
-        trailer: 0,
-    };
-
-    /// Takes one byte of a frame of `len` bytes. `rewrite` gives the byte to send for a byte of the body.
-    fn byte(&mut self, byte: u8, len: u16, frame_type: FrameType, rewrite: impl FnOnce(u16, u8) -> u8) -> u8 {
-        let at = self.at;
-        self.at = at.saturating_add(1);
-        match at {
-            0 => {
-                self.destination = byte;
-                self.foreign = byte != MULTICAST;
-            }
-            1 => self.source = byte,
-            2 => {
-                self.code = byte;
-                self.foreign |= byte != frame_type.code();
-            }
-            3 => self.status = Status(byte),
-            _ => {}
-        }
-        let body = len.saturating_sub(4);
-        if self.foreign || at >= len {
-            return byte;
-        }
-        if at < body {
-            self.received.push(byte);
-            let out = rewrite(at, byte);
-            self.sent.push(out);
-            return out;
-        }
-        self.trailer = self.trailer >> 8 | u32::from(byte) << 24;
-        let [out, ..] = (self.sent.value() >> (u32::from(at.saturating_sub(body)) << 3)).to_le_bytes();
-        out
+impl Sender {
+    const fn new(last: bool, error: bool) -> Self {
+        Self { transit: Transit::START, sent: RunningFcs::START, add: Status::of_device(last, error) }
     }
 
-    /// Whether the last byte of the FCS has just passed and was wrong.
-    fn is_bad(&self) -> bool {
-        self.trailer != self.received.value()
-    }
-
-    /// The checks of a whole frame in their order, as far as a passing frame can be judged.
-    fn finish(&self, len: u16, frame_type: FrameType) -> Result<(), Error> {
-        if self.at < 8 {
-            return Err(Error::Truncated { got: self.at, need: 8 });
-        }
-        if self.destination != MULTICAST {
-            return Err(Error::WrongDestination { got: self.destination });
-        }
-        if self.code != frame_type.code() {
-            return Err(Error::UnexpectedType { got: self.code, want: frame_type.code() });
-        }
-        if self.at != len {
-            return Err(Error::LengthMismatch { got: self.at, want: len });
-        }
-        let (got, want) = (self.trailer, self.received.value());
-        if got == want { Ok(()) } else { Err(Error::BadFcs { got, want }) }
+    /// The byte to send for byte `at` of the FCS, 0 to 3.
+    #[inline(never)]
+    fn trailer(&self, at: u16) -> u8 {
+        let [out, ..] = (self.sent.value() >> (u32::from(at & 3) << 3)).to_le_bytes();
+        if at == 3 && !self.transit.is_whole() { !out } else { out }
     }
 }
 
@@ -103,49 +44,59 @@ impl Passage {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct DiscoveryRewriter {
-    passage: Passage,
+    sender: Sender,
     lengths: Entry,
-    add: Status,
     /// Devices before this one; the two offsets; all as far as they have come.
     before: u16,
     in_offset: u16,
     out_offset: u16,
+    /// Where the own entry begins; `u16::MAX` for none.
+    entry_at: u16,
     /// Carry of the 16-bit addition that is under way.
     carry: bool,
 }
 
 const DISCOVERY_LEN: u16 = 1030;
+const DISCOVERY_FCS: u16 = DISCOVERY_LEN - 4;
+/// Where the table of entries begins.
+const TABLE: u16 = 10;
 const _: () = assert!(DISCOVERY_LEN as usize == Discovery::LEN);
 
 impl DiscoveryRewriter {
     /// `last`: the device is the last one; `error`: it has seen a wrong checksum since its previous STATUS byte.
     pub const fn new(lengths: Entry, last: bool, error: bool) -> Self {
-        Self {
-            passage: Passage::START,
-            lengths,
-            add: Status::of_device(last, error),
-            before: 0,
-            in_offset: 0,
-            out_offset: 0,
-            carry: false,
-        }
+        let sender = Sender::new(last, error);
+        Self { sender, lengths, before: 0, in_offset: 0, out_offset: 0, entry_at: u16::MAX, carry: false }
     }
 
     /// The byte to send for the byte received.
+    #[inline]
     pub fn byte(&mut self, byte: u8) -> u8 {
-        let mut passage = self.passage;
-        let last_byte = passage.at == DISCOVERY_LEN.saturating_sub(1);
-        let out = passage.byte(byte, DISCOVERY_LEN, FrameType::Discovery, |at, byte| self.body(at, byte));
-        self.passage = passage;
-        if last_byte && !passage.foreign && passage.is_bad() { !out } else { out }
+        let at = self.sender.transit.take(byte);
+        // Most bytes are entries of other devices.
+        let other = (TABLE..DISCOVERY_FCS).contains(&at) && at.wrapping_sub(self.entry_at) > 3;
+        if other {
+            self.sender.sent.push(byte);
+            return byte;
+        }
+        let out = self.special(at, byte);
+        if at < DISCOVERY_FCS {
+            self.sender.sent.push(out);
+        }
+        out
     }
 
-    fn body(&mut self, at: u16, byte: u8) -> u8 {
-        let full = next_address(self.before).is_none();
+    /// Head, own entry, FCS, and what comes after the frame.
+    #[inline(never)]
+    fn special(&mut self, at: u16, byte: u8) -> u8 {
         let ([i0, i1], [o0, o1]) = (self.lengths.input.to_le_bytes(), self.lengths.output.to_le_bytes());
+        if at >= 3 && !self.sender.transit.is_for_all(FrameType::Discovery) {
+            return byte;
+        }
+        let full = next_address(self.before).is_none();
         match at {
             0..=2 => byte,
-            3 => byte | self.add.0,
+            3 => byte | self.sender.add.bits(),
             4 => {
                 self.before = u16::from(byte);
                 let [low, _] = count_after(self.before).to_le_bytes();
@@ -153,6 +104,10 @@ impl DiscoveryRewriter {
             }
             5 => {
                 self.before |= u16::from(byte) << 8;
+                // At most 253 devices before one that has an entry.
+                if let Some(address) = next_address(self.before) {
+                    self.entry_at = TABLE.saturating_add(u16::from(address.hops_before()) << 2);
+                }
                 byte
             }
             6..=9 if full => byte,
@@ -160,12 +115,13 @@ impl DiscoveryRewriter {
             7 => high(&mut self.in_offset, self.carry, byte, i1),
             8 => low(&mut self.out_offset, &mut self.carry, byte, o0),
             9 => high(&mut self.out_offset, self.carry, byte, o1),
-            _ if full || at.saturating_sub(10) >> 2 != self.before => byte,
-            _ => match at.saturating_sub(10) & 3 {
+            DISCOVERY_FCS..DISCOVERY_LEN => self.sender.trailer(at.wrapping_sub(DISCOVERY_FCS)),
+            _ => match at.wrapping_sub(self.entry_at) {
                 0 => i0,
                 1 => i1,
                 2 => o0,
-                _ => o1,
+                3 => o1,
+                _ => byte,
             },
         }
     }
@@ -173,13 +129,23 @@ impl DiscoveryRewriter {
     /// STATUS as it was received, and what the device has learnt.
     ///
     /// # Errors
-    /// [`Error::Truncated`]; [`Error::WrongDestination`], [`Error::UnexpectedType`] for a frame that passed unchanged;
-    /// [`Error::LengthMismatch`], [`Error::BadFcs`], [`Error::TooManyDevices`].
+    /// As [`LongFrame::new`](crate::LongFrame::new); [`Error::UnexpectedType`] for a good frame that passed unchanged;
+    /// [`Error::TooManyDevices`].
     pub fn finish(self) -> Result<(Status, Assignment), Error> {
-        self.passage.finish(DISCOVERY_LEN, FrameType::Discovery)?;
+        self.sender.transit.check_type(FrameType::Discovery)?;
         let count = self.before.saturating_add(1);
         let address = next_address(self.before).ok_or(Error::TooManyDevices { count })?;
-        Ok((self.passage.status, Assignment { address, in_offset: self.in_offset, out_offset: self.out_offset }))
+        let assignment = Assignment { address, in_offset: self.in_offset, out_offset: self.out_offset };
+        Ok((self.sender.transit.status(), assignment))
+    }
+
+    pub(crate) const fn transit(&self) -> &Transit {
+        &self.sender.transit
+    }
+
+    /// Output bytes of the line up to this device, as it has written them.
+    pub(crate) const fn output_total(&self) -> u16 {
+        self.out_offset.wrapping_add(self.lengths.output)
     }
 }
 
@@ -199,43 +165,44 @@ fn high(offset: &mut u16, carry: bool, byte: u8, add: u8) -> u8 {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct SyncRewriter {
-    passage: Passage,
+    sender: Sender,
     hop_ns: u32,
-    add: Status,
     time_stamp: u32,
     delay: u16,
     carry: bool,
 }
 
 const SYNC_LEN: u16 = 14;
+const SYNC_FCS: u16 = SYNC_LEN - 4;
 const _: () = assert!(SYNC_LEN as usize == Sync::LEN);
 
 impl SyncRewriter {
     /// `line_delay_next_ns`: the line to the next device; `last`, `error` as with [`DiscoveryRewriter::new`].
     pub const fn new(line_delay_next_ns: u16, last: bool, error: bool) -> Self {
-        Self {
-            passage: Passage::START,
-            hop_ns: hop_ns(line_delay_next_ns),
-            add: Status::of_device(last, error),
-            time_stamp: 0,
-            delay: 0,
-            carry: false,
-        }
+        let sender = Sender::new(last, error);
+        Self { sender, hop_ns: hop_ns(line_delay_next_ns), time_stamp: 0, delay: 0, carry: false }
     }
 
     /// The byte to send for the byte received.
     pub fn byte(&mut self, byte: u8) -> u8 {
-        let mut passage = self.passage;
-        let last_byte = passage.at == SYNC_LEN.saturating_sub(1);
-        let out = passage.byte(byte, SYNC_LEN, FrameType::Sync, |at, byte| self.body(at, byte));
-        self.passage = passage;
-        if last_byte && !passage.foreign && passage.is_bad() { !out } else { out }
+        let at = self.sender.transit.take(byte);
+        let foreign = at >= 3 && !self.sender.transit.is_for_all(FrameType::Sync);
+        let out = match at {
+            _ if foreign => byte,
+            3..SYNC_FCS => self.body(at, byte),
+            SYNC_FCS..SYNC_LEN => self.sender.trailer(at.wrapping_sub(SYNC_FCS)),
+            _ => byte,
+        };
+        if at < SYNC_FCS {
+            self.sender.sent.push(out);
+        }
+        out
     }
 
     fn body(&mut self, at: u16, byte: u8) -> u8 {
         let [h0, h1, h2, h3] = self.hop_ns.to_le_bytes();
         match at {
-            3 => return byte | self.add.0,
+            3 => return byte | self.sender.add.bits(),
             4..=7 => self.time_stamp = self.time_stamp >> 8 | u32::from(byte) << 24,
             8 | 9 => self.delay = self.delay >> 8 | u16::from(byte) << 8,
             _ => {}
@@ -256,12 +223,16 @@ impl SyncRewriter {
     /// The frame as it was received.
     ///
     /// # Errors
-    /// [`Error::Truncated`]; [`Error::WrongDestination`], [`Error::UnexpectedType`] for a frame that passed unchanged;
-    /// [`Error::LengthMismatch`], [`Error::BadFcs`].
+    /// As [`LongFrame::new`](crate::LongFrame::new); [`Error::UnexpectedType`] for a good frame that passed unchanged.
     pub fn finish(self) -> Result<Sync, Error> {
-        self.passage.finish(SYNC_LEN, FrameType::Sync)?;
-        let source = self.passage.source;
-        Ok(Sync { source, status: self.passage.status, time_stamp_ns: self.time_stamp, delay_ns: self.delay })
+        let transit = &self.sender.transit;
+        transit.check_type(FrameType::Sync)?;
+        let (source, status) = (transit.source(), transit.status());
+        Ok(Sync { source, status, time_stamp_ns: self.time_stamp, delay_ns: self.delay })
+    }
+
+    pub(crate) const fn transit(&self) -> &Transit {
+        &self.sender.transit
     }
 }
 
@@ -271,7 +242,7 @@ mod tests {
     use std::vec::Vec;
 
     use super::*;
-    use crate::DelayReq;
+    use crate::delay_req::DelayReq;
 
     fn discovery(frame: &[u8], lengths: Entry, last: bool, error: bool) -> (Vec<u8>, DiscoveryRewriter) {
         let mut rewriter = DiscoveryRewriter::new(lengths, last, error);
@@ -348,13 +319,16 @@ mod tests {
         let frame = Sync::of_master(500, 76, false).emit();
         for len in 0..14 {
             let (_, rewriter) = sync(&frame[..len], 1, false, false);
-            assert!(matches!(rewriter.finish(), Err(Error::Truncated { .. } | Error::LengthMismatch { .. })));
+            assert!(matches!(rewriter.finish(), Err(Error::Truncated { .. } | Error::BadFcs { .. })));
         }
         let mut long = frame.to_vec();
         long.push(0x77);
         let (out, rewriter) = sync(&long, 1, false, false);
         assert_eq!(out[14], 0x77);
-        assert_eq!(rewriter.finish(), Err(Error::LengthMismatch { got: 15, want: 14 }));
+        assert!(matches!(rewriter.finish(), Err(Error::BadFcs { .. })));
+        crate::frame::refresh_fcs(&mut long);
+        let (_, rewriter) = sync(&long, 1, false, false);
+        assert_eq!(rewriter.finish(), Err(Error::TooLong { got: 15, want: 14 }));
     }
 
     proptest! {
@@ -362,7 +336,7 @@ mod tests {
         fn sync_gives_the_bytes_of_the_buffered_form(
             source: u8, status: u8, time_stamp_ns: u32, delay_ns: u16, line: u16, last: bool, error: bool,
         ) {
-            let received = Sync { source, status: Status(status), time_stamp_ns, delay_ns };
+            let received = Sync { source, status: Status::from_bits_retain(status), time_stamp_ns, delay_ns };
             let (out, rewriter) = sync(&received.emit(), line, last, error);
             let mut buffered = received;
             buffered.pass(line, last, error);

@@ -1,5 +1,9 @@
-use crate::frame::{FrameType, LongFrame, emit};
-use crate::{Error, Status};
+use core::fmt;
+
+use crate::error::Error;
+use crate::frame::{LongFrame, emit};
+use crate::frame_type::FrameType;
+use crate::status::Status;
 
 /// A line-delay request. The neighbour's port sends it back after a fixed time; there is no answer of its own.
 ///
@@ -10,7 +14,6 @@ use crate::{Error, Status};
 ///
 /// The frame is its header, so this is view and value in one.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "arbitrary", derive(arbitrary::Arbitrary))]
 pub struct DelayReq {
@@ -57,6 +60,20 @@ impl DelayReq {
     }
 }
 
+impl fmt::Display for DelayReq {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "DELAY_REQ, STATUS {}", self.status)
+    }
+}
+
+#[cfg(feature = "defmt")]
+#[cfg_attr(docsrs, doc(cfg(feature = "defmt")))]
+impl defmt::Format for DelayReq {
+    fn format(&self, f: defmt::Formatter<'_>) {
+        defmt::write!(f, "DELAY_REQ, STATUS {}", self.status);
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -64,7 +81,7 @@ mod tests {
     #[test]
     fn every_header_gives_itself_back() {
         for source in 0..=u8::MAX {
-            for status in (0..=u8::MAX).map(Status) {
+            for status in (0..=u8::MAX).map(Status::from_bits_retain) {
                 let frame = DelayReq { source, status };
                 assert_eq!(DelayReq::parse(&frame.emit()), Ok(frame));
             }

@@ -6,24 +6,34 @@
 //!
 //! Data are used only after their checksum was found right. (The published device uses them in any case.)
 
+mod config;
 mod passage;
 mod port;
 
+pub use config::{Config, Counters};
 pub use passage::Passage;
 pub use port::{Port, PortFlags, Seen, State, Trigger};
 
-use passage::{Kind, Learnt};
+use passage::{Kind, Learnt, Plain};
 
+use crate::clock::{Clock, Correction};
 use crate::cut_through::{DiscoveryRewriter, SyncRewriter};
-use crate::timing::published_send_time_ns;
-use crate::{
-    Assignment, Clock, Correction, DelayModel, DelayReq, DeviceFrame, Entry, Error, LineDelay, LongFrame,
-    MasterFrameView, Parameters, Status, Sync,
-};
+use crate::delay_req::DelayReq;
+use crate::discovery::Assignment;
+use crate::error::Error;
+use crate::exchange::{DeviceFrame, MasterFrameView};
+use crate::frame::LongFrame;
+use crate::frame_type::FrameType;
+use crate::line_delay::LineDelay;
+use crate::param::Parameters;
+use crate::status::Status;
+use crate::sync::{Sync, TRIGGER_TO_CAPTURE_NS};
+use crate::timing::{TRIGGER_NS, published_send_time_ns};
 
 /// One of the two ports.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum PortId {
     /// The first.
     A,
@@ -44,6 +54,7 @@ impl PortId {
 /// Where a frame goes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum Path {
     /// Out of the other port.
     Forward,
@@ -56,6 +67,7 @@ pub enum Path {
 /// Times of a frame's reception.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Arrival {
     /// The device's counter at the start of the frame, in ns.
     pub sof_ns: u32,
@@ -68,6 +80,7 @@ pub struct Arrival {
 /// What came of a frame.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Handled {
     /// Where it goes.
     pub path: Path,
@@ -91,53 +104,6 @@ pub struct Output<'a> {
     pub correction: Correction,
 }
 
-/// What a device is.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub struct Config {
-    /// Its process data.
-    pub lengths: Entry,
-    /// Output bytes of the master frame; `None`: as many as DISCOVERY counted.
-    pub output_len: Option<u16>,
-    /// Start of its own frame in ns of the common time; `None`: as published, by its address.
-    pub send_time_ns: Option<u32>,
-    /// How the line to the next device is measured.
-    pub delay_model: DelayModel,
-    /// Cycle starts without a frame that a device in IO exchange bears.
-    pub missed_frames: u8,
-    /// How long a start-up state waits for its frame, in ns.
-    pub start_up_timeout_ns: u64,
-}
-
-impl Default for Config {
-    /// The reference design's; the start-up time-out is this crate's, the published device has none.
-    fn default() -> Self {
-        Self {
-            lengths: Entry::STOCK,
-            output_len: Some(16),
-            send_time_ns: None,
-            delay_model: DelayModel::DEVICE,
-            missed_frames: 5,
-            start_up_timeout_ns: 20_000_000,
-        }
-    }
-}
-
-/// What a device counts.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub struct Counters {
-    /// Frames that were good.
-    pub good_frames: u32,
-    /// Frames with a wrong checksum.
-    pub crc_errors: u32,
-    /// Frames refused for another reason.
-    pub format_errors: u32,
-    /// How often it went back to IDLE.
-    pub retrains: u32,
-}
-
 /// A device with two ports.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -154,6 +120,8 @@ pub struct Device {
     line: LineDelay,
     clock: Clock,
     last_sync: Option<(Sync, u32)>,
+    /// Delay from the master in ns.
+    way_ns: Option<u32>,
     received: bool,
     missed: u8,
     /// When a frame of the present state came last.
@@ -163,7 +131,7 @@ pub struct Device {
 impl Device {
     /// A device without links.
     pub const fn new(config: Config) -> Self {
-        const PORT: Port = Port { state: State::Idle, flags: PortFlags(0) };
+        const PORT: Port = Port { state: State::Idle, flags: PortFlags::empty() };
         Self {
             config,
             a: PORT,
@@ -174,8 +142,9 @@ impl Device {
             output_total: None,
             parameters: None,
             line: LineDelay::new(config.delay_model),
-            clock: Clock::new(),
+            clock: Clock::averaging(config.clock_average),
             last_sync: None,
+            way_ns: None,
             received: false,
             missed: 0,
             alive_ns: 0,
@@ -204,9 +173,9 @@ impl Device {
 
     /// The port that faces the master, once it is known.
     pub const fn master_port(&self) -> Option<PortId> {
-        if self.a.flags.has(PortFlags::MASTER_PORT) {
+        if self.a.flags.contains(PortFlags::MASTER_PORT) {
             Some(PortId::A)
-        } else if self.b.flags.has(PortFlags::MASTER_PORT) {
+        } else if self.b.flags.contains(PortFlags::MASTER_PORT) {
             Some(PortId::B)
         } else {
             None
@@ -220,7 +189,7 @@ impl Device {
 
     /// Whether only one port is linked.
     pub const fn is_last(&self) -> bool {
-        self.a.flags.has(PortFlags::LAST_DEVICE) || self.b.flags.has(PortFlags::LAST_DEVICE)
+        self.a.flags.contains(PortFlags::LAST_DEVICE) || self.b.flags.contains(PortFlags::LAST_DEVICE)
     }
 
     /// Address and offsets, from the last DISCOVERY.
@@ -255,10 +224,32 @@ impl Device {
         self.last_sync.map(|(_, sof_ns)| sof_ns.wrapping_add(10_000))
     }
 
+    /// Own counter at the start of the first cycle of the IO exchange, in the common time: the master triggers its first
+    /// frame one SYNC period of 10 us after the last SYNC frame, and a cycle begins 500 ns before its trigger.
+    pub fn first_cycle_ns(&self) -> Option<u32> {
+        let ((sync, _), delay_ns) = (self.last_sync?, self.way_ns?);
+        let sent_ns = sync.time_stamp_ns.wrapping_sub(TRIGGER_TO_CAPTURE_NS).wrapping_sub(delay_ns);
+        Some(sent_ns.wrapping_add(10_000).wrapping_sub(TRIGGER_NS))
+    }
+
     /// When to send the own frame, in ns of the common time.
     pub fn send_time_ns(&self) -> Option<u32> {
-        let published = self.assignment.map(|a| published_send_time_ns(a.address));
-        self.config.send_time_ns.or(published)
+        let address = self.assignment?.address;
+        let slot = self.config.slot_ns.map(|slot| {
+            let slots = slot.saturating_mul(address.hops_before().into());
+            TRIGGER_NS.saturating_add(slots).saturating_sub(self.delay_ns().unwrap_or_default())
+        });
+        self.config.send_time_ns.or(slot).or_else(|| Some(published_send_time_ns(address)))
+    }
+
+    /// Delay from the master in ns, from the last SYNC frame; beyond 65,535 ns only if the master tells the period of its
+    /// SYNC frames, see [`Sync::long_delay_ns`].
+    pub fn delay_ns(&self) -> Option<u32> {
+        let (sync, _) = self.last_sync?;
+        // PARAM: a period of its own, in ticks of 5 ns.
+        let ticks = self.parameters().map(|parameters| parameters.sync_cycle).filter(|ticks| *ticks > 1000);
+        let long = ticks.and_then(|ticks| sync.long_delay_ns(ticks.saturating_mul(5)));
+        Some(long.unwrap_or(sync.delay_ns.into()))
     }
 
     /// The links have changed. With one link the device is the last one, and that port faces the master. A device that
@@ -279,11 +270,11 @@ impl Device {
         };
         for port in [PortId::A, PortId::B] {
             let handler = self.port_mut(port);
-            handler.flags = PortFlags(handler.flags.0 & !PortFlags::LAST_DEVICE.0);
+            handler.flags.remove(PortFlags::LAST_DEVICE);
             if only == Some(port) {
                 handler.flags |= PortFlags::LAST_DEVICE | PortFlags::MASTER_PORT;
             } else if handler.state == State::Idle {
-                handler.flags = PortFlags(0);
+                handler.flags = PortFlags::empty();
             }
         }
     }
@@ -291,8 +282,8 @@ impl Device {
     /// Back to IDLE: address, clock and line delay are forgotten.
     fn restart(&mut self) {
         let last_device = |port: Port| {
-            let linked = port.flags.has(PortFlags::LAST_DEVICE);
-            PortFlags(if linked { PortFlags::LAST_DEVICE.0 | PortFlags::MASTER_PORT.0 } else { 0 })
+            let last = port.flags.contains(PortFlags::LAST_DEVICE);
+            if last { PortFlags::LAST_DEVICE | PortFlags::MASTER_PORT } else { PortFlags::empty() }
         };
         let (a, b) = (last_device(self.a), last_device(self.b));
         let retrains = self.counters.retrains.saturating_add(1);
@@ -331,14 +322,15 @@ impl Device {
     /// A start-up frame begins at `port`. Its bytes go through the [`Passage`], then to [`end`](Self::end).
     pub fn begin(&self, port: PortId) -> Passage {
         let handler = self.port(port);
-        let master = handler.flags.has(PortFlags::MASTER_PORT);
+        let master = handler.flags.contains(PortFlags::MASTER_PORT);
+        let idle_last = handler.state == State::Idle && handler.flags.contains(PortFlags::LAST_DEVICE);
         let kind = match (handler.state, self.line_delay_next_ns()) {
-            (State::Idle, _) if handler.flags.has(PortFlags::LAST_DEVICE) => self.discovery(),
+            _ if idle_last => self.discovery(),
             (State::Discovery, _) if master => self.discovery(),
             (State::Sync, Ok(line)) if master => Kind::Sync(SyncRewriter::new(line, self.is_last(), self.error)),
-            _ => Kind::Plain,
+            _ => Kind::Plain(Plain::NEW),
         };
-        Passage::new(kind)
+        Passage::new(kind, self.path(port), idle_last)
     }
 
     const fn discovery(&self) -> Kind {
@@ -348,26 +340,28 @@ impl Device {
     /// A start-up frame that began with [`begin`](Self::begin) has ended at `port`.
     pub fn end(&mut self, port: PortId, passage: Passage, arrival: Arrival) -> Handled {
         let state = self.port(port).state;
-        let path = self.path(port);
+        let path = passage.path().unwrap_or(Path::Absorb);
         let mut handled = Handled { path, result: Ok(()), trigger: Trigger::None, correction: Correction::None };
         if state == State::Exchange {
             return handled;
         }
         // A STATUS byte has been written, so the error has been reported.
-        self.error &= matches!(passage.kind, Kind::Plain);
+        self.error &= !passage.has_written_status();
         let learnt = passage.learnt();
         handled.result = learnt.map(|_| ());
         self.count(handled.result);
         let Ok(learnt) = learnt else { return handled };
-        handled.trigger = self.port_mut(port).head(passage.head).trigger;
-        let master = self.port(port).flags.has(PortFlags::MASTER_PORT);
-        if master && state.waits_for(passage.head) {
+        let head = passage.transit().head();
+        handled.trigger = self.port_mut(port).head(head).trigger;
+        let master = self.port(port).flags.contains(PortFlags::MASTER_PORT);
+        if master && state.waits_for(head) {
             self.alive_ns = arrival.now_ns;
         }
         match learnt {
             Learnt::Place(assignment) => self.assignment = Some(assignment),
             Learnt::Sync(sync) => {
                 self.last_sync = Some((sync, arrival.sof_ns));
+                self.way_ns = self.delay_ns();
                 handled.correction = self.clock.frame(sync.time_stamp_ns, arrival.sof_ns, arrival.counter_ns);
             }
             Learnt::Parameters(bytes) if master && state == State::Param => {
@@ -376,15 +370,14 @@ impl Device {
             }
             Learnt::Parameters(_) | Learnt::Nothing => {}
         }
-        if passage.is_discovery() && (self.is_last() || Status(passage.head[3]).is_last()) {
-            self.output_total = Some(passage.output_total());
-        }
-        if state == State::Idle && self.is_last() && self.port(port).state == State::Idle {
-            handled.path = Path::Absorb;
+        if self.is_last() || passage.transit().status().contains(Status::LAST) {
+            self.output_total = passage.output_total().or(self.output_total);
         }
         self.port_mut(port).end_of_frame();
-        if master && state == State::Sync && matches!(passage.kind, Kind::Plain) {
-            handled.result = self.line_delay_next_ns().map(|_| ());
+        // A device that cannot rewrite SYNC must not take part: its line delay was never measured.
+        let unmeasured = master && state == State::Sync && passage.transit().is_for_all(FrameType::Sync);
+        if let (true, Err(error)) = (unmeasured, self.line_delay_next_ns()) {
+            handled.result = Err(error);
             self.restart();
         }
         handled
@@ -413,7 +406,7 @@ impl Device {
 
     fn path(&self, port: PortId) -> Path {
         let handler = self.port(port);
-        let master = handler.flags.has(PortFlags::MASTER_PORT);
+        let master = handler.flags.contains(PortFlags::MASTER_PORT);
         match handler.state {
             State::LineDelay if master => Path::Reflect,
             State::LineDelay => Path::Absorb,
@@ -432,14 +425,20 @@ impl Device {
         }
     }
 
-    /// The own request has come back to the reverse port after `rtt_ns`. `trigger`: what had started it.
+    /// The own request, which `trigger` had started, has come back to the reverse port after `rtt_ns`.
     ///
     /// # Errors
     /// As [`LongFrame::new`] and [`DelayReq::of`]; the round trip is then not used.
-    pub fn delay_reflection(&mut self, frame: &[u8], rtt_ns: u32, trigger: Trigger) -> Result<(), Error> {
-        let result = LongFrame::new(frame).and_then(DelayReq::of).map(|_| ());
-        self.count(result);
-        result?;
+    pub fn delay_reflection(&mut self, trigger: Trigger, frame: &[u8], rtt_ns: u32) -> Result<(), Error> {
+        let result = LongFrame::new(frame).and_then(|frame| match frame.frame_type() {
+            // Defined by the vendor, and sent by nobody: it tells nothing.
+            FrameType::DelayResp => Ok(false),
+            _ => DelayReq::of(frame).map(|_| true),
+        });
+        self.count(result.map(|_| ()));
+        if !result? {
+            return Ok(());
+        }
         self.line.add(rtt_ns);
         let reverse = self.master_port().map(PortId::other);
         if let (Trigger::Last, Some(port)) = (trigger, reverse) {
@@ -456,18 +455,18 @@ impl Device {
     /// As [`MasterFrameView::new`] and [`MasterFrameView::slice`]; [`Error::WrongState`] if the device is not in
     /// IO exchange. The frame counts as received even so.
     pub fn exchange<'a>(&mut self, frame: &'a [u8], sof_ns: u32, counter_ns: u32) -> Result<Output<'a>, Error> {
-        let (State::Exchange, Some(place), Some((sync, _))) = (self.state(), self.assignment, self.last_sync) else {
+        let (State::Exchange, Some(place), Some(delay_ns)) = (self.state(), self.assignment, self.way_ns) else {
             return Err(Error::WrongState);
         };
         self.received = true;
         let output_len = self.config.output_len.or(self.output_total).unwrap_or_default();
-        let taken = MasterFrameView::new(frame, output_len.into()).and_then(|view| {
-            Ok((view.slice(place.out_offset, self.config.lengths.output)?, view.reference_ns(sync.delay_ns)))
+        let taken = MasterFrameView::new(output_len.into(), frame).and_then(|view| {
+            Ok((view.slice(place.out_offset, self.config.lengths.output)?, view.reference_ns(delay_ns)))
         });
         self.count(taken.map(|_| ()));
         let (data, reference_ns) = taken?;
         // Start 500 ns into the cycle, and the way here.
-        let expected = u32::from(sync.delay_ns).saturating_add(crate::timing::TRIGGER_NS);
+        let expected = delay_ns.saturating_add(TRIGGER_NS);
         Ok(Output { data, reference_ns, correction: self.clock.frame(expected, sof_ns, counter_ns) })
     }
 

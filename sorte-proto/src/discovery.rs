@@ -1,5 +1,10 @@
-use crate::frame::{FrameType, LongFrame, count, emit};
-use crate::{DeviceAddress, Error, Status};
+use core::fmt;
+
+use crate::address::DeviceAddress;
+use crate::error::Error;
+use crate::frame::{LongFrame, MULTICAST, count, emit, refresh_fcs};
+use crate::frame_type::FrameType;
+use crate::status::Status;
 
 /// Devices that a discovery frame has room for.
 pub const MAX_DEVICES: usize = 254;
@@ -43,7 +48,6 @@ impl Entry {
 /// Only the first `count` entries have a meaning. The rest is whatever the master filled in: the published master
 /// sends a debug pattern there.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct DiscoveryView<'a> {
     frame: LongFrame<'a>,
     fields: &'a [u8; PAYLOAD],
@@ -126,7 +130,6 @@ impl<'a> DiscoveryView<'a> {
 
 /// The values of a discovery frame, all 254 entries with what is in them.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "arbitrary", derive(arbitrary::Arbitrary))]
 pub struct Discovery {
     /// SA, 0 in everything the published firmware sends.
@@ -157,6 +160,21 @@ impl Discovery {
             output_total: 0,
             entries: [Entry { input: 0, output: 0 }; MAX_DEVICES],
         }
+    }
+
+    /// [`request`](Self::request) written into a buffer, without a frame of its own on the stack; gives its length.
+    ///
+    /// # Errors
+    /// [`Error::BufferTooSmall`]
+    pub fn write_request(last: bool, into: &mut [u8]) -> Result<usize, Error> {
+        let frame = room(into, Self::LEN)?;
+        frame.fill(0);
+        let status = if last { Status::FINAL } else { Status::DISCOVERY };
+        if let [da, _, code, flags, ..] = frame {
+            (*da, *code, *flags) = (MULTICAST, FrameType::Discovery.code(), status.bits());
+        }
+        refresh_fcs(frame);
+        Ok(Self::LEN)
     }
 
     /// As the published master sends it: its table is filled with a debug pattern, 31 blocks of 32 bytes holding the
@@ -243,7 +261,6 @@ pub(crate) fn next_address(devices_before: u16) -> Option<DeviceAddress> {
 
 /// The line as the master knows it from the last discovery answer.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Network {
     devices: u8,
     input_total: u16,
@@ -261,15 +278,23 @@ impl Network {
     /// # Errors
     /// [`Error::TooManyDevices`], [`Error::TableMismatch`]
     pub fn new(answer: DiscoveryView<'_>) -> Result<Self, Error> {
-        let devices = answer.count();
         let mut network = Self::EMPTY;
-        network.devices = match u8::try_from(devices) {
+        network.take(answer)?;
+        Ok(network)
+    }
+
+    /// The same in place: a kilobyte that is not copied. A refusal leaves the network as it was.
+    ///
+    /// # Errors
+    /// As [`new`](Self::new).
+    pub fn take(&mut self, answer: DiscoveryView<'_>) -> Result<(), Error> {
+        let count = answer.count();
+        let devices = match u8::try_from(count) {
             Ok(n) if usize::from(n) <= MAX_DEVICES => n,
-            _ => return Err(Error::TooManyDevices { count: devices }),
+            _ => return Err(Error::TooManyDevices { count }),
         };
         let (mut input, mut output) = (0u16, 0u16);
-        for (to, entry) in network.entries.iter_mut().zip(answer.entries()) {
-            *to = entry;
+        for entry in answer.entries() {
             (input, output) = (input.saturating_add(entry.input), output.saturating_add(entry.output));
         }
         for (got, want) in [(answer.input_total(), input), (answer.output_total(), output)] {
@@ -278,8 +303,9 @@ impl Network {
                 return Err(Error::TableMismatch { got, want });
             }
         }
-        (network.input_total, network.output_total) = (input, output);
-        Ok(network)
+        self.entries.iter_mut().zip(answer.entries()).for_each(|(to, entry)| *to = entry);
+        (self.devices, self.input_total, self.output_total) = (devices, input, output);
+        Ok(())
     }
 
     /// Devices in the line, 0..=254.
@@ -316,9 +342,76 @@ impl Network {
 }
 
 /// Checks the length of a buffer that a frame is to be written into.
-pub(crate) fn room(into: &mut [u8], need: usize) -> Result<&mut [u8], Error> {
+pub(crate) fn room(into: &mut [u8], want: usize) -> Result<&mut [u8], Error> {
     let got = count(into.len());
-    into.get_mut(..need).ok_or(Error::BufferTooSmall { got, need: count(need) })
+    into.get_mut(..want).ok_or(Error::BufferTooSmall { got, want: count(want) })
+}
+
+impl fmt::Display for Discovery {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(
+            f,
+            "DISCOVERY {} devices, in {}, out {}, STATUS {}",
+            self.count, self.input_total, self.output_total, self.status
+        )
+    }
+}
+
+#[cfg(feature = "defmt")]
+#[cfg_attr(docsrs, doc(cfg(feature = "defmt")))]
+impl defmt::Format for Discovery {
+    fn format(&self, f: defmt::Formatter<'_>) {
+        defmt::write!(
+            f,
+            "DISCOVERY {=u16} devices, in {=u16}, out {=u16}, STATUS {}",
+            self.count,
+            self.input_total,
+            self.output_total,
+            self.status
+        );
+    }
+}
+
+impl fmt::Display for DiscoveryView<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(
+            f,
+            "DISCOVERY {} devices, in {}, out {}, STATUS {}",
+            self.count(),
+            self.input_total(),
+            self.output_total(),
+            self.status()
+        )
+    }
+}
+
+#[cfg(feature = "defmt")]
+#[cfg_attr(docsrs, doc(cfg(feature = "defmt")))]
+impl defmt::Format for DiscoveryView<'_> {
+    fn format(&self, f: defmt::Formatter<'_>) {
+        defmt::write!(
+            f,
+            "DISCOVERY {=u16} devices, in {=u16}, out {=u16}, STATUS {}",
+            self.count(),
+            self.input_total(),
+            self.output_total(),
+            self.status()
+        );
+    }
+}
+
+impl fmt::Display for Network {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{} devices, in {}, out {}", self.devices, self.input_total, self.output_total)
+    }
+}
+
+#[cfg(feature = "defmt")]
+#[cfg_attr(docsrs, doc(cfg(feature = "defmt")))]
+impl defmt::Format for Network {
+    fn format(&self, f: defmt::Formatter<'_>) {
+        defmt::write!(f, "{=u8} devices, in {=u16}, out {=u16}", self.devices, self.input_total, self.output_total);
+    }
 }
 
 #[cfg(test)]
@@ -327,7 +420,6 @@ mod tests {
     use std::vec::Vec;
 
     use super::*;
-    use crate::frame::refresh_fcs;
 
     fn pass_all(lengths: &[Entry]) -> Discovery {
         let mut frame = Discovery::request(false);
@@ -346,6 +438,17 @@ mod tests {
         let network = Network::new(DiscoveryView::new(&bytes).unwrap()).unwrap();
         assert_eq!((network.devices(), network.input_total(), network.output_total()), (254, 1016, 1016));
         assert_eq!(network.assignments().last().unwrap().0.out_offset, 1012);
+    }
+
+    #[test]
+    fn a_request_without_a_copy_is_the_same() {
+        for last in [false, true] {
+            let mut buffer = [0x55; 1031];
+            assert_eq!(Discovery::write_request(last, &mut buffer), Ok(1030));
+            assert_eq!((&buffer[..1030], buffer[1030]), (&Discovery::request(last).emit()[..], 0x55));
+        }
+        let error = Error::BufferTooSmall { got: 1029, want: 1030 };
+        assert_eq!(Discovery::write_request(true, &mut [0; 1029]), Err(error));
     }
 
     #[test]
@@ -398,7 +501,7 @@ mod tests {
         #[test]
         fn what_was_emitted_is_parsed_and_back(source: u8, status: u8, count: u16, lengths in entries()) {
             let mut frame = pass_all(&lengths);
-            (frame.source, frame.status, frame.count) = (source, Status(status), count);
+            (frame.source, frame.status, frame.count) = (source, Status::from_bits_retain(status), count);
             let bytes = frame.emit();
             let back = Discovery::parse(&bytes).unwrap();
             prop_assert_eq!(back, frame);

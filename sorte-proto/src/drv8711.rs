@@ -22,6 +22,7 @@ mod codes;
 mod current;
 mod fields;
 mod registers;
+mod status;
 
 pub use apply::{Apply, Next};
 pub use codes::{
@@ -30,7 +31,8 @@ pub use codes::{
 };
 pub use current::{full_scale_microamps, torque_for_microamps};
 pub use fields::Field;
-pub use registers::{Blank, Configuration, Ctrl, Decay, Drive, Off, Stall, Status, Torque};
+pub use registers::{Blank, Configuration, Ctrl, Decay, Drive, Off, Stall, Torque};
+pub use status::Status;
 
 /// The eight registers by their addresses.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -132,11 +134,11 @@ impl Register {
     /// Whether `read` may be what a register that holds `written` reads.
     ///
     /// # Errors
-    /// [`Error::ReadBack`](crate::Error::ReadBack)
-    pub const fn verify(self, written: u16, read: u16) -> Result<(), crate::Error> {
+    /// [`Error::ReadBack`](crate::error::Error::ReadBack)
+    pub const fn verify(self, written: u16, read: u16) -> Result<(), crate::error::Error> {
         let mask = self.read_back_mask();
         let (got, want) = (read & mask, written & mask);
-        if got == want { Ok(()) } else { Err(crate::Error::ReadBack { register: self.address(), got, want }) }
+        if got == want { Ok(()) } else { Err(crate::error::Error::ReadBack { register: self.address(), got, want }) }
     }
 }
 

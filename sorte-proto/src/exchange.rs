@@ -1,7 +1,12 @@
+use core::fmt;
+
+use crate::address::DeviceAddress;
 use crate::crc::crc8_step;
+use crate::crc::crc8_update;
 use crate::discovery::room;
-use crate::frame::count;
-use crate::{DeviceAddress, Error, Status, crc8_update};
+use crate::error::Error;
+use crate::frame::{count, wrong_length};
+use crate::status::Status;
 
 /// Output bytes of the published master: four devices with four bytes each.
 pub const STOCK_OUTPUT: usize = 16;
@@ -20,7 +25,6 @@ pub const STOCK_INPUT: usize = 3;
 /// Device `a` owns the bytes `2 + offset ..` as DISCOVERY told it. The time stamp is inserted while the frame is on
 /// its way and no check covers it: see [`check_time_stamp`](Self::check_time_stamp).
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct MasterFrameView<'a> {
     status: Status,
     output: &'a [u8],
@@ -31,24 +35,24 @@ impl<'a> MasterFrameView<'a> {
     /// Bytes beside the output bytes.
     pub const OVERHEAD: usize = 5;
 
-    /// Checks, in this order: length (too short, too long), CRC-8, SA.
+    /// Checks, in this order: length (too short, too long), CRC-8, SA. The bytes are the whole frame and nothing after it.
     ///
     /// # Errors
-    /// [`Error::Truncated`], [`Error::LengthMismatch`], [`Error::BadCrc8`], [`Error::WrongSource`]
+    /// [`Error::Truncated`], [`Error::TooLong`], [`Error::BadCrc8`], [`Error::WrongSource`]
     #[inline]
-    pub fn new(bytes: &'a [u8], output_len: usize) -> Result<Self, Error> {
-        let need = output_len.saturating_add(Self::OVERHEAD);
-        if bytes.len() != need {
-            return Err(wrong_length(bytes.len(), need));
+    pub fn new(output_len: usize, bytes: &'a [u8]) -> Result<Self, Error> {
+        let want = output_len.saturating_add(Self::OVERHEAD);
+        if bytes.len() != want {
+            return Err(wrong_length(bytes.len(), want));
         }
         let &[source, status, ref output @ .., crc, t0, t1] = bytes else {
-            return Err(wrong_length(bytes.len(), need));
+            return Err(wrong_length(bytes.len(), want));
         };
         check(source, status, output, crc)?;
         if source != 0 {
             return Err(Error::WrongSource { got: source });
         }
-        Ok(Self { status: Status(status), output, time_stamp: u16::from_le_bytes([t0, t1]) })
+        Ok(Self { status: Status::from_bits_retain(status), output, time_stamp: u16::from_le_bytes([t0, t1]) })
     }
 
     /// STATUS; 0x30 in everything that the published master sends.
@@ -77,9 +81,8 @@ impl<'a> MasterFrameView<'a> {
     }
 
     /// The master's time at the start of the frame as the device at a distance of `delay_ns` sees it.
-    pub const fn reference_ns(self, delay_ns: u16) -> u32 {
-        // Two 16-bit numbers: the sum cannot pass u32.
-        (self.time_stamp as u32).saturating_add(delay_ns as u32)
+    pub const fn reference_ns(self, delay_ns: u32) -> u32 {
+        (self.time_stamp as u32).saturating_add(delay_ns)
     }
 
     /// Whether the time stamp is at most `window_ns` from `expected` (both wrap): the only check it can have.
@@ -101,23 +104,22 @@ impl<'a> MasterFrameView<'a> {
 /// # Errors
 /// [`Error::BufferTooSmall`]
 #[inline]
-pub fn write_master_frame(into: &mut [u8], output: &[u8], time_stamp: u16) -> Result<usize, Error> {
-    write(into, Status::EXCHANGE, output, time_stamp)
+pub fn write_master_frame(output: &[u8], time_stamp: u16, into: &mut [u8]) -> Result<usize, Error> {
+    write(Status::EXCHANGE, output, time_stamp, into)
 }
 
 #[inline]
-fn write(into: &mut [u8], status: Status, output: &[u8], time_stamp: u16) -> Result<usize, Error> {
-    let need = output.len().saturating_add(MasterFrameView::OVERHEAD);
-    if let Some((body, stamp)) = room(into, need)?.split_last_chunk_mut() {
+fn write(status: Status, output: &[u8], time_stamp: u16, into: &mut [u8]) -> Result<usize, Error> {
+    let want = output.len().saturating_add(MasterFrameView::OVERHEAD);
+    if let Some((body, stamp)) = room(into, want)?.split_last_chunk_mut() {
         seal(body, 0, status, output);
         *stamp = time_stamp.to_le_bytes();
     }
-    Ok(need)
+    Ok(want)
 }
 
 /// The values of a master frame with `S` output bytes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct MasterFrame<const S: usize = STOCK_OUTPUT> {
     /// STATUS.
     pub status: Status,
@@ -136,9 +138,9 @@ impl<const S: usize> MasterFrame<S> {
     /// # Errors
     /// As [`MasterFrameView::new`].
     pub fn parse(bytes: &[u8]) -> Result<Self, Error> {
-        let view = MasterFrameView::new(bytes, S)?;
-        let need = count(Self::LEN);
-        let output = view.output().first_chunk().ok_or(Error::Truncated { got: count(bytes.len()), need })?;
+        let view = MasterFrameView::new(S, bytes)?;
+        let want = count(Self::LEN);
+        let output = view.output().first_chunk().ok_or(Error::Truncated { got: count(bytes.len()), want })?;
         Ok(Self { status: view.status(), output: *output, time_stamp: view.time_stamp() })
     }
 
@@ -146,8 +148,8 @@ impl<const S: usize> MasterFrame<S> {
     ///
     /// # Errors
     /// [`Error::BufferTooSmall`]
-    pub fn emit(&self, into: &mut [u8]) -> Result<usize, Error> {
-        write(into, self.status, &self.output, self.time_stamp)
+    pub fn emit_into(&self, into: &mut [u8]) -> Result<usize, Error> {
+        write(self.status, &self.output, self.time_stamp, into)
     }
 }
 
@@ -162,7 +164,6 @@ impl<const S: usize> MasterFrame<S> {
 /// The published firmware contradicts itself here: its comment and its send times describe this frame with p = 3,
 /// its code sends another one, see [`PublishedDeviceFrame`]. This crate takes the designed frame.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct DeviceFrameView<'a> {
     address: DeviceAddress,
     status: Status,
@@ -173,22 +174,22 @@ impl<'a> DeviceFrameView<'a> {
     /// Bytes beside the payload.
     pub const OVERHEAD: usize = 3;
 
-    /// Checks, in this order: length (too short, too long), CRC-8, SA.
+    /// Checks, in this order: length (too short, too long), CRC-8, SA. The bytes are the whole frame and nothing after it.
     ///
     /// # Errors
-    /// [`Error::Truncated`], [`Error::LengthMismatch`], [`Error::BadCrc8`], [`Error::WrongSource`]
+    /// [`Error::Truncated`], [`Error::TooLong`], [`Error::BadCrc8`], [`Error::WrongSource`]
     #[inline]
-    pub fn new(bytes: &'a [u8], payload_len: usize) -> Result<Self, Error> {
-        let need = payload_len.saturating_add(Self::OVERHEAD);
-        if bytes.len() != need {
-            return Err(wrong_length(bytes.len(), need));
+    pub fn new(payload_len: usize, bytes: &'a [u8]) -> Result<Self, Error> {
+        let want = payload_len.saturating_add(Self::OVERHEAD);
+        if bytes.len() != want {
+            return Err(wrong_length(bytes.len(), want));
         }
         let &[source, status, ref payload @ .., crc] = bytes else {
-            return Err(wrong_length(bytes.len(), need));
+            return Err(wrong_length(bytes.len(), want));
         };
         check(source, status, payload, crc)?;
         let address = DeviceAddress::new(source).ok_or(Error::WrongSource { got: source })?;
-        Ok(Self { address, status: Status(status), payload })
+        Ok(Self { address, status: Status::from_bits_retain(status), payload })
     }
 
     /// Who sent it.
@@ -209,7 +210,6 @@ impl<'a> DeviceFrameView<'a> {
 
 /// The values of a device frame with `P` payload bytes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct DeviceFrame<const P: usize = STOCK_INPUT> {
     /// Who sends it.
     pub address: DeviceAddress,
@@ -228,9 +228,9 @@ impl<const P: usize> DeviceFrame<P> {
     /// # Errors
     /// As [`DeviceFrameView::new`].
     pub fn parse(bytes: &[u8]) -> Result<Self, Error> {
-        let view = DeviceFrameView::new(bytes, P)?;
-        let need = count(Self::LEN);
-        let payload = view.payload().first_chunk().ok_or(Error::Truncated { got: count(bytes.len()), need })?;
+        let view = DeviceFrameView::new(P, bytes)?;
+        let want = count(Self::LEN);
+        let payload = view.payload().first_chunk().ok_or(Error::Truncated { got: count(bytes.len()), want })?;
         Ok(Self { address: view.address(), status: view.status(), payload: *payload })
     }
 
@@ -238,7 +238,7 @@ impl<const P: usize> DeviceFrame<P> {
     ///
     /// # Errors
     /// [`Error::BufferTooSmall`]
-    pub fn emit(&self, into: &mut [u8]) -> Result<usize, Error> {
+    pub fn emit_into(&self, into: &mut [u8]) -> Result<usize, Error> {
         let frame = room(into, Self::LEN)?;
         seal(frame, self.address.get(), self.status, &self.payload);
         Ok(Self::LEN)
@@ -254,7 +254,6 @@ impl<const P: usize> DeviceFrame<P> {
 ///       address  LAST | ERROR  DRV8711 STATUS  0  unusable
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct PublishedDeviceFrame {
     /// Who sends it.
     pub address: DeviceAddress,
@@ -271,18 +270,18 @@ impl PublishedDeviceFrame {
     /// Checks length and SA; there is no check over the contents.
     ///
     /// # Errors
-    /// [`Error::Truncated`], [`Error::LengthMismatch`], [`Error::WrongSource`]
+    /// [`Error::Truncated`], [`Error::TooLong`], [`Error::WrongSource`]
     pub fn parse_unchecked(bytes: &[u8]) -> Result<Self, Error> {
         let &[source, status, drv8711_status, _, _] = bytes else {
             return Err(wrong_length(bytes.len(), Self::LEN));
         };
         let address = DeviceAddress::new(source).ok_or(Error::WrongSource { got: source })?;
-        Ok(Self { address, status: Status(status), drv8711_status })
+        Ok(Self { address, status: Status::from_bits_retain(status), drv8711_status })
     }
 
     /// The bytes before the unusable CRC byte.
     pub const fn emit_without_crc(&self) -> [u8; 4] {
-        [self.address.get(), self.status.0, self.drv8711_status, 0]
+        [self.address.get(), self.status.bits(), self.drv8711_status, 0]
     }
 }
 
@@ -296,8 +295,8 @@ fn check(source: u8, status: u8, data: &[u8], got: u8) -> Result<(), Error> {
 #[inline]
 fn seal(frame: &mut [u8], source: u8, status: Status, data: &[u8]) {
     if let [sa, flags, rest @ .., crc] = frame {
-        (*sa, *flags) = (source, status.0);
-        let mut check = crc8_step(crc8_step(0, source), status.0);
+        (*sa, *flags) = (source, status.bits());
+        let mut check = crc8_step(crc8_step(0, source), status.bits());
         for (to, from) in rest.iter_mut().zip(data) {
             *to = *from;
             check = crc8_step(check, *from);
@@ -306,10 +305,86 @@ fn seal(frame: &mut [u8], source: u8, status: Status, data: &[u8]) {
     }
 }
 
-#[cold]
-fn wrong_length(got: usize, want: usize) -> Error {
-    let (got, want) = (count(got), count(want));
-    if got < want { Error::Truncated { got, need: want } } else { Error::LengthMismatch { got, want } }
+impl fmt::Display for MasterFrameView<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "master, {} output bytes at {}, STATUS {}", self.output.len(), self.time_stamp, self.status)
+    }
+}
+
+#[cfg(feature = "defmt")]
+#[cfg_attr(docsrs, doc(cfg(feature = "defmt")))]
+impl defmt::Format for MasterFrameView<'_> {
+    fn format(&self, f: defmt::Formatter<'_>) {
+        defmt::write!(
+            f,
+            "master, {=usize} output bytes at {=u16}, STATUS {}",
+            self.output.len(),
+            self.time_stamp,
+            self.status
+        );
+    }
+}
+
+impl<const S: usize> fmt::Display for MasterFrame<S> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "master, {} output bytes at {}, STATUS {}", self.output.len(), self.time_stamp, self.status)
+    }
+}
+
+#[cfg(feature = "defmt")]
+#[cfg_attr(docsrs, doc(cfg(feature = "defmt")))]
+impl<const S: usize> defmt::Format for MasterFrame<S> {
+    fn format(&self, f: defmt::Formatter<'_>) {
+        defmt::write!(
+            f,
+            "master, {=usize} output bytes at {=u16}, STATUS {}",
+            self.output.len(),
+            self.time_stamp,
+            self.status
+        );
+    }
+}
+
+impl fmt::Display for DeviceFrameView<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "device {}, {:02X?}, STATUS {}", self.address, self.payload, self.status)
+    }
+}
+
+#[cfg(feature = "defmt")]
+#[cfg_attr(docsrs, doc(cfg(feature = "defmt")))]
+impl defmt::Format for DeviceFrameView<'_> {
+    fn format(&self, f: defmt::Formatter<'_>) {
+        defmt::write!(f, "device {}, {=[u8]:02X}, STATUS {}", self.address, self.payload, self.status);
+    }
+}
+
+impl<const P: usize> fmt::Display for DeviceFrame<P> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "device {}, {:02X?}, STATUS {}", self.address, self.payload.as_slice(), self.status)
+    }
+}
+
+#[cfg(feature = "defmt")]
+#[cfg_attr(docsrs, doc(cfg(feature = "defmt")))]
+impl<const P: usize> defmt::Format for DeviceFrame<P> {
+    fn format(&self, f: defmt::Formatter<'_>) {
+        defmt::write!(f, "device {}, {=[u8]:02X}, STATUS {}", self.address, self.payload.as_slice(), self.status);
+    }
+}
+
+impl fmt::Display for PublishedDeviceFrame {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "device {}, DRV8711 {:02X}h, STATUS {}", self.address, self.drv8711_status, self.status)
+    }
+}
+
+#[cfg(feature = "defmt")]
+#[cfg_attr(docsrs, doc(cfg(feature = "defmt")))]
+impl defmt::Format for PublishedDeviceFrame {
+    fn format(&self, f: defmt::Formatter<'_>) {
+        defmt::write!(f, "device {}, DRV8711 {=u8:02X}h, STATUS {}", self.address, self.drv8711_status, self.status);
+    }
 }
 
 #[cfg(test)]
@@ -319,11 +394,11 @@ mod tests {
     use std::vec::Vec;
 
     use super::*;
-    use crate::crc8;
+    use crate::crc::crc8;
 
     fn master(output: &[u8], time_stamp: u16) -> Vec<u8> {
         let mut bytes = vec![0; output.len() + 5];
-        assert_eq!(write_master_frame(&mut bytes, output, time_stamp), Ok(output.len() + 5));
+        assert_eq!(write_master_frame(output, time_stamp, &mut bytes), Ok(output.len() + 5));
         bytes
     }
 
@@ -333,9 +408,9 @@ mod tests {
         for bit in 0..21 * 8 {
             let mut bytes = good.clone();
             bytes[bit / 8] ^= 1 << (bit % 8);
-            let class = MasterFrameView::new(&bytes, 16).map_err(Error::class);
+            let class = MasterFrameView::new(16, &bytes).map_err(Error::class);
             if bit < 19 * 8 {
-                assert_eq!(class, Err(crate::ErrorClass::BadCrc8));
+                assert_eq!(class, Err(crate::error::ErrorClass::BadCrc8));
             } else {
                 assert!(class.is_ok());
             }
@@ -346,12 +421,12 @@ mod tests {
     fn every_other_length_is_refused() {
         let good = master(&[1; 16], 0);
         for len in 0..21 {
-            let error = Error::Truncated { got: len as u16, need: 21 };
-            assert_eq!(MasterFrameView::new(&good[..len], 16), Err(error));
+            let error = Error::Truncated { got: len as u16, want: 21 };
+            assert_eq!(MasterFrameView::new(16, &good[..len]), Err(error));
         }
         for output in 0..16 {
-            let error = Error::LengthMismatch { got: 21, want: output as u16 + 5 };
-            assert_eq!(MasterFrameView::new(&good, output), Err(error));
+            let error = Error::TooLong { got: 21, want: output as u16 + 5 };
+            assert_eq!(MasterFrameView::new(output, &good), Err(error));
         }
     }
 
@@ -359,8 +434,8 @@ mod tests {
     fn sources_are_told_apart() {
         for source in 0..=u8::MAX {
             let crc = crc8(&[source, 0]);
-            let device = DeviceFrameView::new(&[source, 0, crc], 0).map(|_| ());
-            let master = MasterFrameView::new(&[source, 0, crc, 0, 0], 0).map(|_| ());
+            let device = DeviceFrameView::new(0, &[source, 0, crc]).map(|_| ());
+            let master = MasterFrameView::new(0, &[source, 0, crc, 0, 0]).map(|_| ());
             let wrong = Err(Error::WrongSource { got: source });
             assert_eq!(device, if (1..=254).contains(&source) { Ok(()) } else { wrong });
             assert_eq!(master, if source == 0 { Ok(()) } else { wrong });
@@ -370,7 +445,7 @@ mod tests {
     #[test]
     fn a_slice_lies_in_the_output() {
         let bytes = master(&[10, 11, 12, 13], 0);
-        let view = MasterFrameView::new(&bytes, 4).unwrap();
+        let view = MasterFrameView::new(4, &bytes).unwrap();
         assert_eq!(view.slice(1, 2), Ok(&[11, 12][..]));
         assert_eq!(view.slice(4, 0), Ok(&[][..]));
         assert_eq!(view.slice(3, 2), Err(Error::OutsideOutput { offset: 3, len: 2 }));
@@ -383,7 +458,7 @@ mod tests {
             [(100, 90, 10), (90, 100, 10), (5, 65535, 6), (65535, 5, 6), (0, 0x8000, 0x8000)]
         {
             let bytes = master(&[], stamp);
-            let view = MasterFrameView::new(&bytes, 0).unwrap();
+            let view = MasterFrameView::new(0, &bytes).unwrap();
             assert_eq!(view.check_time_stamp(expected, window), Ok(()));
             let error = Error::ImplausibleTimeStamp { got: stamp, want: expected };
             assert_eq!(view.check_time_stamp(expected, window - 1), Err(error));
@@ -393,31 +468,31 @@ mod tests {
     #[test]
     fn a_small_buffer_is_refused_and_left_alone() {
         let mut bytes = [7; 20];
-        let error = Err(Error::BufferTooSmall { got: 20, need: 21 });
-        assert_eq!(write_master_frame(&mut bytes, &[0; 16], 0), error);
+        let error = Err(Error::BufferTooSmall { got: 20, want: 21 });
+        assert_eq!(write_master_frame(&[0; 16], 0, &mut bytes), error);
         assert_eq!(bytes, [7; 20]);
     }
 
     proptest! {
         #[test]
         fn master_frames_come_back(status: u8, output: [u8; 16], time_stamp: u16) {
-            let frame = MasterFrame { status: Status(status), output, time_stamp };
+            let frame = MasterFrame { status: Status::from_bits_retain(status), output, time_stamp };
             let mut bytes = [0; 21];
-            prop_assert_eq!(frame.emit(&mut bytes), Ok(21));
+            prop_assert_eq!(frame.emit_into(&mut bytes), Ok(21));
             prop_assert_eq!(MasterFrame::<16>::parse(&bytes), Ok(frame));
         }
 
         #[test]
         fn device_frames_come_back(address in 1u8..=254, status: u8, payload: [u8; 3]) {
-            let frame = DeviceFrame { address: DeviceAddress::new(address).unwrap(), status: Status(status), payload };
+            let frame = DeviceFrame { address: DeviceAddress::new(address).unwrap(), status: Status::from_bits_retain(status), payload };
             let mut bytes = [0; 6];
-            prop_assert_eq!(frame.emit(&mut bytes), Ok(6));
+            prop_assert_eq!(frame.emit_into(&mut bytes), Ok(6));
             prop_assert_eq!(DeviceFrame::<3>::parse(&bytes), Ok(frame));
             for bit in 0..48 {
                 let mut wrong = bytes;
                 wrong[bit / 8] ^= 1 << (bit % 8);
-                let class = DeviceFrameView::new(&wrong, 3).map_err(Error::class);
-                prop_assert_eq!(class.err(), Some(crate::ErrorClass::BadCrc8));
+                let class = DeviceFrameView::new(3, &wrong).map_err(Error::class);
+                prop_assert_eq!(class.err(), Some(crate::error::ErrorClass::BadCrc8));
             }
         }
     }

@@ -2,7 +2,8 @@
 //!
 //! The counter runs in ticks of 5 ns: 0, 5, .. 3995, 0. A compare fires in the tick in which the counter reaches or
 //! passes its value, if it is enabled then. The handler runs a fixed time after the first event that is not yet
-//! served, after the compares of that tick, and serves all that has fired by then.
+//! served, after the compares of that tick, and serves all that has fired by then. Its register writes take effect at
+//! once, or one after the other, see [`Channel::with_write_time`].
 //!
 //! Nothing is simulated between the events, so a cycle costs a handful of steps and not 800.
 //!
@@ -16,8 +17,9 @@
 //! assert_eq!(axis.next_edge(8000), Some(Edge { ns: 6595, high: false }));
 //! ```
 
-use crate::StartTime;
-use crate::sync0::{PULSE_NS, Register, Sync0, Variant, Write, Writes};
+use crate::pins::{Levels, Pins};
+use crate::pto::{Pto, StartTime};
+use crate::sync0::{Flags, PULSE_NS, Register, Sync0, Variant, Write, Writes};
 
 /// One tick of the counter in ns.
 pub const TICK_NS: u64 = 5;
@@ -27,6 +29,8 @@ const CYCLE: u64 = 800;
 const WRAP: u64 = 799;
 const PULSE: u64 = PULSE_NS as u64 / TICK_NS;
 const NEVER: u64 = u64::MAX;
+/// Writes of one run of the handler: three events with at most seven each.
+const MOST_WRITES: usize = 21;
 
 /// A change of the SYNC0 output.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -60,6 +64,8 @@ pub struct Served {
     pub events: Events,
     /// What CMP6, CMP0 and CMP7 wrote.
     pub writes: [Option<Writes>; 3],
+    /// New levels of DIR and enable, if they change.
+    pub levels: Option<Levels>,
 }
 
 /// What happens next.
@@ -77,7 +83,8 @@ pub enum Happening {
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Channel {
     sync0: Sync0,
-    start: Option<StartTime>,
+    pins: Pins,
+    word: Pto,
     latency: u64,
     /// The last tick that has been dealt with.
     now: u64,
@@ -96,6 +103,13 @@ pub struct Channel {
     sync_start: u16,
     armed: bool,
     pending: Events,
+    /// Writes that are still to be made, the time of one, of the next and of the last.
+    queue: [Option<Write>; MOST_WRITES],
+    made: u8,
+    queued: u8,
+    write_ticks: u64,
+    write: u64,
+    busy_until: u64,
 }
 
 impl Channel {
@@ -104,7 +118,8 @@ impl Channel {
     pub const fn new(variant: Variant, cmp7_ns: u16, latency_ns: u16) -> Self {
         Self {
             sync0: Sync0::new(variant),
-            start: None,
+            pins: Pins::new(),
+            word: Pto::NoPulse { direction: crate::pto::Direction::Low },
             latency: (latency_ns as u64).div_ceil(TICK_NS),
             now: 0,
             cmp0: WRAP,
@@ -120,12 +135,39 @@ impl Channel {
             sync_start: 0,
             armed: true,
             pending: Events { cmp6: false, cmp0: false, cmp7: false },
+            queue: [None; MOST_WRITES],
+            made: 0,
+            queued: 0,
+            write_ticks: 0,
+            write: NEVER,
+            busy_until: 0,
         }
     }
 
+    /// Each register write takes `write_ns`, rounded up to ticks: the first takes effect so long after the handler's start,
+    /// and so on. New events wait until the last is made.
+    pub const fn with_write_time(mut self, write_ns: u16) -> Self {
+        self.write_ticks = (write_ns as u64).div_ceil(TICK_NS);
+        self
+    }
+
     /// The word in the output buffer: what CMP7 will find.
+    pub const fn set_word(&mut self, word: Pto) {
+        self.word = word;
+    }
+
+    /// A word with this start and the DIR level that is there.
     pub const fn set_start(&mut self, start: Option<StartTime>) {
-        self.start = start;
+        let direction = self.pins.levels().direction;
+        self.word = match start {
+            Some(start) => Pto::Pulse { start, direction },
+            None => Pto::NoPulse { direction },
+        };
+    }
+
+    /// DIR and enable.
+    pub const fn levels(&self) -> Levels {
+        self.pins.levels()
     }
 
     /// The handler's state.
@@ -164,13 +206,15 @@ impl Channel {
         loop {
             let compare = self.cmp0.min(self.cmp1).min(self.cmp6).min(self.cmp7);
             let edge = self.rise.min(self.fall);
-            let at = compare.min(edge).min(self.serve);
+            let at = compare.min(edge).min(self.serve).min(self.write);
             if at.saturating_mul(TICK_NS) >= until_ns {
                 return None;
             }
             self.now = at;
             if compare == at {
                 self.compare();
+            } else if self.write == at {
+                self.write_queued();
             } else if edge == at {
                 return Some(Happening::Edge(self.edge()));
             } else {
@@ -203,7 +247,7 @@ impl Channel {
             self.pending.cmp7 = true;
         }
         if interrupt && self.serve == NEVER {
-            self.serve = at.saturating_add(self.latency);
+            self.serve = at.saturating_add(self.latency).max(self.busy_until);
         }
     }
 
@@ -226,10 +270,11 @@ impl Channel {
     fn run_handler(&mut self) -> Happening {
         let events = core::mem::take(&mut self.pending);
         self.serve = NEVER;
-        let mut writes = [None; 3];
+        let (mut writes, mut levels) = ([None; 3], None);
         let [six, zero, seven] = &mut writes;
         if events.cmp6 {
             *six = Some(self.sync0.cmp6());
+            levels = self.pins.cmp6();
             self.apply(*six);
         }
         if events.cmp0 {
@@ -237,19 +282,49 @@ impl Channel {
             self.apply(*zero);
         }
         if events.cmp7 {
-            *seven = Some(self.sync0.cmp7(self.start));
+            let pending = self.sync0.flags().contains(Flags::PENDING_PULSE);
+            levels = self.pins.cmp7(self.word, pending).or(levels);
+            *seven = Some(self.sync0.cmp7(self.word.start()));
             self.apply(*seven);
         }
-        Happening::Served(Served { ns: self.now.saturating_mul(TICK_NS), events, writes })
+        Happening::Served(Served { ns: self.now.saturating_mul(TICK_NS), events, writes, levels })
     }
 
     fn apply(&mut self, writes: Option<Writes>) {
         for write in writes.into_iter().flatten() {
-            self.write(write);
+            if self.write_ticks == 0 {
+                self.make(write);
+            } else {
+                self.enqueue(write);
+            }
         }
     }
 
-    fn write(&mut self, Write { register, value }: Write) {
+    fn enqueue(&mut self, write: Write) {
+        if let Some(place) = self.queue.get_mut(usize::from(self.queued)) {
+            *place = Some(write);
+            self.queued = self.queued.saturating_add(1);
+        }
+        self.write = self.now.saturating_add(self.write_ticks);
+        self.made = 0;
+        self.busy_until = self.now.saturating_add(self.write_ticks.saturating_mul(self.queued.into()));
+    }
+
+    /// The oldest write takes effect.
+    fn write_queued(&mut self) {
+        let next = self.queue.get(usize::from(self.made)).copied().flatten();
+        self.made = self.made.saturating_add(1);
+        if self.made >= self.queued {
+            (self.queued, self.write) = (0, NEVER);
+        } else {
+            self.write = self.now.saturating_add(self.write_ticks);
+        }
+        if let Some(write) = next {
+            self.make(write);
+        }
+    }
+
+    fn make(&mut self, Write { register, value }: Write) {
         match register {
             Register::CmpCfg => self.cfg = value,
             Register::Cmp1 => self.cmp1_ns = value,

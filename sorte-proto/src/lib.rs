@@ -8,8 +8,8 @@ extern crate std;
 
 pub mod cut_through;
 
-#[cfg(test)]
-mod both_ends;
+mod address;
+mod builders;
 mod clock;
 mod crc;
 mod delay_req;
@@ -18,12 +18,16 @@ mod discovery;
 pub mod drv8711;
 mod error;
 mod exchange;
+mod flags;
+pub mod follow;
 mod frame;
+mod frame_type;
 pub mod iep;
 mod line_delay;
 pub mod master;
 mod param;
 mod payload;
+pub mod pins;
 mod preamble;
 mod pto;
 mod status;
@@ -32,6 +36,9 @@ mod sync;
 pub mod sync0;
 pub mod timing;
 
+pub use servowire_core::OutOfRange;
+
+pub use address::DeviceAddress;
 pub use clock::{AVERAGE, Clock, Correction, WRITE_DELAY_NS};
 pub use crc::{crc8, crc8_update, fcs};
 pub use delay_req::DelayReq;
@@ -41,7 +48,8 @@ pub use exchange::{
     DeviceFrame, DeviceFrameView, MasterFrame, MasterFrameView, PublishedDeviceFrame, STOCK_INPUT, STOCK_OUTPUT,
     write_master_frame,
 };
-pub use frame::{DeviceAddress, FrameType, LongFrame, MULTICAST};
+pub use frame::{LongFrame, MULTICAST};
+pub use frame_type::FrameType;
 pub use line_delay::{DelayModel, LineDelay, SAMPLES};
 pub use param::{CrcKind, CrcMode, Param, ParamView, Parameters, Topology};
 pub use payload::{MotorMask, Payload, Slice};

@@ -1,4 +1,4 @@
-use crate::Error;
+use crate::error::Error;
 
 /// Round trips that make one measurement.
 pub const SAMPLES: u8 = 16;

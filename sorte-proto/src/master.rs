@@ -1,6 +1,6 @@
 //! The controller's side: the start-up sequence, then the IO exchange.
 //!
-//! Sans-IO. [`Master::poll`] says what to send and when; [`Master::received`] takes what comes back. Every wait ends:
+//! Sans-IO. [`Master::poll`] says what to send and when; [`Master::receive`] takes what comes back. Every wait ends:
 //! an answer that does not come, devices that fall silent or a line that changes take the master back to IDLE with an
 //! [`Action::Restart`] that says why, and after a pause it starts again. (The published master waits for ever.)
 //!
@@ -17,11 +17,17 @@ pub use action::{Action, Outgoing};
 pub use config::{Config, Counters, State};
 use cycle::Cycle;
 
-use crate::timing::TRIGGER_NS;
-use crate::{
-    DelayReq, DeviceFrameView, DiscoveryView, Error, FrameType, LineDelay, Network, Param, ParamView, Sync,
-    write_master_frame,
-};
+use crate::delay_req::DelayReq;
+use crate::discovery::{DiscoveryView, Network};
+use crate::error::Error;
+use crate::exchange::{DeviceFrameView, write_master_frame};
+use crate::frame::LongFrame;
+use crate::frame_type::FrameType;
+use crate::line_delay::{LineDelay, SAMPLES};
+use crate::param::{Param, ParamView, Parameters};
+use crate::status::Status;
+use crate::sync::{Sync, TRANSIT_NS};
+use crate::timing::{TRIGGER_NS, Timing};
 
 /// A master with one port.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -44,9 +50,15 @@ pub struct Master {
     asked_ns: Option<u64>,
     /// DISCOVERY, SYNC: the answer that is needed has come.
     answered: bool,
+    /// SYNC: time stamp of the frame sent last.
+    sync_stamp_ns: u32,
     /// Where the master's time is 0.
     epoch_ns: u64,
     pending: Option<Error>,
+    /// Why the axes are being stopped, and cycles left for it.
+    stopping: Option<(Error, u32)>,
+    failures: u16,
+    good_cycles: u16,
     cycle: Cycle,
 }
 
@@ -74,8 +86,12 @@ impl Master {
             unanswered: 0,
             asked_ns: None,
             answered: false,
+            sync_stamp_ns: 0,
             epoch_ns: 0,
             pending: None,
+            stopping: None,
+            failures: 0,
+            good_cycles: 0,
             cycle: Cycle::NEW,
         }
     }
@@ -121,16 +137,34 @@ impl Master {
     /// The host's enable bit. Taking it away ends whatever is going on.
     pub fn enable(&mut self, enabled: bool) {
         if !enabled {
-            self.state = State::Idle;
+            (self.state, self.failures, self.stopping) = (State::Idle, 0, None);
         }
         self.enabled = enabled;
     }
 
     /// Back to IDLE; [`poll`](Self::poll) reports why.
     fn fail(&mut self, error: Error) {
-        self.state = State::Idle;
+        self.failures = self.failures.saturating_add(1);
+        let most = self.config.max_failures;
+        self.state = if most != 0 && self.failures >= most { State::Error } else { State::Idle };
         self.counters.retrains = self.counters.retrains.saturating_add(1);
-        self.pending = Some(error);
+        (self.pending, self.stopping, self.good_cycles) = (Some(error), None, 0);
+    }
+
+    /// The IO exchange must end; the axes may come to rest first.
+    fn give_up(&mut self, error: Error) {
+        match (self.config.stop_cycles, self.stopping) {
+            (0, _) => self.fail(error),
+            (cycles, None) => self.stopping = Some((error, cycles)),
+            (_, Some(_)) => {}
+        }
+    }
+
+    /// All axes stand still after an [`Action::Exchange`] with `stop`: the master starts again now.
+    pub fn halted(&mut self) {
+        if let Some((error, _)) = self.stopping {
+            self.fail(error);
+        }
     }
 
     /// What to do now. Call it again at once after anything but [`Action::Wait`].
@@ -157,6 +191,7 @@ impl Master {
         }
         match self.state {
             State::Idle => Action::Wait { until_ns: self.next_ns },
+            State::Error => Action::Wait { until_ns: u64::MAX },
             State::Discovery => self.discovery(now_ns),
             State::Param => self.param(now_ns),
             State::LineDelay => self.delay(now_ns),
@@ -179,7 +214,7 @@ impl Master {
                 self.next_ns = now_ns.saturating_add(TRIGGER_NS.into());
             }
             State::Exchange => self.cycle = Cycle::NEW,
-            State::Idle => {}
+            State::Idle | State::Error => {}
         }
     }
 
@@ -217,7 +252,7 @@ impl Master {
             self.enter(State::LineDelay, now_ns);
         } else if self.unanswered < self.config.param_tries {
             self.unanswered = self.unanswered.saturating_add(1);
-            let frame = Param::request(self.config.parameters, self.remaining == 1);
+            let frame = Param::request(self.parameters(), self.remaining == 1);
             return self.send(Outgoing::Param(frame), self.config.frame_period_ns);
         } else {
             self.fail(Error::NoAnswer { sent: FrameType::Param, frame: self.frame.saturating_sub(1) });
@@ -225,9 +260,15 @@ impl Master {
         self.poll(now_ns)
     }
 
+    /// What the devices are told: with a long line, the period of the SYNC frames in ticks of 5 ns too.
+    const fn parameters(&self) -> Parameters {
+        let told = self.config.parameters;
+        if self.config.long_line { Parameters { sync_cycle: self.config.sync_period_ns / 5, ..told } } else { told }
+    }
+
     fn delay(&mut self, now_ns: u64) -> Action {
         if !self.line.is_complete() {
-            let last = self.is_last(crate::SAMPLES.into());
+            let last = self.is_last(SAMPLES.into());
             self.asked_ns = Some(self.next_ns);
             return self.send(Outgoing::DelayReq(DelayReq::of_master(last)), self.config.frame_period_ns);
         }
@@ -253,6 +294,7 @@ impl Master {
         if self.frame < frames {
             let line = self.line.checked().unwrap_or_default();
             let frame = Sync::of_master(self.time_ns(self.next_ns), line, self.is_last(frames));
+            self.sync_stamp_ns = frame.time_stamp_ns;
             // Half a period after the last trigger the answers are looked at.
             let gap = if self.is_last(frames) { period / 2 } else { period };
             return self.send(Outgoing::Sync(frame), gap);
@@ -274,14 +316,20 @@ impl Master {
 
     fn exchange(&mut self, now_ns: u64) -> Action {
         if let Err(error) = self.close_cycle() {
+            self.give_up(error);
+        }
+        self.stopping = self.stopping.map(|(error, left)| (error, left.saturating_sub(1)));
+        if let Some((error, 0)) = self.stopping {
             self.fail(error);
+        }
+        if self.state != State::Exchange {
             return self.poll(now_ns);
         }
         let (at_ns, cycle) = (self.next_ns, self.counters.cycles);
         self.counters.cycles = cycle.saturating_add(1);
         self.next_ns = at_ns.saturating_add(self.config.cycle_ns.into());
         let [low, high, ..] = self.time_ns(at_ns).to_le_bytes();
-        Action::Exchange { at_ns, time_stamp: u16::from_le_bytes([low, high]), cycle }
+        Action::Exchange { at_ns, time_stamp: u16::from_le_bytes([low, high]), cycle, stop: self.stopping.is_some() }
     }
 
     /// The cycle is over: who has not answered?
@@ -296,6 +344,10 @@ impl Master {
             ..Cycle::NEW
         };
         let before = core::mem::replace(&mut self.cycle, next);
+        self.good_cycles = if silent || damaged { 0 } else { self.good_cycles.saturating_add(1) };
+        if self.good_cycles >= 1000 {
+            self.failures = 0;
+        }
         if silent {
             self.counters.timing_errors = self.counters.timing_errors.saturating_add(1);
         }
@@ -315,13 +367,13 @@ impl Master {
     /// Writes the master frame for an [`Action::Exchange`] and gives its length. Output bytes that are not given are 0.
     ///
     /// # Errors
-    /// [`Error::LengthMismatch`] if `output` has not [`output_len`](Self::output_len) bytes; [`Error::BufferTooSmall`].
+    /// [`Error::OutputLength`] if `output` has not [`output_len`](Self::output_len) bytes; [`Error::BufferTooSmall`].
     pub fn write_frame(&self, output: &[u8], time_stamp: u16, into: &mut [u8]) -> Result<usize, Error> {
         let (got, want) = (u16::try_from(output.len()).unwrap_or(u16::MAX), self.output_len());
         if got != want {
-            return Err(Error::LengthMismatch { got, want });
+            return Err(Error::OutputLength { got, want });
         }
-        write_master_frame(into, output, time_stamp)
+        write_master_frame(output, time_stamp, into)
     }
 
     /// A start-up frame has come back; `sof_ns`: its start.
@@ -329,35 +381,68 @@ impl Master {
     /// # Errors
     /// What the frame is refused for; [`Error::WrongState`] in IDLE and IO exchange. A bad DISCOVERY answer takes the
     /// master back to IDLE, everything else just does not count as an answer.
-    pub fn received(&mut self, frame: &[u8], sof_ns: u64) -> Result<(), Error> {
+    pub fn receive(&mut self, frame: &[u8], sof_ns: u64) -> Result<(), Error> {
         let result = match self.state {
-            State::Idle | State::Exchange => return Err(Error::WrongState),
+            State::Idle | State::Exchange | State::Error => return Err(Error::WrongState),
             State::Discovery => self.discovery_answer(frame),
             State::Param => ParamView::new(frame).map(|_| {
                 (self.remaining, self.unanswered) = (self.remaining.saturating_sub(1), 0);
             }),
-            State::LineDelay => DelayReq::parse(frame).map(|_| {
-                if let Some(asked) = self.asked_ns.take() {
-                    self.line.add(u32::try_from(sof_ns.saturating_sub(asked)).unwrap_or(u32::MAX));
-                }
-            }),
-            State::Sync => Sync::parse(frame).map(|answer| {
-                self.answered |= answer.status.is_last() && answer.status.is_state_change();
-            }),
+            State::LineDelay => self.delay_answer(frame, sof_ns),
+            State::Sync => self.sync_answer(frame),
         };
         if let Err(error) = result {
             self.count(error);
-            if self.state == State::Discovery {
+            if self.state == State::Discovery
+                || matches!(error, Error::LineTooLong { .. } | Error::CycleTooShort { .. })
+            {
                 self.fail(error);
             }
         }
         result
     }
 
+    /// The vendor defines DELAY_RESP and sends the request back instead: a response tells nothing.
+    fn delay_answer(&mut self, frame: &[u8], sof_ns: u64) -> Result<(), Error> {
+        let frame = LongFrame::new(frame)?;
+        if frame.frame_type() == FrameType::DelayResp {
+            return Ok(());
+        }
+        DelayReq::of(frame)?;
+        if let Some(asked) = self.asked_ns.take() {
+            self.line.add(u32::try_from(sof_ns.saturating_sub(asked)).unwrap_or(u32::MAX));
+        }
+        Ok(())
+    }
+
+    /// Both times have grown by the same hops, so the answer tells how far the last device is.
+    fn sync_answer(&mut self, frame: &[u8]) -> Result<(), Error> {
+        let answer = Sync::parse(frame)?;
+        if !answer.status.contains(Status::LAST | Status::STATE_CHANGE) {
+            return Ok(());
+        }
+        let first = self.line.checked().unwrap_or_default();
+        let hops = answer.time_stamp_ns.wrapping_sub(self.sync_stamp_ns).saturating_sub(TRANSIT_NS.into());
+        let delay_ns = hops.saturating_add(first.into());
+        if delay_ns > u16::MAX.into() && !self.config.long_line {
+            return Err(Error::LineTooLong { delay_ns });
+        }
+        let devices = self.network.devices();
+        let hop = hops.checked_div(u32::from(devices).saturating_sub(1)).unwrap_or_default();
+        let cable = u16::try_from(hop.saturating_sub(TRANSIT_NS.into())).unwrap_or(u16::MAX);
+        let (line_delays_ns, payload_len) = ([first, cable], self.config.payload_len.into());
+        let line = Timing { line_delays_ns: &line_delays_ns, devices, output_len: self.output_len(), payload_len };
+        if let Some(misfit) = line.misfit(self.config.cycle_ns) {
+            return Err(Error::CycleTooShort { device: misfit.device, needs_ns: misfit.needs_ns });
+        }
+        self.answered = true;
+        Ok(())
+    }
+
     fn discovery_answer(&mut self, frame: &[u8]) -> Result<(), Error> {
         let answer = DiscoveryView::new(frame)?;
-        if answer.status().is_last() {
-            self.network = Network::new(answer)?;
+        if answer.status().contains(Status::LAST) {
+            self.network.take(answer)?;
             self.answered = true;
         }
         Ok(())
@@ -380,7 +465,7 @@ impl Master {
         if self.state != State::Exchange {
             return Err(Error::WrongState);
         }
-        let view = match DeviceFrameView::new(frame, self.config.payload_len.into()) {
+        let view = match DeviceFrameView::new(self.config.payload_len.into(), frame) {
             Ok(view) => view,
             Err(error) => {
                 self.cycle.damaged = true;
@@ -389,13 +474,13 @@ impl Master {
             }
         };
         let (address, last) = (view.address().get(), self.network.devices());
-        if address > last || view.status().is_last() != (address == last) {
+        if address > last || view.status().contains(Status::LAST) != (address == last) {
             let error = Error::TopologyChanged { address };
-            self.fail(error);
+            self.give_up(error);
             return Err(error);
         }
         self.cycle.mark(address);
-        if view.status().is_error() {
+        if view.status().contains(Status::ERROR) {
             self.counters.device_errors = self.counters.device_errors.saturating_add(1);
         }
         Ok(view)

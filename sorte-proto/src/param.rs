@@ -1,5 +1,9 @@
-use crate::frame::{FrameType, LongFrame, emit};
-use crate::{Error, Status};
+use core::fmt;
+
+use crate::error::Error;
+use crate::frame::{LongFrame, emit};
+use crate::frame_type::FrameType;
+use crate::status::Status;
 
 /// Shape of the network, a byte of PARAM. Only the line is implemented by the vendor.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
@@ -63,11 +67,21 @@ pub enum CrcKind {
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "arbitrary", derive(arbitrary::Arbitrary))]
-pub struct CrcMode(pub u8);
+pub struct CrcMode(u8);
 
 impl CrcMode {
     /// CRC-8 both ways.
     pub const CRC8: Self = Self(0x33);
+
+    /// From the byte of PARAM; every byte is a mode.
+    pub const fn from_byte(byte: u8) -> Self {
+        Self(byte)
+    }
+
+    /// The byte of PARAM.
+    pub const fn byte(self) -> u8 {
+        self.0
+    }
 
     /// Check of master frames.
     pub const fn out(self) -> CrcKind {
@@ -102,7 +116,6 @@ impl CrcMode {
 ///       u32  u32   u32    u8        u8           u8     u8
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Parameters {
     /// Cycle time in ns.
@@ -183,11 +196,12 @@ impl Parameters {
             topology: topology.into(),
             diagnostics,
             alarm,
-            crc_mode: CrcMode(crc_mode),
+            crc_mode: CrcMode::from_byte(crc_mode),
         }
     }
 
     /// The bytes in wire order.
+    #[rustfmt::skip]
     pub fn emit(&self) -> [u8; Self::LEN] {
         let [c0, c1, c2, c3] = self.cycle_time_ns.to_le_bytes();
         let [s0, s1, s2, s3] = self.sync_cycle.to_le_bytes();
@@ -198,45 +212,14 @@ impl Parameters {
         let [o0, o1, o2, o3] = self.t_out_ns.to_le_bytes();
         let (burst, gap, topology) = (self.delay_burst, self.delay_gap_ms, u8::from(self.topology));
         [
-            c0,
-            c1,
-            c2,
-            c3,
-            s0,
-            s1,
-            s2,
-            s3,
-            p0,
-            p1,
-            burst,
-            gap,
-            f0,
-            f1,
-            f2,
-            f3,
-            g0,
-            g1,
-            g2,
-            g3,
-            i0,
-            i1,
-            i2,
-            i3,
-            o0,
-            o1,
-            o2,
-            o3,
-            topology,
-            self.diagnostics,
-            self.alarm,
-            self.crc_mode.0,
+            c0, c1, c2, c3, s0, s1, s2, s3, p0, p1, burst, gap, f0, f1, f2, f3, g0, g1, g2, g3, i0, i1, i2, i3, o0, o1,
+            o2, o3, topology, self.diagnostics, self.alarm, self.crc_mode.byte(),
         ]
     }
 }
 
 /// A PARAM frame in a buffer.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct ParamView<'a> {
     frame: LongFrame<'a>,
     bytes: &'a [u8; Parameters::LEN],
@@ -282,7 +265,6 @@ impl<'a> ParamView<'a> {
 
 /// The values of a PARAM frame.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Param {
     /// SA, 0 in everything the published firmware sends.
@@ -317,6 +299,62 @@ impl Param {
     }
 }
 
+impl fmt::Display for Parameters {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(
+            f,
+            "cycle {} ns, ipg {} x 5 ns, forward {} ns, CRC {:02X}h",
+            self.cycle_time_ns,
+            self.ipg_5ns,
+            self.delay_fwd_time_ns,
+            self.crc_mode.byte()
+        )
+    }
+}
+
+#[cfg(feature = "defmt")]
+#[cfg_attr(docsrs, doc(cfg(feature = "defmt")))]
+impl defmt::Format for Parameters {
+    fn format(&self, f: defmt::Formatter<'_>) {
+        defmt::write!(
+            f,
+            "cycle {=u32} ns, ipg {=u32} x 5 ns, forward {=u32} ns, CRC {=u8:02X}h",
+            self.cycle_time_ns,
+            self.ipg_5ns,
+            self.delay_fwd_time_ns,
+            self.crc_mode.byte()
+        );
+    }
+}
+
+impl fmt::Display for Param {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "PARAM {}, STATUS {}", self.parameters, self.status)
+    }
+}
+
+#[cfg(feature = "defmt")]
+#[cfg_attr(docsrs, doc(cfg(feature = "defmt")))]
+impl defmt::Format for Param {
+    fn format(&self, f: defmt::Formatter<'_>) {
+        defmt::write!(f, "PARAM {}, STATUS {}", self.parameters, self.status);
+    }
+}
+
+impl fmt::Display for ParamView<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "PARAM {}, STATUS {}", self.parameters(), self.status())
+    }
+}
+
+#[cfg(feature = "defmt")]
+#[cfg_attr(docsrs, doc(cfg(feature = "defmt")))]
+impl defmt::Format for ParamView<'_> {
+    fn format(&self, f: defmt::Formatter<'_>) {
+        defmt::write!(f, "PARAM {}, STATUS {}", self.parameters(), self.status());
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use proptest::prelude::*;
@@ -331,7 +369,7 @@ mod tests {
 
         #[test]
         fn what_was_emitted_is_parsed_and_back(source: u8, status: u8, bytes: [u8; 32]) {
-            let frame = Param { source, status: Status(status), parameters: Parameters::parse(&bytes) };
+            let frame = Param { source, status: Status::from_bits_retain(status), parameters: Parameters::parse(&bytes) };
             let wire = frame.emit();
             prop_assert_eq!(&wire[4..36], &bytes);
             prop_assert_eq!(Param::parse(&wire), Ok(frame));

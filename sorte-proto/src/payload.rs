@@ -1,4 +1,9 @@
-use crate::{Direction, Error, Pto};
+use core::fmt;
+
+use servowire_core::OutOfRange;
+
+use crate::flags::show_flags;
+use crate::pto::{Direction, Pto};
 
 /// A device's share of the master frame in the CNC application: four bytes.
 ///
@@ -33,52 +38,61 @@ impl Slice {
     }
 }
 
+impl fmt::Display for Slice {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self.command {
+            0 => self.pto.fmt(f),
+            command => write!(f, "{} command {command:04X}h", self.pto),
+        }
+    }
+}
+
 impl From<Pto> for Slice {
     fn from(pto: Pto) -> Self {
         Self { pto, command: 0 }
     }
 }
 
-/// Which of the four motors take part: bit 0 is motor 1 (device 1), 0..=15.
+/// Which of the four motors take part.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(try_from = "u8", into = "u8"))]
 pub struct MotorMask(u8);
 
-impl MotorMask {
-    /// No motor: all drivers off.
-    pub const NONE: Self = Self(0);
-    /// All four motors.
-    pub const ALL: Self = Self(15);
-
-    /// `mask`: 0..=15.
-    pub const fn new(mask: u8) -> Option<Self> {
-        if mask <= Self::ALL.0 { Some(Self(mask)) } else { None }
-    }
-
-    /// The mask.
-    pub const fn get(self) -> u8 {
-        self.0
-    }
-
-    /// Whether motor `index` (0..=3) takes part.
-    pub const fn has(self, index: u8) -> bool {
-        index < 4 && self.0 >> index & 1 == 1
+bitflags::bitflags! {
+    impl MotorMask: u8 {
+        /// Motor of device 1.
+        const M1 = 1 << 0;
+        /// Motor of device 2.
+        const M2 = 1 << 1;
+        /// Motor of device 3.
+        const M3 = 1 << 2;
+        /// Motor of device 4.
+        const M4 = 1 << 3;
     }
 }
 
-impl TryFrom<u8> for MotorMask {
-    type Error = Error;
+show_flags!(MotorMask);
 
-    fn try_from(mask: u8) -> Result<Self, Error> {
-        Self::new(mask).ok_or(Error::InvalidMotorMask { got: mask })
+impl TryFrom<u8> for MotorMask {
+    type Error = OutOfRange;
+
+    /// `mask`: 0..=15.
+    fn try_from(mask: u8) -> Result<Self, OutOfRange> {
+        Self::from_bits(mask).ok_or_else(|| OutOfRange::above(mask.into(), Self::all().bits().into()))
     }
 }
 
 impl From<MotorMask> for u8 {
     fn from(mask: MotorMask) -> Self {
-        mask.0
+        mask.bits()
+    }
+}
+
+#[cfg(feature = "arbitrary")]
+impl arbitrary::Arbitrary<'_> for MotorMask {
+    fn arbitrary(u: &mut arbitrary::Unstructured<'_>) -> arbitrary::Result<Self> {
+        u8::arbitrary(u).map(Self::from_bits_truncate)
     }
 }
 
@@ -107,16 +121,16 @@ impl Payload {
     /// The same word for every motor of `motors`. The others get a no-pulse word with the same DIR level, so that
     /// their drivers stay on; without any motor, all four get driver off (TIDEP-0061 section 2.3.3).
     pub const fn shared(pto: Pto, motors: MotorMask) -> Self {
-        let rest = match (motors, pto.direction()) {
-            (MotorMask::NONE, _) => Pto::DriverOff,
-            (_, Some(direction)) => Pto::NoPulse { direction },
-            (_, None) => Pto::NoPulse { direction: Direction::Low },
+        let rest = match pto.direction() {
+            _ if !motors.intersects(MotorMask::all()) => Pto::DriverOff,
+            Some(direction) => Pto::NoPulse { direction },
+            None => Pto::NoPulse { direction: Direction::Low },
         };
         Self::independent([
-            if motors.has(0) { pto } else { rest },
-            if motors.has(1) { pto } else { rest },
-            if motors.has(2) { pto } else { rest },
-            if motors.has(3) { pto } else { rest },
+            if motors.contains(MotorMask::M1) { pto } else { rest },
+            if motors.contains(MotorMask::M2) { pto } else { rest },
+            if motors.contains(MotorMask::M3) { pto } else { rest },
+            if motors.contains(MotorMask::M4) { pto } else { rest },
         ])
     }
 
@@ -140,6 +154,13 @@ impl Payload {
     }
 }
 
+impl fmt::Display for Payload {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let [a, b, c, d] = self.0;
+        write!(f, "{a}, {b}, {c}, {d}")
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use proptest::prelude::*;
@@ -149,8 +170,8 @@ mod tests {
     #[test]
     fn masks_are_four_bits() {
         for mask in 0..=u8::MAX {
-            assert_eq!(MotorMask::new(mask).map(MotorMask::get), (mask < 16).then_some(mask));
-            assert_eq!(MotorMask::try_from(mask).is_err(), mask > 15);
+            let want = if mask < 16 { Ok(mask) } else { Err(OutOfRange { got: mask.into(), max: 15 }) };
+            assert_eq!(MotorMask::try_from(mask).map(u8::from), want);
         }
     }
 
@@ -158,7 +179,7 @@ mod tests {
     fn each_motor_of_the_mask_gets_the_word() {
         let pto = Pto::from_word(0x89ab);
         for mask in 0..16 {
-            let Payload(slices) = Payload::shared(pto, MotorMask::new(mask).unwrap());
+            let Payload(slices) = Payload::shared(pto, MotorMask::from_bits(mask).unwrap());
             for (index, slice) in slices.iter().enumerate() {
                 let want = match (mask, mask >> index & 1) {
                     (0, _) => 0x7fff,

@@ -1,4 +1,4 @@
-use crate::Error;
+use crate::error::Error;
 
 const PREAMBLE: u8 = 0x55;
 const SFD: u8 = 0xd5;

@@ -1,4 +1,8 @@
-use crate::Error;
+use core::fmt;
+
+use servowire_core::OutOfRange;
+
+use crate::error::Error;
 
 /// Level of the DIR output of an axis, bit 15 of the PTO word.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
@@ -17,6 +21,10 @@ impl Direction {
     /// Whether DIR is high.
     pub const fn is_high(self) -> bool {
         matches!(self, Self::High)
+    }
+
+    const fn sign(self) -> &'static str {
+        if self.is_high() { "-" } else { "+" }
     }
 
     const fn of(word: u16) -> Self {
@@ -55,6 +63,15 @@ impl StartTime {
         if ns >= Self::MIN.0 && ns <= Self::MAX.0 { Some(Self(ns)) } else { None }
     }
 
+    /// The nearest that the wire can carry: 1 for 0, 3990 above it.
+    pub const fn truncate(ns: u16) -> Self {
+        match Self::new(ns) {
+            Some(start) => start,
+            None if ns == 0 => Self::MIN,
+            None => Self::MAX,
+        }
+    }
+
     /// Nanoseconds after the start of the cycle.
     pub const fn ns(self) -> u16 {
         self.0
@@ -67,10 +84,11 @@ impl StartTime {
 }
 
 impl TryFrom<u16> for StartTime {
-    type Error = Error;
+    type Error = OutOfRange;
 
-    fn try_from(ns: u16) -> Result<Self, Error> {
-        Self::new(ns).ok_or(Error::ReservedPtoValue { raw: ns })
+    fn try_from(ns: u16) -> Result<Self, OutOfRange> {
+        let limit = if ns == 0 { Self::MIN } else { Self::MAX };
+        Self::new(ns).ok_or_else(|| OutOfRange::above(ns.into(), limit.0.into()))
     }
 }
 
@@ -83,9 +101,19 @@ impl From<StartTime> for u16 {
 /// A PTO word without a meaning: 3991..=0x7FFE, the same with bit 15, or 0xFFFF.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(try_from = "Pto", into = "Pto"))]
 pub struct Reserved(u16);
 
 impl Reserved {
+    /// `word`: one without a meaning.
+    pub const fn new(word: u16) -> Option<Self> {
+        match Pto::from_word(word) {
+            Pto::Reserved(reserved) => Some(reserved),
+            _ => None,
+        }
+    }
+
     /// The word.
     pub const fn word(self) -> u16 {
         self.0
@@ -102,6 +130,8 @@ impl Reserved {
     }
 }
 
+/// The last nanosecond of a cycle.
+const LAST_NS: u32 = 3999;
 const TIME: u16 = 0x7fff;
 const DIR: u16 = 0x8000;
 const DRIVER_OFF: u16 = 0x7fff;
@@ -122,7 +152,6 @@ const DRIVER_OFF: u16 = 0x7fff;
 /// All of the word is about the next cycle, DIR too: a device that sets DIR as soon as it takes the word turns the
 /// direction of a pulse that is still to come. It belongs to the wrap at the start of that cycle.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(from = "u16", into = "u16"))]
 pub enum Pto {
@@ -177,16 +206,13 @@ impl Pto {
     /// keeps the exact time for its next step.
     ///
     /// # Errors
-    /// [`Error::SyncTimeOutOfRange`] above 3999.
-    pub const fn from_step(sync_ns: u32, direction: Direction) -> Result<Self, Error> {
-        let start = match sync_ns {
-            0 => StartTime::MIN,
-            3991..=3999 => StartTime::MAX,
-            #[expect(clippy::cast_possible_truncation, reason = "at most 3990")]
-            1..=3990 => StartTime(sync_ns as u16),
-            ns => return Err(Error::SyncTimeOutOfRange { ns }),
-        };
-        Ok(Self::Pulse { start, direction })
+    /// [`OutOfRange`] above 3999.
+    pub const fn from_step(sync_ns: u32, direction: Direction) -> Result<Self, OutOfRange> {
+        if sync_ns > LAST_NS {
+            return Err(OutOfRange::above(sync_ns as u64, LAST_NS as u64));
+        }
+        #[expect(clippy::cast_possible_truncation, reason = "at most 3999")]
+        Ok(Self::Pulse { start: StartTime::truncate(sync_ns as u16), direction })
     }
 
     /// The word, unless it is reserved.
@@ -223,6 +249,23 @@ impl Pto {
     }
 }
 
+impl TryFrom<Pto> for Reserved {
+    type Error = OutOfRange;
+
+    fn try_from(pto: Pto) -> Result<Self, OutOfRange> {
+        match pto {
+            Pto::Reserved(reserved) => Ok(reserved),
+            pto => Err(OutOfRange { got: pto.word().into(), max: 3991 }),
+        }
+    }
+}
+
+impl From<Reserved> for Pto {
+    fn from(reserved: Reserved) -> Self {
+        Self::Reserved(reserved)
+    }
+}
+
 impl From<u16> for Pto {
     fn from(word: u16) -> Self {
         Self::from_word(word)
@@ -232,6 +275,38 @@ impl From<u16> for Pto {
 impl From<Pto> for u16 {
     fn from(pto: Pto) -> Self {
         pto.word()
+    }
+}
+
+/// `+1234`, `-1`: a pulse so many ns into the cycle, DIR 0 or 1; `+.`, `-.`: no pulse; `off`; `0FA0h?`: reserved.
+impl fmt::Display for Pto {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::NoPulse { direction } => write!(f, "{}.", direction.sign()),
+            Self::Pulse { start, direction } => write!(f, "{}{}", direction.sign(), start.ns()),
+            Self::DriverOff => f.write_str("off"),
+            Self::Reserved(raw) => write!(f, "{:04X}h?", raw.word()),
+        }
+    }
+}
+
+#[cfg(feature = "defmt")]
+#[cfg_attr(docsrs, doc(cfg(feature = "defmt")))]
+impl defmt::Format for Pto {
+    fn format(&self, f: defmt::Formatter<'_>) {
+        match self {
+            Self::NoPulse { direction } => defmt::write!(f, "{=str}.", direction.sign()),
+            Self::Pulse { start, direction } => defmt::write!(f, "{=str}{=u16}", direction.sign(), start.ns()),
+            Self::DriverOff => defmt::write!(f, "off"),
+            Self::Reserved(raw) => defmt::write!(f, "{=u16:04X}h?", raw.word()),
+        }
+    }
+}
+
+#[cfg(feature = "arbitrary")]
+impl arbitrary::Arbitrary<'_> for StartTime {
+    fn arbitrary(u: &mut arbitrary::Unstructured<'_>) -> arbitrary::Result<Self> {
+        u16::arbitrary(u).map(|ns| Self::truncate(ns & 0xfff))
     }
 }
 
@@ -245,6 +320,7 @@ impl arbitrary::Arbitrary<'_> for Pto {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::string::ToString;
 
     #[test]
     fn every_word_gives_itself_back_and_falls_into_its_class() {
@@ -261,6 +337,10 @@ mod tests {
             assert_eq!(pto.driver_enabled(), word != 0x7fff);
             assert_eq!(pto.direction(), (word != 0x7fff).then_some(high.into()));
             assert_eq!(Pto::checked(word).is_err(), matches!(pto, Pto::Reserved(_)));
+            assert_eq!(Reserved::new(word).map(Pto::Reserved), Pto::checked(word).is_err().then_some(pto));
+            let time = word & 0x7fff;
+            assert_eq!(StartTime::try_from(time).ok(), StartTime::new(time));
+            assert_eq!(StartTime::truncate(time).ns(), time.clamp(1, 3990));
         }
     }
 
@@ -275,7 +355,16 @@ mod tests {
             }
         }
         for ns in [4000, 4001, 0x7fff, 0x8000, 0x1_0001, u32::MAX] {
-            assert_eq!(Pto::from_step(ns, Direction::Low), Err(Error::SyncTimeOutOfRange { ns }));
+            assert_eq!(Pto::from_step(ns, Direction::Low), Err(OutOfRange { got: ns.into(), max: 3999 }));
+        }
+    }
+
+    #[test]
+    fn a_log_shows_words_as_people_say_them() {
+        for (word, text) in
+            [(1234, "+1234"), (0x8001, "-1"), (0, "+."), (0x8000, "-."), (0x7fff, "off"), (4000, "0FA0h?")]
+        {
+            assert_eq!(Pto::from_word(word).to_string(), text);
         }
     }
 

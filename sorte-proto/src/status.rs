@@ -1,4 +1,4 @@
-use core::ops::{BitOr, BitOrAssign};
+use crate::flags::show_flags;
 
 /// The STATUS byte of every frame.
 ///
@@ -9,23 +9,29 @@ use core::ops::{BitOr, BitOrAssign};
 /// ```
 ///
 /// The nibble is sent as the published firmware sends it, which is not what its header file lists; no receiver looks
-/// at it, and neither does this crate.
+/// at it, and neither does this crate. Every byte is a `Status` and gives itself back.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "arbitrary", derive(arbitrary::Arbitrary))]
-pub struct Status(pub u8);
+pub struct Status(u8);
+
+bitflags::bitflags! {
+    impl Status: u8 {
+        /// The frame has passed the last device; in a device frame: the sender is the last device.
+        const LAST = 1 << 0;
+        /// Defined by the vendor, never used.
+        const DONE = 1 << 1;
+        /// The device saw a wrong checksum since its previous STATUS byte.
+        const ERROR = 1 << 2;
+        /// The last frame of this phase.
+        const STATE_CHANGE = 1 << 3;
+        const _ = !0;
+    }
+}
+
+show_flags!(Status);
 
 impl Status {
-    /// The frame has passed the last device; in a device frame: the sender is the last device.
-    pub const LAST: Self = Self(0x01);
-    /// Defined by the vendor, never used.
-    pub const DONE: Self = Self(0x02);
-    /// The device saw a wrong checksum since its previous STATUS byte.
-    pub const ERROR: Self = Self(0x04);
-    /// The last frame of this phase.
-    pub const STATE_CHANGE: Self = Self(0x08);
-
     /// DISCOVERY frames of the master but the last, and device frames of the IO exchange.
     pub const DISCOVERY: Self = Self(0x00);
     /// PARAM frames of the master but the last.
@@ -46,26 +52,6 @@ impl Status {
     /// The last DELAY_REQ frame of a device: the type nibble is kept.
     pub const FINAL_DEVICE_DELAY_REQ: Self = Self(0x28);
 
-    /// Whether all bits of `flags` are set.
-    pub const fn has(self, flags: Self) -> bool {
-        self.0 & flags.0 == flags.0
-    }
-
-    /// [`LAST`](Self::LAST)
-    pub const fn is_last(self) -> bool {
-        self.has(Self::LAST)
-    }
-
-    /// [`ERROR`](Self::ERROR)
-    pub const fn is_error(self) -> bool {
-        self.has(Self::ERROR)
-    }
-
-    /// [`STATE_CHANGE`](Self::STATE_CHANGE)
-    pub const fn is_state_change(self) -> bool {
-        self.has(Self::STATE_CHANGE)
-    }
-
     /// Bits 7 to 4 as they came.
     pub const fn type_nibble(self) -> u8 {
         self.0 >> 4
@@ -77,36 +63,33 @@ impl Status {
     }
 }
 
-impl BitOr for Status {
-    type Output = Self;
-
-    fn bitor(self, other: Self) -> Self {
-        Self(self.0 | other.0)
-    }
-}
-
-impl BitOrAssign for Status {
-    fn bitor_assign(&mut self, other: Self) {
-        self.0 |= other.0;
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::string::ToString;
 
     #[test]
     fn each_bit_of_all_256_has_its_name() {
         for raw in 0..=u8::MAX {
-            let status = Status(raw);
-            assert_eq!(status.is_last(), raw & 1 != 0);
-            assert_eq!(status.has(Status::DONE), raw & 2 != 0);
-            assert_eq!(status.is_error(), raw & 4 != 0);
-            assert_eq!(status.is_state_change(), raw & 8 != 0);
-            assert_eq!(status.type_nibble(), raw >> 4);
+            let status = Status::from_bits_retain(raw);
+            assert_eq!(status.contains(Status::LAST), raw & 1 != 0);
+            assert_eq!(status.contains(Status::DONE), raw & 2 != 0);
+            assert_eq!(status.contains(Status::ERROR), raw & 4 != 0);
+            assert_eq!(status.contains(Status::STATE_CHANGE), raw & 8 != 0);
+            assert_eq!((status.type_nibble(), status.bits()), (raw >> 4, raw));
+            assert_eq!(Status::from_bits(raw), Some(status));
         }
         assert_eq!(Status::of_device(true, false), Status::LAST);
         assert_eq!(Status::of_device(false, true), Status::ERROR);
-        assert_eq!(Status::SYNC | Status::LAST, Status(0x41));
+        assert_eq!(Status::SYNC | Status::LAST, Status::from_bits_retain(0x41));
+    }
+
+    #[test]
+    fn a_log_shows_names_and_the_rest() {
+        for (raw, text) in
+            [(0x00, ""), (0x05, "LAST ERROR"), (0x30, "30h"), (0x41, "LAST 40h"), (0x18, "STATE_CHANGE 10h")]
+        {
+            assert_eq!(Status::from_bits_retain(raw).to_string(), text);
+        }
     }
 }

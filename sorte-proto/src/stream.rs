@@ -1,16 +1,18 @@
 //! The decoders as `nom` streaming parsers, for frames that arrive as a stream of bytes.
 //!
 //! Missing bytes give `Incomplete` with the number that is wanted; every other fault is an `Error`. With
-//! [`sorte_proto::Error`](crate::Error) as the error type the reason is kept; any other type that implements
+//! [`sorte_proto::Error`](crate::error::Error) as the error type the reason is kept; any other type that implements
 //! `FromExternalError` works too.
 
-use core::num::NonZeroUsize;
+use nom::error::{FromExternalError, ParseError};
+use nom::{IResult, Parser};
+use servowire_core::stream::{missing, refused, unit};
 
-use nom::error::{ErrorKind, FromExternalError, ParseError};
-use nom::{Err, IResult, Needed, Parser};
-
+use crate::error::Error;
+use crate::exchange::{DeviceFrameView, MasterFrameView};
+use crate::frame::LongFrame;
+use crate::frame_type::FrameType;
 use crate::preamble::{Scan, scan};
-use crate::{DeviceFrameView, Error, FrameType, LongFrame, MasterFrameView};
 
 /// Takes preamble and start delimiter off the front, as [`strip_preamble`](crate::strip_preamble).
 ///
@@ -49,7 +51,7 @@ where
     let &[_, _, code, ..] = input else { return Err(missing(3_usize.saturating_sub(input.len()))) };
     let unknown = Error::UnknownType { got: code };
     let len = FrameType::from_code(code).and_then(FrameType::frame_len).ok_or_else(|| refused(input, unknown))?;
-    take(input, len, LongFrame::new)
+    unit(input, len, LongFrame::new)
 }
 
 /// Takes a master frame of the IO exchange with `output_len` output bytes off the front.
@@ -61,7 +63,7 @@ where
     E: ParseError<&'a [u8]> + FromExternalError<&'a [u8], Error>,
 {
     let len = output_len.saturating_add(MasterFrameView::OVERHEAD);
-    move |input: &'a [u8]| take(input, len, |frame| MasterFrameView::new(frame, output_len))
+    move |input: &'a [u8]| unit(input, len, |frame| MasterFrameView::new(output_len, frame))
 }
 
 /// Takes a device frame of the IO exchange with `payload_len` payload bytes off the front.
@@ -73,34 +75,22 @@ where
     E: ParseError<&'a [u8]> + FromExternalError<&'a [u8], Error>,
 {
     let len = payload_len.saturating_add(DeviceFrameView::OVERHEAD);
-    move |input: &'a [u8]| take(input, len, |frame| DeviceFrameView::new(frame, payload_len))
-}
-
-fn take<'a, T, E>(input: &'a [u8], len: usize, parse: impl Fn(&'a [u8]) -> Result<T, Error>) -> IResult<&'a [u8], T, E>
-where
-    E: ParseError<&'a [u8]> + FromExternalError<&'a [u8], Error>,
-{
-    let (frame, rest) = input.split_at_checked(len).ok_or_else(|| missing(len.saturating_sub(input.len())))?;
-    Ok((rest, parse(frame).map_err(|error| refused(input, error))?))
-}
-
-fn missing<E>(bytes: usize) -> Err<E> {
-    Err::Incomplete(NonZeroUsize::new(bytes).map_or(Needed::Unknown, Needed::Size))
-}
-
-fn refused<'a, E>(input: &'a [u8], error: Error) -> Err<E>
-where
-    E: ParseError<&'a [u8]> + FromExternalError<&'a [u8], Error>,
-{
-    Err::Error(E::from_external_error(input, ErrorKind::MapRes, error))
+    move |input: &'a [u8]| unit(input, len, |frame| DeviceFrameView::new(payload_len, frame))
 }
 
 #[cfg(test)]
 mod tests {
+    use nom::{Err, Needed};
     use std::vec::Vec;
 
     use super::*;
-    use crate::{DelayReq, Discovery, Param, Parameters, Preamble, Status, Sync, strip_preamble, write_master_frame};
+    use crate::delay_req::DelayReq;
+    use crate::discovery::Discovery;
+    use crate::exchange::write_master_frame;
+    use crate::param::{Param, Parameters};
+    use crate::preamble::{Preamble, strip_preamble};
+    use crate::status::Status;
+    use crate::sync::Sync;
 
     fn stream() -> Vec<u8> {
         let frames: [(Preamble, Vec<u8>); 4] = [
@@ -132,7 +122,7 @@ mod tests {
     #[test]
     fn the_exchange_is_a_stream_too() {
         let mut wire = [0; 24];
-        let len = write_master_frame(&mut wire, &[0x11; 16], 0x2233).unwrap();
+        let len = write_master_frame(&[0x11; 16], 0x2233, &mut wire).unwrap();
         let (rest, view) = master_frame::<Error>(16).parse(&wire).unwrap();
         assert_eq!((rest, view.output(), view.status()), (&[0; 3][..], &[0x11; 16][..], Status::EXCHANGE));
         for cut in 0..len {

@@ -21,7 +21,8 @@
 //!
 //! [`Variant::Published`] does what the published device does, register write for register write; with steps 4 us
 //! apart and random phases some 5 to 7 % of them come a cycle late or not at all. [`Variant::Lossless`] keeps every
-//! step, as long as the handler runs within 590 ns and steps are at least 4000 ns apart.
+//! step, as long as the last register write of an event is made within less than 600 ns and steps are at least 4000 ns
+//! apart. The CMP6 handler with a deferred pulse has the most, seven: with `w` ns for each, latency + 7 w < 600.
 //!
 //! Events that are pending together are served in the order CMP6, CMP0, CMP7.
 //!
@@ -38,9 +39,8 @@
 //! ]);
 //! ```
 
-use core::ops::{BitOr, BitOrAssign};
-
-use crate::StartTime;
+use crate::flags::show_flags;
+use crate::pto::StartTime;
 
 /// Width of the pulse in ns: PWIDTH = 399.
 pub const PULSE_NS: u16 = 2000;
@@ -48,7 +48,11 @@ pub const PULSE_NS: u16 = 2000;
 pub const CMP7_NS: u16 = 2000;
 /// CMP1 of a pulse programmed late, in ns: two ticks before the next cycle.
 pub const LATE_CMP1_NS: u16 = 3990;
-/// The longest time from an event to its handler for which [`Variant::Lossless`] is proved, in ns.
+/// The longest time from an event to the last of its register writes for which [`Variant::Lossless`] is proved, in ns.
+///
+/// The proof is a walk over all phases of a step at every latency in ticks of 5 ns, over pairs of phases, and over writes
+/// of 0 to 60 ns as events of their own, against the timer of [`iep`](crate::iep). At 600 ns the same walk loses steps: a
+/// pulse that ends 3386 ns into the cycle leaves 604 ns until CMP1 of the one deferred behind it.
 pub const MAX_LATENCY_NS: u16 = 590;
 
 /// CMP_CFG of an idle output: CMP0 resets the counter, CMP0 and CMP7 are enabled. Bit n+1 enables CMPn.
@@ -74,48 +78,33 @@ pub enum Variant {
     Lossless,
 }
 
-/// Flags between the events, by the bits of the published status word. Its bits 4 to 6 are the events themselves.
+/// Flags between the events, with the names and bits of the published status word. Its bits 4 to 6 are the events
+/// themselves.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub struct Flags(pub u16);
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct Flags(u16);
+
+bitflags::bitflags! {
+    impl Flags: u16 {
+        /// A pulse is programmed and not yet over.
+        const PENDING_PULSE = 1 << 0;
+        /// A pulse has been ordered and is not yet programmed.
+        const ACTIVE_PULSE = 1 << 1;
+        /// The coming wrap must not yet enable CMP6.
+        const DELAYED_CMP6_ACTIVATED = 1 << 3;
+        /// The pulse ordered last ends in the cycle after its own.
+        const SYNC_PULSE_OVERLAP = 1 << 7;
+        /// So does the pulse programmed last.
+        const PREV_SYNC_PULSE_OVERLAP = 1 << 8;
+    }
+}
+
+show_flags!(Flags);
 
 impl Flags {
-    /// PENDING_PULSE: a pulse is programmed and not yet over.
-    pub const PENDING: Self = Self(1 << 0);
-    /// ACTIVE_PULSE: a pulse has been ordered and is not yet programmed.
-    pub const ACTIVE: Self = Self(1 << 1);
-    /// DELAYED_CMP6_ACTIVATED: the coming wrap must not yet enable CMP6.
-    pub const DELAYED: Self = Self(1 << 3);
-    /// SYNC_PULSE_OVERLAP: the pulse ordered last ends in the cycle after its own.
-    pub const OVERLAP: Self = Self(1 << 7);
-    /// PREV_SYNC_PULSE_OVERLAP: so does the pulse programmed last.
-    pub const PREV_OVERLAP: Self = Self(1 << 8);
-
-    /// Whether all of `flags` are set.
-    pub const fn has(self, flags: Self) -> bool {
-        self.0 & flags.0 == flags.0
-    }
-
-    const fn set(&mut self, flag: Self, on: bool) {
-        if on {
-            self.0 |= flag.0;
-        } else {
-            self.0 &= !flag.0;
-        }
-    }
-}
-
-impl BitOr for Flags {
-    type Output = Self;
-
-    fn bitor(self, other: Self) -> Self {
-        Self(self.0 | other.0)
-    }
-}
-
-impl BitOrAssign for Flags {
-    fn bitor_assign(&mut self, other: Self) {
-        self.0 |= other.0;
+    /// With `flag` set or cleared.
+    const fn with(self, flag: Self, on: bool) -> Self {
+        if on { self.union(flag) } else { self.difference(flag) }
     }
 }
 
@@ -252,7 +241,7 @@ impl Default for Sync0 {
 impl Sync0 {
     /// An idle output: CMP_CFG holds [`CMP_CFG_IDLE`], SYNC0 is armed.
     pub const fn new(variant: Variant) -> Self {
-        Self { variant, flags: Flags(0), pto: 0, ticks: 0, new6: 0, cfg: CMP_CFG_IDLE }
+        Self { variant, flags: Flags::empty(), pto: 0, ticks: 0, new6: 0, cfg: CMP_CFG_IDLE }
     }
 
     /// Which machine it is.
@@ -268,10 +257,10 @@ impl Sync0 {
     /// The pulse is over.
     pub const fn cmp6(&mut self) -> Writes {
         self.cfg &= !(CMP1_ENABLED | CMP6_ENABLED);
-        self.flags.set(Flags::PENDING, false);
+        self.flags = self.flags.with(Flags::PENDING_PULSE, false);
         let mut writes = Writes { prelude: Prelude::Rearm, first_cfg: self.cfg, ..Writes::NONE };
-        if self.flags.has(Flags::ACTIVE) {
-            if self.flags.has(Flags::PREV_OVERLAP) {
+        if self.flags.contains(Flags::ACTIVE_PULSE) {
+            if self.flags.contains(Flags::PREV_SYNC_PULSE_OVERLAP) {
                 self.program_now(&mut writes);
             } else if matches!(self.variant, Variant::Lossless) {
                 self.program_late(&mut writes);
@@ -283,35 +272,35 @@ impl Sync0 {
     /// The counter wraps.
     pub const fn cmp0(&mut self) -> Writes {
         let mut writes = Writes::NONE;
-        if self.flags.has(Flags::DELAYED) {
-            self.flags.set(Flags::DELAYED, false);
-        } else if self.flags.has(Flags::PENDING) {
+        if self.flags.contains(Flags::DELAYED_CMP6_ACTIVATED) {
+            self.flags = self.flags.with(Flags::DELAYED_CMP6_ACTIVATED, false);
+        } else if self.flags.contains(Flags::PENDING_PULSE) {
             self.cfg |= CMP6_ENABLED;
             writes.prelude = Prelude::Enable;
             writes.first_cfg = self.cfg;
         }
-        let deferred = self.flags.has(Flags::ACTIVE) && !self.flags.has(Flags::PREV_OVERLAP);
+        let deferred = self.flags.contains(Flags::ACTIVE_PULSE) && !self.flags.contains(Flags::PREV_SYNC_PULSE_OVERLAP);
         if deferred && matches!(self.variant, Variant::Published) {
             self.program_now(&mut writes);
         }
         writes
     }
 
-    /// New data: the start of the pulse in the next cycle, [`Pto::start`](crate::Pto::start) of the device's word.
+    /// New data: the start of the pulse in the next cycle, [`Pto::start`](crate::pto::Pto::start) of the device's word.
     pub const fn cmp7(&mut self, start: Option<StartTime>) -> Writes {
         let mut writes = Writes::NONE;
         let Some(start) = start else {
             if matches!(self.variant, Variant::Published) {
-                self.flags.set(Flags::PREV_OVERLAP, false);
+                self.flags = self.flags.with(Flags::PREV_SYNC_PULSE_OVERLAP, false);
             }
             return writes;
         };
-        self.flags.set(Flags::ACTIVE, true);
+        self.flags = self.flags.with(Flags::ACTIVE_PULSE, true);
         self.pto = start.ns();
         self.ticks = start.ticks();
         // At most 3990 + 2000.
         let end = self.pto.wrapping_add(PULSE_NS);
-        self.flags.set(Flags::OVERLAP, end >= OVERLAP_NS);
+        self.flags = self.flags.with(Flags::SYNC_PULSE_OVERLAP, end >= OVERLAP_NS);
         self.new6 = match (self.variant, end >= OVERLAP_NS) {
             (_, false) => end,
             // Never 0: that event would be lost in the wrap.
@@ -320,7 +309,7 @@ impl Sync0 {
             (Variant::Lossless, true) if end < LATE_CMP1_NS + EARLIEST_CMP6_NS => EARLIEST_CMP6_NS,
             (Variant::Lossless, true) => end.wrapping_sub(LATE_CMP1_NS),
         };
-        if !self.flags.has(Flags::PENDING) {
+        if !self.flags.contains(Flags::PENDING_PULSE) {
             self.program_late(&mut writes);
         }
         writes
@@ -328,10 +317,10 @@ impl Sync0 {
 
     /// A pulse for the next cycle.
     const fn program_late(&mut self, writes: &mut Writes) {
-        let overlap = self.flags.has(Flags::OVERLAP);
-        self.flags.set(Flags::PREV_OVERLAP, overlap);
+        let overlap = self.flags.contains(Flags::SYNC_PULSE_OVERLAP);
+        self.flags = self.flags.with(Flags::PREV_SYNC_PULSE_OVERLAP, overlap);
         if overlap {
-            self.flags.set(Flags::DELAYED, true);
+            self.flags = self.flags.with(Flags::DELAYED_CMP6_ACTIVATED, true);
         }
         self.cfg |= CMP1_ENABLED;
         self.programmed(writes, Program::Late, self.ticks, LATE_CMP1_NS);
@@ -339,15 +328,15 @@ impl Sync0 {
 
     /// A pulse for the running cycle.
     const fn program_now(&mut self, writes: &mut Writes) {
-        let overlap = self.flags.has(Flags::OVERLAP);
-        self.flags.set(Flags::PREV_OVERLAP, overlap);
+        let overlap = self.flags.contains(Flags::SYNC_PULSE_OVERLAP);
+        self.flags = self.flags.with(Flags::PREV_SYNC_PULSE_OVERLAP, overlap);
         self.cfg |= if overlap { CMP1_ENABLED } else { CMP1_ENABLED | CMP6_ENABLED };
         self.programmed(writes, Program::Now, 0, self.pto);
     }
 
     const fn programmed(&mut self, writes: &mut Writes, program: Program, start: u16, cmp1: u16) {
-        self.flags.set(Flags::ACTIVE, false);
-        self.flags.set(Flags::PENDING, true);
+        self.flags = self.flags.with(Flags::ACTIVE_PULSE, false);
+        self.flags = self.flags.with(Flags::PENDING_PULSE, true);
         writes.program = program;
         writes.start = start;
         writes.cmp6 = self.new6;

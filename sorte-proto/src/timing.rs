@@ -1,7 +1,8 @@
 //! What fits into a cycle of the IO exchange.
 
+use crate::address::DeviceAddress;
+use crate::discovery::MAX_DEVICES;
 use crate::sync::TRANSIT_NS;
-use crate::{DeviceAddress, MAX_DEVICES};
 
 /// One byte at 100 Mbit/s, in ns.
 pub const BYTE_NS: u32 = 80;
@@ -32,7 +33,7 @@ pub const fn published_send_time_ns(address: DeviceAddress) -> u32 {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Timing<'a> {
-    /// Line delays in ns: master to device 1, device 1 to 2, ...; the last one stands for all behind it. Empty: no delay.
+    /// Line delays in ns: master to device 1, device 1 to 2, ...; the last one stands for all after it. Empty: no delay.
     pub line_delays_ns: &'a [u16],
     /// Devices, 0..=254.
     pub devices: u8,
@@ -113,8 +114,8 @@ impl Timing<'_> {
         cables.saturating_add(u32::from(address.saturating_sub(1)).saturating_mul(u32::from(TRANSIT_NS)))
     }
 
-    /// Time of one device frame with its two preamble bytes and the gap behind it, in ns.
-    const fn slot_ns(&self) -> u32 {
+    /// Time of one device frame with its two preamble bytes and the gap after it, in ns: 880 with 3 payload bytes.
+    pub const fn slot_ns(&self) -> u32 {
         self.device_frame_ns().saturating_add(GAP_NS)
     }
 
@@ -124,7 +125,7 @@ impl Timing<'_> {
     }
 
     /// When device `address` starts to send, in ns of the common time: so that the frames reach the master one slot
-    /// behind the other. Signed, because a cable longer than a slot asks a device to send before the one in front.
+    /// after the other. Signed, because a cable longer than a slot asks a device to send before the one in front.
     pub fn send_time_ns(&self, address: DeviceAddress) -> i64 {
         let slots = i64::from(address.hops_before()).saturating_mul(i64::from(self.slot_ns()));
         let way = self.way_ns(address.get()).saturating_sub(self.way_ns(1));
@@ -150,6 +151,43 @@ impl Timing<'_> {
     }
 }
 
+/// A cycle that is too short, and for whom.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Misfit {
+    /// The first device for which it is.
+    pub device: u8,
+    /// How long the cycle must be for this device, in ns.
+    pub needs_ns: u32,
+    /// Which way takes so long.
+    pub limit: Limit,
+}
+
+impl Timing<'_> {
+    /// The first device that a cycle of `cycle_ns` is too short for, in the order of the addresses.
+    pub fn misfit(&self, cycle_ns: u32) -> Option<Misfit> {
+        let devices = self.devices.min(DeviceAddress::MAX.get());
+        let sent_ns = self.budget().master_sent_ns;
+        let (mut cables_ns, mut hops_ns, mut slots_ns) = (0_u32, 0_u32, 0_u32);
+        let frame_ns = self.device_frame_ns().saturating_add(TRIGGER_NS).saturating_add(self.line_delay_ns(1));
+        (1..=devices).find_map(|device| {
+            cables_ns = cables_ns.saturating_add(self.line_delay_ns(device));
+            let out = sent_ns.saturating_add(cables_ns).saturating_add(hops_ns);
+            let back = frame_ns.saturating_add(slots_ns);
+            hops_ns = hops_ns.saturating_add(TRANSIT_NS.into());
+            slots_ns = slots_ns.saturating_add(self.slot_ns());
+            let (needs_ns, limit) = if out > back { (out, Limit::MasterFrame) } else { (back, Limit::DeviceFrames) };
+            (needs_ns > cycle_ns).then_some(Misfit { device, needs_ns, limit })
+        })
+    }
+
+    /// The shortest cycle in whole periods of the step pulse generator, 4 us, in ns. A step word is about the second period
+    /// after the cycle that brought it, so longer cycles mean fewer steps a second and not longer pulses.
+    pub fn cnc_cycle_ns(&self) -> u32 {
+        self.budget().min_cycle_ns().max(1).div_ceil(CNC_CYCLE_NS).saturating_mul(CNC_CYCLE_NS)
+    }
+}
+
 const _: () = assert!(MAX_DEVICES == DeviceAddress::MAX.get() as usize);
 
 #[cfg(test)]
@@ -167,6 +205,28 @@ mod tests {
         assert_eq!(cnc(4, &[0]).budget().limit(), Limit::DeviceFrames);
         let long = cnc(4, &[200]).budget();
         assert_eq!((long.limit(), long.min_cycle_ns()), (Limit::MasterFrame, 4205));
+    }
+
+    #[test]
+    fn the_device_that_breaks_the_cycle_is_named() {
+        assert_eq!(cnc(4, &[85]).misfit(4000), None);
+        // 500 + 4 x 880 + 640 + 85: the fifth device's frame at the master.
+        let misfit = Timing { output_len: 16, ..cnc(5, &[85]) }.misfit(4000);
+        assert_eq!(misfit, Some(Misfit { device: 5, needs_ns: 4745, limit: Limit::DeviceFrames }));
+        // 500 + 23 x 80 + 4 x 200 + 3 x 355: the master frame at the fourth.
+        let misfit = cnc(4, &[200]).misfit(4000);
+        assert_eq!(misfit, Some(Misfit { device: 4, needs_ns: 4205, limit: Limit::MasterFrame }));
+        for devices in 1..=254 {
+            let line = cnc(devices, &[85]);
+            let cycle = line.cnc_cycle_ns();
+            assert!(cycle % 4000 == 0 && line.misfit(cycle).is_none());
+            assert!(cycle == 4000 || line.misfit(cycle - 4000).is_some());
+            assert_eq!(line.misfit(line.budget().min_cycle_ns() - 1).map(|m| m.needs_ns > 0), Some(true));
+        }
+        assert_eq!(
+            (cnc(4, &[85]).cnc_cycle_ns(), cnc(10, &[85]).cnc_cycle_ns(), cnc(254, &[85]).cnc_cycle_ns()),
+            (4000, 12_000, 224_000)
+        );
     }
 
     #[test]

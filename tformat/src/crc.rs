@@ -1,3 +1,5 @@
+use crate::error::Error;
+
 /// The check field over `bytes`: the data bits of all fields before it, in line order.
 ///
 /// Generator x^8 + 1, width 8, initial value 0, no final XOR (TIDM-1011, section 2.3.1). Because
@@ -25,6 +27,14 @@ pub const fn crc(mut bytes: &[u8]) -> u8 {
         bytes = rest;
     }
     sum
+}
+
+/// Checks the last field against the ones before it.
+pub(crate) fn check(fields: &[u8]) -> Result<(), Error> {
+    match (crc(fields), fields) {
+        (0, _) | (_, []) => Ok(()),
+        (sum, [.., got]) => Err(Error::Crc { got: *got, want: sum ^ got }),
+    }
 }
 
 #[cfg(test)]

@@ -4,30 +4,42 @@
 //! are set from outside; the EEPROM, the ten-fold resets and the reaction to damaged requests are its own. Faults can
 //! be switched on to see what a master makes of them.
 //!
-//! What the documents leave open is decided here as follows: a damaged or unknown request is answered with ID 3, with
-//! ca0 for a parity error, ca1 for a delimiter error and neither for a wrong check field or data ID; a wrong sink code
-//! is not answered. A write makes the EEPROM busy for 18 ms, in which writes are ignored and every access is answered
-//! with the busy flag, after a read with data 0. Selecting a page takes no time. After power-on the page is 0 and
-//! unwritten bytes are 0xff.
+//! It is written from the documents with numbers of its own, not with those of the [`master`](crate::master) that it
+//! tests. What the documents leave open is a switch of its [`Config`]; by default a damaged or unknown request is answered
+//! with ID 3, with CA0 for a parity error, CA1 for a delimiter error and neither for a wrong check field or data ID; a
+//! wrong sink code is not answered. A write makes the EEPROM busy for 18 ms, in which writes are ignored and every access
+//! is answered with the busy flag, after a read with data 0. Selecting a page takes no time. After power-on the page is 0
+//! and unwritten bytes are 0xff.
 //!
 //! ```
 //! use tformat::device::Device;
-//! use tformat::{BitRate, U24};
+//! use tformat::{Abm, Abs, BitRate};
 //!
 //! let mut encoder = Device::<6>::new(0x17, BitRate::Mbit2_5);
-//! encoder.set_position(U24::truncate(0x12_3456), U24::truncate(7));
+//! encoder.set_position(Abs::truncate(0x12_3456), Abm::truncate(7));
 //! // the request for ID 3, its delimiter at 4 us
-//! let reply = encoder.byte(0x1a, 4_000).expect("an answer");
-//! assert_eq!(reply.at_ns, 7_000);
-//! assert_eq!(reply.frame.as_bytes()[2..9], [0x56, 0x34, 0x12, 0x17, 0x07, 0x00, 0x00]);
+//! let sent = encoder.byte(0x1a, 4_000).expect("a response");
+//! assert_eq!(sent.at_ns, 7_000);
+//! assert_eq!(sent.frame.as_bytes()[2..9], [0x56, 0x34, 0x12, 0x17, 0x07, 0x00, 0x00]);
 //! ```
+
+mod config;
 
 use nrz_line::{Format, Receiver, Window};
 
-use crate::{
-    Address, Adf, Alarm, Almc, BitRate, DataId, EncoderId, Error, Frame, Full, Memory, MultiTurn, RESPONSE_DELAY_NS,
-    Request, Response, SingleTurn, StatusField, U24, master::Reset,
-};
+use crate::address::{Address, Adf};
+use crate::count::{Abm, Abs};
+use crate::data_id::DataId;
+use crate::error::Error;
+use crate::frame::Frame;
+use crate::message::{AllData, Identification, Memory, MultiTurn, SingleTurn};
+use crate::request::Request;
+use crate::resolution::Resolution;
+use crate::response::Response;
+use crate::status::{Almc, StatusField};
+use crate::timing::BitRate;
+
+pub use config::{AbsentPage, BusyData, Config, Interval};
 
 /// A fault that the encoder or its line is made to have.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
@@ -56,10 +68,10 @@ pub enum Fault {
     RejectAll,
 }
 
-/// What an encoder sends, and when its start bit begins.
+/// What an encoder sends, and when.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub struct Reply {
+pub struct Transmission {
     /// The fields as a UART sends them. A fault in a start bit or delimiter is only in [`line`](Self::line).
     pub frame: Frame,
     /// The line bits.
@@ -68,17 +80,18 @@ pub struct Reply {
     pub at_ns: u64,
 }
 
-/// Time for which a write keeps the EEPROM busy.
-pub const EEPROM_BUSY_NS: u64 = 18_000_000;
+/// Time for which a write keeps the EEPROM busy, and for which a single-turn zero is stored: 18 ms.
+const STORING_NS: u64 = 18_000_000;
 
 /// An encoder with `PAGES` pages of EEPROM (6 in Tamagawa's).
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Device<const PAGES: usize> {
+    config: Config,
     rate: BitRate,
     enid: u8,
-    abs: U24,
-    zero: U24,
-    abm: U24,
+    abs: Abs,
+    zero: Abs,
+    abm: Abm,
     /// Alarms that are set, and those whose cause is still there.
     almc: Almc,
     causes: Almc,
@@ -86,9 +99,12 @@ pub struct Device<const PAGES: usize> {
     eeprom: [[u8; 127]; PAGES],
     page: u8,
     busy_until_ns: u64,
+    storing_until_ns: u64,
+    effects: u32,
     repeated: Option<DataId>,
     repeats: u8,
-    last_request_ns: u64,
+    /// Start of the last reset request, and end of the response to it.
+    last_reset: (u64, u64),
     received: [u8; 4],
     len: u8,
     /// A request was judged and no pause has come since.
@@ -107,20 +123,23 @@ impl<const PAGES: usize> Device<PAGES> {
     /// An encoder at position 0 without alarms, as after power-on.
     pub const fn new(enid: u8, rate: BitRate) -> Self {
         Self {
+            config: Config::new(),
             rate,
             enid,
-            abs: U24::truncate(0),
-            zero: U24::truncate(0),
-            abm: U24::truncate(0),
-            almc: Almc::NONE,
-            causes: Almc::NONE,
+            abs: Abs::truncate(0),
+            zero: Abs::truncate(0),
+            abm: Abm::truncate(0),
+            almc: Almc::empty(),
+            causes: Almc::empty(),
             fault: Fault::None,
             eeprom: [[0xff; 127]; PAGES],
             page: 0,
             busy_until_ns: 0,
+            storing_until_ns: 0,
+            effects: 0,
             repeated: None,
             repeats: 0,
-            last_request_ns: 0,
+            last_reset: (0, 0),
             received: [0; 4],
             len: 0,
             deaf: false,
@@ -129,22 +148,30 @@ impl<const PAGES: usize> Device<PAGES> {
         }
     }
 
+    /// With other decisions where the documents leave them open.
+    pub const fn with_config(self, config: Config) -> Self {
+        Self { config, ..self }
+    }
+
+    /// How often a reset, of either kind, has had its effect since power-on.
+    pub const fn effects(&self) -> u32 {
+        self.effects
+    }
+
     /// Turns the shaft: ABS before the single-turn zero is applied, and ABM.
-    pub const fn set_position(&mut self, abs: U24, abm: U24) {
+    pub const fn set_position(&mut self, abs: Abs, abm: Abm) {
         self.abs = abs;
         self.abm = abm;
     }
 
-    /// The cause of an alarm comes or goes. A latched alarm stays set until a reset finds its cause gone.
-    pub const fn set_alarm(&mut self, alarm: Alarm, present: bool) {
+    /// The cause of alarms comes or goes. A latched alarm stays set until a reset finds its cause gone.
+    pub const fn set_alarms(&mut self, alarms: Almc, present: bool) {
         if present {
-            self.causes = self.causes.with(Almc::of(alarm));
-            self.almc = self.almc.with(Almc::of(alarm));
+            self.causes = self.causes.union(alarms);
+            self.almc = self.almc.union(alarms);
         } else {
-            self.causes = self.causes.without(Almc::of(alarm));
-            if !alarm.is_latched() {
-                self.almc = self.almc.without(Almc::of(alarm));
-            }
+            self.causes = self.causes.difference(alarms);
+            self.almc = self.almc.difference(alarms.difference(Almc::LATCHED));
         }
     }
 
@@ -156,6 +183,16 @@ impl<const PAGES: usize> Device<PAGES> {
     /// The error byte as it would be answered now.
     pub const fn almc(&self) -> Almc {
         self.almc
+    }
+
+    /// ABS as it would be answered now: from the zero that ID 8 set, in the width that the encoder ID names.
+    pub const fn abs(&self) -> Abs {
+        self.single_turn()
+    }
+
+    /// ABM as it would be answered now.
+    pub const fn abm(&self) -> Abm {
+        self.abm
     }
 
     /// The EEPROM page that is selected.
@@ -170,7 +207,7 @@ impl<const PAGES: usize> Device<PAGES> {
 
     /// A byte was received without framing error, its delimiter at `now_ns`. Gives the answer once a request is
     /// complete.
-    pub fn byte(&mut self, byte: u8, now_ns: u64) -> Option<Reply> {
+    pub fn byte(&mut self, byte: u8, now_ns: u64) -> Option<Transmission> {
         if self.is_deaf(now_ns) {
             return None;
         }
@@ -178,35 +215,42 @@ impl<const PAGES: usize> Device<PAGES> {
         self.len = self.len.saturating_add(1);
         let received = self.received;
         let request = Request::parse(received.get(..usize::from(self.len))?);
-        let answer = match request {
+        let response = match request {
             Err(Error::Truncated { .. }) => return None,
             Ok(_) if self.fault == Fault::RejectAll => Some(self.rejection(false, false)),
             Ok(request) => Some(self.answer(request, now_ns)),
             Err(error) => {
-                self.repeated = None;
+                self.damaged();
                 match error {
-                    Error::SinkCode { .. } => None,
+                    Error::SinkCode { .. } if !self.config.answers_wrong_sink => None,
                     Error::Parity { .. } => Some(self.rejection(true, false)),
                     _ => Some(self.rejection(false, false)),
                 }
             }
         };
         self.deaf = true;
-        self.reply(answer?, now_ns)
+        self.transmission(response?, now_ns)
     }
 
     /// A byte was received with a framing error: the request is damaged.
-    pub fn framing_error(&mut self, now_ns: u64) -> Option<Reply> {
+    pub fn framing_error(&mut self, now_ns: u64) -> Option<Transmission> {
         if self.is_deaf(now_ns) {
             return None;
         }
         self.deaf = true;
-        self.repeated = None;
-        self.reply(self.rejection(false, true), now_ns)
+        self.damaged();
+        let answers = self.config.answers_delimiter_error;
+        self.transmission(self.rejection(false, true), now_ns).filter(|_| answers)
+    }
+
+    fn damaged(&mut self) {
+        if self.config.damage_restarts_count {
+            self.repeated = None;
+        }
     }
 
     /// Whether what arrives now is the rest of a request that was already judged. A pause of half a field begins a new
-    /// request, so that nothing behind a damaged control field is ever taken for another command.
+    /// request, so that nothing after a damaged control field is ever taken for another command.
     fn is_deaf(&mut self, now_ns: u64) -> bool {
         let patience = u64::from(self.rate.fields_ns(1)).saturating_mul(3) / 2;
         if now_ns.saturating_sub(self.last_byte_ns) > patience {
@@ -218,68 +262,88 @@ impl<const PAGES: usize> Device<PAGES> {
     }
 
     /// One line bit was received, at `now_ns`; the line idles high.
-    pub fn bit(&mut self, level: bool, now_ns: u64) -> Option<Reply> {
+    pub fn bit(&mut self, level: bool, now_ns: u64) -> Option<Transmission> {
         let field = self.bits.push(level)?;
         let [byte, _] = field.content.to_le_bytes();
         if field.delimiter { self.byte(byte, now_ns) } else { self.framing_error(now_ns) }
     }
 
-    /// What a sound request does, and the answer to it.
+    /// What a sound request that ended at `now_ns` does, and the response to it.
     pub fn answer(&mut self, request: Request, now_ns: u64) -> Response {
+        let before = SingleTurn { sf: self.sf(), abs: self.single_turn() };
         self.count_resets(request.data_id(), now_ns);
-        let single = SingleTurn { sf: self.sf(), abs: self.single_turn() };
+        let after = SingleTurn { sf: self.sf(), abs: self.single_turn() };
+        let reset = if self.config.tenth_shows_effect { after } else { before };
         match request {
-            Request::Id0 => Response::Id0(single),
-            Request::Id1 => Response::Id1(MultiTurn { sf: self.sf(), abm: self.abm }),
-            Request::Id2 => Response::Id2(EncoderId { sf: self.sf(), enid: self.enid }),
-            Request::Id3 => Response::Id3(self.full(self.sf())),
-            Request::Id6 { adf, edf } => Response::Id6(self.write(adf.address(), edf, now_ns)),
-            Request::Id7 => Response::Id7(single),
-            Request::Id8 => Response::Id8(single),
-            Request::IdC => Response::IdC(single),
-            Request::IdD { adf } => Response::IdD(self.read(adf.address(), now_ns)),
+            Request::ReadSingleTurn => Response::ReadSingleTurn(after),
+            Request::ReadMultiTurn => Response::ReadMultiTurn(MultiTurn { sf: self.sf(), abm: self.abm }),
+            Request::ReadEncoderId => Response::ReadEncoderId(Identification { sf: self.sf(), enid: self.enid }),
+            Request::ReadAll => Response::ReadAll(self.all_data(self.sf())),
+            Request::WriteEeprom { adf, edf } => Response::WriteEeprom(self.write(adf.address(), edf, now_ns)),
+            Request::ResetErrors => Response::ResetErrors(reset),
+            Request::SetSingleTurnZero => Response::SetSingleTurnZero(reset),
+            Request::ResetTurnsAndErrors => Response::ResetTurnsAndErrors(reset),
+            Request::ReadEeprom { adf } => Response::ReadEeprom(self.read(adf.address(), now_ns)),
         }
     }
 
     fn sf(&self) -> StatusField {
-        StatusField::of_alarms(self.almc)
+        if self.config.leaves_status_zero { StatusField::empty() } else { StatusField::of_alarms(self.almc) }
     }
 
     /// ABS from the zero that ID 8 set, in the width that the encoder ID names (24 bits for an unknown ID).
-    fn single_turn(&self) -> U24 {
-        let bits = crate::Profile::from_enid(self.enid).map_or(24, |hint| hint.profile.abs_bits());
-        let mask = 1_u32.wrapping_shl(bits.into()).wrapping_sub(1);
-        U24::truncate(self.abs.get().wrapping_sub(self.zero.get()) & mask)
+    const fn single_turn(&self) -> Abs {
+        let bits = match Resolution::from_enid(self.enid) {
+            Some(hint) => hint.resolution.abs_bits(),
+            None => 24,
+        };
+        let mask = 1_u32.wrapping_shl(bits as u32).wrapping_sub(1);
+        Abs::truncate(self.abs.get().wrapping_sub(self.zero.get()) & mask)
     }
 
-    fn full(&self, sf: StatusField) -> Full {
-        Full { sf, abs: self.single_turn(), enid: self.enid, abm: self.abm, almc: self.almc }
+    fn all_data(&self, sf: StatusField) -> AllData {
+        AllData { sf, abs: self.single_turn(), enid: self.enid, abm: self.abm, almc: self.almc }
     }
 
     /// The ID 3 frame that answers a damaged request.
     fn rejection(&self, parity: bool, delimiter: bool) -> Response {
-        Response::Id3(self.full(self.sf().with_request_errors(parity, delimiter)))
+        let mut sf = self.sf();
+        sf.set(StatusField::CA0, parity);
+        sf.set(StatusField::CA1, delimiter);
+        Response::ReadAll(self.all_data(sf))
     }
 
-    /// Ten equal reset requests in a row, 40 us apart or more, do their work; any other request starts the count again.
+    /// Ten equal reset requests in a row, 40 us apart or more, do their work.
     fn count_resets(&mut self, id: DataId, now_ns: u64) {
-        let since = now_ns.saturating_sub(self.last_request_ns);
-        self.last_request_ns = now_ns;
-        if !matches!(id, DataId::Id7 | DataId::Id8 | DataId::IdC) {
-            self.repeated = None;
+        if !matches!(id, DataId::ResetErrors | DataId::SetSingleTurnZero | DataId::ResetTurnsAndErrors) {
+            if self.config.others_restart_count {
+                self.repeated = None;
+            }
             return;
         }
-        let continues = self.repeated == Some(id) && since >= u64::from(Reset::SPACING_NS);
+        let field_ns = u64::from(self.rate.fields_ns(1));
+        let begin_ns = now_ns.saturating_sub(field_ns);
+        let since_ns = begin_ns.saturating_sub(match self.config.reset_interval {
+            Interval::StartToStart => self.last_reset.0,
+            Interval::EndToStart => self.last_reset.1,
+        });
+        let response_ns = u64::from(self.config.response_delay_ns).saturating_add(field_ns.saturating_mul(6));
+        self.last_reset = (begin_ns, now_ns.saturating_add(response_ns));
+        let continues = self.repeated == Some(id) && since_ns >= 40_000;
         self.repeats = if continues { self.repeats.saturating_add(1) } else { 1 };
         self.repeated = Some(id);
-        if self.repeats < Reset::REQUESTS {
+        if self.repeats < 10 {
             return;
         }
         self.repeated = None;
+        self.effects = self.effects.saturating_add(1);
         match id {
-            DataId::Id8 => self.zero = self.abs,
-            DataId::IdC => {
-                self.abm = U24::truncate(0);
+            DataId::SetSingleTurnZero => {
+                self.zero = self.abs;
+                self.storing_until_ns = now_ns.saturating_add(STORING_NS);
+            }
+            DataId::ResetTurnsAndErrors => {
+                self.abm = Abm::truncate(0);
                 self.almc = self.causes;
             }
             _ => self.almc = self.causes,
@@ -288,35 +352,54 @@ impl<const PAGES: usize> Device<PAGES> {
 
     fn write(&mut self, address: Address, edf: u8, now_ns: u64) -> Memory {
         let busy = now_ns < self.busy_until_ns;
-        if !busy && address == Address::PAGE_REGISTER {
-            if usize::from(edf) < PAGES {
-                self.page = edf;
-            }
-        } else if !busy {
-            self.busy_until_ns = now_ns.saturating_add(EEPROM_BUSY_NS);
-            let page = self.eeprom.get_mut(usize::from(self.page));
-            if let Some(cell) = page.and_then(|page| page.get_mut(usize::from(address.get()))) {
+        if !busy {
+            if address == Address::PAGE_REGISTER {
+                self.select(edf);
+            } else if let Some(cell) = self.cell(address) {
                 *cell = edf;
+            }
+            if address != Address::PAGE_REGISTER || self.config.page_select_is_busy {
+                self.busy_until_ns = now_ns.saturating_add(STORING_NS);
             }
         }
         Memory { adf: Adf::of(address, busy), edf }
     }
 
-    fn read(&self, address: Address, now_ns: u64) -> Memory {
-        if now_ns < self.busy_until_ns {
-            return Memory { adf: Adf::of(address, true), edf: 0 };
+    fn select(&mut self, page: u8) {
+        let pages = u8::try_from(PAGES).unwrap_or(u8::MAX);
+        match self.config.absent_page {
+            AbsentPage::Wrapped => self.page = page.checked_rem(pages).unwrap_or(0),
+            AbsentPage::Ignored if page < pages => self.page = page,
+            AbsentPage::Ignored => {}
         }
-        let page = self.eeprom.get(usize::from(self.page));
-        let cell = page.and_then(|page| page.get(usize::from(address.get())));
-        Memory { adf: Adf::of(address, false), edf: cell.copied().unwrap_or(self.page) }
+    }
+
+    /// A cell of the page that is selected.
+    fn cell(&mut self, address: Address) -> Option<&mut u8> {
+        self.eeprom.get_mut(usize::from(self.page))?.get_mut(usize::from(address.get()))
+    }
+
+    fn read(&mut self, address: Address, now_ns: u64) -> Memory {
+        let page = self.page;
+        let held = self.cell(address).map_or(page, |cell| *cell);
+        let busy = now_ns < self.busy_until_ns;
+        let edf = match self.config.busy_data {
+            BusyData::Zeros if busy => 0,
+            BusyData::Ones if busy => 0xff,
+            _ => held,
+        };
+        Memory { adf: Adf::of(address, busy), edf }
     }
 
     /// The answer as it leaves, with the fault that is switched on.
-    fn reply(&self, response: Response, now_ns: u64) -> Option<Reply> {
+    fn transmission(&self, response: Response, now_ns: u64) -> Option<Transmission> {
         let sound = response.emit();
         let line = sound.line();
+        // The request that completes the ten is still answered.
+        let storing = now_ns < self.storing_until_ns && now_ns.saturating_add(STORING_NS) > self.storing_until_ns;
         let line = match self.fault {
             Fault::Silent => return None,
+            _ if storing && self.config.silent_while_storing => return None,
             Fault::FlipBit { at } if u32::from(at) < line.len() => flipped(line, 1_u128.wrapping_shl(at.into()))?,
             Fault::BadCrc => flipped(line, 0x1fe_u128.wrapping_shl(line.len().saturating_sub(Frame::FIELD_BITS)))?,
             Fault::CutAfter { fields } if (1..sound.fields()).contains(&fields) => {
@@ -326,7 +409,7 @@ impl<const PAGES: usize> Device<PAGES> {
         };
         let fields = u8::try_from(line.len() / Frame::FIELD_BITS).ok()?;
         let frame = Frame::from_line(line, fields).unwrap_or(sound);
-        Some(Reply { frame, line, at_ns: now_ns.saturating_add(RESPONSE_DELAY_NS.into()) })
+        Some(Transmission { frame, line, at_ns: now_ns.saturating_add(self.config.response_delay_ns.into()) })
     }
 }
 

@@ -1,255 +1,148 @@
-use crate::StatusField;
+use crate::status::StatusField;
 
-/// Why a frame was refused, a transaction failed, or a number does not fit.
-///
-/// Frames are checked in this order, and the first check that fails is the one reported:
-///
-/// 1. framing of every field in the order of the line: [`StartBit`](Self::StartBit),
-///    [`Delimiter`](Self::Delimiter), [`Truncated`](Self::Truncated);
-/// 2. the control field: [`SinkCode`](Self::SinkCode), [`Parity`](Self::Parity),
-///    [`UnknownDataId`](Self::UnknownDataId) in a request; [`CfMismatch`](Self::CfMismatch) or, at the end of all
-///    checks, [`Rejected`](Self::Rejected) in a response;
-/// 3. the number of fields: [`Truncated`](Self::Truncated);
-/// 4. the check field: [`Crc`](Self::Crc);
-/// 5. the EEPROM echo: [`AddressMismatch`](Self::AddressMismatch), [`DataMismatch`](Self::DataMismatch).
-///
-/// Fields count from 0, the control field.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-#[non_exhaustive]
-pub enum Error {
-    /// A start bit reads 1.
-    #[error("field {field}: the start bit is 1")]
-    StartBit {
-        /// First field with this fault.
-        field: u8,
-    },
-    /// A delimiter reads 0.
-    #[error("field {field}: the delimiter is 0")]
-    Delimiter {
-        /// First field with this fault.
-        field: u8,
-    },
-    /// The frame ends too early, or the next field did not come in time.
-    #[error("the frame ends after {got} of {want} fields")]
-    Truncated {
-        /// Whole fields that were there.
-        got: u8,
-        /// Fields of the whole frame.
-        want: u8,
-    },
-    /// The control field does not begin with the sink code 0, 1, 0.
-    #[error("control field {cf:#04x}: the sink code is not 010")]
-    SinkCode {
-        /// The control field.
-        cf: u8,
-    },
-    /// The parity of the control field is odd.
-    #[error("control field {cf:#04x}: the parity is wrong")]
-    Parity {
-        /// The control field.
-        cf: u8,
-    },
-    /// The control field is well formed, but its data ID is none of the nine documented ones.
-    #[error("data ID {code:X} is not documented")]
-    UnknownDataId {
-        /// The four bits of the data ID.
-        code: u8,
-    },
-    /// The response answers another data ID than was asked for.
-    #[error("the response has control field {got:#04x}, the request had {want:#04x}")]
-    CfMismatch {
-        /// Control field of the response.
-        got: u8,
-        /// Control field of the request.
-        want: u8,
-    },
-    /// The encoder refused the request: it answered with a sound ID 3 frame that was not asked for.
-    #[error("the encoder refused the request: ID 3 response with status {sf}")]
-    Rejected {
-        /// Status of that frame; ca0 and ca1 name the damage.
-        sf: StatusField,
-    },
-    /// The check field is not the XOR of the fields before it.
-    #[error("the check field is {got:#04x}, computed {want:#04x}")]
-    Crc {
-        /// Received.
-        got: u8,
-        /// Computed over the received fields.
-        want: u8,
-    },
-    /// An EEPROM response speaks of another address.
-    #[error("the response is for EEPROM address {got:#04x}, asked was {want:#04x}")]
-    AddressMismatch {
-        /// Address in the response.
-        got: u8,
-        /// Address in the request.
-        want: u8,
-    },
-    /// The response to an EEPROM write repeats another data byte.
-    #[error("the response repeats EEPROM data {got:#04x}, written was {want:#04x}")]
-    DataMismatch {
-        /// Data in the response.
-        got: u8,
-        /// Data in the request.
-        want: u8,
-    },
-    /// On a half-duplex line the request did not come back as it was sent.
-    #[error("byte {at} of the echo is {got:#04x}, sent was {want:#04x}")]
-    EchoMismatch {
-        /// Index of the byte in the request.
-        at: u8,
-        /// Received.
-        got: u8,
-        /// Sent.
-        want: u8,
-    },
-    /// No response within the time-out.
-    #[error("{}", if *.echo { "only the own request came back: no encoder, or the wires A and B are exchanged" } else { "no response" })]
-    NoResponse {
-        /// Whether the own request was received: the line works, but nobody answers on it.
-        echo: bool,
-    },
-    /// The EEPROM stayed busy, or the encoder did not take a value, after all tries.
-    #[error("the EEPROM was still busy after {tries} requests")]
-    Busy {
-        /// Requests made.
-        tries: u16,
-    },
-    /// A data field has bits set above the width of the encoder: the wrong profile, or a damaged frame.
-    #[error("data field {value:#08x} has bits set that this encoder leaves 0: {excess:#08x}")]
-    UpperBits {
-        /// The 24-bit field.
-        value: u32,
-        /// Those of its bits that must be 0.
-        excess: u32,
-    },
-    /// A `nom` combinator of the caller refused the input.
-    #[error("a parser combinator refused the input")]
-    Combinator,
-}
-
-/// The kind of an [`Error`], for counters and statistics.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-#[non_exhaustive]
-#[allow(missing_docs, reason = "each stands for the error of the same name")]
-pub enum ErrorClass {
-    StartBit,
-    Delimiter,
-    Truncated,
-    SinkCode,
-    Parity,
-    UnknownDataId,
-    CfMismatch,
-    Rejected,
-    Crc,
-    AddressMismatch,
-    DataMismatch,
-    EchoMismatch,
-    NoResponse,
-    Busy,
-    UpperBits,
-    Combinator,
-}
-
-impl ErrorClass {
-    /// All classes, in the order of the checks.
-    pub const ALL: [Self; 16] = [
-        Self::StartBit,
-        Self::Delimiter,
-        Self::Truncated,
-        Self::SinkCode,
-        Self::Parity,
-        Self::UnknownDataId,
-        Self::CfMismatch,
-        Self::Rejected,
-        Self::Crc,
-        Self::AddressMismatch,
-        Self::DataMismatch,
-        Self::EchoMismatch,
-        Self::NoResponse,
-        Self::Busy,
-        Self::UpperBits,
-        Self::Combinator,
-    ];
-
-    /// The name in lower case, as logs and test vectors spell it.
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::StartBit => "start_bit",
-            Self::Delimiter => "delimiter",
-            Self::Truncated => "truncated",
-            Self::SinkCode => "sink_code",
-            Self::Parity => "parity",
-            Self::UnknownDataId => "unknown_data_id",
-            Self::CfMismatch => "cf_mismatch",
-            Self::Rejected => "rejected",
-            Self::Crc => "crc",
-            Self::AddressMismatch => "address_mismatch",
-            Self::DataMismatch => "data_mismatch",
-            Self::EchoMismatch => "echo_mismatch",
-            Self::NoResponse => "no_response",
-            Self::Busy => "busy",
-            Self::UpperBits => "upper_bits",
-            Self::Combinator => "combinator",
-        }
+servowire_core::errors! {
+    /// Why a frame was refused, a transaction failed, or a number does not fit.
+    ///
+    /// Frames are checked in this order, and the first check that fails is the one reported:
+    ///
+    /// 1. framing of every field in the order of the line: [`StartBit`](Self::StartBit),
+    ///    [`Delimiter`](Self::Delimiter), [`Truncated`](Self::Truncated);
+    /// 2. the control field: [`SinkCode`](Self::SinkCode), [`Parity`](Self::Parity),
+    ///    [`UnknownDataId`](Self::UnknownDataId) in a request; [`CfMismatch`](Self::CfMismatch) or, at the end of all
+    ///    checks, [`Rejected`](Self::Rejected) in a response;
+    /// 3. the number of fields: [`Truncated`](Self::Truncated);
+    /// 4. the check field: [`Crc`](Self::Crc);
+    /// 5. the EEPROM echo: [`AddressMismatch`](Self::AddressMismatch), [`DataMismatch`](Self::DataMismatch).
+    ///
+    /// Fields count from 0, the control field.
+    pub enum Error {
+        /// A start bit reads 1.
+        #[error("field {field}: the start bit is 1")]
+        StartBit {
+            /// First field with this fault.
+            field: u8,
+        },
+        /// A delimiter reads 0.
+        #[error("field {field}: the delimiter is 0")]
+        Delimiter {
+            /// First field with this fault.
+            field: u8,
+        },
+        /// The frame ends too early, or the next field did not come in time.
+        #[error("the frame ends after {got} of {want} fields")]
+        Truncated {
+            /// Whole fields that were there.
+            got: u16,
+            /// Fields of the whole frame.
+            want: u16,
+        },
+        /// The control field does not begin with the sink code 0, 1, 0.
+        #[error("control field {cf:#04x}: the sink code is not 010")]
+        SinkCode {
+            /// The control field.
+            cf: u8,
+        },
+        /// The parity of the control field is odd.
+        #[error("control field {cf:#04x}: the parity is wrong")]
+        Parity {
+            /// The control field.
+            cf: u8,
+        },
+        /// The control field is well formed, but its data ID is none of the nine documented ones.
+        #[error("data ID {code:X} is not documented")]
+        UnknownDataId {
+            /// The four bits of the data ID.
+            code: u8,
+        },
+        /// The response answers another data ID than was asked for.
+        #[error("the response has control field {got:#04x}, the request had {want:#04x}")]
+        CfMismatch {
+            /// Control field of the response.
+            got: u8,
+            /// Control field of the request.
+            want: u8,
+        },
+        /// The encoder refused the request: it answered with a sound ID 3 frame that was not asked for.
+        #[error("the encoder refused the request: ID 3 response with status [{sf}]")]
+        Rejected {
+            /// Status of that frame; CA0 and CA1 name the damage.
+            sf: StatusField,
+        },
+        /// The check field is not the XOR of the fields before it.
+        #[error("the check field is {got:#04x}, computed {want:#04x}")]
+        Crc {
+            /// Received.
+            got: u8,
+            /// Computed over the received fields.
+            want: u8,
+        },
+        /// An EEPROM response speaks of another address.
+        #[error("the response is for EEPROM address {got:#04x}, asked was {want:#04x}")]
+        AddressMismatch {
+            /// Address in the response.
+            got: u8,
+            /// Address in the request.
+            want: u8,
+        },
+        /// The response to an EEPROM write repeats another data byte, or a byte that was written reads back as another.
+        #[error("the EEPROM data is {got:#04x}, written was {want:#04x}")]
+        DataMismatch {
+            /// Data in the response.
+            got: u8,
+            /// Data in the request.
+            want: u8,
+        },
+        /// On a half-duplex line the request did not come back as it was sent.
+        #[error("byte {at} of the echo is {got:#04x}, sent was {want:#04x}")]
+        EchoMismatch {
+            /// Index of the byte in the request.
+            at: u8,
+            /// Received.
+            got: u8,
+            /// Sent.
+            want: u8,
+        },
+        /// No response within the time-out.
+        #[error("{}", if *.echo { "only the own request came back: no encoder, or the wires A and B are exchanged" } else { "no response" })]
+        NoResponse {
+            /// Whether the own request was received: the line works, but nobody answers on it.
+            echo: bool,
+        },
+        /// The EEPROM stayed busy, or the encoder did not take a value, after all tries.
+        #[error("the EEPROM was still busy after {tries} requests")]
+        Busy {
+            /// Requests made.
+            tries: u16,
+        },
+        /// The act was not done: fewer requests than it needs can have been taken, or the read-back shows it.
+        #[error("not done, after {sent} requests: {because}")]
+        NotDone {
+            /// Requests that the encoder may have taken.
+            sent: u8,
+            /// How it failed.
+            because: ErrorClass,
+        },
+        /// Whether the act was done is not known. Read back what can be read before it is tried again.
+        #[error("whether it was done is not known: {because}")]
+        EffectUnknown {
+            /// How it failed.
+            because: ErrorClass,
+        },
+        /// A data field has bits set above the width of the encoder: the wrong resolution, or a damaged frame.
+        #[error("data field {value:#08x} has bits set that this encoder leaves 0: {excess:#08x}")]
+        UpperBits {
+            /// The 24-bit field.
+            value: u32,
+            /// Those of its bits that must be 0.
+            excess: u32,
+        },
+        /// A `nom` combinator of the caller refused the input.
+        #[error("a parser combinator refused the input")]
+        Combinator,
     }
 }
 
-impl Error {
-    /// The kind of this error.
-    pub const fn class(self) -> ErrorClass {
-        match self {
-            Self::StartBit { .. } => ErrorClass::StartBit,
-            Self::Delimiter { .. } => ErrorClass::Delimiter,
-            Self::Truncated { .. } => ErrorClass::Truncated,
-            Self::SinkCode { .. } => ErrorClass::SinkCode,
-            Self::Parity { .. } => ErrorClass::Parity,
-            Self::UnknownDataId { .. } => ErrorClass::UnknownDataId,
-            Self::CfMismatch { .. } => ErrorClass::CfMismatch,
-            Self::Rejected { .. } => ErrorClass::Rejected,
-            Self::Crc { .. } => ErrorClass::Crc,
-            Self::AddressMismatch { .. } => ErrorClass::AddressMismatch,
-            Self::DataMismatch { .. } => ErrorClass::DataMismatch,
-            Self::EchoMismatch { .. } => ErrorClass::EchoMismatch,
-            Self::NoResponse { .. } => ErrorClass::NoResponse,
-            Self::Busy { .. } => ErrorClass::Busy,
-            Self::UpperBits { .. } => ErrorClass::UpperBits,
-            Self::Combinator => ErrorClass::Combinator,
-        }
-    }
-}
-
-impl nrz_line::Classified for ErrorClass {
-    fn class_index(&self) -> usize {
-        *self as usize
-    }
-}
-
-impl nrz_line::Classified for Error {
-    fn class_index(&self) -> usize {
-        self.class().class_index()
-    }
-}
-
-impl<I> nom::error::ParseError<I> for Error {
-    fn from_error_kind(_: I, _: nom::error::ErrorKind) -> Self {
-        Self::Combinator
-    }
-
-    fn append(_: I, _: nom::error::ErrorKind, other: Self) -> Self {
-        other
-    }
-}
-
-impl<I> nom::error::FromExternalError<I, Self> for Error {
-    fn from_external_error(_: I, _: nom::error::ErrorKind, error: Self) -> Self {
-        error
-    }
-}
+servowire_core::nom_error!(Error);
 
 #[cfg(test)]
 mod tests {
@@ -257,21 +150,11 @@ mod tests {
     use std::string::ToString;
 
     #[test]
-    fn an_error_fits_two_words_of_a_32_bit_core_and_a_half() {
-        assert!(size_of::<Error>() <= 2 * size_of::<u64>());
-        assert!(size_of::<Result<(), Error>>() <= 2 * size_of::<u64>());
-    }
-
-    #[test]
-    fn every_class_has_a_place_of_its_own() {
-        use nrz_line::Classified;
-        assert!(ErrorClass::ALL.iter().enumerate().all(|(k, class)| class.class_index() == k));
-    }
-
-    #[test]
     fn messages_are_sentences_for_a_person() {
         assert_eq!(Error::Crc { got: 0x12, want: 0x34 }.to_string(), "the check field is 0x12, computed 0x34");
         assert!(Error::NoResponse { echo: true }.to_string().contains("A and B"));
         assert_eq!(Error::NoResponse { echo: false }.to_string(), "no response");
+        let rejected = Error::Rejected { sf: StatusField::CA0 };
+        assert_eq!(rejected.to_string(), "the encoder refused the request: ID 3 response with status [CA0]");
     }
 }

@@ -1,6 +1,8 @@
+use core::fmt;
+
 use nrz_line::{BitOrder, Window};
 
-use crate::Error;
+use crate::error::Error;
 
 /// The fields of one frame, 1 to 11 data bytes.
 ///
@@ -13,7 +15,6 @@ use crate::Error;
 ///  frame bit      0   1                    8   9   10  11        field k begins at bit 10 k
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Frame {
     bytes: [u8; Frame::MAX_FIELDS],
     len: u8,
@@ -117,6 +118,26 @@ impl Frame {
     }
 }
 
+impl fmt::Display for Frame {
+    /// The bytes in hexadecimal: `1A 20 29`.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        for (at, byte) in self.as_bytes().iter().enumerate() {
+            write!(f, "{}{byte:02X}", if at > 0 { " " } else { "" })?;
+        }
+        Ok(())
+    }
+}
+
+#[cfg(feature = "defmt")]
+#[cfg_attr(docsrs, doc(cfg(feature = "defmt")))]
+impl defmt::Format for Frame {
+    fn format(&self, f: defmt::Formatter<'_>) {
+        for (at, byte) in self.as_bytes().iter().enumerate() {
+            defmt::write!(f, "{=str}{=u8:02X}", if at > 0 { " " } else { "" }, byte);
+        }
+    }
+}
+
 /// The mask of the first `bits` bits.
 const fn first(bits: u32) -> u128 {
     match 1_u128.checked_shl(bits) {
@@ -154,6 +175,22 @@ pub(crate) const fn faults11(line: u128) -> u32 {
     let sum = a ^ b ^ c ^ d;
     let crc = (sum >> 1 ^ sum >> 11 ^ sum >> 21) & 0xff;
     starts | delimiters | crc
+}
+
+/// As [`faults11`], for the six fields in the low 60 bits.
+#[inline(always)]
+pub(crate) const fn faults6(line: u128) -> u32 {
+    let [a, b, ..] = groups(line);
+    let sum = a ^ b;
+    let crc = (sum >> 1 ^ sum >> 11 ^ sum >> 21) & 0xff;
+    (a | b) & START3 | !(a & b) & DELIMITER3 | crc
+}
+
+/// As [`faults11`], for the four fields in the low 40 bits.
+#[inline(always)]
+pub(crate) const fn faults4(line: u128) -> u32 {
+    // In place of the fifth and sixth field there are framed ones with the data bits 0.
+    faults6(line & first(40) | (1 << 9 | 1 << 19) << 40)
 }
 
 /// The data bytes of eleven fields, each with a constant shift.
@@ -206,6 +243,11 @@ pub(crate) fn load(bytes: &[u8; Frame::MAX_LINE_BYTES], order: BitOrder) -> u128
     }
 }
 
+/// How many fields there are, as an error tells it.
+pub(crate) fn count(bytes: &[u8]) -> u16 {
+    u16::try_from(bytes.len()).unwrap_or(u16::MAX)
+}
+
 /// Off the hot path: names the first fault of the framing in a line that should hold `fields` fields.
 #[cold]
 pub(crate) fn framing(line: Window, fields: u8) -> Error {
@@ -214,18 +256,19 @@ pub(crate) fn framing(line: Window, fields: u8) -> Error {
         match (line.get(at), line.get(at.wrapping_add(9))) {
             (Some(true), _) => return Error::StartBit { field },
             (_, Some(false)) => return Error::Delimiter { field },
-            (_, None) => return Error::Truncated { got: field, want: fields },
+            (_, None) => return Error::Truncated { got: field.into(), want: fields.into() },
             _ => {}
         }
     }
     // Never: the caller saw a fault.
-    Error::Truncated { got: fields, want: fields }
+    Error::Truncated { got: fields.into(), want: fields.into() }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use proptest::prelude::*;
+    use std::string::ToString;
 
     /// Line bits of a frame, field by field and bit by bit.
     fn slow_line(bytes: &[u8]) -> u128 {
@@ -258,6 +301,10 @@ mod tests {
             let window = Window::from_bits(line, 110).unwrap();
             let by_field = Frame::from_line(window, 11).is_ok_and(|frame| crate::crc(frame.as_bytes()) == 0);
             prop_assert_eq!(faults11(line) == 0, by_field);
+            for (fields, found) in [(6, faults6(line)), (4, faults4(line))] {
+                let by_field = Frame::from_line(window, fields).is_ok_and(|frame| crate::crc(frame.as_bytes()) == 0);
+                prop_assert_eq!(found == 0, by_field);
+            }
         }
 
         /// Every framing bit of every field, flipped alone, is named; every length short of the frame is told.
@@ -273,7 +320,7 @@ mod tests {
             }
             for short in 0..len {
                 let cut = Window::from_bits(line, short).unwrap();
-                let want = Error::Truncated { got: (short / 10) as u8, want: frame.fields() };
+                let want = Error::Truncated { got: (short / 10) as u16, want: frame.fields().into() };
                 prop_assert_eq!(Frame::from_line(cut, frame.fields()), Err(want));
             }
         }
@@ -283,5 +330,6 @@ mod tests {
     fn sizes() {
         assert_eq!((Frame::new(&[]), Frame::new(&[0; 12])), (None, None));
         assert_eq!(Frame::new(&[7; 11]).unwrap().as_bytes(), [7; 11]);
+        assert_eq!(Frame::new(&[0x1a, 0, 0xc8]).unwrap().to_string(), "1A 00 C8");
     }
 }

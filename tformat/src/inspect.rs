@@ -6,20 +6,26 @@
 //!
 //! ```
 //! use tformat::inspect::{Cause, inspect};
-//! use tformat::{Request, Response, SingleTurn, StatusField, U24};
+//! use tformat::{Abs, Request, Response, SingleTurn, StatusField};
 //!
-//! let answer = Response::Id0(SingleTurn { sf: StatusField::new(0), abs: U24::truncate(0x1d4b) });
+//! let answer = Response::ReadSingleTurn(SingleTurn { sf: StatusField::empty(), abs: Abs::truncate(0x1d4b) });
 //! // A and B exchanged: every level is inverted
-//! let report = inspect(Request::Id0, answer.emit().line().inverted());
+//! let report = inspect(Request::ReadSingleTurn, answer.emit().line().inverted());
 //! assert_eq!(report.cause, Some(Cause::LineInverted));
 //! assert_eq!(report.response, Some(answer));
 //! ```
 
 use core::fmt;
 
-use nrz_line::{BitOrder, Window};
+use nrz_line::Window;
 
-use crate::{ControlField, DataId, Error, ErrorClass, Frame, Request, Response, crc};
+use crate::crc::crc;
+use crate::data_id::{ControlField, DataId};
+use crate::error::{Error, ErrorClass};
+use crate::frame::Frame;
+use crate::master::parse_echoed;
+use crate::request::Request;
+use crate::response::Response;
 
 /// One field, read without judging it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -82,7 +88,7 @@ impl fmt::Display for Cause {
             Self::OwnEcho => f.write_str("the own request came back before the answer: remove the echo"),
             Self::OnlyEcho => f.write_str("only the own request came back: no encoder, or A and B are exchanged"),
             Self::HalfRate => f.write_str("the line runs at half the assumed bit rate"),
-            Self::OtherDataId { answered } => write!(f, "this is a sound answer to ID {:X}", answered.code()),
+            Self::OtherDataId { answered } => write!(f, "this is a sound response to {answered}"),
             Self::RequestRefused => f.write_str("the encoder found the request damaged and answered with ID 3"),
             Self::StuckLow => f.write_str("the line stays at 0"),
             Self::StuckHigh => f.write_str("the line stays at 1: nobody answers"),
@@ -92,30 +98,7 @@ impl fmt::Display for Cause {
 }
 
 /// The kinds of faults found, as a set.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub struct Findings(u32);
-
-impl Findings {
-    /// Whether a fault of this kind was found.
-    pub const fn has(self, class: ErrorClass) -> bool {
-        self.0 >> class as u32 & 1 == 1
-    }
-
-    /// Whether none was found.
-    pub const fn is_empty(self) -> bool {
-        self.0 == 0
-    }
-
-    /// The kinds that were found, in the order of the checks.
-    pub fn classes(self) -> impl Iterator<Item = ErrorClass> {
-        ErrorClass::ALL.into_iter().filter(move |class| self.has(*class))
-    }
-
-    const fn add(&mut self, class: ErrorClass) {
-        self.0 |= 1 << class as u32;
-    }
-}
+pub type Findings = servowire_core::Findings<ErrorClass>;
 
 /// What there is to say about a line.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -169,7 +152,7 @@ pub fn inspect_bytes(request: Request, bytes: &[u8]) -> Report {
     let line = bytes.get(..end).and_then(Frame::new).map_or(Window::EMPTY, Frame::line);
     let mut report = inspect(request, line);
     // An echo in front pushes the end of the answer out of the eleven fields.
-    if let Ok(response) = crate::master::parse_echoed(request, bytes) {
+    if let Ok(response) = parse_echoed(request, bytes) {
         report.cause = Some(Cause::OwnEcho);
         report.response = Some(response);
     }
@@ -177,7 +160,7 @@ pub fn inspect_bytes(request: Request, bytes: &[u8]) -> Report {
 }
 
 fn contradicts(response: Option<Response>) -> bool {
-    matches!(response, Some(Response::Id3(full)) if !full.sf.agrees_with(full.almc))
+    matches!(response, Some(Response::ReadAll(full)) if !full.sf.agrees_with(full.almc))
 }
 
 /// Undoes the usual mistakes one by one; the first that gives a sound answer is the cause.
@@ -185,7 +168,7 @@ fn diagnose(request: Request, line: Window, error: Error) -> (Option<Cause>, Opt
     let all_ones = line.inverted().bits() == 0;
     match error {
         Error::Rejected { .. } => {
-            let response = Response::parse_line(Request::Id3, line).ok();
+            let response = Response::parse_line(Request::ReadAll, line).ok();
             return (Some(Cause::RequestRefused), response);
         }
         _ if line.is_empty() || all_ones => return (Some(Cause::StuckHigh), None),
@@ -195,7 +178,7 @@ fn diagnose(request: Request, line: Window, error: Error) -> (Option<Cause>, Opt
     let sound = |line: Option<Window>| line.and_then(|line| Response::parse_line(request, line).ok());
     let attempts = [
         (Cause::LineInverted, sound(Some(line.inverted()))),
-        (Cause::WrongBitOrder, sound(reordered(line))),
+        (Cause::WrongBitOrder, sound(Some(line.reordered()))),
         (Cause::OwnEcho, echo(request, line).and_then(|answer| sound(Some(answer)))),
         (Cause::HalfRate, half_rate(request, line)),
     ];
@@ -217,11 +200,6 @@ fn diagnose(request: Request, line: Window, error: Error) -> (Option<Cause>, Opt
     (disturbed.then_some(Cause::Disturbed), None)
 }
 
-/// The line with the bits of every byte in the other order.
-fn reordered(line: Window) -> Option<Window> {
-    Window::read(&line.to_bytes(BitOrder::LsbFirst), 0, line.len(), BitOrder::MsbFirst).ok()
-}
-
 /// What follows the own request and the turn-round, if the line begins with the request; nothing is left if nobody answers.
 fn echo(request: Request, line: Window) -> Option<Window> {
     let sent = request.emit().line();
@@ -232,18 +210,15 @@ fn echo(request: Request, line: Window) -> Option<Window> {
     if same { rest.skip(turn_round) } else { None }
 }
 
-/// The answer if every second bit of the line is one bit of it: as far as the window reaches, 64 bits.
+/// The response if every second bit of the line is one bit of it: as far as the window reaches, 64 bits.
 fn half_rate(request: Request, line: Window) -> Option<Response> {
-    let mut bits = 0_u128;
-    let len = line.len() / 2;
-    for at in 0..len {
-        let (first, second) = (line.get(at.wrapping_mul(2))?, line.get(at.wrapping_mul(2).wrapping_add(1))?);
-        if first != second {
-            return None;
-        }
-        bits |= u128::from(first) << at;
+    let (first, second) = (line.decimated(), line.skip(1)?.decimated());
+    // Both samples of each bit are the same.
+    let pairs = Window::from_bits(first.bits(), line.len() / 2)?;
+    if pairs.bits() != second.bits() & !u128::MAX.checked_shl(pairs.len()).unwrap_or(0) {
+        return None;
     }
-    Response::parse_line(request, Window::from_bits(bits, len)?).ok()
+    Response::parse_line(request, pairs).ok()
 }
 
 /// How far the frame is from where it was looked for. Missing bits are completed with idle line at the end.
@@ -251,7 +226,7 @@ fn shifted(request: Request, line: Window) -> Option<(i8, Response)> {
     let need = u32::from(request.data_id().response_fields()).wrapping_mul(Frame::FIELD_BITS);
     for bits in 1..=9_i8 {
         let by = u32::from(bits.unsigned_abs());
-        let late = line.skip(by).and_then(|late| padded(late, need));
+        let late = line.skip(by).and_then(|late| late.padded(need));
         if let Some(response) = late.and_then(|late| Response::parse_line(request, late).ok()) {
             return Some((bits, response));
         }
@@ -259,14 +234,6 @@ fn shifted(request: Request, line: Window) -> Option<(i8, Response)> {
     // One bit missing: it was the start bit.
     let early = Window::from_bits(line.bits() << 1, line.len().wrapping_add(1).min(Window::MAX_LEN))?;
     Response::parse_line(request, early).ok().map(|response| (-1, response))
-}
-
-/// The line followed by idle bits up to `len`.
-fn padded(line: Window, len: u32) -> Option<Window> {
-    if line.len() >= len {
-        return Some(line);
-    }
-    Window::from_bits(line.bits() | u128::MAX.checked_shl(line.len())?, len)
 }
 
 /// A sound answer to something else.
@@ -296,29 +263,29 @@ fn raw_fields(line: Window, want: u8) -> ([RawField; Frame::MAX_FIELDS], u8) {
 fn findings(request: Request, report: &Report) -> Findings {
     let mut found = Findings::default();
     if let Some(error) = report.error {
-        found.add(error.class());
+        found.insert(error.class());
     }
     let mut bytes = [0; Frame::MAX_FIELDS];
     for (byte, field) in bytes.iter_mut().zip(report.fields()) {
         *byte = field.byte;
         if !field.start_ok {
-            found.add(ErrorClass::StartBit);
+            found.insert(ErrorClass::StartBit);
         }
         if !field.delimiter_ok {
-            found.add(ErrorClass::Delimiter);
+            found.insert(ErrorClass::Delimiter);
         }
     }
     let bytes = bytes.get(..usize::from(report.len)).unwrap_or(&bytes);
     let id = request.data_id();
     match bytes.first().map(|cf| (*cf, ControlField::parse(*cf))) {
-        Some((_, Err(error))) => found.add(error.class()),
-        Some((cf, Ok(_))) if cf != id.control_field().get() => found.add(ErrorClass::CfMismatch),
+        Some((_, Err(error))) => found.insert(error.class()),
+        Some((cf, Ok(_))) if cf != id.control_field().get() => found.insert(ErrorClass::CfMismatch),
         _ => {}
     }
     if report.len < id.response_fields() {
-        found.add(ErrorClass::Truncated);
+        found.insert(ErrorClass::Truncated);
     } else if crc(bytes) != 0 {
-        found.add(ErrorClass::Crc);
+        found.insert(ErrorClass::Crc);
     }
     found
 }
@@ -336,7 +303,7 @@ mod tests {
 
     /// The line in its own length, then idle up to `len`.
     fn idle_after(line: Window, len: u32) -> Window {
-        padded(line, len).unwrap()
+        line.padded(len).unwrap()
     }
 
     proptest! {
@@ -357,7 +324,7 @@ mod tests {
             let early = idle_after(line.skip(1).unwrap(), line.len());
             let cases = [
                 (line.inverted(), Cause::LineInverted),
-                (reordered(idle_after(line, line.len().next_multiple_of(8))).unwrap(), Cause::WrongBitOrder),
+                (idle_after(line, line.len().next_multiple_of(8)).reordered(), Cause::WrongBitOrder),
                 (late, Cause::Shifted { bits: shift as i8 }),
                 (early, Cause::Shifted { bits: -1 }),
             ];
@@ -373,7 +340,7 @@ mod tests {
             let (sent, line) = (request.emit().line(), response.emit().line());
             let only = inspect(request, idle_after(sent, line.len().max(sent.len() + 10)));
             // The echo of a write to the EEPROM is what its answer looks like.
-            if request.data_id() != DataId::Id6 {
+            if request.data_id() != DataId::WriteEeprom {
                 prop_assert_eq!(only.cause, Some(Cause::OnlyEcho));
                 let bytes = [request.emit().as_bytes(), response.emit().as_bytes()].concat();
                 let both = inspect_bytes(request, &bytes);
@@ -395,7 +362,7 @@ mod tests {
             prop_assume!(asked.data_id() != other.data_id());
             let report = inspect(other, idle_after(response.emit().line(), 120));
             let want = match response {
-                Response::Id3(_) => Cause::RequestRefused,
+                Response::ReadAll(_) => Cause::RequestRefused,
                 _ => Cause::OtherDataId { answered: asked.data_id() },
             };
             prop_assert_eq!((report.cause, report.response), (Some(want), Some(response)));
@@ -411,17 +378,17 @@ mod tests {
 
     #[test]
     fn stuck_lines() {
-        assert_eq!(inspect(Request::Id0, window(0, 110)).cause, Some(Cause::StuckLow));
-        assert_eq!(inspect(Request::Id0, window(u128::MAX, 110)).cause, Some(Cause::StuckHigh));
-        assert_eq!(inspect(Request::Id0, Window::EMPTY).cause, Some(Cause::StuckHigh));
+        assert_eq!(inspect(Request::ReadSingleTurn, window(0, 110)).cause, Some(Cause::StuckLow));
+        assert_eq!(inspect(Request::ReadSingleTurn, window(u128::MAX, 110)).cause, Some(Cause::StuckHigh));
+        assert_eq!(inspect(Request::ReadSingleTurn, Window::EMPTY).cause, Some(Cause::StuckHigh));
     }
 
     #[test]
     fn all_faults_are_listed() {
         let mut line = Frame::new(&[0x02, 0x20, 0xb4, 0xbd, 0x1c, 0x36]).unwrap().line().bits();
         line ^= 1 << 20 | 1 << 39;
-        let report = inspect(Request::Id0, window(line, 60));
-        assert!(report.findings.classes().eq([ErrorClass::StartBit, ErrorClass::Delimiter, ErrorClass::Crc]));
+        let report = inspect(Request::ReadSingleTurn, window(line, 60));
+        assert!(report.findings.iter().eq([ErrorClass::StartBit, ErrorClass::Delimiter, ErrorClass::Crc]));
         assert_eq!(report.error, Some(Error::StartBit { field: 2 }));
         assert!(!report.fields()[2].start_ok && !report.fields()[3].delimiter_ok);
     }
@@ -430,12 +397,15 @@ mod tests {
     fn status_that_contradicts_the_alarms() {
         let mut answer = [0x1a, 0x00, 0, 0, 0, 0x17, 0, 0, 0, 0xc8, 0];
         answer[10] = crc(&answer);
-        assert!(inspect_bytes(Request::Id3, &answer).status_contradicts_alarms);
+        assert!(inspect_bytes(Request::ReadAll, &answer).status_contradicts_alarms);
     }
 
     #[test]
     fn causes_are_sentences() {
         assert_eq!(Cause::Shifted { bits: -1 }.to_string(), "1 bit(s) at the beginning of the frame are missing");
-        assert_eq!(Cause::OtherDataId { answered: DataId::IdC }.to_string(), "this is a sound answer to ID C");
+        assert_eq!(
+            Cause::OtherDataId { answered: DataId::ResetTurnsAndErrors }.to_string(),
+            "this is a sound response to ID C"
+        );
     }
 }

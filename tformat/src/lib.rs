@@ -6,34 +6,41 @@
 #[cfg(any(test, feature = "std"))]
 extern crate std;
 
+mod address;
 pub mod clb;
-mod control;
+mod count;
 mod crc;
+mod data_id;
 pub mod device;
+mod doubt;
 mod error;
 mod frame;
 pub mod inspect;
 pub mod master;
-mod profile;
+mod message;
 mod request;
+mod resolution;
 mod response;
+mod show;
 pub mod spi;
 mod status;
 pub mod stream;
 mod timing;
 mod vendor;
 
-pub use control::{ControlField, DataId};
+pub use address::{Address, Adf, Page};
+pub use count::{Abm, Abs};
 pub use crc::crc;
+pub use data_id::{ControlField, DataId};
+pub use doubt::{Doubt, Policy};
 pub use error::{Error, ErrorClass};
 pub use frame::Frame;
-pub use nrz_line::{BitOrder, TooWide, Window};
-pub use profile::{Hint, Position, Profile, WidthError};
-pub use request::{Address, Adf, NotAnAddress, Request};
-pub use response::{EncoderId, Full, Memory, MultiTurn, Response, SingleTurn};
-pub use status::{Alarm, Almc, StatusField};
+pub use message::{AllData, Identification, Memory, MultiTurn, SingleTurn};
+pub use nrz_line::{BitOrder, Window};
+pub use request::Request;
+pub use resolution::{Hint, Position, Resolution};
+pub use response::Response;
+pub use servowire_core::OutOfRange;
+pub use status::{Almc, StatusField};
 pub use timing::{BitRate, RESPONSE_DELAY_NS};
 pub use vendor::VendorCommand;
-
-/// A 24-bit data field: ABS (single-turn) or ABM (multi-turn) as it comes, low byte first on the line.
-pub type U24 = nrz_line::Unsigned<24>;

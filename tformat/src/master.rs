@@ -1,43 +1,52 @@
 //! The controller's side as state machines without I/O: they are told what arrived and what time it is, and say what
 //! to do next. Time is a count of nanoseconds from any origin.
 //!
-//! * [`Transaction`] takes one request to its answer: own echo, time-outs, all checks.
-//! * [`Reset`] and [`EepromAccess`] are made of several transactions and drive them by [`Step`].
+//! * [`Transaction`] takes one request to its response: time-outs, echoes, late interrupts, all checks.
+//! * [`Reset`], [`SingleTurnZero`], [`EepromAccess`] and [`Detection`] are made of several transactions and drive them
+//!   by [`Step`].
 //! * [`Counters`] and [`ErrorRate`] keep account of what was refused.
 //!
 //! ```
 //! use tformat::master::{Line, Progress, Transaction};
 //! use tformat::{BitRate, Request, Response};
 //!
-//! let line = Line::new(BitRate::Mbit2_5).with_echo();
-//! let mut transaction = Transaction::start(Request::Id0, line, 0);
+//! let mut transaction = Transaction::start(Request::ReadSingleTurn, Line::new(BitRate::Mbit2_5), 0);
 //! assert_eq!(transaction.frame().as_bytes(), [0x02]);
 //!
-//! // the UART receives the own request and, 3 us later, the six fields of the answer, 4 us each
-//! let mut now_ns = 4_000;
-//! let mut progress = transaction.byte(0x02, now_ns);
-//! now_ns += 3_000;
-//! for byte in [0x02, 0x20, 0xb4, 0xbd, 0x1c, 0x37] {
-//!     now_ns += 4_000;
-//!     progress = transaction.byte(byte, now_ns);
-//! }
-//! let Progress::Done(Response::Id0(single)) = progress else { panic!("{progress:?}") };
-//! assert_eq!(single.abs.get(), 1_883_572);
+//! // The receiver is on all the time: the UART hears the request and, 3 us later, the six fields of the response.
+//! let progress = transaction.bytes(&[0x02], 4_000);
+//! assert_eq!(progress, Progress::Pending { until_ns: 23_599 });
+//! // The response comes in a DMA block whose last byte ended at 31 us.
+//! let progress = transaction.bytes(&[0x02, 0x20, 0xb4, 0xbd, 0x1c, 0x37], 31_000);
+//! let Progress::Done { value, ready_ns: 31_000 } = progress else { panic!("{progress:?}") };
+//! assert_eq!(value.response.abs().unwrap().get(), 1_883_572);
+//! assert_eq!(value.sampled_ns, 4_480);
 //! ```
 
+mod detection;
 mod eeprom;
+mod line;
 mod reset;
 mod transaction;
+mod zero;
 
-pub use eeprom::{EepromAccess, Page};
-pub use nrz_line::{ErrorRate, Polling};
+use crate::error::{Error, ErrorClass};
+use crate::request::Request;
+
+pub use detection::Detection;
+pub use eeprom::EepromAccess;
+pub use line::Line;
 pub use reset::Reset;
-pub use transaction::{Line, Progress, Transaction, parse_echoed};
-
-use crate::{Error, ErrorClass, Request};
+pub use servowire_core::{ErrorRate, Polling};
+pub use transaction::{Exchange, Progress, Transaction, parse_echoed};
+pub use zero::SingleTurnZero;
 
 /// What a procedure of several transactions wants next.
-pub type Step<T> = nrz_line::Step<Request, T, Error>;
+pub type Step<T> = servowire_core::Step<Request, T, Error>;
 
 /// How many transactions went well, and how many failed with which [`ErrorClass`].
-pub type Counters = nrz_line::Counters<{ ErrorClass::ALL.len() }>;
+pub type Counters = servowire_core::Counters<{ ErrorClass::ALL.len() }>;
+
+/// How often a busy EEPROM is asked: every millisecond, 40 times, which is twice the 18 ms that an encoder takes to write
+/// a byte.
+pub const EEPROM_POLLING: Polling = Polling { interval_ns: 1_000_000, max_tries: 40 };

@@ -4,7 +4,10 @@
 
 use nrz_line::{BitOrder, Window};
 
-use crate::{Error, Frame, Request, Response};
+use crate::error::Error;
+use crate::frame::Frame;
+use crate::request::Request;
+use crate::response::Response;
 
 /// The word that idles the transmitter while an answer is received: ten idle bits.
 pub const SPI10_IDLE: u16 = 0x3ff;
@@ -39,7 +42,7 @@ pub fn parse_spi10(request: Request, words: &[u16]) -> Result<Response, Error> {
             return Err(Error::Delimiter { field: field.wrapping_sub(1) });
         }
         if word & 0x100 != 0 {
-            // Behind the expected fields there is only idle line.
+            // After the expected fields there is only idle line.
             if field >= request.data_id().response_fields() {
                 break;
             }
@@ -76,13 +79,31 @@ pub fn spi16_words(request: Request) -> impl Iterator<Item = u16> {
         .take(words as usize)
 }
 
-/// Decodes the answer to `request` from the 16-bit words received over a whole transaction.
+/// Decodes the response to `request` from the 16-bit words received over a whole transaction.
 ///
-/// The answer begins at stream bit 18 (one-field request), 38 (ID D) or 48 (ID 6).
+/// The response begins at stream bit 18 (one-field request), 38 (ID D) or 48 (ID 6); what follows it is left alone.
 ///
 /// # Errors
 /// As [`Response::parse_line`].
 pub fn parse_spi16(request: Request, words: &[u16]) -> Result<Response, Error> {
+    // Eight words hold the longest response to a one-field request, to the bit: 18 + 110 = 128.
+    let line = match (request, words.first_chunk()) {
+        (Request::WriteEeprom { .. } | Request::ReadEeprom { .. }, _) | (_, None) => spi16_line(request, words),
+        (_, Some(words)) => Window::from_bits(stream(words) >> 18, MAX_RESPONSE_BITS).unwrap_or(Window::EMPTY),
+    };
+    Response::parse_line(request, line)
+}
+
+/// The first 128 bits of the stream, the first of the line in bit 0.
+#[inline(always)]
+fn stream([a, b, c, d, e, f, g, h]: &[u16; 8]) -> u128 {
+    let pair = |first: u16, second: u16| u128::from((u32::from(first) << 16 | u32::from(second)).reverse_bits());
+    pair(*a, *b) | pair(*c, *d) << 32 | pair(*e, *f) << 64 | pair(*g, *h) << 96
+}
+
+/// The line from the first bit of the response on, from any number of words.
+#[inline(never)]
+fn spi16_line(request: Request, words: &[u16]) -> Window {
     let mut bytes = [0; 2 * SPI16_MAX_WORDS];
     for (pair, word) in bytes.chunks_exact_mut(2).zip(words) {
         pair.copy_from_slice(&word.to_be_bytes());
@@ -90,8 +111,7 @@ pub fn parse_spi16(request: Request, words: &[u16]) -> Result<Response, Error> {
     let start = response_start(request);
     let there = u32::try_from(words.len().min(SPI16_MAX_WORDS)).unwrap_or(0).saturating_mul(16);
     let len = there.saturating_sub(start).min(MAX_RESPONSE_BITS);
-    let line = Window::read(&bytes, start as usize, len, BitOrder::MsbFirst).unwrap_or(Window::EMPTY);
-    Response::parse_line(request, line)
+    Window::read(&bytes, start as usize, len, BitOrder::MsbFirst).unwrap_or(Window::EMPTY)
 }
 
 const MAX_RESPONSE_BITS: u32 = 110;
@@ -116,11 +136,48 @@ mod tests {
     /// First words of the vendor's 16-bit transmit stream: 0x903f | (ID bits and parity) << 6.
     #[test]
     fn first_word_of_a_readout() {
-        for (request, code) in [(Request::Id0, 0x00), (Request::Id1, 0x11), (Request::Id2, 0x09), (Request::Id3, 0x18)]
-        {
+        for (request, code) in [
+            (Request::ReadSingleTurn, 0x00),
+            (Request::ReadMultiTurn, 0x11),
+            (Request::ReadEncoderId, 0x09),
+            (Request::ReadAll, 0x18),
+        ] {
             assert_eq!(spi16_words(request).next(), Some(0x903f | code << 6));
         }
-        assert_eq!(spi16_words(Request::Id3).count(), 8);
+        assert_eq!(spi16_words(Request::ReadAll).count(), 8);
+    }
+
+    /// A response begins at stream bit 18, 38 (ID D) or 48 (ID 6); a refused EEPROM write is 48 and 110 bits long.
+    #[test]
+    fn a_refusal_fits_the_longest_stream() {
+        let adf = crate::Adf::from_bits(5);
+        let refused =
+            crate::AllData::parse(&[0x1a, 0x40, 0xeb, 0x3b, 0x1c, 0x17, 0x04, 0x27, 0x00, 0x00, 0xa2]).unwrap();
+        let requests = [Request::ReadSingleTurn, Request::ReadEeprom { adf }, Request::WriteEeprom { adf, edf: 1 }];
+        for (request, start) in requests.into_iter().zip([18, 38, 48]) {
+            let mut bytes = [0xff; 2 * SPI16_MAX_WORDS];
+            Response::ReadAll(refused).emit().line().write(&mut bytes, start, BitOrder::MsbFirst).unwrap();
+            let words: Vec<u16> = bytes.chunks(2).map(|w| u16::from_be_bytes([w[0], w[1]])).collect();
+            assert_eq!(parse_spi16(request, &words), Err(Error::Rejected { sf: refused.sf }));
+            let needed = (start + 110).div_ceil(16);
+            assert_eq!(parse_spi16(request, &words[..needed]), Err(Error::Rejected { sf: refused.sf }));
+            let short = parse_spi16(request, &words[..needed - 1]);
+            assert!(matches!(short, Err(Error::Truncated { want: 11, .. })), "{short:?}");
+        }
+        assert_eq!(SPI16_MAX_WORDS, 10);
+    }
+
+    /// After a response of ID D that is shorter than the words there is idle line, which is left alone.
+    #[test]
+    fn idle_words_after_a_short_response() {
+        let adf = crate::Adf::from_bits(1);
+        let mut words: Vec<u16> = spi10_words(&Frame::new(&[0xea, 1, 0x5a, 0xb1]).unwrap()).collect();
+        words.extend([SPI10_IDLE; 4]);
+        let memory = crate::Memory { adf, edf: 0x5a };
+        assert_eq!(parse_spi10(Request::ReadEeprom { adf }, &words), Ok(Response::ReadEeprom(memory)));
+        // A line that idles before the response is whole is a start bit that reads 1.
+        words[3] = SPI10_IDLE;
+        assert_eq!(parse_spi10(Request::ReadEeprom { adf }, &words), Err(Error::StartBit { field: 3 }));
     }
 
     proptest! {

@@ -4,12 +4,13 @@
 //! [`tformat::Error`](crate::Error) as the error type the reason is kept; any other type that implements
 //! `FromExternalError` works too.
 
-use core::num::NonZeroUsize;
+use nom::error::{FromExternalError, ParseError};
+use nom::{IResult, Parser};
+use servowire_core::stream::{missing, refused};
 
-use nom::error::{ErrorKind, FromExternalError, ParseError};
-use nom::{Err, IResult, Needed, Parser};
-
-use crate::{Error, Request, Response};
+use crate::error::Error;
+use crate::request::Request;
+use crate::response::Response;
 
 /// Takes one request off the front, as an encoder receives it.
 ///
@@ -17,7 +18,7 @@ use crate::{Error, Request, Response};
 /// use tformat::{Error, Request, stream};
 /// // a request for ID 3, then the first byte of an EEPROM access
 /// let (rest, first) = stream::request::<Error>(&[0x1a, 0x32]).unwrap();
-/// assert_eq!((rest, first), (&[0x32][..], Request::Id3));
+/// assert_eq!((rest, first), (&[0x32][..], Request::ReadAll));
 /// assert!(stream::request::<Error>(rest).unwrap_err().is_incomplete());
 /// ```
 ///
@@ -35,9 +36,9 @@ where
 /// ```
 /// use nom::Parser;
 /// use tformat::{Error, Request, stream};
-/// // two answers to ID 0, one behind the other
+/// // two answers to ID 0, one after the other
 /// let bytes = [0x02, 0x20, 0xb4, 0xbd, 0x1c, 0x37, 0x02, 0x20, 0x50, 0xa9, 0x78, 0xa3];
-/// let mut two = (stream::response::<Error>(Request::Id0), stream::response(Request::Id0));
+/// let mut two = (stream::response::<Error>(Request::ReadSingleTurn), stream::response(Request::ReadSingleTurn));
 /// let (rest, (_, second)) = two.parse(&bytes[..]).unwrap();
 /// assert!(rest.is_empty());
 /// assert_eq!(second.abs().unwrap().get(), 7_907_664);
@@ -54,17 +55,15 @@ where
     }
 }
 
-/// The rest of the input behind a frame of `len` fields, or what `nom` calls the fault.
+/// The rest of the input after a frame of `len` fields, or what `nom` calls the fault.
 fn finish<'a, T, E>(input: &'a [u8], frame: Result<T, Error>, len: impl Fn(&T) -> u8) -> IResult<&'a [u8], T, E>
 where
     E: ParseError<&'a [u8]> + FromExternalError<&'a [u8], Error>,
 {
     match frame {
         Ok(value) => Ok((input.get(usize::from(len(&value))..).unwrap_or(&[]), value)),
-        Err(Error::Truncated { got, want }) => Err(Err::Incomplete(
-            NonZeroUsize::new(usize::from(want.saturating_sub(got))).map_or(Needed::Unknown, Needed::Size),
-        )),
-        Err(error) => Err(Err::Error(E::from_external_error(input, ErrorKind::MapRes, error))),
+        Err(Error::Truncated { got, want }) => Err(missing(want.saturating_sub(got).into())),
+        Err(error) => Err(refused(input, error)),
     }
 }
 
@@ -72,6 +71,7 @@ where
 mod tests {
     use super::*;
     use crate::response::tests::exchanges;
+    use nom::{Err, Needed};
     use proptest::prelude::*;
 
     proptest! {

@@ -1,8 +1,7 @@
-use crate::DataId;
+use crate::data_id::DataId;
 
 /// The two bit rates of T-Format encoders.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "arbitrary", derive(arbitrary::Arbitrary))]
 pub enum BitRate {
@@ -11,6 +10,11 @@ pub enum BitRate {
     /// 5 Mbit/s, 200 ns a bit: a faster variant that some encoders have.
     Mbit5,
 }
+
+crate::show::one_line!(BitRate {
+    Self::Mbit2_5 => "2.5 Mbit/s";
+    Self::Mbit5 => "5 Mbit/s";
+});
 
 /// Nominal time from the end of a request to the start bit of the answer.
 ///

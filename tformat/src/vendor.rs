@@ -1,5 +1,8 @@
-use crate::request::{check_crc, count};
-use crate::{Error, Frame};
+use servowire_core::OutOfRange;
+
+use crate::crc::{check, crc};
+use crate::error::Error;
+use crate::frame::{Frame, count};
 
 /// The extension point for commands that are not Tamagawa's: encoders of other makers use private ones over the
 /// same fields, some even with control fields that break the layout.
@@ -10,21 +13,50 @@ use crate::{Error, Frame};
 /// ```
 /// use tformat::{ControlField, VendorCommand};
 /// // data ID 5 is not documented; suppose an encoder answers it with five fields
-/// let command = VendorCommand { cf: ControlField::compose(5).get(), response_fields: 5 };
+/// let command = VendorCommand::new(ControlField::compose(5).get(), 5)?;
 /// assert_eq!(command.parse(&[0x2a, 0x11, 0x22, 0x33, 0x2a]), Ok(&[0x11, 0x22, 0x33][..]));
+/// # Ok::<(), tformat::OutOfRange>(())
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-#[cfg_attr(feature = "arbitrary", derive(arbitrary::Arbitrary))]
+#[cfg_attr(
+    feature = "serde",
+    derive(serde::Serialize, serde::Deserialize),
+    serde(try_from = "(u8, u8)", into = "(u8, u8)")
+)]
 pub struct VendorCommand {
-    /// First field of the request and of the answer; see [`ControlField::compose`](crate::ControlField::compose).
-    pub cf: u8,
-    /// Fields of the answer, with the control and check fields, 2 to 11.
-    pub response_fields: u8,
+    cf: u8,
+    response_fields: u8,
 }
 
+crate::show::one_line!(VendorCommand {
+    Self { cf, response_fields } => "CF {:02X}h, response of {} fields", cf, response_fields;
+});
+
 impl VendorCommand {
+    /// A command with this first field, in the request and in the response (see
+    /// [`ControlField::compose`](crate::ControlField::compose)), and a response of 2 to 11 fields, control and check
+    /// field included.
+    ///
+    /// # Errors
+    /// [`OutOfRange`] for another number of fields.
+    pub const fn new(cf: u8, response_fields: u8) -> Result<Self, OutOfRange> {
+        match response_fields {
+            2..=11 => Ok(Self { cf, response_fields }),
+            0 | 1 => Err(OutOfRange { got: response_fields as i64, max: 2 }),
+            _ => Err(OutOfRange { got: response_fields as i64, max: 11 }),
+        }
+    }
+
+    /// First field of the request and of the response.
+    pub const fn cf(self) -> u8 {
+        self.cf
+    }
+
+    /// Fields of the response, 2..=11.
+    pub const fn response_fields(self) -> u8 {
+        self.response_fields
+    }
+
     /// The request: the control field alone, or followed by `body` and the check field over both.
     ///
     /// `None` if `body` has more than nine bytes.
@@ -37,25 +69,47 @@ impl VendorCommand {
         *cf = self.cf;
         let (data, rest) = rest.split_at_mut_checked(body.len())?;
         data.copy_from_slice(body);
-        *rest.first_mut()? = self.cf ^ crate::crc(body);
+        *rest.first_mut()? = self.cf ^ crc(body);
         let len = body.len().saturating_add(2);
         Frame::new(bytes.get(..len)?)
     }
 
-    /// The fields of an answer between control field and check field.
+    /// The fields of a response between control field and check field. It decodes the front of `bytes`; what follows is left alone.
     ///
     /// # Errors
     /// [`Error::Truncated`] without any field, [`Error::CfMismatch`], [`Error::Truncated`], [`Error::Crc`].
     pub fn parse(self, bytes: &[u8]) -> Result<&[u8], Error> {
         let want = self.response_fields;
-        let Some(&got) = bytes.first() else { return Err(Error::Truncated { got: 0, want }) };
+        let Some(&got) = bytes.first() else { return Err(Error::Truncated { got: 0, want: want.into() }) };
         if got != self.cf {
             return Err(Error::CfMismatch { got, want: self.cf });
         }
         match bytes.get(..usize::from(want)) {
-            Some(fields @ [_, body @ .., _]) => check_crc(fields).map(|()| body),
-            _ => Err(Error::Truncated { got: count(bytes), want }),
+            Some(fields @ [_, body @ .., _]) => check(fields).map(|()| body),
+            _ => Err(Error::Truncated { got: count(bytes), want: want.into() }),
         }
+    }
+}
+
+impl TryFrom<(u8, u8)> for VendorCommand {
+    type Error = OutOfRange;
+
+    fn try_from((cf, response_fields): (u8, u8)) -> Result<Self, OutOfRange> {
+        Self::new(cf, response_fields)
+    }
+}
+
+impl From<VendorCommand> for (u8, u8) {
+    fn from(command: VendorCommand) -> Self {
+        (command.cf, command.response_fields)
+    }
+}
+
+#[cfg(feature = "arbitrary")]
+#[cfg_attr(docsrs, doc(cfg(feature = "arbitrary")))]
+impl<'a> arbitrary::Arbitrary<'a> for VendorCommand {
+    fn arbitrary(from: &mut arbitrary::Unstructured<'a>) -> arbitrary::Result<Self> {
+        Ok(Self { cf: from.arbitrary()?, response_fields: from.int_in_range(2..=11)? })
     }
 }
 
@@ -75,7 +129,15 @@ mod tests {
     }
 
     #[test]
-    fn answers() {
+    fn responses_have_two_to_eleven_fields() {
+        for fields in 0..=255 {
+            assert_eq!(VendorCommand::new(0x14, fields).is_ok(), (2..=11).contains(&fields));
+        }
+        assert_eq!((PRIVATE.cf(), PRIVATE.response_fields()), (0x14, 4));
+    }
+
+    #[test]
+    fn responses() {
         assert_eq!(PRIVATE.parse(&[0x14, 1, 2, 0x17, 9]), Ok(&[1, 2][..]));
         assert_eq!(PRIVATE.parse(&[0x14, 1, 2, 0x16]), Err(Error::Crc { got: 0x16, want: 0x17 }));
         assert_eq!(PRIVATE.parse(&[0x15]), Err(Error::CfMismatch { got: 0x15, want: 0x14 }));

@@ -71,7 +71,7 @@ impl<S: SpiDevice> Drv8711<S> {
     /// The faults. All bits set may also mean that the chip is dead, so OFF is read then, which never is all ones here.
     fn status(&mut self) -> Result<Status, Error<S::Error>> {
         let [_, byte] = self.transfer(Register::Status.read())?;
-        let status = Status::from_byte(byte);
+        let status = Status::from_bits_retain(byte);
         if status.looks_unpowered() {
             let off = Word::answer(self.transfer(Register::Off.read())?);
             Register::Off.verify(self.written.value(Register::Off), off).map_err(|_| Error::Dead)?;
@@ -136,7 +136,7 @@ fn main() -> Result<(), Error<ErrorKind>> {
 
     driver.spi.registers[7] = 0x12; // over-current in bridge A, predriver fault in bridge B
     let status = driver.status()?;
-    println!("status: {status:?}");
+    println!("status: {status}");
     driver.clear(status)?;
     println!("cleared: {:?}", driver.status()?.is_fault());
     driver.enable(false)?;
@@ -144,7 +144,7 @@ fn main() -> Result<(), Error<ErrorKind>> {
     driver.spi.powered = false;
     match driver.status() {
         Err(error) => println!("without supply: {error}"),
-        Ok(status) => println!("without supply: {status:?}?"),
+        Ok(status) => println!("without supply: {status}?"),
     }
     Ok(())
 }

@@ -14,6 +14,7 @@ pub(crate) const SOURCES: &[Source] = &[
     ("tformat_master", "tformat/uart_echo.jsonl", transaction),
     ("tformat_device", "tformat/procedures.jsonl", procedure),
     ("tformat_inspect", "tformat/negatives.jsonl", inspected),
+    ("tformat_world", "tformat/requests.jsonl", world),
 ];
 
 fn request(row: &Value) -> Option<Vec<u8>> {
@@ -76,4 +77,18 @@ fn procedure(row: &Value) -> Option<Vec<u8>> {
 fn inspected(row: &Value) -> Option<Vec<u8>> {
     let bits = row["wire"].as_str()?.len();
     answer(row, u8::try_from(bits).ok()?, &wire(row)?)
+}
+
+/// A request at one rate or the other, in one of the procedures, an echo, and three faults that depend on its bytes.
+fn world(row: &Value) -> Option<Vec<u8>> {
+    let bytes = hex(row["bytes"].as_str()?);
+    let sum = bytes.iter().fold(0_u8, |sum, byte| sum.wrapping_mul(31).wrapping_add(*byte));
+    let kind = "0123678CD".find(row["data_id"].as_str()?)?;
+    let byte = |key: &str| row[key].as_u64().unwrap_or(0) as u8;
+    let mut input = vec![sum, sum >> 4, sum, kind as u8, byte("adf"), byte("edf")];
+    input.extend([sum, sum >> 2, 0, 3, 0, 9, 7, 0]);
+    for k in 0..3_u8 {
+        input.extend([sum % 5 + k, k, sum.wrapping_add(5 * k), 3, sum, 40]);
+    }
+    Some(input)
 }

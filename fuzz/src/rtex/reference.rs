@@ -1,6 +1,6 @@
 //! The layouts once more, bit by bit out of one number: slow, and nothing shared with the crate.
 
-use rtex_block::{Command, Request, Response};
+use rtex_block::{Command, ControlBits, NonCyclicCommand, Response};
 
 /// `len` bits of a block from bit `first` of byte `byte` on; the block is one number, low byte first.
 fn bits(block: &[u8], byte: u32, first: u32, len: u32) -> u64 {
@@ -20,33 +20,37 @@ pub(super) fn command(block: &[u8], command: &Command) {
     is("MAC-ID", bits(block, 0, 0, 5), command.mac_id.get().into());
     is("Update_Counter", bits(block, 0, 5, 2), command.update_counter.get().into());
     is("C/R", bits(block, 0, 7, 1), 0);
-    is("non-cyclic code", bits(block, 1, 0, 4), command.request.code() as u64);
+    is("non-cyclic code", bits(block, 1, 0, 4), command.noncyclic.code() as u64);
     is("cyclic code", bits(block, 1, 4, 3), command.cyclic as u64);
     is("TMG_CNT", bits(block, 1, 7, 1), command.tmg_cnt.into());
-    is("Servo_On", bits(block, 2, 7, 1), command.control.servo_on().into());
-    is("Gain_SW", bits(block, 2, 4, 1), command.control.gain_sw().into());
-    is("Hard_Stop", bits(block, 3, 7, 1), command.control.hard_stop().into());
-    is("EX-OUT1", bits(block, 3, 0, 1), command.control.ex_out1().into());
+    is("Servo_On", bits(block, 2, 7, 1), command.control.contains(ControlBits::SERVO_ON).into());
+    is("Gain_SW", bits(block, 2, 4, 1), command.control.contains(ControlBits::GAIN_SW).into());
+    is("Hard_Stop", bits(block, 3, 7, 1), command.control.contains(ControlBits::HARD_STOP).into());
+    is("EX-OUT1", bits(block, 3, 0, 1), command.control.contains(ControlBits::EX_OUT1).into());
     is("reserved", bits(block, 2, 0, 2) | bits(block, 2, 5, 2) | bits(block, 3, 2, 1) | bits(block, 3, 4, 1), 0);
     assert_eq!(signed(block, 4), command.command_data1.into());
-    match command.request {
-        Request::Normal { command_data2, command_data3 } => {
+    match command.noncyclic {
+        NonCyclicCommand::Normal { command_data2, command_data3 } => {
             assert_eq!((signed(block, 8), signed(block, 12)), (command_data2.into(), command_data3.into()));
         }
-        Request::Homing { type_code, latch_sel1, latch_sel2, monitor_sel, setting_data } => {
+        NonCyclicCommand::Homing { type_code, latch_sel1, latch_sel2, monitor_sel, setting_data } => {
             is("Type_Code", bits(block, 8, 0, 8), type_code.into());
             is("Latch_Sel1", bits(block, 10, 0, 4), latch_sel1.get().into());
             is("Latch_Sel2", bits(block, 10, 4, 4), latch_sel2.get().into());
             is("Monitor_Sel", bits(block, 11, 0, 8), monitor_sel.into());
             assert_eq!(signed(block, 12), setting_data.into());
         }
-        Request::Profile { type_code, latch_sel1, monitor_sel, target_speed } => {
+        NonCyclicCommand::Profile { type_code, latch_sel1, monitor_sel, target_speed } => {
             is("Type_Code", bits(block, 8, 0, 8), type_code.into());
             is("Latch_Sel1", bits(block, 10, 0, 8), latch_sel1.get().into());
             is("Monitor_Sel", bits(block, 11, 0, 8), monitor_sel.into());
             assert_eq!(signed(block, 12), target_speed.into());
         }
-        Request::Reset(a) | Request::SystemId(a) | Request::Alarm(a) | Request::Parameter(a) | Request::Monitor(a) => {
+        NonCyclicCommand::Reset(a)
+        | NonCyclicCommand::SystemId(a)
+        | NonCyclicCommand::Alarm(a)
+        | NonCyclicCommand::Parameter(a)
+        | NonCyclicCommand::Monitor(a) => {
             is("Type_Code", bits(block, 8, 0, 16), a.type_code.get().into());
             is("Index", bits(block, 10, 0, 16), a.index.into());
             assert_eq!(signed(block, 12), a.data.into());
@@ -60,7 +64,7 @@ pub(super) fn response(block: &[u8], response: &Response) {
     is("Update_Counter_Echo", bits(block, 0, 5, 2), response.update_counter_echo.get().into());
     is("code", bits(block, 1, 0, 7), response.code.get().into());
     is("CMD_Error", bits(block, 1, 7, 1), response.cmd_error.into());
-    is("status", bits(block, 2, 0, 16), u16::from(response.status).into());
+    is("status", bits(block, 2, 0, 16), response.status.bits().into());
     assert_eq!(signed(block, 4), response.response_data1.into());
     assert_eq!(signed(block, 8), response.response_data2.into());
     assert_eq!(signed(block, 12), response.response_data3.into());

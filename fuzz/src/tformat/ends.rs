@@ -2,17 +2,17 @@
 
 use tformat::device::{Device, Fault};
 use tformat::inspect::{Cause, inspect as look};
-use tformat::master::{EepromAccess, Line, Page, Polling, Progress, Reset, Step, Transaction};
-use tformat::{Address, Alarm, BitRate, Error, Frame, Request, Response, U24, Window};
+use tformat::master::{EepromAccess, Line, Polling, Progress, Reset, Step, Transaction};
+use tformat::{Abm, Abs, Address, Almc, BitRate, Error, Frame, Page, Request, Response, Window};
 
 use super::{byte, chosen};
 
-/// A transaction under any bytes, framing errors and pauses: it ends once and for all, in time, and with what
-/// `Response::parse` makes of the same bytes.
+/// A transaction under any blocks, framing errors and pauses: it ends once and for all, in time, and what it gives is at the
+/// end of what it was given.
 ///
 /// ```text
-/// 0..3  request      3  echo (bit 0), rate (bit 1)      4..  events: 0 poll, 1 framing error, other: a byte follows;
-///                                                            the high bits are the time since the event before
+/// 0..3  request      3  echo hint (bit 0), rate (bit 1)      4..  events: 0 poll, 1 framing error, 2 a byte follows, 3 four
+///                                                            bytes follow; the high bits are the time since the event before
 /// ```
 pub fn master(mut data: &[u8]) {
     let request = chosen(&mut data);
@@ -20,38 +20,35 @@ pub fn master(mut data: &[u8]) {
     let rate = if options & 2 == 0 { BitRate::Mbit2_5 } else { BitRate::Mbit5 };
     let line = if options & 1 == 0 { Line::new(rate) } else { Line::new(rate).with_echo() };
     let mut transaction = Transaction::start(request, line, 0);
-    let (mut now, mut received, mut clean) = (0, Vec::new(), true);
-    while let (Progress::Waiting { until_ns }, false) = (transaction.progress(), data.is_empty()) {
+    let (mut now, mut received) = (0, Vec::new());
+    while let (Progress::Pending { until_ns }, false) = (transaction.progress(), data.is_empty()) {
         let event = byte(&mut data);
         now += u64::from(event >> 2) * u64::from(rate.bit_ns());
-        let in_time = now <= until_ns;
         match event & 3 {
-            0 => _ = transaction.poll(now),
-            1 => {
-                _ = transaction.framing_error(now);
-                clean &= !in_time;
-            }
-            _ => {
-                let value = byte(&mut data);
-                _ = transaction.byte(value, now);
-                received.extend(in_time.then_some(value));
+            0 => assert!(now <= until_ns || !matches!(transaction.poll(now), Progress::Pending { .. })),
+            1 => _ = transaction.framing_error(now),
+            count => {
+                let block: Vec<u8> = (0..count * count - 3).map(|_| byte(&mut data)).collect();
+                received.extend(&block);
+                _ = transaction.bytes(&block, now);
             }
         }
-        assert!(in_time || !matches!(transaction.progress(), Progress::Waiting { .. }));
     }
     let end = match transaction.progress() {
-        Progress::Waiting { until_ns } => transaction.poll(until_ns + 1),
+        Progress::Pending { until_ns } => transaction.poll(until_ns + 1),
         end => end,
     };
-    assert_eq!(transaction.byte(0x1a, now), end);
+    assert_eq!(transaction.bytes(&[0x1a], now), end);
     assert_eq!(transaction.poll(u64::MAX), end);
-    if clean {
-        let want = match received.as_slice() {
-            bytes if line.echo => tformat::master::parse_echoed(request, bytes),
-            [] => Err(Error::NoResponse { echo: false }),
-            bytes => Response::parse(request, bytes),
-        };
-        assert_eq!(end, want.map_or_else(Progress::Failed, Progress::Done));
+    match end {
+        Progress::Done { value, ready_ns } => {
+            assert!(received.ends_with(value.response.emit().as_bytes()));
+            // Four bits of turn-around and the response itself have passed since the end of the request.
+            let fields = u64::from(request.data_id().request_fields() + request.data_id().response_fields());
+            assert!(ready_ns >= (fields * 10 + 4) * u64::from(rate.bit_ns()));
+        }
+        Progress::Failed { ready_ns, .. } => assert!(ready_ns >= 10_000 + 120 * u64::from(rate.bit_ns())),
+        Progress::Pending { .. } => panic!("the time-out did not end it"),
     }
 }
 
@@ -63,25 +60,26 @@ pub fn master(mut data: &[u8]) {
 /// ```
 pub fn device(mut data: &[u8]) {
     let (procedure, address, value) = (byte(&mut data), byte(&mut data), byte(&mut data));
-    let page = Page(byte(&mut data) % 8);
+    let page = Page::truncate(byte(&mut data));
     let polling = Polling { interval_ns: 1_000_000, max_tries: u16::from(byte(&mut data)) };
     let address = Address::new(address & 0x7f).expect("seven bits");
     let mut line = Simulated::new(data);
-    line.encoder.set_position(U24::truncate(u32::from(value) << 9), U24::truncate(7));
-    line.encoder.set_alarm(Alarm::CountingError, true);
-    line.encoder.set_alarm(Alarm::CountingError, false);
+    line.encoder.set_position(Abs::truncate(u32::from(value) << 9), Abm::truncate(7));
+    line.encoder.set_alarms(Almc::CE, true);
+    line.encoder.set_alarms(Almc::CE, false);
     match procedure % 5 {
         0 => {
             let done = line.reset(Reset::clear_errors());
-            assert!(!done || line.encoder.almc().raw() == 0);
+            assert!(!done || line.encoder.almc().bits() == 0);
         }
-        1 => _ = line.reset(Reset::clear_turns_and_errors()),
+        1 => _ = line.reset(Reset::clear_turns_and_lose_multi_turn_reference()),
         2 => _ = line.reset(Reset::set_single_turn_zero_and_shift_commutation_angle()),
         3 => {
             let written = line.access(EepromAccess::write(Some(page), address, value, polling), polling);
-            // The encoder has six pages and keeps the one it has when another is named.
-            if written.is_ok() && address != Address::PAGE_REGISTER && line.encoder.page() == page.0 {
-                let cells = line.encoder.eeprom_mut()[usize::from(page.0)];
+            if written.is_ok() && address != Address::PAGE_REGISTER {
+                // The encoder has six pages: on another nothing is written.
+                assert_eq!(line.encoder.page(), page.get());
+                let cells = line.encoder.eeprom_mut()[usize::from(page.get())];
                 assert_eq!(cells[usize::from(address.get())], value);
             }
         }
@@ -108,7 +106,7 @@ impl<'a> Simulated<'a> {
         while let Step::Send { request, not_before_ns } = step {
             assert_eq!(request.data_id(), reset.data_id());
             let outcome = self.transact(request, not_before_ns);
-            step = reset.answer(outcome, self.now_ns);
+            step = reset.receive(outcome, self.now_ns);
             assert!(self.requests <= u32::from(Reset::MAX_REFUSED) * u32::from(Reset::REQUESTS));
         }
         matches!(step, Step::Done { .. })
@@ -121,9 +119,9 @@ impl<'a> Simulated<'a> {
             match step {
                 Step::Send { request, not_before_ns } => {
                     let outcome = self.transact(request, not_before_ns);
-                    step = access.answer(outcome, self.now_ns);
-                    // Three phases, each with its own tries.
-                    assert!(self.requests <= 3 * u32::from(polling.max_tries.max(1)));
+                    step = access.receive(outcome, self.now_ns);
+                    // Two writes with their read-backs, each pair with its own tries.
+                    assert!(self.requests <= 4 * u32::from(polling.max_tries.max(1)) + 4);
                 }
                 Step::Done { value, .. } => return Ok(value),
                 Step::Failed { error, .. } => return Err(error),
@@ -158,12 +156,12 @@ impl<'a> Simulated<'a> {
         }
         let end = loop {
             match transaction.progress() {
-                Progress::Waiting { until_ns } => {
+                Progress::Pending { until_ns } => {
                     self.now_ns = self.now_ns.max(until_ns + 1);
                     let _ = transaction.poll(self.now_ns);
                 }
-                Progress::Done(response) => break Ok(response),
-                Progress::Failed(error) => break Err(error),
+                Progress::Done { value, .. } => break Ok(value.response),
+                Progress::Failed { error, .. } => break Err(error),
             }
         };
         assert!(end.is_err() || end.is_ok_and(|response| response.data_id() == request.data_id()));
@@ -177,7 +175,7 @@ impl<'a> Simulated<'a> {
             let at = field * Frame::FIELD_BITS;
             let [byte, ..] = (line.bits() >> (at + 1)).to_le_bytes();
             let _ = match (line.get(at), line.get(at + 9)) {
-                (Some(false), Some(true)) => transaction.byte(byte, self.now_ns),
+                (Some(false), Some(true)) => transaction.bytes(&[byte], self.now_ns),
                 _ => transaction.framing_error(self.now_ns),
             };
         }
@@ -203,7 +201,7 @@ pub fn inspect(mut data: &[u8]) {
         }
         Err(error) => {
             assert_eq!(report.error, Some(error));
-            assert!(report.findings.has(error.class()));
+            assert!(report.findings.contains(error.class()));
         }
     }
     assert!(report.fields().len() <= usize::from(request.data_id().response_fields()));

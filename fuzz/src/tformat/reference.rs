@@ -1,7 +1,8 @@
 //! A decoder of answers as one would write it from the text: bit by bit, check by check.
 
 use tformat::{
-    Adf, Almc, DataId, EncoderId, Error, Full, Memory, MultiTurn, Request, Response, SingleTurn, StatusField, U24,
+    Abm, Abs, Adf, AllData, Almc, DataId, Error, Identification, Memory, MultiTurn, Request, Response, SingleTurn,
+    StatusField,
 };
 
 /// The control field of ID 3, with which an encoder answers a damaged request too.
@@ -29,7 +30,7 @@ pub(crate) fn response(request: Request, bits: &[bool]) -> Result<Response, Erro
         return Err(Error::Crc { got: *got, want: sum });
     }
     if cf != asked {
-        return Err(Error::Rejected { sf: StatusField::new(fields[1]) });
+        return Err(Error::Rejected { sf: StatusField::from_bits_retain(fields[1]) });
     }
     let response = values(id, &fields);
     echoed(request, response)?;
@@ -40,7 +41,7 @@ pub(crate) fn response(request: Request, bits: &[bool]) -> Result<Response, Erro
 fn framed(bits: &[bool], want: usize) -> Result<Vec<u8>, Error> {
     let mut fields = Vec::new();
     for field in 0..want {
-        let truncated = Error::Truncated { got: field as u8, want: want as u8 };
+        let truncated = Error::Truncated { got: field as u16, want: want as u16 };
         let field = field as u8;
         let bit = |at: usize| bits.get(usize::from(field) * 10 + at).copied();
         if bit(0) == Some(true) {
@@ -64,38 +65,43 @@ fn data_bits(bits: &[bool]) -> u8 {
 }
 
 fn values(id: DataId, f: &[u8]) -> Response {
-    let number =
-        |at: usize| U24::truncate(u32::from(f[at]) + 256 * u32::from(f[at + 1]) + 65536 * u32::from(f[at + 2]));
-    let sf = StatusField::new(f[1]);
-    let single = || SingleTurn { sf, abs: number(2) };
-    let memory = || Memory { adf: Adf::new(f[1]), edf: f[2] };
+    let number = |at: usize| u32::from(f[at]) + 256 * u32::from(f[at + 1]) + 65536 * u32::from(f[at + 2]);
+    let sf = StatusField::from_bits_retain(f[1]);
+    let single = || SingleTurn { sf, abs: Abs::truncate(number(2)) };
+    let memory = || Memory { adf: Adf::from_bits(f[1]), edf: f[2] };
     match id {
-        DataId::Id0 => Response::Id0(single()),
-        DataId::Id1 => Response::Id1(MultiTurn { sf, abm: number(2) }),
-        DataId::Id2 => Response::Id2(EncoderId { sf, enid: f[2] }),
-        DataId::Id3 => Response::Id3(Full { sf, abs: number(2), enid: f[5], abm: number(6), almc: Almc::new(f[9]) }),
-        DataId::Id6 => Response::Id6(memory()),
-        DataId::Id7 => Response::Id7(single()),
-        DataId::Id8 => Response::Id8(single()),
-        DataId::IdC => Response::IdC(single()),
-        DataId::IdD => Response::IdD(memory()),
+        DataId::ReadSingleTurn => Response::ReadSingleTurn(single()),
+        DataId::ReadMultiTurn => Response::ReadMultiTurn(MultiTurn { sf, abm: Abm::truncate(number(2)) }),
+        DataId::ReadEncoderId => Response::ReadEncoderId(Identification { sf, enid: f[2] }),
+        DataId::ReadAll => Response::ReadAll(AllData {
+            sf,
+            abs: Abs::truncate(number(2)),
+            enid: f[5],
+            abm: Abm::truncate(number(6)),
+            almc: Almc::from_bits_retain(f[9]),
+        }),
+        DataId::WriteEeprom => Response::WriteEeprom(memory()),
+        DataId::ResetErrors => Response::ResetErrors(single()),
+        DataId::SetSingleTurnZero => Response::SetSingleTurnZero(single()),
+        DataId::ResetTurnsAndErrors => Response::ResetTurnsAndErrors(single()),
+        DataId::ReadEeprom => Response::ReadEeprom(memory()),
     }
 }
 
 /// EEPROM answers repeat the address and, after a write that was done, the data.
 fn echoed(request: Request, response: Response) -> Result<(), Error> {
-    let (Response::Id6(memory) | Response::IdD(memory)) = response else { return Ok(()) };
+    let (Response::WriteEeprom(memory) | Response::ReadEeprom(memory)) = response else { return Ok(()) };
     let (asked, written) = match request {
-        Request::Id6 { adf, edf } => (adf, Some(edf)),
-        Request::IdD { adf } => (adf, None),
+        Request::WriteEeprom { adf, edf } => (adf, Some(edf)),
+        Request::ReadEeprom { adf } => (adf, None),
         _ => return Ok(()),
     };
-    let (got, want) = (memory.adf.raw() & 0x7f, asked.raw() & 0x7f);
+    let (got, want) = (memory.adf.bits() & 0x7f, asked.bits() & 0x7f);
     if got != want {
         return Err(Error::AddressMismatch { got, want });
     }
     match written {
-        Some(want) if memory.adf.raw() & 0x80 == 0 && memory.edf != want => {
+        Some(want) if memory.adf.bits() & 0x80 == 0 && memory.edf != want => {
             Err(Error::DataMismatch { got: memory.edf, want })
         }
         _ => Ok(()),

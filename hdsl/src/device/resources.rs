@@ -30,7 +30,7 @@ pub struct Resource {
 /// * direct read: the name without an offset or with offset 0, attributes 1..=5 as two bytes;
 /// * indirect read and write: the data, from the offset on.
 ///
-/// Refusals: 40h/10h unknown resource, 41h/10h no right to write, 42h/10h offset behind the data.
+/// Refusals: 40h/10h unknown resource, 41h/10h no right to write, 40h/13h offset after the data.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Resources {
@@ -49,7 +49,7 @@ impl Default for Resources {
 const READ_ONLY: u8 = 15;
 
 impl Resources {
-    /// ROOT, RESOLUTN (8388608 steps a turn), EESIZE, and eight bytes of user data at 100h. SRSSI is 7, PING 1.
+    /// ROOT, RESOLUTN (8388608 steps a turn), EESIZE, and a user file of eight bytes at 131h. SRSSI is 7, PING 1.
     pub const fn new() -> Self {
         let mut registers = [0; 64];
         let [.., srssi, _, _, ping] = &mut registers;
@@ -61,7 +61,7 @@ impl Resources {
                 resource(ResourceAddress::ROOT, *b"ROOT    ", 0, READ_ONLY, [0; 8]),
                 resource(ResourceAddress::RESOLUTN, *b"RESOLUTN", 4, READ_ONLY, [0, 0x80, 0, 0, 0, 0, 0, 0]),
                 resource(ResourceAddress::EESIZE, *b"EESIZE  ", 2, READ_ONLY, [0x20, 0, 0, 0, 0, 0, 0, 0]),
-                resource(ResourceAddress::USER, *b"USERDATA", 8, 0, [0; 8]),
+                resource(ResourceAddress::RWFILE, *b"RWFILE  ", 8, 0, [0; 8]),
             ],
         }
     }
@@ -109,7 +109,7 @@ impl Resources {
     /// # Errors
     /// The refusal to be sent.
     pub fn long(&mut self, request: &LongRequest) -> Result<Data, ResourceError> {
-        let unknown = ResourceError { class: 0x40, detail: 0x10 };
+        let unknown = ResourceError::NOT_THERE;
         let found = self.all.iter_mut().find(|resource| resource.address == request.address).ok_or(unknown)?;
         let offset = request.offset.map_or(0, Offset::get);
         match request.access {
@@ -142,25 +142,25 @@ impl Resource {
             3 => self.write_level,
             4 => self.timeout_ms,
             5 => self.data_type,
-            _ => return Err(ResourceError { class: 0x42, detail: 0x10 }),
+            _ => return Err(ResourceError::OFFSET_TOO_HIGH),
         };
         Ok(Self::cut(&[0, value], 0, length))
     }
 
     fn read(&self, offset: u16, length: Length) -> Result<Data, ResourceError> {
         if offset > u16::from(self.size) {
-            return Err(ResourceError { class: 0x42, detail: 0x10 });
+            return Err(ResourceError::OFFSET_TOO_HIGH);
         }
         Ok(Self::cut(&self.data, offset, length))
     }
 
     fn write(&mut self, indirect: bool, offset: u16, data: &Data) -> Result<Data, ResourceError> {
         if !indirect || self.write_level >= READ_ONLY {
-            return Err(ResourceError { class: 0x41, detail: 0x10 });
+            return Err(ResourceError::NOT_WRITABLE);
         }
         let end = usize::from(offset).saturating_add(data.as_bytes().len());
         if end > usize::from(self.size) {
-            return Err(ResourceError { class: 0x42, detail: 0x10 });
+            return Err(ResourceError::OFFSET_TOO_HIGH);
         }
         for (to, from) in self.data.iter_mut().skip(usize::from(offset)).zip(data.as_bytes()) {
             *to = *from;

@@ -1,5 +1,8 @@
-use super::{MessageBytes, checked};
-use crate::Error;
+use core::fmt;
+
+use super::resource::write_address;
+use super::{MessageBytes, Offset, ResourceAddress, ResourceError, checked};
+use crate::error::Error;
 
 /// LLEN: how many data bytes a long message carries or asks for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Default)]
@@ -45,8 +48,11 @@ impl Length {
 
 /// 0, 2, 4 or 8 bytes of data.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(
+    feature = "serde",
+    derive(serde::Serialize, serde::Deserialize),
+    serde(try_from = "(Length, [u8; 8])", into = "(Length, [u8; 8])")
+)]
 pub struct Data {
     bytes: [u8; 8],
     length: Length,
@@ -75,6 +81,16 @@ impl Data {
         Ok(data)
     }
 
+    /// Eight bytes.
+    pub const fn eight(bytes: [u8; 8]) -> Self {
+        Self { bytes, length: Length::Eight }
+    }
+
+    /// All eight bytes, 0 after the data.
+    pub const fn padded(&self) -> [u8; 8] {
+        self.bytes
+    }
+
     /// LLEN.
     pub const fn length(&self) -> Length {
         self.length
@@ -86,85 +102,29 @@ impl Data {
     }
 }
 
-/// Address of a resource, 10 bits.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(try_from = "u16", into = "u16"))]
-pub struct ResourceAddress(u16);
-
-impl ResourceAddress {
-    /// "ROOT".
-    pub const ROOT: Self = Self(0x000);
-    /// "RESOLUTN": steps a turn, 4 bytes.
-    pub const RESOLUTN: Self = Self(0x081);
-    /// Date of the firmware.
-    pub const FWDATE: Self = Self(0x086);
-    /// "EESIZE".
-    pub const EESIZE: Self = Self(0x087);
-    /// First resource of the user data.
-    pub const USER: Self = Self(0x100);
-    /// Access key.
-    pub const ACCESS_KEY: Self = Self(0x105);
-    /// "UWARNING".
-    pub const UWARNING: Self = Self(0x107);
-
-    /// `None` above 3FFh.
-    pub const fn new(address: u16) -> Option<Self> {
-        if address < 1 << 10 { Some(Self(address)) } else { None }
-    }
-
-    /// The address, 0..=3FFh.
-    pub const fn get(self) -> u16 {
-        self.0
-    }
-}
-
-impl TryFrom<u16> for ResourceAddress {
+impl TryFrom<(Length, [u8; 8])> for Data {
     type Error = Error;
 
-    fn try_from(address: u16) -> Result<Self, Error> {
-        Self::new(address).ok_or(Error::Header { got: address, want: 0x3ff })
+    /// Bytes after the data have to be 0.
+    fn try_from((length, bytes): (Length, [u8; 8])) -> Result<Self, Error> {
+        let data = Self::new(bytes.get(..length.bytes()).unwrap_or(&bytes))?;
+        if data.bytes == bytes { Ok(data) } else { Err(Error::DataLength { len: 8 }) }
     }
 }
 
-impl From<ResourceAddress> for u16 {
-    fn from(address: ResourceAddress) -> Self {
-        address.0
+impl From<Data> for (Length, [u8; 8]) {
+    fn from(data: Data) -> Self {
+        (data.length, data.bytes)
     }
 }
 
-/// Offset within a resource, 15 bits.
-///
-/// In direct reads it selects an attribute (SICK manual, p. 87): 0 name, 1 data size, 2 read level, 3 write level,
-/// 4 time-out in ms (255: more than 254), 5 data type.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(try_from = "u16", into = "u16"))]
-pub struct Offset(u16);
-
-impl Offset {
-    /// `None` above 7FFFh.
-    pub const fn new(offset: u16) -> Option<Self> {
-        if offset < 1 << 15 { Some(Self(offset)) } else { None }
-    }
-
-    /// The offset, 0..=7FFFh.
-    pub const fn get(self) -> u16 {
-        self.0
-    }
-}
-
-impl TryFrom<u16> for Offset {
-    type Error = Error;
-
-    fn try_from(offset: u16) -> Result<Self, Error> {
-        Self::new(offset).ok_or(Error::Header { got: offset, want: 0x7fff })
-    }
-}
-
-impl From<Offset> for u16 {
-    fn from(offset: Offset) -> Self {
-        offset.0
+/// `4D 4F 54 4F`
+impl fmt::Display for Data {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        for (at, byte) in self.as_bytes().iter().enumerate() {
+            write!(f, "{}{byte:02X}", if at == 0 { "" } else { " " })?;
+        }
+        Ok(())
     }
 }
 
@@ -203,7 +163,6 @@ pub enum Access {
 /// assert_eq!(answer.map(|data| data.as_bytes() == b"RESOLUTN"), Ok(true));
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "arbitrary", derive(arbitrary::Arbitrary))]
 pub struct LongRequest {
@@ -223,13 +182,13 @@ const LOFF: u8 = 0x20;
 const LIND: u8 = 0x10;
 
 const fn header(address: ResourceAddress, read: bool, off: bool, indirect: bool, length: Length) -> [u8; 2] {
-    let [high, low] = address.0.to_be_bytes();
+    let [high, low] = address.get().to_be_bytes();
     let flags = if read { LRW } else { 0 } | if off { LOFF } else { 0 } | if indirect { LIND } else { 0 };
     [MARK | flags | length.code() << 2 | high, low]
 }
 
 const fn address(first: u8, second: u8) -> ResourceAddress {
-    ResourceAddress(u16::from_be_bytes([first & 3, second]))
+    ResourceAddress::truncate(u16::from_be_bytes([first & 3, second]))
 }
 
 /// Bytes of a long request that begins with this byte.
@@ -258,48 +217,62 @@ impl LongRequest {
         matches!(self.access, Access::Read(_))
     }
 
-    /// The bytes to send.
-    pub fn emit(&self) -> MessageBytes {
+    /// PC_ADD_H and PC_ADD_L of the request.
+    pub(crate) const fn header(&self) -> [u8; 2] {
         let length = match &self.access {
             Access::Read(length) => *length,
             Access::Write(data) => data.length,
         };
+        header(self.address, self.is_read(), self.offset.is_some(), self.indirect, length)
+    }
+
+    /// The bytes to send.
+    pub fn emit(&self) -> MessageBytes {
+        self.body().sealed()
+    }
+
+    /// The bytes before the CRC.
+    pub(super) fn body(&self) -> MessageBytes {
         let mut bytes = MessageBytes::EMPTY;
-        bytes.push(&header(self.address, self.is_read(), self.offset.is_some(), self.indirect, length));
+        bytes.push(&self.header());
         if let Some(offset) = self.offset {
-            bytes.push(&(offset.0 | 0x8000).to_be_bytes());
+            bytes.push(&(offset.get() | 0x8000).to_be_bytes());
         }
         if let Access::Write(data) = &self.access {
             bytes.push(data.as_bytes());
         }
-        bytes.sealed()
+        bytes
     }
 
-    /// What an encoder makes of received bytes. Bytes behind the message are left alone.
+    /// What an encoder makes of received bytes. Bytes after the message are left alone.
     ///
     /// # Errors
     /// [`Error::Truncated`], [`Error::ShortMessageStart`], [`Error::Crc`], and [`Error::ShortMessageStart`] for an
     /// OFF_H without its marker bit.
     pub fn parse(bytes: &[u8]) -> Result<Self, Error> {
         let first = long_start(bytes)?;
-        let covered = checked(bytes, request_len(first))?;
-        let (Some([_, low]), Some(mut rest)) = (covered.first_chunk(), covered.get(2..)) else {
+        Self::of_covered(checked(bytes, request_len(first))?)
+    }
+
+    /// From the bytes before a right CRC.
+    pub(super) fn of_covered(covered: &[u8]) -> Result<Self, Error> {
+        let (Some([first, low]), Some(mut rest)) = (covered.first_chunk(), covered.get(2..)) else {
             return Err(Error::Truncated { got: 0, want: 2 });
         };
         let mut offset = None;
-        if let (true, Some(([high, low], behind))) = (first & LOFF != 0, rest.split_first_chunk()) {
+        if let (true, Some(([high, low], after))) = (first & LOFF != 0, rest.split_first_chunk()) {
             if high & MARK == 0 {
                 return Err(Error::ShortMessageStart { first: *high });
             }
-            offset = Some(Offset(u16::from_be_bytes([high & 0x7f, *low])));
-            rest = behind;
+            offset = Some(Offset::truncate(u16::from_be_bytes([*high, *low])));
+            rest = after;
         }
         let access = if first & LRW != 0 {
             Access::Read(Length::from_code(first >> 2))
         } else {
             Access::Write(Data::new(rest)?)
         };
-        Ok(Self { address: address(first, *low), indirect: first & LIND != 0, offset, access })
+        Ok(Self { address: address(*first, *low), indirect: first & LIND != 0, offset, access })
     }
 
     /// The data in the answer to this request; none after a write.
@@ -309,37 +282,23 @@ impl LongRequest {
     /// sound answer is for another request, [`Error::Resource`] if the encoder refused.
     pub fn parse_answer(&self, bytes: &[u8]) -> Result<Data, Error> {
         let answer = LongAnswer::parse(bytes)?;
+        self.check_answer(answer)?;
+        answer.result.map_err(|error| Error::Resource { error })
+    }
+
+    /// Whether a sound answer belongs to this request.
+    pub(super) fn check_answer(&self, answer: LongAnswer) -> Result<(), Error> {
         let want = header(self.address, self.is_read(), false, self.indirect, Length::None);
         let got = header(answer.address, answer.read, false, answer.indirect, Length::None);
         if got != want {
             return Err(Error::Header { got: u16::from_be_bytes(got), want: u16::from_be_bytes(want) });
         }
-        answer.result.map_err(|ResourceError { class, detail }| Error::Resource { class, detail })
+        Ok(())
     }
-}
-
-/// Why an encoder refuses a long message (SICK manual, p. 85). On the line the detail comes first.
-///
-/// | class | |
-/// |---|---|
-/// | 40h | resource and address errors, details 10h..16h |
-/// | 41h | access errors, 10h..14h |
-/// | 42h | data errors, 10h..12h |
-/// | 43h | internal errors, 11h..17h |
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-#[cfg_attr(feature = "arbitrary", derive(arbitrary::Arbitrary))]
-pub struct ResourceError {
-    /// Class.
-    pub class: u8,
-    /// Detail, within its class.
-    pub detail: u8,
 }
 
 /// The encoder's answer to a long message. LOFF = 1 marks an error; then two bytes of error code follow.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "arbitrary", derive(arbitrary::Arbitrary))]
 pub struct LongAnswer {
@@ -359,69 +318,100 @@ impl LongAnswer {
         Self { address: request.address, read: request.is_read(), indirect: request.indirect, result }
     }
 
+    /// PC_ADD_H and PC_ADD_L of the answer.
+    pub(crate) const fn header(&self) -> [u8; 2] {
+        let (error, length) = match &self.result {
+            Ok(data) if self.read => (false, data.length),
+            Ok(_) => (false, Length::None),
+            Err(_) => (true, Length::Two),
+        };
+        header(self.address, self.read, error, self.indirect, length)
+    }
+
     /// The bytes to send. Data of an acknowledged write are not sent.
     pub fn emit(&self) -> MessageBytes {
+        self.body().sealed()
+    }
+
+    /// The bytes before the CRC.
+    pub(super) fn body(&self) -> MessageBytes {
         let mut bytes = MessageBytes::EMPTY;
+        bytes.push(&self.header());
         match &self.result {
             Ok(data) => {
                 let data = if self.read { *data } else { Data::NONE };
-                bytes.push(&header(self.address, self.read, false, self.indirect, data.length));
                 bytes.push(data.as_bytes());
             }
             Err(error) => {
-                bytes.push(&header(self.address, self.read, true, self.indirect, Length::Two));
-                bytes.push(&[error.detail, error.class]);
+                bytes.push(&[error.detail(), error.class_code()]);
             }
         }
-        bytes.sealed()
+        bytes
     }
 
-    /// Reads an answer. Bytes behind it are left alone.
+    /// Reads an answer. Bytes after it are left alone.
     ///
     /// # Errors
     /// [`Error::Truncated`], [`Error::ShortMessageStart`], [`Error::Crc`]; [`Error::DataLength`] for an error answer
     /// without its two bytes.
     pub fn parse(bytes: &[u8]) -> Result<Self, Error> {
         let first = long_start(bytes)?;
-        let covered = checked(bytes, answer_len(first))?;
-        let (Some([_, low]), Some(rest)) = (covered.first_chunk(), covered.get(2..)) else {
+        Self::of_covered(checked(bytes, answer_len(first))?)
+    }
+
+    /// From the bytes before a right CRC.
+    pub(super) fn of_covered(covered: &[u8]) -> Result<Self, Error> {
+        let (Some([first, low]), Some(rest)) = (covered.first_chunk(), covered.get(2..)) else {
             return Err(Error::Truncated { got: 0, want: 2 });
         };
         let result = match (first & LOFF != 0, rest) {
             (false, data) => Ok(Data::new(data)?),
-            (true, [detail, class, ..]) => Err(ResourceError { class: *class, detail: *detail }),
+            (true, [detail, class, ..]) => Err(ResourceError::new(*class, *detail)),
             (true, _) => return Err(Error::DataLength { len: 0 }),
         };
-        Ok(Self { address: address(first, *low), read: first & LRW != 0, indirect: first & LIND != 0, result })
+        Ok(Self { address: address(*first, *low), read: first & LRW != 0, indirect: first & LIND != 0, result })
     }
 }
 
+/// `indirect read of 081h RESOLUTN, 4 bytes, offset 0`
+impl fmt::Display for LongRequest {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(if self.indirect { "indirect " } else { "direct " })?;
+        f.write_str(if self.is_read() { "read of " } else { "write to " })?;
+        write_address(f, self.address)?;
+        match &self.access {
+            Access::Read(length) => write!(f, ", {} bytes", length.bytes())?,
+            Access::Write(data) if data.length() == Length::None => f.write_str(" without data")?,
+            Access::Write(data) => write!(f, ": {data}")?,
+        }
+        self.offset.map_or(Ok(()), |offset| write!(f, ", offset {offset}"))
+    }
+}
+
+/// `081h RESOLUTN holds 00 80 00 00`
+impl fmt::Display for LongAnswer {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write_address(f, self.address)?;
+        match &self.result {
+            Ok(data) if self.read => write!(f, " holds {data}"),
+            Ok(_) => f.write_str(" is written"),
+            Err(error) => write!(f, " refused: {error}"),
+        }
+    }
+}
+
+crate::ranged::format_as_displayed!(Data, LongRequest, LongAnswer);
+
 #[cfg(feature = "arbitrary")]
-mod any {
-    use super::{Data, Length, Offset, ResourceAddress};
-    use arbitrary::{Arbitrary, Result, Unstructured};
-
-    impl<'a> Arbitrary<'a> for ResourceAddress {
-        fn arbitrary(from: &mut Unstructured<'a>) -> Result<Self> {
-            Ok(Self(u16::arbitrary(from)? & 0x3ff))
+#[cfg_attr(docsrs, doc(cfg(feature = "arbitrary")))]
+impl<'a> arbitrary::Arbitrary<'a> for Data {
+    fn arbitrary(from: &mut arbitrary::Unstructured<'a>) -> arbitrary::Result<Self> {
+        let length = Length::arbitrary(from)?;
+        let mut bytes = [0; 8];
+        for byte in bytes.iter_mut().take(length.bytes()) {
+            *byte = u8::arbitrary(from)?;
         }
-    }
-
-    impl<'a> Arbitrary<'a> for Offset {
-        fn arbitrary(from: &mut Unstructured<'a>) -> Result<Self> {
-            Ok(Self(u16::arbitrary(from)? & 0x7fff))
-        }
-    }
-
-    impl<'a> Arbitrary<'a> for Data {
-        fn arbitrary(from: &mut Unstructured<'a>) -> Result<Self> {
-            let length = Length::arbitrary(from)?;
-            let mut bytes = [0; 8];
-            for byte in bytes.iter_mut().take(length.bytes()) {
-                *byte = u8::arbitrary(from)?;
-            }
-            Ok(Self { bytes, length })
-        }
+        Ok(Self { bytes, length })
     }
 }
 

@@ -1,5 +1,8 @@
-use super::{Collector, LongAnswer, LongRequest, MessageBytes, ShortAnswer, ShortRequest, answer_len};
-use crate::{EncoderSymbol, Error, MasterSymbol};
+use super::{
+    Collector, Gathered, LongAnswer, LongRequest, MessageBytes, Sender, ShortAnswer, ShortRequest, answer_len,
+};
+use crate::error::Error;
+use crate::parameter::{EncoderSymbol, MasterSymbol};
 
 /// The master's side of the parameters channel: one short and one long message can be under way.
 ///
@@ -16,7 +19,9 @@ pub struct Requester {
     collector: Collector,
     short: Slot<ShortRequest>,
     long: Slot<LongRequest>,
-    sending: Option<Sending>,
+    /// What the two messages look like on the line, made when they are started.
+    bodies: [MessageBytes; 2],
+    sending: Option<Sender>,
     reset: bool,
 }
 
@@ -66,13 +71,6 @@ enum Slot<T> {
     },
 }
 
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-struct Sending {
-    bytes: MessageBytes,
-    at: u8,
-}
-
 /// What came to its end in an H-frame.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -92,7 +90,15 @@ impl<T: Copy> Slot<T> {
 impl Requester {
     /// With nothing under way.
     pub const fn new(limits: Limits) -> Self {
-        Self { limits, collector: Collector::new(), short: Slot::Free, long: Slot::Free, sending: None, reset: false }
+        Self {
+            limits,
+            collector: Collector::new(),
+            short: Slot::Free,
+            long: Slot::Free,
+            bodies: [MessageBytes::EMPTY; 2],
+            sending: None,
+            reset: false,
+        }
     }
 
     /// FRES: no short message is under way.
@@ -109,11 +115,12 @@ impl Requester {
     ///
     /// # Errors
     /// [`Error::Busy`].
-    pub const fn start_short(&mut self, request: ShortRequest) -> Result<(), Error> {
+    pub fn start_short(&mut self, request: ShortRequest) -> Result<(), Error> {
         if !self.short.is_free() {
             return Err(Error::Busy);
         }
         self.short = Slot::Queued { request, tries: 0 };
+        self.bodies[0] = request.body();
         Ok(())
     }
 
@@ -121,11 +128,12 @@ impl Requester {
     ///
     /// # Errors
     /// [`Error::Busy`].
-    pub const fn start_long(&mut self, request: LongRequest) -> Result<(), Error> {
+    pub fn start_long(&mut self, request: LongRequest) -> Result<(), Error> {
         if !self.long.is_free() {
             return Err(Error::Busy);
         }
         self.long = Slot::Queued { request, tries: 0 };
+        self.bodies[1] = request.body();
         Ok(())
     }
 
@@ -153,9 +161,7 @@ impl Requester {
             return MasterSymbol::Init;
         }
         if let Some(sending) = &mut self.sending {
-            let nibble = sending.bytes.nibble(sending.at);
-            sending.at = sending.at.saturating_add(1);
-            if let Some(nibble) = nibble {
+            if let Some(nibble) = sending.next() {
                 return MasterSymbol::Data(nibble);
             }
             // One IDLE at least before the next message.
@@ -164,26 +170,30 @@ impl Requester {
             return MasterSymbol::Idle;
         }
         match self.next() {
-            Some(bytes) => {
-                self.sending = Some(Sending { bytes, at: 1 });
-                bytes.nibble(0).map_or(MasterSymbol::Idle, MasterSymbol::Data)
+            Some(body) => {
+                let mut sender = Sender::new(body);
+                let first = sender.next();
+                self.sending = Some(sender);
+                first.map_or(MasterSymbol::Idle, MasterSymbol::Data)
             }
             None => MasterSymbol::Idle,
         }
     }
 
+    /// The message whose turn it is.
     fn next(&mut self) -> Option<MessageBytes> {
         if let Slot::Queued { request, tries } = self.short {
             self.short = Slot::Sending { request, tries: tries.saturating_add(1) };
-            return Some(request.emit());
+            return Some(self.bodies[0]);
         }
         if let Slot::Queued { request, tries } = self.long {
             self.long = Slot::Sending { request, tries: tries.saturating_add(1) };
-            return Some(request.emit());
+            return Some(self.bodies[1]);
         }
         None
     }
 
+    #[cold]
     fn sent(&mut self) {
         if let Slot::Sending { request, tries } = self.short {
             self.short = Slot::Waiting { request, tries, frames: 0 };
@@ -196,10 +206,16 @@ impl Requester {
     /// Takes the symbol of an answer; `None` if it was no good.
     pub fn receive(&mut self, symbol: Option<EncoderSymbol>) -> Finished {
         let mut finished = Finished::default();
+        self.take(symbol, &mut finished);
+        finished
+    }
+
+    /// The symbol of an answer; what came to its end goes into `finished`.
+    pub(crate) fn take(&mut self, symbol: Option<EncoderSymbol>, finished: &mut Finished) {
         match symbol {
             Some(EncoderSymbol::Data(nibble)) => {
                 if let Some(message) = self.collector.nibble(nibble, answer_len) {
-                    self.complete(&message, &mut finished);
+                    self.complete(&message, finished);
                 }
             }
             Some(EncoderSymbol::Idle | EncoderSymbol::Init) => self.collector.idle(),
@@ -221,23 +237,22 @@ impl Requester {
                 self.collector.finish();
             }
         }
-        self.count(&mut finished);
-        finished
+        self.count(finished);
     }
 
-    fn complete(&mut self, message: &MessageBytes, finished: &mut Finished) {
-        let bytes = message.as_bytes();
-        let is_long = bytes.first().is_some_and(|first| first & 0x80 != 0);
-        if let (true, Slot::Waiting { request, .. }) = (is_long, self.long) {
+    fn complete(&mut self, message: &Gathered, finished: &mut Finished) {
+        if let (true, Slot::Waiting { request, .. }) = (message.is_long(), self.long) {
             self.long = Slot::Free;
-            finished.long = Some(match request.parse_answer(bytes) {
-                Ok(_) | Err(Error::Resource { .. }) => LongAnswer::parse(bytes),
-                Err(e) => Err(e),
+            finished.long = Some(match message.covered() {
+                Some(covered) => {
+                    LongAnswer::of_covered(covered).and_then(|answer| request.check_answer(answer).map(|()| answer))
+                }
+                None => LongAnswer::parse(message.bytes.as_bytes()),
             });
         }
-        if let (false, Slot::Waiting { request, .. }) = (is_long, self.short) {
+        if let (false, Slot::Waiting { request, .. }) = (message.is_long(), self.short) {
             // A wrong one is passed over: the time-out sends the request again.
-            if let Ok(answer) = request.parse_answer(bytes) {
+            if let Some(Ok(answer)) = message.covered().map(|covered| request.answer_of_covered(covered)) {
                 self.short = Slot::Free;
                 finished.short = Some(Ok(answer));
             }
@@ -245,20 +260,22 @@ impl Requester {
     }
 
     /// Counts the frames of waiting.
+    #[inline]
     fn count(&mut self, finished: &mut Finished) {
-        if let Slot::Waiting { request, tries, frames } = self.short {
-            if frames >= self.limits.short_frames {
+        if let Slot::Waiting { request, tries, frames } = &mut self.short {
+            if *frames >= self.limits.short_frames {
+                let (request, tries) = (*request, *tries);
                 finished.short = self.again(request, tries, Error::NoAnswer { tries });
             } else {
-                self.short = Slot::Waiting { request, tries, frames: frames.saturating_add(1) };
+                *frames = frames.saturating_add(1);
             }
         }
-        if let Slot::Waiting { request, tries, frames } = self.long {
-            if frames >= self.limits.long_frames {
+        if let Slot::Waiting { tries, frames, .. } = &mut self.long {
+            if *frames >= self.limits.long_frames {
+                finished.long = Some(Err(Error::NoAnswer { tries: *tries }));
                 self.long = Slot::Free;
-                finished.long = Some(Err(Error::NoAnswer { tries }));
             } else {
-                self.long = Slot::Waiting { request, tries, frames: frames.saturating_add(1) };
+                *frames = frames.saturating_add(1);
             }
         }
     }
@@ -279,7 +296,7 @@ impl Requester {
 mod tests {
     use super::super::*;
     use super::*;
-    use crate::Nibble;
+    use crate::parameter::Nibble;
     use proptest::prelude::*;
     use std::vec::Vec;
 

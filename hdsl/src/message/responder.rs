@@ -1,5 +1,5 @@
-use super::{Collector, LongAnswer, LongRequest, MessageBytes, ShortAnswer, ShortRequest, request_len};
-use crate::{EncoderSymbol, MasterSymbol};
+use super::{Collector, LongAnswer, LongRequest, MessageBytes, Sender, ShortAnswer, ShortRequest, request_len};
+use crate::parameter::{EncoderSymbol, MasterSymbol};
 
 /// A sound request that an encoder received.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -9,6 +9,15 @@ pub enum Request {
     Short(ShortRequest),
     /// Access to a resource.
     Long(LongRequest),
+}
+
+impl core::fmt::Display for Request {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        match self {
+            Self::Short(request) => request.fmt(f),
+            Self::Long(request) => request.fmt(f),
+        }
+    }
 }
 
 /// The encoder's side of the parameters channel.
@@ -24,7 +33,7 @@ pub struct Responder {
     long: Option<MessageBytes>,
     /// SNAK, LNAK or INIT, to be sent between messages.
     signal: Option<EncoderSymbol>,
-    sending: Option<(MessageBytes, u8)>,
+    sending: Option<Sender>,
 }
 
 impl Default for Responder {
@@ -53,14 +62,13 @@ impl Responder {
             }
         };
         let message = self.collector.nibble(nibble, request_len)?;
-        let bytes = message.as_bytes();
-        if bytes.first().is_some_and(|first| first & 0x80 != 0) {
-            if let Ok(request) = LongRequest::parse(bytes) {
+        if message.is_long() {
+            if let Some(Ok(request)) = message.covered().map(LongRequest::of_covered) {
                 return Some(Request::Long(request));
             }
             self.signal = Some(EncoderSymbol::Lnak);
         } else {
-            if let Ok(request) = ShortRequest::parse(bytes) {
+            if let Some(Ok(request)) = message.covered().map(ShortRequest::of_covered) {
                 return Some(Request::Short(request));
             }
             self.signal = Some(EncoderSymbol::Snak);
@@ -75,20 +83,18 @@ impl Responder {
 
     /// Sends the answer to a short message as soon as the channel is free.
     pub fn answer_short(&mut self, answer: ShortAnswer) {
-        self.short = Some(answer.emit());
+        self.short = Some(answer.body());
     }
 
     /// Sends the answer to a long message as soon as the channel is free and no short answer is waiting.
     pub fn answer_long(&mut self, answer: &LongAnswer) {
-        self.long = Some(answer.emit());
+        self.long = Some(answer.body());
     }
 
     /// The symbol for the answer.
     pub fn transmit(&mut self) -> EncoderSymbol {
-        if let Some((bytes, at)) = &mut self.sending {
-            let nibble = bytes.nibble(*at);
-            *at = at.saturating_add(1);
-            if let Some(nibble) = nibble {
+        if let Some(sending) = &mut self.sending {
+            if let Some(nibble) = sending.next() {
                 return EncoderSymbol::Data(nibble);
             }
             self.sending = None;
@@ -98,9 +104,11 @@ impl Responder {
             return signal;
         }
         match self.short.take().or_else(|| self.long.take()) {
-            Some(bytes) => {
-                self.sending = Some((bytes, 1));
-                bytes.nibble(0).map_or(EncoderSymbol::Idle, EncoderSymbol::Data)
+            Some(body) => {
+                let mut sender = Sender::new(body);
+                let first = sender.next();
+                self.sending = Some(sender);
+                first.map_or(EncoderSymbol::Idle, EncoderSymbol::Data)
             }
             None => EncoderSymbol::Idle,
         }
@@ -122,7 +130,9 @@ mod tests {
                 let mut requests = 0;
                 for k in 0..8 {
                     let value = bytes.nibble(k).unwrap().get() ^ if k == at { flip } else { 0 };
-                    requests += u8::from(encoder.receive(MasterSymbol::Data(crate::Nibble::truncate(value))).is_some());
+                    requests += u8::from(
+                        encoder.receive(MasterSymbol::Data(crate::parameter::Nibble::truncate(value))).is_some(),
+                    );
                 }
                 encoder.receive(MasterSymbol::Idle);
                 assert_eq!(requests, 0);

@@ -1,9 +1,12 @@
+use core::fmt;
+
+use servowire_core::OutOfRange;
+
 use super::{MessageBytes, checked};
-use crate::Error;
+use crate::error::Error;
 
 /// A register of the encoder, 40h..=7Fh.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(try_from = "u8", into = "u8"))]
 pub struct RemoteRegister(u8);
 
@@ -39,10 +42,11 @@ impl RemoteRegister {
 }
 
 impl TryFrom<u8> for RemoteRegister {
-    type Error = Error;
+    type Error = OutOfRange;
 
-    fn try_from(address: u8) -> Result<Self, Error> {
-        Self::new(address).ok_or(Error::Header { got: u16::from(address), want: 0x40 })
+    fn try_from(address: u8) -> Result<Self, OutOfRange> {
+        let max = if address < 0x40 { 0x40 } else { 0x7f };
+        Self::new(address).ok_or(OutOfRange { got: address.into(), max })
     }
 }
 
@@ -61,7 +65,6 @@ impl From<RemoteRegister> for u8 {
 /// assert_eq!(read.parse_answer(&[0x7c, 0x07, 0x53, 0x3f]).map(|answer| answer.data), Ok(Some(7)));
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "arbitrary", derive(arbitrary::Arbitrary))]
 pub enum ShortRequest {
@@ -88,21 +91,31 @@ impl ShortRequest {
 
     /// The bytes to send.
     pub fn emit(self) -> MessageBytes {
+        self.body().sealed()
+    }
+
+    /// The bytes before the CRC.
+    pub(super) fn body(self) -> MessageBytes {
         let mut bytes = MessageBytes::EMPTY;
         bytes.push(&[self.first()]);
         if let Self::Write(_, value) = self {
             bytes.push(&[value]);
         }
-        bytes.sealed()
+        bytes
     }
 
-    /// What an encoder makes of received bytes. Bytes behind the message are left alone.
+    /// What an encoder makes of received bytes. Bytes after the message are left alone.
     ///
     /// # Errors
     /// [`Error::Truncated`], [`Error::LongMessageStart`], [`Error::Crc`].
     pub fn parse(bytes: &[u8]) -> Result<Self, Error> {
         let first = short_start(bytes)?;
-        match checked(bytes, super::request_len(first))? {
+        Self::of_covered(checked(bytes, super::request_len(first))?)
+    }
+
+    /// From the bytes before a right CRC.
+    pub(super) const fn of_covered(covered: &[u8]) -> Result<Self, Error> {
+        match covered {
             [first] => Ok(Self::Read(RemoteRegister::of_index(*first))),
             [first, value] => Ok(Self::Write(RemoteRegister::of_index(*first), *value)),
             // Never: a short message has one or two bytes before its CRC.
@@ -118,7 +131,11 @@ impl ShortRequest {
     /// request, so a changed direction shows as a wrong CRC.
     pub fn parse_answer(self, bytes: &[u8]) -> Result<ShortAnswer, Error> {
         short_start(bytes)?;
-        let covered = checked(bytes, super::answer_len(self.first()))?;
+        self.answer_of_covered(checked(bytes, super::answer_len(self.first()))?)
+    }
+
+    /// From the bytes before a right CRC.
+    pub(super) fn answer_of_covered(self, covered: &[u8]) -> Result<ShortAnswer, Error> {
         let got = covered.first().copied().unwrap_or(0);
         if got != self.first() {
             return Err(Error::Header { got: u16::from(got), want: u16::from(self.first()) });
@@ -137,7 +154,6 @@ fn short_start(bytes: &[u8]) -> Result<u8, Error> {
 
 /// The encoder's answer to a short message.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "arbitrary", derive(arbitrary::Arbitrary))]
 pub struct ShortAnswer {
@@ -150,14 +166,48 @@ pub struct ShortAnswer {
 impl ShortAnswer {
     /// The bytes to send.
     pub fn emit(self) -> MessageBytes {
+        self.body().sealed()
+    }
+
+    /// The bytes before the CRC.
+    pub(super) fn body(self) -> MessageBytes {
         let mut bytes = MessageBytes::EMPTY;
         match self.data {
             Some(data) => bytes.push(&[0x40 | self.register.index(), data]),
             None => bytes.push(&[self.register.index()]),
         }
-        bytes.sealed()
+        bytes
     }
 }
+
+/// `7Ch`
+impl fmt::Display for RemoteRegister {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{:02X}h", self.0)
+    }
+}
+
+/// `write register 7Fh = A5h`
+impl fmt::Display for ShortRequest {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Read(register) => write!(f, "read register {register}"),
+            Self::Write(register, value) => write!(f, "write register {register} = {value:02X}h"),
+        }
+    }
+}
+
+/// `register 7Ch holds 07h`
+impl fmt::Display for ShortAnswer {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self.data {
+            Some(data) => write!(f, "register {} holds {data:02X}h", self.register),
+            None => write!(f, "register {} is written", self.register),
+        }
+    }
+}
+
+crate::ranged::format_as_displayed!(RemoteRegister, ShortRequest, ShortAnswer);
 
 #[cfg(feature = "arbitrary")]
 impl<'a> arbitrary::Arbitrary<'a> for RemoteRegister {
@@ -182,6 +232,17 @@ mod tests {
     fn answer(request: ShortRequest, value: u8) -> ShortAnswer {
         let data = matches!(request, ShortRequest::Read(_)).then_some(value);
         ShortAnswer { register: request.register(), data }
+    }
+
+    #[test]
+    fn as_a_log_shows_them() {
+        use std::string::ToString;
+        let write = ShortRequest::Write(RemoteRegister::PING, 0xa5);
+        assert_eq!(write.to_string(), "write register 7Fh = A5h");
+        assert_eq!(answer(write, 0).to_string(), "register 7Fh is written");
+        assert_eq!(answer(ShortRequest::Read(RemoteRegister::SRSSI), 7).to_string(), "register 7Ch holds 07h");
+        assert_eq!(RemoteRegister::try_from(0x80), Err(OutOfRange { got: 0x80, max: 0x7f }));
+        assert_eq!(RemoteRegister::try_from(0x3f), Err(OutOfRange { got: 0x3f, max: 0x40 }));
     }
 
     #[test]

@@ -164,27 +164,57 @@ pub(super) const fn sub_blocks(word: u16) -> u8 {
     if x == 0xff || y == 0xff { 0xff } else { y << 5 | x }
 }
 
-/// 6-bit blocks for the line disparity code in line order: x = 0..=31, the version with more zeros.
+/// Marks a block with as many ones as zeros.
+pub(crate) const NEUTRAL: u8 = 0x80;
+
+/// 6-bit blocks for the line disparity code in line order: x = 0..=31, the version with more zeros, or [`NEUTRAL`].
 pub(crate) static SIX_MORE_ZEROS: [u8; 32] = {
     let mut table = [0; 32];
     let mut x = 0;
     while x < 32 {
         let block = if x == 28 { SIX_K28 } else { SIX[x] };
         let invert = block.count_ones() > 3 || x == 7;
-        table[x] = line(if invert { block ^ 0b11_1111 } else { block }, 6) as u8;
+        let neutral = if block.count_ones() == 3 { NEUTRAL } else { 0 };
+        table[x] = line(if invert { block ^ 0b11_1111 } else { block }, 6) as u8 | neutral;
         x += 1;
     }
     table
 };
 
-/// 4-bit blocks for the line disparity code in line order: y = 0..=7, the version with more zeros.
+/// 4-bit blocks for the line disparity code in line order: y = 0..=7, the version with more zeros, or [`NEUTRAL`].
 pub(crate) static FOUR_MORE_ZEROS: [u8; 8] = {
     let mut table = [0; 8];
     let mut y = 0;
     while y < 8 {
         let invert = FOUR[y].count_ones() > 2 || y == 3;
-        table[y] = line(if invert { FOUR[y] ^ 0b1111 } else { FOUR[y] }, 4) as u8;
+        let neutral = if FOUR[y].count_ones() == 2 { NEUTRAL } else { 0 };
+        table[y] = line(if invert { FOUR[y] ^ 0b1111 } else { FOUR[y] }, 4) as u8 | neutral;
         y += 1;
+    }
+    table
+};
+
+/// All words by the reduced rule: value, [`INVALID`] and [`SPECIAL`].
+pub(super) static REDUCED: [u16; 1024] = {
+    let mut table = [0; 1024];
+    let mut bits: u16 = 0;
+    while bits < 1024 {
+        let run_abcd = matches!(bits & 0b1111, 0 | 0b1111);
+        // e i f g h are bits 4..=8.
+        let run_eifgh = matches!(bits >> 4 & 0b1_1111, 0 | 0b1_1111);
+        let run_cdei = matches!(bits >> 2 & 0b1111, 0 | 0b1111);
+        // e in bit 4, i g h j in bits 5, 7, 8, 9.
+        let eighj = bits & 0b11_1011_0000;
+        let special = run_cdei || eighj == 0b11_1010_0000 || eighj == 0b00_0001_0000;
+        let mut entry = sub_blocks(bits) as u16;
+        if run_abcd || run_eifgh {
+            entry |= INVALID;
+        }
+        if special {
+            entry |= SPECIAL;
+        }
+        table[bits as usize] = entry;
+        bits += 1;
     }
     table
 };

@@ -53,7 +53,7 @@ fn run_length_is_at_most_five() {
             for rd in BOTH {
                 let (a, rd) = first.encode(rd);
                 let (b, _) = second.encode(rd);
-                let bits = u32::from(a.bits()) | u32::from(b.bits()) << 10;
+                let bits = u32::from(a.get()) | u32::from(b.get()) << 10;
                 let mut run = (1, 0);
                 for k in 1..20 {
                     run.0 = if bits >> k & 1 == bits >> (k - 1) & 1 { run.0 + 1 } else { 1 };

@@ -1,34 +1,41 @@
 //! Master, line and encoder on one bench.
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a test fails by panicking")]
 
+use hdsl::cable::{Cable, Disturbance};
 use hdsl::device::Device;
-use hdsl::line::{Disturbance, Line};
 use hdsl::master::{Master, Report, State};
-use hdsl::{EncoderId, Profile};
+use hdsl::registers::{Interrupts, Register, Registers};
+use hdsl::{Dialect, EncoderId};
 
 pub(crate) struct Bench {
     pub(crate) master: Master,
+    /// Image beside the receiver.
+    pub(crate) map: Registers,
+    /// Interrupt lines after the last frame.
+    pub(crate) interrupts: Interrupts,
     pub(crate) device: Device,
-    pub(crate) line: Line,
+    pub(crate) cable: Cable,
     /// Position at the last sampling edge.
     pub(crate) position: i64,
     pub(crate) speed: i64,
 }
 
 impl Bench {
-    pub(crate) fn new(profile: Profile, id: u32, disturbance: Disturbance) -> Self {
+    pub(crate) fn new(dialect: Dialect, id: u32, disturbance: Disturbance) -> Self {
         Self {
-            master: Master::new(profile),
+            master: Master::new(dialect),
+            map: Registers::new(&dialect),
+            interrupts: Interrupts::empty(),
             device: Device::new(EncoderId::new(id).unwrap()),
-            line: Line::new(disturbance, 1),
+            cable: Cable::new(disturbance, 1),
             position: 1 << 30,
             speed: 0,
         }
     }
 
     /// With an encoder of 32 bits.
-    pub(crate) fn on_cable(profile: Profile, metres: u32) -> Self {
-        Self::new(profile, 0x00153, Disturbance::cable(metres))
+    pub(crate) fn on_cable(dialect: Dialect, metres: u32) -> Self {
+        Self::new(dialect, 0x00153, Disturbance::metres(metres))
     }
 
     /// One H-frame.
@@ -38,10 +45,18 @@ impl Bench {
 
     pub(crate) fn frame_with(&mut self, late: Option<i16>) -> Report {
         self.position += self.speed;
-        let head = self.line.down(self.master.transmission().head.bits());
+        let head = self.cable.down(self.master.transmission().head.bits());
         let answer = self.device.answer(head, self.position as u64);
-        let samples = self.line.up(answer);
-        self.master.finish(&samples, late).unwrap()
+        let samples = self.cable.up(answer);
+        let report = *self.master.finish(&samples, late).unwrap();
+        self.interrupts = self.map.apply(&report);
+        report
+    }
+
+    /// What an application writes over the bus.
+    #[allow(dead_code, reason = "not all tests do")]
+    pub(crate) fn write(&mut self, register: Register, value: u8) {
+        self.map.write(&mut self.master, register as u8, value).unwrap();
     }
 
     pub(crate) fn frames(&mut self, count: usize) {
@@ -54,7 +69,7 @@ impl Bench {
     pub(crate) fn lock(&mut self) -> &mut Self {
         for _ in 0..2000 {
             let _ = self.frame();
-            if self.master.state() == State::Running && self.aligned() && self.master.registers().quality() == 15 {
+            if self.master.state() == State::Running && self.aligned() && self.map.quality() == 15 {
                 return self;
             }
         }
@@ -62,6 +77,6 @@ impl Bench {
     }
 
     pub(crate) fn aligned(&self) -> bool {
-        self.master.phase() == hdsl::Phase::Check && self.master.registers().position() == self.position as u64
+        self.master.phase() == hdsl::Phase::Check && self.map.position() == self.position as u64
     }
 }

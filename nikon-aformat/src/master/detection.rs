@@ -1,9 +1,15 @@
-use super::{EepromRead, Polling, Step};
-use crate::{EncoderAddress, Error, Operation, Profile, Request, Response, TypeWord};
+use super::{EepromRead, Step};
+use crate::error::Error;
+use crate::number::EncoderAddress;
+use crate::operation::Operation;
+use crate::request::Request;
+use crate::resolution::Resolution;
+use crate::response::Response;
+use crate::type_word::TypeWord;
 
 /// Finds an encoder and its widths: command 4, then the type word of the EEPROM.
 ///
-/// The bit rate is part of the encoder's order code and has to be tried out by the caller: no reply means another rate.
+/// The bit rate is part of the encoder's order code and has to be tried out by the caller: no response means another rate.
 /// One drive maker tries 4 Mbit/s first, then 2.5.
 ///
 /// On a line with several encoders ask each by its address with [`Detection::of`].
@@ -22,9 +28,9 @@ pub struct Detected {
     pub ea: EncoderAddress,
     /// Its type word.
     pub type_word: TypeWord,
-    /// Its widths, if the type word is one of the known ones, in a profile of version 2.1: nothing on the line tells the
+    /// Its widths, if the type word is one of the known ones, in a resolution of version 2.1: nothing on the line tells the
     /// version.
-    pub profile: Option<Profile>,
+    pub resolution: Option<Resolution>,
 }
 
 impl Detection {
@@ -50,36 +56,36 @@ impl Detection {
     }
 
     /// A transaction ended at `now_ns` with this outcome.
-    pub fn answer(&mut self, outcome: Result<Response, Error>, now_ns: u64) -> Step<Detected> {
+    pub fn receive(&mut self, outcome: Result<Response, Error>, now_ns: u64) -> Step<Detected> {
         let Some(mut reading) = self.reading else {
-            let soon = now_ns.saturating_add(crate::REQUEST_GAP_NS.into());
+            let soon = now_ns.saturating_add(crate::timing::REQUEST_GAP_NS.into());
             return match outcome {
                 Ok(response) => self.read(response.ea, soon),
-                Err(error) => Step::Failed { error, not_before_ns: soon },
+                Err(error) => Step::Failed { error, ready_ns: soon },
             };
         };
-        let step = reading.answer(outcome, now_ns);
+        let step = reading.receive(outcome, now_ns);
         self.reading = Some(reading);
         match step {
             Step::Send { request, not_before_ns } => Step::Send { request, not_before_ns },
-            Step::Failed { error, not_before_ns } => Step::Failed { error, not_before_ns },
-            Step::Done { value, not_before_ns } => {
+            Step::Failed { error, ready_ns } => Step::Failed { error, ready_ns },
+            Step::Done { value, ready_ns } => {
                 let type_word = TypeWord(value);
-                let value = Detected { ea: reading.ea(), type_word, profile: type_word.profile() };
-                Step::Done { value, not_before_ns }
+                let value = Detected { ea: reading.ea(), type_word, resolution: type_word.resolution() };
+                Step::Done { value, ready_ns }
             }
         }
     }
 
     const fn read(&mut self, ea: EncoderAddress, not_before_ns: u64) -> Step<Detected> {
-        let mut reading = EepromRead::new(ea, TypeWord::EEPROM_ADDRESS, Polling::READ);
+        let mut reading = EepromRead::new(ea, TypeWord::EEPROM_ADDRESS);
         let first = reading.start(not_before_ns);
         self.reading = Some(reading);
         match first {
             Step::Send { request, not_before_ns } => Step::Send { request, not_before_ns },
             // Never: a read begins with a request.
-            Step::Done { not_before_ns, .. } | Step::Failed { not_before_ns, .. } => {
-                Step::Failed { error: Error::NoResponse, not_before_ns }
+            Step::Done { ready_ns, .. } | Step::Failed { ready_ns, .. } => {
+                Step::Failed { error: Error::NoResponse, ready_ns }
             }
         }
     }

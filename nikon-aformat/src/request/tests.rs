@@ -4,7 +4,7 @@ use std::vec::Vec;
 
 /// One operation of each kind.
 pub(crate) fn every(address: u8, bank: u8, data: u16, wide: u32) -> Vec<Operation> {
-    let (id, coefficient) = (U24::truncate(wide), U19::truncate(wide));
+    let (id, coefficient) = (EncoderId::truncate(wide), U19::truncate(wide));
     let mut all: Vec<_> = Command::ALL.into_iter().filter_map(Operation::without_arguments).collect();
     all.extend([
         Operation::EepromRead { address },

@@ -1,4 +1,9 @@
-use crate::{Alarm, BlockSize, CommandBlock, CyclicCode, ErrorCode, LEN, MacId, NonCyclicCode, SubCode, split32};
+use super::literals::{
+    ERR86_0, ERR86_1, NON_CYCLIC, SUB, WRONG_CYCLIC, WRONG_DIRECTION, WRONG_MAC_ID, WRONG_NON_CYCLIC,
+};
+use crate::block::BlockSize;
+use crate::error_code::{Alarm, ErrorCode};
+use crate::header::MacId;
 
 /// What a drive finds wrong with the header, the codes and the sub block of a command.
 ///
@@ -19,6 +24,10 @@ impl Verdict {
     pub fn is_discarded(&self) -> bool {
         self.alarm.is_some()
     }
+
+    const fn discard(error: u16, (main, sub): (u8, u8)) -> Self {
+        Self { error: Some(ErrorCode(error)), sub_error: None, alarm: Some(Alarm { main, sub }) }
+    }
 }
 
 /// The checks of a drive with address `mac_id`, in this order: C/R (0012h), MAC-ID (0011h), cyclic code (0021h),
@@ -28,35 +37,30 @@ impl Verdict {
 /// and is this crate's. A block of the wrong size cannot happen on the ring; it counts as not addressed to
 /// this drive.
 pub fn check(bytes: &[u8], size: BlockSize, mac_id: MacId) -> Verdict {
-    let fault = |error, alarm| Verdict { error: Some(error), sub_error: None, alarm };
-    let (main, sub): (&[u8; LEN], Option<&[u8; LEN]>) = match size {
-        BlockSize::Bytes16 => match crate::exact(bytes) {
-            Ok(main) => (main, None),
-            Err(_) => return fault(ErrorCode::MAC_ID, Some(Alarm::CYCLIC_DATA)),
-        },
-        BlockSize::Bytes32 => match split32(bytes) {
-            Ok((main, sub)) => (main, Some(sub)),
-            Err(_) => return fault(ErrorCode::MAC_ID, Some(Alarm::CYCLIC_DATA)),
-        },
-    };
-    let Ok(block) = CommandBlock::of(main) else { return fault(ErrorCode::DIRECTION, Some(Alarm::CYCLIC_DATA)) };
-    if block.mac_id() != mac_id {
-        return fault(ErrorCode::MAC_ID, Some(Alarm::CYCLIC_DATA));
+    let &[byte0, byte1, ..] = bytes else { return Verdict::discard(WRONG_MAC_ID, ERR86_0) };
+    if bytes.len() != size.bytes() {
+        return Verdict::discard(WRONG_MAC_ID, ERR86_0);
     }
-    let code = block.code();
-    if CyclicCode::new(code.cyclic_bits()).is_none() {
-        return fault(ErrorCode::CYCLIC_CODE, Some(Alarm::CYCLIC_CODE));
+    if byte0 & 0x80 != 0 {
+        return Verdict::discard(WRONG_DIRECTION, ERR86_0);
+    }
+    if byte0 & 0x1f != mac_id.get() {
+        return Verdict::discard(WRONG_MAC_ID, ERR86_0);
+    }
+    if byte1 >> 4 & 7 > 4 {
+        return Verdict::discard(WRONG_CYCLIC, ERR86_1);
     }
     let mut verdict = Verdict::default();
-    if NonCyclicCode::new(code.noncyclic_bits()).is_none() {
-        verdict.error = Some(ErrorCode::NON_CYCLIC_CODE);
+    if !NON_CYCLIC.contains(&(byte1 & 0x0f)) {
+        verdict.error = Some(ErrorCode(WRONG_NON_CYCLIC));
     }
-    match sub {
-        Some(sub) if sub[0] & 0x80 == 0 => {
-            verdict.sub_error = Some(ErrorCode::DIRECTION);
-            verdict.alarm = Some(Alarm::CYCLIC_DATA);
+    match bytes.get(16) {
+        Some(byte16) if byte16 & 0x80 == 0 => {
+            verdict.sub_error = Some(ErrorCode(WRONG_DIRECTION));
+            let (main, sub) = ERR86_0;
+            verdict.alarm = Some(Alarm { main, sub });
         }
-        Some(sub) if SubCode::new(sub[0] & 15).is_none() => verdict.sub_error = Some(ErrorCode::NON_CYCLIC_CODE),
+        Some(byte16) if !SUB.contains(&(byte16 & 0x0f)) => verdict.sub_error = Some(ErrorCode(WRONG_NON_CYCLIC)),
         _ => {}
     }
     verdict

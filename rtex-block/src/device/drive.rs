@@ -1,13 +1,30 @@
+mod execute;
+mod sub_block;
+
+use execute::Job;
+
 use super::check::{Verdict, check};
+use super::config::DriveConfig;
+use super::literals::{
+    CP, CT, CV, ERR27_4, ERR86_2, ERR91_1, HARD_STOP, NOP, PAUSE, PP, PROFILE, PROFILE_IDLE, SERVO_ON, SMOOTH_STOP,
+    WRONG_MODE,
+};
 use super::motion::{Drivemode, Motion};
 use super::parameters::{ACCELERATION, DECELERATION, Parameters, RESPONSE_DATA, SPEED_UNIT, SUB_RESPONSE_DATA};
 use super::profile::Ramp;
-use super::service::{Job, text};
-use super::settings::Settings;
-use crate::{
-    Alarm, BlockSize, Code, CommandBlock, ControlBits, CyclicCode, ErrorCode, Execution, Header, LEN, LEN32, Nibble,
-    Request, Response, Response32, StatusFlags, SubCode, SubCommand, SubResponse, TypeCode, UpdateCounter, split32,
-};
+use crate::block::{BlockSize, LEN, LEN32};
+use crate::code::{Code, NonCyclicCode};
+use crate::error_code::{Alarm, ErrorCode};
+use crate::execution::Execution;
+use crate::header::{Header, UpdateCounter};
+use crate::noncyclic_command::NonCyclicCommand;
+use crate::response::Response;
+use crate::status::StatusFlags;
+use crate::sub::{Response32, SubResponse, split32};
+use crate::type_code::{Nibble, Pr};
+
+/// Command units per second.
+const HOMING_SPEED: i64 = 1_000_000;
 
 /// A model of a drive: every exchange takes a command block and gives a response block.
 ///
@@ -15,30 +32,38 @@ use crate::{
 /// so the echo of a code comes one command later than the echo of the counter. Blocks with a fault in header or
 /// cyclic code are thrown away and the command before stays in force; if that lasts the drive raises Err86.
 ///
-/// The motor follows its command position as a first-order lag; that is a model for tests, not for tuning.
+/// It shares no number with the master, and is as late, forgetful and literal as its [`Manners`](super::Manners) say. The motor
+/// follows its command position as a first-order lag; that is a model for tests, not for tuning.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Drive {
-    pub(super) settings: Settings,
-    pub(super) parameters: Parameters,
-    pub(super) motion: Motion,
-    pub(super) alarm: Option<Alarm>,
-    pub(super) history: [Option<Alarm>; 14],
-    pub(super) warning: u16,
-    pub(super) homed: bool,
-    pub(super) latches: [Option<i32>; 2],
+    config: DriveConfig,
+    parameters: Parameters,
+    motion: Motion,
+    alarm: Option<Alarm>,
+    history: [Option<Alarm>; 14],
+    warning: u16,
+    homed: bool,
+    latches: [Option<i32>; 2],
+    armed: [bool; 2],
+    homing: bool,
+    feed_forward: i32,
     main_power: bool,
     inputs: StatusFlags,
-    /// The command in force.
-    cyclic: CyclicCode,
-    control: ControlBits,
-    pub(super) data1: i32,
+    /// The command in force: cyclic code, Control_Bits, Command_Data1.
+    cyclic: u8,
+    control: u16,
+    data1: i32,
     target_speed: i32,
     /// What the next response echoes.
-    echo: Code,
-    pub(super) error: Option<ErrorCode>,
-    pub(super) job: Option<Job>,
+    echo: u8,
+    error: Option<ErrorCode>,
+    job: Option<Job>,
+    /// The request before, whose echoes linger, and for how many answers.
+    stale: Option<(NonCyclicCommand, u16)>,
     sub: SubResponse,
+    /// Responses that are not out yet.
+    pending: [Response; 3],
     /// Supervision.
     exchanges: u16,
     faults: u16,
@@ -51,35 +76,51 @@ pub struct Drive {
 
 impl Drive {
     /// A drive that has just got control power; main power is on, and nothing has been received.
-    pub const fn new(settings: Settings) -> Self {
+    pub const fn new(config: DriveConfig) -> Self {
+        let silent = Response {
+            mac_id: config.mac_id,
+            update_counter_echo: UpdateCounter::ZERO,
+            cmd_error: false,
+            code: Code::truncate(NOP),
+            status: StatusFlags::empty(),
+            response_data1: 0,
+            response_data2: 0,
+            response_data3: 0,
+        };
+        let sub = SubResponse {
+            cmd_error: false,
+            execution: Execution::empty(),
+            code: Nibble::ZERO,
+            type_code: 0,
+            index: 0,
+            data1: 0,
+            data2: 0,
+            data3: 0,
+        };
         Self {
-            settings,
+            config,
             parameters: Parameters::DEFAULT,
             motion: Motion::new(),
             alarm: None,
             history: [None; 14],
             warning: 0,
-            homed: false,
+            homed: config.manners.homed_at_start,
             latches: [None; 2],
+            armed: [false; 2],
+            homing: false,
+            feed_forward: 0,
             main_power: true,
             inputs: StatusFlags::empty(),
-            cyclic: CyclicCode::Nop,
-            control: ControlBits::empty(),
+            cyclic: NOP,
+            control: 0,
             data1: 0,
             target_speed: 0,
-            echo: Code::NOP,
+            echo: NOP,
             error: None,
             job: None,
-            sub: SubResponse {
-                cmd_error: false,
-                execution: Execution { err: false, wng: false, busy: false },
-                code: Nibble::ZERO,
-                type_code: 0,
-                index: 0,
-                data1: 0,
-                data2: 0,
-                data3: 0,
-            },
+            stale: None,
+            sub,
+            pending: [silent; 3],
             exchanges: 0,
             faults: 0,
             lost: 0,
@@ -109,15 +150,15 @@ impl Drive {
     /// A communication period in which no frame came.
     pub fn miss(&mut self) {
         self.lost = self.lost.saturating_add(1);
-        if self.lost == self.settings.lost_limit {
-            self.raise(self.settings.codes.communication_lost);
+        if self.lost == self.config.lost_limit {
+            self.raise(self.config.codes.communication_lost);
             self.exchanges = 0;
             self.counter = None;
         }
         self.tick();
     }
 
-    /// Servo_Active: the motor is energised.
+    /// The motor is energised. Servo_Active may say so for longer.
     pub const fn is_active(&self) -> bool {
         self.motion.is_active()
     }
@@ -127,14 +168,24 @@ impl Drive {
         self.motion.actual
     }
 
+    /// The feed-forward in force, from Command_Data3.
+    pub const fn feed_forward(&self) -> i32 {
+        self.feed_forward
+    }
+
     /// The active alarm.
     pub const fn alarm(&self) -> Option<Alarm> {
         self.alarm
     }
 
     /// How it was set up.
-    pub const fn settings(&self) -> &Settings {
-        &self.settings
+    pub const fn config(&self) -> &DriveConfig {
+        &self.config
+    }
+
+    /// Other manners from now on.
+    pub const fn set_config(&mut self, config: DriveConfig) {
+        self.config = config;
     }
 
     /// Raises an alarm: the motor is released at once. An alarm that is already there stays.
@@ -144,7 +195,7 @@ impl Drive {
             self.history.rotate_right(1);
             self.history[0] = Some(alarm);
         }
-        self.motion.release();
+        self.motion.release(0);
     }
 
     /// Clears the active alarm and the counts that lead to the next.
@@ -158,8 +209,13 @@ impl Drive {
     pub fn set_main_power(&mut self, on: bool) {
         self.main_power = on;
         if !on {
-            self.motion.release();
+            self.motion.release(0);
         }
+    }
+
+    /// The motor is released without an alarm, and Servo_Ready stays 1.
+    pub fn drop_servo(&mut self) {
+        self.motion.release(0);
     }
 
     /// Puts a warning; 0 for none.
@@ -173,73 +229,84 @@ impl Drive {
         self.inputs = StatusFlags::from_bytes([0, high]);
     }
 
-    /// Catches the actual position in LPOS1, as the trigger of latch 1 does.
-    pub const fn catch_latch1(&mut self) {
-        self.latches[0] = Some(self.motion.actual);
-    }
-
-    /// Catches the actual position in LPOS2, as the trigger of latch 2 does.
-    pub const fn catch_latch2(&mut self) {
-        self.latches[1] = Some(self.motion.actual);
+    /// The trigger of latch 1 or 2: catches the actual position, if the latch is armed.
+    pub fn trigger(&mut self, latch: usize) {
+        let actual = self.motion.actual;
+        let places = self.armed.iter_mut().zip(&mut self.latches);
+        if let Some((armed, caught)) = places.take(latch).last().filter(|(armed, _)| **armed) {
+            *armed = false;
+            *caught = Some(actual);
+        }
     }
 
     /// Servo_Ready: main power, no alarm, synchronised.
     pub const fn is_ready(&self) -> bool {
-        self.main_power && self.alarm.is_none() && self.exchanges >= self.settings.sync_exchanges
+        self.main_power && self.alarm.is_none() && self.exchanges >= self.config.sync_exchanges
     }
 
     fn status(&self) -> StatusFlags {
-        let progress = self.motion.profile.is_some();
-        let settled = self.motion.deviation().unsigned_abs() <= self.settings.in_position;
+        let progress = self.motion.in_progress();
+        let settled = self.motion.deviation().unsigned_abs() <= self.config.in_position;
         let set = [
-            (StatusFlags::SERVO_ACTIVE, self.is_active()),
+            (StatusFlags::SERVO_ACTIVE, self.motion.says_active()),
             (StatusFlags::SERVO_READY, self.is_ready()),
             (StatusFlags::ALARM, self.alarm.is_some()),
             (StatusFlags::WARNING, self.warning != 0),
             (StatusFlags::TORQUE_LIMITED, self.motion.torque_limited),
             (StatusFlags::HOMING_COMPLETE, self.homed),
             (StatusFlags::IN_PROGRESS, progress),
-            (StatusFlags::IN_POSITION, settled && !progress),
+            (StatusFlags::IN_POSITION, settled && !progress || self.config.manners.always_in_position),
         ];
-        set.into_iter().fold(self.inputs, |all, (flag, on)| if on { all.with(flag) } else { all })
+        set.into_iter().fold(self.inputs, |all, (flag, on)| if on { all | flag } else { all })
     }
 
     /// The response while the block with this byte 0 comes in: its counter, everything else as it was before.
-    fn response(&self, byte0: u8) -> Response {
+    fn response(&mut self, byte0: u8) -> Response {
         let [response_data1, ..] = self.response_data();
-        Response {
-            mac_id: self.settings.mac_id,
-            update_counter_echo: Header::from_byte(byte0).update_counter,
+        let present = Response {
+            mac_id: self.config.mac_id,
+            update_counter_echo: UpdateCounter::ZERO,
             cmd_error: false,
-            code: self.echo,
+            code: Code::truncate(self.echo),
             status: self.status(),
             response_data1,
             response_data2: 0,
             response_data3: 0,
         }
-        .with_answer(&self.answer())
+        .with_noncyclic(&self.noncyclic());
+        self.pending.rotate_right(1);
+        let out = match usize::from(self.config.manners.echo_lag).checked_sub(1) {
+            None => present,
+            // What is rotated to the front is the oldest; shorter lags take a younger one.
+            Some(lag) => {
+                let [oldest, younger @ ..] = self.pending;
+                younger.get(lag).copied().unwrap_or(oldest)
+            }
+        };
+        self.pending[0] = present;
+        Response { update_counter_echo: Header::from_byte(byte0).update_counter, ..out }
     }
 
     /// Response_Data1 to 3 as Pr7.29 to 7.31 select them.
-    pub(super) fn response_data(&self) -> [i32; 3] {
+    fn response_data(&self) -> [i32; 3] {
         let defaults = [self.motion.actual, self.speed(self.motion.actual_step), self.motion.torque];
         let [one, two, three] = RESPONSE_DATA;
         [self.selected(one, defaults[0]), self.selected(two, defaults[1]), self.selected(three, defaults[2])]
     }
 
-    fn selected(&self, pr: crate::Pr, default: i32) -> i32 {
+    fn selected(&self, pr: Pr, default: i32) -> i32 {
         match u8::try_from(self.parameters.value(pr)) {
             Ok(0) => default,
-            Ok(code) => self.monitor(TypeCode::short(code), 0).unwrap_or(0),
+            Ok(code) => self.monitor(code.into(), 0).unwrap_or(0),
             Err(_) => 0,
         }
     }
 
     /// A step per update period as a speed in the unit of Pr7.25.
-    pub(super) fn speed(&self, step: i32) -> i32 {
+    fn speed(&self, step: i32) -> i32 {
         let scale = if self.parameters.value(SPEED_UNIT) == 0 { 60_000_000_000 } else { 1_000_000_000 };
-        let per = if self.parameters.value(SPEED_UNIT) == 0 { self.settings.units_per_rev } else { 1 };
-        let divisor = i128::from(self.settings.update_ns).saturating_mul(per.into());
+        let per = if self.parameters.value(SPEED_UNIT) == 0 { self.config.units_per_rev } else { 1 };
+        let divisor = i128::from(self.config.update_ns).saturating_mul(per.into());
         let speed = i128::from(step).saturating_mul(scale).checked_div(divisor).unwrap_or(0);
         i32::try_from(speed).unwrap_or(if speed < 0 { i32::MIN } else { i32::MAX })
     }
@@ -248,27 +315,20 @@ impl Drive {
     fn units_per_second(&self, speed: i32) -> i64 {
         let speed = i64::from(speed);
         if self.parameters.value(SPEED_UNIT) == 0 {
-            speed.saturating_mul(self.settings.units_per_rev.into()) / 60
+            speed.saturating_mul(self.config.units_per_rev.into()) / 60
         } else {
             speed
         }
     }
 
-    pub(super) fn is_near(&self) -> bool {
-        let to_go = self.motion.profile.map_or(0, |generator| generator.distance_to_go());
-        to_go.unsigned_abs() <= self.settings.near.into()
-    }
-
     fn receive(&mut self, bytes: &[u8], size: BlockSize) {
         self.lost = 0;
         self.exchanges = self.exchanges.saturating_add(1);
-        let verdict = check(bytes, size, self.settings.mac_id);
+        let verdict = check(bytes, size, self.config.mac_id);
         if let Some(alarm) = verdict.alarm {
             self.discard(bytes, verdict, alarm);
         } else if let Some(main) = bytes.first_chunk::<LEN>() {
-            if let Ok(block) = CommandBlock::of(main) {
-                self.accept(block, verdict.error);
-            }
+            self.accept(main, verdict.error);
             if let Ok((_, sub)) = split32(bytes) {
                 self.serve_sub(sub, verdict.sub_error);
             }
@@ -279,7 +339,7 @@ impl Drive {
     /// The block is thrown away; an undefined code is echoed as it came.
     fn discard(&mut self, bytes: &[u8], verdict: Verdict, alarm: Alarm) {
         if let (Some(_), Some(&byte1)) = (verdict.error, bytes.get(1)) {
-            self.echo = Code::from_byte(byte1);
+            self.echo = byte1;
             self.error = verdict.error;
         }
         if let (Some(code), Ok((_, sub))) = (verdict.sub_error, split32(bytes)) {
@@ -290,117 +350,94 @@ impl Drive {
 
     fn count_fault(&mut self, alarm: Alarm) {
         self.faults = self.faults.saturating_add(1);
-        if self.faults >= self.settings.fault_limit && self.exchanges >= self.settings.sync_exchanges {
+        if self.faults >= self.config.fault_limit && self.exchanges >= self.config.sync_exchanges {
             self.raise(alarm);
         }
     }
 
-    fn accept(&mut self, block: CommandBlock<'_>, error: Option<ErrorCode>) {
-        let before = core::mem::replace(&mut self.echo, block.code());
+    fn accept(&mut self, block: &[u8; LEN], error: Option<ErrorCode>) {
+        let [byte0, byte1, c2, c3, d4, d5, d6, d7, noncyclic @ ..] = *block;
+        let (cyclic, code) = (byte1 >> 4 & 7, byte1 & 0x0f);
+        let before = core::mem::replace(&mut self.echo, byte1);
         self.error = error;
-        let Some(cyclic) = block.code().cyclic() else { return };
-        if error.is_none() && !block.code().is_allowed() {
-            self.error = Some(ErrorCode::CYCLIC_MODE);
-            return self.count_fault(Alarm::COMMAND);
+        let goes_together = if cyclic == NOP { code == 0 } else { code != PROFILE || cyclic == PP };
+        if error.is_none() && !goes_together {
+            self.error = Some(ErrorCode(WRONG_MODE));
+            let (main, sub) = ERR91_1;
+            return self.count_fault(Alarm { main, sub });
         }
         self.faults = 0;
-        if cyclic == CyclicCode::Nop {
+        if cyclic == NOP {
             // The command before stays in force; Control_Bits are not looked at.
             self.job = None;
             return;
         }
-        self.supervise(block.update_counter());
+        self.supervise(UpdateCounter::truncate(byte0 >> 5));
         self.cyclic = cyclic;
-        self.control = block.control();
-        self.data1 = block.command_data1();
-        self.motion.request(self.control.servo_on() && self.is_ready(), &self.settings);
-        let Some(noncyclic) = block.code().noncyclic() else { return };
-        let request = Request::from_bytes(noncyclic, block.noncyclic_bytes());
-        if let Request::Profile { target_speed, .. } = request {
+        self.control = u16::from_le_bytes([c2, c3]);
+        self.data1 = i32::from_le_bytes([d4, d5, d6, d7]);
+        let servo_on = self.control & SERVO_ON != 0 && self.is_ready();
+        self.motion.request(servo_on, &self.config);
+        let Some(code) = NonCyclicCode::new(code) else { return };
+        let request = NonCyclicCommand::from_bytes(code, noncyclic);
+        if let NonCyclicCommand::Profile { target_speed, .. } = request {
             self.target_speed = target_speed;
         }
-        self.error = self.serve(request, before).err();
+        self.error = self.serve(request, before & 0x7f == PROFILE_IDLE).err().map(ErrorCode);
     }
 
     /// The counter adds 1 in every update period; with two communications in it every value comes twice.
     fn supervise(&mut self, counter: UpdateCounter) {
         let last = self.counter.replace(counter);
-        let allowed = self.settings.communications.saturating_sub(1);
+        let allowed = self.config.communications.saturating_sub(1);
         let good = match last {
             None => true,
             Some(last) if counter == last => self.repeats < allowed,
-            Some(last) => counter == last.next(),
+            Some(last) => counter.get() == last.get().wrapping_add(1) & 3,
         };
         self.repeats = if last == Some(counter) { self.repeats.saturating_add(1) } else { 0 };
         self.wrong_counts = if good { 0 } else { self.wrong_counts.saturating_add(1) };
-        if self.wrong_counts >= self.settings.counter_limit && self.exchanges >= self.settings.sync_exchanges {
-            self.raise(Alarm::UPDATE_COUNTER);
+        if self.wrong_counts >= self.config.counter_limit && self.exchanges >= self.config.sync_exchanges {
+            let (main, sub) = ERR86_2;
+            self.raise(Alarm { main, sub });
         }
-    }
-
-    fn serve_sub(&mut self, sub: &[u8; LEN], error: Option<ErrorCode>) {
-        if let Some(code) = error {
-            return self.refuse_sub(sub, code);
-        }
-        let Ok(command) = SubCommand::from_bytes(sub) else { return };
-        let [data, ..] = SUB_RESPONSE_DATA.map(|pr| self.selected(pr, 0));
-        let result = match command.code {
-            SubCode::Normal => Ok(data),
-            SubCode::SystemId => text(TypeCode::short(command.type_code), command.index),
-            SubCode::Monitor => self.monitor(TypeCode::short(command.type_code), command.index),
-        };
-        match result {
-            Ok(data1) => {
-                self.sub = SubResponse {
-                    cmd_error: false,
-                    code: Nibble::low(command.code as u8),
-                    type_code: command.type_code,
-                    index: command.index,
-                    data1,
-                    ..self.sub
-                }
-            }
-            Err(code) => self.refuse_sub(sub, code),
-        }
-    }
-
-    fn refuse_sub(&mut self, sub: &[u8; LEN], code: ErrorCode) {
-        self.sub = SubResponse {
-            cmd_error: true,
-            code: Nibble::low(sub[0]),
-            type_code: 0,
-            index: code.0,
-            data1: 0,
-            ..self.sub
-        };
     }
 
     /// The end of a communication period; at the end of an update period the axis moves.
     fn tick(&mut self) {
         self.communication = self.communication.saturating_add(1);
-        if self.communication < self.settings.communications {
+        if self.communication < self.config.communications {
             return;
         }
         self.communication = 0;
         let acceleration = |pr| i64::from(self.parameters.value(pr).max(1)).saturating_mul(10_000);
         let ramp = Ramp { up: acceleration(ACCELERATION), down: acceleration(DECELERATION) };
         let per_update = |speed: i32| {
-            let units = self.units_per_second(speed).saturating_mul(self.settings.update_ns.into()) / 1_000_000_000;
+            let units = self.units_per_second(speed).saturating_mul(self.config.update_ns.into()) / 1_000_000_000;
             i32::try_from(units).unwrap_or(if units < 0 { i32::MIN } else { i32::MAX })
         };
         let mode = match self.cyclic {
-            CyclicCode::Nop | CyclicCode::ProfilePosition => Drivemode::Profile,
-            CyclicCode::CyclicPosition => Drivemode::Position(self.data1),
-            CyclicCode::CyclicVelocity => Drivemode::Velocity(per_update(self.data1)),
-            CyclicCode::CyclicTorque => Drivemode::Torque(self.data1),
+            CP => Drivemode::Position(self.data1),
+            CV => Drivemode::Velocity(per_update(self.data1)),
+            CT => Drivemode::Torque(self.data1),
+            _ => Drivemode::Profile,
         };
-        let (hard, smooth) = (self.control.hard_stop(), self.control.smooth_stop());
+        let (hard, smooth) = (self.control & HARD_STOP != 0, self.control & SMOOTH_STOP != 0);
         if mode == Drivemode::Profile && (hard || smooth) && self.motion.is_active() {
-            return self.motion.stop_profile(!hard, ramp, &self.settings);
+            return self.motion.stop_profile(!hard, ramp, &self.config);
         }
-        let speed = if self.control.pause() { 0 } else { self.units_per_second(self.target_speed).saturating_abs() };
-        if !self.motion.update(mode, ramp, speed, &self.settings) {
-            self.raise(Alarm::COMMAND_STEP);
+        let pause = self.control & PAUSE != 0;
+        let target = if self.homing { HOMING_SPEED } else { self.units_per_second(self.target_speed) };
+        let speed = if pause { 0 } else { target.saturating_abs() };
+        if !self.motion.update(mode, ramp, speed, &self.config) {
+            let (main, sub) = ERR27_4;
+            self.raise(Alarm { main, sub });
+        }
+        // The origin becomes 0.
+        if self.homing && self.motion.profile.is_none() {
+            self.homing = false;
+            self.homed = self.motion.is_active();
+            self.motion.shift(self.motion.command.wrapping_neg());
         }
     }
 }

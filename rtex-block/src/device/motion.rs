@@ -1,6 +1,5 @@
+use super::config::DriveConfig;
 use super::profile::{Generator, Ramp};
-use super::settings::Settings;
-use crate::position::{is_within_limit, step};
 
 /// Largest torque, 0.1 % of rated.
 pub(super) const MAX_TORQUE: i32 = 3_000;
@@ -17,7 +16,7 @@ pub(super) enum Power {
     SwitchingOn { left: u16 },
     /// Energised.
     On,
-    /// Not energised, slowing down on the dynamic brake.
+    /// Not energised, slowing down on the dynamic brake. Servo_Active may still say otherwise.
     Braking,
 }
 
@@ -50,6 +49,10 @@ pub(super) struct Motion {
     pub(super) torque: i32,
     pub(super) torque_limited: bool,
     pub(super) profile: Option<Generator>,
+    /// Update periods before the motion starts and In_Progress rises.
+    start_in: u16,
+    /// Update periods for which Servo_Active is still 1.
+    says_active: u16,
 }
 
 impl Motion {
@@ -63,6 +66,8 @@ impl Motion {
             torque: 0,
             torque_limited: false,
             profile: None,
+            start_in: 0,
+            says_active: 0,
         }
     }
 
@@ -70,15 +75,36 @@ impl Motion {
         matches!(self.power, Power::On)
     }
 
-    /// PERR.
-    pub(super) const fn deviation(&self) -> i32 {
-        step(self.actual, self.command)
+    /// Servo_Active.
+    pub(super) const fn says_active(&self) -> bool {
+        self.is_active() || self.says_active > 0
     }
 
-    /// Takes the current off the motor.
-    pub(super) fn release(&mut self) {
+    /// In_Progress.
+    pub(super) const fn in_progress(&self) -> bool {
+        self.profile.is_some() && self.start_in == 0
+    }
+
+    pub(super) const fn start(&mut self, generator: Generator, late: u16) {
+        self.profile = Some(generator);
+        self.start_in = late;
+    }
+
+    /// A motion of the drive's own: an instant one will do.
+    pub(super) const fn home(&mut self, distance: i32) {
+        self.start(Generator::new(distance), 0);
+    }
+
+    /// PERR.
+    pub(super) const fn deviation(&self) -> i32 {
+        self.command.wrapping_sub(self.actual)
+    }
+
+    /// Takes the current off the motor; Servo_Active stays 1 for `late` update periods.
+    pub(super) fn release(&mut self, late: u16) {
         if self.is_active() {
             self.power = Power::Braking;
+            self.says_active = late;
         } else if matches!(self.power, Power::SwitchingOn { .. }) {
             self.power = Power::Off;
         }
@@ -86,22 +112,23 @@ impl Motion {
     }
 
     /// Servo_On as the drive sees it.
-    pub(super) fn request(&mut self, servo_on: bool, settings: &Settings) {
+    pub(super) fn request(&mut self, servo_on: bool, config: &DriveConfig) {
         match (servo_on, self.power) {
-            (false, _) => self.release(),
-            (true, Power::Off) => self.power = Power::SwitchingOn { left: settings.servo_on_updates },
+            (false, _) => self.release(config.manners.servo_off_late),
+            (true, Power::Off) => self.power = Power::SwitchingOn { left: config.servo_on_updates },
             (true, _) => {}
         }
     }
 
-    /// Puts the coordinates so that APOS becomes `actual`.
-    pub(super) fn set_actual(&mut self, actual: i32) {
-        self.command = self.command.wrapping_add(step(self.actual, actual));
-        self.actual = actual;
+    /// Puts the coordinates.
+    pub(super) const fn shift(&mut self, by: i32) {
+        self.command = self.command.wrapping_add(by);
+        self.actual = self.actual.wrapping_add(by);
     }
 
     /// One update period; `false` if the position command makes too large a step.
-    pub(super) fn update(&mut self, mode: Drivemode, ramp: Ramp, profile_speed: i64, settings: &Settings) -> bool {
+    pub(super) fn update(&mut self, mode: Drivemode, ramp: Ramp, profile_speed: i64, config: &DriveConfig) -> bool {
+        self.says_active = self.says_active.saturating_sub(1);
         match self.power {
             Power::Off => self.rest(),
             Power::SwitchingOn { left } => {
@@ -119,30 +146,34 @@ impl Motion {
                     self.power = Power::Off;
                 }
             }
-            Power::On => return self.drive(mode, ramp, profile_speed, settings),
+            Power::On => return self.drive(mode, ramp, profile_speed, config),
         }
         true
     }
 
-    fn drive(&mut self, mode: Drivemode, ramp: Ramp, profile_speed: i64, settings: &Settings) -> bool {
+    fn drive(&mut self, mode: Drivemode, ramp: Ramp, profile_speed: i64, config: &DriveConfig) -> bool {
         let last = self.actual_step;
         match mode {
             Drivemode::Position(target) => {
                 self.profile = None;
-                self.command_step = step(self.command, target);
-                if !is_within_limit(self.command_step, settings.update_ns, settings.gear) {
+                self.command_step = target.wrapping_sub(self.command);
+                if is_too_large(self.command_step, config) {
                     return false;
                 }
                 self.command = target;
-                self.follow(settings);
+                self.follow(config);
             }
             Drivemode::Profile => {
                 let advance = match &mut self.profile {
-                    Some(generator) => generator.step(profile_speed, ramp, settings.update_ns),
+                    Some(_) if self.start_in > 0 => {
+                        self.start_in = self.start_in.saturating_sub(1);
+                        (0, false)
+                    }
+                    Some(generator) => generator.step(profile_speed, ramp, config.update_ns),
                     None => (0, true),
                 };
                 self.advance(advance);
-                self.follow(settings);
+                self.follow(config);
             }
             Drivemode::Velocity(speed) => {
                 self.profile = None;
@@ -158,20 +189,20 @@ impl Motion {
                 self.command = self.actual;
             }
         }
-        let torque = step(last, self.actual_step).saturating_mul(TORQUE_PER_STEP);
+        let torque = self.actual_step.wrapping_sub(last).saturating_mul(TORQUE_PER_STEP);
         self.torque = torque.clamp(MAX_TORQUE.saturating_neg(), MAX_TORQUE);
         self.torque_limited = torque != self.torque;
         true
     }
 
     /// One update period of a profile motion that is being stopped.
-    pub(super) fn stop_profile(&mut self, smooth: bool, ramp: Ramp, settings: &Settings) {
+    pub(super) fn stop_profile(&mut self, smooth: bool, ramp: Ramp, config: &DriveConfig) {
         let advance = match &mut self.profile {
-            Some(generator) if smooth => generator.brake(ramp, settings.update_ns),
+            Some(generator) if smooth => generator.brake(ramp, config.update_ns),
             _ => (0, true),
         };
         self.advance(advance);
-        self.follow(settings);
+        self.follow(config);
     }
 
     fn advance(&mut self, (by, done): (i32, bool)) {
@@ -182,9 +213,9 @@ impl Motion {
         }
     }
 
-    fn follow(&mut self, settings: &Settings) {
+    fn follow(&mut self, config: &DriveConfig) {
         let deviation = self.deviation();
-        let part = deviation >> settings.follow.min(15);
+        let part = deviation >> config.follow.min(15);
         // A shift rounds down: the last units are made one by one from above.
         self.turn(if part == 0 { deviation.signum() } else { part });
     }
@@ -201,4 +232,11 @@ impl Motion {
         self.torque_limited = false;
         self.command = self.actual;
     }
+}
+
+/// Whether a step makes more than 400 000 000 pulses in a second after the electronic gear.
+fn is_too_large(step: i32, config: &DriveConfig) -> bool {
+    let (pulses, units) = config.gear.into();
+    let rate = u128::from(step.unsigned_abs()).saturating_mul(pulses.into()).saturating_mul(1_000_000_000);
+    rate > 400_000_000_u128.saturating_mul(units.into()).saturating_mul(config.update_ns.into())
 }

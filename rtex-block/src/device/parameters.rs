@@ -15,42 +15,62 @@ const fn pr7(number: u8) -> Pr {
     Pr { class: 7, number }
 }
 
+/// A parameter: the value that counts, and the one that was written.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+struct Parameter {
+    pr: Pr,
+    value: i32,
+    written: i32,
+}
+
+const fn of(pr: Pr, value: i32) -> Parameter {
+    Parameter { pr, value, written: value }
+}
+
 /// The parameters that the model looks at.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub(super) struct Parameters([(Pr, i32); 10]);
+pub(super) struct Parameters([Parameter; 10]);
 
 impl Parameters {
     pub(super) const DEFAULT: Self = Self([
-        (SPEED_UNIT, 1),
-        (RESPONSE_DATA[0], 0),
-        (RESPONSE_DATA[1], 0),
-        (RESPONSE_DATA[2], 0),
-        (SUB_RESPONSE_DATA[0], 0),
-        (SUB_RESPONSE_DATA[1], 0),
-        (SUB_RESPONSE_DATA[2], 0),
-        (FEED_FORWARD, 0),
-        (ACCELERATION, 1_000),
-        (DECELERATION, 1_000),
+        of(SPEED_UNIT, 1),
+        of(RESPONSE_DATA[0], 0),
+        of(RESPONSE_DATA[1], 0),
+        of(RESPONSE_DATA[2], 0),
+        of(SUB_RESPONSE_DATA[0], 0),
+        of(SUB_RESPONSE_DATA[1], 0),
+        of(SUB_RESPONSE_DATA[2], 0),
+        of(FEED_FORWARD, 0),
+        of(ACCELERATION, 1_000),
+        of(DECELERATION, 1_000),
     ]);
 
-    pub(super) fn get(&self, pr: Pr) -> Option<i32> {
-        self.0.iter().find(|(known, _)| *known == pr).map(|(_, value)| *value)
+    /// What was written to it, whether it counts or not; `None` if there is no such parameter.
+    pub(super) fn written(&self, pr: Pr) -> Option<i32> {
+        self.0.iter().find(|parameter| parameter.pr == pr).map(|parameter| parameter.written)
     }
 
-    /// Of a parameter that is in the table.
+    /// What counts, of a parameter that is in the table.
     pub(super) fn value(&self, pr: Pr) -> i32 {
-        self.get(pr).unwrap_or(0)
+        self.0.iter().find(|parameter| parameter.pr == pr).map_or(0, |parameter| parameter.value)
     }
 
     /// Whether there is such a parameter.
-    pub(super) fn set(&mut self, pr: Pr, value: i32) -> bool {
-        match self.0.iter_mut().find(|(known, _)| *known == pr) {
-            Some((_, place)) => {
-                *place = value;
-                true
-            }
-            None => false,
+    pub(super) fn set(&mut self, pr: Pr, value: i32, at_once: bool) -> bool {
+        let Some(parameter) = self.0.iter_mut().find(|parameter| parameter.pr == pr) else { return false };
+        parameter.written = value;
+        if at_once {
+            parameter.value = value;
+        }
+        true
+    }
+
+    /// What was written counts from now on.
+    pub(super) fn take_over(&mut self) {
+        for parameter in &mut self.0 {
+            parameter.value = parameter.written;
         }
     }
 }

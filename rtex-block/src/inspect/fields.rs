@@ -1,9 +1,17 @@
 use core::fmt;
 
-use crate::{
-    Alarm, Answer, Arguments, Code, CommandBlock, CyclicCode, ErrorCode, Execution, Header, LEN, NonCyclicCode, Reply,
-    Request, ResponseBlock, SubResponse, split32,
-};
+use crate::block::LEN;
+use crate::code::{Code, CyclicCode};
+use crate::command::CommandBlock;
+use crate::control::ControlBits;
+use crate::error_code::{Alarm, ErrorCode};
+use crate::execution::{Execution, LatchFlags, ProfileFlags};
+use crate::header::Header;
+use crate::noncyclic_command::{Arguments, NonCyclicCommand};
+use crate::noncyclic_response::{NonCyclicResponse, Results};
+use crate::response::ResponseBlock;
+use crate::status::StatusFlags;
+use crate::sub::{SubResponse, split32};
 
 /// A value of a field.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -19,8 +27,9 @@ pub enum Value {
     Code(Code),
     /// Error_Code or Sub_Error_Code.
     Error(ErrorCode),
-    /// An alarm.
-    Alarm(Alarm),
+    /// Bytes 12-15 of an alarm answer. Which type codes ask for alarm and warning, and which for attributes, is in the manual
+    /// of the drive.
+    AlarmData([u8; 4]),
     /// Four characters of a text.
     Text([u8; 4]),
 }
@@ -31,15 +40,12 @@ impl fmt::Display for Value {
             Self::Number(number) => write!(f, "{number}"),
             Self::Hex(code) => write!(f, "{code:02X}h"),
             Self::Bit(bit) => write!(f, "{}", u8::from(bit)),
-            Self::Code(code) => {
-                write!(f, "{:02X}h {} / ", code.get(), code.cyclic().map_or("undefined", CyclicCode::name))?;
-                f.write_str(code.noncyclic().map_or("undefined", NonCyclicCode::name))
+            Self::Code(code) => code.write(f),
+            Self::Error(code) => code.fmt(f),
+            Self::AlarmData([main, sub, low, high]) => {
+                let alarm = Alarm { main, sub };
+                write!(f, "{alarm} warning {high:02X}{low:02X}h, or attributes {high:02X}{low:02X}{sub:02X}{main:02X}h")
             }
-            Self::Error(code) => match code.meaning() {
-                Some(meaning) => write!(f, "{code} ({meaning})"),
-                None => write!(f, "{code}"),
-            },
-            Self::Alarm(alarm) => write!(f, "{alarm}"),
             Self::Text(group) => write!(f, "\"{}\"", group.as_slice().escape_ascii()),
         }
     }
@@ -120,6 +126,10 @@ impl List {
         self.add(name, at, at, Value::Bit(value));
     }
 
+    fn flags(&mut self, at: u8, flags: impl Iterator<Item = (&'static str, bool)>) {
+        flags.for_each(|(name, value)| self.bit(name, at, value));
+    }
+
     fn header(&mut self, byte0: u8, counter: &'static str, mac_id: &'static str) {
         let header = Header::from_byte(byte0);
         self.add(counter, 0, 0, Value::Number(header.update_counter.get().into()));
@@ -130,9 +140,9 @@ impl List {
         self.header(block.bytes()[0], "Update_Counter", "MAC-ID");
         self.bit("TMG_CNT", 1, block.tmg_cnt());
         self.add("Command_Code", 1, 1, Value::Code(block.code()));
-        for (bit, name) in crate::ControlBits::NAMED {
-            let [low, _] = bit.to_bytes();
-            self.bit(name, if low == 0 { 3 } else { 2 }, block.control().contains(*bit));
+        for (name, flag) in ControlBits::all().iter_names() {
+            let [low, _] = flag.to_bytes();
+            self.bit(name, if low == 0 { 3 } else { 2 }, block.control().contains(flag));
         }
         let name = match block.code().cyclic() {
             Some(CyclicCode::ProfilePosition) => "Target_Position",
@@ -143,28 +153,31 @@ impl List {
         };
         self.word(name, 4, block.command_data1());
         if let Some(code) = block.code().noncyclic() {
-            self.request(&Request::from_bytes(code, block.noncyclic_bytes()));
+            self.request(&NonCyclicCommand::from_bytes(code, block.noncyclic_bytes()));
         }
     }
 
-    fn request(&mut self, request: &Request) {
+    fn request(&mut self, request: &NonCyclicCommand) {
         match *request {
-            Request::Normal { command_data2, command_data3 } => {
+            NonCyclicCommand::Normal { command_data2, command_data3 } => {
                 self.word("Command_Data2", 8, command_data2);
                 self.word("Command_Data3", 12, command_data3);
             }
-            Request::Reset(a) | Request::SystemId(a) | Request::Alarm(a) | Request::Monitor(a) => {
+            NonCyclicCommand::Reset(a)
+            | NonCyclicCommand::SystemId(a)
+            | NonCyclicCommand::Alarm(a)
+            | NonCyclicCommand::Monitor(a) => {
                 self.arguments(a, "Command_Data3");
             }
-            Request::Parameter(a) => self.arguments(a, "Setting_Data"),
-            Request::Homing { type_code, latch_sel1, latch_sel2, monitor_sel, setting_data } => {
+            NonCyclicCommand::Parameter(a) => self.arguments(a, "Setting_Data"),
+            NonCyclicCommand::Homing { type_code, latch_sel1, latch_sel2, monitor_sel, setting_data } => {
                 self.byte("Type_Code", 8, type_code);
                 self.byte("Latch_Sel1", 10, latch_sel1.get());
                 self.byte("Latch_Sel2", 10, latch_sel2.get());
                 self.byte("Monitor_Sel", 11, monitor_sel);
                 self.word("Setting_Data", 12, setting_data);
             }
-            Request::Profile { type_code, latch_sel1, monitor_sel, target_speed } => {
+            NonCyclicCommand::Profile { type_code, latch_sel1, monitor_sel, target_speed } => {
                 self.byte("Type_Code", 8, type_code);
                 self.byte("Latch_Sel1", 10, latch_sel1.get());
                 self.byte("Monitor_Sel", 11, monitor_sel);
@@ -183,40 +196,37 @@ impl List {
         self.header(block.bytes()[0], "Update_Counter_Echo", "Actual_MAC-ID");
         self.bit("CMD_Error", 1, block.cmd_error());
         self.add("Command_Code_Echo", 1, 1, Value::Code(block.code()));
-        for (bit, name) in crate::StatusFlags::NAMED {
-            let [low, _] = bit.to_bytes();
-            self.bit(name, if low == 0 { 3 } else { 2 }, block.status().contains(*bit));
+        for (name, flag) in StatusFlags::all().iter_names() {
+            let [low, _] = flag.to_bytes();
+            self.bit(name, if low == 0 { 3 } else { 2 }, block.status().contains(flag));
         }
         self.word("Response_Data1", 4, block.response_data1());
-        self.answer(&block.answer());
+        self.noncyclic(&block.noncyclic());
     }
 
-    fn answer(&mut self, answer: &Answer) {
-        match *answer {
-            Answer::CommandError(code) => self.add("Error_Code", 8, 9, Value::Error(code)),
-            Answer::Normal { response_data2, response_data3 } => {
+    fn noncyclic(&mut self, noncyclic: &NonCyclicResponse) {
+        match *noncyclic {
+            NonCyclicResponse::CommandError(code) => self.add("Error_Code", 8, 9, Value::Error(code)),
+            NonCyclicResponse::Normal { response_data2, response_data3 } => {
                 self.word("Response_Data2", 8, response_data2);
                 self.word("Response_Data3", 12, response_data3);
             }
-            Answer::Reset(r) | Answer::Parameter(r) | Answer::Monitor(r) => {
-                self.reply(r);
+            NonCyclicResponse::Reset(r) | NonCyclicResponse::Parameter(r) | NonCyclicResponse::Monitor(r) => {
+                self.results(r);
                 self.word("Monitor_Data", 12, r.data);
             }
-            Answer::SystemId(r) => {
-                self.reply(r);
+            NonCyclicResponse::SystemId(r) => {
+                self.results(r);
                 self.add("ASCII", 12, 15, Value::Text(r.characters()));
             }
-            Answer::Alarm(r) => {
-                let (alarm, warning) = r.alarm();
-                self.reply(r);
-                self.add("Alarm_Code", 12, 13, Value::Alarm(alarm));
-                self.add("Warning_Code", 14, 15, Value::Hex(warning));
+            NonCyclicResponse::Alarm(r) => {
+                self.results(r);
+                self.add("Alarm_Data", 12, 15, Value::AlarmData(r.data.to_le_bytes()));
             }
-            Answer::Homing {
+            NonCyclicResponse::Homing {
                 execution,
                 type_code,
-                latch_comp1,
-                latch_comp2,
+                latch,
                 latch_sel1,
                 latch_sel2,
                 monitor_sel,
@@ -224,51 +234,35 @@ impl List {
             } => {
                 self.byte("Type_Code_Echo", 8, type_code);
                 self.execution(execution);
-                self.bit("Latch_Comp2", 9, latch_comp2);
-                self.bit("Latch_Comp1", 9, latch_comp1);
+                self.flags(9, LatchFlags::all().iter_names().map(|(name, flag)| (name, latch.contains(flag))));
                 self.byte("Latch_Sel2_Echo", 10, latch_sel2.get());
                 self.byte("Latch_Sel1_Echo", 10, latch_sel1.get());
                 self.byte("Monitor_Sel_Echo", 11, monitor_sel);
                 self.word("Monitor_Data", 12, monitor_data);
             }
-            Answer::Profile {
-                execution,
-                type_code,
-                psl,
-                nsl,
-                near,
-                latch_comp1,
-                latch_sel1,
-                monitor_sel,
-                monitor_data,
-            } => {
+            NonCyclicResponse::Profile { execution, type_code, flags, latch_sel1, monitor_sel, monitor_data } => {
                 self.byte("Type_Code_Echo", 8, type_code);
                 self.execution(execution);
-                self.bit("PSL", 9, psl);
-                self.bit("NSL", 9, nsl);
-                self.bit("NEAR", 9, near);
-                self.bit("Latch_Comp1", 9, latch_comp1);
+                self.flags(9, ProfileFlags::all().iter_names().map(|(name, flag)| (name, flags.contains(flag))));
                 self.byte("Latch_Sel1_Echo", 10, latch_sel1.get());
                 self.byte("Monitor_Sel_Echo", 11, monitor_sel);
                 self.word("Monitor_Data", 12, monitor_data);
             }
-            Answer::Undefined { bytes: [b8, b9, b10, b11, data @ ..], .. } => {
+            NonCyclicResponse::Undefined { bytes: [b8, b9, b10, b11, data @ ..], .. } => {
                 self.word("bytes 8-11", 8, i32::from_le_bytes([b8, b9, b10, b11]));
                 self.word("bytes 12-15", 12, i32::from_le_bytes(data));
             }
         }
     }
 
-    fn reply(&mut self, reply: Reply) {
-        self.add("Type_Code_Echo", 8, 9, Value::Hex(reply.type_code.get()));
-        self.execution(reply.execution);
-        self.add("Index_Echo", 10, 11, Value::Hex(reply.index));
+    fn results(&mut self, results: Results) {
+        self.add("Type_Code_Echo", 8, 9, Value::Hex(results.type_code.get()));
+        self.execution(results.execution);
+        self.add("Index_Echo", 10, 11, Value::Hex(results.index));
     }
 
     fn execution(&mut self, execution: Execution) {
-        self.bit("ERR", 9, execution.err);
-        self.bit("WNG", 9, execution.wng);
-        self.bit("Busy", 9, execution.busy);
+        self.flags(9, Execution::all().iter_names().map(|(name, flag)| (name, execution.contains(flag))));
     }
 
     fn sub_command(&mut self, sub: &[u8; LEN]) {
@@ -286,9 +280,9 @@ impl List {
     fn sub_response(&mut self, sub: &[u8; LEN]) {
         let sub = SubResponse::from_bytes(sub);
         self.bit("Sub_CMD_Err", 16, sub.cmd_error);
-        self.bit("Sub_ERR", 16, sub.execution.err);
-        self.bit("Sub_WNG", 16, sub.execution.wng);
-        self.bit("Sub_Busy", 16, sub.execution.busy);
+        self.bit("Sub_ERR", 16, sub.execution.contains(Execution::ERR));
+        self.bit("Sub_WNG", 16, sub.execution.contains(Execution::WNG));
+        self.bit("Sub_Busy", 16, sub.execution.contains(Execution::BUSY));
         self.byte("Sub_Command_Code_Echo", 16, sub.code.get());
         self.byte("Sub_Type_Code_Echo", 17, sub.type_code);
         match sub.error_code() {

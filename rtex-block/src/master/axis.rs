@@ -1,184 +1,120 @@
-use core::num::NonZeroU16;
+//! The master's side of one drive.
 
-use super::{ActiveCode, EchoWatch, Handshake, MoveProgress, ProfileMove, Progress, ServoOff, Turn};
-use crate::position::{Gear, max_step, step};
-use crate::{Answer, Command, ControlBits, ErrorCode, MacId, Request, Response, StatusFlags};
+mod service;
+mod setpoint;
 
-/// Time limits, in update periods.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub struct Limits {
-    /// Unchanged echoes of the counter that count as a time-out.
-    pub echo: NonZeroU16,
-    /// From the first valid command, or from [`Axis::clear`], to Servo_Ready.
-    pub ready: u32,
-    /// From Servo_On to Servo_Active.
-    pub active: u32,
-    /// From Servo_On = 0 to Servo_Active = 0.
-    pub inactive: u32,
-    /// For the answer to a request, and for the start of a profile motion.
-    pub answer: u32,
-    /// Consecutive responses with CMD_Error, while nothing is asked, that stop the axis. One may come from a single
-    /// damaged frame; the drive holds the command before it then.
-    pub command_errors: NonZeroU16,
-}
+use service::{Service, SubService};
 
-/// What an axis is set up with.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub struct AxisSettings {
-    /// The drive's address.
-    pub mac_id: MacId,
-    /// What it does when it is switched on.
-    pub mode: ActiveCode,
-    /// Update period, ns: for the limit of the position step.
-    pub update_ns: u32,
-    /// Electronic gear, for the same limit.
-    pub gear: Gear,
-    /// Time limits.
-    pub limits: Limits,
-}
-
-/// Why an axis was stopped.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub enum StopReason {
-    /// The echo of the counter stood still for the limit.
-    EchoTimeout,
-    /// Alarm = 1.
-    Alarm,
-    /// Servo_Ready went to 0 while the servo was wanted on.
-    NotReady,
-    /// Servo_Active went to 0 by itself.
-    NotActive,
-    /// Servo_Ready did not come in time.
-    ReadyTimeout,
-    /// Servo_Active did not come in time.
-    ActiveTimeout,
-    /// Servo_Active did not go in time: the drive does not obey.
-    InactiveTimeout,
-    /// The command was not accepted for the limit; the last Error_Code.
-    CommandError(ErrorCode),
-    /// The axis at this place of the ring failed, and all are stopped.
-    OtherAxis(u8),
-    /// The caller stopped it.
-    Requested,
-}
-
-/// State of an axis.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub enum AxisState {
-    /// Waiting for Servo_Ready, Servo_On = 0.
-    Starting,
-    /// Ready, Servo_On = 0.
-    Off,
-    /// Servo_On = 1, waiting for Servo_Active.
-    SwitchingOn,
-    /// Energised: the set-point counts.
-    On,
-    /// Servo_On = 0, waiting for Servo_Active = 0.
-    SwitchingOff,
-    /// Servo_On = 0 until [`Axis::clear`].
-    Stopped(StopReason),
-}
-
-/// A set-point that an axis does not take; it keeps the one before.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[non_exhaustive]
-pub enum SetpointError {
-    /// The axis is not on.
-    #[error("the axis is not on")]
-    NotOn,
-    /// The axis was set up for another mode.
-    #[error("the axis is set up for another mode")]
-    Mode,
-    /// The step exceeds 400 M pulses per second behind the electronic gear: the drive would raise Err27.4.
-    #[error("a step of {step} command units exceeds 400 M pulses per second")]
-    Step {
-        /// Wrapping difference to the command position before.
-        step: i32,
-    },
-    /// A profile motion is under way.
-    #[error("a profile motion is under way")]
-    Moving,
-}
-
-/// A request on its way.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-enum Service {
-    Idle,
-    Asking(Handshake),
-    /// The outcome is known; the normal command is out until its echo is seen.
-    Releasing {
-        left: u32,
-    },
-}
+use super::config::{AxisConfig, StopPolicy};
+use super::counter::Turn;
+use super::echo::EchoWatch;
+use super::profile_move::ProfileMove;
+use super::progress::{Failure, Progress};
+use super::received::Received;
+use super::servo_off::{ActiveCode, ServoOff};
+use super::state::{AxisState, StopReason};
+use crate::Counters;
+use crate::command::Command;
+use crate::control::ControlBits;
+use crate::error::Error;
+use crate::header::MacId;
+use crate::noncyclic_command::NonCyclicCommand;
+use crate::noncyclic_response::NonCyclicResponse;
+use crate::position::{max_step, max_step_at, step};
+use crate::response::Response;
+use crate::status::StatusFlags;
+use crate::sub::{Command32, SubResponse};
 
 /// The master's side of one drive: start-up, servo-on, set-points, requests, servo-off.
 ///
 /// ```text
 ///  Starting ──Servo_Ready──► Off ──switch_on──► SwitchingOn ──Servo_Active──► On
-///                             ▲                                                │ switch_off
-///                             └──────Servo_Active = 0──── SwitchingOff ◄───────┘
+///     ▲ not ready             │▲                                              │ switch_off
+///     └───────────────────────┘└─────Servo_Active = 0──── SwitchingOff ◄──────┘
 ///  any ──alarm, time-out, not ready──► Stopped ──clear──► Starting
+///  On ──another axis fails, policy Decelerate──► Stopping ──stands──► Stopped
 /// ```
-/// Call [`receive`](Self::receive) and then [`send`](Self::send) once in every update period. While Servo_Active is 0 the
-/// command position follows the actual position, so switching on makes no jump. In every state but SwitchingOn
-/// and On the command is a [`ServoOff`]: Servo_On = 0 with a code at which the drive looks. SX-DSV02310, "Servo_On";
-/// the extra waiting times of the vendor are not known.
+/// Call [`receive`](Self::receive) and then [`send`](Self::send) once in every update period. While the servo is off the
+/// command position follows the actual position, so switching on makes no jump. In every state but SwitchingOn, On and
+/// Stopping the command is a [`ServoOff`]: Servo_On = 0 with a code at which the drive looks, whatever the caller does.
+/// SX-DSV02310, "Servo_On"; the extra waiting times of the vendor are not known.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Axis {
-    settings: AxisSettings,
+    config: AxisConfig,
     /// Largest step of the command position.
     max_step: u32,
+    mode: ActiveCode,
     state: AxisState,
     /// Update periods left in the present state.
     left: u32,
     /// Position, speed or torque, by the mode.
     setpoint: i32,
+    /// The set-point before, and the step between them.
+    before: i32,
+    last_step: i32,
     actual: i32,
     status: StatusFlags,
     control: ControlBits,
-    feed_forward: i32,
+    /// Command_Data3, Sub_Command_Data2 and 3.
+    feed_forward: [i32; 3],
     watch: EchoWatch,
+    counters: Counters,
+    /// Why the last block was refused; `None` after a good one.
+    last_refusal: Option<Error>,
     /// Consecutive responses with CMD_Error.
     refused: u16,
+    /// Responses with Servo_Active = 1 since the servo was commanded off.
+    active_off: u32,
+    disobeys: bool,
     service: Service,
-    outcome: Option<Progress>,
+    outcome: Option<Progress<NonCyclicResponse>>,
+    sub: SubService,
+    sub_outcome: Option<Progress<SubResponse>>,
     profile: Option<ProfileMove>,
 }
 
 impl Axis {
     /// An axis whose drive has not answered yet.
-    pub const fn new(settings: AxisSettings) -> Self {
+    pub const fn new(config: AxisConfig) -> Self {
+        let by_gear = max_step(config.update_ns, config.gear);
+        let max_step = match config.over_speed {
+            Some(level) => {
+                let by_speed = max_step_at(level, config.update_ns);
+                if by_speed < by_gear { by_speed } else { by_gear }
+            }
+            None => by_gear,
+        };
         Self {
-            settings,
-            max_step: max_step(settings.update_ns, settings.gear),
+            config,
+            max_step,
+            mode: config.mode,
             state: AxisState::Starting,
-            left: settings.limits.ready,
+            left: config.limits.ready,
             setpoint: 0,
+            before: 0,
+            last_step: 0,
             actual: 0,
             status: StatusFlags::empty(),
             control: ControlBits::empty(),
-            feed_forward: 0,
-            watch: EchoWatch::new(settings.limits.echo),
+            feed_forward: [0; 3],
+            watch: EchoWatch::new(config.limits.echo),
+            counters: Counters::new(),
+            last_refusal: None,
             refused: 0,
+            active_off: 0,
+            disobeys: false,
             service: Service::Idle,
             outcome: None,
+            sub: SubService::Idle,
+            sub_outcome: None,
             profile: None,
         }
     }
 
     /// How it was set up.
-    pub const fn settings(&self) -> &AxisSettings {
-        &self.settings
+    pub const fn config(&self) -> &AxisConfig {
+        &self.config
     }
 
     /// The present state.
@@ -196,33 +132,46 @@ impl Axis {
         self.status
     }
 
-    /// The set-point: command position in CP, otherwise speed or torque.
-    pub const fn setpoint(&self) -> i32 {
-        self.setpoint
+    /// Blocks of the drive that were sound, and those that were refused, by class.
+    pub const fn counters(&self) -> &Counters {
+        &self.counters
     }
 
-    /// Whether the servo is off, and the drive ready to switch it on.
+    /// Servo_Active was still 1 when [`Limits::inactive`](super::Limits::inactive) was over, with Servo_On = 0: take the
+    /// power away by other means. Stays until [`clear`](Self::clear).
+    pub const fn disobeys(&self) -> bool {
+        self.disobeys
+    }
+
+    /// Whether the servo is off, the drive ready to switch it on, and no request is under way that would change its
+    /// position or its state.
     pub const fn can_switch_on(&self) -> bool {
-        matches!(self.state, AxisState::Off) && self.status.servo_ready()
+        matches!(self.state, AxisState::Off)
+            && self.status.contains(StatusFlags::SERVO_READY)
+            && !self.service.needs_servo_off()
     }
 
     /// Switches the servo on, from `Off`; gives whether it did anything.
     pub fn switch_on(&mut self) -> bool {
         let able = self.can_switch_on();
         if able {
-            self.enter(AxisState::SwitchingOn, self.settings.limits.active);
+            self.enter(AxisState::SwitchingOn, self.config.limits.active);
         }
         able
     }
 
     /// Switches the servo off. A stopped axis stays stopped.
     pub fn switch_off(&mut self) {
-        if matches!(self.state, AxisState::SwitchingOn | AxisState::On) {
-            self.enter(AxisState::SwitchingOff, self.settings.limits.inactive);
+        match self.state {
+            AxisState::Stopping(reason) => self.stop(reason),
+            AxisState::SwitchingOn | AxisState::On => {
+                self.enter(AxisState::SwitchingOff, self.config.limits.inactive);
+            }
+            _ => {}
         }
     }
 
-    /// Stops the axis: servo off until [`clear`](Self::clear). The first reason stays.
+    /// Stops the axis at once: servo off until [`clear`](Self::clear). The first reason stays.
     pub fn stop(&mut self, reason: StopReason) {
         if !matches!(self.state, AxisState::Stopped(_)) {
             self.enter(AxisState::Stopped(reason), 0);
@@ -234,209 +183,155 @@ impl Axis {
         if matches!(self.state, AxisState::Stopped(_)) {
             self.watch.reset();
             self.refused = 0;
-            self.enter(AxisState::Starting, self.settings.limits.ready);
+            self.active_off = 0;
+            self.disobeys = false;
+            self.last_refusal = None;
+            self.enter(AxisState::Starting, self.config.limits.ready);
         }
     }
 
-    /// Control bits other than Servo_On, which the state decides.
-    pub const fn set_control(&mut self, control: ControlBits) {
-        self.control = control.without(ControlBits::SERVO_ON);
-    }
-
-    /// Command_Data3 of the normal command: velocity or torque feed-forward by Pr7.35. With Pr7.35 = 0 it must stay 0,
-    /// or the drive answers 0032h. A request carries its own data instead.
-    pub const fn set_feed_forward(&mut self, value: i32) {
-        self.feed_forward = value;
-    }
-
-    /// The next command position, in CP.
-    ///
-    /// # Errors
-    /// [`SetpointError`]; the position before is kept then.
-    pub const fn set_position(&mut self, position: i32) -> Result<(), SetpointError> {
-        match (self.state, self.settings.mode) {
-            (AxisState::On, ActiveCode::CyclicPosition) => {}
-            (AxisState::On, _) => return Err(SetpointError::Mode),
-            _ => return Err(SetpointError::NotOn),
+    /// Takes what an update period brought: the drive's response to what was `sent`. While invalid data go out no limit
+    /// runs.
+    pub fn receive(&mut self, sent: Turn, received: &Received) {
+        let response = self.sound(received);
+        if self.state == AxisState::On {
+            self.last_step = step(self.before, self.setpoint);
+            self.before = self.setpoint;
         }
-        let step = step(self.setpoint, position);
-        if step.unsigned_abs() > self.max_step {
-            return Err(SetpointError::Step { step });
-        }
-        self.setpoint = position;
-        Ok(())
-    }
-
-    /// The next speed in CV (unit by Pr7.25) or torque in CT (0.1 %).
-    ///
-    /// # Errors
-    /// [`SetpointError`]; the value before is kept then.
-    pub const fn set_rate(&mut self, rate: i32) -> Result<(), SetpointError> {
-        match (self.state, self.settings.mode) {
-            (AxisState::On, ActiveCode::CyclicVelocity | ActiveCode::CyclicTorque) => {
-                self.setpoint = rate;
-                Ok(())
-            }
-            (AxisState::On, _) => Err(SetpointError::Mode),
-            _ => Err(SetpointError::NotOn),
-        }
-    }
-
-    /// Starts a profile motion, in PP.
-    ///
-    /// # Errors
-    /// [`SetpointError`]; a motion under way goes on then.
-    pub const fn start_move(&mut self, type_code: u8, target: i32, speed: i32) -> Result<(), SetpointError> {
-        match (self.state, self.settings.mode) {
-            (AxisState::On, ActiveCode::ProfilePosition) => {}
-            (AxisState::On, _) => return Err(SetpointError::Mode),
-            _ => return Err(SetpointError::NotOn),
-        }
-        if self.profile.is_some() || !matches!(self.service, Service::Idle) {
-            return Err(SetpointError::Moving);
-        }
-        let limit = self.settings.limits.answer;
-        self.profile = Some(ProfileMove::new(self.settings.mac_id, type_code, target, speed, limit));
-        Ok(())
-    }
-
-    /// Changes the speed of the motion under way, if there is one.
-    pub const fn set_move_speed(&mut self, speed: i32) {
-        if let Some(profile) = &mut self.profile {
-            profile.set_speed(speed);
-        }
-    }
-
-    /// How far the profile motion is; once it has ended this gives its end and forgets it.
-    pub const fn take_move(&mut self) -> Option<MoveProgress> {
-        let Some(profile) = &self.profile else { return None };
-        let progress = profile.progress();
-        if !matches!(progress, MoveProgress::Preparing | MoveProgress::Starting | MoveProgress::Moving { .. }) {
-            self.profile = None;
-        }
-        Some(progress)
-    }
-
-    /// Sends a non-cyclic command; `false` if one is under way, or the request is none of the kind.
-    pub const fn ask(&mut self, request: Request) -> bool {
-        let (cyclic, limit) = (self.settings.mode.cyclic(), self.settings.limits.answer);
-        if !matches!(self.service, Service::Idle) || self.profile.is_some() {
-            return false;
-        }
-        match Handshake::new(self.settings.mac_id, cyclic, request, limit) {
-            Some(handshake) => {
-                self.service = Service::Asking(handshake);
-                self.outcome = None;
-                true
-            }
-            None => false,
-        }
-    }
-
-    /// The outcome of the last request, once.
-    pub const fn take_outcome(&mut self) -> Option<Progress> {
-        self.outcome.take()
-    }
-
-    /// Takes what an update period brought: the drive's response to what was `sent`, `None` if there was none or it
-    /// was refused. While invalid data go out no limit runs.
-    pub fn receive(&mut self, sent: Turn, response: Option<&Response>) {
-        let response = response.filter(|response| response.mac_id == self.settings.mac_id);
         if sent != Turn::Invalid {
             if self.watch.sample(response.map(|r| r.update_counter_echo)) {
-                self.stop(StopReason::EchoTimeout);
+                self.stop(self.silence());
             }
+            self.count_refusals(response);
+            self.serve(response);
+            self.serve_sub(response.and(received.sub()));
             if let Some(response) = response {
-                self.look(response);
+                self.supervise(response.status);
             }
-            self.poll(response);
             self.wait();
         }
         if let Some(response) = response {
             self.status = response.status;
             self.actual = response.response_data1;
         }
-        if self.state != AxisState::On {
-            self.setpoint = if self.settings.mode == ActiveCode::CyclicPosition { self.actual } else { 0 };
+        match self.state {
+            AxisState::On => {}
+            AxisState::Stopping(reason) => self.slow_down(reason),
+            _ => self.rest(),
         }
     }
 
-    /// What to send in this update period.
-    pub const fn send(&self, turn: Turn) -> Command {
-        let mac_id = self.settings.mac_id;
+    /// What to send in this update period; in the 16-byte mode its `main` half alone.
+    pub fn send(&self, turn: Turn) -> Command32 {
+        let mac_id = self.config.mac_id;
         let counter = match turn {
-            Turn::Invalid => return Command::nop(mac_id),
+            Turn::Invalid => return Command32 { main: Command::nop(mac_id), sub: self.sub_command([0; 2]) },
             Turn::Valid(counter) => counter,
         };
-        let off = *ServoOff::new(mac_id, counter, self.settings.mode).command();
-        let request = match (&self.service, &self.profile) {
-            (Service::Asking(handshake), _) => handshake.request(),
-            (_, Some(profile)) => profile.request(),
-            _ => Request::Normal { command_data2: 0, command_data3: self.feed_forward },
-        };
-        let command_data1 = match &self.profile {
-            Some(profile) => profile.target_position(),
-            None => self.setpoint,
+        let off = *ServoOff::new(mac_id, counter, self.mode).command();
+        let [data3, sub2, sub3] = self.feed_forward;
+        let noncyclic = self.noncyclic(data3);
+        let command_data1 = match self.profile {
+            Some(profile) if profile.progress().is_pending() => profile.target_position(),
+            _ => self.setpoint,
         };
         let control = match self.state {
-            AxisState::SwitchingOn | AxisState::On => self.control.with(ControlBits::SERVO_ON),
+            AxisState::SwitchingOn | AxisState::On => self.control | ControlBits::SERVO_ON,
+            AxisState::Stopping(_) => self.control | ControlBits::SERVO_ON | self.smooth_stop(),
             _ => self.control,
         };
-        Command { control, command_data1, request, ..off }
+        let main = Command { control, command_data1, noncyclic, ..off };
+        Command32 { main, sub: self.sub_command([sub2, sub3]) }
+    }
+
+    /// The axis at `place` has failed; `at_once` where the communication has.
+    pub(super) fn share_failure(&mut self, place: u8, at_once: bool) {
+        let reason = StopReason::OtherAxis(place);
+        match (self.state, self.config.stop) {
+            _ if at_once => self.stop(reason),
+            (AxisState::Stopping(_), _) | (_, StopPolicy::None) => {}
+            (AxisState::On, StopPolicy::Decelerate { .. }) if self.mode != ActiveCode::CyclicTorque => {
+                self.enter(AxisState::Stopping(reason), self.config.limits.stop);
+                self.slow_down(reason);
+            }
+            _ => self.stop(reason),
+        }
+    }
+
+    /// The response, if it is sound and the drive's own; every block is counted.
+    fn sound<'a>(&mut self, received: &'a Received) -> Option<&'a Response> {
+        let outcome = match (received, received.response()) {
+            (Received::Refused(error), _) => Err(*error),
+            (_, Some(response)) if response.mac_id == self.config.mac_id => Ok(response),
+            (_, Some(response)) => Err(Error::MacId { got: response.mac_id.get(), want: self.config.mac_id.get() }),
+            (_, None) => return None,
+        };
+        self.counters.record(&outcome);
+        self.last_refusal = outcome.err();
+        outcome.ok()
+    }
+
+    /// Why the echo stands still.
+    fn silence(&self) -> StopReason {
+        match self.last_refusal {
+            Some(Error::MacId { got, .. }) => StopReason::WrongMacId(MacId::truncate(got)),
+            Some(error) => StopReason::Refused(error.class()),
+            None => StopReason::EchoTimeout,
+        }
+    }
+
+    /// Counts CMD_Error, but for the answer to a request and to the start of a motion.
+    fn count_refusals(&mut self, response: Option<&Response>) {
+        let Some(response) = response else { return };
+        let NonCyclicResponse::CommandError(code) = response.noncyclic() else {
+            self.refused = 0;
+            return;
+        };
+        let asked = self.service != Service::Idle || self.profile.is_some_and(|profile| !profile.is_moving());
+        if response.code.noncyclic_bits() == 0 || !asked {
+            self.refused = self.refused.saturating_add(1);
+            if self.refused >= self.config.limits.command_errors.get() {
+                self.stop(StopReason::CommandError(code));
+            }
+        }
     }
 
     /// Alarm, readiness and activity by the state.
-    fn look(&mut self, response: &Response) {
-        let status = response.status;
+    fn supervise(&mut self, status: StatusFlags) {
+        let [alarm, ready, active] =
+            [StatusFlags::ALARM, StatusFlags::SERVO_READY, StatusFlags::SERVO_ACTIVE].map(|flag| status.contains(flag));
         match self.state {
-            AxisState::Starting if status.servo_ready() && !status.servo_active() => self.enter(AxisState::Off, 0),
-            AxisState::SwitchingOff if !status.servo_active() => self.enter(AxisState::Off, 0),
-            AxisState::SwitchingOn | AxisState::On if status.alarm() => self.stop(StopReason::Alarm),
-            AxisState::SwitchingOn | AxisState::On if !status.servo_ready() => self.stop(StopReason::NotReady),
-            AxisState::SwitchingOn if status.servo_active() => self.enter(AxisState::On, 0),
-            AxisState::On if !status.servo_active() => self.stop(StopReason::NotActive),
+            AxisState::Starting if ready && !active && !alarm => self.enter(AxisState::Off, 0),
+            AxisState::Starting | AxisState::Stopped(_) => {}
+            _ if alarm => self.stop(StopReason::Alarm),
+            AxisState::Off if !ready => self.enter(AxisState::Starting, self.config.limits.ready),
+            AxisState::SwitchingOff if !active => self.enter(AxisState::Off, 0),
+            AxisState::SwitchingOn | AxisState::On | AxisState::Stopping(_) if !ready => {
+                self.stop(StopReason::NotReady);
+            }
+            AxisState::SwitchingOn if active => self.enter(AxisState::On, 0),
+            AxisState::On | AxisState::Stopping(_) if !active => self.stop(StopReason::NotActive),
             _ => {}
         }
-        let asked = matches!(self.service, Service::Asking(_)) || self.profile.is_some();
-        match response.answer() {
-            Answer::CommandError(code) if !asked => {
-                self.refused = self.refused.saturating_add(1);
-                if self.refused >= self.settings.limits.command_errors.get() {
-                    self.stop(StopReason::CommandError(code));
-                }
-            }
-            _ => self.refused = 0,
+        if self.state.is_servo_on() || !active {
+            self.active_off = 0;
+            return;
         }
-    }
-
-    /// Requests and profile motion.
-    fn poll(&mut self, response: Option<&Response>) {
-        if let Some(profile) = &mut self.profile {
-            profile.poll(response);
-        }
-        let released = response.is_some_and(|r| r.code.noncyclic_bits() == 0);
-        match &mut self.service {
-            Service::Idle => {}
-            Service::Asking(handshake) => {
-                let progress = handshake.poll(response);
-                if progress != Progress::Pending {
-                    self.outcome = Some(progress);
-                    self.service = Service::Releasing { left: self.settings.limits.answer };
-                }
-            }
-            Service::Releasing { left } => match left.checked_sub(1) {
-                Some(less) if !released => *left = less,
-                _ => self.service = Service::Idle,
-            },
+        self.active_off = self.active_off.saturating_add(1);
+        if self.active_off > self.config.limits.inactive {
+            self.disobeys = true;
+            self.stop(StopReason::InactiveTimeout);
         }
     }
 
     /// The limit of the present state.
     fn wait(&mut self) {
         let reason = match self.state {
+            AxisState::Starting if self.status.contains(StatusFlags::ALARM) => StopReason::Alarm,
             AxisState::Starting => StopReason::ReadyTimeout,
             AxisState::SwitchingOn => StopReason::ActiveTimeout,
             AxisState::SwitchingOff => StopReason::InactiveTimeout,
+            AxisState::Stopping(reason) => reason,
             AxisState::Off | AxisState::On | AxisState::Stopped(_) => return,
         };
         match self.left.checked_sub(1) {
@@ -445,11 +340,68 @@ impl Axis {
         }
     }
 
+    /// The set-point of an axis that does not move by command.
+    fn rest(&mut self) {
+        self.setpoint = if self.mode == ActiveCode::CyclicPosition { self.actual } else { 0 };
+        self.before = self.setpoint;
+        self.last_step = 0;
+    }
+
+    /// One update period of a controlled deceleration.
+    fn slow_down(&mut self, reason: StopReason) {
+        let StopPolicy::Decelerate { per_update } = self.config.stop else { return self.stop(reason) };
+        let less = |value: i32| {
+            let magnitude = value.unsigned_abs().saturating_sub(per_update.max(1));
+            // Smaller than an i32 in magnitude, so it is one.
+            let magnitude = i32::try_from(magnitude).unwrap_or(i32::MAX);
+            if value < 0 { magnitude.saturating_neg() } else { magnitude }
+        };
+        let stands = match self.mode {
+            ActiveCode::CyclicPosition => {
+                self.last_step = less(self.last_step);
+                self.setpoint = self.setpoint.wrapping_add(self.last_step);
+                self.last_step == 0
+            }
+            ActiveCode::CyclicVelocity => {
+                self.setpoint = less(self.setpoint);
+                self.setpoint == 0
+            }
+            ActiveCode::ProfilePosition => !self.status.contains(StatusFlags::IN_PROGRESS),
+            ActiveCode::CyclicTorque => true,
+        };
+        if stands {
+            self.stop(reason);
+        }
+    }
+
+    /// The bit that ends a profile motion.
+    fn smooth_stop(&self) -> ControlBits {
+        match self.mode {
+            ActiveCode::ProfilePosition => ControlBits::SMOOTH_STOP,
+            _ => ControlBits::empty(),
+        }
+    }
+
+    /// Bytes 8-15: the request, the motion, or the normal command with its feed-forward.
+    fn noncyclic(&self, feed_forward: i32) -> NonCyclicCommand {
+        match (self.service.request(), &self.profile) {
+            (Some(request), _) => request.with_feed_forward(feed_forward),
+            (None, Some(profile)) => profile.request().with_feed_forward(feed_forward),
+            (None, None) => NonCyclicCommand::IDLE.with_feed_forward(feed_forward),
+        }
+    }
+
     fn enter(&mut self, state: AxisState, limit: u32) {
         self.state = state;
         self.left = limit;
         if state != AxisState::On {
-            self.profile = None;
+            self.feed_forward = [0; 3];
+        }
+        if !state.is_servo_on() {
+            if let Some(profile) = &mut self.profile {
+                profile.abandon(Failure::ServoOff);
+            }
+            self.rest();
         }
     }
 }

@@ -1,4 +1,11 @@
-use crate::{BlockSize, Code, Error, ErrorCode, MacId, Response, UpdateCounter, split32};
+use crate::block::BlockSize;
+use crate::code::Code;
+use crate::error::Error;
+use crate::error_code::ErrorCode;
+use crate::header::{MacId, UpdateCounter};
+use crate::noncyclic_response::NonCyclicResponse;
+use crate::response::Response;
+use crate::sub::split32;
 
 /// What the response to a command should say.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -39,7 +46,7 @@ impl Expected {
     /// response that is 112 of 128 bits.
     ///
     /// # Errors
-    /// [`Error::Length`], [`Error::Direction`] or [`Error::MacId`]: nothing of such a block may be used.
+    /// [`Error::Truncated`], [`Error::TooLong`], [`Error::Direction`] or [`Error::MacId`]: nothing of such a block may be used.
     pub const fn check(&self, bytes: &[u8]) -> Result<(Response, Reception), Error> {
         let parsed = match self.size {
             BlockSize::Bytes16 => Response::parse(bytes),
@@ -59,7 +66,7 @@ impl Expected {
             Reception::CounterNotEchoed
         } else if response.code.get() != self.code.get() {
             Reception::CodeNotYetEchoed
-        } else if let crate::Answer::CommandError(code) = response.answer() {
+        } else if let NonCyclicResponse::CommandError(code) = response.noncyclic() {
             Reception::CommandError(code)
         } else {
             Reception::Accepted

@@ -1,4 +1,4 @@
-use crate::UpdateCounter;
+use crate::header::UpdateCounter;
 
 /// What goes out in one update period.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

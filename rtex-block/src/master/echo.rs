@@ -1,6 +1,6 @@
 use core::num::NonZeroU16;
 
-use crate::UpdateCounter;
+use crate::header::UpdateCounter;
 
 /// Notices that the echo of the counter stands still.
 ///

@@ -1,26 +1,11 @@
-use crate::{Answer, Code, CyclicCode, ErrorCode, MacId, Reply, Request, Response};
-
-/// How far a request has come.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub enum Progress {
-    /// No answer to this request yet, or the drive is busy: hold the command.
-    Pending,
-    /// Executed.
-    Done {
-        /// Bytes 12-15 of the answer.
-        data: i32,
-        /// WNG: executed with a restriction.
-        warning: bool,
-    },
-    /// ERR: accepted, and failed while it was executed.
-    Failed,
-    /// CMD_Error: not accepted.
-    Rejected(ErrorCode),
-    /// No answer within the caller's limit.
-    TimedOut,
-}
+use super::progress::{Failure, Progress};
+use crate::code::{Code, CyclicCode};
+use crate::execution::Execution;
+use crate::header::MacId;
+use crate::noncyclic_command::{Arguments, NonCyclicCommand};
+use crate::noncyclic_response::NonCyclicResponse;
+use crate::response::Response;
+use crate::type_code::TypeCode;
 
 /// One non-cyclic command from the request to its answer.
 ///
@@ -29,88 +14,111 @@ pub enum Progress {
 ///      each response:  C/R or MAC-ID wrong           discard
 ///                      code echo not this code       pending
 ///                      CMD_Error                     rejected
-///                      type or index echo differs    pending: answer to an older request
+///                      echo of type, index or        pending: answer to an older request
+///                        selections differs
 ///                      ERR                           failed
 ///                      Busy                          pending
 ///                      else                          done
 ///  go back to the normal command (0h)
 /// ```
 /// Going back is needed before the same command is *executed* again; a monitor value is refreshed while the
-/// command is held, so [`poll`](Self::poll) may be called on after `Done`. The rules follow from the meaning of the
+/// command is held, so [`receive`](Self::receive) may be called on after `Done`. The rules follow from the meaning of the
 /// flags in SX-DSV02310; how echoes are matched is this crate's reading.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Handshake {
     mac_id: MacId,
     code: Code,
-    request: Request,
+    request: NonCyclicCommand,
     left: u32,
+    /// The index echo is part of the answer.
+    any_index: bool,
 }
 
 impl Handshake {
-    /// A handshake for `request`, sent to `mac_id` with `cyclic`; it times out after `limit` pending polls.
+    /// A handshake for `request`, sent to `mac_id` with `cyclic`; it times out when `limit` responses have left it pending.
     ///
-    /// `None` for [`Request::Normal`], which has no answer, and for [`Request::Profile`], which is a motion:
+    /// `None` for [`NonCyclicCommand::Normal`], which has no answer, and for [`NonCyclicCommand::Profile`], which is a motion:
     /// see [`ProfileMove`](super::ProfileMove).
-    pub const fn new(mac_id: MacId, cyclic: CyclicCode, request: Request, limit: u32) -> Option<Self> {
+    pub const fn new(mac_id: MacId, cyclic: CyclicCode, request: NonCyclicCommand, limit: u32) -> Option<Self> {
         match request {
-            Request::Normal { .. } | Request::Profile { .. } => None,
-            _ => Some(Self { mac_id, code: Code::of(cyclic, request.code()), request, left: limit }),
+            NonCyclicCommand::Normal { .. } | NonCyclicCommand::Profile { .. } => None,
+            _ => {
+                let code = Code::of(cyclic, request.code());
+                Some(Self { mac_id, code, request, left: limit, any_index: false })
+            }
         }
+    }
+
+    /// A handshake for reading the attributes of the alarm that is being issued: Index 0, `type_code` as the drive's manual
+    /// gives it for attributes.
+    ///
+    /// The answer carries the alarm as Index_Echo and its attributes in bytes 12-15, so the echo of the type code alone is
+    /// compared. SX-DSV02310, "Alarm command".
+    pub const fn alarm_attributes(mac_id: MacId, cyclic: CyclicCode, type_code: TypeCode, limit: u32) -> Self {
+        let request = NonCyclicCommand::Alarm(Arguments { type_code, index: 0, data: 0 });
+        Self { mac_id, code: Code::of(cyclic, request.code()), request, left: limit, any_index: true }
     }
 
     /// What to send while the handshake is pending.
-    pub const fn request(&self) -> Request {
+    pub const fn request(&self) -> NonCyclicCommand {
         self.request
     }
 
+    /// Update periods until it times out.
+    pub const fn left(&self) -> u32 {
+        self.left
+    }
+
     /// Takes what one update period brought: the drive's response, `None` if there was none or it was refused.
-    pub fn poll(&mut self, response: Option<&Response>) -> Progress {
+    ///
+    /// `Done` carries the whole response: the data, WNG, and the echoes.
+    pub fn receive(&mut self, response: Option<&Response>) -> Progress<NonCyclicResponse> {
         let progress = match response {
             Some(response) if response.mac_id == self.mac_id && response.code == self.code => {
-                self.read(response.answer())
+                self.read(response.noncyclic())
             }
-            _ => Progress::Pending,
+            _ => None,
         };
-        if progress != Progress::Pending {
-            return progress;
-        }
-        match self.left.checked_sub(1) {
+        progress.unwrap_or_else(|| match self.left.checked_sub(1) {
             Some(left) => {
                 self.left = left;
-                Progress::Pending
+                Progress::Pending { left }
             }
-            None => Progress::TimedOut,
+            None => Progress::Failed { error: Failure::TimedOut },
+        })
+    }
+
+    /// `None` while the answer is due.
+    fn read(&self, response: NonCyclicResponse) -> Option<Progress<NonCyclicResponse>> {
+        if let NonCyclicResponse::CommandError(code) = response {
+            return Some(Progress::Failed { error: Failure::CommandError(code) });
+        }
+        let execution = response.execution().filter(|_| self.is_echo(&response))?;
+        if execution.contains(Execution::ERR) {
+            Some(Progress::Failed { error: Failure::Execution })
+        } else if execution.contains(Execution::BUSY) {
+            None
+        } else {
+            Some(Progress::Done { value: response })
         }
     }
 
-    fn read(&self, answer: Answer) -> Progress {
-        let (execution, data) = match (self.request, answer) {
-            (_, Answer::CommandError(code)) => return Progress::Rejected(code),
-            (Request::Reset(sent), Answer::Reset(reply))
-            | (Request::SystemId(sent), Answer::SystemId(reply))
-            | (Request::Alarm(sent), Answer::Alarm(reply))
-            | (Request::Parameter(sent), Answer::Parameter(reply))
-            | (Request::Monitor(sent), Answer::Monitor(reply)) => {
-                let Reply { execution, type_code, index, data } = reply;
-                if type_code != sent.type_code || index != sent.index {
-                    return Progress::Pending;
-                }
-                (execution, data)
+    /// Whether type code and index, or the selections of a latch, are those of the request.
+    fn is_echo(&self, response: &NonCyclicResponse) -> bool {
+        match (self.request, *response) {
+            (NonCyclicCommand::Reset(sent), NonCyclicResponse::Reset(results))
+            | (NonCyclicCommand::SystemId(sent), NonCyclicResponse::SystemId(results))
+            | (NonCyclicCommand::Alarm(sent), NonCyclicResponse::Alarm(results))
+            | (NonCyclicCommand::Parameter(sent), NonCyclicResponse::Parameter(results))
+            | (NonCyclicCommand::Monitor(sent), NonCyclicResponse::Monitor(results)) => {
+                results.type_code == sent.type_code && (self.any_index || results.index == sent.index)
             }
-            (Request::Homing { type_code: sent, .. }, Answer::Homing { execution, type_code, monitor_data, .. })
-                if type_code == sent =>
-            {
-                (execution, monitor_data)
-            }
-            _ => return Progress::Pending,
-        };
-        if execution.err {
-            Progress::Failed
-        } else if execution.busy {
-            Progress::Pending
-        } else {
-            Progress::Done { data, warning: execution.wng }
+            (
+                NonCyclicCommand::Homing { type_code, latch_sel1, latch_sel2, monitor_sel, .. },
+                NonCyclicResponse::Homing { type_code: a, latch_sel1: b, latch_sel2: c, monitor_sel: d, .. },
+            ) => (a, b, c, d) == (type_code, latch_sel1, latch_sel2, monitor_sel),
+            _ => false,
         }
     }
 }

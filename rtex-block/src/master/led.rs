@@ -1,4 +1,4 @@
-use super::{Fault, Phase};
+use super::phase::{Fault, Phase};
 
 /// What the COM LED of the master shows at a moment. Green and red exclude each other.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]

@@ -1,4 +1,4 @@
-use super::SlaveInfo;
+use super::slaves::SlaveInfo;
 
 /// State of the communication ASIC, as the guide names it (INITIAL and READY are inferred names).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -41,13 +41,13 @@ impl Phase {
     pub const ALL: [Self; 5] = [Self::Init, Self::Waiting, Self::Prepare, Self::Start, Self::Running];
 }
 
-/// A fault that stops the phases. It stays until the system is reset.
+/// A fault that stops the phases.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "arbitrary", derive(arbitrary::Arbitrary))]
 pub enum Fault {
-    /// The slaves found are not those of the table, or a MAC-ID is there twice.
+    /// The slaves found are not those of the table, or a MAC-ID is there twice. It stays until the system is reset.
     SlaveInfoMismatch,
     /// Reception stopped in PH_RUNNING.
     Timeout,
@@ -115,6 +115,13 @@ impl PhaseControl {
             (Phase::Start, Asic::Running, _) => self.phase = Phase::Running,
             (Phase::Running, _, _) if inputs.timeout => self.fault = Some(Fault::Timeout),
             _ => {}
+        }
+    }
+
+    /// Forgets a time-out, so that the ring can be cleared. A mismatch of the slaves stays: only a system reset releases it.
+    pub const fn release_timeout(&mut self) {
+        if matches!(self.fault, Some(Fault::Timeout)) {
+            self.fault = None;
         }
     }
 }

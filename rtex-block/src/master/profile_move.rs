@@ -1,27 +1,39 @@
-use crate::{Answer, Code, ErrorCode, MacId, Nibble, Request, Response};
+use super::progress::{Failure, Progress};
+use crate::code::Code;
+use crate::execution::{Execution, ProfileFlags};
+use crate::header::MacId;
+use crate::noncyclic_command::NonCyclicCommand;
+use crate::noncyclic_response::NonCyclicResponse;
+use crate::response::Response;
+use crate::status::StatusFlags;
+use crate::type_code::Nibble;
 
-/// How far a profile motion has come.
+/// How far a profile motion is while it is pending.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub enum MoveProgress {
-    /// Code 10h is out; the drive has not echoed it yet, or is still moving.
+pub enum MoveStage {
+    /// Code 10h is out; the drive has not echoed it yet, or still moves.
     Preparing,
-    /// Code 17h is out and not answered yet.
+    /// Code 17h is out, and In_Progress has not been 1 yet.
     Starting,
-    /// The drive generates the position command.
-    Moving {
-        /// Inside the near window.
-        near: bool,
-    },
-    /// In_Progress went back to 0.
-    Done,
-    /// ERR: accepted, and failed while it was executed.
-    Failed,
-    /// CMD_Error: not accepted.
-    Rejected(ErrorCode),
-    /// The drive did not start within the caller's limit.
-    TimedOut,
+    /// In_Progress was 1: the drive generates the position command.
+    Moving,
+    /// The motion has ended, well or not; the code is 10h again.
+    Ended,
+}
+
+/// The end of a profile motion: In_Progress went from 1 to 0, so the drive generates no position command any more.
+///
+/// That is not the arrival of the motor: it may still be on its way to the last command position.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct CommandEnded {
+    /// In_Position in the same response: whether the deviation was inside the window already.
+    pub in_position: bool,
+    /// WNG: executed with a restriction.
+    pub warning: bool,
 }
 
 /// Profile motion: the change of the code from 10h to 17h starts it while In_Progress is 0.
@@ -36,17 +48,40 @@ pub struct ProfileMove {
     type_code: u8,
     target_position: i32,
     target_speed: i32,
-    progress: MoveProgress,
-    left: u32,
+    stage: MoveStage,
+    progress: Progress<CommandEnded>,
+    latch_sel1: Nibble,
+    monitor_sel: u8,
+    flags: ProfileFlags,
+    monitor_data: i32,
 }
 
 impl ProfileMove {
     /// A motion to `target_position` (by the type code absolute or relative), unit of the speed by Pr7.25; the
-    /// drive has `limit` polls to get ready and start.
+    /// drive has `limit` update periods to get ready and to set In_Progress.
     ///
-    /// Before a relative motion read IPOS while In_Progress is 0: it follows the motor in servo-off, CV and CT.
+    /// A motion of no length may never set it, and fails as [`NotStarted`](Failure::NotStarted) then. That In_Progress
+    /// may come later than the first echo of 17h is inferred: the vendor does not say when it rises. Before a relative
+    /// motion read IPOS while In_Progress is 0: it follows the motor in servo-off, CV and CT.
     pub const fn new(mac_id: MacId, type_code: u8, target_position: i32, target_speed: i32, limit: u32) -> Self {
-        Self { mac_id, type_code, target_position, target_speed, progress: MoveProgress::Preparing, left: limit }
+        Self {
+            mac_id,
+            type_code,
+            target_position,
+            target_speed,
+            stage: MoveStage::Preparing,
+            progress: Progress::Pending { left: limit },
+            latch_sel1: Nibble::ZERO,
+            monitor_sel: 0,
+            flags: ProfileFlags::empty(),
+            monitor_data: 0,
+        }
+    }
+
+    /// With Latch_Sel1 and Monitor_Sel, which the drive echoes; an answer with other ones is an older one.
+    #[must_use]
+    pub const fn with_latch(self, latch_sel1: Nibble, monitor_sel: u8) -> Self {
+        Self { latch_sel1, monitor_sel, ..self }
     }
 
     /// Another target speed, valid at once.
@@ -60,56 +95,110 @@ impl ProfileMove {
     }
 
     /// What to send now: the normal command (code 10h) before the start and after the end, otherwise 17h.
-    pub const fn request(&self) -> Request {
-        match self.progress {
-            MoveProgress::Starting | MoveProgress::Moving { .. } => Request::Profile {
+    pub const fn request(&self) -> NonCyclicCommand {
+        match self.stage {
+            MoveStage::Starting | MoveStage::Moving => NonCyclicCommand::Profile {
                 type_code: self.type_code,
-                latch_sel1: Nibble::ZERO,
-                monitor_sel: 0,
+                latch_sel1: self.latch_sel1,
+                monitor_sel: self.monitor_sel,
                 target_speed: self.target_speed,
             },
-            _ => Request::IDLE,
+            MoveStage::Preparing | MoveStage::Ended => NonCyclicCommand::IDLE,
         }
     }
 
     /// How far it is.
-    pub const fn progress(&self) -> MoveProgress {
+    pub const fn progress(&self) -> Progress<CommandEnded> {
         self.progress
+    }
+
+    /// How far it is while it is pending.
+    pub const fn stage(&self) -> MoveStage {
+        self.stage
+    }
+
+    /// Whether In_Progress was 1 and the end has not come.
+    pub const fn is_moving(&self) -> bool {
+        matches!(self.stage, MoveStage::Moving)
+    }
+
+    /// NEAR, PSL, NSL and Latch_Comp1 of the last answer.
+    pub const fn flags(&self) -> ProfileFlags {
+        self.flags
+    }
+
+    /// Monitor_Data of the last answer: the value chosen by Monitor_Sel. LPOS1 counts once Latch_Comp1 is set.
+    pub const fn monitor_data(&self) -> i32 {
+        self.monitor_data
+    }
+
+    /// Ends it without the drive's doing.
+    pub(super) const fn abandon(&mut self, error: Failure) {
+        if self.progress.is_pending() {
+            self.fail(error);
+        }
     }
 
     /// Takes what one update period brought: the drive's response, `None` if there was none or it was refused.
-    pub fn poll(&mut self, response: Option<&Response>) -> MoveProgress {
-        let response = response.filter(|response| response.mac_id == self.mac_id);
-        self.progress = match (self.progress, response) {
-            (MoveProgress::Preparing, Some(r))
-                if r.code == Code::PROFILE_IDLE && !r.cmd_error && !r.status.in_progress() =>
+    pub fn receive(&mut self, response: Option<&Response>) -> Progress<CommandEnded> {
+        match (self.stage, response.filter(|response| response.mac_id == self.mac_id)) {
+            (MoveStage::Preparing, Some(r))
+                if r.code == Code::PROFILE_IDLE && !r.cmd_error && !r.status.contains(StatusFlags::IN_PROGRESS) =>
             {
-                MoveProgress::Starting
+                self.stage = MoveStage::Starting;
             }
-            (MoveProgress::Starting | MoveProgress::Moving { .. }, Some(r)) if r.code == Code::PROFILE_START => {
-                self.read(r)
-            }
-            (progress, _) => progress,
-        };
-        if matches!(self.progress, MoveProgress::Preparing | MoveProgress::Starting) {
-            match self.left.checked_sub(1) {
-                Some(left) => self.left = left,
-                None => self.progress = MoveProgress::TimedOut,
-            }
+            (MoveStage::Starting | MoveStage::Moving, Some(r)) if r.code == Code::PROFILE_START => self.read(r),
+            _ => {}
         }
+        self.wait();
         self.progress
     }
 
-    fn read(&self, response: &Response) -> MoveProgress {
-        match response.answer() {
-            Answer::CommandError(code) => MoveProgress::Rejected(code),
-            Answer::Profile { type_code, .. } if type_code != self.type_code => self.progress,
-            Answer::Profile { execution, .. } if execution.err => MoveProgress::Failed,
-            Answer::Profile { execution, near, .. } if execution.busy || response.status.in_progress() => {
-                MoveProgress::Moving { near }
-            }
-            Answer::Profile { .. } => MoveProgress::Done,
-            _ => self.progress,
+    fn read(&mut self, response: &Response) {
+        let NonCyclicResponse::Profile { execution, type_code, flags, latch_sel1, monitor_sel, monitor_data } =
+            response.noncyclic()
+        else {
+            return self.refuse(response);
+        };
+        if (type_code, latch_sel1, monitor_sel) != (self.type_code, self.latch_sel1, self.monitor_sel) {
+            return;
         }
+        (self.flags, self.monitor_data) = (flags, monitor_data);
+        let moves = execution.contains(Execution::BUSY) || response.status.contains(StatusFlags::IN_PROGRESS);
+        if execution.contains(Execution::ERR) {
+            self.fail(Failure::Execution);
+        } else if moves {
+            self.stage = MoveStage::Moving;
+        } else if self.stage == MoveStage::Moving {
+            let in_position = response.status.contains(StatusFlags::IN_POSITION);
+            let warning = execution.contains(Execution::WNG);
+            self.progress = Progress::Done { value: CommandEnded { in_position, warning } };
+            self.stage = MoveStage::Ended;
+        }
+    }
+
+    /// CMD_Error refuses the start. During the motion it is the damage of one frame: the drive moves on.
+    fn refuse(&mut self, response: &Response) {
+        if let (MoveStage::Starting, NonCyclicResponse::CommandError(code)) = (self.stage, response.noncyclic()) {
+            self.fail(Failure::CommandError(code));
+        }
+    }
+
+    /// The limit for getting ready and starting; a motion under way has none.
+    fn wait(&mut self) {
+        let (Progress::Pending { left }, MoveStage::Preparing | MoveStage::Starting) = (self.progress, self.stage)
+        else {
+            return;
+        };
+        match (left.checked_sub(1), self.stage) {
+            (Some(left), _) => self.progress = Progress::Pending { left },
+            (None, MoveStage::Starting) => self.fail(Failure::NotStarted),
+            (None, _) => self.fail(Failure::TimedOut),
+        }
+    }
+
+    const fn fail(&mut self, error: Failure) {
+        self.progress = Progress::Failed { error };
+        self.stage = MoveStage::Ended;
     }
 }

@@ -1,11 +1,15 @@
-use super::{Axis, AxisState, CommandCounter, StopReason, Turn};
-use crate::{Command, Response};
+use super::axis::Axis;
+use super::counter::{CommandCounter, Turn};
+use super::received::Received;
+use super::state::{AxisState, StopReason};
+use crate::header::MacId;
+use crate::sub::Command32;
 
 /// All axes of a ring, in step: one call in every update period.
 ///
-/// As soon as one axis fails (its echo stands still, it has an alarm, it does not obey) every other is stopped in
-/// the same call, so the commands it gives back are servo-off for all. That is what the guide asks for on a
-/// time-out; for an alarm it is this crate's choice, made for coordinated motion.
+/// As soon as one axis fails the others stop in the same call: at once if the communication has failed (its echo stands
+/// still), as the System Design Guide for Master asks for, otherwise each by its [`StopPolicy`](super::StopPolicy), which
+/// is at once unless changed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Ring<const N: usize> {
@@ -15,10 +19,30 @@ pub struct Ring<const N: usize> {
     failed: Option<u8>,
 }
 
+/// Two axes of a ring have the same address.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[error("two axes have the MAC-ID {0}")]
+pub struct SameMacId(pub MacId);
+
 impl<const N: usize> Ring<N> {
-    /// A ring that sends `invalid` update periods of invalid data (00h) before the first valid commands.
-    pub const fn new(axes: [Axis; N], invalid: u32) -> Self {
-        Self { counter: CommandCounter::new(invalid), sent: Turn::Invalid, axes, failed: None }
+    /// A ring that sends `invalid` update periods of invalid data (00h) before the first valid commands. It has 1 to 32
+    /// axes; any other number does not compile.
+    ///
+    /// # Errors
+    /// [`SameMacId`]
+    pub fn new(axes: [Axis; N], invalid: u32) -> Result<Self, SameMacId> {
+        const { assert!(N > 0 && N <= MacId::COUNT, "a ring has 1 to 32 drives") };
+        let mut seen = 0_u32;
+        for axis in &axes {
+            let mac_id = axis.config().mac_id;
+            let bit = 1_u32.wrapping_shl(mac_id.get().into());
+            if seen & bit != 0 {
+                return Err(SameMacId(mac_id));
+            }
+            seen |= bit;
+        }
+        Ok(Self { counter: CommandCounter::new(invalid), sent: Turn::Invalid, axes, failed: None })
     }
 
     /// The axes, in the order they were given.
@@ -45,12 +69,13 @@ impl<const N: usize> Ring<N> {
         }
     }
 
-    /// Takes the responses to the last commands and gives the next commands.
-    pub fn update(&mut self, responses: &[Option<Response>; N]) -> [Command; N] {
-        for (axis, response) in self.axes.iter_mut().zip(responses) {
-            axis.receive(self.sent, response.as_ref());
+    /// Takes the responses to the last commands and gives the next commands; in the 16-byte mode their `main` halves alone
+    /// go out.
+    pub fn update(&mut self, received: &[Received; N]) -> [Command32; N] {
+        for (axis, received) in self.axes.iter_mut().zip(received) {
+            axis.receive(self.sent, received);
         }
-        self.stop_together();
+        self.share_failures();
         self.sent = self.counter.next();
         self.axes.each_ref().map(|axis| axis.send(self.sent))
     }
@@ -71,6 +96,12 @@ impl<const N: usize> Ring<N> {
         self.axes.iter_mut().for_each(Axis::switch_off);
     }
 
+    /// Stops all axes at once.
+    pub fn stop(&mut self, reason: StopReason) {
+        self.axes.iter_mut().for_each(|axis| axis.stop(reason));
+        self.share_failures();
+    }
+
     /// Leaves the stop: every axis waits for Servo_Ready again.
     pub fn clear(&mut self) {
         self.failed = None;
@@ -82,13 +113,19 @@ impl<const N: usize> Ring<N> {
         self.axes.iter().all(|axis| axis.state() == state)
     }
 
-    fn stop_together(&mut self) {
+    /// Whether the communication with an axis has failed.
+    pub fn is_timed_out(&self) -> bool {
+        self.axes.iter().any(|axis| matches!(axis.state(), AxisState::Stopped(reason) if reason.is_communication()))
+    }
+
+    fn share_failures(&mut self) {
         if self.failed.is_none() {
             let place = self.axes.iter().position(|axis| matches!(axis.state(), AxisState::Stopped(_)));
             self.failed = place.and_then(|place| u8::try_from(place).ok());
         }
         if let Some(place) = self.failed {
-            self.axes.iter_mut().for_each(|axis| axis.stop(StopReason::OtherAxis(place)));
+            let at_once = self.is_timed_out();
+            self.axes.iter_mut().for_each(|axis| axis.share_failure(place, at_once));
         }
     }
 }

@@ -1,4 +1,8 @@
-use crate::{Command, ControlBits, CyclicCode, LEN, MacId, UpdateCounter};
+use crate::block::LEN;
+use crate::code::CyclicCode;
+use crate::command::Command;
+use crate::control::ControlBits;
+use crate::header::{MacId, UpdateCounter};
 
 /// The cyclic codes with which a drive looks at Servo_On: all but NOP.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -63,7 +67,7 @@ impl ServoOff {
         }
         Some(Self(Command {
             update_counter: before.update_counter.next(),
-            control: before.control.without(ControlBits::SERVO_ON),
+            control: before.control.difference(ControlBits::SERVO_ON),
             ..*before
         }))
     }

@@ -1,4 +1,4 @@
-use crate::MacId;
+use crate::header::MacId;
 
 /// One entry of the slave information table.
 ///

@@ -2,19 +2,37 @@
 
 use std::cell::Cell;
 use std::fs::File;
-use std::io::{self, BufRead, BufReader, Read};
-use std::path::Path;
+use std::io::{self, BufRead, BufReader, Cursor, Read, Seek};
+use std::path::{Path, PathBuf};
 use std::rc::Rc;
+
+use flate2::read::MultiGzDecoder;
+use ruzstd::decoding::StreamingDecoder;
 
 use crate::fault::{At, Fault};
 
 const BUFFER: usize = 1 << 18;
 
+/// Files inside files are unpacked so deep.
+const DEEPEST: u8 = 4;
+/// What has to be read backwards and is no file on disk is held in memory, up to so many bytes.
+const MOST_HELD: u64 = 1 << 28;
+
+/// A reader that can go back.
+pub trait SeekRead: BufRead + Seek + Send + Sync {}
+
+impl<R: BufRead + Seek + Send + Sync> SeekRead for R {}
+
 /// An open file.
 pub struct Input {
     name: String,
+    /// The file itself, where it can be opened once more.
+    path: Option<PathBuf>,
+    depth: u8,
     reader: BufReader<Box<dyn Read>>,
     taken: Rc<Cell<u64>>,
+    /// Somebody else counts.
+    quiet: bool,
 }
 
 impl Input {
@@ -29,7 +47,51 @@ impl Input {
         if file.metadata().map_err(|e| fault(&e))?.is_dir() {
             return Err(Fault::new(&name, At::File, "is a folder; name the capture files in it"));
         }
-        Ok(Self::over(&name, Box::new(file)))
+        let regular = file.metadata().is_ok_and(|data| data.is_file());
+        let path = regular.then(|| path.to_path_buf());
+        Ok(Self { path, ..Self::over(&name, Box::new(file)) })
+    }
+
+    /// Unpacks gzip and zstd, as often as they are packed.
+    pub fn unpacked(mut self) -> Result<Self, Fault> {
+        let head = self.peek()?;
+        let packed = match head {
+            [0x1f, 0x8b, 0x08, ..] => Some(true),
+            [0x28, 0xb5, 0x2f, 0xfd, ..] | [0x50..=0x5f, 0x2a, 0x4d, 0x18, ..] => Some(false),
+            _ => None,
+        };
+        let Some(gzip) = packed else { return Ok(self) };
+        if self.depth >= DEEPEST {
+            return Err(self.fault(At::File, "is packed into itself too often"));
+        }
+        let (name, depth, meter) = (self.name.clone(), self.depth + 1, self.meter());
+        let reader: Box<dyn Read> = if gzip {
+            Box::new(MultiGzDecoder::new(self))
+        } else {
+            match StreamingDecoder::new(self) {
+                Ok(decoder) => Box::new(decoder),
+                Err(e) => return Err(Fault::new(&name, At::File, format!("cannot be unpacked (zstd): {e}"))),
+            }
+        };
+        // The progress bar counts what was read of the file.
+        let unpacked = Self { depth, quiet: true, taken: meter, ..Self::over(&name, reader) };
+        unpacked.unpacked()
+    }
+
+    /// The same content in a form that can be read backwards.
+    pub fn seekable(mut self) -> Result<Box<dyn SeekRead>, Fault> {
+        if let Some(path) = self.path.take() {
+            let file = File::open(path).map_err(|e| self.io_fault(At::File, &e))?;
+            return Ok(Box::new(BufReader::new(file)));
+        }
+        let mut bytes = Vec::new();
+        let read = self.by_ref().take(MOST_HELD + 1).read_to_end(&mut bytes);
+        read.map_err(|e| self.io_fault(At::File, &e))?;
+        if bytes.len() as u64 > MOST_HELD {
+            let what = format!("more than {} MB of this format have to be a file, not a stream", MOST_HELD >> 20);
+            return Err(self.fault(At::File, what));
+        }
+        Ok(Box::new(Cursor::new(bytes)))
     }
 
     /// Bytes that are part of the program.
@@ -39,7 +101,14 @@ impl Input {
 
     /// Any reader.
     pub fn over(name: &str, reader: Box<dyn Read>) -> Self {
-        Self { name: name.to_owned(), reader: BufReader::with_capacity(BUFFER, reader), taken: Rc::default() }
+        Self {
+            name: name.to_owned(),
+            path: None,
+            depth: 0,
+            quiet: false,
+            reader: BufReader::with_capacity(BUFFER, reader),
+            taken: Rc::default(),
+        }
     }
 
     /// The next bytes without taking them.
@@ -68,6 +137,12 @@ impl Input {
         self.fault(at, format!("cannot be read: {}", plain(error)))
     }
 
+    fn count(&self, bytes: usize) {
+        if !self.quiet {
+            self.taken.set(self.taken.get() + bytes as u64);
+        }
+    }
+
     /// Fills `buffer` as far as the file goes.
     pub fn read_full(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
         let mut filled = 0;
@@ -86,7 +161,7 @@ impl Input {
 impl Read for Input {
     fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
         let n = self.reader.read(buffer)?;
-        self.taken.set(self.taken.get() + n as u64);
+        self.count(n);
         Ok(n)
     }
 }
@@ -97,7 +172,7 @@ impl BufRead for Input {
     }
 
     fn consume(&mut self, amount: usize) {
-        self.taken.set(self.taken.get() + amount as u64);
+        self.count(amount);
         self.reader.consume(amount);
     }
 }

@@ -1,7 +1,4 @@
-//! Samples at a fixed rate without a header: `sigrok-cli -O binary`, memory dumps of an FPGA.
-//!
-//! Two ways out: level changes of all channels, as from every other format; and for one channel the samples
-//! themselves, packed 64 a word, which is what a receiver takes fastest.
+//! Samples at a fixed rate without a header: `sigrok-cli -O binary`, memory dumps of an FPGA, the inside of a session.
 
 use super::time::Clock;
 use super::{Change, Input, Line};
@@ -25,6 +22,8 @@ pub struct Raw {
     unit: Unit,
     clock: Clock,
     channels: Vec<String>,
+    /// The channel of each bit of a sample.
+    of_bit: Vec<Option<u16>>,
     block: Vec<u8>,
     /// The last sample, for the changes.
     last: Option<u64>,
@@ -33,28 +32,35 @@ pub struct Raw {
     ragged: Option<Fault>,
 }
 
-/// Samples of one channel.
-#[derive(Debug, Default)]
-pub struct Words {
-    /// 64 samples each, the oldest in bit 0.
-    pub words: Vec<u64>,
-    /// Samples in all words together; the last word may be filled in part.
-    pub samples: u64,
-}
-
 impl Raw {
-    /// `rate` in samples a second.
+    /// `rate` in samples a second. Channels are called by their numbers.
     pub fn new(input: Input, rate: u64, unit: Unit) -> Self {
-        let (unit, channels) = match unit {
-            Unit::Bit => (Unit::Bit, 1),
-            Unit::Bytes(n) => (Unit::Bytes(n.clamp(1, 8)), 8 * n.clamp(1, 8)),
+        let bits = match unit {
+            Unit::Bit => 1,
+            Unit::Bytes(n) => 8 * n.clamp(1, 8) as u16,
         };
-        let channels = (0..channels).map(|c| c.to_string()).collect();
+        Self::with_channels(input, rate, unit, (0..bits).map(|bit| (bit, bit.to_string())).collect())
+    }
+
+    /// `channels`: bit of the sample and name.
+    pub fn with_channels(input: Input, rate: u64, unit: Unit, channels: Vec<(u16, String)>) -> Self {
+        let unit = match unit {
+            Unit::Bit => Unit::Bit,
+            Unit::Bytes(n) => Unit::Bytes(n.clamp(1, 8)),
+        };
+        let mut of_bit = vec![None; 64];
+        for (channel, (bit, _)) in (0..).zip(&channels) {
+            if let Some(place) = of_bit.get_mut(usize::from(*bit)) {
+                *place = Some(channel);
+            }
+        }
+        let channels = channels.into_iter().map(|(_, name)| name).collect();
         Self {
             input,
             unit,
             clock: Clock::new(rate),
             channels,
+            of_bit,
             block: vec![0; BLOCK],
             last: None,
             samples: 0,
@@ -65,11 +71,6 @@ impl Raw {
     /// Between sample numbers and times.
     pub fn clock(&self) -> Clock {
         self.clock
-    }
-
-    /// Samples read so far.
-    pub fn samples(&self) -> u64 {
-        self.samples
     }
 
     /// Reads a block; gives its length in bytes and in samples, 0 at the end.
@@ -83,8 +84,7 @@ impl Raw {
             return Ok((got, got as u64 * 8));
         };
         let at = self.samples * n as u64;
-        // Whole words of 64 samples for units of 3, 5, 6 or 7 bytes too.
-        let buffer = self.block.get_mut(..BLOCK / 64 / n * 64 * n).unwrap_or_default();
+        let buffer = self.block.get_mut(..BLOCK / 8 / n * 8 * n).unwrap_or_default();
         let got = self.input.read_full(buffer).map_err(|e| self.input.io_fault(At::Byte(at), &e))?;
         let rest = got % n;
         if rest != 0 {
@@ -94,50 +94,67 @@ impl Raw {
         Ok((got - rest, (got / n) as u64))
     }
 
-    /// The next samples of a channel, packed; none at the end.
-    pub fn words(&mut self, channel: u16, out: &mut Words) -> Result<bool, Fault> {
-        let (bytes, samples) = self.fill()?;
-        self.samples += samples;
-        let block = self.block.get(..bytes).unwrap_or_default();
-        out.samples = samples;
-        out.words.clear();
-        match self.unit {
-            Unit::Bit => out.words.extend(block.chunks(8).map(little_endian)),
-            Unit::Bytes(1) => out.words.extend(block.chunks(64).map(|chunk| pack_bytes(chunk, channel))),
-            Unit::Bytes(n) => out.words.extend(block.chunks(64 * n).map(|chunk| {
-                chunk.chunks(n).rev().fold(0, |word, sample| word << 1 | little_endian(sample) >> channel & 1)
-            })),
-        }
-        Ok(samples != 0 || self.ragged.is_some())
-    }
-
     /// The changes between the last sample and the next ones, whose bits are the channels.
     fn differences(&mut self, bytes: usize, changes: &mut Vec<Change>) {
         let block = self.block.get(..bytes).unwrap_or_default();
-        let all = if self.channels.len() == 64 { u64::MAX } else { (1 << self.channels.len()) - 1 };
-        let mut see = |index: u64, sample: u64| {
-            let mut changed = self.last.map_or(all, |last| last ^ sample);
+        let mask =
+            (0..64).filter(|bit| self.of_bit.get(*bit).copied().flatten().is_some()).fold(0, |m, bit| m | 1 << bit);
+        let mut last = self.last;
+        let (clock, of_bit) = (self.clock, &self.of_bit);
+        let mut see = |last: &mut Option<u64>, index: u64, sample: u64| {
+            let mut changed = last.map_or(mask, |last| (last ^ sample) & mask);
+            *last = Some(sample);
             while changed != 0 {
-                let channel = changed.trailing_zeros() as u16;
-                changes.push(Change { time: self.clock.time(index), channel, level: sample >> channel & 1 == 1 });
+                let bit = changed.trailing_zeros();
+                if let Some(channel) = of_bit.get(bit as usize).copied().flatten() {
+                    changes.push(Change { time: clock.time(index), channel, level: sample >> bit & 1 == 1 });
+                }
                 changed &= changed - 1;
             }
-            self.last = Some(sample);
         };
         match self.unit {
             Unit::Bit => {
-                for (index, &byte) in (self.samples..).step_by(8).zip(block) {
-                    for bit in 0..8 {
-                        see(index + bit, u64::from(byte >> bit & 1));
+                for (index, chunk) in (self.samples..).step_by(64).zip(block.chunks(8)) {
+                    let (word, count) = (little_endian(chunk), 8 * chunk.len() as u64);
+                    if last.is_none() {
+                        see(&mut last, index, word & 1);
+                    }
+                    // A one where a sample differs from the one before.
+                    let before = last.unwrap_or(0);
+                    let mut edges = word ^ (word << 1 | before);
+                    if count < 64 {
+                        edges &= (1 << count) - 1;
+                    }
+                    while edges != 0 {
+                        let at = u64::from(edges.trailing_zeros());
+                        see(&mut last, index + at, word >> at & 1);
+                        edges &= edges - 1;
+                    }
+                }
+            }
+            Unit::Bytes(1) => {
+                for (index, eight) in (self.samples..).step_by(8).zip(block.chunks(8)) {
+                    // Eight samples like the one before: nothing to see.
+                    let same = last.is_some_and(|last| little_endian(eight) == (last & 0xff) * 0x0101_0101_0101_0101);
+                    if !same {
+                        for (k, sample) in (0..).zip(eight) {
+                            if last != Some(u64::from(*sample)) {
+                                see(&mut last, index + k, u64::from(*sample));
+                            }
+                        }
                     }
                 }
             }
             Unit::Bytes(n) => {
                 for (index, sample) in (self.samples..).zip(block.chunks(n)) {
-                    see(index, little_endian(sample));
+                    let sample = little_endian(sample);
+                    if last != Some(sample) {
+                        see(&mut last, index, sample);
+                    }
                 }
             }
         }
+        self.last = last;
     }
 }
 
@@ -164,14 +181,4 @@ fn little_endian(bytes: &[u8]) -> u64 {
         Some(whole) => u64::from_le_bytes(*whole),
         None => bytes.iter().rev().fold(0, |word, &byte| word << 8 | u64::from(byte)),
     }
-}
-
-/// Bit `channel` of up to 64 bytes in one word: of eight bytes at a time, a product gathers the bits in its top byte.
-fn pack_bytes(chunk: &[u8], channel: u16) -> u64 {
-    let mut word = 0;
-    for (k, eight) in chunk.chunks(8).enumerate() {
-        let ones = little_endian(eight) >> channel & 0x0101_0101_0101_0101;
-        word |= (ones.wrapping_mul(0x0102_0408_1020_4080) >> 56) << (8 * k);
-    }
-    word
 }

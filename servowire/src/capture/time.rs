@@ -32,6 +32,29 @@ pub fn from_seconds(seconds: f64) -> Option<i64> {
     (time.abs() < 9e18).then_some(time as i64)
 }
 
+/// A frequency in hertz as people and files write it: digits, a prefix of the powers of a thousand, `Hz` in any case.
+/// A small `m` is meant as mega, as sigrok has it.
+pub fn frequency(text: &str) -> Option<f64> {
+    let bare = text.trim();
+    let bare = match bare.len().checked_sub(2).map(|at| (bare.get(..at), bare.get(at..))) {
+        Some((Some(before), Some(unit))) if unit.eq_ignore_ascii_case("hz") => before.trim_end(),
+        _ => bare,
+    };
+    let last = bare.chars().last()?;
+    let factor = match last.to_ascii_lowercase() {
+        'k' => 1e3,
+        'm' => 1e6,
+        'g' => 1e9,
+        't' => 1e12,
+        'p' => 1e15,
+        'e' => 1e18,
+        _ => 1.0,
+    };
+    let digits = if factor > 1.0 { bare.get(..bare.len() - 1)? } else { bare };
+    let number: f64 = digits.trim().parse().ok()?;
+    (number.is_finite() && number >= 0.0).then_some(number * factor)
+}
+
 /// Sample indices in picoseconds and back.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Clock {

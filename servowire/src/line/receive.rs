@@ -1,155 +1,425 @@
-//! The receiver of `nrz-line` fed from changes with times and from packed samples.
+//! Start-stop fields from the edges of a line whose speakers keep their own time.
+//!
+//! Edges are gathered until the line rests. What follows without a change of direction was sent by one clock: its bit
+//! length is fitted to the edges, then every field is read on the grid that fits it best. So a controller and an encoder
+//! may be off by some per cent each, and jitter and spikes move no bit.
 
-use std::io;
+use super::LineField;
+use super::spikes::{Edge, Spikes};
 
-use nrz_line::{Field, Format, Receiver, Samples};
+/// How far a speaker's bit may be from the nominal one: one part in this many.
+const OFF: f64 = 0.065;
+/// Steps of the search for a bit length, to each side.
+const STEPS: i32 = 26;
+/// Bits without a field after which somebody else may speak.
+const OTHER_SPEAKER: f64 = 3.0;
+/// Mean square distance from the grid, in bits, up to which a known bit length is kept.
+const GOOD_FIT: f64 = 0.02;
+/// Edges of an open burst that are kept at most; further ones are read as far as whole fields go.
+const MOST_EDGES: usize = 512;
 
-use super::{LineField, Setup};
-use crate::capture::raw::Words;
-use crate::capture::time::Clock;
-
-/// Samples a bit of the grid on which changes with times are laid.
-const GRID: u32 = 80;
-
-/// Behind a capture that ends with an idle line, so that the last delimiter is taken: bits.
-const TAIL_BITS: u64 = 2;
-
-/// Places fields of a receiver in the capture's time.
-#[derive(Debug, Clone, Copy)]
-struct Scale {
-    clock: Clock,
-    origin: i64,
-    /// Length of a field in picoseconds.
-    length: i64,
+/// Receives fields of one line. Levels are given as on an idle-high line.
+#[derive(Debug, Clone)]
+pub struct EdgeReceiver {
+    bit: f64,
+    content_bits: u32,
+    spikes: Spikes,
+    /// The open burst; it begins with a falling edge.
+    burst: Vec<Edge>,
+    /// Bit lengths heard, the last one first.
+    heard: Vec<f64>,
+    /// Sum of measured bit lengths in parts of the nominal, and how many.
+    rates: Rates,
+    /// Fields that end a burst, for the caller to take.
+    fields: Vec<LineField>,
+    /// Spikes dropped before the next field.
+    dropped: u32,
+    /// The beginning of the capture, until the first burst has been read.
+    begin: Option<i64>,
+    begun: bool,
 }
 
-impl Scale {
-    fn place(&self, field: Field) -> LineField {
-        let start = self.origin.saturating_add(self.clock.time(field.start));
-        LineField {
-            content: field.content,
-            delimiter: field.delimiter,
-            start,
-            end: start.saturating_add(self.length),
-            spikes: field.spikes,
-        }
+/// Bit rates measured on a line, relative to the nominal one.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Rates {
+    /// Slowest.
+    pub least: f64,
+    /// Fastest.
+    pub most: f64,
+    sum: f64,
+    count: u32,
+    /// Spikes dropped so far.
+    pub spikes: u64,
+    /// Edges that stayed.
+    pub edges: u64,
+}
+
+impl Default for Rates {
+    fn default() -> Self {
+        Self { least: f64::INFINITY, most: 0.0, sum: 0.0, count: 0, spikes: 0, edges: 0 }
     }
 }
 
-fn receiver(samples_per_bit: u32, content_bits: u32, setup: Setup) -> Option<(Receiver, i64)> {
-    let format = Format::new(samples_per_bit, content_bits).ok()?;
-    Some((Receiver::new(format), setup.bit() * i64::from(format.field_bits())))
-}
+impl Rates {
+    /// The mean rate as a share of the nominal one; none before a field was measured.
+    pub fn mean(&self) -> Option<f64> {
+        (self.count > 0).then(|| self.sum / f64::from(self.count))
+    }
 
-/// Receives from level changes, on a grid of 80 samples a bit.
-#[derive(Debug, Clone, Copy)]
-pub struct EdgeReceiver {
-    receiver: Option<Receiver>,
-    scale: Scale,
-    inverted: bool,
-    /// Level since the last change, none before the first.
-    level: Option<bool>,
-    /// Samples of the grid up to the last change.
-    ticks: u64,
+    /// An edge that stays, and the spikes dropped before it.
+    pub(crate) fn count_edge(&mut self, spikes: u32) {
+        self.spikes += u64::from(spikes);
+        self.edges += 1;
+    }
+
+    /// The rate was measured once more, as a share of the nominal one.
+    pub(crate) fn measured(&mut self, rate: f64) {
+        self.least = self.least.min(rate);
+        self.most = self.most.max(rate);
+        self.sum += rate;
+        self.count += 1;
+    }
 }
 
 impl EdgeReceiver {
-    /// For fields of `content_bits`, 8 or 16.
-    pub fn new(setup: Setup, content_bits: u32) -> Self {
-        let clock = Clock::new(u64::from(setup.rate) * u64::from(GRID));
-        let (receiver, length) = receiver(GRID, content_bits, setup).unzip();
-        let scale = Scale { clock, origin: 0, length: length.unwrap_or_default() };
-        Self { receiver, scale, inverted: setup.inverted, level: None, ticks: 0 }
-    }
-
-    /// The line takes a level.
-    pub fn change(&mut self, time: i64, level: bool) -> Option<LineField> {
-        let level = level != self.inverted;
-        let before = self.level.replace(level);
-        let Some(before) = before else {
-            self.scale.origin = time;
-            return None;
-        };
-        if before == level { None } else { self.lasted(before, time, 0) }
-    }
-
-    /// The capture ends.
-    pub fn finish(&mut self, end: i64) -> Option<LineField> {
-        let level = self.level?;
-        self.lasted(level, end, if level { TAIL_BITS * u64::from(GRID) } else { 0 })
-    }
-
-    fn lasted(&mut self, level: bool, until: i64, more: u64) -> Option<LineField> {
-        let ticks = self.scale.clock.index(until.saturating_sub(self.scale.origin)).max(self.ticks);
-        let field = self.receiver.as_mut()?.run(level, ticks - self.ticks + more);
-        self.ticks = ticks;
-        field.map(|field| self.scale.place(field))
-    }
-}
-
-/// Receives from samples at a whole number of samples a bit.
-#[derive(Debug, Clone, Copy)]
-pub struct SampleReceiver {
-    receiver: Receiver,
-    scale: Scale,
-    channel: u16,
-    inverted: bool,
-    /// Level of the line at the receiver's position.
-    level: bool,
-}
-
-impl SampleReceiver {
-    /// Nothing where the samples of a bit are not a whole number from 4 to 80.
-    pub fn new(clock: Clock, setup: Setup, content_bits: u32) -> Option<Self> {
-        let rate = u64::from(setup.rate);
-        if rate == 0 || clock.rate() % rate != 0 {
-            return None;
+    /// For fields of `content_bits`, 8 or 16, of bits of `bit` picoseconds.
+    pub fn new(bit: f64, content_bits: u32) -> Self {
+        Self {
+            bit,
+            content_bits,
+            spikes: Spikes::new(bit),
+            burst: Vec::with_capacity(64),
+            heard: Vec::new(),
+            rates: Rates::default(),
+            fields: Vec::new(),
+            dropped: 0,
+            begin: None,
+            begun: false,
         }
-        let samples_per_bit = u32::try_from(clock.rate() / rate).ok()?;
-        let (receiver, length) = receiver(samples_per_bit, content_bits, setup)?;
-        let scale = Scale { clock, origin: 0, length };
-        Some(Self { receiver, scale, channel: setup.channel, inverted: setup.inverted, level: true })
     }
 
-    /// The channel to feed.
-    pub fn channel(&self) -> u16 {
-        self.channel
+    /// What was measured so far.
+    pub fn rates(&self) -> Rates {
+        self.rates
     }
 
-    /// The line takes a level.
-    pub fn change(&mut self, time: i64, level: bool) -> Option<LineField> {
-        let field = self.reach(self.scale.clock.index(time));
-        self.level = level != self.inverted;
-        field
+    /// The line takes a level. Says whether there are fields to [`take`](Self::take).
+    pub fn change(&mut self, time: i64, level: bool) -> bool {
+        if !self.begun {
+            self.begun = true;
+            self.begin = Some(time);
+        }
+        for edge in self.spikes.change(time, level) {
+            self.edge(edge);
+        }
+        !self.fields.is_empty()
     }
 
-    /// The line keeps its level up to sample `index`.
-    pub fn reach(&mut self, index: u64) -> Option<LineField> {
-        let field = self.receiver.run(self.level, index.saturating_sub(self.receiver.position()));
-        field.map(|field| self.scale.place(field))
+    /// The line has not changed until `time`. Says whether there are fields to [`take`](Self::take).
+    pub fn reach(&mut self, time: i64) -> bool {
+        for edge in self.spikes.reach(time) {
+            self.edge(edge);
+        }
+        let Some(last) = self.burst.last() else { return !self.fields.is_empty() };
+        let over = if last.level { self.longest_high() } else { f64::from(self.field_bits()) * 2.0 };
+        if (time.saturating_sub(last.time)) as f64 > over * self.bit {
+            self.close();
+        }
+        !self.fields.is_empty()
     }
 
-    /// The next samples.
-    pub fn words(&mut self, block: &Words, mut take: impl FnMut(&LineField) -> io::Result<()>) -> io::Result<()> {
-        let flip = if self.inverted { u64::MAX } else { 0 };
-        let mut left = block.samples;
-        for word in &block.words {
-            let mut samples = Samples::partial(word ^ flip, left.min(64) as u32);
-            left = left.saturating_sub(64);
-            while let Some(field) = self.receiver.feed(&mut samples) {
-                take(&self.scale.place(field))?;
+    /// The capture ends at `time`. A high level is taken to last; a field that ends low is not whole and is left out.
+    pub fn finish(&mut self, time: i64) -> bool {
+        for edge in self.spikes.reach(time.saturating_add((self.bit * 2.0) as i64)) {
+            self.edge(edge);
+        }
+        let open = self.burst.last().is_some_and(|last| !last.level);
+        self.close();
+        if open && self.fields.last().is_some_and(|field| field.end > time.saturating_add(self.bit as i64)) {
+            self.fields.pop();
+        }
+        !self.fields.is_empty()
+    }
+
+    /// The fields that are complete.
+    pub fn take(&mut self) -> std::vec::Drain<'_, LineField> {
+        self.fields.drain(..)
+    }
+
+    fn field_bits(&self) -> u32 {
+        self.content_bits + 2
+    }
+
+    /// Longer than a line is high inside a field, in bits.
+    fn longest_high(&self) -> f64 {
+        f64::from(self.field_bits()) + 1.0
+    }
+
+    fn push(&mut self, edge: Edge) {
+        self.rates.count_edge(edge.spikes);
+        // A burst begins with a falling edge: a rising one ends what was before the capture.
+        if self.burst.is_empty() && edge.level {
+            self.dropped = self.dropped.saturating_add(edge.spikes);
+        } else {
+            self.burst.push(edge);
+        }
+    }
+
+    fn edge(&mut self, edge: Edge) {
+        let pause = self.burst.last().map_or(0.0, |last| edge.time.saturating_sub(last.time) as f64);
+        if !edge.level && pause > self.longest_high() * self.bit {
+            self.close();
+        } else if self.burst.len() >= MOST_EDGES {
+            self.read(false);
+        }
+        self.push(edge);
+    }
+
+    fn close(&mut self) {
+        self.read(true);
+        self.burst.clear();
+    }
+
+    /// Reads the burst speaker by speaker. Unless it is `whole`, its last speech stays for the next time.
+    fn read(&mut self, whole: bool) {
+        let burst = std::mem::take(&mut self.burst);
+        let mut rest = burst.as_slice();
+        let idle = self.longest_high() * self.bit;
+        let at_once = |begin: i64| rest.first().is_some_and(|first| ((first.time - begin) as f64) < idle);
+        if self.begin.take().is_some_and(at_once) {
+            let skip = self.first_field(rest);
+            let (piece, fields) = rest.split_at(skip);
+            if let (Some(first), Some(last), Some(next)) = (piece.first(), piece.last(), fields.first()) {
+                // How long the level behind its last edge still belongs to it is not known.
+                let (start, end) = (first.time, next.time.min(last.time + self.bit as i64));
+                self.fields.push(LineField { content: 0, delimiter: false, start, end, spikes: 0 });
+            }
+            rest = fields;
+        }
+        while !rest.is_empty() {
+            let speech = self.speech(rest);
+            let (now, behind) = rest.split_at(speech.min(rest.len()));
+            if behind.is_empty() && !whole && now.len() < MOST_EDGES / 2 {
+                break;
+            }
+            self.speak(now);
+            rest = behind;
+        }
+        let kept = burst.len() - rest.len();
+        self.burst = burst;
+        self.burst.drain(..kept);
+    }
+
+    /// The edge from which on most fields end with a delimiter and begin where the one before ends: where the capture
+    /// begins inside a field, a falling edge need not be a start bit.
+    fn first_field(&self, edges: &[Edge]) -> usize {
+        let whole = f64::from(self.field_bits());
+        let Some(first) = edges.first() else { return 0 };
+        let near = edges
+            .iter()
+            .enumerate()
+            .filter(|(_, edge)| !edge.level && ((edge.time - first.time) as f64) < 2.0 * whole * self.bit);
+        let faults = |from: usize| {
+            let mut faults = 0;
+            let mut start = first.time;
+            for (k, edge) in edges.iter().enumerate().skip(from).filter(|(_, edge)| !edge.level) {
+                let bits = (edge.time - start) as f64 / self.bit;
+                if k > from && bits < whole - 1.0 {
+                    continue;
+                }
+                // A pause between two fields is short or that of another speaker.
+                faults += u32::from(k > from && (whole + 1.0..whole + OTHER_SPEAKER).contains(&bits));
+                start = edge.time;
+                let last =
+                    edges.iter().skip(k).take_while(|next| ((next.time - start) as f64) < (whole - 0.5) * self.bit);
+                faults += u32::from(last.last().is_some_and(|last| !last.level));
+            }
+            faults
+        };
+        near.map(|(k, _)| (k, faults(k))).min_by_key(|(_, faults)| *faults).map_or(0, |(k, _)| k)
+    }
+
+    /// Edges up to the first pause in which somebody else may have begun.
+    fn speech(&self, edges: &[Edge]) -> usize {
+        let bit = self.heard.first().copied().unwrap_or(self.bit);
+        let mut start = edges.first().map_or(0, |edge| edge.time);
+        let last = f64::from(self.field_bits()) - 1.0;
+        for (at, edge) in edges.iter().enumerate().skip(1) {
+            let bits = (edge.time - start) as f64 / bit;
+            if edge.level || bits < last {
+                continue;
+            }
+            if bits > f64::from(self.field_bits()) + OTHER_SPEAKER {
+                return at;
+            }
+            start = edge.time;
+        }
+        edges.len()
+    }
+
+    /// Fields of one speaker.
+    fn speak(&mut self, edges: &[Edge]) {
+        let bit = self.fit(edges);
+        let mut rest = edges;
+        while let Some(start) = rest.first() {
+            let last = (f64::from(self.field_bits()) - 0.6) * bit;
+            let inside = rest.iter().skip(1).position(|edge| !edge.level && (edge.time - start.time) as f64 > last);
+            let (field, behind) = rest.split_at(inside.map_or(rest.len(), |at| at + 1));
+            self.field(field, bit);
+            rest = behind;
+        }
+    }
+
+    /// A field on its grid: its start bit begins with the first edge.
+    fn field(&mut self, edges: &[Edge], bit: f64) {
+        let Some(first) = edges.first() else { return };
+        let place = |edge: &Edge| (edge.time - first.time) as f64 / bit;
+        // The first edge is as uncertain as the others: the grid lies where all fit best.
+        let whole = f64::from(self.field_bits());
+        let (mut sum, mut count) = (0.0, 1.0);
+        for at in edges.iter().skip(1).map(place).take_while(|at| *at < whole - 0.4) {
+            sum += at - at.round();
+            count += 1.0;
+        }
+        let shift = sum / count;
+        let (mut bits, mut level, mut from) = (0_u32, false, 0_u32);
+        let mut spikes = 0_u32;
+        for edge in edges {
+            spikes = spikes.saturating_add(edge.spikes);
+        }
+        for edge in edges.iter().skip(1) {
+            let at = (place(edge) - shift).round().clamp(0.0, whole) as u32;
+            if level && at > from {
+                bits |= ones(at) & !ones(from);
+            }
+            (level, from) = (edge.level, at.max(from));
+        }
+        if level {
+            bits |= ones(self.field_bits()) & !ones(from);
+        }
+        let spikes = spikes.saturating_add(std::mem::take(&mut self.dropped));
+        if bits & 1 == 1 {
+            // The start bit was no bit.
+            self.dropped = spikes.saturating_add(1);
+            return;
+        }
+        let start = first.time + (shift * bit) as i64;
+        self.fields.push(LineField {
+            content: (bits >> 1 & ones(self.content_bits)) as u16,
+            delimiter: bits >> (self.content_bits + 1) & 1 == 1,
+            start,
+            end: start + (whole * bit) as i64,
+            spikes,
+        });
+    }
+
+    /// The bit length that fits the edges: one that was heard before if it does, else the best.
+    fn fit(&mut self, edges: &[Edge]) -> f64 {
+        let mut best: Option<(f64, usize)> = None;
+        for (at, bit) in self.heard.iter().enumerate() {
+            let misfit = self.misfit(edges, *bit);
+            if misfit < GOOD_FIT && best.is_none_or(|(least, _)| misfit < least) {
+                best = Some((misfit, at));
             }
         }
-        if let Some(last) = block.words.last() {
-            let used = (block.samples + 63) % 64;
-            self.level = (last >> used & 1 == 1) != self.inverted;
+        if let Some((_, at)) = best {
+            let bit = self.heard.remove(at);
+            let own = self.slope(edges, bit);
+            let bit = bit + 0.2 * (own - bit);
+            self.heard.insert(0, bit);
+            self.rates.measured(self.bit / bit);
+            return bit;
         }
-        Ok(())
+        let step = OFF / f64::from(STEPS);
+        let mut found = (self.misfit(edges, self.bit), self.bit);
+        for k in 1..=STEPS {
+            for side in [-1.0, 1.0] {
+                let bit = self.bit * (1.0 + side * f64::from(k) * step);
+                // Between equals, the one nearer to the nominal rate.
+                let misfit = self.misfit(edges, bit) + 1e-5 * f64::from(k);
+                if misfit < found.0 {
+                    found = (misfit, bit);
+                }
+            }
+        }
+        let bit = self.slope(edges, found.1);
+        if found.0 < GOOD_FIT && edges.len() > 3 {
+            self.heard.insert(0, bit);
+            self.heard.truncate(4);
+            self.rates.measured(self.bit / bit);
+        }
+        bit
     }
 
-    /// The capture ends.
-    pub fn finish(&mut self) -> Option<LineField> {
-        let tail = if self.level { TAIL_BITS * u64::from(self.receiver.format().samples_per_bit()) } else { 0 };
-        self.reach(self.receiver.position() + tail)
+    /// Mean square distance of the edges from the grids of their fields, in bits.
+    fn misfit(&self, edges: &[Edge], bit: f64) -> f64 {
+        let (mut all, mut fields) = (0.0, 0.0);
+        // Sum, sum of squares and number of a field; its first edge lies at 0.
+        let (mut sum, mut squares, mut count) = (0.0, 0.0, 1.0);
+        self.each(edges, bit, |place, first| {
+            if first {
+                all += squares - sum * sum / count;
+                (sum, squares, count) = (0.0, 0.0, 1.0);
+            }
+            let off = place - place.round();
+            sum += off;
+            squares += off * off;
+            count += 1.0;
+            fields += 1.0;
+        });
+        all += squares - sum * sum / count;
+        if fields > 0.0 { all / fields } else { 0.0 }
     }
+
+    /// The bit length by which the edges lie best, once their places are known from `bit`.
+    fn slope(&self, edges: &[Edge], bit: f64) -> f64 {
+        // Least squares of time over place, each field with an offset of its own.
+        let (mut above, mut below) = (0.0, 0.0);
+        let mut field: Vec<(f64, f64)> = Vec::with_capacity(16);
+        let mut close = |field: &mut Vec<(f64, f64)>| {
+            let count = field.len() as f64;
+            if count > 1.0 {
+                let mean = |pick: fn(&(f64, f64)) -> f64| field.iter().map(pick).sum::<f64>() / count;
+                let (places, times) = (mean(|p| p.0), mean(|p| p.1));
+                for (place, time) in field.iter() {
+                    above += (place - places) * (time - times);
+                    below += (place - places) * (place - places);
+                }
+            }
+            field.clear();
+        };
+        self.each(edges, bit, |place, first| {
+            if first {
+                close(&mut field);
+                field.push((0.0, 0.0));
+            }
+            field.push((place.round(), place));
+        });
+        close(&mut field);
+        // Few short fields say little.
+        if below < 40.0 { bit } else { bit * (above / below).clamp(0.97, 1.03) }
+    }
+
+    /// The places of all edges but the first of each field, in bits from the start of the field.
+    fn each(&self, edges: &[Edge], bit: f64, mut take: impl FnMut(f64, bool)) {
+        let last = f64::from(self.field_bits()) - 0.6;
+        let per = 1.0 / bit;
+        let mut start = edges.first().map_or(0, |edge| edge.time);
+        let mut first = true;
+        for edge in edges.iter().skip(1) {
+            let place = (edge.time - start) as f64 * per;
+            if place > last && !edge.level {
+                start = edge.time;
+                first = true;
+            } else if place < last + 0.2 {
+                take(place, first);
+                first = false;
+            }
+        }
+    }
+}
+
+/// So many ones.
+const fn ones(count: u32) -> u32 {
+    if count >= 32 { u32::MAX } else { (1 << count) - 1 }
 }

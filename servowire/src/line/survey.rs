@@ -1,241 +1,345 @@
-//! What the first changes tell: which channel, how fast, which way up.
+//! What the first edges of channels tell: which of them carry a protocol, which, how fast, which way up.
+//!
+//! Every rate of every protocol is tried on every channel that moves, both ways up; a trial ends early where hardly
+//! anything holds. So a spike, a slow encoder or a decoy never hides a line.
 
-use std::fmt;
+use super::Rates;
+use super::evidence::{CERTAIN, Evidence};
+use super::lane::{Tap, Wires};
+use crate::protocols::{Protocol, Settings};
 
-use super::{EdgeReceiver, Options, Setup, StartStop};
-use crate::capture::Change;
-use crate::output::Tally;
-
-/// A nominal rate is met within this share.
-const TOLERANCE: f64 = 0.025;
-
+/// Edges of a channel that are looked at.
+const SAMPLE: usize = 3000;
+/// Edges after which a trial may be given up.
+const PIECE: usize = 96;
 /// Fewer changes, the level at the beginning included, are no traffic: the shortest frame has four edges.
-const FEWEST: usize = 5;
+pub(super) const FEWEST: usize = 5;
+/// A rival within this share of the best score is worth a word.
+const CLOSE: f64 = 0.5;
 
-/// A line that can be decoded, and how it was found.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Survey {
-    /// What to decode.
-    pub setup: Setup,
-    /// Name of the channel.
-    name: String,
-    /// Bits a second as seen; none where the runs do not tell.
-    seen: Option<f64>,
-    /// The level at which the line rests, where it does.
-    idle: Option<bool>,
+/// The edges of a channel, by time.
+pub(super) type Edges = [(i64, bool)];
+
+/// A protocol at a rate.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct Speech {
+    /// The protocol.
+    pub(super) protocol: Protocol,
+    /// Bits a second.
+    pub(super) rate: u32,
 }
 
-impl fmt::Display for Survey {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { setup, name, seen, idle } = self;
-        let rests = match (setup.inverted, idle) {
-            (false, Some(false)) => "taken as idling high, though it idles low (A and B swapped?)",
-            (false, _) => "idles high",
-            (true, Some(true)) => "taken as idling low, though it idles high",
-            (true, _) => "idles low (A and B swapped) and is decoded inverted",
-        };
-        write!(f, "channel \"{name}\" {rests}, {} Mbit/s", f64::from(setup.rate) / 1e6)?;
-        match seen.map(|seen| (seen, (seen / f64::from(setup.rate) - 1.0) * 100.0)) {
-            Some((_, off)) if off.abs() < 10.0 => write!(f, " ({off:+.2} % on the line)"),
-            Some((seen, _)) => write!(f, ", though the runs look like {:.3} Mbit/s", seen / 1e6),
-            None => Ok(()),
-        }
+/// A line that was found.
+#[derive(Debug, Clone)]
+pub(super) struct Found {
+    pub(super) taps: Vec<Tap>,
+    pub(super) speech: Speech,
+    pub(super) evidence: Evidence,
+    pub(super) rates: Rates,
+    /// The level at which the line rests, where it does.
+    pub(super) idle: Option<bool>,
+    /// Bits a second that the runs look like.
+    pub(super) seen: Option<f64>,
+    /// The next best reading of the same channel.
+    pub(super) rival: Option<(Speech, i64)>,
+}
+
+impl Found {
+    pub(super) fn is_certain(&self) -> bool {
+        self.evidence.score >= CERTAIN
+    }
+
+    fn bit(&self) -> i64 {
+        1_000_000_000_000 / i64::from(self.speech.rate.max(1))
+    }
+
+    /// All taps idle low.
+    pub(super) fn is_inverted(&self) -> bool {
+        self.taps.iter().all(|tap| tap.inverted)
     }
 }
 
-/// Finds the line to decode among the channels, as far as the options leave it open.
-///
-/// The bit rate comes from the lengths of the runs; channel and polarity are those that decode best.
-pub fn survey<P: StartStop>(
-    changes: &[Change],
-    reached: i64,
-    channels: &[String],
-    options: &Options,
-    make: &dyn Fn(i64) -> P,
-) -> Result<Survey, String> {
-    let wanted = options.channel.as_deref().map(|name| find(name, channels)).transpose()?;
-    let mut best: Option<(Survey, (u64, i64, bool, bool))> = None;
-    let mut misfits = Vec::new();
-    for (channel, name) in (0_u16..).zip(channels) {
-        if wanted.is_some_and(|wanted| wanted != channel) {
-            continue;
-        }
-        let own: Vec<(i64, bool)> =
-            changes.iter().filter(|c| c.channel == channel).map(|c| (c.time, c.level)).collect();
-        let (rate, seen) = match options.bit_rate {
-            Some(rate) => (rate, bit_rate(&own, &[rate]).seen()),
-            None if own.len() < FEWEST => continue,
-            None => match bit_rate(&own, P::RATES) {
-                Rate::Nominal { rate, seen } => (rate, Some(seen)),
-                Rate::Other(seen) => {
-                    misfits.push((name, seen));
-                    continue;
-                }
-                Rate::Unclear => continue,
-            },
+/// What may be on the lines.
+#[derive(Debug, Clone)]
+pub(super) struct Candidates<'a> {
+    pub(super) speeches: Vec<Speech>,
+    pub(super) inverted: Option<bool>,
+    pub(super) settings: &'a Settings,
+    /// Whether the user named the protocol.
+    asked: bool,
+    pair: Option<[u16; 2]>,
+}
+
+impl<'a> Candidates<'a> {
+    /// As far as the options leave it open.
+    pub(super) fn new(protocol: Protocol, settings: &'a Settings, pair: Option<[u16; 2]>) -> Self {
+        let rated = |protocol: Protocol| {
+            let rates: Vec<u32> = match settings.line.bit_rate {
+                Some(rate) if !(protocol == Protocol::Hdsl) => vec![rate],
+                _ => protocol.rates().to_vec(),
+            };
+            rates.into_iter().map(move |rate| Speech { protocol, rate })
         };
-        for inverted in [false, true] {
-            if options.inverted.is_some_and(|given| given != inverted) {
+        let speeches = protocol.of_lines().iter().copied().flat_map(rated).collect();
+        let line = &settings.line;
+        let asked = protocol != Protocol::Auto || line.bit_rate.is_some() || line.inverted.is_some();
+        Self { speeches, inverted: line.inverted, settings, asked, pair }
+    }
+
+    /// Whether the user said what the lines are.
+    pub(super) fn is_asked_for(&self) -> bool {
+        self.asked
+    }
+
+    /// The channels of requests and answers as the user named them.
+    pub(super) fn pair(&self) -> Option<[u16; 2]> {
+        self.pair
+    }
+
+    /// The best reading of two channels as one line.
+    pub(super) fn read_pair(&self, channels: [u16; 2], edges: [&Edges; 2]) -> Option<Found> {
+        let edges = edges.map(|edges| edges.get(..SAMPLE.min(edges.len())).unwrap_or_default());
+        let mut best: Option<Found> = None;
+        for speech in &self.speeches {
+            for inverted in [false, true].into_iter().filter(|way| self.inverted.is_none_or(|given| given == *way)) {
+                let taps: Vec<Tap> = channels.into_iter().map(|channel| Tap { channel, inverted }).collect();
+                let (evidence, rates) = self.trial(*speech, &taps, &edges);
+                let found = Found { taps, speech: *speech, evidence, rates, idle: None, seen: None, rival: None };
+                if best.as_ref().is_none_or(|best| mark(&found) > mark(best)) {
+                    best = Some(found);
+                }
+            }
+        }
+        best
+    }
+
+    /// The best reading of a channel, and the one behind it.
+    pub(super) fn read(&self, channel: u16, edges: &Edges) -> Option<Found> {
+        let edges = edges.get(..SAMPLE.min(edges.len()))?;
+        let mut best: Option<Found> = None;
+        let mut second: Option<(Speech, i64)> = None;
+        for speech in &self.speeches {
+            let bit = 1e12 / f64::from(speech.rate.max(1));
+            if !may_run_at(edges, bit) && self.speeches.len() > 1 {
                 continue;
             }
-            let setup = Setup { channel, rate, inverted };
-            let tally = trial(&own, reached, setup, &mut make(setup.bit()));
-            let idle = idle_level(&own, setup.bit());
-            let idles_so = idle.is_none_or(|idle| idle != inverted);
-            let second = if tally.ok > 0 { -(tally.refused as i64) } else { own.len() as i64 };
-            let score = (tally.ok, second, idles_so, !inverted);
-            // With equal marks the first stays.
-            if best.as_ref().is_none_or(|(_, mark)| score > *mark) {
-                best = Some((Survey { setup, name: name.clone(), seen, idle }, score));
+            let idle = idle_level(edges, bit as i64);
+            for inverted in [false, true] {
+                if self.inverted.is_some_and(|given| given != inverted) {
+                    continue;
+                }
+                let taps = vec![Tap { channel, inverted }];
+                let (evidence, rates) = self.trial(*speech, &taps, &[edges]);
+                let found = Found { taps, speech: *speech, evidence, rates, idle, seen: None, rival: None };
+                if best.as_ref().is_none_or(|best| mark(&found) > mark(best)) {
+                    if let Some(old) = best.replace(found).filter(|old| old.speech != *speech) {
+                        second = Some((old.speech, old.evidence.score));
+                    }
+                } else if best.as_ref().is_some_and(|best| best.speech != *speech)
+                    && second.is_none_or(|(_, score)| found.evidence.score > score)
+                {
+                    second = Some((*speech, found.evidence.score));
+                }
+            }
+        }
+        let mut best = best?;
+        let close = |score: i64| score > 0 && score as f64 > CLOSE * best.evidence.score as f64;
+        best.rival = second.filter(|(_, score)| close(*score));
+        if !best.is_certain() {
+            best.seen = seen_rate(edges);
+        }
+        Some(best)
+    }
+
+    /// What a protocol makes of one channel, or of two as one line.
+    pub(super) fn trial(&self, speech: Speech, taps: &[Tap], channels: &[&Edges]) -> (Evidence, Rates) {
+        let mut evidence = Evidence::new(speech.protocol.weights());
+        let Some(mut decoder) = speech.protocol.line_decoder(speech.rate, self.settings) else {
+            return (evidence, Rates::default());
+        };
+        let mut wires = Wires::new(taps);
+        let mut at = vec![0_usize; channels.len()];
+        let mut end = 0;
+        let mut count = 0;
+        // The next edge of all channels.
+        while let Some((k, (time, level))) = channels
+            .iter()
+            .zip(&at)
+            .enumerate()
+            .filter_map(|(k, (edges, at))| Some((k, *edges.get(*at)?)))
+            .min_by_key(|(_, (time, _))| *time)
+        {
+            if let Some(next) = at.get_mut(k) {
+                *next += 1;
+            }
+            end = time;
+            let channel = taps.get(k).map_or(0, |tap| tap.channel);
+            // Evidence takes whatever comes.
+            if let Some(level) = wires.change(channel, level) {
+                let _ = decoder.change(time, level, &mut evidence);
+            }
+            count += 1;
+            if count % PIECE == 0 && evidence.is_hopeless() {
+                break;
+            }
+        }
+        let _ = decoder.finish(end, &mut evidence);
+        (evidence, decoder.rates())
+    }
+
+    /// Lines among the readings of channels: what is heard twice is taken once, requests and answers on two channels
+    /// are one line.
+    pub(super) fn lines(
+        &self,
+        mut readings: Vec<Found>,
+        judged: &[u16],
+        edges: &dyn Fn(u16) -> Vec<(i64, bool)>,
+    ) -> Vec<Found> {
+        self.join(&mut readings, edges);
+        self.join_unnamed(&mut readings, judged, edges);
+        readings.sort_by_key(|found| std::cmp::Reverse(mark(found)));
+        let mut lines: Vec<Found> = Vec::new();
+        for found in readings {
+            let again = |line: &Found| {
+                line.speech.protocol == found.speech.protocol
+                    && found.evidence.is_part_of(&line.evidence, 3 * line.bit())
+            };
+            if !lines.iter().any(again) {
+                lines.push(found);
+            }
+        }
+        lines
+    }
+
+    /// Answers of HIPERFACE DSL say nothing by themselves: they are looked for on every channel that is nothing else.
+    fn join_unnamed(&self, readings: &mut Vec<Found>, judged: &[u16], edges: &dyn Fn(u16) -> Vec<(i64, bool)>) {
+        let asks = |found: &Found| {
+            let evidence = &found.evidence;
+            found.speech.protocol == Protocol::Hdsl && evidence.requests > 8 && evidence.alone * 4 < evidence.requests
+        };
+        for asking in readings.clone().into_iter().filter(asks) {
+            let own = asking.taps.clone();
+            let other = |channel: &&u16| {
+                let sure = |found: &Found| found.is_certain() && found.taps.iter().any(|tap| tap.channel == **channel);
+                !own.iter().any(|tap| tap.channel == **channel) && !readings.iter().any(sure)
+            };
+            let mut best: Option<Found> = None;
+            for channel in judged.iter().filter(other) {
+                for inverted in [false, true] {
+                    let taps: Vec<Tap> = own.iter().copied().chain([Tap { channel: *channel, inverted }]).collect();
+                    let lines: Vec<Vec<(i64, bool)>> = taps.iter().map(|tap| edges(tap.channel)).collect();
+                    let lines: Vec<&Edges> =
+                        lines.iter().filter_map(|edges| edges.get(..SAMPLE.min(edges.len()))).collect();
+                    let (evidence, rates) = self.trial(asking.speech, &taps, &lines);
+                    let found = Found { taps, evidence, rates, ..asking.clone() };
+                    let most = best.as_ref().map_or(asking.evidence.alone, |best| best.evidence.alone);
+                    if found.evidence.alone > most {
+                        best = Some(found);
+                    }
+                }
+            }
+            if let Some(best) = best {
+                readings
+                    .retain(|found| !found.taps.iter().any(|tap| best.taps.iter().any(|t| t.channel == tap.channel)));
+                readings.push(best);
             }
         }
     }
-    best.map(|(found, _)| found).ok_or_else(|| nothing::<P>(changes, channels, wanted, &misfits))
-}
 
-/// Why no channel can be decoded.
-fn nothing<P: StartStop>(
-    changes: &[Change],
-    channels: &[String],
-    wanted: Option<u16>,
-    misfits: &[(&String, f64)],
-) -> String {
-    let protocol = P::NAME;
-    let rates = P::RATES.iter().map(|rate| (f64::from(*rate) / 1e6).to_string()).collect::<Vec<_>>().join(" and ");
-    if let Some((name, seen)) = misfits.first() {
-        let digits = (2.0 - (seen / 1e6).log10().floor()).clamp(0.0, 6.0) as usize;
-        let mbit = seen / 1e6;
-        return format!(
-            "channel \"{name}\" runs at about {mbit:.digits$} Mbit/s, where {protocol} has {rates} Mbit/s; \
-             if that is right, say it with --bit-rate"
-        );
+    /// Requests alone on one channel and their answers on another.
+    fn join(&self, readings: &mut Vec<Found>, edges: &dyn Fn(u16) -> Vec<(i64, bool)>) {
+        let asks = |found: &Found| found.evidence.requests > 0 && found.evidence.answers * 4 < found.evidence.requests;
+        let answers = |found: &Found| found.evidence.alone > found.evidence.requests;
+        let mut pairs = Vec::new();
+        for (a, asking) in readings.iter().enumerate().filter(|(_, found)| asks(found)) {
+            for (b, answering) in readings.iter().enumerate().filter(|(_, found)| answers(found)) {
+                if a == b || asking.speech.protocol != answering.speech.protocol {
+                    continue;
+                }
+                let taps: Vec<Tap> = asking.taps.iter().chain(&answering.taps).copied().collect();
+                let channels: Vec<Vec<(i64, bool)>> = taps.iter().map(|tap| edges(tap.channel)).collect();
+                let channels: Vec<&Edges> =
+                    channels.iter().filter_map(|edges| edges.get(..SAMPLE.min(edges.len()))).collect();
+                let (evidence, rates) = self.trial(answering.speech, &taps, &channels);
+                if evidence.answers > 0 && evidence.score > answering.evidence.score {
+                    pairs.push((evidence.score, a, b, Found { taps, evidence, rates, ..answering.clone() }));
+                }
+            }
+        }
+        pairs.sort_by_key(|(score, ..)| std::cmp::Reverse(*score));
+        let mut used: Vec<usize> = Vec::new();
+        for (_, a, b, found) in pairs {
+            if !used.contains(&a) && !used.contains(&b) {
+                used.extend([a, b]);
+                readings.push(found);
+            }
+        }
+        let mut at = 0;
+        readings.retain(|_| {
+            at += 1;
+            !used.contains(&(at - 1))
+        });
     }
-    let edges = |channel: u16| changes.iter().filter(|c| c.channel == channel).count().saturating_sub(1);
-    if let Some(channel) = wanted {
-        let name = channels.get(usize::from(channel)).map_or("", String::as_str);
-        return format!("no traffic on channel \"{name}\": {} edges", edges(channel));
+}
+
+/// What makes one reading better than another: sound frames, then the level at which the line rests.
+fn mark(found: &Found) -> (i64, bool, bool) {
+    let inverted = found.is_inverted();
+    (found.evidence.score, found.idle.is_none_or(|idle| idle != inverted), !inverted)
+}
+
+/// Whether runs of about this bit are there at all. Spikes beside every edge are two of three runs.
+fn may_run_at(edges: &Edges, bit: f64) -> bool {
+    let (mut short, mut fitting, mut all) = (0_u32, 0_u32, 0_u32);
+    for pair in edges.windows(2).take(1024) {
+        let [(from, _), (to, _)] = pair else { continue };
+        let bits = to.saturating_sub(*from) as f64 / bit;
+        all += 1;
+        short += u32::from(bits < 0.375);
+        fitting += u32::from((0.45..3.6).contains(&bits));
     }
-    let most = (0_u16..).zip(channels).map(|(channel, _)| edges(channel)).max().unwrap_or(0);
-    format!("no traffic: at most {most} edges on any of {} channels", channels.len())
+    5 * short <= 4 * all && 12 * fitting >= all
 }
 
-/// A channel by its name, or by its number from 0.
-fn find(name: &str, channels: &[String]) -> Result<u16, String> {
-    let by_name = channels.iter().position(|c| c == name).or_else(|| {
-        let last = |c: &String| c.rsplit('.').next().is_some_and(|end| end == name);
-        channels.iter().position(last)
-    });
-    let by_number = || name.parse().ok().filter(|&n: &usize| n < channels.len());
-    by_name.or_else(by_number).and_then(|index| u16::try_from(index).ok()).ok_or_else(|| {
-        let shown = channels.iter().take(20).map(|c| format!("\"{c}\"")).collect::<Vec<_>>().join(", ");
-        let more = if channels.len() > 20 { ", ..." } else { "" };
-        format!("no channel \"{name}\"; the file has {shown}{more}")
-    })
-}
-
-/// The lengths between changes of level.
-fn runs(own: &[(i64, bool)]) -> impl Iterator<Item = (bool, i64)> {
-    let mut edges = own.to_vec();
-    edges.dedup_by_key(|(_, level)| *level);
-    let ends = edges.clone();
-    edges.into_iter().zip(ends.into_iter().skip(1)).map(|((from, level), (to, _))| (level, to.saturating_sub(from)))
-}
-
-/// What the runs say of the rate, in bits a second.
-#[derive(Debug, Clone, Copy, PartialEq)]
-enum Rate {
-    /// One that the protocol has.
-    Nominal {
-        /// As the protocol has it.
-        rate: u32,
-        /// As it is on the line.
-        seen: f64,
-    },
-    /// Another one.
-    Other(f64),
-    /// Too little to tell.
-    Unclear,
-}
-
-impl Rate {
-    fn seen(self) -> Option<f64> {
-        match self {
-            Self::Nominal { seen, .. } | Self::Other(seen) => Some(seen),
-            Self::Unclear => None,
+/// The level of what is longer than any field's run, by time.
+pub(super) fn idle_level(edges: &Edges, bit: i64) -> Option<bool> {
+    let (mut high, mut low) = (0_i64, 0_i64);
+    for pair in edges.windows(2) {
+        let [(from, level), (to, _)] = pair else { continue };
+        let length = to.saturating_sub(*from);
+        if length > 20 * bit {
+            let sum = if *level { &mut high } else { &mut low };
+            *sum = sum.saturating_add(length);
         }
     }
+    (high != low).then_some(high > low)
 }
 
-fn bit_rate(own: &[(i64, bool)], rates: &[u32]) -> Rate {
-    let mut lengths: Vec<f64> = runs(own).map(|(_, length)| length as f64).filter(|length| *length > 0.0).collect();
+/// The rate that the runs of a channel look like, in bits a second: the shortest length that is too frequent to be a
+/// spike. None where there is hardly a run.
+pub(super) fn seen_rate(edges: &Edges) -> Option<f64> {
+    let mut lengths: Vec<f64> = edges
+        .windows(2)
+        .filter_map(|pair| match pair {
+            [(from, _), (to, _)] => Some(to.saturating_sub(*from) as f64),
+            _ => None,
+        })
+        .filter(|length| *length > 0.0)
+        .collect();
     lengths.sort_by(f64::total_cmp);
-    let fitting = rates.iter().find_map(|rate| Some((*rate, fit(&lengths, 1e12 / f64::from(*rate))?)));
-    match fitting {
-        Some((rate, seen)) if (seen / f64::from(rate) - 1.0).abs() <= TOLERANCE => Rate::Nominal { rate, seen },
-        Some((_, seen)) => Rate::Other(seen),
-        None => shortest_bit(&lengths).map_or(Rate::Unclear, |bit| Rate::Other(1e12 / mean_bit(&lengths, bit).0)),
-    }
-}
-
-/// The rate seen, if the sorted lengths are whole numbers of bits of about `bit` picoseconds and some are one bit.
-fn fit(lengths: &[f64], bit: f64) -> Option<f64> {
-    let runs = lengths.partition_point(|length| *length < 9.5 * bit);
-    let single =
-        lengths.partition_point(|length| *length < 1.25 * bit) - lengths.partition_point(|length| *length < 0.75 * bit);
-    let (mean, fitting) = mean_bit(lengths, bit);
-    let enough = 10 * fitting >= 8 * runs && 32 * single >= runs && single > 0;
-    enough.then(|| 1e12 / mean)
-}
-
-/// The mean bit of the runs of up to nine bits that fit `bit`, and how many these are. Over long runs it is exact,
-/// because all edges are off by the same few nanoseconds.
-fn mean_bit(lengths: &[f64], bit: f64) -> (f64, usize) {
-    let (mut time, mut bits, mut fitting) = (0.0, 0.0, 0);
+    let enough = (lengths.len() / 32).max(2);
+    let bit = lengths.iter().enumerate().find_map(|(k, shortest)| {
+        let group: Vec<f64> =
+            lengths.get(k..)?.iter().copied().take_while(|length| *length <= 1.4 * shortest).collect();
+        (group.len() >= enough).then(|| group.iter().sum::<f64>() / group.len() as f64)
+    })?;
+    let (mut time, mut bits) = (0.0, 0.0);
     for length in lengths.iter().take_while(|length| **length < 9.5 * bit) {
         let count = (length / bit).round();
         if count > 0.0 && (length - count * bit).abs() < 0.3 * bit {
             time += length;
             bits += count;
-            fitting += 1;
         }
     }
-    (if bits > 0.0 { time / bits } else { bit }, fitting)
-}
-
-/// The shortest length that is frequent enough not to be a spike.
-fn shortest_bit(lengths: &[f64]) -> Option<f64> {
-    let enough = (lengths.len() / 32).max(2);
-    lengths.iter().enumerate().find_map(|(k, shortest)| {
-        let group: Vec<f64> =
-            lengths.get(k..)?.iter().copied().take_while(|length| *length <= 1.4 * shortest).collect();
-        (group.len() >= enough).then(|| group.iter().sum::<f64>() / group.len() as f64)
-    })
-}
-
-/// The level of what is longer than any field's run, by time.
-fn idle_level(own: &[(i64, bool)], bit: i64) -> Option<bool> {
-    let (mut high, mut low) = (0_i64, 0_i64);
-    for (level, length) in runs(own).filter(|(_, length)| *length > 20 * bit) {
-        let sum = if level { &mut high } else { &mut low };
-        *sum = sum.saturating_add(length);
-    }
-    (high != low).then_some(high > low)
-}
-
-/// What the protocol makes of the changes.
-fn trial<P: StartStop>(own: &[(i64, bool)], reached: i64, setup: Setup, protocol: &mut P) -> Tally {
-    let mut receiver = EdgeReceiver::new(setup, P::CONTENT_BITS);
-    let mut tally = Tally::default();
-    protocol.begin(own.first().map_or(0, |(time, _)| *time));
-    // A tally takes whatever comes.
-    for (time, level) in own {
-        if let Some(field) = receiver.change(*time, *level) {
-            let _ = protocol.field(&field, &mut tally);
-        }
-    }
-    if let Some(field) = receiver.finish(reached) {
-        let _ = protocol.field(&field, &mut tally);
-    }
-    let _ = protocol.finish(Some(reached), &mut tally);
-    tally
+    Some(1e12 / if bits > 0.0 { time / bits } else { bit })
 }

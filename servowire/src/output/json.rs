@@ -4,25 +4,27 @@ use std::io::{self, Write};
 
 use serde::ser::{Serialize, SerializeMap, Serializer};
 
-use super::{Printer, Sink};
+use super::{Lane, Printer, Sink};
 use crate::event::{Direction, Event, Field, Place, Position, Refusal, Value, Verdict};
 
 /// Prints for programs.
 pub struct JsonLines<W> {
     out: W,
     file: String,
+    lanes: Vec<Lane>,
+    lane: usize,
 }
 
 impl<W: Write> JsonLines<W> {
     /// Writes to `out`.
     pub fn new(out: W) -> Self {
-        Self { out, file: String::new() }
+        Self { out, file: String::new(), lanes: Vec::new(), lane: 0 }
     }
 }
 
 impl<W: Write> Sink for JsonLines<W> {
     fn event(&mut self, event: &Event) -> io::Result<()> {
-        serde_json::to_writer(&mut self.out, &Object { file: &self.file, event })?;
+        serde_json::to_writer(&mut self.out, &Object { file: &self.file, lane: self.lanes.get(self.lane), event })?;
         self.out.write_all(b"\n")
     }
 }
@@ -30,7 +32,17 @@ impl<W: Write> Sink for JsonLines<W> {
 impl<W: Write> Printer for JsonLines<W> {
     fn begin(&mut self, file: &str) -> io::Result<()> {
         file.clone_into(&mut self.file);
+        self.lanes.clear();
         Ok(())
+    }
+
+    fn begin_lane(&mut self, lane: &Lane) -> io::Result<()> {
+        self.lanes.push(lane.clone());
+        Ok(())
+    }
+
+    fn lane(&mut self, lane: usize) {
+        self.lane = lane;
     }
 
     fn end(&mut self) -> io::Result<()> {
@@ -41,6 +53,7 @@ impl<W: Write> Printer for JsonLines<W> {
 /// An event as the README describes it; keys that say nothing are left out.
 struct Object<'a> {
     file: &'a str,
+    lane: Option<&'a Lane>,
     event: &'a Event,
 }
 
@@ -49,6 +62,11 @@ impl Serialize for Object<'_> {
         let event = self.event;
         let mut map = serializer.serialize_map(None)?;
         map.serialize_entry("file", self.file)?;
+        if let Some(lane) = self.lane {
+            map.serialize_entry("channel", &lane.channel)?;
+            map.serialize_entry("protocol", lane.protocol.title())?;
+            map.serialize_entry("bit_rate", &lane.rate)?;
+        }
         match event.place {
             Place::Time { start, end } => {
                 map.serialize_entry("start_ps", &start)?;

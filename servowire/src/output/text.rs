@@ -5,19 +5,22 @@
 //! ```
 //! `>` is a request, `<` an answer, `<>` a good request with what it got.
 
-use std::collections::HashMap;
+use std::collections::{BTreeMap, HashMap};
 use std::fmt::Write as _;
 use std::io::{self, Write};
 
-use super::{Printer, Sink};
+use super::{Lane, Printer, Sink};
 use crate::event::{Direction, Event, Field, Place, Value, Verdict};
 
 /// Prints for people.
 pub struct Text<W> {
     out: W,
     line: String,
-    /// A good request whose answer may follow.
-    held: Option<Event>,
+    /// A good request of each line whose answer may follow.
+    held: BTreeMap<usize, Event>,
+    /// Names of the lines, and the one that speaks.
+    lanes: Vec<String>,
+    lane: usize,
     headings: bool,
     /// The widest value of each field so far, so that lines of one kind stand in columns.
     widths: HashMap<&'static str, usize>,
@@ -29,13 +32,25 @@ const WIDEST: usize = 24;
 impl<W: Write> Text<W> {
     /// `headings`: print the file's name above its lines.
     pub fn new(out: W, headings: bool) -> Self {
-        Self { out, line: String::new(), held: None, headings, widths: HashMap::new() }
+        Self {
+            out,
+            line: String::new(),
+            held: BTreeMap::new(),
+            lanes: Vec::new(),
+            lane: 0,
+            headings,
+            widths: HashMap::new(),
+        }
     }
 
     fn print(&mut self, event: &Event, place: Place, direction: &str) -> io::Result<()> {
         let line = &mut self.line;
         line.clear();
         place_column(line, place);
+        if self.lanes.len() > 1 {
+            let widest = self.lanes.iter().map(String::len).max().unwrap_or(0);
+            let _ = write!(line, "  {:<widest$}", self.lanes.get(self.lane).map_or("", String::as_str));
+        }
         let _ = write!(line, "  {direction:<2}  {:<6}", event.kind);
         for field in &event.fields {
             line.push_str("  ");
@@ -60,7 +75,7 @@ impl<W: Write> Text<W> {
     }
 
     fn release(&mut self) -> io::Result<()> {
-        match self.held.take() {
+        match self.held.remove(&self.lane) {
             Some(request) => self.print(&request, request.place, ">"),
             None => Ok(()),
         }
@@ -70,18 +85,19 @@ impl<W: Write> Text<W> {
 impl<W: Write> Sink for Text<W> {
     fn event(&mut self, event: &Event) -> io::Result<()> {
         match event.direction {
-            Some(Direction::Answer) => match self.held.take() {
+            Some(Direction::Answer) => match self.held.remove(&self.lane) {
                 Some(request) if event.kind == request.kind => self.print(event, request.place, "<>"),
                 held => {
-                    self.held = held;
-                    self.release()?;
+                    if let Some(request) = held {
+                        self.print(&request, request.place, ">")?;
+                    }
                     self.print(event, event.place, "<")
                 }
             },
             Some(Direction::Request) => {
                 self.release()?;
                 if event.verdict.is_ok() {
-                    self.held = Some(event.clone());
+                    self.held.insert(self.lane, event.clone());
                     return Ok(());
                 }
                 self.print(event, event.place, ">")
@@ -99,8 +115,22 @@ impl<W: Write> Printer for Text<W> {
         if self.headings { writeln!(self.out, "{file}") } else { Ok(()) }
     }
 
+    fn begin_lane(&mut self, lane: &Lane) -> io::Result<()> {
+        self.lanes.push(lane.channel.clone());
+        Ok(())
+    }
+
+    fn lane(&mut self, lane: usize) {
+        self.lane = lane;
+    }
+
     fn end(&mut self) -> io::Result<()> {
-        self.release()?;
+        for lane in 0..self.lanes.len().max(1) {
+            self.lane = lane;
+            self.release()?;
+        }
+        self.lanes.clear();
+        self.lane = 0;
         if self.headings {
             writeln!(self.out)?;
         }

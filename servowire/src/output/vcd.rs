@@ -7,6 +7,7 @@ use std::path::Path;
 
 use vcd::{IdCode, TimescaleUnit, VarType, Writer};
 
+use super::Lane;
 use crate::capture::Change;
 use crate::event::{Direction, Event, Field, Place, Value, Verdict};
 
@@ -19,11 +20,14 @@ const NOTHING: &str = "-";
 /// A VCD being written.
 pub struct VcdOut {
     writer: Writer<BufWriter<File>>,
-    names: &'static [&'static str],
     /// Codes of the capture's channels.
     channels: Vec<IdCode>,
-    /// Codes of `frame`, `verdict` and the fields.
-    strings: Option<Strings>,
+    /// Lines found before the header was written.
+    lanes: Vec<Lane>,
+    /// The codes of each.
+    strings: Vec<Strings>,
+    /// The line that the events are of.
+    lane: usize,
     /// What is to be written, in order.
     waiting: BTreeMap<(i64, u64), Item>,
     sequence: u64,
@@ -32,9 +36,11 @@ pub struct VcdOut {
     written: Option<u64>,
 }
 
+#[derive(Clone)]
 struct Strings {
     frame: IdCode,
     verdict: IdCode,
+    names: &'static [&'static str],
     fields: Vec<IdCode>,
 }
 
@@ -44,13 +50,14 @@ enum Item {
 }
 
 impl VcdOut {
-    /// `names`: the fields that the protocol may give.
-    pub fn create(path: &Path, names: &'static [&'static str]) -> io::Result<Self> {
+    /// A new file.
+    pub fn create(path: &Path) -> io::Result<Self> {
         Ok(Self {
             writer: Writer::new(BufWriter::new(File::create(path)?)),
-            names,
             channels: Vec::new(),
-            strings: None,
+            lanes: Vec::new(),
+            strings: Vec::new(),
+            lane: 0,
             waiting: BTreeMap::new(),
             sequence: 0,
             origin: None,
@@ -58,8 +65,16 @@ impl VcdOut {
         })
     }
 
-    /// Writes the header.
-    pub(super) fn channels(&mut self, channels: &[String], decoded: u16) -> io::Result<()> {
+    pub(super) fn begin_lane(&mut self, lane: Lane) {
+        self.lanes.push(lane);
+    }
+
+    pub(super) fn lane(&mut self, lane: usize) {
+        self.lane = lane;
+    }
+
+    /// Writes the header. A line that is found later has no place in it.
+    pub(super) fn channels(&mut self, channels: &[String]) -> io::Result<()> {
         let writer = &mut self.writer;
         writer.version("servowire")?;
         writer.timescale(1, TimescaleUnit::NS)?;
@@ -68,15 +83,16 @@ impl VcdOut {
             self.channels.push(writer.add_wire(1, &word(name))?);
         }
         writer.upscope()?;
-        let line = channels.get(usize::from(decoded)).map_or_else(|| "line".to_owned(), |name| word(name));
-        writer.add_module(&format!("decoded_{line}"))?;
-        let mut string = |name: &str| writer.add_var(VarType::String, 1, name, None);
-        let (frame, verdict) = (string("frame")?, string("verdict")?);
-        let fields = self.names.iter().map(|name| string(name)).collect::<io::Result<Vec<_>>>()?;
-        writer.upscope()?;
-        writer.enddefinitions()?;
-        self.strings = Some(Strings { frame, verdict, fields });
-        Ok(())
+        for lane in &self.lanes {
+            writer.add_module(&format!("decoded_{}", word(&lane.channel)))?;
+            let mut string = |name: &str| writer.add_var(VarType::String, 1, name, None);
+            let (frame, verdict) = (string("frame")?, string("verdict")?);
+            let names = lane.protocol.field_names();
+            let fields = names.iter().map(|name| string(name)).collect::<io::Result<Vec<_>>>()?;
+            writer.upscope()?;
+            self.strings.push(Strings { frame, verdict, names, fields });
+        }
+        writer.enddefinitions()
     }
 
     fn wait(&mut self, time: i64, item: Item) {
@@ -88,8 +104,8 @@ impl VcdOut {
     pub(super) fn change(&mut self, change: &Change) -> io::Result<()> {
         if self.origin.is_none() {
             self.origin = Some(change.time.min(0));
-            let strings = self.strings.iter().flat_map(|s| [s.frame, s.verdict].into_iter().chain(s.fields.clone()));
-            for code in strings.collect::<Vec<_>>() {
+            let strings = self.strings.clone();
+            for code in strings.iter().flat_map(|s| [s.frame, s.verdict].into_iter().chain(s.fields.clone())) {
                 self.wait(change.time, Item::Text(code, NOTHING.to_owned()));
             }
         }
@@ -101,7 +117,7 @@ impl VcdOut {
 
     /// A decoded frame.
     pub(super) fn event(&mut self, event: &Event) {
-        let (Place::Time { start, end }, Some(strings)) = (event.place, &self.strings) else { return };
+        let (Place::Time { start, end }, Some(strings)) = (event.place, self.strings.get(self.lane)) else { return };
         let side = match event.direction {
             Some(Direction::Request) => "request ",
             Some(Direction::Answer) => "answer ",
@@ -112,7 +128,7 @@ impl VcdOut {
             Verdict::Refused(refusal) => format!("{}: {}", refusal.class, refusal.reason),
         };
         let mut shown = vec![(strings.frame, format!("{side}{}", event.kind)), (strings.verdict, verdict)];
-        for (name, code) in self.names.iter().zip(&strings.fields) {
+        for (name, code) in strings.names.iter().zip(&strings.fields) {
             if let Some(field) = event.fields.iter().find(|field| field.name == *name) {
                 shown.push((*code, text(field)));
             }

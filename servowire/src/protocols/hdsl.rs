@@ -3,21 +3,23 @@
 //! Every run of equal levels is rounded to whole bits, so that the grid follows the edges of whoever drives. A frame is
 //! found by the head of the master; the answer behind it at the delay where its words hold.
 
-use std::ops::Range;
+mod bits;
 
-use hdsl::frame::{ANSWER_BITS, BIT_RATE, Head, Received};
+use std::io;
+
+use hdsl::frame::{ANSWER_BITS, BIT_RATE, H_FRAME_BITS, Head, Received};
 use hdsl::message::{LongAnswer, Request, Responder, ShortRequest};
-use hdsl::sampling::{Alignment, TEST_PATTERN};
+use hdsl::sampling::{Delay, TEST_PATTERN};
+use hdsl::symbol::{RunningDisparity, Word};
 use hdsl::{
     Answer, EncoderByte, EncoderId, EncoderSymbol, Error, MasterSymbol, Phase, PositionBits, PositionTracker,
     QualityEvent, QualityMonitor, QualityRule, Rule, VFrame, Window,
 };
 
-use crate::capture::{Capture, Change, Line, time};
-use crate::event::{Direction, Event, Field, Place, Position, Refusal, Value, Verdict};
-use crate::fault::{At, Fault};
-use crate::line::{self, Stop};
-use crate::output::{Output, Sink};
+use crate::event::{Direction, Event, Field, NO_RESPONSE, Place, Position, Refusal, Value, Verdict};
+use crate::line::{LineDecoder, Rates};
+use crate::output::Sink;
+use bits::Bits;
 
 /// The names of all fields.
 pub const FIELDS: &[&str] = &[
@@ -25,125 +27,108 @@ pub const FIELDS: &[&str] = &[
     "VPOS", "STATUS2", "VPOS2", "QM", "ENC_ID", "message",
 ];
 
-/// A bit in picoseconds.
-const BIT: i64 = time::SECOND / BIT_RATE as i64;
+/// Nominal bit rates.
+pub const RATES: &[u32] = &[BIT_RATE];
+
 /// Bits that have to be there before a frame is looked for: longest head, direction switch, delay, answer.
-const NEED: usize = 36 + 1 + 12 + ANSWER_BITS as usize;
-/// Longest run that is taken bit by bit; a longer one is a pause.
-const PAUSE: i64 = 200;
+const NEED: u64 = 36 + 1 + 12 + ANSWER_BITS as u64;
+/// Bits between the heads of two frames at most: the longest frame with its stuffing.
+const LONGEST: u64 = 273 + 4;
 
-/// Decodes a capture to its end.
-pub(super) fn decode(file: &str, capture: Capture, options: &line::Options, out: &mut Output<'_>) -> Result<(), Stop> {
-    match capture {
-        Capture::Edges(mut line) => run(file, line.as_mut(), options, out),
-        Capture::Samples(mut raw) => {
-            let rate = raw.clock().rate();
-            if rate < 4 * u64::from(BIT_RATE) {
-                let what = format!("{rate} samples a second are too few for 9.375 Mbit/s: 37.5 MHz or faster");
-                return Err(Fault::new(file, At::File, what).into());
-            }
-            run(file, &mut raw, options, out)
-        }
-        Capture::Bytes(_) | Capture::Packets(_) => {
-            Err(Fault::new(file, At::File, "HIPERFACE DSL is decoded from edges or samples of the line").into())
-        }
+/// Decodes the link on one line.
+pub struct DslLine {
+    bits: Bits,
+    decoder: Decoder,
+    bit: f64,
+}
+
+impl DslLine {
+    /// `bit`: nominal length in picoseconds.
+    pub fn new(bit: f64) -> Self {
+        Self { bits: Bits::new(bit), decoder: Decoder::new(), bit }
     }
 }
 
-fn run(file: &str, line: &mut dyn Line, options: &line::Options, out: &mut Output<'_>) -> Result<(), Stop> {
-    let mut changes = Vec::new();
-    let mut more = line.read(&mut changes)?;
-    let channel = channel(file, line.channels(), options, &changes)?;
-    out.channels(line.channels(), channel)?;
-    let mut bits = Bits { inverted: options.inverted.unwrap_or(false), ..Bits::default() };
-    let mut decoder = Decoder::new();
-    loop {
-        for change in &changes {
-            if out.wants_changes() {
-                out.change(change)?;
-            }
-            if change.channel == channel {
-                bits.change(change.time, change.level);
-            }
-        }
-        decoder.take(&mut bits, NEED, out)?;
-        out.tick();
-        if !more {
-            break;
-        }
-        changes.clear();
-        more = line.read(&mut changes)?;
-    }
-    bits.change(line.reached(), false);
-    decoder.take(&mut bits, Head::BITS as usize, out)
-}
-
-/// The channel asked for by name or number, or the one with the most changes at first.
-fn channel(file: &str, names: &[String], options: &line::Options, changes: &[Change]) -> Result<u16, Fault> {
-    let all = 0..u16::try_from(names.len()).unwrap_or(u16::MAX);
-    if let Some(wanted) = &options.channel {
-        let named = all.clone().zip(names).find(|(_, name)| *name == wanted).map(|(channel, _)| channel);
-        let numbered = || wanted.parse().ok().filter(|number| all.contains(number));
-        return named
-            .or_else(numbered)
-            .ok_or_else(|| Fault::new(file, At::File, format!("there is no channel {wanted:?}")));
-    }
-    let busy = |channel: &u16| changes.iter().filter(|change| change.channel == *channel).count();
-    all.max_by_key(busy).ok_or_else(|| Fault::new(file, At::File, "there is no channel"))
-}
-
-/// Line bits with their times.
-#[derive(Default)]
-struct Bits {
-    inverted: bool,
-    last: Option<(i64, bool)>,
-    levels: Vec<bool>,
-    times: Vec<i64>,
-}
-
-impl Bits {
-    fn change(&mut self, time: i64, level: bool) {
-        if let Some((since, high)) = self.last {
-            let count = ((time - since + BIT / 2) / BIT).min(PAUSE);
-            for bit in 0..count {
-                self.levels.push(high);
-                self.times.push(since + bit * BIT);
-            }
-        }
-        self.last = Some((time, level != self.inverted));
+impl LineDecoder for DslLine {
+    fn change(&mut self, time: i64, level: bool, out: &mut dyn Sink) -> io::Result<()> {
+        self.bits.change(time, level);
+        let enough = if self.decoder.delay.is_none() { LESSON } else { 2 * NEED };
+        if self.bits.end() > self.decoder.next + enough { self.decoder.take(&mut self.bits, NEED, out) } else { Ok(()) }
     }
 
-    /// Up to 128 bits from `at` on.
-    fn window(&self, at: usize) -> Window {
-        let levels = self.levels.get(at..).unwrap_or_default();
-        let len = levels.len().min(128);
-        let bits = levels.iter().take(len).rev().fold(0, |bits, level| bits << 1 | u128::from(*level));
-        Window::from_bits(bits, len as u32).unwrap_or(Window::EMPTY)
+    fn reach(&mut self, time: i64, out: &mut dyn Sink) -> io::Result<()> {
+        self.bits.reach(time);
+        if self.decoder.delay.is_some() { self.decoder.take(&mut self.bits, NEED, out) } else { Ok(()) }
     }
 
-    fn place(&self, bits: Range<usize>) -> Place {
-        let time = |at: usize| self.times.get(at).copied().unwrap_or(0);
-        Place::Time { start: time(bits.start), end: time(bits.end.saturating_sub(1)) + BIT }
+    fn gap(&mut self, time: i64, out: &mut dyn Sink) -> io::Result<()> {
+        self.finish(time, out)?;
+        *self = Self::new(self.bit);
+        Ok(())
+    }
+
+    fn finish(&mut self, time: i64, out: &mut dyn Sink) -> io::Result<()> {
+        self.bits.finish(time, 2.0);
+        self.decoder.take(&mut self.bits, u64::from(Head::BITS), out)
+    }
+
+    fn rates(&self) -> Rates {
+        self.bits.rates
     }
 }
 
-/// A head; the partly high last bit of an EXTRA window can have been rounded to one bit more in all.
-fn head(line: Window) -> Option<(Received, usize)> {
-    if let Ok(head) = Head::parse(line) {
-        return Some((head, head.len as usize));
-    }
-    let ones = (line.bits() >> 8).trailing_ones();
-    if !(3..=10).contains(&ones) || (line.bits() >> (8 + ones)).trailing_zeros() != 2 {
+/// A head at bit `at`; the partly high last bit of an EXTRA window can have been rounded to one bit more in all.
+fn head(bits: &Bits, at: u64) -> Option<(Received, u64)> {
+    let raw = bits.load(at);
+    // SYNC and the ones of SAMPLE.
+    if raw & 0xff != HEAD {
         return None;
     }
-    let low = line.bits() & ((1 << (8 + ones)) - 1);
-    let shorter = Window::from_bits(low | line.bits() >> (9 + ones) << (8 + ones), line.len() - 1)?;
-    Head::parse(shorter).ok().map(|head| (head, head.len as usize + 1))
+    let line = bits.window(at);
+    if let Ok(head) = Head::parse(line) {
+        return Some((head, head.len.into()));
+    }
+    let ones = (raw >> 8).trailing_ones();
+    if !(3..=10).contains(&ones) || (raw >> (8 + ones)).trailing_zeros() != 2 {
+        return None;
+    }
+    let low = raw & ((1 << (8 + ones)) - 1);
+    let shorter = Window::from_bits(low | raw >> (9 + ones) << (8 + ones), line.len().checked_sub(1)?)?;
+    Head::parse(shorter).ok().map(|head| (head, u64::from(head.len) + 1))
+}
+
+/// SYNC and the two ones of SAMPLE, the first bit in bit 0.
+const HEAD: u128 = 0b1111_0100;
+/// Good words and checks from which an answer is where it was looked for.
+const GOOD: usize = 10;
+/// Answers from which the delay is learned, and bits in which they are.
+const LEARNED: usize = 8;
+const LESSON: u64 = 1300;
+const DISPARITY: &str = "all words are in the tables, but not one behind the other: bits of at least one were flipped";
+const PAUSED: &str = "the line rests here, though frames follow each other for ever";
+
+/// What there is where the head of a frame was due, within three bits.
+fn damage(line: u128) -> (&'static str, String) {
+    // 0 0 1 0 1 1, 1 1 0, 1 1 0
+    const PATTERN: u128 = 0b0110_1111_0100;
+    let near = (0..=6).map(|at| ((line >> at & 0xfff) ^ PATTERN).count_ones()).min().unwrap_or(12);
+    match near {
+        0 => ("invalid_word", "the parameter word of the head is in no table".to_owned()),
+        1..=2 => ("head", format!("the head of the frame is damaged in {near} bit(s)")),
+        _ => ("missing", "a frame is missing".to_owned()),
+    }
 }
 
 /// What is known of the link so far.
 struct Decoder {
+    /// The bit at which to go on.
+    next: u64,
+    /// The last head, and how far it was from the one before.
+    head: Option<u64>,
+    apart: Option<u64>,
     delay: Option<u32>,
+    /// Time from the end of a head to its answer, in picoseconds.
+    lag: Option<i64>,
     tracker: PositionTracker,
     quality: QualityMonitor,
     frame: VFrame,
@@ -157,7 +142,11 @@ struct Decoder {
 impl Decoder {
     fn new() -> Self {
         Self {
+            next: 0,
+            head: None,
+            apart: None,
             delay: None,
+            lag: None,
             tracker: PositionTracker::new(PositionBits::MAX),
             quality: QualityMonitor::new(QualityRule::Sick),
             frame: VFrame::default(),
@@ -169,24 +158,62 @@ impl Decoder {
     }
 
     /// Takes all frames that are there; fewer than `need` bits are kept for the next time.
-    fn take(&mut self, bits: &mut Bits, need: usize, out: &mut Output<'_>) -> Result<(), Stop> {
-        let mut at = 0;
-        while at + need <= bits.levels.len() {
-            let Some((found, len)) = head(bits.window(at)) else {
-                at += 1;
+    fn take(&mut self, bits: &mut Bits, need: u64, out: &mut dyn Sink) -> io::Result<()> {
+        while self.next + need <= bits.end() {
+            let at = self.next;
+            let Some((found, len)) = head(bits, at) else {
+                self.next += 1;
                 continue;
             };
+            self.missed(bits, at, out)?;
             let symbol = found.byte.symbol();
             out.event(&master(found, symbol, bits.place(at..at + len)))?;
             self.message_out(symbol, bits.place(at..at + len), out)?;
-            at += len;
+            self.next = at + len;
             if symbol.is_ok_and(MasterSymbol::is_answered) {
-                at = self.answer(symbol, bits, at + 1, out)?;
+                let whole = self.next + 1 + u64::from(ANSWER_BITS) <= bits.end();
+                if !whole {
+                    break;
+                }
+                self.next = self.answer(symbol, bits, at + len + 1, out)?;
             }
         }
-        bits.levels.drain(..at.min(bits.levels.len()));
-        bits.times.drain(..at.min(bits.times.len()));
+        bits.forget(self.next.saturating_sub(LONGEST));
         Ok(())
+    }
+
+    /// Frames follow each other for ever: says where one should have been before the head at `at`.
+    fn missed(&mut self, bits: &mut Bits, at: u64, out: &mut dyn Sink) -> io::Result<()> {
+        let Some(last) = self.head.replace(at) else {
+            bits.paused = None;
+            return Ok(());
+        };
+        let (apart, usual) = (at - last, self.apart.unwrap_or(u64::from(H_FRAME_BITS)));
+        if bits.paused.take_if(|paused| *paused <= at).is_some() {
+            let place = bits.place(last..at);
+            self.lose(1);
+            out.event(&event(place, Direction::Request, "H-frame", Vec::new(), Err(("gap", PAUSED.to_owned()))))?;
+        } else if apart > LONGEST || apart + 8 >= 2 * usual {
+            let missing = ((apart as f64 / usual as f64).round() as u64).saturating_sub(1).max(1);
+            for k in 1..=missing {
+                let due = last + k * apart / (missing + 1);
+                self.lose(1);
+                let (class, what) = damage(bits.load(due.saturating_sub(3)));
+                let place = bits.place(due..due + u64::from(Head::BITS));
+                out.event(&event(place, Direction::Request, "H-frame", Vec::new(), Err((class, what))))?;
+            }
+        } else {
+            self.apart = Some(apart);
+        }
+        Ok(())
+    }
+
+    /// Frames that were not heard: the fast position and the V-frame go on without them.
+    fn lose(&mut self, frames: u8) {
+        for _ in 0..frames {
+            self.tracker.step(None);
+            self.at = None;
+        }
     }
 
     /// The answer that begins at `from` or some bits later; where to go on.
@@ -194,40 +221,52 @@ impl Decoder {
         &mut self,
         symbol: Result<MasterSymbol, Error>,
         bits: &Bits,
-        from: usize,
-        out: &mut Output<'_>,
-    ) -> Result<usize, Stop> {
-        let line = |delay: u32| bits.window(from + delay as usize);
-        let delays = self.delay.into_iter().chain(0..=u32::from(Alignment::MAX_DELAY) + 1);
-        let Some((delay, score)) = delays.map(|d| (d, score(line(d)))).rev().max_by_key(|(_, score)| *score) else {
-            return Ok(from);
+        from: u64,
+        out: &mut dyn Sink,
+    ) -> io::Result<u64> {
+        let line = |delay: u32| bits.window(from + u64::from(delay));
+        let usual = match self.delay {
+            Some(delay) => delay,
+            None => usual_delay(bits, from),
         };
-        let place = bits.place(from + delay as usize..from + (delay + ANSWER_BITS) as usize);
-        let silent = line(0).bits().trailing_ones() > 64;
+        // The delay of a cable does not change, but it need not be whole bits; between equals the time decides.
+        let since = |delay: u32| bits.time(from + u64::from(delay)) - bits.time(from);
+        let off = |delay: u32| self.lag.map_or(0, |lag| (since(delay) - lag).abs());
+        let near = [usual, usual + 1, usual.saturating_sub(1)].map(|delay| (delay, score(line(delay))));
+        let better = |a: &(u32, usize), b: &(u32, usize)| a.1 > b.1 || a.1 == b.1 && off(a.0) < off(b.0);
+        let (delay, score) =
+            near.into_iter().reduce(|best, next| if better(&next, &best) { next } else { best }).unwrap_or((usual, 0));
+        if score >= GOOD {
+            let now = since(delay);
+            self.lag = Some(self.lag.map_or(now, |lag| lag + (now - lag) / 8));
+        }
+        let place = bits.place(from + u64::from(delay)..from + u64::from(delay + ANSWER_BITS));
+        let silent = line(0).bits().trailing_ones() > 56;
         if score < 4 || silent {
-            out.event(&event(
-                place,
-                Direction::Answer,
-                "answer",
-                Vec::new(),
-                Err(("no_response", "no answer".into())),
-            ))?;
+            let why = if silent { "no answer" } else { "hardly a word of the answer holds" };
+            let class = if silent { NO_RESPONSE } else { "invalid_word" };
+            let verdict = Err((class, why.to_owned()));
+            self.tracker.step(None);
+            out.event(&event(place, Direction::Answer, "answer", Vec::new(), verdict))?;
+            self.at = self.at.map(|at| (at + 1) % 8);
             return Ok(from);
         }
-        self.delay = Some(delay);
+        self.delay = Some(usual);
         let window = line(delay);
-        let end = from + (delay + ANSWER_BITS) as usize;
+        let end = from + u64::from(delay + ANSWER_BITS);
         match symbol {
             Ok(MasterSymbol::Start | MasterSymbol::Learn | MasterSymbol::Check) => {
                 let good = window.bits() as u64 & ((1 << ANSWER_BITS) - 1) == TEST_PATTERN;
                 let verdict = if good { Ok(()) } else { Err(("pattern", "the test pattern is damaged".into())) };
-                out.event(&event(
+                let mut event = event(
                     place,
                     Direction::Answer,
                     "test pattern",
                     vec![number("delay", delay.into(), "bit")],
                     verdict,
-                ))?;
+                );
+                event.delay = None;
+                out.event(&event)?;
             }
             Ok(MasterSymbol::IdReq) => self.identifier(window, place, out)?,
             _ => self.normal(window, place, out)?,
@@ -235,18 +274,26 @@ impl Decoder {
         Ok(end)
     }
 
-    fn identifier(&mut self, window: Window, place: Place, out: &mut Output<'_>) -> Result<(), Stop> {
-        let id = Answer::parse(window, Rule::Strict).and_then(EncoderId::from_answer);
-        let fields = id.map_or_else(|_| Vec::new(), |id| vec![hex("ENC_ID", id.raw().into(), 5)]);
+    fn identifier(&mut self, window: Window, place: Place, out: &mut dyn Sink) -> io::Result<()> {
+        let id = Answer::parse(Rule::Strict, window).and_then(EncoderId::from_answer);
+        let fields = id.map_or_else(|_| Vec::new(), |id| vec![hex("ENC_ID", id.get().into(), 5)]);
         if let Ok(bits) = id.and_then(EncoderId::check) {
-            *self = Self { delay: self.delay, tracker: PositionTracker::new(bits), ..Self::new() };
+            *self = Self {
+                delay: self.delay,
+                lag: self.lag,
+                next: self.next,
+                head: self.head,
+                apart: self.apart,
+                tracker: PositionTracker::new(bits),
+                ..Self::new()
+            };
         }
         out.event(&event(place, Direction::Answer, "identifier", fields, id.map(|_| ()).map_err(refusal)))?;
         Ok(())
     }
 
-    fn normal(&mut self, window: Window, place: Place, out: &mut Output<'_>) -> Result<(), Stop> {
-        let Ok(answer) = Answer::parse(window, Rule::Strict) else { return Ok(()) };
+    fn normal(&mut self, window: Window, place: Place, out: &mut dyn Sink) -> io::Result<()> {
+        let Ok(answer) = Answer::parse(Rule::Strict, window) else { return Ok(()) };
         let dd = answer.delta_delta();
         self.tracker.step(dd.ok());
         let parameter = answer.parameter();
@@ -261,8 +308,13 @@ impl Decoder {
         fields.extend(dd.ok().map(|dd| number("DD", dd.get().into(), "")));
         fields.extend(byte("SEC", answer.secondary()));
         fields.push(number("VEL", self.tracker.velocity().into(), "steps/frame"));
-        let first = answer.words().into_iter().find_map(|word| word.byte().err()).or(dd.err());
-        let mut event = event(place, Direction::Answer, "answer", fields, first.map_or(Ok(()), |e| Err(refusal(e))));
+        let first = answer.words().into_iter().find_map(|word| word.byte().err()).or(dd.err()).map(refusal);
+        let verdict = match first {
+            Some(refused) => Err(refused),
+            None if !disparity_holds(window) => Err(("disparity", DISPARITY.to_owned())),
+            None => Ok(()),
+        };
+        let mut event = event(place, Direction::Answer, "answer", fields, verdict);
         if self.tracker.phase() == Phase::Check && !self.tracker.is_unreliable() {
             event.fields.push(hex("POS", self.tracker.position(), 10));
             event.position = Some(position(self.tracker.position()));
@@ -272,9 +324,9 @@ impl Decoder {
         self.v_frame(answer, parameter.is_ok_and(EncoderByte::vsync), place, out)
     }
 
-    fn v_frame(&mut self, answer: Answer, vsync: bool, place: Place, out: &mut Output<'_>) -> Result<(), Stop> {
+    fn v_frame(&mut self, answer: Answer, vsync: bool, place: Place, out: &mut dyn Sink) -> io::Result<()> {
         if let Some(at) = self.at {
-            self.frame.put(at, answer, Rule::Strict);
+            self.frame.put(Rule::Strict, at, answer);
             if at == 7 {
                 self.quality.count(if vsync { QualityEvent::VsyncOk } else { QualityEvent::VsyncMissing });
                 self.end_v_frame(place, out)?;
@@ -287,7 +339,7 @@ impl Decoder {
         Ok(())
     }
 
-    fn end_v_frame(&mut self, place: Place, out: &mut Output<'_>) -> Result<(), Stop> {
+    fn end_v_frame(&mut self, place: Place, out: &mut dyn Sink) -> io::Result<()> {
         let VFrame { safe1, safe2 } = self.frame;
         let safe = safe1.position();
         self.quality.count(if safe.is_ok() { QualityEvent::Safe1Ok } else { QualityEvent::Safe1Error });
@@ -308,12 +360,7 @@ impl Decoder {
     }
 
     /// Requests, symbol by symbol.
-    fn message_out(
-        &mut self,
-        symbol: Result<MasterSymbol, Error>,
-        place: Place,
-        out: &mut Output<'_>,
-    ) -> Result<(), Stop> {
+    fn message_out(&mut self, symbol: Result<MasterSymbol, Error>, place: Place, out: &mut dyn Sink) -> io::Result<()> {
         let Ok(symbol) = symbol else { return Ok(()) };
         if let Some(request) = self.requests.receive(symbol) {
             let what = match request {
@@ -330,7 +377,7 @@ impl Decoder {
     }
 
     /// Answers: what was gathered until the next IDLE.
-    fn message_in(&mut self, byte: Option<EncoderByte>, place: Place, out: &mut Output<'_>) -> Result<(), Stop> {
+    fn message_in(&mut self, byte: Option<EncoderByte>, place: Place, out: &mut dyn Sink) -> io::Result<()> {
         if let Some(Ok(EncoderSymbol::Data(nibble))) = byte.map(EncoderByte::symbol) {
             self.nibbles.push(nibble.get());
             return Ok(());
@@ -346,7 +393,7 @@ impl Decoder {
             }),
             Request::Long(_) => LongAnswer::parse(&bytes).map(|answer| match answer.result {
                 Ok(data) => format!("resource {:03X}h: {:02X?}", answer.address.get(), data.as_bytes()),
-                Err(error) => format!("refused, class {:02X}h, detail {:02X}h", error.class, error.detail),
+                Err(error) => format!("refused, class {:02X}h, detail {:02X}h", error.class_code(), error.detail()),
             }),
         };
         let fields = result.as_ref().map_or_else(|_| Vec::new(), |what| vec![text("message", what.clone())]);
@@ -355,14 +402,59 @@ impl Decoder {
     }
 }
 
+/// The delay at which most of the answers behind the next heads hold.
+fn usual_delay(bits: &Bits, from: u64) -> u32 {
+    let delays = 0..=u32::from(Delay::MAX.get()) + 1;
+    let mut sums = vec![0; delays.clone().count()];
+    let (mut at, mut heard) = (from, 0);
+    while heard < LEARNED && at + u64::from(ANSWER_BITS) < bits.end() {
+        for (delay, sum) in delays.clone().zip(&mut sums) {
+            *sum += score(bits.window(at + u64::from(delay)));
+        }
+        heard += 1;
+        at += u64::from(ANSWER_BITS);
+        // The answer behind the next head.
+        loop {
+            if at + u64::from(Head::BITS) > bits.end() {
+                at = bits.end();
+                break;
+            }
+            if let Some((_, len)) = head(bits, at) {
+                at += len + 1;
+                break;
+            }
+            at += 1;
+        }
+    }
+    let best = delays.zip(sums).reduce(|best, next| if next.1 > best.1 { next } else { best });
+    best.map_or(0, |(delay, _)| delay)
+}
+
 /// How well an answer stands here: good words, switch bit, check of the acceleration; most for the test pattern.
 fn score(line: Window) -> usize {
-    let Ok(answer) = Answer::parse(line, Rule::Strict) else { return 0 };
+    let Ok(answer) = Answer::parse(Rule::Strict, line) else { return 0 };
     if line.bits() as u64 & ((1 << ANSWER_BITS) - 1) == TEST_PATTERN {
         return 20;
     }
     let words = answer.words().iter().filter(|word| !word.is_byte_error()).count();
-    words + usize::from(answer.switch_ok()) + if answer.delta_delta().is_ok() { 2 } else { 0 }
+    let disparity = if disparity_holds(line) { 3 } else { 0 };
+    words + usize::from(answer.switch_ok()) + if answer.delta_delta().is_ok() { 2 } else { 0 } + disparity
+}
+
+/// Whether the running disparity holds from word to word of an answer, whatever it was before.
+fn disparity_holds(line: Window) -> bool {
+    let bits = line.bits();
+    let words = [0, 10, 20, 30, 40, 51].map(|at| Word::truncate((bits >> at) as u16));
+    [RunningDisparity::Minus, RunningDisparity::Plus].into_iter().any(|before| {
+        let mut rd = before;
+        words.into_iter().all(|word| {
+            let holds = word.is_in(rd);
+            if word.disparity() != 0 {
+                rd = rd.other();
+            }
+            holds
+        })
+    })
 }
 
 fn master(head: Received, symbol: Result<MasterSymbol, Error>, place: Place) -> Event {

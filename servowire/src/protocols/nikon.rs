@@ -10,8 +10,8 @@ use std::io;
 
 use nikon_aformat::inspect::Kind;
 use nikon_aformat::{
-    BitOrder, BitRate, Command, Echo, Error, Expected, FRAME_BITS, Layout, Profile, Reply, Request, RequestFrame,
-    Response,
+    BitOrder, BitRate, Command, Echo, Error, Expected, FRAME_BITS, Layout, RawResponse, Request, RequestFrame,
+    Resolution, Response,
 };
 
 use crate::capture::hexlog::Burst;
@@ -31,8 +31,20 @@ pub struct Settings {
     pub multi_turn_bits: Option<u8>,
 }
 
+/// Nominal bit rates.
+pub const RATES: &[u32] = &[
+    BitRate::Mbit2_5.bits_per_second(),
+    BitRate::Mbit4.bits_per_second(),
+    BitRate::Mbit6_67.bits_per_second(),
+    BitRate::Mbit8.bits_per_second(),
+    BitRate::Mbit16.bits_per_second(),
+];
+
 /// A pause that ends a reply, in bits. Replies of two encoders are 7 bits apart or more.
 const PAUSE_BITS: i64 = 4;
+
+/// The longest reply, in bits.
+const LONGEST_BITS: i64 = 6 * FRAME_BITS as i64;
 
 /// A pause that ends a request whose memory data frames do not come, in picoseconds: drivers leave 1 to 10 us.
 const MEMORY_PAUSE: i64 = 50_000_000;
@@ -129,6 +141,8 @@ pub struct Decoder {
     encoder: Encoder,
     /// Begin of the capture, until the first group has been seen.
     begin: Option<i64>,
+    /// Until when the rest of a reply may come in which the capture began.
+    cut_until: Option<i64>,
     open: Group,
     pending: Option<Pending>,
 }
@@ -136,7 +150,14 @@ pub struct Decoder {
 impl Decoder {
     /// `bit`: its length in picoseconds.
     pub fn new(bit: i64, settings: Settings) -> Self {
-        Self { bit, encoder: Encoder::new(settings), begin: None, open: Group::default(), pending: None }
+        Self {
+            bit,
+            encoder: Encoder::new(settings),
+            begin: None,
+            cut_until: None,
+            open: Group::default(),
+            pending: None,
+        }
     }
 
     /// Whether the open group is over before a frame that begins at `start`.
@@ -158,7 +179,9 @@ impl Decoder {
         };
         // With no idle line before it, a bad first group is only the end of one.
         let at_once = begin.is_some_and(|begin| group.start() - begin < i64::from(FRAME_BITS) * self.bit);
-        if at_once && !event.verdict.is_ok() {
+        let still = self.cut_until.take().is_some_and(|until| group.start() < until);
+        if (at_once || still) && !event.verdict.is_ok() {
+            self.cut_until = Some(group.start() + LONGEST_BITS * self.bit);
             return out.event(&describe::cut(group.place(), "the capture begins inside a frame"));
         }
         out.event(&event)
@@ -191,8 +214,8 @@ impl Decoder {
         let result = match (group.broken, expected) {
             (Some(frame), _) => Err(Error::Delimiter { frame }),
             (None, Ok(expected)) => {
-                let reply = Reply::from_words(&group.contents, BitOrder::LsbFirst, expected.layout());
-                reply.and_then(|reply| Response::parse(&reply, &expected))
+                let reply = RawResponse::from_words(expected.layout(), &group.contents, BitOrder::LsbFirst);
+                reply.and_then(|reply| Response::parse(&expected, &reply))
             }
             (None, Err(error)) => Err(error),
         };
@@ -219,11 +242,12 @@ fn expected(group: &Group, asked: Option<Request>) -> Result<Expected, Error> {
             return Ok(Expected::new(Layout::Abs17, Command::Abs17));
         }
         let code = group.contents.first().map_or(31, |first| first >> 6 & 31);
-        let command = Command::from_code(u8::try_from(code).unwrap_or(31))?;
+        let code = u8::try_from(code).unwrap_or(31);
+        let command = Command::from_code(code).ok_or(Error::UnknownCommand { code })?;
         let [standard, _] = command.layouts();
         return Ok(Expected::new(command.layouts().into_iter().find(fits).unwrap_or(standard), command));
     };
-    let expected = request.expected(Profile::default());
+    let expected = request.expected(Resolution::default());
     if fits(&expected.layout()) {
         return Ok(expected);
     }
@@ -234,14 +258,6 @@ fn expected(group: &Group, asked: Option<Request>) -> Result<Expected, Error> {
 }
 
 impl StartStop for Decoder {
-    const NAME: &'static str = "A-format";
-    const RATES: &'static [u32] = &[
-        BitRate::Mbit2_5.bits_per_second(),
-        BitRate::Mbit4.bits_per_second(),
-        BitRate::Mbit6_67.bits_per_second(),
-        BitRate::Mbit8.bits_per_second(),
-        BitRate::Mbit16.bits_per_second(),
-    ];
     const CONTENT_BITS: u32 = 16;
 
     fn begin(&mut self, start: i64) {
@@ -255,7 +271,7 @@ impl StartStop for Decoder {
         self.open.push(field);
         let whole = match self.open.kind() {
             Kind::Request => self.open.request_frames(),
-            _ => Reply::MAX_FRAMES,
+            _ => RawResponse::MAX_FRAMES,
         };
         if self.open.contents.len() >= whole { self.close(out) } else { Ok(()) }
     }

@@ -6,16 +6,14 @@
 
 use std::borrow::Cow;
 use std::collections::HashMap;
+use std::io;
 
 use rtex_block::inspect::{self, Report, inspect};
-use rtex_block::{Error, ErrorClass, Header};
+use rtex_block::{Error, Header};
 
-use crate::capture::Capture;
 use crate::capture::hexlog::Burst;
 use crate::event::{Direction, Event, Field, Place, Position, Refusal, Value, Verdict};
-use crate::fault::{At, Fault};
-use crate::line::Stop;
-use crate::output::{Output, Sink};
+use crate::output::Sink;
 
 /// What the blocks do not tell.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -32,31 +30,32 @@ impl Default for Settings {
     }
 }
 
-/// Decodes a log of blocks.
-pub(super) fn decode(file: &str, capture: Capture, settings: &Settings, out: &mut Output<'_>) -> Result<(), Stop> {
-    let Capture::Bytes(mut log) = capture else {
-        let what = "RTEX blocks are read from logs of bytes: hex digits with --bytes, binary with --record-size";
-        return Err(Fault::new(file, At::File, what).into());
-    };
-    let mut decoder = Decoder { settings: *settings, last: HashMap::new() };
-    while let Some(burst) = log.burst()? {
-        out.tick();
-        for block in burst.bytes.chunks(settings.block_size.max(1)) {
-            if let Some(event) = decoder.block(&burst, block) {
-                out.event(&event)?;
-            }
-        }
-    }
-    Ok(())
-}
+/// Why a recorded line is refused.
+pub(super) const NO_LINE: &str =
+    "RTEX blocks are read from logs of bytes: hex digits with --bytes, binary with --record-size";
 
-struct Decoder {
+/// Follows the blocks of a log.
+pub(super) struct Decoder {
     settings: Settings,
     /// The last block of a direction and a MAC-ID: byte 0 without the counter.
     last: HashMap<u8, Report>,
 }
 
 impl Decoder {
+    pub(super) fn new(settings: Settings) -> Self {
+        Self { settings, last: HashMap::new() }
+    }
+
+    /// A line or record of the log.
+    pub(super) fn burst(&mut self, burst: &Burst, out: &mut dyn Sink) -> io::Result<()> {
+        for block in burst.bytes.chunks(self.settings.block_size.max(1)) {
+            if let Some(event) = self.block(burst, block) {
+                out.event(&event)?;
+            }
+        }
+        Ok(())
+    }
+
     fn block(&mut self, burst: &Burst, block: &[u8]) -> Option<Event> {
         let header = Header::from_byte(block.first().copied()?);
         if self.settings.mac_id.is_some_and(|only| only != header.mac_id.get()) {
@@ -172,22 +171,11 @@ fn verdict(report: &Report) -> Verdict {
         _ => None,
     };
     Verdict::Refused(Box::new(Refusal {
-        class: class(error.class()),
+        class: error.class().name(),
         reason: error.to_string(),
         field: at.map(|byte: u8| format!("byte {byte}")),
         bit: None,
         time: None,
         cause: report.cause.map(|cause| cause.to_string()),
     }))
-}
-
-fn class(class: ErrorClass) -> &'static str {
-    match class {
-        ErrorClass::Length => "length",
-        ErrorClass::CyclicCode => "cyclic_code",
-        ErrorClass::NonCyclicCode => "noncyclic_code",
-        ErrorClass::SubChk => "sub_chk",
-        ErrorClass::SubCommandCode => "sub_command_code",
-        _ => "other",
-    }
 }

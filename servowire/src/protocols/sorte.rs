@@ -7,8 +7,7 @@ use std::fmt::Write as _;
 
 use pcap_file::DataLink;
 use sorte_proto::{
-    DeviceFrameView, DiscoveryView, Error, ErrorClass, FrameType, LongFrame, MasterFrameView, ParamView, Pto, Slice,
-    Status, SyncView,
+    DeviceFrameView, DiscoveryView, Error, FrameType, LongFrame, MasterFrameView, ParamView, Slice, Status, SyncView,
 };
 
 use crate::capture::pcapng::{Packet, Pcapng};
@@ -69,24 +68,9 @@ fn event(packet: &Packet) -> Event {
 fn guess(packet: &Packet) -> &'static str {
     let code = packet.bytes.get(2).copied().and_then(FrameType::from_code);
     match (packet.link, packet.bytes.first()) {
-        (DataLink::ETHERNET, _) => code.map_or("?", name),
+        (DataLink::ETHERNET, _) => code.map_or("?", FrameType::name),
         (_, Some(0)) => "master",
         _ => "device",
-    }
-}
-
-const fn name(frame_type: FrameType) -> &'static str {
-    match frame_type {
-        FrameType::Discovery => "DISCOVERY",
-        FrameType::Param => "PARAM",
-        FrameType::DelayReq => "DELAY_REQ",
-        FrameType::DelayResp => "DELAY_RESP",
-        FrameType::Sync => "SYNC",
-        FrameType::Out => "OUT",
-        FrameType::In => "IN",
-        FrameType::Alarm => "ALARM",
-        FrameType::Diag => "DIAG",
-        FrameType::Recon => "RECON",
     }
 }
 
@@ -107,7 +91,7 @@ fn long(bytes: &[u8]) -> Decoded {
             fields.push(number("cycle_time", parameters.cycle_time_ns, "ns"));
             fields.push(number("delay_burst", parameters.delay_burst, ""));
             fields.push(number("ipg", i64::from(parameters.ipg_5ns) * 5, "ns"));
-            fields.push(hex("crc_mode", parameters.crc_mode.0.into(), 2));
+            fields.push(hex("crc_mode", parameters.crc_mode.byte().into(), 2));
         }
         FrameType::Sync => {
             let view = SyncView::of(frame)?;
@@ -117,36 +101,27 @@ fn long(bytes: &[u8]) -> Decoded {
         FrameType::DelayReq | FrameType::DelayResp => {}
         _ => fields.push(data(frame.payload())),
     }
-    Ok((name(frame.frame_type()), fields))
+    Ok((frame.frame_type().name(), fields))
 }
 
 fn exchange(bytes: &[u8]) -> Decoded {
     if bytes.first() == Some(&0) {
-        let view = MasterFrameView::new(bytes, bytes.len().saturating_sub(MasterFrameView::OVERHEAD))?;
+        let view = MasterFrameView::new(bytes.len().saturating_sub(MasterFrameView::OVERHEAD), bytes)?;
         let mut fields = vec![status(view.status())];
         // Four bytes a device is the CNC machine; anything else is shown as it is.
         if view.output().len() % 4 == 0 && view.output().len() <= 16 {
             let slices = view.output().chunks_exact(4).filter_map(|bytes| bytes.first_chunk());
-            fields.extend(PTO.into_iter().zip(slices).map(|(name, bytes)| text(name, word(Slice::parse(*bytes).pto))));
+            fields.extend(
+                PTO.into_iter().zip(slices).map(|(name, bytes)| text(name, Slice::parse(*bytes).pto.to_string())),
+            );
         } else {
             fields.push(data(view.output()));
         }
         fields.push(number("time stamp", view.time_stamp(), "ns"));
         return Ok(("master", fields));
     }
-    let view = DeviceFrameView::new(bytes, bytes.len().saturating_sub(DeviceFrameView::OVERHEAD))?;
+    let view = DeviceFrameView::new(bytes.len().saturating_sub(DeviceFrameView::OVERHEAD), bytes)?;
     Ok(("device", vec![number("SA", view.address().get(), ""), status(view.status()), data(view.payload())]))
-}
-
-/// A PTO word as people say it: `+1234`, `-1`, `.` for no pulse.
-fn word(pto: Pto) -> String {
-    let sign = |high: bool| if high { '-' } else { '+' };
-    match pto {
-        Pto::NoPulse { direction } => format!("{}.", sign(direction.is_high())),
-        Pto::Pulse { start, direction } => format!("{}{}", sign(direction.is_high()), start.ns()),
-        Pto::DriverOff => "off".to_owned(),
-        Pto::Reserved(word) => format!("{:04X}?", word.word()),
-    }
 }
 
 fn number(name: &'static str, value: impl Into<i64>, unit: &'static str) -> Field {
@@ -171,27 +146,12 @@ fn data(bytes: &[u8]) -> Field {
 }
 
 fn status(status: Status) -> Field {
-    let bits = [
-        (Status::LAST, "LAST"),
-        (Status::DONE, "DONE"),
-        (Status::ERROR, "ERROR"),
-        (Status::STATE_CHANGE, "STATE_CHANGE"),
-    ];
-    let set = bits.into_iter().filter(|(bit, _)| status.has(*bit)).map(|(_, name)| name).collect();
-    Field { name: "STATUS", value: Value::Flags { raw: status.0.into(), digits: 2, set } }
+    let set = status.iter_names().map(|(name, _)| name).collect();
+    Field { name: "STATUS", value: Value::Flags { raw: status.bits().into(), digits: 2, set } }
 }
 
 fn refused(error: Error) -> Verdict {
-    let class = match error.class() {
-        ErrorClass::Truncated => "truncated",
-        ErrorClass::BadFcs => "bad_fcs",
-        ErrorClass::WrongDestination => "wrong_destination",
-        ErrorClass::UnknownType => "unknown_type",
-        ErrorClass::LengthMismatch => "length_mismatch",
-        ErrorClass::BadCrc8 => "bad_crc8",
-        ErrorClass::WrongSource => "wrong_source",
-        _ => "other",
-    };
+    let class = error.class().name();
     let reason = error.to_string();
     Verdict::Refused(Box::new(Refusal { class, reason, field: None, bit: None, time: None, cause: None }))
 }

@@ -10,7 +10,7 @@ mod frame;
 use std::io;
 
 use tformat::inspect::{Cause, inspect, inspect_bytes};
-use tformat::{BitRate, ControlField, DataId, Error, Full, Request, Response};
+use tformat::{AllData, BitRate, ControlField, DataId, Error, Request, Response};
 
 use crate::capture::hexlog::Burst;
 use crate::event::{Event, Verdict};
@@ -29,6 +29,9 @@ pub struct Settings {
     /// Bits that count turns; otherwise by the encoder ID.
     pub multi_turn_bits: Option<u8>,
 }
+
+/// Nominal bit rates.
+pub const RATES: &[u32] = &[BitRate::Mbit2_5.bits_per_second(), BitRate::Mbit5.bits_per_second()];
 
 /// A pause inside a frame that ends it, in bits: one and a half fields.
 const FIELD_TIMEOUT_BITS: i64 = 15;
@@ -50,6 +53,8 @@ pub struct Decoder {
     begin: Option<i64>,
     /// Until when the rest of a frame is passed over in which the capture began.
     skip: Option<i64>,
+    /// Until when another piece of that frame may come.
+    cut_until: Option<i64>,
     /// The end of what was passed over.
     skipped: i64,
     open: Frame,
@@ -64,6 +69,7 @@ impl Decoder {
             encoder: Encoder::new(settings),
             begin: None,
             skip: None,
+            cut_until: None,
             skipped: 0,
             open: Frame::default(),
             pending: None,
@@ -114,10 +120,12 @@ impl Decoder {
         let event = self.unasked(&frame);
         // With no idle line before it, a bad first frame is only the end of one.
         let at_once = begin.is_some_and(|begin| frame.start() - begin < FIELD_TIMEOUT_BITS * self.bit);
-        if at_once && !event.verdict.is_ok() {
+        let still = self.cut_until.take().filter(|until| frame.start() < *until);
+        if (at_once || still.is_some()) && !event.verdict.is_ok() {
             self.pending = None;
             self.skipped = frame.end;
-            self.skip = begin.map(|begin| begin + LONGEST_BITS * self.bit);
+            self.skip = begin.map(|begin| begin + LONGEST_BITS * self.bit).or(still);
+            self.cut_until = self.skip;
             return out.event(&describe::cut(frame.place(), "the capture begins inside a frame"));
         }
         out.event(&event)
@@ -129,7 +137,7 @@ impl Decoder {
             (Some(field), _) => Err(Error::Delimiter { field }),
             (None, Some(request)) => Response::parse(request, frame.bytes()),
             // The encoder refuses a damaged request with an ID 3 frame.
-            (None, None) => Full::parse(frame.bytes()).and_then(|full| Err(Error::Rejected { sf: full.sf })),
+            (None, None) => AllData::parse(frame.bytes()).and_then(|full| Err(Error::Rejected { sf: full.sf })),
         };
         let delay = pending.end().map(|end| frame.start() - end);
         let asked = pending.request.map(Request::data_id);
@@ -192,8 +200,6 @@ impl Decoder {
 }
 
 impl StartStop for Decoder {
-    const NAME: &'static str = "T-Format";
-    const RATES: &'static [u32] = &[BitRate::Mbit2_5.bits_per_second(), BitRate::Mbit5.bits_per_second()];
     const CONTENT_BITS: u32 = 8;
 
     fn begin(&mut self, start: i64) {
@@ -207,7 +213,7 @@ impl StartStop for Decoder {
         if let Some(until) = self.skip {
             let pause = field.start - self.skipped;
             self.skipped = field.end;
-            if field.start < until && pause <= FIELD_TIMEOUT_BITS * self.bit {
+            if field.start < until && pause <= TURN_ROUND_BITS * self.bit {
                 return Ok(());
             }
             self.skip = None;

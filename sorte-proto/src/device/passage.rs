@@ -1,30 +1,50 @@
 //! A start-up frame on its way through a device.
 
-use crate::crc::RunningFcs;
-use crate::cut_through::{DiscoveryRewriter, SyncRewriter};
-use crate::{Assignment, Error, FrameType, LongFrame, MULTICAST, Parameters, Sync};
+use super::Path;
+use crate::cut_through::{DiscoveryRewriter, SyncRewriter, Transit};
+use crate::discovery::Assignment;
+use crate::error::Error;
+use crate::frame_type::FrameType;
+use crate::param::Parameters;
+use crate::sync::Sync;
 
 /// A start-up frame on its way through a device: a byte in, a byte out, some hundred bytes of state.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Passage {
-    pub(super) kind: Kind,
-    at: u16,
-    /// DA, SA, TYPE and STATUS as received.
-    pub(super) head: [u8; 4],
-    /// Bytes 4 to 35 as sent: the parameters, if it is a PARAM frame.
-    stored: [u8; Parameters::LEN],
-    /// FCS of all but the last four bytes, which are held back.
-    check: RunningFcs,
-    held: u32,
+    kind: Kind,
+    path: Path,
+    /// A last device in IDLE sends back DISCOVERY and nothing else.
+    only_discovery: bool,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub(super) enum Kind {
-    Plain,
+    Plain(Plain),
     Discovery(DiscoveryRewriter),
     Sync(SyncRewriter),
+}
+
+/// A frame that passes unchanged.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub(super) struct Plain {
+    transit: Transit,
+    /// Bytes 4 to 35: the parameters, if it is a PARAM frame.
+    stored: [u8; Parameters::LEN],
+}
+
+impl Plain {
+    pub(super) const NEW: Self = Self { transit: Transit::START, stored: [0; Parameters::LEN] };
+
+    #[inline]
+    fn take(&mut self, byte: u8) {
+        let at = self.transit.take(byte);
+        if let Some(place) = self.stored.get_mut(usize::from(at.wrapping_sub(4))) {
+            *place = byte;
+        }
+    }
 }
 
 /// What a good frame has told.
@@ -37,71 +57,81 @@ pub(super) enum Learnt {
 }
 
 impl Passage {
-    pub(super) const fn new(kind: Kind) -> Self {
-        Self { kind, at: 0, head: [0; 4], stored: [0; Parameters::LEN], check: RunningFcs::START, held: 0 }
+    pub(super) const fn new(kind: Kind, path: Path, only_discovery: bool) -> Self {
+        Self { kind, path, only_discovery }
     }
 
     /// The byte to send for the byte received.
+    #[inline]
     pub fn byte(&mut self, byte: u8) -> u8 {
-        let out = match &mut self.kind {
-            Kind::Plain => byte,
+        match &mut self.kind {
             Kind::Discovery(rewriter) => rewriter.byte(byte),
             Kind::Sync(rewriter) => rewriter.byte(byte),
-        };
-        let at = usize::from(self.at);
-        if let Some(place) = self.head.get_mut(at) {
-            *place = byte;
-        } else if let Some(place) = at.checked_sub(4).and_then(|at| self.stored.get_mut(at)) {
-            *place = out;
+            Kind::Plain(plain) => {
+                plain.take(byte);
+                byte
+            }
         }
-        if at >= 4 {
-            let [oldest, ..] = self.held.to_le_bytes();
-            self.check.push(oldest);
-        }
-        self.held = self.held >> 8 | u32::from(byte) << 24;
-        self.at = self.at.saturating_add(1);
-        out
     }
 
-    pub(super) fn is_discovery(&self) -> bool {
-        self.head[2] == FrameType::Discovery.code()
+    /// Where the frame goes. It is known before the first byte, but for a last device in IDLE, which sends back
+    /// DISCOVERY only: `None` there until the third byte has come. The published device begins to send four bytes after
+    /// it begins to receive, so its FIFO bears that.
+    pub const fn path(&self) -> Option<Path> {
+        if !self.only_discovery {
+            return Some(self.path);
+        }
+        match self.transit() {
+            transit if transit.len() < 3 => None,
+            transit if transit.is_for_all(FrameType::Discovery) => Some(self.path),
+            _ => Some(Path::Absorb),
+        }
+    }
+
+    pub(super) const fn transit(&self) -> &Transit {
+        match &self.kind {
+            Kind::Plain(plain) => &plain.transit,
+            Kind::Discovery(rewriter) => rewriter.transit(),
+            Kind::Sync(rewriter) => rewriter.transit(),
+        }
+    }
+
+    /// Whether the device has put its own bits into the STATUS byte that went out.
+    pub(super) const fn has_written_status(&self) -> bool {
+        let frame_type = match self.kind {
+            Kind::Plain(_) => return false,
+            Kind::Discovery(_) => FrameType::Discovery,
+            Kind::Sync(_) => FrameType::Sync,
+        };
+        self.transit().len() > 3 && self.transit().is_for_all(frame_type)
     }
 
     /// Output bytes of the line so far, in a DISCOVERY frame.
-    pub(super) fn output_total(&self) -> u16 {
-        let [_, _, _, _, low, high, ..] = self.stored;
-        u16::from_le_bytes([low, high])
+    pub(super) fn output_total(&self) -> Option<u16> {
+        match &self.kind {
+            Kind::Discovery(rewriter) => Some(rewriter.output_total()),
+            Kind::Plain(Plain { transit, stored }) if transit.is_for_all(FrameType::Discovery) => {
+                let [_, _, _, _, low, high, ..] = *stored;
+                Some(u16::from_le_bytes([low, high]))
+            }
+            _ => None,
+        }
     }
 
-    /// The checks of [`LongFrame::new`] in their order, then what the frame says.
+    /// The checks of [`LongFrame::new`](crate::LongFrame::new), then what the frame says. A good frame of another type
+    /// than the one that is rewritten says nothing.
     pub(super) fn learnt(&self) -> Result<Learnt, Error> {
-        match self.kind {
+        let learnt = match &self.kind {
             Kind::Discovery(rewriter) => rewriter.finish().map(|(_, assignment)| Learnt::Place(assignment)),
             Kind::Sync(rewriter) => rewriter.finish().map(Learnt::Sync),
-            Kind::Plain => self.plain(),
-        }
-    }
-
-    fn plain(&self) -> Result<Learnt, Error> {
-        const { assert!(LongFrame::OVERHEAD == 8) };
-        let [da, _, code, _] = self.head;
-        if self.at < 8 {
-            return Err(Error::Truncated { got: self.at, need: 8 });
-        }
-        let (got, want) = (self.held, self.check.value());
-        if got != want {
-            return Err(Error::BadFcs { got, want });
-        }
-        if da != MULTICAST {
-            return Err(Error::WrongDestination { got: da });
-        }
-        let frame_type = FrameType::from_code(code).ok_or(Error::UnknownType { got: code })?;
-        match frame_type.frame_len() {
-            Some(len) if len != usize::from(self.at) => {
-                Err(Error::LengthMismatch { got: self.at, want: u16::try_from(len).unwrap_or(u16::MAX) })
-            }
-            _ if frame_type == FrameType::Param => Ok(Learnt::Parameters(self.stored)),
-            _ => Ok(Learnt::Nothing),
+            Kind::Plain(plain) => plain.transit.check().map(|frame_type| match frame_type {
+                FrameType::Param => Learnt::Parameters(plain.stored),
+                _ => Learnt::Nothing,
+            }),
+        };
+        match learnt {
+            Err(Error::UnexpectedType { .. }) => Ok(Learnt::Nothing),
+            learnt => learnt,
         }
     }
 }

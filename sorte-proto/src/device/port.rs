@@ -1,14 +1,15 @@
 //! One port's handler: what the head of a frame does to its state.
 
-use core::ops::{BitOr, BitOrAssign};
-
+use crate::flags::show_flags;
 use crate::frame::MULTICAST;
-use crate::{FrameType, Status};
+use crate::frame_type::FrameType;
+use crate::status::Status;
 
 /// State of a device, by the published codes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[non_exhaustive]
 #[repr(u8)]
 pub enum State {
     /// 0: waits for DISCOVERY.
@@ -45,48 +46,30 @@ impl State {
 
 /// Flags of a port's handler, with the published names.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub struct PortFlags(pub u8);
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct PortFlags(u8);
 
-impl PortFlags {
-    /// LAST_DEVICE: no other port is linked.
-    pub const LAST_DEVICE: Self = Self(1 << 0);
-    /// MASTER_PORT: this port faces the master.
-    pub const MASTER_PORT: Self = Self(1 << 1);
-    /// IGNORE_TO_EOF: the frame has been looked at; its rest is of no interest.
-    pub const IGNORE_TO_EOF: Self = Self(1 << 2);
-    /// SWITCH_PORT_CONFIG: the state has changed, so the forwarding has to change at the end of the frame.
-    pub const SWITCH_PORT_CONFIG: Self = Self(1 << 3);
-    /// NEW_SYNC_FRAME: a SYNC frame for the clock.
-    pub const NEW_SYNC_FRAME: Self = Self(1 << 4);
-
-    /// Whether all of `flags` are set.
-    pub const fn has(self, flags: Self) -> bool {
-        self.0 & flags.0 == flags.0
-    }
-
-    const fn without(self, flags: Self) -> Self {
-        Self(self.0 & !flags.0)
+bitflags::bitflags! {
+    impl PortFlags: u8 {
+        /// LAST_DEVICE: no other port is linked.
+        const LAST_DEVICE = 1 << 0;
+        /// MASTER_PORT: this port faces the master.
+        const MASTER_PORT = 1 << 1;
+        /// IGNORE_TO_EOF: the frame has been looked at; its rest is of no interest.
+        const IGNORE_TO_EOF = 1 << 2;
+        /// SWITCH_PORT_CONFIG: the state has changed, so the forwarding has to change at the end of the frame.
+        const SWITCH_PORT_CONFIG = 1 << 3;
+        /// NEW_SYNC_FRAME: a SYNC frame for the clock.
+        const NEW_SYNC_FRAME = 1 << 4;
     }
 }
 
-impl BitOr for PortFlags {
-    type Output = Self;
-
-    fn bitor(self, other: Self) -> Self {
-        Self(self.0 | other.0)
-    }
-}
-
-impl BitOrAssign for PortFlags {
-    fn bitor_assign(&mut self, other: Self) {
-        self.0 |= other.0;
-    }
-}
+show_flags!(PortFlags);
 
 /// Measurement that a delay request on the master port starts on the other port.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum Trigger {
     /// None.
     #[default]
@@ -100,6 +83,7 @@ pub enum Trigger {
 /// What a handler found out from the head of a frame.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Seen {
     /// The frame is sent on with changes.
     pub modifies: bool,
@@ -118,6 +102,7 @@ pub struct Seen {
 /// another DA than the state waits for is ignored.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Port {
     /// State.
     pub state: State,
@@ -128,17 +113,17 @@ pub struct Port {
 impl Port {
     /// Takes DA, SA, TYPE and STATUS of a frame.
     pub fn head(&mut self, head: [u8; 4]) -> Seen {
-        if self.flags.has(PortFlags::IGNORE_TO_EOF) {
+        if self.flags.contains(PortFlags::IGNORE_TO_EOF) {
             return Seen::default();
         }
         self.flags |= PortFlags::IGNORE_TO_EOF;
-        let master = self.flags.has(PortFlags::MASTER_PORT);
+        let master = self.flags.contains(PortFlags::MASTER_PORT);
         // The reverse port does not see requests in LINE_DELAY, only its own one reflected.
         if !self.state.waits_for(head) || self.state == State::LineDelay && !master {
             return Seen::default();
         }
-        let [_, _, _, status] = head.map(Status);
-        let change = status.is_state_change();
+        let [_, _, _, status] = head.map(Status::from_bits_retain);
+        let change = status.contains(Status::STATE_CHANGE);
         let seen = match self.state {
             State::Idle => return self.first(status),
             State::Discovery => Seen { modifies: master, ..Seen::default() },
@@ -165,11 +150,11 @@ impl Port {
 
     /// The first DISCOVERY tells which way the master is. A last device handles even this one.
     fn first(&mut self, status: Status) -> Seen {
-        if !status.is_last() {
+        if !status.contains(Status::LAST) {
             self.flags |= PortFlags::MASTER_PORT;
         }
         self.enter(State::Discovery);
-        Seen { modifies: self.flags.has(PortFlags::LAST_DEVICE), ..Seen::default() }
+        Seen { modifies: self.flags.contains(PortFlags::LAST_DEVICE), ..Seen::default() }
     }
 
     pub(super) fn enter(&mut self, state: State) {
@@ -179,8 +164,7 @@ impl Port {
 
     /// The frame has ended: the next one is looked at again.
     pub fn end_of_frame(&mut self) {
-        self.flags =
-            self.flags.without(PortFlags::IGNORE_TO_EOF | PortFlags::SWITCH_PORT_CONFIG | PortFlags::NEW_SYNC_FRAME);
+        self.flags.remove(PortFlags::IGNORE_TO_EOF | PortFlags::SWITCH_PORT_CONFIG | PortFlags::NEW_SYNC_FRAME);
     }
 }
 
@@ -193,7 +177,7 @@ mod tests {
     fn every_head_moves_one_step_at_most() {
         let states = [State::Idle, State::Discovery, State::Param, State::LineDelay, State::Sync, State::Exchange];
         for state in states {
-            for flags in (0..32).map(PortFlags) {
+            for flags in (0..32).map(PortFlags::from_bits_retain) {
                 for code in 0..=u8::MAX {
                     for status in 0..=u8::MAX {
                         let before = Port { state, flags };
@@ -204,9 +188,9 @@ mod tests {
                         if step == 1 {
                             assert_eq!(code, if state as u8 == 0 { 1 } else { [1, 2, 3, 5][state as usize - 1] });
                             assert!(status & 8 != 0 || state == State::Idle);
-                            assert!(port.flags.has(PortFlags::SWITCH_PORT_CONFIG));
+                            assert!(port.flags.contains(PortFlags::SWITCH_PORT_CONFIG));
                         }
-                        if flags.has(PortFlags::IGNORE_TO_EOF) {
+                        if flags.contains(PortFlags::IGNORE_TO_EOF) {
                             assert_eq!((port, seen), (before, Seen::default()));
                         }
                         let mut other = before;

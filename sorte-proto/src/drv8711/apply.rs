@@ -1,7 +1,7 @@
 //! The sequence that writes a configuration and makes sure that it arrived.
 
 use super::{Configuration, Register, Word};
-use crate::Error;
+use crate::error::Error;
 
 /// TORQUE, OFF, BLANK, DECAY, DRIVE, STALL, and CTRL last because it holds ENBL.
 const ORDER: [Register; 7] = [

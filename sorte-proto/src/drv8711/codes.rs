@@ -1,7 +1,7 @@
 //! Codes of the fields. Times and currents are the data sheet's nominal ones.
 
 use super::Register;
-use crate::Error;
+use crate::error::Error;
 
 /// What a field may hold.
 pub(super) trait Code: Sized {

@@ -1,11 +1,11 @@
 //! The registers as values.
 
-use super::Register;
 use super::codes::{
     Code, DeadTime, DecayMode, DriveTime, IsGain, OcpDeglitch, OcpThreshold, SampleThreshold, SinkCurrent,
     SourceCurrent, StallCount, StallDivider, StepMode,
 };
-use crate::Error;
+use super::{Register, Status};
+use crate::error::Error;
 
 macro_rules! register {
     (
@@ -131,65 +131,6 @@ register! {
     }
 }
 
-register! {
-    /// STATUS: faults. Its low byte is payload byte 0 of the device frame.
-    Status {
-        /// OTS: too hot.
-        overtemperature: bool = 0,
-        /// AOCP: over-current in bridge A.
-        overcurrent_a: bool = 1,
-        /// BOCP: over-current in bridge B.
-        overcurrent_b: bool = 2,
-        /// APDF: predriver fault in bridge A.
-        predriver_a: bool = 3,
-        /// BPDF: predriver fault in bridge B.
-        predriver_b: bool = 4,
-        /// UVLO: supply too low.
-        undervoltage: bool = 5,
-        /// STD: stall.
-        stall: bool = 6,
-        /// STDLAT: stall, latched.
-        stall_latched: bool = 7,
-    }
-}
-
-impl Status {
-    /// The value that clears the six fault bits and leaves the stall bits: writing 0 clears.
-    pub const CLEAR_FAULTS: u16 = 0xfc0;
-    /// The value that clears all bits.
-    pub const CLEAR_ALL: u16 = 0;
-
-    /// From the low byte, as a device frame carries it: every byte is a status.
-    pub fn from_byte(byte: u8) -> Self {
-        let bit = |n: u8| byte >> n & 1 == 1;
-        Self {
-            overtemperature: bit(0),
-            overcurrent_a: bit(1),
-            overcurrent_b: bit(2),
-            predriver_a: bit(3),
-            predriver_b: bit(4),
-            undervoltage: bit(5),
-            stall: bit(6),
-            stall_latched: bit(7),
-        }
-    }
-
-    /// Whether one of the six faults is set.
-    pub fn is_fault(self) -> bool {
-        self.value() & 0x3f != 0
-    }
-
-    /// All ones: with the fault pin inactive, the chip has no supply. Reading back OFF tells a dead bus.
-    pub fn looks_unpowered(self) -> bool {
-        self.value() == 0xff
-    }
-
-    /// The value that clears exactly the bits that are set here.
-    pub fn clear_these(self) -> u16 {
-        !self.value() & 0xfff
-    }
-}
-
 /// All seven registers that are set up; the default is what the chip holds after power-up.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -292,21 +233,7 @@ mod tests {
             check(Register::Decay, value, Decay::parse(value).map(Decay::value));
             check(Register::Stall, value, Stall::parse(value).map(Stall::value));
             check(Register::Drive, value, Drive::parse(value).map(Drive::value));
-            check(Register::Status, value, Status::parse(value).map(Status::value));
+            check(Register::Status, value, Ok(Status::of_register(value).bits().into()));
         }
-    }
-
-    #[test]
-    fn every_status_byte_has_its_bits() {
-        for byte in 0..=u8::MAX {
-            let status = Status::from_byte(byte);
-            assert_eq!(status.value(), byte.into());
-            assert_eq!(Status::parse(byte.into()), Ok(status));
-            assert_eq!(status.is_fault(), byte & 0x3f != 0);
-            assert_eq!(status.looks_unpowered(), byte == 0xff);
-            // Writing 0 clears: what is left are the bits that were not set.
-            assert_eq!(u16::from(byte) & status.clear_these(), 0);
-        }
-        assert_eq!(Status::CLEAR_FAULTS & 0x3f, 0);
     }
 }

@@ -1,7 +1,12 @@
 //! What the master wants done.
 
+use crate::delay_req::DelayReq;
+use crate::discovery::Discovery;
 use crate::discovery::room;
-use crate::{DelayReq, Discovery, Error, Param, Preamble, Sync};
+use crate::error::Error;
+use crate::param::Param;
+use crate::preamble::Preamble;
+use crate::sync::Sync;
 
 /// A start-up frame to send.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -33,9 +38,9 @@ impl Outgoing {
     ///
     /// # Errors
     /// [`Error::BufferTooSmall`]; [`Discovery::LEN`] is always enough.
-    pub fn write(&self, into: &mut [u8]) -> Result<usize, Error> {
+    pub fn emit_into(&self, into: &mut [u8]) -> Result<usize, Error> {
         match self {
-            Self::Discovery { last } => put(into, &Discovery::request(*last).emit()),
+            Self::Discovery { last } => Discovery::write_request(*last, into),
             Self::Param(frame) => put(into, &frame.emit()),
             Self::DelayReq(frame) => put(into, &frame.emit()),
             Self::Sync(frame) => put(into, &frame.emit()),
@@ -73,6 +78,9 @@ pub enum Action {
         time_stamp: u16,
         /// Number of the cycle, from 0.
         cycle: u64,
+        /// The master is about to start again, so the axes have to come to rest: see
+        /// [`Config::stop_cycles`](super::Config::stop_cycles). Then call [`Master::halted`](super::Master::halted).
+        stop: bool,
     },
     /// The master has gone back to IDLE.
     Restart {

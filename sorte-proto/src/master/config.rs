@@ -1,11 +1,14 @@
 //! States, settings and counters of the master.
 
-use crate::{DelayModel, Parameters};
+use crate::builders::builders;
+use crate::line_delay::DelayModel;
+use crate::param::Parameters;
 
 /// State of the master, by the codes that the published one shows to its host.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[non_exhaustive]
 #[repr(u8)]
 pub enum State {
     /// Waits for link and enable, or until the pause after a failure is over.
@@ -21,11 +24,15 @@ pub enum State {
     Sync = 4,
     /// 5: exchanges data.
     Exchange = 5,
+    /// 6: has failed too often and waits for the host to take the enable bit away and give it again.
+    Error = 6,
 }
 
 /// How a master behaves. The counts are those of the published image; the time-outs are this crate's.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[non_exhaustive]
 pub struct Config {
     /// DISCOVERY frames, 2 at least: devices take part from the second on.
     pub discovery_frames: u16,
@@ -59,10 +66,20 @@ pub struct Config {
     pub retrain_crc_errors: u8,
     /// Cycles in a row with a device frame missing that make the master start again; 0: never.
     pub retrain_timing_errors: u8,
+    /// Cycles of the IO exchange that are left for the axes to come to rest before the master starts again; 0: it starts
+    /// at once, and motors that run stop dead.
+    pub stop_cycles: u32,
+    /// Failures in a row, without an IO exchange of 1000 cycles between them, after which the master stays in
+    /// [`State::Error`]; 0: it tries for ever.
+    pub max_failures: u16,
+    /// The line may be longer than the delay field of SYNC can say: an extension of this crate, see
+    /// [`Sync::long_delay_ns`](crate::Sync::long_delay_ns). The master tells its SYNC period in PARAM then.
+    pub long_line: bool,
 }
 
-impl Default for Config {
-    fn default() -> Self {
+impl Config {
+    /// The published master's counts and times, and this crate's time-outs.
+    pub const fn new() -> Self {
         Self {
             discovery_frames: 10,
             param_frames: 10,
@@ -80,7 +97,38 @@ impl Default for Config {
             delay_model: DelayModel::MASTER,
             retrain_crc_errors: 3,
             retrain_timing_errors: 3,
+            stop_cycles: 0,
+            max_failures: 0,
+            long_line: false,
         }
+    }
+
+    builders! {
+        with_discovery_frames discovery_frames: u16,
+        with_param_frames param_frames: u16,
+        with_sync_frames sync_frames: u16,
+        with_frame_period_ns frame_period_ns: u64,
+        with_sync_period_ns sync_period_ns: u32,
+        with_cycle_ns cycle_ns: u32,
+        with_answer_timeout_ns answer_timeout_ns: u64,
+        with_param_tries param_tries: u16,
+        with_restart_pause_ns restart_pause_ns: u64,
+        with_min_devices min_devices: u8,
+        with_min_output_len min_output_len: u16,
+        with_payload_len payload_len: u8,
+        with_parameters parameters: Parameters,
+        with_delay_model delay_model: DelayModel,
+        with_retrain_crc_errors retrain_crc_errors: u8,
+        with_retrain_timing_errors retrain_timing_errors: u8,
+        with_stop_cycles stop_cycles: u32,
+        with_max_failures max_failures: u16,
+        with_long_line long_line: bool,
+    }
+}
+
+impl Default for Config {
+    fn default() -> Self {
+        Self::new()
     }
 }
 
@@ -88,17 +136,18 @@ impl Default for Config {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[non_exhaustive]
 pub struct Counters {
     /// Cycles of the IO exchange.
     pub cycles: u64,
     /// Frames with a wrong checksum.
-    pub crc_errors: u32,
+    pub crc_errors: u64,
     /// Cycles in which a device frame was missing.
-    pub timing_errors: u32,
+    pub timing_errors: u64,
     /// Frames refused for another reason.
-    pub format_errors: u32,
+    pub format_errors: u64,
     /// Device frames with the ERROR bit: a device has seen a wrong checksum.
-    pub device_errors: u32,
+    pub device_errors: u64,
     /// How often it went back to IDLE.
-    pub retrains: u32,
+    pub retrains: u64,
 }

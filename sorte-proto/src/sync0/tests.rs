@@ -211,3 +211,80 @@ fn the_handler_never_runs_without_an_event() {
     }
     assert_eq!(served, 19);
 }
+
+/// Every phase of a step, alone, after one of the same phase, and after a rest, with writes as events of their own: as
+/// long as the last write is made before 600 ns, all come, and DIR is still for 200 ns around each rise.
+#[test]
+fn lossless_up_to_the_last_write_before_600_ns() {
+    let stride = if cfg!(miri) { 499 } else { 1 };
+    for write_ns in [0, 5, 10, 20, 40, 60] {
+        let longest = (MAX_LATENCY_NS - 7 * write_ns) / 5 * 5;
+        for latency in [0, longest / 10 * 5, longest] {
+            for phase in (1..=3990).step_by(stride) {
+                let words = [phase, phase, 0, phase, 0, 0, phase];
+                assert_walk(Channel::new(Variant::Lossless, CMP7_NS, latency).with_write_time(write_ns), &words);
+            }
+        }
+    }
+}
+
+#[test]
+fn pairs_of_phases_with_writes_of_their_own() {
+    let phases: Vec<u16> = (1..=3990).step_by(if cfg!(miri) { 1900 } else { 97 }).chain(1384..=1392).collect();
+    for &first in &phases {
+        for &second in phases.iter().filter(|&&second| second >= first) {
+            for (latency, write_ns) in [(170, 60), (450, 20), (590, 0)] {
+                let axis = Channel::new(Variant::Lossless, CMP7_NS, latency).with_write_time(write_ns);
+                assert_walk(axis, &[first, second, second, 0, second]);
+            }
+        }
+    }
+}
+
+/// The walk can fail: above the bound, steps are lost, however the time is split between latency and writes.
+#[test]
+fn beyond_the_bound_steps_are_lost() {
+    for (latency, write_ns) in [(610, 0), (540, 10), (470, 20), (330, 40), (190, 60)] {
+        let lost = (1380..1400).any(|phase| {
+            let axis = Channel::new(Variant::Lossless, CMP7_NS, latency).with_write_time(write_ns);
+            pulses(axis, &[phase, phase, phase, 0]).len() < 3
+        });
+        assert!(lost, "{latency} + 7 x {write_ns}");
+    }
+}
+
+/// Words with alternating DIR: all steps at their time and full width, DIR right at each and still around it.
+fn assert_walk(mut axis: Channel, words: &[u16]) {
+    use crate::pins::DIR_SETUP_HOLD_NS;
+    use crate::pto::{Direction, Pto};
+    let (mut rises, mut falls, mut changes, mut dir) = (Vec::new(), 0, Vec::new(), Direction::Low);
+    let direction = |n: usize| Direction::from(n % 2 == 0);
+    for (n, &start) in words.iter().chain(&[0; 3]).enumerate() {
+        axis.set_word(match StartTime::new(start) {
+            Some(start) => Pto::Pulse { start, direction: direction(n) },
+            None => Pto::NoPulse { direction: direction(n) },
+        });
+        while let Some(happening) = axis.next(4000 * (n as u64 + 1)) {
+            match happening {
+                Happening::Edge(Edge { ns, high: true }) => rises.push((ns, dir)),
+                Happening::Edge(Edge { ns, .. }) => {
+                    falls += 1;
+                    assert_eq!(ns - rises[falls - 1].0, u64::from(PULSE_NS), "{words:?}");
+                }
+                Happening::Served(served) => {
+                    if let Some(levels) = served.levels {
+                        changes.push(served.ns);
+                        dir = levels.direction;
+                    }
+                }
+            }
+        }
+    }
+    let want: Vec<_> = (0..).zip(words).filter(|(_, start)| **start != 0).collect();
+    assert_eq!((rises.len(), falls), (want.len(), want.len()), "{words:?}");
+    for ((rise, dir), (n, start)) in rises.iter().zip(want) {
+        assert!(rise.abs_diff((n as u64 + 1) * 4000 + u64::from(*start)) < 10, "{words:?}");
+        assert_eq!(*dir, direction(n), "{words:?}");
+        assert!(changes.iter().all(|change| change.abs_diff(*rise) >= DIR_SETUP_HOLD_NS), "{words:?} {changes:?}");
+    }
+}

@@ -19,6 +19,7 @@ pub(crate) fn tables(rows: &dyn Fn(&str) -> Vec<Value>) -> String {
         table("REFUSED: &[(&[u8], Option<ErrorClass>)]", &rows("ioex_master_negative"), |row| {
             let want = match text(row, "expect") {
                 "Ok" => "None".to_owned(),
+                "LengthMismatch" => "Some(ErrorClass::TooLong)".to_owned(),
                 class => format!("Some(ErrorClass::{class})"),
             };
             format!("(&{}, {want})", bytes(text(row, "frame")))

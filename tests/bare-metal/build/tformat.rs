@@ -9,7 +9,7 @@ pub(crate) fn tables(rows: &dyn Fn(&str) -> Vec<Value>) -> String {
     let full: Vec<&Value> = responses.iter().filter(|row| row["request_id"] == "3").collect();
     [
         table("ANSWERS: &[Answer]", &responses, answer),
-        table("FULL: &[Full]", full.iter().copied(), fields),
+        table("FULL: &[AllData]", full.iter().copied(), fields),
         table("FULL_FORMS: &[FullForms]", full, full_forms),
         table("FLIPS: &[Flip]", negatives.iter().filter(|row| row["kind"] == "bit_flip"), flip),
         table("CHECKS: &[(&str, &[u8], u8)]", &rows("crc"), |row| {
@@ -21,12 +21,12 @@ pub(crate) fn tables(rows: &dyn Fn(&str) -> Vec<Value>) -> String {
 
 fn answer(row: &Value) -> String {
     format!(
-        "Answer {{ name: {:?}, request: {}, bytes: &{}, line: {}, want: Response::Id{}({}) }}",
+        "Answer {{ name: {:?}, request: {}, bytes: &{}, line: {}, want: Response::{}({}) }}",
         text(row, "name"),
         request(row),
         bytes(text(row, "bytes")),
         window(text(row, "wire")),
-        text(row, "request_id"),
+        variant(row),
         fields(row)
     )
 }
@@ -51,25 +51,41 @@ fn flip(row: &Value) -> String {
     )
 }
 
+/// The crate's name of a data ID.
+fn variant(row: &Value) -> &'static str {
+    match text(row, "request_id") {
+        "0" => "ReadSingleTurn",
+        "1" => "ReadMultiTurn",
+        "2" => "ReadEncoderId",
+        "3" => "ReadAll",
+        "6" => "WriteEeprom",
+        "7" => "ResetErrors",
+        "8" => "SetSingleTurnZero",
+        "C" => "ResetTurnsAndErrors",
+        _ => "ReadEeprom",
+    }
+}
+
 /// The decoded values of an answer as a value of the crate.
 fn fields(row: &Value) -> String {
-    let sf = || format!("sf: StatusField::new({})", number(&row["sf"], "raw"));
-    let data = |key| format!("{key}: U24::truncate({})", number(row, key));
+    let sf = || format!("sf: StatusField::from_bits_retain({})", number(&row["sf"], "raw"));
+    let abs = || format!("abs: Abs::truncate({})", number(row, "abs"));
+    let abm = || format!("abm: Abm::truncate({})", number(row, "abm"));
     match text(row, "request_id") {
-        "0" | "7" | "8" | "C" => format!("SingleTurn {{ {}, {} }}", sf(), data("abs")),
-        "1" => format!("MultiTurn {{ {}, {} }}", sf(), data("abm")),
-        "2" => format!("EncoderId {{ {}, enid: {} }}", sf(), number(row, "enid")),
+        "0" | "7" | "8" | "C" => format!("SingleTurn {{ {}, {} }}", sf(), abs()),
+        "1" => format!("MultiTurn {{ {}, {} }}", sf(), abm()),
+        "2" => format!("Identification {{ {}, enid: {} }}", sf(), number(row, "enid")),
         "3" => format!(
-            "Full {{ {}, {}, enid: {}, {}, almc: Almc::new({}) }}",
+            "AllData {{ {}, {}, enid: {}, {}, almc: Almc::from_bits_retain({}) }}",
             sf(),
-            data("abs"),
+            abs(),
             number(row, "enid"),
-            data("abm"),
+            abm(),
             number(&row["almc"], "raw")
         ),
         _ => {
             let busy = u64::from(row["busy"] == true) << 7;
-            format!("Memory {{ adf: Adf::new({}), edf: {} }}", number(row, "adf") | busy, number(row, "edf"))
+            format!("Memory {{ adf: Adf::from_bits({}), edf: {} }}", number(row, "adf") | busy, number(row, "edf"))
         }
     }
 }
@@ -78,8 +94,8 @@ fn fields(row: &Value) -> String {
 fn request(row: &Value) -> String {
     let byte = |key: &str| row[key].as_u64().unwrap_or(0);
     match text(row, "request_id") {
-        "6" => format!("Request::Id6 {{ adf: Adf::new({}), edf: {} }}", byte("adf"), byte("edf")),
-        "D" => format!("Request::IdD {{ adf: Adf::new({}) }}", byte("adf")),
-        id => format!("Request::Id{id}"),
+        "6" => format!("Request::WriteEeprom {{ adf: Adf::from_bits({}), edf: {} }}", byte("adf"), byte("edf")),
+        "D" => format!("Request::ReadEeprom {{ adf: Adf::from_bits({}) }}", byte("adf")),
+        _ => format!("Request::{}", variant(row)),
     }
 }

@@ -50,3 +50,11 @@ fn ticks<I, O>(kernel: fn(&'static I) -> O, inputs: &'static [I], rounds: usize)
 fn nothing<I, O>(_: &'static I) -> MaybeUninit<O> {
     MaybeUninit::uninit()
 }
+
+/// Instructions of one call of `call`, to within a tick, with those of reading the timer.
+#[cfg(feature = "hdsl")]
+pub(crate) fn once(call: impl FnOnce()) -> u32 {
+    let begin = SYST::get_current();
+    call();
+    (begin.wrapping_sub(SYST::get_current()) & RELOAD) * INSTRUCTIONS_PER_TICK as u32
+}

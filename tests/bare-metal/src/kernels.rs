@@ -7,6 +7,8 @@
 mod deliberate_panic;
 #[cfg(feature = "hdsl")]
 mod hdsl;
+#[cfg(feature = "hdsl")]
+mod hdsl_frame;
 #[cfg(feature = "nikon-aformat")]
 mod nikon;
 #[cfg(feature = "nikon-aformat")]
@@ -37,6 +39,8 @@ pub(crate) const ALL: &[&[Kernel]] = &[
     nrz_line::KERNELS,
     #[cfg(feature = "hdsl")]
     hdsl::KERNELS,
+    #[cfg(feature = "hdsl")]
+    hdsl_frame::KERNELS,
     #[cfg(feature = "nikon-aformat")]
     nikon::KERNELS,
     #[cfg(feature = "nikon-aformat")]

@@ -1,10 +1,12 @@
 //! HIPERFACE DSL.
 
+mod bench;
 mod code;
 mod firmware;
 mod frame;
 mod message;
 mod position;
+mod registers;
 mod sync;
 
 use crate::row::{Check, Fault};
@@ -16,26 +18,33 @@ pub(crate) const TOPICS: &[(&str, Check)] = &[
     ("8b10b_encode", code::encode),
     ("8b10b_stream", code::stream),
     ("answer", frame::answer),
+    ("answer_strict", frame::answer_strict),
     ("crc16", code::crc16),
     ("crc5", code::crc5),
     ("edges", frame::edges),
     ("ext_sync_seed", sync::ext_sync_seed),
     ("fast_position", position::fast_position),
+    ("fast_position_wrap", position::fast_position_wrap),
     ("fw_link", firmware::fw_link),
     ("fw_messages", firmware::fw_messages),
     ("fw_startup", firmware::fw_startup),
     ("fw_sync", sync::fw_sync),
     ("learn", frame::learn),
+    ("learn_leading", frame::learn_leading),
+    ("link_sick", firmware::link_sick),
     ("long_message", message::long_message),
     ("master_header", frame::master_header),
     ("master_param", code::master_param),
+    ("pipe_fifo", registers::pipe_fifo),
     ("quality_monitor", position::quality_monitor),
+    ("register_ops", registers::register_ops),
     ("rssi", frame::rssi),
     ("sample_edge", frame::sample_edge),
     ("sampled_answer", frame::sampled_answer),
     ("short_message", message::short_message),
     ("sync_startup", sync::sync_startup),
     ("vframe", frame::vframe),
+    ("vframe_strict", frame::vframe_strict),
 ];
 
 /// Line bits as an integer, the first of them in bit 0.
@@ -55,7 +64,7 @@ impl Line {
     }
 
     fn word(&self) -> Word {
-        Word::truncate(self.bits as u64)
+        Word::truncate(self.bits as u16)
     }
 }
 

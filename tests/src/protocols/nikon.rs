@@ -7,7 +7,7 @@ mod request;
 mod session;
 mod value;
 
-use nikon_aformat::{Command, EncoderAddress, Error, ErrorClass, Layout, Profile, RequestFrame, Version};
+use nikon_aformat::{Command, EncoderAddress, Error, Layout, RequestFrame, Resolution, Version};
 use serde::{Deserialize, Deserializer, de};
 
 use nikon_aformat::BitOrder::MsbFirst;
@@ -53,12 +53,9 @@ fn same_name(name: &str, command: Command) -> Verdict {
     if name.is_empty() { Ok(()) } else { same("name", &name, &command.mnemonic()) }
 }
 
-/// The rows' name of an error: the crate's own, but for what a procedure ends with when no reply comes.
+/// The rows' name of an error.
 fn class(error: Error) -> &'static str {
-    match error.class() {
-        ErrorClass::NoResponse | ErrorClass::Interrupted => "timeout",
-        class => class.name(),
-    }
+    error.class().name()
 }
 
 /// A number that a row may not have: the row is at fault, not the crate.
@@ -67,10 +64,11 @@ fn or_unreadable<T, E: std::fmt::Display>(result: Result<T, E>) -> Result<T, Fau
 }
 
 fn command(code: u8) -> Result<Command, Fault> {
-    or_unreadable(Command::from_code(code))
+    Command::from_code(code).ok_or_else(|| Fault::Unreadable(format!("no command {code}")))
 }
 
 fn address(ea: u32) -> Result<EncoderAddress, Fault> {
+    let ea = or_unreadable(u8::try_from(ea))?;
     or_unreadable(EncoderAddress::try_from(ea))
 }
 
@@ -79,8 +77,8 @@ fn layout(name: &str) -> Result<Layout, Fault> {
     found.ok_or_else(|| Fault::Unreadable(format!("no layout {name:?}")))
 }
 
-fn profile(st_bits: u8, mt_bits: u8, version: RowVersion) -> Result<Profile, Fault> {
-    Ok(or_unreadable(Profile::new(st_bits, mt_bits))?.with_version(version.0))
+fn resolution(st_bits: u8, mt_bits: u8, version: RowVersion) -> Result<Resolution, Fault> {
+    Ok(or_unreadable(Resolution::new(st_bits, mt_bits))?.with_version(version.0))
 }
 
 /// A version as the rows write it.

@@ -9,6 +9,8 @@ mod startup;
 mod sync0;
 mod time;
 
+use sorte_proto::Error;
+
 use crate::row::Check;
 
 pub(super) const TOPICS: &[(&str, Check)] = &[
@@ -43,10 +45,12 @@ enum Origin {
     Model,
 }
 
-/// The class of a refusal as the rows name it, or "Ok".
-fn outcome<T>(result: &Result<T, sorte_proto::Error>) -> String {
+/// The class of a refusal as the rows name it, or "Ok". They have one word for a frame that is too long and for one that
+/// is too short for its type, and another for less than a header of 8 bytes, or less than a frame of the exchange.
+fn outcome<T>(result: &Result<T, Error>) -> String {
     match result {
         Ok(_) => "Ok".to_owned(),
+        Err(Error::TooLong { .. } | Error::Truncated { got: 8.., want: 14 | 40 | 1030 }) => "LengthMismatch".to_owned(),
         Err(error) => format!("{:?}", error.class()),
     }
 }

@@ -8,7 +8,7 @@ use serde::Deserialize;
 use nrz_line::{Format, Receiver};
 use tformat::device::Device;
 use tformat::master::{Reset, Step};
-use tformat::{BitRate, ControlField, DataId, Error, Frame, Profile, Request, Response, U24, spi};
+use tformat::{Abm, Abs, Adf, Almc, BitRate, ControlField, DataId, Error, Frame, Request, Resolution, Response, spi};
 
 use crate::hex::{Bits, Bytes, Hex};
 use crate::row::{Check, Row, Verdict, each, same};
@@ -40,7 +40,7 @@ fn outcome<T>(result: &Result<T, Error>) -> String {
 /// A data ID as the rows write it, one hex digit.
 fn data_id(Hex(code): Hex) -> DataId {
     // A row with another ID is answered by a mismatch, not by a panic.
-    DataId::from_code(code as u8).unwrap_or(DataId::Id0)
+    DataId::from_code(code as u8).unwrap_or(DataId::ReadSingleTurn)
 }
 
 fn line_of(frame: Frame) -> String {
@@ -127,18 +127,7 @@ fn crc(row: CrcRow) -> Verdict {
 
 /// A request by its data ID and, for the EEPROM, address and data.
 fn compose(id: DataId, adf: Option<u8>, edf: Option<u8>) -> Request {
-    let adf = tformat::Adf::new(adf.unwrap_or(0));
-    match id {
-        DataId::Id0 => Request::Id0,
-        DataId::Id1 => Request::Id1,
-        DataId::Id2 => Request::Id2,
-        DataId::Id3 => Request::Id3,
-        DataId::Id6 => Request::Id6 { adf, edf: edf.unwrap_or(0) },
-        DataId::Id7 => Request::Id7,
-        DataId::Id8 => Request::Id8,
-        DataId::IdC => Request::IdC,
-        DataId::IdD => Request::IdD { adf },
-    }
+    Request::of(id, Adf::from_bits(adf.unwrap_or(0)), edf.unwrap_or(0))
 }
 
 #[derive(Deserialize)]
@@ -199,12 +188,12 @@ fn request_decode(row: RequestDecodeRow) -> Verdict {
     let Ok(request) = parsed else { return Ok(()) };
     same("data_id", &row.data_id.map(|id| id.0 as u8), &Some(request.data_id().code()))?;
     let (adf, edf) = match request {
-        Request::Id6 { adf, edf } => (Some(adf), Some(edf)),
-        Request::IdD { adf } => (Some(adf), None),
+        Request::WriteEeprom { adf, edf } => (Some(adf), Some(edf)),
+        Request::ReadEeprom { adf } => (Some(adf), None),
         _ => (None, None),
     };
     same("adf", &row.adf, &adf.map(|adf| adf.address().get()))?;
-    same("busy_bit", &row.busy_bit, &adf.map(tformat::Adf::busy))?;
+    same("busy_bit", &row.busy_bit, &adf.map(Adf::busy))?;
     same("edf", &row.edf, &edf)
 }
 
@@ -223,20 +212,20 @@ struct PositionRow {
 }
 
 fn position(row: PositionRow) -> Verdict {
-    let Ok(profile) = Profile::new(row.abs_bits, row.abm_bits) else {
+    let Ok(resolution) = Resolution::new(row.abs_bits, row.abm_bits) else {
         return same("widths", &"possible", &"refused");
     };
-    let (abs, abm) = (U24::truncate(row.abs), U24::truncate(row.abm));
-    let signed = profile.position(abs, abm);
+    let (abs, abm) = (Abs::truncate(row.abs), Abm::truncate(row.abm));
+    let signed = resolution.position(abs, abm);
     same("high_bits_nonzero", &row.high_bits_nonzero, &matches!(signed, Err(Error::UpperBits { .. })))?;
     if row.high_bits_nonzero {
         return Ok(());
     }
-    let unsigned = profile.unsigned_turns().position(abs, abm).ok();
+    let unsigned = resolution.with_unsigned_turns().position(abs, abm).ok();
     same("combined_unsigned", &row.combined_unsigned, &unsigned.map(|p| p.combined))?;
     same("turns_signed", &row.turns_signed, &signed.ok().map(|p| p.turns))?;
     same("combined_signed", &row.combined_signed, &signed.ok().map(|p| p.combined))?;
-    same("fraction32", &row.fraction32, &profile.fraction(abs).ok())
+    same("fraction32", &row.fraction32, &resolution.fraction(abs).ok())
 }
 
 #[derive(Deserialize)]
@@ -270,14 +259,15 @@ fn oversampled(row: OversampledRow) -> Verdict {
     let fields: Vec<_> = levels.zip(&row.runs).filter_map(|(level, &len)| receiver.run(level, len)).collect();
     let framed = fields.iter().all(|f| f.delimiter);
     same("expect", &row.expect.as_str(), &if framed { "ok" } else { "framing" })?;
-    same("expect_bytes", &row.expect_bytes.0, &fields.iter().map(|f| f.content as u8).collect())?;
+    let received: Vec<u8> = fields.iter().map(|f| f.content as u8).collect();
+    same("expect_bytes", &row.expect_bytes.0, &received)?;
     if let Some(starts) = row.start_samples {
         same("start_samples", &starts, &fields.iter().map(|f| f.start).collect())?;
     }
     same("spikes_dropped", &row.spikes_dropped, &fields.iter().map(|f| f.spikes).sum())?;
     match (row.bits, row.gaps) {
         // The free-running rule and the receiver take the same bits from fields without gaps.
-        (Some(bits), None) => same("bits", &Some(bits_of(&bits)), &Frame::new(&row.expect_bytes.0).map(line_of)),
+        (Some(bits), None) => same("bits", &Some(bits_of(&bits)), &Frame::new(&received).map(line_of)),
         _ => Ok(()),
     }
 }
@@ -318,7 +308,7 @@ fn procedures(rows: &[Row]) -> Vec<Verdict> {
             let device = &mut encoder.1;
             let answered = Request::parse(&request.0).map(|asked| device.answer(asked, t_us * 1000));
             same("response", &Ok(response.0), &answered.map(|r| r.emit().as_bytes().to_vec()))?;
-            let Ok(Response::Id6(memory) | Response::IdD(memory)) = answered else {
+            let Ok(Response::WriteEeprom(memory) | Response::ReadEeprom(memory)) = answered else {
                 return same("response", &"of the EEPROM", &"another");
             };
             same("busy", &busy, &memory.adf.busy())?;
@@ -338,30 +328,38 @@ fn procedures(rows: &[Row]) -> Vec<Verdict> {
             earliest_start_us,
             wait_after_us,
         } => {
-            let (mut reset, does) = match self::data_id(data_id) {
-                DataId::Id7 => (Reset::clear_errors(), "all errors"),
-                DataId::Id8 => {
-                    (Reset::set_single_turn_zero_and_shift_commutation_angle(), "single turn data (zero position)")
-                }
-                _ => (Reset::clear_turns_and_errors(), "multi turn data and all errors"),
+            let mut reset = match self::data_id(data_id) {
+                DataId::ResetErrors => Reset::clear_errors(),
+                DataId::SetSingleTurnZero => Reset::set_single_turn_zero_and_shift_commutation_angle(),
+                _ => Reset::clear_turns_and_lose_multi_turn_reference(),
             };
-            same("effect", &effect.as_str(), &does)?;
             same("min_gap_us", &min_gap_us, &(Reset::SPACING_NS / 1000))?;
-            same("response_delay_us", &response_delay_us, &(tformat::RESPONSE_DELAY_NS / 1000))?;
             same("count", &count, &Reset::REQUESTS)?;
             let mut device = Device::<6>::new(0x17, BitRate::Mbit2_5);
-            let transaction = u64::from(BitRate::Mbit2_5.transaction_ns(reset.data_id()));
+            device.set_position(Abs::truncate(5), Abm::truncate(7));
+            device.set_alarms(Almc::CE, true);
+            device.set_alarms(Almc::CE, false);
+            // A field takes 4 us; the response has six of them and begins when this encoder likes.
+            let transaction_ns = u64::from(4 + response_delay_us + 24) * 1000;
             let (mut starts, mut end) = (Vec::new(), 0);
             let mut step = reset.start(0);
             while let Step::Send { request: asked, not_before_ns } = step {
                 same("request", &request.0[..], asked.emit().as_bytes())?;
                 starts.push(not_before_ns / 1000);
-                end = not_before_ns + transaction;
-                step = reset.answer(Ok(device.answer(asked, not_before_ns)), end);
+                end = not_before_ns + transaction_ns;
+                step = reset.receive(Ok(device.answer(asked, not_before_ns)), end);
             }
             same("earliest_start_us", &earliest_start_us, &starts)?;
-            let Step::Done { not_before_ns, .. } = step else { return same("end", &"done", &"failed") };
-            same("wait_after_us", &wait_after_us, &((not_before_ns - end) / 1000))
+            // What the encoder has done: to the position, the turns, the errors.
+            let does = match (device.abs().get(), device.abm().get(), device.almc().is_empty()) {
+                (5, 7, true) => "all errors",
+                (0, 7, false) => "single turn data (zero position)",
+                (5, 0, true) => "multi turn data and all errors",
+                _ => "something else",
+            };
+            same("effect", &effect.as_str(), &does)?;
+            let Step::Done { ready_ns, .. } = step else { return same("end", &"done", &"failed") };
+            same("wait_after_us", &wait_after_us, &((ready_ns - end) / 1000))
         }
     };
     rows.iter().map(&mut check).collect()

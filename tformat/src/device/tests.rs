@@ -1,74 +1,19 @@
 use super::*;
-use crate::master::{EepromAccess, Line, Page, Polling, Progress, Step, Transaction};
 use crate::request::tests::requests;
-use nrz_line::Wave;
 use proptest::prelude::*;
-use std::vec::Vec;
 
 fn encoder() -> Device<6> {
     let mut device = Device::new(0x17, BitRate::Mbit2_5);
-    device.set_position(U24::truncate(0x51_2345), U24::truncate(0xfffe));
+    device.set_position(Abs::truncate(0x51_2345), Abm::truncate(0xfffe));
     device
 }
 
 /// Sends a request by bytes and gives the reply.
-fn send(device: &mut Device<6>, bytes: &[u8], now_ns: u64) -> Option<Reply> {
+fn send(device: &mut Device<6>, bytes: &[u8], now_ns: u64) -> Option<Transmission> {
     (1..).zip(bytes).fold(None, |reply, (k, byte)| device.byte(*byte, now_ns + 4_000 * k).or(reply))
 }
 
-/// One transaction over UARTs that hear each other; the outcome and the time it ended.
-fn transact(device: &mut Device<6>, request: Request, now_ns: u64) -> (Result<Response, Error>, u64) {
-    let mut master = Transaction::start(request, Line::new(BitRate::Mbit2_5).with_echo(), now_ns);
-    let sent = request.emit();
-    for (k, byte) in (1..).zip(sent.as_bytes()) {
-        let _ = master.byte(*byte, now_ns + 4_000 * k);
-    }
-    if let Some(reply) = send(device, sent.as_bytes(), now_ns) {
-        for (k, byte) in (1..).zip(reply.frame.as_bytes()) {
-            let _ = master.byte(*byte, reply.at_ns + 4_000 * k);
-        }
-    }
-    match master.progress() {
-        Progress::Done(response) => (Ok(response), now_ns + 60_000),
-        Progress::Failed(error) => (Err(error), now_ns + 60_000),
-        Progress::Waiting { until_ns } => match master.poll(until_ns + 1) {
-            Progress::Failed(error) => (Err(error), until_ns),
-            other => panic!("{other:?}"),
-        },
-    }
-}
-
-/// Runs a procedure to its end.
-macro_rules! run {
-    ($procedure:expr, $device:expr, $now:expr) => {{
-        let mut procedure = $procedure;
-        let mut step = procedure.start($now);
-        loop {
-            match step {
-                Step::Send { request, not_before_ns } => {
-                    let (outcome, end) = transact($device, request, not_before_ns);
-                    step = procedure.answer(outcome, end);
-                }
-                Step::Done { value, not_before_ns } => break (Ok(value), not_before_ns),
-                Step::Failed { error, not_before_ns } => break (Err(error), not_before_ns),
-            }
-        }
-    }};
-}
-
 proptest! {
-    #[test]
-    fn every_request_is_answered_in_kind(request in requests()) {
-        let mut device = encoder();
-        let request = match request {
-            Request::Id6 { adf, edf } => Request::write_eeprom(adf.address(), edf),
-            Request::IdD { adf } => Request::read_eeprom(adf.address()),
-            other => other,
-        };
-        let (outcome, _) = transact(&mut device, request, 100_000);
-        prop_assert_eq!(outcome.map(Response::data_id), Ok(request.data_id()));
-    }
-
     /// No damaged request moves anything in the encoder.
     #[test]
     fn damaged_requests_change_nothing(request in requests(), bit in 0..32usize) {
@@ -80,7 +25,7 @@ proptest! {
         let reply = send(&mut device, &bytes, 0);
         prop_assert_eq!((device.eeprom, device.page, device.zero, device.abm), (before.eeprom, before.page, before.zero, before.abm));
         if let Some(reply) = reply {
-            prop_assert_eq!(Full::parse(reply.frame.as_bytes()).map(|f| f.sf.request_delimiter_error()), Ok(false));
+            prop_assert_eq!(AllData::parse(reply.frame.as_bytes()).map(|f| f.sf.contains(StatusField::CA1)), Ok(false));
         }
     }
 
@@ -99,7 +44,7 @@ proptest! {
 #[test]
 fn damage_is_told_in_the_status() {
     let mut device = encoder();
-    let sf = |reply: Option<Reply>| reply.map(|r| Full::parse(r.frame.as_bytes()).unwrap().sf.raw());
+    let sf = |reply: Option<Transmission>| reply.map(|r| AllData::parse(r.frame.as_bytes()).unwrap().sf.bits());
     assert_eq!(sf(send(&mut device, &[0x12], 0)), Some(0x40));
     assert_eq!(sf(send(&mut device, &[0xa2], 100_000)), Some(0x00));
     assert_eq!(sf(send(&mut device, &[0xea, 0x01, 0xea], 200_000)), Some(0x00));
@@ -110,149 +55,144 @@ fn damage_is_told_in_the_status() {
     assert_eq!(sf(send(&mut device, &[0x1a], 600_000)), Some(0x00));
 }
 
+/// Ten requests for ID C whose starts are `interval` apart, `disturb` after the sixth; whether they had their effect.
+fn resets(config: Config, interval: u64, disturb: impl Fn(&mut Device<6>, u64)) -> bool {
+    let mut device = encoder().with_config(config);
+    for k in 1..=10 {
+        let now_ns = k * interval;
+        let _ = send(&mut device, &[0x62], now_ns);
+        if k == 6 {
+            disturb(&mut device, now_ns + interval / 2);
+        }
+    }
+    assert_eq!(device.effects(), u32::from(device.abm.get() == 0));
+    device.abm.get() == 0
+}
+
+/// 40 us or more, from start to start or from the end of the response (3 us and six fields after the request).
 #[test]
-fn resets_do_what_the_table_says() {
-    let mut device = encoder();
-    device.set_alarm(Alarm::BatteryError, true);
-    device.set_alarm(Alarm::OverHeat, true);
-    device.set_alarm(Alarm::BatteryError, false);
-    assert_eq!(device.almc().raw(), 0x50);
-    let (done, now_ns) = run!(Reset::clear_errors(), &mut device, 0);
-    assert!(done.is_ok());
-    // The cause of the over-heat is still there; position and turns are as before.
-    assert_eq!((device.almc().raw(), device.single_turn().get(), device.abm.get()), (0x10, 0x51_2345, 0xfffe));
-    let (done, now_ns) = run!(Reset::set_single_turn_zero_and_shift_commutation_angle(), &mut device, now_ns);
-    assert!(done.is_ok());
-    assert_eq!((device.single_turn().get(), device.abm.get()), (0, 0xfffe));
-    device.set_alarm(Alarm::OverHeat, false);
-    let (done, _) = run!(Reset::clear_turns_and_errors(), &mut device, now_ns);
-    assert!(done.is_ok());
-    assert_eq!((device.almc().raw(), device.abm.get()), (0, 0));
+fn the_spacing_of_resets() {
+    let nothing = |_: &mut Device<6>, _| {};
+    let start = Config::new();
+    let end = Config { reset_interval: Interval::EndToStart, ..start };
+    assert!(resets(start, 40_000, nothing) && !resets(start, 39_999, nothing));
+    assert!(resets(end, 71_000, nothing) && !resets(end, 70_999, nothing));
+}
+
+/// Whether another request, or a damaged one, starts the count again is a switch each.
+#[test]
+fn what_starts_the_count_of_resets_again() {
+    let other = |device: &mut Device<6>, now_ns| _ = send(device, &[0x02], now_ns);
+    let damaged = |device: &mut Device<6>, now_ns| _ = send(device, &[0x12], now_ns);
+    let framing = |device: &mut Device<6>, now_ns| _ = device.framing_error(now_ns);
+    let another_reset = |device: &mut Device<6>, now_ns| _ = send(device, &[0xba], now_ns);
+    let strict = Config::new();
+    let lax = Config { others_restart_count: false, damage_restarts_count: false, ..strict };
+    assert!(!resets(strict, 100_000, other) && resets(lax, 100_000, other));
+    assert!(!resets(strict, 100_000, damaged) && resets(lax, 100_000, damaged));
+    assert!(!resets(strict, 100_000, framing) && resets(lax, 100_000, framing));
+    assert!(!resets(lax, 100_000, another_reset));
+}
+
+/// The tenth response shows the position before, or the one after; then the zero is stored for 18 ms.
+#[test]
+fn the_tenth_response_and_storing() {
+    for (shows, silent) in [(false, false), (true, true)] {
+        let config = Config { tenth_shows_effect: shows, silent_while_storing: silent, ..Config::new() };
+        let mut device = encoder().with_config(config);
+        let mut tenth = None;
+        for k in 1..=10 {
+            tenth = send(&mut device, &[0xc2], k * 100_000);
+        }
+        let tenth = Response::parse(Request::SetSingleTurnZero, tenth.unwrap().frame.as_bytes()).unwrap();
+        assert_eq!(tenth.abs().map(Abs::get), Some(if shows { 0 } else { 0x51_2345 }));
+        // The request for ID 0 ends 1 ns before the 18 ms are over, and then.
+        let mut earlier = device;
+        assert_eq!(send(&mut earlier, &[0x02], 18_999_999).is_none(), silent);
+        assert!(send(&mut device, &[0x02], 19_000_000).is_some());
+    }
+}
+
+/// A write keeps the memory busy until 18 ms after its request; then it can be written again.
+#[test]
+fn the_memory_is_busy_for_18_ms() {
+    for (data, config) in [
+        (0x00, Config::new()),
+        (0xff, Config { busy_data: BusyData::Ones, ..Config::new() }),
+        (0x5a, Config { busy_data: BusyData::Cell, ..Config::new() }),
+    ] {
+        let mut device = encoder().with_config(config);
+        let address = Address::truncate(5);
+        let memory = |busy, edf| Memory { adf: Adf::of(address, busy), edf };
+        let write = |edf| Request::write_eeprom(address, edf);
+        assert_eq!(device.answer(write(0x5a), 100), Response::WriteEeprom(memory(false, 0x5a)));
+        let read = Request::read_eeprom(address);
+        assert_eq!(device.answer(read, 18_000_099), Response::ReadEeprom(memory(true, data)));
+        assert_eq!(device.answer(write(0x77), 18_000_099), Response::WriteEeprom(memory(true, 0x77)));
+        assert_eq!(device.answer(read, 18_000_100), Response::ReadEeprom(memory(false, 0x5a)));
+        assert_eq!(device.answer(write(0x77), 18_000_100), Response::WriteEeprom(memory(false, 0x77)));
+        assert_eq!(device.eeprom_mut()[0][5], 0x77);
+    }
 }
 
 #[test]
-fn another_request_or_a_short_pause_starts_the_count_again() {
-    for disturb in [true, false] {
+fn the_page_register() {
+    let select = |page| Request::write_eeprom(Address::PAGE_REGISTER, page);
+    for (absent, page) in [(AbsentPage::Ignored, 2), (AbsentPage::Wrapped, 3)] {
+        let mut device = encoder().with_config(Config { absent_page: absent, ..Config::new() });
+        let _ = device.answer(select(2), 100);
+        assert_eq!(device.page(), 2);
+        let _ = device.answer(select(9), 200);
+        assert_eq!(device.page(), page);
+        // Selecting takes no time; while the memory is busy it is ignored.
+        let _ = device.answer(Request::write_eeprom(Address::truncate(0), 1), 300);
+        let memory = Memory { adf: Adf::of(Address::PAGE_REGISTER, true), edf: 4 };
+        assert_eq!(device.answer(select(4), 400), Response::WriteEeprom(memory));
+        assert_eq!(device.page(), page);
+    }
+    let mut slow = encoder().with_config(Config { page_select_is_busy: true, ..Config::new() });
+    let _ = slow.answer(select(2), 100);
+    let answered = slow.answer(Request::read_eeprom(Address::PAGE_REGISTER), 200);
+    assert!(matches!(answered, Response::ReadEeprom(memory) if memory.adf.busy()));
+}
+
+/// What follows a request that was judged is not heard until the line has been idle for half a field.
+#[test]
+fn deaf_time() {
+    for (gap, heard) in [(6_000, false), (6_001, true)] {
         let mut device = encoder();
-        for k in 0..10 {
-            let now_ns = k * 80_000;
-            let _ = device.answer(Request::IdC, now_ns);
-            if disturb && k == 5 {
-                let _ = device.answer(Request::Id0, now_ns + 40_000);
-            }
-        }
-        assert_eq!(device.abm.get(), if disturb { 0xfffe } else { 0 });
+        assert!(device.byte(0x12, 4_000).is_some());
+        assert_eq!(device.byte(0x02, 4_000 + gap).is_some(), heard);
     }
-    let mut hasty = encoder();
-    for k in 0..10 {
-        let _ = hasty.answer(Request::IdC, k * 39_999);
-    }
-    assert_eq!(hasty.abm.get(), 0xfffe);
 }
 
 #[test]
-fn the_whole_eeprom_is_written_and_read_back() {
-    let mut device = encoder();
-    let mut now_ns = 0;
-    for index in (0..762).step_by(31) {
-        let (page, address) = Page::locate(index, 6).unwrap();
-        let data = (index % 251) as u8;
-        let (value, end) =
-            run!(EepromAccess::write(Some(page), address, data, Polling::default()), &mut device, now_ns);
-        assert_eq!(value, Ok(data));
-        now_ns = end;
+fn what_is_not_answered_is_a_switch() {
+    let usual = Config::new();
+    let unusual =
+        Config { answers_wrong_sink: true, answers_delimiter_error: false, leaves_status_zero: true, ..usual };
+    for (config, sink, delimiter, status) in [(usual, false, true, 0x20), (unusual, true, false, 0x00)] {
+        let mut device = encoder().with_config(config);
+        device.set_alarms(Almc::BA, true);
+        assert_eq!(send(&mut device, &[0x1b], 100_000).is_some(), sink);
+        assert_eq!(device.framing_error(200_000).is_some(), delimiter);
+        let response =
+            Response::parse(Request::ReadSingleTurn, send(&mut device, &[0x02], 300_000).unwrap().frame.as_bytes());
+        assert_eq!(response.unwrap().status().map(|sf| sf.bits()), Some(status));
     }
-    for index in (0..762).step_by(31) {
-        let (page, address) = Page::locate(index, 6).unwrap();
-        let (value, end) = run!(EepromAccess::read(Some(page), address, Polling::default()), &mut device, now_ns);
-        assert_eq!(value, Ok((index % 251) as u8));
-        now_ns = end;
-    }
-    assert_eq!(device.eeprom_mut()[0][1], 0xff);
 }
 
+/// The documents' numbers: 3 us, six fields of 4 us, or of 2 us at the fast rate.
 #[test]
-fn faults_are_seen_by_the_master() {
+fn the_response_begins_3_us_after_the_request() {
     let mut device = encoder();
-    let mut now_ns = 0;
-    let mut outcome = |fault| {
-        device.set_fault(fault);
-        now_ns += 1_000_000;
-        transact(&mut device, Request::Id0, now_ns).0
-    };
-    assert_eq!(outcome(Fault::Silent), Err(Error::NoResponse { echo: true }));
-    assert!(matches!(outcome(Fault::BadCrc), Err(Error::Crc { .. })));
-    assert_eq!(outcome(Fault::CutAfter { fields: 4 }), Err(Error::Truncated { got: 4, want: 6 }));
-    assert!(matches!(outcome(Fault::FlipBit { at: 23 }), Err(Error::Crc { .. })));
-    assert!(matches!(outcome(Fault::FlipBit { at: 5 }), Err(Error::Parity { .. })));
-    assert!(matches!(outcome(Fault::RejectAll), Err(Error::Rejected { .. })));
-    assert!(outcome(Fault::None).is_ok());
-    device.set_fault(Fault::FlipBit { at: 9 });
-    let reply = send(&mut device, &[0x02], 20_000_000).unwrap();
-    assert_eq!(Response::parse_line(Request::Id0, reply.line), Err(Error::Delimiter { field: 0 }));
-}
-
-/// xorshift: the noise of the line must be the same in every run.
-fn next(seed: &mut u64) -> u64 {
-    *seed ^= *seed << 13;
-    *seed ^= *seed >> 7;
-    *seed ^= *seed << 17;
-    *seed
-}
-
-/// One way over the line: rendered at 16 samples a bit with rate error, jitter of every edge by up to two samples
-/// and now and then a wrong bit, received by the oversampling receiver. Gives the bytes with their framing.
-fn over_the_line(line: Window, seed: &mut u64, wrong_bits: bool) -> Vec<(u8, bool)> {
-    let wave = Wave::new(16, (next(seed) % 20_000) as i32 - 10_000, next(seed) as u32);
-    let flip = if wrong_bits { next(seed) % u64::from(line.len()) } else { u64::MAX };
-    let mut edge = |bit: u64| wave.first_sample(bit + 2) + next(seed) % 5;
-    let mut receiver = Receiver::new(Format::new(16, 8).unwrap());
-    let mut fields = Vec::new();
-    let mut from = edge(0);
-    fields.extend(receiver.run(true, from));
-    for bit in 0..u64::from(line.len()) {
-        let to = edge(bit + 1);
-        fields.extend(receiver.run(line.get(bit as u32).unwrap() != (bit == flip), to - from));
-        from = to;
+    assert_eq!(send(&mut device, &[0x02], 0).map(|sent| sent.at_ns), Some(7_000));
+    let mut late = encoder().with_config(Config::new().with_response_delay(9_000));
+    assert_eq!(send(&mut late, &[0x02], 0).map(|sent| sent.at_ns), Some(13_000));
+    for number in 0..Config::NUMBERED {
+        assert!((1_700..=9_000).contains(&Config::numbered(number).response_delay_ns));
     }
-    fields.extend(receiver.run(true, 200));
-    fields.iter().map(|f| (f.content as u8, f.delimiter)).collect()
-}
-
-/// Master and encoder over a line with delay, jitter, rate error and, in a third of the answers, one wrong bit:
-/// clean answers always arrive, no answer with a single wrong bit is ever taken for a good one.
-#[test]
-fn both_ends_over_a_poor_line() {
-    let mut device = encoder();
-    let mut seed = 0x5eed_0123_4567_89ab;
-    let mut refused = 0;
-    for k in 0..3_000_u64 {
-        let abs = U24::truncate(next(&mut seed) as u32 & 0x7f_ffff);
-        device.set_position(abs, U24::truncate(k as u32));
-        let (request, now_ns) = ([Request::Id0, Request::Id3][(k % 2) as usize], k * 1_000_000);
-        let mut master = Transaction::start(request, Line::new(BitRate::Mbit2_5), now_ns);
-        let heard = over_the_line(master.frame().line(), &mut seed, false);
-        assert_eq!(heard, [(request.emit().as_bytes()[0], true)]);
-        let reply = device.byte(heard[0].0, now_ns + 4_000).unwrap();
-        let damaged = next(&mut seed) % 3 == 0;
-        let cable_ns = next(&mut seed) % 1_000;
-        for (n, (byte, framed)) in (1..).zip(over_the_line(reply.line, &mut seed, damaged)) {
-            let at_ns = reply.at_ns + cable_ns + 4_000 * n;
-            let _ = if framed { master.byte(byte, at_ns) } else { master.framing_error(at_ns) };
-        }
-        match master.poll(now_ns + 900_000) {
-            Progress::Done(response) => {
-                assert!(!damaged, "a wrong bit was not seen");
-                assert_eq!(response.abs(), Some(abs));
-            }
-            Progress::Failed(_) => {
-                assert!(damaged);
-                refused += 1;
-            }
-            Progress::Waiting { .. } => panic!("the time-out did not end it"),
-        }
-    }
-    assert!((900..1_100).contains(&refused), "{refused}");
+    assert_eq!(Config::numbered(0), Config::default());
 }
 
 #[test]

@@ -1,40 +1,53 @@
 use super::Step;
-use crate::{DataId, Error, Request, Response, SingleTurn};
+use crate::data_id::DataId;
+use crate::error::Error;
+use crate::message::SingleTurn;
+use crate::request::Request;
+use crate::response::Response;
 
 /// A reset: the same one-field request ten times, at least 40 us apart, with no other request in between.
 ///
 /// The documents give the number and the spacing. Whether the spacing counts from start to start or from the end of
-/// the answer is not said; this takes the longer one, 40 us of idle line after every answer. Whether another request
-/// starts the count again is not said either, so a refused answer starts it again here; three of them end the
-/// procedure.
+/// the response is not said; this takes the longer one, 40 us of idle line after every response. Whether another request
+/// or a damaged one starts the count again is not said either.
 ///
-/// Confirm the effect by reading ID 3 afterwards.
+/// The ten requests are one act. Clearing errors (ID 7) can do no harm twice: a refused response starts the count again,
+/// and the third ends it. ID 8 and ID C are **never sent again by themselves**: after a refused or lost response they
+/// end with
+///
+/// * [`Error::NotDone`] if fewer than ten requests can have been taken;
+/// * [`Error::EffectUnknown`] otherwise.
+///
+/// The value keeps count if it is started again, so that the requests of an attempt that was broken off are not
+/// forgotten. Confirm the effect by reading ID 3 afterwards; [`SingleTurnZero`](super::SingleTurnZero) does it for ID 8.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Reset {
     request: Request,
     answered: u8,
     refused: u8,
+    /// Requests that the encoder may have taken since the last effect that is known.
+    taken: u8,
 }
 
 impl Reset {
     /// Requests in a sequence.
     pub const REQUESTS: u8 = 10;
-    /// Idle line between the end of an answer and the next request.
+    /// Idle line between the end of a response and the next request.
     pub const SPACING_NS: u32 = 40_000;
-    /// Wait after the last answer to ID 8, while the encoder stores the offset.
+    /// Wait after the last response to ID 8, while the encoder stores the offset.
     pub const ZERO_WAIT_NS: u32 = 18_000_000;
-    /// Refused answers that end the procedure.
+    /// Refused responses that end clearing errors.
     pub const MAX_REFUSED: u8 = 3;
 
     /// ID 7: clears all latched errors. Position and turns stay.
     pub const fn clear_errors() -> Self {
-        Self::of(Request::Id7)
+        Self::of(Request::ResetErrors)
     }
 
     /// ID C: sets the turns to 0 and clears all errors. **The multi-turn reference of the machine is lost.**
-    pub const fn clear_turns_and_errors() -> Self {
-        Self::of(Request::IdC)
+    pub const fn clear_turns_and_lose_multi_turn_reference() -> Self {
+        Self::of(Request::ResetTurnsAndErrors)
     }
 
     /// ID 8: makes the present position the zero of the turn. **This shifts the commutation angle of the motor.**
@@ -42,11 +55,11 @@ impl Reset {
     /// A drive that uses the encoder for commutation will then drive the current into the wrong phases; drive manuals
     /// forbid it on a motor in service. It is for encoders that are being fitted.
     pub const fn set_single_turn_zero_and_shift_commutation_angle() -> Self {
-        Self::of(Request::Id8)
+        Self::of(Request::SetSingleTurnZero)
     }
 
     const fn of(request: Request) -> Self {
-        Self { request, answered: 0, refused: 0 }
+        Self { request, answered: 0, refused: 0, taken: 0 }
     }
 
     /// The data ID that is sent.
@@ -54,7 +67,7 @@ impl Reset {
         self.request.data_id()
     }
 
-    /// Sound answers in a row so far.
+    /// Sound responses in a row so far.
     pub const fn answered(&self) -> u8 {
         self.answered
     }
@@ -63,37 +76,60 @@ impl Reset {
     pub const fn start(&mut self, now_ns: u64) -> Step<SingleTurn> {
         self.answered = 0;
         self.refused = 0;
-        Step::Send { request: self.request, not_before_ns: now_ns }
+        self.send(now_ns)
     }
 
-    /// A transaction ended at `now_ns` with this outcome.
-    pub fn answer(&mut self, outcome: Result<Response, Error>, now_ns: u64) -> Step<SingleTurn> {
-        let not_before_ns = now_ns.saturating_add(Self::SPACING_NS.into());
-        match outcome {
-            Ok(Response::Id7(value) | Response::Id8(value) | Response::IdC(value)) => {
-                self.answered = self.answered.saturating_add(1);
-                if self.answered >= Self::REQUESTS {
-                    let wait = if self.request.data_id() == DataId::Id8 { Self::ZERO_WAIT_NS } else { 0 };
-                    return Step::Done { value, not_before_ns: now_ns.saturating_add(wait.into()) };
-                }
-            }
-            Ok(other) => return self.refuse(mismatch(other, self.request), not_before_ns),
-            Err(error) => return self.refuse(error, not_before_ns),
+    /// A transaction ended with this outcome; the line is free from `ready_ns` on.
+    pub fn receive(&mut self, outcome: Result<Response, Error>, ready_ns: u64) -> Step<SingleTurn> {
+        let spaced_ns = ready_ns.saturating_add(Self::SPACING_NS.into());
+        let value = match (outcome, self.request) {
+            (Ok(Response::ResetErrors(value)), Request::ResetErrors)
+            | (Ok(Response::SetSingleTurnZero(value)), Request::SetSingleTurnZero)
+            | (Ok(Response::ResetTurnsAndErrors(value)), Request::ResetTurnsAndErrors) => value,
+            (Ok(other), request) => return self.refuse(mismatch(other, request), ready_ns),
+            (Err(error), _) => return self.refuse(error, ready_ns),
+        };
+        self.answered = self.answered.saturating_add(1);
+        if self.answered < Self::REQUESTS {
+            return self.send(spaced_ns);
         }
+        // An encoder that had started its count again in between still counts.
+        self.taken = Self::REQUESTS.saturating_sub(1);
+        Step::Done { value, ready_ns: ready_ns.saturating_add(self.wait_ns()) }
+    }
+
+    const fn send(&mut self, not_before_ns: u64) -> Step<SingleTurn> {
+        self.taken = self.taken.saturating_add(1);
         Step::Send { request: self.request, not_before_ns }
     }
 
-    fn refuse(&mut self, error: Error, not_before_ns: u64) -> Step<SingleTurn> {
+    const fn wait_ns(self) -> u64 {
+        match self.request {
+            Request::SetSingleTurnZero => Self::ZERO_WAIT_NS as u64,
+            _ => 0,
+        }
+    }
+
+    fn refuse(&mut self, error: Error, ready_ns: u64) -> Step<SingleTurn> {
+        let spaced_ns = ready_ns.saturating_add(Self::SPACING_NS.into());
         self.answered = 0;
         self.refused = self.refused.saturating_add(1);
-        if self.refused >= Self::MAX_REFUSED {
-            return Step::Failed { error, not_before_ns };
+        if self.request == Request::ResetErrors {
+            if self.refused < Self::MAX_REFUSED {
+                return self.send(spaced_ns);
+            }
+            return Step::Failed { error, ready_ns: spaced_ns };
         }
-        Step::Send { request: self.request, not_before_ns }
+        let because = error.class();
+        if self.taken < Self::REQUESTS {
+            return Step::Failed { error: Error::NotDone { sent: self.taken, because }, ready_ns: spaced_ns };
+        }
+        let stored_ns = spaced_ns.max(ready_ns.saturating_add(self.wait_ns()));
+        Step::Failed { error: Error::EffectUnknown { because }, ready_ns: stored_ns }
     }
 }
 
-/// What an answer of another kind means: the caller handed in the outcome of another request.
+/// What a response of another kind means: the caller handed in the outcome of another request.
 pub(super) fn mismatch(response: Response, request: Request) -> Error {
     let (got, want) = (response.data_id().control_field().get(), request.data_id().control_field().get());
     Error::CfMismatch { got, want }
@@ -102,42 +138,136 @@ pub(super) fn mismatch(response: Response, request: Request) -> Error {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{BitRate, StatusField, U24};
+    use crate::count::Abs;
+    use crate::status::StatusField;
     use std::vec::Vec;
 
-    const SINGLE: SingleTurn = SingleTurn { sf: StatusField::new(0), abs: U24::MAX };
+    const SINGLE: SingleTurn = SingleTurn { sf: StatusField::from_bits_retain(0), abs: Abs::MAX };
+    const LOST: Result<Response, Error> = Err(Error::NoResponse { echo: false });
 
+    /// Ten requests (three drivers), 40 us (one driver's comment) after a response that ends 31 us after its request
+    /// began; 18 ms after ID 8.
     #[test]
-    fn ten_requests_40_us_after_each_answer() {
+    fn ten_requests_40_us_after_each_response() {
         for (mut reset, response, wait) in [
-            (Reset::clear_errors(), Response::Id7(SINGLE), 0),
-            (Reset::set_single_turn_zero_and_shift_commutation_angle(), Response::Id8(SINGLE), 18_000_000),
-            (Reset::clear_turns_and_errors(), Response::IdC(SINGLE), 0),
+            (Reset::clear_errors(), Response::ResetErrors(SINGLE), 0),
+            (
+                Reset::set_single_turn_zero_and_shift_commutation_angle(),
+                Response::SetSingleTurnZero(SINGLE),
+                18_000_000,
+            ),
+            (Reset::clear_turns_and_lose_multi_turn_reference(), Response::ResetTurnsAndErrors(SINGLE), 0),
         ] {
-            let transaction = u64::from(BitRate::Mbit2_5.transaction_ns(reset.data_id()));
             let mut step = reset.start(0);
             let mut starts = Vec::new();
             while let Step::Send { request, not_before_ns } = step {
                 assert_eq!(request.data_id(), response.data_id());
                 starts.push(not_before_ns / 1000);
-                step = reset.answer(Ok(response), not_before_ns + transaction);
+                step = reset.receive(Ok(response), not_before_ns + 31_000);
             }
             assert_eq!(starts, [0, 71, 142, 213, 284, 355, 426, 497, 568, 639]);
-            assert_eq!(step, Step::Done { value: SINGLE, not_before_ns: 670_000 + wait });
+            assert_eq!(step, Step::Done { value: SINGLE, ready_ns: 670_000 + wait });
         }
     }
 
     #[test]
-    fn a_refused_answer_starts_the_count_again_and_the_third_ends_it() {
+    fn clearing_errors_counts_again_after_a_refused_response_and_ends_with_the_third() {
         let mut reset = Reset::clear_errors();
         let _ = reset.start(0);
         for _ in 0..9 {
-            let _ = reset.answer(Ok(Response::Id7(SINGLE)), 0);
+            let _ = reset.receive(Ok(Response::ResetErrors(SINGLE)), 0);
         }
-        let _ = reset.answer(Err(Error::NoResponse { echo: false }), 0);
+        let _ = reset.receive(LOST, 0);
         assert_eq!(reset.answered(), 0);
-        let _ = reset.answer(Ok(Response::Id0(SINGLE)), 0);
-        let end = reset.answer(Err(Error::Crc { got: 0, want: 1 }), 5);
-        assert_eq!(end, Step::Failed { error: Error::Crc { got: 0, want: 1 }, not_before_ns: 40_005 });
+        let _ = reset.receive(Ok(Response::ReadSingleTurn(SINGLE)), 0);
+        let end = reset.receive(Err(Error::Crc { got: 0, want: 1 }), 5);
+        assert_eq!(end, Step::Failed { error: Error::Crc { got: 0, want: 1 }, ready_ns: 40_005 });
+    }
+
+    /// Each reset takes responses to its own ID and to no other.
+    #[test]
+    fn responses_to_other_resets_are_refused() {
+        let responses =
+            [Response::ResetErrors(SINGLE), Response::SetSingleTurnZero(SINGLE), Response::ResetTurnsAndErrors(SINGLE)];
+        for (own, request) in
+            [Request::ResetErrors, Request::SetSingleTurnZero, Request::ResetTurnsAndErrors].into_iter().enumerate()
+        {
+            for (k, response) in responses.into_iter().enumerate() {
+                let mut reset = Reset::of(request);
+                let _ = reset.start(0);
+                let _ = reset.receive(Ok(response), 0);
+                assert_eq!(reset.answered(), u8::from(k == own));
+            }
+        }
+    }
+
+    /// One lost response ends ID 8 and ID C: nine requests cannot have had an effect, ten may have.
+    #[test]
+    fn what_cannot_be_undone_is_not_sent_again() {
+        for lost in 1..=10 {
+            for (mut reset, response, wait) in [
+                (
+                    Reset::set_single_turn_zero_and_shift_commutation_angle(),
+                    Response::SetSingleTurnZero(SINGLE),
+                    18_000_000,
+                ),
+                (Reset::clear_turns_and_lose_multi_turn_reference(), Response::ResetTurnsAndErrors(SINGLE), 40_000),
+            ] {
+                let _ = reset.start(0);
+                for _ in 1..lost {
+                    let _ = reset.receive(Ok(response), 0);
+                }
+                let because = crate::ErrorClass::NoResponse;
+                let want = match lost {
+                    10 => Step::Failed { error: Error::EffectUnknown { because }, ready_ns: wait },
+                    sent => Step::Failed { error: Error::NotDone { sent, because }, ready_ns: 40_000 },
+                };
+                assert_eq!(reset.receive(LOST, 0), want);
+            }
+        }
+    }
+
+    #[test]
+    fn the_requests_of_a_broken_attempt_are_not_forgotten() {
+        let mut reset = Reset::set_single_turn_zero_and_shift_commutation_angle();
+        let _ = reset.start(0);
+        for _ in 1..6 {
+            let _ = reset.receive(Ok(Response::SetSingleTurnZero(SINGLE)), 0);
+        }
+        let sixth = reset.receive(LOST, 0);
+        assert!(matches!(sixth, Step::Failed { error: Error::NotDone { sent: 6, .. }, .. }), "{sixth:?}");
+        let _ = reset.start(0);
+        for _ in 1..4 {
+            let _ = reset.receive(Ok(Response::SetSingleTurnZero(SINGLE)), 0);
+        }
+        let tenth = reset.receive(LOST, 0);
+        assert!(matches!(tenth, Step::Failed { error: Error::EffectUnknown { .. }, .. }), "{tenth:?}");
+    }
+
+    /// Ten responses do not prove the effect: noise may have made the encoder start its count again.
+    #[test]
+    fn after_ten_responses_an_encoder_may_still_count() {
+        let mut reset = Reset::clear_turns_and_lose_multi_turn_reference();
+        let _ = reset.start(0);
+        for _ in 0..9 {
+            let _ = reset.receive(Ok(Response::ResetTurnsAndErrors(SINGLE)), 0);
+        }
+        let tenth = reset.receive(Ok(Response::ResetTurnsAndErrors(SINGLE)), 0);
+        assert!(matches!(tenth, Step::Done { .. }));
+        let _ = reset.start(0);
+        let first = reset.receive(LOST, 0);
+        assert!(matches!(first, Step::Failed { error: Error::EffectUnknown { .. }, .. }), "{first:?}");
+    }
+
+    /// A refusal is no evidence: it may answer noise on the line, and the tenth request was taken all the same.
+    #[test]
+    fn a_refusal_of_the_tenth_request_is_no_evidence() {
+        let mut reset = Reset::set_single_turn_zero_and_shift_commutation_angle();
+        let _ = reset.start(0);
+        for _ in 1..10 {
+            let _ = reset.receive(Ok(Response::SetSingleTurnZero(SINGLE)), 0);
+        }
+        let end = reset.receive(Err(Error::Rejected { sf: StatusField::CA0 }), 0);
+        assert!(matches!(end, Step::Failed { error: Error::EffectUnknown { .. }, .. }), "{end:?}");
     }
 }

@@ -1,74 +1,72 @@
-use crate::response::expected_fields;
-use crate::{BitRate, Error, Frame, RESPONSE_DELAY_NS, Request, Response};
+use super::Line;
+use crate::error::Error;
+use crate::frame::Frame;
+use crate::message::CF3;
+use crate::request::Request;
+use crate::response::{Response, expected_fields};
 
-/// How a controller is connected, and how long it waits.
+/// A response with all checks passed, and when its position was taken.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub struct Line {
-    /// Bit rate.
-    pub rate: BitRate,
-    /// Whether the receiver is on while the request is sent, so that it comes back first.
-    pub echo: bool,
-    /// Longest wait from the end of the request to the *start bit* of the answer, in ns. Default 10 000: the nominal
-    /// 3 us, 1 us for 100 m of cable, and margin.
-    pub response_timeout_ns: u32,
-    /// Longest time from the end of one field to the end of the next, in ns. Default one and a half field times.
-    pub field_timeout_ns: u32,
+pub struct Exchange {
+    /// The response.
+    pub response: Response,
+    /// The instant of sampling by [`Line::sampling_ns`], for extrapolation: it lies between the end of the request and
+    /// the begin of the response.
+    pub sampled_ns: u64,
 }
 
-impl Line {
-    /// A line without echo and with the default time-outs.
-    pub const fn new(rate: BitRate) -> Self {
-        Self { rate, echo: false, response_timeout_ns: 10_000, field_timeout_ns: rate.bit_ns().saturating_mul(15) }
-    }
+crate::show::one_line!(Exchange { Self { response, sampled_ns } => "{}, sampled at {} ns", response, sampled_ns; });
 
-    /// The same with the receiver always on.
-    pub const fn with_echo(self) -> Self {
-        Self { echo: true, ..self }
-    }
-}
+/// How far a transaction is. `ready_ns` of a failure is the time at which the longest response to the request is over,
+/// however late within the time-out it began.
+pub type Progress = servowire_core::Progress<Exchange, Error>;
 
-/// How far a transaction is.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub enum Progress {
-    /// More bytes are to come; at the time given, call [`Transaction::poll`].
-    Waiting {
-        /// When the wait is over.
-        until_ns: u64,
-    },
-    /// The answer, with all checks passed.
-    Done(Response),
-    /// No answer, or a refused one.
-    Failed(Error),
-}
-
-/// Longest request and longest answer in bytes.
+/// Longest request and longest response in bytes.
 const MAX_BYTES: usize = 4 + Frame::MAX_FIELDS;
 
-/// One request and its answer, byte by byte as a UART receives them.
+/// One request and its response, as a UART receives them: byte by byte, or in blocks.
 ///
-/// Once done or failed it stays so. An answer that is refused early is still received to its end, so that its rest is
-/// not taken for the next one.
+/// No byte that began before the request had left the line is ever part of the response, as long as the end times that
+/// the machine is told are late by less than the [latency budget](Line::latency_budget_ns). An echo of the request is
+/// known by its time; in a block it is known by its place, counted back from the end, and by its content.
+///
+/// Once done or failed it stays so: until `ready_ns` go on to give it what arrives, and it is thrown away.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Transaction {
     request: Request,
     line: Line,
+    start_ns: u64,
+    /// What may be the response.
     received: [u8; MAX_BYTES],
     len: u8,
+    /// Bytes of the own request that came back, and the first that came back as another.
+    echoed: u8,
+    echo_fault: Option<u8>,
     until_ns: u64,
-    end: Option<Result<Response, Error>>,
+    end: Option<(Result<Exchange, Error>, u64)>,
 }
 
 impl Transaction {
-    /// Begins a transaction whose request starts on the line at `now_ns`.
-    pub fn start(request: Request, line: Line, now_ns: u64) -> Self {
-        let sending = line.rate.fields_ns(request.data_id().request_fields());
-        let first = sending.saturating_add(line.response_timeout_ns).saturating_add(line.rate.fields_ns(1));
-        let until_ns = now_ns.saturating_add(first.into());
-        Self { request, line, received: [0; MAX_BYTES], len: 0, until_ns, end: None }
+    /// Begins a transaction; the start bit of the request is on the line at `start_ns`.
+    pub fn start(request: Request, line: Line, start_ns: u64) -> Self {
+        let transaction = Self {
+            request,
+            line,
+            start_ns,
+            received: [0; MAX_BYTES],
+            len: 0,
+            echoed: 0,
+            echo_fault: None,
+            until_ns: 0,
+            end: None,
+        };
+        let first_field = transaction.request_end_ns().saturating_add(line.response_timeout_ns.into());
+        Self {
+            until_ns: first_field.saturating_add(transaction.fields_ns(1)).saturating_add(line.hand_over_ns.into()),
+            ..transaction
+        }
     }
 
     /// The fields to send.
@@ -76,26 +74,58 @@ impl Transaction {
         self.request.emit()
     }
 
-    /// A byte was received, its delimiter at `now_ns`.
-    pub fn byte(&mut self, byte: u8, now_ns: u64) -> Progress {
-        if let Progress::Waiting { .. } = self.poll(now_ns) {
-            self.take(byte, now_ns);
+    /// The end of the request's last bit.
+    pub fn request_end_ns(&self) -> u64 {
+        self.start_ns.saturating_add(self.fields_ns(self.request.data_id().request_fields()))
+    }
+
+    /// When the driver is to be switched on: [`Line::driver_lead_ns`] before the start bit.
+    pub fn driver_on_ns(&self) -> u64 {
+        self.start_ns.saturating_sub(self.line.driver_lead_ns.into())
+    }
+
+    /// When the driver is to be switched off: not before the first time, the end of the request, and not after the
+    /// second, when the encoder may begin to answer.
+    pub fn driver_off_ns(&self) -> (u64, u64) {
+        let end_ns = self.request_end_ns();
+        (end_ns, end_ns.saturating_add(self.line.turn_around_ns.into()))
+    }
+
+    /// Bytes were received one after the other, the delimiter of the last one at `end_ns` or, within the latency
+    /// budget, before.
+    pub fn bytes(&mut self, bytes: &[u8], end_ns: u64) -> Progress {
+        if self.end.is_some() || bytes.is_empty() {
+            return self.progress();
+        }
+        for byte in bytes {
+            self.push(*byte);
+        }
+        self.drop_earlier(end_ns);
+        self.drop_echo_by_content();
+        // The response ends where the block ends: what is too much was there before.
+        while self.len > self.expected() {
+            self.drop_front();
+        }
+        if self.len > 0 {
+            let patience = self.line.field_timeout_ns.saturating_add(self.line.hand_over_ns);
+            self.until_ns = end_ns.saturating_add(patience.into());
+        }
+        if self.len > 0 && self.len == self.expected() {
+            self.finish(end_ns);
         }
         self.progress()
     }
 
-    /// The UART reports a framing error for the byte that ended at `now_ns`.
+    /// The UART reports a framing error for the byte that ended at `end_ns`.
     ///
-    /// Ends the transaction with [`Error::Delimiter`]; in the echo, with [`Error::EchoMismatch`] of the byte.
-    pub fn framing_error(&mut self, now_ns: u64) -> Progress {
-        if let Progress::Waiting { .. } = self.poll(now_ns) {
-            let field = self.len.saturating_sub(self.skip());
-            let sent = self.frame();
-            let echoed = sent.as_bytes().get(usize::from(self.len)).filter(|_| self.line.echo);
-            self.end = Some(Err(match echoed {
-                Some(&want) => Error::EchoMismatch { at: self.len, got: 0, want },
-                None => Error::Delimiter { field },
-            }));
+    /// In a response it ends the transaction with [`Error::Delimiter`]; in the echo it is only remembered.
+    pub fn framing_error(&mut self, end_ns: u64) -> Progress {
+        if self.end.is_none() {
+            if self.is_earlier(end_ns, 1) {
+                self.echo_fault = self.echo_fault.or(Some(0));
+            } else {
+                self.fail(Error::Delimiter { field: self.len }, end_ns);
+            }
         }
         self.progress()
     }
@@ -103,7 +133,7 @@ impl Transaction {
     /// Ends the transaction if its time is over.
     pub fn poll(&mut self, now_ns: u64) -> Progress {
         if self.end.is_none() && now_ns > self.until_ns {
-            self.end = Some(self.evaluate());
+            self.finish(self.until_ns);
         }
         self.progress()
     }
@@ -111,46 +141,103 @@ impl Transaction {
     /// Where the transaction stands.
     pub const fn progress(&self) -> Progress {
         match self.end {
-            None => Progress::Waiting { until_ns: self.until_ns },
-            Some(Ok(response)) => Progress::Done(response),
-            Some(Err(error)) => Progress::Failed(error),
+            None => Progress::Pending { until_ns: self.until_ns },
+            Some((Ok(value), ready_ns)) => Progress::Done { value, ready_ns },
+            Some((Err(error), ready_ns)) => Progress::Failed { error, ready_ns },
         }
     }
 
-    fn take(&mut self, byte: u8, now_ns: u64) {
+    fn fields_ns(&self, fields: u8) -> u64 {
+        self.line.rate.fields_ns(fields).into()
+    }
+
+    /// Fields of the response that begins with the first byte there is.
+    fn expected(&self) -> u8 {
+        let [cf, ..] = self.received;
+        expected_fields(self.request.data_id(), cf)
+    }
+
+    fn push(&mut self, byte: u8) {
+        if usize::from(self.len) == MAX_BYTES {
+            self.drop_front();
+        }
         if let Some(place) = self.received.get_mut(usize::from(self.len)) {
             *place = byte;
             self.len = self.len.saturating_add(1);
         }
-        let id = self.request.data_id();
-        let skip = self.skip();
-        if self.len <= skip {
-            return;
-        }
-        self.until_ns = now_ns.saturating_add(self.line.field_timeout_ns.into());
-        let cf = self.received.get(usize::from(skip)).copied().unwrap_or(0);
-        if self.len >= skip.saturating_add(expected_fields(id, cf)) {
-            self.end = Some(self.evaluate());
+    }
+
+    fn drop_front(&mut self) {
+        self.received.rotate_left(1);
+        self.len = self.len.saturating_sub(1);
+    }
+
+    /// Whether the first of `fields` fields that end at `end_ns` began before a response can begin.
+    fn is_earlier(&self, end_ns: u64, fields: u8) -> bool {
+        let earliest = self.request_end_ns().saturating_add(self.line.turn_around_ns.into());
+        end_ns < earliest.saturating_add(self.fields_ns(fields))
+    }
+
+    /// Drops what began before a response can begin: the echo, and what was on the line before.
+    fn drop_earlier(&mut self, end_ns: u64) {
+        while self.len > 0 && self.is_earlier(end_ns, self.len) {
+            let [got, ..] = self.received;
+            match self.frame().as_bytes().get(usize::from(self.echoed)) {
+                Some(want) if *want == got => self.echoed = self.echoed.saturating_add(1),
+                Some(_) => self.echo_fault = self.echo_fault.or(Some(got)),
+                None => {}
+            }
+            self.drop_front();
         }
     }
 
-    /// Bytes of the own request that come back first.
-    const fn skip(&self) -> u8 {
-        if self.line.echo { self.request.data_id().request_fields() } else { 0 }
+    /// Drops an echo whose time does not tell: the request, and a control field after it.
+    ///
+    /// No response begins like that: in place of SF there would be a control field, whose low bits are never 0 as the
+    /// information bits of SF are; and EDF and CRC of an EEPROM response cannot both be right.
+    fn drop_echo_by_content(&mut self) {
+        let sent = self.frame();
+        let cf = sent.as_bytes().first().copied().unwrap_or(0);
+        let heard = self.received.get(..usize::from(self.len)).unwrap_or(&self.received);
+        let echo = heard.strip_prefix(sent.as_bytes()).and_then(<[u8]>::first);
+        if echo.is_some_and(|next| *next == cf || *next == CF3) {
+            self.echoed = sent.fields();
+            for _ in 0..sent.fields() {
+                self.drop_front();
+            }
+        }
     }
 
-    fn evaluate(&self) -> Result<Response, Error> {
+    /// The response is whole, or no more of it will come.
+    fn finish(&mut self, end_ns: u64) {
         let bytes = self.received.get(..usize::from(self.len)).unwrap_or(&self.received);
-        match bytes {
-            _ if self.line.echo => parse_echoed(self.request, bytes),
-            [] => Err(Error::NoResponse { echo: false }),
-            _ => Response::parse(self.request, bytes),
+        let outcome = match (bytes, self.echo_fault) {
+            ([], Some(got)) if self.line.echo => {
+                let want = self.frame().as_bytes().get(usize::from(self.echoed)).copied().unwrap_or(0);
+                Err(Error::EchoMismatch { at: self.echoed, got, want })
+            }
+            ([], _) => Err(Error::NoResponse { echo: self.echoed == self.request.data_id().request_fields() }),
+            (bytes, _) => Response::parse(self.request, bytes),
+        };
+        match outcome {
+            Ok(response) => {
+                let sampled_ns = self.request_end_ns().saturating_add(self.line.sampling_ns.into());
+                self.end = Some((Ok(Exchange { response, sampled_ns }), end_ns));
+            }
+            Err(error) => self.fail(error, end_ns),
         }
+    }
+
+    /// Ends with an error: the longest response, begun as late as it may, is over at `ready_ns`.
+    fn fail(&mut self, error: Error, end_ns: u64) {
+        let latest = self.request_end_ns().saturating_add(self.line.response_timeout_ns.into());
+        let drained_ns = latest.saturating_add(self.fields_ns(11));
+        self.end = Some((Err(error), drained_ns.max(end_ns)));
     }
 }
 
 /// Decodes all that a UART received since the request began, with the receiver on all the time: the own request, then
-/// the answer.
+/// the response. For buffers without times; what follows the response is left alone.
 ///
 /// # Errors
 /// [`Error::NoResponse`] without any byte; [`Error::EchoMismatch`] for the first byte that is not what was sent;
@@ -165,114 +252,11 @@ pub fn parse_echoed(request: Request, bytes: &[u8]) -> Result<Response, Error> {
     }
     match (bytes, bytes.get(usize::from(sent.fields())..)) {
         ([], _) => Err(Error::NoResponse { echo: false }),
-        (_, None) => Err(Error::Truncated { got: 0, want: request.data_id().response_fields() }),
+        (_, None) => Err(Error::Truncated { got: 0, want: request.data_id().response_fields().into() }),
         (_, Some([])) => Err(Error::NoResponse { echo: true }),
-        (_, Some(answer)) => Response::parse(request, answer),
+        (_, Some(response)) => Response::parse(request, response),
     }
 }
-
-/// The default time-out leaves the nominal delay and 100 m of cable well behind.
-const _: () = assert!(Line::new(BitRate::Mbit2_5).response_timeout_ns > RESPONSE_DELAY_NS * 2);
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::response::tests::exchanges;
-    use proptest::prelude::*;
-
-    const LINE: Line = Line::new(BitRate::Mbit2_5);
-
-    /// Feeds an answer after the nominal delay; `echo` first if the line has one.
-    fn run(request: Request, line: Line, echo: &[u8], answer: &[u8]) -> Progress {
-        let mut transaction = Transaction::start(request, line, 1_000);
-        let mut now_ns = 1_000;
-        for byte in echo {
-            now_ns += 4_000;
-            let _ = transaction.byte(*byte, now_ns);
-        }
-        now_ns = 1_000 + 4_000 * u64::from(request.data_id().request_fields()) + 3_000;
-        for byte in answer {
-            now_ns += 4_000;
-            let _ = transaction.byte(*byte, now_ns);
-        }
-        match transaction.progress() {
-            Progress::Waiting { until_ns } => {
-                assert_eq!(transaction.poll(until_ns), Progress::Waiting { until_ns });
-                transaction.poll(until_ns + 1)
-            }
-            done => done,
-        }
-    }
-
-    proptest! {
-        #[test]
-        fn answers_arrive_with_and_without_echo((request, response) in exchanges()) {
-            let (sent, answer) = (request.emit(), response.emit());
-            prop_assert_eq!(run(request, LINE, &[], answer.as_bytes()), Progress::Done(response));
-            prop_assert_eq!(run(request, LINE.with_echo(), sent.as_bytes(), answer.as_bytes()), Progress::Done(response));
-        }
-
-        #[test]
-        fn cut_answers_end_by_time_out((request, response) in exchanges(), cut in 0..11usize) {
-            let (sent, answer) = (request.emit(), response.emit());
-            let cut = cut.min(answer.as_bytes().len() - 1);
-            let want = answer.fields();
-            let part = &answer.as_bytes()[..cut];
-            let plain = if cut == 0 { Error::NoResponse { echo: false } } else { Error::Truncated { got: cut as u8, want } };
-            prop_assert_eq!(run(request, LINE, &[], part), Progress::Failed(plain));
-            let echoed = if cut == 0 { Error::NoResponse { echo: true } } else { plain };
-            prop_assert_eq!(run(request, LINE.with_echo(), sent.as_bytes(), part), Progress::Failed(echoed));
-        }
-
-        /// What has ended does not change any more, whatever comes.
-        #[test]
-        fn an_end_is_an_end((request, response) in exchanges(), more: [u8; 20]) {
-            let mut transaction = Transaction::start(request, LINE, 0);
-            for byte in response.emit().as_bytes() {
-                let _ = transaction.byte(*byte, 10_000);
-            }
-            let ended = transaction;
-            prop_assert_eq!(ended.progress(), Progress::Done(response));
-            for byte in more {
-                let _ = transaction.byte(byte, 10_000);
-                let _ = transaction.framing_error(10_000);
-                let _ = transaction.poll(u64::MAX);
-            }
-            prop_assert_eq!(transaction, ended);
-        }
-    }
-
-    #[test]
-    fn the_echo_must_be_what_was_sent() {
-        let request = Request::write_eeprom(crate::Address::PAGE_REGISTER, 1);
-        let wrong = run(request, LINE.with_echo(), &[0x32, 0x7f, 0x03, 0x4c], &[0x32, 0x7f, 0x01, 0x4c]);
-        assert_eq!(wrong, Progress::Failed(Error::EchoMismatch { at: 2, got: 3, want: 1 }));
-        let half = run(request, LINE.with_echo(), &[0x32, 0x7f], &[]);
-        assert_eq!(half, Progress::Failed(Error::Truncated { got: 0, want: 4 }));
-        assert_eq!(run(request, LINE.with_echo(), &[], &[]), Progress::Failed(Error::NoResponse { echo: false }));
-    }
-
-    #[test]
-    fn a_refusal_is_received_whole() {
-        let refusal = [0x1a, 0x40, 0xeb, 0x3b, 0x1c, 0x17, 0x04, 0x27, 0x00, 0x00, 0xa2];
-        let progress = run(Request::Id0, LINE, &[], &refusal);
-        let Progress::Failed(Error::Rejected { sf }) = progress else { panic!("{progress:?}") };
-        assert!(sf.request_parity_error());
-    }
-
-    #[test]
-    fn framing_errors_of_the_uart() {
-        let mut plain = Transaction::start(Request::Id0, LINE, 0);
-        let _ = plain.byte(0x02, 11_000);
-        assert_eq!(plain.framing_error(15_000), Progress::Failed(Error::Delimiter { field: 1 }));
-        let mut echoed = Transaction::start(Request::Id0, LINE.with_echo(), 0);
-        assert_eq!(echoed.framing_error(4_000), Progress::Failed(Error::EchoMismatch { at: 0, got: 0, want: 2 }));
-    }
-
-    #[test]
-    fn late_bytes_do_not_count() {
-        let mut transaction = Transaction::start(Request::Id0, LINE, 0);
-        assert_eq!(transaction.progress(), Progress::Waiting { until_ns: 18_000 });
-        assert_eq!(transaction.byte(0x02, 18_001), Progress::Failed(Error::NoResponse { echo: false }));
-    }
-}
+mod tests;

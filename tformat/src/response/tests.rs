@@ -1,15 +1,17 @@
 use super::*;
 use crate::request::tests::requests;
+use crate::status::Almc;
+use nrz_line::BitOrder;
 use proptest::prelude::*;
 use std::vec::Vec;
 
-pub(crate) fn fulls() -> impl Strategy<Value = Full> {
-    (any::<[u8; 3]>(), any::<u32>(), any::<u32>()).prop_map(|([sf, enid, almc], abs, abm)| Full {
-        sf: StatusField::new(sf),
-        abs: U24::truncate(abs),
+pub(crate) fn fulls() -> impl Strategy<Value = AllData> {
+    (any::<[u8; 3]>(), any::<u32>(), any::<u32>()).prop_map(|([sf, enid, almc], abs, abm)| AllData {
+        sf: StatusField::from_bits_retain(sf),
+        abs: Abs::truncate(abs),
         enid,
-        abm: U24::truncate(abm),
-        almc: Almc::new(almc),
+        abm: Abm::truncate(abm),
+        almc: Almc::from_bits_retain(almc),
     })
 }
 
@@ -18,19 +20,28 @@ pub(crate) fn exchanges() -> impl Strategy<Value = (Request, Response)> {
     (requests(), fulls(), any::<bool>()).prop_map(|(request, full, busy)| (request, answer(request, full, busy)))
 }
 
+/// As [`exchanges`], with the information bits of SF at 0, as they are documented.
+pub(crate) fn plain_exchanges() -> impl Strategy<Value = (Request, Response)> {
+    let plain =
+        fulls().prop_map(|data| AllData { sf: data.sf.intersection(StatusField::from_bits_retain(0xf0)), ..data });
+    (requests(), plain, any::<bool>()).prop_map(|(request, data, busy)| (request, answer(request, data, busy)))
+}
+
 /// The answer to `request` of an encoder that knows `full`.
-fn answer(request: Request, full: Full, busy: bool) -> Response {
+fn answer(request: Request, full: AllData, busy: bool) -> Response {
     let single = SingleTurn { sf: full.sf, abs: full.abs };
     match request {
-        Request::Id0 => Response::Id0(single),
-        Request::Id1 => Response::Id1(MultiTurn { sf: full.sf, abm: full.abm }),
-        Request::Id2 => Response::Id2(EncoderId { sf: full.sf, enid: full.enid }),
-        Request::Id3 => Response::Id3(full),
-        Request::Id6 { adf, edf } => Response::Id6(Memory { adf: Adf::of(adf.address(), busy), edf }),
-        Request::Id7 => Response::Id7(single),
-        Request::Id8 => Response::Id8(single),
-        Request::IdC => Response::IdC(single),
-        Request::IdD { adf } => Response::IdD(Memory { adf: Adf::of(adf.address(), busy), edf: full.enid }),
+        Request::ReadSingleTurn => Response::ReadSingleTurn(single),
+        Request::ReadMultiTurn => Response::ReadMultiTurn(MultiTurn { sf: full.sf, abm: full.abm }),
+        Request::ReadEncoderId => Response::ReadEncoderId(Identification { sf: full.sf, enid: full.enid }),
+        Request::ReadAll => Response::ReadAll(full),
+        Request::WriteEeprom { adf, edf } => Response::WriteEeprom(Memory { adf: Adf::of(adf.address(), busy), edf }),
+        Request::ResetErrors => Response::ResetErrors(single),
+        Request::SetSingleTurnZero => Response::SetSingleTurnZero(single),
+        Request::ResetTurnsAndErrors => Response::ResetTurnsAndErrors(single),
+        Request::ReadEeprom { adf } => {
+            Response::ReadEeprom(Memory { adf: Adf::of(adf.address(), busy), edf: full.enid })
+        }
     }
 }
 
@@ -39,13 +50,13 @@ const LOGGED: [u8; 11] = [0x1a, 0x20, 0x29, 0xc0, 0x3b, 0x17, 0x00, 0x00, 0x00, 
 
 #[test]
 fn a_logged_answer_in_every_form() {
-    let full = Full::parse(&LOGGED).unwrap();
+    let full = AllData::parse(&LOGGED).unwrap();
     assert_eq!((full.abs.get(), full.enid, full.abm.get()), (3_915_817, 23, 0));
-    assert_eq!((full.sf.raw(), full.almc.raw()), (0x20, 0xc8));
+    assert_eq!((full.sf.bits(), full.almc.bits()), (0x20, 0xc8));
     assert!(full.sf.agrees_with(full.almc));
     assert_eq!(full.emit(), LOGGED);
     for order in [BitOrder::LsbFirst, BitOrder::MsbFirst] {
-        assert_eq!(Full::parse_line(&full.emit_line(order), order), Ok(full));
+        assert_eq!(AllData::parse_line(&full.emit_line(order), order), Ok(full));
     }
 }
 
@@ -61,9 +72,13 @@ proptest! {
     }
 
     #[test]
-    fn bytes_behind_the_answer_are_left_alone((request, response) in exchanges(), tail: [u8; 4]) {
+    fn bytes_after_the_response_are_left_alone((request, response) in exchanges(), tail: [u8; 4]) {
         let bytes = [response.emit().as_bytes(), &tail].concat();
         prop_assert_eq!(Response::parse(request, &bytes), Ok(response));
+        let line = response.emit().line();
+        let tail = u128::from(u32::from_le_bytes(tail) & 0x3ffff);
+        let longer = Window::from_bits(line.bits() | tail << line.len(), line.len() + 18).unwrap();
+        prop_assert_eq!(Response::parse_line(request, longer), Ok(response));
     }
 
     #[test]
@@ -101,7 +116,7 @@ proptest! {
         let frame = response.emit();
         let (bytes, want) = (frame.as_bytes(), frame.fields());
         for got in 0..want {
-            let error = Err(Error::Truncated { got, want });
+            let error = Err(Error::Truncated { got: got.into(), want: want.into() });
             prop_assert_eq!(Response::parse(request, &bytes[..usize::from(got)]), error);
             for bits in 0..10 {
                 let short = Window::from_bits(frame.line().bits(), u32::from(got) * 10 + bits).unwrap();
@@ -113,14 +128,14 @@ proptest! {
     /// An ID 3 frame to another request is a refusal, once it is complete and sound.
     #[test]
     fn rejections(request in requests(), full in fulls()) {
-        prop_assume!(request != Request::Id3);
+        prop_assume!(request != Request::ReadAll);
         let bytes = full.emit();
         let rejected = Err(Error::Rejected { sf: full.sf });
         prop_assert_eq!(Response::parse(request, &bytes), rejected);
         prop_assert_eq!(Response::parse_line(request, Frame::of11(bytes).line()), rejected);
-        for got in 1..11 {
+        for got in 1..11_u8 {
             let cut = Response::parse(request, &bytes[..usize::from(got)]);
-            prop_assert_eq!(cut, Err(Error::Truncated { got, want: 11 }));
+            prop_assert_eq!(cut, Err(Error::Truncated { got: got.into(), want: 11 }));
         }
         let mut bad = bytes;
         bad[5] ^= 4;
@@ -130,7 +145,7 @@ proptest! {
 
     #[test]
     fn answers_to_other_requests((request, response) in exchanges(), other in requests()) {
-        prop_assume!(request.data_id() != other.data_id() && response.data_id() != DataId::Id3);
+        prop_assume!(request.data_id() != other.data_id() && response.data_id() != DataId::ReadAll);
         let error = Response::parse(other, response.emit().as_bytes());
         let (got, want) = (request.data_id().control_field().get(), other.data_id().control_field().get());
         prop_assert_eq!(error, Err(Error::CfMismatch { got, want }));
@@ -138,19 +153,19 @@ proptest! {
 
     #[test]
     fn eeprom_echo(adf: u8, edf: u8, other: u8) {
-        let (adf, other_adf) = (Adf::of(Adf::new(adf).address(), false), Adf::of(Adf::new(other).address(), false));
-        let write = Request::Id6 { adf, edf };
-        let address = Response::parse(write, Response::Id6(Memory { adf: other_adf, edf }).emit().as_bytes());
+        let (adf, other_adf) = (Adf::of(Adf::from_bits(adf).address(), false), Adf::of(Adf::from_bits(other).address(), false));
+        let write = Request::WriteEeprom { adf, edf };
+        let address = Response::parse(write, Response::WriteEeprom(Memory { adf: other_adf, edf }).emit().as_bytes());
         prop_assert_eq!(address.is_ok(), adf == other_adf);
         if adf != other_adf {
-            let (got, want) = (other_adf.raw(), adf.raw());
+            let (got, want) = (other_adf.bits(), adf.bits());
             prop_assert_eq!(address, Err(Error::AddressMismatch { got, want }));
         }
-        let data = Response::parse(write, Response::Id6(Memory { adf, edf: other }).emit().as_bytes());
+        let data = Response::parse(write, Response::WriteEeprom(Memory { adf, edf: other }).emit().as_bytes());
         prop_assert_eq!(data.err(), (other != edf).then_some(Error::DataMismatch { got: other, want: edf }));
         // A busy memory did not write; its data byte is not compared.
         let busy = Memory { adf: Adf::of(adf.address(), true), edf: other };
-        prop_assert_eq!(Response::parse(write, Response::Id6(busy).emit().as_bytes()), Ok(Response::Id6(busy)));
+        prop_assert_eq!(Response::parse(write, Response::WriteEeprom(busy).emit().as_bytes()), Ok(Response::WriteEeprom(busy)));
     }
 }
 
@@ -160,7 +175,7 @@ fn what_the_check_field_cannot_see_is_accepted() {
     let mut two_bits = LOGGED;
     two_bits[2] ^= 1;
     two_bits[3] ^= 1;
-    assert_eq!(Full::parse(&two_bits).map(|f| f.abs.get()), Ok(0x3b_c029 ^ 0x101));
+    assert_eq!(AllData::parse(&two_bits).map(|f| f.abs.get()), Ok(0x3b_c029 ^ 0x101));
     let all_ones: Vec<u8> = std::vec![0xff; 6];
-    assert_eq!(Response::parse(Request::Id0, &all_ones), Err(Error::SinkCode { cf: 0xff }));
+    assert_eq!(Response::parse(Request::ReadSingleTurn, &all_ones), Err(Error::SinkCode { cf: 0xff }));
 }

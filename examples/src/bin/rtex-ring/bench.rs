@@ -2,9 +2,10 @@
 
 use core::f64::consts::TAU;
 
-use rtex_block::device::{Drive, OpenCodes, Settings};
-use rtex_block::master::{ActiveCode, Axis, AxisSettings, Limits, Ring, SetpointError, Slave, StopReason};
-use rtex_block::position::Gear;
+use rtex_block::device::{Drive, DriveConfig, OpenCodes};
+use rtex_block::master::{
+    ActiveCode, Axis, AxisConfig, Limits, Received, Ring, SameMacId, SetpointError, Slave, StopReason,
+};
 use rtex_block::{Alarm, MacId, Response, TypeCode};
 
 pub(crate) const AXES: usize = 32;
@@ -25,6 +26,10 @@ const CODES: OpenCodes = OpenCodes {
     alarm_active: TypeCode::short(0x01),
     alarm_history: TypeCode::short(0x02),
     alarm_clear: TypeCode::short(0x03),
+    alarm_attributes: TypeCode::short(0x76),
+    parameter_initial: TypeCode::short(0x77),
+    latch_arm: 0x78,
+    homing: 0x79,
     communication_lost: Alarm { main: 80, sub: 0 },
 };
 
@@ -39,7 +44,7 @@ pub(crate) struct Bench {
     silent: [bool; AXES],
     /// When each servo went off.
     off_at: [Option<u64>; AXES],
-    responses: [Option<Response>; AXES],
+    responses: [Received; AXES],
 }
 
 /// Time of an update period.
@@ -52,29 +57,27 @@ fn mac_id(place: usize) -> MacId {
 }
 
 impl Bench {
-    pub(crate) fn new(mode: ActiveCode, limits: Limits) -> Self {
-        let axis = |place| {
-            Axis::new(AxisSettings { mac_id: mac_id(place), mode, update_ns: UPDATE_NS, gear: Gear::UNITY, limits })
-        };
+    pub(crate) fn new(mode: ActiveCode, limits: Limits) -> Result<Self, SameMacId> {
+        let axis = |place| Axis::new(AxisConfig::new(mac_id(place), mode, UPDATE_NS, limits));
         // Drives do not get ready at the same moment.
         let drive = |place: usize| {
             let sync_exchanges = 20 + u16::try_from(place).unwrap_or(0) * 3;
-            Drive::new(Settings { sync_exchanges, ..Settings::new(mac_id(place), CODES) })
+            Drive::new(DriveConfig::new(mac_id(place), CODES).with_sync_exchanges(sync_exchanges))
         };
-        Self {
-            ring: Ring::new(core::array::from_fn(axis), INVALID),
+        Ok(Self {
+            ring: Ring::new(core::array::from_fn(axis), INVALID)?,
             now: 0,
             history: Vec::new(),
             drives: core::array::from_fn(drive),
             silent: [false; AXES],
             off_at: [None; AXES],
-            responses: [None; AXES],
-        }
+            responses: [Received::Nothing; AXES],
+        })
     }
 
     /// What the ring configuration finds.
     pub(crate) fn slaves(&self) -> impl Iterator<Item = Slave> {
-        self.drives.iter().map(|drive| Slave { mac_id: drive.settings().mac_id, kind: 0 })
+        self.drives.iter().map(|drive| Slave { mac_id: drive.config().mac_id, kind: 0 })
     }
 
     /// One update period: the master reads and writes, then the frame goes round.
@@ -85,10 +88,10 @@ impl Bench {
             let was_active = drive.is_active();
             let silent = self.silent.get(place) == Some(&true);
             let received = match commands.get(place) {
-                Some(command) if !silent => Response::parse(&drive.exchange(&command.emit())).ok(),
+                Some(command) if !silent => Response::parse(&drive.exchange(&command.main.emit())).into(),
                 _ => {
                     drive.miss();
-                    None
+                    Received::Nothing
                 }
             };
             if let Some(response) = self.responses.get_mut(place) {

@@ -26,8 +26,7 @@ use rtex_block::timing::{FrameTime, Periods, TimerSystem};
 /// Unchanged echoes that count as a time-out: 4 ms.
 const ECHO_LIMIT: NonZeroU16 = NonZeroU16::MIN.saturating_add(7);
 
-const LIMITS: Limits =
-    Limits { echo: ECHO_LIMIT, ready: 400, active: 100, inactive: 100, answer: 100, command_errors: ECHO_LIMIT };
+const LIMITS: Limits = Limits::new(ECHO_LIMIT, 100).with_ready(400);
 
 /// Update periods of motion before the drive goes silent, and of recording behind it.
 const BEFORE: u64 = 2_000;
@@ -40,7 +39,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let out = std::env::args().nth(1).unwrap_or_else(|| "rtex-ring.svg".to_owned());
     check_periods()?;
 
-    let mut bench = Bench::new(ActiveCode::CyclicPosition, LIMITS);
+    let mut bench = Bench::new(ActiveCode::CyclicPosition, LIMITS)?;
     let mut phases = PhaseControl::new();
     start_communication(&mut bench, &mut phases);
 

@@ -1,5 +1,6 @@
 use super::*;
 use proptest::prelude::*;
+use std::string::ToString;
 use std::vec::Vec;
 
 fn data() -> impl Strategy<Value = Data> {
@@ -11,9 +12,9 @@ pub(crate) fn requests() -> impl Strategy<Value = LongRequest> {
         prop_oneof![(0..4_u8).prop_map(|code| Access::Read(Length::from_code(code))), data().prop_map(Access::Write),];
     (0..1024_u16, any::<bool>(), prop::option::of(0..1_u16 << 15), access).prop_map(
         |(address, indirect, offset, access)| LongRequest {
-            address: ResourceAddress(address),
+            address: ResourceAddress::truncate(address),
             indirect,
-            offset: offset.map(Offset),
+            offset: offset.map(Offset::truncate),
             access,
         },
     )
@@ -34,13 +35,13 @@ proptest! {
     #[test]
     fn answers_come_back(request in requests(), data in data(), code in prop::option::of(any::<[u8; 2]>())) {
         let result = match code {
-            Some([class, detail]) => Err(ResourceError { class, detail }),
+            Some([class, detail]) => Err(ResourceError::new(class, detail)),
             None => Ok(data),
         };
         let answer = LongAnswer::to(&request, result);
         let bytes = answer.emit();
         let want = match result {
-            Err(ResourceError { class, detail }) => Err(Error::Resource { class, detail }),
+            Err(error) => Err(Error::Resource { error }),
             Ok(data) => Ok(if request.is_read() { data } else { Data::NONE }),
         };
         prop_assert_eq!(request.parse_answer(bytes.as_bytes()), want);
@@ -68,7 +69,7 @@ proptest! {
     fn accepted_requests_are_what_it_would_emit(bytes in prop::collection::vec(any::<u8>(), 2..12)) {
         let mut bytes = bytes;
         bytes[0] |= MARK;
-        let crc = crate::crc16(&bytes);
+        let crc = crate::crc::crc16(&bytes);
         bytes.extend(crc.to_be_bytes());
         if let Ok(request) = LongRequest::parse(&bytes) {
             let emitted = request.emit();
@@ -86,9 +87,15 @@ fn the_documented_examples() {
         access: Access::Read(Length::Two),
     };
     assert_eq!(request.emit().as_bytes(), [0xe4, 0x81, 0x80, 0x03, 0x14, 0x13]);
-    let refused = LongRequest { address: ResourceAddress(0x200), offset: None, ..request };
+    let refused = LongRequest { address: ResourceAddress::truncate(0x200), offset: None, ..request };
     let answer = [0xe6, 0x00, 0x10, 0x40, 0x38, 0x7b];
-    assert_eq!(refused.parse_answer(&answer), Err(Error::Resource { class: 0x40, detail: 0x10 }));
+    assert_eq!(refused.parse_answer(&answer), Err(Error::Resource { error: ResourceError::NOT_THERE }));
     assert!(matches!(request.parse_answer(&answer), Err(Error::Header { .. })));
+    assert_eq!(request.to_string(), "direct read of 081h RESOLUTN, 2 bytes, offset 3");
+    let answer = LongAnswer::to(&refused, Err(ResourceError::NOT_THERE));
+    assert_eq!(answer.to_string(), "200h ACCESSIO refused: the resource is not there (class 40h, detail 10h)");
+    let write =
+        LongRequest { access: Access::Write(Data::new(b"MO").unwrap()), indirect: true, offset: None, ..request };
+    assert_eq!(write.to_string(), "indirect write to 081h RESOLUTN: 4D 4F");
     assert_eq!(Data::new(&[0; 3]), Err(Error::DataLength { len: 3 }));
 }

@@ -3,8 +3,8 @@
 use std::borrow::Cow;
 
 use nikon_aformat::{
-    Alm, Body, Command, Data, EncoderStatus, Error, Expected, Operation, PmAlm, Profile, Request, Response,
-    Temperature, TypeWord, Version,
+    Alm, Body, Command, Data, EncoderStatus, Error, Expected, Operation, PmAlm, Request, Resolution, Response,
+    Temperature, TypeWord,
 };
 
 use super::{Group, Settings};
@@ -85,7 +85,7 @@ fn arguments(operation: Operation, fields: &mut Vec<Field>) {
 pub(super) struct Encoder {
     settings: Settings,
     /// By the type word, once the line has carried it.
-    hint: Option<Profile>,
+    hint: Option<Resolution>,
 }
 
 impl Encoder {
@@ -145,18 +145,18 @@ impl Encoder {
         let counts = i64::try_from(abs).unwrap_or(i64::MAX);
         fields.push(number("ABS", counts, ""));
         let bits = response.layout().abs_bits();
-        let Some(profile) = self.profile() else {
+        let Some(resolution) = self.resolution() else {
             return Some(Position { counts, span: Some(1 << bits), per_turn: None });
         };
-        match profile.position(abs, bits) {
+        match resolution.position(abs, bits) {
             Ok(position) => Some(Position {
                 counts,
-                span: Some(1 << (profile.st_bits() + position.turns_bits)),
-                per_turn: Some(profile.counts_per_turn()),
+                span: Some(1 << (resolution.st_bits() + position.turns_bits)),
+                per_turn: Some(resolution.counts_per_turn()),
             }),
             Err(Error::NotCarried) => Some(Position { counts, span: Some(1 << bits), per_turn: None }),
             Err(error) => {
-                let text = format!("{error}; taken as {} + {} bits", profile.st_bits(), profile.mt_bits());
+                let text = format!("{error}; taken as {} + {} bits", resolution.st_bits(), resolution.mt_bits());
                 fields.push(Field { name: "width", value: Value::Text(text) });
                 None
             }
@@ -168,20 +168,20 @@ impl Encoder {
         fields.extend(response.temperature().map(temperature));
         fields.extend(response.velocity().map(|velocity| number("velocity", velocity.into(), "")));
         match response.data() {
-            Some(Data::Status { pm_alm, .. }) if pm_alm.raw() != 0 => fields.push(notices(pm_alm)),
+            Some(Data::Status { pm_alm, .. }) if pm_alm.bits() != 0 => fields.push(notices(pm_alm)),
             Some(Data::Eeprom { data, address }) => {
                 fields.push(hex("address", address.into(), 2));
                 // While the memory is busy the data say nothing.
-                if !response.es().is_some_and(EncoderStatus::busy) {
+                if !response.es().is_some_and(|es| es.contains(EncoderStatus::BUSY)) {
                     fields.push(hex("data", data.into(), 4));
                     if address == TypeWord::EEPROM_ADDRESS && response.command() == Some(Command::EepromRead) {
-                        self.hint = TypeWord(data).profile().or(self.hint);
+                        self.hint = TypeWord(data).resolution().or(self.hint);
                     }
                 }
             }
             Some(Data::EepromBank { data, bank, address, .. }) => {
                 fields.extend([hex("bank", bank.into(), 2), hex("address", address.into(), 2)]);
-                if !response.es().is_some_and(EncoderStatus::busy) {
+                if !response.es().is_some_and(|es| es.contains(EncoderStatus::BUSY)) {
                     fields.push(hex("data", data.into(), 4));
                 }
             }
@@ -197,11 +197,11 @@ impl Encoder {
     }
 
     /// The widths as the user gave them, else as the type word has them.
-    fn profile(&self) -> Option<Profile> {
+    fn resolution(&self) -> Option<Resolution> {
         let Settings { single_turn_bits, multi_turn_bits } = self.settings;
-        let st = single_turn_bits.or(self.hint.map(Profile::st_bits))?;
-        let mt = multi_turn_bits.or(self.hint.map(Profile::mt_bits)).unwrap_or(16);
-        Profile::new(st, mt).ok()
+        let st = single_turn_bits.or(self.hint.map(Resolution::st_bits))?;
+        let mt = multi_turn_bits.or(self.hint.map(Resolution::mt_bits)).unwrap_or(16);
+        Resolution::new(st, mt).ok()
     }
 }
 
@@ -255,19 +255,24 @@ fn event(group: &Group, direction: Direction, kind: Cow<'static, str>, fields: V
 }
 
 fn status(es: EncoderStatus) -> Field {
-    let names = [(es.busy(), "busy"), (es.battery(), "battery"), (es.warning(), "warning"), (es.error(), "error")];
-    let set = names.iter().filter(|(on, _)| *on).map(|(_, name)| *name).collect();
-    Field { name: "ES", value: Value::Flags { raw: es.raw().into(), digits: 1, set } }
+    let names = [
+        (EncoderStatus::BUSY, "busy"),
+        (EncoderStatus::BATT, "battery"),
+        (EncoderStatus::WARNING, "warning"),
+        (EncoderStatus::ERROR, "error"),
+    ];
+    let set = names.iter().filter(|(flag, _)| es.contains(*flag)).map(|(_, name)| *name).collect();
+    Field { name: "ES", value: Value::Flags { raw: es.bits().into(), digits: 1, set } }
 }
 
 fn alarms(alm: Alm) -> Field {
-    let set = alm.alarms(Version::V3_0).map(nikon_aformat::Alarm::short).collect();
-    Field { name: "ALM", value: Value::Flags { raw: alm.raw().into(), digits: 4, set } }
+    let set = alm.iter_names().map(|(name, _)| name).collect();
+    Field { name: "ALM", value: Value::Flags { raw: alm.bits().into(), digits: 4, set } }
 }
 
 fn notices(pm_alm: PmAlm) -> Field {
-    let set = pm_alm.alarms().map(nikon_aformat::PmAlarm::short).collect();
-    Field { name: "PM-ALM", value: Value::Flags { raw: pm_alm.raw().into(), digits: 2, set } }
+    let set = pm_alm.iter_names().map(|(name, _)| name).collect();
+    Field { name: "PM-ALM", value: Value::Flags { raw: pm_alm.bits().into(), digits: 2, set } }
 }
 
 fn temperature(temperature: Temperature) -> Field {

@@ -2,7 +2,7 @@
 
 use std::borrow::Cow;
 
-use tformat::{Adf, Almc, DataId, Error, Full, Memory, Profile, Request, Response, StatusField, U24};
+use tformat::{Abs, Adf, AllData, Almc, DataId, Error, Memory, Request, Resolution, Response, StatusField};
 
 use super::frame::Frame;
 use super::{ANSWER_TIMEOUT, Settings};
@@ -16,8 +16,8 @@ pub const FIELDS: &[&str] =
 pub(super) fn request(frame: &Frame, id: Option<DataId>, result: Result<Request, Error>) -> Event {
     let mut fields = Vec::new();
     match result {
-        Ok(Request::Id6 { adf, edf }) => fields.extend([address(adf), hex("EDF", edf)]),
-        Ok(Request::IdD { adf }) => fields.push(address(adf)),
+        Ok(Request::WriteEeprom { adf, edf }) => fields.extend([address(adf), hex("EDF", edf)]),
+        Ok(Request::ReadEeprom { adf }) => fields.push(address(adf)),
         Ok(request) => fields.extend(resets(request.data_id())),
         Err(_) => fields.push(bytes(frame)),
     }
@@ -30,7 +30,7 @@ pub(super) fn request(frame: &Frame, id: Option<DataId>, result: Result<Request,
 pub(super) struct Encoder {
     settings: Settings,
     /// By the last ENID on the line.
-    hint: Option<Profile>,
+    hint: Option<Resolution>,
 }
 
 impl Encoder {
@@ -52,8 +52,8 @@ impl Encoder {
             Ok(response) => position = self.response(response, &mut fields),
             // A refusal is a sound ID 3 frame with all its values.
             Err(Error::Rejected { .. }) => {
-                if let Ok(full) = Full::parse(frame.bytes()) {
-                    position = self.response(Response::Id3(full), &mut fields);
+                if let Ok(full) = AllData::parse(frame.bytes()) {
+                    position = self.response(Response::ReadAll(full), &mut fields);
                 }
             }
             Err(_) => fields.push(bytes(frame)),
@@ -72,22 +72,22 @@ impl Encoder {
     fn response(&mut self, response: Response, fields: &mut Vec<Field>) -> Option<Position> {
         fields.extend(response.status().map(status));
         match response {
-            Response::Id0(v) => self.single_turn(v.abs, fields),
-            Response::Id7(v) | Response::Id8(v) | Response::IdC(v) => {
+            Response::ReadSingleTurn(v) => self.single_turn(v.abs, fields),
+            Response::ResetErrors(v) | Response::SetSingleTurnZero(v) | Response::ResetTurnsAndErrors(v) => {
                 let position = self.single_turn(v.abs, fields);
                 fields.extend(resets(response.data_id()));
                 position
             }
-            Response::Id1(v) => {
-                fields.push(number("ABM", v.abm));
+            Response::ReadMultiTurn(v) => {
+                fields.push(number("ABM", v.abm.get()));
                 None
             }
-            Response::Id2(v) => {
+            Response::ReadEncoderId(v) => {
                 self.identify(v.enid, fields);
                 None
             }
-            Response::Id3(full) => self.full(full, fields),
-            Response::Id6(Memory { adf, edf }) | Response::IdD(Memory { adf, edf }) => {
+            Response::ReadAll(full) => self.full(full, fields),
+            Response::WriteEeprom(Memory { adf, edf }) | Response::ReadEeprom(Memory { adf, edf }) => {
                 fields.push(address(adf));
                 if !adf.busy() {
                     fields.push(hex("EDF", edf));
@@ -97,45 +97,45 @@ impl Encoder {
         }
     }
 
-    fn full(&mut self, full: Full, fields: &mut Vec<Field>) -> Option<Position> {
-        fields.push(number("ABS", full.abs));
+    fn full(&mut self, full: AllData, fields: &mut Vec<Field>) -> Option<Position> {
+        fields.push(number("ABS", full.abs.get()));
         self.identify(full.enid, fields);
-        fields.push(number("ABM", full.abm));
+        fields.push(number("ABM", full.abm.get()));
         fields.push(alarms(full.almc));
-        let profile = self.profile()?;
-        match profile.position(full.abs, full.abm) {
+        let resolution = self.resolution()?;
+        match resolution.position(full.abs, full.abm) {
             Ok(position) => Some(Position {
                 counts: position.combined,
-                span: Some(1 << (profile.abs_bits() + profile.abm_bits())),
-                per_turn: Some(profile.counts_per_turn().into()),
+                span: Some(1 << (resolution.abs_bits() + resolution.abm_bits())),
+                per_turn: Some(resolution.counts_per_turn().into()),
             }),
-            Err(error) => too_wide(error, profile, fields),
+            Err(error) => too_wide(error, resolution, fields),
         }
     }
 
-    fn single_turn(&self, abs: U24, fields: &mut Vec<Field>) -> Option<Position> {
-        fields.push(number("ABS", abs));
-        let Some(profile) = self.profile() else {
+    fn single_turn(&self, abs: Abs, fields: &mut Vec<Field>) -> Option<Position> {
+        fields.push(number("ABS", abs.get()));
+        let Some(resolution) = self.resolution() else {
             return Some(Position { counts: abs.get().into(), span: None, per_turn: None });
         };
-        let turn = Some(profile.counts_per_turn().into());
-        match profile.single_turn(abs) {
+        let turn = Some(resolution.counts_per_turn().into());
+        match resolution.single_turn(abs) {
             Ok(counts) => Some(Position { counts: counts.into(), span: turn, per_turn: turn }),
-            Err(error) => too_wide(error, profile, fields),
+            Err(error) => too_wide(error, resolution, fields),
         }
     }
 
     fn identify(&mut self, enid: u8, fields: &mut Vec<Field>) {
         fields.push(Field { name: "ENID", value: Value::Number { value: enid.into(), unit: "" } });
-        self.hint = Profile::from_enid(enid).map(|hint| hint.profile);
+        self.hint = Resolution::from_enid(enid).map(|hint| hint.resolution);
     }
 
     /// The widths as the user gave them, else as the encoder ID suggests.
-    fn profile(&self) -> Option<Profile> {
+    fn resolution(&self) -> Option<Resolution> {
         let Settings { single_turn_bits, multi_turn_bits } = self.settings;
-        let abs = single_turn_bits.or(self.hint.map(Profile::abs_bits))?;
-        let abm = multi_turn_bits.or(self.hint.map(Profile::abm_bits)).unwrap_or(16);
-        Profile::new(abs, abm).ok()
+        let abs = single_turn_bits.or(self.hint.map(Resolution::abs_bits))?;
+        let abm = multi_turn_bits.or(self.hint.map(Resolution::abm_bits)).unwrap_or(16);
+        Resolution::new(abs, abm).ok()
     }
 }
 
@@ -191,15 +191,15 @@ fn event(frame: &Frame, direction: Direction, id: Option<DataId>, fields: Vec<Fi
 
 fn kind(id: Option<DataId>) -> Cow<'static, str> {
     Cow::Borrowed(match id {
-        Some(DataId::Id0) => "ID 0",
-        Some(DataId::Id1) => "ID 1",
-        Some(DataId::Id2) => "ID 2",
-        Some(DataId::Id3) => "ID 3",
-        Some(DataId::Id6) => "ID 6",
-        Some(DataId::Id7) => "ID 7",
-        Some(DataId::Id8) => "ID 8",
-        Some(DataId::IdC) => "ID C",
-        Some(DataId::IdD) => "ID D",
+        Some(DataId::ReadSingleTurn) => "ID 0",
+        Some(DataId::ReadMultiTurn) => "ID 1",
+        Some(DataId::ReadEncoderId) => "ID 2",
+        Some(DataId::ReadAll) => "ID 3",
+        Some(DataId::WriteEeprom) => "ID 6",
+        Some(DataId::ResetErrors) => "ID 7",
+        Some(DataId::SetSingleTurnZero) => "ID 8",
+        Some(DataId::ResetTurnsAndErrors) => "ID C",
+        Some(DataId::ReadEeprom) => "ID D",
         None => "ID ?",
     })
 }
@@ -207,37 +207,31 @@ fn kind(id: Option<DataId>) -> Cow<'static, str> {
 /// What a reset request clears. One of ten has to be seen ten times to have an effect.
 fn resets(id: DataId) -> Option<Field> {
     let what = match id {
-        DataId::Id7 => "errors",
-        DataId::Id8 => "single-turn position",
-        DataId::IdC => "turns and errors",
+        DataId::ResetErrors => "errors",
+        DataId::SetSingleTurnZero => "single-turn position",
+        DataId::ResetTurnsAndErrors => "turns and errors",
         _ => return None,
     };
     Some(Field { name: "resets", value: Value::Text(what.to_owned()) })
 }
 
 fn status(sf: StatusField) -> Field {
-    let names = [
-        (sf.counting_error(), "ea0"),
-        (sf.other_error(), "ea1"),
-        (sf.request_parity_error(), "ca0"),
-        (sf.request_delimiter_error(), "ca1"),
-    ];
-    let set = names.iter().filter(|(on, _)| *on).map(|(_, name)| *name).collect();
-    Field { name: "SF", value: Value::Flags { raw: sf.raw().into(), digits: 2, set } }
+    let set = sf.iter_names().map(|(name, _)| name).collect();
+    Field { name: "SF", value: Value::Flags { raw: sf.bits().into(), digits: 2, set } }
 }
 
 fn alarms(almc: Almc) -> Field {
-    let set = almc.alarms().map(tformat::Alarm::short).collect();
-    Field { name: "ALMC", value: Value::Flags { raw: almc.raw().into(), digits: 2, set } }
+    let set = almc.iter_names().map(|(name, _)| name).collect();
+    Field { name: "ALMC", value: Value::Flags { raw: almc.bits().into(), digits: 2, set } }
 }
 
 fn address(adf: Adf) -> Field {
     let set = if adf.busy() { vec!["busy"] } else { Vec::new() };
-    Field { name: "ADF", value: Value::Flags { raw: adf.raw().into(), digits: 2, set } }
+    Field { name: "ADF", value: Value::Flags { raw: adf.bits().into(), digits: 2, set } }
 }
 
-fn number(name: &'static str, value: U24) -> Field {
-    Field { name, value: Value::Number { value: value.get().into(), unit: "" } }
+fn number(name: &'static str, value: u32) -> Field {
+    Field { name, value: Value::Number { value: value.into(), unit: "" } }
 }
 
 fn hex(name: &'static str, byte: u8) -> Field {
@@ -255,8 +249,8 @@ fn spikes(frame: &Frame) -> Option<Field> {
 }
 
 /// The position does not fit the encoder: said beside the values, which are those of the line.
-fn too_wide(error: Error, profile: Profile, fields: &mut Vec<Field>) -> Option<Position> {
-    let text = format!("{error}; taken as {} + {} bits", profile.abs_bits(), profile.abm_bits());
+fn too_wide(error: Error, resolution: Resolution, fields: &mut Vec<Field>) -> Option<Position> {
+    let text = format!("{error}; taken as {} + {} bits", resolution.abs_bits(), resolution.abm_bits());
     fields.push(Field { name: "width", value: Value::Text(text) });
     None
 }
@@ -264,8 +258,8 @@ fn too_wide(error: Error, profile: Profile, fields: &mut Vec<Field>) -> Option<P
 /// Fields of a request.
 fn request_names(id: DataId) -> &'static [&'static str] {
     match id {
-        DataId::Id6 => &["CF", "ADF", "EDF", "CRC"],
-        DataId::IdD => &["CF", "ADF", "CRC"],
+        DataId::WriteEeprom => &["CF", "ADF", "EDF", "CRC"],
+        DataId::ReadEeprom => &["CF", "ADF", "CRC"],
         _ => &["CF"],
     }
 }
@@ -273,11 +267,13 @@ fn request_names(id: DataId) -> &'static [&'static str] {
 /// Fields of an answer.
 fn answer_names(id: DataId) -> &'static [&'static str] {
     match id {
-        DataId::Id0 | DataId::Id7 | DataId::Id8 | DataId::IdC => &["CF", "SF", "ABS0", "ABS1", "ABS2", "CRC"],
-        DataId::Id1 => &["CF", "SF", "ABM0", "ABM1", "ABM2", "CRC"],
-        DataId::Id2 => &["CF", "SF", "ENID", "CRC"],
-        DataId::Id3 => &["CF", "SF", "ABS0", "ABS1", "ABS2", "ENID", "ABM0", "ABM1", "ABM2", "ALMC", "CRC"],
-        DataId::Id6 | DataId::IdD => &["CF", "ADF", "EDF", "CRC"],
+        DataId::ReadSingleTurn | DataId::ResetErrors | DataId::SetSingleTurnZero | DataId::ResetTurnsAndErrors => {
+            &["CF", "SF", "ABS0", "ABS1", "ABS2", "CRC"]
+        }
+        DataId::ReadMultiTurn => &["CF", "SF", "ABM0", "ABM1", "ABM2", "CRC"],
+        DataId::ReadEncoderId => &["CF", "SF", "ENID", "CRC"],
+        DataId::ReadAll => &["CF", "SF", "ABS0", "ABS1", "ABS2", "ENID", "ABM0", "ABM1", "ABM2", "ALMC", "CRC"],
+        DataId::WriteEeprom | DataId::ReadEeprom => &["CF", "ADF", "EDF", "CRC"],
     }
 }
 

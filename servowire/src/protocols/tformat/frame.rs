@@ -135,7 +135,7 @@ impl Pending {
     /// Fields of the answer that begins with `cf`: as that says, or where it is damaged, as was asked.
     pub(super) fn answer_fields(&self, cf: u8) -> usize {
         let said = ControlField::parse(cf).and_then(ControlField::data_id).ok();
-        let id = said.or(self.request.map(Request::data_id)).unwrap_or(DataId::Id3);
+        let id = said.or(self.request.map(Request::data_id)).unwrap_or(DataId::ReadAll);
         usize::from(id.response_fields())
     }
 }

@@ -1,19 +1,19 @@
 //! HIPERFACE DSL: symbols, answers, checks, position, messages, sync, and both machines.
 
+use hdsl::cable::{Cable, Disturbance};
 use hdsl::device::Device;
 use hdsl::frame::{Extra, Head, Received};
-use hdsl::line::{Disturbance, Line};
 use hdsl::master::{Counters, Master};
 use hdsl::message::{Access, Data, Length, LongRequest, RemoteRegister, ResourceAddress, ShortAnswer, ShortRequest};
-use hdsl::registers::{Event, EventS, Register};
-use hdsl::rssi::Rssi;
-use hdsl::sampling::{Alignment, EdgeRule, TEST_PATTERN, WINDOW};
+use hdsl::registers::{Event, EventS, Register, Registers};
+use hdsl::rssi::EdgeWatch;
+use hdsl::sampling::{Alignment, Delay, EdgeRule, SampleIndex, TEST_PATTERN, WINDOW};
 use hdsl::symbol::{Character, DisparityCheck, DisparityStatus, Reading, RunningDisparity, Word};
 use hdsl::sync::{CoreClock, Es, Next, Startup, Synchroniser};
 use hdsl::{
-    Answer, Content, DeltaDelta, EncoderByte, EncoderId, EncoderSymbol, Error, Estimator, LineDisparity, MasterSymbol,
-    ParameterByte, PositionBits, PositionTracker, Profile, QualityEvent, QualityMonitor, QualityRule, Rule, VFrame,
-    crc16,
+    Answer, Content, DeltaDelta, Dialect, EncoderByte, EncoderId, EncoderSymbol, Error, LineDisparity, MasterSymbol,
+    ParameterByte, PositionBits, PositionRule, PositionTracker, QualityEvent, QualityMonitor, QualityRule, Rule,
+    VFrame, crc16,
 };
 
 use super::kernels;
@@ -62,6 +62,9 @@ const fn samples(bits: u64, delay: usize) -> [u8; WINDOW] {
 
 const PATTERNS: [[u8; WINDOW]; 3] = [samples(TEST_PATTERN, 5), samples(TEST_PATTERN, 42), samples(LINES[0], 20)];
 
+/// Where to sample.
+const PLACE: Alignment = Alignment { index: SampleIndex::truncate(1), delay: Delay::MIN };
+
 /// Values of the acceleration channel, present or not.
 const ACCELERATIONS: [[Option<i16>; 4]; 2] =
     [[Some(0), Some(-5), Some(1023), Some(7)], [Some(300), None, None, Some(-1024)]];
@@ -73,6 +76,10 @@ const PERIODS: [(u32, u8); 4] = [(900, 1), (1500, 2), (20_000, 10), (5, 1)];
 
 /// Frames of a whole link.
 const LINKS: [u32; 1] = [130];
+
+fn es_of(es: u8) -> Result<Es, Error> {
+    Es::new(es).ok_or(Error::NoPulse)
+}
 
 fn content(word: u64) -> Content {
     Content {
@@ -87,12 +94,12 @@ fn content(word: u64) -> Content {
 kernels! {
     /// A word by the strict tables.
     fn hdsl_symbol(word: &u64) -> Reading {
-        Word::truncate(*word).read(Rule::Strict)
+        Word::truncate(*word as u16).read(Rule::Strict)
     } over SYMBOLS;
 
     /// A word by the reduced rule.
     fn hdsl_symbol_reduced(word: &u64) -> Reading {
-        Word::truncate(*word).read(Rule::Reduced)
+        Word::truncate(*word as u16).read(Rule::Reduced)
     } over SYMBOLS;
 
     /// A byte to a word.
@@ -102,12 +109,12 @@ kernels! {
 
     /// The running disparity of a word.
     fn hdsl_disparity(word: &u64) -> DisparityStatus {
-        DisparityCheck::new(RunningDisparity::Minus).step(Word::truncate(*word))
+        DisparityCheck::new(RunningDisparity::Minus).step(Word::truncate(*word as u16))
     } over SYMBOLS;
 
     /// 61 bits to six judged words and the checked acceleration.
     fn hdsl_answer(line: &u64) -> (Answer, Result<DeltaDelta, Error>) {
-        let answer = Answer::from_bits(*line, Rule::Strict);
+        let answer = Answer::from_bits(Rule::Strict, *line);
         (answer, answer.delta_delta())
     } over LINES;
 
@@ -118,13 +125,13 @@ kernels! {
 
     /// Eight answers to both safe positions.
     fn hdsl_v_frame(lines: &[u64; 8]) -> (Result<u64, Error>, Result<u64, Error>) {
-        let frame = VFrame::of(&lines.map(|line| Answer::from_bits(line, Rule::Strict)), Rule::Strict);
+        let frame = VFrame::of(Rule::Strict, &lines.map(|line| Answer::from_bits(Rule::Strict, line)));
         (frame.safe1.position(), frame.safe2.position())
     } over GROUPS;
 
     /// The identifier of an encoder.
     fn hdsl_encoder_id(line: &u64) -> Result<PositionBits, Error> {
-        EncoderId::from_answer(Answer::from_bits(*line, Rule::Strict)).and_then(EncoderId::check)
+        EncoderId::from_answer(Answer::from_bits(Rule::Strict, *line)).and_then(EncoderId::check)
     } over LINES;
 
     /// CRC-16 over 32 bytes.
@@ -142,9 +149,9 @@ kernels! {
         (tracker.position(), tracker.velocity())
     } over ACCELERATIONS;
 
-    /// The same with the estimator of the SDK.
+    /// The same with the position of the SDK.
     fn hdsl_position_ti(values: &[Option<i16>; 4]) -> (u64, i32) {
-        let mut tracker = PositionTracker::with_estimator(PositionBits::MAX, Estimator::Wrapping16);
+        let mut tracker = PositionTracker::with_rule(PositionBits::MAX, PositionRule::Ti);
         for value in values {
             tracker.step(value.and_then(DeltaDelta::new));
         }
@@ -161,25 +168,24 @@ kernels! {
 
     /// The head of a frame, and what an encoder reads of it.
     fn hdsl_head((byte, edge, disparity): &(u8, u8, i8)) -> Result<Received, Error> {
-        let (head, _) = Head::new(ParameterByte::new(*byte), Extra::new(*edge), LineDisparity(*disparity));
+        let (head, _) = Head::new(ParameterByte::new(*byte), Extra::new(*edge), LineDisparity::new(*disparity));
         Head::parse(head.bits())
     } over HEADS;
 
     /// The head as samples.
     fn hdsl_head_samples((byte, edge, disparity): &(u8, u8, i8)) -> u8 {
-        let (head, _) = Head::new(ParameterByte::new(*byte), Extra::new(*edge), LineDisparity(*disparity));
+        let (head, _) = Head::new(ParameterByte::new(*byte), Extra::new(*edge), LineDisparity::new(*disparity));
         head.samples().fold(0, |all, byte| all ^ byte)
     } over HEADS;
 
     /// Sampling index and delay from the test pattern.
     fn hdsl_learn(samples: &[u8; WINDOW]) -> Result<Alignment, Error> {
-        Alignment::learn(samples, EdgeRule::Leading)
+        Alignment::learn(EdgeRule::Leading, samples)
     } over PATTERNS;
 
-    /// The bits and the RSSI of an answer at a learned place.
-    fn hdsl_sampled(samples: &[u8; WINDOW]) -> (Result<u64, Error>, Option<Rssi>) {
-        let place = Alignment::learn(&PATTERNS[0], EdgeRule::All);
-        (place.and_then(|place| place.bits(samples)), place.ok().map(|place| place.rssi(samples)))
+    /// The bits, the edges and the RSSI of an answer at a learned place.
+    fn hdsl_read(samples: &[u8; WINDOW]) -> Result<(u64, EdgeWatch), Error> {
+        PLACE.read(samples)
     } over PATTERNS;
 
     /// A short message there and back.
@@ -193,13 +199,13 @@ kernels! {
     /// A long message there and its answer.
     fn hdsl_long(bytes: &[u8; 32]) -> Result<Data, Error> {
         let access = Access::Write(Data::new(&bytes[..8])?);
-        let request = LongRequest { address: ResourceAddress::USER, indirect: true, offset: None, access };
+        let request = LongRequest { address: ResourceAddress::RWFILE, indirect: true, offset: None, access };
         LongRequest::parse(request.emit().as_bytes())?.parse_answer(bytes)
     } over BLOCKS;
 
     /// Ten frames in sync mode.
     fn hdsl_sync((period, es): &(u32, u8)) -> Result<Next, Error> {
-        let mut sync = Synchroniser::new(*period, Es::try_from(*es)?)?;
+        let mut sync = Synchroniser::new(*period, es_of(*es)?)?;
         for late in 0..9 {
             sync.next(Some(late));
         }
@@ -208,14 +214,15 @@ kernels! {
 
     /// The start-up arithmetic of sync mode.
     fn hdsl_sync_startup((period, es): &(u32, u8)) -> Result<Startup, Error> {
-        Startup::new(*period * 4, CoreClock::Mhz300, Es::try_from(*es)?)
+        Startup::new(*period * 4, CoreClock::Mhz300, es_of(*es)?)
     } over PERIODS;
 
     /// A whole link from RESET to two V-frames after lock, with messages: master, line and encoder.
     fn hdsl_link(frames: &u32) -> Result<(Counters, u64), Error> {
-        let mut master = Master::new(Profile::SICK);
-        let mut encoder = Device::new(EncoderId::try_from(0x00153)?);
-        let mut line = Line::new(Disturbance { jitter: 1, ..Disturbance::cable(10) }, 1);
+        let mut master = Master::new(Dialect::SICK);
+        let mut map = Registers::new(&Dialect::SICK);
+        let mut encoder = Device::new(EncoderId::truncate(0x00153));
+        let mut line = Cable::new(Disturbance { jitter: 1, ..Disturbance::metres(10) }, 1);
         for frame in 0..*frames {
             let head = line.down(master.transmission().head.bits());
             let samples = line.up(encoder.answer(head, u64::from(frame)));
@@ -225,19 +232,20 @@ kernels! {
                 let address = ResourceAddress::RESOLUTN;
                 let _ = master.start_long(LongRequest { address, indirect: false, offset: None, access });
             }
-            let _ = master.finish(&samples, None)?;
+            let _ = map.apply(master.finish(&samples, None)?);
         }
-        Ok((master.counters(), master.registers().position()))
+        Ok((master.counters(), map.position()))
     } over LINKS;
 
     /// What an application does with registers.
     fn hdsl_registers(word: &u64) -> (Event, EventS, Option<u8>) {
-        let mut master = Master::new(Profile::TI);
+        let mut master = Master::new(Dialect::TI);
+        let mut map = Registers::new(&Dialect::TI);
         let [address, value, ..] = word.to_le_bytes();
-        let _ = master.write(address, value);
-        let _ = master.write(Register::SysCtrl as u8, 0xc0);
-        let (event, event_s) = master.take_events();
-        (event, event_s, master.registers().byte(address))
+        let _ = map.write(&mut master, address, value);
+        let _ = map.write(&mut master, Register::SysCtrl as u8, 0xc0);
+        let (event, event_s) = map.take_events();
+        (event, event_s, map.read(address))
     } over SYMBOLS;
 
     /// Symbols of both directions.

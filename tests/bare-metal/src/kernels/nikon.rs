@@ -1,9 +1,9 @@
 //! A-format: requests and replies in every form.
 
 use nikon_aformat::{
-    Abs40, Alarm, Alm, BitOrder, BitRate, Command, Crc3, Crc8, EncoderAddress, EncoderStatus, Error, Expected, Frames,
-    Operation, Position, Profile, Reply, Request, RequestFrame, Response, TypeWord, U24, U40, UserAddress, Version,
-    Window, crc3, crc8, stream,
+    Abs40, Alm, BitOrder, BitRate, Command, Crc3, Crc8, EncoderAddress, EncoderStatus, Error, Expected, Frames,
+    Operation, Position, RawResponse, Request, RequestFrame, Resolution, Response, TypeWord, U24, U40, UserAddress,
+    Version, Window, crc3, crc8, stream,
 };
 use nom::{IResult, Parser};
 
@@ -30,16 +30,16 @@ const fn user(address: u8) -> UserAddress {
     }
 }
 
-const fn profile(st_bits: u8, mt_bits: u8) -> Profile {
-    match Profile::new(st_bits, mt_bits) {
-        Ok(profile) => profile,
+const fn resolution(st_bits: u8, mt_bits: u8) -> Resolution {
+    match Resolution::new(st_bits, mt_bits) {
+        Ok(resolution) => resolution,
         Err(_) => panic!("no such widths"),
     }
 }
 
 /// Profiles and positions.
-const POSITIONS: [(Profile, u64, u8); 3] =
-    [(profile(17, 16), 0x1_9000_526f, 40), (profile(20, 16), 0xfb_f700, 24), (profile(24, 0), 0x1_ffff, 17)];
+const POSITIONS: [(Resolution, u64, u8); 3] =
+    [(resolution(17, 16), 0x1_9000_526f, 40), (resolution(20, 16), 0xfb_f700, 24), (resolution(24, 0), 0x1_ffff, 17)];
 
 /// The bytes of a request, two a frame, and how many.
 const SENT: [([u8; 4], usize); 2] = [([0x44, 0x03, 0, 0], 2), ([0x40, 0xb0, 0x5b, 0x78], 4)];
@@ -47,38 +47,38 @@ const SENT: [([u8; 4], usize); 2] = [([0x44, 0x03, 0, 0], 2), ([0x40, 0xb0, 0x5b
 kernels! {
     /// The reply with the whole position from its 72 line bits, least significant bit of a byte first, all checks.
     fn nikon_abs40_line_lsb(row: &Whole) -> Result<Abs40, Error> {
-        Abs40::parse_line(&row.lsb_first, BitOrder::LsbFirst, &row.expected)
+        Abs40::parse_line(&row.expected, &row.lsb_first, BitOrder::LsbFirst)
     } over WHOLE;
 
     /// The same from a shift register, most significant bit first.
     fn nikon_abs40_line_msb(row: &Whole) -> Result<Abs40, Error> {
-        Abs40::parse_line(&row.msb_first, BitOrder::MsbFirst, &row.expected)
+        Abs40::parse_line(&row.expected, &row.msb_first, BitOrder::MsbFirst)
     } over WHOLE;
 
     /// Replies of all layouts from line bits.
     fn nikon_response_parse_line(row: &Replied) -> Result<Response, Error> {
-        Response::parse_line(row.line, &row.expected)
+        Response::parse_line(&row.expected, row.line)
     } over REPLIES;
 
     /// Replies of all layouts from words.
     fn nikon_response_parse_words(row: &Replied) -> Result<Response, Error> {
-        Response::parse_words(row.words, BitOrder::MsbFirst, &row.expected)
+        Response::parse_words(&row.expected, row.words, BitOrder::MsbFirst)
     } over REPLIES;
 
     /// The frames of the replies of all layouts.
-    fn nikon_response_emit(row: &Emitted) -> Reply {
+    fn nikon_response_emit(row: &Emitted) -> RawResponse {
         row.emit()
     } over EMITTED;
 
     /// The line bits of an ABS40 reply.
     fn nikon_abs40_emit_line(row: &Whole) -> [u8; Abs40::LINE_BYTES] {
-        let reply = Abs40 { ea: EncoderAddress::ZERO, es: EncoderStatus::NONE, abs: U40::truncate(row.lsb_first.len() as u64) };
+        let reply = Abs40 { ea: EncoderAddress::ZERO, es: EncoderStatus::empty(), abs: U40::truncate(row.lsb_first.len() as u64) };
         reply.emit_line(BitOrder::LsbFirst, &row.expected)
     } over WHOLE;
 
     /// Frames of a reply, their check field and line bits.
     fn nikon_reply(row: &Replied) -> Option<((u8, u8), Window, u16)> {
-        let reply = Reply::from_words(row.words, BitOrder::MsbFirst, row.expected.layout()).ok()?;
+        let reply = RawResponse::from_words(row.expected.layout(), row.words, BitOrder::MsbFirst).ok()?;
         Some((reply.crc(), reply.line(), reply.words(BitOrder::MsbFirst).fold(0, |all, word| all ^ word)))
     } over REPLIES;
 
@@ -101,7 +101,7 @@ kernels! {
 
     /// What the reply to a request has to be.
     fn nikon_expected(request: &Request) -> Result<Expected, Error> {
-        request.check(Profile::default()).map(|request| request.expected(profile(17, 16)))
+        request.check(Resolution::default()).map(|request| request.expected(resolution(17, 16)))
     } over REQUESTS;
 
     /// A request frame from line bits, and its transmit word.
@@ -110,8 +110,8 @@ kernels! {
     } over LINES;
 
     /// A command from its code, in a version.
-    fn nikon_command(code: &u8) -> Result<Command, Error> {
-        Command::from_code(*code)?.in_version(Version::V2_1)
+    fn nikon_command(code: &u8) -> Option<Command> {
+        Command::from_code(*code).filter(|command| command.is_in(Version::V2_1))
     } over [0_u8, 24, 31];
 
     /// CRC-8 of a whole reply's bytes, by bit, byte and word, and a CRC-3.
@@ -122,21 +122,21 @@ kernels! {
     } over [[0x20, 0x85, 0xf6, 0x4a, 0x80, 0x09, 0x80]];
 
     /// Single turn, turns and angle of a position.
-    fn nikon_position((profile, abs, bits): &(Profile, u64, u8)) -> Result<(Position, u32, u32, i32), Error> {
-        let position = profile.position(*abs, *bits)?;
+    fn nikon_position((resolution, abs, bits): &(Resolution, u64, u8)) -> Result<(Position, u32, u32, i32), Error> {
+        let position = resolution.position(*abs, *bits)?;
         let single = position.single_turn;
-        Ok((position, profile.fraction(single), profile.milli_degrees(single), profile.difference(single, 0)))
+        Ok((position, resolution.fraction(single), resolution.milli_degrees(single), resolution.difference(single, 0)))
     } over POSITIONS;
 
-    /// The type word as a profile.
-    fn nikon_type_word(word: &u16) -> Option<Profile> {
-        TypeWord(*word).profile()
+    /// The type word as a resolution.
+    fn nikon_type_word(word: &u16) -> Option<Resolution> {
+        TypeWord(*word).resolution()
     } over [0x0011_u16, 0x0007];
 
     /// The alarms of an alarm field, counted, and their summary.
     fn nikon_alarms(raw: &u16) -> (usize, EncoderStatus) {
-        let alm = Alm::new(*raw).with(Alarm::Batt, true);
-        (alm.alarms(Version::V3_0).count(), EncoderStatus::of_alarms(alm))
+        let alm = Alm::from_bits_retain(*raw) | Alm::BATT;
+        ((alm & Alm::known(Version::V3_0)).iter_names().count(), EncoderStatus::of_alarms(alm))
     } over [0_u16, 0x0755];
 
     /// The halves of a position joined.
@@ -167,16 +167,16 @@ const EMITTED: [Response; 3] = [
     Response::new(
         EncoderAddress::MAX,
         Command::Abs40,
-        EncoderStatus::NONE,
+        EncoderStatus::empty(),
         nikon_aformat::Data::Abs40 { abs: U40::truncate(0x1_2345_6789) },
     ),
     Response::new(
         EncoderAddress::MAX,
         Command::Abs24VelAcc,
-        EncoderStatus::NONE,
+        EncoderStatus::empty(),
         nikon_aformat::Data::Abs24VelAcc { abs: U24::truncate(77), velocity: -5, acceleration: 9 },
     ),
-    Response::abs17(EncoderAddress::ZERO, EncoderStatus::NONE, nikon_aformat::U17::truncate(0x1_5555)),
+    Response::abs17(EncoderAddress::ZERO, EncoderStatus::empty(), nikon_aformat::U17::truncate(0x1_5555)),
 ];
 
 /// The line bits of request frames, the last one damaged.

@@ -3,17 +3,18 @@
 use core::num::NonZeroU16;
 
 use nom::IResult;
-use rtex_block::device::{self, Drive, OpenCodes, Settings};
+use rtex_block::device::{self, Drive, DriveConfig, OpenCodes};
 use rtex_block::inspect::{self, Report};
 use rtex_block::master::{
-    ActiveCode, Asic, Axis, AxisSettings, CommandCounter, EchoWatch, Expected, Fault, Handshake, Inputs, Led, Limits,
-    Order, Phase, PhaseControl, ProfileMove, Reception, Ring, ServoOff, Slave, SlaveInfo, Turn, compare, led,
+    ActiveCode, Asic, Axis, AxisConfig, CommandCounter, EchoWatch, Expected, Fault, Handshake, Inputs, Led, Limits,
+    Order, Phase, PhaseControl, ProfileMove, Progress, Received, Reception, Ring, ServoOff, Slave, SlaveInfo, Turn,
+    compare, led,
 };
 use rtex_block::position::{self, Gear};
 use rtex_block::timing::{FrameTime, Periods, timer_reload};
 use rtex_block::{
-    Alarm, Answer, Arguments, BlockSize, Code, Command, Command32, CommandBlock, CyclicCode, Error, MacId, Request,
-    Response, Response32, ResponseBlock, SubCommand, TypeCode, UpdateCounter, pack, stream,
+    Alarm, Arguments, BlockSize, Code, Command, Command32, CommandBlock, CyclicCode, Error, MacId, NonCyclicCommand,
+    NonCyclicResponse, Response, Response32, ResponseBlock, SubCommand, TypeCode, UpdateCounter, pack, stream,
 };
 
 use super::kernels;
@@ -41,25 +42,25 @@ const READ: Arguments = Arguments { type_code: TypeCode::short(7), index: 0, dat
 
 const COMMAND: Command = Command { command_data1: 1_000, ..Command::idle(MAC_ID, COUNTER) };
 
-const ASKING: Command = Command { request: Request::Monitor(READ), ..COMMAND };
+const ASKING: Command = Command { noncyclic: NonCyclicCommand::Monitor(READ), ..COMMAND };
 
 const EXPECTED: Expected =
     Expected { size: BlockSize::Bytes16, mac_id: MAC_ID, update_counter: COUNTER.next(), code: Code::CYCLIC_POSITION };
 
 const LIMIT: NonZeroU16 = NonZeroU16::MIN.saturating_add(7);
 
-const AXIS: Axis = Axis::new(AxisSettings {
-    mac_id: MAC_ID,
-    mode: ActiveCode::CyclicPosition,
-    update_ns: 500_000,
-    gear: Gear::UNITY,
-    limits: Limits { echo: LIMIT, ready: 100, active: 100, inactive: 100, answer: 100, command_errors: LIMIT },
-});
+const AXIS: Axis = axis(5);
 
-const HANDSHAKE: Handshake = match Handshake::new(MAC_ID, CyclicCode::CyclicPosition, Request::Monitor(READ), 100) {
-    Some(handshake) => handshake,
-    None => panic!("a monitor command has an answer"),
-};
+const fn axis(mac_id: u8) -> Axis {
+    let limits = Limits::new(LIMIT, 100);
+    Axis::new(AxisConfig::new(MacId::truncate(mac_id), ActiveCode::CyclicPosition, 500_000, limits))
+}
+
+const HANDSHAKE: Handshake =
+    match Handshake::new(MAC_ID, CyclicCode::CyclicPosition, NonCyclicCommand::Monitor(READ), 100) {
+        Some(handshake) => handshake,
+        None => panic!("a monitor command has an answer"),
+    };
 
 const CODES: OpenCodes = OpenCodes {
     profile_absolute: 0x10,
@@ -68,10 +69,14 @@ const CODES: OpenCodes = OpenCodes {
     alarm_active: TypeCode::short(0x01),
     alarm_history: TypeCode::short(0x02),
     alarm_clear: TypeCode::short(0x03),
+    alarm_attributes: TypeCode::short(0x76),
+    parameter_initial: TypeCode::short(0x77),
+    latch_arm: 0x78,
+    homing: 0x79,
     communication_lost: Alarm { main: 80, sub: 0 },
 };
 
-const DRIVE: Drive = Drive::new(Settings::new(MAC_ID, CODES));
+const DRIVE: Drive = Drive::new(DriveConfig::new(MAC_ID, CODES));
 
 const BLOCK32: [u8; 32] = {
     let (mut block, mut at) = ([0; 32], 0);
@@ -104,8 +109,8 @@ kernels! {
     } over [VIEW];
 
     /// A response of any kind from a slice, with what bytes 8-15 say.
-    fn rtex_answer(row: &Response16) -> Option<(Response, Answer)> {
-        Response::parse(&row.block).ok().map(|response| (response, response.answer()))
+    fn rtex_noncyclic(row: &Response16) -> Option<(Response, NonCyclicResponse)> {
+        Response::parse(&row.block).ok().map(|response| (response, response.noncyclic()))
     } over RESPONSES;
 
     /// The same, with the reserved bits checked.
@@ -114,9 +119,9 @@ kernels! {
     } over RESPONSES;
 
     /// A response of any kind into its bytes.
-    fn rtex_response_emit((response, answer): &(Response, Answer)) -> [u8; 16] {
-        response.with_answer(answer).emit()
-    } over [(RESPONSE, RESPONSE.answer())];
+    fn rtex_response_emit((response, answer): &(Response, NonCyclicResponse)) -> [u8; 16] {
+        response.with_noncyclic(answer).emit()
+    } over [(RESPONSE, RESPONSE.noncyclic())];
 
     /// A command into its bytes.
     fn rtex_command_emit(command: &Command) -> [u8; 16] {
@@ -187,32 +192,32 @@ kernels! {
     } over [(CommandCounter::new(0), EchoWatch::new(LIMIT)), (CommandCounter::new(1), EchoWatch::new(LIMIT))];
 
     /// An update period of a request.
-    fn rtex_handshake((handshake, response): &(Handshake, Option<Response>)) -> rtex_block::master::Progress {
+    fn rtex_handshake((handshake, response): &(Handshake, Option<Response>)) -> Progress<NonCyclicResponse> {
         let mut handshake = *handshake;
-        handshake.poll(response.as_ref())
+        handshake.receive(response.as_ref())
     } over [(HANDSHAKE, Some(RESPONSE)), (HANDSHAKE, None)];
 
     /// An update period of a profile motion.
-    fn rtex_profile_move((motion, response): &(ProfileMove, Response)) -> Request {
+    fn rtex_profile_move((motion, response): &(ProfileMove, Response)) -> NonCyclicCommand {
         let mut motion = *motion;
-        motion.poll(Some(response));
+        let _ = motion.receive(Some(response));
         motion.request()
     } over [(ProfileMove::new(MAC_ID, 0x11, 1_000, 500, 100), RESPONSE)];
 
     /// An update period of one axis: response in, command out.
-    fn rtex_axis((axis, response): &(Axis, Option<Response>)) -> Command {
+    fn rtex_axis((axis, received): &(Axis, Received)) -> Command32 {
         let mut axis = *axis;
-        axis.receive(Turn::Valid(COUNTER), response.as_ref());
+        axis.receive(Turn::Valid(COUNTER), received);
         let _ = axis.set_position(1_010);
         axis.send(Turn::Valid(COUNTER))
-    } over [(AXIS, Some(RESPONSE)), (AXIS, None)];
+    } over [(AXIS, Received::Main(RESPONSE)), (AXIS, Received::Nothing)];
 
     /// An update period of a ring of four axes.
-    fn rtex_ring((ring, responses): &(Ring<4>, [Option<Response>; 4])) -> [Command; 4] {
-        let mut ring = *ring;
+    fn rtex_ring((axes, received): &([Axis; 4], [Received; 4])) -> Option<[Command32; 4]> {
+        let mut ring = Ring::new(*axes, 0).ok()?;
         ring.switch_on();
-        ring.update(responses)
-    } over [(Ring::new([AXIS; 4], 0), [Some(RESPONSE); 4])];
+        Some(ring.update(received))
+    } over [([axis(5), axis(6), axis(7), axis(8)], [Received::Main(RESPONSE); 4])];
 
     /// An exchange with the drive model.
     fn rtex_drive((drive, command): &(Drive, Command)) -> [u8; 16] {

@@ -14,8 +14,9 @@ use sorte_proto::sync0::{Sync0, Variant, Write, Writes};
 use sorte_proto::timing::{Budget, Timing};
 use sorte_proto::{
     Assignment, Clock, Correction, DelayModel, DelayReq, DeviceAddress, DeviceFrame, DeviceFrameView, Direction,
-    Discovery, DiscoveryView, Entry, Error, LineDelay, LongFrame, MasterFrameView, MotorMask, Network, Param,
-    Parameters, Payload, Pto, Slice, StartTime, Status, Sync, crc8, fcs, stream, strip_preamble, write_master_frame,
+    Discovery, DiscoveryView, Entry, Error, LineDelay, LongFrame, MasterFrameView, MotorMask, Network, OutOfRange,
+    Param, Parameters, Payload, Pto, Slice, StartTime, Status, Sync, crc8, fcs, stream, strip_preamble,
+    write_master_frame,
 };
 
 use super::kernels;
@@ -87,13 +88,13 @@ kernels! {
     /// The master frame of four devices, into a buffer as firmware has it.
     fn sorte_master_frame_build((output, time_stamp): &([u8; 16], u16)) -> Buffer {
         let mut buffer = Buffer([0; 24]);
-        let _ = write_master_frame(&mut buffer.0, output, *time_stamp);
+        let _ = write_master_frame(output, *time_stamp, &mut buffer.0);
         buffer
     } over OUTPUTS;
 
     /// The check of a master frame, the slice of device 3, and the reference time.
     fn sorte_master_frame_check(frame: &[u8; 21]) -> Result<([u8; 4], u32), Error> {
-        let view = MasterFrameView::new(frame, 16)?;
+        let view = MasterFrameView::new(16, frame)?;
         match view.slice(8, 4)?.first_chunk() {
             Some(slice) => Ok((*slice, view.reference_ns(440))),
             None => Err(Error::OutsideOutput { offset: 8, len: 4 }),
@@ -103,13 +104,13 @@ kernels! {
     /// A device frame.
     fn sorte_device_frame_build(payload: &[u8; 3]) -> [u8; 6] {
         let mut frame = [0; 6];
-        let _ = DeviceFrame { address: DeviceAddress::FIRST, status: Status::LAST, payload: *payload }.emit(&mut frame);
+        let _ = DeviceFrame { address: DeviceAddress::FIRST, status: Status::LAST, payload: *payload }.emit_into(&mut frame);
         frame
     } over [[1, 2, 3], [0, 0, 0]];
 
     /// The check of a device frame.
     fn sorte_device_frame_check(frame: &[u8; 6]) -> Result<DeviceFrameView<'static>, Error> {
-        DeviceFrameView::new(frame, 3)
+        DeviceFrameView::new(3, frame)
     } over DEVICE_FRAMES;
 
     /// CMP6 of the step pulse generator, from all of its states.
@@ -142,14 +143,14 @@ kernels! {
     } over GENERATORS;
 
     /// A word to its meaning and back, and a step to a word.
-    fn sorte_pto(word: &u16) -> (Pto, u16, Result<Pto, Error>) {
+    fn sorte_pto(word: &u16) -> (Pto, u16, Result<Pto, OutOfRange>) {
         let pto = Pto::from_word(*word);
         (pto, pto.word(), Pto::from_step(u32::from(*word), Direction::High))
     } over [0_u16, 1234, 0x89ab, 0x7fff, 0xffff];
 
     /// The payload of four motors with one sequence.
     fn sorte_payload((word, mask): &(u16, u8)) -> [u8; 16] {
-        Payload::shared(Pto::from_word(*word), MotorMask::new(*mask).unwrap_or_default()).emit()
+        Payload::shared(Pto::from_word(*word), MotorMask::from_bits_truncate(*mask)).emit()
     } over [(0x89ab_u16, 5_u8), (1234, 15), (1, 0)];
 
     /// A payload taken apart.
@@ -259,8 +260,8 @@ kernels! {
             Action::Send { frame: Outgoing::Discovery { .. }, .. } => Outgoing::Sync(Sync::of_master(500, 76, true)),
             _ => Outgoing::Discovery { last: true },
         };
-        let len = written.write(&mut buffer).unwrap_or_default();
-        let answer = master.received(frame, *sof_ns);
+        let len = written.emit_into(&mut buffer).unwrap_or_default();
+        let answer = master.receive(frame, *sof_ns);
         let _ = master.poll(*sof_ns);
         let _ = master.device_frame(frame);
         let _ = master.write_frame(frame, 0, &mut buffer);
@@ -274,7 +275,7 @@ kernels! {
         let mut frame = *frame;
         let handled = device.frame(*port, &mut frame, Arrival { sof_ns: 0, counter_ns: 0, now_ns: 0 });
         let restarted = device.poll(u64::MAX) | device.cycle_start();
-        let _ = device.delay_reflection(&frame, 500, handled.trigger);
+        let _ = device.delay_reflection(handled.trigger, &frame, 500);
         let _ = device.answer([0; 3]);
         let _ = (device.line_delay_next_ns(), device.cycle_zero_ns(), device.send_time_ns(), device.parameters());
         (handled, restarted)
@@ -312,7 +313,7 @@ kernels! {
         let codes = |register: Register| register.fields().iter().map(|field| field.get(*value)).sum();
         let ctrl = drv8711::Ctrl::parse(*value).map_or(0, drv8711::Ctrl::value);
         let decay = drv8711::Decay::parse(*value).map_or(0, drv8711::Decay::value);
-        let status = drv8711::Status::from_byte(value.to_le_bytes()[0]);
+        let status = drv8711::Status::of_register(*value);
         (ctrl, decay, codes(Register::Drive), status.is_fault() | status.looks_unpowered())
     } over [0xc10_u16, 0xfff, 0x110];
 

@@ -2,35 +2,51 @@
 
 use nom::{IResult, Parser};
 use tformat::{
-    Adf, Alarm, Almc, BitOrder, BitRate, ControlField, DataId, Error, Frame, Full, Hint, Position, Profile, Request,
-    Response, StatusField, U24, VendorCommand, crc, spi, stream,
+    Abm, Abs, Adf, AllData, Almc, BitOrder, BitRate, ControlField, DataId, Error, Frame, Hint, Position, Request,
+    Resolution, Response, StatusField, VendorCommand, Window, crc, spi, stream,
 };
 
 use super::kernels;
 use crate::self_test::tformat::{ANSWERS, Answer, FULL, FULL_FORMS, FullForms};
 
 /// One request of each length.
-const REQUESTS: [Request; 3] =
-    [Request::Id3, Request::IdD { adf: Adf::new(0x35) }, Request::Id6 { adf: Adf::new(0x7f), edf: 1 }];
+const REQUESTS: [Request; 3] = [
+    Request::ReadAll,
+    Request::ReadEeprom { adf: Adf::from_bits(0x35) },
+    Request::WriteEeprom { adf: Adf::from_bits(0x7f), edf: 1 },
+];
 
 /// Their fields, and how many there are.
 const SENT: [([u8; 4], usize); 3] = [([0x1a, 0, 0, 0], 1), ([0xea, 0x35, 0xdf, 0], 3), ([0x32, 0x7f, 0x01, 0x4c], 4)];
 
 /// An encoder of 23 and 16 bits with signed turns, one of 17 and 16 with unsigned ones; ABS and ABM of each.
-const POSITIONS: [(Profile, U24, U24); 2] = [
-    (profile(23, 16), U24::truncate(0x3b_c029), U24::truncate(0xfffe)),
-    (profile(17, 16).unsigned_turns(), U24::truncate(0x1_c029), U24::truncate(7)),
+const POSITIONS: [(Resolution, Abs, Abm); 2] = [
+    (resolution(23, 16), Abs::truncate(0x3b_c029), Abm::truncate(0xfffe)),
+    (resolution(17, 16).with_unsigned_turns(), Abs::truncate(0x1_c029), Abm::truncate(7)),
 ];
 
-const fn profile(abs_bits: u8, abm_bits: u8) -> Profile {
-    match Profile::new(abs_bits, abm_bits) {
-        Ok(profile) => profile,
+const fn resolution(abs_bits: u8, abm_bits: u8) -> Resolution {
+    match Resolution::new(abs_bits, abm_bits) {
+        Ok(resolution) => resolution,
         Err(_) => panic!("no such widths"),
     }
 }
 
 /// A logged answer to ID 3.
 const LOGGED: [u8; 11] = [0x1a, 0x20, 0x29, 0xc0, 0x3b, 0x17, 0x00, 0x00, 0x00, 0xc8, 0x37];
+
+/// It as line bits.
+const LINE: Window = {
+    let (mut bits, mut field) = (0, 0);
+    while field < 11 {
+        bits |= ((LOGGED[field] as u128) << 1 | 1 << 9) << (10 * field);
+        field += 1;
+    }
+    match Window::from_bits(bits, 110) {
+        Some(line) => line,
+        None => panic!("no frame is that long"),
+    }
+};
 
 /// It as 10-bit SPI words: delimiter of the field before, start bit, data bits.
 const SPI10: [u16; 11] = {
@@ -58,29 +74,35 @@ const SPI16: [u16; 8] = {
     words
 };
 
+/// A command that is not Tamagawa's.
+const VENDOR: VendorCommand = match VendorCommand::new(0x2a, 5) {
+    Ok(command) => command,
+    Err(_) => panic!("no such length"),
+};
+
 kernels! {
     /// The answer to ID 3 from its 110 line bits, least significant bit of a byte first, with all checks.
-    fn tformat_id3_line_lsb(row: &FullForms) -> Result<Full, Error> {
-        Full::parse_line(&row.lsb_first, BitOrder::LsbFirst)
+    fn tformat_id3_line_lsb(row: &FullForms) -> Result<AllData, Error> {
+        AllData::parse_line(&row.lsb_first, BitOrder::LsbFirst)
     } over FULL_FORMS;
 
     /// The same from a shift register, most significant bit first.
-    fn tformat_id3_line_msb(row: &FullForms) -> Result<Full, Error> {
-        Full::parse_line(&row.msb_first, BitOrder::MsbFirst)
+    fn tformat_id3_line_msb(row: &FullForms) -> Result<AllData, Error> {
+        AllData::parse_line(&row.msb_first, BitOrder::MsbFirst)
     } over FULL_FORMS;
 
     /// The answer to ID 3 from UART bytes.
-    fn tformat_id3_uart(row: &FullForms) -> Result<Full, Error> {
-        Full::parse(&row.uart)
+    fn tformat_id3_uart(row: &FullForms) -> Result<AllData, Error> {
+        AllData::parse(&row.uart)
     } over FULL_FORMS;
 
     /// The UART bytes of an answer to ID 3.
-    fn tformat_id3_emit(full: &Full) -> [u8; Full::FIELDS] {
+    fn tformat_id3_emit(full: &AllData) -> [u8; AllData::FIELDS] {
         full.emit()
     } over FULL;
 
     /// The line bits of an answer to ID 3.
-    fn tformat_id3_emit_line(full: &Full) -> [u8; Frame::MAX_LINE_BYTES] {
+    fn tformat_id3_emit_line(full: &AllData) -> [u8; Frame::MAX_LINE_BYTES] {
         full.emit_line(BitOrder::LsbFirst)
     } over FULL;
 
@@ -93,6 +115,11 @@ kernels! {
     fn tformat_response_parse_line(row: &Answer) -> Result<Response, Error> {
         Response::parse_line(row.request, row.line)
     } over ANSWERS;
+
+    /// The answer to ID 3 from a window of line bits, whichever ID is asked for.
+    fn tformat_response_parse_line_id3((request, line): &(Request, Window)) -> Result<Response, Error> {
+        Response::parse_line(*request, *line)
+    } over [(Request::ReadAll, LINE)];
 
     /// The fields of the answers of all IDs.
     fn tformat_response_emit(row: &Answer) -> Frame {
@@ -131,31 +158,31 @@ kernels! {
     } over ANSWERS;
 
     /// ABS and ABM as one position.
-    fn tformat_position((profile, abs, abm): &(Profile, U24, U24)) -> Result<Position, Error> {
-        profile.position(*abs, *abm)
+    fn tformat_position((resolution, abs, abm): &(Resolution, Abs, Abm)) -> Result<Position, Error> {
+        resolution.position(*abs, *abm)
     } over POSITIONS;
 
     /// The fraction of a turn, and the way from there to the zero point.
-    fn tformat_fraction((profile, abs, _): &(Profile, U24, U24)) -> Result<(u32, i32), Error> {
-        Ok((profile.fraction(*abs)?, profile.difference(profile.single_turn(*abs)?, 0)))
+    fn tformat_fraction((resolution, abs, _): &(Resolution, Abs, Abm)) -> Result<(u32, i32), Error> {
+        Ok((resolution.fraction(*abs)?, resolution.difference(resolution.single_turn(*abs)?, 0)))
     } over POSITIONS;
 
     /// What an encoder ID suggests.
     fn tformat_from_enid(enid: &u8) -> Option<Hint> {
-        Profile::from_enid(*enid)
+        Resolution::from_enid(*enid)
     } over [0x17_u8, 0x11, 0x99];
 
     /// The alarms of an error byte, counted, and whether the status says the same.
-    fn tformat_alarms(full: &Full) -> (usize, bool) {
-        let Full { sf, almc, .. } = *full;
-        let latched = almc.alarms().filter(|alarm| Alarm::is_latched(*alarm)).count();
-        (latched, sf.agrees_with(almc.with(Almc::NONE)) && !StatusField::of_alarms(almc).request_damaged())
+    fn tformat_alarms(full: &AllData) -> (usize, bool) {
+        let AllData { sf, almc, .. } = *full;
+        let latched = almc.intersection(Almc::LATCHED).iter().count();
+        (latched, sf.agrees_with(almc) && !StatusField::of_alarms(almc).intersects(StatusField::REQUEST_DAMAGED))
     } over FULL;
 
     /// How long a transaction takes on the line.
     fn tformat_transaction_time((rate, request): &(BitRate, Request)) -> u32 {
         rate.transaction_ns(request.data_id())
-    } over [(BitRate::Mbit2_5, Request::Id3), (BitRate::Mbit5, Request::Id0)];
+    } over [(BitRate::Mbit2_5, Request::ReadAll), (BitRate::Mbit5, Request::ReadSingleTurn)];
 
     /// A request as 10-bit SPI words.
     fn tformat_spi10_words(request: &Request) -> [u16; 4] {
@@ -166,7 +193,7 @@ kernels! {
 
     /// The answer to ID 3 from 10-bit SPI words.
     fn tformat_spi10_parse((words, len): &([u16; 11], usize)) -> Result<Response, Error> {
-        spi::parse_spi10(Request::Id3, words.get(..*len).unwrap_or(words))
+        spi::parse_spi10(Request::ReadAll, words.get(..*len).unwrap_or(words))
     } over [(SPI10, SPI10.len())];
 
     /// The transmitted stream of a transaction in 16-bit words.
@@ -178,7 +205,7 @@ kernels! {
 
     /// The answer to ID 3 from the received stream in 16-bit words.
     fn tformat_spi16_parse((words, len): &([u16; 8], usize)) -> Result<Response, Error> {
-        spi::parse_spi16(Request::Id3, words.get(..*len).unwrap_or(words))
+        spi::parse_spi16(Request::ReadAll, words.get(..*len).unwrap_or(words))
     } over [(SPI16, SPI16.len())];
 
     /// A request off the front of a stream.
@@ -194,10 +221,10 @@ kernels! {
     /// A vendor's own request with a body of two bytes.
     fn tformat_vendor_emit((command, body): &(VendorCommand, [u8; 2])) -> Option<Frame> {
         command.emit(body)
-    } over [(VendorCommand { cf: 0x2a, response_fields: 5 }, [0x11, 0x22])];
+    } over [(VENDOR, [0x11, 0x22])];
 
     /// The answer to a vendor's own request.
     fn tformat_vendor_parse((command, bytes): &(VendorCommand, [u8; 5])) -> Result<&'static [u8], Error> {
         command.parse(bytes)
-    } over [(VendorCommand { cf: 0x2a, response_fields: 5 }, [0x2a, 0x11, 0x22, 0x33, 0x2a])];
+    } over [(VENDOR, [0x2a, 0x11, 0x22, 0x33, 0x2a])];
 }

@@ -1,12 +1,12 @@
 //! T-Format: master, encoder, inspection and the receive logic of the CLB design.
 
 use tformat::clb::{Outputs, SerialCrc, Tile};
-use tformat::device::{Device, Fault, Reply};
+use tformat::device::{Device, Fault, Transmission};
 use tformat::inspect::{Report, inspect, inspect_bytes};
 use tformat::master::{
-    Counters, EepromAccess, ErrorRate, Line, Page, Polling, Progress, Reset, Step, Transaction, parse_echoed,
+    Counters, EEPROM_POLLING, EepromAccess, ErrorRate, Line, Progress, Reset, Step, Transaction, parse_echoed,
 };
-use tformat::{Address, Alarm, BitRate, Error, ErrorClass, Request, Response, SingleTurn, U24, Window};
+use tformat::{Abm, Abs, Address, Almc, BitRate, Error, ErrorClass, Page, Request, Response, SingleTurn, Window};
 
 use super::kernels;
 use crate::self_test::tformat::{ANSWERS, Answer, FLIPS, Flip};
@@ -20,8 +20,8 @@ const SENT: [Sent; 3] = [&[0x1a], &[0xea, 0x35, 0xdf], &[0x32, 0x7f, 0x01, 0x4c]
 /// Requests and whether they come back on the line.
 type Echoed = (Request, bool, &'static [u8]);
 const ECHOED: [Echoed; 2] = [
-    (Request::Id0, false, &[0x02, 0x20, 0xb4, 0xbd, 0x1c, 0x37]),
-    (Request::Id0, true, &[0x02, 0x02, 0x20, 0xb4, 0xbd, 0x1c, 0x37]),
+    (Request::ReadSingleTurn, false, &[0x02, 0x20, 0xb4, 0xbd, 0x1c, 0x37]),
+    (Request::ReadSingleTurn, true, &[0x02, 0x02, 0x20, 0xb4, 0xbd, 0x1c, 0x37]),
 ];
 
 kernels! {
@@ -32,16 +32,21 @@ kernels! {
         let mut now_ns = 4_000;
         for byte in *bytes {
             now_ns += 4_000;
-            transaction.byte(*byte, now_ns);
+            let _ = transaction.bytes(&[*byte], now_ns);
         }
         transaction.progress()
+    } over ECHOED;
+
+    /// A transaction whose whole answer comes in one block.
+    fn tformat_transaction_block((request, _, bytes): &Echoed) -> Progress {
+        Transaction::start(*request, LINE, 0).bytes(bytes, 31_000)
     } over ECHOED;
 
     /// A transaction that ends with a framing error or a time-out.
     fn tformat_transaction_fails((request, echo, bytes): &Echoed) -> Progress {
         let mut transaction = Transaction::start(*request, LINE, 0);
         for byte in *bytes {
-            transaction.byte(*byte, 4_000);
+            let _ = transaction.bytes(&[*byte], 40_000);
         }
         if *echo { transaction.framing_error(8_000) } else { transaction.poll(1_000_000) }
     } over ECHOED;
@@ -56,23 +61,23 @@ kernels! {
         let mut reset = Reset::clear_errors();
         let first = reset.start(0);
         match first {
-            Step::Send { .. } => reset.answer(Ok(row.want), 100_000),
+            Step::Send { .. } => reset.receive(Ok(row.want), 100_000),
             end => end,
         }
     } over ANSWERS;
 
     /// EEPROM access, from its start to the step after one answer.
     fn tformat_eeprom(row: &Answer) -> Step<u8> {
-        let (page, address) = Page::locate(300, Page::COUNT).unwrap_or((Page(0), Address::PAGE_REGISTER));
-        let mut access = EepromAccess::write(Some(page), address, row.bytes.len() as u8, Polling::default());
+        let (page, address) = Page::locate(300, Page::COUNT).unwrap_or((Page::MAX, Address::PAGE_REGISTER));
+        let mut access = EepromAccess::write(Some(page), address, row.bytes.len() as u8, EEPROM_POLLING);
         match access.start(0) {
-            Step::Send { .. } => access.answer(Ok(row.want), 100_000),
+            Step::Send { .. } => access.receive(Ok(row.want), 100_000),
             end => end,
         }
     } over ANSWERS;
 
     /// An outcome counted, and what that makes of the line.
-    fn tformat_counters(row: &Flip) -> (u32, u32, bool) {
+    fn tformat_counters(row: &Flip) -> (u64, u32, bool) {
         let mut counters = Counters::new();
         let mut rate = ErrorRate::new(100, 250);
         let outcome = Response::parse_line(row.request, row.line);
@@ -82,10 +87,10 @@ kernels! {
     } over FLIPS;
 
     /// A new encoder with an alarm receives a request byte by byte and answers.
-    fn tformat_device_byte(sent: &Sent) -> Option<Reply> {
+    fn tformat_device_byte(sent: &Sent) -> Option<Transmission> {
         let mut encoder = Device::<1>::new(0x17, BitRate::Mbit2_5);
-        encoder.set_position(U24::truncate(0x12_3456), U24::truncate(7));
-        encoder.set_alarm(Alarm::CountingError, !sent.is_empty());
+        encoder.set_position(Abs::truncate(0x12_3456), Abm::truncate(7));
+        encoder.set_alarms(Almc::CE, !sent.is_empty());
         encoder.set_fault(Fault::FlipBit { at: sent.len() as u8 });
         let mut now_ns = 0;
         sent.iter().fold(None, |reply, byte| {
@@ -95,7 +100,7 @@ kernels! {
     } over SENT;
 
     /// A new encoder receives a request bit by bit and answers.
-    fn tformat_device_bit(row: &Flip) -> Option<Reply> {
+    fn tformat_device_bit(row: &Flip) -> Option<Transmission> {
         let mut encoder = Device::<1>::new(0x17, BitRate::Mbit2_5);
         let mut now_ns = 0;
         (0..row.line.len()).filter_map(|at| row.line.get(at)).fold(None, |reply, level| {
@@ -112,7 +117,7 @@ kernels! {
     /// What is wrong with UART bytes, and which kinds of faults that are.
     fn tformat_inspect_bytes((request, _, bytes): &Echoed) -> (Report, usize) {
         let report = inspect_bytes(*request, bytes);
-        (report, report.findings.classes().count() + report.fields().len())
+        (report, report.findings.iter().count() + report.fields().len())
     } over ECHOED;
 
     /// A cycle of the tile.

@@ -24,7 +24,7 @@ include!(concat!(env!("OUT_DIR"), "/hdsl.rs"));
 pub(crate) const TOPICS: &[Topic] = &[("hdsl/8b10b_decode", words), ("hdsl/crc16", checks), ("hdsl/answer", answers)];
 
 fn words() -> Tally {
-    each(WORDS, |row| row.name, |row| Word::truncate(row.word).decode().map(Into::into) == row.want)
+    each(WORDS, |row| row.name, |row| Word::truncate(row.word as u16).decode().map(Into::into) == row.want)
 }
 
 fn checks() -> Tally {
@@ -32,6 +32,6 @@ fn checks() -> Tally {
 }
 
 fn answers() -> Tally {
-    let acceleration = |bits| Answer::from_bits(bits, Rule::Reduced).delta_delta().ok();
+    let acceleration = |bits| Answer::from_bits(Rule::Reduced, bits).delta_delta().ok();
     each(ANSWERS, |row| row.name, |row| acceleration(row.bits).map(DeltaDelta::get) == row.dd)
 }

@@ -1,7 +1,7 @@
 //! Replies of all layouts from line bits and words, ABS40 in both bit orders, refused flips, request frames.
 
 use nikon_aformat::{
-    Abs40, BitOrder, Command, EncoderAddress, ErrorClass, Expected, Layout, Reply, RequestFrame, Response, Window,
+    Abs40, BitOrder, Command, EncoderAddress, ErrorClass, Expected, Layout, RawResponse, RequestFrame, Response, Window,
 };
 
 use super::{Tally, Topic, each};
@@ -68,9 +68,9 @@ fn replies() -> Tally {
         REPLIES,
         |row| row.name,
         |row| {
-            let from_line = Response::parse_line(row.line, &row.expected);
-            let reply = Reply::from_line(row.line, row.expected.layout());
-            from_line == Response::parse_words(row.words, BitOrder::MsbFirst, &row.expected)
+            let from_line = Response::parse_line(&row.expected, row.line);
+            let reply = RawResponse::from_line(row.expected.layout(), row.line);
+            from_line == Response::parse_words(&row.expected, row.words, BitOrder::MsbFirst)
                 && from_line.is_ok_and(|response| response.abs() == row.abs && response.ea.get() == row.ea)
                 && reply.is_ok_and(|reply| reply.crc() == (row.crc, row.crc) && reply.line() == row.line)
         },
@@ -82,8 +82,8 @@ fn whole() -> Tally {
         WHOLE,
         |_| "ABS40",
         |row| {
-            let lsb = Abs40::parse_line(&row.lsb_first, BitOrder::LsbFirst, &row.expected);
-            lsb == Abs40::parse_line(&row.msb_first, BitOrder::MsbFirst, &row.expected)
+            let lsb = Abs40::parse_line(&row.expected, &row.lsb_first, BitOrder::LsbFirst);
+            lsb == Abs40::parse_line(&row.expected, &row.msb_first, BitOrder::MsbFirst)
                 && lsb.is_ok_and(|reply| reply.abs.get() == row.abs)
         },
     )
@@ -93,7 +93,7 @@ fn flips() -> Tally {
     each(
         FLIPS,
         |row| row.name,
-        |row| Response::parse_line(row.line, &row.expected).map_err(nikon_aformat::Error::class) == Err(row.want),
+        |row| Response::parse_line(&row.expected, row.line).map_err(nikon_aformat::Error::class) == Err(row.want),
     )
 }
 

@@ -1,7 +1,9 @@
 //! Blocks both ways, what a master finds in them, and servo-off.
 
 use rtex_block::master::{Expected, Reception, ServoOff};
-use rtex_block::{BlockSize, Code, Command, CommandBlock, Error, MacId, Response, UpdateCounter};
+use rtex_block::{
+    BlockSize, Code, Command, CommandBlock, ControlBits, Error, MacId, Response, StatusFlags, UpdateCounter,
+};
 
 use super::{Tally, Topic, each};
 
@@ -73,9 +75,9 @@ fn responses() -> Tally {
                     && response.mac_id.get() == row.mac_id
                     && response.update_counter_echo.get() == row.counter
                     && response.cmd_error == row.cmd_error
-                    && response.status.servo_active() == row.servo_active
+                    && response.status.contains(StatusFlags::SERVO_ACTIVE) == row.servo_active
                     && response.response_data1 == row.data1
-                    && response.with_answer(&response.answer()) == response
+                    && response.with_noncyclic(&response.noncyclic()) == response
             })
         },
     )
@@ -89,7 +91,7 @@ fn commands() -> Tally {
             Command::parse_strict(&row.block).is_ok_and(|command| {
                 command.emit() == row.block
                     && command.mac_id.get() == row.mac_id
-                    && command.control.servo_on() == row.servo_on
+                    && command.control.contains(ControlBits::SERVO_ON) == row.servo_on
                     && command.command_data1 == row.data1
             })
         },
@@ -102,7 +104,7 @@ fn checks() -> Tally {
         |row| row.name,
         |row| {
             let class = match row.expected().map(|expected| expected.check(row.block)) {
-                Some(Err(Error::Length { .. })) => "wrong_length",
+                Some(Err(Error::Truncated { .. } | Error::TooLong { .. })) => "wrong_length",
                 Some(Err(Error::Direction { .. })) => "not_a_response",
                 Some(Err(Error::MacId { .. })) => "mac_id_mismatch",
                 Some(Ok((_, Reception::CounterNotEchoed))) => "counter_not_echoed",

@@ -35,9 +35,9 @@ fn ioex_master() -> Tally {
         |_| "of ioex_master",
         |row| {
             let mut frame = [0; 21];
-            write_master_frame(&mut frame, &row.output, row.time_stamp) == Ok(21)
+            write_master_frame(&row.output, row.time_stamp, &mut frame) == Ok(21)
                 && frame == row.frame
-                && MasterFrameView::new(&frame, 16).is_ok_and(|view| view.output() == row.output)
+                && MasterFrameView::new(16, &frame).is_ok_and(|view| view.output() == row.output)
         },
     )
 }
@@ -46,7 +46,7 @@ fn ioex_master_negative() -> Tally {
     each(
         REFUSED,
         |_| "of ioex_master_negative",
-        |(frame, want)| MasterFrameView::new(frame, 16).map(|_| ()).map_err(Error::class) == want.map_or(Ok(()), Err),
+        |(frame, want)| MasterFrameView::new(16, frame).map(|_| ()).map_err(Error::class) == want.map_or(Ok(()), Err),
     )
 }
 

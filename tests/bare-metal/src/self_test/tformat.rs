@@ -1,8 +1,8 @@
 //! Answers from bytes and from line bits in both orders, refused single flips, check fields.
 
 use tformat::{
-    Adf, Almc, BitOrder, EncoderId, ErrorClass, Frame, Full, Memory, MultiTurn, Request, Response, SingleTurn,
-    StatusField, U24, Window, crc,
+    Abm, Abs, Adf, AllData, Almc, BitOrder, ErrorClass, Frame, Identification, Memory, MultiTurn, Request, Response,
+    SingleTurn, StatusField, Window, crc,
 };
 
 use super::{Tally, Topic, each};
@@ -16,9 +16,9 @@ pub(crate) struct Answer {
     pub(crate) want: Response,
 }
 
-/// A row of `responses.jsonl` that answers ID 3, as [`Full`] takes it: UART bytes, line bits in either bit order.
+/// A row of `responses.jsonl` that answers ID 3, as [`AllData`] takes it: UART bytes, line bits in either bit order.
 pub(crate) struct FullForms {
-    pub(crate) uart: [u8; Full::FIELDS],
+    pub(crate) uart: [u8; AllData::FIELDS],
     pub(crate) lsb_first: [u8; Frame::MAX_LINE_BYTES],
     pub(crate) msb_first: [u8; Frame::MAX_LINE_BYTES],
 }
@@ -76,10 +76,10 @@ fn full_forms() -> Tally {
         |_| "of an answer to ID 3",
         |row| {
             let lines = [(BitOrder::LsbFirst, row.lsb_first), (BitOrder::MsbFirst, row.msb_first)];
-            Full::parse(&row.uart).is_ok_and(|full| {
+            AllData::parse(&row.uart).is_ok_and(|full| {
                 full.emit() == row.uart
                     && lines.iter().all(|(order, line)| {
-                        Full::parse_line(line, *order) == Ok(full) && full.emit_line(*order) == *line
+                        AllData::parse_line(line, *order) == Ok(full) && full.emit_line(*order) == *line
                     })
             })
         },

@@ -60,7 +60,7 @@ pub(super) fn decode(rows: &[Row]) -> Vec<Verdict> {
         same("disparity", &row.disparity, &word.disparity())?;
         let reading = word.read(Rule::Reduced);
         // The word alone in the secondary channel of an answer.
-        let secondary = hdsl::Answer::from_bits(u64::from(word.bits()) << 51, Rule::Reduced).secondary();
+        let secondary = hdsl::Answer::from_bits(Rule::Reduced, u64::from(word.get()) << 51).secondary();
         let reduced = Reduced {
             byte: Hex(reading.raw().into()),
             byte_error: reading.is_byte_error(),
@@ -89,7 +89,7 @@ pub(super) fn stream(rows: &[Row]) -> Vec<Verdict> {
         let mut words = Vec::new();
         for sent in &row.sent {
             let (word, after) = super::character(*sent)?.encode(rd);
-            words.push(word.bits());
+            words.push(word.get());
             rd = after;
         }
         for flip in &row.flips {
@@ -189,8 +189,8 @@ struct MasterParam {
 pub(super) fn master_param(rows: &[Row]) -> Vec<Verdict> {
     each(rows, |row: MasterParam| {
         let byte = ParameterByte::new(row.param.0 as u8);
-        let got = LineDisparity(row.d_in).encode(byte);
-        same("code and d_out", &(row.code.word(), LineDisparity(row.d_out)), &got)?;
+        let got = LineDisparity::new(row.d_in).encode(byte);
+        same("code and d_out", &(row.code.word(), LineDisparity::new(row.d_out)), &got)?;
         same("decoded", &Some(byte), &ParameterByte::decode(row.code.word()))
     })
 }

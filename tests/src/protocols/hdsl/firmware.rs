@@ -1,14 +1,15 @@
 //! Traces of the receiver firmware, under its profile.
 
 use hdsl::frame::{FILLER, Trailer};
-use hdsl::master::{Cause, Master, State};
+use hdsl::master::{Cause, State};
 use hdsl::registers::{OnlineD, Register, Registers};
 use hdsl::sampling::{TEST_PATTERN, line};
 use hdsl::symbol::{Character, Control, RunningDisparity};
-use hdsl::{Content, DeltaDelta, EncoderByte, EncoderId, EncoderSymbol, MasterSymbol, Profile, Window};
+use hdsl::{Content, DeltaDelta, Dialect, EncoderByte, EncoderId, EncoderSymbol, MasterSymbol, Window};
 use serde::Deserialize;
 
 use super::Line;
+use super::bench::Bench;
 use crate::hex::{Bits, Bytes, Hex};
 use crate::row::{Fault, Row, Verdict, each, same};
 
@@ -55,17 +56,17 @@ fn bits64(bits: &Bits) -> u64 {
 }
 
 /// Compares the registers that a start-up row shows. After a failed identification the firmware leaves MASTER_QM.
-fn startup_registers(frame: &StartupFrame, master: &Master, identified: bool) -> Verdict {
+fn startup_registers(frame: &StartupFrame, bench: &Bench, identified: bool) -> Verdict {
     let (_, _, _, _, qm, delay, resets, id, online) = frame;
-    let map = master.registers();
+    let map = &bench.map;
     if identified {
         same("MASTER_QM", qm, &Hex(map.get::<1>(Register::MasterQm)[0].into()))?;
     }
     same("cable delay", &(delay.0 & 15), &u64::from(map.get::<1>(Register::Delay)[0] & 15))?;
-    same("resets", resets, &master.counters().restarts)?;
+    same("resets", resets, &bench.master.counters().restarts)?;
     let [high, middle, low] = map.get(Register::EncId);
     same("ENC_ID", id, &Hex(u32::from_be_bytes([0, high, middle, low]).into()))?;
-    same("ONLINE_STATUS_D", online, &Hex(map.online_d().raw().into()))
+    same("ONLINE_STATUS_D", online, &Hex(map.online_d().bits().into()))
 }
 
 pub(super) fn fw_startup(rows: &[Row]) -> Vec<Verdict> {
@@ -74,78 +75,85 @@ pub(super) fn fw_startup(rows: &[Row]) -> Vec<Verdict> {
     each(rows, |row: Startup| {
         columns(&row.columns, &names)?;
         let delay = row.frames.iter().map(|f| (f.5.0 & 15) as u32).find(|delay| *delay != 0).unwrap_or(1);
-        let mut master = Master::new(Profile::TI);
+        let mut bench = Bench::new(Dialect::TI);
         let (mut sent, mut identified) = (Vec::new(), true);
         let mut frames = row.frames.iter();
-        while let Some(frame) = next_answered(&mut master, &mut sent, &mut frames, &mut identified)? {
-            let present = master.transmission();
+        while let Some(frame) = next_answered(&mut bench, &mut sent, &mut frames, &mut identified)? {
+            let present = bench.master.transmission();
             let symbol = present.head.byte().symbol().map(symbol_name);
             same("symbol", &frame.0.as_deref(), &symbol.ok())?;
             same("param", &frame.1, &Some(Hex(present.head.byte().raw().into())))?;
             same("master bits", &frame.2.0, &sent)?;
-            startup_registers(frame, &master, identified)?;
+            startup_registers(frame, &bench, identified)?;
             sent.clear();
             let silent = frame.3.0.iter().all(|bit| *bit);
             let samples = if silent { [0xff; 72] } else { line(bits64(&frame.3), delay * 8) };
-            let before = master;
-            let report = master.finish(&samples, None).map_err(|e| Fault::Unreadable(e.to_string()))?;
+            let before = bench;
+            let report = bench.finish(&samples)?;
             sent.extend(report.tail.bits());
             identified &= !matches!(report.restarted, Some(Cause::Identifier(_)));
-            identified |= master.state() == State::WaitVsync;
+            identified |= bench.master.state() == State::WaitVsync;
             if report.restarted.is_some() && report.tail.trailer != Trailer::Cut {
                 // A row of its own for what was sent when the master gave up, with the registers before that.
-                let Some(gave_up) = frames.next() else { return Ok(()) };
+                let Some(gave_up) = frames.next() else { return learned(&row, &bench) };
                 same("gave up", &None, &gave_up.0)?;
                 same("master bits", &gave_up.2.0, &sent)?;
                 startup_registers(gave_up, &before, identified)?;
                 sent.clear();
             }
         }
-        let id = master.encoder_id().map(EncoderId::raw);
-        same("encoder_id", &row.encoder_id, &Hex(id.map_or(row.encoder_id.0, u64::from)))
+        learned(&row, &bench)
     })
+}
+
+/// The last entry shows ENC_ID with the nibble of ENC_ID2 doubled if the receiver locked, and 0 if it learned none.
+fn learned(row: &Startup, bench: &Bench) -> Verdict {
+    let shown = row.frames.last().map_or(0, |frame| frame.7.0);
+    let id = bench.master.encoder_id().map(EncoderId::get).map(u64::from);
+    if shown == 0 {
+        return same("encoder_id", &None, &id);
+    }
+    let nibble = row.encoder_id.0 >> 16;
+    same("ENC_ID of the row", &shown, &(row.encoder_id.0 & 0xffff | nibble << 20 | nibble << 16))?;
+    same("encoder_id", &Some(row.encoder_id.0), &id)
 }
 
 /// Sends frames until one is answered, and gives its row.
 fn next_answered<'a>(
-    master: &mut Master,
+    bench: &mut Bench,
     sent: &mut Vec<bool>,
     frames: &mut impl Iterator<Item = &'a StartupFrame>,
     identified: &mut bool,
 ) -> Result<Option<&'a StartupFrame>, Fault> {
     loop {
-        let present = master.transmission();
+        let present = bench.master.transmission();
         sent.extend((0..present.lead_in).map(|_| false));
         sent.extend(window(present.head.bits()));
         if present.answered {
-            *identified |= master.registers().link();
+            *identified |= bench.map.link();
             return Ok(frames.next());
         }
         sent.extend(window(FILLER));
-        let report = master.finish(&[], None).map_err(|e| Fault::Unreadable(e.to_string()))?;
+        let report = bench.finish(&[])?;
         sent.extend(report.tail.bits());
     }
 }
 
 /// A receiver that has just seen VSYNC; the next answer is the first of a V-frame.
-fn locked(pos_bits: u8) -> Result<Master, Fault> {
+fn locked(dialect: Dialect, pos_bits: u8) -> Result<Bench, Fault> {
     let id = EncoderId::new(3 | u32::from(pos_bits.wrapping_sub(11)) << 4);
     let id = id.ok_or_else(|| Fault::Unreadable(format!("pos_bits {pos_bits}")))?;
-    let mut master = Master::new(Profile::TI);
+    let mut bench = Bench::new(dialect);
     for _ in 0..200 {
-        let bits = match master.state() {
+        let bits = match bench.master.state() {
             State::Reset | State::Sync | State::Start | State::Learn | State::Check => TEST_PATTERN,
             State::IdReq => id.to_answer(Character::data(0), RunningDisparity::Minus).0,
             State::WaitVsync => idle(EncoderByte::of(EncoderSymbol::Idle, true)),
-            State::Running => return Ok(master),
+            State::Running => return Ok(bench),
         };
-        let _ = feed(&mut master, bits)?;
+        let _ = bench.feed(bits)?;
     }
     Err(Fault::Unreadable("the receiver does not lock".to_owned()))
-}
-
-fn feed(master: &mut Master, bits: u64) -> Result<hdsl::master::Report, Fault> {
-    master.finish(&line(bits, 8), None).map_err(|e| Fault::Unreadable(e.to_string()))
 }
 
 /// An answer at standstill.
@@ -175,18 +183,18 @@ fn bytes<const N: usize>(map: &Registers, from: Register) -> u64 {
     map.get::<N>(from).iter().fold(0, |all, byte| all << 8 | u64::from(*byte))
 }
 
-fn link_registers(frame: &LinkFrame, master: &Master, noise: bool) -> Verdict {
-    let map = master.registers();
+fn link_registers(frame: &LinkFrame, bench: &Bench, noise: bool) -> Verdict {
+    let map = &bench.map;
     let (_, qm, pos, vel, online, errors, phase, vpos, sum, safe2) = frame;
     same("MASTER_QM", qm, &Hex(bytes::<1>(map, Register::MasterQm)))?;
     same("POS", pos, &Hex(bytes::<5>(map, Register::Pos)))?;
     same("VEL", vel, &Hex(bytes::<3>(map, Register::Vel)))?;
     // A symbol made by noise opens a message, after which the firmware shows MIN for a frame.
-    let min = u64::from(OnlineD::MIN.raw());
+    let min = u64::from(OnlineD::MIN.bits());
     let unsure = if noise { min << 32 | min << 16 } else { 0 };
     same("ONLINE_STATUS", &Hex(online.0 & !unsure), &Hex(bytes::<6>(map, Register::OnlineStatusD) & !unsure))?;
     same("ACC_ERR_CNT", errors, &map.get::<1>(Register::AccErrCnt)[0])?;
-    same("align_phase", phase, &(master.phase() as u8))?;
+    same("align_phase", phase, &(bench.master.phase() as u8))?;
     same("VPOS, VPOSCRC", vpos, &Hex(bytes::<7>(map, Register::VPos)))?;
     same("SAFE_SUM", sum, &Hex(bytes::<1>(map, Register::SafeSum)))?;
     same("STATUS2, VPOS2, VPOSCRC2", safe2, &Hex(bytes::<8>(map, Register::Status2)))
@@ -197,20 +205,60 @@ pub(super) fn fw_link(rows: &[Row]) -> Vec<Verdict> {
     let names = [&names[..], &["SAFE_SUM", "STATUS2+VPOS2+CRC2"]].concat();
     each(rows, |row: Link| {
         columns(&row.columns, &names)?;
-        let mut master = locked(row.pos_bits)?;
+        let mut bench = locked(Dialect::TI, row.pos_bits)?;
+        let (last, len) = (row.frames.len().saturating_sub(1), row.frames.len());
         for (at, frame) in row.frames.into_iter().enumerate() {
             if frame.first().is_some_and(|first| first == "LINK_LOST") {
-                // The answer that caused the loss is not in the row.
-                continue;
+                // The answer that caused the loss is not in the row: nothing can follow.
+                same("entry of the loss", &last, &at)?;
+                return same("values of the loss", &10, &frame.len());
             }
-            let frame: LinkFrame =
-                serde_json::from_value(frame.into()).map_err(|e| Fault::Unreadable(format!("frame {at}: {e}")))?;
-            let report = feed(&mut master, frame.0.bits as u64)?;
-            same("restarted", &None, &report.restarted)?;
-            link_registers(&frame, &master, row.flip_probability > 0.0).map_err(|fault| at_frame(at, fault))?;
+            link_frame(&mut bench, at, frame, row.flip_probability > 0.0)?;
+        }
+        same("frames", &true, &(len > 0))
+    })
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct SickLink {
+    pos_bits: u8,
+    #[serde(rename = "kind")]
+    _kind: String,
+    columns: Vec<String>,
+    frames: Vec<Vec<serde_json::Value>>,
+}
+
+pub(super) fn link_sick(rows: &[Row]) -> Vec<Verdict> {
+    let names = ["answer", "MASTER_QM", "POS", "VEL", "ONLINE_STATUS_D/1/2", "ACC_ERR_CNT", "align_phase", "VPOS+CRC"];
+    let names = [&names[..], &["SAFE_SUM", "STATUS2+VPOS2+CRC2"]].concat();
+    each(rows, |row: SickLink| {
+        columns(&row.columns, &names)?;
+        let mut bench = locked(Dialect::SICK, row.pos_bits)?;
+        let last = row.frames.len().saturating_sub(1);
+        for (at, frame) in row.frames.into_iter().enumerate() {
+            if frame.first().is_some_and(|first| first == "LINK_LOST") {
+                same("entry of the loss", &last, &at)?;
+                let (_, answer): (String, Line) = read_frame(at, frame)?;
+                let report = bench.feed(answer.bits as u64)?;
+                same("restarted", &Some(Cause::Quality), &report.restarted)?;
+                return same("LINK", &false, &bench.map.link());
+            }
+            link_frame(&mut bench, at, frame, false)?;
         }
         Ok(())
     })
+}
+
+fn read_frame<T: serde::de::DeserializeOwned>(at: usize, frame: Vec<serde_json::Value>) -> Result<T, Fault> {
+    serde_json::from_value(frame.into()).map_err(|e| Fault::Unreadable(format!("frame {at}: {e}")))
+}
+
+fn link_frame(bench: &mut Bench, at: usize, frame: Vec<serde_json::Value>, noise: bool) -> Verdict {
+    let frame: LinkFrame = read_frame(at, frame)?;
+    let report = bench.feed(frame.0.bits as u64)?;
+    same("restarted", &None, &report.restarted)?;
+    link_registers(&frame, bench, noise).map_err(|fault| at_frame(at, fault))
 }
 
 /// Says in which frame of a trace the difference is.
@@ -250,10 +298,9 @@ struct Messages {
     data: Option<Bytes>,
 }
 
-/// Starts the message of a row and gives how many bytes of PC_BUFFER belong to it.
-fn trigger(row: &Messages, master: &mut Master) -> Result<usize, Fault> {
+/// Starts the message of a row.
+fn trigger(row: &Messages, bench: &mut Bench) -> Verdict {
     let missing = || Fault::Unreadable("a key of this kind of row is missing".to_owned());
-    let busy = |e: hdsl::Error| Fault::Unreadable(e.to_string());
     if row.kind == "long" {
         let (Some(addr), Some(read), Some(indirect), Some(llen), Some(data)) =
             (row.addr, row.read, row.indirect, row.llen, &row.data)
@@ -262,8 +309,8 @@ fn trigger(row: &Messages, master: &mut Master) -> Result<usize, Fault> {
         };
         let request = super::message::request(addr, read, indirect, llen, row.offset, data)?;
         same("request", &row.request.0, &request.emit().as_bytes().to_vec())?;
-        master.start_long(request).map_err(busy)?;
-        return Ok(data.0.len());
+        let header = row.request.0.first_chunk().copied().unwrap_or([0; 2]);
+        return bench.long(header, request.offset, &request.access);
     }
     let register = super::message::register(row.reg.ok_or_else(missing)?)?;
     let request = match (row.kind.as_str(), row.value) {
@@ -272,44 +319,63 @@ fn trigger(row: &Messages, master: &mut Master) -> Result<usize, Fault> {
         _ => return Err(missing()),
     };
     same("request", &row.request.0, &request.emit().as_bytes().to_vec())?;
-    master.start_short(request).map_err(busy)?;
-    Ok(0)
+    bench.short(request)
 }
 
-pub(super) fn fw_messages(rows: &[Row]) -> Vec<Verdict> {
-    each(rows, |row: Messages| {
-        let mut master = locked(32)?;
-        let mut answers = Encoder::default();
-        // One V-frame has to pass before messages are sent; the rows begin in the next but one frame boundary.
+/// A receiver and its encoder, kept from row to row.
+struct Session {
+    bench: Bench,
+    answers: Encoder,
+}
+
+impl Session {
+    fn new() -> Result<Self, Fault> {
+        let mut session = Self { bench: locked(Dialect::TI, 32)?, answers: Encoder::default() };
+        // One V-frame has to pass before messages are sent.
         for _ in 0..15 {
-            let _ = feed(&mut master, answers.next(EncoderSymbol::Idle))?;
+            session.bench.feed(session.answers.next(EncoderSymbol::Idle))?;
         }
-        let mut written = 0;
+        Ok(session)
+    }
+
+    fn row(&mut self, row: &Messages) -> Verdict {
         let mut sent = Vec::new();
         for (at, symbol) in row.encoder_symbols.iter().enumerate() {
             if at == 1 {
-                written = trigger(&row, &mut master)?;
+                trigger(row, &mut self.bench)?;
             }
-            let byte = master.transmission().head.byte();
+            let byte = self.bench.master.transmission().head.byte();
             sent.push(byte.symbol().map_or(0xff, MasterSymbol::bits));
             let symbol = EncoderSymbol::from_bits(*symbol).map_err(|e| Fault::Unreadable(e.to_string()))?;
-            let report = feed(&mut master, answers.next(symbol))?;
-            if let Some(Ok(answer)) = report.finished.long {
-                written = written.max(answer.result.map_or(2, |data| data.as_bytes().len()));
-            }
+            self.bench.feed(self.answers.next(symbol))?;
         }
         same("master_symbols", &row.master_symbols, &sent)?;
-        let map = master.registers();
-        if row.kind == "long" {
-            same("PC_ADD", &row.pc_add, &Hex(bytes::<2>(map, Register::PcAdd)))?;
-            let buffer: [u8; 8] = map.get(Register::PcBuffer);
-            same("PC_BUFFER", &row.pc_buffer.0.get(..written), &buffer.get(..written))?;
-        } else {
-            same("S_PC_DATA", &row.s_pc_data, &Hex(bytes::<1>(map, Register::SPcData)))?;
+        let map = &self.bench.map;
+        same("PC_ADD", &row.pc_add, &Hex(bytes::<2>(map, Register::PcAdd)))?;
+        same("PC_BUFFER", &row.pc_buffer.0, &map.get::<8>(Register::PcBuffer).to_vec())?;
+        same("S_PC_DATA", &row.s_pc_data, &Hex(bytes::<1>(map, Register::SPcData)))?;
+        same("EVENT", &row.event, &Hex(map.event().bits().into()))?;
+        same("EVENT_S", &row.event_s, &Hex(map.event_s().bits().into()))
+    }
+}
+
+/// Rows are sessions in order: a short message with nothing in PC_BUFFER after a row with something begins a new one.
+pub(super) fn fw_messages(rows: &[Row]) -> Vec<Verdict> {
+    let mut session: Option<Session> = None;
+    let mut used = false;
+    let mut check = |row: &Row| -> Verdict {
+        let row: Messages = row.read()?;
+        let empty = row.pc_buffer.0.iter().all(|byte| *byte == 0);
+        if row.kind != "long" && empty && used {
+            session = None;
         }
-        same("EVENT", &row.event, &Hex(map.event().raw().into()))?;
-        same("EVENT_S", &row.event_s, &Hex(map.event_s().raw().into()))
-    })
+        used = !empty || used && session.is_some();
+        match &mut session {
+            Some(session) => session.row(&row),
+            none => none.insert(Session::new()?).row(&row),
+        }
+    };
+    rows.iter().map(&mut check).collect()
 }
 
 /// An encoder at standstill that says what it is told to.

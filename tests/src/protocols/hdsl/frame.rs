@@ -2,7 +2,7 @@
 
 use hdsl::frame::{Extra, Head};
 use hdsl::rssi::{Rssi, edges as edge_byte, longest_gap};
-use hdsl::sampling::{Alignment, EdgeRule, SampleIndex, TEST_PATTERN};
+use hdsl::sampling::{Alignment, Delay, EdgeRule, SampleIndex, TEST_PATTERN};
 use hdsl::symbol::{Character, Reading, Rule};
 use hdsl::{Answer, Content, DeltaDelta, EncoderByte, Error, LineDisparity, ParameterByte, SafeBlock, VFrame};
 use serde::Deserialize;
@@ -22,13 +22,13 @@ enum MasterHeader {
 pub(super) fn master_header(rows: &[Row]) -> Vec<Verdict> {
     each(rows, |row: MasterHeader| match row {
         MasterHeader::Equalisation { d_in, eq, d_out } => {
-            same("eq and d_out", &(eq.bits as u8, LineDisparity(d_out)), &LineDisparity(d_in).equalisation())
+            same("eq and d_out", &(eq.bits as u8, LineDisparity::new(d_out)), &LineDisparity::new(d_in).equalisation())
         }
         MasterHeader::Free { param, d_in, bits, d_out } => {
             let byte = ParameterByte::new(param.0 as u8);
-            let (head, after) = Head::new(byte, None, LineDisparity(d_in));
+            let (head, after) = Head::new(byte, None, LineDisparity::new(d_in));
             same("bits", &bits.window(), &head.bits())?;
-            same("d_out", &LineDisparity(d_out), &after)?;
+            same("d_out", &LineDisparity::new(d_out), &after)?;
             same("param", &Ok(byte), &Head::parse(bits.window()).map(|got| got.byte))
         }
         MasterHeader::Sync { param, edge_eighths, window_bits, eq, para, samples } => {
@@ -96,6 +96,7 @@ fn acceleration_class(answer: Answer) -> &'static str {
         Ok(_) => "ok",
         Err(Error::InvalidWord { .. }) => "byte_error",
         Err(Error::EncoderError) => "encoder_error",
+        Err(Error::WrongKind { .. }) => "special_error",
         Err(Error::AccelerationCrc { .. }) => "crc_error",
         Err(_) => "unexpected",
     }
@@ -105,13 +106,13 @@ pub(super) fn answer(rows: &[Row]) -> Vec<Verdict> {
     each(rows, |row: AnswerRow| {
         let line = row.bits.window();
         if row.truncated {
-            let error = match Answer::parse(line, Rule::Strict) {
+            let error = match Answer::parse(Rule::Strict, line) {
                 Err(Error::Truncated { .. }) => Some("truncated".to_owned()),
                 _ => None,
             };
             return same("error", &row.error, &error);
         }
-        let (Ok(strict), Ok(reduced)) = (Answer::parse(line, Rule::Strict), Answer::parse(line, Rule::Reduced)) else {
+        let (Ok(strict), Ok(reduced)) = (Answer::parse(Rule::Strict, line), Answer::parse(Rule::Reduced, line)) else {
             return same("accepted", &true, &false);
         };
         same("error", &row.error, &None)?;
@@ -135,6 +136,59 @@ pub(super) fn answer(rows: &[Row]) -> Vec<Verdict> {
             same("rd_out", &row.rd_out, &Some(sign(rd)))?;
         }
         Ok(())
+    })
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct AnswerStrict {
+    bits: Line,
+    acc: String,
+    dd: Option<i16>,
+}
+
+pub(super) fn answer_strict(rows: &[Row]) -> Vec<Verdict> {
+    each(rows, |row: AnswerStrict| {
+        let Ok(answer) = Answer::parse(Rule::Strict, row.bits.window()) else { return same("accepted", &true, &false) };
+        same("acc", &row.acc.as_str(), &acceleration_class(answer))?;
+        same("dd", &row.dd, &answer.delta_delta().ok().map(DeltaDelta::get))
+    })
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct VFrameStrict {
+    frames: Vec<Line>,
+    safe1: String,
+    summary: Option<Hex>,
+    vpos: Option<Hex>,
+    crc1: Option<Hex>,
+    safe2: String,
+    status2: Option<Hex>,
+    vpos2: Option<Hex>,
+    crc2: Option<Hex>,
+    vsync: Vec<Option<bool>>,
+}
+
+/// Status, position and CRC of a block; nothing where one of the words is in no table.
+fn strict_bytes(block: SafeBlock, words: &[Reading]) -> [Option<Hex>; 3] {
+    let [status, position, crc] = safe_bytes(block);
+    let good = |range: core::ops::Range<usize>| words.get(range).is_some_and(|w| w.iter().all(|w| !w.is_byte_error()));
+    [good(0..1).then_some(status), good(1..6).then_some(position), good(6..8).then_some(crc)]
+}
+
+pub(super) fn vframe_strict(rows: &[Row]) -> Vec<Verdict> {
+    each(rows, |row: VFrameStrict| {
+        let answers: Vec<_> = row.frames.iter().map(|f| Answer::from_bits(Rule::Strict, f.bits as u64)).collect();
+        let Ok(answers) = <[Answer; 8]>::try_from(answers) else { return same("frames", &8, &row.frames.len()) };
+        let frame = VFrame::of(Rule::Strict, &answers);
+        same("safe1", &row.safe1.as_str(), &safe_class(frame.safe1))?;
+        let first = strict_bytes(frame.safe1, &answers.map(Answer::vertical));
+        same("summary, vpos, crc1", &[row.summary, row.vpos, row.crc1], &first)?;
+        same("safe2", &row.safe2.as_str(), &safe_class(frame.safe2))?;
+        let second = strict_bytes(frame.safe2, &answers.map(Answer::secondary));
+        same("status2, vpos2, crc2", &[row.status2, row.vpos2, row.crc2], &second)?;
+        same("vsync", &row.vsync, &answers.iter().map(|a| a.parameter().ok().map(EncoderByte::vsync)).collect())
     })
 }
 
@@ -169,9 +223,9 @@ fn safe_bytes(block: SafeBlock) -> [Hex; 3] {
 
 pub(super) fn vframe(rows: &[Row]) -> Vec<Verdict> {
     each(rows, |row: VFrameRow| {
-        let answers: Vec<_> = row.frames.iter().map(|f| Answer::from_bits(f.bits as u64, Rule::Reduced)).collect();
+        let answers: Vec<_> = row.frames.iter().map(|f| Answer::from_bits(Rule::Reduced, f.bits as u64)).collect();
         let Ok(answers) = <[Answer; 8]>::try_from(answers) else { return same("frames", &8, &row.frames.len()) };
-        let frame = VFrame::of(&answers, Rule::Reduced);
+        let frame = VFrame::of(Rule::Reduced, &answers);
         same("safe1", &row.safe1.as_str(), &safe_class(frame.safe1))?;
         same("summary, vpos, crc1", &[row.summary, row.vpos, row.crc1], &safe_bytes(frame.safe1))?;
         same("safe2", &row.safe2.as_str(), &safe_class(frame.safe2))?;
@@ -201,14 +255,22 @@ fn sampled(bits: u64, delay: u32, bytes: usize) -> Vec<u8> {
 }
 
 pub(super) fn learn(rows: &[Row]) -> Vec<Verdict> {
+    learn_by(EdgeRule::All, rows)
+}
+
+pub(super) fn learn_leading(rows: &[Row]) -> Vec<Verdict> {
+    learn_by(EdgeRule::Leading, rows)
+}
+
+fn learn_by(rule: EdgeRule, rows: &[Row]) -> Vec<Verdict> {
     each(rows, |row: Learn| {
         let samples = row.samples.0;
         if let (Some(delay), None) = (row.delay_eighths, row.jitter) {
             let pattern = TEST_PATTERN ^ row.flip.map_or(0, |flip| 1 << flip);
             same("samples", &samples, &sampled(pattern, delay, samples.len()))?;
         }
-        let (index, delay, error) = match Alignment::learn(&samples, EdgeRule::All) {
-            Ok(found) => (Some(found.index.get()), Some(found.delay), None),
+        let (index, delay, error) = match Alignment::learn(rule, &samples) {
+            Ok(found) => (Some(found.index.get()), Some(found.delay.get()), None),
             Err(Error::PatternNotFound { index }) => (Some(index), None, Some("pattern_not_found")),
             Err(Error::NoEdge) => (None, None, Some("no_edge")),
             Err(_) => (None, None, Some("unexpected")),
@@ -241,12 +303,14 @@ pub(super) fn sampled_answer(rows: &[Row]) -> Vec<Verdict> {
             same("samples", &samples, &sampled(row.sent.bits as u64, row.delay_eighths, samples.len()))?;
         }
         let index = SampleIndex::new(row.time_index);
-        let Some(index) = index else { return same("time_index", &true, &false) };
-        let alignment = Alignment { index, delay: row.delay };
+        let (Some(index), Some(delay)) = (index, Delay::new(row.delay)) else {
+            return same("time_index, delay", &true, &false);
+        };
+        let alignment = Alignment { index, delay };
         let Ok(bits) = alignment.bits(&samples) else { return same("complete", &true, &false) };
         same("bits", &row.bits.bits, &bits.into())?;
         same("bit_errors", &row.bit_errors, &(u128::from(bits) ^ row.sent.bits).count_ones())?;
-        same("rssi", &row.rssi, &alignment.rssi(&samples).get())
+        same("rssi", &Ok(row.rssi), &alignment.rssi(&samples).map(Rssi::get))
     })
 }
 

@@ -145,7 +145,7 @@ pub(super) fn long_message(rows: &[Row]) -> Vec<Verdict> {
             same("request", &sent.0, &want.emit().as_bytes().to_vec())?;
             same("request parsed", &Ok(want), &LongRequest::parse(&sent.0))?;
             let error = match error_code.as_ref().map(|code| code.0.as_slice()) {
-                Some([detail, class]) => Some(ResourceError { class: *class, detail: *detail }),
+                Some([detail, class]) => Some(ResourceError::new(*class, *detail)),
                 Some(_) => return Err(Fault::Unreadable("error_code has two bytes".to_owned())),
                 None => None,
             };
@@ -159,7 +159,7 @@ pub(super) fn long_message(rows: &[Row]) -> Vec<Verdict> {
             same("answer parsed", &Ok(reply), &LongAnswer::parse(&answer.0))?;
             let got = match want.parse_answer(&answer.0) {
                 Ok(data) => data.as_bytes().to_vec(),
-                Err(Error::Resource { class, detail }) => vec![detail, class],
+                Err(Error::Resource { error }) => vec![error.detail(), error.class_code()],
                 Err(e) => return Err(Fault::Unreadable(e.to_string())),
             };
             same("pc_buffer", &pc_buffer.0, &got)

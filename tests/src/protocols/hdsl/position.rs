@@ -1,6 +1,6 @@
 //! Fast position and quality monitor.
 
-use hdsl::{DeltaDelta, Estimator, PositionBits, PositionTracker, QualityEvent, QualityMonitor, QualityRule};
+use hdsl::{DeltaDelta, PositionBits, PositionRule, PositionTracker, QualityEvent, QualityMonitor, QualityRule};
 use serde::Deserialize;
 
 use crate::hex::Hex;
@@ -40,10 +40,10 @@ fn velocity(tracker: &PositionTracker) -> Hex {
     Hex(i64::from(tracker.velocity()).rem_euclid(1 << 24).unsigned_abs())
 }
 
-/// All frames with one estimator.
-fn run(row: &FastPosition, estimator: Estimator) -> Verdict {
+/// All frames by one rule.
+fn run(row: &FastPosition, rule: PositionRule) -> Verdict {
     let bits = PositionBits::new(row.pos_bits).ok_or_else(|| Fault::Unreadable("pos_bits".to_owned()))?;
-    let mut tracker = PositionTracker::with_estimator(bits, estimator);
+    let mut tracker = PositionTracker::with_rule(bits, rule);
     for frame in &row.frames {
         let word = DeltaDelta::from_word(frame.acc.0 as u16);
         let value = if frame.byte_error { None } else { word.ok() };
@@ -71,9 +71,14 @@ fn run(row: &FastPosition, estimator: Estimator) -> Verdict {
 
 pub(super) fn fast_position(rows: &[Row]) -> Vec<Verdict> {
     each(rows, |row: FastPosition| {
-        run(&row, Estimator::Wrapping16)?;
-        if row.quirk { Ok(()) } else { run(&row, Estimator::Clamped) }
+        run(&row, PositionRule::Ti)?;
+        if row.quirk { Ok(()) } else { run(&row, PositionRule::Sick) }
     })
+}
+
+/// `quirk` names the rule: the vendor's, or the default.
+pub(super) fn fast_position_wrap(rows: &[Row]) -> Vec<Verdict> {
+    each(rows, |row: FastPosition| run(&row, if row.quirk { PositionRule::Ti } else { PositionRule::Sick }))
 }
 
 #[derive(Deserialize)]

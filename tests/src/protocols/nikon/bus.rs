@@ -46,22 +46,21 @@ impl Slot {
         Self { error: Some(error.to_owned()), ..Self::default() }
     }
 
-    fn of(arrival: Arrival) -> Self {
+    fn of(arrival: Arrival, received_crc: Option<u8>) -> Self {
         let response = match arrival.outcome {
             Ok(response) => response,
             Err(error) => return Self::error(class(error)),
         };
-        let (got, _) = response.emit().crc();
         let mut slot = Self {
             ok: Some(true),
             duplicate: arrival.duplicate.then_some(true),
             ea: Some(response.ea.get()),
-            crc: Some(got),
-            es: response.es().map(nikon_aformat::EncoderStatus::raw),
+            crc: received_crc,
+            es: response.es().map(|es| es.bits()),
             es_any: response.es().is_none().then_some(response.has_status().into()),
             abs: response.abs(),
-            alm: response.alm().map(nikon_aformat::Alm::raw),
-            temp_raw: response.temperature().map(nikon_aformat::Temperature::raw),
+            alm: response.alm().map(|alm| alm.bits()),
+            temp_raw: response.temperature().map(|temperature| temperature.raw().into()),
             velocity: response.velocity(),
             ..Self::default()
         };
@@ -83,15 +82,16 @@ pub(super) fn line(_: &str, row: BusRow) -> Verdict {
     )?;
     let expected = Expected::new(layout, command);
     let mut bus = Bus::new(expected, Addresses::first(row.expected_encoders));
-    let mut receiver = LineReceiver::bits(layout).on_bus();
+    let mut receiver = LineReceiver::bits(layout);
     let mut slots = Vec::new();
     for bit in row.line.0 {
         if let Some(reply) = receiver.push(bit) {
-            slots.push(Slot::of(bus.push(reply)));
+            let crc = reply.ok().map(|reply| reply.crc().0);
+            slots.push(Slot::of(bus.push(reply), crc));
         }
     }
     if let Some(error) = receiver.finish() {
-        slots.push(Slot::of(bus.push(Err(error))));
+        slots.push(Slot::of(bus.push(Err(error)), None));
     }
     slots.extend((0..bus.not_started()).map(|_| Slot::error("missing")));
     same("replies", &row.expect, &slots)?;

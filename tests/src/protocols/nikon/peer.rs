@@ -4,7 +4,9 @@
 //! alone, and `enc_cmd` is stale after commands 21 and 22.
 
 use nikon_aformat::BitOrder::MsbFirst;
-use nikon_aformat::{Body, Command, Data, Expected, Layout, Operation, Profile, Request, Response, U24, UserAddress};
+use nikon_aformat::{
+    Body, Command, Data, EncoderId, Expected, Layout, Operation, Request, Resolution, Response, UserAddress,
+};
 use serde::Deserialize;
 
 use super::reply::words;
@@ -44,8 +46,8 @@ struct Driver {
 }
 
 /// The layout of a version 2.1 reply to a command, whatever its arguments.
-fn layout(command: Command, profile: Profile) -> Layout {
-    let id = U24::default();
+fn layout(command: Command, resolution: Resolution) -> Layout {
+    let id = EncoderId::default();
     let with_arguments = match command {
         Command::EepromRead => Operation::EepromRead { address: 0 },
         Command::EepromWrite => Operation::EepromWrite { address: UserAddress::default(), data: 0 },
@@ -54,15 +56,15 @@ fn layout(command: Command, profile: Profile) -> Layout {
         _ => Operation::SetAddress2 { id },
     };
     let operation = Operation::without_arguments(command).unwrap_or(with_arguments);
-    Request::new(nikon_aformat::EncoderAddress::ZERO, operation).layout(profile)
+    Request::new(nikon_aformat::EncoderAddress::ZERO, operation).layout(resolution)
 }
 
 pub(super) fn driver(_: &str, row: DriverRow) -> Verdict {
     let command = command(row.cmd)?;
-    let profile = or_unreadable(Profile::new(row.st_bits, row.mt_bits))?;
-    let expected = Expected::new(layout(command, profile), command);
+    let resolution = or_unreadable(Resolution::new(row.st_bits, row.mt_bits))?;
+    let expected = Expected::new(layout(command, resolution), command);
     let words = words(&row.words);
-    let response = match Response::parse_words(&words, MsbFirst, &expected) {
+    let response = match Response::parse_words(&expected, &words, MsbFirst) {
         Ok(response) => response,
         Err(error) => return same("outcome", &"good", &class(error)),
     };
@@ -76,26 +78,26 @@ pub(super) fn driver(_: &str, row: DriverRow) -> Verdict {
         Body::Abs17 { es_any, .. } => same("enc_status_raw", &driver.enc_status_raw, &es_any.into())?,
         Body::Full { command, es, .. } => {
             same("enc_cmd", &driver.enc_cmd, &command.code())?;
-            same("enc_status_raw", &driver.enc_status_raw, &(es.raw().reverse_bits() >> 4))?;
+            same("enc_status_raw", &driver.enc_status_raw, &(es.bits().reverse_bits() >> 4))?;
         }
     }
-    position(&driver, response, profile)?;
+    position(&driver, response, resolution)?;
     data(&driver, response)?;
     raw(&driver, response, &words)
 }
 
-fn position(driver: &Driver, response: Response, profile: Profile) -> Verdict {
+fn position(driver: &Driver, response: Response, resolution: Resolution) -> Verdict {
     if let Some(Data::Abs24High { abs }) = response.data() {
         return same("abs", &driver.abs, &abs.get().into());
     }
     let Some(abs) = response.abs() else { return Ok(()) };
-    let position = profile.position(abs, response.layout().abs_bits()).ok();
+    let position = resolution.position(abs, response.layout().abs_bits()).ok();
     let whole = response.abs40().is_some();
     let single_turn = position.map(|p| u64::from(p.single_turn));
     same("abs", &driver.abs, &single_turn.filter(|_| whole).unwrap_or(abs))?;
     let Some(position) = position else { return Ok(()) };
     same("multi_turn", &driver.multi_turn, &position.turns)?;
-    let angle = u64::from(profile.degrees_f32(position.single_turn).to_bits());
+    let angle = u64::from(resolution.degrees_f32(position.single_turn).to_bits());
     same("angle_f32_bits", &driver.angle_f32_bits.0, &angle)
 }
 
@@ -104,7 +106,7 @@ fn data(driver: &Driver, response: Response) -> Verdict {
         same("temperature_int", &driver.temperature_int, &(temperature.milli_celsius() / 1000))?;
     }
     if let Some(alm) = response.alm() {
-        same("alm_flags", &driver.alm_flags, &std::array::from_fn(|k| u8::from(alm.raw() >> k & 1 == 1)))?;
+        same("alm_flags", &driver.alm_flags, &std::array::from_fn(|k| u8::from(alm.bits() >> k & 1 == 1)))?;
     }
     match response.data() {
         Some(Data::Id { id }) => {

@@ -3,12 +3,13 @@
 use nikon_aformat::BitOrder::MsbFirst;
 use nikon_aformat::reception::LineReceiver;
 use nikon_aformat::{
-    Body, Data, Echo, EchoField, Error, Expected, Layout, Profile, Reply, Response, U19, U24, Version, Window,
+    Alm, Body, Data, Echo, EchoField, EncoderId, EncoderStatus, Error, Expected, Layout, RawResponse, Resolution,
+    Response, U19, Version, Window,
 };
 use serde::Deserialize;
 
 use super::value::{alarm_names, notice_names};
-use super::{RowVersion, address, class, command, layout, or_unreadable, profile, same_name, text, window};
+use super::{RowVersion, address, class, command, layout, or_unreadable, resolution, same_name, text, window};
 use crate::hex::{Bits, Bytes, Hex};
 use crate::row::{Fault, Verdict, same};
 
@@ -90,66 +91,66 @@ pub(super) fn words(hex: &[Hex]) -> Vec<u16> {
 
 pub(super) fn response(name: &str, row: ResponseRow) -> Verdict {
     let expected = expected(row.cmd, &row.layout, row.request_ea)?;
-    let profile = profile(row.st_bits, row.mt_bits, row.version)?;
+    let resolution = resolution(row.st_bits, row.mt_bits, row.version)?;
     same_name(name, command(row.cmd)?)?;
     same("size", &(row.frames, row.bits), &(expected.layout().frames(), expected.layout().line_bits()))?;
     let words = words(&row.words);
-    let reply = or_unreadable(Reply::from_words(&words, MsbFirst, expected.layout()))?;
+    let reply = or_unreadable(RawResponse::from_words(expected.layout(), &words, MsbFirst))?;
     same("wire", &text(window(&row.wire.0)?), &text(reply.line()))?;
     let mut packed = vec![0xff; row.packed.0.len()];
     or_unreadable(reply.line().write(&mut packed, 0, MsbFirst))?;
     same("packed", &row.packed.0, &packed)?;
-    let response = match Response::parse_line(window(&row.wire.0)?, &expected) {
+    let response = match Response::parse_line(&expected, window(&row.wire.0)?) {
         Ok(response) => response,
         Err(error) => return same("outcome", &"good", &class(error)),
     };
-    same("from words", &Ok(response), &Response::parse_words(&words, MsbFirst, &expected))?;
+    same("from words", &Ok(response), &Response::parse_words(&expected, &words, MsbFirst))?;
     let at_offset = or_unreadable(Window::read(&row.packed.0, 0, row.bits, MsbFirst))?;
-    same("from packed bytes", &Ok(response), &Response::parse_line(at_offset, &expected))?;
-    same("sent again", &Ok(response), &Response::parse(&response.emit(), &expected))?;
+    same("from packed bytes", &Ok(response), &Response::parse_line(&expected, at_offset))?;
+    same("sent again", &Ok(response), &Response::parse(&expected, &response.emit()))?;
     same("crc", &(row.expect.crc, row.expect.crc), &reply.crc())?;
     let first = reply.contents().first().copied().unwrap_or(0);
     same("sync", &row.expect.sync, &(first & 7))?;
     same("fixed", &row.expect.fixed, &response.command().map(|_| first >> 11 & 1))?;
     information(&row.expect, response)?;
     data(&row.expect, response, row.version.0)?;
-    position(&row.expect, response, profile)
+    position(&row.expect, response, resolution)
 }
 
 fn information(want: &Fields, got: Response) -> Verdict {
     same("ea", &want.ea, &got.ea.get())?;
     same("cc", &want.cc, &got.command().map(nikon_aformat::Command::code))?;
     let es = got.es();
-    same("es", &want.es, &es.map(nikon_aformat::EncoderStatus::raw))?;
+    same("es", &want.es, &es.map(|es| es.bits()))?;
     let any = match got.body {
         Body::Abs17 { es_any, .. } => Some(u8::from(es_any)),
         Body::Full { .. } => None,
     };
     same("es_any", &want.es_any, &any)?;
     let flags = es.map(|es| Flags {
-        busy: es.busy().into(),
-        battery: es.battery().into(),
-        warning: es.warning().into(),
-        error: es.error().into(),
+        busy: es.contains(EncoderStatus::BUSY).into(),
+        battery: es.contains(EncoderStatus::BATT).into(),
+        warning: es.contains(EncoderStatus::WARNING).into(),
+        error: es.contains(EncoderStatus::ERROR).into(),
     });
     same("es_flags", &want.es_flags, &flags)
 }
 
 fn data(want: &Fields, got: Response, version: Version) -> Verdict {
     same("abs", &want.abs, &got.abs())?;
-    same("temp_raw", &want.temp_raw, &got.temperature().map(nikon_aformat::Temperature::raw))?;
+    same("temp_raw", &want.temp_raw, &got.temperature().map(|temperature| temperature.raw().into()))?;
     same("temp_milli_c", &want.temp_milli_c, &got.temperature().map(nikon_aformat::Temperature::milli_celsius))?;
     same("velocity", &want.velocity, &got.velocity())?;
     let alm = got.alm();
-    same("alm", &want.alm, &alm.map(nikon_aformat::Alm::raw))?;
+    same("alm", &want.alm, &alm.map(|alm| alm.bits()))?;
     same("alm_set", &want.alm_set, &alm.map(|alm| alarm_names(alm, version)))?;
-    let reserved = alm.filter(|_| version < Version::V3_0).map(|alm| alm.reserved(version));
+    let reserved = alm.filter(|_| version < Version::V3_0).map(|alm| alm.difference(Alm::known(version)).bits() >> 11);
     same("alm_reserved", &want.alm_reserved, &reserved)?;
     let mut rest = Rest::default();
     match got.data() {
         Some(Data::Abs24High { abs }) => rest.abs_high = Some(abs.get()),
         Some(Data::Status { pm_alm, .. }) => {
-            rest.pm_alm = Some(pm_alm.raw());
+            rest.pm_alm = Some(pm_alm.bits());
             rest.pm_alm_set = (version >= Version::V3_0).then(|| notice_names(pm_alm));
         }
         Some(Data::Eeprom { data, address }) => rest.memory = (Some(data), None, Some(address), None),
@@ -185,14 +186,14 @@ struct Rest {
     acceleration: Option<i16>,
 }
 
-fn position(want: &Fields, got: Response, profile: Profile) -> Verdict {
-    let position = got.abs().and_then(|abs| profile.position(abs, got.layout().abs_bits()).ok());
+fn position(want: &Fields, got: Response, resolution: Resolution) -> Verdict {
+    let position = got.abs().and_then(|abs| resolution.position(abs, got.layout().abs_bits()).ok());
     same("single_turn", &want.single_turn, &position.map(|p| p.single_turn))?;
     same("turns_visible_bits", &want.turns_visible_bits, &position.map(|p| p.turns_bits))?;
     same("turns", &want.turns, &position.map(|p| p.turns))?;
     same("turns_signed", &want.turns_signed, &position.and_then(nikon_aformat::Position::signed_turns))?;
-    same("angle_deg_f64", &want.angle_deg_f64, &position.map(|p| profile.degrees(p.single_turn)))?;
-    let single = position.map(|p| u64::from(profile.degrees_f32(p.single_turn).to_bits()));
+    same("angle_deg_f64", &want.angle_deg_f64, &position.map(|p| resolution.degrees(p.single_turn)))?;
+    let single = position.map(|p| u64::from(resolution.degrees_f32(p.single_turn).to_bits()));
     same("angle_deg_f32_bits", &want.angle_deg_f32_bits.map(|bits| bits.0), &single)
 }
 
@@ -233,7 +234,7 @@ impl Arguments {
     fn echo(&self) -> Result<Echo, Fault> {
         Ok(match (self.addr, self.id, self.coef) {
             (Some(address), None, None) => Echo::Eeprom { address, bank: self.bank, data: self.data },
-            (None, Some(id), None) => Echo::Id(or_unreadable(U24::try_from(id))?),
+            (None, Some(id), None) => Echo::Id(or_unreadable(EncoderId::try_from(id))?),
             (None, None, Some(coefficient)) => Echo::Coefficient(or_unreadable(U19::try_from(coefficient))?),
             _ => return Err(Fault::Unreadable("one argument to repeat, of three kinds".to_owned())),
         })
@@ -285,7 +286,7 @@ impl Outcome {
 
 pub(super) fn judged(name: &str, row: JudgedRow) -> Verdict {
     same_name(name, command(row.cmd)?)?;
-    profile(row.st_bits, row.mt_bits, row.version)?;
+    resolution(row.st_bits, row.mt_bits, row.version)?;
     let mut expected = expected(row.cmd, &row.layout, row.request_ea)?;
     if let Some(Options { check_addr, echo }) = row.options {
         if check_addr == Some(false) {
@@ -295,7 +296,7 @@ pub(super) fn judged(name: &str, row: JudgedRow) -> Verdict {
             expected = expected.echoing(arguments.echo()?);
         }
     }
-    same("outcome", &row.expect, &Outcome::of(Response::parse_line(window(&row.wire.0)?, &expected)))
+    same("outcome", &row.expect, &Outcome::of(Response::parse_line(&expected, window(&row.wire.0)?)))
 }
 
 #[derive(Deserialize)]
@@ -326,14 +327,14 @@ struct Published {
 pub(super) fn anchor(_: &str, row: AnchorRow) -> Verdict {
     let expected = Expected::new(layout(&row.layout)?, command(row.cmd)?);
     let words = words(&row.words);
-    let response = match Response::parse_words(&words, MsbFirst, &expected) {
+    let response = match Response::parse_words(&expected, &words, MsbFirst) {
         Ok(response) => response,
         Err(error) => return same("outcome", &"good", &class(error)),
     };
     let want = row.expect;
     same("ea", &want.ea, &response.ea.get())?;
     same("cc", &Some(want.cc), &response.command().map(nikon_aformat::Command::code))?;
-    let es = response.es().map_or(0, nikon_aformat::EncoderStatus::raw);
+    let es = response.es().map_or(0, |es: nikon_aformat::EncoderStatus| es.bits());
     same("es", &want.es, &es)?;
     same("es_wire_order", &want.es_wire_order.unwrap_or(es.reverse_bits() >> 4), &(es.reverse_bits() >> 4))?;
     same("abs", &want.abs.or(response.abs()), &response.abs())?;
@@ -343,9 +344,9 @@ pub(super) fn anchor(_: &str, row: AnchorRow) -> Verdict {
     let (Some(single_turn), Some(turns)) = (want.single_turn, want.turns) else { return Ok(()) };
     // The row does not say the widths: one of those that exist has to fit.
     let shown = |st_bits| {
-        let profile = Profile::new(st_bits, 16).ok()?;
-        let position = profile.position(response.abs()?, response.layout().abs_bits()).ok()?;
-        let angle = format!("{:.9}", profile.degrees(position.single_turn));
+        let resolution = Resolution::new(st_bits, 16).ok()?;
+        let position = resolution.position(response.abs()?, response.layout().abs_bits()).ok()?;
+        let angle = format!("{:.9}", resolution.degrees(position.single_turn));
         Some((position.single_turn, position.turns, want.angle_deg.map(|_| angle)))
     };
     let published = (single_turn, turns, want.angle_deg.map(|angle| format!("{angle:.9}")));
@@ -371,7 +372,8 @@ pub(super) struct OversampledRow {
 pub(super) fn oversampled(_: &str, row: OversampledRow) -> Verdict {
     let layout = layout(&row.layout)?;
     same("frames", &row.frames, &layout.frames())?;
-    let mut receiver = or_unreadable(LineReceiver::oversampled(row.oversampling, layout))?;
+    let mut receiver =
+        or_unreadable(LineReceiver::oversampled(row.oversampling, layout))?.allowing_idle_between_frames();
     let reply = received(&mut receiver, &row.samples_packed_msb_first, row.samples)?;
     same("wire", &text(window(&row.expect_wire.0)?), &text(reply.line()))?;
     sound(reply, &row.expect_words, layout, row.cmd)
@@ -394,12 +396,16 @@ pub(super) fn unaligned(_: &str, row: UnalignedRow) -> Verdict {
     same("frames", &row.frames, &layout.frames())?;
     let start = or_unreadable(Window::read(&row.stream_packed_msb_first.0, row.leading_idle_bits, 1, MsbFirst))?;
     same("a start bit behind the idle bits", &0, &start.bits())?;
-    let reply = received(&mut LineReceiver::bits(layout), &row.stream_packed_msb_first, row.stream_bits)?;
+    let reply = received(
+        &mut LineReceiver::bits(layout).allowing_idle_between_frames(),
+        &row.stream_packed_msb_first,
+        row.stream_bits,
+    )?;
     sound(reply, &row.expect_words, layout, row.cmd)
 }
 
 /// The only reply in `len` samples.
-fn received(receiver: &mut LineReceiver, packed: &Bytes, len: usize) -> Result<Reply, Fault> {
+fn received(receiver: &mut LineReceiver, packed: &Bytes, len: usize) -> Result<RawResponse, Fault> {
     let samples = packed.0.iter().flat_map(|byte| (0..8).rev().map(move |k| byte >> k & 1 == 1)).take(len);
     let replies: Vec<_> = samples.filter_map(|sample| receiver.push(sample)).collect();
     same("left over", &None, &receiver.finish())?;
@@ -409,8 +415,8 @@ fn received(receiver: &mut LineReceiver, packed: &Bytes, len: usize) -> Result<R
     }
 }
 
-fn sound(reply: Reply, want: &[Hex], layout: Layout, cmd: u8) -> Verdict {
+fn sound(reply: RawResponse, want: &[Hex], layout: Layout, cmd: u8) -> Verdict {
     same("words", &words(want), &reply.words(MsbFirst).collect())?;
-    let parsed = Response::parse(&reply, &Expected::new(layout, command(cmd)?));
+    let parsed = Response::parse(&Expected::new(layout, command(cmd)?), &reply);
     same("outcome", &Ok(()), &parsed.map(|_| ()).map_err(class))
 }

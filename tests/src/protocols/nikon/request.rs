@@ -1,7 +1,10 @@
 //! What a master sends, and what an encoder makes of it.
 
 use nikon_aformat::BitOrder::MsbFirst;
-use nikon_aformat::{Error, FRAME_GAP_NS, FrameCode, Operation, Profile, Request, RequestFrame, U19, U24, UserAddress};
+use nikon_aformat::{
+    Command, EncoderAddress, EncoderId, Error, FRAME_GAP_NS, FrameCode, Operation, Request, RequestFrame, Resolution,
+    U19, UserAddress, Version,
+};
 use serde::Deserialize;
 
 use super::{RowVersion, address, class, command, frame_text, or_unreadable, same_name, text, window};
@@ -44,10 +47,10 @@ pub(super) fn cdf(name: &str, row: CdfRow) -> Verdict {
     };
     let names = ["EEPROM_READ_BANK", "EEPROM_WRITE_BANK", "VELCOEF_READ", "VELCOEF_WRITE"];
     same("name is one of version 3.0", &true, &names.contains(&name))?;
-    same("min_version", &(row.min_version.0 > nikon_aformat::Version::V2_1), &operation.needs_version_3())
+    same("min_version", &(row.min_version.0 > Version::V2_1), &operation.needs_version_3())
 }
 
-fn plain(name: &str, command: nikon_aformat::Command, version: RowVersion) -> Verdict {
+fn plain(name: &str, command: Command, version: RowVersion) -> Verdict {
     same_name(name, command)?;
     same("min_version", &version.0, &command.min_version())
 }
@@ -115,39 +118,42 @@ pub(super) enum RangeRow {
     VelocityCoefficientWrite { coef: u32, expect_error: Option<String> },
 }
 
-/// Arguments are types that hold nothing else, so the range is checked where a number becomes one of them.
+/// Arguments are types that hold nothing else, so the range is checked where a number becomes one of them, and what is
+/// refused there names the argument.
 pub(super) fn range(_: &str, row: RangeRow) -> Verdict {
-    let byte = |value: u32, class| u8::try_from(value).map_err(|_| class);
     let (want, got) = match row {
-        RangeRow::Cdf { cmd, ea, version, expect_error } => {
-            let profile = Profile::default().with_version(version.0);
-            let request = nikon_aformat::Command::from_code(cmd).and_then(|command| {
-                let ea = nikon_aformat::EncoderAddress::try_from(ea)?;
-                command.in_version(version.0)?;
-                Operation::without_arguments(command).map_or(Ok(()), |o| Request::new(ea, o).check(profile).map(|_| ()))
-            });
-            (expect_error, request.map_err(class))
-        }
+        RangeRow::Cdf { cmd, ea, version, expect_error } => (expect_error, command_in_range(cmd, ea, version.0)),
         RangeRow::EepromRead { addr, bank, expect_error } => {
-            let bank = bank.map_or(Ok(0), |bank| byte(bank, "bank_range"));
-            (expect_error, byte(addr, "address_range").and(bank).map(|_| ()))
+            let bank = fits::<u8, u32>(bank.unwrap_or(0), "bank_range");
+            (expect_error, fits::<u8, u32>(addr, "address_range").and(bank))
         }
         RangeRow::EepromWrite { addr, bank, data, expect_error } => {
-            let address = match bank {
-                None => UserAddress::try_from(addr).map(|_| ()).map_err(class),
-                Some(bank) => byte(addr, "address_range").and(byte(bank, "bank_range")).map(|_| ()),
+            let byte = fits::<u8, u32>(addr, "address_range");
+            let address = match (bank, u8::try_from(addr)) {
+                (Some(bank), _) => byte.and(fits::<u8, u32>(bank, "bank_range")),
+                (None, Ok(addr)) => fits::<UserAddress, u8>(addr, "address_range"),
+                (None, Err(_)) => byte,
             };
-            let data = u16::try_from(data).map(|_| ()).map_err(|_| "data_range");
-            (expect_error, address.and(data))
+            (expect_error, address.and(fits::<u16, u32>(data, "data_range")))
         }
-        RangeRow::IdWrite { ident, expect_error } => {
-            (expect_error, U24::try_from(ident).map(|_| ()).map_err(|_| "data_range"))
-        }
+        RangeRow::IdWrite { ident, expect_error } => (expect_error, fits::<EncoderId, u32>(ident, "data_range")),
         RangeRow::VelocityCoefficientWrite { coef, expect_error } => {
-            (expect_error, U19::try_from(coef).map(|_| ()).map_err(|_| "data_range"))
+            (expect_error, fits::<U19, u32>(coef, "data_range"))
         }
     };
     same("expect_error", &want.as_deref(), &got.err())
+}
+
+/// Whether `value` becomes a `T`.
+fn fits<T: TryFrom<V>, V>(value: V, class: &'static str) -> Result<(), &'static str> {
+    T::try_from(value).map(|_| ()).map_err(|_| class)
+}
+
+fn command_in_range(code: u8, ea: u32, version: Version) -> Result<(), &'static str> {
+    let command = Command::from_code(code).ok_or("unknown_command")?;
+    let ea = u8::try_from(ea).ok().and_then(EncoderAddress::new).ok_or("address_range")?;
+    let operation = Operation::without_arguments(command).unwrap_or(Operation::EepromRead { address: 0 });
+    Request::new(ea, operation).check(Resolution::default().with_version(version)).map(|_| ()).map_err(class)
 }
 
 #[derive(Deserialize)]
@@ -198,12 +204,12 @@ pub(super) fn transaction(name: &str, row: TransactionRow) -> Verdict {
     same("gap", &row.gap_between_frames_min_ns, &(names.len() > 1).then_some(FRAME_GAP_NS))?;
     same("repeat", &row.repeat, &command.repeats())?;
     same("multi_response", &row.multi_response, &command.is_multi_response())?;
-    let profile = match row.profile.as_str() {
-        "standard" => Profile::default(),
-        "factory_option" => Profile::default().low_with_velocity().resets_with_position(),
+    let resolution = match row.profile.as_str() {
+        "standard" => Resolution::default(),
+        "factory_option" => Resolution::default().low_with_velocity().resets_with_position(),
         other => return Err(Fault::Unreadable(format!("no profile {other:?}"))),
     };
-    let layout = request.layout(profile);
+    let layout = request.layout(resolution);
     same("response_layout", &row.response_layout.as_str(), &layout.name())?;
     same("response size", &(row.response_frames, row.response_bits), &(layout.frames(), layout.line_bits()))
 }
@@ -215,8 +221,8 @@ fn frame_name(index: usize, frame: RequestFrame) -> String {
 }
 
 fn operation(name: &str, code: u8, args: &Arguments) -> Result<Operation, Fault> {
-    let id = || or_unreadable(U24::try_from(args.ident.unwrap_or(u32::MAX)));
-    let user = |address: u8| or_unreadable(UserAddress::try_from(u32::from(address)));
+    let id = || or_unreadable(EncoderId::try_from(args.ident.unwrap_or(u32::MAX)));
+    let user = |address: u8| or_unreadable(UserAddress::try_from(address));
     Ok(match (code, args.addr, args.bank, args.data) {
         (13, Some(address), None, None) => Operation::EepromRead { address },
         (13, Some(address), Some(bank), None) => Operation::EepromReadBank { bank, address },

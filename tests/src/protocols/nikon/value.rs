@@ -1,8 +1,7 @@
 //! Check values, positions, alarms, temperatures, times.
 
 use nikon_aformat::{
-    Alarm, Alm, Battery, BitRate, Crc3, Crc8, EncoderStatus, PmAlarm, PmAlm, Profile, Temperature, TypeWord, U10, U40,
-    Version, crc3,
+    Alm, Battery, BitRate, Crc3, Crc8, EncoderStatus, PmAlm, Resolution, Temperature, TypeWord, U10, U40, Version, crc3,
 };
 use serde::Deserialize;
 
@@ -10,38 +9,47 @@ use super::{RowVersion, layout, or_unreadable};
 use crate::hex::{Bits, Hex};
 use crate::row::{Fault, Verdict, same};
 
-/// The rows' names of the alarms that are set.
+/// The rows' names of the alarms, from bit 0 up.
+const ALARMS: [&str; 16] = [
+    "batt",
+    "mt_err",
+    "ov_flow",
+    "ov_spd",
+    "mem_err",
+    "st_err",
+    "ps_err",
+    "busy",
+    "mem_busy",
+    "ov_temp",
+    "inc_err",
+    "ov_spd_s",
+    "st_err_s",
+    "ps_err_s",
+    "busy_s",
+    "inc_err_s",
+];
+
+/// The rows' names of the maintenance notices, by their flag.
+const NOTICES: [(PmAlm, &str); 4] =
+    [(PmAlm::INCW1, "incw_1"), (PmAlm::INCW2, "incw_2"), (PmAlm::IFW1, "ifw_1"), (PmAlm::IFW2, "ifw_2")];
+
+/// The rows' names of the alarms that are set and that `version` has. That the crate's names stand at the same bits is
+/// checked on the way: the rows write them with underscores.
 pub(super) fn alarm_names(alm: Alm, version: Version) -> Vec<String> {
-    let name = |alarm| match alarm {
-        Alarm::Batt => "batt",
-        Alarm::MtErr => "mt_err",
-        Alarm::OvFlow => "ov_flow",
-        Alarm::OvSpd => "ov_spd",
-        Alarm::MemErr => "mem_err",
-        Alarm::StErr => "st_err",
-        Alarm::PsErr => "ps_err",
-        Alarm::Busy => "busy",
-        Alarm::MemBusy => "mem_busy",
-        Alarm::OvTemp => "ov_temp",
-        Alarm::IncErr => "inc_err",
-        Alarm::OvSpdS => "ov_spd_s",
-        Alarm::StErrS => "st_err_s",
-        Alarm::PsErrS => "ps_err_s",
-        Alarm::BusyS => "busy_s",
-        Alarm::IncErrS => "inc_err_s",
-    };
-    alm.alarms(version).map(name).map(str::to_owned).collect()
+    let plain = |name: &str| name.replace('_', "").to_uppercase();
+    let known = alm & Alm::known(version);
+    known
+        .iter_names()
+        .map(|(name, flag)| {
+            let row = ALARMS.get(flag.bits().trailing_zeros() as usize).copied().unwrap_or("none");
+            if plain(row) == plain(name) { row.to_owned() } else { format!("{name} at the bit of {row}") }
+        })
+        .collect()
 }
 
 /// The rows' names of the maintenance notices that are set.
 pub(super) fn notice_names(pm_alm: PmAlm) -> Vec<String> {
-    let name = |alarm| match alarm {
-        PmAlarm::IncW1 => "incw_1",
-        PmAlarm::IncW2 => "incw_2",
-        PmAlarm::IfW1 => "ifw_1",
-        PmAlarm::IfW2 => "ifw_2",
-    };
-    pm_alm.alarms().map(name).map(str::to_owned).collect()
+    NOTICES.into_iter().filter(|(flag, _)| pm_alm.contains(*flag)).map(|(_, name)| name.to_owned()).collect()
 }
 
 #[derive(Deserialize)]
@@ -55,10 +63,10 @@ pub(super) struct AlarmRow {
 }
 
 pub(super) fn alarm(_: &str, row: AlarmRow) -> Verdict {
-    let alm = Alm::new(row.alm);
+    let alm = Alm::from_bits_retain(row.alm);
     same("set", &row.set, &alarm_names(alm, row.version.0))?;
-    same("summary_es", &row.summary_es, &EncoderStatus::of_alarms(alm).raw())?;
-    same("wire_order_bits", &row.wire_order_bits.0, &(0..16).map(|k| alm.raw() >> k & 1 == 1).collect())
+    same("summary_es", &row.summary_es, &EncoderStatus::of_alarms(alm).bits())?;
+    same("wire_order_bits", &row.wire_order_bits.0, &(0..16).map(|k| alm.bits() >> k & 1 == 1).collect())
 }
 
 #[derive(Deserialize)]
@@ -132,22 +140,22 @@ pub(super) struct MathRow {
 }
 
 pub(super) fn decode_math(_: &str, row: MathRow) -> Verdict {
-    let profile = or_unreadable(Profile::new(row.st_bits, row.mt_bits))?;
+    let resolution = or_unreadable(Resolution::new(row.st_bits, row.mt_bits))?;
     let abs = or_unreadable(U40::try_from(row.abs40))?;
     same("abs24_low", &row.abs24_low, &abs.low24().get())?;
     same("abs24_high", &row.abs24_high, &abs.high24().get())?;
     same("abs17", &row.abs17, &abs.low17().get())?;
     let joined = U40::from_halves(abs.low24(), abs.high24()).map(U40::get);
     same("abs40_from_high_and_low", &Some(row.abs40_from_high_and_low), &joined)?;
-    let position = or_unreadable(profile.position(row.abs40, 40))?;
+    let position = or_unreadable(resolution.position(row.abs40, 40))?;
     same("single_turn", &row.single_turn, &position.single_turn)?;
     same("turns", &row.turns, &position.turns)?;
     same("turns_signed", &row.turns_signed, &position.signed_turns())?;
-    same("angle_deg_f64", &row.angle_deg_f64, &profile.degrees(position.single_turn))?;
-    let single = u64::from(profile.degrees_f32(position.single_turn).to_bits());
+    same("angle_deg_f64", &row.angle_deg_f64, &resolution.degrees(position.single_turn))?;
+    let single = u64::from(resolution.degrees_f32(position.single_turn).to_bits());
     same("angle_deg_f32_bits", &row.angle_deg_f32_bits.0, &single)?;
-    same("angle_milli_deg_floor", &row.angle_milli_deg_floor, &profile.milli_degrees(position.single_turn))?;
-    same("composed", &abs, &profile.compose(position.single_turn, position.turns))
+    same("angle_milli_deg_floor", &row.angle_milli_deg_floor, &resolution.milli_degrees(position.single_turn))?;
+    same("composed", &abs, &resolution.compose(position.single_turn, position.turns))
 }
 
 #[derive(Deserialize)]
@@ -176,13 +184,13 @@ pub(super) fn type_word(_: &str, row: TypeWordRow) -> Verdict {
         Battery::Unknown(_) => None,
     };
     same("battery", &row.battery.as_deref(), &battery)?;
-    same("profile", &(row.st_bits.is_some() && row.mt_bits.is_some()), &word.profile().is_some())
+    same("resolution", &(row.st_bits.is_some() && row.mt_bits.is_some()), &word.resolution().is_some())
 }
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct TemperatureRow {
-    temp_raw: u32,
+    temp_raw: u16,
     milli_celsius_unsigned: u32,
     whole_celsius_truncated: u32,
     milli_celsius_if_twos_complement: i32,
@@ -229,11 +237,11 @@ pub(super) fn timing(_: &str, row: TimingRow) -> Verdict {
     };
     same("bit_ns", &row.bit_ns, &(f64::from(rate.bit_ps()) / 1000.0))?;
     same("response size", &(row.response_frames, row.response_bits), &(layout.frames(), layout.line_bits()))?;
-    same("response_ns", &whole(row.response_ns), &rate.reply_ns(layout))?;
+    same("response_ns", &whole(row.response_ns), &rate.response_ns(layout))?;
     same("one_frame_ns", &whole(row.one_frame_ns), &rate.bits_ns(nikon_aformat::FRAME_BITS))?;
     let one = whole(row.request_plus_response_ns_without_turnaround);
     same("request_plus_response_ns_without_turnaround", &one, &rate.transaction_ns(layout, 1))?;
-    same("bus_gap_ns", &row.bus_gap_ns, &rate.reply_gap_ns())?;
+    same("bus_gap_ns", &row.bus_gap_ns, &rate.response_gap_ns())?;
     let eight = whole(row.eight_encoders_ns_without_turnaround);
     same("eight_encoders_ns_without_turnaround", &eight, &rate.transaction_ns(layout, 8))
 }

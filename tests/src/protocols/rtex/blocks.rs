@@ -3,9 +3,9 @@
 use std::collections::BTreeMap;
 
 use rtex_block::{
-    Alarm, Answer, Arguments, Command, Command32, ControlBits, CyclicCode, Error, ErrorCode, Execution, Header, Nibble,
-    NonCyclicCode, Reply, Request, Response, Response32, StatusFlags, SubCommand, SubResponse, TypeCode, UpdateCounter,
-    pack,
+    Alarm, Arguments, Command, Command32, ControlBits, CyclicCode, Error, ErrorCode, Execution, Header, LatchFlags,
+    Nibble, NonCyclicCode, NonCyclicCommand, NonCyclicResponse, ProfileFlags, Response, Response32, Results,
+    StatusFlags, SubCommand, SubResponse, TypeCode, UpdateCounter, pack,
 };
 use serde::Deserialize;
 use serde_json::Value;
@@ -157,6 +157,10 @@ pub(super) fn packing(rows: &[Row]) -> Vec<Verdict> {
     })
 }
 
+fn flag<F: Default>(set: bool, flag: F) -> F {
+    if set { flag } else { F::default() }
+}
+
 /// The keys of `data` and `sub`, by name; what is read is taken out, so that nothing is left unlooked at.
 struct Keys(BTreeMap<String, Value>);
 
@@ -185,7 +189,8 @@ impl Keys {
     }
 
     fn execution(&mut self) -> Result<Execution, Fault> {
-        Ok(Execution { err: self.bit("err")?, wng: self.bit("wng")?, busy: self.bit("busy")? })
+        let (err, wng, busy) = (self.bit("err")?, self.bit("wng")?, self.bit("busy")?);
+        Ok(flag(err, Execution::ERR) | flag(wng, Execution::WNG) | flag(busy, Execution::BUSY))
     }
 
     fn end(self) -> Verdict {
@@ -213,7 +218,7 @@ struct CommandRow {
     hex: Bytes,
 }
 
-fn request(code: NonCyclicCode, keys: BTreeMap<String, Value>) -> Result<Request, Fault> {
+fn noncyclic_command(code: NonCyclicCode, keys: BTreeMap<String, Value>) -> Result<NonCyclicCommand, Fault> {
     let mut keys = Keys(keys);
     let arguments = |keys: &mut Keys, data: &str| {
         Ok(Arguments {
@@ -223,23 +228,23 @@ fn request(code: NonCyclicCode, keys: BTreeMap<String, Value>) -> Result<Request
         })
     };
     let request = match code {
-        NonCyclicCode::Normal => Request::Normal {
+        NonCyclicCode::Normal => NonCyclicCommand::Normal {
             command_data2: keys.number("command_data2")?,
             command_data3: keys.number("command_data3")?,
         },
-        NonCyclicCode::Reset => Request::Reset(arguments(&mut keys, "command_data3")?),
-        NonCyclicCode::SystemId => Request::SystemId(arguments(&mut keys, "command_data3")?),
-        NonCyclicCode::Alarm => Request::Alarm(arguments(&mut keys, "command_data3")?),
-        NonCyclicCode::Monitor => Request::Monitor(arguments(&mut keys, "command_data3")?),
-        NonCyclicCode::Parameter => Request::Parameter(arguments(&mut keys, "setting_data")?),
-        NonCyclicCode::Homing => Request::Homing {
+        NonCyclicCode::Reset => NonCyclicCommand::Reset(arguments(&mut keys, "command_data3")?),
+        NonCyclicCode::SystemId => NonCyclicCommand::SystemId(arguments(&mut keys, "command_data3")?),
+        NonCyclicCode::Alarm => NonCyclicCommand::Alarm(arguments(&mut keys, "command_data3")?),
+        NonCyclicCode::Monitor => NonCyclicCommand::Monitor(arguments(&mut keys, "command_data3")?),
+        NonCyclicCode::Parameter => NonCyclicCommand::Parameter(arguments(&mut keys, "setting_data")?),
+        NonCyclicCode::Homing => NonCyclicCommand::Homing {
             type_code: keys.number("type_code")?,
             latch_sel1: keys.nibble("latch_sel1")?,
             latch_sel2: keys.nibble("latch_sel2")?,
             monitor_sel: keys.number_or_0("monitor_sel")?,
             setting_data: keys.number("setting_data")?,
         },
-        NonCyclicCode::Profile => Request::Profile {
+        NonCyclicCode::Profile => NonCyclicCommand::Profile {
             type_code: keys.number("type_code")?,
             latch_sel1: keys.nibble("latch_sel1")?,
             monitor_sel: keys.number_or_0("monitor_sel")?,
@@ -261,7 +266,7 @@ pub(super) fn commands(rows: &[Row]) -> Vec<Verdict> {
             cyclic: cyclic(&row.cyclic)?,
             control: control_from(&row.control)?,
             command_data1: row.command_data1,
-            request: request(noncyclic(&row.noncyclic)?, row.data)?,
+            noncyclic: noncyclic_command(noncyclic(&row.noncyclic)?, row.data)?,
         };
         let Some(sub) = row.sub else {
             same("fields", &Ok(main), &Command::parse(&row.hex.0))?;
@@ -304,52 +309,56 @@ struct ResponseRow {
     hex: Bytes,
 }
 
-fn answer(code: NonCyclicCode, cmd_error: bool, keys: BTreeMap<String, Value>) -> Result<Answer, Fault> {
+fn noncyclic_response(
+    code: NonCyclicCode,
+    cmd_error: bool,
+    keys: BTreeMap<String, Value>,
+) -> Result<NonCyclicResponse, Fault> {
     let mut keys = Keys(keys);
     if cmd_error {
         let code = ErrorCode(keys.number("error_code")?);
-        return keys.end().map(|()| Answer::CommandError(code));
+        return keys.end().map(|()| NonCyclicResponse::CommandError(code));
     }
-    let answer = match code {
-        NonCyclicCode::Normal => Answer::Normal {
+    let response = match code {
+        NonCyclicCode::Normal => NonCyclicResponse::Normal {
             response_data2: keys.number("response_data2")?,
             response_data3: keys.number("response_data3")?,
         },
-        NonCyclicCode::Reset => Answer::Reset(reply(&mut keys, code)?),
-        NonCyclicCode::SystemId => Answer::SystemId(reply(&mut keys, code)?),
-        NonCyclicCode::Alarm => Answer::Alarm(reply(&mut keys, code)?),
-        NonCyclicCode::Parameter => Answer::Parameter(reply(&mut keys, code)?),
-        NonCyclicCode::Monitor => Answer::Monitor(reply(&mut keys, code)?),
-        NonCyclicCode::Homing => Answer::Homing {
+        NonCyclicCode::Reset => NonCyclicResponse::Reset(results(&mut keys, code)?),
+        NonCyclicCode::SystemId => NonCyclicResponse::SystemId(results(&mut keys, code)?),
+        NonCyclicCode::Alarm => NonCyclicResponse::Alarm(results(&mut keys, code)?),
+        NonCyclicCode::Parameter => NonCyclicResponse::Parameter(results(&mut keys, code)?),
+        NonCyclicCode::Monitor => NonCyclicResponse::Monitor(results(&mut keys, code)?),
+        NonCyclicCode::Homing => NonCyclicResponse::Homing {
             execution: keys.execution()?,
             type_code: keys.number("type_code_echo")?,
-            latch_comp1: keys.bit("latch_comp1")?,
-            latch_comp2: keys.bit("latch_comp2")?,
+            latch: flag(keys.bit("latch_comp1")?, LatchFlags::LATCH_COMP1)
+                | flag(keys.bit("latch_comp2")?, LatchFlags::LATCH_COMP2),
             latch_sel1: keys.nibble("latch_sel1_echo")?,
             latch_sel2: keys.nibble("latch_sel2_echo")?,
             monitor_sel: keys.number_or_0("monitor_sel_echo")?,
             monitor_data: keys.number("monitor_data")?,
         },
-        NonCyclicCode::Profile => Answer::Profile {
+        NonCyclicCode::Profile => NonCyclicResponse::Profile {
             execution: keys.execution()?,
             type_code: keys.number("type_code_echo")?,
-            psl: keys.bit("psl")?,
-            nsl: keys.bit("nsl")?,
-            near: keys.bit("near")?,
-            latch_comp1: keys.bit("latch_comp1")?,
+            flags: flag(keys.bit("psl")?, ProfileFlags::PSL)
+                | flag(keys.bit("nsl")?, ProfileFlags::NSL)
+                | flag(keys.bit("near")?, ProfileFlags::NEAR)
+                | flag(keys.bit("latch_comp1")?, ProfileFlags::LATCH_COMP1),
             latch_sel1: keys.nibble("latch_sel1_echo")?,
             monitor_sel: keys.number_or_0("monitor_sel_echo")?,
             monitor_data: keys.number("monitor_data")?,
         },
     };
-    keys.end().map(|()| answer)
+    keys.end().map(|()| response)
 }
 
-fn reply(keys: &mut Keys, code: NonCyclicCode) -> Result<Reply, Fault> {
+fn results(keys: &mut Keys, code: NonCyclicCode) -> Result<Results, Fault> {
     let data = match code {
         NonCyclicCode::Alarm => {
             let alarm = Alarm { main: keys.number("alarm_main")?, sub: keys.number("alarm_sub")? };
-            Reply::alarm_data(alarm, keys.number("warning_code")?)
+            Results::alarm_data(alarm, keys.number("warning_code")?)
         }
         NonCyclicCode::SystemId => {
             let text = keys.0.remove("ascii_hex").unwrap_or_default();
@@ -359,7 +368,7 @@ fn reply(keys: &mut Keys, code: NonCyclicCode) -> Result<Reply, Fault> {
         _ => keys.number("monitor_data")?,
     };
     let type_code = keys.type_code("type_code_echo")?;
-    Ok(Reply { execution: keys.execution()?, type_code, index: keys.number("index_echo")?, data })
+    Ok(Results { execution: keys.execution()?, type_code, index: keys.number("index_echo")?, data })
 }
 
 fn sub_response(keys: BTreeMap<String, Value>) -> Result<SubResponse, Fault> {
@@ -367,7 +376,9 @@ fn sub_response(keys: BTreeMap<String, Value>) -> Result<SubResponse, Fault> {
     let name = keys.0.remove("sub_command").and_then(|v| v.as_str().map(str::to_owned)).unwrap_or_default();
     let code = Nibble::new(sub_code(&name)? as u8).ok_or_else(|| unreadable("sub-command above 15"))?;
     let cmd_error = keys.bit("sub_cmd_err")?;
-    let execution = Execution { err: keys.bit("sub_err")?, wng: keys.bit("sub_wng")?, busy: keys.bit("sub_busy")? };
+    let execution = flag(keys.bit("sub_err")?, Execution::ERR)
+        | flag(keys.bit("sub_wng")?, Execution::WNG)
+        | flag(keys.bit("sub_busy")?, Execution::BUSY);
     let index = keys.number(if cmd_error { "sub_error_code" } else { "sub_index_echo" })?;
     let (type_code, data1) = if cmd_error {
         (keys.number_or_0("sub_type_code_echo")?, keys.number_or_0("sub_response_data1")?)
@@ -384,7 +395,7 @@ pub(super) fn responses(rows: &[Row]) -> Vec<Verdict> {
         same("mode", &usize::from(row.mode), &row.hex.0.len())?;
         size(row.mode)?;
         let noncyclic = noncyclic(&row.noncyclic)?;
-        let answer = answer(noncyclic, row.cmd_error == 1, row.data)?;
+        let data = noncyclic_response(noncyclic, row.cmd_error == 1, row.data)?;
         let main = Response {
             mac_id: mac_id(row.actual_mac_id)?,
             update_counter_echo: counter(row.update_counter_echo)?,
@@ -395,12 +406,12 @@ pub(super) fn responses(rows: &[Row]) -> Vec<Verdict> {
             response_data2: 0,
             response_data3: 0,
         }
-        .with_answer(&answer);
+        .with_noncyclic(&data);
         let Some(sub) = row.sub else {
             let parsed = Response::parse(&row.hex.0).map_err(|e| unreadable(e.to_string()))?;
             same("fields", &main, &parsed)?;
             same("fields, strictly", &Ok(main), &Response::parse_strict(&row.hex.0))?;
-            same("data", &answer, &parsed.answer())?;
+            same("data", &data, &parsed.noncyclic())?;
             same("cmd_error", &row.cmd_error, &parsed.cmd_error.into())?;
             same("status", &row.status, &status(parsed.status))?;
             return same("hex", &row.hex.0, &main.emit().to_vec());
@@ -409,7 +420,7 @@ pub(super) fn responses(rows: &[Row]) -> Vec<Verdict> {
         let parsed = Response32::parse(&row.hex.0).map_err(|e| unreadable(e.to_string()))?;
         same("fields", &response, &parsed)?;
         same("fields, strictly", &Ok(response), &Response32::parse_strict(&row.hex.0))?;
-        same("data", &answer, &parsed.main.answer())?;
+        same("data", &data, &parsed.main.noncyclic())?;
         same("hex", &row.hex.0, &response.emit().to_vec())
     })
 }

@@ -59,27 +59,27 @@ pub(super) fn sub_code(name: &str) -> Result<SubCode, Fault> {
 pub(super) type Bits = BTreeMap<String, u8>;
 
 fn key(name: &str) -> String {
-    name.to_lowercase().replace('-', "_")
+    name.to_lowercase()
 }
 
 pub(super) fn control(bits: ControlBits) -> Bits {
-    ControlBits::NAMED.iter().map(|(bit, name)| (key(name), u8::from(bits.contains(*bit)))).collect()
+    ControlBits::all().iter_names().map(|(name, bit)| (key(name), u8::from(bits.contains(bit)))).collect()
 }
 
 pub(super) fn status(flags: StatusFlags) -> Bits {
-    StatusFlags::NAMED.iter().map(|(bit, name)| (key(name), u8::from(flags.contains(*bit)))).collect()
+    StatusFlags::all().iter_names().map(|(name, bit)| (key(name), u8::from(flags.contains(bit)))).collect()
 }
 
 pub(super) fn control_from(bits: &Bits) -> Result<ControlBits, Fault> {
     bits.iter().filter(|(_, set)| **set != 0).try_fold(ControlBits::empty(), |all, (name, _)| {
-        let found = ControlBits::NAMED.iter().find(|(_, n)| key(n) == *name);
-        found.map(|(bit, _)| all.with(*bit)).ok_or_else(|| unreadable(format!("{name} is not a control bit")))
+        let found = ControlBits::all().iter_names().find(|(n, _)| key(n) == *name);
+        found.map(|(_, bit)| all | bit).ok_or_else(|| unreadable(format!("{name} is not a control bit")))
     })
 }
 
 pub(super) fn status_from(bits: &Bits) -> Result<StatusFlags, Fault> {
     bits.iter().filter(|(_, set)| **set != 0).try_fold(StatusFlags::empty(), |all, (name, _)| {
-        let found = StatusFlags::NAMED.iter().find(|(_, n)| key(n) == *name);
-        found.map(|(bit, _)| all.with(*bit)).ok_or_else(|| unreadable(format!("{name} is not a status flag")))
+        let found = StatusFlags::all().iter_names().find(|(n, _)| key(n) == *name);
+        found.map(|(_, bit)| all | bit).ok_or_else(|| unreadable(format!("{name} is not a status flag")))
     })
 }

@@ -3,8 +3,12 @@
 use core::num::NonZeroU16;
 
 use rtex_block::device;
-use rtex_block::master::{CommandCounter, EchoWatch, Expected, Handshake, Progress, Reception, ServoOff, Turn};
-use rtex_block::{BlockSize, Command, CommandBlock, ControlBits, Error, MacId, NonCyclicCode, Request, Response};
+use rtex_block::master::{
+    CommandCounter, EchoWatch, Expected, Failure, Handshake, Progress, Reception, ServoOff, Turn,
+};
+use rtex_block::{
+    BlockSize, Command, CommandBlock, ControlBits, Error, Execution, MacId, NonCyclicCode, NonCyclicCommand, Response,
+};
 use serde::Deserialize;
 
 use super::fields::{code, counter, mac_id, size, unreadable};
@@ -13,7 +17,7 @@ use crate::row::{Fault, Row, Verdict, each, same};
 
 fn class(result: &Result<(Response, Reception), Error>) -> String {
     match result {
-        Err(Error::Length { .. }) => "wrong_length",
+        Err(Error::Truncated { .. } | Error::TooLong { .. }) => "wrong_length",
         Err(Error::Direction { .. }) => "not_a_response",
         Err(Error::MacId { .. }) => "mac_id_mismatch",
         Ok((_, Reception::CounterNotEchoed)) => "counter_not_echoed",
@@ -215,11 +219,11 @@ struct Done {
     warning: u8,
 }
 
-fn request(keys: &RequestKeys) -> Result<(rtex_block::CyclicCode, Request), Fault> {
+fn request(keys: &RequestKeys) -> Result<(rtex_block::CyclicCode, NonCyclicCommand), Fault> {
     let (cyclic, noncyclic) = code(keys.code.0)?.pair().map_err(|e| unreadable(e.to_string()))?;
     let [type_low, type_high] = keys.type_code.to_le_bytes();
     let [index_low, index_high] = keys.index.to_le_bytes();
-    Ok((cyclic, Request::from_bytes(noncyclic, [type_low, type_high, index_low, index_high, 0, 0, 0, 0])))
+    Ok((cyclic, NonCyclicCommand::from_bytes(noncyclic, [type_low, type_high, index_low, index_high, 0, 0, 0, 0])))
 }
 
 pub(super) fn noncyclic_traces(rows: &[Row]) -> Vec<Verdict> {
@@ -231,15 +235,18 @@ pub(super) fn noncyclic_traces(rows: &[Row]) -> Vec<Verdict> {
         let seen: Vec<Expect> = row
             .responses
             .iter()
-            .map(|bytes| match handshake.poll(Response::parse(&bytes.0).ok().as_ref()) {
-                Progress::Pending | Progress::TimedOut => Expect::Pending,
-                Progress::Failed => Expect::Failed,
-                Progress::Rejected(code) => Expect::Rejected(Hex(code.0.into())),
-                Progress::Done { data, warning } => {
-                    Expect::Done { done: Done { monitor_data: data, warning: warning.into() } }
+            .map(|bytes| match handshake.receive(Response::parse(&bytes.0).ok().as_ref()) {
+                Progress::Pending { .. } => Ok(Expect::Pending),
+                Progress::Failed { error: Failure::Execution } => Ok(Expect::Failed),
+                Progress::Failed { error: Failure::CommandError(code) } => Ok(Expect::Rejected(Hex(code.0.into()))),
+                Progress::Failed { error } => Err(unreadable(error.to_string())),
+                Progress::Done { value } => {
+                    let warning = value.execution().is_some_and(|e| e.contains(Execution::WNG)).into();
+                    let data = value.data().ok_or_else(|| unreadable("no data"))?;
+                    Ok(Expect::Done { done: Done { monitor_data: data, warning } })
                 }
             })
-            .collect();
+            .collect::<Result<_, Fault>>()?;
         same("expect", &row.expect, &seen)
     })
 }

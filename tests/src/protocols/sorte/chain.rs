@@ -54,9 +54,10 @@ fn check_hop(pass: &mut Option<Pass>, row: &Hop) -> Verdict {
     let (Some(status), false) = (row.rx_head.0.get(3), row.number == 0) else {
         return Err(Fault::Unreadable("rx_head, hop".to_owned()));
     };
-    let last_round = Status(*status).is_state_change();
-    let goes_on =
-        |p: &Pass| p.chain == row.chain && p.hop < row.number && p.frame.status.is_state_change() == last_round;
+    let last_round = Status::from_bits_retain(*status).contains(Status::STATE_CHANGE);
+    let goes_on = |p: &Pass| {
+        p.chain == row.chain && p.hop < row.number && p.frame.status.contains(Status::STATE_CHANGE) == last_round
+    };
     let mut current = match pass.take() {
         Some(current) if goes_on(&current) => current,
         _ => Pass { chain: row.chain, hop: 0, frame: Discovery::published_request(last_round) },
@@ -66,7 +67,7 @@ fn check_hop(pass: &mut Option<Pass>, row: &Hop) -> Verdict {
         current.hop += 1;
     }
     // What the row shows of the frame before must be what we have; an error flag of an unlisted hop is taken from it.
-    current.frame.status = Status(*status);
+    current.frame.status = Status::from_bits_retain(*status);
     let before = current.frame.emit();
     same("rx_head", &Some(&row.rx_head.0[..]), &before.get(..row.rx_head.0.len()))?;
 

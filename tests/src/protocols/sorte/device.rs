@@ -73,9 +73,9 @@ fn name(state: State) -> String {
 }
 
 fn flags(names: &[String]) -> Result<PortFlags, Fault> {
-    let of = |name: &String| FLAGS.iter().find(|(_, n)| n == name).map(|(flag, _)| flag.0);
+    let of = |name: &String| FLAGS.iter().find(|(_, n)| n == name).map(|(flag, _)| flag.bits());
     let mut bits = names.iter().map(|name| of(name).ok_or_else(|| Fault::Unreadable(format!("flag {name}"))));
-    bits.try_fold(0, |all, bit| Ok(all | bit?)).map(PortFlags)
+    bits.try_fold(0, |all, bit| Ok(all | bit?)).map(PortFlags::from_bits_retain)
 }
 
 pub(super) fn device_state(rows: &[Row]) -> Vec<Verdict> {
@@ -149,7 +149,7 @@ fn measure(device: &mut Device) {
     for n in 1..=16 {
         let trigger = if n == 16 { Trigger::Last } else { Trigger::Normal };
         let request = Device::delay_request(trigger).map(|request| request.emit()).unwrap_or_default();
-        assert_eq!(device.delay_reflection(&request, 560, trigger), Ok(()));
+        assert_eq!(device.delay_reflection(trigger, &request, 560), Ok(()));
     }
 }
 

@@ -54,7 +54,7 @@ struct Sized {
 
 fn build(output: &[u8], time_stamp: u16) -> Vec<u8> {
     let mut frame = vec![0; output.len() + MasterFrameView::OVERHEAD];
-    let len = write_master_frame(&mut frame, output, time_stamp);
+    let len = write_master_frame(output, time_stamp, &mut frame);
     assert_eq!(len, Ok(frame.len()));
     frame
 }
@@ -74,7 +74,7 @@ pub(super) fn master(rows: &[Row]) -> Vec<Verdict> {
             same("frame", &row.frame.0, &frame)?;
             same("wire", &row.wire.0, &on_wire(Preamble::Short, &frame))?;
             same("stripped", &Ok(&frame[..]), &strip_preamble(&row.wire.0))?;
-            let view = MasterFrameView::new(&row.frame.0, row.out_data.0.len()).map_err(refused)?;
+            let view = MasterFrameView::new(row.out_data.0.len(), &row.frame.0).map_err(refused)?;
             same("tx_timestamp", &row.tx_timestamp, &view.time_stamp())?;
             for (index, device) in row.devices.into_iter().enumerate() {
                 let len = device.slice.0.len();
@@ -82,7 +82,7 @@ pub(super) fn master(rows: &[Row]) -> Vec<Verdict> {
                 same(
                     "master_ts_plus_delay",
                     &device.master_ts_plus_delay,
-                    &view.reference_ns(device.line_delay_previous),
+                    &view.reference_ns(device.line_delay_previous.into()),
                 )?;
                 same("address", &usize::from(device.address), &(index + 1))?;
             }
@@ -95,7 +95,7 @@ pub(super) fn master(rows: &[Row]) -> Vec<Verdict> {
                 same("out_offsets", &Ok(offset), &assignment.map(|a| a.out_offset))?;
             }
             let total = discovery.output_total;
-            let view = MasterFrameView::new(&row.frame.0, total.into()).map_err(refused)?;
+            let view = MasterFrameView::new(total.into(), &row.frame.0).map_err(refused)?;
             same("frame", &row.frame.0, &build(view.output(), row.tx_timestamp))?;
             same("crc8", &row.frame.0.get(usize::from(total) + 2).map(|&crc| crc.into()), &Some(row.crc8.0))?;
             let slices = row.out_offsets.iter().zip(&row.out_lengths).map(|(&offset, &len)| view.slice(offset, len));
@@ -119,14 +119,14 @@ struct MasterNegative {
 
 pub(super) fn master_negative(rows: &[Row]) -> Vec<Verdict> {
     each(rows, |row: MasterNegative| {
-        same("expect", &row.expect, &outcome(&MasterFrameView::new(&row.frame.0, 16)))?;
+        same("expect", &row.expect, &outcome(&MasterFrameView::new(16, &row.frame.0)))?;
         let (Some(byte), Some(bit)) = (row.byte, row.bit) else { return Ok(()) };
         // The flip undone is a good frame.
         let mut whole = row.frame.0;
         if let Some(flipped) = whole.get_mut(byte) {
             *flipped ^= 1 << bit;
         }
-        same("byte, bit", &"Ok".to_owned(), &outcome(&MasterFrameView::new(&whole, 16)))
+        same("byte, bit", &"Ok".to_owned(), &outcome(&MasterFrameView::new(16, &whole)))
     })
 }
 
@@ -187,16 +187,16 @@ fn payload_len(layout: &str) -> Result<usize, Fault> {
 pub(super) fn device(rows: &[Row]) -> Vec<Verdict> {
     each(rows, |row: DeviceRow| match row {
         DeviceRow::Designed(row) => {
-            let view = DeviceFrameView::new(&row.frame.0, payload_len(&row.layout)?).map_err(refused)?;
+            let view = DeviceFrameView::new(payload_len(&row.layout)?, &row.frame.0).map_err(refused)?;
             same("address", &row.address, &view.address().get())?;
-            same("status", &Status(row.status), &view.status())?;
-            same("last, error", &Status(row.status), &Status::of_device(row.last, row.error))?;
+            same("status", &Status::from_bits_retain(row.status), &view.status())?;
+            same("last, error", &Status::from_bits_retain(row.status), &Status::of_device(row.last, row.error))?;
             same("payload", &&row.payload.0[..], &view.payload())?;
             same("wire", &row.wire.0, &on_wire(Preamble::Short, &row.frame.0))?;
             if let Ok(payload) = view.payload().try_into() {
                 let mut frame = [0; DeviceFrame::<3>::LEN];
                 let frame_of = DeviceFrame::<3> { address: view.address(), status: view.status(), payload };
-                let len = frame_of.emit(&mut frame);
+                let len = frame_of.emit_into(&mut frame);
                 same("frame", &Ok(row.frame.0.len()), &len)?;
                 same("frame", &row.frame.0, &frame.to_vec())?;
             }
@@ -204,10 +204,10 @@ pub(super) fn device(rows: &[Row]) -> Vec<Verdict> {
         }
         DeviceRow::Refused(row) => {
             let len = payload_len(&row.layout)?;
-            same("expect", &row.expect, &outcome(&DeviceFrameView::new(&row.frame.0, len)))
+            same("expect", &row.expect, &outcome(&DeviceFrameView::new(len, &row.frame.0)))
         }
         DeviceRow::Published(row) => {
-            let address = DeviceAddress::try_from(row.address).map_err(refused)?;
+            let address = DeviceAddress::try_from(row.address).map_err(|error| Fault::Unreadable(error.to_string()))?;
             let status = Status::of_device(row.last, row.error);
             let frame = PublishedDeviceFrame { address, status, drv8711_status: row.drv_status };
             let mut wire = on_wire(Preamble::Short, &frame.emit_without_crc());

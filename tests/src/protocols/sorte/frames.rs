@@ -105,14 +105,14 @@ impl From<Fields> for Parameters {
             topology: f.topology.into(),
             diagnostics: f.diagnostics,
             alarm: f.alarm,
-            crc_mode: CrcMode(f.crc_mode),
+            crc_mode: CrcMode::from_byte(f.crc_mode),
         }
     }
 }
 
 pub(super) fn param(rows: &[Row]) -> Vec<Verdict> {
     each(rows, |row: ParamRow| {
-        let frame = Param { source: 0, status: Status(row.status), parameters: row.fields.into() };
+        let frame = Param { source: 0, status: Status::from_bits_retain(row.status), parameters: row.fields.into() };
         same("frame", &row.frame.0, &frame.emit().to_vec())?;
         same("fields", &Ok(frame), &Param::parse(&row.frame.0))?;
         let stored = ParamView::new(&row.frame.0).map(|view| view.bytes().to_vec());

@@ -104,7 +104,7 @@ fn start_up(devices: u8, rtt_ns: &[u32]) -> (Vec<Outgoing>, Master) {
                 sent.push(frame);
                 let answer = answer(frame, devices);
                 let after = if let Outgoing::DelayReq(_) = frame { rtt.next().copied().unwrap_or(400) } else { 400 };
-                assert_eq!(master.received(&answer, at_ns + u64::from(after)), Ok(()));
+                assert_eq!(master.receive(&answer, at_ns + u64::from(after)), Ok(()));
             }
             Action::Exchange { .. } | Action::Restart { .. } => return (sent, master),
         }
@@ -154,7 +154,7 @@ fn wire(frame: &Outgoing) -> Vec<u8> {
         return on_wire(Preamble::Long, &Discovery::published_request(*last).emit());
     }
     let mut buffer = [0; Discovery::LEN];
-    let len = frame.write(&mut buffer).unwrap_or_default();
+    let len = frame.emit_into(&mut buffer).unwrap_or_default();
     on_wire(frame.preamble(), buffer.get(..len).unwrap_or_default())
 }
 
@@ -186,7 +186,7 @@ pub(super) fn master_startup(rows: &[Row]) -> Vec<Verdict> {
         StartupRow::Exchange(row) => {
             same("frame", &"IOEX_MASTER", &row.frame.as_str())?;
             let mut frame = vec![0; row.out_data.0.len() + MasterFrameView::OVERHEAD];
-            let len = write_master_frame(&mut frame, &row.out_data.0, row.tx_timestamp);
+            let len = write_master_frame(&row.out_data.0, row.tx_timestamp, &mut frame);
             same("len", &Ok(frame.len()), &len)?;
             same("wire", &row.wire.0, &on_wire(Preamble::Short, &frame))?;
             let crc8 = frame.len().checked_sub(3).and_then(|at| frame.get(at)).copied();

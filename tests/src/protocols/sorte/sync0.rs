@@ -59,16 +59,16 @@ fn start(word: u16) -> Option<StartTime> {
     Pto::from_word(word).start()
 }
 
-/// Names of the flags in the order of their bits.
+/// Names of the flags in the order of their bits, spelt here once more, so that a wrong name in the crate is found.
 fn names(flags: Flags) -> Vec<&'static str> {
     let all = [
-        (Flags::PENDING, "PENDING_PULSE"),
-        (Flags::ACTIVE, "ACTIVE_PULSE"),
-        (Flags::DELAYED, "DELAYED_CMP6_ACTIVATED"),
-        (Flags::OVERLAP, "SYNC_PULSE_OVERLAP"),
-        (Flags::PREV_OVERLAP, "PREV_SYNC_PULSE_OVERLAP"),
+        (0, "PENDING_PULSE"),
+        (1, "ACTIVE_PULSE"),
+        (3, "DELAYED_CMP6_ACTIVATED"),
+        (7, "SYNC_PULSE_OVERLAP"),
+        (8, "PREV_SYNC_PULSE_OVERLAP"),
     ];
-    all.into_iter().filter(|(flag, _)| flags.has(*flag)).map(|(_, name)| name).collect()
+    all.into_iter().filter(|(bit, _)| flags.bits() >> bit & 1 == 1).map(|(_, name)| name).collect()
 }
 
 #[derive(Deserialize)]

@@ -1,14 +1,14 @@
 //! What a step becomes on the wire: the PTO word and the payload of the master frame, made by sorte-proto.
 
 use serde::Deserialize;
-use sorte_proto::{Direction, MotorMask, Payload, Pto, Slice, StartTime};
+use sorte_proto::{Direction, MotorMask, OutOfRange, Payload, Pto, Slice, StartTime};
 use step_profile::{Command, Motors};
 
 use crate::hex::{Bytes, Hex};
 use crate::row::{Fault, Row, Verdict, each, same};
 
 /// The word of a motor's command.
-pub(super) fn pto(command: Command) -> Result<Pto, sorte_proto::Error> {
+pub(super) fn pto(command: Command) -> Result<Pto, OutOfRange> {
     match command {
         Command::Disable => Ok(Pto::DriverOff),
         Command::Hold { direction } => Ok(Pto::NoPulse { direction: direction.dir().into() }),
@@ -54,7 +54,7 @@ pub(super) fn pto_word(rows: &[Row]) -> Vec<Verdict> {
         Word::Encode { sync, dir, word, wire_le, shifted_ns, error } => {
             let direction = step_profile::Direction::from_dir(dir != 0);
             let pto = pto(Command::Pulse { direction, sync_time: sync });
-            same("error", &error, &pto.err().map(|error| format!("{:?}", error.class())))?;
+            same("error", &error, &pto.err().map(|_| "SyncTimeOutOfRange".to_owned()))?;
             let pto = pto.ok();
             same("word", &word.map(|word| word.0), &pto.map(|pto| pto.word().into()))?;
             same("wire_le", &wire_le.map(|bytes| bytes.0), &pto.map(wire))?;
@@ -101,7 +101,7 @@ struct PayloadRow {
 pub(super) fn payload(rows: &[Row]) -> Vec<Verdict> {
     each(rows, |row: PayloadRow| {
         let pto = |word: Hex| Pto::from_word(word.0 as u16);
-        let payload = match (row.mask.and_then(MotorMask::new), row.word, row.independent) {
+        let payload = match (row.mask.and_then(MotorMask::from_bits), row.word, row.independent) {
             (Some(motors), Some(word), false) => Payload::shared(pto(word), motors),
             (None, None, true) => Payload::independent(row.device_words.map(pto)),
             _ => return Err(Fault::Unreadable("neither a mask with a word nor four words".to_owned())),

@@ -3,7 +3,7 @@
 use serde::Deserialize;
 
 use tformat::master::parse_echoed;
-use tformat::{Alarm, DataId, Error, Full, Profile, Request, Response, StatusField, Window};
+use tformat::{AllData, Almc, Error, Request, Resolution, Response, StatusField, Window};
 
 use super::{bits_of, class, compose, data_id, line_of, outcome};
 use crate::hex::{Bits, Bytes, Hex};
@@ -47,30 +47,30 @@ fn check_status(expected: Option<&Status>, real: Option<StatusField>) -> Verdict
     let (Some(want), Some(sf)) = (expected, real) else {
         return same("sf", &expected.is_some(), &real.is_some());
     };
-    same("sf.raw", &want.raw, &sf.raw())?;
-    same("sf.info", &want.info, &sf.information())?;
-    same("sf.ea0_counting_error", &want.ea0_counting_error, &sf.counting_error())?;
-    same("sf.ea1_other_error", &want.ea1_other_error, &sf.other_error())?;
-    same("sf.ca0_parity_error", &want.ca0_parity_error, &sf.request_parity_error())?;
-    same("sf.ca1_delimiter_error", &want.ca1_delimiter_error, &sf.request_delimiter_error())
+    same("sf.raw", &want.raw, &sf.bits())?;
+    same("sf.info", &want.info, &(sf.bits() & 0x0f))?;
+    same("sf.ea0_counting_error", &want.ea0_counting_error, &sf.contains(StatusField::EA0))?;
+    same("sf.ea1_other_error", &want.ea1_other_error, &sf.contains(StatusField::EA1))?;
+    same("sf.ca0_parity_error", &want.ca0_parity_error, &sf.contains(StatusField::CA0))?;
+    same("sf.ca1_delimiter_error", &want.ca1_delimiter_error, &sf.contains(StatusField::CA1))
 }
 
-fn check_alarms(expected: Option<&Alarms>, real: Option<tformat::Almc>) -> Verdict {
+fn check_alarms(expected: Option<&Alarms>, real: Option<Almc>) -> Verdict {
     let (Some(want), Some(almc)) = (expected, real) else {
         return same("almc", &expected.is_some(), &real.is_some());
     };
-    same("almc.raw", &want.raw, &almc.raw())?;
+    same("almc.raw", &want.raw, &almc.bits())?;
     let flags = [
-        (want.over_speed, Alarm::OverSpeed),
-        (want.full_absolute_status, Alarm::FullAbsoluteStatus),
-        (want.counting_error, Alarm::CountingError),
-        (want.counter_overflow, Alarm::CounterOverflow),
-        (want.over_heat, Alarm::OverHeat),
-        (want.multi_turn_error, Alarm::MultiTurnError),
-        (want.battery_error, Alarm::BatteryError),
-        (want.battery_alarm, Alarm::BatteryAlarm),
+        (want.over_speed, "over_speed", Almc::OS),
+        (want.full_absolute_status, "full_absolute_status", Almc::FS),
+        (want.counting_error, "counting_error", Almc::CE),
+        (want.counter_overflow, "counter_overflow", Almc::OF),
+        (want.over_heat, "over_heat", Almc::OH),
+        (want.multi_turn_error, "multi_turn_error", Almc::ME),
+        (want.battery_error, "battery_error", Almc::BE),
+        (want.battery_alarm, "battery_alarm", Almc::BA),
     ];
-    flags.iter().try_for_each(|(want, alarm)| same(alarm.name(), want, &almc.has(*alarm)))
+    flags.iter().try_for_each(|(want, name, alarm)| same(name, want, &almc.contains(*alarm)))
 }
 
 /// The statements that a row may make about an answer.
@@ -95,23 +95,23 @@ fn check_content(want: &Content, response: Response) -> Verdict {
     same("cf", &want.cf, &frame.as_bytes().first().copied())?;
     same("crc", &want.crc, &frame.as_bytes().last().copied())?;
     check_status(want.sf.as_ref(), response.status())?;
-    same("abs", &want.abs, &response.abs().map(tformat::U24::get))?;
+    same("abs", &want.abs, &response.abs().map(tformat::Abs::get))?;
     let (abm, enid, almc) = match response {
-        Response::Id1(v) => (Some(v.abm), None, None),
-        Response::Id2(v) => (None, Some(v.enid), None),
-        Response::Id3(v) => (Some(v.abm), Some(v.enid), Some(v.almc)),
+        Response::ReadMultiTurn(v) => (Some(v.abm), None, None),
+        Response::ReadEncoderId(v) => (None, Some(v.enid), None),
+        Response::ReadAll(v) => (Some(v.abm), Some(v.enid), Some(v.almc)),
         _ => (None, None, None),
     };
-    same("abm", &want.abm, &abm.map(tformat::U24::get))?;
+    same("abm", &want.abm, &abm.map(tformat::Abm::get))?;
     same("enid", &want.enid, &enid)?;
     check_alarms(want.almc.as_ref(), almc)?;
     if let Some(width) = &want.width {
-        let hint = enid.and_then(Profile::from_enid);
-        let real = hint.map(|h| (h.profile.abs_bits(), h.profile.abm_bits(), h.documented));
+        let hint = enid.and_then(Resolution::from_enid);
+        let real = hint.map(|h| (h.resolution.abs_bits(), h.resolution.abm_bits(), h.documented));
         same("width", &Some((width.abs_bits, width.abm_bits, width.enid_documented)), &real)?;
     }
     let memory = match response {
-        Response::Id6(memory) | Response::IdD(memory) => Some(memory),
+        Response::WriteEeprom(memory) | Response::ReadEeprom(memory) => Some(memory),
         _ => None,
     };
     same("adf", &want.adf, &memory.map(|m| m.adf.address().get()))?;
@@ -161,8 +161,7 @@ fn response(row: &ResponseRow, content: &Content) -> Verdict {
 #[serde(deny_unknown_fields)]
 pub(super) struct NegativeRow {
     /// How the frame was damaged.
-    #[serde(rename = "kind")]
-    _kind: String,
+    kind: String,
     level: Level,
     request_id: Hex,
     adf: Option<u8>,
@@ -192,16 +191,16 @@ enum Level {
 pub(super) fn negative(row: NegativeRow) -> Verdict {
     let id = data_id(row.request_id);
     let bytes = row.bytes.map(|b| b.0).unwrap_or_default();
-    // A row that says nothing of the EEPROM request means one that the answer would fit.
-    let echoed = |at| bytes.get(at).copied();
-    let adf = row.adf.or_else(|| echoed(1).map(|adf| adf & 0x7f));
-    let request = compose(id, adf, row.edf.or_else(|| echoed(2)));
+    // Rows about damage that the check field does not see, and about trailing bytes, leave the EEPROM request open: it is
+    // one that the answer fits. All other rows are refused before the address is looked at, or say what was asked.
+    let fits = row.kind.starts_with("crc_blind") || row.kind == "trailing_bytes";
+    let request = match Request::answered_by(&bytes) {
+        Ok(request) if fits => request,
+        _ => compose(id, row.adf, row.edf),
+    };
     let parsed = match (&row.level, &row.wire) {
         (Level::Bytes, _) => Response::parse(request, &bytes),
-        (Level::Wire, Some(wire)) => {
-            let line = window(wire);
-            Response::parse_line(asked_on(id, line, row.adf, row.edf), line)
-        }
+        (Level::Wire, Some(wire)) => Response::parse_line(request, window(wire)),
         (Level::Wire, None) => return same("wire", &"line bits", &"none"),
     };
     same("error", &row.error.as_deref().unwrap_or("ok"), &parsed.as_ref().map_or_else(|e| class(*e), |_| "ok"))?;
@@ -216,12 +215,6 @@ pub(super) fn negative(row: NegativeRow) -> Verdict {
         (_, None) => Ok(()),
         (_, Some(_)) => same("sf", &"a status", &"none"),
     }
-}
-
-/// The request of a line row: what the row says, or one that the answer would fit.
-fn asked_on(id: DataId, line: Window, adf: Option<u8>, edf: Option<u8>) -> Request {
-    let byte = |field: u32| (line.bits() >> (10 * field + 1)) as u8;
-    compose(id, adf.or(Some(byte(1) & 0x7f)), edf.or(Some(byte(2))))
 }
 
 #[derive(Deserialize)]
@@ -249,8 +242,8 @@ fn uart_echo(row: EchoRow, content: &Content) -> Verdict {
         Ok(response) => check_content(content, response),
         // The row describes the ID 3 frame in which the encoder refused.
         Err(Error::Rejected { .. }) if content.cf.is_some() => {
-            match Full::parse(row.rx.0.get(row.skip..).unwrap_or(&[])) {
-                Ok(full) => check_content(content, Response::Id3(full)),
+            match AllData::parse(row.rx.0.get(row.skip..).unwrap_or(&[])) {
+                Ok(full) => check_content(content, Response::ReadAll(full)),
                 Err(error) => same("refusal", &"an ID 3 frame", &class(error)),
             }
         }

@@ -1,0 +1,11 @@
+//! Reads positions of an A-format encoder at 8 Mbit/s and prints them.
+#![no_std]
+#![no_main]
+
+use nikon_aformat::BitRate;
+use panic_halt as _;
+
+#[rp2040_hal::entry]
+fn main() -> ! {
+    servowire_rp2040::aformat::master(BitRate::Mbit8)
+}

@@ -1,0 +1,11 @@
+//! A T-Format encoder at 2.5 Mbit/s.
+#![no_std]
+#![no_main]
+
+use panic_halt as _;
+use tformat::BitRate;
+
+#[rp2040_hal::entry]
+fn main() -> ! {
+    servowire_rp2040::tformat::encoder(BitRate::Mbit2_5, 64)
+}

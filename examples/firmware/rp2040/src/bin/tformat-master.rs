@@ -1,0 +1,11 @@
+//! Reads positions of a T-Format encoder at 2.5 Mbit/s and prints them.
+#![no_std]
+#![no_main]
+
+use panic_halt as _;
+use tformat::BitRate;
+
+#[rp2040_hal::entry]
+fn main() -> ! {
+    servowire_rp2040::tformat::master(BitRate::Mbit2_5)
+}

@@ -1,0 +1,83 @@
+//! Clocks, pins and console of a board with a crystal of 12 MHz.
+
+use cortex_m::peripheral::Peripherals as Core;
+use rp2040_hal::clocks::{Clock as _, ClockSource, ClocksManager};
+use rp2040_hal::dma::{CH0, Channel, DMAExt};
+use rp2040_hal::fugit::RateExtU32;
+use rp2040_hal::gpio::bank0::{Gpio0, Gpio1};
+use rp2040_hal::gpio::{FunctionPio0, FunctionUart, Pin, Pins, PullDown, PullUp};
+use rp2040_hal::pac::{Peripherals, UART0};
+use rp2040_hal::pio::PIOExt;
+use rp2040_hal::pll::{PLLConfig, common_configs::PLL_USB_48MHZ, setup_pll_blocking};
+use rp2040_hal::uart::{DataBits, Enabled, StopBits, UartConfig, UartPeripheral};
+use rp2040_hal::xosc::setup_xosc_blocking;
+use rp2040_hal::{Sio, Watchdog};
+
+use crate::clock::Clock;
+use crate::port::{self, Receiver, Transmitter};
+use crate::programs::Rate;
+
+/// The console: GPIO 0 sends, 1,000,000 baud, 8N1.
+pub type Console =
+    UartPeripheral<Enabled, UART0, (Pin<Gpio0, FunctionUart, PullDown>, Pin<Gpio1, FunctionUart, PullDown>)>;
+
+/// All that an image uses.
+pub struct Board {
+    /// Prints.
+    pub console: Console,
+    /// Time.
+    pub clock: Clock,
+    /// Bits to the line.
+    pub transmitter: Transmitter,
+    /// Units from the line.
+    pub receiver: Receiver,
+    /// For [`port::RingReceiver`].
+    pub channel: Channel<CH0>,
+}
+
+const CRYSTAL_HZ: u32 = 12_000_000;
+const CONSOLE_BAUD: u32 = 1_000_000;
+
+/// 12 MHz x 120 / 6 / 2 = 120 MHz.
+const PLL_120MHZ: PLLConfig =
+    PLLConfig { vco_freq: rp2040_hal::fugit::HertzU32::MHz(1440), refdiv: 1, post_div1: 6, post_div2: 2 };
+
+impl Board {
+    /// Sets everything up for units of `bits` bits between start and stop bit at `rate`.
+    ///
+    /// # Panics
+    /// If called twice, or if a clock does not start.
+    pub fn new(rate: Rate, bits: u8) -> Self {
+        let mut p = Peripherals::take().expect("called once");
+        let core = Core::take().expect("called once");
+        let mut watchdog = Watchdog::new(p.WATCHDOG);
+        watchdog.enable_tick_generation((CRYSTAL_HZ / 1_000_000) as u8);
+        let crystal = setup_xosc_blocking(p.XOSC, CRYSTAL_HZ.Hz()).expect("crystal");
+        let mut clocks = ClocksManager::new(p.CLOCKS);
+        let system = setup_pll_blocking(p.PLL_SYS, crystal.get_freq(), PLL_120MHZ, &mut clocks, &mut p.RESETS);
+        let usb = setup_pll_blocking(p.PLL_USB, crystal.get_freq(), PLL_USB_48MHZ, &mut clocks, &mut p.RESETS);
+        clocks.init_default(&crystal, &system.expect("PLL"), &usb.expect("PLL")).expect("clocks");
+
+        let pins = Pins::new(p.IO_BANK0, p.PADS_BANK0, Sio::new(p.SIO).gpio_bank0, &mut p.RESETS);
+        let console =
+            UartPeripheral::new(p.UART0, (pins.gpio0.into_function(), pins.gpio1.into_function()), &mut p.RESETS)
+                .enable(
+                    UartConfig::new(CONSOLE_BAUD.Hz(), DataBits::Eight, None, StopBits::One),
+                    clocks.peripheral_clock.freq(),
+                )
+                .expect("7.5 clocks a sample");
+        let _: Pin<_, FunctionPio0, _> = pins.gpio2.into_function();
+        let _: Pin<_, FunctionPio0, _> = pins.gpio3.into_function();
+        // The receiver is off while the driver is on: its output floats then.
+        let _: Pin<_, FunctionPio0, PullUp> = pins.gpio4.into_function().into_pull_type();
+        let (mut pio, sm0, sm1, ..) = p.PIO0.split(&mut p.RESETS);
+        let (transmitter, receiver) = port::start(&mut pio, sm0, sm1, rate, bits);
+        let channel = p.DMA.split(&mut p.RESETS).ch0;
+        Self { console, clock: Clock::new(core.SYST), transmitter, receiver, channel }
+    }
+}
+
+/// The second stage of the boot: sets the flash up.
+#[unsafe(link_section = ".boot2")]
+#[used]
+pub static BOOT2: [u8; 256] = rp2040_boot2::BOOT_LOADER_GENERIC_03H;

@@ -1,0 +1,9 @@
+#![doc = include_str!("../README.md")]
+#![no_std]
+
+pub mod aformat;
+pub mod board;
+pub mod clock;
+pub mod port;
+pub mod programs;
+pub mod tformat;

@@ -1,0 +1,198 @@
+//! A simulated cable between master and encoder: delay, jitter, glitches, bit errors and the encoder's clock.
+
+use nrz_line::Window;
+
+use crate::frame::{ANSWER_BITS, SAMPLES_PER_BIT};
+use crate::sampling::WINDOW;
+
+/// What the line does to what passes. All zero is a perfect line of no length.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "arbitrary", derive(arbitrary::Arbitrary))]
+pub struct Disturbance {
+    /// From the start of reception to the first bit of an answer, in eighths of a bit (13.333 ns): there and back.
+    pub delay: u32,
+    /// Every edge of an answer is moved by up to this many samples either way.
+    pub jitter: u8,
+    /// Samples of an answer that are inverted, of a million.
+    pub glitches: u32,
+    /// Bits that are inverted, of a million, in each direction.
+    pub bit_errors: u32,
+    /// How much the encoder's bits are longer than the master's, in parts of a million.
+    pub clock_ppm: i32,
+}
+
+impl Disturbance {
+    /// A clean line of `metres`: 5 ns a metre each way, and most of a bit for encoder and transceivers.
+    pub const fn metres(metres: u32) -> Self {
+        let delay = metres.saturating_mul(10).saturating_mul(3) / 40;
+        Self { delay: delay.saturating_add(7), jitter: 0, glitches: 0, bit_errors: 0, clock_ppm: 0 }
+    }
+}
+
+/// The cable with its source of noise. A seed gives always the same noise.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Cable {
+    /// What happens to what passes.
+    pub disturbance: Disturbance,
+    noise: Noise,
+}
+
+impl Cable {
+    /// With a seed for the noise.
+    pub const fn new(disturbance: Disturbance, seed: u64) -> Self {
+        Self { disturbance, noise: Noise(seed.wrapping_mul(2).wrapping_add(1)) }
+    }
+
+    /// The head of an H-frame as it reaches the encoder.
+    pub fn down(&mut self, head: Window) -> Window {
+        let mut bits = head.bits();
+        for at in 0..head.len() {
+            bits ^= u128::from(self.noise.hits(self.disturbance.bit_errors)) << at;
+        }
+        Window::from_bits(bits, head.len()).unwrap_or(head)
+    }
+
+    /// What the master samples of an answer: a byte a bit time, the first sample in bit 7. Without an answer the line
+    /// stays high.
+    pub fn up(&mut self, answer: Option<u64>) -> [u8; WINDOW] {
+        let mut words = [0; WORDS];
+        if let Some(bits) = answer {
+            let bits = self.spoilt(bits);
+            self.edges(bits, &mut words);
+        }
+        fill(&mut words);
+        if self.disturbance.glitches > 0 {
+            for word in &mut words {
+                for at in 0..64 {
+                    *word ^= u64::from(self.noise.hits(self.disturbance.glitches)) << at;
+                }
+            }
+        }
+        let mut samples = [0; WINDOW];
+        for (to, from) in samples.chunks_exact_mut(8).zip(words) {
+            to.copy_from_slice(&from.to_be_bytes());
+        }
+        samples
+    }
+
+    fn spoilt(&mut self, mut bits: u64) -> u64 {
+        if self.disturbance.bit_errors > 0 {
+            for at in 0..ANSWER_BITS {
+                bits ^= u64::from(self.noise.hits(self.disturbance.bit_errors)) << at;
+            }
+        }
+        bits
+    }
+
+    /// Marks the samples at which the level changes, the first sample in bit 63 of the first word.
+    fn edges(&mut self, bits: u64, words: &mut [u64; WORDS]) {
+        // Ones before and after the answer.
+        let line = u128::from(bits) << 1 | 1 | u128::MAX << ANSWER_BITS.wrapping_add(1);
+        let mut changes = (line ^ line >> 1) & (1_u128 << ANSWER_BITS.wrapping_add(1)).wrapping_sub(1);
+        let scale = i64::from(self.disturbance.clock_ppm).saturating_add(1_000_000);
+        while changes != 0 {
+            let bit = changes.trailing_zeros();
+            changes &= changes.wrapping_sub(1);
+            let nominal = i64::from(bit.saturating_mul(SAMPLES_PER_BIT)).saturating_mul(scale) / 1_000_000;
+            let place = nominal.saturating_add(i64::from(self.disturbance.delay)).saturating_add(self.jitter());
+            let place = usize::try_from(place).unwrap_or(0);
+            if let Some(word) = words.get_mut(place / 64) {
+                *word ^= 1 << (63 & !place);
+            }
+        }
+    }
+
+    fn jitter(&mut self) -> i64 {
+        let jitter = self.disturbance.jitter;
+        if jitter == 0 {
+            return 0;
+        }
+        let span = u64::from(jitter).saturating_mul(2).saturating_add(1);
+        let drawn = self.noise.below(span);
+        i64::try_from(drawn).unwrap_or(0).saturating_sub(i64::from(jitter))
+    }
+}
+
+/// 64-bit words of the samples of an answer.
+const WORDS: usize = WINDOW / 8;
+const _: () = assert!(WORDS * 8 == WINDOW);
+
+/// From edges to levels: every sample is the level before it, inverted at each edge. The line is high at first.
+fn fill(words: &mut [u64; WORDS]) {
+    let mut high = true;
+    for word in words {
+        let mut level = *word;
+        for shift in [1, 2, 4, 8, 16, 32] {
+            level ^= level >> shift;
+        }
+        *word = if high { !level } else { level };
+        high = *word & 1 == 1;
+    }
+}
+
+/// A small generator of pseudo-random numbers (xorshift).
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+struct Noise(u64);
+
+impl Noise {
+    const fn next(&mut self) -> u64 {
+        self.0 ^= self.0 << 13;
+        self.0 ^= self.0 >> 7;
+        self.0 ^= self.0 << 17;
+        self.0.wrapping_mul(0x2545_f491_4f6c_dd1d) >> 32
+    }
+
+    /// 0..limit, for limits far below 2^32.
+    const fn below(&mut self, limit: u64) -> u64 {
+        self.next().wrapping_mul(limit) >> 32
+    }
+
+    /// True `rate` times of a million.
+    const fn hits(&mut self, rate: u32) -> bool {
+        rate != 0 && self.below(1_000_000) < rate as u64
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::sampling::{Alignment, EdgeRule, TEST_PATTERN, line};
+    use proptest::prelude::*;
+
+    proptest! {
+        #[test]
+        fn a_clean_line_only_delays(bits in 0..1_u64 << 61, delay in 0..88_u32) {
+            let mut simulated = Cable::new(Disturbance { delay, ..Disturbance::default() }, 1);
+            prop_assert_eq!(simulated.up(Some(bits)), line(bits, delay));
+            prop_assert_eq!(simulated.up(None), [0xff; WINDOW]);
+        }
+
+        /// Jitter of one sample never makes a bit error, wherever the receiver learned to sample.
+        #[test]
+        fn one_sample_of_jitter(bits in 0..1_u64 << 61, delay in 0..84_u32, seed: u64) {
+            let mut simulated = Cable::new(Disturbance { delay, jitter: 1, ..Disturbance::default() }, seed);
+            let learned = Alignment::learn(EdgeRule::Leading, &simulated.up(Some(TEST_PATTERN)));
+            prop_assert_eq!(learned.unwrap().bits(&simulated.up(Some(bits))), Ok(bits));
+        }
+
+        /// An encoder whose clock is 2000 ppm off is still read.
+        #[test]
+        fn clock_offset(bits in 0..1_u64 << 61, ppm in -2000..2000, seed: u64) {
+            let mut simulated = Cable::new(Disturbance { delay: 20, clock_ppm: ppm, jitter: 1, ..Disturbance::default() }, seed);
+            let learned = Alignment::learn(EdgeRule::Leading, &simulated.up(Some(TEST_PATTERN)));
+            prop_assert_eq!(learned.unwrap().bits(&simulated.up(Some(bits))), Ok(bits));
+        }
+    }
+
+    #[test]
+    fn rates_are_as_asked_for() {
+        let mut simulated = Cable::new(Disturbance { bit_errors: 10_000, ..Disturbance::default() }, 7);
+        let wrong: u32 = (0..2000).map(|_| (simulated.spoilt(0)).count_ones()).sum();
+        assert!((1000..1450).contains(&wrong), "{wrong}");
+        assert_eq!(Disturbance::metres(100).delay, 82);
+    }
+}

@@ -1,0 +1,41 @@
+use core::fmt;
+
+/// Why a position must not be used.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "arbitrary", derive(arbitrary::Arbitrary))]
+#[non_exhaustive]
+pub enum Doubt {
+    /// The link is not up, or was lost.
+    NoLink,
+    /// The last acceleration word could not be used: the fast position is estimated.
+    Estimated,
+    /// The fast position does not agree with the safe one yet, or no more.
+    Alignment,
+    /// The velocity is beyond a sixteenth of the range a frame, where it is known modulo an eighth of the range only.
+    Speed,
+    /// No V-frame is complete yet.
+    NoVFrame,
+    /// The last V-frame brought no sound safe block: what is in the registers is older.
+    Stale,
+    /// The encoder says that it has no position.
+    Withheld,
+}
+
+impl fmt::Display for Doubt {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::NoLink => "the link is down",
+            Self::Estimated => "the fast position is estimated",
+            Self::Alignment => "the fast position is not aligned with the safe one",
+            Self::Speed => "the speed is beyond a sixteenth of the range a frame",
+            Self::NoVFrame => "no V-frame is complete yet",
+            Self::Stale => "the last V-frame brought no sound safe position",
+            Self::Withheld => "the encoder has no position",
+        })
+    }
+}
+
+impl core::error::Error for Doubt {}
+
+crate::ranged::format_as_displayed!(Doubt);

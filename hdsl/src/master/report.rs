@@ -1,0 +1,160 @@
+//! What an H-frame brought.
+
+use super::{Cause, State};
+use crate::encoder_id::EncoderId;
+use crate::error::Error;
+use crate::frame::{Stuffing, Tail, Trailer};
+use crate::message::Finished;
+use crate::quality::QualityMonitor;
+use crate::rssi::Rssi;
+use crate::sampling::Delay;
+use crate::symbol::{Character, Control, Reading};
+use crate::vframe::VFrame;
+
+/// What is known about the quality of the line besides the bits of an answer.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "arbitrary", derive(arbitrary::Arbitrary))]
+pub struct Signal {
+    /// RSSI of this answer.
+    pub rssi: Rssi,
+    /// The delay of the cable, as learned at the start.
+    pub delay: Delay,
+    /// Bit n is set if an edge of the test pattern was seen in sample period n of the start-up.
+    pub edges: u8,
+}
+
+/// What an H-frame brought, and how it ends on the line.
+///
+/// What comes once a V-frame or more rarely is there in the one frame that it belongs to.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[non_exhaustive]
+pub struct Report {
+    /// What to send after the answer.
+    pub tail: Tail,
+    /// State in which the frame was sent.
+    pub was: State,
+    /// State of the next frame.
+    pub state: State,
+    /// Set if the next frame begins a new start-up.
+    pub restarted: Option<Cause>,
+    /// The encoder identifier, in the frame that brought it.
+    pub encoder: Option<EncoderId>,
+    /// The line, where it was measured.
+    pub signal: Option<Signal>,
+    /// The quality monitor, 0..=15.
+    pub quality: u8,
+    /// Fast position, 40 bits, usable or not; see [`Master::fast`](super::Master::fast).
+    pub position: u64,
+    /// Speed in steps an H-frame, usable or not.
+    pub velocity: i32,
+    /// The flag POS: the fast position is estimated or not aligned.
+    pub doubtful: bool,
+    /// Acceleration words in a row that could not be used.
+    pub acceleration_errors: u32,
+    /// The safe blocks of a V-frame, one H-frame after its end.
+    pub v_frame: Option<VFrame>,
+    /// The word of the pipe channel, K30.7 included.
+    pub pipe: Option<Reading>,
+    /// The encoder says INIT: it has dropped its messages.
+    pub init: bool,
+    /// Messages that came to their end.
+    pub finished: Finished,
+    /// No long message is under way.
+    pub long_free: bool,
+    /// No short message is under way.
+    pub short_free: bool,
+}
+
+impl Report {
+    /// Before the first frame.
+    pub(super) const START: Self = Self {
+        tail: Tail { trailer: Trailer::Whole, stuffing: Stuffing::MIN },
+        was: State::Reset,
+        state: State::Reset,
+        restarted: None,
+        encoder: None,
+        signal: None,
+        quality: QualityMonitor::START,
+        position: 0,
+        velocity: 0,
+        doubtful: false,
+        acceleration_errors: 0,
+        v_frame: None,
+        pipe: None,
+        init: false,
+        finished: Finished { short: None, long: None },
+        long_free: false,
+        short_free: false,
+    };
+
+    /// Clears what belongs to one frame.
+    #[inline]
+    pub(super) fn begin(&mut self, state: State, signal: Option<Signal>) {
+        self.was = state;
+        self.signal = signal;
+        self.encoder = None;
+        self.v_frame = None;
+        self.pipe = None;
+        self.init = false;
+        self.finished = Finished { short: None, long: None };
+    }
+
+    /// What the pipe channel brought; `None` if it had no data in this frame.
+    ///
+    /// # Errors
+    /// [`Error::InvalidWord`].
+    pub fn pipe_character(&self) -> Option<Result<Character, Error>> {
+        let word = self.pipe.filter(|word| !word.is(Control::K30_7))?;
+        Some(word.character())
+    }
+}
+
+/// A fast position that may be used.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct Fast {
+    /// Position in steps at the sampling edge of the last H-frame, with its sign if the encoder's positions have one.
+    pub position: i64,
+    /// Speed in steps an H-frame.
+    pub velocity: i32,
+}
+
+/// A safe position that may be used. It must not close a control loop: it is not in step with the pulse (SICK manual,
+/// p. 67).
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct Safe {
+    /// Position in steps, with its sign if the encoder's positions have one.
+    pub position: i64,
+    /// H-frames from its sampling edge to that of the last H-frame, 8..=15.
+    pub age: u8,
+    /// SUMMARY: bit n sums up the encoder status register ENC_STn.
+    pub summary: u8,
+}
+
+/// What was counted since the machine was made.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[non_exhaustive]
+pub struct Counters {
+    /// H-frames.
+    pub frames: u64,
+    /// Restarts.
+    pub restarts: u32,
+    /// Bad words in answers, all channels.
+    pub words: u32,
+    /// Acceleration words that could not be used.
+    pub acceleration: u32,
+    /// V-frames without a good safe channel 1.
+    pub safe1: u32,
+    /// V-frames without a good safe channel 2.
+    pub safe2: u32,
+    /// Answers with a wrong switch bit.
+    pub switch_bits: u32,
+}

@@ -1,0 +1,180 @@
+//! Requests by what they are for. Those that cannot be undone say so in their name.
+
+use core::fmt;
+
+use super::{Access, Data, Length, LongRequest, Offset, ResourceAddress};
+
+/// Who may access a resource (SICK manual, p. 90). Levels 5..=14 are not defined.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "arbitrary", derive(arbitrary::Arbitrary))]
+#[repr(u8)]
+pub enum AccessLevel {
+    /// Everybody.
+    Public = 0,
+    /// Operator.
+    Operator = 1,
+    /// Maintenance.
+    Maintenance = 2,
+    /// Authorised client.
+    AuthorisedClient = 3,
+    /// Service.
+    Service = 4,
+    /// Nobody.
+    Never = 15,
+}
+
+impl AccessLevel {
+    /// The number, 0..=4 or 15.
+    pub const fn code(self) -> u8 {
+        self as u8
+    }
+
+    /// From the four low bits; `None` for 5..=14.
+    pub const fn from_code(code: u8) -> Option<Self> {
+        Some(match code & 15 {
+            0 => Self::Public,
+            1 => Self::Operator,
+            2 => Self::Maintenance,
+            3 => Self::AuthorisedClient,
+            4 => Self::Service,
+            15 => Self::Never,
+            _ => return None,
+        })
+    }
+}
+
+impl fmt::Display for AccessLevel {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.pad(match self {
+            Self::Public => "public",
+            Self::Operator => "operator",
+            Self::Maintenance => "maintenance",
+            Self::AuthorisedClient => "authorised client",
+            Self::Service => "service",
+            Self::Never => "never",
+        })
+    }
+}
+
+impl LongRequest {
+    /// Reads the value of a resource, from the beginning.
+    pub const fn read(address: ResourceAddress, length: Length) -> Self {
+        Self { address, indirect: true, offset: None, access: Access::Read(length) }
+    }
+
+    /// Reads the value of a resource from `offset` on.
+    pub const fn read_at(address: ResourceAddress, offset: Offset, length: Length) -> Self {
+        Self { address, indirect: true, offset: Some(offset), access: Access::Read(length) }
+    }
+
+    /// Reads the eight characters of a resource's name.
+    pub const fn read_name(address: ResourceAddress) -> Self {
+        Self { address, indirect: false, offset: None, access: Access::Read(Length::Eight) }
+    }
+
+    /// Reads an attribute of a resource, two bytes: 1 data size, 2 read level, 3 write level, 4 time-out in ms, 5 data type.
+    pub const fn read_attribute(address: ResourceAddress, attribute: Offset) -> Self {
+        Self { address, indirect: false, offset: Some(attribute), access: Access::Read(Length::Two) }
+    }
+
+    /// Resets the encoder (RID 100h, SICK manual, p. 114). It saves its lifetime data and does not answer; the link starts
+    /// anew, and a position that is not saved by the encoder is lost.
+    pub const fn reset_encoder() -> Self {
+        Self { address: ResourceAddress::RESET, indirect: true, offset: None, access: Access::Write(Data::NONE) }
+    }
+
+    /// Shuts the encoder down (RID 100h, offset 1): it is silent **until its power is switched off and on**.
+    pub const fn shut_encoder_down_until_power_cycle() -> Self {
+        let access = Access::Write(Data::NONE);
+        Self { address: ResourceAddress::RESET, indirect: true, offset: Offset::new(1), access }
+    }
+
+    /// Adds 1 to the user counter (RID 121h).
+    pub const fn count_up() -> Self {
+        Self { address: ResourceAddress::INCCOUNT, indirect: true, offset: None, access: Access::Write(Data::NONE) }
+    }
+
+    /// Sets the user counter to 0 (RID 122h); what it had counted is lost.
+    pub const fn clear_user_counter_for_good() -> Self {
+        Self { address: ResourceAddress::RESETCNT, indirect: true, offset: None, access: Access::Write(Data::NONE) }
+    }
+
+    /// Asks for an access level with its key (RID 104h). After a reset the level is public again.
+    pub fn set_access(level: AccessLevel, key: [u8; 4]) -> Self {
+        let [k0, k1, k2, k3] = key;
+        let access = Access::Write(Data::eight([level.code(), 0, 0, 0, k0, k1, k2, k3]));
+        Self { address: ResourceAddress::SETACCESS, indirect: true, offset: None, access }
+    }
+
+    /// Changes the key of an access level (RID 105h). **A key that is lost cannot be had back.**
+    pub fn change_access_key_for_good(level: AccessLevel, new: [u8; 4], old: [u8; 4]) -> Self {
+        let ([n0, n1, n2, n3], [o0, o1, o2, o3]) = (new, old);
+        Self {
+            address: ResourceAddress::CHANGEKEY,
+            indirect: true,
+            offset: Offset::new(level as u16),
+            access: Access::Write(Data::eight([n0, n1, n2, n3, o0, o1, o2, o3])),
+        }
+    }
+
+    /// Whether the encoder loses something by this request, or leaves the link: reset, shut-down, counting direction, access
+    /// keys, user counter, deletion of files.
+    pub fn is_dangerous(&self) -> bool {
+        let Access::Write(_) = self.access else { return false };
+        match self.address {
+            ResourceAddress::RESET
+            | ResourceAddress::COUNTDIR
+            | ResourceAddress::CHANGEKEY
+            | ResourceAddress::RESETCNT => true,
+            ResourceAddress::MAKEFILE => self.offset.is_none_or(|offset| offset.get() >> 8 & 3 == 0),
+            _ => false,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Header bytes of the manual's examples: 54 read 2 bytes, 58 read 4, 5C read 8, 7C with an offset, 11 write without
+    /// data, 1D write 8 (to addresses below 100h: 54 becomes D4 on the line, with its marker bit).
+    #[test]
+    fn headers_of_the_manual() {
+        let header = |request: LongRequest| {
+            let bytes = request.emit();
+            let mut head = [0; 2];
+            head.copy_from_slice(&bytes.as_bytes()[..2]);
+            head
+        };
+        let read = |length| header(LongRequest::read(ResourceAddress::TEMPRTUR, length));
+        assert_eq!(
+            [read(Length::Two), read(Length::Four), read(Length::Eight)],
+            [[0xd4, 0xc1], [0xd8, 0xc1], [0xdc, 0xc1]]
+        );
+        let offset = Offset::truncate(8);
+        assert_eq!(header(LongRequest::read_at(ResourceAddress::TYPECODE, offset, Length::Eight)), [0xfc, 0x83]);
+        assert_eq!(header(LongRequest::reset_encoder()), [0x91, 0x00]);
+        assert_eq!(header(LongRequest::set_access(AccessLevel::Operator, *b"1111")), [0x9d, 0x04]);
+        assert_eq!(header(LongRequest::read_name(ResourceAddress::RESOLUTN)), [0xcc, 0x81]);
+    }
+
+    #[test]
+    fn dangerous_ones_are_known() {
+        let shut_down = LongRequest::shut_encoder_down_until_power_cycle();
+        assert_eq!((shut_down.offset.map(Offset::get), shut_down.emit().as_bytes().len()), (Some(1), 6));
+        let key = LongRequest::change_access_key_for_good(AccessLevel::Service, *b"abcd", *b"4444");
+        assert_eq!(key.offset.map(Offset::get), Some(4));
+        assert_eq!(key.emit().as_bytes()[4..12], *b"abcd4444");
+        for request in [shut_down, key, LongRequest::reset_encoder(), LongRequest::clear_user_counter_for_good()] {
+            assert!(request.is_dangerous());
+        }
+        let read = LongRequest::read(ResourceAddress::RESET, Length::Two);
+        assert!(!read.is_dangerous() && !LongRequest::count_up().is_dangerous());
+        for code in 0..=255 {
+            let level = AccessLevel::from_code(code);
+            assert_eq!(level.map(AccessLevel::code), matches!(code & 15, 0..=4 | 15).then_some(code & 15));
+        }
+    }
+}

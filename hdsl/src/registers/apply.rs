@@ -1,0 +1,280 @@
+//! From the report of an H-frame to the registers.
+
+use super::{Event, EventS, Interrupts, Online1, Online2, OnlineD, Register, RegisterRule, Registers};
+use crate::error::Error;
+use crate::master::{Report, State};
+use crate::message::LongAnswer;
+use crate::vframe::{SafeBlock, VFrame};
+
+/// The events of the drive that stand at the places of their status.
+const STATUS_EVENTS: u16 = OnlineD::POS.bits() | OnlineD::QMLW.bits();
+
+impl Registers {
+    /// Takes over what an H-frame brought; the interrupt lines that are active then.
+    pub fn apply(&mut self, report: &Report) -> Interrupts {
+        if report.restarted.is_some() {
+            self.messages(report);
+            self.restart();
+            return self.masked_events();
+        }
+        let mut news = Interrupts::empty();
+        if let Some(frame) = &report.v_frame {
+            news = match self.rule {
+                RegisterRule::Sick => self.v_frame(frame),
+                RegisterRule::Ti => self.v_frame_ti(frame),
+            };
+        }
+        self.numbers(report);
+        self.messages(report);
+        self.status(report);
+        if report.state == State::Running {
+            // The sampling instant's frame is over; safe positions come once a V-frame.
+            self.put(Register::PosTx, [if report.v_frame.is_some() { 3 } else { 2 }]);
+            news.insert(Interrupts::H_FRAME);
+        }
+        news | self.masked_events()
+    }
+
+    /// The head of the next H-frame is on the line: POSTX 0.
+    pub fn request_sent(&mut self) {
+        self.put(Register::PosTx, [0]);
+    }
+
+    /// As the map is when the link is started anew.
+    pub(super) fn restart(&mut self) {
+        for status in [Register::OnlineStatusD, Register::OnlineStatus1, Register::OnlineStatus2] {
+            self.put(status, [0x11, 0x04]);
+        }
+        self.put(Register::MasterQm, [0]);
+        self.put(Register::AccErrCnt, [0]);
+        self.put(Register::Pos, [0; 5]);
+        self.put(Register::Vel, [0; 3]);
+        self.put(Register::SlaveRegCtrl, [0x3f]);
+        self.put(Register::PcCtrl, [0]);
+        self.put(Register::SysCtrl, [0]);
+        self.put(Register::SafeCtrl, [0]);
+        self.put(Register::PosTx, [0]);
+        self.pipe = super::PipeFifo::new();
+        self.raise(Event::PRST | Event::QMLW);
+        self.raise_s(EventS::PRST | EventS::QMLW);
+    }
+
+    fn raise(&mut self, events: Event) {
+        self.put(Register::EventH, (self.event() | events).bits().to_be_bytes());
+    }
+
+    fn raise_s(&mut self, events: EventS) {
+        self.put(Register::EventS, [(self.event_s() | events).bits()]);
+    }
+
+    /// What is shown as it is.
+    fn numbers(&mut self, report: &Report) {
+        if let Some(id) = report.encoder {
+            let [_, high, middle, low] = id.get().to_be_bytes();
+            self.put(Register::EncId, [high << 4 | high, middle, low]);
+        }
+        if report.state > State::IdReq {
+            self.put(Register::MasterQm, [0x80 | report.quality]);
+        }
+        if let Some(signal) = report.signal {
+            self.put(Register::Edges, [signal.edges, signal.rssi.get() << 4 | signal.delay.get()]);
+        }
+        if report.was != State::Running {
+            return;
+        }
+        self.put40(Register::Pos, report.position);
+        let [_, velocity @ ..] = report.velocity.to_be_bytes();
+        self.put::<3>(Register::Vel, velocity);
+        let most = if self.rule == RegisterRule::Sick { 31 } else { 255 };
+        let errors = u8::try_from(report.acceleration_errors.min(most)).unwrap_or(u8::MAX);
+        self.put(Register::AccErrCnt, [errors]);
+        if let Some(word) = report.pipe {
+            match self.rule {
+                RegisterRule::Sick => self.pipe.put(word),
+                RegisterRule::Ti => self.put(Register::PipeD, [word.raw()]),
+            }
+        }
+    }
+
+    /// Online status, and the events that go with it.
+    fn status(&mut self, report: &Report) {
+        let (before, mut d) = (self.online_d(), self.online_d());
+        let [mut one, mut two] = [self.online_1().bits(), self.online_2().bits()];
+        let low = report.quality < crate::quality::QualityMonitor::LOW;
+        for (flag, on) in [
+            (OnlineD::PRST, report.state <= State::Check),
+            (OnlineD::POS, report.doubtful),
+            (OnlineD::QMLW, low),
+            (OnlineD::MIN, report.init),
+            (OnlineD::FREL, report.long_free),
+        ] {
+            d.set(flag, on);
+        }
+        // These three have the same places in all, and QMLW, PRST in channel 2.
+        let common = (OnlineD::PRST | OnlineD::QMLW | OnlineD::MIN).bits();
+        one = one & !common & !Online1::FRES.bits() | d.bits() & common | u16::from(report.short_free);
+        let common = (OnlineD::PRST | OnlineD::QMLW).bits();
+        two = two & !common | d.bits() & common;
+        self.put(Register::OnlineStatus1, one.to_be_bytes());
+        self.put(Register::OnlineStatus2, two.to_be_bytes());
+        match &report.finished.long {
+            Some(Ok(_)) => d.remove(OnlineD::ANS),
+            Some(Err(Error::Dropped)) | None => {}
+            Some(Err(_)) => d.insert(OnlineD::ANS),
+        }
+        self.put(Register::OnlineStatusD, d.bits().to_be_bytes());
+
+        let arisen = match self.rule {
+            RegisterRule::Sick => d.difference(before),
+            RegisterRule::Ti => d,
+        };
+        let mut events = Event::from_bits_retain(arisen.bits() & STATUS_EVENTS);
+        events.set(Event::MIN, report.init);
+        events.set(Event::FREL, d.difference(before).contains(OnlineD::FREL) || report.finished.long.is_some());
+        events.set(Event::ANS, matches!(report.finished.long, Some(Err(error)) if error != Error::Dropped));
+        let mut safe = EventS::empty();
+        safe.set(EventS::QMLW, arisen.contains(OnlineD::QMLW));
+        safe.set(EventS::MIN, report.init);
+        safe.set(
+            EventS::FRES,
+            report.state == State::Running && report.was != State::Running || report.finished.short.is_some(),
+        );
+        if !events.is_empty() {
+            self.raise(events);
+        }
+        if !safe.is_empty() {
+            self.raise_s(safe);
+        }
+    }
+
+    /// The ends of messages.
+    fn messages(&mut self, report: &Report) {
+        if let Some(result) = &report.finished.short {
+            if let Ok(answer) = result {
+                if let Some(data) = answer.data {
+                    self.put(Register::SPcData, [data]);
+                }
+            }
+            self.put(Register::SlaveRegCtrl, [0x3f]);
+        }
+        if let Some(result) = &report.finished.long {
+            if let Ok(answer) = result {
+                self.long_answer(answer);
+            }
+            self.put(Register::PcCtrl, [0]);
+        }
+    }
+
+    fn long_answer(&mut self, answer: &LongAnswer) {
+        self.put(Register::PcAdd, answer.header());
+        match (answer.result, self.rule) {
+            (Ok(data), _) => self.put_buffer(data.as_bytes()),
+            (Err(error), RegisterRule::Sick) => self.put_buffer(&[error.detail(), error.class_code()]),
+            (Err(error), RegisterRule::Ti) => self.put_buffer(&[error.class_code(), error.detail()]),
+        }
+    }
+
+    /// Sets the first bytes of PC_BUFFER; the others keep their value.
+    pub(super) fn put_buffer(&mut self, bytes: &[u8]) {
+        for (at, byte) in (Register::PcBuffer as u8..).zip(bytes) {
+            self.set_byte(at, *byte);
+        }
+    }
+
+    /// Both channels by the manual: each keeps its last valid block.
+    fn v_frame(&mut self, frame: &VFrame) -> Interrupts {
+        let VFrame { safe1, safe2 } = *frame;
+        let mut one = self.online_1();
+        let mut news = Interrupts::empty();
+        let before = one;
+        one.set(Online1::SCE, !safe1.is_sound());
+        if safe1.is_sound() {
+            let withheld = safe1.position().is_err();
+            one.set(Online1::VPOS, withheld);
+            self.summary(safe1.status(), &mut one);
+            self.put40(Register::VPos, safe1.raw_position());
+            self.put(Register::VPosCrc, safe1.raw_crc().to_be_bytes());
+            news.set(Interrupts::VPOS, !withheld);
+        }
+        self.put(Register::OnlineStatus1, one.bits().to_be_bytes());
+        let arisen = one.difference(before);
+        let mut events = EventS::empty();
+        events.set(EventS::SSUM, arisen.contains(Online1::SSUM));
+        events.set(EventS::SCE, arisen.contains(Online1::SCE));
+        events.set(EventS::VPOS, arisen.contains(Online1::VPOS));
+        self.raise_s(events);
+
+        let mut two = self.online_2();
+        two.set(Online2::SCE2, !safe2.is_sound());
+        if safe2.is_sound() {
+            self.safe_2(safe2, &mut two);
+            news.insert(Interrupts::VPOS2);
+        }
+        self.put(Register::OnlineStatus2, two.bits().to_be_bytes());
+        news
+    }
+
+    /// Both channels as the firmware of the SDK shows them.
+    fn v_frame_ti(&mut self, frame: &VFrame) -> Interrupts {
+        let VFrame { safe1, safe2 } = *frame;
+        let mut one = self.online_1();
+        let mut news = Interrupts::empty();
+        self.summary(safe1.status(), &mut one);
+        self.put(Register::VPosCrc, safe1.raw_crc().to_be_bytes());
+        match safe1.position() {
+            Ok(position) => {
+                self.put40(Register::VPos, position);
+                one.remove(Online1::SCE | Online1::VPOS);
+                news.insert(Interrupts::VPOS);
+            }
+            Err(Error::PositionInvalid { .. }) => {
+                one.remove(Online1::SCE);
+                one.insert(Online1::VPOS);
+                self.raise_s(EventS::VPOS);
+            }
+            Err(Error::Crc { .. }) => {
+                one.insert(Online1::SCE);
+                self.raise_s(EventS::SCE);
+            }
+            // A block with a bad word leaves the flags as they are.
+            Err(_) => {}
+        }
+        if one.contains(Online1::SSUM) {
+            self.raise_s(EventS::SSUM);
+        }
+        self.put(Register::OnlineStatus1, one.bits().to_be_bytes());
+        if safe1.is_sound() {
+            let mut two = self.online_2();
+            if !safe2.has_byte_error() {
+                two.set(Online2::SCE2, !safe2.crc_ok());
+            }
+            self.safe_2(safe2, &mut two);
+            self.put(Register::OnlineStatus2, two.bits().to_be_bytes());
+            news.insert(Interrupts::VPOS2);
+        }
+        news
+    }
+
+    /// SUMMARY, with its flags and the event SUM.
+    fn summary(&mut self, summary: u8, one: &mut Online1) {
+        let ([mask], [before]) = (self.get(Register::MaskSum), self.get(Register::SafeSum));
+        let mut d = self.online_d();
+        d.set(OnlineD::SUM, summary != 0);
+        one.set(Online1::SSUM, summary != 0);
+        self.put(Register::OnlineStatusD, d.bits().to_be_bytes());
+        self.put(Register::SafeSum, [summary]);
+        let known = self.rule == RegisterRule::Sick && before & mask != 0;
+        if summary & mask != 0 && !known {
+            self.raise(Event::SUM);
+        }
+    }
+
+    fn safe_2(&mut self, safe2: SafeBlock, two: &mut Online2) {
+        let status = safe2.status();
+        self.put(Register::Status2, [status]);
+        self.put40(Register::VPos2, safe2.raw_position());
+        self.put(Register::VPosCrc2, safe2.raw_crc().to_be_bytes());
+        two.set(Online2::SUM2, status & 0x60 != 0);
+        two.set(Online2::VPOS2, matches!(safe2.position(), Err(Error::PositionInvalid { .. })));
+    }
+}

@@ -1,0 +1,154 @@
+use core::fmt;
+
+use servowire_core::U24;
+
+use crate::layout::Layout;
+use crate::number::{EncoderId, U19, U40};
+use crate::status::{Alm, PmAlm};
+use crate::temperature::Temperature;
+
+/// The data of a response, by its layout.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "arbitrary", derive(arbitrary::Arbitrary))]
+#[allow(missing_docs, reason = "the fields that need words have them")]
+#[non_exhaustive]
+pub enum Data {
+    /// The whole position.
+    Abs40 { abs: U40 },
+    /// Position bits 0..=23.
+    Abs24 { abs: U24 },
+    /// Position bits 16..=39.
+    Abs24High { abs: U24 },
+    /// Alarms.
+    Status { alm: Alm, pm_alm: PmAlm },
+    /// An EEPROM word and its address. Says nothing while ES0 is set.
+    Eeprom { data: u16, address: u8 },
+    /// An EEPROM word of a bank. With `bank_error` the encoder has no such bank.
+    EepromBank { data: u16, bank: u8, address: u8, bank_error: bool },
+    /// Temperature.
+    Temperature { temperature: Temperature },
+    /// Identification code.
+    Id { id: EncoderId },
+    /// Velocity coefficient; its unit and use are not documented.
+    Coefficient { coefficient: U19 },
+    /// Position bits 0..=23 and alarms.
+    Abs24Status { abs: U24, alm: Alm },
+    /// Position bits 0..=23 and temperature.
+    Abs24Temp { abs: U24, temperature: Temperature },
+    /// Position bits 0..=23 and velocity, two's complement; its unit is not documented.
+    Abs24Vel { abs: U24, velocity: i32 },
+    /// Position bits 0..=23, velocity and acceleration, two's complement; their units are not documented.
+    Abs24VelAcc { abs: U24, velocity: i32, acceleration: i16 },
+    /// The whole position and velocity.
+    Abs40Vel { abs: U40, velocity: i32 },
+}
+
+impl Data {
+    /// The layout that carries this data.
+    pub const fn layout(self) -> Layout {
+        match self {
+            Self::Abs40 { .. } => Layout::Abs40,
+            Self::Abs24 { .. } => Layout::Abs24,
+            Self::Abs24High { .. } => Layout::Abs24High,
+            Self::Status { .. } => Layout::Status,
+            Self::Eeprom { .. } => Layout::Eeprom,
+            Self::EepromBank { .. } => Layout::EepromBank,
+            Self::Temperature { .. } => Layout::Temperature,
+            Self::Id { .. } => Layout::Id,
+            Self::Coefficient { .. } => Layout::Coefficient,
+            Self::Abs24Status { .. } => Layout::Abs24Status,
+            Self::Abs24Temp { .. } => Layout::Abs24Temp,
+            Self::Abs24Vel { .. } => Layout::Abs24Vel,
+            Self::Abs24VelAcc { .. } => Layout::Abs24VelAcc,
+            Self::Abs40Vel { .. } => Layout::Abs40Vel,
+        }
+    }
+
+    /// The data bits of a layout, the first of the line in bit 0; `None` for [`Layout::Abs17`].
+    #[expect(clippy::cast_possible_truncation, reason = "each shift brings a field to the low bits")]
+    #[expect(clippy::cast_possible_wrap, reason = "two's complement on the line")]
+    pub(crate) const fn from_bits(layout: Layout, bits: u128) -> Option<Self> {
+        let low = bits as u64;
+        let abs = U24::truncate(low as u32);
+        let velocity = (low >> 24) as u32 as i32;
+        Some(match layout {
+            Layout::Abs17 => return None,
+            Layout::Abs40 => Self::Abs40 { abs: U40::truncate(low) },
+            Layout::Abs24 => Self::Abs24 { abs },
+            Layout::Abs24High => Self::Abs24High { abs },
+            Layout::Status => Self::Status {
+                alm: Alm::from_bits_retain(low as u16),
+                pm_alm: PmAlm::from_bits_retain((low >> 16) as u8),
+            },
+            Layout::Eeprom => Self::Eeprom { data: low as u16, address: (low >> 16) as u8 },
+            Layout::EepromBank => Self::EepromBank {
+                data: low as u16,
+                bank: (low >> 16) as u8,
+                address: (low >> 24) as u8,
+                bank_error: low >> 32 & 1 == 1,
+            },
+            Layout::Temperature => Self::Temperature { temperature: Temperature::from_eeprom(low as u16) },
+            Layout::Id => Self::Id { id: EncoderId::truncate(low as u32) },
+            Layout::Coefficient => Self::Coefficient { coefficient: U19::truncate(low as u32) },
+            Layout::Abs24Status => Self::Abs24Status { abs, alm: Alm::from_bits_retain((low >> 24) as u16) },
+            Layout::Abs24Temp => Self::Abs24Temp { abs, temperature: Temperature::from_eeprom((low >> 24) as u16) },
+            Layout::Abs24Vel => Self::Abs24Vel { abs, velocity },
+            Layout::Abs24VelAcc => Self::Abs24VelAcc { abs, velocity, acceleration: (bits >> 56) as u16 as i16 },
+            Layout::Abs40Vel => Self::Abs40Vel { abs: U40::truncate(low), velocity: (bits >> 40) as u32 as i32 },
+        })
+    }
+
+    /// The data bits, the first of the line in bit 0; unused ones are 0.
+    #[expect(clippy::cast_sign_loss, reason = "two's complement on the line")]
+    pub(crate) const fn bits(self) -> u128 {
+        match self {
+            Self::Abs40 { abs } => abs.get() as u128,
+            Self::Abs24 { abs } | Self::Abs24High { abs } => abs.get() as u128,
+            Self::Id { id } => id.get() as u128,
+            Self::Status { alm, pm_alm } => alm.bits() as u128 | (pm_alm.bits() as u128) << 16,
+            Self::Eeprom { data, address } => data as u128 | (address as u128) << 16,
+            Self::EepromBank { data, bank, address, bank_error } => {
+                data as u128 | (bank as u128) << 16 | (address as u128) << 24 | (bank_error as u128) << 32
+            }
+            Self::Temperature { temperature } => temperature.raw() as u128,
+            Self::Coefficient { coefficient } => coefficient.get() as u128,
+            Self::Abs24Status { abs, alm } => abs.get() as u128 | (alm.bits() as u128) << 24,
+            Self::Abs24Temp { abs, temperature } => abs.get() as u128 | (temperature.raw() as u128) << 24,
+            Self::Abs24Vel { abs, velocity } => abs.get() as u128 | (velocity as u32 as u128) << 24,
+            Self::Abs24VelAcc { abs, velocity, acceleration } => {
+                abs.get() as u128 | (velocity as u32 as u128) << 24 | (acceleration as u16 as u128) << 56
+            }
+            Self::Abs40Vel { abs, velocity } => abs.get() as u128 | (velocity as u32 as u128) << 40,
+        }
+    }
+}
+
+impl fmt::Display for Data {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match *self {
+            Self::Abs40 { abs } => write!(f, "ABS {:#012x}", abs.get()),
+            Self::Abs24 { abs } => write!(f, "ABS {:#08x}", abs.get()),
+            Self::Abs24High { abs } => write!(f, "ABS high {:#08x}", abs.get()),
+            Self::Status { alm, pm_alm } if pm_alm.is_empty() => write!(f, "ALM {alm}"),
+            Self::Status { alm, pm_alm } => write!(f, "ALM {alm} PM-ALM {pm_alm}"),
+            Self::Eeprom { data, address } => write!(f, "address {address:#04x} data {data:#06x}"),
+            Self::EepromBank { bank_error: true, bank, .. } => write!(f, "no bank {bank:#04x}"),
+            Self::EepromBank { data, bank, address, .. } => {
+                write!(f, "bank {bank:#04x} address {address:#04x} data {data:#06x}")
+            }
+            Self::Temperature { temperature } => write!(f, "temperature {temperature}"),
+            Self::Id { id } => write!(f, "ID {:#08x}", id.get()),
+            Self::Coefficient { coefficient } => write!(f, "coefficient {coefficient}"),
+            Self::Abs24Status { abs, alm } => write!(f, "ABS {:#08x} ALM {alm}", abs.get()),
+            Self::Abs24Temp { abs, temperature } => write!(f, "ABS {:#08x} temperature {temperature}", abs.get()),
+            Self::Abs24Vel { abs, velocity } => write!(f, "ABS {:#08x} velocity {velocity}", abs.get()),
+            Self::Abs24VelAcc { abs, velocity, acceleration } => {
+                write!(f, "ABS {:#08x} velocity {velocity} acceleration {acceleration}", abs.get())
+            }
+            Self::Abs40Vel { abs, velocity } => write!(f, "ABS {:#012x} velocity {velocity}", abs.get()),
+        }
+    }
+}
+
+crate::text::format_as_displayed!(Data);

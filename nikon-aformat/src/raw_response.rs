@@ -1,0 +1,143 @@
+use core::fmt;
+
+use nrz_line::{BitOrder, Window};
+
+use crate::crc::mirrored;
+use crate::error::Error;
+use crate::frame::{MAX_FRAMES, contents, pack, truncated};
+use crate::layout::FRAME_BITS;
+use crate::layout::Layout;
+use crate::text::write_words;
+
+/// The frames of one response, 2 to 6: their content bits, framing checked and removed, nothing else judged.
+///
+/// ```text
+///  line, time →   0 | 16 content bits | 1 | 0 | 16 content bits | 1 | ...
+///  line bit       0   1            16  17  18   19           34  35        frame k begins at bit 18 k
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub struct RawResponse {
+    contents: [u16; MAX_FRAMES as usize],
+    frames: u8,
+}
+
+impl RawResponse {
+    /// Most frames of a response.
+    pub const MAX_FRAMES: usize = MAX_FRAMES as usize;
+
+    /// `contents` are 0 behind the frames of the layout.
+    pub(crate) const fn of(contents: [u16; MAX_FRAMES as usize], layout: Layout) -> Self {
+        Self { contents, frames: layout.frames() }
+    }
+
+    /// The response at the beginning of a piece of line, its frames back to back; bits behind it are left alone.
+    ///
+    /// # Errors
+    /// [`Error::Truncated`], [`Error::StartBit`], [`Error::Delimiter`].
+    pub fn from_line(layout: Layout, line: Window) -> Result<Self, Error> {
+        contents(line, u32::from(layout.frames())).map(|contents| Self::of(contents, layout))
+    }
+
+    /// A response from the content bits of its frames, one word each; words behind it are left alone.
+    ///
+    /// # Errors
+    /// [`Error::Truncated`].
+    pub fn from_words(layout: Layout, words: &[u16], order: BitOrder) -> Result<Self, Error> {
+        let Some(words) = words.get(..usize::from(layout.frames())) else {
+            let got = u32::try_from(words.len()).unwrap_or(u32::MAX);
+            return Err(truncated(got.saturating_mul(FRAME_BITS), layout.line_bits()));
+        };
+        let mut contents = [0; Self::MAX_FRAMES];
+        for (to, from) in contents.iter_mut().zip(words) {
+            *to = match order {
+                BitOrder::LsbFirst => *from,
+                BitOrder::MsbFirst => from.reverse_bits(),
+            };
+        }
+        Ok(Self::of(contents, layout))
+    }
+
+    /// Number of frames.
+    pub const fn frames(self) -> u8 {
+        self.frames
+    }
+
+    /// The content bits of the frames, the first of the line in bit 0.
+    pub fn contents(&self) -> &[u16] {
+        self.contents.get(..usize::from(self.frames)).unwrap_or(&self.contents)
+    }
+
+    /// The content bits as words.
+    pub fn words(&self, order: BitOrder) -> impl Iterator<Item = u16> {
+        self.contents().iter().map(move |content| match order {
+            BitOrder::LsbFirst => *content,
+            BitOrder::MsbFirst => content.reverse_bits(),
+        })
+    }
+
+    /// The line bits, 18 a frame, back to back.
+    pub const fn line(&self) -> Window {
+        match Window::from_bits(pack(self.contents), (self.frames as u32).wrapping_mul(FRAME_BITS)) {
+            Some(line) => line,
+            // Never: six frames are 108 bits.
+            None => Window::EMPTY,
+        }
+    }
+
+    /// The received CRC-8 and the one computed over the content bits before it.
+    pub fn crc(&self) -> (u8, u8) {
+        let bytes = bytes(self.contents);
+        let len = usize::from(self.frames).wrapping_mul(2);
+        let got = bytes.get(len.wrapping_sub(1)).copied().unwrap_or(0);
+        let covered = bytes.get(..len.wrapping_sub(1)).unwrap_or(&bytes);
+        (got.reverse_bits(), mirrored(covered).reverse_bits())
+    }
+
+    /// The frames of all content bits but the CRC-8, the first of the line in bit 0; the CRC-8 is added.
+    #[expect(clippy::cast_possible_truncation, reason = "each shift brings a frame to the low bits")]
+    pub(crate) fn of_payload(payload: u128, layout: Layout) -> Self {
+        let mut contents = [0; Self::MAX_FRAMES];
+        for (content, at) in contents.iter_mut().zip((0_u32..).step_by(16)) {
+            *content = payload.wrapping_shr(at) as u16;
+        }
+        Self::of(contents, layout).sealed()
+    }
+
+    /// The frames with the CRC-8 that their other bits demand.
+    pub(crate) fn sealed(mut self) -> Self {
+        let (_, crc) = self.crc();
+        if let Some(last) = self.contents.get_mut(usize::from(self.frames).wrapping_sub(1)) {
+            *last = *last & 0xff | u16::from(crc.reverse_bits()) << 8;
+        }
+        self
+    }
+
+    /// Whether the CRC-8 is right.
+    pub(crate) fn is_sound(&self) -> bool {
+        let bytes = bytes(self.contents);
+        mirrored(bytes.get(..usize::from(self.frames).wrapping_mul(2)).unwrap_or(&bytes)) == 0
+    }
+
+    /// All content bits as one number, the first of the line in bit 0.
+    pub(crate) fn payload(&self) -> u128 {
+        let [c0, c1, c2, c3, c4, c5] = self.contents;
+        let wide = |content, at: u32| u128::from(content) << at;
+        wide(c0, 0) | wide(c1, 16) | wide(c2, 32) | wide(c3, 48) | wide(c4, 64) | wide(c5, 80)
+    }
+}
+
+/// The content bits as bytes, the first of the line in bit 0 of the first.
+const fn bytes(contents: [u16; MAX_FRAMES as usize]) -> [u8; 2 * MAX_FRAMES as usize] {
+    let [c0, c1, c2, c3, c4, c5] = contents;
+    let ([a, b], [c, d], [e, f]) = (c0.to_le_bytes(), c1.to_le_bytes(), c2.to_le_bytes());
+    let ([g, h], [i, j], [k, l]) = (c3.to_le_bytes(), c4.to_le_bytes(), c5.to_le_bytes());
+    [a, b, c, d, e, f, g, h, i, j, k, l]
+}
+
+impl fmt::Display for RawResponse {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write_words(f, self.words(BitOrder::MsbFirst))
+    }
+}
+
+crate::text::format_as_displayed!(RawResponse);

@@ -1,0 +1,83 @@
+//! No illegal value can be deserialised: `cargo test -p nikon-aformat --features serde`.
+#![cfg(feature = "serde")]
+#![allow(missing_docs, clippy::unwrap_used)]
+
+use core::fmt::Debug;
+
+use nikon_aformat::{
+    Alm, EncoderAddress, EncoderId, EncoderStatus, Operation, PmAlm, Request, RequestFrame, Resolution, Temperature,
+    U10, U17, U19, U24, U40, UserAddress, Version,
+};
+use serde::Serialize;
+use serde::de::DeserializeOwned;
+
+/// `legal` is read, and written again as it was; each of `illegal` is refused.
+fn limits<T: DeserializeOwned + Serialize + Debug>(legal: &[&str], illegal: &[&str]) {
+    for text in legal {
+        let value: T = serde_json::from_str(text).unwrap_or_else(|error| unreachable!("{text}: {error}"));
+        assert_eq!(&serde_json::to_string(&value).unwrap(), text);
+    }
+    for text in illegal {
+        let read = serde_json::from_str::<T>(text);
+        assert!(read.is_err(), "{text} became {read:?}");
+    }
+}
+
+#[test]
+fn numbers() {
+    limits::<U10>(&["0", "1023"], &["1024", "65536", "-1"]);
+    limits::<U17>(&["131071"], &["131072"]);
+    limits::<U19>(&["524287"], &["524288"]);
+    limits::<U24>(&["16777215"], &["16777216"]);
+    limits::<U40>(&["1099511627775"], &["1099511627776"]);
+    limits::<EncoderAddress>(&["0", "7"], &["8", "255", "256"]);
+    limits::<EncoderId>(&["16777215"], &["16777216"]);
+    limits::<UserAddress>(&["0", "239"], &["240", "255"]);
+    limits::<Temperature>(&["1023"], &["1024"]);
+}
+
+#[test]
+fn flags() {
+    limits::<EncoderStatus>(&["0", "15"], &["16", "255"]);
+    limits::<Alm>(&["65535"], &["65536"]);
+    limits::<PmAlm>(&["255"], &["256"]);
+}
+
+/// Sync code and CRC-3 of a frame are checked.
+#[test]
+fn frames() {
+    let legal = (0..=u16::MAX).filter(|content| serde_json::from_str::<RequestFrame>(&content.to_string()).is_ok());
+    assert_eq!(legal.count(), 1024);
+}
+
+#[test]
+fn widths() {
+    let text = |st: u32, mt: u32, version: &str, low: bool| {
+        format!(
+            r#"{{"st_bits":{st},"mt_bits":{mt},"version":"{version}","low_with_velocity":{low},"resets_with_position":false}}"#
+        )
+    };
+    for st in 0..=40 {
+        for mt in 0..=40 {
+            let possible = (1..=32).contains(&st) && mt <= 32 && st + mt <= 40;
+            assert_eq!(
+                serde_json::from_str::<Resolution>(&text(st, mt, "V2_1", false)).is_ok(),
+                possible,
+                "{st} + {mt}"
+            );
+        }
+    }
+    // A factory setting of version 3.0 cannot be one of an encoder of version 2.1.
+    let read: Resolution = serde_json::from_str(&text(20, 16, "V2_1", true)).unwrap();
+    assert!(!read.has_low_with_velocity() || read.version() == Version::V3_0);
+}
+
+/// What holds numbers holds no illegal ones.
+#[test]
+fn requests() {
+    let write = Request::new(EncoderAddress::MAX, Operation::EepromWrite { address: UserAddress::MAX, data: 1 });
+    let text = serde_json::to_string(&write).unwrap();
+    assert_eq!(serde_json::from_str::<Request>(&text).unwrap(), write);
+    assert!(serde_json::from_str::<Request>(&text.replace("239", "240")).is_err());
+    assert!(serde_json::from_str::<Request>(&text.replace("\"ea\":7", "\"ea\":8")).is_err());
+}

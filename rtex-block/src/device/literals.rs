@@ -1,0 +1,71 @@
+//! Numbers of the wire, once more: the drive shares none with the master.
+
+/// Cyclic codes, bits 6-4 of byte 1.
+pub(super) const NOP: u8 = 0;
+pub(super) const PP: u8 = 1;
+pub(super) const CP: u8 = 2;
+pub(super) const CV: u8 = 3;
+pub(super) const CT: u8 = 4;
+
+/// Non-cyclic codes that are defined, and those of them that the sub block knows.
+pub(super) const NON_CYCLIC: [u8; 8] = [0, 1, 2, 4, 5, 6, 7, 10];
+pub(super) const SUB: [u8; 3] = [0, 2, 10];
+pub(super) const PROFILE: u8 = 7;
+
+/// Byte 1: profile position, idle.
+pub(super) const PROFILE_IDLE: u8 = 0x10;
+
+/// Error codes.
+pub(super) const WRONG_MAC_ID: u16 = 0x0011;
+pub(super) const WRONG_DIRECTION: u16 = 0x0012;
+pub(super) const WRONG_CYCLIC: u16 = 0x0021;
+pub(super) const WRONG_NON_CYCLIC: u16 = 0x0022;
+pub(super) const WRONG_MODE: u16 = 0x002e;
+pub(super) const WRONG_TYPE: u16 = 0x0031;
+pub(super) const WRONG_ARGUMENT: u16 = 0x0032;
+pub(super) const WRONG_FEED_FORWARD: u16 = 0x0034;
+
+/// Alarms, main and sub code.
+pub(super) const ERR27_4: (u8, u8) = (27, 4);
+pub(super) const ERR86_0: (u8, u8) = (86, 0);
+pub(super) const ERR86_1: (u8, u8) = (86, 1);
+pub(super) const ERR86_2: (u8, u8) = (86, 2);
+pub(super) const ERR91_1: (u8, u8) = (91, 1);
+
+/// Type codes.
+pub(super) const RESET_SOFTWARE: u16 = 0x001;
+pub(super) const RESET_ATTRIBUTE_C: u16 = 0x011;
+pub(super) const PARAMETER_WRITE: u16 = 0x011;
+pub(super) const HOMING_ACTUAL: u8 = 0x21;
+pub(super) const HOMING_COMMAND: u8 = 0x22;
+pub(super) const HOMING_LATCH: u8 = 0x50;
+pub(super) const PROFILE_RELATIVE: u8 = 0x11;
+pub(super) const PERR: u16 = 0x01;
+pub(super) const MPOS: u16 = 0x04;
+pub(super) const ASPD: u16 = 0x05;
+pub(super) const TRQ: u16 = 0x06;
+pub(super) const APOS: u16 = 0x07;
+pub(super) const IPOS: u16 = 0x08;
+pub(super) const LPOS1: u16 = 0x09;
+pub(super) const LPOS2: u16 = 0x0a;
+pub(super) const MSPD: u16 = 0x0c;
+pub(super) const REGENERATIVE_LOAD: u16 = 0x11;
+pub(super) const OVERLOAD: u16 = 0x12;
+
+/// Texts by the new and the conventional type code.
+pub(super) const TEXTS: [(u16, u16, &[u8]); 8] = [
+    (0x01, 0x010, b"Panasonic"),
+    (0x05, 0x050, b"1"),
+    (0x12, 0x120, b"DRIVE MODEL"),
+    (0x13, 0x130, b"00000000"),
+    (0x14, 0x140, b"0.1"),
+    (0x15, 0x150, b"A"),
+    (0x31, 0x310, b"SCALE"),
+    (0x32, 0x320, b"SCALE MODEL"),
+];
+
+/// Control bits that the drive looks at, byte 2 in bits 7-0.
+pub(super) const SERVO_ON: u16 = 0x0080;
+pub(super) const PAUSE: u16 = 0x2000;
+pub(super) const SMOOTH_STOP: u16 = 0x4000;
+pub(super) const HARD_STOP: u16 = 0x8000;

@@ -1,0 +1,71 @@
+use crate::builder::builder;
+
+/// How impolite a modelled drive is. The polite one of [`POLITE`](Self::POLITE) does everything as soon as it can.
+///
+/// Each of them is allowed by what the documents at hand say, or left open by them; a master has to live with any
+/// combination.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[non_exhaustive]
+pub struct Manners {
+    /// Exchanges by which everything but the counter echo is later than it has to be, 0..=3.
+    pub echo_lag: u8,
+    /// Update periods from the start of a profile motion to In_Progress = 1; the axis stands as long.
+    pub in_progress_late: u16,
+    /// Update periods for which Servo_Active stays 1 after Servo_On went to 0.
+    pub servo_off_late: u16,
+    /// Answers to a new request that still carry type code, index and data of the request before it.
+    pub stale_answers: u16,
+    /// Every request is busy for as long as a parameter write.
+    pub always_busy: bool,
+    /// A request that fails says ERR while it is still busy.
+    pub err_while_busy: bool,
+    /// A position can be set with the servo on; otherwise that fails with ERR.
+    pub sets_position_while_on: bool,
+    /// Most parameters count only after a reset of type 011h or 001h.
+    pub parameters_after_reset: bool,
+    /// Homing_Complete is 1 from power-up on.
+    pub homed_at_start: bool,
+    /// In_Position is 1 during the standstill before a profile motion, and during the motion too.
+    pub always_in_position: bool,
+    /// WNG is set in every answer.
+    pub warns: bool,
+}
+
+impl Manners {
+    /// As soon as it can.
+    pub const POLITE: Self = Self {
+        echo_lag: 0,
+        in_progress_late: 0,
+        servo_off_late: 0,
+        stale_answers: 0,
+        always_busy: false,
+        err_while_busy: false,
+        sets_position_while_on: false,
+        parameters_after_reset: false,
+        homed_at_start: false,
+        always_in_position: false,
+        warns: false,
+    };
+
+    builder! {
+        with_echo_lag: echo_lag, u8;
+        with_in_progress_late: in_progress_late, u16;
+        with_servo_off_late: servo_off_late, u16;
+        with_stale_answers: stale_answers, u16;
+        with_always_busy: always_busy, bool;
+        with_err_while_busy: err_while_busy, bool;
+        with_sets_position_while_on: sets_position_while_on, bool;
+        with_parameters_after_reset: parameters_after_reset, bool;
+        with_homed_at_start: homed_at_start, bool;
+        with_always_in_position: always_in_position, bool;
+        with_warns: warns, bool;
+    }
+}
+
+impl Default for Manners {
+    fn default() -> Self {
+        Self::POLITE
+    }
+}

@@ -1,0 +1,194 @@
+//! Set-points, modes and profile motion of an axis.
+
+use super::Axis;
+use crate::control::ControlBits;
+use crate::master::profile_move::{CommandEnded, ProfileMove};
+use crate::master::progress::Progress;
+use crate::master::servo_off::ActiveCode;
+use crate::master::state::{AxisState, SetpointError};
+use crate::position::step;
+use crate::status::StatusFlags;
+use crate::type_code::Nibble;
+
+impl Axis {
+    /// The set-point: command position in CP, otherwise speed or torque.
+    pub const fn setpoint(&self) -> i32 {
+        self.setpoint
+    }
+
+    /// The present mode.
+    pub const fn mode(&self) -> ActiveCode {
+        self.mode
+    }
+
+    /// Largest step of the command position in an update period, command units.
+    pub const fn max_step(&self) -> u32 {
+        self.max_step
+    }
+
+    /// Changes the mode, with the servo off or on. The new set-point is the actual position in CP, otherwise 0.
+    ///
+    /// With the servo on let the axis stand first: the actual position is one or two update periods old when it becomes the
+    /// command position. A drive that cannot change to the mode answers CMD_Error, which stops the axis at its limit.
+    ///
+    /// # Errors
+    /// [`SetpointError::Busy`] during a profile motion or a request, [`SetpointError::NotOn`] on the way from off to on or
+    /// back; the mode is kept then.
+    pub fn set_mode(&mut self, mode: ActiveCode) -> Result<(), SetpointError> {
+        match self.state {
+            AxisState::SwitchingOn | AxisState::Stopping(_) | AxisState::SwitchingOff => {
+                return Err(SetpointError::NotOn);
+            }
+            AxisState::On if self.is_moving() || self.status.contains(StatusFlags::IN_PROGRESS) => {
+                return Err(SetpointError::Busy);
+            }
+            _ => {}
+        }
+        if self.service.request().is_some() {
+            return Err(SetpointError::Busy);
+        }
+        if mode != self.mode {
+            self.mode = mode;
+            self.feed_forward = [0; 3];
+            self.rest();
+        }
+        Ok(())
+    }
+
+    /// Control bits other than Servo_On, which the state decides.
+    pub const fn set_control(&mut self, control: ControlBits) {
+        self.control = control.difference(ControlBits::SERVO_ON);
+    }
+
+    /// Command_Data3 where the command does not need it itself: velocity or torque feed-forward by Pr7.35, as long as the
+    /// servo is on. With Pr7.35 = 0 it must stay 0, or the drive answers 0032h. While a command needs bytes 12-15 itself
+    /// (homing types 21h and 22h, parameter write, profile motion) the drive keeps the last value.
+    ///
+    /// # Errors
+    /// [`SetpointError::NotOn`]
+    pub fn set_feed_forward(&mut self, value: i32) -> Result<(), SetpointError> {
+        self.must_be_on()?;
+        self.feed_forward[0] = value;
+        Ok(())
+    }
+
+    /// Sub_Command_Data2 and 3 of the 32-byte mode: feed-forward by Pr7.36 and Pr7.37 (numbers inferred), as long as the
+    /// servo is on.
+    ///
+    /// # Errors
+    /// [`SetpointError::NotOn`]
+    pub fn set_sub_feed_forward(&mut self, data2: i32, data3: i32) -> Result<(), SetpointError> {
+        self.must_be_on()?;
+        self.feed_forward = [self.feed_forward[0], data2, data3];
+        Ok(())
+    }
+
+    /// The next command position, in CP.
+    ///
+    /// # Errors
+    /// [`SetpointError`]; the position before is kept then.
+    pub fn set_position(&mut self, position: i32) -> Result<(), SetpointError> {
+        self.must_be_on()?;
+        if self.mode != ActiveCode::CyclicPosition {
+            return Err(SetpointError::Mode);
+        }
+        // From the position that was sent last: several calls in one update period do not add up.
+        let step = step(self.before, position);
+        if step.unsigned_abs() > self.max_step {
+            return Err(SetpointError::Step { step });
+        }
+        self.setpoint = position;
+        Ok(())
+    }
+
+    /// The next speed in CV (unit by Pr7.25) or torque in CT (0.1 % of rated).
+    ///
+    /// # Errors
+    /// [`SetpointError`]; the value before is kept then.
+    pub fn set_rate(&mut self, rate: i32) -> Result<(), SetpointError> {
+        self.must_be_on()?;
+        let limit = match self.mode {
+            ActiveCode::CyclicVelocity => self.config.max_speed,
+            ActiveCode::CyclicTorque => self.config.max_torque,
+            _ => return Err(SetpointError::Mode),
+        };
+        within(rate, limit)?;
+        self.setpoint = rate;
+        Ok(())
+    }
+
+    /// Starts a profile motion, in PP; unit of the speed by Pr7.25.
+    ///
+    /// # Errors
+    /// [`SetpointError`]; a motion under way goes on then.
+    pub fn start_move(&mut self, type_code: u8, target: i32, speed: i32) -> Result<(), SetpointError> {
+        self.start_move_with_latch(type_code, target, speed, Nibble::ZERO, 0)
+    }
+
+    /// As [`start_move`](Self::start_move), with Latch_Sel1 and Monitor_Sel; the answers are in [`profile`](Self::profile).
+    ///
+    /// # Errors
+    /// [`SetpointError`]; a motion under way goes on then.
+    pub fn start_move_with_latch(
+        &mut self,
+        type_code: u8,
+        target: i32,
+        speed: i32,
+        latch_sel1: Nibble,
+        monitor_sel: u8,
+    ) -> Result<(), SetpointError> {
+        self.must_be_on()?;
+        if self.mode != ActiveCode::ProfilePosition {
+            return Err(SetpointError::Mode);
+        }
+        if self.is_moving() || self.service.is_busy() {
+            return Err(SetpointError::Busy);
+        }
+        within(speed, self.config.max_speed)?;
+        let motion = ProfileMove::new(self.config.mac_id, type_code, target, speed, self.config.limits.answer);
+        self.profile = Some(motion.with_latch(latch_sel1, monitor_sel));
+        Ok(())
+    }
+
+    /// Changes the speed of the motion under way, if there is one.
+    ///
+    /// # Errors
+    /// [`SetpointError::NotOn`], [`SetpointError::Rate`]; the speed before is kept then.
+    pub fn set_move_speed(&mut self, speed: i32) -> Result<(), SetpointError> {
+        self.must_be_on()?;
+        within(speed, self.config.max_speed)?;
+        if let Some(profile) = &mut self.profile {
+            profile.set_speed(speed);
+        }
+        Ok(())
+    }
+
+    /// The profile motion under way, or ended and not taken yet.
+    pub const fn profile(&self) -> Option<&ProfileMove> {
+        self.profile.as_ref()
+    }
+
+    /// How far the profile motion is; once it has ended this gives its end and forgets it.
+    pub fn take_move(&mut self) -> Option<Progress<CommandEnded>> {
+        let progress = self.profile?.progress();
+        if !progress.is_pending() {
+            self.profile = None;
+        }
+        Some(progress)
+    }
+
+    pub(super) fn is_moving(&self) -> bool {
+        self.profile.is_some_and(|profile| profile.progress().is_pending())
+    }
+
+    fn must_be_on(&self) -> Result<(), SetpointError> {
+        if self.state == AxisState::On { Ok(()) } else { Err(SetpointError::NotOn) }
+    }
+}
+
+fn within(rate: i32, limit: Option<u32>) -> Result<(), SetpointError> {
+    match limit {
+        Some(limit) if rate.unsigned_abs() > limit => Err(SetpointError::Rate { rate }),
+        _ => Ok(()),
+    }
+}

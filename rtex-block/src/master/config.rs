@@ -1,0 +1,123 @@
+//! What an axis is set up with.
+
+use core::num::NonZeroU16;
+
+use super::servo_off::ActiveCode;
+use crate::builder::builder;
+use crate::header::MacId;
+use crate::position::Gear;
+
+/// Time limits, in update periods.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[non_exhaustive]
+pub struct Limits {
+    /// Unchanged echoes of the counter that count as a time-out.
+    pub echo: NonZeroU16,
+    /// From the first valid command, or from [`Axis::clear`](super::Axis::clear), to Servo_Ready.
+    pub ready: u32,
+    /// From Servo_On to Servo_Active.
+    pub active: u32,
+    /// From Servo_On = 0 to Servo_Active = 0.
+    pub inactive: u32,
+    /// For the answer to a request, and for the start of a profile motion.
+    pub answer: u32,
+    /// For a controlled deceleration ([`StopPolicy::Decelerate`]).
+    pub stop: u32,
+    /// Consecutive responses with CMD_Error, other than the answer to a request, that stop the axis. One may come from
+    /// a single damaged frame; the drive holds the command before it then.
+    pub command_errors: NonZeroU16,
+}
+
+impl Limits {
+    /// `echo` for the echo of the counter and for command errors, `wait` for everything that is waited for. The vendor's
+    /// times are not known, so there is no default.
+    pub const fn new(echo: NonZeroU16, wait: u32) -> Self {
+        Self { echo, ready: wait, active: wait, inactive: wait, answer: wait, stop: wait, command_errors: echo }
+    }
+
+    builder! {
+        with_ready: ready, u32;
+        with_active: active, u32;
+        with_inactive: inactive, u32;
+        with_answer: answer, u32;
+        with_stop: stop, u32;
+        with_command_errors: command_errors, NonZeroU16;
+    }
+}
+
+/// What an axis does when another one of the ring has failed.
+///
+/// Whatever it says, a failure of the communication makes every axis servo-off in the same update period, as the System
+/// Design Guide for Master asks for; and an axis that fails itself is switched off at once.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub enum StopPolicy {
+    /// Servo-off in the same update period.
+    #[default]
+    AtOnce,
+    /// Slows down, then servo-off; servo-off anyway when [`Limits::stop`] is over. A profile motion is ended with
+    /// Smooth_Stop, a torque command is taken away at once.
+    Decelerate {
+        /// Change of the step (CP, command units) or of the speed (CV, unit by Pr7.25) in each update period; 0 counts
+        /// as 1.
+        per_update: u32,
+    },
+    /// Goes on.
+    None,
+}
+
+/// What an axis is set up with.
+///
+/// Response_Data1 must be the actual position, so Pr7.29 of the drive must be 0.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[non_exhaustive]
+pub struct AxisConfig {
+    /// The drive's address.
+    pub mac_id: MacId,
+    /// What it does when it is switched on; [`Axis::set_mode`](super::Axis::set_mode) changes it.
+    pub mode: ActiveCode,
+    /// Update period, ns: for the limit of the position step.
+    pub update_ns: u32,
+    /// Time limits.
+    pub limits: Limits,
+    /// Electronic gear, for the limit of 400 M pulse/s; 1/1 unless changed.
+    pub gear: Gear,
+    /// Over-speed level of the drive, command units per second; `None` leaves it to the drive.
+    pub over_speed: Option<u32>,
+    /// Largest speed command in CV and PP, unit by Pr7.25; `None` leaves it to the drive.
+    pub max_speed: Option<u32>,
+    /// Largest torque command in CT, 0.1 % of rated; `None` leaves it to the drive.
+    pub max_torque: Option<u32>,
+    /// What it does when another axis fails; at once unless changed.
+    pub stop: StopPolicy,
+}
+
+impl AxisConfig {
+    /// With electronic gear 1/1, without limits of speed and torque, and stopping at once with the others.
+    pub const fn new(mac_id: MacId, mode: ActiveCode, update_ns: u32, limits: Limits) -> Self {
+        Self {
+            mac_id,
+            mode,
+            update_ns,
+            limits,
+            gear: Gear::UNITY,
+            over_speed: None,
+            max_speed: None,
+            max_torque: None,
+            stop: StopPolicy::AtOnce,
+        }
+    }
+
+    builder! {
+        with_gear: gear, Gear;
+        with_over_speed: over_speed, Option<u32>;
+        with_max_speed: max_speed, Option<u32>;
+        with_max_torque: max_torque, Option<u32>;
+        with_stop: stop, StopPolicy;
+    }
+}

@@ -1,0 +1,74 @@
+use core::fmt;
+
+use super::state::AskError;
+use crate::error_code::ErrorCode;
+use crate::type_code::Pr;
+
+/// How far a procedure is. Its time is counted in update periods.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[must_use]
+pub enum Progress<T> {
+    /// Not finished.
+    Pending {
+        /// Update periods until it fails for lack of an answer.
+        left: u32,
+    },
+    /// Finished.
+    Done {
+        /// What it was made for.
+        value: T,
+    },
+    /// Failed.
+    Failed {
+        /// Why.
+        error: Failure,
+    },
+}
+
+impl<T> Progress<T> {
+    /// Whether it goes on.
+    pub const fn is_pending(&self) -> bool {
+        matches!(self, Self::Pending { .. })
+    }
+}
+
+/// Why a procedure failed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[non_exhaustive]
+pub enum Failure {
+    /// ERR: the command was accepted and failed while it was executed.
+    Execution,
+    /// CMD_Error: the command was not accepted.
+    CommandError(ErrorCode),
+    /// No answer within the caller's limit. Whether the drive has executed the command is not known.
+    TimedOut,
+    /// A profile motion: the drive answered the start and did not set In_Progress within the caller's limit. It may start yet.
+    NotStarted,
+    /// The servo was switched off.
+    ServoOff,
+    /// The axis did not take the request of a procedure.
+    NotSent(AskError),
+    /// The axis is not in the mode that the procedure needs.
+    Mode,
+    /// The parameter has another value than was written to it.
+    Differs(Pr),
+}
+
+impl fmt::Display for Failure {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Execution => f.write_str("failed while it was executed (ERR)"),
+            Self::CommandError(code) => write!(f, "not accepted: {code}"),
+            Self::TimedOut => f.write_str("no answer in time"),
+            Self::ServoOff => f.write_str("the servo was switched off"),
+            Self::NotSent(error) => write!(f, "not sent: {error}"),
+            Self::Mode => f.write_str("the axis is in another mode"),
+            Self::Differs(pr) => write!(f, "{pr} did not take its value"),
+            Self::NotStarted => f.write_str("the motion did not start in time"),
+        }
+    }
+}

@@ -1,0 +1,47 @@
+use crate::error::Error;
+use crate::response::Response;
+use crate::sub::{Response32, SubResponse};
+
+/// What an update period brought from one drive.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum Received {
+    /// No block.
+    Nothing,
+    /// A block that was refused.
+    Refused(Error),
+    /// A block of the 16-byte mode.
+    Main(Response),
+    /// A block of the 32-byte mode.
+    Both(Response32),
+}
+
+impl Received {
+    /// The main half of a sound block.
+    pub const fn response(&self) -> Option<&Response> {
+        match self {
+            Self::Main(main) | Self::Both(Response32 { main, .. }) => Some(main),
+            Self::Nothing | Self::Refused(_) => None,
+        }
+    }
+
+    /// The sub half of a sound block of the 32-byte mode.
+    pub const fn sub(&self) -> Option<&SubResponse> {
+        match self {
+            Self::Both(Response32 { sub, .. }) => Some(sub),
+            _ => None,
+        }
+    }
+}
+
+impl From<Result<Response, Error>> for Received {
+    fn from(parsed: Result<Response, Error>) -> Self {
+        parsed.map_or_else(Self::Refused, Self::Main)
+    }
+}
+
+impl From<Result<Response32, Error>> for Received {
+    fn from(parsed: Result<Response32, Error>) -> Self {
+        parsed.map_or_else(Self::Refused, Self::Both)
+    }
+}

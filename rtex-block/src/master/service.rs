@@ -1,0 +1,266 @@
+//! Everything that a master does, behind two calls: one in the interrupt, one in the main loop.
+
+use core::num::NonZeroU16;
+
+use super::axis::Axis;
+use super::counter::Turn;
+use super::echo::ReceiveWatchdog;
+use super::led::{Led, led};
+use super::phase::{Asic, Fault, Inputs, Phase, PhaseControl};
+use super::received::Received;
+use super::ring::{Ring, SameMacId};
+use super::slaves::{Order, Slave, compare};
+use super::state::StopReason;
+use crate::block::{BlockSize, LEN32};
+use crate::builder::builder;
+use crate::header::MacId;
+use crate::pack::{self, SizeMismatch};
+use crate::response::Response;
+use crate::sub::{Command32, Response32};
+use crate::timing::{Periods, TimerSystem};
+
+/// What a master is set up with.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[non_exhaustive]
+pub struct MasterConfig {
+    /// Size of the blocks; all drives of a ring have the same here.
+    pub size: BlockSize,
+    /// Communication and update period.
+    pub periods: Periods,
+    /// Who gives the rhythm.
+    pub timer: TimerSystem,
+    /// Update periods of invalid data (00h) in PH_RUNNING, before the first valid commands; 4 unless changed (the vendor's
+    /// number is not known).
+    pub invalid: u32,
+    /// Whether the slave table is in the order of the ring; it is unless changed.
+    pub order: Order,
+    /// Update periods without [`Master::received`] that count as a time-out; `None` where the receive interrupt is not used.
+    pub watchdog: Option<NonZeroU16>,
+}
+
+impl MasterConfig {
+    /// Without receive watchdog, with the slave table in the order of the ring.
+    pub const fn new(size: BlockSize, periods: Periods, timer: TimerSystem) -> Self {
+        Self { size, periods, timer, invalid: 4, order: Order::Ring, watchdog: None }
+    }
+
+    builder! {
+        with_invalid: invalid, u32;
+        with_order: order, Order;
+        with_watchdog: watchdog, Option<NonZeroU16>;
+    }
+}
+
+/// Why a master cannot be set up.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[non_exhaustive]
+pub enum SetupError {
+    /// Two axes have the same address.
+    #[error(transparent)]
+    SameMacId(#[from] SameMacId),
+    /// The periods do not work with the timer system.
+    #[error("the periods do not work with the timer system")]
+    Timer,
+    /// An axis reckons with another update period.
+    #[error("the axis of drive {0} has another update period")]
+    UpdatePeriod(MacId),
+    /// The slave table does not list the axis in its place.
+    #[error("the slave table does not list drive {0} in the place of its axis")]
+    Table(MacId),
+}
+
+/// A master: phases, slave table, COM LED, receive watchdog and the ring of axes.
+///
+/// * The main loop calls [`control`](Self::control) with the state of the ASIC, and shows [`led`](Self::led).
+/// * Interrupts stay off until [`is_running`](Self::is_running).
+/// * The NC interrupt calls one of the `exchange` functions: it reads the blocks of the last reception and writes the next
+///   commands, before anything else is calculated. In the external-timer system it comes from the host's timer, in the
+///   internal-timer system from XSYNC.
+/// * The receive interrupt (XINTRX), where it is used, calls [`received`](Self::received). External timer: its priority is
+///   above that of the NC interrupt, and it switches the reception bank. Internal timer: its priority is below.
+///
+/// The exchange must be over before the next frame starts. If it is not, the bank switch is put off and the commands go out
+/// one communication period later ([`Periods::frames_late`]).
+///
+/// Outside PH_RUNNING an exchange writes invalid data (00h, counter 0) and looks at nothing. System Design Guide for Master,
+/// chapters 1 and 2.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Master<const N: usize> {
+    config: MasterConfig,
+    table: [Slave; N],
+    ring: Ring<N>,
+    phases: PhaseControl,
+    watchdog: Option<ReceiveWatchdog>,
+    prepared: bool,
+}
+
+impl<const N: usize> Master<N> {
+    /// A master in PH_INIT.
+    ///
+    /// # Errors
+    /// [`SetupError`]
+    pub fn new(config: MasterConfig, table: [Slave; N], axes: [Axis; N]) -> Result<Self, SetupError> {
+        let ring = Ring::new(axes, config.invalid)?;
+        if !config.timer.allows(&config.periods) {
+            return Err(SetupError::Timer);
+        }
+        for (slave, axis) in table.iter().zip(ring.axes()) {
+            let axis = axis.config();
+            if axis.update_ns != config.periods.update_ns {
+                return Err(SetupError::UpdatePeriod(axis.mac_id));
+            }
+            if axis.mac_id != slave.mac_id {
+                return Err(SetupError::Table(axis.mac_id));
+            }
+        }
+        let watchdog = config.watchdog.map(ReceiveWatchdog::new);
+        Ok(Self { config, table, ring, phases: PhaseControl::new(), watchdog, prepared: false })
+    }
+
+    /// One turn of the main loop: the state of the ASIC, and the slaves that the ring configuration found, once they are
+    /// known.
+    pub fn control(&mut self, asic: Asic, found: Option<&[Slave]>) -> Phase {
+        let slave_info = found.map(|found| compare(&self.table, found, self.config.order));
+        let timeout = self.is_timed_out();
+        self.phases.step(Inputs { asic, slave_info, tx_ready: self.prepared, timeout });
+        self.phases.phase()
+    }
+
+    /// Whether cyclic communication runs: only now interrupts are let in.
+    pub fn is_running(&self) -> bool {
+        self.phases.phase() == Phase::Running
+    }
+
+    /// The phase.
+    pub const fn phase(&self) -> Phase {
+        self.phases.phase()
+    }
+
+    /// The fault of the phases.
+    pub const fn fault(&self) -> Option<Fault> {
+        self.phases.fault()
+    }
+
+    /// What the COM LED shows `t_ms` after the start of a lit half-period.
+    pub fn led(&self, t_ms: u64) -> Led {
+        led(self.phases.phase(), self.phases.fault(), t_ms)
+    }
+
+    /// How it was set up.
+    pub const fn config(&self) -> &MasterConfig {
+        &self.config
+    }
+
+    /// The ring, for reading.
+    pub const fn ring(&self) -> &Ring<N> {
+        &self.ring
+    }
+
+    /// The ring, for set-points, requests, switching on and off. Its [`update`](Ring::update) belongs to the exchange.
+    pub const fn ring_mut(&mut self) -> &mut Ring<N> {
+        &mut self.ring
+    }
+
+    /// From the receive interrupt: a frame has come. Gives whether the handler has to switch the reception bank, which is so
+    /// in the external-timer system.
+    pub const fn received(&mut self) -> bool {
+        if let Some(watchdog) = &mut self.watchdog {
+            watchdog.received();
+        }
+        self.config.timer.reception_first()
+    }
+
+    /// The exchange, with blocks that are decoded already.
+    pub fn exchange(&mut self, received: &[Received; N]) -> [Command32; N] {
+        if !self.is_running() {
+            self.prepared |= self.phases.phase() == Phase::Prepare;
+            return self.ring.axes().each_ref().map(|axis| axis.send(Turn::Invalid));
+        }
+        if self.watchdog.as_mut().is_some_and(ReceiveWatchdog::tick) {
+            self.ring.stop(StopReason::ReceiveTimeout);
+        }
+        let commands = self.ring.update(received);
+        let timeout = self.is_timed_out();
+        self.phases.step(Inputs { asic: Asic::Running, slave_info: None, tx_ready: true, timeout });
+        commands
+    }
+
+    /// The exchange over memory of bytes: the blocks of all axes one after the other, in the order of the axes.
+    ///
+    /// # Errors
+    /// [`SizeMismatch`] unless each memory has the size of all blocks; nothing is read or written then.
+    pub fn exchange_bytes(&mut self, rx: &[u8], tx: &mut [u8]) -> Result<(), SizeMismatch> {
+        self.over(rx, tx, 1, |words, block| block.copy_from_slice(words), |block, words| words.copy_from_slice(block))
+    }
+
+    /// The exchange over memory of 16-bit words, packed as [`pack`] says.
+    ///
+    /// # Errors
+    /// [`SizeMismatch`] unless each memory has the size of all blocks; nothing is read or written then.
+    pub fn exchange_words16(&mut self, rx: &[u16], tx: &mut [u16]) -> Result<(), SizeMismatch> {
+        // The sizes are compared before.
+        let read = |words: &[u16], block: &mut [u8]| pack::from_words16(words, block).unwrap_or(());
+        self.over(rx, tx, 2, read, |block, words| pack::to_words16(block, words).unwrap_or(()))
+    }
+
+    /// The exchange over memory of 32-bit words, packed as [`pack`] says.
+    ///
+    /// # Errors
+    /// [`SizeMismatch`] unless each memory has the size of all blocks; nothing is read or written then.
+    pub fn exchange_words32(&mut self, rx: &[u32], tx: &mut [u32]) -> Result<(), SizeMismatch> {
+        // The sizes are compared before.
+        let read = |words: &[u32], block: &mut [u8]| pack::from_words32(words, block).unwrap_or(());
+        self.over(rx, tx, 4, read, |block, words| pack::to_words32(block, words).unwrap_or(()))
+    }
+
+    /// Leaves the stop after a time-out, an alarm or a stop of the caller: every axis waits for Servo_Ready again. A mismatch
+    /// of the slaves stays until the system is reset.
+    pub fn clear(&mut self) {
+        self.ring.clear();
+        self.phases.release_timeout();
+        self.watchdog = self.config.watchdog.map(ReceiveWatchdog::new);
+    }
+
+    fn is_timed_out(&self) -> bool {
+        self.ring.is_timed_out() || self.watchdog.is_some_and(|watchdog| watchdog.is_tripped())
+    }
+
+    /// The exchange over two memories of words of `width` bytes.
+    fn over<W>(
+        &mut self,
+        rx: &[W],
+        tx: &mut [W],
+        width: usize,
+        read: impl Fn(&[W], &mut [u8]),
+        write: impl Fn(&[u8], &mut [W]),
+    ) -> Result<(), SizeMismatch> {
+        let size = self.config.size.bytes();
+        let bytes = size.saturating_mul(N);
+        for words in [rx.len(), tx.len()] {
+            if words.checked_mul(width) != Some(bytes) {
+                return Err(SizeMismatch { bytes, words });
+            }
+        }
+        let words = size.checked_div(width).unwrap_or(size);
+        let mut received = [Received::Nothing; N];
+        for (received, words) in received.iter_mut().zip(rx.chunks_exact(words)) {
+            let mut memory = [0; LEN32];
+            if let Some(block) = memory.get_mut(..size) {
+                read(words, block);
+                *received = match self.config.size {
+                    BlockSize::Bytes16 => Response::parse(block).into(),
+                    BlockSize::Bytes32 => Response32::parse(block).into(),
+                };
+            }
+        }
+        for (command, words) in self.exchange(&received).iter().zip(tx.chunks_exact_mut(words)) {
+            if let Some(block) = command.emit().get(..size) {
+                write(block, words);
+            }
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,159 @@
+//! States of an axis, why it stops, and what it refuses.
+
+use core::fmt;
+
+use crate::error::ErrorClass;
+use crate::error_code::ErrorCode;
+use crate::header::MacId;
+
+/// Why an axis was stopped.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[non_exhaustive]
+pub enum StopReason {
+    /// The echo of the counter stood still for the limit.
+    EchoTimeout,
+    /// The echo stood still because the blocks in this place come from the drive with this address: the axes are not
+    /// listed in the order of the ring, or the drive's switches are set wrong.
+    WrongMacId(MacId),
+    /// The echo stood still because every block was refused; the class of the last one.
+    Refused(ErrorClass),
+    /// The receive watchdog has tripped.
+    ReceiveTimeout,
+    /// Alarm = 1.
+    Alarm,
+    /// Servo_Ready went to 0 while the servo was wanted on.
+    NotReady,
+    /// Servo_Active went to 0 by itself.
+    NotActive,
+    /// Servo_Ready did not come in time.
+    ReadyTimeout,
+    /// Servo_Active did not come in time.
+    ActiveTimeout,
+    /// Servo_Active did not go in time, or came by itself: the drive does not obey.
+    InactiveTimeout,
+    /// The command was not accepted for the limit; the last Error_Code.
+    CommandError(ErrorCode),
+    /// The axis at this place of the ring failed.
+    OtherAxis(u8),
+    /// The caller stopped it.
+    Requested,
+}
+
+impl StopReason {
+    /// Whether commands or responses do not get through: every axis must be switched off then.
+    pub const fn is_communication(self) -> bool {
+        matches!(self, Self::EchoTimeout | Self::WrongMacId(_) | Self::Refused(_) | Self::ReceiveTimeout)
+    }
+}
+
+impl fmt::Display for StopReason {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::EchoTimeout => f.write_str("the counter echo stands still"),
+            Self::WrongMacId(other) => write!(f, "the blocks come from drive {other}"),
+            Self::Refused(class) => write!(f, "every block was refused: {class}"),
+            Self::ReceiveTimeout => f.write_str("nothing is received"),
+            Self::Alarm => f.write_str("alarm"),
+            Self::NotReady => f.write_str("Servo_Ready went to 0"),
+            Self::NotActive => f.write_str("Servo_Active went to 0"),
+            Self::ReadyTimeout => f.write_str("Servo_Ready did not come"),
+            Self::ActiveTimeout => f.write_str("Servo_Active did not come"),
+            Self::InactiveTimeout => f.write_str("Servo_Active did not go"),
+            Self::CommandError(code) => write!(f, "command not accepted: {code}"),
+            Self::OtherAxis(place) => write!(f, "axis {place} has failed"),
+            Self::Requested => f.write_str("stopped by the caller"),
+        }
+    }
+}
+
+/// State of an axis. Servo_On is 1 in `SwitchingOn`, `On` and `Stopping`, and in no other state.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub enum AxisState {
+    /// Waiting for Servo_Ready, Servo_On = 0.
+    Starting,
+    /// Ready, Servo_On = 0.
+    Off,
+    /// Servo_On = 1, waiting for Servo_Active.
+    SwitchingOn,
+    /// Energised: the set-point counts.
+    On,
+    /// Slowing down before servo-off; set-points are not taken.
+    Stopping(StopReason),
+    /// Servo_On = 0, waiting for Servo_Active = 0.
+    SwitchingOff,
+    /// Servo_On = 0 until [`Axis::clear`](super::Axis::clear).
+    Stopped(StopReason),
+}
+
+impl AxisState {
+    /// Whether the axis commands Servo_On = 1.
+    pub const fn is_servo_on(self) -> bool {
+        matches!(self, Self::SwitchingOn | Self::On | Self::Stopping(_))
+    }
+}
+
+impl fmt::Display for AxisState {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Starting => f.write_str("starting"),
+            Self::Off => f.write_str("off"),
+            Self::SwitchingOn => f.write_str("switching on"),
+            Self::On => f.write_str("on"),
+            Self::Stopping(reason) => write!(f, "stopping: {reason}"),
+            Self::SwitchingOff => f.write_str("switching off"),
+            Self::Stopped(reason) => write!(f, "stopped: {reason}"),
+        }
+    }
+}
+
+/// A set-point or a mode that an axis does not take; it keeps the one before.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[non_exhaustive]
+pub enum SetpointError {
+    /// The axis is not on.
+    #[error("the axis is not on")]
+    NotOn,
+    /// The axis is in another mode.
+    #[error("the axis is in another mode")]
+    Mode,
+    /// The step exceeds 400 M pulses per second after the electronic gear, or the over-speed level: the drive would raise
+    /// Err27.4.
+    #[error("a step of {step} command units is too large")]
+    Step {
+        /// Wrapping difference to the command position before.
+        step: i32,
+    },
+    /// The speed or torque exceeds the limit of the configuration.
+    #[error("{rate} exceeds the limit of the axis")]
+    Rate {
+        /// What was asked for.
+        rate: i32,
+    },
+    /// A profile motion or a request is under way.
+    #[error("a profile motion or a request is under way")]
+    Busy,
+}
+
+/// A request that an axis does not send.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, thiserror::Error)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[non_exhaustive]
+pub enum AskError {
+    /// Another request, or a profile motion, is under way.
+    #[error("another request or a profile motion is under way")]
+    Busy,
+    /// The normal command has no answer, and a profile motion is started with
+    /// [`Axis::start_move`](super::Axis::start_move).
+    #[error("no request that is answered")]
+    NotARequest,
+    /// A reset, or setting a position, with the servo on: the drive would lose its state, or the set-point would stay in
+    /// the old coordinates and make a jump.
+    #[error("not while the servo is on")]
+    ServoOn,
+}

@@ -1,0 +1,58 @@
+use super::progress::{Failure, Progress};
+use crate::execution::Execution;
+use crate::sub::{SubCode, SubCommand, SubResponse};
+
+/// One sub-command of the 32-byte mode, from the request to its answer; it runs beside the main command.
+///
+/// The rules are those of [`Handshake`](super::Handshake), with the flags and echoes of bytes 16-19.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct SubHandshake {
+    command: SubCommand,
+    left: u32,
+}
+
+impl SubHandshake {
+    /// Asks for `code` (system ID or monitor); it times out when `limit` responses have left it pending. `None` for the
+    /// normal sub-command, which has no answer.
+    pub const fn new(code: SubCode, type_code: u8, index: u16, limit: u32) -> Option<Self> {
+        match code {
+            SubCode::Normal => None,
+            _ => Some(Self { command: SubCommand { code, type_code, index, ..SubCommand::IDLE }, left: limit }),
+        }
+    }
+
+    /// What to send while the handshake is pending.
+    pub const fn command(&self) -> SubCommand {
+        self.command
+    }
+
+    /// Takes what one update period brought: the sub block of the drive's response, `None` if there was none.
+    pub fn receive(&mut self, response: Option<&SubResponse>) -> Progress<SubResponse> {
+        let progress = response.filter(|r| r.code.get() == self.command.code as u8).and_then(|r| self.read(r));
+        progress.unwrap_or_else(|| match self.left.checked_sub(1) {
+            Some(left) => {
+                self.left = left;
+                Progress::Pending { left }
+            }
+            None => Progress::Failed { error: Failure::TimedOut },
+        })
+    }
+
+    /// `None` while the answer is due.
+    fn read(&self, response: &SubResponse) -> Option<Progress<SubResponse>> {
+        if let Some(code) = response.error_code() {
+            return Some(Progress::Failed { error: Failure::CommandError(code) });
+        }
+        if response.type_code != self.command.type_code || response.index != self.command.index {
+            return None;
+        }
+        if response.execution.contains(Execution::ERR) {
+            Some(Progress::Failed { error: Failure::Execution })
+        } else if response.execution.contains(Execution::BUSY) {
+            None
+        } else {
+            Some(Progress::Done { value: *response })
+        }
+    }
+}

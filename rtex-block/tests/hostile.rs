@@ -1,0 +1,317 @@
+//! A master and four impolite drives over lines that lose, delay and repeat blocks, with faults that last.
+//!
+//! `HOSTILE_EVENTS=10000000 cargo test --release -p rtex-block --test hostile` runs ten million update periods.
+#![allow(
+    clippy::arithmetic_side_effects,
+    clippy::cast_possible_truncation,
+    clippy::cast_possible_wrap,
+    clippy::indexing_slicing,
+    clippy::panic,
+    clippy::unwrap_used,
+    missing_docs
+)]
+
+mod common;
+
+use core::num::NonZeroU16;
+
+use common::CODES;
+use rtex_block::device::{Drive, DriveConfig, Manners};
+use rtex_block::master::{
+    ActiveCode, Asic, Axis, AxisConfig, AxisState, Fault, Limits, Master, MasterConfig, Phase, Slave, StopPolicy,
+};
+use rtex_block::timing::{Periods, TimerSystem};
+use rtex_block::{Alarm, Arguments, BlockSize, CommandBlock, MacId, NonCyclicCommand, SubCode, TypeCode, pack};
+use servowire_world::{Cable, Kind, Rates, Scenario, Tally};
+
+const AXES: usize = 4;
+const PERIOD_NS: u64 = 500_000;
+const LIMIT: u16 = 8;
+/// Update periods from a fault until every motor is released: the limit that notices it, one for the command to get there,
+/// one for the drive to obey, three that its status may be late, and four that frames may be lost meanwhile.
+const OFF_WITHIN: u64 = LIMIT as u64 + 2 + 3 + 4;
+
+/// Numbers without a pattern (xorshift).
+struct Draw(u64);
+
+impl Draw {
+    fn below(&mut self, limit: u64) -> u64 {
+        self.0 ^= self.0 << 13;
+        self.0 ^= self.0 >> 7;
+        self.0 ^= self.0 << 17;
+        (self.0 >> 33) % limit
+    }
+
+    fn manners(&mut self) -> Manners {
+        let mut some = |limit| self.below(limit) as u16;
+        Manners::POLITE
+            .with_echo_lag(some(4) as u8)
+            .with_in_progress_late(some(20))
+            .with_servo_off_late(some(4))
+            .with_stale_answers(some(4))
+            .with_always_busy(some(2) == 0)
+            .with_err_while_busy(some(2) == 0)
+            .with_always_in_position(some(2) == 0)
+            .with_warns(some(2) == 0)
+    }
+}
+
+/// One direction to or from a drive: what arrives in a period stays in the memory until something newer comes.
+struct Line {
+    cable: Cable,
+    /// On their way, with the time of arrival.
+    late: Vec<(u64, Vec<u8>)>,
+}
+
+impl Line {
+    fn new(seed: u64) -> Self {
+        let rates = Rates { longest_ns: 1_200_000, ..Rates::QUIET }
+            .with(Kind::Drop, 2_000)
+            .with(Kind::Delay, 2_000)
+            .with(Kind::Repeat, 1_000)
+            .with(Kind::Cut, 500)
+            .with(Kind::Foreign, 500);
+        Self { cable: Cable::new(20_000, Scenario::random(seed, rates)), late: Vec::new() }
+    }
+
+    /// What the memory at the other end holds of this period: the block that came last.
+    fn carry(&mut self, block: &[u8], now: u64) -> Option<[u8; 32]> {
+        let arrivals = self.cable.carry(block, now * PERIOD_NS);
+        self.late.extend(arrivals.into_iter().map(|arrival| (arrival.at_ns, arrival.bytes)));
+        let end = (now + 1) * PERIOD_NS;
+        self.late.sort_by_key(|(at, _)| *at);
+        let here = self.late.iter().take_while(|(at, _)| *at < end).count();
+        // The ASIC takes whole frames only.
+        self.late.drain(..here).rev().find_map(|(_, bytes)| bytes.try_into().ok())
+    }
+
+    fn faults(&self) -> u64 {
+        self.cable.tally.faults.iter().sum()
+    }
+}
+
+struct Bench {
+    master: Master<AXES>,
+    drives: [Drive; AXES],
+    down: [Line; AXES],
+    up: [Line; AXES],
+    cut: [bool; AXES],
+    turned: [bool; AXES],
+    tx: [u32; AXES * 8],
+    rx: [u32; AXES * 8],
+    now: u64,
+    /// The last update period in which a line did anything wrong.
+    hurt: u64,
+    started: bool,
+}
+
+fn mac_id(place: usize) -> MacId {
+    MacId::new(place as u8 * 7 + 1).unwrap()
+}
+
+impl Bench {
+    fn new(draw: &mut Draw) -> Self {
+        let limit = NonZeroU16::new(LIMIT).unwrap();
+        let limits = Limits::new(limit, 80).with_ready(200).with_stop(6);
+        let policies = [StopPolicy::AtOnce, StopPolicy::Decelerate { per_update: 40 }];
+        let axis = |place: usize| {
+            let config = AxisConfig::new(mac_id(place), ActiveCode::CyclicPosition, 500_000, limits);
+            Axis::new(config.with_stop(policies[place % 2]))
+        };
+        let table: [Slave; AXES] = core::array::from_fn(|place| Slave { mac_id: mac_id(place), kind: 3 });
+        let periods = Periods::from_a6n(3, 1, None).unwrap();
+        let config = MasterConfig::new(BlockSize::Bytes32, periods, TimerSystem::Internal).with_watchdog(Some(limit));
+        let mut master = Master::new(config, table, core::array::from_fn(axis)).unwrap();
+        master.control(Asic::RingConfig, None);
+        assert_eq!(master.control(Asic::Ready, Some(&table)), Phase::Prepare);
+        let mut bench = Self {
+            master,
+            drives: core::array::from_fn(|place| {
+                Drive::new(DriveConfig::new(mac_id(place), CODES).with_manners(draw.manners()))
+            }),
+            down: core::array::from_fn(|place| Line::new(place as u64 + 1)),
+            up: core::array::from_fn(|place| Line::new(place as u64 + 100)),
+            cut: [false; AXES],
+            turned: [false; AXES],
+            tx: [0; AXES * 8],
+            rx: [0; AXES * 8],
+            now: 0,
+            hurt: 0,
+            started: false,
+        };
+        bench.update();
+        bench.master.control(Asic::Ready, None);
+        assert_eq!(bench.master.control(Asic::Running, None), Phase::Running);
+        bench
+    }
+
+    fn update(&mut self) {
+        self.master.exchange_words32(&self.rx, &mut self.tx).unwrap();
+        self.judge();
+        self.frame();
+    }
+
+    /// The laws of every update period, on the blocks as they are in the memory.
+    fn judge(&mut self) {
+        let fault = self.master.fault();
+        for place in 0..AXES {
+            let mut block = [0; 32];
+            pack::from_words32(&self.tx[place * 8..place * 8 + 8], &mut block).unwrap();
+            let main = *block.first_chunk().unwrap();
+            let view = CommandBlock::of(&main).unwrap();
+            self.started |= view.obeys_control();
+            assert_eq!(view.obeys_control(), self.started, "a NOP at {}", self.now);
+            let state = self.master.ring().axes()[place].state();
+            assert!(view.is_servo_off() || state.is_servo_on() || !self.started, "{state} at {}", self.now);
+            // A failure of the communication is servo-off for all, at once.
+            assert!(fault.is_none() || view.is_servo_off() || !self.started, "{state} at {}", self.now);
+        }
+    }
+
+    /// A frame goes round with what the master wrote last.
+    fn frame(&mut self) {
+        self.now += 1;
+        let before: u64 = self.down.iter().chain(&self.up).map(Line::faults).sum();
+        let mut any = false;
+        for place in 0..AXES {
+            let words = place * 8..place * 8 + 8;
+            let mut block = [0; 32];
+            pack::from_words32(&self.tx[words.clone()], &mut block).unwrap();
+            let from = self.drives[place].position();
+            let command = if self.cut[place] { None } else { self.down[place].carry(&block, self.now) };
+            if let Some(command) = command {
+                let mut response = self.drives[place].exchange32(&command);
+                response[0] ^= u8::from(self.turned[place]);
+                if let Some(block) = self.up[place].carry(&response, self.now) {
+                    any = true;
+                    pack::to_words32(&block, &mut self.rx[words]).unwrap();
+                }
+            } else {
+                self.drives[place].miss();
+            }
+            let by = self.drives[place].position().wrapping_sub(from);
+            assert!(by.abs() <= 3_000, "axis {place} jumps by {by} at {}", self.now);
+        }
+        if any {
+            assert!(!self.master.received());
+        }
+        if self.down.iter().chain(&self.up).map(Line::faults).sum::<u64>() != before {
+            self.hurt = self.now;
+        }
+    }
+
+    fn until(&mut self, what: &str, limit: u64, mut done: impl FnMut(&mut Self) -> bool) {
+        for _ in 0..=limit {
+            if done(self) {
+                return;
+            }
+            self.update();
+        }
+        let states = self.master.ring().axes().each_ref().map(Axis::state);
+        panic!("{what}: not within {limit} update periods at {}: {states:?}", self.now);
+    }
+
+    fn all_off(&self) -> bool {
+        self.drives.iter().all(|drive| !drive.is_active())
+    }
+
+    /// Clears until every axis is on; a frame that is lost may spoil an attempt, the next one succeeds.
+    fn recover(&mut self, draw: &mut Draw) {
+        (self.cut, self.turned) = ([false; AXES], [false; AXES]);
+        for drive in &mut self.drives {
+            drive.set_config(drive.config().with_manners(draw.manners()));
+            drive.set_main_power(true);
+        }
+        for _ in 0..20 {
+            for drive in &mut self.drives {
+                drive.clear_alarm();
+            }
+            self.master.clear();
+            for _ in 0..400 {
+                self.update();
+                self.master.ring_mut().switch_on();
+                if self.master.ring().all_are(AxisState::On) {
+                    assert_eq!(self.master.fault(), None);
+                    return;
+                }
+                if self.master.ring().failure().is_some() {
+                    break;
+                }
+            }
+        }
+        panic!("no recovery at {}: {:?}", self.now, self.master.ring().failure());
+    }
+
+    /// Set-points and requests; outcomes are taken by chance.
+    fn work(&mut self, draw: &mut Draw) {
+        let now = self.now;
+        for (place, axis) in self.master.ring_mut().axes_mut().iter_mut().enumerate() {
+            if axis.state() == AxisState::On {
+                let forth = (now / 300 + place as u64) % 2 == 0;
+                let by = (place as i32 + 1) * if forth { 60 } else { -60 };
+                axis.set_position(axis.setpoint().wrapping_add(by)).unwrap();
+            }
+            match draw.below(40) {
+                0 => {
+                    let about = Arguments { type_code: TypeCode::short(draw.below(16) as u8), index: 0, data: 0 };
+                    let _ = axis.ask(NonCyclicCommand::Monitor(about));
+                }
+                1 => _ = axis.ask_sub(SubCode::Monitor, draw.below(16) as u8, 0),
+                2 => _ = (axis.take_outcome(), axis.take_sub_outcome()),
+                _ => {}
+            }
+        }
+    }
+}
+
+fn events() -> u64 {
+    std::env::var("HOSTILE_EVENTS").ok().and_then(|text| text.parse().ok()).unwrap_or(100_000)
+}
+
+#[test]
+fn hostile_every_servo_is_off_in_time() {
+    let mut draw = Draw(0x9e37_79b9_7f4a_7c15);
+    let mut bench = Bench::new(&mut draw);
+    let mut faults = [0_u32; 8];
+    let mut spurious = 0_u32;
+    bench.recover(&mut draw);
+    while bench.now < events() {
+        for _ in 0..30 + draw.below(300) {
+            bench.work(&mut draw);
+            bench.update();
+            if bench.master.ring().failure().is_some() {
+                break;
+            }
+        }
+        if let Some((place, reason)) = bench.master.ring().failure() {
+            // Only what the lines did can have been the cause.
+            assert!(bench.now - bench.hurt <= 20, "axis {place} at {}: {reason}", bench.now);
+            spurious += 1;
+        } else {
+            let (place, kind) = (draw.below(AXES as u64) as usize, draw.below(faults.len() as u64) as usize);
+            faults[kind] += 1;
+            match kind {
+                0 => bench.drives[place].raise(Alarm { main: 16, sub: 0 }),
+                1 => bench.drives[place].set_main_power(false),
+                2 => bench.cut[place] = true,
+                3 => bench.cut = [true; AXES],
+                4 => bench.turned[place] = true,
+                5 => bench.drives[place].drop_servo(),
+                6 => bench.master.ring_mut().switch_off(),
+                // The master hangs: the same blocks go round again and again.
+                _ => (0..LIMIT).for_each(|_| bench.frame()),
+            }
+            let orderly = kind == 6;
+            bench.until("every motor released", OFF_WITHIN + 8, |bench| bench.all_off());
+            bench.until("the master knows", OFF_WITHIN, |bench| orderly || bench.master.ring().failure().is_some());
+            let by_line = matches!(kind, 2..=4);
+            assert!(!by_line || bench.master.fault() == Some(Fault::Timeout), "kind {kind} at {}", bench.now);
+        }
+        bench.until("every motor released", OFF_WITHIN + 8, |bench| bench.all_off());
+        bench.recover(&mut draw);
+    }
+    let mut tally = Tally::default();
+    bench.down.iter().chain(&bench.up).for_each(|line| tally.add(&line.cable.tally));
+    println!("{} update periods, faults by kind {faults:?}, stops by the lines {spurious}\n{tally}", bench.now);
+    assert!(events() < 50_000 || faults.iter().all(|&n| n > 0), "{faults:?}");
+}

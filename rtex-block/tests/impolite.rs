@@ -1,0 +1,393 @@
+//! The master against a drive that is late, forgetful and literal, in every combination of its manners.
+#![allow(
+    clippy::arithmetic_side_effects,
+    clippy::cast_possible_truncation,
+    clippy::cast_possible_wrap,
+    clippy::indexing_slicing,
+    clippy::panic,
+    clippy::unwrap_used,
+    missing_docs
+)]
+
+mod common;
+
+use common::{CODES, LIMIT, Pair, limits, monitor, set_position};
+use rtex_block::device::{Drive, DriveConfig, Manners};
+use rtex_block::master::{
+    ActiveCode, AskError, AxisConfig, AxisState, CommandEnded, Failure, MoveStage, Progress, Received, SetpointError,
+    StopReason, Turn,
+};
+use rtex_block::position::Gear;
+use rtex_block::{
+    Alarm, Arguments, Code, ErrorClass, ErrorCode, MacId, NonCyclicCommand, NonCyclicResponse, Response, TypeCode,
+};
+
+/// Every switch on or off: 2 to the power of 11.
+fn all_manners() -> impl Iterator<Item = Manners> {
+    (0..1_u32 << 11).map(|bits| {
+        let on = |k: u32| bits >> k & 1 == 1;
+        let some = |k: u32, n: u16| if on(k) { n } else { 0 };
+        Manners::POLITE
+            .with_echo_lag(if on(0) { 3 } else { 0 })
+            .with_in_progress_late(some(1, 9))
+            .with_servo_off_late(some(2, 7))
+            .with_stale_answers(some(3, 2))
+            .with_always_busy(on(4))
+            .with_err_while_busy(on(5))
+            .with_sets_position_while_on(on(6))
+            .with_parameters_after_reset(on(7))
+            .with_homed_at_start(on(8))
+            .with_always_in_position(on(9))
+            .with_warns(on(10))
+    })
+}
+
+/// Servo on, a cyclic move, a monitor value, a profile motion, servo off: whatever the drive is like.
+#[test]
+fn every_combination_of_manners() {
+    for manners in all_manners() {
+        let mut pair = Pair::on(ActiveCode::CyclicPosition, manners);
+        assert_eq!(pair.axis.setpoint(), 0, "{manners:?}");
+        for k in 1..=20 {
+            pair.axis.set_position(k * 50).unwrap();
+            pair.update();
+        }
+        pair.until("at the position", |pair| pair.drive.position() == 1_000);
+        let Progress::Done { value } = pair.ask(monitor(0x07)) else { panic!("{manners:?}") };
+        assert_eq!(value.data(), Some(1_000), "{manners:?}");
+        let failed = pair.ask(monitor(0xee));
+        assert_eq!(failed, Progress::Failed { error: Failure::CommandError(ErrorCode(0x0031)) }, "{manners:?}");
+
+        pair.until("free", |pair| pair.axis.can_ask());
+        pair.axis.set_mode(ActiveCode::ProfilePosition).unwrap();
+        pair.axis.start_move(0x11, 3_000, 2_000_000).unwrap();
+        let ended = pair.end_of_move();
+        assert!(matches!(ended, Progress::Done { .. }), "{manners:?}: {ended:?}");
+        pair.until("at the target", |pair| pair.drive.position() == 4_000);
+
+        pair.axis.switch_off();
+        pair.until("off", |pair| pair.axis.state() == AxisState::Off);
+        assert!(!pair.drive.is_active());
+        assert_eq!(pair.drive.alarm(), None, "{manners:?}");
+    }
+}
+
+/// A motion is not done before it has started, however late In_Progress comes, and its end is not the arrival.
+#[test]
+fn a_motion_that_starts_late_is_not_done_early() {
+    for late in [0, 1, 5, 30] {
+        let manners = Manners::POLITE.with_in_progress_late(late).with_always_in_position(true);
+        let mut pair = Pair::on(ActiveCode::ProfilePosition, manners);
+        pair.axis.start_move(0x11, 20_000, 1_000_000).unwrap();
+        let mut started = None;
+        let ended = pair.run(|axis| {
+            if axis.profile().unwrap().stage() == MoveStage::Moving {
+                started = Some(axis.actual_position());
+            }
+            axis.take_move().unwrap()
+        });
+        assert!(matches!(ended, Progress::Done { value: CommandEnded { in_position: true, warning: false } }));
+        assert!(started.is_some());
+        pair.until("at the target", |pair| pair.drive.position() == 20_000);
+    }
+    // Without the start the motion fails at its limit; one of no length may do so too.
+    let mut pair = Pair::on(ActiveCode::ProfilePosition, Manners::POLITE.with_in_progress_late(u16::MAX));
+    pair.axis.start_move(0x11, 20_000, 1_000_000).unwrap();
+    let from = pair.now;
+    assert_eq!(pair.end_of_move(), Progress::Failed { error: Failure::NotStarted });
+    assert!((60..65).contains(&(pair.now - from)), "{}", pair.now - from);
+    // An unknown type is refused at the start.
+    let mut pair = Pair::on(ActiveCode::ProfilePosition, Manners::POLITE);
+    pair.axis.start_move(0xee, 20_000, 1_000_000).unwrap();
+    assert_eq!(pair.end_of_move(), Progress::Failed { error: Failure::CommandError(ErrorCode(0x0031)) });
+    // The drive never echoes 10h, so the motion never begins.
+    let mut pair = Pair::on(ActiveCode::ProfilePosition, Manners::POLITE);
+    pair.axis.start_move(0x11, 20_000, 1_000_000).unwrap();
+    for _ in 0..70 {
+        if let Received::Main(response) = &mut pair.received {
+            response.code = Code::truncate(0x1a);
+        }
+        pair.update();
+    }
+    assert_eq!(pair.axis.take_move(), Some(Progress::Failed { error: Failure::TimedOut }));
+}
+
+/// ERR counts with Busy or without, and a request that is only busy goes on to its limit.
+#[test]
+fn err_and_busy_in_either_order() {
+    for manners in [Manners::POLITE, Manners::POLITE.with_always_busy(true).with_err_while_busy(true)] {
+        let mut pair = Pair::on(ActiveCode::ProfilePosition, manners);
+        // Homing of an unknown kind is refused; the drive's own one fails in no state but on.
+        pair.axis.switch_off();
+        pair.until("off", |pair| pair.axis.state() == AxisState::Off);
+        assert_eq!(pair.ask(set_position(0xc8, 0)), Progress::Failed { error: Failure::Execution });
+    }
+    let mut pair = Pair::new(ActiveCode::CyclicPosition, Manners::POLITE.with_always_busy(true));
+    pair.until("off", |pair| pair.axis.state() == AxisState::Off);
+    pair.drive = Drive::new(pair.drive.config().with_busy_exchanges(u16::MAX));
+    pair.axis.ask(monitor(7)).unwrap();
+    assert_eq!(pair.outcome(), Progress::Failed { error: Failure::TimedOut });
+}
+
+/// A position is set with the servo off only, and the servo is not switched on before the drive has answered.
+#[test]
+fn setting_a_position() {
+    for manners in [Manners::POLITE, Manners::POLITE.with_sets_position_while_on(true)] {
+        for type_code in [0x21, 0x22] {
+            let mut pair = Pair::on(ActiveCode::CyclicPosition, manners);
+            assert_eq!(pair.axis.ask(set_position(type_code, 9_000)), Err(AskError::ServoOn));
+            pair.axis.switch_off();
+            assert_eq!(pair.axis.ask(set_position(type_code, 9_000)), Err(AskError::ServoOn));
+            pair.until("off", |pair| pair.axis.state() == AxisState::Off);
+            pair.axis.ask(set_position(type_code, 9_000)).unwrap();
+            assert!(!pair.axis.switch_on());
+            assert!(matches!(pair.outcome(), Progress::Done { .. }));
+            pair.switch_on();
+            assert_eq!((pair.axis.setpoint(), pair.drive.position()), (9_000, 9_000));
+            (0..50).for_each(|_| pair.update());
+            assert_eq!((pair.drive.alarm(), pair.drive.position()), (None, 9_000));
+        }
+    }
+    for type_code in [0x01, 0x11] {
+        let mut pair = Pair::on(ActiveCode::CyclicPosition, Manners::POLITE);
+        let reset = NonCyclicCommand::Reset(Arguments { type_code: TypeCode::short(type_code), index: 0, data: 0 });
+        assert_eq!(pair.axis.ask(reset), Err(AskError::ServoOn));
+    }
+}
+
+/// Feed-forward goes out while the servo is on, with every command that does not need bytes 12-15 itself, and no longer.
+#[test]
+fn feed_forward_lives_with_the_servo() {
+    let mut pair = Pair::new(ActiveCode::CyclicPosition, Manners::POLITE);
+    pair.until("off", |pair| pair.axis.state() == AxisState::Off);
+    let select = Arguments { type_code: TypeCode::short(0x11), index: 0x0723, data: 2 };
+    let _ = pair.ask(NonCyclicCommand::Parameter(select));
+    assert_eq!(pair.axis.set_feed_forward(500), Err(SetpointError::NotOn));
+    pair.switch_on();
+    pair.axis.set_feed_forward(500).unwrap();
+    (0..3).for_each(|_| pair.update());
+    assert_eq!(pair.drive.feed_forward(), 500);
+    // A monitor command carries it along; a parameter write leaves the drive with the last one.
+    for request in [monitor(7), NonCyclicCommand::Parameter(select)] {
+        assert!(matches!(pair.ask(request), Progress::Done { .. }));
+        assert_eq!(pair.drive.feed_forward(), 500, "{request}");
+    }
+    // Out of range: the drive keeps the old one and says so, which stops the axis at the limit.
+    pair.axis.set_feed_forward(3_001).unwrap();
+    for _ in 0..4 {
+        pair.update();
+        assert_eq!(pair.drive.feed_forward(), 500);
+    }
+    pair.until("stopped", |pair| pair.axis.state() != AxisState::On);
+    assert_eq!(pair.axis.state(), AxisState::Stopped(StopReason::CommandError(ErrorCode(0x0034))));
+    (0..3).for_each(|_| pair.update());
+    assert_eq!(pair.drive.feed_forward(), 0);
+    pair.axis.clear();
+    pair.switch_on();
+    (0..3).for_each(|_| pair.update());
+    assert_eq!(pair.drive.feed_forward(), 0);
+}
+
+/// Servo_Active that falls by itself, that stays after servo-off, and that comes unasked.
+#[test]
+fn servo_active_that_does_as_it_likes() {
+    let mut pair = Pair::on(ActiveCode::CyclicPosition, Manners::POLITE);
+    pair.drive.drop_servo();
+    pair.until("stopped", |pair| pair.axis.state() == AxisState::Stopped(StopReason::NotActive));
+    assert!(!pair.axis.disobeys());
+    // Late, within the limit and beyond it.
+    for (late, state) in [(10, AxisState::Off), (40, AxisState::Stopped(StopReason::InactiveTimeout))] {
+        let mut pair = Pair::on(ActiveCode::CyclicPosition, Manners::POLITE.with_servo_off_late(late));
+        pair.axis.switch_off();
+        let from = pair.now;
+        pair.until("over", |pair| pair.axis.state() != AxisState::SwitchingOff);
+        assert_eq!(pair.axis.state(), state);
+        assert!(pair.now - from <= 14, "{}", pair.now - from);
+        (0..5).for_each(|_| pair.update());
+        assert_eq!(pair.axis.disobeys(), late == 40);
+    }
+    // Stopped for another reason, the drive stays active: that is reported beside the reason.
+    let mut pair = Pair::on(ActiveCode::CyclicPosition, Manners::POLITE.with_servo_off_late(100));
+    pair.axis.stop(StopReason::Requested);
+    (0..12).for_each(|_| pair.update());
+    assert!(!pair.axis.disobeys());
+    (0..4).for_each(|_| pair.update());
+    assert_eq!((pair.axis.disobeys(), pair.axis.state()), (true, AxisState::Stopped(StopReason::Requested)));
+    pair.axis.clear();
+    assert!(!pair.axis.disobeys());
+}
+
+/// The alarm stops the axis in every state, and in `Off` it does not stay ready.
+#[test]
+fn an_alarm_in_every_state() {
+    let alarm = Alarm { main: 16, sub: 0 };
+    let stopped = AxisState::Stopped(StopReason::Alarm);
+    for state in 0..4 {
+        let mut pair = Pair::new(ActiveCode::CyclicPosition, Manners::POLITE.with_servo_off_late(8));
+        pair.until("off", |pair| pair.axis.state() == AxisState::Off);
+        if state > 0 {
+            assert!(pair.axis.switch_on());
+            (0..3).for_each(|_| pair.update());
+            assert_eq!(pair.axis.state(), AxisState::SwitchingOn);
+        }
+        if state > 1 {
+            pair.until("on", |pair| pair.axis.state() == AxisState::On);
+        }
+        if state > 2 {
+            pair.axis.switch_off();
+            (0..3).for_each(|_| pair.update());
+            assert_eq!(pair.axis.state(), AxisState::SwitchingOff);
+        }
+        pair.drive.raise(alarm);
+        (0..3).for_each(|_| pair.update());
+        assert_eq!(pair.axis.state(), stopped);
+        assert!(!pair.axis.switch_on());
+    }
+    // At start-up it is the reason why Servo_Ready did not come.
+    let mut pair = Pair::new(ActiveCode::CyclicPosition, Manners::POLITE);
+    pair.drive.raise(alarm);
+    pair.until("stopped", |pair| pair.axis.state() != AxisState::Starting);
+    assert_eq!(pair.axis.state(), stopped);
+    // Main power that goes while the servo is off is no failure: the axis waits for it.
+    let mut pair = Pair::new(ActiveCode::CyclicPosition, Manners::POLITE);
+    pair.until("off", |pair| pair.axis.state() == AxisState::Off);
+    pair.drive.set_main_power(false);
+    (0..3).for_each(|_| pair.update());
+    assert_eq!((pair.axis.state(), pair.axis.switch_on()), (AxisState::Starting, false));
+    pair.drive.set_main_power(true);
+    pair.until("off", |pair| pair.axis.state() == AxisState::Off);
+}
+
+/// CMD_Error counts during a motion as anywhere else; a single one does not end the motion.
+#[test]
+fn cmd_error_during_a_motion() {
+    let mut pair = Pair::on(ActiveCode::ProfilePosition, Manners::POLITE);
+    pair.axis.start_move(0x11, 1_000_000, 1_000_000).unwrap();
+    pair.until("moving", |pair| pair.axis.profile().unwrap().stage() == MoveStage::Moving);
+    let spoil = |pair: &mut Pair| {
+        pair.update();
+        let response = *pair.received.response().unwrap();
+        pair.received = Received::Main(response.with_noncyclic(&NonCyclicResponse::CommandError(ErrorCode(0x0021))));
+    };
+    for _ in 0..3 {
+        for _ in 1..LIMIT {
+            spoil(&mut pair);
+        }
+        pair.update();
+        assert_eq!((pair.axis.state(), pair.axis.profile().unwrap().stage()), (AxisState::On, MoveStage::Moving));
+        pair.update();
+    }
+    for _ in 0..LIMIT {
+        assert_eq!(pair.axis.state(), AxisState::On);
+        spoil(&mut pair);
+    }
+    pair.update();
+    assert_eq!(pair.axis.state(), AxisState::Stopped(StopReason::CommandError(ErrorCode(0x0021))));
+    assert_eq!(pair.axis.take_move(), Some(Progress::Failed { error: Failure::ServoOff }));
+}
+
+/// Blocks of another drive in this one's place are named, and so is a memory that holds no responses.
+#[test]
+fn why_the_echo_stands_still() {
+    type Spoil = fn(&mut Received);
+    let cases: [(Spoil, StopReason); 3] = [
+        (|r| *r = Received::Nothing, StopReason::EchoTimeout),
+        (
+            |r| {
+                if let Received::Main(response) = r {
+                    response.mac_id = MacId::new(3).unwrap();
+                }
+            },
+            StopReason::WrongMacId(MacId::truncate(3)),
+        ),
+        (|r| *r = Response::parse(&[0; 16]).into(), StopReason::Refused(ErrorClass::Direction)),
+    ];
+    for (spoil, reason) in cases {
+        let mut pair = Pair::on(ActiveCode::CyclicPosition, Manners::POLITE);
+        for _ in 0..LIMIT {
+            pair.update();
+            assert_eq!(pair.axis.state(), AxisState::On);
+            spoil(&mut pair.received);
+        }
+        pair.update();
+        assert_eq!(pair.axis.state(), AxisState::Stopped(reason));
+        let counters = pair.axis.counters();
+        assert_eq!(counters.errors(), if reason == StopReason::EchoTimeout { 0 } else { LIMIT.into() });
+        assert!(counters.good() > 20);
+        // Good blocks again, and after the clearing the axis starts anew.
+        pair.axis.clear();
+        pair.switch_on();
+    }
+}
+
+/// The limits of set-points, with gears other than 1/1.
+#[test]
+fn limits_of_set_points() {
+    let mac_id = MacId::new(9).unwrap();
+    let config = AxisConfig::new(mac_id, ActiveCode::CyclicPosition, 500_000, limits());
+    // 400 M pulse/s in 0.5 ms are 200 000 pulses: 66 666 units at 3/1, 266 666 at 3/4, and 5 000 by 10 M units/s.
+    for (numerator, denominator, over_speed, largest) in
+        [(1, 1, None, 200_000), (3, 1, None, 66_666), (3, 4, None, 266_666), (1, 1, Some(10_000_000), 5_000)]
+    {
+        let gear = Gear::new(numerator, denominator).unwrap();
+        let config = config.with_gear(gear).with_over_speed(over_speed);
+        let drive = DriveConfig::new(mac_id, CODES).with_gear(gear);
+        let mut pair = Pair::with(config, drive);
+        pair.switch_on();
+        for sign in [1, -1] {
+            let step = sign * (largest + 1);
+            assert_eq!(pair.axis.set_position(step), Err(SetpointError::Step { step }));
+        }
+        // The step counts from what was sent last: two calls in an update period do not add up.
+        pair.axis.set_position(largest).unwrap();
+        assert!(pair.axis.set_position(2 * largest).is_err());
+        (0..30).for_each(|_| pair.update());
+        assert_eq!(pair.drive.alarm(), None);
+        if over_speed.is_none() {
+            // The drive has the same limit, by its own reckoning.
+            let mut block = pair.axis.send(Turn::Valid(pair.counter.last().next())).main;
+            block.command_data1 = largest * 2 + 1;
+            pair.drive.exchange(&block.emit());
+            assert_eq!(pair.drive.alarm(), Some(Alarm { main: 27, sub: 4 }));
+        }
+    }
+    let config = AxisConfig::new(mac_id, ActiveCode::CyclicVelocity, 500_000, limits())
+        .with_max_speed(Some(3_000))
+        .with_max_torque(Some(999));
+    let mut pair = Pair::with(config, DriveConfig::new(mac_id, CODES));
+    pair.switch_on();
+    assert_eq!(pair.axis.set_rate(-3_001), Err(SetpointError::Rate { rate: -3_001 }));
+    pair.axis.set_rate(-3_000).unwrap();
+    pair.axis.set_mode(ActiveCode::CyclicTorque).unwrap();
+    assert_eq!((pair.axis.setpoint(), pair.axis.set_rate(1_000).is_err()), (0, true));
+    pair.axis.set_rate(999).unwrap();
+    pair.axis.set_mode(ActiveCode::ProfilePosition).unwrap();
+    assert_eq!(pair.axis.start_move(0x11, 5, 3_001), Err(SetpointError::Rate { rate: 3_001 }));
+    assert_eq!(pair.axis.set_move_speed(3_001), Err(SetpointError::Rate { rate: 3_001 }));
+}
+
+/// From mode to mode with the servo on: no jump, and no motion of its own.
+#[test]
+fn every_change_of_mode() {
+    use ActiveCode::{CyclicPosition, CyclicTorque, CyclicVelocity, ProfilePosition};
+    let modes = [CyclicPosition, ProfilePosition, CyclicVelocity, CyclicTorque];
+    for from in modes {
+        for to in modes {
+            let mut pair = Pair::new(CyclicPosition, Manners::POLITE.with_echo_lag(2));
+            pair.until("off", |pair| pair.axis.state() == AxisState::Off);
+            let _ = pair.ask(set_position(0x21, 700_000));
+            pair.switch_on();
+            pair.axis.set_mode(from).unwrap();
+            (0..20).for_each(|_| pair.update());
+            pair.axis.set_mode(to).unwrap();
+            (0..20).for_each(|_| pair.update());
+            assert_eq!((pair.axis.mode(), pair.axis.state()), (to, AxisState::On));
+            assert_eq!((pair.drive.position(), pair.drive.alarm()), (700_000, None), "{from:?} {to:?}");
+        }
+    }
+    let mut pair = Pair::on(ProfilePosition, Manners::POLITE);
+    pair.axis.start_move(0x11, 100_000, 1_000_000).unwrap();
+    assert_eq!(pair.axis.set_mode(CyclicPosition), Err(SetpointError::Busy));
+    pair.axis.switch_off();
+    assert_eq!(pair.axis.set_mode(CyclicPosition), Err(SetpointError::NotOn));
+}

@@ -1,0 +1,246 @@
+//! Texts, parameters, alarms, homing, latch and sub-commands, against a drive that shares no number with the master.
+#![allow(
+    clippy::arithmetic_side_effects,
+    clippy::cast_possible_truncation,
+    clippy::cast_possible_wrap,
+    clippy::indexing_slicing,
+    clippy::panic,
+    clippy::unwrap_used,
+    missing_docs
+)]
+
+mod common;
+
+use common::{CODES, Pair, alarm, monitor, set_position};
+use rtex_block::device::Manners;
+use rtex_block::master::procedure::{AlarmHistory, Backup, Home, Latch, ReadText, Restore};
+use rtex_block::master::{ActiveCode, AskError, AxisState, Failure, Progress, Received, StopReason};
+use rtex_block::{
+    Alarm, Arguments, ErrorCode, LatchFlags, Nibble, NonCyclicCommand, NonCyclicResponse, Pr, ProfileFlags, Response,
+    Response32, SubCode, TypeCode,
+};
+
+/// Homing in the drive: Homing_Complete of an earlier homing is not the end of this one.
+#[test]
+fn homing_ends_when_this_homing_ends() {
+    for manners in [Manners::POLITE, Manners::POLITE.with_homed_at_start(true).with_echo_lag(3)] {
+        let mut pair = Pair::on(ActiveCode::ProfilePosition, manners);
+        let mut home = Home::new(0xc8, 1_000);
+        let mut reached = Vec::new();
+        assert_eq!(
+            pair.run(|axis| {
+                reached.push(axis.actual_position());
+                home.receive(axis)
+            }),
+            Progress::Done { value: () }
+        );
+        assert!(reached.iter().any(|at| *at < -2_500), "{reached:?}");
+        pair.until("at the origin", |pair| pair.drive.position() == 0);
+        assert_eq!(pair.axis.state(), AxisState::On);
+    }
+    let mut pair = Pair::on(ActiveCode::ProfilePosition, Manners::POLITE);
+    let mut home = Home::new(0xc8, 5);
+    assert_eq!(pair.run(|axis| home.receive(axis)), Progress::Failed { error: Failure::TimedOut });
+    let mut pair = Pair::on(ActiveCode::CyclicPosition, Manners::POLITE);
+    let mut home = Home::new(0xc8, 5);
+    assert_eq!(pair.run(|axis| home.receive(axis)), Progress::Failed { error: Failure::Mode });
+}
+
+/// The latch counts once it is complete; what was caught before it was armed does not.
+#[test]
+fn latch_positions() {
+    let mut pair = Pair::on(ActiveCode::CyclicPosition, Manners::POLITE.with_stale_answers(1));
+    pair.drive.trigger(1);
+    let mut latch = Latch::new(0xc7, Nibble::new(5).unwrap(), 300);
+    for _ in 0..100 {
+        pair.update();
+        assert!(latch.receive(&mut pair.axis).is_pending());
+    }
+    for k in 1..=10 {
+        pair.axis.set_position(k * 100).unwrap();
+        pair.update();
+        let _ = latch.receive(&mut pair.axis);
+    }
+    pair.until("at the position", |pair| pair.drive.position() == 1_000);
+    pair.drive.trigger(1);
+    pair.axis.set_position(2_000).unwrap();
+    assert_eq!(pair.run(|axis| latch.receive(axis)), Progress::Done { value: 1_000 });
+    let mut latch = Latch::new(0xc7, Nibble::new(5).unwrap(), 30);
+    assert_eq!(pair.run(|axis| latch.receive(axis)), Progress::Failed { error: Failure::TimedOut });
+    // An answer with another selection is an older one.
+    pair.until("free", |pair| pair.axis.can_ask());
+    pair.axis.ask(set_position(0x50, 0)).unwrap();
+    for _ in 0..20 {
+        pair.update();
+        let response = *pair.received.response().unwrap();
+        if let NonCyclicResponse::Homing {
+            execution, type_code, latch, latch_sel2, monitor_sel, monitor_data, ..
+        } = response.noncyclic()
+        {
+            let latch_sel1 = Nibble::new(7).unwrap();
+            let other = NonCyclicResponse::Homing {
+                execution,
+                type_code,
+                latch,
+                latch_sel1,
+                latch_sel2,
+                monitor_sel,
+                monitor_data,
+            };
+            pair.received = Received::Main(response.with_noncyclic(&other));
+        }
+        assert_eq!(pair.axis.take_outcome(), None);
+    }
+    pair.update();
+    assert!(matches!(pair.outcome(), Progress::Done { .. }));
+}
+
+#[test]
+fn a_motion_with_a_latch_shows_it() {
+    let mut pair = Pair::on(ActiveCode::ProfilePosition, Manners::POLITE);
+    let _ = pair.ask(set_position(0xc7, 0));
+    pair.until("free", |pair| pair.axis.can_ask());
+    let selection = Nibble::new(3).unwrap();
+    pair.axis.start_move_with_latch(0x11, 50_000, 4_000_000, selection, 0x09).unwrap();
+    pair.until("half way", |pair| pair.drive.position() > 20_000);
+    assert!(!pair.axis.profile().unwrap().flags().contains(ProfileFlags::LATCH_COMP1));
+    pair.drive.trigger(1);
+    let caught = pair.drive.position();
+    pair.until("latched", |pair| pair.axis.profile().unwrap().flags().contains(ProfileFlags::LATCH_COMP1));
+    assert_eq!(pair.axis.profile().unwrap().monitor_data(), caught);
+    assert!(matches!(pair.end_of_move(), Progress::Done { .. }));
+    assert_eq!(LatchFlags::LATCH_COMP1.bits(), 1);
+}
+
+/// "Can this alarm be cleared?": the answer carries the alarm as its index echo.
+#[test]
+fn attributes_of_the_present_alarm() {
+    let mut pair = Pair::on(ActiveCode::CyclicPosition, Manners::POLITE);
+    pair.drive.set_config(pair.drive.config().with_alarm_attributes(0x0000_0101));
+    pair.drive.raise(Alarm { main: 38, sub: 1 });
+    pair.until("stopped", |pair| pair.axis.state() == AxisState::Stopped(StopReason::Alarm));
+    pair.axis.ask_alarm_attributes(CODES.alarm_attributes).unwrap();
+    let Progress::Done { value: NonCyclicResponse::Alarm(results) } = pair.outcome() else { panic!() };
+    assert_eq!((results.index, results.data), (38 << 8 | 1, 0x0101));
+    // Asked as any other alarm request it would wait for Index 0 and never end.
+    assert_eq!(pair.ask(alarm(CODES.alarm_attributes, 0)), Progress::Failed { error: Failure::TimedOut });
+    // An answer to another type is an older one.
+    pair.drive.set_config(pair.drive.config().with_manners(Manners::POLITE.with_stale_answers(3)));
+    pair.until("free", |pair| pair.axis.can_ask());
+    pair.axis.ask_alarm_attributes(CODES.alarm_attributes).unwrap();
+    let Progress::Done { value } = pair.outcome() else { panic!() };
+    assert_eq!(value.data(), Some(0x0101));
+
+    let mut history = AlarmHistory::new(CODES.alarm_history);
+    let mut entries = [Alarm { main: 1, sub: 1 }; 3];
+    assert_eq!(pair.run(|axis| history.receive(axis, &mut entries)), Progress::Done { value: () });
+    let none = Alarm { main: 0, sub: 0 };
+    assert_eq!(entries, [Alarm { main: 38, sub: 1 }, none, none]);
+}
+
+#[test]
+fn texts_and_parameters() {
+    let mut pair = Pair::new(ActiveCode::CyclicPosition, Manners::POLITE.with_stale_answers(2).with_echo_lag(1));
+    for (type_code, want) in [(0x01, &b"Panasonic"[..]), (0x05, b"1"), (0x12, b"DRIVE MODEL"), (0x13, b"00000000")] {
+        let mut text = ReadText::new(TypeCode::short(type_code));
+        let Progress::Done { value } = pair.run(|axis| text.receive(axis)) else { panic!() };
+        assert_eq!(value.as_bytes(), want);
+    }
+    let pr = |class, number| Pr { class, number };
+    let mut list = [(pr(7, 25), 0), (pr(8, 1), 0), (pr(8, 4), 0)];
+    let mut backup = Backup::new(CODES.parameter_read);
+    assert_eq!(pair.run(|axis| backup.receive(axis, &mut list)), Progress::Done { value: () });
+    assert_eq!(list.map(|(_, value)| value), [1, 1_000, 1_000]);
+    list[1].1 = 77;
+    let mut restore = Restore::new(CODES.parameter_read);
+    assert_eq!(pair.run(|axis| restore.receive(axis, &list)), Progress::Done { value: () });
+    let mut backup = Backup::new(CODES.parameter_read);
+    let mut again = list.map(|(pr, _)| (pr, -1));
+    assert_eq!(pair.run(|axis| backup.receive(axis, &mut again)), Progress::Done { value: () });
+    assert_eq!(again, list);
+    // Read with the code for initial values it differs from what was written.
+    let mut restore = Restore::new(CODES.parameter_initial);
+    let differs = Progress::Failed { error: Failure::Differs(pr(8, 1)) };
+    assert_eq!(pair.run(|axis| restore.receive(axis, &list)), differs);
+    assert_eq!(restore.place(), 1);
+    // A parameter that does not exist.
+    let mut restore = Restore::new(CODES.parameter_read);
+    let refused = Progress::Failed { error: Failure::CommandError(ErrorCode(0x0032)) };
+    assert_eq!(pair.run(|axis| restore.receive(axis, &[(pr(99, 0), 0)])), refused);
+}
+
+/// A drive whose parameters count only after a reset.
+#[test]
+fn speed_in_r_min_after_a_reset() {
+    let mut pair = Pair::new(ActiveCode::CyclicVelocity, Manners::POLITE.with_parameters_after_reset(true));
+    pair.until("off", |pair| pair.axis.state() == AxisState::Off);
+    let write = Arguments { type_code: TypeCode::short(0x11), index: 0x0719, data: 0 };
+    assert!(matches!(pair.ask(NonCyclicCommand::Parameter(write)), Progress::Done { .. }));
+    let speed = |pair: &mut Pair| {
+        pair.switch_on();
+        pair.axis.set_rate(60_000).unwrap();
+        (0..5).for_each(|_| pair.update());
+        let from = pair.drive.position();
+        pair.update();
+        let by = pair.drive.position().wrapping_sub(from);
+        let Some(NonCyclicResponse::Normal { response_data2, .. }) = pair.received.response().map(Response::noncyclic)
+        else {
+            panic!()
+        };
+        pair.axis.switch_off();
+        pair.until("off", |pair| pair.axis.state() == AxisState::Off);
+        (by, response_data2)
+    };
+    // 60 000 command units a second are 30 in half a millisecond.
+    assert_eq!(speed(&mut pair), (30, 60_000));
+    let reset = NonCyclicCommand::Reset(Arguments { type_code: TypeCode::short(0x11), index: 0, data: 0 });
+    assert!(matches!(pair.ask(reset), Progress::Done { .. }));
+    // 60 000 r/min are 1 000 revolutions of 2^20 units a second: 524 288 in half a millisecond.
+    assert_eq!(speed(&mut pair), (524_288, 60_000));
+}
+
+/// Response_Data2 and 3, and those of the sub block, by Pr7.30 to 7.34.
+#[test]
+fn selected_response_data() {
+    let mut pair = Pair::new(ActiveCode::CyclicPosition, Manners::POLITE);
+    pair.wide = true;
+    pair.until("off", |pair| pair.axis.state() == AxisState::Off);
+    assert!(matches!(pair.ask(set_position(0x21, 4_321)), Progress::Done { .. }));
+    for (number, code) in [(30, 7), (31, 8), (32, 7), (33, 7), (34, 8)] {
+        let write = Arguments { type_code: TypeCode::short(0x11), index: 0x0700 | number, data: code };
+        assert!(matches!(pair.ask(NonCyclicCommand::Parameter(write)), Progress::Done { .. }));
+    }
+    (0..4).for_each(|_| pair.update());
+    let Received::Both(Response32 { main, sub }) = pair.received else { panic!() };
+    assert_eq!((main.response_data2, main.response_data3), (4_321, 4_321));
+    assert_eq!((sub.data1, sub.data2, sub.data3), (4_321, 4_321, 4_321));
+}
+
+/// In the 32-byte mode sub-commands run beside requests of the main block.
+#[test]
+fn sub_commands() {
+    let mut pair = Pair::new(ActiveCode::CyclicPosition, Manners::POLITE);
+    pair.wide = true;
+    pair.until("off", |pair| pair.axis.state() == AxisState::Off);
+    pair.axis.ask(monitor(0x07)).unwrap();
+    pair.axis.ask_sub(SubCode::SystemId, 0x01, 1).unwrap();
+    assert_eq!(pair.axis.ask_sub(SubCode::Monitor, 0x07, 0), Err(AskError::Busy));
+    let outcome = |pair: &mut Pair| {
+        (0..80).find_map(|_| {
+            pair.update();
+            pair.axis.take_sub_outcome()
+        })
+    };
+    let Some(Progress::Done { value }) = outcome(&mut pair) else { panic!() };
+    assert_eq!((value.data1.to_le_bytes(), value.index), (*b"soni", 1));
+    assert!(matches!(pair.outcome(), Progress::Done { .. }));
+    (0..5).for_each(|_| pair.update());
+    assert_eq!(pair.axis.ask_sub(SubCode::Normal, 0, 0), Err(AskError::NotARequest));
+    pair.axis.ask_sub(SubCode::Monitor, 0xee, 0).unwrap();
+    assert_eq!(outcome(&mut pair), Some(Progress::Failed { error: Failure::CommandError(ErrorCode(0x0031)) }));
+    // A drive in the 16-byte mode never answers.
+    (0..5).for_each(|_| pair.update());
+    pair.wide = false;
+    pair.axis.ask_sub(SubCode::Monitor, 0x07, 0).unwrap();
+    assert_eq!(outcome(&mut pair), Some(Progress::Failed { error: Failure::TimedOut }));
+}

@@ -1,0 +1,25 @@
+#![doc = include_str!("../README.md")]
+#![no_std]
+#![cfg_attr(docsrs, feature(doc_cfg))]
+#![cfg_attr(test, allow(clippy::arithmetic_side_effects, clippy::unwrap_used))]
+
+#[cfg(test)]
+extern crate std;
+
+mod clock;
+mod direction;
+mod error;
+#[cfg(feature = "tformat")]
+mod quiet;
+#[cfg(all(feature = "async", feature = "tformat"))]
+mod race;
+#[cfg(feature = "tformat")]
+pub mod tformat;
+
+pub use clock::Clock;
+#[cfg(feature = "embassy-time")]
+pub use clock::EmbassyClock;
+#[cfg(feature = "async")]
+pub use clock::{Timer, WithDelay};
+pub use direction::{Automatic, Direction, DriverEnable};
+pub use error::Error;

@@ -1,0 +1,125 @@
+//! When the line may be used again, without I/O: the rules that the blocking and the async drivers share.
+
+/// How long a driver waits for a line that does not become quiet.
+const PATIENCE_NS: u64 = 2_000_000;
+
+/// What is known of the line between two calls. It outlives a dropped future.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct Line {
+    /// Somebody may be talking until then.
+    ready_ns: u64,
+    /// How long the line has to be silent after something unasked came.
+    silence_ns: u64,
+}
+
+/// What to do before a request.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Settle {
+    /// Throw away what comes, and look again at the latest then.
+    Until(u64),
+    /// Send.
+    Quiet,
+    /// Give up.
+    Never,
+}
+
+/// A wait for silence.
+#[expect(clippy::struct_field_names, reason = "the unit is part of the name")]
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct Settling {
+    until_ns: u64,
+    limit_ns: u64,
+    silence_ns: u64,
+}
+
+impl Line {
+    pub(crate) const fn new(silence_ns: u32) -> Self {
+        Self { ready_ns: 0, silence_ns: silence_ns as u64 }
+    }
+
+    /// A request goes out that can keep the line busy until `worst_ns`: to be called before its first byte.
+    pub(crate) const fn soil(&mut self, worst_ns: u64) {
+        self.ready_ns = worst_ns;
+    }
+
+    /// The exchange has ended, and the line is free from `ready_ns` on.
+    pub(crate) const fn clean(&mut self, ready_ns: u64) {
+        self.ready_ns = ready_ns;
+    }
+
+    /// The exchange has failed at `now_ns`. The rest of an answer may still be coming, even if a UART that drops damaged bytes
+    /// shows nothing of it: so the worst stays assumed, and besides the line has to be silent for a while.
+    pub(crate) fn failed(&mut self, ready_ns: u64, now_ns: u64) {
+        self.ready_ns = self.ready_ns.max(ready_ns).max(now_ns.saturating_add(self.silence_ns));
+    }
+
+    /// From when on the line is free.
+    pub(crate) const fn free_ns(&self, now_ns: u64) -> u64 {
+        if self.ready_ns > now_ns { self.ready_ns } else { now_ns }
+    }
+
+    pub(crate) const fn settle(&self, now_ns: u64) -> Settling {
+        let limit_ns = self.free_ns(now_ns).saturating_add(PATIENCE_NS);
+        Settling { until_ns: self.ready_ns, limit_ns, silence_ns: self.silence_ns }
+    }
+}
+
+impl Settling {
+    /// Something came that nobody has asked for, or the UART complained.
+    pub(crate) const fn heard(&mut self, now_ns: u64) {
+        let until_ns = now_ns.saturating_add(self.silence_ns);
+        if until_ns > self.until_ns {
+            self.until_ns = until_ns;
+        }
+    }
+
+    /// What had come by `now_ns` has been thrown away.
+    pub(crate) const fn poll(&self, now_ns: u64) -> Settle {
+        if now_ns >= self.until_ns {
+            Settle::Quiet
+        } else if now_ns >= self.limit_ns {
+            Settle::Never
+        } else {
+            Settle::Until(self.until_ns)
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_clean_line_is_used_at_once() {
+        let line = Line::new(8_000);
+        assert_eq!(line.settle(5).poll(5), Settle::Quiet);
+    }
+
+    #[test]
+    fn a_soiled_line_is_waited_for_and_babble_is_waited_out() {
+        let mut line = Line::new(8_000);
+        line.soil(100_000);
+        let mut settling = line.settle(10_000);
+        assert_eq!(settling.poll(99_999), Settle::Until(100_000));
+        settling.heard(20_000);
+        assert_eq!(settling.poll(99_999), Settle::Until(100_000));
+        settling.heard(99_000);
+        assert_eq!(settling.poll(106_999), Settle::Until(107_000));
+        assert_eq!(settling.poll(107_000), Settle::Quiet);
+        line.clean(107_000);
+        assert_eq!(line.settle(107_000).poll(107_000), Settle::Quiet);
+    }
+
+    #[test]
+    fn an_endless_talker_is_given_up() {
+        let line = Line::new(8_000);
+        let mut settling = line.settle(0);
+        let mut now_ns = 0;
+        while settling.poll(now_ns) != Settle::Never {
+            now_ns += 4_000;
+            settling.heard(now_ns);
+            assert!(now_ns < 3_000_000, "for ever");
+        }
+        assert_eq!(now_ns, 2_000_000);
+    }
+}

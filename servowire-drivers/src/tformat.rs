@@ -1,0 +1,49 @@
+//! T-Format encoders: Tamagawa and others, 2.5 or 5 Mbit/s, at a plain UART (8N1).
+//!
+//! [`blocking`] spins while it waits, some tens of microseconds a call; [`asynch`] gives the time back. Both have the same
+//! `Encoder` with the same calls.
+
+#[cfg(feature = "async")]
+pub mod asynch;
+pub mod blocking;
+
+use tformat::master::{Exchange, Line};
+use tformat::{Doubt, Error, Policy, Position, Request, Resolution};
+
+/// Longest request and longest answer together.
+const MAX_BYTES: usize = 16;
+
+/// A position that may be used, and when it was true.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Sample {
+    /// The position.
+    pub position: Position,
+    /// When the encoder took it, by the driver's clock.
+    pub sampled_ns: u64,
+}
+
+impl Sample {
+    fn of(exchange: Exchange, resolution: Resolution, policy: Policy) -> Result<Self, Doubt> {
+        let position = resolution.read(&exchange.response, policy)?;
+        Ok(Self { position, sampled_ns: exchange.sampled_ns })
+    }
+}
+
+/// When the longest answer to this request is over, if it began at `start_ns`.
+fn worst_ns(line: &Line, request: Request, start_ns: u64) -> u64 {
+    let fields = request.emit().fields().saturating_add(12);
+    let wait = u64::from(line.response_timeout_ns).saturating_add(line.rate.fields_ns(fields).into());
+    start_ns.saturating_add(wait)
+}
+
+/// The line has to be silent for two fields after something that nobody has asked for.
+fn silence_ns(line: &Line) -> u32 {
+    line.rate.fields_ns(2)
+}
+
+/// The answer to another request than was sent. Never: the transaction checks it.
+fn other(request: Request) -> Error {
+    let want = request.data_id().control_field().get();
+    Error::CfMismatch { got: want, want }
+}

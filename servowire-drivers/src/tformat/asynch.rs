@@ -1,0 +1,206 @@
+//! Waits by giving the time back. Every future may be dropped at any point: the driver is then switched off at once, and the
+//! next call waits until the line is free. Whether a request that changes the encoder has had its effect is not known then.
+//!
+//! The UART's `read` should be free of side effects when it is dropped, as that of buffered UARTs is; otherwise bytes are lost,
+//! which costs the exchange in which it happens.
+
+use embedded_io_async::{Read, Write};
+use tformat::master::{EEPROM_POLLING, EepromAccess, Exchange, Line, Progress, Reset, Step, Transaction};
+use tformat::{Address, AllData, Doubt, Page, Policy, Request, Resolution, Response, SingleTurn};
+
+use super::{MAX_BYTES, Sample, other, silence_ns, worst_ns};
+use crate::direction::Guard;
+use crate::quiet::{self, Settle};
+use crate::race::race;
+use crate::{Direction, Error, Timer};
+
+/// Why a call of an [`Encoder`] failed.
+pub type Failure<U, D> =
+    Error<<U as embedded_io_async::ErrorType>::Error, <D as Direction>::Error, tformat::Error, Doubt>;
+
+/// An encoder, alone at its UART.
+#[derive(Debug)]
+pub struct Encoder<U, D, T> {
+    uart: U,
+    direction: D,
+    timer: T,
+    line: Line,
+    state: quiet::Line,
+}
+
+impl<U: Read + Write, D: Direction, T: Timer> Encoder<U, D, T> {
+    /// An encoder at this UART, set to the rate of `line`, 8 data bits, no parity, one stop bit.
+    ///
+    /// Whether the receiver is on while the request goes out makes no difference: an echo is known by its time.
+    pub fn new(uart: U, direction: D, timer: T, line: Line) -> Self {
+        Self { uart, direction, timer, line, state: quiet::Line::new(silence_ns(&line)) }
+    }
+
+    /// Gives UART, direction and timer back.
+    pub fn release(self) -> (U, D, T) {
+        (self.uart, self.direction, self.timer)
+    }
+
+    /// The position, if it may be used, and when it was true: from ID 3, by the rules of [`Resolution::read`].
+    ///
+    /// # Errors
+    /// [`Error`], [`Error::Doubt`] among them.
+    pub async fn read_position(&mut self, resolution: Resolution, policy: Policy) -> Result<Sample, Failure<U, D>> {
+        let exchange = self.transact(Request::ReadAll).await?;
+        Sample::of(exchange, resolution, policy).map_err(Error::Doubt)
+    }
+
+    /// ID 3: position, turns, encoder ID and alarms. Look at the alarms before you use the position.
+    ///
+    /// # Errors
+    /// [`Error`].
+    pub async fn read_all(&mut self) -> Result<AllData, Failure<U, D>> {
+        match self.transact(Request::ReadAll).await?.response {
+            Response::ReadAll(all) => Ok(all),
+            _ => Err(Error::Protocol(other(Request::ReadAll))),
+        }
+    }
+
+    /// ID 7, ten times: clears the latched alarms. Position and turns stay.
+    ///
+    /// # Errors
+    /// [`Error`]; read the alarms to see whether they were cleared.
+    pub async fn clear_errors(&mut self) -> Result<SingleTurn, Failure<U, D>> {
+        let mut reset = Reset::clear_errors();
+        let first = reset.start(self.timer.now_ns());
+        self.run(first, |outcome, now_ns| reset.receive(outcome, now_ns)).await
+    }
+
+    /// ID D: the byte at `address`, on the page that is selected now if `page` is `None`.
+    ///
+    /// # Errors
+    /// [`Error`].
+    pub async fn read_eeprom(&mut self, page: Option<Page>, address: Address) -> Result<u8, Failure<U, D>> {
+        let mut access = EepromAccess::read(page, address, EEPROM_POLLING);
+        let first = access.start(self.timer.now_ns());
+        self.run(first, |outcome, now_ns| access.receive(outcome, now_ns)).await
+    }
+
+    /// ID 6: writes a byte and reads it back. Motor makers keep commutation data in this memory: know what is there.
+    ///
+    /// # Errors
+    /// [`Error`]: whether the byte was written is not known then. Read it.
+    pub async fn write_eeprom(&mut self, page: Option<Page>, address: Address, data: u8) -> Result<u8, Failure<U, D>> {
+        let mut access = EepromAccess::write(page, address, data, EEPROM_POLLING);
+        let first = access.start(self.timer.now_ns());
+        self.run(first, |outcome, now_ns| access.receive(outcome, now_ns)).await
+    }
+
+    /// A procedure of several transactions: does what its steps ask for and hands the outcomes to `receive`.
+    ///
+    /// # Errors
+    /// [`Error`]: that of the procedure, for which a fault of the UART is a lost answer; or at once one of the pin or of a line
+    /// that cannot be used, and then whether the last request had its effect is not known.
+    pub async fn run<V>(
+        &mut self,
+        mut step: Step<V>,
+        mut receive: impl FnMut(Result<Response, tformat::Error>, u64) -> Step<V>,
+    ) -> Result<V, Failure<U, D>> {
+        loop {
+            match step {
+                Step::Send { request, not_before_ns } => {
+                    self.timer.wait_until(not_before_ns).await;
+                    let outcome = match self.transact(request).await {
+                        Ok(exchange) => Ok(exchange.response),
+                        Err(Error::Protocol(error)) => Err(error),
+                        // The answer is lost; what that means is for the procedure to say.
+                        Err(Error::Io(_)) => Err(tformat::Error::NoResponse { echo: false }),
+                        Err(other) => return Err(other),
+                    };
+                    step = receive(outcome, self.state.free_ns(self.timer.now_ns()));
+                }
+                Step::Done { value, ready_ns } => {
+                    self.state.clean(ready_ns);
+                    return Ok(value);
+                }
+                Step::Failed { error, ready_ns } => {
+                    self.state.clean(ready_ns);
+                    return Err(Error::Protocol(error));
+                }
+            }
+        }
+    }
+
+    /// One request and its answer.
+    ///
+    /// # Errors
+    /// [`Error`].
+    pub async fn transact(&mut self, request: Request) -> Result<Exchange, Failure<U, D>> {
+        self.settle().await?;
+        let on_ns = self.timer.now_ns();
+        // The worst is assumed until the end is known: an early return or a dropped future leaves it so.
+        self.state.soil(worst_ns(&self.line, request, on_ns.saturating_add(self.line.driver_lead_ns.into())));
+        let guard = Guard::transmit(&mut self.direction).map_err(Error::Pin)?;
+        self.timer.wait_until(on_ns.saturating_add(self.line.driver_lead_ns.into())).await;
+        let mut transaction = Transaction::start(request, self.line, self.timer.now_ns());
+        send(&mut self.uart, request.emit().as_bytes()).await?;
+        // What `flush` means differs between UARTs; by the clock the last bit has left at this time.
+        self.timer.wait_until(transaction.request_end_ns()).await;
+        guard.receive().map_err(Error::Pin)?;
+        let mut progress = transaction.progress();
+        loop {
+            match progress {
+                Progress::Pending { until_ns } => progress = self.receive(&mut transaction, until_ns).await?,
+                Progress::Done { value, ready_ns } => {
+                    self.state.clean(ready_ns);
+                    return Ok(value);
+                }
+                Progress::Failed { error, ready_ns } => {
+                    self.state.failed(ready_ns, self.timer.now_ns());
+                    return Err(Error::Protocol(error));
+                }
+            }
+        }
+    }
+
+    /// Takes what is there, or waits for it; asks the clock only if there is nothing.
+    async fn receive(&mut self, transaction: &mut Transaction, until_ns: u64) -> Result<Progress, Failure<U, D>> {
+        let mut buffer = [0; MAX_BYTES];
+        // The time is over behind `until_ns`, not at it.
+        let wait = self.timer.wait_until(until_ns.saturating_add(1));
+        match race(self.uart.read(&mut buffer), wait).await {
+            None => Ok(transaction.poll(self.timer.now_ns())),
+            Some(count) => {
+                let count = count.map_err(Error::Io)?;
+                let bytes = buffer.get(..count).filter(|bytes| !bytes.is_empty()).ok_or(Error::Closed)?;
+                Ok(transaction.bytes(bytes, self.timer.now_ns()))
+            }
+        }
+    }
+
+    /// Waits until the line is free, and throws away what comes meanwhile, errors of the UART included.
+    async fn settle(&mut self) -> Result<(), Failure<U, D>> {
+        let mut settling = self.state.settle(self.timer.now_ns());
+        let mut until_ns = self.timer.now_ns();
+        loop {
+            let mut buffer = [0; MAX_BYTES];
+            let heard = match race(self.uart.read(&mut buffer), self.timer.wait_until(until_ns)).await {
+                Some(Ok(0)) => return Err(Error::Closed),
+                heard => heard.is_some(),
+            };
+            let now_ns = self.timer.now_ns();
+            if heard {
+                settling.heard(now_ns);
+            }
+            match settling.poll(now_ns) {
+                Settle::Quiet => return Ok(()),
+                Settle::Never => return Err(Error::NeverQuiet),
+                Settle::Until(ns) => until_ns = ns,
+            }
+        }
+    }
+}
+
+/// Hands all bytes to the UART.
+async fn send<U: Write, PIN, P, D>(uart: &mut U, mut bytes: &[u8]) -> Result<(), Error<U::Error, PIN, P, D>> {
+    while !bytes.is_empty() {
+        let count = uart.write(bytes).await.map_err(Error::Io)?;
+        bytes = bytes.get(count..).filter(|_| count > 0).ok_or(Error::Closed)?;
+    }
+    uart.flush().await.map_err(Error::Io)
+}

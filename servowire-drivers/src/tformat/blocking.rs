@@ -1,0 +1,201 @@
+//! Waits by spinning.
+
+use embedded_io::{Read, ReadReady, Write};
+use tformat::master::{EEPROM_POLLING, EepromAccess, Exchange, Line, Progress, Reset, Step, Transaction};
+use tformat::{Address, AllData, Doubt, Page, Policy, Request, Resolution, Response, SingleTurn};
+
+use super::{MAX_BYTES, Sample, other, silence_ns, worst_ns};
+use crate::direction::Guard;
+use crate::quiet::{self, Settle};
+use crate::{Clock, Direction, Error};
+
+/// Why a call of an [`Encoder`] failed.
+pub type Failure<U, D> = Error<<U as embedded_io::ErrorType>::Error, <D as Direction>::Error, tformat::Error, Doubt>;
+
+/// An encoder, alone at its UART.
+#[derive(Debug)]
+pub struct Encoder<U, D, C> {
+    uart: U,
+    direction: D,
+    clock: C,
+    line: Line,
+    state: quiet::Line,
+}
+
+impl<U: Read + ReadReady + Write, D: Direction, C: Clock> Encoder<U, D, C> {
+    /// An encoder at this UART, set to the rate of `line`, 8 data bits, no parity, one stop bit.
+    ///
+    /// Whether the receiver is on while the request goes out makes no difference: an echo is known by its time.
+    pub fn new(uart: U, direction: D, clock: C, line: Line) -> Self {
+        Self { uart, direction, clock, line, state: quiet::Line::new(silence_ns(&line)) }
+    }
+
+    /// Gives UART, direction and clock back.
+    pub fn release(self) -> (U, D, C) {
+        (self.uart, self.direction, self.clock)
+    }
+
+    /// The position, if it may be used, and when it was true: from ID 3, by the rules of [`Resolution::read`].
+    ///
+    /// # Errors
+    /// [`Error`], [`Error::Doubt`] among them.
+    pub fn read_position(&mut self, resolution: Resolution, policy: Policy) -> Result<Sample, Failure<U, D>> {
+        let exchange = self.transact(Request::ReadAll)?;
+        Sample::of(exchange, resolution, policy).map_err(Error::Doubt)
+    }
+
+    /// ID 3: position, turns, encoder ID and alarms. Look at the alarms before you use the position.
+    ///
+    /// # Errors
+    /// [`Error`].
+    pub fn read_all(&mut self) -> Result<AllData, Failure<U, D>> {
+        match self.transact(Request::ReadAll)?.response {
+            Response::ReadAll(all) => Ok(all),
+            _ => Err(Error::Protocol(other(Request::ReadAll))),
+        }
+    }
+
+    /// ID 7, ten times: clears the latched alarms. Position and turns stay.
+    ///
+    /// # Errors
+    /// [`Error`]; read the alarms to see whether they were cleared.
+    pub fn clear_errors(&mut self) -> Result<SingleTurn, Failure<U, D>> {
+        let mut reset = Reset::clear_errors();
+        let first = reset.start(self.clock.now_ns());
+        self.run(first, |outcome, now_ns| reset.receive(outcome, now_ns))
+    }
+
+    /// ID D: the byte at `address`, on the page that is selected now if `page` is `None`.
+    ///
+    /// # Errors
+    /// [`Error`].
+    pub fn read_eeprom(&mut self, page: Option<Page>, address: Address) -> Result<u8, Failure<U, D>> {
+        let mut access = EepromAccess::read(page, address, EEPROM_POLLING);
+        let first = access.start(self.clock.now_ns());
+        self.run(first, |outcome, now_ns| access.receive(outcome, now_ns))
+    }
+
+    /// ID 6: writes a byte and reads it back. Motor makers keep commutation data in this memory: know what is there.
+    ///
+    /// # Errors
+    /// [`Error`]: whether the byte was written is not known then. Read it.
+    pub fn write_eeprom(&mut self, page: Option<Page>, address: Address, data: u8) -> Result<u8, Failure<U, D>> {
+        let mut access = EepromAccess::write(page, address, data, EEPROM_POLLING);
+        let first = access.start(self.clock.now_ns());
+        self.run(first, |outcome, now_ns| access.receive(outcome, now_ns))
+    }
+
+    /// A procedure of several transactions: does what its steps ask for and hands the outcomes to `receive`.
+    ///
+    /// # Errors
+    /// [`Error`]: that of the procedure, for which a fault of the UART is a lost answer; or at once one of the pin or of a line
+    /// that cannot be used, and then whether the last request had its effect is not known.
+    pub fn run<T>(
+        &mut self,
+        mut step: Step<T>,
+        mut receive: impl FnMut(Result<Response, tformat::Error>, u64) -> Step<T>,
+    ) -> Result<T, Failure<U, D>> {
+        loop {
+            match step {
+                Step::Send { request, not_before_ns } => {
+                    while self.clock.now_ns() < not_before_ns {}
+                    let outcome = match self.transact(request) {
+                        Ok(exchange) => Ok(exchange.response),
+                        Err(Error::Protocol(error)) => Err(error),
+                        // The answer is lost; what that means is for the procedure to say.
+                        Err(Error::Io(_)) => Err(tformat::Error::NoResponse { echo: false }),
+                        Err(other) => return Err(other),
+                    };
+                    step = receive(outcome, self.state.free_ns(self.clock.now_ns()));
+                }
+                Step::Done { value, ready_ns } => {
+                    self.state.clean(ready_ns);
+                    return Ok(value);
+                }
+                Step::Failed { error, ready_ns } => {
+                    self.state.clean(ready_ns);
+                    return Err(Error::Protocol(error));
+                }
+            }
+        }
+    }
+
+    /// One request and its answer.
+    ///
+    /// # Errors
+    /// [`Error`].
+    pub fn transact(&mut self, request: Request) -> Result<Exchange, Failure<U, D>> {
+        self.settle()?;
+        let on_ns = self.clock.now_ns();
+        // The worst is assumed until the end is known: an early return leaves it so.
+        self.state.soil(worst_ns(&self.line, request, on_ns.saturating_add(self.line.driver_lead_ns.into())));
+        let guard = Guard::transmit(&mut self.direction).map_err(Error::Pin)?;
+        while self.clock.now_ns() < on_ns.saturating_add(self.line.driver_lead_ns.into()) {}
+        let mut transaction = Transaction::start(request, self.line, self.clock.now_ns());
+        send(&mut self.uart, request.emit().as_bytes())?;
+        // What `flush` means differs between UARTs; by the clock the last bit has left at this time.
+        while self.clock.now_ns() < transaction.request_end_ns() {}
+        guard.receive().map_err(Error::Pin)?;
+        loop {
+            match self.receive(&mut transaction)? {
+                Progress::Pending { .. } => {}
+                Progress::Done { value, ready_ns } => {
+                    self.state.clean(ready_ns);
+                    return Ok(value);
+                }
+                Progress::Failed { error, ready_ns } => {
+                    self.state.failed(ready_ns, self.clock.now_ns());
+                    return Err(Error::Protocol(error));
+                }
+            }
+        }
+    }
+
+    /// Takes what is there; asks the clock only if there is nothing.
+    fn receive(&mut self, transaction: &mut Transaction) -> Result<Progress, Failure<U, D>> {
+        if !self.uart.read_ready().map_err(Error::Io)? {
+            // What came while the clock was read is not late.
+            let now_ns = self.clock.now_ns();
+            if !self.uart.read_ready().map_err(Error::Io)? {
+                return Ok(transaction.poll(now_ns));
+            }
+        }
+        let mut buffer = [0; MAX_BYTES];
+        let count = self.uart.read(&mut buffer).map_err(Error::Io)?;
+        let bytes = buffer.get(..count).filter(|bytes| !bytes.is_empty()).ok_or(Error::Closed)?;
+        Ok(transaction.bytes(bytes, self.clock.now_ns()))
+    }
+
+    /// Waits until the line is free, and throws away what comes meanwhile, errors of the UART included.
+    fn settle(&mut self) -> Result<(), Failure<U, D>> {
+        let mut settling = self.state.settle(self.clock.now_ns());
+        loop {
+            let heard = match self.uart.read_ready() {
+                Ok(true) => match self.uart.read(&mut [0; MAX_BYTES]) {
+                    Ok(0) => return Err(Error::Closed),
+                    Ok(_) | Err(_) => true,
+                },
+                Ok(false) => false,
+                Err(_) => true,
+            };
+            let now_ns = self.clock.now_ns();
+            if heard {
+                settling.heard(now_ns);
+            }
+            match settling.poll(now_ns) {
+                Settle::Quiet if !heard => return Ok(()),
+                Settle::Never => return Err(Error::NeverQuiet),
+                Settle::Quiet | Settle::Until(_) => {}
+            }
+        }
+    }
+}
+
+/// Hands all bytes to the UART.
+fn send<U: Write, PIN, P, D>(uart: &mut U, mut bytes: &[u8]) -> Result<(), Error<U::Error, PIN, P, D>> {
+    while !bytes.is_empty() {
+        let count = uart.write(bytes).map_err(Error::Io)?;
+        bytes = bytes.get(count..).filter(|_| count > 0).ok_or(Error::Closed)?;
+    }
+    uart.flush().map_err(Error::Io)
+}

@@ -1,0 +1,220 @@
+//! An encoder on a hostile line behind a UART whose time runs by the look at the clock.
+
+#![allow(dead_code, unreachable_pub, reason = "each test uses its part")]
+#![allow(clippy::expect_used)]
+
+use std::cell::RefCell;
+use std::collections::VecDeque;
+use std::convert::Infallible;
+use std::rc::Rc;
+
+use embedded_hal::digital::{ErrorType as PinErrorType, OutputPin};
+use embedded_io::{ErrorKind, ErrorType, Read, ReadReady, Write};
+use servowire_drivers::Clock;
+use servowire_world::{Event, Framing, Host, Id, Kind, Message, Rates, Scenario, Tally, Truth, Wire, World};
+use tformat::device::Device;
+use tformat::{Abm, Abs, BitRate};
+
+const WIRE: Wire = Wire { bit_ps: 400_000, framing: Framing::StartStop { width: 8 }, devices: 1 };
+/// A look at the clock.
+const LOOK_NS: u64 = 100;
+
+/// What a UART does with a byte whose stop bit is wrong: the three ways of the HALs.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Misframed {
+    /// Drops it without a word.
+    Dropped,
+    /// Gives it as if it were good.
+    Delivered,
+    /// Gives an error, and loses all that it holds.
+    Reported,
+}
+
+pub struct Bench {
+    world: World,
+    encoder: Device<6>,
+    misframed: Misframed,
+    fifo: VecDeque<Option<u8>>,
+    sent_until_ns: u64,
+    /// The turn of the shaft that the last answer carries; each has its own.
+    shaft: u32,
+    pub request: Option<Id>,
+    pub driver_on: bool,
+    pub on_at_ns: u64,
+    pub off_at_ns: u64,
+}
+
+pub type Shared = Rc<RefCell<Bench>>;
+
+impl Bench {
+    pub fn new(scenario: Scenario, misframed: Misframed) -> Shared {
+        Rc::new(RefCell::new(Self {
+            world: World::new(WIRE, scenario),
+            encoder: Device::new(0x17, BitRate::Mbit2_5),
+            misframed,
+            fifo: VecDeque::new(),
+            sent_until_ns: 0,
+            shaft: 0,
+            request: None,
+            driver_on: false,
+            on_at_ns: 0,
+            off_at_ns: 0,
+        }))
+    }
+
+    pub fn world(&mut self) -> &mut World {
+        &mut self.world
+    }
+
+    pub fn truth(&self) -> &Truth {
+        self.world.truth()
+    }
+
+    pub fn encoder(&mut self) -> &mut Device<6> {
+        &mut self.encoder
+    }
+
+    pub fn tally(&self) -> Tally {
+        *self.world.tally()
+    }
+
+    pub fn now_ns(&self) -> u64 {
+        self.world.now_ns()
+    }
+
+    /// Time goes on, and what happens meanwhile happens.
+    pub fn pass(&mut self, until_ns: u64) {
+        loop {
+            match self.world.next(until_ns) {
+                Event::Time { .. } => return,
+                Event::Delivered(block) => self.take(&block.bytes().collect::<Vec<_>>()),
+                Event::Heard { unit, .. } => {
+                    let (byte, framed) = unit.bits.content();
+                    self.shaft += 1;
+                    self.encoder.set_position(Abs::truncate(self.shaft), Abm::truncate(3));
+                    let now_ns = self.world.now_ns();
+                    let answer =
+                        if framed { self.encoder.byte(byte as u8, now_ns) } else { self.encoder.framing_error(now_ns) };
+                    if let Some(answer) = answer {
+                        let message = Message::bytes(answer.frame.as_bytes()).tagged(self.shaft.into());
+                        self.world.answer(0, unit.origin.transmission, &message, answer.at_ns);
+                    }
+                }
+            }
+        }
+    }
+
+    fn take(&mut self, bytes: &[(u8, bool)]) {
+        for (byte, framed) in bytes {
+            match (framed, self.misframed) {
+                (true, _) | (false, Misframed::Delivered) => self.fifo.push_back(Some(*byte)),
+                (false, Misframed::Dropped) => {}
+                (false, Misframed::Reported) => self.fifo.push_back(None),
+            }
+        }
+    }
+}
+
+pub struct Watch(pub Shared);
+
+impl Clock for Watch {
+    fn now_ns(&mut self) -> u64 {
+        let mut bench = self.0.borrow_mut();
+        let until_ns = bench.now_ns() + LOOK_NS;
+        bench.pass(until_ns);
+        bench.now_ns()
+    }
+}
+
+pub struct Uart(pub Shared);
+
+impl ErrorType for Uart {
+    type Error = ErrorKind;
+}
+
+impl Write for Uart {
+    fn write(&mut self, bytes: &[u8]) -> Result<usize, ErrorKind> {
+        let mut bench = self.0.borrow_mut();
+        let begin_ns = bench.sent_until_ns.max(bench.now_ns());
+        let id = bench.world.send(&Message::bytes(bytes), begin_ns);
+        bench.request = Some(id);
+        bench.sent_until_ns = begin_ns + 4_000 * bytes.len() as u64;
+        Ok(bytes.len())
+    }
+
+    /// Lies, as many do: the bytes are still going out.
+    fn flush(&mut self) -> Result<(), ErrorKind> {
+        Ok(())
+    }
+}
+
+impl ReadReady for Uart {
+    fn read_ready(&mut self) -> Result<bool, ErrorKind> {
+        Ok(!self.0.borrow().fifo.is_empty())
+    }
+}
+
+impl Uart {
+    /// What a read gives at once, if anything.
+    pub fn try_read(&mut self, bytes: &mut [u8]) -> Option<Result<usize, ErrorKind>> {
+        let fifo = &mut self.0.borrow_mut().fifo;
+        let mut count = 0;
+        while let (Some(place), Some(byte)) = (bytes.get_mut(count), fifo.front().copied()) {
+            match byte {
+                Some(byte) => *place = byte,
+                None if count > 0 => break,
+                None => {
+                    fifo.clear();
+                    return Some(Err(ErrorKind::Other));
+                }
+            }
+            fifo.pop_front();
+            count += 1;
+        }
+        (count > 0).then_some(Ok(count))
+    }
+}
+
+impl Read for Uart {
+    fn read(&mut self, bytes: &mut [u8]) -> Result<usize, ErrorKind> {
+        self.try_read(bytes).expect("the driver reads only what is there")
+    }
+}
+
+pub struct Pin(pub Shared);
+
+impl PinErrorType for Pin {
+    type Error = Infallible;
+}
+
+impl OutputPin for Pin {
+    fn set_low(&mut self) -> Result<(), Infallible> {
+        let mut bench = self.0.borrow_mut();
+        bench.driver_on = false;
+        bench.off_at_ns = bench.now_ns();
+        Ok(())
+    }
+
+    fn set_high(&mut self) -> Result<(), Infallible> {
+        let mut bench = self.0.borrow_mut();
+        bench.driver_on = true;
+        bench.on_at_ns = bench.now_ns();
+        Ok(())
+    }
+}
+
+/// A host whose UART hands over bytes one by one, up to 2 us late, and that hears itself or not whatever the driver was told.
+pub fn scenario(seed: u64) -> Scenario {
+    let scenario = Scenario::random(seed, RATES);
+    let host = Host { echo: scenario.host.echo, latency_ns: scenario.host.latency_ns % 2_000, ..Host::IDEAL };
+    Scenario { host, ..scenario }
+}
+
+/// How many hostile events a test has to live through.
+pub fn events() -> u64 {
+    std::env::var("HOSTILE_EVENTS").ok().and_then(|events| events.parse().ok()).unwrap_or(100_000)
+}
+
+/// Every kind of fault, so often that every third call is hurt in some way, and none so long that it reaches over several
+/// calls.
+pub const RATES: Rates = Rates { per_million: [3_000; Kind::ALL.len()], longest_ns: 60_000 };

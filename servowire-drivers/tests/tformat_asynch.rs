@@ -1,0 +1,186 @@
+//! The async driver on the hostile line: the same as the blocking one, and futures that are dropped at every point.
+
+#![cfg(all(feature = "tformat", feature = "async"))]
+#![allow(
+    clippy::arithmetic_side_effects,
+    clippy::cast_possible_truncation,
+    clippy::indexing_slicing,
+    clippy::panic,
+    clippy::std_instead_of_core,
+    clippy::unwrap_used
+)]
+
+mod bench;
+
+use std::future::{Future, poll_fn};
+use std::pin::pin;
+use std::task::{Context, Poll, Waker};
+
+use bench::{Bench, Misframed, Pin, Shared, Uart, Watch, events, scenario};
+use embedded_io::{ErrorKind, ErrorType};
+use servowire_drivers::tformat::asynch::Encoder;
+use servowire_drivers::tformat::blocking;
+use servowire_drivers::{Clock, DriverEnable, Timer};
+use servowire_world::{Kind, Scenario, Tally, Transmission, Verdict};
+use tformat::BitRate;
+use tformat::master::Line;
+
+/// The UART as futures that can be dropped.
+struct AsyncUart(Uart);
+
+impl ErrorType for AsyncUart {
+    type Error = ErrorKind;
+}
+
+impl embedded_io_async::Read for AsyncUart {
+    async fn read(&mut self, bytes: &mut [u8]) -> Result<usize, ErrorKind> {
+        poll_fn(|_| self.0.try_read(bytes).map_or(Poll::Pending, Poll::Ready)).await
+    }
+}
+
+impl embedded_io_async::Write for AsyncUart {
+    /// A byte at a time, with a pause before each.
+    async fn write(&mut self, bytes: &[u8]) -> Result<usize, ErrorKind> {
+        pause().await;
+        embedded_io::Write::write(&mut self.0, &bytes[..1])
+    }
+
+    async fn flush(&mut self) -> Result<(), ErrorKind> {
+        pause().await;
+        Ok(())
+    }
+}
+
+async fn pause() {
+    let mut asked = false;
+    poll_fn(|_| if std::mem::replace(&mut asked, true) { Poll::Ready(()) } else { Poll::Pending }).await;
+}
+
+/// Time goes on with every look, and every look may be the last.
+struct AsyncWatch(Watch);
+
+impl Clock for AsyncWatch {
+    fn now_ns(&mut self) -> u64 {
+        self.0.now_ns()
+    }
+}
+
+impl Timer for AsyncWatch {
+    async fn wait_until(&mut self, ns: u64) {
+        poll_fn(|_| if self.0.now_ns() >= ns { Poll::Ready(()) } else { Poll::Pending }).await;
+    }
+}
+
+type Driver = Encoder<AsyncUart, DriverEnable<Pin>, AsyncWatch>;
+
+fn driver(bench: &Shared) -> Driver {
+    let pin = DriverEnable(Pin(bench.clone()));
+    Encoder::new(AsyncUart(Uart(bench.clone())), pin, AsyncWatch(Watch(bench.clone())), Line::new(BitRate::Mbit2_5))
+}
+
+/// Polls at most `most` times.
+fn run<T>(future: impl Future<Output = T>, most: usize) -> Option<T> {
+    let mut future = pin!(future);
+    let mut context = Context::from_waker(Waker::noop());
+    (0..most).find_map(|_| match future.as_mut().poll(&mut context) {
+        Poll::Ready(value) => Some(value),
+        Poll::Pending => None,
+    })
+}
+
+const FOR_EVER: usize = 1_000_000;
+
+/// Dropped after each number of polls: the driver is off at once, and the next call is good.
+#[test]
+fn a_future_may_be_dropped_at_any_point() {
+    for polls in 0.. {
+        let bench = Bench::new(Scenario::quiet(), Misframed::Reported);
+        let mut encoder = driver(&bench);
+        let first = run(encoder.read_all(), polls);
+        assert!(!bench.borrow().driver_on, "after {polls} polls");
+        let second = run(encoder.read_all(), FOR_EVER).unwrap();
+        let fresh = bench.borrow().truth().verdict(bench.borrow().request.unwrap(), second.unwrap().abs.get().into());
+        assert_eq!(fresh, Verdict::Fresh, "after {polls} polls");
+        assert_eq!(bench.borrow().truth().clashes(), 0, "after {polls} polls");
+        if first.is_some() {
+            assert!(polls > 100);
+            return;
+        }
+    }
+}
+
+/// A future that is forgotten runs no destructor: the pin stays on until the next call, which waits all the same.
+#[test]
+fn a_future_may_be_forgotten() {
+    for polls in 0..400 {
+        let bench = Bench::new(Scenario::quiet(), Misframed::Reported);
+        let mut encoder = driver(&bench);
+        let mut future = Box::pin(encoder.read_all());
+        let mut context = Context::from_waker(Waker::noop());
+        let ended = (0..polls).any(|_| future.as_mut().poll(&mut context).is_ready());
+        std::mem::forget(future);
+        let second = run(encoder.read_all(), FOR_EVER).unwrap();
+        assert!(second.is_ok(), "after {polls} polls, ended {ended}: {second:?}");
+        assert!(!bench.borrow().driver_on);
+    }
+}
+
+/// The blocking and the async driver say the same on the same line.
+#[test]
+fn both_drivers_agree() {
+    for seed in 0..20 {
+        let bench = |seed| Bench::new(scenario(seed), Misframed::Delivered);
+        let (one, other) = (bench(seed), bench(seed));
+        let pin = DriverEnable(Pin(one.clone()));
+        let mut spinning =
+            blocking::Encoder::new(Uart(one.clone()), pin, Watch(one.clone()), Line::new(BitRate::Mbit2_5));
+        let mut waiting = driver(&other);
+        let calls = (0..30).filter(|_| {
+            let [one, other] = [spinning.read_all().is_ok(), run(waiting.read_all(), FOR_EVER).unwrap().is_ok()];
+            one == other
+        });
+        // Their looks at the clock differ, so a fault at the edge of a time-out may be judged differently.
+        assert!(calls.count() >= 28, "seed {seed}");
+    }
+}
+
+#[test]
+fn hostile_events_never_cost_a_good_answer() {
+    let (mut sum, mut seed) = (Tally::default(), 0);
+    let (mut good, mut failed, mut dropped) = (0_u64, 0_u64, 0_u64);
+    while sum.events() < events() {
+        let misframed = [Misframed::Dropped, Misframed::Delivered, Misframed::Reported][seed as usize % 3];
+        let bench = Bench::new(scenario(seed), misframed);
+        let mut encoder = driver(&bench);
+        for call in 0..100_usize {
+            let polls = if call % 4 == 3 { call * 7 + seed as usize % 7 } else { FOR_EVER };
+            let before = bench.borrow().tally().of(Kind::Preempt);
+            let result = run(encoder.read_all(), polls);
+            let mut bench = bench.borrow_mut();
+            assert!(!bench.driver_on, "seed {seed}, call {call}");
+            let Some(request) = bench.request else { continue };
+            let truth = bench.truth();
+            let preempted = bench.tally().of(Kind::Preempt) > before;
+            let sent_ns = truth.transmission(request).unwrap().end_ns;
+            let in_time = |answer: &Transmission| {
+                let soon = answer.start_ns <= sent_ns + 9_000 && answer.delivered_ns <= answer.end_ns + 2_000;
+                soon && answer.end_ns - answer.start_ns == 44_000
+            };
+            let whole = !preempted && truth.undisturbed(request) && truth.intact_answers(request).any(in_time);
+            match result {
+                None => dropped += 1,
+                Some(Ok(_)) => good += 1,
+                Some(Err(error)) => {
+                    assert!(!whole, "seed {seed}, call {call}: {error:?}");
+                    failed += 1;
+                }
+            }
+            let past_ns = bench.now_ns().saturating_sub(1_000_000);
+            bench.world().truth_mut().forget_before(past_ns);
+        }
+        sum.add(&bench.borrow().tally());
+        seed += 1;
+    }
+    println!("{sum}\n{good} good, {failed} failed, {dropped} dropped");
+    assert!(good > failed && dropped > 100);
+}

@@ -1,0 +1,174 @@
+//! The blocking driver on the hostile line.
+
+#![cfg(feature = "tformat")]
+#![allow(
+    clippy::arithmetic_side_effects,
+    clippy::cast_possible_truncation,
+    clippy::expect_used,
+    clippy::panic,
+    clippy::std_instead_of_core,
+    clippy::unwrap_used
+)]
+
+mod bench;
+
+use bench::{Bench, Misframed, Pin, Shared, Uart, Watch, events, scenario};
+use servowire_drivers::tformat::blocking::Encoder;
+use servowire_drivers::{DriverEnable, Error};
+use servowire_world::{Fault, Kind, Planned, Scenario, Script, Tally, Transmission, Verdict};
+use tformat::master::Line;
+use tformat::{Address, Almc, BitRate, Doubt, Policy, Resolution};
+
+fn driver(bench: &Shared) -> Encoder<Uart, DriverEnable<Pin>, Watch> {
+    let line = Line::new(BitRate::Mbit2_5);
+    Encoder::new(Uart(bench.clone()), DriverEnable(Pin(bench.clone())), Watch(bench.clone()), line)
+}
+
+fn planned(faults: &[(u16, u8, Fault)]) -> Scenario {
+    let planned = faults.iter().map(|&(transmission, unit, fault)| Planned { transmission, unit, fault });
+    Scenario { script: Script::planned(planned.collect()), ..Scenario::quiet() }
+}
+
+#[test]
+fn positions_come_and_the_pin_is_right() {
+    let bench = Bench::new(Scenario::quiet(), Misframed::Dropped);
+    let mut encoder = driver(&bench);
+    for _ in 0..10 {
+        let all = encoder.read_all().unwrap();
+        let bench = bench.borrow();
+        let request = bench.request.unwrap();
+        let truth = bench.truth();
+        assert_eq!(truth.verdict(request, all.abs.get().into()), Verdict::Fresh);
+        let sent = truth.transmission(request).unwrap();
+        assert!(bench.on_at_ns + 400 <= sent.start_ns, "one bit before the start bit");
+        // not before the last bit has left, and not when the encoder begins 3 us later
+        assert!((sent.end_ns..sent.end_ns + 1_000).contains(&bench.off_at_ns));
+    }
+}
+
+#[test]
+fn a_position_with_alarms_is_a_doubt() {
+    let bench = Bench::new(Scenario::quiet(), Misframed::Dropped);
+    let mut encoder = driver(&bench);
+    let resolution = Resolution::new(23, 16).unwrap();
+    let sample = encoder.read_position(resolution, Policy::STRICT).unwrap();
+    assert_eq!((sample.position.abs, sample.position.turns), (1, 3));
+    let sent = bench.borrow().truth().transmission(bench.borrow().request.unwrap()).unwrap().end_ns;
+    assert!(sample.sampled_ns.abs_diff(sent) < 1_000, "within the turn-around");
+    bench.borrow_mut().encoder().set_alarms(Almc::BE, true);
+    let doubt = Error::Doubt(Doubt::Alarms { alarms: Almc::BE });
+    assert_eq!(encoder.read_position(resolution, Policy::STRICT), Err(doubt));
+    assert!(encoder.read_position(resolution, Policy::SINGLE_TURN).is_ok());
+}
+
+#[test]
+fn procedures_run_over_it() {
+    let bench = Bench::new(Scenario::quiet(), Misframed::Dropped);
+    let mut encoder = driver(&bench);
+    encoder.clear_errors().unwrap();
+    let address = Address::new(5).unwrap();
+    assert_eq!(encoder.write_eeprom(None, address, 0x5a), Ok(0x5a));
+    assert_eq!(encoder.read_eeprom(None, address), Ok(0x5a));
+    bench.borrow_mut().encoder().eeprom_mut()[0][5] = 7;
+    assert_eq!(encoder.read_eeprom(None, address), Ok(7));
+}
+
+/// Each fault alone, in the answer of the first call: the call fails or not, the second one is good.
+#[test]
+fn any_fault_is_over_with_the_next_call() {
+    let faults = [
+        Fault::Drop,
+        Fault::Repeat,
+        Fault::Flip { bit: 4 },
+        Fault::Flip { bit: 9 },
+        Fault::Idle { bits: 20 },
+        Fault::Cut,
+        Fault::Delay { ns: 30_000 },
+        Fault::Noise { after_ns: 2_000 },
+        Fault::Preempt { ns: 300_000 },
+    ];
+    for misframed in [Misframed::Dropped, Misframed::Delivered, Misframed::Reported] {
+        for fault in faults {
+            for (transmission, units) in [(0, 1), (1, 11)] {
+                for unit in 0..units {
+                    let bench = Bench::new(planned(&[(transmission, unit, fault)]), misframed);
+                    let mut encoder = driver(&bench);
+                    let first = encoder.read_all();
+                    assert!(!bench.borrow().driver_on);
+                    // An encoder that says more than its answer may have its say.
+                    let rest_ns = bench.borrow().now_ns() + 10_000;
+                    bench.borrow_mut().pass(rest_ns);
+                    let second = encoder.read_all();
+                    assert!(
+                        second.is_ok(),
+                        "{fault:?} in unit {unit} of {transmission}, {misframed:?}: {first:?}, {second:?}"
+                    );
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn a_babbling_line_is_given_up_and_used_again() {
+    let bench = Bench::new(Scenario::quiet(), Misframed::Reported);
+    let mut encoder = driver(&bench);
+    let id = bench.borrow_mut().world().send(&servowire_world::Message::bytes(&[]), 0);
+    let babble = servowire_world::Message::bytes(&[0x55; 1_000]);
+    bench.borrow_mut().world().answer(0, id, &babble, 0);
+    bench.borrow_mut().pass(50_000);
+    assert_eq!(encoder.read_all(), Err(Error::NeverQuiet));
+    assert!(!bench.borrow().driver_on);
+    bench.borrow_mut().pass(5_000_000);
+    assert!(encoder.read_all().is_ok());
+}
+
+/// Whatever has happened before: a call whose request and answer come through whole is good.
+#[test]
+fn hostile_events_never_cost_a_good_answer() {
+    let resolution = Resolution::new(23, 16).unwrap();
+    let (mut sum, mut seed) = (Tally::default(), 0);
+    let (mut good, mut failed, mut old, mut unknown) = (0_u64, 0_u64, 0_u64, 0_u64);
+    while sum.events() < events() {
+        let misframed = [Misframed::Dropped, Misframed::Delivered, Misframed::Reported][seed as usize % 3];
+        let bench = Bench::new(scenario(seed), misframed);
+        let mut encoder = driver(&bench);
+        for call in 0..100 {
+            let before = bench.borrow().tally().of(Kind::Preempt);
+            let result = encoder.read_position(resolution, Policy::STRICT);
+            let mut bench = bench.borrow_mut();
+            assert!(!bench.driver_on, "seed {seed}, call {call}");
+            let Some(request) = bench.request else { continue };
+            let truth = bench.truth();
+            let preempted = bench.tally().of(Kind::Preempt) > before;
+            let sent_ns = truth.transmission(request).unwrap().end_ns;
+            let in_time = |answer: &Transmission| {
+                let soon = answer.start_ns <= sent_ns + 9_000 && answer.delivered_ns <= answer.end_ns + 2_000;
+                soon && answer.end_ns - answer.start_ns == 44_000
+            };
+            let whole = !preempted && truth.undisturbed(request) && truth.intact_answers(request).any(in_time);
+            match result {
+                Ok(sample) => match truth.verdict(request, sample.position.abs.into()) {
+                    Verdict::Fresh | Verdict::Forged { .. } => good += 1,
+                    Verdict::Old { .. } => {
+                        assert!(preempted, "seed {seed}, call {call}: an old position");
+                        old += 1;
+                    }
+                    Verdict::Unknown => unknown += 1,
+                },
+                // The request was damaged on the line, and the encoder says so.
+                Err(Error::Doubt(Doubt::RequestDamaged { .. })) => failed += 1,
+                Err(error) => {
+                    assert!(!whole, "seed {seed}, call {call}: {error:?}");
+                    failed += 1;
+                }
+            }
+            let past_ns = bench.now_ns().saturating_sub(1_000_000);
+            bench.world().truth_mut().forget_before(past_ns);
+        }
+        sum.add(&bench.borrow().tally());
+        seed += 1;
+    }
+    println!("{sum}\n{good} good, {failed} failed, {old} old, {unknown} unknown");
+    assert!(good > failed);
+}

@@ -1,0 +1,304 @@
+//! CSV of logic analysers and oscilloscopes: Saleae, sigrok, DSView, Kingst, WaveForms, Rigol, Siglent, Tektronix,
+//! Keysight, PicoScope.
+//!
+//! They differ in separators, headings and units, so the table is taken as it is: data begin where two lines of numbers
+//! follow each other, the names stand above. A column of 0 and 1 is a channel; a column of voltages becomes one, with a
+//! threshold half-way between its levels.
+
+mod cell;
+mod heading;
+
+use std::collections::VecDeque;
+use std::io::{BufRead, Read};
+
+use super::time::{Clock, SECOND};
+use super::{Change, Input, Line};
+use crate::fault::{At, Fault};
+use cell::{Cell, Threshold};
+use heading::{Heading, Times};
+
+/// Changes given at once.
+const BLOCK: usize = 4096;
+/// Longer lines are no table.
+const LONGEST: usize = 1 << 20;
+/// Rows looked at for the kinds of the columns and the levels of voltages.
+const SAMPLE: usize = 1 << 14;
+/// Cells looked at.
+const SAMPLE_CELLS: usize = 1 << 18;
+
+/// A table behind its heading.
+pub struct Table {
+    name: String,
+    lines: Lines,
+    heading: Heading,
+    channels: Vec<String>,
+    columns: Vec<Column>,
+    /// Rows that were read to find the columns.
+    waiting: VecDeque<(u64, Vec<u8>)>,
+    clock: Times,
+    /// Time of the first row, where times are absolute.
+    origin: Option<i64>,
+    now: Option<i64>,
+    rows: u64,
+    /// Rows that could not be read, and the first of them.
+    bad: u64,
+    first_bad: Option<(u64, String)>,
+    hole: bool,
+    gap: Option<i64>,
+    over: bool,
+}
+
+/// A column that is a channel.
+struct Column {
+    index: usize,
+    threshold: Option<Threshold>,
+    level: Option<bool>,
+}
+
+/// Lines with their numbers.
+struct Lines {
+    input: Input,
+    line: u64,
+}
+
+impl Lines {
+    /// The next line into `text`, without its end; whether there was one.
+    fn next(&mut self, text: &mut Vec<u8>) -> Result<bool, Fault> {
+        text.clear();
+        let at = At::Line(self.line + 1);
+        let mut limited = self.input.by_ref().take(LONGEST as u64);
+        let got = limited.read_until(b'\n', text).map_err(|e| self.input.io_fault(at, &e))?;
+        if got == 0 {
+            return Ok(false);
+        }
+        self.line += 1;
+        if got == LONGEST {
+            return Err(self.input.fault(at, format!("a line of more than {LONGEST} characters: not a table")));
+        }
+        while text.last().is_some_and(|last| matches!(last, b'\n' | b'\r')) {
+            text.pop();
+        }
+        if self.line == 1 && text.starts_with(b"\xef\xbb\xbf") {
+            text.drain(..3);
+        }
+        Ok(true)
+    }
+}
+
+impl Table {
+    /// Reads the heading, and rows enough to know the columns.
+    pub fn new(input: Input, threshold: Option<f64>) -> Result<Self, Fault> {
+        let name = input.name().to_owned();
+        let mut lines = Lines { input, line: 0 };
+        let mut above: Vec<Vec<u8>> = Vec::new();
+        let mut waiting: VecDeque<(u64, Vec<u8>)> = VecDeque::new();
+        let mut text = Vec::new();
+        // Up to the second of two lines of numbers.
+        while lines.next(&mut text)? {
+            if heading::is_row(&text) {
+                waiting.push_back((lines.line, text.clone()));
+                if waiting.len() == 2 {
+                    break;
+                }
+            } else if !text.is_empty() {
+                above.extend(waiting.drain(..).map(|(_, row)| row));
+                above.push(text.clone());
+            }
+            if above.len() > heading::LONGEST {
+                break;
+            }
+        }
+        let heading = Heading::parse(&above, waiting.front().map(|(_, row)| row.as_slice()));
+        let Some(heading) = heading else {
+            let what = "no table with times or a sample rate and columns of levels or voltages is in it";
+            return Err(Fault::new(&name, At::Line(1), what));
+        };
+        let mut cells = 0;
+        while waiting.len() < SAMPLE && cells < SAMPLE_CELLS && lines.next(&mut text)? {
+            cells += heading.columns();
+            waiting.push_back((lines.line, text.clone()));
+        }
+        let (columns, channels) = columns(&heading, &waiting, threshold);
+        if channels.is_empty() {
+            return Err(Fault::new(&name, At::Line(1), "no column of levels or voltages is in the table"));
+        }
+        if u16::try_from(channels.len()).is_err() {
+            return Err(Fault::new(&name, At::Line(1), "more than 65535 columns"));
+        }
+        let clock = heading
+            .times(&waiting)
+            .ok_or_else(|| Fault::new(&name, At::Line(1), "neither times nor a sample rate are in the table"))?;
+        Ok(Self {
+            name,
+            lines,
+            heading,
+            channels,
+            columns,
+            waiting,
+            clock,
+            origin: None,
+            now: None,
+            rows: 0,
+            bad: 0,
+            first_bad: None,
+            hole: false,
+            gap: None,
+            over: false,
+        })
+    }
+
+    fn step(&mut self, changes: &mut Vec<Change>) -> Result<bool, Fault> {
+        let (line, row) = if let Some(row) = self.waiting.pop_front() {
+            row
+        } else {
+            let mut text = Vec::new();
+            if !self.lines.next(&mut text)? {
+                return Ok(false);
+            }
+            (self.lines.line, text)
+        };
+        if row.is_empty() {
+            return Ok(true);
+        }
+        if let Err(what) = self.row(&row, changes) {
+            self.bad += 1;
+            self.first_bad.get_or_insert((line, what));
+        }
+        Ok(true)
+    }
+
+    /// Takes a row, or says what is wrong with it and leaves everything as it was.
+    fn row(&mut self, row: &[u8], changes: &mut Vec<Change>) -> Result<(), String> {
+        let cells = self.heading.split(row);
+        let needed = self.columns.last().map_or(0, |column| column.index);
+        if cells.len() <= needed {
+            return Err(format!("the row has {} columns, the heading {}", cells.len(), self.heading.columns()));
+        }
+        let time = match self.clock {
+            Times::Column { index, divisor } => {
+                let text = String::from_utf8_lossy(cells.get(index).copied().unwrap_or_default());
+                cell::time(&text, divisor).ok_or_else(|| format!("{text:?} is not a time"))?
+            }
+            Times::Dates { index } => {
+                let text = String::from_utf8_lossy(cells.get(index).copied().unwrap_or_default());
+                let time = cell::date(&text).ok_or_else(|| format!("{text:?} is not a date and time"))?;
+                time.saturating_sub(*self.origin.get_or_insert(time))
+            }
+            Times::Steps { start, period } => start.saturating_add((self.rows as f64 * period).round() as i64),
+            Times::Rate(rate) => Clock::new(rate).time(self.rows),
+        };
+        if let Some(before) = self.now.filter(|before| time < *before) {
+            let (now, before) = (time as f64 / SECOND as f64, before as f64 / SECOND as f64);
+            return Err(format!("time goes back from {before} s to {now} s"));
+        }
+        let mut levels = Vec::with_capacity(self.columns.len());
+        for column in &self.columns {
+            let text = cells.get(column.index).copied().unwrap_or_default();
+            let level = match (cell::level(text), &column.threshold) {
+                (Cell::Level(level), None) => Some(level),
+                (Cell::Nothing, _) => None,
+                (_, Some(threshold)) => match cell::number(text, self.heading.comma()) {
+                    Some(volts) => Some(threshold.level(volts, column.level)),
+                    None => return Err(format!("{:?} is no voltage", String::from_utf8_lossy(text))),
+                },
+                (Cell::Other, None) => {
+                    return Err(format!("{:?}, where a level is 0 or 1", String::from_utf8_lossy(text)));
+                }
+            };
+            levels.push(level);
+        }
+        self.rows += 1;
+        self.now = Some(time);
+        if levels.iter().all(Option::is_none) {
+            // No data from here on.
+            self.hole = true;
+            return Ok(());
+        }
+        if std::mem::take(&mut self.hole) {
+            self.gap = Some(time);
+            self.columns.iter_mut().for_each(|column| column.level = None);
+        }
+        for ((channel, column), level) in (0_u16..).zip(&mut self.columns).zip(levels) {
+            if let Some(level) = level.filter(|level| column.level != Some(*level)) {
+                column.level = Some(level);
+                changes.push(Change { time, channel, level });
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Which columns are channels: all cells levels, or all voltages.
+fn columns(heading: &Heading, rows: &VecDeque<(u64, Vec<u8>)>, threshold: Option<f64>) -> (Vec<Column>, Vec<String>) {
+    let mut digital = vec![true; heading.columns()];
+    let mut numbers: Vec<Vec<f64>> = vec![Vec::new(); heading.columns()];
+    let mut other = vec![0_usize; heading.columns()];
+    for (_, row) in rows {
+        for (index, text) in heading.split(row).into_iter().enumerate().take(heading.columns()) {
+            let kind = cell::level(text);
+            let (Some(digital), Some(numbers), Some(other)) =
+                (digital.get_mut(index), numbers.get_mut(index), other.get_mut(index))
+            else {
+                continue;
+            };
+            match (kind, cell::number(text, heading.comma())) {
+                (Cell::Nothing, _) => {}
+                (kind, Some(number)) => {
+                    *digital &= matches!(kind, Cell::Level(_));
+                    numbers.push(number);
+                }
+                (_, None) => *other += 1,
+            }
+        }
+    }
+    let (mut columns, mut names) = (Vec::new(), Vec::new());
+    for index in 0..heading.columns() {
+        if !heading.may_be_channel(index) {
+            continue;
+        }
+        let Some(values) =
+            numbers.get_mut(index).filter(|values| values.len() > other.get(index).copied().unwrap_or(0))
+        else {
+            continue;
+        };
+        let is_digital = digital.get(index).copied().unwrap_or(false);
+        let threshold = if is_digital { None } else { Some(Threshold::find(values, threshold)) };
+        columns.push(Column { index, threshold, level: None });
+        names.push(heading.name(index));
+    }
+    (columns, names)
+}
+
+impl Line for Table {
+    fn channels(&self) -> &[String] {
+        &self.channels
+    }
+
+    fn read(&mut self, changes: &mut Vec<Change>) -> Result<bool, Fault> {
+        let enough = changes.len() + BLOCK;
+        let (first, mut rows) = (changes.len(), 0);
+        while !self.over && changes.len() < enough && rows < 16 * BLOCK && !(self.hole && changes.len() > first) {
+            let more = self.step(changes);
+            self.over = !matches!(more, Ok(true));
+            more?;
+            rows += 1;
+        }
+        if let (true, Some((line, what))) = (self.over, self.first_bad.take()) {
+            let all = if self.bad == 1 {
+                "this row was left out".to_owned()
+            } else {
+                format!("{} rows were left out", self.bad)
+            };
+            return Err(Fault::new(&self.name, At::Line(line), format!("{what}; {all}")));
+        }
+        Ok(!self.over)
+    }
+
+    fn reached(&self) -> i64 {
+        self.now.unwrap_or(0)
+    }
+
+    fn gap(&mut self) -> Option<i64> {
+        self.gap.take()
+    }
+}

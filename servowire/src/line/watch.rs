@@ -1,0 +1,337 @@
+//! All channels of a capture while it is read: which are decoded, which are nothing, which have hardly moved yet.
+
+use std::io;
+
+use super::lane::{LineDecoder, Tap, Wires};
+use super::report;
+use super::survey::{Candidates, FEWEST, Found, Speech};
+use crate::capture::Change;
+use crate::output::{Lane, Output};
+use crate::protocols::Settings;
+
+/// Changes looked at before decoding begins.
+const PREVIEW: usize = 1 << 16;
+/// Changes of one channel by which it is judged later on.
+const ENOUGH: usize = 1 << 9;
+/// Changes of undecided channels that are kept together.
+const MOST_KEPT: usize = 1 << 20;
+/// What the last chance of a line asks for: a request whose answer came.
+const LEAST: i64 = 4;
+/// A channel that was nothing is looked at again after so many times the edges it was judged by.
+const PATIENCE: u64 = 8;
+
+/// What a channel is.
+#[derive(Debug, Clone)]
+enum State {
+    /// Not judged yet.
+    Open(Vec<(i64, bool)>),
+    /// Part of a line that is decoded.
+    Taken(usize),
+    /// Nothing, or more of what is decoded already; looked at again after so many edges, if at all.
+    Passed(Option<u64>),
+}
+
+/// A line being decoded.
+struct Running {
+    wires: Wires,
+    decoder: Box<dyn LineDecoder>,
+}
+
+/// The channels of a capture.
+pub(super) struct Watch<'a> {
+    file: &'a str,
+    names: &'a [String],
+    candidates: Candidates<'a>,
+    states: Vec<State>,
+    lines: Vec<Running>,
+    pub(super) found: Vec<Found>,
+    /// Changes before the first survey, in their order.
+    held: Option<Vec<Change>>,
+    /// Holes between them: number of changes before, time behind.
+    holes: Vec<(usize, i64)>,
+    kept: usize,
+    /// Channels that have enough edges to be judged.
+    due: bool,
+    /// The user named the channels, and everything else is of no interest.
+    named: bool,
+    /// For messages when nothing was found: the busiest channel's first edges.
+    pub(super) busiest: Option<(u16, Vec<(i64, bool)>)>,
+    /// Edges by channel.
+    pub(super) moves: Vec<u64>,
+}
+
+impl<'a> Watch<'a> {
+    pub(super) fn new(file: &'a str, names: &'a [String], candidates: Candidates<'a>, only: Option<&[u16]>) -> Self {
+        let state = |channel: u16| match only {
+            Some(only) if !only.contains(&channel) => State::Passed(None),
+            _ => State::Open(Vec::new()),
+        };
+        let states = (0..u16::try_from(names.len()).unwrap_or(u16::MAX)).map(state).collect();
+        Self {
+            file,
+            names,
+            candidates,
+            states,
+            lines: Vec::new(),
+            found: Vec::new(),
+            held: Some(Vec::new()),
+            holes: Vec::new(),
+            kept: 0,
+            due: false,
+            named: only.is_some(),
+            busiest: None,
+            moves: vec![0; names.len()],
+        }
+    }
+
+    pub(super) fn settings(&self) -> &'a Settings {
+        self.candidates.settings
+    }
+
+    /// The next changes of the capture.
+    pub(super) fn changes(&mut self, changes: &[Change], out: &mut Output<'_>) -> io::Result<()> {
+        for change in changes {
+            self.change(*change, out)?;
+        }
+        if let Some(held) = &mut self.held {
+            held.extend_from_slice(changes);
+        }
+        Ok(())
+    }
+
+    /// Whether it is time for a survey.
+    pub(super) fn is_due(&self) -> bool {
+        match &self.held {
+            Some(held) => held.len() >= PREVIEW,
+            None => self.due || self.kept >= MOST_KEPT,
+        }
+    }
+
+    fn change(&mut self, change: Change, out: &mut Output<'_>) -> io::Result<()> {
+        if self.held.is_none() && out.wants_changes() {
+            out.change(&change)?;
+        }
+        if let Some(moves) = self.moves.get_mut(usize::from(change.channel)) {
+            *moves += 1;
+        }
+        let Some(state) = self.states.get_mut(usize::from(change.channel)) else { return Ok(()) };
+        match state {
+            State::Taken(line) => {
+                let line = *line;
+                self.give(line, change, out)?;
+            }
+            State::Open(edges) => {
+                edges.push((change.time, change.level));
+                self.kept += 1;
+                self.due |= self.held.is_none() && edges.len() == ENOUGH;
+            }
+            State::Passed(Some(left)) => {
+                *left -= 1;
+                if *left == 0 {
+                    *state = State::Open(Vec::new());
+                }
+            }
+            State::Passed(None) => {}
+        }
+        Ok(())
+    }
+
+    /// Nothing has changed until `time`.
+    pub(super) fn reach(&mut self, time: i64, out: &mut Output<'_>) -> io::Result<()> {
+        for (line, running) in self.lines.iter_mut().enumerate() {
+            out.lane(line)?;
+            running.decoder.reach(time, out)?;
+        }
+        Ok(())
+    }
+
+    /// A hole in the capture that ends at `time`.
+    pub(super) fn gap(&mut self, time: i64, out: &mut Output<'_>) -> io::Result<()> {
+        if let Some(held) = &self.held {
+            self.holes.push((held.len(), time));
+        }
+        for (line, running) in self.lines.iter_mut().enumerate() {
+            out.lane(line)?;
+            running.decoder.gap(time, out)?;
+            running.wires.forget();
+        }
+        Ok(())
+    }
+
+    /// The capture ends.
+    pub(super) fn finish(&mut self, time: i64, out: &mut Output<'_>) -> io::Result<()> {
+        for (line, running) in self.lines.iter_mut().enumerate() {
+            out.lane(line)?;
+            running.decoder.finish(time, out)?;
+        }
+        Ok(())
+    }
+
+    /// Judges the open channels; at the `end` also those that have hardly moved. What holds is decoded from its
+    /// first edge on.
+    pub(super) fn survey(&mut self, end: bool, out: &mut Output<'_>) -> io::Result<()> {
+        let first = self.held.is_some();
+        let mut readings = Vec::new();
+        let mut judged = Vec::new();
+        for (channel, state) in (0_u16..).zip(&self.states) {
+            let State::Open(edges) = state else { continue };
+            if edges.len() < FEWEST {
+                continue;
+            }
+            if self.busiest.as_ref().is_none_or(|(_, busiest)| busiest.len() < edges.len()) {
+                self.busiest = Some((channel, edges.iter().take(3000).copied().collect()));
+            }
+            judged.push(channel);
+            if self.candidates.pair().is_some() {
+                continue;
+            }
+            if let Some(found) = self.candidates.read(channel, edges) {
+                readings.push(found);
+            }
+        }
+        readings.extend(self.said_pair());
+        let states = &self.states;
+        let edges = |channel: u16| match states.get(usize::from(channel)) {
+            Some(State::Open(edges)) => edges.clone(),
+            _ => Vec::new(),
+        };
+        let all = self.candidates.lines(readings, &judged, &edges);
+        // The last chance of what is not certain, or the only one where the user says that it is a line.
+        let last = self.found.is_empty() && (end || self.named && self.candidates.is_asked_for());
+        let (taken, passed) = self.choose(all, last);
+        // What sounds in a line that is decoded already is no second one.
+        for found in passed {
+            for tap in &found.taps {
+                self.pass(tap.channel, None);
+            }
+        }
+        for found in taken {
+            self.take(found, out)?;
+        }
+        for channel in judged {
+            if let Some(State::Open(edges)) = self.states.get(usize::from(channel)) {
+                let enough = edges.len() >= ENOUGH;
+                let after = edges.len() as u64 * PATIENCE;
+                if enough {
+                    self.pass(channel, Some(after));
+                }
+            }
+        }
+        self.due = false;
+        self.kept = self.states.iter().map(|state| if let State::Open(edges) = state { edges.len() } else { 0 }).sum();
+        if self.kept >= MOST_KEPT {
+            for channel in 0..self.states.len() {
+                self.pass(channel as u16, Some(PATIENCE));
+            }
+            self.kept = 0;
+        }
+        if first { self.replay(out) } else { Ok(()) }
+    }
+
+    /// The pair of channels that the user named.
+    fn said_pair(&self) -> Option<Found> {
+        let channels = self.candidates.pair()?;
+        let edges = |channel: u16| match self.states.get(usize::from(channel)) {
+            Some(State::Open(edges)) => Some(edges.as_slice()),
+            _ => None,
+        };
+        let [requests, answers] = channels;
+        self.candidates.read_pair(channels, [edges(requests)?, edges(answers)?])
+    }
+
+    /// Lines that are good enough; the last chance is that of the best one. Behind them the channels that only repeat
+    /// what is decoded.
+    fn choose(&self, all: Vec<Found>, last: bool) -> (Vec<Found>, Vec<Found>) {
+        let bit = |found: &Found| 1_000_000_000_000 / i64::from(found.speech.rate.max(1));
+        let again = |found: &Found| {
+            self.found.iter().any(|known| {
+                known.speech.protocol == found.speech.protocol
+                    && found.evidence.is_part_of(&known.evidence, 3 * bit(known))
+            })
+        };
+        let (passed, fresh): (Vec<Found>, Vec<Found>) = all.into_iter().partition(again);
+        let mut taken: Vec<Found> = fresh.iter().filter(|found| found.is_certain()).cloned().collect();
+        if taken.is_empty() && last {
+            let sure = self.candidates.is_asked_for();
+            taken.extend(fresh.into_iter().next().filter(|best| best.evidence.score >= LEAST || sure));
+        }
+        // The user named one channel: whatever it is, it is one line.
+        if self.named {
+            taken.truncate(1);
+        }
+        (taken, passed)
+    }
+
+    fn pass(&mut self, channel: u16, until: Option<u64>) {
+        if let Some(state) = self.states.get_mut(usize::from(channel)) {
+            if matches!(state, State::Open(_)) {
+                *state = State::Passed(until);
+            }
+        }
+    }
+
+    fn name(&self, tap: Tap) -> &'a str {
+        self.names.get(usize::from(tap.channel)).map_or("", String::as_str)
+    }
+
+    /// Decodes a line from now on, and what was kept of its channels.
+    fn take(&mut self, found: Found, out: &mut Output<'_>) -> io::Result<()> {
+        let Speech { protocol, rate } = found.speech;
+        let Some(decoder) = protocol.line_decoder(rate, self.settings()) else { return Ok(()) };
+        let index = self.lines.len();
+        let names: Vec<&str> = found.taps.iter().map(|tap| self.name(*tap)).collect();
+        let lane = Lane {
+            channel: names.join(" + "),
+            channels: found.taps.iter().map(|tap| tap.channel).collect(),
+            protocol,
+            rate,
+        };
+        out.note(&format!("{}: {}", self.file, report::found(&found, &names)));
+        out.begin_lane(lane)?;
+        self.lines.push(Running { wires: Wires::new(&found.taps), decoder });
+        let mut edges = Vec::new();
+        for tap in &found.taps {
+            if let Some(state) = self.states.get_mut(usize::from(tap.channel)) {
+                if let State::Open(kept) = std::mem::replace(state, State::Taken(index)) {
+                    edges.extend(kept.into_iter().map(|(time, level)| Change { time, channel: tap.channel, level }));
+                }
+            }
+        }
+        self.found.push(found);
+        if self.held.is_none() {
+            edges.sort_by_key(|change| change.time);
+            for change in edges {
+                self.give(index, change, out)?;
+            }
+        }
+        Ok(())
+    }
+
+    fn give(&mut self, line: usize, change: Change, out: &mut Output<'_>) -> io::Result<()> {
+        let Some(running) = self.lines.get_mut(line) else { return Ok(()) };
+        if let Some(level) = running.wires.change(change.channel, change.level) {
+            out.lane(line)?;
+            running.decoder.change(change.time, level, out)?;
+        }
+        Ok(())
+    }
+
+    /// Decodes what was held back for the first survey.
+    fn replay(&mut self, out: &mut Output<'_>) -> io::Result<()> {
+        let Some(held) = self.held.take() else { return Ok(()) };
+        out.channels(self.names)?;
+        let mut holes = std::mem::take(&mut self.holes).into_iter().peekable();
+        for (at, change) in held.into_iter().enumerate() {
+            while let Some((_, time)) = holes.next_if(|(before, _)| *before <= at) {
+                self.gap(time, out)?;
+            }
+            if out.wants_changes() {
+                out.change(&change)?;
+            }
+            if let Some(State::Taken(line)) = self.states.get(usize::from(change.channel)) {
+                self.give(*line, change, out)?;
+            }
+        }
+        Ok(())
+    }
+}

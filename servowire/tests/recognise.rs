@@ -1,0 +1,34 @@
+//! Random captures without a single option, under every condition of the table.
+//!
+//! A handful of captures each, so that it stays short; `cargo run --release -p servowire --example recognition-table`
+//! draws as many as one likes.
+
+#![allow(clippy::std_instead_of_core, clippy::unwrap_used)]
+
+mod random;
+
+use std::fmt::Write as _;
+
+use random::speech::Kind;
+use random::table::{CONDITIONS, row};
+
+/// Captures a condition and protocol.
+const CAPTURES: u32 = 6;
+
+#[test]
+fn random_captures_come_out_right() {
+    let (mut right, mut all) = (0, 0);
+    let mut faults = String::new();
+    for condition in CONDITIONS {
+        for kind in Kind::ALL {
+            let row = row(condition, kind, CAPTURES);
+            right += row.right;
+            all += row.captures;
+            assert_eq!(row.wrong, 0, "{} {}: values that were never sent", condition.name, kind.name());
+            if let Some((seed, why, notes)) = row.first {
+                writeln!(faults, "{} {}, seed {seed}: {why}\n{notes}", condition.name, kind.name()).unwrap();
+            }
+        }
+    }
+    assert!(100 * right >= 98 * all, "{right} of {all} are right\n{faults}");
+}

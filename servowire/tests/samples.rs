@@ -1,0 +1,49 @@
+//! The same capture in every format, written by other programs or by hand.
+#![allow(clippy::unwrap_used, clippy::indexing_slicing, clippy::std_instead_of_core)]
+
+mod common;
+
+use std::path::PathBuf;
+
+fn sample(name: &str) -> PathBuf {
+    PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("tests/samples").join(name)
+}
+
+/// Positions of the seven answers of `captures/hpm-uart-readme.vcd`.
+fn positions(run: &common::Run) -> Vec<i64> {
+    run.json().iter().filter_map(|event| event["fields"]["ABS"].as_i64()).collect()
+}
+
+#[test]
+fn one_capture_in_every_format() {
+    let plain =
+        common::decode(&PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("captures/hpm-uart-readme.vcd"), &["--json"]);
+    plain.is_good();
+    let want = positions(&plain);
+    assert_eq!(want.len(), 7);
+    for name in [
+        "hpm-uart-100M.sr",
+        "hpm-uart-sigrok-dedup.csv",
+        "hpm-uart-wrapped.fst",
+        "hpm-uart.fst",
+        "hpm-uart.vcd.gz",
+        "hpm-uart.vcd.zst",
+        "synthetic-dsview-v3.dsl",
+        "synthetic-logic2-iso.csv",
+        "synthetic-logic2-v0.bin",
+        "synthetic-logic2-v1.bin",
+        "synthetic-logic2.csv",
+    ] {
+        let run = common::decode(&sample(name), &["--json"]);
+        assert_eq!((run.code, positions(&run)), (0, want.clone()), "{name}: {}", run.err);
+    }
+}
+
+/// Eight channels of which three were recorded, at 1 MHz: read, and too slow for what is known.
+#[test]
+fn channels_of_a_sigrok_session() {
+    for name in ["demo-3of4.bits", "demo-3of4.csv", "demo-3of4.hex", "demo-3of4.vcd", "demo-3of4-time.csv"] {
+        common::decode(&sample(name), &[]).fails_with("channel \"D2\" runs at about 1.00 Mbit/s");
+    }
+    common::decode(&sample("demo-3of4.sr"), &["--channel", "D1"]).fails_with("samples a bit are too few");
+}

@@ -1,0 +1,82 @@
+use crate::crc::RunningFcs;
+use crate::error::Error;
+use crate::frame::{MULTICAST, check};
+use crate::frame_type::FrameType;
+use crate::status::Status;
+
+/// A frame that passes byte by byte: how far it is, its head, and its check. Twelve bytes of state.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub(crate) struct Transit {
+    /// Bytes so far.
+    at: u16,
+    /// DA, SA, TYPE and STATUS as they came.
+    head: [u8; 4],
+    /// Over all bytes, the FCS too.
+    received: RunningFcs,
+    /// The last four bytes.
+    trailer: u32,
+}
+
+impl Transit {
+    pub(crate) const START: Self = Self { at: 0, head: [0; 4], received: RunningFcs::START, trailer: 0 };
+
+    /// Takes a byte and gives its place in the frame.
+    #[inline]
+    pub(crate) fn take(&mut self, byte: u8) -> u16 {
+        let at = self.at;
+        self.at = at.saturating_add(1);
+        self.received.push(byte);
+        self.trailer = self.trailer >> 8 | u32::from(byte) << 24;
+        if let Some(place) = self.head.get_mut(usize::from(at)) {
+            *place = byte;
+        }
+        at
+    }
+
+    /// Bytes so far.
+    pub(crate) const fn len(&self) -> u16 {
+        self.at
+    }
+
+    /// DA, SA, TYPE and STATUS as they came, once four bytes are there.
+    pub(crate) const fn head(&self) -> [u8; 4] {
+        self.head
+    }
+
+    pub(crate) const fn source(&self) -> u8 {
+        let [_, source, ..] = self.head;
+        source
+    }
+
+    pub(crate) const fn status(&self) -> Status {
+        let [.., status] = self.head;
+        Status::from_bits_retain(status)
+    }
+
+    /// Whether DA and TYPE are such that a device rewrites the frame. Known with the third byte.
+    pub(crate) const fn is_for_all(&self, frame_type: FrameType) -> bool {
+        let [da, _, code, _] = self.head;
+        da == MULTICAST && code == frame_type.code()
+    }
+
+    /// Whether the last four bytes are the FCS of those before.
+    #[inline]
+    pub(crate) const fn is_whole(&self) -> bool {
+        self.received.is_whole()
+    }
+
+    /// The checks of [`LongFrame::new`](crate::frame::LongFrame::new), made by the same function.
+    pub(crate) fn check(&self) -> Result<FrameType, Error> {
+        let want = if self.is_whole() { self.trailer } else { self.received.before(self.trailer) };
+        check(self.at.into(), self.head, self.trailer, want)
+    }
+
+    /// The same for a frame that must be of this type.
+    pub(crate) fn check_type(&self, want: FrameType) -> Result<(), Error> {
+        match self.check()? {
+            got if got == want => Ok(()),
+            got => Err(Error::UnexpectedType { got: got.code(), want: want.code() }),
+        }
+    }
+}

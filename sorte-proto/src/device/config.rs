@@ -1,0 +1,80 @@
+//! Settings and counters of a device.
+
+use crate::builders::builders;
+use crate::clock::AVERAGE;
+use crate::discovery::Entry;
+use crate::line_delay::DelayModel;
+
+/// What a device is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[non_exhaustive]
+pub struct Config {
+    /// Its process data.
+    pub lengths: Entry,
+    /// Output bytes of the master frame; `None`: as many as DISCOVERY counted.
+    pub output_len: Option<u16>,
+    /// Start of its own frame in ns of the common time; `None`: as published, by its address.
+    pub send_time_ns: Option<u32>,
+    /// Spacing of the device frames at the master in ns: the own frame starts 500 ns and so many slots into the cycle, less
+    /// the way to the master. `None`: as published, or as [`send_time_ns`](Self::send_time_ns) says. 880 fits 3 payload bytes
+    /// and cables of up to 525 ns.
+    pub slot_ns: Option<u32>,
+    /// How the line to the next device is measured.
+    pub delay_model: DelayModel,
+    /// Frames that a correction of the clock is made from, see [`Clock::averaging`](crate::Clock::averaging).
+    pub clock_average: u8,
+    /// Cycle starts without a frame that a device in IO exchange bears.
+    pub missed_frames: u8,
+    /// How long a start-up state waits for its frame, in ns.
+    pub start_up_timeout_ns: u64,
+}
+
+impl Config {
+    /// The reference design's; the start-up time-out is this crate's, the published device has none.
+    pub const fn new() -> Self {
+        Self {
+            lengths: Entry::STOCK,
+            output_len: Some(16),
+            send_time_ns: None,
+            slot_ns: None,
+            delay_model: DelayModel::DEVICE,
+            clock_average: AVERAGE,
+            missed_frames: 5,
+            start_up_timeout_ns: 20_000_000,
+        }
+    }
+    builders! {
+        with_lengths lengths: Entry,
+        with_output_len output_len: Option<u16>,
+        with_send_time_ns send_time_ns: Option<u32>,
+        with_slot_ns slot_ns: Option<u32>,
+        with_delay_model delay_model: DelayModel,
+        with_clock_average clock_average: u8,
+        with_missed_frames missed_frames: u8,
+        with_start_up_timeout_ns start_up_timeout_ns: u64,
+    }
+}
+
+impl Default for Config {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+/// What a device counts.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[non_exhaustive]
+pub struct Counters {
+    /// Frames that were good.
+    pub good_frames: u64,
+    /// Frames with a wrong checksum.
+    pub crc_errors: u64,
+    /// Frames refused for another reason.
+    pub format_errors: u64,
+    /// How often it went back to IDLE.
+    pub retrains: u64,
+}

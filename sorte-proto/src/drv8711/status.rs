@@ -1,0 +1,84 @@
+//! The STATUS register.
+
+use crate::flags::show_flags;
+
+/// STATUS: faults, with the data sheet's names. It is payload byte 0 of the device frame.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "arbitrary", derive(arbitrary::Arbitrary))]
+pub struct Status(u8);
+
+bitflags::bitflags! {
+    impl Status: u8 {
+        /// Overtemperature shutdown: too hot.
+        const OTS = 1 << 0;
+        /// Over-current in bridge A.
+        const AOCP = 1 << 1;
+        /// Over-current in bridge B.
+        const BOCP = 1 << 2;
+        /// Predriver fault in bridge A.
+        const APDF = 1 << 3;
+        /// Predriver fault in bridge B.
+        const BPDF = 1 << 4;
+        /// Undervoltage lockout: supply too low.
+        const UVLO = 1 << 5;
+        /// Stall.
+        const STD = 1 << 6;
+        /// Stall, latched.
+        const STDLAT = 1 << 7;
+    }
+}
+
+show_flags!(Status);
+
+impl Status {
+    /// The six faults; the stall bits are none.
+    pub const FAULTS: Self = Self(0x3f);
+    /// The value that clears the six fault bits and leaves the stall bits: writing 0 clears.
+    pub const CLEAR_FAULTS: u16 = 0xfc0;
+    /// The value that clears all bits.
+    pub const CLEAR_ALL: u16 = 0;
+
+    /// From the register's value; its upper four bits are reserved and left out.
+    pub const fn of_register(value: u16) -> Self {
+        let [_, low] = value.to_be_bytes();
+        Self(low)
+    }
+
+    /// Whether one of the six faults is set.
+    pub const fn is_fault(self) -> bool {
+        self.intersects(Self::FAULTS)
+    }
+
+    /// All ones: with the fault pin inactive, the chip has no supply. Reading back OFF tells a dead bus.
+    pub const fn looks_unpowered(self) -> bool {
+        self.is_all()
+    }
+
+    /// The value that clears exactly the bits that are set here.
+    pub const fn clear_these(self) -> u16 {
+        !(self.0 as u16) & 0xfff
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::string::ToString;
+
+    #[test]
+    fn every_status_byte_has_its_bits() {
+        for byte in 0..=u8::MAX {
+            let status = Status::from_bits_retain(byte);
+            for high in 0..16 {
+                assert_eq!(Status::of_register(high << 8 | u16::from(byte)), status);
+            }
+            assert_eq!(status.is_fault(), byte & 0x3f != 0);
+            assert_eq!(status.looks_unpowered(), byte == 0xff);
+            // Writing 0 clears: what is left are the bits that were not set.
+            assert_eq!(u16::from(byte) & status.clear_these(), 0);
+        }
+        assert_eq!(Status::CLEAR_FAULTS & 0x3f, 0);
+        assert_eq!((Status::OTS | Status::UVLO | Status::STDLAT).to_string(), "OTS UVLO STDLAT");
+    }
+}

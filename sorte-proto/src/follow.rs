@@ -1,0 +1,276 @@
+//! Motion that survives lost frames. **An extension of this crate, not TI's.**
+//!
+//! The published device does the previous cycle's step again when a frame is lost, and nobody ever knows. Here the command
+//! word of each [`Slice`], which the reference design leaves free, carries the position that the axis has after the step
+//! of this word, modulo 2^16. A device that missed a frame sees how far it is behind and catches up in cycles that have no
+//! step of their own; if it is too far behind it stops. The reserved bytes of its device frame tell the master how many
+//! steps it has made.
+//!
+//! ```text
+//!  Slice         byte 0..2  PTO             byte 2..4  position after it, LSB first
+//!  device frame  byte 0     DRV8711 STATUS  byte 1..3  position of the device, LSB first
+//! ```
+//!
+//! Position counts up with DIR 0 and down with DIR 1.
+//!
+//! ```
+//! use sorte_proto::follow::{Asked, Follower};
+//! use sorte_proto::{Direction, Pto};
+//! let (mut axis, mut device) = (Asked::new(), Follower::new(128));
+//! let step = Pto::from_step(500, Direction::Low)?;
+//! let rest = Pto::default();
+//! device.next(Some(axis.slice(rest))); // both agree on the position
+//! axis.slice(step); // this frame is lost
+//! device.next(None);
+//! assert_eq!(device.next(Some(axis.slice(rest))).start().map(|start| start.ns()), Some(1)); // caught up
+//! assert_eq!(axis.lag(device.position()), 0);
+//! # Ok::<(), sorte_proto::OutOfRange>(())
+//! ```
+
+use crate::drv8711::Status;
+use crate::payload::Slice;
+use crate::pto::{Direction, Pto, StartTime};
+
+/// Steps of a word: 1, -1 or 0.
+const fn step(word: Pto) -> i16 {
+    match word {
+        Pto::Pulse { direction: Direction::Low, .. } => 1,
+        Pto::Pulse { direction: Direction::High, .. } => -1,
+        _ => 0,
+    }
+}
+
+/// The master's end: what one axis was asked for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct Asked {
+    position: i64,
+}
+
+impl Asked {
+    /// At 0.
+    pub const fn new() -> Self {
+        Self { position: 0 }
+    }
+
+    /// The word with the position that it leads to.
+    pub const fn slice(&mut self, word: Pto) -> Slice {
+        self.position = self.position.saturating_add(step(word) as i64);
+        let [low, high, ..] = self.position.to_le_bytes();
+        Slice { pto: word, command: u16::from_le_bytes([low, high]) }
+    }
+
+    /// Steps asked for so far, backward ones negative.
+    pub const fn position(&self) -> i64 {
+        self.position
+    }
+
+    /// How many steps a device at `position` has still to make. Words that are on their way count too: two cycles with the
+    /// published timing.
+    pub const fn lag(&self, position: u16) -> i16 {
+        let [low, high, ..] = self.position.to_le_bytes();
+        difference(u16::from_le_bytes([low, high]), position)
+    }
+}
+
+/// The way from `from` to `to` modulo 2^16, the shorter one.
+const fn difference(to: u16, from: u16) -> i16 {
+    i16::from_le_bytes(to.wrapping_sub(from).to_le_bytes())
+}
+
+/// The device's end.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Follower {
+    /// Steps ordered; unknown until the first word.
+    position: Option<u16>,
+    asked: u16,
+    direction: Direction,
+    /// The cycle before had no pulse.
+    quiet: bool,
+    stopped: bool,
+    max_lag: u16,
+}
+
+impl Follower {
+    /// `max_lag`: steps behind the master beyond which the axis stops. 128 is half a full step at 1/256.
+    pub const fn new(max_lag: u16) -> Self {
+        Self { position: None, asked: 0, direction: Direction::Low, quiet: false, stopped: false, max_lag }
+    }
+
+    /// What the axis does in the next cycle. `slice`: the device's bytes of a good frame; `None` if none came. The first
+    /// one only tells where the axis is.
+    pub fn next(&mut self, slice: Option<Slice>) -> Pto {
+        let word = self.word(slice);
+        self.quiet = word.start().is_none();
+        self.position = self.position.map(|position| position.wrapping_add_signed(step(word)));
+        word
+    }
+
+    fn word(&mut self, slice: Option<Slice>) -> Pto {
+        let Some(Slice { pto, command }) = slice else {
+            // Nothing is known of this cycle. The next word tells what is missing.
+            return Pto::NoPulse { direction: self.direction };
+        };
+        self.direction = pto.direction().unwrap_or(self.direction);
+        self.asked = command;
+        let position = *self.position.get_or_insert(command.wrapping_add_signed(step(pto).wrapping_neg()));
+        let lag = difference(command, position);
+        self.stopped |= lag.unsigned_abs() > self.max_lag;
+        let rest = Pto::NoPulse { direction: self.direction };
+        match pto {
+            Pto::DriverOff => pto,
+            _ if self.stopped => rest,
+            // A step back of one that was never made: both are left out.
+            Pto::Pulse { .. } if lag.signum() == step(pto) => pto,
+            Pto::Pulse { .. } => rest,
+            // A pulse at the start of this cycle is 4 us and more after any of the cycle before the last, and 4 us and
+            // more before any of the next.
+            _ if lag != 0 && self.quiet => Pto::Pulse { start: StartTime::MIN, direction: (lag < 0).into() },
+            _ => rest,
+        }
+    }
+
+    /// Steps made, modulo 2^16: what the device tells the master.
+    pub const fn position(&self) -> u16 {
+        match self.position {
+            Some(position) => position,
+            None => 0,
+        }
+    }
+
+    /// Steps that are missing, as far as the last good frame told.
+    pub const fn lag(&self) -> i16 {
+        match self.position {
+            Some(position) => difference(self.asked, position),
+            None => 0,
+        }
+    }
+
+    /// Whether the axis was so far behind that it has stopped. It starts again with [`resume`](Self::resume).
+    pub const fn is_stopped(&self) -> bool {
+        self.stopped
+    }
+
+    /// The host has dealt with the loss: the next word tells anew where the axis is.
+    pub const fn resume(&mut self) {
+        (self.stopped, self.position) = (false, None);
+    }
+}
+
+/// Payload of a device frame: status of the driver, and the device's position.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct Feedback {
+    /// The driver's STATUS.
+    pub status: Status,
+    /// Steps made, modulo 2^16. The reference design sends 0.
+    pub position: u16,
+}
+
+impl Feedback {
+    /// Length in bytes.
+    pub const LEN: usize = 3;
+
+    /// Any three bytes are a feedback.
+    pub const fn parse([status, low, high]: [u8; Self::LEN]) -> Self {
+        Self { status: Status::from_bits_retain(status), position: u16::from_le_bytes([low, high]) }
+    }
+
+    /// The bytes in wire order.
+    pub const fn emit(self) -> [u8; Self::LEN] {
+        let [low, high] = self.position.to_le_bytes();
+        [self.status.bits(), low, high]
+    }
+}
+
+impl core::fmt::Display for Feedback {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        write!(f, "position {}, DRV8711 {}", self.position, self.status)
+    }
+}
+
+#[cfg(test)]
+#[allow(clippy::cast_sign_loss)]
+mod tests {
+    use proptest::prelude::*;
+    use std::vec::Vec;
+
+    use super::*;
+
+    fn word(kind: u8) -> Pto {
+        match kind {
+            0 => Pto::from_step(1000, Direction::Low).unwrap(),
+            1 => Pto::from_step(3990, Direction::High).unwrap(),
+            2 => Pto::NoPulse { direction: Direction::High },
+            _ => Pto::NoPulse { direction: Direction::Low },
+        }
+    }
+
+    #[test]
+    fn any_three_bytes_give_themselves_back() {
+        for n in 0..=u16::MAX {
+            let [low, high] = n.to_le_bytes();
+            let bytes = [high ^ low, low, high];
+            assert_eq!(Feedback::parse(bytes).emit(), bytes);
+        }
+    }
+
+    #[test]
+    fn too_far_behind_it_stops_and_stays() {
+        let (mut asked, mut device) = (Asked::new(), Follower::new(5));
+        device.next(Some(asked.slice(word(3))));
+        for _ in 0..5 {
+            asked.slice(word(0));
+        }
+        assert!(device.next(Some(asked.slice(word(3)))).start().is_some());
+        assert!(!device.is_stopped() && device.lag() == 4);
+        asked.slice(word(0));
+        asked.slice(word(0));
+        for _ in 0..10 {
+            assert_eq!(device.next(Some(asked.slice(word(3)))), word(3));
+            assert!(device.is_stopped());
+        }
+        assert_eq!((device.position(), asked.position()), (1, 7));
+        device.resume();
+        device.next(Some(asked.slice(word(3))));
+        assert_eq!((device.position(), device.lag(), device.is_stopped()), (7, 0, false));
+    }
+
+    proptest! {
+        /// Whatever is lost: nothing is made twice, steps stay 4 us apart, and after some rest all are made.
+        #[test]
+        fn every_step_is_made_in_the_end(cycles in proptest::collection::vec((0u8..6, any::<bool>()), 0..200), start: u16) {
+            let mut asked = Asked { position: start.into() };
+            let mut device = Follower::new(300);
+            let mut made = i64::from(start);
+            let mut rises: Vec<u64> = Vec::new();
+            let rest = (0..500).map(|_| (4, false));
+            device.next(Some(asked.slice(word(3))));
+            for (cycle, (kind, lost)) in cycles.into_iter().chain(rest).enumerate() {
+                // Steps of a legal program: not after a later one in the cycle before.
+                let slice = asked.slice(word(kind));
+                let done = device.next((!lost).then_some(slice));
+                made += i64::from(step(done));
+                rises.extend(done.start().map(|s| cycle as u64 * 4000 + u64::from(s.ns())));
+                prop_assert_eq!(device.position(), made as u16);
+                prop_assert!(lost || device.lag() == difference(asked.position as u16, made as u16));
+            }
+            prop_assert_eq!((made, device.lag(), device.is_stopped()), (asked.position(), 0, false));
+            // The words themselves may follow a 3990 with a 1000; a step that is caught up never comes too close.
+            prop_assert!(rises.windows(2).all(|pair| pair[1] - pair[0] >= 4000 || pair[0] % 4000 == 3990));
+        }
+
+        #[test]
+        fn without_losses_every_word_is_done_as_it_is(kinds in proptest::collection::vec(0u8..6, 1..100)) {
+            let (mut asked, mut device) = (Asked::new(), Follower::new(1));
+            for kind in kinds {
+                let pto = word(kind);
+                prop_assert_eq!(device.next(Some(asked.slice(pto))), pto);
+                prop_assert_eq!(asked.lag(device.position()), 0);
+            }
+        }
+    }
+}

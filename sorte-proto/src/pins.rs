@@ -1,0 +1,72 @@
+//! DIR and the driver's enable: when they may follow a word.
+
+use crate::pto::{Direction, Pto};
+
+/// STEP edge to a change of DIR, and a change of DIR to the next STEP edge, at least: set-up and hold time of the DRV8711
+/// in ns.
+pub const DIR_SETUP_HOLD_NS: u64 = 200;
+
+/// What the pins carry.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct Levels {
+    /// DIR.
+    pub direction: Direction,
+    /// Whether the motor driver is on.
+    pub enabled: bool,
+}
+
+/// DIR and enable of an axis, beside its [`Sync0`](crate::sync0::Sync0).
+///
+/// A word is about the next cycle, and so are its DIR and its enable. If a pulse is still programmed when CMP7 takes the
+/// word, the pins follow at the end of that pulse, in the CMP6 handler: 2000 ns and more after its rise, and with steps
+/// 4000 ns apart 1380 ns and more before the next one. Otherwise they follow at once, before the earliest pulse of the
+/// next cycle by 1380 ns and more. Both are far beyond the 200 ns of set-up and hold time that the driver asks for, at
+/// every latency up to [`MAX_LATENCY_NS`](crate::sync0::MAX_LATENCY_NS). (A change at the wrap, or at a fixed time, is not
+/// safe: a pulse that begins 3960 ns into the cycle leaves 40 ns.)
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Pins {
+    now: Levels,
+    next: Levels,
+}
+
+impl Pins {
+    /// DIR low, driver on.
+    pub const fn new() -> Self {
+        let levels = Levels { direction: Direction::Low, enabled: true };
+        Self { now: levels, next: levels }
+    }
+
+    /// What the pins carry now.
+    pub const fn levels(&self) -> Levels {
+        self.now
+    }
+
+    /// CMP7 has taken a word. `pulse_pending`: [`PENDING_PULSE`](crate::sync0::Flags::PENDING_PULSE) as it was before
+    /// this event. Gives the levels to write, if they change.
+    pub fn cmp7(&mut self, word: Pto, pulse_pending: bool) -> Option<Levels> {
+        // A driver-off word holds DIR.
+        let direction = word.direction().unwrap_or(self.next.direction);
+        self.next = Levels { direction, enabled: word.driver_enabled() };
+        if pulse_pending { None } else { self.follow() }
+    }
+
+    /// The pulse is over. Gives the levels to write, if they change.
+    pub fn cmp6(&mut self) -> Option<Levels> {
+        self.follow()
+    }
+
+    fn follow(&mut self) -> Option<Levels> {
+        let changed = self.now != self.next;
+        self.now = self.next;
+        changed.then_some(self.now)
+    }
+}
+
+impl Default for Pins {
+    fn default() -> Self {
+        Self::new()
+    }
+}

@@ -1,0 +1,153 @@
+//! A whole H-frame of a running link, mean and worst of 4,000: what a processor has to do between an answer and the next
+//! head. A short and a long message are started every 100 frames, 1.2 ms.
+
+use core::hint::black_box;
+
+use hdsl::cable::{Cable, Disturbance};
+use hdsl::device::Device;
+use hdsl::master::{Master, Report, State};
+use hdsl::message::{LongRequest, RemoteRegister, ResourceAddress, ShortRequest};
+use hdsl::registers::{Interrupts, Registers};
+use hdsl::sampling::WINDOW;
+use hdsl::{Dialect, EncoderId, Window};
+
+use super::Kernel;
+use crate::count;
+
+const FRAMES: u32 = 4000;
+
+/// Both ends on a cable.
+struct Link {
+    master: Master,
+    map: Registers,
+    encoder: Device,
+    cable: Cable,
+    position: u64,
+    count: u32,
+}
+
+/// What a kernel does with an H-frame; `bits` are those of the answer.
+type Step = fn(&mut Link, samples: &[u8; WINDOW], bits: u64) -> Window;
+
+impl Link {
+    fn up(dialect: Dialect) -> Self {
+        let mut link = Self {
+            master: Master::new(dialect),
+            map: Registers::new(&dialect),
+            encoder: Device::new(EncoderId::truncate(0x00153)),
+            cable: Cable::new(Disturbance { jitter: 1, ..Disturbance::metres(10) }, 1),
+            position: 0,
+            count: 0,
+        };
+        for _ in 0..200 {
+            link.frame(hdsl_frame);
+        }
+        link
+    }
+
+    /// One H-frame, and the instructions of the receiver.
+    fn frame(&mut self, step: Step) -> u32 {
+        self.position = self.position.wrapping_add(77);
+        self.count = self.count.wrapping_add(1);
+        if self.count % 100 == 0 && self.master.state() == State::Running {
+            let _ = self.master.start_short(ShortRequest::Read(RemoteRegister::PING));
+            let _ = self.master.start_long(LongRequest::read_name(ResourceAddress::RESOLUTN));
+        }
+        let answer = self.encoder.answer(self.master.transmission().head.bits(), self.position);
+        let samples = self.cable.up(answer);
+        count::once(|| {
+            black_box(step(self, black_box(&samples), answer.unwrap_or(0)));
+        })
+    }
+}
+
+/// Samples to the next head.
+#[expect(unsafe_code, reason = "the symbol is how run.sh finds the kernel")]
+#[inline(never)]
+#[unsafe(no_mangle)]
+fn hdsl_frame(link: &mut Link, samples: &[u8; WINDOW], _: u64) -> Window {
+    let _ = link.master.finish(samples, None);
+    link.master.transmission().head.bits()
+}
+
+/// 61 bits to the next head.
+#[expect(unsafe_code, reason = "the symbol is how run.sh finds the kernel")]
+#[inline(never)]
+#[unsafe(no_mangle)]
+fn hdsl_frame_bits(link: &mut Link, _: &[u8; WINDOW], bits: u64) -> Window {
+    let _ = link.master.finish_bits(bits, None, None);
+    link.master.transmission().head.bits()
+}
+
+/// The register map, from the report.
+#[expect(unsafe_code, reason = "the symbol is how run.sh finds the kernel")]
+#[inline(never)]
+#[unsafe(no_mangle)]
+fn hdsl_frame_registers(map: &mut Registers, report: &Report) -> Interrupts {
+    map.apply(report)
+}
+
+/// No work: what the measurement itself takes.
+fn nothing(_: &mut Link, _: &[u8; WINDOW], _: u64) -> Window {
+    Window::EMPTY
+}
+
+/// Mean, in tenths, and worst of all frames.
+fn measure(dialect: Dialect, step: Step) -> (u32, u32) {
+    let mut link = Link::up(dialect);
+    // Without the receiver the link stands still; the answers are as long.
+    let mut idle = Link::up(dialect);
+    let empty = (0..FRAMES).fold(0, |sum: u32, _| sum + idle.frame(nothing)) / FRAMES;
+    let (mut sum, mut worst) = (0, 0);
+    for _ in 0..FRAMES {
+        let one = link.frame(step);
+        sum += one;
+        worst = worst.max(one);
+    }
+    ((sum / (FRAMES / 10)).saturating_sub(empty * 10), worst.saturating_sub(empty))
+}
+
+/// A frame with the register map beside it; the map alone is what is more.
+fn with_registers(link: &mut Link, samples: &[u8; WINDOW], _: u64) -> Window {
+    let _ = link.master.finish(samples, None);
+    hdsl_frame_registers(&mut link.map, link.master.report());
+    link.master.transmission().head.bits()
+}
+
+macro_rules! worst {
+    ($($name:ident = $step:expr, $dialect:expr;)*) => {
+        $(
+            #[expect(unsafe_code, reason = "the symbol is how run.sh finds the kernel")]
+            #[inline(never)]
+            #[unsafe(no_mangle)]
+            fn $name() -> u32 {
+                measure($dialect, $step).1 * 10
+            }
+        )*
+    };
+}
+
+worst! {
+    hdsl_frame_worst = hdsl_frame, Dialect::SICK;
+    hdsl_frame_bits_worst = hdsl_frame_bits, Dialect::SICK;
+}
+
+/// The TI dialect, samples to the next head.
+#[expect(unsafe_code, reason = "the symbol is how run.sh finds the kernel")]
+#[inline(never)]
+#[unsafe(no_mangle)]
+fn hdsl_frame_ti() -> u32 {
+    measure(Dialect::TI, hdsl_frame).0
+}
+
+pub(crate) const KERNELS: &[Kernel] = &[
+    Kernel { name: "hdsl_frame", tenths: || measure(Dialect::SICK, hdsl_frame).0 },
+    Kernel { name: "hdsl_frame_worst", tenths: hdsl_frame_worst },
+    Kernel { name: "hdsl_frame_bits", tenths: || measure(Dialect::SICK, hdsl_frame_bits).0 },
+    Kernel { name: "hdsl_frame_bits_worst", tenths: hdsl_frame_bits_worst },
+    Kernel {
+        name: "hdsl_frame_registers",
+        tenths: || measure(Dialect::SICK, with_registers).0.saturating_sub(measure(Dialect::SICK, hdsl_frame).0),
+    },
+    Kernel { name: "hdsl_frame_ti", tenths: hdsl_frame_ti },
+];

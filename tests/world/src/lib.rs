@@ -1,0 +1,28 @@
+#![doc = include_str!("../README.md")]
+#![allow(
+    clippy::arithmetic_side_effects,
+    clippy::cast_possible_truncation,
+    clippy::indexing_slicing,
+    clippy::std_instead_of_core
+)]
+
+mod bits;
+mod cable;
+mod fault;
+mod host;
+mod layout;
+mod scenario;
+mod tally;
+mod truth;
+mod world;
+
+pub use bits::{Bits, Framing, Message};
+pub use cable::{Arrival, Cable};
+pub use fault::{Fault, Kind, Planned, Rates, Script};
+pub use host::{Delivery, Host, Stamp};
+pub use scenario::Scenario;
+#[cfg(feature = "proptest")]
+pub use scenario::strategy::{faults, scenarios};
+pub use tally::Tally;
+pub use truth::{Act, Handed, Id, Origin, Speaker, Transmission, Truth, Verdict};
+pub use world::{Block, Event, Unit, Wire, World};

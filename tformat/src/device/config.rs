@@ -1,0 +1,138 @@
+/// What the time between two reset requests is counted from. No document says which.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "arbitrary", derive(arbitrary::Arbitrary))]
+pub enum Interval {
+    /// From the start of one request to the start of the next.
+    #[default]
+    StartToStart,
+    /// From the end of a response to the start of the next request.
+    EndToStart,
+}
+
+/// What becomes of a write to the page register with the number of a page that is not there.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "arbitrary", derive(arbitrary::Arbitrary))]
+pub enum AbsentPage {
+    /// The page stays as it is.
+    #[default]
+    Ignored,
+    /// The number is taken modulo the number of pages.
+    Wrapped,
+}
+
+/// The data byte of a read while the memory is busy.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "arbitrary", derive(arbitrary::Arbitrary))]
+pub enum BusyData {
+    /// 0x00.
+    #[default]
+    Zeros,
+    /// 0xff.
+    Ones,
+    /// What the cell holds.
+    Cell,
+}
+
+/// The points that no document decides, and the answer delay. The defaults are those of the reference vectors.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "arbitrary", derive(arbitrary::Arbitrary))]
+#[non_exhaustive]
+pub struct Config {
+    /// From the end of the request to the start bit of the response, in ns. Default 3 000; 3 200 was logged.
+    pub response_delay_ns: u32,
+    /// What the 40 us between two resets are counted from.
+    pub reset_interval: Interval,
+    /// Whether another request starts the count of resets again.
+    pub others_restart_count: bool,
+    /// Whether a damaged request starts the count of resets again.
+    pub damage_restarts_count: bool,
+    /// Whether the response to the tenth reset shows its effect, or only the one after.
+    pub tenth_shows_effect: bool,
+    /// Whether the encoder is silent for 18 ms while it stores a single-turn zero.
+    pub silent_while_storing: bool,
+    /// Whether selecting a page keeps the memory busy like any write.
+    pub page_select_is_busy: bool,
+    /// Pages that are not there.
+    pub absent_page: AbsentPage,
+    /// Data of reads while the memory is busy.
+    pub busy_data: BusyData,
+    /// Whether a request with a wrong sink code is answered with ID 3.
+    pub answers_wrong_sink: bool,
+    /// Whether a request with a delimiter error is answered with ID 3.
+    pub answers_delimiter_error: bool,
+    /// Whether SF is always 0, as in some compatible encoders.
+    pub leaves_status_zero: bool,
+}
+
+impl Config {
+    /// As [`Default`].
+    pub const fn new() -> Self {
+        Self {
+            response_delay_ns: 3_000,
+            reset_interval: Interval::StartToStart,
+            others_restart_count: true,
+            damage_restarts_count: true,
+            tenth_shows_effect: false,
+            silent_while_storing: false,
+            page_select_is_busy: false,
+            absent_page: AbsentPage::Ignored,
+            busy_data: BusyData::Zeros,
+            answers_wrong_sink: false,
+            answers_delimiter_error: true,
+            leaves_status_zero: false,
+        }
+    }
+
+    /// The combination with this number, for tests that walk them all: each bit is one switch, above bit 9 comes the
+    /// answer delay (3.0, 3.2, 1.7 or 9 us).
+    pub const fn numbered(number: u16) -> Self {
+        const fn bit(number: u16, at: u32) -> bool {
+            number >> at & 1 == 1
+        }
+        Self {
+            reset_interval: if bit(number, 0) { Interval::EndToStart } else { Interval::StartToStart },
+            others_restart_count: !bit(number, 1),
+            damage_restarts_count: !bit(number, 2),
+            tenth_shows_effect: bit(number, 3),
+            silent_while_storing: bit(number, 4),
+            page_select_is_busy: bit(number, 5),
+            absent_page: if bit(number, 6) { AbsentPage::Wrapped } else { AbsentPage::Ignored },
+            busy_data: match (bit(number, 7), bit(number, 8)) {
+                (false, _) => BusyData::Zeros,
+                (true, false) => BusyData::Ones,
+                (true, true) => BusyData::Cell,
+            },
+            answers_wrong_sink: bit(number, 9),
+            answers_delimiter_error: !bit(number, 9),
+            leaves_status_zero: bit(number, 8),
+            response_delay_ns: match number >> 10 & 3 {
+                0 => 3_000,
+                1 => 3_200,
+                2 => 1_700,
+                _ => 9_000,
+            },
+        }
+    }
+
+    /// Combinations that [`numbered`](Self::numbered) gives.
+    pub const NUMBERED: u16 = 1 << 12;
+
+    /// With another delay of the response.
+    pub const fn with_response_delay(self, ns: u32) -> Self {
+        Self { response_delay_ns: ns, ..self }
+    }
+}
+
+impl Default for Config {
+    fn default() -> Self {
+        Self::new()
+    }
+}

@@ -1,0 +1,96 @@
+use crate::timing::BitRate;
+
+/// How a controller is connected, and how long it waits.
+///
+/// The defaults are numbers of the drivers and logs that are known; see each field.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[non_exhaustive]
+pub struct Line {
+    /// Bit rate.
+    pub rate: BitRate,
+    /// A hint that the receiver is on while the request is sent. It only names failures better: an echo is known by its
+    /// time and its content, whatever is said here.
+    pub echo: bool,
+    /// Longest wait from the end of the request to the *start bit* of the response, in ns. Default 10 000: the nominal
+    /// 3 us, 1 us for 100 m of cable, and margin.
+    pub response_timeout_ns: u32,
+    /// Longest time from the end of one field to the end of the next, in ns. Default one and a half field times.
+    pub field_timeout_ns: u32,
+    /// Shortest time from the end of the request to the start bit of the response, in ns: what begins earlier is no
+    /// response. Default four bits (1.6 or 0.8 us), for which a driver in use keeps the line driven after its request.
+    pub turn_around_ns: u32,
+    /// Longest time from the end of a byte on the line to its hand-over to the master, in ns: the latency of the
+    /// interrupt, or the size of a DMA block and the time after which idle line is reported. Default the
+    /// [latency budget](Self::latency_budget_ns).
+    pub hand_over_ns: u32,
+    /// Time for which the driver is on before the start bit of the request, in ns. Default 1 000, the least that one
+    /// driver asks for; TI's design does with one bit.
+    pub driver_lead_ns: u32,
+    /// From the end of the request to the instant at which the encoder takes the position, in ns. No document says when
+    /// that is; default 480, the instant that one driver assumes.
+    pub sampling_ns: u32,
+}
+
+impl Line {
+    /// A line without echo and with the default times.
+    pub const fn new(rate: BitRate) -> Self {
+        let line = Self {
+            rate,
+            echo: false,
+            response_timeout_ns: 10_000,
+            field_timeout_ns: rate.bit_ns().saturating_mul(15),
+            turn_around_ns: rate.bit_ns().saturating_mul(4),
+            hand_over_ns: 0,
+            driver_lead_ns: 1_000,
+            sampling_ns: 480,
+        };
+        let hand_over_ns = line.latency_budget_ns();
+        Self { hand_over_ns, ..line }
+    }
+
+    /// With the hint that the receiver is always on.
+    pub const fn with_echo(self) -> Self {
+        Self { echo: true, ..self }
+    }
+
+    /// With another wait for the start bit of the response.
+    pub const fn with_response_timeout(self, ns: u32) -> Self {
+        Self { response_timeout_ns: ns, ..self }
+    }
+
+    /// With another wait for the next field.
+    pub const fn with_field_timeout(self, ns: u32) -> Self {
+        Self { field_timeout_ns: ns, ..self }
+    }
+
+    /// With another least turn-around of the encoder. The [latency budget](Self::latency_budget_ns) goes with it.
+    pub const fn with_turn_around(self, ns: u32) -> Self {
+        Self { turn_around_ns: ns, ..self }
+    }
+
+    /// With another time to hand over a byte, for DMA blocks and idle detection.
+    pub const fn with_hand_over(self, ns: u32) -> Self {
+        Self { hand_over_ns: ns, ..self }
+    }
+
+    /// With another lead of the driver.
+    pub const fn with_driver_lead(self, ns: u32) -> Self {
+        Self { driver_lead_ns: ns, ..self }
+    }
+
+    /// With another sampling instant.
+    pub const fn with_sampling(self, ns: u32) -> Self {
+        Self { sampling_ns: ns, ..self }
+    }
+
+    /// By how much the end time that the master is told may lie after the end of the byte on the line, in ns: just
+    /// below the turn-around and one field, 5.599 us at 2.5 Mbit/s and 2.799 us at 5 Mbit/s by default.
+    ///
+    /// Within it no byte of the own request, and nothing that was on the line before, is taken for a response. A block
+    /// may be handed over at any later time, as long as it is told when it ended.
+    pub const fn latency_budget_ns(self) -> u32 {
+        self.turn_around_ns.saturating_add(self.rate.fields_ns(1)).saturating_sub(1)
+    }
+}

@@ -1,0 +1,243 @@
+use super::*;
+use crate::address::Address;
+use crate::response::tests::plain_exchanges;
+use crate::status::StatusField;
+use crate::timing::BitRate;
+use proptest::prelude::*;
+use std::vec::Vec;
+
+const LINE: Line = Line::new(BitRate::Mbit2_5);
+/// A logged response to ID 0.
+const RESPONSE: [u8; 6] = [0x02, 0x20, 0xb4, 0xbd, 0x1c, 0x37];
+
+/// Each byte with the end of its delimiter: fields of 4 us, the first begins at `from`.
+fn at(from: u64, bytes: &[u8]) -> Vec<(u8, u64)> {
+    bytes.iter().zip(1..).map(|(byte, k)| (*byte, from + 4_000 * k)).collect()
+}
+
+/// Feeds bytes one by one and waits for the end.
+fn run(request: Request, line: Line, bytes: &[(u8, u64)]) -> Result<Response, Error> {
+    let mut transaction = Transaction::start(request, line, 0);
+    for (byte, end_ns) in bytes {
+        let _ = transaction.bytes(&[*byte], *end_ns);
+    }
+    ended(&mut transaction)
+}
+
+fn ended(transaction: &mut Transaction) -> Result<Response, Error> {
+    if let Progress::Pending { until_ns } = transaction.progress() {
+        assert_eq!(transaction.poll(until_ns), Progress::Pending { until_ns });
+        let _ = transaction.poll(until_ns + 1);
+    }
+    match transaction.progress() {
+        Progress::Done { value, .. } => Ok(value.response),
+        Progress::Failed { error, .. } => Err(error),
+        Progress::Pending { .. } => panic!("the time-out did not end it"),
+    }
+}
+
+/// The numbers of the sources: 10 us to the start bit, one and a half fields from field to field, four bits of
+/// turn-around, 1 us of lead, 0.48 us to the sampling instant.
+#[test]
+fn defaults_are_numbers_of_the_sources() {
+    let slow = Line::new(BitRate::Mbit2_5);
+    let got = (slow.response_timeout_ns, slow.field_timeout_ns, slow.turn_around_ns, slow.latency_budget_ns());
+    assert_eq!(got, (10_000, 6_000, 1_600, 5_599));
+    assert_eq!((slow.hand_over_ns, slow.driver_lead_ns, slow.sampling_ns, slow.echo), (5_599, 1_000, 480, false));
+    let fast = Line::new(BitRate::Mbit5);
+    let got = (fast.response_timeout_ns, fast.field_timeout_ns, fast.turn_around_ns, fast.latency_budget_ns());
+    assert_eq!(got, (10_000, 3_000, 800, 2_799));
+}
+
+/// The request of 4 us begins at 10 us. Its driver is on 1 us before, and off before the encoder answers.
+#[test]
+fn times_of_a_transaction() {
+    let mut transaction = Transaction::start(Request::ReadSingleTurn, LINE, 10_000);
+    assert_eq!((transaction.driver_on_ns(), transaction.driver_off_ns()), (9_000, (14_000, 15_600)));
+    // 14 us, 10 us to the start bit, 4 us for the field, 5.599 us until it is handed over.
+    assert_eq!(transaction.progress(), Progress::Pending { until_ns: 33_599 });
+    assert_eq!(transaction.poll(33_599), Progress::Pending { until_ns: 33_599 });
+    // The longest response begun at 24 us is over 44 us later.
+    let want = Progress::Failed { error: Error::NoResponse { echo: false }, ready_ns: 68_000 };
+    assert_eq!(transaction.poll(33_600), want);
+
+    let mut transaction = Transaction::start(Request::ReadSingleTurn, LINE, 10_000);
+    // The next field ends 6 us later at the latest.
+    assert_eq!(transaction.bytes(&[0x02], 21_000), Progress::Pending { until_ns: 32_599 });
+    let done = transaction.bytes(&RESPONSE[1..], 41_000);
+    let response = Response::parse(Request::ReadSingleTurn, &RESPONSE).unwrap();
+    assert_eq!(done, Progress::Done { value: Exchange { response, sampled_ns: 14_480 }, ready_ns: 41_000 });
+}
+
+proptest! {
+    /// With and without echo, whatever the master was told, byte by byte and in blocks cut anywhere.
+    #[test]
+    fn responses_arrive((request, response) in plain_exchanges(), echo: bool, hint: bool, cuts: [bool; 16]) {
+        let (sent, answer) = (request.emit(), response.emit());
+        let end = 4_000 * u64::from(sent.fields());
+        let mut bytes = if echo { at(0, sent.as_bytes()) } else { Vec::new() };
+        bytes.extend(at(end + 3_000, answer.as_bytes()));
+        let line = Line { echo: hint, ..LINE };
+        prop_assert_eq!(run(request, line, &bytes), Ok(response));
+        let mut transaction = Transaction::start(request, line, 0);
+        let mut block = Vec::new();
+        for (k, (byte, end_ns)) in bytes.iter().enumerate() {
+            block.push(*byte);
+            if cuts[k] || k + 1 == bytes.len() {
+                let _ = transaction.bytes(&block, *end_ns);
+                block.clear();
+            }
+        }
+        prop_assert_eq!(ended(&mut transaction), Ok(response));
+    }
+
+    /// Within the latency budget no echo is ever a response, and no good response is lost; 5.599 us is still within.
+    #[test]
+    fn late_interrupts((request, response) in plain_exchanges(), late in prop::collection::vec(0..=5_599_u64, 15), answers: bool) {
+        let (sent, answer) = (request.emit(), response.emit());
+        let end = 4_000 * u64::from(sent.fields());
+        let mut bytes = at(0, sent.as_bytes());
+        if answers {
+            bytes.extend(at(end + 3_000, answer.as_bytes()));
+        }
+        // Handlers run one after the other.
+        let mut before = 0;
+        for ((_, end_ns), late) in bytes.iter_mut().zip(late) {
+            before = (*end_ns + late).max(before);
+            *end_ns = before;
+        }
+        let want = if answers { Ok(response) } else { Err(Error::NoResponse { echo: true }) };
+        prop_assert_eq!(run(request, LINE, &bytes), want);
+    }
+
+    #[test]
+    fn cut_responses_end_by_time_out((request, response) in plain_exchanges(), cut in 0..11_usize, echo: bool) {
+        let (sent, answer) = (request.emit(), response.emit());
+        let cut = cut.min(answer.as_bytes().len() - 1);
+        let mut bytes = if echo { at(0, sent.as_bytes()) } else { Vec::new() };
+        bytes.extend(at(4_000 * u64::from(sent.fields()) + 3_000, &answer.as_bytes()[..cut]));
+        let want = match cut {
+            0 => Error::NoResponse { echo },
+            _ => Error::Truncated { got: cut as u16, want: answer.fields().into() },
+        };
+        prop_assert_eq!(run(request, LINE, &bytes), Err(want));
+    }
+
+    /// What has ended does not change any more, whatever comes.
+    #[test]
+    fn an_end_is_an_end((request, response) in plain_exchanges(), more: [u8; 20]) {
+        let mut transaction = Transaction::start(request, LINE, 0);
+        let _ = transaction.bytes(response.emit().as_bytes(), 100_000);
+        let ended = transaction;
+        let done = matches!(ended.progress(), Progress::Done { value, ready_ns: 100_000 } if value.response == response);
+        prop_assert!(done);
+        for byte in more {
+            let _ = transaction.bytes(&[byte], 100_000);
+            let _ = transaction.framing_error(100_000);
+            let _ = transaction.poll(u64::MAX);
+        }
+        prop_assert_eq!(transaction, ended);
+    }
+}
+
+/// A response that ended before the request had left, or that the request before is owed, is none.
+#[test]
+fn what_is_older_than_the_request_is_not_a_response() {
+    let early: Vec<_> = RESPONSE.iter().zip(1..).map(|(byte, k)| (*byte, 500 * k)).collect();
+    assert_eq!(run(Request::ReadSingleTurn, LINE, &early), Err(Error::NoResponse { echo: true }));
+    // It began 1 us before the end of the request: its first bytes are dropped, and the rest is no response.
+    let stale = run(Request::ReadSingleTurn, LINE, &at(3_000, &RESPONSE));
+    assert!(stale.is_err(), "{stale:?}");
+    // The earliest response begins 1.6 us after the request.
+    assert!(run(Request::ReadSingleTurn, LINE, &at(5_600, &RESPONSE)).is_ok());
+    assert!(run(Request::ReadSingleTurn, LINE, &at(5_599, &RESPONSE)).is_err());
+}
+
+#[test]
+fn a_write_is_not_done_by_its_own_echo() {
+    let request = Request::write_eeprom(Address::truncate(1), 0x5a);
+    let sent = request.emit();
+    let only = run(request, LINE, &at(0, sent.as_bytes()));
+    assert_eq!(only, Err(Error::NoResponse { echo: true }));
+    // Nor in a block that is handed over late, with the time of its end.
+    let mut transaction = Transaction::start(request, LINE, 0);
+    let _ = transaction.bytes(sent.as_bytes(), 16_000);
+    assert_eq!(ended(&mut transaction), Err(Error::NoResponse { echo: true }));
+}
+
+/// All positions of 16 bits: an echo in front never makes another one of them, even if its time is not known.
+#[test]
+fn an_echo_is_never_part_of_a_position() {
+    for abs in (0..65_536_u32).step_by(if cfg!(miri) { 4_099 } else { 1 }) {
+        let [low, high, ..] = abs.to_le_bytes();
+        let mut bytes = [0x02, 0x02, 0x20, low, high, 0, 0];
+        bytes[6] = crate::crc(&bytes[1..6]);
+        let mut transaction = Transaction::start(Request::ReadSingleTurn, LINE, 0);
+        for byte in bytes {
+            let _ = transaction.bytes(&[byte], 100_000);
+        }
+        assert_eq!(ended(&mut transaction).map(|r| r.abs().map(crate::Abs::get)), Ok(Some(abs)));
+    }
+}
+
+/// 1.1 us late at 5 Mbit/s, and the whole response at once after 4 us of idle line.
+#[test]
+fn what_is_there_is_taken_before_the_clock_is_asked() {
+    let response = Response::parse(Request::ReadSingleTurn, &RESPONSE);
+    let mut fast = Transaction::start(Request::ReadSingleTurn, Line::new(BitRate::Mbit5), 0);
+    for (byte, k) in RESPONSE.iter().zip(1..) {
+        let late = if k == 4 { 1_100 } else { 0 };
+        let _ = fast.poll(5_000 + 2_000 * k);
+        let _ = fast.bytes(&[*byte], 5_000 + 2_000 * k + late);
+    }
+    assert_eq!(ended(&mut fast), response);
+    let mut block = Transaction::start(Request::ReadSingleTurn, LINE, 0);
+    let _ = block.bytes(&RESPONSE, 1_000_000);
+    assert_eq!(ended(&mut block), response);
+}
+
+#[test]
+fn the_echo_is_told_where_nothing_else_came() {
+    let request = Request::write_eeprom(Address::PAGE_REGISTER, 1);
+    let wrong = at(0, &[0x32, 0x7f, 0x03, 0x4c]);
+    let error = Error::EchoMismatch { at: 2, got: 3, want: 1 };
+    assert_eq!(run(request, LINE.with_echo(), &wrong), Err(error));
+    assert_eq!(run(request, LINE, &wrong), Err(Error::NoResponse { echo: false }));
+    assert_eq!(run(request, LINE.with_echo(), &at(0, &[0x32, 0x7f])), Err(Error::NoResponse { echo: false }));
+    let mut transaction = Transaction::start(request, LINE.with_echo(), 0);
+    let _ = transaction.framing_error(4_000);
+    assert_eq!(ended(&mut transaction), Err(Error::EchoMismatch { at: 0, got: 0, want: 0x32 }));
+}
+
+#[test]
+fn a_refusal_is_received_whole() {
+    let refusal = [0x1a, 0x40, 0xeb, 0x3b, 0x1c, 0x17, 0x04, 0x27, 0x00, 0x00, 0xa2];
+    let outcome = run(Request::ReadSingleTurn, LINE, &at(7_000, &refusal));
+    assert_eq!(outcome, Err(Error::Rejected { sf: StatusField::CA0 }));
+    // Behind an echo, in one block.
+    let mut transaction = Transaction::start(Request::ReadSingleTurn, LINE, 0);
+    let block = [&[0x02], &refusal[..]].concat();
+    let _ = transaction.bytes(&block, 51_000);
+    assert_eq!(ended(&mut transaction), Err(Error::Rejected { sf: StatusField::CA0 }));
+}
+
+/// After a framing error the encoder goes on to talk: the line is free when the longest response is over.
+#[test]
+fn framing_errors_of_the_uart() {
+    let mut plain = Transaction::start(Request::ReadSingleTurn, LINE, 0);
+    let _ = plain.bytes(&[0x02], 11_000);
+    let want = Progress::Failed { error: Error::Delimiter { field: 1 }, ready_ns: 58_000 };
+    assert_eq!(plain.framing_error(15_000), want);
+    let mut late = Transaction::start(Request::ReadSingleTurn, LINE, 0);
+    let want = Progress::Failed { error: Error::Delimiter { field: 0 }, ready_ns: 99_000 };
+    assert_eq!(late.framing_error(99_000), want);
+}
+
+/// More bytes than any request and response have: the last ones count.
+#[test]
+fn a_long_block_ends_with_the_response() {
+    let mut transaction = Transaction::start(Request::ReadSingleTurn, LINE, 0);
+    let block = [&[0x55; 40], &RESPONSE[..]].concat();
+    let _ = transaction.bytes(&block, 200_000);
+    assert_eq!(ended(&mut transaction), Response::parse(Request::ReadSingleTurn, &RESPONSE));
+}

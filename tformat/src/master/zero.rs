@@ -1,0 +1,207 @@
+use super::reset::mismatch;
+use super::{Reset, Step};
+use crate::error::{Error, ErrorClass};
+use crate::message::SingleTurn;
+use crate::request::Request;
+use crate::resolution::Resolution;
+use crate::response::Response;
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+enum Phase {
+    /// The position before.
+    Before,
+    /// Ten requests for ID 8.
+    Act,
+    /// The position after; how the ten ended.
+    After(Result<(), ErrorClass>),
+}
+
+/// Sets the single-turn zero and sees what became of it: reads the position, sends ID 8 ten times, waits 18 ms, and reads
+/// the position again. **This shifts the commutation angle of the motor**, see
+/// [`Reset::set_single_turn_zero_and_shift_commutation_angle`].
+///
+/// The shaft has to stand still. The result is the position read afterwards, within the tolerance of 0. Otherwise it
+/// ends with
+///
+/// * [`Error::NotDone`]: ID 8 was not sent often enough, or the position is what it was before;
+/// * [`Error::EffectUnknown`]: the position could not be read, or it says nothing because it was at zero before.
+///
+/// ID 8 is sent at most ten times.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct SingleTurnZero {
+    resolution: Resolution,
+    tolerance: u32,
+    reset: Reset,
+    phase: Phase,
+    before: u32,
+    tries: u8,
+}
+
+impl SingleTurnZero {
+    /// Times that a position is read before it is given up.
+    pub const MAX_READS: u8 = 3;
+
+    /// `tolerance`: how far from zero, in counts, the shaft may seem to be afterwards.
+    pub const fn set_and_shift_commutation_angle(resolution: Resolution, tolerance: u32) -> Self {
+        let reset = Reset::set_single_turn_zero_and_shift_commutation_angle();
+        Self { resolution, tolerance, reset, phase: Phase::Before, before: 0, tries: 0 }
+    }
+
+    /// The first request, at once.
+    pub const fn start(&mut self, now_ns: u64) -> Step<SingleTurn> {
+        self.phase = Phase::Before;
+        self.tries = 0;
+        read(now_ns)
+    }
+
+    /// A transaction ended with this outcome; the line is free from `ready_ns` on.
+    pub fn receive(&mut self, outcome: Result<Response, Error>, ready_ns: u64) -> Step<SingleTurn> {
+        let act = match self.phase {
+            Phase::Before | Phase::After(_) => return self.position(outcome, ready_ns),
+            Phase::Act => self.reset.receive(outcome, ready_ns),
+        };
+        match act {
+            Step::Done { ready_ns, .. } => self.look(Ok(()), ready_ns),
+            Step::Failed { error: Error::EffectUnknown { because }, ready_ns } => self.look(Err(because), ready_ns),
+            step => step,
+        }
+    }
+
+    const fn look(&mut self, act: Result<(), ErrorClass>, ready_ns: u64) -> Step<SingleTurn> {
+        self.phase = Phase::After(act);
+        self.tries = 0;
+        read(ready_ns)
+    }
+
+    fn position(&mut self, outcome: Result<Response, Error>, ready_ns: u64) -> Step<SingleTurn> {
+        let read_out = match outcome {
+            Ok(Response::ReadSingleTurn(single)) => self.resolution.single_turn(single.abs).map(|abs| (single, abs)),
+            Ok(other) => Err(mismatch(other, Request::ReadSingleTurn)),
+            Err(error) => Err(error),
+        };
+        match (read_out, self.phase) {
+            (Err(error), phase) => {
+                self.tries = self.tries.saturating_add(1);
+                if self.tries < Self::MAX_READS {
+                    return read(ready_ns);
+                }
+                let because = error.class();
+                let error = match phase {
+                    Phase::After(_) => Error::EffectUnknown { because },
+                    _ => Error::NotDone { sent: 0, because },
+                };
+                Step::Failed { error, ready_ns }
+            }
+            (Ok((single, abs)), Phase::After(act)) => self.judge(act, single, abs, ready_ns),
+            (Ok((_, abs)), _) => {
+                self.before = abs;
+                self.phase = Phase::Act;
+                self.reset.start(ready_ns.saturating_add(Reset::SPACING_NS.into()))
+            }
+        }
+    }
+
+    /// What the position after the ten requests says of them.
+    fn judge(&self, act: Result<(), ErrorClass>, single: SingleTurn, abs: u32, ready_ns: u64) -> Step<SingleTurn> {
+        let near = |from: u32, to: u32| self.resolution.difference(from, to).unsigned_abs() <= self.tolerance;
+        let error = match act {
+            _ if near(0, abs) && (act.is_ok() || !near(0, self.before)) => {
+                return Step::Done { value: single, ready_ns };
+            }
+            Ok(()) => Error::NotDone { sent: Reset::REQUESTS, because: ErrorClass::DataMismatch },
+            Err(because) if near(self.before, abs) && !near(0, abs) => {
+                Error::NotDone { sent: Reset::REQUESTS, because }
+            }
+            Err(because) => Error::EffectUnknown { because },
+        };
+        Step::Failed { error, ready_ns }
+    }
+}
+
+const fn read(not_before_ns: u64) -> Step<SingleTurn> {
+    Step::Send { request: Request::ReadSingleTurn, not_before_ns }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::count::Abs;
+    use crate::status::StatusField;
+
+    const LOST: Result<Response, Error> = Err(Error::NoResponse { echo: false });
+
+    fn single(abs: u32) -> SingleTurn {
+        SingleTurn { sf: StatusField::empty(), abs: Abs::truncate(abs) }
+    }
+
+    /// Position before, which of the ten responses is lost (0: none), and position after (none: it cannot be read).
+    fn run(before: u32, lost: u8, after: Option<u32>) -> (Step<SingleTurn>, u8) {
+        let resolution = Resolution::new(17, 16).unwrap();
+        let mut zero = SingleTurnZero::set_and_shift_commutation_angle(resolution, 4);
+        let mut step = zero.start(0);
+        let mut sent = 0;
+        while let Step::Send { request, not_before_ns } = step {
+            let outcome = match request {
+                Request::SetSingleTurnZero => {
+                    sent += 1;
+                    if sent == lost { LOST } else { Ok(Response::SetSingleTurnZero(single(before))) }
+                }
+                _ if sent == 0 => Ok(Response::ReadSingleTurn(single(before))),
+                _ => after.map_or(LOST, |after| Ok(Response::ReadSingleTurn(single(after)))),
+            };
+            step = zero.receive(outcome, not_before_ns + 31_000);
+        }
+        (step, sent)
+    }
+
+    #[test]
+    fn a_zero_that_shows_is_done() {
+        // 31 us, 40 us of idle line, ten times 71 us, 18 ms, 31 us.
+        let ready_ns = 31_000 + 40_000 + 670_000 + 18_000_000 + 31_000;
+        assert_eq!(run(5_000, 0, Some(2)), (Step::Done { value: single(2), ready_ns }, 10));
+        // The other side of zero, and a shaft that was at zero already.
+        assert!(matches!(run(5_000, 0, Some(131_069)).0, Step::Done { .. }));
+        assert!(matches!(run(1, 0, Some(1)).0, Step::Done { .. }));
+        // The last response was lost, but the zero shows.
+        assert!(matches!(run(5_000, 10, Some(4)).0, Step::Done { .. }));
+    }
+
+    #[test]
+    fn a_zero_that_does_not_show_is_not_done() {
+        for (before, lost, after, sent) in [(5_000, 0, 5_000, 10), (5_000, 0, 5, 10), (5_000, 10, 5_003, 10)] {
+            let (step, requests) = run(before, lost, Some(after));
+            assert!(matches!(step, Step::Failed { error: Error::NotDone { sent: got, .. }, .. } if got == sent));
+            assert_eq!(requests, 10);
+        }
+        // Nine requests have no effect, and there is nothing to see.
+        let (step, requests) = run(5_000, 9, None);
+        assert!(matches!(step, Step::Failed { error: Error::NotDone { sent: 9, .. }, .. }), "{step:?}");
+        assert_eq!(requests, 9);
+    }
+
+    #[test]
+    fn what_cannot_be_seen_is_unknown() {
+        let because = ErrorClass::NoResponse;
+        for (before, after) in [(5_000, None), (1, Some(1)), (5_000, Some(9_000))] {
+            let (step, requests) = run(before, 10, after);
+            assert!(
+                matches!(step, Step::Failed { error: Error::EffectUnknown { because: got }, .. } if got == because)
+            );
+            assert_eq!(requests, 10);
+        }
+        assert!(matches!(run(5_000, 0, None).0, Step::Failed { error: Error::EffectUnknown { .. }, .. }));
+    }
+
+    #[test]
+    fn without_a_position_before_nothing_is_sent() {
+        let mut zero = SingleTurnZero::set_and_shift_commutation_angle(Resolution::new(17, 16).unwrap(), 4);
+        let _ = zero.start(0);
+        for _ in 0..2 {
+            assert_eq!(zero.receive(LOST, 7), read(7));
+        }
+        let because = ErrorClass::NoResponse;
+        assert_eq!(zero.receive(LOST, 7), Step::Failed { error: Error::NotDone { sent: 0, because }, ready_ns: 7 });
+    }
+}

@@ -1,0 +1,384 @@
+use servowire_core::OutOfRange;
+
+use crate::address::{Address, Page};
+use crate::count::{Abm, Abs};
+use crate::error::Error;
+
+/// The widths of an encoder's data, and the size of its memory: what the wire does not say.
+///
+/// ```text
+///  ABS  |23 ... abs_bits| abs_bits-1 ... 0|      upper bits 0, position in the turn
+///  ABM  |23 ... abm_bits| abm_bits-1 ... 0|      upper bits 0, turns, as two's complement if signed
+/// ```
+///
+/// The check field does not protect against a wrong width; the upper bits do, so a set one is refused.
+///
+/// It prints as the widths: `23 + 16 bits`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[cfg_attr(
+    feature = "serde",
+    derive(serde::Serialize, serde::Deserialize),
+    serde(try_from = "Widths", into = "Widths")
+)]
+pub struct Resolution {
+    abs_bits: u8,
+    abm_bits: u8,
+    signed_turns: bool,
+    checks_upper_bits: bool,
+    pages: u8,
+}
+
+crate::show::one_line!(Resolution { Self { abs_bits, abm_bits, .. } => "{} + {} bits", abs_bits, abm_bits; });
+
+/// What an encoder ID suggests.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct Hint {
+    /// The widths.
+    pub resolution: Resolution,
+    /// Whether a document or a log of a real encoder shows this ID with these widths; otherwise they follow from
+    /// the rule that all known IDs obey.
+    pub documented: bool,
+}
+
+/// Where the shaft is, in the units of a [`Resolution`].
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct Position {
+    /// Counts in the turn, 0..2^abs_bits.
+    pub abs: u32,
+    /// Turns: 0..2^abm_bits, or -2^(abm_bits-1)..2^(abm_bits-1) if they are signed.
+    pub turns: i32,
+    /// turns * 2^abs_bits + abs, in counts; at most 48 bits wide.
+    pub combined: i64,
+}
+
+crate::show::one_line!(Position { Self { abs, turns, .. } => "turn {}, {} counts", turns, abs; });
+
+impl Resolution {
+    /// Widths of ABS (1..=24) and ABM (0..=24). Turns are signed, upper bits are checked, the EEPROM has six pages.
+    ///
+    /// # Errors
+    /// [`OutOfRange`] with the limit that a width passes.
+    pub const fn new(abs_bits: u8, abm_bits: u8) -> Result<Self, OutOfRange> {
+        match (within(abs_bits, 1, 24), within(abm_bits, 0, 24)) {
+            (Ok(abs_bits), Ok(abm_bits)) => {
+                Ok(Self { abs_bits, abm_bits, signed_turns: true, checks_upper_bits: true, pages: Page::COUNT })
+            }
+            (Err(error), _) | (_, Err(error)) => Err(error),
+        }
+    }
+
+    /// With turns counted from 0 up.
+    pub const fn with_unsigned_turns(self) -> Self {
+        Self { signed_turns: false, ..self }
+    }
+
+    /// For an encoder that puts something else into the upper bits: they are cut off, not checked.
+    pub const fn with_upper_bits_ignored(self) -> Self {
+        Self { checks_upper_bits: false, ..self }
+    }
+
+    /// With another number of EEPROM pages, 1..=8: six in Tamagawa's encoders, eight in a compatible one.
+    ///
+    /// # Errors
+    /// [`OutOfRange`].
+    pub const fn with_pages(self, pages: u8) -> Result<Self, OutOfRange> {
+        match within(pages, 1, 8) {
+            Ok(pages) => Ok(Self { pages, ..self }),
+            Err(error) => Err(error),
+        }
+    }
+
+    /// What ENID suggests. In all known cases it is the number of single-turn bits.
+    ///
+    /// | ENID | ABS | ABM | known from |
+    /// |------|-----|-----|------------|
+    /// | 0x0b | 11 | 13 | drive firmware |
+    /// | 0x11 | 17 | 16 | drive firmware, descriptions of 17-bit types |
+    /// | 0x15 | 21 | 0 | a compatible encoder |
+    /// | 0x17 | 23 | 16 | drive firmware, log of a TS5700N8401 |
+    /// | 0x14 | 20 | 16 | not documented: the same rule |
+    /// | 0x18 | 24 | 16 | not documented: the same rule |
+    ///
+    /// `None` for all others. A model name says nothing: TIDM-1011 gives the TS5700N8501 24 bits, a motor
+    /// controller in wide use 17.
+    pub const fn from_enid(enid: u8) -> Option<Hint> {
+        let (abm_bits, documented) = match enid {
+            0x0b => (13, true),
+            0x11 | 0x17 => (16, true),
+            0x15 => (0, true),
+            0x14 | 0x18 => (16, false),
+            _ => return None,
+        };
+        match Self::new(enid, abm_bits) {
+            Ok(resolution) => Some(Hint { resolution, documented }),
+            Err(_) => None,
+        }
+    }
+
+    /// Single-turn bits, 1..=24.
+    pub const fn abs_bits(self) -> u8 {
+        self.abs_bits
+    }
+
+    /// Multi-turn bits, 0..=24.
+    pub const fn abm_bits(self) -> u8 {
+        self.abm_bits
+    }
+
+    /// Whether turns are two's complement.
+    pub const fn has_signed_turns(self) -> bool {
+        self.signed_turns
+    }
+
+    /// Whether bits above the widths are refused.
+    pub const fn checks_upper_bits(self) -> bool {
+        self.checks_upper_bits
+    }
+
+    /// Pages of the EEPROM, 1..=8.
+    pub const fn pages(self) -> u8 {
+        self.pages
+    }
+
+    /// The page with this number; `None` if the encoder does not have it.
+    pub const fn page(self, number: u8) -> Option<Page> {
+        if number < self.pages { Page::new(number) } else { None }
+    }
+
+    /// Page and address of the byte `index` of the whole EEPROM; `None` after its end.
+    pub const fn locate(self, index: u16) -> Option<(Page, Address)> {
+        Page::locate(index, self.pages)
+    }
+
+    /// Counts in a turn.
+    pub const fn counts_per_turn(self) -> u32 {
+        1_u32.wrapping_shl(self.abs_bits as u32)
+    }
+
+    /// The single-turn position in counts.
+    ///
+    /// # Errors
+    /// [`Error::UpperBits`].
+    pub const fn single_turn(self, abs: Abs) -> Result<u32, Error> {
+        self.cut(abs.get(), self.abs_bits)
+    }
+
+    /// The number of turns.
+    ///
+    /// # Errors
+    /// [`Error::UpperBits`].
+    #[expect(clippy::cast_possible_wrap, reason = "24 bits fit")]
+    pub const fn turns(self, abm: Abm) -> Result<i32, Error> {
+        match self.cut(abm.get(), self.abm_bits) {
+            Ok(turns) if self.signed_turns => Ok(sign_extend(turns, self.abm_bits)),
+            Ok(turns) => Ok(turns as i32),
+            Err(error) => Err(error),
+        }
+    }
+
+    /// Both parts as one position.
+    ///
+    /// # Errors
+    /// [`Error::UpperBits`] of ABS, then of ABM.
+    ///
+    /// ABS and ABM are types of their own: exchanging them does not compile.
+    ///
+    /// ```compile_fail
+    /// # let (resolution, abs, abm) = (tformat::Resolution::new(17, 16)?, tformat::Abs::MAX, tformat::Abm::MAX);
+    /// resolution.position(abm, abs);
+    /// # Ok::<(), tformat::OutOfRange>(())
+    /// ```
+    pub const fn position(self, abs: Abs, abm: Abm) -> Result<Position, Error> {
+        match (self.single_turn(abs), self.turns(abm)) {
+            (Ok(abs), Ok(turns)) => {
+                let combined = (turns as i64).wrapping_shl(self.abs_bits as u32) | abs as i64;
+                Ok(Position { abs, turns, combined })
+            }
+            (Err(error), _) | (_, Err(error)) => Err(error),
+        }
+    }
+
+    /// The single-turn position as a fraction of a turn: 2^32 is a whole one.
+    ///
+    /// # Errors
+    /// [`Error::UpperBits`].
+    pub const fn fraction(self, abs: Abs) -> Result<u32, Error> {
+        match self.single_turn(abs) {
+            Ok(counts) => Ok(counts.wrapping_shl(32_u32.wrapping_sub(self.abs_bits as u32))),
+            Err(error) => Err(error),
+        }
+    }
+
+    /// The shorter way from one single-turn position to another in counts, over the zero point if need be:
+    /// -2^(abs_bits-1)..2^(abs_bits-1).
+    pub const fn difference(self, from: u32, to: u32) -> i32 {
+        sign_extend(to.wrapping_sub(from), self.abs_bits)
+    }
+
+    const fn cut(self, value: u32, bits: u8) -> Result<u32, Error> {
+        let mask = 1_u32.wrapping_shl(bits as u32).wrapping_sub(1);
+        let excess = value & !mask;
+        if excess != 0 && self.checks_upper_bits {
+            return Err(Error::UpperBits { value, excess });
+        }
+        Ok(value & mask)
+    }
+}
+
+/// A setting, if it lies in its range.
+const fn within(value: u8, min: u8, max: u8) -> Result<u8, OutOfRange> {
+    if value < min || value > max {
+        let limit = if value < min { min } else { max };
+        return Err(OutOfRange { got: value as i64, max: limit as i64 });
+    }
+    Ok(value)
+}
+
+/// The low `bits` (0..=24) of `value` as two's complement.
+#[expect(clippy::cast_possible_wrap, reason = "the wrap is the sign")]
+const fn sign_extend(value: u32, bits: u8) -> i32 {
+    if bits == 0 {
+        return 0;
+    }
+    let unused = 32_u32.wrapping_sub(bits as u32);
+    (value.wrapping_shl(unused) as i32).wrapping_shr(unused)
+}
+
+/// A resolution as it is written down. The number of pages may be missing: then it is six.
+#[cfg(feature = "serde")]
+#[derive(serde::Serialize, serde::Deserialize)]
+struct Widths {
+    abs_bits: u8,
+    abm_bits: u8,
+    signed_turns: bool,
+    checks_upper_bits: bool,
+    #[serde(default = "six")]
+    pages: u8,
+}
+
+#[cfg(feature = "serde")]
+const fn six() -> u8 {
+    Page::COUNT
+}
+
+#[cfg(feature = "serde")]
+impl TryFrom<Widths> for Resolution {
+    type Error = OutOfRange;
+
+    fn try_from(w: Widths) -> Result<Self, OutOfRange> {
+        let resolution = Self::new(w.abs_bits, w.abm_bits)?.with_pages(w.pages)?;
+        Ok(Self { signed_turns: w.signed_turns, checks_upper_bits: w.checks_upper_bits, ..resolution })
+    }
+}
+
+#[cfg(feature = "serde")]
+impl From<Resolution> for Widths {
+    fn from(p: Resolution) -> Self {
+        let Resolution { abs_bits, abm_bits, signed_turns, checks_upper_bits, pages } = p;
+        Self { abs_bits, abm_bits, signed_turns, checks_upper_bits, pages }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+    use std::string::ToString;
+
+    const P17: Resolution = match Resolution::new(17, 16) {
+        Ok(resolution) => resolution,
+        Err(_) => panic!(),
+    };
+
+    fn abs(value: u32) -> Abs {
+        Abs::new(value).unwrap()
+    }
+
+    fn abm(value: u32) -> Abm {
+        Abm::new(value).unwrap()
+    }
+
+    #[test]
+    fn position_of_a_17_bit_encoder() {
+        let position = P17.position(abs(131_071), abm(0xffff)).unwrap();
+        assert_eq!(position, Position { abs: 131_071, turns: -1, combined: -1 });
+        let unsigned = P17.with_unsigned_turns().position(abs(131_071), abm(0xffff)).unwrap();
+        assert_eq!((unsigned.turns, unsigned.combined), (65_535, 8_589_934_591));
+        assert_eq!(P17.fraction(abs(65_536)), Ok(1 << 31));
+    }
+
+    #[test]
+    fn upper_bits_are_refused_or_cut_off() {
+        assert_eq!(P17.single_turn(abs(0x2_0001)), Err(Error::UpperBits { value: 0x2_0001, excess: 0x2_0000 }));
+        assert_eq!(P17.turns(abm(0x1_0000)), Err(Error::UpperBits { value: 0x1_0000, excess: 0x1_0000 }));
+        assert_eq!(P17.with_upper_bits_ignored().single_turn(abs(0x2_0001)), Ok(1));
+        let single = Resolution::new(21, 0).unwrap();
+        assert_eq!(single.turns(abm(0)), Ok(0));
+        assert!(single.turns(abm(1)).is_err());
+    }
+
+    #[test]
+    fn every_width_is_taken_or_refused() {
+        // Interpreted, some of the pairs have to do.
+        let stride = if cfg!(miri) { 5 } else { 1 };
+        for abs_bits in (0..=255).step_by(stride) {
+            for abm_bits in (0..=255).step_by(stride) {
+                let possible = (1..=24).contains(&abs_bits) && abm_bits <= 24;
+                assert_eq!(Resolution::new(abs_bits, abm_bits).is_ok(), possible);
+            }
+        }
+        assert_eq!(Resolution::new(0, 16), Err(OutOfRange { got: 0, max: 1 }));
+        assert_eq!(Resolution::new(25, 16), Err(OutOfRange { got: 25, max: 24 }));
+        assert_eq!(Resolution::new(17, 25), Err(OutOfRange { got: 25, max: 24 }));
+        assert_eq!(P17.to_string(), "17 + 16 bits");
+    }
+
+    /// Six pages unless told otherwise, and no page that the encoder does not have.
+    #[test]
+    fn pages() {
+        assert_eq!((P17.pages(), P17.page(5), P17.page(6)), (6, Page::new(5), None));
+        let eight = P17.with_pages(8).unwrap();
+        assert_eq!((eight.page(7), eight.page(8), eight.pages()), (Page::new(7), None, 8));
+        assert_eq!((P17.locate(761).is_some(), P17.locate(762), eight.locate(1015).is_some()), (true, None, true));
+        assert_eq!(P17.with_pages(9), Err(OutOfRange { got: 9, max: 8 }));
+        assert_eq!(P17.with_pages(0), Err(OutOfRange { got: 0, max: 1 }));
+    }
+
+    #[test]
+    fn hints_follow_the_number_of_bits() {
+        for enid in 0..=255 {
+            let hint = Resolution::from_enid(enid);
+            assert_eq!(hint.is_some(), [11, 17, 20, 21, 23, 24].contains(&enid));
+            if let Some(hint) = hint {
+                assert_eq!(hint.resolution.abs_bits(), enid);
+                assert_eq!(hint.documented, enid != 20 && enid != 24);
+            }
+        }
+    }
+
+    proptest! {
+        #[test]
+        fn combined_is_turns_and_counts(abs_bits in 1..=24_u8, abm_bits in 0..=24_u8, low: u32, high: u32, signed: bool) {
+            let resolution = Resolution::new(abs_bits, abm_bits).unwrap();
+            let resolution = if signed { resolution } else { resolution.with_unsigned_turns() };
+            let (low, high) = (low & ((1 << abs_bits) - 1), high & ((1 << abm_bits) - 1));
+            let position = resolution.position(abs(low), abm(high)).unwrap();
+            let full = 1_i64 << abm_bits;
+            let turns = if signed && i64::from(high) * 2 >= full && abm_bits > 0 { i64::from(high) - full } else { i64::from(high) };
+            prop_assert_eq!(i64::from(position.turns), turns);
+            prop_assert_eq!(position.combined, turns * (1 << abs_bits) + i64::from(low));
+        }
+
+        #[test]
+        fn difference_wraps(abs_bits in 1..=24_u8, from: u32, to: u32) {
+            let resolution = Resolution::new(abs_bits, 0).unwrap();
+            let turn = 1_i64 << abs_bits;
+            let d = i64::from(resolution.difference(from, to));
+            prop_assert!(-turn / 2 <= d && d < (turn + 1) / 2);
+            prop_assert_eq!((i64::from(to) - i64::from(from) - d).rem_euclid(turn), 0);
+        }
+    }
+}

@@ -1,0 +1,297 @@
+//! Master and encoder on the hostile line, and who judges the master.
+
+use core::fmt;
+
+use servowire_world::{
+    Block, Delivery, Event, Framing, Id, Message, Scenario, Speaker, Stamp, Tally, Transmission, Verdict, Wire, World,
+};
+use tformat::device::{Config, Device};
+use tformat::master::{Line, Progress, Step, Transaction};
+use tformat::{Abm, Abs, BitRate, Error, Request, Response};
+
+/// What was seen in a run besides the line's own tally.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Seen {
+    pub done: u64,
+    pub failed: u64,
+    /// Good answers that had to be taken, and were.
+    pub owed: u64,
+    /// Values that no master can tell from an answer: foreign speakers, answers after `ready_ns`.
+    pub forged: u64,
+    /// Damage that the XOR does not see.
+    pub undetected: u64,
+    /// Exchanges of which the latency was beyond the budget.
+    pub beyond_budget: u64,
+}
+
+impl fmt::Display for Seen {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { done, failed, owed, forged, undetected, beyond_budget } = self;
+        write!(f, "{done} done ({owed} owed), {failed} failed, {forged} forged, {undetected} undetected, ")?;
+        write!(f, "{beyond_budget} beyond the budget")
+    }
+}
+
+/// Field and bit by the documents: 4 us and 400 ns, or half of it.
+const fn field_ns(rate: BitRate) -> u64 {
+    match rate {
+        BitRate::Mbit2_5 => 4_000,
+        BitRate::Mbit5 => 2_000,
+    }
+}
+
+/// A host with a master, and an encoder with six pages.
+pub struct Bench {
+    pub world: World,
+    pub device: Device<6>,
+    pub line: Line,
+    pub ready_ns: u64,
+    pub seen: Seen,
+    /// Requests that the encoder believed and nobody sent like that: damage that it cannot see, or another speaker.
+    pub forged_requests: u32,
+    /// Whether the shaft moves with every request, so that each response has a value of its own.
+    pub moves: bool,
+    turn: u32,
+    budget_ns: u64,
+    response_ns: u64,
+}
+
+/// What became of one exchange.
+pub struct Exchanged {
+    pub outcome: Result<Response, Error>,
+    pub ready_ns: u64,
+}
+
+impl Bench {
+    pub fn new(scenario: Scenario, rate: BitRate, config: Config, hint: bool) -> Self {
+        let bit_ps = field_ns(rate) * 100;
+        let host = scenario.host;
+        let wire = Wire { bit_ps, framing: Framing::StartStop { width: 8 }, devices: 1 };
+        let line = Line::new(rate);
+        // What the user has to know of the hardware: how late bytes are handed over.
+        let block_ns = 16 * field_ns(rate) as u32 + 20_000;
+        let hand_over_ns = host.latency_ns
+            + match host.delivery {
+                Delivery::Each => 0,
+                Delivery::Blocks { idle_ns, .. } | Delivery::Idle { idle_ns } => block_ns + idle_ns,
+            };
+        let line = line.with_hand_over(line.hand_over_ns.max(hand_over_ns));
+        Self {
+            world: World::new(wire, scenario),
+            device: Device::new(0x17, rate).with_config(config),
+            line: if hint { line.with_echo() } else { line },
+            ready_ns: 100_000,
+            seen: Seen::default(),
+            forged_requests: 0,
+            moves: true,
+            turn: 0,
+            // Four bits of turn-around and a field.
+            budget_ns: field_ns(rate) * 14 / 10,
+            response_ns: 11 * field_ns(rate),
+        }
+    }
+
+    /// One request, judged by the laws of time.
+    pub fn exchange(&mut self, request: Request, not_before_ns: u64) -> Exchanged {
+        if self.moves {
+            self.turn += 1;
+            self.device.set_position(Abs::truncate(self.turn & 0x7f_ffff), Abm::truncate(self.turn & 0xffff));
+        }
+        let start_ns = not_before_ns.max(self.world.now_ns());
+        let mut transaction = Transaction::start(request, self.line, start_ns);
+        let id = self.world.send(&Message::bytes(transaction.frame().as_bytes()), start_ns);
+        let mut late_ns = 0;
+        while let Progress::Pending { until_ns } = transaction.progress() {
+            self.event(&mut transaction, until_ns + 1, &mut late_ns);
+        }
+        let (outcome, ready_ns) = match transaction.progress() {
+            Progress::Done { value, ready_ns } => (Ok(value.response), ready_ns),
+            Progress::Failed { error, ready_ns } => (Err(error), ready_ns),
+            Progress::Pending { .. } => panic!("it has ended"),
+        };
+        self.judge(request, id, outcome, ready_ns, late_ns);
+        // The machine drains until the line is free.
+        let ended = transaction.progress();
+        while self.world.now_ns() < ready_ns {
+            self.event(&mut transaction, ready_ns, &mut late_ns);
+        }
+        assert_eq!(transaction.progress(), ended, "what has ended has changed");
+        self.line_is_free(id, outcome, start_ns, ready_ns);
+        self.ready_ns = ready_ns.max(self.world.now_ns());
+        let old_ns = self.world.now_ns().saturating_sub(2_000_000);
+        self.world.truth_mut().forget_before(old_ns);
+        Exchanged { outcome, ready_ns: self.ready_ns }
+    }
+
+    /// Nothing is sent until `until_ns`.
+    pub fn wait(&mut self, until_ns: u64) {
+        let mut idle = Transaction::start(Request::ReadAll, self.line, u64::MAX / 2);
+        while self.world.now_ns() < until_ns {
+            self.event(&mut idle, until_ns, &mut 0);
+        }
+    }
+
+    /// Runs a procedure to its end.
+    pub fn run<T>(
+        &mut self,
+        mut step: Step<T>,
+        mut receive: impl FnMut(Result<Response, Error>, u64) -> Step<T>,
+    ) -> Result<T, Error> {
+        for _ in 0..1_000 {
+            match step {
+                Step::Send { request, not_before_ns } => {
+                    self.wait(not_before_ns);
+                    let exchanged = self.exchange(request, not_before_ns);
+                    step = receive(exchanged.outcome, exchanged.ready_ns);
+                }
+                Step::Done { value, ready_ns } => {
+                    self.wait(ready_ns);
+                    return Ok(value);
+                }
+                Step::Failed { error, ready_ns } => {
+                    self.wait(ready_ns);
+                    return Err(error);
+                }
+            }
+        }
+        panic!("the procedure does not end");
+    }
+
+    fn event(&mut self, transaction: &mut Transaction, until_ns: u64, late_ns: &mut u64) {
+        match self.world.next(until_ns) {
+            Event::Heard { unit, .. } => {
+                let (content, framed) = unit.bits.content();
+                let byte = content as u8;
+                let sent =
+                    if framed { self.device.byte(byte, unit.end_ns) } else { self.device.framing_error(unit.end_ns) };
+                if framed && (unit.damaged || unit.origin.speaker != Speaker::Host) {
+                    self.forged_requests += u32::from([0xba, 0xc2, 0x62, 0x32].contains(&byte));
+                    self.forged_requests += u32::from(sent.is_some() && byte & 7 != 2);
+                }
+                if let Some(sent) = sent {
+                    let message = Message::bytes(sent.frame.as_bytes()).tagged(tag(sent.frame.as_bytes()));
+                    let _ = self.world.answer(0, unit.origin.transmission, &message, sent.at_ns);
+                }
+            }
+            Event::Delivered(block) => {
+                *late_ns = block.late_ns().max(*late_ns);
+                feed(transaction, &block, field_ns(self.line.rate));
+            }
+            Event::Time { now_ns } => _ = transaction.poll(now_ns),
+        }
+    }
+
+    fn judge(&mut self, request: Request, id: Id, outcome: Result<Response, Error>, ready_ns: u64, late_ns: u64) {
+        let truth = self.world.truth();
+        let sent = truth.transmission(id).expect("the request is remembered").clone();
+        // A request that left late, or with pauses, is lateness too.
+        let late_ns =
+            late_ns + sent.end_ns.saturating_sub(sent.asked_ns + sent.units as u64 * field_ns(self.line.rate));
+        let within = late_ns < self.budget_ns;
+        self.seen.beyond_budget += u64::from(!within);
+        let response = match outcome {
+            Ok(response) => response,
+            Err(error) => {
+                self.seen.failed += 1;
+                let cf = request.data_id().control_field().get().into();
+                let foreign = truth.handed_since(id).any(|handed| handed.origin.speaker == Speaker::Foreign);
+                let disturbed = foreign || !truth.undisturbed(id);
+                let owed = !disturbed && within && truth.intact_answers(id).any(|t| self.is_owed(cf, &sent, t));
+                // A refusal was received whole, too.
+                assert!(
+                    !owed || matches!(error, Error::Rejected { .. }),
+                    "a good response is lost: {error}, {request} {sent:?}, answers {:?}, line {:?}, handed {:?}",
+                    truth.answers(id).collect::<Vec<_>>(),
+                    self.line,
+                    truth.handed_since(id).collect::<Vec<_>>()
+                );
+                return;
+            }
+        };
+        self.seen.done += 1;
+        self.seen.owed += u64::from(truth.intact_answers(id).next().is_some());
+        assert!(ready_ns >= sent.asked_ns);
+        if response.abs().is_none() {
+            return;
+        }
+        match truth.verdict(id, tag(response.emit().as_bytes())) {
+            Verdict::Fresh => {}
+            Verdict::Forged { .. } => self.seen.forged += 1,
+            Verdict::Unknown => {
+                let foreign = truth.handed_since(id).any(|handed| handed.origin.speaker == Speaker::Foreign);
+                let intact = truth.undisturbed(id) && !foreign && truth.intact_answers(id).next().is_some();
+                assert!(!intact, "the response {response} was never sent");
+                self.seen.undetected += 1;
+            }
+            Verdict::Old { of } => {
+                let of = truth.transmission(of);
+                // Where the request is on the line twice, the encoder answers the first.
+                let own = of.is_some_and(|of| of.answers == Some(id));
+                assert!(!within || own, "the response {response} is older than its request {sent:?}: {of:?}");
+            }
+        }
+    }
+
+    /// Whether the master has to take this answer: it began in time and was sent without long pauses.
+    fn is_owed(&self, cf: u64, request: &Transmission, answer: &Transmission) -> bool {
+        // An encoder that heard another request, by damage or from another speaker, answers that.
+        if answer.tag.is_none_or(|tag| tag & 0xff != cf) {
+            return false;
+        }
+        let field_ns = field_ns(self.line.rate);
+        let pause_ns = (answer.end_ns - answer.start_ns).saturating_sub(answer.units as u64 * field_ns);
+        answer.start_ns <= request.end_ns + 10_000 && pause_ns <= field_ns / 2
+    }
+
+    /// Law 4, for answers of legal length that began in time.
+    fn line_is_free(&self, id: Id, outcome: Result<Response, Error>, start_ns: u64, ready_ns: u64) {
+        let truth = self.world.truth();
+        let Some(sent) = truth.transmission(id) else { return };
+        let nominal_ns = start_ns + sent.units as u64 * field_ns(self.line.rate);
+        if outcome.is_ok() || sent.end_ns > nominal_ns {
+            return;
+        }
+        let legal = |t: &&Transmission| {
+            t.answers == Some(id)
+                && matches!(t.speaker, Speaker::Device(_))
+                && t.start_ns <= sent.end_ns + 10_000
+                && t.end_ns - t.start_ns <= self.response_ns
+        };
+        let talking: Vec<_> = truth.speaking_from(ready_ns).filter(legal).collect();
+        assert!(talking.is_empty(), "ready at {ready_ns} after {outcome:?}, but {talking:?}");
+    }
+
+    pub fn tally(&self) -> Tally {
+        *self.world.tally()
+    }
+
+    pub fn is_exact(&self) -> bool {
+        self.world.host().stamp == Stamp::Line
+    }
+}
+
+/// What a UART's driver makes of a block: runs of good bytes and framing errors, each with the end that follows from the
+/// end of the block.
+fn feed(transaction: &mut Transaction, block: &Block, field_ns: u64) {
+    let units: Vec<_> = block.bytes().collect();
+    let mut good = Vec::new();
+    for (k, (byte, framed)) in units.iter().enumerate() {
+        let after = (units.len() - 1 - k) as u64;
+        let end_ns = block.end_ns.saturating_sub(after * field_ns);
+        if *framed {
+            good.push(*byte);
+            continue;
+        }
+        let _ = transaction.bytes(&good, end_ns.saturating_sub(field_ns));
+        good.clear();
+        let _ = transaction.framing_error(end_ns);
+    }
+    let _ = transaction.bytes(&good, block.end_ns);
+}
+
+/// The value that marks a response: its position, and of what kind it is.
+fn tag(frame: &[u8]) -> u64 {
+    let mut value = [0; 8];
+    value.iter_mut().zip(frame).for_each(|(to, from)| *to = *from);
+    u64::from_le_bytes(value)
+}

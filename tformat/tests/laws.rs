@@ -1,0 +1,191 @@
+//! The laws of time on the hostile line. `HOSTILE_EVENTS` says how many events: 100,000 unless it is set.
+#![allow(clippy::arithmetic_side_effects, clippy::cast_possible_truncation, clippy::panic, reason = "a test")]
+#![allow(clippy::expect_used, clippy::indexing_slicing, clippy::unwrap_used, reason = "a test")]
+#![allow(clippy::missing_docs_in_private_items, missing_docs, unreachable_pub, dead_code, reason = "a test")]
+
+mod bench;
+
+use bench::{Bench, Seen};
+use proptest::prelude::*;
+use servowire_world::{Kind, Rates, Scenario, Tally, scenarios};
+use tformat::device::Config;
+use tformat::master::{EEPROM_POLLING, EepromAccess, Reset, SingleTurnZero};
+use tformat::{Abm, Abs, Address, Almc, BitRate, Error, Page, Request, Resolution};
+
+fn events() -> u64 {
+    std::env::var("HOSTILE_EVENTS").ok().and_then(|n| n.parse().ok()).unwrap_or(100_000)
+}
+
+/// Runs seed after seed until enough has happened, and prints what it was.
+fn runs(name: &str, share: u64, mut one: impl FnMut(u64) -> Bench) {
+    let (mut tally, mut seen, mut seed) = (Tally::default(), Seen::default(), 0);
+    while tally.events() < events() / share {
+        let bench = one(seed);
+        tally.add(&bench.tally());
+        let s = bench.seen;
+        seen.done += s.done;
+        seen.failed += s.failed;
+        seen.owed += s.owed;
+        seen.forged += s.forged;
+        seen.undetected += s.undetected;
+        seen.beyond_budget += s.beyond_budget;
+        seed += 1;
+    }
+    println!("{name}: {seed} seeds, {tally}; {seen}");
+    assert!(seen.done > 0 && seen.failed > 0 && seen.owed > 0, "the line was not hostile, or nothing but");
+    for kind in Kind::ALL {
+        assert!(tally.of(kind) > 0, "{kind:?} never happened");
+    }
+}
+
+fn bench(seed: u64, rates: Rates) -> Bench {
+    let rate = BitRate::ALL[(seed / 2) as usize % 2];
+    let config = Config::numbered((seed * 37) as u16 % Config::NUMBERED);
+    Bench::new(Scenario::random(seed, rates), rate, config, seed % 3 == 0)
+}
+
+/// So that ten exchanges in a row are whole in every second run.
+const MILD: Rates = Rates { per_million: [700; Kind::ALL.len()], longest_ns: 100_000 };
+
+const READS: [Request; 4] = [Request::ReadSingleTurn, Request::ReadAll, Request::ReadMultiTurn, Request::ReadEncoderId];
+
+/// Laws 1 to 4 for single transactions, under all switches of the encoder.
+#[test]
+fn hostile_transactions() {
+    runs("transactions", 1, |seed| {
+        let mut bench = bench(seed, Rates::ROUGH);
+        for k in 0..60_usize {
+            let request = READS[[0, 1, 0, 2, 0, 3][k % 6]];
+            let at_ns = bench.ready_ns + (seed + k as u64) % 3 * 5_000;
+            let _ = bench.exchange(request, at_ns);
+        }
+        bench
+    });
+}
+
+/// Law 5: one zero at the most, and the three ends mean what they say.
+#[test]
+fn hostile_zero_presets() {
+    let mut ends = [0_u32; 3];
+    runs("zero presets", 4, |seed| {
+        let mut bench = bench(seed, MILD);
+        bench.moves = false;
+        bench.device.set_position(Abs::truncate(0x1000 + seed as u32 % 0x1000), Abm::truncate(3));
+        let resolution = Resolution::new(23, 16).unwrap();
+        let mut zero = SingleTurnZero::set_and_shift_commutation_angle(resolution, 10);
+        let step = zero.start(bench.ready_ns);
+        let end = bench.run(step, |outcome, ready_ns| zero.receive(outcome, ready_ns));
+        let effects = bench.device.effects();
+        if bench.forged_requests > 0 || bench.seen.forged + bench.seen.undetected > 0 {
+            return bench;
+        }
+        assert!(effects <= 1, "{effects} zeros, seed {seed}");
+        match end {
+            Ok(_) => assert_eq!(effects, 1, "seed {seed}"),
+            Err(Error::EffectUnknown { .. }) => {}
+            Err(error) => assert!(matches!(error, Error::NotDone { .. }) && effects == 0, "{error}, seed {seed}"),
+        }
+        ends[match end {
+            Ok(_) => 0,
+            Err(Error::EffectUnknown { .. }) => 1,
+            Err(_) => 2,
+        }] += 1;
+        bench
+    });
+    println!("zero presets: {} done, {} unknown, {} not done", ends[0], ends[1], ends[2]);
+    assert!(ends[0] > 0 && ends[2] > 0, "{ends:?}");
+}
+
+/// Law 5 for ID C: two attempts in a row, the second after whatever became of the first.
+#[test]
+fn hostile_turn_resets() {
+    runs("turn resets", 4, |seed| {
+        let mut bench = bench(seed, MILD);
+        bench.moves = false;
+        bench.device.set_position(Abs::truncate(5), Abm::truncate(7));
+        let mut reset = Reset::clear_turns_and_lose_multi_turn_reference();
+        for _ in 0..2 {
+            let before = bench.device.effects();
+            let step = reset.start(bench.ready_ns);
+            let end = bench.run(step, |outcome, ready_ns| reset.receive(outcome, ready_ns));
+            let effects = bench.device.effects() - before;
+            if bench.forged_requests > 0 {
+                return bench;
+            }
+            assert!(effects <= 1, "seed {seed}");
+            if matches!(end, Err(Error::NotDone { .. })) {
+                assert_eq!(effects, 0, "seed {seed}");
+            }
+        }
+        bench
+    });
+}
+
+/// Errors may be cleared as often as one likes: the alarms are gone in the end, position and turns are not.
+#[test]
+fn hostile_error_resets() {
+    runs("error resets", 4, |seed| {
+        let mut bench = bench(seed, MILD);
+        bench.moves = false;
+        bench.device.set_position(Abs::truncate(5), Abm::truncate(7));
+        bench.device.set_alarms(Almc::CE, true);
+        bench.device.set_alarms(Almc::CE, false);
+        let mut reset = Reset::clear_errors();
+        let step = reset.start(bench.ready_ns);
+        let _ = bench.run(step, |outcome, ready_ns| reset.receive(outcome, ready_ns));
+        assert!(bench.forged_requests > 0 || (bench.device.abs().get(), bench.device.abm().get()) == (5, 7));
+        bench
+    });
+}
+
+/// Law 5 for the EEPROM: a byte is written once at the most, to the page that was named and to no other, and the end says
+/// what is there.
+#[test]
+fn hostile_eeprom_writes() {
+    let mut ends = [0_u32; 3];
+    runs("EEPROM writes", 4, |seed| {
+        let mut bench = bench(seed, MILD);
+        let (page, cell, data) = (seed as usize % 8, seed as usize % 127, 0x40 + seed as u8 % 64);
+        let address = Address::truncate(cell as u8);
+        let mut access = EepromAccess::write(Page::new(page as u8), address, data, EEPROM_POLLING);
+        let step = access.start(bench.ready_ns);
+        let end = bench.run(step, |outcome, ready_ns| access.receive(outcome, ready_ns));
+        if bench.forged_requests > 0 {
+            return bench;
+        }
+        let written: Vec<_> = bench
+            .device
+            .eeprom_mut()
+            .iter()
+            .enumerate()
+            .flat_map(|(page, cells)| cells.iter().enumerate().map(move |(at, byte)| (page, at, *byte)))
+            .filter(|(.., byte)| *byte != 0xff)
+            .collect();
+        match end {
+            Ok(value) => assert_eq!((value, written), (data, vec![(page, cell, data)]), "seed {seed}"),
+            Err(Error::EffectUnknown { .. }) => assert!(written.len() <= 1, "seed {seed}: {written:?}"),
+            Err(error) => assert_eq!(written, [], "seed {seed}: {error}"),
+        }
+        ends[match end {
+            Ok(_) => 0,
+            Err(Error::EffectUnknown { .. }) => 1,
+            Err(_) => 2,
+        }] += 1;
+        bench
+    });
+    println!("EEPROM writes: {} done, {} unknown, {} refused", ends[0], ends[1], ends[2]);
+    assert!(ends[0] > 0 && ends[2] > 0, "{ends:?}");
+}
+
+proptest! {
+    /// Few faults at any places: what fails is cut down to the fewest.
+    #[test]
+    fn few_faults(scenario in scenarios(12, 4), config in 0..Config::NUMBERED, fast: bool, hint: bool) {
+        let rate = if fast { BitRate::Mbit5 } else { BitRate::Mbit2_5 };
+        let mut bench = Bench::new(scenario, rate, Config::numbered(config), hint);
+        for k in 0..6 {
+            let at_ns = bench.ready_ns;
+            let _ = bench.exchange(READS[k % 4], at_ns);
+        }
+    }
+}
