@@ -82,8 +82,10 @@ mod tests {
     #[test]
     fn the_whole_exact_domain_and_the_edges_of_every_cycle() {
         assert_eq!(u64::from(pru_exact::RECIPROCAL) * 4000, (1 << 32) + 704);
-        (0..pru_exact::EXACT_BELOW + 4000).for_each(check);
-        for m in 0..=u32::MAX / 4000 {
+        // An interpreter takes samples.
+        let stride = if cfg!(miri) { 99_991 } else { 1 };
+        (0..pru_exact::EXACT_BELOW + 4000).step_by(stride).for_each(check);
+        for m in (0..=u32::MAX / 4000).step_by(stride) {
             for t in (m * 4000).saturating_sub(2)..=(m * 4000).saturating_add(2) {
                 check(t);
             }

@@ -198,6 +198,7 @@ mod tests {
     use crate::profile::Parameters;
 
     #[test]
+    #[cfg_attr(miri, ignore = "too long for an interpreter")]
     fn a_quarter_turn_and_its_second_of_rest() {
         let profile = Profile::new(Parameters::at(Speed::KHZ_250)).unwrap();
         let mut mode = PositionMode::new(Motors::M2, Microstep::Div256);
@@ -223,6 +224,7 @@ mod tests {
     }
 
     #[test]
+    #[cfg_attr(miri, ignore = "too long for an interpreter")]
     fn an_abort_before_the_first_pulse_rests_too() {
         let profile = Profile::new(Parameters::at(Speed::KHZ_250)).unwrap();
         let mut mode = PositionMode::new(Motors::ALL, Microstep::Full);

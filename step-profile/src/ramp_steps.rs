@@ -327,6 +327,7 @@ mod tests {
     /// From phase 0 and with K = 1 the PRU leaves the right path at 90 of all whole frequencies below its proved domain,
     /// and at none of TI's named speeds.
     #[test]
+    #[cfg_attr(miri, ignore = "too long for an interpreter")]
     fn where_the_pru_goes_wrong_on_the_ramp() {
         let wrong = |speed: Speed| {
             let given = (speed.raw(), 1, 0);
@@ -348,6 +349,7 @@ mod tests {
     }
 
     #[test]
+    #[cfg_attr(miri, ignore = "too long for an interpreter")]
     fn the_trap_of_phase_0() {
         let silent = |init| {
             profile(Arithmetic::Corrected, (262_144, 1, init)).steps(51_200).filter(|s| s.sync_time == 0).count()

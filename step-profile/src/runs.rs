@@ -100,6 +100,7 @@ mod tests {
     }
 
     #[test]
+    #[cfg_attr(miri, ignore = "too long for an interpreter")]
     fn every_short_move_follows_the_rule() {
         for k in 1..=7 {
             for n in 0..=70 * k {
@@ -120,6 +121,7 @@ mod tests {
 
     /// A stop after j steps goes down by the steps below the depth reached.
     #[test]
+    #[cfg_attr(miri, ignore = "too long for an interpreter")]
     fn every_stop_goes_straight_down() {
         for k in 1..=4_u32 {
             for n in 1..=70 * k {

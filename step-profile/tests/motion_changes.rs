@@ -227,3 +227,22 @@ fn soft_limits_a_halt_and_a_quick_stop() {
     while mover.pulse().is_some() {}
     assert_eq!(mover.position(), 10);
 }
+
+/// The last step of a phase can lie in the half tick in which the phase ends: the next one is a step on all the same.
+#[test]
+fn a_step_at_the_end_of_a_phase() {
+    let limits = Limits::new(15_290, 459_337).unwrap().with_jerk(23_056_699).unwrap();
+    let mut mover = Mover::new(Clock::MICROSECONDS, limits).unwrap();
+    mover.set_override(92, 0);
+    mover.run(Direction::Reverse, 9947, 0).unwrap();
+    while mover.due().is_some_and(|due| due < 118_480) {
+        mover.pulse();
+    }
+    mover.move_to(-1597, 118_480).unwrap();
+    let mut last = mover.pulse().unwrap().tick;
+    for _ in 0..400 {
+        let now = mover.pulse().unwrap().tick;
+        assert!((60..=115).contains(&(now - last)), "{last}, {now}");
+        last = now;
+    }
+}

@@ -93,18 +93,17 @@ impl Curve {
         self.pieces.get(..self.len).unwrap_or(&[])
     }
 
-    /// Adds a piece; one without duration is left out.
-    pub(super) fn push(&mut self, lasts: Real, [v, a, j]: [Real; 3], up: bool, bend: Bend) {
+    /// Adds a piece with its duration and distance; one without duration is left out.
+    pub(super) fn push(&mut self, (lasts, distance): (Real, Real), [v, a, j]: [Real; 3], up: bool, bend: Bend) {
         if lasts.is_zero() {
             return;
         }
         let piece = Piece { time: self.time, p: self.p, v, a, j, up, bend };
-        let end = piece.after(lasts);
         if let Some(place) = self.pieces.get_mut(self.len) {
             *place = piece;
             self.len = self.len.saturating_add(1);
         }
-        (self.time, self.p) = (end.time, end.p);
+        (self.time, self.p) = (self.time + lasts, self.p + distance);
     }
 
     /// Adds a change of speed.
@@ -114,14 +113,16 @@ impl Curve {
         if dv.is_zero() {
             return;
         }
-        let end = self.p + slope.distance();
+        let whole = slope.distance();
         let a = dv / (edge + flat);
         let j = if edge.is_zero() { Real::ZERO } else { a / edge };
         let bent = (a * edge).half();
-        self.push(edge, [from, Real::ZERO, j], up, Bend::Growing);
-        self.push(flat, [from.along(bent, up), a, Real::ZERO], up, Bend::Flat);
-        self.push(edge, [to.along(bent, !up), a, j], up, Bend::Fading);
-        self.p = end;
+        // The middle has the mean speed.
+        let first = from.along(bent * THIRD, up) * edge;
+        let middle = if edge.is_zero() { whole } else { (from + to).half() * flat };
+        self.push((edge, first), [from, Real::ZERO, j], up, Bend::Growing);
+        self.push((flat, middle), [from.along(bent, up), a, Real::ZERO], up, Bend::Flat);
+        self.push((edge, whole - (first + middle)), [to.along(bent, !up), a, j], up, Bend::Fading);
     }
 
     /// Adds a stretch at constant speed.
@@ -129,8 +130,6 @@ impl Curve {
         if distance.is_zero() || v.is_zero() {
             return;
         }
-        let end = self.p + distance;
-        self.push(distance / v, [v, Real::ZERO, Real::ZERO], true, Bend::Flat);
-        self.p = end;
+        self.push((distance / v, distance), [v, Real::ZERO, Real::ZERO], true, Bend::Flat);
     }
 }

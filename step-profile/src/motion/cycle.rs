@@ -128,6 +128,7 @@ mod tests {
     use std::vec::Vec;
 
     #[test]
+    #[cfg_attr(miri, ignore = "too long for an interpreter")]
     fn reloads_add_up_to_the_ticks() {
         let plan = Plan::new(Clock::MICROSECONDS, Limits::new(61_000, 100_000).unwrap(), 40_000).unwrap();
         let ticks: Vec<u64> = plan.pulses().collect();
@@ -147,6 +148,7 @@ mod tests {
     }
 
     #[test]
+    #[cfg_attr(miri, ignore = "too long for an interpreter")]
     fn a_cycle_has_one_step_at_most_and_the_time_is_kept() {
         let limits = Limits::new(250_000, 20_000_000).unwrap();
         assert!(PtoMover::new(limits.with_speed(250_001).unwrap()).is_err());

@@ -180,6 +180,7 @@ mod tests {
     }
 
     #[test]
+    #[cfg_attr(miri, ignore = "too long for an interpreter")]
     fn the_switch_is_found_to_the_step() {
         for direction in DIRECTIONS {
             for at in [1, 700, 3000, -100] {
@@ -194,6 +195,7 @@ mod tests {
     }
 
     #[test]
+    #[cfg_attr(miri, ignore = "too long for an interpreter")]
     fn no_switch_and_a_switch_that_stays_closed() {
         for direction in DIRECTIONS {
             let (state, real, _, mover) = home(direction, 6000);

@@ -130,7 +130,7 @@ impl Mover {
         let pulse = Pulse { tick: self.clock.tick(moment), direction: self.direction };
         self.position = self.direction.advance(self.position);
         self.free = moment.saturating_add(self.clock.moment(1));
-        self.due = self.stepper.next(&self.phases);
+        self.due = self.stepper.next(&self.phases).map(|due| due.max(self.free));
         if self.due.is_none() {
             self.go_on();
         } else if self.phases.is_endless() && self.stepper.count() >= 1 << 30 {

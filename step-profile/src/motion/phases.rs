@@ -143,11 +143,8 @@ impl Phases {
         let (over, behind) = curve.skipped;
         let mut new = Self::rest(frame.begin, frame.from);
         new.endless = frame.endless;
-        let position = |p: Real| {
-            let ahead =
-                signed((p * frame.scale).to_fixed(P)).saturating_sub(signed((behind * frame.scale).to_fixed(P)));
-            frame.from.saturating_add(ahead)
-        };
+        let origin = frame.from.saturating_sub(signed((behind * frame.scale).to_fixed(P)));
+        let position = |p: Real| origin.saturating_add(signed((p * frame.scale).to_fixed(P)));
         let pieces = curve.pieces();
         let mut ends = pieces.iter().skip(1).map(|next| (next.time, next.p)).chain([(curve.time, curve.p)]);
         for piece in pieces {

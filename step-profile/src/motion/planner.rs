@@ -89,8 +89,7 @@ impl Bent {
     /// A curve that brings the acceleration to 0.
     fn coasting(&self, start: Motion) -> Curve {
         let mut curve = Curve::new();
-        curve.push(self.edge, [start.v, start.a, self.jerk.j], start.up, Bend::Fading);
-        curve.p = self.coast.1;
+        curve.push((self.edge, self.coast.1), [start.v, start.a, self.jerk.j], start.up, Bend::Fading);
         curve
     }
 }

@@ -246,7 +246,7 @@ impl Stepper {
             self.a = self.grown(ahead.da6, 6);
         }
         // rest / v, with the last interval for 1 / v.
-        let late = (u64::from((rest >> WIDEN) as u32).wrapping_mul(time.into()) >> 32) as u32;
+        let late = (u64::from((rest.max(0) >> WIDEN) as u32).wrapping_mul(time.into()) >> 32) as u32;
         let interval = time.wrapping_add(late).wrapping_sub(self.late);
         self.change = interval.wrapping_sub(self.last) as i32;
         (self.last, self.late) = (interval, late);
@@ -272,9 +272,13 @@ impl Stepper {
             if next == time {
                 break;
             }
-            time = next;
-            ahead = self.ahead(time);
-            rest = self.rest.wrapping_add(STEP).wrapping_sub(ahead.dp);
+            let there = self.ahead(next);
+            let left = self.rest.wrapping_add(STEP).wrapping_sub(there.dp);
+            if left < 0 && rest >= 0 && next.wrapping_sub(time) == self.grid {
+                // The half tick before was the last: its speed makes it a little shorter than it is.
+                break;
+            }
+            (time, ahead, rest) = (next, there, left);
         }
         self.commit(time, rest, &ahead);
     }
