@@ -38,8 +38,8 @@ const fn resolution(st_bits: u8, mt_bits: u8) -> Resolution {
 }
 
 /// Profiles and positions.
-const POSITIONS: [(Resolution, u64, u8); 3] =
-    [(resolution(17, 16), 0x1_9000_526f, 40), (resolution(20, 16), 0xfb_f700, 24), (resolution(24, 0), 0x1_ffff, 17)];
+const POSITIONS: [(Resolution, Response); 3] =
+    [(resolution(17, 16), EMITTED[0]), (resolution(20, 16), EMITTED[1]), (resolution(24, 0), EMITTED[2])];
 
 /// The bytes of a request, two a frame, and how many.
 const SENT: [([u8; 4], usize); 2] = [([0x44, 0x03, 0, 0], 2), ([0x40, 0xb0, 0x5b, 0x78], 4)];
@@ -122,8 +122,8 @@ kernels! {
     } over [[0x20, 0x85, 0xf6, 0x4a, 0x80, 0x09, 0x80]];
 
     /// Single turn, turns and angle of a position.
-    fn nikon_position((resolution, abs, bits): &(Resolution, u64, u8)) -> Result<(Position, u32, u32, i32), Error> {
-        let position = resolution.position(*abs, *bits)?;
+    fn nikon_position((resolution, response): &(Resolution, Response)) -> Result<(Position, u32, u32, i32), Error> {
+        let position = resolution.position(response)?;
         let single = position.single_turn;
         Ok((position, resolution.fraction(single), resolution.milli_degrees(single), resolution.difference(single, 0)))
     } over POSITIONS;
