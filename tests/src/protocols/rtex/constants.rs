@@ -143,7 +143,7 @@ fn other(name: &str) -> Option<u64> {
         "index.pr7_20" => Pr { class: 7, number: 20 }.index().into(),
         "frame.one_axis_ns" => FrameTime::GUIDE.one_ns.into(),
         "frame.full_ns" => FrameTime::GUIDE.full_ns.into(),
-        "led.half_period_ms" => (0..).find(|t_ms| led(Phase::Prepare, None, *t_ms) == Led::Off)?,
+        "led.half_period_ms" => (0..10_000).find(|t_ms| led(Phase::Prepare, None, *t_ms) == Led::Off)?,
         _ => return None,
     })
 }
