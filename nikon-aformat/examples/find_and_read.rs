@@ -29,7 +29,7 @@ fn main() -> Result<(), Error> {
         encoder.set_fault(if cycle == 3 { Fault::FlipBit { at: 37 } } else { Fault::None });
         let outcome = transact(&mut encoder, request, resolution, now_ns);
         counters.record(&outcome);
-        match outcome.and_then(|raw| Ok((resolution.position(raw.abs().unwrap_or(0), 40)?, raw.es()))) {
+        match outcome.and_then(|response| Ok((resolution.position(&response)?, response.es()))) {
             Ok((position, es)) => {
                 let es = es.unwrap_or_default();
                 println!("{cycle}: turn {:>3}, {:>7} counts, status {es}", position.turns, position.single_turn);

@@ -21,6 +21,8 @@
 //! assert_eq!(bus.of(second), Outcome::Missing);
 //! ```
 
+use nrz_line::BitOrder;
+
 use crate::error::Error;
 use crate::expected::Expected;
 use crate::number::EncoderAddress;
@@ -153,6 +155,11 @@ impl Bus {
     /// A response has arrived, or was cut or broken.
     pub fn push(&mut self, raw: Result<RawResponse, Error>) -> Arrival {
         self.take(raw.and_then(|raw| Response::parse(&self.expected, &raw)))
+    }
+
+    /// A response has arrived as words, the content bits of one frame each.
+    pub fn push_words(&mut self, words: &[u16], order: BitOrder) -> Arrival {
+        self.take(Response::parse_words(&self.expected, words, order))
     }
 
     /// A response that was judged already.
@@ -299,9 +306,14 @@ mod tests {
         #[test]
         fn order_does_not_matter(asked: u8, order in Just([0_u8, 1, 2, 3, 4, 5, 6, 7]).prop_shuffle()) {
             let mut bus = bus(Addresses::from_bits(asked));
-            for ea in order.into_iter().filter(|ea| asked >> ea & 1 == 1) {
+            for (turn, ea) in order.into_iter().filter(|ea| asked >> ea & 1 == 1).enumerate() {
                 prop_assert!(!bus.heard_all());
-                bus.push(Ok(response(ea, u32::from(ea) * 1000).emit()));
+                let raw = response(ea, u32::from(ea) * 1000).emit();
+                if turn % 2 == 0 {
+                    bus.push(Ok(raw));
+                } else {
+                    bus.push_words(raw.contents(), BitOrder::LsbFirst);
+                }
             }
             prop_assert!(bus.heard_all() && bus.missing().is_empty() && bus.extra().is_empty());
             for ea in bus.asked().iter() {

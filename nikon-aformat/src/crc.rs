@@ -28,6 +28,13 @@ fn next(register: u8) -> u8 {
     table[usize::from(register)]
 }
 
+/// The register 16 content bits later, the first line bit in bit 0.
+#[inline(always)]
+pub(crate) fn next_word(register: u8, content: u16) -> u8 {
+    let [low, high] = content.to_le_bytes();
+    next(next(register ^ low) ^ high)
+}
+
 /// The CRC-8 of a response, taken in as the response comes: bit by bit, byte by byte or word by word.
 ///
 /// Generator x^8 + x^4 + x^3 + x^2 + 1 (0x1D), initial value 0, no final XOR; bits enter in the order of the line.
@@ -228,6 +235,8 @@ mod tests {
             prop_assert_eq!(msb_first(&bytes).fold(Crc8::new(), Crc8::bit).get(), whole);
             prop_assert_eq!(bytes.iter().fold(Crc8::new(), |crc, byte| crc.byte(*byte)).get(), whole);
             prop_assert_eq!(words.iter().fold(Crc8::new(), |crc, word| crc.word(*word)).get(), whole);
+            let by_words = words.iter().fold(0, |register, word| next_word(register, word.reverse_bits()));
+            prop_assert_eq!(by_words.reverse_bits(), whole);
             let mirror: std::vec::Vec<u8> = bytes.iter().map(|byte| byte.reverse_bits()).collect();
             prop_assert_eq!(mirrored(&mirror).reverse_bits(), whole);
             if let Some(eight) = mirror.first_chunk() {

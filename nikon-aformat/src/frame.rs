@@ -206,32 +206,57 @@ const fn mirror3(bits: u8) -> u8 {
     (bits & 7).reverse_bits() >> 5
 }
 
-/// The content bits of the first `frames` frames of a line, back to back, after the length and framing checks.
-pub(crate) fn contents(line: Window, frames: u32) -> Result<[u16; MAX_FRAMES as usize], Error> {
-    let bits = frames.wrapping_mul(FRAME_BITS);
-    if line.len() < bits {
-        return Err(truncated(line.len(), bits));
-    }
-    let within = match 1_u128.checked_shl(bits) {
+/// What holds for the line bits of the first frames, in the words of a 32-bit core.
+#[derive(Clone, Copy)]
+struct Masks {
+    within: [u32; 4],
+    framing: [u32; 4],
+    delimiters: [u32; 4],
+}
+
+/// By the number of frames.
+static MASKS: [Masks; MAX_FRAMES as usize + 1] = [masks(0), masks(1), masks(2), masks(3), masks(4), masks(5), masks(6)];
+
+const fn masks(frames: u32) -> Masks {
+    let within = match 1_u128.checked_shl(frames.wrapping_mul(FRAME_BITS)) {
         Some(one) => one.wrapping_sub(1),
         None => u128::MAX,
     };
-    if (line.bits() ^ DELIMITER) & (START | DELIMITER) & within != 0 {
+    Masks { within: words(within), framing: words((START | DELIMITER) & within), delimiters: words(DELIMITER & within) }
+}
+
+#[inline(always)]
+#[expect(clippy::cast_possible_truncation, reason = "the number is taken apart")]
+const fn words(bits: u128) -> [u32; 4] {
+    [bits as u32, (bits >> 32) as u32, (bits >> 64) as u32, (bits >> 96) as u32]
+}
+
+/// The content bits of the first `frames` frames of a line, back to back, after the length and framing checks.
+pub(crate) fn contents(line: Window, frames: u32) -> Result<[u16; MAX_FRAMES as usize], Error> {
+    let bits = frames.wrapping_mul(FRAME_BITS);
+    let (Some(masks), true) = (MASKS.get(frames as usize), line.len() >= bits) else {
+        return Err(truncated(line.len(), bits));
+    };
+    let ([w0, w1, w2, w3], [f0, f1, f2, f3]) = (words(line.bits()), masks.framing);
+    let [d0, d1, d2, d3] = masks.delimiters;
+    if (w0 & f0 ^ d0) | (w1 & f1 ^ d1) | (w2 & f2 ^ d2) | (w3 & f3 ^ d3) != 0 {
         return Err(framing(line, frames));
     }
-    Ok(unpack(line.bits() & within))
+    let [i0, i1, i2, i3] = masks.within;
+    Ok(unpack([w0 & i0, w1 & i1, w2 & i2, w3 & i3]))
 }
 
 /// The content bits of six frames, each with a constant shift.
+#[inline(always)]
 #[expect(clippy::cast_possible_truncation, reason = "each shift brings a frame's content bits to bits 0..=15")]
-pub(crate) const fn unpack(line: u128) -> [u16; MAX_FRAMES as usize] {
+const fn unpack([w0, w1, w2, w3]: [u32; 4]) -> [u16; MAX_FRAMES as usize] {
     [
-        (line >> 1) as u16,
-        (line >> 19) as u16,
-        (line >> 37) as u16,
-        (line >> 55) as u16,
-        (line >> 73) as u16,
-        (line >> 91) as u16,
+        (w0 >> 1) as u16,
+        (w0 >> 19 | w1 << 13) as u16,
+        (w1 >> 5) as u16,
+        (w1 >> 23 | w2 << 9) as u16,
+        (w2 >> 9) as u16,
+        (w2 >> 27 | w3 << 5) as u16,
     ]
 }
 
@@ -351,7 +376,7 @@ mod tests {
         fn line_and_back(content: [u16; 6]) {
             let line = Window::from_bits(pack(content), 108).unwrap();
             prop_assert_eq!(contents(line, 6), Ok(content));
-            prop_assert_eq!(unpack(line.bits()), content);
+            prop_assert_eq!(unpack(words(line.bits())), content);
             for frame in 0..6_u8 {
                 for (bit, want) in [(0, Error::StartBit { frame }), (17, Error::Delimiter { frame })] {
                     let at = u32::from(frame) * 18 + bit;

@@ -2,7 +2,7 @@ use core::fmt;
 
 use nrz_line::{BitOrder, Window};
 
-use crate::crc::mirrored;
+use crate::crc::{mirrored, next_word};
 use crate::error::Error;
 use crate::frame::{MAX_FRAMES, contents, pack, truncated};
 use crate::layout::FRAME_BITS;
@@ -114,15 +114,13 @@ impl RawResponse {
 
     /// Whether the CRC-8 is right.
     pub(crate) fn is_sound(&self) -> bool {
-        let bytes = bytes(self.contents);
-        mirrored(bytes.get(..usize::from(self.frames).wrapping_mul(2)).unwrap_or(&bytes)) == 0
+        self.contents().iter().fold(0, |register, content| next_word(register, *content)) == 0
     }
 
-    /// All content bits as one number, the first of the line in bit 0.
-    pub(crate) fn payload(&self) -> u128 {
-        let [c0, c1, c2, c3, c4, c5] = self.contents;
-        let wide = |content, at: u32| u128::from(content) << at;
-        wide(c0, 0) | wide(c1, 16) | wide(c2, 32) | wide(c3, 48) | wide(c4, 64) | wide(c5, 80)
+    /// The content bits of six frames, 0 after the last.
+    #[inline(always)]
+    pub(crate) const fn all_contents(&self) -> [u16; MAX_FRAMES as usize] {
+        self.contents
     }
 }
 

@@ -215,7 +215,7 @@ mod tests {
         let expected = Expected::new(Layout::Abs17, Command::Abs17).from_address(EncoderAddress::MAX);
         let tolerant = hear(receiver.allowing_idle_between_frames());
         let wrong = tolerant[0].and_then(|raw| Response::parse(&expected, &raw));
-        assert_eq!(wrong.map(|response| response.abs()), Ok(Some(57_028)));
+        assert_eq!(wrong.map(Response::abs), Ok(Some(57_028)));
     }
 
     /// Every single wrong bit of every position in a sweep: nothing wrong is ever accepted.

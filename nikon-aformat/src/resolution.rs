@@ -1,8 +1,11 @@
 use core::fmt;
 
+use servowire_core::OutOfRange;
+
 use crate::command::Version;
 use crate::error::Error;
 use crate::number::U40;
+use crate::response::Response;
 
 /// What the line does not say about an encoder: its widths, its version and its factory settings.
 ///
@@ -24,19 +27,6 @@ pub struct Resolution {
     resets_with_position: bool,
 }
 
-/// Widths that no encoder can have: 1 to 32 single-turn bits, at most 16 bits of turns, at most 40 together.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[error(
-    "{st_bits} single-turn bits and {mt_bits} bits of turns: 1 to 32 and 0 to 32, together at most 40, are possible"
-)]
-pub struct WidthError {
-    /// Single-turn bits asked for.
-    pub st_bits: u8,
-    /// Bits of turns asked for.
-    pub mt_bits: u8,
-}
-
 /// Where the shaft is, in the units of a [`Resolution`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -47,19 +37,6 @@ pub struct Position {
     pub turns: u32,
     /// How many bits of the turns the response shows: all, fewer in 24 bits, none in 17.
     pub turns_bits: u8,
-}
-
-impl Position {
-    /// The turns as a signed number, if all 16 bits of them are there: -32768..=32767. Beyond, the counter wraps round and
-    /// OVFLOW is raised.
-    #[expect(
-        clippy::cast_possible_truncation,
-        clippy::cast_possible_wrap,
-        reason = "16 bits, and the wrap is the sign"
-    )]
-    pub const fn signed_turns(self) -> Option<i16> {
-        if self.turns_bits == 16 { Some(self.turns as u16 as i16) } else { None }
-    }
 }
 
 impl Default for Resolution {
@@ -74,10 +51,20 @@ impl Resolution {
     /// an encoder of version 2.1.
     ///
     /// # Errors
-    /// [`WidthError`] for no or more than 32 single-turn bits, more than 32 bits of turns, or more than 40 together.
-    pub const fn new(st_bits: u8, mt_bits: u8) -> Result<Self, WidthError> {
-        if st_bits == 0 || st_bits > 32 || mt_bits > 32 || st_bits.saturating_add(mt_bits) > 40 {
-            return Err(WidthError { st_bits, mt_bits });
+    /// [`OutOfRange`] for no or more than 32 single-turn bits, more than 32 bits of turns, or more than 40 together.
+    pub const fn new(st_bits: u8, mt_bits: u8) -> Result<Self, OutOfRange> {
+        let (st, mt) = (st_bits as u64, mt_bits as u64);
+        if st == 0 {
+            return Err(OutOfRange { got: 0, max: 1 });
+        }
+        if st > 32 {
+            return Err(OutOfRange::above(st, 32));
+        }
+        if mt > 32 {
+            return Err(OutOfRange::above(mt, 32));
+        }
+        if st.saturating_add(mt) > 40 {
+            return Err(OutOfRange::above(st.saturating_add(mt), 40));
         }
         Ok(Self { st_bits, mt_bits, version: Version::V2_1, low_with_velocity: false, resets_with_position: false })
     }
@@ -130,14 +117,40 @@ impl Resolution {
         1_u64.wrapping_shl(self.st_bits as u32)
     }
 
-    /// Takes the position of a response apart. `abs` and `abs_bits` are what the response shows from bit 0 up, see
-    /// [`Response::abs`](crate::Response::abs) and [`Layout::abs_bits`](crate::layout::Layout::abs_bits).
+    /// Takes the position of a response apart, whatever its status says; for control there is [`read`](Self::read).
     ///
     /// # Errors
-    /// [`Error::NotCarried`] if the response shows less than a whole turn, as 17 bits do of a 20-bit encoder;
+    /// [`Error::NotCarried`] if the response shows no position from bit 0 up or less than a whole turn, as 17 bits do of a
+    /// 20-bit encoder; [`Error::UpperBits`] if bits are set above the widths of the resolution.
+    pub const fn position(self, response: &Response) -> Result<Position, Error> {
+        match response.abs() {
+            Some(abs) => self.part(abs, response.layout().abs_bits()),
+            None => Err(Error::NotCarried),
+        }
+    }
+
+    /// Takes a whole position apart.
+    ///
+    /// # Errors
     /// [`Error::UpperBits`] if bits are set above the widths of the resolution.
+    pub const fn split(self, abs: U40) -> Result<Position, Error> {
+        self.part(abs.get(), 40)
+    }
+
+    /// The turns of a position as a signed number, if the response showed all bits of them: with 16 bits -32768..=32767.
+    /// Beyond, the counter wraps round and OVFLOW is raised.
+    #[expect(clippy::cast_possible_wrap, reason = "the wrap is the sign")]
+    pub const fn signed_turns(self, position: Position) -> Option<i32> {
+        if position.turns_bits != self.mt_bits || self.mt_bits == 0 {
+            return None;
+        }
+        let unused = 32_u32.saturating_sub(self.mt_bits as u32);
+        Some((position.turns.wrapping_shl(unused) as i32).wrapping_shr(unused))
+    }
+
+    /// Of the position bits `abs` the `abs_bits` lowest are there.
     #[expect(clippy::cast_possible_truncation, reason = "both parts are masked to 32 bits at most")]
-    pub const fn position(self, abs: u64, abs_bits: u8) -> Result<Position, Error> {
+    const fn part(self, abs: u64, abs_bits: u8) -> Result<Position, Error> {
         if abs_bits < self.st_bits {
             return Err(Error::NotCarried);
         }
@@ -206,9 +219,9 @@ struct Written {
 
 #[cfg(feature = "serde")]
 impl TryFrom<Written> for Resolution {
-    type Error = WidthError;
+    type Error = OutOfRange;
 
-    fn try_from(written: Written) -> Result<Self, WidthError> {
+    fn try_from(written: Written) -> Result<Self, OutOfRange> {
         let resolution = Self::new(written.st_bits, written.mt_bits)?.with_version(written.version);
         let resolution = if written.low_with_velocity { resolution.low_with_velocity() } else { resolution };
         Ok(if written.resets_with_position { resolution.resets_with_position() } else { resolution })
@@ -266,16 +279,29 @@ mod tests {
     }
 
     #[test]
+    fn turns_of_any_width_have_a_sign() {
+        for mt_bits in 1..=32_u8 {
+            let resolution = Resolution::new(8, mt_bits).unwrap();
+            let signed = |turns: u32| resolution.signed_turns(resolution.split(resolution.compose(0, turns)).unwrap());
+            assert_eq!(signed(u32::MAX), Some(-1), "{mt_bits} bits");
+            assert_eq!(signed(1 << (mt_bits - 1)), Some(-1 << (mt_bits - 1)), "{mt_bits} bits");
+            assert_eq!(signed((1 << (mt_bits - 1)) - 1), i32::try_from((1_u32 << (mt_bits - 1)) - 1).ok());
+        }
+        let none = Resolution::new(24, 0).unwrap();
+        assert_eq!(none.signed_turns(none.split(U40::truncate(5)).unwrap()), None);
+    }
+
+    #[test]
     fn what_a_response_shows() {
         let resolution = Resolution::new(20, 16).unwrap();
         let abs = resolution.compose(0xabcde, 0x8001);
-        let at = |bits: u8| resolution.position(abs.get() & ((1 << bits) - 1), bits);
+        let at = |bits: u8| resolution.part(abs.get() & ((1 << bits) - 1), bits);
         assert_eq!(at(40), Ok(Position { single_turn: 0xabcde, turns: 0x8001, turns_bits: 16 }));
-        assert_eq!(at(40).unwrap().signed_turns(), Some(-32_767));
+        assert_eq!(resolution.signed_turns(at(40).unwrap()), Some(-32_767));
         assert_eq!(at(24), Ok(Position { single_turn: 0xabcde, turns: 1, turns_bits: 4 }));
-        assert_eq!(at(24).unwrap().signed_turns(), None);
+        assert_eq!(resolution.signed_turns(at(24).unwrap()), None);
         assert_eq!(at(17), Err(Error::NotCarried));
-        assert_eq!(resolution.position(1 << 36, 40), Err(Error::UpperBits { width: 36 }));
+        assert_eq!(resolution.split(U40::truncate(1 << 36)), Err(Error::UpperBits { width: 36 }));
     }
 
     proptest! {
@@ -284,7 +310,7 @@ mod tests {
             let resolution = Resolution::new(st, mt).unwrap();
             let (single, turns) = (single & ((1 << st) - 1), turns & ((1 << mt) - 1));
             let abs = resolution.compose(single, turns);
-            prop_assert_eq!(resolution.position(abs.get(), 40), Ok(Position { single_turn: single, turns, turns_bits: mt }));
+            prop_assert_eq!(resolution.split(abs), Ok(Position { single_turn: single, turns, turns_bits: mt }));
             prop_assert!(resolution.milli_degrees(single) < 360_000);
             prop_assert_eq!(resolution.fraction(single) >> (32 - st), single);
             prop_assert!((resolution.degrees(single) * 1000.0 - f64::from(resolution.milli_degrees(single))).abs() < 1.001);

@@ -88,18 +88,16 @@ impl Response {
         if !raw.is_sound() || !expected.fits(raw) {
             return Err(expected.refusal(raw));
         }
-        let payload = raw.payload();
-        let ea = EncoderAddress::truncate(nibbles(payload >> 3));
-        let body = match Data::from_bits(expected.layout(), payload >> 16) {
-            Some(data) => {
-                expected.check_memory(data)?;
-                Body::Full {
-                    command: expected.command(),
-                    es: EncoderStatus::from_bits_truncate(nibbles(payload >> 12)),
-                    data,
-                }
-            }
-            None => Body::Abs17 { es_any: payload >> 6 & 1 == 1, abs: abs17(payload) },
+        let contents = raw.all_contents();
+        let [first, second, ..] = contents;
+        let ea = EncoderAddress::truncate(low_byte(first >> 3));
+        let body = if let Some(data) = Data::from_contents(expected.layout(), contents) {
+            expected.check_memory(data)?;
+            let es = EncoderStatus::from_bits_truncate(low_byte(first >> 12));
+            Body::Full { command: expected.command(), es, data }
+        } else {
+            let abs = U17::truncate(u32::from(first) >> 7 | u32::from(second) << 9);
+            Body::Abs17 { es_any: first >> 6 & 1 == 1, abs }
         };
         Ok(Self { ea, body })
     }
@@ -261,15 +259,9 @@ impl Response {
     }
 }
 
-/// The low bits of a shifted payload, for fields of up to eight bits.
 #[expect(clippy::cast_possible_truncation, reason = "the caller cuts its field off")]
-const fn nibbles(payload: u128) -> u8 {
-    payload as u8
-}
-
-#[expect(clippy::cast_possible_truncation, reason = "17 bits")]
-const fn abs17(payload: u128) -> U17 {
-    U17::truncate((payload >> 7) as u32)
+const fn low_byte(bits: u16) -> u8 {
+    bits as u8
 }
 
 impl fmt::Display for Response {

@@ -116,10 +116,12 @@ impl Run {
         truth.acts.clear();
         truth.forget_before(self.at_ns.saturating_sub(1_000_000));
     }
+}
 
-    fn shown<T>(&self, what: &str, end: Result<T, Error>, shown: &mut Shown) {
+impl Shown {
+    fn ended<T>(&mut self, what: &str, end: Result<T, Error>) {
         let end = end.err().map_or("done", |error| error.class().name());
-        *shown.ends.entry(format!("{what}: {end}")).or_default() += 1;
+        *self.ends.entry(format!("{what}: {end}")).or_default() += 1;
     }
 }
 
@@ -168,7 +170,7 @@ fn hostile_resets() {
                 let alm = run.bench.encoders.all[0].alm(now_ns);
                 assert!(!alm.contains(nikon_aformat::Alm::MEMBUSY), "seed {seed} turn {turn}: busy at ready_ns");
             }
-            run.shown("zero preset", end, shown);
+            shown.ended("zero preset", end);
         }
         shown.tally.add(run.bench.world.tally());
     });
@@ -194,7 +196,7 @@ fn hostile_eeprom_reads() {
             let end = run.drive(first, |outcome, now_ns| read.receive(outcome, now_ns));
             let stored = [turn * 0x111, turn * 0x321 + 7][usize::from(turn % 2)];
             assert!(end.is_err() || end == Ok(stored), "seed {seed} turn {turn}: {end:x?} instead of {stored:x}");
-            run.shown("read", end, shown);
+            shown.ended("read", end);
             run.forget();
         }
         shown.tally.add(run.bench.world.tally());
@@ -232,13 +234,13 @@ fn hostile_writes() {
                 Err(_) => word == before && acts == 0,
             };
             assert!(right, "seed {seed} turn {turn}: {end:?}, {acts} writes, {word:x?}");
-            run.shown("write", end, shown);
+            shown.ended("write", end);
         }
         let id = EncoderId::truncate(seed as u32);
         let mut write = VerifiedWrite::new(Write::id(EA, id));
         let first = write.start(run.now_ns());
         let end = run.drive(first, |outcome, now_ns| write.receive(outcome, now_ns));
-        run.shown("id", end, shown);
+        shown.ended("id", end);
         shown.tally.add(run.bench.world.tally());
     });
     for end in ["done", "not_done", "effect_unknown"] {

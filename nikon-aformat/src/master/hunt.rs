@@ -135,10 +135,11 @@ impl Hunt {
     }
 
     fn drop_first(&mut self) {
-        self.contents.rotate_left(1);
-        self.begun_ns.rotate_left(1);
+        let [_, c1, c2, c3, c4, c5] = self.contents;
+        self.contents = [c1, c2, c3, c4, c5, 0];
+        let [_, b1, b2, b3, b4, b5] = self.begun_ns;
+        self.begun_ns = [b1, b2, b3, b4, b5, 0];
         self.got = self.got.saturating_sub(1);
-        self.clear_from(self.got);
     }
 
     /// A pause: what was begun is not continued.
@@ -167,12 +168,6 @@ impl Hunt {
     fn clear(&mut self) {
         self.got = 0;
         self.contents = [0; RawResponse::MAX_FRAMES];
-    }
-
-    fn clear_from(&mut self, got: usize) {
-        if let Some(rest) = self.contents.get_mut(got..) {
-            rest.fill(0);
-        }
     }
 }
 

@@ -1,11 +1,12 @@
 use super::hunt::{Block, Found, Hunt};
 use super::{Line, Progress};
 use crate::bus::{Addresses, Bus, Outcome};
+use crate::doubt::{Doubt, Policy};
 use crate::error::Error;
 use crate::expected::Expected;
 use crate::number::EncoderAddress;
 use crate::request::{Frames, Request};
-use crate::resolution::Resolution;
+use crate::resolution::{Position, Resolution};
 use crate::response::Response;
 
 /// When a position was sampled: not documented, but after the end of the request and before the response began.
@@ -26,6 +27,21 @@ pub struct Reading {
     pub response: Response,
     /// When it was sampled.
     pub sampled: Sampled,
+}
+
+impl Reading {
+    /// The position for control at `now_ns`: only if nothing speaks against its use, its age included. See
+    /// [`Resolution::read`].
+    ///
+    /// # Errors
+    /// [`Doubt::Old`], then as [`Resolution::read`].
+    pub fn position(&self, resolution: Resolution, policy: Policy, now_ns: u64) -> Result<Position, Doubt> {
+        let age_ns = now_ns.saturating_sub(self.sampled.earliest_ns);
+        if age_ns > policy.max_age_ns() {
+            return Err(Doubt::Old { age_ns });
+        }
+        resolution.read(&self.response, policy)
+    }
 }
 
 /// One request and its response, frame by frame or in blocks.

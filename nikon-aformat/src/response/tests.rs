@@ -9,7 +9,9 @@ use std::vec::Vec;
 
 /// Data of `layout` out of random numbers, never a bank error; `None` for the short form.
 pub(crate) fn data(layout: Layout, a: u64, b: u64) -> Option<Data> {
-    match Data::from_bits(layout, u128::from(a) | u128::from(b) << 64) {
+    let word = |bits: u64, at: u32| (bits >> at) as u16;
+    let contents = [0, word(a, 0), word(a, 16), word(a, 32), word(a, 48), word(b, 0)];
+    match Data::from_contents(layout, contents) {
         Some(Data::EepromBank { data, bank, address, .. }) => {
             Some(Data::EepromBank { data, bank, address, bank_error: false })
         }

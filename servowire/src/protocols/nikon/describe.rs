@@ -148,7 +148,7 @@ impl Encoder {
         let Some(resolution) = self.resolution() else {
             return Some(Position { counts, span: Some(1 << bits), per_turn: None });
         };
-        match resolution.position(abs, bits) {
+        match resolution.position(&response) {
             Ok(position) => Some(Position {
                 counts,
                 span: Some(1 << (resolution.st_bits() + position.turns_bits)),

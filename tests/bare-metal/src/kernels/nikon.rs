@@ -1,5 +1,6 @@
 //! A-format: requests and replies in every form.
 
+use nikon_aformat::bus::{Addresses, Bus};
 use nikon_aformat::{
     Abs40, Alm, BitOrder, BitRate, Command, Crc3, Crc8, EncoderAddress, EncoderStatus, Error, Expected, Frames,
     Operation, Position, RawResponse, Request, RequestFrame, Resolution, Response, TypeWord, U24, U40, UserAddress,
@@ -38,8 +39,8 @@ const fn resolution(st_bits: u8, mt_bits: u8) -> Resolution {
 }
 
 /// Profiles and positions.
-const POSITIONS: [(Resolution, u64, u8); 3] =
-    [(resolution(17, 16), 0x1_9000_526f, 40), (resolution(20, 16), 0xfb_f700, 24), (resolution(24, 0), 0x1_ffff, 17)];
+const POSITIONS: [(Resolution, Response); 3] =
+    [(resolution(17, 16), EMITTED[0]), (resolution(20, 16), EMITTED[1]), (resolution(24, 0), EMITTED[2])];
 
 /// The bytes of a request, two a frame, and how many.
 const SENT: [([u8; 4], usize); 2] = [([0x44, 0x03, 0, 0], 2), ([0x40, 0xb0, 0x5b, 0x78], 4)];
@@ -64,6 +65,20 @@ kernels! {
     fn nikon_response_parse_words(row: &Replied) -> Result<Response, Error> {
         Response::parse_words(&row.expected, row.words, BitOrder::MsbFirst)
     } over REPLIES;
+
+    /// The reply with the whole position from words, all checks.
+    fn nikon_abs40_words(words: &[u16; 4]) -> Result<Response, Error> {
+        Response::parse_words(&WHOLE_MT, words, BitOrder::MsbFirst)
+    } over EIGHT;
+
+    /// The replies of eight encoders from words, each found under its address.
+    fn nikon_bus_of_eight(words: &[[u16; 4]; 8]) -> Addresses {
+        let mut bus = Bus::new(WHOLE_MT, Addresses::ALL);
+        for four in words {
+            let _ = bus.push_words(four, BitOrder::MsbFirst);
+        }
+        bus.missing()
+    } over [EIGHT];
 
     /// The frames of the replies of all layouts.
     fn nikon_response_emit(row: &Emitted) -> RawResponse {
@@ -122,8 +137,8 @@ kernels! {
     } over [[0x20, 0x85, 0xf6, 0x4a, 0x80, 0x09, 0x80]];
 
     /// Single turn, turns and angle of a position.
-    fn nikon_position((resolution, abs, bits): &(Resolution, u64, u8)) -> Result<(Position, u32, u32, i32), Error> {
-        let position = resolution.position(*abs, *bits)?;
+    fn nikon_position((resolution, response): &(Resolution, Response)) -> Result<(Position, u32, u32, i32), Error> {
+        let position = resolution.position(response)?;
         let single = position.single_turn;
         Ok((position, resolution.fraction(single), resolution.milli_degrees(single), resolution.difference(single, 0)))
     } over POSITIONS;
@@ -159,6 +174,20 @@ kernels! {
         stream::line_response(row.expected, BitOrder::LsbFirst).parse((&row.lsb_first, 0))
     } over WHOLE;
 }
+
+/// What eight encoders answer to command 4.
+const WHOLE_MT: Expected = Expected::new(nikon_aformat::Layout::Abs40, Command::Abs40Mt);
+
+const EIGHT: [[u16; 4]; 8] = [
+    [0x2080, 0x2c48, 0x4200, 0xa006],
+    [0x3080, 0x8148, 0xc200, 0xa035],
+    [0x2880, 0x7348, 0x2200, 0xa089],
+    [0x3880, 0xd8c8, 0xa200, 0xa0ee],
+    [0x2480, 0x16c8, 0x6200, 0xa0e6],
+    [0x3480, 0xadc8, 0xe200, 0xa05a],
+    [0x2c80, 0x4028, 0x1200, 0xa087],
+    [0x3c80, 0xf228, 0x9200, 0xa026],
+];
 
 /// Something to send.
 type Emitted = Response;

@@ -91,7 +91,7 @@ fn position(driver: &Driver, response: Response, resolution: Resolution) -> Verd
         return same("abs", &driver.abs, &abs.get().into());
     }
     let Some(abs) = response.abs() else { return Ok(()) };
-    let position = resolution.position(abs, response.layout().abs_bits()).ok();
+    let position = resolution.position(&response).ok();
     let whole = response.abs40().is_some();
     let single_turn = position.map(|p| u64::from(p.single_turn));
     same("abs", &driver.abs, &single_turn.filter(|_| whole).unwrap_or(abs))?;

@@ -139,6 +139,12 @@ pub(super) struct MathRow {
     abs40_from_high_and_low: u64,
 }
 
+/// The rows show a sign only where there are 16 bits of turns.
+pub(super) fn sixteen(resolution: Resolution, position: nikon_aformat::Position) -> Option<i16> {
+    let signed = resolution.signed_turns(position).filter(|_| position.turns_bits == 16);
+    signed.and_then(|turns| i16::try_from(turns).ok())
+}
+
 pub(super) fn decode_math(_: &str, row: MathRow) -> Verdict {
     let resolution = or_unreadable(Resolution::new(row.st_bits, row.mt_bits))?;
     let abs = or_unreadable(U40::try_from(row.abs40))?;
@@ -147,10 +153,10 @@ pub(super) fn decode_math(_: &str, row: MathRow) -> Verdict {
     same("abs17", &row.abs17, &abs.low17().get())?;
     let joined = U40::from_halves(abs.low24(), abs.high24()).map(U40::get);
     same("abs40_from_high_and_low", &Some(row.abs40_from_high_and_low), &joined)?;
-    let position = or_unreadable(resolution.position(row.abs40, 40))?;
+    let position = or_unreadable(resolution.split(abs))?;
     same("single_turn", &row.single_turn, &position.single_turn)?;
     same("turns", &row.turns, &position.turns)?;
-    same("turns_signed", &row.turns_signed, &position.signed_turns())?;
+    same("turns_signed", &row.turns_signed, &sixteen(resolution, position))?;
     same("angle_deg_f64", &row.angle_deg_f64, &resolution.degrees(position.single_turn))?;
     let single = u64::from(resolution.degrees_f32(position.single_turn).to_bits());
     same("angle_deg_f32_bits", &row.angle_deg_f32_bits.0, &single)?;
