@@ -137,10 +137,10 @@ pub fn reply(mut data: &[u8]) {
     }
 }
 
-/// Reception by samples and by words of samples gives the same, on a bus and alone, and the bus accounts for all of it.
+/// Reception by samples and by words of samples gives the same, strict and tolerant, and the bus accounts for all of it.
 ///
 /// ```text
-/// 0  layout      1  samples a bit, and whether on a bus (bit 7)      2..  samples, LSB first
+/// 0  layout      1  samples a bit, and whether idle bits may stand between frames (bit 7)      2..  samples, LSB first
 /// ```
 pub fn reception(mut data: &[u8]) {
     let layout = Layout::ALL[usize::from(byte(&mut data)) % Layout::ALL.len()];
@@ -152,7 +152,7 @@ pub fn reception(mut data: &[u8]) {
             Err(_) => return,
         },
     };
-    let receiver = if how & 0x80 == 0 { receiver } else { receiver.on_bus() };
+    let receiver = if how & 0x80 == 0 { receiver } else { receiver.allowing_idle_between_frames() };
     let (mut by_sample, mut by_word) = (receiver, receiver);
     let mut bus = Bus::new(Expected::new(layout, Command::Abs40Mt), Addresses::ALL);
     let mut one = Vec::new();

@@ -10,7 +10,7 @@ use hdsl::device::{Complement, Disparity, Overload};
 use hdsl::frame::Extra;
 use hdsl::master::{Cause, Master, State};
 use hdsl::message::{Access, Data, Length, LongRequest, RemoteRegister, ResourceAddress, ResourceError, ShortRequest};
-use hdsl::registers::{Interrupts, Online1, Online2, OnlineD, Register};
+use hdsl::registers::{BusError, Event, Interrupts, Online1, Online2, OnlineD, Register, RegisterBus, RemoteReceiver};
 use hdsl::symbol::RunningDisparity;
 use hdsl::sync::{Es, Synchroniser};
 use hdsl::{Channel2Findings, Channel2Monitor, Dialect, Error};
@@ -365,7 +365,8 @@ fn an_impolite_encoder() {
 /// What the monitor of channel 2 says about each fault of it.
 #[test]
 fn channel_2_is_watched() {
-    let cases: [(fn(&mut hdsl::device::Faults), Channel2Findings); 6] = [
+    type Change = fn(&mut hdsl::device::Faults);
+    let cases: [(Change, Channel2Findings); 6] = [
         (|_| {}, Channel2Findings::empty()),
         (|f| f.test_2 = true, Channel2Findings::TEST2),
         (|f| f.error_2 = true, Channel2Findings::ERR2),
@@ -404,4 +405,55 @@ fn signed_positions() {
     let safe = bench.master.safe().unwrap();
     assert_eq!(safe.position, bench.position + 7 * i64::from(safe.age));
     assert!(bench.master.fast().unwrap().position < 0 && safe.position < 0);
+}
+
+/// The registers of a bench as a bus to a receiver elsewhere: every access lets some frames pass.
+impl RegisterBus for Bench {
+    type Error = Error;
+
+    fn read(&mut self, address: u8, bytes: &mut [u8]) -> Result<(), Error> {
+        self.frames(3);
+        for (at, byte) in (address..).zip(bytes) {
+            *byte = self.map.read(at).ok_or(Error::NoRegister { address: at })?;
+        }
+        Ok(())
+    }
+
+    fn write(&mut self, address: u8, bytes: &[u8]) -> Result<(), Error> {
+        self.frames(1);
+        (address..).zip(bytes).try_for_each(|(at, byte)| self.map.write(&mut self.master, at, *byte))
+    }
+}
+
+/// Typed messages, events and positions of a receiver that is reached through its registers only.
+#[test]
+fn a_receiver_behind_a_bus() {
+    for dialect in DIALECTS {
+        let mut bench = Bench::on_cable(dialect, 10);
+        bench.speed = 4;
+        bench.lock();
+        let mut remote = RemoteReceiver::new(dialect, bench);
+        remote.start_short(ShortRequest::Write(RemoteRegister::PING, 0x77)).unwrap();
+        assert_eq!(remote.start_short(ShortRequest::Read(RemoteRegister::PING)), Err(BusError::Link(Error::Busy)));
+        while remote.poll_short().unwrap().is_none() {}
+        remote.start_short(ShortRequest::Read(RemoteRegister::PING)).unwrap();
+        let data = (0..100).find_map(|_| remote.poll_short().unwrap());
+        assert_eq!(data, Some(0x77));
+
+        let [write, read] = write_and_read();
+        for (request, want) in [(write, &b""[..]), (read, b"MOTOR 42")] {
+            remote.start_long(&request).unwrap();
+            assert_eq!(remote.start_long(&request), Err(BusError::Link(Error::Busy)));
+            let data = (0..100).find_map(|_| remote.poll_long().unwrap()).unwrap();
+            assert_eq!(data.as_bytes(), want);
+        }
+        remote.start_long(&LongRequest::read(ResourceAddress::new(0x3ff).unwrap(), Length::Two)).unwrap();
+        let refused = (0..100).find_map(|_| remote.poll_long().err());
+        assert_eq!(refused, Some(BusError::Link(Error::Resource { error: ResourceError::NOT_THERE })));
+
+        let map = remote.registers().unwrap();
+        assert_eq!((map.velocity(), map.quality(), map.link()), (4, 15, true));
+        let _ = remote.take_events().unwrap();
+        assert!(!remote.take_events().unwrap().0.intersects(Event::FREL | Event::PRST));
+    }
 }

@@ -14,7 +14,8 @@ use hdsl::registers::Registers;
 use hdsl::{Answer, Dialect, EncoderId, Rule, Window};
 
 const ANSWER: u64 = u64::MAX >> 3;
-/// Bits of the encoder's position.
+/// 11 bits of acceleration, 24 of position.
+const ID: EncoderId = EncoderId::truncate(0x000d3);
 const BITS: u32 = 24;
 
 struct Noise(u64);
@@ -79,13 +80,14 @@ struct Tally {
     safe: u64,
     messages: u64,
     restarts: u64,
+    identifiers: u64,
 }
 
 fn run(dialect: Dialect, seed: u64, frames: u64) -> Tally {
     let mut noise = Noise(seed);
     let mut tally = Tally::default();
-    // 11 bits of acceleration, 24 of position: the range is passed every thousand frames or so.
-    let mut device = Device::new(EncoderId::new(0x000d3).unwrap());
+    // The range is passed every thousand frames or so.
+    let mut device = Device::new(ID);
     device.resources.set_register(RemoteRegister::PING, 0x5a);
     let mut master = Master::new(dialect);
     let mut map = Registers::new(&dialect);
@@ -120,6 +122,13 @@ fn run(dialect: Dialect, seed: u64, frames: u64) -> Tally {
         let poisoned = running && accepted.is_ok_and(|value| i64::from(value.get()) != truth);
         since_poison = if poisoned { 0 } else { since_poison.saturating_add(1) };
 
+        // The identifier comes once and without check bits: an application knows which encoder it has and compares. (The line
+        // inverted for that one frame gives another one.)
+        if master.encoder_id().is_some_and(|id| id != ID) {
+            tally.identifiers += 1;
+            master.request_restart();
+            continue;
+        }
         // Law: the fast position is the truth; a wrong word that passed CRC-5 is found out at the end of the next V-frame.
         if let Ok(fast) = master.fast() {
             tally.fast += 1;
@@ -160,8 +169,8 @@ fn hostile_frames_give_the_truth_or_nothing() {
         let tally = run(dialect, seed, frames / 2);
         println!(
             "{} fast positions, {} of them wrong for up to 16 frames after a word that passed CRC-5; {} safe positions; \
-             {} messages; {} restarts; {:?}",
-            tally.fast, tally.explained, tally.safe, tally.messages, tally.restarts, tally.events
+             {} messages; {} restarts; {} wrong identifiers; {:?}",
+            tally.fast, tally.explained, tally.safe, tally.messages, tally.restarts, tally.identifiers, tally.events
         );
         assert!(tally.fast > frames / 20 && tally.safe > frames / 200 && tally.messages > 0);
     }

@@ -258,7 +258,7 @@ fn one_fault_costs_one_response() {
             if whole == 8 {
                 continue;
             }
-            let mut receiver = LineReceiver::bits(Layout::Abs40).on_bus();
+            let mut receiver = LineReceiver::bits(Layout::Abs40);
             let bus = hear(&mut receiver, &answers, transaction.bus());
             assert!(matches!(transaction.poll(u64::MAX), Progress::Done { .. }));
             for address in EncoderAddress::ALL {

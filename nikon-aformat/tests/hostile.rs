@@ -6,17 +6,12 @@
 
 mod common;
 
-use common::line::{Bench, frame_ns, host_within, idle_ns, rates};
+use common::line::{Bench, events, frame_ns, host_within, idle_ns, rates};
 use nikon_aformat::bus::Addresses;
 use nikon_aformat::device::{Device, Encoders};
 use nikon_aformat::master::{BusTransaction, Line, Progress, Transaction};
 use nikon_aformat::{BitRate, EncoderAddress, Operation, Request, Resolution};
 use servowire_world::{Id, Kind, Scenario, Speaker, Tally, Transmission, Verdict};
-
-/// Events of a run: 100,000, or as many as the environment says.
-fn events() -> u64 {
-    std::env::var("HOSTILE_EVENTS").ok().and_then(|text| text.parse().ok()).unwrap_or(100_000)
-}
 
 fn encoders<const N: usize>(rate: BitRate, addresses: [u8; N]) -> Encoders<N, 2> {
     Encoders { all: addresses.map(|ea| Device::new(EncoderAddress::truncate(ea), Resolution::default(), rate)) }

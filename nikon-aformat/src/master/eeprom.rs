@@ -115,8 +115,9 @@ impl EepromRead {
             }
             (Ok((word, false)), Next::Second) => return self.done(word, now_ns),
             (Ok((word, false)), Next::First) if !self.discard_first => return self.done(word, now_ns),
-            (Ok(_), Next::Other) => {
-                self.next = Next::First;
+            // A busy memory has not begun with the other address.
+            (Ok((_, busy)), Next::Other) => {
+                self.next = if busy { Next::Other } else { Next::First };
                 Error::Busy { tries: self.tries }
             }
             (Ok(_), Next::First | Next::Second) => {

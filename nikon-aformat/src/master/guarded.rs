@@ -11,6 +11,9 @@ use crate::timing::REQUEST_GAP_NS;
 /// one takes effect. So another command is sent first, which starts the count again, until it is answered and ES0 is
 /// clear. Then the eight requests follow, one act that is never repeated in part.
 ///
+/// `Done` rests on the eight responses. An encoder that hears something else in between, as noise on its end of the line, may
+/// start its count again and answer all the same: where a wrong zero is dangerous, compare the position before and after.
+///
 /// | it ends with | the encoder |
 /// |---|---|
 /// | `Done`, with the response to STATUS | has done it |

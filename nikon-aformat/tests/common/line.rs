@@ -14,6 +14,11 @@ pub struct Handed {
     pub end_ns: u64,
 }
 
+/// Events of a run: 100,000, or as many as the environment says.
+pub fn events() -> u64 {
+    std::env::var("HOSTILE_EVENTS").ok().and_then(|text| text.parse().ok()).unwrap_or(100_000)
+}
+
 /// The encoders of a line, and what carries their words.
 #[derive(Debug)]
 pub struct Bench<const N: usize> {

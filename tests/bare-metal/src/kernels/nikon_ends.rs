@@ -44,7 +44,7 @@ fn answer(request: Request) -> Option<Transmission> {
 kernels! {
     /// A reply from packed samples, one a bit, on a bus.
     fn nikon_receive(row: &Flip) -> Option<Result<RawResponse, Error>> {
-        let mut receiver = LineReceiver::bits(row.expected.layout()).on_bus();
+        let mut receiver = LineReceiver::bits(row.expected.layout());
         let bits = row.line.bits();
         let mut low = Samples::new(bits as u64);
         let mut high = Samples::partial((bits >> 64) as u64 | u64::MAX << (row.line.len() - 64), 64);
