@@ -48,3 +48,7 @@ pub use type_code::{Nibble, Pr, TypeCode};
 
 /// Good blocks, and refused ones by their class.
 pub type Counters = servowire_core::Counters<{ ErrorClass::ALL.len() }>;
+
+/// Step of the tests that walk 16 bits: all values, fewer under Miri.
+#[cfg(test)]
+pub(crate) const STRIDE: usize = if cfg!(miri) { 251 } else { 1 };

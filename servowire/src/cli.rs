@@ -154,12 +154,25 @@ pub struct TformatArgs {
 #[derive(Debug, Clone, Copy, Args)]
 #[command(next_help_heading = "RTEX")]
 pub struct RtexArgs {
-    /// Bytes of a block, 16 or 32: a line or record may hold several blocks.
-    #[arg(long, value_name = "BYTES", default_value_t = 16, value_parser = block_size)]
-    pub block_size: u8,
+    /// Bytes of a block, 16 or 32; otherwise what the log looks like. A line or record may hold several blocks.
+    #[arg(long, value_name = "BYTES", value_parser = block_size)]
+    pub block_size: Option<u8>,
+    /// Update period, as 500us or 0.5ms: gives the log times (for --stats and --jump) and checks the steps of the position.
+    #[arg(long, value_name = "TIME", value_parser = period)]
+    pub period: Option<u32>,
     /// Only the blocks of this drive.
     #[arg(long, value_name = "ID", value_parser = clap::value_parser!(u8).range(0..=31))]
     pub mac_id: Option<u8>,
+}
+
+/// A period in ns.
+fn period(text: &str) -> Result<u32, String> {
+    let units = [("ns", 1.0), ("us", 1e3), ("ms", 1e6)];
+    let read = units.into_iter().find_map(|(unit, ns)| Some(text.strip_suffix(unit)?.trim().parse::<f64>().ok()? * ns));
+    match read.map(f64::round) {
+        Some(ns) if (1.0..=1e9).contains(&ns) => Ok(ns as u32),
+        _ => Err(format!("\"{text}\" is not a period from 1 ns to 1000 ms, as 500us or 0.5ms")),
+    }
 }
 
 fn block_size(text: &str) -> Result<u8, String> {
@@ -196,7 +209,11 @@ impl Decode {
                 single_turn_bits: self.tformat.single_turn_bits,
                 multi_turn_bits: self.tformat.multi_turn_bits,
             },
-            rtex: rtex::Settings { block_size: usize::from(self.rtex.block_size), mac_id: self.rtex.mac_id },
+            rtex: rtex::Settings {
+                block_size: self.rtex.block_size.map(usize::from),
+                mac_id: self.rtex.mac_id,
+                period_ns: self.rtex.period,
+            },
             nikon: nikon::Settings {
                 single_turn_bits: self.tformat.single_turn_bits,
                 multi_turn_bits: self.tformat.multi_turn_bits,

@@ -162,8 +162,12 @@ fn raw_damaged() {
 fn hex_damaged() {
     let bench = Bench::new();
     let run = bench.decode("a.txt", "1A\n1A 20 29 C0 3B 17 00 00 00 C8 37\n1G\n", &["--bytes", "--json"]);
-    run.fails_with("line 3: \"1G\" is not bytes in hex");
-    assert_eq!(run.json().len(), 2);
+    // A wrong digit costs its line.
+    assert_eq!((run.code, run.json().len()), (1, 3));
+    assert_eq!(run.verdicts().last().map(String::as_str), Some("hex"));
+    assert!(run.out.contains("\\\"1G\\\" is not bytes in hex"), "{}", run.out);
+    // Where no line before was one of bytes, the file is no log.
+    bench.decode("a.txt", "time\n1A\n", &["--bytes"]).fails_with("line 1: \"time\" is not bytes in hex");
     bench.decode("a.txt", "A".repeat(100_000), &["--bytes"]).fails_with("a line of more than 65536 characters");
     bench.decode("a.txt", "# nothing\n", &["--bytes"]).fails_with("no frame in it");
 }

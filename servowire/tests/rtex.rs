@@ -116,3 +116,61 @@ fn faults_and_notes() {
     assert_eq!(counters, [false, false, true]);
     bench.decode("a.vcd", common::good_traffic(2.5e6).vcd(), &["--protocol", "rtex"]).fails_with("--record-size");
 }
+
+/// Times from the update period; steps, jumps and requests are seen.
+#[test]
+fn a_log_with_a_period() {
+    let bench = Bench::new();
+    let mut all = exchanges();
+    // In the last exchange the command goes on by more than 400 M pulses a second.
+    all[5].0[4..8].copy_from_slice(&300_000_i32.to_le_bytes());
+    all[5].1[4..8].copy_from_slice(&299_990_i32.to_le_bytes());
+    let options = ["--protocol", "rtex", "--bytes", "--mac-id", "5", "--period", "500us"];
+    let run = bench.decode("log.txt", hex_log(&all), &[&options[..], &["--json"]].concat());
+    let events = run.is_good().json();
+    assert_eq!(events[10]["fields"]["note"], "position step 298960, at most 200000: Err27.4");
+    let run = bench.decode("log.txt", hex_log(&all), &[&options[..], &["--stats", "--jump", "1000"]].concat());
+    assert!(run.is_good().out.contains("1 of more than 1000 counts"), "{}", run.out);
+}
+
+/// One wrong digit costs one line.
+#[test]
+fn a_spoilt_line() {
+    let bench = Bench::new();
+    let text = hex_log(&exchanges()).replacen("4520", "45g0", 2);
+    let spoilt = text.lines().filter(|line| line.contains('g')).count();
+    assert!(spoilt > 0);
+    let run = bench.decode("log.txt", text, &["--protocol", "rtex", "--bytes", "--json"]);
+    assert_eq!((run.json().len(), run.verdicts().iter().filter(|v| **v == "hex").count()), (12, spoilt));
+}
+
+/// Blocks of 32 bytes are recognised as such: their sub blocks are no drives.
+#[test]
+fn a_log_of_long_blocks() {
+    let bench = Bench::new();
+    let mut text = String::new();
+    for (command, response) in exchanges() {
+        for (block, sub) in [(command, 0x8a_u8), (response, 0x0a)] {
+            writeln!(text, "{:032x}{sub:02x}{:030x}", u128::from_be_bytes(block), 0).unwrap();
+        }
+    }
+    let run = bench.decode("log.txt", text, &["--protocol", "rtex", "--bytes", "--json"]);
+    assert_eq!(run.is_good().json().len(), 12);
+    assert!(run.json().iter().all(|event| event["kind"].as_str().unwrap().ends_with('5')));
+    assert!(run.err.contains("the log looks like blocks of 32 bytes"), "{}", run.err);
+}
+
+#[test]
+fn a_drive_that_never_answers() {
+    let bench = Bench::new();
+    let mut all = exchanges();
+    for (command, _) in &mut all {
+        command[0] ^= 2;
+    }
+    let run = bench.decode("log.txt", hex_log(&all), &["--protocol", "rtex", "--bytes", "--json"]);
+    let events = run.is_good().json();
+    assert_eq!(
+        events.last().unwrap()["fields"]["note"],
+        "drive 5 answers and was never sent a command; drive 7 never answered"
+    );
+}

@@ -1,6 +1,6 @@
 //! Bytes as hex digits, as a serial monitor or a debugger prints them: a burst a line.
 //!
-//! `1A 20 29 C0`, `1a2029c0`, `0x1A, 0x20` and `1A:20` are all read; what stands behind `#` or `//` is a remark.
+//! `1A 20 29 C0`, `1a2029c0`, `0x1A, 0x20` and `1A:20` are all read; what follows `#` or `//` is a remark.
 //! There is no time in such a log, and a line of it is what followed without a pause.
 
 use std::io::{BufRead, Read};
@@ -16,6 +16,8 @@ pub struct HexLog {
     input: Input,
     text: Vec<u8>,
     line: u64,
+    /// A line of bytes was read: this is a log.
+    good: bool,
 }
 
 /// The bytes of one line of the log.
@@ -23,17 +25,19 @@ pub struct HexLog {
 pub struct Burst {
     /// Its number, from 1.
     pub line: u64,
-    /// What it holds; at least one byte.
+    /// What it holds; at least one byte, unless it is spoilt.
     pub bytes: Vec<u8>,
+    /// Why the line is not bytes.
+    pub spoilt: Option<String>,
 }
 
 impl HexLog {
     /// A log from its beginning.
     pub fn new(input: Input) -> Self {
-        Self { input, text: Vec::new(), line: 0 }
+        Self { input, text: Vec::new(), line: 0, good: false }
     }
 
-    /// The next line that holds bytes; none at the end.
+    /// The next line that holds bytes, or should; none at the end.
     pub fn burst(&mut self) -> Result<Option<Burst>, Fault> {
         loop {
             self.text.clear();
@@ -49,9 +53,17 @@ impl HexLog {
                     .input
                     .fault(at, format!("a line of more than {LONGEST} characters: not a log of hex bytes")));
             }
-            let bytes = parse(&self.text).map_err(|what| self.input.fault(at, what))?;
-            if !bytes.is_empty() {
-                return Ok(Some(Burst { line: self.line, bytes }));
+            match parse(&self.text) {
+                Ok(bytes) if bytes.is_empty() => {}
+                Ok(bytes) => {
+                    self.good = true;
+                    return Ok(Some(Burst { line: self.line, bytes, spoilt: None }));
+                }
+                // In a log a wrong digit costs its line; a file without any bytes before it is no log.
+                Err(what) if self.good => {
+                    return Ok(Some(Burst { line: self.line, bytes: Vec::new(), spoilt: Some(what) }));
+                }
+                Err(what) => return Err(self.input.fault(at, what)),
             }
         }
     }

@@ -5,6 +5,7 @@ use std::io;
 use super::{Protocol, Settings, nikon, rtex, tformat};
 use crate::capture::ByteLog;
 use crate::capture::hexlog::Burst;
+use crate::event::{Event, Place, Refusal, Verdict};
 use crate::fault::{At, Fault};
 use crate::line::{StartStop, Stop};
 use crate::output::{Output, Sink, Tally};
@@ -32,7 +33,10 @@ pub(super) fn decode(
     let Some(protocol) = recognise(&bursts, protocol, settings, out) else {
         return Err(Fault::new(file, At::File, "HIPERFACE DSL is decoded from edges or samples of the line").into());
     };
-    let mut reader = Reader::new(protocol, settings);
+    let mut reader = Reader::new(protocol, settings, &bursts);
+    if let Reader::Rtex(decoder) = &reader {
+        decoder.shape_note().iter().for_each(|note| out.note(note));
+    }
     for burst in &bursts {
         reader.burst(burst, out)?;
     }
@@ -59,7 +63,7 @@ fn recognise(bursts: &[Burst], protocol: Protocol, settings: &Settings, out: &Ou
     // A block of RTEX has no check sum, so it comes last among equals; what leaves fewest refused wins.
     let tried = [Protocol::Tformat, Protocol::Nikon, Protocol::Rtex].map(|protocol| {
         let mut tally = Tally::default();
-        let mut reader = Reader::new(protocol, settings);
+        let mut reader = Reader::new(protocol, settings, bursts);
         // A tally takes whatever comes.
         let _ = bursts.iter().try_for_each(|burst| reader.burst(burst, &mut tally));
         let _ = reader.finish(&mut tally);
@@ -81,19 +85,22 @@ fn share(tally: Tally) -> u64 {
 enum Reader {
     Tformat(Box<tformat::Decoder>),
     Nikon(Box<nikon::Decoder>),
-    Rtex(rtex::Decoder),
+    Rtex(Box<rtex::Decoder>),
 }
 
 impl Reader {
-    fn new(protocol: Protocol, settings: &Settings) -> Self {
+    fn new(protocol: Protocol, settings: &Settings, sample: &[Burst]) -> Self {
         match protocol {
             Protocol::Nikon => Self::Nikon(Box::new(nikon::Decoder::new(0, settings.nikon))),
-            Protocol::Rtex => Self::Rtex(rtex::Decoder::new(settings.rtex)),
+            Protocol::Rtex => Self::Rtex(Box::new(rtex::Decoder::new(settings.rtex, sample))),
             _ => Self::Tformat(Box::new(tformat::Decoder::new(0, settings.tformat))),
         }
     }
 
     fn burst(&mut self, burst: &Burst, out: &mut dyn Sink) -> io::Result<()> {
+        if let Some(what) = &burst.spoilt {
+            return out.event(&spoilt(burst.line, what));
+        }
         match self {
             Self::Tformat(decoder) => decoder.burst(burst, out),
             Self::Nikon(decoder) => decoder.burst(burst, out),
@@ -105,7 +112,21 @@ impl Reader {
         match self {
             Self::Tformat(decoder) => decoder.finish(None, out),
             Self::Nikon(decoder) => decoder.finish(None, out),
-            Self::Rtex(_) => Ok(()),
+            Self::Rtex(decoder) => decoder.finish(out),
         }
+    }
+}
+
+/// A line of a log that is not bytes.
+fn spoilt(line: u64, what: &str) -> Event {
+    let refusal = Refusal { class: "hex", reason: what.to_owned(), field: None, bit: None, time: None, cause: None };
+    Event {
+        place: Place::Line(line),
+        direction: None,
+        kind: "line".into(),
+        fields: Vec::new(),
+        position: None,
+        delay: None,
+        verdict: Verdict::Refused(Box::new(refusal)),
     }
 }

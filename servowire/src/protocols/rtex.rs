@@ -8,7 +8,8 @@ use std::borrow::Cow;
 use std::collections::HashMap;
 use std::io;
 
-use rtex_block::inspect::{self, Report, inspect};
+use rtex_block::inspect::{self, LogAnalysis, LogShape, Report, inspect};
+use rtex_block::position::Gear;
 use rtex_block::{Error, Header};
 
 use crate::capture::hexlog::Burst;
@@ -16,44 +17,108 @@ use crate::event::{Direction, Event, Field, Place, Position, Refusal, Value, Ver
 use crate::output::Sink;
 
 /// What the blocks do not tell.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Settings {
-    /// Bytes of a block, 16 or 32.
-    pub block_size: usize,
+    /// Bytes of a block, 16 or 32; otherwise what most of the first blocks look like.
+    pub block_size: Option<usize>,
     /// Only the blocks of this drive.
     pub mac_id: Option<u8>,
-}
-
-impl Default for Settings {
-    fn default() -> Self {
-        Self { block_size: rtex_block::LEN, mac_id: None }
-    }
+    /// Update period, ns: gives the log a time axis and the position step its limit.
+    pub period_ns: Option<u32>,
 }
 
 /// Why a recorded line is refused.
 pub(super) const NO_LINE: &str =
     "RTEX blocks are read from logs of bytes: hex digits with --bytes, binary with --record-size";
 
+/// Bytes by which size and byte order are recognised.
+const SAMPLE: usize = 4096;
+
 /// Follows the blocks of a log.
 pub(super) struct Decoder {
     settings: Settings,
+    block_size: usize,
+    shape: Option<LogShape>,
+    analysis: LogAnalysis,
     /// The last block of a direction and a MAC-ID: byte 0 without the counter.
     last: HashMap<u8, Report>,
+    /// Of the same: the last counter, and the update periods so far.
+    updates: HashMap<u8, (u8, i64)>,
 }
 
 impl Decoder {
-    pub(super) fn new(settings: Settings) -> Self {
-        Self { settings, last: HashMap::new() }
+    /// `sample`: the beginning of the log.
+    pub(super) fn new(settings: Settings, sample: &[Burst]) -> Self {
+        let bytes: Vec<u8> = sample.iter().flat_map(|burst| burst.bytes.iter().copied()).take(SAMPLE).collect();
+        let shape = LogShape::guess(&bytes);
+        // Lines or records of one block are what they are; a size is guessed where the lines allow both.
+        let guessed = shape.map_or(rtex_block::LEN, |shape| shape.size.bytes());
+        Self {
+            settings,
+            block_size: settings.block_size.unwrap_or(guessed),
+            shape,
+            analysis: LogAnalysis::new(settings.period_ns, Gear::UNITY),
+            last: HashMap::new(),
+            updates: HashMap::new(),
+        }
+    }
+
+    /// What there is to say about the log as a whole, before its blocks.
+    pub(super) fn shape_note(&self) -> Option<String> {
+        let LogShape { size, word } = self.shape?;
+        let size = size.bytes();
+        let order = match word {
+            1 => "",
+            2 => ", with the bytes of each 16-bit word exchanged",
+            _ => ", with the bytes of each 32-bit word in the other order",
+        };
+        if word == 1 && size == self.block_size && (size == rtex_block::LEN || self.settings.block_size.is_some()) {
+            return None;
+        }
+        let taken = if size == self.block_size { "" } else { "; try --block-size" };
+        Some(format!("the log looks like blocks of {size} bytes{order}{taken}"))
     }
 
     /// A line or record of the log.
     pub(super) fn burst(&mut self, burst: &Burst, out: &mut dyn Sink) -> io::Result<()> {
-        for block in burst.bytes.chunks(self.settings.block_size.max(1)) {
+        for block in burst.bytes.chunks(self.block_size.max(1)) {
             if let Some(event) = self.block(burst, block) {
                 out.event(&event)?;
             }
         }
         Ok(())
+    }
+
+    /// The end of the log: drives that were on one side of it only.
+    pub(super) fn finish(&mut self, out: &mut dyn Sink) -> io::Result<()> {
+        let notes: Vec<String> = self.analysis.end().map(|finding| finding.to_string()).collect();
+        if notes.is_empty() || self.settings.mac_id.is_some() {
+            return Ok(());
+        }
+        out.event(&Event {
+            place: Place::Line(0),
+            direction: None,
+            kind: Cow::Borrowed("log"),
+            fields: vec![Field { name: "note", value: Value::Text(notes.join("; ")) }],
+            position: None,
+            delay: None,
+            verdict: Verdict::Ok,
+        })
+    }
+
+    /// Where a block is: in update periods, if the period is known, else in the log.
+    fn place(&mut self, burst: &Burst, header: Header) -> Place {
+        let counter = header.update_counter.get();
+        let (last, updates) = self.updates.entry(header.to_byte() & 0x9f).or_insert((counter, 0));
+        *updates += i64::from(counter.wrapping_sub(*last) & 3);
+        *last = counter;
+        match self.settings.period_ns {
+            Some(period_ns) => {
+                let start = *updates * i64::from(period_ns) * 1_000;
+                Place::Time { start, end: start }
+            }
+            None => Place::Line(burst.line),
+        }
     }
 
     fn block(&mut self, burst: &Burst, block: &[u8]) -> Option<Event> {
@@ -62,21 +127,23 @@ impl Decoder {
             return None;
         }
         let report = inspect(block);
+        let place = self.place(burst, header);
         let mut fields = Vec::new();
         if report.is_usable {
+            let findings: Vec<String> = self.analysis.block(block).map(|finding| finding.to_string()).collect();
             let before = self.last.insert(header.to_byte() & 0x9f, report);
             match before {
                 Some(before) => changed(&report, &before, &mut fields),
                 None => whole(&report, block, &mut fields),
             }
-            notes(&report, &mut fields);
+            notes(&report, findings, &mut fields);
         } else {
             let text = block.iter().map(|byte| format!("{byte:02X}")).collect::<Vec<_>>().join(" ");
             fields.push(Field { name: "bytes", value: Value::Text(text) });
         }
         let (direction, word) = if header.response { (Direction::Answer, "rsp") } else { (Direction::Request, "cmd") };
         Some(Event {
-            place: Place::Line(burst.line),
+            place,
             direction: Some(direction),
             kind: Cow::Owned(format!("{word} {}", header.mac_id)),
             fields,
@@ -130,11 +197,11 @@ fn changed(report: &Report, before: &Report, fields: &mut Vec<Field>) {
     }
 }
 
-fn notes(report: &Report, fields: &mut Vec<Field>) {
+fn notes(report: &Report, findings: Vec<String>, fields: &mut Vec<Field>) {
     let said = report.notes().map(|note| note.to_string());
     let strict = report.findings().map(|error| error.to_string());
     let cause = report.cause.map(|cause| cause.to_string());
-    let text = said.chain(strict).chain(cause).collect::<Vec<_>>().join("; ");
+    let text = findings.into_iter().chain(said).chain(strict).chain(cause).collect::<Vec<_>>().join("; ");
     if !text.is_empty() {
         fields.push(Field { name: "note", value: Value::Text(text) });
     }

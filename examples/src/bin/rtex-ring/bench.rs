@@ -77,7 +77,7 @@ impl Bench {
 
     /// What the ring configuration finds.
     pub(crate) fn slaves(&self) -> impl Iterator<Item = Slave> {
-        self.drives.iter().map(|drive| Slave { mac_id: drive.config().mac_id, kind: 0 })
+        self.drives.iter().map(|drive| Slave { mac_id: drive.config().mac_id, kind: 1 })
     }
 
     /// One update period: the master reads and writes, then the frame goes round.
@@ -147,7 +147,7 @@ impl Bench {
             let alarm = drive.alarm().map_or("-".to_owned(), |alarm| alarm.to_string());
             let reason = match self.ring.axes().get(place).map(Axis::state) {
                 Some(rtex_block::master::AxisState::Stopped(StopReason::OtherAxis(other))) => format!("axis {other}"),
-                Some(state) => format!("{state:?}"),
+                Some(state) => state.to_string(),
                 None => String::new(),
             };
             println!("{place:4} {farthest:10} {:10} {off:8.1} ms  {alarm:8}  {reason}", drive.position());

@@ -18,8 +18,9 @@ use core::num::NonZeroU16;
 use std::error::Error;
 
 use bench::{AXES, Bench, UPDATE_NS, time_ms};
+use rtex_block::MacId;
 use rtex_block::master::{
-    ActiveCode, Asic, AxisState, Fault, Inputs, Limits, Order, PhaseControl, Slave, StopReason, compare, led,
+    ActiveCode, Asic, AxisState, Fault, Inputs, Limits, Order, Phase, PhaseControl, Slave, StopReason, compare, led,
 };
 use rtex_block::timing::{FrameTime, Periods, TimerSystem};
 
@@ -28,9 +29,9 @@ const ECHO_LIMIT: NonZeroU16 = NonZeroU16::MIN.saturating_add(7);
 
 const LIMITS: Limits = Limits::new(ECHO_LIMIT, 100).with_ready(400);
 
-/// Update periods of motion before the drive goes silent, and of recording behind it.
+/// Update periods of motion before the drive goes silent, and of recording after it.
 const BEFORE: u64 = 2_000;
-const BEHIND: u64 = 400;
+const AFTER: u64 = 400;
 
 /// The drive that goes silent.
 const SILENT: usize = 11;
@@ -41,7 +42,7 @@ fn main() -> Result<(), Box<dyn Error>> {
 
     let mut bench = Bench::new(ActiveCode::CyclicPosition, LIMITS)?;
     let mut phases = PhaseControl::new();
-    start_communication(&mut bench, &mut phases);
+    start_communication(&bench, &mut phases);
 
     bench.until("all drives ready, servo off", 1_000, |bench| bench.ring.all_are(AxisState::Off))?;
     bench.ring.switch_on();
@@ -57,7 +58,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     println!("{:9.1} ms  drive {SILENT} goes silent in the middle of the motion", time_ms(silent_at));
 
     let mut stopped_at = None;
-    while bench.now < silent_at + BEHIND {
+    while bench.now < silent_at + AFTER {
         if bench.ring.failure().is_none() {
             bench.command_wave(begin)?;
         }
@@ -100,27 +101,41 @@ fn check_periods() -> Result<(), String> {
     }
 }
 
-/// The phases of the control function, with an ASIC that takes a while for each of its states.
-fn start_communication(bench: &mut Bench, phases: &mut PhaseControl) {
+/// When the ASIC of this example gets to each of its states, ms.
+const ASIC: [(f64, Asic); 4] =
+    [(20.0, Asic::Initial), (140.0, Asic::RingConfig), (1_300.0, Asic::Ready), (2_100.0, Asic::Running)];
+
+/// The slave table of the machine: 32 drives of one kind, in the order of the ring.
+fn slave_table() -> [Slave; AXES] {
+    core::array::from_fn(|place| Slave { mac_id: MacId::truncate(place as u8), kind: 1 })
+}
+
+/// The phases of the control function, with an ASIC that takes a while for each of its states. The main loop turns every
+/// 10 ms; each change of phase or LED is shown.
+fn start_communication(bench: &Bench, phases: &mut PhaseControl) {
     let found: Vec<Slave> = bench.slaves().collect();
-    let table = found.clone();
-    let states = [Asic::Initial, Asic::RingConfig, Asic::Ready, Asic::Ready, Asic::Running];
-    for asic in states {
-        let slave_info = (asic == Asic::Ready).then(|| compare(&table, &found, Order::Ring));
-        phases.step(Inputs { asic, slave_info, tx_ready: asic == Asic::Ready, timeout: false });
-        let now_ms = bench.now * u64::from(UPDATE_NS) / 1_000_000;
-        println!(
-            "{:9.1} ms  ASIC {asic:?}, phase {:?}, COM LED {:?}",
-            time_ms(bench.now),
-            phases.phase(),
-            led(phases.phase(), phases.fault(), now_ms),
-        );
+    let table = slave_table();
+    let mut shown = None;
+    let mut prepared = false;
+    for t_ms in (0..=2_200_u64).step_by(10) {
+        let Some((_, asic)) = ASIC.iter().rev().find(|(from, _)| *from <= t_ms as f64) else { continue };
+        let slave_info = (*asic == Asic::Ready).then(|| compare(&table, &found, Order::Ring));
+        phases.step(Inputs { asic: *asic, slave_info, tx_ready: prepared, timeout: false });
+        prepared |= phases.phase() == Phase::Prepare;
+        let now = (phases.phase(), led(phases.phase(), phases.fault(), t_ms));
+        if shown != Some(now) {
+            println!(
+                "{:9.1} ms  before the motion: ASIC {asic:?}, phase {:?}, COM LED {:?}",
+                t_ms as f64, now.0, now.1
+            );
+            shown = Some(now);
+        }
     }
 }
 
 fn report_stop(bench: &Bench, fault: Option<Fault>, silent_at: u64) {
     println!("{:9.1} ms  all servos off, {:.1} ms after", time_ms(bench.now), time_ms(bench.now - silent_at));
     if let Some((place, reason)) = bench.ring.failure() {
-        println!("{:14}cause: axis {place}, {reason:?}; fault of the master: {fault:?}", "");
+        println!("{:14}cause: axis {place}, {reason}; fault of the master: {fault:?}", "");
     }
 }

@@ -3,6 +3,7 @@
 use std::error::Error;
 
 use plotters::prelude::*;
+use plotters::style::text_anchor::{HPos, Pos, VPos};
 
 use crate::bench::{AXES, Sample, time_ms};
 
@@ -32,11 +33,18 @@ pub(crate) fn positions(path: &str, history: &[Sample], marks: &[(u64, &str)]) -
         let points = history.iter().filter_map(|(at, all)| Some((time_ms(*at), *all.get(place)?)));
         chart.draw_series(LineSeries::new(points, colour.stroke_width(1)))?;
     }
-    for (row, (at, text)) in (1..).zip(marks) {
+    // Marks that lie close together are written one below the other, away from the right edge.
+    let line = (high - low) / 20;
+    for (row, (at, text)) in (0..).zip(marks) {
         let x = time_ms(*at);
         chart.draw_series(LineSeries::new([(x, low - margin), (x, high + margin)], BLACK.stroke_width(1)))?;
-        let y = high + margin - row * (high - low) / 24;
-        chart.draw_series([Text::new(format!("{text}, {x:.1} ms"), (x, y), ("sans-serif", 14))])?;
+        let (text, y) = (format!("{text}, {x:.1} ms "), high + margin - line * (row + 1));
+        let right = Pos::new(HPos::Right, VPos::Center);
+        chart.draw_series([Text::new(
+            text,
+            (x, y),
+            ("sans-serif", 14).into_font().into_text_style(&root).pos(right),
+        )])?;
     }
     root.present()?;
     Ok(())
