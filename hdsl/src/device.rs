@@ -1,51 +1,31 @@
 //! The encoder as a machine without I/O: what a simulator or a test bench runs.
 //!
 //! In every H-frame it is given the line bits from SYNC to PARA and the position at the sampling edge, and gives the
-//! answer, which begins one bit time after PARA. Where the manual leaves something to the encoder, the choice made here
-//! is said at the item.
+//! answer, which begins one bit time after PARA. It is an absolute encoder: its safe position is the true one, whatever
+//! the acceleration channel could say about it.
+//!
+//! It shares no rule with the receiver: test pattern, CRC and limits are written down here once more. What the documents
+//! leave to the encoder is a switch in [`Behaviour`], what it can do wrong one in [`Faults`].
 
+mod behaviour;
 mod resources;
 
 use nrz_line::Window;
 
+pub use behaviour::{Behaviour, Complement, Disparity, Faults, Overload};
 pub use resources::{Resource, Resources};
 
 use crate::acceleration::DeltaDelta;
 use crate::answer::Content;
-use crate::crc::crc16;
 use crate::encoder_id::{EncoderId, PositionBits};
 use crate::error::Error;
-use crate::frame::{Head, V_FRAME};
+use crate::frame::Head;
 use crate::message::{LongAnswer, Request, Responder};
 use crate::parameter::{EncoderByte, MasterSymbol};
-use crate::sampling::TEST_PATTERN;
 use crate::symbol::{Character, Control, RunningDisparity};
 
-/// What an encoder can be made to do wrong.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-#[cfg_attr(feature = "arbitrary", derive(arbitrary::Arbitrary))]
-pub struct Faults {
-    /// It does not answer.
-    pub silent: bool,
-    /// VSYNC is never set.
-    pub no_vsync: bool,
-    /// The acceleration channel carries K29.7 K29.7.
-    pub no_acceleration: bool,
-    /// Safe channel 1 carries K29.7 in the place of a position.
-    pub no_position: bool,
-    /// Safe channel 2 begins with K27.7.
-    pub no_position_2: bool,
-    /// The CRC of safe channel 1 is wrong.
-    pub bad_crc: bool,
-    /// The CRC of safe channel 2 is wrong.
-    pub bad_crc_2: bool,
-    /// STATUS2 has TEST2 set.
-    pub test_2: bool,
-    /// Messages are received and not answered.
-    pub mute: bool,
-}
+/// The test pattern, first line bit in bit 0: 0100110011001000000100010101110111111011001100110100010011001.
+const PATTERN: u64 = 0x1322_ccdf_ba88_1332;
 
 /// An encoder.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -53,29 +33,35 @@ pub struct Faults {
 pub struct Device {
     id: EncoderId,
     bits: PositionBits,
+    /// What the documents leave to it.
+    pub behaviour: Behaviour,
     /// What it does wrong.
     pub faults: Faults,
     /// Registers and resources that messages reach.
     pub resources: Resources,
     /// Byte for the pipe channel; `None` sends K30.7.
     pub pipe: Option<u8>,
-    /// H-frames between a request and the first symbol of its answer.
-    pub latency: u16,
     responder: Responder,
     waiting: Option<(Request, u16)>,
+    /// Requests so far, for what it forgets.
+    requests: u16,
     disparity: RunningDisparity,
+    /// SYNC frames since the last RESET.
+    synchronised: u8,
     /// Place in the V-frame; `None` before the first normal answer.
     at: Option<u8>,
     toggle: bool,
-    /// Position and speed as the receiver can know them from the acceleration words.
+    /// True position at the last sampling edge.
     position: u64,
+    /// Position and speed as the receiver can know them from the acceleration words.
+    told: u64,
     velocity: i64,
     blocks: [[Character; 8]; 2],
 }
 
 impl Device {
-    /// An encoder with this identifier, at rest at position 0. If the identifier asks for more than a receiver of this
-    /// crate can do, the position has 40 bits.
+    /// An encoder with this identifier, at position 0. If the identifier asks for more than a receiver of this crate can do,
+    /// the position has 40 bits.
     pub const fn new(id: EncoderId) -> Self {
         let bits = match id.check() {
             Ok(bits) => bits,
@@ -84,26 +70,19 @@ impl Device {
         Self {
             id,
             bits,
-            faults: Faults {
-                silent: false,
-                no_vsync: false,
-                no_acceleration: false,
-                no_position: false,
-                no_position_2: false,
-                bad_crc: false,
-                bad_crc_2: false,
-                test_2: false,
-                mute: false,
-            },
+            behaviour: Behaviour::PLAIN,
+            faults: Faults::NONE,
             resources: Resources::new(),
             pipe: None,
-            latency: 4,
             responder: Responder::new(),
             waiting: None,
+            requests: 0,
             disparity: RunningDisparity::Minus,
+            synchronised: 0,
             at: None,
             toggle: false,
             position: 0,
+            told: 0,
             velocity: 0,
             blocks: [[Character::data(0); 8]; 2],
         }
@@ -112,21 +91,37 @@ impl Device {
     /// Takes the head of an H-frame and the position at its sampling edge, and gives the 61 bits of the answer, the
     /// first line bit in bit 0; `None` if there is none.
     ///
-    /// A head that cannot be read is not answered. A symbol of the master that has no meaning is passed over.
+    /// Before it has seen RESET and enough SYNC frames it answers nothing. A head that cannot be read is not answered; a
+    /// symbol of the master that has no meaning is passed over.
     pub fn answer(&mut self, head: Window, position: u64) -> Option<u64> {
-        let before = self.position;
-        let acceleration = self.measure(position & self.bits.mask());
-        let byte = Head::parse(head).ok()?.byte;
-        let symbol = byte.symbol();
-        let start_up = !byte.first();
-        let answer = match symbol {
-            Ok(MasterSymbol::Reset | MasterSymbol::Sync) if start_up => {
+        let before = core::mem::replace(&mut self.position, position & self.bits.mask());
+        let acceleration = self.measure();
+        let Ok(head) = Head::parse(head) else {
+            if !self.behaviour.stalls_on_bad_head {
+                self.go_on(before);
+            }
+            return None;
+        };
+        let symbol = head.byte.symbol();
+        let start_up = !head.byte.first();
+        match symbol {
+            Ok(MasterSymbol::Reset) if start_up => {
                 self.reset();
                 return None;
             }
-            Ok(MasterSymbol::Start | MasterSymbol::Learn | MasterSymbol::Check) if start_up => TEST_PATTERN,
+            Ok(MasterSymbol::Sync) if start_up => {
+                let frames = self.synchronised.saturating_add(1);
+                self.reset();
+                self.synchronised = frames;
+                return None;
+            }
+            _ if self.synchronised < self.behaviour.sync_frames => return None,
+            _ => {}
+        }
+        let answer = match symbol {
+            Ok(MasterSymbol::Start | MasterSymbol::Learn | MasterSymbol::Check) if start_up => PATTERN,
             Ok(MasterSymbol::IdReq) if start_up => {
-                let (bits, after) = self.id.to_answer(Character::data(0), self.disparity);
+                let (bits, after) = self.id.to_answer(Character::data(0), self.column());
                 self.disparity = after;
                 bits
             }
@@ -135,29 +130,43 @@ impl Device {
         (!self.faults.silent).then_some(answer)
     }
 
-    /// Messages, V-frame and running disparity as after power-up. The motion goes on.
+    /// Messages, V-frame, clock and running disparity as after power-up. The motion goes on.
     const fn reset(&mut self) {
         self.responder = Responder::new();
         self.waiting = None;
         self.disparity = RunningDisparity::Minus;
+        self.synchronised = 0;
         self.at = None;
         self.toggle = false;
     }
 
-    /// The second difference that takes the receiver to `position`. Beyond 11 bits the encoder sends the largest
-    /// value and catches up in the following frames; the manual leaves that open.
-    fn measure(&mut self, position: u64) -> DeltaDelta {
-        let step = self.signed(position.wrapping_sub(self.position));
-        let value = DeltaDelta::clamp(step.wrapping_sub(self.velocity));
+    /// The running disparity with which an answer begins.
+    const fn column(&self) -> RunningDisparity {
+        match self.behaviour.disparity {
+            Disparity::CarriedOn => self.disparity,
+            Disparity::EachAnswer(column) => column,
+        }
+    }
+
+    /// The second difference that takes the receiver to the present position; `None` if the encoder says that it has none.
+    fn measure(&mut self) -> Option<DeltaDelta> {
+        let step = self.signed(self.position.wrapping_sub(self.told));
         if self.at.is_none() {
             // Nobody listens yet: no need to limit.
             self.velocity = step;
-            self.position = position;
-            return DeltaDelta::ZERO;
+            self.told = self.position;
+            return Some(DeltaDelta::ZERO);
         }
-        self.velocity = self.velocity.wrapping_add(i64::from(value.get()));
-        self.position = self.position.wrapping_add_signed(self.velocity) & self.bits.mask();
-        value
+        let wanted = step.wrapping_sub(self.velocity);
+        let value = wanted.clamp(-1024, 1023);
+        if wanted != value && self.behaviour.overload == Overload::NoValue {
+            self.velocity = step;
+            self.told = self.position;
+            return None;
+        }
+        self.velocity = self.velocity.wrapping_add(value);
+        self.told = self.told.wrapping_add_signed(self.velocity) & self.bits.mask();
+        i16::try_from(value).ok().and_then(DeltaDelta::new)
     }
 
     /// A difference of positions, with its sign.
@@ -166,36 +175,55 @@ impl Device {
         i64::from_le_bytes((difference << unused).to_le_bytes()) >> unused
     }
 
-    fn normal(&mut self, symbol: Result<MasterSymbol, Error>, before: u64, acceleration: DeltaDelta) -> u64 {
-        let at = self.at.unwrap_or(0);
-        if at == 0 {
+    /// The frame counts, though its head could not be read.
+    fn go_on(&mut self, before: u64) {
+        if let Some(at) = self.at {
+            if at == 0 {
+                self.latch(before);
+            }
+            self.at = Some(at.wrapping_add(1) & 7);
+            self.responder.receive_nothing();
+        }
+    }
+
+    fn normal(&mut self, symbol: Result<MasterSymbol, Error>, before: u64, acceleration: Option<DeltaDelta>) -> u64 {
+        let at = self.at.unwrap_or(self.behaviour.first_place & 7);
+        if at == 0 || self.at.is_none() {
             self.latch(before);
         }
-        self.at = Some(at.saturating_add(1) % V_FRAME);
-        let request = if let Ok(symbol) = symbol {
-            self.responder.receive(symbol)
-        } else {
-            self.responder.receive_nothing();
-            None
-        };
-        if symbol == Ok(MasterSymbol::Init) {
-            self.waiting = None;
-        }
-        if let Some(request) = request.filter(|_| !self.faults.mute) {
-            self.waiting = Some((request, self.latency));
-        }
+        self.at = Some(at.wrapping_add(1) & 7);
+        self.take(symbol);
         self.serve();
         let [vertical, secondary] = self.blocks.map(|b| b.get(usize::from(at)).copied().unwrap_or(Character::data(0)));
+        let byte = EncoderByte::of(self.responder.transmit(), at == 7 && !self.faults.no_vsync);
         let content = Content {
             vertical,
-            parameter: EncoderByte::of(self.responder.transmit(), at == 7 && !self.faults.no_vsync),
+            parameter: EncoderByte::new(byte.raw() | (self.behaviour.reserved_bits & 3) << 5),
             pipe: self.pipe.map_or(Character::control(Control::K30_7), Character::data),
-            acceleration: (!self.faults.no_acceleration).then_some(acceleration),
+            acceleration: acceleration.filter(|_| !self.faults.no_acceleration),
             secondary,
         };
-        let (bits, after) = content.emit(self.disparity);
+        let (bits, after) = content.emit(self.column());
         self.disparity = after;
         bits
+    }
+
+    /// The master's symbol; a request that is complete waits for its answer, unless it is forgotten.
+    fn take(&mut self, symbol: Result<MasterSymbol, Error>) {
+        let Ok(symbol) = symbol else {
+            self.responder.receive_nothing();
+            return;
+        };
+        let request = self.responder.receive(symbol);
+        if symbol == MasterSymbol::Init {
+            self.waiting = None;
+        }
+        let Some(request) = request else { return };
+        self.requests = self.requests.wrapping_add(1);
+        let forgotten = self.requests.checked_rem(self.behaviour.forgets_every) == Some(0);
+        if !self.faults.mute && !forgotten {
+            self.waiting = Some((request, self.behaviour.latency));
+        }
     }
 
     /// Answers the request that has waited long enough.
@@ -211,18 +239,24 @@ impl Device {
         }
     }
 
-    /// The two safe blocks of a V-frame; `position` is that of the sampling edge before it. The second position is
-    /// sent as the ones' complement of the first; the manual does not say which complement.
+    /// The two safe blocks of a V-frame; `position` is that of the sampling edge before it.
     fn latch(&mut self, position: u64) {
         let test = if self.faults.test_2 { 0x40 } else { 0 };
-        let status = if self.toggle { 0x80 } else { 0 } | test | 0x1c;
-        self.toggle = !self.toggle;
-        let mut first = block(Character::data(self.resources.summary()), position, self.faults.bad_crc);
+        let error = if self.faults.error_2 { 0x20 } else { 0 };
+        let status = if self.toggle { 0x80 } else { 0 } | test | error | 0x1c;
+        self.toggle = self.toggle == self.faults.stuck_toggle;
+        let sign = if self.id.is_signed() { self.signed(position) } else { i64::from_le_bytes(position.to_le_bytes()) };
+        let mut first = block(Character::data(self.resources.summary()), sign, self.faults.bad_crc);
         if self.faults.no_position {
             first = marked(first, [Character::control(Control::K29_7); 5], self.faults.bad_crc);
         }
         let k28 = Character::new(status, true).unwrap_or(Character::data(status));
-        let mut second = block(k28, !position & PositionBits::MAX.mask(), self.faults.bad_crc_2);
+        let coarse = sign >> (self.behaviour.second_shift & 31);
+        let second = match self.behaviour.complement {
+            Complement::Ones => !coarse,
+            Complement::Twos => coarse.wrapping_neg(),
+        };
+        let mut second = block(k28, second, self.faults.bad_crc_2);
         if self.faults.no_position_2 {
             let [top, rest] = [Character::control(Control::K27_7), Character::data(0)];
             second = marked(second, [top, rest, rest, rest, rest], self.faults.bad_crc_2);
@@ -231,7 +265,7 @@ impl Device {
     }
 }
 
-fn block(status: Character, position: u64, bad_crc: bool) -> [Character; 8] {
+fn block(status: Character, position: i64, bad_crc: bool) -> [Character; 8] {
     let [_, _, _, p4, p3, p2, p1, p0] = position.to_be_bytes().map(Character::data);
     marked([status; 8], [p4, p3, p2, p1, p0], bad_crc)
 }
@@ -240,7 +274,34 @@ fn block(status: Character, position: u64, bad_crc: bool) -> [Character; 8] {
 fn marked(block: [Character; 8], position: [Character; 5], bad_crc: bool) -> [Character; 8] {
     let [status, ..] = block;
     let [p4, p3, p2, p1, p0] = position;
-    let crc = crc16(&[status, p4, p3, p2, p1, p0].map(Character::byte)) ^ u16::from(bad_crc);
+    let crc = check(&[status, p4, p3, p2, p1, p0].map(Character::byte)) ^ u16::from(bad_crc);
     let [high, low] = crc.to_be_bytes().map(Character::data);
     [status, p4, p3, p2, p1, p0, high, low]
+}
+
+/// CRC-16 by long division: x^16 + x^15 + x^12 + x^7 + x^6 + x^4 + x^3 + 1, then the low byte inverted.
+fn check(bytes: &[u8]) -> u16 {
+    let mut rest = 0_u16;
+    for byte in bytes {
+        rest ^= u16::from(*byte) << 8;
+        for _ in 0..8 {
+            rest = if rest & 0x8000 != 0 { (rest << 1) ^ 0x90d9 } else { rest << 1 };
+        }
+    }
+    rest ^ 0x00ff
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::sampling::TEST_PATTERN;
+
+    /// What both ends wrote down agrees with what the documents print.
+    #[test]
+    fn literals() {
+        let printed = "0100110011001000000100010101110111111011001100110100010011001";
+        let bits = printed.bytes().rev().fold(0_u64, |bits, c| bits << 1 | u64::from(c == b'1'));
+        assert_eq!((PATTERN, TEST_PATTERN), (bits, bits));
+        assert_eq!((check(b"123456789"), check(&[0x00, 0x00, 0x12, 0x34, 0x56, 0x78])), (0x91c5, 0x3227));
+    }
 }

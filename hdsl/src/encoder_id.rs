@@ -84,6 +84,9 @@ impl EncoderId {
     ///  ID 7:0     ID 15:8     ID 19:16, ID 19:16    ID 15:8    ID 7:0
     /// ```
     ///
+    /// There are no check bits. A line that is inverted for this one frame gives another identifier with both copies equal:
+    /// an application that knows its encoder compares.
+    ///
     /// # Errors
     /// [`Error::InvalidWord`] for a word of these five that is in no table, by [`Rule::Strict`](crate::Rule::Strict) only;
     /// [`Error::EncoderIdMismatch`] if the two copies differ.

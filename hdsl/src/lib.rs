@@ -9,6 +9,7 @@ extern crate std;
 mod acceleration;
 mod answer;
 pub mod cable;
+mod channel2;
 mod crc;
 pub mod device;
 mod dialect;
@@ -32,6 +33,7 @@ mod vframe;
 
 pub use acceleration::DeltaDelta;
 pub use answer::{Answer, Content};
+pub use channel2::{Channel2Findings, Channel2Monitor};
 pub use crc::{CRC_16, RunningCrc16, crc16};
 pub use dialect::Dialect;
 pub use doubt::Doubt;

@@ -22,11 +22,13 @@
 //! ```
 
 mod apply;
+mod bus;
 mod flags;
 mod map;
 mod pipe;
 mod write;
 
+pub use bus::{BusError, RegisterBus, RemoteReceiver};
 pub use flags::{Event, EventS, Interrupts, Online1, Online2, OnlineD, Status2};
 pub use map::Register;
 pub use pipe::PipeFifo;

@@ -99,7 +99,7 @@ impl RunningDisparity {
         }
     }
 
-    const fn after(self, word: Word) -> Self {
+    pub(crate) const fn after(self, word: Word) -> Self {
         if word.disparity() == 0 { self } else { self.other() }
     }
 }

@@ -196,7 +196,7 @@ impl Startup {
     pub fn new(period: u32, clock: CoreClock, es: Es) -> Result<Self, Error> {
         let eighth = clock.cycles_per_eighth();
         let bit = eighth * 8;
-        let es = u32::from(es.get());
+        let es = u32::from(es.get()).max(1);
         let shortest = Self::SHORTEST * es * bit;
         let Some(left) = period.checked_sub(shortest) else {
             return Err(Error::PeriodTooShort { missing: (shortest - period).div_ceil(bit) });
@@ -276,7 +276,8 @@ impl Synchroniser {
     /// [`Error::PeriodTooShort`], [`Error::ExtraOutOfRange`] for more than 26 stuffing blocks.
     #[expect(clippy::arithmetic_side_effects, reason = "an ES is not 0")]
     pub fn new(period: u32, es: Es) -> Result<Self, Error> {
-        let divisor = u32::from(es.get());
+        // An ES is not 0; that is said where it divides, so that no panic is reachable.
+        let divisor = u32::from(es.get()).max(1);
         let (frame, remainder) = (period / divisor, period % divisor);
         // Window of 25..=72 eighths: 4..=9 bits.
         let Some(left) = frame.checked_sub(FRAME + 25) else {

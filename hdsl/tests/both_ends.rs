@@ -6,12 +6,14 @@ mod bench;
 
 use bench::Bench;
 use hdsl::cable::Disturbance;
+use hdsl::device::{Complement, Disparity, Overload};
 use hdsl::frame::Extra;
 use hdsl::master::{Cause, Master, State};
 use hdsl::message::{Access, Data, Length, LongRequest, RemoteRegister, ResourceAddress, ResourceError, ShortRequest};
-use hdsl::registers::{Interrupts, Online1, Online2, OnlineD, Register};
+use hdsl::registers::{BusError, Event, Interrupts, Online1, Online2, OnlineD, Register, RegisterBus, RemoteReceiver};
+use hdsl::symbol::RunningDisparity;
 use hdsl::sync::{Es, Synchroniser};
-use hdsl::{Dialect, Error};
+use hdsl::{Channel2Findings, Channel2Monitor, Dialect, Error};
 
 const DIALECTS: [Dialect; 2] = [Dialect::SICK, Dialect::TI];
 
@@ -277,5 +279,181 @@ fn synchronised_to_a_pulse() {
                 assert!(worst <= 10, "{tenths_of_us} {es} {metres}: {worst}");
             }
         }
+    }
+}
+
+/// Everything that the documents leave to the encoder, in all combinations of extremes: the link comes up, position and
+/// messages are right.
+#[test]
+fn whatever_the_encoder_makes_of_open_points() {
+    for combination in 0..256_u32 {
+        let on = |bit: u32| combination >> bit & 1 == 1;
+        let mut bench = Bench::on_cable(DIALECTS[usize::from(on(0))], 10);
+        let behaviour = &mut bench.device.behaviour;
+        behaviour.overload = if on(1) { Overload::NoValue } else { Overload::Saturated };
+        behaviour.complement = if on(2) { Complement::Twos } else { Complement::Ones };
+        behaviour.second_shift = if on(2) { 8 } else { 0 };
+        behaviour.disparity = if on(3) { Disparity::EachAnswer(RunningDisparity::Plus) } else { Disparity::CarriedOn };
+        behaviour.reserved_bits = if on(4) { 3 } else { 0 };
+        behaviour.sync_frames = if on(5) { 16 } else { 1 };
+        behaviour.first_place = if on(6) { 5 } else { 0 };
+        behaviour.stalls_on_bad_head = on(7);
+        behaviour.latency = if on(7) { 300 } else { 0 };
+        bench.speed = -321;
+        bench.lock();
+        bench.master.start_short(ShortRequest::Write(RemoteRegister::PING, 0x5a)).unwrap();
+        let mut monitor = Channel2Monitor::new();
+        let mut answered = false;
+        for _ in 0..if on(7) { 500 } else { 60 } {
+            let report = bench.frame();
+            answered |= report.finished.short.is_some_and(|result| result.is_ok());
+            assert_eq!(bench.master.fast().map(|fast| (fast.position, fast.velocity)), Ok((bench.position, -321)));
+            let safe = bench.master.safe().unwrap();
+            assert_eq!(safe.position, bench.position + 321 * i64::from(safe.age), "{combination}");
+            if let Some(frame) = report.v_frame {
+                assert_eq!(monitor.v_frame(&frame), Channel2Findings::empty());
+            }
+        }
+        // A latency beyond 64 frames is a message that is not answered in time, and sent again.
+        assert!(answered != on(7) || bench.device.resources.register(RemoteRegister::PING) == 0x5a, "{combination}");
+    }
+}
+
+/// The safe position is the true one also while the acceleration channel is overloaded and the fast position lags.
+#[test]
+fn an_overload_is_no_wrong_position() {
+    for overload in [Overload::Saturated, Overload::NoValue] {
+        let mut bench = Bench::on_cable(Dialect::SICK, 0);
+        bench.device.behaviour.overload = overload;
+        bench.lock();
+        let mut positions = [bench.position; 16];
+        for frame in 0..400 {
+            // Jerks of ten thousand steps a frame, now and then.
+            bench.speed = if frame % 100 == 3 { 10_000 } else { 0 };
+            let _ = bench.frame();
+            positions.rotate_right(1);
+            positions[0] = bench.position;
+            if let Ok(safe) = bench.master.safe() {
+                assert_eq!(safe.position, positions[usize::from(safe.age)], "{frame}");
+            }
+            if overload == Overload::NoValue {
+                let fast = bench.master.fast();
+                assert!(fast.is_err() || fast.unwrap().position == bench.position, "{frame}");
+            }
+        }
+    }
+}
+
+/// An encoder that was not synchronised is silent; one that forgets requests is asked again.
+#[test]
+fn an_impolite_encoder() {
+    let mut bench = Bench::on_cable(Dialect::SICK, 0);
+    bench.device.behaviour.sync_frames = 17;
+    bench.frames(18);
+    assert_eq!(bench.frame().restarted, Some(Cause::Learn(Error::NoEdge)));
+
+    let mut bench = Bench::on_cable(Dialect::SICK, 0);
+    bench.lock();
+    bench.device.behaviour.forgets_every = 2;
+    for _ in 0..6 {
+        bench.master.start_short(ShortRequest::Read(RemoteRegister::PING)).unwrap();
+        let answered = (0..200).any(|_| bench.frame().finished.short.is_some_and(|result| result.is_ok()));
+        assert!(answered);
+    }
+}
+
+/// What the monitor of channel 2 says about each fault of it.
+#[test]
+fn channel_2_is_watched() {
+    type Change = fn(&mut hdsl::device::Faults);
+    let cases: [(Change, Channel2Findings); 6] = [
+        (|_| {}, Channel2Findings::empty()),
+        (|f| f.test_2 = true, Channel2Findings::TEST2),
+        (|f| f.error_2 = true, Channel2Findings::ERR2),
+        (|f| f.stuck_toggle = true, Channel2Findings::TOG2),
+        (|f| f.no_position_2 = true, Channel2Findings::VPOS2),
+        (|f| f.bad_crc_2 = true, Channel2Findings::STALE),
+    ];
+    for (change, want) in cases {
+        let mut bench = Bench::on_cable(Dialect::SICK, 0);
+        bench.lock();
+        change(&mut bench.device.faults);
+        let mut monitor = Channel2Monitor::new();
+        let mut all = Channel2Findings::empty();
+        for _ in 0..40 {
+            if let Some(frame) = bench.frame().v_frame {
+                all |= monitor.v_frame(&frame);
+            }
+        }
+        assert_eq!(all, want, "{want}");
+    }
+}
+
+/// Signed positions come with their sign.
+#[test]
+fn signed_positions() {
+    // 00153h with bit 10: 32 bits, signed.
+    let mut bench = Bench::new(Dialect::SICK, 0x00553, Disturbance::metres(0));
+    bench.position = 1000;
+    bench.speed = -7;
+    while bench.position > -5000 {
+        let _ = bench.frame();
+        if let Ok(fast) = bench.master.fast() {
+            assert_eq!(fast.position, bench.position);
+        }
+    }
+    let safe = bench.master.safe().unwrap();
+    assert_eq!(safe.position, bench.position + 7 * i64::from(safe.age));
+    assert!(bench.master.fast().unwrap().position < 0 && safe.position < 0);
+}
+
+/// The registers of a bench as a bus to a receiver elsewhere: every access lets some frames pass.
+impl RegisterBus for Bench {
+    type Error = Error;
+
+    fn read(&mut self, address: u8, bytes: &mut [u8]) -> Result<(), Error> {
+        self.frames(3);
+        for (at, byte) in (address..).zip(bytes) {
+            *byte = self.map.read(at).ok_or(Error::NoRegister { address: at })?;
+        }
+        Ok(())
+    }
+
+    fn write(&mut self, address: u8, bytes: &[u8]) -> Result<(), Error> {
+        self.frames(1);
+        (address..).zip(bytes).try_for_each(|(at, byte)| self.map.write(&mut self.master, at, *byte))
+    }
+}
+
+/// Typed messages, events and positions of a receiver that is reached through its registers only.
+#[test]
+fn a_receiver_behind_a_bus() {
+    for dialect in DIALECTS {
+        let mut bench = Bench::on_cable(dialect, 10);
+        bench.speed = 4;
+        bench.lock();
+        let mut remote = RemoteReceiver::new(dialect, bench);
+        remote.start_short(ShortRequest::Write(RemoteRegister::PING, 0x77)).unwrap();
+        assert_eq!(remote.start_short(ShortRequest::Read(RemoteRegister::PING)), Err(BusError::Link(Error::Busy)));
+        while remote.poll_short().unwrap().is_none() {}
+        remote.start_short(ShortRequest::Read(RemoteRegister::PING)).unwrap();
+        let data = (0..100).find_map(|_| remote.poll_short().unwrap());
+        assert_eq!(data, Some(0x77));
+
+        let [write, read] = write_and_read();
+        for (request, want) in [(write, &b""[..]), (read, b"MOTOR 42")] {
+            remote.start_long(&request).unwrap();
+            assert_eq!(remote.start_long(&request), Err(BusError::Link(Error::Busy)));
+            let data = (0..100).find_map(|_| remote.poll_long().unwrap()).unwrap();
+            assert_eq!(data.as_bytes(), want);
+        }
+        remote.start_long(&LongRequest::read(ResourceAddress::new(0x3ff).unwrap(), Length::Two)).unwrap();
+        let refused = (0..100).find_map(|_| remote.poll_long().err());
+        assert_eq!(refused, Some(BusError::Link(Error::Resource { error: ResourceError::NOT_THERE })));
+
+        let map = remote.registers().unwrap();
+        assert_eq!((map.velocity(), map.quality(), map.link()), (4, 15, true));
+        let _ = remote.take_events().unwrap();
+        assert!(!remote.take_events().unwrap().0.intersects(Event::FREL | Event::PRST));
     }
 }

@@ -85,7 +85,7 @@ fn transact(encoder: &mut Device<1>, request: Request, resolution: Resolution, n
         }
     }
     match transaction.poll(now_ns + 10_000_000) {
-        Progress::Done { value, .. } => Ok(value),
+        Progress::Done { value, .. } => Ok(value.response),
         Progress::Failed { error, .. } => Err(error),
         Progress::Pending { .. } => unreachable!("10 ms are longer than any time-out"),
     }

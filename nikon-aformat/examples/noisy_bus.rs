@@ -72,7 +72,7 @@ pub fn run(transactions: u64, per_million: u64, seed: u64) -> Tally {
         let mut line = Line::of(&answers);
         line.disturb(&mut noise);
         let mut bus = Bus::new(expected, Addresses::ALL);
-        let mut receiver = LineReceiver::bits(Layout::Abs40).on_bus();
+        let mut receiver = LineReceiver::bits(Layout::Abs40);
         let mut good = 0;
         for word in &line.words {
             let mut samples = Samples::new(*word);

@@ -152,8 +152,12 @@ impl Bus {
 
     /// A response has arrived, or was cut or broken.
     pub fn push(&mut self, raw: Result<RawResponse, Error>) -> Arrival {
+        self.take(raw.and_then(|raw| Response::parse(&self.expected, &raw)))
+    }
+
+    /// A response that was judged already.
+    pub(crate) fn take(&mut self, outcome: Result<Response, Error>) -> Arrival {
         self.arrived = self.arrived.saturating_add(1);
-        let outcome = raw.and_then(|raw| Response::parse(&self.expected, &raw));
         let (mut duplicate, mut extra) = (false, false);
         match outcome {
             Ok(response) => {
@@ -226,9 +230,9 @@ impl Bus {
         self.asked.len().saturating_sub(self.arrived)
     }
 
-    /// Whether as many responses arrived as were asked for, so that there is nothing left to wait for.
-    pub const fn is_complete(&self) -> bool {
-        self.not_started() == 0
+    /// Whether every address that was asked has sent a good response.
+    pub fn heard_all(&self) -> bool {
+        self.missing().is_empty()
     }
 
     fn select(&self, wanted: impl Fn(Outcome) -> bool) -> Addresses {
@@ -273,14 +277,15 @@ mod tests {
         let [a0, a1, a2, _, _, a5, ..] = EncoderAddress::ALL;
         assert_eq!(bus.push(Ok(response(0, 1).emit())).outcome, Ok(response(0, 1)));
         assert!(bus.push(Ok(response(5, 2).emit())).extra);
-        assert!(!bus.is_complete());
+        assert!(!bus.heard_all());
         let mut damaged = response(1, 3).emit().words(crate::BitOrder::LsbFirst).collect::<std::vec::Vec<_>>();
         damaged[1] ^= 1;
         let damaged = RawResponse::from_words(Layout::Abs24, &damaged, crate::BitOrder::LsbFirst);
         assert!(matches!(bus.push(damaged).outcome, Err(Error::Crc { .. })));
         let twice = bus.push(Ok(response(0, 9).emit()));
         assert!(twice.duplicate && twice.outcome == Ok(response(0, 9)));
-        assert!(bus.is_complete());
+        // As many responses as were asked for, and two of them are still missing.
+        assert!(!bus.heard_all());
         assert_eq!(bus.of(a0), Outcome::Duplicate { first: response(0, 1) });
         assert_eq!((bus.response(a0), bus.of(a1), bus.of(a2)), (None, Outcome::Missing, Outcome::Missing));
         assert_eq!(bus.of(a5), Outcome::Extra(response(5, 2)));
@@ -295,10 +300,10 @@ mod tests {
         fn order_does_not_matter(asked: u8, order in Just([0_u8, 1, 2, 3, 4, 5, 6, 7]).prop_shuffle()) {
             let mut bus = bus(Addresses::from_bits(asked));
             for ea in order.into_iter().filter(|ea| asked >> ea & 1 == 1) {
-                prop_assert!(!bus.is_complete());
+                prop_assert!(!bus.heard_all());
                 bus.push(Ok(response(ea, u32::from(ea) * 1000).emit()));
             }
-            prop_assert!(bus.is_complete() && bus.missing().is_empty() && bus.extra().is_empty());
+            prop_assert!(bus.heard_all() && bus.missing().is_empty() && bus.extra().is_empty());
             for ea in bus.asked().iter() {
                 prop_assert_eq!(bus.response(ea), Some(response(ea.get(), u32::from(ea.get()) * 1000)));
             }

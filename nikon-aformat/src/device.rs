@@ -4,12 +4,10 @@
 //! one line. Position, alarms, temperature and the rest are set from outside; EEPROM, addresses, eight-fold resets and
 //! busy times are its own. Faults can be switched on to see what a master makes of them.
 //!
-//! What the documents leave open is decided here as follows. A damaged request, a command of a later version and a write to
-//! the maker's addresses are not answered. In a multi-response request EA is the highest address that answers; encoder k
-//! answers in slot k, whoever else is there. A reset takes effect with the eighth request in succession, and any other
-//! request on the line starts the count again. The responses to commands 11 and 20 show the new address. The first response to
-//! an EEPROM read has ES0 set and data 0. While the encoder is busy, writes are repeated in the response but not done. The
-//! EEPROM without bank is bank 0.
+//! What the documents leave open is a [`Behaviour`]. A damaged request, a command of a later version and a write to the
+//! maker's addresses are not answered. A reset takes effect with the eighth request in succession, and any other request on
+//! the line starts the count again; the responses of other encoders do not. While the encoder is busy, writes are repeated in
+//! the response but not done. The EEPROM without bank is bank 0.
 //!
 //! ```
 //! use nikon_aformat::device::Device;
@@ -26,7 +24,10 @@
 //! assert_eq!(answer.raw.frames(), 4);
 //! ```
 
+mod behaviour;
 mod memory;
+
+pub use behaviour::{Behaviour, Ea, Shows};
 
 use nrz_line::Window;
 
@@ -35,6 +36,7 @@ use crate::data::Data;
 use crate::device::memory::Memory;
 use crate::error::Error;
 use crate::frame::RequestFrame;
+use crate::layout::FRAME_BITS;
 use crate::number::{EncoderAddress, EncoderId, U10, U19};
 use crate::operation::Operation;
 use crate::raw_response::RawResponse;
@@ -43,21 +45,25 @@ use crate::resolution::Resolution;
 use crate::response::Response;
 use crate::status::{Alm, EncoderStatus, PmAlm};
 use crate::temperature::Temperature;
-use crate::timing::{BitRate, WRITE_BUSY_NS};
+use crate::timing::BitRate;
 use crate::type_word::TypeWord;
-
-/// Time from the end of a request to the response. Not documented; one vendor's simulated encoder waits so long.
-pub const TURN_AROUND_NS: u32 = 2_800;
 
 /// A pause after which a frame begins a new request. No upper limit is documented for the gap between the frames of a
 /// request; early drivers left 10 us.
 pub const MAX_FRAME_GAP_NS: u32 = 20_000;
+
+/// How long an encoder is busy with a write, an address setting or a reset: the longest time of "Nikon Protocol Design".
+const BUSY_NS: u32 = 30_000_000;
+
+/// The frames of another encoder's response follow each other within this many bits.
+const RESPONSE_PAUSE_BITS: u32 = 4;
 
 /// A fault that the encoder or its line is made to have.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "arbitrary", derive(arbitrary::Arbitrary))]
+#[non_exhaustive]
 pub enum Fault {
     /// None.
     #[default]
@@ -112,12 +118,13 @@ pub struct Device<const BANKS: usize> {
     pm_alm: PmAlm,
     memory: Memory<BANKS>,
     fault: Fault,
+    behaviour: Behaviour,
     repeated: Option<Request>,
     repeats: u8,
     received: [RequestFrame; Frames::MAX],
     len: u8,
-    /// A request was judged and no pause has come since.
-    deaf: bool,
+    /// What follows without a longer pause than this, in ns from delimiter to delimiter, is not judged.
+    deaf_ns: Option<u32>,
     last_frame_ns: u64,
 }
 
@@ -144,11 +151,12 @@ impl<const BANKS: usize> Device<BANKS> {
             pm_alm: PmAlm::empty(),
             memory,
             fault: Fault::None,
+            behaviour: Behaviour::new(),
             repeated: None,
             repeats: 0,
             received: [RequestFrame::mdf(crate::frame::FrameCode::Fc0, 0); Frames::MAX],
             len: 0,
-            deaf: false,
+            deaf_ns: None,
             last_frame_ns: 0,
         }
     }
@@ -198,6 +206,11 @@ impl<const BANKS: usize> Device<BANKS> {
         }
     }
 
+    /// Decides what the documents leave open.
+    pub const fn set_behaviour(&mut self, behaviour: Behaviour) {
+        self.behaviour = behaviour;
+    }
+
     /// Switches a fault on or, with [`Fault::None`], off.
     pub const fn set_fault(&mut self, fault: Fault) {
         self.fault = fault;
@@ -218,6 +231,11 @@ impl<const BANKS: usize> Device<BANKS> {
         self.memory.set(bank, address, data);
     }
 
+    /// What the resets have set to 0: counts in the turn, and turns.
+    pub const fn zero(&self) -> (u32, u32) {
+        (self.zero, self.turns_zero)
+    }
+
     /// The position as a response carries it.
     pub const fn abs(&self) -> crate::number::U40 {
         self.resolution.compose(self.single_turn.wrapping_sub(self.zero), self.turns.wrapping_sub(self.turns_zero))
@@ -226,11 +244,15 @@ impl<const BANKS: usize> Device<BANKS> {
     /// A frame was received with start bit and delimiter in order, its delimiter at `now_ns`; `content` are its bits, the first
     /// of the line in bit 0. Gives the answer once a request is complete.
     pub fn frame(&mut self, content: u16, now_ns: u64) -> Option<Transmission> {
-        let frame = RequestFrame::from_content(content);
         if self.is_deaf(now_ns) {
             return None;
         }
-        let Ok(frame) = frame else {
+        if content & 7 == u16::from(Response::SYNC_CODE) && self.len == 0 {
+            // Another encoder speaks.
+            self.deaf_ns = Some(self.rate.bits_ns(FRAME_BITS.saturating_add(RESPONSE_PAUSE_BITS)));
+            return None;
+        }
+        let Ok(frame) = RequestFrame::from_content(content) else {
             self.misheard();
             return None;
         };
@@ -243,7 +265,7 @@ impl<const BANKS: usize> Device<BANKS> {
                 None
             }
             Ok(request) => {
-                self.deaf = true;
+                self.len = 0;
                 let response = self.answer(request, now_ns)?;
                 self.send(request, response, now_ns)
             }
@@ -257,24 +279,27 @@ impl<const BANKS: usize> Device<BANKS> {
         }
     }
 
+    /// The rest of a damaged request is not judged, and the count of a reset starts again.
     fn misheard(&mut self) {
-        self.deaf = true;
+        self.deaf_ns = Some(self.rate.bits_ns(FRAME_BITS).saturating_add(MAX_FRAME_GAP_NS));
         self.repeated = None;
         self.repeats = 0;
+        self.len = 0;
     }
 
-    /// Whether what arrives now is the rest of a request that was already judged.
+    /// Whether what arrives now belongs to what is not judged.
     fn is_deaf(&mut self, now_ns: u64) -> bool {
-        let patience = self.rate.bits_ns(crate::FRAME_BITS).saturating_add(MAX_FRAME_GAP_NS);
-        let pause = now_ns.saturating_sub(self.last_frame_ns);
-        // A complete request is followed by the next one after any pause; a broken one only after a long one.
-        let complete = self.deaf && self.repeated.is_some();
-        if complete || pause > patience.into() {
-            self.len = 0;
-            self.deaf = false;
-        }
+        let pause_ns = now_ns.saturating_sub(self.last_frame_ns);
         self.last_frame_ns = now_ns;
-        self.deaf
+        if self.deaf_ns.is_some_and(|deaf_ns| pause_ns <= deaf_ns.into()) {
+            return true;
+        }
+        self.deaf_ns = None;
+        let patience_ns = self.rate.bits_ns(FRAME_BITS).saturating_add(MAX_FRAME_GAP_NS);
+        if pause_ns > patience_ns.into() {
+            self.len = 0;
+        }
+        false
     }
 
     /// What a sound request does, and the answer to it; `None` if it is for another encoder or not understood.
@@ -283,7 +308,20 @@ impl<const BANKS: usize> Device<BANKS> {
         if request.check(self.resolution).is_err() || !self.is_meant(request) {
             return None;
         }
-        self.reset(request, now_ns);
+        let old = self.ea;
+        let takes_effect = request.command().is_reset() && self.repeats == request.command().repeats();
+        if takes_effect && self.behaviour.reset_shows == Shows::Eighth {
+            self.reset(request, now_ns);
+        }
+        let response = self.respond(request, old, now_ns);
+        if takes_effect && self.behaviour.reset_shows == Shows::Ninth {
+            self.reset(request, now_ns);
+        }
+        response
+    }
+
+    fn respond(&mut self, request: Request, old: EncoderAddress, now_ns: u64) -> Option<Response> {
+        let is_first_read = request.command() == Command::EepromRead && !self.memory.is_busy(now_ns);
         let es = EncoderStatus::of_alarms(self.alm(now_ns));
         let layout = request.layout(self.resolution);
         let abs = self.abs();
@@ -316,8 +354,14 @@ impl<const BANKS: usize> Device<BANKS> {
             memory => self.access(memory, request.ea, now_ns)?,
         };
         // An access makes the memory busy, and its response shows it.
-        let es = EncoderStatus::of_alarms(self.alm(now_ns));
-        Some(Response::new(self.ea, request.command(), es, data))
+        let hidden = is_first_read && !self.behaviour.busy_in_first_read;
+        let alm = if hidden { self.alm } else { self.alm(now_ns) };
+        let ea = match request.command() {
+            Command::SetAddress1 | Command::SetAddress2 if self.behaviour.shows_new_address => request.ea,
+            Command::SetAddress1 | Command::SetAddress2 => old,
+            _ => self.ea,
+        };
+        Some(Response::new(ea, request.command(), EncoderStatus::of_alarms(alm), data))
     }
 
     /// Whether this encoder is asked.
@@ -325,7 +369,7 @@ impl<const BANKS: usize> Device<BANKS> {
         match request.operation {
             Operation::SetAddress1 | Operation::IdRead2 | Operation::IdWrite2 { .. } => true,
             Operation::SetAddress2 { id } => id == self.id,
-            _ if request.command().is_multi_response() => self.ea <= request.ea,
+            _ if request.command().is_multi_response() => self.behaviour.ea == Ea::All || self.ea <= request.ea,
             _ => self.ea == request.ea,
         }
     }
@@ -342,11 +386,8 @@ impl<const BANKS: usize> Device<BANKS> {
     /// The effect of the eighth request of a reset.
     fn reset(&mut self, request: Request, now_ns: u64) {
         let command = request.command();
-        if !command.is_reset() || self.repeats != command.repeats() {
-            return;
-        }
         self.repeats = 0;
-        self.memory.busy(now_ns, WRITE_BUSY_NS);
+        self.memory.busy(now_ns, BUSY_NS);
         match command {
             Command::ZeroPreset => self.zero = self.single_turn,
             Command::SetAddress1 => self.ea = request.ea,
@@ -364,12 +405,13 @@ impl<const BANKS: usize> Device<BANKS> {
     fn access(&mut self, operation: Operation, ea: EncoderAddress, now_ns: u64) -> Option<Data> {
         let busy = self.memory.is_busy(now_ns);
         Some(match operation {
-            Operation::EepromRead { address } => {
-                Data::Eeprom { data: self.memory.read(0, address, now_ns).unwrap_or(0), address }
-            }
+            Operation::EepromRead { address } => Data::Eeprom {
+                data: self.memory.read(0, address, now_ns).unwrap_or(self.behaviour.undetermined),
+                address,
+            },
             Operation::EepromReadBank { bank, address } => {
                 let bank_error = !Memory::<BANKS>::has(bank);
-                let data = self.memory.read(bank, address, now_ns).unwrap_or(0);
+                let data = self.memory.read(bank, address, now_ns).unwrap_or(self.behaviour.undetermined);
                 Data::EepromBank { data, bank, address, bank_error }
             }
             Operation::EepromWrite { address, data } => {
@@ -384,14 +426,14 @@ impl<const BANKS: usize> Device<BANKS> {
             Operation::IdWrite1 { id } | Operation::IdWrite2 { id } => {
                 if !busy {
                     self.id = id;
-                    self.memory.busy(now_ns, WRITE_BUSY_NS);
+                    self.memory.busy(now_ns, BUSY_NS);
                 }
                 Data::Id { id }
             }
             Operation::SetAddress2 { id } => {
                 if !busy {
                     self.ea = ea;
-                    self.memory.busy(now_ns, WRITE_BUSY_NS);
+                    self.memory.busy(now_ns, BUSY_NS);
                 }
                 Data::Id { id }
             }
@@ -399,7 +441,7 @@ impl<const BANKS: usize> Device<BANKS> {
             Operation::CoefficientWrite { coefficient } => {
                 if !busy {
                     self.coefficient = coefficient;
-                    self.memory.busy(now_ns, WRITE_BUSY_NS);
+                    self.memory.busy(now_ns, BUSY_NS);
                 }
                 Data::Coefficient { coefficient }
             }
@@ -422,9 +464,10 @@ impl<const BANKS: usize> Device<BANKS> {
             Fault::CutAfter { bits } => Window::from_bits(good.bits(), good.len().min(bits.into())),
             Fault::BadCrc => Window::from_bits(good.bits() ^ crc, good.len()),
         };
-        let slot = if request.command().is_multi_response() { self.ea.get() } else { 0 };
+        let place = self.behaviour.place.unwrap_or(self.ea.get());
+        let slot = if request.command().is_multi_response() { place } else { 0 };
         let slot_ns = self.rate.bits_ns(good.len()).saturating_add(self.rate.response_gap_ns());
-        let wait = TURN_AROUND_NS.saturating_add(slot_ns.saturating_mul(slot.into()));
+        let wait = self.behaviour.turn_around_ns.saturating_add(slot_ns.saturating_mul(slot.into()));
         Some(Transmission { raw, line: line?, at_ns: now_ns.saturating_add(wait.into()) })
     }
 }

@@ -139,12 +139,22 @@ servowire_core::errors! {
             /// Requests made.
             tries: u16,
         },
-        /// A reset was interrupted: a response did not come, and the eight requests have to be sent anew.
-        #[error("no response to the reset after {done} good responses of 8")]
+        /// A reset was interrupted before the eighth request, so it was **not done**. The eight requests have to be sent anew.
+        #[error("no response to the reset after {done} good responses of 8: not done")]
         Interrupted {
             /// Good responses in succession so far.
             done: u8,
         },
+        /// Whether a command that cannot be undone took effect is not known: the response to its last request did not come.
+        /// Find out before it is repeated.
+        #[error("the response to a command that cannot be undone is missing: it may have been done")]
+        EffectUnknown,
+        /// What was written is not what is read back.
+        #[error("what was written is not what is read back")]
+        NotDone,
+        /// MEMERR is set: an access to the EEPROM failed.
+        #[error("the encoder reports a failed access to its EEPROM")]
+        MemoryFault,
         /// A position has bits set above the width of the encoder: the wrong resolution.
         #[error("the position has bits set above bit {width} that this encoder leaves 0")]
         UpperBits {

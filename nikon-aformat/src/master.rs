@@ -10,17 +10,24 @@
 mod cycle;
 mod detection;
 mod eeprom;
+mod guarded;
+mod hunt;
 mod line;
 mod reset;
 mod transaction;
+mod verified;
+mod write;
 
 pub use cycle::{Cycle, PeriodTooShort};
 pub use detection::{Detected, Detection};
-pub use eeprom::{EepromRead, READ_POLLING, WRITE_POLLING, Write};
+pub use eeprom::{EepromRead, READ_POLLING, WRITE_POLLING};
+pub use guarded::GuardedReset;
 pub use line::Line;
 pub use reset::Reset;
 pub use servowire_core::{ErrorRate, Polling};
-pub use transaction::{BusTransaction, Transaction};
+pub use transaction::{BusTransaction, Reading, Sampled, Transaction};
+pub use verified::VerifiedWrite;
+pub use write::Write;
 
 use crate::error::{Error, ErrorClass};
 use crate::request::Request;

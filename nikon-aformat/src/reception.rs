@@ -1,8 +1,10 @@
 //! Reception of responses from a sampled line: oversampled, or as a plain bit stream at any bit offset.
 //!
-//! Every start bit is searched anew and the clock is recovered from every edge, so idle bits may stand between the
-//! frames of a response, and the rate error counts over one frame of 18 bits only. Over six frames of 108 bits one per
-//! cent would already be more than a bit.
+//! Every start bit is searched anew and the clock is recovered from every edge, so the rate error counts over one frame of 18
+//! bits only. Over six frames of 108 bits one per cent would already be more than a bit.
+//!
+//! The frames of a response follow each other without idle bits, and five idle bits or more separate two responses. A frame that
+//! begins a bit or more late has lost its start bit, and its response is refused.
 //!
 //! ```
 //! use nikon_aformat::reception::LineReceiver;
@@ -34,7 +36,8 @@ use crate::raw_response::RawResponse;
 pub struct LineReceiver {
     receiver: Receiver,
     layout: Layout,
-    on_bus: bool,
+    /// Whether idle bits may stand between the frames of a response.
+    idle_allowed: bool,
     contents: [u16; RawResponse::MAX_FRAMES],
     got: u8,
     /// Index of the first sample behind the last frame.
@@ -53,7 +56,7 @@ impl LineReceiver {
     /// Idle bits that separate two responses on a bus. The shortest gap that masters allow for is 7.5 bits.
     const BUS_GAP_BITS: u64 = 5;
 
-    /// A receiver of `samples_per_bit` samples a bit, 4 to 80, that takes any gap between frames.
+    /// A receiver of `samples_per_bit` samples a bit, 4 to 80.
     ///
     /// The vendor's receivers use 4, 5, 6 or 8.
     ///
@@ -66,26 +69,25 @@ impl LineReceiver {
         }
     }
 
-    /// A receiver of a plain bit stream, as a shift register packs it, that takes any gap between frames.
+    /// A receiver of a plain bit stream, as a shift register packs it.
     pub const fn bits(layout: Layout) -> Self {
         Self::of(PLAIN_BITS, layout)
     }
 
-    /// The same for a bus, where the frames of a response follow each other without idle bits and five idle bits or more separate
-    /// two responses.
+    /// Takes any gap between the frames of a response, for a line on which idle bits stand between them.
     ///
-    /// A frame that begins a bit or more late has lost its start bit, and a later edge was taken for it: without this
-    /// rule, one such frame in 256 at the end of a response passes the CRC-8. And a response that lost a frame does not swallow
-    /// the first frame of the next one.
-    pub const fn on_bus(self) -> Self {
-        Self { on_bus: true, ..self }
+    /// **One wrong bit can then give a wrong position**: where the start bit of a frame is lost, a later edge is taken for it, and
+    /// one such frame in 256 at the end of a response passes the CRC-8. And a response that lost a frame swallows the
+    /// first frame of the next one.
+    pub const fn allowing_idle_between_frames(self) -> Self {
+        Self { idle_allowed: true, ..self }
     }
 
     const fn of(format: Format, layout: Layout) -> Self {
         Self {
             receiver: Receiver::new(format),
             layout,
-            on_bus: false,
+            idle_allowed: false,
             contents: [0; RawResponse::MAX_FRAMES],
             got: 0,
             end: 0,
@@ -126,18 +128,18 @@ impl LineReceiver {
         let begun = (self.got > 0 || self.receiver.is_receiving()) && !self.broken;
         let error = self.truncation();
         let format = self.receiver.format();
-        *self = Self { on_bus: self.on_bus, ..Self::of(format, self.layout) };
+        *self = Self { idle_allowed: self.idle_allowed, ..Self::of(format, self.layout) };
         begun.then_some(error)
     }
 
-    /// One frame more. On a bus, a gap before it ends the response that was begun, and the frame begins the next one.
+    /// One frame more. A gap before it ends the response that was begun, and the frame begins the next one.
     fn take(&mut self, field: Field) -> Option<Result<RawResponse, Error>> {
         let samples = u64::from(self.receiver.format().samples_per_bit());
         // The end of a frame is known to half a bit.
         let idle = field.start.saturating_sub(self.end).saturating_add(samples / 2);
         self.end = field.start.saturating_add(samples.saturating_mul(FRAME_BITS.into()));
         let mut ended = None;
-        if self.on_bus {
+        if !self.idle_allowed {
             if idle >= samples.saturating_mul(Self::BUS_GAP_BITS) {
                 self.broken = false;
                 ended = (self.got > 0).then(|| Err(self.truncation()));
@@ -164,11 +166,11 @@ impl LineReceiver {
         Some(Ok(RawResponse::of(core::mem::take(&mut self.contents), self.layout)))
     }
 
-    /// A response is given up; on a bus, its rest is passed over.
+    /// A response is given up, and its rest passed over.
     fn break_off(&mut self, error: Error) -> Error {
         self.got = 0;
         self.contents = [0; RawResponse::MAX_FRAMES];
-        self.broken = self.on_bus;
+        self.broken = !self.idle_allowed;
         error
     }
 
@@ -180,7 +182,12 @@ impl LineReceiver {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::command::Command;
+    use crate::expected::Expected;
+    use crate::number::{EncoderAddress, U17};
+    use crate::response::Response;
     use crate::response::tests::exchanges;
+    use crate::status::EncoderStatus;
     use core::iter::repeat_n;
     use nrz_line::{Wave, Window};
     use proptest::prelude::*;
@@ -193,6 +200,41 @@ mod tests {
 
     fn bits_of(line: Window) -> impl Iterator<Item = bool> {
         (0..line.len()).map(move |at| line.get(at) == Some(true))
+    }
+
+    /// ABS17 of encoder 7, position 96964, with one wrong bit: the start bit of the second frame reads 1.
+    #[test]
+    fn one_wrong_bit_gives_no_position_but_with_idle_allowed() {
+        let line = "111000111110010001101110111101100100111";
+        let hear = |mut receiver: LineReceiver| {
+            let bits = line.chars().map(|c| c == '1').chain(repeat_n(true, 40));
+            bits.filter_map(|bit| receiver.push(bit)).collect::<Vec<_>>()
+        };
+        let receiver = LineReceiver::bits(Layout::Abs17);
+        assert_eq!(hear(receiver), [Err(Error::StartBit { frame: 1 })]);
+        let expected = Expected::new(Layout::Abs17, Command::Abs17).from_address(EncoderAddress::MAX);
+        let tolerant = hear(receiver.allowing_idle_between_frames());
+        let wrong = tolerant[0].and_then(|raw| Response::parse(&expected, &raw));
+        assert_eq!(wrong.map(|response| response.abs()), Ok(Some(57_028)));
+    }
+
+    /// Every single wrong bit of every position in a sweep: nothing wrong is ever accepted.
+    #[test]
+    fn no_single_flip_passes() {
+        let expected = Expected::new(Layout::Abs17, Command::Abs17).from_address(EncoderAddress::MAX);
+        for abs in (0..=0x1_ffff).step_by(if cfg!(miri) { 10_007 } else { 11 }) {
+            let sent = Response::abs17(EncoderAddress::MAX, EncoderStatus::empty(), U17::truncate(abs));
+            let line = sent.emit().line();
+            for at in 0..line.len() {
+                let flipped = Window::from_bits(line.bits() ^ 1 << at, line.len()).unwrap();
+                let mut receiver = LineReceiver::bits(Layout::Abs17);
+                let bits = repeat_n(true, 3).chain(bits_of(flipped)).chain(repeat_n(true, 40));
+                for raw in bits.filter_map(|bit| receiver.push(bit)).flatten() {
+                    let read = Response::parse(&expected, &raw);
+                    assert!(read.is_err(), "{abs}, bit {at}: {read:?}");
+                }
+            }
+        }
     }
 
     proptest! {
@@ -209,14 +251,14 @@ mod tests {
                 bits.extend(bits_of(raw.line()).skip(frame * 18).take(18));
             }
             bits.push(true);
-            let mut receiver = LineReceiver::oversampled(samples, expected.layout()).unwrap();
+            let mut receiver = LineReceiver::oversampled(samples, expected.layout()).unwrap().allowing_idle_between_frames();
             let got: Vec<_> = render(&bits, Wave::new(samples, ppm, phase)).into_iter()
                 .filter_map(|(level, len)| receiver.run(level, len)).collect();
             prop_assert_eq!(got, [Ok(raw)]);
             prop_assert_eq!(receiver.finish(), None);
         }
 
-        /// On a bus, a frame that begins one to four bits late is refused: its start bit was lost.
+        /// A frame that begins one to four bits late is refused: its start bit was lost.
         #[test]
         fn a_late_frame_lost_its_start_bit((_, expected, response) in exchanges(), frame in 1..6_u8, late in 1..5_usize) {
             let raw = response.emit();
@@ -224,7 +266,7 @@ mod tests {
             let mut bits: Vec<bool> = bits_of(raw.line()).collect();
             let at = usize::from(frame) * 18;
             bits.splice(at..at, repeat_n(true, late));
-            let mut receiver = LineReceiver::bits(expected.layout()).on_bus();
+            let mut receiver = LineReceiver::bits(expected.layout());
             let got: Vec<_> = bits.into_iter().filter_map(|bit| receiver.push(bit)).collect();
             prop_assert_eq!(got, [Err(Error::StartBit { frame })]);
             prop_assert_eq!(receiver.finish(), None);
@@ -242,7 +284,7 @@ mod tests {
             bits.truncate(whole * 18);
             bits.extend(repeat_n(true, gap));
             bits.extend(bits_of(raw.line()));
-            let mut receiver = LineReceiver::bits(expected.layout()).on_bus();
+            let mut receiver = LineReceiver::bits(expected.layout());
             let got: Vec<_> = bits.into_iter().filter_map(|bit| receiver.push(bit)).collect();
             let cut = Error::Truncated { got: whole as u16 * 18, want: frames as u16 * 18 };
             if whole == 0 {

@@ -70,17 +70,17 @@ fn transact<const N: usize, const B: usize>(
                 if framed { transaction.frame((bits >> 1) as u16, now_ns) } else { transaction.framing_error(now_ns) };
             match transaction.progress() {
                 Progress::Pending { .. } => {}
-                Progress::Done { value, .. } => return (Ok(value), now_ns),
+                Progress::Done { value, .. } => return (Ok(value.response), now_ns),
                 Progress::Failed { error, .. } => return (Err(error), now_ns),
             }
         }
     }
     match transaction.progress() {
-        Progress::Pending { until_ns } => match transaction.poll(until_ns + 1) {
-            Progress::Failed { error, .. } => (Err(error), until_ns + 1),
+        Progress::Pending { until_ns } => match transaction.poll(until_ns) {
+            Progress::Failed { error, .. } => (Err(error), until_ns),
             other => panic!("{other:?}"),
         },
-        Progress::Done { value, .. } => (Ok(value), now_ns),
+        Progress::Done { value, .. } => (Ok(value.response), now_ns),
         Progress::Failed { error, .. } => (Err(error), now_ns),
     }
 }
@@ -258,9 +258,9 @@ fn one_fault_costs_one_response() {
             if whole == 8 {
                 continue;
             }
-            let mut receiver = LineReceiver::bits(Layout::Abs40).on_bus();
+            let mut receiver = LineReceiver::bits(Layout::Abs40);
             let bus = hear(&mut receiver, &answers, transaction.bus());
-            assert!(transaction.poll(u64::MAX));
+            assert!(matches!(transaction.poll(u64::MAX), Progress::Done { .. }));
             for address in EncoderAddress::ALL {
                 assert_eq!(bus.response(address).is_some(), address.get() != bad, "{fault:?} of {bad}, {address}");
             }

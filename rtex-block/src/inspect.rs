@@ -16,10 +16,12 @@
 //! ```
 
 mod fields;
+mod log;
 
 use core::fmt;
 
 pub use fields::{Field, Fields, Value};
+pub use log::{LogAnalysis, LogFinding, LogShape};
 
 use crate::block::{LEN, LEN32};
 use crate::code::Code;

@@ -245,6 +245,7 @@ impl fmt::Display for NonCyclicResponse {
             Self::Alarm(r) => {
                 let (alarm, warning) = r.alarm();
                 write!(f, "type {:02X}h index {} {alarm} warning {warning:X}h", r.type_code.get(), r.index)?;
+                write!(f, " (or attributes {:08X}h)", r.data)?;
                 suffix(f, &r.execution)
             }
             Self::SystemId(r) => {

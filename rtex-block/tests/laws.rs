@@ -270,7 +270,10 @@ fn messages_print_in_one_line() {
         index: 2,
         data: Results::alarm_data(Alarm { main: 86, sub: 1 }, 0xa0),
     };
-    assert_eq!(NonCyclicResponse::Alarm(alarm).to_string(), "type 01h index 2 Err86.1 warning A0h WNG");
+    assert_eq!(
+        NonCyclicResponse::Alarm(alarm).to_string(),
+        "type 01h index 2 Err86.1 warning A0h (or attributes 00A00156h) WNG"
+    );
     let arguments = Arguments { type_code: TypeCode::short(0x11), index: 0x0714, data: -1 };
     let idle = Command::idle(MacId::MAX, UpdateCounter::MAX);
     let write = Command { noncyclic: NonCyclicCommand::Parameter(arguments), control: ControlBits::SERVO_ON, ..idle };

@@ -1,11 +1,12 @@
-/// Why a call failed. `IO` is the error of the UART, `PIN` that of the direction pin, `P` that of the protocol.
+/// Why a call failed. `IO` is the error of the UART, `PIN` that of the direction pin, `P` that of the protocol, and
+/// `D` its doubts about a position.
 ///
 /// After any of them the next call begins with a clean line: it waits until nobody can be talking any more and throws away
 /// what has come.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
-pub enum Error<IO, PIN, P> {
+pub enum Error<IO, PIN, P, D> {
     /// The UART reports a fault: noise, framing, overrun. The exchange is lost.
     #[error("the UART reports a fault")]
     Io(IO),
@@ -21,4 +22,7 @@ pub enum Error<IO, PIN, P> {
     /// No answer, or one that was refused.
     #[error("{0}")]
     Protocol(P),
+    /// A good answer whose position must not be used.
+    #[error("{0}")]
+    Doubt(D),
 }

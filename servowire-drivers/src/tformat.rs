@@ -7,21 +7,27 @@
 pub mod asynch;
 pub mod blocking;
 
-use tformat::master::{Line, Progress, Transaction};
-use tformat::{Error, Request};
+use tformat::master::{Exchange, Line};
+use tformat::{Doubt, Error, Policy, Position, Request, Resolution};
 
-/// Longest request or answer.
+/// Longest request and longest answer together.
 const MAX_BYTES: usize = 16;
 
-/// Feeds bytes that were received back to back, the last one ending at `end_ns`.
-fn feed(transaction: &mut Transaction, line: &Line, bytes: &[u8], end_ns: u64) -> Progress {
-    let field_ns = u64::from(line.rate.fields_ns(1));
-    let mut progress = transaction.progress();
-    for (behind, byte) in (0..bytes.len()).rev().zip(bytes) {
-        let behind_ns = u64::try_from(behind).unwrap_or(0).saturating_mul(field_ns);
-        progress = transaction.byte(*byte, end_ns.saturating_sub(behind_ns));
+/// A position that may be used, and when it was true.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Sample {
+    /// The position.
+    pub position: Position,
+    /// When the encoder took it, by the driver's clock.
+    pub sampled_ns: u64,
+}
+
+impl Sample {
+    fn of(exchange: Exchange, resolution: Resolution, policy: Policy) -> Result<Self, Doubt> {
+        let position = resolution.read(&exchange.response, policy)?;
+        Ok(Self { position, sampled_ns: exchange.sampled_ns })
     }
-    progress
 }
 
 /// When the longest answer to this request is over, if it began at `start_ns`.
@@ -31,19 +37,9 @@ fn worst_ns(line: &Line, request: Request, start_ns: u64) -> u64 {
     start_ns.saturating_add(wait)
 }
 
-/// When the last bit of the request has left.
-fn sent_ns(line: &Line, request: Request, start_ns: u64) -> u64 {
-    start_ns.saturating_add(line.rate.fields_ns(request.emit().fields()).into())
-}
-
 /// The line has to be silent for two fields after something that nobody has asked for.
 fn silence_ns(line: &Line) -> u32 {
     line.rate.fields_ns(2)
-}
-
-/// The driver is on one bit before the start bit.
-fn lead_ns(line: &Line) -> u64 {
-    line.rate.bit_ns().into()
 }
 
 /// The answer to another request than was sent. Never: the transaction checks it.

@@ -16,12 +16,12 @@ use std::future::{Future, poll_fn};
 use std::pin::pin;
 use std::task::{Context, Poll, Waker};
 
-use bench::{Bench, Misframed, Pin, RATES, Shared, Uart, Watch, events};
+use bench::{Bench, Misframed, Pin, Shared, Uart, Watch, events, scenario};
 use embedded_io::{ErrorKind, ErrorType};
 use servowire_drivers::tformat::asynch::Encoder;
 use servowire_drivers::tformat::blocking;
 use servowire_drivers::{Clock, DriverEnable, Timer};
-use servowire_world::{Host, Kind, Scenario, Tally, Transmission, Verdict};
+use servowire_world::{Kind, Scenario, Tally, Transmission, Verdict};
 use tformat::BitRate;
 use tformat::master::Line;
 
@@ -129,8 +129,7 @@ fn a_future_may_be_forgotten() {
 #[test]
 fn both_drivers_agree() {
     for seed in 0..20 {
-        let bench =
-            |seed| Bench::new(Scenario { host: Host::IDEAL, ..Scenario::random(seed, RATES) }, Misframed::Delivered);
+        let bench = |seed| Bench::new(scenario(seed), Misframed::Delivered);
         let (one, other) = (bench(seed), bench(seed));
         let pin = DriverEnable(Pin(one.clone()));
         let mut spinning =
@@ -151,8 +150,7 @@ fn hostile_events_never_cost_a_good_answer() {
     let (mut good, mut failed, mut dropped) = (0_u64, 0_u64, 0_u64);
     while sum.events() < events() {
         let misframed = [Misframed::Dropped, Misframed::Delivered, Misframed::Reported][seed as usize % 3];
-        let scenario = Scenario { host: Host::IDEAL, ..Scenario::random(seed, RATES) };
-        let bench = Bench::new(scenario, misframed);
+        let bench = Bench::new(scenario(seed), misframed);
         let mut encoder = driver(&bench);
         for call in 0..100_usize {
             let polls = if call % 4 == 3 { call * 7 + seed as usize % 7 } else { FOR_EVER };
@@ -165,11 +163,10 @@ fn hostile_events_never_cost_a_good_answer() {
             let preempted = bench.tally().of(Kind::Preempt) > before;
             let sent_ns = truth.transmission(request).unwrap().end_ns;
             let in_time = |answer: &Transmission| {
-                let soon = answer.start_ns <= sent_ns + 9_000 && answer.delivered_ns <= answer.end_ns + 1_000;
+                let soon = answer.start_ns <= sent_ns + 9_000 && answer.delivered_ns <= answer.end_ns + 2_000;
                 soon && answer.end_ns - answer.start_ns == 44_000
             };
-            let alone = truth.handed_since(request).all(|handed| handed.origin.answers == Some(request));
-            let whole = !preempted && alone && truth.undisturbed(request) && truth.intact_answers(request).any(in_time);
+            let whole = !preempted && truth.undisturbed(request) && truth.intact_answers(request).any(in_time);
             match result {
                 None => dropped += 1,
                 Some(Ok(_)) => good += 1,

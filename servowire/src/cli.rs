@@ -7,7 +7,7 @@ use clap::{Args, Parser, Subcommand, ValueEnum};
 
 use crate::capture::{Format, Hints, time};
 use crate::protocols::{Protocol, Settings, nikon, rtex, tformat};
-use crate::{cnc, decode, line, profile};
+use crate::{cnc, decode, line, profile, talk};
 
 /// Decodes what servo drives, controllers and encoders say to each other.
 #[derive(Debug, Parser)]
@@ -25,6 +25,8 @@ enum Command {
     Profile(profile::Arguments),
     /// The reference machine: SORTE master, four devices, four motors.
     Cnc(cnc::Arguments),
+    /// Talk to a T-Format encoder at a USB-RS485 adapter, or be one.
+    Talk(talk::Arguments),
 }
 
 impl Cli {
@@ -34,6 +36,7 @@ impl Cli {
             Command::Decode(arguments) => decode::run(&arguments),
             Command::Profile(arguments) => arguments.run(),
             Command::Cnc(arguments) => arguments.run(),
+            Command::Talk(arguments) => arguments.run(),
         }
     }
 }

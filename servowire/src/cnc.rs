@@ -1,12 +1,18 @@
-//! `servowire cnc`: the reference machine, from discovery to the steps of four motors.
+//! `servowire cnc`: the reference machine, from discovery to the steps of its motors.
 
 mod axis;
+mod clock;
+mod exchange;
+mod feed;
+mod host;
 mod line;
+mod node;
 mod noise;
 mod plot;
 mod program;
 mod record;
 mod report;
+mod scaling;
 
 use std::error::Error;
 use std::io::{self, BufWriter, IsTerminal, Write};
@@ -15,9 +21,11 @@ use std::process::ExitCode;
 
 use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
-use sorte_proto::sync0::{MAX_LATENCY_NS, Variant};
+use sorte_proto::sync0::Variant;
 use step_profile::{Frequency, Motors, Parameters, Profile, Speed};
 
+use axis::Build;
+use host::Host;
 use line::{Line, Progress, Setup};
 use plot::{Curves, Sound};
 use program::Program;
@@ -25,27 +33,32 @@ use record::Recorder;
 
 /// Runs of more cycles than this have a progress bar.
 const LONG: u64 = 2_000_000;
-/// Cycles from the end of the motion until its last pulse is over.
-const DRAIN: u32 = 5;
 
-/// Run the reference machine: a master, four devices, four stepper motors at 250 kHz.
+/// Run the reference machine: a master, up to 254 devices, stepper motors at up to 250 kHz.
 ///
-/// Master and devices start up over simulated cables, then exchange data every 4 us: the motion of the axes goes through
-/// PTO words and frames into the devices' SYNC0 generators and from there into the motors. Prints the start-up, what the
-/// cycle has room for, and what became of every step. The same seed gives the same run.
+/// Master and devices start up over simulated cables, then exchange data every 4 us, or as long as the line needs: the
+/// motion of the axes goes through PTO words and frames into the devices' SYNC0 generators and from there into the motors.
+/// Each device runs on its own crystal; frames, slots, data and pulses are where its counter puts them. Prints the
+/// start-up, what the cycle has room for, and what became of every step. The same seed gives the same run.
 #[derive(Debug, Args)]
 pub struct Arguments {
     /// Devices in the line, a motor each.
-    #[arg(long, value_name = "N", default_value_t = 4, value_parser = clap::value_parser!(u8).range(1..=4))]
+    #[arg(long, value_name = "N", default_value_t = 4, value_parser = clap::value_parser!(u8).range(1..=254))]
     devices: u8,
-    /// Delay of the cables in ns, the one at the master first; the last stands for those behind it.
+    /// Delay of the cables in ns, the one at the master first; the last stands for those after it.
     #[arg(long, value_name = "NS", value_delimiter = ',', default_value = "85")]
     cables: Vec<u16>,
+    /// Cycle of the IO exchange in ns, a multiple of 4000; without it the shortest that the line fits.
+    #[arg(long, value_name = "NS", value_parser = cycle_time)]
+    cycle_time: Option<u32>,
+    /// Print cycle time against devices, cable and payload, and stop; with --svg, draw it.
+    #[arg(long)]
+    scaling: bool,
     /// Length of a move in steps; 51200 are a turn at 1/256.
     #[arg(long, value_name = "N", default_value_t = 51_200)]
     steps: u32,
     /// Step frequencies in Hz; they take turns from move to move. 250000, or 249000 with --published-sync0: at 250 kHz
-    /// all steps have the same phase, and that machine is at home there.
+    /// all steps have the same phase, and that machine is at home there. In a longer cycle motion is as much slower.
     #[arg(long, value_name = "HZ", value_delimiter = ',')]
     freq: Vec<u32>,
     /// Steps that each of the 32 ramp entries lasts.
@@ -54,24 +67,55 @@ pub struct Arguments {
     /// Moves, each back from the one before.
     #[arg(long, value_name = "N", default_value_t = 1, conflicts_with_all = ["cycles", "dance"])]
     moves: u64,
-    /// Move there and back for so many cycles.
+    /// Move there and back for so many cycles, then come to rest.
     #[arg(long, value_name = "N")]
     cycles: Option<u64>,
+    /// Each axis its own move: other lengths, and the frequencies in turn.
+    #[arg(long, conflicts_with = "dance")]
+    independent: bool,
     /// Play a tune instead.
     #[arg(long)]
     dance: bool,
-    /// The SYNC0 generator of the published device, which loses steps.
+    /// The devices as published: their SYNC0 generator, which loses steps, and the last word again when a frame is lost.
     #[arg(long)]
     published_sync0: bool,
-    /// From an event of the devices' timers to its handler, in ns.
-    #[arg(long, value_name = "NS", default_value_t = 300, value_parser = clap::value_parser!(u16).range(0..=i64::from(MAX_LATENCY_NS)))]
+    /// Leave the command words free, as the reference design does; without it they carry positions, so that an axis that
+    /// missed a frame catches up (an extension of this project).
+    #[arg(long)]
+    no_positions: bool,
+    /// Steps that an axis may be behind before the motion is stopped.
+    #[arg(long, value_name = "N", default_value_t = 128, value_parser = clap::value_parser!(u16).range(1..=16_000))]
+    max_lag: u16,
+    /// From an event of the devices' timers to its handler, in ns. Latency and seven writes below 600 ns lose nothing.
+    #[arg(long, value_name = "NS", default_value_t = 300, value_parser = clap::value_parser!(u16).range(0..=2000))]
     latency: u16,
+    /// Time of each register write of the handler, in ns.
+    #[arg(long, value_name = "NS", default_value_t = 20, value_parser = clap::value_parser!(u16).range(0..=200))]
+    write_time: u16,
+    /// Error of the devices' crystals, up to so many ppm either way.
+    #[arg(long, value_name = "PPM", default_value_t = 50.0, value_parser = amount)]
+    crystal: f64,
+    /// What a crystal's error gains in a second, up to so many ppm.
+    #[arg(long, value_name = "PPM", default_value_t = 1.0, value_parser = amount)]
+    drift: f64,
+    /// Error of the capture of a frame's start, up to so many ns either way.
+    #[arg(long, value_name = "NS", default_value_t = 5.0, value_parser = amount)]
+    jitter: f64,
+    /// Ns by which the way back over each cable is longer than the way out: half of it is an error of the clocks.
+    #[arg(long, value_name = "NS", default_value_t = 0.0, value_parser = amount)]
+    asymmetry: f64,
+    /// A pulse further from its time is late, in ns; 100, and 2 more for each device.
+    #[arg(long, value_name = "NS", value_parser = amount)]
+    tolerance: Option<f64>,
     /// Probability that a bit flips on a cable.
     #[arg(long, value_name = "P", default_value_t = 0.0, value_parser = probability)]
     bit_error_rate: f64,
     /// Pull the cable in front of a device in a cycle.
-    #[arg(long, value_name = "DEVICE@CYCLE", value_parser = unplug)]
+    #[arg(long, value_name = "DEVICE@CYCLE", value_parser = incident)]
     unplug: Option<(usize, u64)>,
+    /// The motor driver of a device shuts down in a cycle: over-current.
+    #[arg(long, value_name = "DEVICE@CYCLE", value_parser = incident)]
+    driver_fault: Option<(usize, u64)>,
     /// Seed of bit errors, crystals and counters.
     #[arg(long, value_name = "N", default_value_t = 1)]
     seed: u64,
@@ -81,10 +125,10 @@ pub struct Arguments {
     /// Write the frames at the master for Wireshark.
     #[arg(long, value_name = "OUT")]
     pcapng: Option<PathBuf>,
-    /// Cycles that --vcd and --pcapng record, behind the start-up.
+    /// Cycles that --vcd and --pcapng record, after the start-up.
     #[arg(long, value_name = "N", default_value_t = 5000)]
     record_cycles: u64,
-    /// Draw speed and position of the axes.
+    /// Draw speed and position of the first four axes, or the scaling.
     #[arg(long, value_name = "OUT")]
     svg: Option<PathBuf>,
     /// Write the motors' sound.
@@ -99,17 +143,40 @@ fn probability(text: &str) -> Result<f64, String> {
     }
 }
 
-fn unplug(text: &str) -> Result<(usize, u64), String> {
+fn amount(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(amount) if (0.0..=10_000.0).contains(&amount) => Ok(amount),
+        _ => Err(format!("\"{text}\" is not a number from 0 to 10000")),
+    }
+}
+
+fn cycle_time(text: &str) -> Result<u32, String> {
+    match text.parse::<u32>() {
+        Ok(ns @ 4000..=4_000_000) if ns % 4000 == 0 => Ok(ns),
+        _ => Err(format!("\"{text}\" is not a multiple of 4000 ns up to 4 ms")),
+    }
+}
+
+fn incident(text: &str) -> Result<(usize, u64), String> {
     let parts = text.split_once('@').and_then(|(device, cycle)| Some((device.parse().ok()?, cycle.parse().ok()?)));
     match parts {
-        Some((device @ 1..=4, cycle)) => Ok((device, cycle)),
-        _ => Err(format!("\"{text}\" is not a device from 1 to 4 and a cycle, as 3@10000")),
+        Some((device @ 1..=254, cycle)) => Ok((device, cycle)),
+        _ => Err(format!("\"{text}\" is not a device from 1 to 254 and a cycle, as 3@10000")),
     }
 }
 
 impl Arguments {
-    /// Does it. 0: every step that a good frame carried was made at its time; 1: not so; 2: wrong use.
+    /// Does it. 0: every step that was asked for was made at its time; 1: not so, and one line says what was wrong; 2: wrong
+    /// use.
     pub(crate) fn run(&self) -> ExitCode {
+        let mut out = BufWriter::new(io::stdout().lock());
+        if self.scaling {
+            let drawn = self.svg.as_deref().map_or(Ok(()), scaling::draw);
+            return match scaling::table(&mut out).map_err(Into::into).and(drawn) {
+                Ok(()) => ExitCode::SUCCESS,
+                Err(error) => failed(&error),
+            };
+        }
         let program = match self.program() {
             Ok(program) => program,
             Err(error) => {
@@ -117,66 +184,83 @@ impl Arguments {
                 return ExitCode::from(2);
             }
         };
-        match self.simulate(program, &mut BufWriter::new(io::stdout().lock())) {
-            Ok(true) => ExitCode::SUCCESS,
-            Ok(false) => ExitCode::FAILURE,
-            Err(error) => {
-                eprintln!("error: {error}");
+        match self.simulate(program, &mut out) {
+            Ok(None) => ExitCode::SUCCESS,
+            Ok(Some(why)) => {
+                // The report comes first.
+                let _: io::Result<()> = out.flush();
+                eprintln!("failed: {why}");
                 ExitCode::FAILURE
             }
+            Err(error) => failed(&error),
         }
     }
 
-    fn motors(&self) -> Motors {
-        Motors::new((1 << self.devices) - 1).unwrap_or(Motors::NONE)
-    }
-
-    fn program(&self) -> Result<Program, step_profile::Error> {
+    fn program(&self) -> Result<Program, Box<dyn Error>> {
+        for (device, _) in self.unplug.into_iter().chain(self.driver_fault) {
+            if device > usize::from(self.devices) {
+                return Err(format!("device {device} of {}", self.devices).into());
+            }
+        }
+        // Programs of four motors repeat them for the axes after the fourth.
+        let motors = Motors::new((1 << self.devices.min(4)) - 1).unwrap_or_default();
         let parameters = |speed| Parameters::at(speed).with_steps_per_entry(self.k);
         if self.dance {
-            return Program::dance(self.motors(), parameters(Speed::KHZ_100));
+            return Ok(Program::dance(motors, parameters(Speed::KHZ_100))?);
         }
         let default = if self.published_sync0 { 249_000 } else { 250_000 };
         let freq = if self.freq.is_empty() { core::slice::from_ref(&default) } else { self.freq.as_slice() };
         let speeds = freq.iter().map(|hz| Speed::from_frequency(Frequency::from_hz(*hz)));
         let profiles: Result<Vec<_>, _> = speeds.map(|speed| Profile::new(parameters(speed?))).collect();
         let moves = if self.cycles.is_some() { u64::MAX } else { self.moves };
-        Ok(Program::turns(self.motors(), profiles?, self.steps, moves))
+        if self.independent {
+            return Ok(Program::independent(self.devices.into(), &profiles?, self.steps, moves));
+        }
+        Ok(Program::turns(motors, profiles?, self.steps, moves))
     }
 
     fn setup(&self) -> Setup {
         let last = self.cables.last().copied().unwrap_or_default();
         let cables_ns = (0..usize::from(self.devices)).map(|k| self.cables.get(k).copied().unwrap_or(last)).collect();
-        Setup {
-            cables_ns,
+        let build = Build {
             variant: if self.published_sync0 { Variant::Published } else { Variant::Lossless },
             latency_ns: self.latency,
+            write_ns: self.write_time,
+            tolerance_ns: self.tolerance.unwrap_or(100.0 + 2.0 * f64::from(self.devices)),
+        };
+        Setup {
+            cables_ns,
+            cycle_ns: self.cycle_time,
+            build,
+            crystal_ppm: self.crystal,
+            drift_ppm: self.drift,
+            jitter_ns: self.jitter,
+            asymmetry_ns: self.asymmetry,
             bit_error_rate: self.bit_error_rate,
             unplug: self.unplug,
+            driver_fault: self.driver_fault,
+            positions: !(self.no_positions || self.published_sync0),
+            max_lag: self.max_lag,
             seed: self.seed,
         }
     }
 
-    /// Whether no step was late or lost.
-    fn simulate(&self, mut program: Program, out: &mut dyn Write) -> Result<bool, Box<dyn Error>> {
-        let setup = self.setup();
-        let cables_ns = setup.cables_ns.clone();
-        let mut line = Line::new(setup);
-        let mut record =
-            Recorder::new(line.nodes.len(), self.vcd.as_deref(), self.pcapng.as_deref(), self.record_cycles)?;
+    /// What was wrong, if anything was.
+    fn simulate(&self, program: Program, out: &mut dyn Write) -> Result<Option<String>, Box<dyn Error>> {
+        let mut line = Line::new(self.setup());
+        let axes = line.nodes.len();
+        let mut host = Host::new(program, axes, self.cycles, self.max_lag);
+        let mut record = Recorder::new(axes, self.vcd.as_deref(), self.pcapng.as_deref(), self.record_cycles)?;
         let (mut curves, mut sound) =
             (self.svg.is_some().then(Curves::default), self.wav.is_some().then(Sound::default));
         let bar = self.bar();
-        let (mut cycle, mut behind) = (0, 0);
-        loop {
-            let progress = line.step(&mut || program.next(), &mut record);
-            match progress {
-                None => break,
-                Some(Progress::StartUp) => continue,
-                Some(Progress::Cycle) => {}
+        let mut cycle = 0;
+        while let Some(progress) = line.step(&mut host, &mut record) {
+            if matches!(progress, Progress::StartUp) {
+                continue;
             }
             if cycle == 0 {
-                report::start_up(out, &line, &cables_ns)?;
+                report::start_up(out, &line)?;
                 out.flush()?;
             }
             cycle += 1;
@@ -192,22 +276,20 @@ impl Arguments {
             if cycle % 65_536 == 0 {
                 bar.set_position(cycle);
             }
-            behind = if program.is_over() { behind + 1 } else { 0 };
-            if self.cycles.map_or(behind > DRAIN, |cycles| cycle >= cycles) {
+            if host.is_done() {
                 break;
             }
         }
         bar.finish_and_clear();
         record.finish()?;
         report::end(out, &line)?;
-        out.flush()?;
         if let (Some(curves), Some(path)) = (&curves, &self.svg) {
-            curves.draw(line.nodes.len(), path)?;
+            curves.draw(axes.min(4), path)?;
         }
         if let (Some(sound), Some(path)) = (&sound, &self.wav) {
             sound.write(path)?;
         }
-        Ok(line.nodes.iter().all(|node| node.axis.tally.late == 0 && node.axis.tally.lost == 0))
+        Ok(report::verdict(&line, &host))
     }
 
     fn bar(&self) -> ProgressBar {
@@ -218,4 +300,9 @@ impl Arguments {
         let style = ProgressStyle::with_template("{pos}/{len} cycles [{bar:40}] {per_sec}, {eta} left");
         ProgressBar::new(cycles).with_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()))
     }
+}
+
+fn failed(error: &dyn core::fmt::Display) -> ExitCode {
+    eprintln!("error: {error}");
+    ExitCode::FAILURE
 }

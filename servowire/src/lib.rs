@@ -19,3 +19,4 @@ pub mod line;
 pub mod output;
 pub mod profile;
 pub mod protocols;
+pub mod talk;

@@ -1,8 +1,11 @@
 //! `servowire profile`: a move of a stepper axis, step by step.
 
+mod curves;
 mod drawing;
+mod motion;
 
 use std::error::Error;
+use std::fmt::Display;
 use std::fs;
 use std::io::{self, BufWriter, Write};
 use std::ops::Range;
@@ -10,13 +13,18 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 
 use clap::{Args, ValueEnum};
+use motion::Move;
 use serde::Serialize;
+use step_profile::motion::Limits;
 use step_profile::{Arithmetic, Frequency, Parameters, Profile, RampStep, Speed, Tone};
 
 /// Times of the steps of a move on a 4 us cycle.
 ///
 /// The sin² ramp and the integers of the 250 kHz motion controller of TIDEP0061: for every step the cycle of its pulse
 /// and the start of the pulse in that cycle. Without an output option a summary and a table of the ramp.
+///
+/// With --shape trapezoid or s-curve the fastest move within --accel and --jerk; --compare sets all shapes side by side, at the
+/// same speed and peak acceleration.
 #[derive(Debug, Args)]
 pub struct Arguments {
     /// Step frequency at full speed, as 94570 or 94.57kHz.
@@ -28,9 +36,21 @@ pub struct Arguments {
     /// Length of the move.
     #[arg(long, value_name = "N")]
     steps: u32,
-    /// Steps that each of the 32 ramp entries lasts.
-    #[arg(long, value_name = "N", default_value_t = 1)]
-    k: u32,
+    /// Steps that each of the 32 ramp entries lasts; 1, or what --accel allows.
+    #[arg(long, value_name = "N", conflicts_with = "accel")]
+    k: Option<u32>,
+    /// Shape of the move.
+    #[arg(long, value_enum, default_value_t = Shape::Sin2)]
+    shape: Shape,
+    /// Greatest acceleration in steps/s².
+    #[arg(long, value_name = "A", value_parser = clap::value_parser!(u32).range(1..))]
+    accel: Option<u32>,
+    /// Greatest jerk in steps/s³, for the S-curve; without it ten times A² / V.
+    #[arg(long, value_name = "J", requires = "accel")]
+    jerk: Option<u64>,
+    /// All shapes side by side, within --accel and --jerk.
+    #[arg(long, requires = "accel", conflicts_with_all = ["csv", "json"])]
+    compare: bool,
     /// sync_time before the first step in ns, 0 to 3999.
     #[arg(long, value_name = "NS", default_value_t = Parameters::INIT_SYNC)]
     init_sync: u32,
@@ -48,6 +68,17 @@ pub struct Arguments {
     svg: Option<PathBuf>,
 }
 
+/// How the speed grows and falls.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum Shape {
+    /// The published ramp: sin² over the steps, in 32 levels.
+    Sin2,
+    /// Constant acceleration.
+    Trapezoid,
+    /// Limited jerk.
+    SCurve,
+}
+
 /// [`Arithmetic`] as the command line spells it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 enum Mode {
@@ -62,14 +93,19 @@ enum Mode {
 impl Arguments {
     /// Does it. 0: done; 1: cannot write; 2: the move is not possible.
     pub(crate) fn run(&self) -> ExitCode {
-        let profile = match self.profile() {
-            Ok(profile) => profile,
-            Err(e) => {
-                eprintln!("error: {e}");
-                return ExitCode::from(2);
+        let out = &mut BufWriter::new(io::stdout().lock());
+        let done = if self.compare || self.shape != Shape::Sin2 {
+            match self.moves() {
+                Ok(moves) => self.write_moves(&moves, out),
+                Err(e) => return wrong_use(&e),
+            }
+        } else {
+            match self.profile() {
+                Ok(profile) => self.write(profile, out),
+                Err(e) => return wrong_use(&e),
             }
         };
-        match self.write(profile, &mut BufWriter::new(io::stdout().lock())) {
+        match done {
             Ok(()) => ExitCode::SUCCESS,
             // The reader has seen enough.
             Err(e) if is_broken_pipe(e.as_ref()) => ExitCode::SUCCESS,
@@ -90,12 +126,50 @@ impl Arguments {
             Mode::PruExact => Arithmetic::PruExact,
             Mode::Carried => Arithmetic::Carried,
         };
-        Profile::new(
-            Parameters::at(speed)
-                .with_steps_per_entry(self.k)
-                .with_init_sync(self.init_sync)
-                .with_arithmetic(arithmetic),
-        )
+        let parameters = Parameters::at(speed).with_init_sync(self.init_sync).with_arithmetic(arithmetic);
+        Profile::new(match (self.k, self.accel) {
+            (None, Some(acceleration)) => parameters.with_acceleration(acceleration),
+            (k, _) => parameters.with_steps_per_entry(k.unwrap_or(1)),
+        })
+    }
+
+    /// The shape that is asked for, or all.
+    fn moves(&self) -> Result<Vec<Move>, Box<dyn Error>> {
+        let (hz, over) = match (self.tone, self.freq) {
+            (Some(tone), _) => tone.frequency(),
+            (None, frequency) => frequency.unwrap_or(Frequency::from_hz(1)),
+        }
+        .ratio();
+        let speed = (hz / u32::from(over)).max(1);
+        let acceleration = self.accel.ok_or("--shape trapezoid and s-curve need --accel")?;
+        let flat = Limits::new(speed, acceleration)?;
+        let jerk = self.jerk.unwrap_or(u64::from(acceleration).pow(2) / u64::from(speed) * 10);
+        let smooth = || flat.with_jerk(jerk.clamp(1, Limits::MAX_JERK));
+        Ok(match self.shape {
+            _ if self.compare => vec![
+                Move::sin2(self.profile()?, self.steps),
+                Move::planned(flat, self.steps)?,
+                Move::planned(smooth()?, self.steps)?,
+            ],
+            Shape::Trapezoid => vec![Move::planned(flat, self.steps)?],
+            Shape::SCurve => vec![Move::planned(smooth()?, self.steps)?],
+            Shape::Sin2 => vec![Move::sin2(self.profile()?, self.steps)],
+        })
+    }
+
+    fn write_moves(&self, moves: &[Move], out: &mut dyn Write) -> Result<(), Box<dyn Error>> {
+        if self.csv || self.json {
+            for made in moves {
+                write_ticks(made, self.json, out)?;
+            }
+        } else {
+            motion::table(moves, out)?;
+            if let Some(path) = &self.svg {
+                let title = format!("{} steps", self.steps);
+                fs::write(path, curves::svg(&title, moves)?).map_err(|e| format!("{}: {e}", path.display()))?;
+            }
+        }
+        Ok(out.flush()?)
     }
 
     fn write(&self, profile: Profile<'_>, out: &mut dyn Write) -> Result<(), Box<dyn Error>> {
@@ -120,6 +194,26 @@ impl Arguments {
         }
         Ok(out.flush()?)
     }
+}
+
+fn wrong_use(error: &dyn Display) -> ExitCode {
+    eprintln!("error: {error}");
+    ExitCode::from(2)
+}
+
+/// Number and time of every step, in ns from the start.
+fn write_ticks(made: &Move, json: bool, out: &mut dyn Write) -> io::Result<()> {
+    if !json {
+        writeln!(out, "step,time_ns")?;
+    }
+    for (step, time) in made.steps.iter().enumerate() {
+        if json {
+            writeln!(out, "{{\"step\":{step},\"time_ns\":{time}}}")?;
+        } else {
+            writeln!(out, "{step},{time}")?;
+        }
+    }
+    Ok(())
 }
 
 fn is_broken_pipe(error: &(dyn Error + 'static)) -> bool {
@@ -344,6 +438,32 @@ mod tests {
         let arguments = arguments(&line);
         let error = arguments.write(arguments.profile().unwrap(), &mut Vec::new()).unwrap_err();
         assert!(error.to_string().contains("move.svg"), "{error}");
+    }
+
+    fn shapes(line: &str) -> Result<String, Box<dyn Error>> {
+        let arguments = arguments(&format!("profile {line}"));
+        let mut out = Vec::new();
+        arguments.write_moves(&arguments.moves()?, &mut out)?;
+        Ok(String::from_utf8(out)?)
+    }
+
+    /// A trapezoid at the same peak acceleration is many times as fast over 64 steps.
+    #[test]
+    fn shapes_beside_one_another() {
+        let text = shapes("--freq 100k --steps 64 --accel 1000000 --jerk 100000000 --compare").unwrap();
+        let duration = |name: &str| -> f64 {
+            let line = text.lines().find(|line| line.starts_with(name)).unwrap();
+            line.split_whitespace().nth(1).unwrap().parse().unwrap()
+        };
+        // 2 sqrt(n/a), and 4 (n/2j)^(1/3)
+        assert!((duration("trapezoid") - 16.0).abs() < 0.001 && (duration("s-curve") - 27.36).abs() < 0.01, "{text}");
+        assert!(duration("sin2") > 100.0, "{text}");
+        let csv = shapes("--freq 1k --steps 3 --shape trapezoid --accel 10000 --csv").unwrap();
+        assert_eq!(csv.lines().next(), Some("step,time_ns"));
+        assert_eq!(csv.lines().count(), 4);
+        let json = shapes("--freq 1k --steps 1 --shape s-curve --accel 10000 --jerk 1000000 --json").unwrap();
+        assert_eq!(json, "{\"step\":0,\"time_ns\":15874011}\n");
+        assert!(shapes("--freq 1k --steps 3 --shape trapezoid").is_err());
     }
 
     #[test]

@@ -142,7 +142,7 @@ impl Device {
             output_total: None,
             parameters: None,
             line: LineDelay::new(config.delay_model),
-            clock: Clock::new(),
+            clock: Clock::averaging(config.clock_average),
             last_sync: None,
             way_ns: None,
             received: false,

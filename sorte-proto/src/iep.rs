@@ -105,6 +105,7 @@ pub struct Channel {
     pending: Events,
     /// Writes that are still to be made, the time of one, of the next and of the last.
     queue: [Option<Write>; MOST_WRITES],
+    made: u8,
     queued: u8,
     write_ticks: u64,
     write: u64,
@@ -135,6 +136,7 @@ impl Channel {
             armed: true,
             pending: Events { cmp6: false, cmp0: false, cmp7: false },
             queue: [None; MOST_WRITES],
+            made: 0,
             queued: 0,
             write_ticks: 0,
             write: NEVER,
@@ -304,16 +306,20 @@ impl Channel {
             self.queued = self.queued.saturating_add(1);
         }
         self.write = self.now.saturating_add(self.write_ticks);
+        self.made = 0;
         self.busy_until = self.now.saturating_add(self.write_ticks.saturating_mul(self.queued.into()));
     }
 
     /// The oldest write takes effect.
     fn write_queued(&mut self) {
-        let [first, ..] = self.queue;
-        self.queue.rotate_left(1);
-        self.queued = self.queued.saturating_sub(1);
-        self.write = if self.queued == 0 { NEVER } else { self.now.saturating_add(self.write_ticks) };
-        if let Some(write) = first {
+        let next = self.queue.get(usize::from(self.made)).copied().flatten();
+        self.made = self.made.saturating_add(1);
+        if self.made >= self.queued {
+            (self.queued, self.write) = (0, NEVER);
+        } else {
+            self.write = self.now.saturating_add(self.write_ticks);
+        }
+        if let Some(write) = next {
             self.make(write);
         }
     }

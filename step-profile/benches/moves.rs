@@ -3,15 +3,17 @@
 //! `cargo bench -p step-profile`
 //!
 //! The crates do not compute the same: `ramp-maker` and `stepgen` give a delay a step of a trapezoid, this crate
-//! gives cycle and sync_time of a sin² ramp. All three make moves of the same length, with ramps of the same length, to
+//! gives cycle and sync_time of a sin² ramp, and absolute ticks of trapezoids and S-curves. All make moves of the same length, with ramps of the same length, to
 //! the same speed of 100 kHz, step by step through their iterators.
 #![allow(missing_docs, clippy::arithmetic_side_effects, clippy::cast_precision_loss)]
+#![allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
 #![allow(clippy::std_instead_of_core, clippy::unwrap_used)]
 
 use std::hint::black_box;
 use std::time::{Duration, Instant};
 
 use ramp_maker::{MotionProfile, Trapezoidal};
+use step_profile::motion::{Clock, Limits, Plan};
 use step_profile::{Arithmetic, Axis, Command, Direction, Parameters, Profile, Speed};
 use stepgen::Stepgen;
 
@@ -30,8 +32,10 @@ const CASES: [Case; 3] = [
 
 type Move = fn(&Case) -> u64;
 
-const MOVES: [(&str, Move); 5] = [
+const MOVES: [(&str, Move); 7] = [
     ("step-profile, steps", corrected),
+    ("step-profile, trapezoid", trapezoid),
+    ("step-profile, S-curve", s_curve),
     ("step-profile, one axis by the cycle", axis),
     ("ramp-maker, f32", ramp_maker_f32),
     ("ramp-maker, 32.32 fixed point", ramp_maker_fixed),
@@ -80,6 +84,31 @@ fn corrected(case: &Case) -> u64 {
     steps
 }
 
+fn limits(case: &Case) -> Limits {
+    Limits::new(100_000, (acceleration(case) * 1e6) as u32).unwrap()
+}
+
+fn ticks(limits: Limits, case: &Case) -> u64 {
+    let plan = Plan::new(Clock::new(10_000_000).unwrap(), black_box(limits), black_box(case.steps)).unwrap();
+    let mut steps = 0;
+    for tick in plan.pulses() {
+        black_box(tick);
+        steps += 1;
+    }
+    steps
+}
+
+fn trapezoid(case: &Case) -> u64 {
+    ticks(limits(case), case)
+}
+
+/// A jerk that reaches the acceleration in a tenth of the ramp's time.
+fn s_curve(case: &Case) -> u64 {
+    let acceleration = acceleration(case) * 1e6;
+    let jerk = acceleration * acceleration / 100_000.0 * 10.0;
+    ticks(limits(case).with_jerk((jerk as u64).min(Limits::MAX_JERK)).unwrap(), case)
+}
+
 /// Ten cycles a step at full speed, more on the ramps.
 fn axis(case: &Case) -> u64 {
     let mut axis = Axis::new();
@@ -99,7 +128,6 @@ fn acceleration(case: &Case) -> f64 {
     100.0 * 100.0 / (2.0 * f64::from(case.ramp))
 }
 
-#[allow(clippy::cast_possible_truncation)]
 fn ramp_maker_f32(case: &Case) -> u64 {
     let mut profile = Trapezoidal::<f32>::new(black_box(acceleration(case) as f32));
     profile.enter_position_mode(100.0, black_box(case.steps));
@@ -123,7 +151,6 @@ fn ramp_maker_fixed(case: &Case) -> u64 {
     steps
 }
 
-#[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
 fn stepgen(case: &Case) -> u64 {
     // 10 MHz ticks: its delays have 16 bits, and none may be below 30.
     let mut profile = Stepgen::new(10_000_000);

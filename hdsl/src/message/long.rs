@@ -217,6 +217,15 @@ impl LongRequest {
         matches!(self.access, Access::Read(_))
     }
 
+    /// PC_ADD_H and PC_ADD_L of the request.
+    pub(crate) const fn header(&self) -> [u8; 2] {
+        let length = match &self.access {
+            Access::Read(length) => *length,
+            Access::Write(data) => data.length,
+        };
+        header(self.address, self.is_read(), self.offset.is_some(), self.indirect, length)
+    }
+
     /// The bytes to send.
     pub fn emit(&self) -> MessageBytes {
         self.body().sealed()
@@ -224,12 +233,8 @@ impl LongRequest {
 
     /// The bytes before the CRC.
     pub(super) fn body(&self) -> MessageBytes {
-        let length = match &self.access {
-            Access::Read(length) => *length,
-            Access::Write(data) => data.length,
-        };
         let mut bytes = MessageBytes::EMPTY;
-        bytes.push(&header(self.address, self.is_read(), self.offset.is_some(), self.indirect, length));
+        bytes.push(&self.header());
         if let Some(offset) = self.offset {
             bytes.push(&(offset.get() | 0x8000).to_be_bytes());
         }

@@ -1,4 +1,6 @@
-use crate::timing::{READ_BUSY_NS, WRITE_BUSY_NS};
+/// The longest times of "Nikon Protocol Design", in ns.
+const READ_BUSY_NS: u32 = 300_000;
+const WRITE_BUSY_NS: u32 = 30_000_000;
 
 /// The EEPROM of an encoder and the time for which it is busy.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -9,7 +9,7 @@
 ///
 /// let line = Line::new(BitRate::Mbit16).with_response_timeout_ns(10_000);
 /// let request = Request::new(EncoderAddress::MAX, Operation::Abs40Mt);
-/// let min_ns = line.min_cycle_ns(request, &request.expected(Resolution::default()), 8);
+/// let min_ns = line.min_cycle_ns(request, &request.expected(Resolution::default()));
 /// assert!(Cycle::new(min_ns - 1, min_ns, 0).is_err());
 ///
 /// let mut cycle = Cycle::new(125_000, min_ns, 1_000)?;

@@ -1,14 +1,15 @@
 use servowire_core::Polling;
 
 use super::Step;
+use crate::command::Command;
 use crate::data::Data;
 use crate::error::Error;
-use crate::number::{EncoderAddress, EncoderId, U19, UserAddress};
+use crate::number::EncoderAddress;
 use crate::operation::Operation;
 use crate::request::Request;
 use crate::response::Response;
-use crate::status::EncoderStatus;
-use crate::timing::{READ_BUSY_NS, WRITE_BUSY_NS};
+use crate::status::{Alm, EncoderStatus};
+use crate::timing::READ_BUSY_NS;
 
 /// For reads: every 300 us, the longest time that a read takes, ten times.
 pub const READ_POLLING: Polling = Polling { interval_ns: READ_BUSY_NS, max_tries: 10 };
@@ -21,8 +22,21 @@ pub(super) fn is_busy(response: Response) -> bool {
     response.es().is_some_and(|es| es.contains(EncoderStatus::BUSY))
 }
 
-/// Reads one EEPROM word: the whole request again and again until the memory is no longer busy. The transaction checks
-/// that every response repeats the address and the bank.
+/// The alarms of a response to STATUS from this encoder; all else is no answer to it.
+pub(super) fn status_of(ea: EncoderAddress, outcome: Result<Response, Error>) -> Result<(Response, Alm), Error> {
+    let response = outcome?;
+    match (response.command(), response.alm()) {
+        (Some(Command::Status), Some(alm)) if response.ea == ea => Ok((response, alm)),
+        _ => Err(Error::NotCarried),
+    }
+}
+
+/// Reads one EEPROM word.
+///
+/// The data of the first response are undetermined, and the memory is busy for up to 300 us ("Nikon Protocol Design"). So the
+/// whole request is sent again, and the data of a second response are used, if ES0 is clear in it. After a response
+/// that is missing or refused it is not known which one the next is: then another address is read first, so that the
+/// next response to this request is a first one for certain.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct EepromRead {
@@ -30,7 +44,18 @@ pub struct EepromRead {
     polling: Polling,
     /// The data of the first response are never used.
     discard_first: bool,
+    next: Next,
     tries: u16,
+}
+
+/// Which response comes next.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+enum Next {
+    /// That of another address.
+    Other,
+    First,
+    Second,
 }
 
 impl EepromRead {
@@ -45,12 +70,17 @@ impl EepromRead {
     }
 
     const fn of(request: Request) -> Self {
-        Self { request, polling: READ_POLLING, discard_first: true, tries: 0 }
+        Self { request, polling: READ_POLLING, discard_first: true, next: Next::First, tries: 0 }
     }
 
     /// With another interval or number of tries.
     pub const fn with_polling(self, polling: Polling) -> Self {
         Self { polling, ..self }
+    }
+
+    /// Begins with another address, because the last read of this one has failed.
+    pub const fn after_a_failed_read(self) -> Self {
+        Self { next: Next::Other, ..self }
     }
 
     /// Uses the data of the first response if ES0 is clear in it.
@@ -69,7 +99,7 @@ impl EepromRead {
     /// The first request, at once.
     pub const fn start(&mut self, now_ns: u64) -> Step<u16> {
         self.tries = 0;
-        Step::Send { request: self.request, not_before_ns: now_ns }
+        Step::Send { request: self.next_request(), not_before_ns: now_ns }
     }
 
     /// A transaction ended at `now_ns` with this outcome.
@@ -77,117 +107,79 @@ impl EepromRead {
     /// A response that is missing or refused counts as a try; [`Error::BankError`] ends the procedure at once.
     pub fn receive(&mut self, outcome: Result<Response, Error>, now_ns: u64) -> Step<u16> {
         self.tries = self.tries.saturating_add(1);
+        let word = outcome.and_then(|response| self.word(response));
+        let error = match (word, self.next) {
+            (Err(error), _) => {
+                self.next = if self.discard_first { Next::Other } else { Next::First };
+                error
+            }
+            (Ok((word, false)), Next::Second) => return self.done(word, now_ns),
+            (Ok((word, false)), Next::First) if !self.discard_first => return self.done(word, now_ns),
+            // A busy memory has not begun with the other address.
+            (Ok((_, busy)), Next::Other) => {
+                self.next = if busy { Next::Other } else { Next::First };
+                Error::Busy { tries: self.tries }
+            }
+            (Ok(_), Next::First | Next::Second) => {
+                self.next = Next::Second;
+                Error::Busy { tries: self.tries }
+            }
+        };
         let not_before_ns = now_ns.saturating_add(self.polling.interval_ns.into());
-        let error = match outcome {
-            Ok(response) => match response.data() {
-                Some(Data::Eeprom { data, .. } | Data::EepromBank { data, .. })
-                    if !is_busy(response) && (self.tries > 1 || !self.discard_first) =>
-                {
-                    return Step::Done { value: data, ready_ns: now_ns };
-                }
-                Some(Data::Eeprom { .. } | Data::EepromBank { .. }) => Error::Busy { tries: self.tries },
-                _ => Error::NotCarried,
-            },
-            Err(error) => error,
-        };
         if self.tries >= self.polling.max_tries || error == Error::BankError {
+            // Whether the encoder has the word ready is not known.
+            self.next = Next::Other;
             return Step::Failed { error, ready_ns: not_before_ns };
         }
-        Step::Send { request: self.request, not_before_ns }
-    }
-}
-
-/// Writes something that outlasts the supply: an EEPROM word, an identification code, an address, the velocity
-/// coefficient.
-///
-/// The request is sent **once**: repeating it wears the EEPROM. Its response repeats the arguments, which the transaction
-/// checks; then the encoder is left alone for 30 ms and its status read until it is no longer busy. If the response to the
-/// write is missing or refused, the procedure ends: read back what is there before you write again.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub struct Write {
-    request: Request,
-    /// Whom to ask for the status, once the write is answered.
-    written: Option<EncoderAddress>,
-    tries: u16,
-}
-
-impl Write {
-    /// Writes an EEPROM word.
-    pub const fn eeprom(ea: EncoderAddress, address: UserAddress, data: u16) -> Self {
-        Self::of(ea, Operation::EepromWrite { address, data })
+        Step::Send { request: self.next_request(), not_before_ns }
     }
 
-    /// Writes an EEPROM word of a bank. Version 3.0.
-    pub const fn eeprom_of_bank(ea: EncoderAddress, bank: u8, address: u8, data: u16) -> Self {
-        Self::of(ea, Operation::EepromWriteBank { bank, address, data })
+    const fn done(&mut self, value: u16, now_ns: u64) -> Step<u16> {
+        self.next = Next::First;
+        Step::Done { value, ready_ns: now_ns }
     }
 
-    /// Writes the identification code of the encoder `ea` (command 18).
-    pub const fn id(ea: EncoderAddress, id: EncoderId) -> Self {
-        Self::of(ea, Operation::IdWrite1 { id })
-    }
-
-    /// Writes the identification code of the only encoder on the line, whatever its address (command 19).
-    pub const fn id_of_the_only_encoder(id: EncoderId) -> Self {
-        Self::of(EncoderAddress::ZERO, Operation::IdWrite2 { id })
-    }
-
-    /// Gives the encoder with the identification code `id` the address `new` (command 20).
-    pub const fn address(id: EncoderId, new: EncoderAddress) -> Self {
-        Self::of(new, Operation::SetAddress2 { id })
-    }
-
-    /// Writes the velocity coefficient of the encoder `ea`. Version 3.0.
-    pub const fn coefficient(ea: EncoderAddress, coefficient: U19) -> Self {
-        Self::of(ea, Operation::CoefficientWrite { coefficient })
-    }
-
-    const fn of(ea: EncoderAddress, operation: Operation) -> Self {
-        Self { request: Request::new(ea, operation), written: None, tries: 0 }
-    }
-
-    /// The request, at once.
-    pub const fn start(&mut self, now_ns: u64) -> Step<Response> {
-        self.written = None;
-        self.tries = 0;
-        Step::Send { request: self.request, not_before_ns: now_ns }
-    }
-
-    /// A transaction ended at `now_ns` with this outcome. The value is the response to STATUS.
-    pub fn receive(&mut self, outcome: Result<Response, Error>, now_ns: u64) -> Step<Response> {
-        let Some(ea) = self.written else {
-            let not_before_ns = now_ns.saturating_add(WRITE_BUSY_NS.into());
-            return match outcome {
-                Ok(response) => {
-                    // Command 19 reaches an encoder of any address; its response says which.
-                    let any = matches!(self.request.operation, Operation::IdWrite2 { .. });
-                    let ea = if any { response.ea } else { self.request.ea };
-                    self.written = Some(ea);
-                    Step::Send { request: Request::new(ea, Operation::Status), not_before_ns }
-                }
-                Err(error) => Step::Failed { error, ready_ns: not_before_ns },
-            };
-        };
-        self.tries = self.tries.saturating_add(1);
-        let not_before_ns = now_ns.saturating_add(WRITE_POLLING.interval_ns.into());
-        let error = match outcome {
-            Ok(value) if !is_busy(value) => return Step::Done { value, ready_ns: now_ns },
-            Ok(_) => Error::Busy { tries: self.tries },
-            Err(error) => error,
-        };
-        if self.tries >= WRITE_POLLING.max_tries {
-            return Step::Failed { error, ready_ns: not_before_ns };
+    const fn next_request(&self) -> Request {
+        match self.next {
+            Next::First | Next::Second => self.request,
+            Next::Other => self.other_request(),
         }
-        Step::Send { request: Request::new(ea, Operation::Status), not_before_ns }
+    }
+
+    const fn other_request(&self) -> Request {
+        let operation = match self.request.operation {
+            Operation::EepromRead { address } => Operation::EepromRead { address: address ^ 1 },
+            Operation::EepromReadBank { bank, address } => Operation::EepromReadBank { bank, address: address ^ 1 },
+            // Never: only these two are made.
+            other => other,
+        };
+        Request::new(self.request.ea, operation)
+    }
+
+    /// The word in a response to the request that was sent last, and whether the memory is busy.
+    fn word(&self, response: Response) -> Result<(u16, bool), Error> {
+        let fits = match (self.next_request().operation, response.data()) {
+            (Operation::EepromRead { address: want }, Some(Data::Eeprom { data, address })) if address == want => {
+                Some(data)
+            }
+            (
+                Operation::EepromReadBank { bank: bank_want, address: want },
+                Some(Data::EepromBank { data, bank, address, .. }),
+            ) if (bank, address) == (bank_want, want) => Some(data),
+            _ => None,
+        };
+        match fits {
+            Some(data) if response.command() == Some(Command::EepromRead) && response.ea == self.request.ea => {
+                Ok((data, is_busy(response)))
+            }
+            _ => Err(Error::NotCarried),
+        }
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::command::Command;
-    use crate::status::{Alm, EncoderStatus, PmAlm};
 
     const EA: EncoderAddress = EncoderAddress::ZERO;
 
@@ -195,9 +187,8 @@ mod tests {
         Response::new(EA, Command::EepromRead, EncoderStatus::from_bits_truncate(es), Data::Eeprom { data, address: 9 })
     }
 
-    fn status(ea: EncoderAddress, es: u8) -> Response {
-        let data = Data::Status { alm: Alm::empty(), pm_alm: PmAlm::empty() };
-        Response::new(ea, Command::Status, EncoderStatus::from_bits_truncate(es), data)
+    fn word_of(es: u8, data: u16, address: u8) -> Response {
+        Response::new(EA, Command::EepromRead, EncoderStatus::from_bits_truncate(es), Data::Eeprom { data, address })
     }
 
     #[test]
@@ -208,8 +199,31 @@ mod tests {
         let again = Step::Send { request, not_before_ns: 300_100 };
         assert_eq!(read.receive(Ok(word(0, 0xdead)), 100), again);
         assert_eq!(read.receive(Ok(word(1, 0xdead)), 100), again);
-        assert_eq!(read.receive(Err(Error::NoResponse), 100), again);
         assert_eq!(read.receive(Ok(word(0, 7)), 100), Step::Done { value: 7, ready_ns: 100 });
+        let mut trusting = EepromRead::new(EA, 9).trusting_es0_of_the_first_response();
+        let _ = trusting.start(0);
+        assert_eq!(trusting.receive(Ok(word(1, 0xdead)), 0), Step::Send { request, not_before_ns: 300_000 });
+        let _ = trusting.start(0);
+        assert_eq!(trusting.receive(Ok(word(0, 8)), 3), Step::Done { value: 8, ready_ns: 3 });
+    }
+
+    /// After a missing response nobody knows whether the next one is a first one: another address is read in between.
+    #[test]
+    fn an_error_does_not_count_as_the_first_response() {
+        let request = |address| Request::new(EA, Operation::EepromRead { address });
+        let again = |address| Step::Send { request: request(address), not_before_ns: 300_000 };
+        let other = Response { body: word(0, 1).body, ..word(0, 1) };
+        for bad in [Err(Error::NoResponse), Ok(word_of(0, 5, 8)), Ok(Response { ea: EncoderAddress::MAX, ..other })] {
+            let mut read = EepromRead::new(EA, 9);
+            let _ = read.start(0);
+            assert_eq!(read.receive(Ok(word(0, 0xdead)), 0), again(9));
+            assert_eq!(read.receive(bad, 0), again(8));
+            // Of the other address only that it was answered counts.
+            assert_eq!(read.receive(Ok(word(0, 0xdead)), 0), again(8));
+            assert_eq!(read.receive(Ok(word_of(0, 0xbad, 8)), 0), again(9));
+            assert_eq!(read.receive(Ok(word(0, 0xdead)), 0), again(9));
+            assert_eq!(read.receive(Ok(word(0, 7)), 0), Step::Done { value: 7, ready_ns: 0 });
+        }
     }
 
     #[test]
@@ -224,25 +238,5 @@ mod tests {
         let _ = read.start(0);
         let end = Step::Failed { error: Error::BankError, ready_ns: 300_000 };
         assert_eq!(read.receive(Err(Error::BankError), 0), end);
-    }
-
-    #[test]
-    fn a_write_is_sent_once() {
-        let id = EncoderId::truncate(0x12_3456);
-        let answered = EncoderAddress::truncate(5);
-        let mut write = Write::id_of_the_only_encoder(id);
-        assert!(
-            matches!(write.start(0), Step::Send { request, .. } if request.operation == Operation::IdWrite2 { id })
-        );
-        let raw = Response::new(answered, Command::IdWrite2, EncoderStatus::from_bits_truncate(1), Data::Id { id });
-        let ask = Request::new(answered, Operation::Status);
-        assert_eq!(write.receive(Ok(raw), 0), Step::Send { request: ask, not_before_ns: 30_000_000 });
-        let again = write.receive(Ok(status(answered, 1)), 40_000_000);
-        assert_eq!(again, Step::Send { request: ask, not_before_ns: 41_000_000 });
-        let value = status(answered, 0);
-        assert_eq!(write.receive(Ok(value), 9), Step::Done { value, ready_ns: 9 });
-        let _ = write.start(0);
-        let failed = write.receive(Err(Error::NoResponse), 0);
-        assert_eq!(failed, Step::Failed { error: Error::NoResponse, ready_ns: 30_000_000 });
     }
 }

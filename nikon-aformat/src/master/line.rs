@@ -1,4 +1,6 @@
 use crate::expected::Expected;
+use crate::layout::{FRAME_BITS, Layout};
+use crate::number::EncoderAddress;
 use crate::request::Request;
 use crate::timing::{BitRate, FRAME_GAP_NS, REQUEST_GAP_NS};
 
@@ -12,30 +14,74 @@ pub struct Line {
     pub rate: BitRate,
     /// Idle time between two frames of a request, in ns. Default [`FRAME_GAP_NS`].
     pub frame_gap_ns: u32,
-    /// Longest wait from the end of the request to the *start bit* of the response, in ns. The turn-around time is not
-    /// documented; the default is 1000 bits, as one maker's master has it. Others wait 3 ms and 35 ms.
+    /// Least time from the end of the request to the *start bit* of the response, in ns: what begins earlier is no answer.
+    /// Default 0, because the turn-around time is not documented.
+    pub turn_around_ns: u32,
+    /// Longest time from the end of the request to the *start bit* of the response, in ns. Default 1000 bits, as one maker's
+    /// master has it. Others wait 3 ms and 35 ms.
     pub response_timeout_ns: u32,
-    /// Longest idle time between two frames of a response, in ns. Default four bits.
+    /// Longest idle time between two frames of a response, in ns. Default a quarter of [`BitRate::response_gap_ns`].
     pub idle_in_response_ns: u32,
     /// Longest idle time between two responses on a bus, in ns. Default twice [`BitRate::response_gap_ns`].
     pub idle_between_responses_ns: u32,
+    /// Latency budget: by how much the end time of a frame that is handed over may be late, in ns. A response that begins
+    /// sooner than this after the request is not taken, because it may have begun before.
+    ///
+    /// Default a quarter of [`BitRate::response_gap_ns`], 375 ns to 750 ns, which is below seven bits, the turn-around time of
+    /// one vendor's simulated encoder.
+    pub latency_ns: u32,
+    /// Least time from the end of a transaction to the next request, in ns. Default [`REQUEST_GAP_NS`].
+    pub request_gap_ns: u32,
+    /// The highest address on the line, asked or not. What EA of a multi-response request means is not documented, and
+    /// encoders that were not asked may answer; the line is free when this one can no longer speak. Default 7.
+    pub highest: EncoderAddress,
 }
 
 impl Line {
     /// A line with the default time-outs.
     pub const fn new(rate: BitRate) -> Self {
+        let gap_ns = rate.response_gap_ns();
         Self {
             rate,
             frame_gap_ns: FRAME_GAP_NS,
+            turn_around_ns: 0,
             response_timeout_ns: rate.bits_ns(1000),
-            idle_in_response_ns: rate.bits_ns(4),
-            idle_between_responses_ns: rate.response_gap_ns().saturating_mul(2),
+            idle_in_response_ns: gap_ns / 4,
+            idle_between_responses_ns: gap_ns.saturating_mul(2),
+            latency_ns: gap_ns / 4,
+            request_gap_ns: REQUEST_GAP_NS,
+            highest: EncoderAddress::MAX,
         }
     }
 
-    /// The same with another wait for the response.
+    /// With another gap between the frames of a request.
+    pub const fn with_frame_gap_ns(self, frame_gap_ns: u32) -> Self {
+        Self { frame_gap_ns, ..self }
+    }
+
+    /// With the least turn-around time of the encoders on this line.
+    pub const fn with_turn_around_ns(self, turn_around_ns: u32) -> Self {
+        Self { turn_around_ns, ..self }
+    }
+
+    /// With another wait for the response.
     pub const fn with_response_timeout_ns(self, response_timeout_ns: u32) -> Self {
         Self { response_timeout_ns, ..self }
+    }
+
+    /// With another bound for the idle time between the frames of a response.
+    pub const fn with_idle_in_response_ns(self, idle_in_response_ns: u32) -> Self {
+        Self { idle_in_response_ns, ..self }
+    }
+
+    /// With another latency budget.
+    pub const fn with_latency_ns(self, latency_ns: u32) -> Self {
+        Self { latency_ns, ..self }
+    }
+
+    /// With the highest address on the line.
+    pub const fn with_highest(self, highest: EncoderAddress) -> Self {
+        Self { highest, ..self }
     }
 
     /// Line time of a request in ns, its gaps included.
@@ -43,16 +89,98 @@ impl Line {
         self.rate.bits_ns(request.emit().line_bits(self.rate.bits(self.frame_gap_ns)))
     }
 
-    /// The time after which a transaction with `encoders` encoders is over in any case, in ns from its start.
-    pub fn longest_ns(&self, request: Request, expected: &Expected, encoders: u8) -> u32 {
-        let raw = self.rate.response_ns(expected.layout()).saturating_add(self.idle_in_response_ns);
-        let raws = raw.saturating_add(self.idle_between_responses_ns).saturating_mul(encoders.into());
-        self.request_ns(request).saturating_add(self.response_timeout_ns).saturating_add(raws)
+    /// Longest line time of a response, idle time between its frames included, in ns.
+    pub const fn response_ns(&self, layout: Layout) -> u32 {
+        let gaps = (layout.frames() as u32).saturating_sub(1);
+        self.rate.response_ns(layout).saturating_add(self.idle_in_response_ns.saturating_mul(gaps))
     }
 
-    /// Shortest period in which a request to `encoders` encoders can be repeated even if nobody answers, in ns: the
-    /// longest transaction and [`REQUEST_GAP_NS`].
-    pub fn min_cycle_ns(&self, request: Request, expected: &Expected, encoders: u8) -> u32 {
-        self.longest_ns(request, expected, encoders).saturating_add(REQUEST_GAP_NS)
+    /// From the end of a request to the time when no answer to it can be on the line any more, in ns.
+    ///
+    /// The responses to a multi-response request are waited for up to the slot of [`highest`](Self::highest), however many
+    /// encoders are asked.
+    pub const fn answered_ns(&self, expected: &Expected) -> u32 {
+        let response = self.response_ns(expected.layout());
+        let before = if expected.command().is_multi_response() { self.highest.get() as u32 } else { 0 };
+        let others = response.saturating_add(self.idle_between_responses_ns).saturating_mul(before);
+        self.response_timeout_ns.saturating_add(others).saturating_add(response).saturating_add(self.latency_ns)
+    }
+
+    /// The time after which a transaction is over in any case, in ns from its start.
+    pub fn longest_ns(&self, request: Request, expected: &Expected) -> u32 {
+        self.request_ns(request).saturating_add(self.answered_ns(expected))
+    }
+
+    /// Shortest period in which a request can be repeated even if nobody answers, in ns: the longest transaction and
+    /// [`request_gap_ns`](Self::request_gap_ns).
+    pub fn min_cycle_ns(&self, request: Request, expected: &Expected) -> u32 {
+        self.longest_ns(request, expected).saturating_add(self.request_gap_ns)
+    }
+
+    /// Line time of a frame in ns, whole at every rate.
+    pub(super) const fn frame_ns(&self) -> u64 {
+        self.rate.bits_ns(FRAME_BITS) as u64
+    }
+
+    /// How much later than the end of the request a frame has to begin by its stamp, in ns, to be an answer for certain.
+    pub(super) const fn early_ns(&self) -> u64 {
+        (if self.turn_around_ns > self.latency_ns { self.turn_around_ns } else { self.latency_ns }) as u64
+    }
+
+    /// Idle time by their stamps after which two frames do not belong together, in ns.
+    pub(super) const fn pause_ns(&self) -> u64 {
+        self.idle_in_response_ns.saturating_add(self.latency_ns) as u64
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::operation::Operation;
+    use crate::resolution::Resolution;
+
+    /// The numbers of the sources, and those of this crate that follow from them.
+    #[test]
+    fn defaults() {
+        let line = |rate| Line::new(rate);
+        let all = BitRate::ALL.map(line);
+        assert_eq!(all.map(|line| line.frame_gap_ns), [1_000; 5]);
+        assert_eq!(all.map(|line| line.response_timeout_ns), [400_000, 250_000, 150_000, 125_000, 62_500]);
+        assert_eq!(all.map(|line| line.idle_between_responses_ns), [6_000, 4_000, 4_000, 3_000, 3_000]);
+        assert_eq!(all.map(|line| line.latency_ns), [750, 500, 500, 375, 375]);
+        assert_eq!(all.map(|line| line.idle_in_response_ns), [750, 500, 500, 375, 375]);
+        assert_eq!(all.map(|line| (line.turn_around_ns, line.request_gap_ns, line.highest.get())), [(0, 10_000, 7); 5]);
+    }
+
+    /// Frames of one response and of two are told apart by their stamps, however late each is within the budget.
+    #[test]
+    fn the_budget_leaves_the_gap_of_a_bus_visible() {
+        for line in BitRate::ALL.map(Line::new) {
+            assert!(line.pause_ns() < u64::from(line.rate.response_gap_ns() - line.latency_ns));
+            assert!(line.latency_ns < line.rate.bits_ns(7));
+        }
+    }
+
+    /// 18 bits and the gaps of a request, 72 bits of a response, 1000 bits of waiting, at 16 Mbit/s.
+    #[test]
+    fn times_of_a_transaction() {
+        let line = Line::new(BitRate::Mbit16).with_idle_in_response_ns(0).with_latency_ns(0);
+        let of = |operation| Request::new(EncoderAddress::ZERO, operation);
+        let (one, all) = (of(Operation::Abs40), of(Operation::Abs40Mt));
+        let expected = |request: Request| request.expected(Resolution::default());
+        assert_eq!(line.request_ns(one), 1_125);
+        // Two frames and 16 bits between them.
+        assert_eq!(line.request_ns(of(Operation::EepromRead { address: 0 })), 3_250);
+        let gapless = line.with_frame_gap_ns(0);
+        assert_eq!(gapless.request_ns(of(Operation::EepromRead { address: 0 })), 2_250);
+        assert_eq!(line.longest_ns(one, &expected(one)), 1_125 + 62_500 + 4_500);
+        assert_eq!(line.min_cycle_ns(one, &expected(one)), 1_125 + 62_500 + 4_500 + 10_000);
+        assert_eq!(line.longest_ns(all, &expected(all)), 1_125 + 62_500 + 8 * 4_500 + 7 * 3_000);
+        let two = line.with_highest(EncoderAddress::truncate(1));
+        assert_eq!(two.longest_ns(all, &expected(all)), 1_125 + 62_500 + 2 * 4_500 + 3_000);
+        let idle = line.with_idle_in_response_ns(100);
+        assert_eq!(idle.longest_ns(one, &expected(one)), 1_125 + 62_500 + 4_800);
+        assert_eq!(idle.with_latency_ns(50).longest_ns(one, &expected(one)), 1_125 + 62_500 + 4_850);
+        assert_eq!((line.with_turn_around_ns(9).early_ns(), line.with_latency_ns(7).early_ns()), (9, 7));
     }
 }

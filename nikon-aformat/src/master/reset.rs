@@ -1,5 +1,5 @@
 use super::Step;
-use super::eeprom::{WRITE_POLLING, is_busy};
+use super::eeprom::{WRITE_POLLING, is_busy, status_of};
 use crate::command::Command;
 use crate::error::Error;
 use crate::number::EncoderAddress;
@@ -11,9 +11,10 @@ use crate::timing::{REQUEST_GAP_NS, WRITE_BUSY_NS};
 /// A reset: the same request eight times in succession, a wait of 30 ms, then the status.
 ///
 /// One good response after the other has to come: where one is missing or refused, the encoder may not have heard the request,
-/// the count would begin anew, and the procedure ends with [`Error::Interrupted`]. It is not repeated on its own,
-/// because the master cannot know whether eight requests have arrived already; [`start`](Self::start) begins again
-/// from one.
+/// and the count would begin anew. It is not repeated on its own; [`start`](Self::start) begins again from one.
+///
+/// The encoder counts requests, not procedures: seven that were interrupted and one more are eight. Use
+/// [`GuardedReset`](super::GuardedReset), which starts the count again before it begins.
 ///
 /// Release 9.2 of the AM243x Motor Control SDK sends the code a ninth time, which later releases call a defect. The
 /// effect shows in the response to the next request, here STATUS.
@@ -60,6 +61,11 @@ impl Reset {
         Self { request: Request::new(ea, operation), done: 0, tries: 0 }
     }
 
+    /// The request that is sent eight times.
+    pub const fn request(&self) -> Request {
+        self.request
+    }
+
     /// The command that is sent.
     pub const fn command(&self) -> Command {
         self.request.command()
@@ -78,21 +84,33 @@ impl Reset {
     }
 
     /// A transaction ended at `now_ns` with this outcome. The value is the response to STATUS.
+    ///
+    /// Fails with [`Error::Interrupted`] (not done) if one of the first seven responses does not come, and with
+    /// [`Error::EffectUnknown`] if the eighth or the status does not: the encoder may have done it, and be busy for 30 ms.
     pub fn receive(&mut self, outcome: Result<Response, Error>, now_ns: u64) -> Step<Response> {
-        let soon = now_ns.saturating_add(REQUEST_GAP_NS.into());
+        let soon_ns = now_ns.saturating_add(REQUEST_GAP_NS.into());
         if self.done >= Self::REQUESTS {
             return self.status(outcome, now_ns);
         }
-        if outcome.is_err() {
-            let error = Error::Interrupted { done: self.done };
-            self.done = 0;
-            return Step::Failed { error, ready_ns: soon };
+        if !outcome.is_ok_and(|response| self.is_answer(response)) {
+            let done = core::mem::take(&mut self.done);
+            if done >= Self::REQUESTS.saturating_sub(1) {
+                let ready_ns = now_ns.saturating_add(WRITE_BUSY_NS.into());
+                return Step::Failed { error: Error::EffectUnknown, ready_ns };
+            }
+            return Step::Failed { error: Error::Interrupted { done }, ready_ns: soon_ns };
         }
         self.done = self.done.saturating_add(1);
         if self.done < Self::REQUESTS {
-            return Step::Send { request: self.request, not_before_ns: soon };
+            return Step::Send { request: self.request, not_before_ns: soon_ns };
         }
         self.ask_status(now_ns.saturating_add(WRITE_BUSY_NS.into()))
+    }
+
+    /// Whether this is the response to the reset. That of command 11 may show the old or the new address.
+    fn is_answer(&self, response: Response) -> bool {
+        response.command() == Some(self.request.command())
+            && (response.ea == self.request.ea || !self.request.command().answers_with_own_address())
     }
 
     const fn ask_status(&self, not_before_ns: u64) -> Step<Response> {
@@ -100,16 +118,14 @@ impl Reset {
     }
 
     fn status(&mut self, outcome: Result<Response, Error>, now_ns: u64) -> Step<Response> {
-        let polling = WRITE_POLLING;
         self.tries = self.tries.saturating_add(1);
-        let not_before_ns = now_ns.saturating_add(polling.interval_ns.into());
-        let error = match outcome {
-            Ok(value) if !is_busy(value) => return Step::Done { value, ready_ns: now_ns },
-            Ok(_) => Error::Busy { tries: self.tries },
-            Err(error) => error,
-        };
-        if self.tries >= polling.max_tries {
-            return Step::Failed { error, ready_ns: not_before_ns };
+        match status_of(self.request.ea, outcome) {
+            Ok((value, _)) if !is_busy(value) => return Step::Done { value, ready_ns: now_ns },
+            _ => {}
+        }
+        let not_before_ns = now_ns.saturating_add(WRITE_POLLING.interval_ns.into());
+        if self.tries >= WRITE_POLLING.max_tries {
+            return Step::Failed { error: Error::EffectUnknown, ready_ns: not_before_ns };
         }
         self.ask_status(not_before_ns)
     }
@@ -165,9 +181,38 @@ mod tests {
                 let _ = reset.receive(Ok(status(Command::ClearStatus, 0)), 0);
             }
             let end = reset.receive(Err(Error::NoResponse), 0);
-            assert_eq!(end, Step::Failed { error: Error::Interrupted { done }, ready_ns: 10_000 });
+            let want = match done {
+                7 => Step::Failed { error: Error::EffectUnknown, ready_ns: 30_000_000 },
+                _ => Step::Failed { error: Error::Interrupted { done }, ready_ns: 10_000 },
+            };
+            assert_eq!(end, want);
             assert_eq!(reset.done(), 0);
         }
+    }
+
+    /// A response to something else is none to the reset, and none to STATUS.
+    #[test]
+    fn only_its_own_responses_count() {
+        let mut reset = Reset::set_single_turn_zero_and_shift_commutation_angle(EA);
+        let _ = reset.start(0);
+        let word = Data::Eeprom { data: 0, address: 0 };
+        let word = Response::new(EA, Command::EepromRead, EncoderStatus::empty(), word);
+        let elsewhere = Response { ea: EncoderAddress::ZERO, ..status(Command::ZeroPreset, 0) };
+        for other in [word, elsewhere, status(Command::Status, 0)] {
+            let _ = reset.start(0);
+            let end = reset.receive(Ok(other), 0);
+            assert_eq!(end, Step::Failed { error: Error::Interrupted { done: 0 }, ready_ns: 10_000 });
+        }
+        let _ = reset.start(0);
+        for _ in 0..8 {
+            let _ = reset.receive(Ok(status(Command::ZeroPreset, 0)), 0);
+        }
+        for other in
+            [word, status(Command::ZeroPreset, 0), Response { ea: EncoderAddress::ZERO, ..status(Command::Status, 0) }]
+        {
+            assert!(matches!(reset.receive(Ok(other), 0), Step::Send { .. }));
+        }
+        assert!(matches!(reset.receive(Ok(status(Command::Status, 0)), 0), Step::Done { .. }));
     }
 
     #[test]

@@ -1,27 +1,54 @@
+use super::hunt::{Block, Found, Hunt};
 use super::{Line, Progress};
-use crate::bus::{Addresses, Bus};
+use crate::bus::{Addresses, Bus, Outcome};
 use crate::error::Error;
 use crate::expected::Expected;
-use crate::frame::truncated;
-use crate::layout::FRAME_BITS;
-use crate::raw_response::RawResponse;
+use crate::number::EncoderAddress;
 use crate::request::{Frames, Request};
 use crate::resolution::Resolution;
 use crate::response::Response;
-use crate::timing::REQUEST_GAP_NS;
 
-/// One request and its response, frame by frame as a shift register receives them.
+/// When a position was sampled: not documented, but after the end of the request and before the response began.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Sampled {
+    /// The end of the request, in ns.
+    pub earliest_ns: u64,
+    /// The first start bit of the response, in ns; late by no more than [`Line::latency_ns`].
+    pub latest_ns: u64,
+}
+
+/// A response, and when its values were sampled.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Reading {
+    /// What the encoder sent.
+    pub response: Response,
+    /// When it was sampled.
+    pub sampled: Sampled,
+}
+
+/// One request and its response, frame by frame or in blocks.
 ///
-/// Once done or failed it stays so. Of a multi-response request it takes the first response; [`BusTransaction`] takes all.
+/// It ends with the first response that passes all checks and began after the request had left the line. What is refused
+/// meanwhile does not end it: the answer may still come. When no answer can come any more, it fails with the fault of the
+/// first refused response; then the line is free. Once done or failed it stays so.
+///
+/// Feed what was received before asking with [`poll`](Self::poll). Of a multi-response request it takes the first
+/// response; [`BusTransaction`] takes all.
+///
+/// The own request, if the receiver hears it, needs no setting: its sync code is not that of a response.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Transaction {
     request: Request,
     expected: Expected,
     line: Line,
-    collector: Collector,
+    hunt: Hunt,
+    asked_ns: u64,
     until_ns: u64,
-    end: Option<Result<Response, Error>>,
+    refused: Option<Error>,
+    end: Option<Result<Reading, Error>>,
     ready_ns: u64,
 }
 
@@ -31,14 +58,16 @@ impl Transaction {
     /// A request that encoders of this version do not understand fails at once with
     /// [`Error::UnsupportedInVersion`] and is not to be sent.
     pub fn start(request: Request, resolution: Resolution, line: Line, now_ns: u64) -> Self {
-        let frame = line.rate.bits_ns(FRAME_BITS);
-        let first = line.request_ns(request).saturating_add(line.response_timeout_ns).saturating_add(frame);
+        let expected = request.expected(resolution);
+        let asked_ns = now_ns.saturating_add(line.request_ns(request).into());
         Self {
             request,
-            expected: request.expected(resolution),
+            expected,
             line,
-            collector: Collector::EMPTY,
-            until_ns: now_ns.saturating_add(first.into()),
+            hunt: Hunt::new(asked_ns),
+            asked_ns,
+            until_ns: asked_ns.saturating_add(line.answered_ns(&expected).into()),
+            refused: None,
             end: request.check(resolution).err().map(Err),
             ready_ns: now_ns,
         }
@@ -49,92 +78,108 @@ impl Transaction {
         self.request.emit()
     }
 
-    /// A frame was received with start bit and delimiter in order, its delimiter at `now_ns`; `content` are its bits, the first
+    /// A frame was received with start bit and delimiter in order, its delimiter at `end_ns`; `content` are its bits, the first
     /// of the line in bit 0.
-    pub fn frame(&mut self, content: u16, now_ns: u64) -> Progress<Response> {
-        if let Progress::Pending { .. } = self.poll(now_ns) {
-            self.until_ns = now_ns.saturating_add(self.patience_ns());
-            if let Some(raw) = self.collector.frame(content, now_ns, &self.expected) {
-                self.finish(Response::parse(&self.expected, &raw), now_ns);
-            }
+    pub fn frame(&mut self, content: u16, end_ns: u64) -> Progress<Reading> {
+        self.block(&[Some(content)], 0, end_ns)
+    }
+
+    /// A frame was received whose delimiter, at `end_ns`, reads 0.
+    pub fn framing_error(&mut self, end_ns: u64) -> Progress<Reading> {
+        self.block(&[None], 0, end_ns)
+    }
+
+    /// Frames were received together, as a DMA block or when the line went idle: the last delimiter at `end_ns`, none of them
+    /// begun before `since_ns` (0 if that is not known). `None` stands for a frame whose delimiter reads 0.
+    ///
+    /// With nothing known of pauses in the block, the response has to be at its end, unless `since_ns` is after the request.
+    pub fn block(&mut self, frames: &[Option<u16>], since_ns: u64, end_ns: u64) -> Progress<Reading> {
+        if self.end.is_none() {
+            let Self { hunt, line, expected, refused, end, ready_ns, asked_ns, until_ns, .. } = self;
+            hunt.take(line, expected, Block { frames, since_ns, end_ns }, |found| match found.outcome {
+                Ok(response) if end.is_none() => {
+                    let sampled = Sampled { earliest_ns: *asked_ns, latest_ns: found.began_ns };
+                    *end = Some(Ok(Reading { response, sampled }));
+                    let others = expected.command().is_multi_response();
+                    let free_ns = if others { found.end_ns.max(*until_ns) } else { found.end_ns };
+                    *ready_ns = free_ns.saturating_add(line.request_gap_ns.into());
+                }
+                Ok(_) => {}
+                Err(error) => *refused = refused.or(Some(error)),
+            });
         }
         self.progress()
     }
 
-    /// A frame was received whose delimiter reads 0.
-    pub fn framing_error(&mut self, now_ns: u64) -> Progress<Response> {
-        if let Progress::Pending { .. } = self.poll(now_ns) {
-            self.finish(Err(Error::Delimiter { frame: self.collector.got }), now_ns);
-        }
-        self.progress()
-    }
-
-    /// Ends the transaction if its time is over.
-    pub fn poll(&mut self, now_ns: u64) -> Progress<Response> {
+    /// Where the transaction stands at `now_ns`; it fails if no answer can come any more.
+    pub fn poll(&mut self, now_ns: u64) -> Progress<Reading> {
         if self.end.is_none() && now_ns > self.until_ns {
-            let nothing = self.collector.got == 0;
-            self.finish(
-                Err(if nothing { Error::NoResponse } else { self.collector.truncation(&self.expected) }),
-                now_ns,
-            );
+            let Self { hunt, expected, refused, .. } = self;
+            hunt.finish(expected, |Found { outcome, .. }| *refused = refused.or(outcome.err()));
+            self.end = Some(Err(self.refused.unwrap_or(Error::NoResponse)));
+            self.ready_ns = self.until_ns.saturating_add(self.line.request_gap_ns.into());
         }
         self.progress()
     }
 
     /// Where the transaction stands.
-    pub const fn progress(&self) -> Progress<Response> {
+    pub const fn progress(&self) -> Progress<Reading> {
         match self.end {
-            None => Progress::Pending { until_ns: self.until_ns },
+            None => Progress::Pending { until_ns: self.until_ns.saturating_add(1) },
             Some(Ok(value)) => Progress::Done { value, ready_ns: self.ready_ns },
             Some(Err(error)) => Progress::Failed { error, ready_ns: self.ready_ns },
         }
     }
-
-    fn finish(&mut self, end: Result<Response, Error>, now_ns: u64) {
-        self.end = Some(end);
-        self.ready_ns = now_ns.saturating_add(REQUEST_GAP_NS.into());
-    }
-
-    fn patience_ns(&self) -> u64 {
-        u64::from(self.line.rate.bits_ns(FRAME_BITS)).saturating_add(self.line.idle_in_response_ns.into())
-    }
 }
 
-/// A multi-response request and the responses of all encoders, frame by frame.
+/// A multi-response request and the responses of all encoders, frame by frame or in blocks.
 ///
-/// It ends when as many responses have arrived as encoders were asked, good or not, or when its time is over; what is
-/// missing then is said by [`Bus`].
+/// It is done when every encoder that was asked has been heard, or when the slot of the highest address on the line has
+/// passed; what is missing then is said by [`Bus`]. A response that is lost or damaged costs no other one.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct BusTransaction {
     request: Request,
     expected: Expected,
     line: Line,
-    collector: Collector,
+    hunt: Hunt,
     bus: Bus,
+    asked_ns: u64,
+    began_ns: [u64; 8],
     until_ns: u64,
     ended: bool,
-    /// A frame was broken; the rest of its response is passed over.
-    broken: bool,
+    refused: Option<Error>,
+    ready_ns: u64,
 }
 
 impl BusTransaction {
     /// Begins a transaction with encoders of this resolution; the first start bit of the request is at `now_ns`.
     ///
     /// What EA of the request means to the encoders is not documented. [`Addresses::highest`] of those that are asked is
-    /// the most likely reading.
+    /// the most likely reading; [`Line::highest`] covers the others.
+    ///
+    /// A request that encoders of this version do not understand fails at once with
+    /// [`Error::UnsupportedInVersion`] and is not to be sent.
     pub fn start(request: Request, resolution: Resolution, asked: Addresses, line: Line, now_ns: u64) -> Self {
         let expected = request.expected(resolution).any_address();
-        let longest = line.longest_ns(request, &expected, asked.len());
+        let line = match asked.highest() {
+            Some(highest) => line.with_highest(line.highest.max(highest)),
+            None => line,
+        };
+        let asked_ns = now_ns.saturating_add(line.request_ns(request).into());
+        let refused = request.check(resolution).err();
         Self {
             request,
             expected,
             line,
-            collector: Collector::EMPTY,
+            hunt: Hunt::new(asked_ns),
             bus: Bus::new(expected, asked),
-            until_ns: now_ns.saturating_add(longest.into()),
-            ended: asked.is_empty(),
-            broken: false,
+            asked_ns,
+            began_ns: [0; 8],
+            until_ns: asked_ns.saturating_add(line.answered_ns(&expected).into()),
+            ended: asked.is_empty() || refused.is_some(),
+            refused,
+            ready_ns: now_ns,
         }
     }
 
@@ -143,45 +188,64 @@ impl BusTransaction {
         self.request.emit()
     }
 
-    /// A frame was received with start bit and delimiter in order, its delimiter at `now_ns`; `content` are its bits, the first
-    /// of the line in bit 0. Whether the transaction is over.
-    pub fn frame(&mut self, content: u16, now_ns: u64) -> bool {
-        if self.poll(now_ns) {
-            return true;
-        }
-        self.begin_response(now_ns);
-        if let Some(raw) = self.collector.frame(content, now_ns, &self.expected).filter(|_| !self.broken) {
-            self.bus.push(Ok(raw));
-        }
-        self.close_if_complete()
+    /// A frame was received with start bit and delimiter in order, its delimiter at `end_ns`; `content` are its bits, the first
+    /// of the line in bit 0.
+    pub fn frame(&mut self, content: u16, end_ns: u64) -> Progress<()> {
+        self.block(&[Some(content)], 0, end_ns)
     }
 
-    /// A frame was received whose delimiter reads 0. Whether the transaction is over.
-    pub fn framing_error(&mut self, now_ns: u64) -> bool {
-        if self.poll(now_ns) {
-            return true;
-        }
-        self.begin_response(now_ns);
-        if !self.broken {
-            self.bus.push(Err(Error::Delimiter { frame: self.collector.got }));
-        }
-        self.broken = true;
-        self.collector = Collector { last_ns: now_ns, ..Collector::EMPTY };
-        self.close_if_complete()
+    /// A frame was received whose delimiter, at `end_ns`, reads 0.
+    pub fn framing_error(&mut self, end_ns: u64) -> Progress<()> {
+        self.block(&[None], 0, end_ns)
     }
 
-    /// Ends the transaction if its time is over. Whether it is over.
-    pub fn poll(&mut self, now_ns: u64) -> bool {
+    /// Frames were received together: the last delimiter at `end_ns`, none of them begun before `since_ns` (0 if that is not
+    /// known). `None` stands for a frame whose delimiter reads 0.
+    ///
+    /// With nothing known of pauses in the block, only a response at its end is taken, unless `since_ns` is after the
+    /// request: give the time at which the receiver was switched on.
+    pub fn block(&mut self, frames: &[Option<u16>], since_ns: u64, end_ns: u64) -> Progress<()> {
+        if !self.ended {
+            let Self { hunt, line, expected, bus, began_ns, .. } = self;
+            hunt.take(line, expected, Block { frames, since_ns, end_ns }, |found| {
+                if let Ok(response) = found.outcome {
+                    if let Some(began) = began_ns.get_mut(usize::from(response.ea.get())) {
+                        *began = found.began_ns;
+                    }
+                }
+                bus.take(found.outcome);
+            });
+            self.ended = self.bus.heard_all();
+            self.free();
+        }
+        self.progress()
+    }
+
+    /// Where the transaction stands at `now_ns`; it is over if no answer can come any more.
+    pub fn poll(&mut self, now_ns: u64) -> Progress<()> {
         if !self.ended && now_ns > self.until_ns {
-            self.cut();
+            let Self { hunt, expected, bus, .. } = self;
+            hunt.finish(expected, |Found { outcome, .. }| {
+                bus.take(outcome);
+            });
             self.ended = true;
+            self.free();
         }
-        self.ended
+        self.progress()
     }
 
-    /// When the transaction is over at the latest.
-    pub const fn until_ns(&self) -> u64 {
-        self.until_ns
+    /// Encoders that were not asked, or heard already, may still speak.
+    fn free(&mut self) {
+        self.ready_ns = self.until_ns.saturating_add(self.line.request_gap_ns.into());
+    }
+
+    /// Where the transaction stands.
+    pub const fn progress(&self) -> Progress<()> {
+        match (self.refused, self.ended) {
+            (Some(error), _) => Progress::Failed { error, ready_ns: self.ready_ns },
+            (None, true) => Progress::Done { value: (), ready_ns: self.ready_ns },
+            (None, false) => Progress::Pending { until_ns: self.until_ns.saturating_add(1) },
+        }
     }
 
     /// What has come so far.
@@ -189,147 +253,10 @@ impl BusTransaction {
         &self.bus
     }
 
-    /// A frame behind a pause is the first of the next response.
-    fn begin_response(&mut self, now_ns: u64) {
-        let whole = u64::from(self.line.rate.bits_ns(FRAME_BITS)).saturating_add(self.line.idle_in_response_ns.into());
-        if now_ns.saturating_sub(self.collector.last_ns) > whole {
-            self.cut();
-        }
-    }
-
-    fn cut(&mut self) {
-        if self.collector.got > 0 && !self.broken {
-            self.bus.push(Err(self.collector.truncation(&self.expected)));
-        }
-        self.broken = false;
-        self.collector.got = 0;
-    }
-
-    /// A broken response is over when its last frame has passed, which only a pause tells.
-    fn close_if_complete(&mut self) -> bool {
-        self.ended = self.bus.is_complete() && !self.broken;
-        self.ended
-    }
-}
-
-/// Frames of one response.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-struct Collector {
-    contents: [u16; RawResponse::MAX_FRAMES],
-    got: u8,
-    last_ns: u64,
-}
-
-impl Collector {
-    const EMPTY: Self = Self { contents: [0; RawResponse::MAX_FRAMES], got: 0, last_ns: 0 };
-
-    fn frame(&mut self, content: u16, now_ns: u64, expected: &Expected) -> Option<RawResponse> {
-        self.last_ns = now_ns;
-        if let Some(place) = self.contents.get_mut(usize::from(self.got)) {
-            *place = content;
-        }
-        self.got = self.got.saturating_add(1);
-        if self.got < expected.layout().frames() {
-            return None;
-        }
-        self.got = 0;
-        Some(RawResponse::of(core::mem::take(&mut self.contents), expected.layout()))
-    }
-
-    fn truncation(&self, expected: &Expected) -> Error {
-        truncated(u32::from(self.got).wrapping_mul(FRAME_BITS), expected.layout().line_bits())
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::command::{Command, Version};
-    use crate::data::Data;
-    use crate::number::EncoderAddress;
-    use crate::operation::Operation;
-    use crate::response::tests::exchanges;
-    use crate::status::EncoderStatus;
-    use proptest::prelude::*;
-    use servowire_core::U24;
-
-    const LINE: Line = Line::new(crate::timing::BitRate::Mbit16);
-    const FRAME_NS: u64 = 1_125;
-
-    proptest! {
-        #[test]
-        fn a_response_arrives_or_its_absence_is_told((request, expected, response) in exchanges(), cut in 0..7_usize) {
-            let resolution = if response.layout() == crate::layout::Layout::Abs40Vel { Resolution::default().low_with_velocity() } else { Resolution::default() };
-            let resolution = if request.command().is_reset() && response.layout() == crate::layout::Layout::Abs24 { resolution.resets_with_position() } else { resolution };
-            let mut transaction = Transaction::start(request, resolution, LINE, 0);
-            prop_assert_eq!(transaction.frames(), request.emit());
-            let raw = response.emit();
-            let mut now_ns = u64::from(LINE.request_ns(request)) + 3_000;
-            for content in raw.contents().iter().take(cut) {
-                now_ns += FRAME_NS;
-                let _ = transaction.frame(*content, now_ns);
-            }
-            let frames = usize::from(raw.frames());
-            if cut >= frames {
-                prop_assert_eq!(transaction.progress(), Progress::Done { value: response, ready_ns: now_ns + 10_000 });
-                let ended = transaction;
-                let _ = (transaction.frame(7, now_ns), transaction.framing_error(now_ns), transaction.poll(u64::MAX));
-                prop_assert_eq!(transaction, ended);
-            } else {
-                let Progress::Pending { until_ns } = transaction.progress() else { panic!() };
-                prop_assert_eq!(transaction.poll(until_ns), Progress::Pending { until_ns });
-                let want = if cut == 0 { Error::NoResponse } else {
-                    Error::Truncated { got: cut as u16 * 18, want: expected.layout().line_bits() as u16 }
-                };
-                prop_assert_eq!(transaction.poll(until_ns + 1), Progress::Failed { error: want, ready_ns: until_ns + 10_001 });
-                prop_assert!(until_ns <= u64::from(LINE.longest_ns(request, &expected, 1)));
-            }
-        }
-    }
-
-    #[test]
-    fn what_an_old_encoder_does_not_know_is_not_sent() {
-        let request = Request::new(EncoderAddress::ZERO, Operation::Abs24Vel);
-        let resolution = Resolution::default().with_version(Version::V2_1);
-        let progress = Transaction::start(request, resolution, LINE, 0).progress();
-        let error = Error::UnsupportedInVersion { command: Command::Abs24Vel, version: Version::V2_1 };
-        assert_eq!(progress, Progress::Failed { error, ready_ns: 0 });
-    }
-
-    fn raw(ea: u8) -> RawResponse {
-        let data = Data::Abs24 { abs: U24::truncate(u32::from(ea) << 8) };
-        Response::new(EncoderAddress::truncate(ea), Command::Abs24LowMt, EncoderStatus::empty(), data).emit()
-    }
-
-    /// Three encoders; the second one loses its last frame, breaks a delimiter or is silent.
-    #[test]
-    fn one_bad_response_costs_only_itself() {
-        let request = Request::new(EncoderAddress::truncate(2), Operation::Abs24LowMt);
-        for fault in 0..4 {
-            let mut bus = BusTransaction::start(request, Resolution::default(), Addresses::first(3), LINE, 0);
-            let mut now_ns = 10_000;
-            for ea in 0..3 {
-                for (k, content) in raw(ea).contents().iter().enumerate() {
-                    now_ns += FRAME_NS;
-                    let over = match (ea, fault, k) {
-                        (1, 1, 2) | (1, 3, _) => false,
-                        (1, 2, 1) => bus.framing_error(now_ns),
-                        _ => bus.frame(*content, now_ns),
-                    };
-                    assert!(!over || ea == 2, "fault {fault}");
-                }
-                now_ns += 1_500;
-            }
-            let heard = bus.bus();
-            let good = |ea| heard.response(EncoderAddress::truncate(ea)).is_some();
-            assert_eq!([good(0), good(1), good(2)], [true, fault == 0, true], "fault {fault}");
-            assert_eq!(
-                (heard.damaged(), heard.not_started()),
-                (u8::from(fault == 1 || fault == 2), u8::from(fault == 3))
-            );
-            let until_ns = bus.until_ns();
-            assert!(bus.poll(until_ns + 1));
-        }
+    /// The good response of an encoder that was asked, and when its values were sampled.
+    pub fn reading(&self, ea: EncoderAddress) -> Option<Reading> {
+        let Outcome::Good(response) = self.bus.of(ea) else { return None };
+        let latest_ns = self.began_ns.get(usize::from(ea.get())).copied().unwrap_or(0);
+        Some(Reading { response, sampled: Sampled { earliest_ns: self.asked_ns, latest_ns } })
     }
 }

@@ -1,6 +1,8 @@
 //! What the tests of both ends share.
 #![allow(unreachable_pub, dead_code, missing_docs)]
 
+pub mod line;
+
 use nikon_aformat::{Command, EncoderId, Operation, U19, UserAddress};
 
 /// One operation of each kind.

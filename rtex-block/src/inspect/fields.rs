@@ -27,8 +27,9 @@ pub enum Value {
     Code(Code),
     /// Error_Code or Sub_Error_Code.
     Error(ErrorCode),
-    /// An alarm.
-    Alarm(Alarm),
+    /// Bytes 12-15 of an alarm answer. Which type codes ask for alarm and warning, and which for attributes, is in the manual
+    /// of the drive.
+    AlarmData([u8; 4]),
     /// Four characters of a text.
     Text([u8; 4]),
 }
@@ -41,7 +42,10 @@ impl fmt::Display for Value {
             Self::Bit(bit) => write!(f, "{}", u8::from(bit)),
             Self::Code(code) => code.write(f),
             Self::Error(code) => code.fmt(f),
-            Self::Alarm(alarm) => write!(f, "{alarm}"),
+            Self::AlarmData([main, sub, low, high]) => {
+                let alarm = Alarm { main, sub };
+                write!(f, "{alarm} warning {high:02X}{low:02X}h, or attributes {high:02X}{low:02X}{sub:02X}{main:02X}h")
+            }
             Self::Text(group) => write!(f, "\"{}\"", group.as_slice().escape_ascii()),
         }
     }
@@ -216,10 +220,8 @@ impl List {
                 self.add("ASCII", 12, 15, Value::Text(r.characters()));
             }
             NonCyclicResponse::Alarm(r) => {
-                let (alarm, warning) = r.alarm();
                 self.results(r);
-                self.add("Alarm_Code", 12, 13, Value::Alarm(alarm));
-                self.add("Warning_Code", 14, 15, Value::Hex(warning));
+                self.add("Alarm_Data", 12, 15, Value::AlarmData(r.data.to_le_bytes()));
             }
             NonCyclicResponse::Homing {
                 execution,

@@ -5,17 +5,18 @@
 //! which costs the exchange in which it happens.
 
 use embedded_io_async::{Read, Write};
-use tformat::master::{EEPROM_POLLING, EepromAccess, Line, Progress, Reset, Step, Transaction};
-use tformat::{Address, AllData, Page, Request, Response, SingleTurn};
+use tformat::master::{EEPROM_POLLING, EepromAccess, Exchange, Line, Progress, Reset, Step, Transaction};
+use tformat::{Address, AllData, Doubt, Page, Policy, Request, Resolution, Response, SingleTurn};
 
-use super::{MAX_BYTES, feed, lead_ns, other, sent_ns, silence_ns, worst_ns};
+use super::{MAX_BYTES, Sample, other, silence_ns, worst_ns};
 use crate::direction::Guard;
 use crate::quiet::{self, Settle};
 use crate::race::race;
 use crate::{Direction, Error, Timer};
 
 /// Why a call of an [`Encoder`] failed.
-pub type Failure<U, D> = Error<<U as embedded_io_async::ErrorType>::Error, <D as Direction>::Error, tformat::Error>;
+pub type Failure<U, D> =
+    Error<<U as embedded_io_async::ErrorType>::Error, <D as Direction>::Error, tformat::Error, Doubt>;
 
 /// An encoder, alone at its UART.
 #[derive(Debug)]
@@ -30,7 +31,7 @@ pub struct Encoder<U, D, T> {
 impl<U: Read + Write, D: Direction, T: Timer> Encoder<U, D, T> {
     /// An encoder at this UART, set to the rate of `line`, 8 data bits, no parity, one stop bit.
     ///
-    /// `line.echo` says whether the receiver is on while the request goes out.
+    /// Whether the receiver is on while the request goes out makes no difference: an echo is known by its time.
     pub fn new(uart: U, direction: D, timer: T, line: Line) -> Self {
         Self { uart, direction, timer, line, state: quiet::Line::new(silence_ns(&line)) }
     }
@@ -40,12 +41,21 @@ impl<U: Read + Write, D: Direction, T: Timer> Encoder<U, D, T> {
         (self.uart, self.direction, self.timer)
     }
 
+    /// The position, if it may be used, and when it was true: from ID 3, by the rules of [`Resolution::read`].
+    ///
+    /// # Errors
+    /// [`Error`], [`Error::Doubt`] among them.
+    pub async fn read_position(&mut self, resolution: Resolution, policy: Policy) -> Result<Sample, Failure<U, D>> {
+        let exchange = self.transact(Request::ReadAll).await?;
+        Sample::of(exchange, resolution, policy).map_err(Error::Doubt)
+    }
+
     /// ID 3: position, turns, encoder ID and alarms. Look at the alarms before you use the position.
     ///
     /// # Errors
     /// [`Error`].
     pub async fn read_all(&mut self) -> Result<AllData, Failure<U, D>> {
-        match self.transact(Request::ReadAll).await? {
+        match self.transact(Request::ReadAll).await?.response {
             Response::ReadAll(all) => Ok(all),
             _ => Err(Error::Protocol(other(Request::ReadAll))),
         }
@@ -84,7 +94,8 @@ impl<U: Read + Write, D: Direction, T: Timer> Encoder<U, D, T> {
     /// A procedure of several transactions: does what its steps ask for and hands the outcomes to `receive`.
     ///
     /// # Errors
-    /// [`Error`]: that of the procedure, or at once one of UART or pin.
+    /// [`Error`]: that of the procedure, for which a fault of the UART is a lost answer; or at once one of the pin or of a line
+    /// that cannot be used, and then whether the last request had its effect is not known.
     pub async fn run<V>(
         &mut self,
         mut step: Step<V>,
@@ -95,8 +106,10 @@ impl<U: Read + Write, D: Direction, T: Timer> Encoder<U, D, T> {
                 Step::Send { request, not_before_ns } => {
                     self.timer.wait_until(not_before_ns).await;
                     let outcome = match self.transact(request).await {
-                        Ok(response) => Ok(response),
+                        Ok(exchange) => Ok(exchange.response),
                         Err(Error::Protocol(error)) => Err(error),
+                        // The answer is lost; what that means is for the procedure to say.
+                        Err(Error::Io(_)) => Err(tformat::Error::NoResponse { echo: false }),
                         Err(other) => return Err(other),
                     };
                     step = receive(outcome, self.state.free_ns(self.timer.now_ns()));
@@ -117,18 +130,17 @@ impl<U: Read + Write, D: Direction, T: Timer> Encoder<U, D, T> {
     ///
     /// # Errors
     /// [`Error`].
-    pub async fn transact(&mut self, request: Request) -> Result<Response, Failure<U, D>> {
+    pub async fn transact(&mut self, request: Request) -> Result<Exchange, Failure<U, D>> {
         self.settle().await?;
         let on_ns = self.timer.now_ns();
         // The worst is assumed until the end is known: an early return or a dropped future leaves it so.
-        self.state.soil(worst_ns(&self.line, request, on_ns.saturating_add(lead_ns(&self.line))));
+        self.state.soil(worst_ns(&self.line, request, on_ns.saturating_add(self.line.driver_lead_ns.into())));
         let guard = Guard::transmit(&mut self.direction).map_err(Error::Pin)?;
-        self.timer.wait_until(on_ns.saturating_add(lead_ns(&self.line))).await;
-        let start_ns = self.timer.now_ns();
-        let mut transaction = Transaction::start(request, self.line, start_ns);
+        self.timer.wait_until(on_ns.saturating_add(self.line.driver_lead_ns.into())).await;
+        let mut transaction = Transaction::start(request, self.line, self.timer.now_ns());
         send(&mut self.uart, request.emit().as_bytes()).await?;
         // What `flush` means differs between UARTs; by the clock the last bit has left at this time.
-        self.timer.wait_until(sent_ns(&self.line, request, start_ns)).await;
+        self.timer.wait_until(transaction.request_end_ns()).await;
         guard.receive().map_err(Error::Pin)?;
         let mut progress = transaction.progress();
         loop {
@@ -156,7 +168,7 @@ impl<U: Read + Write, D: Direction, T: Timer> Encoder<U, D, T> {
             Some(count) => {
                 let count = count.map_err(Error::Io)?;
                 let bytes = buffer.get(..count).filter(|bytes| !bytes.is_empty()).ok_or(Error::Closed)?;
-                Ok(feed(transaction, &self.line, bytes, self.timer.now_ns()))
+                Ok(transaction.bytes(bytes, self.timer.now_ns()))
             }
         }
     }
@@ -185,7 +197,7 @@ impl<U: Read + Write, D: Direction, T: Timer> Encoder<U, D, T> {
 }
 
 /// Hands all bytes to the UART.
-async fn send<U: Write, PIN, P>(uart: &mut U, mut bytes: &[u8]) -> Result<(), Error<U::Error, PIN, P>> {
+async fn send<U: Write, PIN, P, D>(uart: &mut U, mut bytes: &[u8]) -> Result<(), Error<U::Error, PIN, P, D>> {
     while !bytes.is_empty() {
         let count = uart.write(bytes).await.map_err(Error::Io)?;
         bytes = bytes.get(count..).filter(|_| count > 0).ok_or(Error::Closed)?;

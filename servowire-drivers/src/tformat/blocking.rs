@@ -1,16 +1,16 @@
 //! Waits by spinning.
 
 use embedded_io::{Read, ReadReady, Write};
-use tformat::master::{EEPROM_POLLING, EepromAccess, Line, Progress, Reset, Step, Transaction};
-use tformat::{Address, AllData, Page, Request, Response, SingleTurn};
+use tformat::master::{EEPROM_POLLING, EepromAccess, Exchange, Line, Progress, Reset, Step, Transaction};
+use tformat::{Address, AllData, Doubt, Page, Policy, Request, Resolution, Response, SingleTurn};
 
-use super::{MAX_BYTES, feed, lead_ns, other, sent_ns, silence_ns, worst_ns};
+use super::{MAX_BYTES, Sample, other, silence_ns, worst_ns};
 use crate::direction::Guard;
 use crate::quiet::{self, Settle};
 use crate::{Clock, Direction, Error};
 
 /// Why a call of an [`Encoder`] failed.
-pub type Failure<U, D> = Error<<U as embedded_io::ErrorType>::Error, <D as Direction>::Error, tformat::Error>;
+pub type Failure<U, D> = Error<<U as embedded_io::ErrorType>::Error, <D as Direction>::Error, tformat::Error, Doubt>;
 
 /// An encoder, alone at its UART.
 #[derive(Debug)]
@@ -25,7 +25,7 @@ pub struct Encoder<U, D, C> {
 impl<U: Read + ReadReady + Write, D: Direction, C: Clock> Encoder<U, D, C> {
     /// An encoder at this UART, set to the rate of `line`, 8 data bits, no parity, one stop bit.
     ///
-    /// `line.echo` says whether the receiver is on while the request goes out.
+    /// Whether the receiver is on while the request goes out makes no difference: an echo is known by its time.
     pub fn new(uart: U, direction: D, clock: C, line: Line) -> Self {
         Self { uart, direction, clock, line, state: quiet::Line::new(silence_ns(&line)) }
     }
@@ -35,12 +35,21 @@ impl<U: Read + ReadReady + Write, D: Direction, C: Clock> Encoder<U, D, C> {
         (self.uart, self.direction, self.clock)
     }
 
+    /// The position, if it may be used, and when it was true: from ID 3, by the rules of [`Resolution::read`].
+    ///
+    /// # Errors
+    /// [`Error`], [`Error::Doubt`] among them.
+    pub fn read_position(&mut self, resolution: Resolution, policy: Policy) -> Result<Sample, Failure<U, D>> {
+        let exchange = self.transact(Request::ReadAll)?;
+        Sample::of(exchange, resolution, policy).map_err(Error::Doubt)
+    }
+
     /// ID 3: position, turns, encoder ID and alarms. Look at the alarms before you use the position.
     ///
     /// # Errors
     /// [`Error`].
     pub fn read_all(&mut self) -> Result<AllData, Failure<U, D>> {
-        match self.transact(Request::ReadAll)? {
+        match self.transact(Request::ReadAll)?.response {
             Response::ReadAll(all) => Ok(all),
             _ => Err(Error::Protocol(other(Request::ReadAll))),
         }
@@ -79,7 +88,8 @@ impl<U: Read + ReadReady + Write, D: Direction, C: Clock> Encoder<U, D, C> {
     /// A procedure of several transactions: does what its steps ask for and hands the outcomes to `receive`.
     ///
     /// # Errors
-    /// [`Error`]: that of the procedure, or at once one of UART or pin.
+    /// [`Error`]: that of the procedure, for which a fault of the UART is a lost answer; or at once one of the pin or of a line
+    /// that cannot be used, and then whether the last request had its effect is not known.
     pub fn run<T>(
         &mut self,
         mut step: Step<T>,
@@ -90,8 +100,10 @@ impl<U: Read + ReadReady + Write, D: Direction, C: Clock> Encoder<U, D, C> {
                 Step::Send { request, not_before_ns } => {
                     while self.clock.now_ns() < not_before_ns {}
                     let outcome = match self.transact(request) {
-                        Ok(response) => Ok(response),
+                        Ok(exchange) => Ok(exchange.response),
                         Err(Error::Protocol(error)) => Err(error),
+                        // The answer is lost; what that means is for the procedure to say.
+                        Err(Error::Io(_)) => Err(tformat::Error::NoResponse { echo: false }),
                         Err(other) => return Err(other),
                     };
                     step = receive(outcome, self.state.free_ns(self.clock.now_ns()));
@@ -112,18 +124,17 @@ impl<U: Read + ReadReady + Write, D: Direction, C: Clock> Encoder<U, D, C> {
     ///
     /// # Errors
     /// [`Error`].
-    pub fn transact(&mut self, request: Request) -> Result<Response, Failure<U, D>> {
+    pub fn transact(&mut self, request: Request) -> Result<Exchange, Failure<U, D>> {
         self.settle()?;
         let on_ns = self.clock.now_ns();
         // The worst is assumed until the end is known: an early return leaves it so.
-        self.state.soil(worst_ns(&self.line, request, on_ns.saturating_add(lead_ns(&self.line))));
+        self.state.soil(worst_ns(&self.line, request, on_ns.saturating_add(self.line.driver_lead_ns.into())));
         let guard = Guard::transmit(&mut self.direction).map_err(Error::Pin)?;
-        while self.clock.now_ns() < on_ns.saturating_add(lead_ns(&self.line)) {}
-        let start_ns = self.clock.now_ns();
-        let mut transaction = Transaction::start(request, self.line, start_ns);
+        while self.clock.now_ns() < on_ns.saturating_add(self.line.driver_lead_ns.into()) {}
+        let mut transaction = Transaction::start(request, self.line, self.clock.now_ns());
         send(&mut self.uart, request.emit().as_bytes())?;
         // What `flush` means differs between UARTs; by the clock the last bit has left at this time.
-        while self.clock.now_ns() < sent_ns(&self.line, request, start_ns) {}
+        while self.clock.now_ns() < transaction.request_end_ns() {}
         guard.receive().map_err(Error::Pin)?;
         loop {
             match self.receive(&mut transaction)? {
@@ -152,7 +163,7 @@ impl<U: Read + ReadReady + Write, D: Direction, C: Clock> Encoder<U, D, C> {
         let mut buffer = [0; MAX_BYTES];
         let count = self.uart.read(&mut buffer).map_err(Error::Io)?;
         let bytes = buffer.get(..count).filter(|bytes| !bytes.is_empty()).ok_or(Error::Closed)?;
-        Ok(feed(transaction, &self.line, bytes, self.clock.now_ns()))
+        Ok(transaction.bytes(bytes, self.clock.now_ns()))
     }
 
     /// Waits until the line is free, and throws away what comes meanwhile, errors of the UART included.
@@ -181,7 +192,7 @@ impl<U: Read + ReadReady + Write, D: Direction, C: Clock> Encoder<U, D, C> {
 }
 
 /// Hands all bytes to the UART.
-fn send<U: Write, PIN, P>(uart: &mut U, mut bytes: &[u8]) -> Result<(), Error<U::Error, PIN, P>> {
+fn send<U: Write, PIN, P, D>(uart: &mut U, mut bytes: &[u8]) -> Result<(), Error<U::Error, PIN, P, D>> {
     while !bytes.is_empty() {
         let count = uart.write(bytes).map_err(Error::Io)?;
         bytes = bytes.get(count..).filter(|_| count > 0).ok_or(Error::Closed)?;

@@ -11,9 +11,9 @@ use std::rc::Rc;
 use embedded_hal::digital::{ErrorType as PinErrorType, OutputPin};
 use embedded_io::{ErrorKind, ErrorType, Read, ReadReady, Write};
 use servowire_drivers::Clock;
-use servowire_world::{Event, Framing, Id, Kind, Message, Rates, Scenario, Tally, Truth, Wire, World};
+use servowire_world::{Event, Framing, Host, Id, Kind, Message, Rates, Scenario, Tally, Truth, Wire, World};
 use tformat::device::Device;
-use tformat::{BitRate, U24};
+use tformat::{Abm, Abs, BitRate};
 
 const WIRE: Wire = Wire { bit_ps: 400_000, framing: Framing::StartStop { width: 8 }, devices: 1 };
 /// A look at the clock.
@@ -91,7 +91,7 @@ impl Bench {
                 Event::Heard { unit, .. } => {
                     let (byte, framed) = unit.bits.content();
                     self.shaft += 1;
-                    self.encoder.set_position(U24::truncate(self.shaft), U24::truncate(3));
+                    self.encoder.set_position(Abs::truncate(self.shaft), Abm::truncate(3));
                     let now_ns = self.world.now_ns();
                     let answer =
                         if framed { self.encoder.byte(byte as u8, now_ns) } else { self.encoder.framing_error(now_ns) };
@@ -201,6 +201,13 @@ impl OutputPin for Pin {
         bench.on_at_ns = bench.now_ns();
         Ok(())
     }
+}
+
+/// A host whose UART hands over bytes one by one, up to 2 us late, and that hears itself or not whatever the driver was told.
+pub fn scenario(seed: u64) -> Scenario {
+    let scenario = Scenario::random(seed, RATES);
+    let host = Host { echo: scenario.host.echo, latency_ns: scenario.host.latency_ns % 2_000, ..Host::IDEAL };
+    Scenario { host, ..scenario }
 }
 
 /// How many hostile events a test has to live through.

@@ -1,100 +1,124 @@
-//! Master, cables and devices, frame by frame.
+//! Master, cables and devices: the start-up, frame by frame.
 
 use sorte_proto::device::{self, Arrival, Device, Handled, Path, PortId, State, Trigger};
 use sorte_proto::master::{Action, Config, Master, Outgoing};
-use sorte_proto::sync0::Variant;
-use sorte_proto::{Correction, DeviceFrame, Discovery, Error, MasterFrameView, Pto, Slice, TRANSIT_NS};
+use sorte_proto::timing::{CNC_CYCLE_NS, Timing};
+use sorte_proto::{DelayModel, Discovery, Parameters, TRANSIT_NS};
 
-use super::axis::Axis;
+use super::axis::Build;
+use super::clock::Clock;
+use super::host::Host;
+use super::node::Node;
 use super::noise::{Noise, SplitMix64};
 use super::record::Recorder;
 
 /// From the end of the request to its reflection as the master and as a device see it.
-const MASTER_REFLECTION_NS: u64 = 320;
-const DEVICE_REFLECTION_NS: u64 = 360;
+const MASTER_REFLECTION_NS: f64 = 320.0;
+const DEVICE_REFLECTION_NS: f64 = 360.0;
 /// From the trigger of a SYNC frame to the capture of its start.
-const CAPTURE_NS: u64 = 280;
-/// From the capture to the correction of the counter, and until that takes effect.
-const HANDLER_NS: u64 = 700;
-const WRITE_NS: u64 = 135;
+const CAPTURE_NS: f64 = 280.0;
+/// From the capture to the correction of the counter.
+const HANDLER_NS: f64 = 700.0;
+/// Devices that a cycle of 4 us has room for: the published send times are theirs.
+const PUBLISHED: usize = 4;
+/// Lines for the user that are kept; the rest is counted.
+const EVENTS: usize = 50;
 
 /// What the machine is built of.
 #[derive(Debug, Clone)]
 pub(super) struct Setup {
-    /// In front of each device, in ns.
     pub(super) cables_ns: Vec<u16>,
-    pub(super) variant: Variant,
-    pub(super) latency_ns: u16,
+    /// Cycle of the IO exchange; `None`: the shortest that the line fits.
+    pub(super) cycle_ns: Option<u32>,
+    pub(super) build: Build,
+    /// Crystals are up to so wrong, and gain up to so much in a second.
+    pub(super) crystal_ppm: f64,
+    pub(super) drift_ppm: f64,
+    /// Captures of a frame's start are up to so wrong, in ns.
+    pub(super) jitter_ns: f64,
+    /// The way back over a cable takes so much longer than the way out, in ns.
+    pub(super) asymmetry_ns: f64,
     pub(super) bit_error_rate: f64,
     /// The cable in front of this device (from 1) is pulled in this cycle.
     pub(super) unplug: Option<(usize, u64)>,
+    /// The driver of this device (from 1) shuts down in this cycle.
+    pub(super) driver_fault: Option<(usize, u64)>,
+    /// Positions travel in the command words.
+    pub(super) positions: bool,
+    pub(super) max_lag: u16,
     pub(super) seed: u64,
 }
 
-/// A counter of 5 ns ticks on its own crystal.
-#[derive(Debug, Clone, Copy)]
-struct Counter {
-    /// How far it is ahead of the simulation's time, in ns, at `at_ns`.
-    ahead: f64,
-    at_ns: u64,
-    /// Parts per billion.
-    drift_ppb: f64,
-}
-
-impl Counter {
-    fn ahead_at(&self, ns: u64) -> f64 {
-        self.ahead + (ns as f64 - self.at_ns as f64) * self.drift_ppb * 1e-9
+impl Setup {
+    /// The line as the time plan sees it.
+    pub(super) fn timing(&self) -> Timing<'_> {
+        let devices = self.cables_ns.len();
+        let output_len = (devices * 4).max(16) as u16;
+        Timing { line_delays_ns: &self.cables_ns, devices: devices as u8, output_len, payload_len: 3 }
     }
 
-    /// What the register reads.
-    fn read(&self, ns: u64) -> u32 {
-        let ticks = ((ns as f64 + self.ahead_at(ns)) / 5.0).floor();
-        (ticks as i64 * 5) as u32
+    /// Cycle of the IO exchange: whole periods of the generator, with room for clocks that are 2 ns a device off.
+    pub(super) fn cycle_ns(&self) -> u32 {
+        let needs = self.timing().budget().min_cycle_ns() + 2 * self.cables_ns.len() as u32;
+        self.cycle_ns.unwrap_or(needs.div_ceil(CNC_CYCLE_NS) * CNC_CYCLE_NS)
     }
 
-    fn correct(&mut self, correction: Correction, ns: u64) {
-        let step = match correction {
-            Correction::None => return,
-            Correction::Set { counter_ns } => {
-                (self.ahead, self.at_ns) = (f64::from(counter_ns) - (ns + WRITE_NS) as f64, ns);
-                return;
-            }
-            Correction::Rate { increment, ticks } => f64::from(ticks) * (f64::from(increment) - 5.0),
-        };
-        (self.ahead, self.at_ns) = (self.ahead_at(ns) + step, ns);
+    /// Whether the delay field of SYNC is too short, so that this project's extension is needed.
+    pub(super) fn is_long(&self) -> bool {
+        let way: u64 = self.cables_ns.iter().map(|ns| u64::from(*ns) + u64::from(TRANSIT_NS)).sum();
+        way > u64::from(u16::MAX)
     }
-}
 
-/// A device with its axis.
-pub(super) struct Node {
-    pub(super) device: Device,
-    pub(super) axis: Axis,
-    counter: Counter,
-    /// The word for the next cycle, if a good frame has brought one.
-    word: Option<Pto>,
-    in_exchange: bool,
-    /// Largest clock error in the IO exchange, in ns.
-    pub(super) clock_error_ns: f64,
-    /// Frames that were accepted although a bit of what the CRC-8 covers was wrong.
-    pub(super) undetected: u64,
-    /// Frames accepted with a wrong time stamp, which nothing covers.
-    pub(super) bad_stamps: u64,
+    fn master(&self) -> Config {
+        let cycle_time_ns = self.cycle_ns();
+        Config::new()
+            .with_cycle_ns(cycle_time_ns)
+            .with_parameters(Parameters { cycle_time_ns, ..Parameters::CNC })
+            .with_long_line(self.is_long())
+            .with_stop_cycles(25_000)
+            .with_max_failures(20)
+    }
+
+    fn device(&self) -> device::Config {
+        let timing = self.timing();
+        let config = device::Config::new().with_output_len(Some(timing.output_len));
+        if self.cables_ns.len() <= PUBLISHED && self.cycle_ns() == 4000 {
+            return config;
+        }
+        // In a long line what the published measurement loses in each hop would add up to microseconds, and in a long cycle
+        // sixteen frames are far apart.
+        let frames = (64_000 / self.cycle_ns()).clamp(1, 16) as u8;
+        config
+            .with_clock_average(frames)
+            .with_slot_ns(Some(timing.slot_ns()))
+            .with_delay_model(DelayModel { shift_samples: false, ..DelayModel::DEVICE })
+    }
 }
 
 pub(super) struct Line {
-    setup: Setup,
+    pub(super) setup: Setup,
     pub(super) master: Master,
     pub(super) nodes: Vec<Node>,
     pub(super) noise: Noise,
+    pub(super) random: SplitMix64,
     /// Devices that a cable leads to.
-    plugged: usize,
-    now_ns: u64,
+    pub(super) plugged: usize,
+    pub(super) now_ns: u64,
     /// Start-up frames sent, by kind: DISCOVERY, PARAM, DELAY_REQ, SYNC.
     pub(super) sent: [u64; 4],
     /// When the first cycle began.
     pub(super) first_cycle_ns: Option<u64>,
-    /// Lines for the user: what went wrong, and when.
+    /// Device frames that ran into the one before, and those that came after the end of their cycle.
+    pub(super) collisions: u64,
+    pub(super) overruns: u64,
+    /// Shortest gap between two device frames at the master, in ns.
+    pub(super) gap_ns: f64,
+    /// Lines for the user: what went wrong, and when; and how many there were.
     pub(super) events: Vec<String>,
+    pub(super) event_count: u64,
+    /// A master frame as it is sent and as it travels.
+    pub(super) buffers: [Vec<u8>; 2],
+    pub(super) output: Vec<u8>,
 }
 
 /// What a call of [`Line::step`] has done.
@@ -106,31 +130,28 @@ pub(super) enum Progress {
 impl Line {
     pub(super) fn new(setup: Setup) -> Self {
         let mut random = SplitMix64(setup.seed);
-        let config = device::Config::default();
-        let node = |_| Node {
-            device: Device::new(config),
-            axis: Axis::new(setup.variant, setup.latency_ns),
-            counter: Counter {
-                ahead: random.unit() * 4e9,
-                at_ns: 0,
-                // Crystals of 50 ppm.
-                drift_ppb: (random.unit() - 0.5) * 100_000.0,
-            },
-            word: None,
-            in_exchange: false,
-            clock_error_ns: 0.0,
-            undetected: 0,
-            bad_stamps: 0,
-        };
-        let nodes: Vec<Node> = setup.cables_ns.iter().map(node).collect();
+        let config = setup.device();
+        let mut either = |most: f64| (random.unit() - 0.5) * 2.0 * most;
+        let mut nodes = Vec::new();
+        for _ in &setup.cables_ns {
+            let clock = Clock::new(2e9 + either(2e9), either(setup.crystal_ppm), either(setup.drift_ppm));
+            nodes.push(Node::new(config, setup.build, clock, setup.max_lag));
+        }
         let mut line = Self {
-            master: Master::new(Config::default()),
+            master: Master::new(setup.master()),
             noise: Noise::new(setup.bit_error_rate, setup.seed ^ 0x5eed),
+            random,
             plugged: 0,
             now_ns: 0,
             sent: [0; 4],
             first_cycle_ns: None,
+            collisions: 0,
+            overruns: 0,
+            gap_ns: f64::INFINITY,
             events: Vec::new(),
+            event_count: 0,
+            buffers: [Vec::new(), Vec::new()],
+            output: Vec::new(),
             nodes,
             setup,
         };
@@ -139,7 +160,7 @@ impl Line {
         line
     }
 
-    fn plug(&mut self, devices: usize) {
+    pub(super) fn plug(&mut self, devices: usize) {
         self.plugged = devices;
         for (k, node) in self.nodes.iter_mut().enumerate() {
             node.device.links(k < devices, k + 1 < devices);
@@ -149,12 +170,29 @@ impl Line {
         }
     }
 
-    fn cable(&self, k: usize) -> u64 {
+    pub(super) fn event(&mut self, text: String) {
+        self.event_count += 1;
+        if self.events.len() < EVENTS {
+            self.events.push(text);
+        }
+    }
+
+    pub(super) fn cable(&self, k: usize) -> f64 {
         self.setup.cables_ns.get(k).copied().unwrap_or_default().into()
     }
 
-    /// Goes on until something has been sent. `words`: gives what the axes are to do in the next cycle.
-    pub(super) fn step(&mut self, words: &mut dyn FnMut() -> [Pto; 4], record: &mut Recorder) -> Option<Progress> {
+    /// The same cable on the way to the master.
+    pub(super) fn cable_back(&self, k: usize) -> f64 {
+        self.cable(k) + self.setup.asymmetry_ns
+    }
+
+    /// Error of a capture.
+    pub(super) fn jitter(&mut self) -> f64 {
+        if self.setup.jitter_ns == 0.0 { 0.0 } else { (self.random.unit() - 0.5) * 2.0 * self.setup.jitter_ns }
+    }
+
+    /// Goes on until something has been sent; `None`: the master waits for ever.
+    pub(super) fn step(&mut self, host: &mut Host, record: &mut Recorder) -> Option<Progress> {
         loop {
             match self.master.poll(self.now_ns) {
                 Action::Wait { until_ns: u64::MAX } => return None,
@@ -163,14 +201,19 @@ impl Line {
                     self.start_up(frame, at_ns, record);
                     return Some(Progress::StartUp);
                 }
-                Action::Exchange { at_ns, time_stamp, cycle, .. } => {
+                Action::Exchange { at_ns, time_stamp, cycle, stop } => {
                     self.first_cycle_ns.get_or_insert(at_ns);
-                    self.cycle(at_ns, time_stamp, cycle, words(), record);
+                    host.plan(stop, &self.nodes);
+                    self.cycle(at_ns, time_stamp, cycle, host.words(), record);
+                    if stop && host.is_still() {
+                        self.master.halted();
+                    }
                     return Some(Progress::Cycle);
                 }
                 Action::Restart { error } => {
                     let cycles = self.master.counters().cycles;
-                    self.events.push(format!("cycle {cycles}: {error}; the master starts again"));
+                    self.event(format!("cycle {cycles}: {error}; the master starts again"));
+                    host.restarted();
                 }
             }
         }
@@ -178,7 +221,8 @@ impl Line {
 
     /// Time passes; devices that wait for a frame in vain give up.
     fn wait(&mut self, until_ns: u64) {
-        let cycles = until_ns.saturating_sub(self.now_ns) / 4000;
+        let cycle_ns = u64::from(self.setup.cycle_ns());
+        let cycles = until_ns.saturating_sub(self.now_ns) / cycle_ns;
         self.now_ns = until_ns;
         for node in &mut self.nodes {
             if node.device.state() != State::Exchange {
@@ -189,10 +233,7 @@ impl Line {
                     node.device.cycle_start();
                 }
             }
-            if node.in_exchange && node.device.state() != State::Exchange {
-                node.in_exchange = false;
-                node.axis.restart(self.setup.variant);
-            }
+            node.leave(cycle_ns);
         }
     }
 
@@ -210,15 +251,17 @@ impl Line {
         let len = frame.emit_into(&mut buffer).unwrap_or_default();
         let bytes = buffer.get(..len).unwrap_or_default();
         record.start_up(at_ns, frame.preamble(), bytes, false);
-        if let Some((answer, sof_ns)) = self.carry(bytes, at_ns) {
+        if let Some((answer, sof)) = self.carry(bytes, at_ns as f64) {
+            let sof_ns = sof as u64;
             record.start_up(sof_ns, frame.preamble(), &answer, true);
+            let captured_ns = (sof + self.jitter()).max(at_ns as f64) as u64;
             // What the master refuses, it counts.
-            let _: Result<_, _> = self.master.receive(&answer, sof_ns);
+            let _: Result<_, _> = self.master.receive(&answer, captured_ns);
         }
     }
 
     /// A start-up frame goes to the end of the line and comes back.
-    fn carry(&mut self, frame: &[u8], at_ns: u64) -> Option<(Vec<u8>, u64)> {
+    fn carry(&mut self, frame: &[u8], at_ns: f64) -> Option<(Vec<u8>, f64)> {
         let mut frame = frame.to_vec();
         let mut sof_ns = at_ns;
         for k in 0..self.plugged {
@@ -227,7 +270,7 @@ impl Line {
             let handled = self.pass(k, PortId::A, &mut frame, sof_ns)?;
             self.measure(k, handled.trigger, sof_ns);
             match handled.path {
-                Path::Forward => sof_ns += u64::from(TRANSIT_NS),
+                Path::Forward => sof_ns += f64::from(TRANSIT_NS),
                 Path::Absorb => return None,
                 Path::Reflect => {
                     sof_ns += MASTER_REFLECTION_NS;
@@ -238,144 +281,51 @@ impl Line {
         None
     }
 
-    fn carry_back(&mut self, from: usize, mut frame: Vec<u8>, mut sof_ns: u64) -> Option<(Vec<u8>, u64)> {
+    fn carry_back(&mut self, from: usize, mut frame: Vec<u8>, mut sof_ns: f64) -> Option<(Vec<u8>, f64)> {
         for k in (0..from).rev() {
-            sof_ns += self.cable(k + 1);
+            sof_ns += self.cable_back(k + 1);
             self.noise.pass(&mut frame);
             if self.pass(k, PortId::B, &mut frame, sof_ns)?.path != Path::Forward {
                 return None;
             }
-            sof_ns += u64::from(TRANSIT_NS);
+            sof_ns += f64::from(TRANSIT_NS);
         }
         self.noise.pass(&mut frame);
-        Some((frame, sof_ns + self.cable(0)))
+        Some((frame, sof_ns + self.cable_back(0)))
     }
 
-    fn pass(&mut self, k: usize, port: PortId, frame: &mut [u8], sof_ns: u64) -> Option<Handled> {
+    fn pass(&mut self, k: usize, port: PortId, frame: &mut [u8], sof_ns: f64) -> Option<Handled> {
+        let jitter = self.jitter();
         let node = self.nodes.get_mut(k)?;
         let captured = sof_ns + CAPTURE_NS;
         let arrival = Arrival {
-            sof_ns: node.counter.read(captured),
-            counter_ns: node.counter.read(captured + HANDLER_NS),
-            now_ns: sof_ns,
+            sof_ns: node.clock.read(captured + jitter),
+            counter_ns: node.clock.read(captured + HANDLER_NS),
+            now_ns: sof_ns as u64,
         };
         let handled = node.device.frame(port, frame, arrival);
-        node.counter.correct(handled.correction, captured + HANDLER_NS);
+        node.clock.correct(handled.correction, captured + HANDLER_NS);
         Some(handled)
     }
 
     /// Device k measures the line to the next one, which then does the same.
-    fn measure(&mut self, k: usize, trigger: Trigger, at_ns: u64) {
+    fn measure(&mut self, k: usize, trigger: Trigger, at_ns: f64) {
         let (Some(request), true) = (Device::delay_request(trigger), k + 1 < self.plugged) else { return };
         let mut frame = request.emit();
-        let cable = self.cable(k + 1);
+        let (out, back) = (self.cable(k + 1), self.cable_back(k + 1));
         self.noise.pass(&mut frame);
-        let Some(handled) = self.pass(k + 1, PortId::A, &mut frame, at_ns + cable) else { return };
+        let Some(handled) = self.pass(k + 1, PortId::A, &mut frame, at_ns + out) else { return };
         self.measure(k + 1, handled.trigger, at_ns);
         if handled.path != Path::Reflect {
             return;
         }
         self.noise.pass(&mut frame);
+        let jitter = self.jitter();
         if let Some(node) = self.nodes.get_mut(k) {
             // Both captures are on the 5 ns grid, so the measured time varies by a tick.
-            let sent = node.counter.read(at_ns);
-            let rtt = node.counter.read(at_ns + 2 * cable + DEVICE_REFLECTION_NS).wrapping_sub(sent);
+            let sent = node.clock.read(at_ns);
+            let rtt = node.clock.read(at_ns + out + back + DEVICE_REFLECTION_NS + jitter).wrapping_sub(sent);
             let _: Result<_, _> = node.device.delay_reflection(trigger, &frame, rtt);
         }
-    }
-
-    /// One cycle of the IO exchange.
-    fn cycle(&mut self, at_ns: u64, time_stamp: u16, cycle: u64, words: [Pto; 4], record: &mut Recorder) {
-        if let Some((device, _)) = self.setup.unplug.filter(|(_, when)| *when == cycle) {
-            self.events.push(format!("cycle {cycle}: the cable in front of device {device} is pulled"));
-            self.plug(device - 1);
-        }
-        self.now_ns = at_ns;
-        let begin_ns = at_ns - 500;
-        let mut frame = [0; 64 + MasterFrameView::OVERHEAD];
-        let mut output = [0; 64];
-        for (bytes, word) in output.chunks_exact_mut(4).zip(words) {
-            bytes.copy_from_slice(&Slice::from(word).emit());
-        }
-        let output = output.get(..usize::from(self.master.output_len())).unwrap_or_default();
-        let len = self.master.write_frame(output, time_stamp, &mut frame).unwrap_or_default();
-        let sent = frame;
-        let (sent, frame) = (sent.get(..len).unwrap_or_default(), frame.get_mut(..len).unwrap_or_default());
-        record.exchange(at_ns, sent, false);
-
-        let master_ns = begin_ns.wrapping_sub(self.master.epoch_ns());
-        let mut way_ns = 0;
-        for (k, (node, word)) in self.nodes.iter_mut().zip(words).enumerate() {
-            if word.start().is_some() {
-                node.axis.tally.asked += 1;
-            }
-            // The axis takes what the frame before has brought.
-            let before = node.word.take();
-            if node.device.state() == State::Exchange {
-                node.in_exchange = true;
-                record.axis(k, begin_ns, |seen| node.axis.run_cycle(before, seen));
-            }
-            if k >= self.plugged {
-                continue;
-            }
-            way_ns += u64::from(self.setup.cables_ns.get(k).copied().unwrap_or_default());
-            self.noise.pass(frame);
-            let sof_ns = at_ns + way_ns;
-            node.receive(frame, sent, sof_ns, master_ns, sof_ns.wrapping_sub(self.master.epoch_ns()));
-            way_ns += u64::from(TRANSIT_NS);
-        }
-        self.answers(at_ns, begin_ns, record);
-        for node in &mut self.nodes {
-            if node.device.state() == State::Exchange {
-                node.device.cycle_start();
-            } else if node.in_exchange {
-                node.in_exchange = false;
-                node.axis.restart(self.setup.variant);
-            }
-        }
-    }
-
-    /// The devices' frames travel back, each over the cables before it.
-    fn answers(&mut self, at_ns: u64, begin_ns: u64, record: &mut Recorder) {
-        let mut way_ns = 0;
-        for k in 0..self.plugged {
-            way_ns += self.cable(k) + if k > 0 { u64::from(TRANSIT_NS) } else { 0 };
-            let Some(node) = self.nodes.get_mut(k) else { return };
-            let (Some(answer), Some(send_ns)) = (node.device.answer([0; 3]), node.device.send_time_ns()) else {
-                continue;
-            };
-            let mut frame = [0; DeviceFrame::<3>::LEN];
-            if answer.emit_into(&mut frame).is_err() {
-                continue;
-            }
-            for _ in 0..=k {
-                self.noise.pass(&mut frame);
-            }
-            record.exchange(begin_ns.max(at_ns - 500) + u64::from(send_ns) + way_ns, &frame, true);
-            // What the master refuses, it counts.
-            let _: Result<_, Error> = self.master.device_frame(&frame).map(|_| ());
-        }
-    }
-}
-
-impl Node {
-    /// The master frame at this device. `cycle_ns`, `sof_master_ns`: the master's time at the start of the cycle and at
-    /// the start of the frame here.
-    fn receive(&mut self, frame: &[u8], sent: &[u8], sof_ns: u64, cycle_ns: u64, sof_master_ns: u64) {
-        let counter = self.counter.read(sof_ns);
-        let in_cycle = counter.wrapping_sub(cycle_ns as u32);
-        let Ok(output) = self.device.exchange(frame, in_cycle, in_cycle) else { return };
-        self.word = output.data.first_chunk().map(|bytes| Slice::parse(*bytes).pto);
-        self.counter.correct(output.correction, sof_ns);
-        if frame != sent {
-            let stamp = frame.len().saturating_sub(2);
-            if frame.get(..stamp) == sent.get(..stamp) {
-                self.bad_stamps += 1;
-            } else {
-                self.undetected += 1;
-            }
-        }
-        let error = f64::from(counter.wrapping_sub(sof_master_ns as u32) as i32);
-        self.clock_error_ns = self.clock_error_ns.max(error.abs());
     }
 }

@@ -1,7 +1,10 @@
-//! What the axes are to do: turns there and back, or the tune.
+//! What the axes are to do: a source of words, one for each axis in each cycle.
+//!
+//! A new kind of program is a variant of [`Program`] with its arm in [`Program::next`] and [`Program::is_over`]; nothing else
+//! in the machine knows what a program is.
 
 use sorte_proto::{Direction, Pto};
-use step_profile::{Command, Dance, Group, Motors, MoveState, Note, Parameters, Profile, Tone};
+use step_profile::{Axis, Command, Dance, Group, Motors, MoveState, Note, Parameters, Profile, Tone};
 
 /// The tune of `--dance`: up and down the tones of Table 3, this project's own.
 const SONG: [Note; 16] = [
@@ -25,14 +28,11 @@ const SONG: [Note; 16] = [
 
 /// One cycle after the other.
 pub(super) enum Program {
-    /// Moves of the same length, each in the other direction.
-    Turns {
-        group: Group<'static>,
-        profiles: Vec<Profile<'static>>,
-        steps: u32,
-        done: u64,
-        moves: u64,
-    },
+    /// All axes together: moves of the same length, each in the other direction.
+    Turns { group: Group<'static>, profiles: Vec<Profile<'static>>, steps: u32, done: u64, moves: u64 },
+    /// Each axis its own move at its own speed.
+    Independent { axes: Vec<(Axis<'static>, Profile<'static>, u32)>, done: u64, moves: u64 },
+    /// The tune.
     Dance(Box<Dance<'static>>),
 }
 
@@ -42,13 +42,21 @@ impl Program {
         Self::Turns { group: Group::new(motors), profiles, steps, done: 0, moves }
     }
 
+    /// Axis k of n makes `steps * (n - k) / n` steps, with the speeds in turn.
+    pub(super) fn independent(axes: usize, profiles: &[Profile<'static>], steps: u32, moves: u64) -> Self {
+        let length = |k: usize| (u64::from(steps) * (axes - k) as u64 / axes as u64).max(1) as u32;
+        let axes =
+            (0..axes).zip(profiles.iter().cycle()).map(|(k, profile)| (Axis::new(), *profile, length(k))).collect();
+        Self::Independent { axes, done: 0, moves }
+    }
+
     pub(super) fn dance(motors: Motors, parameters: Parameters<'static>) -> Result<Self, step_profile::Error> {
         let direction = step_profile::Direction::Forward;
         Dance::new(motors, parameters, direction, &SONG).map(|dance| Self::Dance(Box::new(dance)))
     }
 
-    /// The words of the next cycle.
-    pub(super) fn next(&mut self) -> [Pto; 4] {
+    /// The words of the next cycle. Programs of four motors repeat them for the axes after the fourth.
+    pub(super) fn next(&mut self, words: &mut [Pto]) {
         let commands = match self {
             Self::Dance(dance) => dance.tick(),
             Self::Turns { group, profiles, steps, done, moves } => {
@@ -63,14 +71,33 @@ impl Program {
                 }
                 group.tick()
             }
+            Self::Independent { axes, done, moves } => {
+                if axes.iter().all(|(axis, ..)| axis.state() == MoveState::Idle) && done < moves {
+                    let direction = step_profile::Direction::from_dir(*done % 2 == 1);
+                    for (axis, profile, steps) in axes.iter_mut() {
+                        // The axis is idle, so the move begins.
+                        let _: Result<_, _> = axis.start(*profile, *steps, direction);
+                    }
+                    *done += 1;
+                }
+                for (to, (axis, ..)) in words.iter_mut().zip(axes) {
+                    *to = word(axis.tick());
+                }
+                return;
+            }
         };
-        commands.map(word)
+        for (to, command) in words.iter_mut().zip(commands.into_iter().cycle()) {
+            *to = word(command);
+        }
     }
 
     pub(super) fn is_over(&self) -> bool {
         match self {
             Self::Dance(dance) => dance.is_over(),
             Self::Turns { group, done, moves, .. } => done >= moves && group.state() == MoveState::Idle,
+            Self::Independent { axes, done, moves } => {
+                done >= moves && axes.iter().all(|(axis, ..)| axis.state() == MoveState::Idle)
+            }
         }
     }
 }

@@ -20,6 +20,9 @@ const BYTE_NS: u64 = 80;
 /// Preamble of the frames of the IO exchange.
 const SHORT: usize = Preamble::Short.bytes().len();
 
+/// Nothing is seen later than so long after it happened: the clocks of the devices differ.
+const SETTLED_NS: u64 = 20_000;
+
 /// Interface of the start-up frames, which are Ethernet frames; and of the others.
 const ETHERNET: u32 = 0;
 const EXCHANGE: u32 = 1;
@@ -79,7 +82,7 @@ impl Recorder {
     fn frame(&mut self, at_ns: u64, preamble: usize, frame: &[u8], answer: bool, name: &'static str, interface: u32) {
         let wire_ns = (preamble + frame.len()) as u64 * BYTE_NS;
         if let Some(trace) = &mut self.vcd {
-            let result = if answer { Ok(()) } else { trace.flush(at_ns.saturating_sub(500)) };
+            let result = if answer { Ok(()) } else { trace.flush(at_ns.saturating_sub(SETTLED_NS)) };
             trace.frame(at_ns, wire_ns, answer, name);
             self.keep(result);
         }
@@ -96,12 +99,12 @@ impl Recorder {
         }
     }
 
-    /// A cycle of an axis that begins at `begin_ns`.
-    pub(super) fn axis(&mut self, device: usize, begin_ns: u64, run: impl FnOnce(Option<&mut Vec<(u64, Seen)>>)) {
+    /// A cycle of an axis.
+    pub(super) fn axis(&mut self, device: usize, run: impl FnOnce(Option<&mut Vec<(u64, Seen)>>)) {
         let Some(trace) = self.vcd.as_mut().filter(|_| self.cycles > 0) else { return run(None) };
         let mut seen = Vec::new();
         run(Some(&mut seen));
-        trace.axis(device, begin_ns, &seen);
+        trace.axis(device, &seen);
     }
 
     /// Everything is written.
@@ -135,7 +138,7 @@ fn open(path: &Path) -> io::Result<PcapNgWriter<BufWriter<File>>> {
     let exchange = interface(
         DataLink::USER0,
         "sorte-io",
-        "SORTE IO exchange: SA, STATUS, data, CRC-8; SA 0 is the master, with a time stamp behind the CRC-8",
+        "SORTE IO exchange: SA, STATUS, data, CRC-8; SA 0 is the master, with a time stamp after the CRC-8",
         None,
     );
     for block in [start_up, exchange] {
@@ -211,7 +214,7 @@ impl Trace {
         }
     }
 
-    fn axis(&mut self, device: usize, begin_ns: u64, seen: &[(u64, Seen)]) {
+    fn axis(&mut self, device: usize, seen: &[(u64, Seen)]) {
         let Some(signals) = self.devices.get(device) else { return };
         self.waiting.extend(seen.iter().map(|(ns, change)| {
             let level = match *change {
@@ -220,7 +223,7 @@ impl Trace {
                 Seen::Enable(on) => Level::Wire(signals.enable, on),
                 Seen::Position(position) => Level::Number(signals.position, position),
             };
-            (begin_ns + ns, level)
+            (*ns, level)
         }));
     }
 

@@ -2,20 +2,26 @@
 
 use std::io::{self, Write};
 
-use sorte_proto::timing::{CNC_CYCLE_NS, Limit, Timing};
+use sorte_proto::master::State;
+use sorte_proto::timing::Limit;
 
+use super::host::Host;
 use super::line::Line;
 
-/// The start-up: what was sent, what was found, and whether a cycle of 4 us is long enough.
-pub(super) fn start_up(out: &mut dyn Write, line: &Line, cables_ns: &[u16]) -> io::Result<()> {
+/// Axes that are listed one by one.
+const LISTED: usize = 16;
+
+/// The start-up: what was sent, what was found, and whether the cycle is long enough.
+pub(super) fn start_up(out: &mut dyn Write, line: &Line) -> io::Result<()> {
     let [discovery, param, delay, sync] = line.sent;
     let ready = line.first_cycle_ns.map_or(0.0, |ns| ns as f64 / 1e6);
     writeln!(
         out,
         "start-up    DISCOVERY {discovery}, PARAM {param}, DELAY_REQ {delay}, SYNC {sync}; first cycle after {ready:.2} ms"
     )?;
+    let cables_ns = &line.setup.cables_ns;
     let measured = line.master.line_delay().checked();
-    for (k, node) in line.nodes.iter().enumerate() {
+    for (k, node) in line.nodes.iter().enumerate().take(LISTED) {
         let Some(place) = node.device.assignment() else {
             writeln!(out, "  device {}  not found", k + 1)?;
             continue;
@@ -28,16 +34,18 @@ pub(super) fn start_up(out: &mut dyn Write, line: &Line, cables_ns: &[u16]) -> i
         let measured = before.map_or_else(|error| error.to_string(), |ns| format!("{ns} ns"));
         writeln!(
             out,
-            "  device {}  address {}, output bytes {}..{}, cable {cable} ns, measured {measured}",
+            "  device {}  address {}, output bytes {}..{}, cable {cable} ns, measured {measured}, sends at {} ns",
             k + 1,
-            place.address.get(),
+            place.address,
             place.out_offset,
             place.out_offset + 4,
+            node.device.send_time_ns().unwrap_or_default(),
         )?;
     }
-    let devices = line.master.network().devices();
-    let timing = Timing { line_delays_ns: cables_ns, devices, output_len: line.master.output_len(), payload_len: 3 };
-    let budget = timing.budget();
+    if line.nodes.len() > LISTED {
+        writeln!(out, "  and {} more", line.nodes.len() - LISTED)?;
+    }
+    let budget = line.setup.timing().budget();
     let limit = match budget.limit() {
         Limit::MasterFrame => "the master frame's way out",
         Limit::DeviceFrames => "the device frames' way back",
@@ -47,52 +55,70 @@ pub(super) fn start_up(out: &mut dyn Write, line: &Line, cables_ns: &[u16]) -> i
         "timing      master frame {} bytes, at the last device after {} ns; last device frame at the master after {} ns",
         budget.master_frame_bytes, budget.master_frame_at_last_ns, budget.device_frames_at_master_ns
     )?;
-    let fits = if budget.fits(CNC_CYCLE_NS) { "fits" } else { "does not fit" };
-    writeln!(
-        out,
-        "            shortest cycle {} ns, limited by {limit}: {fits} {CNC_CYCLE_NS} ns",
-        budget.min_cycle_ns()
-    )
+    let cycle_ns = line.setup.cycle_ns();
+    let fits = if budget.fits(cycle_ns) { "fits" } else { "does not fit" };
+    writeln!(out, "            shortest cycle {} ns, limited by {limit}: {fits} {cycle_ns} ns", budget.min_cycle_ns())?;
+    if line.setup.is_long() {
+        writeln!(out, "            the line is longer than the delay field of SYNC: with this project's extension")?;
+    }
+    Ok(())
 }
 
 /// The run: steps, clocks, errors.
 pub(super) fn end(out: &mut dyn Write, line: &Line) -> io::Result<()> {
     let counters = line.master.counters();
-    writeln!(out, "exchange    {} cycles, {:.3} s of machine time", counters.cycles, counters.cycles as f64 * 4e-6)?;
-    writeln!(out, "  axis       asked     carried     on time      late      lost    position  clock error")?;
+    let seconds = counters.cycles as f64 * f64::from(line.setup.cycle_ns()) * 1e-9;
+    writeln!(out, "exchange    {} cycles, {seconds:.3} s of machine time", counters.cycles)?;
+    writeln!(
+        out,
+        "  axis       asked        made     on time      late      lost  caught up    position  clock error  pulse error"
+    )?;
     for (k, node) in line.nodes.iter().enumerate() {
         let t = node.axis.tally;
+        let troubled = t.late > 0 || t.lost > 0 || node.axis.position != node.asked.position();
+        if k >= LISTED && !troubled && k + 1 < line.nodes.len() {
+            continue;
+        }
         writeln!(
             out,
-            "  {:4}  {:10}  {:10}  {:10}  {:8}  {:8}  {:10}  {:8.0} ns",
+            "  {:4}  {:10}  {:10}  {:10}  {:8}  {:8}  {:9}  {:10}  {:8.0} ns  {:8.0} ns",
             k + 1,
             t.asked,
-            t.carried,
+            t.on_time + t.late,
             t.on_time,
             t.late,
             t.lost,
+            t.caught_up,
             node.axis.position,
-            node.clock_error_ns
+            node.clock_error_ns,
+            t.worst_ns,
         )?;
     }
-    let (asked, bad) = line.nodes.iter().fold((0, 0), |(asked, bad), node| {
-        (asked + node.axis.tally.carried, bad + node.axis.tally.late + node.axis.tally.lost)
-    });
+    let sum = |of: fn(&super::node::Node) -> u64| line.nodes.iter().map(of).sum::<u64>();
+    let (ordered, bad) = (sum(|n| n.axis.tally.ordered), sum(|n| n.axis.tally.late + n.axis.tally.lost));
     if bad > 0 {
         writeln!(
             out,
-            "            {:.2} % of the steps carried were late or lost",
-            100.0 * bad as f64 / asked.max(1) as f64
+            "            {:.2} % of the steps were late or lost",
+            100.0 * bad as f64 / ordered.max(1) as f64
         )?;
     }
-    let refused: u64 = line.nodes.iter().map(|node| node.device.counters().crc_errors).sum();
-    let stamps: u64 = line.nodes.iter().map(|node| node.bad_stamps).sum();
-    let undetected: u64 = line.nodes.iter().map(|node| node.undetected).sum();
     writeln!(
         out,
-        "errors      {} bits flipped; devices refused {refused} frames, the master {}; {} cycles with a frame missing",
-        line.noise.flips, counters.crc_errors, counters.timing_errors
+        "errors      {} bits flipped; devices refused {} frames, the master {}; {} cycles with a frame missing",
+        line.noise.flips,
+        sum(|n| n.device.counters().crc_errors),
+        counters.crc_errors,
+        counters.timing_errors
     )?;
+    if line.gap_ns.is_finite() {
+        writeln!(
+            out,
+            "            device frames at the master: {} collisions, {} after their cycle, smallest gap {:.0} ns",
+            line.collisions, line.overruns, line.gap_ns
+        )?;
+    }
+    let (stamps, undetected) = (sum(|n| n.bad_stamps), sum(|n| n.undetected));
     if stamps > 0 {
         writeln!(
             out,
@@ -108,5 +134,53 @@ pub(super) fn end(out: &mut dyn Write, line: &Line) -> io::Result<()> {
     for event in &line.events {
         writeln!(out, "event       {event}")?;
     }
+    let more = line.event_count - line.events.len() as u64;
+    if more > 0 {
+        writeln!(out, "event       and {more} more")?;
+    }
     Ok(())
+}
+
+/// What was not as it should be, the gravest first; `None` if every step was made at its time.
+pub(super) fn verdict(line: &Line, host: &Host) -> Option<String> {
+    if line.master.state() == State::Error || line.first_cycle_ns.is_none() {
+        let last = line.events.last().map_or("no device answers", String::as_str);
+        return Some(format!("the machine did not run: {last}"));
+    }
+    if let Some(why) = &host.ended {
+        return Some(format!("the motion was stopped: {why}"));
+    }
+    if !host.is_done() {
+        let last = line.events.last().map_or("the master waits for ever", String::as_str);
+        return Some(format!("the motion was not finished: {last}"));
+    }
+    for (k, node) in line.nodes.iter().enumerate() {
+        let (axis, t, asked) = (k + 1, node.axis.tally, node.asked.position());
+        if t.asked > 0 && t.on_time + t.late == 0 {
+            return Some(format!("axis {axis} never moved, of {} steps asked", t.asked));
+        }
+        if node.axis.position != asked {
+            return Some(format!("axis {axis} was asked to {asked} and is at {}", node.axis.position));
+        }
+        if t.late + t.lost > 0 {
+            return Some(format!(
+                "axis {axis}: {} steps late, {} lost, {:.0} ns off at worst",
+                t.late, t.lost, t.worst_ns
+            ));
+        }
+        if t.dir_faults > 0 {
+            return Some(format!("axis {axis}: DIR changed within 200 ns of a step {} times", t.dir_faults));
+        }
+        if t.step_faults > 0 {
+            return Some(format!("axis {axis}: {} pulses too short or too close for the driver", t.step_faults));
+        }
+        if node.axis.under_way() > 0 {
+            return Some(format!("axis {axis}: {} steps are still to come", node.axis.under_way()));
+        }
+    }
+    if line.collisions + line.overruns > 0 {
+        let (collisions, overruns) = (line.collisions, line.overruns);
+        return Some(format!("{collisions} device frames collided, {overruns} came after their cycle"));
+    }
+    None
 }

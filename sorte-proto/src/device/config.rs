@@ -1,6 +1,7 @@
 //! Settings and counters of a device.
 
 use crate::builders::builders;
+use crate::clock::AVERAGE;
 use crate::discovery::Entry;
 use crate::line_delay::DelayModel;
 
@@ -22,6 +23,8 @@ pub struct Config {
     pub slot_ns: Option<u32>,
     /// How the line to the next device is measured.
     pub delay_model: DelayModel,
+    /// Frames that a correction of the clock is made from, see [`Clock::averaging`](crate::Clock::averaging).
+    pub clock_average: u8,
     /// Cycle starts without a frame that a device in IO exchange bears.
     pub missed_frames: u8,
     /// How long a start-up state waits for its frame, in ns.
@@ -37,6 +40,7 @@ impl Config {
             send_time_ns: None,
             slot_ns: None,
             delay_model: DelayModel::DEVICE,
+            clock_average: AVERAGE,
             missed_frames: 5,
             start_up_timeout_ns: 20_000_000,
         }
@@ -47,6 +51,7 @@ impl Config {
         with_send_time_ns send_time_ns: Option<u32>,
         with_slot_ns slot_ns: Option<u32>,
         with_delay_model delay_model: DelayModel,
+        with_clock_average clock_average: u8,
         with_missed_frames missed_frames: u8,
         with_start_up_timeout_ns start_up_timeout_ns: u64,
     }

@@ -32,9 +32,11 @@ pub(super) struct Stepper {
     a: Wide,
     /// A sixth of the jerk.
     j6: i64,
-    /// Last interval and its last change.
+    /// Last interval and its last change, to about a moment; only to guess the next one.
     last: u32,
     change: i32,
+    /// Moments from the last half tick to the last step, for that.
+    late: u32,
     /// Moments in half a tick.
     grid: u32,
     /// Steps left in this phase.
@@ -83,6 +85,7 @@ impl Stepper {
             j6: 0,
             last: 0,
             change: 0,
+            late: 0,
             grid,
             left: 0,
             count: 0,
@@ -156,7 +159,7 @@ impl Stepper {
                 self.mode = if j6 == 0 { Mode::Slope } else { Mode::Bend };
                 self.end = end;
                 let guess = self.first_guess() & self.mask();
-                self.last = guess;
+                (self.last, self.late) = (guess, 0);
                 self.newton(guess);
                 self.change = 0;
             }
@@ -199,7 +202,8 @@ impl Stepper {
     /// The interval changes about as it did before.
     #[inline]
     fn guess(&self) -> u32 {
-        (self.last.saturating_add_signed(self.change).max(self.last >> 1)) & self.mask()
+        let interval = self.last.saturating_add_signed(self.change).max(self.last >> 1);
+        interval.saturating_add(self.late) & self.mask()
     }
 
     /// The next step at constant acceleration.
@@ -241,8 +245,11 @@ impl Stepper {
         if self.mode == Mode::Bend {
             self.a = self.grown(ahead.da6, 6);
         }
-        self.change = time.wrapping_sub(self.last) as i32;
-        self.last = time;
+        // rest / v, with the last interval for 1 / v.
+        let late = (u64::from((rest >> WIDEN) as u32).wrapping_mul(time.into()) >> 32) as u32;
+        let interval = time.wrapping_add(late).wrapping_sub(self.late);
+        self.change = interval.wrapping_sub(self.last) as i32;
+        (self.last, self.late) = (interval, late);
     }
 
     /// Newton's steps from a guess.

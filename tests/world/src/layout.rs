@@ -62,11 +62,13 @@ impl Layout {
         self.placed.iter().rev().find(|place| place.0 <= at).map_or(0, |place| place.2)
     }
 
-    /// Begin of the first unit that left and end of the last.
-    pub(crate) fn ends(&self) -> (usize, usize) {
+    /// Begin of the first unit that left, end of the last, and the same for its first copy if it was repeated.
+    pub(crate) fn ends(&self) -> (usize, usize, usize) {
         let mut left = self.placed.iter().filter(|place| place.3);
         let first = left.next().map_or(0, |place| place.0);
-        let last = self.placed.iter().rev().find(|place| place.3).map_or(first, |place| place.0 + place.1);
-        (first, last)
+        let last = self.placed.iter().rev().find(|place| place.3);
+        let end = |place: &(usize, usize, usize, bool)| place.0 + place.1;
+        let copy = last.and_then(|last| self.placed.iter().find(|place| place.2 == last.2));
+        (first, last.map_or(first, end), copy.map_or(first, end))
     }
 }

@@ -49,6 +49,9 @@ pub struct Transmission {
     pub start_ns: u64,
     /// The end of its last bit.
     pub end_ns: u64,
+    /// The end of its last bit, copies by [`Fault::Repeat`](crate::Fault::Repeat) not counted: from here on a device may
+    /// answer.
+    pub sent_ns: u64,
     /// How many units the speaker meant to send.
     pub units: usize,
     /// How many units of it the host was given.
@@ -147,7 +150,7 @@ impl Truth {
 
     /// Law 1: what the value `tag`, given as the answer to `request`, is worth.
     pub fn verdict(&self, request: Id, tag: u64) -> Verdict {
-        let sent_ns = self.transmission(request).map_or(u64::MAX, |request| request.end_ns);
+        let sent_ns = self.transmission(request).map_or(u64::MAX, |request| request.sent_ns);
         let mut verdict = Verdict::Unknown;
         for carrier in self.log.iter().filter(|t| t.tag == Some(tag) && t.speaker != Speaker::Host) {
             let of = carrier.id;

@@ -225,6 +225,7 @@ impl World {
             asked_ns,
             start_ns: times.0,
             end_ns: times.1,
+            sent_ns: times.2,
             units: message.units.len(),
             delivered: 0,
             delivered_ns: 0,
@@ -273,7 +274,7 @@ impl World {
         faults: &[(usize, Fault)],
         origin: Origin,
         begin_ns: u64,
-    ) -> (u64, u64) {
+    ) -> (u64, u64, u64) {
         let ns = |bits: usize| begin_ns + (bits as u64 * self.wire.bit_ps).div_ceil(1000);
         let swap = faults.iter().any(|(_, fault)| *fault == Fault::EchoSwap);
         let receivers = u16::from(self.wire.devices) + 1;
@@ -306,7 +307,7 @@ impl World {
             flights.push(flying);
         }
         let times = layout.ends();
-        let times = (ns(times.0), ns(times.1));
+        let times = (ns(times.0), ns(times.1), ns(times.2));
         for flying in flights {
             self.take_off(flying);
         }

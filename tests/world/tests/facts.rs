@@ -123,6 +123,17 @@ fn a_late_answer_is_old_or_forged_but_never_fresh() {
     }
 }
 
+/// A device that answers the first copy of a request is not early.
+#[test]
+fn a_repeated_request_may_be_answered_once() {
+    let mut world = World::new(UART, planned(&[(0, 0, Fault::Repeat)]));
+    let request = world.send(&Message::bytes(&[0x55]), 0);
+    world.answer(0, request, &Message::bytes(&[1]).tagged(7), 7_000);
+    let sent = world.truth().transmission(request).unwrap();
+    assert_eq!((sent.sent_ns, sent.end_ns), (4_000, 8_000));
+    assert_eq!(world.truth().verdict(request, 7), Verdict::Fresh);
+}
+
 #[test]
 fn collisions_hurt_the_first_and_swallow_the_second() {
     let mut world = World::new(UART, Scenario::quiet());
@@ -283,7 +294,7 @@ fn holds(scenario: &Scenario) -> Tally {
     let heard = events.iter().filter(|(_, e)| matches!(e, Event::Heard { .. })).count();
     assert_eq!(tally.heard, heard as u64);
     for t in world.truth().transmissions() {
-        assert!(t.asked_ns <= t.start_ns && t.start_ns <= t.end_ns);
+        assert!(t.asked_ns <= t.start_ns && t.start_ns <= t.sent_ns && t.sent_ns <= t.end_ns);
         assert!(!t.intact || (t.delivered == t.units && t.delivered_ns >= t.end_ns), "{t:?}");
     }
     assert_eq!((events, tally), {

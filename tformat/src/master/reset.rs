@@ -93,7 +93,8 @@ impl Reset {
         if self.answered < Self::REQUESTS {
             return self.send(spaced_ns);
         }
-        self.taken = 0;
+        // An encoder that had started its count again in between still counts.
+        self.taken = Self::REQUESTS.saturating_sub(1);
         Step::Done { value, ready_ns: ready_ns.saturating_add(self.wait_ns()) }
     }
 
@@ -241,6 +242,21 @@ mod tests {
         }
         let tenth = reset.receive(LOST, 0);
         assert!(matches!(tenth, Step::Failed { error: Error::EffectUnknown { .. }, .. }), "{tenth:?}");
+    }
+
+    /// Ten responses do not prove the effect: noise may have made the encoder start its count again.
+    #[test]
+    fn after_ten_responses_an_encoder_may_still_count() {
+        let mut reset = Reset::clear_turns_and_lose_multi_turn_reference();
+        let _ = reset.start(0);
+        for _ in 0..9 {
+            let _ = reset.receive(Ok(Response::ResetTurnsAndErrors(SINGLE)), 0);
+        }
+        let tenth = reset.receive(Ok(Response::ResetTurnsAndErrors(SINGLE)), 0);
+        assert!(matches!(tenth, Step::Done { .. }));
+        let _ = reset.start(0);
+        let first = reset.receive(LOST, 0);
+        assert!(matches!(first, Step::Failed { error: Error::EffectUnknown { .. }, .. }), "{first:?}");
     }
 
     /// A refusal is no evidence: it may answer noise on the line, and the tenth request was taken all the same.

@@ -194,8 +194,9 @@ impl Bench {
             Err(error) => {
                 self.seen.failed += 1;
                 let cf = request.data_id().control_field().get().into();
-                let owed =
-                    truth.undisturbed(id) && within && truth.intact_answers(id).any(|t| self.is_owed(cf, &sent, t));
+                let foreign = truth.handed_since(id).any(|handed| handed.origin.speaker == Speaker::Foreign);
+                let disturbed = foreign || !truth.undisturbed(id);
+                let owed = !disturbed && within && truth.intact_answers(id).any(|t| self.is_owed(cf, &sent, t));
                 // A refusal was received whole, too.
                 assert!(
                     !owed || matches!(error, Error::Rejected { .. }),

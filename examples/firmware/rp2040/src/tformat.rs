@@ -4,7 +4,7 @@ use core::fmt::Write;
 
 use tformat::device::Device;
 use tformat::master::{Line, Progress, Transaction};
-use tformat::{BitRate, Request, Response, U24};
+use tformat::{Abm, Abs, BitRate, Request, Response};
 
 use crate::board::Board;
 use crate::port::{Prepared, RingReceiver, Unit};
@@ -36,13 +36,13 @@ pub fn master(rate: BitRate) -> ! {
         transmitter.send(&message);
         let (end, ready_ns) = loop {
             let progress = match receiver.take() {
-                Some(Unit { content, framed: true }) => transaction.byte(content as u8, clock.now_ns()),
+                Some(Unit { content, framed: true }) => transaction.bytes(&[content as u8], clock.now_ns()),
                 Some(_) => transaction.framing_error(clock.now_ns()),
                 None => transaction.poll(clock.now_ns()),
             };
             match progress {
                 Progress::Pending { .. } => {}
-                Progress::Done { value, ready_ns } => break (Ok(value), ready_ns),
+                Progress::Done { value, ready_ns } => break (Ok(value.response), ready_ns),
                 Progress::Failed { error, ready_ns } => break (Err(error), ready_ns),
             }
         };
@@ -118,7 +118,7 @@ fn control_field(request: Request) -> u8 {
 /// The shaft moves, and the answer to `request` is made.
 fn prepare(device: &mut Device<6>, request: Request, position: &mut u32, wait_cycles: u32) -> (u8, Prepared) {
     *position += 1;
-    device.set_position(U24::truncate(*position), U24::truncate(7));
+    device.set_position(Abs::truncate(*position), Abm::truncate(7));
     let answer = device.answer(request, 0).emit().line();
     (control_field(request), Prepared::new(answer.bits(), answer.len(), wait_cycles))
 }

@@ -4,7 +4,7 @@ use nikon_aformat::bus::{Addresses, Bus};
 use nikon_aformat::device::{Device, Transmission};
 use nikon_aformat::inspect::{Report, inspect};
 use nikon_aformat::master::{
-    BusTransaction, Counters, Cycle, Detected, Detection, EepromRead, ErrorRate, Line, Progress, Reset, Step,
+    BusTransaction, Counters, Cycle, Detected, Detection, EepromRead, ErrorRate, Line, Progress, Reading, Reset, Step,
     Transaction, Write,
 };
 use nikon_aformat::reception::LineReceiver;
@@ -44,7 +44,7 @@ fn answer(request: Request) -> Option<Transmission> {
 kernels! {
     /// A reply from packed samples, one a bit, on a bus.
     fn nikon_receive(row: &Flip) -> Option<Result<RawResponse, Error>> {
-        let mut receiver = LineReceiver::bits(row.expected.layout()).on_bus();
+        let mut receiver = LineReceiver::bits(row.expected.layout());
         let bits = row.line.bits();
         let mut low = Samples::new(bits as u64);
         let mut high = Samples::partial((bits >> 64) as u64 | u64::MAX << (row.line.len() - 64), 64);
@@ -52,7 +52,7 @@ kernels! {
     } over LONG;
 
     /// A transaction from its start to the last frame of the reply, or to its time-out.
-    fn nikon_transaction(row: &Whole) -> Progress<Response> {
+    fn nikon_transaction(row: &Whole) -> Progress<Reading> {
         let mut transaction = Transaction::start(REQUESTS[0], Resolution::default(), LINE, 0);
         let mut now_ns = 3_000;
         let line = Window::read(&row.lsb_first, 0, 72, nikon_aformat::BitOrder::LsbFirst).unwrap_or(Window::EMPTY);
@@ -73,8 +73,7 @@ kernels! {
             now_ns += 1_125;
             let _ = transaction.frame(content, now_ns);
         }
-        transaction.framing_error(now_ns + 5_000);
-        transaction.poll(10_000_000);
+        let _ = (transaction.framing_error(now_ns + 5_000), transaction.poll(10_000_000));
         let bus: &Bus = transaction.bus();
         (bus.arrived(), bus.missing().without(bus.extra()))
     } over WHOLE;
@@ -102,7 +101,7 @@ kernels! {
 
     /// A start of a cycle.
     fn nikon_cycle(now_ns: &u64) -> Option<(bool, u64)> {
-        let min_ns = LINE.min_cycle_ns(REQUESTS[3], &REQUESTS[3].expected(Resolution::default()), 8);
+        let min_ns = LINE.min_cycle_ns(REQUESTS[3], &REQUESTS[3].expected(Resolution::default()));
         let mut cycle = Cycle::new(1_000_000, min_ns, 0).ok()?;
         Some((cycle.is_due(*now_ns), cycle.next_ns()))
     } over [0_u64, 3_500_000];

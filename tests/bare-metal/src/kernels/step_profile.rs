@@ -209,13 +209,13 @@ kernels! {
     } over [TRAPEZOID];
 
     /// An S-curve is planned: seven phases, four phases.
-    fn step_profile_motion_plan_s(move_: &Limited) -> Option<u64> {
-        Some(planned(move_)?.duration())
+    fn step_profile_motion_plan_s(move_: &Limited) -> Option<u32> {
+        Some(planned(move_)?.steps())
     } over [S_CURVE, S_SHORT];
 
     /// An S-curve with entry and exit speed, whose peak has no closed form.
-    fn step_profile_motion_plan_s_entry(move_: &Limited) -> Option<u64> {
-        Some(planned(move_)?.duration())
+    fn step_profile_motion_plan_s_entry(move_: &Limited) -> Option<State> {
+        Some(planned(move_)?.at(0))
     } over [S_ENTRY];
 
     /// A trapezoid planned, and its 500 steps, all of them on the ramps.
@@ -225,12 +225,12 @@ kernels! {
 
     /// An S-curve planned, and its 500 steps, all of them on the ramps.
     fn step_profile_motion_s_ramp_500(move_: &Limited) -> Option<u64> {
-        Some(planned(move_)?.pulses().fold(0, |sum, tick| sum ^ tick))
+        Some(planned(move_)?.pulses().fold(1, |sum, tick| sum ^ tick))
     } over [S_CURVE];
 
     /// 5000 steps at constant speed, and their plan.
     fn step_profile_motion_cruise_5000(move_: &Limited) -> Option<u64> {
-        Some(planned(move_)?.pulses().fold(0, |sum, tick| sum ^ tick))
+        Some(planned(move_)?.pulses().fold(2, |sum, tick| sum ^ tick))
     } over [CRUISE];
 
     /// An axis that is told another target after 200 of 1000 steps, and held, and sent on.

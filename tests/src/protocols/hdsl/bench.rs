@@ -40,7 +40,8 @@ impl Bench {
 
     /// A short message as an application starts it.
     pub(super) fn short(&mut self, request: ShortRequest) -> Result<(), Fault> {
-        let index = request.register().address() & 0x3f;
+        // Bit 6 is not looked at; without it a write to 7Fh would be the idle mark.
+        let index = request.register().address();
         match request {
             ShortRequest::Read(_) => self.write(Register::SlaveRegCtrl as u8, 0x80 | index),
             ShortRequest::Write(_, value) => {

@@ -82,7 +82,7 @@ pub(super) fn line(_: &str, row: BusRow) -> Verdict {
     )?;
     let expected = Expected::new(layout, command);
     let mut bus = Bus::new(expected, Addresses::first(row.expected_encoders));
-    let mut receiver = LineReceiver::bits(layout).on_bus();
+    let mut receiver = LineReceiver::bits(layout);
     let mut slots = Vec::new();
     for bit in row.line.0 {
         if let Some(reply) = receiver.push(bit) {

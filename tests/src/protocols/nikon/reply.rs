@@ -372,7 +372,8 @@ pub(super) struct OversampledRow {
 pub(super) fn oversampled(_: &str, row: OversampledRow) -> Verdict {
     let layout = layout(&row.layout)?;
     same("frames", &row.frames, &layout.frames())?;
-    let mut receiver = or_unreadable(LineReceiver::oversampled(row.oversampling, layout))?;
+    let mut receiver =
+        or_unreadable(LineReceiver::oversampled(row.oversampling, layout))?.allowing_idle_between_frames();
     let reply = received(&mut receiver, &row.samples_packed_msb_first, row.samples)?;
     same("wire", &text(window(&row.expect_wire.0)?), &text(reply.line()))?;
     sound(reply, &row.expect_words, layout, row.cmd)
@@ -395,7 +396,11 @@ pub(super) fn unaligned(_: &str, row: UnalignedRow) -> Verdict {
     same("frames", &row.frames, &layout.frames())?;
     let start = or_unreadable(Window::read(&row.stream_packed_msb_first.0, row.leading_idle_bits, 1, MsbFirst))?;
     same("a start bit behind the idle bits", &0, &start.bits())?;
-    let reply = received(&mut LineReceiver::bits(layout), &row.stream_packed_msb_first, row.stream_bits)?;
+    let reply = received(
+        &mut LineReceiver::bits(layout).allowing_idle_between_frames(),
+        &row.stream_packed_msb_first,
+        row.stream_bits,
+    )?;
     sound(reply, &row.expect_words, layout, row.cmd)
 }
 

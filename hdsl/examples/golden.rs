@@ -1,0 +1,74 @@
+//! Golden traces for teams that build this receiver in an FPGA or a PRU: every H-frame of a link as the samples of both
+//! directions and the registers after it, one JSON object a line.
+//!
+//! `cargo run --release -p hdsl --example golden -- [sick|ti] [metres] [frames] > trace.jsonl`
+//!
+//! ```text
+//!  state     state of the receiver in this frame
+//!  head      SYNC to PARA: 8 samples a bit (75 MHz), a byte each, the first sample in bit 7
+//!  answer    the 72 bit times after the direction switch, likewise; null for a frame without an answer
+//!  tail      TRAILER and stuffing as line bits
+//!  registers bytes 00h to 55h of the register map after the frame
+//! ```
+//!
+//! The link comes up, the position runs to and fro past the end of its range, a short and a long message pass, one answer
+//! is damaged. The same arguments give the same trace.
+
+use core::fmt::Write;
+
+use hdsl::cable::{Cable, Disturbance};
+use hdsl::device::Device;
+use hdsl::master::Master;
+use hdsl::message::{LongRequest, RemoteRegister, ResourceAddress, ShortRequest};
+use hdsl::registers::Registers;
+use hdsl::{Dialect, EncoderId};
+
+fn hex(bytes: impl IntoIterator<Item = u8>) -> String {
+    bytes.into_iter().fold(String::new(), |mut text, byte| {
+        // Never fails: it is a string.
+        let _ = write!(text, "{byte:02x}");
+        text
+    })
+}
+
+fn main() -> Result<(), Box<dyn core::error::Error>> {
+    let arguments: Vec<String> = std::env::args().skip(1).collect();
+    let dialect = match arguments.first().map(String::as_str) {
+        None | Some("sick") => Dialect::SICK,
+        Some("ti") => Dialect::TI,
+        Some(other) => return Err(format!("{other}: sick or ti").into()),
+    };
+    let metres = arguments.get(1).map_or(Ok(20), |text| text.parse())?;
+    let frames: u64 = arguments.get(2).map_or(Ok(400), |text| text.parse())?;
+    let mut cable = Cable::new(Disturbance { jitter: 1, ..Disturbance::metres(metres) }, 1);
+    let mut master = Master::new(dialect);
+    let mut map = Registers::new(&dialect);
+    // 24 bits of position, and a start near its end.
+    let mut encoder = Device::new(EncoderId::try_from(0x000d3)?);
+    let mut position = (1_u64 << 24) - 2000;
+    for frame in 0..frames {
+        let speed: i64 = if frame % 300 < 150 { 40 } else { -40 };
+        position = position.wrapping_add_signed(speed) & 0xff_ffff;
+        match frame {
+            160 => master.start_short(ShortRequest::Read(RemoteRegister::PING))?,
+            200 => master.start_long(LongRequest::read_name(ResourceAddress::RESOLUTN))?,
+            _ => {}
+        }
+        let present = master.transmission();
+        let answer = encoder.answer(cable.down(present.head.bits()), position);
+        // One damaged bit in the acceleration.
+        let answer = if frame == 280 { answer.map(|bits| bits ^ 1 << 35) } else { answer };
+        let samples = cable.up(answer);
+        let state = master.state();
+        let report = master.finish(&samples, None)?;
+        map.apply(report);
+        let answer = if present.answered { format!("\"{}\"", hex(samples)) } else { "null".to_owned() };
+        let tail: String = report.tail.bits().map(|bit| if bit { '1' } else { '0' }).collect();
+        println!(
+            "{{\"frame\":{frame},\"state\":\"{state}\",\"head\":\"{}\",\"answer\":{answer},\"tail\":\"{tail}\",\"registers\":\"{}\"}}",
+            hex(present.head.samples()),
+            hex(*map.as_bytes())
+        );
+    }
+    Ok(())
+}

@@ -1,0 +1,92 @@
+//! What can be said about safe channel 2 without knowing the encoder's scaling.
+
+use core::fmt;
+
+use crate::error::Error;
+use crate::registers::Status2;
+use crate::vframe::VFrame;
+
+/// What is wrong with safe channel 2, by the SICK manual (p. 55-58) and the HDSL register list.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "arbitrary", derive(arbitrary::Arbitrary))]
+pub struct Channel2Findings(u8);
+
+bitflags::bitflags! {
+    impl Channel2Findings: u8 {
+        /// The block has a bad word or a wrong CRC: nothing new is known.
+        const STALE = 1 << 0;
+        /// FIX2 is not 11100b.
+        const FIX2 = 1 << 1;
+        /// TOG2 did not alternate between two sound blocks of neighbouring V-frames.
+        const TOG2 = 1 << 2;
+        /// ERR2: the encoder reports an error of channel 2.
+        const ERR2 = 1 << 3;
+        /// TEST2: a test runs.
+        const TEST2 = 1 << 4;
+        /// The encoder says that it has no second position (K27.7).
+        const VPOS2 = 1 << 5;
+        const _ = !0;
+    }
+}
+
+impl fmt::Display for Channel2Findings {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        servowire_core::write_names(f, self.iter_names().map(|(name, _)| name))
+    }
+}
+
+crate::ranged::format_as_displayed!(Channel2Findings);
+
+/// Watches safe channel 2, V-frame by V-frame.
+///
+/// It reports what the documents say about the channel and no more. The comparison of both safe positions is the
+/// application's: scaling and complement of the second one depend on the encoder.
+///
+/// ```
+/// use hdsl::{Channel2Findings, Channel2Monitor, VFrame};
+/// let mut monitor = Channel2Monitor::new();
+/// // with every report that has one: monitor.v_frame(&report.v_frame)
+/// assert_eq!(monitor.v_frame(&VFrame::default()), Channel2Findings::STALE);
+/// assert_eq!(monitor.age(), 1);
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Channel2Monitor {
+    /// TOG2 of the V-frame before, if its block was sound.
+    toggle: Option<bool>,
+    age: u32,
+}
+
+impl Channel2Monitor {
+    /// At the beginning of a link; to be used again after a restart.
+    pub const fn new() -> Self {
+        Self { toggle: None, age: 0 }
+    }
+
+    /// Takes the blocks of the next V-frame.
+    pub fn v_frame(&mut self, frame: &VFrame) -> Channel2Findings {
+        let block = frame.safe2;
+        let before = self.toggle.take();
+        if !block.is_sound() {
+            self.age = self.age.saturating_add(1);
+            return Channel2Findings::STALE;
+        }
+        self.age = 0;
+        let status = Status2::from_bits_retain(block.status());
+        let toggle = status.contains(Status2::TOG2);
+        self.toggle = Some(toggle);
+        let mut findings = Channel2Findings::empty();
+        findings.set(Channel2Findings::FIX2, !status.is_fixed_part_right());
+        findings.set(Channel2Findings::TOG2, before == Some(toggle));
+        findings.set(Channel2Findings::ERR2, status.contains(Status2::ERR2));
+        findings.set(Channel2Findings::TEST2, status.contains(Status2::TEST2));
+        findings.set(Channel2Findings::VPOS2, matches!(block.position(), Err(Error::PositionInvalid { .. })));
+        findings
+    }
+
+    /// V-frames since the last sound block.
+    pub const fn age(&self) -> u32 {
+        self.age
+    }
+}

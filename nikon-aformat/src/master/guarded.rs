@@ -1,0 +1,67 @@
+use super::eeprom::{WRITE_POLLING, is_busy};
+use super::verified::apart;
+use super::{Reset, Step};
+use crate::error::Error;
+use crate::response::Response;
+use crate::timing::REQUEST_GAP_NS;
+
+/// A [`Reset`] that ends as done, not done, or with an unknown effect.
+///
+/// An encoder counts equal requests, whoever sends them and whenever: after seven of an interrupted reset the first of a new
+/// one takes effect. So another command is sent first, which starts the count again, until it is answered and ES0 is
+/// clear. Then the eight requests follow, one act that is never repeated in part.
+///
+/// `Done` rests on the eight responses. An encoder that hears something else in between, as noise on its end of the line, may
+/// start its count again and answer all the same: where a wrong zero is dangerous, compare the position before and after.
+///
+/// | it ends with | the encoder |
+/// |---|---|
+/// | `Done`, with the response to STATUS | has done it |
+/// | [`Error::Interrupted`], [`Error::Busy`], [`Error::NoResponse`] and other faults of the first response | has **not** done it |
+/// | [`Error::EffectUnknown`] | may have done it; it may be busy until `ready_ns` |
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct GuardedReset {
+    reset: Reset,
+    started: bool,
+    tries: u16,
+}
+
+impl GuardedReset {
+    /// Guards this reset.
+    pub const fn new(reset: Reset) -> Self {
+        Self { reset, started: false, tries: 0 }
+    }
+
+    /// The first request, at once.
+    pub const fn start(&mut self, now_ns: u64) -> Step<Response> {
+        self.started = false;
+        self.tries = 0;
+        let (request, _) = apart(self.reset.request());
+        Step::Send { request, not_before_ns: now_ns }
+    }
+
+    /// A transaction ended at `now_ns` with this outcome.
+    pub fn receive(&mut self, outcome: Result<Response, Error>, now_ns: u64) -> Step<Response> {
+        if self.started {
+            return self.reset.receive(outcome, now_ns);
+        }
+        let (request, ea) = apart(self.reset.request());
+        let error = match outcome {
+            Ok(response) if response.command() != Some(request.command()) => Error::NotCarried,
+            Ok(response) if ea.is_some_and(|ea| ea != response.ea) => Error::NotCarried,
+            Ok(response) if is_busy(response) => Error::Busy { tries: self.tries.saturating_add(1) },
+            Ok(_) => {
+                self.started = true;
+                return self.reset.start(now_ns.saturating_add(REQUEST_GAP_NS.into()));
+            }
+            Err(error) => error,
+        };
+        self.tries = self.tries.saturating_add(1);
+        let not_before_ns = now_ns.saturating_add(WRITE_POLLING.interval_ns.into());
+        if self.tries >= WRITE_POLLING.max_tries {
+            return Step::Failed { error, ready_ns: not_before_ns };
+        }
+        Step::Send { request, not_before_ns }
+    }
+}

@@ -1,0 +1,222 @@
+use super::Line;
+use crate::error::Error;
+use crate::expected::{Expected, SYNC_CODE};
+use crate::frame::truncated;
+use crate::layout::FRAME_BITS;
+use crate::raw_response::RawResponse;
+use crate::response::Response;
+
+/// Finds responses among the frames that arrive.
+///
+/// The frames received last are kept, as many as a response has. They are taken for one if they pass all checks and cannot
+/// have begun before the request had left the line; else the oldest one is dropped. So a good response is found whatever
+/// came before it: the own request, an older answer, noise, the rest of a damaged one.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub(super) struct Hunt {
+    /// End of the request.
+    from_ns: u64,
+    contents: [u16; RawResponse::MAX_FRAMES],
+    /// When each began at the earliest.
+    begun_ns: [u64; RawResponse::MAX_FRAMES],
+    got: usize,
+    /// End of the last one, by its stamp.
+    end_ns: u64,
+}
+
+/// What was found.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct Found {
+    /// A response, or why something that began like one was refused.
+    pub(super) outcome: Result<Response, Error>,
+    /// Its first start bit, by the stamps.
+    pub(super) began_ns: u64,
+    /// Its last delimiter, by the stamps.
+    pub(super) end_ns: u64,
+}
+
+/// Frames that are handed over together: `None` for one whose delimiter read 0.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Block<'a> {
+    pub(super) frames: &'a [Option<u16>],
+    pub(super) since_ns: u64,
+    pub(super) end_ns: u64,
+}
+
+impl Hunt {
+    /// What began before `from_ns` is no answer.
+    pub(super) const fn new(from_ns: u64) -> Self {
+        Self {
+            from_ns,
+            contents: [0; RawResponse::MAX_FRAMES],
+            begun_ns: [0; RawResponse::MAX_FRAMES],
+            got: 0,
+            end_ns: 0,
+        }
+    }
+
+    /// Takes the frames of a block.
+    pub(super) fn take(&mut self, line: &Line, expected: &Expected, block: Block<'_>, mut found: impl FnMut(Found)) {
+        let count = block.frames.len();
+        let times = Times { line, block, count };
+        if self.got > 0 && times.earliest_start(expected).saturating_sub(self.end_ns) > line.pause_ns() {
+            self.cut(expected, &mut found);
+        }
+        for (at, frame) in block.frames.iter().enumerate() {
+            self.end_ns = times.end(at);
+            let Some(content) = *frame else {
+                self.broken(expected, &times, at, &mut found);
+                continue;
+            };
+            self.push(content, times.begun(at));
+            if self.got >= usize::from(expected.layout().frames()) {
+                self.judge(expected, &times, at, &mut found);
+            }
+        }
+        // What is left stands at the end of the block, so its times are known.
+        let len = self.got.min(count);
+        let first = self.got.saturating_sub(len);
+        for (place, left) in self.begun_ns.iter_mut().take(self.got).skip(first).zip((0..len).rev()) {
+            *place = (*place).max(times.begun_of_tail(left));
+        }
+    }
+
+    /// The time is over: the fault of a response that had begun.
+    pub(super) fn finish(&mut self, expected: &Expected, mut found: impl FnMut(Found)) {
+        self.cut(expected, &mut found);
+    }
+
+    fn push(&mut self, content: u16, begun_ns: u64) {
+        if let (Some(to), Some(begun)) = (self.contents.get_mut(self.got), self.begun_ns.get_mut(self.got)) {
+            (*to, *begun) = (content, begun_ns);
+            self.got = self.got.saturating_add(1);
+        }
+    }
+
+    /// The frames are as many as a response has, the last of them number `at` of its block.
+    fn judge(&mut self, expected: &Expected, times: &Times<'_>, at: usize, found: &mut impl FnMut(Found)) {
+        let [first, ..] = self.contents;
+        let [begun_ns, ..] = self.begun_ns;
+        let before = self.got.saturating_sub(1);
+        let last_of_block = at.saturating_add(1) == times.count;
+        let begun_ns = if last_of_block && before <= at { begun_ns.max(times.begun_of_tail(before)) } else { begun_ns };
+        if begun_ns >= self.from_ns && begins_a_response(first) && !self.is_overtaken(expected, times, at) {
+            let raw = RawResponse::of(self.contents, expected.layout());
+            let outcome = Response::parse(expected, &raw);
+            let began_ns = self.end_ns.saturating_sub(times.line.rate.response_ns(expected.layout()).into());
+            found(Found { outcome, began_ns, end_ns: self.end_ns });
+            if outcome.is_ok() {
+                self.clear();
+                return;
+            }
+        }
+        self.drop_first();
+    }
+
+    /// Whether a sound response begins inside the frames at hand and goes on in the block: then the first of these frames has
+    /// lost those that followed it, and that the CRC-8 is right is chance.
+    fn is_overtaken(&self, expected: &Expected, times: &Times<'_>, at: usize) -> bool {
+        let next = at.saturating_add(1);
+        (1..self.got).any(|lost| {
+            let (Some(first), Some(more)) =
+                (self.contents.get(lost), times.block.frames.get(next..next.saturating_add(lost)))
+            else {
+                return false;
+            };
+            if expected.differs_first(*first) != 0 {
+                return false;
+            }
+            let mut contents = [0; RawResponse::MAX_FRAMES];
+            let kept = self.contents.iter().take(self.got).skip(lost).copied();
+            let frames = kept.chain(more.iter().map(|frame| frame.unwrap_or(0)));
+            contents.iter_mut().zip(frames).for_each(|(to, from)| *to = from);
+            RawResponse::of(contents, expected.layout()).is_sound()
+        })
+    }
+
+    fn drop_first(&mut self) {
+        self.contents.rotate_left(1);
+        self.begun_ns.rotate_left(1);
+        self.got = self.got.saturating_sub(1);
+        self.clear_from(self.got);
+    }
+
+    /// A pause: what was begun is not continued.
+    fn cut(&mut self, expected: &Expected, found: &mut impl FnMut(Found)) {
+        let ([first, ..], [begun_ns, ..]) = (self.contents, self.begun_ns);
+        if self.got > 0 && begun_ns >= self.from_ns && begins_a_response(first) {
+            let got = u32::try_from(self.got).unwrap_or(0).wrapping_mul(FRAME_BITS);
+            let outcome = Err(truncated(got, expected.layout().line_bits()));
+            found(Found { outcome, began_ns: begun_ns, end_ns: self.end_ns });
+        }
+        self.clear();
+    }
+
+    /// A delimiter read 0.
+    fn broken(&mut self, expected: &Expected, times: &Times<'_>, at: usize, found: &mut impl FnMut(Found)) {
+        let last_of_block = at.saturating_add(1) == times.count;
+        let begun_ns = if last_of_block { times.begun(at).max(times.begun_of_tail(0)) } else { times.begun(at) };
+        if begun_ns >= self.from_ns {
+            let most = expected.layout().frames().saturating_sub(1);
+            let frame = u8::try_from(self.got).unwrap_or(most).min(most);
+            found(Found { outcome: Err(Error::Delimiter { frame }), began_ns: begun_ns, end_ns: self.end_ns });
+        }
+        self.clear();
+    }
+
+    fn clear(&mut self) {
+        self.got = 0;
+        self.contents = [0; RawResponse::MAX_FRAMES];
+    }
+
+    fn clear_from(&mut self, got: usize) {
+        if let Some(rest) = self.contents.get_mut(got..) {
+            rest.fill(0);
+        }
+    }
+}
+
+/// Whether a frame has the sync code of a response. The frames of the own request, heard as an echo, have another.
+const fn begins_a_response(content: u16) -> bool {
+    content & 7 == SYNC_CODE as u16
+}
+
+/// What is known of the times of a block's frames.
+struct Times<'a> {
+    line: &'a Line,
+    block: Block<'a>,
+    count: usize,
+}
+
+impl Times<'_> {
+    fn frames_ns(&self, frames: usize) -> u64 {
+        u64::try_from(frames).unwrap_or(u64::MAX).saturating_mul(self.line.frame_ns())
+    }
+
+    /// The end of frame `at`, at the latest.
+    fn end(&self, at: usize) -> u64 {
+        self.block.end_ns.saturating_sub(self.frames_ns(self.count.saturating_sub(at).saturating_sub(1)))
+    }
+
+    /// When frame `at` began at the earliest, whatever pauses the block holds.
+    fn begun(&self, at: usize) -> u64 {
+        self.block.since_ns.saturating_add(self.frames_ns(at))
+    }
+
+    /// When a frame with `left` frames between it and the end of the block began at the earliest, if these belong to the same
+    /// response. Idle time between them does not count: had they begun so much earlier, they would have met the request on the
+    /// line.
+    fn begun_of_tail(&self, left: usize) -> u64 {
+        let frames = self.frames_ns(left.saturating_add(1));
+        self.block.end_ns.saturating_sub(frames.saturating_add(self.line.early_ns()))
+    }
+
+    /// When the first frame began at the earliest. Where no other response begins in the block, its frames follow each other.
+    fn earliest_start(&self, expected: &Expected) -> u64 {
+        let begins = |frame: &Option<u16>| frame.is_some_and(|content| expected.differs_first(content) == 0);
+        if self.block.frames.iter().skip(1).any(begins) {
+            return self.block.since_ns;
+        }
+        self.block.since_ns.max(self.block.end_ns.saturating_sub(self.frames_ns(self.count)))
+    }
+}

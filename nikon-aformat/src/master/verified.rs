@@ -1,0 +1,190 @@
+use super::eeprom::{WRITE_POLLING, is_busy, status_of};
+use super::{EepromRead, Step, Write};
+use crate::data::Data;
+use crate::error::Error;
+use crate::number::EncoderAddress;
+use crate::operation::Operation;
+use crate::request::Request;
+use crate::response::Response;
+use crate::status::Alm;
+
+/// A [`Write`] that ends as done, not done, or with an unknown effect.
+///
+/// 1. STATUS, until ES0 is clear: a busy encoder repeats the arguments and does nothing. MEMERR must be clear, so that it tells
+///    about this write. (Not where the address of the encoder is not known: commands 19 and 20.)
+/// 2. The write, **once**, 30 ms, STATUS. MEMERR must still be clear.
+/// 3. What was written is read back, also if the response to the write is missing.
+///
+/// | it ends with | the encoder |
+/// |---|---|
+/// | `Done` | has stored it |
+/// | [`Error::NotDone`] | has something else stored |
+/// | [`Error::Busy`], [`Error::MemoryFault`] | was not asked to write, or reports that it failed |
+/// | [`Error::EffectUnknown`] | may have stored it: it cannot be read back |
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct VerifiedWrite {
+    write: Write,
+    back: Back,
+    phase: Phase,
+    tries: u16,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+enum Phase {
+    Ready,
+    Writing,
+    ReadingBack,
+}
+
+/// How it is read back.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+enum Back {
+    Word { read: EepromRead, data: u16 },
+    Id(Request),
+}
+
+impl VerifiedWrite {
+    /// Verifies this write.
+    pub const fn new(write: Write) -> Self {
+        let Request { ea, operation } = write.request();
+        let back = match operation {
+            Operation::EepromWrite { address, data } => {
+                Back::Word { read: EepromRead::new(ea, address.get()).after_a_failed_read(), data }
+            }
+            Operation::EepromWriteBank { bank, address, data } => {
+                Back::Word { read: EepromRead::of_bank(ea, bank, address).after_a_failed_read(), data }
+            }
+            Operation::IdWrite2 { .. } => Back::Id(Request::new(ea, Operation::IdRead2)),
+            Operation::CoefficientWrite { .. } => Back::Id(Request::new(ea, Operation::CoefficientRead)),
+            _ => Back::Id(Request::new(ea, Operation::IdRead1)),
+        };
+        Self { write, back, phase: Phase::Ready, tries: 0 }
+    }
+
+    /// The first request, at once.
+    pub const fn start(&mut self, now_ns: u64) -> Step<()> {
+        self.tries = 0;
+        let Request { ea, operation } = self.write.request();
+        match operation {
+            Operation::IdWrite2 { .. } | Operation::SetAddress2 { .. } => self.begin(now_ns),
+            _ => {
+                self.phase = Phase::Ready;
+                Step::Send { request: Request::new(ea, Operation::Status), not_before_ns: now_ns }
+            }
+        }
+    }
+
+    /// A transaction ended at `now_ns` with this outcome.
+    pub fn receive(&mut self, outcome: Result<Response, Error>, now_ns: u64) -> Step<()> {
+        match self.phase {
+            Phase::Ready => self.ready(outcome, now_ns),
+            Phase::Writing => match self.write.receive(outcome, now_ns) {
+                Step::Send { request, not_before_ns } => Step::Send { request, not_before_ns },
+                Step::Failed { error: Error::MemoryFault, ready_ns } => {
+                    Step::Failed { error: Error::MemoryFault, ready_ns }
+                }
+                Step::Done { ready_ns, .. } | Step::Failed { ready_ns, .. } => self.read_back(ready_ns),
+            },
+            Phase::ReadingBack => self.compare(outcome, now_ns),
+        }
+    }
+
+    const fn begin(&mut self, not_before_ns: u64) -> Step<()> {
+        self.phase = Phase::Writing;
+        let _ = self.write.start(not_before_ns);
+        Step::Send { request: self.write.request(), not_before_ns }
+    }
+
+    fn ready(&mut self, outcome: Result<Response, Error>, now_ns: u64) -> Step<()> {
+        let soon_ns = now_ns.saturating_add(crate::timing::REQUEST_GAP_NS.into());
+        let error = match status_of(self.write.request().ea, outcome) {
+            Ok((response, alm)) if !is_busy(response) && !alm.contains(Alm::MEMBUSY) => {
+                if alm.contains(Alm::MEMERR) {
+                    return Step::Failed { error: Error::MemoryFault, ready_ns: soon_ns };
+                }
+                return self.begin(soon_ns);
+            }
+            Ok(_) => Error::Busy { tries: self.tries.saturating_add(1) },
+            Err(error) => error,
+        };
+        let ask = Request::new(self.write.request().ea, Operation::Status);
+        self.again(ask, error, now_ns)
+    }
+
+    /// Asks once more, a millisecond later, up to forty times: longer than any access lasts.
+    fn again(&mut self, request: Request, error: Error, now_ns: u64) -> Step<()> {
+        self.tries = self.tries.saturating_add(1);
+        let not_before_ns = now_ns.saturating_add(WRITE_POLLING.interval_ns.into());
+        if self.tries >= Self::MAX_TRIES {
+            return Step::Failed { error, ready_ns: not_before_ns };
+        }
+        Step::Send { request, not_before_ns }
+    }
+
+    const MAX_TRIES: u16 = 40;
+
+    fn read_back(&mut self, not_before_ns: u64) -> Step<()> {
+        self.phase = Phase::ReadingBack;
+        self.tries = 0;
+        match &mut self.back {
+            Back::Word { read, .. } => match read.start(not_before_ns) {
+                Step::Send { request, not_before_ns } => Step::Send { request, not_before_ns },
+                // Never: a read begins with a request.
+                Step::Done { ready_ns, .. } | Step::Failed { ready_ns, .. } => {
+                    Step::Failed { error: Error::EffectUnknown, ready_ns }
+                }
+            },
+            Back::Id(request) => Step::Send { request: *request, not_before_ns },
+        }
+    }
+
+    fn compare(&mut self, outcome: Result<Response, Error>, now_ns: u64) -> Step<()> {
+        let written = self.write.request();
+        match &mut self.back {
+            Back::Word { read, data } => match read.receive(outcome, now_ns) {
+                Step::Send { request, not_before_ns } => Step::Send { request, not_before_ns },
+                Step::Done { value, ready_ns } if value == *data => Step::Done { value: (), ready_ns },
+                Step::Done { ready_ns, .. } => Step::Failed { error: Error::NotDone, ready_ns },
+                Step::Failed { ready_ns, .. } => Step::Failed { error: Error::EffectUnknown, ready_ns },
+            },
+            Back::Id(request) => {
+                let request = *request;
+                match outcome.ok().and_then(|response| same(written, request, response)) {
+                    Some(true) => Step::Done { value: (), ready_ns: now_ns },
+                    Some(false) => Step::Failed { error: Error::NotDone, ready_ns: now_ns },
+                    None => self.again(request, Error::EffectUnknown, now_ns),
+                }
+            }
+        }
+    }
+}
+
+/// Whether a response shows what was written; `None` if it shows nothing.
+fn same(written: Request, asked: Request, response: Response) -> Option<bool> {
+    let own = response.ea == asked.ea || !asked.command().answers_with_own_address();
+    if response.command() != Some(asked.command()) || !own || is_busy(response) {
+        return None;
+    }
+    match (written.operation, response.data()?) {
+        (
+            Operation::IdWrite1 { id: want } | Operation::IdWrite2 { id: want } | Operation::SetAddress2 { id: want },
+            Data::Id { id },
+        ) => Some(id == want),
+        (Operation::CoefficientWrite { coefficient: want }, Data::Coefficient { coefficient }) => {
+            Some(coefficient == want)
+        }
+        _ => None,
+    }
+}
+
+/// Whom to ask so that the count of a reset starts again, and whether it answers with this address.
+pub(super) const fn apart(request: Request) -> (Request, Option<EncoderAddress>) {
+    match request.operation {
+        // The address of the only encoder is not known.
+        Operation::SetAddress1 => (Request::new(request.ea, Operation::IdRead2), None),
+        _ => (Request::new(request.ea, Operation::Status), Some(request.ea)),
+    }
+}

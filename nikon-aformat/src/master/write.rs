@@ -1,0 +1,170 @@
+use super::Step;
+use super::eeprom::{WRITE_POLLING, is_busy, status_of};
+use crate::error::Error;
+use crate::number::{EncoderAddress, EncoderId, U19, UserAddress};
+use crate::operation::Operation;
+use crate::request::Request;
+use crate::response::Response;
+use crate::status::Alm;
+use crate::timing::WRITE_BUSY_NS;
+
+/// Writes something that outlasts the supply: an EEPROM word, an identification code, an address, the velocity
+/// coefficient.
+///
+/// The request is sent **once**: repeating it wears the EEPROM. Its response repeats the arguments, which the transaction
+/// checks; then the encoder is left alone for 30 ms and its status read until it is no longer busy. If the response to the
+/// write is missing or refused, the procedure ends with [`Error::EffectUnknown`].
+///
+/// What was written is not read back, and an encoder that was busy repeats the arguments and does nothing: use
+/// [`VerifiedWrite`](super::VerifiedWrite).
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Write {
+    request: Request,
+    /// Whom to ask for the status, once the write is answered.
+    written: Option<EncoderAddress>,
+    tries: u16,
+}
+
+impl Write {
+    /// Writes an EEPROM word.
+    pub const fn eeprom(ea: EncoderAddress, address: UserAddress, data: u16) -> Self {
+        Self::of(ea, Operation::EepromWrite { address, data })
+    }
+
+    /// Writes an EEPROM word of a bank. Version 3.0.
+    pub const fn eeprom_of_bank(ea: EncoderAddress, bank: u8, address: u8, data: u16) -> Self {
+        Self::of(ea, Operation::EepromWriteBank { bank, address, data })
+    }
+
+    /// Writes the identification code of the encoder `ea` (command 18).
+    pub const fn id(ea: EncoderAddress, id: EncoderId) -> Self {
+        Self::of(ea, Operation::IdWrite1 { id })
+    }
+
+    /// Writes the identification code of the only encoder on the line, whatever its address (command 19).
+    pub const fn id_of_the_only_encoder(id: EncoderId) -> Self {
+        Self::of(EncoderAddress::ZERO, Operation::IdWrite2 { id })
+    }
+
+    /// Gives the encoder with the identification code `id` the address `new` (command 20).
+    pub const fn address(id: EncoderId, new: EncoderAddress) -> Self {
+        Self::of(new, Operation::SetAddress2 { id })
+    }
+
+    /// Writes the velocity coefficient of the encoder `ea`. Version 3.0.
+    pub const fn coefficient(ea: EncoderAddress, coefficient: U19) -> Self {
+        Self::of(ea, Operation::CoefficientWrite { coefficient })
+    }
+
+    const fn of(ea: EncoderAddress, operation: Operation) -> Self {
+        Self { request: Request::new(ea, operation), written: None, tries: 0 }
+    }
+
+    /// The request, at once.
+    pub const fn start(&mut self, now_ns: u64) -> Step<Response> {
+        self.written = None;
+        self.tries = 0;
+        Step::Send { request: self.request, not_before_ns: now_ns }
+    }
+
+    /// What is written, and by whose address.
+    pub const fn request(&self) -> Request {
+        self.request
+    }
+
+    /// A transaction ended at `now_ns` with this outcome. The value is the response to STATUS.
+    ///
+    /// Fails with [`Error::EffectUnknown`] if no response to the write or no status comes, and with [`Error::MemoryFault`]
+    /// if MEMERR is set.
+    pub fn receive(&mut self, outcome: Result<Response, Error>, now_ns: u64) -> Step<Response> {
+        let Some(ea) = self.written else {
+            let not_before_ns = now_ns.saturating_add(WRITE_BUSY_NS.into());
+            return match outcome {
+                Ok(response) if response.command() == Some(self.request.command()) => {
+                    // Command 19 reaches an encoder of any address; its response says which.
+                    let any = matches!(self.request.operation, Operation::IdWrite2 { .. });
+                    let ea = if any { response.ea } else { self.request.ea };
+                    self.written = Some(ea);
+                    Step::Send { request: Request::new(ea, Operation::Status), not_before_ns }
+                }
+                _ => Step::Failed { error: Error::EffectUnknown, ready_ns: not_before_ns },
+            };
+        };
+        self.tries = self.tries.saturating_add(1);
+        let not_before_ns = now_ns.saturating_add(WRITE_POLLING.interval_ns.into());
+        match status_of(ea, outcome) {
+            Ok((_, alm)) if alm.contains(Alm::MEMERR) => {
+                return Step::Failed { error: Error::MemoryFault, ready_ns: now_ns };
+            }
+            Ok((value, _)) if !is_busy(value) => return Step::Done { value, ready_ns: now_ns },
+            _ => {}
+        }
+        if self.tries >= WRITE_POLLING.max_tries {
+            return Step::Failed { error: Error::EffectUnknown, ready_ns: not_before_ns };
+        }
+        Step::Send { request: Request::new(ea, Operation::Status), not_before_ns }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::command::Command;
+    use crate::data::Data;
+    use crate::status::{EncoderStatus, PmAlm};
+
+    fn status(ea: EncoderAddress, es: u8, alm: Alm) -> Response {
+        let data = Data::Status { alm, pm_alm: PmAlm::empty() };
+        Response::new(ea, Command::Status, EncoderStatus::from_bits_truncate(es), data)
+    }
+
+    #[test]
+    fn a_write_is_sent_once() {
+        let id = EncoderId::truncate(0x12_3456);
+        let answered = EncoderAddress::truncate(5);
+        let mut write = Write::id_of_the_only_encoder(id);
+        assert!(
+            matches!(write.start(0), Step::Send { request, .. } if request.operation == Operation::IdWrite2 { id })
+        );
+        let raw = Response::new(answered, Command::IdWrite2, EncoderStatus::from_bits_truncate(1), Data::Id { id });
+        let ask = Request::new(answered, Operation::Status);
+        assert_eq!(write.receive(Ok(raw), 0), Step::Send { request: ask, not_before_ns: 30_000_000 });
+        let again = write.receive(Ok(status(answered, 1, Alm::empty())), 40_000_000);
+        assert_eq!(again, Step::Send { request: ask, not_before_ns: 41_000_000 });
+        let value = status(answered, 0, Alm::empty());
+        assert_eq!(write.receive(Ok(value), 9), Step::Done { value, ready_ns: 9 });
+        let _ = write.start(0);
+        let failed = write.receive(Err(Error::NoResponse), 0);
+        assert_eq!(failed, Step::Failed { error: Error::EffectUnknown, ready_ns: 30_000_000 });
+    }
+
+    /// A status that shows MEMERR, one that never comes, and a response to something else.
+    #[test]
+    fn what_is_no_success() {
+        let ea = EncoderAddress::truncate(3);
+        let mut write = Write::eeprom(ea, UserAddress::MAX, 0x1234);
+        let data = Data::Eeprom { data: 0x1234, address: 0xef };
+        let echo = |command| Response::new(ea, command, EncoderStatus::empty(), data);
+        let _ = write.start(0);
+        let other = write.receive(Ok(echo(Command::EepromRead)), 7);
+        assert_eq!(other, Step::Failed { error: Error::EffectUnknown, ready_ns: 30_000_007 });
+        let _ = write.start(0);
+        let _ = write.receive(Ok(echo(Command::EepromWrite)), 0);
+        let fault = write.receive(Ok(status(ea, 0, Alm::MEMERR)), 5);
+        assert_eq!(fault, Step::Failed { error: Error::MemoryFault, ready_ns: 5 });
+        let _ = write.start(0);
+        let _ = write.receive(Ok(echo(Command::EepromWrite)), 0);
+        // Nothing else is taken for the status: neither a response to the write nor another encoder's.
+        let ask = Request::new(ea, Operation::Status);
+        let elsewhere = status(EncoderAddress::ZERO, 0, Alm::empty());
+        for no_status in [Ok(echo(Command::EepromWrite)), Ok(elsewhere), Err(Error::NoResponse)] {
+            assert_eq!(write.receive(no_status, 0), Step::Send { request: ask, not_before_ns: 1_000_000 });
+        }
+        for _ in 0..6 {
+            assert!(matches!(write.receive(Err(Error::NoResponse), 0), Step::Send { .. }));
+        }
+        let end = Step::Failed { error: Error::EffectUnknown, ready_ns: 1_000_000 };
+        assert_eq!(write.receive(Err(Error::NoResponse), 0), end);
+    }
+}

@@ -1,0 +1,214 @@
+//! Encoders and a master on the hostile line.
+
+use nikon_aformat::device::{Encoders, Transmission};
+use nikon_aformat::{BitRate, Frames};
+use servowire_world::{Event, Framing, Host, Id, Message, Rates, Scenario, Stamp, Transmission as Sent, Wire, World};
+
+/// What the host is given at once.
+#[derive(Debug)]
+pub struct Handed {
+    /// `None` where a delimiter read 0.
+    pub frames: Vec<Option<u16>>,
+    /// When the hand-over before was.
+    pub since_ns: u64,
+    pub end_ns: u64,
+}
+
+/// Events of a run: 100,000, or as many as the environment says.
+pub fn events() -> u64 {
+    std::env::var("HOSTILE_EVENTS").ok().and_then(|text| text.parse().ok()).unwrap_or(100_000)
+}
+
+/// The encoders of a line, and what carries their words.
+#[derive(Debug)]
+pub struct Bench<const N: usize> {
+    pub world: World,
+    pub encoders: Encoders<N, 2>,
+    pub rate: BitRate,
+    /// Makes every position that is sent another one.
+    pub serial: u64,
+    /// Hand-overs: since when, until when, and of how many frames.
+    pub handed: Vec<(u64, u64, usize)>,
+    /// What the zero point of each encoder was last seen to be: a change is an act.
+    zeros: [(u32, u32); N],
+    /// EEPROM words written so far, as the memory shows it.
+    watched: [Option<u16>; N],
+    /// Bank and address that are watched.
+    pub watch: (u8, u8),
+}
+
+/// Bits of a request frame and of a response frame.
+const WIDTH: u32 = 16;
+
+/// A bit in ps, from the rates of the protocol and not from the crate.
+pub const fn bit_ps(rate: BitRate) -> u64 {
+    match rate {
+        BitRate::Mbit2_5 => 400_000,
+        BitRate::Mbit4 => 250_000,
+        BitRate::Mbit6_67 => 150_000,
+        BitRate::Mbit8 => 125_000,
+        BitRate::Mbit16 => 62_500,
+    }
+}
+
+/// 18 bits in ns: whole at every rate.
+pub const fn frame_ns(rate: BitRate) -> u64 {
+    18 * bit_ps(rate) / 1000
+}
+
+/// Idle time that a master allows in front of a frame of a response by default.
+pub const fn idle_ns(rate: BitRate) -> u64 {
+    match rate {
+        BitRate::Mbit2_5 => 750,
+        BitRate::Mbit4 | BitRate::Mbit6_67 => 500,
+        BitRate::Mbit8 | BitRate::Mbit16 => 375,
+    }
+}
+
+/// A host that is told the end times of the line, or is late by no more than `latency_ns`.
+pub fn host_within(scenario: Scenario, latency_ns: u32) -> Scenario {
+    let Scenario { host, mut script } = scenario;
+    let late = host.stamp == Stamp::Handler;
+    if late {
+        script.rates = script.rates.with(servowire_world::Kind::Preempt, 0);
+    }
+    let latency_ns = if late { host.latency_ns % (latency_ns + 1) } else { host.latency_ns };
+    Scenario { host: Host { latency_ns, ..host }, script }
+}
+
+impl<const N: usize> Bench<N> {
+    pub fn new(encoders: Encoders<N, 2>, rate: BitRate, scenario: Scenario) -> Self {
+        let wire = Wire { bit_ps: bit_ps(rate), framing: Framing::StartStop { width: WIDTH }, devices: N as u8 };
+        let zeros = encoders.all.map(|device| device.zero());
+        let mut bench = Self {
+            world: World::new(wire, scenario),
+            encoders,
+            rate,
+            serial: 0,
+            handed: vec![(0, 0, 0)],
+            zeros,
+            watched: [None; N],
+            watch: (0, 0),
+        };
+        bench.watched = bench.words();
+        bench
+    }
+
+    pub fn words(&self) -> [Option<u16>; N] {
+        let (bank, address) = self.watch;
+        self.encoders.all.map(|device| device.eeprom(bank, address))
+    }
+
+    /// Watches another word from now on.
+    pub fn watch(&mut self, bank: u8, address: u8) {
+        self.watch = (bank, address);
+        self.watched = self.words();
+    }
+
+    /// Sends the frames of a request, the gaps between them as long as the protocol demands at least.
+    pub fn send(&mut self, frames: Frames, at_ns: u64) -> Id {
+        let contents = frames.as_slice().iter().map(|frame| u64::from(frame.content()));
+        let gap = 1_000_000_u64.div_ceil(bit_ps(self.rate));
+        let message = Message::frames(WIDTH, contents).with_gap_bits(gap as usize);
+        self.world.send(&message, at_ns)
+    }
+
+    /// Goes on to the next block for the host, or to `until_ns`; the encoders do their part on the way.
+    pub fn next(&mut self, until_ns: u64) -> Result<Handed, u64> {
+        loop {
+            match self.world.next(until_ns) {
+                Event::Heard { device, unit } => {
+                    self.serial += 1;
+                    let at = usize::from(device);
+                    let (content, framed) = unit.bits.content();
+                    let serial = self.serial;
+                    self.encoders.all[at].set_position(serial as u32 & 0xf_ffff, (serial >> 20) as u32 & 0xffff);
+                    let answer = if framed {
+                        self.encoders.all[at].frame(content as u16, unit.end_ns)
+                    } else {
+                        self.encoders.all[at].framing_error(unit.end_ns);
+                        None
+                    };
+                    self.note_acts(device, unit.origin.transmission);
+                    if let Some(answer) = answer {
+                        self.answer(device, unit.origin.transmission, &answer);
+                    }
+                }
+                Event::Delivered(block) => {
+                    let frame = |unit: &servowire_world::Unit| match unit.bits.content() {
+                        (content, true) => Some(content as u16),
+                        _ => None,
+                    };
+                    // A handler's clock is late, so what it saw last may have ended before.
+                    let host = self.world.host();
+                    let late = if host.stamp == Stamp::Handler { host.latency_ns } else { 0 };
+                    let since_ns = self.handed.last().map_or(0, |last| last.1.saturating_sub(late.into()));
+                    self.handed.push((since_ns, block.end_ns, block.units.len()));
+                    if self.handed.len() > 400 {
+                        self.handed.drain(..200);
+                    }
+                    return Ok(Handed {
+                        frames: block.units.iter().map(frame).collect(),
+                        since_ns,
+                        end_ns: block.end_ns,
+                    });
+                }
+                Event::Time { now_ns } => return Err(now_ns),
+            }
+        }
+    }
+
+    /// Whether a master may pass a response over though it arrived whole: idle time in it was longer than the master allows,
+    /// or others followed
+    /// it in its last block, and this block held only a part of it or began before the request had left: nothing told its age.
+    pub fn is_excused(&self, response: &Sent) -> bool {
+        let asked_ns =
+            response.answers.and_then(|id| self.world.truth().transmission(id)).map_or(0, |sent| sent.end_ns);
+        let within = |(since, end, _): &&(u64, u64, usize)| *since <= response.start_ns && response.start_ns < *end;
+        if response.end_ns - response.start_ns > response.units as u64 * frame_ns(self.rate) + idle_ns(self.rate) {
+            return true;
+        }
+        let whole = self.handed.iter().find(within);
+        // The block that holds its end.
+        let behind = self.handed.iter().find(|(since, end, _)| *since < response.end_ns && response.end_ns <= *end);
+        let inside = |(_, end, _): &(u64, u64, usize)| end.saturating_sub(response.end_ns) > frame_ns(self.rate) / 2;
+        let split = whole != behind;
+        behind.is_some_and(|block| inside(block) && (split || block.0 < asked_ns))
+    }
+
+    fn answer(&mut self, device: u8, request: Id, answer: &Transmission) {
+        let contents = answer.raw.contents();
+        let tag = value_of(contents);
+        let message = Message::frames(WIDTH, contents.iter().map(|content| u64::from(*content))).tagged(tag);
+        self.world.answer(device, request, &message, answer.at_ns);
+    }
+
+    fn note_acts(&mut self, device: u8, request: Id) {
+        let at = usize::from(device);
+        let zero = self.encoders.all[at].zero();
+        if zero != self.zeros[at] {
+            self.zeros[at] = zero;
+            self.world.act(device, "zero", request);
+        }
+        let word = self.words()[at];
+        if word != self.watched[at] {
+            self.watched[at] = word;
+            self.world.act(device, "word", request);
+        }
+    }
+}
+
+/// The 40 bits after the information field: what a position is known by.
+pub fn value_of(contents: &[u16]) -> u64 {
+    contents.iter().skip(1).rev().fold(0_u64, |all, content| all << 16 | u64::from(*content)) & 0xff_ffff_ffff
+}
+
+/// How rough a run is, by its seed.
+pub fn rates(seed: u64) -> Rates {
+    match seed % 4 {
+        0 => Rates::QUIET,
+        1 => Rates { per_million: [4_000; 12], longest_ns: 60_000 },
+        2 => Rates { per_million: [20_000; 12], longest_ns: 200_000 },
+        _ => Rates { per_million: [60_000; 12], longest_ns: 30_000 },
+    }
+}

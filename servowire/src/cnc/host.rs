@@ -1,0 +1,125 @@
+//! The host above the master: runs the program, watches what the axes tell, slows down, stops, and says why.
+
+use sorte_proto::Pto;
+
+use super::feed::Feed;
+use super::node::Node;
+use super::program::Program;
+
+/// Steps behind at which the host slows down, so that the axis finds cycles to catch up in.
+const SLOW_LAG: u16 = 32;
+/// The rate then: 12 us and more between two steps, so two cycles in a row without one.
+const SLOW: f64 = 0.3;
+/// Cycles from the last word until all pulses are over.
+const DRAIN: u32 = 6;
+/// Cycles after which the host waits no longer for an axis that does not catch up.
+const PATIENCE: u32 = 20_000;
+
+pub(super) struct Host {
+    program: Program,
+    feed: Feed,
+    words: Vec<Pto>,
+    max_lag: u16,
+    /// Cycles of motion; `None`: until the program is over.
+    cycles: Option<u64>,
+    cycle: u64,
+    /// Why the motion was ended before its time.
+    pub(super) ended: Option<String>,
+    /// The master has started again: nothing moves until the axes are where they should be.
+    resuming: bool,
+    catching_up: bool,
+    /// Cycles since there was nothing more to do; since the resumption began.
+    idle: u32,
+    waited: u32,
+}
+
+impl Host {
+    pub(super) fn new(program: Program, axes: usize, cycles: Option<u64>, max_lag: u16) -> Self {
+        Self {
+            program,
+            feed: Feed::new(axes),
+            words: vec![Pto::default(); axes],
+            max_lag,
+            cycles,
+            cycle: 0,
+            ended: None,
+            resuming: false,
+            catching_up: false,
+            idle: 0,
+            waited: 0,
+        }
+    }
+
+    /// The master starts again; what was on the way is lost.
+    pub(super) fn restarted(&mut self) {
+        (self.resuming, self.waited) = (true, 0);
+    }
+
+    /// Makes the words of the next cycle. `stop`: the master is about to start again.
+    pub(super) fn plan(&mut self, stop: bool, nodes: &[Node]) {
+        self.cycle += 1;
+        let worst = nodes.iter().map(|node| node.lag.unsigned_abs()).max().unwrap_or(0);
+        if self.ended.is_none() {
+            self.ended = self.trouble(stop, worst, nodes);
+        }
+        if self.resuming && !stop {
+            self.waited += 1;
+            self.resuming = worst > 0 || self.waited <= DRAIN;
+        }
+        self.catching_up = worst > if self.catching_up { 0 } else { SLOW_LAG };
+        let over = self.cycles.is_some_and(|cycles| self.cycle > cycles);
+        let halt = stop || over || self.resuming || self.ended.is_some();
+        self.feed.set(if halt {
+            0.0
+        } else if self.catching_up {
+            SLOW
+        } else {
+            1.0
+        });
+        self.feed.next(&mut self.program, &mut self.words);
+        let finished =
+            (self.program.is_over() && self.feed.is_empty()) || (over || self.ended.is_some()) && self.feed.is_still();
+        self.idle = if finished { self.idle + 1 } else { 0 };
+        if worst > 0 && self.idle > DRAIN && self.idle < PATIENCE {
+            // The axis still has something to catch up.
+            self.idle = self.idle.max(DRAIN + 1);
+        } else if worst == 0 && self.idle > DRAIN {
+            self.idle = PATIENCE;
+        }
+    }
+
+    fn trouble(&self, stop: bool, worst: u16, nodes: &[Node]) -> Option<String> {
+        let faulty = nodes.iter().position(|node| node.status.is_fault());
+        if let Some((axis, node)) = faulty.and_then(|k| Some((k, nodes.get(k)?))) {
+            return Some(format!("the driver of axis {} reports {}", axis + 1, node.status));
+        }
+        if !stop && self.resuming && self.waited > 1 {
+            if let Some(missing) = nodes.iter().position(|node| !node.is_running()) {
+                return Some(format!("device {} is missing", missing + 1));
+            }
+        }
+        if worst > self.max_lag {
+            let axis = nodes.iter().position(|node| node.lag.unsigned_abs() == worst).unwrap_or(0);
+            return Some(format!("axis {} is {worst} steps behind", axis + 1));
+        }
+        if self.resuming && self.waited >= PATIENCE {
+            return Some("an axis does not catch up".to_owned());
+        }
+        None
+    }
+
+    /// One for each axis.
+    pub(super) fn words(&self) -> &[Pto] {
+        &self.words
+    }
+
+    /// Whether the axes stand still.
+    pub(super) fn is_still(&self) -> bool {
+        self.feed.is_still()
+    }
+
+    /// Whether the motion is over, and every pulse of it.
+    pub(super) fn is_done(&self) -> bool {
+        self.idle >= PATIENCE
+    }
+}

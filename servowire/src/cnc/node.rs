@@ -1,0 +1,192 @@
+//! A device with its clock, its axis and what the master knows of it.
+
+use sorte_proto::device::{Config, Device, State};
+use sorte_proto::drv8711;
+use sorte_proto::follow::{Asked, Feedback, Follower};
+use sorte_proto::{Pto, Slice};
+
+use super::axis::{Axis, Build, PERIOD, Seen};
+use super::clock::Clock;
+
+/// A word that a frame has brought.
+#[derive(Debug, Clone, Copy)]
+struct Incoming {
+    /// When the device has it, in ns since the start of its generator.
+    at: u64,
+    word: Pto,
+    /// The master's time of its step.
+    expected: f64,
+}
+
+pub(super) struct Node {
+    pub(super) device: Device,
+    pub(super) axis: Axis,
+    pub(super) clock: Clock,
+    /// What the master has asked for, and what the device has made of it.
+    pub(super) asked: Asked,
+    pub(super) follower: Follower,
+    /// Asked for before this cycle's word: what the device's frame of this cycle can know of.
+    before: Asked,
+    /// As the device's last frame told: steps missing, faults of the driver.
+    pub(super) lag: i16,
+    pub(super) status: drv8711::Status,
+    incoming: Option<Incoming>,
+    /// Own counter and master's time at the start of the first cycle; `None` outside the IO exchange.
+    zero: Option<(f64, f64)>,
+    cycle: u64,
+    /// Largest clock error in the IO exchange, in ns.
+    pub(super) clock_error_ns: f64,
+    /// Frames that were accepted although a bit of what the CRC-8 covers was wrong.
+    pub(super) undetected: u64,
+    /// Frames accepted with a wrong time stamp, which nothing covers.
+    pub(super) bad_stamps: u64,
+}
+
+/// A master frame at a device.
+pub(super) struct Received<'a> {
+    pub(super) frame: &'a [u8],
+    /// As the master sent it.
+    pub(super) sent: &'a [u8],
+    /// Start of the frame here, as it is captured, and when the device has dealt with it.
+    pub(super) sof: f64,
+    pub(super) done: f64,
+    /// The master's time at the start of the cycle after next in which the step is made.
+    pub(super) acts: f64,
+    pub(super) cycle_ns: u64,
+    /// Positions are in the command words; else the published device, which uses the last word again.
+    pub(super) positions: bool,
+}
+
+impl Node {
+    pub(super) fn new(config: Config, build: Build, clock: Clock, max_lag: u16) -> Self {
+        Self {
+            device: Device::new(config),
+            axis: Axis::new(build),
+            clock,
+            asked: Asked::new(),
+            follower: Follower::new(max_lag),
+            before: Asked::new(),
+            lag: 0,
+            status: drv8711::Status::empty(),
+            incoming: None,
+            zero: None,
+            cycle: 0,
+            clock_error_ns: 0.0,
+            undetected: 0,
+            bad_stamps: 0,
+        }
+    }
+
+    /// What the master sends this device for `word`.
+    pub(super) fn ask(&mut self, word: Pto, positions: bool) -> Slice {
+        self.before = self.asked;
+        self.axis.tally.asked += u64::from(word.start().is_some());
+        let slice = self.asked.slice(word);
+        if positions { slice } else { Slice::from(word) }
+    }
+
+    /// A cycle begins at `begin` of the master's time.
+    pub(super) fn enter(&mut self, begin: f64) {
+        if self.device.state() != State::Exchange {
+            return;
+        }
+        let Some(first) = self.device.first_cycle_ns().filter(|_| self.zero.is_none()) else { return };
+        // The counter has 32 bits; the time meant is the one nearby.
+        let now = self.clock.at(begin);
+        let ahead = first.wrapping_sub(now as i64 as u32) as i32;
+        let zero = now.floor() + f64::from(ahead);
+        self.zero = Some((zero, begin));
+        (self.cycle, self.incoming) = (0, None);
+        self.axis.start(zero);
+    }
+
+    pub(super) fn is_running(&self) -> bool {
+        self.zero.is_some()
+    }
+
+    /// The axis runs through this cycle of the device.
+    pub(super) fn run(&mut self, cycle_ns: u64, mut seen: Option<&mut Vec<(u64, Seen)>>) {
+        let start = self.cycle * cycle_ns;
+        if let Some(Incoming { at, word, expected }) = self.incoming.take() {
+            // The word is held back until its cycle begins, so that it does not matter when in the cycle before it came.
+            self.axis.run(at.max(start), &self.clock, seen.as_deref_mut());
+            self.axis.set(word, expected);
+        }
+        if cycle_ns > PERIOD {
+            self.axis.run(start + PERIOD, &self.clock, seen.as_deref_mut());
+            self.axis.rest();
+        }
+        self.axis.run(start + cycle_ns, &self.clock, seen);
+        self.cycle += 1;
+    }
+
+    /// When the own frame of this cycle leaves, and the frame's payload.
+    pub(super) fn answer(&self, cycle_ns: u64, positions: bool) -> Option<(f64, Feedback)> {
+        let (zero, _) = self.zero?;
+        let slot = self.device.send_time_ns()?;
+        let position = if positions { self.follower.position() } else { 0 };
+        let at = self.clock.when(zero + (self.cycle * cycle_ns) as f64 + f64::from(slot));
+        Some((at, Feedback { status: self.axis.fault, position }))
+    }
+
+    /// The master has got the device's frame.
+    pub(super) fn reported(&mut self, feedback: Feedback, positions: bool) {
+        self.lag = if positions { self.before.lag(feedback.position) } else { 0 };
+        self.status = feedback.status;
+    }
+
+    /// The master frame of the cycle that [`run`](Self::run) has just gone through.
+    pub(super) fn receive(&mut self, received: &Received<'_>) {
+        let Some((zero, begin)) = self.zero else { return };
+        let own = (zero as i64 as u32).wrapping_add(((self.cycle - 1) * received.cycle_ns) as u32);
+        let in_cycle = |ns: f64| self.clock.read(ns).wrapping_sub(own);
+        let (sof_ns, now_ns) = (in_cycle(received.sof), in_cycle(received.done));
+        let output = self.device.exchange(received.frame, sof_ns, now_ns);
+        let slice = output.ok().and_then(|output| output.data.first_chunk()).map(|bytes| Slice::parse(*bytes));
+        if let Ok(output) = output {
+            self.clock.correct(output.correction, received.done);
+            self.judge(received);
+            let error = (self.clock.at(received.done) - zero) - (received.done - begin);
+            self.clock_error_ns = self.clock_error_ns.max(error.abs());
+        }
+        let word = match slice {
+            slice if received.positions => {
+                let word = self.follower.next(slice);
+                let own = slice.is_some_and(|slice| slice.pto.start().is_some());
+                self.axis.tally.caught_up += u64::from(word.start().is_some() && !own);
+                word
+            }
+            Some(slice) => slice.pto,
+            // The published device keeps the word and makes its step once more.
+            None => return,
+        };
+        let expected = received.acts + word.start().map_or(0.0, |start| f64::from(start.ns()));
+        let at = (self.clock.at(received.done) - zero).max(0.0) as u64;
+        self.incoming = Some(Incoming { at, word, expected });
+    }
+
+    /// What was wrong with a frame that the device has accepted.
+    fn judge(&mut self, received: &Received<'_>) {
+        let (frame, sent) = (received.frame, received.sent);
+        if frame == sent {
+            return;
+        }
+        let stamp = frame.len().saturating_sub(2);
+        if frame.get(..stamp) == sent.get(..stamp) {
+            self.bad_stamps += 1;
+        } else {
+            self.undetected += 1;
+        }
+    }
+
+    /// The device has left the IO exchange: pulses that are programmed still come.
+    pub(super) fn leave(&mut self, cycle_ns: u64) {
+        if self.device.state() == State::Exchange || self.zero.is_none() {
+            return;
+        }
+        self.incoming = None;
+        self.axis.rest();
+        self.axis.run(self.cycle * cycle_ns + 3 * PERIOD, &self.clock, None);
+        self.zero = None;
+    }
+}

@@ -1,0 +1,72 @@
+//! Cycle time against devices, cable and payload: a table, and a picture.
+
+use std::error::Error;
+use std::io::{self, Write};
+use std::path::Path;
+
+use plotters::prelude::*;
+use sorte_proto::timing::{Limit, Timing};
+
+/// Device counts of the table.
+const DEVICES: [u8; 14] = [1, 2, 3, 4, 5, 8, 10, 16, 32, 64, 100, 128, 200, 254];
+/// Cable between any two devices in ns, at some 5 ns a metre; and bytes of process data to and from each device.
+const LINES: [(u16, u16, u16); 5] = [(10, 4, 3), (85, 4, 3), (500, 4, 3), (85, 8, 8), (85, 32, 32)];
+
+fn cycle_ns(devices: u8, (cable, output, input): (u16, u16, u16)) -> (u32, Limit, u32) {
+    let output_len = (u16::from(devices) * output).max(16);
+    let line = Timing { line_delays_ns: &[cable], devices, output_len, payload_len: input };
+    let budget = line.budget();
+    (budget.min_cycle_ns(), budget.limit(), line.cnc_cycle_ns())
+}
+
+/// The table.
+pub(super) fn table(out: &mut dyn Write) -> io::Result<()> {
+    writeln!(out, "shortest cycle in us; < limited by the master frame's way out, > by the device frames' way back")?;
+    writeln!(out, "in brackets: whole periods of the step pulse generator, which is the cycle of a CNC line")?;
+    write!(out, "{:8}", "devices")?;
+    for (cable, output, input) in LINES {
+        write!(out, "{:>22}", format!("{cable} ns, {output}/{input} bytes"))?;
+    }
+    writeln!(out)?;
+    for devices in DEVICES {
+        write!(out, "{devices:7} ")?;
+        for line in LINES {
+            let (min, limit, cnc) = cycle_ns(devices, line);
+            let mark = if limit == Limit::MasterFrame { '<' } else { '>' };
+            write!(out, "{:>22}", format!("{mark} {:.2} ({})", f64::from(min) / 1e3, cnc / 1000))?;
+        }
+        writeln!(out)?;
+    }
+    Ok(())
+}
+
+/// The picture.
+pub(super) fn draw(path: &Path) -> Result<(), Box<dyn Error>> {
+    let root = SVGBackend::new(path, (900, 560)).into_drawing_area();
+    root.fill(&WHITE)?;
+    let end = f64::from(cycle_ns(254, LINES[4]).0) / 1e3;
+    let mut chart = ChartBuilder::on(&root)
+        .margin(12)
+        .caption("SORTE: shortest cycle against devices", ("sans-serif", 18))
+        .x_label_area_size(36)
+        .y_label_area_size(64)
+        .build_cartesian_2d(0.0..260.0, 0.0..end * 1.02)?;
+    chart.configure_mesh().x_desc("devices").y_desc("us").light_line_style(WHITE).draw()?;
+    for (k, line) in LINES.into_iter().enumerate() {
+        let color = Palette99::pick(k).to_rgba();
+        let points = (1..=254).map(|devices| (f64::from(devices), f64::from(cycle_ns(devices, line).0) / 1e3));
+        let (cable, output, input) = line;
+        chart
+            .draw_series(LineSeries::new(points, color.stroke_width(2)))?
+            .label(format!("{cable} ns of cable, {output} bytes out, {input} in"))
+            .legend(move |(x, y)| PathElement::new(vec![(x, y), (x + 16, y)], color.stroke_width(2)));
+    }
+    chart
+        .configure_series_labels()
+        .position(SeriesLabelPosition::UpperLeft)
+        .background_style(WHITE)
+        .border_style(BLACK)
+        .draw()?;
+    root.present()?;
+    Ok(())
+}

@@ -1,0 +1,148 @@
+//! `servowire talk`: a T-Format encoder at a USB-RS485 adapter.
+
+mod act;
+pub mod link;
+pub mod port;
+pub mod simulate;
+
+use std::path::PathBuf;
+use std::process::ExitCode;
+use std::time::Duration;
+
+use clap::{Args, Subcommand};
+use tformat::BitRate;
+
+use link::Link;
+
+/// Talk to a T-Format encoder at a USB-RS485 adapter, or be one.
+///
+/// Exit code 0: it was done; 1: the encoder did not answer as it should, or the port failed; 2: wrong use.
+#[derive(Debug, Args)]
+pub struct Arguments {
+    /// The serial port, as /dev/ttyUSB0 or COM3.
+    #[arg(long)]
+    port: String,
+    /// Bits a second, 2.5M or 5M.
+    #[arg(long, value_name = "HZ", default_value = "2.5M", value_parser = rate)]
+    rate: BitRate,
+    /// Longest wait for an answer. USB adapters hold short answers back, up to 16 ms.
+    #[arg(long, value_name = "MS", default_value_t = 50, value_parser = clap::value_parser!(u64).range(1..=10_000))]
+    timeout: u64,
+    #[command(subcommand)]
+    what: What,
+}
+
+#[derive(Debug, Subcommand)]
+enum What {
+    /// Read position, turns and alarms once.
+    Read,
+    /// Read them again and again, live.
+    Watch(Watch),
+    /// Say what the encoder and the adapter are.
+    Info,
+    /// Clear latched alarms. Position and turns stay.
+    ClearErrors,
+    /// Read or write the EEPROM.
+    #[command(subcommand)]
+    Eeprom(Eeprom),
+    /// Be an encoder.
+    Simulate(Simulate),
+}
+
+#[derive(Debug, Args)]
+struct Watch {
+    /// Time from one reading to the next.
+    #[arg(long, value_name = "MS", default_value_t = 20)]
+    period: u64,
+    /// End after this many readings.
+    #[arg(long)]
+    count: Option<u64>,
+    /// Write every reading into this file as CSV.
+    #[arg(long, value_name = "FILE")]
+    csv: Option<PathBuf>,
+}
+
+#[derive(Debug, Subcommand)]
+enum Eeprom {
+    /// Write all pages into a file of text, a line a page.
+    Dump {
+        /// The file; the standard output without it.
+        file: Option<PathBuf>,
+        /// Pages: six in Tamagawa's encoders, eight in a compatible one.
+        #[arg(long, default_value_t = 6, value_parser = clap::value_parser!(u8).range(1..=8))]
+        pages: u8,
+    },
+    /// Write the bytes of such a file that differ. Motor makers keep name plate and commutation data in this memory: a motor
+    /// may not run any more with the data of another.
+    Restore {
+        /// The file.
+        file: PathBuf,
+        /// Has to be given: the memory is overwritten.
+        #[arg(long, required = true)]
+        overwrite_eeprom: bool,
+        /// Do not ask.
+        #[arg(long)]
+        yes: bool,
+    },
+}
+
+#[derive(Debug, Args)]
+struct Simulate {
+    /// Encoder ID, 0x17 for 23 bits a turn.
+    #[arg(long, default_value = "0x17", value_parser = encoder_id)]
+    id: u8,
+    /// Turns of the shaft a minute.
+    #[arg(long, default_value_t = 60.0, allow_negative_numbers = true)]
+    rpm: f64,
+    /// The adapter hears itself.
+    #[arg(long)]
+    echo: bool,
+}
+
+fn encoder_id(text: &str) -> Result<u8, String> {
+    let parsed = match text.strip_prefix("0x") {
+        Some(digits) => u8::from_str_radix(digits, 16),
+        None => text.parse(),
+    };
+    parsed.map_err(|_| format!("\"{text}\" is not a byte, as 0x17 or 23"))
+}
+
+fn rate(text: &str) -> Result<BitRate, String> {
+    match text.trim_end_matches("Hz") {
+        "2.5M" | "2500000" => Ok(BitRate::Mbit2_5),
+        "5M" | "5000000" => Ok(BitRate::Mbit5),
+        _ => Err(format!("\"{text}\" is neither 2.5M nor 5M, the rates of T-Format")),
+    }
+}
+
+impl Arguments {
+    /// Does what was asked.
+    pub fn run(&self) -> ExitCode {
+        match self.perform() {
+            Ok(code) => code,
+            Err(fault) => {
+                eprintln!("{}: {fault}", self.port);
+                ExitCode::FAILURE
+            }
+        }
+    }
+
+    fn perform(&self) -> Result<ExitCode, link::Fault> {
+        let port = port::open(&self.port, self.rate)?;
+        if let What::Simulate(simulate) = &self.what {
+            let Simulate { id, rpm, echo } = *simulate;
+            let encoder = simulate::Encoder { rate: self.rate, id, rpm, echo };
+            return simulate::run(port, encoder, None).map(|()| ExitCode::SUCCESS);
+        }
+        let mut link = Link::open(port, Duration::from_millis(self.timeout))?;
+        match &self.what {
+            What::Read => act::read(&mut link),
+            What::Watch(watch) => act::watch(&mut link, watch),
+            What::Info => act::info(&mut link, &self.port, self.rate),
+            What::ClearErrors => act::clear_errors(&mut link),
+            What::Eeprom(Eeprom::Dump { file, pages }) => act::dump(&mut link, file.as_deref(), *pages),
+            What::Eeprom(Eeprom::Restore { file, yes, .. }) => act::restore(&mut link, file, *yes),
+            What::Simulate(_) => Ok(ExitCode::SUCCESS),
+        }
+    }
+}

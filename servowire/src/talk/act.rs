@@ -1,0 +1,224 @@
+//! The commands.
+
+use std::fs;
+use std::io::{self, BufRead, Write};
+use std::path::Path;
+use std::process::ExitCode;
+use std::thread;
+use std::time::{Duration, Instant};
+
+use tformat::master::{EEPROM_POLLING, EepromAccess, Reset};
+use tformat::{Address, AllData, BitRate, Page, Request, Resolution, Response};
+
+use super::Watch;
+use super::link::{Fault, Link};
+use super::port::{self, Port};
+
+/// Bytes of a page; the address behind them selects the page.
+const PAGE_LEN: u8 = 127;
+
+type Done = Result<ExitCode, Fault>;
+
+fn read_all<P: Port>(link: &mut Link<P>) -> Result<AllData, Fault> {
+    match link.exchange(Request::ReadAll)? {
+        Response::ReadAll(all) => Ok(all),
+        _ => Err(Fault::Input("the answer is to another request".to_owned())),
+    }
+}
+
+pub(super) fn read<P: Port>(link: &mut Link<P>) -> Done {
+    println!("{}", line(&read_all(link)?));
+    Ok(ExitCode::SUCCESS)
+}
+
+/// Position, turns and alarms in words.
+fn line(all: &AllData) -> String {
+    let hint = Resolution::from_enid(all.enid);
+    let position = hint.map(|hint| (hint.resolution, hint.resolution.position(all.abs, all.abm)));
+    let place = match position {
+        Some((resolution, Ok(at))) => {
+            let degrees = f64::from(at.abs) * 360.0 / f64::from(resolution.counts_per_turn());
+            format!("{degrees:>10.5} deg  {:>8} counts  turn {}", at.abs, at.turns)
+        }
+        Some((_, Err(error))) => format!("ABS {} ABM {}: {error}", all.abs, all.abm),
+        None => format!("ABS {} ABM {} (encoder ID {:#04x} says nothing of their widths)", all.abs, all.abm, all.enid),
+    };
+    let alarms = if all.almc.is_empty() { "no alarms".to_owned() } else { format!("alarms {}", all.almc) };
+    format!("{place}  {alarms}")
+}
+
+pub(super) fn watch<P: Port>(link: &mut Link<P>, watch: &Watch) -> Done {
+    let mut csv = watch.csv.as_deref().map(csv::Writer::from_path).transpose().map_err(io::Error::from)?;
+    if let Some(csv) = &mut csv {
+        csv.write_record(["time_s", "abs", "abm", "almc", "fault"]).map_err(io::Error::from)?;
+    }
+    let (mut good, mut bad, begin) = (0_u64, 0_u64, Instant::now());
+    let mut out = io::stdout().lock();
+    while watch.count.is_none_or(|count| good + bad < count) {
+        let reading = match read_all(link) {
+            Err(fault @ (Fault::Io(_) | Fault::Port(_))) => return Err(fault),
+            reading => reading,
+        };
+        let time = begin.elapsed().as_secs_f64();
+        let (text, record) = match &reading {
+            Ok(all) => {
+                good += 1;
+                (
+                    line(all),
+                    [all.abs.to_string(), all.abm.to_string(), format!("{:#04x}", all.almc.bits()), String::new()],
+                )
+            }
+            Err(fault) => {
+                bad += 1;
+                (fault.to_string(), [String::new(), String::new(), String::new(), fault.to_string()])
+            }
+        };
+        if let Some(csv) = &mut csv {
+            let record = std::iter::once(format!("{time:.6}")).chain(record);
+            csv.write_record(record).map_err(io::Error::from)?;
+        }
+        let errors = bad as f64 * 100.0 / (good + bad) as f64;
+        // Over the line before, to the end of the line.
+        write!(out, "\r{text}  {errors:.1} % errors\x1b[K")?;
+        out.flush()?;
+        thread::sleep(Duration::from_millis(watch.period));
+    }
+    writeln!(out, "\n{good} good, {bad} refused or missing")?;
+    if let Some(mut csv) = csv {
+        csv.flush()?;
+    }
+    Ok(if bad == 0 { ExitCode::SUCCESS } else { ExitCode::FAILURE })
+}
+
+pub(super) fn info<P: Port>(link: &mut Link<P>, name: &str, rate: BitRate) -> Done {
+    let all = read_all(link)?;
+    let widths = match Resolution::from_enid(all.enid) {
+        Some(hint) if hint.documented => {
+            format!("{} bits a turn, {} of turns", hint.resolution.abs_bits(), hint.resolution.abm_bits())
+        }
+        Some(hint) => {
+            format!("probably {} bits a turn, {} of turns", hint.resolution.abs_bits(), hint.resolution.abm_bits())
+        }
+        None => "not documented".to_owned(),
+    };
+    println!("encoder ID {:#04x}: {widths}", all.enid);
+    println!("{}", line(&all));
+    println!("the adapter {}", if link.echo() { "hears itself" } else { "does not hear itself" });
+    for line in port::about(name, rate) {
+        println!("{line}");
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+pub(super) fn clear_errors<P: Port>(link: &mut Link<P>) -> Done {
+    let before = read_all(link)?.almc;
+    let mut reset = Reset::clear_errors();
+    let first = reset.start(link.now_ns());
+    link.run(first, |outcome, now_ns| reset.receive(outcome, now_ns))?;
+    let after = read_all(link)?.almc;
+    println!("alarms before: {}; after: {}", name(before), name(after));
+    Ok(if after.is_empty() { ExitCode::SUCCESS } else { ExitCode::FAILURE })
+}
+
+fn name(almc: tformat::Almc) -> String {
+    if almc.is_empty() { "none".to_owned() } else { almc.to_string() }
+}
+
+fn read_byte<P: Port>(link: &mut Link<P>, page: Option<Page>, address: Address) -> Result<u8, Fault> {
+    let mut access = EepromAccess::read(page, address, EEPROM_POLLING);
+    let first = access.start(link.now_ns());
+    link.run(first, |outcome, now_ns| access.receive(outcome, now_ns))
+}
+
+fn write_byte<P: Port>(link: &mut Link<P>, address: Address, data: u8) -> Result<u8, Fault> {
+    let mut access = EepromAccess::write(None, address, data, EEPROM_POLLING);
+    let first = access.start(link.now_ns());
+    link.run(first, |outcome, now_ns| access.receive(outcome, now_ns))
+}
+
+/// The bytes of a page, after it was selected and the selection was read back.
+fn read_page<P: Port>(link: &mut Link<P>, number: u8) -> Result<Vec<u8>, Fault> {
+    let page = Page::new(number).ok_or_else(|| Fault::Input(format!("there is no page {number}")))?;
+    let selected = match read_byte(link, Some(page), Address::truncate(0)) {
+        Ok(_) => read_byte(link, None, Address::PAGE_REGISTER)?,
+        Err(fault) => return Err(fault),
+    };
+    if selected != number {
+        return Err(Fault::Input(format!("the encoder stays on page {selected}: it has no page {number}")));
+    }
+    (0..PAGE_LEN).map(|address| read_byte(link, None, Address::truncate(address))).collect()
+}
+
+pub(super) fn dump<P: Port>(link: &mut Link<P>, file: Option<&Path>, pages: u8) -> Done {
+    let mut lines = Vec::new();
+    for number in 0..pages {
+        let bytes = read_page(link, number)?;
+        let hex: Vec<_> = bytes.iter().map(|byte| format!("{byte:02x}")).collect();
+        lines.push(format!("{number}: {}\n", hex.join(" ")));
+    }
+    let text = lines.concat();
+    match file {
+        Some(file) => fs::write(file, text)?,
+        None => io::stdout().write_all(text.as_bytes())?,
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+/// The pages of a dump.
+fn parse(text: &str) -> Result<Vec<(u8, Vec<u8>)>, Fault> {
+    let page = |(at, line): (usize, &str)| {
+        let wrong = |what: &str| Fault::Input(format!("line {}: {what}", at + 1));
+        let (number, bytes) = line.split_once(": ").ok_or_else(|| wrong("no page number"))?;
+        let number = number.parse().map_err(|_| wrong("no page number"))?;
+        let bytes: Result<Vec<u8>, _> = bytes.split_whitespace().map(|byte| u8::from_str_radix(byte, 16)).collect();
+        let bytes = bytes.map_err(|_| wrong("not a byte in hex"))?;
+        if bytes.len() != usize::from(PAGE_LEN) {
+            return Err(wrong(&format!("{} bytes instead of {}", bytes.len(), PAGE_LEN)));
+        }
+        Ok((number, bytes))
+    };
+    text.lines().enumerate().map(page).collect()
+}
+
+pub(super) fn restore<P: Port>(link: &mut Link<P>, file: &Path, yes: bool) -> Done {
+    let pages = parse(&fs::read_to_string(file)?)?;
+    let all = read_all(link)?;
+    if !yes && !confirmed(all.enid)? {
+        return Err(Fault::Input("nothing was written".to_owned()));
+    }
+    let mut written = 0;
+    for (number, want) in pages {
+        let have = read_page(link, number)?;
+        for ((address, want), have) in (0..PAGE_LEN).zip(want).zip(have) {
+            if want != have {
+                write_byte(link, Address::truncate(address), want)?;
+                written += 1;
+            }
+        }
+    }
+    println!("{written} bytes were different; they were written and read back");
+    Ok(ExitCode::SUCCESS)
+}
+
+fn confirmed(enid: u8) -> Result<bool, Fault> {
+    print!("The EEPROM of encoder ID {enid:#04x} will be overwritten. Type yes: ");
+    io::stdout().flush()?;
+    let mut answer = String::new();
+    io::stdin().lock().read_line(&mut answer)?;
+    Ok(answer.trim() == "yes")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn dumps_are_read_back() {
+        let bytes: Vec<_> = (0..127_u8).map(|byte| format!("{byte:02x}")).collect();
+        let text = format!("3: {}\n", bytes.join(" "));
+        assert_eq!(parse(&text).unwrap(), [(3, (0..127).collect())]);
+        for wrong in ["3 00", "x: 00", "3: 0g", "3: 00 01"] {
+            assert!(parse(wrong).is_err(), "{wrong}");
+        }
+    }
+}

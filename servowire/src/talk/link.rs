@@ -1,0 +1,189 @@
+//! Requests and answers through a port that tells no times.
+//!
+//! On a PC nothing can be seen of the 3 us between request and answer: an adapter hands over both at once, milliseconds later.
+//! So the own echo is known by its content and by its place, and a request goes out only when the line has been read empty.
+
+use std::io;
+use std::thread;
+use std::time::{Duration, Instant};
+
+use tformat::master::Step;
+use tformat::{Request, Response};
+
+use super::port::Port;
+
+/// Why something could not be done.
+#[derive(Debug, thiserror::Error)]
+pub enum Fault {
+    /// The port could not be opened.
+    #[error("{0}")]
+    Port(String),
+    /// The port, or a file, failed.
+    #[error(transparent)]
+    Io(#[from] io::Error),
+    /// The answer was refused, or there was none.
+    #[error("{0}")]
+    Encoder(#[from] tformat::Error),
+    /// The request came back, and nothing else.
+    #[error("only the own request came back: no encoder is there, it has no power, or A and B are swapped")]
+    OnlyEcho,
+    /// The input is not what it has to be.
+    #[error("{0}")]
+    Input(String),
+}
+
+/// The encoder at the other end of a port.
+#[derive(Debug)]
+pub struct Link<P> {
+    port: P,
+    timeout: Duration,
+    echo: bool,
+    began: Instant,
+}
+
+impl<P: Port> Link<P> {
+    /// Finds out whether the adapter hears itself, by a request whose answer has another length with echo than without.
+    ///
+    /// # Errors
+    /// [`Fault`] if no encoder answers.
+    pub fn open(port: P, timeout: Duration) -> Result<Self, Fault> {
+        let mut link = Self { port, timeout, echo: false, began: Instant::now() };
+        let mut fault = Fault::Encoder(tformat::Error::NoResponse { echo: false });
+        for echo in [true, false, true, false] {
+            link.echo = echo;
+            match link.exchange(Request::ReadAll) {
+                Ok(_) => return Ok(link),
+                // What has echo in it says more than what has not.
+                Err(next) => fault = if matches!(fault, Fault::OnlyEcho) { fault } else { next },
+            }
+        }
+        Err(fault)
+    }
+
+    /// Whether the adapter hears itself.
+    pub const fn echo(&self) -> bool {
+        self.echo
+    }
+
+    /// Time since the port was opened.
+    pub fn now_ns(&self) -> u64 {
+        u64::try_from(self.began.elapsed().as_nanos()).unwrap_or(u64::MAX)
+    }
+
+    /// One request and its answer.
+    ///
+    /// # Errors
+    /// [`Fault`].
+    pub fn exchange(&mut self, request: Request) -> Result<Response, Fault> {
+        self.empty()?;
+        let frame = request.emit();
+        self.port.write_all(frame.as_bytes())?;
+        self.port.flush()?;
+        let (mut bytes, end) = (Vec::new(), Instant::now() + self.timeout);
+        loop {
+            let left = end.saturating_duration_since(Instant::now());
+            if left.is_zero() || bytes.len() > MOST_BYTES {
+                return self.judge(request, &bytes);
+            }
+            self.port.wait(left)?;
+            let mut buffer = [0; MOST_BYTES];
+            match self.port.read(&mut buffer) {
+                Ok(0) => return Err(io::Error::from(io::ErrorKind::UnexpectedEof).into()),
+                Ok(count) => bytes.extend(buffer.iter().take(count)),
+                Err(error) if is_wait(&error) => continue,
+                Err(error) => return Err(error.into()),
+            }
+            if let Some(response) = self.find(request, &bytes) {
+                return Ok(response);
+            }
+        }
+    }
+
+    /// Takes a procedure through its steps.
+    ///
+    /// # Errors
+    /// [`Fault`]: the procedure's own, or at once one of the port.
+    pub fn run<T>(
+        &mut self,
+        mut step: Step<T>,
+        mut receive: impl FnMut(Result<Response, tformat::Error>, u64) -> Step<T>,
+    ) -> Result<T, Fault> {
+        loop {
+            match step {
+                Step::Send { request, not_before_ns } => {
+                    thread::sleep(Duration::from_nanos(not_before_ns.saturating_sub(self.now_ns())));
+                    let outcome = match self.exchange(request) {
+                        Ok(response) => Ok(response),
+                        Err(Fault::Encoder(error)) => Err(error),
+                        Err(Fault::OnlyEcho) => Err(tformat::Error::NoResponse { echo: true }),
+                        Err(other) => return Err(other),
+                    };
+                    step = receive(outcome, self.now_ns());
+                }
+                Step::Done { value, .. } => return Ok(value),
+                Step::Failed { error, .. } => return Err(error.into()),
+            }
+        }
+    }
+
+    /// Reads the line empty.
+    fn empty(&mut self) -> Result<(), Fault> {
+        self.port.forget()?;
+        self.port.wait(Duration::from_millis(1))?;
+        for _ in 0..MOST_BYTES {
+            match self.port.read(&mut [0; MOST_BYTES]) {
+                Ok(_) => {}
+                Err(error) if is_wait(&error) => return Ok(()),
+                Err(error) => return Err(error.into()),
+            }
+        }
+        Err(Fault::Input("the line does not become quiet".to_owned()))
+    }
+
+    /// A good answer in its place: at the end of what came, or one byte before it; after the echo, if the adapter hears itself,
+    /// and otherwise at the beginning. A byte of noise may be in front of either.
+    fn find(&self, request: Request, bytes: &[u8]) -> Option<Response> {
+        let sent = request.emit();
+        let echo: &[u8] = if self.echo { sent.as_bytes() } else { &[] };
+        let length = usize::from(request.data_id().response_fields());
+        (0..=1).find_map(|behind| {
+            let end = bytes.len().checked_sub(behind)?;
+            let (before, answer) = (bytes.get(..end.checked_sub(length)?)?, bytes.get(end - length..end)?);
+            let between = before.len().checked_sub(echo.len())?;
+            let placed = before.starts_with(echo) || before.ends_with(echo);
+            if between > 1 || !placed {
+                return None;
+            }
+            Response::parse(request, answer).ok()
+        })
+    }
+
+    /// The time is over: what is wrong with what came?
+    fn judge(&self, request: Request, bytes: &[u8]) -> Result<Response, Fault> {
+        let sent = request.emit();
+        let answer = bytes.strip_prefix(sent.as_bytes()).filter(|_| self.echo);
+        match answer.unwrap_or(bytes) {
+            [] if answer.is_some() => Err(Fault::OnlyEcho),
+            [] => Err(tformat::Error::NoResponse { echo: false }.into()),
+            // Good in itself, but not in its place: an echo, or noise before it.
+            answer => match Response::parse(request, answer) {
+                Ok(_) if answer == sent.as_bytes() => Err(Fault::OnlyEcho),
+                Ok(_) => Err(tformat::Error::EchoMismatch {
+                    at: 0,
+                    got: answer.first().copied().unwrap_or(0),
+                    want: sent.as_bytes().first().copied().unwrap_or(0),
+                }
+                .into()),
+                Err(error) => Err(error.into()),
+            },
+        }
+    }
+}
+
+/// More than any exchange has.
+const MOST_BYTES: usize = 64;
+
+/// Nothing came for now.
+fn is_wait(error: &io::Error) -> bool {
+    matches!(error.kind(), io::ErrorKind::TimedOut | io::ErrorKind::WouldBlock | io::ErrorKind::Interrupted)
+}

@@ -1,0 +1,78 @@
+//! An encoder at a serial port.
+
+use std::collections::VecDeque;
+use std::io;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant};
+
+use tformat::device::Device;
+use tformat::{Abm, Abs, BitRate, Resolution};
+
+use super::link::Fault;
+use super::port::Port;
+
+/// How long the own answer may take to come back.
+const ECHO: Duration = Duration::from_millis(100);
+/// How long a read waits, and so how fast the end is seen.
+const LOOK: Duration = Duration::from_millis(20);
+
+/// What is simulated.
+#[derive(Debug, Clone, Copy)]
+pub struct Encoder {
+    /// Bit rate.
+    pub rate: BitRate,
+    /// Encoder ID.
+    pub id: u8,
+    /// Turns of the shaft a minute.
+    pub rpm: f64,
+    /// Whether the adapter hears itself: what comes first after an answer, and is the same, is thrown away.
+    pub echo: bool,
+}
+
+/// Answers requests until `stop` is set, for ever without it.
+///
+/// A PC answers milliseconds late; a master that waits some microseconds as it should hears nothing. For `talk` at another
+/// adapter it is soon enough.
+///
+/// # Errors
+/// [`Fault::Io`].
+pub fn run<P: Port>(mut port: P, encoder: Encoder, stop: Option<&AtomicBool>) -> Result<(), Fault> {
+    let Encoder { rate, id, rpm, echo: hears_itself } = encoder;
+    let mut device = Device::<6>::new(id, rate);
+    let bits = Resolution::from_enid(id).map_or(24, |hint| hint.resolution.abs_bits());
+    let begin = Instant::now();
+    let (mut echo, mut echo_until): (VecDeque<u8>, _) = (VecDeque::new(), begin);
+    port.wait(LOOK)?;
+    while !stop.is_some_and(|stop| stop.load(Ordering::Relaxed)) {
+        let mut buffer = [0; 64];
+        let count = match port.read(&mut buffer) {
+            Ok(0) => return Ok(()),
+            Ok(count) => count,
+            Err(error) if matches!(error.kind(), io::ErrorKind::TimedOut | io::ErrorKind::Interrupted) => continue,
+            Err(error) => return Err(error.into()),
+        };
+        let elapsed = begin.elapsed();
+        let turned = elapsed.as_secs_f64() * rpm / 60.0 * f64::from(1_u32 << bits.min(24));
+        let counts = turned as i64;
+        device.set_position(Abs::truncate(counts as u32), Abm::truncate((counts >> bits) as u32));
+        if Instant::now() > echo_until {
+            echo.clear();
+        }
+        // Bytes of one read came together; before them there was a pause.
+        let now_ns = u64::try_from(elapsed.as_nanos()).unwrap_or(u64::MAX);
+        for byte in buffer.iter().take(count) {
+            if echo.front() == Some(byte) {
+                echo.pop_front();
+                continue;
+            }
+            echo.clear();
+            if let Some(answer) = device.byte(*byte, now_ns) {
+                port.write_all(answer.frame.as_bytes())?;
+                port.flush()?;
+                echo.extend(answer.frame.as_bytes().iter().filter(|_| hears_itself));
+                echo_until = Instant::now() + ECHO;
+            }
+        }
+    }
+    Ok(())
+}

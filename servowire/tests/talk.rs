@@ -1,0 +1,219 @@
+//! `talk` over pseudo-terminals: against its own encoder, and against one on a line with faults. A pseudo-terminal has no bit
+//! rate and no time, so this tests content, order and recovery.
+
+#![cfg(target_os = "linux")]
+#![allow(
+    clippy::arithmetic_side_effects,
+    clippy::indexing_slicing,
+    clippy::panic,
+    clippy::std_instead_of_core,
+    clippy::unwrap_used
+)]
+
+use std::fs::File;
+use std::io::{Read, Write};
+use std::process::{Command, Output};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::thread::{self, JoinHandle};
+use std::time::{Duration, Instant};
+
+use serialport::{SerialPort, TTYPort};
+use servowire::talk::link::{Fault, Link};
+use servowire::talk::simulate;
+use servowire_world::{Cable, Kind, Rates, Scenario, Tally};
+use tformat::device::Device;
+use tformat::{Abm, Abs, Address, Almc, BitRate, Request, Response};
+
+/// An encoder in a thread of its own at the other end of a pseudo-terminal.
+struct Bench {
+    name: String,
+    stop: Arc<AtomicBool>,
+    encoder: Option<JoinHandle<Tally>>,
+    /// As long as this is open, the encoder's end is; the program locks the port for itself.
+    _kept: Option<File>,
+}
+
+impl Bench {
+    fn new(encoder: impl FnOnce(TTYPort, &AtomicBool) -> Tally + Send + 'static) -> (Self, TTYPort) {
+        let (master, slave) = TTYPort::pair().unwrap();
+        let stop = Arc::new(AtomicBool::new(false));
+        let seen = Arc::clone(&stop);
+        let encoder = Some(thread::spawn(move || encoder(master, &seen)));
+        let name = slave.name().unwrap();
+        let kept = File::options().read(true).write(true).open(&name);
+        (Self { name, stop, encoder, _kept: kept.ok() }, slave)
+    }
+
+    fn end(mut self) -> Tally {
+        self.stop.store(true, Ordering::Relaxed);
+        self.encoder.take().unwrap().join().unwrap()
+    }
+
+    /// The program at this port.
+    fn talk(&self, arguments: &[&str]) -> Output {
+        Command::new(env!("CARGO_BIN_EXE_servowire"))
+            .args(["talk", "--port", &self.name])
+            .args(arguments)
+            .output()
+            .unwrap()
+    }
+}
+
+/// The encoder of `talk simulate`.
+fn simulated(id: u8) -> (Bench, TTYPort) {
+    Bench::new(move |master, stop| {
+        let encoder = simulate::Encoder { rate: BitRate::Mbit2_5, id, rpm: 0.0, echo: false };
+        simulate::run(Box::new(master), encoder, Some(stop)).unwrap();
+        Tally::default()
+    })
+}
+
+/// An encoder whose answers go through a line with these faults, and whose requests come back if `echo`.
+fn hurt(scenario: Scenario, echo: bool) -> (Bench, TTYPort) {
+    Bench::new(move |mut master, stop| {
+        let mut device = Device::<6>::new(0x17, BitRate::Mbit2_5);
+        device.set_alarms(Almc::OS, true);
+        device.set_alarms(Almc::OS, false);
+        let mut line = Cable::new(0, scenario);
+        let (begin, mut shaft) = (Instant::now(), 0);
+        master.set_timeout(Duration::from_millis(5)).unwrap();
+        while !stop.load(Ordering::Relaxed) {
+            let mut buffer = [0; 64];
+            let Ok(count) = master.read(&mut buffer) else { continue };
+            let now_ns = u64::try_from(begin.elapsed().as_nanos()).unwrap();
+            for byte in &buffer[..count] {
+                if echo {
+                    master.write_all(&[*byte]).unwrap();
+                }
+                shaft += 1;
+                device.set_position(Abs::truncate(shaft), Abm::truncate(2));
+                if let Some(answer) = device.byte(*byte, now_ns) {
+                    for arrival in line.carry(answer.frame.as_bytes(), 0) {
+                        thread::sleep(Duration::from_nanos(arrival.at_ns));
+                        // In two pieces, as USB likes it.
+                        let (first, second) = arrival.bytes.split_at(arrival.bytes.len() / 3);
+                        master.write_all(first).unwrap();
+                        thread::sleep(Duration::from_micros(200));
+                        master.write_all(second).unwrap();
+                    }
+                }
+            }
+        }
+        line.tally
+    })
+}
+
+fn text(output: &Output) -> String {
+    String::from_utf8_lossy(&output.stdout).into_owned() + &String::from_utf8_lossy(&output.stderr)
+}
+
+#[test]
+fn the_program_reads_what_its_own_encoder_says() {
+    let (bench, port) = simulated(0x17);
+    drop(port);
+    let output = bench.talk(&["read"]);
+    assert!(output.status.success(), "{}", text(&output));
+    assert_eq!(text(&output), "   0.00000 deg         0 counts  turn 0  no alarms\n");
+    let output = bench.talk(&["info"]);
+    assert!(text(&output).starts_with("encoder ID 0x17: 23 bits a turn, 16 of turns\n"), "{}", text(&output));
+    assert!(text(&output).contains("does not hear itself"));
+    let output = bench.talk(&["clear-errors"]);
+    assert_eq!(text(&output), "alarms before: none; after: none\n");
+    let folder = tempfile::tempdir().unwrap();
+    let csv = folder.path().join("out.csv");
+    let output = bench.talk(&["watch", "--count", "3", "--period", "1", "--csv", csv.to_str().unwrap()]);
+    assert!(text(&output).ends_with("3 good, 0 refused or missing\n"), "{}", text(&output));
+    assert_eq!(std::fs::read_to_string(csv).unwrap().lines().count(), 4);
+    bench.end();
+}
+
+#[test]
+fn eeproms_are_dumped_and_restored_only_when_one_insists() {
+    let (bench, port) = simulated(0x11);
+    drop(port);
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("eeprom");
+    let file = file.to_str().unwrap();
+    let output = bench.talk(&["eeprom", "dump", "--pages", "2", file]);
+    assert!(output.status.success(), "{}", text(&output));
+    let dump = std::fs::read_to_string(file).unwrap();
+    assert_eq!(dump.lines().count(), 2);
+    assert!(dump.starts_with("0: ff ff"));
+    std::fs::write(file, dump.replacen("1: ff ff", "1: 12 ff", 1)).unwrap();
+    let output = bench.talk(&["eeprom", "restore", file]);
+    assert_eq!(output.status.code(), Some(2), "without the option it is wrong use");
+    let output = bench.talk(&["eeprom", "restore", "--overwrite-eeprom", file]);
+    assert!(text(&output).contains("nothing was written"), "{}", text(&output));
+    let output = bench.talk(&["eeprom", "restore", "--overwrite-eeprom", "--yes", file]);
+    assert!(text(&output).starts_with("1 bytes were different"), "{}", text(&output));
+    let output = bench.talk(&["eeprom", "dump", "--pages", "2"]);
+    assert_eq!(text(&output), dump.replacen("1: ff ff", "1: 12 ff", 1));
+    bench.end();
+}
+
+#[test]
+fn the_echo_is_found_and_taken_away() {
+    for echo in [false, true] {
+        let (bench, port) = hurt(Scenario::quiet(), echo);
+        let mut link = Link::open(Box::new(port), Duration::from_millis(50)).unwrap();
+        assert_eq!(link.echo(), echo);
+        let write = Request::write_eeprom(Address::truncate(3), 0x77);
+        let Response::WriteEeprom(memory) = link.exchange(write).unwrap() else { panic!() };
+        assert_eq!((memory.adf.busy(), memory.edf), (false, 0x77));
+        bench.end();
+    }
+}
+
+/// A request that comes back, and nothing else, is no answer: not even a write, whose answer looks the same.
+#[test]
+fn an_echo_alone_is_no_answer() {
+    let (bench, port) = hurt(Scenario::quiet(), true);
+    let mut link = Link::open(Box::new(port), Duration::from_millis(30)).unwrap();
+    // from here on nobody is there
+    bench.end();
+    assert!(link.exchange(Request::write_eeprom(Address::truncate(3), 0x77)).is_err());
+
+    let (bench, port) = Bench::new(|mut master, stop| {
+        master.set_timeout(Duration::from_millis(5)).unwrap();
+        while !stop.load(Ordering::Relaxed) {
+            let mut byte = [0];
+            if master.read(&mut byte).is_ok() {
+                master.write_all(&byte).unwrap();
+            }
+        }
+        Tally::default()
+    });
+    let fault = Link::open(Box::new(port), Duration::from_millis(20)).unwrap_err();
+    assert!(matches!(fault, Fault::OnlyEcho), "{fault}");
+    bench.end();
+}
+
+/// Whatever the line does, a value that is accepted was sent, and the next exchange on a good line is good.
+#[test]
+fn faults_are_refused_and_over_with_the_next_exchange() {
+    let rates = Rates { longest_ns: 2_000_000, ..Rates::QUIET }
+        .with(Kind::Drop, 50_000)
+        .with(Kind::Flip, 100_000)
+        .with(Kind::Cut, 100_000)
+        .with(Kind::Delay, 100_000)
+        .with(Kind::Repeat, 50_000)
+        .with(Kind::Noise, 50_000);
+    for echo in [false, true] {
+        let (bench, port) = hurt(Scenario::random(7, rates), echo);
+        let mut link = (0..5)
+            .find_map(|_| Link::open(Box::new(port.try_clone_native().unwrap()), Duration::from_millis(15)).ok())
+            .unwrap();
+        let (mut good, mut last) = (0, 0);
+        for _ in 0..150 {
+            if let Ok(Response::ReadAll(all)) = link.exchange(Request::ReadAll) {
+                assert!(all.abs.get() > last, "{} after {last}: an old answer", all.abs);
+                assert_eq!((all.abm.get(), all.enid), (2, 0x17));
+                (good, last) = (good + 1, all.abs.get());
+            }
+        }
+        let tally = bench.end();
+        println!("{good} of 150 good; {tally}");
+        assert!(good > 75);
+    }
+}
