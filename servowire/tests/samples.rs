@@ -3,6 +3,7 @@
 
 mod common;
 
+use std::fmt::Write as _;
 use std::path::PathBuf;
 
 fn sample(name: &str) -> PathBuf {
@@ -64,7 +65,7 @@ fn a_line_in_a_vector() {
         "$timescale 1 ps $end $var wire 4 ab bus [7:4] $end $var string 1 c text $end $enddefinitions $end\n"
             .to_owned();
     for (time, level) in &wave.edges {
-        text += &format!("#{time} b{}010 ab\nsx c\n", u8::from(*level));
+        writeln!(text, "#{time} b{}010 ab\nsx c", u8::from(*level)).unwrap();
     }
     let bench = common::Bench::new();
     let run = bench.decode("bus.vcd", &text, &["--json"]);
