@@ -139,7 +139,7 @@ impl Vcd {
         let result = loop {
             let rest = buffer.get(self.from..self.to).unwrap_or_default();
             let Some(first) = rest.first() else { break Ok(()) };
-            if first.is_ascii_whitespace() {
+            if *first <= b' ' {
                 self.line += u64::from(*first == b'\n');
                 self.from += 1;
                 continue;
