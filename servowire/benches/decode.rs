@@ -126,7 +126,7 @@ fn one_by_one(samples: &[bool]) -> Tally {
         if let Some(field) = receiver.push(sample) {
             let start = time(field.start);
             let (content, delimiter, spikes) = (field.content, field.delimiter, field.spikes);
-            let field = LineField { content, delimiter, start, end: start + 10 * BIT, spikes };
+            let field = LineField { content, delimiter, start, end: start + 10 * BIT, spikes, bits: 0 };
             protocol.field(&field, &mut tally).unwrap();
         }
     }

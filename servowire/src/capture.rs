@@ -133,13 +133,18 @@ pub struct Hints {
 pub fn open(path: &Path, hints: Hints) -> Result<(Capture, Rc<Cell<u64>>), Fault> {
     let input = Input::open(path)?;
     let meter = input.meter();
+    Ok((open_input(input, path, hints)?, meter))
+}
+
+/// Opens what comes from `input`; `path` is only looked at for its ending.
+pub fn open_input(input: Input, path: &Path, hints: Hints) -> Result<Capture, Fault> {
     let mut input = if hints.format.is_none_or(Format::is_text) { input.unpacked()? } else { input };
     let format = match hints.format {
         Some(format) => format,
         None if hints.record_size.is_some() => Format::Records,
         None => guess(&mut input, path, hints.sample_rate.is_some())?,
     };
-    Ok((decoder(input, format, hints)?, meter))
+    decoder(input, format, hints)
 }
 
 /// The format that the first bytes show beyond doubt.

@@ -184,6 +184,20 @@ fn block_size(text: &str) -> Result<u8, String> {
 }
 
 impl Decode {
+    /// An option that says something of a file.
+    pub(crate) fn describes_a_file(&self) -> Option<&'static str> {
+        let said = [
+            (self.file.format.is_some(), "--format"),
+            (self.file.rate.is_some(), "--rate"),
+            (self.file.bytes, "--bytes"),
+            (self.file.record_size.is_some(), "--record-size"),
+            (self.file.threshold.is_some(), "--threshold"),
+            (self.line.channel.is_some(), "--channel"),
+            (self.line.tx.is_some(), "--tx"),
+        ];
+        said.into_iter().find(|(is, _)| *is).map(|(_, option)| option)
+    }
+
     /// What was said about the files.
     pub(crate) fn hints(&self) -> Hints {
         let format = if self.file.bytes { Some(Format::Hex) } else { self.file.format };

@@ -9,7 +9,7 @@ use std::rc::Rc;
 use indicatif::{ProgressBar, ProgressStyle};
 
 use crate::bundled;
-use crate::capture::{self, Capture};
+use crate::capture::{self, Capture, Input};
 use crate::cli::Decode;
 use crate::fault::{At, Fault};
 use crate::line::Stop;
@@ -25,12 +25,17 @@ const LONG: u64 = 1 << 24;
 /// Decodes all files. 0: all frames good; 1: not so; 2: the options do not go together.
 pub(crate) fn run(arguments: &Decode) -> ExitCode {
     let files = arguments.files.len();
-    if files == 0 && bundled::of(arguments.protocol).is_empty() {
+    let piped = if files == 0 { Input::piped() } else { None };
+    if let (0, None, Some(option)) = (files, &piped, arguments.describes_a_file()) {
+        eprintln!("error: {option} describes a capture: name its file, or - for the standard input");
+        return ExitCode::from(2);
+    }
+    if files == 0 && piped.is_none() && bundled::of(arguments.protocol).is_empty() {
         eprintln!("error: no captures of this protocol come with the program: name a file");
         return ExitCode::from(2);
     }
     if let Some(out) = &arguments.vcd {
-        if files != 1 {
+        if files + usize::from(piped.is_some()) != 1 {
             eprintln!("error: --vcd writes one capture: name one file, not {files}");
             return ExitCode::from(2);
         }
@@ -45,9 +50,9 @@ pub(crate) fn run(arguments: &Decode) -> ExitCode {
     let mut printer: Box<dyn Printer> = match (arguments.stats, arguments.json) {
         (true, json) => Box::new(Stats::new(out, json, arguments.jump)),
         (false, true) => Box::new(JsonLines::new(out)),
-        (false, false) => Box::new(Text::new(out, files != 1)),
+        (false, false) => Box::new(Text::new(out, files != 1 && piped.is_none())),
     };
-    match all(arguments, printer.as_mut()) {
+    match all(arguments, piped, printer.as_mut()) {
         Ok(true) => ExitCode::SUCCESS,
         Ok(false) => ExitCode::FAILURE,
         // The reader has seen enough.
@@ -60,8 +65,15 @@ pub(crate) fn run(arguments: &Decode) -> ExitCode {
 }
 
 /// Whether all files were good.
-fn all(arguments: &Decode, printer: &mut dyn Printer) -> io::Result<bool> {
+fn all(arguments: &Decode, piped: Option<Input>, printer: &mut dyn Printer) -> io::Result<bool> {
     let mut good = true;
+    if let Some(input) = piped {
+        let (bar, meter) = (Bar { bar: None }, input.meter());
+        return match capture::open_input(input, Path::new("-"), arguments.hints()) {
+            Ok(capture) => one(arguments, "standard input", capture, &bar, &meter, printer),
+            Err(fault) => Ok(complain(&fault, &bar)),
+        };
+    }
     for path in &arguments.files {
         let name = if path.as_os_str() == "-" { "standard input".to_owned() } else { path.display().to_string() };
         let opened = capture::open(path, arguments.hints());

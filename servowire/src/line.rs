@@ -38,6 +38,9 @@ pub struct LineField {
     pub end: i64,
     /// Spikes that were dropped before it or in it.
     pub spikes: u32,
+    /// For the first field of a speaker: the bits of the line from its start bit on, as long as he speaks, the first in
+    /// bit 0; those behind are 1. Otherwise 0.
+    pub bits: u128,
 }
 
 /// A protocol on a start-stop line: takes fields, gives events.

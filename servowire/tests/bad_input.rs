@@ -70,7 +70,7 @@ fn vcd_damaged() {
     let back = text.replace("#49000000\n", "#5\n");
     assert!(back != text);
     bench.decode("back.vcd", back, &["--json"]).fails_with("time goes back from #");
-    bench.decode("a.vcd", text.replace("$var wire 1", "$var wire 4"), &[]).fails_with("no variable of one bit");
+    bench.decode("a.vcd", text.replace("$var wire 1", "$var real 1"), &[]).fails_with("no variable of one bit");
     bench
         .decode("a.vcd", text.replace("$enddefinitions $end", ""), &[])
         .fails_with("value changes before $enddefinitions");

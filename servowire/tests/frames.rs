@@ -228,3 +228,38 @@ fn pauses_inside_frames() {
     run.is_good();
     assert_eq!(run.json().len(), 12);
 }
+
+/// Wherever a bit is lost or added in an answer, that is said, and the rest of it is no second frame.
+#[test]
+fn a_bit_lost_or_added() {
+    let bits: Vec<bool> = id3(0x12_3456, 0x789a, 0).into_iter().flat_map(field).collect();
+    let (mut right, mut all) = (0, 0);
+    for at in (3..108).step_by(5) {
+        for add in [false, true] {
+            let mut bits = bits.clone();
+            if add {
+                bits.insert(at, !bits[at]);
+            } else {
+                bits.remove(at);
+            }
+            let run = decode(|wave| {
+                wave.send(&[0x1a]).idle_us(3.0).bits(&bits).idle_us(40.0);
+            });
+            let events = run.json();
+            assert!(events.len() >= 2 && events[1]["verdict"] != "ok", "{at} {add}: {}", run.out);
+            all += 1;
+            let cause = events[1]["cause"].as_str().unwrap_or_default();
+            let want = if add { "or one was added" } else { "was lost" };
+            right += usize::from(events.len() == 2 && (cause.contains(want) || cause.contains("bit(s)")));
+        }
+    }
+    assert!(100 * right >= 90 * all, "{right} of {all}");
+}
+
+#[test]
+fn a_cut_answer_is_called_cut() {
+    let run = decode(|wave| {
+        wave.exchange(&[0x1a], &id3(1, 0, 0)[..7]);
+    });
+    assert!(run.json()[1]["cause"].as_str().unwrap().contains("it was cut"), "{}", run.out);
+}

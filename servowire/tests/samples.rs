@@ -3,6 +3,7 @@
 
 mod common;
 
+use std::fmt::Write as _;
 use std::path::PathBuf;
 
 fn sample(name: &str) -> PathBuf {
@@ -46,4 +47,30 @@ fn channels_of_a_sigrok_session() {
         common::decode(&sample(name), &[]).fails_with("channel \"D2\" runs at about 1.00 Mbit/s");
     }
     common::decode(&sample("demo-3of4.sr"), &["--channel", "D1"]).fails_with("samples a bit are too few");
+}
+
+/// A byte order mark, a blank in a name, SystemVerilog types, a vector by its bits.
+#[test]
+fn an_odd_vcd() {
+    let run = common::decode(&sample("odd.vcd"), &["--channel", "RX"]);
+    run.fails_with("the file has \"RS485 A/B\", \"clk\", \"nib[0]\", \"nib[1]\", \"nib[2]\", \"nib[3]\"");
+}
+
+/// The line inside a vector, with a blank between value and code, and an unfinished last word.
+#[test]
+fn a_line_in_a_vector() {
+    let mut wave = common::good_traffic(2.5e6);
+    wave.idle_us(40.0);
+    let mut text =
+        "$timescale 1 ps $end $var wire 4 ab bus [7:4] $end $var string 1 c text $end $enddefinitions $end\n"
+            .to_owned();
+    for (time, level) in &wave.edges {
+        writeln!(text, "#{time} b{}010 ab\nsx c", u8::from(*level)).unwrap();
+    }
+    let bench = common::Bench::new();
+    let run = bench.decode("bus.vcd", &text, &["--json"]);
+    run.is_good();
+    assert_eq!((run.json().len(), run.json()[0]["channel"].as_str()), (common::GOOD_FRAMES, Some("bus[7]")));
+    let run = bench.decode("bus.vcd", text + "#10", &["--json"]);
+    run.fails_with("the file ends in the middle of a time: it was cut off");
 }

@@ -1,6 +1,7 @@
 //! FST, the packed waveforms of GTKWave and Verilator. Channels are the variables of one bit.
 
 use std::collections::HashMap;
+use std::panic::{self, AssertUnwindSafe};
 
 use fst_reader::{FstFilter, FstHierarchyEntry, FstReader, FstSignalHandle, FstSignalValue, FstVarType};
 
@@ -12,6 +13,17 @@ use crate::fault::{At, Fault};
 const PARTS: u64 = 64;
 /// The most channels.
 const CHANNELS: usize = 65_535;
+
+const DAMAGED: &str = "not FST as it should be: the file is damaged";
+
+/// The library panics on some damaged files. That is their fault, not ours: it is caught, and nothing is printed.
+fn guarded<T>(call: impl FnOnce() -> T) -> Option<T> {
+    let hook = panic::take_hook();
+    panic::set_hook(Box::new(|_| ()));
+    let result = panic::catch_unwind(AssertUnwindSafe(call));
+    panic::set_hook(hook);
+    result.ok()
+}
 
 /// An FST file behind its hierarchy.
 pub struct Fst {
@@ -35,10 +47,12 @@ impl Fst {
         let name = input.name().to_owned();
         let fault = |what: String| Fault::new(&name, At::File, what);
         let broken = |e: fst_reader::ReaderError| fault(format!("not FST as it should be: {e}"));
-        let mut reader = FstReader::open(input.seekable()?).map_err(broken)?;
+        let source = input.seekable()?;
+        let opened = guarded(|| FstReader::open(source));
+        let mut reader = opened.ok_or_else(|| fault(DAMAGED.into()))?.map_err(broken)?;
         let header = reader.get_header();
         let (mut scopes, mut found): (Vec<String>, Vec<(String, String, FstSignalHandle)>) = (Vec::new(), Vec::new());
-        let read = reader.read_hierarchy(|entry| match entry {
+        let hierarchy = |entry| match entry {
             FstHierarchyEntry::Scope { name, .. } => scopes.push(name),
             FstHierarchyEntry::UpScope => drop(scopes.pop()),
             FstHierarchyEntry::Var { tpe, name, length: 1, handle, is_alias: false, .. }
@@ -47,8 +61,8 @@ impl Fst {
                 found.push((scopes.join("."), name, handle));
             }
             _ => {}
-        });
-        read.map_err(broken)?;
+        };
+        guarded(|| reader.read_hierarchy(hierarchy)).ok_or_else(|| fault(DAMAGED.into()))?.map_err(broken)?;
         if found.is_empty() {
             return Err(fault("no variable of one bit in this file, so no line to decode".into()));
         }
@@ -105,7 +119,8 @@ impl Line for Fst {
         let (first, exponent) = (changes.len(), self.exponent);
         let (of_handle, from) = (&self.of_handle, self.next);
         let mut too_large = false;
-        let read = self.reader.read_signals(&filter, |stamp, handle, value| {
+        let reader = &mut self.reader;
+        let take = |stamp: u64, handle: FstSignalHandle, value: FstSignalValue<'_>| {
             let FstSignalValue::String(&[digit]) = value else { return };
             let level = match digit {
                 b'0' | b'L' | b'l' => false,
@@ -122,7 +137,9 @@ impl Line for Fst {
                 Some(time) => changes.push(Change { time, channel, level }),
                 None => too_large = true,
             }
-        });
+        };
+        let read = guarded(|| reader.read_signals(&filter, take));
+        let read = read.ok_or_else(|| Fault::new(&self.name, At::File, DAMAGED))?;
         read.map_err(|e| Fault::new(&self.name, At::File, format!("not FST as it should be: {e}")))?;
         if too_large {
             return Err(Fault::new(&self.name, At::File, "its times are too large"));

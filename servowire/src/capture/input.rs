@@ -2,9 +2,12 @@
 
 use std::cell::Cell;
 use std::fs::File;
-use std::io::{self, BufRead, BufReader, Cursor, Read, Seek};
+use std::io::{self, BufRead, BufReader, Cursor, IsTerminal, Read, Seek};
 use std::path::{Path, PathBuf};
 use std::rc::Rc;
+use std::sync::mpsc;
+use std::thread;
+use std::time::Duration;
 
 use flate2::read::MultiGzDecoder;
 use ruzstd::decoding::StreamingDecoder;
@@ -17,6 +20,9 @@ const BUFFER: usize = 1 << 18;
 const DEEPEST: u8 = 4;
 /// What has to be read backwards and is no file on disk is held in memory, up to so many bytes.
 const MOST_HELD: u64 = 1 << 28;
+
+/// How long a pipe that nobody asked for may be silent.
+const PATIENCE: Duration = Duration::from_millis(400);
 
 /// A reader that can go back.
 pub trait SeekRead: BufRead + Seek + Send + Sync {}
@@ -50,6 +56,23 @@ impl Input {
         let regular = file.metadata().is_ok_and(|data| data.is_file());
         let path = regular.then(|| path.to_path_buf());
         Ok(Self { path, ..Self::over(&name, Box::new(file)) })
+    }
+
+    /// What comes through a pipe or from a redirected file, if something comes at once.
+    pub fn piped() -> Option<Self> {
+        if io::stdin().is_terminal() {
+            return None;
+        }
+        let (send, first) = mpsc::channel();
+        thread::spawn(move || {
+            let mut bytes = vec![0; 1 << 12];
+            let read = io::stdin().read(&mut bytes);
+            bytes.truncate(read.unwrap_or(0));
+            // Nobody waits any more.
+            drop(send.send(bytes));
+        });
+        let bytes = first.recv_timeout(PATIENCE).ok().filter(|bytes| !bytes.is_empty())?;
+        Some(Self::over("standard input", Box::new(Cursor::new(bytes).chain(io::stdin()))))
     }
 
     /// Unpacks gzip and zstd, as often as they are packed.

@@ -1,142 +1,303 @@
 //! Value change dumps (IEEE 1364): sigrok, PulseView, Logic 2, GTKWave, simulators.
+//!
+//! The header is read as words, whatever its types and attributes; the body by its first letters, line ends or not.
+
+mod header;
 
 use std::collections::HashMap;
-use std::io::{self, Cursor, Read};
-
-use vcd::{Command, IdCode, ParseError, Parser, TimescaleUnit, Value};
+use std::io::{self, Read};
 
 use super::{Change, Input, Line};
 use crate::fault::{At, Fault};
+use header::Header;
 
 /// Changes given at once.
 const BLOCK: usize = 4096;
+/// Bytes read at once. A word that is longer is no word.
+const BUFFER: usize = 1 << 18;
 
-/// A VCD file behind its header. Channels are the variables of one bit.
+/// A VCD file behind its header. Channels are the variables of one bit, and the bits of small vectors.
 pub struct Vcd {
-    name: String,
-    /// A line end is put behind the file, since the parser wants white space behind the last token.
-    parser: Parser<io::Chain<Input, Cursor<&'static [u8]>>>,
+    input: Input,
+    buffer: Vec<u8>,
+    /// What is unread of the buffer.
+    from: usize,
+    to: usize,
+    line: u64,
     channels: Vec<String>,
-    codes: HashMap<IdCode, u16>,
-    tick: Tick,
+    codes: Codes,
+    /// The file's unit of time in femtoseconds.
+    tick: u128,
     now: i64,
     /// Time of the file's last time stamp in its own unit.
     stamp: u64,
-    over: bool,
+    /// Words to skip up to `$end`.
+    skipping: bool,
+    ended: bool,
+}
+
+/// What a code stands for: channels from its last bit on.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+struct Code {
+    first: u16,
+    width: u16,
+}
+
+/// Codes of variables. Almost all have one or two letters.
+#[derive(Debug, Default)]
+struct Codes {
+    short: Vec<Option<Code>>,
+    long: HashMap<Vec<u8>, Code>,
+}
+
+impl Codes {
+    fn place(code: &[u8]) -> Option<usize> {
+        match *code {
+            [a] => Some(usize::from(a)),
+            [a, b] => Some(usize::from(a) | usize::from(b) << 8),
+            _ => None,
+        }
+    }
+
+    fn get(&self, code: &[u8]) -> Option<Code> {
+        match Self::place(code) {
+            Some(place) => self.short.get(place).copied().flatten(),
+            None => self.long.get(code).copied(),
+        }
+    }
+
+    fn insert(&mut self, text: &[u8], code: Code) {
+        match Self::place(text) {
+            Some(place) => {
+                if self.short.is_empty() {
+                    self.short = vec![None; 1 << 16];
+                }
+                if let Some(slot) = self.short.get_mut(place) {
+                    *slot = Some(code);
+                }
+            }
+            None => drop(self.long.insert(text.to_vec(), code)),
+        }
+    }
+}
+
+/// What a piece of the body asks for.
+enum Next {
+    /// It was taken; go on behind it.
+    Taken(usize),
+    /// It may go on behind the buffer.
+    More,
 }
 
 impl Vcd {
     /// Reads the header.
-    pub fn new(input: Input) -> Result<Self, Fault> {
-        let name = input.name().to_owned();
-        let mut file = Self {
-            name,
-            parser: Parser::new(input.chain(Cursor::new(b"\n".as_slice()))),
-            channels: Vec::new(),
-            codes: HashMap::new(),
-            // What most tools mean when they leave it out.
-            tick: Tick::new(1, TimescaleUnit::NS),
+    pub fn new(mut input: Input) -> Result<Self, Fault> {
+        let header = Header::read(&mut input)?;
+        let (channels, codes) = header.channels(&input)?;
+        let Header { tick, line, .. } = header;
+        Ok(Self {
+            input,
+            buffer: vec![0; BUFFER],
+            from: 0,
+            to: 0,
+            line,
+            channels,
+            codes,
+            tick,
             now: 0,
             stamp: 0,
-            over: false,
-        };
-        file.header()?;
-        Ok(file)
+            skipping: false,
+            ended: false,
+        })
     }
 
-    fn header(&mut self) -> Result<(), Fault> {
-        let mut scopes: Vec<String> = Vec::new();
-        let mut found: Vec<(Vec<String>, String, u16)> = Vec::new();
-        loop {
-            match self.parser.next() {
-                Some(Ok(Command::Enddefinitions)) => break,
-                Some(Ok(Command::Timescale(number, unit))) => self.tick = Tick::new(number, unit),
-                Some(Ok(Command::ScopeDef(_, scope))) => scopes.push(scope),
-                Some(Ok(Command::Upscope)) => drop(scopes.pop()),
-                Some(Ok(Command::VarDef(_, 1, code, reference, index))) => {
-                    let reference = match index {
-                        Some(index) => format!("{reference}{index}"),
-                        None => reference,
-                    };
-                    let next =
-                        u16::try_from(self.codes.len()).map_err(|_| self.fault("more than 65536 one-bit variables"))?;
-                    let channel = *self.codes.entry(code).or_insert(next);
-                    if channel == next {
-                        found.push((scopes.clone(), reference, channel));
-                    }
-                }
-                Some(Ok(Command::Timestamp(_) | Command::ChangeScalar(..))) => {
-                    return Err(self.fault("value changes before $enddefinitions: the header is damaged"));
-                }
-                Some(Ok(_)) => {}
-                Some(Err(e)) => return Err(self.broken(&e, "in the header")),
-                None => return Err(self.fault("the file ends in its header, before $enddefinitions")),
-            }
+    fn fault(&self, what: impl Into<String>) -> Fault {
+        self.input.fault(At::Line(self.line), what)
+    }
+
+    /// Moves what is left to the front and reads on.
+    fn fill(&mut self) -> Result<(), Fault> {
+        self.buffer.copy_within(self.from..self.to, 0);
+        self.to -= self.from;
+        self.from = 0;
+        if self.to == self.buffer.len() {
+            return Err(self.fault("not VCD in the middle of a value change: a word without end"));
         }
-        if found.is_empty() {
-            return Err(self.fault("no variable of one bit in this file, so no line to decode"));
-        }
-        // The name alone where it is the only one of its kind, else with its scopes.
-        for (scopes, reference, _) in &found {
-            let alone = found.iter().filter(|(_, other, _)| other == reference).count() == 1;
-            let path = scopes.iter().map(String::as_str).chain([reference.as_str()]).collect::<Vec<_>>();
-            self.channels.push(if alone { reference.clone() } else { path.join(".") });
+        let free = self.buffer.get_mut(self.to..).unwrap_or_default();
+        match self.input.read(free) {
+            Ok(0) => self.ended = true,
+            Ok(n) => self.to += n,
+            Err(e) if e.kind() == io::ErrorKind::Interrupted => {}
+            Err(e) => return Err(self.input.io_fault(At::Line(self.line), &e)),
         }
         Ok(())
     }
 
-    fn fault(&self, what: impl Into<String>) -> Fault {
-        Fault::new(&self.name, At::Line(self.parser.line()), what)
-    }
-
-    fn broken(&self, error: &io::Error, place: &str) -> Fault {
-        if error.kind() == io::ErrorKind::UnexpectedEof {
-            // The line end put behind the file counts as one.
-            let line = At::Line(self.parser.line().saturating_sub(1).max(1));
-            return Fault::new(&self.name, line, format!("the file ends {place}: it was cut off"));
-        }
-        match error.get_ref().and_then(|e| e.downcast_ref::<ParseError>()) {
-            Some(parse) => Fault::new(&self.name, At::Line(parse.line()), format!("not VCD {place}: {}", parse.kind())),
-            None => self.fault(format!("cannot be read: {error}")),
-        }
-    }
-
-    fn step(&mut self, changes: &mut Vec<Change>) -> Result<bool, Fault> {
-        let command = match self.parser.next() {
-            None => return Ok(false),
-            Some(Err(e)) => return Err(self.broken(&e, "in the middle of a value change")),
-            Some(Ok(command)) => command,
+    /// Takes pieces until there are enough changes or the buffer is used up.
+    fn scan(&mut self, changes: &mut Vec<Change>, enough: usize) -> Result<(), Fault> {
+        let buffer = std::mem::take(&mut self.buffer);
+        let result = loop {
+            let rest = buffer.get(self.from..self.to).unwrap_or_default();
+            let Some(first) = rest.first() else { break Ok(()) };
+            if *first <= b' ' {
+                self.line += u64::from(*first == b'\n');
+                self.from += 1;
+                continue;
+            }
+            if changes.len() >= enough {
+                break Ok(());
+            }
+            match self.piece(rest, changes) {
+                Ok(Next::Taken(length)) => self.from += length,
+                Ok(Next::More) => break Ok(()),
+                Err(fault) => break Err(fault),
+            }
         };
-        match command {
-            Command::Timestamp(stamp) => {
-                if stamp < self.stamp {
-                    return Err(self.fault(format!("time goes back from #{} to #{stamp}", self.stamp)));
-                }
-                self.stamp = stamp;
-                self.now = self.tick.time(stamp).ok_or_else(|| self.fault(format!("time #{stamp} is too large")))?;
-            }
-            Command::ChangeScalar(code, value) => {
-                // Unknown and floating: the line keeps the level it had.
-                let level = match value {
-                    Value::V0 => false,
-                    Value::V1 => true,
-                    Value::X | Value::Z => return Ok(true),
+        self.buffer = buffer;
+        result
+    }
+
+    /// One stamp, value change or command. At the end of the file a word ends there.
+    fn piece(&mut self, rest: &[u8], changes: &mut Vec<Change>) -> Result<Next, Fault> {
+        let length = word(rest);
+        let (text, behind) = rest.split_at(length);
+        if behind.is_empty() && !self.ended {
+            return Ok(Next::More);
+        }
+        if self.skipping {
+            self.skipping = text != b"$end";
+            return Ok(Next::Taken(length));
+        }
+        let cut = behind.is_empty();
+        let Some((first, tail)) = text.split_first() else { return Ok(Next::Taken(0)) };
+        match first {
+            b'#' => self.time(tail, cut)?,
+            b'$' => self.skipping = matches!(text, b"$comment" | b"$dumpoff" | b"$attrbegin"),
+            b'b' | b'B' | b'r' | b'R' | b's' | b'S' | b'p' => return self.vector(*first, tail, rest, length, changes),
+            b'0' | b'1' | b'x' | b'X' | b'z' | b'Z' | b'U' | b'W' | b'L' | b'H' | b'-' | b'h' | b'l' | b'u' | b'w' => {
+                // A blank may stand between value and code.
+                let Some((code, length)) = (if tail.is_empty() { second(rest, length) } else { Some((tail, length)) })
+                else {
+                    return self.open();
                 };
-                if let Some(&channel) = self.codes.get(&code) {
-                    changes.push(Change { time: self.now, channel, level });
+                if length == rest.len() && !self.ended {
+                    return Ok(Next::More);
                 }
+                self.value(*first, self.codes.get(code), changes);
+                return Ok(Next::Taken(length));
             }
-            Command::ChangeVector(code, vector) => {
-                if let (Some(&channel), Some(value)) = (self.codes.get(&code), vector.get(0)) {
-                    if matches!(value, Value::V0 | Value::V1) {
-                        changes.push(Change { time: self.now, channel, level: value == Value::V1 });
+            _ => {
+                let what = format!("unexpected character {:?}", char::from(*first));
+                return Err(self.fault(format!("not VCD in the middle of a value change: {what}")));
+            }
+        }
+        Ok(Next::Taken(length))
+    }
+
+    /// The word goes on behind the buffer, or the file ends in it.
+    fn open(&self) -> Result<Next, Fault> {
+        if self.ended {
+            return Err(self.fault("the file ends in the middle of a value change: it was cut off"));
+        }
+        Ok(Next::More)
+    }
+
+    fn time(&mut self, digits: &[u8], cut: bool) -> Result<(), Fault> {
+        let whole = digits.split(|byte| *byte == b'.').next().unwrap_or_default();
+        let mut stamp = Some(0_u64);
+        for digit in whole {
+            let digit = digit.wrapping_sub(b'0');
+            stamp = stamp.filter(|_| digit < 10).and_then(|s| s.checked_mul(10)?.checked_add(digit.into()));
+        }
+        let Some(stamp) = stamp.filter(|_| !whole.is_empty()) else {
+            let text = String::from_utf8_lossy(digits).into_owned();
+            return Err(self.fault(format!("not VCD in the middle of a value change: #{text} is no time")));
+        };
+        if stamp < self.stamp {
+            // The last word of a file that was cut off.
+            if cut {
+                return Err(self.fault("the file ends in the middle of a time: it was cut off"));
+            }
+            return Err(self.fault(format!("time goes back from #{} to #{stamp}", self.stamp)));
+        }
+        let now = u128::from(stamp).checked_mul(self.tick).and_then(|time| i64::try_from((time + 500) / 1000).ok());
+        self.now = now.ok_or_else(|| self.fault(format!("time #{stamp} is too large")))?;
+        self.stamp = stamp;
+        Ok(())
+    }
+
+    /// A value and a code with a blank between; `length` is that of the value with its letter.
+    fn vector(
+        &mut self,
+        kind: u8,
+        value: &[u8],
+        rest: &[u8],
+        length: usize,
+        changes: &mut Vec<Change>,
+    ) -> Result<Next, Fault> {
+        let Some((mut code, mut end)) = second(rest, length) else { return self.open() };
+        if kind == b'p' {
+            // The strengths of both levels come before the code.
+            for _ in 0..2 {
+                let Some(next) = second(rest, end) else { return self.open() };
+                (code, end) = next;
+            }
+        }
+        if end == rest.len() && !self.ended {
+            return Ok(Next::More);
+        }
+        match kind {
+            b'b' | b'B' => {
+                if let Some(code) = self.codes.get(code) {
+                    for bit in 0..code.width {
+                        // Short vectors are extended to the left: 1 with 0.
+                        let at = value.len().checked_sub(1 + usize::from(bit)).and_then(|at| value.get(at));
+                        let digit = at.or(value.first()).copied().unwrap_or(b'x');
+                        let digit = if at.is_none() && digit == b'1' { b'0' } else { digit };
+                        self.value(digit, Some(Code { first: code.first + bit, width: 1 }), changes);
                     }
                 }
             }
+            b'p' => {
+                let level = match value.first() {
+                    Some(b'D' | b'd' | b'L' | b'l' | b'0' | b'A' | b'a' | b'B') => b'0',
+                    Some(b'U' | b'u' | b'H' | b'h' | b'1') => b'1',
+                    Some(b'Z' | b'T' | b'F' | b'f') => b'z',
+                    _ => b'x',
+                };
+                self.value(level, self.codes.get(code), changes);
+            }
             _ => {}
         }
-        Ok(true)
+        Ok(Next::Taken(end))
     }
+
+    fn value(&self, digit: u8, code: Option<Code>, changes: &mut Vec<Change>) {
+        let level = match digit {
+            b'0' | b'L' | b'l' => false,
+            // A line that nobody drives is pulled high.
+            b'1' | b'H' | b'h' | b'z' | b'Z' => true,
+            // Unknown: the line keeps the level it had.
+            _ => return,
+        };
+        if let Some(Code { first, width: 1 }) = code {
+            changes.push(Change { time: self.now, channel: first, level });
+        }
+    }
+}
+
+/// Length of the word at the front.
+fn word(text: &[u8]) -> usize {
+    text.iter().position(|byte| *byte <= b' ').unwrap_or(text.len())
+}
+
+/// The word behind the one that ends at `from`, and where it ends.
+fn second(text: &[u8], from: usize) -> Option<(&[u8], usize)> {
+    let rest = text.get(from..)?;
+    let blanks = rest.iter().position(|byte| *byte > b' ')?;
+    let rest = rest.get(blanks..)?;
+    let length = word(rest);
+    Some((rest.get(..length)?, from + blanks + length))
 }
 
 impl Line for Vcd {
@@ -146,29 +307,22 @@ impl Line for Vcd {
 
     fn read(&mut self, changes: &mut Vec<Change>) -> Result<bool, Fault> {
         let enough = changes.len() + BLOCK;
-        while !self.over && changes.len() < enough {
-            let more = self.step(changes);
-            self.over = !matches!(more, Ok(true));
-            more?;
+        loop {
+            let before = (self.from, self.to);
+            self.scan(changes, enough)?;
+            if changes.len() >= enough {
+                return Ok(true);
+            }
+            if self.ended && (self.from == self.to || before == (self.from, self.to)) {
+                return Ok(false);
+            }
+            if !self.ended {
+                self.fill()?;
+            }
         }
-        Ok(!self.over)
     }
 
     fn reached(&self) -> i64 {
         self.now
-    }
-}
-
-/// The file's unit of time in femtoseconds.
-#[derive(Clone, Copy)]
-struct Tick(u128);
-
-impl Tick {
-    fn new(number: u32, unit: TimescaleUnit) -> Self {
-        Self(u128::from(number) * (1_000_000_000_000_000 / u128::from(unit.divisor())))
-    }
-
-    fn time(self, stamp: u64) -> Option<i64> {
-        i64::try_from((u128::from(stamp).checked_mul(self.0)? + 500) / 1000).ok()
     }
 }

@@ -192,7 +192,7 @@ impl EdgeReceiver {
             if let (Some(first), Some(last), Some(next)) = (piece.first(), piece.last(), fields.first()) {
                 // How long the level behind its last edge still belongs to it is not known.
                 let (start, end) = (first.time, next.time.min(last.time + self.bit as i64));
-                self.fields.push(LineField { content: 0, delimiter: false, start, end, spikes: 0 });
+                self.fields.push(LineField { content: 0, delimiter: false, start, end, spikes: 0, bits: 0 });
             }
             rest = fields;
         }
@@ -260,6 +260,7 @@ impl EdgeReceiver {
     /// Fields of one speaker.
     fn speak(&mut self, edges: &[Edge]) {
         let bit = self.fit(edges);
+        let first = self.fields.len();
         let mut rest = edges;
         while let Some(start) = rest.first() {
             let last = (f64::from(self.field_bits()) - 0.6) * bit;
@@ -267,6 +268,9 @@ impl EdgeReceiver {
             let (field, behind) = rest.split_at(inside.map_or(rest.len(), |at| at + 1));
             self.field(field, bit);
             rest = behind;
+        }
+        if let Some(field) = self.fields.get_mut(first) {
+            field.bits = line_bits(edges, field.start, bit);
         }
     }
 
@@ -310,6 +314,7 @@ impl EdgeReceiver {
             start,
             end: start + (whole * bit) as i64,
             spikes,
+            bits: 0,
         });
     }
 
@@ -417,6 +422,18 @@ impl EdgeReceiver {
             }
         }
     }
+}
+
+/// Bits of a line from `start` on.
+fn line_bits(edges: &[Edge], start: i64, bit: f64) -> u128 {
+    let place = |edge: &Edge| ((edge.time - start) as f64 / bit).round().clamp(0.0, 128.0) as u32;
+    let below = |at: u32| 1_u128.checked_shl(at).map_or(u128::MAX, |bit| bit - 1);
+    let mut bits = u128::MAX;
+    for (k, edge) in edges.iter().enumerate().filter(|(_, edge)| !edge.level) {
+        let until = edges.get(k + 1).map_or(128, place);
+        bits &= !(below(until) & !below(place(edge)));
+    }
+    bits
 }
 
 /// So many ones.

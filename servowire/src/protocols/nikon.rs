@@ -288,7 +288,7 @@ impl StartStop for Decoder {
             let line = Some(burst.line);
             self.open.line = line;
             let content = word.reverse_bits();
-            self.field(&LineField { content, delimiter: true, start: 0, end: 0, spikes: 0 }, out)?;
+            self.field(&LineField { content, delimiter: true, start: 0, end: 0, spikes: 0, bits: 0 }, out)?;
         }
         if self.open.is_empty() {
             self.open.line = None;

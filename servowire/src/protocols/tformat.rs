@@ -93,7 +93,7 @@ impl Decoder {
             }
             // Behind a low delimiter the receiver may have skipped fields: the answer lasts as long as a whole one.
             Some(pending) => {
-                let whole = 10 * pending.answer_fields(self.open.first()) as i64 - FIELD_TIMEOUT_BITS;
+                let whole = 10 * pending.answer_fields(self.open.first()) as i64;
                 self.open.broken.is_some() && start - self.open.start() > whole * self.bit
             }
         }
@@ -143,19 +143,33 @@ impl Decoder {
         let asked = pending.request.map(Request::data_id);
         let mut event = self.encoder.answer(frame, asked, result, delay);
         if let (Verdict::Refused(refusal), Some(request)) = (&mut event.verdict, pending.request) {
-            refusal.cause = self.cause(request, frame).map(|cause| cause.to_string());
+            refusal.cause = self.cause(request, frame);
         }
         event
     }
 
     /// What probably spoilt the answer to a request.
-    fn cause(&self, request: Request, frame: &Frame) -> Option<Cause> {
+    fn cause(&self, request: Request, frame: &Frame) -> Option<String> {
         let report = match frame.broken {
             None => inspect_bytes(request, frame.bytes()),
             Some(_) => inspect(request, frame.line(self.bit)?),
         };
         // That is what its verdict says already.
-        report.cause.filter(|cause| *cause != Cause::RequestRefused)
+        let cause = report.cause.filter(|cause| *cause != Cause::RequestRefused);
+        if cause.is_some_and(|cause| cause != Cause::Disturbed) {
+            return cause.map(|cause| cause.to_string());
+        }
+        let due = usize::from(request.data_id().response_fields());
+        // With all delimiters in place, no bit has slipped.
+        if let Some(slipped) =
+            (frame.broken.is_some() || frame.fields != due).then(|| frame.slipped_bit(request)).flatten()
+        {
+            return Some(slipped.to_owned());
+        }
+        if frame.broken.is_none() && frame.fields < due {
+            return Some("it was cut: the encoder broke off, or somebody switched the line".to_owned());
+        }
+        cause.map(|cause| cause.to_string())
     }
 
     /// A frame without a request before it: a request, or an answer alone.

@@ -1,6 +1,6 @@
 //! Fields that make a frame, and the request that waits for one.
 
-use tformat::{ControlField, DataId, Error, Request, Window};
+use tformat::{ControlField, DataId, Error, Request, Response, Window};
 
 use crate::event::Place;
 use crate::line::LineField;
@@ -21,6 +21,8 @@ pub(super) struct Frame {
     /// The first field whose delimiter read 0.
     pub(super) broken: Option<u8>,
     pub(super) spikes: u32,
+    /// The bits of the line, the first in bit 0, where they are known.
+    pub(super) raw: u128,
     /// The line of a log without times.
     pub(super) line: Option<u64>,
 }
@@ -38,7 +40,7 @@ impl Frame {
     pub(super) fn of_log(line: u64, bytes: &[u8]) -> Self {
         let mut frame = Self { line: Some(line), ..Self::default() };
         for &byte in bytes {
-            frame.push(&LineField { content: byte.into(), delimiter: true, start: 0, end: 0, spikes: 0 });
+            frame.push(&LineField { content: byte.into(), delimiter: true, start: 0, end: 0, spikes: 0, bits: 0 });
         }
         frame
     }
@@ -46,6 +48,9 @@ impl Frame {
     /// Takes a field; beyond the most it replaces the last one.
     pub(super) fn push(&mut self, field: &LineField) {
         let k = self.fields.min(MOST_FIELDS - 1);
+        if self.fields == 0 {
+            self.raw = field.bits;
+        }
         if let (Some(byte), Some(start)) = (self.bytes.get_mut(k), self.starts.get_mut(k)) {
             *byte = (field.content & 0xff) as u8;
             *start = field.start;
@@ -56,6 +61,26 @@ impl Frame {
         self.spikes = self.spikes.saturating_add(field.spikes);
         self.end = field.end;
         self.fields = k + 1;
+    }
+
+    /// What makes a sound answer of the bits on the line: one more at a place, or one less.
+    pub(super) fn slipped_bit(&self, request: Request) -> Option<&'static str> {
+        let len = 10 * u32::from(request.data_id().response_fields());
+        let sound = |bits: u128| {
+            Window::from_bits(bits & ((1 << len) - 1), len)
+                .is_some_and(|line| Response::parse_line(request, line).is_ok())
+        };
+        if self.raw == 0 {
+            return None;
+        }
+        (1..len).find_map(|at| {
+            let low = self.raw & ((1 << at) - 1);
+            let more = |bit: u128| low | bit << at | self.raw >> at << (at + 1);
+            if sound(more(0)) || sound(more(1)) {
+                return Some("a bit of it was lost on the way");
+            }
+            sound(low | self.raw >> (at + 1) << at).then_some("a bit came twice, or one was added on the way")
+        })
     }
 
     /// The data ID that the first field asks for or answers.
