@@ -1,6 +1,9 @@
 //! What was said on a line: the one form into which every protocol decodes and from which every output prints.
 
 use std::borrow::Cow;
+use std::fmt::{Display, Write as _};
+
+use bitflags::Flags;
 
 /// A frame, or the absence of one that was due.
 #[derive(Debug, Clone, PartialEq)]
@@ -19,6 +22,44 @@ pub struct Event {
     pub delay: Option<i64>,
     /// Whether the frame holds.
     pub verdict: Verdict,
+}
+
+impl Event {
+    /// Without position and delay.
+    pub fn new(
+        place: Place,
+        direction: Option<Direction>,
+        kind: impl Into<Cow<'static, str>>,
+        fields: Vec<Field>,
+        verdict: Verdict,
+    ) -> Self {
+        Self { place, direction, kind: kind.into(), fields, position: None, delay: None, verdict }
+    }
+
+    /// A frame whose beginning the capture does not hold: no fault of the line.
+    pub fn cut(place: Place) -> Self {
+        let note = Field::text("note", "the capture begins inside a frame");
+        Self::new(place, None, "cut", vec![note], Verdict::Ok)
+    }
+
+    /// A piece of a frame, `what`, at the end of the capture: what comes then is not known, so it is not sound.
+    pub fn cut_off(place: Place, what: &str) -> Self {
+        Self::new(place, None, "cut", Vec::new(), Verdict::cut_off(what))
+    }
+
+    /// No answer, called `what`, came to the request at `asked` within `timeout`, in picoseconds, or until `now`.
+    pub fn silence(asked: Place, kind: &'static str, what: &str, timeout: i64, now: i64, cause: &str) -> Self {
+        let (place, reason) = match asked {
+            Place::Time { end: start, .. } => {
+                let end = start.saturating_add(timeout).min(now);
+                let within = end.saturating_sub(start) as f64 / 1e6;
+                (Place::Time { start, end }, format!("no {what} within {within:.1} us"))
+            }
+            Place::Line(_) => (asked, format!("no {what} before the next request")),
+        };
+        let refusal = Refusal { cause: Some(cause.to_owned()), ..Refusal::new(NO_RESPONSE, reason) };
+        Self::new(place, Some(Direction::Answer), kind, Vec::new(), refusal.into())
+    }
 }
 
 /// Where in a capture.
@@ -51,6 +92,45 @@ pub struct Field {
     pub name: &'static str,
     /// What it held.
     pub value: Value,
+}
+
+impl Field {
+    /// A number without a unit.
+    pub fn number(name: &'static str, value: impl Into<i64>) -> Self {
+        Self::measured(name, value, "")
+    }
+
+    /// A number with its unit.
+    pub fn measured(name: &'static str, value: impl Into<i64>, unit: &'static str) -> Self {
+        Self { name, value: Value::Number { value: value.into(), unit } }
+    }
+
+    /// A code or check value of so many hex digits.
+    pub fn hex(name: &'static str, value: impl Into<u64>, digits: usize) -> Self {
+        Self { name, value: Value::Hex { value: value.into(), digits } }
+    }
+
+    /// Named bits, by the names that the protocol's crate gives them.
+    pub fn flags<F: Flags<Bits: Into<u64>>>(name: &'static str, flags: &F, digits: usize) -> Self {
+        let set = flags.iter_names().map(|(name, _)| name).collect();
+        Self { name, value: Value::Flags { raw: flags.bits().into(), digits, set } }
+    }
+
+    /// What displays itself.
+    pub fn text(name: &'static str, what: impl Display) -> Self {
+        Self { name, value: Value::Text(what.to_string()) }
+    }
+
+    /// Bytes or words in hex, so many digits each, a space between them.
+    pub fn digits(name: &'static str, values: impl IntoIterator<Item = impl Into<u64>>, digits: usize) -> Self {
+        let mut text = String::new();
+        for value in values {
+            let space = if text.is_empty() { "" } else { " " };
+            // A String takes everything.
+            let _ = write!(text, "{space}{:0digits$X}", value.into());
+        }
+        Self { name, value: Value::Text(text) }
+    }
 }
 
 /// A value with what is needed to print it.
@@ -140,12 +220,24 @@ pub struct Refusal {
     pub cause: Option<String>,
 }
 
+impl Refusal {
+    /// Why, and nothing of where.
+    pub fn new(class: &'static str, reason: impl Display) -> Self {
+        Self { class, reason: reason.to_string(), field: None, bit: None, time: None, cause: None }
+    }
+}
+
+impl From<Refusal> for Verdict {
+    fn from(refusal: Refusal) -> Self {
+        Self::Refused(Box::new(refusal))
+    }
+}
+
 impl Verdict {
-    /// The capture ends inside the frame: what comes then is not known, so it is not sound.
-    pub fn cut_off() -> Self {
-        let reason = "the capture ends inside a frame".to_owned();
+    /// The capture ends inside `what`: what comes then is not known, so it is not sound.
+    pub fn cut_off(what: &str) -> Self {
         let cause = Some("the file was cut off, or recording stopped there".to_owned());
-        Self::Refused(Box::new(Refusal { class: "truncated", reason, field: None, bit: None, time: None, cause }))
+        Refusal { cause, ..Refusal::new("truncated", format!("the capture ends inside {what}")) }.into()
     }
 
     /// Whether all checks passed.

@@ -51,7 +51,7 @@ impl Sink for Held<'_> {
     fn event(&mut self, event: &Event) -> io::Result<()> {
         match (event.place, &event.verdict) {
             (Place::Time { end, .. }, Verdict::Refused(_)) if end > self.end && !event.verdict.is_silence() => {
-                self.out.event(&Event { fields: Vec::new(), verdict: Verdict::cut_off(), ..event.clone() })
+                self.out.event(&Event { fields: Vec::new(), verdict: Verdict::cut_off("a frame"), ..event.clone() })
             }
             _ => self.out.event(event),
         }

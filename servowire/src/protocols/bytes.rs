@@ -5,7 +5,7 @@ use std::io;
 use super::{Protocol, Settings, nikon, rtex, tformat};
 use crate::capture::ByteLog;
 use crate::capture::hexlog::Burst;
-use crate::event::{Event, Place, Refusal, Verdict};
+use crate::event::{Event, Place, Refusal};
 use crate::fault::{At, Fault};
 use crate::line::{StartStop, Stop};
 use crate::output::{Output, Sink, Tally};
@@ -119,14 +119,5 @@ impl Reader {
 
 /// A line of a log that is not bytes.
 fn spoilt(line: u64, what: &str) -> Event {
-    let refusal = Refusal { class: "hex", reason: what.to_owned(), field: None, bit: None, time: None, cause: None };
-    Event {
-        place: Place::Line(line),
-        direction: None,
-        kind: "line".into(),
-        fields: Vec::new(),
-        position: None,
-        delay: None,
-        verdict: Verdict::Refused(Box::new(refusal)),
-    }
+    Event::new(Place::Line(line), None, "line", Vec::new(), Refusal::new("hex", what).into())
 }

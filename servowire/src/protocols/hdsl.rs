@@ -8,7 +8,7 @@ mod bits;
 use std::io;
 
 use hdsl::frame::{ANSWER_BITS, BIT_RATE, H_FRAME_BITS, Head, Received};
-use hdsl::message::{LongAnswer, Request, Responder, ShortRequest};
+use hdsl::message::{LongAnswer, Request, Responder};
 use hdsl::sampling::{Delay, TEST_PATTERN};
 use hdsl::symbol::{RunningDisparity, Word};
 use hdsl::{
@@ -16,7 +16,7 @@ use hdsl::{
     QualityEvent, QualityMonitor, QualityRule, Rule, VFrame, Window,
 };
 
-use crate::event::{Direction, Event, Field, NO_RESPONSE, Place, Position, Refusal, Value, Verdict};
+use crate::event::{Direction, Event, Field, NO_RESPONSE, Place, Position, Refusal, Verdict};
 use crate::line::{LineDecoder, Rates};
 use crate::output::Sink;
 use bits::Bits;
@@ -262,7 +262,7 @@ impl Decoder {
                     place,
                     Direction::Answer,
                     "test pattern",
-                    vec![number("delay", delay.into(), "bit")],
+                    vec![Field::measured("delay", delay, "bit")],
                     verdict,
                 );
                 event.delay = None;
@@ -276,7 +276,7 @@ impl Decoder {
 
     fn identifier(&mut self, window: Window, place: Place, out: &mut dyn Sink) -> io::Result<()> {
         let id = Answer::parse(Rule::Strict, window).and_then(EncoderId::from_answer);
-        let fields = id.map_or_else(|_| Vec::new(), |id| vec![hex("ENC_ID", id.get().into(), 5)]);
+        let fields = id.map_or_else(|_| Vec::new(), |id| vec![Field::hex("ENC_ID", id.get(), 5)]);
         if let Ok(bits) = id.and_then(EncoderId::check) {
             *self = Self {
                 delay: self.delay,
@@ -297,17 +297,17 @@ impl Decoder {
         let dd = answer.delta_delta();
         self.tracker.step(dd.ok());
         let parameter = answer.parameter();
-        let byte = |name, word: hdsl::symbol::Reading| word.byte().ok().map(|byte| hex(name, byte.into(), 2));
-        let mut fields = vec![number("delay", self.delay.unwrap_or(0).into(), "bit")];
+        let byte = |name, word: hdsl::symbol::Reading| word.byte().ok().map(|byte| Field::hex(name, byte, 2));
+        let mut fields = vec![Field::measured("delay", self.delay.unwrap_or(0), "bit")];
         fields.extend(byte("VERT", answer.vertical()));
         if let Ok(parameter) = parameter {
-            fields.push(text("SYMBOL", encoder_symbol(parameter)));
-            fields.push(number("VSYNC", parameter.vsync().into(), ""));
+            fields.push(encoder_symbol(parameter));
+            fields.push(Field::number("VSYNC", parameter.vsync()));
         }
         fields.extend(byte("PIPE", answer.pipe()));
-        fields.extend(dd.ok().map(|dd| number("DD", dd.get().into(), "")));
+        fields.extend(dd.ok().map(|dd| Field::number("DD", dd.get())));
         fields.extend(byte("SEC", answer.secondary()));
-        fields.push(number("VEL", self.tracker.velocity().into(), "steps/frame"));
+        fields.push(Field::measured("VEL", self.tracker.velocity(), "steps/frame"));
         let first = answer.words().into_iter().find_map(|word| word.byte().err()).or(dd.err()).map(refusal);
         let verdict = match first {
             Some(refused) => Err(refused),
@@ -316,7 +316,7 @@ impl Decoder {
         };
         let mut event = event(place, Direction::Answer, "answer", fields, verdict);
         if self.tracker.phase() == Phase::Check && !self.tracker.is_unreliable() {
-            event.fields.push(hex("POS", self.tracker.position(), 10));
+            event.fields.push(Field::hex("POS", self.tracker.position(), 10));
             event.position = Some(position(self.tracker.position()));
         }
         out.event(&event)?;
@@ -347,11 +347,11 @@ impl Decoder {
             Ok(position) => self.tracker.align(position),
             Err(_) => self.tracker.no_safe_position(),
         }
-        let mut fields = vec![hex("SUMMARY", safe1.status().into(), 2)];
-        fields.extend(safe.ok().map(|position| hex("VPOS", position, 10)));
-        fields.push(hex("STATUS2", safe2.status().into(), 2));
-        fields.extend(safe2.position().ok().map(|position| hex("VPOS2", position, 10)));
-        fields.push(number("QM", self.quality.value().into(), ""));
+        let mut fields = vec![Field::hex("SUMMARY", safe1.status(), 2)];
+        fields.extend(safe.ok().map(|position| Field::hex("VPOS", position, 10)));
+        fields.push(Field::hex("STATUS2", safe2.status(), 2));
+        fields.extend(safe2.position().ok().map(|position| Field::hex("VPOS2", position, 10)));
+        fields.push(Field::number("QM", self.quality.value()));
         let error = safe.err().or(safe2.position().err());
         let mut event = event(place, Direction::Answer, "V-frame", fields, error.map_or(Ok(()), |e| Err(refusal(e))));
         event.position = safe.ok().map(position);
@@ -363,15 +363,8 @@ impl Decoder {
     fn message_out(&mut self, symbol: Result<MasterSymbol, Error>, place: Place, out: &mut dyn Sink) -> io::Result<()> {
         let Ok(symbol) = symbol else { return Ok(()) };
         if let Some(request) = self.requests.receive(symbol) {
-            let what = match request {
-                Request::Short(ShortRequest::Read(register)) => format!("read register {:02X}h", register.address()),
-                Request::Short(ShortRequest::Write(register, value)) => {
-                    format!("write register {:02X}h = {value:02X}h", register.address())
-                }
-                Request::Long(request) => format!("resource {:03X}h: {:?}", request.address.get(), request.access),
-            };
             self.request = Some(request);
-            out.event(&event(place, Direction::Request, "message", vec![text("message", what)], Ok(())))?;
+            out.event(&event(place, Direction::Request, "message", vec![Field::text("message", request)], Ok(())))?;
         }
         Ok(())
     }
@@ -387,16 +380,10 @@ impl Decoder {
         let bytes: Vec<u8> =
             nibbles.chunks(2).map(|pair| pair.iter().fold(0, |byte, nibble| byte << 4 | nibble)).collect();
         let result = match request {
-            Request::Short(request) => request.parse_answer(&bytes).map(|answer| match answer.data {
-                Some(data) => format!("register {:02X}h holds {data:02X}h", answer.register.address()),
-                None => format!("register {:02X}h is written", answer.register.address()),
-            }),
-            Request::Long(_) => LongAnswer::parse(&bytes).map(|answer| match answer.result {
-                Ok(data) => format!("resource {:03X}h: {:02X?}", answer.address.get(), data.as_bytes()),
-                Err(error) => format!("refused, class {:02X}h, detail {:02X}h", error.class_code(), error.detail()),
-            }),
+            Request::Short(request) => request.parse_answer(&bytes).map(|answer| Field::text("message", answer)),
+            Request::Long(_) => LongAnswer::parse(&bytes).map(|answer| Field::text("message", answer)),
         };
-        let fields = result.as_ref().map_or_else(|_| Vec::new(), |what| vec![text("message", what.clone())]);
+        let fields = result.iter().cloned().collect();
         out.event(&event(place, Direction::Answer, "message", fields, result.map(|_| ()).map_err(refusal)))?;
         Ok(())
     }
@@ -459,44 +446,27 @@ fn disparity_holds(line: Window) -> bool {
 
 fn master(head: Received, symbol: Result<MasterSymbol, Error>, place: Place) -> Event {
     let mut fields = Vec::new();
-    fields.extend(symbol.ok().map(|symbol| text("SYMBOL", master_symbol(symbol))));
-    fields.push(number("FIRST", head.byte.first().into(), ""));
-    fields.push(number("MSYNC", head.byte.msync().into(), ""));
+    fields.extend(symbol.ok().map(|symbol| Field::text("SYMBOL", symbol)));
+    fields.push(Field::number("FIRST", head.byte.first()));
+    fields.push(Field::number("MSYNC", head.byte.msync()));
     if head.extra_bits > 0 {
-        fields.push(number("EXTRA", head.extra_bits.into(), "bit"));
+        fields.push(Field::measured("EXTRA", head.extra_bits, "bit"));
     }
     event(place, Direction::Request, "H-frame", fields, symbol.map(|_| ()).map_err(refusal))
 }
 
-fn master_symbol(symbol: MasterSymbol) -> String {
-    match symbol {
-        MasterSymbol::Data(nibble) => format!("{:X}", nibble.get()),
-        other => format!("{other:?}").to_uppercase(),
-    }
-}
-
-fn encoder_symbol(byte: EncoderByte) -> String {
+/// The symbol, or the five bits of one without a meaning.
+fn encoder_symbol(byte: EncoderByte) -> Field {
     match byte.symbol() {
-        Ok(EncoderSymbol::Data(nibble)) => format!("{:X}", nibble.get()),
-        Ok(other) => format!("{other:?}").to_uppercase(),
-        Err(_) => format!("{:02X}h", byte.raw() & 31),
+        Ok(symbol) => Field::text("SYMBOL", symbol),
+        Err(_) => Field::text("SYMBOL", format_args!("{:02X}h", byte.raw() & 31)),
     }
 }
 
 type Refused = (&'static str, String);
 
 fn refusal(error: Error) -> Refused {
-    let class = match error {
-        Error::InvalidWord { .. } => "invalid_word",
-        Error::AccelerationCrc { .. } => "acceleration_crc",
-        Error::EncoderError => "encoder_error",
-        Error::Crc { .. } => "crc",
-        Error::PositionInvalid { .. } => "position_invalid",
-        Error::EncoderIdMismatch { .. } => "encoder_id",
-        Error::UndefinedSymbol { .. } => "undefined_symbol",
-        _ => "message",
-    };
-    (class, error.to_string())
+    (error.class().name(), error.to_string())
 }
 
 fn event(
@@ -508,25 +478,11 @@ fn event(
 ) -> Event {
     let verdict = match verdict {
         Ok(()) => Verdict::Ok,
-        Err((class, reason)) => {
-            Verdict::Refused(Box::new(Refusal { class, reason, field: None, bit: None, time: None, cause: None }))
-        }
+        Err((class, reason)) => Refusal::new(class, reason).into(),
     };
-    Event { place, direction: Some(direction), kind: kind.into(), fields, position: None, delay: None, verdict }
+    Event::new(place, Some(direction), kind, fields, verdict)
 }
 
 fn position(counts: u64) -> Position {
     Position { counts: i64::try_from(counts).unwrap_or(i64::MAX), span: Some(1 << 40), per_turn: None }
-}
-
-fn number(name: &'static str, value: i64, unit: &'static str) -> Field {
-    Field { name, value: Value::Number { value, unit } }
-}
-
-fn hex(name: &'static str, value: u64, digits: usize) -> Field {
-    Field { name, value: Value::Hex { value, digits } }
-}
-
-fn text(name: &'static str, value: String) -> Field {
-    Field { name, value: Value::Text(value) }
 }

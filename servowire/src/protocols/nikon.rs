@@ -182,7 +182,7 @@ impl Decoder {
         let still = self.cut_until.take().is_some_and(|until| group.start() < until);
         if (at_once || still) && !event.verdict.is_ok() {
             self.cut_until = Some(group.start() + LONGEST_BITS * self.bit);
-            return out.event(&describe::cut(group.place(), "the capture begins inside a frame"));
+            return out.event(&Event::cut(group.place()));
         }
         out.event(&event)
     }
@@ -306,7 +306,7 @@ impl StartStop for Decoder {
                     .is_ok_and(|expected| self.open.contents.len() < usize::from(expected.layout().frames())),
             };
             if recent && short {
-                return out.event(&describe::cut_off(self.open.place()));
+                return out.event(&Event::cut_off(self.open.place(), "a request or reply"));
             }
             self.close(out)?;
         }

@@ -4,7 +4,6 @@
 //! changed since the block of the same drive and direction before it. The counter is only mentioned where it does
 //! not stand still or go on by one.
 
-use std::borrow::Cow;
 use std::collections::HashMap;
 use std::io;
 
@@ -95,15 +94,8 @@ impl Decoder {
         if notes.is_empty() || self.settings.mac_id.is_some() {
             return Ok(());
         }
-        out.event(&Event {
-            place: Place::Line(0),
-            direction: None,
-            kind: Cow::Borrowed("log"),
-            fields: vec![Field { name: "note", value: Value::Text(notes.join("; ")) }],
-            position: None,
-            delay: None,
-            verdict: Verdict::Ok,
-        })
+        let fields = vec![Field::text("note", notes.join("; "))];
+        out.event(&Event::new(Place::Line(0), None, "log", fields, Verdict::Ok))
     }
 
     /// Where a block is: in update periods, if the period is known, else in the log.
@@ -138,19 +130,12 @@ impl Decoder {
             }
             notes(&report, findings, &mut fields);
         } else {
-            let text = block.iter().map(|byte| format!("{byte:02X}")).collect::<Vec<_>>().join(" ");
-            fields.push(Field { name: "bytes", value: Value::Text(text) });
+            fields.push(Field::digits("bytes", block.iter().copied(), 2));
         }
         let (direction, word) = if header.response { (Direction::Answer, "rsp") } else { (Direction::Request, "cmd") };
-        Some(Event {
-            place,
-            direction: Some(direction),
-            kind: Cow::Owned(format!("{word} {}", header.mac_id)),
-            fields,
-            position: self.position(&report),
-            delay: None,
-            verdict: verdict(&report),
-        })
+        let kind = format!("{word} {}", header.mac_id);
+        let position = self.position(&report);
+        Some(Event { position, ..Event::new(place, Some(direction), kind, fields, verdict(&report)) })
     }
 
     /// The actual position, where only one drive is looked at: the figures are made for one axis.
@@ -188,8 +173,7 @@ fn changed(report: &Report, before: &Report, fields: &mut Vec<Field>) {
         match (new.value, old) {
             (inspect::Value::Number(counter), Some(inspect::Value::Number(last))) if new.first == 0 => {
                 if counter != (last + 1) % 4 {
-                    let text = format!("{last} -> {counter}: not the next");
-                    fields.push(Field { name: new.name, value: Value::Text(text) });
+                    fields.push(Field::text(new.name, format_args!("{last} -> {counter}: not the next")));
                 }
             }
             _ => fields.push(field(&new)),
@@ -203,7 +187,7 @@ fn notes(report: &Report, findings: Vec<String>, fields: &mut Vec<Field>) {
     let cause = report.cause.map(|cause| cause.to_string());
     let text = findings.into_iter().chain(said).chain(strict).chain(cause).collect::<Vec<_>>().join("; ");
     if !text.is_empty() {
-        fields.push(Field { name: "note", value: Value::Text(text) });
+        fields.push(Field::text("note", text));
     }
 }
 
@@ -219,13 +203,12 @@ fn flag_field(flags: &[inspect::Field], block: &[u8], name: &'static str) -> Fie
 }
 
 fn field(field: &inspect::Field) -> Field {
-    let value = match field.value {
-        inspect::Value::Number(value) => Value::Number { value, unit: "" },
-        inspect::Value::Bit(bit) => Value::Number { value: bit.into(), unit: "" },
-        inspect::Value::Hex(value) => Value::Hex { value: value.into(), digits: if value > 0xff { 4 } else { 2 } },
-        other => Value::Text(other.to_string()),
-    };
-    Field { name: field.name, value }
+    match field.value {
+        inspect::Value::Number(value) => Field::number(field.name, value),
+        inspect::Value::Bit(bit) => Field::number(field.name, bit),
+        inspect::Value::Hex(value) => Field::hex(field.name, value, if value > 0xff { 4 } else { 2 }),
+        other => Field::text(field.name, other),
+    }
 }
 
 /// A block that a drive takes is good; what strict decoding says of it is a note.
@@ -237,12 +220,7 @@ fn verdict(report: &Report) -> Verdict {
         Error::SubChk { .. } | Error::SubCommandCode { .. } => Some(16),
         _ => None,
     };
-    Verdict::Refused(Box::new(Refusal {
-        class: error.class().name(),
-        reason: error.to_string(),
-        field: at.map(|byte: u8| format!("byte {byte}")),
-        bit: None,
-        time: None,
-        cause: report.cause.map(|cause| cause.to_string()),
-    }))
+    let field = at.map(|byte: u8| format!("byte {byte}"));
+    let cause = report.cause.map(|cause| cause.to_string());
+    Refusal { field, cause, ..Refusal::new(error.class().name(), error) }.into()
 }

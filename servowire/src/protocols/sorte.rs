@@ -11,7 +11,7 @@ use sorte_proto::{
 };
 
 use crate::capture::pcapng::{Packet, Pcapng};
-use crate::event::{Direction, Event, Field, Place, Refusal, Value, Verdict};
+use crate::event::{Direction, Event, Field, Place, Refusal, Verdict};
 use crate::line::Stop;
 use crate::output::{Output, Sink};
 
@@ -52,7 +52,7 @@ fn event(packet: &Packet) -> Event {
     let frame = if packet.link == DataLink::ETHERNET { long(&packet.bytes) } else { exchange(&packet.bytes) };
     let (kind, fields, verdict) = match frame {
         Ok((kind, fields)) => (kind, fields, Verdict::Ok),
-        Err(error) => (guess(packet), Vec::new(), refused(error)),
+        Err(error) => (guess(packet), Vec::new(), Refusal::new(error.class().name(), error).into()),
     };
     let direction = match (packet.link, packet.inbound) {
         (DataLink::ETHERNET, Some(true)) => Some(Direction::Answer),
@@ -61,7 +61,7 @@ fn event(packet: &Packet) -> Event {
     };
     let end = packet.time.saturating_add(BYTE.saturating_mul(packet.bytes.len() as i64));
     let place = Place::Time { start: packet.time, end };
-    Event { place, direction, kind: kind.into(), fields, position: None, delay: None, verdict }
+    Event::new(place, direction, kind, fields, verdict)
 }
 
 /// What a refused packet was meant to be.
@@ -82,21 +82,21 @@ fn long(bytes: &[u8]) -> Decoded {
     match frame.frame_type() {
         FrameType::Discovery => {
             let view = DiscoveryView::of(frame)?;
-            fields.push(number("devices", view.count(), ""));
-            fields.push(number("in", view.input_total(), ""));
-            fields.push(number("out", view.output_total(), ""));
+            fields.push(Field::number("devices", view.count()));
+            fields.push(Field::number("in", view.input_total()));
+            fields.push(Field::number("out", view.output_total()));
         }
         FrameType::Param => {
             let parameters = ParamView::of(frame)?.parameters();
-            fields.push(number("cycle_time", parameters.cycle_time_ns, "ns"));
-            fields.push(number("delay_burst", parameters.delay_burst, ""));
-            fields.push(number("ipg", i64::from(parameters.ipg_5ns) * 5, "ns"));
-            fields.push(hex("crc_mode", parameters.crc_mode.byte().into(), 2));
+            fields.push(Field::measured("cycle_time", parameters.cycle_time_ns, "ns"));
+            fields.push(Field::number("delay_burst", parameters.delay_burst));
+            fields.push(Field::measured("ipg", i64::from(parameters.ipg_5ns) * 5, "ns"));
+            fields.push(Field::hex("crc_mode", parameters.crc_mode.byte(), 2));
         }
         FrameType::Sync => {
             let view = SyncView::of(frame)?;
-            fields.push(number("time stamp", view.time_stamp_ns(), "ns"));
-            fields.push(number("delay", view.delay_ns(), "ns"));
+            fields.push(Field::measured("time stamp", view.time_stamp_ns(), "ns"));
+            fields.push(Field::measured("delay", view.delay_ns(), "ns"));
         }
         FrameType::DelayReq | FrameType::DelayResp => {}
         _ => fields.push(data(frame.payload())),
@@ -111,47 +111,27 @@ fn exchange(bytes: &[u8]) -> Decoded {
         // Four bytes a device is the CNC machine; anything else is shown as it is.
         if view.output().len() % 4 == 0 && view.output().len() <= 16 {
             let slices = view.output().chunks_exact(4).filter_map(|bytes| bytes.first_chunk());
-            fields.extend(
-                PTO.into_iter().zip(slices).map(|(name, bytes)| text(name, Slice::parse(*bytes).pto.to_string())),
-            );
+            fields.extend(PTO.into_iter().zip(slices).map(|(name, bytes)| Field::text(name, Slice::parse(*bytes).pto)));
         } else {
             fields.push(data(view.output()));
         }
-        fields.push(number("time stamp", view.time_stamp(), "ns"));
+        fields.push(Field::measured("time stamp", view.time_stamp(), "ns"));
         return Ok(("master", fields));
     }
     let view = DeviceFrameView::new(bytes.len().saturating_sub(DeviceFrameView::OVERHEAD), bytes)?;
-    Ok(("device", vec![number("SA", view.address().get(), ""), status(view.status()), data(view.payload())]))
+    Ok(("device", vec![Field::number("SA", view.address().get()), status(view.status()), data(view.payload())]))
 }
 
-fn number(name: &'static str, value: impl Into<i64>, unit: &'static str) -> Field {
-    Field { name, value: Value::Number { value: value.into(), unit } }
-}
-
-fn hex(name: &'static str, value: u64, digits: usize) -> Field {
-    Field { name, value: Value::Hex { value, digits } }
-}
-
-fn text(name: &'static str, text: String) -> Field {
-    Field { name, value: Value::Text(text) }
-}
-
+/// Bytes that are shown as they are, without spaces.
 fn data(bytes: &[u8]) -> Field {
     let mut digits = String::new();
     for byte in bytes {
         // A String takes everything.
         let _ = write!(digits, "{byte:02X}");
     }
-    text("data", digits)
+    Field::text("data", digits)
 }
 
 fn status(status: Status) -> Field {
-    let set = status.iter_names().map(|(name, _)| name).collect();
-    Field { name: "STATUS", value: Value::Flags { raw: status.bits().into(), digits: 2, set } }
-}
-
-fn refused(error: Error) -> Verdict {
-    let class = error.class().name();
-    let reason = error.to_string();
-    Verdict::Refused(Box::new(Refusal { class, reason, field: None, bit: None, time: None, cause: None }))
+    Field::flags("STATUS", &status, 2)
 }

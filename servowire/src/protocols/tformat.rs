@@ -126,7 +126,7 @@ impl Decoder {
             self.skipped = frame.end;
             self.skip = begin.map(|begin| begin + LONGEST_BITS * self.bit).or(still);
             self.cut_until = self.skip;
-            return out.event(&describe::cut(frame.place(), "the capture begins inside a frame"));
+            return out.event(&Event::cut(frame.place()));
         }
         out.event(&event)
     }
@@ -280,7 +280,7 @@ impl StartStop for Decoder {
             let request = self.pending.is_none()
                 && self.open.data_id().is_ok_and(|id| self.open.fields == usize::from(id.request_fields()));
             if recent && !request {
-                return out.event(&describe::cut_off(self.open.place()));
+                return out.event(&Event::cut_off(self.open.place(), "a frame"));
             }
             self.close(out)?;
         }

@@ -1,12 +1,12 @@
 //! T-Format frames as events: names, values, positions, reasons.
 
-use std::borrow::Cow;
+use std::sync::LazyLock;
 
-use tformat::{Abs, Adf, AllData, Almc, DataId, Error, Memory, Request, Resolution, Response, StatusField};
+use tformat::{Abs, Adf, AllData, DataId, Error, Memory, Request, Resolution, Response};
 
 use super::frame::Frame;
 use super::{ANSWER_TIMEOUT, Settings};
-use crate::event::{Direction, Event, Field, NO_RESPONSE, Place, Position, Refusal, Value, Verdict};
+use crate::event::{Direction, Event, Field, Place, Position, Refusal, Value, Verdict};
 
 /// The fields an event may have.
 pub const FIELDS: &[&str] =
@@ -16,13 +16,13 @@ pub const FIELDS: &[&str] =
 pub(super) fn request(frame: &Frame, id: Option<DataId>, result: Result<Request, Error>) -> Event {
     let mut fields = Vec::new();
     match result {
-        Ok(Request::WriteEeprom { adf, edf }) => fields.extend([address(adf), hex("EDF", edf)]),
+        Ok(Request::WriteEeprom { adf, edf }) => fields.extend([address(adf), Field::hex("EDF", edf, 2)]),
         Ok(Request::ReadEeprom { adf }) => fields.push(address(adf)),
         Ok(request) => fields.extend(resets(request.data_id())),
-        Err(_) => fields.push(bytes(frame)),
+        Err(_) => fields.push(Field::digits("bytes", frame.bytes().iter().copied(), 2)),
     }
     fields.extend(spikes(frame));
-    let names = id.map_or(&["CF"][..], request_names);
+    let names = id.map_or(&["CF"][..], |id| id.layout().0);
     event(frame, Direction::Request, id, fields, verdict(frame, names, result.err()))
 }
 
@@ -56,13 +56,13 @@ impl Encoder {
                     position = self.response(Response::ReadAll(full), &mut fields);
                 }
             }
-            Err(_) => fields.push(bytes(frame)),
+            Err(_) => fields.push(Field::digits("bytes", frame.bytes().iter().copied(), 2)),
         }
         if result.is_ok() {
-            fields.extend(frame.bytes().last().map(|crc| hex("CRC", *crc)));
+            fields.extend(frame.bytes().last().map(|crc| Field::hex("CRC", *crc, 2)));
         }
         fields.extend(spikes(frame));
-        let names = frame.data_id().ok().or(id).map_or(&["CF"][..], answer_names);
+        let names = frame.data_id().ok().or(id).map_or(&["CF"][..], |id| id.layout().1);
         let mut event = event(frame, Direction::Answer, id, fields, verdict(frame, names, result.err()));
         event.position = position;
         event.delay = delay;
@@ -70,7 +70,7 @@ impl Encoder {
     }
 
     fn response(&mut self, response: Response, fields: &mut Vec<Field>) -> Option<Position> {
-        fields.extend(response.status().map(status));
+        fields.extend(response.status().map(|sf| Field::flags("SF", &sf, 2)));
         match response {
             Response::ReadSingleTurn(v) => self.single_turn(v.abs, fields),
             Response::ResetErrors(v) | Response::SetSingleTurnZero(v) | Response::ResetTurnsAndErrors(v) => {
@@ -79,7 +79,7 @@ impl Encoder {
                 position
             }
             Response::ReadMultiTurn(v) => {
-                fields.push(number("ABM", v.abm.get()));
+                fields.push(Field::number("ABM", v.abm.get()));
                 None
             }
             Response::ReadEncoderId(v) => {
@@ -90,7 +90,7 @@ impl Encoder {
             Response::WriteEeprom(Memory { adf, edf }) | Response::ReadEeprom(Memory { adf, edf }) => {
                 fields.push(address(adf));
                 if !adf.busy() {
-                    fields.push(hex("EDF", edf));
+                    fields.push(Field::hex("EDF", edf, 2));
                 }
                 None
             }
@@ -98,10 +98,10 @@ impl Encoder {
     }
 
     fn full(&mut self, full: AllData, fields: &mut Vec<Field>) -> Option<Position> {
-        fields.push(number("ABS", full.abs.get()));
+        fields.push(Field::number("ABS", full.abs.get()));
         self.identify(full.enid, fields);
-        fields.push(number("ABM", full.abm.get()));
-        fields.push(alarms(full.almc));
+        fields.push(Field::number("ABM", full.abm.get()));
+        fields.push(Field::flags("ALMC", &full.almc, 2));
         let resolution = self.resolution()?;
         match resolution.position(full.abs, full.abm) {
             Ok(position) => Some(Position {
@@ -114,7 +114,7 @@ impl Encoder {
     }
 
     fn single_turn(&self, abs: Abs, fields: &mut Vec<Field>) -> Option<Position> {
-        fields.push(number("ABS", abs.get()));
+        fields.push(Field::number("ABS", abs.get()));
         let Some(resolution) = self.resolution() else {
             return Some(Position { counts: abs.get().into(), span: None, per_turn: None });
         };
@@ -126,7 +126,7 @@ impl Encoder {
     }
 
     fn identify(&mut self, enid: u8, fields: &mut Vec<Field>) {
-        fields.push(Field { name: "ENID", value: Value::Number { value: enid.into(), unit: "" } });
+        fields.push(Field::number("ENID", enid));
         self.hint = Resolution::from_enid(enid).map(|hint| hint.resolution);
     }
 
@@ -139,69 +139,21 @@ impl Encoder {
     }
 }
 
-/// A frame that the capture holds only in part: no fault of the line.
-pub(super) fn cut(place: Place, what: &str) -> Event {
-    Event {
-        place,
-        direction: None,
-        kind: Cow::Borrowed("cut"),
-        fields: vec![Field { name: "note", value: Value::Text(what.to_owned()) }],
-        position: None,
-        delay: None,
-        verdict: Verdict::Ok,
-    }
-}
-
-/// A piece of a frame at the end of the capture: what comes then is not known, so it is not sound.
-pub(super) fn cut_off(place: Place) -> Event {
-    let reason = "the capture ends inside a frame".to_owned();
-    let cause = Some("the file was cut off, or recording stopped there".to_owned());
-    let refusal = Refusal { class: "truncated", reason, field: None, bit: None, time: None, cause };
-    Event { fields: Vec::new(), verdict: Verdict::Refused(Box::new(refusal)), ..cut(place, "") }
-}
-
 /// No answer came to the request at `place` until `now`.
 pub(super) fn silence(request: Request, place: Place, now: i64) -> Event {
-    let (place, reason) = match place {
-        Place::Time { end: start, .. } => {
-            let end = start.saturating_add(ANSWER_TIMEOUT).min(now);
-            let reason = format!("no answer within {:.1} us", (end - start) as f64 / 1e6);
-            (Place::Time { start, end }, reason)
-        }
-        Place::Line(_) => (place, "no answer before the next request".to_owned()),
-    };
     let cause = "only the request is on the line: no encoder, A and B exchanged, or not its bit rate";
-    let refusal =
-        Refusal { class: NO_RESPONSE, reason, field: None, bit: None, time: None, cause: Some(cause.to_owned()) };
-    Event {
-        place,
-        direction: Some(Direction::Answer),
-        kind: kind(Some(request.data_id())),
-        fields: Vec::new(),
-        position: None,
-        delay: None,
-        verdict: Verdict::Refused(Box::new(refusal)),
-    }
+    Event::silence(place, kind(Some(request.data_id())), "answer", ANSWER_TIMEOUT, now, cause)
 }
 
 fn event(frame: &Frame, direction: Direction, id: Option<DataId>, fields: Vec<Field>, verdict: Verdict) -> Event {
-    let (direction, kind) = (Some(direction), kind(id));
-    Event { place: frame.place(), direction, kind, fields, position: None, delay: None, verdict }
+    Event::new(frame.place(), Some(direction), kind(id), fields, verdict)
 }
 
-fn kind(id: Option<DataId>) -> Cow<'static, str> {
-    Cow::Borrowed(match id {
-        Some(DataId::ReadSingleTurn) => "ID 0",
-        Some(DataId::ReadMultiTurn) => "ID 1",
-        Some(DataId::ReadEncoderId) => "ID 2",
-        Some(DataId::ReadAll) => "ID 3",
-        Some(DataId::WriteEeprom) => "ID 6",
-        Some(DataId::ResetErrors) => "ID 7",
-        Some(DataId::SetSingleTurnZero) => "ID 8",
-        Some(DataId::ResetTurnsAndErrors) => "ID C",
-        Some(DataId::ReadEeprom) => "ID D",
-        None => "ID ?",
-    })
+/// The data ID as it displays itself, written once and not for every frame.
+fn kind(id: Option<DataId>) -> &'static str {
+    static NAMES: LazyLock<[(DataId, String); 9]> = LazyLock::new(|| DataId::ALL.map(|id| (id, id.to_string())));
+    let name = |id| NAMES.iter().find(|(known, _)| *known == id).map(|(_, name)| name.as_str());
+    id.and_then(name).unwrap_or("ID ?")
 }
 
 /// What a reset request clears. One of ten has to be seen ten times to have an effect.
@@ -212,17 +164,7 @@ fn resets(id: DataId) -> Option<Field> {
         DataId::ResetTurnsAndErrors => "turns and errors",
         _ => return None,
     };
-    Some(Field { name: "resets", value: Value::Text(what.to_owned()) })
-}
-
-fn status(sf: StatusField) -> Field {
-    let set = sf.iter_names().map(|(name, _)| name).collect();
-    Field { name: "SF", value: Value::Flags { raw: sf.bits().into(), digits: 2, set } }
-}
-
-fn alarms(almc: Almc) -> Field {
-    let set = almc.iter_names().map(|(name, _)| name).collect();
-    Field { name: "ALMC", value: Value::Flags { raw: almc.bits().into(), digits: 2, set } }
+    Some(Field::text("resets", what))
 }
 
 fn address(adf: Adf) -> Field {
@@ -230,51 +172,15 @@ fn address(adf: Adf) -> Field {
     Field { name: "ADF", value: Value::Flags { raw: adf.bits().into(), digits: 2, set } }
 }
 
-fn number(name: &'static str, value: u32) -> Field {
-    Field { name, value: Value::Number { value: value.into(), unit: "" } }
-}
-
-fn hex(name: &'static str, byte: u8) -> Field {
-    Field { name, value: Value::Hex { value: byte.into(), digits: 2 } }
-}
-
-fn bytes(frame: &Frame) -> Field {
-    let text = frame.bytes().iter().map(|byte| format!("{byte:02X}")).collect::<Vec<_>>().join(" ");
-    Field { name: "bytes", value: Value::Text(text) }
-}
-
 fn spikes(frame: &Frame) -> Option<Field> {
-    let value = Value::Number { value: frame.spikes.into(), unit: "" };
-    (frame.spikes > 0).then_some(Field { name: "spikes", value })
+    (frame.spikes > 0).then(|| Field::number("spikes", frame.spikes))
 }
 
 /// The position does not fit the encoder: said beside the values, which are those of the line.
 fn too_wide(error: Error, resolution: Resolution, fields: &mut Vec<Field>) -> Option<Position> {
     let text = format!("{error}; taken as {} + {} bits", resolution.abs_bits(), resolution.abm_bits());
-    fields.push(Field { name: "width", value: Value::Text(text) });
+    fields.push(Field::text("width", text));
     None
-}
-
-/// Fields of a request.
-fn request_names(id: DataId) -> &'static [&'static str] {
-    match id {
-        DataId::WriteEeprom => &["CF", "ADF", "EDF", "CRC"],
-        DataId::ReadEeprom => &["CF", "ADF", "CRC"],
-        _ => &["CF"],
-    }
-}
-
-/// Fields of an answer.
-fn answer_names(id: DataId) -> &'static [&'static str] {
-    match id {
-        DataId::ReadSingleTurn | DataId::ResetErrors | DataId::SetSingleTurnZero | DataId::ResetTurnsAndErrors => {
-            &["CF", "SF", "ABS0", "ABS1", "ABS2", "CRC"]
-        }
-        DataId::ReadMultiTurn => &["CF", "SF", "ABM0", "ABM1", "ABM2", "CRC"],
-        DataId::ReadEncoderId => &["CF", "SF", "ENID", "CRC"],
-        DataId::ReadAll => &["CF", "SF", "ABS0", "ABS1", "ABS2", "ENID", "ABM0", "ABM1", "ABM2", "ALMC", "CRC"],
-        DataId::WriteEeprom | DataId::ReadEeprom => &["CF", "ADF", "EDF", "CRC"],
-    }
 }
 
 fn verdict(frame: &Frame, names: &[&'static str], error: Option<Error>) -> Verdict {
@@ -283,14 +189,8 @@ fn verdict(frame: &Frame, names: &[&'static str], error: Option<Error>) -> Verdi
     // A field that is missing should have begun where the frame ends.
     let start = field.map(|field| frame.bytes().get(field).and(frame.starts.get(field)).copied().unwrap_or(frame.end));
     let start = start.filter(|_| frame.line.is_none());
-    Verdict::Refused(Box::new(Refusal {
-        class: error.class().name(),
-        reason: error.to_string(),
-        field: field.and_then(|field| names.get(field)).map(|name| (*name).to_owned()),
-        bit,
-        time: start,
-        cause: None,
-    }))
+    let field = field.and_then(|field| names.get(field)).map(|name| (*name).to_owned());
+    Refusal { field, bit, time: start, ..Refusal::new(error.class().name(), error) }.into()
 }
 
 /// The field in which an error shows, and the first bit of it that is wrong: 0 is the start bit.
