@@ -48,10 +48,10 @@ impl Abs40 {
     /// Decodes the response from its 72 line bits, the first of them at the beginning of `line`. `expected` is of layout
     /// [`Layout::Abs40`]; its address and command are checked.
     ///
-    /// For a window at another bit offset see [`Response::parse_line`], which gives the same.
+    /// For a window at another bit offset see [`Response::parse_line`](crate::Response::parse_line), which gives the same.
     ///
     /// # Errors
-    /// As [`Response::parse_line`].
+    /// As [`Response::parse_line`](crate::Response::parse_line).
     #[inline(always)]
     pub fn parse_line(expected: &Expected, line: &[u8; Self::LINE_BYTES], order: BitOrder) -> Result<Self, Error> {
         match Self::of_words(expected, load(line, order)) {

@@ -12,7 +12,7 @@ pub(crate) const SYNC_CODE: u8 = 4;
 
 /// What is known about a response before it comes: its layout, the command, the address, the arguments that it repeats.
 ///
-/// [`Request::expected`] makes it from a request; [`Expected::new`] serves captures whose request is not at hand.
+/// [`Request::expected`](crate::Request::expected) makes it from a request; [`Expected::new`] serves captures whose request is not at hand.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Expected {
