@@ -46,7 +46,7 @@ pub(crate) fn next_word(register: u8, content: u16) -> u8 {
 ///
 /// ```
 /// use nikon_aformat::Crc8;
-/// // a raw to command 1 as a vendor manual prints it: 3E03 00EF DF35, the last byte is the CRC
+/// // a response to command 1 as a vendor manual prints it: 3E03 00EF DF35, the last byte is the CRC
 /// let by_word = Crc8::new().word(0x3e03).word(0x00ef).byte(0xdf);
 /// assert_eq!(by_word.get(), 0x35);
 /// assert_eq!(by_word.byte(0x35).get(), 0);

@@ -11,7 +11,7 @@
 //! use nikon_aformat::{BitOrder, Command, Expected, Layout, RawResponse, Response};
 //! use nrz_line::Samples;
 //!
-//! // three idle bits, then the raw to command 1 that a vendor's manual shows
+//! // three idle bits, then the response to command 1 that a vendor's manual shows
 //! let line = RawResponse::from_words(Layout::Abs24, &[0x3e03, 0x00ef, 0xdf35], BitOrder::MsbFirst)?.line();
 //! let mut samples = Samples::partial((line.bits() << 3 | 0b111) as u64, line.len() + 3);
 //!

@@ -106,7 +106,7 @@ impl Response {
     ///
     /// ```
     /// use nikon_aformat::{BitOrder, Command, Expected, Layout, Response};
-    /// // the raw that the manual of a vendor's driver shows: encoder 0, command 4, 17 + 16 bits
+    /// // the response that the manual of a vendor's driver shows: encoder 0, command 4, 17 + 16 bits
     /// let expected = Expected::new(Layout::Abs40, Command::Abs40Mt);
     /// let raw = Response::parse_words(&expected, &[0x2085, 0xf64a, 0x8009, 0x80a1], BitOrder::MsbFirst)?;
     /// let abs = raw.abs40().map_or(0, |abs| abs.get());

@@ -14,7 +14,7 @@ use nikon_aformat::master::{EepromRead, GuardedReset, Line, Progress, Reset, Ste
 use nikon_aformat::{BitRate, EncoderAddress, EncoderId, Error, Request, Resolution, Response, UserAddress};
 use servowire_world::{Kind, Scenario, Tally};
 
-/// Every open point, by the bits of a number.
+/// Four of the open points, by the bits of a number.
 fn behaviour(seed: u64) -> Behaviour {
     let behaviour = Behaviour::new().with_turn_around_ns([2_800, 900, 5_000, 15_000][(seed >> 3) as usize % 4]);
     let behaviour = if seed & 1 == 0 { behaviour } else { behaviour.not_busy_in_first_read() };

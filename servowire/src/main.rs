@@ -1,4 +1,4 @@
-//! `servowire decode [FILES...]`
+//! The program `servowire`: its commands are in the library, module `cli`.
 
 use std::process::ExitCode;
 

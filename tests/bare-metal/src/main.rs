@@ -1,7 +1,7 @@
 //! The protocol crates on a Cortex-M4: every number of the vectors' tables is decoded again here, and the
 //! instructions of each entry point that firmware calls are counted.
 //!
-//! `run.sh` builds this image twice, runs it under QEMU and reads what it prints:
+//! `run.sh` builds an image for each protocol at two levels of optimisation, runs it under QEMU and reads what it prints:
 //!
 //! ```text
 //! self-test   <topic>    <rows passed>     <rows failed>
