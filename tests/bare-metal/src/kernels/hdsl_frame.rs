@@ -49,7 +49,7 @@ impl Link {
     fn frame(&mut self, step: Step) -> u32 {
         self.position = self.position.wrapping_add(77);
         self.count = self.count.wrapping_add(1);
-        if self.count % 100 == 0 && self.master.state() == State::Running {
+        if self.count.is_multiple_of(100) && self.master.state() == State::Running {
             let _ = self.master.start_short(ShortRequest::Read(RemoteRegister::PING));
             let _ = self.master.start_long(LongRequest::read_name(ResourceAddress::RESOLUTN));
         }
@@ -65,7 +65,7 @@ impl Link {
 #[expect(unsafe_code, reason = "the symbol is how run.sh finds the kernel")]
 #[inline(never)]
 #[unsafe(no_mangle)]
-fn hdsl_frame(link: &mut Link, samples: &[u8; WINDOW], _: u64) -> Window {
+extern "Rust" fn hdsl_frame(link: &mut Link, samples: &[u8; WINDOW], _: u64) -> Window {
     let _ = link.master.finish(samples, None);
     link.master.transmission().head.bits()
 }
@@ -74,7 +74,7 @@ fn hdsl_frame(link: &mut Link, samples: &[u8; WINDOW], _: u64) -> Window {
 #[expect(unsafe_code, reason = "the symbol is how run.sh finds the kernel")]
 #[inline(never)]
 #[unsafe(no_mangle)]
-fn hdsl_frame_bits(link: &mut Link, _: &[u8; WINDOW], bits: u64) -> Window {
+extern "Rust" fn hdsl_frame_bits(link: &mut Link, _: &[u8; WINDOW], bits: u64) -> Window {
     let _ = link.master.finish_bits(bits, None, None);
     link.master.transmission().head.bits()
 }
@@ -83,7 +83,7 @@ fn hdsl_frame_bits(link: &mut Link, _: &[u8; WINDOW], bits: u64) -> Window {
 #[expect(unsafe_code, reason = "the symbol is how run.sh finds the kernel")]
 #[inline(never)]
 #[unsafe(no_mangle)]
-fn hdsl_frame_registers(map: &mut Registers, report: &Report) -> Interrupts {
+extern "Rust" fn hdsl_frame_registers(map: &mut Registers, report: &Report) -> Interrupts {
     map.apply(report)
 }
 
