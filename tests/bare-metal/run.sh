@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# Builds an image for each protocol at opt-level 3 and s, runs it under QEMU, and checks: vector rows, instruction counts against
-# budget.toml, and that no panic can be reached from any kernel.
+# Builds an image for each protocol at opt-level 3 and s, runs it under QEMU, and checks: vector rows, instruction counts and
+# stacks against budget.toml, and that no panic can be reached from any kernel.
 #
 #   run.sh             check
 #   run.sh --record    the same, and write the measured figures into budget.toml
@@ -58,5 +58,7 @@ for level in O3 Os; do
         build "$level" "$protocol" "$protocol-$level"
         run "$protocol-$level"
     done
+    build "$level" stack,sorte-proto "stack-$level"
+    run "stack-$level"
 done
 python3 report.py table "$objdump" "$images" "$@"

@@ -4,7 +4,7 @@ use core::hint::black_box;
 
 use nom::{IResult, Parser};
 use sorte_proto::cut_through::{DiscoveryRewriter, SyncRewriter};
-use sorte_proto::device::{self, Arrival, Device, Handled, Path, PortId};
+use sorte_proto::device::{self, Arrival, Device, Handled, Passage, Path, PortId};
 use sorte_proto::drv8711::{
     self, Apply, Configuration, IsGain, Next, Register, full_scale_microamps, torque_for_microamps,
 };
@@ -83,6 +83,32 @@ const fn generators(variant: Variant) -> [Sync0; 5] {
     let mut both = overlapping;
     let _ = both.cmp7(OVERLAPPING);
     [idle, pending, deferred, overlapping, both]
+}
+
+/// Head of DISCOVERY; the check is not looked at until its end.
+const DISCOVERY: [u8; 1030] = {
+    let mut frame = [0; 1030];
+    frame[0] = 0xff;
+    frame[2] = 1;
+    frame
+};
+
+/// Bytes through a device, one after the other; the last that it sends.
+fn through(frame: &[u8]) -> (u8, Option<Path>) {
+    let mut device = Device::new(device::Config::new());
+    device.links(true, false);
+    let mut passage = device.begin(PortId::A);
+    let mut last = 0;
+    for byte in frame {
+        last = pass(&mut passage, *byte);
+    }
+    (last, passage.path())
+}
+
+/// A byte, as an interrupt brings it: the passage is in memory between two of them.
+#[inline(never)]
+fn pass(passage: &mut Passage, byte: u8) -> u8 {
+    passage.byte(byte)
 }
 
 kernels! {
@@ -178,14 +204,16 @@ kernels! {
         head
     }];
 
-    /// 64 bytes of DISCOVERY through a device that the frame passes, as its port sees them, and the passage made before.
-    fn sorte_passage(frame: &[u8; 64]) -> ([u8; 64], Option<Path>) {
-        let mut device = Device::new(device::Config::new());
-        device.links(true, false);
-        let mut passage = device.begin(PortId::A);
-        (frame.map(|byte| passage.byte(byte)), passage.path())
+    /// A whole DISCOVERY through a device, a call for each byte, as its port sees them. 1030 bytes.
+    fn sorte_passage(frame: &[u8; 1030]) -> (u8, Option<Path>) {
+        through(frame)
+    } over [DISCOVERY];
+
+    /// The first 16 bytes of it: count, offsets, and the entry of the first device.
+    fn sorte_passage_head(frame: &[u8; 16]) -> (u8, Option<Path>) {
+        through(frame)
     } over [{
-        let mut head = [0; 64];
+        let mut head = [0; 16];
         head[0] = 0xff;
         head[2] = 1;
         head
