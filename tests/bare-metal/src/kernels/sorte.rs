@@ -4,11 +4,12 @@ use core::hint::black_box;
 
 use nom::{IResult, Parser};
 use sorte_proto::cut_through::{DiscoveryRewriter, SyncRewriter};
-use sorte_proto::device::{self, Arrival, Device, Handled, Passage, Path, PortId};
+use sorte_proto::device::{self, Arrival, Device, Forwarding, Handled, Passage, Path, PortId};
 use sorte_proto::drv8711::{
     self, Apply, Configuration, IsGain, Next, Register, full_scale_microamps, torque_for_microamps,
 };
 use sorte_proto::follow::{Asked, Feedback, Follower};
+use sorte_proto::host::{DeviceMemory, MasterMemory};
 use sorte_proto::iep::{Channel, Edge};
 use sorte_proto::master::{self, Action, Master, Outgoing};
 use sorte_proto::sync0::{Sync0, Variant, Write, Writes};
@@ -334,6 +335,23 @@ kernels! {
         let _ = (device.line_delay_next_ns(), device.cycle_zero_ns(), device.send_time_ns(), device.parameters());
         (handled, restarted)
     } over [(SYNC, PortId::A), (SYNC, PortId::B)];
+
+    /// A device that the host takes out and puts back, with what its ports do in between.
+    fn sorte_device_modes(port: &PortId) -> [Forwarding; 3] {
+        let mut device = black_box(Device::new(device::Config::default()));
+        let idle = device.forwarding(*port);
+        device.enter_error();
+        let error = device.forwarding(*port);
+        device.reset();
+        [idle, error, device.forwarding(*port)]
+    } over [PortId::A, PortId::B];
+
+    /// What the vendor's host reads of both memories.
+    fn sorte_host(ram: &[u8; 0x210]) -> (Option<master::State>, Option<u16>, bool, Option<DeviceAddress>, Option<Parameters>) {
+        let (host, device) = (MasterMemory::new(ram), DeviceMemory::new(ram));
+        let good = host.discovery().is_ok() | host.input().is_some() | host.output(16).is_some();
+        (host.state(), host.devices(), good, device.address(), device.parameters())
+    } over [[1; 0x210]];
 
     /// A device refuses an exchange it is not in.
     fn sorte_device_exchange(frame: &[u8; 21]) -> bool {
