@@ -141,6 +141,9 @@ pub fn decode(
             watch.survey(false, out)?;
         }
         watch.reach(line.reached(), out)?;
+        if out.is_over(line.reached()) {
+            break;
+        }
     }
     let end = line.reached();
     watch.survey(true, out)?;
