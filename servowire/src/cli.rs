@@ -183,6 +183,9 @@ pub struct FileArgs {
     /// The files are binary records of this many bytes, a burst each.
     #[arg(long, value_name = "BYTES", value_parser = clap::value_parser!(u16).range(1..), conflicts_with_all = ["rate", "bytes"])]
     pub record_size: Option<u16>,
+    /// The file still grows: what comes to it is decoded too, until the program is stopped.
+    #[arg(long)]
+    pub follow: bool,
     /// Voltage above which a column of an oscilloscope's table is high; otherwise half-way between its levels.
     #[arg(long, value_name = "VOLTS", allow_negative_numbers = true)]
     pub threshold: Option<f64>,
@@ -275,6 +278,7 @@ impl Decode {
             (self.file.bytes, "--bytes"),
             (self.file.record_size.is_some(), "--record-size"),
             (self.file.threshold.is_some(), "--threshold"),
+            (self.file.follow, "--follow"),
             (self.line.channel.is_some(), "--channel"),
             (self.line.tx.is_some(), "--tx"),
         ];
@@ -296,6 +300,7 @@ impl Decode {
             unit_size: usize::from(self.file.unit_size),
             record_size: self.file.record_size.map(usize::from),
             threshold: self.file.threshold,
+            grows: self.file.follow,
         }
     }
 
