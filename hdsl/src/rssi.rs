@@ -138,7 +138,7 @@ impl WordWatch {
     /// After the first `bytes` + 1 bytes of the last word.
     pub(crate) const fn finish(self, bytes: u8) -> EdgeWatch {
         let [a, b, c, d] = self.seen.to_le_bytes();
-        let last = self.previous.wrapping_shr(24_u32.wrapping_sub(bytes as u32 * 8));
+        let last = self.previous.wrapping_shr(24_u32.wrapping_sub((bytes as u32).wrapping_mul(8)));
         EdgeWatch { previous: last & 1 == 1, seen: a | b | c | d, lowest: self.lowest }
     }
 }

@@ -296,7 +296,14 @@ mod tests {
                         watch.step(*byte);
                     }
                     let bits = (slow >> from) as u64 & (u64::MAX >> 3);
-                    assert_eq!(Alignment { index, delay }.read(&samples), Ok((bits, watch)));
+                    let place = Alignment { index, delay };
+                    assert_eq!((place.read(&samples), place.bits(&samples)), (Ok((bits, watch)), Ok(bits)));
+                    // Not one byte more than the answer is needed.
+                    let short = &samples[..from + 61];
+                    assert_eq!((place.read(short), place.bits(short)), (Ok((bits, watch)), Ok(bits)));
+                    assert!(place.read(&samples[..from + 60]).is_err() && place.bits(&samples[..from + 60]).is_err());
+                    let words = core::array::from_fn(|k| u32::from_le_bytes(*samples[4 * k..].first_chunk().unwrap()));
+                    assert_eq!(place.read_words(&words), (bits, watch));
                 }
             }
         }

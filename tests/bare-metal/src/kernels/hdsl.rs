@@ -63,7 +63,8 @@ const fn samples(bits: u64, delay: usize) -> [u8; WINDOW] {
 const PATTERNS: [[u8; WINDOW]; 3] = [samples(TEST_PATTERN, 5), samples(TEST_PATTERN, 42), samples(LINES[0], 20)];
 
 /// The same with the place that is learned for their delays.
-const PLACED: [(Alignment, [u8; WINDOW]); 3] = [(PLACES[0], PATTERNS[0]), (PLACES[1], PATTERNS[1]), (PLACES[2], PATTERNS[2])];
+const PLACED: [(Alignment, [u8; WINDOW]); 3] =
+    [(PLACES[0], PATTERNS[0]), (PLACES[1], PATTERNS[1]), (PLACES[2], PATTERNS[2])];
 
 const PLACED_WORDS: [(Alignment, [u32; WINDOW / 4]); 3] =
     [(PLACES[0], words(&PATTERNS[0])), (PLACES[1], words(&PATTERNS[1])), (PLACES[2], words(&PATTERNS[2]))];
