@@ -125,12 +125,12 @@ pub(super) struct Cubic<W> {
 }
 
 impl<W: Word> Cubic<W> {
-    /// In the unit in which 1 / `inverse` is 2^bits, from a piece on an axis `wait` moments after its begin. `ahead` gives
+    /// In the unit in which 1 / `inverse` is 2^bits, with 2^shift moments in a tick, from a piece on an axis `wait` moments after its begin. `ahead` gives
     /// the steps to the next one, and the steps that it is behind.
     pub(super) fn new(
         piece: &Piece,
         wait: Real,
-        (inverse, bits): (Real, i32),
+        (inverse, bits, shift): (Real, i32, i32),
         scale: impl Fn(Real, i32) -> Real,
         ahead: impl Fn(Real) -> (Real, Real),
     ) -> Self {
@@ -148,7 +148,7 @@ impl<W: Word> Cubic<W> {
             rest if rest.is_zero() || !more => (whole, rest),
             rest => (whole + Real::ONE, Real::ONE - rest),
         };
-        let later = piece.after(wait + scale(rest / Real::new(per), -1).scaled(bits.wrapping_neg()));
+        let later = piece.after(wait + (rest / Real::new(per)).scaled(shift.wrapping_sub(bits)));
         let (ahead, behind) = ahead(later.p);
         let fixed = |x: Real| W::rounded(x * inverse, bits);
         let exact = W::rounded(whole, 0);
@@ -201,19 +201,13 @@ impl<W: Word> Cubic<W> {
         self.off.is_below(self.v.minus(self.h))
     }
 
-    /// About as many ticks as a step takes at this speed.
+    /// About as many ticks as the next step takes.
     pub(super) fn interval(&self) -> u64 {
-        self.step.quotient(self.speed()).map_or(u64::MAX, |ticks| u64::try_from(ticks).unwrap_or(0))
+        self.at_most(self.step)
     }
 
-    /// The first step, up to `last` ticks on.
-    pub(super) fn first(&self, last: u64) -> (u64, Self) {
-        if !self.off.is_negative() || last == 0 {
-            return (0, *self);
-        }
-        let zero = self.off.minus(self.off);
-        let need = zero.minus(self.off);
-        // No more than any one of v, h and j alone would take, for h and j half a power of 2.
+    /// Ticks for a way: no more than the speed alone would take, and half a power of 2 that h or j alone would take.
+    fn at_most(&self, need: W) -> u64 {
         let mut guess = need.quotient(self.v).and_then(|ticks| u64::try_from(ticks).ok()).unwrap_or(u64::MAX);
         for (size, power) in [(self.h, 2), (self.j, 3)] {
             let bits = size.bits();
@@ -222,6 +216,16 @@ impl<W: Word> Cubic<W> {
                 guess = guess.min(1_u64.checked_shl(ticks).unwrap_or(u64::MAX) >> 1);
             }
         }
+        guess
+    }
+
+    /// The first step, up to `last` ticks on.
+    pub(super) fn first(&self, last: u64) -> (u64, Self) {
+        if !self.off.is_negative() || last == 0 {
+            return (0, *self);
+        }
+        let zero = self.off.minus(self.off);
+        let guess = self.at_most(zero.minus(self.off));
         Self { off: self.off.plus(self.step), ..*self }.solve(guess, last)
     }
 

@@ -68,9 +68,9 @@ impl Frame {
         self.begin.saturating_add(self.since(curve, curve.time).to_fixed(0))
     }
 
-    /// Position at its end.
+    /// Position at its end: that of the motor, which is at a whole step.
     pub(super) fn last(&self, curve: &Curve) -> i64 {
-        self.to.unwrap_or_else(|| self.position(curve, curve.p))
+        self.to.unwrap_or_else(|| i64::from(steps(self.position(curve, curve.p))) << P)
     }
 
     /// Piece `at`, cut where the curve was joined, with its end and the steps made then; `None` after the last one.

@@ -238,13 +238,13 @@ impl Stepper {
         (self.t, self.end) = (tick, until.max(tick));
         let last = self.end.wrapping_sub(tick);
         let by = if (10..=50).contains(&bits) {
-            let (by, cubic) = Cubic::new(piece, wait, (inverse, bits), scale, ahead).first(last);
+            let (by, cubic) = Cubic::new(piece, wait, (inverse, bits, frame.shift as i32), scale, ahead).first(last);
             self.guess.start(&cubic);
             self.mode = if straight { Mode::Slope(cubic) } else { Mode::Bend(cubic) };
             by
         } else {
             let bits = 117_i32.saturating_sub(inverse.exponent()).clamp(0, 50);
-            let (by, cubic) = Cubic::new(piece, wait, (inverse, bits), scale, ahead).first(last);
+            let (by, cubic) = Cubic::new(piece, wait, (inverse, bits, frame.shift as i32), scale, ahead).first(last);
             let interval = cubic.interval();
             self.mode = Mode::Long(cubic, interval, interval);
             by
