@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # Builds the firmware images and runs those for which there is an emulator: RP2040s in pairs, two chips and a wire, with their PIO's
-# scheduler compared with an independent emulator; the STM32F405 under QEMU. Needs node, python3 and qemu-system-arm; installs the rest
+# scheduler compared with an independent emulator; the RP2350's PIO program in that one; the STM32F405 under QEMU. Needs node, python3 and qemu-system-arm; installs the rest
 # by name: targets from rustup, the emulators from npm and PyPI.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")"
@@ -18,12 +18,16 @@ build() { (cd "$firmware/$1" && cargo build --release --locked --bins "${@:2}");
 
 target thumbv6m-none-eabi
 target thumbv7em-none-eabihf
+target thumbv8m.main-none-eabihf
 build rp2040
 python3 size.py "$firmware"/rp2040/target/thumbv6m-none-eabi/release/{t,a}format-{master,encoder}
 for image in stm32f405 stm32g4; do
     build "$image"
     python3 size.py "$firmware/$image/target/thumbv7em-none-eabihf/release/servowire-$image"
 done
+build rp2350-hdsl
+hdsl=$firmware/rp2350-hdsl/target/thumbv8m.main-none-eabihf/release/servowire-rp2350-hdsl
+python3 size.py "$hdsl"
 
 [ -d node_modules/rp2040js ] || npm ci --silent --no-audit --no-fund
 [ -x .venv/bin/python ] || python3 -m venv .venv
@@ -33,6 +37,8 @@ node --test --test-reporter=spec
 for image in tformat-master tformat-encoder-5m aformat-master aformat-encoder-2m5; do
     node waveform.mjs "$image" | .venv/bin/python compare.py
 done
+
+.venv/bin/python hdsl.py "$hdsl"
 
 build stm32f405 --features emulated
 (cd ../.. && cargo build -p servowire-examples --bin tformat-encoder)
