@@ -196,6 +196,9 @@ mod tests {
             }
         }
         assert_eq!(Register::at(8), None);
+        assert_eq!(Register::Torque.write(0x1ff).to_bytes(), [0x11, 0xff]);
+        let names = ["CTRL", "TORQUE", "OFF", "BLANK", "DECAY", "STALL", "DRIVE", "STATUS"];
+        assert_eq!(Register::ALL.map(Register::name), names);
     }
 
     #[test]
