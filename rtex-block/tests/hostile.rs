@@ -44,7 +44,11 @@ impl Draw {
 
     fn manners(&mut self) -> Manners {
         let mut some = |limit| self.below(limit) as u16;
+        // Up to three exchanges for each flag, but Servo_Active, which has a lateness of its own at servo-off.
+        let late = core::array::from_fn(|bit| if bit == 7 { 0 } else { some(4) as u8 });
         Manners::POLITE
+            .with_status_late(late)
+            .with_latch_late(some(4) as u8)
             .with_echo_lag(some(4) as u8)
             .with_in_progress_late(some(20))
             .with_servo_off_late(some(4))

@@ -38,7 +38,11 @@ impl Verdict {
 /// this drive.
 pub fn check(bytes: &[u8], size: BlockSize, mac_id: MacId) -> Verdict {
     let &[byte0, byte1, ..] = bytes else { return Verdict::discard(WRONG_MAC_ID, ERR86_0) };
-    if bytes.len() != size.bytes() {
+    let len = match size {
+        BlockSize::Bytes16 => 16,
+        BlockSize::Bytes32 => 32,
+    };
+    if bytes.len() != len {
         return Verdict::discard(WRONG_MAC_ID, ERR86_0);
     }
     if byte0 & 0x80 != 0 {
