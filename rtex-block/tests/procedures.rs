@@ -70,12 +70,13 @@ fn positions_are_set_once_and_read_back() {
         let mut pair = Pair::with(config, DriveConfig::new(MacId::new(9).unwrap(), CODES));
         pair.until("off", |pair| pair.axis.state() == AxisState::Off);
         let mut set = SetPosition::actual(900);
-        let (mut blocks, mut last) = (0, 0);
+        let (mut blocks, mut last, mut read) = (0, 0, 0);
         let ended = loop {
             pair.update();
             let response = *pair.received.response().unwrap();
             blocks += u32::from(response.code.get() == 0x24 && last != 0x24);
             last = response.code.get();
+            read = if last == 0x2a { response.emit()[8] } else { read };
             if last == 0x24 && !answers {
                 // The homing answer is spoilt: it looks like one to another type.
                 let mut block = response.emit();
@@ -92,7 +93,8 @@ fn positions_are_set_once_and_read_back() {
                 break progress;
             }
         };
-        assert_eq!((ended, blocks), (want, 1));
+        // APOS.
+        assert_eq!((ended, blocks, read), (want, 1, 0x07));
     }
 }
 
@@ -151,7 +153,7 @@ fn latch_positions() {
 #[test]
 fn two_latches() {
     let nibble = |value| Nibble::new(value).unwrap();
-    for late in [0, 4] {
+    for late in [0, 4, 15] {
         let manners = Manners::POLITE.with_latch_late(late).with_echo_lag(1);
         let mut pair = Pair::on(ActiveCode::CyclicPosition, manners);
         let mut both = Latch::both(0xc7, [nibble(3), nibble(12)], 600);
@@ -396,15 +398,21 @@ fn feed_forward_of_the_sub_block() {
     let mut pair = Pair::new(ActiveCode::CyclicPosition, Manners::POLITE);
     pair.wide = true;
     pair.until("off", |pair| pair.axis.state() == AxisState::Off);
-    let select = Arguments { type_code: TypeCode::short(0x11), index: 0x0725, data: 1 };
-    assert!(matches!(pair.ask(NonCyclicCommand::Parameter(select)), Progress::Done { .. }));
-    assert!(pair.axis.set_sub_feed_forward(1, 2).is_err());
-    pair.switch_on();
-    pair.axis.set_sub_feed_forward(70, -71).unwrap();
-    pair.axis.ask_sub(SubCode::Monitor, 0x07, 0).unwrap();
-    (0..5).for_each(|_| pair.update());
-    assert_eq!(pair.drive.sub_feed_forward(), [0, -71]);
-    pair.axis.switch_off();
-    (0..2).for_each(|_| pair.update());
-    assert_eq!(pair.drive.sub_feed_forward(), [0, 0]);
+    for (index, held) in [(0x0725, [0, -71]), (0x0724, [70, -71])] {
+        let select = Arguments { type_code: TypeCode::short(0x11), index, data: 1 };
+        assert!(matches!(pair.ask(NonCyclicCommand::Parameter(select)), Progress::Done { .. }));
+        assert!(pair.axis.set_sub_feed_forward(1, 2).is_err());
+        pair.switch_on();
+        pair.axis.set_sub_feed_forward(70, -71).unwrap();
+        // With a sub-command and without one.
+        for _ in 0..2 {
+            (0..9).for_each(|_| pair.update());
+            assert_eq!(pair.drive.sub_feed_forward(), held);
+            let _ = pair.axis.ask_sub(SubCode::Monitor, 0x07, 0);
+        }
+        pair.axis.switch_off();
+        pair.until("off", |pair| pair.axis.state() == AxisState::Off);
+        assert_eq!(pair.drive.sub_feed_forward(), [0, 0]);
+        pair.until("free", |pair| pair.axis.can_ask());
+    }
 }

@@ -310,7 +310,7 @@ impl Drive {
         let per = if self.parameters.value(SPEED_UNIT) == 0 { self.config.units_per_rev } else { 1 };
         let divisor = i128::from(self.config.update_ns).saturating_mul(per.into());
         let speed = i128::from(step).saturating_mul(scale).checked_div(divisor).unwrap_or(0);
-        i32::try_from(speed).unwrap_or(if speed < 0 { i32::MIN } else { i32::MAX })
+        saturated(speed)
     }
 
     /// A speed in the unit of Pr7.25 as command units per second.
@@ -416,8 +416,8 @@ impl Drive {
         let acceleration = |pr| i64::from(self.parameters.value(pr).max(1)).saturating_mul(10_000);
         let ramp = Ramp { up: acceleration(ACCELERATION), down: acceleration(DECELERATION) };
         let per_update = |speed: i32| {
-            let units = self.units_per_second(speed).saturating_mul(self.config.update_ns.into()) / 1_000_000_000;
-            i32::try_from(units).unwrap_or(if units < 0 { i32::MIN } else { i32::MAX })
+            let units = i128::from(self.units_per_second(speed)).saturating_mul(self.config.update_ns.into());
+            saturated(units / 1_000_000_000)
         };
         let mode = match self.cyclic {
             CP => Drivemode::Position(self.data1),
@@ -443,4 +443,8 @@ impl Drive {
             self.motion.shift(self.motion.command.wrapping_neg());
         }
     }
+}
+
+fn saturated(value: i128) -> i32 {
+    i32::try_from(value.clamp(i32::MIN.into(), i32::MAX.into())).unwrap_or(0)
 }

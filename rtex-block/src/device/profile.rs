@@ -54,7 +54,7 @@ impl Generator {
         self.fraction_nano = self.fraction_nano.saturating_add(self.speed_milli.saturating_mul(ns) / MILLI);
         let whole = (self.fraction_nano / NANO).min(distance);
         self.fraction_nano %= NANO;
-        let step = if self.to_go < 0 { whole.saturating_neg() } else { whole };
+        let step = whole.saturating_mul(self.to_go.signum());
         self.to_go = self.to_go.saturating_sub(step);
         (i32::try_from(step).unwrap_or(i32::MAX), self.to_go == 0)
     }

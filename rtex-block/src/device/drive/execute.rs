@@ -137,7 +137,6 @@ impl Drive {
         match self.parameters.value(FEED_FORWARD) {
             0 if data3 != 0 => Err(WRONG_ARGUMENT),
             2 if data3.saturating_abs() > MAX_TORQUE => Err(WRONG_FEED_FORWARD),
-            0 => Ok(()),
             _ => {
                 self.feed_forward = data3;
                 Ok(())

@@ -34,9 +34,6 @@ impl AlarmHistory {
             Progress::Done { value: NonCyclicResponse::Alarm(results) } => {
                 (*place, _) = results.alarm();
                 self.index = self.index.saturating_add(1);
-                if usize::from(self.index) > entries.len() {
-                    return Progress::Done { value: () };
-                }
                 Progress::Pending { left: axis.answer_left() }
             }
             // Never: an alarm request is done with an alarm response.
