@@ -14,14 +14,14 @@ use core::num::NonZeroU16;
 
 use common::{CODES, Pair, limits, monitor};
 use rtex_block::device::{DriveConfig, Manners};
-use rtex_block::master::procedure::{Home, Latch};
+use rtex_block::master::procedure::{Home, Latch, ReadText};
 use rtex_block::master::{
     ActiveCode, Axis, AxisConfig, AxisState, Failure, Handshake, Limits, MoveStage, ProfileMove, Progress, Received,
-    Ring, StopPolicy, StopReason, SubHandshake, Turn,
+    Ring, ServoOff, StopPolicy, StopReason, SubHandshake, Turn,
 };
 use rtex_block::{
-    Alarm, CommandBlock, ControlBits, CyclicCode, ErrorCode, MacId, Nibble, NonCyclicCommand, Response, Response32,
-    StatusFlags, SubCode,
+    Alarm, Command, CommandBlock, ControlBits, CyclicCode, ErrorCode, MacId, Nibble, NonCyclicCommand, Response,
+    Response32, StatusFlags, SubCode, TypeCode,
 };
 
 fn mac_id() -> MacId {
@@ -56,7 +56,9 @@ fn a_handshake_takes_its_own_answer_only() {
     let failed = Progress::Failed { error: Failure::Execution };
     assert_eq!(handshake.receive(Some(&answer(0x2a, 0, 0x07, 0x90))), failed);
     let mut handshake = new();
+    assert_eq!(handshake.left(), 2);
     assert_eq!(handshake.receive(None), Progress::Pending { left: 1 });
+    assert_eq!(handshake.left(), 1);
     assert_eq!(handshake.receive(None), Progress::Pending { left: 0 });
     assert_eq!(handshake.receive(None), Progress::Failed { error: Failure::TimedOut });
     let refused = Progress::Failed { error: Failure::CommandError(ErrorCode(0x31)) };
@@ -242,6 +244,39 @@ fn a_motion_that_is_over_is_over() {
     assert_eq!((pair.drive.position(), pair.axis.state()), (20_000, AxisState::On));
 }
 
+/// The time that a procedure has left is that of its present request.
+#[test]
+fn what_is_left_of_a_limit() {
+    let mut pair = Pair::new(ActiveCode::CyclicPosition, Manners::POLITE.with_echo_lag(2));
+    pair.until("off", |pair| pair.axis.state() == AxisState::Off);
+    let mut text = ReadText::new(TypeCode::short(0x01));
+    let left: Vec<_> = (0..6)
+        .map(|_| {
+            pair.update();
+            match text.receive(&mut pair.axis) {
+                Progress::Pending { left } => left,
+                other => panic!("{other:?}"),
+            }
+        })
+        .collect();
+    // Asked at the first call, answered five update periods later; the next group has the whole limit again.
+    assert_eq!(left, [60, 59, 58, 57, 56, 60]);
+}
+
+/// What a motion with a latch sends: code 17h with type, Latch_Sel1, Monitor_Sel and speed, which may change.
+#[test]
+fn what_a_motion_sends() {
+    let mut pair = Pair::on(ActiveCode::ProfilePosition, Manners::POLITE);
+    pair.axis.start_move_with_latch(0x11, 3_000_000, 1_000, Nibble::new(3).unwrap(), 0x09).unwrap();
+    pair.until("moving", |pair| pair.axis.profile().unwrap().is_moving());
+    let block = |pair: &Pair| pair.axis.send(Turn::Valid(pair.counter.last().next())).main.emit();
+    assert_eq!(block(&pair)[1..4], [0x17, 0x80, 0]);
+    assert_eq!(block(&pair)[4..8], 3_000_000_i32.to_le_bytes());
+    assert_eq!(block(&pair)[8..], [0x11, 0, 3, 0x09, 0xe8, 0x03, 0, 0]);
+    pair.axis.set_move_speed(-2).unwrap();
+    assert_eq!(block(&pair)[12..], [0xfe, 0xff, 0xff, 0xff]);
+}
+
 /// Axis 1 of two that slows down, by the policy; the first has an alarm.
 struct Two {
     ring: Ring<2>,
@@ -373,6 +408,25 @@ fn a_latch_that_cannot_be_armed() {
     let refused = Progress::Failed { error: Failure::CommandError(ErrorCode(0x31)) };
     assert_eq!(pair.run(|axis| latch.receive(axis)), refused);
     assert!(pair.now < 100);
+}
+
+/// The servo-off after a command: counter one on, Servo_On cleared, all else kept; none after a block at which a drive does
+/// not look, or that it refuses.
+#[test]
+fn servo_off_after_a_command() {
+    let after = |hex: [u8; 4]| {
+        let mut block = [7; 16];
+        block[..4].copy_from_slice(&hex);
+        block[9] = 0;
+        ServoOff::after(&Command::parse(&block).unwrap())
+            .map(|off| (off.emit()[..4].to_vec(), off.emit()[4..] == block[4..]))
+    };
+    assert_eq!(after([0x69, 0x20, 0x90, 0x03]), Some((vec![0x09, 0x20, 0x10, 0x03], true)));
+    assert_eq!(after([0x09, 0x2a, 0x80, 0x00]), Some((vec![0x29, 0x2a, 0x00, 0x00], true)));
+    assert_eq!(after([0x29, 0x17, 0x00, 0x00]), Some((vec![0x49, 0x17, 0x00, 0x00], true)));
+    for none in [[0x09, 0x00, 0x80, 0], [0x09, 0x0a, 0x80, 0], [0x09, 0x27, 0x80, 0]] {
+        assert_eq!(after(none), None, "{none:x?}");
+    }
 }
 
 /// A servo-off at any time is a servo-off: the block of an axis that an alarm has stopped.

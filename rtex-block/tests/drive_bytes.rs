@@ -92,6 +92,14 @@ impl Raw {
     }
 }
 
+/// Ready as soon as as many exchanges are over as it needs for synchronisation.
+#[test]
+fn ready_when_it_is_synchronised() {
+    let mut raw = Raw::new(config().with_sync_exchanges(5));
+    let ready: Vec<_> = (0..7).map(|_| raw.send(0x20, OFF, 0, NOTHING)[2] & 0x40 != 0).collect();
+    assert_eq!(ready, [false, false, false, false, false, true, true]);
+}
+
 #[test]
 fn status_byte_by_byte() {
     let mut raw = Raw::new(config());
@@ -272,6 +280,8 @@ fn monitor_values() {
         let answer = raw.hold(3, 0x2a, ON, at, about(code, index, 0));
         assert_eq!((answer[1], answer[8], answer[9]), (0xaa, error, 0), "{code:x}");
     }
+    at += 10;
+    raw.send(0x20, ON, at, NOTHING);
     // Released, it stands: no speed of any kind, and the command position is the actual one.
     raw.hold(30, 0x20, OFF, 0, NOTHING);
     for code in [0x01, 0x05, 0x06, 0x0c] {
@@ -408,6 +418,9 @@ fn near_window() {
         // Paused at the start, all of it is still to go.
         let answer = raw.hold(3, 0x17, [0x80, 0x20], 3_000, about(0x11, 0, 1_000_000));
         assert_eq!((answer[1], answer[2] & 0x02, answer[9] & 0x0f), (0x17, 0x02, want));
+        // There is a Latch_Sel1 to be echoed, and no Latch_Sel2.
+        let answer = raw.hold(3, 0x17, [0x80, 0x20], 3_000, about(0x11, 0x09f3, 1_000_000));
+        assert_eq!(answer[10..12], [0x03, 0x09]);
     }
 }
 
@@ -439,9 +452,9 @@ fn a_motion_takes_its_time() {
     let steps = run(1_000_000, 1_000_000);
     assert!((2_295..=2_310).contains(&steps.len()), "{}", steps.len());
     assert_eq!((steps.iter().sum::<i32>(), steps.iter().max()), (1_000_000, Some(&500)));
-    // It never gets faster on the way down, and the last stretch is made at a crawl: 5 M units/s2 in half a millisecond.
+    // It never gets faster on the way down: 5 M units/s2 take 2.5 units a period off the speed.
     assert!(steps[1_500..].windows(2).all(|pair| pair[1] <= pair[0] + 1));
-    assert!(steps[2_280..].iter().all(|&step| step <= 30), "{:?}", &steps[2_280..]);
+    assert!(steps[2_100..].windows(2).all(|pair| pair[0] - pair[1] <= 4), "{:?}", &steps[2_100..]);
     // Less than one unit a period: 300 units at 1 500 a second take 0.2 s.
     let steps = run(-300, 1_500);
     assert!((400..=406).contains(&steps.len()), "{}", steps.len());

@@ -392,6 +392,7 @@ fn limits_of_set_points() {
         let drive = DriveConfig::new(mac_id, CODES).with_gear(gear);
         let mut pair = Pair::with(config, drive);
         pair.switch_on();
+        assert_eq!(i32::try_from(pair.axis.max_step()), Ok(largest));
         for sign in [1, -1] {
             let step = sign * (largest + 1);
             assert_eq!(pair.axis.set_position(step), Err(SetpointError::Step { step }));

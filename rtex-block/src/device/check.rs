@@ -21,6 +21,12 @@ pub struct Verdict {
 
 impl Verdict {
     /// Whether the block is thrown away and the one before it stays in force.
+    ///
+    /// ```
+    /// use rtex_block::{BlockSize, MacId, device::check};
+    /// let block = [0x85, 0x20, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0];
+    /// assert!(check(&block, BlockSize::Bytes16, MacId::new(5).unwrap()).is_discarded());
+    /// ```
     pub fn is_discarded(&self) -> bool {
         self.alarm.is_some()
     }

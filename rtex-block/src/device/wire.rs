@@ -49,14 +49,11 @@ impl Request {
 
     /// Bytes 8-15 of the answer. `flags` are Latch_Comp and the profile flags where the layout has them.
     pub(super) const fn answer(&self, execution: Execution, index: u16, flags: u8, data: i32) -> [u8; 8] {
-        let [type_low, type_high, latch_sel, monitor_sel, ..] = self.bytes;
+        let [type_low, type_high, ..] = self.bytes;
         let low_nibble = if self.is_short() { flags } else { type_high & 0x0f };
-        let [index_low, index_high] = index.to_le_bytes();
-        let [two, three] = match self.code {
-            HOMING => [latch_sel, monitor_sel],
-            PROFILE => [latch_sel & 0x0f, monitor_sel],
-            _ => [index_low, index_high],
-        };
+        // Of homing and profile these are the selections; profile has no Latch_Sel2.
+        let [index_low, three] = index.to_le_bytes();
+        let two = if self.code == PROFILE { index_low & 0x0f } else { index_low };
         let [a, b, c, d] = data.to_le_bytes();
         [type_low, execution.bits() | low_nibble, two, three, a, b, c, d]
     }
