@@ -236,8 +236,8 @@ impl Axis {
             _ => self.setpoint,
         };
         let control = match self.state {
-            AxisState::SwitchingOn | AxisState::On => self.control | ControlBits::SERVO_ON,
-            AxisState::Stopping(_) => self.control | ControlBits::SERVO_ON | self.smooth_stop(),
+            AxisState::SwitchingOn | AxisState::On => self.control.union(ControlBits::SERVO_ON),
+            AxisState::Stopping(_) => self.control.union(ControlBits::SERVO_ON).union(self.smooth_stop()),
             _ => self.control,
         };
         let main = Command { control, command_data1, noncyclic, ..off };
