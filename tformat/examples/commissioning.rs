@@ -10,7 +10,7 @@ use tformat::{Abm, Abs, Address, BitRate, Error, OutOfRange, Page, Request, Reso
 
 const NAME: &[u8] = b"axis 2";
 
-fn main() -> Result<(), Box<dyn std::error::Error>> {
+fn main() -> Result<(), Box<dyn core::error::Error>> {
     let line = line();
     let transaction = Transaction::start(Request::ReadAll, line, 100_000);
     let (earliest, latest) = transaction.driver_off_ns();
@@ -26,8 +26,8 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     }
     // An encoder that answers after the master's patience has ended.
     let slow = Config::new().with_response_delay(90_000);
-    let error = fit(&mut Device::<6>::new(0x17, BitRate::Mbit2_5).with_config(slow), line, resolution);
-    println!("a slow encoder: {}", error.map_or_else(|e| e.to_string(), |fitted| fitted));
+    let ended = fit(&mut Device::<6>::new(0x17, BitRate::Mbit2_5).with_config(slow), line, resolution);
+    println!("a slow encoder: {}", ended.unwrap_or_else(|error| error.to_string()));
     Ok(())
 }
 

@@ -6,7 +6,7 @@
 use tformat::spi::{parse_spi10, parse_spi16, spi10_words, spi16_words};
 use tformat::{AllData, BitOrder, Request, Response, Window};
 
-fn main() -> Result<(), Box<dyn std::error::Error>> {
+fn main() -> Result<(), Box<dyn core::error::Error>> {
     let request = Request::ReadAll;
     // Logged from a TS5700N8401.
     let data = AllData::parse(&[0x1a, 0x20, 0x29, 0xc0, 0x3b, 0x17, 0x00, 0x00, 0x00, 0xc8, 0x37])?;
@@ -21,7 +21,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let mut stream = [0xff; 16];
     let line = Window::read(&data.emit_line(BitOrder::MsbFirst), 0, 110, BitOrder::MsbFirst)?;
     line.write(&mut stream, 18, BitOrder::MsbFirst)?;
-    let heard = stream.chunks(2).map(|pair| u16::from_be_bytes([pair[0], pair[1]])).collect::<Vec<_>>();
+    let heard = stream.chunks(2).filter_map(|pair| pair.try_into().ok().map(u16::from_be_bytes)).collect::<Vec<_>>();
     println!("16 bits: {} -> {}", sent.join(" "), parse_spi16(request, &heard)?);
     assert_eq!(parse_spi16(request, &heard)?, Response::ReadAll(data));
     Ok(())
