@@ -57,6 +57,11 @@ impl Format {
         self.content_bits
     }
 
+    /// Bits of one field with start bit and delimiter: 10 or 18.
+    pub const fn field_bits(self) -> u32 {
+        self.content_bits.saturating_add(2)
+    }
+
     /// Samples from the edge of a bit to the place where its level is taken.
     pub(crate) const fn middle(self) -> u32 {
         self.samples_per_bit >> 1
