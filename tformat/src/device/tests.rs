@@ -142,6 +142,12 @@ fn the_page_register() {
         let mut device = encoder().with_config(Config { absent_page: absent, ..Config::new() });
         let _ = device.answer(select(2), 100);
         assert_eq!(device.page(), 2);
+        // Six pages are numbered 0 to 5.
+        let mut last = device;
+        let _ = last.answer(select(5), 200);
+        assert_eq!(last.page(), 5);
+        let _ = last.answer(select(6), 300);
+        assert_eq!(last.page(), if absent == AbsentPage::Ignored { 5 } else { 0 });
         let _ = device.answer(select(9), 200);
         assert_eq!(device.page(), page);
         // Selecting takes no time; while the memory is busy it is ignored.
