@@ -3,6 +3,7 @@
 mod act;
 pub mod link;
 pub mod port;
+pub mod relay;
 pub mod simulate;
 
 use std::path::PathBuf;
@@ -45,7 +46,7 @@ enum What {
     /// Read or write the EEPROM.
     #[command(subcommand)]
     Eeprom(Eeprom),
-    /// Be an encoder.
+    /// Be an encoder, or pass everything on to a real one and log it.
     Simulate(Simulate),
 }
 
@@ -97,6 +98,12 @@ struct Simulate {
     /// The adapter hears itself.
     #[arg(long)]
     echo: bool,
+    /// The port of a second adapter with a real encoder: requests are passed on to it, answers back, and all of it is printed.
+    #[arg(long, value_name = "PORT", conflicts_with_all = ["id", "rpm"])]
+    encoder: Option<String>,
+    /// Write it into this file as CSV too.
+    #[arg(long, value_name = "FILE", requires = "encoder")]
+    csv: Option<PathBuf>,
 }
 
 fn encoder_id(text: &str) -> Result<u8, String> {
@@ -130,9 +137,15 @@ impl Arguments {
     fn perform(&self) -> Result<ExitCode, link::Fault> {
         let port = port::open(&self.port, self.rate)?;
         if let What::Simulate(simulate) = &self.what {
-            let Simulate { id, rpm, echo } = *simulate;
-            let encoder = simulate::Encoder { rate: self.rate, id, rpm, echo };
-            return simulate::run(port, encoder, None).map(|()| ExitCode::SUCCESS);
+            let Simulate { id, rpm, echo, .. } = *simulate;
+            let done = if let Some(encoder) = &simulate.encoder {
+                let encoder = port::open(encoder, self.rate)?;
+                let mut link = Link::open(encoder, Duration::from_millis(self.timeout))?;
+                act::relay(port, &mut link, echo, simulate.csv.as_deref())
+            } else {
+                simulate::run(port, simulate::Encoder { rate: self.rate, id, rpm, echo }, None)
+            };
+            return done.map(|()| ExitCode::SUCCESS);
         }
         let mut link = Link::open(port, Duration::from_millis(self.timeout))?;
         match &self.what {

@@ -13,6 +13,7 @@ use tformat::{Address, AllData, BitRate, Page, Request, Resolution, Response};
 use super::Watch;
 use super::link::{Fault, Link};
 use super::port::{self, Port};
+use super::relay::{self, Said};
 
 /// Bytes of a page; the address behind them selects the page.
 const PAGE_LEN: u8 = 127;
@@ -88,6 +89,35 @@ pub(super) fn watch<P: Port>(link: &mut Link<P>, watch: &Watch) -> Done {
         csv.flush()?;
     }
     Ok(if bad == 0 { ExitCode::SUCCESS } else { ExitCode::FAILURE })
+}
+
+/// Between a master and its encoder, for ever.
+pub(super) fn relay<M: Port, E: Port>(
+    master: M,
+    encoder: &mut Link<E>,
+    hears_itself: bool,
+    csv: Option<&Path>,
+) -> Result<(), Fault> {
+    let mut csv = csv.map(csv::Writer::from_path).transpose().map_err(io::Error::from)?;
+    if let Some(csv) = &mut csv {
+        csv.write_record(["time_s", "request", "answer", "fault"]).map_err(io::Error::from)?;
+    }
+    let begin = Instant::now();
+    let log = |said: &Said| {
+        let (request, answer, fault) = match said {
+            Said::Request(request, Ok(answer)) => (request.to_string(), answer.to_string(), String::new()),
+            Said::Request(request, Err(fault)) => (request.to_string(), String::new(), fault.to_string()),
+            Said::Junk(bytes) => (String::new(), String::new(), format!("no request: {bytes:02x?}")),
+        };
+        let time = format!("{:.6}", begin.elapsed().as_secs_f64());
+        println!("{time}  {request}  {answer}{fault}");
+        if let Some(csv) = &mut csv {
+            csv.write_record([time, request, answer, fault]).map_err(io::Error::from)?;
+            csv.flush()?;
+        }
+        Ok(())
+    };
+    relay::run(master, encoder, hears_itself, log, None)
 }
 
 pub(super) fn info<P: Port>(link: &mut Link<P>, name: &str, rate: BitRate) -> Done {

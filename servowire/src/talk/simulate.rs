@@ -1,6 +1,5 @@
 //! An encoder at a serial port.
 
-use std::collections::VecDeque;
 use std::io;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
@@ -10,9 +9,8 @@ use tformat::{Abm, Abs, BitRate, Resolution};
 
 use super::link::Fault;
 use super::port::Port;
+use super::relay::Echo;
 
-/// How long the own answer may take to come back.
-const ECHO: Duration = Duration::from_millis(100);
 /// How long a read waits, and so how fast the end is seen.
 const LOOK: Duration = Duration::from_millis(20);
 
@@ -41,7 +39,7 @@ pub fn run<P: Port>(mut port: P, encoder: Encoder, stop: Option<&AtomicBool>) ->
     let mut device = Device::<6>::new(id, rate);
     let bits = Resolution::from_enid(id).map_or(24, |hint| hint.resolution.abs_bits());
     let begin = Instant::now();
-    let (mut echo, mut echo_until): (VecDeque<u8>, _) = (VecDeque::new(), begin);
+    let mut echo = Echo::new(hears_itself);
     port.wait(LOOK)?;
     while !stop.is_some_and(|stop| stop.load(Ordering::Relaxed)) {
         let mut buffer = [0; 64];
@@ -55,22 +53,16 @@ pub fn run<P: Port>(mut port: P, encoder: Encoder, stop: Option<&AtomicBool>) ->
         let turned = elapsed.as_secs_f64() * rpm / 60.0 * f64::from(1_u32 << bits.min(24));
         let counts = turned as i64;
         device.set_position(Abs::truncate(counts as u32), Abm::truncate((counts >> bits) as u32));
-        if Instant::now() > echo_until {
-            echo.clear();
-        }
         // Bytes of one read came together; before them there was a pause.
         let now_ns = u64::try_from(elapsed.as_nanos()).unwrap_or(u64::MAX);
         for byte in buffer.iter().take(count) {
-            if echo.front() == Some(byte) {
-                echo.pop_front();
+            if echo.is(*byte) {
                 continue;
             }
-            echo.clear();
             if let Some(answer) = device.byte(*byte, now_ns) {
                 port.write_all(answer.frame.as_bytes())?;
                 port.flush()?;
-                echo.extend(answer.frame.as_bytes().iter().filter(|_| hears_itself));
-                echo_until = Instant::now() + ECHO;
+                echo.sent(answer.frame.as_bytes());
             }
         }
     }
