@@ -52,7 +52,7 @@ const IDLE: u32 = 0b101;
 const START: u32 = 0b011;
 
 /// Samples after which the origin moves on an idle line.
-const LONG: u32 = 1 << 30;
+const LONG: u32 = 0x4000_0000;
 
 /// Samples after which the origin moves while a field does not end, as on a line that carries something else.
 const NEAR: u32 = 0x7fff_ffff;
