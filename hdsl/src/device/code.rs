@@ -128,9 +128,7 @@ pub(super) fn parameter(head: Window) -> Option<u8> {
     let is = |block: &[bool], printed: &[u8]| {
         let equal =
             |invert: bool| block.iter().zip(printed).all(|(bit, printed)| *bit == ((*printed == b'1') != invert));
-        let ones = printed.iter().filter(|bit| **bit == b'1').count();
-        equal(false)
-            || equal(true) && (ones.saturating_mul(2) != printed.len() || matches!(printed, b"111000" | b"1100"))
+        equal(false) || equal(true) && (!is_balanced(printed) || matches!(printed, b"111000" | b"1100"))
     };
     let x = if is(six, b"001111") { 28 } else { SIX.iter().position(|printed| is(six, *printed))? };
     // A7 stands for 7.
