@@ -8,6 +8,7 @@ pub mod fst;
 pub mod hexlog;
 mod input;
 pub mod pcapng;
+mod pipe;
 pub mod raw;
 pub mod records;
 pub mod saleae_binary;
@@ -54,6 +55,11 @@ pub trait Line {
     fn gap(&mut self) -> Option<i64> {
         None
     }
+
+    /// The file that is read, if it is read as it comes.
+    fn input(&self) -> Option<&Input> {
+        None
+    }
 }
 
 /// An opened file.
@@ -82,6 +88,14 @@ impl ByteLog {
         match self {
             Self::Hex(log) => log.burst(),
             Self::Records(log) => log.burst(),
+        }
+    }
+
+    /// Whether the next burst has to be waited for.
+    pub fn pauses(&self) -> bool {
+        match self {
+            Self::Hex(log) => log.input().pauses(),
+            Self::Records(log) => log.input().pauses(),
         }
     }
 }
@@ -127,11 +141,13 @@ pub struct Hints {
     pub record_size: Option<usize>,
     /// The voltage above which a column of a table is high; otherwise half-way between its levels.
     pub threshold: Option<f64>,
+    /// The file still grows: its end is waited for.
+    pub grows: bool,
 }
 
 /// Opens a file, finding its format. The number beside it counts the bytes read, for a progress bar.
 pub fn open(path: &Path, hints: Hints) -> Result<(Capture, Rc<Cell<u64>>), Fault> {
-    let input = Input::open(path)?;
+    let input = Input::open(path, hints.grows)?;
     let meter = input.meter();
     Ok((open_input(input, path, hints)?, meter))
 }
@@ -215,6 +231,9 @@ pub fn open_embedded(name: &str, bytes: &'static [u8]) -> Result<Capture, Fault>
 fn decoder(mut input: Input, format: Format, hints: Hints) -> Result<Capture, Fault> {
     if input.peek()?.is_empty() {
         return Err(input.fault(At::File, "the file is empty"));
+    }
+    if hints.grows && matches!(format, Format::Session | Format::Fst | Format::SaleaeBinary) {
+        return Err(input.fault(At::File, "this format is complete at its end: it cannot be followed while it grows"));
     }
     Ok(match format {
         Format::Vcd => Capture::Edges(Box::new(vcd::Vcd::new(input)?)),

@@ -1,11 +1,13 @@
 //! The command line.
 
+use std::io::{self, Write};
 use std::path::PathBuf;
 use std::process::ExitCode;
 
-use clap::{Args, Parser, Subcommand, ValueEnum};
+use clap::{Args, CommandFactory, Parser, Subcommand, ValueEnum};
 
 use crate::capture::{Format, Hints, time};
+use crate::output::filter::Filter;
 use crate::protocols::{Protocol, Settings, nikon, rtex, tformat};
 use crate::{cnc, decode, line, profile, talk, timing};
 
@@ -29,6 +31,16 @@ enum Command {
     Talk(talk::Arguments),
     /// Who is on an encoder's line when: shortest cycle, worst fault.
     Timing(timing::Arguments),
+    /// Completions for a shell: put them where it looks for them.
+    Completions {
+        /// Which shell.
+        shell: clap_complete::Shell,
+    },
+    /// The manual page of the program, or of a command: `servowire man decode | man -l -`.
+    Man {
+        /// The command.
+        command: Option<String>,
+    },
 }
 
 impl Cli {
@@ -40,6 +52,44 @@ impl Cli {
             Command::Cnc(arguments) => arguments.run(),
             Command::Talk(arguments) => arguments.run(),
             Command::Timing(arguments) => arguments.run(),
+            Command::Completions { shell } => {
+                let mut text = Vec::new();
+                clap_complete::generate(shell, &mut Self::command(), "servowire", &mut text);
+                print(&text)
+            }
+            Command::Man { command } => man(command.as_deref()),
+        }
+    }
+}
+
+/// Writes to the standard output; somebody who does not read on is no fault.
+fn print(text: &[u8]) -> ExitCode {
+    match io::stdout().lock().write_all(text).and_then(|()| io::stdout().flush()) {
+        Err(e) if e.kind() != io::ErrorKind::BrokenPipe => {
+            eprintln!("error: cannot write: {e}");
+            ExitCode::FAILURE
+        }
+        _ => ExitCode::SUCCESS,
+    }
+}
+
+fn man(command: Option<&str>) -> ExitCode {
+    let mut whole = Cli::command();
+    whole.build();
+    let page = match command {
+        None => Some(whole),
+        Some(name) => whole.find_subcommand(name).cloned(),
+    };
+    let Some(page) = page else {
+        eprintln!("error: there is no command {:?}", command.unwrap_or_default());
+        return ExitCode::from(2);
+    };
+    let mut text = Vec::new();
+    match clap_mangen::Man::new(page).render(&mut text) {
+        Ok(()) => print(&text),
+        Err(e) => {
+            eprintln!("error: {e}");
+            ExitCode::FAILURE
         }
     }
 }
@@ -61,6 +111,9 @@ pub struct Decode {
     /// JSON Lines, an object a frame; times in picoseconds.
     #[arg(long)]
     pub json: bool,
+    /// A table for spreadsheets, a row a frame, a column a field; times in microseconds.
+    #[arg(long, conflicts_with_all = ["json", "stats"])]
+    pub csv: bool,
     /// Figures instead of frames: errors by class, cycle time, answer delay, largest move of the position.
     #[arg(long)]
     pub stats: bool,
@@ -70,6 +123,12 @@ pub struct Decode {
     /// Write the capture as VCD, with the decoded fields beside it as strings.
     #[arg(long, value_name = "OUT")]
     pub vcd: Option<PathBuf>,
+    /// Draw position and errors over time, and how long answers took.
+    #[arg(long, value_name = "OUT")]
+    pub svg: Option<PathBuf>,
+    /// Which frames are shown.
+    #[command(flatten)]
+    pub filter: FilterArgs,
     /// How the file is to be read.
     #[command(flatten)]
     pub file: FileArgs,
@@ -82,6 +141,27 @@ pub struct Decode {
     /// What RTEX blocks do not tell.
     #[command(flatten)]
     pub rtex: RtexArgs,
+}
+
+/// Which frames are shown and counted.
+#[derive(Debug, Args)]
+#[command(next_help_heading = "Filter")]
+pub struct FilterArgs {
+    /// Only frames of these kinds, as 3 or D (T-Format), ABS40, H-frame.
+    #[arg(long, value_name = "KIND", value_delimiter = ',')]
+    pub id: Vec<String>,
+    /// Only the encoder (EA), drive (MAC-ID) or device (SA) of this address.
+    #[arg(long, value_name = "N")]
+    pub address: Option<u16>,
+    /// Only frames from this time of the capture on, as 20us, 1.5ms or 2s.
+    #[arg(long, value_name = "TIME", value_parser = moment, allow_hyphen_values = true)]
+    pub from: Option<i64>,
+    /// Only frames before this time.
+    #[arg(long, value_name = "TIME", value_parser = moment, allow_hyphen_values = true)]
+    pub to: Option<i64>,
+    /// Only what is refused.
+    #[arg(long)]
+    pub errors: bool,
 }
 
 /// How the file is to be read.
@@ -103,6 +183,9 @@ pub struct FileArgs {
     /// The files are binary records of this many bytes, a burst each.
     #[arg(long, value_name = "BYTES", value_parser = clap::value_parser!(u16).range(1..), conflicts_with_all = ["rate", "bytes"])]
     pub record_size: Option<u16>,
+    /// The file still grows: what comes to it is decoded too, until the program is stopped.
+    #[arg(long)]
+    pub follow: bool,
     /// Voltage above which a column of an oscilloscope's table is high; otherwise half-way between its levels.
     #[arg(long, value_name = "VOLTS", allow_negative_numbers = true)]
     pub threshold: Option<f64>,
@@ -165,12 +248,15 @@ pub struct RtexArgs {
     pub mac_id: Option<u8>,
 }
 
+/// A time of the capture in ps.
+fn moment(text: &str) -> Result<i64, String> {
+    time::duration(text).ok_or_else(|| format!("\"{text}\" is not a time with its unit, as 20us, 1.5ms or 2s"))
+}
+
 /// A period in ns.
 fn period(text: &str) -> Result<u32, String> {
-    let units = [("ns", 1.0), ("us", 1e3), ("ms", 1e6)];
-    let read = units.into_iter().find_map(|(unit, ns)| Some(text.strip_suffix(unit)?.trim().parse::<f64>().ok()? * ns));
-    match read.map(f64::round) {
-        Some(ns) if (1.0..=1e9).contains(&ns) => Ok(ns as u32),
+    match time::duration(text).map(|time| (time + 500) / 1000) {
+        Some(ns) if (1..=1_000_000_000).contains(&ns) => Ok(ns as u32),
         _ => Err(format!("\"{text}\" is not a period from 1 ns to 1000 ms, as 500us or 0.5ms")),
     }
 }
@@ -192,10 +278,17 @@ impl Decode {
             (self.file.bytes, "--bytes"),
             (self.file.record_size.is_some(), "--record-size"),
             (self.file.threshold.is_some(), "--threshold"),
+            (self.file.follow, "--follow"),
             (self.line.channel.is_some(), "--channel"),
             (self.line.tx.is_some(), "--tx"),
         ];
         said.into_iter().find(|(is, _)| *is).map(|(_, option)| option)
+    }
+
+    /// Which frames are asked for.
+    pub(crate) fn filter(&self) -> Filter {
+        let FilterArgs { id, address, from, to, errors } = &self.filter;
+        Filter::new(id.clone(), address.map(i64::from), (*from, *to), *errors)
     }
 
     /// What was said about the files.
@@ -207,6 +300,7 @@ impl Decode {
             unit_size: usize::from(self.file.unit_size),
             record_size: self.file.record_size.map(usize::from),
             threshold: self.file.threshold,
+            grows: self.file.follow,
         }
     }
 
@@ -244,6 +338,11 @@ pub(crate) fn frequency(text: &str) -> Result<u64, String> {
     }
 }
 
+/// A frequency that fits into 32 bits.
+pub(crate) fn hertz(text: &str) -> Result<u32, String> {
+    u32::try_from(frequency(text)?).map_err(|_| format!("\"{text}\" is more than 4 GHz"))
+}
+
 /// Rates for which the receiver's grid of 80 samples a bit can be laid.
 fn bit_rate(text: &str) -> Result<u32, String> {
     match frequency(text)? {
@@ -274,7 +373,6 @@ mod tests {
 
     #[test]
     fn the_command_line_is_consistent() {
-        use clap::CommandFactory;
         Cli::command().debug_assert();
     }
 }

@@ -59,7 +59,7 @@ pub struct Arguments {
     steps: u32,
     /// Step frequencies in Hz; they take turns from move to move. 250000, or 249000 with --published-sync0: at 250 kHz
     /// all steps have the same phase, and that machine is at home there. In a longer cycle motion is as much slower.
-    #[arg(long, value_name = "HZ", value_delimiter = ',')]
+    #[arg(long, value_name = "HZ", value_delimiter = ',', value_parser = crate::cli::hertz)]
     freq: Vec<u32>,
     /// Steps that each of the 32 ramp entries lasts.
     #[arg(long, value_name = "N", default_value_t = 1)]
@@ -174,7 +174,7 @@ impl Arguments {
             let drawn = self.svg.as_deref().map_or(Ok(()), scaling::draw);
             return match scaling::table(&mut out).map_err(Into::into).and(drawn) {
                 Ok(()) => ExitCode::SUCCESS,
-                Err(error) => failed(&error),
+                Err(error) => failed(error.as_ref()),
             };
         }
         let program = match self.program() {
@@ -192,7 +192,7 @@ impl Arguments {
                 eprintln!("failed: {why}");
                 ExitCode::FAILURE
             }
-            Err(error) => failed(&error),
+            Err(error) => failed(error.as_ref()),
         }
     }
 
@@ -302,7 +302,11 @@ impl Arguments {
     }
 }
 
-fn failed(error: &dyn core::fmt::Display) -> ExitCode {
+fn failed(error: &(dyn Error + 'static)) -> ExitCode {
+    // The reader has seen enough.
+    if error.downcast_ref().is_some_and(|e: &io::Error| e.kind() == io::ErrorKind::BrokenPipe) {
+        return ExitCode::SUCCESS;
+    }
     eprintln!("error: {error}");
     ExitCode::FAILURE
 }

@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::rc::Rc;
 
+use anstream::{AutoStream, ColorChoice};
 use indicatif::{ProgressBar, ProgressStyle};
 
 use crate::bundled;
@@ -14,10 +15,12 @@ use crate::cli::Decode;
 use crate::fault::{At, Fault};
 use crate::line::Stop;
 use crate::output::json::JsonLines;
+use crate::output::picture::Picture;
 use crate::output::stats::Stats;
+use crate::output::table::Csv;
 use crate::output::text::Text;
 use crate::output::vcd::VcdOut;
-use crate::output::{Output, Printer};
+use crate::output::{Output, Printer, Tally};
 
 /// Files from this size on have a progress bar.
 const LONG: u64 = 1 << 24;
@@ -34,23 +37,30 @@ pub(crate) fn run(arguments: &Decode) -> ExitCode {
         eprintln!("error: no captures of this protocol come with the program: name a file");
         return ExitCode::from(2);
     }
-    if let Some(out) = &arguments.vcd {
+    for (out, option) in [(&arguments.vcd, "--vcd"), (&arguments.svg, "--svg")] {
+        let Some(out) = out else { continue };
         if files + usize::from(piped.is_some()) != 1 {
-            eprintln!("error: --vcd writes one capture: name one file, not {files}");
+            eprintln!("error: {option} writes one capture: name one file, not {files}");
             return ExitCode::from(2);
         }
         let same =
             |file: &PathBuf| file.canonicalize().is_ok_and(|file| out.canonicalize().is_ok_and(|out| out == file));
         if arguments.files.iter().any(same) {
-            eprintln!("error: --vcd would overwrite the capture {}", out.display());
+            eprintln!("error: {option} would overwrite the capture {}", out.display());
             return ExitCode::from(2);
         }
     }
-    let out = BufWriter::with_capacity(1 << 16, io::stdout().lock());
-    let mut printer: Box<dyn Printer> = match (arguments.stats, arguments.json) {
-        (true, json) => Box::new(Stats::new(out, json, arguments.jump)),
-        (false, true) => Box::new(JsonLines::new(out)),
-        (false, false) => Box::new(Text::new(out, files != 1 && piped.is_none())),
+    let stdout = io::stdout();
+    let colour = AutoStream::choice(&stdout) != ColorChoice::Never;
+    let out = BufWriter::with_capacity(1 << 16, stdout.lock());
+    let mut printer: Box<dyn Printer> = if arguments.stats {
+        Box::new(Stats::new(out, arguments.json, arguments.jump))
+    } else if arguments.json {
+        Box::new(JsonLines::new(out))
+    } else if arguments.csv {
+        Box::new(Csv::new(out))
+    } else {
+        Box::new(Text::new(out, files != 1 && piped.is_none(), colour))
     };
     match all(arguments, piped, printer.as_mut()) {
         Ok(true) => ExitCode::SUCCESS,
@@ -106,14 +116,18 @@ fn one(
     printer: &mut dyn Printer,
 ) -> io::Result<bool> {
     let protocol = arguments.protocol;
-    let flat = match capture {
-        Capture::Bytes(_) => Some("a log of bytes has no times for a VCD"),
-        Capture::Packets(_) => Some("a network capture has no levels for a VCD"),
-        Capture::Edges(_) | Capture::Samples(_) => None,
-    };
-    if let (Some(_), Some(what)) = (&arguments.vcd, flat) {
+    let mut filter = arguments.filter();
+    let timeless = matches!(capture, Capture::Bytes(_)) && arguments.rtex.period.is_none();
+    let levels = matches!(capture, Capture::Edges(_) | Capture::Samples(_));
+    let cannot = [
+        (arguments.vcd.is_some() && !levels, "there are no levels in it for a VCD"),
+        (arguments.svg.is_some() && timeless, "a log of bytes has no times for a picture"),
+        (filter.has_times() && timeless, "a log of bytes has no times for --from and --to"),
+    ];
+    if let Some((_, what)) = cannot.into_iter().find(|(is, _)| *is) {
         return Ok(complain(&Fault::new(name, At::File, what), bar));
     }
+    let mut picture = arguments.svg.as_ref().map(|_| Picture::new(name));
     let mut vcd = match &arguments.vcd {
         None => None,
         Some(path) => match VcdOut::create(path) {
@@ -128,11 +142,18 @@ fn one(
     let progress = || bar.set(meter.get());
     let notes = |text: &str| bar.say(text);
     let mut out = Output::new(printer, vcd.as_mut(), &progress, &notes);
+    out = out.with_picture(picture.as_mut()).with_filter(&mut filter);
     let end = protocol.decode(name, capture, &arguments.settings(), &mut out);
-    let (tally, refusals) = (out.tally, out.refusals());
+    let (tally, chosen, refusals) = (out.tally, out.chosen, out.refusals());
     printer.end()?;
     if let Some(vcd) = &mut vcd {
         vcd.finish()?;
+    }
+    if let (Some(picture), Some(path)) = (&picture, &arguments.svg) {
+        if let Err(e) = picture.draw(path) {
+            let what = format!("cannot be drawn: {e}");
+            return Ok(complain(&Fault::new(&path.display().to_string(), At::File, what), bar));
+        }
     }
     if let Some(refusals) = &refusals {
         bar.say(&format!("error: {name}: {refusals}"));
@@ -140,6 +161,10 @@ fn one(
     match end {
         Ok(()) if tally.ok == 0 && tally.refused == 0 => {
             Ok(complain(&Fault::new(name, At::File, "no frame in it: the line is idle, or not of this protocol"), bar))
+        }
+        Ok(()) if chosen == Tally::default() => {
+            let all = tally.ok + tally.refused;
+            Ok(complain(&Fault::new(name, At::File, format!("none of its {all} frames passes the filter")), bar))
         }
         Ok(()) => Ok(refusals.is_none()),
         Err(Stop::Fault(fault)) => Ok(complain(&fault, bar)),

@@ -143,6 +143,13 @@ pub enum Value {
         /// Its unit.
         unit: &'static str,
     },
+    /// A measured value with a fraction.
+    Decimal {
+        /// The number.
+        value: f64,
+        /// Its unit.
+        unit: &'static str,
+    },
     /// A code or check value, printed in hex.
     Hex {
         /// The value.

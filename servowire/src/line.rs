@@ -10,6 +10,7 @@ mod watch;
 
 use std::fmt;
 use std::io;
+use std::time::{Duration, Instant};
 
 pub use evidence::Weights;
 pub use lane::{LineDecoder, StartStopLine, Tap, Wires};
@@ -24,6 +25,9 @@ use crate::capture::raw::Raw;
 use crate::fault::{At, Fault};
 use crate::output::{Output, Sink};
 use crate::protocols::{Protocol, Settings};
+
+/// What comes live is shown after this time at the latest, if it is complete.
+const SHOWN: Duration = Duration::from_millis(250);
 
 /// A field of a start-stop line with its place in the capture.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -120,8 +124,15 @@ pub fn decode(
     };
     let mut watch = Watch::new(file, &names, Candidates::new(protocol, settings, pair), only.as_deref());
     let (mut changes, mut fault) = (Vec::new(), None);
+    let mut shown = Instant::now();
     loop {
         changes.clear();
+        if line.input().is_some_and(|input| input.is_live() && (shown.elapsed() > SHOWN || input.pauses())) {
+            watch.early(out)?;
+            watch.reach(line.reached(), out)?;
+            out.flush()?;
+            shown = Instant::now();
+        }
         let more = match line.read(&mut changes) {
             Ok(more) => more,
             Err(e) => {
@@ -141,6 +152,9 @@ pub fn decode(
             watch.survey(false, out)?;
         }
         watch.reach(line.reached(), out)?;
+        if out.is_over(line.reached()) {
+            break;
+        }
     }
     let end = line.reached();
     watch.survey(true, out)?;

@@ -1,7 +1,10 @@
 //! Where events go: text, JSON Lines, a VCD beside, statistics.
 
+pub mod filter;
 pub mod json;
+pub mod picture;
 pub mod stats;
+pub mod table;
 pub mod text;
 pub mod vcd;
 
@@ -44,6 +47,11 @@ pub trait Printer: Sink {
     /// The events that follow are of this line.
     fn lane(&mut self, _lane: usize) {}
 
+    /// Nothing comes for a while: what is complete is shown.
+    fn flush(&mut self) -> io::Result<()> {
+        Ok(())
+    }
+
     /// The file is at its end.
     fn end(&mut self) -> io::Result<()>;
 }
@@ -71,12 +79,16 @@ impl Sink for Tally {
 pub struct Output<'a> {
     printer: &'a mut dyn Printer,
     vcd: Option<&'a mut vcd::VcdOut>,
+    picture: Option<&'a mut picture::Picture>,
+    filter: Option<&'a mut filter::Filter>,
     /// Called after every block that was read.
     progress: &'a dyn Fn(),
     /// Takes what the user should know but did not ask for.
     notes: &'a dyn Fn(&str),
     /// Frames so far.
     pub tally: Tally,
+    /// Those of them that were asked for.
+    pub chosen: Tally,
     /// Refused frames by class, with the first cause that was given.
     refused: BTreeMap<&'static str, (u64, Option<String>)>,
     lane: Option<usize>,
@@ -90,7 +102,30 @@ impl<'a> Output<'a> {
         progress: &'a dyn Fn(),
         notes: &'a dyn Fn(&str),
     ) -> Self {
-        Self { printer, vcd, progress, notes, tally: Tally::default(), refused: BTreeMap::new(), lane: None }
+        Self {
+            printer,
+            vcd,
+            picture: None,
+            filter: None,
+            progress,
+            notes,
+            tally: Tally::default(),
+            chosen: Tally::default(),
+            refused: BTreeMap::new(),
+            lane: None,
+        }
+    }
+
+    /// Draws the events too.
+    #[must_use]
+    pub fn with_picture(self, picture: Option<&'a mut picture::Picture>) -> Self {
+        Self { picture, ..self }
+    }
+
+    /// Only what passes is shown.
+    #[must_use]
+    pub fn with_filter(self, filter: &'a mut filter::Filter) -> Self {
+        Self { filter: Some(filter), ..self }
     }
 
     /// Whether the changes of the line have a taker.
@@ -106,6 +141,9 @@ impl<'a> Output<'a> {
     /// A further line is decoded; it has the next number, from 0.
     pub fn begin_lane(&mut self, lane: Lane) -> io::Result<()> {
         self.printer.begin_lane(&lane)?;
+        if let Some(picture) = &mut self.picture {
+            picture.begin_lane(lane.clone());
+        }
         if let Some(vcd) = &mut self.vcd {
             vcd.begin_lane(lane);
         }
@@ -117,6 +155,9 @@ impl<'a> Output<'a> {
         if self.lane != Some(lane) {
             self.lane = Some(lane);
             self.printer.lane(lane);
+            if let Some(picture) = &mut self.picture {
+                picture.lane(lane);
+            }
             if let Some(vcd) = &mut self.vcd {
                 vcd.lane(lane);
             }
@@ -136,13 +177,23 @@ impl<'a> Output<'a> {
 
     /// The refused frames in a sentence; none where all hold.
     pub fn refusals(&self) -> Option<String> {
-        let Tally { ok, refused } = self.tally;
+        let Tally { ok, refused } = self.chosen;
         let one = |(class, (count, cause)): (&&str, &(u64, Option<String>))| match cause {
             Some(cause) => format!("{class} {count} ({cause})"),
             None => format!("{class} {count}"),
         };
         let classes = self.refused.iter().map(one).collect::<Vec<_>>().join("; ");
         (refused > 0).then(|| format!("{refused} of {} frames refused: {classes}", ok + refused))
+    }
+
+    /// Whether nothing that was asked for can come any more once a recording was read up to `time`.
+    pub fn is_over(&self, time: i64) -> bool {
+        self.filter.as_ref().is_some_and(|filter| filter.is_over(time))
+    }
+
+    /// Nothing comes for a while: what is complete is shown.
+    pub fn flush(&mut self) -> io::Result<()> {
+        self.printer.flush()
     }
 
     /// Something the user should know.
@@ -154,6 +205,17 @@ impl<'a> Output<'a> {
 impl Sink for Output<'_> {
     fn event(&mut self, event: &Event) -> io::Result<()> {
         self.tally.event(event)?;
+        let mut errors = false;
+        if let Some(filter) = &mut self.filter {
+            if !filter.takes(self.lane.unwrap_or(0), event) {
+                return Ok(());
+            }
+            errors = filter.errors;
+        }
+        self.chosen.event(event)?;
+        if errors && event.verdict.is_ok() {
+            return Ok(());
+        }
         if let Verdict::Refused(refusal) = &event.verdict {
             let (count, cause) = self.refused.entry(refusal.class).or_default();
             *count += 1;
@@ -163,6 +225,9 @@ impl Sink for Output<'_> {
         }
         if let Some(vcd) = &mut self.vcd {
             vcd.event(event);
+        }
+        if let Some(picture) = &mut self.picture {
+            picture.event(event);
         }
         self.printer.event(event)
     }

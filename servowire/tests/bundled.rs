@@ -44,5 +44,5 @@ fn without_a_file_the_published_positions_are_shown() {
     assert_eq!(positions, published);
     let text = common::servowire(&["decode"]);
     text.is_good();
-    assert!(text.out.contains("ABS 3915817  ENID 23  ABM 0  ALMC C8 [OF BE BA]"), "{}", text.out);
+    assert!(text.out.contains("ABS 3915817  ENID 23  ABM 0  ALMC OF BE BA"), "{}", text.out);
 }

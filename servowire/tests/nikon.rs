@@ -118,7 +118,7 @@ fn without_a_file_the_published_positions_are_shown() {
     assert_eq!(positions, want);
     let text = common::servowire(&["decode", "-p", "nikon"]);
     text.is_good();
-    assert!(text.out.contains("ABS40_MT  EA 0  ES A [BATT ERROR]"), "{}", text.out);
+    assert!(text.out.contains("ABS40_MT  EA 0  ES BATT ERROR"), "{}", text.out);
 }
 
 #[test]

@@ -147,10 +147,11 @@ class Run:
         lines = [line.split("\t") for line in path.read_text().splitlines()]
         self.topics = {line[1]: (int(line[2]), int(line[3])) for line in lines if line[0] == "self-test"}
         self.kernels = {line[1]: float(line[2]) for line in lines if line[0] == "kernel"}
+        self.stacks = {line[1]: int(line[2]) for line in lines if line[0] == "stack"}
         self.faults = [f"self-test {topic}: {bad} rows differ" for topic, (_, bad) in self.topics.items() if bad]
         if lines[-1:] != [["end"]]:
             self.faults.append("the image did not come to its end: " + " ".join(lines[-1] if lines else ["no output"]))
-        if not self.topics or not self.kernels:
+        if not self.topics or not (self.kernels or self.stacks):
             self.faults.append("nothing was tested")
 
 
@@ -192,6 +193,26 @@ def record(levels, compiler):
         figures |= {key: value for key, value in limits.get(kernel, {}).items() if key.startswith("limit_")}
         lines.append(f"{kernel} = {{ " + ", ".join(f"{key} = {value}" for key, value in figures.items()) + " }\n")
     BUDGET.write_text(head + "[kernels]\n" + "".join(lines))
+
+
+def stacks(levels, limits):
+    """Prints the stack of calls, deepest point in bytes; yields what is wrong."""
+    print("bytes of stack of the calls, without the state machine itself and the caller's buffers")
+    print("{:34} {:>8} {:>8} {:>11}".format("calls", "O3", "Os", "budget"))
+    deepest = {}
+    for name, level in levels.items():
+        for run in (run for run in level.runs if run.stacks):
+            known = run.stacks.pop("known_1000", 0)
+            if not 1000 <= known < 1200:
+                yield f"{run.name}: the stack of an array of 1000 bytes is measured as {known}"
+            for calls, count in run.stacks.items():
+                deepest.setdefault(calls, {})[name] = count
+    for calls, counts in deepest.items():
+        limit = limits.get(calls, 0)
+        print("{:34} {:>8} {:>8} {:>11}".format(calls, *counts.values(), limit))
+        yield from (f"{calls}: {n} bytes of stack at {level}, the budget is {limit}" for level, n in counts.items() if n > limit)
+    yield from (f"{calls}: in budget.toml, but not measured" for calls in limits.keys() - deepest.keys())
+    print()
 
 
 ROW = "{:34} {:>8} {:>8} {:>8} {:>17} {:>7} {:>7}  {}"
@@ -240,6 +261,7 @@ def table(objdump, folder, recording):
             hints += [hint] if hint else []
         print(line(kernel, levels, entry or {}, any(paths.values())))
     print()
+    faults += stacks(levels, budget.get("stack", {}))
     for hint in hints:
         print(f"note: {hint}")
     for fault in faults:

@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# Builds an image for each protocol at opt-level 3 and s, runs it under QEMU, and checks: vector rows, instruction counts against
-# budget.toml, and that no panic can be reached from any kernel. Some protocols also for a Cortex-M0+.
+# Builds an image for each protocol at opt-level 3 and s, runs it under QEMU, and checks: vector rows, instruction counts and
+# stacks against budget.toml, and that no panic can be reached from any kernel. Some protocols also for a Cortex-M0+.
 #
 #   run.sh             check
 #   run.sh --record    the same, and write the measured figures into budget.toml
@@ -64,6 +64,8 @@ for level in O3 Os; do
         build "$level" "$protocol" "$protocol-$level"
         run "$protocol-$level"
     done
+    build "$level" stack,sorte-proto "stack-$level"
+    run "stack-$level"
 done
 for protocol in "${protocols_m0[@]}"; do
     build M0 "$protocol" "$protocol-M0"

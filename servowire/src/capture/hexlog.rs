@@ -37,6 +37,11 @@ impl HexLog {
         Self { input, text: Vec::new(), line: 0, good: false }
     }
 
+    /// The file that is read.
+    pub(super) fn input(&self) -> &Input {
+        &self.input
+    }
+
     /// The next line that holds bytes, or should; none at the end.
     pub fn burst(&mut self) -> Result<Option<Burst>, Fault> {
         loop {

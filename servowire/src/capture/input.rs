@@ -1,17 +1,16 @@
 //! The file below a reader: buffered, metered for the progress bar, with faults that carry its name.
 
-use std::cell::Cell;
+use std::cell::{Cell, RefCell};
 use std::fs::File;
 use std::io::{self, BufRead, BufReader, Cursor, IsTerminal, Read, Seek};
 use std::path::{Path, PathBuf};
 use std::rc::Rc;
-use std::sync::mpsc;
-use std::thread;
 use std::time::Duration;
 
 use flate2::read::MultiGzDecoder;
 use ruzstd::decoding::StreamingDecoder;
 
+use super::pipe::Pipe;
 use crate::fault::{At, Fault};
 
 const BUFFER: usize = 1 << 18;
@@ -23,6 +22,8 @@ const MOST_HELD: u64 = 1 << 28;
 
 /// How long a pipe that nobody asked for may be silent.
 const PATIENCE: Duration = Duration::from_millis(400);
+/// A source that gives nothing for so long has nothing for now.
+const PAUSE: Duration = Duration::from_millis(60);
 
 /// A reader that can go back.
 pub trait SeekRead: BufRead + Seek + Send + Sync {}
@@ -39,14 +40,25 @@ pub struct Input {
     taken: Rc<Cell<u64>>,
     /// Somebody else counts.
     quiet: bool,
+    /// What is below the reader, if it may be silent for a while.
+    pipe: Option<Rc<RefCell<Pipe>>>,
+}
+
+/// A pipe that somebody else looks at too.
+struct Shared(Rc<RefCell<Pipe>>);
+
+impl Read for Shared {
+    fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
+        self.0.borrow_mut().read(buffer)
+    }
 }
 
 impl Input {
-    /// Opens `path`, or the standard input for `-`.
-    pub fn open(path: &Path) -> Result<Self, Fault> {
+    /// Opens `path`, or the standard input for `-`. `grows`: its end is waited for.
+    pub fn open(path: &Path, grows: bool) -> Result<Self, Fault> {
         let name = path.display().to_string();
         if path.as_os_str() == "-" {
-            return Ok(Self::over("standard input", Box::new(io::stdin())));
+            return Ok(Self::over_pipe("standard input", Pipe::over(io::stdin(), false)));
         }
         let fault = |e: &io::Error| Fault::new(&name, At::File, format!("cannot be opened: {}", plain(e)));
         let file = File::open(path).map_err(|e| fault(&e))?;
@@ -54,8 +66,10 @@ impl Input {
             return Err(Fault::new(&name, At::File, "is a folder; name the capture files in it"));
         }
         let regular = file.metadata().is_ok_and(|data| data.is_file());
-        let path = regular.then(|| path.to_path_buf());
-        Ok(Self { path, ..Self::over(&name, Box::new(file)) })
+        if grows || !regular {
+            return Ok(Self::over_pipe(&name, Pipe::over(file, grows)));
+        }
+        Ok(Self { path: Some(path.to_path_buf()), ..Self::over(&name, Box::new(file)) })
     }
 
     /// What comes through a pipe or from a redirected file, if something comes at once.
@@ -63,16 +77,24 @@ impl Input {
         if io::stdin().is_terminal() {
             return None;
         }
-        let (send, first) = mpsc::channel();
-        thread::spawn(move || {
-            let mut bytes = vec![0; 1 << 12];
-            let read = io::stdin().read(&mut bytes);
-            bytes.truncate(read.unwrap_or(0));
-            // Nobody waits any more.
-            drop(send.send(bytes));
-        });
-        let bytes = first.recv_timeout(PATIENCE).ok().filter(|bytes| !bytes.is_empty())?;
-        Some(Self::over("standard input", Box::new(Cursor::new(bytes).chain(io::stdin()))))
+        let mut pipe = Pipe::over(io::stdin(), false);
+        (pipe.is_ready(PATIENCE) && !pipe.is_over()).then(|| Self::over_pipe("standard input", pipe))
+    }
+
+    fn over_pipe(name: &str, pipe: Pipe) -> Self {
+        let pipe = Rc::new(RefCell::new(pipe));
+        Self { pipe: Some(Rc::clone(&pipe)), ..Self::over(name, Box::new(Shared(pipe))) }
+    }
+
+    /// Whether it may be silent for a while.
+    pub fn is_live(&self) -> bool {
+        self.pipe.is_some()
+    }
+
+    /// Whether a read would have to wait: nothing is there, and nothing comes for a moment.
+    pub fn pauses(&self) -> bool {
+        let silent = |pipe: &Rc<RefCell<Pipe>>| !pipe.borrow_mut().is_ready(PAUSE);
+        self.reader.buffer().is_empty() && self.pipe.as_ref().is_some_and(silent)
     }
 
     /// Unpacks gzip and zstd, as often as they are packed.
@@ -129,6 +151,7 @@ impl Input {
             path: None,
             depth: 0,
             quiet: false,
+            pipe: None,
             reader: BufReader::with_capacity(BUFFER, reader),
             taken: Rc::default(),
         }
@@ -166,10 +189,13 @@ impl Input {
         }
     }
 
-    /// Fills `buffer` as far as the file goes.
-    pub fn read_full(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
+    /// Fills `buffer` as far as the file goes; of one that pauses, with the whole units of `unit` bytes that are there.
+    pub fn read_full(&mut self, buffer: &mut [u8], unit: usize) -> io::Result<usize> {
         let mut filled = 0;
         while let Some(free) = buffer.get_mut(filled..).filter(|free| !free.is_empty()) {
+            if filled > 0 && filled % unit == 0 && self.pauses() {
+                break;
+            }
             match self.read(free) {
                 Ok(0) => break,
                 Ok(n) => filled += n,

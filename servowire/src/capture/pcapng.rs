@@ -22,6 +22,7 @@ pub struct Pcapng {
     name: String,
     reader: PcapNgReader<Input>,
     packets: u64,
+    live: bool,
 }
 
 /// A packet as it was on the network.
@@ -40,9 +41,14 @@ pub struct Packet {
 impl Pcapng {
     /// A capture from its beginning.
     pub fn new(input: Input) -> Result<Self, Fault> {
-        let name = input.name().to_owned();
+        let (name, live) = (input.name().to_owned(), input.is_live());
         let reader = PcapNgReader::new(input).map_err(|e| Fault::new(&name, At::File, say(&e)))?;
-        Ok(Self { name, reader, packets: 0 })
+        Ok(Self { name, reader, packets: 0, live })
+    }
+
+    /// Whether packets may come one by one.
+    pub fn is_live(&self) -> bool {
+        self.live
     }
 
     /// The next packet; none at the end.

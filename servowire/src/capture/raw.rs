@@ -80,12 +80,12 @@ impl Raw {
         }
         let Unit::Bytes(n) = self.unit else {
             let at = At::Byte(self.samples / 8);
-            let got = self.input.read_full(&mut self.block).map_err(|e| self.input.io_fault(at, &e))?;
+            let got = self.input.read_full(&mut self.block, 1).map_err(|e| self.input.io_fault(at, &e))?;
             return Ok((got, got as u64 * 8));
         };
         let at = self.samples * n as u64;
         let buffer = self.block.get_mut(..BLOCK / 8 / n * 8 * n).unwrap_or_default();
-        let got = self.input.read_full(buffer).map_err(|e| self.input.io_fault(At::Byte(at), &e))?;
+        let got = self.input.read_full(buffer, n).map_err(|e| self.input.io_fault(At::Byte(at), &e))?;
         let rest = got % n;
         if rest != 0 {
             let what = format!("{rest} bytes are left, where a sample has {n}: cut off, or another --unit-size");
@@ -159,6 +159,10 @@ impl Raw {
 }
 
 impl Line for Raw {
+    fn input(&self) -> Option<&Input> {
+        Some(&self.input)
+    }
+
     fn channels(&self) -> &[String] {
         &self.channels
     }

@@ -17,12 +17,17 @@ impl Records {
         Self { input, size: size.max(1), record: 0 }
     }
 
+    /// The file that is read.
+    pub(super) fn input(&self) -> &Input {
+        &self.input
+    }
+
     /// The next record, numbered from 1; none at the end.
     pub fn burst(&mut self) -> Result<Option<Burst>, Fault> {
         let mut bytes = vec![0; self.size];
         self.record += 1;
         let at = At::Byte(self.record.saturating_sub(1).saturating_mul(self.size as u64));
-        match self.input.read_full(&mut bytes) {
+        match self.input.read_full(&mut bytes, self.size) {
             Ok(0) => Ok(None),
             Ok(got) if got == self.size => Ok(Some(Burst { line: self.record, bytes, spoilt: None })),
             Ok(got) => {

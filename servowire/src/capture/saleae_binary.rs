@@ -40,7 +40,7 @@ impl SaleaeBinary {
     /// Reads the header.
     pub fn new(mut input: Input) -> Result<Self, Fault> {
         let mut header = [0; HEADER];
-        let got = input.read_full(&mut header).map_err(|e| input.io_fault(At::Byte(0), &e))?;
+        let got = input.read_full(&mut header, HEADER).map_err(|e| input.io_fault(At::Byte(0), &e))?;
         if !header.starts_with(b"<SALEAE>") {
             return Err(input.fault(At::Byte(0), "does not begin with <SALEAE>: not a Saleae binary export"));
         }
@@ -89,7 +89,7 @@ impl SaleaeBinary {
     fn bytes<const N: usize>(&mut self, missing: &str) -> Result<[u8; N], Fault> {
         let mut raw = [0; N];
         let at = At::Byte(self.at);
-        let got = self.input.read_full(&mut raw).map_err(|e| self.input.io_fault(at, &e))?;
+        let got = self.input.read_full(&mut raw, N).map_err(|e| self.input.io_fault(at, &e))?;
         if got < N {
             let at = At::Byte(self.at + got as u64);
             return Err(self.input.fault(at, format!("{missing}: it was cut off")));

@@ -114,6 +114,10 @@ impl SigrokText {
 }
 
 impl Line for SigrokText {
+    fn input(&self) -> Option<&Input> {
+        Some(&self.input)
+    }
+
     fn channels(&self) -> &[String] {
         &self.channels
     }

@@ -114,7 +114,8 @@ impl Table {
             return Err(Fault::new(&name, At::Line(1), what));
         };
         let mut cells = 0;
-        while waiting.len() < SAMPLE && cells < SAMPLE_CELLS && lines.next(&mut text)? {
+        let enough = |waiting: &VecDeque<_>, lines: &Lines| !waiting.is_empty() && lines.input.pauses();
+        while waiting.len() < SAMPLE && cells < SAMPLE_CELLS && !enough(&waiting, &lines) && lines.next(&mut text)? {
             cells += heading.columns();
             waiting.push_back((lines.line, text.clone()));
         }
@@ -270,6 +271,10 @@ fn columns(heading: &Heading, rows: &VecDeque<(u64, Vec<u8>)>, threshold: Option
 }
 
 impl Line for Table {
+    fn input(&self) -> Option<&Input> {
+        Some(&self.lines.input)
+    }
+
     fn channels(&self) -> &[String] {
         &self.channels
     }
@@ -278,6 +283,9 @@ impl Line for Table {
         let enough = changes.len() + BLOCK;
         let (first, mut rows) = (changes.len(), 0);
         while !self.over && changes.len() < enough && rows < 16 * BLOCK && !(self.hole && changes.len() > first) {
+            if rows > 0 && self.waiting.is_empty() && self.lines.input.pauses() {
+                break;
+            }
             let more = self.step(changes);
             self.over = !matches!(more, Ok(true));
             more?;

@@ -55,6 +55,22 @@ pub fn frequency(text: &str) -> Option<f64> {
     (number.is_finite() && number >= 0.0).then_some(number * factor)
 }
 
+/// A time as people write it, with its unit: `500us`, `0.5 ms`, `-2s`; in picoseconds.
+pub fn duration(text: &str) -> Option<i64> {
+    let bare = text.trim();
+    let digits = bare.trim_end_matches(char::is_alphabetic);
+    let picoseconds = match bare.get(digits.len()..)? {
+        "ps" => 1.0,
+        "ns" => 1e3,
+        "us" | "µs" | "μs" => 1e6,
+        "ms" => 1e9,
+        "s" => 1e12,
+        _ => return None,
+    };
+    let number: f64 = digits.trim_end().parse().ok()?;
+    from_seconds(number * picoseconds / 1e12)
+}
+
 /// Sample indices in picoseconds and back.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Clock {
@@ -120,6 +136,24 @@ mod tests {
             ("1e300", None),
         ] {
             assert_eq!(from_decimal(text), want, "{text:?}");
+        }
+    }
+
+    #[test]
+    fn times_with_units() {
+        for (text, want) in [
+            ("500us", Some(500_000_000)),
+            ("0.5 ms", Some(500_000_000)),
+            ("-2s", Some(-2_000_000_000_000)),
+            ("1e3ns", Some(1_000_000)),
+            ("7 µs", Some(7_000_000)),
+            ("5", None),
+            ("us", None),
+            ("5 h", None),
+            ("", None),
+            ("1e30s", None),
+        ] {
+            assert_eq!(duration(text), want, "{text:?}");
         }
     }
 

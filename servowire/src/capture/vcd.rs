@@ -301,6 +301,10 @@ fn second(text: &[u8], from: usize) -> Option<(&[u8], usize)> {
 }
 
 impl Line for Vcd {
+    fn input(&self) -> Option<&Input> {
+        Some(&self.input)
+    }
+
     fn channels(&self) -> &[String] {
         &self.channels
     }
@@ -310,7 +314,7 @@ impl Line for Vcd {
         loop {
             let before = (self.from, self.to);
             self.scan(changes, enough)?;
-            if changes.len() >= enough {
+            if changes.len() >= enough || !self.ended && changes.len() > enough - BLOCK && self.input.pauses() {
                 return Ok(true);
             }
             if self.ended && (self.from == self.to || before == (self.from, self.to)) {

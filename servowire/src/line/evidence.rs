@@ -122,6 +122,7 @@ fn content(event: &Event) -> u64 {
     for field in event.fields.iter().filter(|field| field.name != "spikes" && field.name != "delay") {
         match &field.value {
             Value::Number { value, .. } => value.hash(&mut hasher),
+            Value::Decimal { value, .. } => value.to_bits().hash(&mut hasher),
             Value::Hex { value, .. } | Value::Flags { raw: value, .. } => value.hash(&mut hasher),
             Value::Text(text) => text.hash(&mut hasher),
         }

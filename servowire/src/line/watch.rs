@@ -50,6 +50,8 @@ pub(super) struct Watch<'a> {
     /// Holes between them: number of changes before, time behind.
     holes: Vec<(usize, i64)>,
     kept: usize,
+    /// Changes held back when they were judged early.
+    tried: usize,
     /// Channels that have enough edges to be judged.
     due: bool,
     /// The user named the channels, and everything else is of no interest.
@@ -77,6 +79,7 @@ impl<'a> Watch<'a> {
             held: Some(Vec::new()),
             holes: Vec::new(),
             kept: 0,
+            tried: 0,
             due: false,
             named: only.is_some(),
             busiest: None,
@@ -167,9 +170,24 @@ impl<'a> Watch<'a> {
         Ok(())
     }
 
+    /// What was held back may already do: judges it if it is twice as much as the last time, and goes on holding it back
+    /// if no line is certain.
+    pub(super) fn early(&mut self, out: &mut Output<'_>) -> io::Result<()> {
+        let held = self.held.as_ref().map_or(0, Vec::len);
+        if held < FEWEST || held < 2 * self.tried {
+            return Ok(());
+        }
+        self.tried = held;
+        self.judge(false, true, out)
+    }
+
     /// Judges the open channels; at the `end` also those that have hardly moved. What holds is decoded from its
     /// first edge on.
     pub(super) fn survey(&mut self, end: bool, out: &mut Output<'_>) -> io::Result<()> {
+        self.judge(end, false, out)
+    }
+
+    fn judge(&mut self, end: bool, early: bool, out: &mut Output<'_>) -> io::Result<()> {
         let first = self.held.is_some();
         let mut readings = Vec::new();
         let mut judged = Vec::new();
@@ -197,8 +215,11 @@ impl<'a> Watch<'a> {
         };
         let all = self.candidates.lines(readings, &judged, &edges);
         // The last chance of what is not certain, or the only one where the user says that it is a line.
-        let last = self.found.is_empty() && (end || self.named && self.candidates.is_asked_for());
+        let last = !early && self.found.is_empty() && (end || self.named && self.candidates.is_asked_for());
         let (taken, passed) = self.choose(all, last);
+        if early && taken.is_empty() {
+            return Ok(());
+        }
         // What sounds in a line that is decoded already is no second one.
         for found in passed {
             for tap in &found.taps {

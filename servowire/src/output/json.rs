@@ -45,6 +45,10 @@ impl<W: Write> Printer for JsonLines<W> {
         self.lane = lane;
     }
 
+    fn flush(&mut self) -> io::Result<()> {
+        self.out.flush()
+    }
+
     fn end(&mut self) -> io::Result<()> {
         self.out.flush()
     }
@@ -127,6 +131,7 @@ impl Serialize for Value {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         match self {
             Self::Number { value, .. } => serializer.serialize_i64(*value),
+            Self::Decimal { value, .. } => serializer.serialize_f64(*value),
             Self::Hex { value, .. } => serializer.serialize_u64(*value),
             Self::Text(text) => serializer.serialize_str(text),
             Self::Flags { raw, set, .. } => {

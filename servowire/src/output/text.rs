@@ -1,7 +1,7 @@
-//! One line a transaction.
+//! One line a transaction, of a hundred columns at most; what is longer goes on below.
 //!
 //! ```text
-//!     10.000 us  <>  ID 3    SF 20 [ea1]  ABS 3915817  ENID 23  ABM 0  ...  = 0.466802 turns  after 3.00 us  ok
+//!      10.000 us  <>  ID 3  SF EA1  ABS 3915817  ABM 0  ALMC OF BE BA  0.466802 turns  +3.00 us  ok
 //! ```
 //! `>` is a request, `<` an answer, `<>` a good request with what it got.
 
@@ -9,13 +9,27 @@ use std::collections::{BTreeMap, HashMap};
 use std::fmt::Write as _;
 use std::io::{self, Write};
 
+use clap::builder::styling::{AnsiColor, Style};
+
 use super::{Lane, Printer, Sink};
 use crate::event::{Direction, Event, Field, Place, Value, Verdict};
+
+/// Columns of a line.
+const COLUMNS: usize = 100;
+/// Wider values are left to stand out of their column.
+const WIDEST: usize = 24;
+/// What hardly ever changes is said when it does.
+const STEADY: &[&str] = &["ENID", "delay"];
+/// A check field that holds is said by the verdict.
+const CHECKED: &str = "CRC";
+
+const REFUSED: &str = "REFUSED";
+const ALARM: Style = AnsiColor::Red.on_default().bold();
 
 /// Prints for people.
 pub struct Text<W> {
     out: W,
-    line: String,
+    line: Columns,
     /// A good request of each line whose answer may follow.
     held: BTreeMap<usize, Event>,
     /// Names of the lines, and the one that speaks.
@@ -24,36 +38,45 @@ pub struct Text<W> {
     headings: bool,
     /// The widest value of each field so far, so that lines of one kind stand in columns.
     widths: HashMap<&'static str, usize>,
+    /// What was last said of a line's steady fields.
+    steady: HashMap<(usize, &'static str), Value>,
 }
 
-/// Wider values are left to stand out of their column.
-const WIDEST: usize = 24;
-
 impl<W: Write> Text<W> {
-    /// `headings`: print the file's name above its lines.
-    pub fn new(out: W, headings: bool) -> Self {
+    /// `headings`: print the file's name above its lines; `colour`: let refused frames stand out.
+    pub fn new(out: W, headings: bool, colour: bool) -> Self {
         Self {
             out,
-            line: String::new(),
+            line: Columns { text: String::new(), pieces: Vec::new(), colour },
             held: BTreeMap::new(),
             lanes: Vec::new(),
             lane: 0,
             headings,
             widths: HashMap::new(),
+            steady: HashMap::new(),
         }
     }
 
     fn print(&mut self, event: &Event, place: Place, direction: &str) -> io::Result<()> {
-        let line = &mut self.line;
-        line.clear();
-        place_column(line, place);
+        self.line.begin(place);
         if self.lanes.len() > 1 {
             let widest = self.lanes.iter().map(String::len).max().unwrap_or(0);
-            let _ = write!(line, "  {:<widest$}", self.lanes.get(self.lane).map_or("", String::as_str));
+            let _ = write!(self.line.text, "  {:<widest$}", self.lanes.get(self.lane).map_or("", String::as_str));
         }
-        let _ = write!(line, "  {direction:<2}  {:<6}", event.kind);
+        let _ = write!(self.line.text, "  {direction:<2}");
+        let _ = write!(self.line.piece(), "{:<4}", event.kind);
         for field in &event.fields {
-            line.push_str("  ");
+            if field.name == CHECKED && event.verdict.is_ok() {
+                continue;
+            }
+            if STEADY.contains(&field.name) {
+                let known = self.steady.entry((self.lane, field.name)).or_insert_with(|| Value::Text(String::new()));
+                if *known == field.value {
+                    continue;
+                }
+                known.clone_from(&field.value);
+            }
+            let line = self.line.piece();
             let from = line.len();
             field_text(line, field);
             let width = line.len() - from;
@@ -64,14 +87,13 @@ impl<W: Write> Text<W> {
             }
         }
         if let Some(turns) = event.position.and_then(|position| position.turns()) {
-            let _ = write!(line, "  = {turns:10.6} turns");
+            let _ = write!(self.line.piece(), "{turns:8.6} turns");
         }
         if let Some(delay) = event.delay {
-            let _ = write!(line, "  after {:.2} us", delay as f64 / 1e6);
+            let _ = write!(self.line.piece(), "+{:.2} us", delay as f64 / 1e6);
         }
-        verdict_text(line, &event.verdict);
-        line.push('\n');
-        self.out.write_all(line.as_bytes())
+        verdict_text(self.line.piece(), &event.verdict);
+        self.line.write(&mut self.out)
     }
 
     fn release(&mut self) -> io::Result<()> {
@@ -79,6 +101,84 @@ impl<W: Write> Text<W> {
             Some(request) => self.print(&request, request.place, ">"),
             None => Ok(()),
         }
+    }
+}
+
+/// A line in pieces that are not parted.
+struct Columns {
+    text: String,
+    /// Where they begin.
+    pieces: Vec<usize>,
+    colour: bool,
+}
+
+impl Columns {
+    fn begin(&mut self, place: Place) {
+        self.text.clear();
+        self.pieces.clear();
+        let _ = match place {
+            Place::Time { start, .. } => write!(self.text, "{:>11.3} us", start as f64 / 1e6),
+            Place::Line(number) => write!(self.text, "line {number:>5}"),
+        };
+    }
+
+    /// The place for a further piece.
+    fn piece(&mut self) -> &mut String {
+        self.text.push_str("  ");
+        self.pieces.push(self.text.len());
+        &mut self.text
+    }
+
+    fn write(&self, out: &mut impl Write) -> io::Result<()> {
+        if !self.colour && self.text.len() <= COLUMNS {
+            out.write_all(self.text.as_bytes())?;
+            return out.write_all(b"\n");
+        }
+        let indent = self.pieces.first().copied().unwrap_or(0);
+        out.write_all(self.text.get(..indent).unwrap_or_default().as_bytes())?;
+        let (mut at, mut first) = (indent, true);
+        let ends = self.pieces.iter().skip(1).copied().chain([self.text.len()]);
+        for (from, to) in self.pieces.iter().zip(ends) {
+            let piece = self.text.get(*from..to).unwrap_or_default().trim_end();
+            let width = to - from;
+            if !first && at + 2 + piece.chars().count() > COLUMNS && indent + piece.len() <= COLUMNS {
+                write!(out, "\n{:indent$}", "")?;
+                at = indent;
+            } else if !first {
+                out.write_all(b"  ")?;
+                at += 2;
+            }
+            first = false;
+            at = self.words(out, piece, at, indent)?;
+            // Padding keeps the columns.
+            let padding = width.saturating_sub(2 + piece.len());
+            if to < self.text.len() && at + padding < COLUMNS {
+                write!(out, "{:padding$}", "")?;
+                at += padding;
+            }
+        }
+        out.write_all(b"\n")
+    }
+
+    /// A piece from a column on; one that is too long by itself is parted between its words.
+    fn words(&self, out: &mut impl Write, piece: &str, mut at: usize, indent: usize) -> io::Result<usize> {
+        for (k, word) in piece.split(' ').enumerate() {
+            let width = word.chars().count();
+            if k > 0 && at + 1 + width > COLUMNS {
+                write!(out, "\n{:indent$}", "")?;
+                at = indent;
+            } else if k > 0 {
+                out.write_all(b" ")?;
+                at += 1;
+            }
+            if k == 0 && word == REFUSED && self.colour {
+                write!(out, "{ALARM}{word}{ALARM:#}")?;
+            } else {
+                out.write_all(word.as_bytes())?;
+            }
+            at += width;
+        }
+        Ok(at)
     }
 }
 
@@ -124,12 +224,17 @@ impl<W: Write> Printer for Text<W> {
         self.lane = lane;
     }
 
+    fn flush(&mut self) -> io::Result<()> {
+        self.out.flush()
+    }
+
     fn end(&mut self) -> io::Result<()> {
         for lane in 0..self.lanes.len().max(1) {
             self.lane = lane;
             self.release()?;
         }
         self.lanes.clear();
+        self.steady.clear();
         self.lane = 0;
         if self.headings {
             writeln!(self.out)?;
@@ -138,33 +243,29 @@ impl<W: Write> Printer for Text<W> {
     }
 }
 
-fn place_column(line: &mut String, place: Place) {
-    let _ = match place {
-        Place::Time { start, .. } => write!(line, "{:>14.3} us", start as f64 / 1e6),
-        Place::Line(number) => write!(line, "line {number:>6}"),
-    };
-}
-
 fn field_text(line: &mut String, field: &Field) {
     let name = field.name;
     let _ = match &field.value {
         Value::Number { value, unit: "" } => write!(line, "{name} {value}"),
         Value::Number { value, unit } => write!(line, "{name} {value} {unit}"),
+        Value::Decimal { value, unit } => write!(line, "{name} {value:.2} {unit}"),
         Value::Hex { value, digits } => write!(line, "{name} {value:0digits$X}"),
-        Value::Flags { raw, digits, set } => {
-            let _ = write!(line, "{name} {raw:0digits$X}");
-            // The brackets of no names are left out.
-            if set.is_empty() { Ok(()) } else { write!(line, " [{}]", set.join(" ")) }
+        Value::Flags { raw: 0, .. } => write!(line, "{name} 0"),
+        // The names alone, unless one of the bits has none.
+        Value::Flags { raw, set, .. } if raw.count_ones() as usize == set.len() => {
+            write!(line, "{name} {}", set.join(" "))
         }
+        Value::Flags { raw, digits, set } if set.is_empty() => write!(line, "{name} {raw:0digits$X}"),
+        Value::Flags { raw, digits, set } => write!(line, "{name} {raw:0digits$X} [{}]", set.join(" ")),
         Value::Text(text) => write!(line, "{name} {text}"),
     };
 }
 
 fn verdict_text(line: &mut String, verdict: &Verdict) {
     match verdict {
-        Verdict::Ok => line.push_str("  ok"),
+        Verdict::Ok => line.push_str("ok"),
         Verdict::Refused(refusal) => {
-            let _ = write!(line, "  REFUSED {}", refusal.class);
+            let _ = write!(line, "{REFUSED} {}", refusal.class);
             if let Some(field) = &refusal.field {
                 let _ = write!(line, " in {field}");
             }

@@ -167,6 +167,7 @@ impl VcdOut {
 fn text(field: &Field) -> String {
     match &field.value {
         Value::Number { value, unit } => format!("{value} {unit}").trim_end().to_owned(),
+        Value::Decimal { value, unit } => format!("{value} {unit}").trim_end().to_owned(),
         Value::Hex { value, digits } => format!("{value:0digits$X}"),
         Value::Flags { raw, digits, set } => format!("{raw:0digits$X} {}", set.join(" ")).trim_end().to_owned(),
         Value::Text(text) => text.clone(),

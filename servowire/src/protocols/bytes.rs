@@ -23,7 +23,7 @@ pub(super) fn decode(
 ) -> Result<(), Stop> {
     let mut bursts = Vec::new();
     let mut end = Ok(true);
-    while bursts.len() < SAMPLE && end == Ok(true) {
+    while bursts.len() < SAMPLE && end == Ok(true) && (bursts.is_empty() || !log.pauses()) {
         match log.burst() {
             Ok(Some(burst)) => bursts.push(burst),
             Ok(None) => end = Ok(false),
@@ -41,6 +41,9 @@ pub(super) fn decode(
         reader.burst(burst, out)?;
     }
     while end == Ok(true) {
+        if log.pauses() {
+            out.flush()?;
+        }
         out.tick();
         match log.burst() {
             Ok(Some(burst)) => reader.burst(&burst, out)?,

@@ -307,7 +307,7 @@ impl Decoder {
         fields.extend(byte("PIPE", answer.pipe()));
         fields.extend(dd.ok().map(|dd| Field::number("DD", dd.get())));
         fields.extend(byte("SEC", answer.secondary()));
-        fields.push(Field::measured("VEL", self.tracker.velocity(), "steps/frame"));
+        fields.push(Field::measured("VEL", self.tracker.velocity(), "/frame"));
         let first = answer.words().into_iter().find_map(|word| word.byte().err()).or(dd.err()).map(refusal);
         let verdict = match first {
             Some(refused) => Err(refused),

@@ -43,6 +43,9 @@ const BYTE: i64 = 80_000;
 pub(super) fn decode(mut capture: Pcapng, out: &mut Output<'_>) -> Result<(), Stop> {
     while let Some(packet) = capture.packet()? {
         out.event(&event(&packet))?;
+        if capture.is_live() {
+            out.flush()?;
+        }
         out.tick();
     }
     Ok(())

@@ -179,6 +179,6 @@ fn number(value: &Value) -> Option<i64> {
         Value::Number { value, .. } => Some(*value),
         Value::Hex { value, .. } => i64::try_from(*value).ok(),
         Value::Flags { raw, .. } => i64::try_from(*raw).ok(),
-        Value::Text(_) => None,
+        Value::Decimal { .. } | Value::Text(_) => None,
     }
 }

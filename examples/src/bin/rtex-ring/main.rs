@@ -38,6 +38,10 @@ const SILENT: usize = 11;
 
 fn main() -> Result<(), Box<dyn Error>> {
     let out = std::env::args().nth(1).unwrap_or_else(|| "rtex-ring.svg".to_owned());
+    if out.starts_with('-') {
+        println!("usage: rtex-ring [OUT.svg]\n\nRuns the ring and draws it; without a name into rtex-ring.svg.");
+        return Ok(());
+    }
     check_periods()?;
 
     let mut bench = Bench::new(ActiveCode::CyclicPosition, LIMITS)?;

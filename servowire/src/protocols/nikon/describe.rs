@@ -163,7 +163,8 @@ impl Encoder {
 
     fn data(&mut self, response: Response, fields: &mut Vec<Field>) {
         fields.extend(response.alm().map(|alm| Field::flags("ALM", &alm, 4)));
-        fields.extend(response.temperature().map(|degrees| Field::text("temperature", degrees)));
+        let degrees = response.temperature().map(|value| f64::from(value.milli_celsius()) / 1000.0);
+        fields.extend(degrees.map(|value| Field { name: "temperature", value: Value::Decimal { value, unit: "C" } }));
         fields.extend(response.velocity().map(|velocity| Field::number("velocity", velocity)));
         match response.data() {
             Some(Data::Status { pm_alm, .. }) if pm_alm.bits() != 0 => fields.push(Field::flags("PM-ALM", &pm_alm, 2)),
@@ -206,7 +207,8 @@ impl Encoder {
 /// No reply came to the request at `place` until `now`.
 pub(super) fn silence(request: Request, place: Place, timeout: i64, now: i64) -> Event {
     let cause = "only the request is on the line: no encoder of this address, A and B exchanged, or not its bit rate";
-    Event::silence(place, request.command().mnemonic(), "reply", timeout, now, cause)
+    let fields = vec![Field::number("EA", request.ea.get())];
+    Event { fields, ..Event::silence(place, request.command().mnemonic(), "reply", timeout, now, cause) }
 }
 
 /// The content bits as vendor documents print them, the first bit of the line in bit 15.
