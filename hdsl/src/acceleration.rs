@@ -121,13 +121,13 @@ mod tests {
     #[test]
     fn every_value_comes_back_and_every_word_is_canonical() {
         let mut good = 0;
-        for word in 0..=u16::MAX {
+        for word in (0..=u16::MAX).step_by(crate::thin(31)) {
             if let Ok(value) = DeltaDelta::from_word(word) {
                 assert_eq!(value.to_word(), word);
                 good += 1;
             }
         }
-        assert_eq!(good, 2048);
+        assert!(cfg!(miri) || good == 2048);
         for (value, word) in [(0, 0x001f), (1, 0x003a), (-1, 0xfff5), (-5, 0xff61), (1023, 0x7fea), (-1024, 0x8000)] {
             assert_eq!(DeltaDelta::new(value).unwrap().to_word(), word);
         }

@@ -326,7 +326,7 @@ pub(crate) mod tests {
     #[test]
     fn single_flips_of_the_acceleration() {
         let (mut by_value, mut wrong, mut seen) = (0, 0, 0);
-        for dd in (-1024..=1023).step_by(if cfg!(miri) { 97 } else { 1 }) {
+        for dd in (-1024..=1023).step_by(crate::thin(397)) {
             for rd in [RunningDisparity::Minus, RunningDisparity::Plus] {
                 // IDLE and K30.7 stand in one column each: the disparity is known before the acceleration.
                 let content = Content {

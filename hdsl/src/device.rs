@@ -4,10 +4,11 @@
 //! answer, which begins one bit time after PARA. It is an absolute encoder: its safe position is the true one, whatever
 //! the acceleration channel could say about it.
 //!
-//! It shares no rule with the receiver: test pattern, CRC and limits are written down here once more. What the documents
-//! leave to the encoder is a switch in [`Behaviour`], what it can do wrong one in [`Faults`].
+//! It shares no rule of the line with the receiver: code, test pattern, checks and limits are written down here once more.
+//! What the documents leave to the encoder is a switch in [`Behaviour`], what it can do wrong one in [`Faults`].
 
 mod behaviour;
+mod code;
 mod resources;
 
 use nrz_line::Window;
@@ -15,14 +16,12 @@ use nrz_line::Window;
 pub use behaviour::{Behaviour, Complement, Disparity, Faults, Overload};
 pub use resources::{Resource, Resources};
 
-use crate::acceleration::DeltaDelta;
-use crate::answer::Content;
 use crate::encoder_id::{EncoderId, PositionBits};
 use crate::error::Error;
-use crate::frame::Head;
 use crate::message::{LongAnswer, Request, Responder};
-use crate::parameter::{EncoderByte, MasterSymbol};
-use crate::symbol::{Character, Control, RunningDisparity};
+use crate::parameter::MasterSymbol;
+use crate::symbol::RunningDisparity;
+use code::Symbol;
 
 /// The test pattern, first line bit in bit 0: 0100110011001000000100010101110111111011001100110100010011001.
 const PATTERN: u64 = 0x1322_ccdf_ba88_1332;
@@ -56,7 +55,7 @@ pub struct Device {
     /// Position and speed as the receiver can know them from the acceleration words.
     told: u64,
     velocity: i64,
-    blocks: [[Character; 8]; 2],
+    blocks: [[Symbol; 8]; 2],
 }
 
 impl Device {
@@ -84,7 +83,7 @@ impl Device {
             position: 0,
             told: 0,
             velocity: 0,
-            blocks: [[Character::data(0); 8]; 2],
+            blocks: [[Symbol::data(0); 8]; 2],
         }
     }
 
@@ -96,14 +95,15 @@ impl Device {
     pub fn answer(&mut self, head: Window, position: u64) -> Option<u64> {
         let before = core::mem::replace(&mut self.position, position & self.bits.mask());
         let acceleration = self.measure();
-        let Ok(head) = Head::parse(head) else {
+        let Some(byte) = code::parameter(head) else {
             if !self.behaviour.stalls_on_bad_head {
                 self.go_on(before);
             }
             return None;
         };
-        let symbol = head.byte.symbol();
-        let start_up = !head.byte.first();
+        let symbol = MasterSymbol::from_bits(byte & 0x1f);
+        // FIRST is 0.
+        let start_up = byte & 0x80 == 0;
         match symbol {
             Ok(MasterSymbol::Reset) if start_up => {
                 self.reset();
@@ -121,9 +121,9 @@ impl Device {
         let answer = match symbol {
             Ok(MasterSymbol::Start | MasterSymbol::Learn | MasterSymbol::Check) if start_up => PATTERN,
             Ok(MasterSymbol::IdReq) if start_up => {
-                let (bits, after) = self.id.to_answer(Character::data(0), self.column());
-                self.disparity = after;
-                bits
+                let [low, middle, high, _] = self.id.get().to_le_bytes().map(Symbol::data);
+                let both = Symbol::data(high.byte << 4 | high.byte);
+                self.emit([low, middle, both, middle, low, Symbol::data(0)])
             }
             _ => self.normal(symbol, before, acceleration),
         };
@@ -148,14 +148,20 @@ impl Device {
         }
     }
 
+    fn emit(&mut self, symbols: [Symbol; 6]) -> u64 {
+        let (bits, plus) = code::answer(symbols, self.column() == RunningDisparity::Plus);
+        self.disparity = if plus { RunningDisparity::Plus } else { RunningDisparity::Minus };
+        bits
+    }
+
     /// The second difference that takes the receiver to the present position; `None` if the encoder says that it has none.
-    fn measure(&mut self) -> Option<DeltaDelta> {
+    fn measure(&mut self) -> Option<i16> {
         let step = self.signed(self.position.wrapping_sub(self.told));
         if self.at.is_none() {
             // Nobody listens yet: no need to limit.
             self.velocity = step;
             self.told = self.position;
-            return Some(DeltaDelta::ZERO);
+            return Some(0);
         }
         let wanted = step.wrapping_sub(self.velocity);
         let value = wanted.clamp(-1024, 1023);
@@ -166,7 +172,7 @@ impl Device {
         }
         self.velocity = self.velocity.wrapping_add(value);
         self.told = self.told.wrapping_add_signed(self.velocity) & self.bits.mask();
-        i16::try_from(value).ok().and_then(DeltaDelta::new)
+        i16::try_from(value).ok()
     }
 
     /// A difference of positions, with its sign.
@@ -186,7 +192,7 @@ impl Device {
         }
     }
 
-    fn normal(&mut self, symbol: Result<MasterSymbol, Error>, before: u64, acceleration: Option<DeltaDelta>) -> u64 {
+    fn normal(&mut self, symbol: Result<MasterSymbol, Error>, before: u64, acceleration: Option<i16>) -> u64 {
         let at = self.at.unwrap_or(self.behaviour.first_place & 7);
         if at == 0 || self.at.is_none() {
             self.latch(before);
@@ -194,18 +200,17 @@ impl Device {
         self.at = Some(at.wrapping_add(1) & 7);
         self.take(symbol);
         self.serve();
-        let [vertical, secondary] = self.blocks.map(|b| b.get(usize::from(at)).copied().unwrap_or(Character::data(0)));
-        let byte = EncoderByte::of(self.responder.transmit(), at == 7 && !self.faults.no_vsync);
-        let content = Content {
-            vertical,
-            parameter: EncoderByte::new(byte.raw() | (self.behaviour.reserved_bits & 3) << 5),
-            pipe: self.pipe.map_or(Character::control(Control::K30_7), Character::data),
-            acceleration: acceleration.filter(|_| !self.faults.no_acceleration),
-            secondary,
+        let [vertical, secondary] = self.blocks.map(|b| b.get(usize::from(at)).copied().unwrap_or(Symbol::data(0)));
+        let vsync = if at == 7 && !self.faults.no_vsync { 0x80 } else { 0 };
+        let parameter = self.responder.transmit().bits() | vsync | (self.behaviour.reserved_bits & 3) << 5;
+        // K30.7: no data.
+        let pipe = self.pipe.map_or(Symbol::special(0xfe), Symbol::data);
+        let [high, low] = match acceleration.filter(|_| !self.faults.no_acceleration) {
+            Some(value) => acceleration_word(value).to_be_bytes().map(Symbol::data),
+            // K29.7 twice: no value.
+            None => [Symbol::special(0xfd); 2],
         };
-        let (bits, after) = content.emit(self.column());
-        self.disparity = after;
-        bits
+        self.emit([vertical, Symbol::data(parameter), pipe, high, low, secondary])
     }
 
     /// The master's symbol; a request that is complete waits for its answer, unless it is forgotten.
@@ -246,11 +251,12 @@ impl Device {
         let status = if self.toggle { 0x80 } else { 0 } | test | error | 0x1c;
         self.toggle = self.toggle == self.faults.stuck_toggle;
         let sign = if self.id.is_signed() { self.signed(position) } else { i64::from_le_bytes(position.to_le_bytes()) };
-        let mut first = block(Character::data(self.resources.summary()), sign, self.faults.bad_crc);
+        let mut first = block(Symbol::data(self.resources.summary()), sign, self.faults.bad_crc);
         if self.faults.no_position {
-            first = marked(first, [Character::control(Control::K29_7); 5], self.faults.bad_crc);
+            first = marked(first, [Symbol::special(0xfd); 5], self.faults.bad_crc);
         }
-        let k28 = Character::new(status, true).unwrap_or(Character::data(status));
+        // FIX2 is 28: a K28 character.
+        let k28 = Symbol::special(status);
         let coarse = sign >> (self.behaviour.second_shift & 31);
         let second = match self.behaviour.complement {
             Complement::Ones => !coarse,
@@ -258,25 +264,38 @@ impl Device {
         };
         let mut second = block(k28, second, self.faults.bad_crc_2);
         if self.faults.no_position_2 {
-            let [top, rest] = [Character::control(Control::K27_7), Character::data(0)];
+            let [top, rest] = [Symbol::special(0xfb), Symbol::data(0)];
             second = marked(second, [top, rest, rest, rest, rest], self.faults.bad_crc_2);
         }
         self.blocks = [first, second];
     }
 }
 
-fn block(status: Character, position: i64, bad_crc: bool) -> [Character; 8] {
-    let [_, _, _, p4, p3, p2, p1, p0] = position.to_be_bytes().map(Character::data);
+fn block(status: Symbol, position: i64, bad_crc: bool) -> [Symbol; 8] {
+    let [_, _, _, p4, p3, p2, p1, p0] = position.to_be_bytes().map(Symbol::data);
     marked([status; 8], [p4, p3, p2, p1, p0], bad_crc)
 }
 
 /// The block with another position and the CRC that belongs to it.
-fn marked(block: [Character; 8], position: [Character; 5], bad_crc: bool) -> [Character; 8] {
+fn marked(block: [Symbol; 8], position: [Symbol; 5], bad_crc: bool) -> [Symbol; 8] {
     let [status, ..] = block;
     let [p4, p3, p2, p1, p0] = position;
-    let crc = check(&[status, p4, p3, p2, p1, p0].map(Character::byte)) ^ u16::from(bad_crc);
-    let [high, low] = crc.to_be_bytes().map(Character::data);
+    let crc = check(&[status, p4, p3, p2, p1, p0].map(|symbol| symbol.byte)) ^ u16::from(bad_crc);
+    let [high, low] = crc.to_be_bytes().map(Symbol::data);
     [status, p4, p3, p2, p1, p0, high, low]
+}
+
+/// Eleven bits, and the remainder of x^5 + x^2 + 1 with its five bits inverted, by long division.
+fn acceleration_word(value: i16) -> u16 {
+    let [high, low] = value.to_be_bytes();
+    let word = u16::from_be_bytes([high, low]) << 5;
+    let mut rest = word;
+    for step in 0..11_u32 {
+        if rest << step & 0x8000 != 0 {
+            rest ^= (0b10_0101 << 10) >> step;
+        }
+    }
+    word | (rest ^ 0x1f) & 0x1f
 }
 
 /// CRC-16 by long division: x^16 + x^15 + x^12 + x^7 + x^6 + x^4 + x^3 + 1, then the low byte inverted.
@@ -302,6 +321,9 @@ mod tests {
         let printed = "0100110011001000000100010101110111111011001100110100010011001";
         let bits = printed.bytes().rev().fold(0_u64, |bits, c| bits << 1 | u64::from(c == b'1'));
         assert_eq!((PATTERN, TEST_PATTERN), (bits, bits));
+        for (value, word) in [(0, 0x001f), (1, 0x003a), (-1, 0xfff5), (-5, 0xff61), (1023, 0x7fea), (-1024, 0x8000)] {
+            assert_eq!(acceleration_word(value), word, "{value}");
+        }
         assert_eq!((check(b"123456789"), check(&[0x00, 0x00, 0x12, 0x34, 0x56, 0x78])), (0x91c5, 0x3227));
     }
 }

@@ -298,8 +298,8 @@ mod tests {
     /// Every byte with every window at every disparity is read back by the encoder's side.
     #[test]
     fn heads_come_back() {
-        for raw in 0..=255 {
-            for edge in 23..=72 {
+        for raw in (0..=255).step_by(crate::thin(51)) {
+            for edge in (23..=72).step_by(crate::thin(7)) {
                 for d in -5..=5 {
                     let (byte, extra) = (ParameterByte::new(raw), Extra::new(edge));
                     let (head, _) = Head::new(byte, extra, LineDisparity::new(d));

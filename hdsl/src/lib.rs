@@ -31,6 +31,12 @@ pub mod symbol;
 pub mod sync;
 mod vframe;
 
+/// The step of a sweep of a test: under Miri every `n`-th case, since a whole sweep takes minutes there.
+#[cfg(test)]
+pub(crate) const fn thin(n: usize) -> usize {
+    if cfg!(miri) { n } else { 1 }
+}
+
 pub use acceleration::DeltaDelta;
 pub use answer::{Answer, Content};
 pub use channel2::{Channel2Findings, Channel2Monitor};

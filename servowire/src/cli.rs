@@ -10,7 +10,7 @@ use rtex_block::position::Gear;
 use crate::capture::{Format, Hints, time};
 use crate::output::filter::Filter;
 use crate::protocols::{Protocol, Settings, nikon, rtex, tformat};
-use crate::{cnc, decode, line, profile, talk, timing};
+use crate::{cnc, decode, line, profile, registers, talk, timing};
 
 /// Decodes what servo drives, controllers and encoders say to each other.
 #[derive(Debug, Parser)]
@@ -32,6 +32,8 @@ enum Command {
     Talk(talk::Arguments),
     /// Who is on an encoder's line when: shortest cycle, worst fault.
     Timing(timing::Arguments),
+    /// The register map of a HIPERFACE DSL receiver in words.
+    Registers(registers::Arguments),
     /// Completions for a shell: put them where it looks for them.
     Completions {
         /// Which shell.
@@ -53,6 +55,7 @@ impl Cli {
             Command::Cnc(arguments) => arguments.run(),
             Command::Talk(arguments) => arguments.run(),
             Command::Timing(arguments) => arguments.run(),
+            Command::Registers(arguments) => arguments.run(),
             Command::Completions { shell } => {
                 let mut text = Vec::new();
                 clap_complete::generate(shell, &mut Self::command(), "servowire", &mut text);

@@ -19,5 +19,6 @@ pub mod line;
 pub mod output;
 pub mod profile;
 pub mod protocols;
+pub mod registers;
 pub mod talk;
 pub mod timing;

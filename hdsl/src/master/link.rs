@@ -10,7 +10,7 @@ use crate::error::Error;
 use crate::parameter::{EncoderByte, EncoderSymbol};
 use crate::position::{Phase, PositionTracker};
 use crate::quality::{QualityEvent, QualityMonitor, QualityRule};
-use crate::symbol::{Control, Reading};
+use crate::symbol::Reading;
 use crate::vframe::VFrame;
 
 /// What belongs to one link between its lock and its loss.
@@ -30,8 +30,6 @@ pub(super) struct Link {
     is_new: bool,
     /// The last good safe position, or none because the encoder had none.
     last_safe: Option<u64>,
-    /// The penalties for a bad word in the vertical and the secondary channel were given in this V-frame.
-    counted: [bool; 2],
 }
 
 impl Link {
@@ -50,7 +48,6 @@ impl Link {
             last: VFrame::default(),
             is_new: false,
             last_safe: Some(0),
-            counted: [false; 2],
         }
     }
 
@@ -99,7 +96,7 @@ impl Master {
         self.take_symbol(parameter);
         self.take_acceleration(answer);
         if let Some(parameter) = parameter {
-            self.count_vsync(parameter.vsync());
+            self.link.quality.count_vsync(self.link.at, parameter.vsync());
         }
         if self.link.at == 7 {
             self.end_v_frame();
@@ -134,65 +131,17 @@ impl Master {
     /// What is wrong with the words; mostly nothing.
     #[inline]
     fn count_words(&mut self, answer: Answer) {
-        if self.link.at == 0 {
-            self.link.counted = [false; 2];
-        }
-        if !answer.is_plain() {
-            self.count_bad_words(&answer);
-        }
-        if !answer.switch_ok() {
-            self.counters.switch_bits = self.counters.switch_bits.wrapping_add(1);
-        }
         let weak = self.report.signal.is_some_and(|signal| signal.rssi.get() < 2);
         if weak && self.dialect.quality == QualityRule::Sick {
             self.link.quality.count(QualityEvent::LowRssi);
         }
-    }
-
-    /// Bad words and special characters without a meaning, channel by channel.
-    #[cold]
-    fn count_bad_words(&mut self, answer: &Answer) {
-        let ti = self.dialect.quality == QualityRule::Ti;
-        let link = &mut self.link;
-        let quality = &mut link.quality;
-        let unknown = |word: Reading, known: Option<Control>| {
-            word.is_special() && !word.is_byte_error() && known.is_none_or(|known| word.raw() != known as u8)
-        };
-        if ti && answer.vertical().is_byte_error() && !link.counted[0] {
-            link.counted[0] = true;
-            quality.count(QualityEvent::Safe1Error);
+        let bad = self.link.quality.count_words(self.link.at, &answer);
+        if bad > 0 {
+            self.counters.words = self.counters.words.wrapping_add(bad.into());
         }
-        if unknown(answer.vertical(), Some(Control::K29_7)) {
-            quality.count(QualityEvent::UnknownSpecial);
+        if !answer.switch_ok() {
+            self.counters.switch_bits = self.counters.switch_bits.wrapping_add(1);
         }
-        if unknown(answer.parameter_word(), None) {
-            quality.count(QualityEvent::UnknownSpecial);
-        }
-        for word in [answer.parameter_word(), answer.pipe()] {
-            if word.is_byte_error() {
-                quality.count(QualityEvent::ParameterOrPipeWord);
-            }
-        }
-        let damaged = answer.acceleration_words().iter().any(|word| word.is_byte_error());
-        let specials = answer.acceleration_words().into_iter().filter(|word| unknown(*word, Some(Control::K29_7)));
-        // The firmware of the SDK counts specials once a frame, and not besides a bad word.
-        let most = match (ti, damaged) {
-            (false, _) => 2,
-            (true, false) => 1,
-            (true, true) => 0,
-        };
-        for _ in specials.take(most) {
-            quality.count(QualityEvent::UnknownSpecial);
-        }
-        if damaged {
-            quality.count(QualityEvent::AccelerationWord);
-        }
-        if answer.secondary().is_byte_error() && !link.counted[1] {
-            link.counted[1] = true;
-            quality.count(QualityEvent::Safe2Error);
-        }
-        let bad = answer.words().iter().filter(|word| word.is_byte_error()).count();
-        self.counters.words = self.counters.words.wrapping_add(u32::try_from(bad).unwrap_or(0));
     }
 
     fn take_symbol(&mut self, parameter: Option<EncoderByte>) {
@@ -227,38 +176,19 @@ impl Master {
         None
     }
 
-    #[inline]
-    fn count_vsync(&mut self, vsync: bool) {
-        let event = match (self.link.at, vsync) {
-            (7, true) => QualityEvent::VsyncOk,
-            (7, false) => QualityEvent::VsyncMissing,
-            (_, true) => QualityEvent::VsyncEarly,
-            (_, false) => return,
-        };
-        self.link.quality.count(event);
-    }
-
     /// After RX7: judges the safe channels and aligns the fast position.
     fn end_v_frame(&mut self) {
         let VFrame { safe1, safe2 } = self.link.vframe;
         let position = safe1.position();
-        let sound = matches!(position, Ok(_) | Err(Error::PositionInvalid { .. }));
+        let sound1 = matches!(position, Ok(_) | Err(Error::PositionInvalid { .. }));
+        let sound2 = safe2.is_sound();
         let link = &mut self.link;
-        if sound {
-            link.quality.count(QualityEvent::Safe1Ok);
-        } else {
-            // A bad word may have been counted when it came.
-            if !link.counted[0] {
-                link.quality.count(QualityEvent::Safe1Error);
-            }
+        link.quality.count_blocks(sound1, sound2);
+        if !sound1 {
             self.counters.safe1 = self.counters.safe1.wrapping_add(1);
         }
-        if !safe2.is_sound() {
+        if !sound2 {
             self.counters.safe2 = self.counters.safe2.wrapping_add(1);
-            // Bad words were counted when they came.
-            if self.dialect.quality == QualityRule::Sick && !link.counted[1] {
-                link.quality.count(QualityEvent::Safe2Error);
-            }
         }
         let safe = match position {
             Ok(position) => {

@@ -443,7 +443,8 @@ mod tests {
     fn continuous_messages() {
         let (mut master, mut encoder) = (Requester::new(Limits::DEFAULT), Responder::new());
         let (mut shorts, mut longs) = (0, 0);
-        for _ in 0..20_000 {
+        let rounds = if cfg!(miri) { 400 } else { 20_000 };
+        for _ in 0..rounds {
             if master.is_short_free() {
                 master.start_short(read(RemoteRegister::PING)).unwrap();
             }
@@ -454,6 +455,6 @@ mod tests {
             shorts += u32::from(done.short.is_some_and(|s| s.is_ok()));
             longs += u32::from(done.long.is_some_and(|l| l.is_ok()));
         }
-        assert!(shorts > 400 && longs > 100, "{shorts} {longs}");
+        assert!(shorts > rounds / 50 && longs > rounds / 200, "{shorts} {longs}");
     }
 }

@@ -1,0 +1,212 @@
+//! `servowire registers`: the register map of a HIPERFACE DSL receiver in words.
+
+use std::error::Error;
+use std::fmt::{self, Display, Write as _};
+use std::fs;
+use std::io::{self, Read as _};
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+
+use clap::{Args, ValueEnum};
+use hdsl::message::{Length, ResourceAddress, ResourceError};
+use hdsl::registers::{Online1, Online2, OnlineD, Register, Registers};
+use hdsl::{Dialect, EncoderId, crc16};
+
+/// The register map of a HIPERFACE DSL receiver in words: link, positions, status, events, messages.
+///
+/// Exit code 0: the map could be read, whatever it says; 2: it could not.
+#[derive(Debug, Args)]
+pub struct Arguments {
+    /// 86 bytes, 00h to 55h, as they are or as hex digits; - for the standard input. More bytes may follow.
+    file: PathBuf,
+    /// Whose receiver it is.
+    #[arg(long, value_enum, default_value_t = Receiver::Ti)]
+    receiver: Receiver,
+    /// Where the map begins in a dump of a memory, in bytes.
+    #[arg(long, value_name = "BYTES", default_value_t = 0)]
+    at: usize,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum Receiver {
+    /// Firmware of the Motor Control SDK.
+    Ti,
+    /// SICK IP core.
+    Sick,
+}
+
+impl Arguments {
+    /// Prints the map. 2: there is none.
+    pub fn run(&self) -> ExitCode {
+        match self.text() {
+            Ok(text) => {
+                print!("{text}");
+                ExitCode::SUCCESS
+            }
+            Err(error) => {
+                eprintln!("servowire registers: {}: {error}", self.file.display());
+                ExitCode::from(2)
+            }
+        }
+    }
+
+    fn text(&self) -> Result<String, Box<dyn Error>> {
+        let bytes = bytes(&read(&self.file)?);
+        let rest = bytes.get(self.at..).unwrap_or_default();
+        let Some(image) = rest.first_chunk() else {
+            let want = Registers::LEN;
+            return Err(format!("{} bytes from {} on, a register map has {want}", rest.len(), self.at).into());
+        };
+        let dialect = match self.receiver {
+            Receiver::Ti => Dialect::TI,
+            Receiver::Sick => Dialect::SICK,
+        };
+        let mut text = String::new();
+        Map { map: Registers::from_bytes(&dialect, *image), receiver: self.receiver }.write(&mut text)?;
+        Ok(text)
+    }
+}
+
+fn read(path: &Path) -> io::Result<Vec<u8>> {
+    if path != Path::new("-") {
+        return fs::read(path);
+    }
+    let mut bytes = Vec::new();
+    io::stdin().lock().read_to_end(&mut bytes)?;
+    Ok(bytes)
+}
+
+/// Pairs of hex digits with or without space between them; anything else is taken as it is.
+fn bytes(file: &[u8]) -> Vec<u8> {
+    let digits: Vec<u8> = file.iter().copied().filter(|byte| !byte.is_ascii_whitespace()).collect();
+    let pairs = digits.chunks_exact(2).map(|pair| core::str::from_utf8(pair).ok());
+    let bytes: Option<Vec<u8>> = pairs.map(|pair| u8::from_str_radix(pair?, 16).ok()).collect();
+    bytes.filter(|_| digits.len() % 2 == 0 && digits.iter().all(u8::is_ascii_hexdigit)).unwrap_or_else(|| file.to_vec())
+}
+
+struct Map {
+    map: Registers,
+    receiver: Receiver,
+}
+
+impl Map {
+    fn write(mut self, out: &mut String) -> fmt::Result {
+        let map = &self.map;
+        let (link, d) = (if map.link() { "up" } else { "down" }, map.online_d());
+        line(out, "link", format_args!("{link}, quality {} of 15", map.quality()))?;
+        line(out, "drive", set(d))?;
+        line(out, "safe 1", set(map.online_1()))?;
+        line(out, "safe 2", set(map.online_2()))?;
+        let id = EncoderId::truncate(u32::from_be_bytes([0, byte(map, 0x0d) & 15, byte(map, 0x0e), byte(map, 0x0f)]));
+        line(out, "encoder", encoder(id))?;
+        let [edges, delay] = map.get(Register::Edges);
+        let periods: Vec<String> = (0..8).filter(|at| edges >> at & 1 == 1).map(|at: u8| at.to_string()).collect();
+        let periods = if periods.is_empty() { "none".to_owned() } else { periods.join(" ") };
+        line(out, "line", format_args!("RSSI {}, delay {} bits, edges in periods {periods}", delay >> 4, delay & 15))?;
+
+        let doubt = if d.contains(OnlineD::POS) { ", not to be used: POS" } else { "" };
+        let position = number(id, map.position());
+        line(out, "fast position", format_args!("{position}, {} steps a frame{doubt}", map.velocity()))?;
+        self.safe(out, id)?;
+        self.messages(out)?;
+
+        let masks = format!("{:04X}h", u16::from_be_bytes(self.map.get(Register::MaskH)));
+        let interrupts = self.map.masked_events();
+        let (event, event_s) = self.map.take_events();
+        line(out, "events", format_args!("{}, mask {masks}", set(event)))?;
+        let [mask_s] = self.map.get(Register::MaskS);
+        line(out, "safe events", format_args!("{}, mask {mask_s:02X}h", set(event_s)))?;
+        line(out, "interrupts", set(interrupts))
+    }
+
+    fn safe(&self, out: &mut String, id: EncoderId) -> fmt::Result {
+        let map = &self.map;
+        let [summary] = map.get(Register::SafeSum);
+        let crc = check(map, Register::SafeSum, Register::VPos, Register::VPosCrc);
+        let stale = match map.online_1() {
+            flags if flags.contains(Online1::VPOS) => ", not to be used: VPOS",
+            flags if flags.contains(Online1::SCE) => ", not new: SCE",
+            _ => "",
+        };
+        let position = number(id, map.safe_position());
+        line(out, "safe position", format_args!("{position}, SUMMARY {summary:02X}h, CRC {crc}{stale}"))?;
+        let crc = check(map, Register::Status2, Register::VPos2, Register::VPosCrc2);
+        let stale = match map.online_2() {
+            flags if flags.contains(Online2::VPOS2) => ", not to be used: VPOS2",
+            flags if flags.contains(Online2::SCE2) => ", not new: SCE2",
+            _ => "",
+        };
+        let (position, status) = (map.safe_position_2(), map.status_2());
+        let fixed = if status.is_fixed_part_right() { "" } else { " (FIX2 is wrong)" };
+        line(out, "safe position 2", format_args!("{position:010X}h, STATUS2 {status}{fixed}, CRC {crc}{stale}"))
+    }
+
+    fn messages(&self, out: &mut String) -> fmt::Result {
+        let map = &self.map;
+        let [high, low] = map.get(Register::PcAdd);
+        let resource = ResourceAddress::truncate(u16::from_be_bytes([high, low]));
+        let direction = if high & 0x40 != 0 { "read" } else { "write" };
+        let resource = format!("{} {:03X}h", resource.name().unwrap_or("resource"), resource.get());
+        let what = if high & 0x10 != 0 { "" } else { ", directly" };
+        let buffer: [u8; 8] = map.get(Register::PcBuffer);
+        let free = map.online_d().contains(OnlineD::FREL);
+        let state = match (free, map.online_d().contains(OnlineD::ANS)) {
+            (false, _) => "under way",
+            (true, true) => "not answered well",
+            (true, false) => "free",
+        };
+        let data = if free && high & 0x20 != 0 {
+            let [first, second, ..] = buffer;
+            let [detail, class] = if self.receiver == Receiver::Sick { [first, second] } else { [second, first] };
+            format!("refused: {}", ResourceError::new(class, detail))
+        } else {
+            let data = buffer.get(..Length::from_code(high >> 2).bytes()).unwrap_or_default();
+            let text = core::str::from_utf8(data).ok().filter(|text| text.bytes().all(|byte| byte.is_ascii_graphic()));
+            let text = text.filter(|text| !text.is_empty()).map(|text| format!(" {text:?}")).unwrap_or_default();
+            data.iter().fold(String::from("data"), |text, byte| format!("{text} {byte:02X}")) + &text
+        };
+        line(out, "long message", format_args!("{state}; {direction} {resource}{what}; {data}"))?;
+        let free = if map.online_1().contains(Online1::FRES) { "free" } else { "under way" };
+        // The SICK core has PC_DATA at 2Fh.
+        let data = byte(map, if self.receiver == Receiver::Ti { Register::SPcData as u8 } else { 0x2f });
+        line(out, "short message", format_args!("{free}; data {data:02X}h"))?;
+        let ([errors], [threshold]) = (map.get(Register::AccErrCnt), map.get(Register::AccErrCntThresh));
+        let beyond = if map.too_many_acceleration_errors() { ", too many" } else { "" };
+        line(out, "acceleration", format_args!("{errors} words in a row lost, threshold {threshold}{beyond}"))
+    }
+}
+
+fn line(out: &mut String, name: &str, text: impl Display) -> fmt::Result {
+    writeln!(out, "{name:16}{text}")
+}
+
+fn byte(map: &Registers, address: u8) -> u8 {
+    map.byte(address).unwrap_or(0)
+}
+
+/// Flags by their names.
+fn set(flags: impl Display) -> String {
+    let text = flags.to_string();
+    if text.is_empty() { "none".to_owned() } else { text }
+}
+
+fn encoder(id: EncoderId) -> String {
+    let sign = if id.is_signed() { "signed" } else { "unsigned" };
+    match id.check() {
+        Ok(bits) => format!("{:05X}h: {bits} bits, {sign}, index {}", id.get(), id.user_index()),
+        Err(error) => format!("{:05X}h: {error}", id.get()),
+    }
+}
+
+/// A position with the sign that the encoder gives it.
+fn number(id: EncoderId, raw: u64) -> String {
+    let position = if id.check().is_ok() { id.position(raw).to_string() } else { raw.to_string() };
+    format!("{position} ({raw:010X}h)")
+}
+
+/// Whether the CRC in the map fits to the status byte and the position.
+fn check(map: &Registers, status: Register, position: Register, crc: Register) -> &'static str {
+    let ([status], [p4, p3, p2, p1, p0]) = (map.get(status), map.get(position));
+    let want = crc16(&[status, p4, p3, p2, p1, p0]);
+    if map.get(crc) == want.to_be_bytes() { "right" } else { "wrong" }
+}
