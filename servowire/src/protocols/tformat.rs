@@ -13,7 +13,7 @@ use tformat::inspect::{Cause, inspect, inspect_bytes};
 use tformat::{AllData, BitRate, ControlField, DataId, Error, Request, Response};
 
 use crate::capture::hexlog::Burst;
-use crate::event::{Event, Verdict};
+use crate::event::{Direction, Event, Verdict};
 use crate::line::{LineField, StartStop};
 use crate::output::Sink;
 use describe::Encoder;
@@ -252,7 +252,8 @@ impl StartStop for Decoder {
         // The line is nothing but a request, or nothing but an answer.
         let is_request = id(rest).is_ok_and(|id| rest.len() == usize::from(id.request_fields()));
         let is_answer = id(rest).is_ok_and(|id| rest.len() == usize::from(id.response_fields())) && !is_request;
-        if self.pending.is_some_and(|pending| is_request && rest.len() < pending.answer_fields_of(rest)) {
+        let asks = burst.direction == Some(Direction::Request);
+        if asks || self.pending.is_some_and(|pending| is_request && rest.len() < pending.answer_fields_of(rest)) {
             self.give_up(0, out)?;
         }
         if is_answer && self.pending.is_none() {
