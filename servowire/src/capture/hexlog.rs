@@ -10,6 +10,7 @@ use std::collections::VecDeque;
 use std::io::{BufRead, Read};
 
 use super::Input;
+use super::input::HEAD;
 use crate::event::Direction;
 use crate::fault::{At, Fault};
 use dump::{Dump, Row};
@@ -132,7 +133,7 @@ impl HexLog {
     }
 
     fn shape(head: &str) -> Shape {
-        match Dump::of(head, head.len() < LONGEST) {
+        match Dump::of(head, head.len() < HEAD) {
             Some(dump) => Shape::Dump { dump, gathered: Gathered::default(), last: Vec::new(), again: false },
             None if array_begins(head) => Shape::Array { open: false, cells: String::new(), from: 0 },
             None => Shape::Lines,
