@@ -31,6 +31,43 @@ fn hex(bytes: impl IntoIterator<Item = u8>) -> String {
     })
 }
 
+/// The trace, a line for every H-frame.
+pub(crate) fn trace(dialect: Dialect, metres: u32, frames: u64) -> Result<String, Box<dyn core::error::Error>> {
+    let mut text = String::new();
+    let mut cable = Cable::new(Disturbance { jitter: 1, ..Disturbance::metres(metres) }, 1);
+    let mut master = Master::new(dialect);
+    let mut map = Registers::new(&dialect);
+    // 24 bits of position, and a start near its end.
+    let mut encoder = Device::new(EncoderId::try_from(0x000d3)?);
+    let mut position = (1_u64 << 24) - 4000;
+    for frame in 0..frames {
+        let speed: i64 = if frame % 240 < 120 { 40 } else { -40 };
+        position = position.wrapping_add_signed(speed) & 0xff_ffff;
+        match frame {
+            90 => master.start_short(ShortRequest::Read(RemoteRegister::PING))?,
+            100 => master.start_long(LongRequest::read_name(ResourceAddress::RESOLUTN))?,
+            _ => {}
+        }
+        let present = master.transmission();
+        let answer = encoder.answer(cable.down(present.head.bits()), position);
+        // One damaged bit in the acceleration.
+        let answer = if frame == 170 { answer.map(|bits| bits ^ 1 << 35) } else { answer };
+        let samples = cable.up(answer);
+        let state = master.state();
+        let report = master.finish(&samples, None)?;
+        map.apply(report);
+        let answer = if present.answered { format!("\"{}\"", hex(samples)) } else { "null".to_owned() };
+        let tail: String = report.tail.bits().map(|bit| if bit { '1' } else { '0' }).collect();
+        writeln!(
+            text,
+            "{{\"frame\":{frame},\"state\":\"{state}\",\"head\":\"{}\",\"answer\":{answer},\"tail\":\"{tail}\",\"registers\":\"{}\"}}",
+            hex(present.head.samples()),
+            hex(*map.as_bytes())
+        )?;
+    }
+    Ok(text)
+}
+
 fn main() -> Result<(), Box<dyn core::error::Error>> {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
     let dialect = match arguments.first().map(String::as_str) {
@@ -39,36 +76,7 @@ fn main() -> Result<(), Box<dyn core::error::Error>> {
         Some(other) => return Err(format!("{other}: sick or ti").into()),
     };
     let metres = arguments.get(1).map_or(Ok(20), |text| text.parse())?;
-    let frames: u64 = arguments.get(2).map_or(Ok(400), |text| text.parse())?;
-    let mut cable = Cable::new(Disturbance { jitter: 1, ..Disturbance::metres(metres) }, 1);
-    let mut master = Master::new(dialect);
-    let mut map = Registers::new(&dialect);
-    // 24 bits of position, and a start near its end.
-    let mut encoder = Device::new(EncoderId::try_from(0x000d3)?);
-    let mut position = (1_u64 << 24) - 2000;
-    for frame in 0..frames {
-        let speed: i64 = if frame % 300 < 150 { 40 } else { -40 };
-        position = position.wrapping_add_signed(speed) & 0xff_ffff;
-        match frame {
-            160 => master.start_short(ShortRequest::Read(RemoteRegister::PING))?,
-            200 => master.start_long(LongRequest::read_name(ResourceAddress::RESOLUTN))?,
-            _ => {}
-        }
-        let present = master.transmission();
-        let answer = encoder.answer(cable.down(present.head.bits()), position);
-        // One damaged bit in the acceleration.
-        let answer = if frame == 280 { answer.map(|bits| bits ^ 1 << 35) } else { answer };
-        let samples = cable.up(answer);
-        let state = master.state();
-        let report = master.finish(&samples, None)?;
-        map.apply(report);
-        let answer = if present.answered { format!("\"{}\"", hex(samples)) } else { "null".to_owned() };
-        let tail: String = report.tail.bits().map(|bit| if bit { '1' } else { '0' }).collect();
-        println!(
-            "{{\"frame\":{frame},\"state\":\"{state}\",\"head\":\"{}\",\"answer\":{answer},\"tail\":\"{tail}\",\"registers\":\"{}\"}}",
-            hex(present.head.samples()),
-            hex(*map.as_bytes())
-        );
-    }
+    let frames = arguments.get(2).map_or(Ok(200), |text| text.parse())?;
+    print!("{}", trace(dialect, metres, frames)?);
     Ok(())
 }

@@ -2,7 +2,7 @@ use core::fmt;
 
 use servowire_core::OutOfRange;
 
-use crate::crc::crc5;
+use crate::crc::{crc5, is_crc5_right};
 use crate::error::Error;
 
 /// The second difference of the position between sampling instants, 11 bits in two's complement: -1024..=1023 steps.
@@ -63,15 +63,25 @@ impl DeltaDelta {
     ///
     /// # Errors
     /// [`Error::AccelerationCrc`].
+    #[inline]
     pub const fn from_word(word: u16) -> Result<Self, Error> {
-        let want = crc5(word >> 5);
-        let [low, _] = word.to_le_bytes();
-        let got = low & 0x1f;
-        if got != want {
-            return Err(Error::AccelerationCrc { got, want });
-        }
-        Ok(Self(i16::from_le_bytes(word.to_le_bytes()) >> 5))
+        Self::from_bytes(word.to_be_bytes())
     }
+
+    /// The same of the two bytes, the high one first.
+    #[inline]
+    pub(crate) const fn from_bytes(bytes: [u8; 2]) -> Result<Self, Error> {
+        if is_crc5_right(bytes) {
+            return Ok(Self(i16::from_be_bytes(bytes) >> 5));
+        }
+        Err(wrong_check(u16::from_be_bytes(bytes)))
+    }
+}
+
+#[cold]
+const fn wrong_check(word: u16) -> Error {
+    let [low, _] = word.to_le_bytes();
+    Error::AccelerationCrc { got: low & 0x1f, want: crc5(word >> 5) }
 }
 
 impl TryFrom<i16> for DeltaDelta {

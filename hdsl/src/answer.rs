@@ -6,7 +6,7 @@ use crate::acceleration::DeltaDelta;
 use crate::error::Error;
 use crate::frame::ANSWER_BITS;
 use crate::parameter::EncoderByte;
-use crate::symbol::{Character, Control, Reading, Rule, RunningDisparity, Word};
+use crate::symbol::{Character, Control, Entry, Reading, Rule, RunningDisparity, Word};
 
 /// An answer as received: each channel is judged alone, a bad word in one does not touch the others.
 ///
@@ -18,25 +18,28 @@ use crate::symbol::{Character, Control, Reading, Rule, RunningDisparity, Word};
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Answer {
-    vertical: Reading,
-    parameter: Reading,
-    pipe: Reading,
-    acceleration: [Reading; 2],
-    secondary: Reading,
-    switch_ok: bool,
+    line: u64,
+    vertical: Entry,
+    parameter: Entry,
+    pipe: Entry,
+    acceleration: [Entry; 2],
+    secondary: Entry,
     rule: Rule,
 }
 
 impl Answer {
     /// Reads the 61 low bits of `line`, the first line bit in bit 0.
+    #[inline]
     pub const fn from_bits(rule: Rule, line: u64) -> Self {
+        let line = line & (u64::MAX >> 3);
+        let table = rule.table();
         Self {
-            vertical: word(line).read(rule),
-            parameter: word(line >> 10).read(rule),
-            pipe: word(line >> 20).read(rule),
-            acceleration: [word(line >> 30).read(rule), word(line >> 40).read(rule)],
-            secondary: word(line >> 51).read(rule).in_secondary(rule),
-            switch_ok: (line >> 49 ^ line >> 50) & 1 == 1,
+            line,
+            vertical: table.entry(word(line)),
+            parameter: table.entry(word(line >> 10)),
+            pipe: table.entry(word(line >> 20)),
+            acceleration: [table.entry(word(line >> 30)), table.entry(word(line >> 40))],
+            secondary: table.entry(word(line >> 51)).in_secondary(rule, word(line >> 51)),
             rule,
         }
     }
@@ -59,57 +62,66 @@ impl Answer {
     }
 
     /// The byte of the V-frame.
+    #[inline]
     pub const fn vertical(self) -> Reading {
-        self.vertical
+        Reading::new(self.vertical, word(self.line))
     }
 
     /// The word of the parameters channel.
+    #[inline]
     pub const fn parameter_word(self) -> Reading {
-        self.parameter
+        Reading::new(self.parameter, word(self.line >> 10))
     }
 
     /// The parameter byte.
     ///
     /// # Errors
     /// [`Error::InvalidWord`]. A special character is taken by its value, as the vendor's receiver does.
+    #[inline]
     pub const fn parameter(self) -> Result<EncoderByte, Error> {
-        match self.parameter.byte() {
+        match self.parameter_word().byte() {
             Ok(byte) => Ok(EncoderByte::new(byte)),
             Err(e) => Err(e),
         }
     }
 
     /// The word of the pipe (SensorHub) channel.
+    #[inline]
     pub const fn pipe(self) -> Reading {
-        self.pipe
+        Reading::new(self.pipe, word(self.line >> 20))
     }
 
     /// The two words of the acceleration channel, high byte first.
+    #[inline]
     pub const fn acceleration_words(self) -> [Reading; 2] {
-        self.acceleration
+        let [high, low] = self.acceleration;
+        [Reading::new(high, word(self.line >> 30)), Reading::new(low, word(self.line >> 40))]
     }
 
     /// The word of safe channel 2.
+    #[inline]
     pub const fn secondary(self) -> Reading {
-        self.secondary
+        Reading::new(self.secondary, word(self.line >> 51))
     }
 
     /// Whether the switch bit is the inverse of the bit before it. A wrong one is worth a note, no more.
+    #[inline]
     pub const fn switch_ok(self) -> bool {
-        self.switch_ok
+        (self.line >> 49 ^ self.line >> 50) & 1 == 1
     }
 
     /// All six words in line order.
     pub const fn words(self) -> [Reading; 6] {
-        let [high, low] = self.acceleration;
-        [self.vertical, self.parameter, self.pipe, high, low, self.secondary]
+        let [high, low] = self.acceleration_words();
+        [self.vertical(), self.parameter_word(), self.pipe(), high, low, self.secondary()]
     }
 
     /// Whether all words are good, and none but those of the pipe and the secondary channel is a special character.
+    #[inline]
     pub(crate) const fn is_plain(&self) -> bool {
         let [high, low] = self.acceleration;
-        let plain = self.vertical.flags() | self.parameter.flags() | high.flags() | low.flags();
-        plain == 0 && !self.pipe.is_byte_error() && !self.secondary.is_byte_error()
+        let plain = self.vertical.or(self.parameter).or(high).or(low);
+        plain.is_data() && !self.pipe.or(self.secondary).is_byte_error()
     }
 
     /// Words that stand only in the other column than the running disparity asks for, a diagnostic.
@@ -148,6 +160,16 @@ impl Answer {
     #[inline]
     pub const fn delta_delta(self) -> Result<DeltaDelta, Error> {
         let [high, low] = self.acceleration;
+        if high.or(low).is_data() {
+            return DeltaDelta::from_bytes([high.raw(), low.raw()]);
+        }
+        self.special_delta_delta()
+    }
+
+    /// The same for words that are not both data characters.
+    #[cold]
+    const fn special_delta_delta(self) -> Result<DeltaDelta, Error> {
+        let [high, low] = self.acceleration_words();
         let (high_byte, low_byte) = match (high.byte(), low.byte()) {
             (Ok(high), Ok(low)) => (high, low),
             (Err(e), _) | (_, Err(e)) => return Err(e),
@@ -158,7 +180,7 @@ impl Answer {
         if self.is_strict() && (high.is_special() || low.is_special()) {
             return Err(Error::WrongKind { byte: if high.is_special() { high_byte } else { low_byte } });
         }
-        DeltaDelta::from_word(u16::from_be_bytes([high_byte, low_byte]))
+        DeltaDelta::from_bytes([high_byte, low_byte])
     }
 }
 
@@ -210,9 +232,10 @@ impl Content {
 }
 
 /// Ten bits of the line from the lowest up.
+#[inline]
+#[expect(clippy::cast_possible_truncation, reason = "ten bits are taken")]
 const fn word(line: u64) -> Word {
-    let [low, high, ..] = line.to_le_bytes();
-    Word::truncate(u16::from_le_bytes([low, high]))
+    Word::truncate(line as u16 & 0x3ff)
 }
 
 /// Six characters as an answer.

@@ -88,6 +88,30 @@ pub(crate) const fn crc5(value: u16) -> u8 {
     FIVE[((middle as u16 ^ value) & 31) as usize] ^ 0x1f
 }
 
+/// What the bytes of an acceleration word add to its syndrome: those of the high byte, those of the low one.
+#[expect(clippy::indexing_slicing, reason = "runs at compile time")]
+static SYNDROME: [[u8; 256]; 2] = {
+    let mut tables = [[0; 256]; 2];
+    let mut byte: u8 = 0;
+    loop {
+        let high = (byte as u16) << 3;
+        tables[0][byte as usize] = crc5(high);
+        tables[1][byte as usize] = crc5((byte >> 5) as u16) ^ 0x1f ^ byte & 0x1f;
+        if byte == 255 {
+            break;
+        }
+        byte += 1;
+    }
+    tables
+};
+
+/// Whether the five low bits of a 16-bit word are the [`crc5`] of the eleven above them.
+#[inline]
+#[expect(clippy::indexing_slicing, reason = "a byte is below 256")]
+pub(crate) const fn is_crc5_right([high, low]: [u8; 2]) -> bool {
+    SYNDROME[0][high as usize] == SYNDROME[1][low as usize]
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -112,6 +136,10 @@ mod tests {
         for value in 0..2048_u16 {
             let bits = (0..11).rev().map(|k| value >> k & 1 == 1);
             assert_eq!(u32::from(crc5(value)), division(bits, 5, 0x05) ^ 0x1f, "{value}");
+            for check in 0..32 {
+                let word = value << 5 | check;
+                assert_eq!(is_crc5_right(word.to_be_bytes()), check == u16::from(crc5(value)), "{word:04x}");
+            }
         }
     }
 

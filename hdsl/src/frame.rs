@@ -101,6 +101,7 @@ impl Head {
 
     /// The head for a parameter byte, and the line disparity after it. `before` is the disparity before
     /// EQUALISATION, so with the ones of the EXTRA window if there is one (the partly high last bit counts as a one).
+    #[inline]
     pub const fn new(byte: ParameterByte, extra: Option<Extra>, before: LineDisparity) -> (Self, LineDisparity) {
         let (equalisation, d) = before.equalisation();
         let (para, d) = d.encode(byte);
@@ -135,19 +136,20 @@ impl Head {
     }
 
     /// The line bits; the last bit of an EXTRA window is a one also when its edge lies inside.
+    #[inline]
     pub fn bits(self) -> Window {
         // SYNC, the two ones of SAMPLE and those of the window: at most 17 bits, then 18 more.
         let rest = 0b0110 | u32::from(self.equalisation) << 4 | u32::from(self.para.get()) << 8;
-        let (bits, extra) = match self.extra {
-            None => (u64::from(FIXED | rest << 8), 0),
+        match self.extra {
+            None => Window::from_bits((FIXED | rest << 8).into(), Self::BITS).unwrap_or(Window::EMPTY),
             Some(extra) => {
                 let extra = u32::from(extra.bits());
                 // Ones up to the end of the window, over those of FIXED.
                 let ones = FIXED | (1_u32 << extra.wrapping_add(8)).wrapping_sub(1) & !0xff;
-                (u64::from(ones) | u64::from(rest) << extra.wrapping_add(8), extra)
+                let bits = u64::from(ones) | u64::from(rest) << extra.wrapping_add(8);
+                Window::from_bits(bits.into(), Self::BITS.wrapping_add(extra)).unwrap_or(Window::EMPTY)
             }
-        };
-        Window::from_bits(bits.into(), Self::BITS.wrapping_add(extra)).unwrap_or(Window::EMPTY)
+        }
     }
 
     /// The line at eight samples a bit: a byte each, its first sample in bit 7.

@@ -52,6 +52,7 @@ impl LineDisparity {
     /// ```
     ///
     /// An encoder does not interpret these bits.
+    #[inline]
     pub const fn equalisation(self) -> (u8, Self) {
         match self.0 {
             -1..=1 => (0b0000, self),

@@ -289,29 +289,57 @@ impl Master {
             let got = u16::try_from(samples.len()).unwrap_or(u16::MAX);
             return Err(Error::Truncated { got, want: 72 });
         }
-        if self.state == State::Start {
-            self.edges = 0;
-            return Ok(match Alignment::learn(self.dialect.edge, samples) {
-                Ok(found) => {
-                    self.alignment = Some(found);
-                    self.end(TEST_PATTERN, None, late)
+        Ok(match (self.state, self.alignment, samples.first_chunk()) {
+            (State::Start, ..) => self.learn(samples, late),
+            (_, Some(alignment), Some(window)) if self.present.answered => {
+                let (bits, watch) = alignment.read_window(window);
+                self.end_sampled(alignment, bits, watch, late)
+            }
+            _ => self.end(u64::MAX, None, late),
+        })
+    }
+
+    /// The same with four bytes of samples a word, the first of them in the low bits: what a DMA leaves in the memory of a
+    /// little-endian processor, and fast on one that cannot load words from any address.
+    pub fn finish_words(&mut self, samples: &[u32; WINDOW / 4], late: Option<i16>) -> &Report {
+        match (self.state, self.alignment) {
+            (State::Start, _) => {
+                let mut bytes = [0; WINDOW];
+                for (to, from) in bytes.chunks_exact_mut(4).zip(samples) {
+                    to.copy_from_slice(&from.to_le_bytes());
                 }
-                Err(error) => {
-                    self.report.begin(self.state, None);
-                    self.end_with(Err(Cause::Learn(error)), late)
-                }
-            });
+                self.learn(&bytes, late)
+            }
+            (_, Some(alignment)) if self.present.answered => {
+                let (bits, watch) = alignment.read_words(samples);
+                self.end_sampled(alignment, bits, watch, late)
+            }
+            _ => self.end(u64::MAX, None, late),
         }
-        let (Some(alignment), true) = (self.alignment, self.present.answered) else {
-            return Ok(self.end(u64::MAX, None, late));
-        };
-        // Never refused: the window has room for every delay.
-        let (bits, watch) = alignment.read(samples).unwrap_or((u64::MAX, EdgeWatch::new(true)));
+    }
+
+    /// A START frame.
+    fn learn(&mut self, samples: &[u8], late: Option<i16>) -> &Report {
+        self.edges = 0;
+        match Alignment::learn(self.dialect.edge, samples) {
+            Ok(found) => {
+                self.alignment = Some(found);
+                self.end(TEST_PATTERN, None, late)
+            }
+            Err(error) => {
+                self.report.begin(self.state, None);
+                self.end_with(Err(Cause::Learn(error)), late)
+            }
+        }
+    }
+
+    #[inline]
+    fn end_sampled(&mut self, alignment: Alignment, bits: u64, watch: EdgeWatch, late: Option<i16>) -> &Report {
         if matches!(self.state, State::Learn | State::Check) {
             self.edges |= watch.edges();
         }
         let signal = Signal { rssi: watch.rssi(), delay: alignment.delay, edges: self.edges };
-        Ok(self.end(bits, Some(signal), late))
+        self.end(bits, Some(signal), late)
     }
 
     /// Takes the 61 bits of the answer, the first in bit 0, from a front end that finds them itself (an FPGA, a PRU), and
@@ -327,7 +355,24 @@ impl Master {
         let bits = bits & (u64::MAX >> 3);
         self.report.begin(self.state, signal);
         let outcome = self.receive(bits);
-        self.end_with(outcome, late)
+        if self.report.was != State::Running || outcome.is_err() || self.sync.is_some() || self.restart {
+            return self.end_with(outcome, late);
+        }
+        self.go_on()
+    }
+
+    /// What [`end_with`](Self::end_with) comes to on a running link that is free running: the usual end.
+    fn go_on(&mut self) -> &Report {
+        self.counters.frames = self.counters.frames.wrapping_add(1);
+        let symbol = if self.link.is_settled() { self.requester.transmit() } else { MasterSymbol::Idle };
+        (self.present, self.disparity) =
+            transmission(State::Running, symbol, self.link.msync(), None, LineDisparity::ZERO);
+        self.report.restarted = None;
+        self.report.state = State::Running;
+        self.report.tail = Tail { trailer: Trailer::AfterAnswer, stuffing: Stuffing::MIN };
+        self.report.long_free = self.requester.is_long_free();
+        self.report.short_free = self.requester.is_short_free();
+        &self.report
     }
 
     fn end_with(&mut self, mut outcome: Result<(), Cause>, late: Option<i16>) -> &Report {
@@ -444,6 +489,7 @@ impl Master {
     }
 }
 
+#[inline]
 fn transmission(
     state: State,
     symbol: MasterSymbol,
@@ -452,8 +498,12 @@ fn transmission(
     disparity: LineDisparity,
 ) -> (Transmission, LineDisparity) {
     let byte = ParameterByte::of(symbol, matches!(state, State::WaitVsync | State::Running), msync);
-    let before = extra.map_or(disparity, |extra| disparity.with_ones(extra.bits()));
-    let (head, after) = Head::new(byte, extra, before);
+    let (head, after) = match extra {
+        // Every answered frame of a free-running link; what is constant here costs nothing.
+        None if disparity == LineDisparity::ZERO => Head::new(byte, None, LineDisparity::ZERO),
+        None => Head::new(byte, None, disparity),
+        Some(extra) => Head::new(byte, Some(extra), disparity.with_ones(extra.bits())),
+    };
     (Transmission { lead_in: 0, head, answered: !matches!(state, State::Reset | State::Sync) }, after)
 }
 

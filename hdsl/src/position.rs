@@ -66,6 +66,8 @@ pub enum Phase {
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct PositionTracker {
     bits: PositionBits,
+    /// As many ones.
+    mask: u64,
     rule: PositionRule,
     position: u64,
     velocity: u32,
@@ -93,6 +95,7 @@ impl PositionTracker {
     pub const fn with_rule(bits: PositionBits, rule: PositionRule) -> Self {
         Self {
             bits,
+            mask: bits.mask(),
             rule,
             position: 0,
             velocity: 0,
@@ -108,29 +111,37 @@ impl PositionTracker {
     }
 
     /// Takes the acceleration of one H-frame; `None` if it cannot be used, so that it is estimated.
+    #[inline]
     pub fn step(&mut self, value: Option<DeltaDelta>) {
-        if let Some(value) = value {
-            let value = value.get();
-            self.errors = 0;
-            self.integrate(i32::from(value), value);
-        } else {
-            self.errors = self.errors.saturating_add(1);
-            self.phase = Phase::Position;
-            self.agreed = 0;
-            self.unreliable = true;
-            let (added, kept) = self.estimate();
-            self.integrate(added, kept);
-        }
+        let (added, kept) = match value {
+            Some(value) => {
+                self.errors = 0;
+                (i32::from(value.get()), value.get())
+            }
+            None => self.without_value(),
+        };
+        self.integrate(added, kept);
+    }
+
+    /// The estimate in the place of a value.
+    #[cold]
+    fn without_value(&mut self) -> (i32, i16) {
+        self.errors = self.errors.saturating_add(1);
+        self.phase = Phase::Position;
+        self.agreed = 0;
+        self.unreliable = true;
+        self.estimate()
     }
 
     /// `added` goes into the velocity, `kept` into the history.
+    #[inline]
     fn integrate(&mut self, added: i32, kept: i16) {
         self.velocity = self.velocity.wrapping_add_signed(added) & VELOCITY;
         let [d0, d1, d2, d3, _] = self.history;
         self.history = [kept.wrapping_sub(self.last), d0, d1, d2, d3];
         self.last = kept;
         let signed = self.velocity();
-        self.position = self.position.wrapping_add_signed(i64::from(signed)) & self.bits.mask();
+        self.position = self.position.wrapping_add_signed(i64::from(signed)) & self.mask;
         self.relative = self.relative.wrapping_add(signed);
     }
 
@@ -175,11 +186,11 @@ impl PositionTracker {
     pub fn align(&mut self, safe: u64) {
         let relative = i64::from(self.relative);
         let mask = match self.rule {
-            PositionRule::Sick => self.bits.mask(),
+            PositionRule::Sick => self.mask,
             PositionRule::Ti => POSITION,
         };
         let expected = safe.wrapping_add_signed(relative) & mask;
-        let agrees = (expected ^ self.position) & self.bits.mask() == 0;
+        let agrees = (expected ^ self.position) & self.mask == 0;
         match self.phase {
             Phase::Position => {
                 self.position = expected;
@@ -227,7 +238,7 @@ impl PositionTracker {
         } else if velocity < limit.wrapping_neg() || velocity >= limit {
             Err(Doubt::Speed)
         } else {
-            Ok((self.position & self.bits.mask(), velocity))
+            Ok((self.position & self.mask, velocity))
         }
     }
 

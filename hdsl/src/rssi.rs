@@ -109,7 +109,7 @@ impl EdgeWatch {
     }
 }
 
-/// An [`EdgeWatch`] over four bit times at once.
+/// An [`EdgeWatch`] over four bit times at once, the first sample of them in bit 31.
 #[derive(Clone, Copy)]
 pub(crate) struct WordWatch {
     previous: u32,
@@ -118,18 +118,15 @@ pub(crate) struct WordWatch {
 }
 
 impl WordWatch {
-    /// `previous` is the level of the sample before the first byte.
-    pub(crate) const fn new(previous: bool) -> Self {
-        Self { previous: (previous as u32) << 24, seen: 0, lowest: Rssi::MAX }
+    /// `previous` are the samples before the first word.
+    pub(crate) const fn after(previous: u32) -> Self {
+        Self { previous, seen: 0, lowest: Rssi::MAX }
     }
 
-    /// Takes the samples of four bit times, the first of them in the low byte.
-    #[inline]
-    pub(crate) fn step(&mut self, samples: u32) {
-        // The sample before each one: within the byte, and the last of the byte before.
-        let within = samples >> 1 & 0x7f7f_7f7f;
-        let across = (samples << 8 | self.previous >> 24) & 0x0101_0101;
-        let edges = samples ^ (within | across << 7);
+    /// Takes the samples of four bit times. Only edges in `of` count.
+    #[inline(always)]
+    pub(crate) fn step(&mut self, samples: u32, of: u32) {
+        let edges = (samples ^ samples >> 1 ^ self.previous << 31) & of;
         self.previous = samples;
         self.seen |= edges;
         // In each byte, the lowest of bits 6:0 taken away: nothing is left of a single edge, which is the best signal.
@@ -138,9 +135,11 @@ impl WordWatch {
         }
     }
 
-    pub(crate) const fn finish(self) -> EdgeWatch {
+    /// After the first `bytes` + 1 bytes of the last word.
+    pub(crate) const fn finish(self, bytes: u8) -> EdgeWatch {
         let [a, b, c, d] = self.seen.to_le_bytes();
-        EdgeWatch { previous: self.previous >> 24 & 1 == 1, seen: a | b | c | d, lowest: self.lowest }
+        let last = self.previous.wrapping_shr(24_u32.wrapping_sub((bytes as u32).wrapping_mul(8)));
+        EdgeWatch { previous: last & 1 == 1, seen: a | b | c | d, lowest: self.lowest }
     }
 }
 

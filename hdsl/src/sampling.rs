@@ -3,10 +3,13 @@
 //! Reception begins one bit after the end of PARA. A byte holds the eight samples of one bit time of the master, the
 //! first of them in bit 7. The line is high until the encoder drives it.
 
+mod gather;
+
 use crate::error::Error;
 use crate::frame::ANSWER_BITS;
 use crate::ranged::ranged;
-use crate::rssi::{EdgeWatch, Rssi, WordWatch};
+use crate::rssi::{EdgeWatch, Rssi};
+use gather::{Gather, Words};
 
 /// Bytes of samples that a receiver takes in for one answer: 61 bits and room for a delay of up to 11.
 pub const WINDOW: usize = 72;
@@ -95,50 +98,6 @@ impl SampleIndex {
     }
 }
 
-/// Takes one bit of each of four bytes at a time.
-///
-/// The mask leaves bits s, s + 8, s + 16 and s + 24; the product moves them next to each other, and no two of its other
-/// terms meet.
-#[derive(Clone, Copy)]
-struct Gather {
-    mask: u32,
-    factor: u32,
-}
-
-impl Gather {
-    const fn new(index: SampleIndex) -> Self {
-        let shift = 7 & !index.get();
-        Self { mask: 0x0101_0101 << shift, factor: (1 << 28 | 1 << 21 | 1 << 14 | 1 << 7) >> shift }
-    }
-
-    /// Four bits more at the top of `bits`.
-    #[inline(always)]
-    fn next(self, bits: u32, samples: [u8; 4], watch: &mut WordWatch) -> u32 {
-        let word = u32::from_le_bytes(samples);
-        watch.step(word);
-        bits >> 4 | self.four(word)
-    }
-
-    /// The bits of up to 32 bytes, a multiple of four, at the top.
-    #[inline(always)]
-    fn all(self, samples: &[u8], watch: &mut WordWatch) -> u32 {
-        let mut bits = 0;
-        let mut pairs = samples.chunks_exact(8);
-        for pair in &mut pairs {
-            let Some((a, b)) = pair.split_first_chunk() else { break };
-            bits = self.next(bits, *a, watch);
-            bits = b.first_chunk().map_or(bits, |b| self.next(bits, *b, watch));
-        }
-        pairs.remainder().first_chunk().map_or(bits, |last| self.next(bits, *last, watch))
-    }
-
-    /// The bits of four bytes, the first of them in the low byte, in bits 31:28.
-    #[inline]
-    const fn four(self, samples: u32) -> u32 {
-        (samples & self.mask).wrapping_mul(self.factor) & 0xf000_0000
-    }
-}
-
 /// How the first falling edge is read from its byte.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -193,7 +152,10 @@ impl Alignment {
     /// # Errors
     /// [`Error::Truncated`] if the samples end before the answer.
     pub fn bits(self, samples: &[u8]) -> Result<u64, Error> {
-        self.read(samples).map(|(bits, _)| bits)
+        match samples.first_chunk() {
+            Some(window) => Ok(Words::of_bytes(window, self.delay).bits(self)),
+            None => self.read(samples).map(|(bits, _)| bits),
+        }
     }
 
     /// Bits and edges of the answer.
@@ -201,23 +163,31 @@ impl Alignment {
     /// # Errors
     /// [`Error::Truncated`] if the samples end before the answer.
     pub fn read(self, samples: &[u8]) -> Result<(u64, EdgeWatch), Error> {
-        let from = usize::from(self.delay.get());
-        let Some((before, answer)) = samples.split_at_checked(from) else { return Err(short(samples, self.delay)) };
-        let Some(answer) = answer.first_chunk::<{ ANSWER_BITS as usize }>() else {
-            return Err(short(samples, self.delay));
-        };
-        // The line is high before the first byte.
-        let mut watch = WordWatch::new(before.last().is_none_or(|byte| byte & 1 == 1));
-        let gather = Gather::new(self.index);
-        // Eight and seven words, then one byte.
-        let Some((first, rest)) = answer.split_at_checked(32) else { return Err(short(samples, self.delay)) };
-        let Some((last, second)) = rest.split_last() else { return Err(short(samples, self.delay)) };
-        let low = gather.all(first, &mut watch);
-        let high = gather.all(second, &mut watch);
-        let mut watch = watch.finish();
-        watch.step(*last);
-        let high = high >> 4 | u32::from(self.index.bit(*last)) << 28;
-        Ok((u64::from(low) | u64::from(high) << 32, watch))
+        match samples.first_chunk() {
+            Some(window) => Ok(self.read_window(window)),
+            None => self.read_short(samples),
+        }
+    }
+
+    /// The same of a whole window.
+    pub(crate) fn read_window(self, samples: &[u8; WINDOW]) -> (u64, EdgeWatch) {
+        Words::of_bytes(samples, self.delay).read(self)
+    }
+
+    /// The same of words of four bytes each, the first byte in the low bits: for processors that load whole words only.
+    pub fn read_words(self, samples: &[u32; WINDOW / 4]) -> (u64, EdgeWatch) {
+        Words::of_words(samples, self.delay).read(self)
+    }
+
+    /// The same of fewer bytes than a window has, which may be enough for a short delay.
+    #[cold]
+    fn read_short(self, samples: &[u8]) -> Result<(u64, EdgeWatch), Error> {
+        room(samples, self.delay)?;
+        let mut window = [0xff; WINDOW];
+        for (to, from) in window.iter_mut().zip(samples) {
+            *to = *from;
+        }
+        Ok(self.read_window(&window))
     }
 
     /// RSSI of the answer: the smallest over its bits (HDSL Protocol Design).
@@ -326,7 +296,14 @@ mod tests {
                         watch.step(*byte);
                     }
                     let bits = (slow >> from) as u64 & (u64::MAX >> 3);
-                    assert_eq!(Alignment { index, delay }.read(&samples), Ok((bits, watch)));
+                    let place = Alignment { index, delay };
+                    assert_eq!((place.read(&samples), place.bits(&samples)), (Ok((bits, watch)), Ok(bits)));
+                    // Not one byte more than the answer is needed.
+                    let short = &samples[..from + 61];
+                    assert_eq!((place.read(short), place.bits(short)), (Ok((bits, watch)), Ok(bits)));
+                    assert!(place.read(&samples[..from + 60]).is_err() && place.bits(&samples[..from + 60]).is_err());
+                    let words = core::array::from_fn(|k| u32::from_le_bytes(*samples[4 * k..].first_chunk().unwrap()));
+                    assert_eq!(place.read_words(&words), (bits, watch));
                 }
             }
         }

@@ -14,7 +14,7 @@
 
 mod table;
 
-use table::{CONTROL, CONTROLS, DATA, DECODE, INVALID, MINUS, PLUS, REDUCED, SPECIAL};
+use table::{CONTROL, CONTROLS, DATA, DECODE, INVALID, MINUS, PLUS, REDUCED, SPECIAL, Table};
 pub(crate) use table::{FOUR_MORE_ZEROS, NEUTRAL, SIX_MORE_ZEROS};
 
 use core::fmt;
@@ -45,29 +45,27 @@ impl Word {
         if entry & INVALID != 0 { None } else { Some(Character(entry & 0x1ff)) }
     }
 
+    /// K28.1, 2, 5 and 6 of column RD+.
+    const fn is_crossed_k28(self) -> bool {
+        let k28_plus = self.get() & 63 == 0b00_0011;
+        // fghj = 0110, 1010, 0101, 1001: balanced and not two pairs; symmetric to line order.
+        k28_plus && matches!(self.get() >> 6, 0b0110 | 0b1010 | 0b0101 | 0b1001)
+    }
+
     /// Whether the word is in the column for this running disparity.
     pub const fn is_in(self, column: RunningDisparity) -> bool {
         self.entry() & column.flag() != 0
     }
 
     /// What a receiver makes of the word by `rule`.
+    #[inline]
     pub const fn read(self, rule: Rule) -> Reading {
-        match rule {
-            Rule::Strict => Reading { entry: self.entry() & 0x3ff, word: self },
-            Rule::Reduced => Reading { entry: self.reduced(), word: self },
-        }
+        Reading::new(rule.table().entry(self), self)
     }
 
     #[inline]
-    #[expect(clippy::indexing_slicing, reason = "a word has ten bits, the table 1024 entries")]
     const fn entry(self) -> u16 {
-        DECODE[(self.get() & 0x3ff) as usize]
-    }
-
-    #[inline]
-    #[expect(clippy::indexing_slicing, reason = "a word has ten bits, the table 1024 entries")]
-    const fn reduced(self) -> u16 {
-        REDUCED[(self.get() & 0x3ff) as usize]
+        DECODE.entry(self).0
     }
 }
 
@@ -252,15 +250,68 @@ pub enum Rule {
     Reduced,
 }
 
+impl Rule {
+    /// What the words stand for.
+    #[inline]
+    pub(crate) const fn table(self) -> &'static Table {
+        match self {
+            Self::Strict => &DECODE,
+            Self::Reduced => &REDUCED,
+        }
+    }
+}
+
+/// What a receiver makes of a word: value in bits 7:0, flags above.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub(crate) struct Entry(u16);
+
+impl Entry {
+    /// The value that the look-ups give.
+    #[inline]
+    pub(crate) const fn raw(self) -> u8 {
+        self.0.to_le_bytes()[0]
+    }
+
+    /// The flags of both, for a test of several words at once.
+    #[inline]
+    pub(crate) const fn or(self, other: Self) -> Self {
+        Self(self.0 | other.0)
+    }
+
+    /// Neither a byte error nor a special character.
+    #[inline]
+    pub(crate) const fn is_data(self) -> bool {
+        self.0 & (INVALID | SPECIAL) == 0
+    }
+
+    #[inline]
+    pub(crate) const fn is_byte_error(self) -> bool {
+        self.0 & INVALID != 0
+    }
+
+    /// The same word read in the secondary channel, where the reduced rule puts K28.1, 2, 5 and 6 of column RD+
+    /// right. By the strict rule nothing is to be put right.
+    #[inline]
+    pub(crate) const fn in_secondary(self, rule: Rule, word: Word) -> Self {
+        if matches!(rule, Rule::Reduced) && word.is_crossed_k28() { Self(self.0 ^ 0b1110_0000) } else { self }
+    }
+}
+
 /// What a receiver makes of a word.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Reading {
-    entry: u16,
+    entry: Entry,
     word: Word,
 }
 
 impl Reading {
+    #[inline]
+    pub(crate) const fn new(entry: Entry, word: Word) -> Self {
+        Self { entry, word }
+    }
+
     /// The word.
     pub const fn word(self) -> Word {
         self.word
@@ -269,13 +320,13 @@ impl Reading {
     /// Whether the word is no good by the rule it was read with.
     #[inline]
     pub const fn is_byte_error(self) -> bool {
-        self.entry & INVALID != 0
+        self.entry.is_byte_error()
     }
 
     /// Whether the rule takes the word for a special character.
     #[inline]
     pub const fn is_special(self) -> bool {
-        self.entry & SPECIAL != 0
+        self.entry.0 & SPECIAL != 0
     }
 
     /// The value that the look-ups give, also for a bad word: FFh if a sub-block is in no table.
@@ -283,13 +334,7 @@ impl Reading {
     /// Registers of the receiver take this value; for anything else see [`byte`](Self::byte).
     #[inline]
     pub const fn raw(self) -> u8 {
-        self.entry.to_le_bytes()[0]
-    }
-
-    /// Byte error and special character: 0 for a data character.
-    #[inline]
-    pub(crate) const fn flags(self) -> u16 {
-        self.entry & (INVALID | SPECIAL)
+        self.entry.raw()
     }
 
     /// The character.
@@ -300,7 +345,7 @@ impl Reading {
         if self.is_byte_error() {
             Err(Error::InvalidWord { word: self.word.get() })
         } else {
-            Ok(Character(self.entry & 0x1ff))
+            Ok(Character(self.entry.0 & 0x1ff))
         }
     }
 
@@ -314,20 +359,7 @@ impl Reading {
 
     /// Whether the word is this special character.
     pub const fn is(self, control: Control) -> bool {
-        self.entry == control as u16 | SPECIAL
-    }
-
-    /// The same word read in the secondary channel, where the reduced rule puts K28.1, 2, 5 and 6 of column RD+
-    /// right. By the strict rule nothing is to be put right.
-    pub(crate) const fn in_secondary(self, rule: Rule) -> Self {
-        let bits = self.word.get();
-        let k28_plus = bits & 63 == 0b00_0011;
-        // fghj = 0110, 1010, 0101, 1001: balanced and not two pairs; symmetric to line order.
-        let crossed = matches!(bits >> 6, 0b0110 | 0b1010 | 0b0101 | 0b1001);
-        if matches!(rule, Rule::Reduced) && k28_plus && crossed {
-            return Self { entry: self.entry ^ 0b1110_0000, word: self.word };
-        }
-        self
+        self.entry.0 & (0xff | SPECIAL | INVALID) == control as u16 | SPECIAL
     }
 }
 

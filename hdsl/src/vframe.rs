@@ -28,6 +28,7 @@ pub struct SafeBlock {
 
 impl SafeBlock {
     /// Takes the word of H-frame `at`, 0..=7; only in order.
+    #[inline(always)]
     fn put(&mut self, rule: Rule, at: u8, reading: Reading, mark: Control) {
         if at == 0 {
             *self = Self::default();
@@ -49,8 +50,16 @@ impl SafeBlock {
                 Rule::Reduced => reading.raw() == mark as u8,
             };
         }
-        if reading.is_byte_error() && self.bad.is_none() {
-            self.bad = Some(reading.word());
+        if reading.is_byte_error() {
+            self.note_bad(reading.word());
+        }
+    }
+
+    /// Keeps the first bad word.
+    #[cold]
+    const fn note_bad(&mut self, word: Word) {
+        if self.bad.is_none() {
+            self.bad = Some(word);
         }
     }
 
@@ -124,6 +133,7 @@ pub struct VFrame {
 
 impl VFrame {
     /// Takes the answer of H-frame `at`, 0..=7, in order; 0 begins anew.
+    #[inline(always)]
     pub fn put(&mut self, rule: Rule, at: u8, answer: Answer) {
         self.safe1.put(rule, at, answer.vertical(), Control::K29_7);
         self.safe2.put(rule, at, answer.secondary(), Control::K27_7);

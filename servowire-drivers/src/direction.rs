@@ -51,14 +51,12 @@ impl<P: OutputPin> Direction for DriverEnable<P> {
 }
 
 /// Switches the driver off when it is dropped, whatever has happened.
-#[cfg(feature = "tformat")]
 #[derive(Debug)]
 pub(crate) struct Guard<'a, D: Direction> {
     direction: &'a mut D,
     on: bool,
 }
 
-#[cfg(feature = "tformat")]
 impl<'a, D: Direction> Guard<'a, D> {
     pub(crate) fn transmit(direction: &'a mut D) -> Result<Self, D::Error> {
         let guard = Self { direction, on: true };
@@ -73,7 +71,6 @@ impl<'a, D: Direction> Guard<'a, D> {
     }
 }
 
-#[cfg(feature = "tformat")]
 impl<D: Direction> Drop for Guard<'_, D> {
     fn drop(&mut self) {
         if self.on {

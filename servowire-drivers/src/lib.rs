@@ -20,10 +20,15 @@ mod error;
 #[cfg(feature = "nikon")]
 pub mod nikon;
 #[cfg(any(feature = "nikon", feature = "tformat"))]
+mod procedure;
+#[cfg(any(feature = "nikon", feature = "tformat"))]
 mod quiet;
-#[cfg(all(feature = "async", feature = "tformat"))]
+#[cfg(feature = "async")]
 mod race;
+#[cfg(feature = "rtex")]
+pub mod rtex;
 pub mod samples;
+pub mod spi;
 #[cfg(feature = "tformat")]
 pub mod tformat;
 

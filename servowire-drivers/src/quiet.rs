@@ -1,5 +1,11 @@
 //! When the line may be used again, without I/O: the rules that the blocking and the async drivers share.
 
+use crate::Clock;
+#[cfg(feature = "async")]
+use crate::Timer;
+#[cfg(feature = "async")]
+use crate::race::race;
+
 /// How long a driver waits for a line that does not become quiet.
 const PATIENCE_NS: u64 = 2_000_000;
 
@@ -81,6 +87,50 @@ impl Settling {
             Settle::Never
         } else {
             Settle::Until(self.until_ns)
+        }
+    }
+}
+
+/// Throws away what comes until the line is free; `listen` tells whether something came. Whether it became free.
+pub(crate) fn wait<E>(
+    line: &Line,
+    clock: &mut impl Clock,
+    mut listen: impl FnMut() -> Result<bool, E>,
+) -> Result<bool, E> {
+    let mut settling = line.settle(clock.now_ns());
+    loop {
+        let heard = listen()?;
+        let now_ns = clock.now_ns();
+        if heard {
+            settling.heard(now_ns);
+        }
+        match settling.poll(now_ns) {
+            Settle::Quiet => return Ok(true),
+            Settle::Never => return Ok(false),
+            Settle::Until(_) => {}
+        }
+    }
+}
+
+/// The same with a `listen` that ends when something came, and may be dropped before.
+#[cfg(feature = "async")]
+pub(crate) async fn wait_asynch<E>(
+    line: &Line,
+    timer: &mut impl Timer,
+    mut listen: impl AsyncFnMut() -> Result<(), E>,
+) -> Result<bool, E> {
+    let mut until_ns = timer.now_ns();
+    let mut settling = line.settle(until_ns);
+    loop {
+        let heard = race(listen(), timer.wait_until(until_ns)).await.transpose()?.is_some();
+        let now_ns = timer.now_ns();
+        if heard {
+            settling.heard(now_ns);
+        }
+        match settling.poll(now_ns) {
+            Settle::Quiet => return Ok(true),
+            Settle::Never => return Ok(false),
+            Settle::Until(ns) => until_ns = ns,
         }
     }
 }

@@ -61,9 +61,9 @@ pub fn reorder(samples: &mut [u8], order: Order) {
     }
 }
 
-/// Writes line bits as `per_bit` samples each, for a peripheral of this order. A byte of ones goes before them and at least one
-/// behind, up to the end of a word, for what a data line does between transfers is not defined: switch the line driver on and off
-/// inside them. Gives the bytes that were written.
+/// Writes line bits as `per_bit` samples each, for a peripheral of this order. Ones go before them, for a bit and whole bytes,
+/// and at least a byte of them behind, up to the end of a word, for what a data line does between transfers is not defined:
+/// switch the line driver on and off inside them. Gives the bytes that were written.
 ///
 /// # Errors
 /// [`TooShort`] if `out` ends earlier; it is undefined then.
@@ -73,8 +73,9 @@ pub fn write(
     order: Order,
     out: &mut [u8],
 ) -> Result<usize, TooShort> {
-    let mut at = 8_usize;
-    *out.first_mut().ok_or(TooShort)? = 0xff;
+    let lead = usize::from(per_bit).div_ceil(8).max(1);
+    out.get_mut(..lead).ok_or(TooShort)?.fill(0xff);
+    let mut at = lead.saturating_mul(8);
     for bit in bits {
         for _ in 0..per_bit {
             let place = out.get_mut(at / 8).ok_or(TooShort)?;

@@ -9,99 +9,19 @@
     clippy::unwrap_used
 )]
 
-use std::cell::RefCell;
-use std::collections::VecDeque;
-use std::convert::Infallible;
-use std::rc::Rc;
+mod frames;
 
-use nikon_aformat::device::Device;
-use nikon_aformat::master::Line;
-use nikon_aformat::{BitRate, EncoderAddress, RequestFrame, Resolution};
-use servowire_drivers::nikon::{Encoder, Frame, FramePort};
-use servowire_drivers::{Clock, Error};
-use servowire_world::{
-    Event, Fault, Framing, Host, Id, Kind, Message, Planned, Rates, Scenario, Script, Tally, Transmission, Verdict,
-    Wire, World,
-};
+use frames::{Bench, Port, RATES, Shared, deliveries, host, line};
+use nikon_aformat::bus::Addresses;
+use nikon_aformat::master::Cycle;
+use nikon_aformat::{EncoderAddress, Operation, Policy, Resolution};
+use servowire_drivers::Error;
+use servowire_drivers::nikon::blocking::Master;
+use servowire_world::{Fault, Kind, Planned, Scenario, Script, Tally, Transmission, Verdict};
 
-/// 2.5 Mbit/s: a frame is 7.2 us.
-const WIRE: Wire = Wire { bit_ps: 400_000, framing: Framing::StartStop { width: 16 }, devices: 1 };
-const LOOK_NS: u64 = 100;
-const RATES: Rates = Rates { per_million: [6_000; Kind::ALL.len()], longest_ns: 60_000 };
-
-struct Bench {
-    world: World,
-    encoder: Device<1>,
-    fifo: VecDeque<Frame>,
-    shaft: u32,
-    request: Option<Id>,
-}
-
-impl Bench {
-    fn new(scenario: Scenario) -> Rc<RefCell<Self>> {
-        let encoder = Device::new(EncoderAddress::ZERO, Resolution::default(), BitRate::Mbit2_5);
-        let world = World::new(WIRE, scenario);
-        Rc::new(RefCell::new(Self { world, encoder, fifo: VecDeque::new(), shaft: 0, request: None }))
-    }
-
-    fn pass(&mut self, until_ns: u64) {
-        loop {
-            match self.world.next(until_ns) {
-                Event::Time { .. } => return,
-                Event::Delivered(block) => self.fifo.extend(block.units.iter().map(|unit| {
-                    let (content, framed) = unit.bits.content();
-                    Frame { content: content as u16, framed }
-                })),
-                Event::Heard { unit, .. } => {
-                    let (content, framed) = unit.bits.content();
-                    self.shaft += 1;
-                    self.encoder.set_position(self.shaft, 3);
-                    if !framed {
-                        self.encoder.framing_error(unit.end_ns);
-                    } else if let Some(answer) = self.encoder.frame(content as u16, unit.end_ns) {
-                        let contents = answer.raw.contents().iter().map(|content| u64::from(*content));
-                        let message = Message::frames(16, contents).tagged(self.shaft.into());
-                        self.world.answer(0, unit.origin.transmission, &message, answer.at_ns);
-                    }
-                }
-            }
-        }
-    }
-}
-
-#[derive(Clone)]
-struct Port(Rc<RefCell<Bench>>);
-
-impl FramePort for Port {
-    type Error = Infallible;
-
-    fn send(&mut self, frames: &[RequestFrame], gap_bits: u32) -> Result<(), Infallible> {
-        let contents = frames.iter().map(|frame| u64::from(frame.content()));
-        let message = Message::frames(16, contents).with_gap_bits(gap_bits as usize);
-        let mut bench = self.0.borrow_mut();
-        let now_ns = bench.world.now_ns();
-        bench.request = Some(bench.world.send(&message, now_ns));
-        Ok(())
-    }
-
-    fn take(&mut self) -> Result<Option<Frame>, Infallible> {
-        Ok(self.0.borrow_mut().fifo.pop_front())
-    }
-}
-
-impl Clock for Port {
-    fn now_ns(&mut self) -> u64 {
-        let mut bench = self.0.borrow_mut();
-        let until_ns = bench.world.now_ns() + LOOK_NS;
-        bench.pass(until_ns);
-        bench.world.now_ns()
-    }
-}
-
-fn driver(bench: &Rc<RefCell<Bench>>) -> Encoder<Port, Port> {
+fn driver(bench: &Shared) -> Master<Port, Port> {
     let port = Port(bench.clone());
-    let line = Line::new(BitRate::Mbit2_5).with_response_timeout_ns(20_000);
-    Encoder::new(port.clone(), port, EncoderAddress::ZERO, Resolution::default(), line)
+    Master::new(port.clone(), port, Resolution::default(), line())
 }
 
 #[test]
@@ -109,7 +29,7 @@ fn positions_come() {
     let bench = Bench::new(Scenario::quiet());
     let mut encoder = driver(&bench);
     for turn in 1..=10_u64 {
-        let abs = encoder.read_abs40().unwrap().response.abs40().unwrap().get();
+        let abs = encoder.read_abs40(EncoderAddress::ZERO).unwrap().response.abs40().unwrap().get();
         assert_eq!(abs, turn | 3 << 20);
     }
     assert_eq!(bench.borrow().world.truth().clashes(), 0);
@@ -134,8 +54,8 @@ fn any_fault_is_over_with_the_next_call() {
                 let script = Script::planned(vec![Planned { transmission, unit, fault }]);
                 let bench = Bench::new(Scenario { script, ..Scenario::quiet() });
                 let mut encoder = driver(&bench);
-                let first = encoder.read_abs40();
-                let second = encoder.read_abs40();
+                let first = encoder.read_abs40(EncoderAddress::ZERO);
+                let second = encoder.read_abs40(EncoderAddress::ZERO);
                 assert!(second.is_ok(), "{fault:?} in unit {unit} of {transmission}: {first:?}, {second:?}");
             }
         }
@@ -149,12 +69,13 @@ fn hostile_events_are_survived() {
     let (mut sum, mut seed, mut good, mut failed) = (Tally::default(), 0, 0, 0);
     while sum.events() < events {
         let scenario = Scenario::random(seed, RATES);
-        let host = Host { echo: scenario.host.echo, ..Host::IDEAL };
-        let bench = Bench::new(Scenario { host, ..scenario });
+        let delivery = deliveries()[seed as usize % 3];
+        let host = host(scenario.host.echo, delivery);
+        let bench = Bench::with(Scenario { host, ..scenario }, 1, true);
         let mut encoder = driver(&bench);
         for call in 0..100 {
             let before = bench.borrow().world.tally().of(Kind::Preempt);
-            let result = encoder.read_abs40();
+            let result = encoder.read_abs40(EncoderAddress::ZERO);
             let mut bench = bench.borrow_mut();
             let Some(request) = bench.request else { continue };
             let preempted = bench.world.tally().of(Kind::Preempt) > before;
@@ -187,4 +108,53 @@ fn hostile_events_are_survived() {
     }
     println!("{sum}\n{good} good, {failed} failed");
     assert!(good > failed && failed > 100);
+}
+
+/// Bytes one by one, in DMA blocks, at idle: the values are the same.
+#[test]
+fn frames_may_come_in_blocks() {
+    for delivery in deliveries() {
+        let bench = Bench::with(Scenario { host: host(false, delivery), ..Scenario::quiet() }, 1, true);
+        let mut encoder = driver(&bench);
+        for turn in 1..=5_u32 {
+            let position = encoder.read_position(EncoderAddress::ZERO, Policy::STRICT).unwrap();
+            assert_eq!((position.single_turn, position.turns), (turn, 3), "{delivery:?}");
+        }
+        assert_eq!(bench.borrow().world.truth().clashes(), 0);
+    }
+}
+
+/// Five encoders on a line, read in a cycle: each gives its own value of the same instant, and one that is hurt costs no other one.
+#[test]
+fn a_bus_is_read_in_its_cycle() {
+    let asked = Addresses::first(5);
+    let lost = Planned { transmission: 3, unit: 1, fault: Fault::Drop };
+    let bench = Bench::with(Scenario { script: Script::planned(vec![lost]), ..Scenario::quiet() }, 5, false);
+    let mut bus = driver(&bench);
+    let mut cycle = Cycle::new(1_000_000, 900_000, 50_000).unwrap();
+    for turn in 1..=4 {
+        let answers = bus.read_cycle(&mut cycle, Operation::Abs40Mt, asked).unwrap();
+        let good: Vec<_> = asked.iter().filter_map(|ea| answers.reading(ea).map(|reading| (ea, reading))).collect();
+        let shaft = bench.borrow().asked_at;
+        for (ea, reading) in &good {
+            let abs = reading.response.abs40().unwrap().get();
+            assert_eq!(abs, u64::from(shaft) | (3 + u64::from(ea.get())) << 20);
+        }
+        assert_eq!(good.len(), if turn == 1 { 4 } else { 5 });
+    }
+    let now_ns = bench.borrow().world.now_ns();
+    assert!((3_050_000..3_700_000).contains(&now_ns), "{now_ns}: the fourth of a grid of 1 ms");
+    assert_eq!(cycle.missed(), 0);
+    assert_eq!(bus.read_abs40(EncoderAddress::truncate(4)).unwrap().response.ea.get(), 4);
+    assert_eq!(bench.borrow().world.truth().clashes(), 0);
+}
+
+#[test]
+fn procedures_run_over_it() {
+    let bench = Bench::new(Scenario::quiet());
+    let mut encoder = driver(&bench);
+    encoder.clear_status(EncoderAddress::ZERO).unwrap();
+    let type_word = encoder.read_eeprom(EncoderAddress::ZERO, 0).unwrap();
+    assert_eq!(encoder.read_eeprom(EncoderAddress::ZERO, 0), Ok(type_word));
+    assert_eq!(bench.borrow().world.truth().clashes(), 0);
 }

@@ -12,7 +12,7 @@
 
 mod bench;
 
-use bench::{Bench, Misframed, Pin, Shared, Uart, Watch, events, scenario};
+use bench::{Bench, HAND_OVER_NS, Misframed, Pin, Shared, Uart, Watch, events, line, scenario};
 use servowire_drivers::tformat::blocking::Encoder;
 use servowire_drivers::{DriverEnable, Error};
 use servowire_world::{Fault, Kind, Planned, Scenario, Script, Tally, Transmission, Verdict};
@@ -20,7 +20,10 @@ use tformat::master::Line;
 use tformat::{Address, Almc, BitRate, Doubt, Policy, Resolution};
 
 fn driver(bench: &Shared) -> Encoder<Uart, DriverEnable<Pin>, Watch> {
-    let line = Line::new(BitRate::Mbit2_5);
+    driver_at(bench, Line::new(BitRate::Mbit2_5))
+}
+
+fn driver_at(bench: &Shared, line: Line) -> Encoder<Uart, DriverEnable<Pin>, Watch> {
     Encoder::new(Uart(bench.clone()), DriverEnable(Pin(bench.clone())), Watch(bench.clone()), line)
 }
 
@@ -132,7 +135,7 @@ fn hostile_events_never_cost_a_good_answer() {
     while sum.events() < events() {
         let misframed = [Misframed::Dropped, Misframed::Delivered, Misframed::Reported][seed as usize % 3];
         let bench = Bench::new(scenario(seed), misframed);
-        let mut encoder = driver(&bench);
+        let mut encoder = driver_at(&bench, line());
         for call in 0..100 {
             let before = bench.borrow().tally().of(Kind::Preempt);
             let result = encoder.read_position(resolution, Policy::STRICT);
@@ -143,7 +146,7 @@ fn hostile_events_never_cost_a_good_answer() {
             let preempted = bench.tally().of(Kind::Preempt) > before;
             let sent_ns = truth.transmission(request).unwrap().end_ns;
             let in_time = |answer: &Transmission| {
-                let soon = answer.start_ns <= sent_ns + 9_000 && answer.delivered_ns <= answer.end_ns + 2_000;
+                let soon = answer.start_ns <= sent_ns + 9_000 && answer.delivered_ns <= answer.end_ns + HAND_OVER_NS;
                 soon && answer.end_ns - answer.start_ns == 44_000
             };
             let whole = !preempted && truth.undisturbed(request) && truth.intact_answers(request).any(in_time);

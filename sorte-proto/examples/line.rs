@@ -2,7 +2,8 @@
 //!
 //! `cargo run -p sorte-proto --example line -- [line delay in ns]`
 
-use sorte_proto::timing::{CNC_CYCLE_NS, Limit, Timing};
+use sorte_proto::Parameters;
+use sorte_proto::timing::{CNC_CYCLE_NS, GAP_NS, Limit, Timing};
 
 fn main() {
     let line_delay = std::env::args().nth(1).and_then(|text| text.parse().ok()).unwrap_or(85);
@@ -23,4 +24,19 @@ fn main() {
             if budget.fits(CNC_CYCLE_NS) { ", fits 4 us" } else { "" },
         );
     }
+    println!("\ncycle times that the vendor names, and the devices that they have room for");
+    for cycle_ns in Parameters::CYCLE_TIMES_NS.into_iter().rev() {
+        let fits = |devices: &u8| {
+            let output_len = u16::from(*devices) * 4;
+            Timing { line_delays_ns: &[line_delay], devices: *devices, output_len, payload_len: 3 }
+                .misfit(cycle_ns)
+                .is_none()
+        };
+        println!("{:9} us  {:3}", f64::from(cycle_ns) / 1e3, (1..=254).take_while(fits).last().unwrap_or(0));
+    }
+    let named = Parameters::GAPS_NS;
+    println!(
+        "gaps that the vendor names: {named:?} ns; PARAM announces {} ns, the exchange is laid out for {GAP_NS} ns",
+        Parameters::STOCK.gap_ns()
+    );
 }

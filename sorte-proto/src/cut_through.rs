@@ -32,6 +32,16 @@ impl Sender {
         Self { transit: Transit::START, sent: RunningFcs::START, add: Status::of_device(last, error) }
     }
 
+    /// Takes a byte that passes as it is, if nobody has to look at it.
+    #[inline]
+    fn passes(&mut self, byte: u8) -> bool {
+        let quiet = self.transit.passes(byte);
+        if quiet {
+            self.sent.push(byte);
+        }
+        quiet
+    }
+
     /// The byte to send for byte `at` of the FCS, 0 to 3.
     #[inline(never)]
     fn trailer(&self, at: u16) -> u8 {
@@ -72,22 +82,30 @@ impl DiscoveryRewriter {
     /// The byte to send for the byte received.
     #[inline]
     pub fn byte(&mut self, byte: u8) -> u8 {
-        let at = self.sender.transit.take(byte);
         // Most bytes are entries of other devices.
-        let other = (TABLE..DISCOVERY_FCS).contains(&at) && at.wrapping_sub(self.entry_at) > 3;
-        if other {
-            self.sender.sent.push(byte);
-            return byte;
-        }
+        if self.sender.passes(byte) { byte } else { self.look(byte) }
+    }
+
+    #[inline(never)]
+    fn look(&mut self, byte: u8) -> u8 {
+        let at = self.sender.transit.take(byte);
         let out = self.special(at, byte);
         if at < DISCOVERY_FCS {
             self.sender.sent.push(out);
         }
+        // Up to the own entry, then up to the FCS.
+        let quiet = match at {
+            0..=8 => 0,
+            _ if !self.sender.transit.is_for_all(FrameType::Discovery) => u16::MAX,
+            _ if at < self.entry_at => self.entry_at.min(DISCOVERY_FCS),
+            _ if at.wrapping_sub(self.entry_at) < 3 => 0,
+            _ => DISCOVERY_FCS,
+        };
+        self.sender.transit.quiet_until(quiet);
         out
     }
 
     /// Head, own entry, FCS, and what comes after the frame.
-    #[inline(never)]
     fn special(&mut self, at: u16, byte: u8) -> u8 {
         let ([i0, i1], [o0, o1]) = (self.lengths.input.to_le_bytes(), self.lengths.output.to_le_bytes());
         if at >= 3 && !self.sender.transit.is_for_all(FrameType::Discovery) {

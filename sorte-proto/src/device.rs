@@ -7,10 +7,12 @@
 //! Data are used only after their checksum was found right. (The published device uses them in any case.)
 
 mod config;
+mod mode;
 mod passage;
 mod port;
 
-pub use config::{Config, Counters};
+pub use config::{Config, Counters, PortCounters};
+pub use mode::Forwarding;
 pub use passage::Passage;
 pub use port::{Port, PortFlags, Seen, State, Trigger};
 
@@ -136,7 +138,7 @@ impl Device {
             config,
             a: PORT,
             b: PORT,
-            counters: Counters { good_frames: 0, crc_errors: 0, format_errors: 0, retrains: 0 },
+            counters: Counters::ZERO,
             error: false,
             assignment: None,
             output_total: None,
@@ -182,6 +184,11 @@ impl Device {
         }
     }
 
+    /// The port that does not face the master; B while none is known to.
+    fn reverse_port(&self) -> PortId {
+        self.master_port().map_or(PortId::B, PortId::other)
+    }
+
     /// State of the port that faces the master.
     pub fn state(&self) -> State {
         self.master_port().map_or(State::Idle, |port| self.port(port).state)
@@ -190,6 +197,11 @@ impl Device {
     /// Whether only one port is linked.
     pub const fn is_last(&self) -> bool {
         self.a.flags.contains(PortFlags::LAST_DEVICE) || self.b.flags.contains(PortFlags::LAST_DEVICE)
+    }
+
+    /// Whether the host has taken it out of the line's work.
+    fn is_out(&self) -> bool {
+        self.a.state == State::Error
     }
 
     /// Address and offsets, from the last DISCOVERY.
@@ -260,7 +272,7 @@ impl Device {
             Some(PortId::B) => !b,
             None => false,
         };
-        if master_lost {
+        if master_lost && !self.is_out() {
             self.restart();
         }
         let only = match (a, b) {
@@ -288,13 +300,13 @@ impl Device {
         let (a, b) = (last_device(self.a), last_device(self.b));
         let retrains = self.counters.retrains.saturating_add(1);
         let counters = Counters { retrains, ..self.counters };
-        *self = Self { counters, error: self.error, alive_ns: self.alive_ns, ..Self::new(self.config) };
+        *self = Self { counters, error: self.error, ..Self::new(self.config) };
         (self.a.flags, self.b.flags) = (a, b);
     }
 
     /// Looks at the time: a start-up state that has waited too long for its frame gives up. Returns whether it has.
     pub fn poll(&mut self, now_ns: u64) -> bool {
-        let waits = !matches!(self.state(), State::Idle | State::Exchange);
+        let waits = !matches!(self.state(), State::Idle | State::Exchange | State::Diag | State::Error);
         let late = waits && now_ns.saturating_sub(self.alive_ns) > self.config.start_up_timeout_ns;
         if late {
             self.restart();
@@ -307,7 +319,7 @@ impl Device {
     pub fn cycle_start(&mut self) -> bool {
         self.missed = if self.received { 0 } else { self.missed.saturating_add(1) };
         self.received = false;
-        let lost = self.missed > self.config.missed_frames;
+        let lost = self.missed > self.config.missed_frames && !self.is_out();
         if lost {
             self.restart();
         }
@@ -342,14 +354,14 @@ impl Device {
         let state = self.port(port).state;
         let path = passage.path().unwrap_or(Path::Absorb);
         let mut handled = Handled { path, result: Ok(()), trigger: Trigger::None, correction: Correction::None };
-        if state == State::Exchange {
+        if matches!(state, State::Exchange | State::Diag | State::Error) {
             return handled;
         }
         // A STATUS byte has been written, so the error has been reported.
         self.error &= !passage.has_written_status();
         let learnt = passage.learnt();
         handled.result = learnt.map(|_| ());
-        self.count(handled.result);
+        self.count(port, handled.result);
         let Ok(learnt) = learnt else { return handled };
         let head = passage.transit().head();
         handled.trigger = self.port_mut(port).head(head).trigger;
@@ -392,16 +404,9 @@ impl Device {
         self.end(port, passage, arrival)
     }
 
-    fn count(&mut self, result: Result<(), Error>) {
-        let counters = &mut self.counters;
-        match result {
-            Ok(()) => counters.good_frames = counters.good_frames.saturating_add(1),
-            Err(Error::BadFcs { .. } | Error::BadCrc8 { .. }) => {
-                counters.crc_errors = counters.crc_errors.saturating_add(1);
-                self.error = true;
-            }
-            Err(_) => counters.format_errors = counters.format_errors.saturating_add(1),
-        }
+    fn count(&mut self, port: PortId, result: Result<(), Error>) {
+        self.counters.count(port, result);
+        self.error |= matches!(result, Err(Error::BadFcs { .. } | Error::BadCrc8 { .. }));
     }
 
     fn path(&self, port: PortId) -> Path {
@@ -435,13 +440,13 @@ impl Device {
             FrameType::DelayResp => Ok(false),
             _ => DelayReq::of(frame).map(|_| true),
         });
-        self.count(result.map(|_| ()));
+        let port = self.reverse_port();
+        self.count(port, result.map(|_| ()));
         if !result? {
             return Ok(());
         }
         self.line.add(rtt_ns);
-        let reverse = self.master_port().map(PortId::other);
-        if let (Trigger::Last, Some(port)) = (trigger, reverse) {
+        if trigger == Trigger::Last && self.master_port().is_some() {
             self.port_mut(port).enter(State::Sync);
             self.port_mut(port).end_of_frame();
         }
@@ -463,7 +468,7 @@ impl Device {
         let taken = MasterFrameView::new(output_len.into(), frame).and_then(|view| {
             Ok((view.slice(place.out_offset, self.config.lengths.output)?, view.reference_ns(delay_ns)))
         });
-        self.count(taken.map(|_| ()));
+        self.count(self.reverse_port().other(), taken.map(|_| ()));
         let (data, reference_ns) = taken?;
         // Start 500 ns into the cycle, and the way here.
         let expected = delay_ns.saturating_add(TRIGGER_NS);

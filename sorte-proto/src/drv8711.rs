@@ -34,6 +34,22 @@ pub use fields::Field;
 pub use registers::{Blank, Configuration, Ctrl, Decay, Drive, Off, Stall, Torque};
 pub use status::Status;
 
+use crate::sync0::PULSE_NS;
+use crate::timing::CNC_CYCLE_NS;
+
+/// STEP must be high, and low, for so long, in ns.
+pub const STEP_NS: u32 = 1900;
+/// From a change of DIR to a rising STEP, and from a rising STEP to a change of DIR, in ns.
+pub const DIR_SETUP_HOLD_NS: u32 = 200;
+/// Most steps in a second.
+pub const MAX_STEP_HZ: u32 = 250_000;
+/// From waking the chip (nSLEEP high) to the first step, in ns.
+pub const WAKE_NS: u32 = 1_000_000;
+
+// A pulse of the reference design, and what it leaves of its cycle.
+const _: () = assert!(PULSE_NS as u32 >= STEP_NS && CNC_CYCLE_NS - PULSE_NS as u32 >= STEP_NS);
+const _: () = assert!(CNC_CYCLE_NS == 1_000_000_000 / MAX_STEP_HZ);
+
 /// The eight registers by their addresses.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -180,6 +196,9 @@ mod tests {
             }
         }
         assert_eq!(Register::at(8), None);
+        assert_eq!(Register::Torque.write(0x1ff).to_bytes(), [0x11, 0xff]);
+        let names = ["CTRL", "TORQUE", "OFF", "BLANK", "DECAY", "STALL", "DRIVE", "STATUS"];
+        assert_eq!(Register::ALL.map(Register::name), names);
     }
 
     #[test]

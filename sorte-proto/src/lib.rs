@@ -22,6 +22,7 @@ mod flags;
 pub mod follow;
 mod frame;
 mod frame_type;
+pub mod host;
 pub mod iep;
 mod line_delay;
 pub mod master;

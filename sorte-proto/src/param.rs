@@ -176,6 +176,17 @@ impl Parameters {
     /// [`STOCK`](Self::STOCK) with the cycle time of the CNC machine, 4 us.
     pub const CNC: Self = Self { cycle_time_ns: 4000, ..Self::STOCK };
 
+    /// Cycle times that the vendor's header names, in ns: 1 ms, 100, 62.5, 31.25, 10 and 4 us.
+    pub const CYCLE_TIMES_NS: [u32; 6] = [1_000_000, 100_000, 62_500, 31_250, 10_000, 4000];
+    /// Inter-packet gaps that the vendor's header names, in ns. The IO exchange is laid out for 240 ns, see
+    /// [`GAP_NS`](crate::timing::GAP_NS).
+    pub const GAPS_NS: [u32; 5] = [200, 260, 500, 640, 960];
+
+    /// Inter-packet gap in ns.
+    pub const fn gap_ns(&self) -> u32 {
+        self.ipg_5ns.saturating_mul(5)
+    }
+
     /// Any 32 bytes are parameters.
     #[rustfmt::skip]
     pub fn parse(bytes: &[u8; Self::LEN]) -> Self {

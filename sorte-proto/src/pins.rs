@@ -2,9 +2,37 @@
 
 use crate::pto::{Direction, Pto};
 
+/// A general-purpose pin of the AM335x.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct Gpio {
+    /// GPIO module, 0..=3.
+    pub module: u8,
+    /// Bit in it, 0..=31.
+    pub bit: u8,
+}
+
+/// The motor driver on the board of the reference design (TIDEP-0061, section 2.4.1). STEP is the SYNC0 output of the IEP, and
+/// the registers are at SPI1 with chip select 0.
+pub mod ice {
+    use super::Gpio;
+
+    /// DIR.
+    pub const DIR: Gpio = Gpio { module: 1, bit: 31 };
+    /// RESET, active high: the registers take their reset values.
+    pub const RESET: Gpio = Gpio { module: 1, bit: 14 };
+    /// nSLEEP, active low. Wait [`WAKE_NS`](crate::drv8711::WAKE_NS) after it rises.
+    pub const N_SLEEP: Gpio = Gpio { module: 1, bit: 15 };
+    /// nSTALL, active low, from the driver.
+    pub const N_STALL: Gpio = Gpio { module: 0, bit: 12 };
+    /// nFAULT, active low, from the driver.
+    pub const N_FAULT: Gpio = Gpio { module: 0, bit: 13 };
+}
+
 /// STEP edge to a change of DIR, and a change of DIR to the next STEP edge, at least: set-up and hold time of the DRV8711
 /// in ns.
-pub const DIR_SETUP_HOLD_NS: u64 = 200;
+pub const DIR_SETUP_HOLD_NS: u64 = crate::drv8711::DIR_SETUP_HOLD_NS as u64;
 
 /// What the pins carry.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]

@@ -126,6 +126,7 @@ fn an_error_is_kept_until_a_status_byte_carries_it() {
         assert_eq!(foreign, sent);
         let counters = device.counters();
         assert_eq!((counters.crc_errors, counters.format_errors), (1, 0));
+        assert_eq!((counters.a.crc_errors, counters.b.crc_errors), (1, 0));
 
         let mut next = Discovery::request(false).emit();
         assert_eq!(device.frame(PortId::A, &mut next, ARRIVAL).result, Ok(()));
@@ -152,9 +153,11 @@ fn a_delay_response_is_accepted_and_ignored() {
         }
     }
     let mut device = device_in(State::LineDelay, false);
-    let before = device.line_delay_next_ns();
+    let (before, counted) = (device.line_delay_next_ns(), device.counters());
     assert_eq!(device.delay_reflection(Trigger::Normal, &response, 560), Ok(()));
     assert_eq!((device.counters().format_errors, device.line_delay_next_ns()), (0, before));
+    // It came to the port that does not face the master.
+    assert_eq!((device.counters().a, device.counters().b.good_frames), (counted.a, counted.b.good_frames + 1));
 }
 
 /// Where a frame goes is known before its first byte, but for a last device in IDLE: there with the third.

@@ -1,5 +1,6 @@
 //! Motion that a machine can use: trapezoids and S-curves within limits of speed, acceleration and jerk, in integers.
 
+mod cubic;
 mod curve;
 mod cycle;
 mod homing;

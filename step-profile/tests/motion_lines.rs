@@ -133,3 +133,22 @@ fn refusals_leave_the_path_as_it_was() {
     let scale = [AxisSetup { steps_per_m: 0, ..axes[0] }];
     assert!(matches!(Path::<1, 1>::new(Clock::MICROSECONDS, scale, 5), Err(Error::NoScale)));
 }
+
+/// An axis with three steps on a line whose ramps last 20 s: the first one is 11.5 s away, on the ramp.
+#[test]
+fn a_step_long_after_the_start_of_a_ramp() {
+    let axes = [axis(20_000, 1000, 0, 80_000); 2];
+    for hz in [1_000_000, 1_000_000_000] {
+        let mut path = Path::<2, 2>::new(Clock::new(hz).unwrap(), axes, 0).unwrap();
+        path.push([400_000, 3], u32::MAX).unwrap();
+        let slow: Vec<u64> =
+            path.next_line().unwrap().filter(|pulse| pulse.axis == 1).map(|pulse| pulse.tick).collect();
+        let (half, hz) = ((400_000_f64 / 1000.0).sqrt(), f64::from(hz));
+        let first = (2.0 * 400_000.0 / 6.0 / 1000.0_f64).sqrt();
+        let want = [first, half, 2.0 * half - first].map(|seconds| seconds * hz);
+        for (tick, want) in slow.iter().zip(want) {
+            assert!((*tick as f64 - want).abs() <= 0.51 + want * 1e-12, "{slow:?} for {want}");
+        }
+        assert_eq!(slow.len(), 3);
+    }
+}

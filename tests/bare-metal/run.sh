@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# Builds an image for each protocol at opt-level 3 and s, runs it under QEMU, and checks: vector rows, instruction counts against
-# budget.toml, and that no panic can be reached from any kernel.
+# Builds an image for each protocol at opt-level 3 and s, runs it under QEMU, and checks: vector rows, instruction counts and
+# stacks against budget.toml, and that no panic can be reached from any kernel. Some protocols also for a Cortex-M0+.
 #
 #   run.sh             check
 #   run.sh --record    the same, and write the measured figures into budget.toml
@@ -8,6 +8,9 @@ set -euo pipefail
 cd "$(dirname "$0")"
 
 target=thumbv7em-none-eabihf
+# The Cortex-M0+, and what is measured for it. The Cortex-M4 that QEMU emulates executes its code too.
+target_m0=thumbv6m-none-eabi
+protocols_m0=(hdsl)
 images=target/images
 # The default features are the protocols.
 protocols=$(sed -n 's/^default = \[\(.*\)\]$/\1/p' Cargo.toml | tr -d '",')
@@ -23,10 +26,11 @@ need() {
 
 # build LEVEL FEATURES IMAGE: the image as $images/IMAGE.elf
 build() {
-    local profile=release
-    [ "$1" = O3 ] || profile=small
-    cargo build --locked --quiet --target "$target" --profile "$profile" --no-default-features --features "$2"
-    cp "target/$target/$profile/bare-metal" "$images/$3.elf"
+    local profile=release triple=$target
+    [ "$1" != Os ] || profile=small
+    [ "$1" != M0 ] || triple=$target_m0
+    cargo build --locked --quiet --target "$triple" --profile "$profile" --no-default-features --features "$2"
+    cp "target/$triple/$profile/bare-metal" "$images/$3.elf"
 }
 
 # run IMAGE: what it prints as $images/IMAGE.txt; report.py judges it
@@ -40,7 +44,9 @@ need cargo "install Rust from https://rustup.rs"
 need qemu-system-arm "apt-get install qemu-system-arm"
 need python3 "apt-get install python3"
 python3 -c 'import tomllib' 2>/dev/null || fail "python3 is older than 3.11"
-[ -d "$(rustc --print target-libdir --target "$target")" ] || fail "target missing: rustup target add $target"
+for triple in "$target" "$target_m0"; do
+    [ -d "$(rustc --print target-libdir --target "$triple")" ] || fail "target missing: rustup target add $triple"
+done
 objdump=$(dirname "$(rustc --print target-libdir)")/bin/llvm-objdump
 [ -x "$objdump" ] || fail "llvm-objdump is missing: rustup component add llvm-tools"
 
@@ -58,5 +64,11 @@ for level in O3 Os; do
         build "$level" "$protocol" "$protocol-$level"
         run "$protocol-$level"
     done
+    build "$level" stack,sorte-proto "stack-$level"
+    run "stack-$level"
+done
+for protocol in "${protocols_m0[@]}"; do
+    build M0 "$protocol" "$protocol-M0"
+    run "$protocol-M0"
 done
 python3 report.py table "$objdump" "$images" "$@"

@@ -138,7 +138,7 @@ impl Master {
             self.link.counted = [false; 2];
         }
         if !answer.is_plain() {
-            self.count_bad_words(answer);
+            self.count_bad_words(&answer);
         }
         if !answer.switch_ok() {
             self.counters.switch_bits = self.counters.switch_bits.wrapping_add(1);
@@ -151,7 +151,7 @@ impl Master {
 
     /// Bad words and special characters without a meaning, channel by channel.
     #[cold]
-    fn count_bad_words(&mut self, answer: Answer) {
+    fn count_bad_words(&mut self, answer: &Answer) {
         let ti = self.dialect.quality == QualityRule::Ti;
         let link = &mut self.link;
         let quality = &mut link.quality;
@@ -201,11 +201,11 @@ impl Master {
         self.requester.take(symbol, &mut self.report.finished);
     }
 
-    #[inline]
+    #[inline(always)]
     fn take_acceleration(&mut self, answer: Answer) {
         let value = match answer.delta_delta() {
             Ok(value) => Some(value),
-            Err(error) => self.unusable(answer, error),
+            Err(error) => self.unusable(&answer, error),
         };
         let tracker = &mut self.link.tracker;
         tracker.step(value);
@@ -216,7 +216,7 @@ impl Master {
 
     /// An acceleration word with something wrong: counted, and used all the same if the dialect does so.
     #[cold]
-    fn unusable(&mut self, answer: Answer, error: Error) -> Option<DeltaDelta> {
+    fn unusable(&mut self, answer: &Answer, error: Error) -> Option<DeltaDelta> {
         if self.dialect.damaged_acceleration && matches!(error, Error::InvalidWord { .. }) {
             if let Ok(value) = DeltaDelta::from_word(u16::from_be_bytes(answer.acceleration_words().map(Reading::raw)))
             {

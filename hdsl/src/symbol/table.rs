@@ -9,6 +9,8 @@
     reason = "all but one function run at compile time, where a slip is a compiler error; that one masks its indices"
 )]
 
+use super::{Entry, Word};
+
 /// `abcdei` of D.0..D.31, column RD-.
 const SIX: [u16; 32] = [
     0b10_0111, 0b01_1101, 0b10_1101, 0b11_0001, 0b11_0101, 0b10_1001, 0b01_1001, 0b11_1000, // 0..=7
@@ -95,9 +97,19 @@ pub(super) const MINUS: u16 = 1 << 10;
 /// The word is in column RD+.
 pub(super) const PLUS: u16 = 1 << 11;
 
-/// What each of the 1024 words stands for: value in bits 7:0 and the flags above. Words in neither column
+/// What each of the 1024 words stands for by a rule.
+pub(crate) struct Table([u16; 1024]);
+
+impl Table {
+    #[inline]
+    pub(crate) const fn entry(&self, word: Word) -> Entry {
+        Entry(self.0[(word.get() & 0x3ff) as usize])
+    }
+}
+
+/// By the tables of the code: value in bits 7:0 and the flags above. Words in neither column
 /// carry the value of the two sub-block look-ups.
-pub(super) static DECODE: [u16; 1024] = {
+pub(super) static DECODE: Table = {
     let mut table = [0; 1024];
     let mut word = 0;
     while word < 1024 {
@@ -121,7 +133,7 @@ pub(super) static DECODE: [u16; 1024] = {
         }
         column += 1;
     }
-    table
+    Table(table)
 };
 
 /// The 6-bit block in line order to x; FFh where no column has it.
@@ -195,7 +207,7 @@ pub(crate) static FOUR_MORE_ZEROS: [u8; 8] = {
 };
 
 /// All words by the reduced rule: value, [`INVALID`] and [`SPECIAL`].
-pub(super) static REDUCED: [u16; 1024] = {
+pub(super) static REDUCED: Table = {
     let mut table = [0; 1024];
     let mut bits: u16 = 0;
     while bits < 1024 {
@@ -216,5 +228,5 @@ pub(super) static REDUCED: [u16; 1024] = {
         table[bits as usize] = entry;
         bits += 1;
     }
-    table
+    Table(table)
 };

@@ -76,9 +76,10 @@ fn the_reduced_rule_reads_every_data_character() {
     }
     for control in Control::ALL {
         for rd in BOTH {
-            let reading = Character::control(control).encode(rd).0.read(Rule::Reduced);
+            let (word, _) = Character::control(control).encode(rd);
+            let reading = word.read(Rule::Reduced);
             assert!(reading.is_special() && !reading.is_byte_error());
-            assert_eq!(reading.in_secondary(Rule::Reduced).raw(), control as u8);
+            assert_eq!(Rule::Reduced.table().entry(word).in_secondary(Rule::Reduced, word).raw(), control as u8);
         }
     }
 }

@@ -4,13 +4,16 @@
 //! The UART's `read` should be free of side effects when it is dropped, as that of buffered UARTs is; otherwise bytes are lost,
 //! which costs the exchange in which it happens.
 
+use core::ops::ControlFlow;
+
 use embedded_io_async::{Read, Write};
 use tformat::master::{EEPROM_POLLING, EepromAccess, Exchange, Line, Progress, Reset, Step, Transaction};
 use tformat::{Address, AllData, Doubt, Page, Policy, Request, Resolution, Response, SingleTurn};
 
 use super::{MAX_BYTES, Sample, other, silence_ns, worst_ns};
 use crate::direction::Guard;
-use crate::quiet::{self, Settle};
+use crate::procedure;
+use crate::quiet;
 use crate::race::race;
 use crate::{Direction, Error, Timer};
 
@@ -102,27 +105,14 @@ impl<U: Read + Write, D: Direction, T: Timer> Encoder<U, D, T> {
         mut receive: impl FnMut(Result<Response, tformat::Error>, u64) -> Step<V>,
     ) -> Result<V, Failure<U, D>> {
         loop {
-            match step {
-                Step::Send { request, not_before_ns } => {
-                    self.timer.wait_until(not_before_ns).await;
-                    let outcome = match self.transact(request).await {
-                        Ok(exchange) => Ok(exchange.response),
-                        Err(Error::Protocol(error)) => Err(error),
-                        // The answer is lost; what that means is for the procedure to say.
-                        Err(Error::Io(_)) => Err(tformat::Error::NoResponse { echo: false }),
-                        Err(other) => return Err(other),
-                    };
-                    step = receive(outcome, self.state.free_ns(self.timer.now_ns()));
-                }
-                Step::Done { value, ready_ns } => {
-                    self.state.clean(ready_ns);
-                    return Ok(value);
-                }
-                Step::Failed { error, ready_ns } => {
-                    self.state.clean(ready_ns);
-                    return Err(Error::Protocol(error));
-                }
-            }
+            let (request, not_before_ns) = match procedure::next(step, &mut self.state) {
+                ControlFlow::Continue(next) => next,
+                ControlFlow::Break(end) => return end.map_err(Error::Protocol),
+            };
+            self.timer.wait_until(not_before_ns).await;
+            let exchanged = self.transact(request).await.map(|exchange| exchange.response);
+            let outcome = procedure::outcome(exchanged, tformat::Error::NoResponse { echo: false })?;
+            step = receive(outcome, self.state.free_ns(self.timer.now_ns()));
         }
     }
 
@@ -175,24 +165,12 @@ impl<U: Read + Write, D: Direction, T: Timer> Encoder<U, D, T> {
 
     /// Waits until the line is free, and throws away what comes meanwhile, errors of the UART included.
     async fn settle(&mut self) -> Result<(), Failure<U, D>> {
-        let mut settling = self.state.settle(self.timer.now_ns());
-        let mut until_ns = self.timer.now_ns();
-        loop {
-            let mut buffer = [0; MAX_BYTES];
-            let heard = match race(self.uart.read(&mut buffer), self.timer.wait_until(until_ns)).await {
-                Some(Ok(0)) => return Err(Error::Closed),
-                heard => heard.is_some(),
-            };
-            let now_ns = self.timer.now_ns();
-            if heard {
-                settling.heard(now_ns);
-            }
-            match settling.poll(now_ns) {
-                Settle::Quiet => return Ok(()),
-                Settle::Never => return Err(Error::NeverQuiet),
-                Settle::Until(ns) => until_ns = ns,
-            }
-        }
+        let uart = &mut self.uart;
+        let listen = async || match uart.read(&mut [0; MAX_BYTES]).await {
+            Ok(0) => Err(Error::Closed),
+            Ok(_) | Err(_) => Ok(()),
+        };
+        if quiet::wait_asynch(&self.state, &mut self.timer, listen).await? { Ok(()) } else { Err(Error::NeverQuiet) }
     }
 }
 

@@ -1,12 +1,15 @@
 //! Waits by spinning.
 
+use core::ops::ControlFlow;
+
 use embedded_io::{Read, ReadReady, Write};
 use tformat::master::{EEPROM_POLLING, EepromAccess, Exchange, Line, Progress, Reset, Step, Transaction};
 use tformat::{Address, AllData, Doubt, Page, Policy, Request, Resolution, Response, SingleTurn};
 
 use super::{MAX_BYTES, Sample, other, silence_ns, worst_ns};
 use crate::direction::Guard;
-use crate::quiet::{self, Settle};
+use crate::procedure;
+use crate::quiet;
 use crate::{Clock, Direction, Error};
 
 /// Why a call of an [`Encoder`] failed.
@@ -96,27 +99,14 @@ impl<U: Read + ReadReady + Write, D: Direction, C: Clock> Encoder<U, D, C> {
         mut receive: impl FnMut(Result<Response, tformat::Error>, u64) -> Step<T>,
     ) -> Result<T, Failure<U, D>> {
         loop {
-            match step {
-                Step::Send { request, not_before_ns } => {
-                    while self.clock.now_ns() < not_before_ns {}
-                    let outcome = match self.transact(request) {
-                        Ok(exchange) => Ok(exchange.response),
-                        Err(Error::Protocol(error)) => Err(error),
-                        // The answer is lost; what that means is for the procedure to say.
-                        Err(Error::Io(_)) => Err(tformat::Error::NoResponse { echo: false }),
-                        Err(other) => return Err(other),
-                    };
-                    step = receive(outcome, self.state.free_ns(self.clock.now_ns()));
-                }
-                Step::Done { value, ready_ns } => {
-                    self.state.clean(ready_ns);
-                    return Ok(value);
-                }
-                Step::Failed { error, ready_ns } => {
-                    self.state.clean(ready_ns);
-                    return Err(Error::Protocol(error));
-                }
-            }
+            let (request, not_before_ns) = match procedure::next(step, &mut self.state) {
+                ControlFlow::Continue(next) => next,
+                ControlFlow::Break(end) => return end.map_err(Error::Protocol),
+            };
+            while self.clock.now_ns() < not_before_ns {}
+            let exchanged = self.transact(request).map(|exchange| exchange.response);
+            let outcome = procedure::outcome(exchanged, tformat::Error::NoResponse { echo: false })?;
+            step = receive(outcome, self.state.free_ns(self.clock.now_ns()));
         }
     }
 
@@ -168,26 +158,16 @@ impl<U: Read + ReadReady + Write, D: Direction, C: Clock> Encoder<U, D, C> {
 
     /// Waits until the line is free, and throws away what comes meanwhile, errors of the UART included.
     fn settle(&mut self) -> Result<(), Failure<U, D>> {
-        let mut settling = self.state.settle(self.clock.now_ns());
-        loop {
-            let heard = match self.uart.read_ready() {
-                Ok(true) => match self.uart.read(&mut [0; MAX_BYTES]) {
-                    Ok(0) => return Err(Error::Closed),
-                    Ok(_) | Err(_) => true,
-                },
-                Ok(false) => false,
-                Err(_) => true,
-            };
-            let now_ns = self.clock.now_ns();
-            if heard {
-                settling.heard(now_ns);
-            }
-            match settling.poll(now_ns) {
-                Settle::Quiet if !heard => return Ok(()),
-                Settle::Never => return Err(Error::NeverQuiet),
-                Settle::Quiet | Settle::Until(_) => {}
-            }
-        }
+        let uart = &mut self.uart;
+        let quiet = quiet::wait(&self.state, &mut self.clock, || match uart.read_ready() {
+            Ok(true) => match uart.read(&mut [0; MAX_BYTES]) {
+                Ok(0) => Err(Error::Closed),
+                Ok(_) | Err(_) => Ok(true),
+            },
+            Ok(false) => Ok(false),
+            Err(_) => Ok(true),
+        });
+        if quiet? { Ok(()) } else { Err(Error::NeverQuiet) }
     }
 }
 

@@ -11,8 +11,9 @@ use std::rc::Rc;
 use embedded_hal::digital::{ErrorType as PinErrorType, OutputPin};
 use embedded_io::{ErrorKind, ErrorType, Read, ReadReady, Write};
 use servowire_drivers::Clock;
-use servowire_world::{Event, Framing, Host, Id, Kind, Message, Rates, Scenario, Tally, Truth, Wire, World};
+use servowire_world::{Delivery, Event, Framing, Host, Id, Kind, Message, Rates, Scenario, Tally, Truth, Wire, World};
 use tformat::device::Device;
+use tformat::master::Line;
 use tformat::{Abm, Abs, BitRate};
 
 const WIRE: Wire = Wire { bit_ps: 400_000, framing: Framing::StartStop { width: 8 }, devices: 1 };
@@ -203,11 +204,27 @@ impl OutputPin for Pin {
     }
 }
 
-/// A host whose UART hands over bytes one by one, up to 2 us late, and that hears itself or not whatever the driver was told.
+/// A host that hears itself or not whatever the driver was told, and whose UART holds 16 bytes and hands them over one by one, up to
+/// 2 us late, or in DMA blocks, or at idle: a field of silence, up to 1 us late.
 pub fn scenario(seed: u64) -> Scenario {
     let scenario = Scenario::random(seed, RATES);
-    let host = Host { echo: scenario.host.echo, latency_ns: scenario.host.latency_ns % 2_000, ..Host::IDEAL };
+    let idle_ns = 4_000;
+    let (delivery, most_ns) = match seed / 3 % 3 {
+        0 => (Delivery::Each, 2_000),
+        1 => (Delivery::Blocks { units: 4, idle_ns }, 1_000),
+        _ => (Delivery::Idle { idle_ns }, 1_000),
+    };
+    let latency_ns = scenario.host.latency_ns % most_ns;
+    let host = Host { echo: scenario.host.echo, delivery, latency_ns, fifo: 16, ..Host::IDEAL };
     Scenario { host, ..scenario }
+}
+
+/// The longest time from the end of an answer to its hand-over by such a host.
+pub const HAND_OVER_NS: u64 = 5_000;
+
+/// A line at such a host: a block is handed over up to ten fields after the first of its bytes.
+pub fn line() -> Line {
+    Line::new(BitRate::Mbit2_5).with_hand_over(50_000)
 }
 
 /// How many hostile events a test has to live through.

@@ -4,12 +4,14 @@ use crate::frame::{MULTICAST, check};
 use crate::frame_type::FrameType;
 use crate::status::Status;
 
-/// A frame that passes byte by byte: how far it is, its head, and its check. Twelve bytes of state.
+/// A frame that passes byte by byte: how far it is, its head, and its check. Sixteen bytes of state.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub(crate) struct Transit {
     /// Bytes so far.
     at: u16,
+    /// Bytes before this one pass as they are, and nobody has to look at them.
+    quiet: u16,
     /// DA, SA, TYPE and STATUS as they came.
     head: [u8; 4],
     /// Over all bytes, the FCS too.
@@ -19,15 +21,36 @@ pub(crate) struct Transit {
 }
 
 impl Transit {
-    pub(crate) const START: Self = Self { at: 0, head: [0; 4], received: RunningFcs::START, trailer: 0 };
+    pub(crate) const START: Self = Self { at: 0, quiet: 0, head: [0; 4], received: RunningFcs::START, trailer: 0 };
+
+    /// Takes a byte of a quiet stretch; any other is left, and the answer is no.
+    #[inline]
+    pub(crate) fn passes(&mut self, byte: u8) -> bool {
+        let quiet = self.at < self.quiet;
+        if quiet {
+            // Below `quiet`, so it does not wrap.
+            self.at = self.at.wrapping_add(1);
+            self.check_in(byte);
+        }
+        quiet
+    }
+
+    /// Nobody has to look at the bytes from the next one to before `end`.
+    pub(crate) const fn quiet_until(&mut self, end: u16) {
+        self.quiet = end;
+    }
+
+    #[inline]
+    fn check_in(&mut self, byte: u8) {
+        self.received.push(byte);
+        self.trailer = self.trailer >> 8 | u32::from(byte) << 24;
+    }
 
     /// Takes a byte and gives its place in the frame.
-    #[inline]
     pub(crate) fn take(&mut self, byte: u8) -> u16 {
         let at = self.at;
         self.at = at.saturating_add(1);
-        self.received.push(byte);
-        self.trailer = self.trailer >> 8 | u32::from(byte) << 24;
+        self.check_in(byte);
         if let Some(place) = self.head.get_mut(usize::from(at)) {
             *place = byte;
         }

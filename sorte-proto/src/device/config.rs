@@ -1,8 +1,10 @@
 //! Settings and counters of a device.
 
+use super::PortId;
 use crate::builders::builders;
 use crate::clock::AVERAGE;
 use crate::discovery::Entry;
+use crate::error::Error;
 use crate::line_delay::DelayModel;
 
 /// What a device is.
@@ -63,7 +65,7 @@ impl Default for Config {
     }
 }
 
-/// What a device counts.
+/// What a device counts, at both ports together and at each.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -77,4 +79,44 @@ pub struct Counters {
     pub format_errors: u64,
     /// How often it went back to IDLE.
     pub retrains: u64,
+    /// Of these, at [`PortId::A`].
+    pub a: PortCounters,
+    /// Of these, at [`PortId::B`].
+    pub b: PortCounters,
+}
+
+/// What a device counts at one of its ports. A port that forwards by hardware sees no frames.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[non_exhaustive]
+pub struct PortCounters {
+    /// Frames that were good.
+    pub good_frames: u64,
+    /// Frames with a wrong checksum.
+    pub crc_errors: u64,
+    /// Frames refused for another reason.
+    pub format_errors: u64,
+}
+
+impl Counters {
+    pub(super) const ZERO: Self = {
+        const PORT: PortCounters = PortCounters { good_frames: 0, crc_errors: 0, format_errors: 0 };
+        Self { good_frames: 0, crc_errors: 0, format_errors: 0, retrains: 0, a: PORT, b: PORT }
+    };
+
+    /// A frame at `port` was good, or refused for a reason.
+    pub(super) fn count(&mut self, port: PortId, result: Result<(), Error>) {
+        let at = match port {
+            PortId::A => &mut self.a,
+            PortId::B => &mut self.b,
+        };
+        for counter in match result {
+            Ok(()) => [&mut self.good_frames, &mut at.good_frames],
+            Err(Error::BadFcs { .. } | Error::BadCrc8 { .. }) => [&mut self.crc_errors, &mut at.crc_errors],
+            Err(_) => [&mut self.format_errors, &mut at.format_errors],
+        } {
+            *counter = counter.saturating_add(1);
+        }
+    }
 }

@@ -40,9 +40,19 @@ impl Plain {
 
     #[inline]
     fn take(&mut self, byte: u8) {
+        if !self.transit.passes(byte) {
+            self.look(byte);
+        }
+    }
+
+    #[inline(never)]
+    fn look(&mut self, byte: u8) {
         let at = self.transit.take(byte);
-        if let Some(place) = self.stored.get_mut(usize::from(at.wrapping_sub(4))) {
-            *place = byte;
+        match self.stored.get_mut(usize::from(at.wrapping_sub(4))) {
+            Some(place) => *place = byte,
+            // The head, or what comes after the parameters.
+            None if at > 3 => self.transit.quiet_until(u16::MAX),
+            None => {}
         }
     }
 }

@@ -25,9 +25,33 @@ pub enum State {
     Sync = 4,
     /// 5: IOEX, the IO exchange.
     Exchange = 5,
+    /// 6: diagnosis. The published firmware has the code and nothing behind it; this crate never enters it.
+    Diag = 6,
+    /// 7: out of the line's work until the host resets the device, see [`Device::enter_error`](super::Device::enter_error).
+    Error = 7,
 }
 
 impl State {
+    /// The published code.
+    pub const fn code(self) -> u8 {
+        self as u8
+    }
+
+    /// The state with this code.
+    pub const fn from_code(code: u8) -> Option<Self> {
+        Some(match code {
+            0 => Self::Idle,
+            1 => Self::Discovery,
+            2 => Self::Param,
+            3 => Self::LineDelay,
+            4 => Self::Sync,
+            5 => Self::Exchange,
+            6 => Self::Diag,
+            7 => Self::Error,
+            _ => return None,
+        })
+    }
+
     /// Whether this is the head of a frame the state acts on.
     pub(super) fn waits_for(self, [da, _, code, _]: [u8; 4]) -> bool {
         da == MULTICAST && self.frame_type().is_some_and(|t| t.code() == code)
@@ -39,7 +63,7 @@ impl State {
             Self::Param => Some(FrameType::Param),
             Self::LineDelay => Some(FrameType::DelayReq),
             Self::Sync => Some(FrameType::Sync),
-            Self::Exchange => None,
+            Self::Exchange | Self::Diag | Self::Error => None,
         }
     }
 }
@@ -135,7 +159,7 @@ impl Port {
                 }
                 Seen { modifies: master, ..Seen::default() }
             }
-            State::Param | State::Exchange => Seen::default(),
+            State::Param | State::Exchange | State::Diag | State::Error => Seen::default(),
         };
         if change {
             self.enter(match self.state {
@@ -143,6 +167,8 @@ impl Port {
                 State::Param => State::LineDelay,
                 State::LineDelay => State::Sync,
                 State::Sync | State::Exchange => State::Exchange,
+                // Never: no frame is waited for.
+                State::Diag | State::Error => self.state,
             });
         }
         seen

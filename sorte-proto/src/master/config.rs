@@ -28,6 +28,22 @@ pub enum State {
     Error = 6,
 }
 
+impl State {
+    /// The state with this code: the low three bits of the status register that the host reads; 7 has no meaning.
+    pub const fn from_code(code: u8) -> Option<Self> {
+        Some(match code {
+            0 => Self::Idle,
+            1 => Self::Discovery,
+            2 => Self::Param,
+            3 => Self::LineDelay,
+            4 => Self::Sync,
+            5 => Self::Exchange,
+            6 => Self::Error,
+            _ => return None,
+        })
+    }
+}
+
 /// How a master behaves. The counts are those of the published image; the time-outs are this crate's.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]

@@ -5,6 +5,7 @@ use super::slope::Slope;
 
 /// What the acceleration of a piece does.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub(super) enum Bend {
     /// It grows from its start.
     Growing,
@@ -16,6 +17,7 @@ pub(super) enum Bend {
 
 /// A piece of constant jerk: its state at its begin.
 #[derive(Debug, Clone, Copy)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub(super) struct Piece {
     /// Begin, on the curve's time.
     pub(super) time: Real,
@@ -32,15 +34,6 @@ pub(super) struct Piece {
 }
 
 impl Piece {
-    /// Speed and distance `t` before the begin, as if the piece had begun then. `t` is less than a tick.
-    pub(super) fn before(&self, t: Real) -> (Real, Real) {
-        let Self { v, a, j, up, bend, .. } = *self;
-        let shrinking = bend == Bend::Fading;
-        let dv = (a * t).along(j * t.squared().half(), shrinking);
-        let bow = (a.half().along(j * t * THIRD.half(), shrinking)) * t.squared();
-        (v.along(dv, !up), (v * t).along(bow, !up))
-    }
-
     /// The state `t` after the begin.
     pub(super) fn after(&self, t: Real) -> Self {
         let Self { time, p, v, a, j, up, bend } = *self;
@@ -63,6 +56,7 @@ impl Piece {
 
 /// Up to eight pieces: back to acceleration 0, a slope, a cruise, a slope.
 #[derive(Debug, Clone, Copy)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub(super) struct Curve {
     pieces: [Piece; Curve::MAX],
     len: usize,
@@ -108,14 +102,12 @@ impl Curve {
 
     /// Adds a change of speed.
     pub(super) fn slope(&mut self, slope: &Slope) {
-        let Slope { from, to, edge, flat } = *slope;
+        let Slope { from, to, edge, flat, j, a } = *slope;
         let (up, dv) = (to > from, from.distance(to));
         if dv.is_zero() {
             return;
         }
         let whole = slope.distance();
-        let a = dv / (edge + flat);
-        let j = if edge.is_zero() { Real::ZERO } else { a / edge };
         let bent = (a * edge).half();
         // The middle has the mean speed.
         let first = from.along(bent * THIRD, up) * edge;

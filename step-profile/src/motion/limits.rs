@@ -172,10 +172,11 @@ impl Limits {
 
     /// In steps and moments.
     pub(super) fn bounds(self, clock: Clock) -> Bounds {
-        let second = Real::new(clock.moments().into());
-        let speed = Real::new(self.speed.into()) / second;
-        let acceleration = Real::new(self.acceleration.into()) / second.squared();
-        Bounds::new(speed, acceleration, self.jerk.map(|jerk| Real::new(jerk) / (second.squared() * second)))
+        let moment = Real::ONE / Real::new(clock.moments().into());
+        let squared = moment.squared();
+        let (speed, acceleration) =
+            (Real::new(self.speed.into()) * moment, Real::new(self.acceleration.into()) * squared);
+        Bounds::new(speed, acceleration, self.jerk.map(|jerk| Real::new(jerk) * squared * moment))
     }
 }
 
@@ -208,6 +209,8 @@ impl fmt::Display for Limits {
 pub(super) struct Bounds {
     pub(super) v: Real,
     pub(super) a: Real,
+    /// 1 / a.
+    pub(super) per_a: Real,
     pub(super) jerk: Option<Jerk>,
 }
 
@@ -216,6 +219,8 @@ pub(super) struct Bounds {
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub(super) struct Jerk {
     pub(super) j: Real,
+    /// 1 / j.
+    pub(super) per_j: Real,
     /// Time to the greatest acceleration, a / j.
     pub(super) edge: Real,
     /// Change of speed that just reaches the greatest acceleration, a² / j.
@@ -225,10 +230,11 @@ pub(super) struct Jerk {
 impl Bounds {
     pub(super) fn new(v: Real, a: Real, j: Option<Real>) -> Self {
         let jerk = j.map(|j| {
-            let edge = a / j;
-            Jerk { j, edge, knee: a * edge }
+            let per_j = Real::ONE / j;
+            let edge = a * per_j;
+            Jerk { j, per_j, edge, knee: a * edge }
         });
-        Self { v, a, jerk }
+        Self { v, a, per_a: Real::ONE / a, jerk }
     }
 
     /// With a lower speed.

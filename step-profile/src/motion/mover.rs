@@ -1,7 +1,7 @@
 //! An axis that can be told something else at any time.
 
 use super::limits::{Bounds, Clock, Limits};
-use super::phases::{self, Frame, Phases};
+use super::phases::{Frame, P, Phases};
 use super::plan::{State, checked};
 use super::planner::{Goal, Motion, plan};
 use super::real::Real;
@@ -65,9 +65,9 @@ pub struct Mover {
     /// Position of the motor where the position of the plan is 0.
     origin: i64,
     position: i64,
-    /// Moment of the next step.
+    /// Tick of the next step.
     due: Option<u64>,
-    /// Moment after which the next step may come.
+    /// Tick from which on it may come.
     free: u64,
     aim: Aim,
     held: bool,
@@ -90,8 +90,8 @@ impl Mover {
             clock,
             limits,
             bounds: checked(clock, limits)?,
-            phases: Phases::rest(0, 0),
-            stepper: Stepper::new(clock.grid()),
+            phases: Phases::rest(clock.shift(), 0, 0),
+            stepper: Stepper::new(),
             direction: Direction::Forward,
             origin: 0,
             position: 0,
@@ -119,22 +119,23 @@ impl Mover {
     }
 
     /// The tick of the next step; `None` if there is none to come.
-    pub fn due(&self) -> Option<u64> {
-        self.due.map(|moment| self.clock.tick(moment))
+    pub const fn due(&self) -> Option<u64> {
+        self.due
     }
 
     /// Takes the next step.
     #[inline]
     pub fn pulse(&mut self) -> Option<Pulse> {
-        let moment = self.due?;
-        let pulse = Pulse { tick: self.clock.tick(moment), direction: self.direction };
+        let tick = self.due?;
+        let pulse = Pulse { tick, direction: self.direction };
         self.position = self.direction.advance(self.position);
-        self.free = moment.saturating_add(self.clock.moment(1));
-        self.due = self.stepper.next(&self.phases).map(|due| due.max(self.free));
+        self.free = tick.saturating_add(1);
+        let Phases { curve, frame } = &self.phases;
+        self.due = self.stepper.next(curve, frame).map(|due| due.max(self.free));
         if self.due.is_none() {
             self.go_on();
-        } else if self.phases.is_endless() && self.stepper.count() >= 1 << 30 {
-            self.replan(moment);
+        } else if frame.endless && self.stepper.count() >= 1 << 30 {
+            self.replan(self.clock.moment(tick));
         }
         Some(pulse)
     }
@@ -247,7 +248,7 @@ impl Mover {
 
     /// No further step. The position is that of the steps made; a motor at speed runs on and loses it.
     pub fn halt(&mut self, now: u64) {
-        let moment = self.clock.moment(now).max(self.free);
+        let moment = self.clock.moment(now.max(self.free));
         self.halted = !self.is_at_rest(now);
         (self.aim, self.held, self.quick, self.due) = (Aim::Rest, false, false, None);
         self.rest(moment);
@@ -301,8 +302,8 @@ impl Mover {
     /// At rest, the position of the plan is 0 where the motor is.
     fn rest(&mut self, moment: u64) {
         self.origin = self.position;
-        self.phases = Phases::rest(moment, 0);
-        self.stepper = Stepper::new(self.clock.grid());
+        self.phases = Phases::rest(self.clock.shift(), moment, 0);
+        self.stepper = Stepper::new();
     }
 
     /// A plan is over: on to the aim if that is somewhere else.
@@ -331,8 +332,8 @@ impl Mover {
 
     /// From the state at a moment to the aim.
     fn replan_within(&mut self, moment: u64, bounds: &Bounds) {
-        let moment = moment.max(self.phases.begin());
-        let moving = self.phases.is_endless() || moment < self.phases.end();
+        let moment = moment.max(self.phases.frame.begin);
+        let moving = self.phases.frame.endless || moment < self.phases.end();
         let next = if moving { self.onward(moment, bounds) } else { self.anew(moment, bounds) };
         self.adopt(next);
         if self.due.is_none() && self.has_work() {
@@ -346,8 +347,9 @@ impl Mover {
         self.due = None;
         if let Some(phases) = next {
             self.origin = self.position;
-            self.stepper = Stepper::new(self.clock.grid());
-            self.due = self.stepper.next(&phases).map(|due| due.max(self.free).max(phases.begin()));
+            self.stepper = Stepper::new();
+            let begin = phases.frame.begin.div_ceil(self.clock.moment(1));
+            self.due = self.stepper.next(&phases.curve, &phases.frame).map(|due| due.max(self.free).max(begin));
             self.phases = phases;
         }
     }
@@ -357,26 +359,14 @@ impl Mover {
         let state = self.phases.at(moment);
         let made = self.position.abs_diff(self.origin);
         let p = state.p.wrapping_sub(i64::try_from(made).unwrap_or(0) << 32);
-        let start = Motion {
-            v: Real::fixed(state.v.max(0).unsigned_abs(), phases::V),
-            a: Real::fixed(state.a.unsigned_abs(), phases::A),
-            up: state.a >= 0,
-        };
-        let mut frame = Frame {
-            begin: moment,
-            from: p,
-            to: None,
-            grid: self.clock.grid(),
-            offset: Real::ZERO,
-            scale: Real::new(1),
-            endless: false,
-        };
+        let start = Motion { v: state.v, a: state.a.0, up: state.a.1 };
+        let mut frame = Frame { to: None, ..Frame::rest(self.clock.shift(), moment, p) };
         let curve = self.goal(self.direction, bounds).and_then(|(goal, bounds)| match goal {
             Want::At(target) => {
                 let left = ahead(self.position, target, self.direction)?;
                 let to = i64::from(left) << 32;
                 frame.to = Some(to);
-                let distance = Real::fixed(u64::try_from(to.checked_sub(p)?).ok()?, phases::P);
+                let distance = Real::fixed(u64::try_from(to.checked_sub(p)?).ok()?, P);
                 plan(start, Goal::At(distance, Real::ZERO), &bounds).ok()
             }
             Want::Speed(v) => {
@@ -385,11 +375,11 @@ impl Mover {
             }
         });
         if let Some(curve) = curve {
-            return Some(Phases::new(&curve, &frame));
+            return Some(Phases { curve, frame });
         }
         (frame.to, frame.endless) = (None, false);
         let curve = plan(start, Goal::Speed(Real::ZERO), bounds).ok()?;
-        Some(Phases::new(&curve, &frame))
+        Some(Phases { curve, frame })
     }
 
     /// The plan of an axis at rest.
@@ -409,15 +399,7 @@ impl Mover {
             begin = begin.saturating_add(self.clock.moment(self.pause.into()));
             self.direction = direction;
         }
-        let mut frame = Frame {
-            begin: self.clock.aligned(begin),
-            from: 0,
-            to: None,
-            grid: self.clock.grid(),
-            offset: Real::ZERO,
-            scale: Real::new(1),
-            endless: false,
-        };
+        let mut frame = Frame { to: None, ..Frame::rest(self.clock.shift(), self.clock.aligned(begin), 0) };
         let start = Motion::steady(Real::ZERO);
         let curve = self.goal(direction, bounds).and_then(|(goal, bounds)| match goal {
             Want::At(target) => {
@@ -430,7 +412,7 @@ impl Mover {
                 plan(start, Goal::Speed(v), &bounds).ok()
             }
         });
-        curve.map(|curve| Phases::new(&curve, &frame))
+        curve.map(|curve| Phases { curve, frame })
     }
 
     /// What to do in this direction; `None` if that is a stop.

@@ -2,7 +2,7 @@
 
 use super::curve::Curve;
 use super::limits::{Bounds, Clock, Limits};
-use super::phases::{Frame, Phases};
+use super::phases::Frame;
 use super::plan::checked;
 use super::planner::{Goal, Motion, greatest, plan};
 use super::real::Real;
@@ -299,7 +299,8 @@ pub struct AxisPulse {
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct LinePulses<const N: usize> {
     clock: Clock,
-    axes: [(Phases, Stepper); N],
+    curve: Curve,
+    axes: [(Frame, Stepper); N],
     due: [Option<u64>; N],
     directions: [Direction; N],
     end: u64,
@@ -309,18 +310,14 @@ impl<const N: usize> LinePulses<N> {
     fn new(clock: Clock, curve: &Curve, line: &Line<N>, (begin, offset): (u64, Real)) -> Self {
         let axes = line.steps.map(|steps| {
             let steps = steps.unsigned_abs();
-            let scale = Real::new(steps.into()) / line.length;
-            let to = Some(i64::from(steps) << 32);
-            (
-                Phases::new(curve, &Frame { begin, from: 0, to, grid: clock.grid(), offset, scale, endless: false }),
-                Stepper::new(clock.grid()),
-            )
+            let (scale, to) = (Real::new(steps.into()) / line.length, Some(i64::from(steps) << 32));
+            (Frame { to, offset, scale, ..Frame::rest(clock.shift(), begin, 0) }, Stepper::new())
         });
-        let end = axes.first().map_or(begin, |(phases, _)| phases.end());
+        let end = axes.first().map_or(begin, |(frame, _)| frame.end(curve));
         let directions = line.steps.map(|steps| Direction::from_dir(steps < 0));
-        let mut new = Self { clock, axes, due: [None; N], directions, end };
-        for ((phases, stepper), due) in new.axes.iter_mut().zip(&mut new.due) {
-            *due = stepper.next(phases);
+        let mut new = Self { clock, curve: *curve, axes, due: [None; N], directions, end };
+        for ((frame, stepper), due) in new.axes.iter_mut().zip(&mut new.due) {
+            *due = stepper.next(&new.curve, frame);
         }
         new
     }
@@ -336,12 +333,12 @@ impl<const N: usize> Iterator for LinePulses<N> {
 
     fn next(&mut self) -> Option<AxisPulse> {
         let first = self.due.iter().enumerate().filter_map(|(axis, due)| due.map(|due| (due, axis))).min();
-        let (moment, at) = first?;
+        let (tick, at) = first?;
         let axis = u8::try_from(at).unwrap_or(u8::MAX);
         let direction = self.directions.get(at).copied().unwrap_or_default();
-        if let (Some((phases, stepper)), Some(due)) = (self.axes.get_mut(at), self.due.get_mut(at)) {
-            *due = stepper.next(phases);
+        if let (Some((frame, stepper)), Some(due)) = (self.axes.get_mut(at), self.due.get_mut(at)) {
+            *due = stepper.next(&self.curve, frame);
         }
-        Some(AxisPulse { axis, tick: self.clock.tick(moment), direction })
+        Some(AxisPulse { axis, tick, direction })
     }
 }

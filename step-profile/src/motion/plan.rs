@@ -49,16 +49,8 @@ impl Plan {
         let speed = |hz: u32| (Real::new(hz.into()) / Real::new(clock.moments().into())).min(bounds.v);
         let goal = Goal::At(Real::new(steps.into()), speed(exit));
         let curve = plan(Motion::steady(speed(entry)), goal, &bounds).map_err(|need| too_short(steps, need))?;
-        let frame = Frame {
-            begin: 0,
-            from: 0,
-            to: Some(to),
-            grid: clock.grid(),
-            offset: Real::ZERO,
-            scale: Real::new(1),
-            endless: false,
-        };
-        Ok(Self { clock, phases: Phases::new(&curve, &frame) })
+        let frame = Frame { to: Some(to), ..Frame::rest(clock.shift(), 0, 0) };
+        Ok(Self { clock, phases: Phases { curve, frame } })
     }
 
     /// The clock of the ticks.
@@ -67,7 +59,7 @@ impl Plan {
     }
 
     /// From the start to the standstill (or the exit speed), in ticks.
-    pub const fn duration(&self) -> u64 {
+    pub fn duration(&self) -> u64 {
         self.clock.tick(self.phases.end())
     }
 
@@ -78,7 +70,7 @@ impl Plan {
 
     /// The ticks of the steps, the first one first.
     pub fn pulses(&self) -> Pulses<'_> {
-        Pulses { plan: self, stepper: Stepper::new(self.clock.grid()) }
+        Pulses { plan: self, stepper: Stepper::new() }
     }
 
     /// Where the move is and how fast, at a tick after its start.
@@ -88,7 +80,9 @@ impl Plan {
 
     /// Begins of the phases of constant jerk, and the end, in ticks.
     pub fn corners(&self) -> impl Iterator<Item = u64> {
-        let ticks = self.phases.all().iter().map(|phase| self.clock.tick(phase.since));
+        let Phases { curve, frame } = &self.phases;
+        let moment = |time| frame.begin.saturating_add(frame.since(curve, time).to_fixed(0));
+        let ticks = curve.pieces().iter().map(move |piece| self.clock.tick(moment(piece.time)));
         ticks.chain([self.duration()])
     }
 }
@@ -106,13 +100,18 @@ impl Iterator for Pulses<'_> {
 
     #[inline]
     fn next(&mut self) -> Option<u64> {
-        self.stepper.next(&self.plan.phases).map(|moment| self.plan.clock.tick(moment))
+        self.stepper.next(&self.plan.phases.curve, &self.plan.phases.frame)
     }
 
     fn size_hint(&self) -> (usize, Option<usize>) {
         let left = self.plan.steps().saturating_sub(self.stepper.count());
         let left = usize::try_from(left).ok();
         (left.unwrap_or(usize::MAX), left)
+    }
+
+    #[inline]
+    fn fold<B, F: FnMut(B, u64) -> B>(self, init: B, take: F) -> B {
+        self.stepper.fold(&self.plan.phases.curve, &self.plan.phases.frame, init, take)
     }
 }
 
@@ -136,16 +135,15 @@ pub struct State {
 impl State {
     pub(super) fn new(clock: Clock, state: phases::State) -> Self {
         let second = Real::new(clock.moments().into());
-        let unit = |x: i64, bits: i32, per: Real| {
-            let size = (Real::fixed(x.unsigned_abs(), bits) * per).to_fixed(16);
-            let size = i64::try_from(size).unwrap_or(i64::MAX);
-            if x < 0 { size.wrapping_neg() } else { size }
+        let unit = |(size, up): (Real, bool), per: Real| {
+            let size = i64::try_from((size * per).to_fixed(16)).unwrap_or(i64::MAX);
+            if up { size } else { size.wrapping_neg() }
         };
         Self {
             position: state.p,
-            speed: unit(state.v, phases::V, second),
-            acceleration: unit(state.a, phases::A, second.squared()),
-            jerk: unit(state.j6, phases::J, Real::new(6) * second.squared() * second),
+            speed: unit((state.v, true), second),
+            acceleration: unit(state.a, second.squared()),
+            jerk: unit(state.j, second.squared() * second),
         }
     }
 }

@@ -67,7 +67,7 @@ struct Bent {
 
 impl Bent {
     fn new(Motion { v, a, up }: Motion, jerk: Jerk) -> Self {
-        let edge = a / jerk.j;
+        let edge = a * jerk.per_j;
         let dv = (a * edge).half();
         let bow = a * edge.squared() * THIRD;
         let (base, coast) = (v.along(dv, !up), v.along(dv, up));
@@ -218,34 +218,42 @@ pub(super) fn greatest(to: Real, n: Real, bounds: &Bounds) -> Real {
     }
 }
 
-/// The largest argument between `low` and `high`, as near as it matters, at which `need` is not above `n`. It is not at
-/// `low`. False position, with the end that stays weighed less (Illinois) and halving in between.
+/// The largest speed between `low` and `high`, as near as it matters, from and to which `need` is not above `n`. It is not
+/// `low`.
+///
+/// Near `low` the need grows with the root of the speed above it, and that root is what is searched: false position, with
+/// the end that stays weighed less (Illinois), and halving if that takes long.
 fn crossing(low: Real, high: Real, n: Real, need: impl Fn(Real) -> Real) -> Real {
     let top = need(high);
     if top <= n {
         return high;
     }
-    let (mut low, mut high) = (low, high);
-    let mut left = n - need(low);
-    let (mut below, mut above) = (left, top - n);
+    let (base, mut best) = (low, low);
+    let (mut low, mut high) = (Real::ZERO, (high - low).sqrt());
+    let mut left = n - need(base);
+    let (mut below, mut above, mut rose) = (left, top - n, None);
     for round in 0..40_u8 {
         let width = high - low;
         if left.scaled(14) <= n || width.scaled(40) <= high {
             break;
         }
-        let part = if round % 4 == 3 { width.half() } else { width * (below / (below + above)) };
+        let part = if round % 16 > 8 { width.half() } else { width * (below / (below + above)) };
         let middle = low + part;
-        let got = need(middle);
+        let speed = base + middle.squared();
+        let got = need(speed);
         if got <= n {
             left = n - got;
-            below = left;
-            low = middle;
-            above = above.half();
+            (low, best, below) = (middle, speed, left);
+            if rose == Some(true) {
+                above = above.half();
+            }
         } else {
-            above = got - n;
-            high = middle;
-            below = below.half();
+            (high, above) = (middle, got - n);
+            if rose == Some(false) {
+                below = below.half();
+            }
         }
+        rose = Some(got <= n);
     }
-    low
+    best
 }

@@ -16,6 +16,7 @@ pub(super) struct Real {
 
 impl Real {
     pub(super) const ZERO: Self = Self { m: 0, e: 0 };
+    pub(super) const ONE: Self = Self::new(1);
     /// Larger than anything a plan knows.
     pub(super) const HUGE: Self = Self { m: 1 << 63, e: 937 };
 
@@ -47,6 +48,21 @@ impl Real {
         }
     }
 
+    /// As [`to_fixed`](Self::to_fixed), up to 2^126.
+    pub(super) const fn to_wide(self, bits: i32) -> i128 {
+        let shift = self.e.saturating_add(bits);
+        match shift {
+            _ if shift <= 0 => self.to_fixed(bits) as i128,
+            ..=62 => (self.m as i128) << shift,
+            _ => i128::MAX >> 1,
+        }
+    }
+
+    /// The exponent of the top bit: the number is from 2^this to less than twice that.
+    pub(super) const fn exponent(self) -> i32 {
+        self.e.saturating_add(63)
+    }
+
     pub(super) const fn is_zero(self) -> bool {
         self.m == 0
     }
@@ -72,9 +88,14 @@ impl Real {
         if other > self { other } else { self }
     }
 
+    /// The whole number below.
+    pub(super) const fn floor(self) -> Self {
+        if self.e >= 0 { self } else { Self::new(self.to_fixed(0)) }
+    }
+
     /// What is above the whole number below.
     pub(super) fn fraction(self) -> Self {
-        self - Self::new(self.to_fixed(0))
+        self - self.floor()
     }
 
     /// The root of the upper bits, and two of Heron's steps.

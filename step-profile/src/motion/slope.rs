@@ -16,17 +16,24 @@ pub(super) struct Slope {
     pub(super) edge: Real,
     /// Time at constant acceleration.
     pub(super) flat: Real,
+    /// Size of the jerk.
+    pub(super) j: Real,
+    /// Size of the acceleration between them.
+    pub(super) a: Real,
 }
 
 impl Slope {
     pub(super) fn new(from: Real, to: Real, bounds: &Bounds) -> Self {
         let dv = from.distance(to);
-        let (edge, flat) = match bounds.jerk {
-            None => (Real::ZERO, dv / bounds.a),
-            Some(jerk) if dv < jerk.knee => ((dv / jerk.j).sqrt(), Real::ZERO),
-            Some(jerk) => (jerk.edge, dv / bounds.a - jerk.edge),
+        let (edge, flat, j, a) = match bounds.jerk {
+            None => (Real::ZERO, dv * bounds.per_a, Real::ZERO, bounds.a),
+            Some(jerk) if dv < jerk.knee => {
+                let edge = (dv * jerk.per_j).sqrt();
+                (edge, Real::ZERO, jerk.j, jerk.j * edge)
+            }
+            Some(jerk) => (jerk.edge, dv * bounds.per_a - jerk.edge, jerk.j, bounds.a),
         };
-        Self { from, to, edge, flat }
+        Self { from, to, edge, flat, j, a }
     }
 
     pub(super) fn time(&self) -> Real {

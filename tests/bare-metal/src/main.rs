@@ -6,6 +6,7 @@
 //! ```text
 //! self-test   <topic>    <rows passed>     <rows failed>
 //! kernel      <symbol>   <instructions>
+//! stack       <name>     <bytes>
 //! end
 //! ```
 #![no_std]
@@ -14,6 +15,8 @@
 mod count;
 mod kernels;
 mod self_test;
+#[cfg(feature = "stack")]
+mod stack;
 
 use core::panic::PanicInfo;
 
@@ -33,9 +36,15 @@ fn main() -> ! {
     }
     if let Some(peripherals) = Peripherals::take() {
         count::start(peripherals.SYST);
-        for kernel in kernels::ALL.iter().copied().flatten() {
+        // An image of its own measures stacks: what calls more would move the figures of the kernels.
+        let kernels: &[_] = if cfg!(feature = "stack") { &[] } else { kernels::ALL };
+        for kernel in kernels.iter().copied().flatten() {
             let tenths = (kernel.tenths)();
             hprintln!("kernel\t{}\t{}.{}", kernel.name, tenths / 10, tenths % 10);
+        }
+        #[cfg(feature = "stack")]
+        for stack in stack::ALL {
+            hprintln!("stack\t{}\t{}", stack.name, (stack.bytes)());
         }
         hprintln!("end");
     }

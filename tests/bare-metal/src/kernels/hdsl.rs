@@ -62,8 +62,34 @@ const fn samples(bits: u64, delay: usize) -> [u8; WINDOW] {
 
 const PATTERNS: [[u8; WINDOW]; 3] = [samples(TEST_PATTERN, 5), samples(TEST_PATTERN, 42), samples(LINES[0], 20)];
 
-/// Where to sample.
-const PLACE: Alignment = Alignment { index: SampleIndex::truncate(1), delay: Delay::MIN };
+/// The same with the place that is learned for their delays.
+const PLACED: [(Alignment, [u8; WINDOW]); 3] =
+    [(PLACES[0], PATTERNS[0]), (PLACES[1], PATTERNS[1]), (PLACES[2], PATTERNS[2])];
+
+const PLACED_WORDS: [(Alignment, [u32; WINDOW / 4]); 3] =
+    [(PLACES[0], words(&PATTERNS[0])), (PLACES[1], words(&PATTERNS[1])), (PLACES[2], words(&PATTERNS[2]))];
+
+/// Four samples a word, the first in the low bits.
+const fn words(samples: &[u8; WINDOW]) -> [u32; WINDOW / 4] {
+    let mut all = [0; WINDOW / 4];
+    let mut at = 0;
+    while at < WINDOW {
+        all[at / 4] |= (samples[at] as u32) << (8 * (at % 4));
+        at += 1;
+    }
+    all
+}
+
+/// Where to sample after a delay in eighths.
+const fn place(delay: u8) -> Alignment {
+    let bits = match Delay::new((delay + 4) / 8) {
+        Some(bits) => bits,
+        None => Delay::MIN,
+    };
+    Alignment { index: SampleIndex::truncate(delay + 4), delay: bits }
+}
+
+const PLACES: [Alignment; 3] = [place(5), place(42), place(20)];
 
 /// Values of the acceleration channel, present or not.
 const ACCELERATIONS: [[Option<i16>; 4]; 2] =
@@ -184,9 +210,19 @@ kernels! {
     } over PATTERNS;
 
     /// The bits, the edges and the RSSI of an answer at a learned place.
-    fn hdsl_read(samples: &[u8; WINDOW]) -> Result<(u64, EdgeWatch), Error> {
-        PLACE.read(samples)
-    } over PATTERNS;
+    fn hdsl_read((place, samples): &(Alignment, [u8; WINDOW])) -> Result<(u64, EdgeWatch), Error> {
+        place.read(samples)
+    } over PLACED;
+
+    /// The same from whole words.
+    fn hdsl_read_words((place, samples): &(Alignment, [u32; WINDOW / 4])) -> (u64, EdgeWatch) {
+        place.read_words(samples)
+    } over PLACED_WORDS;
+
+    /// The bits alone.
+    fn hdsl_bits((place, samples): &(Alignment, [u8; WINDOW])) -> Result<u64, Error> {
+        place.bits(samples)
+    } over PLACED;
 
     /// A short message there and back.
     fn hdsl_short(word: &u64) -> Result<ShortAnswer, Error> {

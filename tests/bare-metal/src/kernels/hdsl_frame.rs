@@ -26,16 +26,24 @@ struct Link {
     count: u32,
 }
 
-/// What a kernel does with an H-frame; `bits` are those of the answer.
-type Step = fn(&mut Link, samples: &[u8; WINDOW], bits: u64) -> Window;
+/// An answer in all forms that a receiver takes.
+struct Received {
+    bytes: [u8; WINDOW],
+    words: [u32; WINDOW / 4],
+    bits: u64,
+}
+
+/// What a kernel does with an H-frame.
+type Step = fn(&mut Link, answer: &Received) -> Window;
 
 impl Link {
-    fn up(dialect: Dialect) -> Self {
+    /// Answers come `delay` eighths of a bit after the start of reception.
+    fn up(dialect: Dialect, delay: u32) -> Self {
         let mut link = Self {
             master: Master::new(dialect),
             map: Registers::new(&dialect),
             encoder: Device::new(EncoderId::truncate(0x00153)),
-            cable: Cable::new(Disturbance { jitter: 1, ..Disturbance::metres(10) }, 1),
+            cable: Cable::new(Disturbance { jitter: 1, delay, ..Disturbance::default() }, 1),
             position: 0,
             count: 0,
         };
@@ -54,9 +62,14 @@ impl Link {
             let _ = self.master.start_long(LongRequest::read_name(ResourceAddress::RESOLUTN));
         }
         let answer = self.encoder.answer(self.master.transmission().head.bits(), self.position);
-        let samples = self.cable.up(answer);
+        let bytes = self.cable.up(answer);
+        let mut words = [0; WINDOW / 4];
+        for (to, from) in words.iter_mut().zip(bytes.chunks_exact(4)) {
+            *to = from.iter().rev().fold(0, |word, byte| word << 8 | u32::from(*byte));
+        }
+        let received = Received { bytes, words, bits: answer.unwrap_or(0) };
         count::once(|| {
-            black_box(step(self, black_box(&samples), answer.unwrap_or(0)));
+            black_box(step(self, black_box(&received)));
         })
     }
 }
@@ -65,8 +78,17 @@ impl Link {
 #[expect(unsafe_code, reason = "the symbol is how run.sh finds the kernel")]
 #[inline(never)]
 #[unsafe(no_mangle)]
-extern "Rust" fn hdsl_frame(link: &mut Link, samples: &[u8; WINDOW], _: u64) -> Window {
-    let _ = link.master.finish(samples, None);
+extern "Rust" fn hdsl_frame(link: &mut Link, answer: &Received) -> Window {
+    let _ = link.master.finish(&answer.bytes, None);
+    link.master.transmission().head.bits()
+}
+
+/// Samples in whole words to the next head.
+#[expect(unsafe_code, reason = "the symbol is how run.sh finds the kernel")]
+#[inline(never)]
+#[unsafe(no_mangle)]
+extern "Rust" fn hdsl_frame_words(link: &mut Link, answer: &Received) -> Window {
+    let _ = link.master.finish_words(&answer.words, None);
     link.master.transmission().head.bits()
 }
 
@@ -74,8 +96,8 @@ extern "Rust" fn hdsl_frame(link: &mut Link, samples: &[u8; WINDOW], _: u64) -> 
 #[expect(unsafe_code, reason = "the symbol is how run.sh finds the kernel")]
 #[inline(never)]
 #[unsafe(no_mangle)]
-extern "Rust" fn hdsl_frame_bits(link: &mut Link, _: &[u8; WINDOW], bits: u64) -> Window {
-    let _ = link.master.finish_bits(bits, None, None);
+extern "Rust" fn hdsl_frame_bits(link: &mut Link, answer: &Received) -> Window {
+    let _ = link.master.finish_bits(answer.bits, None, None);
     link.master.transmission().head.bits()
 }
 
@@ -88,15 +110,20 @@ extern "Rust" fn hdsl_frame_registers(map: &mut Registers, report: &Report) -> I
 }
 
 /// No work: what the measurement itself takes.
-fn nothing(_: &mut Link, _: &[u8; WINDOW], _: u64) -> Window {
+fn nothing(_: &mut Link, _: &Received) -> Window {
     Window::EMPTY
 }
 
-/// Mean, in tenths, and worst of all frames.
-fn measure(dialect: Dialect, step: Step) -> (u32, u32) {
-    let mut link = Link::up(dialect);
+/// Mean, in tenths, and worst of all frames on 10 m of cable.
+fn measure(step: Step) -> (u32, u32) {
+    measure_at(14, step)
+}
+
+/// The same after a delay in eighths of a bit.
+fn measure_at(delay: u32, step: Step) -> (u32, u32) {
+    let mut link = Link::up(Dialect::SICK, delay);
     // Without the receiver the link stands still; the answers are as long.
-    let mut idle = Link::up(dialect);
+    let mut idle = Link::up(Dialect::SICK, delay);
     let empty = (0..FRAMES).fold(0, |sum: u32, _| sum + idle.frame(nothing)) / FRAMES;
     let (mut sum, mut worst) = (0, 0);
     for _ in 0..FRAMES {
@@ -108,8 +135,8 @@ fn measure(dialect: Dialect, step: Step) -> (u32, u32) {
 }
 
 /// A frame with the register map beside it; the map alone is what is more.
-fn with_registers(link: &mut Link, samples: &[u8; WINDOW], _: u64) -> Window {
-    let _ = link.master.finish(samples, None);
+fn with_registers(link: &mut Link, answer: &Received) -> Window {
+    let _ = link.master.finish(&answer.bytes, None);
     hdsl_frame_registers(&mut link.map, link.master.report());
     link.master.transmission().head.bits()
 }
@@ -121,8 +148,8 @@ macro_rules! named {
             #[expect(unsafe_code, reason = "the symbol is how run.sh finds the kernel")]
             #[inline(never)]
             #[unsafe(no_mangle)]
-            fn $name(link: &mut Link, samples: &[u8; WINDOW], bits: u64) -> Window {
-                $step(link, samples, bits)
+            fn $name(link: &mut Link, answer: &Received) -> Window {
+                $step(link, answer)
             }
         )*
     };
@@ -130,16 +157,19 @@ macro_rules! named {
 
 named! {
     hdsl_frame_worst = hdsl_frame;
+    hdsl_frame_words_worst = hdsl_frame_words;
+    hdsl_frame_border = hdsl_frame;
     hdsl_frame_bits_worst = hdsl_frame_bits;
 }
 
 pub(crate) const KERNELS: &[Kernel] = &[
-    Kernel { name: "hdsl_frame", tenths: || measure(Dialect::SICK, hdsl_frame).0 },
-    Kernel { name: "hdsl_frame_worst", tenths: || measure(Dialect::SICK, hdsl_frame_worst).1 * 10 },
-    Kernel { name: "hdsl_frame_bits", tenths: || measure(Dialect::SICK, hdsl_frame_bits).0 },
-    Kernel { name: "hdsl_frame_bits_worst", tenths: || measure(Dialect::SICK, hdsl_frame_bits_worst).1 * 10 },
-    Kernel {
-        name: "hdsl_frame_registers",
-        tenths: || measure(Dialect::SICK, with_registers).0.saturating_sub(measure(Dialect::SICK, hdsl_frame).0),
-    },
+    Kernel { name: "hdsl_frame", tenths: || measure(hdsl_frame).0 },
+    Kernel { name: "hdsl_frame_worst", tenths: || measure(hdsl_frame_worst).1 * 10 },
+    // The edges are where bit times meet: with jitter two fall into one, and the RSSI has to be looked up.
+    Kernel { name: "hdsl_frame_border", tenths: || measure_at(16, hdsl_frame_border).0 },
+    Kernel { name: "hdsl_frame_words", tenths: || measure(hdsl_frame_words).0 },
+    Kernel { name: "hdsl_frame_words_worst", tenths: || measure(hdsl_frame_words_worst).1 * 10 },
+    Kernel { name: "hdsl_frame_bits", tenths: || measure(hdsl_frame_bits).0 },
+    Kernel { name: "hdsl_frame_bits_worst", tenths: || measure(hdsl_frame_bits_worst).1 * 10 },
+    Kernel { name: "hdsl_frame_registers", tenths: || measure(with_registers).0.saturating_sub(measure(hdsl_frame).0) },
 ];

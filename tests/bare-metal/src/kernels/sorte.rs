@@ -4,11 +4,12 @@ use core::hint::black_box;
 
 use nom::{IResult, Parser};
 use sorte_proto::cut_through::{DiscoveryRewriter, SyncRewriter};
-use sorte_proto::device::{self, Arrival, Device, Handled, Path, PortId};
+use sorte_proto::device::{self, Arrival, Device, Forwarding, Handled, Passage, Path, PortId};
 use sorte_proto::drv8711::{
     self, Apply, Configuration, IsGain, Next, Register, full_scale_microamps, torque_for_microamps,
 };
 use sorte_proto::follow::{Asked, Feedback, Follower};
+use sorte_proto::host::{DeviceMemory, MasterMemory};
 use sorte_proto::iep::{Channel, Edge};
 use sorte_proto::master::{self, Action, Master, Outgoing};
 use sorte_proto::sync0::{Sync0, Variant, Write, Writes};
@@ -83,6 +84,32 @@ const fn generators(variant: Variant) -> [Sync0; 5] {
     let mut both = overlapping;
     let _ = both.cmp7(OVERLAPPING);
     [idle, pending, deferred, overlapping, both]
+}
+
+/// Head of DISCOVERY; the check is not looked at until its end.
+const DISCOVERY: [u8; 1030] = {
+    let mut frame = [0; 1030];
+    frame[0] = 0xff;
+    frame[2] = 1;
+    frame
+};
+
+/// Bytes through a device, one after the other; the last that it sends.
+fn through(frame: &[u8]) -> (u8, Option<Path>) {
+    let mut device = Device::new(device::Config::new());
+    device.links(true, false);
+    let mut passage = device.begin(PortId::A);
+    let mut last = 0;
+    for byte in frame {
+        last = pass(&mut passage, *byte);
+    }
+    (last, passage.path())
+}
+
+/// A byte, as an interrupt brings it: the passage is in memory between two of them.
+#[inline(never)]
+fn pass(passage: &mut Passage, byte: u8) -> u8 {
+    passage.byte(byte)
 }
 
 kernels! {
@@ -178,14 +205,16 @@ kernels! {
         head
     }];
 
-    /// 64 bytes of DISCOVERY through a device that the frame passes, as its port sees them, and the passage made before.
-    fn sorte_passage(frame: &[u8; 64]) -> ([u8; 64], Option<Path>) {
-        let mut device = Device::new(device::Config::new());
-        device.links(true, false);
-        let mut passage = device.begin(PortId::A);
-        (frame.map(|byte| passage.byte(byte)), passage.path())
+    /// A whole DISCOVERY through a device, a call for each byte, as its port sees them. 1030 bytes.
+    fn sorte_passage(frame: &[u8; 1030]) -> (u8, Option<Path>) {
+        through(frame)
+    } over [DISCOVERY];
+
+    /// The first 16 bytes of it: count, offsets, and the entry of the first device.
+    fn sorte_passage_head(frame: &[u8; 16]) -> (u8, Option<Path>) {
+        through(frame)
     } over [{
-        let mut head = [0; 64];
+        let mut head = [0; 16];
         head[0] = 0xff;
         head[2] = 1;
         head
@@ -306,6 +335,23 @@ kernels! {
         let _ = (device.line_delay_next_ns(), device.cycle_zero_ns(), device.send_time_ns(), device.parameters());
         (handled, restarted)
     } over [(SYNC, PortId::A), (SYNC, PortId::B)];
+
+    /// A device that the host takes out and puts back, with what its ports do in between.
+    fn sorte_device_modes(port: &PortId) -> [Forwarding; 3] {
+        let mut device = black_box(Device::new(device::Config::default()));
+        let idle = device.forwarding(*port);
+        device.enter_error();
+        let error = device.forwarding(*port);
+        device.reset();
+        [idle, error, device.forwarding(*port)]
+    } over [PortId::A, PortId::B];
+
+    /// What the vendor's host reads of both memories.
+    fn sorte_host(ram: &[u8; 0x210]) -> (Option<master::State>, Option<u16>, bool, Option<DeviceAddress>, Option<Parameters>) {
+        let (host, device) = (MasterMemory::new(ram), DeviceMemory::new(ram));
+        let good = host.discovery().is_ok() | host.input().is_some() | host.output(16).is_some();
+        (host.state(), host.devices(), good, device.address(), device.parameters())
+    } over [[1; 0x210]];
 
     /// A device refuses an exchange it is not in.
     fn sorte_device_exchange(frame: &[u8; 21]) -> bool {

@@ -56,6 +56,8 @@ const S_CURVE: Limited = Limited { jerk: 5_000_000, ..TRAPEZOID };
 const S_SHORT: Limited = Limited { steps: 20, ..S_CURVE };
 const S_ENTRY: Limited = Limited { steps: 100, ends: [1000, 500], ..S_CURVE };
 const CRUISE: Limited = Limited { steps: 5000, ends: [20_000; 2], ..TRAPEZOID };
+const LONG_TRAPEZOID: Limited = Limited { steps: 5000, speed: 50_000, ..TRAPEZOID };
+const LONG_S_CURVE: Limited = Limited { jerk: 1_000_000, ..LONG_TRAPEZOID };
 const FAST: Limited = Limited { speed: 250_000, acceleration: 100_000_000, ..TRAPEZOID };
 
 fn limits(move_: &Limited) -> Option<Limits> {
@@ -227,6 +229,16 @@ kernels! {
     fn step_profile_motion_s_ramp_500(move_: &Limited) -> Option<u64> {
         Some(planned(move_)?.pulses().fold(1, |sum, tick| sum ^ tick))
     } over [S_CURVE];
+
+    /// 5000 steps of a trapezoid as a machine has it, all of them on the ramps, and their plan.
+    fn step_profile_motion_ramp_5000(move_: &Limited) -> Option<u64> {
+        Some(planned(move_)?.pulses().fold(3, |sum, tick| sum ^ tick))
+    } over [LONG_TRAPEZOID];
+
+    /// The same of an S-curve.
+    fn step_profile_motion_s_ramp_5000(move_: &Limited) -> Option<u64> {
+        Some(planned(move_)?.pulses().fold(4, |sum, tick| sum ^ tick))
+    } over [LONG_S_CURVE];
 
     /// 5000 steps at constant speed, and their plan.
     fn step_profile_motion_cruise_5000(move_: &Limited) -> Option<u64> {

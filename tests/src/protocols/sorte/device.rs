@@ -51,13 +51,15 @@ struct Cycle {
     restart: bool,
 }
 
-const STATES: [(State, &str); 6] = [
+const STATES: [(State, &str); 8] = [
     (State::Idle, "IDLE"),
     (State::Discovery, "DISCOVERY"),
     (State::Param, "PARAM"),
     (State::LineDelay, "LINE_DELAY"),
     (State::Sync, "SYNC"),
     (State::Exchange, "IOEX"),
+    (State::Diag, "DIAG"),
+    (State::Error, "ERROR"),
 ];
 
 const FLAGS: [(PortFlags, &str); 5] = [

@@ -1,0 +1,221 @@
+//! Waits by giving the time back. Every future may be dropped at any point: the next call waits until the line is free. Whether
+//! a request that changes the encoder has had its effect is not known then.
+
+use core::convert::Infallible;
+use core::ops::ControlFlow;
+
+use nikon_aformat::bus::Addresses;
+use nikon_aformat::master::{
+    BusTransaction, Cycle, EepromRead, GuardedReset, Line, Progress, Reading, Reset, Step, Transaction,
+};
+use nikon_aformat::{Doubt, EncoderAddress, Operation, Policy, Position, Request, RequestFrame, Resolution, Response};
+
+use super::{Frame, LOST, Receiver, silence_ns, worst_ns};
+use crate::procedure;
+use crate::quiet;
+use crate::race::race;
+use crate::{Error, Timer};
+
+/// What sends and receives frames.
+#[allow(async_fn_in_trait, reason = "drivers are used by one executor; Send is left to the implementation")]
+pub trait FramePort {
+    /// Why it cannot.
+    type Error;
+    /// Sends these frames with `gap_bits` idle bits between two, and begins at once. It switches the line driver on
+    /// before and off after by itself, also when the future is dropped: the encoder answers some microseconds later.
+    ///
+    /// # Errors
+    /// Those of the port.
+    async fn send(&mut self, frames: &[RequestFrame], gap_bits: u32) -> Result<(), Self::Error>;
+    /// Ends when a frame has been received, and gives it. Dropped before that it should lose none: a lost frame costs the
+    /// exchange in which it happens. Between two calls the port keeps at least the frames of a response.
+    ///
+    /// # Errors
+    /// Those of the port: the exchange is lost.
+    async fn take(&mut self) -> Result<Frame, Self::Error>;
+}
+
+/// Why a call of a [`Master`] failed.
+pub type Failure<F> = Error<<F as FramePort>::Error, Infallible, nikon_aformat::Error, Doubt>;
+
+/// The controller's end of a line with up to eight encoders of one resolution.
+#[derive(Debug)]
+pub struct Master<F, T> {
+    port: F,
+    timer: T,
+    resolution: Resolution,
+    line: Line,
+    state: quiet::Line,
+}
+
+impl<F: FramePort, T: Timer> Master<F, T> {
+    /// A line with encoders of this resolution. The port must be asked for frames within `line.latency_ns` of their end, unless it gives their times:
+    /// nothing but the driver may run meanwhile, or give the line a larger budget.
+    pub const fn new(port: F, timer: T, resolution: Resolution, line: Line) -> Self {
+        Self { port, timer, resolution, line, state: quiet::Line::new(silence_ns(line)) }
+    }
+
+    /// Gives port and timer back.
+    pub fn release(self) -> (F, T) {
+        (self.port, self.timer)
+    }
+
+    /// The position of an encoder, if it may be used: from command 0, by the rules of [`Resolution::read`].
+    ///
+    /// # Errors
+    /// [`Error`], [`Error::Doubt`] among them.
+    pub async fn read_position(&mut self, ea: EncoderAddress, policy: Policy) -> Result<Position, Failure<F>> {
+        let reading = self.read_abs40(ea).await?;
+        reading.position(self.resolution, policy, self.timer.now_ns()).map_err(Error::Doubt)
+    }
+
+    /// Command 0: the whole position. Look at its encoder status before you use it.
+    ///
+    /// # Errors
+    /// [`Error`].
+    pub async fn read_abs40(&mut self, ea: EncoderAddress) -> Result<Reading, Failure<F>> {
+        self.transact(Request::new(ea, Operation::Abs40)).await
+    }
+
+    /// A multi-response command: the answers of all encoders to one request. What came of each
+    /// [`BusTransaction::reading`] says; one that is missing or damaged costs no other one.
+    ///
+    /// # Errors
+    /// [`Error`]. Missing answers are none.
+    pub async fn read_all(&mut self, operation: Operation, asked: Addresses) -> Result<BusTransaction, Failure<F>> {
+        let request = Request::new(asked.highest().unwrap_or(EncoderAddress::MAX), operation);
+        let line = self.line.with_highest(self.line.highest.max(request.ea));
+        let (resolution, plain) = (self.resolution, self.line);
+        let start = |now_ns| BusTransaction::start(request, resolution, asked, plain, now_ns);
+        let (transaction, ()) = self.exchange(request, line, start).await?;
+        Ok(transaction)
+    }
+
+    /// [`read_all`](Self::read_all) when the cycle is due: waits for the next start and keeps to its grid.
+    ///
+    /// # Errors
+    /// [`Error`].
+    pub async fn read_cycle(
+        &mut self,
+        cycle: &mut Cycle,
+        operation: Operation,
+        asked: Addresses,
+    ) -> Result<BusTransaction, Failure<F>> {
+        self.timer.wait_until(cycle.next_ns()).await;
+        cycle.is_due(self.timer.now_ns());
+        self.read_all(operation, asked).await
+    }
+
+    /// Command 8, eight times: clears the alarms of an encoder. Position and turns stay.
+    ///
+    /// # Errors
+    /// [`Error`]; read the status to see whether they were cleared.
+    pub async fn clear_status(&mut self, ea: EncoderAddress) -> Result<Response, Failure<F>> {
+        let mut reset = GuardedReset::new(Reset::clear_status(ea));
+        let first = reset.start(self.timer.now_ns());
+        self.run(first, |outcome, now_ns| reset.receive(outcome, now_ns)).await
+    }
+
+    /// Command 13: the word at an address of the EEPROM. Writing is a procedure for [`run`](Self::run).
+    ///
+    /// # Errors
+    /// [`Error`].
+    pub async fn read_eeprom(&mut self, ea: EncoderAddress, address: u8) -> Result<u16, Failure<F>> {
+        let mut read = EepromRead::new(ea, address);
+        let first = read.start(self.timer.now_ns());
+        self.run(first, |outcome, now_ns| read.receive(outcome, now_ns)).await
+    }
+
+    /// A procedure of several transactions: does what its steps ask for and hands the outcomes to `receive`.
+    ///
+    /// # Errors
+    /// [`Error`]: that of the procedure, for which a fault of the port is a lost answer; [`Error::NeverQuiet`] at once, and
+    /// then whether the last request had its effect is not known.
+    pub async fn run<V>(
+        &mut self,
+        mut step: Step<V>,
+        mut receive: impl FnMut(Result<Response, nikon_aformat::Error>, u64) -> Step<V>,
+    ) -> Result<V, Failure<F>> {
+        loop {
+            let (request, not_before_ns) = match procedure::next(step, &mut self.state) {
+                ControlFlow::Continue(next) => next,
+                ControlFlow::Break(end) => return end.map_err(Error::Protocol),
+            };
+            self.timer.wait_until(not_before_ns).await;
+            let exchanged = self.transact(request).await.map(|reading| reading.response);
+            let outcome = procedure::outcome(exchanged, LOST)?;
+            step = receive(outcome, self.state.free_ns(self.timer.now_ns()));
+        }
+    }
+
+    /// One request and its answer.
+    ///
+    /// # Errors
+    /// [`Error`].
+    pub async fn transact(&mut self, request: Request) -> Result<Reading, Failure<F>> {
+        let (resolution, line) = (self.resolution, self.line);
+        let start = |now_ns| Transaction::start(request, resolution, line, now_ns);
+        let (_, reading) = self.exchange(request, line, start).await?;
+        Ok(reading)
+    }
+
+    /// One request and all that answers.
+    async fn exchange<R: Receiver>(
+        &mut self,
+        request: Request,
+        line: Line,
+        start: impl FnOnce(u64) -> R,
+    ) -> Result<(R, R::Value), Failure<F>> {
+        self.settle().await?;
+        let start_ns = self.timer.now_ns();
+        let mut transaction = start(start_ns);
+        match transaction.progress() {
+            // Encoders of this version do not know it, or nobody is asked: nothing is sent.
+            Progress::Failed { error, .. } => return Err(Error::Protocol(error)),
+            Progress::Done { value, .. } => return Ok((transaction, value)),
+            Progress::Pending { .. } => {}
+        }
+        // The worst is assumed until the end is known: an early return or a dropped future leaves it so.
+        self.state.soil(worst_ns(line, request, self.resolution, start_ns));
+        let gap_bits = line.rate.bits(line.frame_gap_ns);
+        self.port.send(request.emit().as_slice(), gap_bits).await.map_err(Error::Io)?;
+        let mut progress = transaction.progress();
+        loop {
+            match progress {
+                Progress::Pending { until_ns } => progress = self.receive(&mut transaction, until_ns).await?,
+                Progress::Done { value, ready_ns } => {
+                    self.state.clean(ready_ns);
+                    return Ok((transaction, value));
+                }
+                Progress::Failed { error, ready_ns } => {
+                    self.state.failed(ready_ns, self.timer.now_ns());
+                    return Err(Error::Protocol(error));
+                }
+            }
+        }
+    }
+
+    /// Takes what is there, or waits for it; asks the clock only if there is nothing.
+    async fn receive<R: Receiver>(
+        &mut self,
+        receiver: &mut R,
+        until_ns: u64,
+    ) -> Result<Progress<R::Value>, Failure<F>> {
+        // The time is over behind `until_ns`, not at it.
+        let wait = self.timer.wait_until(until_ns.saturating_add(1));
+        match race(self.port.take(), wait).await {
+            None => Ok(receiver.poll(self.timer.now_ns())),
+            Some(frame) => Ok(receiver.take(frame.map_err(Error::Io)?, self.timer.now_ns())),
+        }
+    }
+
+    /// Waits until the line is free, and throws away what comes meanwhile, errors of the port included.
+    async fn settle(&mut self) -> Result<(), Failure<F>> {
+        let port = &mut self.port;
+        let listen = async || {
+            let _: Result<Frame, _> = port.take().await;
+            Ok(())
+        };
+        if quiet::wait_asynch(&self.state, &mut self.timer, listen).await? { Ok(()) } else { Err(Error::NeverQuiet) }
+    }
+}

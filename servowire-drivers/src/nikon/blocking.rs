@@ -1,0 +1,210 @@
+//! Waits by spinning.
+
+use core::convert::Infallible;
+use core::ops::ControlFlow;
+
+use nikon_aformat::bus::Addresses;
+use nikon_aformat::master::{
+    BusTransaction, Cycle, EepromRead, GuardedReset, Line, Progress, Reading, Reset, Step, Transaction,
+};
+use nikon_aformat::{Doubt, EncoderAddress, Operation, Policy, Position, Request, RequestFrame, Resolution, Response};
+
+use super::{Frame, LOST, Receiver, silence_ns, worst_ns};
+use crate::procedure;
+use crate::quiet;
+use crate::{Clock, Error};
+
+/// What sends and receives frames.
+pub trait FramePort {
+    /// Why it cannot.
+    type Error;
+    /// Sends these frames with `gap_bits` idle bits between two, and begins at once. It switches the line driver on
+    /// before and off after by itself: the encoder answers some microseconds later.
+    ///
+    /// # Errors
+    /// Those of the port.
+    fn send(&mut self, frames: &[RequestFrame], gap_bits: u32) -> Result<(), Self::Error>;
+    /// The next frame that was received, if there is one. Between two looks the port keeps at least the frames of a response.
+    ///
+    /// # Errors
+    /// Those of the port: the exchange is lost.
+    fn take(&mut self) -> Result<Option<Frame>, Self::Error>;
+    /// Whether something is on the line that nobody has asked for, frames or not; it is thrown away.
+    fn listen(&mut self) -> bool {
+        !matches!(self.take(), Ok(None))
+    }
+}
+
+/// Why a call of a [`Master`] failed.
+pub type Failure<F> = Error<<F as FramePort>::Error, Infallible, nikon_aformat::Error, Doubt>;
+
+/// The controller's end of a line with up to eight encoders of one resolution.
+#[derive(Debug)]
+pub struct Master<F, C> {
+    port: F,
+    clock: C,
+    resolution: Resolution,
+    line: Line,
+    state: quiet::Line,
+}
+
+impl<F: FramePort, C: Clock> Master<F, C> {
+    /// A line with encoders of this resolution. The port must be asked for frames within `line.latency_ns` of their end, unless it gives their times:
+    /// nothing but the driver may run meanwhile, or give the line a larger budget.
+    pub const fn new(port: F, clock: C, resolution: Resolution, line: Line) -> Self {
+        Self { port, clock, resolution, line, state: quiet::Line::new(silence_ns(line)) }
+    }
+
+    /// Gives port and clock back.
+    pub fn release(self) -> (F, C) {
+        (self.port, self.clock)
+    }
+
+    /// The position of an encoder, if it may be used: from command 0, by the rules of [`Resolution::read`].
+    ///
+    /// # Errors
+    /// [`Error`], [`Error::Doubt`] among them.
+    pub fn read_position(&mut self, ea: EncoderAddress, policy: Policy) -> Result<Position, Failure<F>> {
+        let reading = self.read_abs40(ea)?;
+        reading.position(self.resolution, policy, self.clock.now_ns()).map_err(Error::Doubt)
+    }
+
+    /// Command 0: the whole position. Look at its encoder status before you use it.
+    ///
+    /// # Errors
+    /// [`Error`].
+    pub fn read_abs40(&mut self, ea: EncoderAddress) -> Result<Reading, Failure<F>> {
+        self.transact(Request::new(ea, Operation::Abs40))
+    }
+
+    /// A multi-response command: the answers of all encoders to one request. What came of each
+    /// [`BusTransaction::reading`] says; one that is missing or damaged costs no other one.
+    ///
+    /// # Errors
+    /// [`Error`]. Missing answers are none.
+    pub fn read_all(&mut self, operation: Operation, asked: Addresses) -> Result<BusTransaction, Failure<F>> {
+        let request = Request::new(asked.highest().unwrap_or(EncoderAddress::MAX), operation);
+        let line = self.line.with_highest(self.line.highest.max(request.ea));
+        let (resolution, plain) = (self.resolution, self.line);
+        let start = |now_ns| BusTransaction::start(request, resolution, asked, plain, now_ns);
+        let (transaction, ()) = self.exchange(request, line, start)?;
+        Ok(transaction)
+    }
+
+    /// [`read_all`](Self::read_all) when the cycle is due: waits for the next start and keeps to its grid.
+    ///
+    /// # Errors
+    /// [`Error`].
+    pub fn read_cycle(
+        &mut self,
+        cycle: &mut Cycle,
+        operation: Operation,
+        asked: Addresses,
+    ) -> Result<BusTransaction, Failure<F>> {
+        while !cycle.is_due(self.clock.now_ns()) {}
+        self.read_all(operation, asked)
+    }
+
+    /// Command 8, eight times: clears the alarms of an encoder. Position and turns stay.
+    ///
+    /// # Errors
+    /// [`Error`]; read the status to see whether they were cleared.
+    pub fn clear_status(&mut self, ea: EncoderAddress) -> Result<Response, Failure<F>> {
+        let mut reset = GuardedReset::new(Reset::clear_status(ea));
+        let first = reset.start(self.clock.now_ns());
+        self.run(first, |outcome, now_ns| reset.receive(outcome, now_ns))
+    }
+
+    /// Command 13: the word at an address of the EEPROM. Writing is a procedure for [`run`](Self::run).
+    ///
+    /// # Errors
+    /// [`Error`].
+    pub fn read_eeprom(&mut self, ea: EncoderAddress, address: u8) -> Result<u16, Failure<F>> {
+        let mut read = EepromRead::new(ea, address);
+        let first = read.start(self.clock.now_ns());
+        self.run(first, |outcome, now_ns| read.receive(outcome, now_ns))
+    }
+
+    /// A procedure of several transactions: does what its steps ask for and hands the outcomes to `receive`.
+    ///
+    /// # Errors
+    /// [`Error`]: that of the procedure, for which a fault of the port is a lost answer; [`Error::NeverQuiet`] at once, and
+    /// then whether the last request had its effect is not known.
+    pub fn run<V>(
+        &mut self,
+        mut step: Step<V>,
+        mut receive: impl FnMut(Result<Response, nikon_aformat::Error>, u64) -> Step<V>,
+    ) -> Result<V, Failure<F>> {
+        loop {
+            let (request, not_before_ns) = match procedure::next(step, &mut self.state) {
+                ControlFlow::Continue(next) => next,
+                ControlFlow::Break(end) => return end.map_err(Error::Protocol),
+            };
+            while self.clock.now_ns() < not_before_ns {}
+            let exchanged = self.transact(request).map(|reading| reading.response);
+            let outcome = procedure::outcome(exchanged, LOST)?;
+            step = receive(outcome, self.state.free_ns(self.clock.now_ns()));
+        }
+    }
+
+    /// One request and its answer.
+    ///
+    /// # Errors
+    /// [`Error`].
+    pub fn transact(&mut self, request: Request) -> Result<Reading, Failure<F>> {
+        let (resolution, line) = (self.resolution, self.line);
+        let start = |now_ns| Transaction::start(request, resolution, line, now_ns);
+        let (_, reading) = self.exchange(request, line, start)?;
+        Ok(reading)
+    }
+
+    /// One request and all that answers.
+    fn exchange<R: Receiver>(
+        &mut self,
+        request: Request,
+        line: Line,
+        start: impl FnOnce(u64) -> R,
+    ) -> Result<(R, R::Value), Failure<F>> {
+        self.settle()?;
+        let start_ns = self.clock.now_ns();
+        let mut transaction = start(start_ns);
+        match transaction.progress() {
+            // Encoders of this version do not know it, or nobody is asked: nothing is sent.
+            Progress::Failed { error, .. } => return Err(Error::Protocol(error)),
+            Progress::Done { value, .. } => return Ok((transaction, value)),
+            Progress::Pending { .. } => {}
+        }
+        // The worst is assumed until the end is known: an early return leaves it so.
+        self.state.soil(worst_ns(line, request, self.resolution, start_ns));
+        let gap_bits = line.rate.bits(line.frame_gap_ns);
+        self.port.send(request.emit().as_slice(), gap_bits).map_err(Error::Io)?;
+        loop {
+            match self.receive(&mut transaction)? {
+                Progress::Pending { .. } => {}
+                Progress::Done { value, ready_ns } => {
+                    self.state.clean(ready_ns);
+                    return Ok((transaction, value));
+                }
+                Progress::Failed { error, ready_ns } => {
+                    self.state.failed(ready_ns, self.clock.now_ns());
+                    return Err(Error::Protocol(error));
+                }
+            }
+        }
+    }
+
+    /// Takes what is there; asks whether the time is over only if there is nothing.
+    fn receive<R: Receiver>(&mut self, receiver: &mut R) -> Result<Progress<R::Value>, Failure<F>> {
+        let before_ns = self.clock.now_ns();
+        Ok(match self.port.take().map_err(Error::Io)? {
+            Some(frame) => receiver.take(frame, self.clock.now_ns()),
+            None => receiver.poll(before_ns),
+        })
+    }
+
+    /// Waits until the line is free, and throws away what comes meanwhile, errors of the port included.
+    fn settle(&mut self) -> Result<(), Failure<F>> {
+        let port = &mut self.port;
+        if quiet::wait(&self.state, &mut self.clock, || Ok(port.listen()))? { Ok(()) } else { Err(Error::NeverQuiet) }
+    }
+}

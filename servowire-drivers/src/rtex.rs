@@ -1,0 +1,277 @@
+//! RTEX drives: the master's exchange over the memory of the communication ASIC (MNM1221).
+//!
+//! The register map of the ASIC is not public, so what is done at its bus is a [`Port`] that you write from its data sheet: a
+//! state, a table of slaves, and words to read and write. Everything else is here: phases, invalid data first, word packing, the
+//! bank rules, the exchange in every update period, late exchanges.
+//!
+//! ```text
+//!             external timer                              internal timer
+//!  main loop  control() until it gives Running, then interrupts on; control() and led() for ever
+//!  XINTRX     priority above: reception.frame(), then     priority below: reception.frame()
+//!             switch the reception bank
+//!  NC         from the host's timer: exchange()           from the falling edge of XSYNC: exchange()
+//! ```
+//!
+//! In the external-timer system the receive interrupt may switch the reception bank in the middle of an exchange, in the
+//! internal-timer system the ASIC does at XSYNC if the exchange is late; half of the blocks would be of another frame. So the
+//! exchange looks at [`Reception`] and at the clock before and after it reads, and reads once more if the bank was switched between;
+//! if it was again, it takes none. System Design Guide for Master, chapters 1 and 2.
+//!
+//! Every block that the port fails to read or to write is tried again at once. If that fails too, what was not read counts as a
+//! period without an answer, as the echo watch of each axis counts them, and what was not written is replaced in the next period.
+
+#[cfg(feature = "async")]
+pub mod asynch;
+mod port;
+mod reception;
+
+use core::convert::Infallible;
+
+use rtex_block::master::{Asic, Fault, Led, Master, Phase, Received, Ring, Slave};
+use rtex_block::timing::TimerSystem;
+use rtex_block::{BlockSize, Command32, MacId, Response, Response32, UpdateCounter};
+
+use crate::{Clock, Error};
+pub use port::{Port, Word};
+pub use reception::Reception;
+
+/// Why a call of a [`Driver`] failed.
+pub type Failure<P> = Error<<P as Port>::Error, Infallible, Fault, Infallible>;
+
+/// Words of the longest block, on a bus of bytes.
+const MOST_WORDS: usize = rtex_block::LEN32;
+/// How often an exchange reads the blocks, if the bank is switched meanwhile.
+const READS: u8 = 2;
+
+/// Does it again if the port reports a fault: half a command must not go out.
+fn twice<E>(mut transfer: impl FnMut() -> Result<(), E>) -> Result<(), E> {
+    transfer().or_else(|_| transfer())
+}
+
+/// What an exchange was like.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Exchanged {
+    /// Communication periods by which the commands go out late, because the exchange ended after the next frame had begun.
+    pub frames_late: u32,
+    /// The bank was switched while the blocks were read, each time: none of them was taken.
+    pub torn: bool,
+}
+
+/// A master of `N` axes, and the port of its ASIC.
+#[derive(Debug)]
+pub struct Driver<'r, P, C, const N: usize> {
+    port: P,
+    clock: C,
+    master: Master<N>,
+    reception: &'r Reception,
+    /// Frames of `reception` that the master has heard of.
+    frames: u32,
+    late: u32,
+    torn: u32,
+    heard: [Heard; N],
+}
+
+/// What was last heard of a drive.
+#[derive(Debug, Clone, Copy, Default)]
+struct Heard {
+    echo: Option<UpdateCounter>,
+    /// Of the last exchange.
+    position: Option<i32>,
+}
+
+impl Heard {
+    fn take(&mut self, drive: MacId, received: &Received) {
+        let response = received.response().filter(|response| response.mac_id == drive);
+        let echo = response.map(|response| response.update_counter_echo);
+        self.position = response.filter(|_| echo != self.echo).map(|response| response.response_data1);
+        self.echo = echo.or(self.echo);
+    }
+}
+
+impl<'r, P: Port, C: Clock, const N: usize> Driver<'r, P, C, N> {
+    /// A driver in PH_INIT. The receive interrupt has the same `reception`.
+    pub fn new(port: P, clock: C, master: Master<N>, reception: &'r Reception) -> Self {
+        Self {
+            port,
+            clock,
+            master,
+            reception,
+            frames: reception.frames(),
+            late: 0,
+            torn: 0,
+            heard: [Heard::default(); N],
+        }
+    }
+
+    /// Gives port, clock and master back.
+    pub fn release(self) -> (P, C, Master<N>) {
+        (self.port, self.clock, self.master)
+    }
+
+    /// The master, for reading.
+    pub const fn master(&self) -> &Master<N> {
+        &self.master
+    }
+
+    /// The axes: set-points, requests, switching on and off.
+    pub const fn ring_mut(&mut self) -> &mut Ring<N> {
+        self.master.ring_mut()
+    }
+
+    /// Exchanges that ended after the next frame had begun.
+    pub const fn late(&self) -> u32 {
+        self.late
+    }
+
+    /// Exchanges that could not read the blocks of one frame.
+    pub const fn torn(&self) -> u32 {
+        self.torn
+    }
+
+    /// What the COM LED shows `t_ms` after the start of a lit half-period.
+    pub fn led(&self, t_ms: u64) -> Led {
+        self.master.led(t_ms)
+    }
+
+    /// The actual position of the axis at `place`, command units, if the last exchange brought a new one: a sound block of its drive
+    /// whose counter had gone on.
+    pub fn position(&self, place: usize) -> Option<i32> {
+        self.heard.get(place)?.position
+    }
+
+    /// One turn of the main loop. Until it gives [`Phase::Running`] interrupts stay off; it writes the first transmit data itself.
+    ///
+    /// # Errors
+    /// [`Error::Protocol`] with the fault of the phases; [`Error::Io`].
+    pub fn control(&mut self) -> Result<Phase, Failure<P>> {
+        let asic = self.port.state().map_err(Error::Io)?;
+        let mut table = [Slave { mac_id: MacId::truncate(0), kind: 0 }; MacId::COUNT];
+        let found = match (self.master.phase(), asic) {
+            (Phase::Waiting, Asic::Ready) => self.port.slaves(&mut table).map_err(Error::Io)?,
+            _ => None,
+        };
+        let phase = self.master.control(asic, found.map(|count| table.get(..count).unwrap_or(&table)));
+        if phase == Phase::Prepare {
+            let commands = self.master.exchange(&[Received::Nothing; N]);
+            self.write(&commands).map_err(Error::Io)?;
+        }
+        match self.master.fault() {
+            Some(fault) => Err(Error::Protocol(fault)),
+            None => Ok(phase),
+        }
+    }
+
+    /// [`control`](Self::control) until the communication runs, for `limit_ns` at the most; it gives the phase that was reached.
+    ///
+    /// # Errors
+    /// As [`control`](Self::control).
+    pub fn start(&mut self, limit_ns: u64) -> Result<Phase, Failure<P>> {
+        let until_ns = self.clock.now_ns().saturating_add(limit_ns);
+        loop {
+            let phase = self.control()?;
+            if phase == Phase::Running || self.clock.now_ns() >= until_ns {
+                return Ok(phase);
+            }
+        }
+    }
+
+    /// The exchange of an update period, from the NC interrupt, before anything else is calculated: reads the blocks of the last
+    /// reception and writes the next commands. `began_ns` is the start of the frame that began the period, by the driver's clock:
+    /// the time of the interrupt.
+    ///
+    /// # Errors
+    /// [`Error::Io`]; the next exchange goes on.
+    pub fn exchange(&mut self, began_ns: u64) -> Result<Exchanged, Failure<P>> {
+        let read = self.read(began_ns);
+        let frames = self.reception.frames();
+        if frames != self.frames {
+            self.frames = frames;
+            self.master.received();
+        }
+        let (received, torn, fault) = match read {
+            Ok(Some(received)) => (received, false, None),
+            Ok(None) => ([Received::Nothing; N], true, None),
+            Err(fault) => ([Received::Nothing; N], false, Some(fault)),
+        };
+        self.torn = self.torn.saturating_add(torn.into());
+        for ((heard, axis), received) in self.heard.iter_mut().zip(self.master.ring().axes()).zip(&received) {
+            heard.take(axis.config().mac_id, received);
+        }
+        let commands = self.master.exchange(&received);
+        let written = self.write(&commands);
+        let frames_late = self.frames_since(began_ns);
+        self.late = self.late.saturating_add((frames_late > 0).into());
+        match (fault, written) {
+            (Some(fault), _) | (None, Err(fault)) => Err(Error::Io(fault)),
+            (None, Ok(())) => Ok(Exchanged { frames_late, torn }),
+        }
+    }
+
+    /// Leaves the stop after a time-out, an alarm or a stop of the caller; see [`Master::clear`].
+    pub fn clear(&mut self) {
+        self.master.clear();
+    }
+
+    /// The blocks of one frame; `None` if the bank was switched meanwhile each time.
+    fn read(&mut self, began_ns: u64) -> Result<Option<[Received; N]>, P::Error> {
+        for _ in 0..READS {
+            let before = self.bank(began_ns);
+            let mut received = [Received::Nothing; N];
+            for (place, received) in received.iter_mut().enumerate() {
+                *received = self.block(place)?;
+            }
+            if self.bank(began_ns) == before {
+                return Ok(Some(received));
+            }
+        }
+        Ok(None)
+    }
+
+    /// What is another one after each switch of the reception bank: the receive interrupt switches it, or XSYNC.
+    fn bank(&mut self, began_ns: u64) -> u32 {
+        match self.master.config().timer {
+            TimerSystem::External => self.reception.frames(),
+            TimerSystem::Internal => self.frames_since(began_ns),
+        }
+    }
+
+    /// Frames that have begun since the one at `began_ns`.
+    fn frames_since(&mut self, began_ns: u64) -> u32 {
+        let past_ns = self.clock.now_ns().saturating_sub(began_ns);
+        self.master.config().periods.frames_late(u32::try_from(past_ns).unwrap_or(u32::MAX))
+    }
+
+    fn block(&mut self, place: usize) -> Result<Received, P::Error> {
+        let size = self.master.config().size;
+        let (mut words, mut bytes) = ([P::Word::default(); MOST_WORDS], [0; rtex_block::LEN32]);
+        let (words, bytes) = block_of::<P>(size, &mut words, &mut bytes);
+        twice(|| self.port.read(place, words))?;
+        P::Word::unpack(words, bytes);
+        Ok(match size {
+            BlockSize::Bytes16 => Response::parse(bytes).into(),
+            BlockSize::Bytes32 => Response32::parse(bytes).into(),
+        })
+    }
+
+    fn write(&mut self, commands: &[Command32; N]) -> Result<(), P::Error> {
+        let size = self.master.config().size;
+        for (place, command) in commands.iter().enumerate() {
+            let (mut words, mut bytes) = ([P::Word::default(); MOST_WORDS], command.emit());
+            let (words, bytes) = block_of::<P>(size, &mut words, &mut bytes);
+            P::Word::pack(bytes, words);
+            twice(|| self.port.write(place, words))?;
+        }
+        Ok(())
+    }
+}
+
+/// As much of both as a block has.
+fn block_of<'a, P: Port>(
+    size: BlockSize,
+    words: &'a mut [P::Word; MOST_WORDS],
+    bytes: &'a mut [u8; rtex_block::LEN32],
+) -> (&'a mut [P::Word], &'a mut [u8]) {
+    let count = size.bytes().checked_div(P::Word::BYTES).unwrap_or(0);
+    (words.get_mut(..count).unwrap_or_default(), bytes.get_mut(..size.bytes()).unwrap_or_default())
+}

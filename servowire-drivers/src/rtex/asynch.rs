@@ -1,0 +1,40 @@
+//! The exchange as a future: the interrupt is waited for, with a look at the clock beside it.
+
+use embedded_hal_async::digital::Wait;
+
+use super::{Driver, Exchanged, Failure, Port};
+use crate::Timer;
+use crate::race::race;
+
+/// How the period of an exchange began.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum Began {
+    /// By the interrupt.
+    Edge,
+    /// By the clock, for the edge did not come: it was lost, or the ASIC has stopped, which the echo watch notices.
+    Clock,
+}
+
+impl<P: Port, T: Timer, const N: usize> Driver<'_, P, T, N> {
+    /// Waits for the next falling edge of `sync` (XSYNC, or the pin of the external timer), an update period and a half at the
+    /// longest, then exchanges. It may be dropped while it waits; the exchange itself is one step.
+    ///
+    /// # Errors
+    /// [`Error::Io`](crate::Error::Io); the next exchange goes on. A pin that reports a fault counts as an edge that was lost.
+    pub async fn next(&mut self, sync: &mut impl Wait) -> Result<(Began, Exchanged), Failure<P>> {
+        let update_ns = u64::from(self.master().config().periods.update_ns);
+        let until_ns = self.clock.now_ns().saturating_add(update_ns.saturating_mul(3) >> 1);
+        let edge = race(sync.wait_for_falling_edge(), self.clock.wait_until(until_ns)).await;
+        let began = match edge {
+            Some(Ok(())) => Began::Edge,
+            Some(Err(_)) => {
+                self.clock.wait_until(until_ns).await;
+                Began::Clock
+            }
+            None => Began::Clock,
+        };
+        let now_ns = self.clock.now_ns();
+        self.exchange(now_ns).map(|exchanged| (began, exchanged))
+    }
+}

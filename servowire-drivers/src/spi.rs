@@ -1,0 +1,319 @@
+//! An SPI as transmitter and sampler, where no UART fits: [`SpiUart`] for T-Format, `SpiFrames` for A-format.
+//!
+//! MISO at the receiver's output, MOSI at the driver's input, SCK not connected and set to 4 to 80 times the bit rate; which sample
+//! lies where in memory says [`Order`]. A request is one transfer, in which every bit becomes several equal samples; then the line
+//! driver goes off, and a second transfer, the window, samples the line for as long as the buffer lasts. It begins after the
+//! request has left the line, so nothing in it can be older than the request.
+//!
+//! ```text
+//!  MOSI  1111 | request | 1111          1111111111111111111111111111111111 ...
+//!  DE    ______/‾‾‾‾‾‾‾‾‾‾‾\________________________________________________
+//!  MISO                         window: idle | answer                | idle
+//! ```
+//!
+//! * The window has to begin before the answer does: a T-Format encoder answers after 3 us, so use DMA or a HAL with a short way
+//!   into the transfer.
+//! * The clock must run through a transfer without gaps. The RP2040's SPI pauses between words with CPHA = 0; take CPHA = 1.
+//! * The window has to hold the wait for the answer and the longest answer: at 2.5 Mbit/s, 8 samples a bit, T-Format needs
+//!   10 us and 110 bits, 135 bytes; [`Sampling::bytes`] counts them.
+//! * While nothing is expected the line is heard only in looks of one field or frame. So a driver takes that much longer a call.
+
+#[cfg(feature = "nikon")]
+mod frames;
+mod uart;
+
+#[cfg(feature = "async")]
+use core::{future::poll_fn, task::Poll};
+use embedded_hal::spi::SpiBus;
+#[cfg(feature = "async")]
+use embedded_hal_async::spi::SpiBus as AsyncSpiBus;
+
+use embedded_io::ErrorKind;
+use nrz_line::{Field, Format, FormatError, Receiver, Samples};
+
+use crate::Direction;
+use crate::direction::Guard;
+use crate::samples::{Order, TooShort, reorder, write};
+
+#[cfg(feature = "nikon")]
+pub use frames::SpiFrames;
+pub use uart::SpiUart;
+
+/// How an SPI samples the line.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Sampling {
+    order: Order,
+    format: Format,
+    bits_per_second: u32,
+}
+
+impl Sampling {
+    /// `per_bit`: clocks of the SPI a bit, 4 to 80; 8 is a good number. `content_bits`: 8 for T-Format, 16 for A-format.
+    ///
+    /// # Errors
+    /// [`FormatError`] for other numbers.
+    pub const fn new(order: Order, per_bit: u8, content_bits: u8, bits_per_second: u32) -> Result<Self, FormatError> {
+        match Format::new(per_bit as u32, content_bits as u32) {
+            Ok(format) => Ok(Self { order, format, bits_per_second }),
+            Err(error) => Err(error),
+        }
+    }
+
+    /// Bytes of memory that hold so much time on the line.
+    pub fn bytes(&self, ns: u32) -> usize {
+        let samples = u64::from(ns).saturating_mul(self.samples_per_second()).div_ceil(8_000_000_000);
+        usize::try_from(samples).unwrap_or(usize::MAX)
+    }
+
+    /// When sample number `index` was taken, counted from the first, ns.
+    #[cfg(any(test, feature = "nikon"))]
+    fn ns(&self, index: u64) -> u64 {
+        index.saturating_mul(1_000_000_000).checked_div(self.samples_per_second()).unwrap_or(0)
+    }
+
+    const fn samples_per_second(&self) -> u64 {
+        (self.bits_per_second as u64).saturating_mul(self.format.samples_per_bit() as u64)
+    }
+
+    /// Bytes of one field.
+    fn look(&self) -> usize {
+        let samples = self.format.field_bits().saturating_mul(self.format.samples_per_bit());
+        usize::try_from(samples.div_ceil(8)).unwrap_or(usize::MAX)
+    }
+}
+
+/// What went wrong at the SPI or in what it has sampled.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[non_exhaustive]
+pub enum SpiError<S, P> {
+    /// The SPI reports a fault.
+    #[error("the SPI reports a fault")]
+    Spi(S),
+    /// The direction pin does.
+    #[error("the direction pin reports a fault")]
+    Pin(P),
+    /// A stop bit was 0.
+    #[error("a stop bit is 0")]
+    Framing,
+    /// Something was on the line outside the window.
+    #[error("something is on the line outside the window")]
+    Noise,
+    /// The request does not fit the buffer.
+    #[error(transparent)]
+    TooShort(#[from] TooShort),
+}
+
+impl<S: core::fmt::Debug, P: core::fmt::Debug> embedded_io::Error for SpiError<S, P> {
+    fn kind(&self) -> ErrorKind {
+        match self {
+            Self::Framing | Self::Noise => ErrorKind::InvalidData,
+            Self::TooShort(_) => ErrorKind::OutOfMemory,
+            Self::Spi(_) | Self::Pin(_) => ErrorKind::Other,
+        }
+    }
+}
+
+/// What a look at the line gave.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Heard {
+    Field(Field),
+    /// Samples of 0 outside the window.
+    Noise,
+}
+
+/// The machine behind both: buffers, and what the last transfer has sampled.
+#[derive(Debug)]
+struct Sampler<'b, S, D> {
+    bus: S,
+    direction: D,
+    sampling: Sampling,
+    tx: &'b mut [u8],
+    rx: &'b mut [u8],
+    receiver: Receiver,
+    /// Bytes of `rx` that were sampled, and how many of them the receiver has.
+    len: usize,
+    at: usize,
+    /// What is left of the byte before `at`.
+    samples: Samples,
+}
+
+type Fault<S, D> = SpiError<<S as embedded_hal::spi::ErrorType>::Error, <D as Direction>::Error>;
+
+impl<'b, S, D> Sampler<'b, S, D> {
+    const fn new(bus: S, direction: D, sampling: Sampling, tx: &'b mut [u8], rx: &'b mut [u8]) -> Self {
+        let receiver = Receiver::new(sampling.format);
+        Self { bus, direction, sampling, tx, rx, receiver, len: 0, at: 0, samples: Samples::partial(0, 0) }
+    }
+
+    /// The next field of what was sampled.
+    fn field(&mut self) -> Option<Field> {
+        loop {
+            if let Some(field) = self.receiver.feed(&mut self.samples) {
+                return Some(field);
+            }
+            let byte = self.rx.get(..self.len)?.get(self.at)?;
+            self.samples = Samples::partial(u64::from(*byte), 8);
+            self.at = self.at.saturating_add(1);
+        }
+    }
+
+    /// The request as samples: bytes of `tx`.
+    fn prepare(&mut self, bits: impl IntoIterator<Item = bool>) -> Result<usize, TooShort> {
+        self.forget();
+        let per_bit = u8::try_from(self.sampling.format.samples_per_bit()).unwrap_or(u8::MAX);
+        write(bits, per_bit, self.sampling.order, self.tx)
+    }
+
+    /// `len` bytes to be sampled into; MOSI stays 1 meanwhile.
+    fn idle(&mut self, len: usize) -> &mut [u8] {
+        self.forget();
+        let len = len.min(self.rx.len());
+        let (window, _) = self.rx.split_at_mut_checked(len).unwrap_or_default();
+        window.fill(0xff);
+        window
+    }
+
+    /// They have been.
+    fn sampled(&mut self, len: usize) {
+        self.len = len.min(self.rx.len());
+        if let Some(window) = self.rx.get_mut(..self.len) {
+            reorder(window, self.sampling.order);
+        }
+    }
+
+    /// What was sampled before is over.
+    fn forget(&mut self) {
+        self.receiver = Receiver::new(self.sampling.format);
+        self.samples = Samples::partial(0, 0);
+        (self.len, self.at) = (0, 0);
+    }
+
+    /// Whether the line was ever 0 in what was sampled; it counts as taken.
+    fn is_busy(&mut self) -> bool {
+        let busy = self.rx.get(..self.len).is_some_and(|window| window.iter().any(|byte| *byte != 0xff));
+        self.forget();
+        busy
+    }
+}
+
+impl<S: SpiBus, D: Direction> Sampler<'_, S, D> {
+    /// Sends `bits`. The line driver is off afterwards.
+    fn send(&mut self, bits: impl IntoIterator<Item = bool>) -> Result<(), Fault<S, D>> {
+        let len = self.prepare(bits)?;
+        let guard = Guard::transmit(&mut self.direction).map_err(SpiError::Pin)?;
+        self.bus.write(self.tx.get(..len).unwrap_or_default()).map_err(SpiError::Spi)?;
+        self.bus.flush().map_err(SpiError::Spi)?;
+        guard.receive().map_err(SpiError::Pin)
+    }
+
+    /// Samples `len` bytes.
+    fn sample(&mut self, len: usize) -> Result<(), Fault<S, D>> {
+        self.idle(len);
+        let len = len.min(self.rx.len());
+        let window = self.rx.get_mut(..len).unwrap_or_default();
+        self.bus.transfer_in_place(window).map_err(SpiError::Spi)?;
+        self.bus.flush().map_err(SpiError::Spi)?;
+        self.sampled(len);
+        Ok(())
+    }
+
+    /// Sends, and samples the window.
+    fn ask(&mut self, bits: impl IntoIterator<Item = bool>) -> Result<(), Fault<S, D>> {
+        self.send(bits)?;
+        self.sample(usize::MAX)
+    }
+
+    /// What is there; if nothing is, a look at the line.
+    fn hear(&mut self) -> Result<Option<Heard>, Fault<S, D>> {
+        if let Some(field) = self.field() {
+            return Ok(Some(Heard::Field(field)));
+        }
+        self.sample(self.sampling.look())?;
+        Ok(self.is_busy().then_some(Heard::Noise))
+    }
+}
+
+#[cfg(feature = "async")]
+impl<S: AsyncSpiBus, D: Direction> Sampler<'_, S, D> {
+    /// Sends `bits`. The line driver is off afterwards, and when the future is dropped.
+    async fn send_asynch(&mut self, bits: impl IntoIterator<Item = bool>) -> Result<(), Fault<S, D>> {
+        let len = self.prepare(bits)?;
+        let guard = Guard::transmit(&mut self.direction).map_err(SpiError::Pin)?;
+        self.bus.write(self.tx.get(..len).unwrap_or_default()).await.map_err(SpiError::Spi)?;
+        self.bus.flush().await.map_err(SpiError::Spi)?;
+        guard.receive().map_err(SpiError::Pin)
+    }
+
+    /// Samples `len` bytes.
+    async fn sample_asynch(&mut self, len: usize) -> Result<(), Fault<S, D>> {
+        self.idle(len);
+        let len = len.min(self.rx.len());
+        let window = self.rx.get_mut(..len).unwrap_or_default();
+        self.bus.transfer_in_place(window).await.map_err(SpiError::Spi)?;
+        self.bus.flush().await.map_err(SpiError::Spi)?;
+        self.sampled(len);
+        Ok(())
+    }
+
+    /// Sends, and samples the window.
+    async fn ask_asynch(&mut self, bits: impl IntoIterator<Item = bool>) -> Result<(), Fault<S, D>> {
+        self.send_asynch(bits).await?;
+        self.sample_asynch(usize::MAX).await
+    }
+
+    /// What is there, or what comes.
+    async fn hear_asynch(&mut self) -> Result<Heard, Fault<S, D>> {
+        loop {
+            if let Some(field) = self.field() {
+                return Ok(Heard::Field(field));
+            }
+            self.sample_asynch(self.sampling.look()).await?;
+            if self.is_busy() {
+                return Ok(Heard::Noise);
+            }
+            // An SPI that never waits must not keep the clock from being asked.
+            let mut asked = false;
+            poll_fn(|context| {
+                if core::mem::replace(&mut asked, true) {
+                    return Poll::Ready(());
+                }
+                context.waker().wake_by_ref();
+                Poll::Pending
+            })
+            .await;
+        }
+    }
+}
+
+/// Start bit, content and stop bit of each unit, with idle bits between two.
+fn line_bits(units: impl IntoIterator<Item = (u16, u32)>, gap_bits: u32) -> impl Iterator<Item = bool> {
+    units.into_iter().enumerate().flat_map(move |(at, (content, width))| {
+        let idle = if at == 0 { 0 } else { gap_bits };
+        let bits = (0..width).map(move |bit| content.checked_shr(bit).unwrap_or(0) & 1 == 1);
+        let idle = core::iter::repeat_n(true, usize::try_from(idle).unwrap_or(0));
+        idle.chain(core::iter::once(false)).chain(bits).chain(core::iter::once(true))
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::vec::Vec;
+
+    #[test]
+    fn a_buffer_for_the_wait_and_the_longest_answer() {
+        let sampling = Sampling::new(Order::MsbFirst8, 8, 8, 2_500_000).unwrap();
+        assert_eq!(sampling.bytes(10_000 + 44_000), 135);
+        assert_eq!(sampling.look(), 10);
+        assert_eq!(sampling.ns(8), 400);
+        assert_eq!(sampling.bytes(u32::MAX), 10_737_419);
+        assert!(Sampling::new(Order::MsbFirst8, 3, 8, 1).is_err());
+    }
+
+    #[test]
+    fn units_have_start_and_stop_bits_and_pauses() {
+        let bits: Vec<_> = line_bits([(0b01, 2), (0b11, 2)], 3).map(u8::from).collect();
+        assert_eq!(bits, [0, 1, 0, 1, 1, 1, 1, 0, 1, 1, 1]);
+    }
+}

@@ -1,0 +1,386 @@
+//! The RTEX driver at a simulated ASIC: both timer systems, all widths of the bus, and faults.
+
+#![cfg(feature = "rtex")]
+#![allow(
+    clippy::arithmetic_side_effects,
+    clippy::cast_possible_truncation,
+    clippy::cast_possible_wrap,
+    clippy::cast_sign_loss,
+    clippy::indexing_slicing,
+    clippy::missing_panics_doc,
+    clippy::panic,
+    clippy::std_instead_of_core,
+    clippy::unwrap_used
+)]
+
+mod asic;
+
+use std::marker::PhantomData;
+use std::num::NonZeroU16;
+
+use asic::{AXES, Bus, COM_NS, Drawn, Ring, SWITCHES, Shared, Watch};
+use rtex_block::device::Drive;
+use rtex_block::master::{
+    ActiveCode, Axis, AxisConfig, AxisState, Fault, Limits, Master, MasterConfig, Phase, Slave, StopReason,
+};
+use rtex_block::timing::{Periods, TimerSystem};
+use rtex_block::{BlockSize, MacId};
+use servowire_drivers::Error;
+use servowire_drivers::rtex::Driver;
+
+const LIMIT: u16 = 6;
+
+type Rtex<W> = Driver<'static, Bus<W>, Watch, AXES>;
+
+fn driver<W: Drawn>(ring: &Shared) -> Rtex<W> {
+    let (external, wide, reception) = (ring.borrow().external, ring.borrow().wide, ring.borrow().reception());
+    let (periods, timer) = if external {
+        (Periods::from_a6n(-1, 2, Some(COM_NS as i64)).unwrap(), TimerSystem::External)
+    } else {
+        (Periods::from_a6n(-1, 1, Some(COM_NS as i64)).unwrap(), TimerSystem::Internal)
+    };
+    let limit = NonZeroU16::new(LIMIT).unwrap();
+    let size = if wide { BlockSize::Bytes32 } else { BlockSize::Bytes16 };
+    let config = MasterConfig::new(size, periods, timer).with_watchdog(Some(limit));
+    let ids = SWITCHES.map(|switches| MacId::new(switches).unwrap());
+    let limits = Limits::new(limit, 60).with_ready(200);
+    let axes = ids.map(|id| Axis::new(AxisConfig::new(id, ActiveCode::CyclicPosition, periods.update_ns, limits)));
+    let master = Master::new(config, ids.map(|mac_id| Slave { mac_id, kind: 1 }), axes).unwrap();
+    Driver::new(Bus(ring.clone(), PhantomData), Watch(ring.clone()), master, reception)
+}
+
+/// The NC interrupt of the next update period, and what the exchange gave.
+fn update<W: Drawn>(
+    ring: &Shared,
+    driver: &mut Rtex<W>,
+) -> Result<servowire_drivers::rtex::Exchanged, Error<(), std::convert::Infallible, Fault, std::convert::Infallible>> {
+    let began_ns = {
+        let mut ring = ring.borrow_mut();
+        let periods = if ring.external { 2 } else { 1 };
+        for _ in 0..periods {
+            let begins_ns = ring.next_frame_ns();
+            ring.pass(begins_ns);
+        }
+        ring.in_exchange = true;
+        ring.read_of.clear();
+        ring.now_ns
+    };
+    let result = driver.exchange(began_ns);
+    let mut ring = ring.borrow_mut();
+    ring.in_exchange = false;
+    ring.let_in();
+    result
+}
+
+fn on<W: Drawn>(ring: &Shared) -> Rtex<W> {
+    let mut driver = driver::<W>(ring);
+    assert_eq!(driver.start(1_000_000), Ok(Phase::Running));
+    for _ in 0..400 {
+        if driver.ring_mut().switch_on() {
+            break;
+        }
+        update(ring, &mut driver).unwrap();
+    }
+    for _ in 0..60 {
+        if driver.master().ring().all_are(AxisState::On) {
+            return driver;
+        }
+        update(ring, &mut driver).unwrap();
+    }
+    panic!("{:?}", driver.master().ring().failure());
+}
+
+fn move_on<W: Drawn>(driver: &mut Rtex<W>) {
+    for (k, axis) in driver.ring_mut().axes_mut().iter_mut().enumerate() {
+        if axis.state() == AxisState::On {
+            let to = axis.setpoint().wrapping_add(10 * (k as i32 + 1));
+            axis.set_position(to).unwrap();
+        }
+    }
+}
+
+fn turns<W: Drawn>(external: bool, wide: bool) {
+    let ring = Ring::new(external, wide);
+    let mut driver = on::<W>(&ring);
+    for _ in 0..50 {
+        move_on(&mut driver);
+        let exchanged = update(&ring, &mut driver).unwrap();
+        assert_eq!((exchanged.frames_late, exchanged.torn), (0, false));
+        assert!((0..AXES).all(|place| driver.position(place).is_some()));
+    }
+    for _ in 0..60 {
+        update(&ring, &mut driver).unwrap();
+    }
+    for place in 0..AXES {
+        assert_eq!(driver.position(place), Some(500 * (place as i32 + 1)));
+        assert_eq!(ring.borrow().drives[place].position(), 500 * (place as i32 + 1));
+    }
+    assert_eq!((driver.late(), driver.torn()), (0, 0));
+    driver.ring_mut().switch_off();
+    for _ in 0..5 {
+        update(&ring, &mut driver).unwrap();
+    }
+    assert!(!ring.borrow().drives.iter().any(Drive::is_active));
+}
+
+#[test]
+fn both_timer_systems_on_every_bus() {
+    for external in [false, true] {
+        for wide in [false, true] {
+            turns::<u8>(external, wide);
+            turns::<u16>(external, wide);
+            turns::<u32>(external, wide);
+        }
+    }
+}
+
+#[test]
+fn other_slaves_than_in_the_table_are_a_fault() {
+    let ring = Ring::new(false, false);
+    ring.borrow_mut().found[1].kind = 2;
+    let mut driver = driver::<u16>(&ring);
+    assert_eq!(driver.start(1_000_000), Err(Error::Protocol(Fault::SlaveInfoMismatch)));
+}
+
+#[test]
+fn a_ring_that_does_not_close_is_waited_for_so_long() {
+    let ring = Ring::new(false, false);
+    ring.borrow_mut().found = [Slave { mac_id: MacId::truncate(1), kind: 0 }; AXES];
+    let mut driver = driver::<u16>(&ring);
+    assert_eq!(driver.start(100), Ok(Phase::Waiting));
+}
+
+/// The bank is switched in the middle of the exchange, after any access, by the receive interrupt or by XSYNC because the exchange is
+/// late: the blocks of two frames are never taken as one.
+#[test]
+fn a_switch_of_the_bank_never_tears_an_exchange() {
+    for external in [true, false] {
+        let ring = Ring::new(external, false);
+        let mut driver = on::<u16>(&ring);
+        let words = AXES * 8;
+        let mut twice = 0;
+        for at in 0..words {
+            // The exchange begins with a frame, which is back 29.6 us later; the next one begins after 500 us.
+            ring.borrow_mut().stall_in = Some((at as u32, if external { 29_000 } else { 499_000 }));
+            let exchanged = update(&ring, &mut driver).unwrap();
+            ring.borrow_mut().stall_in = None;
+            let read = std::mem::take(&mut ring.borrow_mut().read_of);
+            let taken = &read[read.len() - words..];
+            assert!(taken.iter().all(|frame| *frame == taken[0]), "{external} {at}: {read:?}");
+            assert!(!exchanged.torn);
+            assert_eq!(driver.master().ring().failure(), None);
+            twice += usize::from(read.len() == 2 * words);
+            for _ in 0..2 {
+                update(&ring, &mut driver).unwrap();
+            }
+        }
+        assert!(twice > words / 2);
+    }
+    let ring = Ring::new(true, false);
+    let mut driver = on::<u16>(&ring);
+    // A bus so slow that a frame comes in every reading: none is taken, and the axes stop before anything worse happens.
+    for _ in 0..LIMIT {
+        ring.borrow_mut().stall_in = None;
+        let mut slow = || {
+            ring.borrow_mut().stall_in = Some((3, 2 * COM_NS));
+            let began_ns = ring.borrow().now_ns;
+            driver.exchange(began_ns).unwrap()
+        };
+        let exchanged = slow();
+        assert!(exchanged.frames_late > 0);
+    }
+    assert!(driver.late() >= u32::from(LIMIT));
+}
+
+/// The port fails at any one of its calls: the next exchange is good, and nothing stops.
+#[test]
+fn a_fault_of_the_port_is_over_with_the_next_exchange() {
+    for external in [false, true] {
+        let ring = Ring::new(external, false);
+        let mut driver = on::<u16>(&ring);
+        for at in 0..2 * AXES as u32 * 8 {
+            ring.borrow_mut().fail_in = Some(at);
+            update(&ring, &mut driver).unwrap();
+            update(&ring, &mut driver).unwrap();
+            assert!((0..AXES).all(|place| driver.position(place).is_some()), "{at}");
+            assert_eq!(driver.master().ring().failure(), None, "{at}");
+        }
+    }
+}
+
+/// Frames that do not come: no position is given, and every servo is off within the limit.
+#[test]
+fn silence_switches_every_servo_off() {
+    for external in [false, true] {
+        let ring = Ring::new(external, false);
+        let mut driver = on::<u16>(&ring);
+        ring.borrow_mut().lose_frames = u32::MAX;
+        for period in 0..u32::from(LIMIT) + 2 {
+            update(&ring, &mut driver).unwrap();
+            assert!(period == 0 || (0..AXES).all(|place| driver.position(place).is_none()));
+        }
+        let (_, reason) = driver.master().ring().failure().unwrap();
+        assert!(matches!(reason, StopReason::EchoTimeout | StopReason::ReceiveTimeout), "{reason}");
+        assert_eq!(driver.control(), Err(Error::Protocol(Fault::Timeout)));
+        // The ring is back: all are switched on again.
+        ring.borrow_mut().lose_frames = 0;
+        for drive in &mut ring.borrow_mut().drives {
+            drive.clear_alarm();
+        }
+        driver.clear();
+        for _ in 0..100 {
+            update(&ring, &mut driver).unwrap();
+            driver.ring_mut().switch_on();
+        }
+        assert!(
+            driver.master().ring().all_are(AxisState::On),
+            "{:?} {:?}",
+            driver.master().ring().failure(),
+            ring.borrow().drives.map(|d| d.alarm())
+        );
+    }
+}
+
+/// Faults of the port, lost frames and stalls, 100,000 of them. The exchange after one is good; what it reads was asked for before the
+/// fault, so the one after that gives every position again, and they are those of the last frames.
+#[test]
+fn hostile_events_are_over_with_the_next_call() {
+    let events = std::env::var("HOSTILE_EVENTS").ok().and_then(|events| events.parse().ok()).unwrap_or(100_000);
+    let mut draw = 0x9e37_79b9_7f4a_7c15_u64;
+    let mut below = move |limit: u64| {
+        draw ^= draw << 13;
+        draw ^= draw >> 7;
+        draw ^= draw << 17;
+        (draw >> 33) % limit
+    };
+    let (mut count, mut kinds) = (0, [0_u64; 3]);
+    while count < events {
+        let external = below(2) == 1;
+        let ring = Ring::new(external, below(2) == 1);
+        let mut driver = on::<u32>(&ring);
+        for _ in 0..2_000 {
+            let kind = below(3) as usize;
+            kinds[kind] += 1;
+            count += 1;
+            match kind {
+                0 => ring.borrow_mut().fail_in = Some(below(24) as u32),
+                1 => ring.borrow_mut().lose_frames = 1 + below(2) as u32,
+                _ => ring.borrow_mut().stall_in = Some((below(24) as u32, below(700_000))),
+            }
+            move_on(&mut driver);
+            let late = update(&ring, &mut driver).map_or(0, |exchanged| exchanged.frames_late);
+            {
+                let mut ring = ring.borrow_mut();
+                (ring.fail_in, ring.lose_frames, ring.stall_in) = (None, 0, None);
+            }
+            // A late exchange has missed the next interrupt, so the same commands went out twice.
+            for _ in 0..2 + late {
+                update(&ring, &mut driver).unwrap();
+            }
+            for place in 0..AXES {
+                assert!(
+                    driver.position(place).is_some(),
+                    "event {count}, kind {kind}, {external} {:?} {:?}",
+                    driver.master().ring().failure(),
+                    ring.borrow().drives.map(|d| d.alarm())
+                );
+                let (said, is) = (driver.position(place).unwrap(), ring.borrow().drives[place].position());
+                let per_update = 10 * (place as i32 + 1);
+                assert!(is.wrapping_sub(said).unsigned_abs() <= 3 * per_update as u32, "{said}, and it is at {is}");
+            }
+            assert_eq!(driver.master().ring().failure(), None, "event {count}, kind {kind}");
+        }
+    }
+    println!("{kinds:?}");
+    assert!(kinds.iter().all(|count| *count > events / 4));
+}
+
+/// The pin of XSYNC: an edge at each frame, but for those that are lost.
+#[cfg(feature = "async")]
+mod asynch {
+    use std::future::{Future, poll_fn};
+    use std::pin::pin;
+    use std::task::{Context, Poll, Waker};
+
+    use servowire_drivers::rtex::asynch::Began;
+    use servowire_drivers::{Clock, Timer};
+
+    use super::*;
+
+    struct Pin {
+        ring: Shared,
+        lost: bool,
+    }
+
+    impl embedded_hal::digital::ErrorType for Pin {
+        type Error = std::convert::Infallible;
+    }
+
+    impl embedded_hal_async::digital::Wait for Pin {
+        async fn wait_for_high(&mut self) -> Result<(), Self::Error> {
+            unreachable!()
+        }
+
+        async fn wait_for_low(&mut self) -> Result<(), Self::Error> {
+            unreachable!()
+        }
+
+        async fn wait_for_rising_edge(&mut self) -> Result<(), Self::Error> {
+            unreachable!()
+        }
+
+        async fn wait_for_falling_edge(&mut self) -> Result<(), Self::Error> {
+            let edge_ns = self.ring.borrow().next_frame_ns();
+            poll_fn(|_| {
+                let past = self.ring.borrow().now_ns >= edge_ns;
+                if past && !self.lost { Poll::Ready(Ok(())) } else { Poll::Pending }
+            })
+            .await
+        }
+
+        async fn wait_for_any_edge(&mut self) -> Result<(), Self::Error> {
+            unreachable!()
+        }
+    }
+
+    struct Sleep(Watch);
+
+    impl Clock for Sleep {
+        fn now_ns(&mut self) -> u64 {
+            self.0.now_ns()
+        }
+    }
+
+    impl Timer for Sleep {
+        async fn wait_until(&mut self, ns: u64) {
+            poll_fn(|_| if self.0.now_ns() >= ns { Poll::Ready(()) } else { Poll::Pending }).await;
+        }
+    }
+
+    fn spin<T>(future: impl Future<Output = T>) -> T {
+        let (mut future, mut context) = (pin!(future), Context::from_waker(Waker::noop()));
+        loop {
+            if let Poll::Ready(value) = future.as_mut().poll(&mut context) {
+                return value;
+            }
+        }
+    }
+
+    #[test]
+    fn a_lost_edge_is_healed_by_the_clock() {
+        let ring = Ring::new(false, false);
+        let started = on::<u16>(&ring);
+        let (port, watch, master) = started.release();
+        let reception = ring.borrow().reception();
+        let mut driver = Driver::new(port, Sleep(watch), master, reception);
+        let mut pin = Pin { ring: ring.clone(), lost: false };
+        for k in 0..20 {
+            pin.lost = k % 5 == 4;
+            ring.borrow_mut().let_in();
+            let (began, exchanged) = spin(driver.next(&mut pin)).unwrap();
+            assert_eq!(began, if k % 5 == 4 { Began::Clock } else { Began::Edge });
+            assert!(!exchanged.torn);
+            assert_eq!(driver.master().ring().failure(), None);
+        }
+    }
+}

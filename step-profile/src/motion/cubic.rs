@@ -1,0 +1,265 @@
+//! The position of an axis at whole ticks, in exact integers.
+
+use super::curve::{Bend, Piece};
+use super::real::Real;
+
+/// The integers of a [`Cubic`]: 64 bits, or 128 where 64 are too few. All sums wrap.
+pub(super) trait Word: Copy {
+    /// In units of `2^-bits`, rounded.
+    fn rounded(x: Real, bits: i32) -> Self;
+    /// 2^bits.
+    fn power(bits: i32) -> Self;
+    fn plus(self, other: Self) -> Self;
+    fn minus(self, other: Self) -> Self;
+    /// `self` times `by`, plus `more`.
+    fn times_plus(self, by: u64, more: Self) -> Self;
+    fn is_negative(self) -> bool;
+    /// Bits of a number above 0; 0 for any other.
+    fn bits(self) -> u32;
+    /// `self` is from 0 to less than `other`.
+    fn is_below(self, other: Self) -> bool;
+    /// About `self / by`, rounded down; `None` if `by` is not above 0.
+    fn quotient(self, by: Self) -> Option<i64>;
+}
+
+macro_rules! word {
+    ($word:ty, $shift:expr, $times_plus:item) => {
+        #[allow(
+            clippy::cast_possible_truncation,
+            clippy::cast_possible_wrap,
+            clippy::cast_sign_loss,
+            clippy::cast_lossless,
+            reason = "words in two's complement"
+        )]
+        impl Word for $word {
+            fn rounded(x: Real, bits: i32) -> Self {
+                (x.to_wide(bits.saturating_add(1)) as Self).wrapping_add(1) >> 1
+            }
+
+            fn power(bits: i32) -> Self {
+                Self::wrapping_shl(1, bits.unsigned_abs())
+            }
+
+            #[inline]
+            fn plus(self, other: Self) -> Self {
+                self.wrapping_add(other)
+            }
+
+            #[inline]
+            fn minus(self, other: Self) -> Self {
+                self.wrapping_sub(other)
+            }
+
+            #[inline]
+            $times_plus
+
+            #[inline]
+            fn is_negative(self) -> bool {
+                self < 0
+            }
+
+            fn bits(self) -> u32 {
+                if self > 0 { Self::BITS.saturating_sub(self.leading_zeros()) } else { 0 }
+            }
+
+            #[inline]
+            fn is_below(self, other: Self) -> bool {
+                // The sign of the difference, unless it is that of `self`.
+                self.wrapping_sub(other) & !self < 0
+            }
+
+            fn quotient(self, by: Self) -> Option<i64> {
+                if by <= 0 {
+                    return None;
+                }
+                let down = $shift.saturating_sub(by.leading_zeros());
+                let (dividend, divisor) = (self >> down, (by >> down) as i32);
+                if let Ok(dividend) = i32::try_from(dividend) {
+                    return dividend.checked_div_euclid(divisor).map(i64::from);
+                }
+                let coarse = i32::try_from(dividend >> 16).unwrap_or(if self < 0 { i32::MIN } else { i32::MAX });
+                coarse.checked_div_euclid(divisor).map(|by| i64::from(by) << 16)
+            }
+        }
+    };
+}
+
+// By halves, in two multiplications with addition of a 32-bit core.
+word!(
+    i64,
+    49_u32,
+    fn times_plus(self, by: u64, more: Self) -> Self {
+        if cfg!(target_pointer_width = "32") && by >> 32 == 0 {
+            let low = (self as u32 as u64).wrapping_mul(by).wrapping_add(more as u64);
+            let high = ((self >> 32) as u32).wrapping_mul(by as u32);
+            low.wrapping_add((high as u64) << 32) as i64
+        } else {
+            self.wrapping_mul(by as i64).wrapping_add(more)
+        }
+    }
+);
+word!(
+    i128,
+    113_u32,
+    fn times_plus(self, by: u64, more: Self) -> Self {
+        self.wrapping_mul(by as i128).wrapping_add(more)
+    }
+);
+
+/// The position less the one at which the next step is made, at a whole tick, with its derivatives.
+///
+/// With x ticks from any whole tick on, a position of constant jerk is p + v x + h x² + j x³. In a unit in which h or, with a
+/// jerk, j is a power of 2 all four are integers, so the sums below are exact at every tick: nothing is rounded after the
+/// first one. What is rounded there is the time at which h (or, without a jerk, v) is a whole number, by less than 2^-`bits`
+/// of a tick. That costs the size of the unit: a step has up to 2^59 units in 64 bits.
+#[derive(Debug, Clone, Copy)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub(super) struct Cubic<W> {
+    /// Position, less the one at which the step is made; from 0 to less than a tick's way when it has just been made.
+    pub(super) off: W,
+    v: W,
+    h: W,
+    j: W,
+    /// A step.
+    pub(super) step: W,
+}
+
+impl<W: Word> Cubic<W> {
+    /// In the unit in which 1 / `inverse` is 2^bits, with 2^shift moments in a tick, from a piece on an axis `wait` moments after its begin. `ahead` gives
+    /// the steps to the next one, and the steps that it is behind.
+    pub(super) fn new(
+        piece: &Piece,
+        wait: Real,
+        (inverse, bits, shift): (Real, i32, i32),
+        scale: impl Fn(Real, i32) -> Real,
+        ahead: impl Fn(Real) -> (Real, Real),
+    ) -> Self {
+        let zero = W::rounded(Real::ZERO, bits);
+        let signed = |x: W, up: bool| if up { x } else { zero.minus(x) };
+        let Piece { up, bend, .. } = *piece;
+        let grows = bend != Bend::Fading;
+        let (bent, then) = (bend != Bend::Flat, piece.after(wait));
+        // The first number below the leading one, up or down to a whole number as it is a little later.
+        let (exact, per) = if bent { (scale(then.a.half(), 2), 3) } else { (scale(then.v, 1), 2) };
+        let units = (exact * inverse).scaled(bits);
+        let whole = units.floor();
+        let more = if bent { grows } else { up };
+        let (whole, rest) = match units - whole {
+            rest if rest.is_zero() || !more => (whole, rest),
+            rest => (whole + Real::ONE, Real::ONE - rest),
+        };
+        let later = piece.after(wait + (rest / Real::new(per)).scaled(shift.wrapping_sub(bits)));
+        let (ahead, behind) = ahead(later.p);
+        let fixed = |x: Real| W::rounded(x * inverse, bits);
+        let exact = W::rounded(whole, 0);
+        let one = W::power(bits);
+        Self {
+            off: fixed(behind).minus(fixed(ahead)),
+            v: if bent { fixed(scale(later.v, 1)) } else { exact },
+            h: signed(if bent { exact } else { one }, up),
+            j: if bent { signed(one, up == grows) } else { zero },
+            step: W::rounded(inverse, bits),
+        }
+    }
+
+    /// Without jerk: at the next step, if that is made `by` ticks on.
+    #[inline(always)]
+    pub(super) fn straight(&self, by: u64) -> Self {
+        let mean = self.h.times_plus(by, self.v);
+        Self { off: mean.times_plus(by, self.off.minus(self.step)), v: self.h.times_plus(by, mean), ..*self }
+    }
+
+    /// At the next step, if that is made `by` ticks on.
+    #[inline(always)]
+    pub(super) fn bent(&self, by: u64) -> Self {
+        let first = self.j.times_plus(by, self.h);
+        let second = self.j.times_plus(by, first);
+        let mean = first.times_plus(by, self.v);
+        Self {
+            off: mean.times_plus(by, self.off.minus(self.step)),
+            v: second.times_plus(by, mean),
+            h: self.j.times_plus(by, second),
+            ..*self
+        }
+    }
+
+    /// What the position has grown by since the tick before.
+    #[inline(always)]
+    fn speed(&self) -> W {
+        self.v.minus(self.h).plus(self.j)
+    }
+
+    /// The position has passed that of the step, and had not at the tick before.
+    #[inline(always)]
+    pub(super) fn is_there(&self) -> bool {
+        self.off.is_below(self.speed())
+    }
+
+    /// The same without jerk.
+    #[inline(always)]
+    pub(super) fn is_straight_there(&self) -> bool {
+        self.off.is_below(self.v.minus(self.h))
+    }
+
+    /// About as many ticks as the next step takes.
+    pub(super) fn interval(&self) -> u64 {
+        self.at_most(self.step)
+    }
+
+    /// Ticks for a way: no more than the speed alone would take, and half a power of 2 that h or j alone would take.
+    fn at_most(&self, need: W) -> u64 {
+        let mut guess = need.quotient(self.v).and_then(|ticks| u64::try_from(ticks).ok()).unwrap_or(u64::MAX);
+        for (size, power) in [(self.h, 2), (self.j, 3)] {
+            let bits = size.bits();
+            if bits > 0 {
+                let ticks = need.bits().saturating_add(1).saturating_sub(bits).div_ceil(power);
+                guess = guess.min(1_u64.checked_shl(ticks).unwrap_or(u64::MAX) >> 1);
+            }
+        }
+        guess
+    }
+
+    /// The first step, up to `last` ticks on.
+    pub(super) fn first(&self, last: u64) -> (u64, Self) {
+        if !self.off.is_negative() || last == 0 {
+            return (0, *self);
+        }
+        let zero = self.off.minus(self.off);
+        let guess = self.at_most(zero.minus(self.off));
+        Self { off: self.off.plus(self.step), ..*self }.solve(guess, last)
+    }
+
+    /// The step after the one that has just been made, `guess` ticks on or as many as it is, up to `last`: Newton's method
+    /// between the ticks that are known to be too early and late enough; if it takes long, halving.
+    ///
+    /// The guess is such that no sum there leaves its word: the way there is 12 steps at most, and so is the way to twice a
+    /// time that is too early.
+    pub(super) fn solve(&self, guess: u64, last: u64) -> (u64, Self) {
+        let (mut early, mut late) = (0, last.max(1));
+        let mut by = guess.max(1).min(late);
+        let mut round = 0_u8;
+        loop {
+            let next = self.bent(by);
+            if next.off.is_negative() {
+                early = by;
+            } else {
+                late = by;
+                if next.is_there() {
+                    return (by, next);
+                }
+            }
+            let left = late.saturating_sub(early);
+            if left <= 1 {
+                return (late, self.bent(late));
+            }
+            round = round.saturating_add(1);
+            let newton = next.off.quotient(next.speed()).filter(|_| round < 12);
+            let next = match newton {
+                Some(over) if over < 0 => by.saturating_add(over.unsigned_abs()).min(by.saturating_mul(2)),
+                Some(over) => by.saturating_sub(over.unsigned_abs()),
+                None => early.saturating_add(left >> 1),
+            };
+            by = next.max(early.saturating_add(1)).min(late.saturating_sub(1));
+        }
+    }
+}
