@@ -55,7 +55,7 @@ const START: u32 = 0b011;
 const LONG: u32 = 1 << 30;
 
 /// Samples after which the origin moves while a field does not end, as on a line that carries something else.
-const NEAR: u32 = (1 << 31) - 1;
+const NEAR: u32 = 0x7fff_ffff;
 
 impl Receiver {
     /// A receiver on an idle (high) line.
