@@ -4,6 +4,7 @@
 //! `fuzz_targets/` hands them to the fuzzer. A new target is a function in the file of its protocol, a line in
 //! [`TARGETS`], a file in `fuzz_targets/` and its `[[bin]]`, and seeds from `examples/seed_corpus.rs`.
 
+pub mod capture;
 pub mod hdsl;
 pub mod nikon;
 pub mod nrz_line;
@@ -17,6 +18,19 @@ pub type Target = fn(&[u8]);
 
 /// All targets by name.
 pub const TARGETS: &[(&str, Target)] = &[
+    ("capture_vcd", capture::vcd),
+    ("capture_table", capture::table),
+    ("capture_saleae", capture::saleae),
+    ("capture_session", capture::session),
+    ("capture_fst", capture::fst),
+    ("capture_sigrok_text", capture::sigrok_text),
+    ("capture_ols", capture::ols),
+    ("capture_raw", capture::raw),
+    ("capture_packed", capture::packed),
+    ("capture_hex", capture::hex),
+    ("capture_records", capture::records),
+    ("capture_packets", capture::packets),
+    ("capture_survey", capture::survey),
     ("hdsl_symbol", hdsl::symbol),
     ("hdsl_answer", hdsl::answer),
     ("hdsl_head", hdsl::head),

@@ -7,6 +7,7 @@ pub mod archive;
 pub mod fst;
 pub mod hexlog;
 mod input;
+pub mod ols;
 pub mod pcapng;
 mod pipe;
 pub mod raw;
@@ -116,6 +117,8 @@ pub enum Format {
     Fst,
     /// Text of sigrok-cli -O bits or -O hex.
     SigrokText,
+    /// A file of the OLS client, or of sigrok-cli -O ols.
+    Ols,
     /// One sample in one or more whole bytes, a bit a channel (sigrok-cli -O binary).
     Raw,
     /// One channel, eight samples a byte, the oldest in bit 0.
@@ -124,7 +127,8 @@ pub enum Format {
     Hex,
     /// Binary records of one size (--record-size), a burst each.
     Records,
-    /// Packets of a network capture.
+    /// Packets of a network capture, pcap or pcapng.
+    #[value(alias = "pcap")]
     Pcapng,
 }
 
@@ -172,7 +176,7 @@ fn known(head: &[u8]) -> Option<Format> {
     };
     if head.starts_with(b"<SALEAE>") {
         Some(Format::SaleaeBinary)
-    } else if head.starts_with(pcapng::MAGIC) {
+    } else if head.starts_with(pcapng::MAGIC) || pcapng::CLASSIC.iter().any(|magic| head.starts_with(magic)) {
         Some(Format::Pcapng)
     } else if head.starts_with(b"PK\x03\x04") {
         Some(Format::Session)
@@ -182,6 +186,8 @@ fn known(head: &[u8]) -> Option<Format> {
         Some(Format::Vcd)
     } else if text.starts_with(b"libsigrok ") {
         Some(Format::SigrokText)
+    } else if begins(&[b";rate:", b";size:", b";channels:"]) {
+        Some(Format::Ols)
     } else if begins(TABLES) {
         Some(Format::Csv)
     } else {
@@ -215,7 +221,7 @@ const TABLES: &[&[u8]] = &[
 impl Format {
     /// Text may be packed; of the others the first bytes are the format's own.
     fn is_text(self) -> bool {
-        matches!(self, Self::Vcd | Self::Csv | Self::SigrokText | Self::Hex)
+        matches!(self, Self::Vcd | Self::Csv | Self::SigrokText | Self::Ols | Self::Hex)
     }
 }
 
@@ -241,6 +247,7 @@ fn decoder(mut input: Input, format: Format, hints: Hints) -> Result<Capture, Fa
         Format::Session => archive::open(input)?,
         Format::Fst => Capture::Edges(Box::new(fst::Fst::new(input)?)),
         Format::SigrokText => Capture::Edges(Box::new(sigrok_text::SigrokText::new(input)?)),
+        Format::Ols => Capture::Edges(Box::new(ols::Ols::new(input)?)),
         Format::SaleaeBinary => Capture::Edges(Box::new(saleae_binary::SaleaeBinary::new(input)?)),
         Format::Raw | Format::Packed => {
             let Some(rate) = hints.sample_rate else {
@@ -278,6 +285,9 @@ fn guess(input: &mut Input, path: &Path, has_rate: bool) -> Result<Format, Fault
     }
     if let Some((_, name)) = PACKED.iter().find(|(magic, _)| head.starts_with(magic)) {
         return Err(input.fault(At::File, format!("packed by {name}: unpack it first")));
+    }
+    if hexlog::looks_like(head) {
+        return Ok(Format::Hex);
     }
     let extension = path.extension().and_then(|e| e.to_str()).unwrap_or_default().to_ascii_lowercase();
     match extension.as_str() {

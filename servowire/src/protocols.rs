@@ -8,6 +8,7 @@
 mod bytes;
 pub mod hdsl;
 pub mod nikon;
+mod plausible;
 pub mod rtex;
 pub mod sorte;
 pub mod tformat;

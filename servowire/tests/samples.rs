@@ -46,6 +46,8 @@ fn channels_of_a_sigrok_session() {
     for name in ["demo-3of4.bits", "demo-3of4.csv", "demo-3of4.hex", "demo-3of4.vcd", "demo-3of4-time.csv"] {
         common::decode(&sample(name), &[]).fails_with("channel \"D2\" runs at about 1.00 Mbit/s");
     }
+    // Which has no names.
+    common::decode(&sample("demo-3of4.ols"), &[]).fails_with("channel \"1\" runs at about 1.00 Mbit/s");
     common::decode(&sample("demo-3of4.sr"), &["--channel", "D1"]).fails_with("samples a bit are too few");
 }
 

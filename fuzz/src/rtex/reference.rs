@@ -28,7 +28,7 @@ pub(super) fn command(block: &[u8], command: &Command) {
     is("Hard_Stop", bits(block, 3, 7, 1), command.control.contains(ControlBits::HARD_STOP).into());
     is("EX-OUT1", bits(block, 3, 0, 1), command.control.contains(ControlBits::EX_OUT1).into());
     is("reserved", bits(block, 2, 0, 2) | bits(block, 2, 5, 2) | bits(block, 3, 2, 1) | bits(block, 3, 4, 1), 0);
-    assert_eq!(signed(block, 4), command.command_data1.into());
+    assert_eq!(signed(block, 4), i64::from(command.command_data1));
     match command.noncyclic {
         NonCyclicCommand::Normal { command_data2, command_data3 } => {
             assert_eq!((signed(block, 8), signed(block, 12)), (command_data2.into(), command_data3.into()));
@@ -38,13 +38,13 @@ pub(super) fn command(block: &[u8], command: &Command) {
             is("Latch_Sel1", bits(block, 10, 0, 4), latch_sel1.get().into());
             is("Latch_Sel2", bits(block, 10, 4, 4), latch_sel2.get().into());
             is("Monitor_Sel", bits(block, 11, 0, 8), monitor_sel.into());
-            assert_eq!(signed(block, 12), setting_data.into());
+            assert_eq!(signed(block, 12), i64::from(setting_data));
         }
         NonCyclicCommand::Profile { type_code, latch_sel1, monitor_sel, target_speed } => {
             is("Type_Code", bits(block, 8, 0, 8), type_code.into());
             is("Latch_Sel1", bits(block, 10, 0, 8), latch_sel1.get().into());
             is("Monitor_Sel", bits(block, 11, 0, 8), monitor_sel.into());
-            assert_eq!(signed(block, 12), target_speed.into());
+            assert_eq!(signed(block, 12), i64::from(target_speed));
         }
         NonCyclicCommand::Reset(a)
         | NonCyclicCommand::SystemId(a)
@@ -53,7 +53,7 @@ pub(super) fn command(block: &[u8], command: &Command) {
         | NonCyclicCommand::Monitor(a) => {
             is("Type_Code", bits(block, 8, 0, 16), a.type_code.get().into());
             is("Index", bits(block, 10, 0, 16), a.index.into());
-            assert_eq!(signed(block, 12), a.data.into());
+            assert_eq!(signed(block, 12), i64::from(a.data));
         }
     }
 }
@@ -65,7 +65,7 @@ pub(super) fn response(block: &[u8], response: &Response) {
     is("code", bits(block, 1, 0, 7), response.code.get().into());
     is("CMD_Error", bits(block, 1, 7, 1), response.cmd_error.into());
     is("status", bits(block, 2, 0, 16), response.status.bits().into());
-    assert_eq!(signed(block, 4), response.response_data1.into());
-    assert_eq!(signed(block, 8), response.response_data2.into());
-    assert_eq!(signed(block, 12), response.response_data3.into());
+    assert_eq!(signed(block, 4), i64::from(response.response_data1));
+    assert_eq!(signed(block, 8), i64::from(response.response_data2));
+    assert_eq!(signed(block, 12), i64::from(response.response_data3));
 }

@@ -1,23 +1,54 @@
-//! Bytes as hex digits, as a serial monitor or a debugger prints them: a burst a line.
+//! Bytes as text: a log of a serial monitor or a debugger, a dump, an array of C or Rust.
 //!
-//! `1A 20 29 C0`, `1a2029c0`, `0x1A, 0x20` and `1A:20` are all read; what follows `#` or `//` is a remark.
-//! There is no time in such a log, and a line of it is what followed without a pause.
+//! `1A 20 29 C0`, `1a2029c0`, `0x1A, 0x20` and `TX: 1A -> RX: 1A 20` are all read; what follows `#` or `//` is a remark.
+//! A line of a log is what followed without a pause; a dump or an array is one burst.
 
+mod dump;
+mod words;
+
+use std::collections::VecDeque;
 use std::io::{BufRead, Read};
 
 use super::Input;
+use super::input::HEAD;
+use crate::event::Direction;
 use crate::fault::{At, Fault};
+use dump::{Dump, Row};
 
 /// The longest line that is read; longer ones are not a log of a servo line.
 const LONGEST: usize = 1 << 16;
+/// Bytes of a dump or an array that are given at once.
+const MOST: usize = 1 << 16;
+/// Lines by which a log is known where nothing else says that it is one.
+const SEEN: usize = 24;
 
 /// A log of bytes.
 pub struct HexLog {
     input: Input,
     text: Vec<u8>,
     line: u64,
-    /// A line of bytes was read: this is a log.
+    /// Bytes were read: this is a log.
     good: bool,
+    shape: Shape,
+    ready: VecDeque<Burst>,
+    over: bool,
+}
+
+/// What the text is, by its beginning.
+#[derive(Debug, Clone, PartialEq, Eq)]
+enum Shape {
+    Unknown,
+    Lines,
+    Dump { dump: Dump, gathered: Gathered, last: Vec<u8>, again: bool },
+    Array { open: bool, cells: String, from: u64 },
+}
+
+/// Bytes of a dump so far, from line and address on.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+struct Gathered {
+    line: u64,
+    next: u64,
+    bytes: Vec<u8>,
 }
 
 /// The bytes of one line of the log.
@@ -25,16 +56,58 @@ pub struct HexLog {
 pub struct Burst {
     /// Its number, from 1.
     pub line: u64,
+    /// Who sent it, where the log says so.
+    pub direction: Option<Direction>,
     /// What it holds; at least one byte, unless it is spoilt.
     pub bytes: Vec<u8>,
     /// Why the line is not bytes.
     pub spoilt: Option<String>,
 }
 
+impl Burst {
+    /// Bytes from `line`.
+    pub fn new(line: u64, bytes: Vec<u8>) -> Self {
+        Self { line, direction: None, bytes, spoilt: None }
+    }
+}
+
+/// Whether a file looks like a log of bytes.
+pub(super) fn looks_like(head: &[u8]) -> bool {
+    let Ok(text) = std::str::from_utf8(head.get(..head.len().min(1 << 12)).unwrap_or(head)) else { return false };
+    if text.bytes().any(|byte| byte < b' ' && !matches!(byte, b'\t' | b'\r' | b'\n')) {
+        return false;
+    }
+    if array_begins(text) || Dump::of(text, false).is_some() {
+        return true;
+    }
+    let mut lines: Vec<&str> = text.lines().collect();
+    if lines.len() > 1 && !text.ends_with('\n') {
+        lines.pop();
+    }
+    let said: Vec<_> = lines.into_iter().take(SEEN).map(words::line).collect();
+    said.iter().all(Result::is_ok) && said.iter().flatten().flatten().map(|said| said.bytes.len()).sum::<usize>() > 1
+}
+
+/// `= {` or `= [` behind a name.
+fn array_begins(text: &str) -> bool {
+    text.split_once('=').is_some_and(|(before, behind)| {
+        let behind = behind.trim_start().trim_start_matches('&');
+        before.contains([']', ':']) && behind.starts_with(['{', '['])
+    })
+}
+
 impl HexLog {
     /// A log from its beginning.
     pub fn new(input: Input) -> Self {
-        Self { input, text: Vec::new(), line: 0, good: false }
+        Self {
+            input,
+            text: Vec::new(),
+            line: 0,
+            good: false,
+            shape: Shape::Unknown,
+            ready: VecDeque::new(),
+            over: false,
+        }
     }
 
     /// The file that is read.
@@ -42,74 +115,154 @@ impl HexLog {
         &self.input
     }
 
-    /// The next line that holds bytes, or should; none at the end.
+    /// The next burst; none at the end.
     pub fn burst(&mut self) -> Result<Option<Burst>, Fault> {
+        if self.shape == Shape::Unknown {
+            self.shape = Self::shape(&String::from_utf8_lossy(self.input.peek()?));
+        }
         loop {
-            self.text.clear();
-            self.line += 1;
-            let at = At::Line(self.line);
-            let mut limited = self.input.by_ref().take(LONGEST as u64);
-            let got = limited.read_until(b'\n', &mut self.text).map_err(|e| self.input.io_fault(at, &e))?;
-            if got == 0 {
+            if let Some(burst) = self.ready.pop_front() {
+                self.good |= burst.spoilt.is_none();
+                return Ok(Some(burst));
+            }
+            if self.over {
                 return Ok(None);
             }
-            if got == LONGEST {
-                return Err(self
-                    .input
-                    .fault(at, format!("a line of more than {LONGEST} characters: not a log of hex bytes")));
+            self.next_line()?;
+        }
+    }
+
+    fn shape(head: &str) -> Shape {
+        match Dump::of(head, head.len() < HEAD) {
+            Some(dump) => Shape::Dump { dump, gathered: Gathered::default(), last: Vec::new(), again: false },
+            None if array_begins(head) => Shape::Array { open: false, cells: String::new(), from: 0 },
+            None => Shape::Lines,
+        }
+    }
+
+    fn next_line(&mut self) -> Result<(), Fault> {
+        self.text.clear();
+        self.line += 1;
+        let at = At::Line(self.line);
+        let mut limited = self.input.by_ref().take(LONGEST as u64);
+        let got = limited.read_until(b'\n', &mut self.text).map_err(|e| self.input.io_fault(at, &e))?;
+        if got == LONGEST {
+            let what = format!("a line of more than {LONGEST} characters: not a log of hex bytes");
+            return Err(self.input.fault(at, what));
+        }
+        self.over = got == 0;
+        let text = String::from_utf8_lossy(&self.text).into_owned();
+        let (number, ready) = (self.line, &mut self.ready);
+        let taken = match &mut self.shape {
+            Shape::Dump { dump, gathered, last, again } => {
+                dump_line(*dump, &text, number, self.over, (gathered, last, again), ready)
             }
-            match parse(&self.text) {
-                Ok(bytes) if bytes.is_empty() => {}
-                Ok(bytes) => {
-                    self.good = true;
-                    return Ok(Some(Burst { line: self.line, bytes, spoilt: None }));
-                }
-                // In a log a wrong digit costs its line; a file without any bytes before it is no log.
-                Err(what) if self.good => {
-                    return Ok(Some(Burst { line: self.line, bytes: Vec::new(), spoilt: Some(what) }));
-                }
-                Err(what) => return Err(self.input.fault(at, what)),
+            Shape::Array { open, cells, from } => array_line(&text, number, (open, cells, from), ready),
+            Shape::Unknown | Shape::Lines => words::line(&text).map(|said| {
+                ready.extend(
+                    said.into_iter().map(|said| Burst { direction: said.direction, ..Burst::new(number, said.bytes) }),
+                );
+            }),
+        };
+        match taken {
+            Ok(()) => Ok(()),
+            // In a log a wrong digit costs its line; a file without any bytes before it is no log.
+            Err(what) if self.good => {
+                self.ready.push_back(Burst { spoilt: Some(what), ..Burst::new(number, Vec::new()) });
+                Ok(())
             }
+            Err(what) => Err(self.input.fault(at, what)),
         }
     }
 }
 
-fn parse(text: &[u8]) -> Result<Vec<u8>, String> {
-    let text = String::from_utf8_lossy(text);
-    let text = text.trim_start_matches('\u{feff}');
-    let text = text.split('#').next().unwrap_or_default();
+/// A line of a dump; at the `end` what was gathered is a burst.
+fn dump_line(
+    dump: Dump,
+    text: &str,
+    number: u64,
+    end: bool,
+    (gathered, last, again): (&mut Gathered, &mut Vec<u8>, &mut bool),
+    ready: &mut VecDeque<Burst>,
+) -> Result<(), String> {
+    if dump == Dump::Octal {
+        return Err("octal words, which do not tell how they were made: dump with od -An -tx1, or xxd".to_owned());
+    }
+    let mut give = |gathered: &mut Gathered| {
+        let bytes = std::mem::take(&mut gathered.bytes);
+        if !bytes.is_empty() {
+            ready.push_back(Burst::new(gathered.line, bytes));
+        }
+    };
+    if end {
+        give(gathered);
+        return Ok(());
+    }
+    if text.trim().is_empty() {
+        return Ok(());
+    }
+    match dump.row(text)? {
+        (_, Row::Again) => *again = true,
+        (at, row) => {
+            if std::mem::take(again) && !last.is_empty() {
+                while gathered.next < at && gathered.bytes.len() < MOST {
+                    gathered.bytes.extend_from_slice(last);
+                    gathered.next += last.len() as u64;
+                }
+            }
+            if let Row::Bytes(bytes) = row {
+                if gathered.bytes.len() + bytes.len() > MOST {
+                    give(gathered);
+                }
+                if gathered.bytes.is_empty() {
+                    gathered.line = number;
+                }
+                gathered.next = at.saturating_add(bytes.len() as u64);
+                gathered.bytes.extend_from_slice(&bytes);
+                *last = bytes;
+            }
+        }
+    }
+    Ok(())
+}
+
+/// A line of an array in C or Rust: what is between the innermost brackets behind a `=` is a burst.
+fn array_line(
+    text: &str,
+    number: u64,
+    (open, cells, from): (&mut bool, &mut String, &mut u64),
+    ready: &mut VecDeque<Burst>,
+) -> Result<(), String> {
     let text = text.split("//").next().unwrap_or_default();
-    let mut bytes = Vec::new();
-    let separator = |c: char| c.is_whitespace() || matches!(c, ',' | ';' | ':' | '-' | '[' | ']');
-    for word in text.split(separator).filter(|word| !word.is_empty()) {
-        let digits = word.strip_prefix("0x").or_else(|| word.strip_prefix("0X")).unwrap_or(word);
-        if digits.is_empty() || digits.len() % 2 != 0 || !digits.bytes().all(|b| b.is_ascii_hexdigit()) {
-            return Err(format!("\"{word}\" is not bytes in hex: two digits each, as in 1A 20 29"));
-        }
-        bytes.extend(digits.as_bytes().chunks(2).map(|pair| pair.iter().fold(0, |n, &d| n << 4 | nibble(d))));
+    let mut rest = text;
+    if !*open {
+        let Some((_, behind)) = text.split_once('=') else { return Ok(()) };
+        (rest, *open) = (behind, true);
     }
-    Ok(bytes)
-}
-
-fn nibble(digit: u8) -> u8 {
-    match digit {
-        b'0'..=b'9' => digit - b'0',
-        _ => (digit | 0x20) - b'a' + 10,
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn ways_to_write_bytes() {
-        for text in ["1A 20 29", "1a2029", "0x1A, 0x20,0x29", "1a:20:29", "  [1A-20-29] # position", "1A20 29 // x"] {
-            assert_eq!(parse(text.as_bytes()), Ok(vec![0x1a, 0x20, 0x29]), "{text}");
-        }
-        assert_eq!(parse(b"\r\n"), Ok(vec![]));
-        for text in ["1A 2", "xyz", "1A 0x", "12 3g"] {
-            assert!(parse(text.as_bytes()).is_err(), "{text}");
+    for letter in rest.chars() {
+        match letter {
+            '{' | '[' => {
+                cells.clear();
+                *from = number;
+            }
+            '}' | ']' => {
+                let inside = std::mem::take(cells);
+                let bytes = match words::numbers(&inside) {
+                    Some(bytes) => bytes,
+                    None => words::line(&inside)?.into_iter().flat_map(|said| said.bytes).collect(),
+                };
+                if !bytes.is_empty() {
+                    ready.push_back(Burst::new(*from, bytes));
+                }
+            }
+            ';' => {
+                *open = false;
+                cells.clear();
+                break;
+            }
+            letter if cells.len() < 8 * MOST => cells.push(letter),
+            _ => return Err("an array of more than half a million characters".to_owned()),
         }
     }
+    Ok(())
 }

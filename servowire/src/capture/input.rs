@@ -15,6 +15,9 @@ use crate::fault::{At, Fault};
 
 const BUFFER: usize = 1 << 18;
 
+/// Bytes by which a file is known.
+pub(super) const HEAD: usize = 1 << 12;
+
 /// Files inside files are unpacked so deep.
 const DEEPEST: u8 = 4;
 /// What has to be read backwards and is no file on disk is held in memory, up to so many bytes.
@@ -37,6 +40,9 @@ pub struct Input {
     path: Option<PathBuf>,
     depth: u8,
     reader: BufReader<Box<dyn Read>>,
+    /// The beginning, gathered to see what it is, and how much of it was taken.
+    head: Vec<u8>,
+    head_taken: usize,
     taken: Rc<Cell<u64>>,
     /// Somebody else counts.
     quiet: bool,
@@ -93,8 +99,7 @@ impl Input {
 
     /// Whether a read would have to wait: nothing is there, and nothing comes for a moment.
     pub fn pauses(&self) -> bool {
-        let silent = |pipe: &Rc<RefCell<Pipe>>| !pipe.borrow_mut().is_ready(PAUSE);
-        self.reader.buffer().is_empty() && self.pipe.as_ref().is_some_and(silent)
+        self.head_taken == self.head.len() && self.waits()
     }
 
     /// Unpacks gzip and zstd, as often as they are packed.
@@ -153,14 +158,32 @@ impl Input {
             quiet: false,
             pipe: None,
             reader: BufReader::with_capacity(BUFFER, reader),
+            head: Vec::new(),
+            head_taken: 0,
             taken: Rc::default(),
         }
     }
 
-    /// The next bytes without taking them.
+    /// The beginning of the file without taking it: [`HEAD`] bytes, or all there are.
     pub fn peek(&mut self) -> Result<&[u8], Fault> {
-        let name = &self.name;
-        self.reader.fill_buf().map_err(|e| Fault::new(name, At::File, format!("cannot be read: {}", plain(&e))))
+        while self.head.len() < HEAD && self.head_taken == 0 && (self.head.is_empty() || !self.waits()) {
+            let name = &self.name;
+            let more = self.reader.fill_buf();
+            let more = more.map_err(|e| Fault::new(name, At::File, format!("cannot be read: {}", plain(&e))))?;
+            let count = more.len().min(HEAD - self.head.len());
+            self.head.extend_from_slice(more.get(..count).unwrap_or_default());
+            self.reader.consume(count);
+            if count == 0 {
+                break;
+            }
+        }
+        Ok(self.head.get(self.head_taken..).unwrap_or_default())
+    }
+
+    /// Whether nothing more than the head is there for a moment.
+    fn waits(&self) -> bool {
+        let silent = |pipe: &Rc<RefCell<Pipe>>| !pipe.borrow_mut().is_ready(PAUSE);
+        self.reader.buffer().is_empty() && self.pipe.as_ref().is_some_and(silent)
     }
 
     /// The name for messages.
@@ -209,7 +232,9 @@ impl Input {
 
 impl Read for Input {
     fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
-        let n = self.reader.read(buffer)?;
+        let mut head = self.head.get(self.head_taken..).unwrap_or_default();
+        let n = if head.is_empty() { self.reader.read(buffer)? } else { head.read(buffer)? };
+        self.head_taken = self.head.len().min(self.head_taken + n);
         self.count(n);
         Ok(n)
     }
@@ -217,12 +242,19 @@ impl Read for Input {
 
 impl BufRead for Input {
     fn fill_buf(&mut self) -> io::Result<&[u8]> {
-        self.reader.fill_buf()
+        match self.head.get(self.head_taken..) {
+            Some(head) if !head.is_empty() => Ok(head),
+            _ => self.reader.fill_buf(),
+        }
     }
 
     fn consume(&mut self, amount: usize) {
         self.count(amount);
-        self.reader.consume(amount);
+        if self.head_taken < self.head.len() {
+            self.head_taken = self.head.len().min(self.head_taken + amount);
+        } else {
+            self.reader.consume(amount);
+        }
     }
 }
 

@@ -29,7 +29,7 @@ impl Records {
         let at = At::Byte(self.record.saturating_sub(1).saturating_mul(self.size as u64));
         match self.input.read_full(&mut bytes, self.size) {
             Ok(0) => Ok(None),
-            Ok(got) if got == self.size => Ok(Some(Burst { line: self.record, bytes, spoilt: None })),
+            Ok(got) if got == self.size => Ok(Some(Burst::new(self.record, bytes))),
             Ok(got) => {
                 let what = format!("the last record has {got} of {} bytes: it was cut off", self.size);
                 Err(self.input.fault(at, what))

@@ -108,7 +108,8 @@ impl Table {
                 break;
             }
         }
-        let heading = Heading::parse(&above, waiting.front().map(|(_, row)| row.as_slice()));
+        let heading =
+            Heading::parse(&above, waiting.iter().map(|(_, row)| row.as_slice()).collect::<Vec<_>>().as_slice());
         let Some(heading) = heading else {
             let what = "no table with times or a sample rate and columns of levels or voltages is in it";
             return Err(Fault::new(&name, At::Line(1), what));

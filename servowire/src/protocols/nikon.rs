@@ -8,16 +8,17 @@ mod describe;
 
 use std::io;
 
-use nikon_aformat::inspect::Kind;
+use nikon_aformat::inspect::{Cause, Kind, inspect};
 use nikon_aformat::{
     BitOrder, BitRate, Command, Echo, Error, Expected, FRAME_BITS, Layout, RawResponse, Request, RequestFrame,
-    Resolution, Response,
+    Resolution, Response, Window,
 };
 
 use crate::capture::hexlog::Burst;
-use crate::event::{Event, Place};
+use crate::event::{Event, Place, Verdict};
 use crate::line::{LineField, StartStop};
 use crate::output::Sink;
+use crate::protocols::plausible::slipped_bit;
 use describe::Encoder;
 
 pub use describe::FIELDS;
@@ -61,14 +62,25 @@ struct Group {
     /// The first frame whose delimiter read 0.
     broken: Option<u8>,
     spikes: u32,
+    /// The bits of the line, the first in bit 0, where they are known.
+    raw: u128,
     /// The line of a log without times.
     line: Option<u64>,
 }
 
 impl Group {
-    fn push(&mut self, field: &LineField) {
+    /// `bit`: its length in picoseconds, 0 in a log.
+    fn push(&mut self, field: &LineField, bit: i64) {
         if !field.delimiter && self.broken.is_none() {
             self.broken = u8::try_from(self.contents.len()).ok();
+        }
+        if self.contents.is_empty() {
+            self.raw = field.bits;
+        } else if field.bits != 0 && bit > 0 {
+            // Somebody seems to begin anew: what he says stands behind.
+            let at = u32::try_from((field.start - self.start() + bit / 2) / bit).unwrap_or(u32::MAX);
+            let below = 1_u128.checked_shl(at).map_or(u128::MAX, |one| one - 1);
+            self.raw &= field.bits.checked_shl(at).unwrap_or(u128::MAX) | below;
         }
         self.contents.push(field.content);
         self.starts.push(field.start);
@@ -165,7 +177,15 @@ impl Decoder {
         let pause = start - self.open.end;
         match self.open.kind() {
             Kind::Request => pause > MEMORY_PAUSE,
-            _ => pause > PAUSE_BITS * self.bit,
+            _ if pause <= PAUSE_BITS * self.bit => false,
+            // The frames of a damaged reply need not follow each other: it lasts as long as a whole one.
+            _ => {
+                let asked = self.pending.map(|pending| pending.request);
+                let whole = asked
+                    .filter(|request| !request.command().is_multi_response())
+                    .map_or(0, |request| i64::from(request.expected(Resolution::default()).layout().line_bits()));
+                start - self.open.start() >= whole * self.bit
+            }
         }
     }
 
@@ -188,7 +208,7 @@ impl Decoder {
     }
 
     fn request(&mut self, group: &Group, out: &mut dyn Sink) -> io::Result<Event> {
-        self.give_up(group.start(), out)?;
+        self.give_up(group.start(), true, out)?;
         let result = group.request();
         self.pending = result.ok().map(|request| Pending { request, place: group.place(), replies: 0 });
         Ok(describe::request(group, result))
@@ -219,18 +239,59 @@ impl Decoder {
             }
             (None, Err(error)) => Err(error),
         };
-        self.encoder.answer(group, expected.ok(), result, delay)
+        let mut event = self.encoder.answer(group, expected.ok(), result, delay);
+        if let (Verdict::Refused(refusal), Some(request)) = (&mut event.verdict, asked) {
+            refusal.cause = cause(group, request, expected.ok()).or(refusal.cause.take());
+        }
+        event
     }
 
-    /// No reply came until `now`.
-    fn give_up(&mut self, now: i64, out: &mut dyn Sink) -> io::Result<()> {
+    /// No reply came until `now`; `asked`: when somebody asked again.
+    fn give_up(&mut self, now: i64, asked: bool, out: &mut dyn Sink) -> io::Result<()> {
         match self.pending.take() {
             Some(pending) if pending.replies == 0 => {
-                out.event(&describe::silence(pending.request, pending.place, REPLY_TIMEOUT_BITS * self.bit, now))
+                let timeout = REPLY_TIMEOUT_BITS * self.bit;
+                out.event(&describe::silence(pending.request, pending.place, timeout, now, asked))
             }
             _ => Ok(()),
         }
     }
+}
+
+/// High bits at the end of a whole reply that say more of an idle line than of its check field.
+const CUT_BITS: u32 = 5;
+const CUT: &str = "it was cut: the encoder broke off, or somebody switched the line";
+
+/// What probably spoilt the reply to a request.
+fn cause(group: &Group, request: Request, expected: Option<Expected>) -> Option<String> {
+    let layout =
+        expected.map_or_else(|| request.expected(Resolution::default()).layout(), |expected| expected.layout());
+    let len = layout.line_bits();
+    let expected = expected.unwrap_or_else(|| request.expected(Resolution::default()));
+    let line = Window::from_bits(group.raw & (1_u128.checked_shl(len)?.wrapping_sub(1)), len)?;
+    let found = if group.raw == 0 { None } else { inspect(request, Resolution::default(), line).cause };
+    if let Some(cause) = found.filter(|cause| *cause != Cause::Disturbed) {
+        return Some(cause.to_string());
+    }
+    let due = usize::from(layout.frames());
+    let sound =
+        |bits: u128| Window::from_bits(bits, len).is_some_and(|line| Response::parse_line(&expected, line).is_ok());
+    // With one bit wrong, none has slipped.
+    let flipped = (0..len).any(|at| sound(line.bits() ^ 1 << at));
+    let in_place = group.broken.is_none() && group.contents.len() == due;
+    if in_place && !flipped && (line.bits() << (128 - len)).leading_ones() >= CUT_BITS {
+        return Some(CUT.to_owned());
+    }
+    if flipped {
+        return Some(Cause::Disturbed.to_string());
+    }
+    if let Some(slipped) = slipped_bit(group.raw, len, sound) {
+        return Some(slipped.to_owned());
+    }
+    if group.broken.is_none() && group.contents.len() < due {
+        return Some(CUT.to_owned());
+    }
+    found.map(|cause| cause.to_string())
 }
 
 /// What a reply has to be: as asked, in the layout that has so many frames; without a request, as it says itself.
@@ -268,7 +329,7 @@ impl StartStop for Decoder {
         if !self.open.is_empty() && self.is_over(field.start) {
             self.close(out)?;
         }
-        self.open.push(field);
+        self.open.push(field, self.bit);
         let whole = match self.open.kind() {
             Kind::Request => self.open.request_frames(),
             _ => RawResponse::MAX_FRAMES,
@@ -312,7 +373,7 @@ impl StartStop for Decoder {
         }
         match (end, self.pending.and_then(|pending| pending.end())) {
             (Some(end), Some(asked)) if end - asked < REPLY_TIMEOUT_BITS * self.bit => Ok(()),
-            (end, _) => self.give_up(end.unwrap_or_default(), out),
+            (end, _) => self.give_up(end.unwrap_or_default(), false, out),
         }
     }
 }

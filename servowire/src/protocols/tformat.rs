@@ -13,7 +13,7 @@ use tformat::inspect::{Cause, inspect, inspect_bytes};
 use tformat::{AllData, BitRate, ControlField, DataId, Error, Request, Response};
 
 use crate::capture::hexlog::Burst;
-use crate::event::{Event, Verdict};
+use crate::event::{Direction, Event, Verdict};
 use crate::line::{LineField, StartStop};
 use crate::output::Sink;
 use describe::Encoder;
@@ -94,7 +94,8 @@ impl Decoder {
             // Behind a low delimiter the receiver may have skipped fields: the answer lasts as long as a whole one.
             Some(pending) => {
                 let whole = 10 * pending.answer_fields(self.open.first()) as i64;
-                self.open.broken.is_some() && start - self.open.start() > whole * self.bit
+                pending.is_asked_again(&self.open)
+                    || self.open.broken.is_some() && start - self.open.start() > whole * self.bit
             }
         }
     }
@@ -111,7 +112,7 @@ impl Decoder {
         let frame = std::mem::take(&mut self.open);
         let begin = self.begin.take();
         if self.pending.is_some_and(|pending| pending.is_asked_again(&frame)) {
-            self.give_up(frame.start(), out)?;
+            self.give_up(frame.start(), true, out)?;
         }
         if let Some(pending) = self.pending.take() {
             let event = self.answer(&frame, pending);
@@ -160,10 +161,10 @@ impl Decoder {
             return cause.map(|cause| cause.to_string());
         }
         let due = usize::from(request.data_id().response_fields());
-        // With all delimiters in place, no bit has slipped.
-        if let Some(slipped) =
-            (frame.broken.is_some() || frame.fields != due).then(|| frame.slipped_bit(request)).flatten()
-        {
+        // With all delimiters in place and one bit wrong, none has slipped.
+        let wrong = frame.bytes().iter().fold(0, |crc, byte| crc ^ byte).count_ones();
+        let flipped = frame.broken.is_none() && frame.fields == due && wrong == 1;
+        if let Some(slipped) = if flipped { None } else { frame.slipped_bit(request) } {
             return Some(slipped.to_owned());
         }
         if frame.broken.is_none() && frame.fields < due {
@@ -193,11 +194,13 @@ impl Decoder {
         describe::request(frame, asked, result)
     }
 
-    /// The answer did not come until `now`.
-    fn give_up(&mut self, now: i64, out: &mut dyn Sink) -> io::Result<()> {
+    /// The answer did not come until `now`; `asked`: when somebody asked again.
+    fn give_up(&mut self, now: i64, asked: bool, out: &mut dyn Sink) -> io::Result<()> {
         match self.pending.take() {
             // Nobody owes an answer to a damaged request.
-            Some(Pending { request: Some(request), place }) => out.event(&describe::silence(request, place, now)),
+            Some(Pending { request: Some(request), place }) => {
+                out.event(&describe::silence(request, place, now, asked))
+            }
             _ => Ok(()),
         }
     }
@@ -235,7 +238,7 @@ impl StartStop for Decoder {
         if self.open.fields == 0 {
             let due = self.pending.and_then(|pending| pending.end()).map(|end| end.saturating_add(ANSWER_TIMEOUT));
             if due.is_some_and(|due| field.start > due) {
-                self.give_up(field.start, out)?;
+                self.give_up(field.start, true, out)?;
             }
         }
         self.open.push(field);
@@ -252,8 +255,9 @@ impl StartStop for Decoder {
         // The line is nothing but a request, or nothing but an answer.
         let is_request = id(rest).is_ok_and(|id| rest.len() == usize::from(id.request_fields()));
         let is_answer = id(rest).is_ok_and(|id| rest.len() == usize::from(id.response_fields())) && !is_request;
-        if self.pending.is_some_and(|pending| is_request && rest.len() < pending.answer_fields_of(rest)) {
-            self.give_up(0, out)?;
+        let asks = burst.direction == Some(Direction::Request);
+        if asks || self.pending.is_some_and(|pending| is_request && rest.len() < pending.answer_fields_of(rest)) {
+            self.give_up(0, false, out)?;
         }
         if is_answer && self.pending.is_none() {
             return self.take(burst.line, rest, out);
@@ -274,7 +278,7 @@ impl StartStop for Decoder {
     }
 
     fn finish(&mut self, end: Option<i64>, out: &mut dyn Sink) -> io::Result<()> {
-        let Some(end) = end else { return self.give_up(0, out) };
+        let Some(end) = end else { return self.give_up(0, false, out) };
         if self.open.fields > 0 {
             let recent = end - self.open.end <= FIELD_TIMEOUT_BITS * self.bit;
             let request = self.pending.is_none()
@@ -285,7 +289,7 @@ impl StartStop for Decoder {
             self.close(out)?;
         }
         match self.pending.and_then(|pending| pending.end()) {
-            Some(asked) if end > asked.saturating_add(ANSWER_TIMEOUT) => self.give_up(end, out),
+            Some(asked) if end > asked.saturating_add(ANSWER_TIMEOUT) => self.give_up(end, false, out),
             _ => Ok(()),
         }
     }

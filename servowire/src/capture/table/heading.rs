@@ -118,23 +118,31 @@ fn is_units(cells: &[String]) -> bool {
 
 impl Heading {
     /// From the lines above the first row. None where they tell neither times nor a rate.
-    pub(super) fn parse(above: &[Vec<u8>], row: Option<&[u8]>) -> Option<Self> {
+    pub(super) fn parse(above: &[Vec<u8>], rows: &[&[u8]]) -> Option<Self> {
         let lines: Vec<String> = above.iter().map(|line| String::from_utf8_lossy(line).into_owned()).collect();
         let (remarks, lines): (Vec<&str>, Vec<&str>) =
             lines.iter().map(String::as_str).partition(|line| line.trim_start().starts_with([';', '#']));
         let last = lines.last().copied().unwrap_or_default();
-        let row = row.unwrap_or_default();
+        let row = rows.first().copied().unwrap_or_default();
         let separator = separator(if row.is_empty() { last.as_bytes() } else { row });
         let count = if row.is_empty() { titles(last, separator).len() } else { split(row, separator).len() };
         let mut heads: Vec<Vec<String>> = lines.iter().map(|line| titles(line, separator)).collect();
         let only_units =
             |cells: &Vec<String>| is_units(cells) && !cells.iter().any(|cell| is_time(cell) && unit(cell).is_none());
         let units = if heads.last().is_some_and(only_units) { heads.pop() } else { None };
-        // A line of units may be the only heading.
-        let names = match heads.last() {
-            Some(cells) if cells.len() >= count.min(2) => cells.clone(),
-            _ => units.clone().unwrap_or_default(),
+        // Rigol: first time and period stand behind the units.
+        let steps = if heads.last().is_some_and(|cells| cells.first().is_some_and(|cell| cell == "Sequence")) {
+            heads.pop().and_then(|cells| Self::steps(&cells))
+        } else {
+            None
         };
+        // A line of units may be the only heading; a key with its value is none.
+        let is_heading = |cells: &&Vec<String>| {
+            let number = |cell: &String| cell::number(cell.as_bytes(), false).is_some();
+            cells.len() >= count.min(2)
+                && (!cells.iter().any(number) || cells.first().is_some_and(|cell| is_time(cell)))
+        };
+        let names = heads.last().filter(is_heading).cloned().or(units.clone()).unwrap_or_default();
         let said = |key: &str| {
             let start = |line: &&&str| line.trim_start_matches([';', '#', ' ']).to_ascii_lowercase().starts_with(key);
             let line = remarks.iter().find(start)?;
@@ -144,8 +152,13 @@ impl Heading {
         let channels: Vec<String> = said("channels")
             .map(|text| text.split(',').map(|name| name.trim().to_owned()).collect())
             .unwrap_or_default();
-        let mut heading = Self { separator, comma: separator == b';', names, count, time: None, fixed: None };
-        heading.find_time(units.as_deref(), &heads, rate, channels.len());
+        let mut heading = Self { separator, comma: separator == b';', names, count, time: None, fixed: steps };
+        if steps.is_none() {
+            heading.find_time(units.as_deref(), &heads, rate, channels.len());
+        }
+        if heading.time.is_none() && heading.fixed.is_none() && rate.is_none() {
+            heading.time = heading.growing(rows).map(|index| (index, 1));
+        }
         if heading.time.is_none() && heading.fixed.is_none() {
             let rate = rate.filter(|rate| (1.0..=1e12).contains(rate))?;
             heading.fixed = Some(Times::Rate(rate.round() as u64));
@@ -183,7 +196,8 @@ impl Heading {
             }
         }
         let time = self.names.iter().position(|name| is_time(name));
-        let time = time.or_else(|| self.names.iter().position(|name| name.eq_ignore_ascii_case("time")));
+        // The names may not say it, but the units do.
+        let time = time.or_else(|| units?.iter().position(|cell| unit(cell).is_some()));
         if let Some(index) = time {
             let name = self.names.get(index).map_or("", String::as_str);
             let by_units = units.and_then(|units| unit(units.get(index)?));
@@ -204,6 +218,18 @@ impl Heading {
         let mut numbers = cells.iter().rev().filter_map(|cell| cell::number(cell.as_bytes(), false));
         let (period, start) = (numbers.next()?, numbers.next()?);
         Some(Times::Steps { start: (start * 1e12) as i64, period: period * 1e12 })
+    }
+
+    /// Where nothing says which column is the time: the first that grows from one row to the next, with another beside it.
+    fn growing(&self, rows: &[&[u8]]) -> Option<usize> {
+        let [first, second] = rows else { return None };
+        let numbers = |row: &[u8]| -> Vec<Option<f64>> {
+            self.split(row).into_iter().map(|cell| cell::number(cell, self.comma)).collect()
+        };
+        let (first, second) = (numbers(first), numbers(second));
+        let both = first.iter().zip(&second).filter_map(|(a, b)| a.zip(*b));
+        let grows = first.iter().zip(&second).position(|(a, b)| a.zip(*b).is_some_and(|(a, b)| a < b && b - a < 1.0));
+        grows.filter(|_| both.count() > 1)
     }
 
     /// Names of the channels as a remark has them; the column of times is not among them.

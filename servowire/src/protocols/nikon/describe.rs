@@ -7,6 +7,7 @@ use nikon_aformat::{
 
 use super::{Group, Settings};
 use crate::event::{Direction, Event, Field, Place, Position, Refusal, Value, Verdict};
+use crate::protocols::plausible::{Motion, two_masters};
 
 /// The fields an event may have.
 pub const FIELDS: &[&str] = &[
@@ -30,6 +31,9 @@ pub const FIELDS: &[&str] = &[
     "words",
     "note",
 ];
+
+/// Nobody gives up an encoder after so short a time, in picoseconds.
+const BRIEF: i64 = 20_000_000;
 
 /// A request as it was on the line.
 pub(super) fn request(group: &Group, result: Result<Request, Error>) -> Event {
@@ -84,11 +88,13 @@ pub(super) struct Encoder {
     settings: Settings,
     /// By the type word, once the line has carried it.
     hint: Option<Resolution>,
+    /// By address.
+    motion: [Motion; 8],
 }
 
 impl Encoder {
     pub(super) fn new(settings: Settings) -> Self {
-        Self { settings, hint: None }
+        Self { settings, hint: None, motion: [Motion::default(); 8] }
     }
 
     /// A reply as it was on the line.
@@ -107,6 +113,9 @@ impl Encoder {
                 let (crc, _) = response.emit().crc();
                 let received = group.contents.last().map_or(crc, |last| (last >> 8) as u8).reverse_bits();
                 fields.push(Field::hex("CRC", received, 2));
+                let motion = self.motion.get_mut(usize::from(response.ea.get()));
+                let moved = position.zip(motion).and_then(|(position, motion)| motion.note(group.place(), position));
+                fields.extend(moved.map(|what| Field::text("note", what)));
             }
             Err(_) => fields.push(words(group)),
         }
@@ -205,10 +214,18 @@ impl Encoder {
 }
 
 /// No reply came to the request at `place` until `now`.
-pub(super) fn silence(request: Request, place: Place, timeout: i64, now: i64) -> Event {
-    let cause = "only the request is on the line: no encoder of this address, A and B exchanged, or not its bit rate";
+pub(super) fn silence(request: Request, place: Place, timeout: i64, now: i64, asked: bool) -> Event {
+    let after = match place {
+        Place::Time { end, .. } if asked => now.saturating_sub(end),
+        _ => timeout,
+    };
+    let cause = if after < BRIEF {
+        two_masters(after)
+    } else {
+        "only the request is on the line: no encoder of this address, A and B exchanged, or not its bit rate".to_owned()
+    };
     let fields = vec![Field::number("EA", request.ea.get())];
-    Event { fields, ..Event::silence(place, request.command().mnemonic(), "reply", timeout, now, cause) }
+    Event { fields, ..Event::silence(place, request.command().mnemonic(), "reply", timeout, now, &cause) }
 }
 
 /// The content bits as vendor documents print them, the first bit of the line in bit 15.

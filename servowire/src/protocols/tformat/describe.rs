@@ -2,11 +2,12 @@
 
 use std::sync::LazyLock;
 
-use tformat::{Abs, Adf, AllData, DataId, Error, Memory, Request, Resolution, Response};
+use tformat::{Abs, Adf, AllData, DataId, Error, Memory, Request, Resolution, Response, StatusField};
 
 use super::frame::Frame;
 use super::{ANSWER_TIMEOUT, Settings};
 use crate::event::{Direction, Event, Field, Place, Position, Refusal, Value, Verdict};
+use crate::protocols::plausible::{Motion, two_masters};
 
 /// The fields an event may have.
 pub const FIELDS: &[&str] =
@@ -31,11 +32,13 @@ pub(super) struct Encoder {
     settings: Settings,
     /// By the last ENID on the line.
     hint: Option<Resolution>,
+    enid: Option<u8>,
+    motion: Motion,
 }
 
 impl Encoder {
     pub(super) fn new(settings: Settings) -> Self {
-        Self { settings, hint: None }
+        Self { settings, hint: None, enid: None, motion: Motion::default() }
     }
 
     /// An answer as it was on the line, to `id` where the request was read.
@@ -47,9 +50,17 @@ impl Encoder {
         delay: Option<i64>,
     ) -> Event {
         let mut fields = Vec::with_capacity(8);
-        let mut position = None;
+        let (mut position, mut note) = (None, None);
         match result {
-            Ok(response) => position = self.response(response, &mut fields),
+            Ok(response) => {
+                let before = self.enid;
+                position = self.response(response, &mut fields);
+                let moved = position.and_then(|position| self.motion.note(frame.place(), position));
+                let notes: Vec<String> = doubts(response, before).into_iter().chain(moved).collect();
+                if !notes.is_empty() {
+                    note = Some(Field::text("note", notes.join("; ")));
+                }
+            }
             // A refusal is a sound ID 3 frame with all its values.
             Err(Error::Rejected { .. }) => {
                 if let Ok(full) = AllData::parse(frame.bytes()) {
@@ -61,6 +72,7 @@ impl Encoder {
         if result.is_ok() {
             fields.extend(frame.bytes().last().map(|crc| Field::hex("CRC", *crc, 2)));
         }
+        fields.extend(note);
         fields.extend(spikes(frame));
         let names = frame.data_id().ok().or(id).map_or(&["CF"][..], |id| id.layout().1);
         let mut event = event(frame, Direction::Answer, id, fields, verdict(frame, names, result.err()));
@@ -127,6 +139,7 @@ impl Encoder {
 
     fn identify(&mut self, enid: u8, fields: &mut Vec<Field>) {
         fields.push(Field::number("ENID", enid));
+        self.enid = Some(enid);
         self.hint = Resolution::from_enid(enid).map(|hint| hint.resolution);
     }
 
@@ -139,10 +152,40 @@ impl Encoder {
     }
 }
 
-/// No answer came to the request at `place` until `now`.
-pub(super) fn silence(request: Request, place: Place, now: i64) -> Event {
-    let cause = "only the request is on the line: no encoder, A and B exchanged, or not its bit rate";
-    Event::silence(place, kind(Some(request.data_id())), "answer", ANSWER_TIMEOUT, now, cause)
+/// What an answer says that hardly goes together; `before`: the encoder ID until now.
+fn doubts(response: Response, before: Option<u8>) -> Vec<String> {
+    let mut out = Vec::new();
+    let enid = match response {
+        Response::ReadEncoderId(v) => Some(v.enid),
+        Response::ReadAll(full) => Some(full.enid),
+        _ => None,
+    };
+    if let (Some(before), Some(enid)) = (before, enid.filter(|enid| before.is_some_and(|before| before != *enid))) {
+        out.push(format!(
+            "the encoder ID was {before} and is {enid}: another encoder, or damage that CRC does not see"
+        ));
+    }
+    if let Response::ReadAll(full) = response {
+        // Encoders that leave SF at 0 do so always.
+        if full.sf.bits() != 0 && !full.sf.agrees_with(full.almc) {
+            out.push(format!("SF does not say what ALMC says: {} is due", StatusField::of_alarms(full.almc)));
+        }
+    }
+    out
+}
+
+/// No answer came to the request at `place` until `now`; `asked`: because somebody asked again.
+pub(super) fn silence(request: Request, place: Place, now: i64, asked: bool) -> Event {
+    let after = match place {
+        Place::Time { end, .. } if asked => now.saturating_sub(end),
+        _ => ANSWER_TIMEOUT,
+    };
+    let cause = if after < ANSWER_TIMEOUT {
+        two_masters(after)
+    } else {
+        "only the request is on the line: no encoder, A and B exchanged, or not its bit rate".to_owned()
+    };
+    Event::silence(place, kind(Some(request.data_id())), "answer", ANSWER_TIMEOUT, now, &cause)
 }
 
 fn event(frame: &Frame, direction: Direction, id: Option<DataId>, fields: Vec<Field>, verdict: Verdict) -> Event {

@@ -4,6 +4,7 @@ use tformat::{ControlField, DataId, Error, Request, Response, Window};
 
 use crate::event::Place;
 use crate::line::LineField;
+use crate::protocols::plausible;
 
 /// More fields without a pause are no frame.
 pub(super) const MOST_FIELDS: usize = 16;
@@ -66,20 +67,8 @@ impl Frame {
     /// What makes a sound answer of the bits on the line: one more at a place, or one less.
     pub(super) fn slipped_bit(&self, request: Request) -> Option<&'static str> {
         let len = 10 * u32::from(request.data_id().response_fields());
-        let sound = |bits: u128| {
-            Window::from_bits(bits & ((1 << len) - 1), len)
-                .is_some_and(|line| Response::parse_line(request, line).is_ok())
-        };
-        if self.raw == 0 {
-            return None;
-        }
-        (1..len).find_map(|at| {
-            let low = self.raw & ((1 << at) - 1);
-            let more = |bit: u128| low | bit << at | self.raw >> at << (at + 1);
-            if sound(more(0)) || sound(more(1)) {
-                return Some("a bit of it was lost on the way");
-            }
-            sound(low | self.raw >> (at + 1) << at).then_some("a bit came twice, or one was added on the way")
+        plausible::slipped_bit(self.raw, len, |bits| {
+            Window::from_bits(bits, len).is_some_and(|line| Response::parse_line(request, line).is_ok())
         })
     }
 
@@ -137,10 +126,13 @@ impl Pending {
         }
     }
 
-    /// Whether a frame is not the answer but the next request: it is one, and later than an answer begins.
+    /// Whether a frame is not the answer but the next request: it is one, and later than an answer begins or for
+    /// something else.
     pub(super) fn is_asked_again(&self, frame: &Frame) -> bool {
         let late = self.end().is_some_and(|end| frame.start() - end > LATE_ANSWER);
-        late && frame.broken.is_none()
+        let other = self.request.is_some_and(|request| frame.data_id().is_ok_and(|id| id != request.data_id()));
+        (late || other)
+            && frame.broken.is_none()
             && frame.fields < self.answer_fields(frame.first())
             && frame.data_id().is_ok_and(|id| frame.fields == usize::from(id.request_fields()))
     }

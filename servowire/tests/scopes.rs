@@ -1,0 +1,171 @@
+//! Tables of oscilloscopes and analysers, written by hand after the layouts that their makers' programs have.
+#![allow(
+    clippy::arithmetic_side_effects,
+    clippy::cast_possible_truncation,
+    clippy::cast_possible_wrap,
+    clippy::cast_precision_loss,
+    clippy::cast_sign_loss,
+    clippy::indexing_slicing,
+    clippy::std_instead_of_core,
+    clippy::unwrap_used
+)]
+
+mod common;
+
+use std::fmt::Write as _;
+
+use common::{Bench, GOOD_FRAMES, good_traffic};
+
+/// Samples a second, and the time of the first.
+const RATE: f64 = 20e6;
+const START: f64 = -1e-4;
+
+/// Voltages of a line with noise, overshoot behind its edges, and slow edges.
+fn volts() -> Vec<f64> {
+    let mut wave = good_traffic(2.5e6);
+    wave.idle_us(20.0);
+    let (mut out, mut last, mut seed) = (Vec::new(), 3.2_f64, 1_u32);
+    for level in wave.samples(RATE) {
+        let due = if level { 3.2 } else { 0.1 };
+        seed = seed.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+        let noise = f64::from(seed >> 16) / 65_536.0 * 0.2 - 0.1;
+        let overshoot = (due - last) * 0.15;
+        last = due;
+        out.push(due + overshoot + noise);
+    }
+    out
+}
+
+fn time(k: usize) -> f64 {
+    START + k as f64 / RATE
+}
+
+/// A heading and a row for each voltage.
+fn table(heading: &str, row: impl Fn(usize, f64) -> String) -> String {
+    let mut text = heading.to_owned();
+    for (k, volts) in volts().into_iter().enumerate() {
+        text.push_str(&row(k, volts));
+        text.push('\n');
+    }
+    text
+}
+
+#[track_caller]
+fn is_read(name: &str, text: &str) {
+    let run = Bench::new().decode("scope.csv", text, &["--json"]);
+    assert_eq!(run.code, 0, "{name}: {}", run.err);
+    assert_eq!(run.json().len(), GOOD_FRAMES, "{name}: {}\n{}", run.err, run.out);
+}
+
+#[test]
+fn rigol() {
+    let heading = "X,CH1,CH2,Start,Increment,\nSequence,Volt,Volt,-1.000000e-04,5.000000e-08\n";
+    is_read("DS1000Z", &table(heading, |k, v| format!("{k},{v:.2e},{:.2e},", 0.01)));
+    let heading = "Time,X(CH2),\nSecond,Volt,\n";
+    is_read("DS1000E", &table(heading, |k, v| format!("{:.4e},{v:.1e},", time(k))));
+    is_read("MSO5000 screen", &table("Time(s),CH1(V)\n", |k, v| format!("{:.9e},{v:.3}", time(k))));
+    is_read("MSO5000 screen, old", &table("Time(s),CH1V,CH2V\n", |k, v| format!("{:.9e},{v:.3},0.01", time(k))));
+    is_read("MSO5000 memory", &table("CH1(V),t0 = -0.0001s, tInc = 5e-08s,\n", |_, v| format!("{v:.4},,,")));
+    is_read("DHO memory", &table("CH1V,CH4V,t0=-0.0001,tInc=5e-08\n", |_, v| format!("{v:.4},0.02,,")));
+}
+
+/// Stamps of so few digits that most of them repeat.
+#[test]
+fn times_with_too_few_digits() {
+    is_read("five digits", &table("Time(s),CH1(V)\n", |k, v| format!("{:.4e},{v:.3}", 1.0 + time(k))));
+}
+
+#[test]
+fn siglent() {
+    let heading = "Record Length,Analog:14000\nSample Interval,Analog:5.0E-08\nVertical Units,CH1:V CH2:V,,\n\
+        Vertical Scale,CH1:1.00 CH2:1.00\nVertical Offset,CH1:0.00 CH2:0.00\nHorizontal Units,s\nHorizontal Scale,5.0E-05\n\
+        Model Number,SDS1104X-E\nSerial Number,SDS000000\nSoftware Version,7.1.6.1.33\n\nSource,CH1,CH2\nSecond,Value,Value\n";
+    is_read("menu save", &table(heading, |k, v| format!("{:+.7E},{v:+.2E},+4.0E-02", time(k))));
+    let heading = "iRecord Length,Analog:14000\nSample Rate,2e7\nVertical Scale,CH1: 0.05\nVertical Offset,CH1: 0.0\n\
+        Horizontal Scale,5e-05\nSecond,Volt\n";
+    is_read("bin2csv", &table(heading, |k, v| format!("{:.11},{v:.5}", time(k))));
+}
+
+#[test]
+fn tektronix() {
+    let keys = [
+        "Record Length,2.500000e+03",
+        "Sample Interval,5.000000e-08",
+        "Trigger Point,1.250000000000e+03",
+        "Trigger Time,0.0",
+        ",",
+        "Source,CH1",
+        "Vertical Units,V",
+        "Vertical Scale,1.000000e+00",
+        "Vertical Offset,0.0",
+        "Horizontal Units,s",
+        "Horizontal Scale,2.500000e-04",
+        "Pt Fmt,Y",
+        "Yzero,0.0",
+        "Probe Atten,1.000000e+01",
+        "Model Number,TDS2024B",
+        "Serial Number,C000000",
+        "Firmware Version,FV:v22.01",
+    ];
+    let row = |k: usize, v: f64| format!("{},,{:.9},  {v:.5},", keys.get(k).unwrap_or(&","), time(k));
+    is_read("TDS2000", &table("", row));
+    let heading = "Model,MSO2014\nFirmware Version,1.20\n\nWaveform Type,ANALOG,,Waveform Type,DIGITAL\nPoint Format,Y,,Point Format,Y\n\
+        Horizontal Units,s,,Horizontal Units,s\nHorizontal Scale,4e-05,,Horizontal Scale,4e-05\nSample Interval,5e-08,,Sample Interval,5e-08\n\
+        Record Length,1e+07,,Record Length,1e+07\nGating,0.0% to 100.0%,,Gating,0.0% to 100.0%\nProbe Attenuation,10,,,\n\
+        Vertical Units,V,,Threshold Used,1.65\n,,,,\nLabel,line,,Label,,\nTIME,CH1,,TIME,D1,D0\n";
+    is_read(
+        "MSO2000, two blocks",
+        &table(heading, |k, v| format!("{0:.9e},{v:.3},,{0:.9e},{1},0", time(k), u8::from(v > 1.6))),
+    );
+    is_read("TDS3000, without heading", &table("", |k, v| format!("{:.9},{v:.4}\r", time(k))));
+}
+
+#[test]
+fn keysight_and_pico() {
+    is_read(
+        "InfiniiVision",
+        &table("x-axis,1,2\nsecond,Volt,Volt\n", |k, v| format!("{:.9E},{v:+.5E},-402.010E-06", time(k))),
+    );
+    let heading = "Time,Channel A,Channel B\n(us),(V),(V)\n\n";
+    is_read("PicoScope", &table(heading, |k, v| format!("{:.8},{v:.8},0.00100000", time(k) * 1e6)));
+    let heading = "Zeit;Kanal A\n(μs);(V)\n\n";
+    is_read(
+        "PicoScope, German",
+        &table(heading, |k, v| {
+            let volts = if v > 3.7 { "∞".to_owned() } else { format!("{v:.8}") };
+            format!("{:.8};{volts}", time(k) * 1e6).replace('.', ",")
+        }),
+    );
+}
+
+#[test]
+fn waveforms_and_analysers() {
+    let heading = "#Digilent WaveForms Oscilloscope Acquisition\n#Device Name: Discovery2\n#Serial Number: SN:210321000000\n\
+        #Date Time: 2025-03-05 15:48:44.807.213.070\n#Sample rate: 2e+07Hz\n#Samples: 20000\n#Trigger: Source: Channel 1\n\n\
+        Time (s),Channel 1 (V),Channel 2 (V)\n";
+    is_read("WaveForms", &table(heading, |k, v| format!("{:e},{v},0.001", time(k))));
+    let heading = "#Digilent WaveForms Logic Analyzer Acquisition\n#Sample rate: 2e+07Hz\n\nTime (s)\tDIO 0\tDIO 1\n";
+    is_read("WaveForms logic, tabs", &table(heading, |k, v| format!("{:.9}\t{}\t0", time(k), u8::from(v > 1.6))));
+    is_read("Logic 2 analog", &table("Time [s],Channel 1\n", |k, v| format!("{:.9},{v:.3}", time(k))));
+    is_read(
+        "Logic 2 analog, MSO",
+        &table("Trigger [s],Time [s],Ch0,Ch1\n", |k, v| format!("{:.12},{:.12},{v:.6},", time(k), time(k))),
+    );
+    let heading = "Time[s], Channel 0, Channel 1\n";
+    is_read("Kingst", &table(heading, |k, v| format!("{:.15}, {}, 0", time(k), u8::from(v > 1.6))));
+    let heading = "; CSV, generated by DSView, sampled on Tue Mar  4 10:00:00 2025\n; Channels (2/16)\n; Sample rate: 20 MHz\n\
+        ; Sample count: 20 K Samples\nTime(s), CH0, CH1\n";
+    is_read("DSView", &table(heading, |k, v| format!("{:.9},{},0", k as f64 / RATE, u8::from(v > 1.6))));
+}
+
+/// The threshold may be said; a wrong one finds nothing.
+#[test]
+fn a_threshold_of_ones_own() {
+    let text = table("Time(s),CH1(V)\n", |k, v| format!("{:.9},{v:.3}", time(k)));
+    let bench = Bench::new();
+    assert_eq!(bench.decode("a.csv", &text, &["--json", "--threshold", "1.0"]).json().len(), GOOD_FRAMES);
+    assert_eq!(bench.decode("a.csv", &text, &["--threshold", "9"]).code, 1);
+    let mut rows = String::new();
+    let _ = writeln!(rows, "{text}oops,1");
+    bench.decode("a.csv", &rows, &[]).fails_with("\"oops\" is not a time; this row was left out");
+}
