@@ -6,14 +6,16 @@
 #[cfg(any(test, feature = "std"))]
 extern crate std;
 
+mod format;
 mod order;
 mod receiver;
 mod samples;
 mod wave;
 mod window;
 
+pub use format::{Format, FormatError};
 pub use order::BitOrder;
-pub use receiver::{Field, Format, FormatError, Receiver};
+pub use receiver::{Field, Receiver};
 pub use samples::Samples;
 pub use wave::Wave;
 pub use window::{OutOfBounds, Window};

@@ -6,19 +6,21 @@
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Samples {
-    bits: u64,
+    low: u32,
+    high: u32,
     len: u32,
 }
 
 impl Samples {
     /// 64 samples, the oldest in bit 0.
     pub const fn new(word: u64) -> Self {
-        Self { bits: word, len: 64 }
+        Self::partial(word, 64)
     }
 
     /// The oldest `len` samples of `word`; all 64 where `len` is larger.
     pub const fn partial(word: u64, len: u32) -> Self {
-        Self { bits: word, len: if len > 64 { 64 } else { len } }
+        let len = if len > 64 { 64 } else { len };
+        Self { low: (word & 0xffff_ffff) as u32, high: (word >> 32) as u32, len }
     }
 
     /// Samples that are left.
@@ -31,20 +33,21 @@ impl Samples {
         self.len == 0
     }
 
-    /// The level of the oldest sample and how many samples it lasts here, at most `len`.
-    pub(crate) const fn front_run(self) -> (bool, u32) {
-        let level = self.bits & 1 == 1;
-        let changed = if level { !self.bits } else { self.bits };
-        let run = changed.trailing_zeros();
-        (level, if run < self.len { run } else { self.len })
+    /// The oldest samples from bit 0 on, and how many there are, at most 32.
+    #[inline]
+    pub(crate) const fn front(self) -> (u32, u32) {
+        (self.low, if self.len < 32 { self.len } else { 32 })
     }
 
-    /// Takes `count` samples off the front.
+    /// Takes `count` samples off the front, 1 to 32.
+    #[inline]
     pub(crate) const fn skip(&mut self, count: u32) {
-        self.bits = match self.bits.checked_shr(count) {
-            Some(rest) => rest,
-            None => 0,
-        };
-        self.len = self.len.saturating_sub(count);
+        self.len = self.len.wrapping_sub(count);
+        if count == 32 {
+            self.low = self.high;
+        } else {
+            self.low = self.low.wrapping_shr(count) | self.high.wrapping_shl(32_u32.wrapping_sub(count));
+            self.high = self.high.wrapping_shr(count);
+        }
     }
 }

@@ -209,6 +209,13 @@ impl<O: bitvec::order::BitOrder> TryFrom<&bitvec::slice::BitSlice<u8, O>> for Wi
 #[cfg_attr(docsrs, doc(cfg(feature = "bitvec")))]
 impl Window {
     /// The bits as a `bitvec` array of 128 bits in the order `O`; take the first [`len`](Self::len) of them.
+    ///
+    /// ```
+    /// use bitvec::prelude::*;
+    /// let window = nrz_line::Window::from_bits(0b0101, 4).unwrap();
+    /// let bits = window.to_bitarray::<Msb0>();
+    /// assert_eq!(bits[..4], bits![1, 0, 1, 0]);
+    /// ```
     pub fn to_bitarray<O: bitvec::order::BitOrder>(self) -> bitvec::array::BitArray<[u8; 16], O> {
         let mut out = bitvec::array::BitArray::ZERO;
         for at in 0..self.len {

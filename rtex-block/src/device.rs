@@ -11,6 +11,7 @@ mod manners;
 mod motion;
 mod parameters;
 mod profile;
+mod wire;
 
 pub use check::{Verdict, check};
 pub use config::{DriveConfig, OpenCodes};

@@ -42,7 +42,12 @@ impl Results {
         (Alarm { main, sub }, u16::from_le_bytes([low, high]))
     }
 
-    /// The data of an alarm answer.
+    /// The data of an alarm answer: what [`alarm`](Self::alarm) reads.
+    ///
+    /// ```
+    /// use rtex_block::{Alarm, Results};
+    /// assert_eq!(Results::alarm_data(Alarm { main: 38, sub: 1 }, 0xa0).to_le_bytes(), [38, 1, 0xa0, 0]);
+    /// ```
     pub const fn alarm_data(alarm: Alarm, warning: u16) -> i32 {
         let [low, high] = warning.to_le_bytes();
         i32::from_le_bytes([alarm.main, alarm.sub, low, high])

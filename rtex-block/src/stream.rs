@@ -38,6 +38,16 @@ where
 }
 
 /// A 32-byte response block.
+///
+/// ```
+/// use rtex_block::stream;
+/// let mut log = [0; 70];
+/// for block in log.chunks_exact_mut(32) {
+///     (block[0], block[1], block[16]) = (0x85, 0x20, 0x0a);
+/// }
+/// let (rest, first) = stream::response32::<nom::error::Error<&[u8]>>(&log).unwrap();
+/// assert_eq!((rest.len(), first.sub.code.get()), (38, 0x0a));
+/// ```
 pub fn response32<'a, E>(input: &'a [u8]) -> IResult<&'a [u8], Response32, E>
 where
     E: ParseError<&'a [u8]> + FromExternalError<&'a [u8], Error>,

@@ -192,6 +192,8 @@ mod tests {
             assert_eq!(TimerSystem::Internal.allows(&periods), pr7_21 == 1);
         }
         assert_eq!(Periods::from_a6n(3, 2, None).map(|p| p.update_ns), Some(1_000_000));
+        // 6 is 1 ms, 3 is 0.5 ms, whatever Pr7.91 says.
+        assert_eq!(Periods::from_a6n(6, 1, Some(5)).map(|p| (p.com_ns, p.update_ns)), Some((1_000_000, 1_000_000)));
         assert_eq!(Periods::from_a6n(6, 2, None), None);
         assert_eq!(Periods::from_a6n(-1, 1, None), None);
         assert_eq!(Periods::from_a6n(-1, 1, Some(62_500)), None);
@@ -227,6 +229,8 @@ mod tests {
     fn frame_time_line() {
         let line = FrameTime::GUIDE;
         assert_eq!((line.estimate_ns(1), line.estimate_ns(32), line.estimate_ns(99)), (11_000, 300_000, 300_000));
+        let fit = [10_999, 11_000, 62_500, 83_333, 125_000, 166_666, 250_000, 500_000].map(|ns| line.axes_within(ns));
+        assert_eq!(fit, [0, 1, 6, 8, 13, 17, 26, 32]);
         for com_ns in [0, 10_999, 11_000, 62_500, 83_333, 125_000, 166_666, 250_000, 299_999, 300_000, u32::MAX] {
             let axes = line.axes_within(com_ns);
             assert!(axes == 0 || line.estimate_ns(axes) <= u64::from(com_ns));

@@ -15,7 +15,9 @@ use common::Pair;
 use proptest::prelude::*;
 use rtex_block::device::Manners;
 use rtex_block::master::{ActiveCode, AxisState, Received, StopReason};
-use rtex_block::{Alarm, CommandBlock, ControlBits, NonCyclicCode, NonCyclicCommand, Response, SubCode};
+use rtex_block::{
+    Alarm, CommandBlock, ControlBits, Nibble, NonCyclicCode, NonCyclicCommand, Response, SubCode, TypeCode,
+};
 
 /// What a caller can do to an axis.
 #[derive(Debug, Clone, Copy)]
@@ -27,9 +29,11 @@ enum Action {
     Stop,
     Control(u16),
     FeedForward(i32),
+    SubFeedForward(i32, i32),
+    Attributes(u16),
     Position(i32),
     Rate(i32),
-    Move(u8, i32, i32),
+    Move(u8, i32, i32, u8),
     MoveSpeed(i32),
     Ask(NonCyclicCode, [u8; 8]),
     Sub(u8),
@@ -52,9 +56,11 @@ fn action() -> impl Strategy<Value = Action> {
         1 => Just(Action::Stop),
         2 => any::<u16>().prop_map(Action::Control),
         1 => any::<i32>().prop_map(Action::FeedForward),
+        1 => any::<(i32, i32)>().prop_map(|(two, three)| Action::SubFeedForward(two, three)),
+        1 => any::<u16>().prop_map(Action::Attributes),
         2 => (-300_000..300_000).prop_map(Action::Position),
         2 => any::<i32>().prop_map(Action::Rate),
-        2 => any::<(u8, i32, i32)>().prop_map(|(code, to, at)| Action::Move(code % 4 + 0x10, to, at)),
+        2 => any::<(u8, i32, i32, u8)>().prop_map(|(code, to, at, sel)| Action::Move(code % 4 + 0x10, to, at, sel)),
         1 => any::<i32>().prop_map(Action::MoveSpeed),
         3 => (proptest::sample::select(&NonCyclicCode::ALL[..]), any::<[u8; 8]>()).prop_map(|(c, b)| Action::Ask(c, b)),
         1 => any::<u8>().prop_map(Action::Sub),
@@ -81,9 +87,13 @@ fn act(pair: &mut Pair, action: Action) {
         Action::Stop => axis.stop(StopReason::Requested),
         Action::Control(bits) => axis.set_control(ControlBits::from_bits_retain(bits)),
         Action::FeedForward(value) => _ = axis.set_feed_forward(value),
+        Action::SubFeedForward(two, three) => _ = axis.set_sub_feed_forward(two, three),
+        Action::Attributes(code) => _ = axis.ask_alarm_attributes(TypeCode::truncate(code)),
         Action::Position(by) => _ = axis.set_position(axis.setpoint().wrapping_add(by)),
         Action::Rate(rate) => _ = axis.set_rate(rate),
-        Action::Move(code, to, at) => _ = axis.start_move(code, to, at),
+        Action::Move(code, to, at, sel) => {
+            _ = axis.start_move_with_latch(code, to, at, Nibble::truncate(sel), sel);
+        }
         Action::MoveSpeed(at) => _ = axis.set_move_speed(at),
         Action::Ask(code, bytes) => _ = axis.ask(NonCyclicCommand::from_bytes(code, bytes)),
         Action::Sub(type_code) => _ = axis.ask_sub(SubCode::Monitor, type_code, 0),

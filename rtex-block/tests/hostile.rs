@@ -20,6 +20,7 @@ use rtex_block::device::{Drive, DriveConfig, Manners};
 use rtex_block::master::{
     ActiveCode, Asic, Axis, AxisConfig, AxisState, Fault, Limits, Master, MasterConfig, Phase, Slave, StopPolicy,
 };
+use rtex_block::position::Gear;
 use rtex_block::timing::{Periods, TimerSystem};
 use rtex_block::{Alarm, Arguments, BlockSize, CommandBlock, MacId, NonCyclicCommand, SubCode, TypeCode, pack};
 use servowire_world::{Cable, Kind, Rates, Scenario, Tally};
@@ -44,7 +45,11 @@ impl Draw {
 
     fn manners(&mut self) -> Manners {
         let mut some = |limit| self.below(limit) as u16;
+        // Up to three exchanges for each flag, but Servo_Active, which has a lateness of its own at servo-off.
+        let late = core::array::from_fn(|bit| if bit == 7 { 0 } else { some(4) as u8 });
         Manners::POLITE
+            .with_status_late(late)
+            .with_latch_late(some(4) as u8)
             .with_echo_lag(some(4) as u8)
             .with_in_progress_late(some(20))
             .with_servo_off_late(some(4))
@@ -109,6 +114,12 @@ fn mac_id(place: usize) -> MacId {
     MacId::new(place as u8 * 7 + 1).unwrap()
 }
 
+/// Electronic gears, of which one alone is 1/1.
+fn gear(place: usize) -> Gear {
+    let (numerator, denominator) = [(1, 1), (3, 1), (7, 4), (125, 1)][place];
+    Gear::new(numerator, denominator).unwrap()
+}
+
 impl Bench {
     fn new(draw: &mut Draw) -> Self {
         let limit = NonZeroU16::new(LIMIT).unwrap();
@@ -116,7 +127,7 @@ impl Bench {
         let policies = [StopPolicy::AtOnce, StopPolicy::Decelerate { per_update: 40 }];
         let axis = |place: usize| {
             let config = AxisConfig::new(mac_id(place), ActiveCode::CyclicPosition, 500_000, limits);
-            Axis::new(config.with_stop(policies[place % 2]))
+            Axis::new(config.with_stop(policies[place % 2]).with_gear(gear(place)))
         };
         let table: [Slave; AXES] = core::array::from_fn(|place| Slave { mac_id: mac_id(place), kind: 3 });
         let periods = Periods::from_a6n(3, 1, None).unwrap();
@@ -127,7 +138,8 @@ impl Bench {
         let mut bench = Self {
             master,
             drives: core::array::from_fn(|place| {
-                Drive::new(DriveConfig::new(mac_id(place), CODES).with_manners(draw.manners()))
+                let config = DriveConfig::new(mac_id(place), CODES).with_gear(gear(place));
+                Drive::new(config.with_manners(draw.manners()))
             }),
             down: core::array::from_fn(|place| Line::new(place as u64 + 1)),
             up: core::array::from_fn(|place| Line::new(place as u64 + 100)),
@@ -250,6 +262,9 @@ impl Bench {
                 let forth = (now / 300 + place as u64) % 2 == 0;
                 let by = (place as i32 + 1) * if forth { 60 } else { -60 };
                 axis.set_position(axis.setpoint().wrapping_add(by)).unwrap();
+                // 200 000 pulses in half a millisecond are 1 600 command units at 125/1: a step too far is not taken.
+                let too_far = axis.setpoint().wrapping_add(axis.max_step() as i32 + 1 + by.abs());
+                assert!(axis.set_position(too_far).is_err());
             }
             match draw.below(40) {
                 0 => {

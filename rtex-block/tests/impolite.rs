@@ -13,18 +13,20 @@ mod common;
 
 use common::{CODES, LIMIT, Pair, limits, monitor, set_position};
 use rtex_block::device::{Drive, DriveConfig, Manners};
+use rtex_block::master::procedure::{Caught, Home, Latch};
 use rtex_block::master::{
     ActiveCode, AskError, AxisConfig, AxisState, CommandEnded, Failure, MoveStage, Progress, Received, SetpointError,
     StopReason, Turn,
 };
 use rtex_block::position::Gear;
 use rtex_block::{
-    Alarm, Arguments, Code, ErrorClass, ErrorCode, MacId, NonCyclicCommand, NonCyclicResponse, Response, TypeCode,
+    Alarm, Arguments, Code, ErrorClass, ErrorCode, MacId, Nibble, NonCyclicCommand, NonCyclicResponse, Response,
+    StatusFlags, TypeCode,
 };
 
-/// Every switch on or off: 2 to the power of 11.
+/// Every switch on or off, and every flag late or not: 2 to the power of 13.
 fn all_manners() -> impl Iterator<Item = Manners> {
-    (0..1_u32 << 11).map(|bits| {
+    (0..1_u32 << 13).map(|bits| {
         let on = |k: u32| bits >> k & 1 == 1;
         let some = |k: u32, n: u16| if on(k) { n } else { 0 };
         Manners::POLITE
@@ -39,36 +41,92 @@ fn all_manners() -> impl Iterator<Item = Manners> {
             .with_homed_at_start(on(8))
             .with_always_in_position(on(9))
             .with_warns(on(10))
+            .with_status_late(if on(11) { [5, 2, 7, 3, 4, 1, 6, 2] } else { [0; 8] })
+            .with_latch_late(if on(12) { 6 } else { 0 })
     })
 }
 
-/// Servo on, a cyclic move, a monitor value, a profile motion, servo off: whatever the drive is like.
+/// Servo on, a cyclic move, a latch, a monitor value, a profile motion, homing, servo off, an alarm.
+fn a_day_of_work(manners: Manners) {
+    let mac_id = MacId::new(9).unwrap();
+    let config = AxisConfig::new(mac_id, ActiveCode::CyclicPosition, 500_000, limits().with_inactive(40));
+    let mut pair = Pair::with(config, DriveConfig::new(mac_id, CODES).with_manners(manners));
+    pair.switch_on();
+    assert_eq!(pair.axis.setpoint(), 0, "{manners:?}");
+    for k in 1..=20 {
+        pair.axis.set_position(k * 50).unwrap();
+        pair.update();
+    }
+    pair.until("at the position", |pair| pair.drive.position() == 1_000);
+
+    let mut latch = Latch::second(0xc7, Nibble::new(2).unwrap(), 400);
+    (0..40).for_each(|_| {
+        pair.update();
+        assert!(latch.receive(&mut pair.axis).is_pending(), "{manners:?}");
+    });
+    pair.drive.trigger(2);
+    let caught = Caught { latch1: None, latch2: Some(1_000) };
+    assert_eq!(pair.run(|axis| latch.receive(axis)), Progress::Done { value: caught }, "{manners:?}");
+
+    let Progress::Done { value } = pair.ask(monitor(0x07)) else { panic!("{manners:?}") };
+    assert_eq!(value.data(), Some(1_000), "{manners:?}");
+    let failed = pair.ask(monitor(0xee));
+    assert_eq!(failed, Progress::Failed { error: Failure::CommandError(ErrorCode(0x0031)) }, "{manners:?}");
+
+    pair.until("free", |pair| pair.axis.can_ask());
+    pair.axis.set_mode(ActiveCode::ProfilePosition).unwrap();
+    pair.axis.start_move(0x11, 3_000, 2_000_000).unwrap();
+    let ended = pair.end_of_move();
+    assert!(matches!(ended, Progress::Done { .. }), "{manners:?}: {ended:?}");
+    assert!((pair.drive.position() - 4_000).abs() < 400, "{manners:?}: at {}", pair.drive.position());
+    pair.until("at the target", |pair| pair.drive.position() == 4_000);
+    let mut home = Home::new(0xc8, 1_000);
+    assert_eq!(pair.run(|axis| home.receive(axis)), Progress::Done { value: () }, "{manners:?}");
+    pair.until("at the origin", |pair| pair.drive.position() == 0);
+
+    pair.axis.switch_off();
+    pair.until("off", |pair| pair.axis.state() == AxisState::Off);
+    assert!(!pair.drive.is_active());
+    assert_eq!(pair.drive.alarm(), None, "{manners:?}");
+    pair.until("free", |pair| pair.axis.can_ask());
+    pair.switch_on();
+    pair.drive.raise(Alarm { main: 16, sub: 0 });
+    let from = pair.now;
+    pair.until("stopped", |pair| matches!(pair.axis.state(), AxisState::Stopped(_)));
+    // As late as the first of the flags that show it, and the echo lag.
+    assert!(pair.now - from <= 2 + 6 + 3, "{manners:?}");
+}
+
 #[test]
 fn every_combination_of_manners() {
-    for manners in all_manners() {
-        let mut pair = Pair::on(ActiveCode::CyclicPosition, manners);
-        assert_eq!(pair.axis.setpoint(), 0, "{manners:?}");
-        for k in 1..=20 {
-            pair.axis.set_position(k * 50).unwrap();
-            pair.update();
+    // An opt-level of 1 takes every fifth; release all of them.
+    let step = if cfg!(debug_assertions) { 5 } else { 1 };
+    all_manners().step_by(step).for_each(a_day_of_work);
+}
+
+/// Each flag of byte 2 late by itself, by any number of exchanges.
+#[test]
+fn every_flag_late_by_itself() {
+    for flag in 0..8 {
+        for late in 1..=15 {
+            let mut status_late = [0; 8];
+            status_late[flag] = late;
+            let manners = Manners::POLITE.with_status_late(status_late);
+            let mut pair = Pair::on(ActiveCode::ProfilePosition, manners);
+            pair.axis.start_move(0x11, 20_000, 1_000_000).unwrap();
+            let ended = pair.end_of_move();
+            assert!(matches!(ended, Progress::Done { .. }), "{flag} {late}: {ended:?}");
+            assert!((pair.drive.position() - 20_000).abs() < 400, "{flag} {late}: at {}", pair.drive.position());
+            // The flag is seen exactly as much later as it is late: the drive's alarm, readiness and activity at servo-off.
+            pair.drive.raise(Alarm { main: 16, sub: 0 });
+            let from = pair.now;
+            pair.until("stopped", |pair| matches!(pair.axis.state(), AxisState::Stopped(_)));
+            let first = (0..3).map(|k| status_late[7 - k]).min().unwrap();
+            assert_eq!(pair.now - from, 2 + u32::from(first), "{flag} {late}");
+            (0..20).for_each(|_| pair.update());
+            let status = pair.axis.status();
+            assert!(status.contains(StatusFlags::ALARM) && !status.contains(StatusFlags::SERVO_READY));
         }
-        pair.until("at the position", |pair| pair.drive.position() == 1_000);
-        let Progress::Done { value } = pair.ask(monitor(0x07)) else { panic!("{manners:?}") };
-        assert_eq!(value.data(), Some(1_000), "{manners:?}");
-        let failed = pair.ask(monitor(0xee));
-        assert_eq!(failed, Progress::Failed { error: Failure::CommandError(ErrorCode(0x0031)) }, "{manners:?}");
-
-        pair.until("free", |pair| pair.axis.can_ask());
-        pair.axis.set_mode(ActiveCode::ProfilePosition).unwrap();
-        pair.axis.start_move(0x11, 3_000, 2_000_000).unwrap();
-        let ended = pair.end_of_move();
-        assert!(matches!(ended, Progress::Done { .. }), "{manners:?}: {ended:?}");
-        pair.until("at the target", |pair| pair.drive.position() == 4_000);
-
-        pair.axis.switch_off();
-        pair.until("off", |pair| pair.axis.state() == AxisState::Off);
-        assert!(!pair.drive.is_active());
-        assert_eq!(pair.drive.alarm(), None, "{manners:?}");
     }
 }
 
@@ -334,6 +392,7 @@ fn limits_of_set_points() {
         let drive = DriveConfig::new(mac_id, CODES).with_gear(gear);
         let mut pair = Pair::with(config, drive);
         pair.switch_on();
+        assert_eq!(i32::try_from(pair.axis.max_step()), Ok(largest));
         for sign in [1, -1] {
             let step = sign * (largest + 1);
             assert_eq!(pair.axis.set_position(step), Err(SetpointError::Step { step }));

@@ -110,6 +110,39 @@ fn drives_on_one_side_only() {
     let mut log = analysis();
     findings(&mut log, &[command(1, 0x20, 0)]);
     assert_eq!(log.end().count(), 0);
+    let mut log = analysis();
+    findings(&mut log, &[response(1, 0x20, 0)]);
+    assert_eq!(log.end().count(), 0);
+    // Before the start the counter stands at 0, and its echo with it.
+    let nop: Vec<_> = (0..5).flat_map(|_| [command(0, 0, 0), response(0, 0, 0)]).collect();
+    assert_eq!(findings(&mut analysis(), &nop), []);
+}
+
+/// A drive that goes silent is missed at the third command, once, and again after it has come back.
+#[test]
+fn a_drive_that_goes_silent() {
+    let asked = |counter| command(counter, 0x20, 0);
+    let answered = |counter| response(counter, 0x20, 0);
+    let blocks = [
+        asked(1),
+        answered(1),
+        asked(2),
+        asked(2),
+        answered(2),
+        asked(3),
+        asked(0),
+        asked(1),
+        asked(2),
+        answered(2),
+        asked(3),
+        asked(0),
+        asked(1),
+    ];
+    let silent = LogFinding::NoAnswer { commands: 3 };
+    assert_eq!(findings(&mut analysis(), &blocks), [(7, silent), (12, silent)]);
+    // One that has never answered is said at the end.
+    let mut log = analysis();
+    assert_eq!(findings(&mut log, &[1, 2, 3, 0].map(asked)), []);
 }
 
 #[test]
@@ -136,5 +169,22 @@ fn size_and_byte_order_of_a_log() {
         assert_eq!(guess, Some(LogShape { size: BlockSize::Bytes32, word }));
     }
     assert_eq!(LogShape::guess(&[0; 256]), None);
+    // Four blocks are enough, of which more than half make sense.
+    let shape = Some(LogShape { size: BlockSize::Bytes16, word: 1 });
+    assert_eq!(LogShape::guess(&short[..64]), shape);
+    let spoilt = |blocks: usize| {
+        let mut bytes = short.clone();
+        bytes.chunks_mut(16).take(blocks).for_each(|block| block[1] = 0x7f);
+        LogShape::guess(&bytes)
+    };
+    assert_eq!((spoilt(7), spoilt(8)), (shape, None));
+    // Sub blocks of which some look like main blocks: 32 bytes explain more. Where all of them do, 16 are enough.
+    let like_main = |subs: usize| {
+        let mut bytes = long.clone();
+        bytes.chunks_mut(32).take(subs).for_each(|block| block[17] = 0x20);
+        LogShape::guess(&bytes).map(|shape| shape.size)
+    };
+    assert_eq!(like_main(10), Some(BlockSize::Bytes32));
+    assert_eq!(like_main(16), Some(BlockSize::Bytes16));
     assert_eq!(LogShape::guess(&short[..48]), None);
 }

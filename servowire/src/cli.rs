@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 
 use clap::{Args, CommandFactory, Parser, Subcommand, ValueEnum};
+use rtex_block::position::Gear;
 
 use crate::capture::{Format, Hints, time};
 use crate::output::filter::Filter;
@@ -243,6 +244,9 @@ pub struct RtexArgs {
     /// Update period, as 500us or 0.5ms: gives the log times (for --stats and --jump) and checks the steps of the position.
     #[arg(long, value_name = "TIME", value_parser = period)]
     pub period: Option<u32>,
+    /// Electronic gear of the drives as 8/1: the steps of the position are checked after it.
+    #[arg(long, value_name = "N/D", value_parser = gear, requires = "period")]
+    pub gear: Option<Gear>,
     /// Only the blocks of this drive.
     #[arg(long, value_name = "ID", value_parser = clap::value_parser!(u8).range(0..=31))]
     pub mac_id: Option<u8>,
@@ -259,6 +263,11 @@ fn period(text: &str) -> Result<u32, String> {
         Some(ns) if (1..=1_000_000_000).contains(&ns) => Ok(ns as u32),
         _ => Err(format!("\"{text}\" is not a period from 1 ns to 1000 ms, as 500us or 0.5ms")),
     }
+}
+
+fn gear(text: &str) -> Result<Gear, String> {
+    let read = text.split_once('/').and_then(|(n, d)| Gear::new(n.trim().parse().ok()?, d.trim().parse().ok()?));
+    read.ok_or_else(|| format!("\"{text}\" is not a gear of two whole numbers above 0, as 8/1"))
 }
 
 fn block_size(text: &str) -> Result<u8, String> {
@@ -321,6 +330,7 @@ impl Decode {
                 block_size: self.rtex.block_size.map(usize::from),
                 mac_id: self.rtex.mac_id,
                 period_ns: self.rtex.period,
+                gear: self.rtex.gear.unwrap_or(Gear::UNITY),
             },
             nikon: nikon::Settings {
                 single_turn_bits: self.tformat.single_turn_bits,

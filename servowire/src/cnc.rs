@@ -2,6 +2,7 @@
 
 mod axis;
 mod clock;
+mod driver;
 mod exchange;
 mod feed;
 mod host;
@@ -9,6 +10,7 @@ mod line;
 mod node;
 mod noise;
 mod plot;
+mod power;
 mod program;
 mod record;
 mod report;
@@ -28,9 +30,11 @@ use step_profile::{Frequency, Motors, Parameters, Profile, Speed};
 use crate::gcode::{AXES, Part};
 
 use axis::Build;
+use driver::Fault;
 use host::Host;
 use line::{Line, Progress, Setup};
 use plot::{Curves, Sound};
+use power::Power;
 use program::Program;
 use record::Recorder;
 
@@ -125,9 +129,12 @@ pub struct Arguments {
     /// Pull the cable in front of a device in a cycle.
     #[arg(long, value_name = "DEVICE@CYCLE", value_parser = incident)]
     unplug: Option<(usize, u64)>,
-    /// The motor driver of a device shuts down in a cycle: over-current.
-    #[arg(long, value_name = "DEVICE@CYCLE", value_parser = incident)]
-    driver_fault: Option<(usize, u64)>,
+    /// The motor driver of a device shuts down in a cycle: over-current, or what is named after it, as 2@500=BPDF or =unpowered.
+    #[arg(long, value_name = "DEVICE@CYCLE", value_parser = driver_fault)]
+    driver_fault: Option<(usize, u64, Fault)>,
+    /// Switch a motor driver off when its axis has had no step for so many cycles; it needs 1 ms to wake.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(20..))]
+    power_save: Option<u32>,
     /// Seed of bit errors, crystals and counters.
     #[arg(long, value_name = "N", default_value_t = 1)]
     seed: u64,
@@ -177,6 +184,14 @@ fn incident(text: &str) -> Result<(usize, u64), String> {
     }
 }
 
+fn driver_fault(text: &str) -> Result<(usize, u64, Fault), String> {
+    let (place, name) = text.split_once('=').unwrap_or((text, "AOCP"));
+    let (device, cycle) = incident(place)?;
+    let fault = Fault::parse(name);
+    let names = "OTS, AOCP, BOCP, APDF, BPDF, UVLO, STD, STDLAT, unpowered";
+    fault.map(|fault| (device, cycle, fault)).ok_or_else(|| format!("\"{name}\" is none of {names}"))
+}
+
 impl Arguments {
     /// Does it. 0: every step that was asked for was made at its time; 1: not so, and one line says what was wrong; 2: wrong
     /// use.
@@ -209,7 +224,8 @@ impl Arguments {
     }
 
     fn program(&self) -> Result<Program, Box<dyn Error>> {
-        for (device, _) in self.unplug.into_iter().chain(self.driver_fault) {
+        let devices = self.driver_fault.map(|(device, ..)| device);
+        for device in self.unplug.map(|(device, _)| device).into_iter().chain(devices) {
             if device > usize::from(self.devices) {
                 return Err(format!("device {device} of {}", self.devices).into());
             }
@@ -277,10 +293,12 @@ impl Arguments {
     fn simulate(&self, program: Program, out: &mut dyn Write) -> Result<Option<String>, Box<dyn Error>> {
         let mut line = Line::new(self.setup());
         let axes = line.nodes.len();
+        let cycle_ns = line.setup.cycle_ns();
+        let program = Power::new(program, axes, self.power_save, cycle_ns);
         let mut host = Host::new(program, axes, self.cycles, self.max_lag);
         let mut record = Recorder::new(axes, self.vcd.as_deref(), self.pcapng.as_deref(), self.record_cycles)?;
-        let (mut curves, mut sound) =
-            (self.svg.is_some().then(Curves::default), self.wav.is_some().then(Sound::default));
+        let mut curves = self.svg.is_some().then(|| Curves::new(cycle_ns));
+        let mut sound = self.wav.as_deref().map(|path| Sound::create(path, cycle_ns)).transpose()?;
         let bar = self.bar();
         let mut cycle = 0;
         while let Some(progress) = line.step(&mut host, &mut record) {
@@ -298,7 +316,7 @@ impl Arguments {
                     curves.add(cycle, positions);
                 }
                 if let Some(sound) = &mut sound {
-                    sound.add(cycle, positions);
+                    sound.add(cycle, positions)?;
                 }
             }
             if cycle % 65_536 == 0 {
@@ -310,12 +328,13 @@ impl Arguments {
         }
         bar.finish_and_clear();
         record.finish()?;
-        report::end(out, &line)?;
+        report::end(out, &line, &host)?;
+        out.flush()?;
         if let (Some(curves), Some(path)) = (&curves, &self.svg) {
             curves.draw(axes.min(4), path)?;
         }
-        if let (Some(sound), Some(path)) = (&sound, &self.wav) {
-            sound.write(path)?;
+        if let Some(sound) = sound {
+            sound.finish()?;
         }
         Ok(report::verdict(&line, &host))
     }

@@ -195,6 +195,80 @@ fn the_scaling_is_a_table_and_a_picture() {
     assert!(fs::read_to_string(&path).unwrap().contains("</svg>"));
 }
 
+/// Each reason of a driver has its line: a bit of STATUS, no supply in the motion, no supply from the beginning.
+#[test]
+fn a_driver_says_what_it_has() {
+    for (fault, line) in [
+        ("2@500=BPDF", "the driver of axis 2 reports BPDF"),
+        ("4@500=stdlat", "the driver of axis 4 reports STDLAT"),
+        ("1@500=unpowered", "the driver of axis 1 has no supply"),
+        ("3@0=unpowered", "the driver of axis 3 does not take its settings: DRV8711 register 1 reads 0xbff"),
+    ] {
+        let output = servowire(&["cnc", "--steps", "3000", "--driver-fault", fault]);
+        assert!(failure(&output).contains(line), "{fault}: {output:?}");
+    }
+}
+
+/// Axes that are at rest lose their current, and get it back a millisecond before their next step.
+#[test]
+fn drivers_that_are_switched_off_are_awake_before_they_step() {
+    let run = |more: &[&str]| {
+        let arguments = ["cnc", "--independent", "--steps", "8000", "--moves", "2", "--freq", "250000,100000"];
+        servowire(&[&arguments[..], more].concat())
+    };
+    let (always, saving) = (run(&[]), run(&["--power-save", "2000"]));
+    assert!(always.status.success() && saving.status.success(), "{saving:?}");
+    assert!(text(&saving).contains("switched their drivers off") && !text(&always).contains("drivers off"));
+    let rows = |output: &Output| axes(&text(output)).iter().map(|axis| axis[..7].to_vec()).collect::<Vec<_>>();
+    assert_eq!(rows(&saving), rows(&always));
+    // The second move waits for the drivers, 1 ms and two cycles, once for each of the two speeds: their first steps are not
+    // in the same cycle.
+    let cycles = |output: &Output| -> i64 {
+        let report = text(output);
+        let line = report.lines().find(|line| line.starts_with("exchange")).unwrap().to_owned();
+        line.split_whitespace().nth(1).unwrap().parse().unwrap()
+    };
+    assert_eq!(cycles(&saving) - cycles(&always), 2 * 252);
+    let noisy = run(&["--power-save", "20", "--bit-error-rate", "1e-6", "--seed", "2"]);
+    assert!(noisy.status.success() && axes(&text(&noisy)).iter().any(|axis| axis[5] > 0), "{noisy:?}");
+}
+
+/// The reader has seen enough: no message, and no failure.
+#[test]
+fn a_closed_pipe_ends_it_quietly() {
+    for arguments in
+        [&["cnc", "--steps", "2000"][..], &["cnc", "--scaling"], &["cnc", "--steps", "100", "--devices", "254"]]
+    {
+        let mut child = Command::new(env!("CARGO_BIN_EXE_servowire"))
+            .args(arguments)
+            .stdout(std::process::Stdio::piped())
+            .stderr(std::process::Stdio::piped())
+            .spawn()
+            .unwrap();
+        drop(child.stdout.take());
+        let output = child.wait_with_output().unwrap();
+        assert!(output.status.success() && output.stderr.is_empty(), "{arguments:?}: {output:?}");
+    }
+}
+
+/// The sound is written while the machine runs, and lasts as long as the machine.
+#[test]
+fn a_sound_lasts_as_long_as_the_machine() {
+    let folder = TempDir::new().unwrap();
+    for cycle in ["4000", "8000"] {
+        let path = folder.path().join(cycle);
+        let wav = path.to_str().unwrap();
+        assert!(servowire(&["cnc", "--steps", "3000", "--cycle-time", cycle, "--wav", wav]).status.success());
+        let output = servowire(&["cnc", "--steps", "3000", "--cycle-time", cycle]);
+        let report = text(&output);
+        let line = report.lines().find(|line| line.starts_with("exchange")).unwrap();
+        let cycles: u64 = line.split_whitespace().nth(1).unwrap().parse().unwrap();
+        // Two bytes a sample after a header of 44.
+        let samples = (fs::metadata(&path).unwrap().len() - 44) / 2;
+        assert_eq!(samples, cycles * cycle.parse::<u64>().unwrap() * 44_100 / 1_000_000_000);
+    }
+}
+
 #[test]
 fn what_is_recorded_is_read_back() {
     let folder = TempDir::new().unwrap();
@@ -251,6 +325,7 @@ fn wrong_use_is_explained() {
     for (arguments, word) in [
         (["--unplug", "9@1"], "device 9 of 4"),
         (["--driver-fault", "300@1"], "device from 1 to 254"),
+        (["--driver-fault", "3@1=XYZ"], "is none of OTS"),
         (["--cycle-time", "5000"], "multiple of 4000"),
         (["--bit-error-rate", "2"], "probability"),
         (["--freq", "300000"], "error"),

@@ -133,6 +133,150 @@ fn a_log_with_a_period() {
     assert!(run.is_good().out.contains("1 of more than 1000 counts"), "{}", run.out);
 }
 
+/// Without what it needs --jump says so.
+#[test]
+fn jumps_that_cannot_be_told() {
+    let bench = Bench::new();
+    let options = ["--protocol", "rtex", "--bytes", "--stats", "--jump", "5"];
+    for (more, want) in [
+        (
+            &[][..],
+            "jumps         not known: no position of a single axis is seen (a log of RTEX blocks needs --mac-id)",
+        ),
+        (&["--period", "500us"], "needs --mac-id"),
+        (
+            &["--mac-id", "5"],
+            "jumps         not known: the positions have no times (a log of RTEX blocks needs --period)",
+        ),
+        (&["--mac-id", "5", "--period", "500us"], "jumps         5 of more than 5 counts"),
+    ] {
+        let run = bench.decode("log.txt", hex_log(&exchanges()), &[&options[..], more].concat());
+        assert!(run.is_good().out.contains(want), "{more:?}: {}", run.out);
+    }
+    let json = [&options[..], &["--mac-id", "5", "--json"]].concat();
+    assert!(bench.decode("log.txt", hex_log(&exchanges()), &json).json()[0]["jumps"].is_null());
+}
+
+/// 400 M pulses a second in 0.5 ms are 200 000 pulses: 50 000 command units at gear 4/1.
+#[test]
+fn steps_after_the_gear() {
+    let bench = Bench::new();
+    let mut all = exchanges();
+    all[5].0[4..8].copy_from_slice(&51_041_i32.to_le_bytes());
+    let notes = |more: &[&str]| {
+        let options = ["--protocol", "rtex", "--bytes", "--json", "--period", "0.5ms"];
+        let run = bench.decode("log.txt", hex_log(&all), &[&options[..], more].concat());
+        run.is_good().json()[10]["fields"].get("note").map(|note| note.as_str().unwrap().to_owned())
+    };
+    assert_eq!(notes(&[]), None);
+    assert_eq!(notes(&["--gear", "4/1"]).unwrap(), "position step 50001, at most 50000: Err27.4");
+    assert_eq!(notes(&["--gear", "200000/50001"]), None);
+    for wrong in ["4", "0/1", "1/0", "-4/1"] {
+        let gear = format!("--gear={wrong}");
+        let options = ["--protocol", "rtex", "--bytes", "--period", "0.5ms", gear.as_str()];
+        assert_eq!(bench.decode("log.txt", hex_log(&all), &options).code, 2, "{wrong}");
+    }
+}
+
+/// What no single block shows: each finding stands beside the block at which it is seen.
+#[test]
+fn findings_between_blocks() {
+    let block =
+        |bytes: [u8; 10]| bytes.iter().fold(String::new(), |text, byte| text + &format!("{byte:02x}")) + "000000000000";
+    let command = |counter: u8, code| block([counter << 5 | 5, code, 0x80, 0, 0, 0, 0, 0, 7, 0]);
+    let response = |counter: u8, code, nine| block([0x80 | counter << 5 | 5, code, 0xc1, 0, 0, 0, 0, 0, 7, nine]);
+    let bench = Bench::new();
+    let notes = |lines: &[String]| {
+        let run = bench.decode("log.txt", lines.join("\n"), &["--protocol", "rtex", "--bytes", "--json"]);
+        let noted: Vec<_> = run
+            .is_good()
+            .json()
+            .iter()
+            .enumerate()
+            .filter_map(|(k, event)| Some((k, event["fields"].get("note")?.as_str()?.to_owned())))
+            .collect();
+        noted
+    };
+    let note = |at: usize, text: &str| (at, text.to_owned());
+    // The echo of the counter stands still beyond the two communications of an update.
+    let still = [1, 2, 2, 2, 3].map(|counter| response(counter, 0x20, 0));
+    assert_eq!(notes(&still), [note(3, "the counter echo stands still for 3 responses")]);
+    // The code comes back later than one command after the other.
+    let late: Vec<_> =
+        (1..=4).flat_map(|k| [command(k & 3, 0x20), response(k & 3, if k == 4 { 0x20 } else { 0x10 }, 0)]).collect();
+    assert_eq!(notes(&late), [note(7, "the code came back after 4 responses")]);
+    // A request: its latency, and for how long it was busy.
+    let asked: Vec<_> = [(1, 0x20, 0), (2, 0x20, 0), (3, 0x26, 0x10), (0, 0x26, 0x10), (1, 0x26, 0)]
+        .into_iter()
+        .flat_map(|(k, echo, nine)| {
+            [command(k, if k == 1 && echo == 0x20 { 0x20 } else { 0x26 }), response(k, echo, nine)]
+        })
+        .collect();
+    assert_eq!(notes(&asked), [note(9, "answered after 4 responses, 2 of them busy")]);
+    // A drive that goes silent, and a block of another one in its place.
+    let mut silent: Vec<_> = [1, 2].into_iter().flat_map(|k| [command(k, 0x20), response(k, 0x20, 0)]).collect();
+    silent.extend([3, 0, 1].map(|counter| command(counter, 0x20)));
+    silent.push(response(1, 0x20, 0).replacen("a5", "a6", 1));
+    assert_eq!(
+        notes(&silent),
+        [note(6, "no answer to the last 3 commands"), note(8, "drive 6 answers and was never sent a command")]
+    );
+}
+
+/// Blocks of 32 bytes in lines of 16, of which one is spoilt: no sub block is taken for a drive.
+#[test]
+fn long_blocks_in_two_lines() {
+    let bench = Bench::new();
+    let mut lines = vec!["# main half, sub half".to_owned()];
+    for (command, response) in exchanges() {
+        for (block, sub) in [(command, 0x8a_u8), (response, 0x0a)] {
+            lines.push(format!("{:032x}", u128::from_be_bytes(block)));
+            lines.push(format!("{sub:02x}{:030x}", 0));
+        }
+    }
+    let options = ["--protocol", "rtex", "--bytes", "--json"];
+    let kinds = |run: &common::Run| {
+        run.json().iter().map(|event| event["kind"].as_str().unwrap().to_owned()).collect::<Vec<_>>()
+    };
+    let run = bench.decode("log.txt", lines.join("\n"), &options);
+    assert_eq!(run.is_good().json().len(), 12);
+    assert!(kinds(&run).iter().all(|kind| kind.ends_with('5')), "{:?}", kinds(&run));
+    for spoilt in [5, 6] {
+        let mut lines = lines.clone();
+        lines[spoilt].replace_range(3..4, "g");
+        let run = bench.decode("log.txt", lines.join("\n"), &options);
+        let of_drives: Vec<_> = kinds(&run).into_iter().filter(|kind| kind != "line").collect();
+        assert_eq!(of_drives.len(), 11);
+        assert!(of_drives.iter().all(|kind| kind.ends_with('5')), "{of_drives:?}");
+    }
+    lines.pop();
+    let run = bench.decode("log.txt", lines.join("\n"), &options);
+    assert_eq!(run.json().last().unwrap()["fields"]["note"], "the log ends in the middle of a block");
+    // The size that is given wrongly is said.
+    let wrong = bench.decode("log.txt", lines.join("\n"), &[&options[..], &["--block-size", "16"]].concat());
+    assert!(wrong.err.contains("looks like blocks of 32 bytes; try --block-size"), "{}", wrong.err);
+}
+
+/// Words of 16 or 32 bits written the wrong way round are said as such, for the log as a whole.
+#[test]
+fn logs_with_exchanged_bytes() {
+    let bench = Bench::new();
+    for (width, want) in [
+        (2, "with the bytes of each 16-bit word exchanged"),
+        (4, "with the bytes of each 32-bit word in the other order"),
+    ] {
+        let mut text = String::new();
+        for block in exchanges().into_iter().flat_map(|(command, response)| [command, response]) {
+            for byte in block.chunks(width).flat_map(|word| word.iter().rev()) {
+                write!(text, "{byte:02x}").unwrap();
+            }
+            text.push('\n');
+        }
+        let run = bench.decode("log.txt", text, &["--protocol", "rtex", "--bytes"]);
+        assert!(run.err.contains(want), "{}", run.err);
+    }
+}
+
 /// One wrong digit costs one line.
 #[test]
 fn a_spoilt_line() {

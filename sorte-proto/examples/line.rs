@@ -3,6 +3,7 @@
 //! `cargo run -p sorte-proto --example line -- [line delay in ns]`
 
 use sorte_proto::Parameters;
+use sorte_proto::sync0::CMP7_NS;
 use sorte_proto::timing::{CNC_CYCLE_NS, GAP_NS, Limit, Timing};
 
 fn main() {
@@ -21,7 +22,11 @@ fn main() {
             budget.master_frame_at_last_ns,
             budget.device_frames_at_master_ns,
             budget.min_cycle_ns(),
-            if budget.fits(CNC_CYCLE_NS) { ", fits 4 us" } else { "" },
+            match (budget.fits(CNC_CYCLE_NS), budget.same_cycle(CMP7_NS.into())) {
+                (true, true) => ", fits 4 us",
+                (true, false) => ", fits 4 us, but only with 16 output bytes do all devices act in the same cycle",
+                (false, _) => "",
+            },
         );
     }
     println!("\ncycle times that the vendor names, and the devices that they have room for");

@@ -131,10 +131,16 @@ fn main() -> Result<(), Error> {
         }
     }
     println!("{}; {} cycles from {} ns of the master's time on", master.network(), cycles, now_ns - master.epoch_ns());
+    println!("round trips to the first device, shortest and longest: {:?} ns", master.line_delay().extremes());
     for (axis, node) in axes.iter().zip(&nodes) {
         let address = node.device.assignment().map_or(0, |place| place.address.get());
         let (asked, lag) = (axis.position(), axis.lag(node.follower.position()));
         println!("device {address}: {:?}, asked to {asked}, {lag} steps behind", node.device.state());
+        println!(
+            "  first cycle at {:?} ns of its counter, {:?} as the published device has it",
+            node.device.first_cycle_ns(),
+            node.device.cycle_zero_ns()
+        );
         assert_eq!(lag, 0);
     }
     Ok(())

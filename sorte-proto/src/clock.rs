@@ -54,11 +54,6 @@ impl Clock {
         Self { set: false, average: frames, count: 0, sum: 0 }
     }
 
-    /// Whether the counter has been set.
-    pub const fn is_set(&self) -> bool {
-        self.set
-    }
-
     /// A frame that was expected at `time_stamp_ns` of the master's time has begun at `rx_sof_ns` of the own counter,
     /// which now reads `counter_now_ns`. In SYNC the time stamp comes with the frame; in the IO exchange it is the
     /// accumulated delay plus 500 in each cycle.

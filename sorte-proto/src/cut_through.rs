@@ -282,10 +282,11 @@ mod tests {
     fn a_line_of_300_devices_gives_the_bytes_of_the_buffered_form() {
         let mut buffered = Discovery::request(true);
         let mut passing = buffered.emit().to_vec();
-        for k in 0..300u16 {
+        let devices = if cfg!(miri) { 3 } else { 300 };
+        for k in 0..devices {
             let lengths = Entry { input: k, output: 300 - k };
-            let (out, rewriter) = discovery(&passing, lengths, k == 299, k % 3 == 0);
-            let assignment = buffered.pass(lengths, k == 299, k % 3 == 0);
+            let (out, rewriter) = discovery(&passing, lengths, k + 1 == devices, k % 3 == 0);
+            let assignment = buffered.pass(lengths, k + 1 == devices, k % 3 == 0);
             assert_eq!(out, buffered.emit());
             assert_eq!(rewriter.finish().map(|(_, a)| a), assignment);
             assert_eq!(assignment.is_ok(), k < 254);
@@ -295,7 +296,7 @@ mod tests {
 
     #[test]
     fn every_count_passes_as_in_the_buffered_form() {
-        for count in (0..300).chain([0x1fe, 0x1ff, 0x7f00, 0xfffe, 0xffff]) {
+        for count in (0..300).step_by(crate::stride(127)).chain([0x1fe, 0x1ff, 0x7f00, 0xfffe, 0xffff]) {
             let mut buffered = Discovery { count, input_total: 0xfffe, ..Discovery::request(false) };
             let (out, rewriter) = discovery(&buffered.emit(), Entry::STOCK, true, false);
             let assignment = buffered.pass(Entry::STOCK, true, false);
@@ -307,7 +308,7 @@ mod tests {
     #[test]
     fn no_flip_is_healed() {
         let good = Sync::of_master(500, 76, false).emit();
-        for bit in 0..14 * 8 {
+        for bit in (0..14 * 8).step_by(crate::stride(7)) {
             let mut frame = good;
             frame[bit / 8] ^= 1 << (bit % 8);
             let (out, rewriter) = sync(&frame, 100, false, false);
@@ -315,7 +316,7 @@ mod tests {
             assert!(rewriter.finish().is_err());
         }
         let good = Discovery::request(false).emit();
-        for bit in (0..40 * 8).chain(1020 * 8..1030 * 8) {
+        for bit in (0..40 * 8).chain(1020 * 8..1030 * 8).step_by(crate::stride(59)) {
             let mut frame = good;
             frame[bit / 8] ^= 1 << (bit % 8);
             let (out, rewriter) = discovery(&frame, Entry::STOCK, true, false);

@@ -80,8 +80,8 @@ mod tests {
 
     #[test]
     fn every_header_gives_itself_back() {
-        for source in 0..=u8::MAX {
-            for status in (0..=u8::MAX).map(Status::from_bits_retain) {
+        for source in (0..=u8::MAX).step_by(crate::stride(51)) {
+            for status in (0..=u8::MAX).step_by(crate::stride(15)).map(Status::from_bits_retain) {
                 let frame = DelayReq { source, status };
                 assert_eq!(DelayReq::parse(&frame.emit()), Ok(frame));
             }

@@ -300,7 +300,7 @@ impl Device {
         let (a, b) = (last_device(self.a), last_device(self.b));
         let retrains = self.counters.retrains.saturating_add(1);
         let counters = Counters { retrains, ..self.counters };
-        *self = Self { counters, error: self.error, alive_ns: self.alive_ns, ..Self::new(self.config) };
+        *self = Self { counters, error: self.error, ..Self::new(self.config) };
         (self.a.flags, self.b.flags) = (a, b);
     }
 

@@ -6,6 +6,12 @@
 #[cfg(any(test, feature = "std"))]
 extern crate std;
 
+/// Stride of a sweep in a test: every value, but every `thin`th one in an interpreter.
+#[cfg(test)]
+const fn stride(thin: usize) -> usize {
+    if cfg!(miri) { thin } else { 1 }
+}
+
 pub mod cut_through;
 
 mod address;

@@ -344,7 +344,7 @@ impl Master {
             ..Cycle::NEW
         };
         let before = core::mem::replace(&mut self.cycle, next);
-        self.good_cycles = if silent || damaged { 0 } else { self.good_cycles.saturating_add(1) };
+        self.good_cycles = if silent || damaged { 0 } else { self.good_cycles.saturating_add(open.into()) };
         if self.good_cycles >= 1000 {
             self.failures = 0;
         }

@@ -324,7 +324,7 @@ mod tests {
 
     #[test]
     fn every_word_gives_itself_back_and_falls_into_its_class() {
-        for word in 0..=u16::MAX {
+        for word in (0..=u16::MAX).step_by(crate::stride(199)) {
             let pto = Pto::from_word(word);
             assert_eq!(pto.word(), word);
             let high = word >= 0x8000;
@@ -346,7 +346,7 @@ mod tests {
 
     #[test]
     fn a_step_moves_by_one_up_or_nine_down_at_most() {
-        for ns in 0..4000 {
+        for ns in (0..4000).step_by(crate::stride(199)) {
             for direction in [Direction::Low, Direction::High] {
                 let pto = Pto::from_step(ns, direction).unwrap();
                 let sent = u32::from(pto.start().unwrap().ns());
@@ -370,7 +370,7 @@ mod tests {
 
     #[test]
     fn ticks_are_whole_five_nanoseconds() {
-        for ns in 0..=u16::MAX {
+        for ns in (0..=u16::MAX).step_by(crate::stride(199)) {
             assert_eq!(StartTime::new(ns).map(StartTime::ticks), (1..=3990).contains(&ns).then(|| (ns + 5) / 5 - 1));
         }
     }

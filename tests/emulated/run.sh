@@ -1,15 +1,34 @@
 #!/usr/bin/env bash
-# Builds the RP2040 images and runs them in pairs: two chips and a wire. Then compares the PIO's scheduler with an independent
-# emulator. Needs node and python3; installs the rest by name: the target from rustup, the emulators from npm and PyPI.
+# Builds the firmware images and runs those for which there is an emulator: RP2040s in pairs, two chips and a wire, with their PIO's
+# scheduler compared with an independent emulator; the RP2350's PIO program in that one; the STM32F405 under QEMU. Needs node, python3 and qemu-system-arm; installs the rest
+# by name: targets from rustup, the emulators from npm and PyPI.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")"
 
-for tool in node npm python3; do
+for tool in node npm python3 qemu-system-arm; do
     command -v "$tool" >/dev/null || { echo "run.sh: $tool is missing (node has to be 18 or newer)" >&2; exit 1; }
 done
-rustup target list --installed | grep -qx thumbv6m-none-eabi || rustup target add thumbv6m-none-eabi
-(cd ../../examples/firmware/rp2040 && cargo build --release --locked --bins)
-python3 size.py ../../examples/firmware/rp2040/target/thumbv6m-none-eabi/release/{t,a}format-{master,encoder}
+firmware=../../examples/firmware
+
+# target TRIPLE
+target() { rustup target list --installed | grep -qx "$1" || rustup target add "$1"; }
+
+# build IMAGES [ARGUMENT...]
+build() { (cd "$firmware/$1" && cargo build --release --locked --bins "${@:2}"); }
+
+target thumbv6m-none-eabi
+target thumbv7em-none-eabihf
+target thumbv8m.main-none-eabihf
+build rp2040
+python3 size.py "$firmware"/rp2040/target/thumbv6m-none-eabi/release/{t,a}format-{master,encoder}
+for image in stm32f405 stm32g4; do
+    build "$image"
+    python3 size.py "$firmware/$image/target/thumbv7em-none-eabihf/release/servowire-$image"
+done
+build rp2350-hdsl
+hdsl=$firmware/rp2350-hdsl/target/thumbv8m.main-none-eabihf/release/servowire-rp2350-hdsl
+python3 size.py "$hdsl"
+
 [ -d node_modules/rp2040js ] || npm ci --silent --no-audit --no-fund
 [ -x .venv/bin/python ] || python3 -m venv .venv
 .venv/bin/python -c 'import pioemu' 2>/dev/null || .venv/bin/pip install --quiet rp2040-pio-emulator==0.88.0
@@ -18,3 +37,10 @@ node --test --test-reporter=spec
 for image in tformat-master tformat-encoder-5m aformat-master aformat-encoder-2m5; do
     node waveform.mjs "$image" | .venv/bin/python compare.py
 done
+
+.venv/bin/python hdsl.py "$hdsl"
+
+build stm32f405 --features emulated
+(cd ../.. && cargo build -p servowire-examples --bin tformat-encoder)
+python3 stm32f405.py "$firmware/stm32f405/target/thumbv7em-none-eabihf/release/servowire-stm32f405" \
+    ../../target/debug/tformat-encoder

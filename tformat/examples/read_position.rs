@@ -35,7 +35,8 @@ fn main() -> Result<(), Error> {
             Err(error) => println!("{cycle}: refused, {error}"),
         }
     }
-    println!("{} good, {} refused", counters.good(), counters.errors());
+    let (good, refused, share) = (counters.good(), counters.errors(), counters.errors_per_million());
+    println!("{good} good, {refused} refused: {share} of a million");
     Ok(())
 }
 

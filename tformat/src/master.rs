@@ -2,7 +2,7 @@
 //! to do next. Time is a count of nanoseconds from any origin.
 //!
 //! * [`Transaction`] takes one request to its response: time-outs, echoes, late interrupts, all checks.
-//! * [`Reset`], [`SingleTurnZero`], [`EepromAccess`] and [`Detection`] are made of several transactions and drive them
+//! * [`Reset`], [`SingleTurnZero`], [`MultiTurnZero`], [`EepromAccess`] and [`Detection`] are made of several transactions and drive them
 //!   by [`Step`].
 //! * [`Counters`] and [`ErrorRate`] keep account of what was refused.
 //!
@@ -28,6 +28,8 @@ mod eeprom;
 mod line;
 mod reset;
 mod transaction;
+mod turns;
+mod witness;
 mod zero;
 
 use crate::error::{Error, ErrorClass};
@@ -39,6 +41,7 @@ pub use line::Line;
 pub use reset::Reset;
 pub use servowire_core::{ErrorRate, Polling};
 pub use transaction::{Exchange, Progress, Transaction, parse_echoed};
+pub use turns::MultiTurnZero;
 pub use zero::SingleTurnZero;
 
 /// What a procedure of several transactions wants next.

@@ -218,6 +218,11 @@ impl Resolution {
         sign_extend(to.wrapping_sub(from), self.abs_bits)
     }
 
+    /// The shorter way from one number of turns to another, over the overflow if need be.
+    pub(crate) const fn turns_between(self, from: u32, to: u32) -> i32 {
+        sign_extend(to.wrapping_sub(from), self.abm_bits)
+    }
+
     const fn cut(self, value: u32, bits: u8) -> Result<u32, Error> {
         let mask = 1_u32.wrapping_shl(bits as u32).wrapping_sub(1);
         let excess = value & !mask;

@@ -9,7 +9,7 @@ use bench::{Bench, Seen};
 use proptest::prelude::*;
 use servowire_world::{Kind, Rates, Scenario, Tally, scenarios};
 use tformat::device::Config;
-use tformat::master::{EEPROM_POLLING, EepromAccess, Reset, SingleTurnZero};
+use tformat::master::{EEPROM_POLLING, EepromAccess, MultiTurnZero, Reset, SingleTurnZero};
 use tformat::{Abm, Abs, Address, Almc, BitRate, Error, Page, Request, Resolution};
 
 fn events() -> u64 {
@@ -93,6 +93,40 @@ fn hostile_zero_presets() {
         bench
     });
     println!("zero presets: {} done, {} unknown, {} not done", ends[0], ends[1], ends[2]);
+    assert!(ends[0] > 0 && ends[2] > 0, "{ends:?}");
+}
+
+/// Law 5 for ID C that is read back, with a shaft that trembles on the boundary of a turn.
+#[test]
+fn hostile_turn_zeros() {
+    let mut ends = [0_u32; 3];
+    runs("turn zeros", 4, |seed| {
+        let mut bench = bench(seed, MILD);
+        bench.moves = false;
+        bench.trembles = seed % 2 == 0;
+        bench.device.set_position(Abs::truncate(0x7f_ffff), Abm::truncate(0x10 + seed as u32 % 0x1000));
+        let resolution = Resolution::new(23, 16).unwrap();
+        let mut zero = MultiTurnZero::set_and_lose_multi_turn_reference(resolution, 1);
+        let step = zero.start(bench.ready_ns);
+        let end = bench.run(step, |outcome, ready_ns| zero.receive(outcome, ready_ns));
+        let effects = bench.device.effects();
+        if bench.forged_requests > 0 || bench.seen.forged + bench.seen.undetected > 0 {
+            return bench;
+        }
+        assert!(effects <= 1, "{effects} resets, seed {seed}");
+        match end {
+            Ok(_) => assert_eq!(effects, 1, "seed {seed}"),
+            Err(Error::EffectUnknown { .. }) => {}
+            Err(error) => assert!(matches!(error, Error::NotDone { .. }) && effects == 0, "{error}, seed {seed}"),
+        }
+        ends[match end {
+            Ok(_) => 0,
+            Err(Error::EffectUnknown { .. }) => 1,
+            Err(_) => 2,
+        }] += 1;
+        bench
+    });
+    println!("turn zeros: {} done, {} unknown, {} not done", ends[0], ends[1], ends[2]);
     assert!(ends[0] > 0 && ends[2] > 0, "{ends:?}");
 }
 

@@ -21,6 +21,12 @@ pub struct Verdict {
 
 impl Verdict {
     /// Whether the block is thrown away and the one before it stays in force.
+    ///
+    /// ```
+    /// use rtex_block::{BlockSize, MacId, device::check};
+    /// let block = [0x85, 0x20, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0];
+    /// assert!(check(&block, BlockSize::Bytes16, MacId::new(5).unwrap()).is_discarded());
+    /// ```
     pub fn is_discarded(&self) -> bool {
         self.alarm.is_some()
     }
@@ -38,7 +44,11 @@ impl Verdict {
 /// this drive.
 pub fn check(bytes: &[u8], size: BlockSize, mac_id: MacId) -> Verdict {
     let &[byte0, byte1, ..] = bytes else { return Verdict::discard(WRONG_MAC_ID, ERR86_0) };
-    if bytes.len() != size.bytes() {
+    let len = match size {
+        BlockSize::Bytes16 => 16,
+        BlockSize::Bytes32 => 32,
+    };
+    if bytes.len() != len {
         return Verdict::discard(WRONG_MAC_ID, ERR86_0);
     }
     if byte0 & 0x80 != 0 {

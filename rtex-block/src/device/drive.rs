@@ -6,22 +6,16 @@ use execute::Job;
 use super::check::{Verdict, check};
 use super::config::DriveConfig;
 use super::literals::{
-    CP, CT, CV, ERR27_4, ERR86_2, ERR91_1, HARD_STOP, NOP, PAUSE, PP, PROFILE, PROFILE_IDLE, SERVO_ON, SMOOTH_STOP,
-    WRONG_MODE,
+    CP, CT, CV, ERR27_4, ERR86_2, ERR91_1, HARD_STOP, NON_CYCLIC, NOP, PAUSE, PP, PROFILE, PROFILE_IDLE, SERVO_ON,
+    SHOWN_ACTIVE, SHOWN_ALARM, SHOWN_HOMED, SHOWN_IN_POSITION, SHOWN_IN_PROGRESS, SHOWN_READY, SHOWN_TORQUE_LIMITED,
+    SHOWN_WARNING, SMOOTH_STOP, WRONG_MODE,
 };
 use super::motion::{Drivemode, Motion};
 use super::parameters::{ACCELERATION, DECELERATION, Parameters, RESPONSE_DATA, SPEED_UNIT, SUB_RESPONSE_DATA};
 use super::profile::Ramp;
+use super::wire::{Block, Request, Sub};
 use crate::block::{BlockSize, LEN, LEN32};
-use crate::code::{Code, NonCyclicCode};
-use crate::error_code::{Alarm, ErrorCode};
-use crate::execution::Execution;
-use crate::header::{Header, UpdateCounter};
-use crate::noncyclic_command::NonCyclicCommand;
-use crate::response::Response;
-use crate::status::StatusFlags;
-use crate::sub::{Response32, SubResponse, split32};
-use crate::type_code::{Nibble, Pr};
+use crate::error_code::Alarm;
 
 /// Command units per second.
 const HOMING_SPEED: i64 = 1_000_000;
@@ -32,8 +26,8 @@ const HOMING_SPEED: i64 = 1_000_000;
 /// so the echo of a code comes one command later than the echo of the counter. Blocks with a fault in header or
 /// cyclic code are thrown away and the command before stays in force; if that lasts the drive raises Err86.
 ///
-/// It shares no number with the master, and is as late, forgetful and literal as its [`Manners`](super::Manners) say. The motor
-/// follows its command position as a first-order lag; that is a model for tests, not for tuning.
+/// It shares neither numbers nor code with the master: blocks are read and written by byte. It is as late, forgetful and
+/// literal as its [`Manners`](super::Manners) say. The motor follows its command position as a first-order lag; that is a model for tests, not for tuning.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Drive {
@@ -48,8 +42,15 @@ pub struct Drive {
     armed: [bool; 2],
     homing: bool,
     feed_forward: i32,
+    sub_feed_forward: [i32; 2],
     main_power: bool,
-    inputs: StatusFlags,
+    /// Byte 3 of a response.
+    inputs: u8,
+    /// Byte 2 of the responses, and Latch_Comp, as they would have been without lateness; the latest first.
+    shown: [u8; 16],
+    comp: [u8; 16],
+    /// Latch_Comp as the next response shows it.
+    latched: u8,
     /// The command in force: cyclic code, Control_Bits, Command_Data1.
     cyclic: u8,
     control: u16,
@@ -57,18 +58,18 @@ pub struct Drive {
     target_speed: i32,
     /// What the next response echoes.
     echo: u8,
-    error: Option<ErrorCode>,
+    error: Option<u16>,
     job: Option<Job>,
     /// The request before, whose echoes linger, and for how many answers.
-    stale: Option<(NonCyclicCommand, u16)>,
-    sub: SubResponse,
+    stale: Option<(Request, u16)>,
+    sub: Sub,
     /// Responses that are not out yet.
-    pending: [Response; 3],
+    pending: [Block; 3],
     /// Supervision.
     exchanges: u16,
     faults: u16,
     lost: u16,
-    counter: Option<UpdateCounter>,
+    counter: Option<u8>,
     repeats: u8,
     wrong_counts: u16,
     communication: u8,
@@ -77,26 +78,7 @@ pub struct Drive {
 impl Drive {
     /// A drive that has just got control power; main power is on, and nothing has been received.
     pub const fn new(config: DriveConfig) -> Self {
-        let silent = Response {
-            mac_id: config.mac_id,
-            update_counter_echo: UpdateCounter::ZERO,
-            cmd_error: false,
-            code: Code::truncate(NOP),
-            status: StatusFlags::empty(),
-            response_data1: 0,
-            response_data2: 0,
-            response_data3: 0,
-        };
-        let sub = SubResponse {
-            cmd_error: false,
-            execution: Execution::empty(),
-            code: Nibble::ZERO,
-            type_code: 0,
-            index: 0,
-            data1: 0,
-            data2: 0,
-            data3: 0,
-        };
+        let silent = Block::new(config.mac_id.get(), NOP, [0; 2], 0, [0; 8]);
         Self {
             config,
             parameters: Parameters::DEFAULT,
@@ -109,8 +91,12 @@ impl Drive {
             armed: [false; 2],
             homing: false,
             feed_forward: 0,
+            sub_feed_forward: [0; 2],
             main_power: true,
-            inputs: StatusFlags::empty(),
+            inputs: 0,
+            shown: [0; 16],
+            comp: [0; 16],
+            latched: 0,
             cyclic: NOP,
             control: 0,
             data1: 0,
@@ -119,7 +105,7 @@ impl Drive {
             error: None,
             job: None,
             stale: None,
-            sub,
+            sub: Sub::Done(0, 0, 0, 0),
             pending: [silent; 3],
             exchanges: 0,
             faults: 0,
@@ -133,17 +119,22 @@ impl Drive {
 
     /// One exchange in the 16-byte mode.
     pub fn exchange(&mut self, command: &[u8; LEN]) -> [u8; LEN] {
-        let response = self.response(command[0]).emit();
-        self.receive(command, BlockSize::Bytes16);
+        let response = self.response(command[0]);
+        self.receive(command, None, check(command, BlockSize::Bytes16, self.config.mac_id));
         response
     }
 
     /// One exchange in the 32-byte mode.
     pub fn exchange32(&mut self, command: &[u8; LEN32]) -> [u8; LEN32] {
         let [_, data2, data3] = SUB_RESPONSE_DATA.map(|pr| self.selected(pr, 0));
-        let sub = SubResponse { data2, data3, ..self.sub };
-        let response = Response32 { main: self.response(command[0]), sub }.emit();
-        self.receive(command, BlockSize::Bytes32);
+        let sub = self.sub.emit(data2, data3);
+        let mut response = [0; LEN32];
+        let halves = self.response(command[0]).into_iter().chain(sub);
+        response.iter_mut().zip(halves).for_each(|(to, from)| *to = from);
+        let verdict = check(command, BlockSize::Bytes32, self.config.mac_id);
+        if let (Some(main), Some(rest)) = (command.first_chunk(), command.last_chunk()) {
+            self.receive(main, Some(*rest), verdict);
+        }
         response
     }
 
@@ -171,6 +162,11 @@ impl Drive {
     /// The feed-forward in force, from Command_Data3.
     pub const fn feed_forward(&self) -> i32 {
         self.feed_forward
+    }
+
+    /// The feed-forward in force, from Sub_Command_Data2 and 3.
+    pub const fn sub_feed_forward(&self) -> [i32; 2] {
+        self.sub_feed_forward
     }
 
     /// The active alarm.
@@ -224,9 +220,8 @@ impl Drive {
     }
 
     /// Puts the inputs that byte 3 of a response shows.
-    pub const fn set_inputs(&mut self, inputs: StatusFlags) {
-        let [_, high] = inputs.to_bytes();
-        self.inputs = StatusFlags::from_bytes([0, high]);
+    pub const fn set_inputs(&mut self, byte3: u8) {
+        self.inputs = byte3;
     }
 
     /// The trigger of latch 1 or 2: catches the actual position, if the latch is armed.
@@ -244,36 +239,43 @@ impl Drive {
         self.main_power && self.alarm.is_none() && self.exchanges >= self.config.sync_exchanges
     }
 
-    fn status(&self) -> StatusFlags {
+    /// Byte 2 as it is.
+    fn status(&self) -> u8 {
         let progress = self.motion.in_progress();
         let settled = self.motion.deviation().unsigned_abs() <= self.config.in_position;
         let set = [
-            (StatusFlags::SERVO_ACTIVE, self.motion.says_active()),
-            (StatusFlags::SERVO_READY, self.is_ready()),
-            (StatusFlags::ALARM, self.alarm.is_some()),
-            (StatusFlags::WARNING, self.warning != 0),
-            (StatusFlags::TORQUE_LIMITED, self.motion.torque_limited),
-            (StatusFlags::HOMING_COMPLETE, self.homed),
-            (StatusFlags::IN_PROGRESS, progress),
-            (StatusFlags::IN_POSITION, settled && !progress || self.config.manners.always_in_position),
+            (SHOWN_ACTIVE, self.motion.says_active()),
+            (SHOWN_READY, self.is_ready()),
+            (SHOWN_ALARM, self.alarm.is_some()),
+            (SHOWN_WARNING, self.warning != 0),
+            (SHOWN_TORQUE_LIMITED, self.motion.torque_limited),
+            (SHOWN_HOMED, self.homed),
+            (SHOWN_IN_PROGRESS, progress),
+            (SHOWN_IN_POSITION, settled && !progress || self.config.manners.always_in_position),
         ];
-        set.into_iter().fold(self.inputs, |all, (flag, on)| if on { all | flag } else { all })
+        set.into_iter().fold(0, |all, (flag, on)| if on { all | flag } else { all })
+    }
+
+    /// Byte 2 as this response shows it: each bit from as many exchanges ago as it is late.
+    fn shown(&mut self) -> u8 {
+        let (now, comp) = (self.status(), self.latch_flags());
+        for (past, new) in [(&mut self.shown, now), (&mut self.comp, comp)] {
+            past.rotate_right(1);
+            past[0] = new;
+        }
+        let ago = |past: &[u8; 16], late: u8| past.get(usize::from(late)).copied().unwrap_or(past[15]);
+        self.latched = ago(&self.comp, self.config.manners.latch_late);
+        let bits = self.config.manners.status_late.into_iter().zip(0..8_u32);
+        bits.fold(0, |all, (late, bit)| all | ago(&self.shown, late) & 1_u8.wrapping_shl(bit))
     }
 
     /// The response while the block with this byte 0 comes in: its counter, everything else as it was before.
-    fn response(&mut self, byte0: u8) -> Response {
+    fn response(&mut self, byte0: u8) -> [u8; LEN] {
+        let shown = self.shown();
         let [response_data1, ..] = self.response_data();
-        let present = Response {
-            mac_id: self.config.mac_id,
-            update_counter_echo: UpdateCounter::ZERO,
-            cmd_error: false,
-            code: Code::truncate(self.echo),
-            status: self.status(),
-            response_data1,
-            response_data2: 0,
-            response_data3: 0,
-        }
-        .with_noncyclic(&self.noncyclic());
+        let byte1 = self.echo & 0x7f | if self.error.is_some() { 0x80 } else { 0 };
+        let tail = self.noncyclic(shown);
+        let present = Block::new(self.config.mac_id.get(), byte1, [shown, self.inputs], response_data1, tail);
         self.pending.rotate_right(1);
         let out = match usize::from(self.config.manners.echo_lag).checked_sub(1) {
             None => present,
@@ -284,7 +286,7 @@ impl Drive {
             }
         };
         self.pending[0] = present;
-        Response { update_counter_echo: Header::from_byte(byte0).update_counter, ..out }
+        out.with_counter_of(byte0)
     }
 
     /// Response_Data1 to 3 as Pr7.29 to 7.31 select them.
@@ -294,7 +296,7 @@ impl Drive {
         [self.selected(one, defaults[0]), self.selected(two, defaults[1]), self.selected(three, defaults[2])]
     }
 
-    fn selected(&self, pr: Pr, default: i32) -> i32 {
+    fn selected(&self, pr: u16, default: i32) -> i32 {
         match u8::try_from(self.parameters.value(pr)) {
             Ok(0) => default,
             Ok(code) => self.monitor(code.into(), 0).unwrap_or(0),
@@ -308,7 +310,7 @@ impl Drive {
         let per = if self.parameters.value(SPEED_UNIT) == 0 { self.config.units_per_rev } else { 1 };
         let divisor = i128::from(self.config.update_ns).saturating_mul(per.into());
         let speed = i128::from(step).saturating_mul(scale).checked_div(divisor).unwrap_or(0);
-        i32::try_from(speed).unwrap_or(if speed < 0 { i32::MIN } else { i32::MAX })
+        saturated(speed)
     }
 
     /// A speed in the unit of Pr7.25 as command units per second.
@@ -321,29 +323,29 @@ impl Drive {
         }
     }
 
-    fn receive(&mut self, bytes: &[u8], size: BlockSize) {
+    fn receive(&mut self, main: &[u8; LEN], sub: Option<[u8; LEN]>, verdict: Verdict) {
         self.lost = 0;
         self.exchanges = self.exchanges.saturating_add(1);
-        let verdict = check(bytes, size, self.config.mac_id);
+        let sub_error = verdict.sub_error.map(|code| code.0);
         if let Some(alarm) = verdict.alarm {
-            self.discard(bytes, verdict, alarm);
-        } else if let Some(main) = bytes.first_chunk::<LEN>() {
-            self.accept(main, verdict.error);
-            if let Ok((_, sub)) = split32(bytes) {
-                self.serve_sub(sub, verdict.sub_error);
+            self.discard(main, sub, verdict, alarm);
+        } else {
+            self.accept(main, verdict.error.map(|code| code.0));
+            if let Some(sub) = sub {
+                self.serve_sub(sub, sub_error);
             }
         }
         self.tick();
     }
 
     /// The block is thrown away; an undefined code is echoed as it came.
-    fn discard(&mut self, bytes: &[u8], verdict: Verdict, alarm: Alarm) {
-        if let (Some(_), Some(&byte1)) = (verdict.error, bytes.get(1)) {
-            self.echo = byte1;
-            self.error = verdict.error;
+    fn discard(&mut self, main: &[u8; LEN], sub: Option<[u8; LEN]>, verdict: Verdict, alarm: Alarm) {
+        if let Some(code) = verdict.error {
+            self.echo = main[1];
+            self.error = Some(code.0);
         }
-        if let (Some(code), Ok((_, sub))) = (verdict.sub_error, split32(bytes)) {
-            self.refuse_sub(sub, code);
+        if let (Some(code), Some([byte16, ..])) = (verdict.sub_error, sub) {
+            self.sub = Sub::Refused(byte16 & 0x0f, code.0);
         }
         self.count_fault(alarm);
     }
@@ -355,14 +357,14 @@ impl Drive {
         }
     }
 
-    fn accept(&mut self, block: &[u8; LEN], error: Option<ErrorCode>) {
+    fn accept(&mut self, block: &[u8; LEN], error: Option<u16>) {
         let [byte0, byte1, c2, c3, d4, d5, d6, d7, noncyclic @ ..] = *block;
         let (cyclic, code) = (byte1 >> 4 & 7, byte1 & 0x0f);
         let before = core::mem::replace(&mut self.echo, byte1);
         self.error = error;
         let goes_together = if cyclic == NOP { code == 0 } else { code != PROFILE || cyclic == PP };
         if error.is_none() && !goes_together {
-            self.error = Some(ErrorCode(WRONG_MODE));
+            self.error = Some(WRONG_MODE);
             let (main, sub) = ERR91_1;
             return self.count_fault(Alarm { main, sub });
         }
@@ -372,28 +374,29 @@ impl Drive {
             self.job = None;
             return;
         }
-        self.supervise(UpdateCounter::truncate(byte0 >> 5));
+        self.supervise(byte0 >> 5 & 3);
         self.cyclic = cyclic;
         self.control = u16::from_le_bytes([c2, c3]);
         self.data1 = i32::from_le_bytes([d4, d5, d6, d7]);
         let servo_on = self.control & SERVO_ON != 0 && self.is_ready();
         self.motion.request(servo_on, &self.config);
-        let Some(code) = NonCyclicCode::new(code) else { return };
-        let request = NonCyclicCommand::from_bytes(code, noncyclic);
-        if let NonCyclicCommand::Profile { target_speed, .. } = request {
-            self.target_speed = target_speed;
+        if NON_CYCLIC.contains(&code) {
+            let request = Request { code, bytes: noncyclic };
+            if code == PROFILE {
+                self.target_speed = request.data();
+            }
+            self.error = self.serve(request, before & 0x7f == PROFILE_IDLE).err();
         }
-        self.error = self.serve(request, before & 0x7f == PROFILE_IDLE).err().map(ErrorCode);
     }
 
     /// The counter adds 1 in every update period; with two communications in it every value comes twice.
-    fn supervise(&mut self, counter: UpdateCounter) {
+    fn supervise(&mut self, counter: u8) {
         let last = self.counter.replace(counter);
         let allowed = self.config.communications.saturating_sub(1);
         let good = match last {
             None => true,
             Some(last) if counter == last => self.repeats < allowed,
-            Some(last) => counter.get() == last.get().wrapping_add(1) & 3,
+            Some(last) => counter == last.wrapping_add(1) & 3,
         };
         self.repeats = if last == Some(counter) { self.repeats.saturating_add(1) } else { 0 };
         self.wrong_counts = if good { 0 } else { self.wrong_counts.saturating_add(1) };
@@ -413,8 +416,8 @@ impl Drive {
         let acceleration = |pr| i64::from(self.parameters.value(pr).max(1)).saturating_mul(10_000);
         let ramp = Ramp { up: acceleration(ACCELERATION), down: acceleration(DECELERATION) };
         let per_update = |speed: i32| {
-            let units = self.units_per_second(speed).saturating_mul(self.config.update_ns.into()) / 1_000_000_000;
-            i32::try_from(units).unwrap_or(if units < 0 { i32::MIN } else { i32::MAX })
+            let units = i128::from(self.units_per_second(speed)).saturating_mul(self.config.update_ns.into());
+            saturated(units / 1_000_000_000)
         };
         let mode = match self.cyclic {
             CP => Drivemode::Position(self.data1),
@@ -440,4 +443,8 @@ impl Drive {
             self.motion.shift(self.motion.command.wrapping_neg());
         }
     }
+}
+
+fn saturated(value: i128) -> i32 {
+    i32::try_from(value.clamp(i32::MIN.into(), i32::MAX.into())).unwrap_or(0)
 }

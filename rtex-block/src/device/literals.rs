@@ -9,8 +9,18 @@ pub(super) const CT: u8 = 4;
 
 /// Non-cyclic codes that are defined, and those of them that the sub block knows.
 pub(super) const NON_CYCLIC: [u8; 8] = [0, 1, 2, 4, 5, 6, 7, 10];
-pub(super) const SUB: [u8; 3] = [0, 2, 10];
+pub(super) const NORMAL: u8 = 0;
+pub(super) const RESET: u8 = 1;
+pub(super) const SYSTEM_ID: u8 = 2;
+pub(super) const HOMING: u8 = 4;
+pub(super) const ALARM: u8 = 5;
+pub(super) const PARAMETER: u8 = 6;
 pub(super) const PROFILE: u8 = 7;
+pub(super) const MONITOR: u8 = 10;
+pub(super) const SUB: [u8; 3] = [SUB_NORMAL, SUB_SYSTEM_ID, SUB_MONITOR];
+pub(super) const SUB_NORMAL: u8 = 0;
+pub(super) const SUB_SYSTEM_ID: u8 = 2;
+pub(super) const SUB_MONITOR: u8 = 10;
 
 /// Byte 1: profile position, idle.
 pub(super) const PROFILE_IDLE: u8 = 0x10;
@@ -36,10 +46,10 @@ pub(super) const ERR91_1: (u8, u8) = (91, 1);
 pub(super) const RESET_SOFTWARE: u16 = 0x001;
 pub(super) const RESET_ATTRIBUTE_C: u16 = 0x011;
 pub(super) const PARAMETER_WRITE: u16 = 0x011;
-pub(super) const HOMING_ACTUAL: u8 = 0x21;
-pub(super) const HOMING_COMMAND: u8 = 0x22;
-pub(super) const HOMING_LATCH: u8 = 0x50;
-pub(super) const PROFILE_RELATIVE: u8 = 0x11;
+pub(super) const HOMING_ACTUAL: u16 = 0x21;
+pub(super) const HOMING_COMMAND: u16 = 0x22;
+pub(super) const HOMING_LATCH: u16 = 0x50;
+pub(super) const PROFILE_RELATIVE: u16 = 0x11;
 pub(super) const PERR: u16 = 0x01;
 pub(super) const MPOS: u16 = 0x04;
 pub(super) const ASPD: u16 = 0x05;
@@ -69,3 +79,21 @@ pub(super) const SERVO_ON: u16 = 0x0080;
 pub(super) const PAUSE: u16 = 0x2000;
 pub(super) const SMOOTH_STOP: u16 = 0x4000;
 pub(super) const HARD_STOP: u16 = 0x8000;
+
+/// Status_Flags, byte 2 of a response.
+pub(super) const SHOWN_ACTIVE: u8 = 0x80;
+pub(super) const SHOWN_READY: u8 = 0x40;
+pub(super) const SHOWN_ALARM: u8 = 0x20;
+pub(super) const SHOWN_WARNING: u8 = 0x10;
+pub(super) const SHOWN_TORQUE_LIMITED: u8 = 0x08;
+pub(super) const SHOWN_HOMED: u8 = 0x04;
+pub(super) const SHOWN_IN_PROGRESS: u8 = 0x02;
+pub(super) const SHOWN_IN_POSITION: u8 = 0x01;
+
+/// Byte 9 of an answer: how far it is, and by the layout the latches and the near window.
+pub(super) const ERR: u8 = 0x80;
+pub(super) const WNG: u8 = 0x40;
+pub(super) const BUSY: u8 = 0x10;
+pub(super) const LATCH_COMP1: u8 = 0x01;
+pub(super) const LATCH_COMP2: u8 = 0x02;
+pub(super) const NEAR: u8 = 0x02;

@@ -17,6 +17,11 @@ pub struct Manners {
     pub servo_off_late: u16,
     /// Answers to a new request that still carry type code, index and data of the request before it.
     pub stale_answers: u16,
+    /// Exchanges by which each bit of byte 2 of the Status_Flags is shown later than it is so, bit 0 first (In_Position) and bit 7
+    /// last (Servo_Active), 0..=15 each.
+    pub status_late: [u8; 8],
+    /// Exchanges by which Latch_Comp1 and 2 are shown later than they are so, 0..=15.
+    pub latch_late: u8,
     /// Every request is busy for as long as a parameter write.
     pub always_busy: bool,
     /// A request that fails says ERR while it is still busy.
@@ -40,6 +45,8 @@ impl Manners {
         in_progress_late: 0,
         servo_off_late: 0,
         stale_answers: 0,
+        status_late: [0; 8],
+        latch_late: 0,
         always_busy: false,
         err_while_busy: false,
         sets_position_while_on: false,
@@ -54,6 +61,8 @@ impl Manners {
         with_in_progress_late: in_progress_late, u16;
         with_servo_off_late: servo_off_late, u16;
         with_stale_answers: stale_answers, u16;
+        with_status_late: status_late, [u8; 8];
+        with_latch_late: latch_late, u8;
         with_always_busy: always_busy, bool;
         with_err_while_busy: err_while_busy, bool;
         with_sets_position_while_on: sets_position_while_on, bool;

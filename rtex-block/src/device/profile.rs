@@ -39,22 +39,18 @@ impl Generator {
         let ns = i64::from(update_ns);
         let change = |acceleration: i64| acceleration.saturating_mul(ns) / (NANO / MILLI);
         let distance = self.to_go.saturating_abs();
-        let now = self.speed_milli / MILLI;
-        let braking = now.saturating_mul(now).checked_div(ramp.down.saturating_mul(2)).unwrap_or(0);
-        let limit = if distance <= braking { 0 } else { speed.saturating_mul(MILLI) };
-        self.speed_milli = if self.speed_milli < limit {
-            self.speed_milli.saturating_add(change(ramp.up).max(1)).min(limit)
-        } else {
-            self.speed_milli.saturating_sub(change(ramp.down).max(1)).max(limit)
-        };
-        // The last stretch is made at a crawl, so that rounding of the ramp never leaves the axis short of it.
-        if distance <= braking.max(1) && speed > 0 {
-            self.speed_milli = self.speed_milli.max(change(ramp.down).min(speed.saturating_mul(MILLI)).max(1));
-        }
+        // From any faster than this the axis could not stop on its target: speeds v, v - step, v - 2 step... over the distance.
+        let half = change(ramp.down) / (2 * MILLI);
+        let squared = ramp.down.saturating_mul(2).saturating_mul(distance).saturating_add(half.saturating_mul(half));
+        let stops = i64::try_from(squared.unsigned_abs().isqrt()).unwrap_or(i64::MAX).saturating_sub(half).max(1);
+        let limit = stops.min(speed).saturating_mul(MILLI);
+        let slowest = self.speed_milli.saturating_sub(change(ramp.down));
+        let fastest = self.speed_milli.saturating_add(change(ramp.up));
+        self.speed_milli = limit.max(slowest).min(fastest);
         self.fraction_nano = self.fraction_nano.saturating_add(self.speed_milli.saturating_mul(ns) / MILLI);
         let whole = (self.fraction_nano / NANO).min(distance);
         self.fraction_nano %= NANO;
-        let step = if self.to_go < 0 { whole.saturating_neg() } else { whole };
+        let step = whole.saturating_mul(self.to_go.signum());
         self.to_go = self.to_go.saturating_sub(step);
         (i32::try_from(step).unwrap_or(i32::MAX), self.to_go == 0)
     }

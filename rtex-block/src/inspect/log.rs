@@ -46,6 +46,12 @@ pub enum LogFinding {
         /// Of these, with Busy.
         busy: u32,
     },
+    /// The drive has answered before, and not to the last commands: more than the two communications that an update period
+    /// can have.
+    NoAnswer {
+        /// Commands without an answer.
+        commands: u32,
+    },
     /// Drives were sent commands, and this one never answered.
     NeverAnswered(MacId),
     /// This drive answers and was never sent a command.
@@ -62,6 +68,7 @@ impl fmt::Display for LogFinding {
             Self::Answered { responses, busy } => {
                 write!(f, "answered after {responses} responses, {busy} of them busy")
             }
+            Self::NoAnswer { commands } => write!(f, "no answer to the last {commands} commands"),
             Self::NeverAnswered(mac_id) => write!(f, "drive {mac_id} never answered"),
             Self::NeverAsked(mac_id) => write!(f, "drive {mac_id} answers and was never sent a command"),
         }
@@ -74,6 +81,8 @@ impl fmt::Display for LogFinding {
 struct Track {
     commands: u32,
     responses: u32,
+    /// Commands since the last response.
+    unanswered: u32,
     counter: Option<UpdateCounter>,
     sent_twice: bool,
     echo: Option<UpdateCounter>,
@@ -90,6 +99,7 @@ impl Track {
     const NEW: Self = Self {
         commands: 0,
         responses: 0,
+        unanswered: 0,
         counter: None,
         sent_twice: false,
         echo: None,
@@ -154,6 +164,9 @@ impl LogAnalysis {
         let limit = self.max_step;
         let Some(track) = self.track(block.mac_id()) else { return [None; 3] };
         track.commands = track.commands.saturating_add(1);
+        track.unanswered = track.unanswered.saturating_add(1);
+        // Said once.
+        let silent = (track.responses > 0 && track.unanswered == 3).then_some(LogFinding::NoAnswer { commands: 3 });
         let nop = block.code() == Code::NOP;
         let to = block.update_counter();
         let jump = track.counter.filter(|_| !nop).and_then(|from| {
@@ -179,12 +192,13 @@ impl LogAnalysis {
             let asks = !matches!(block.code().noncyclic_bits(), 0 | 7);
             track.request = asks.then_some((0, 0));
         }
-        [jump, too_far, None]
+        [jump, too_far, silent]
     }
 
     fn response(&mut self, block: ResponseBlock<'_>) -> [Option<LogFinding>; 3] {
         let Some(track) = self.track(block.mac_id()) else { return [None; 3] };
         track.responses = track.responses.saturating_add(1);
+        track.unanswered = 0;
         let echo = block.update_counter_echo();
         track.still = if track.echo == Some(echo) { track.still.saturating_add(1) } else { 0 };
         track.echo = Some(echo);

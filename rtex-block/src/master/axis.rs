@@ -236,8 +236,8 @@ impl Axis {
             _ => self.setpoint,
         };
         let control = match self.state {
-            AxisState::SwitchingOn | AxisState::On => self.control | ControlBits::SERVO_ON,
-            AxisState::Stopping(_) => self.control | ControlBits::SERVO_ON | self.smooth_stop(),
+            AxisState::SwitchingOn | AxisState::On => self.control.union(ControlBits::SERVO_ON),
+            AxisState::Stopping(_) => self.control.union(ControlBits::SERVO_ON).union(self.smooth_stop()),
             _ => self.control,
         };
         let main = Command { control, command_data1, noncyclic, ..off };
@@ -250,7 +250,7 @@ impl Axis {
         match (self.state, self.config.stop) {
             _ if at_once => self.stop(reason),
             (AxisState::Stopping(_), _) | (_, StopPolicy::None) => {}
-            (AxisState::On, StopPolicy::Decelerate { .. }) if self.mode != ActiveCode::CyclicTorque => {
+            (AxisState::On, StopPolicy::Decelerate { .. }) => {
                 self.enter(AxisState::Stopping(reason), self.config.limits.stop);
                 self.slow_down(reason);
             }
@@ -353,8 +353,7 @@ impl Axis {
         let less = |value: i32| {
             let magnitude = value.unsigned_abs().saturating_sub(per_update.max(1));
             // Smaller than an i32 in magnitude, so it is one.
-            let magnitude = i32::try_from(magnitude).unwrap_or(i32::MAX);
-            if value < 0 { magnitude.saturating_neg() } else { magnitude }
+            i32::try_from(magnitude).unwrap_or(i32::MAX).saturating_mul(value.signum())
         };
         let stands = match self.mode {
             ActiveCode::CyclicPosition => {

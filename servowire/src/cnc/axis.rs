@@ -2,18 +2,17 @@
 
 use std::collections::VecDeque;
 
-use sorte_proto::drv8711;
+use sorte_proto::drv8711::{STEP_NS, WAKE_NS};
 use sorte_proto::iep::{Channel, Edge, Happening};
 use sorte_proto::pins::DIR_SETUP_HOLD_NS;
 use sorte_proto::sync0::{CMP7_NS, Variant};
 use sorte_proto::{Direction, Pto};
 
 use super::clock::Clock;
+use super::driver::Driver;
 
 /// Period of the generator.
 pub(super) const PERIOD: u64 = 4000;
-/// STEP must be high, and low, for so long: the shortest pulse of the DRV8711, in ns.
-const STEP_NS: f64 = 1900.0;
 /// Steps under way at most; older ones are lost.
 const UNDER_WAY: usize = 8;
 
@@ -36,6 +35,8 @@ pub(super) struct Tally {
     pub(super) dir_faults: u64,
     /// STEP high or low for less than the driver needs.
     pub(super) step_faults: u64,
+    /// Steps before the driver was awake.
+    pub(super) wake_faults: u64,
     /// Largest distance of a pulse from its time, in ns.
     pub(super) worst_ns: f64,
 }
@@ -70,10 +71,10 @@ pub(super) struct Axis {
     rise: f64,
     fall: f64,
     changed: f64,
+    woken: f64,
     enabled: bool,
     dir: bool,
-    /// Set while the driver has shut down.
-    pub(super) fault: drv8711::Status,
+    pub(super) driver: Driver,
     pub(super) position: i64,
     pub(super) tally: Tally,
 }
@@ -88,9 +89,10 @@ impl Axis {
             rise: f64::NEG_INFINITY,
             fall: f64::NEG_INFINITY,
             changed: f64::NEG_INFINITY,
+            woken: f64::NEG_INFINITY,
             enabled: true,
             dir: false,
-            fault: drv8711::Status::empty(),
+            driver: Driver::new(),
             position: 0,
             tally: Tally::default(),
         }
@@ -137,7 +139,7 @@ impl Axis {
                             seen.push((at as u64, Seen::Position(self.position)));
                         }
                     } else {
-                        self.tally.step_faults += u64::from(at - self.rise < STEP_NS);
+                        self.tally.step_faults += u64::from(at - self.rise < f64::from(STEP_NS));
                         self.fall = at;
                     }
                 }
@@ -155,6 +157,9 @@ impl Axis {
                         self.changed = at;
                         self.tally.dir_faults += u64::from(at - self.rise < DIR_SETUP_HOLD_NS as f64);
                     }
+                    if levels.enabled && !self.enabled {
+                        self.woken = at;
+                    }
                     (self.dir, self.enabled) = (dir, levels.enabled);
                 }
             }
@@ -163,11 +168,12 @@ impl Axis {
 
     /// The motor takes a step; which of the expected was it?
     fn pulse(&mut self, at: f64) {
-        if self.enabled && self.fault.is_empty() {
+        if self.enabled && self.driver.drives() {
             self.position += if self.dir { -1 } else { 1 };
         }
         self.tally.dir_faults += u64::from(at - self.changed < DIR_SETUP_HOLD_NS as f64);
-        self.tally.step_faults += u64::from(at - self.fall < STEP_NS);
+        self.tally.step_faults += u64::from(at - self.fall < f64::from(STEP_NS));
+        self.tally.wake_faults += u64::from(!self.enabled || at - self.woken < f64::from(WAKE_NS));
         self.rise = at;
         // The nearest is meant: steps are 4 us apart.
         let near = |want: &f64| (at - want).abs() < PERIOD as f64 / 2.0;

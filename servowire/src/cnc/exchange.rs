@@ -72,10 +72,10 @@ impl Line {
             self.event(format!("cycle {cycle}: the cable in front of device {device} is pulled"));
             self.plug(device - 1);
         }
-        if let Some((device, _)) = self.setup.driver_fault.filter(|(_, when)| *when == cycle) {
-            self.event(format!("cycle {cycle}: the driver of device {device} shuts down"));
+        if let Some((device, _, fault)) = self.setup.driver_fault.filter(|(_, when, _)| *when == cycle) {
+            self.event(format!("cycle {cycle}: the driver of device {device} {fault}"));
             if let Some(node) = self.nodes.get_mut(device - 1) {
-                node.axis.fault = sorte_proto::drv8711::Status::AOCP;
+                node.axis.driver.hit(fault);
             }
         }
     }

@@ -5,7 +5,7 @@
 
 use sorte_proto::{Direction, Pto, StartTime};
 
-use super::program::Program;
+use super::power::Power;
 
 /// Change of the rate in a cycle: from full speed to rest in 5000 cycles, 20 ms at 4 us.
 const SLOPE: f64 = 1.0 / 5000.0;
@@ -42,7 +42,7 @@ impl Feed {
     }
 
     /// The words of the next cycle.
-    pub(super) fn next(&mut self, program: &mut Program, words: &mut [Pto]) {
+    pub(super) fn next(&mut self, program: &mut Power, words: &mut [Pto]) {
         if self.rate >= 1.0 && self.target >= 1.0 && self.done == 0.0 {
             program.next(words);
             return;
@@ -87,7 +87,7 @@ impl Feed {
 }
 
 /// The word without its step.
-fn rest(word: Pto) -> Pto {
+pub(super) fn rest(word: Pto) -> Pto {
     match word {
         Pto::DriverOff => Pto::DriverOff,
         word => Pto::NoPulse { direction: word.direction().unwrap_or(Direction::Low) },

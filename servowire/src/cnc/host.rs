@@ -4,7 +4,7 @@ use sorte_proto::Pto;
 
 use super::feed::Feed;
 use super::node::Node;
-use super::program::Program;
+use super::power::Power;
 
 /// Steps behind at which the host slows down, so that the axis finds cycles to catch up in.
 const SLOW_LAG: u16 = 32;
@@ -16,7 +16,7 @@ const DRAIN: u32 = 6;
 const PATIENCE: u32 = 20_000;
 
 pub(super) struct Host {
-    program: Program,
+    pub(super) program: Power,
     feed: Feed,
     words: Vec<Pto>,
     max_lag: u16,
@@ -34,7 +34,7 @@ pub(super) struct Host {
 }
 
 impl Host {
-    pub(super) fn new(program: Program, axes: usize, cycles: Option<u64>, max_lag: u16) -> Self {
+    pub(super) fn new(program: Power, axes: usize, cycles: Option<u64>, max_lag: u16) -> Self {
         Self {
             program,
             feed: Feed::new(axes),
@@ -76,6 +76,9 @@ impl Host {
         } else {
             1.0
         });
+        for (axis, _) in nodes.iter().enumerate().filter(|(_, node)| node.lag != 0) {
+            self.program.keep(axis);
+        }
         self.feed.next(&mut self.program, &mut self.words);
         let finished =
             (self.program.is_over() && self.feed.is_empty()) || (over || self.ended.is_some()) && self.feed.is_still();
@@ -89,9 +92,17 @@ impl Host {
     }
 
     fn trouble(&self, stop: bool, worst: u16, nodes: &[Node]) -> Option<String> {
-        let faulty = nodes.iter().position(|node| node.status.is_fault());
-        if let Some((axis, node)) = faulty.and_then(|k| Some((k, nodes.get(k)?))) {
-            return Some(format!("the driver of axis {} reports {}", axis + 1, node.status));
+        for (axis, node) in (1..).zip(nodes) {
+            if let Err(error) = node.set_up {
+                return Some(format!("the driver of axis {axis} does not take its settings: {error}"));
+            }
+            if node.status.looks_unpowered() {
+                return Some(format!("the driver of axis {axis} has no supply"));
+            }
+            // A stall is not a fault of the chip, but the motor is not where it was sent.
+            if !node.status.is_empty() {
+                return Some(format!("the driver of axis {axis} reports {}", node.status));
+            }
         }
         if !stop && self.resuming && self.waited > 1 {
             if let Some(missing) = nodes.iter().position(|node| !node.is_running()) {

@@ -7,6 +7,7 @@ use sorte_proto::{DelayModel, Discovery, Parameters, TRANSIT_NS};
 
 use super::axis::Build;
 use super::clock::Clock;
+use super::driver::Fault;
 use super::host::Host;
 use super::node::Node;
 use super::noise::{Noise, SplitMix64};
@@ -41,8 +42,8 @@ pub(super) struct Setup {
     pub(super) bit_error_rate: f64,
     /// The cable in front of this device (from 1) is pulled in this cycle.
     pub(super) unplug: Option<(usize, u64)>,
-    /// The driver of this device (from 1) shuts down in this cycle.
-    pub(super) driver_fault: Option<(usize, u64)>,
+    /// This happens to the driver of this device (from 1) in this cycle.
+    pub(super) driver_fault: Option<(usize, u64, Fault)>,
     /// Positions travel in the command words.
     pub(super) positions: bool,
     pub(super) max_lag: u16,
@@ -156,6 +157,15 @@ impl Line {
             setup,
         };
         line.master.link(true);
+        for (device, node) in (1..).zip(&mut line.nodes) {
+            // A driver without supply from the beginning does not take its registers either.
+            if let Some((_, _, fault)) =
+                line.setup.driver_fault.filter(|(faulty, when, _)| (*faulty, *when) == (device, 0))
+            {
+                node.axis.driver.hit(fault);
+            }
+            node.set_up = node.axis.driver.set_up();
+        }
         line.plug(line.nodes.len());
         line
     }

@@ -3,7 +3,7 @@
 use sorte_proto::device::{Config, Device, State};
 use sorte_proto::drv8711;
 use sorte_proto::follow::{Asked, Feedback, Follower};
-use sorte_proto::{Pto, Slice};
+use sorte_proto::{Error, Pto, Slice};
 
 use super::axis::{Axis, Build, PERIOD, Seen};
 use super::clock::Clock;
@@ -30,6 +30,8 @@ pub(super) struct Node {
     /// As the device's last frame told: steps missing, faults of the driver.
     pub(super) lag: i16,
     pub(super) status: drv8711::Status,
+    /// Whether the driver took its registers.
+    pub(super) set_up: Result<(), Error>,
     incoming: Option<Incoming>,
     /// Own counter and master's time at the start of the first cycle; `None` outside the IO exchange.
     zero: Option<(f64, f64)>,
@@ -68,6 +70,7 @@ impl Node {
             before: Asked::new(),
             lag: 0,
             status: drv8711::Status::empty(),
+            set_up: Ok(()),
             incoming: None,
             zero: None,
             cycle: 0,
@@ -121,12 +124,13 @@ impl Node {
     }
 
     /// When the own frame of this cycle leaves, and the frame's payload.
-    pub(super) fn answer(&self, cycle_ns: u64, positions: bool) -> Option<(f64, Feedback)> {
+    pub(super) fn answer(&mut self, cycle_ns: u64, positions: bool) -> Option<(f64, Feedback)> {
         let (zero, _) = self.zero?;
         let slot = self.device.send_time_ns()?;
         let position = if positions { self.follower.position() } else { 0 };
         let at = self.clock.when(zero + (self.cycle * cycle_ns) as f64 + f64::from(slot));
-        Some((at, Feedback { status: self.axis.fault, position }))
+        let status = self.axis.driver.status(self.cycle * cycle_ns);
+        Some((at, Feedback { status, position }))
     }
 
     /// The master has got the device's frame.

@@ -1,6 +1,8 @@
 //! Speed and position of the axes over time, and the sound of the motors.
 
 use std::error::Error;
+use std::fs::File;
+use std::io::BufWriter;
 use std::path::Path;
 
 use plotters::prelude::*;
@@ -13,16 +15,19 @@ const SAMPLE_RATE: u32 = 44_100;
 const MICROSTEPS: f64 = 256.0;
 
 /// Positions of the axes, cycle by cycle, thinned out.
-#[derive(Default)]
 pub(super) struct Curves {
+    cycle_ns: u32,
     /// Cycles between two points.
     every: u64,
     points: Vec<(u64, [i64; 4])>,
 }
 
 impl Curves {
+    pub(super) fn new(cycle_ns: u32) -> Self {
+        Self { cycle_ns, every: 1, points: Vec::new() }
+    }
+
     pub(super) fn add(&mut self, cycle: u64, positions: [i64; 4]) {
-        self.every = self.every.max(1);
         if cycle % self.every != 0 {
             return;
         }
@@ -39,7 +44,7 @@ impl Curves {
         let root = SVGBackend::new(path, (1000, 700)).into_drawing_area();
         root.fill(&WHITE)?;
         let (upper, lower) = root.split_vertically(350);
-        let seconds = |cycle: u64| cycle as f64 * 4e-6;
+        let seconds = |cycle: u64| cycle as f64 * f64::from(self.cycle_ns) * 1e-9;
         let position = |axis: usize| {
             self.points.iter().map(move |(cycle, p)| (seconds(*cycle), p.get(axis).copied().unwrap_or(0) as f64))
         };
@@ -82,19 +87,31 @@ fn curves(area: &Area<'_>, title: &str, unit: &str, curves: &[Vec<(f64, f64)>]) 
     Ok(())
 }
 
-/// The sound of the motors: each hums with its full steps.
-#[derive(Default)]
+/// The sound of the motors, written while they run: each hums with its full steps.
 pub(super) struct Sound {
-    samples: Vec<f64>,
+    writer: hound::WavWriter<BufWriter<File>>,
+    cycle_ns: u32,
+    written: u64,
     last: [i64; 4],
     /// Loudness of each motor: follows whether it moves.
     volume: [f64; 4],
 }
 
 impl Sound {
-    pub(super) fn add(&mut self, cycle: u64, positions: [i64; 4]) {
-        let due = (cycle * 4 * u64::from(SAMPLE_RATE) / 1_000_000) as usize;
-        while self.samples.len() < due {
+    pub(super) fn create(path: &Path, cycle_ns: u32) -> Result<Self, hound::Error> {
+        let spec = hound::WavSpec {
+            channels: 1,
+            sample_rate: SAMPLE_RATE,
+            bits_per_sample: 16,
+            sample_format: hound::SampleFormat::Int,
+        };
+        let writer = hound::WavWriter::create(path, spec)?;
+        Ok(Self { writer, cycle_ns, written: 0, last: [0; 4], volume: [0.0; 4] })
+    }
+
+    pub(super) fn add(&mut self, cycle: u64, positions: [i64; 4]) -> Result<(), hound::Error> {
+        let due = u128::from(cycle) * u128::from(self.cycle_ns) * u128::from(SAMPLE_RATE) / 1_000_000_000;
+        while u128::from(self.written) < due {
             let mut sum = 0.0;
             for ((position, last), volume) in positions.iter().zip(&self.last).zip(&mut self.volume) {
                 let target = if position == last { 0.0 } else { 1.0 };
@@ -104,21 +121,13 @@ impl Sound {
                 sum += *volume * (phase.sin() + 0.4 * (2.0 * phase).sin() + 0.2 * (3.0 * phase).sin());
             }
             self.last = positions;
-            self.samples.push(sum / 8.0);
+            self.written += 1;
+            self.writer.write_sample(((sum / 8.0).clamp(-1.0, 1.0) * f64::from(i16::MAX)) as i16)?;
         }
+        Ok(())
     }
 
-    pub(super) fn write(&self, path: &Path) -> Result<(), hound::Error> {
-        let spec = hound::WavSpec {
-            channels: 1,
-            sample_rate: SAMPLE_RATE,
-            bits_per_sample: 16,
-            sample_format: hound::SampleFormat::Int,
-        };
-        let mut writer = hound::WavWriter::create(path, spec)?;
-        for sample in &self.samples {
-            writer.write_sample((sample.clamp(-1.0, 1.0) * f64::from(i16::MAX)) as i16)?;
-        }
-        writer.finalize()
+    pub(super) fn finish(self) -> Result<(), hound::Error> {
+        self.writer.finalize()
     }
 }

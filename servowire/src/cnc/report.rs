@@ -65,7 +65,7 @@ pub(super) fn start_up(out: &mut dyn Write, line: &Line) -> io::Result<()> {
 }
 
 /// The run: steps, clocks, errors.
-pub(super) fn end(out: &mut dyn Write, line: &Line) -> io::Result<()> {
+pub(super) fn end(out: &mut dyn Write, line: &Line, host: &Host) -> io::Result<()> {
     let counters = line.master.counters();
     let seconds = counters.cycles as f64 * f64::from(line.setup.cycle_ns()) * 1e-9;
     writeln!(out, "exchange    {} cycles, {seconds:.3} s of machine time", counters.cycles)?;
@@ -117,6 +117,9 @@ pub(super) fn end(out: &mut dyn Write, line: &Line) -> io::Result<()> {
             "            device frames at the master: {} collisions, {} after their cycle, smallest gap {:.0} ns",
             line.collisions, line.overruns, line.gap_ns
         )?;
+    }
+    if host.program.off > 0 {
+        writeln!(out, "drivers     {} words of axes at rest switched their drivers off", host.program.off)?;
     }
     let (stamps, undetected) = (sum(|n| n.bad_stamps), sum(|n| n.undetected));
     if stamps > 0 {
@@ -173,6 +176,9 @@ pub(super) fn verdict(line: &Line, host: &Host) -> Option<String> {
         }
         if t.step_faults > 0 {
             return Some(format!("axis {axis}: {} pulses too short or too close for the driver", t.step_faults));
+        }
+        if t.wake_faults > 0 {
+            return Some(format!("axis {axis}: {} steps before its driver was awake", t.wake_faults));
         }
         if node.axis.under_way() > 0 {
             return Some(format!("axis {axis}: {} steps are still to come", node.axis.under_way()));

@@ -34,6 +34,8 @@ struct Figures {
     cycle: Spread,
     delay: Spread,
     position: Option<(i64, Position)>,
+    /// Positions in frames without a time.
+    untimed: u64,
     largest: u64,
     jumps: u64,
     listed: Vec<Jump>,
@@ -118,13 +120,25 @@ impl Figures {
         if let Some(delay) = event.delay {
             self.delay.add(delay);
         }
-        let Place::Time { start, .. } = event.place else { return };
+        let Place::Time { start, .. } = event.place else {
+            self.untimed += u64::from(event.position.is_some());
+            return;
+        };
         if event.verdict.is_silence() {
             return;
         }
         self.keep_cycle(event.direction, start);
         if let Some(position) = event.position {
             self.follow(start, position, limit);
+        }
+    }
+
+    /// What there must be to tell jumps, and is not.
+    fn missing(&self) -> Option<&'static str> {
+        match (self.position, self.untimed) {
+            (Some(_), _) => None,
+            (None, 0) => Some("no position of a single axis is seen (a log of RTEX blocks needs --mac-id)"),
+            (None, _) => Some("the positions have no times (a log of RTEX blocks needs --period)"),
         }
     }
 
@@ -176,7 +190,9 @@ impl<W: Write> Stats<W> {
         if f.position.is_some() {
             writeln!(self.out, "  largest move  {} counts", f.largest)?;
         }
-        if let Some(limit) = self.limit {
+        if let (Some(_), Some(missing)) = (self.limit, f.missing()) {
+            writeln!(self.out, "  jumps         not known: {missing}")?;
+        } else if let Some(limit) = self.limit {
             writeln!(self.out, "  jumps         {} of more than {limit} counts", f.jumps)?;
             for Jump { time, from, to, moved } in &f.listed {
                 writeln!(self.out, "    {:>14.3} us  {from} to {to}: {moved:+}", *time as f64 / 1e6)?;
@@ -193,7 +209,7 @@ impl<W: Write> Stats<W> {
             "ok": f.ok, "refused": f.refused, "kinds": f.kinds,
             "cycle": f.cycle.json(), "answer_delay": f.delay.json(),
             "largest_move": f.position.map(|_| f.largest),
-            "jumps": self.limit.map(|_| f.jumps),
+            "jumps": self.limit.filter(|_| f.missing().is_none()).map(|_| f.jumps),
             "jumps_listed": f.listed.iter().map(jump).collect::<Vec<_>>(),
         });
         serde_json::to_writer(&mut self.out, &object)?;

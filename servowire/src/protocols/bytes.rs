@@ -102,6 +102,9 @@ impl Reader {
 
     fn burst(&mut self, burst: &Burst, out: &mut dyn Sink) -> io::Result<()> {
         if let Some(what) = &burst.spoilt {
+            if let Self::Rtex(decoder) = self {
+                decoder.spoilt();
+            }
             return out.event(&spoilt(burst.line, what));
         }
         match self {

@@ -16,7 +16,7 @@ use crate::event::{Direction, Event, Field, Place, Position, Refusal, Value, Ver
 use crate::output::Sink;
 
 /// What the blocks do not tell.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Settings {
     /// Bytes of a block, 16 or 32; otherwise what most of the first blocks look like.
     pub block_size: Option<usize>,
@@ -24,6 +24,14 @@ pub struct Settings {
     pub mac_id: Option<u8>,
     /// Update period, ns: gives the log a time axis and the position step its limit.
     pub period_ns: Option<u32>,
+    /// Electronic gear of the drives, for the same limit.
+    pub gear: Gear,
+}
+
+impl Default for Settings {
+    fn default() -> Self {
+        Self { block_size: None, mac_id: None, period_ns: None, gear: Gear::UNITY }
+    }
 }
 
 /// Why a recorded line is refused.
@@ -38,6 +46,9 @@ pub(super) struct Decoder {
     settings: Settings,
     block_size: usize,
     shape: Option<LogShape>,
+    /// Each line holds half a block of 32 bytes; the main half, while the other is still to come.
+    halves: bool,
+    half: Option<Vec<u8>>,
     analysis: LogAnalysis,
     /// The last block of a direction and a MAC-ID: byte 0 without the counter.
     last: HashMap<u8, Report>,
@@ -48,15 +59,24 @@ pub(super) struct Decoder {
 impl Decoder {
     /// `sample`: the beginning of the log.
     pub(super) fn new(settings: Settings, sample: &[Burst]) -> Self {
-        let bytes: Vec<u8> = sample.iter().flat_map(|burst| burst.bytes.iter().copied()).take(SAMPLE).collect();
+        let read = || sample.iter().filter(|burst| burst.spoilt.is_none()).map(|burst| &burst.bytes);
+        // What a spoilt line has held does not matter, but its place does.
+        let line = vec![0; read().next().map_or(0, Vec::len)];
+        let lines = sample.iter().map(|burst| if burst.spoilt.is_some() { &line } else { &burst.bytes });
+        let bytes: Vec<u8> = lines.flatten().copied().take(SAMPLE).collect();
         let shape = LogShape::guess(&bytes);
         // Lines or records of one block are what they are; a size is guessed where the lines allow both.
         let guessed = shape.map_or(rtex_block::LEN, |shape| shape.size.bytes());
+        let block_size = settings.block_size.unwrap_or(guessed);
+        let halves =
+            block_size == rtex_block::LEN32 && !line.is_empty() && read().all(|it| it.len() == rtex_block::LEN);
         Self {
             settings,
-            block_size: settings.block_size.unwrap_or(guessed),
+            block_size,
             shape,
-            analysis: LogAnalysis::new(settings.period_ns, Gear::UNITY),
+            halves,
+            half: None,
+            analysis: LogAnalysis::new(settings.period_ns, settings.gear),
             last: HashMap::new(),
             updates: HashMap::new(),
         }
@@ -80,6 +100,9 @@ impl Decoder {
 
     /// A line or record of the log.
     pub(super) fn burst(&mut self, burst: &Burst, out: &mut dyn Sink) -> io::Result<()> {
+        if self.halves {
+            return self.half(burst, out);
+        }
         for block in burst.bytes.chunks(self.block_size.max(1)) {
             if let Some(event) = self.block(burst, block) {
                 out.event(&event)?;
@@ -88,9 +111,34 @@ impl Decoder {
         Ok(())
     }
 
+    /// A line that is not bytes: of a block in two lines the other half is lost with it.
+    pub(super) fn spoilt(&mut self) {
+        self.half = match self.half.take() {
+            Some(_) => None,
+            None => self.halves.then(Vec::new),
+        };
+    }
+
+    /// Half of a block.
+    fn half(&mut self, burst: &Burst, out: &mut dyn Sink) -> io::Result<()> {
+        let Some(mut block) = self.half.take() else {
+            self.half = Some(burst.bytes.clone());
+            return Ok(());
+        };
+        if block.is_empty() {
+            return Ok(());
+        }
+        block.extend_from_slice(&burst.bytes);
+        let event = self.block(burst, &block);
+        event.map_or(Ok(()), |event| out.event(&event))
+    }
+
     /// The end of the log: drives that were on one side of it only.
     pub(super) fn finish(&mut self, out: &mut dyn Sink) -> io::Result<()> {
-        let notes: Vec<String> = self.analysis.end().map(|finding| finding.to_string()).collect();
+        let mut notes: Vec<String> = self.analysis.end().map(|finding| finding.to_string()).collect();
+        if self.half.as_ref().is_some_and(|half| !half.is_empty()) {
+            notes.push("the log ends in the middle of a block".to_owned());
+        }
         if notes.is_empty() || self.settings.mac_id.is_some() {
             return Ok(());
         }

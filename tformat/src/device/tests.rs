@@ -209,3 +209,93 @@ fn bit_by_bit_is_the_same() {
     assert_eq!(reply, send(&mut by_bytes, request.emit().as_bytes(), 0));
     assert!(reply.is_some());
 }
+
+/// What leaves with each fault, for a request for ID 0 that is answered by six fields.
+#[test]
+fn faults_that_are_switched_on() {
+    let sound = send(&mut encoder(), &[0x02], 0).unwrap();
+    assert_eq!((sound.frame.fields(), sound.line.len()), (6, 60));
+    let with = |fault| {
+        let mut device = encoder();
+        device.set_fault(fault);
+        send(&mut device, &[0x02], 0)
+    };
+    assert_eq!(with(Fault::None), Some(sound));
+    assert_eq!(with(Fault::Silent), None);
+    for at in [0, 17, 59] {
+        let sent = with(Fault::FlipBit { at }).unwrap();
+        assert_eq!(sent.line.bits() ^ sound.line.bits(), 1 << at);
+    }
+    // There is no bit 60 in it.
+    assert_eq!(with(Fault::FlipBit { at: 60 }), Some(sound));
+    let wrong = with(Fault::BadCrc).unwrap();
+    assert_eq!(wrong.frame.as_bytes()[..5], sound.frame.as_bytes()[..5]);
+    assert_eq!(wrong.frame.as_bytes()[5], !sound.frame.as_bytes()[5]);
+    let read = |sent: Transmission| Response::parse(Request::ReadSingleTurn, sent.frame.as_bytes());
+    assert!(matches!(read(wrong), Err(Error::Crc { .. })));
+    for fields in 1..6 {
+        let cut = with(Fault::CutAfter { fields }).unwrap();
+        assert_eq!(cut.frame.as_bytes(), &sound.frame.as_bytes()[..usize::from(fields)]);
+        assert_eq!(cut.line.len(), u32::from(fields) * 10);
+    }
+    for fields in [0, 6, 7] {
+        assert_eq!(with(Fault::CutAfter { fields }), Some(sound));
+    }
+    let refused = with(Fault::RejectAll).unwrap();
+    assert_eq!(read(refused), Err(Error::Rejected { sf: StatusField::empty() }));
+    assert_eq!((refused.frame.fields(), refused.frame.as_bytes()[0]), (11, 0x1a));
+}
+
+/// Over-speed is latched until ten requests for ID 7 or ID C find its cause gone; the battery alarm goes with its cause.
+#[test]
+fn alarms_and_their_causes() {
+    for cf in [0xba, 0x62] {
+        let mut device = encoder();
+        device.set_alarms(Almc::OS | Almc::CE | Almc::BA, true);
+        device.set_alarms(Almc::OS | Almc::BA, false);
+        assert_eq!(device.almc(), Almc::OS | Almc::CE);
+        for k in 1..=10 {
+            assert_eq!(device.effects(), 0);
+            let _ = send(&mut device, &[cf], k * 100_000);
+        }
+        // The counting error is still there.
+        assert_eq!((device.almc(), device.effects()), (Almc::CE, 1));
+        assert_eq!((device.abs().get(), device.abm().get()), (0x51_2345, if cf == 0x62 { 0 } else { 0xfffe }));
+    }
+}
+
+/// Encoder ID 11h: 17 bits. An unknown one: all 24.
+#[test]
+fn the_position_has_the_width_that_the_encoder_id_names() {
+    for (enid, abs) in [(0x11, 0x1_2345), (0x17, 0x51_2345), (0x7f, 0xd1_2345)] {
+        let mut device = Device::<6>::new(enid, BitRate::Mbit2_5);
+        device.set_position(Abs::truncate(0xd1_2345), Abm::truncate(3));
+        assert_eq!(device.abs().get(), abs);
+    }
+}
+
+/// Each bit of the number is one switch, and 0 is the default.
+#[test]
+fn combinations_by_their_number() {
+    let usual = Config::new();
+    let expected = [
+        Config { reset_interval: Interval::EndToStart, ..usual },
+        Config { others_restart_count: false, ..usual },
+        Config { damage_restarts_count: false, ..usual },
+        Config { tenth_shows_effect: true, ..usual },
+        Config { silent_while_storing: true, ..usual },
+        Config { page_select_is_busy: true, ..usual },
+        Config { absent_page: AbsentPage::Wrapped, ..usual },
+        Config { busy_data: BusyData::Ones, ..usual },
+        Config { leaves_status_zero: true, ..usual },
+        Config { answers_wrong_sink: true, answers_delimiter_error: false, ..usual },
+        Config { response_delay_ns: 3_200, ..usual },
+        Config { response_delay_ns: 1_700, ..usual },
+    ];
+    for (at, want) in expected.into_iter().enumerate() {
+        assert_eq!(Config::numbered(1 << at), want, "bit {at}");
+    }
+    assert_eq!(Config::numbered(3 << 7), Config { busy_data: BusyData::Cell, leaves_status_zero: true, ..usual });
+    assert_eq!(Config::numbered(3 << 10), Config { response_delay_ns: 9_000, ..usual });
+    assert_eq!(Config::NUMBERED, 4_096);
+}

@@ -19,7 +19,8 @@ use crate::response::Response;
 /// * [`Error::EffectUnknown`] otherwise.
 ///
 /// The value keeps count if it is started again, so that the requests of an attempt that was broken off are not
-/// forgotten. Confirm the effect by reading ID 3 afterwards; [`SingleTurnZero`](super::SingleTurnZero) does it for ID 8.
+/// forgotten. Confirm the effect by reading ID 3 afterwards; [`SingleTurnZero`](super::SingleTurnZero)
+/// does it for ID 8 and [`MultiTurnZero`](super::MultiTurnZero) for ID C.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Reset {
@@ -177,9 +178,9 @@ mod tests {
         for _ in 0..9 {
             let _ = reset.receive(Ok(Response::ResetErrors(SINGLE)), 0);
         }
-        let _ = reset.receive(LOST, 0);
-        assert_eq!(reset.answered(), 0);
-        let _ = reset.receive(Ok(Response::ReadSingleTurn(SINGLE)), 0);
+        let again = Step::Send { request: Request::ResetErrors, not_before_ns: 40_000 };
+        assert_eq!((reset.receive(LOST, 0), reset.answered()), (again, 0));
+        assert_eq!(reset.receive(Ok(Response::ReadSingleTurn(SINGLE)), 0), again);
         let end = reset.receive(Err(Error::Crc { got: 0, want: 1 }), 5);
         assert_eq!(end, Step::Failed { error: Error::Crc { got: 0, want: 1 }, ready_ns: 40_005 });
     }

@@ -110,7 +110,7 @@ impl Transaction {
             let patience = self.line.field_timeout_ns.saturating_add(self.line.hand_over_ns);
             self.until_ns = end_ns.saturating_add(patience.into());
         }
-        if self.len > 0 && self.len == self.expected() {
+        if self.len == self.expected() {
             self.finish(end_ns);
         }
         self.progress()

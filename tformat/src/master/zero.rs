@@ -1,21 +1,10 @@
-use super::reset::mismatch;
+use super::witness::Witness;
 use super::{Reset, Step};
-use crate::error::{Error, ErrorClass};
+use crate::error::Error;
 use crate::message::SingleTurn;
 use crate::request::Request;
 use crate::resolution::Resolution;
 use crate::response::Response;
-
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-enum Phase {
-    /// The position before.
-    Before,
-    /// Ten requests for ID 8.
-    Act,
-    /// The position after; how the ten ended.
-    After(Result<(), ErrorClass>),
-}
 
 /// Sets the single-turn zero and sees what became of it: reads the position, sends ID 8 ten times, waits 18 ms, and reads
 /// the position again. **This shifts the commutation angle of the motor**, see
@@ -33,101 +22,41 @@ enum Phase {
 pub struct SingleTurnZero {
     resolution: Resolution,
     tolerance: u32,
-    reset: Reset,
-    phase: Phase,
-    before: u32,
-    tries: u8,
+    witness: Witness,
 }
 
 impl SingleTurnZero {
     /// Times that a position is read before it is given up.
-    pub const MAX_READS: u8 = 3;
+    pub const MAX_READS: u8 = Witness::MAX_READS;
 
     /// `tolerance`: how far from zero, in counts, the shaft may seem to be afterwards.
     pub const fn set_and_shift_commutation_angle(resolution: Resolution, tolerance: u32) -> Self {
         let reset = Reset::set_single_turn_zero_and_shift_commutation_angle();
-        Self { resolution, tolerance, reset, phase: Phase::Before, before: 0, tries: 0 }
+        Self { resolution, tolerance, witness: Witness::new(reset, Request::ReadSingleTurn, 0) }
     }
 
     /// The first request, at once.
     pub const fn start(&mut self, now_ns: u64) -> Step<SingleTurn> {
-        self.phase = Phase::Before;
-        self.tries = 0;
-        read(now_ns)
+        self.witness.start(now_ns)
     }
 
     /// A transaction ended with this outcome; the line is free from `ready_ns` on.
     pub fn receive(&mut self, outcome: Result<Response, Error>, ready_ns: u64) -> Step<SingleTurn> {
-        let act = match self.phase {
-            Phase::Before | Phase::After(_) => return self.position(outcome, ready_ns),
-            Phase::Act => self.reset.receive(outcome, ready_ns),
+        let Self { resolution, tolerance, witness } = self;
+        let value = |response| match response {
+            Response::ReadSingleTurn(single) => Some(resolution.single_turn(single.abs).map(|abs| (single, abs))),
+            _ => None,
         };
-        match act {
-            Step::Done { ready_ns, .. } => self.look(Ok(()), ready_ns),
-            Step::Failed { error: Error::EffectUnknown { because }, ready_ns } => self.look(Err(because), ready_ns),
-            step => step,
-        }
+        witness
+            .receive(outcome, ready_ns, value, |from, to| resolution.difference(from, to).unsigned_abs() <= *tolerance)
     }
-
-    const fn look(&mut self, act: Result<(), ErrorClass>, ready_ns: u64) -> Step<SingleTurn> {
-        self.phase = Phase::After(act);
-        self.tries = 0;
-        read(ready_ns)
-    }
-
-    fn position(&mut self, outcome: Result<Response, Error>, ready_ns: u64) -> Step<SingleTurn> {
-        let read_out = match outcome {
-            Ok(Response::ReadSingleTurn(single)) => self.resolution.single_turn(single.abs).map(|abs| (single, abs)),
-            Ok(other) => Err(mismatch(other, Request::ReadSingleTurn)),
-            Err(error) => Err(error),
-        };
-        match (read_out, self.phase) {
-            (Err(error), phase) => {
-                self.tries = self.tries.saturating_add(1);
-                if self.tries < Self::MAX_READS {
-                    return read(ready_ns);
-                }
-                let because = error.class();
-                let error = match phase {
-                    Phase::After(_) => Error::EffectUnknown { because },
-                    _ => Error::NotDone { sent: 0, because },
-                };
-                Step::Failed { error, ready_ns }
-            }
-            (Ok((single, abs)), Phase::After(act)) => self.judge(act, single, abs, ready_ns),
-            (Ok((_, abs)), _) => {
-                self.before = abs;
-                self.phase = Phase::Act;
-                self.reset.start(ready_ns.saturating_add(Reset::SPACING_NS.into()))
-            }
-        }
-    }
-
-    /// What the position after the ten requests says of them.
-    fn judge(&self, act: Result<(), ErrorClass>, single: SingleTurn, abs: u32, ready_ns: u64) -> Step<SingleTurn> {
-        let near = |from: u32, to: u32| self.resolution.difference(from, to).unsigned_abs() <= self.tolerance;
-        let error = match act {
-            _ if near(0, abs) && (act.is_ok() || !near(0, self.before)) => {
-                return Step::Done { value: single, ready_ns };
-            }
-            Ok(()) => Error::NotDone { sent: Reset::REQUESTS, because: ErrorClass::DataMismatch },
-            Err(because) if near(self.before, abs) && !near(0, abs) => {
-                Error::NotDone { sent: Reset::REQUESTS, because }
-            }
-            Err(because) => Error::EffectUnknown { because },
-        };
-        Step::Failed { error, ready_ns }
-    }
-}
-
-const fn read(not_before_ns: u64) -> Step<SingleTurn> {
-    Step::Send { request: Request::ReadSingleTurn, not_before_ns }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::count::Abs;
+    use crate::error::ErrorClass;
     use crate::status::StatusField;
 
     const LOST: Result<Response, Error> = Err(Error::NoResponse { echo: false });
@@ -198,8 +127,9 @@ mod tests {
     fn without_a_position_before_nothing_is_sent() {
         let mut zero = SingleTurnZero::set_and_shift_commutation_angle(Resolution::new(17, 16).unwrap(), 4);
         let _ = zero.start(0);
+        let again = Step::Send { request: Request::ReadSingleTurn, not_before_ns: 7 };
         for _ in 0..2 {
-            assert_eq!(zero.receive(LOST, 7), read(7));
+            assert_eq!(zero.receive(LOST, 7), again);
         }
         let because = ErrorClass::NoResponse;
         assert_eq!(zero.receive(LOST, 7), Step::Failed { error: Error::NotDone { sent: 0, because }, ready_ns: 7 });

@@ -51,6 +51,8 @@ pub struct Bench {
     pub forged_requests: u32,
     /// Whether the shaft moves with every request, so that each response has a value of its own.
     pub moves: bool,
+    /// Whether the shaft stands on the boundary of a turn and goes over it and back with every request.
+    pub trembles: bool,
     turn: u32,
     budget_ns: u64,
     response_ns: u64,
@@ -84,6 +86,7 @@ impl Bench {
             seen: Seen::default(),
             forged_requests: 0,
             moves: true,
+            trembles: false,
             turn: 0,
             // Four bits of turn-around and a field.
             budget_ns: field_ns(rate) * 14 / 10,
@@ -96,6 +99,12 @@ impl Bench {
         if self.moves {
             self.turn += 1;
             self.device.set_position(Abs::truncate(self.turn & 0x7f_ffff), Abm::truncate(self.turn & 0xffff));
+        }
+        if self.trembles {
+            // 0x7f_ffff and 0 are neighbours.
+            let (over, turns) = (self.device.abs().get() == 0, self.device.abm().get());
+            let (abs, turns) = if over { (0x7f_ffff, turns.wrapping_sub(1)) } else { (0, turns + 1) };
+            self.device.set_position(Abs::truncate(abs), Abm::truncate(turns & 0xffff));
         }
         let start_ns = not_before_ns.max(self.world.now_ns());
         let mut transaction = Transaction::start(request, self.line, start_ns);

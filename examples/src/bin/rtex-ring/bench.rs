@@ -1,18 +1,20 @@
-//! The ring: a master, 32 modelled drives, and a line that can be cut.
+//! The ring: a master, 32 modelled drives, and the memory of the ASIC between them.
 
 use core::f64::consts::TAU;
 
 use rtex_block::device::{Drive, DriveConfig, OpenCodes};
 use rtex_block::master::{
-    ActiveCode, Axis, AxisConfig, Limits, Received, Ring, SameMacId, SetpointError, Slave, StopReason,
+    ActiveCode, Asic, Axis, AxisConfig, AxisState, Limits, Master, MasterConfig, SetpointError, SetupError, Slave,
+    StopReason,
 };
-use rtex_block::{Alarm, MacId, Response, TypeCode};
+use rtex_block::pack::SizeMismatch;
+use rtex_block::timing::{Periods, TimerSystem};
+use rtex_block::{Alarm, BlockSize, MacId, TypeCode, pack};
 
 pub(crate) const AXES: usize = 32;
-pub(crate) const UPDATE_NS: u32 = 500_000;
 
-/// Update periods in which the master sends invalid data before the first valid commands.
-const INVALID: u32 = 10;
+/// 32-bit words of a block of 16 bytes.
+const WORDS: usize = 4;
 
 /// Stroke of the motion, command units, and its period, update periods.
 const STROKE: f64 = 100_000.0;
@@ -33,23 +35,41 @@ const CODES: OpenCodes = OpenCodes {
     communication_lost: Alarm { main: 80, sub: 0 },
 };
 
-/// The positions of all axes in one update period.
-pub(crate) type Sample = (u64, [i32; AXES]);
+/// When the ASIC gets to each of its states, ms.
+pub(crate) const ASIC: [(u64, Asic); 4] =
+    [(20, Asic::Initial), (140, Asic::RingConfig), (1_300, Asic::Ready), (2_100, Asic::Running)];
 
-pub(crate) struct Bench {
-    pub(crate) ring: Ring<AXES>,
-    pub(crate) now: u64,
-    pub(crate) history: Vec<Sample>,
-    drives: [Drive; AXES],
-    silent: [bool; AXES],
-    /// When each servo went off.
-    off_at: [Option<u64>; AXES],
-    responses: [Received; AXES],
+/// Kinds of drives; the vendor's numbers are not published.
+const ROTARY: u16 = 1;
+const LINEAR: u16 = 2;
+
+/// The slave table of the machine, as its drawing lists the drives along the ring.
+fn slave_table() -> [Slave; AXES] {
+    core::array::from_fn(|place| Slave { mac_id: mac_id(place), kind: if place < 24 { ROTARY } else { LINEAR } })
 }
 
-/// Time of an update period.
-pub(crate) fn time_ms(update: u64) -> f64 {
-    update as f64 * f64::from(UPDATE_NS) / 1e6
+/// A drive as it was fitted: what its switches say, and what it is.
+struct Fitted {
+    drive: Drive,
+    kind: u16,
+    silent: bool,
+    /// When its servo went off.
+    off_at: Option<u64>,
+}
+
+/// The positions of all axes at a time, ms.
+pub(crate) type Sample = (f64, [i32; AXES]);
+
+pub(crate) struct Bench {
+    pub(crate) master: Master<AXES>,
+    pub(crate) history: Vec<Sample>,
+    /// Update periods since PH_RUNNING.
+    pub(crate) now: u64,
+    periods: Periods,
+    drives: Vec<Fitted>,
+    /// Transmission and reception memory of the ASIC.
+    tx: [u32; AXES * WORDS],
+    rx: [u32; AXES * WORDS],
 }
 
 fn mac_id(place: usize) -> MacId {
@@ -57,70 +77,80 @@ fn mac_id(place: usize) -> MacId {
 }
 
 impl Bench {
-    pub(crate) fn new(mode: ActiveCode, limits: Limits) -> Result<Self, SameMacId> {
-        let axis = |place| Axis::new(AxisConfig::new(mac_id(place), mode, UPDATE_NS, limits));
-        // Drives do not get ready at the same moment.
-        let drive = |place: usize| {
-            let sync_exchanges = 20 + u16::try_from(place).unwrap_or(0) * 3;
-            Drive::new(DriveConfig::new(mac_id(place), CODES).with_sync_exchanges(sync_exchanges))
-        };
+    /// `swapped`: two drives stand in each other's place.
+    pub(crate) fn new(periods: Periods, limits: Limits, swapped: bool) -> Result<Self, SetupError> {
+        let config = MasterConfig::new(BlockSize::Bytes16, periods, TimerSystem::Internal).with_invalid(10);
+        let axis =
+            |place| Axis::new(AxisConfig::new(mac_id(place), ActiveCode::CyclicPosition, periods.update_ns, limits));
+        let mut drives: Vec<Fitted> = (0_u16..)
+            .zip(core::iter::repeat_n(ROTARY, 24).chain(core::iter::repeat_n(LINEAR, 8)))
+            .map(|(switches, kind)| {
+                // Drives do not get ready at the same moment.
+                let config = DriveConfig::new(mac_id(switches.into()), CODES).with_sync_exchanges(20 + switches * 3);
+                Fitted { drive: Drive::new(config), kind, silent: false, off_at: None }
+            })
+            .collect();
+        if swapped {
+            drives.swap(3, 4);
+        }
         Ok(Self {
-            ring: Ring::new(core::array::from_fn(axis), INVALID)?,
-            now: 0,
+            master: Master::new(config, slave_table(), core::array::from_fn(axis))?,
             history: Vec::new(),
-            drives: core::array::from_fn(drive),
-            silent: [false; AXES],
-            off_at: [None; AXES],
-            responses: [Received::Nothing; AXES],
+            now: 0,
+            periods,
+            drives,
+            tx: [0; AXES * WORDS],
+            rx: [0; AXES * WORDS],
         })
     }
 
     /// What the ring configuration finds.
-    pub(crate) fn slaves(&self) -> impl Iterator<Item = Slave> {
-        self.drives.iter().map(|drive| Slave { mac_id: drive.config().mac_id, kind: 1 })
+    pub(crate) fn found(&self) -> Vec<Slave> {
+        self.drives.iter().map(|fitted| Slave { mac_id: fitted.drive.config().mac_id, kind: fitted.kind }).collect()
     }
 
-    /// One update period: the master reads and writes, then the frame goes round.
-    pub(crate) fn update(&mut self) {
-        let commands = self.ring.update(&self.responses);
+    /// Time since the start of the program: the update periods begin when the ASIC is RUNNING.
+    pub(crate) fn time_ms(&self, update: u64) -> f64 {
+        let [.., (running, _)] = ASIC;
+        running as f64 + update as f64 * f64::from(self.periods.update_ns) / 1e6
+    }
+
+    /// The NC interrupt: reads the reception memory and writes the transmission memory.
+    pub(crate) fn exchange(&mut self) -> Result<(), SizeMismatch> {
+        self.master.exchange_words32(&self.rx, &mut self.tx)
+    }
+
+    /// An update period: the exchange, then the frame goes round. What a silent drive has said last stays in the memory.
+    pub(crate) fn update(&mut self) -> Result<(), SizeMismatch> {
+        self.exchange()?;
         self.now += 1;
-        for (place, drive) in self.drives.iter_mut().enumerate() {
-            let was_active = drive.is_active();
-            let silent = self.silent.get(place) == Some(&true);
-            let received = match commands.get(place) {
-                Some(command) if !silent => Response::parse(&drive.exchange(&command.main.emit())).into(),
-                _ => {
-                    drive.miss();
-                    Received::Nothing
-                }
-            };
-            if let Some(response) = self.responses.get_mut(place) {
-                *response = received;
+        for (fitted, (tx, rx)) in
+            self.drives.iter_mut().zip(self.tx.chunks_exact(WORDS).zip(self.rx.chunks_exact_mut(WORDS)))
+        {
+            let was_active = fitted.drive.is_active();
+            if fitted.silent {
+                fitted.drive.miss();
+            } else {
+                let mut block = [0; 16];
+                pack::from_words32(tx, &mut block)?;
+                pack::to_words32(&fitted.drive.exchange(&block), rx)?;
             }
-            if let (true, false, Some(at)) = (was_active, drive.is_active(), self.off_at.get_mut(place)) {
-                *at = Some(self.now);
+            if was_active && !fitted.drive.is_active() {
+                fitted.off_at = Some(self.now);
             }
         }
-        self.history.push((self.now, self.drives.each_ref().map(Drive::position)));
-    }
-
-    /// Updates until `done`, and says so.
-    pub(crate) fn until(&mut self, what: &str, limit: u64, done: impl Fn(&Self) -> bool) -> Result<(), String> {
-        let end = self.now + limit;
-        while !done(self) {
-            if self.now == end {
-                return Err(format!("{what}: not reached after {limit} update periods, {:?}", self.ring.failure()));
-            }
-            self.update();
+        let mut positions = [0; AXES];
+        for (position, fitted) in positions.iter_mut().zip(&self.drives) {
+            *position = fitted.drive.position();
         }
-        println!("{:9.1} ms  {what}", time_ms(self.now));
+        self.history.push((self.time_ms(self.now), positions));
         Ok(())
     }
 
     /// A wave that runs along the axes: each does the same as its neighbour, a little later.
     pub(crate) fn command_wave(&mut self, begin: u64) -> Result<(), SetpointError> {
         let phase = (self.now - begin) as f64 / PERIOD;
-        for (place, axis) in self.ring.axes_mut().iter_mut().enumerate() {
+        for (place, axis) in self.master.ring_mut().axes_mut().iter_mut().enumerate() {
             let own = (phase - place as f64 / AXES as f64).max(0.0);
             axis.set_position((STROKE / 2.0 * (1.0 - (TAU * own).cos())).round() as i32)?;
         }
@@ -129,28 +159,28 @@ impl Bench {
 
     /// Takes a drive off the ring.
     pub(crate) fn silence(&mut self, place: usize) {
-        if let Some(silent) = self.silent.get_mut(place) {
-            *silent = true;
+        if let Some(fitted) = self.drives.get_mut(place) {
+            fitted.silent = true;
         }
     }
 
     pub(crate) fn all_off(&self) -> bool {
-        self.drives.iter().all(|drive| !drive.is_active())
+        self.drives.iter().all(|fitted| !fitted.drive.is_active())
     }
 
     /// Where every axis came to rest, and why.
     pub(crate) fn print_table(&self) {
         println!("\naxis   farthest    at rest   servo off  alarm     stopped by");
-        for (place, drive) in self.drives.iter().enumerate() {
+        for (place, fitted) in self.drives.iter().enumerate() {
             let farthest = self.history.iter().filter_map(|(_, at)| at.get(place)).max().copied().unwrap_or(0);
-            let off = self.off_at.get(place).copied().flatten().map_or(f64::NAN, time_ms);
-            let alarm = drive.alarm().map_or("-".to_owned(), |alarm| alarm.to_string());
-            let reason = match self.ring.axes().get(place).map(Axis::state) {
-                Some(rtex_block::master::AxisState::Stopped(StopReason::OtherAxis(other))) => format!("axis {other}"),
+            let off = fitted.off_at.map_or(f64::NAN, |at| self.time_ms(at));
+            let alarm = fitted.drive.alarm().map_or("-".to_owned(), |alarm| alarm.to_string());
+            let reason = match self.master.ring().axes().get(place).map(Axis::state) {
+                Some(AxisState::Stopped(StopReason::OtherAxis(other))) => format!("axis {other}"),
                 Some(state) => state.to_string(),
                 None => String::new(),
             };
-            println!("{place:4} {farthest:10} {:10} {off:8.1} ms  {alarm:8}  {reason}", drive.position());
+            println!("{place:4} {farthest:10} {:10} {off:8.1} ms  {alarm:8}  {reason}", fitted.drive.position());
         }
         println!();
     }

@@ -1,12 +1,13 @@
 //! An RTEX ring of 32 axes from power-up to a coordinated motion; half way one drive goes silent, the master notices by
 //! the counter echo and stops all axes.
 //!
-//! `cargo run -p servowire-examples --bin rtex-ring [OUT.svg]` prints what happens when, a table of the axes, and writes
-//! their positions as an SVG (default `rtex-ring.svg`).
+//! `cargo run -p servowire-examples --bin rtex-ring -- [--swapped] [OUT.svg]` prints what happens when, a table of the axes,
+//! and writes their positions as an SVG.
 #![allow(
     clippy::arithmetic_side_effects,
     clippy::cast_possible_truncation,
     clippy::cast_precision_loss,
+    clippy::cast_sign_loss,
     clippy::std_instead_of_core,
     reason = "a program for a host"
 )]
@@ -16,79 +17,116 @@ mod plot;
 
 use core::num::NonZeroU16;
 use std::error::Error;
+use std::process::ExitCode;
 
-use bench::{AXES, Bench, UPDATE_NS, time_ms};
-use rtex_block::MacId;
-use rtex_block::master::{
-    ActiveCode, Asic, AxisState, Fault, Inputs, Limits, Order, Phase, PhaseControl, Slave, StopReason, compare, led,
-};
+use bench::{ASIC, AXES, Bench};
+use rtex_block::master::{Asic, AxisState, Fault, Led, Limits, Phase, StopReason};
 use rtex_block::timing::{FrameTime, Periods, TimerSystem};
+
+const HELP: &str = "\
+An RTEX ring of 32 axes from power-up to a motion in which one drive goes silent.
+
+Usage: rtex-ring [--swapped] [OUT.svg]
+
+  OUT.svg    where the positions are drawn (default: rtex-ring.svg)
+  --swapped  two drives stand in each other's place: the master refuses the ring
+  --help     this text";
 
 /// Unchanged echoes that count as a time-out: 4 ms.
 const ECHO_LIMIT: NonZeroU16 = NonZeroU16::MIN.saturating_add(7);
 
 const LIMITS: Limits = Limits::new(ECHO_LIMIT, 100).with_ready(400);
 
-/// Update periods of motion before the drive goes silent, and of recording after it.
+/// Update periods of motion before the drive goes silent, of recording after it, and until the program ends.
 const BEFORE: u64 = 2_000;
-const AFTER: u64 = 400;
+const RECORDED: u64 = 400;
+const AFTER: u64 = 2_400;
+
+/// Update periods from one turn of the main loop to the next: 10 ms.
+const LOOP: u64 = 20;
 
 /// The drive that goes silent.
 const SILENT: usize = 11;
 
-fn main() -> Result<(), Box<dyn Error>> {
-    let out = std::env::args().nth(1).unwrap_or_else(|| "rtex-ring.svg".to_owned());
-    if out.starts_with('-') {
-        println!("usage: rtex-ring [OUT.svg]\n\nRuns the ring and draws it; without a name into rtex-ring.svg.");
-        return Ok(());
+fn main() -> ExitCode {
+    let (mut out, mut swapped) = ("rtex-ring.svg".to_owned(), false);
+    for argument in std::env::args().skip(1) {
+        match argument.as_str() {
+            "--help" | "-h" => {
+                println!("{HELP}");
+                return ExitCode::SUCCESS;
+            }
+            "--swapped" => swapped = true,
+            option if option.starts_with('-') => {
+                eprintln!("error: no option {option}\n\n{HELP}");
+                return ExitCode::from(2);
+            }
+            _ => out = argument,
+        }
     }
-    check_periods()?;
+    match run(&out, swapped) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("error: {error}");
+            ExitCode::FAILURE
+        }
+    }
+}
 
-    let mut bench = Bench::new(ActiveCode::CyclicPosition, LIMITS)?;
-    let mut phases = PhaseControl::new();
-    start_communication(&bench, &mut phases);
+fn run(out: &str, swapped: bool) -> Result<(), Box<dyn Error>> {
+    let periods = periods()?;
+    let mut bench = Bench::new(periods, LIMITS, swapped)?;
+    let mut lamp = Lamp::default();
+    start_communication(&mut bench, &mut lamp)?;
+    if let Some(fault) = bench.master.fault() {
+        return Err(format!("the ring does not start: {fault:?}").into());
+    }
 
-    bench.until("all drives ready, servo off", 1_000, |bench| bench.ring.all_are(AxisState::Off))?;
-    bench.ring.switch_on();
-    bench.until("all servos on", 1_000, |bench| bench.ring.all_are(AxisState::On))?;
+    until(&mut bench, &mut lamp, "all drives ready, servo off", AxisState::Off)?;
+    bench.master.ring_mut().switch_on();
+    until(&mut bench, &mut lamp, "all servos on", AxisState::On)?;
 
     let begin = bench.now;
     while bench.now < begin + BEFORE {
         bench.command_wave(begin)?;
-        bench.update();
+        update(&mut bench, &mut lamp)?;
     }
     bench.silence(SILENT);
     let silent_at = bench.now;
-    println!("{:9.1} ms  drive {SILENT} goes silent in the middle of the motion", time_ms(silent_at));
+    say(bench.time_ms(silent_at), &format!("drive {SILENT} goes silent in the middle of the motion"));
 
     let mut stopped_at = None;
     while bench.now < silent_at + AFTER {
-        if bench.ring.failure().is_none() {
+        if bench.master.ring().failure().is_none() {
             bench.command_wave(begin)?;
         }
-        bench.update();
-        let timeout = matches!(bench.ring.failure(), Some((_, StopReason::EchoTimeout)));
-        phases.step(Inputs { asic: Asic::Running, slave_info: None, tx_ready: true, timeout });
+        update(&mut bench, &mut lamp)?;
         if stopped_at.is_none() && bench.all_off() {
             stopped_at = Some(bench.now);
-            report_stop(&bench, phases.fault(), silent_at);
+            report_stop(&bench, silent_at);
         }
     }
     bench.print_table();
-    plot::positions(
-        &out,
-        &bench.history,
-        &[(silent_at, "drive silent"), (stopped_at.unwrap_or(bench.now), "all servos off")],
-    )?;
+    let marks = [
+        (bench.time_ms(silent_at), "drive silent"),
+        (bench.time_ms(stopped_at.unwrap_or(bench.now)), "all servos off"),
+    ];
+    let end = bench.time_ms(silent_at + RECORDED);
+    let shown = bench.history.partition_point(|(at, _)| *at <= end);
+    plot::positions(out, bench.history.get(..shown).unwrap_or_default(), &marks)?;
     println!("positions: {out}");
-    match (phases.fault(), stopped_at) {
+    match (bench.master.fault(), stopped_at) {
         (Some(Fault::Timeout), Some(_)) => Ok(()),
         other => Err(format!("the ring did not stop as it must: {other:?}").into()),
     }
 }
 
-/// 0.5 ms is in the table of the A6N family, and a frame with all axes fits it.
-fn check_periods() -> Result<(), String> {
+fn say(time_ms: f64, what: &str) {
+    println!("{time_ms:9.1} ms  {what}");
+}
+
+/// 0.5 ms is in the table of the A6N family and works with the internal timer, and a frame with all axes fits it.
+fn periods() -> Result<Periods, String> {
     let periods = Periods::from_a6n(3, 1, None).ok_or("Pr7.20 = 3, Pr7.21 = 1 is not in the table")?;
     let frame_ns = FrameTime::GUIDE.estimate_ns(AXES as u32);
     println!(
@@ -98,48 +136,87 @@ fn check_periods() -> Result<(), String> {
         if TimerSystem::Internal.allows(&periods) { "possible" } else { "not possible" },
         frame_ns / 1_000,
     );
-    if periods.update_ns == UPDATE_NS && frame_ns <= u64::from(periods.com_ns) {
-        Ok(())
+    if frame_ns <= u64::from(periods.com_ns) {
+        Ok(periods)
     } else {
         Err("the ring does not fit its periods".to_owned())
     }
 }
 
-/// When the ASIC of this example gets to each of its states, ms.
-const ASIC: [(f64, Asic); 4] =
-    [(20.0, Asic::Initial), (140.0, Asic::RingConfig), (1_300.0, Asic::Ready), (2_100.0, Asic::Running)];
-
-/// The slave table of the machine: 32 drives of one kind, in the order of the ring.
-fn slave_table() -> [Slave; AXES] {
-    core::array::from_fn(|place| Slave { mac_id: MacId::truncate(place as u8), kind: 1 })
+/// Phase, fault and COM LED as they were shown last. A flashing LED begins lit when its pattern does.
+#[derive(Default)]
+struct Lamp {
+    since_ms: u64,
+    state: Option<(Phase, Option<Fault>)>,
+    shown: Option<(Phase, Led)>,
 }
 
-/// The phases of the control function, with an ASIC that takes a while for each of its states. The main loop turns every
-/// 10 ms; each change of phase or LED is shown.
-fn start_communication(bench: &Bench, phases: &mut PhaseControl) {
-    let found: Vec<Slave> = bench.slaves().collect();
-    let table = slave_table();
-    let mut shown = None;
-    let mut prepared = false;
-    for t_ms in (0..=2_200_u64).step_by(10) {
-        let Some((_, asic)) = ASIC.iter().rev().find(|(from, _)| *from <= t_ms as f64) else { continue };
-        let slave_info = (*asic == Asic::Ready).then(|| compare(&table, &found, Order::Ring));
-        phases.step(Inputs { asic: *asic, slave_info, tx_ready: prepared, timeout: false });
-        prepared |= phases.phase() == Phase::Prepare;
-        let now = (phases.phase(), led(phases.phase(), phases.fault(), t_ms));
-        if shown != Some(now) {
-            println!(
-                "{:9.1} ms  before the motion: ASIC {asic:?}, phase {:?}, COM LED {:?}",
-                t_ms as f64, now.0, now.1
-            );
-            shown = Some(now);
+impl Lamp {
+    /// The end of a turn of the main loop.
+    fn show(&mut self, bench: &Bench, time_ms: u64, asic: Asic) {
+        let master = &bench.master;
+        let state = (master.phase(), master.fault());
+        let pattern = |(phase, fault)| rtex_block::master::pattern(phase, fault);
+        if self.state.map(pattern) != Some(pattern(state)) {
+            self.since_ms = time_ms;
+        }
+        self.state = Some(state);
+        let now = (master.phase(), master.led(time_ms - self.since_ms));
+        if self.shown != Some(now) {
+            let fault = master.fault().map_or(String::new(), |fault| format!(", fault {fault:?}"));
+            say(time_ms as f64, &format!("ASIC {asic:?}, phase {:?}{fault}, COM LED {:?}", now.0, now.1));
+            self.shown = Some(now);
         }
     }
 }
 
-fn report_stop(bench: &Bench, fault: Option<Fault>, silent_at: u64) {
-    println!("{:9.1} ms  all servos off, {:.1} ms after", time_ms(bench.now), time_ms(bench.now - silent_at));
-    if let Some((place, reason)) = bench.ring.failure() {
-        println!("{:14}cause: axis {place}, {reason}; fault of the master: {fault:?}", "");
+/// The main loop up to PH_RUNNING, with an ASIC that takes a while for each of its states. Interrupts are off, so the loop
+/// writes the first transmit data itself.
+fn start_communication(bench: &mut Bench, lamp: &mut Lamp) -> Result<(), Box<dyn Error>> {
+    let found = bench.found();
+    let [.., (running, _)] = ASIC;
+    for time_ms in (0..).step_by(10) {
+        let Some((_, asic)) = ASIC.iter().rev().find(|(from, _)| *from <= time_ms) else { continue };
+        // The slaves are known once the ring is closed.
+        bench.master.control(*asic, (*asic == Asic::Ready).then_some(&found));
+        if bench.master.phase() == Phase::Prepare {
+            bench.exchange()?;
+        }
+        lamp.show(bench, time_ms, *asic);
+        if bench.master.is_running() || bench.master.fault().is_some() && time_ms > running {
+            return Ok(());
+        }
+    }
+    Ok(())
+}
+
+/// An update period, and in every twentieth of them a turn of the main loop.
+fn update(bench: &mut Bench, lamp: &mut Lamp) -> Result<(), Box<dyn Error>> {
+    bench.update()?;
+    if bench.now % LOOP == 0 {
+        bench.master.control(Asic::Running, None);
+        lamp.show(bench, bench.time_ms(bench.now) as u64, Asic::Running);
+    }
+    Ok(())
+}
+
+/// Updates until all axes are in this state, and says so.
+fn until(bench: &mut Bench, lamp: &mut Lamp, what: &str, state: AxisState) -> Result<(), Box<dyn Error>> {
+    let end = bench.now + 1_000;
+    while !bench.master.ring().all_are(state) {
+        if bench.now == end {
+            return Err(format!("{what}: not reached, {:?}", bench.master.ring().failure()).into());
+        }
+        update(bench, lamp)?;
+    }
+    say(bench.time_ms(bench.now), what);
+    Ok(())
+}
+
+fn report_stop(bench: &Bench, silent_at: u64) {
+    let after = bench.time_ms(bench.now) - bench.time_ms(silent_at);
+    say(bench.time_ms(bench.now), &format!("all servos off, {after:.1} ms after"));
+    if let Some((place, reason @ StopReason::EchoTimeout)) = bench.master.ring().failure() {
+        println!("{:14}cause: axis {place}, {reason}; fault of the master: {:?}", "", bench.master.fault());
     }
 }

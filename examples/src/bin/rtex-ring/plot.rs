@@ -5,11 +5,12 @@ use std::error::Error;
 use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, Pos, VPos};
 
-use crate::bench::{AXES, Sample, time_ms};
+use crate::bench::{AXES, Sample};
 
-/// Writes the positions of all axes, with marked moments (update period and text).
-pub(crate) fn positions(path: &str, history: &[Sample], marks: &[(u64, &str)]) -> Result<(), Box<dyn Error>> {
-    let end = history.last().map_or(1.0, |(at, _)| time_ms(*at));
+/// Writes the positions of all axes, with marked moments (ms and text).
+pub(crate) fn positions(path: &str, history: &[Sample], marks: &[(f64, &str)]) -> Result<(), Box<dyn Error>> {
+    let begin = history.first().map_or(0.0, |(at, _)| *at);
+    let end = history.last().map_or(1.0, |(at, _)| *at);
     let all = || history.iter().flat_map(|(_, positions)| positions.iter().copied());
     let (low, high) = (all().min().unwrap_or(0), all().max().unwrap_or(1));
     let margin = (high - low) / 20 + 1;
@@ -21,7 +22,7 @@ pub(crate) fn positions(path: &str, history: &[Sample], marks: &[(u64, &str)]) -
         .margin(14)
         .x_label_area_size(44)
         .y_label_area_size(86)
-        .build_cartesian_2d(0.0..end, low - margin..high + margin)?;
+        .build_cartesian_2d(begin..end, low - margin..high + margin)?;
     chart
         .configure_mesh()
         .x_desc("time, ms")
@@ -30,13 +31,13 @@ pub(crate) fn positions(path: &str, history: &[Sample], marks: &[(u64, &str)]) -
         .draw()?;
     for place in 0..AXES {
         let colour = HSLColor(place as f64 / AXES as f64 * 0.8, 0.7, 0.45);
-        let points = history.iter().filter_map(|(at, all)| Some((time_ms(*at), *all.get(place)?)));
+        let points = history.iter().filter_map(|(at, all)| Some((*at, *all.get(place)?)));
         chart.draw_series(LineSeries::new(points, colour.stroke_width(1)))?;
     }
     // Marks that lie close together are written one below the other, away from the right edge.
     let line = (high - low) / 20;
     for (row, (at, text)) in (0..).zip(marks) {
-        let x = time_ms(*at);
+        let x = *at;
         chart.draw_series(LineSeries::new([(x, low - margin), (x, high + margin)], BLACK.stroke_width(1)))?;
         let (text, y) = (format!("{text}, {x:.1} ms "), high + margin - line * (row + 1));
         let right = Pos::new(HPos::Right, VPos::Center);

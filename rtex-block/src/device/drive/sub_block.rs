@@ -2,36 +2,33 @@
 
 use super::Drive;
 use super::execute::text;
-use crate::block::LEN;
-use crate::device::parameters::SUB_RESPONSE_DATA;
-use crate::error_code::ErrorCode;
-use crate::sub::SubResponse;
-use crate::type_code::Nibble;
+use crate::device::literals::{SUB_MONITOR, SUB_NORMAL, SUB_SYSTEM_ID, WRONG_NON_CYCLIC};
+use crate::device::parameters::{SUB_FEED_FORWARD, SUB_RESPONSE_DATA};
+use crate::device::wire::Sub;
 
 impl Drive {
-    pub(super) fn serve_sub(&mut self, sub: &[u8; LEN], error: Option<ErrorCode>) {
-        if let Some(code) = error {
-            return self.refuse_sub(sub, code);
-        }
-        let [byte16, type_code, low, high, ..] = *sub;
+    /// Takes a sub block with what [`check`](crate::device::check()) says of it. Bytes 24-31 count even if the code does not.
+    pub(super) fn serve_sub(&mut self, sub: [u8; 16], error: Option<u16>) {
+        let [byte16, type_code, low, high, _, _, _, _, feed @ ..] = sub;
         let (code, index) = (byte16 & 0x0f, u16::from_le_bytes([low, high]));
-        let [data, ..] = SUB_RESPONSE_DATA.map(|pr| self.selected(pr, 0));
-        let result = match code {
-            0 => Ok(data),
-            2 => text(type_code.into(), index),
-            _ => self.monitor(type_code.into(), index),
-        };
-        match result {
-            Ok(data1) => {
-                let code = Nibble::truncate(code);
-                self.sub = SubResponse { cmd_error: false, code, type_code, index, data1, ..self.sub };
+        let [a, b, c, d, e, f, g, h] = feed;
+        let feed = [i32::from_le_bytes([a, b, c, d]), i32::from_le_bytes([e, f, g, h])];
+        for ((held, new), select) in self.sub_feed_forward.iter_mut().zip(feed).zip(SUB_FEED_FORWARD) {
+            if self.parameters.value(select) != 0 {
+                *held = new;
             }
-            Err(code) => self.refuse_sub(sub, ErrorCode(code)),
         }
-    }
-
-    pub(super) fn refuse_sub(&mut self, sub: &[u8; LEN], code: ErrorCode) {
-        let echo = Nibble::truncate(sub[0]);
-        self.sub = SubResponse { cmd_error: true, code: echo, type_code: 0, index: code.0, data1: 0, ..self.sub };
+        let [data, ..] = SUB_RESPONSE_DATA.map(|pr| self.selected(pr, 0));
+        let result = match (error, code) {
+            (Some(code), _) => Err(code),
+            (None, SUB_NORMAL) => Ok(data),
+            (None, SUB_SYSTEM_ID) => text(type_code.into(), index),
+            (None, SUB_MONITOR) => self.monitor(type_code.into(), index),
+            (None, _) => Err(WRONG_NON_CYCLIC),
+        };
+        self.sub = match result {
+            Ok(data1) => Sub::Done(code, type_code, index, data1),
+            Err(error) => Sub::Refused(code, error),
+        };
     }
 }

@@ -29,9 +29,6 @@ impl Backup {
             Progress::Done { value: response } => {
                 *value = response.data().unwrap_or(0);
                 self.place = self.place.saturating_add(1);
-                if self.place >= list.len() {
-                    return Progress::Done { value: () };
-                }
                 Progress::Pending { left: axis.answer_left() }
             }
             Progress::Pending { left } => Progress::Pending { left },
@@ -72,9 +69,6 @@ impl Restore {
                         return Progress::Failed { error: Failure::Differs(pr) };
                     }
                     self.place = self.place.saturating_add(1);
-                    if self.place >= list.len() {
-                        return Progress::Done { value: () };
-                    }
                 }
                 self.written = !self.written;
                 Progress::Pending { left: axis.answer_left() }

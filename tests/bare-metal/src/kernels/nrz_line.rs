@@ -48,8 +48,8 @@ pub(crate) const LEVELS: [bool; 96] = {
 };
 
 /// Idle line, the edges of the field, idle line.
-pub(crate) const RUNS: [(bool, u64); 8] =
-    [(true, 8), (false, 8), (true, 8), (false, 8), (true, 8), (false, 8), (true, 16), (false, 16)];
+pub(crate) const RUNS: [(bool, u64); 9] =
+    [(true, 8), (false, 8), (true, 8), (false, 8), (true, 8), (false, 8), (true, 16), (false, 16), (true, 16)];
 
 kernels! {
     /// A window of 110 bits at any offset.
@@ -75,17 +75,28 @@ kernels! {
     } over [(8, 8), (4, 16), (3, 8)];
 
     /// One field, sample by sample: 96 calls.
-    fn nrz_line_push((receiver, levels): &Line<[bool; 96]>) -> Option<Field> {
+    fn nrz_line_push((receiver, levels): &Line<&'static [bool]>) -> Option<Field> {
         let mut receiver = *receiver;
-        levels.iter().fold(None, |field, level| receiver.push(*level).or(field))
-    } over [(RECEIVER, LEVELS)];
+        let mut found = None;
+        for level in *levels {
+            if let Some(field) = receiver.push(*level) {
+                found = Some(field);
+            }
+        }
+        found
+    } over [(RECEIVER, &LEVELS)];
 
     /// One field as runs of equal samples: 9 calls.
-    fn nrz_line_run((receiver, runs): &Line<[(bool, u64); 8]>) -> Option<Field> {
+    fn nrz_line_run((receiver, runs): &Line<&'static [(bool, u64)]>) -> Option<Field> {
         let mut receiver = *receiver;
-        let field = runs.iter().fold(None, |field, (level, len)| receiver.run(*level, *len).or(field));
-        receiver.run(true, 16).or(field)
-    } over [(RECEIVER, RUNS)];
+        let mut found = None;
+        for (level, len) in *runs {
+            if let Some(field) = receiver.run(*level, *len) {
+                found = Some(field);
+            }
+        }
+        found
+    } over [(RECEIVER, &RUNS)];
 
     /// One field in packed words: 2 words.
     fn nrz_line_feed((receiver, words): &Line<[u64; 2]>) -> Option<Field> {

@@ -20,8 +20,7 @@ fn by_sample(receiver: &mut Receiver) -> Option<u16> {
 }
 
 fn by_run(receiver: &mut Receiver) -> Option<u16> {
-    let idle = (true, 16);
-    RUNS.iter().chain([&idle]).find_map(|(level, len)| receiver.run(*level, *len)).map(|field| field.content)
+    RUNS.iter().find_map(|(level, len)| receiver.run(*level, *len)).map(|field| field.content)
 }
 
 fn by_word(receiver: &mut Receiver) -> Option<u16> {

@@ -49,6 +49,36 @@ fn defaults_are_numbers_of_the_sources() {
     assert_eq!(got, (10_000, 3_000, 800, 2_799));
 }
 
+/// Each setting is changed by its own call, and by no other.
+#[test]
+fn settings_are_independent() {
+    let changed = LINE
+        .with_echo()
+        .with_response_timeout(1)
+        .with_field_timeout(2)
+        .with_turn_around(3)
+        .with_hand_over(4)
+        .with_driver_lead(5)
+        .with_sampling(6);
+    let times = [
+        changed.response_timeout_ns,
+        changed.field_timeout_ns,
+        changed.turn_around_ns,
+        changed.hand_over_ns,
+        changed.driver_lead_ns,
+        changed.sampling_ns,
+    ];
+    assert_eq!((changed.rate, changed.echo, times), (BitRate::Mbit2_5, true, [1, 2, 3, 4, 5, 6]));
+}
+
+/// The own request does not shorten the wait for the response: 4 us, 10 us, a field, 5.599 us to hand it over.
+#[test]
+fn an_echo_leaves_the_time_out_as_it_is() {
+    let mut transaction = Transaction::start(Request::ReadSingleTurn, LINE, 0);
+    assert_eq!(transaction.bytes(&[0x02], 4_000), Progress::Pending { until_ns: 23_599 });
+    assert_eq!(transaction.poll(23_599), Progress::Pending { until_ns: 23_599 });
+}
+
 /// The request of 4 us begins at 10 us. Its driver is on 1 us before, and off before the encoder answers.
 #[test]
 fn times_of_a_transaction() {
@@ -240,4 +270,15 @@ fn a_long_block_ends_with_the_response() {
     let block = [&[0x55; 40], &RESPONSE[..]].concat();
     let _ = transaction.bytes(&block, 200_000);
     assert_eq!(ended(&mut transaction), Response::parse(Request::ReadSingleTurn, &RESPONSE));
+}
+
+/// Noise before the own request, and after that a refusal: the longest request and response are the last 15 bytes.
+#[test]
+fn a_long_block_with_an_echo_ends_with_the_response() {
+    let refusal = [0x1a, 0x40, 0xeb, 0x3b, 0x1c, 0x17, 0x04, 0x27, 0x00, 0x00, 0xa2];
+    let request = Request::write_eeprom(Address::truncate(1), 0x5a);
+    let mut transaction = Transaction::start(request, LINE, 0);
+    let block = [&[0x55; 40], request.emit().as_bytes(), &refusal[..]].concat();
+    let _ = transaction.bytes(&block, 400_000);
+    assert_eq!(ended(&mut transaction), Err(Error::Rejected { sf: StatusField::CA0 }));
 }

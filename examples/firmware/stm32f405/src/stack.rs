@@ -1,0 +1,39 @@
+//! How much stack was used: it is filled with a pattern before `main`, and looked through.
+
+use core::ptr;
+
+const PATTERN: u32 = 0x5eed_5eed;
+/// What the start-up itself may be using.
+const IN_USE: usize = 64;
+
+unsafe extern "C" {
+    static mut _stack_end: u32;
+    static mut _stack_start: u32;
+}
+
+/// The lowest and the highest address of the stack, `_stack_end` and `_stack_start` of the linker script.
+fn bounds() -> (*mut u32, *mut u32) {
+    (&raw mut _stack_end, &raw mut _stack_start)
+}
+
+/// Fills what is not used yet.
+#[inline(always)]
+pub fn paint() {
+    let (mut at, end) = bounds();
+    let end = end.wrapping_byte_sub(IN_USE + 1024);
+    while at < end {
+        // SAFETY: below the stack pointer and above the static variables nothing lives.
+        unsafe { ptr::write_volatile(at, PATTERN) };
+        at = at.wrapping_add(1);
+    }
+}
+
+/// The most that was in use so far, in bytes.
+pub fn used() -> usize {
+    let (mut at, end) = bounds();
+    // SAFETY: as above; reading what may be in use is harmless.
+    while at < end && unsafe { ptr::read_volatile(at) } == PATTERN {
+        at = at.wrapping_add(1);
+    }
+    end as usize - at as usize
+}

@@ -1,0 +1,133 @@
+//! The motor driver of a device: a DRV8711 behind its SPI, and the task that sets it up and polls it.
+
+use core::fmt;
+
+use sorte_proto::drv8711::{Apply, Configuration, Next, Register, Status, StepMode};
+
+/// Time of a word at the 500 kHz of the SPI, in ns: so old can the STATUS be that a device tells.
+const WORD_NS: u64 = 32_000;
+
+/// Something that happens to a driver.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Fault {
+    /// It sets bits of STATUS and drives the motor no more.
+    Reports(Status),
+    /// It has no supply: every register reads all ones.
+    Unpowered,
+}
+
+impl Fault {
+    pub(super) fn parse(name: &str) -> Option<Self> {
+        let name = name.to_ascii_uppercase();
+        if name == "UNPOWERED" {
+            return Some(Self::Unpowered);
+        }
+        Status::from_name(&name).map(Self::Reports)
+    }
+}
+
+impl fmt::Display for Fault {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Reports(status) => write!(f, "reports {status}"),
+            Self::Unpowered => f.write_str("loses its supply"),
+        }
+    }
+}
+
+#[derive(Debug, Clone)]
+pub(super) struct Driver {
+    registers: [u16; 8],
+    powered: bool,
+    /// What the device read last, and when it reads again.
+    polled: Status,
+    due_ns: u64,
+}
+
+impl Driver {
+    /// After power-up.
+    pub(super) fn new() -> Self {
+        let registers = Register::ALL.map(Register::reset_value);
+        Self { registers, powered: true, polled: Status::empty(), due_ns: 0 }
+    }
+
+    pub(super) fn hit(&mut self, fault: Fault) {
+        match fault {
+            Fault::Unpowered => self.powered = false,
+            Fault::Reports(status) => {
+                if let Some(register) = self.registers.last_mut() {
+                    *register |= u16::from(status.bits());
+                }
+            }
+        }
+    }
+
+    /// The registers of the reference motor: 1/256 steps, and the motor driven.
+    pub(super) fn set_up(&mut self) -> Result<(), sorte_proto::Error> {
+        let mut configuration = Configuration::default();
+        configuration.ctrl.enable = true;
+        configuration.ctrl.mode = StepMode::Div256;
+        let mut apply = Apply::new(configuration);
+        while let Next::Transfer(word) = apply.next() {
+            apply.answer(self.transfer(word.bits()).to_be_bytes())?;
+        }
+        Ok(())
+    }
+
+    /// A word over the SPI.
+    fn transfer(&mut self, word: u16) -> u16 {
+        if !self.powered {
+            return 0xffff;
+        }
+        let address = word >> 12 & 7;
+        let Some(register) = self.registers.get_mut(usize::from(address)) else { return 0 };
+        if word & 0x8000 == 0 {
+            // Writing 0 to a bit of STATUS clears it.
+            *register = if address == 7 { *register & word } else { word & 0xfff };
+        }
+        // Bit 10 of TORQUE always reads 0.
+        if address == 1 { *register & 0xbff } else { *register }
+    }
+
+    /// Whether steps move the motor.
+    pub(super) fn drives(&self) -> bool {
+        self.powered && self.registers.last() == Some(&0)
+    }
+
+    /// STATUS as the device has it at `now_ns` of its time.
+    pub(super) fn status(&mut self, now_ns: u64) -> Status {
+        if now_ns >= self.due_ns {
+            self.due_ns = now_ns + WORD_NS;
+            self.polled = Status::of_register(self.transfer(Register::Status.read().bits()));
+        }
+        self.polled
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_chip_takes_its_registers_and_one_without_supply_does_not() {
+        let mut driver = Driver::new();
+        assert_eq!(driver.set_up(), Ok(()));
+        assert_eq!(driver.registers[0], 0xc41);
+        assert!(driver.drives());
+        let mut dead = Driver::new();
+        dead.hit(Fault::Unpowered);
+        assert!(matches!(dead.set_up(), Err(sorte_proto::Error::ReadBack { register: 1, .. })));
+        assert!(!dead.drives() && dead.status(0).looks_unpowered());
+    }
+
+    #[test]
+    fn a_fault_is_told_with_the_next_word_of_the_spi() {
+        let mut driver = Driver::new();
+        assert_eq!(driver.status(0), Status::empty());
+        driver.hit(Fault::parse("bpdf").unwrap());
+        assert!(!driver.drives());
+        assert_eq!(driver.status(31_999), Status::empty());
+        assert_eq!(driver.status(32_000), Status::BPDF);
+        assert_eq!(Fault::parse("XYZ"), None);
+    }
+}

@@ -1,0 +1,65 @@
+//! A tap on the line: what the published firmware sends, taken apart with the streaming parsers.
+//!
+//! The recording is made here: DISCOVERY on its way back past two devices, a cycle of the IO exchange, and the frame that a
+//! published device would send if its routine were called.
+//!
+//! `cargo run -p sorte-proto --example tap`
+
+use core::error::Error as AnyError;
+
+use nom::Parser;
+use sorte_proto::stream::{device_frame, long_frame, master_frame, preamble};
+use sorte_proto::{
+    DeviceAddress, DeviceFrame, Discovery, DiscoveryView, Entry, Error, FrameType, Network, Preamble,
+    PublishedDeviceFrame, Status, write_master_frame,
+};
+
+fn recording() -> Result<Vec<u8>, Error> {
+    let mut discovery = Discovery::published_request(true);
+    for last in [false, true] {
+        discovery.pass(Entry::STOCK, last, false)?;
+    }
+    let mut wire = Preamble::Long.bytes().to_vec();
+    wire.extend(discovery.emit());
+    let mut master = [0; 21];
+    write_master_frame(&[7; 16], 40_500, &mut master)?;
+    wire.extend(Preamble::Short.bytes());
+    wire.extend(master);
+    let mut device = [0; 6];
+    DeviceFrame { address: DeviceAddress::FIRST, status: Status::empty(), payload: [0; 3] }.emit_into(&mut device)?;
+    wire.extend(Preamble::Short.bytes());
+    wire.extend(device);
+    Ok(wire)
+}
+
+fn main() -> Result<(), Box<dyn AnyError>> {
+    let wire = recording()?;
+    let (rest, ((), frame)) =
+        (preamble::<Error>, long_frame).parse(&wire).map_err(|error| format!("start-up: {error:?}"))?;
+    println!("{frame}; type nibble {:x}h", frame.status().type_nibble());
+    if frame.frame_type() == FrameType::Discovery {
+        for (place, entry) in Network::new(DiscoveryView::of(frame)?)?.assignments() {
+            println!("  device {}: {} bytes out from {}", place.address, entry.output, place.out_offset);
+        }
+    }
+
+    let (rest, ((), view)) =
+        (preamble::<Error>, master_frame(16)).parse(rest).map_err(|error| format!("master: {error:?}"))?;
+    println!("{view}");
+    // Nothing else checks the time stamp: it must be where the cycle is.
+    for expected in [40_490, 36_500] {
+        match view.check_time_stamp(expected, 100) {
+            Ok(()) => println!("  stamped at its time, {expected} ns or nearly"),
+            Err(error) => println!("  {error}"),
+        }
+    }
+    let (rest, ((), view)) =
+        (preamble::<Error>, device_frame(3)).parse(rest).map_err(|error| format!("device: {error:?}"))?;
+    println!("{view}; {} bytes left", rest.len());
+
+    // What the published routine builds: no check that could be made.
+    let frame = PublishedDeviceFrame { address: DeviceAddress::FIRST, status: Status::LAST, drv8711_status: 0 };
+    let [address, status, driver, zero] = frame.emit_without_crc();
+    println!("{}", PublishedDeviceFrame::parse_unchecked(&[address, status, driver, zero, 0x5a])?);
+    Ok(())
+}

@@ -1,0 +1,150 @@
+use super::witness::Witness;
+use super::{Reset, Step};
+use crate::error::Error;
+use crate::message::MultiTurn;
+use crate::request::Request;
+use crate::resolution::Resolution;
+use crate::response::Response;
+
+/// Sets the turns to 0, clears all errors, and sees what became of it: reads the turns by ID 1, sends ID C ten times,
+/// waits 18 ms, and reads the turns again. **The multi-turn reference of the machine is lost**, see
+/// [`Reset::clear_turns_and_lose_multi_turn_reference`].
+///
+/// Documents of the vendors say that the effect is to be confirmed by reading, and name no wait after ID C. This takes the
+/// only time for storing that any of them gives, so that a count that comes late is not taken for one that was not reset.
+///
+/// A shaft that stands on the boundary of a turn counts a turn more or less when it trembles: `tolerance` says how many, 1
+/// in general and 0 if the shaft is known to stand elsewhere. The result is the count read afterwards, within the tolerance
+/// of 0. Otherwise it ends with
+///
+/// * [`Error::NotDone`]: ID C was not sent often enough, or the count is what it was before;
+/// * [`Error::EffectUnknown`]: the count could not be read, or it says nothing because it was at 0 before, or near it.
+///
+/// ID C is sent at most ten times. Whether the errors are gone is to be seen by ID 3.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct MultiTurnZero {
+    resolution: Resolution,
+    tolerance: u32,
+    witness: Witness,
+}
+
+impl MultiTurnZero {
+    /// Times that the turns are read before it is given up.
+    pub const MAX_READS: u8 = Witness::MAX_READS;
+
+    /// `tolerance`: how far from 0, in turns, the count may be afterwards.
+    pub const fn set_and_lose_multi_turn_reference(resolution: Resolution, tolerance: u32) -> Self {
+        let reset = Reset::clear_turns_and_lose_multi_turn_reference();
+        Self { resolution, tolerance, witness: Witness::new(reset, Request::ReadMultiTurn, Reset::ZERO_WAIT_NS) }
+    }
+
+    /// The first request, at once.
+    pub const fn start(&mut self, now_ns: u64) -> Step<MultiTurn> {
+        self.witness.start(now_ns)
+    }
+
+    /// A transaction ended with this outcome; the line is free from `ready_ns` on.
+    pub fn receive(&mut self, outcome: Result<Response, Error>, ready_ns: u64) -> Step<MultiTurn> {
+        let Self { resolution, tolerance, witness } = self;
+        let value = |response| match response {
+            Response::ReadMultiTurn(multi) => Some(resolution.turns(multi.abm).map(|_| (multi, multi.abm.get()))),
+            _ => None,
+        };
+        witness.receive(outcome, ready_ns, value, |from, to| {
+            resolution.turns_between(from, to).unsigned_abs() <= *tolerance
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::count::{Abm, Abs};
+    use crate::error::ErrorClass;
+    use crate::message::SingleTurn;
+    use crate::status::StatusField;
+
+    const LOST: Result<Response, Error> = Err(Error::NoResponse { echo: false });
+
+    fn multi(abm: u32) -> MultiTurn {
+        MultiTurn { sf: StatusField::empty(), abm: Abm::truncate(abm) }
+    }
+
+    /// Turns before, which of the ten responses is lost (0: none), and turns after (none: they cannot be read), with a
+    /// tolerance of one turn and 16 bits of turns.
+    fn run(before: u32, lost: u8, after: Option<u32>) -> (Step<MultiTurn>, u8) {
+        let mut zero = MultiTurnZero::set_and_lose_multi_turn_reference(Resolution::new(17, 16).unwrap(), 1);
+        let mut step = zero.start(0);
+        let mut sent = 0;
+        while let Step::Send { request, not_before_ns } = step {
+            let outcome = match request {
+                Request::ResetTurnsAndErrors => {
+                    sent += 1;
+                    let single = SingleTurn { sf: StatusField::empty(), abs: Abs::truncate(5) };
+                    if sent == lost { LOST } else { Ok(Response::ResetTurnsAndErrors(single)) }
+                }
+                _ if sent == 0 => Ok(Response::ReadMultiTurn(multi(before))),
+                _ => after.map_or(LOST, |after| Ok(Response::ReadMultiTurn(multi(after)))),
+            };
+            step = zero.receive(outcome, not_before_ns + 31_000);
+        }
+        (step, sent)
+    }
+
+    /// 31 us, 40 us of idle line, ten times 71 us but for the last pause, 18 ms, 31 us.
+    #[test]
+    fn turns_that_read_zero_are_done() {
+        let ready_ns = 31_000 + 40_000 + 670_000 + 18_000_000 + 31_000;
+        assert_eq!(run(700, 0, Some(0)), (Step::Done { value: multi(0), ready_ns }, 10));
+        // The last response was lost, but the count shows it.
+        assert!(matches!(run(700, 10, Some(0)).0, Step::Done { .. }));
+    }
+
+    /// On the boundary of a turn the count goes to 1 or to -1, which is 0xffff in 16 bits.
+    #[test]
+    fn a_count_that_trembles_is_done() {
+        for after in [0, 1, 0xffff] {
+            assert!(matches!(run(700, 0, Some(after)).0, Step::Done { value, .. } if value == multi(after)));
+        }
+        for after in [2, 0xfffe] {
+            assert!(matches!(run(700, 0, Some(after)).0, Step::Failed { error: Error::NotDone { sent: 10, .. }, .. }));
+        }
+    }
+
+    #[test]
+    fn turns_that_stay_are_not_done() {
+        for after in [700, 701, 699] {
+            let (step, sent) = run(700, 10, Some(after));
+            assert!(matches!(step, Step::Failed { error: Error::NotDone { sent: 10, .. }, .. }), "{step:?}");
+            assert_eq!(sent, 10);
+        }
+        // Nine requests have no effect: nothing is read.
+        let (step, sent) = run(700, 9, Some(0));
+        assert!(matches!(step, Step::Failed { error: Error::NotDone { sent: 9, .. }, .. }), "{step:?}");
+        assert_eq!(sent, 9);
+    }
+
+    /// After a lost response, turns that were near 0 before say nothing, nor does another count than before.
+    #[test]
+    fn what_cannot_be_seen_is_unknown() {
+        let because = ErrorClass::NoResponse;
+        for (before, after) in [(700, None), (0, Some(0)), (1, Some(0)), (0xffff, Some(1)), (700, Some(350))] {
+            let (step, sent) = run(before, 10, after);
+            let unknown =
+                matches!(step, Step::Failed { error: Error::EffectUnknown { because: got }, .. } if got == because);
+            assert!(unknown && sent == 10, "{before} {after:?}: {step:?}");
+        }
+        // All ten were answered, and the turns cannot be read.
+        assert!(matches!(run(700, 0, None).0, Step::Failed { error: Error::EffectUnknown { .. }, .. }));
+    }
+
+    /// Bits above the width are no count: read again, and given up.
+    #[test]
+    fn a_count_that_is_too_wide_says_nothing() {
+        let (step, sent) = run(0x1_0000, 0, Some(0));
+        let because = ErrorClass::UpperBits;
+        assert!(matches!(step, Step::Failed { error: Error::NotDone { sent: 0, because: got }, .. } if got == because));
+        assert_eq!(sent, 0);
+    }
+}
