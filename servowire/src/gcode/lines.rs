@@ -92,7 +92,7 @@ impl State<'_> {
                     }
                     &m.args
                 }
-                Code::ToolChange(_) => continue,
+                // A tool moves no axis.
                 _ => continue,
             };
             for word in args {
@@ -187,7 +187,8 @@ impl State<'_> {
             return Err("an arc needs its center: I and J, from where it begins".to_owned());
         }
         let from = self.at;
-        let center = [0, 1].map(|i| from[i] + words.center[i].unwrap_or(0.0) * self.unit);
+        let [i, j] = words.center.map(|away| away.unwrap_or(0.0) * self.unit);
+        let center = [from[0] + i, from[1] + j];
         let units = |[x, y]: [f64; 2]| [(x * 1e4).round() as i32, (y * 1e4).round() as i32];
         let arc = Arc::new(units([from[0], from[1]]), units([to[0], to[1]]), units(center), clockwise, CHORD);
         let chords: Vec<_> = arc
@@ -230,11 +231,11 @@ mod tests {
     #[test]
     fn arcs_end_where_they_say() {
         let half = ends("G0 X10\nG3 X-10 I-10 J0 F600");
-        assert!(half.len() > 30 && *half.last().unwrap() == [-10.0, 0.0, 0.0]);
+        assert!(half.len() > 30 && half.last() == Some(&[-10.0, 0.0, 0.0]));
         assert!(half[1..].iter().all(|[x, y, _]| (x.hypot(*y) - 10.0).abs() < 1e-3 && *y >= 0.0));
         let turn = ends("G0 X10\nG2 I-10 Z-2 F600");
         let low = turn.iter().map(|p| p[1]).fold(0.0, f64::min);
-        assert!((low + 10.0).abs() < 1e-3 && *turn.last().unwrap() == [10.0, 0.0, -2.0]);
+        assert!((low + 10.0).abs() < 1e-3 && turn.last() == Some(&[10.0, 0.0, -2.0]));
     }
 
     #[test]

@@ -51,8 +51,7 @@ pub(super) fn write(
         return rows(arguments.json, steps, out).map_err(Into::into);
     }
     let mut wires = arguments.vcd.as_deref().map(Wires::new).transpose()?;
-    let mut places = vec![[0; AXES]];
-    let mut times = vec![0];
+    let mut places = vec![(0.0, [0; AXES])];
     let mut axes = [Axis::default(); AXES];
     let mut steps = steps;
     for pulse in steps.by_ref() {
@@ -62,8 +61,7 @@ pub(super) fn write(
             wires.add(&pulse)?;
         }
         if arguments.svg.is_some() {
-            places.push(axes.map(|axis| axis.position));
-            times.push(pulse.tick);
+            places.push((pulse.tick as f64 / 1e9, axes.map(|axis| axis.position)));
         }
     }
     writeln!(out, "path    {lines} straight lines in {:.6} s", steps.end() as f64 / 1e9)?;
@@ -75,7 +73,7 @@ pub(super) fn write(
         wires.finish()?;
     }
     if let Some(path) = &arguments.svg {
-        draw(path, &places, &times).map_err(|e| format!("{}: {e}", path.display()))?;
+        draw(path, &places).map_err(|e| format!("{}: {e}", path.display()))?;
     }
     Ok(out.flush()?)
 }
@@ -99,13 +97,19 @@ fn rows(json: bool, steps: Steps, out: &mut dyn Write) -> io::Result<()> {
     out.flush()
 }
 
+/// The wires of an axis.
+struct Wire {
+    step: IdCode,
+    dir: IdCode,
+    direction: Option<Direction>,
+    /// When the last pulse is over.
+    falls: Option<u64>,
+}
+
 /// STEP and DIR of each axis.
 struct Wires {
     to: Writer<BufWriter<File>>,
-    axes: [(IdCode, IdCode); AXES],
-    direction: [Option<Direction>; AXES],
-    /// When the last pulse of each axis is over.
-    falls: [Option<u64>; AXES],
+    axes: Vec<Wire>,
 }
 
 impl Wires {
@@ -114,44 +118,42 @@ impl Wires {
         let mut to = Writer::new(BufWriter::new(file));
         to.timescale(1, TimescaleUnit::NS)?;
         to.add_module("axes")?;
-        let mut wire = |name: &str, kind: &str| to.add_wire(1, &format!("{name}_{kind}"));
-        let [x, y, z] = NAMES.map(|name| Ok::<_, io::Error>((wire(name, "step")?, wire(name, "dir")?)));
-        let axes = [x?, y?, z?];
+        let mut axes = Vec::new();
+        for name in NAMES {
+            let (step, dir) = (to.add_wire(1, &format!("{name}_step"))?, to.add_wire(1, &format!("{name}_dir"))?);
+            axes.push(Wire { step, dir, direction: None, falls: None });
+        }
         to.upscope()?;
         to.enddefinitions()?;
         to.timestamp(0)?;
-        for (step, dir) in axes {
-            to.change_scalar(step, Value::V0)?;
-            to.change_scalar(dir, Value::V0)?;
+        for wire in &axes {
+            to.change_scalar(wire.step, Value::V0)?;
+            to.change_scalar(wire.dir, Value::V0)?;
         }
-        Ok(Self { to, axes, direction: [None; AXES], falls: [None; AXES] })
+        Ok(Self { to, axes })
     }
 
     /// Lets pulses end that are over before a time.
     fn until(&mut self, time: u64) -> io::Result<()> {
-        while let Some((at, falls)) = (0..AXES).filter_map(|at| self.falls[at].map(|t| (at, t))).min_by_key(|(_, t)| *t)
-        {
-            if falls > time {
-                break;
-            }
+        while let Some(wire) = self.axes.iter_mut().min_by_key(|wire| wire.falls.unwrap_or(u64::MAX)) {
+            let Some(falls) = wire.falls.filter(|falls| *falls <= time) else { break };
             self.to.timestamp(falls)?;
-            self.to.change_scalar(self.axes[at].0, Value::V0)?;
-            self.falls[at] = None;
+            self.to.change_scalar(wire.step, Value::V0)?;
+            wire.falls = None;
         }
         Ok(())
     }
 
     fn add(&mut self, pulse: &AxisPulse) -> io::Result<()> {
         self.until(pulse.tick)?;
-        let at = usize::from(pulse.axis).min(AXES - 1);
-        let (step, dir) = self.axes[at];
+        let Some(wire) = self.axes.get_mut(usize::from(pulse.axis)) else { return Ok(()) };
         self.to.timestamp(pulse.tick)?;
-        if self.direction[at] != Some(pulse.direction) {
-            self.direction[at] = Some(pulse.direction);
-            self.to.change_scalar(dir, Value::from(pulse.direction.dir()))?;
+        if wire.direction != Some(pulse.direction) {
+            wire.direction = Some(pulse.direction);
+            self.to.change_scalar(wire.dir, Value::from(pulse.direction.dir()))?;
         }
-        self.to.change_scalar(step, Value::V1)?;
-        self.falls[at] = Some(pulse.tick + PULSE_NS);
+        self.to.change_scalar(wire.step, Value::V1)?;
+        wire.falls = Some(pulse.tick + PULSE_NS);
         Ok(())
     }
 
@@ -161,15 +163,17 @@ impl Wires {
     }
 }
 
+/// A place of the axes at a time in s.
+type Place = (f64, [i64; AXES]);
+
 /// The path on the left, the positions of the axes over time on the right.
-fn draw(path: &Path, places: &[[i64; AXES]], times: &[u64]) -> Result<(), Box<dyn Error>> {
+fn draw(path: &Path, places: &[Place]) -> Result<(), Box<dyn Error>> {
     // A point a pixel is enough.
     let every = (places.len() / 20_000).max(1);
-    let mut thin: Vec<usize> = (0..places.len()).step_by(every).collect();
-    thin.extend(places.len().checked_sub(1));
-    let at = |k: usize, axis: usize| places[k][axis] as f64;
+    let thin = || places.iter().step_by(every).chain(places.last());
+    let value = |place: &Place, axis: usize| place.1.get(axis).map_or(0.0, |steps| *steps as f64);
     let range = |axis: usize| {
-        let values = || places.iter().map(|place| place[axis] as f64);
+        let values = || places.iter().map(|place| value(place, axis));
         let (low, high) = (values().fold(0.0, f64::min), values().fold(0.0, f64::max));
         let margin = (high - low).max(1.0) * 0.06;
         low - margin..high + margin
@@ -177,23 +181,18 @@ fn draw(path: &Path, places: &[[i64; AXES]], times: &[u64]) -> Result<(), Box<dy
     let root = SVGBackend::new(path, (1200, 600)).into_drawing_area();
     root.fill(&WHITE)?;
     let (left, right) = root.split_horizontally(600);
-    let mut plane = ChartBuilder::on(&left);
+    let mut chart = ChartBuilder::on(&left);
     let mut plane =
-        plane.margin(12).x_label_area_size(42).y_label_area_size(70).build_cartesian_2d(range(0), range(1))?;
+        chart.margin(12).x_label_area_size(42).y_label_area_size(70).build_cartesian_2d(range(0), range(1))?;
     plane.configure_mesh().max_light_lines(0).x_desc("X [steps]").y_desc("Y [steps]").draw()?;
-    plane.draw_series(LineSeries::new(thin.iter().map(|&k| (at(k, 0), at(k, 1))), BLUE.stroke_width(2)))?;
-    let end = times.last().map_or(1.0, |ns| (*ns as f64 / 1e9).max(1e-9));
-    let areas = right.split_evenly((AXES, 1));
-    for (axis, area) in areas.iter().enumerate() {
+    plane.draw_series(LineSeries::new(thin().map(|place| (value(place, 0), value(place, 1))), BLUE.stroke_width(2)))?;
+    let end = places.last().map_or(1.0, |(time, _)| time.max(1e-9));
+    for (axis, (area, name)) in right.split_evenly((AXES, 1)).iter().zip(NAMES).enumerate() {
         let mut chart = ChartBuilder::on(area);
-        let mut chart =
-            chart.margin(12).x_label_area_size(42).y_label_area_size(70).build_cartesian_2d(0.0..end, range(axis))?;
-        let name = NAMES.get(axis).copied().unwrap_or_default();
-        chart.configure_mesh().max_light_lines(0).x_desc("time [s]").y_desc(format!("{name} [steps]")).draw()?;
-        chart.draw_series(LineSeries::new(
-            thin.iter().map(|&k| (times[k] as f64 / 1e9, at(k, axis))),
-            BLUE.stroke_width(2),
-        ))?;
+        chart.margin(12).x_label_area_size(42).y_label_area_size(70);
+        let mut curve = chart.build_cartesian_2d(0.0..end, range(axis))?;
+        curve.configure_mesh().max_light_lines(0).x_desc("time [s]").y_desc(format!("{name} [steps]")).draw()?;
+        curve.draw_series(LineSeries::new(thin().map(|place| (place.0, value(place, axis))), BLUE.stroke_width(2)))?;
     }
     Ok(root.present()?)
 }

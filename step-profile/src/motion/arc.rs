@@ -145,7 +145,7 @@ fn length(a: [i64; 2]) -> i64 {
 }
 
 #[cfg(test)]
-#[expect(clippy::cast_precision_loss, reason = "compared within a unit")]
+#[expect(clippy::cast_precision_loss, clippy::cast_sign_loss, reason = "compared within a unit")]
 mod tests {
     use super::*;
     use proptest::prelude::*;
@@ -162,7 +162,7 @@ mod tests {
     proptest! {
         #[test]
         fn every_chord_is_near_the_arc(
-            radius in 1..1_000_000_000_i32, a in 0.0..6.28_f64, sweep in 0.01..6.27_f64,
+            radius in 1..1_000_000_000_i32, a in 0.0..6.0_f64, sweep in 0.01..6.2_f64,
             center in [-1000..1000_i32, -1000..1000_i32], clockwise: bool, part in 1e-5..0.1_f64,
         ) {
             let error = ((f64::from(radius) * part) as u32).max(1);
