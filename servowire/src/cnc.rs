@@ -24,7 +24,10 @@ use std::process::ExitCode;
 use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
 use sorte_proto::sync0::Variant;
+use step_profile::motion::{Limits, PtoMover};
 use step_profile::{Frequency, Motors, Parameters, Profile, Speed};
+
+use crate::gcode::{AXES, Part};
 
 use axis::Build;
 use driver::Fault;
@@ -43,7 +46,8 @@ const LONG: u64 = 2_000_000;
 /// Master and devices start up over simulated cables, then exchange data every 4 us, or as long as the line needs: the
 /// motion of the axes goes through PTO words and frames into the devices' SYNC0 generators and from there into the motors.
 /// Each device runs on its own crystal; frames, slots, data and pulses are where its counter puts them. Prints the
-/// start-up, what the cycle has room for, and what became of every step. The same seed gives the same run.
+/// start-up, what the cycle has room for, and what became of every step. The same seed gives the same run. With --gcode the
+/// first three axes follow a part program, each within the first --freq (100000), --accel and --jerk.
 #[derive(Debug, Args)]
 pub struct Arguments {
     /// Devices in the line, a motor each.
@@ -80,6 +84,14 @@ pub struct Arguments {
     /// Play a tune instead.
     #[arg(long)]
     dance: bool,
+    #[command(flatten)]
+    part: Part,
+    /// Greatest acceleration of an axis of a part program, in steps/s².
+    #[arg(long, value_name = "A", requires = "gcode", default_value_t = Part::ACCELERATION, value_parser = clap::value_parser!(u32).range(1..))]
+    accel: u32,
+    /// Its greatest jerk, in steps/s³; without it a trapezoid.
+    #[arg(long, value_name = "J", requires = "gcode")]
+    jerk: Option<u64>,
     /// The devices as published: their SYNC0 generator, which loses steps, and the last word again when a frame is lost.
     #[arg(long)]
     published_sync0: bool,
@@ -217,6 +229,22 @@ impl Arguments {
             if device > usize::from(self.devices) {
                 return Err(format!("device {device} of {}", self.devices).into());
             }
+        }
+        if let Some(path) = &self.part.gcode {
+            if usize::from(self.devices) < AXES || self.dance || self.independent || self.cycles.is_some() {
+                return Err("--gcode moves X, Y and Z, and nothing else: it needs three devices, and no --dance, --independent or --cycles".into());
+            }
+            let lines = Part::read(path)?;
+            let limits = Limits::new(self.freq.first().copied().unwrap_or(Part::SPEED), self.accel)?;
+            let limits = self.jerk.map_or(Ok(limits), |jerk| limits.with_jerk(jerk))?;
+            if limits.speed() > PtoMover::MAX_SPEED {
+                return Err(format!(
+                    "--freq {}: an axis makes a step in each cycle of 4 us at most, 250000",
+                    limits.speed()
+                )
+                .into());
+            }
+            return Ok(Program::part(self.part.steps(lines, limits)?));
         }
         // Programs of four motors repeat them for the axes after the fourth.
         let motors = Motors::new((1 << self.devices.min(4)) - 1).unwrap_or_default();

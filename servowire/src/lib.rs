@@ -15,6 +15,7 @@ pub mod cnc;
 mod decode;
 pub mod event;
 pub mod fault;
+mod gcode;
 pub mod line;
 pub mod output;
 pub mod profile;

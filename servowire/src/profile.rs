@@ -3,13 +3,14 @@
 mod curves;
 mod drawing;
 mod motion;
+mod part;
 
 use std::error::Error;
 use std::fmt::Display;
 use std::fs;
 use std::io::{self, BufWriter, Write};
 use std::ops::Range;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use clap::{Args, ValueEnum};
@@ -18,23 +19,26 @@ use serde::Serialize;
 use step_profile::motion::Limits;
 use step_profile::{Arithmetic, Frequency, Parameters, Profile, RampStep, Speed, Tone};
 
+use crate::gcode::Part;
+
 /// Times of the steps of a move on a 4 us cycle.
 ///
 /// The sin² ramp and the integers of the 250 kHz motion controller of TIDEP0061: for every step the cycle of its pulse
 /// and the start of the pulse in that cycle. Without an output option a summary and a table of the ramp.
 ///
 /// With --shape trapezoid or s-curve the fastest move within --accel and --jerk; --compare sets all shapes side by side, at the
-/// same speed and peak acceleration.
+/// same speed and peak acceleration. With --gcode the steps of three axes along the path of a part program, each axis within
+/// --freq, --accel and --jerk (100 kHz, 400000 steps/s² and none).
 #[derive(Debug, Args)]
 pub struct Arguments {
     /// Step frequency at full speed, as 94570 or 94.57kHz.
-    #[arg(long, value_name = "HZ", value_parser = frequency, required_unless_present = "tone")]
+    #[arg(long, value_name = "HZ", value_parser = frequency, required_unless_present_any = ["tone", "gcode"])]
     freq: Option<Frequency>,
     /// A tone of Table 3 instead of a frequency: cis, E, fis, G, gis, A, H, cis2, D2, fis2.
     #[arg(long, value_name = "NAME", value_parser = tone, conflicts_with = "freq")]
     tone: Option<Tone>,
     /// Length of the move.
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", required_unless_present = "gcode", default_value_t = 0)]
     steps: u32,
     /// Steps that each of the 32 ramp entries lasts; 1, or what --accel allows.
     #[arg(long, value_name = "N", conflicts_with = "accel")]
@@ -57,6 +61,8 @@ pub struct Arguments {
     /// How cycles and sync_times are computed.
     #[arg(long, value_enum, default_value_t = Mode::Corrected)]
     arithmetic: Mode,
+    #[command(flatten)]
+    part: Part,
     /// A line a step, with a header.
     #[arg(long, group = "output")]
     csv: bool,
@@ -66,6 +72,9 @@ pub struct Arguments {
     /// Draw speed, acceleration and step time over time into this file.
     #[arg(long, group = "output", value_name = "OUT")]
     svg: Option<PathBuf>,
+    /// Write STEP and DIR of each axis of a part program as a VCD.
+    #[arg(long, group = "output", value_name = "OUT", requires = "gcode")]
+    vcd: Option<PathBuf>,
 }
 
 /// How the speed grows and falls.
@@ -94,6 +103,9 @@ impl Arguments {
     /// Does it. 0: done; 1: cannot write; 2: the move is not possible.
     pub(crate) fn run(&self) -> ExitCode {
         let out = &mut BufWriter::new(io::stdout().lock());
+        if let Some(path) = &self.part.gcode {
+            return self.follow(path, out);
+        }
         let done = if self.compare || self.shape != Shape::Sin2 {
             match self.moves() {
                 Ok(moves) => self.write_moves(&moves, out),
@@ -105,14 +117,23 @@ impl Arguments {
                 Err(e) => return wrong_use(&e),
             }
         };
-        match done {
-            Ok(()) => ExitCode::SUCCESS,
-            // The reader has seen enough.
-            Err(e) if is_broken_pipe(e.as_ref()) => ExitCode::SUCCESS,
-            Err(e) => {
-                eprintln!("error: cannot write: {e}");
-                ExitCode::FAILURE
-            }
+        written(done)
+    }
+
+    /// A part program.
+    fn follow(&self, path: &Path, out: &mut dyn Write) -> ExitCode {
+        let planned = || -> Result<_, Box<dyn Error>> {
+            let lines = Part::read(path)?;
+            let speed = self
+                .freq
+                .map_or(Part::SPEED, |frequency| (frequency.ratio().0 / u32::from(frequency.ratio().1)).max(1));
+            let limits = Limits::new(speed, self.accel.unwrap_or(Part::ACCELERATION))?;
+            let limits = self.jerk.map_or(Ok(limits), |jerk| limits.with_jerk(jerk))?;
+            Ok((lines.len(), self.part.steps(lines, limits)?))
+        };
+        match planned() {
+            Ok((lines, steps)) => written(part::write(self, lines, steps, out)),
+            Err(e) => wrong_use(&e),
         }
     }
 
@@ -193,6 +214,18 @@ impl Arguments {
             }
         }
         Ok(out.flush()?)
+    }
+}
+
+fn written(done: Result<(), Box<dyn Error>>) -> ExitCode {
+    match done {
+        Ok(()) => ExitCode::SUCCESS,
+        // The reader has seen enough.
+        Err(e) if is_broken_pipe(e.as_ref()) => ExitCode::SUCCESS,
+        Err(e) => {
+            eprintln!("error: cannot write: {e}");
+            ExitCode::FAILURE
+        }
     }
 }
 

@@ -83,6 +83,14 @@ servowire_core::errors! {
         /// An axis with 0 steps a metre.
         #[error("an axis with 0 steps a metre")]
         NoScale,
+        /// The ends of an arc are not on one circle, or it is too large.
+        #[error("an arc from a radius of {from} to one of {to}")]
+        ArcRadius {
+            /// Radius at its begin, in the caller's unit.
+            from: u32,
+            /// Radius at its end.
+            to: u32,
+        },
         /// A target lies outside the soft limits.
         #[error("target {target} is outside the soft limits")]
         SoftLimit {

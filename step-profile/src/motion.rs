@@ -1,5 +1,6 @@
 //! Motion that a machine can use: trapezoids and S-curves within limits of speed, acceleration and jerk, in integers.
 
+mod arc;
 mod cubic;
 mod curve;
 mod cycle;
@@ -14,6 +15,7 @@ mod real;
 mod slope;
 mod stepper;
 
+pub use arc::Arc;
 pub use cycle::{PtoMover, Reload, Reloads};
 pub use homing::{Homing, HomingConfig, HomingState};
 pub use limits::{Clock, Limits};

@@ -3,8 +3,13 @@
 //! A new kind of program is a variant of [`Program`] with its arm in [`Program::next`] and [`Program::is_over`]; nothing else
 //! in the machine knows what a program is.
 
+use std::collections::VecDeque;
+
 use sorte_proto::{Direction, Pto};
+use step_profile::motion::AxisPulse;
 use step_profile::{Axis, Command, Dance, Group, Motors, MoveState, Note, Parameters, Profile, Tone};
+
+use crate::gcode::{AXES, Steps};
 
 /// The tune of `--dance`: up and down the tones of Table 3, this project's own.
 const SONG: [Note; 16] = [
@@ -34,6 +39,8 @@ pub(super) enum Program {
     Independent { axes: Vec<(Axis<'static>, Profile<'static>, u32)>, done: u64, moves: u64 },
     /// The tune.
     Dance(Box<Dance<'static>>),
+    /// A part program: X, Y and Z are the first three axes.
+    Part(Box<Follower>),
 }
 
 impl Program {
@@ -50,6 +57,10 @@ impl Program {
         Self::Independent { axes, done: 0, moves }
     }
 
+    pub(super) fn part(steps: Steps) -> Self {
+        Self::Part(Box::new(Follower::new(steps)))
+    }
+
     pub(super) fn dance(motors: Motors, parameters: Parameters<'static>) -> Result<Self, step_profile::Error> {
         let direction = step_profile::Direction::Forward;
         Dance::new(motors, parameters, direction, &SONG).map(|dance| Self::Dance(Box::new(dance)))
@@ -59,6 +70,7 @@ impl Program {
     pub(super) fn next(&mut self, words: &mut [Pto]) {
         let commands = match self {
             Self::Dance(dance) => dance.tick(),
+            Self::Part(part) => return part.next(words),
             Self::Turns { group, profiles, steps, done, moves } => {
                 if group.state() == MoveState::Idle && done < moves {
                     let direction = step_profile::Direction::from_dir(*done % 2 == 1);
@@ -94,11 +106,58 @@ impl Program {
     pub(super) fn is_over(&self) -> bool {
         match self {
             Self::Dance(dance) => dance.is_over(),
+            Self::Part(part) => part.is_over(),
             Self::Turns { group, done, moves, .. } => done >= moves && group.state() == MoveState::Idle,
             Self::Independent { axes, done, moves } => {
                 done >= moves && axes.iter().all(|(axis, ..)| axis.state() == MoveState::Idle)
             }
         }
+    }
+}
+
+/// The steps of a part program, cycle by cycle.
+pub(super) struct Follower {
+    steps: Steps,
+    /// The first step that is not due yet.
+    next: Option<AxisPulse>,
+    /// Begin of the next cycle, in ns.
+    now: u64,
+    directions: [step_profile::Direction; AXES],
+    /// Steps of each axis that are due.
+    due: [VecDeque<AxisPulse>; AXES],
+}
+
+impl Follower {
+    fn new(mut steps: Steps) -> Self {
+        let (next, directions) = (steps.next(), [step_profile::Direction::default(); AXES]);
+        Self { steps, next, now: 0, directions, due: [const { VecDeque::new() }; AXES] }
+    }
+
+    /// At most one step of each axis; where a corner has two in a cycle the second one is in the next.
+    fn next(&mut self, words: &mut [Pto]) {
+        let begin = self.now;
+        self.now += u64::from(step_profile::CYCLE_NS);
+        while let Some(pulse) = self.next.filter(|pulse| pulse.tick < self.now) {
+            self.next = self.steps.next();
+            if let Some(due) = self.due.get_mut(usize::from(pulse.axis)) {
+                due.push_back(pulse);
+            }
+        }
+        for ((word, due), direction) in words.iter_mut().zip(&mut self.due).zip(&mut self.directions) {
+            let command = match due.pop_front() {
+                Some(pulse) => {
+                    *direction = pulse.direction;
+                    let sync_time = pulse.tick.saturating_sub(begin) as u32;
+                    Command::Pulse { direction: pulse.direction, sync_time }
+                }
+                None => Command::Hold { direction: *direction },
+            };
+            *word = self::word(command);
+        }
+    }
+
+    fn is_over(&self) -> bool {
+        self.next.is_none() && self.due.iter().all(VecDeque::is_empty)
     }
 }
 

@@ -1,0 +1,198 @@
+//! The steps of a part program: as a table, a line a step, a drawing, and wires.
+
+use std::error::Error;
+use std::fs::File;
+use std::io::{self, BufWriter, Write};
+use std::path::Path;
+
+use plotters::prelude::*;
+use step_profile::Direction;
+use step_profile::motion::AxisPulse;
+use vcd::{IdCode, TimescaleUnit, Value, Writer};
+
+use super::Arguments;
+use crate::gcode::{AXES, Steps};
+
+const NAMES: [&str; AXES] = ["X", "Y", "Z"];
+
+/// Length of a STEP pulse in a VCD, in ns.
+const PULSE_NS: u64 = 1000;
+
+/// What an axis has done.
+#[derive(Debug, Clone, Copy, Default)]
+struct Axis {
+    steps: u64,
+    position: i64,
+    last: Option<u64>,
+    /// The shortest time from step to step in one direction, in ns.
+    shortest: Option<u64>,
+}
+
+impl Axis {
+    fn add(&mut self, pulse: &AxisPulse) {
+        self.steps += 1;
+        self.position += if pulse.direction == Direction::Forward { 1 } else { -1 };
+        if let Some(last) = self.last {
+            let interval = pulse.tick - last;
+            self.shortest = Some(self.shortest.map_or(interval, |shortest| shortest.min(interval)));
+        }
+        self.last = Some(pulse.tick);
+    }
+}
+
+/// As the arguments ask for it.
+pub(super) fn write(
+    arguments: &Arguments,
+    lines: usize,
+    steps: Steps,
+    out: &mut dyn Write,
+) -> Result<(), Box<dyn Error>> {
+    if arguments.csv || arguments.json {
+        return rows(arguments.json, steps, out).map_err(Into::into);
+    }
+    let mut wires = arguments.vcd.as_deref().map(Wires::new).transpose()?;
+    let mut places = vec![(0.0, [0; AXES])];
+    let mut axes = [Axis::default(); AXES];
+    let mut steps = steps;
+    for pulse in steps.by_ref() {
+        let Some(axis) = axes.get_mut(usize::from(pulse.axis)) else { continue };
+        axis.add(&pulse);
+        if let Some(wires) = &mut wires {
+            wires.add(&pulse)?;
+        }
+        if arguments.svg.is_some() {
+            places.push((pulse.tick as f64 / 1e9, axes.map(|axis| axis.position)));
+        }
+    }
+    writeln!(out, "path    {lines} straight lines in {:.6} s", steps.end() as f64 / 1e9)?;
+    for (name, axis) in NAMES.iter().zip(&axes).filter(|(_, axis)| axis.steps > 0) {
+        let fastest = axis.shortest.map_or(0.0, |ns| 1e6 / ns as f64);
+        writeln!(out, "axis {name}  {} steps, at {} in the end, fastest {fastest:.3} kHz", axis.steps, axis.position)?;
+    }
+    if let Some(wires) = wires {
+        wires.finish()?;
+    }
+    if let Some(path) = &arguments.svg {
+        draw(path, &places).map_err(|e| format!("{}: {e}", path.display()))?;
+    }
+    Ok(out.flush()?)
+}
+
+fn rows(json: bool, steps: Steps, out: &mut dyn Write) -> io::Result<()> {
+    if !json {
+        writeln!(out, "time_ns,axis,position")?;
+    }
+    let mut axes = [Axis::default(); AXES];
+    for pulse in steps {
+        let at = usize::from(pulse.axis);
+        let (Some(axis), Some(name)) = (axes.get_mut(at), NAMES.get(at)) else { continue };
+        axis.add(&pulse);
+        let (time, position) = (pulse.tick, axis.position);
+        if json {
+            writeln!(out, "{{\"time_ns\":{time},\"axis\":\"{name}\",\"position\":{position}}}")?;
+        } else {
+            writeln!(out, "{time},{name},{position}")?;
+        }
+    }
+    out.flush()
+}
+
+/// The wires of an axis.
+struct Wire {
+    step: IdCode,
+    dir: IdCode,
+    direction: Option<Direction>,
+    /// When the last pulse is over.
+    falls: Option<u64>,
+}
+
+/// STEP and DIR of each axis.
+struct Wires {
+    to: Writer<BufWriter<File>>,
+    axes: Vec<Wire>,
+}
+
+impl Wires {
+    fn new(path: &Path) -> Result<Self, Box<dyn Error>> {
+        let file = File::create(path).map_err(|e| format!("{}: {e}", path.display()))?;
+        let mut to = Writer::new(BufWriter::new(file));
+        to.timescale(1, TimescaleUnit::NS)?;
+        to.add_module("axes")?;
+        let mut axes = Vec::new();
+        for name in NAMES {
+            let (step, dir) = (to.add_wire(1, &format!("{name}_step"))?, to.add_wire(1, &format!("{name}_dir"))?);
+            axes.push(Wire { step, dir, direction: None, falls: None });
+        }
+        to.upscope()?;
+        to.enddefinitions()?;
+        to.timestamp(0)?;
+        for wire in &axes {
+            to.change_scalar(wire.step, Value::V0)?;
+            to.change_scalar(wire.dir, Value::V0)?;
+        }
+        Ok(Self { to, axes })
+    }
+
+    /// Lets pulses end that are over before a time.
+    fn until(&mut self, time: u64) -> io::Result<()> {
+        while let Some(wire) = self.axes.iter_mut().min_by_key(|wire| wire.falls.unwrap_or(u64::MAX)) {
+            let Some(falls) = wire.falls.filter(|falls| *falls <= time) else { break };
+            self.to.timestamp(falls)?;
+            self.to.change_scalar(wire.step, Value::V0)?;
+            wire.falls = None;
+        }
+        Ok(())
+    }
+
+    fn add(&mut self, pulse: &AxisPulse) -> io::Result<()> {
+        self.until(pulse.tick)?;
+        let Some(wire) = self.axes.get_mut(usize::from(pulse.axis)) else { return Ok(()) };
+        self.to.timestamp(pulse.tick)?;
+        if wire.direction != Some(pulse.direction) {
+            wire.direction = Some(pulse.direction);
+            self.to.change_scalar(wire.dir, Value::from(pulse.direction.dir()))?;
+        }
+        self.to.change_scalar(wire.step, Value::V1)?;
+        wire.falls = Some(pulse.tick + PULSE_NS);
+        Ok(())
+    }
+
+    fn finish(mut self) -> io::Result<()> {
+        self.until(u64::MAX)?;
+        self.to.flush()
+    }
+}
+
+/// A place of the axes at a time in s.
+type Place = (f64, [i64; AXES]);
+
+/// The path on the left, the positions of the axes over time on the right.
+fn draw(path: &Path, places: &[Place]) -> Result<(), Box<dyn Error>> {
+    // A point a pixel is enough.
+    let every = (places.len() / 20_000).max(1);
+    let thin = || places.iter().step_by(every).chain(places.last());
+    let value = |place: &Place, axis: usize| place.1.get(axis).map_or(0.0, |steps| *steps as f64);
+    let range = |axis: usize| {
+        let values = || places.iter().map(|place| value(place, axis));
+        let (low, high) = (values().fold(0.0, f64::min), values().fold(0.0, f64::max));
+        let margin = (high - low).max(1.0) * 0.06;
+        low - margin..high + margin
+    };
+    let root = SVGBackend::new(path, (1200, 600)).into_drawing_area();
+    root.fill(&WHITE)?;
+    let (left, right) = root.split_horizontally(600);
+    let mut chart = ChartBuilder::on(&left);
+    let mut plane =
+        chart.margin(12).x_label_area_size(42).y_label_area_size(70).build_cartesian_2d(range(0), range(1))?;
+    plane.configure_mesh().max_light_lines(0).x_desc("X [steps]").y_desc("Y [steps]").draw()?;
+    plane.draw_series(LineSeries::new(thin().map(|place| (value(place, 0), value(place, 1))), BLUE.stroke_width(2)))?;
+    let end = places.last().map_or(1.0, |(time, _)| time.max(1e-9));
+    for (axis, (area, name)) in right.split_evenly((AXES, 1)).iter().zip(NAMES).enumerate() {
+        let mut chart = ChartBuilder::on(area);
+        chart.margin(12).x_label_area_size(42).y_label_area_size(70);
+        let mut curve = chart.build_cartesian_2d(0.0..end, range(axis))?;
+        curve.configure_mesh().max_light_lines(0).x_desc("time [s]").y_desc(format!("{name} [steps]")).draw()?;
+        curve.draw_series(LineSeries::new(thin().map(|place| (place.0, value(place, axis))), BLUE.stroke_width(2)))?;
+    }
+    Ok(root.present()?)
+}
