@@ -34,9 +34,10 @@ pub(super) fn status_of(ea: EncoderAddress, outcome: Result<Response, Error>) ->
 /// Reads one EEPROM word.
 ///
 /// The data of the first response are undetermined, and the memory is busy for up to 300 us ("Nikon Protocol Design"). So the
-/// whole request is sent again, and the data of a second response are used, if ES0 is clear in it. After a response
-/// that is missing or refused it is not known which one the next is: then another address is read first, so that the
-/// next response to this request is a first one for certain.
+/// whole request is sent again, and the data of a second response are used, if ES0 is clear in it. Which response is the
+/// first is not known where a read was broken off, by this controller before it started again or by another: then the
+/// response to the next request has the data of the old read, and that to the one after it is undetermined. So another
+/// address is read before, at the beginning and after a response that is missing or refused.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct EepromRead {
@@ -70,7 +71,7 @@ impl EepromRead {
     }
 
     const fn of(request: Request) -> Self {
-        Self { request, polling: READ_POLLING, discard_first: true, next: Next::First, tries: 0 }
+        Self { request, polling: READ_POLLING, discard_first: true, next: Next::Other, tries: 0 }
     }
 
     /// With another interval or number of tries.
@@ -78,9 +79,9 @@ impl EepromRead {
         Self { polling, ..self }
     }
 
-    /// Begins with another address, because the last read of this one has failed.
-    pub const fn after_a_failed_read(self) -> Self {
-        Self { next: Next::Other, ..self }
+    /// Begins with the address itself, because it is known that no read of it was broken off: two requests instead of three or four.
+    pub const fn knowing_that_none_was_broken_off(self) -> Self {
+        Self { next: Next::First, ..self }
     }
 
     /// Uses the data of the first response if ES0 is clear in it.
@@ -193,14 +194,15 @@ mod tests {
 
     #[test]
     fn the_first_data_are_not_used() {
-        let mut read = EepromRead::new(EA, 9);
+        let mut read = EepromRead::new(EA, 9).knowing_that_none_was_broken_off();
         let request = Request::new(EA, Operation::EepromRead { address: 9 });
         assert_eq!(read.start(5), Step::Send { request, not_before_ns: 5 });
         let again = Step::Send { request, not_before_ns: 300_100 };
         assert_eq!(read.receive(Ok(word(0, 0xdead)), 100), again);
         assert_eq!(read.receive(Ok(word(1, 0xdead)), 100), again);
         assert_eq!(read.receive(Ok(word(0, 7)), 100), Step::Done { value: 7, ready_ns: 100 });
-        let mut trusting = EepromRead::new(EA, 9).trusting_es0_of_the_first_response();
+        let mut trusting =
+            EepromRead::new(EA, 9).knowing_that_none_was_broken_off().trusting_es0_of_the_first_response();
         let _ = trusting.start(0);
         assert_eq!(trusting.receive(Ok(word(1, 0xdead)), 0), Step::Send { request, not_before_ns: 300_000 });
         let _ = trusting.start(0);
@@ -214,7 +216,7 @@ mod tests {
         let again = |address| Step::Send { request: request(address), not_before_ns: 300_000 };
         let other = Response { body: word(0, 1).body, ..word(0, 1) };
         for bad in [Err(Error::NoResponse), Ok(word_of(0, 5, 8)), Ok(Response { ea: EncoderAddress::MAX, ..other })] {
-            let mut read = EepromRead::new(EA, 9);
+            let mut read = EepromRead::new(EA, 9).knowing_that_none_was_broken_off();
             let _ = read.start(0);
             assert_eq!(read.receive(Ok(word(0, 0xdead)), 0), again(9));
             assert_eq!(read.receive(bad, 0), again(8));
@@ -226,9 +228,29 @@ mod tests {
         }
     }
 
+    /// A controller that starts again does not know what it was doing: a read of another address ends what is open.
+    #[test]
+    fn another_address_is_read_before() {
+        let mut read = EepromRead::new(EA, 9);
+        let request = |address| Request::new(EA, Operation::EepromRead { address });
+        assert_eq!(read.start(5), Step::Send { request: request(8), not_before_ns: 5 });
+        let own = Step::Send { request: request(9), not_before_ns: 300_000 };
+        assert_eq!(read.receive(Ok(word_of(0, 0xbad, 8)), 0), own);
+        assert_eq!(read.receive(Ok(word(0, 0xdead)), 0), own);
+        assert_eq!(read.receive(Ok(word(0, 7)), 0), Step::Done { value: 7, ready_ns: 0 });
+        // The same machine knows how its last read ended.
+        assert_eq!(read.start(5), Step::Send { request: request(9), not_before_ns: 5 });
+        let bank = Operation::EepromReadBank { bank: 3, address: 0x41 };
+        let other = Request::new(EA, Operation::EepromReadBank { bank: 3, address: 0x40 });
+        assert_eq!(EepromRead::of_bank(EA, 3, 0x41).start(1), Step::Send { request: other, not_before_ns: 1 });
+        assert_eq!(EepromRead::of_bank(EA, 3, 0x41).request.operation, bank);
+    }
+
     #[test]
     fn reading_is_bounded_and_a_wrong_bank_ends_it() {
-        let mut read = EepromRead::new(EA, 9).with_polling(Polling { max_tries: 3, ..READ_POLLING });
+        let mut read = EepromRead::new(EA, 9)
+            .knowing_that_none_was_broken_off()
+            .with_polling(Polling { max_tries: 3, ..READ_POLLING });
         let _ = read.start(0);
         let _ = read.receive(Ok(word(1, 0)), 0);
         let _ = read.receive(Ok(word(1, 0)), 0);
