@@ -63,6 +63,15 @@ impl Abs40 {
     }
 
     /// The 72 line bits of the response to the command that `expected` names.
+    ///
+    /// ```
+    /// use nikon_aformat::{Abs40, BitOrder, Command, EncoderAddress, EncoderStatus, Expected, Layout, U40};
+    /// let expected = Expected::new(Layout::Abs40, Command::Abs40);
+    /// let abs = U40::truncate(0x12_3456_789a);
+    /// let sent = Abs40 { ea: EncoderAddress::ZERO, es: EncoderStatus::empty(), abs };
+    /// let line = sent.emit_line(BitOrder::MsbFirst, &expected);
+    /// assert_eq!(Abs40::parse_line(&expected, &line, BitOrder::MsbFirst), Ok(sent));
+    /// ```
     pub fn emit_line(self, order: BitOrder, expected: &Expected) -> [u8; Self::LINE_BYTES] {
         let head = u128::from(SYNC_CODE) | u128::from(self.ea.get()) << 3 | u128::from(expected.command().code()) << 6;
         let payload = head | u128::from(self.es.bits() & 0xf) << 12 | u128::from(self.abs.get()) << 16;

@@ -7,7 +7,7 @@
 mod common;
 
 use common::exchanges::Setup;
-use common::line::{events, first_seed, rates};
+use common::line::{USUAL_EVENTS, events, first_seed, rates};
 use common::procedures::{Shown, addresses_by_id, addresses_by_wire, detections, eeprom_reads, writes, zero_presets};
 use common::switches::{Switches, assert_all_drawn};
 use nikon_aformat::BitRate;
@@ -32,7 +32,7 @@ fn seeds(ends: &[&str], run: impl Fn(&Setup, &mut Shown)) {
     println!("{:?}\n{:?}\n{}", shown.ends, shown.mix, shown.tally);
     assert_all_drawn(&shown.mix);
     for end in ends {
-        assert!(shown.ends.contains_key(*end), "{end} never happened");
+        assert!(events() < USUAL_EVENTS || shown.ends.contains_key(*end), "{end} never happened");
     }
 }
 

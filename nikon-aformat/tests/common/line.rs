@@ -14,9 +14,12 @@ pub struct Handed {
     pub end_ns: u64,
 }
 
-/// Events of a run: 100,000, or as many as the environment says.
+/// Events of a run, unless the environment says another number.
+pub const USUAL_EVENTS: u64 = 100_000;
+
+/// Events of this run.
 pub fn events() -> u64 {
-    std::env::var("HOSTILE_EVENTS").ok().and_then(|text| text.parse().ok()).unwrap_or(100_000)
+    std::env::var("HOSTILE_EVENTS").ok().and_then(|text| text.parse().ok()).unwrap_or(USUAL_EVENTS)
 }
 
 /// The first seed: 0, or what the environment says.
@@ -177,6 +180,10 @@ impl<const N: usize> Bench<N> {
         let asked_ns =
             response.answers.and_then(|id| self.world.truth().transmission(id)).map_or(0, |sent| sent.end_ns);
         let within = |(since, end, _): &&(u64, u64, usize)| *since <= response.start_ns && response.start_ns < *end;
+        // A frame that was repeated and lost once leaves a gap as long as itself.
+        if response.end_ns - response.start_ns >= (response.units as u64 + 1) * frame_ns(self.rate) {
+            return true;
+        }
         if response.longest_idle(18) as u64 * bit_ps(self.rate) > idle_ns(self.rate) * 1000 {
             return true;
         }

@@ -5,6 +5,8 @@ use std::collections::BTreeMap;
 use nikon_aformat::bus::Addresses;
 use nikon_aformat::device::Behaviour;
 
+use super::line::{USUAL_EVENTS, events};
+
 /// One setting of all open points.
 #[derive(Debug, Clone, Copy)]
 pub struct Switches(u64);
@@ -133,7 +135,10 @@ pub enum Order {
     Descending,
 }
 
-/// Every setting of every point was drawn.
+/// Every setting of every point was drawn, in a run of the usual length or a longer one.
 pub fn assert_all_drawn(mix: &Mix) {
+    if events() < USUAL_EVENTS {
+        return;
+    }
     assert_eq!(mix.len(), 4 + 2 + 4 + 2 + 3 + 2 + 2 + 2, "{mix:?}");
 }
