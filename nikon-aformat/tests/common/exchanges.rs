@@ -93,9 +93,12 @@ fn judge<const N: usize>(bench: &Bench<N>, id: Id, value: u64, shown: &mut Shown
 }
 
 /// Law 4: no encoder speaks at `ready_ns` or later that began in time, which for the last of `places` on a bus is as many
-/// longest responses and pauses later.
+/// longest responses and pauses later. A request that the line repeats is answered twice.
 fn line_is_free<const N: usize>(bench: &Bench<N>, id: Id, at_ns: u64, ready_ns: u64, places: u64, seed: u64) {
     let truth = bench.world.truth();
+    if truth.transmission(id).is_none_or(|sent| sent.end_ns > sent.sent_ns) {
+        return;
+    }
     let longest_ns = |units: u64| units * frame_ns(bench.rate) + (units - 1) * idle_ns(bench.rate);
     let places_ns = (places - 1) * (longest_ns(4) + between_ns(bench.rate));
     let last_ns = at_ns + frame_ns(bench.rate) + TIMEOUT_NS + places_ns;
