@@ -45,6 +45,7 @@ pub const TARGETS: &[(&str, Target)] = &[
     ("nikon_master", nikon::master),
     ("nikon_device", nikon::device),
     ("nikon_inspect", nikon::inspect),
+    ("nikon_world", nikon::world::hostile),
     ("nrz_receiver", nrz_line::receiver),
     ("rtex_block", rtex::block),
     ("rtex_drive", rtex::drive),

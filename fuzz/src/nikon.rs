@@ -1,5 +1,7 @@
 //! A-format.
 
+pub mod world;
+
 use nikon_aformat::bus::{Addresses, Bus};
 use nikon_aformat::device::{Device, Encoders};
 use nikon_aformat::inspect::inspect as report;

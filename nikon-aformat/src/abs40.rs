@@ -2,10 +2,9 @@ use core::fmt;
 
 use nrz_line::{BitOrder, Window};
 
-use crate::crc::mirrored8;
+use crate::contents::sound_four;
 use crate::error::Error;
 use crate::expected::{Expected, SYNC_CODE};
-use crate::frame::{DELIMITER, START};
 use crate::layout::Layout;
 use crate::number::{EncoderAddress, U40};
 use crate::raw_response::RawResponse;
@@ -29,18 +28,6 @@ pub struct Abs40 {
     pub abs: U40,
 }
 
-/// The start bits and delimiters of four frames, and what they have to be, in the three words of a 32-bit core.
-const FRAMING: [u32; 3] = words((START | DELIMITER) & ALL);
-const FRAMED: [u32; 3] = words(DELIMITER & ALL);
-const ALL: u128 = (1 << 72) - 1;
-
-/// The 72 lowest bits in the three words of a 32-bit core.
-#[inline(always)]
-#[expect(clippy::cast_possible_truncation, reason = "the number is taken apart")]
-pub(crate) const fn words(bits: u128) -> [u32; 3] {
-    [bits as u32, (bits >> 32) as u32, (bits >> 64) as u32]
-}
-
 impl Abs40 {
     /// Bytes that hold the line bits of the response.
     pub const LINE_BYTES: usize = 9;
@@ -54,51 +41,37 @@ impl Abs40 {
     /// As [`Response::parse_line`](crate::Response::parse_line).
     #[inline(always)]
     pub fn parse_line(expected: &Expected, line: &[u8; Self::LINE_BYTES], order: BitOrder) -> Result<Self, Error> {
-        match Self::of_words(expected, load(line, order)) {
+        match Self::of_line(expected, load(line, order)) {
             Some(value) => Ok(value),
             None => Err(refusal(expected, line, order)),
         }
     }
 
-    /// The line bits as three words, the first bit in bit 0 of the first; `None` if any check fails.
+    /// From four words of line bits, the first bit in bit 0 of the first; `None` if any check fails.
     #[inline(always)]
-    pub(crate) fn of_words(expected: &Expected, [w0, w1, w2]: [u32; 3]) -> Option<Self> {
-        let ([m0, m1, m2], [f0, f1, f2]) = (FRAMING, FRAMED);
-        let framing = (w0 & m0 ^ f0) | (w1 & m1 ^ f1) | (w2 & m2 ^ f2);
-        let b = [
-            byte(w0 >> 1),
-            byte(w0 >> 9),
-            byte(w0 >> 19),
-            byte(w0 >> 27 | w1 << 5),
-            byte(w1 >> 5),
-            byte(w1 >> 13),
-            byte(w1 >> 23),
-            byte(w1 >> 31 | w2 << 1),
-        ];
+    fn of_line(expected: &Expected, line: u128) -> Option<Self> {
+        let (contents, wrong) = sound_four(line);
         // All checks at once: a branch for each would cost more than it saves.
-        Self::of_bytes(expected, b, framing)
-    }
-
-    /// From the content bits of the four frames; `None` if any check fails.
-    #[inline(always)]
-    pub(crate) fn of_contents(expected: &Expected, [c0, c1, c2, c3]: [u16; 4]) -> Option<Self> {
-        let ([b0, b1], [b2, b3]) = (c0.to_le_bytes(), c1.to_le_bytes());
-        let ([b4, b5], [b6, b7]) = (c2.to_le_bytes(), c3.to_le_bytes());
-        Self::of_bytes(expected, [b0, b1, b2, b3, b4, b5, b6, b7], 0)
-    }
-
-    #[inline(always)]
-    fn of_bytes(expected: &Expected, bytes: [u8; 8], framing: u32) -> Option<Self> {
-        let [b0, b1, b2, b3, b4, b5, b6, _] = bytes;
-        let first = expected.differs_first(u16::from_le_bytes([b0, b1]));
-        if framing | u32::from(mirrored8(bytes)) | u32::from(first) != 0 {
+        if wrong | expected.differs(contents) != 0 {
             return None;
         }
-        let (ea, es) = (EncoderAddress::truncate(b0 >> 3), EncoderStatus::from_bits_truncate(b1 >> 4));
+        let [p0, p1, _] = contents;
+        let [_, b1, b2, b3] = p0.to_le_bytes();
+        let [b4, b5, b6, _] = p1.to_le_bytes();
+        let (ea, es) = (EncoderAddress::truncate(low_byte(p0 >> 3)), EncoderStatus::from_bits_truncate(b1 >> 4));
         Some(Self { ea, es, abs: U40::from_le_bytes([b2, b3, b4, b5, b6]) })
     }
 
     /// The 72 line bits of the response to the command that `expected` names.
+    ///
+    /// ```
+    /// use nikon_aformat::{Abs40, BitOrder, Command, EncoderAddress, EncoderStatus, Expected, Layout, U40};
+    /// let expected = Expected::new(Layout::Abs40, Command::Abs40);
+    /// let abs = U40::truncate(0x12_3456_789a);
+    /// let sent = Abs40 { ea: EncoderAddress::ZERO, es: EncoderStatus::empty(), abs };
+    /// let line = sent.emit_line(BitOrder::MsbFirst, &expected);
+    /// assert_eq!(Abs40::parse_line(&expected, &line, BitOrder::MsbFirst), Ok(sent));
+    /// ```
     pub fn emit_line(self, order: BitOrder, expected: &Expected) -> [u8; Self::LINE_BYTES] {
         let head = u128::from(SYNC_CODE) | u128::from(self.ea.get()) << 3 | u128::from(expected.command().code()) << 6;
         let payload = head | u128::from(self.es.bits() & 0xf) << 12 | u128::from(self.abs.get()) << 16;
@@ -110,21 +83,21 @@ impl Abs40 {
     }
 }
 
-/// The line bits as three words, the first bit in bit 0 of the first.
+/// The line bits, the first in bit 0.
 #[inline(always)]
-fn load(line: &[u8; Abs40::LINE_BYTES], order: BitOrder) -> [u32; 3] {
+fn load(line: &[u8; Abs40::LINE_BYTES], order: BitOrder) -> u128 {
     let mut word = [0; 16];
     if let Some(head) = word.first_chunk_mut() {
         *head = *line;
     }
-    words(match order {
+    match order {
         BitOrder::LsbFirst => u128::from_le_bytes(word),
         BitOrder::MsbFirst => u128::from_be_bytes(word).reverse_bits(),
-    })
+    }
 }
 
 #[expect(clippy::cast_possible_truncation, reason = "the low eight bits are meant")]
-const fn byte(word: u32) -> u8 {
+const fn low_byte(word: u32) -> u8 {
     word as u8
 }
 

@@ -140,8 +140,10 @@ pub struct Bus {
     expected: Expected,
     asked: Addresses,
     good: [Option<Response>; 8],
+    heard: Addresses,
     doubled: Addresses,
-    arrived: u8,
+    /// Good responses from addresses that had been heard already.
+    repeated: u8,
     damaged: u8,
 }
 
@@ -149,7 +151,15 @@ impl Bus {
     /// Responses of this kind are expected from these addresses.
     pub const fn new(expected: Expected, asked: Addresses) -> Self {
         let expected = expected.any_address();
-        Self { expected, asked, good: [None; 8], doubled: Addresses::NONE, arrived: 0, damaged: 0 }
+        Self {
+            expected,
+            asked,
+            good: [None; 8],
+            heard: Addresses::NONE,
+            doubled: Addresses::NONE,
+            repeated: 0,
+            damaged: 0,
+        }
     }
 
     /// A response has arrived, or was cut or broken.
@@ -158,23 +168,25 @@ impl Bus {
     }
 
     /// A response has arrived as words, the content bits of one frame each.
+    #[inline(always)]
     pub fn push_words(&mut self, words: &[u16], order: BitOrder) -> Arrival {
         self.take(Response::parse_words(&self.expected, words, order))
     }
 
     /// A response that was judged already.
+    #[inline(always)]
     pub(crate) fn take(&mut self, outcome: Result<Response, Error>) -> Arrival {
-        self.arrived = self.arrived.saturating_add(1);
         let (mut duplicate, mut extra) = (false, false);
         match outcome {
             Ok(response) => {
                 extra = !self.asked.has(response.ea);
-                if let Some(place) = self.good.get_mut(usize::from(response.ea.get())) {
-                    duplicate = place.is_some();
-                    *place = place.or(Some(response));
-                }
+                duplicate = self.heard.has(response.ea);
                 if duplicate {
+                    self.repeated = self.repeated.saturating_add(1);
                     self.doubled = self.doubled.with(response.ea);
+                } else if let Some(place) = self.good.get_mut(usize::from(response.ea.get() & 7)) {
+                    *place = Some(response);
+                    self.heard = self.heard.with(response.ea);
                 }
             }
             Err(_) => self.damaged = self.damaged.saturating_add(1),
@@ -207,8 +219,8 @@ impl Bus {
     }
 
     /// The addresses that were asked and sent nothing good.
-    pub fn missing(&self) -> Addresses {
-        self.select(|answer| answer == Outcome::Missing)
+    pub const fn missing(&self) -> Addresses {
+        self.asked.without(self.heard)
     }
 
     /// The addresses that sent two good responses or more.
@@ -217,14 +229,13 @@ impl Bus {
     }
 
     /// The addresses that sent a good response and were not asked.
-    pub fn extra(&self) -> Addresses {
-        let good = self.select(|answer| matches!(answer, Outcome::Extra(_) | Outcome::Duplicate { .. }));
-        good.without(self.asked)
+    pub const fn extra(&self) -> Addresses {
+        self.heard.without(self.asked)
     }
 
     /// Responses that arrived, good or not.
     pub const fn arrived(&self) -> u8 {
-        self.arrived
+        self.heard.len().saturating_add(self.repeated).saturating_add(self.damaged)
     }
 
     /// Responses that were refused; their address cannot be trusted.
@@ -234,16 +245,12 @@ impl Bus {
 
     /// How many fewer responses arrived than were asked for, good or not: so many never started.
     pub const fn not_started(&self) -> u8 {
-        self.asked.len().saturating_sub(self.arrived)
+        self.asked.len().saturating_sub(self.arrived())
     }
 
     /// Whether every address that was asked has sent a good response.
-    pub fn heard_all(&self) -> bool {
+    pub const fn heard_all(&self) -> bool {
         self.missing().is_empty()
-    }
-
-    fn select(&self, wanted: impl Fn(Outcome) -> bool) -> Addresses {
-        EncoderAddress::ALL.into_iter().filter(|ea| wanted(self.of(*ea))).fold(Addresses::NONE, Addresses::with)
     }
 }
 

@@ -2,7 +2,6 @@ use core::fmt;
 
 use servowire_core::U24;
 
-use crate::frame::MAX_FRAMES;
 use crate::layout::Layout;
 use crate::number::{EncoderId, U19, U40};
 use crate::status::{Alm, PmAlm};
@@ -64,45 +63,6 @@ impl Data {
             Self::Abs24VelAcc { .. } => Layout::Abs24VelAcc,
             Self::Abs40Vel { .. } => Layout::Abs40Vel,
         }
-    }
-
-    /// The data of a layout out of the content bits of its frames; `None` for [`Layout::Abs17`]. On a 32-bit core each field is
-    /// a shift or two.
-    #[inline(always)]
-    #[expect(clippy::cast_possible_truncation, clippy::cast_possible_wrap, reason = "fields are cut out of words")]
-    pub(crate) const fn from_contents(layout: Layout, contents: [u16; MAX_FRAMES as usize]) -> Option<Self> {
-        let [_, c1, c2, c3, c4, c5] = contents;
-        // Data bits 0..=31, from 24 and from 56.
-        let low = c1 as u32 | (c2 as u32) << 16;
-        let behind_24 = c2 as u32 >> 8 | (c3 as u32) << 8 | (c4 as u32) << 24;
-        let behind_56 = c4 >> 8 | c5 << 8;
-        let abs = U24::truncate(low);
-        let (velocity, word) = (behind_24 as i32, behind_24 as u16);
-        Some(match layout {
-            Layout::Abs17 => return None,
-            Layout::Abs40 => Self::Abs40 { abs: U40::truncate(low as u64 | (c3 as u64) << 32) },
-            Layout::Abs24 => Self::Abs24 { abs },
-            Layout::Abs24High => Self::Abs24High { abs },
-            Layout::Status => {
-                Self::Status { alm: Alm::from_bits_retain(c1), pm_alm: PmAlm::from_bits_retain(c2 as u8) }
-            }
-            Layout::Eeprom => Self::Eeprom { data: c1, address: c2 as u8 },
-            Layout::EepromBank => {
-                Self::EepromBank { data: c1, bank: c2 as u8, address: (c2 >> 8) as u8, bank_error: c3 & 1 == 1 }
-            }
-            Layout::Temperature => Self::Temperature { temperature: Temperature::from_eeprom(c1) },
-            Layout::Id => Self::Id { id: EncoderId::truncate(low) },
-            Layout::Coefficient => Self::Coefficient { coefficient: U19::truncate(low) },
-            Layout::Abs24Status => Self::Abs24Status { abs, alm: Alm::from_bits_retain(word) },
-            Layout::Abs24Temp => Self::Abs24Temp { abs, temperature: Temperature::from_eeprom(word) },
-            Layout::Abs24Vel => Self::Abs24Vel { abs, velocity },
-            Layout::Abs24VelAcc => Self::Abs24VelAcc { abs, velocity, acceleration: behind_56 as i16 },
-            Layout::Abs40Vel => {
-                let velocity = c3 as u32 >> 8 | (c4 as u32) << 8 | (c5 as u32) << 24;
-                let abs = U40::truncate(low as u64 | (c3 as u64) << 32);
-                Self::Abs40Vel { abs, velocity: velocity as i32 }
-            }
-        })
     }
 
     /// The data bits, the first of the line in bit 0; unused ones are 0.

@@ -5,8 +5,8 @@
 //! busy times are its own. Faults can be switched on to see what a master makes of them.
 //!
 //! What the documents leave open is a [`Behaviour`]. A damaged request, a command of a later version and a write to the
-//! maker's addresses are not answered. A reset takes effect with the eighth request in succession, and any other request on
-//! the line starts the count again; the responses of other encoders do not. While the encoder is busy, writes are repeated in
+//! maker's addresses are not answered. A reset takes effect with the eighth request in succession; the responses of other
+//! encoders do not start the count again. While the encoder is busy, writes are repeated in
 //! the response but not done. The EEPROM without bank is bank 0.
 //!
 //! ```
@@ -28,7 +28,7 @@ mod behaviour;
 mod encoders;
 mod memory;
 
-pub use behaviour::{Behaviour, Ea, Shows};
+pub use behaviour::{Behaviour, Ea, Restart, Shows};
 pub use encoders::Encoders;
 
 use nrz_line::Window;
@@ -134,7 +134,7 @@ impl<const BANKS: usize> Device<BANKS> {
     /// An encoder at position 0 without alarms, 25 degrees warm, with the type word of its resolution.
     pub const fn new(ea: EncoderAddress, resolution: Resolution, rate: BitRate) -> Self {
         let mut memory = Memory::new();
-        memory.set(0, TypeWord::EEPROM_ADDRESS, type_word(resolution).0);
+        memory.set(0, TypeWord::EEPROM_ADDRESS, TypeWord::of(resolution).0);
         Self {
             ea,
             resolution,
@@ -180,6 +180,11 @@ impl<const BANKS: usize> Device<BANKS> {
         self.acceleration = acceleration;
     }
 
+    /// The velocity coefficient of version 3.0.
+    pub const fn coefficient(&self) -> U19 {
+        self.coefficient
+    }
+
     /// The temperature, which EEPROM word 0xf9 shows too.
     pub const fn set_temperature(&mut self, temperature: Temperature) {
         self.temperature = temperature;
@@ -187,6 +192,11 @@ impl<const BANKS: usize> Device<BANKS> {
     }
 
     /// The identification code.
+    pub const fn id(&self) -> EncoderId {
+        self.id
+    }
+
+    /// Sets the identification code.
     pub const fn set_id(&mut self, id: EncoderId) {
         self.id = id;
     }
@@ -284,8 +294,10 @@ impl<const BANKS: usize> Device<BANKS> {
     /// The rest of a damaged request is not judged, and the count of a reset starts again.
     fn misheard(&mut self) {
         self.deaf_ns = Some(self.rate.bits_ns(FRAME_BITS).saturating_add(MAX_FRAME_GAP_NS));
-        self.repeated = None;
-        self.repeats = 0;
+        if self.behaviour.restart == Restart::Any {
+            self.repeated = None;
+            self.repeats = 0;
+        }
         self.len = 0;
     }
 
@@ -378,6 +390,9 @@ impl<const BANKS: usize> Device<BANKS> {
 
     /// Counts how often the same request came in succession.
     fn count(&mut self, request: Request) {
+        if self.behaviour.restart == Restart::Own && !self.is_meant(request) {
+            return;
+        }
         if self.repeated != Some(request) {
             self.repeats = 0;
         }
@@ -472,21 +487,4 @@ impl<const BANKS: usize> Device<BANKS> {
         let wait = self.behaviour.turn_around_ns.saturating_add(slot_ns.saturating_mul(slot.into()));
         Some(Transmission { raw, line: line?, at_ns: now_ns.saturating_add(wait.into()) })
     }
-}
-
-/// The type word of an encoder with these widths; for widths that have no code, an unknown one.
-const fn type_word(resolution: Resolution) -> TypeWord {
-    let code = match resolution.st_bits() {
-        17 => 0,
-        20 => 1,
-        22 => 2,
-        24 => 3,
-        _ => 7,
-    };
-    let multiturn = match resolution.mt_bits() {
-        0 => 0,
-        16 => 2,
-        _ => 3,
-    };
-    TypeWord(code | multiturn << 3)
 }

@@ -1,5 +1,5 @@
 use crate::command::Command;
-use crate::data::Data;
+use crate::contents::Contents;
 use crate::error::{EchoField, Error};
 use crate::frame::truncated;
 use crate::layout::{FRAME_BITS, Layout};
@@ -115,7 +115,25 @@ impl Expected {
         self.ea
     }
 
+    /// Frames of the response.
+    #[inline(always)]
+    pub(crate) const fn frames(&self) -> u8 {
+        self.layout.frames()
+    }
+
     /// The known bits of the first frame that are wrong.
+    #[inline(always)]
+    pub(crate) const fn differs(&self, [first, ..]: Contents) -> u32 {
+        first & self.mask as u32 ^ self.value as u32
+    }
+
+    /// The content bits, if the CRC-8 leaves no remainder and the known bits of the first frame are right: one branch for both.
+    #[inline(always)]
+    pub(crate) const fn fitting(&self, contents: Contents, crc: u32) -> Option<Contents> {
+        if crc | self.differs(contents) == 0 { Some(contents) } else { None }
+    }
+
+    /// The same of the first frame alone.
     #[inline(always)]
     pub(crate) const fn differs_first(&self, content: u16) -> u16 {
         content & self.mask ^ self.value
@@ -153,29 +171,28 @@ impl Expected {
         }
     }
 
-    /// Bank error and repeated arguments.
-    pub(crate) fn check_memory(&self, data: Data) -> Result<(), Error> {
-        if let Data::EepromBank { bank_error: true, .. } = data {
-            return Err(Error::BankError);
+    /// Whether an EEPROM response repeats what was sent, in the order address, bank, data. A response without bank to a
+    /// request with one has nothing to compare.
+    #[inline(always)]
+    pub(crate) fn check_eeprom(&self, data: u16, bank: Option<u8>, address: u8) -> Result<(), Error> {
+        let Echo::Eeprom { address: want, bank: bank_want, data: data_want } = self.echo else { return Ok(()) };
+        same(EchoField::Address, address, want)?;
+        if let (Some(got), Some(want)) = (bank, bank_want) {
+            same(EchoField::Bank, got, want)?;
         }
-        match (self.echo, data) {
-            (Echo::Eeprom { address, bank, data }, Data::Eeprom { address: a, data: d }) => {
-                same(EchoField::Address, a, address)?;
-                // A response without bank to a request with one: nothing to compare.
-                let _ = bank;
-                data.map_or(Ok(()), |want| same(EchoField::Data, d, want))
-            }
-            (Echo::Eeprom { address, bank, data }, Data::EepromBank { address: a, bank: b, data: d, .. }) => {
-                same(EchoField::Address, a, address)?;
-                bank.map_or(Ok(()), |want| same(EchoField::Bank, b, want))?;
-                data.map_or(Ok(()), |want| same(EchoField::Data, d, want))
-            }
-            (Echo::Id(want), Data::Id { id }) => same(EchoField::Id, id, want),
-            (Echo::Coefficient(want), Data::Coefficient { coefficient }) => {
-                same(EchoField::Coefficient, coefficient, want)
-            }
-            _ => Ok(()),
-        }
+        data_want.map_or(Ok(()), |want| same(EchoField::Data, data, want))
+    }
+
+    /// Whether an identification code is the one that was sent.
+    #[inline(always)]
+    pub(crate) fn check_id(&self, id: EncoderId) -> Result<(), Error> {
+        if let Echo::Id(want) = self.echo { same(EchoField::Id, id, want) } else { Ok(()) }
+    }
+
+    /// Whether a velocity coefficient is the one that was sent.
+    #[inline(always)]
+    pub(crate) fn check_coefficient(&self, coefficient: U19) -> Result<(), Error> {
+        if let Echo::Coefficient(want) = self.echo { same(EchoField::Coefficient, coefficient, want) } else { Ok(()) }
     }
 }
 

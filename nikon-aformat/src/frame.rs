@@ -2,6 +2,7 @@ use core::fmt;
 
 use nrz_line::{BitOrder, Window};
 
+use crate::contents::{apart, framed};
 use crate::crc::crc3;
 use crate::error::Error;
 use crate::layout::FRAME_BITS;
@@ -127,7 +128,7 @@ impl RequestFrame {
     /// # Errors
     /// [`Error::Truncated`], [`Error::StartBit`], [`Error::Delimiter`], then as [`from_content`](Self::from_content).
     pub fn from_line(line: Window) -> Result<Self, Error> {
-        let [content, ..] = contents(line, 1)?;
+        let [content, ..] = apart(framed(1, &line).ok_or_else(|| framing(line, 1))?);
         Self::from_content(content)
     }
 
@@ -206,60 +207,6 @@ const fn mirror3(bits: u8) -> u8 {
     (bits & 7).reverse_bits() >> 5
 }
 
-/// What holds for the line bits of the first frames, in the words of a 32-bit core.
-#[derive(Clone, Copy)]
-struct Masks {
-    within: [u32; 4],
-    framing: [u32; 4],
-    delimiters: [u32; 4],
-}
-
-/// By the number of frames.
-static MASKS: [Masks; MAX_FRAMES as usize + 1] = [masks(0), masks(1), masks(2), masks(3), masks(4), masks(5), masks(6)];
-
-const fn masks(frames: u32) -> Masks {
-    let within = match 1_u128.checked_shl(frames.wrapping_mul(FRAME_BITS)) {
-        Some(one) => one.wrapping_sub(1),
-        None => u128::MAX,
-    };
-    Masks { within: words(within), framing: words((START | DELIMITER) & within), delimiters: words(DELIMITER & within) }
-}
-
-#[inline(always)]
-#[expect(clippy::cast_possible_truncation, reason = "the number is taken apart")]
-const fn words(bits: u128) -> [u32; 4] {
-    [bits as u32, (bits >> 32) as u32, (bits >> 64) as u32, (bits >> 96) as u32]
-}
-
-/// The content bits of the first `frames` frames of a line, back to back, after the length and framing checks.
-pub(crate) fn contents(line: Window, frames: u32) -> Result<[u16; MAX_FRAMES as usize], Error> {
-    let bits = frames.wrapping_mul(FRAME_BITS);
-    let (Some(masks), true) = (MASKS.get(frames as usize), line.len() >= bits) else {
-        return Err(truncated(line.len(), bits));
-    };
-    let ([w0, w1, w2, w3], [f0, f1, f2, f3]) = (words(line.bits()), masks.framing);
-    let [d0, d1, d2, d3] = masks.delimiters;
-    if (w0 & f0 ^ d0) | (w1 & f1 ^ d1) | (w2 & f2 ^ d2) | (w3 & f3 ^ d3) != 0 {
-        return Err(framing(line, frames));
-    }
-    let [i0, i1, i2, i3] = masks.within;
-    Ok(unpack([w0 & i0, w1 & i1, w2 & i2, w3 & i3]))
-}
-
-/// The content bits of six frames, each with a constant shift.
-#[inline(always)]
-#[expect(clippy::cast_possible_truncation, reason = "each shift brings a frame's content bits to bits 0..=15")]
-const fn unpack([w0, w1, w2, w3]: [u32; 4]) -> [u16; MAX_FRAMES as usize] {
-    [
-        (w0 >> 1) as u16,
-        (w0 >> 19 | w1 << 13) as u16,
-        (w1 >> 5) as u16,
-        (w1 >> 23 | w2 << 9) as u16,
-        (w2 >> 9) as u16,
-        (w2 >> 27 | w3 << 5) as u16,
-    ]
-}
-
 /// The line bits of six frames.
 pub(crate) const fn pack(content: [u16; MAX_FRAMES as usize]) -> u128 {
     let [c0, c1, c2, c3, c4, c5] = content;
@@ -278,10 +225,14 @@ pub(crate) fn truncated(got: u32, want: u32) -> Error {
     Error::Truncated { got: narrow(got), want: narrow(want) }
 }
 
-/// Off the hot path: names the first framing fault of a line that holds `frames` frames.
+/// Off the hot path: why a line does not hold `frames` frames.
 #[cold]
-pub(crate) fn framing(line: Window, frames: u32) -> Error {
-    for frame in 0_u8..6 {
+pub(crate) fn framing(line: Window, frames: u8) -> Error {
+    let bits = u32::from(frames).wrapping_mul(FRAME_BITS);
+    if line.len() < bits {
+        return truncated(line.len(), bits);
+    }
+    for frame in 0..frames {
         let at = u32::from(frame).wrapping_mul(FRAME_BITS);
         match (line.get(at), line.get(at.wrapping_add(17))) {
             (Some(true), _) => return Error::StartBit { frame },
@@ -290,7 +241,7 @@ pub(crate) fn framing(line: Window, frames: u32) -> Error {
         }
     }
     // Never: the caller saw a fault.
-    truncated(line.len(), frames.wrapping_mul(FRAME_BITS))
+    truncated(line.len(), bits)
 }
 
 impl fmt::Display for RequestFrame {
@@ -304,6 +255,7 @@ crate::text::format_as_displayed!(RequestFrame);
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::contents::together;
     use proptest::prelude::*;
     use std::vec::Vec;
 
@@ -375,13 +327,14 @@ mod tests {
         #[test]
         fn line_and_back(content: [u16; 6]) {
             let line = Window::from_bits(pack(content), 108).unwrap();
-            prop_assert_eq!(contents(line, 6), Ok(content));
-            prop_assert_eq!(unpack(words(line.bits())), content);
+            prop_assert_eq!(framed(6, &line), Some(together(content)));
+            prop_assert_eq!(apart(together(content)), content);
             for frame in 0..6_u8 {
                 for (bit, want) in [(0, Error::StartBit { frame }), (17, Error::Delimiter { frame })] {
                     let at = u32::from(frame) * 18 + bit;
                     let bad = Window::from_bits(line.bits() ^ 1 << at, 108).unwrap();
-                    prop_assert_eq!(contents(bad, 6), Err(want));
+                    prop_assert_eq!(framed(6, &bad), None);
+                    prop_assert_eq!(framing(bad, 6), want);
                 }
             }
         }

@@ -13,6 +13,7 @@ const STRIDE: usize = if cfg!(miri) { 97 } else { 1 };
 mod abs40;
 pub mod bus;
 mod command;
+mod contents;
 mod crc;
 mod data;
 pub mod device;

@@ -17,6 +17,8 @@ number! {
 
 number! {
     /// The 40 bits of ABS40: single turn below, turns above.
+    // Aligned as the other fields of a response, which is a quarter smaller by that.
+    #[repr(Rust, packed(4))]
     pub struct U40(u64, 40);
 }
 

@@ -2,9 +2,10 @@ use core::fmt;
 
 use nrz_line::{BitOrder, Window};
 
+use crate::contents::{Contents, apart, framed, together};
 use crate::crc::{mirrored, next_word};
 use crate::error::Error;
-use crate::frame::{MAX_FRAMES, contents, pack, truncated};
+use crate::frame::{MAX_FRAMES, framing, pack, truncated};
 use crate::layout::FRAME_BITS;
 use crate::layout::Layout;
 use crate::text::write_words;
@@ -35,7 +36,10 @@ impl RawResponse {
     /// # Errors
     /// [`Error::Truncated`], [`Error::StartBit`], [`Error::Delimiter`].
     pub fn from_line(layout: Layout, line: Window) -> Result<Self, Error> {
-        contents(line, u32::from(layout.frames())).map(|contents| Self::of(contents, layout))
+        match framed(layout.frames(), &line) {
+            Some(contents) => Ok(Self::of(apart(contents), layout)),
+            None => Err(framing(line, layout.frames())),
+        }
     }
 
     /// A response from the content bits of its frames, one word each; words behind it are left alone.
@@ -119,8 +123,8 @@ impl RawResponse {
 
     /// The content bits of six frames, 0 after the last.
     #[inline(always)]
-    pub(crate) const fn all_contents(&self) -> [u16; MAX_FRAMES as usize] {
-        self.contents
+    pub(crate) const fn all_contents(&self) -> Contents {
+        together(self.contents)
     }
 }
 

@@ -79,6 +79,24 @@ impl LineReceiver {
     /// **One wrong bit can then give a wrong position**: where the start bit of a frame is lost, a later edge is taken for it, and
     /// one such frame in 256 at the end of a response passes the CRC-8. And a response that lost a frame swallows the
     /// first frame of the next one.
+    ///
+    /// ```
+    /// use nikon_aformat::reception::LineReceiver;
+    /// use nikon_aformat::{BitOrder, Error, Layout, RawResponse};
+    /// let sent = RawResponse::from_words(Layout::Abs24, &[0x3e03, 0x00ef, 0xdf35], BitOrder::MsbFirst)?;
+    /// let mut receiver =
+    ///     LineReceiver::oversampled(4, Layout::Abs24).map_err(|_| Error::NotCarried)?.allowing_idle_between_frames();
+    /// let mut got = None;
+    /// for frame in 0..3 {
+    ///     // two idle bits, then the 18 bits of the frame, each four samples long
+    ///     let bits = sent.line().bits() >> (18 * frame) << 2 | 0b11;
+    ///     for at in 0..20 {
+    ///         got = got.or(receiver.run(bits >> at & 1 == 1, 4));
+    ///     }
+    /// }
+    /// assert_eq!(got, Some(Ok(sent)));
+    /// # Ok::<(), Error>(())
+    /// ```
     pub const fn allowing_idle_between_frames(self) -> Self {
         Self { idle_allowed: true, ..self }
     }

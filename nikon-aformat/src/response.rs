@@ -1,16 +1,17 @@
 use core::fmt;
 
 use nrz_line::{BitOrder, Window};
+use servowire_core::U24;
 
-use crate::abs40::{Abs40, words};
 use crate::command::Command;
+use crate::contents::{Contents, sound_line, sound_words};
 use crate::data::Data;
 use crate::error::Error;
 use crate::expected::{Expected, SYNC_CODE};
 use crate::layout::Layout;
-use crate::number::{EncoderAddress, U17, U40};
+use crate::number::{EncoderAddress, EncoderId, U17, U19, U40};
 use crate::raw_response::RawResponse;
-use crate::status::{Alm, EncoderStatus};
+use crate::status::{Alm, EncoderStatus, PmAlm};
 use crate::temperature::Temperature;
 
 #[cfg(test)]
@@ -85,21 +86,70 @@ impl Response {
     /// In this order: [`Error::Truncated`], [`Error::Crc`], [`Error::SyncCode`], [`Error::FixedBit`],
     /// [`Error::AddressMismatch`], [`Error::CommandMismatch`], [`Error::BankError`], [`Error::EchoMismatch`].
     pub fn parse(expected: &Expected, raw: &RawResponse) -> Result<Self, Error> {
+        let contents = raw.all_contents();
         if !raw.is_sound() || !expected.fits(raw) {
             return Err(expected.refusal(raw));
         }
-        let contents = raw.all_contents();
-        let [first, second, ..] = contents;
-        let ea = EncoderAddress::truncate(low_byte(first >> 3));
-        let body = if let Some(data) = Data::from_contents(expected.layout(), contents) {
-            expected.check_memory(data)?;
-            let es = EncoderStatus::from_bits_truncate(low_byte(first >> 12));
-            Body::Full { command: expected.command(), es, data }
-        } else {
-            let abs = U17::truncate(u32::from(first) >> 7 | u32::from(second) << 9);
-            Body::Abs17 { es_any: first >> 6 & 1 == 1, abs }
-        };
-        Ok(Self { ea, body })
+        Self::of_contents(expected, contents)
+    }
+
+    /// What the content bits say, after the checks that do not need to know it. On a 32-bit core each field is a shift or two.
+    #[inline(always)]
+    #[expect(clippy::cast_possible_truncation, clippy::cast_possible_wrap, reason = "fields are cut out of words")]
+    fn of_contents(expected: &Expected, [p0, p1, p2]: Contents) -> Result<Self, Error> {
+        let (ea, es) = (EncoderAddress::truncate((p0 >> 3) as u8), EncoderStatus::from_bits_truncate((p0 >> 12) as u8));
+        let full = |data| Ok(Self::new(ea, expected.command(), es, data));
+        // Data bits from 0, from 16, from 24, from 32, from 40 and from 56: the information field is before them. Each layout
+        // computes those that it has.
+        let low = || p0 >> 16 | p1 << 16;
+        let (word, from_16, from_24, from_32) =
+            (|| low() as u16, || p1 as u8, || p1 >> 8 | p2 << 24, || (p1 >> 16) as u8);
+        let (from_40, from_56) = (|| p1 >> 24 | p2 << 8, || (p2 >> 8) as u16);
+        let abs = || U24::truncate(low());
+        let abs40 = || U40::truncate(u64::from(low()) | u64::from(from_32()) << 32);
+        match expected.layout() {
+            Layout::Abs17 => {
+                Ok(Self { ea, body: Body::Abs17 { es_any: p0 >> 6 & 1 == 1, abs: U17::truncate(p0 >> 7) } })
+            }
+            Layout::Abs40 => full(Data::Abs40 { abs: abs40() }),
+            Layout::Abs24 => full(Data::Abs24 { abs: abs() }),
+            Layout::Abs24High => full(Data::Abs24High { abs: abs() }),
+            Layout::Status => {
+                full(Data::Status { alm: Alm::from_bits_retain(word()), pm_alm: PmAlm::from_bits_retain(from_16()) })
+            }
+            Layout::Eeprom => {
+                expected.check_eeprom(word(), None, from_16())?;
+                full(Data::Eeprom { data: word(), address: from_16() })
+            }
+            Layout::EepromBank => {
+                let (bank, address, bank_error) = (from_16(), from_24() as u8, from_32() & 1 == 1);
+                if bank_error {
+                    return Err(Error::BankError);
+                }
+                expected.check_eeprom(word(), Some(bank), address)?;
+                full(Data::EepromBank { data: word(), bank, address, bank_error })
+            }
+            Layout::Temperature => full(Data::Temperature { temperature: Temperature::from_eeprom(word()) }),
+            Layout::Id => {
+                let id = EncoderId::truncate(low());
+                expected.check_id(id)?;
+                full(Data::Id { id })
+            }
+            Layout::Coefficient => {
+                let coefficient = U19::truncate(low());
+                expected.check_coefficient(coefficient)?;
+                full(Data::Coefficient { coefficient })
+            }
+            Layout::Abs24Status => full(Data::Abs24Status { abs: abs(), alm: Alm::from_bits_retain(from_24() as u16) }),
+            Layout::Abs24Temp => {
+                full(Data::Abs24Temp { abs: abs(), temperature: Temperature::from_eeprom(from_24() as u16) })
+            }
+            Layout::Abs24Vel => full(Data::Abs24Vel { abs: abs(), velocity: from_24() as i32 }),
+            Layout::Abs24VelAcc => {
+                full(Data::Abs24VelAcc { abs: abs(), velocity: from_24() as i32, acceleration: from_56() as i16 })
+            }
+            Layout::Abs40Vel => full(Data::Abs40Vel { abs: abs40(), velocity: from_40() as i32 }),
+        }
     }
 
     /// Decodes a response from 16-bit words, the content bits of one frame each; words behind it are left alone.
@@ -117,16 +167,11 @@ impl Response {
     /// # Errors
     /// As [`parse`](Self::parse).
     pub fn parse_words(expected: &Expected, words: &[u16], order: BitOrder) -> Result<Self, Error> {
-        if let (Layout::Abs40, Some(four)) = (expected.layout(), words.first_chunk::<4>()) {
-            let contents = match order {
-                BitOrder::LsbFirst => *four,
-                BitOrder::MsbFirst => four.map(u16::reverse_bits),
-            };
-            if let Some(abs40) = Abs40::of_contents(expected, contents) {
-                return Ok(Self::of_abs40(expected, abs40));
-            }
-        }
-        Self::parse_any(expected, RawResponse::from_words(expected.layout(), words, order))
+        let sound = sound_words(expected.frames(), words, order);
+        let Some(contents) = sound.and_then(|(contents, crc)| expected.fitting(contents, crc)) else {
+            return Err(refusal(expected, RawResponse::from_words(expected.layout(), words, order)));
+        };
+        Self::of_contents(expected, contents)
     }
 
     /// Decodes the response at the beginning of a piece of line, its frames back to back; bits behind it are left alone.
@@ -137,22 +182,11 @@ impl Response {
     /// [`Error::Truncated`], [`Error::StartBit`] and [`Error::Delimiter`] frame by frame, then as
     /// [`parse`](Self::parse).
     pub fn parse_line(expected: &Expected, line: Window) -> Result<Self, Error> {
-        if expected.layout() == Layout::Abs40 && line.len() >= Layout::Abs40.line_bits() {
-            if let Some(abs40) = Abs40::of_words(expected, words(line.bits())) {
-                return Ok(Self::of_abs40(expected, abs40));
-            }
-        }
-        Self::parse_any(expected, RawResponse::from_line(expected.layout(), line))
-    }
-
-    /// All other layouts, and what the kernel of ABS40 refuses.
-    fn parse_any(expected: &Expected, raw: Result<RawResponse, Error>) -> Result<Self, Error> {
-        Self::parse(expected, &raw?)
-    }
-
-    #[inline(always)]
-    const fn of_abs40(expected: &Expected, Abs40 { ea, es, abs }: Abs40) -> Self {
-        Self { ea, body: Body::Full { command: expected.command(), es, data: Data::Abs40 { abs } } }
+        let sound = sound_line(expected.frames(), &line);
+        let Some(contents) = sound.and_then(|(contents, crc)| expected.fitting(contents, crc)) else {
+            return Err(refusal(expected, RawResponse::from_line(expected.layout(), line)));
+        };
+        Self::of_contents(expected, contents)
     }
 
     /// The frames to send.
@@ -259,9 +293,14 @@ impl Response {
     }
 }
 
-#[expect(clippy::cast_possible_truncation, reason = "the caller cuts its field off")]
-const fn low_byte(bits: u16) -> u8 {
-    bits as u8
+/// Off the hot path: why a response is refused.
+#[cold]
+#[inline(never)]
+fn refusal(expected: &Expected, raw: Result<RawResponse, Error>) -> Error {
+    match raw {
+        Ok(raw) => expected.refusal(&raw),
+        Err(error) => error,
+    }
 }
 
 impl fmt::Display for Response {

@@ -80,6 +80,19 @@ pub type Bits<'a> = (&'a [u8], usize);
 
 /// Passes over idle bits and takes an expected response off the front of a packed line; `Incomplete` counts bits.
 ///
+/// ```
+/// use nikon_aformat::{BitOrder, Command, Error, Expected, Layout, RawResponse, stream};
+/// use nom::Parser;
+/// // five idle bits, then the response to command 1 that a vendor's manual shows
+/// let raw = RawResponse::from_words(Layout::Abs24, &[0x3e03, 0x00ef, 0xdf35], BitOrder::MsbFirst)?;
+/// let mut bytes = [0xff; 8];
+/// raw.line().write(&mut bytes, 5, BitOrder::LsbFirst)?;
+/// let expected = Expected::new(Layout::Abs24, Command::Abs24Low);
+/// let (rest, response) = stream::line_response::<Error>(expected, BitOrder::LsbFirst).parse((&bytes, 0)).unwrap();
+/// assert_eq!((rest, response.abs()), ((&bytes[7..], 3), Some(0xfb_f700)));
+/// # Ok::<(), Box<dyn core::error::Error>>(())
+/// ```
+///
 /// # Errors
 /// As [`Response::parse_line`], with `Incomplete` for a line that ends in the response or before it.
 pub fn line_response<'a, E>(expected: Expected, order: BitOrder) -> impl Parser<Bits<'a>, Output = Response, Error = E>

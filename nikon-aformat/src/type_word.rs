@@ -55,6 +55,23 @@ impl TypeWord {
     /// Its EEPROM address.
     pub const EEPROM_ADDRESS: u8 = 0xf6;
 
+    /// The type word of an encoder with these widths; for widths that have no code, an unknown one.
+    pub(crate) const fn of(resolution: Resolution) -> Self {
+        let code = match resolution.st_bits() {
+            17 => 0,
+            20 => 1,
+            22 => 2,
+            24 => 3,
+            _ => 7,
+        };
+        let multiturn = match resolution.mt_bits() {
+            0 => 0,
+            16 => 2,
+            _ => 3,
+        };
+        Self(code | multiturn << 3)
+    }
+
     /// Code of the resolution, 0..=7.
     pub const fn resolution_code(self) -> u8 {
         (self.0 & 7) as u8

@@ -159,7 +159,7 @@ fn eeprom_written_once_and_read_back() {
     let mut read = EepromRead::new(ea(3), 0x42);
     let first = read.start(now_ns);
     let (end, sent, now_ns) = drive(&mut encoders, resolution, first, |o, t| read.receive(o, t));
-    assert_eq!((end, sent.len()), (Ok(0x1234), 2));
+    assert_eq!((end, sent.len()), (Ok(0x1234), 4));
     let mut read = EepromRead::of_bank(ea(3), 2, 0x42);
     let first = read.start(now_ns);
     let (end, ..) = drive(&mut encoders, resolution, first, |o, t| read.receive(o, t));
@@ -231,7 +231,7 @@ fn detection_finds_address_and_widths() {
         let first = detection.start(0);
         let (end, sent, _) = drive(&mut one, resolution, first, |o, t| detection.receive(o, t));
         let Ok(Detected { ea: found, resolution: got, .. }) = end else { panic!("{end:?}") };
-        assert_eq!((found, got, sent.len()), (ea(4), Some(resolution), 3));
+        assert_eq!((found, got, sent.len()), (ea(4), Some(resolution), 5));
         one.all[0].set_fault(Fault::Silent);
         let mut detection = Detection::of(ea(4));
         let first = detection.start(0);

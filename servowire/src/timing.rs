@@ -1,6 +1,7 @@
 //! `servowire timing`: who is on the line when, how short a cycle can be, and what the worst fault costs.
 
 mod drawing;
+mod nikon;
 mod tformat;
 
 use std::error::Error;
@@ -11,7 +12,7 @@ use std::process::ExitCode;
 
 use clap::{Args, Subcommand};
 
-/// Who is on the line when: the shortest cycle and the worst fault of an exchange with an encoder.
+/// Who is on the line when: the shortest cycle and the worst fault of an exchange with encoders.
 #[derive(Debug, Args)]
 pub struct Arguments {
     #[command(subcommand)]
@@ -25,6 +26,8 @@ pub struct Arguments {
 enum Protocol {
     /// One Tamagawa T-Format encoder.
     Tformat(tformat::Arguments),
+    /// Nikon A-format encoders, one or several on a bus.
+    Nikon(nikon::Arguments),
 }
 
 impl Arguments {
@@ -42,6 +45,7 @@ impl Arguments {
     fn try_run(&self) -> Result<(), Box<dyn Error>> {
         let plan = match &self.protocol {
             Protocol::Tformat(arguments) => arguments.plan(),
+            Protocol::Nikon(arguments) => arguments.plan()?,
         };
         if let Some(path) = &self.svg {
             fs::write(path, drawing::svg(&plan)).map_err(|error| format!("{}: {error}", path.display()))?;

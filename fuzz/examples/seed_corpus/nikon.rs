@@ -13,6 +13,7 @@ pub(crate) const SOURCES: &[Source] = &[
     ("nikon_master", "nikon/rx_responses.jsonl", transaction),
     ("nikon_device", "nikon/tx_transactions.jsonl", frames),
     ("nikon_inspect", "nikon/rx_negative.jsonl", inspected),
+    ("nikon_world", "nikon/tx_transactions.jsonl", world),
 ];
 
 fn request(row: &Value) -> Option<Vec<u8>> {
@@ -83,4 +84,16 @@ fn transaction(row: &Value) -> Option<Vec<u8>> {
 fn frames(row: &Value) -> Option<Vec<u8>> {
     let words = row["frames"].as_array()?.iter().filter_map(|frame| frame["word16"].as_str()).map(hex);
     Some(words.flat_map(|word| [word[0].reverse_bits(), word[1].reverse_bits(), 2, 6]).collect())
+}
+
+/// What is done, the host and three faults out of the words of a request.
+fn world(row: &Value) -> Option<Vec<u8>> {
+    let bytes = request(row)?;
+    let sum = bytes.iter().fold(0_u8, |sum, byte| sum.wrapping_mul(31).wrapping_add(*byte));
+    let mut input = vec![sum, sum >> 3, sum ^ sum >> 4];
+    input.extend([sum, sum >> 2, 0, 1, 0, 9, 7, 0]);
+    for k in 0..3_u8 {
+        input.extend([sum % 5 + k, k, sum.wrapping_add(5 * k), 3, sum, 40]);
+    }
+    Some(input)
 }

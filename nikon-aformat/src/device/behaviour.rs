@@ -21,6 +21,20 @@ pub struct Behaviour {
     pub place: Option<u8>,
     /// Whether the responses to commands 11 and 20 show the new address. Default: yes.
     pub shows_new_address: bool,
+    /// What starts the count of a reset again. Default [`Restart::Any`].
+    pub restart: Restart,
+}
+
+/// What starts the count of a reset again, besides another request to the same encoder.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "arbitrary", derive(arbitrary::Arbitrary))]
+pub enum Restart {
+    /// Any other request on the line, and a damaged frame.
+    Any,
+    /// Nothing else.
+    Own,
 }
 
 /// Which response shows the effect of a reset first.
@@ -58,6 +72,7 @@ impl Behaviour {
             ea: Ea::Highest,
             place: None,
             shows_new_address: true,
+            restart: Restart::Any,
         }
     }
 
@@ -84,6 +99,16 @@ impl Behaviour {
     /// With this place among the responses to a multi-response request.
     pub const fn at_place(self, place: u8) -> Self {
         Self { place: Some(place), ..self }
+    }
+
+    /// With these EEPROM data while they are not determined.
+    pub const fn with_undetermined(self, undetermined: u16) -> Self {
+        Self { undetermined, ..self }
+    }
+
+    /// With a count of resets that only other requests to the same encoder start again.
+    pub const fn counting_its_own_requests(self) -> Self {
+        Self { restart: Restart::Own, ..self }
     }
 
     /// With the old address in the responses to commands 11 and 20.

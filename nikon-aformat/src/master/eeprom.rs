@@ -34,9 +34,11 @@ pub(super) fn status_of(ea: EncoderAddress, outcome: Result<Response, Error>) ->
 /// Reads one EEPROM word.
 ///
 /// The data of the first response are undetermined, and the memory is busy for up to 300 us ("Nikon Protocol Design"). So the
-/// whole request is sent again, and the data of a second response are used, if ES0 is clear in it. After a response
-/// that is missing or refused it is not known which one the next is: then another address is read first, so that the
-/// next response to this request is a first one for certain.
+/// whole request is sent again, and the data of a second response are used, if ES0 is clear in it. Which response is the
+/// first is not known where a read was broken off, by this controller before it started again or by another: then the
+/// response to the next request has the data of the old read, and that to the one after it is undetermined. And a busy
+/// memory does not begin with a read. So another address is read before, until ES0 is clear: at the beginning and after a
+/// response that is missing or refused.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct EepromRead {
@@ -44,6 +46,8 @@ pub struct EepromRead {
     polling: Polling,
     /// The data of the first response are never used.
     discard_first: bool,
+    /// No read of this address was broken off, and the memory is not busy.
+    known: bool,
     next: Next,
     tries: u16,
 }
@@ -70,7 +74,7 @@ impl EepromRead {
     }
 
     const fn of(request: Request) -> Self {
-        Self { request, polling: READ_POLLING, discard_first: true, next: Next::First, tries: 0 }
+        Self { request, polling: READ_POLLING, discard_first: true, known: false, next: Next::Other, tries: 0 }
     }
 
     /// With another interval or number of tries.
@@ -78,9 +82,10 @@ impl EepromRead {
         Self { polling, ..self }
     }
 
-    /// Begins with another address, because the last read of this one has failed.
-    pub const fn after_a_failed_read(self) -> Self {
-        Self { next: Next::Other, ..self }
+    /// Begins with the address itself, because it is known that no read of it was broken off and that the memory is not busy: two
+    /// requests instead of three or four. Once a read has failed that is forgotten.
+    pub const fn knowing_that_none_was_broken_off(self) -> Self {
+        Self { known: true, ..self }
     }
 
     /// Uses the data of the first response if ES0 is clear in it.
@@ -99,6 +104,7 @@ impl EepromRead {
     /// The first request, at once.
     pub const fn start(&mut self, now_ns: u64) -> Step<u16> {
         self.tries = 0;
+        self.next = if self.known { Next::First } else { Next::Other };
         Step::Send { request: self.next_request(), not_before_ns: now_ns }
     }
 
@@ -113,8 +119,10 @@ impl EepromRead {
                 self.next = if self.discard_first { Next::Other } else { Next::First };
                 error
             }
-            (Ok((word, false)), Next::Second) => return self.done(word, now_ns),
-            (Ok((word, false)), Next::First) if !self.discard_first => return self.done(word, now_ns),
+            (Ok((word, false)), Next::Second) => return Step::Done { value: word, ready_ns: now_ns },
+            (Ok((word, false)), Next::First) if !self.discard_first => {
+                return Step::Done { value: word, ready_ns: now_ns };
+            }
             // A busy memory has not begun with the other address.
             (Ok((_, busy)), Next::Other) => {
                 self.next = if busy { Next::Other } else { Next::First };
@@ -128,15 +136,10 @@ impl EepromRead {
         let not_before_ns = now_ns.saturating_add(self.polling.interval_ns.into());
         if self.tries >= self.polling.max_tries || error == Error::BankError {
             // Whether the encoder has the word ready is not known.
-            self.next = Next::Other;
+            self.known = false;
             return Step::Failed { error, ready_ns: not_before_ns };
         }
         Step::Send { request: self.next_request(), not_before_ns }
-    }
-
-    const fn done(&mut self, value: u16, now_ns: u64) -> Step<u16> {
-        self.next = Next::First;
-        Step::Done { value, ready_ns: now_ns }
     }
 
     const fn next_request(&self) -> Request {
@@ -193,14 +196,15 @@ mod tests {
 
     #[test]
     fn the_first_data_are_not_used() {
-        let mut read = EepromRead::new(EA, 9);
+        let mut read = EepromRead::new(EA, 9).knowing_that_none_was_broken_off();
         let request = Request::new(EA, Operation::EepromRead { address: 9 });
         assert_eq!(read.start(5), Step::Send { request, not_before_ns: 5 });
         let again = Step::Send { request, not_before_ns: 300_100 };
         assert_eq!(read.receive(Ok(word(0, 0xdead)), 100), again);
         assert_eq!(read.receive(Ok(word(1, 0xdead)), 100), again);
         assert_eq!(read.receive(Ok(word(0, 7)), 100), Step::Done { value: 7, ready_ns: 100 });
-        let mut trusting = EepromRead::new(EA, 9).trusting_es0_of_the_first_response();
+        let mut trusting =
+            EepromRead::new(EA, 9).knowing_that_none_was_broken_off().trusting_es0_of_the_first_response();
         let _ = trusting.start(0);
         assert_eq!(trusting.receive(Ok(word(1, 0xdead)), 0), Step::Send { request, not_before_ns: 300_000 });
         let _ = trusting.start(0);
@@ -214,7 +218,7 @@ mod tests {
         let again = |address| Step::Send { request: request(address), not_before_ns: 300_000 };
         let other = Response { body: word(0, 1).body, ..word(0, 1) };
         for bad in [Err(Error::NoResponse), Ok(word_of(0, 5, 8)), Ok(Response { ea: EncoderAddress::MAX, ..other })] {
-            let mut read = EepromRead::new(EA, 9);
+            let mut read = EepromRead::new(EA, 9).knowing_that_none_was_broken_off();
             let _ = read.start(0);
             assert_eq!(read.receive(Ok(word(0, 0xdead)), 0), again(9));
             assert_eq!(read.receive(bad, 0), again(8));
@@ -226,9 +230,42 @@ mod tests {
         }
     }
 
+    /// A controller that starts again does not know what it was doing: a read of another address ends what is open.
+    #[test]
+    fn another_address_is_read_before() {
+        let mut read = EepromRead::new(EA, 9);
+        let request = |address| Request::new(EA, Operation::EepromRead { address });
+        assert_eq!(read.start(5), Step::Send { request: request(8), not_before_ns: 5 });
+        let own = Step::Send { request: request(9), not_before_ns: 300_000 };
+        assert_eq!(read.receive(Ok(word_of(0, 0xbad, 8)), 0), own);
+        assert_eq!(read.receive(Ok(word(0, 0xdead)), 0), own);
+        assert_eq!(read.receive(Ok(word(0, 7)), 0), Step::Done { value: 7, ready_ns: 0 });
+        // What happened meanwhile is not known either.
+        assert_eq!(read.start(5), Step::Send { request: request(8), not_before_ns: 5 });
+        // A memory that is busy has not begun with the other address.
+        let other = Step::Send { request: request(8), not_before_ns: 300_000 };
+        assert_eq!(read.receive(Ok(word_of(1, 0xbad, 8)), 0), other);
+        // One that is known to be idle shows its own read; after a failure nothing is known.
+        let mut read = EepromRead::new(EA, 9).knowing_that_none_was_broken_off();
+        for _ in 0..2 {
+            assert_eq!(read.start(5), Step::Send { request: request(9), not_before_ns: 5 });
+            assert_eq!(read.receive(Ok(word(1, 0xdead)), 0), own);
+            assert_eq!(read.receive(Ok(word(0, 7)), 0), Step::Done { value: 7, ready_ns: 0 });
+        }
+        let _ = read.start(0);
+        while let Step::Send { .. } = read.receive(Err(Error::NoResponse), 0) {}
+        assert_eq!(read.start(5), Step::Send { request: request(8), not_before_ns: 5 });
+        let bank = Operation::EepromReadBank { bank: 3, address: 0x41 };
+        let other = Request::new(EA, Operation::EepromReadBank { bank: 3, address: 0x40 });
+        assert_eq!(EepromRead::of_bank(EA, 3, 0x41).start(1), Step::Send { request: other, not_before_ns: 1 });
+        assert_eq!(EepromRead::of_bank(EA, 3, 0x41).request.operation, bank);
+    }
+
     #[test]
     fn reading_is_bounded_and_a_wrong_bank_ends_it() {
-        let mut read = EepromRead::new(EA, 9).with_polling(Polling { max_tries: 3, ..READ_POLLING });
+        let mut read = EepromRead::new(EA, 9)
+            .knowing_that_none_was_broken_off()
+            .with_polling(Polling { max_tries: 3, ..READ_POLLING });
         let _ = read.start(0);
         let _ = read.receive(Ok(word(1, 0)), 0);
         let _ = read.receive(Ok(word(1, 0)), 0);

@@ -51,11 +51,9 @@ impl VerifiedWrite {
     pub const fn new(write: Write) -> Self {
         let Request { ea, operation } = write.request();
         let back = match operation {
-            Operation::EepromWrite { address, data } => {
-                Back::Word { read: EepromRead::new(ea, address.get()).after_a_failed_read(), data }
-            }
+            Operation::EepromWrite { address, data } => Back::Word { read: EepromRead::new(ea, address.get()), data },
             Operation::EepromWriteBank { bank, address, data } => {
-                Back::Word { read: EepromRead::of_bank(ea, bank, address).after_a_failed_read(), data }
+                Back::Word { read: EepromRead::of_bank(ea, bank, address), data }
             }
             Operation::IdWrite2 { .. } => Back::Id(Request::new(ea, Operation::IdRead2)),
             Operation::CoefficientWrite { .. } => Back::Id(Request::new(ea, Operation::CoefficientRead)),

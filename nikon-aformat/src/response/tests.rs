@@ -9,14 +9,9 @@ use std::vec::Vec;
 
 /// Data of `layout` out of random numbers, never a bank error; `None` for the short form.
 pub(crate) fn data(layout: Layout, a: u64, b: u64) -> Option<Data> {
-    let word = |bits: u64, at: u32| (bits >> at) as u16;
-    let contents = [0, word(a, 0), word(a, 16), word(a, 32), word(a, 48), word(b, 0)];
-    match Data::from_contents(layout, contents) {
-        Some(Data::EepromBank { data, bank, address, .. }) => {
-            Some(Data::EepromBank { data, bank, address, bank_error: false })
-        }
-        other => other,
-    }
+    // Bit 48 is the bank error.
+    let contents = [(a as u32) << 16, (a >> 16) as u32 & !(u32::from(layout == Layout::EepromBank) << 16), b as u32];
+    Response::of_contents(&Expected::new(layout, Command::Abs40), contents).ok().and_then(Response::data)
 }
 
 /// The response of a sound encoder to `request`, its data out of random numbers and the arguments repeated.

@@ -1,6 +1,6 @@
 //! Encoders and a master on the hostile line.
 
-use nikon_aformat::device::{Encoders, Transmission};
+use nikon_aformat::device::{Device, Encoders, Transmission};
 use nikon_aformat::{BitRate, Frames};
 use servowire_world::{Event, Framing, Host, Id, Message, Rates, Scenario, Stamp, Transmission as Sent, Wire, World};
 
@@ -14,9 +14,17 @@ pub struct Handed {
     pub end_ns: u64,
 }
 
-/// Events of a run: 100,000, or as many as the environment says.
+/// Events of a run, unless the environment says another number.
+pub const USUAL_EVENTS: u64 = 100_000;
+
+/// Events of this run.
 pub fn events() -> u64 {
-    std::env::var("HOSTILE_EVENTS").ok().and_then(|text| text.parse().ok()).unwrap_or(100_000)
+    std::env::var("HOSTILE_EVENTS").ok().and_then(|text| text.parse().ok()).unwrap_or(USUAL_EVENTS)
+}
+
+/// The first seed: 0, or what the environment says.
+pub fn first_seed() -> u64 {
+    std::env::var("SEED").ok().and_then(|text| text.parse().ok()).unwrap_or(0)
 }
 
 /// The encoders of a line, and what carries their words.
@@ -29,12 +37,19 @@ pub struct Bench<const N: usize> {
     pub serial: u64,
     /// Hand-overs: since when, until when, and of how many frames.
     pub handed: Vec<(u64, u64, usize)>,
-    /// What the zero point of each encoder was last seen to be: a change is an act.
-    zeros: [(u32, u32); N],
-    /// EEPROM words written so far, as the memory shows it.
-    watched: [Option<u16>; N],
+    /// What each encoder keeps, as it was last seen: a change is an act.
+    kept: [Kept; N],
     /// Bank and address that are watched.
     pub watch: (u8, u8),
+}
+
+/// What an encoder keeps when a request is over.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Kept {
+    pub zero: (u32, u32),
+    pub word: Option<u16>,
+    pub id: u32,
+    pub ea: u8,
 }
 
 /// Bits of a request frame and of a response frame.
@@ -48,6 +63,15 @@ pub const fn bit_ps(rate: BitRate) -> u64 {
         BitRate::Mbit6_67 => 150_000,
         BitRate::Mbit8 => 125_000,
         BitRate::Mbit16 => 62_500,
+    }
+}
+
+/// Idle time that a master allows between two responses by default: twice what vendors' receivers wait.
+pub const fn between_ns(rate: BitRate) -> u64 {
+    match rate {
+        BitRate::Mbit2_5 => 6_000,
+        BitRate::Mbit4 | BitRate::Mbit6_67 => 4_000,
+        BitRate::Mbit8 | BitRate::Mbit16 => 3_000,
     }
 }
 
@@ -79,30 +103,21 @@ pub fn host_within(scenario: Scenario, latency_ns: u32) -> Scenario {
 impl<const N: usize> Bench<N> {
     pub fn new(encoders: Encoders<N, 2>, rate: BitRate, scenario: Scenario) -> Self {
         let wire = Wire { bit_ps: bit_ps(rate), framing: Framing::StartStop { width: WIDTH }, devices: N as u8 };
-        let zeros = encoders.all.map(|device| device.zero());
-        let mut bench = Self {
-            world: World::new(wire, scenario),
-            encoders,
-            rate,
-            serial: 0,
-            handed: vec![(0, 0, 0)],
-            zeros,
-            watched: [None; N],
-            watch: (0, 0),
-        };
-        bench.watched = bench.words();
-        bench
+        let watch = (0, 0);
+        let kept = encoders.all.map(|device| kept(&device, watch));
+        let handed = vec![(0, 0, 0)];
+        Self { world: World::new(wire, scenario), encoders, rate, serial: 0, handed, kept, watch }
     }
 
-    pub fn words(&self) -> [Option<u16>; N] {
-        let (bank, address) = self.watch;
-        self.encoders.all.map(|device| device.eeprom(bank, address))
+    /// What each encoder keeps now.
+    pub fn kept(&self) -> [Kept; N] {
+        self.encoders.all.map(|device| kept(&device, self.watch))
     }
 
     /// Watches another word from now on.
     pub fn watch(&mut self, bank: u8, address: u8) {
         self.watch = (bank, address);
-        self.watched = self.words();
+        self.kept = self.kept();
     }
 
     /// Sends the frames of a request, the gaps between them as long as the protocol demands at least.
@@ -158,14 +173,18 @@ impl<const N: usize> Bench<N> {
         }
     }
 
-    /// Whether a master may pass a response over though it arrived whole: idle time in it was longer than the master allows,
-    /// or others followed
-    /// it in its last block, and this block held only a part of it or began before the request had left: nothing told its age.
+    /// Whether a master may pass a response over though it arrived whole: idle time between two of its frames was longer than
+    /// the master allows, or others followed it in its last block, and this block held only a part of it or began before the
+    /// request had left: nothing told its age.
     pub fn is_excused(&self, response: &Sent) -> bool {
         let asked_ns =
             response.answers.and_then(|id| self.world.truth().transmission(id)).map_or(0, |sent| sent.end_ns);
         let within = |(since, end, _): &&(u64, u64, usize)| *since <= response.start_ns && response.start_ns < *end;
-        if response.end_ns - response.start_ns > response.units as u64 * frame_ns(self.rate) + idle_ns(self.rate) {
+        // A frame that was repeated and lost once leaves a gap as long as itself.
+        if response.end_ns - response.start_ns >= (response.units as u64 + 1) * frame_ns(self.rate) {
+            return true;
+        }
+        if response.longest_idle(18) as u64 * bit_ps(self.rate) > idle_ns(self.rate) * 1000 {
             return true;
         }
         let whole = self.handed.iter().find(within);
@@ -185,17 +204,22 @@ impl<const N: usize> Bench<N> {
 
     fn note_acts(&mut self, device: u8, request: Id) {
         let at = usize::from(device);
-        let zero = self.encoders.all[at].zero();
-        if zero != self.zeros[at] {
-            self.zeros[at] = zero;
-            self.world.act(device, "zero", request);
-        }
-        let word = self.words()[at];
-        if word != self.watched[at] {
-            self.watched[at] = word;
-            self.world.act(device, "word", request);
+        let (old, new) = (self.kept[at], kept(&self.encoders.all[at], self.watch));
+        self.kept[at] = new;
+        let changed = [
+            ("zero", old.zero != new.zero),
+            ("word", old.word != new.word),
+            ("id", old.id != new.id),
+            ("address", old.ea != new.ea),
+        ];
+        for (what, _) in changed.into_iter().filter(|(_, changed)| *changed) {
+            self.world.act(device, what, request);
         }
     }
+}
+
+fn kept(device: &Device<2>, (bank, address): (u8, u8)) -> Kept {
+    Kept { zero: device.zero(), word: device.eeprom(bank, address), id: device.id().get(), ea: device.ea().get() }
 }
 
 /// The 40 bits after the information field: what a position is known by.

@@ -1,7 +1,10 @@
 //! What the tests of both ends share.
 #![allow(unreachable_pub, dead_code, missing_docs)]
 
+pub mod exchanges;
 pub mod line;
+pub mod procedures;
+pub mod switches;
 
 use nikon_aformat::{Command, EncoderId, Operation, U19, UserAddress};
 

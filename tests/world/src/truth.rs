@@ -67,6 +67,20 @@ pub struct Transmission {
     pub(crate) broken: bool,
 }
 
+impl Transmission {
+    /// The longest idle time between two units of `len` bits, start and stop bit included, in bits; for a transmission without
+    /// damage.
+    pub fn longest_idle(&self, len: usize) -> usize {
+        let (mut at, mut longest) = (0, 0);
+        while at < self.image.len() {
+            let idle = (at..self.image.len()).take_while(|k| self.image.get(*k)).count();
+            longest = longest.max(if at > 0 && at + idle < self.image.len() { idle } else { 0 });
+            at += idle + len;
+        }
+        longest
+    }
+}
+
 /// A unit that the host was given.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Handed {

@@ -44,7 +44,7 @@ pub(super) struct Outcome {
 pub(super) fn procedure(_: &str, row: ProcedureRow) -> Verdict {
     match row {
         ProcedureRow::EepromRead { ea, addr, steps, expect } => {
-            let mut read = EepromRead::new(address(ea)?, addr);
+            let mut read = EepromRead::new(address(ea)?, addr).knowing_that_none_was_broken_off();
             let end = drive(&steps, read.start(0), |outcome, now_ns| read.receive(outcome, now_ns))?;
             let real = match end {
                 Ok(data) => Outcome { data: Some(data), ..Outcome::default() },

@@ -1,0 +1,237 @@
+//! Single transactions and buses on the hostile line, and the laws that they keep.
+
+use nikon_aformat::bus::Addresses;
+use nikon_aformat::device::{Device, Encoders, Fault};
+use nikon_aformat::master::{BusTransaction, Line, Progress, Transaction};
+use nikon_aformat::{BitRate, EncoderAddress, Operation, Request, Resolution};
+use servowire_world::{Id, Scenario, Speaker, Tally, Transmission, Verdict};
+
+use super::line::{Bench, between_ns, frame_ns, host_within, idle_ns};
+use super::switches::{Mix, Switches};
+
+/// What a run depends on.
+#[derive(Debug, Clone)]
+pub struct Setup {
+    /// To repeat it by.
+    pub seed: u64,
+    pub rate: BitRate,
+    pub scenario: Scenario,
+    pub switches: Switches,
+    /// Nothing happens to the line: then nothing may be lost or mistaken.
+    pub quiet: bool,
+}
+
+/// Encoders that behave as the switches say; those that are not `present` are silent.
+fn encoders<const N: usize>(
+    rate: BitRate,
+    addresses: [u8; N],
+    present: Addresses,
+    switches: Switches,
+) -> Encoders<N, 2> {
+    let mut index = 0;
+    let all = addresses.map(|ea| {
+        let address = EncoderAddress::truncate(ea);
+        let mut device = Device::new(address, Resolution::default(), rate);
+        device.set_behaviour(switches.behaviour(ea, index));
+        if present.has(address) {
+            index += 1;
+        } else {
+            device.set_fault(Fault::Silent);
+        }
+        device
+    });
+    Encoders { all }
+}
+
+/// What a run has shown.
+#[derive(Debug, Default)]
+pub struct Shown {
+    runs: u64,
+    good: u64,
+    failed: u64,
+    /// Not seen by the CRC-8, or a foreign speaker's.
+    unknown: u64,
+    forged: u64,
+    pub mix: Mix,
+    pub tally: Tally,
+}
+
+/// Whether the request was on the line only when the master believed, so that it can know the age of an answer. What a
+/// repetition adds does not count: encoders may answer the first.
+fn on_time<const N: usize>(bench: &Bench<N>, id: Id, at_ns: u64) -> bool {
+    let sent = bench.world.truth().transmission(id);
+    sent.is_some_and(|sent| sent.start_ns >= at_ns && sent.sent_ns <= at_ns + frame_ns(bench.rate))
+}
+
+fn judge<const N: usize>(bench: &Bench<N>, id: Id, value: u64, shown: &mut Shown, setup: &Setup) -> Verdict {
+    let Setup { seed, quiet, .. } = *setup;
+    let truth = bench.world.truth();
+    let verdict = truth.verdict(id, value);
+    match verdict {
+        Verdict::Fresh => {}
+        Verdict::Old { of } => panic!("seed {seed}: {value:#x} of {of:?} is older than {id:?}"),
+        // Only where something was damaged, repeated or lost, which the CRC-8 does not see once in 256 times; and only what a
+        // foreign speaker or a delay, of the answer or of its request, put there.
+        Verdict::Unknown => {
+            let damaged = !truth.undisturbed(id) || truth.answers(id).any(|answer| !answer.intact);
+            assert!(damaged, "seed {seed}: nobody sent {value:#x}");
+            shown.unknown += 1;
+        }
+        Verdict::Forged { of } => {
+            let forger = truth.transmission(of).unwrap();
+            let is_late = |t: &Transmission| t.start_ns > t.asked_ns || t.end_ns > t.sent_ns;
+            let request = forger.answers.and_then(|request| truth.transmission(request));
+            let late = is_late(forger) || request.is_none_or(is_late);
+            // Noise can be a request.
+            let foreign = forger.speaker == Speaker::Foreign || request.is_some_and(|t| t.speaker != Speaker::Host);
+            assert!(late || foreign, "seed {seed}: {forger:?} is no answer to {id:?}");
+            shown.forged += 1;
+        }
+    }
+    assert!(verdict == Verdict::Fresh || !quiet, "seed {seed}: {verdict:?} on a quiet line");
+    verdict
+}
+
+/// Law 4: no encoder speaks at `ready_ns` or later that began in time, which for the last of `places` on a bus is as many
+/// longest responses and pauses later. A request that the line repeats is answered twice.
+fn line_is_free<const N: usize>(bench: &Bench<N>, id: Id, at_ns: u64, ready_ns: u64, places: u64, seed: u64) {
+    let truth = bench.world.truth();
+    if truth.transmission(id).is_none_or(|sent| sent.end_ns > sent.sent_ns) {
+        return;
+    }
+    let longest_ns = |units: u64| units * frame_ns(bench.rate) + (units - 1) * idle_ns(bench.rate);
+    let places_ns = (places - 1) * (longest_ns(4) + between_ns(bench.rate));
+    let last_ns = at_ns + frame_ns(bench.rate) + TIMEOUT_NS + places_ns;
+    let in_time = |t: &&Transmission| {
+        t.answers == Some(id)
+            && t.start_ns <= last_ns
+            && t.end_ns - t.start_ns <= longest_ns(t.units as u64)
+            && matches!(t.speaker, Speaker::Device(_))
+    };
+    let late = truth.speaking_from(ready_ns).find(in_time);
+    assert!(late.is_none(), "seed {seed}: ready at {ready_ns}, but {late:?}");
+}
+
+/// How long the masters of these tests wait for a response: the longest turn-around time of the switches, and the longest time
+/// after which a host of the world sees that the line is idle.
+const TIMEOUT_NS: u64 = 25_000;
+
+fn line(rate: BitRate) -> Line {
+    Line::new(rate).with_response_timeout_ns(TIMEOUT_NS as u32)
+}
+
+/// `turns` requests to one of three encoders after the other.
+pub fn single(setup: &Setup, turns: u64, shown: &mut Shown) {
+    let Setup { seed, rate, switches, quiet, .. } = *setup;
+    let line = line(rate);
+    let scenario = host_within(setup.scenario.clone(), line.latency_ns);
+    switches.note(&mut shown.mix);
+    let mut bench = Bench::new(encoders(rate, [0, 3, 6], Addresses::ALL, switches), rate, scenario);
+    let mut at_ns = 1_000;
+    let failed = shown.failed;
+    for turn in 0..turns {
+        let ea = EncoderAddress::truncate([0, 3, 6][(turn % 3) as usize]);
+        let request = Request::new(ea, Operation::Abs40);
+        let mut transaction = Transaction::start(request, Resolution::default(), line, at_ns);
+        let id = bench.send(transaction.frames(), at_ns);
+        let end = loop {
+            match transaction.progress() {
+                Progress::Pending { until_ns } => match bench.next(until_ns) {
+                    Ok(block) => drop(transaction.block(&block.frames, block.since_ns, block.end_ns)),
+                    Err(now_ns) => drop(transaction.poll(now_ns)),
+                },
+                end => break end,
+            }
+        };
+        let known = on_time(&bench, id, at_ns);
+        // Who believes a forged answer does not know that the true one is still to come.
+        let mut believed = Verdict::Fresh;
+        let ready_ns = match end {
+            Progress::Done { value, ready_ns } => {
+                shown.good += 1;
+                if known {
+                    believed = judge(&bench, id, value.response.abs40().unwrap().get(), shown, setup);
+                    let sent_ns = at_ns + frame_ns(rate);
+                    assert!(value.sampled.earliest_ns.abs_diff(sent_ns) <= 1 && value.sampled.latest_ns >= sent_ns);
+                }
+                ready_ns
+            }
+            Progress::Failed { error, ready_ns } => {
+                shown.failed += 1;
+                let mut intact = bench.world.truth().intact_answers(id);
+                let lost = intact.find(|t| {
+                    t.units == 4
+                        && t.speaker == Speaker::Device((turn % 3) as u8)
+                        && t.delivered_ns < bench.world.now_ns()
+                });
+                assert!(
+                    !known || lost.is_none_or(|t| bench.is_excused(t)),
+                    "seed {seed} turn {turn}: {error}, but {lost:?}"
+                );
+                ready_ns
+            }
+            Progress::Pending { .. } => unreachable!(),
+        };
+        if known && believed == Verdict::Fresh {
+            line_is_free(&bench, id, at_ns, ready_ns, 1, seed);
+        }
+        at_ns = bench.world.now_ns().max(ready_ns) + turn % 7 * 100;
+        bench.world.truth_mut().forget_before(at_ns.saturating_sub(2_000_000));
+    }
+    if quiet && bench.world.host().fifo == 0 {
+        assert_eq!(failed, shown.failed, "seed {seed}: on a quiet line nothing is lost, {:?}", bench.world.host());
+    }
+    shown.runs += 1;
+    shown.tally.add(bench.world.tally());
+}
+
+/// `turns` requests to some of the encoders that are there, and to some that are not.
+pub fn bus(setup: &Setup, turns: u64, shown: &mut Shown) {
+    let Setup { seed, rate, switches, .. } = *setup;
+    let line = line(rate);
+    let scenario = host_within(setup.scenario.clone(), line.latency_ns);
+    switches.note(&mut shown.mix);
+    let present = switches.present();
+    let mut bench = Bench::new(encoders(rate, [0, 1, 2, 3, 4, 5, 6, 7], present, switches), rate, scenario);
+    let mut at_ns = 1_000;
+    for turn in 0..turns {
+        let asked = Addresses::from_bits((seed.wrapping_mul(0x9e37_79b9) >> (turn % 24)) as u8 | 1 << (turn % 8));
+        let request = Request::new(asked.highest().unwrap(), Operation::Abs40Mt);
+        let mut transaction = BusTransaction::start(request, Resolution::default(), asked, line, at_ns);
+        let id = bench.send(transaction.frames(), at_ns);
+        let ready_ns = loop {
+            match transaction.progress() {
+                Progress::Pending { until_ns } => match bench.next(until_ns) {
+                    Ok(block) => drop(transaction.block(&block.frames, block.since_ns, block.end_ns)),
+                    Err(now_ns) => drop(transaction.poll(now_ns)),
+                },
+                Progress::Done { ready_ns, .. } => break ready_ns,
+                Progress::Failed { error, .. } => panic!("seed {seed}: {error}"),
+            }
+        };
+        if on_time(&bench, id, at_ns) {
+            for ea in asked.iter() {
+                if let Some(reading) = transaction.reading(ea) {
+                    shown.good += 1;
+                    let _ = judge(&bench, id, reading.response.abs40().unwrap().get(), shown, setup);
+                    continue;
+                }
+                shown.failed += 1;
+                let mut intact = bench.world.truth().intact_answers(id);
+                let lost = intact.find(|t| {
+                    t.units == 4 && t.speaker == Speaker::Device(ea.get()) && t.delivered_ns < bench.world.now_ns()
+                });
+                let doubled = transaction.bus().duplicates().has(ea);
+                assert!(
+                    doubled || lost.is_none_or(|t| bench.is_excused(t)),
+                    "seed {seed} turn {turn}: {ea} lost, {lost:?}"
+                );
+            }
+            line_is_free(&bench, id, at_ns, ready_ns, 8, seed);
+        }
+        at_ns = bench.world.now_ns().max(ready_ns);
+        bench.world.truth_mut().forget_before(at_ns.saturating_sub(2_000_000));
+    }
+    shown.runs += 1;
+    shown.tally.add(bench.world.tally());
+}
