@@ -129,3 +129,49 @@ fn the_sign_of_the_clock_offset() {
     };
     assert_eq!((place(0), place(10_000), place(-10_000)), (480, 484, 475));
 }
+
+/// What the receiver does by itself: three tries of 64 H-frames for a short message, 32,000 H-frames for a long one, 369 ms free
+/// running.
+#[test]
+fn how_long_a_message_is_waited_for() {
+    let limits = Dialect::SICK.messages;
+    assert_eq!((limits.short_tries, limits.short_frames, limits.long_frames), (3, 64, 32_000));
+    assert_eq!(Dialect::TI.messages, limits);
+}
+
+/// A V-frame with a wrong CRC aligns nothing: the default dialect begins anew and says so, the SDK's firmware compares with
+/// the last good position.
+#[test]
+fn a_safe_position_of_before() {
+    for (dialect, phase, doubtful) in
+        [(Dialect::SICK, hdsl::Phase::Position, true), (Dialect::TI, hdsl::Phase::Check, false)]
+    {
+        let mut bench = Bench::on_cable(dialect, 10);
+        bench.lock();
+        bench.frames(40);
+        bench.device.faults.bad_crc = true;
+        while bench.master.counters().safe1 == 0 {
+            let _ = bench.frame();
+        }
+        assert_eq!((bench.master.phase(), bench.master.report().doubtful), (phase, doubtful));
+    }
+}
+
+/// A request that the encoder has not answered yet is dropped by INIT: nothing comes afterwards.
+#[test]
+fn a_request_that_waits_at_the_encoder() {
+    let mut bench = Bench::on_cable(Dialect::SICK, 10);
+    bench.lock();
+    bench.device.behaviour.latency = 40;
+    bench.master.start_short(ShortRequest::Read(RemoteRegister::PING)).unwrap();
+    // Six nibbles and an IDLE: the encoder has it.
+    bench.frames(10);
+    bench.master.reset_messages().unwrap();
+    for _ in 0..120 {
+        let head = bench.master.transmission().head.bits();
+        let bits = bench.device.answer(head, bench.position as u64).unwrap();
+        let symbol = hdsl::Answer::from_bits(hdsl::Rule::Strict, bits).parameter().unwrap().symbol();
+        assert!(matches!(symbol, Ok(EncoderSymbol::Idle | EncoderSymbol::Init)), "{symbol:?}");
+        bench.master.finish_bits(bits, None, None);
+    }
+}
