@@ -202,7 +202,7 @@ pub fn master(mut data: &[u8]) {
         let content = u16::from_le_bytes([event[0], event[1]]);
         // The lowest bits say how many frames come at once, and since when.
         let block = [Some(content), None, Some(!content), Some(content)];
-        let block = &block[..usize::from(event[2] >> 3 & 3) + 1];
+        let block = &block[..=usize::from(event[2] >> 3 & 3)];
         let since_ns = if event[2] & 0x80 == 0 { 0 } else { now_ns };
         let after = match event[2] {
             0 => single.framing_error(now_ns),
