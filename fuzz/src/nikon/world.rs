@@ -5,7 +5,7 @@ use servowire_world::Scenario;
 
 use crate::byte;
 
-#[allow(dead_code, unreachable_pub, clippy::pedantic, reason = "what the tests share; not all of it is used")]
+#[allow(clippy::pedantic, reason = "what the tests share")]
 #[path = "../../../nikon-aformat/tests/common/mod.rs"]
 mod common;
 
