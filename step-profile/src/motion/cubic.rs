@@ -209,12 +209,12 @@ impl<W: Word> Cubic<W> {
     /// Ticks for a way: no more than the speed alone would take, and half a power of 2 that h or j alone would take.
     fn at_most(&self, need: W) -> u64 {
         let mut guess = need.quotient(self.v).and_then(|ticks| u64::try_from(ticks).ok()).unwrap_or(u64::MAX);
-        for (size, power) in [(self.h, 2), (self.j, 3)] {
-            let bits = size.bits();
-            if bits > 0 {
-                let ticks = need.bits().saturating_add(1).saturating_sub(bits).div_ceil(power);
-                guess = guess.min(1_u64.checked_shl(ticks).unwrap_or(u64::MAX) >> 1);
-            }
+        let doublings = |size: W| need.bits().saturating_add(1).saturating_sub(size.bits());
+        if self.h.bits() > 0 {
+            guess = guess.min(half_power_of_2(doublings(self.h).div_ceil(2)));
+        }
+        if self.j.bits() > 0 {
+            guess = guess.min(half_power_of_2(doublings(self.j).div_ceil(3)));
         }
         guess
     }
@@ -262,4 +262,9 @@ impl<W: Word> Cubic<W> {
             by = next.max(early.saturating_add(1)).min(late.saturating_sub(1));
         }
     }
+}
+
+/// 2^(`doublings` - 1), and 0 for none; no more than half the range.
+fn half_power_of_2(doublings: u32) -> u64 {
+    1_u64.checked_shl(doublings).unwrap_or(u64::MAX) >> 1
 }
