@@ -7,6 +7,9 @@ use crate::encoder_id::PositionBits;
 
 const POSITION: u64 = 0xff_ffff_ffff;
 const VELOCITY: u32 = 0xff_ffff;
+/// Half of what 24 bits hold, in steps a frame. From here to the wrap it takes 4,096 frames of the highest acceleration,
+/// and every eighth is compared with a safe position.
+const FASTEST: i32 = 1 << 22;
 
 /// How velocity and position are calculated.
 ///
@@ -224,13 +227,15 @@ impl PositionTracker {
     /// wrong by a sixteenth of the range passes one comparison; and the velocity has to be below a sixteenth of the range
     /// a frame, since one that is wrong by an eighth of the range passes all of them. So what is given is the truth as
     /// long as the real speed is below that limit, which is above 300 000 revolutions a minute for an encoder that
-    /// counts one turn.
+    /// counts one turn. From 27 bits on the velocity has to be below 2^22 steps a frame as well: beyond twice that it
+    /// leaves its 24 bits. An encoder of 30 bits a turn may then do 20 000 revolutions a minute.
     ///
     /// # Errors
     /// [`Doubt::Estimated`], [`Doubt::Alignment`], [`Doubt::Speed`].
     pub fn fast(&self) -> Result<(u64, i32), Doubt> {
         let velocity = self.velocity();
-        let limit = 1_i32.checked_shl(u32::from(self.bits.get()).saturating_sub(4)).unwrap_or(i32::MAX);
+        let limit =
+            1_i32.checked_shl(u32::from(self.bits.get()).saturating_sub(4)).map_or(FASTEST, |limit| limit.min(FASTEST));
         if self.errors > 0 {
             Err(Doubt::Estimated)
         } else if self.unreliable || self.agreed < 2 {
@@ -411,6 +416,18 @@ mod tests {
             let rule = if ti { PositionRule::Ti } else { PositionRule::Sick };
             let (_, wrong) = truth_or_nothing(rule, bits, start & 0xff_ffff_ffff, speed, &a);
             prop_assert_eq!(wrong, 0);
+        }
+    }
+
+    /// 24 bits of velocity wrap long before a sixteenth of a wide range: no position is given there, on either side.
+    #[test]
+    fn a_velocity_near_its_24_bits_is_not_used() {
+        for bits in 27..=40 {
+            let limit = 1_i64 << (bits - 4);
+            for (speed, a) in [((1_i64 << 23) - 60_000, 1000), (60_000 - (1_i64 << 23), -1000)] {
+                let (_, wrong) = truth_or_nothing(PositionRule::Sick, bits, 77, speed + limit, &[(a, 9); 160]);
+                assert_eq!(wrong, 0, "{bits} {speed}");
+            }
         }
     }
 
