@@ -1,6 +1,5 @@
 //! The command line.
 
-use std::io::{self, Write};
 use std::path::PathBuf;
 use std::process::ExitCode;
 
@@ -9,6 +8,7 @@ use rtex_block::position::Gear;
 
 use crate::capture::{Format, Hints, time};
 use crate::output::filter::Filter;
+use crate::output::say;
 use crate::protocols::{Protocol, Settings, nikon, rtex, tformat};
 use crate::{cnc, decode, line, profile, registers, talk, timing};
 
@@ -66,14 +66,13 @@ impl Cli {
     }
 }
 
-/// Writes to the standard output; somebody who does not read on is no fault.
 fn print(text: &[u8]) -> ExitCode {
-    match io::stdout().lock().write_all(text).and_then(|()| io::stdout().flush()) {
-        Err(e) if e.kind() != io::ErrorKind::BrokenPipe => {
+    match say(format_args!("{}", String::from_utf8_lossy(text))) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(e) => {
             eprintln!("error: cannot write: {e}");
             ExitCode::FAILURE
         }
-        _ => ExitCode::SUCCESS,
     }
 }
 

@@ -9,11 +9,21 @@ pub mod text;
 pub mod vcd;
 
 use std::collections::BTreeMap;
-use std::io;
+use std::fmt;
+use std::io::{self, Write};
 
 use crate::capture::Change;
 use crate::event::{Event, Verdict};
 use crate::protocols::Protocol;
+
+/// Writes to the standard output at once; somebody who does not read on is no fault.
+pub fn say(text: fmt::Arguments) -> io::Result<()> {
+    let mut out = io::stdout().lock();
+    match out.write_fmt(text).and_then(|()| out.flush()) {
+        Err(e) if e.kind() != io::ErrorKind::BrokenPipe => Err(e),
+        _ => Ok(()),
+    }
+}
 
 /// Takes events in the order of the line.
 pub trait Sink {

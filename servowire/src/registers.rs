@@ -12,6 +12,8 @@ use hdsl::message::{Length, ResourceAddress, ResourceError};
 use hdsl::registers::{Online1, Online2, OnlineD, Register, Registers};
 use hdsl::{Dialect, EncoderId, crc16};
 
+use crate::output::say;
+
 /// The register map of a HIPERFACE DSL receiver in words: link, positions, status, events, messages.
 ///
 /// Exit code 0: the map could be read, whatever it says; 2: it could not.
@@ -38,11 +40,8 @@ enum Receiver {
 impl Arguments {
     /// Prints the map. 2: there is none.
     pub fn run(&self) -> ExitCode {
-        match self.text() {
-            Ok(text) => {
-                print!("{text}");
-                ExitCode::SUCCESS
-            }
+        match self.text().and_then(|text| Ok(say(format_args!("{text}"))?)) {
+            Ok(()) => ExitCode::SUCCESS,
             Err(error) => {
                 eprintln!("servowire registers: {}: {error}", self.file.display());
                 ExitCode::from(2)

@@ -12,6 +12,8 @@ use std::process::ExitCode;
 
 use clap::{Args, Subcommand};
 
+use crate::output::say;
+
 /// Who is on the line when: the shortest cycle and the worst fault of an exchange with encoders.
 #[derive(Debug, Args)]
 pub struct Arguments {
@@ -50,7 +52,7 @@ impl Arguments {
         if let Some(path) = &self.svg {
             fs::write(path, drawing::svg(&plan)).map_err(|error| format!("{}: {error}", path.display()))?;
         } else {
-            print!("{plan}");
+            say(format_args!("{plan}"))?;
         }
         Ok(())
     }

@@ -165,6 +165,30 @@ fn a_closed_pipe_ends_quietly() {
 }
 
 #[test]
+fn a_closed_pipe_ends_the_other_commands_quietly() {
+    let map = Bench::new();
+    let map = map.file("map.bin", [0; 256]);
+    for arguments in [
+        &["timing", "tformat"][..],
+        &["timing", "nikon"],
+        &["registers", map.to_str().unwrap()],
+        &["completions", "bash"],
+        &["man"],
+    ] {
+        let mut child = Command::new(env!("CARGO_BIN_EXE_servowire"))
+            .args(arguments)
+            .stdout(Stdio::piped())
+            .stderr(Stdio::piped())
+            .spawn()
+            .unwrap();
+        drop(child.stdout.take());
+        let output = child.wait_with_output().unwrap();
+        assert!(output.status.success(), "{arguments:?}");
+        assert!(output.stderr.is_empty(), "{arguments:?}: {}", String::from_utf8_lossy(&output.stderr));
+    }
+}
+
+#[test]
 fn no_progress_bar_without_a_terminal() {
     let bench = Bench::new();
     let mut wave = good_traffic(2.5e6);

@@ -288,6 +288,20 @@ fn a_spoilt_line() {
     assert_eq!((run.json().len(), run.verdicts().iter().filter(|v| **v == "hex").count()), (12, spoilt));
 }
 
+/// The first line may be the spoilt one, with the protocol named or not.
+#[test]
+fn a_log_that_begins_with_a_spoilt_line() {
+    let bench = Bench::new();
+    let text = hex_log(&exchanges()).split_once('\n').unwrap().1.to_owned();
+    let text = text.replacen(text.chars().nth(7).unwrap(), "g", 1);
+    assert!(text.lines().next().unwrap().contains('g'));
+    for options in [&["--protocol", "rtex", "--bytes", "--json"][..], &["--json"]] {
+        let run = bench.decode("log.txt", &text, options);
+        assert_eq!((run.code, run.json().len()), (1, 12), "{options:?}: {}", run.err);
+        assert_eq!(run.verdicts().iter().filter(|v| **v == "hex").count(), 1);
+    }
+}
+
 /// Blocks of 32 bytes are recognised as such: their sub blocks are no drives.
 #[test]
 fn a_log_of_long_blocks() {

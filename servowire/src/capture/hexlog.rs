@@ -21,6 +21,8 @@ const LONGEST: usize = 1 << 16;
 const MOST: usize = 1 << 16;
 /// Lines by which a log is known where nothing else says that it is one.
 const SEEN: usize = 24;
+/// Lines of bytes for each that is none, where nothing else says that it is a log.
+const SOUND: usize = 8;
 
 /// A log of bytes.
 pub struct HexLog {
@@ -80,12 +82,39 @@ pub(super) fn looks_like(head: &[u8]) -> bool {
     if array_begins(text) || Dump::of(text, false).is_some() {
         return true;
     }
-    let mut lines: Vec<&str> = text.lines().collect();
-    if lines.len() > 1 && !text.ends_with('\n') {
-        lines.pop();
+    let Sample { good, bad, bytes } = Sample::of(text);
+    bad.saturating_mul(SOUND) <= good && bytes > 1
+}
+
+/// What the first lines of a text are.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+struct Sample {
+    /// Lines with bytes.
+    good: usize,
+    /// Lines that are something else.
+    bad: usize,
+    bytes: usize,
+}
+
+impl Sample {
+    fn of(text: &str) -> Self {
+        let mut lines: Vec<&str> = text.lines().collect();
+        if lines.len() > 1 && !text.ends_with('\n') {
+            lines.pop();
+        }
+        let mut sample = Self::default();
+        for line in lines.into_iter().take(SEEN) {
+            match words::line(line) {
+                Ok(said) => {
+                    let bytes: usize = said.iter().map(|said| said.bytes.len()).sum();
+                    sample.good += usize::from(bytes > 0);
+                    sample.bytes += bytes;
+                }
+                Err(_) => sample.bad += 1,
+            }
+        }
+        sample
     }
-    let said: Vec<_> = lines.into_iter().take(SEEN).map(words::line).collect();
-    said.iter().all(Result::is_ok) && said.iter().flatten().flatten().map(|said| said.bytes.len()).sum::<usize>() > 1
 }
 
 /// `= {` or `= [` behind a name.
@@ -118,7 +147,11 @@ impl HexLog {
     /// The next burst; none at the end.
     pub fn burst(&mut self) -> Result<Option<Burst>, Fault> {
         if self.shape == Shape::Unknown {
-            self.shape = Self::shape(&String::from_utf8_lossy(self.input.peek()?));
+            let head = String::from_utf8_lossy(self.input.peek()?).into_owned();
+            self.shape = Self::shape(&head);
+            // The first line may be the spoilt one.
+            let Sample { good, bad, .. } = Sample::of(&head);
+            self.good = self.shape == Shape::Lines && good > bad;
         }
         loop {
             if let Some(burst) = self.ready.pop_front() {

@@ -13,7 +13,7 @@ use hdsl::sampling::{Delay, TEST_PATTERN};
 use hdsl::symbol::{RunningDisparity, Word};
 use hdsl::{
     Answer, EncoderByte, EncoderId, EncoderSymbol, Error, MasterSymbol, Phase, PositionBits, PositionTracker,
-    QualityEvent, QualityMonitor, QualityRule, Rule, VFrame, Window,
+    QualityMonitor, QualityRule, Rule, VFrame, Window,
 };
 
 use crate::event::{Direction, Event, Field, NO_RESPONSE, Place, Position, Refusal, Verdict};
@@ -327,8 +327,8 @@ impl Decoder {
     fn v_frame(&mut self, answer: Answer, vsync: bool, place: Place, out: &mut dyn Sink) -> io::Result<()> {
         if let Some(at) = self.at {
             self.frame.put(Rule::Strict, at, answer);
+            self.quality.count_answer(at, &answer);
             if at == 7 {
-                self.quality.count(if vsync { QualityEvent::VsyncOk } else { QualityEvent::VsyncMissing });
                 self.end_v_frame(place, out)?;
             }
             self.at = Some((at + 1) % 8);
@@ -342,7 +342,7 @@ impl Decoder {
     fn end_v_frame(&mut self, place: Place, out: &mut dyn Sink) -> io::Result<()> {
         let VFrame { safe1, safe2 } = self.frame;
         let safe = safe1.position();
-        self.quality.count(if safe.is_ok() { QualityEvent::Safe1Ok } else { QualityEvent::Safe1Error });
+        self.quality.count_v_frame(&self.frame);
         match safe {
             Ok(position) => self.tracker.align(position),
             Err(_) => self.tracker.no_safe_position(),

@@ -14,6 +14,7 @@ use super::Watch;
 use super::link::{Fault, Link};
 use super::port::{self, Port};
 use super::relay::{self, Said};
+use crate::output::say;
 
 /// Bytes of a page; the address behind them selects the page.
 const PAGE_LEN: u8 = 127;
@@ -28,7 +29,7 @@ fn read_all<P: Port>(link: &mut Link<P>) -> Result<AllData, Fault> {
 }
 
 pub(super) fn read<P: Port>(link: &mut Link<P>) -> Done {
-    println!("{}", line(&read_all(link)?));
+    say(format_args!("{}\n", line(&read_all(link)?)))?;
     Ok(ExitCode::SUCCESS)
 }
 
@@ -110,7 +111,7 @@ pub(super) fn relay<M: Port, E: Port>(
             Said::Junk(bytes) => (String::new(), String::new(), format!("no request: {bytes:02x?}")),
         };
         let time = format!("{:.6}", begin.elapsed().as_secs_f64());
-        println!("{time}  {request}  {answer}{fault}");
+        say(format_args!("{time}  {request}  {answer}{fault}\n"))?;
         if let Some(csv) = &mut csv {
             csv.write_record([time, request, answer, fault]).map_err(io::Error::from)?;
             csv.flush()?;
@@ -131,11 +132,11 @@ pub(super) fn info<P: Port>(link: &mut Link<P>, name: &str, rate: BitRate) -> Do
         }
         None => "not documented".to_owned(),
     };
-    println!("encoder ID {:#04x}: {widths}", all.enid);
-    println!("{}", line(&all));
-    println!("the adapter {}", if link.echo() { "hears itself" } else { "does not hear itself" });
+    say(format_args!("encoder ID {:#04x}: {widths}\n", all.enid))?;
+    say(format_args!("{}\n", line(&all)))?;
+    say(format_args!("the adapter {}\n", if link.echo() { "hears itself" } else { "does not hear itself" }))?;
     for line in port::about(name, rate) {
-        println!("{line}");
+        say(format_args!("{line}\n"))?;
     }
     Ok(ExitCode::SUCCESS)
 }
@@ -146,7 +147,7 @@ pub(super) fn clear_errors<P: Port>(link: &mut Link<P>) -> Done {
     let first = reset.start(link.now_ns());
     link.run(first, |outcome, now_ns| reset.receive(outcome, now_ns))?;
     let after = read_all(link)?.almc;
-    println!("alarms before: {}; after: {}", name(before), name(after));
+    say(format_args!("alarms before: {}; after: {}\n", name(before), name(after)))?;
     Ok(if after.is_empty() { ExitCode::SUCCESS } else { ExitCode::FAILURE })
 }
 
@@ -226,13 +227,12 @@ pub(super) fn restore<P: Port>(link: &mut Link<P>, file: &Path, yes: bool) -> Do
             }
         }
     }
-    println!("{written} bytes were different; they were written and read back");
+    say(format_args!("{written} bytes were different; they were written and read back\n"))?;
     Ok(ExitCode::SUCCESS)
 }
 
 fn confirmed(enid: u8) -> Result<bool, Fault> {
-    print!("The EEPROM of encoder ID {enid:#04x} will be overwritten. Type yes: ");
-    io::stdout().flush()?;
+    say(format_args!("The EEPROM of encoder ID {enid:#04x} will be overwritten. Type yes: "))?;
     let mut answer = String::new();
     io::stdin().lock().read_line(&mut answer)?;
     Ok(answer.trim() == "yes")
