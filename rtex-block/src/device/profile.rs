@@ -90,6 +90,18 @@ mod tests {
         }
     }
 
+    /// 35, 30, 25 ... 5 thousand units a second, 0.5 ms each, are 70 units.
+    #[test]
+    fn the_speed_from_which_the_target_can_be_reached() {
+        let ramp = Ramp { up: 1_000_000_000, down: 10_000_000 };
+        let mut generator = Generator::new(70);
+        let steps: [(i32, bool); 8] = core::array::from_fn(|_| generator.step(1_000_000, ramp, 500_000));
+        assert_eq!(steps[0], (17, false));
+        assert_eq!(steps[7].1, true);
+        assert!(steps.windows(2).all(|pair| pair[1].0 <= pair[0].0), "{steps:?}");
+        assert_eq!(steps.iter().map(|step| step.0).sum::<i32>(), 70);
+    }
+
     #[test]
     fn braking_ends() {
         let ramp = Ramp { up: 10_000_000, down: 10_000_000 };

@@ -49,7 +49,7 @@ pub(super) fn read(file: &str, text: &str) -> Result<Vec<Line>, Fault> {
     let program = gcode::parse(text).map_err(|diagnostics| {
         let first = diagnostics.iter().next();
         let (line, what) = first.map_or((0, String::new()), |d| (d.span.line, d.kind.to_string()));
-        fault(line, format!("this is no G-code ({what}); comments are in parentheses or begin with ;"))
+        fault(line, format!("this is no G-code ({what}); comments are in parentheses or begin with ;, and values are numbers, not variables"))
     })?;
     let (at, lines) = ([0.0; AXES], Vec::new());
     let mut state = State { text, at, motion: None, feed: None, unit: 1.0, relative: false, lines };
@@ -254,7 +254,7 @@ mod tests {
             ("M6", "M6 is not in the subset"),
             ("G90", "no motion in it"),
             ("", "part.nc: no motion in it"),
-            ("G0 X#1", "write the number"),
+            ("G0 X#1", "values are numbers, not variables"),
             ("hello world", "line 1"),
         ] {
             assert!(refused(text).contains(want), "{text}: {}", refused(text));

@@ -14,7 +14,7 @@ type Point = [i32; 2];
 /// use step_profile::motion::Arc;
 /// // A quarter of a circle of 10 mm, counter-clockwise, in µm, exact to 5 µm.
 /// let chords: Vec<_> = Arc::new([10_000, 0], [0, 10_000], [0, 0], false, 5)?.collect();
-/// assert_eq!((chords.len(), chords[15]), (16, [0, 10_000]));
+/// assert_eq!((chords.len(), chords[31]), (32, [0, 10_000]));
 /// # Ok::<_, step_profile::Error>(())
 /// ```
 #[derive(Debug, Clone)]
