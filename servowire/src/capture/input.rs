@@ -164,7 +164,7 @@ impl Input {
         }
     }
 
-    /// The beginning of the file without taking it: [`HEAD`] bytes, or all there are.
+    /// The beginning of the file without taking it: 4 KiB, or all there are.
     pub fn peek(&mut self) -> Result<&[u8], Fault> {
         while self.head.len() < HEAD && self.head_taken == 0 && (self.head.is_empty() || !self.waits()) {
             let name = &self.name;
