@@ -7,7 +7,7 @@ use rtex_block::inspect::inspect;
 use rtex_block::master::{ActiveCode, Axis, AxisConfig, AxisState, Limits, Received, Ring};
 use rtex_block::{
     Alarm, Command, Command32, CommandBlock, ControlBits, Error, MacId, NonCyclicCode, NonCyclicCommand,
-    NonCyclicResponse, Response, Response32, TypeCode, stream,
+    NonCyclicResponse, Response, Response32, stream,
 };
 
 use crate::byte;
@@ -133,20 +133,6 @@ pub fn log(mut data: &[u8]) {
 
 const LIMIT: u16 = 4;
 
-const CODES: OpenCodes = OpenCodes {
-    profile_absolute: 0x10,
-    parameter_read: TypeCode::short(0x10),
-    parameter_store: TypeCode::short(0x21),
-    alarm_active: TypeCode::short(0x01),
-    alarm_history: TypeCode::short(0x02),
-    alarm_clear: TypeCode::short(0x03),
-    alarm_attributes: TypeCode::short(0x76),
-    parameter_initial: TypeCode::short(0x77),
-    latch_arm: 0x78,
-    homing: 0x79,
-    communication_lost: Alarm { main: 80, sub: 0 },
-};
-
 /// A master and two drives on a line that the input spoils: no NOP once started, nothing but servo-off after a failure, and
 /// when all is well again the ring can be switched on.
 ///
@@ -161,8 +147,9 @@ pub fn ring(mut data: &[u8]) {
         let mode = ActiveCode::CyclicPosition;
         Axis::new(AxisConfig::new(mac_id(place), mode, 500_000, limits))
     };
-    let drive =
-        |place| Drive::new(DriveConfig::new(mac_id(place), CODES).with_fault_limit(LIMIT).with_lost_limit(LIMIT));
+    let drive = |place| {
+        Drive::new(DriveConfig::new(mac_id(place), OpenCodes::INVENTED).with_fault_limit(LIMIT).with_lost_limit(LIMIT))
+    };
     let mut ring = Ring::new([axis(0), axis(1)], 2).expect("two addresses");
     let mut drives = [drive(0), drive(1)];
     let mut responses = [Received::Nothing; 2];
@@ -245,7 +232,7 @@ fn recover(ring: &mut Ring<2>, drives: &mut [Drive; 2], mut responses: [Received
 /// Any blocks to a drive of either size: it never stops answering under its own address, and echoes the counter.
 pub fn drive(data: &[u8]) {
     let mac_id = MacId::new(5).expect("below 32");
-    let config = DriveConfig::new(mac_id, CODES).with_sync_exchanges(2).with_servo_on_updates(1);
+    let config = DriveConfig::new(mac_id, OpenCodes::INVENTED).with_sync_exchanges(2).with_servo_on_updates(1);
     let (mut short, mut long) = (Drive::new(config), Drive::new(config));
     for block in data.chunks_exact(16).filter_map(|block| block.first_chunk()) {
         let response = Response::parse_strict(&short.exchange(block));

@@ -12,24 +12,7 @@ use rtex_block::master::procedure::{
 };
 use rtex_block::master::{ActiveCode, Axis, AxisConfig, AxisState, CommandCounter, Limits, Progress, Received, Turn};
 use rtex_block::type_code::{Pr, monitor, parameter, profile, system_id};
-use rtex_block::{
-    Alarm, Arguments, ControlBits, MacId, Nibble, NonCyclicCommand, Response32, StatusFlags, SubCode, TypeCode,
-};
-
-/// Numbers that the documents at hand do not confirm; a model needs some.
-const CODES: OpenCodes = OpenCodes {
-    profile_absolute: 0x10,
-    parameter_read: TypeCode::short(0x10),
-    parameter_store: TypeCode::short(0x21),
-    alarm_active: TypeCode::short(0x01),
-    alarm_history: TypeCode::short(0x02),
-    alarm_clear: TypeCode::short(0x03),
-    alarm_attributes: TypeCode::short(0x76),
-    parameter_initial: TypeCode::short(0x77),
-    latch_arm: 0x78,
-    homing: 0x79,
-    communication_lost: Alarm { main: 80, sub: 0 },
-};
+use rtex_block::{Alarm, Arguments, ControlBits, MacId, Nibble, NonCyclicCommand, Response32, StatusFlags, SubCode};
 
 /// An axis, its drive, and a perfect line between them, in blocks of 32 bytes.
 struct Machine {
@@ -94,7 +77,7 @@ fn main() -> Result<(), String> {
     let manners = Manners::POLITE.with_stale_answers(2).with_in_progress_late(6).with_latch_late(3);
     let mut machine = Machine {
         axis: Axis::new(config),
-        drive: Drive::new(DriveConfig::new(mac_id, CODES).with_manners(manners)),
+        drive: Drive::new(DriveConfig::new(mac_id, OpenCodes::INVENTED).with_manners(manners)),
         counter: CommandCounter::new(4),
         sent: Turn::Invalid,
         received: Received::Nothing,
@@ -118,11 +101,11 @@ fn set_up(machine: &mut Machine) -> Result<(), String> {
     let kind = system_id::device_type(kind.as_bytes()).unwrap_or("unknown");
     println!("vendor {}, device type {kind}", String::from_utf8_lossy(vendor.as_bytes()));
     let mut list = [(Pr { class: 8, number: 1 }, 0), (Pr { class: 8, number: 4 }, 0)];
-    let mut backup = Backup::new(CODES.parameter_read);
+    let mut backup = Backup::new(OpenCodes::INVENTED.parameter_read);
     machine.run(|axis| backup.receive(axis, &mut list))?;
     println!("parameters {list:?}");
     list[1].1 = 2_000;
-    let mut restore = Restore::new(CODES.parameter_read);
+    let mut restore = Restore::new(OpenCodes::INVENTED.parameter_read);
     machine.run(|axis| restore.receive(axis, &list))?;
     let feed = Pr { class: 7, number: 35 }.index();
     machine.ask(NonCyclicCommand::Parameter(Arguments { type_code: parameter::WRITE, index: feed, data: 1 }))?;
@@ -133,7 +116,7 @@ fn set_up(machine: &mut Machine) -> Result<(), String> {
 
 /// Cyclic position with velocity feed-forward, while a latch waits and a sub-command reads the speed.
 fn by_the_host(machine: &mut Machine) -> Result<(), String> {
-    let mut latch = Latch::both(CODES.latch_arm, [Nibble::ZERO; 2], 2_000);
+    let mut latch = Latch::both(OpenCodes::INVENTED.latch_arm, [Nibble::ZERO; 2], 2_000);
     let mut caught = Progress::Pending { left: 0 };
     let mut fastest = 0;
     for k in 0..400 {
@@ -172,7 +155,7 @@ fn by_the_drive(machine: &mut Machine) -> Result<(), String> {
     machine.axis.set_move_speed(200_000).map_err(|error| error.to_string())?;
     let ended = machine.run(|axis| axis.take_move().unwrap_or(Progress::Pending { left: 0 }))?;
     println!("motion ended at {}, in position: {}", machine.axis.actual_position(), ended.in_position);
-    let mut home = Home::new(CODES.homing, 4_000);
+    let mut home = Home::new(OpenCodes::INVENTED.homing, 4_000);
     machine.run(|axis| home.receive(axis))?;
     println!("homed, {} from the origin", machine.axis.actual_position());
     machine.until(|machine| machine.axis.can_ask())
@@ -214,13 +197,18 @@ fn an_alarm(machine: &mut Machine) -> Result<(), String> {
     machine.drive.raise(Alarm { main: 16, sub: 0 });
     machine.until(|machine| matches!(machine.axis.state(), AxisState::Stopped(_)))?;
     println!("{}", machine.axis.state());
-    let mut attributes = AlarmAttributes::new(CODES.alarm_attributes);
+    let mut attributes = AlarmAttributes::new(OpenCodes::INVENTED.alarm_attributes);
     println!("{:?}", machine.run(|axis| attributes.receive(axis))?);
     machine.until(|machine| machine.axis.can_ask())?;
-    let (mut history, mut entries) = (AlarmHistory::new(CODES.alarm_history), [Alarm { main: 0, sub: 0 }; 2]);
+    let (mut history, mut entries) =
+        (AlarmHistory::new(OpenCodes::INVENTED.alarm_history), [Alarm { main: 0, sub: 0 }; 2]);
     machine.run(|axis| history.receive(axis, &mut entries))?;
     println!("history {}", entries[0]);
-    machine.ask(NonCyclicCommand::Alarm(Arguments { type_code: CODES.alarm_clear, index: 0, data: 0 }))?;
+    machine.ask(NonCyclicCommand::Alarm(Arguments {
+        type_code: OpenCodes::INVENTED.alarm_clear,
+        index: 0,
+        data: 0,
+    }))?;
     machine.axis.clear();
     machine.switch_on()?;
     println!("{} again, {} blocks good", machine.axis.state(), machine.axis.counters().good());

@@ -7,22 +7,7 @@ use core::num::NonZeroU16;
 use rtex_block::device::{Drive, DriveConfig, OpenCodes};
 use rtex_block::inspect::inspect;
 use rtex_block::master::{ActiveCode, Axis, AxisConfig, AxisState, Limits, Received, Ring, SameMacId};
-use rtex_block::{Alarm, Command32, MacId, Response, TypeCode};
-
-/// Numbers that the documents at hand do not confirm; a model needs some.
-const CODES: OpenCodes = OpenCodes {
-    profile_absolute: 0x10,
-    parameter_read: TypeCode::short(0x10),
-    parameter_store: TypeCode::short(0x21),
-    alarm_active: TypeCode::short(0x01),
-    alarm_history: TypeCode::short(0x02),
-    alarm_clear: TypeCode::short(0x03),
-    alarm_attributes: TypeCode::short(0x76),
-    parameter_initial: TypeCode::short(0x77),
-    latch_arm: 0x78,
-    homing: 0x79,
-    communication_lost: Alarm { main: 80, sub: 0 },
-};
+use rtex_block::{Command32, MacId, Response};
 
 fn main() -> Result<(), SameMacId> {
     let mac_id = MacId::new(5).unwrap_or_default();
@@ -30,7 +15,8 @@ fn main() -> Result<(), SameMacId> {
     let limits = Limits::new(some, 50).with_ready(200);
     let axis = Axis::new(AxisConfig::new(mac_id, ActiveCode::CyclicPosition, 500_000, limits));
     let mut ring = Ring::new([axis], 2)?;
-    let mut drive = Drive::new(DriveConfig::new(mac_id, CODES).with_sync_exchanges(4).with_servo_on_updates(2));
+    let mut drive =
+        Drive::new(DriveConfig::new(mac_id, OpenCodes::INVENTED).with_sync_exchanges(4).with_servo_on_updates(2));
     let mut received = Received::Nothing;
     let mut before = None;
     for _ in 0..16 {

@@ -16,27 +16,13 @@ use core::num::NonZeroU16;
 use rtex_block::device::{Drive, DriveConfig, OpenCodes};
 use rtex_block::master::{ActiveCode, Axis, AxisConfig, AxisState, Limits, Received, Ring};
 use rtex_block::position::step;
-use rtex_block::{Alarm, Command, CommandBlock, MacId, Response, TypeCode};
+use rtex_block::{Alarm, Command, CommandBlock, MacId, Response};
 
 const AXES: usize = 32;
 const LIMIT: u16 = 8;
 /// Update periods from a fault until every servo is off: the limit that notices it, one for the command to get there,
 /// one for the drive to obey.
 const OFF_WITHIN: u32 = LIMIT as u32 + 2;
-
-const CODES: OpenCodes = OpenCodes {
-    profile_absolute: 0x10,
-    parameter_read: TypeCode::short(0x10),
-    parameter_store: TypeCode::short(0x21),
-    alarm_active: TypeCode::short(0x01),
-    alarm_history: TypeCode::short(0x02),
-    alarm_clear: TypeCode::short(0x03),
-    alarm_attributes: TypeCode::short(0x76),
-    parameter_initial: TypeCode::short(0x77),
-    latch_arm: 0x78,
-    homing: 0x79,
-    communication_lost: Alarm { main: 80, sub: 0 },
-};
 
 fn axis(number: u8) -> Axis {
     let limit = NonZeroU16::new(LIMIT).unwrap();
@@ -80,7 +66,9 @@ impl Bench {
         let number = |k: usize| k as u8;
         Self {
             ring: Ring::new(core::array::from_fn(|k| axis(number(k))), invalid).unwrap(),
-            drives: core::array::from_fn(|k| Drive::new(DriveConfig::new(MacId::new(number(k)).unwrap(), CODES))),
+            drives: core::array::from_fn(|k| {
+                Drive::new(DriveConfig::new(MacId::new(number(k)).unwrap(), OpenCodes::INVENTED))
+            }),
             lines: [Line::Good; AXES],
             responses: [Received::Nothing; AXES],
             commands: core::array::from_fn(|k| Command::nop(MacId::new(number(k)).unwrap())),

@@ -11,14 +11,12 @@
 )]
 
 mod frames;
-
-use std::future::Future;
-use std::pin::pin;
-use std::task::{Context, Poll, Waker};
+mod polls;
 
 use frames::{Bench, Port, RATES, Shared, deliveries, host, line};
 use nikon_aformat::bus::Addresses;
 use nikon_aformat::{EncoderAddress, Operation, Resolution};
+use polls::{FOR_EVER, run};
 use servowire_drivers::Error;
 use servowire_drivers::nikon::asynch::Master;
 use servowire_world::{Kind, Scenario, Tally, Transmission, Verdict};
@@ -27,18 +25,6 @@ fn driver(bench: &Shared) -> Master<Port, Port> {
     let port = Port(bench.clone());
     Master::new(port.clone(), port, Resolution::default(), line())
 }
-
-/// Polls at most `most` times.
-fn run<T>(future: impl Future<Output = T>, most: usize) -> Option<T> {
-    let mut future = pin!(future);
-    let mut context = Context::from_waker(Waker::noop());
-    (0..most).find_map(|_| match future.as_mut().poll(&mut context) {
-        Poll::Ready(value) => Some(value),
-        Poll::Pending => None,
-    })
-}
-
-const FOR_EVER: usize = 1_000_000;
 
 #[test]
 fn a_future_may_be_dropped_at_any_point() {

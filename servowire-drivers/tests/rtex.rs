@@ -14,6 +14,8 @@
 )]
 
 mod asic;
+#[cfg(feature = "async")]
+mod polls;
 
 use std::marker::PhantomData;
 use std::num::NonZeroU16;
@@ -298,13 +300,12 @@ fn hostile_events_are_over_with_the_next_call() {
 /// The pin of XSYNC: an edge at each frame, but for those that are lost.
 #[cfg(feature = "async")]
 mod asynch {
-    use std::future::{Future, poll_fn};
-    use std::pin::pin;
-    use std::task::{Context, Poll, Waker};
+    use std::future::poll_fn;
+    use std::task::Poll;
 
     use servowire_drivers::rtex::asynch::Began;
-    use servowire_drivers::{Clock, Timer};
 
+    use super::polls::{FOR_EVER, Looks, run};
     use super::*;
 
     struct Pin {
@@ -343,41 +344,18 @@ mod asynch {
         }
     }
 
-    struct Sleep(Watch);
-
-    impl Clock for Sleep {
-        fn now_ns(&mut self) -> u64 {
-            self.0.now_ns()
-        }
-    }
-
-    impl Timer for Sleep {
-        async fn wait_until(&mut self, ns: u64) {
-            poll_fn(|_| if self.0.now_ns() >= ns { Poll::Ready(()) } else { Poll::Pending }).await;
-        }
-    }
-
-    fn spin<T>(future: impl Future<Output = T>) -> T {
-        let (mut future, mut context) = (pin!(future), Context::from_waker(Waker::noop()));
-        loop {
-            if let Poll::Ready(value) = future.as_mut().poll(&mut context) {
-                return value;
-            }
-        }
-    }
-
     #[test]
     fn a_lost_edge_is_healed_by_the_clock() {
         let ring = Ring::new(false, false);
         let started = on::<u16>(&ring);
         let (port, watch, master) = started.release();
         let reception = ring.borrow().reception();
-        let mut driver = Driver::new(port, Sleep(watch), master, reception);
+        let mut driver = Driver::new(port, Looks(watch), master, reception);
         let mut pin = Pin { ring: ring.clone(), lost: false };
         for k in 0..20 {
             pin.lost = k % 5 == 4;
             ring.borrow_mut().let_in();
-            let (began, exchanged) = spin(driver.next(&mut pin)).unwrap();
+            let (began, exchanged) = run(driver.next(&mut pin), FOR_EVER).unwrap().unwrap();
             assert_eq!(began, if k % 5 == 4 { Began::Clock } else { Began::Edge });
             assert!(!exchanged.torn);
             assert_eq!(driver.master().ring().failure(), None);

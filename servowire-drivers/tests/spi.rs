@@ -12,6 +12,8 @@
 
 mod bench;
 mod frames;
+#[cfg(feature = "async")]
+mod polls;
 
 use std::convert::Infallible;
 
@@ -19,7 +21,7 @@ use embedded_hal::spi::{ErrorType, SpiBus};
 use nikon_aformat::{EncoderAddress, Resolution};
 use servowire_drivers::samples::Order;
 use servowire_drivers::spi::{Sampling, SpiFrames, SpiUart};
-use servowire_drivers::{Automatic, Clock, DriverEnable, Error, nikon, tformat};
+use servowire_drivers::{Automatic, DriverEnable, Error, nikon, tformat};
 use servowire_world::{Fault, Id, Kind, Message, Planned, Scenario, Script, Tally, Truth, Verdict};
 
 /// 2.5 Mbit/s.
@@ -376,48 +378,23 @@ fn faults_of_aformat_are_over_with_the_next_call() {
 #[cfg(feature = "async")]
 #[test]
 fn both_as_futures() {
-    use std::future::{Future, poll_fn};
-    use std::pin::pin;
-    use std::task::{Context, Poll, Waker};
-
-    struct Timer(bench::Watch);
-
-    impl Clock for Timer {
-        fn now_ns(&mut self) -> u64 {
-            self.0.now_ns()
-        }
-    }
-
-    impl servowire_drivers::Timer for Timer {
-        async fn wait_until(&mut self, ns: u64) {
-            poll_fn(|_| if self.0.now_ns() >= ns { Poll::Ready(()) } else { Poll::Pending }).await;
-        }
-    }
-
-    fn run<T>(future: impl Future<Output = T>) -> T {
-        let (mut future, mut context) = (pin!(future), Context::from_waker(Waker::noop()));
-        loop {
-            if let Poll::Ready(value) = future.as_mut().poll(&mut context) {
-                return value;
-            }
-        }
-    }
+    use polls::{FOR_EVER, Looks, run};
 
     let bench = bench::Bench::new(lost(3, 2, Fault::Drop), bench::Misframed::Dropped);
     let mut buffers = ([0; 48], [0; 160]);
     let port = uart(&bench, true, 8, &mut buffers);
-    let timer = Timer(bench::Watch(bench.clone()));
+    let timer = Looks(bench::Watch(bench.clone()));
     let mut encoder = tformat::asynch::Encoder::new(port, Automatic, timer, tformat_line());
-    assert!(run(encoder.read_all()).is_ok());
-    assert!(run(encoder.read_all()).is_err());
-    assert!(run(encoder.read_all()).is_ok());
+    assert!(run(encoder.read_all(), FOR_EVER).unwrap().is_ok());
+    assert!(run(encoder.read_all(), FOR_EVER).unwrap().is_err());
+    assert!(run(encoder.read_all(), FOR_EVER).unwrap().is_ok());
 
     let bench = frames::Bench::with(lost(3, 2, Fault::Drop), 1, false);
     let mut buffers = ([0; 96], [0; 400]);
     let port = frame_port(&bench, 8, &mut buffers);
     let clock = frames::Port(bench.clone());
     let mut master = nikon::asynch::Master::new(port, clock, Resolution::default(), frames::line());
-    assert!(run(master.read_abs40(EncoderAddress::ZERO)).is_ok());
-    assert!(run(master.read_abs40(EncoderAddress::ZERO)).is_err());
-    assert!(run(master.read_abs40(EncoderAddress::ZERO)).is_ok());
+    assert!(run(master.read_abs40(EncoderAddress::ZERO), FOR_EVER).unwrap().is_ok());
+    assert!(run(master.read_abs40(EncoderAddress::ZERO), FOR_EVER).unwrap().is_err());
+    assert!(run(master.read_abs40(EncoderAddress::ZERO), FOR_EVER).unwrap().is_ok());
 }

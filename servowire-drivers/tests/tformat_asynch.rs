@@ -11,16 +11,17 @@
 )]
 
 mod bench;
+mod polls;
 
 use std::future::{Future, poll_fn};
-use std::pin::pin;
 use std::task::{Context, Poll, Waker};
 
 use bench::{Bench, HAND_OVER_NS, Misframed, Pin, Shared, Uart, Watch, events, line, scenario};
 use embedded_io::{ErrorKind, ErrorType};
+use polls::{FOR_EVER, Looks, run};
+use servowire_drivers::DriverEnable;
 use servowire_drivers::tformat::asynch::Encoder;
 use servowire_drivers::tformat::blocking;
-use servowire_drivers::{Clock, DriverEnable, Timer};
 use servowire_world::{Kind, Scenario, Tally, Transmission, Verdict};
 use tformat::BitRate;
 use tformat::master::Line;
@@ -57,21 +58,7 @@ async fn pause() {
 }
 
 /// Time goes on with every look, and every look may be the last.
-struct AsyncWatch(Watch);
-
-impl Clock for AsyncWatch {
-    fn now_ns(&mut self) -> u64 {
-        self.0.now_ns()
-    }
-}
-
-impl Timer for AsyncWatch {
-    async fn wait_until(&mut self, ns: u64) {
-        poll_fn(|_| if self.0.now_ns() >= ns { Poll::Ready(()) } else { Poll::Pending }).await;
-    }
-}
-
-type Driver = Encoder<AsyncUart, DriverEnable<Pin>, AsyncWatch>;
+type Driver = Encoder<AsyncUart, DriverEnable<Pin>, Looks<Watch>>;
 
 fn driver(bench: &Shared) -> Driver {
     driver_at(bench, Line::new(BitRate::Mbit2_5))
@@ -79,20 +66,8 @@ fn driver(bench: &Shared) -> Driver {
 
 fn driver_at(bench: &Shared, line: Line) -> Driver {
     let pin = DriverEnable(Pin(bench.clone()));
-    Encoder::new(AsyncUart(Uart(bench.clone())), pin, AsyncWatch(Watch(bench.clone())), line)
+    Encoder::new(AsyncUart(Uart(bench.clone())), pin, Looks(Watch(bench.clone())), line)
 }
-
-/// Polls at most `most` times.
-fn run<T>(future: impl Future<Output = T>, most: usize) -> Option<T> {
-    let mut future = pin!(future);
-    let mut context = Context::from_waker(Waker::noop());
-    (0..most).find_map(|_| match future.as_mut().poll(&mut context) {
-        Poll::Ready(value) => Some(value),
-        Poll::Pending => None,
-    })
-}
-
-const FOR_EVER: usize = 1_000_000;
 
 /// Dropped after each number of polls: the driver is off at once, and the next call is good.
 #[test]

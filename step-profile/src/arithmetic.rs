@@ -98,12 +98,13 @@ mod tests {
         assert_eq!(pru_exact::EXACT_BELOW, 1525 * 4000 + 3999);
     }
 
+    /// All 2^32: five seconds.
     #[test]
-    #[ignore = "2^32 step times, 5 s: cargo test --release -p step-profile --lib -- --ignored every_step_time"]
     fn every_step_time() {
         let mut too_large = 0_u32;
         let mut largest_deficit = 0;
-        for t in 0..=u32::MAX {
+        // An interpreter takes samples, and has no sums to compare.
+        for t in (0..=u32::MAX).step_by(if cfg!(miri) { 99_999_989 } else { 1 }) {
             let Interval { cnt, rest, .. } = pru_exact::interval(t);
             let truth = split(t, 0);
             if cnt == truth.cnt {
@@ -117,7 +118,9 @@ mod tests {
                 largest_deficit = largest_deficit.max(deficit);
             }
         }
-        assert_eq!((too_large, largest_deficit), (377_419_962, 703));
+        if !cfg!(miri) {
+            assert_eq!((too_large, largest_deficit), (377_419_962, 703));
+        }
     }
 
     /// Any number, and every other time one near the end.

@@ -38,6 +38,39 @@ fn runs(name: &str, share: u64, mut one: impl FnMut(u64) -> Bench) {
     }
 }
 
+/// How acts that cannot be undone have ended.
+#[derive(Debug, Default)]
+struct Ends {
+    done: u32,
+    unknown: u32,
+    not_done: u32,
+}
+
+impl Ends {
+    fn count<T>(&mut self, end: &Result<T, Error>) {
+        *match end {
+            Ok(_) => &mut self.done,
+            Err(Error::EffectUnknown { .. }) => &mut self.unknown,
+            Err(_) => &mut self.not_done,
+        } += 1;
+    }
+
+    fn print(&self, name: &str) {
+        println!("{name}: {} done, {} unknown, {} not done", self.done, self.unknown, self.not_done);
+        assert!(self.done > 0 && self.not_done > 0, "{self:?}");
+    }
+}
+
+/// Law 5: one effect at the most, and the end says whether there was one.
+fn done_once_at_most<T>(end: &Result<T, Error>, effects: u32, seed: u64) {
+    assert!(effects <= 1, "{effects} effects, seed {seed}");
+    match end {
+        Ok(_) => assert_eq!(effects, 1, "seed {seed}"),
+        Err(Error::EffectUnknown { .. }) => {}
+        Err(error) => assert!(matches!(error, Error::NotDone { .. }) && effects == 0, "{error}, seed {seed}"),
+    }
+}
+
 fn bench(seed: u64, rates: Rates) -> Bench {
     let rate = BitRate::ALL[(seed / 2) as usize % 2];
     let config = Config::numbered((seed * 37) as u16 % Config::NUMBERED);
@@ -66,7 +99,7 @@ fn hostile_transactions() {
 /// Law 5: one zero at the most, and the three ends mean what they say.
 #[test]
 fn hostile_zero_presets() {
-    let mut ends = [0_u32; 3];
+    let mut ends = Ends::default();
     runs("zero presets", 4, |seed| {
         let mut bench = bench(seed, MILD);
         bench.moves = false;
@@ -75,31 +108,20 @@ fn hostile_zero_presets() {
         let mut zero = SingleTurnZero::set_and_shift_commutation_angle(resolution, 10);
         let step = zero.start(bench.ready_ns);
         let end = bench.run(step, |outcome, ready_ns| zero.receive(outcome, ready_ns));
-        let effects = bench.device.effects();
         if bench.forged_requests > 0 || bench.seen.forged + bench.seen.undetected > 0 {
             return bench;
         }
-        assert!(effects <= 1, "{effects} zeros, seed {seed}");
-        match end {
-            Ok(_) => assert_eq!(effects, 1, "seed {seed}"),
-            Err(Error::EffectUnknown { .. }) => {}
-            Err(error) => assert!(matches!(error, Error::NotDone { .. }) && effects == 0, "{error}, seed {seed}"),
-        }
-        ends[match end {
-            Ok(_) => 0,
-            Err(Error::EffectUnknown { .. }) => 1,
-            Err(_) => 2,
-        }] += 1;
+        done_once_at_most(&end, bench.device.effects(), seed);
+        ends.count(&end);
         bench
     });
-    println!("zero presets: {} done, {} unknown, {} not done", ends[0], ends[1], ends[2]);
-    assert!(ends[0] > 0 && ends[2] > 0, "{ends:?}");
+    ends.print("zero presets");
 }
 
 /// Law 5 for ID C that is read back, with a shaft that trembles on the boundary of a turn.
 #[test]
 fn hostile_turn_zeros() {
-    let mut ends = [0_u32; 3];
+    let mut ends = Ends::default();
     runs("turn zeros", 4, |seed| {
         let mut bench = bench(seed, MILD);
         bench.moves = false;
@@ -109,25 +131,14 @@ fn hostile_turn_zeros() {
         let mut zero = MultiTurnZero::set_and_lose_multi_turn_reference(resolution, 1);
         let step = zero.start(bench.ready_ns);
         let end = bench.run(step, |outcome, ready_ns| zero.receive(outcome, ready_ns));
-        let effects = bench.device.effects();
         if bench.forged_requests > 0 || bench.seen.forged + bench.seen.undetected > 0 {
             return bench;
         }
-        assert!(effects <= 1, "{effects} resets, seed {seed}");
-        match end {
-            Ok(_) => assert_eq!(effects, 1, "seed {seed}"),
-            Err(Error::EffectUnknown { .. }) => {}
-            Err(error) => assert!(matches!(error, Error::NotDone { .. }) && effects == 0, "{error}, seed {seed}"),
-        }
-        ends[match end {
-            Ok(_) => 0,
-            Err(Error::EffectUnknown { .. }) => 1,
-            Err(_) => 2,
-        }] += 1;
+        done_once_at_most(&end, bench.device.effects(), seed);
+        ends.count(&end);
         bench
     });
-    println!("turn zeros: {} done, {} unknown, {} not done", ends[0], ends[1], ends[2]);
-    assert!(ends[0] > 0 && ends[2] > 0, "{ends:?}");
+    ends.print("turn zeros");
 }
 
 /// Law 5 for ID C: two attempts in a row, the second after whatever became of the first.
@@ -176,7 +187,7 @@ fn hostile_error_resets() {
 /// what is there.
 #[test]
 fn hostile_eeprom_writes() {
-    let mut ends = [0_u32; 3];
+    let mut ends = Ends::default();
     runs("EEPROM writes", 4, |seed| {
         let mut bench = bench(seed, MILD);
         let (page, cell, data) = (seed as usize % 8, seed as usize % 127, 0x40 + seed as u8 % 64);
@@ -200,15 +211,10 @@ fn hostile_eeprom_writes() {
             Err(Error::EffectUnknown { .. }) => assert!(written.len() <= 1, "seed {seed}: {written:?}"),
             Err(error) => assert_eq!(written, [], "seed {seed}: {error}"),
         }
-        ends[match end {
-            Ok(_) => 0,
-            Err(Error::EffectUnknown { .. }) => 1,
-            Err(_) => 2,
-        }] += 1;
+        ends.count(&end);
         bench
     });
-    println!("EEPROM writes: {} done, {} unknown, {} refused", ends[0], ends[1], ends[2]);
-    assert!(ends[0] > 0 && ends[2] > 0, "{ends:?}");
+    ends.print("EEPROM writes");
 }
 
 proptest! {

@@ -34,6 +34,23 @@ pub struct OpenCodes {
     pub communication_lost: Alarm,
 }
 
+impl OpenCodes {
+    /// Numbers of no document, for examples and tests in which both ends are this crate's: a real drive has others.
+    pub const INVENTED: Self = Self {
+        profile_absolute: 0x10,
+        parameter_read: TypeCode::short(0x10),
+        parameter_store: TypeCode::short(0x21),
+        alarm_active: TypeCode::short(0x01),
+        alarm_history: TypeCode::short(0x02),
+        alarm_clear: TypeCode::short(0x03),
+        alarm_attributes: TypeCode::short(0x76),
+        parameter_initial: TypeCode::short(0x77),
+        latch_arm: 0x78,
+        homing: 0x79,
+        communication_lost: Alarm { main: 80, sub: 0 },
+    };
+}
+
 /// How a modelled drive is set up.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]

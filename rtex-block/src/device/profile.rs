@@ -97,7 +97,7 @@ mod tests {
         let mut generator = Generator::new(70);
         let steps: [(i32, bool); 8] = core::array::from_fn(|_| generator.step(1_000_000, ramp, 500_000));
         assert_eq!(steps[0], (17, false));
-        assert_eq!(steps[7].1, true);
+        assert!(steps[7].1);
         assert!(steps.windows(2).all(|pair| pair[1].0 <= pair[0].0), "{steps:?}");
         assert_eq!(steps.iter().map(|step| step.0).sum::<i32>(), 70);
     }

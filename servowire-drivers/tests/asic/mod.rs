@@ -6,9 +6,9 @@ use std::cell::RefCell;
 use std::marker::PhantomData;
 use std::rc::Rc;
 
+use rtex_block::MacId;
 use rtex_block::device::{Drive, DriveConfig, OpenCodes};
 use rtex_block::master::{Asic, Slave};
-use rtex_block::{Alarm, MacId, TypeCode};
 use servowire_drivers::Clock;
 use servowire_drivers::rtex::{Port, Reception, Word};
 
@@ -19,20 +19,6 @@ pub const COM_NS: u64 = 500_000;
 const FRAME_NS: u64 = 29_600;
 /// An access to the bus.
 const ACCESS_NS: u64 = 110;
-
-const CODES: OpenCodes = OpenCodes {
-    profile_absolute: 0x10,
-    parameter_read: TypeCode::short(0xc0),
-    parameter_store: TypeCode::short(0xc1),
-    alarm_active: TypeCode::short(0xc2),
-    alarm_history: TypeCode::short(0xc3),
-    alarm_clear: TypeCode::short(0xc4),
-    alarm_attributes: TypeCode::short(0xc5),
-    parameter_initial: TypeCode::short(0xc6),
-    latch_arm: 0xc7,
-    homing: 0xc8,
-    communication_lost: Alarm { main: 80, sub: 0 },
-};
 
 /// The switches of the drives, in the order of the ring.
 pub const SWITCHES: [u8; AXES] = [4, 0, 31];
@@ -82,7 +68,7 @@ impl Ring {
     pub fn new(external: bool, wide: bool) -> Shared {
         let none = Answers { frame: 0, blocks: [[0; 32]; AXES] };
         let drive = |switches: u8| {
-            let config = DriveConfig::new(MacId::new(switches).unwrap(), CODES);
+            let config = DriveConfig::new(MacId::new(switches).unwrap(), OpenCodes::INVENTED);
             Drive::new(if external { config.with_communications(2) } else { config })
         };
         Rc::new(RefCell::new(Self {

@@ -9,7 +9,7 @@ use rtex_block::master::{
 };
 use rtex_block::pack::SizeMismatch;
 use rtex_block::timing::{Periods, TimerSystem};
-use rtex_block::{Alarm, BlockSize, MacId, TypeCode, pack};
+use rtex_block::{BlockSize, MacId, pack};
 
 pub(crate) const AXES: usize = 32;
 
@@ -19,21 +19,6 @@ const WORDS: usize = 4;
 /// Stroke of the motion, command units, and its period, update periods.
 const STROKE: f64 = 100_000.0;
 const PERIOD: f64 = 1_600.0;
-
-/// Numbers that the documents at hand do not confirm; a model needs some.
-const CODES: OpenCodes = OpenCodes {
-    profile_absolute: 0x10,
-    parameter_read: TypeCode::short(0x10),
-    parameter_store: TypeCode::short(0x21),
-    alarm_active: TypeCode::short(0x01),
-    alarm_history: TypeCode::short(0x02),
-    alarm_clear: TypeCode::short(0x03),
-    alarm_attributes: TypeCode::short(0x76),
-    parameter_initial: TypeCode::short(0x77),
-    latch_arm: 0x78,
-    homing: 0x79,
-    communication_lost: Alarm { main: 80, sub: 0 },
-};
 
 /// When the ASIC gets to each of its states, ms.
 pub(crate) const ASIC: [(u64, Asic); 4] =
@@ -86,7 +71,8 @@ impl Bench {
             .zip(core::iter::repeat_n(ROTARY, 24).chain(core::iter::repeat_n(LINEAR, 8)))
             .map(|(switches, kind)| {
                 // Drives do not get ready at the same moment.
-                let config = DriveConfig::new(mac_id(switches.into()), CODES).with_sync_exchanges(20 + switches * 3);
+                let config = DriveConfig::new(mac_id(switches.into()), OpenCodes::INVENTED)
+                    .with_sync_exchanges(20 + switches * 3);
                 Fitted { drive: Drive::new(config), kind, silent: false, off_at: None }
             })
             .collect();

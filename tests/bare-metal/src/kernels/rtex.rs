@@ -13,7 +13,7 @@ use rtex_block::master::{
 use rtex_block::position::{self, Gear};
 use rtex_block::timing::{FrameTime, Periods, timer_reload};
 use rtex_block::{
-    Alarm, Arguments, BlockSize, Code, Command, Command32, CommandBlock, CyclicCode, Error, MacId, NonCyclicCommand,
+    Arguments, BlockSize, Code, Command, Command32, CommandBlock, CyclicCode, Error, MacId, NonCyclicCommand,
     NonCyclicResponse, Response, Response32, ResponseBlock, SubCommand, TypeCode, UpdateCounter, pack, stream,
 };
 
@@ -62,21 +62,7 @@ const HANDSHAKE: Handshake =
         None => panic!("a monitor command has an answer"),
     };
 
-const CODES: OpenCodes = OpenCodes {
-    profile_absolute: 0x10,
-    parameter_read: TypeCode::short(0x10),
-    parameter_store: TypeCode::short(0x21),
-    alarm_active: TypeCode::short(0x01),
-    alarm_history: TypeCode::short(0x02),
-    alarm_clear: TypeCode::short(0x03),
-    alarm_attributes: TypeCode::short(0x76),
-    parameter_initial: TypeCode::short(0x77),
-    latch_arm: 0x78,
-    homing: 0x79,
-    communication_lost: Alarm { main: 80, sub: 0 },
-};
-
-const DRIVE: Drive = Drive::new(DriveConfig::new(MAC_ID, CODES));
+const DRIVE: Drive = Drive::new(DriveConfig::new(MAC_ID, OpenCodes::INVENTED));
 
 const BLOCK32: [u8; 32] = {
     let (mut block, mut at) = ([0; 32], 0);

@@ -1,0 +1,36 @@
+//! An executor that counts its polls, and a timer on a clock that goes on with every look.
+#![allow(dead_code, unreachable_pub, reason = "not every test uses all of it")]
+
+use std::future::{Future, poll_fn};
+use std::pin::pin;
+use std::task::{Context, Poll, Waker};
+
+use servowire_drivers::{Clock, Timer};
+
+/// More polls than any call needs.
+pub const FOR_EVER: usize = 1_000_000;
+
+/// Polls at most `most` times, then drops the future.
+pub fn run<T>(future: impl Future<Output = T>, most: usize) -> Option<T> {
+    let mut future = pin!(future);
+    let mut context = Context::from_waker(Waker::noop());
+    (0..most).find_map(|_| match future.as_mut().poll(&mut context) {
+        Poll::Ready(value) => Some(value),
+        Poll::Pending => None,
+    })
+}
+
+/// Waits by looking at the clock at every poll.
+pub struct Looks<C>(pub C);
+
+impl<C: Clock> Clock for Looks<C> {
+    fn now_ns(&mut self) -> u64 {
+        self.0.now_ns()
+    }
+}
+
+impl<C: Clock> Timer for Looks<C> {
+    async fn wait_until(&mut self, ns: u64) {
+        poll_fn(|_| if self.0.now_ns() >= ns { Poll::Ready(()) } else { Poll::Pending }).await;
+    }
+}
