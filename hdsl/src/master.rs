@@ -203,6 +203,19 @@ impl Master {
 
     /// The same with four bytes of samples a word, the first of them in the low bits: what a DMA leaves in the memory of a
     /// little-endian processor, and fast on one that cannot load words from any address.
+    ///
+    /// ```
+    /// use hdsl::Dialect;
+    /// use hdsl::master::{Cause, Master, State};
+    /// # use hdsl::Error;
+    /// let mut master = Master::new(Dialect::SICK);
+    /// // No encoder: after RESET and SYNC, 18 frames without an answer, the line stays high.
+    /// for _ in 0..18 {
+    ///     assert_eq!(master.finish_words(&[u32::MAX; 18], None).restarted, None);
+    /// }
+    /// assert_eq!(master.finish_words(&[u32::MAX; 18], None).restarted, Some(Cause::Learn(Error::NoEdge)));
+    /// assert_eq!(master.state(), State::Reset);
+    /// ```
     pub fn finish_words(&mut self, samples: &[u32; WINDOW / 4], late: Option<i16>) -> &Report {
         match (self.state, self.alignment) {
             (State::Start, _) => {
@@ -249,6 +262,22 @@ impl Master {
     /// count. In START frames too the bits have to be the test pattern.
     ///
     /// For a frame without an answer the bits are not looked at.
+    ///
+    /// ```
+    /// use hdsl::device::Device;
+    /// use hdsl::master::{Master, State};
+    /// use hdsl::{Dialect, EncoderId};
+    ///
+    /// let mut master = Master::new(Dialect::SICK);
+    /// let mut encoder = Device::new(EncoderId::try_from(0x00153)?);
+    /// while master.state() != State::Running {
+    ///     // A line that stays high is all ones.
+    ///     let bits = encoder.answer(master.transmission().head.bits(), 1000).unwrap_or(u64::MAX);
+    ///     master.finish_bits(bits, None, None);
+    /// }
+    /// assert_eq!(master.encoder_id().map(|id| id.position_bits()), Some(32));
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     pub fn finish_bits(&mut self, bits: u64, signal: Option<Signal>, late: Option<i16>) -> &Report {
         self.end(bits, signal, late)
     }

@@ -26,6 +26,12 @@ impl Rssi {
 
     /// As the table of the Motor Control SDK has it: there a longest gap of one or two sample periods counts as 12,
     /// so that many edges look perfect.
+    ///
+    /// ```
+    /// use hdsl::rssi::Rssi;
+    /// // An edge before every sample.
+    /// assert_eq!((Rssi::of_edges(0xff).get(), Rssi::of_edges_ti(0xff).get()), (0, 12));
+    /// ```
     pub const fn of_edges_ti(edges: u8) -> Self {
         match longest_gap(edges) {
             Some(1..=2) => Self::MAX,

@@ -87,6 +87,17 @@ impl Resources {
     }
 
     /// Sets a register from inside the encoder.
+    ///
+    /// ```
+    /// use hdsl::EncoderId;
+    /// use hdsl::device::Device;
+    /// use hdsl::message::RemoteRegister;
+    /// let mut encoder = Device::new(EncoderId::try_from(0x00153)?);
+    /// // Bit 0 of ENC_ST0: the encoder was reset. SUMMARY shows it in every V-frame.
+    /// encoder.resources.set_register(RemoteRegister::ENC_ST0, 0x01);
+    /// assert_eq!(encoder.resources.summary(), 0x01);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     pub fn set_register(&mut self, register: RemoteRegister, value: u8) {
         if let Some(place) = self.registers.get_mut(usize::from(register.address() & 0x3f)) {
             *place = value;
