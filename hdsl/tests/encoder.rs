@@ -93,7 +93,7 @@ fn start_up() {
     for byte in [START, IDREQ, INIT, IDLE] {
         assert_eq!(device.answer(head(byte), 0), None);
     }
-    for frames in [7, 8] {
+    for frames in [7, 7, 8] {
         assert_eq!(device.answer(head(RESET), 0), None);
         for _ in 0..frames {
             assert_eq!(device.answer(head(SYNC), 0), None);
@@ -106,6 +106,30 @@ fn start_up() {
     assert_eq!(words(device.answer(head(IDREQ), 0))[..5], [0x53, 0x01, 0x99, 0x01, 0x53]);
     let vsync = [(); 16].map(|()| words(device.answer(head(INIT), 0))[1] >> 7);
     assert_eq!(vsync, [0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 1]);
+}
+
+/// After a reset all is as at first: a message under way is gone, VSYNC comes in the eighth answer, TOG2 begins with 0, the
+/// running disparity with minus.
+#[test]
+fn a_reset_in_the_middle() {
+    let mut fresh = synchronised(0x00153);
+    let first = [(); 16].map(|()| fresh.answer(head(IDLE), 0));
+    for frames in 8..24 {
+        let mut device = synchronised(0x00153);
+        // Short read of 7Fh: 7F 8A 44.
+        for byte in [0xc7, 0xcf, 0xc8, 0xca, 0xc4, 0xc4] {
+            let _ = device.answer(head(byte), 0);
+        }
+        for _ in 0..frames {
+            let _ = device.answer(head(IDLE), 0);
+        }
+        assert_eq!(device.answer(head(RESET), 0), None);
+        assert_eq!(device.answer(head(START), 0), None);
+        for _ in 0..8 {
+            assert_eq!(device.answer(head(SYNC), 0), None);
+        }
+        assert_eq!([(); 16].map(|()| device.answer(head(IDLE), 0)), first, "{frames}");
+    }
 }
 
 /// A symbol of the start-up with FIRST is no start-up: every answer is a normal one, and the V-frame goes on.
