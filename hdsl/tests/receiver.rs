@@ -1,12 +1,14 @@
 //! What the receiver reports beside positions: places, counters, causes, quality; each against a number of the documents.
-#![allow(missing_docs, clippy::unwrap_used, clippy::arithmetic_side_effects)]
+#![allow(missing_docs, clippy::unwrap_used, clippy::arithmetic_side_effects, clippy::indexing_slicing)]
 
 use hdsl::device::Device;
+use hdsl::frame::Trailer;
 use hdsl::master::{Cause, Master, Signal, State};
 use hdsl::message::{LongRequest, RemoteRegister, ResourceAddress, ShortRequest};
 use hdsl::rssi::Rssi;
 use hdsl::sampling::{Delay, TEST_PATTERN, line};
-use hdsl::{Dialect, EncoderId, Error};
+use hdsl::sync::Es;
+use hdsl::{Dialect, Doubt, EncoderId, Error};
 
 /// Both ends without a line between them.
 struct Pair {
@@ -198,6 +200,9 @@ fn messages_wait_for_a_v_frame() {
         let result = pair.master.start_short(ShortRequest::Read(RemoteRegister::PING));
         let want = if frame < 61 + 8 { Err(Error::NotLocked) } else { Ok(()) };
         assert_eq!(result, want, "{frame}");
+        // A safe position neither.
+        let doubt = [Doubt::NoLink, Doubt::NoVFrame][usize::from(frame >= 61)];
+        assert_eq!(pair.master.safe().err(), (frame < 61 + 8).then_some(doubt), "{frame}");
         if result.is_ok() {
             let dropped = pair.master.reset_messages().unwrap();
             assert_eq!(dropped.short, Some(Err(Error::Dropped)));
@@ -227,4 +232,92 @@ fn edges_of_the_start_up() {
         assert_eq!(report.signal.map(|signal| signal.edges), want, "{frame}");
     }
     assert_eq!(pair.master.state(), State::Running);
+    // Eleven eighths and half a bit: sample 7 of the next bit but one (E = 4 + 3 ones).
+    let alignment = pair.master.alignment().unwrap();
+    assert_eq!((alignment.index.get(), alignment.delay.get()), (7, 1));
+}
+
+/// Samples of a frame without an answer are not looked at, also when a link was there before.
+#[test]
+fn frames_without_an_answer() {
+    for words in [false, true] {
+        let mut pair = Pair::new(Dialect::SICK);
+        for _ in 0..19 {
+            let answer = pair.device.answer(pair.master.transmission().head.bits(), 1000);
+            let _ = pair.master.finish(&answer.map_or([0xff; 72], |bits| line(bits, 11)), None).unwrap();
+        }
+        pair.master.request_restart();
+        let _ = pair.master.finish(&line(TEST_PATTERN, 11), None).unwrap();
+        assert!(pair.master.alignment().is_some() && pair.master.state() == State::Reset);
+        for frame in 0..18 {
+            let report = if words {
+                pair.master.finish_words(&[0; 18], None)
+            } else {
+                pair.master.finish(&[0; 72], None).unwrap()
+            };
+            assert_eq!((report.signal, report.restarted), (None, None), "{frame}");
+        }
+        assert_eq!(pair.master.state(), State::Start);
+    }
+}
+
+/// What is sent when a LEARN frame has failed is the TRAILER without its first bits; otherwise it follows the answer, or a frame
+/// without an answer as a whole.
+#[test]
+fn trailers() {
+    for (good, want) in
+        [(20, Trailer::AfterAnswer), (27, Trailer::Cut), (36, Trailer::AfterAnswer), (90, Trailer::AfterAnswer)]
+    {
+        let mut pair = Pair::new(Dialect::SICK);
+        for frame in 0..good {
+            pair.frame(0, None);
+            let whole = frame < 18;
+            assert_eq!(pair.master.report().tail.trailer == Trailer::Whole, whole, "{frame}");
+        }
+        pair.frame(1, None);
+        assert_eq!(pair.master.report().tail.trailer, want, "{good}");
+    }
+}
+
+/// Messages pass in sync mode too.
+#[test]
+fn a_message_in_sync_mode() {
+    let mut pair = Pair::running(Dialect::SICK);
+    pair.master.set_pulse_period(4687);
+    pair.master.set_frames_per_pulse(Es::new(5)).unwrap();
+    for _ in 0..20 {
+        pair.frame(0, None);
+    }
+    pair.master.start_short(ShortRequest::Read(RemoteRegister::SRSSI)).unwrap();
+    let mut data = None;
+    for _ in 0..40 {
+        assert!(pair.master.transmission().head.extra().is_some());
+        pair.frame(0, None);
+        data = data.or(pair.master.report().finished.short);
+    }
+    assert_eq!(data.unwrap().unwrap().data, Some(7));
+}
+
+/// The pipe channel: a byte, the byte FEh, no data (K30.7), a word in no table.
+#[test]
+fn pipe_words() {
+    let mut pair = Pair::running(Dialect::SICK);
+    for byte in [Some(0x42), Some(0xfe), None] {
+        pair.device.pipe = byte;
+        pair.frame(0, None);
+        let got = pair.master.report().pipe_character().map(|character| character.unwrap().byte());
+        assert_eq!(got, byte);
+    }
+    let bits = pair.device.answer(pair.master.transmission().head.bits(), 1000).unwrap() & !(0x3ff << 20);
+    let report = pair.master.finish_bits(bits, None, None);
+    assert_eq!(report.pipe_character(), Some(Err(Error::InvalidWord { word: 0 })));
+}
+
+/// 7C AB F6, the high nibble of each byte first.
+#[test]
+fn nibbles_in_the_order_sent() {
+    let bytes = ShortRequest::Read(RemoteRegister::SRSSI).emit();
+    let nibbles = [0, 1, 2, 3, 4, 5, 6, 7].map(|at| bytes.nibble(at).map(hdsl::Nibble::get));
+    let want = [Some(0x7), Some(0xc), Some(0xa), Some(0xb), Some(0xf), Some(0x6), None, None];
+    assert_eq!(nibbles, want);
 }

@@ -54,9 +54,8 @@ impl Master {
             }
             // What the end of this frame will change: after RX7 another V-frame begins.
             let last = self.link.at() == 7;
-            let symbol = if last || self.link.is_settled() { self.requester.transmit() } else { MasterSymbol::Idle };
             let msync = self.link.msync() != last;
-            let (next, _) = transmission(State::Running, symbol, msync, None, LineDisparity::ZERO);
+            let (next, _) = transmission(State::Running, self.requester.transmit(), msync, None, LineDisparity::ZERO);
             (self.ahead, self.detour) = (Some(next), true);
         }
         self.ahead
@@ -65,8 +64,7 @@ impl Master {
     /// The head after a frame of a running link that is free running.
     #[inline]
     pub(super) fn following(&mut self) -> Transmission {
-        let symbol = if self.link.is_settled() { self.requester.transmit() } else { MasterSymbol::Idle };
-        transmission(State::Running, symbol, self.link.msync(), None, LineDisparity::ZERO).0
+        transmission(State::Running, self.requester.transmit(), self.link.msync(), None, LineDisparity::ZERO).0
     }
 
     /// Stuffing after a START frame: time for the search.
@@ -89,8 +87,8 @@ impl Master {
             State::Check => MasterSymbol::Check,
             State::IdReq => MasterSymbol::IdReq,
             State::WaitVsync => MasterSymbol::Init,
-            State::Running if self.link.is_settled() => self.requester.transmit(),
-            State::Running => MasterSymbol::Idle,
+            // IDLE up to the first message, which is not taken before a V-frame is complete.
+            State::Running => self.requester.transmit(),
         };
         // The disparity goes on only from frames without an answer.
         let carried = matches!(was, State::Reset | State::Sync) && !restarted;

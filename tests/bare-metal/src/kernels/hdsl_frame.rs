@@ -106,24 +106,6 @@ extern "Rust" fn hdsl_frame_bits(link: &mut Link, answer: &Received) -> Window {
     link.master.transmission().head.bits()
 }
 
-/// The next head before the answer of the present frame.
-#[expect(unsafe_code, reason = "the symbol is how run.sh finds the kernel")]
-#[inline(never)]
-#[unsafe(no_mangle)]
-extern "Rust" fn hdsl_frame_ahead(link: &mut Link, _: &Received) -> Window {
-    link.master.ahead().map_or(Window::EMPTY, |next| next.head.bits())
-}
-
-/// That, and 61 bits afterwards.
-#[expect(unsafe_code, reason = "the symbol is how run.sh finds the kernel")]
-#[inline(never)]
-#[unsafe(no_mangle)]
-extern "Rust" fn hdsl_frame_bits_ahead(link: &mut Link, answer: &Received) -> Window {
-    let next = hdsl_frame_ahead(link, answer);
-    let _ = link.master.finish_bits(answer.bits, None, None);
-    next
-}
-
 /// The next head, before the answer of the present frame is taken in.
 #[expect(unsafe_code, reason = "the symbol is how run.sh finds the kernel")]
 #[inline(never)]
