@@ -24,7 +24,6 @@ mod discovery;
 pub mod drv8711;
 mod error;
 mod exchange;
-mod flags;
 pub mod follow;
 mod frame;
 mod frame_type;
