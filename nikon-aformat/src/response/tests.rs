@@ -202,6 +202,8 @@ fn every_flip_and_truncation_of_every_layout() {
 #[test]
 fn repeated_arguments() {
     use crate::error::EchoField::{self, Address, Bank, Coefficient, Id};
+    /// The field that is wrong, what the response has, and what was sent.
+    type Wrong = Option<(EchoField, u32, u32)>;
     let ea = EncoderAddress::truncate(5);
     let word = |data, address| Data::Eeprom { data, address };
     let of_bank = |data, bank, address| Data::EepromBank { data, bank, address, bank_error: false };
@@ -212,7 +214,7 @@ fn repeated_arguments() {
     let bank_write = Operation::EepromWriteBank { bank: 3, address: 0x42, data: 0x1234 };
     let (id, other) = (EncoderId::truncate(0x12_3456), EncoderId::truncate(0x12_3457));
     let (coefficient, small) = (U19::truncate(0x4_0001), U19::truncate(1));
-    let rows: [(Operation, Data, Option<(EchoField, u32, u32)>); 18] = [
+    let rows: [(Operation, Data, Wrong); 18] = [
         (read, word(0xbeef, 0x42), None),
         (read, word(0xbeef, 0x43), Some((Address, 0x43, 0x42))),
         (write, word(0x1234, 0x42), None),
