@@ -213,6 +213,39 @@ fn setting_a_position() {
     }
 }
 
+/// A homing type whose meaning is not known may give the axis new coordinates: in CP it is not sent with the servo on, nor is
+/// the servo switched on meanwhile. A latch leaves them alone.
+#[test]
+fn homing_types_that_are_not_known() {
+    use ActiveCode::{CyclicPosition, CyclicTorque, CyclicVelocity, ProfilePosition};
+    let homing = |type_code: u8| (type_code, set_position(type_code, 0));
+    for mode in [CyclicPosition, ProfilePosition, CyclicVelocity, CyclicTorque] {
+        let in_position = mode == CyclicPosition;
+        for (type_code, request) in [homing(0x31), homing(0xc8), homing(0x50)] {
+            let refused = in_position && type_code != 0x50;
+            let mut pair = Pair::on(mode, Manners::POLITE);
+            let before = pair.axis;
+            assert_eq!(pair.axis.ask(request).err(), refused.then_some(AskError::ServoOn), "{mode:?} {type_code:x}");
+            assert_eq!(pair.axis == before, refused);
+            pair.axis = before;
+            pair.axis.ask_latch(type_code, [Nibble::ZERO; 2], 0x09).unwrap();
+            let mut pair = Pair::new(mode, Manners::POLITE);
+            pair.until("off", |pair| pair.axis.can_switch_on());
+            let before = pair.axis;
+            pair.axis.ask(request).unwrap();
+            assert_eq!(pair.axis.switch_on(), !refused, "{mode:?} {type_code:x}");
+            pair.axis = before;
+            pair.axis.ask_latch(type_code, [Nibble::ZERO; 2], 0x09).unwrap();
+            assert!(pair.axis.switch_on());
+        }
+        for type_code in [0x21, 0x22] {
+            let mut pair = Pair::on(mode, Manners::POLITE);
+            assert_eq!(pair.axis.ask_latch(type_code, [Nibble::ZERO; 2], 0), Err(AskError::ServoOn));
+            assert_eq!(pair.axis.ask(set_position(type_code, 0)), Err(AskError::ServoOn));
+        }
+    }
+}
+
 /// Feed-forward goes out while the servo is on, with every command that does not need bytes 12-15 itself, and no longer.
 #[test]
 fn feed_forward_lives_with_the_servo() {

@@ -1,4 +1,4 @@
-//! Texts, parameters, alarms, homing, latch and sub-commands, against a drive that shares no number with the master.
+//! Texts, parameters, homing, latch and sub-commands, against a drive that shares no number with the master.
 #![allow(
     clippy::arithmetic_side_effects,
     clippy::cast_possible_truncation,
@@ -11,15 +11,13 @@
 
 mod common;
 
-use common::{CODES, Pair, alarm, limits, monitor, set_position};
+use common::{CODES, Pair, limits, monitor, set_position};
 use rtex_block::device::{DriveConfig, Manners};
-use rtex_block::master::procedure::{
-    AlarmAttributes, AlarmHistory, Attributes, Backup, Caught, Home, Latch, ReadText, Restore, SetPosition,
-};
-use rtex_block::master::{ActiveCode, AskError, AxisConfig, AxisState, Failure, Progress, Received, StopReason};
+use rtex_block::master::procedure::{Backup, Caught, Home, Latch, ReadText, Restore, SetPosition};
+use rtex_block::master::{ActiveCode, AskError, AxisConfig, AxisState, Failure, Progress, Received};
 use rtex_block::{
-    Alarm, Arguments, ErrorCode, LatchFlags, MacId, Nibble, NonCyclicCommand, NonCyclicResponse, Pr, ProfileFlags,
-    Response, Response32, SubCode, TypeCode,
+    Arguments, ErrorCode, LatchFlags, MacId, Nibble, NonCyclicCommand, NonCyclicResponse, Pr, ProfileFlags, Response,
+    Response32, SubCode, TypeCode,
 };
 
 /// Homing in the drive: Homing_Complete of an earlier homing is not the end of this one.
@@ -247,42 +245,6 @@ fn a_motion_with_a_latch_shows_it() {
     assert_eq!(pair.axis.profile().unwrap().monitor_data(), caught);
     assert!(matches!(pair.end_of_move(), Progress::Done { .. }));
     assert_eq!(LatchFlags::LATCH_COMP1.bits(), 1);
-}
-
-/// "Can this alarm be cleared?": the answer carries the alarm as its index echo.
-#[test]
-fn attributes_of_the_present_alarm() {
-    let mut pair = Pair::on(ActiveCode::CyclicPosition, Manners::POLITE);
-    pair.drive.set_config(pair.drive.config().with_alarm_attributes(0x0000_0101));
-    pair.drive.raise(Alarm { main: 38, sub: 1 });
-    pair.until("stopped", |pair| pair.axis.state() == AxisState::Stopped(StopReason::Alarm));
-    pair.axis.ask_alarm_attributes(CODES.alarm_attributes).unwrap();
-    let Progress::Done { value: NonCyclicResponse::Alarm(results) } = pair.outcome() else { panic!() };
-    assert_eq!((results.index, results.data), (38 << 8 | 1, 0x0101));
-    // Asked as any other alarm request it would wait for Index 0 and never end.
-    assert_eq!(pair.ask(alarm(CODES.alarm_attributes, 0)), Progress::Failed { error: Failure::TimedOut });
-    // An answer to another type is an older one.
-    pair.drive.set_config(pair.drive.config().with_manners(Manners::POLITE.with_stale_answers(3)));
-    pair.until("free", |pair| pair.axis.can_ask());
-    pair.axis.ask_alarm_attributes(CODES.alarm_attributes).unwrap();
-    let Progress::Done { value } = pair.outcome() else { panic!() };
-    assert_eq!(value.data(), Some(0x0101));
-
-    pair.until("free", |pair| pair.axis.can_ask());
-    let mut attributes = AlarmAttributes::new(CODES.alarm_attributes);
-    let want = Attributes { alarm: 38 << 8 | 1, bits: 0x0101 };
-    assert_eq!(pair.run(|axis| attributes.receive(axis)), Progress::Done { value: want });
-    // Without an alarm the modelled drive refuses.
-    let mut calm = Pair::new(ActiveCode::CyclicPosition, Manners::POLITE);
-    let mut attributes = AlarmAttributes::new(CODES.alarm_attributes);
-    let refused = Progress::Failed { error: Failure::CommandError(ErrorCode(0x0032)) };
-    assert_eq!(calm.run(|axis| attributes.receive(axis)), refused);
-
-    let mut history = AlarmHistory::new(CODES.alarm_history);
-    let mut entries = [Alarm { main: 1, sub: 1 }; 3];
-    assert_eq!(pair.run(|axis| history.receive(axis, &mut entries)), Progress::Done { value: () });
-    let none = Alarm { main: 0, sub: 0 };
-    assert_eq!(entries, [Alarm { main: 38, sub: 1 }, none, none]);
 }
 
 #[test]
