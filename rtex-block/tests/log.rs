@@ -200,6 +200,34 @@ fn drives_on_one_side_only() {
     assert_eq!(findings(&mut log, &[command(1, 0x20, 0), response(1, 0, 0)]), []);
 }
 
+/// With Index 0 the read-out of attributes echoes the alarm; history and present alarm echo the index that was asked for.
+#[test]
+fn attributes_are_no_alarm_codes() {
+    let alarm = |mut block: [u8; 16], index: u8, eight: u8| {
+        (block[8], block[10], block[11]) = (eight, index, 0x26);
+        block[11] *= u8::from(index > 0);
+        block[12..].copy_from_slice(&[0x01, 0x01, 0, 0x80]);
+        block
+    };
+    let about = |asked: [u8; 16], answer: [u8; 16]| {
+        let mut log = analysis();
+        findings(&mut log, &[command(1, 0x20, 0), response(1, 0x20, 0), asked, answer])
+    };
+    let answered = LogFinding::Answered { responses: 1, busy: 0 };
+    let attributes = LogFinding::Attributes { alarm: 0x2601, bits: 0x8000_0101 };
+    let (asked, answer) = (command(2, 0x25, 0), response(2, 0x25, 0));
+    let ask = |index, eight| alarm(asked, index, eight);
+    assert_eq!(about(ask(0, 7), alarm(answer, 1, 7)), [(3, answered), (3, attributes)]);
+    assert_eq!(about(ask(0, 7), alarm(answer, 0, 7)), [(3, answered)]);
+    assert_eq!(about(ask(1, 7), alarm(answer, 1, 7)), [(3, answered)]);
+    // An answer to another type is an older one, and one that is busy has no data yet.
+    assert_eq!(about(ask(0, 7), alarm(answer, 1, 8)), []);
+    assert_eq!(about(ask(0, 7), alarm(response(2, 0x25, 0x10), 1, 7)), []);
+    // A monitor value is none either.
+    assert_eq!(about(alarm(command(2, 0x2a, 0), 0, 7), alarm(response(2, 0x2a, 0), 1, 7)), [(3, answered)]);
+    assert_eq!(attributes.to_string(), "attributes 80000101h of the alarm with index 2601h");
+}
+
 /// What a person reads.
 #[test]
 fn findings_in_words() {

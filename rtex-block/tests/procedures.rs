@@ -272,6 +272,16 @@ fn texts_and_parameters() {
     let differs = Progress::Failed { error: Failure::Differs(pr(8, 1)) };
     assert_eq!(pair.run(|axis| restore.receive(axis, &list)), differs);
     assert_eq!(restore.place(), 1);
+    // Ten of class 7 (25, 29 to 37), two of class 8, none of class 9.
+    for (class, want) in [(7, Some(10)), (8, Some(2)), (9, None)] {
+        let index = pr(class, 0).index();
+        let count = NonCyclicCommand::Parameter(Arguments { type_code: CODES.parameter_count, index, data: 0 });
+        let counted = match pair.ask(count) {
+            Progress::Done { value } => value.data(),
+            _ => None,
+        };
+        assert_eq!(counted, want);
+    }
     // A parameter that does not exist.
     let mut restore = Restore::new(CODES.parameter_read);
     let refused = Progress::Failed { error: Failure::CommandError(ErrorCode(0x0032)) };
@@ -308,21 +318,24 @@ fn speed_in_r_min_after_a_reset() {
     assert_eq!(speed(&mut pair), (524_288, 60_000));
 }
 
-/// Response_Data2 and 3, and those of the sub block, by Pr7.30 to 7.34.
+/// Response_Data2 and 3, and those of the sub block: Pr7.30 to 7.34 each select one of them, and no other.
 #[test]
 fn selected_response_data() {
-    let mut pair = Pair::new(ActiveCode::CyclicPosition, Manners::POLITE);
-    pair.wide = true;
-    pair.until("off", |pair| pair.axis.state() == AxisState::Off);
-    assert!(matches!(pair.ask(set_position(0x21, 4_321)), Progress::Done { .. }));
-    for (number, code) in [(30, 7), (31, 8), (32, 7), (33, 7), (34, 8)] {
-        let write = Arguments { type_code: TypeCode::short(0x11), index: 0x0700 | number, data: code };
+    for place in 0..5 {
+        let mut pair = Pair::new(ActiveCode::CyclicPosition, Manners::POLITE);
+        pair.wide = true;
+        pair.until("off", |pair| pair.axis.state() == AxisState::Off);
+        assert!(matches!(pair.ask(set_position(0x21, 4_321)), Progress::Done { .. }));
+        let index = [0x071e, 0x071f, 0x0720, 0x0721, 0x0722][place];
+        let write = Arguments { type_code: TypeCode::short(0x11), index, data: 0x07 };
         assert!(matches!(pair.ask(NonCyclicCommand::Parameter(write)), Progress::Done { .. }));
+        (0..4).for_each(|_| pair.update());
+        let Received::Both(Response32 { main, sub }) = pair.received else { panic!() };
+        let mut want = [0; 5];
+        want[place] = 4_321;
+        assert_eq!([main.response_data2, main.response_data3, sub.data1, sub.data2, sub.data3], want);
+        assert_eq!(main.response_data1, 4_321);
     }
-    (0..4).for_each(|_| pair.update());
-    let Received::Both(Response32 { main, sub }) = pair.received else { panic!() };
-    assert_eq!((main.response_data2, main.response_data3), (4_321, 4_321));
-    assert_eq!((sub.data1, sub.data2, sub.data3), (4_321, 4_321, 4_321));
 }
 
 /// In the 32-byte mode sub-commands run beside requests of the main block.

@@ -8,6 +8,7 @@ use crate::command::CommandBlock;
 use crate::control::ControlBits;
 use crate::execution::Execution;
 use crate::header::{MacId, UpdateCounter};
+use crate::noncyclic_response::NonCyclicResponse;
 use crate::position::{Gear, max_step, step};
 use crate::response::ResponseBlock;
 
@@ -51,6 +52,14 @@ pub enum LogFinding {
         responses: u32,
         /// Of these, with Busy.
         busy: u32,
+    },
+    /// An alarm command with Index 0 was answered with another index. Only the read-out of attributes does that: bytes 12-15 are
+    /// no alarm and no warning.
+    Attributes {
+        /// Index_Echo: the alarm that is being issued.
+        alarm: u16,
+        /// Bytes 12-15, byte 12 in bits 7-0.
+        bits: u32,
     },
     /// Another request, or the normal command, takes the place of a request that was not answered in more than three
     /// responses.
@@ -124,6 +133,9 @@ impl fmt::Display for LogFinding {
             Self::PositionStep { step, max } => write!(f, "position step {step}, at most {max}: Err27.4"),
             Self::Answered { responses, busy } => {
                 write!(f, "answered after {responses} responses, {busy} of them busy")
+            }
+            Self::Attributes { alarm, bits } => {
+                write!(f, "attributes {bits:08X}h of the alarm with index {alarm:04X}h")
             }
             Self::GivenUp { code, responses, busy } => {
                 code.write(f)?;
@@ -279,6 +291,15 @@ impl Track {
         None
     }
 
+    /// The attributes of an alarm, if that is what the answer to the request that is out says.
+    fn attributes(&self, block: ResponseBlock<'_>) -> Option<LogFinding> {
+        let ((_, [_, 0, 0]), NonCyclicResponse::Alarm(results)) = (self.request?, block.noncyclic()) else {
+            return None;
+        };
+        let bits = u32::from_le_bytes(results.data.to_le_bytes());
+        (results.index != 0).then_some(LogFinding::Attributes { alarm: results.index, bits })
+    }
+
     /// What goes on at the end; a request that is open says more than its code.
     fn unfinished(&self) -> [Option<Unfinished>; 3] {
         let echo = (self.stands && self.same > NORMAL).then_some(Unfinished::Echo { responses: self.same });
@@ -312,9 +333,9 @@ impl LogAnalysis {
         Self { max_step, tracks: [Track::NEW; MacId::COUNT] }
     }
 
-    /// Takes the next block; of 32 bytes the main half is looked at. Gives what it shows, in no more than four findings.
+    /// Takes the next block; of 32 bytes the main half is looked at. Gives what it shows, in no more than five findings.
     pub fn block(&mut self, bytes: &[u8]) -> impl Iterator<Item = LogFinding> + use<> {
-        let mut found = [None; 4];
+        let mut found = [None; 5];
         if let Some(main) = bytes.first_chunk::<LEN>() {
             if let Ok(command) = CommandBlock::of(main) {
                 found = self.command(command);
@@ -344,27 +365,28 @@ impl LogAnalysis {
         self.tracks.get_mut(usize::from(mac_id.get()))
     }
 
-    fn command(&mut self, block: CommandBlock<'_>) -> [Option<LogFinding>; 4] {
+    fn command(&mut self, block: CommandBlock<'_>) -> [Option<LogFinding>; 5] {
         let limit = self.max_step;
-        let Some(track) = self.track(block.mac_id()) else { return [None; 4] };
+        let Some(track) = self.track(block.mac_id()) else { return [None; 5] };
         track.commands = track.commands.saturating_add(1);
         track.unanswered = track.unanswered.saturating_add(1);
         let silent = track.responses > 0 && track.unanswered == NORMAL;
         let jump = track.count(block.update_counter(), block.code() == Code::NOP);
         let too_far = track.go(block, limit);
         let given_up = track.ask(block);
-        [jump, too_far, given_up, silent.then_some(LogFinding::NoAnswer { commands: NORMAL })]
+        [jump, too_far, given_up, silent.then_some(LogFinding::NoAnswer { commands: NORMAL }), None]
     }
 
-    fn response(&mut self, block: ResponseBlock<'_>) -> [Option<LogFinding>; 4] {
-        let Some(track) = self.track(block.mac_id()) else { return [None; 4] };
+    fn response(&mut self, block: ResponseBlock<'_>) -> [Option<LogFinding>; 5] {
+        let Some(track) = self.track(block.mac_id()) else { return [None; 5] };
         let commands = core::mem::replace(&mut track.unanswered, 0);
         let again = track.responses > 0 && commands > NORMAL;
         track.responses = track.responses.saturating_add(1);
         let stands = track.echo(block.update_counter_echo());
         let late = track.come_back(block.code());
         let answered = track.answer(block);
-        [again.then_some(LogFinding::AnswersAgain { commands }), stands, late, answered]
+        let attributes = answered.and_then(|_| track.attributes(block));
+        [again.then_some(LogFinding::AnswersAgain { commands }), stands, late, answered, attributes]
     }
 }
 

@@ -228,6 +228,8 @@ impl Drive {
             self.parameters.written(index)
         } else if type_code == codes.parameter_initial.get() {
             Parameters::DEFAULT.written(index)
+        } else if type_code == codes.parameter_count.get() {
+            Parameters::count(index)
         } else if type_code == codes.parameter_store.get() {
             Some(0)
         } else {
