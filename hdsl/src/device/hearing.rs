@@ -144,14 +144,17 @@ mod tests {
     /// Seven samples that are wrong are not enough to lose SYNC, eight are.
     #[test]
     fn how_much_is_too_much() {
-        let mut line = pack(&head(0, 16));
-        for bit in 0..8 {
-            let heard = Heard::on_line(&line).map(|heard| (heard.start, parameter(heard.bits)));
-            assert_eq!(heard, Some((16, Some(0xd0))), "{bit}");
-            // Not one of the three in the middle.
-            line[2 + bit] ^= 0x02;
+        for start in 16..24 {
+            let mut line = pack(&head(0, start));
+            for bit in 0..8 {
+                let heard = Heard::on_line(&line).map(|heard| (usize::from(heard.start), parameter(heard.bits)));
+                assert_eq!(heard, Some((start, Some(0xd0))), "{bit}");
+                // Not one of the three in the middle.
+                let place = start + 8 * bit + 6;
+                line[place / 8] ^= 0x80 >> (place % 8);
+            }
+            assert_eq!(Heard::on_line(&line), None);
         }
-        assert_eq!(Heard::on_line(&line), None);
     }
 
     #[test]
