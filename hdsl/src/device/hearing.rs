@@ -38,6 +38,10 @@ impl Heard {
         // CYCLE RESET begins with this bit; before it is the zero, before that are ones.
         let reset = rise.saturating_sub(start).saturating_add(4) / 8;
         let zero = reset.checked_sub(1)?;
+        // After SYNC and two ones at once, or after up to nine ones more.
+        if !(8..=17).contains(&zero) {
+            return None;
+        }
         let mut bits = 0_u128;
         for at in 0..reset.saturating_add(17) {
             let middle = start.saturating_add(at.saturating_mul(8));
@@ -168,6 +172,9 @@ mod tests {
             line[2 + bit] ^= 0xff;
             assert!(Heard::on_line(&line).and_then(|heard| parameter(heard.bits)).is_none(), "{bit}");
         }
+        // Ten ones more are no window.
+        assert!(Heard::on_line(&pack(&head(72, 0))).is_some());
+        assert_eq!(Heard::on_line(&pack(&head(80, 0))), None);
         // The level stays low for two bits more, or rises too early.
         let mut line = pack(&head(0, 0));
         line[9] = 0;
