@@ -30,7 +30,11 @@ fn master(ram: &[u8]) -> Result<(), Box<dyn Error>> {
 
 fn device(ram: &[u8]) {
     let device = DeviceMemory::new(ram);
-    println!("address {:?}, {:?} ns from the master", device.address().map(|address| address.get()), device.delay_ns());
+    println!(
+        "address {:?}, {:?} ns from the master",
+        device.address().map(sorte_proto::DeviceAddress::get),
+        device.delay_ns()
+    );
     println!("line to the next device {:?} ns", device.line_delay_next_ns());
     println!("last SYNC: time stamp and own counter {:?} ns", device.last_sync_ns());
     println!("good frames {:?}, wrong checks {:?}", device.good_frames(), device.crc_errors());
