@@ -6,6 +6,7 @@
 #[cfg(any(test, feature = "std"))]
 extern crate std;
 
+mod builder;
 mod class;
 mod counters;
 mod error_rate;

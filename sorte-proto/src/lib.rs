@@ -15,7 +15,6 @@ const fn stride(thin: usize) -> usize {
 pub mod cut_through;
 
 mod address;
-mod builders;
 mod clock;
 mod crc;
 mod delay_req;
