@@ -1,5 +1,4 @@
 use super::manners::Manners;
-use crate::builder::builder;
 use crate::error_code::Alarm;
 use crate::header::MacId;
 use crate::position::Gear;
@@ -120,7 +119,7 @@ impl DriveConfig {
         }
     }
 
-    builder! {
+    servowire_core::builder! {
         with_update_ns: update_ns, u32;
         with_communications: communications, u8;
         with_sync_exchanges: sync_exchanges, u16;

@@ -1,5 +1,3 @@
-use crate::builder::builder;
-
 /// How impolite a modelled drive is. The polite one of [`POLITE`](Self::POLITE) does everything as soon as it can.
 ///
 /// Each of them is allowed by what the documents at hand say, or left open by them; a master has to live with any
@@ -56,7 +54,7 @@ impl Manners {
         warns: false,
     };
 
-    builder! {
+    servowire_core::builder! {
         with_echo_lag: echo_lag, u8;
         with_in_progress_late: in_progress_late, u16;
         with_servo_off_late: servo_off_late, u16;
