@@ -1,5 +1,6 @@
 // What every pair of images has to do: run it, hurt the line in some exchanges, and check what both have made of it.
 import assert from 'node:assert/strict';
+import { appendFileSync } from 'node:fs';
 import { fileURLToPath } from 'node:url';
 import { Chip } from './chip.mjs';
 import { Wire, units } from './wire.mjs';
@@ -27,14 +28,27 @@ export function run(masterImage, encoderImage, { ms, faults = {}, typed = [] }) 
   const master = new Chip(masterImage, IMAGES + masterImage, { hz: HZ, print });
   const encoder = new Chip(encoderImage, IMAGES + encoderImage, { hz: HZ });
   const wire = new Wire(master, encoder);
+  const counts = []; // instructions of both until each request
   wire.onRequest = (exchange) => {
+    counts.push([master.instructions, encoder.instructions]);
     wire.delay = 0;
     wire.deaf = false;
     wire.disturb = null;
     faults[exchange]?.(wire);
   };
   wire.run(ms * MS);
+  for (const [k, image] of [masterImage, encoderImage].entries()) {
+    const chip = [master, encoder][k];
+    note(image, 'stack', chip.stack);
+    // Not of a run in which something was typed: its cycles are of many kinds.
+    if (typed.length === 0) note(image, 'instructions a cycle', (counts.at(-1)[k] - counts[1][k]) / (counts.length - 2));
+  }
   return { wire, lines };
+}
+
+/** Notes a figure for figures.py. */
+function note(image, what, value) {
+  if (process.env.FIGURES) appendFileSync(process.env.FIGURES, `${image}\t${what}\t${Math.round(value)}\n`);
 }
 
 /** The exchanges of a run that have ended: request and answer as units, by the wire alone. */
