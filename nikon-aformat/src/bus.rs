@@ -4,7 +4,7 @@
 //!  line, time →   request | response of encoder 0 | gap | response of encoder 1 | gap | ...
 //! ```
 //!
-//! Every encoder sends a whole response with a CRC-8 of its own, one behind the other. Ascending order is what everybody
+//! Every encoder sends a whole response with a CRC-8 of its own, one after the other. Ascending order is what everybody
 //! assumes and no document says, so a response is taken for the encoder that its information field names. A response
 //! that is missing, damaged, doubled or uncalled for is reported and costs nothing but itself.
 //!

@@ -16,7 +16,7 @@
 //! let mut samples = Samples::partial((line.bits() << 3 | 0b111) as u64, line.len() + 3);
 //!
 //! let mut receiver = LineReceiver::bits(Layout::Abs24);
-//! let raw = receiver.feed(&mut samples).expect("a raw")?;
+//! let raw = receiver.feed(&mut samples).expect("a response")?;
 //! let response = Response::parse(&Expected::new(Layout::Abs24, Command::Abs24Low), &raw)?;
 //! assert_eq!(response.abs(), Some(0xfb_f700));
 //! # Ok::<(), nikon_aformat::Error>(())
@@ -30,7 +30,7 @@ use crate::layout::FRAME_BITS;
 use crate::layout::Layout;
 use crate::raw_response::RawResponse;
 
-/// A piece of line that holds responses of one layout, one behind the other, as a sampler sees it.
+/// A piece of line that holds responses of one layout, one after the other, as a sampler sees it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct LineReceiver {
@@ -40,7 +40,7 @@ pub struct LineReceiver {
     idle_allowed: bool,
     contents: [u16; RawResponse::MAX_FRAMES],
     got: u8,
-    /// Index of the first sample behind the last frame.
+    /// Index of the first sample after the last frame.
     end: u64,
     /// A frame was broken; the rest of its response is passed over.
     broken: bool,
@@ -290,7 +290,7 @@ mod tests {
             prop_assert_eq!(receiver.finish(), None);
         }
 
-        /// A response that loses frames costs only itself: the next one behind a gap arrives.
+        /// A response that loses frames costs only itself: the next one after a gap arrives.
         #[test]
         fn a_gap_ends_a_response((_, expected, response) in exchanges(), kept in 0..108_usize, gap in 5..40_usize) {
             let raw = response.emit();

@@ -283,7 +283,7 @@ fn a_long_block_with_an_echo_ends_with_the_response() {
     assert_eq!(ended(&mut transaction), Err(Error::Rejected { sf: StatusField::CA0 }));
 }
 
-/// A buffer without times: the request of four bytes as it came back, and behind it a response or nothing.
+/// A buffer without times: the request of four bytes as it came back, and after it a response or nothing.
 #[test]
 fn what_a_uart_received_since_the_request_began() {
     let request = Request::write_eeprom(Address::truncate(1), 0x5a);
