@@ -282,6 +282,7 @@ mod tests {
             (Addresses::first(3).bits(), Addresses::first(8), Addresses::first(9)),
             (7, Addresses::ALL, Addresses::ALL)
         );
+        assert_eq!(Addresses::first(3).with(EncoderAddress::truncate(1)), Addresses::first(3));
         assert_eq!((Addresses::NONE.highest(), Addresses::first(5).highest()), (None, EncoderAddress::new(4)));
     }
 
