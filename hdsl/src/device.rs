@@ -206,17 +206,16 @@ impl Device {
 
     /// Bits of the position: those of the acceleration, 8 more than bits 3:0 of the identifier say, and so many more as bits 9:4
     /// say; 40 at most.
-    const fn bits(&self) -> u32 {
-        let bits = (self.id & 15).wrapping_add(8).wrapping_add(self.id >> 4 & 0x3f);
-        if bits > 40 { 40 } else { bits }
+    fn bits(&self) -> u32 {
+        (self.id & 15).wrapping_add(8).wrapping_add(self.id >> 4 & 0x3f).min(40)
     }
 
-    const fn mask(&self) -> u64 {
+    fn mask(&self) -> u64 {
         !(u64::MAX << self.bits())
     }
 
     /// A difference of positions, with its sign.
-    const fn signed(&self, difference: u64) -> i64 {
+    fn signed(&self, difference: u64) -> i64 {
         let unused = 64_u32.saturating_sub(self.bits());
         i64::from_le_bytes((difference << unused).to_le_bytes()) >> unused
     }

@@ -44,7 +44,6 @@ impl Heard {
             let one = match at {
                 ..8 => majority(samples, middle),
                 _ if at < zero => true,
-                _ if at == zero => false,
                 _ => majority(samples, middle),
             };
             bits |= u128::from(one).checked_shl(u32::try_from(at).ok()?)?;
@@ -140,6 +139,19 @@ mod tests {
             assert_eq!((heard.start, parameter(heard.bits)), (20, Some(0xd0)), "{at}");
             assert!((20 + 63..=20 + 67).contains(&heard.edge), "{at}: {}", heard.edge);
         }
+    }
+
+    /// Seven samples that are wrong are not enough to lose SYNC, eight are.
+    #[test]
+    fn how_much_is_too_much() {
+        let mut line = pack(&head(0, 16));
+        for bit in 0..8 {
+            let heard = Heard::on_line(&line).map(|heard| (heard.start, parameter(heard.bits)));
+            assert_eq!(heard, Some((16, Some(0xd0))), "{bit}");
+            // Not one of the three in the middle.
+            line[2 + bit] ^= 0x02;
+        }
+        assert_eq!(Heard::on_line(&line), None);
     }
 
     #[test]

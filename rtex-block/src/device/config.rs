@@ -25,6 +25,8 @@ pub struct OpenCodes {
     pub alarm_attributes: TypeCode,
     /// Parameter: read the initial value.
     pub parameter_initial: TypeCode,
+    /// Parameter: read the number of parameters in a class, which the high byte of the index names.
+    pub parameter_count: TypeCode,
     /// Homing: arm both latches.
     pub latch_arm: u8,
     /// Homing: a motion of the drive to its origin.
@@ -44,6 +46,7 @@ impl OpenCodes {
         alarm_clear: TypeCode::short(0x03),
         alarm_attributes: TypeCode::short(0x76),
         parameter_initial: TypeCode::short(0x77),
+        parameter_count: TypeCode::short(0x7a),
         latch_arm: 0x78,
         homing: 0x79,
         communication_lost: Alarm { main: 80, sub: 0 },

@@ -34,6 +34,10 @@ pub struct Manners {
     pub always_in_position: bool,
     /// WNG is set in every answer.
     pub warns: bool,
+    /// An alarm is not cleared by command: that fails with ERR.
+    pub refuses_to_clear: bool,
+    /// The command that clears an alarm is executed, and the alarm is there all the same.
+    pub alarm_stays: bool,
 }
 
 impl Manners {
@@ -52,6 +56,8 @@ impl Manners {
         homed_at_start: false,
         always_in_position: false,
         warns: false,
+        refuses_to_clear: false,
+        alarm_stays: false,
     };
 
     servowire_core::builder! {
@@ -68,6 +74,8 @@ impl Manners {
         with_homed_at_start: homed_at_start, bool;
         with_always_in_position: always_in_position, bool;
         with_warns: warns, bool;
+        with_refuses_to_clear: refuses_to_clear, bool;
+        with_alarm_stays: alarm_stays, bool;
     }
 }
 
