@@ -5,6 +5,7 @@
 
 use core::error::Error;
 
+use sorte_proto::DeviceAddress;
 use sorte_proto::host::{DEVICE, DeviceMemory, MASTER, MasterMemory, Place};
 
 fn map(title: &str, places: &[Place]) {
@@ -30,7 +31,7 @@ fn master(ram: &[u8]) -> Result<(), Box<dyn Error>> {
 
 fn device(ram: &[u8]) {
     let device = DeviceMemory::new(ram);
-    println!("address {:?}, {:?} ns from the master", device.address().map(|address| address.get()), device.delay_ns());
+    println!("address {:?}, {:?} ns from the master", device.address().map(DeviceAddress::get), device.delay_ns());
     println!("line to the next device {:?} ns", device.line_delay_next_ns());
     println!("last SYNC: time stamp and own counter {:?} ns", device.last_sync_ns());
     println!("good frames {:?}, wrong checks {:?}", device.good_frames(), device.crc_errors());
