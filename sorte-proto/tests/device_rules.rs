@@ -205,3 +205,14 @@ fn the_last_measurement_and_no_other_takes_the_reverse_port_to_sync() {
     reflect(&mut idle, Trigger::Last);
     assert_eq!([idle.port(PortId::A).state, idle.port(PortId::B).state], [State::Idle; 2]);
 }
+
+/// Only a frame on its way out is rewritten; what comes back from the end of the line passes as it is.
+#[test]
+fn what_comes_back_passes_unchanged() {
+    let sync = Sync::of_master(30_500, 76, false).emit().to_vec();
+    for (state, frame) in [(State::Discovery, answer(false)), (State::Sync, sync)] {
+        let (mut device, mut passing) = (between(state), frame.clone());
+        assert_eq!(device.frame(PortId::B, &mut passing, at(0)).path, Path::Forward);
+        assert_eq!(passing, frame, "{state:?}");
+    }
+}

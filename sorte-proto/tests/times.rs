@@ -211,6 +211,10 @@ fn a_device_enters_the_exchange_ten_microseconds_after_the_last_sync() {
     assert_eq!(device.cycle_zero_ns(), Some(87_000));
     // In the common time: triggered at 30,500, the next frame at 40,500, its cycle 500 ns before.
     assert_eq!((device.first_cycle_ns(), device.delay_ns()), (Some(40_000), Some(76)));
+    // The first address sends at 500 ns and owns the first bytes.
+    let place = device.assignment().unwrap();
+    assert_eq!((place.address.get(), place.in_offset, place.out_offset), (1, 0, 0));
+    assert_eq!(device.send_time_ns(), Some(500));
 }
 
 /// The clock's target in the exchange is the delay plus 500, and the reference time is the stamp plus the delay.
@@ -226,4 +230,27 @@ fn in_the_exchange_a_frame_is_expected_at_its_delay_and_500_ns() {
         let want = if n == 16 { Correction::Rate { increment: 4, ticks: 23 } } else { Correction::None };
         assert_eq!(output.correction, want);
     }
+    // A sum of 0 counts as positive.
+    for n in 1..=16 {
+        let want = if n == 16 { Correction::Rate { increment: 6, ticks: 0 } } else { Correction::None };
+        assert_eq!(device.exchange(&frame, 500 + 76, 2000).unwrap().correction, want);
+    }
+}
+
+/// A damaged master frame is told in the next device frame, and not in the one after it.
+#[test]
+fn an_error_is_told_once() {
+    let mut device = device_in_exchange();
+    let mut frame = [0; 21];
+    write_master_frame(&[7; 16], 1000, &mut frame).unwrap();
+    frame[3] ^= 1;
+    let mut told = Vec::new();
+    for _ in 0..3 {
+        told.push(device.answer([0; 3]).unwrap().status.bits());
+        if told.len() == 1 {
+            assert!(matches!(device.exchange(&frame, 576, 2000), Err(Error::BadCrc8 { .. })));
+        }
+    }
+    // LAST; LAST and ERROR; LAST.
+    assert_eq!(told, [0x01, 0x05, 0x01]);
 }

@@ -24,7 +24,7 @@ pub enum State {
     Sync = 4,
     /// 5: IOEX, the IO exchange.
     Exchange = 5,
-    /// 6: diagnosis. The published firmware has the code and nothing behind it; this crate never enters it.
+    /// 6: diagnosis. The published firmware has the code and does nothing there; this crate never enters it.
     Diag = 6,
     /// 7: out of the line's work until the host resets the device, see [`Device::enter_error`](super::Device::enter_error).
     Error = 7,
