@@ -1,7 +1,7 @@
 //! HIPERFACE DSL.
 
 use hdsl::cable::{Cable, Disturbance};
-use hdsl::device::Device;
+use hdsl::device::{Device, Heard};
 use hdsl::frame::Head;
 use hdsl::master::{Master, State};
 use hdsl::message::{LongAnswer, LongRequest, ShortRequest};
@@ -52,8 +52,13 @@ pub fn answer(mut data: &[u8]) {
     }
 }
 
-/// The head of a frame: what is accepted has the fixed bits, and its parameter byte is one that a word stands for.
+/// The head of a frame: what is accepted has the fixed bits, and its parameter byte is one that a word stands for. As samples too.
 pub fn head(mut data: &[u8]) {
+    if let Some(heard) = Heard::on_line(data) {
+        let end = u32::from(heard.start) + 8 * heard.bits.len();
+        assert!((26..=35).contains(&heard.bits.len()));
+        assert!(heard.start < heard.edge && u32::from(heard.edge) < end);
+    }
     let bits = u128::from(word(&mut data)) | u128::from(word(&mut data)) << 64;
     let len = u32::from(byte(&mut data)) % 129;
     let Some(line) = Window::from_bits(bits, len) else { return };
@@ -202,8 +207,14 @@ pub fn link(mut data: &[u8]) {
             let speed = i16::from_le_bytes([byte(&mut data), byte(&mut data)]) >> 7;
             position = position.wrapping_add_signed(i64::from(speed));
         }
-        let head = cable.down(master.transmission().head.bits());
-        let samples = cable.up(encoder.answer(head, position));
+        let line = cable.down_samples(master.transmission().head);
+        let samples = match Heard::on_line(&line) {
+            Some(heard) => {
+                let answer = encoder.answer(heard.bits, position);
+                cable.up_heard(answer, &heard)
+            }
+            None => cable.up(encoder.answer(Window::EMPTY, position)),
+        };
         let _ = master.finish(&samples, None).expect("there are enough samples");
     }
     assert_eq!(master.state(), State::Running);

@@ -68,6 +68,20 @@ fn printed_blocks() {
     assert_eq!(second[1..6], [0xff, 0xff, 0xed, 0xcb, 0xa9]);
 }
 
+/// TOG2 alternates from V-frame to V-frame and begins with 0 (register list); TEST2 and ERR2 are bits 6 and 5.
+#[test]
+fn status_2() {
+    let mut device = synchronised(0x00153);
+    let status: Vec<u8> = (0..48).map(|_| words(device.answer(head(IDLE), 0))[5]).step_by(8).collect();
+    assert_eq!(status, [0x1c, 0x9c, 0x1c, 0x9c, 0x1c, 0x9c]);
+    device.faults.test_2 = true;
+    device.faults.stuck_toggle = true;
+    let status: Vec<u8> = (0..24).map(|_| words(device.answer(head(IDLE), 0))[5]).step_by(8).collect();
+    assert_eq!(status, [0x5c, 0x5c, 0x5c]);
+    (device.faults.test_2, device.faults.error_2) = (false, true);
+    assert_eq!(words(device.answer(head(IDLE), 0))[5], 0x3c);
+}
+
 /// VPOS has 40 bits: above those of the encoder are zeros, or the sign if bit 10 of the identifier says so; an encoder has 40
 /// at most.
 #[test]

@@ -89,6 +89,8 @@ fn write_protection() {
         // PC_ADD_H bit 7 always reads 1 (p. 50).
         desk.write(0x28, 0x4c);
         assert_eq!(desk.byte(0x28), if dialect == Dialect::SICK { 0xcc } else { 0x4c });
+        desk.write(0x28, 0xe4);
+        assert_eq!(desk.byte(0x28), 0xe4);
         // ACC_ERR_CNT: a write sets the threshold, up to 31; in the SDK the counter is memory.
         desk.write(0x38, 40);
         assert_eq!((desk.byte(0x38), desk.byte(0x41)), if dialect == Dialect::SICK { (0, 31) } else { (40, 31) });

@@ -250,6 +250,25 @@ mod tests {
         assert_eq!(said(request.bytes()), [LNAK]);
     }
 
+    /// Eight nibbles, four more for an offset, and in a write two for each byte of data.
+    #[test]
+    fn lengths_of_long_requests() {
+        for (llen, bytes) in [(0, 0), (1, 2), (2, 4), (3, 8)] {
+            for (read, with_offset) in [(false, false), (false, true), (true, false), (true, true)] {
+                let first = 0x81 | llen << 2 | u8::from(read) << 6 | u8::from(with_offset) << 5;
+                let offset: &[u8] = if with_offset { &[0x80, 0x00] } else { &[] };
+                let data = &[0x55; 8][..if read { 0 } else { bytes }];
+                let request = Message::new(&[&[first, 0x31], offset, data]);
+                let mut channel = Channel::new();
+                let heard: Vec<_> = nibbles(request.sealed().bytes()).into_iter().map(|n| channel.hear(n)).collect();
+                assert_eq!(heard.len(), 8 + 2 * offset.len() + 2 * data.len());
+                assert_eq!(heard.iter().flatten().count(), 1);
+                let last = heard.last().copied().flatten().unwrap();
+                assert_eq!(last.bytes(), request.bytes(), "{first:02x}");
+            }
+        }
+    }
+
     /// A symbol without a meaning in a message, or one that could not be read: the rest is no message.
     #[test]
     fn a_hole_in_a_message() {

@@ -251,6 +251,10 @@ mod tests {
         assert_eq!(ask(&mut resources, &[0xf5, 0x31, 0x80, 6]), [0xd5, 0x31, 3, 4]);
         assert_eq!(ask(&mut resources, &[0xf5, 0x31, 0x80, 8]), [0xd5, 0x31, 0, 0]);
         assert_eq!(ask(&mut resources, &[0xf5, 0x31, 0x80, 9]), [0xf5, 0x31, 0x13, 0x40]);
+        // Without an offset the first two bytes are data; without a length nothing is asked for.
+        assert_eq!(ask(&mut resources, &[0x99, 0x31, 0x80, 1, 0x80, 2]), [0x91, 0x31]);
+        assert_eq!(ask(&mut resources, &[0xdd, 0x31]), [0xdd, 0x31, 0x80, 1, 0x80, 2, 1, 2, 3, 4]);
+        assert_eq!(ask(&mut resources, &[0xd1, 0x31]), [0xd1, 0x31]);
         // 081h cannot be written, a name neither; 0FFh is not there.
         assert_eq!(ask(&mut resources, &[0x94, 0x81, 0, 1]), [0xb4, 0x81, 0x10, 0x41]);
         assert_eq!(ask(&mut resources, &[0x85, 0x31, 0, 1]), [0xa5, 0x31, 0x10, 0x41]);
