@@ -49,7 +49,7 @@ pub struct Tally {
     pub slipped: u64,
 }
 
-/// Idle line before the first response and behind the last.
+/// Idle line before the first response and after the last.
 const MARGIN: usize = 30;
 
 /// A million transactions take some seconds in release.

@@ -4,7 +4,7 @@
 //!  line, time →   request | response of encoder 0 | gap | response of encoder 1 | gap | ...
 //! ```
 //!
-//! Every encoder sends a whole response with a CRC-8 of its own, one behind the other. Ascending order is what everybody
+//! Every encoder sends a whole response with a CRC-8 of its own, one after the other. Ascending order is what everybody
 //! assumes and no document says, so a response is taken for the encoder that its information field names. A response
 //! that is missing, damaged, doubled or uncalled for is reported and costs nothing but itself.
 //!
@@ -282,6 +282,7 @@ mod tests {
             (Addresses::first(3).bits(), Addresses::first(8), Addresses::first(9)),
             (7, Addresses::ALL, Addresses::ALL)
         );
+        assert_eq!(Addresses::first(3).with(EncoderAddress::truncate(1)), Addresses::first(3));
         assert_eq!((Addresses::NONE.highest(), Addresses::first(5).highest()), (None, EncoderAddress::new(4)));
     }
 

@@ -253,7 +253,7 @@ impl<const BANKS: usize> Device<BANKS> {
         self.resolution.compose(self.single_turn.wrapping_sub(self.zero), self.turns.wrapping_sub(self.turns_zero))
     }
 
-    /// A frame was received with start bit and delimiter in order, its delimiter at `now_ns`; `content` are its bits, the first
+    /// A frame was received whose start bit and delimiter are right, its delimiter at `now_ns`; `content` are its bits, the first
     /// of the line in bit 0. Gives the answer once a request is complete.
     pub fn frame(&mut self, content: u16, now_ns: u64) -> Option<Transmission> {
         if self.is_deaf(now_ns) {

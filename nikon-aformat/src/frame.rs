@@ -41,7 +41,7 @@ pub(crate) const MAX_FRAMES: u32 = 6;
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(try_from = "u16", into = "u16"))]
 pub struct RequestFrame(u16);
 
-/// The two bits behind the sync code of a request frame.
+/// The two bits after the sync code of a request frame.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -123,7 +123,7 @@ impl RequestFrame {
         })
     }
 
-    /// The frame at the beginning of a piece of line; bits behind it are left alone.
+    /// The frame at the beginning of a piece of line; bits after it are left alone.
     ///
     /// # Errors
     /// [`Error::Truncated`], [`Error::StartBit`], [`Error::Delimiter`], then as [`from_content`](Self::from_content).
@@ -156,7 +156,7 @@ impl RequestFrame {
     }
 
     /// The frame as one 32-bit word for a shift register: twelve idle bits, the 18 line bits, two idle bits, the first
-    /// of the line in bit 31. The idle bits stand for the times t2 before and t3 behind a frame.
+    /// of the line in bit 31. The idle bits stand for the times t2 before and t3 after a frame.
     pub const fn transmit_word(self) -> u32 {
         0xfff0_0007 | (self.0.reverse_bits() as u32) << 3
     }
@@ -166,7 +166,7 @@ impl RequestFrame {
         FrameCode::truncate(self.0 >> 3)
     }
 
-    /// The eight bits behind the frame code, the byte of a memory data frame.
+    /// The eight bits after the frame code, the byte of a memory data frame.
     #[expect(clippy::cast_possible_truncation, reason = "eight bits")]
     pub const fn byte(self) -> u8 {
         (self.0 >> 5) as u8

@@ -86,7 +86,7 @@ pub enum Cause {
     },
     /// Bits are packed most significant first and were read least significant first, or the other way round.
     WrongBitOrder,
-    /// The own request came back, and the response behind it.
+    /// The own request came back, and the response after it.
     OwnEcho,
     /// Only the own request came back: no encoder, or A and B are exchanged on a half-duplex line.
     OnlyEcho,

@@ -3,7 +3,9 @@
 //!
 //! * [`Transaction`] takes one request to its response, [`BusTransaction`] to the responses of several encoders: time-outs and all
 //!   checks.
-//! * [`Reset`], [`EepromRead`], [`Write`] and [`Detection`] are made of several transactions and drive them by [`Step`].
+//! * [`GuardedReset`] and [`VerifiedWrite`] do what cannot be undone, once, and end as done, not done, or with an unknown effect;
+//!   they are made of [`Reset`], [`Write`] and [`EepromRead`].
+//! * [`Detection`] finds an encoder and its widths. All of these are made of several transactions and drive them by [`Step`].
 //! * [`Cycle`] repeats a readout at a fixed period.
 //! * [`Counters`] and [`ErrorRate`] keep account of what was refused.
 

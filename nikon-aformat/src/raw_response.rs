@@ -26,12 +26,12 @@ impl RawResponse {
     /// Most frames of a response.
     pub const MAX_FRAMES: usize = MAX_FRAMES as usize;
 
-    /// `contents` are 0 behind the frames of the layout.
+    /// `contents` are 0 after the frames of the layout.
     pub(crate) const fn of(contents: [u16; MAX_FRAMES as usize], layout: Layout) -> Self {
         Self { contents, frames: layout.frames() }
     }
 
-    /// The response at the beginning of a piece of line, its frames back to back; bits behind it are left alone.
+    /// The response at the beginning of a piece of line, its frames back to back; bits after it are left alone.
     ///
     /// # Errors
     /// [`Error::Truncated`], [`Error::StartBit`], [`Error::Delimiter`].
@@ -42,7 +42,7 @@ impl RawResponse {
         }
     }
 
-    /// A response from the content bits of its frames, one word each; words behind it are left alone.
+    /// A response from the content bits of its frames, one word each; words after it are left alone.
     ///
     /// # Errors
     /// [`Error::Truncated`].

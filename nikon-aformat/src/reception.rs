@@ -16,7 +16,7 @@
 //! let mut samples = Samples::partial((line.bits() << 3 | 0b111) as u64, line.len() + 3);
 //!
 //! let mut receiver = LineReceiver::bits(Layout::Abs24);
-//! let raw = receiver.feed(&mut samples).expect("a raw")?;
+//! let raw = receiver.feed(&mut samples).expect("a response")?;
 //! let response = Response::parse(&Expected::new(Layout::Abs24, Command::Abs24Low), &raw)?;
 //! assert_eq!(response.abs(), Some(0xfb_f700));
 //! # Ok::<(), nikon_aformat::Error>(())
@@ -30,7 +30,7 @@ use crate::layout::FRAME_BITS;
 use crate::layout::Layout;
 use crate::raw_response::RawResponse;
 
-/// A piece of line that holds responses of one layout, one behind the other, as a sampler sees it.
+/// A piece of line that holds responses of one layout, one after the other, as a sampler sees it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct LineReceiver {
@@ -40,7 +40,7 @@ pub struct LineReceiver {
     idle_allowed: bool,
     contents: [u16; RawResponse::MAX_FRAMES],
     got: u8,
-    /// Index of the first sample behind the last frame.
+    /// Index of the first sample after the last frame.
     end: u64,
     /// A frame was broken; the rest of its response is passed over.
     broken: bool,
@@ -220,6 +220,45 @@ mod tests {
         (0..line.len()).map(move |at| line.get(at) == Some(true))
     }
 
+    /// Half a response, then five idle bits, or four: the shortest pause between two responses, and the longest that belongs to one.
+    #[test]
+    fn the_shortest_pause_between_two_responses() {
+        let sent = Response::abs17(EncoderAddress::MAX, EncoderStatus::empty(), U17::truncate(0x1_2345)).emit();
+        for (pause, ends) in [
+            (5, std::vec![Err(Error::Truncated { got: 18, want: 36 }), Ok(sent)]),
+            (4, std::vec![Err(Error::StartBit { frame: 1 })]),
+        ] {
+            let half = bits_of(sent.line()).take(18);
+            let line = half.chain(repeat_n(true, pause)).chain(bits_of(sent.line()));
+            let mut receiver = LineReceiver::bits(Layout::Abs17);
+            assert_eq!(line.filter_map(|bit| receiver.push(bit)).collect::<Vec<_>>(), ends);
+        }
+    }
+
+    /// Samples, runs and words are counted alike and give the same; the end of a line leaves the receiver as it was made.
+    #[test]
+    fn all_three_ways_and_what_the_end_of_a_line_leaves() {
+        let sent = Response::abs17(EncoderAddress::MAX, EncoderStatus::empty(), U17::truncate(0x1_2345)).emit();
+        let first = u64::from(Window::from_bits(sent.line().bits(), 18).unwrap().bits() as u32);
+        // 18 bits, two idle bits, 18 bits.
+        let line = first | 0b11 << 18 | (sent.line().bits() >> 18 << 20) as u64;
+        for way in 0..3 {
+            let mut receiver = LineReceiver::bits(Layout::Abs17).allowing_idle_between_frames();
+            for _ in 0..2 {
+                let from = receiver.position();
+                let mut samples = Samples::partial(line, 38);
+                let got: Vec<_> = match way {
+                    0 => (0..38).filter_map(|at| receiver.push(line >> at & 1 == 1)).collect(),
+                    1 => (0..38).filter_map(|at| receiver.run(line >> at & 1 == 1, 1)).collect(),
+                    _ => receiver.feed(&mut samples).into_iter().collect(),
+                };
+                assert_eq!((got, receiver.position()), (std::vec![Ok(sent)], from + 38), "way {way}");
+                assert_eq!((receiver.push(true), receiver.finish()), (None, None));
+                assert_eq!(receiver.position(), 0);
+            }
+        }
+    }
+
     /// ABS17 of encoder 7, position 96964, with one wrong bit: the start bit of the second frame reads 1.
     #[test]
     fn one_wrong_bit_gives_no_position_but_with_idle_allowed() {
@@ -290,7 +329,7 @@ mod tests {
             prop_assert_eq!(receiver.finish(), None);
         }
 
-        /// A response that loses frames costs only itself: the next one behind a gap arrives.
+        /// A response that loses frames costs only itself: the next one after a gap arrives.
         #[test]
         fn a_gap_ends_a_response((_, expected, response) in exchanges(), kept in 0..108_usize, gap in 5..40_usize) {
             let raw = response.emit();

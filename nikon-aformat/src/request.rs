@@ -100,7 +100,7 @@ impl Request {
         }
     }
 
-    /// What an encoder makes of received frames. Frames behind the request are left alone.
+    /// What an encoder makes of received frames. Frames after the request are left alone.
     ///
     /// # Errors
     /// [`Error::Truncated`], [`Error::FrameCode`], [`Error::UnknownCommand`]; [`Error::AddressRange`] for a write to

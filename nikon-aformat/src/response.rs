@@ -42,7 +42,7 @@ pub struct Response {
     pub body: Body,
 }
 
-/// What stands behind the address of a response.
+/// What follows the address of a response.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -152,7 +152,7 @@ impl Response {
         }
     }
 
-    /// Decodes a response from 16-bit words, the content bits of one frame each; words behind it are left alone.
+    /// Decodes a response from 16-bit words, the content bits of one frame each; words after it are left alone.
     ///
     /// ```
     /// use nikon_aformat::{BitOrder, Command, Expected, Layout, Response};
@@ -174,7 +174,7 @@ impl Response {
         Self::of_contents(expected, contents)
     }
 
-    /// Decodes the response at the beginning of a piece of line, its frames back to back; bits behind it are left alone.
+    /// Decodes the response at the beginning of a piece of line, its frames back to back; bits after it are left alone.
     ///
     /// Take the piece out of a packed buffer at any bit offset with [`Window::read`].
     ///

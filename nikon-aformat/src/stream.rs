@@ -118,7 +118,7 @@ where
     }
 }
 
-/// The first bit at or behind `offset` that is 0.
+/// The first bit at or after `offset` that is 0.
 fn start_bit(bytes: &[u8], offset: usize, order: BitOrder) -> Option<usize> {
     let mut at = offset;
     loop {
@@ -185,7 +185,7 @@ mod tests {
             }
         }
 
-        /// Two responses on one packed line, behind any number of idle bits.
+        /// Two responses on one packed line, after any number of idle bits.
         #[test]
         fn a_packed_line((_, expected, answer) in exchanges(), idle in 0..70_usize, gap in 0..30_usize, lsb: bool) {
             let order = if lsb { BitOrder::LsbFirst } else { BitOrder::MsbFirst };

@@ -103,7 +103,7 @@ fn faults_of_the_line() {
     for at in 0..72 {
         assert_eq!(line(Fault::FlipBit { at }).unwrap().bits(), good.bits() ^ 1 << at);
     }
-    assert_eq!(line(Fault::FlipBit { at: 72 }), Some(good));
+    assert_eq!((line(Fault::FlipBit { at: 72 }), line(Fault::FlipBit { at: 133 })), (Some(good), Some(good)));
     assert_eq!(line(Fault::CutAfter { bits: 20 }), Window::from_bits(good.bits(), 20));
     assert_eq!(line(Fault::CutAfter { bits: 100 }), Some(good));
     // The last eight content bits: line bits 63 to 70, before the delimiter.
@@ -251,6 +251,47 @@ fn nothing_is_written_while_it_is_busy() {
     }
 }
 
+/// A read lasts 300 us, a write 30 ms; until then no word comes, and ES0 shows it whatever the first response showed.
+#[test]
+fn how_long_the_memory_is_busy() {
+    let read = Operation::EepromRead { address: 9 };
+    for behaviour in [Behaviour::new(), Behaviour::new().not_busy_in_first_read()] {
+        let mut device = device();
+        device.set_behaviour(behaviour.with_undetermined(0xdead));
+        device.set_eeprom(0, 9, 0x1234);
+        let (_, from_ns) = send(&mut device, read, LONG_NS);
+        let busy = |device: &Device<2>, ns| device.alm(from_ns + ns) == Alm::MEMBUSY;
+        assert_eq!((busy(&device, 299_999), busy(&device, 300_000)), (true, false));
+        let again = ask(&mut device, read, LONG_NS + 100_000).unwrap();
+        let undetermined = Some(Data::Eeprom { data: 0xdead, address: 9 });
+        assert_eq!((again.data(), again.es()), (undetermined, Some(EncoderStatus::BUSY)));
+        assert_eq!(data(&mut device, read, 2 * LONG_NS), Data::Eeprom { data: 0x1234, address: 9 });
+
+        let write = Operation::EepromWrite { address: UserAddress::new(9).unwrap(), data: 5 };
+        let written = ask(&mut device, write, 3 * LONG_NS).unwrap();
+        assert_eq!(written.es(), Some(EncoderStatus::BUSY), "its response shows it");
+        let from_ns = 3 * LONG_NS + 24_000;
+        let busy = |ns| device.alm(from_ns + ns) == Alm::MEMBUSY;
+        assert_eq!((busy(29_999_999), busy(30_000_000)), (true, false));
+    }
+}
+
+/// What EA of a multi-response request means: the highest address that answers, or nothing.
+#[test]
+fn who_answers_a_multi_response_request() {
+    for (all, want) in [(false, [false, false, true, true]), (true, [true; 4])] {
+        let mut device = device();
+        if all {
+            device.set_behaviour(Behaviour::new().answering_all());
+        }
+        let answers = (1..).zip([0, 2, 3, 7]).map(|(k, ea)| {
+            let request = Request::new(EncoderAddress::truncate(ea), Operation::Abs40Mt);
+            device.frame(request.emit().as_slice()[0].content(), k * LONG_NS).is_some()
+        });
+        assert!(answers.eq(want));
+    }
+}
+
 /// The first response to a read is not determined, the second is; another address begins anew.
 #[test]
 fn an_eeprom_word_comes_with_the_second_response() {
@@ -285,6 +326,7 @@ fn a_bank_that_is_not_there() {
         let request = Request::new(EA, operation);
         let answer = send(&mut device, operation, LONG_NS).0.unwrap();
         assert_eq!(Response::parse(&request.expected(Resolution::default()), &answer.raw), Err(Error::BankError));
+        assert_eq!(device.alm(LONG_NS + 100_000), Alm::empty(), "nothing is read or written");
     }
     let written = data(&mut device, Operation::EepromWriteBank { bank: 1, address: 0xff, data: 3 }, 50 * LONG_NS);
     assert_eq!(written, Data::EepromBank { data: 3, bank: 1, address: 0xff, bank_error: false });

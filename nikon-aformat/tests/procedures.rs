@@ -2,7 +2,7 @@
 #![allow(missing_docs, clippy::arithmetic_side_effects, clippy::cast_possible_truncation, clippy::indexing_slicing)]
 #![allow(clippy::unwrap_used, clippy::panic, clippy::unnecessary_wraps)]
 
-use nikon_aformat::master::{Detected, Detection, GuardedReset, Reset, Step, VerifiedWrite, Write};
+use nikon_aformat::master::{Detected, Detection, EepromRead, GuardedReset, Reset, Step, VerifiedWrite, Write};
 use nikon_aformat::{
     Alm, Command, Data, EncoderAddress, EncoderId, EncoderStatus, Error, Operation, PmAlm, Request, Response, TypeWord,
     U19, U40, UserAddress,
@@ -237,6 +237,24 @@ fn other_writes_and_how_they_are_read_back() {
     let _ = word.start(0);
     assert_eq!(word.receive(idle(), 0), send(EA, bank, 10_000));
     assert_eq!(word.receive(LOST, 0), send(EA, Operation::EepromReadBank { bank: 3, address: 0x11 }, 30 * MS));
+}
+
+/// A word of a bank: another address, twice the own one; what comes from another bank or address is begun anew.
+#[test]
+fn a_word_of_a_bank() {
+    let ask = |address, not_before_ns| send(EA, Operation::EepromReadBank { bank: 3, address }, not_before_ns);
+    let of = |bank, address, data| {
+        said(EA, Command::EepromRead, 0, Data::EepromBank { data, bank, address, bank_error: false })
+    };
+    for wrong in [of(2, 0x10, 7), of(3, 0x12, 7), word(Command::EepromRead, 0, 0x10, 7), LOST] {
+        let mut read = EepromRead::of_bank(EA, 3, 0x10);
+        assert_eq!(read.start(7), ask(0x11, 7));
+        assert_eq!(read.receive(of(3, 0x11, 1), 0), ask(0x10, 300_000));
+        assert_eq!(read.receive(wrong, 0), ask(0x11, 300_000));
+        assert_eq!(read.receive(of(3, 0x11, 1), 0), ask(0x10, 300_000));
+        assert_eq!(read.receive(of(3, 0x10, 2), 0), ask(0x10, 300_000));
+        assert_eq!(read.receive(of(3, 0x10, 0x1234), 9), Step::Done { value: 0x1234, ready_ns: 9 });
+    }
 }
 
 /// Command 4 to the highest address, then the type word, with another word before it.

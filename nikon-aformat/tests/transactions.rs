@@ -6,8 +6,8 @@
 use nikon_aformat::bus::{Addresses, Outcome};
 use nikon_aformat::master::{BusTransaction, Cycle, Line, PeriodTooShort, Progress, Reading, Sampled, Transaction};
 use nikon_aformat::{
-    BitRate, Command, Data, Doubt, EncoderAddress, EncoderStatus, Error, Operation, Policy, Request, Resolution,
-    Response, U40,
+    BitOrder, BitRate, Command, Data, Doubt, EncoderAddress, EncoderStatus, Error, Operation, Policy, Request,
+    Resolution, Response, U40,
 };
 
 const LINE: Line = Line::new(BitRate::Mbit4);
@@ -71,6 +71,11 @@ fn when_a_response_may_begin() {
             let block: Vec<_> = frames(Command::Abs40, 3).into_iter().map(Some).collect();
             let _ = transaction.block(&block, 0, begin_ns + 4 * FRAME_NS);
             assert_eq!(ended(transaction), want, "{begin_ns} in a block");
+            // Of a response that is cut off.
+            let mut transaction = start(line);
+            let _ = feed(&mut transaction, &frames(Command::Abs40, 3)[..2], begin_ns);
+            let cut = if taken { Error::Truncated { got: 36, want: 72 } } else { Error::NoResponse };
+            assert_eq!(ended(transaction), Err(cut), "{begin_ns} and cut off");
         }
     }
 }
@@ -90,6 +95,39 @@ fn what_is_known_of_the_begin_of_a_block() {
         let _ = transaction.block(block, since_ns, end_ns);
         assert_eq!(ended(transaction).is_ok(), taken, "{since_ns} {end_ns} {}", block.len());
     }
+}
+
+/// Of two responses in a block the first is taken, as it would be without the block.
+#[test]
+fn the_first_response_of_a_block() {
+    let (first, second) = (response(Command::Abs40, 3, 1), response(Command::Abs40, 3, 2));
+    let block: Vec<_> = [first, second].iter().flat_map(|r| r.emit().contents().to_vec()).map(Some).collect();
+    let mut transaction = start(LINE);
+    let _ = transaction.block(&block, 4_500, 100_000);
+    assert_eq!(ended(transaction), Ok(first));
+}
+
+/// The first frame comes twice, and the CRC-8 over it and the first three frames is right by chance: the response begins with
+/// the second of them.
+#[test]
+fn a_repeated_frame_is_no_part_of_a_response() {
+    let request = Request::new(ea(3), Operation::Abs40);
+    let expected = request.expected(Resolution::default());
+    let mut chances = 0;
+    for high in 0..256 {
+        let sent = response(Command::Abs40, 3, 0x1234 | high << 24);
+        let contents = sent.emit().contents().to_vec();
+        let block: Vec<_> = [contents[0]].iter().chain(&contents).copied().collect();
+        if Response::parse_words(&expected, &block[..4], BitOrder::LsbFirst).is_err() {
+            continue;
+        }
+        chances += 1;
+        let block: Vec<_> = block.into_iter().map(Some).collect();
+        let mut transaction = start(LINE);
+        let _ = transaction.block(&block, 4_500, 200_000);
+        assert_eq!(ended(transaction), Ok(sent));
+    }
+    assert_eq!(chances, 1, "one byte in 256 is the CRC-8");
 }
 
 /// Two frames belong together if the stamps leave no more than the idle time in a response and the latency between them.

@@ -90,7 +90,7 @@ impl Window {
         self.len == 0
     }
 
-    /// The level of line bit `at`; `None` behind the end.
+    /// The level of line bit `at`; `None` after the end.
     pub const fn get(self, at: u32) -> Option<bool> {
         if at < self.len { Some(self.bits >> at & 1 == 1) } else { None }
     }
@@ -101,7 +101,7 @@ impl Window {
     }
 
     /// The same line with the bits of each byte in the other order, as if it had been packed in one order and read in the
-    /// other. Bits behind the last whole byte are those that the other order finds there: padding, read as 0.
+    /// other. Bits after the last whole byte are those that the other order finds there: padding, read as 0.
     pub const fn reordered(self) -> Self {
         Self { bits: self.bits.swap_bytes().reverse_bits() & Self::mask(self.len), len: self.len }
     }
@@ -137,7 +137,7 @@ impl Window {
         }
     }
 
-    /// The bits as bytes, first line bit in the first byte; bits behind the end are 0.
+    /// The bits as bytes, first line bit in the first byte; bits after the end are 0.
     pub const fn to_bytes(self, order: BitOrder) -> [u8; 16] {
         match order {
             BitOrder::LsbFirst => self.bits.to_le_bytes(),
@@ -345,7 +345,7 @@ mod tests {
         }
     }
 
-    /// A window fits up to the last bit of a buffer, and nothing fits behind it.
+    /// A window fits up to the last bit of a buffer, and nothing fits after it.
     #[test]
     fn the_end_of_a_buffer() {
         let mut bytes = [0; 3];

@@ -100,6 +100,8 @@ mod tests {
             assert_eq!(max_step(update_ns, Gear::UNITY), want);
         }
         assert_eq!(max_step(500_000, Gear::new(2, 1).unwrap()), 100_000);
+        let within = |step| is_within_limit(step, 500_000, Gear::UNITY);
+        assert_eq!([-200_001, -200_000, 0, 200_000, 200_001].map(within), [false, true, true, true, false]);
         assert_eq!(max_step(u32::MAX, Gear::new(1, u32::MAX).unwrap()), u32::MAX);
         assert_eq!(Gear::new(0, 1), None);
         assert_eq!(Gear::new(1, 0), None);

@@ -69,7 +69,7 @@ pub mod system_id {
     /// Model of the external scale.
     pub const SCALE_MODEL_ID: TypeCode = TypeCode::truncate(0x32);
 
-    /// The conventional code for the same text: ten hex times the new one. Only for the codes above.
+    /// The conventional code for the same text: 10h times the new one. Only for the codes above.
     pub const fn conventional(code: TypeCode) -> Option<TypeCode> {
         match code.get() {
             0x01 | 0x05 | 0x12..=0x15 | 0x31 | 0x32 => Some(TypeCode::truncate(code.get() << 4)),

@@ -10,11 +10,13 @@
 
 mod common;
 
+use core::cell::Cell;
+
 use common::{CODES, Pair, alarm};
 use rtex_block::device::Manners;
 use rtex_block::master::procedure::{AlarmAttributes, AlarmHistory, Attributes, ClearAlarm, ClearableIf, Clearing};
 use rtex_block::master::{ActiveCode, AxisState, Failure, Progress, Received, StopReason};
-use rtex_block::{Alarm, ErrorCode, NonCyclicResponse, Response, StatusFlags, TypeCode};
+use rtex_block::{Alarm, ErrorCode, Execution, NonCyclicResponse, Response, StatusFlags, TypeCode};
 
 const ALARM: Alarm = Alarm { main: 38, sub: 1 };
 /// Update periods for Alarm to fall.
@@ -188,6 +190,17 @@ fn clearing_without_an_answer() {
         });
         assert_eq!((ended, commands), (timed_out, 1), "{manners:?}");
     }
+    // ERR is the last that is heard of it: whether the alarm is still there is not known.
+    let failed = Cell::new(false);
+    let (ended, commands, _) = clear(&mut stopped(Manners::POLITE.with_refuses_to_clear(true)), 0xc4, |pair| {
+        let response = pair.received.response().map(Response::noncyclic);
+        if failed.get() {
+            pair.received = Received::Nothing;
+        }
+        failed
+            .set(failed.get() || response.and_then(|it| it.execution()).is_some_and(|it| it.contains(Execution::ERR)));
+    });
+    assert_eq!((ended, commands, failed.get()), (timed_out, 1, true));
     // An axis whose drive has not answered yet knows of no alarm, nor that there is none.
     let mut pair = Pair::new(ActiveCode::CyclicPosition, Manners::POLITE);
     assert_eq!(clear(&mut pair, 0xc4, |pair| pair.received = Received::Nothing).0, timed_out);

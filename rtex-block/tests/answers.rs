@@ -70,6 +70,49 @@ fn a_handshake_takes_its_own_answer_only() {
     }
 }
 
+/// Each request is answered with its own bytes 8, 10 and 11 alone; of another one the answer is older.
+#[test]
+fn every_echo_of_a_request_counts() {
+    // Reset, system ID, homing (latch), alarm, parameter, monitor.
+    for code in [0x21, 0x22, 0x24, 0x25, 0x26, 0x2a] {
+        let mut block = [0; 16];
+        (block[0], block[1], block[8], block[10], block[11]) = (0x09, code, 0x50, 0x21, 0x09);
+        let request = Command::parse(&block).unwrap().noncyclic;
+        let ask = |response: [u8; 16]| {
+            let mut handshake = Handshake::new(mac_id(), CyclicCode::CyclicPosition, request, 5).unwrap();
+            handshake.receive(Some(&Response::parse(&response).unwrap()))
+        };
+        block[0] = 0x89;
+        assert!(matches!(ask(block), Progress::Done { .. }), "{code:x}");
+        // Byte 10 has Latch_Sel1 and 2, or the low half of the index; byte 11 Monitor_Sel, or its high half.
+        for (byte, bit) in
+            [(8, 0x01), (8, 0x80), (10, 0x01), (10, 0x08), (10, 0x10), (10, 0x80), (11, 0x01), (11, 0x80)]
+        {
+            let mut other = block;
+            other[byte] ^= bit;
+            assert_eq!(ask(other), Progress::Pending { left: 4 }, "{code:x}: byte {byte} {bit:x}");
+        }
+    }
+}
+
+/// Servo_Active = 0 has to be seen in time: a drive of which nothing is heard is not taken to be off.
+#[test]
+fn switching_off_without_a_response() {
+    let limits = Limits::new(NonZeroU16::new(20).unwrap(), 60).with_inactive(5);
+    let config = AxisConfig::new(mac_id(), ActiveCode::CyclicPosition, 500_000, limits);
+    let mut pair = Pair::with(config, DriveConfig::new(mac_id(), CODES));
+    pair.switch_on();
+    pair.axis.switch_off();
+    for _ in 0..5 {
+        pair.received = Received::Nothing;
+        pair.update();
+        assert_eq!(pair.axis.state(), AxisState::SwitchingOff);
+    }
+    pair.received = Received::Nothing;
+    pair.update();
+    assert_eq!(pair.axis.state(), AxisState::Stopped(StopReason::InactiveTimeout));
+}
+
 #[test]
 fn a_sub_handshake_takes_its_own_answer_only() {
     let new = || SubHandshake::new(SubCode::Monitor, 0x07, 3, 5).unwrap();

@@ -64,6 +64,8 @@ fn counters_that_do_not_count() {
     let goes_on = LogFinding::EchoGoesOn { responses: 4 };
     assert_eq!(findings(&mut log, &still), [(3, stands), (5, goes_on), (7, stands)]);
     assert_eq!(log.end().count(), 0);
+    // Three that were said are not said again.
+    assert_eq!(findings(&mut log.clone(), &[still[0]]), []);
     assert_eq!(findings(&mut log, &[still[7]; 4]), []);
     assert!(log.end().eq([at_end(Unfinished::Echo { responses: 7 })]));
     let goes_on = LogFinding::EchoGoesOn { responses: 7 };
@@ -285,6 +287,12 @@ fn a_drive_that_goes_silent() {
     // One that has never answered is said at the end.
     let mut log = analysis();
     assert_eq!(findings(&mut log, &[1, 2, 3, 0].map(asked)), []);
+    assert_eq!(log.end().count(), 0);
+    // Its first answer is not one that comes again.
+    assert_eq!(findings(&mut log, &[answered(0)]), []);
+    // After three commands it was said; nothing is longer than that.
+    let blocks = [asked(1), answered(1), asked(2), asked(3), asked(0), answered(0)];
+    assert_eq!(findings(&mut analysis(), &blocks), [(4, silent)]);
 }
 
 #[test]

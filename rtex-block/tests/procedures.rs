@@ -262,6 +262,7 @@ fn texts_and_parameters() {
     assert_eq!(list.map(|(_, value)| value), [1, 1_000, 1_000]);
     list[1].1 = 77;
     let mut restore = Restore::new(CODES.parameter_read);
+    assert_eq!(restore.place(), 0);
     assert_eq!(pair.run(|axis| restore.receive(axis, &list)), Progress::Done { value: () });
     let mut backup = Backup::new(CODES.parameter_read);
     let mut again = list.map(|(pr, _)| (pr, -1));

@@ -4,13 +4,15 @@
 #![allow(clippy::arithmetic_side_effects, reason = "a program on a host")]
 
 use tformat::device::{Device, Fault};
-use tformat::master::{Counters, Line, Progress, Transaction};
-use tformat::{Abm, Abs, Almc, BitRate, Error, Request, Resolution, Response};
+use tformat::master::{Counters, Exchange, Line, Progress, Transaction};
+use tformat::{Abm, Abs, Almc, BitRate, Error, OutOfRange, Policy, Request, Resolution};
 
 /// Time of one field at 2.5 Mbit/s.
 const FIELD_NS: u64 = 4_000;
 
-fn main() -> Result<(), Error> {
+fn main() -> Result<(), OutOfRange> {
+    let resolution = Resolution::new(23, 16)?;
+    let policy = Policy::MULTI_TURN.with_max_age_ns(125_000);
     let mut encoder = Device::<6>::new(0x17, BitRate::Mbit2_5);
     encoder.set_alarms(Almc::BA, true);
     let mut counters = Counters::new();
@@ -21,17 +23,17 @@ fn main() -> Result<(), Error> {
         // The cable is bad in the fourth cycle.
         encoder.set_fault(if cycle == 3 { Fault::FlipBit { at: 37 } } else { Fault::None });
 
+        // In the sixth the battery is empty.
+        encoder.set_alarms(Almc::BE, cycle == 5);
+
         let outcome = read(&mut encoder, now_ns);
         counters.record(&outcome);
         match outcome {
-            Ok(Response::ReadAll(data)) => match Resolution::from_enid(data.enid) {
-                Some(hint) => {
-                    let position = hint.resolution.position(data.abs, data.abm)?;
-                    println!("{cycle}: {position}, alarms [{}]", data.almc);
-                }
-                None => println!("{cycle}: an encoder of unknown widths, {data}"),
+            // The raw fields stay readable; control takes a position only if it may be used, and is not older than a cycle.
+            Ok(exchange) => match exchange.position(resolution, policy, now_ns + 60_000) {
+                Ok(position) => println!("{cycle}: {position} at {} ns", exchange.sampled_ns),
+                Err(doubt) => println!("{cycle}: not to be used, {doubt}: {}", exchange.response),
             },
-            Ok(other) => println!("{cycle}: unexpected {other}"),
             Err(error) => println!("{cycle}: refused, {error}"),
         }
     }
@@ -41,7 +43,7 @@ fn main() -> Result<(), Error> {
 }
 
 /// One request for ID 3 and its response, the bytes carried from one end to the other.
-fn read(encoder: &mut Device<6>, now_ns: u64) -> Result<Response, Error> {
+fn read(encoder: &mut Device<6>, now_ns: u64) -> Result<Exchange, Error> {
     let mut transaction = Transaction::start(Request::ReadAll, Line::new(BitRate::Mbit2_5), now_ns);
     let mut sent = None;
     for (k, byte) in (1..).zip(transaction.frame().as_bytes()) {
@@ -53,7 +55,7 @@ fn read(encoder: &mut Device<6>, now_ns: u64) -> Result<Response, Error> {
         }
     }
     match transaction.poll(now_ns + 100_000) {
-        Progress::Done { value, .. } => Ok(value.response),
+        Progress::Done { value, .. } => Ok(value),
         Progress::Failed { error, .. } => Err(error),
         Progress::Pending { .. } => unreachable!("100 us are longer than any time-out"),
     }

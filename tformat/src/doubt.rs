@@ -54,30 +54,49 @@ pub enum Doubt {
         /// Those of its bits that must be 0.
         excess: u32,
     },
+    /// The position was sampled too long ago; from [`Exchange`](crate::master::Exchange), which knows when.
+    #[error("the position is {age_ns} ns old")]
+    Old {
+        /// Its age, in ns.
+        age_ns: u64,
+    },
 }
 
-/// Which alarms a drive lives with.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+/// Which alarms a drive lives with, and how old a position may be.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]
 pub struct Policy {
     /// Alarms with which a position may be used.
     pub tolerated: Almc,
+    /// The longest age of a position, in ns from the instant of sampling. Default: any.
+    pub max_age_ns: u64,
+}
+
+impl Default for Policy {
+    fn default() -> Self {
+        Self::STRICT
+    }
 }
 
 impl Policy {
     /// No alarm is tolerated.
-    pub const STRICT: Self = Self { tolerated: Almc::empty() };
+    pub const STRICT: Self = Self::tolerating(Almc::empty());
     /// As one drive does that counts turns: an overflow of the turns is ignored, a low battery is a warning.
-    pub const MULTI_TURN: Self = Self { tolerated: Almc::OF.union(Almc::BA) };
+    pub const MULTI_TURN: Self = Self::tolerating(Almc::OF.union(Almc::BA));
     /// As the same drive does where turns are not used: what concerns the turns and the battery is ignored.
     pub const SINGLE_TURN: Self =
-        Self { tolerated: Almc::OF.union(Almc::BA).union(Almc::BE).union(Almc::ME).union(Almc::OS) };
+        Self::tolerating(Almc::OF.union(Almc::BA).union(Almc::BE).union(Almc::ME).union(Almc::OS));
 
-    /// A policy that tolerates these alarms.
+    /// A policy that tolerates these alarms, at any age.
     pub const fn tolerating(tolerated: Almc) -> Self {
-        Self { tolerated }
+        Self { tolerated, max_age_ns: u64::MAX }
+    }
+
+    /// Only up to this age, in ns from the instant of sampling.
+    pub const fn with_max_age_ns(self, max_age_ns: u64) -> Self {
+        Self { max_age_ns, ..self }
     }
 
     /// EA0 and EA1 stand for alarms that are not told.
@@ -94,7 +113,7 @@ impl Resolution {
     /// with ABS will do.
     ///
     /// That it is no older than its request is the work of [`Transaction`](crate::master::Transaction), which also gives
-    /// the instant of sampling.
+    /// the instant of sampling; [`Exchange::position`](crate::master::Exchange::position) looks at the age too.
     ///
     /// # Errors
     /// [`Doubt`], in the order in which its variants are declared.

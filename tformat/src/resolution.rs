@@ -186,7 +186,7 @@ impl Resolution {
     ///
     /// ABS and ABM are types of their own: exchanging them does not compile.
     ///
-    /// ```compile_fail
+    /// ```compile_fail,E0308
     /// # let (resolution, abs, abm) = (tformat::Resolution::new(17, 16)?, tformat::Abs::MAX, tformat::Abm::MAX);
     /// resolution.position(abm, abs);
     /// # Ok::<(), tformat::OutOfRange>(())

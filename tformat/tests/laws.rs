@@ -1,4 +1,4 @@
-//! The laws of time on the hostile line. `HOSTILE_EVENTS` says how many events: 100,000 unless it is set.
+//! The laws of time on the hostile line. `HOSTILE_EVENTS` says how many events for each test: 100,000 unless it is set.
 #![allow(clippy::arithmetic_side_effects, clippy::cast_possible_truncation, clippy::panic, reason = "a test")]
 #![allow(clippy::expect_used, clippy::indexing_slicing, clippy::unwrap_used, reason = "a test")]
 #![allow(clippy::missing_docs_in_private_items, missing_docs, unreachable_pub, dead_code, reason = "a test")]
@@ -17,9 +17,9 @@ fn events() -> u64 {
 }
 
 /// Runs seed after seed until enough has happened, and prints what it was.
-fn runs(name: &str, share: u64, mut one: impl FnMut(u64) -> Bench) {
+fn runs(name: &str, mut one: impl FnMut(u64) -> Bench) {
     let (mut tally, mut seen, mut seed) = (Tally::default(), Seen::default(), 0);
-    while tally.events() < events() / share {
+    while tally.events() < events() {
         let bench = one(seed);
         tally.add(&bench.tally());
         let s = bench.seen;
@@ -85,7 +85,7 @@ const READS: [Request; 4] = [Request::ReadSingleTurn, Request::ReadAll, Request:
 /// Laws 1 to 4 for single transactions, under all switches of the encoder.
 #[test]
 fn hostile_transactions() {
-    runs("transactions", 1, |seed| {
+    runs("transactions", |seed| {
         let mut bench = bench(seed, Rates::ROUGH);
         for k in 0..60_usize {
             let request = READS[[0, 1, 0, 2, 0, 3][k % 6]];
@@ -100,7 +100,7 @@ fn hostile_transactions() {
 #[test]
 fn hostile_zero_presets() {
     let mut ends = Ends::default();
-    runs("zero presets", 4, |seed| {
+    runs("zero presets", |seed| {
         let mut bench = bench(seed, MILD);
         bench.moves = false;
         bench.device.set_position(Abs::truncate(0x1000 + seed as u32 % 0x1000), Abm::truncate(3));
@@ -123,7 +123,7 @@ fn hostile_zero_presets() {
 #[test]
 fn hostile_turn_zeros() {
     let mut ends = Ends::default();
-    runs("turn zeros", 4, |seed| {
+    runs("turn zeros", |seed| {
         let mut bench = bench(seed, MILD);
         bench.moves = false;
         bench.trembles = seed % 2 == 0;
@@ -149,7 +149,7 @@ fn hostile_turn_zeros() {
 #[test]
 fn hostile_turn_resets() {
     let mut ends = Ends::default();
-    runs("turn resets", 4, |seed| {
+    runs("turn resets", |seed| {
         let mut bench = bench(seed, MILD);
         bench.moves = false;
         bench.device.set_position(Abs::truncate(5), Abm::truncate(7));
@@ -176,7 +176,7 @@ fn hostile_turn_resets() {
 /// Errors may be cleared as often as one likes: they are gone when it is done, position and turns are not.
 #[test]
 fn hostile_error_resets() {
-    runs("error resets", 4, |seed| {
+    runs("error resets", |seed| {
         let mut bench = bench(seed, MILD);
         bench.moves = false;
         bench.device.set_position(Abs::truncate(5), Abm::truncate(7));
@@ -198,7 +198,7 @@ fn hostile_error_resets() {
 #[test]
 fn hostile_eeprom_writes() {
     let mut ends = Ends::default();
-    runs("EEPROM writes", 4, |seed| {
+    runs("EEPROM writes", |seed| {
         let mut bench = bench(seed, MILD);
         let (page, cell, data) = (seed as usize % 8, seed as usize % 127, 0x40 + seed as u8 % 64);
         let address = Address::truncate(cell as u8);

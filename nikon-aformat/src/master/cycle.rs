@@ -1,6 +1,6 @@
 /// When a readout that is repeated at a fixed period is due: continuous mode.
 ///
-/// The grid does not move: a start that comes late does not shift the ones behind it, and starts that were missed are
+/// The grid does not move: a start that comes late does not shift those after it, and starts that were missed are
 /// counted and not made up for.
 ///
 /// ```

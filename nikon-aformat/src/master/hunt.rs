@@ -59,7 +59,7 @@ impl Hunt {
     pub(super) fn take(&mut self, line: &Line, expected: &Expected, block: Block<'_>, mut found: impl FnMut(Found)) {
         let count = block.frames.len();
         let times = Times { line, block, count };
-        if self.got > 0 && times.earliest_start(expected).saturating_sub(self.end_ns) > line.pause_ns() {
+        if self.got != 0 && times.earliest_start(expected).saturating_sub(self.end_ns) > line.pause_ns() {
             self.cut(expected, &mut found);
         }
         for (at, frame) in block.frames.iter().enumerate() {
@@ -145,7 +145,8 @@ impl Hunt {
     /// A pause: what was begun is not continued.
     fn cut(&mut self, expected: &Expected, found: &mut impl FnMut(Found)) {
         let ([first, ..], [begun_ns, ..]) = (self.contents, self.begun_ns);
-        if self.got > 0 && begun_ns >= self.from_ns && begins_a_response(first) {
+        // Without frames it is 0, which begins no response.
+        if begun_ns >= self.from_ns && begins_a_response(first) {
             let got = u32::try_from(self.got).unwrap_or(0).wrapping_mul(FRAME_BITS);
             let outcome = Err(truncated(got, expected.layout().line_bits()));
             found(Found { outcome, began_ns: begun_ns, end_ns: self.end_ns });

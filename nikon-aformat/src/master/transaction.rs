@@ -94,7 +94,7 @@ impl Transaction {
         self.request.emit()
     }
 
-    /// A frame was received with start bit and delimiter in order, its delimiter at `end_ns`; `content` are its bits, the first
+    /// A frame was received whose start bit and delimiter are right, its delimiter at `end_ns`; `content` are its bits, the first
     /// of the line in bit 0.
     pub fn frame(&mut self, content: u16, end_ns: u64) -> Progress<Reading> {
         self.block(&[Some(content)], 0, end_ns)
@@ -204,7 +204,7 @@ impl BusTransaction {
         self.request.emit()
     }
 
-    /// A frame was received with start bit and delimiter in order, its delimiter at `end_ns`; `content` are its bits, the first
+    /// A frame was received whose start bit and delimiter are right, its delimiter at `end_ns`; `content` are its bits, the first
     /// of the line in bit 0.
     pub fn frame(&mut self, content: u16, end_ns: u64) -> Progress<()> {
         self.block(&[Some(content)], 0, end_ns)

@@ -4,7 +4,7 @@ use crate::Wave;
 use proptest::prelude::*;
 use std::vec::Vec;
 
-/// Line bits of fields sent back to back, with idle line before and behind.
+/// Line bits of fields sent back to back, with idle line before and after.
 fn line(content_bits: u32, fields: &[u16]) -> Vec<bool> {
     let mut bits = std::vec![true; 3];
     for field in fields {

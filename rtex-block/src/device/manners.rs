@@ -13,7 +13,7 @@ pub struct Manners {
     pub in_progress_late: u16,
     /// Update periods for which Servo_Active stays 1 after Servo_On went to 0.
     pub servo_off_late: u16,
-    /// Answers to a new request that still carry type code, index and data of the request before it.
+    /// Answers to a new request that still carry type code and index of the request before it.
     pub stale_answers: u16,
     /// Exchanges by which each bit of byte 2 of the Status_Flags is shown later than it is so, bit 0 first (In_Position) and bit 7
     /// last (Servo_Active), 0..=15 each.

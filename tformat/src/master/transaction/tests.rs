@@ -283,7 +283,7 @@ fn a_long_block_with_an_echo_ends_with_the_response() {
     assert_eq!(ended(&mut transaction), Err(Error::Rejected { sf: StatusField::CA0 }));
 }
 
-/// A buffer without times: the request of four bytes as it came back, and behind it a response or nothing.
+/// A buffer without times: the request of four bytes as it came back, and after it a response or nothing.
 #[test]
 fn what_a_uart_received_since_the_request_began() {
     let request = Request::write_eeprom(Address::truncate(1), 0x5a);
@@ -301,4 +301,20 @@ fn what_a_uart_received_since_the_request_began() {
         let want = echo[got];
         assert_eq!(parse_echoed(request, &wrong), Err(Error::EchoMismatch { at: got as u8, got: want ^ 4, want }));
     }
+}
+
+/// 125 us old may be used where 125 us are allowed; the alarms of the logged response are a doubt at any age.
+#[test]
+fn the_age_of_a_position() {
+    let response = Response::parse(Request::ReadSingleTurn, &RESPONSE).unwrap();
+    let exchange = Exchange { response, sampled_ns: 4_480 };
+    let resolution = Resolution::new(23, 16).unwrap();
+    let policy = Policy::tolerating(crate::Almc::all()).with_max_age_ns(125_000);
+    let at = |now_ns| exchange.single_turn(resolution, policy, now_ns);
+    assert_eq!((at(0), at(129_480), at(129_481)), (Ok(1_883_572), Ok(1_883_572), Err(Doubt::Old { age_ns: 125_001 })));
+    let strict = exchange.single_turn(resolution, Policy::STRICT, u64::MAX);
+    assert!(matches!(strict, Err(Doubt::Status { .. })), "{strict:?}");
+    // ID 0 carries no turns.
+    assert_eq!(exchange.position(resolution, policy, 129_480), Err(Doubt::Absent));
+    assert_eq!(exchange.position(resolution, policy, 129_481), Err(Doubt::Old { age_ns: 125_001 }));
 }
