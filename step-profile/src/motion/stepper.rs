@@ -214,21 +214,27 @@ impl Stepper {
     fn enter(&mut self, count: u32, curve: &Curve, frame: &Frame, piece: &Piece, end: Real) -> u64 {
         let scale = |x: Real, power: i32| (x * frame.scale).scaled((frame.shift as i32).wrapping_mul(power));
         let target = (i64::from(count) << 32).wrapping_add(1 << 31);
+        // Where the step is made from the begin of the curve on: behind it, if it was due when a request came.
         let want = Real::fixed(target.saturating_sub(frame.from).max(0).unsigned_abs(), 32);
+        let over = Real::fixed(frame.from.saturating_sub(target).max(0).unsigned_abs(), 32);
         if piece.a.is_zero() && piece.j.is_zero() {
-            let wait = (want - frame.made(curve, piece.p)) / (piece.v * frame.scale);
-            let (t, past) = frame.middle(frame.since(curve, piece.time) + wait);
+            let made = frame.made(curve, piece.p);
+            let late = made + over > want;
+            let way = if late { (want + Real::ONE) - (made + over) } else { want - made };
+            let begin = frame.since(curve, piece.time);
+            let (t, past) = frame.middle(begin + way / (piece.v * frame.scale));
             let interval = Real::ONE / scale(piece.v, 1);
             let wide = |whole: u64, part: Real| u128::from(whole) << 64 | u128::from(part.to_fixed(64));
             let interval = wide(interval.to_fixed(0), interval.fraction());
             let time = wide(t, past.scaled((frame.shift as i32).wrapping_neg()));
-            self.mode = Mode::Cruise { interval, time };
-            return t;
+            // The time of a late step is an interval before that of the next one.
+            self.mode = Mode::Cruise { interval, time: if late { time.wrapping_sub(interval) } else { time } };
+            return if late { frame.middle(begin).0 } else { t };
         }
         let (tick, wait) = frame.sample(curve, piece.time);
         let (until, _) = frame.sample(curve, end);
         let ahead = |p: Real| {
-            let made = frame.made(curve, p);
+            let made = frame.made(curve, p) + over;
             (want - made, made - want)
         };
         let straight = piece.bend == Bend::Flat;
