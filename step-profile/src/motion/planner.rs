@@ -207,7 +207,10 @@ fn top(from: Real, goal: Goal, bounds: &Bounds) -> Result<Real, Real> {
     // Each slope takes at least dv sqrt(dv / j), both together just n if they begin and end at rest and only jerk.
     let steep = (n.squared() * jerk.j).scaled(-2).cbrt();
     let high = (low + steep).min(sum.sqrt()).min(bounds.v);
-    Ok(crossing(low, high, n, need))
+    Ok(climb(low, high, n, |v| {
+        let (up, down) = (Slope::new(from, v, bounds), Slope::new(v, exit, bounds));
+        (up.distance() + down.distance(), up.growth(bounds) + down.growth(bounds))
+    }))
 }
 
 /// The greatest speed from which `to` can be reached within `n`, or the greatest that can be reached from it.
@@ -215,8 +218,36 @@ pub(super) fn greatest(to: Real, n: Real, bounds: &Bounds) -> Real {
     let most = (to.squared() + (bounds.a * n).scaled(1)).sqrt().min(bounds.v).max(to);
     match bounds.jerk {
         None => most,
-        Some(_) => crossing(to, most, n, |v| distance(v, to, bounds)),
+        Some(_) => climb(to, most, n, |v| {
+            let slope = Slope::new(v, to, bounds);
+            (slope.distance(), slope.growth(bounds))
+        }),
     }
+}
+
+/// As [`crossing`], for a need that grows with the speed, with how fast it does: Newton's steps from `high` down, over the
+/// root of the speed above `low`, where the need bends upwards. Each of them ends above the speed that is looked for, so the
+/// last one is made a little longer.
+fn climb(low: Real, high: Real, n: Real, need: impl Fn(Real) -> (Real, Real)) -> Real {
+    let mut root = (high - low).sqrt();
+    for round in 0..12_u8 {
+        let speed = low + root.squared();
+        let (got, growth) = need(speed);
+        if got <= n {
+            if round > 0 && (n - got).scaled(14) > n {
+                break;
+            }
+            return speed;
+        }
+        let over = got - n;
+        let step = over / (root * growth).scaled(1);
+        let more = if over.scaled(7) <= n { step.scaled(-7) } else { Real::ZERO };
+        root = root - (step + more);
+        if root.is_zero() {
+            break;
+        }
+    }
+    crossing(low, high, n, |v| need(v).0)
 }
 
 /// The greatest speed at which a motion may end after `n`.
