@@ -220,7 +220,7 @@ fn axis(v: u32, a: u32, j: u64, steps_per_m: u32) -> AxisSetup {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { cases: if cfg!(miri) { 2 } else { 400 }, ..ProptestConfig::default() })]
+    #![proptest_config(ProptestConfig { cases: 2 * ProptestConfig::default().cases, ..ProptestConfig::default() })]
 
     #[test]
     fn requests_at_any_moment(
