@@ -39,135 +39,27 @@
 mod control;
 mod link;
 mod report;
+mod send;
+mod state;
 
 pub use report::{Counters, Fast, Report, Safe, Signal};
-
-use core::fmt;
+pub use send::Transmission;
+pub use state::{Cause, State};
 
 use crate::answer::Answer;
 use crate::dialect::Dialect;
 use crate::encoder_id::{EncoderId, PositionBits};
 use crate::error::Error;
-use crate::frame::{Extra, Head, Stuffing, Tail, Trailer};
+use crate::frame::{Stuffing, Tail, Trailer};
 use crate::line_code::LineDisparity;
 use crate::message::{Finished, Requester};
-use crate::parameter::{EncoderByte, MasterSymbol, ParameterByte};
+use crate::parameter::{EncoderByte, MasterSymbol};
 use crate::position::Phase;
 use crate::rssi::EdgeWatch;
 use crate::sampling::{Alignment, TEST_PATTERN, WINDOW};
 use crate::sync::Synchroniser;
 use link::Link;
-
-/// Where the receiver is.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub enum State {
-    /// Two frames without an answer.
-    Reset,
-    /// Sixteen frames without an answer: the encoder synchronises.
-    Sync,
-    /// Nine frames: sampling index and delay are searched in the test pattern.
-    Start,
-    /// Nine frames: the test pattern has to come at the learned place.
-    Learn,
-    /// Sixteen frames more of the same: line check.
-    Check,
-    /// One frame: the encoder identifier.
-    IdReq,
-    /// Frames with INIT until VSYNC comes.
-    WaitVsync,
-    /// RX0..RX7, V-frame after V-frame.
-    Running,
-}
-
-impl State {
-    /// How many frames the state lasts; `None` if that depends on the encoder.
-    pub const fn frames(self) -> Option<u8> {
-        match self {
-            Self::Reset => Some(2),
-            Self::Sync | Self::Check => Some(16),
-            Self::Start | Self::Learn => Some(9),
-            Self::IdReq => Some(1),
-            Self::WaitVsync | Self::Running => None,
-        }
-    }
-
-    const fn next(self) -> Self {
-        match self {
-            Self::Reset => Self::Sync,
-            Self::Sync => Self::Start,
-            Self::Start => Self::Learn,
-            Self::Learn => Self::Check,
-            Self::Check => Self::IdReq,
-            Self::IdReq => Self::WaitVsync,
-            Self::WaitVsync | Self::Running => Self::Running,
-        }
-    }
-}
-
-/// Why the link was started anew.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-#[non_exhaustive]
-pub enum Cause {
-    /// The application asked for it (PRST).
-    Requested,
-    /// A START frame: no encoder, or the test pattern is not there.
-    Learn(Error),
-    /// A LEARN or CHECK frame: the test pattern came with a wrong bit.
-    Pattern,
-    /// The identifier was damaged or is of an encoder that this receiver does not support.
-    Identifier(Error),
-    /// No VSYNC within the frames that [`Dialect::vsync_frames`] allows.
-    NoVsync,
-    /// The quality monitor has run out.
-    Quality,
-    /// Too many acceleration words in a row could not be used.
-    AccelerationErrors,
-}
-
-impl fmt::Display for State {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.pad(match self {
-            Self::Reset => "RESET",
-            Self::Sync => "SYNC",
-            Self::Start => "START",
-            Self::Learn => "LEARN",
-            Self::Check => "CHECK",
-            Self::IdReq => "IDREQ",
-            Self::WaitVsync => "WAIT VSYNC",
-            Self::Running => "RUNNING",
-        })
-    }
-}
-
-impl fmt::Display for Cause {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Requested => f.write_str("asked for"),
-            Self::Learn(error) | Self::Identifier(error) => error.fmt(f),
-            Self::Pattern => f.write_str("the test pattern came with a wrong bit"),
-            Self::NoVsync => f.write_str("no VSYNC after INIT"),
-            Self::Quality => f.write_str("the quality monitor has run out"),
-            Self::AccelerationErrors => f.write_str("too many acceleration words in a row could not be used"),
-        }
-    }
-}
-
-/// What to send from the start of an H-frame.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub struct Transmission {
-    /// Zeros before the frame: 16 after a restart, no need of the protocol.
-    pub lead_in: u8,
-    /// SYNC to PARA.
-    pub head: Head,
-    /// Whether an encoder answers: then the line is released after PARA, reception begins one bit later and takes
-    /// [`WINDOW`] bits. Otherwise [`FILLER`](crate::frame::FILLER) is sent.
-    pub answered: bool,
-}
+use send::{trailer, transmission};
 
 /// The receiver.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -193,6 +85,12 @@ pub struct Master {
     /// ACC_ERR_CNT_THRESH.
     threshold: u8,
     restart: bool,
+    /// The next head, if it left before this frame's answer was taken in.
+    ahead: Option<Transmission>,
+    /// Why the link is lost, while the frame after the loss is on the line already.
+    lost: Option<Cause>,
+    /// The frame does not end in the usual way: sync mode, a restart that was asked for, or one of the two above.
+    detour: bool,
 }
 
 impl Master {
@@ -226,6 +124,9 @@ impl Master {
             counters: Counters::default(),
             threshold: 0x1f,
             restart: false,
+            ahead: None,
+            lost: None,
+            detour: sync.is_some(),
         }
     }
 
@@ -301,6 +202,19 @@ impl Master {
 
     /// The same with four bytes of samples a word, the first of them in the low bits: what a DMA leaves in the memory of a
     /// little-endian processor, and fast on one that cannot load words from any address.
+    ///
+    /// ```
+    /// use hdsl::Dialect;
+    /// use hdsl::master::{Cause, Master, State};
+    /// # use hdsl::Error;
+    /// let mut master = Master::new(Dialect::SICK);
+    /// // No encoder: after RESET and SYNC, 18 frames without an answer, the line stays high.
+    /// for _ in 0..18 {
+    ///     assert_eq!(master.finish_words(&[u32::MAX; 18], None).restarted, None);
+    /// }
+    /// assert_eq!(master.finish_words(&[u32::MAX; 18], None).restarted, Some(Cause::Learn(Error::NoEdge)));
+    /// assert_eq!(master.state(), State::Reset);
+    /// ```
     pub fn finish_words(&mut self, samples: &[u32; WINDOW / 4], late: Option<i16>) -> &Report {
         match (self.state, self.alignment) {
             (State::Start, _) => {
@@ -347,6 +261,22 @@ impl Master {
     /// count. In START frames too the bits have to be the test pattern.
     ///
     /// For a frame without an answer the bits are not looked at.
+    ///
+    /// ```
+    /// use hdsl::device::Device;
+    /// use hdsl::master::{Master, State};
+    /// use hdsl::{Dialect, EncoderId};
+    ///
+    /// let mut master = Master::new(Dialect::SICK);
+    /// let mut encoder = Device::new(EncoderId::try_from(0x00153)?);
+    /// while master.state() != State::Running {
+    ///     // A line that stays high is all ones.
+    ///     let bits = encoder.answer(master.transmission().head.bits(), 1000).unwrap_or(u64::MAX);
+    ///     master.finish_bits(bits, None, None);
+    /// }
+    /// assert_eq!(master.encoder_id().map(|id| id.position_bits()), Some(32));
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     pub fn finish_bits(&mut self, bits: u64, signal: Option<Signal>, late: Option<i16>) -> &Report {
         self.end(bits, signal, late)
     }
@@ -355,18 +285,16 @@ impl Master {
         let bits = bits & (u64::MAX >> 3);
         self.report.begin(self.state, signal);
         let outcome = self.receive(bits);
-        if self.report.was != State::Running || outcome.is_err() || self.sync.is_some() || self.restart {
+        if self.report.was != State::Running || outcome.is_err() || self.detour {
             return self.end_with(outcome, late);
         }
+        self.present = self.following();
         self.go_on()
     }
 
     /// What [`end_with`](Self::end_with) comes to on a running link that is free running: the usual end.
     fn go_on(&mut self) -> &Report {
         self.counters.frames = self.counters.frames.wrapping_add(1);
-        let symbol = if self.link.is_settled() { self.requester.transmit() } else { MasterSymbol::Idle };
-        (self.present, self.disparity) =
-            transmission(State::Running, symbol, self.link.msync(), None, LineDisparity::ZERO);
         self.report.restarted = None;
         self.report.state = State::Running;
         self.report.tail = Tail { trailer: Trailer::AfterAnswer, stuffing: Stuffing::MIN };
@@ -375,12 +303,18 @@ impl Master {
         &self.report
     }
 
-    fn end_with(&mut self, mut outcome: Result<(), Cause>, late: Option<i16>) -> &Report {
-        self.counters.frames = self.counters.frames.wrapping_add(1);
-        if core::mem::take(&mut self.restart) {
-            outcome = Err(Cause::Requested);
+    fn end_with(&mut self, outcome: Result<(), Cause>, late: Option<i16>) -> &Report {
+        let asked = core::mem::take(&mut self.restart).then_some(Cause::Requested);
+        let restarted = self.lost.take().or(asked).or(outcome.err());
+        self.detour = self.sync.is_some();
+        if let Some(next) = self.ahead.take() {
+            // The next head is out: a restart comes after its frame.
+            self.present = next;
+            self.lost = restarted;
+            self.detour |= restarted.is_some();
+            return self.go_on();
         }
-        let restarted = outcome.err();
+        self.counters.frames = self.counters.frames.wrapping_add(1);
         let was = self.report.was;
         if restarted.is_some() {
             self.begin_again();
@@ -396,39 +330,6 @@ impl Master {
         self.report.long_free = self.state == State::Running && self.requester.is_long_free();
         self.report.short_free = self.state == State::Running && self.requester.is_short_free();
         &self.report
-    }
-
-    /// Stuffing after a START frame: time for the search.
-    fn search_time(&self, was: State, restarted: Option<Cause>) -> Stuffing {
-        let blocks = match (was, restarted, self.alignment) {
-            (State::Start, Some(_), _) => 16,
-            (State::Start, None, Some(found)) => found.delay.get().saturating_sub(1).saturating_add(4),
-            _ => 0,
-        };
-        Stuffing::new(blocks).unwrap_or(Stuffing::MAX)
-    }
-
-    /// The head of the next frame.
-    fn prepare(&mut self, was: State, extra: Option<Extra>, restarted: bool) {
-        let symbol = match self.state {
-            State::Reset => MasterSymbol::Reset,
-            State::Sync => MasterSymbol::Sync,
-            State::Start => MasterSymbol::Start,
-            State::Learn => MasterSymbol::Learn,
-            State::Check => MasterSymbol::Check,
-            State::IdReq => MasterSymbol::IdReq,
-            State::WaitVsync => MasterSymbol::Init,
-            State::Running if self.link.is_settled() => self.requester.transmit(),
-            State::Running => MasterSymbol::Idle,
-        };
-        // The disparity goes on only from frames without an answer.
-        let carried = matches!(was, State::Reset | State::Sync) && !restarted;
-        let disparity = if carried { self.disparity } else { LineDisparity::ZERO };
-        let msync = self.state == State::Running && self.link.msync();
-        (self.present, self.disparity) = transmission(self.state, symbol, msync, extra, disparity);
-        if restarted {
-            self.present.lead_in = 16;
-        }
     }
 
     fn receive(&mut self, bits: u64) -> Result<(), Cause> {
@@ -486,31 +387,5 @@ impl Master {
             finished: Finished { short: finished.short.or(dropped.short), long: finished.long.or(dropped.long) },
             ..Report::START
         };
-    }
-}
-
-#[inline]
-fn transmission(
-    state: State,
-    symbol: MasterSymbol,
-    msync: bool,
-    extra: Option<Extra>,
-    disparity: LineDisparity,
-) -> (Transmission, LineDisparity) {
-    let byte = ParameterByte::of(symbol, matches!(state, State::WaitVsync | State::Running), msync);
-    let (head, after) = match extra {
-        // Every answered frame of a free-running link; what is constant here costs nothing.
-        None if disparity == LineDisparity::ZERO => Head::new(byte, None, LineDisparity::ZERO),
-        None => Head::new(byte, None, disparity),
-        Some(extra) => Head::new(byte, Some(extra), disparity.with_ones(extra.bits())),
-    };
-    (Transmission { lead_in: 0, head, answered: !matches!(state, State::Reset | State::Sync) }, after)
-}
-
-const fn trailer(before: State, restarted: Option<Cause>) -> Trailer {
-    match (before, restarted) {
-        (State::Reset | State::Sync, _) => Trailer::Whole,
-        (State::Learn, Some(Cause::Pattern)) => Trailer::Cut,
-        _ => Trailer::AfterAnswer,
     }
 }

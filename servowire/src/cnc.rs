@@ -9,6 +9,7 @@ mod host;
 mod line;
 mod node;
 mod noise;
+mod periods;
 mod plot;
 mod power;
 mod program;
@@ -17,8 +18,9 @@ mod report;
 mod scaling;
 
 use std::error::Error;
+use std::fmt;
 use std::io::{self, BufWriter, IsTerminal, Write};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use clap::Args;
@@ -63,7 +65,7 @@ pub struct Arguments {
     #[arg(long)]
     scaling: bool,
     /// Length of a move in steps; 51200 are a turn at 1/256.
-    #[arg(long, value_name = "N", default_value_t = 51_200)]
+    #[arg(long, value_name = "N", default_value_t = 51_200, value_parser = clap::value_parser!(u32).range(1..))]
     steps: u32,
     /// Step frequencies in Hz; they take turns from move to move. 250000, or 249000 with --published-sync0: at 250 kHz
     /// all steps have the same phase, and that machine is at home there. In a longer cycle motion is as much slower.
@@ -73,10 +75,10 @@ pub struct Arguments {
     #[arg(long, value_name = "N", default_value_t = 1)]
     k: u32,
     /// Moves, each back from the one before.
-    #[arg(long, value_name = "N", default_value_t = 1, conflicts_with_all = ["cycles", "dance"])]
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u64).range(1..), conflicts_with_all = ["cycles", "dance"])]
     moves: u64,
     /// Move there and back for so many cycles, then come to rest.
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..))]
     cycles: Option<u64>,
     /// Each axis its own move: other lengths, and the frequencies in turn.
     #[arg(long, conflicts_with = "dance")]
@@ -129,7 +131,8 @@ pub struct Arguments {
     /// Pull the cable in front of a device in a cycle.
     #[arg(long, value_name = "DEVICE@CYCLE", value_parser = incident)]
     unplug: Option<(usize, u64)>,
-    /// The motor driver of a device shuts down in a cycle: over-current, or what is named after it, as 2@500=BPDF or =unpowered.
+    /// The motor driver of a device shuts down in a cycle: over-current, or what is named after it, as 2@500=BPDF, =unpowered
+    /// or =reset.
     #[arg(long, value_name = "DEVICE@CYCLE", value_parser = driver_fault)]
     driver_fault: Option<(usize, u64, Fault)>,
     /// Switch a motor driver off when its axis has had no step for so many cycles; it needs 1 ms to wake.
@@ -188,7 +191,7 @@ fn driver_fault(text: &str) -> Result<(usize, u64, Fault), String> {
     let (place, name) = text.split_once('=').unwrap_or((text, "AOCP"));
     let (device, cycle) = incident(place)?;
     let fault = Fault::parse(name);
-    let names = "OTS, AOCP, BOCP, APDF, BPDF, UVLO, STD, STDLAT, unpowered";
+    let names = "OTS, AOCP, BOCP, APDF, BPDF, UVLO, STD, STDLAT, unpowered, reset";
     fault.map(|fault| (device, cycle, fault)).ok_or_else(|| format!("\"{name}\" is none of {names}"))
 }
 
@@ -198,7 +201,7 @@ impl Arguments {
     pub(crate) fn run(&self) -> ExitCode {
         let mut out = BufWriter::new(io::stdout().lock());
         if self.scaling {
-            let drawn = self.svg.as_deref().map_or(Ok(()), scaling::draw);
+            let drawn = self.svg.as_deref().map_or(Ok(()), |path| named(path, scaling::draw(path)));
             return match scaling::table(&mut out).map_err(Into::into).and(drawn) {
                 Ok(()) => ExitCode::SUCCESS,
                 Err(error) => failed(error.as_ref()),
@@ -298,7 +301,7 @@ impl Arguments {
         let mut host = Host::new(program, axes, self.cycles, self.max_lag);
         let mut record = Recorder::new(axes, self.vcd.as_deref(), self.pcapng.as_deref(), self.record_cycles)?;
         let mut curves = self.svg.is_some().then(|| Curves::new(cycle_ns));
-        let mut sound = self.wav.as_deref().map(|path| Sound::create(path, cycle_ns)).transpose()?;
+        let mut sound = self.wav.as_deref().map(|path| named(path, Sound::create(path, cycle_ns))).transpose()?;
         let bar = self.bar();
         let mut cycle = 0;
         while let Some(progress) = line.step(&mut host, &mut record) {
@@ -331,7 +334,7 @@ impl Arguments {
         report::end(out, &line, &host)?;
         out.flush()?;
         if let (Some(curves), Some(path)) = (&curves, &self.svg) {
-            curves.draw(axes.min(4), path)?;
+            named(path, curves.draw(axes.min(4), path))?;
         }
         if let Some(sound) = sound {
             sound.finish()?;
@@ -347,6 +350,11 @@ impl Arguments {
         let style = ProgressStyle::with_template("{pos}/{len} cycles [{bar:40}] {per_sec}, {eta} left");
         ProgressBar::new(cycles).with_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()))
     }
+}
+
+/// The error with the file that it is about.
+fn named<T>(path: &Path, result: Result<T, impl fmt::Display>) -> Result<T, Box<dyn Error>> {
+    result.map_err(|error| format!("{}: {error}", path.display()).into())
 }
 
 fn failed(error: &(dyn Error + 'static)) -> ExitCode {

@@ -128,10 +128,19 @@ impl Arguments {
         match self.perform() {
             Ok(code) => code,
             Err(fault) => {
-                eprintln!("{}: {fault}", self.port);
+                let name = if fault.names_itself() { String::new() } else { format!("{}: ", self.port) };
+                eprintln!("{name}{fault}");
                 ExitCode::FAILURE
             }
         }
+    }
+
+    /// The encoder at a port that is open.
+    fn link<P: port::Port>(&self, port: P) -> Result<Link<P>, link::Fault> {
+        Link::open(port, Duration::from_millis(self.timeout)).map_err(|fault| match fault {
+            link::Fault::Encoder(error) => link::Fault::Nobody(error, port::megabits(self.rate)),
+            fault => fault,
+        })
     }
 
     fn perform(&self) -> Result<ExitCode, link::Fault> {
@@ -139,15 +148,18 @@ impl Arguments {
         if let What::Simulate(simulate) = &self.what {
             let Simulate { id, rpm, echo, .. } = *simulate;
             let done = if let Some(encoder) = &simulate.encoder {
-                let encoder = port::open(encoder, self.rate)?;
-                let mut link = Link::open(encoder, Duration::from_millis(self.timeout))?;
+                let named = |fault: link::Fault| match fault {
+                    fault if fault.names_itself() => fault,
+                    fault => link::Fault::Port(format!("{encoder}: {fault}")),
+                };
+                let mut link = self.link(port::open(encoder, self.rate)?).map_err(named)?;
                 act::relay(port, &mut link, echo, simulate.csv.as_deref())
             } else {
                 simulate::run(port, simulate::Encoder { rate: self.rate, id, rpm, echo }, None)
             };
             return done.map(|()| ExitCode::SUCCESS);
         }
-        let mut link = Link::open(port, Duration::from_millis(self.timeout))?;
+        let mut link = self.link(port)?;
         match &self.what {
             What::Read => act::read(&mut link),
             What::Watch(watch) => act::watch(&mut link, watch),

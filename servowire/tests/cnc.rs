@@ -209,6 +209,59 @@ fn a_driver_says_what_it_has() {
     }
 }
 
+/// A dip of its supply leaves a driver with ENBL 0 and an empty STATUS: all pulses come, and the motor stands still.
+#[test]
+fn a_motor_that_never_moved_is_told() {
+    let output = servowire(&["cnc", "--steps", "3000", "--driver-fault", "2@0=reset"]);
+    assert_eq!(failure(&output), "failed: axis 2 never moved: 3000 steps were asked, 3000 pulses made\n");
+    let rows = axes(&text(&output));
+    assert_eq!(rows.iter().map(|axis| axis[6]).collect::<Vec<_>>(), [3000, 0, 3000, 3000]);
+    let output = servowire(&["cnc", "--steps", "3000", "--driver-fault", "2@3000=reset"]);
+    assert!(failure(&output).contains("axis 2 was asked to 3000 and is at "), "{output:?}");
+    // There and back: the position alone would not show it.
+    let output = servowire(&["cnc", "--steps", "3000", "--moves", "2", "--driver-fault", "4@0=reset"]);
+    assert!(failure(&output).contains("axis 4 never moved: 6000 steps"), "{output:?}");
+}
+
+/// What was to go wrong and did not is no success.
+#[test]
+fn an_incident_that_never_comes_is_told() {
+    for (arguments, line) in [
+        (
+            ["--unplug", "3@100000"],
+            "the motion was over before cycle 100000, in which the cable in front of device 3 was to be pulled",
+        ),
+        (
+            ["--driver-fault", "1@100000"],
+            "the motion was over before cycle 100000, in which the driver of device 1 was to fail",
+        ),
+    ] {
+        let output = servowire(&[&["cnc", "--steps", "500"], &arguments[..]].concat());
+        assert!(failure(&output).contains(line), "{output:?}");
+    }
+}
+
+/// However bad the line is, the run ends, and its report does not grow with it.
+#[test]
+fn restarts_are_bounded() {
+    for rate in ["3e-5", "1e-3", "0.3"] {
+        let output = servowire(&["cnc", "--cycles", "100000", "--bit-error-rate", rate]);
+        let line = failure(&output);
+        assert!(line.contains("the machine did not run") || line.contains("the motion was"), "{line}");
+        assert!(text(&output).lines().filter(|line| line.starts_with("event")).count() <= 51, "{output:?}");
+    }
+}
+
+#[test]
+fn a_file_that_cannot_be_written_is_named() {
+    for option in ["--vcd", "--pcapng", "--svg", "--wav"] {
+        let output = servowire(&["cnc", "--steps", "10", option, "/no/such/folder/out"]);
+        assert!(failure(&output).contains("/no/such/folder/out: "), "{option}: {output:?}");
+    }
+    let output = servowire(&["cnc", "--scaling", "--svg", "/no/such/folder/out"]);
+    assert!(failure(&output).contains("/no/such/folder/out: "), "{output:?}");
+}
+
 /// Axes that are at rest lose their current, and get it back a millisecond before their next step.
 #[test]
 fn drivers_that_are_switched_off_are_awake_before_they_step() {
@@ -329,6 +382,14 @@ fn wrong_use_is_explained() {
         (["--cycle-time", "5000"], "multiple of 4000"),
         (["--bit-error-rate", "2"], "probability"),
         (["--freq", "300000"], "error"),
+        (["--freq", "1"], "step frequency below 15.26 Hz"),
+        (["--steps", "0"], "'--steps <N>'"),
+        (["--moves", "0"], "'--moves <N>'"),
+        (["--cycles", "0"], "'--cycles <N>'"),
+        (["--k", "0"], "at least 1 needed"),
+        (["--max-lag", "0"], "1..=16000"),
+        (["--unplug", "3"], "as 3@10000"),
+        (["--gcode", "/no/such/file"], "/no/such/file: "),
         (["--devices", "255"], "1..=254"),
     ] {
         let output = servowire(&[&["cnc"], &arguments[..]].concat());

@@ -146,7 +146,7 @@ fn eeproms_are_dumped_and_restored_only_when_one_insists() {
     let output = bench.talk(&["eeprom", "restore", "--overwrite-eeprom", file]);
     assert!(text(&output).contains("nothing was written"), "{}", text(&output));
     let output = bench.talk(&["eeprom", "restore", "--overwrite-eeprom", "--yes", file]);
-    assert!(text(&output).starts_with("1 bytes were different"), "{}", text(&output));
+    assert!(text(&output).starts_with("1 byte was different"), "{}", text(&output));
     let output = bench.talk(&["eeprom", "dump", "--pages", "2"]);
     assert_eq!(text(&output), dump.replacen("1: ff ff", "1: 12 ff", 1));
     bench.end();
@@ -216,6 +216,81 @@ fn faults_are_refused_and_over_with_the_next_exchange() {
         println!("{good} of 150 good; {tally}");
         assert!(good > 75);
     }
+}
+
+/// What can be wrong is said in a sentence that names it, with exit code 1, and at once.
+#[test]
+fn what_is_wrong_is_said() {
+    let (bench, port) = simulated(0x17);
+    drop(port);
+    let at = |port: &str, arguments: &[&str]| {
+        let begin = Instant::now();
+        let mut program = Command::new(env!("CARGO_BIN_EXE_servowire"));
+        let output = program.args(["talk", "--port", port]).args(arguments).output().unwrap();
+        assert!(begin.elapsed() < Duration::from_secs(10));
+        assert_eq!(output.status.code(), Some(1), "{}", text(&output));
+        String::from_utf8(output.stderr).unwrap()
+    };
+    assert!(at("/dev/ttyNone", &["read"]).starts_with("/dev/ttyNone: there is no such port; there "));
+    assert!(at("/dev/null", &["read"]).starts_with("/dev/null: this is no serial port"));
+    assert!(at("/", &["read"]).starts_with("/: this is no serial port"));
+    let said = at(&bench.name, &["simulate", "--encoder", "/dev/ttyNone"]);
+    assert!(said.starts_with("/dev/ttyNone: there is no such port"), "{said}");
+    let folder = tempfile::tempdir().unwrap();
+    let missing = folder.path().join("no/file");
+    let missing = missing.to_str().unwrap();
+    for arguments in [
+        &["eeprom", "restore", "--overwrite-eeprom", "--yes", missing] as &[_],
+        &["eeprom", "dump", "--pages", "1", missing],
+        &["watch", "--csv", missing],
+    ] {
+        assert!(at(&bench.name, arguments).starts_with(&format!("{missing}: ")), "{arguments:?}");
+    }
+    let empty = folder.path().join("empty");
+    File::create(&empty).unwrap();
+    let empty = empty.to_str().unwrap();
+    let said = at(&bench.name, &["eeprom", "restore", "--overwrite-eeprom", "--yes", empty]);
+    assert_eq!(said, format!("{empty}: there is no page in it\n"));
+    let said = at(&bench.name, &["eeprom", "dump", "--pages", "7"]);
+    assert!(said.ends_with("it has no page 6\n"), "{said}");
+    bench.end();
+}
+
+/// Nobody at the other end; and a port that goes away while the program reads.
+#[test]
+fn an_encoder_that_is_not_there_is_said_to_be_so() {
+    let (bench, port) = Bench::new(|_, stop| {
+        while !stop.load(Ordering::Relaxed) {
+            thread::sleep(Duration::from_millis(5));
+        }
+        Tally::default()
+    });
+    drop(port);
+    for arguments in [&["read"] as &[_], &["watch"], &["info"], &["clear-errors"], &["eeprom", "dump"]] {
+        let output = bench.talk(arguments);
+        assert_eq!(output.status.code(), Some(1));
+        let said = text(&output);
+        let want = "no response: is the encoder's power on, is 2.5 Mbit/s its rate, are A and B the right way round?\n";
+        assert!(said.ends_with(want), "{said}");
+    }
+    bench.end();
+
+    let (bench, port) = simulated(0x17);
+    drop(port);
+    // Our end of the pseudo-terminal is inherited; as long as the program has it open itself, it does not go away.
+    let close = "for f in /proc/self/fd/*; do f=${f##*/}; [ $f -lt 3 ] || eval \"exec $f>&-\"; done; exec \"$@\"";
+    let program = Command::new("bash")
+        .args(["-c", close, "bash", "timeout", "20", env!("CARGO_BIN_EXE_servowire")])
+        .args(["talk", "--port", &bench.name, "watch", "--period", "1"])
+        .stdout(std::process::Stdio::null())
+        .stderr(std::process::Stdio::piped())
+        .spawn()
+        .unwrap();
+    thread::sleep(Duration::from_millis(500));
+    bench.end();
+    let output = program.wait_with_output().unwrap();
+    assert_eq!(output.status.code(), Some(1));
+    assert!(text(&output).contains(": the port is gone or refuses: "), "{}", text(&output));
 }
 
 /// Two adapters: the master at one, the encoder at the other, and the program between them.
@@ -290,8 +365,8 @@ fn only_good_answers_are_passed_on() {
                 Ok(())
             };
             let ours: Box<dyn SerialPort> = Box::new(ours);
-            relay::run(ours, &mut encoder, echo, log, Some(&seen)).unwrap();
-            said
+            let end = relay::run(ours, &mut encoder, echo, log, Some(&seen));
+            (said, end)
         });
         let mut answer = [0; 11];
         master.write_all(&[0x1a]).unwrap();
@@ -314,7 +389,8 @@ fn only_good_answers_are_passed_on() {
         master.write_all(&[0x1a]).unwrap();
         assert!(master.read(&mut answer).is_err());
         stop.store(true, Ordering::Relaxed);
-        let said = relay.join().unwrap();
+        let (said, end) = relay.join().unwrap();
+        assert!(end.unwrap_err().to_string().starts_with("the encoder's port is gone"));
         let requests = said.iter().filter(|entry| entry.starts_with("Request")).count();
         assert_eq!(requests, 3, "{said:?}");
         assert!(said.last().unwrap().contains("Err"), "{said:?}");

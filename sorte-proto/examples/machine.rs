@@ -141,7 +141,16 @@ fn main() -> Result<(), Error> {
             node.device.first_cycle_ns(),
             node.device.cycle_zero_ns()
         );
+        let ports = [PortId::A, PortId::B].map(|port| node.device.forwarding(port));
+        println!("  its ports: {ports:?}");
         assert_eq!(lag, 0);
+    }
+    // The host of the last device wants its motor driver off the line, and takes the device out.
+    if let Some(last) = nodes.last_mut() {
+        last.device.enter_error();
+        println!("taken out: {:?}, its port {:?}", last.device.state(), last.device.forwarding(PortId::A));
+        last.device.reset();
+        println!("and back: {:?}", last.device.state());
     }
     Ok(())
 }

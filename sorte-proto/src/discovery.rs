@@ -248,7 +248,7 @@ pub struct Assignment {
     pub out_offset: u16,
 }
 
-/// The device count behind one more device. A passing frame shows its low byte first, so a carry cannot reach the high
+/// The device count after one more device. A passing frame shows its low byte first, so a carry cannot reach the high
 /// one: 254 and 255 both become 255.
 pub(crate) fn count_after(before: u16) -> u16 {
     let [low, high] = before.to_le_bytes();

@@ -163,7 +163,7 @@ servowire_core::errors! {
             want: u8,
         },
         /// Device frames were missing in too many cycles one after the other.
-        #[error("{count} devices have not answered for {cycles} cycles, the first of them is device {first}")]
+        #[error("no frame of device {first} for {cycles} cycles, {count} missing in all")]
         DevicesMissing {
             /// Address of the first that is missing.
             first: u8,

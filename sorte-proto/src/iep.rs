@@ -17,6 +17,8 @@
 //! assert_eq!(axis.next_edge(8000), Some(Edge { ns: 6595, high: false }));
 //! ```
 
+use core::hash::{Hash, Hasher};
+
 use crate::pins::{Levels, Pins};
 use crate::pto::{Pto, StartTime};
 use crate::sync0::{Flags, PULSE_NS, Register, Sync0, Variant, Write, Writes};
@@ -29,8 +31,6 @@ const CYCLE: u64 = 800;
 const WRAP: u64 = 799;
 const PULSE: u64 = PULSE_NS as u64 / TICK_NS;
 const NEVER: u64 = u64::MAX;
-/// Writes of one run of the handler: three events with at most seven each.
-const MOST_WRITES: usize = 21;
 
 /// A change of the SYNC0 output.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -103,13 +103,21 @@ pub struct Channel {
     sync_start: u16,
     armed: bool,
     pending: Events,
-    /// Writes that are still to be made, the time of one, of the next and of the last.
-    queue: [Option<Write>; MOST_WRITES],
+    /// What the handler writes, one after the other, and how many of these writes have been made; the time of one, of the
+    /// next and of the last.
+    queue: [Writes; 3],
     made: u8,
-    queued: u8,
     write_ticks: u64,
     write: u64,
     busy_until: u64,
+}
+
+/// What nearly always tells two channels apart.
+impl Hash for Channel {
+    fn hash<H: Hasher>(&self, state: &mut H) {
+        (self.sync0, self.word, self.cmp6_ns).hash(state);
+        (self.cmp1, self.cmp6, self.serve, self.rise, self.fall).hash(state);
+    }
 }
 
 impl Channel {
@@ -135,9 +143,8 @@ impl Channel {
             sync_start: 0,
             armed: true,
             pending: Events { cmp6: false, cmp0: false, cmp7: false },
-            queue: [None; MOST_WRITES],
+            queue: [Writes::NONE; 3],
             made: 0,
-            queued: 0,
             write_ticks: 0,
             write: NEVER,
             busy_until: 0,
@@ -154,6 +161,11 @@ impl Channel {
     /// The word in the output buffer: what CMP7 will find.
     pub const fn set_word(&mut self, word: Pto) {
         self.word = word;
+    }
+
+    /// The word in the output buffer.
+    pub const fn word(&self) -> Pto {
+        self.word
     }
 
     /// A word with this start and the DIR level that is there.
@@ -190,6 +202,36 @@ impl Channel {
                 }
             }
         }
+    }
+
+    /// The same channel on a counter of cycles that begins `cycles` later: what happens from there on has times that are so
+    /// many cycles less. Run it up to there first, with [`next`](Self::next).
+    ///
+    /// Channels that will do the same are equal then, whatever they did before, so a bench need not work out again what it
+    /// has seen once.
+    ///
+    /// ```
+    /// use sorte_proto::iep::Channel;
+    /// use sorte_proto::sync0::Variant;
+    /// let start = Channel::new(Variant::Lossless, 2000, 0);
+    /// let mut idle = start;
+    /// while idle.next(3_000_000).is_some() {}
+    /// assert_eq!(idle.rebased(750), start);
+    /// ```
+    pub const fn rebased(mut self, cycles: u64) -> Self {
+        let ticks = cycles.saturating_mul(CYCLE);
+        self.cmp0 = earlier(self.cmp0, ticks);
+        self.cmp1 = earlier(self.cmp1, ticks);
+        self.cmp6 = earlier(self.cmp6, ticks);
+        self.cmp7 = earlier(self.cmp7, ticks);
+        self.serve = earlier(self.serve, ticks);
+        self.rise = earlier(self.rise, ticks);
+        self.fall = earlier(self.fall, ticks);
+        self.write = earlier(self.write, ticks);
+        self.busy_until = self.busy_until.saturating_sub(ticks);
+        // The tick dealt with last is of no more interest.
+        self.now = 0;
+        self
     }
 
     /// The next edge before `until_ns`.
@@ -266,7 +308,7 @@ impl Channel {
         Edge { ns: self.now.saturating_mul(TICK_NS), high }
     }
 
-    /// A cut pulse falls right behind the handler, in the same tick.
+    /// A cut pulse falls right after the handler, in the same tick.
     fn run_handler(&mut self) -> Happening {
         let events = core::mem::take(&mut self.pending);
         self.serve = NEVER;
@@ -275,49 +317,41 @@ impl Channel {
         if events.cmp6 {
             *six = Some(self.sync0.cmp6());
             levels = self.pins.cmp6();
-            self.apply(*six);
         }
         if events.cmp0 {
             *zero = Some(self.sync0.cmp0());
-            self.apply(*zero);
         }
         if events.cmp7 {
             let pending = self.sync0.flags().contains(Flags::PENDING_PULSE);
             levels = self.pins.cmp7(self.word, pending).or(levels);
             *seven = Some(self.sync0.cmp7(self.word.start()));
-            self.apply(*seven);
         }
+        self.write_all(writes.map(|writes| writes.unwrap_or(Writes::NONE)));
         Happening::Served(Served { ns: self.now.saturating_mul(TICK_NS), events, writes, levels })
     }
 
-    fn apply(&mut self, writes: Option<Writes>) {
-        for write in writes.into_iter().flatten() {
-            if self.write_ticks == 0 {
-                self.make(write);
-            } else {
-                self.enqueue(write);
-            }
+    /// At once, or one after the other. The handler never runs while writes of the run before are still to be made.
+    fn write_all(&mut self, writes: [Writes; 3]) {
+        let all = writes.into_iter().flatten();
+        if self.write_ticks == 0 {
+            return all.for_each(|write| self.make(write));
         }
-    }
-
-    fn enqueue(&mut self, write: Write) {
-        if let Some(place) = self.queue.get_mut(usize::from(self.queued)) {
-            *place = Some(write);
-            self.queued = self.queued.saturating_add(1);
+        self.queue = writes;
+        self.busy_until = all.fold(self.now, |last, _| last.saturating_add(self.write_ticks));
+        if self.busy_until > self.now {
+            self.write = self.now.saturating_add(self.write_ticks);
         }
-        self.write = self.now.saturating_add(self.write_ticks);
-        self.made = 0;
-        self.busy_until = self.now.saturating_add(self.write_ticks.saturating_mul(self.queued.into()));
     }
 
     /// The oldest write takes effect.
     fn write_queued(&mut self) {
-        let next = self.queue.get(usize::from(self.made)).copied().flatten();
-        self.made = self.made.saturating_add(1);
-        if self.made >= self.queued {
-            (self.queued, self.write) = (0, NEVER);
-        } else {
+        let mut left = self.queue.into_iter().flatten().skip(self.made.into());
+        let next = left.next();
+        if left.next().is_some() {
+            self.made = self.made.saturating_add(1);
             self.write = self.now.saturating_add(self.write_ticks);
+        } else {
+            (self.queue, self.made, self.write) = ([Writes::NONE; 3], 0, NEVER);
         }
         if let Some(write) = next {
             self.make(write);
@@ -359,4 +393,8 @@ impl Channel {
         let wait = if tick > in_cycle { tick } else { tick.saturating_add(CYCLE) };
         start.saturating_add(wait)
     }
+}
+
+const fn earlier(at: u64, ticks: u64) -> u64 {
+    if at == NEVER { NEVER } else { at.saturating_sub(ticks) }
 }

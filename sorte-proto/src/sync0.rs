@@ -39,7 +39,6 @@
 //! ]);
 //! ```
 
-use crate::flags::show_flags;
 use crate::pto::StartTime;
 
 /// Width of the pulse in ns: PWIDTH = 399.
@@ -52,7 +51,7 @@ pub const LATE_CMP1_NS: u16 = 3990;
 ///
 /// The proof is a walk over all phases of a step at every latency in ticks of 5 ns, over pairs of phases, and over writes
 /// of 0 to 60 ns as events of their own, against the timer of [`iep`](crate::iep). At 600 ns the same walk loses steps: a
-/// pulse that ends 3386 ns into the cycle leaves 604 ns until CMP1 of the one deferred behind it.
+/// pulse that ends 3386 ns into the cycle leaves 604 ns until CMP1 of the one deferred after it.
 pub const MAX_LATENCY_NS: u16 = 590;
 
 /// CMP_CFG of an idle output: CMP0 resets the counter, CMP0 and CMP7 are enabled. Bit n+1 enables CMPn.
@@ -99,7 +98,7 @@ bitflags::bitflags! {
     }
 }
 
-show_flags!(Flags);
+servowire_core::show_flags!(Flags);
 
 impl Flags {
     /// With `flag` set or cleared.
@@ -172,7 +171,8 @@ pub struct Writes {
 }
 
 impl Writes {
-    const NONE: Self =
+    /// An event without a write.
+    pub(crate) const NONE: Self =
         Self { prelude: Prelude::Nothing, program: Program::Nothing, first_cfg: 0, start: 0, cmp6: 0, cmp1: 0, cfg: 0 };
 }
 

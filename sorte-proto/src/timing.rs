@@ -245,7 +245,7 @@ mod tests {
         }
     }
 
-    /// The frames of all devices reach the master one slot behind the other, whatever the cables.
+    /// The frames of all devices reach the master one slot after the other, whatever the cables.
     #[test]
     fn device_frames_arrive_back_to_back() {
         let delays = [30, 200, 85, 0, 450, 7];
@@ -265,7 +265,7 @@ mod tests {
             let sent = published_send_time_ns(DeviceAddress::new(a).unwrap());
             i64::from(sent) + i64::from(a - 1) * (355 + line)
         };
-        // Two frames of 640 ns, one behind the other.
+        // Two frames of 640 ns, one after the other.
         for line in 0..=200 {
             for a in 1..4 {
                 assert!(arrives(a + 1, line) - arrives(a, line) >= 640, "{line}");

@@ -96,17 +96,22 @@ class Image:
 
 def parse(text):
     """The functions of a disassembly."""
-    function, halves = None, {}
+    function, halves, branch = None, {}, None
     for line in text.splitlines():
         if head := FUNCTION.match(line):
             start = int(head[1], 16)
             if function:
                 function.end = min(start, function.end + 4)
                 yield function
-            function, halves = Function(head[2], start), {}
+            function, halves, branch = Function(head[2], start), {}, None
         elif function and (body := INSTRUCTION.match(line)):
             function.end = int(body[1], 16)
-            read(function, body[2], body[3], halves)
+            # The linker fills the gap behind a function with d4d4, which reads as a conditional branch; no function ends in one.
+            if branch:
+                read(function, *branch, halves)
+            branch = (body[2], body[3]) if body[2] == "bmi" else None
+            if not branch:
+                read(function, body[2], body[3], halves)
     if function:
         function.end += 4
         yield function

@@ -17,6 +17,8 @@ const STACK_TOP = 0x20040000;
 const PT_LOAD = 1;
 const DMA_CHAN_ABORT = 0x444;
 const EXEC_STALLED = 0x80000000;
+/** Of a character on the console: 10 bits at 1,000,000 baud. */
+const CHARACTER_NS = 10_000;
 
 /** One state machine in time. */
 class Scheduled {
@@ -100,6 +102,8 @@ export class Chip {
     this.deepest = STACK_TOP;
     this.busy = 0; // clocks that the present instruction still takes
     this.synchroniser = new Map();
+    this.typed = []; // characters on their way to the console
+    this.typing = 0; // clocks until the next one is there
     const chip = (this.chip = new RP2040());
     chip.logger = new ConsoleLogger(LogLevel.Error, true);
     load(chip.flash, path);
@@ -133,9 +137,18 @@ export class Chip {
     chip.core.PC = BOOT2_RAM;
   }
 
+  /** Sends a line to the console. */
+  type(text) {
+    this.typed.push(...Buffer.from(`${text}\n`));
+  }
+
   /** One clock of the system. */
   clock() {
     const { chip } = this;
+    if (this.typed.length > 0 && --this.typing < 0) {
+      chip.uart[0].feedByte(this.typed.shift());
+      this.typing = CHARACTER_NS / this.ns;
+    }
     if (this.busy > 0) {
       this.busy--;
     } else if (!chip.core.waiting || chip.core.interruptsUpdated) {

@@ -1,5 +1,6 @@
 // What every pair of images has to do: run it, hurt the line in some exchanges, and check what both have made of it.
 import assert from 'node:assert/strict';
+import { appendFileSync } from 'node:fs';
 import { fileURLToPath } from 'node:url';
 import { Chip } from './chip.mjs';
 import { Wire, units } from './wire.mjs';
@@ -12,21 +13,42 @@ const MS = HZ / 1000;
 
 export const US = HZ / 1e6;
 
-/** Runs `ms` of two images. `faults`: what happens to the line, by the number of the exchange. */
-export function run(masterImage, encoderImage, { ms, faults }) {
+/**
+ * Runs `ms` of two images. `faults`: what happens to the line, by the number of the exchange. `typed`: lines for the master's
+ * console; each is typed when the one before has been answered.
+ */
+export function run(masterImage, encoderImage, { ms, faults = {}, typed = [] }) {
   const lines = [];
-  const print = (text) => lines.push({ t: wire.t, text });
+  const rest = [...typed];
+  const type = () => rest.length > 0 && master.type(rest.shift());
+  const print = (text) => {
+    lines.push({ t: wire.t, text });
+    if (!/^(abs|fault)/.test(text)) type();
+  };
   const master = new Chip(masterImage, IMAGES + masterImage, { hz: HZ, print });
   const encoder = new Chip(encoderImage, IMAGES + encoderImage, { hz: HZ });
   const wire = new Wire(master, encoder);
+  const counts = []; // instructions of both until each request
   wire.onRequest = (exchange) => {
+    counts.push([master.instructions, encoder.instructions]);
     wire.delay = 0;
     wire.deaf = false;
     wire.disturb = null;
     faults[exchange]?.(wire);
   };
   wire.run(ms * MS);
+  for (const [k, image] of [masterImage, encoderImage].entries()) {
+    const chip = [master, encoder][k];
+    note(image, 'stack', chip.stack);
+    // Not of a run in which something was typed: its cycles are of many kinds.
+    if (typed.length === 0) note(image, 'instructions a cycle', (counts.at(-1)[k] - counts[1][k]) / (counts.length - 2));
+  }
   return { wire, lines };
+}
+
+/** Notes a figure for figures.py. */
+function note(image, what, value) {
+  if (process.env.FIGURES) appendFileSync(process.env.FIGURES, `${image}\t${what}\t${Math.round(value)}\n`);
 }
 
 /** The exchanges of a run that have ended: request and answer as units, by the wire alone. */
@@ -108,6 +130,37 @@ export function check(name, { bits, clocks, turn, late, request, length, value }
     `${microseconds(Math.min(...turns))} to ${microseconds(Math.max(...turns))} us, ` +
     `stack ${wire.master.stack} and ${wire.encoder.stack} bytes`);
   for (const { t, text } of failed) console.log(`  at ${(t / US).toFixed(0)} us ${text}`);
+}
+
+/**
+ * Reads, writes and reads a cell of the EEPROM and sets the turns to 0, as typed at the console of the master, and checks what it
+ * says and what was on the wire. `requests`: units of the requests to write and to reset, and how often the latter has to come;
+ * `turns`: those of an answer to a read, as units; `before` and `after`: how the cell is printed.
+ */
+export function service(name, { bits, clocks, length, write, reset, repeats, turns, typed, said, ms }) {
+  const { wire, lines } = run(name, name.replace('master', 'encoder'), { ms, typed });
+  const text = lines.map((line) => line.text).join('\n');
+  assert.deepEqual(lines.map((line) => line.text).filter((line) => !/^abs/.test(line)).slice(1), said, text);
+  assert.equal(wire.clashes, 0, 'both drivers on at once');
+  const all = exchanges(wire, bits, clocks);
+  const asked = all.map((exchange) => exchange.request.map((unit) => unit.value).join());
+  assert.equal(asked.filter((request) => request === write.join()).length, 1, 'the cell is written once');
+  const first = asked.indexOf(reset.join());
+  const resets = asked.filter((request) => request === reset.join());
+  assert.equal(resets.length, repeats, 'the reset is sent as often as the protocol wants');
+  assert.ok(asked.slice(first, first + repeats).every((request) => request === reset.join()), 'with nothing between');
+  const values = all.map((exchange) => exchange.units.map((unit) => unit.value));
+  const reads = all.map((_, k) => k).filter((k) => k > 0 && values[k].length === length);
+  const [early, late] = [reads.filter((k) => k < first), reads.filter((k) => k > first + repeats)];
+  assert.ok(early.length > 3 && late.length > 20, `${early.length} reads before, ${late.length} after`);
+  for (const k of early) assert.equal(turns(values[k]), 7, `${values[k]}`);
+  for (const k of late) assert.equal(turns(values[k]), 0, `${values[k]}`);
+  const plain = all.filter((_, k) => k > 0 && values[k].length !== length && values[k].length > 0);
+  const slowest = Math.max(...plain.map((exchange) => exchange.units[0].at - (exchange.request.at(-1).at + (bits + 2) * clocks)));
+  const printed = lines.filter((line) => /^abs/.test(line.text));
+  assert.ok(/ 0 bad$/.test(printed.at(-1).text), text);
+  console.log(`${name}: ${said.join('; ')}; turns 7 in ${early.length} answers, then 0 in ${late.length}; ` +
+    `answers not made ahead after up to ${(slowest / US).toFixed(1)} us, stack ${wire.master.stack} and ${wire.encoder.stack} bytes`);
 }
 
 /** The driver is on one bit before the first start bit, or a little more, and off within a bit after the last stop bit. */

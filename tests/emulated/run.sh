@@ -16,18 +16,19 @@ target() { rustup target list --installed | grep -qx "$1" || rustup target add "
 # build IMAGES [ARGUMENT...]
 build() { (cd "$firmware/$1" && cargo build --release --locked --bins "${@:2}"); }
 
+objdump=$(dirname "$(rustc --print target-libdir)")/bin/llvm-objdump
+[ -x "$objdump" ] || rustup component add llvm-tools
+# What the runs note: image, what, number.
+FIGURES=$(mktemp)
+export FIGURES PYTHONDONTWRITEBYTECODE=1
+trap 'rm -f "$FIGURES"' EXIT
+
 target thumbv6m-none-eabi
 target thumbv7em-none-eabihf
 target thumbv8m.main-none-eabihf
-build rp2040
-python3 size.py "$firmware"/rp2040/target/thumbv6m-none-eabi/release/{t,a}format-{master,encoder}
-for image in stm32f405 stm32g4; do
+for image in rp2040 stm32f405 stm32g4 rp2350-hdsl; do
     build "$image"
-    python3 size.py "$firmware/$image/target/thumbv7em-none-eabihf/release/servowire-$image"
 done
-build rp2350-hdsl
-hdsl=$firmware/rp2350-hdsl/target/thumbv8m.main-none-eabihf/release/servowire-rp2350-hdsl
-python3 size.py "$hdsl"
 
 [ -d node_modules/rp2040js ] || npm ci --silent --no-audit --no-fund
 [ -x .venv/bin/python ] || python3 -m venv .venv
@@ -38,9 +39,13 @@ for image in tformat-master tformat-encoder-5m aformat-master aformat-encoder-2m
     node waveform.mjs "$image" | .venv/bin/python compare.py
 done
 
-.venv/bin/python hdsl.py "$hdsl"
+.venv/bin/python hdsl.py "$firmware/rp2350-hdsl/target/thumbv8m.main-none-eabihf/release/servowire-rp2350-hdsl"
 
 build stm32f405 --features emulated
 (cd ../.. && cargo build -p servowire-examples --bin tformat-encoder)
 python3 stm32f405.py "$firmware/stm32f405/target/thumbv7em-none-eabihf/release/servowire-stm32f405" \
     ../../target/debug/tformat-encoder
+# Its figures are those of the image that is flashed.
+build stm32f405
+
+python3 figures.py "$objdump" "$FIGURES"

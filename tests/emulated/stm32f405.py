@@ -131,6 +131,9 @@ def check(said, line):
     numbers = {int(good) + int(bad) - 1 for good, bad in failed}
     assert NOTICED <= numbers <= NOTICED | PERHAPS, f"a fault costs its own exchange and no other: {said}"
     stack = max(int(stack) for *_, stack in printed)
+    if "FIGURES" in os.environ:
+        with open(os.environ["FIGURES"], "a", encoding="ascii") as figures:
+            figures.write(f"servowire-stm32f405\tstack\t{stack}\n")
     print(f"stm32f405: {line.requests} exchanges, {len(failed)} of 5 hurt ones noticed, the rest good; stack {stack} bytes")
     print("\n".join("  " + line for line in said.splitlines() if line.startswith("fault")))
 

@@ -29,7 +29,8 @@ export class Wire {
     encoder.clock();
     const masterOn = master.output(DE);
     this.past[t % PAST] = (encoder.output(DE) ? 2 : 0) | (encoder.output(DI) ? 1 : 0);
-    const wanted = this.past[(t + PAST - this.delay) % PAST];
+    // Only what was wanted since the request began comes late.
+    const wanted = t - this.delay < this.began ? 1 : this.past[(t + PAST - this.delay) % PAST];
     const encoderOn = wanted > 1;
     if (masterOn && encoderOn) this.clashes++;
     let level = masterOn ? master.output(DI) : encoderOn ? (wanted & 1) === 1 : true;

@@ -13,7 +13,7 @@ impl Master {
     /// # Errors
     /// [`Doubt::NoLink`], [`Doubt::Estimated`], [`Doubt::Alignment`], [`Doubt::Speed`].
     pub fn fast(&self) -> Result<Fast, Doubt> {
-        let (State::Running, Some(id)) = (self.state, self.encoder) else { return Err(Doubt::NoLink) };
+        let (State::Running, None, Some(id)) = (self.state, self.lost, self.encoder) else { return Err(Doubt::NoLink) };
         let (position, velocity) = self.link.fast()?;
         Ok(Fast { position: id.position(position), velocity })
     }
@@ -23,14 +23,14 @@ impl Master {
     /// # Errors
     /// [`Doubt::NoLink`], [`Doubt::NoVFrame`], [`Doubt::Stale`], [`Doubt::Withheld`].
     pub fn safe(&self) -> Result<Safe, Doubt> {
-        let (State::Running, Some(id)) = (self.state, self.encoder) else { return Err(Doubt::NoLink) };
+        let (State::Running, None, Some(id)) = (self.state, self.lost, self.encoder) else { return Err(Doubt::NoLink) };
         let (position, summary) = self.link.safe()?;
         Ok(Safe { position: id.position(position), age: self.link.at().saturating_add(8), summary })
     }
 
     /// Starts the link anew at the end of the present frame (PRST).
     pub const fn request_restart(&mut self) {
-        self.restart = true;
+        (self.restart, self.detour) = (true, true);
     }
 
     /// Drops all messages and tells the encoder so (MRST). What was under way ends with [`Error::Dropped`].
@@ -61,7 +61,11 @@ impl Master {
     }
 
     fn check_link(&self) -> Result<(), Error> {
-        if self.state == State::Running && self.link.is_settled() { Ok(()) } else { Err(Error::NotLocked) }
+        if self.state == State::Running && self.lost.is_none() && self.link.is_settled() {
+            Ok(())
+        } else {
+            Err(Error::NotLocked)
+        }
     }
 
     /// ACC_ERR_CNT_THRESH: unusable acceleration words in a row after which a dialect that does so restarts the link.
@@ -71,6 +75,18 @@ impl Master {
 
     /// The period of the external pulse in eighths of a bit (13.333 ns each), for
     /// [`set_frames_per_pulse`](Self::set_frames_per_pulse).
+    ///
+    /// ```
+    /// use hdsl::master::Master;
+    /// use hdsl::sync::Es;
+    /// use hdsl::{Dialect, Error};
+    /// let mut master = Master::new(Dialect::SICK);
+    /// assert_eq!(master.set_frames_per_pulse(Es::new(4)), Err(Error::NoPulse));
+    /// // 62.5 us at 75 MHz
+    /// master.set_pulse_period(4687);
+    /// assert_eq!(master.set_frames_per_pulse(Es::new(4)), Ok(()));
+    /// assert!(master.is_on_pulse());
+    /// ```
     pub const fn set_pulse_period(&mut self, period: u32) {
         self.pulse = Some(period);
     }
@@ -85,6 +101,7 @@ impl Master {
             Some(es) => Some(Synchroniser::new(self.pulse.ok_or(Error::NoPulse)?, es)?),
             None => None,
         };
+        self.detour |= self.sync.is_some();
         Ok(())
     }
 }

@@ -136,7 +136,7 @@ impl Master {
             self.link.quality.count(QualityEvent::LowRssi);
         }
         let bad = self.link.quality.count_words(self.link.at, &answer);
-        if bad > 0 {
+        if bad != 0 {
             self.counters.words = self.counters.words.wrapping_add(bad.into());
         }
         if !answer.switch_ok() {

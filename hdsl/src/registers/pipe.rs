@@ -84,10 +84,10 @@ impl PipeFifo {
 
     /// Takes the oldest entry out: PIPE_S and PIPE_D.
     pub fn take(&mut self) -> (u8, u8) {
-        let overflow = if core::mem::take(&mut self.dropped) { Self::POVR } else { 0 };
         if self.len == 0 {
-            return (overflow | Self::PEMP, 0);
+            return (Self::PEMP, 0);
         }
+        let overflow = if core::mem::take(&mut self.dropped) { Self::POVR } else { 0 };
         let entry = self.entries.get(usize::from(self.first)).copied().unwrap_or_default();
         self.first = self.first.wrapping_add(1) % Self::SIZE;
         self.len = self.len.saturating_sub(1);

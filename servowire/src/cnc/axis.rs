@@ -3,16 +3,14 @@
 use std::collections::VecDeque;
 
 use sorte_proto::drv8711::{STEP_NS, WAKE_NS};
-use sorte_proto::iep::{Channel, Edge, Happening};
-use sorte_proto::pins::DIR_SETUP_HOLD_NS;
+use sorte_proto::iep::Channel;
+use sorte_proto::pins::{DIR_SETUP_HOLD_NS, Levels};
 use sorte_proto::sync0::{CMP7_NS, Variant};
 use sorte_proto::{Direction, Pto};
 
-use super::clock::Clock;
 use super::driver::Driver;
+use super::periods::{Change, Generator, PERIOD};
 
-/// Period of the generator.
-pub(super) const PERIOD: u64 = 4000;
 /// Steps under way at most; older ones are lost.
 const UNDER_WAY: usize = 8;
 
@@ -29,6 +27,8 @@ pub(super) struct Tally {
     pub(super) late: u64,
     /// Steps without a pulse.
     pub(super) lost: u64,
+    /// Steps that the motor made: pulses with the driver on.
+    pub(super) moved: u64,
     /// Steps made in a cycle of their own because their frame was lost.
     pub(super) caught_up: u64,
     /// DIR too close to a rising STEP.
@@ -50,6 +50,16 @@ pub(super) enum Seen {
     Position(i64),
 }
 
+/// A word that a frame has brought.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Incoming {
+    /// When the device has it, in ns since the start of its generator.
+    pub(super) at: u64,
+    pub(super) word: Pto,
+    /// The master's time of its step.
+    pub(super) expected: f64,
+}
+
 /// How the generators are made, and what a late pulse is.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Build {
@@ -60,12 +70,15 @@ pub(super) struct Build {
     pub(super) tolerance_ns: f64,
 }
 
+impl Build {
+    pub(super) fn generator(self) -> Generator {
+        Generator::new(Channel::new(self.variant, CMP7_NS, self.latency_ns).with_write_time(self.write_ns))
+    }
+}
+
 #[derive(Debug, Clone)]
 pub(super) struct Axis {
     build: Build,
-    channel: Channel,
-    /// Own counter at the start of the generator.
-    zero: f64,
     /// The master's time of the steps that are under way.
     expected: VecDeque<f64>,
     rise: f64,
@@ -83,8 +96,6 @@ impl Axis {
     pub(super) fn new(build: Build) -> Self {
         Self {
             build,
-            channel: channel(build),
-            zero: 0.0,
             expected: VecDeque::with_capacity(UNDER_WAY),
             rise: f64::NEG_INFINITY,
             fall: f64::NEG_INFINITY,
@@ -98,16 +109,30 @@ impl Axis {
         }
     }
 
-    /// The generator starts when the own counter holds `zero`. Pulses of a run before are over.
-    pub(super) fn start(&mut self, zero: f64) {
+    /// The generator starts anew. Pulses of a run before are over.
+    pub(super) fn start(&mut self) {
         self.tally.lost += self.expected.len() as u64;
         self.expected.clear();
-        (self.channel, self.zero) = (channel(self.build), zero);
     }
 
-    /// The word in the device's buffer from now on, and its time if it has a step.
-    pub(super) fn set(&mut self, word: Pto, expected: f64) {
-        self.channel.set_word(word);
+    /// Something has happened; `word`: the one that has been under way. Changes are given to `seen`, if anybody wants them.
+    pub(super) fn take(
+        &mut self,
+        change: Change,
+        at: impl FnOnce() -> f64,
+        word: Option<Incoming>,
+        seen: Option<&mut Vec<(u64, Seen)>>,
+    ) {
+        match (change, word) {
+            (Change::Word, Some(word)) => self.order(word),
+            (Change::Word, None) => {}
+            (Change::Step(high), _) => self.step(high, at(), seen),
+            (Change::Pins(levels), _) => self.pins(levels, at(), seen),
+        }
+    }
+
+    /// The word is in the buffer: its step will come.
+    fn order(&mut self, Incoming { word, expected, .. }: Incoming) {
         if word.start().is_some() {
             self.tally.ordered += 1;
             self.expected.push_back(expected);
@@ -118,58 +143,40 @@ impl Axis {
         }
     }
 
-    /// The word has been taken.
-    pub(super) fn rest(&mut self) {
-        self.channel.set_start(None);
+    fn step(&mut self, high: bool, at: f64, seen: Option<&mut Vec<(u64, Seen)>>) {
+        if high {
+            self.pulse(at);
+        } else {
+            self.tally.step_faults += u64::from(at - self.rise < f64::from(STEP_NS));
+            self.fall = at;
+        }
+        if let Some(seen) = seen {
+            seen.push((at as u64, Seen::Step(high)));
+            seen.extend(high.then_some((at as u64, Seen::Position(self.position))));
+        }
     }
 
-    /// Goes on until the own counter is `until` ns after the start of the generator. Changes are given to `seen`, if anybody
-    /// wants them.
-    pub(super) fn run(&mut self, until: u64, clock: &Clock, mut seen: Option<&mut Vec<(u64, Seen)>>) {
-        while let Some(happening) = self.channel.next(until) {
-            match happening {
-                Happening::Edge(Edge { ns, high }) => {
-                    let at = clock.when(self.zero + ns as f64);
-                    if let Some(seen) = &mut seen {
-                        seen.push((at as u64, Seen::Step(high)));
-                    }
-                    if high {
-                        self.pulse(at);
-                        if let Some(seen) = &mut seen {
-                            seen.push((at as u64, Seen::Position(self.position)));
-                        }
-                    } else {
-                        self.tally.step_faults += u64::from(at - self.rise < f64::from(STEP_NS));
-                        self.fall = at;
-                    }
-                }
-                Happening::Served(served) => {
-                    let Some(levels) = served.levels else { continue };
-                    let at = clock.when(self.zero + served.ns as f64);
-                    let dir = levels.direction == Direction::High;
-                    if let Some(seen) = &mut seen {
-                        seen.extend((dir != self.dir).then_some((at as u64, Seen::Dir(dir))));
-                        seen.extend(
-                            (levels.enabled != self.enabled).then_some((at as u64, Seen::Enable(levels.enabled))),
-                        );
-                    }
-                    if dir != self.dir {
-                        self.changed = at;
-                        self.tally.dir_faults += u64::from(at - self.rise < DIR_SETUP_HOLD_NS as f64);
-                    }
-                    if levels.enabled && !self.enabled {
-                        self.woken = at;
-                    }
-                    (self.dir, self.enabled) = (dir, levels.enabled);
-                }
-            }
+    fn pins(&mut self, levels: Levels, at: f64, seen: Option<&mut Vec<(u64, Seen)>>) {
+        let dir = levels.direction == Direction::High;
+        if let Some(seen) = seen {
+            seen.extend((dir != self.dir).then_some((at as u64, Seen::Dir(dir))));
+            seen.extend((levels.enabled != self.enabled).then_some((at as u64, Seen::Enable(levels.enabled))));
         }
+        if dir != self.dir {
+            self.changed = at;
+            self.tally.dir_faults += u64::from(at - self.rise < DIR_SETUP_HOLD_NS as f64);
+        }
+        if levels.enabled && !self.enabled {
+            self.woken = at;
+        }
+        (self.dir, self.enabled) = (dir, levels.enabled);
     }
 
     /// The motor takes a step; which of the expected was it?
     fn pulse(&mut self, at: f64) {
         if self.enabled && self.driver.drives() {
             self.position += if self.dir { -1 } else { 1 };
+            self.tally.moved += 1;
         }
         self.tally.dir_faults += u64::from(at - self.changed < DIR_SETUP_HOLD_NS as f64);
         self.tally.step_faults += u64::from(at - self.fall < f64::from(STEP_NS));
@@ -177,14 +184,14 @@ impl Axis {
         self.rise = at;
         // The nearest is meant: steps are 4 us apart.
         let near = |want: &f64| (at - want).abs() < PERIOD as f64 / 2.0;
-        let error = match self.expected.iter().position(near) {
-            Some(place) => {
-                self.tally.lost += place as u64;
-                self.expected.drain(..=place).next_back().map_or(f64::INFINITY, |want| (at - want).abs())
+        if let Some(place) = self.expected.iter().position(near) {
+            self.tally.lost += place as u64;
+            if place > 0 {
+                self.expected.drain(..place);
             }
-            // A step of a cycle before, or one that nobody asked for.
-            None => self.expected.pop_front().map_or(f64::INFINITY, |want| (at - want).abs()),
-        };
+        }
+        // If none is near: a step of a cycle before, or one that nobody asked for.
+        let error = self.expected.pop_front().map_or(f64::INFINITY, |want| (at - want).abs());
         self.tally.worst_ns = self.tally.worst_ns.max(error);
         if error <= self.build.tolerance_ns {
             self.tally.on_time += 1;
@@ -199,6 +206,78 @@ impl Axis {
     }
 }
 
-const fn channel(build: Build) -> Channel {
-    Channel::new(build.variant, CMP7_NS, build.latency_ns).with_write_time(build.write_ns)
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const BUILD: Build = Build { variant: Variant::Lossless, latency_ns: 0, write_ns: 0, tolerance_ns: 100.0 };
+
+    /// An awake axis after so many changes: at a time, of STEP or the pins.
+    fn after(changes: &[(u32, Change)]) -> Axis {
+        let mut axis = Axis::new(BUILD);
+        axis.driver.set_up().unwrap();
+        for (ns, change) in changes {
+            axis.take(*change, || f64::from(*ns), None, None);
+        }
+        axis
+    }
+
+    const UP: Change = Change::Step(true);
+    const DOWN: Change = Change::Step(false);
+
+    const fn pins(direction: Direction, enabled: bool) -> Change {
+        Change::Pins(Levels { direction, enabled })
+    }
+
+    /// 200 ns before and after a rising STEP, the driver wants DIR to be still.
+    #[test]
+    fn a_change_of_dir_within_200_ns_of_a_step_is_seen() {
+        let high = pins(Direction::High, true);
+        let faults = |changes: &[(u32, Change)]| after(changes).tally.dir_faults;
+        assert_eq!(faults(&[(1000, high), (1199, UP)]), 1);
+        assert_eq!(faults(&[(1000, high), (1200, UP)]), 0);
+        assert_eq!(faults(&[(1000, UP), (1199, high)]), 1);
+        assert_eq!(faults(&[(1000, UP), (1200, high)]), 0);
+        // The driver is switched, DIR stays.
+        assert_eq!(faults(&[(1000, UP), (1100, pins(Direction::Low, false))]), 0);
+    }
+
+    /// 1.9 us high and low.
+    #[test]
+    fn a_pulse_too_short_or_too_close_is_seen() {
+        let faults = |changes: &[(u32, Change)]| after(changes).tally.step_faults;
+        assert_eq!(faults(&[(1000, UP), (2900, DOWN), (4800, UP)]), 0);
+        assert_eq!(faults(&[(1000, UP), (2899, DOWN)]), 1);
+        assert_eq!(faults(&[(1000, UP), (3000, DOWN), (4899, UP)]), 1);
+    }
+
+    /// 1 ms from nSLEEP to the first step.
+    #[test]
+    fn a_step_before_the_driver_is_awake_is_seen_and_moves_nothing_while_it_is_off() {
+        let (off, on) = (pins(Direction::Low, false), pins(Direction::Low, true));
+        let faults = |changes: &[(u32, Change)]| {
+            let axis = after(changes);
+            (axis.tally.wake_faults, axis.tally.moved, axis.position)
+        };
+        assert_eq!(faults(&[(1000, off), (5000, UP)]), (1, 0, 0));
+        assert_eq!(faults(&[(1000, off), (2000, on), (1_001_999, UP)]), (1, 1, 1));
+        assert_eq!(faults(&[(1000, off), (2000, on), (1_002_000, UP)]), (0, 1, 1));
+    }
+
+    #[test]
+    fn a_pulse_is_on_time_late_or_instead_of_a_lost_one() {
+        let word = |expected| Incoming { at: 0, word: Pto::from_step(500, Direction::Low).unwrap(), expected };
+        let mut axis = after(&[]);
+        for expected in [10_000.0, 14_000.0, 18_000.0, 22_000.0] {
+            axis.take(Change::Word, || 0.0, Some(word(expected)), None);
+        }
+        for at in [10_100.0, 18_101.0] {
+            axis.take(UP, || at, None, None);
+        }
+        let Tally { ordered, on_time, late, lost, worst_ns, .. } = axis.tally;
+        assert_eq!((ordered, on_time, late, lost, worst_ns), (4, 1, 1, 1, 101.0));
+        assert_eq!(axis.under_way(), 1);
+        axis.start();
+        assert_eq!((axis.tally.lost, axis.under_way()), (2, 0));
+    }
 }

@@ -37,7 +37,10 @@ impl Clock {
 
     /// What the register reads: whole ticks.
     pub(super) fn read(&self, ns: f64) -> u32 {
-        ((self.at(ns) / TICK).floor() as i64 * 5) as u32
+        let value = self.at(ns);
+        // Rounded down, also below 0.
+        let whole = value as i64 - i64::from(value < (value as i64) as f64);
+        (whole.div_euclid(5) * 5) as u32
     }
 
     /// When the counter holds a value.
@@ -96,6 +99,15 @@ mod tests {
         }
         clock.correct(Correction::Set { counter_ns: 5 }, 3e9);
         assert!((clock.at(3e9 + 135.0) - 5.0).abs() < 1e-6);
+    }
+
+    #[test]
+    fn the_register_reads_whole_ticks() {
+        for (value, read) in
+            [(0.0, 0), (4.99, 0), (5.0, 5), (9.999_999, 5), (-0.1, u32::MAX - 4), (4_294_967_296.0, 4_294_967_295)]
+        {
+            assert_eq!(Clock::new(value, 0.0, 0.0).read(0.0), read, "{value}");
+        }
     }
 
     /// 50 ppm are 200 ns in 4 ms.

@@ -7,6 +7,11 @@ use sorte_proto::drv8711::{Apply, Configuration, Next, Register, Status, StepMod
 /// Time of a word at the 500 kHz of the SPI, in ns: so old can the STATUS be that a device tells.
 const WORD_NS: u64 = 32_000;
 
+/// The registers after power-up: CTRL, TORQUE, OFF, BLANK, DECAY, STALL, DRIVE, STATUS.
+const RESET: [u16; 8] = [0xc10, 0x1ff, 0x030, 0x080, 0x110, 0x040, 0xa59, 0x000];
+/// ENBL in CTRL.
+const ENABLED: u16 = 1;
+
 /// Something that happens to a driver.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Fault {
@@ -14,15 +19,18 @@ pub(super) enum Fault {
     Reports(Status),
     /// It has no supply: every register reads all ones.
     Unpowered,
+    /// A dip of its supply: all registers have their reset values, ENBL is 0, and STATUS reports nothing.
+    Reset,
 }
 
 impl Fault {
     pub(super) fn parse(name: &str) -> Option<Self> {
         let name = name.to_ascii_uppercase();
-        if name == "UNPOWERED" {
-            return Some(Self::Unpowered);
+        match name.as_str() {
+            "UNPOWERED" => Some(Self::Unpowered),
+            "RESET" => Some(Self::Reset),
+            name => Status::from_name(name).map(Self::Reports),
         }
-        Status::from_name(&name).map(Self::Reports)
     }
 }
 
@@ -31,6 +39,7 @@ impl fmt::Display for Fault {
         match self {
             Self::Reports(status) => write!(f, "reports {status}"),
             Self::Unpowered => f.write_str("loses its supply"),
+            Self::Reset => f.write_str("loses its settings"),
         }
     }
 }
@@ -47,13 +56,13 @@ pub(super) struct Driver {
 impl Driver {
     /// After power-up.
     pub(super) fn new() -> Self {
-        let registers = Register::ALL.map(Register::reset_value);
-        Self { registers, powered: true, polled: Status::empty(), due_ns: 0 }
+        Self { registers: RESET, powered: true, polled: Status::empty(), due_ns: 0 }
     }
 
     pub(super) fn hit(&mut self, fault: Fault) {
         match fault {
             Fault::Unpowered => self.powered = false,
+            Fault::Reset => self.registers = RESET,
             Fault::Reports(status) => {
                 if let Some(register) = self.registers.last_mut() {
                     *register |= u16::from(status.bits());
@@ -91,7 +100,8 @@ impl Driver {
 
     /// Whether steps move the motor.
     pub(super) fn drives(&self) -> bool {
-        self.powered && self.registers.last() == Some(&0)
+        let [ctrl, .., status] = self.registers;
+        self.powered && ctrl & ENABLED != 0 && status == 0
     }
 
     /// STATUS as the device has it at `now_ns` of its time.
@@ -129,5 +139,16 @@ mod tests {
         assert_eq!(driver.status(31_999), Status::empty());
         assert_eq!(driver.status(32_000), Status::BPDF);
         assert_eq!(Fault::parse("XYZ"), None);
+    }
+
+    /// The one fault that STATUS does not tell.
+    #[test]
+    fn a_chip_that_has_lost_its_settings_drives_no_more_and_reports_nothing() {
+        let mut driver = Driver::new();
+        assert!(!driver.drives(), "ENBL is 0 after power-up");
+        driver.set_up().unwrap();
+        driver.hit(Fault::parse("reset").unwrap());
+        assert!(!driver.drives());
+        assert_eq!(driver.status(0), Status::empty());
     }
 }

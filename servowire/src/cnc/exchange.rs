@@ -46,7 +46,7 @@ impl Line {
             let cable = self.cable(k);
             let Some(node) = self.nodes.get_mut(k) else { break };
             if node.is_running() {
-                record.axis(k, |seen| node.run(cycle_ns, seen));
+                record.axis(k, |seen| node.run(cycle_ns, &mut self.periods, seen));
             }
             if k >= self.plugged {
                 continue;
@@ -61,9 +61,22 @@ impl Line {
             if node.device.state() == State::Exchange {
                 node.device.cycle_start();
             }
-            node.leave(cycle_ns);
+            node.leave(cycle_ns, &mut self.periods);
         }
         self.buffers = [sent, frame];
+    }
+
+    /// What was to happen in a cycle that never came.
+    pub(super) fn still_to_come(&self) -> Option<String> {
+        let cycles = self.master.counters().cycles;
+        let unplug = self.setup.unplug.filter(|(_, when)| *when >= cycles);
+        let fault = self.setup.driver_fault.filter(|(_, when, _)| *when >= cycles);
+        unplug
+            .map(|(device, when)| {
+                format!("cycle {when}, in which the cable in front of device {device} was to be pulled")
+            })
+            .or(fault
+                .map(|(device, when, _)| format!("cycle {when}, in which the driver of device {device} was to fail")))
     }
 
     /// What was to happen in this cycle.
@@ -107,9 +120,7 @@ impl Line {
             if answer.emit_into(&mut frame).is_err() {
                 continue;
             }
-            for _ in 0..=k {
-                self.noise.pass(&mut frame);
-            }
+            self.noise.travel(&mut frame, k + 1);
             let start = sent + way;
             let end = start + ((PREAMBLE + DEVICE_FRAME) * BYTE_NS as usize) as f64;
             if start < line_free {

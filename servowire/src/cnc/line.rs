@@ -11,6 +11,7 @@ use super::driver::Fault;
 use super::host::Host;
 use super::node::Node;
 use super::noise::{Noise, SplitMix64};
+use super::periods::Periods;
 use super::record::Recorder;
 
 /// From the end of the request to its reflection as the master and as a device see it.
@@ -100,6 +101,7 @@ pub(super) struct Line {
     pub(super) setup: Setup,
     pub(super) master: Master,
     pub(super) nodes: Vec<Node>,
+    pub(super) periods: Periods,
     pub(super) noise: Noise,
     pub(super) random: SplitMix64,
     /// Devices that a cable leads to.
@@ -140,6 +142,7 @@ impl Line {
         }
         let mut line = Self {
             master: Master::new(setup.master()),
+            periods: Periods::new(),
             noise: Noise::new(setup.bit_error_rate, setup.seed ^ 0x5eed),
             random,
             plugged: 0,
@@ -232,7 +235,8 @@ impl Line {
     /// Time passes; devices that wait for a frame in vain give up.
     fn wait(&mut self, until_ns: u64) {
         let cycle_ns = u64::from(self.setup.cycle_ns());
-        let cycles = until_ns.saturating_sub(self.now_ns) / cycle_ns;
+        // The first of them begins when its frame is sent, or not at all.
+        let cycles = (until_ns.saturating_sub(self.now_ns) / cycle_ns).saturating_sub(1);
         self.now_ns = until_ns;
         for node in &mut self.nodes {
             if node.device.state() != State::Exchange {
@@ -243,7 +247,7 @@ impl Line {
                     node.device.cycle_start();
                 }
             }
-            node.leave(cycle_ns);
+            node.leave(cycle_ns, &mut self.periods);
         }
     }
 

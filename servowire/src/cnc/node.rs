@@ -5,21 +5,14 @@ use sorte_proto::drv8711;
 use sorte_proto::follow::{Asked, Feedback, Follower};
 use sorte_proto::{Error, Pto, Slice};
 
-use super::axis::{Axis, Build, PERIOD, Seen};
+use super::axis::{Axis, Build, Incoming, Seen};
 use super::clock::Clock;
-
-/// A word that a frame has brought.
-#[derive(Debug, Clone, Copy)]
-struct Incoming {
-    /// When the device has it, in ns since the start of its generator.
-    at: u64,
-    word: Pto,
-    /// The master's time of its step.
-    expected: f64,
-}
+use super::periods::{Generator, PERIOD, Periods};
 
 pub(super) struct Node {
     pub(super) device: Device,
+    build: Build,
+    generator: Generator,
     pub(super) axis: Axis,
     pub(super) clock: Clock,
     /// What the master has asked for, and what the device has made of it.
@@ -35,6 +28,8 @@ pub(super) struct Node {
     incoming: Option<Incoming>,
     /// Own counter and master's time at the start of the first cycle; `None` outside the IO exchange.
     zero: Option<(f64, f64)>,
+    /// Start of the own frame in its cycle, in ns.
+    slot: f64,
     cycle: u64,
     /// Largest clock error in the IO exchange, in ns.
     pub(super) clock_error_ns: f64,
@@ -63,6 +58,8 @@ impl Node {
     pub(super) fn new(config: Config, build: Build, clock: Clock, max_lag: u16) -> Self {
         Self {
             device: Device::new(config),
+            build,
+            generator: build.generator(),
             axis: Axis::new(build),
             clock,
             asked: Asked::new(),
@@ -73,6 +70,7 @@ impl Node {
             set_up: Ok(()),
             incoming: None,
             zero: None,
+            slot: 0.0,
             cycle: 0,
             clock_error_ns: 0.0,
             undetected: 0,
@@ -90,17 +88,18 @@ impl Node {
 
     /// A cycle begins at `begin` of the master's time.
     pub(super) fn enter(&mut self, begin: f64) {
-        if self.device.state() != State::Exchange {
+        if self.zero.is_some() || self.device.state() != State::Exchange {
             return;
         }
-        let Some(first) = self.device.first_cycle_ns().filter(|_| self.zero.is_none()) else { return };
+        let (Some(first), Some(slot)) = (self.device.first_cycle_ns(), self.device.send_time_ns()) else { return };
         // The counter has 32 bits; the time meant is the one nearby.
         let now = self.clock.at(begin);
         let ahead = first.wrapping_sub(now as i64 as u32) as i32;
         let zero = now.floor() + f64::from(ahead);
-        self.zero = Some((zero, begin));
+        (self.zero, self.slot) = (Some((zero, begin)), slot.into());
         (self.cycle, self.incoming) = (0, None);
-        self.axis.start(zero);
+        self.axis.start();
+        self.generator = self.build.generator();
     }
 
     pub(super) fn is_running(&self) -> bool {
@@ -108,27 +107,39 @@ impl Node {
     }
 
     /// The axis runs through this cycle of the device.
-    pub(super) fn run(&mut self, cycle_ns: u64, mut seen: Option<&mut Vec<(u64, Seen)>>) {
+    pub(super) fn run(&mut self, cycle_ns: u64, periods: &mut Periods, mut seen: Option<&mut Vec<(u64, Seen)>>) {
         let start = self.cycle * cycle_ns;
-        if let Some(Incoming { at, word, expected }) = self.incoming.take() {
-            // The word is held back until its cycle begins, so that it does not matter when in the cycle before it came.
-            self.axis.run(at.max(start), &self.clock, seen.as_deref_mut());
-            self.axis.set(word, expected);
-        }
+        // The word is held back until its cycle begins, so that it does not matter when in the cycle before it came.
+        let word = self.incoming.take().map(|word| Incoming { at: word.at.max(start), ..word });
+        let taken = word.map_or(0, |word| word.at).max(start + PERIOD);
+        self.go(taken, word, periods, seen.as_deref_mut());
         if cycle_ns > PERIOD {
-            self.axis.run(start + PERIOD, &self.clock, seen.as_deref_mut());
-            self.axis.rest();
+            self.generator.rest();
+            self.go(start + cycle_ns, None, periods, seen);
         }
-        self.axis.run(start + cycle_ns, &self.clock, seen);
         self.cycle += 1;
+    }
+
+    /// Goes on until the own counter is `until` ns after the start of the generator. `word` gets into the device's buffer on
+    /// the way.
+    fn go(
+        &mut self,
+        until: u64,
+        word: Option<Incoming>,
+        periods: &mut Periods,
+        mut seen: Option<&mut Vec<(u64, Seen)>>,
+    ) {
+        let Self { generator, axis, clock, zero: Some((zero, _)), .. } = self else { return };
+        generator.run(until, word.map(|word| (word.at, word.word)), periods, |ns, change| {
+            axis.take(change, || clock.when(*zero + ns as f64), word, seen.as_deref_mut());
+        });
     }
 
     /// When the own frame of this cycle leaves, and the frame's payload.
     pub(super) fn answer(&mut self, cycle_ns: u64, positions: bool) -> Option<(f64, Feedback)> {
         let (zero, _) = self.zero?;
-        let slot = self.device.send_time_ns()?;
         let position = if positions { self.follower.position() } else { 0 };
-        let at = self.clock.when(zero + (self.cycle * cycle_ns) as f64 + f64::from(slot));
+        let at = self.clock.when(zero + (self.cycle * cycle_ns) as f64 + self.slot);
         let status = self.axis.driver.status(self.cycle * cycle_ns);
         Some((at, Feedback { status, position }))
     }
@@ -184,13 +195,13 @@ impl Node {
     }
 
     /// The device has left the IO exchange: pulses that are programmed still come.
-    pub(super) fn leave(&mut self, cycle_ns: u64) {
+    pub(super) fn leave(&mut self, cycle_ns: u64, periods: &mut Periods) {
         if self.device.state() == State::Exchange || self.zero.is_none() {
             return;
         }
         self.incoming = None;
-        self.axis.rest();
-        self.axis.run(self.cycle * cycle_ns + 3 * PERIOD, &self.clock, None);
+        self.generator.rest();
+        self.go(self.cycle * cycle_ns + 3 * PERIOD, None, periods, None);
         self.zero = None;
     }
 }

@@ -25,6 +25,18 @@ impl Noise {
         if self.ln_good == 0.0 { u64::MAX } else { (self.random.unit().ln() / self.ln_good) as u64 }
     }
 
+    /// A frame passes so many cables, one after the other.
+    pub(super) fn travel(&mut self, frame: &mut [u8], cables: usize) {
+        let bits = frame.len() as u64 * 8 * cables as u64;
+        if self.good >= bits {
+            self.good -= bits;
+            return;
+        }
+        for _ in 0..cables {
+            self.pass(frame);
+        }
+    }
+
     /// A frame passes a cable; whether it was hit.
     pub(super) fn pass(&mut self, frame: &mut [u8]) -> bool {
         let bits = frame.len() as u64 * 8;
@@ -80,6 +92,20 @@ mod tests {
         }
         assert_eq!(hit, noise.flips);
         assert!((7500..8500).contains(&hit), "{hit} of 8 million bits");
+    }
+
+    #[test]
+    fn many_cables_are_one_after_the_other() {
+        let (mut one, mut many) = (Noise::new(2e-3, 5), Noise::new(2e-3, 5));
+        for cables in (0..200).map(|k| k % 7) {
+            let (mut a, mut b) = ([0u8; 30], [0u8; 30]);
+            (0..cables).for_each(|_| {
+                one.pass(&mut a);
+            });
+            many.travel(&mut b, cables);
+            assert_eq!((a, one.flips, one.good), (b, many.flips, many.good));
+        }
+        assert!(one.flips > 100);
     }
 
     #[test]

@@ -121,8 +121,14 @@ impl Recorder {
     }
 }
 
+/// A file to write into; the error names it.
+pub(super) fn create(path: &Path) -> io::Result<BufWriter<File>> {
+    let named = |error: io::Error| io::Error::new(error.kind(), format!("{}: {error}", path.display()));
+    File::create(path).map(BufWriter::new).map_err(named)
+}
+
 fn open(path: &Path) -> io::Result<PcapNgWriter<BufWriter<File>>> {
-    let mut packets = PcapNgWriter::new(BufWriter::new(File::create(path)?)).map_err(io::Error::other)?;
+    let mut packets = PcapNgWriter::new(create(path)?).map_err(io::Error::other)?;
     let interface = |linktype, name: &'static str, note: &'static str, fcs_bits: Option<u8>| {
         let mut options = vec![
             InterfaceDescriptionOption::IfName(Cow::Borrowed(name)),
@@ -174,7 +180,7 @@ struct Trace {
 
 impl Trace {
     fn create(path: &Path, devices: usize) -> io::Result<Self> {
-        let mut writer = Writer::new(BufWriter::new(File::create(path)?));
+        let mut writer = Writer::new(create(path)?);
         writer.timescale(1, TimescaleUnit::NS)?;
         writer.add_module("sorte")?;
         writer.add_module("master")?;

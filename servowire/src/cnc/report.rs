@@ -157,10 +157,20 @@ pub(super) fn verdict(line: &Line, host: &Host) -> Option<String> {
         let last = line.events.last().map_or("the master waits for ever", String::as_str);
         return Some(format!("the motion was not finished: {last}"));
     }
+    if let Some(what) = line.still_to_come() {
+        return Some(format!("the motion was over before {what}"));
+    }
+    if line.nodes.iter().all(|node| node.axis.tally.asked == 0) {
+        return Some("no axis was asked to move".to_owned());
+    }
     for (k, node) in line.nodes.iter().enumerate() {
         let (axis, t, asked) = (k + 1, node.axis.tally, node.asked.position());
-        if t.asked > 0 && t.on_time + t.late == 0 {
-            return Some(format!("axis {axis} never moved, of {} steps asked", t.asked));
+        if t.asked > 0 && t.moved == 0 {
+            return Some(format!(
+                "axis {axis} never moved: {} steps were asked, {} pulses made",
+                t.asked,
+                t.on_time + t.late
+            ));
         }
         if node.axis.position != asked {
             return Some(format!("axis {axis} was asked to {asked} and is at {}", node.axis.position));

@@ -50,10 +50,7 @@ fn line(all: &AllData) -> String {
 }
 
 pub(super) fn watch<P: Port>(link: &mut Link<P>, watch: &Watch) -> Done {
-    let mut csv = watch.csv.as_deref().map(csv::Writer::from_path).transpose().map_err(io::Error::from)?;
-    if let Some(csv) = &mut csv {
-        csv.write_record(["time_s", "abs", "abm", "almc", "fault"]).map_err(io::Error::from)?;
-    }
+    let mut csv = table(watch.csv.as_deref(), &["time_s", "abs", "abm", "almc", "fault"])?;
     let (mut good, mut bad, begin) = (0_u64, 0_u64, Instant::now());
     let mut out = io::stdout().lock();
     while watch.count.is_none_or(|count| good + bad < count) {
@@ -92,6 +89,14 @@ pub(super) fn watch<P: Port>(link: &mut Link<P>, watch: &Watch) -> Done {
     Ok(if bad == 0 { ExitCode::SUCCESS } else { ExitCode::FAILURE })
 }
 
+/// A table in this file, if there is one.
+fn table(path: Option<&Path>, head: &[&str]) -> Result<Option<csv::Writer<fs::File>>, Fault> {
+    let Some(path) = path else { return Ok(None) };
+    let mut csv = csv::Writer::from_writer(fs::File::create(path).map_err(Fault::file(path))?);
+    csv.write_record(head).map_err(io::Error::from).map_err(Fault::file(path))?;
+    Ok(Some(csv))
+}
+
 /// Between a master and its encoder, for ever.
 pub(super) fn relay<M: Port, E: Port>(
     master: M,
@@ -99,10 +104,7 @@ pub(super) fn relay<M: Port, E: Port>(
     hears_itself: bool,
     csv: Option<&Path>,
 ) -> Result<(), Fault> {
-    let mut csv = csv.map(csv::Writer::from_path).transpose().map_err(io::Error::from)?;
-    if let Some(csv) = &mut csv {
-        csv.write_record(["time_s", "request", "answer", "fault"]).map_err(io::Error::from)?;
-    }
+    let mut csv = table(csv, &["time_s", "request", "answer", "fault"])?;
     let begin = Instant::now();
     let log = |said: &Said| {
         let (request, answer, fault) = match said {
@@ -167,16 +169,15 @@ fn write_byte<P: Port>(link: &mut Link<P>, address: Address, data: u8) -> Result
     link.run(first, |outcome, now_ns| access.receive(outcome, now_ns))
 }
 
-/// The bytes of a page, after it was selected and the selection was read back.
+/// The bytes of a page, after it was selected. The procedure reads the selection back.
 fn read_page<P: Port>(link: &mut Link<P>, number: u8) -> Result<Vec<u8>, Fault> {
     let page = Page::new(number).ok_or_else(|| Fault::Input(format!("there is no page {number}")))?;
-    let selected = match read_byte(link, Some(page), Address::truncate(0)) {
-        Ok(_) => read_byte(link, None, Address::PAGE_REGISTER)?,
-        Err(fault) => return Err(fault),
-    };
-    if selected != number {
-        return Err(Fault::Input(format!("the encoder stays on page {selected}: it has no page {number}")));
-    }
+    read_byte(link, Some(page), Address::truncate(0)).map_err(|fault| match fault {
+        Fault::Encoder(tformat::Error::DataMismatch { got, .. }) => {
+            Fault::Input(format!("the encoder stays on page {got}: it has no page {number}"))
+        }
+        fault => fault,
+    })?;
     (0..PAGE_LEN).map(|address| read_byte(link, None, Address::truncate(address))).collect()
 }
 
@@ -189,7 +190,7 @@ pub(super) fn dump<P: Port>(link: &mut Link<P>, file: Option<&Path>, pages: u8) 
     }
     let text = lines.concat();
     match file {
-        Some(file) => fs::write(file, text)?,
+        Some(file) => fs::write(file, text).map_err(Fault::file(file))?,
         None => io::stdout().write_all(text.as_bytes())?,
     }
     Ok(ExitCode::SUCCESS)
@@ -208,27 +209,40 @@ fn parse(text: &str) -> Result<Vec<(u8, Vec<u8>)>, Fault> {
         }
         Ok((number, bytes))
     };
-    text.lines().enumerate().map(page).collect()
+    let pages: Vec<_> = text.lines().enumerate().map(page).collect::<Result<_, Fault>>()?;
+    if pages.is_empty() { Err(Fault::Input("there is no page in it".to_owned())) } else { Ok(pages) }
 }
 
 pub(super) fn restore<P: Port>(link: &mut Link<P>, file: &Path, yes: bool) -> Done {
-    let pages = parse(&fs::read_to_string(file)?)?;
+    let text = fs::read_to_string(file).map_err(Fault::file(file))?;
+    let pages = parse(&text).map_err(|fault| Fault::File(format!("{}: {fault}", file.display())))?;
     let all = read_all(link)?;
     if !yes && !confirmed(all.enid)? {
         return Err(Fault::Input("nothing was written".to_owned()));
     }
     let mut written = 0;
-    for (number, want) in pages {
-        let have = read_page(link, number)?;
-        for ((address, want), have) in (0..PAGE_LEN).zip(want).zip(have) {
-            if want != have {
-                write_byte(link, Address::truncate(address), want)?;
-                written += 1;
-            }
+    let done = pages.into_iter().try_for_each(|page| write_page(link, page, &mut written));
+    let plural = if written == 1 { " was" } else { "s were" };
+    if done.is_err() {
+        say(format_args!(
+            "broken off: {written} byte{plural} written and read back, one more may be; restore again\n"
+        ))?;
+    } else {
+        say(format_args!("{written} byte{plural} different, written and read back\n"))?;
+    }
+    done.map(|()| ExitCode::SUCCESS)
+}
+
+/// Writes the bytes of a page that differ, and counts them.
+fn write_page<P: Port>(link: &mut Link<P>, (number, want): (u8, Vec<u8>), written: &mut u32) -> Result<(), Fault> {
+    let have = read_page(link, number)?;
+    for ((address, want), have) in (0..PAGE_LEN).zip(want).zip(have) {
+        if want != have {
+            write_byte(link, Address::truncate(address), want)?;
+            *written += 1;
         }
     }
-    say(format_args!("{written} bytes were different; they were written and read back\n"))?;
-    Ok(ExitCode::SUCCESS)
+    Ok(())
 }
 
 fn confirmed(enid: u8) -> Result<bool, Fault> {
@@ -247,7 +261,7 @@ mod tests {
         let bytes: Vec<_> = (0..127_u8).map(|byte| format!("{byte:02x}")).collect();
         let text = format!("3: {}\n", bytes.join(" "));
         assert_eq!(parse(&text).unwrap(), [(3, (0..127).collect())]);
-        for wrong in ["3 00", "x: 00", "3: 0g", "3: 00 01"] {
+        for wrong in ["", "3 00", "x: 00", "3: 0g", "3: 00 01"] {
             assert!(parse(wrong).is_err(), "{wrong}");
         }
     }

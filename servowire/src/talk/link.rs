@@ -4,6 +4,7 @@
 //! So the own echo is known by its content and by its place, and a request goes out only when the line has been read empty.
 
 use std::io;
+use std::path::Path;
 use std::thread;
 use std::time::{Duration, Instant};
 
@@ -15,12 +16,18 @@ use super::port::Port;
 /// Why something could not be done.
 #[derive(Debug, thiserror::Error)]
 pub enum Fault {
-    /// The port could not be opened.
+    /// A port could not be opened; it is named.
     #[error("{0}")]
     Port(String),
-    /// The port, or a file, failed.
-    #[error(transparent)]
+    /// A file could not be read or written; it is named.
+    #[error("{0}")]
+    File(String),
+    /// The port failed.
+    #[error("the port is gone or refuses: {0}")]
     Io(#[from] io::Error),
+    /// Nobody has answered well, not even once.
+    #[error("{0}: is the encoder's power on, is {1} Mbit/s its rate, are A and B the right way round?")]
+    Nobody(tformat::Error, f64),
     /// The answer was refused, or there was none.
     #[error("{0}")]
     Encoder(#[from] tformat::Error),
@@ -39,6 +46,18 @@ pub struct Link<P> {
     timeout: Duration,
     echo: bool,
     began: Instant,
+}
+
+impl Fault {
+    /// A fault of this file.
+    pub fn file(path: &Path) -> impl Fn(io::Error) -> Self {
+        move |error| Self::File(format!("{}: {error}", path.display()))
+    }
+
+    /// Whether it names what has failed itself; all others are of the port.
+    pub const fn names_itself(&self) -> bool {
+        matches!(self, Self::Port(_) | Self::File(_))
+    }
 }
 
 impl<P: Port> Link<P> {

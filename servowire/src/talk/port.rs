@@ -1,6 +1,7 @@
 //! Serial ports, and what is to be said about them.
 
 use std::io::{self, Read, Write};
+use std::path::Path;
 use std::time::Duration;
 
 use serialport::{ClearBuffer, SerialPort, SerialPortType};
@@ -39,15 +40,23 @@ impl<P: SerialPort + ?Sized> Port for Box<P> {
 pub fn open(name: &str, rate: BitRate) -> Result<Box<dyn SerialPort>, Fault> {
     let port = serialport::new(name, rate.bits_per_second()).timeout(Duration::from_millis(50));
     port.open().map_err(|error| {
-        let advice = match error.kind() {
-            serialport::ErrorKind::NoDevice => ports(),
-            serialport::ErrorKind::Io(io::ErrorKind::PermissionDenied) => {
-                "; on Linux your user has to be in the group that owns the port, often dialout".to_owned()
+        use serialport::ErrorKind::{Io, NoDevice};
+        let missing = !Path::new(name).exists();
+        let text = match error.kind() {
+            NoDevice | Io(io::ErrorKind::NotFound) if missing => format!("there is no such port{}", ports()),
+            NoDevice => format!("another program has the port: {error}"),
+            Io(io::ErrorKind::PermissionDenied) => {
+                format!("{error}; on Linux your user has to be in the group that owns the port, often dialout")
             }
-            _ => String::new(),
+            _ => format!("this is no serial port, or it makes no {} Mbit/s: {error}", megabits(rate)),
         };
-        Fault::Port(format!("{error}{advice}"))
+        Fault::Port(format!("{name}: {text}"))
     })
+}
+
+/// Mbit/s.
+pub fn megabits(rate: BitRate) -> f64 {
+    f64::from(rate.bits_per_second()) / 1e6
 }
 
 /// What ports there are.

@@ -62,7 +62,7 @@ pub enum Said {
 /// that long.
 ///
 /// # Errors
-/// [`Fault::Io`] of the master's port or of the log.
+/// [`Fault::Io`] of the master's port or of the log; [`Fault::Port`] if that of the encoder is gone.
 pub fn run<M: Port, E: Port>(
     mut master: M,
     encoder: &mut Link<E>,
@@ -103,7 +103,14 @@ pub fn run<M: Port, E: Port>(
             master.flush()?;
             echo.sent(frame.as_bytes());
         }
+        let gone = match &outcome {
+            Err(Fault::Io(error)) => Some(Fault::Port(format!("the encoder's port is gone or refuses: {error}"))),
+            _ => None,
+        };
         log(&Said::Request(request, outcome))?;
+        if let Some(gone) = gone {
+            return Err(gone);
+        }
     }
     Ok(())
 }

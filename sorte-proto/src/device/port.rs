@@ -1,6 +1,5 @@
 //! One port's handler: what the head of a frame does to its state.
 
-use crate::flags::show_flags;
 use crate::frame::MULTICAST;
 use crate::frame_type::FrameType;
 use crate::status::Status;
@@ -25,7 +24,7 @@ pub enum State {
     Sync = 4,
     /// 5: IOEX, the IO exchange.
     Exchange = 5,
-    /// 6: diagnosis. The published firmware has the code and nothing behind it; this crate never enters it.
+    /// 6: diagnosis. The published firmware has the code and does nothing there; this crate never enters it.
     Diag = 6,
     /// 7: out of the line's work until the host resets the device, see [`Device::enter_error`](super::Device::enter_error).
     Error = 7,
@@ -88,7 +87,7 @@ bitflags::bitflags! {
     }
 }
 
-show_flags!(PortFlags);
+servowire_core::show_flags!(PortFlags);
 
 /// Measurement that a delay request on the master port starts on the other port.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]

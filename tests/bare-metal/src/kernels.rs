@@ -5,6 +5,8 @@
 
 #[cfg(feature = "deliberate-panic")]
 mod deliberate_panic;
+#[cfg(feature = "servowire-drivers")]
+mod drivers;
 #[cfg(feature = "hdsl")]
 mod hdsl;
 #[cfg(feature = "hdsl")]
@@ -55,6 +57,8 @@ pub(crate) const ALL: &[&[Kernel]] = &[
     tformat::KERNELS,
     #[cfg(feature = "tformat")]
     tformat_ends::KERNELS,
+    #[cfg(feature = "servowire-drivers")]
+    drivers::KERNELS,
     #[cfg(feature = "deliberate-panic")]
     deliberate_panic::KERNELS,
 ];

@@ -17,6 +17,8 @@ mod kernels;
 mod self_test;
 #[cfg(feature = "stack")]
 mod stack;
+#[cfg(feature = "servowire-drivers")]
+mod transport;
 
 use core::panic::PanicInfo;
 

@@ -2,6 +2,8 @@
 
 use cortex_m_semihosting::hprintln;
 
+#[cfg(feature = "servowire-drivers")]
+pub(crate) mod drivers;
 #[cfg(feature = "hdsl")]
 pub(crate) mod hdsl;
 #[cfg(feature = "nikon-aformat")]
@@ -42,6 +44,8 @@ pub(crate) const ALL: &[&[Topic]] = &[
     step_profile::TOPICS,
     #[cfg(feature = "tformat")]
     tformat::TOPICS,
+    #[cfg(feature = "servowire-drivers")]
+    drivers::TOPICS,
 ];
 
 /// Runs every row; a row that fails is named.

@@ -1,13 +1,17 @@
 //! A-format over the port: a master that prints positions, and an encoder.
 
-use core::fmt::Write;
+use core::fmt::{self, Write as _};
 
 use nikon_aformat::device::Device;
-use nikon_aformat::master::{Line, Progress, Transaction};
-use nikon_aformat::{BitRate, EncoderAddress, FRAME_BITS, Operation, Request, Resolution};
+use nikon_aformat::master::{EepromRead, GuardedReset, Line, Progress, Reset, Step, Transaction, VerifiedWrite, Write};
+use nikon_aformat::{
+    BitRate, EncoderAddress, Error, FRAME_BITS, Operation, Request, Resolution, Response, UserAddress,
+};
 
-use crate::board::Board;
-use crate::port::{Prepared, RingReceiver, Unit};
+use crate::board::{Board, Console};
+use crate::clock::Clock;
+use crate::commands::{Command, Typed};
+use crate::port::{Prepared, RingReceiver, Transmitter, Unit};
 use crate::programs::Rate;
 
 /// From the end of one transaction to the beginning of the next, on top of what the protocol wants.
@@ -16,8 +20,8 @@ const PAUSE_NS: u64 = 20_000;
 const LATENCY_NS: u32 = 2_000;
 /// Frames of the longest response, and some noise.
 const MOST_FRAMES: usize = 8;
-/// Longest wait for the response: encoders answer after some microseconds.
-const RESPONSE_TIMEOUT_NS: u32 = 20_000;
+/// Longest wait for the response: encoders answer after some microseconds, the one below after 30 if it has made no answer ahead.
+const RESPONSE_TIMEOUT_NS: u32 = 60_000;
 
 /// The rates that the port makes exactly; 16 Mbit/s would be 7.5 clocks a bit.
 const fn rate_of(rate: BitRate) -> Option<Rate> {
@@ -30,29 +34,29 @@ const fn rate_of(rate: BitRate) -> Option<Rate> {
     }
 }
 
-/// Reads the whole position of encoder 0 for ever; prints every sixteenth, and every fault.
-///
-/// # Panics
-/// At 16 Mbit/s.
-pub fn master(rate: BitRate) -> ! {
-    let port = rate_of(rate).expect("a rate of this port");
-    let Board { mut console, mut clock, mut transmitter, receiver, channel } = Board::new(port, 16);
-    let mut receiver = RingReceiver::new(channel, receiver);
-    let line = Line::new(rate).with_response_timeout_ns(RESPONSE_TIMEOUT_NS).with_latency_ns(LATENCY_NS);
-    let resolution = Resolution::default();
-    let request = Request::new(EncoderAddress::ZERO, Operation::Abs40);
-    let message = message(Operation::Abs40);
-    let frame_ns = u64::from(rate.bits_ns(FRAME_BITS));
-    let (mut good, mut bad) = (0_u32, 0_u32);
-    let _ = writeln!(console, "A-format master, {} bit/s", rate.bits_per_second());
-    loop {
+/// The line to an encoder.
+struct Master {
+    clock: Clock,
+    transmitter: Transmitter,
+    receiver: RingReceiver,
+    line: Line,
+    /// From when on the line is free.
+    free_ns: u64,
+}
+
+impl Master {
+    /// One request and its answer, when the line is free. How long they took.
+    fn exchange(&mut self, request: Request, message: &Prepared) -> (Result<Response, Error>, u64) {
+        let Self { clock, transmitter, receiver, line, free_ns } = self;
+        let frame_ns = u64::from(line.rate.bits_ns(FRAME_BITS));
+        receiver.settle(clock, *free_ns, 2 * frame_ns);
         let began_ns = clock.now_ns();
-        let mut transaction = Transaction::start(request, resolution, line, began_ns);
-        transmitter.send(&message);
+        let mut transaction = Transaction::start(request, Resolution::default(), *line, began_ns);
+        transmitter.send(message);
         // The receiver is on again from the end of the request on, so nothing that comes is older.
         let since_ns = began_ns + u64::from(line.request_ns(request));
         let (mut frames, mut count, mut last_ns) = ([None; MOST_FRAMES], 0, 0);
-        let (end, ready_ns) = loop {
+        let outcome = loop {
             let unit = receiver.take();
             let now_ns = clock.now_ns();
             let progress = match unit {
@@ -72,14 +76,111 @@ pub fn master(rate: BitRate) -> ! {
                 }
                 None => transaction.poll(now_ns),
             };
-            match progress {
-                Progress::Pending { .. } => {}
-                Progress::Done { value, ready_ns } => break (Ok(value), ready_ns),
-                Progress::Failed { error, ready_ns } => break (Err(error), ready_ns),
-            }
+            let (end, ready_ns) = match progress {
+                Progress::Pending { .. } => continue,
+                Progress::Done { value, ready_ns } => (Ok(value.response), ready_ns),
+                Progress::Failed { error, ready_ns } => (Err(error), ready_ns),
+            };
+            *free_ns = ready_ns;
+            break end;
         };
-        let took_ns = clock.now_ns() - began_ns;
-        match end.map(|reading| reading.response.abs40()) {
+        (outcome, clock.now_ns() - began_ns)
+    }
+
+    /// A procedure of several exchanges.
+    fn run<T>(
+        &mut self,
+        mut step: Step<T>,
+        mut receive: impl FnMut(Result<Response, Error>, u64) -> Step<T>,
+    ) -> Result<T, Error> {
+        loop {
+            let (request, not_before_ns) = match step {
+                Step::Send { request, not_before_ns } => (request, not_before_ns),
+                Step::Done { value, ready_ns } => {
+                    self.free_ns = ready_ns;
+                    return Ok(value);
+                }
+                Step::Failed { error, ready_ns } => {
+                    self.free_ns = ready_ns;
+                    return Err(error);
+                }
+            };
+            while self.clock.now_ns() < not_before_ns {}
+            let (outcome, _) = self.exchange(request, &message(request, self.line));
+            step = receive(outcome, self.free_ns.max(self.clock.now_ns()));
+        }
+    }
+
+    /// Does what was typed, and says what came of it.
+    fn command(&mut self, command: Command, console: &mut Console) -> fmt::Result {
+        let ea = EncoderAddress::ZERO;
+        let now_ns = self.clock.now_ns();
+        match command {
+            Command::Read { address } => self.say_word(address, console),
+            Command::Write { address, data } => {
+                let Some(user) = UserAddress::new(address) else { return console.write_str("that is not for users\n") };
+                let mut write = VerifiedWrite::new(Write::eeprom(ea, user, data));
+                let first = write.start(now_ns);
+                match self.run(first, |outcome, now_ns| write.receive(outcome, now_ns)) {
+                    Ok(()) => self.say_word(address, console),
+                    Err(error) => writeln!(console, "EEPROM {address:02x}: {error}"),
+                }
+            }
+            Command::LoseMultiTurnReference => {
+                let mut reset = GuardedReset::new(Reset::clear_multiturn(ea));
+                let first = reset.start(now_ns);
+                match self.run(first, |outcome, now_ns| reset.receive(outcome, now_ns)) {
+                    Ok(_) => console.write_str("turns: cleared\n"),
+                    Err(error) => writeln!(console, "turns: {error}"),
+                }
+            }
+            Command::Unknown => console.write_str("?\n"),
+        }
+    }
+
+    fn say_word(&mut self, address: u8, console: &mut Console) -> fmt::Result {
+        let mut read = EepromRead::new(EncoderAddress::ZERO, address);
+        let first = read.start(self.clock.now_ns());
+        match self.run(first, |outcome, now_ns| read.receive(outcome, now_ns)) {
+            Ok(word) => writeln!(console, "EEPROM {address:02x}: {word:04x}"),
+            Err(error) => writeln!(console, "EEPROM {address:02x}: {error}"),
+        }
+    }
+}
+
+/// The frames of a request, with the pauses between them.
+fn message(request: Request, line: Line) -> Prepared {
+    let gap_bits = line.rate.bits(line.frame_gap_ns);
+    let (mut bits, mut len) = (0, 0);
+    for frame in request.emit().as_slice() {
+        if len > 0 {
+            bits |= ((1 << gap_bits) - 1) << len;
+            len += gap_bits;
+        }
+        bits |= frame.line().bits() << len;
+        len += FRAME_BITS;
+    }
+    Prepared::new(bits, len, 0)
+}
+
+/// Reads the whole position of encoder 0 for ever; prints every sixteenth, and every fault. Does what is typed meanwhile.
+///
+/// # Panics
+/// At 16 Mbit/s.
+pub fn master(rate: BitRate) -> ! {
+    let port = rate_of(rate).expect("a rate of this port");
+    let Board { mut console, clock, transmitter, receiver, channel } = Board::new(port, 16);
+    let receiver = RingReceiver::new(channel, receiver);
+    let line = Line::new(rate).with_response_timeout_ns(RESPONSE_TIMEOUT_NS).with_latency_ns(LATENCY_NS);
+    let mut master = Master { clock, transmitter, receiver, line, free_ns: 0 };
+    let mut typed = Typed::default();
+    let request = Request::new(EncoderAddress::ZERO, Operation::Abs40);
+    let message = message(request, line);
+    let (mut good, mut bad) = (0_u32, 0_u32);
+    let _ = writeln!(console, "A-format master, {} bit/s", rate.bits_per_second());
+    loop {
+        let (outcome, took_ns) = master.exchange(request, &message);
+        match outcome.map(|response| response.abs40()) {
             Ok(Some(abs)) => {
                 good += 1;
                 if good % 16 == 1 {
@@ -93,18 +194,16 @@ pub fn master(rate: BitRate) -> ! {
                 let _ = writeln!(console, "fault: {error}, {good} good, {bad} bad");
             }
         }
-        receiver.settle(&mut clock, ready_ns + PAUSE_NS, 2 * frame_ns);
+        if let Some(command) = typed.take(&console) {
+            let _ = master.command(command, &mut console);
+        }
+        master.free_ns += PAUSE_NS;
     }
-}
-
-/// The one frame of a read request.
-fn message(operation: Operation) -> Prepared {
-    Prepared::new(u128::from(command_frame(operation)) << 1 | 1 << 17, FRAME_BITS, 0)
 }
 
 /// Encoder 0, whose shaft turns on by one with every answer.
 ///
-/// As with T-Format the answer to the read request that came last is made ahead. `wait_cycles` are on top of the way through
+/// As with T-Format the answer to the read request that came last is made ahead, but not after another request. `wait_cycles` are on top of the way through
 /// the processor.
 ///
 /// # Panics
@@ -114,26 +213,32 @@ pub fn encoder(rate: BitRate, wait_cycles: u32) -> ! {
     let Board { mut console, mut clock, mut transmitter, mut receiver, .. } = Board::new(port, 16);
     let mut device = Device::<1>::new(EncoderAddress::ZERO, Resolution::default(), rate);
     let mut position = 0x1_2345;
-    let mut ahead = prepare(&mut device, Operation::Abs40, &mut position, wait_cycles);
+    let mut ahead = Some(prepare(&mut device, Operation::Abs40, &mut position, wait_cycles));
     let _ = writeln!(console, "A-format encoder, {} bit/s", rate.bits_per_second());
     loop {
         let Some(unit) = receiver.take() else { continue };
         // Data frames have another sync code, so the content of a command frame says all.
-        let started = unit.framed && unit.content == ahead.0;
-        if started {
-            transmitter.send(&ahead.1);
+        let prepared = ahead.as_ref().filter(|(command_frame, _)| unit.framed && unit.content == *command_frame);
+        let started = prepared.is_some();
+        if let Some((_, message)) = prepared {
+            transmitter.send(message);
         }
         let now_ns = clock.now_ns();
         if !unit.framed {
             device.framing_error(now_ns);
             continue;
         }
-        if let Some(reply) = device.frame(unit.content, now_ns).filter(|_| !started) {
+        let reply = device.frame(unit.content, now_ns);
+        let answered = reply.is_some();
+        if let Some(reply) = reply.filter(|_| !started) {
             transmitter.send(&Prepared::new(reply.line.bits(), reply.line.len(), 0));
         }
         let operation = READS.into_iter().find(|operation| command_frame(*operation) == unit.content);
         if let Some(operation) = operation {
-            ahead = prepare(&mut device, operation, &mut position, wait_cycles);
+            ahead = Some(prepare(&mut device, operation, &mut position, wait_cycles));
+        } else if answered {
+            // It may have changed what an answer says, and repetitions are counted: nothing is made ahead now.
+            ahead = None;
         }
     }
 }

@@ -4,6 +4,7 @@
 pub mod aformat;
 pub mod board;
 pub mod clock;
+pub mod commands;
 pub mod port;
 pub mod programs;
 pub mod tformat;

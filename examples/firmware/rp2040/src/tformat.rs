@@ -1,17 +1,25 @@
 //! T-Format over the port: a master that prints positions, and an encoder.
 
-use core::fmt::Write;
+use core::fmt::{self, Write};
 
 use tformat::device::Device;
-use tformat::master::{Line, Progress, Transaction};
-use tformat::{Abm, Abs, BitRate, Request, Response};
+use tformat::master::{EEPROM_POLLING, EepromAccess, Line, MultiTurnZero, Progress, Step, Transaction};
+use tformat::{Abm, Abs, Address, BitRate, Error, Request, Resolution, Response};
 
-use crate::board::Board;
-use crate::port::{Prepared, RingReceiver, Unit};
+use crate::board::{Board, Console};
+use crate::clock::Clock;
+use crate::commands::{Command, Typed};
+use crate::port::{Prepared, RingReceiver, Transmitter, Unit};
 use crate::programs::Rate;
 
 /// From the end of one transaction to the beginning of the next.
 const PAUSE_NS: u64 = 20_000;
+
+/// That of the encoder below.
+const RESOLUTION: Resolution = match Resolution::new(23, 16) {
+    Ok(resolution) => resolution,
+    Err(_) => panic!("possible widths"),
+};
 
 const fn rate_of(rate: BitRate) -> Rate {
     match rate {
@@ -20,34 +28,110 @@ const fn rate_of(rate: BitRate) -> Rate {
     }
 }
 
-/// Reads all data of the encoder for ever; prints every sixteenth position, and every fault.
-pub fn master(rate: BitRate) -> ! {
-    let Board { mut console, mut clock, mut transmitter, receiver, channel } = Board::new(rate_of(rate), 8);
-    let mut receiver = RingReceiver::new(channel, receiver);
-    let line = Line::new(rate);
-    let request = Request::ReadAll;
-    let bits = request.emit().line();
-    let message = Prepared::new(bits.bits(), bits.len(), 0);
-    let (mut good, mut bad) = (0_u32, 0_u32);
-    let _ = writeln!(console, "T-Format master, {} bit/s", rate.bits_per_second());
-    loop {
+/// The line to an encoder.
+struct Master {
+    clock: Clock,
+    transmitter: Transmitter,
+    receiver: RingReceiver,
+    line: Line,
+    /// From when on the line is free.
+    free_ns: u64,
+}
+
+impl Master {
+    /// One request and its answer, when the line is free. How long they took.
+    fn exchange(&mut self, request: Request, message: &Prepared) -> (Result<Response, Error>, u64) {
+        let Self { clock, transmitter, receiver, line, free_ns } = self;
+        receiver.settle(clock, *free_ns, u64::from(line.rate.fields_ns(2)));
         let began_ns = clock.now_ns();
-        let mut transaction = Transaction::start(request, line, began_ns);
-        transmitter.send(&message);
-        let (end, ready_ns) = loop {
+        let mut transaction = Transaction::start(request, *line, began_ns);
+        transmitter.send(message);
+        let outcome = loop {
             let progress = match receiver.take() {
                 Some(Unit { content, framed: true }) => transaction.bytes(&[content as u8], clock.now_ns()),
                 Some(_) => transaction.framing_error(clock.now_ns()),
                 None => transaction.poll(clock.now_ns()),
             };
-            match progress {
-                Progress::Pending { .. } => {}
-                Progress::Done { value, ready_ns } => break (Ok(value.response), ready_ns),
-                Progress::Failed { error, ready_ns } => break (Err(error), ready_ns),
-            }
+            let (end, ready_ns) = match progress {
+                Progress::Pending { .. } => continue,
+                Progress::Done { value, ready_ns } => (Ok(value.response), ready_ns),
+                Progress::Failed { error, ready_ns } => (Err(error), ready_ns),
+            };
+            *free_ns = ready_ns;
+            break end;
         };
-        let took_ns = clock.now_ns() - began_ns;
-        match end {
+        (outcome, clock.now_ns() - began_ns)
+    }
+
+    /// A procedure of several exchanges.
+    fn run<T>(
+        &mut self,
+        mut step: Step<T>,
+        mut receive: impl FnMut(Result<Response, Error>, u64) -> Step<T>,
+    ) -> Result<T, Error> {
+        loop {
+            let (request, not_before_ns) = match step {
+                Step::Send { request, not_before_ns } => (request, not_before_ns),
+                Step::Done { value, ready_ns } => {
+                    self.free_ns = ready_ns;
+                    return Ok(value);
+                }
+                Step::Failed { error, ready_ns } => {
+                    self.free_ns = ready_ns;
+                    return Err(error);
+                }
+            };
+            while self.clock.now_ns() < not_before_ns {}
+            let (outcome, _) = self.exchange(request, &message(request));
+            step = receive(outcome, self.free_ns.max(self.clock.now_ns()));
+        }
+    }
+
+    /// Does what was typed, and says what came of it.
+    fn command(&mut self, command: Command, console: &mut Console) -> fmt::Result {
+        let (address, mut access) = match command {
+            Command::Read { address } => {
+                (address, EepromAccess::read(None, Address::truncate(address), EEPROM_POLLING))
+            }
+            Command::Write { address, data } => {
+                (address, EepromAccess::write(None, Address::truncate(address), data as u8, EEPROM_POLLING))
+            }
+            Command::LoseMultiTurnReference => {
+                let mut zero = MultiTurnZero::set_and_lose_multi_turn_reference(RESOLUTION, 1);
+                let first = zero.start(self.clock.now_ns());
+                return match self.run(first, |outcome, ready_ns| zero.receive(outcome, ready_ns)) {
+                    Ok(multi) => writeln!(console, "turns: {}", multi.abm.get()),
+                    Err(error) => writeln!(console, "turns: {error}"),
+                };
+            }
+            Command::Unknown => return console.write_str("?\n"),
+        };
+        let first = access.start(self.clock.now_ns());
+        match self.run(first, |outcome, ready_ns| access.receive(outcome, ready_ns)) {
+            Ok(byte) => writeln!(console, "EEPROM {address:02x}: {byte:02x}"),
+            Err(error) => writeln!(console, "EEPROM {address:02x}: {error}"),
+        }
+    }
+}
+
+fn message(request: Request) -> Prepared {
+    let bits = request.emit().line();
+    Prepared::new(bits.bits(), bits.len(), 0)
+}
+
+/// Reads all data of the encoder for ever; prints every sixteenth position, and every fault. Does what is typed meanwhile.
+pub fn master(rate: BitRate) -> ! {
+    let Board { mut console, clock, transmitter, receiver, channel } = Board::new(rate_of(rate), 8);
+    let receiver = RingReceiver::new(channel, receiver);
+    let mut master = Master { clock, transmitter, receiver, line: Line::new(rate), free_ns: 0 };
+    let mut typed = Typed::default();
+    let request = Request::ReadAll;
+    let message = message(request);
+    let (mut good, mut bad) = (0_u32, 0_u32);
+    let _ = writeln!(console, "T-Format master, {} bit/s", rate.bits_per_second());
+    loop {
+        let (outcome, took_ns) = master.exchange(request, &message);
+        match outcome {
             Ok(Response::ReadAll(all)) => {
                 good += 1;
                 if good % 16 == 1 {
@@ -64,11 +148,16 @@ pub fn master(rate: BitRate) -> ! {
                 let _ = writeln!(console, "fault: {error}, {good} good, {bad} bad");
             }
         }
-        receiver.settle(&mut clock, ready_ns + PAUSE_NS, u64::from(rate.fields_ns(2)));
+        if let Some(command) = typed.take(&console) {
+            let _ = master.command(command, &mut console);
+        }
+        master.free_ns += PAUSE_NS;
     }
 }
 
 const ENCODER_ID: u8 = 0x17;
+/// Until they are reset.
+const TURNS: Abm = Abm::truncate(7);
 /// A field that comes later than this is not of the request before.
 const FIELD_GAP_NS: u64 = 8_000;
 
@@ -76,12 +165,13 @@ const FIELD_GAP_NS: u64 = 8_000;
 ///
 /// The answer has to begin 3 us after the request, and this processor needs longer to make one. So the answer to a read
 /// request that came last is made ahead, while it is sent: when the request comes again, it only has to be started. All
-/// others are answered when they are ready. `wait_cycles`: what the way through the processor leaves of the 3 us.
+/// others are answered when they are ready, and so is the first read after one of them. `wait_cycles`: what the way through the processor leaves of the 3 us.
 pub fn encoder(rate: BitRate, wait_cycles: u32) -> ! {
     let Board { mut console, mut clock, mut transmitter, mut receiver, .. } = Board::new(rate_of(rate), 8);
     let mut device = Device::<6>::new(ENCODER_ID, rate);
     let mut position = 0x12_3456;
-    let mut ahead = prepare(&mut device, Request::ReadAll, &mut position, wait_cycles);
+    device.set_position(Abs::truncate(position), TURNS);
+    let mut ahead = Some(prepare(&mut device, Request::ReadAll, &mut position, wait_cycles));
     let (mut inside, mut last_ns) = (false, 0);
     let _ = writeln!(console, "T-Format encoder, {} bit/s", rate.bits_per_second());
     loop {
@@ -90,9 +180,10 @@ pub fn encoder(rate: BitRate, wait_cycles: u32) -> ! {
             continue;
         };
         let byte = unit.content as u8;
-        let started = !inside && unit.framed && byte == ahead.0;
-        if started {
-            transmitter.send(&ahead.1);
+        let prepared = ahead.as_ref().filter(|(control_field, _)| !inside && unit.framed && byte == *control_field);
+        let started = prepared.is_some();
+        if let Some((_, message)) = prepared {
+            transmitter.send(message);
         }
         let first = !inside;
         last_ns = clock.now_ns();
@@ -103,7 +194,10 @@ pub fn encoder(rate: BitRate, wait_cycles: u32) -> ! {
         }
         let request = READS.into_iter().find(|request| first && unit.framed && control_field(*request) == byte);
         if let Some(request) = request {
-            ahead = prepare(&mut device, request, &mut position, wait_cycles);
+            ahead = Some(prepare(&mut device, request, &mut position, wait_cycles));
+        } else if !inside {
+            // It may have changed what an answer says, and a repetition is counted: nothing is made ahead now.
+            ahead = None;
         }
     }
 }
@@ -118,7 +212,7 @@ fn control_field(request: Request) -> u8 {
 /// The shaft moves, and the answer to `request` is made.
 fn prepare(device: &mut Device<6>, request: Request, position: &mut u32, wait_cycles: u32) -> (u8, Prepared) {
     *position += 1;
-    device.set_position(Abs::truncate(*position), Abm::truncate(7));
+    device.set_position(Abs::truncate(*position), device.abm());
     let answer = device.answer(request, 0).emit().line();
     (control_field(request), Prepared::new(answer.bits(), answer.len(), wait_cycles))
 }

@@ -3,8 +3,8 @@
 use core::ptr;
 
 const PATTERN: u32 = 0x5eed_5eed;
-/// What the start-up itself may be using.
-const IN_USE: usize = 64;
+/// What this function itself may be using below the stack pointer.
+const IN_USE: u32 = 64;
 
 unsafe extern "C" {
     static mut _stack_end: u32;
@@ -19,9 +19,9 @@ fn bounds() -> (*mut u32, *mut u32) {
 /// Fills what is not used yet.
 #[inline(always)]
 pub fn paint() {
-    let (mut at, end) = bounds();
-    let end = end.wrapping_byte_sub(IN_USE + 1024);
-    while at < end {
+    let (mut at, _) = bounds();
+    let end = cortex_m::register::msp::read() - IN_USE;
+    while (at as u32) < end {
         // SAFETY: below the stack pointer and above the static variables nothing lives.
         unsafe { ptr::write_volatile(at, PATTERN) };
         at = at.wrapping_add(1);

@@ -1,0 +1,96 @@
+//! Transports of the drivers without a line: what was sent is thrown away, and an answer is there when its time has come. Time goes on
+//! by one field or frame with every look at the clock.
+
+use core::convert::Infallible;
+
+use embedded_io::{ErrorType, Read, ReadReady, Write};
+use nikon_aformat::RequestFrame;
+use servowire_drivers::nikon::{Frame, blocking::FramePort};
+
+/// A clock that steps on by so many ns.
+pub(crate) fn steps(step_ns: u64) -> impl FnMut() -> u64 {
+    let mut now_ns = 1_000_000;
+    move || {
+        now_ns += step_ns;
+        now_ns
+    }
+}
+
+/// A UART that answers the first request with these bytes, one by one.
+pub(crate) struct Uart {
+    answer: &'static [u8],
+    /// Looks until the first of them is there.
+    looks: u8,
+}
+
+impl Uart {
+    pub(crate) fn new(answer: &'static [u8]) -> Self {
+        // One before the request, and those of the turn-around.
+        Self { answer, looks: 3 }
+    }
+}
+
+impl ErrorType for Uart {
+    type Error = Infallible;
+}
+
+impl Write for Uart {
+    fn write(&mut self, bytes: &[u8]) -> Result<usize, Infallible> {
+        Ok(bytes.len())
+    }
+
+    fn flush(&mut self) -> Result<(), Infallible> {
+        Ok(())
+    }
+}
+
+impl ReadReady for Uart {
+    fn read_ready(&mut self) -> Result<bool, Infallible> {
+        let waits = self.looks > 0;
+        self.looks = self.looks.saturating_sub(1);
+        Ok(!waits && !self.answer.is_empty())
+    }
+}
+
+impl Read for Uart {
+    fn read(&mut self, bytes: &mut [u8]) -> Result<usize, Infallible> {
+        match (self.answer.split_first(), bytes.first_mut()) {
+            (Some((first, rest)), Some(place)) => {
+                *place = *first;
+                self.answer = rest;
+                Ok(1)
+            }
+            _ => Ok(0),
+        }
+    }
+}
+
+/// A port that answers the first request with frames of these contents.
+pub(crate) struct Port {
+    answer: &'static [u16],
+    looks: u8,
+}
+
+impl Port {
+    pub(crate) fn new(answer: &'static [u16]) -> Self {
+        Self { answer, looks: 4 }
+    }
+}
+
+impl FramePort for Port {
+    type Error = Infallible;
+
+    fn send(&mut self, _: &[RequestFrame], _: u32) -> Result<(), Infallible> {
+        Ok(())
+    }
+
+    fn take(&mut self) -> Result<Option<Frame>, Infallible> {
+        if self.looks > 0 {
+            self.looks -= 1;
+            return Ok(None);
+        }
+        let Some((first, rest)) = self.answer.split_first() else { return Ok(None) };
+        self.answer = rest;
+        Ok(Some(Frame { content: *first, framed: true, end_ns: None }))
+    }
+}

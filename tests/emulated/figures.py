@@ -1,0 +1,110 @@
+"""Compares the figures in the READMEs of the images with what was measured.
+
+    python3 figures.py OBJDUMP MEASURED
+
+MEASURED is what the runs have noted, a line each: image, what, number, between tabs. Flash and static RAM are read from the ELF files;
+the stack of an image that has not run is the bound of stack.py; instructions of what was counted on a Cortex-M4 are those of
+tests/bare-metal/budget.toml, by the name of the kernel that stands behind them in the README. Fails if a README is more than 5 % off,
+if a figure is missing, or if more stack was used than the bound allows.
+"""
+
+import pathlib
+import re
+import struct
+import sys
+import tomllib
+
+import stack
+
+ROOT = pathlib.Path(__file__).parent.parent.parent
+FIRMWARE = ROOT / "examples" / "firmware"
+RAM = 0x20000000
+BAND = 0.05
+COLUMNS = ["image", "flash", "static RAM", "stack", "instructions a cycle"]
+# Folder, target, and whether the stack is measured in a run.
+IMAGES = [
+    ("rp2040", "thumbv6m-none-eabi", True),
+    ("stm32f405", "thumbv7em-none-eabihf", True),
+    ("stm32g4", "thumbv7em-none-eabihf", False),
+    ("rp2350-hdsl", "thumbv8m.main-none-eabihf", False),
+]
+
+
+def sizes(path):
+    """Flash and static RAM, from the segments of an ELF file."""
+    data = path.read_bytes()
+    headers, size, count = (struct.unpack_from(kind, data, at)[0] for kind, at in (("<I", 28), ("<H", 42), ("<H", 44)))
+    flash = ram = 0
+    for k in range(count):
+        kind, _, virtual, _, in_file, in_memory = struct.unpack_from("<6I", data, headers + k * size)
+        if kind == 1:
+            flash += in_file
+            ram += in_memory if RAM <= virtual < RAM + (1 << 20) else 0
+    return flash, ram
+
+
+def number(text):
+    """`22.1 kB`, `516 B`, `1,426` as a number, and the name of a kernel behind it."""
+    found = re.match(r"([\d,.]+)(?: (kB|B))?(?: \(`(\w+)`\))?$", text)
+    assert found, f"{text!r} is no figure"
+    return float(found[1].replace(",", "")) * (1000 if found[2] == "kB" else 1), found[3]
+
+
+def rows(text):
+    """The table of figures: names of images, and the cells behind them."""
+    lines = [[cell.strip() for cell in line.strip("|").split("|")] for line in text.splitlines() if line.startswith("|")]
+    assert COLUMNS in lines, f"no table of {', '.join(COLUMNS)}"
+    for cells in lines[lines.index(COLUMNS) + 2 :]:
+        names = re.findall(r"`([\w-]+)`", cells[0])
+        if len(cells) != len(COLUMNS) or not names:
+            return
+        yield names, cells[1:]
+
+
+def main():
+    objdump, noted = sys.argv[1:]
+    kernels = tomllib.loads((ROOT / "tests/bare-metal/budget.toml").read_text())["kernels"]
+    measured = {}
+    for line in pathlib.Path(noted).read_text().splitlines():
+        image, what, value = line.split("\t")
+        measured[image, what] = max(float(value), measured.get((image, what), 0))
+    faults, compared = [], 0
+
+    def compare(place, said, is_):
+        nonlocal compared
+        compared += 1
+        if abs(said - is_) > BAND * is_:
+            faults.append(f"{place}: the README says {said:g}, measured is {is_:g}")
+
+    for folder, target, runs in IMAGES:
+        readme = (FIRMWARE / folder / "README.md").read_text()
+        built = FIRMWARE / folder / "target" / target / "release"
+        images = {path.name for path in built.iterdir() if path.is_file() and not path.suffix and path.name[0] != "."}
+        for names, cells in rows(readme):
+            (flash, _), (ram, _), (deep, _), (count, kernel) = map(number, cells)
+            for name in names:
+                images.discard(name)
+                path = built / name
+                is_flash, is_ram = sizes(path)
+                bound = stack.bound(objdump, path)
+                used = measured.get((name, "stack")) if runs else bound
+                counted = kernels[kernel]["O3"] if kernel else measured.get((name, "instructions a cycle"))
+                print(f"{name}: {is_flash} bytes of flash, {is_ram} of static RAM, {used:g} of stack (at most {bound}), {counted:g} instructions a cycle")
+                compare(f"{name}, flash", flash, is_flash)
+                compare(f"{name}, static RAM", ram, is_ram)
+                compare(f"{name}, stack", deep, used)
+                compare(f"{name}, instructions a cycle", count, counted)
+                if used > bound:
+                    faults.append(f"{name}: {used:g} bytes of stack were used, {bound} is the bound")
+        if images:
+            faults.append(f"{folder}: the README has no figures of {', '.join(sorted(images))}")
+        # In the text: `1,426 (`tformat_transaction`)`.
+        for said, kernel in re.findall(r"([\d,]+)(?: instructions)? \(`(\w+)`", readme):
+            compare(f"{folder}, {kernel}", number(said)[0], kernels[kernel]["O3"])
+    for fault in faults:
+        print("FAILED:", fault)
+    print(f"figures: {compared} of the READMEs compared")
+    sys.exit(1 if faults else 0)
+
+
+main()
