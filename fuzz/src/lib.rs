@@ -57,6 +57,8 @@ pub const TARGETS: &[(&str, Target)] = &[
     ("sorte_sync0", sorte::sync0),
     ("step_profile_step", step_profile::step),
     ("step_profile_axis", step_profile::axis),
+    ("step_profile_motion", step_profile::motion),
+    ("step_profile_path", step_profile::path),
     ("tformat_request", tformat::request),
     ("tformat_response", tformat::response),
     ("tformat_differential", tformat::differential),

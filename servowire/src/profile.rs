@@ -4,21 +4,23 @@ mod curves;
 mod drawing;
 mod motion;
 mod part;
+mod ramp;
+mod stroke;
 
 use std::error::Error;
 use std::fmt::Display;
 use std::fs;
 use std::io::{self, BufWriter, Write};
-use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use clap::{Args, ValueEnum};
 use motion::Move;
-use serde::Serialize;
+use ramp::Record;
 use step_profile::motion::Limits;
-use step_profile::{Arithmetic, Frequency, Parameters, Profile, RampStep, Speed, Tone};
+use step_profile::{Arithmetic, Frequency, Parameters, Profile, Speed, Tone};
 
+use crate::capture::time;
 use crate::gcode::Part;
 
 /// Times of the steps of a move on a 4 us cycle.
@@ -205,12 +207,12 @@ impl Arguments {
                 writeln!(out)?;
             }
         } else {
-            summary(profile, steps, out)?;
+            ramp::summary(profile, steps, out)?;
             match &self.svg {
                 Some(path) => {
                     fs::write(path, drawing::svg(profile, steps)?).map_err(|e| format!("{}: {e}", path.display()))?;
                 }
-                None => table(profile, steps, out)?,
+                None => ramp::table(profile, steps, out)?,
             }
         }
         Ok(out.flush()?)
@@ -261,17 +263,10 @@ fn is_broken_pipe(error: &(dyn Error + 'static)) -> bool {
 
 /// Whole millihertz: finer than the speed constant anywhere in its range.
 fn frequency(text: &str) -> Result<Frequency, String> {
-    let bare = text.trim().trim_end_matches("Hz").trim_end();
-    let (digits, factor) = match bare.strip_suffix(['k', 'K']) {
-        Some(digits) => (digits.trim_end(), 1e6),
-        None => (bare, 1e3),
-    };
-    let millihertz = digits.parse::<f64>().map_or(f64::NAN, |number| (number * factor).round());
-    if (1.0..=f64::from(u32::MAX)).contains(&millihertz) {
-        Frequency::from_ratio(millihertz as u32, 1000).ok_or_else(String::new)
-    } else {
-        Err(format!("\"{text}\" is not a step frequency, as 94570 or 94.57kHz"))
-    }
+    let millihertz = time::frequency(text).map_or(0.0, |hz| (hz * 1e3).round());
+    let step = (1.0..=f64::from(u32::MAX)).contains(&millihertz);
+    let ratio = step.then(|| Frequency::from_ratio(millihertz as u32, 1000)).flatten();
+    ratio.ok_or_else(|| format!("\"{text}\" is not a step frequency from 1 mHz to 4.29 MHz, as 94570 or 94.57kHz"))
 }
 
 fn tone(text: &str) -> Result<Tone, String> {
@@ -279,122 +274,6 @@ fn tone(text: &str) -> Result<Tone, String> {
         let names: Vec<_> = Tone::ALL.iter().map(|tone| tone.name()).collect();
         format!("\"{text}\" is none of {}", names.join(", "))
     })
-}
-
-/// End of the step's interval, which is its pulse, in ns after the start of cycle 0.
-fn pulse_ns(step: RampStep) -> u64 {
-    step.cycle * u64::from(step_profile::CYCLE_NS) + u64::from(step.sync_time)
-}
-
-/// A step as CSV and JSON have it.
-#[derive(Serialize)]
-struct Record {
-    step: u32,
-    state: String,
-    entry: u8,
-    t_step_ns: u32,
-    cycle: u64,
-    sync_time_ns: u32,
-    time_ns: u64,
-}
-
-impl From<RampStep> for Record {
-    fn from(step: RampStep) -> Self {
-        Self {
-            step: step.index,
-            state: step.state.to_string(),
-            entry: step.entry,
-            t_step_ns: step.t_step,
-            cycle: step.cycle,
-            sync_time_ns: step.sync_time,
-            time_ns: pulse_ns(step),
-        }
-    }
-}
-
-fn summary(profile: Profile<'_>, steps: u32, out: &mut dyn Write) -> io::Result<()> {
-    let parameters = profile.parameters();
-    let full = f64::from(profile.step_time_ns(31));
-    let exact = f64::from(parameters.speed.raw()) * 1000.0 / 65536.0;
-    let (mut zero, mut late) = (0_u32, 0_u32);
-    for step in profile.steps(steps) {
-        zero += u32::from(step.sync_time == 0);
-        late += u32::from(step.sync_time > 3990);
-    }
-    let shape = profile.shape(steps);
-    let proved = if profile.pru_is_exact() { "exact" } else { "outside its proved domain (68.045 kHz and above)" };
-    writeln!(out, "speed constant  {}, a step each {exact:.3} ns ({:.3} kHz)", parameters.speed.raw(), 1e6 / exact)?;
-    match parameters.arithmetic {
-        Arithmetic::Carried => writeln!(out, "full speed      on average as asked, fractions of a ns are carried on")?,
-        _ => writeln!(out, "full speed      a step each {full} ns, {:.1} ppm fast", (exact - full) / full * 1e6)?,
-    }
-    writeln!(
-        out,
-        "move            {steps} steps in {:.6} ms: {} up, {} at full speed, {} down",
-        profile.duration_ns(steps) as f64 / 1e6,
-        shape.accelerating,
-        shape.constant,
-        shape.decelerating
-    )?;
-    writeln!(out, "PRU arithmetic  {proved}")?;
-    writeln!(out, "on the wire     {zero} pulses at sync_time 0 (sent as 1 ns), {late} above 3990 ns (sent as 3990 ns)")
-}
-
-/// Steps at the same ramp entry.
-struct Stretch {
-    first: RampStep,
-    last: RampStep,
-    /// Start of its first interval and end of its last.
-    ms: Range<f64>,
-}
-
-impl Stretch {
-    fn khz(&self) -> f64 {
-        1e6 / f64::from(self.first.t_step)
-    }
-
-    /// Numbers of its steps.
-    fn steps(&self) -> Range<f64> {
-        f64::from(self.first.index)..f64::from(self.last.index) + 1.0
-    }
-}
-
-fn stretches(profile: Profile<'_>, steps: u32) -> Vec<Stretch> {
-    let mut all: Vec<Stretch> = Vec::new();
-    let mut now = 0.0;
-    for step in profile.steps(steps) {
-        let end = now + f64::from(step.t_step) / 1e6;
-        match all.last_mut() {
-            Some(stretch) if (stretch.first.entry, stretch.first.state) == (step.entry, step.state) => {
-                stretch.last = step;
-                stretch.ms.end = end;
-            }
-            _ => all.push(Stretch { first: step, last: step, ms: now..end }),
-        }
-        now = end;
-    }
-    all
-}
-
-fn table(profile: Profile<'_>, steps: u32, out: &mut dyn Write) -> io::Result<()> {
-    writeln!(out, "\n  first    last  state      entry   t_step/ns   rate/kHz  ends in cycle  at ns        ms")?;
-    for stretch in stretches(profile, steps) {
-        let Stretch { first, last, .. } = stretch;
-        writeln!(
-            out,
-            "{:>7} {:>7}  {:<9} {:>6} {:>11} {:>10.3} {:>14} {:>6} {:>9.3}",
-            first.index,
-            last.index,
-            first.state,
-            first.entry,
-            first.t_step,
-            stretch.khz(),
-            last.cycle,
-            last.sync_time,
-            pulse_ns(last) as f64 / 1e6
-        )?;
-    }
-    Ok(())
 }
 
 #[cfg(test)]
@@ -422,9 +301,15 @@ mod tests {
 
     #[test]
     fn frequencies() {
-        for (text, want) in
-            [("94.57kHz", 94_570_000), ("250k", 250_000_000), ("112935.83", 112_935_830), ("1 Hz", 1000)]
-        {
+        for (text, want) in [
+            ("94.57kHz", 94_570_000),
+            ("250k", 250_000_000),
+            ("112935.83", 112_935_830),
+            ("1 Hz", 1000),
+            ("1MHz", 1_000_000_000),
+            ("0.25 MHz", 250_000_000),
+            ("0.001", 1),
+        ] {
             assert_eq!(frequency(text), Ok(Frequency::from_ratio(want, 1000).unwrap()), "{text}");
         }
         for text in ["", "k", "fast", "-1", "0", "5MHz", "5e9", "NaN", "inf"] {

@@ -33,12 +33,14 @@ struct Watched {
     last: Option<u64>,
     position: i64,
     now: u64,
+    /// When the last request came.
+    told: u64,
 }
 
 impl Watched {
     fn new(limits: Limits, hz: u32) -> Self {
         let mover = Mover::new(Clock::new(hz).unwrap(), limits).unwrap();
-        Self { mover, limits, hz: hz.into(), last: None, position: 0, now: 0 }
+        Self { mover, limits, hz: hz.into(), last: None, position: 0, now: 0, told: 0 }
     }
 
     fn limits_hold(&self, s: State) -> Result<(), TestCaseError> {
@@ -65,6 +67,12 @@ impl Watched {
             let off = (before.position - (self.position << 32)).abs() as f64 / 2_f64.powi(32);
             let tick = (before.speed as f64 / 65536.0).abs() / self.hz;
             prop_assert!(off <= 0.5 + tick + 1e-3, "{before:?} at {}", self.position);
+            // Half a tick from where the unrounded axis is in the middle of the step, unless a request has just come.
+            let back = if pulse.direction == Direction::Forward { -1 } else { 1 };
+            let middle = (self.position * 2 + back) << 31;
+            let way = tick * 0.5 + (before.acceleration as f64 / 65536.0).abs() / self.hz / self.hz;
+            let off = (before.position - middle).abs() as f64 / 2_f64.powi(32);
+            prop_assert!(off <= way * 1.002 + 4e-9 || pulse.tick == self.told, "{off} of {way}: {before:?}");
             self.last = Some(pulse.tick);
             self.now = pulse.tick;
             count += 1;
@@ -75,6 +83,7 @@ impl Watched {
     }
 
     fn tell(&mut self, request: Request) -> Result<(), TestCaseError> {
+        self.told = self.now;
         let before = self.mover.at(self.now);
         let direction = self.mover.direction();
         match request {
@@ -107,7 +116,7 @@ impl Watched {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { cases: 500, ..ProptestConfig::default() })]
+    #![proptest_config(ProptestConfig { cases: 2 * ProptestConfig::default().cases, ..ProptestConfig::default() })]
 
     #[test]
     fn requests_at_any_moment(
@@ -226,6 +235,32 @@ fn soft_limits_a_halt_and_a_quick_stop() {
     assert!(!mover.is_halted());
     while mover.pulse().is_some() {}
     assert_eq!(mover.position(), 10);
+}
+
+/// A step is due in the tick of a request, and the axis is past it by part of a tick: the steps after it are not.
+#[test]
+fn a_step_that_is_due_when_a_request_comes() {
+    let clock = Clock::new(100_000).unwrap();
+    for (limits, speed) in [(Limits::new(9000, 50_000).unwrap(), 9000), (Limits::new(9000, 50_000).unwrap(), 777)] {
+        for steps in 40..240 {
+            let mut mover = Mover::new(clock, limits).unwrap();
+            mover.run(Direction::Forward, speed, 0).unwrap();
+            for _ in 0..steps {
+                mover.pulse();
+            }
+            let now = mover.due().unwrap();
+            mover.set_override(99, now);
+            mover.pulse();
+            for step in steps + 1..steps + 20 {
+                let due = mover.due().unwrap();
+                let state = mover.at(due);
+                let off = state.position - (step << 32) - (1 << 31);
+                let way = state.speed as f64 / 65536.0 / 1e5 * 2_f64.powi(31);
+                assert!(off.abs() as f64 <= way * 1.005, "step {step} after {steps} at {due}: {off} of {way}");
+                mover.pulse();
+            }
+        }
+    }
 }
 
 /// The last step of a phase can lie in the half tick in which the phase ends: the next one is a step on all the same.

@@ -46,8 +46,6 @@ fn follow<const N: usize>(
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { cases: 200, ..ProptestConfig::default() })]
-
     #[test]
     fn lines_of_three_axes(
         corners in prop::collection::vec([-600..600_i64, -600..600_i64, -200..200_i64], 1..14),

@@ -5,10 +5,10 @@ use std::error::Error;
 use plotters::prelude::*;
 
 use super::motion::{Move, Sample};
+use super::stroke::Stroke;
 
-/// A shape has its colour and its width, wherever it is drawn; thinner ones lie on top.
-const STYLES: [(&str, RGBColor, u32); 3] =
-    [("sin2", RGBColor(200, 90, 0), 3), ("trapezoid", RGBColor(0, 90, 180), 2), ("s-curve", RGBColor(0, 130, 70), 2)];
+/// A shape has its stroke, wherever it is drawn.
+const SHAPES: [&str; 3] = ["sin2", "trapezoid", "s-curve"];
 
 /// What is drawn, in which unit.
 type Row = (&'static str, fn(&Sample) -> Option<f64>);
@@ -20,8 +20,8 @@ const ROWS: [Row; 4] = [
     ("jerk [10⁶ steps/s³]", |sample| sample.jerk.map(|jerk| jerk / 1e6)),
 ];
 
-fn style(name: &str) -> (RGBColor, u32) {
-    STYLES.iter().find(|(known, ..)| *known == name).map_or((BLACK, 1), |(_, colour, width)| (*colour, *width))
+fn stroke(name: &str) -> Stroke {
+    Stroke::number(SHAPES.iter().position(|known| *known == name).unwrap_or(SHAPES.len()))
 }
 
 /// The moves over one another. The legend stands above the plots.
@@ -31,11 +31,8 @@ pub(super) fn svg(title: &str, moves: &[Move]) -> Result<String, Box<dyn Error>>
     root.fill(&WHITE)?;
     let (head, body) = root.titled(title, ("sans-serif", 22))?.split_vertically(34);
     for (at, made) in (0..).zip(moves) {
-        let (colour, width) = style(made.name);
-        let left = 90 + at * 240;
-        head.draw(&PathElement::new(vec![(left, 16), (left + 36, 16)], colour.stroke_width(width + 1)))?;
         let label = format!("{}, {:.3} ms", made.name, made.duration() * 1e3);
-        head.draw(&Text::new(label, (left + 44, 9), ("sans-serif", 15)))?;
+        stroke(made.name).legend(&head, 90 + at * 300, &label)?;
     }
     let end = moves.iter().map(Move::duration).fold(1e-6, f64::max) * 1e3;
     for (area, (name, value)) in body.split_evenly((4, 1)).iter().zip(ROWS) {
@@ -52,9 +49,8 @@ pub(super) fn svg(title: &str, moves: &[Move]) -> Result<String, Box<dyn Error>>
             .label_style(("sans-serif", 13))
             .draw()?;
         for made in moves {
-            let (colour, width) = style(made.name);
             let points = made.curve.iter().filter_map(|sample| Some((sample.time * 1e3, value(sample)?)));
-            chart.draw_series(LineSeries::new(points, colour.stroke_width(width)))?;
+            stroke(made.name).curve(&mut chart, points)?;
         }
     }
     root.present()?;
@@ -65,6 +61,7 @@ pub(super) fn svg(title: &str, moves: &[Move]) -> Result<String, Box<dyn Error>>
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::profile::stroke::geometry::nothing_is_covered;
     use step_profile::motion::Limits;
     use step_profile::{Parameters, Profile, Speed};
 
@@ -84,6 +81,7 @@ mod tests {
             for text in ["position", "speed [kHz]", "acceleration", "jerk", "sin2", "trapezoid", "s-curve"] {
                 assert!(svg.contains(text), "{steps} steps: {text}");
             }
+            nothing_is_covered(&svg);
         }
     }
 }

@@ -6,7 +6,7 @@ use std::ops::Range;
 use plotters::prelude::*;
 use step_profile::{MoveState, Profile};
 
-use super::{Stretch, stretches};
+use super::ramp::{Stretch, stretches};
 
 type Points = Vec<(f64, f64)>;
 
@@ -100,7 +100,7 @@ fn plot(
     let values = || points.iter().map(|(_, value)| *value);
     let (low, high) = (values().fold(f64::MAX, f64::min), values().fold(1e-3, f64::max));
     let mut chart = ChartBuilder::on(area);
-    chart.margin(12).x_label_area_size(38).y_label_area_size(76);
+    chart.margin(12).x_label_area_size(38).y_label_area_size(104);
     let line = LineSeries::new(points, BLUE.stroke_width(2));
     // The two kinds of axes are of different types, so the few calls are there twice.
     if logarithmic {
@@ -118,6 +118,7 @@ fn plot(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::profile::stroke::geometry::nothing_is_covered;
     use step_profile::{Parameters, Speed};
 
     fn profile(hz: u32, steps_per_entry: u32) -> Profile<'static> {
@@ -133,6 +134,7 @@ mod tests {
             for text in ["speed [kHz]", "acceleration", "step time", "ramp up"] {
                 assert!(svg.contains(text), "{steps} steps: {text}");
             }
+            nothing_is_covered(&svg);
         }
     }
 

@@ -5,7 +5,7 @@ use std::io::{self, Write};
 use step_profile::motion::{Clock, Limits, Plan};
 use step_profile::{Error, MoveState, Profile};
 
-use super::stretches;
+use super::ramp::{pulse_ns, stretches};
 
 /// State of a move at a time.
 #[derive(Debug, Clone, Copy, Default)]
@@ -96,7 +96,7 @@ impl Move {
         let mut times = Vec::new();
         for step in profile.steps(steps) {
             exact += f64::from(parameters.table.entry(step.entry)) * f64::from(parameters.speed.raw()) / 65536.0;
-            let time = super::pulse_ns(step);
+            let time = pulse_ns(step);
             error_ns = f64::max(error_ns, (time as f64 - exact).abs());
             times.push(time - u64::from(parameters.init_sync));
         }

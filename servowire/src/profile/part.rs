@@ -1,7 +1,7 @@
 //! The steps of a part program: as a table, a line a step, a drawing, and wires.
 
 use std::error::Error;
-use std::fs::File;
+use std::fs::{self, File};
 use std::io::{self, BufWriter, Write};
 use std::path::Path;
 
@@ -11,6 +11,7 @@ use step_profile::motion::AxisPulse;
 use vcd::{IdCode, TimescaleUnit, Value, Writer};
 
 use super::Arguments;
+use super::stroke::Stroke;
 use crate::gcode::{AXES, Steps};
 
 const NAMES: [&str; AXES] = ["X", "Y", "Z"];
@@ -73,7 +74,7 @@ pub(super) fn write(
         wires.finish()?;
     }
     if let Some(path) = &arguments.svg {
-        draw(path, &places).map_err(|e| format!("{}: {e}", path.display()))?;
+        fs::write(path, draw(&places)?).map_err(|e| format!("{}: {e}", path.display()))?;
     }
     Ok(out.flush()?)
 }
@@ -167,7 +168,7 @@ impl Wires {
 type Place = (f64, [i64; AXES]);
 
 /// The path on the left, the positions of the axes over time on the right.
-fn draw(path: &Path, places: &[Place]) -> Result<(), Box<dyn Error>> {
+fn draw(places: &[Place]) -> Result<String, Box<dyn Error>> {
     // A point a pixel is enough.
     let every = (places.len() / 20_000).max(1);
     let thin = || places.iter().step_by(every).chain(places.last());
@@ -178,7 +179,8 @@ fn draw(path: &Path, places: &[Place]) -> Result<(), Box<dyn Error>> {
         let margin = (high - low).max(1.0) * 0.06;
         low - margin..high + margin
     };
-    let root = SVGBackend::new(path, (1200, 600)).into_drawing_area();
+    let mut drawing = String::new();
+    let root = SVGBackend::with_string(&mut drawing, (1200, 600)).into_drawing_area();
     root.fill(&WHITE)?;
     let (left, right) = root.split_horizontally(600);
     let mut chart = ChartBuilder::on(&left);
@@ -186,13 +188,43 @@ fn draw(path: &Path, places: &[Place]) -> Result<(), Box<dyn Error>> {
         chart.margin(12).x_label_area_size(42).y_label_area_size(70).build_cartesian_2d(range(0), range(1))?;
     plane.configure_mesh().max_light_lines(0).x_desc("X [steps]").y_desc("Y [steps]").draw()?;
     plane.draw_series(LineSeries::new(thin().map(|place| (value(place, 0), value(place, 1))), BLUE.stroke_width(2)))?;
+    let (head, body) = right.split_vertically(30);
+    for ((axis, name), left) in NAMES.iter().enumerate().zip((70..).step_by(150)) {
+        Stroke::number(axis).legend(&head, left, name)?;
+    }
     let end = places.last().map_or(1.0, |(time, _)| time.max(1e-9));
-    for (axis, (area, name)) in right.split_evenly((AXES, 1)).iter().zip(NAMES).enumerate() {
+    for (axis, (area, name)) in body.split_evenly((AXES, 1)).iter().zip(NAMES).enumerate() {
         let mut chart = ChartBuilder::on(area);
         chart.margin(12).x_label_area_size(42).y_label_area_size(70);
         let mut curve = chart.build_cartesian_2d(0.0..end, range(axis))?;
-        curve.configure_mesh().max_light_lines(0).x_desc("time [s]").y_desc(format!("{name} [steps]")).draw()?;
-        curve.draw_series(LineSeries::new(thin().map(|place| (place.0, value(place, axis))), BLUE.stroke_width(2)))?;
+        let labels = (8, 5);
+        curve
+            .configure_mesh()
+            .max_light_lines(0)
+            .x_labels(labels.0)
+            .y_labels(labels.1)
+            .x_desc("time [s]")
+            .y_desc(format!("{name} [steps]"))
+            .draw()?;
+        Stroke::number(axis).curve(&mut curve, thin().map(|place| (place.0, value(place, axis))))?;
     }
-    Ok(root.present()?)
+    root.present()?;
+    drop((root, left, right, head, body, plane));
+    Ok(drawing)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::profile::stroke::geometry::nothing_is_covered;
+
+    #[test]
+    fn labels_leave_the_curves_free() {
+        let square = [[0, 0, 0], [80_000, 0, 0], [80_000, 80_000, -20_000], [0, 80_000, 0], [0, 0, 0]];
+        let places: Vec<Place> = (0..).map(f64::from).zip(square).collect();
+        let svg = draw(&places).unwrap();
+        assert!(svg.contains("X [steps]") && svg.contains("time [s]") && !svg.contains("NaN"));
+        nothing_is_covered(&svg);
+        nothing_is_covered(&draw(&[(0.0, [0; AXES])]).unwrap());
+    }
 }

@@ -195,12 +195,6 @@ impl<W: Word> Cubic<W> {
         self.off.is_below(self.speed())
     }
 
-    /// The same without jerk.
-    #[inline(always)]
-    pub(super) fn is_straight_there(&self) -> bool {
-        self.off.is_below(self.v.minus(self.h))
-    }
-
     /// About as many ticks as the next step takes.
     pub(super) fn interval(&self) -> u64 {
         self.at_most(self.step)
@@ -227,6 +221,14 @@ impl<W: Word> Cubic<W> {
         let zero = self.off.minus(self.off);
         let guess = self.at_most(zero.minus(self.off));
         Self { off: self.off.plus(self.step), ..*self }.solve(guess, last)
+    }
+
+    /// As [`solve`](Self::solve), for a guess that is most often wrong by one tick.
+    pub(super) fn beside(&self, guess: u64, last: u64) -> (u64, Self) {
+        let early = self.bent(guess).off.is_negative();
+        let by = if early { guess.saturating_add(1) } else { guess.saturating_sub(1) };
+        let next = self.bent(by);
+        if by <= last && next.is_there() { (by, next) } else { self.solve(guess, last) }
     }
 
     /// The step after the one that has just been made, `guess` ticks on or as many as it is, up to `last`: Newton's method
@@ -261,6 +263,18 @@ impl<W: Word> Cubic<W> {
             };
             by = next.max(early.saturating_add(1)).min(late.saturating_sub(1));
         }
+    }
+}
+
+impl Cubic<i64> {
+    /// The upper words alone say [`is_there`](Self::is_there); near the edges they do not, in a word of 2^26 to a step.
+    #[inline(always)]
+    pub(super) fn is_surely_there(&self) -> bool {
+        let upper = |word: i64| (word >> 32) as i32;
+        let off = upper(self.off);
+        // The lower words make the speed less by one at most.
+        let speed = upper(self.v).wrapping_sub(upper(self.h)).wrapping_add(upper(self.j));
+        off.wrapping_add(1).wrapping_sub(speed) & !off < 0
     }
 }
 

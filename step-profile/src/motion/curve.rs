@@ -87,6 +87,18 @@ impl Curve {
         self.pieces.get(..self.len).unwrap_or(&[])
     }
 
+    /// The state at a time of the curve, also before its begin and after its end; `None` without pieces.
+    pub(super) fn at(&self, time: Real) -> Option<Piece> {
+        let pieces = self.pieces();
+        let piece = pieces.iter().rev().find(|piece| piece.time <= time).or(pieces.first())?;
+        Some(piece.after(time - piece.time))
+    }
+
+    /// The distance that is planned: from where the curve was joined to its end.
+    pub(super) fn way(&self) -> Real {
+        self.p - self.skipped.1
+    }
+
     /// Adds a piece with its duration and distance; one without duration is left out.
     pub(super) fn push(&mut self, (lasts, distance): (Real, Real), [v, a, j]: [Real; 3], up: bool, bend: Bend) {
         if lasts.is_zero() {

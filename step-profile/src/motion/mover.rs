@@ -153,16 +153,7 @@ impl Mover {
     /// Position, speed, acceleration and jerk at a tick that is not before the last step.
     pub fn at(&self, now: u64) -> State {
         let state = State::new(self.clock, self.phases.at(self.clock.moment(now)));
-        let origin = self.origin.saturating_mul(1 << 32);
-        match self.direction {
-            Direction::Forward => State { position: origin.saturating_add(state.position), ..state },
-            Direction::Reverse => State {
-                position: origin.saturating_sub(state.position),
-                speed: state.speed.wrapping_neg(),
-                acceleration: state.acceleration.wrapping_neg(),
-                jerk: state.jerk.wrapping_neg(),
-            },
-        }
+        state.on_axis(self.origin, self.direction)
     }
 
     /// Whether the axis stands still at a tick, with nothing to come (or held).

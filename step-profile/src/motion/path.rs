@@ -2,12 +2,10 @@
 
 use super::curve::Curve;
 use super::limits::{Bounds, Clock, Limits};
-use super::phases::Frame;
+use super::line::{Line, LinePulses, Start};
 use super::plan::checked;
-use super::planner::{Goal, Motion, greatest, plan};
+use super::planner::{Goal, Motion, SLACK, fastest_exit, greatest, plan, slowest_exit};
 use super::real::Real;
-use super::stepper::Stepper;
-use crate::axis::Direction;
 use crate::error::Error;
 
 /// An axis of a machine.
@@ -20,17 +18,14 @@ pub struct AxisSetup {
     pub steps_per_m: u32,
 }
 
-/// A line that waits.
+/// How it goes on along a line.
 #[derive(Debug, Clone, Copy)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-struct Line<const N: usize> {
-    steps: [i32; N],
-    /// Length in units: steps of the finest axis.
-    length: Real,
-    /// Along the line, in units.
-    bounds: Bounds,
-    /// Greatest speed at its begin, for the corner.
-    corner: Real,
+pub(super) struct Course {
+    pub(super) curve: Curve,
+    /// The speed at its end.
+    pub(super) exit: Real,
+    /// It ends with the line, not at a rest before that.
+    pub(super) whole: bool,
 }
 
 /// A queue of up to `M` straight lines in `N` axes.
@@ -138,23 +133,19 @@ impl<const N: usize, const M: usize> Path<N, M> {
         if self.is_full() {
             return Err(Error::QueueFull);
         }
-        let mut steps = [0; N];
-        for ((to, from), step) in target.iter().zip(&self.target).zip(&mut steps) {
-            let away = to.checked_sub(*from).and_then(|away| i32::try_from(away).ok()).filter(|away| *away > i32::MIN);
-            *step = away.ok_or(Error::TooManySteps { steps: u32::MAX, limit: u32::MAX / 2 })?;
-        }
+        let steps = Self::steps(self.target, target)?;
         let length = self.length(&steps);
         if length.is_zero() {
             return Ok(());
         }
-        let bounds = self.bounds(&steps, length, feed.max(1));
+        let (bounds, feed) = self.bounds(&steps, length, feed.max(1));
         let corner = match self.before {
-            Some((before, long)) => self.corner((&before, long), (&steps, length), &bounds),
+            Some((before, long)) => self.corner((&before, long), (&steps, length), bounds.a),
             None => Real::ZERO,
         };
         let place = self.first.wrapping_add(self.len).checked_rem(M).and_then(|at| self.lines.get_mut(at));
         if let Some(place) = place {
-            *place = Some(Line { steps, length, bounds, corner });
+            *place = Some(Line::new(steps, length, bounds, (feed, corner)));
             self.len = self.len.saturating_add(1);
             self.before = Some((steps, length));
             self.target = target;
@@ -166,15 +157,54 @@ impl<const N: usize, const M: usize> Path<N, M> {
     /// earlier than [`not_before`](Self::not_before).
     pub fn next_line(&mut self) -> Option<LinePulses<N>> {
         let line = self.line(0)?;
-        let exit = self.exit().min(greatest(self.speed, line.length, &line.bounds));
-        let goal = Goal::At(line.length, exit);
-        let curve = plan(Motion::steady(self.speed), goal, &line.bounds).unwrap_or_else(|_| stop(&line, self.speed));
-        let pulses = LinePulses::new(self.clock, &curve, &line, (self.moment, self.offset));
+        let Course { curve, exit, .. } = self.begin(0, self.speed, Some(Real::ONE))?;
+        let start = self.start();
+        self.finish(&curve, start.moment, start.offset, exit);
+        Some(LinePulses::new(self.clock, &curve, &line, start))
+    }
+
+    /// Steps of each axis from one position to another.
+    pub(super) fn steps(from: [i64; N], to: [i64; N]) -> Result<[i32; N], Error> {
+        let mut steps = [0; N];
+        for ((to, from), step) in to.iter().zip(from).zip(&mut steps) {
+            let away = to.checked_sub(from).and_then(|away| i32::try_from(away).ok()).filter(|away| *away > i32::MIN);
+            *step = away.ok_or(Error::TooManySteps { steps: u32::MAX, limit: u32::MAX / 2 })?;
+        }
+        Ok(steps)
+    }
+
+    pub(super) const fn clock(&self) -> Clock {
+        self.clock
+    }
+
+    /// Speed at which the first line begins.
+    pub(super) const fn speed(&self) -> Real {
+        self.speed
+    }
+
+    /// Where the first line begins, in steps.
+    pub(super) fn origin(&self) -> [i64; N] {
+        let mut at = self.target;
+        for line in (0..self.len).filter_map(|at| self.line(at)) {
+            for (at, steps) in at.iter_mut().zip(line.steps) {
+                *at = at.saturating_sub(steps.into());
+            }
+        }
+        at
+    }
+
+    /// Where and when the first line begins.
+    pub(super) const fn start(&self) -> Start<N> {
+        Start { place: Real::ZERO, made: [0; N], moment: self.moment, offset: self.offset, whole: true }
+    }
+
+    /// Takes the first line out, whose last curve has begun at a moment and an offset, and ends with a speed.
+    pub(super) fn finish(&mut self, curve: &Curve, moment: u64, offset: Real, exit: Real) {
         // Between lines in motion the time goes on exactly; after a rest with half a tick.
         let grid = u64::from(self.clock.grid());
-        let time = self.offset + curve.time;
+        let time = offset + (curve.time - curve.skipped.0);
         let whole = time.to_fixed(0) & grid.wrapping_neg();
-        self.moment = self.moment.saturating_add(whole);
+        self.moment = moment.saturating_add(whole);
         self.offset = time - Real::new(whole);
         if exit.is_zero() && !self.offset.is_zero() {
             (self.moment, self.offset) = (self.moment.saturating_add(grid), Real::ZERO);
@@ -188,7 +218,106 @@ impl<const N: usize, const M: usize> Path<N, M> {
         if self.len == 0 {
             self.before = None;
         }
-        Some(pulses)
+    }
+
+    /// From a motion at a place on line `at`. With `part` of the speeds that were asked for; without one it brakes at once, and
+    /// may come to rest before the end. `None` if rounding leaves no way.
+    pub(super) fn course(&self, at: usize, start: Motion, place: Real, part: Option<Real>) -> Option<Course> {
+        let line = self.line(at)?;
+        let left = line.length - place;
+        let (bounds, wish) = if let Some(part) = part {
+            let bounds = line.bounds(part);
+            (bounds, self.exit(at, part).min(fastest_exit(start, left, &bounds)))
+        } else {
+            let stop = plan(start, Goal::Speed(Real::ZERO), &line.bounds).ok();
+            if let Some(curve) = stop.filter(|curve| curve.way() <= left + SLACK) {
+                let whole = line.cut || left <= curve.way() + SLACK;
+                return Some(Course { curve, exit: Real::ZERO, whole });
+            }
+            (line.bounds.slower(start.v), Real::ZERO)
+        };
+        let to = |exit| {
+            let curve = plan(start, Goal::At(left, exit), &bounds).ok()?;
+            Some(Course { curve, exit, whole: true })
+        };
+        if line.leave.is_some() {
+            return line.leave.and_then(to);
+        }
+        to(wish).or_else(|| {
+            let most = self.most(at);
+            let slowest = slowest_exit(start, left, wish, &bounds).min(most);
+            [slowest, most, Real::ZERO].into_iter().find_map(to)
+        })
+    }
+
+    /// From the begin of line `at`, at a speed. If rounding leaves no way, it goes on at that.
+    pub(super) fn begin(&self, at: usize, speed: Real, part: Option<Real>) -> Option<Course> {
+        let line = self.line(at)?;
+        Some(self.course(at, Motion::steady(speed), Real::ZERO, part).unwrap_or_else(|| {
+            let mut curve = Curve::new();
+            curve.cruise(speed, line.length);
+            Course { curve, exit: speed, whole: true }
+        }))
+    }
+
+    /// On which line and where on it a stop ends that goes on at a speed at the begin of line `at`.
+    pub(super) fn end_of_stop(&self, at: usize, mut speed: Real) -> (usize, Real) {
+        for at in at..self.len {
+            let Some(Course { curve, exit, .. }) = self.begin(at, speed, None) else { break };
+            if exit.is_zero() {
+                return (at, curve.way());
+            }
+            speed = exit;
+        }
+        let last = self.len.saturating_sub(1);
+        (last, self.line(last).map_or(Real::ZERO, |line| line.length))
+    }
+
+    /// The line that is cut off, and where.
+    pub(super) fn end_of_cut(&self) -> Option<(usize, Real)> {
+        (0..self.len).find_map(|at| self.line(at).filter(|line| line.cut).map(|line| (at, line.length)))
+    }
+
+    /// The position in whole steps at a place on line `at`, if the first line begins at `from`.
+    pub(super) fn place(&self, (at, place): (usize, Real), from: [i64; N]) -> [i64; N] {
+        let mut to = from;
+        for i in 0..=at {
+            let Some(line) = self.line(i) else { break };
+            let ends = if i == at { line.steps_at(place) } else { line.ends };
+            for ((to, end), steps) in to.iter_mut().zip(ends).zip(line.steps) {
+                let way = i64::from(end);
+                *to = to.saturating_add(if steps < 0 { way.wrapping_neg() } else { way });
+            }
+        }
+        to
+    }
+
+    /// The queue as far as a place on line `at`, if the first line begins at `from` and a stop leaves it at `exit`.
+    pub(super) fn cut(&mut self, (at, place): (usize, Real), from: [i64; N], exit: Real) {
+        self.target = self.place((at, place), from);
+        let mut speed = exit;
+        for i in 0..self.len {
+            let exit =
+                if i == 0 || i >= at { speed } else { self.begin(i, speed, None).map_or(speed, |course| course.exit) };
+            let entry = self.first.wrapping_add(i).checked_rem(M).and_then(|at| self.lines.get_mut(at));
+            match entry {
+                Some(Some(line)) if i < at => line.leave = line.leave.or(Some(exit)),
+                Some(Some(line)) if i == at => {
+                    line.ends = line.steps_at(place);
+                    (line.length, line.cut) = (place.min(line.length), true);
+                }
+                Some(entry) => *entry = None,
+                None => {}
+            }
+            speed = exit;
+        }
+        (self.len, self.before) = (at.saturating_add(1).min(self.len), None);
+    }
+
+    /// Empty, at rest at a position from a moment on.
+    pub(super) fn clear(&mut self, position: [i64; N], moment: u64) {
+        (self.lines, self.len, self.before, self.target) = ([None; M], 0, None, position);
+        (self.speed, self.moment, self.offset) = (Real::ZERO, self.clock.aligned(moment), Real::ZERO);
     }
 
     /// After a rest, the next line begins no earlier than this tick.
@@ -199,7 +328,7 @@ impl<const N: usize, const M: usize> Path<N, M> {
     }
 
     /// Line `at` of the queue.
-    fn line(&self, at: usize) -> Option<Line<N>> {
+    pub(super) fn line(&self, at: usize) -> Option<Line<N>> {
         if at >= self.len {
             return None;
         }
@@ -207,13 +336,25 @@ impl<const N: usize, const M: usize> Path<N, M> {
         self.lines.get(place).copied().flatten()
     }
 
-    /// The speed at which the first line may end so that all that follow can slow down in time: from the last one back.
-    fn exit(&self) -> Real {
+    /// The speed at which line `at` is to end so that all that follow can slow down in time: from the last one back.
+    pub(super) fn exit(&self, at: usize, part: Real) -> Real {
+        self.slow_down(at, part, greatest)
+    }
+
+    /// The greatest speed at which line `at` may end, whatever was asked for: one from which each line that follows can be
+    /// left at its corner's speed or, which takes less way than some speeds between, come to rest at its end.
+    fn most(&self, at: usize) -> Real {
+        let fastest = |to, n, bounds: &Bounds| greatest(to, n, bounds).max(greatest(Real::ZERO, n, bounds));
+        self.slow_down(at, Real::HUGE, fastest)
+    }
+
+    fn slow_down(&self, at: usize, part: Real, fastest: impl Fn(Real, Real, &Bounds) -> Real) -> Real {
         let mut speed = Real::ZERO;
-        for at in (1..self.len).rev() {
+        for at in (at.saturating_add(1)..self.len).rev() {
             if let (Some(before), Some(line)) = (self.line(at.wrapping_sub(1)), self.line(at)) {
-                let most = line.corner.min(before.bounds.v).min(line.bounds.v);
-                speed = greatest(speed, line.length, &line.bounds).min(most);
+                let bounds = line.bounds(part);
+                let most = line.corner.min(before.bounds(part).v).min(bounds.v);
+                speed = fastest(speed, line.length, &bounds).min(most);
             }
         }
         speed
@@ -230,11 +371,11 @@ impl<const N: usize, const M: usize> Path<N, M> {
         squares.fold(Real::ZERO, |sum, square| sum + square).sqrt()
     }
 
-    /// Along the line, what every axis can take.
-    fn bounds(&self, steps: &[i32; N], length: Real, feed: u32) -> Bounds {
+    /// Along the line, what every axis can take, and the speed that is asked for.
+    fn bounds(&self, steps: &[i32; N], length: Real, feed: u32) -> (Bounds, Real) {
         let second = Real::new(self.clock.moments().into());
         let feed = self.unit * Real::new(feed.into()) / (Real::new(1_000_000) * second);
-        let (mut v, mut a, mut j) = (feed, Real::HUGE, None);
+        let (mut v, mut a, mut j) = (Real::HUGE, Real::HUGE, None);
         for (axis, &steps) in self.axes.iter().zip(steps).filter(|(_, steps)| **steps != 0) {
             let own = axis.limits.bounds(self.clock);
             let part = length / Real::new(steps.unsigned_abs().into());
@@ -244,16 +385,16 @@ impl<const N: usize, const M: usize> Path<N, M> {
                 j = Some(j.map_or(most, |j: Real| j.min(most)));
             }
         }
-        Bounds::new(v, a, j)
+        (Bounds::new(v, a, j), feed)
     }
 
     /// The speed at a corner: v² = a δ s / (1 - s), with s the sine of half the angle between the lines; straight on it is
     /// 1. 1 - s as (1 - s²) / (1 + s), which keeps its digits.
-    fn corner(&self, (from, long): (&[i32; N], Real), (to, length): (&[i32; N], Real), bounds: &Bounds) -> Real {
+    fn corner(&self, (from, long): (&[i32; N], Real), (to, length): (&[i32; N], Real), a: Real) -> Real {
         let (mut along, mut against) = (Real::ZERO, Real::ZERO);
-        for (axis, (&a, &b)) in from.iter().zip(to).enumerate() {
-            let product = (self.way(axis, a) / long) * (self.way(axis, b) / length);
-            if (a < 0) == (b < 0) {
+        for (axis, (&before, &after)) in from.iter().zip(to).enumerate() {
+            let product = (self.way(axis, before) / long) * (self.way(axis, after) / length);
+            if (before < 0) == (after < 0) {
                 along = along + product;
             } else {
                 against = against + product;
@@ -270,75 +411,6 @@ impl<const N: usize, const M: usize> Path<N, M> {
             return Real::ZERO;
         }
         let s = open.half().sqrt();
-        (bounds.a * self.deviation * s * (one + s) / shut.half()).sqrt()
-    }
-}
-
-/// What is left if rounding says that a line is too short: the whole of it at its entry speed.
-fn stop<const N: usize>(line: &Line<N>, speed: Real) -> Curve {
-    let mut curve = Curve::new();
-    curve.cruise(speed, line.length);
-    curve
-}
-
-/// A step of an axis.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub struct AxisPulse {
-    /// Which axis, from 0.
-    pub axis: u8,
-    /// Tick of the clock.
-    pub tick: u64,
-    /// DIR.
-    pub direction: Direction,
-}
-
-/// The steps of a line, of all axes in the order of time.
-#[derive(Debug, Clone)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub struct LinePulses<const N: usize> {
-    clock: Clock,
-    curve: Curve,
-    axes: [(Frame, Stepper); N],
-    due: [Option<u64>; N],
-    directions: [Direction; N],
-    end: u64,
-}
-
-impl<const N: usize> LinePulses<N> {
-    fn new(clock: Clock, curve: &Curve, line: &Line<N>, (begin, offset): (u64, Real)) -> Self {
-        let axes = line.steps.map(|steps| {
-            let steps = steps.unsigned_abs();
-            let (scale, to) = (Real::new(steps.into()) / line.length, Some(i64::from(steps) << 32));
-            (Frame { to, offset, scale, ..Frame::rest(clock.shift(), begin, 0) }, Stepper::new())
-        });
-        let end = axes.first().map_or(begin, |(frame, _)| frame.end(curve));
-        let directions = line.steps.map(|steps| Direction::from_dir(steps < 0));
-        let mut new = Self { clock, curve: *curve, axes, due: [None; N], directions, end };
-        for ((frame, stepper), due) in new.axes.iter_mut().zip(&mut new.due) {
-            *due = stepper.next(&new.curve, frame);
-        }
-        new
-    }
-
-    /// Tick at which the line ends.
-    pub const fn end(&self) -> u64 {
-        self.clock.tick(self.end)
-    }
-}
-
-impl<const N: usize> Iterator for LinePulses<N> {
-    type Item = AxisPulse;
-
-    fn next(&mut self) -> Option<AxisPulse> {
-        let first = self.due.iter().enumerate().filter_map(|(axis, due)| due.map(|due| (due, axis))).min();
-        let (tick, at) = first?;
-        let axis = u8::try_from(at).unwrap_or(u8::MAX);
-        let direction = self.directions.get(at).copied().unwrap_or_default();
-        if let (Some((frame, stepper)), Some(due)) = (self.axes.get_mut(at), self.due.get_mut(at)) {
-            *due = stepper.next(&self.curve, frame);
-        }
-        Some(AxisPulse { axis, tick, direction })
+        (a * self.deviation * s * (one + s) / shut.half()).sqrt()
     }
 }

@@ -51,6 +51,11 @@ impl Frame {
         self.offset + (time - curve.skipped.0)
     }
 
+    /// The time of the curve at a moment.
+    pub(super) fn time(&self, curve: &Curve, moment: u64) -> Real {
+        (Real::new(moment.saturating_sub(self.begin)) + curve.skipped.0) - self.offset
+    }
+
     /// Steps from `from` to a place of the curve.
     pub(super) fn made(&self, curve: &Curve, p: Real) -> Real {
         (p - curve.skipped.1) * self.scale
@@ -114,11 +119,7 @@ impl Frame {
         if !self.endless && moment >= self.end(curve) {
             return rest;
         }
-        let since = Real::new(moment.saturating_sub(self.begin)) + curve.skipped.0;
-        let time = since - self.offset;
-        let pieces = curve.pieces();
-        let Some(piece) = pieces.iter().rev().find(|piece| piece.time <= time).or(pieces.first()) else { return rest };
-        let Piece { p, v, a, j, up, bend, .. } = piece.after(time - piece.time);
+        let Some(Piece { p, v, a, j, up, bend, .. }) = curve.at(self.time(curve, moment)) else { return rest };
         State {
             p: self.position(curve, p),
             v: v * self.scale,

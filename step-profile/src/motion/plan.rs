@@ -8,6 +8,7 @@ use super::phases::{self, Frame, Phases, steps};
 use super::planner::{Goal, Motion, plan};
 use super::real::Real;
 use super::stepper::Stepper;
+use crate::axis::Direction;
 use crate::error::Error;
 
 /// A move of a number of steps: the fastest within its limits.
@@ -133,6 +134,25 @@ pub struct State {
 }
 
 impl State {
+    /// At rest at a position in 2^-32 steps.
+    pub(super) const fn at_rest(position: i64) -> Self {
+        Self { position, speed: 0, acceleration: 0, jerk: 0 }
+    }
+
+    /// Of an axis that moves in a direction from a position in steps.
+    pub(super) const fn on_axis(self, origin: i64, direction: Direction) -> Self {
+        let origin = origin.saturating_mul(1 << 32);
+        match direction {
+            Direction::Forward => Self { position: origin.saturating_add(self.position), ..self },
+            Direction::Reverse => Self {
+                position: origin.saturating_sub(self.position),
+                speed: self.speed.wrapping_neg(),
+                acceleration: self.acceleration.wrapping_neg(),
+                jerk: self.jerk.wrapping_neg(),
+            },
+        }
+    }
+
     pub(super) fn new(clock: Clock, state: phases::State) -> Self {
         let second = Real::new(clock.moments().into());
         let unit = |(size, up): (Real, bool), per: Real| {

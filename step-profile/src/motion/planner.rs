@@ -35,7 +35,7 @@ pub(super) enum Goal {
 }
 
 /// Distances may be this much too short, in steps: what rounding leaves.
-const SLACK: Real = Real::fixed(1, 16);
+pub(super) const SLACK: Real = Real::fixed(1, 16);
 
 /// The speed at which an endless curve ends is cruised for this many moments.
 pub(super) const ENDLESS: Real = Real::fixed(1, -60);
@@ -141,7 +141,8 @@ fn falling(start: Motion, bent: &Bent, goal: Goal, bounds: &Bounds) -> Result<Cu
         }
     }
     let least = distance(base, exit, bounds);
-    if least > target + SLACK {
+    // Above the speed that is left when the acceleration is back at 0 the slope does not lead there.
+    if least > target + SLACK || exit > low {
         return Err(least - back);
     }
     let need = |v| distance(base, v, bounds) + distance(v, exit, bounds);
@@ -206,7 +207,10 @@ fn top(from: Real, goal: Goal, bounds: &Bounds) -> Result<Real, Real> {
     // Each slope takes at least dv sqrt(dv / j), both together just n if they begin and end at rest and only jerk.
     let steep = (n.squared() * jerk.j).scaled(-2).cbrt();
     let high = (low + steep).min(sum.sqrt()).min(bounds.v);
-    Ok(crossing(low, high, n, need))
+    Ok(climb(low, high, n, |v| {
+        let (up, down) = (Slope::new(from, v, bounds), Slope::new(v, exit, bounds));
+        (up.distance() + down.distance(), up.growth(bounds) + down.growth(bounds))
+    }))
 }
 
 /// The greatest speed from which `to` can be reached within `n`, or the greatest that can be reached from it.
@@ -214,7 +218,63 @@ pub(super) fn greatest(to: Real, n: Real, bounds: &Bounds) -> Real {
     let most = (to.squared() + (bounds.a * n).scaled(1)).sqrt().min(bounds.v).max(to);
     match bounds.jerk {
         None => most,
-        Some(_) => crossing(to, most, n, |v| distance(v, to, bounds)),
+        Some(_) => climb(to, most, n, |v| {
+            let slope = Slope::new(v, to, bounds);
+            (slope.distance(), slope.growth(bounds))
+        }),
+    }
+}
+
+/// As [`crossing`], for a need that grows with the speed, with how fast it does: Newton's steps from `high` down, over the
+/// root of the speed above `low`, where the need bends upwards. Each of them ends above the speed that is looked for, so the
+/// last one is made a little longer.
+fn climb(low: Real, high: Real, n: Real, need: impl Fn(Real) -> (Real, Real)) -> Real {
+    let mut root = (high - low).sqrt();
+    for round in 0..12_u8 {
+        let speed = low + root.squared();
+        let (got, growth) = need(speed);
+        if got <= n {
+            if round > 0 && (n - got).scaled(14) > n {
+                break;
+            }
+            return speed;
+        }
+        let over = got - n;
+        let step = over / (root * growth).scaled(1);
+        let more = if over.scaled(7) <= n { step.scaled(-7) } else { Real::ZERO };
+        root = root - (step + more);
+        if root.is_zero() {
+            break;
+        }
+    }
+    crossing(low, high, n, |v| need(v).0)
+}
+
+/// The greatest speed at which a motion may end after `n`.
+pub(super) fn fastest_exit(start: Motion, n: Real, bounds: &Bounds) -> Real {
+    match bounds.jerk.filter(|_| !start.a.is_zero()).map(|jerk| Bent::new(start, jerk)) {
+        None => greatest(start.v, n, bounds),
+        Some(Bent { base, .. }) if start.up => greatest(base.0, n + base.1, bounds),
+        Some(Bent { coast, .. }) => greatest(coast.0, n - coast.1, bounds),
+    }
+}
+
+/// The speed nearest to `exit` from above at which a motion that brakes at once may end after `n`.
+///
+/// A jerk-limited brake to a lower speed may be shorter than one to a higher speed, for it has more of its way at the
+/// greatest acceleration. What is found is the end of the speeds that the way lasts for, from the present one down.
+pub(super) fn slowest_exit(start: Motion, n: Real, exit: Real, bounds: &Bounds) -> Real {
+    let (from, least, n) = match bounds.jerk.filter(|_| !start.a.is_zero()).map(|jerk| Bent::new(start, jerk)) {
+        None => (start.v, Real::ZERO, n),
+        Some(Bent { coast, .. }) if start.up => (coast.0, Real::ZERO, n - coast.1),
+        Some(Bent { base, coast, .. }) => (base.0, base.0 - coast.0, n + base.1),
+    };
+    if from <= exit {
+        return from;
+    }
+    match bounds.jerk {
+        None => (from.squared() - (bounds.a * n).scaled(1)).sqrt().max(exit),
+        Some(_) => from - crossing(least, (from - exit).max(least), n, |by| distance(from, from - by, bounds)),
     }
 }
 

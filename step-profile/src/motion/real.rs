@@ -5,7 +5,7 @@ use core::ops::{Add, Div, Mul, Sub};
 
 /// A number from 0 upwards with 64 significant bits: `m · 2^e`, the top bit of `m` set, or 0.
 ///
-/// Results keep 60 bits at least. A difference below 0 is 0, and a quotient by 0 is 2^1000; nothing
+/// Results keep 58 bits at least. A difference below 0 is 0, and a quotient by 0 is 2^1000; nothing
 /// can overflow or panic.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -98,16 +98,31 @@ impl Real {
         self - self.floor()
     }
 
-    /// The root of the upper bits, and two of Heron's steps.
+    /// The root of the upper 32 bits, and two of Heron's steps, s + (m - s²) / 2s, with a reciprocal of s that is refined
+    /// along with it.
+    #[expect(clippy::cast_possible_wrap, clippy::cast_sign_loss, reason = "differences in two's complement")]
     pub(super) fn sqrt(self) -> Self {
         if self.m == 0 {
             return self;
         }
         let (m, e) = if self.e & 1 == 0 { (self.m, self.e) } else { (self.m >> 1, self.e.saturating_add(1)) };
-        let upper = (m >> 32) as u32;
-        let root = Self::fixed(upper.isqrt().into(), -16).scaled(e >> 1);
-        let root = (root + self / root).half();
-        (root + self / root).half()
+        // 2^15 to 2^16, and 2^32 over it.
+        let coarse = ((m >> 32) as u32).isqrt();
+        let per = u64::from(u32::MAX.checked_div(coarse).unwrap_or(u32::MAX));
+        let s = u64::from(coarse) << 16;
+        // Less than 2^50 is left of m. 15 bits below the point are enough for the next step.
+        let off = m.wrapping_sub(s.wrapping_mul(s)) as i64;
+        let more = (off >> 4).wrapping_mul(per as i64) >> 30;
+        let s = (s << 15).wrapping_add(more as u64).min((1 << 47) - 1);
+        // 2^63 / s to 28 bits: x (2 - s x).
+        let rest = (1_u64 << 48).wrapping_sub((s >> 15).wrapping_mul(per)) as i64;
+        let per = (per << 15).wrapping_add((rest.wrapping_mul(per as i64) >> 33) as u64);
+        // With 32 bits below the point the upper half of the square is m but for 36 bits.
+        let s = s << 17;
+        let (square, _) = product(s, s);
+        let off = m.wrapping_sub(square) as i64;
+        let s = s.saturating_add_signed((off >> 3).wrapping_mul((per >> 1) as i64) >> 28);
+        Self::fixed(s, 32).scaled(e >> 1)
     }
 
     /// Newton's steps from the power of 2 above; from there they come down.
@@ -211,10 +226,14 @@ impl Div for Real {
     }
 }
 
-/// Both halves of a product of 128 bits, in multiplications that a 32-bit core has.
+/// Both halves of a product of 128 bits, on a 32-bit core in multiplications that it has.
 #[expect(clippy::cast_possible_truncation, reason = "halves of a wider number")]
 #[inline]
 const fn product(a: u64, b: u64) -> (u64, u64) {
+    if cfg!(target_pointer_width = "64") {
+        let wide = (a as u128).wrapping_mul(b as u128);
+        return ((wide >> 64) as u64, wide as u64);
+    }
     let (a1, a0, b1, b0) = (a >> 32, a as u32 as u64, b >> 32, b as u32 as u64);
     let low = a0.wrapping_mul(b0);
     let middle = a1.wrapping_mul(b0).wrapping_add(low >> 32);
@@ -295,6 +314,32 @@ mod tests {
             prop_assert_eq!(Real::new(n).to_fixed(0), n);
             prop_assert_eq!(Real::fixed(n, 7).to_fixed(0), n >> 7);
             prop_assert_eq!(Real::fixed(n, 7).fraction(), Real::fixed(n & 127, 7));
+        }
+    }
+
+    /// Squares of whole numbers have their roots to 58 bits.
+    #[test]
+    fn roots_of_squares() {
+        for bits in 0..32_u32 {
+            for n in [
+                1_u64 << bits,
+                (1 << bits) + 1,
+                (2 << bits) - 1,
+                (3 << bits) / 2,
+                (1 << bits) | 0x5555_5555 >> (31 - bits),
+            ] {
+                let (n, root) = (Real::new(n), Real::new(n * n).sqrt());
+                assert!(root.distance(n) <= n.scaled(-58), "{root:?} for {n:?}");
+                let root = Real::new(n.to_fixed(0) * n.to_fixed(0)).scaled(-63).sqrt();
+                let want = n.scaled(-32) * Real::new(2).sqrt();
+                assert!(root.distance(want) <= want.scaled(-57), "{root:?} for {want:?}");
+            }
+        }
+        for m in
+            [u64::MAX, u64::MAX - 1, 1 << 63, (1 << 63) + 1, u64::MAX >> 1, 1 << 62, u64::MAX << 32, u64::MAX << 31]
+        {
+            let root = Real::new(m).sqrt();
+            assert!(root.squared().distance(Real::new(m)) <= Real::new(m).scaled(-57), "{root:?} of {m}");
         }
     }
 

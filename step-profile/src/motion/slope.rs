@@ -40,6 +40,15 @@ impl Slope {
         self.edge.scaled(1) + self.flat
     }
 
+    /// How fast the distance grows with the higher speed.
+    pub(super) fn growth(&self, bounds: &Bounds) -> Real {
+        let per_speed = match bounds.jerk {
+            Some(jerk) if self.flat.is_zero() => jerk.per_j / self.edge,
+            _ => bounds.per_a,
+        };
+        self.time().half() + (self.from + self.to).half() * per_speed
+    }
+
     pub(super) fn distance(&self) -> Real {
         (self.from + self.to).half() * self.time()
     }

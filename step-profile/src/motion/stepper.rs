@@ -45,7 +45,12 @@ enum Mode {
     Long(Cubic<i128>, u64, u64),
 }
 
-/// Foresees intervals, in 2^-8 ticks.
+/// Bits of a part of a tick in a [`Guess`], which foresees intervals of up to 2^20 ticks with them.
+const PART: u32 = 11;
+/// Rounds up.
+const CEIL: u32 = (1 << PART) - 1;
+
+/// Foresees intervals, in 2^-11 ticks.
 #[derive(Debug, Clone, Copy)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 struct Guess {
@@ -57,34 +62,34 @@ struct Guess {
     late: u32,
     /// Ticks to the next step, rounded up.
     next: u32,
-    /// Steps a unit: 2^40 over the high word of a step.
+    /// Steps a unit: 2^43 over the high word of a step.
     rate: u32,
 }
 
 impl Guess {
     /// A step came `by` ticks after the one before; `off` is what the position was past it.
     #[inline(always)]
-    fn learn(&mut self, by: u64, off: i64) {
+    fn learn(&mut self, by: u32, off: i64) {
         // The part of a tick is off / speed, and the speed is about a step an interval.
-        let part = (u64::from((off >> 32) as u32).wrapping_mul(self.interval.into()) >> 8) as u32;
+        let part = (u64::from((off >> 32) as u32).wrapping_mul(self.interval.into()) >> PART) as u32;
         let late = (u64::from(part).wrapping_mul(self.rate.into()) >> 32) as u32;
-        let interval = ((by as u32) << 8).wrapping_add(self.late).wrapping_sub(late);
+        let interval = (by << PART).wrapping_add(self.late).wrapping_sub(late);
         // The change changes about as it did before.
         let change = interval.wrapping_sub(self.interval);
         let next = change.wrapping_sub(self.change).wrapping_add(change).wrapping_add(interval);
-        self.next = next.wrapping_sub(late).wrapping_add(255);
+        self.next = next.wrapping_sub(late).wrapping_add(CEIL);
         (self.interval, self.change, self.late) = (interval, change, late);
     }
 
     /// From the speed alone.
     fn start(&mut self, cubic: &Cubic<i64>) {
         let high = (cubic.step >> 32) as u32;
-        self.rate = u32::MAX.checked_div(high >> 8).unwrap_or(0);
-        let ticks = cubic.interval().min(1 << 22);
-        let (interval, off) = ((ticks as u32) << 8, cubic.off.max(0));
-        (self.interval, self.late) = (interval, 0);
-        self.learn(ticks, off);
-        self.next = interval.wrapping_sub(self.late).wrapping_add(255);
+        self.rate = u32::MAX.checked_div(high >> PART).unwrap_or(0);
+        let ticks = cubic.interval().min(1 << 19);
+        let (interval, off) = ((ticks as u32) << PART, cubic.off.max(0));
+        (self.interval, self.change, self.late) = (interval, 0, 0);
+        self.learn(ticks as u32, off);
+        self.next = interval.wrapping_sub(self.late).wrapping_add(CEIL);
         (self.interval, self.change) = (interval, 0);
     }
 
@@ -95,8 +100,8 @@ impl Guess {
     }
 
     #[inline]
-    const fn ticks(&self) -> u64 {
-        (self.next >> 8) as u64
+    const fn ticks(&self) -> u32 {
+        self.next >> PART
     }
 }
 
@@ -131,15 +136,15 @@ impl Stepper {
                 return Some((*time >> 64) as u64);
             }
             Mode::Slope(cubic) => {
-                let there = cubic.straight(by);
-                there.is_straight_there().then(|| {
+                let there = cubic.straight(by.into());
+                there.is_surely_there().then(|| {
                     *cubic = there;
                     there.off
                 })
             }
             Mode::Bend(cubic) => {
-                let there = cubic.bent(by);
-                there.is_there().then(|| {
+                let there = cubic.bent(by.into());
+                there.is_surely_there().then(|| {
                     *cubic = there;
                     there.off
                 })
@@ -149,7 +154,7 @@ impl Stepper {
         match there {
             Some(off) => {
                 self.guess.learn(by, off);
-                self.t = self.t.wrapping_add(by);
+                self.t = self.t.wrapping_add(by.into());
             }
             None => self.correct(),
         }
@@ -161,13 +166,52 @@ impl Stepper {
         let mut sum = init;
         while let Some(tick) = self.next(curve, frame) {
             sum = take(sum, tick);
-            if let Mode::Cruise { interval, mut time } = self.mode {
-                for _ in 0..self.left {
-                    time = time.wrapping_add(interval);
-                    sum = take(sum, (time >> 64) as u64);
+            sum = match self.mode {
+                Mode::Cruise { interval, mut time } => {
+                    for _ in 0..self.left {
+                        time = time.wrapping_add(interval);
+                        sum = take(sum, (time >> 64) as u64);
+                    }
+                    self.left = 0;
+                    sum
                 }
-                self.left = 0;
+                Mode::Slope(cubic) => self.foreseen(cubic, Cubic::straight, sum, &mut take),
+                Mode::Bend(cubic) => self.foreseen(cubic, Cubic::bent, sum, &mut take),
+                Mode::Long(..) => sum,
+            };
+        }
+        sum
+    }
+
+    /// The steps of a piece up to its end, or to one that is foreseen wrongly.
+    #[inline(always)]
+    fn foreseen<B>(
+        &mut self,
+        mut cubic: Cubic<i64>,
+        after: impl Fn(&Cubic<i64>, u64) -> Cubic<i64>,
+        mut sum: B,
+        take: &mut impl FnMut(B, u64) -> B,
+    ) -> B {
+        let Self { t, left, guess, mode, .. } = self;
+        let (mut tick, mut more, mut own) = (*t, *left, *guess);
+        while more > 0 {
+            let mut by = own.ticks();
+            let mut there = after(&cubic, by.into());
+            if !there.is_surely_there() {
+                // Most often wrong by one tick.
+                by = if there.off < 0 { by.wrapping_add(1) } else { by.wrapping_sub(1) };
+                there = after(&cubic, by.into());
+                if !there.is_surely_there() {
+                    break;
+                }
             }
+            own.learn(by, there.off);
+            (cubic, more, tick) = (there, more.wrapping_sub(1), tick.wrapping_add(by.into()));
+            sum = take(sum, tick);
+        }
+        (*t, *left, *guess) = (tick, more, own);
+        if let Mode::Slope(place) | Mode::Bend(place) = mode {
+            *place = cubic;
         }
         sum
     }
@@ -180,9 +224,9 @@ impl Stepper {
         let by = match &mut self.mode {
             Mode::Cruise { .. } => 0,
             Mode::Slope(cubic) | Mode::Bend(cubic) => {
-                let (by, there) = cubic.solve(self.guess.ticks(), last);
+                let (by, there) = cubic.beside(self.guess.ticks().into(), last);
                 *cubic = there;
-                self.guess.learn(by, there.off.max(0));
+                self.guess.learn(by as u32, there.off.max(0));
                 self.guess.bound();
                 by
             }
@@ -214,21 +258,27 @@ impl Stepper {
     fn enter(&mut self, count: u32, curve: &Curve, frame: &Frame, piece: &Piece, end: Real) -> u64 {
         let scale = |x: Real, power: i32| (x * frame.scale).scaled((frame.shift as i32).wrapping_mul(power));
         let target = (i64::from(count) << 32).wrapping_add(1 << 31);
+        // Where the step is made from the begin of the curve on: behind it, if it was due when a request came.
         let want = Real::fixed(target.saturating_sub(frame.from).max(0).unsigned_abs(), 32);
+        let over = Real::fixed(frame.from.saturating_sub(target).max(0).unsigned_abs(), 32);
         if piece.a.is_zero() && piece.j.is_zero() {
-            let wait = (want - frame.made(curve, piece.p)) / (piece.v * frame.scale);
-            let (t, past) = frame.middle(frame.since(curve, piece.time) + wait);
+            let made = frame.made(curve, piece.p);
+            let late = made + over > want;
+            let way = if late { (want + Real::ONE) - (made + over) } else { want - made };
+            let begin = frame.since(curve, piece.time);
+            let (t, past) = frame.middle(begin + way / (piece.v * frame.scale));
             let interval = Real::ONE / scale(piece.v, 1);
             let wide = |whole: u64, part: Real| u128::from(whole) << 64 | u128::from(part.to_fixed(64));
             let interval = wide(interval.to_fixed(0), interval.fraction());
             let time = wide(t, past.scaled((frame.shift as i32).wrapping_neg()));
-            self.mode = Mode::Cruise { interval, time };
-            return t;
+            // The time of a late step is an interval before that of the next one.
+            self.mode = Mode::Cruise { interval, time: if late { time.wrapping_sub(interval) } else { time } };
+            return if late { frame.middle(begin).0 } else { t };
         }
         let (tick, wait) = frame.sample(curve, piece.time);
         let (until, _) = frame.sample(curve, end);
         let ahead = |p: Real| {
-            let made = frame.made(curve, p);
+            let made = frame.made(curve, p) + over;
             (want - made, made - want)
         };
         let straight = piece.bend == Bend::Flat;
