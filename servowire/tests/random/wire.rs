@@ -9,6 +9,8 @@ use super::{dsl, speech};
 pub struct Scene {
     /// Samples a bit; none for exact times.
     pub samples: Option<(f64, f64)>,
+    /// The nominal rate in bits a second; none for any of the protocol's.
+    pub nominal: Option<f64>,
     /// Both rates, and that of the encoder alone, off by up to so many parts.
     pub rate: f64,
     pub encoder: f64,
@@ -38,6 +40,7 @@ impl Scene {
     pub fn clean() -> Self {
         Self {
             samples: None,
+            nominal: None,
             rate: 0.0,
             encoder: 0.0,
             inverted: false,
@@ -98,7 +101,7 @@ pub fn capture(kind: Kind, scene: &Scene, seed: u64) -> Capture {
     let mut end = 0.0_f64;
     for k in 0..scene.encoders {
         let kind = if k == 0 { kind } else { rng.pick(&Kind::ALL) };
-        let nominal = 1e12 / rng.pick(kind.rates());
+        let nominal = 1e12 / scene.nominal.unwrap_or_else(|| rng.pick(kind.rates()));
         let off = |rng: &mut Rng, part: f64| 1.0 + rng.between(-part, part);
         let controller = nominal * off(&mut rng, scene.rate);
         let encoder = if scene.encoder > 0.0 { nominal * off(&mut rng, scene.encoder) } else { controller };
