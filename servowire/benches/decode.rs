@@ -1,4 +1,4 @@
-//! Speed of the decode path: `cargo bench -p servowire`.
+//! Speed of the decode path: `cargo bench -p servowire --bench decode [WORD]`.
 //!
 //! Traffic at 8 samples a bit goes from memory through the reader, the survey, the receiver and the protocol, as
 //! `servowire decode` does it without options. The plain way beside it asks for every sample on its own.
@@ -14,13 +14,13 @@
     clippy::unwrap_used
 )]
 
+mod clock;
 #[path = "../tests/random/mod.rs"]
 mod random;
 
 use std::hint::black_box;
 use std::io::{self, Cursor};
 use std::rc::Rc;
-use std::time::Instant;
 
 use nrz_line::{Format, Receiver};
 use random::speech::Kind;
@@ -40,23 +40,16 @@ const RATE: u64 = 20_000_000;
 const BIT: i64 = 400_000;
 /// ID 3 transactions, about 10^8 samples.
 const TRANSACTIONS: u32 = 80_000;
-/// Runs; the best counts.
-const RUNS: usize = 5;
 
 fn main() {
-    let samples = traffic();
-    let packed = pack(&samples);
-    let bytes: Rc<[u8]> = samples.iter().map(|&s| u8::from(s)).collect();
-    let frames = 2 * u64::from(TRANSACTIONS);
-    let plain = best(frames, || one_by_one(&samples));
-    println!("T-Format: {:.0} million samples at {N} a bit", samples.len() as f64 / 1e6);
-    let show = |name: &str, samples: usize, seconds: f64| {
-        println!("  {name:<40} {:>8.1} million samples/s", samples as f64 / seconds / 1e6);
-    };
-    show("sample by sample", samples.len(), plain);
-    show("decode, one sample a byte", samples.len(), best(frames, || decode(&bytes, RATE, Unit::Bytes(1))));
-    show("decode, packed 8 samples a byte", samples.len(), best(frames, || decode(&packed, RATE, Unit::Bit)));
+    let wanted = std::env::args().skip(1).find(|word| !word.starts_with('-')).unwrap_or_default();
+    if Kind::Tformat.name().contains(&wanted) {
+        tformat_lines();
+    }
     for (kind, bit_rate, count) in [(Kind::Aformat, 4_000_000, 40_000), (Kind::Dsl, 9_375_000, 100_000)] {
+        if !kind.name().contains(&wanted) {
+            continue;
+        }
         let (samples, frames) = drawn(kind, bit_rate, N as u64, count);
         println!("{}: {:.0} million samples at {N} a bit", kind.name(), samples.len() as f64 / 1e6);
         let packed = pack(&samples);
@@ -65,16 +58,27 @@ fn main() {
     }
 }
 
-/// Best of some runs, in seconds; all `frames` hold.
-fn best(frames: u64, mut run: impl FnMut() -> Tally) -> f64 {
-    let mut best = f64::INFINITY;
-    for _ in 0..RUNS {
-        let start = Instant::now();
-        let tally = black_box(run());
-        best = best.min(start.elapsed().as_secs_f64());
-        assert_eq!((tally.ok, tally.refused), (frames, 0));
-    }
-    best
+fn show(name: &str, samples: usize, seconds: f64) {
+    println!("  {name:<40} {:>8.1} million samples/s", samples as f64 / seconds / 1e6);
+}
+
+fn tformat_lines() {
+    let samples = traffic();
+    let packed = pack(&samples);
+    let bytes: Rc<[u8]> = samples.iter().map(|&s| u8::from(s)).collect();
+    let frames = 2 * u64::from(TRANSACTIONS);
+    let plain = best(frames, || one_by_one(&samples));
+    println!("T-Format: {:.0} million samples at {N} a bit", samples.len() as f64 / 1e6);
+    show("sample by sample", samples.len(), plain);
+    show("decode, one sample a byte", samples.len(), best(frames, || decode(&bytes, RATE, Unit::Bytes(1))));
+    show("decode, packed 8 samples a byte", samples.len(), best(frames, || decode(&packed, RATE, Unit::Bit)));
+}
+
+/// Least time of some runs, in seconds; all `frames` hold.
+fn best(frames: u64, run: impl FnMut() -> Tally) -> f64 {
+    let (seconds, tally) = clock::best(run);
+    assert_eq!((tally.ok, tally.refused), (frames, 0));
+    seconds
 }
 
 /// Eight samples a byte, the oldest in bit 0.

@@ -1,7 +1,8 @@
 //! Speed of every reader, and of the writer of VCD: `cargo bench -p servowire --bench readers [WORD]`.
 //!
 //! The same T-Format traffic is written in each format and read from memory into level changes (or bytes, or packets),
-//! without a decoder behind. Megabytes are those of the file as it is on disk.
+//! without a decoder behind. Megabytes are those of the file as it is on disk. Sessions of sigrok are unpacked on a
+//! thread of their own, whose time does not count.
 #![allow(
     clippy::arithmetic_side_effects,
     clippy::cast_possible_truncation,
@@ -14,6 +15,7 @@
     clippy::unwrap_used
 )]
 
+mod clock;
 #[path = "../tests/random/mod.rs"]
 mod random;
 
@@ -21,8 +23,9 @@ use std::fmt::Write as _;
 use std::hint::black_box;
 use std::io::{Cursor, Write};
 use std::path::Path;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
+use clock::best;
 use flate2::Compression;
 use flate2::write::GzEncoder;
 use pcap_file::DataLink;
@@ -41,8 +44,6 @@ const MANY: u64 = 50_000;
 const SOME: u64 = 5_000;
 /// Samples a second.
 const RATE: f64 = 20e6;
-/// Runs; the best counts.
-const RUNS: usize = 5;
 
 /// Times in picoseconds at which the line takes a level.
 type Edges = Vec<(i64, bool)>;
@@ -74,17 +75,6 @@ fn main() {
 
 fn count(what: &str) -> f64 {
     what.split(' ').next().unwrap().parse().unwrap()
-}
-
-/// The time of the best of some runs, and what came out.
-fn best(mut run: impl FnMut() -> String) -> (f64, String) {
-    let mut best = (Duration::MAX, String::new());
-    for _ in 0..RUNS {
-        let start = Instant::now();
-        let what = black_box(run());
-        best = best.min((start.elapsed(), what));
-    }
-    (best.0.as_secs_f64(), best.1)
 }
 
 fn traffic(transactions: u64) -> Edges {

@@ -73,7 +73,7 @@ impl LineDecoder for DslLine {
     }
 
     fn rates(&self) -> Rates {
-        self.bits.rates
+        self.bits.rates()
     }
 }
 
@@ -101,11 +101,18 @@ fn head(bits: &Bits, at: u64) -> Option<(Received, u64)> {
 const HEAD: u128 = 0b1111_0100;
 /// Good words and checks from which an answer is where it was looked for.
 const GOOD: usize = 10;
+/// All of them.
+const PERFECT: usize = 12;
 /// Answers from which the delay is learned, and bits in which they are.
 const LEARNED: usize = 8;
 const LESSON: u64 = 1300;
 const DISPARITY: &str = "all words are in the tables, but not one behind the other: bits of at least one were flipped";
 const PAUSED: &str = "the line rests here, though frames follow each other for ever";
+
+/// Whether a frame is answered by the test pattern or the identifier.
+fn is_start_up(symbol: MasterSymbol) -> bool {
+    matches!(symbol, MasterSymbol::Start | MasterSymbol::Learn | MasterSymbol::Check | MasterSymbol::IdReq)
+}
 
 /// What there is where the head of a frame was due, within three bits.
 fn damage(line: u128) -> (&'static str, String) {
@@ -232,10 +239,16 @@ impl Decoder {
         // The delay of a cable does not change, but it need not be whole bits; between equals the time decides.
         let since = |delay: u32| bits.time(from + u64::from(delay)) - bits.time(from);
         let off = |delay: u32| self.lag.map_or(0, |lag| (since(delay) - lag).abs());
-        let near = [usual, usual + 1, usual.saturating_sub(1)].map(|delay| (delay, score(line(delay))));
         let better = |a: &(u32, usize), b: &(u32, usize)| a.1 > b.1 || a.1 == b.1 && off(a.0) < off(b.0);
-        let (delay, score) =
-            near.into_iter().reduce(|best, next| if better(&next, &best) { next } else { best }).unwrap_or((usual, 0));
+        let mut best = (usual, score(line(usual)));
+        let running = self.lag.is_some_and(|_| off(usual) < bits.half()) && !symbol.is_ok_and(is_start_up);
+        if !running || best.1 < PERFECT {
+            for delay in [usual + 1, usual.saturating_sub(1)] {
+                let next = (delay, score(line(delay)));
+                best = if better(&next, &best) { next } else { best };
+            }
+        }
+        let (delay, score) = best;
         if score >= GOOD {
             let now = since(delay);
             self.lag = Some(self.lag.map_or(now, |lag| lag + (now - lag) / 8));
@@ -298,7 +311,8 @@ impl Decoder {
         self.tracker.step(dd.ok());
         let parameter = answer.parameter();
         let byte = |name, word: hdsl::symbol::Reading| word.byte().ok().map(|byte| Field::hex(name, byte, 2));
-        let mut fields = vec![Field::measured("delay", self.delay.unwrap_or(0), "bit")];
+        let mut fields = Vec::with_capacity(10);
+        fields.push(Field::measured("delay", self.delay.unwrap_or(0), "bit"));
         fields.extend(byte("VERT", answer.vertical()));
         if let Ok(parameter) = parameter {
             fields.push(encoder_symbol(parameter));
@@ -445,7 +459,7 @@ fn disparity_holds(line: Window) -> bool {
 }
 
 fn master(head: Received, symbol: Result<MasterSymbol, Error>, place: Place) -> Event {
-    let mut fields = Vec::new();
+    let mut fields = Vec::with_capacity(4);
     fields.extend(symbol.ok().map(|symbol| Field::text("SYMBOL", symbol)));
     fields.push(Field::number("FIRST", head.byte.first()));
     fields.push(Field::number("MSYNC", head.byte.msync()));

@@ -109,8 +109,9 @@ pub fn capture(kind: Kind, scene: &Scene, seed: u64) -> Capture {
         end = end.max(over);
         let begin = if scene.inside { inside(&said, &mut rng) } else { 0.0 };
         let whole = said.iter().filter(|speech| speech.start >= begin);
-        // An answer of DSL cannot be told without its head.
-        let behind = whole.skip_while(|speech| kind == Kind::Dsl && speech.side == Side::Encoder);
+        // An answer of DSL cannot be told without its head, nor that nobody answers without the request.
+        let behind =
+            whole.skip_while(|speech| speech.side == Side::Encoder && (kind == Kind::Dsl || speech.edges.is_empty()));
         let events: Vec<Expect> = behind.filter_map(|speech| speech.expect.clone()).collect();
         let line = |side: &dyn Fn(Side) -> bool| -> Vec<(f64, bool)> {
             let edges = said.iter().filter(|speech| side(speech.side)).flat_map(|speech| speech.edges.iter().copied());
@@ -169,7 +170,9 @@ fn conversation(
     let mut place = |speech: Speech, now: &mut f64| {
         *now += speech.pause * nominal;
         let bit = if speech.side == Side::Controller { controller } else { encoder };
-        let start = *now;
+        // The head of a frame of DSL is whole without the TRAILER before it.
+        let trailer = if kind == Kind::Dsl && speech.bits.len() == 32 { 6.0 } else { 0.0 };
+        let start = *now + trailer * bit;
         let mut edges = Vec::new();
         let mut level = true;
         for next in &speech.bits {
