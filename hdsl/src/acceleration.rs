@@ -105,7 +105,7 @@ impl From<DeltaDelta> for i16 {
     }
 }
 
-crate::ranged::format_as_displayed!(DeltaDelta);
+servowire_core::format_as_displayed!(DeltaDelta);
 
 #[cfg(feature = "arbitrary")]
 impl<'a> arbitrary::Arbitrary<'a> for DeltaDelta {

@@ -2,7 +2,8 @@
 
 use nrz_line::Window;
 
-use crate::frame::{ANSWER_BITS, SAMPLES_PER_BIT};
+use crate::device::Heard;
+use crate::frame::{ANSWER_BITS, Head, SAMPLES_PER_BIT};
 use crate::sampling::WINDOW;
 
 /// What the line does to what passes. All zero is a perfect line of no length.
@@ -13,21 +14,25 @@ use crate::sampling::WINDOW;
 pub struct Disturbance {
     /// From the start of reception to the first bit of an answer, in eighths of a bit (13.333 ns): there and back.
     pub delay: u32,
-    /// Every edge of an answer is moved by up to this many samples either way.
+    /// How much of that is on the way to the encoder.
+    pub down_delay: u32,
+    /// Every edge is moved by up to this many samples either way.
     pub jitter: u8,
-    /// Samples of an answer that are inverted, of a million.
+    /// Samples that are inverted, of a million.
     pub glitches: u32,
     /// Bits that are inverted, of a million, in each direction.
     pub bit_errors: u32,
-    /// How much the encoder's bits are longer than the master's, in parts of a million.
+    /// How much the bits of an answer are longer than the master's, in parts of a million. (Heads are too short to show it.)
     pub clock_ppm: i32,
 }
 
 impl Disturbance {
     /// A clean line of `metres`: 5 ns a metre each way, and most of a bit for encoder and transceivers.
     pub const fn metres(metres: u32) -> Self {
+        // 3/40 eighths of a bit a ns.
         let delay = metres.saturating_mul(10).saturating_mul(3) / 40;
-        Self { delay: delay.saturating_add(7), jitter: 0, glitches: 0, bit_errors: 0, clock_ppm: 0 }
+        let down_delay = metres.saturating_mul(5).saturating_mul(3) / 40;
+        Self { delay: delay.saturating_add(7), down_delay, jitter: 0, glitches: 0, bit_errors: 0, clock_ppm: 0 }
     }
 }
 
@@ -55,14 +60,47 @@ impl Cable {
         Window::from_bits(bits, head.len()).unwrap_or(head)
     }
 
+    /// The head of an H-frame as it reaches the encoder, at eight samples a bit: a byte each, its first sample in bit 7. The time of
+    /// the first sample is that at which SYNC leaves the master.
+    pub fn down_samples(&mut self, head: Head) -> [u8; DOWN_WINDOW] {
+        let mut words = [0; DOWN_WINDOW / 8];
+        let mut high = true;
+        for (at, byte) in (0_u32..).step_by(8).zip(head.samples()) {
+            let byte = if self.noise.hits(self.disturbance.bit_errors) { !byte } else { byte };
+            for sample in 0..8 {
+                if (byte << sample & 0x80 != 0) != high {
+                    high = !high;
+                    self.edge(&mut words, i64::from(at.saturating_add(sample)), self.disturbance.down_delay);
+                }
+            }
+        }
+        self.sampled(words)
+    }
+
     /// What the master samples of an answer: a byte a bit time, the first sample in bit 7. Without an answer the line
     /// stays high.
     pub fn up(&mut self, answer: Option<u64>) -> [u8; WINDOW] {
-        let mut words = [0; WORDS];
+        self.up_from(answer, self.disturbance.delay)
+    }
+
+    /// The same of an encoder that keeps time by what it has heard: its answer begins one bit after PARA by its own clock.
+    pub fn up_heard(&mut self, answer: Option<u64>, heard: &Heard) -> [u8; WINDOW] {
+        let there = u32::from(heard.start).saturating_sub(self.disturbance.down_delay);
+        let early = self.disturbance.down_delay.saturating_sub(heard.start.into());
+        self.up_from(answer, self.disturbance.delay.saturating_add(there).saturating_sub(early))
+    }
+
+    fn up_from(&mut self, answer: Option<u64>, delay: u32) -> [u8; WINDOW] {
+        let mut words = [0; WINDOW / 8];
         if let Some(bits) = answer {
             let bits = self.spoilt(bits);
-            self.edges(bits, &mut words);
+            self.edges(bits, delay, &mut words);
         }
+        self.sampled(words)
+    }
+
+    /// From edges to samples, with glitches.
+    fn sampled<const WORDS: usize, const BYTES: usize>(&mut self, mut words: [u64; WORDS]) -> [u8; BYTES] {
         fill(&mut words);
         if self.disturbance.glitches > 0 {
             for word in &mut words {
@@ -71,7 +109,7 @@ impl Cable {
                 }
             }
         }
-        let mut samples = [0; WINDOW];
+        let mut samples = [0; BYTES];
         for (to, from) in samples.chunks_exact_mut(8).zip(words) {
             to.copy_from_slice(&from.to_be_bytes());
         }
@@ -88,7 +126,7 @@ impl Cable {
     }
 
     /// Marks the samples at which the level changes, the first sample in bit 63 of the first word.
-    fn edges(&mut self, bits: u64, words: &mut [u64; WORDS]) {
+    fn edges(&mut self, bits: u64, delay: u32, words: &mut [u64]) {
         // Ones before and after the answer.
         let line = u128::from(bits) << 1 | 1 | u128::MAX << ANSWER_BITS.wrapping_add(1);
         let mut changes = (line ^ line >> 1) & (1_u128 << ANSWER_BITS.wrapping_add(1)).wrapping_sub(1);
@@ -97,11 +135,16 @@ impl Cable {
             let bit = changes.trailing_zeros();
             changes &= changes.wrapping_sub(1);
             let nominal = i64::from(bit.saturating_mul(SAMPLES_PER_BIT)).saturating_mul(scale) / 1_000_000;
-            let place = nominal.saturating_add(i64::from(self.disturbance.delay)).saturating_add(self.jitter());
-            let place = usize::try_from(place).unwrap_or(0);
-            if let Some(word) = words.get_mut(place / 64) {
-                *word ^= 1 << (63 & !place);
-            }
+            self.edge(words, nominal, delay);
+        }
+    }
+
+    /// One edge after a delay, with jitter.
+    fn edge(&mut self, words: &mut [u64], nominal: i64, delay: u32) {
+        let place = nominal.saturating_add(i64::from(delay)).saturating_add(self.jitter());
+        let place = usize::try_from(place).unwrap_or(0);
+        if let Some(word) = words.get_mut(place / 64) {
+            *word ^= 1 << (63 & !place);
         }
     }
 
@@ -116,12 +159,14 @@ impl Cable {
     }
 }
 
-/// 64-bit words of the samples of an answer.
-const WORDS: usize = WINDOW / 8;
-const _: () = assert!(WORDS * 8 == WINDOW);
+/// Bytes of samples in which the encoder hears a head: 35 bits with the longest EXTRA window, and room for a delay of 13.
+pub const DOWN_WINDOW: usize = 48;
+
+// In words of 64 samples.
+const _: () = assert!(WINDOW % 8 == 0 && DOWN_WINDOW % 8 == 0);
 
 /// From edges to levels: every sample is the level before it, inverted at each edge. The line is high at first.
-fn fill(words: &mut [u64; WORDS]) {
+fn fill(words: &mut [u64]) {
     let mut high = true;
     for word in words {
         let mut level = *word;
@@ -193,6 +238,7 @@ mod tests {
         let mut simulated = Cable::new(Disturbance { bit_errors: 10_000, ..Disturbance::default() }, 7);
         let wrong: u32 = (0..2000).map(|_| (simulated.spoilt(0)).count_ones()).sum();
         assert!((1000..1450).contains(&wrong), "{wrong}");
-        assert_eq!(Disturbance::metres(100).delay, 82);
+        // 5 ns a metre each way are 37.5 samples for 100 m.
+        assert_eq!((Disturbance::metres(100).delay, Disturbance::metres(100).down_delay), (82, 37));
     }
 }

@@ -1,7 +1,5 @@
 //! What can be said about safe channel 2 without knowing the encoder's scaling.
 
-use core::fmt;
-
 use crate::error::Error;
 use crate::registers::Status2;
 use crate::vframe::VFrame;
@@ -30,13 +28,7 @@ bitflags::bitflags! {
     }
 }
 
-impl fmt::Display for Channel2Findings {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        servowire_core::write_names(f, self.iter_names().map(|(name, _)| name))
-    }
-}
-
-crate::ranged::format_as_displayed!(Channel2Findings);
+servowire_core::show_flags!(Channel2Findings);
 
 /// Watches safe channel 2, V-frame by V-frame.
 ///

@@ -4,23 +4,50 @@
 //! answer, which begins one bit time after PARA. It is an absolute encoder: its safe position is the true one, whatever
 //! the acceleration channel could say about it.
 //!
-//! It shares no rule of the line with the receiver: code, test pattern, checks and limits are written down here once more.
-//! What the documents leave to the encoder is a switch in [`Behaviour`], what it can do wrong one in [`Faults`].
+//! On a sampled line [`Heard::on_line`] finds the bits and, to an eighth of a bit, the edge;
+//! [`Device::sampling_instant`] is when the position is to be taken.
+//!
+//! It shares no rule of the line with the receiver: code, test pattern, symbols, messages, checks and limits are written down
+//! here once more. What the documents leave to the encoder is a switch in [`Behaviour`], what it can do wrong one in
+//! [`Faults`].
+//!
+//! ```
+//! use hdsl::EncoderId;
+//! use hdsl::cable::{Cable, Disturbance};
+//! use hdsl::device::{Device, Heard};
+//! use hdsl::master::Master;
+//! use hdsl::Dialect;
+//!
+//! let mut cable = Cable::new(Disturbance { jitter: 1, ..Disturbance::metres(40) }, 1);
+//! let mut master = Master::new(Dialect::SICK);
+//! let mut encoder = Device::new(EncoderId::try_from(0x00153)?);
+//! for frame in 0..150_u64 {
+//!     let line = cable.down_samples(master.transmission().head);
+//!     let heard = Heard::on_line(&line).ok_or("no head")?;
+//!     // 864 eighths of a bit a frame; the shaft turns by two steps in each.
+//!     let instant = 864 * frame + u64::from(encoder.sampling_instant(&heard));
+//!     let answer = encoder.answer(heard.bits, 2 * instant);
+//!     master.finish(&cable.up_heard(answer, &heard), None)?;
+//! }
+//! assert!((master.fast()?.velocity - 2 * 864).abs() <= 2 * 2);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 
 mod behaviour;
+mod channel;
 mod code;
+mod hearing;
 mod resources;
 
 use nrz_line::Window;
 
 pub use behaviour::{Behaviour, Complement, Disparity, Faults, Overload};
+pub use hearing::Heard;
 pub use resources::{Resource, Resources};
 
-use crate::encoder_id::{EncoderId, PositionBits};
-use crate::error::Error;
-use crate::message::{LongAnswer, Request, Responder};
-use crate::parameter::MasterSymbol;
+use crate::encoder_id::EncoderId;
 use crate::symbol::RunningDisparity;
+use channel::Channel;
 use code::Symbol;
 
 /// The test pattern, first line bit in bit 0: 0100110011001000000100010101110111111011001100110100010011001.
@@ -30,8 +57,8 @@ const PATTERN: u64 = 0x1322_ccdf_ba88_1332;
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Device {
-    id: EncoderId,
-    bits: PositionBits,
+    /// ENC_ID, 20 bits.
+    id: u32,
     /// What the documents leave to it.
     pub behaviour: Behaviour,
     /// What it does wrong.
@@ -40,8 +67,7 @@ pub struct Device {
     pub resources: Resources,
     /// Byte for the pipe channel; `None` sends K30.7.
     pub pipe: Option<u8>,
-    responder: Responder,
-    waiting: Option<(Request, u16)>,
+    channel: Channel,
     /// Requests so far, for what it forgets.
     requests: u16,
     disparity: RunningDisparity,
@@ -59,22 +85,15 @@ pub struct Device {
 }
 
 impl Device {
-    /// An encoder with this identifier, at position 0. If the identifier asks for more than a receiver of this crate can do,
-    /// the position has 40 bits.
+    /// An encoder with this identifier, at position 0. If the identifier asks for a position of more than 40 bits, it has 40.
     pub const fn new(id: EncoderId) -> Self {
-        let bits = match id.check() {
-            Ok(bits) => bits,
-            Err(_) => PositionBits::MAX,
-        };
         Self {
-            id,
-            bits,
+            id: id.get(),
             behaviour: Behaviour::PLAIN,
             faults: Faults::NONE,
             resources: Resources::new(),
             pipe: None,
-            responder: Responder::new(),
-            waiting: None,
+            channel: Channel::new(),
             requests: 0,
             disparity: RunningDisparity::Minus,
             synchronised: 0,
@@ -93,7 +112,8 @@ impl Device {
     /// Before it has seen RESET and enough SYNC frames it answers nothing. A head that cannot be read is not answered; a
     /// symbol of the master that has no meaning is passed over.
     pub fn answer(&mut self, head: Window, position: u64) -> Option<u64> {
-        let before = core::mem::replace(&mut self.position, position & self.bits.mask());
+        let before = self.position;
+        self.position = position & self.mask();
         let acceleration = self.measure();
         let Some(byte) = code::parameter(head) else {
             if !self.behaviour.stalls_on_bad_head {
@@ -101,15 +121,17 @@ impl Device {
             }
             return None;
         };
-        let symbol = MasterSymbol::from_bits(byte & 0x1f);
+        let symbol = byte & 0x1f;
         // FIRST is 0.
         let start_up = byte & 0x80 == 0;
         match symbol {
-            Ok(MasterSymbol::Reset) if start_up => {
+            // RESET
+            0x1f if start_up => {
                 self.reset();
                 return None;
             }
-            Ok(MasterSymbol::Sync) if start_up => {
+            // SYNC
+            0x19 if start_up => {
                 let frames = self.synchronised.saturating_add(1);
                 self.reset();
                 self.synchronised = frames;
@@ -119,9 +141,11 @@ impl Device {
             _ => {}
         }
         let answer = match symbol {
-            Ok(MasterSymbol::Start | MasterSymbol::Learn | MasterSymbol::Check) if start_up => PATTERN,
-            Ok(MasterSymbol::IdReq) if start_up => {
-                let [low, middle, high, _] = self.id.get().to_le_bytes().map(Symbol::data);
+            // START, LEARN, CHECK
+            0x1a..=0x1c if start_up => PATTERN,
+            // IDREQ
+            0x1d if start_up => {
+                let [low, middle, high, _] = self.id.to_le_bytes().map(Symbol::data);
                 let both = Symbol::data(high.byte << 4 | high.byte);
                 self.emit([low, middle, both, middle, low, Symbol::data(0)])
             }
@@ -130,10 +154,15 @@ impl Device {
         (!self.faults.silent).then_some(answer)
     }
 
+    /// When the position for [`answer`](Self::answer) is to be taken, in eighths of a bit (13.333 ns) on the time base of the samples
+    /// in which the head was heard: at the sampling edge, and later by [`Behaviour::sampling_lag`].
+    pub const fn sampling_instant(&self, heard: &Heard) -> u32 {
+        (heard.edge as u32).saturating_add(self.behaviour.sampling_lag as u32)
+    }
+
     /// Messages, V-frame, clock and running disparity as after power-up. The motion goes on.
     const fn reset(&mut self) {
-        self.responder = Responder::new();
-        self.waiting = None;
+        self.channel = Channel::new();
         self.disparity = RunningDisparity::Minus;
         self.synchronised = 0;
         self.at = None;
@@ -171,13 +200,24 @@ impl Device {
             return None;
         }
         self.velocity = self.velocity.wrapping_add(value);
-        self.told = self.told.wrapping_add_signed(self.velocity) & self.bits.mask();
+        self.told = self.told.wrapping_add_signed(self.velocity) & self.mask();
         i16::try_from(value).ok()
     }
 
+    /// Bits of the position: those of the acceleration, 8 more than bits 3:0 of the identifier say, and so many more as bits 9:4
+    /// say; 40 at most.
+    const fn bits(&self) -> u32 {
+        let bits = (self.id & 15).wrapping_add(8).wrapping_add(self.id >> 4 & 0x3f);
+        if bits > 40 { 40 } else { bits }
+    }
+
+    const fn mask(&self) -> u64 {
+        !(u64::MAX << self.bits())
+    }
+
     /// A difference of positions, with its sign.
-    fn signed(&self, difference: u64) -> i64 {
-        let unused = 64_u32.saturating_sub(u32::from(self.bits.get()));
+    const fn signed(&self, difference: u64) -> i64 {
+        let unused = 64_u32.saturating_sub(self.bits());
         i64::from_le_bytes((difference << unused).to_le_bytes()) >> unused
     }
 
@@ -188,11 +228,11 @@ impl Device {
                 self.latch(before);
             }
             self.at = Some(at.wrapping_add(1) & 7);
-            self.responder.receive_nothing();
+            self.channel.miss();
         }
     }
 
-    fn normal(&mut self, symbol: Result<MasterSymbol, Error>, before: u64, acceleration: Option<i16>) -> u64 {
+    fn normal(&mut self, symbol: u8, before: u64, acceleration: Option<i16>) -> u64 {
         let at = self.at.unwrap_or(self.behaviour.first_place & 7);
         if at == 0 || self.at.is_none() {
             self.latch(before);
@@ -202,7 +242,7 @@ impl Device {
         self.serve();
         let [vertical, secondary] = self.blocks.map(|b| b.get(usize::from(at)).copied().unwrap_or(Symbol::data(0)));
         let vsync = if at == 7 && !self.faults.no_vsync { 0x80 } else { 0 };
-        let parameter = self.responder.transmit().bits() | vsync | (self.behaviour.reserved_bits & 3) << 5;
+        let parameter = self.channel.speak() | vsync | (self.behaviour.reserved_bits & 3) << 5;
         // K30.7: no data.
         let pipe = self.pipe.map_or(Symbol::special(0xfe), Symbol::data);
         let [high, low] = match acceleration.filter(|_| !self.faults.no_acceleration) {
@@ -214,33 +254,20 @@ impl Device {
     }
 
     /// The master's symbol; a request that is complete waits for its answer, unless it is forgotten.
-    fn take(&mut self, symbol: Result<MasterSymbol, Error>) {
-        let Ok(symbol) = symbol else {
-            self.responder.receive_nothing();
-            return;
-        };
-        let request = self.responder.receive(symbol);
-        if symbol == MasterSymbol::Init {
-            self.waiting = None;
-        }
-        let Some(request) = request else { return };
+    fn take(&mut self, symbol: u8) {
+        let Some(request) = self.channel.hear(symbol) else { return };
         self.requests = self.requests.wrapping_add(1);
         let forgotten = self.requests.checked_rem(self.behaviour.forgets_every) == Some(0);
         if !self.faults.mute && !forgotten {
-            self.waiting = Some((request, self.behaviour.latency));
+            self.channel.wait(request, self.behaviour.latency);
         }
     }
 
-    /// Answers the request that has waited long enough.
+    /// Answers the requests that have waited long enough.
     fn serve(&mut self) {
-        match self.waiting.take() {
-            Some((request, left @ 1..)) => self.waiting = Some((request, left.saturating_sub(1))),
-            Some((Request::Short(request), 0)) => self.responder.answer_short(self.resources.short(request)),
-            Some((Request::Long(request), 0)) => {
-                let result = self.resources.long(&request);
-                self.responder.answer_long(&LongAnswer::to(&request, result));
-            }
-            None => {}
+        for request in self.channel.due().into_iter().flatten() {
+            let answer = self.resources.answer(&request, self.behaviour.acknowledges_with_length);
+            self.channel.answer(answer);
         }
     }
 
@@ -250,7 +277,9 @@ impl Device {
         let error = if self.faults.error_2 { 0x20 } else { 0 };
         let status = if self.toggle { 0x80 } else { 0 } | test | error | 0x1c;
         self.toggle = self.toggle == self.faults.stuck_toggle;
-        let sign = if self.id.is_signed() { self.signed(position) } else { i64::from_le_bytes(position.to_le_bytes()) };
+        // Bit 10: positions have a sign.
+        let sign =
+            if self.id >> 10 & 1 == 1 { self.signed(position) } else { i64::from_le_bytes(position.to_le_bytes()) };
         let mut first = block(Symbol::data(self.resources.summary()), sign, self.faults.bad_crc);
         if self.faults.no_position {
             first = marked(first, [Symbol::special(0xfd); 5], self.faults.bad_crc);

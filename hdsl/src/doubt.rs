@@ -38,4 +38,4 @@ impl fmt::Display for Doubt {
 
 impl core::error::Error for Doubt {}
 
-crate::ranged::format_as_displayed!(Doubt);
+servowire_core::format_as_displayed!(Doubt);

@@ -106,6 +106,15 @@ impl EncoderId {
     }
 
     /// The answer to IDREQ. The secondary word is not used; the caller may fill it.
+    ///
+    /// ```
+    /// use hdsl::symbol::{Character, RunningDisparity};
+    /// use hdsl::{Answer, EncoderId, Rule};
+    /// let id = EncoderId::try_from(0x00153)?;
+    /// let (bits, _) = id.to_answer(Character::data(0), RunningDisparity::Minus);
+    /// assert_eq!(EncoderId::from_answer(Answer::from_bits(Rule::Strict, bits)), Ok(id));
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     pub fn to_answer(self, secondary: Character, rd: RunningDisparity) -> (u64, RunningDisparity) {
         let [low, middle, high, _] = self.get().to_le_bytes().map(Character::data);
         let pipe = Character::data(high.byte() << 4 | high.byte());

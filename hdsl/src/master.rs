@@ -39,10 +39,10 @@
 mod control;
 mod link;
 mod report;
+mod state;
 
 pub use report::{Counters, Fast, Report, Safe, Signal};
-
-use core::fmt;
+pub use state::{Cause, State};
 
 use crate::answer::Answer;
 use crate::dialect::Dialect;
@@ -57,104 +57,6 @@ use crate::rssi::EdgeWatch;
 use crate::sampling::{Alignment, TEST_PATTERN, WINDOW};
 use crate::sync::Synchroniser;
 use link::Link;
-
-/// Where the receiver is.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub enum State {
-    /// Two frames without an answer.
-    Reset,
-    /// Sixteen frames without an answer: the encoder synchronises.
-    Sync,
-    /// Nine frames: sampling index and delay are searched in the test pattern.
-    Start,
-    /// Nine frames: the test pattern has to come at the learned place.
-    Learn,
-    /// Sixteen frames more of the same: line check.
-    Check,
-    /// One frame: the encoder identifier.
-    IdReq,
-    /// Frames with INIT until VSYNC comes.
-    WaitVsync,
-    /// RX0..RX7, V-frame after V-frame.
-    Running,
-}
-
-impl State {
-    /// How many frames the state lasts; `None` if that depends on the encoder.
-    pub const fn frames(self) -> Option<u8> {
-        match self {
-            Self::Reset => Some(2),
-            Self::Sync | Self::Check => Some(16),
-            Self::Start | Self::Learn => Some(9),
-            Self::IdReq => Some(1),
-            Self::WaitVsync | Self::Running => None,
-        }
-    }
-
-    const fn next(self) -> Self {
-        match self {
-            Self::Reset => Self::Sync,
-            Self::Sync => Self::Start,
-            Self::Start => Self::Learn,
-            Self::Learn => Self::Check,
-            Self::Check => Self::IdReq,
-            Self::IdReq => Self::WaitVsync,
-            Self::WaitVsync | Self::Running => Self::Running,
-        }
-    }
-}
-
-/// Why the link was started anew.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-#[non_exhaustive]
-pub enum Cause {
-    /// The application asked for it (PRST).
-    Requested,
-    /// A START frame: no encoder, or the test pattern is not there.
-    Learn(Error),
-    /// A LEARN or CHECK frame: the test pattern came with a wrong bit.
-    Pattern,
-    /// The identifier was damaged or is of an encoder that this receiver does not support.
-    Identifier(Error),
-    /// No VSYNC within the frames that [`Dialect::vsync_frames`] allows.
-    NoVsync,
-    /// The quality monitor has run out.
-    Quality,
-    /// Too many acceleration words in a row could not be used.
-    AccelerationErrors,
-}
-
-impl fmt::Display for State {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.pad(match self {
-            Self::Reset => "RESET",
-            Self::Sync => "SYNC",
-            Self::Start => "START",
-            Self::Learn => "LEARN",
-            Self::Check => "CHECK",
-            Self::IdReq => "IDREQ",
-            Self::WaitVsync => "WAIT VSYNC",
-            Self::Running => "RUNNING",
-        })
-    }
-}
-
-impl fmt::Display for Cause {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Requested => f.write_str("asked for"),
-            Self::Learn(error) | Self::Identifier(error) => error.fmt(f),
-            Self::Pattern => f.write_str("the test pattern came with a wrong bit"),
-            Self::NoVsync => f.write_str("no VSYNC after INIT"),
-            Self::Quality => f.write_str("the quality monitor has run out"),
-            Self::AccelerationErrors => f.write_str("too many acceleration words in a row could not be used"),
-        }
-    }
-}
 
 /// What to send from the start of an H-frame.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -301,6 +203,19 @@ impl Master {
 
     /// The same with four bytes of samples a word, the first of them in the low bits: what a DMA leaves in the memory of a
     /// little-endian processor, and fast on one that cannot load words from any address.
+    ///
+    /// ```
+    /// use hdsl::Dialect;
+    /// use hdsl::master::{Cause, Master, State};
+    /// # use hdsl::Error;
+    /// let mut master = Master::new(Dialect::SICK);
+    /// // No encoder: after RESET and SYNC, 18 frames without an answer, the line stays high.
+    /// for _ in 0..18 {
+    ///     assert_eq!(master.finish_words(&[u32::MAX; 18], None).restarted, None);
+    /// }
+    /// assert_eq!(master.finish_words(&[u32::MAX; 18], None).restarted, Some(Cause::Learn(Error::NoEdge)));
+    /// assert_eq!(master.state(), State::Reset);
+    /// ```
     pub fn finish_words(&mut self, samples: &[u32; WINDOW / 4], late: Option<i16>) -> &Report {
         match (self.state, self.alignment) {
             (State::Start, _) => {
@@ -347,6 +262,22 @@ impl Master {
     /// count. In START frames too the bits have to be the test pattern.
     ///
     /// For a frame without an answer the bits are not looked at.
+    ///
+    /// ```
+    /// use hdsl::device::Device;
+    /// use hdsl::master::{Master, State};
+    /// use hdsl::{Dialect, EncoderId};
+    ///
+    /// let mut master = Master::new(Dialect::SICK);
+    /// let mut encoder = Device::new(EncoderId::try_from(0x00153)?);
+    /// while master.state() != State::Running {
+    ///     // A line that stays high is all ones.
+    ///     let bits = encoder.answer(master.transmission().head.bits(), 1000).unwrap_or(u64::MAX);
+    ///     master.finish_bits(bits, None, None);
+    /// }
+    /// assert_eq!(master.encoder_id().map(|id| id.position_bits()), Some(32));
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     pub fn finish_bits(&mut self, bits: u64, signal: Option<Signal>, late: Option<i16>) -> &Report {
         self.end(bits, signal, late)
     }

@@ -271,7 +271,7 @@ impl fmt::Display for EncoderByte {
     }
 }
 
-crate::ranged::format_as_displayed!(MasterSymbol, EncoderSymbol, ParameterByte, EncoderByte);
+servowire_core::format_as_displayed!(MasterSymbol, EncoderSymbol, ParameterByte, EncoderByte);
 
 #[cfg(test)]
 mod tests {

@@ -233,6 +233,18 @@ impl QualityMonitor {
     }
 
     /// QMLW: the value is below 14.
+    ///
+    /// ```
+    /// use hdsl::{QualityEvent, QualityMonitor, QualityRule};
+    /// let mut quality = QualityMonitor::new(QualityRule::Sick);
+    /// // A good V-frame is worth two: from 8 to 14 in three.
+    /// for _ in 0..3 {
+    ///     assert!(quality.is_low());
+    ///     quality.count(QualityEvent::VsyncOk);
+    ///     quality.count(QualityEvent::Safe1Ok);
+    /// }
+    /// assert_eq!((quality.value(), quality.is_low()), (14, false));
+    /// ```
     pub const fn is_low(self) -> bool {
         self.value < Self::LOW
     }

@@ -67,19 +67,4 @@ macro_rules! ranged {
     };
 }
 
-/// `defmt::Format` with the text of `Display`.
-macro_rules! format_as_displayed {
-    ($($name:ty),* $(,)?) => {
-        $(
-            #[cfg(feature = "defmt")]
-            #[cfg_attr(docsrs, doc(cfg(feature = "defmt")))]
-            impl defmt::Format for $name {
-                fn format(&self, f: defmt::Formatter<'_>) {
-                    defmt::write!(f, "{}", defmt::Display2Format(self));
-                }
-            }
-        )*
-    };
-}
-
-pub(crate) use {format_as_displayed, ranged};
+pub(crate) use ranged;

@@ -26,6 +26,12 @@ impl Rssi {
 
     /// As the table of the Motor Control SDK has it: there a longest gap of one or two sample periods counts as 12,
     /// so that many edges look perfect.
+    ///
+    /// ```
+    /// use hdsl::rssi::Rssi;
+    /// // An edge before every sample.
+    /// assert_eq!((Rssi::of_edges(0xff).get(), Rssi::of_edges_ti(0xff).get()), (0, 12));
+    /// ```
     pub const fn of_edges_ti(edges: u8) -> Self {
         match longest_gap(edges) {
             Some(1..=2) => Self::MAX,
@@ -128,10 +134,12 @@ impl WordWatch {
     pub(crate) fn step(&mut self, samples: u32, of: u32) {
         let edges = (samples ^ samples >> 1 ^ self.previous << 31) & of;
         self.previous = samples;
-        self.seen |= edges;
         // In each byte, the lowest of bits 6:0 taken away: nothing is left of a single edge, which is the best signal.
-        if edges & (edges | 0x8080_8080).wrapping_sub(0x0101_0101) != 0 {
-            self.lowest = lowest(self.lowest, edges);
+        if edges & (edges | 0x8080_8080).wrapping_sub(0x0101_0101) == 0 {
+            self.seen |= edges;
+        } else {
+            // What is seen goes through here too: a sum that has to be there at each word stays in a register.
+            (self.seen, self.lowest) = several(self.seen, self.lowest, edges);
         }
     }
 
@@ -143,11 +151,11 @@ impl WordWatch {
     }
 }
 
-/// The RSSI of four bit times by the table.
+/// Four bit times one of which has several edges: RSSI by the table.
 #[cold]
 #[inline(never)]
-fn lowest(lowest: Rssi, edges: u32) -> Rssi {
-    edges.to_le_bytes().into_iter().map(Rssi::of_edges).fold(lowest, Ord::min)
+fn several(seen: u32, lowest: Rssi, edges: u32) -> (u32, Rssi) {
+    (seen | edges, edges.to_le_bytes().into_iter().map(Rssi::of_edges).fold(lowest, Ord::min))
 }
 
 #[cfg(test)]

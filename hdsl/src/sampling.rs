@@ -59,6 +59,12 @@ impl SampleIndex {
 
     /// The same for a byte that holds a rising edge, as the design document draws it: there the formula counts from
     /// the last sample.
+    ///
+    /// ```
+    /// use hdsl::sampling::SampleIndex;
+    /// // The drawing: the bit begins at sample 3, E is 1 from the right.
+    /// assert_eq!(SampleIndex::after_rising_edge(0b0001_1111).get(), 6);
+    /// ```
     pub const fn after_rising_edge(byte: u8) -> Self {
         Self::truncate(7_u8.wrapping_sub(Self::after_falling_edge(byte).get()))
     }

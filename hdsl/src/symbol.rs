@@ -229,7 +229,7 @@ impl fmt::Display for Character {
     }
 }
 
-crate::ranged::format_as_displayed!(Character);
+servowire_core::format_as_displayed!(Character);
 
 /// How a receiver judges a word.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]

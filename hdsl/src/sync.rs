@@ -49,6 +49,15 @@ impl ExtraWindow {
     /// The start state from the vendor's register values: EXTRA_SIZE is the number of bits less one here, also when
     /// TIME_REST is 0.
     ///
+    /// ```
+    /// use hdsl::frame::Stuffing;
+    /// use hdsl::sync::ExtraWindow;
+    /// // A pulse every 6001 cycles at 300 MHz: EXTRA_SIZE 7, EXTRA_EDGE F0h, so TIME_REST 4, 12 blocks, window 60.
+    /// let state = ExtraWindow::from_registers(7, 4, Stuffing::try_from(12)?, 60)?;
+    /// assert_eq!((state.extra().get(), state.extra().bits(), state.extra_edge()), (60, 8, 0xf0));
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    ///
     /// # Errors
     /// [`Error::ExtraOutOfRange`].
     pub const fn from_registers(extra_size: u8, time_rest: u8, stuffing: Stuffing, window: i16) -> Result<Self, Error> {

@@ -298,14 +298,18 @@ fn whatever_the_encoder_makes_of_open_points() {
         behaviour.sync_frames = if on(5) { 16 } else { 1 };
         behaviour.first_place = if on(6) { 5 } else { 0 };
         behaviour.stalls_on_bad_head = on(7);
+        behaviour.acknowledges_with_length = on(6);
         behaviour.latency = if on(7) { 300 } else { 0 };
         bench.speed = -321;
         bench.lock();
         bench.master.start_short(ShortRequest::Write(RemoteRegister::PING, 0x5a)).unwrap();
+        let [write, _] = write_and_read();
+        bench.master.start_long(write).unwrap();
         let mut monitor = Channel2Monitor::new();
-        let mut answered = false;
-        for _ in 0..if on(7) { 500 } else { 60 } {
+        let (mut answered, mut written) = (false, None);
+        for _ in 0..if on(7) { 500 } else { 80 } {
             let report = bench.frame();
+            written = written.or(report.finished.long);
             answered |= report.finished.short.is_some_and(|result| result.is_ok());
             assert_eq!(bench.master.fast().map(|fast| (fast.position, fast.velocity)), Ok((bench.position, -321)));
             let safe = bench.master.safe().unwrap();
@@ -314,6 +318,7 @@ fn whatever_the_encoder_makes_of_open_points() {
                 assert_eq!(monitor.v_frame(&frame), Channel2Findings::empty());
             }
         }
+        assert_eq!(written.map(|end| end.map(|answer| answer.result)), Some(Ok(Ok(Data::NONE))), "{combination}");
         // A latency beyond 64 frames is a message that is not answered in time, and sent again.
         assert!(answered != on(7) || bench.device.resources.register(RemoteRegister::PING) == 0x5a, "{combination}");
     }

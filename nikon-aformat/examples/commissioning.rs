@@ -19,8 +19,10 @@ const RATE: BitRate = BitRate::Mbit8;
 fn main() -> Result<(), Error> {
     let resolution = Resolution::default();
     let mut encoder = Device::<2>::new(EncoderAddress::ZERO, resolution, RATE);
-    let behaviour = Behaviour::new().with_turn_around_ns(4_000).not_busy_in_first_read();
-    encoder.set_behaviour(behaviour.showing_in_the_eighth().showing_the_old_address());
+    let behaviour = Behaviour::new().with_turn_around_ns(4_000).not_busy_in_first_read().with_undetermined(0xdead);
+    let behaviour = behaviour.showing_in_the_eighth().showing_the_old_address();
+    // It counts eight requests of a reset even if others are asked in between.
+    encoder.set_behaviour(behaviour.counting_its_own_requests());
     encoder.set_id(EncoderId::truncate(0x00_0001));
     encoder.set_position(0x8_0000, 12);
     encoder.set_temperature(Temperature(U10::truncate(1004)));

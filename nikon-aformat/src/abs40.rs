@@ -118,7 +118,7 @@ impl fmt::Display for Abs40 {
     }
 }
 
-crate::text::format_as_displayed!(Abs40);
+servowire_core::format_as_displayed!(Abs40);
 
 #[cfg(test)]
 mod tests {

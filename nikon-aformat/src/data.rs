@@ -117,4 +117,4 @@ impl fmt::Display for Data {
     }
 }
 
-crate::text::format_as_displayed!(Data);
+servowire_core::format_as_displayed!(Data);

@@ -250,7 +250,7 @@ impl fmt::Display for RequestFrame {
     }
 }
 
-crate::text::format_as_displayed!(RequestFrame);
+servowire_core::format_as_displayed!(RequestFrame);
 
 #[cfg(test)]
 mod tests {

@@ -228,4 +228,4 @@ impl fmt::Display for Operation {
     }
 }
 
-crate::text::format_as_displayed!(Operation);
+servowire_core::format_as_displayed!(Operation);

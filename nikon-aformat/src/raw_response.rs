@@ -142,4 +142,4 @@ impl fmt::Display for RawResponse {
     }
 }
 
-crate::text::format_as_displayed!(RawResponse);
+servowire_core::format_as_displayed!(RawResponse);

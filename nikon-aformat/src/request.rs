@@ -323,4 +323,4 @@ impl fmt::Display for Frames {
     }
 }
 
-crate::text::format_as_displayed!(Request, Frames);
+servowire_core::format_as_displayed!(Request, Frames);

@@ -261,7 +261,7 @@ impl fmt::Display for Position {
     }
 }
 
-crate::text::format_as_displayed!(Resolution, Position);
+servowire_core::format_as_displayed!(Resolution, Position);
 
 #[cfg(test)]
 mod tests {

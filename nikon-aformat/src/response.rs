@@ -314,4 +314,4 @@ impl fmt::Display for Response {
     }
 }
 
-crate::text::format_as_displayed!(Response);
+servowire_core::format_as_displayed!(Response);

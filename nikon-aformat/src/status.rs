@@ -1,7 +1,5 @@
-use core::fmt;
-
 use bitflags::bitflags;
-use servowire_core::{OutOfRange, write_names};
+use servowire_core::OutOfRange;
 
 use crate::command::Version;
 
@@ -145,36 +143,7 @@ bitflags! {
     }
 }
 
-/// `-` for no flag: a log shows that the field was there.
-fn or_none<'a>(f: &mut fmt::Formatter<'_>, none: bool, names: impl Iterator<Item = &'a str>) -> fmt::Result {
-    if none { f.write_str("-") } else { write_names(f, names) }
-}
-
-impl fmt::Display for EncoderStatus {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        or_none(f, self.is_empty(), self.iter_names().map(|(name, _)| name))
-    }
-}
-
-impl fmt::Display for Alm {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        or_none(f, self.is_empty(), self.iter_names().map(|(name, _)| name))
-    }
-}
-
-impl fmt::Display for PmAlm {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let named = Self::INCW1 | Self::INCW2 | Self::IFW1 | Self::IFW2;
-        or_none(f, self.is_empty(), self.iter_names().map(|(name, _)| name))?;
-        match (self.difference(named).bits(), self.intersects(named)) {
-            (0, _) => Ok(()),
-            (unnamed, true) => write!(f, " {unnamed:02x}h"),
-            (unnamed, false) => write!(f, "{unnamed:02x}h"),
-        }
-    }
-}
-
-crate::text::format_as_displayed!(EncoderStatus, Alm, PmAlm);
+servowire_core::show_flags!(EncoderStatus, Alm, PmAlm);
 
 #[cfg(feature = "arbitrary")]
 impl<'a> arbitrary::Arbitrary<'a> for EncoderStatus {
@@ -215,7 +184,7 @@ mod tests {
         assert_eq!(Alm::from_bits_retain(0x0301).to_string(), "BATT MEMBUSY OVTEMP");
         assert_eq!(EncoderStatus::from_bits_retain(0xa).to_string(), "BATT ERROR");
         assert_eq!((EncoderStatus::empty().to_string(), PmAlm::empty().to_string()), ("-".into(), "-".into()));
-        assert_eq!(PmAlm::from_bits_retain(0xc1).to_string(), "INCW1 c0h");
+        assert_eq!(PmAlm::from_bits_retain(0xc1).to_string(), "INCW1 C0h");
         assert_eq!(PmAlm::from_bits_retain(0x04).to_string(), "04h");
     }
 }

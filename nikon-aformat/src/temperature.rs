@@ -52,7 +52,7 @@ impl fmt::Display for Temperature {
     }
 }
 
-crate::text::format_as_displayed!(Temperature);
+servowire_core::format_as_displayed!(Temperature);
 
 #[cfg(test)]
 mod tests {

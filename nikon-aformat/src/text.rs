@@ -10,20 +10,3 @@ pub(crate) fn write_words(f: &mut fmt::Formatter<'_>, words: impl IntoIterator<I
     }
     Ok(())
 }
-
-/// `defmt::Format` that prints what `Display` prints.
-macro_rules! format_as_displayed {
-    ($($name:ty),+) => {
-        $(
-            #[cfg(feature = "defmt")]
-            #[cfg_attr(docsrs, doc(cfg(feature = "defmt")))]
-            impl defmt::Format for $name {
-                fn format(&self, f: defmt::Formatter<'_>) {
-                    defmt::write!(f, "{}", defmt::Display2Format(self));
-                }
-            }
-        )+
-    };
-}
-
-pub(crate) use format_as_displayed;

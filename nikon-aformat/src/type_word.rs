@@ -138,7 +138,7 @@ impl fmt::Display for TypeWord {
     }
 }
 
-crate::text::format_as_displayed!(TypeWord);
+servowire_core::format_as_displayed!(TypeWord);
 
 #[cfg(test)]
 mod tests {

@@ -302,7 +302,8 @@ mod tests {
         let window = Window::from_bits(0b1101, 4).unwrap();
         assert_eq!(window.skip(2).unwrap(), Window::from_bits(0b11, 2).unwrap());
         assert_eq!(window.skip(5), None);
-        assert_eq!((window.get(1), window.get(3), window.get(4)), (Some(false), Some(true), None));
+        let levels = [0, 1, 2, 3, 4].map(|at| window.get(at));
+        assert_eq!(levels, [Some(true), Some(false), Some(true), Some(true), None]);
         assert_eq!(window.inverted().bits(), 0b0010);
     }
 
@@ -329,6 +330,34 @@ mod tests {
         );
     }
 
+    /// Bit k of the half line is bit 2k of the whole one, whatever stands between.
+    #[test]
+    fn every_second_bit_of_any_line() {
+        let bits = 0x0123_4567_89ab_cdef_fedc_ba98_7654_3210_u128;
+        for bits in [bits, !bits, bits ^ (u128::MAX / 3), bits.rotate_left(9)] {
+            for len in 0..=128 {
+                let whole = Window::from_bits(bits, len).unwrap();
+                let half = whole.decimated();
+                assert_eq!(half.len(), len.div_ceil(2));
+                assert!((0..half.len()).all(|at| half.get(at) == whole.get(2 * at)), "{len} bits of {bits:x}");
+                assert_eq!(half.bits() >> half.len(), 0);
+            }
+        }
+    }
+
+    /// A window fits up to the last bit of a buffer, and nothing fits behind it.
+    #[test]
+    fn the_end_of_a_buffer() {
+        let mut bytes = [0; 3];
+        let ones = Window::from_bits(0xff, 8).unwrap();
+        assert_eq!(ones.write(&mut bytes, 16, BitOrder::LsbFirst), Ok(()));
+        assert_eq!(bytes, [0, 0, 0xff]);
+        assert_eq!(ones.write(&mut bytes, 17, BitOrder::LsbFirst).map_err(|error| error.available), Err(7));
+        assert_eq!(Window::EMPTY.write(&mut bytes, 24, BitOrder::LsbFirst), Ok(()));
+        assert_eq!(Window::EMPTY.write(&mut bytes, 25, BitOrder::LsbFirst).map_err(|error| error.available), Err(0));
+        assert!(Window::EMPTY.is_empty() && !ones.is_empty());
+    }
+
     #[test]
     fn a_line_that_goes_idle() {
         let line = Window::from_bits(0b01, 2).unwrap();
@@ -348,5 +377,8 @@ mod tests {
         assert_eq!(Window::try_from(&msb[..37]), Ok(window));
         assert_eq!(lsb.into_inner(), window.to_bytes(BitOrder::LsbFirst));
         assert_eq!(msb.into_inner(), window.to_bytes(BitOrder::MsbFirst));
+        let long = bitvec::array::BitArray::<[u8; 17], Lsb0>::new([0xff; 17]);
+        assert_eq!(Window::try_from(&long[..128]).map(Window::bits), Ok(u128::MAX));
+        assert_eq!(Window::try_from(&long[..129]), Err(OutOfBounds { offset: 0, len: 129, available: 129 }));
     }
 }

@@ -78,6 +78,6 @@ mod tests {
     fn prints_the_names() {
         let control = ControlBits::SERVO_ON | ControlBits::PAUSE;
         assert_eq!(control.to_string(), "PAUSE SERVO_ON");
-        assert_eq!(ControlBits::empty().to_string(), "");
+        assert_eq!(ControlBits::empty().to_string(), "-");
     }
 }

@@ -13,26 +13,11 @@ macro_rules! flag_set {
             }
         }
 
-        impl core::fmt::Display for $name {
-            /// The names of the bits that are set, with a blank between them.
-            fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
-                servowire_core::write_names(f, self.iter_names().map(|(name, _)| name))
-            }
-        }
+        servowire_core::show_flags!($name);
 
         impl core::fmt::Debug for $name {
             fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
                 write!(f, concat!(stringify!($name), "({})"), self)
-            }
-        }
-
-        #[cfg(feature = "defmt")]
-        #[cfg_attr(docsrs, doc(cfg(feature = "defmt")))]
-        impl defmt::Format for $name {
-            fn format(&self, f: defmt::Formatter<'_>) {
-                for (at, (name, _)) in self.iter_names().enumerate() {
-                    defmt::write!(f, "{=str}{=str}", if at == 0 { "" } else { " " }, name);
-                }
             }
         }
 

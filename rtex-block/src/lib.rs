@@ -7,7 +7,6 @@
 extern crate std;
 
 mod block;
-mod builder;
 mod code;
 mod command;
 mod control;

@@ -154,8 +154,17 @@ impl Response {
         NonCyclicResponse::from_bytes(self.cmd_error, self.code.noncyclic_bits(), self.noncyclic_bytes())
     }
 
-    /// With other bytes 8-15. CMD_Error is set by [`NonCyclicResponse::CommandError`] and cleared by every other value,
-    /// whose layout must be the one of [`code`](Self::code).
+    /// With other bytes 8-15, for a simulated drive. CMD_Error is set by [`NonCyclicResponse::CommandError`] and cleared by every
+    /// other value, whose layout must be the one of [`code`](Self::code).
+    ///
+    /// ```
+    /// use rtex_block::{ErrorCode, NonCyclicResponse, Response};
+    /// // Drive 5 refuses a monitor command in CP (2Ah): type code not known.
+    /// let received = [0xc5, 0x2a, 0x40, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0];
+    /// let refused = Response::parse(&received)?.with_noncyclic(&NonCyclicResponse::CommandError(ErrorCode::TYPE_CODE));
+    /// assert_eq!(refused.emit(), [0xc5, 0xaa, 0x40, 0, 0, 0, 0, 0, 0x31, 0, 0, 0, 0, 0, 0, 0]);
+    /// # Ok::<(), rtex_block::Error>(())
+    /// ```
     #[must_use]
     pub const fn with_noncyclic(self, noncyclic: &NonCyclicResponse) -> Self {
         let [d8, d9, d10, d11, d12, d13, d14, d15] = noncyclic.to_bytes();

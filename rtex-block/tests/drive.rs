@@ -31,6 +31,7 @@ const CODES: OpenCodes = OpenCodes {
     alarm_clear: TypeCode::short(0x75),
     alarm_attributes: TypeCode::short(0x76),
     parameter_initial: TypeCode::short(0x77),
+    parameter_count: TypeCode::short(0x7a),
     latch_arm: 0x78,
     homing: 0x79,
     communication_lost: Alarm { main: 80, sub: 0 },

@@ -15,10 +15,8 @@ use common::{CODES, LIMIT, Pair, limits, monitor, set_position};
 use rtex_block::device::{Drive, DriveConfig, Manners};
 use rtex_block::master::procedure::{Caught, Home, Latch};
 use rtex_block::master::{
-    ActiveCode, AskError, AxisConfig, AxisState, CommandEnded, Failure, MoveStage, Progress, Received, SetpointError,
-    StopReason, Turn,
+    ActiveCode, AskError, AxisConfig, AxisState, CommandEnded, Failure, MoveStage, Progress, Received, StopReason,
 };
-use rtex_block::position::Gear;
 use rtex_block::{
     Alarm, Arguments, Code, ErrorClass, ErrorCode, MacId, Nibble, NonCyclicCommand, NonCyclicResponse, Response,
     StatusFlags, TypeCode,
@@ -213,37 +211,37 @@ fn setting_a_position() {
     }
 }
 
-/// Feed-forward goes out while the servo is on, with every command that does not need bytes 12-15 itself, and no longer.
+/// A homing type whose meaning is not known may give the axis new coordinates: in CP it is not sent with the servo on, nor is
+/// the servo switched on meanwhile. A latch leaves them alone.
 #[test]
-fn feed_forward_lives_with_the_servo() {
-    let mut pair = Pair::new(ActiveCode::CyclicPosition, Manners::POLITE);
-    pair.until("off", |pair| pair.axis.state() == AxisState::Off);
-    let select = Arguments { type_code: TypeCode::short(0x11), index: 0x0723, data: 2 };
-    let _ = pair.ask(NonCyclicCommand::Parameter(select));
-    assert_eq!(pair.axis.set_feed_forward(500), Err(SetpointError::NotOn));
-    pair.switch_on();
-    pair.axis.set_feed_forward(500).unwrap();
-    (0..3).for_each(|_| pair.update());
-    assert_eq!(pair.drive.feed_forward(), 500);
-    // A monitor command carries it along; a parameter write leaves the drive with the last one.
-    for request in [monitor(7), NonCyclicCommand::Parameter(select)] {
-        assert!(matches!(pair.ask(request), Progress::Done { .. }));
-        assert_eq!(pair.drive.feed_forward(), 500, "{request}");
+fn homing_types_that_are_not_known() {
+    use ActiveCode::{CyclicPosition, CyclicTorque, CyclicVelocity, ProfilePosition};
+    let homing = |type_code: u8| (type_code, set_position(type_code, 0));
+    for mode in [CyclicPosition, ProfilePosition, CyclicVelocity, CyclicTorque] {
+        let in_position = mode == CyclicPosition;
+        for (type_code, request) in [homing(0x31), homing(0xc8), homing(0x50)] {
+            let refused = in_position && type_code != 0x50;
+            let mut pair = Pair::on(mode, Manners::POLITE);
+            let before = pair.axis;
+            assert_eq!(pair.axis.ask(request).err(), refused.then_some(AskError::ServoOn), "{mode:?} {type_code:x}");
+            assert_eq!(pair.axis == before, refused);
+            pair.axis = before;
+            pair.axis.ask_latch(type_code, [Nibble::ZERO; 2], 0x09).unwrap();
+            let mut pair = Pair::new(mode, Manners::POLITE);
+            pair.until("off", |pair| pair.axis.can_switch_on());
+            let before = pair.axis;
+            pair.axis.ask(request).unwrap();
+            assert_eq!(pair.axis.switch_on(), !refused, "{mode:?} {type_code:x}");
+            pair.axis = before;
+            pair.axis.ask_latch(type_code, [Nibble::ZERO; 2], 0x09).unwrap();
+            assert!(pair.axis.switch_on());
+        }
+        for type_code in [0x21, 0x22] {
+            let mut pair = Pair::on(mode, Manners::POLITE);
+            assert_eq!(pair.axis.ask_latch(type_code, [Nibble::ZERO; 2], 0), Err(AskError::ServoOn));
+            assert_eq!(pair.axis.ask(set_position(type_code, 0)), Err(AskError::ServoOn));
+        }
     }
-    // Out of range: the drive keeps the old one and says so, which stops the axis at the limit.
-    pair.axis.set_feed_forward(3_001).unwrap();
-    for _ in 0..4 {
-        pair.update();
-        assert_eq!(pair.drive.feed_forward(), 500);
-    }
-    pair.until("stopped", |pair| pair.axis.state() != AxisState::On);
-    assert_eq!(pair.axis.state(), AxisState::Stopped(StopReason::CommandError(ErrorCode(0x0034))));
-    (0..3).for_each(|_| pair.update());
-    assert_eq!(pair.drive.feed_forward(), 0);
-    pair.axis.clear();
-    pair.switch_on();
-    (0..3).for_each(|_| pair.update());
-    assert_eq!(pair.drive.feed_forward(), 0);
 }
 
 /// Servo_Active that falls by itself, that stays after servo-off, and that comes unasked.
@@ -376,77 +374,4 @@ fn why_the_echo_stands_still() {
         pair.axis.clear();
         pair.switch_on();
     }
-}
-
-/// The limits of set-points, with gears other than 1/1.
-#[test]
-fn limits_of_set_points() {
-    let mac_id = MacId::new(9).unwrap();
-    let config = AxisConfig::new(mac_id, ActiveCode::CyclicPosition, 500_000, limits());
-    // 400 M pulse/s in 0.5 ms are 200 000 pulses: 66 666 units at 3/1, 266 666 at 3/4, and 5 000 by 10 M units/s.
-    for (numerator, denominator, over_speed, largest) in
-        [(1, 1, None, 200_000), (3, 1, None, 66_666), (3, 4, None, 266_666), (1, 1, Some(10_000_000), 5_000)]
-    {
-        let gear = Gear::new(numerator, denominator).unwrap();
-        let config = config.with_gear(gear).with_over_speed(over_speed);
-        let drive = DriveConfig::new(mac_id, CODES).with_gear(gear);
-        let mut pair = Pair::with(config, drive);
-        pair.switch_on();
-        assert_eq!(i32::try_from(pair.axis.max_step()), Ok(largest));
-        for sign in [1, -1] {
-            let step = sign * (largest + 1);
-            assert_eq!(pair.axis.set_position(step), Err(SetpointError::Step { step }));
-        }
-        // The step counts from what was sent last: two calls in an update period do not add up.
-        pair.axis.set_position(largest).unwrap();
-        assert!(pair.axis.set_position(2 * largest).is_err());
-        (0..30).for_each(|_| pair.update());
-        assert_eq!(pair.drive.alarm(), None);
-        if over_speed.is_none() {
-            // The drive has the same limit, by its own reckoning.
-            let mut block = pair.axis.send(Turn::Valid(pair.counter.last().next())).main;
-            block.command_data1 = largest * 2 + 1;
-            pair.drive.exchange(&block.emit());
-            assert_eq!(pair.drive.alarm(), Some(Alarm { main: 27, sub: 4 }));
-        }
-    }
-    let config = AxisConfig::new(mac_id, ActiveCode::CyclicVelocity, 500_000, limits())
-        .with_max_speed(Some(3_000))
-        .with_max_torque(Some(999));
-    let mut pair = Pair::with(config, DriveConfig::new(mac_id, CODES));
-    pair.switch_on();
-    assert_eq!(pair.axis.set_rate(-3_001), Err(SetpointError::Rate { rate: -3_001 }));
-    pair.axis.set_rate(-3_000).unwrap();
-    pair.axis.set_mode(ActiveCode::CyclicTorque).unwrap();
-    assert_eq!((pair.axis.setpoint(), pair.axis.set_rate(1_000).is_err()), (0, true));
-    pair.axis.set_rate(999).unwrap();
-    pair.axis.set_mode(ActiveCode::ProfilePosition).unwrap();
-    assert_eq!(pair.axis.start_move(0x11, 5, 3_001), Err(SetpointError::Rate { rate: 3_001 }));
-    assert_eq!(pair.axis.set_move_speed(3_001), Err(SetpointError::Rate { rate: 3_001 }));
-}
-
-/// From mode to mode with the servo on: no jump, and no motion of its own.
-#[test]
-fn every_change_of_mode() {
-    use ActiveCode::{CyclicPosition, CyclicTorque, CyclicVelocity, ProfilePosition};
-    let modes = [CyclicPosition, ProfilePosition, CyclicVelocity, CyclicTorque];
-    for from in modes {
-        for to in modes {
-            let mut pair = Pair::new(CyclicPosition, Manners::POLITE.with_echo_lag(2));
-            pair.until("off", |pair| pair.axis.state() == AxisState::Off);
-            let _ = pair.ask(set_position(0x21, 700_000));
-            pair.switch_on();
-            pair.axis.set_mode(from).unwrap();
-            (0..20).for_each(|_| pair.update());
-            pair.axis.set_mode(to).unwrap();
-            (0..20).for_each(|_| pair.update());
-            assert_eq!((pair.axis.mode(), pair.axis.state()), (to, AxisState::On));
-            assert_eq!((pair.drive.position(), pair.drive.alarm()), (700_000, None), "{from:?} {to:?}");
-        }
-    }
-    let mut pair = Pair::on(ProfilePosition, Manners::POLITE);
-    pair.axis.start_move(0x11, 100_000, 1_000_000).unwrap();
-    assert_eq!(pair.axis.set_mode(CyclicPosition), Err(SetpointError::Busy));
-    pair.axis.switch_off();
-    assert_eq!(pair.axis.set_mode(CyclicPosition), Err(SetpointError::NotOn));
 }

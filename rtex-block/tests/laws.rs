@@ -279,7 +279,7 @@ fn messages_print_in_one_line() {
     let write = Command { noncyclic: NonCyclicCommand::Parameter(arguments), control: ControlBits::SERVO_ON, ..idle };
     assert_eq!(write.to_string(), "to 31 #3 CP parameter (26h) [SERVO_ON] 0, type 11h Pr7.20 data -1");
     let whole = Command32 { main: idle, sub: SubCommand::IDLE };
-    assert_eq!(whole.to_string(), "to 31 #3 CP normal (20h) [] 0, 0 0; sub normal type 00h index 0, 0 0 0");
+    assert_eq!(whole.to_string(), "to 31 #3 CP normal (20h) [-] 0, 0 0; sub normal type 00h index 0, 0 0 0");
     let sub = SubResponse::from_bytes(&[0xca, 0, 0x22, 0, 0, 0, 0, 0, 1, 0, 0, 0, 2, 0, 0, 0]);
     assert_eq!(sub.to_string(), "sub monitor not accepted: 0022h (non-cyclic code not defined), 0 1 2 ERR");
 }

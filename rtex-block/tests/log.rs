@@ -7,9 +7,9 @@
     missing_docs
 )]
 
-use rtex_block::inspect::{LogAnalysis, LogFinding, LogShape};
+use rtex_block::inspect::{LogAnalysis, LogFinding, LogShape, Unfinished};
 use rtex_block::position::Gear;
-use rtex_block::{BlockSize, MacId, UpdateCounter};
+use rtex_block::{BlockSize, Code, MacId, UpdateCounter};
 
 fn command(counter: u8, code: u8, position: i32) -> [u8; 16] {
     let mut block = [0; 16];
@@ -29,6 +29,11 @@ fn response(counter: u8, code: u8, nine: u8) -> [u8; 16] {
 fn findings(analysis: &mut LogAnalysis, blocks: &[[u8; 16]]) -> Vec<(usize, LogFinding)> {
     let found = blocks.iter().enumerate();
     found.flat_map(|(k, block)| analysis.block(block).map(move |finding| (k, finding)).collect::<Vec<_>>()).collect()
+}
+
+/// Of drive 5.
+fn at_end(what: Unfinished) -> LogFinding {
+    LogFinding::AtEnd(MacId::new(5).unwrap(), what)
 }
 
 fn analysis() -> LogAnalysis {
@@ -54,7 +59,16 @@ fn a_good_log_shows_nothing() {
 fn counters_that_do_not_count() {
     let still = [1, 2, 2, 2, 2, 3, 3, 3].map(|counter| response(counter, 0x20, 0));
     let stands = LogFinding::EchoStands { responses: 3 };
-    assert_eq!(findings(&mut analysis(), &still), [(3, stands), (7, stands)]);
+    // What stood for longer than was said is said again when it is over, or at the end.
+    let mut log = analysis();
+    let goes_on = LogFinding::EchoGoesOn { responses: 4 };
+    assert_eq!(findings(&mut log, &still), [(3, stands), (5, goes_on), (7, stands)]);
+    assert_eq!(log.end().count(), 0);
+    assert_eq!(findings(&mut log, &[still[7]; 4]), []);
+    assert!(log.end().eq([at_end(Unfinished::Echo { responses: 7 })]));
+    let goes_on = LogFinding::EchoGoesOn { responses: 7 };
+    assert_eq!(findings(&mut log, &[still[0], still[0], still[1]]), [(0, goes_on)]);
+    assert_eq!(log.end().count(), 0);
     let jumps = [1, 2, 2, 2, 0, 1].map(|counter| command(counter, 0x20, 0));
     let of =
         |from, to| LogFinding::CounterJumps { from: UpdateCounter::truncate(from), to: UpdateCounter::truncate(to) };
@@ -96,6 +110,71 @@ fn requests_and_their_answers() {
     let late: Vec<_> =
         (1..=4).flat_map(|k| [command(k % 4, 0x20, 0), response(k % 4, if k < 4 { 0 } else { 0x20 }, 0)]).collect();
     assert_eq!(findings(&mut analysis(), &late), [(7, LogFinding::CodeLate { responses: 4 })]);
+    // Before it has come back it is late at the end.
+    for (blocks, want) in [(6, None), (7, None)] {
+        let mut log = analysis();
+        assert_eq!(findings(&mut log, &late[..blocks]), []);
+        assert_eq!(log.end().next(), want);
+    }
+    let mut log = analysis();
+    let never: Vec<_> = (1..=5).flat_map(|k| [command(k % 4, 0x20, 0), response(k % 4, 0x10, 0)]).collect();
+    assert_eq!(findings(&mut log, &never), []);
+    let code = Code::CYCLIC_POSITION;
+    assert!(log.end().eq([at_end(Unfinished::Code { code, responses: 5 })]));
+}
+
+/// A drive that stays busy, one that fails while it says Busy, and one that answers to something else.
+#[test]
+fn requests_without_an_answer() {
+    let with = |mut block: [u8; 16], type_code| {
+        block[8] = type_code;
+        block
+    };
+    let code = Code::truncate(0x26);
+    let busy = |n: u8| -> Vec<[u8; 16]> {
+        (1..=n).flat_map(|k| [with(command(k % 4, 0x26, 0), 7), with(response(k % 4, 0x26, 0x10), 7)]).collect()
+    };
+    let mut log = analysis();
+    assert_eq!(findings(&mut log, &busy(3)), []);
+    assert_eq!(log.end().count(), 0);
+    let mut log = analysis();
+    assert_eq!(findings(&mut log, &busy(4)), []);
+    assert!(log.end().eq([at_end(Unfinished::Request { code, responses: 4, busy: 4 })]));
+    // The master gives up: the normal command, or another request.
+    for next in [command(1, 0x20, 0), with(command(1, 0x26, 0), 8), command(1, 0x2a, 0)] {
+        let mut log = analysis();
+        findings(&mut log, &busy(4));
+        assert_eq!(findings(&mut log, &[next]), [(0, LogFinding::GivenUp { code, responses: 4, busy: 4 })]);
+        assert_eq!(log.end().count(), 0);
+        let mut log = analysis();
+        findings(&mut log, &busy(3));
+        assert_eq!(findings(&mut log, &[with(command(0, 0x20, 0), 8)]), []);
+    }
+    // Feed-forward in bytes 12-15 is no other request, nor are the flags of byte 9 an answer to one.
+    let mut log = analysis();
+    findings(&mut log, &busy(4));
+    let mut fed = with(command(1, 0x26, 0), 7);
+    fed[12] = 1;
+    assert_eq!(findings(&mut log, &[fed]), []);
+    // ERR ends it, whatever Busy says; so does CMD_Error, whose bytes 8-9 are the error code.
+    for last in [with(response(1, 0x26, 0x90), 7), response(1, 0xa6, 0)] {
+        let answered = LogFinding::Answered { responses: 5, busy: 4 };
+        let mut log = analysis();
+        findings(&mut log, &busy(4));
+        assert_eq!(findings(&mut log, &[with(command(1, 0x26, 0), 7), last]), [(1, answered)]);
+        assert_eq!(log.end().count(), 0);
+    }
+    // Answers to another type, or with another code, are none to this request.
+    let mut log = analysis();
+    findings(&mut log, &busy(1));
+    let others = [with(response(1, 0x26, 0), 6), with(response(2, 0x2a, 0), 7), with(response(3, 0x26, 0), 6)];
+    assert_eq!(findings(&mut log, &others), []);
+    assert!(log.end().eq([at_end(Unfinished::Request { code, responses: 4, busy: 1 })]));
+    // A profile motion is no request.
+    let mut log = analysis();
+    let motion: Vec<_> = (1..=9).flat_map(|k| [command(k % 4, 0x17, 0), response(k % 4, 0x17, 0x10)]).collect();
+    assert_eq!(findings(&mut log, &motion), []);
+    assert_eq!(log.end().count(), 0);
 }
 
 #[test]
@@ -115,7 +194,65 @@ fn drives_on_one_side_only() {
     assert_eq!(log.end().count(), 0);
     // Before the start the counter stands at 0, and its echo with it.
     let nop: Vec<_> = (0..5).flat_map(|_| [command(0, 0, 0), response(0, 0, 0)]).collect();
-    assert_eq!(findings(&mut analysis(), &nop), []);
+    let mut log = analysis();
+    assert_eq!(findings(&mut log, &nop), []);
+    assert_eq!(log.end().count(), 0);
+    assert_eq!(findings(&mut log, &[command(1, 0x20, 0), response(1, 0, 0)]), []);
+}
+
+/// With Index 0 the read-out of attributes echoes the alarm; history and present alarm echo the index that was asked for.
+#[test]
+fn attributes_are_no_alarm_codes() {
+    let alarm = |mut block: [u8; 16], index: u8, eight: u8| {
+        (block[8], block[10], block[11]) = (eight, index, 0x26);
+        block[11] *= u8::from(index > 0);
+        block[12..].copy_from_slice(&[0x01, 0x01, 0, 0x80]);
+        block
+    };
+    let about = |asked: [u8; 16], answer: [u8; 16]| {
+        let mut log = analysis();
+        findings(&mut log, &[command(1, 0x20, 0), response(1, 0x20, 0), asked, answer])
+    };
+    let answered = LogFinding::Answered { responses: 1, busy: 0 };
+    let attributes = LogFinding::Attributes { alarm: 0x2601, bits: 0x8000_0101 };
+    let (asked, answer) = (command(2, 0x25, 0), response(2, 0x25, 0));
+    let ask = |index, eight| alarm(asked, index, eight);
+    assert_eq!(about(ask(0, 7), alarm(answer, 1, 7)), [(3, answered), (3, attributes)]);
+    assert_eq!(about(ask(0, 7), alarm(answer, 0, 7)), [(3, answered)]);
+    assert_eq!(about(ask(1, 7), alarm(answer, 1, 7)), [(3, answered)]);
+    // An answer to another type is an older one, and one that is busy has no data yet.
+    assert_eq!(about(ask(0, 7), alarm(answer, 1, 8)), []);
+    assert_eq!(about(ask(0, 7), alarm(response(2, 0x25, 0x10), 1, 7)), []);
+    // A monitor value is none either.
+    assert_eq!(about(alarm(command(2, 0x2a, 0), 0, 7), alarm(response(2, 0x2a, 0), 1, 7)), [(3, answered)]);
+    assert_eq!(attributes.to_string(), "attributes 80000101h of the alarm with index 2601h");
+}
+
+/// What a person reads.
+#[test]
+fn findings_in_words() {
+    let code = Code::truncate(0x26);
+    let say = |finding: LogFinding| finding.to_string();
+    assert_eq!(say(LogFinding::EchoGoesOn { responses: 9 }), "the counter echo goes on after 9 responses");
+    assert_eq!(say(LogFinding::AnswersAgain { commands: 5 }), "answers again after 5 commands");
+    assert_eq!(
+        say(LogFinding::GivenUp { code, responses: 9, busy: 8 }),
+        "CP parameter (26h) is given up after 9 responses, 8 of them busy"
+    );
+    for (what, want) in [
+        (Unfinished::Echo { responses: 7 }, "at the end drive 5 has sent the same counter echo in 7 responses"),
+        (Unfinished::Silence { commands: 4 }, "at the end drive 5 has not answered the last 4 commands"),
+        (
+            Unfinished::Request { code, responses: 9, busy: 8 },
+            "at the end drive 5 has not answered CP parameter (26h) in 9 responses, 8 of them busy",
+        ),
+        (
+            Unfinished::Code { code, responses: 9 },
+            "at the end drive 5 has not sent back CP parameter (26h) in 9 responses",
+        ),
+    ] {
+        assert_eq!(say(at_end(what)), want);
+    }
 }
 
 /// A drive that goes silent is missed at the third command, once, and again after it has come back.
@@ -139,7 +276,12 @@ fn a_drive_that_goes_silent() {
         asked(1),
     ];
     let silent = LogFinding::NoAnswer { commands: 3 };
-    assert_eq!(findings(&mut analysis(), &blocks), [(7, silent), (12, silent)]);
+    let mut log = analysis();
+    let again = LogFinding::AnswersAgain { commands: 4 };
+    assert_eq!(findings(&mut log, &blocks), [(7, silent), (9, again), (12, silent)]);
+    assert_eq!(log.end().count(), 0);
+    assert_eq!(findings(&mut log, &[asked(2)]), []);
+    assert!(log.end().eq([at_end(Unfinished::Silence { commands: 4 })]));
     // One that has never answered is said at the end.
     let mut log = analysis();
     assert_eq!(findings(&mut log, &[1, 2, 3, 0].map(asked)), []);

@@ -1,4 +1,4 @@
-//! Texts, parameters, alarms, homing, latch and sub-commands, against a drive that shares no number with the master.
+//! Texts, parameters, homing, latch and sub-commands, against a drive that shares no number with the master.
 #![allow(
     clippy::arithmetic_side_effects,
     clippy::cast_possible_truncation,
@@ -11,15 +11,13 @@
 
 mod common;
 
-use common::{CODES, Pair, alarm, limits, monitor, set_position};
+use common::{CODES, Pair, limits, monitor, set_position};
 use rtex_block::device::{DriveConfig, Manners};
-use rtex_block::master::procedure::{
-    AlarmAttributes, AlarmHistory, Attributes, Backup, Caught, Home, Latch, ReadText, Restore, SetPosition,
-};
-use rtex_block::master::{ActiveCode, AskError, AxisConfig, AxisState, Failure, Progress, Received, StopReason};
+use rtex_block::master::procedure::{Backup, Caught, Home, Latch, ReadText, Restore, SetPosition};
+use rtex_block::master::{ActiveCode, AskError, AxisConfig, AxisState, Failure, Progress, Received};
 use rtex_block::{
-    Alarm, Arguments, ErrorCode, LatchFlags, MacId, Nibble, NonCyclicCommand, NonCyclicResponse, Pr, ProfileFlags,
-    Response, Response32, SubCode, TypeCode,
+    Arguments, ErrorCode, LatchFlags, MacId, Nibble, NonCyclicCommand, NonCyclicResponse, Pr, ProfileFlags, Response,
+    Response32, SubCode, TypeCode,
 };
 
 /// Homing in the drive: Homing_Complete of an earlier homing is not the end of this one.
@@ -249,42 +247,6 @@ fn a_motion_with_a_latch_shows_it() {
     assert_eq!(LatchFlags::LATCH_COMP1.bits(), 1);
 }
 
-/// "Can this alarm be cleared?": the answer carries the alarm as its index echo.
-#[test]
-fn attributes_of_the_present_alarm() {
-    let mut pair = Pair::on(ActiveCode::CyclicPosition, Manners::POLITE);
-    pair.drive.set_config(pair.drive.config().with_alarm_attributes(0x0000_0101));
-    pair.drive.raise(Alarm { main: 38, sub: 1 });
-    pair.until("stopped", |pair| pair.axis.state() == AxisState::Stopped(StopReason::Alarm));
-    pair.axis.ask_alarm_attributes(CODES.alarm_attributes).unwrap();
-    let Progress::Done { value: NonCyclicResponse::Alarm(results) } = pair.outcome() else { panic!() };
-    assert_eq!((results.index, results.data), (38 << 8 | 1, 0x0101));
-    // Asked as any other alarm request it would wait for Index 0 and never end.
-    assert_eq!(pair.ask(alarm(CODES.alarm_attributes, 0)), Progress::Failed { error: Failure::TimedOut });
-    // An answer to another type is an older one.
-    pair.drive.set_config(pair.drive.config().with_manners(Manners::POLITE.with_stale_answers(3)));
-    pair.until("free", |pair| pair.axis.can_ask());
-    pair.axis.ask_alarm_attributes(CODES.alarm_attributes).unwrap();
-    let Progress::Done { value } = pair.outcome() else { panic!() };
-    assert_eq!(value.data(), Some(0x0101));
-
-    pair.until("free", |pair| pair.axis.can_ask());
-    let mut attributes = AlarmAttributes::new(CODES.alarm_attributes);
-    let want = Attributes { alarm: 38 << 8 | 1, bits: 0x0101 };
-    assert_eq!(pair.run(|axis| attributes.receive(axis)), Progress::Done { value: want });
-    // Without an alarm the modelled drive refuses.
-    let mut calm = Pair::new(ActiveCode::CyclicPosition, Manners::POLITE);
-    let mut attributes = AlarmAttributes::new(CODES.alarm_attributes);
-    let refused = Progress::Failed { error: Failure::CommandError(ErrorCode(0x0032)) };
-    assert_eq!(calm.run(|axis| attributes.receive(axis)), refused);
-
-    let mut history = AlarmHistory::new(CODES.alarm_history);
-    let mut entries = [Alarm { main: 1, sub: 1 }; 3];
-    assert_eq!(pair.run(|axis| history.receive(axis, &mut entries)), Progress::Done { value: () });
-    let none = Alarm { main: 0, sub: 0 };
-    assert_eq!(entries, [Alarm { main: 38, sub: 1 }, none, none]);
-}
-
 #[test]
 fn texts_and_parameters() {
     let mut pair = Pair::new(ActiveCode::CyclicPosition, Manners::POLITE.with_stale_answers(2).with_echo_lag(1));
@@ -310,6 +272,16 @@ fn texts_and_parameters() {
     let differs = Progress::Failed { error: Failure::Differs(pr(8, 1)) };
     assert_eq!(pair.run(|axis| restore.receive(axis, &list)), differs);
     assert_eq!(restore.place(), 1);
+    // Ten of class 7 (25, 29 to 37), two of class 8, none of class 9.
+    for (class, want) in [(7, Some(10)), (8, Some(2)), (9, None)] {
+        let index = pr(class, 0).index();
+        let count = NonCyclicCommand::Parameter(Arguments { type_code: CODES.parameter_count, index, data: 0 });
+        let counted = match pair.ask(count) {
+            Progress::Done { value } => value.data(),
+            _ => None,
+        };
+        assert_eq!(counted, want);
+    }
     // A parameter that does not exist.
     let mut restore = Restore::new(CODES.parameter_read);
     let refused = Progress::Failed { error: Failure::CommandError(ErrorCode(0x0032)) };
@@ -346,21 +318,24 @@ fn speed_in_r_min_after_a_reset() {
     assert_eq!(speed(&mut pair), (524_288, 60_000));
 }
 
-/// Response_Data2 and 3, and those of the sub block, by Pr7.30 to 7.34.
+/// Response_Data2 and 3, and those of the sub block: Pr7.30 to 7.34 each select one of them, and no other.
 #[test]
 fn selected_response_data() {
-    let mut pair = Pair::new(ActiveCode::CyclicPosition, Manners::POLITE);
-    pair.wide = true;
-    pair.until("off", |pair| pair.axis.state() == AxisState::Off);
-    assert!(matches!(pair.ask(set_position(0x21, 4_321)), Progress::Done { .. }));
-    for (number, code) in [(30, 7), (31, 8), (32, 7), (33, 7), (34, 8)] {
-        let write = Arguments { type_code: TypeCode::short(0x11), index: 0x0700 | number, data: code };
+    for place in 0..5 {
+        let mut pair = Pair::new(ActiveCode::CyclicPosition, Manners::POLITE);
+        pair.wide = true;
+        pair.until("off", |pair| pair.axis.state() == AxisState::Off);
+        assert!(matches!(pair.ask(set_position(0x21, 4_321)), Progress::Done { .. }));
+        let index = [0x071e, 0x071f, 0x0720, 0x0721, 0x0722][place];
+        let write = Arguments { type_code: TypeCode::short(0x11), index, data: 0x07 };
         assert!(matches!(pair.ask(NonCyclicCommand::Parameter(write)), Progress::Done { .. }));
+        (0..4).for_each(|_| pair.update());
+        let Received::Both(Response32 { main, sub }) = pair.received else { panic!() };
+        let mut want = [0; 5];
+        want[place] = 4_321;
+        assert_eq!([main.response_data2, main.response_data3, sub.data1, sub.data2, sub.data3], want);
+        assert_eq!(main.response_data1, 4_321);
     }
-    (0..4).for_each(|_| pair.update());
-    let Received::Both(Response32 { main, sub }) = pair.received else { panic!() };
-    assert_eq!((main.response_data2, main.response_data3), (4_321, 4_321));
-    assert_eq!((sub.data1, sub.data2, sub.data3), (4_321, 4_321, 4_321));
 }
 
 /// In the 32-byte mode sub-commands run beside requests of the main block.

@@ -91,7 +91,7 @@ mod tests {
     fn a_set_of_classes() {
         let mut found = Findings::default();
         assert!(found.is_empty());
-        assert_eq!(found.to_string(), "");
+        assert_eq!(found.to_string(), "-");
         found.insert(Kind::Third);
         found.insert(Kind::First);
         assert!(found.contains(Kind::First) && !found.contains(Kind::Second) && !found.is_empty());

@@ -6,25 +6,26 @@
 #[cfg(any(test, feature = "std"))]
 extern crate std;
 
+mod builder;
 mod class;
 mod counters;
 mod error_rate;
 mod errors;
 mod findings;
-mod flags;
 mod number;
 mod procedure;
 mod range;
+mod show;
 pub mod stream;
 
 pub use class::{Class, Classified};
 pub use counters::Counters;
 pub use error_rate::ErrorRate;
 pub use findings::Findings;
-pub use flags::write_names;
 pub use number::U24;
 pub use procedure::{Polling, Progress, Step};
 pub use range::OutOfRange;
+pub use show::write_names;
 
 /// What the macros of this crate name; not for use by hand.
 #[doc(hidden)]

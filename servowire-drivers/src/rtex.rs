@@ -70,6 +70,9 @@ pub struct Driver<'r, P, C, const N: usize> {
     late: u32,
     torn: u32,
     heard: [Heard; N],
+    /// When the period of the last exchange began.
+    #[cfg(feature = "async")]
+    began_ns: Option<u64>,
 }
 
 /// What was last heard of a drive.
@@ -101,6 +104,8 @@ impl<'r, P: Port, C: Clock, const N: usize> Driver<'r, P, C, N> {
             late: 0,
             torn: 0,
             heard: [Heard::default(); N],
+            #[cfg(feature = "async")]
+            began_ns: None,
         }
     }
 
@@ -183,6 +188,10 @@ impl<'r, P: Port, C: Clock, const N: usize> Driver<'r, P, C, N> {
     /// # Errors
     /// [`Error::Io`]; the next exchange goes on.
     pub fn exchange(&mut self, began_ns: u64) -> Result<Exchanged, Failure<P>> {
+        #[cfg(feature = "async")]
+        {
+            self.began_ns = Some(began_ns);
+        }
         let read = self.read(began_ns);
         let frames = self.reception.frames();
         if frames != self.frames {

@@ -92,7 +92,7 @@ fn on<W: Drawn>(ring: &Shared) -> Rtex<W> {
     panic!("{:?}", driver.master().ring().failure());
 }
 
-fn move_on<W: Drawn>(driver: &mut Rtex<W>) {
+fn move_on<W: Drawn, C: servowire_drivers::Clock>(driver: &mut Driver<'static, Bus<W>, C, AXES>) {
     for (k, axis) in driver.ring_mut().axes_mut().iter_mut().enumerate() {
         if axis.state() == AxisState::On {
             let to = axis.setpoint().wrapping_add(10 * (k as i32 + 1));
@@ -243,58 +243,87 @@ fn silence_switches_every_servo_off() {
     }
 }
 
+/// Random numbers.
+struct Draw(u64);
+
+impl Draw {
+    fn new() -> Self {
+        Self(0x9e37_79b9_7f4a_7c15)
+    }
+
+    fn below(&mut self, limit: u64) -> u64 {
+        self.0 ^= self.0 << 13;
+        self.0 ^= self.0 >> 7;
+        self.0 ^= self.0 << 17;
+        (self.0 >> 33) % limit
+    }
+}
+
+/// Faults that the driver has to survive; the environment may want more.
+fn faults() -> u64 {
+    let wanted = std::env::var("HOSTILE_EVENTS").ok().and_then(|events| events.parse().ok()).unwrap_or(0);
+    wanted.max(100_000)
+}
+
+/// Faults of the port, lost frames and stalls.
+const KINDS: usize = 3;
+
+fn hurt(ring: &Shared, draw: &mut Draw, kind: usize) {
+    let mut ring = ring.borrow_mut();
+    match kind {
+        0 => ring.fail_in = Some(draw.below(24) as u32),
+        1 => ring.lose_frames = 1 + draw.below(2) as u32,
+        _ => ring.stall_in = Some((draw.below(24) as u32, draw.below(700_000))),
+    }
+}
+
+fn heal(ring: &Shared) {
+    let mut ring = ring.borrow_mut();
+    (ring.fail_in, ring.lose_frames, ring.stall_in) = (None, 0, None);
+}
+
+/// Every position is there, and it is that of the last frames; nothing has stopped.
+fn is_well<C: servowire_drivers::Clock>(
+    ring: &Shared,
+    driver: &Driver<'static, Bus<u32>, C, AXES>,
+    what: &dyn std::fmt::Debug,
+) {
+    assert_eq!(driver.master().ring().failure(), None, "{what:?}");
+    for place in 0..AXES {
+        let said = driver.position(place).unwrap_or_else(|| panic!("{what:?}: no position of {place}"));
+        let is = ring.borrow().drives[place].position();
+        let per_update = 10 * (place as i32 + 1);
+        assert!(is.wrapping_sub(said).unsigned_abs() <= 3 * per_update as u32, "{what:?}: {said}, and it is at {is}");
+    }
+}
+
 /// Faults of the port, lost frames and stalls, 100,000 of them. The exchange after one is good; what it reads was asked for before the
 /// fault, so the one after that gives every position again, and they are those of the last frames.
 #[test]
 fn hostile_events_are_over_with_the_next_call() {
-    let events = std::env::var("HOSTILE_EVENTS").ok().and_then(|events| events.parse().ok()).unwrap_or(100_000);
-    let mut draw = 0x9e37_79b9_7f4a_7c15_u64;
-    let mut below = move |limit: u64| {
-        draw ^= draw << 13;
-        draw ^= draw >> 7;
-        draw ^= draw << 17;
-        (draw >> 33) % limit
-    };
-    let (mut count, mut kinds) = (0, [0_u64; 3]);
-    while count < events {
-        let external = below(2) == 1;
-        let ring = Ring::new(external, below(2) == 1);
+    let mut draw = Draw::new();
+    let (mut count, mut kinds) = (0, [0_u64; KINDS]);
+    while count < faults() {
+        let external = draw.below(2) == 1;
+        let ring = Ring::new(external, draw.below(2) == 1);
         let mut driver = on::<u32>(&ring);
         for _ in 0..2_000 {
-            let kind = below(3) as usize;
+            let kind = draw.below(KINDS as u64) as usize;
             kinds[kind] += 1;
             count += 1;
-            match kind {
-                0 => ring.borrow_mut().fail_in = Some(below(24) as u32),
-                1 => ring.borrow_mut().lose_frames = 1 + below(2) as u32,
-                _ => ring.borrow_mut().stall_in = Some((below(24) as u32, below(700_000))),
-            }
+            hurt(&ring, &mut draw, kind);
             move_on(&mut driver);
             let late = update(&ring, &mut driver).map_or(0, |exchanged| exchanged.frames_late);
-            {
-                let mut ring = ring.borrow_mut();
-                (ring.fail_in, ring.lose_frames, ring.stall_in) = (None, 0, None);
-            }
+            heal(&ring);
             // A late exchange has missed the next interrupt, so the same commands went out twice.
             for _ in 0..2 + late {
                 update(&ring, &mut driver).unwrap();
             }
-            for place in 0..AXES {
-                assert!(
-                    driver.position(place).is_some(),
-                    "event {count}, kind {kind}, {external} {:?} {:?}",
-                    driver.master().ring().failure(),
-                    ring.borrow().drives.map(|d| d.alarm())
-                );
-                let (said, is) = (driver.position(place).unwrap(), ring.borrow().drives[place].position());
-                let per_update = 10 * (place as i32 + 1);
-                assert!(is.wrapping_sub(said).unsigned_abs() <= 3 * per_update as u32, "{said}, and it is at {is}");
-            }
-            assert_eq!(driver.master().ring().failure(), None, "event {count}, kind {kind}");
+            is_well(&ring, &driver, &(count, kind, external));
         }
     }
     println!("{kinds:?}");
-    assert!(kinds.iter().all(|count| *count > events / 4));
+    assert!(count >= 100_000 && kinds.iter().all(|kind| *kind > count / 4));
 }
 
 /// The pin of XSYNC: an edge at each frame, but for those that are lost.
@@ -305,12 +334,22 @@ mod asynch {
 
     use servowire_drivers::rtex::asynch::Began;
 
+    use servowire_drivers::{Clock, Timer};
+
     use super::polls::{FOR_EVER, Looks, run};
     use super::*;
+
+    /// The driver after the start, with a clock that can be waited for.
+    fn waiting<W: Drawn, T: Timer>(ring: &Shared, timer: impl Fn(Watch) -> T) -> Driver<'static, Bus<W>, T, AXES> {
+        let (port, watch, master) = on::<W>(ring).release();
+        Driver::new(port, timer(watch), master, ring.borrow().reception())
+    }
 
     struct Pin {
         ring: Shared,
         lost: bool,
+        /// From the edge to the poll that sees it.
+        late_ns: u64,
     }
 
     impl embedded_hal::digital::ErrorType for Pin {
@@ -331,7 +370,7 @@ mod asynch {
         }
 
         async fn wait_for_falling_edge(&mut self) -> Result<(), Self::Error> {
-            let edge_ns = self.ring.borrow().next_frame_ns();
+            let edge_ns = self.ring.borrow().next_frame_ns() + self.late_ns;
             poll_fn(|_| {
                 let past = self.ring.borrow().now_ns >= edge_ns;
                 if past && !self.lost { Poll::Ready(Ok(())) } else { Poll::Pending }
@@ -347,11 +386,8 @@ mod asynch {
     #[test]
     fn a_lost_edge_is_healed_by_the_clock() {
         let ring = Ring::new(false, false);
-        let started = on::<u16>(&ring);
-        let (port, watch, master) = started.release();
-        let reception = ring.borrow().reception();
-        let mut driver = Driver::new(port, Looks(watch), master, reception);
-        let mut pin = Pin { ring: ring.clone(), lost: false };
+        let mut driver = waiting::<u16, _>(&ring, Looks);
+        let mut pin = Pin { ring: ring.clone(), lost: false, late_ns: 0 };
         for k in 0..20 {
             pin.lost = k % 5 == 4;
             ring.borrow_mut().let_in();
@@ -360,5 +396,111 @@ mod asynch {
             assert!(!exchanged.torn);
             assert_eq!(driver.master().ring().failure(), None);
         }
+    }
+
+    /// The executor wakes late, and the bank is switched when the period is over all the same: after any access, the blocks of two frames
+    /// are not taken as one, and the late exchange is counted. So with an edge that was lost.
+    #[test]
+    fn an_edge_that_is_noticed_late_tears_no_exchange() {
+        for lost in [false, true] {
+            let ring = Ring::new(false, false);
+            let mut driver = waiting::<u16, _>(&ring, Looks);
+            let mut pin = Pin { ring: ring.clone(), lost: false, late_ns: 0 };
+            run(driver.next(&mut pin), FOR_EVER).unwrap().unwrap();
+            let words = AXES * 8;
+            for at in 0..words {
+                // Half a period later the clock takes the place of a lost edge.
+                let late_ns = if lost { 250_000 } else { 19_000 };
+                (pin.lost, pin.late_ns) = (lost, late_ns);
+                ring.borrow_mut().read_of.clear();
+                ring.borrow_mut().stall_in = Some((at as u32, COM_NS - late_ns + 3_000));
+                let (_, exchanged) = run(driver.next(&mut pin), FOR_EVER).unwrap().unwrap();
+                ring.borrow_mut().stall_in = None;
+                let read = std::mem::take(&mut ring.borrow_mut().read_of);
+                let taken = &read[read.len() - words..];
+                assert!(taken.iter().all(|frame| *frame == taken[0]), "{lost} {at}: {read:?}");
+                assert_eq!((exchanged.frames_late, exchanged.torn), (1, false), "{lost} {at}");
+                (pin.lost, pin.late_ns) = (false, 0);
+                for _ in 0..3 {
+                    run(driver.next(&mut pin), FOR_EVER).unwrap().unwrap();
+                }
+                assert_eq!(driver.master().ring().failure(), None);
+            }
+        }
+    }
+
+    /// Dropped after each number of polls: the next call waits for the next edge, its exchange is whole, and every position is new.
+    #[test]
+    fn a_future_may_be_dropped_at_any_point() {
+        let ring = Ring::new(false, false);
+        let mut driver = waiting::<u32, _>(&ring, Looks);
+        let mut pin = Pin { ring: ring.clone(), lost: false, late_ns: 0 };
+        for polls in 0.. {
+            move_on(&mut driver);
+            let first = run(driver.next(&mut pin), polls);
+            let (began, exchanged) = run(driver.next(&mut pin), FOR_EVER).unwrap().unwrap();
+            assert_eq!((began, exchanged.frames_late, exchanged.torn), (Began::Edge, 0, false), "after {polls} polls");
+            is_well(&ring, &driver, &polls);
+            if first.is_some() {
+                assert!(polls > 1_000);
+                return;
+            }
+        }
+    }
+
+    /// A clock that steps on by 20 us with every poll that waits for it.
+    struct Steps(Watch);
+
+    impl Clock for Steps {
+        fn now_ns(&mut self) -> u64 {
+            self.0.now_ns()
+        }
+    }
+
+    impl Timer for Steps {
+        async fn wait_until(&mut self, ns: u64) {
+            poll_fn(|_| {
+                let mut ring = self.0.0.borrow_mut();
+                let until_ns = ns.min(ring.now_ns + 20_000);
+                ring.pass(until_ns);
+                if ring.now_ns >= ns { Poll::Ready(()) } else { Poll::Pending }
+            })
+            .await;
+        }
+    }
+
+    /// The faults of the blocking test, edges that are lost, and futures that are dropped: 100,000 of them, and after each all is well
+    /// again.
+    #[test]
+    fn hostile_events_are_over_with_the_next_call() {
+        let mut draw = Draw::new();
+        let (mut count, mut kinds) = (0, [0_u64; KINDS + 2]);
+        while count < faults() {
+            let ring = Ring::new(false, draw.below(2) == 1);
+            let mut driver = waiting::<u32, _>(&ring, Steps);
+            let mut pin = Pin { ring: ring.clone(), lost: false, late_ns: 0 };
+            for _ in 0..2_000 {
+                let kind = draw.below(kinds.len() as u64) as usize;
+                kinds[kind] += 1;
+                count += 1;
+                move_on(&mut driver);
+                let polls = if kind == KINDS { draw.below(30) as usize } else { FOR_EVER };
+                pin.lost = kind == KINDS + 1;
+                if kind < KINDS {
+                    hurt(&ring, &mut draw, kind);
+                }
+                let outcome = run(driver.next(&mut pin), polls);
+                // An edge that came while nobody waited has the same consequence as a late exchange.
+                let missed = outcome.map_or(1, |result| result.map_or(0, |(_, exchanged)| exchanged.frames_late));
+                pin.lost = false;
+                heal(&ring);
+                for _ in 0..2 + missed {
+                    run(driver.next(&mut pin), FOR_EVER).unwrap().unwrap();
+                }
+                is_well(&ring, &driver, &(count, kind));
+            }
+        }
+        println!("{kinds:?}");
+        assert!(count >= 100_000 && kinds.iter().all(|kind| *kind > count / 6));
     }
 }

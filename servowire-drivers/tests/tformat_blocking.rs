@@ -11,11 +11,13 @@
 )]
 
 mod bench;
+mod hostile;
 
-use bench::{Bench, HAND_OVER_NS, Misframed, Pin, Shared, Uart, Watch, events, line, scenario};
+use bench::{Bench, Misframed, Pin, Shared, Uart, Watch, line, place, scenario};
+use hostile::Calls;
 use servowire_drivers::tformat::blocking::Encoder;
 use servowire_drivers::{DriverEnable, Error};
-use servowire_world::{Fault, Kind, Planned, Scenario, Script, Tally, Transmission, Verdict};
+use servowire_world::{Fault, Planned, Scenario, Script, Verdict};
 use tformat::master::Line;
 use tformat::{Address, Almc, BitRate, Doubt, Policy, Resolution};
 
@@ -55,7 +57,7 @@ fn a_position_with_alarms_is_a_doubt() {
     let mut encoder = driver(&bench);
     let resolution = Resolution::new(23, 16).unwrap();
     let sample = encoder.read_position(resolution, Policy::STRICT).unwrap();
-    assert_eq!((sample.position.abs, sample.position.turns), (1, 3));
+    assert_eq!((sample.position.abs, sample.position.turns), (place(1), 3));
     let sent = bench.borrow().truth().transmission(bench.borrow().request.unwrap()).unwrap().end_ns;
     assert!(sample.sampled_ns.abs_diff(sent) < 1_000, "within the turn-around");
     bench.borrow_mut().encoder().set_alarms(Almc::BE, true);
@@ -130,48 +132,23 @@ fn a_babbling_line_is_given_up_and_used_again() {
 #[test]
 fn hostile_events_never_cost_a_good_answer() {
     let resolution = Resolution::new(23, 16).unwrap();
-    let (mut sum, mut seed) = (Tally::default(), 0);
-    let (mut good, mut failed, mut old, mut unknown) = (0_u64, 0_u64, 0_u64, 0_u64);
-    while sum.events() < events() {
+    let (mut calls, mut seed) = (Calls::default(), 0);
+    while calls.go_on() {
         let misframed = [Misframed::Dropped, Misframed::Delivered, Misframed::Reported][seed as usize % 3];
         let bench = Bench::new(scenario(seed), misframed);
         let mut encoder = driver_at(&bench, line());
         for call in 0..100 {
-            let before = bench.borrow().tally().of(Kind::Preempt);
-            let result = encoder.read_position(resolution, Policy::STRICT);
-            let mut bench = bench.borrow_mut();
-            assert!(!bench.driver_on, "seed {seed}, call {call}");
-            let Some(request) = bench.request else { continue };
-            let truth = bench.truth();
-            let preempted = bench.tally().of(Kind::Preempt) > before;
-            let sent_ns = truth.transmission(request).unwrap().end_ns;
-            let in_time = |answer: &Transmission| {
-                let soon = answer.start_ns <= sent_ns + 9_000 && answer.delivered_ns <= answer.end_ns + HAND_OVER_NS;
-                soon && answer.end_ns - answer.start_ns == 44_000
-            };
-            let whole = !preempted && truth.undisturbed(request) && truth.intact_answers(request).any(in_time);
-            match result {
-                Ok(sample) => match truth.verdict(request, sample.position.abs.into()) {
-                    Verdict::Fresh | Verdict::Forged { .. } => good += 1,
-                    Verdict::Old { .. } => {
-                        assert!(preempted, "seed {seed}, call {call}: an old position");
-                        old += 1;
-                    }
-                    Verdict::Unknown => unknown += 1,
-                },
+            match encoder.read_position(resolution, Policy::STRICT) {
                 // The request was damaged on the line, and the encoder says so.
-                Err(Error::Doubt(Doubt::RequestDamaged { .. })) => failed += 1,
-                Err(error) => {
-                    assert!(!whole, "seed {seed}, call {call}: {error:?}");
-                    failed += 1;
+                Err(Error::Doubt(Doubt::RequestDamaged { .. })) => calls.failed += 1,
+                result => {
+                    let result = result.map(|sample| sample.position.abs);
+                    bench.borrow_mut().judge(&mut calls, Some(result), seed, call);
                 }
             }
-            let past_ns = bench.now_ns().saturating_sub(1_000_000);
-            bench.world().truth_mut().forget_before(past_ns);
         }
-        sum.add(&bench.borrow().tally());
+        calls.tally.add(&bench.borrow().tally());
         seed += 1;
     }
-    println!("{sum}\n{good} good, {failed} failed, {old} old, {unknown} unknown");
-    assert!(good > failed);
+    calls.end();
 }

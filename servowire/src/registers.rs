@@ -93,9 +93,9 @@ impl Map {
         let map = &self.map;
         let (link, d) = (if map.link() { "up" } else { "down" }, map.online_d());
         line(out, "link", format_args!("{link}, quality {} of 15", map.quality()))?;
-        line(out, "drive", set(d))?;
-        line(out, "safe 1", set(map.online_1()))?;
-        line(out, "safe 2", set(map.online_2()))?;
+        line(out, "drive", d)?;
+        line(out, "safe 1", map.online_1())?;
+        line(out, "safe 2", map.online_2())?;
         let id = EncoderId::truncate(u32::from_be_bytes([0, byte(map, 0x0d) & 15, byte(map, 0x0e), byte(map, 0x0f)]));
         line(out, "encoder", encoder(id))?;
         let [edges, delay] = map.get(Register::Edges);
@@ -112,10 +112,10 @@ impl Map {
         let masks = format!("{:04X}h", u16::from_be_bytes(self.map.get(Register::MaskH)));
         let interrupts = self.map.masked_events();
         let (event, event_s) = self.map.take_events();
-        line(out, "events", format_args!("{}, mask {masks}", set(event)))?;
+        line(out, "events", format_args!("{event}, mask {masks}"))?;
         let [mask_s] = self.map.get(Register::MaskS);
-        line(out, "safe events", format_args!("{}, mask {mask_s:02X}h", set(event_s)))?;
-        line(out, "interrupts", set(interrupts))
+        line(out, "safe events", format_args!("{event_s}, mask {mask_s:02X}h"))?;
+        line(out, "interrupts", interrupts)
     }
 
     fn safe(&self, out: &mut String, id: EncoderId) -> fmt::Result {
@@ -181,12 +181,6 @@ fn line(out: &mut String, name: &str, text: impl Display) -> fmt::Result {
 
 fn byte(map: &Registers, address: u8) -> u8 {
     map.byte(address).unwrap_or(0)
-}
-
-/// Flags by their names.
-fn set(flags: impl Display) -> String {
-    let text = flags.to_string();
-    if text.is_empty() { "none".to_owned() } else { text }
 }
 
 fn encoder(id: EncoderId) -> String {

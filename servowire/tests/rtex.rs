@@ -274,6 +274,56 @@ fn logs_with_exchanged_bytes() {
         }
         let run = bench.decode("log.txt", text, &["--protocol", "rtex", "--bytes"]);
         assert!(run.err.contains(want), "{}", run.err);
+        // Said once more at the end, as the error that it is: what was shown is not what was sent.
+        assert_eq!(run.code, 1);
+        assert!(run.err.lines().last().is_some_and(|line| line.ends_with(": pack with shifts")), "{}", run.err);
+    }
+}
+
+/// A line that is a byte too short or too long costs that line: nothing is said of the order of the others.
+#[test]
+fn a_line_of_another_length() {
+    let bench = Bench::new();
+    let text = hex_log(&exchanges());
+    let line = text.lines().nth(3).unwrap();
+    for (other, refused) in [(format!("{line}00"), 1), (line[2..].to_owned(), 1), (line[..2].to_owned(), 1)] {
+        let run = bench.decode("log.txt", text.replacen(line, &other, 1), &["--protocol", "rtex", "--bytes", "--json"]);
+        let truncated = run.verdicts().iter().filter(|verdict| **verdict == "truncated").count();
+        assert_eq!((run.code, truncated), (1, refused), "{other}");
+        assert!(!run.err.contains("looks like") && !run.err.contains("shifts"), "{other}: {}", run.err);
+    }
+}
+
+/// A bus on which nothing answers is no drive 31.
+#[test]
+fn a_bus_of_ones() {
+    let bench = Bench::new();
+    let text = [&*"f".repeat(32); 6].join("\n");
+    let run = bench.decode("log.txt", text, &["--protocol", "rtex", "--bytes", "--json"]);
+    assert_eq!((run.code, run.verdicts()), (1, vec!["reserved".to_owned(); 6]));
+    assert!(run.err.contains("nothing answers on this bus"), "{}", run.err);
+}
+
+/// What goes on at the end of a log is said there, of one drive too.
+#[test]
+fn what_is_left_open() {
+    let bench = Bench::new();
+    let block = |bytes: [u8; 10]| format!("{}000000000000", bytes.map(|byte| format!("{byte:02x}")).concat());
+    let at_end = |lines: &[String], more: &[&str]| {
+        let run =
+            bench.decode("log.txt", lines.join("\n"), &[&["--protocol", "rtex", "--bytes", "--json"], more].concat());
+        run.is_good().json().last().unwrap()["fields"]["note"].as_str().unwrap().to_owned()
+    };
+    let command = |k: u8, code| block([(k % 4) << 5 | 5, code, 0x80, 0, 0, 0, 0, 0, 7, 0]);
+    let busy = |k: u8| block([0x80 | (k % 4) << 5 | 5, 0x26, 0xc1, 0, 0, 0, 0, 0, 7, 0x10]);
+    let asked: Vec<_> = (1..=9).flat_map(|k| [command(k, 0x26), busy(k)]).collect();
+    let silent: Vec<_> = asked[..2].iter().cloned().chain((2..=9).map(|k| command(k, 0x20))).collect();
+    for more in [&[][..], &["--mac-id", "5"], &["--period", "1ms"]] {
+        assert_eq!(
+            at_end(&asked, more),
+            "at the end drive 5 has not answered CP parameter (26h) in 9 responses, 9 of them busy"
+        );
+        assert_eq!(at_end(&silent, more), "at the end drive 5 has not answered the last 8 commands");
     }
 }
 

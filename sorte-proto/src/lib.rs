@@ -15,7 +15,6 @@ const fn stride(thin: usize) -> usize {
 pub mod cut_through;
 
 mod address;
-mod builders;
 mod clock;
 mod crc;
 mod delay_req;
@@ -24,7 +23,6 @@ mod discovery;
 pub mod drv8711;
 mod error;
 mod exchange;
-mod flags;
 pub mod follow;
 mod frame;
 mod frame_type;

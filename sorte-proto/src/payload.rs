@@ -2,7 +2,6 @@ use core::fmt;
 
 use servowire_core::OutOfRange;
 
-use crate::flags::show_flags;
 use crate::pto::{Direction, Pto};
 
 /// A device's share of the master frame in the CNC application: four bytes.
@@ -72,7 +71,7 @@ bitflags::bitflags! {
     }
 }
 
-show_flags!(MotorMask);
+servowire_core::show_flags!(MotorMask);
 
 impl TryFrom<u8> for MotorMask {
     type Error = OutOfRange;

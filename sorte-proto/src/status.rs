@@ -1,5 +1,3 @@
-use crate::flags::show_flags;
-
 /// The STATUS byte of every frame.
 ///
 /// ```text
@@ -29,7 +27,7 @@ bitflags::bitflags! {
     }
 }
 
-show_flags!(Status);
+servowire_core::show_flags!(Status);
 
 impl Status {
     /// DISCOVERY frames of the master but the last, and device frames of the IO exchange.
@@ -87,7 +85,7 @@ mod tests {
     #[test]
     fn a_log_shows_names_and_the_rest() {
         for (raw, text) in
-            [(0x00, ""), (0x05, "LAST ERROR"), (0x30, "30h"), (0x41, "LAST 40h"), (0x18, "STATE_CHANGE 10h")]
+            [(0x00, "-"), (0x05, "LAST ERROR"), (0x30, "30h"), (0x41, "LAST 40h"), (0x18, "STATE_CHANGE 10h")]
         {
             assert_eq!(Status::from_bits_retain(raw).to_string(), text);
         }

@@ -39,7 +39,6 @@
 //! ]);
 //! ```
 
-use crate::flags::show_flags;
 use crate::pto::StartTime;
 
 /// Width of the pulse in ns: PWIDTH = 399.
@@ -99,7 +98,7 @@ bitflags::bitflags! {
     }
 }
 
-show_flags!(Flags);
+servowire_core::show_flags!(Flags);
 
 impl Flags {
     /// With `flag` set or cleared.

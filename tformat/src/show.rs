@@ -23,26 +23,4 @@ macro_rules! one_line {
     };
 }
 
-/// Implements `Display` and `defmt::Format` of a flag set: the names of the set bits, `OF BE BA`.
-/// Every bit of the flag sets of this crate has a name.
-macro_rules! flags {
-    ($type:ty) => {
-        impl core::fmt::Display for $type {
-            fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
-                servowire_core::write_names(f, self.iter_names().map(|(name, _)| name))
-            }
-        }
-
-        #[cfg(feature = "defmt")]
-        #[cfg_attr(docsrs, doc(cfg(feature = "defmt")))]
-        impl defmt::Format for $type {
-            fn format(&self, f: defmt::Formatter<'_>) {
-                for (at, (name, _)) in self.iter_names().enumerate() {
-                    defmt::write!(f, "{=str}{=str}", if at > 0 { " " } else { "" }, name);
-                }
-            }
-        }
-    };
-}
-
-pub(crate) use {flags, one_line};
+pub(crate) use one_line;

@@ -40,7 +40,7 @@ bitflags::bitflags! {
     }
 }
 
-crate::show::flags!(StatusField);
+servowire_core::show_flags!(StatusField);
 
 impl StatusField {
     /// What the encoder says of a damaged request.
@@ -103,7 +103,7 @@ bitflags::bitflags! {
     }
 }
 
-crate::show::flags!(Almc);
+servowire_core::show_flags!(Almc);
 
 impl Almc {
     /// The alarms that stay until ID 7 or ID C clears them (mask 0x7d of one drive maker).

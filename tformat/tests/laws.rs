@@ -108,7 +108,8 @@ fn hostile_zero_presets() {
         let mut zero = SingleTurnZero::set_and_shift_commutation_angle(resolution, 10);
         let step = zero.start(bench.ready_ns);
         let end = bench.run(step, |outcome, ready_ns| zero.receive(outcome, ready_ns));
-        if bench.forged_requests > 0 || bench.seen.forged + bench.seen.undetected > 0 {
+        // What was taken for a response to ID 8 or C is no excuse: it is read back. A wrong reading is one.
+        if bench.forged_requests + bench.misread > 0 {
             return bench;
         }
         done_once_at_most(&end, bench.device.effects(), seed);
@@ -131,7 +132,8 @@ fn hostile_turn_zeros() {
         let mut zero = MultiTurnZero::set_and_lose_multi_turn_reference(resolution, 1);
         let step = zero.start(bench.ready_ns);
         let end = bench.run(step, |outcome, ready_ns| zero.receive(outcome, ready_ns));
-        if bench.forged_requests > 0 || bench.seen.forged + bench.seen.undetected > 0 {
+        // What was taken for a response to ID 8 or C is no excuse: it is read back. A wrong reading is one.
+        if bench.forged_requests + bench.misread > 0 {
             return bench;
         }
         done_once_at_most(&end, bench.device.effects(), seed);
@@ -141,9 +143,12 @@ fn hostile_turn_zeros() {
     ends.print("turn zeros");
 }
 
-/// Law 5 for ID C: two attempts in a row, the second after whatever became of the first.
+/// Law 5 for ID C: two attempts in a row, the second after whatever became of the first. Ten responses are no proof, but
+/// what is said to be done and is not has its reason: the encoder heard what nobody had sent then, or an older response was
+/// taken for one of the ten.
 #[test]
 fn hostile_turn_resets() {
+    let mut ends = Ends::default();
     runs("turn resets", 4, |seed| {
         let mut bench = bench(seed, MILD);
         bench.moves = false;
@@ -157,16 +162,18 @@ fn hostile_turn_resets() {
             if bench.forged_requests > 0 {
                 return bench;
             }
-            assert!(effects <= 1, "seed {seed}");
-            if matches!(end, Err(Error::NotDone { .. })) {
-                assert_eq!(effects, 0, "seed {seed}");
+            ends.count(&end);
+            if end.is_err() || bench.misheard == 0 && bench.seen.forged + bench.seen.undetected == 0 {
+                done_once_at_most(&end, effects, seed);
             }
+            assert!(effects <= 1, "seed {seed}");
         }
         bench
     });
+    ends.print("turn resets");
 }
 
-/// Errors may be cleared as often as one likes: the alarms are gone in the end, position and turns are not.
+/// Errors may be cleared as often as one likes: they are gone when it is done, position and turns are not.
 #[test]
 fn hostile_error_resets() {
     runs("error resets", 4, |seed| {
@@ -177,7 +184,10 @@ fn hostile_error_resets() {
         bench.device.set_alarms(Almc::CE, false);
         let mut reset = Reset::clear_errors();
         let step = reset.start(bench.ready_ns);
-        let _ = bench.run(step, |outcome, ready_ns| reset.receive(outcome, ready_ns));
+        let end = bench.run(step, |outcome, ready_ns| reset.receive(outcome, ready_ns));
+        if end.is_ok() && bench.misheard == 0 && bench.seen.forged + bench.seen.undetected == 0 {
+            assert!(bench.device.almc().is_empty() && bench.device.effects() > 0, "seed {seed}");
+        }
         assert!(bench.forged_requests > 0 || (bench.device.abs().get(), bench.device.abm().get()) == (5, 7));
         bench
     });

@@ -23,6 +23,11 @@ pub struct Behaviour {
     pub first_place: u8,
     /// A frame whose head it could not read does not count in its V-frame.
     pub stalls_on_bad_head: bool,
+    /// The acknowledgement of a write repeats LLEN, without data; otherwise LLEN is 0.
+    pub acknowledges_with_length: bool,
+    /// From the sampling edge at the encoder to the instant of its position, in eighths of a bit (13.333 ns). The manual promises
+    /// less than 100 ns, so up to 7 (SICK manual, p. 12).
+    pub sampling_lag: u8,
     /// H-frames between a request and the first symbol of its answer.
     pub latency: u16,
     /// Every n-th request is forgotten; 0 none.
@@ -40,6 +45,8 @@ impl Behaviour {
         sync_frames: 8,
         first_place: 0,
         stalls_on_bad_head: false,
+        acknowledges_with_length: false,
+        sampling_lag: 0,
         latency: 4,
         forgets_every: 0,
     };

@@ -71,6 +71,18 @@ impl Master {
 
     /// The period of the external pulse in eighths of a bit (13.333 ns each), for
     /// [`set_frames_per_pulse`](Self::set_frames_per_pulse).
+    ///
+    /// ```
+    /// use hdsl::master::Master;
+    /// use hdsl::sync::Es;
+    /// use hdsl::{Dialect, Error};
+    /// let mut master = Master::new(Dialect::SICK);
+    /// assert_eq!(master.set_frames_per_pulse(Es::new(4)), Err(Error::NoPulse));
+    /// // 62.5 us at 75 MHz
+    /// master.set_pulse_period(4687);
+    /// assert_eq!(master.set_frames_per_pulse(Es::new(4)), Ok(()));
+    /// assert!(master.is_on_pulse());
+    /// ```
     pub const fn set_pulse_period(&mut self, period: u32) {
         self.pulse = Some(period);
     }

@@ -104,6 +104,27 @@ impl Report {
 
     /// What the pipe channel brought; `None` if it had no data in this frame.
     ///
+    /// ```
+    /// use hdsl::device::Device;
+    /// use hdsl::master::Master;
+    /// use hdsl::{Dialect, EncoderId};
+    ///
+    /// let mut master = Master::new(Dialect::SICK);
+    /// let mut encoder = Device::new(EncoderId::try_from(0x00153)?);
+    /// let mut data = Vec::new();
+    /// for frame in 0..100 {
+    ///     // A byte in every tenth frame.
+    ///     encoder.pipe = (frame % 10 == 0).then_some(frame);
+    ///     let bits = encoder.answer(master.transmission().head.bits(), 0).unwrap_or(u64::MAX);
+    ///     if let Some(character) = master.finish_bits(bits, None, None).pipe_character() {
+    ///         data.push(character?.byte());
+    ///     }
+    /// }
+    /// // The link runs from frame 61 on.
+    /// assert_eq!(data, [70, 80, 90]);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    ///
     /// # Errors
     /// [`Error::InvalidWord`].
     pub fn pipe_character(&self) -> Option<Result<Character, Error>> {

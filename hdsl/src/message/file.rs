@@ -59,7 +59,7 @@ impl fmt::Display for FileName {
     }
 }
 
-crate::ranged::format_as_displayed!(FileName);
+servowire_core::format_as_displayed!(FileName);
 
 /// Rights and size of the loaded file, as FILESTAT (132h) gives them.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]

@@ -400,7 +400,7 @@ impl fmt::Display for LongAnswer {
     }
 }
 
-crate::ranged::format_as_displayed!(Data, LongRequest, LongAnswer);
+servowire_core::format_as_displayed!(Data, LongRequest, LongAnswer);
 
 #[cfg(feature = "arbitrary")]
 #[cfg_attr(docsrs, doc(cfg(feature = "arbitrary")))]

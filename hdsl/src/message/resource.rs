@@ -226,7 +226,7 @@ impl fmt::Display for ResourceError {
 
 impl core::error::Error for ResourceError {}
 
-crate::ranged::format_as_displayed!(ResourceError);
+servowire_core::format_as_displayed!(ResourceError);
 
 #[cfg(test)]
 mod tests {

@@ -25,6 +25,37 @@ impl core::fmt::Display for Request {
 /// In every H-frame [`receive`](Self::receive) takes the master's symbol and [`transmit`](Self::transmit) gives the
 /// symbol of the answer. A request that is not understood is answered with SNAK or LNAK here; all others are given
 /// to the caller, who answers whenever it can.
+///
+/// ```
+/// use hdsl::MasterSymbol;
+/// use hdsl::message::{Data, LongAnswer, Request, Requester, Responder, ShortAnswer, ShortRequest, RemoteRegister};
+///
+/// let (mut master, mut encoder) = (Requester::new(Default::default()), Responder::new());
+/// master.start_short(ShortRequest::Read(RemoteRegister::PING))?;
+/// let mut answer = None;
+/// // An H-frame each.
+/// while answer.is_none() {
+///     match encoder.receive(master.transmit()) {
+///         Some(Request::Short(request)) => {
+///             encoder.answer_short(ShortAnswer { register: request.register(), data: Some(0x5a) });
+///         }
+///         Some(Request::Long(request)) => encoder.answer_long(&LongAnswer::to(&request, Ok(Data::NONE))),
+///         None => {}
+///     }
+///     answer = master.receive(Some(encoder.transmit())).short;
+/// }
+/// assert_eq!(answer.and_then(Result::ok).and_then(|answer| answer.data), Some(0x5a));
+///
+/// // A symbol that could not be read spoils the message that it was part of.
+/// let half = ShortRequest::Read(RemoteRegister::PING).emit();
+/// for at in 0..6 {
+///     if at == 3 {
+///         encoder.receive_nothing();
+///     }
+///     assert_eq!(encoder.receive(half.nibble(at).map_or(MasterSymbol::Idle, MasterSymbol::Data)), None);
+/// }
+/// # Ok::<(), hdsl::Error>(())
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Responder {

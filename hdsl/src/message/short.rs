@@ -207,7 +207,7 @@ impl fmt::Display for ShortAnswer {
     }
 }
 
-crate::ranged::format_as_displayed!(RemoteRegister, ShortRequest, ShortAnswer);
+servowire_core::format_as_displayed!(RemoteRegister, ShortRequest, ShortAnswer);
 
 #[cfg(feature = "arbitrary")]
 impl<'a> arbitrary::Arbitrary<'a> for RemoteRegister {

@@ -36,6 +36,17 @@ impl Registers {
     }
 
     /// The head of the next H-frame is on the line: POSTX 0.
+    ///
+    /// ```
+    /// use hdsl::Dialect;
+    /// use hdsl::registers::{Register, Registers};
+    /// let mut memory = [0; Registers::LEN];
+    /// // The safe positions of a V-frame are there.
+    /// memory[0x4e] = 3;
+    /// let mut map = Registers::from_bytes(&Dialect::SICK, memory);
+    /// map.request_sent();
+    /// assert_eq!(map.get(Register::PosTx), [0]);
+    /// ```
     pub fn request_sent(&mut self) {
         self.put(Register::PosTx, [0]);
     }

@@ -49,6 +49,56 @@ impl<E: fmt::Display> fmt::Display for BusError<E> {
 ///
 /// Messages are started with `start_...` and asked for with `poll_...` until they give something; their ends are known by
 /// the events FRES and FREL, which are taken then.
+///
+/// ```
+/// use hdsl::Dialect;
+/// use hdsl::message::{LongRequest, RemoteRegister, ResourceAddress, ShortRequest};
+/// use hdsl::registers::{RegisterBus, RemoteReceiver, Registers};
+///
+/// /// Memory that a receiver shares; here one that answers at once.
+/// struct Shared([u8; Registers::LEN]);
+///
+/// impl RegisterBus for Shared {
+///     type Error = core::convert::Infallible;
+///
+///     fn read(&mut self, address: u8, bytes: &mut [u8]) -> Result<(), Self::Error> {
+///         let from = usize::from(address);
+///         bytes.copy_from_slice(&self.0[from..from + bytes.len()]);
+///         Ok(())
+///     }
+///
+///     fn write(&mut self, address: u8, bytes: &[u8]) -> Result<(), Self::Error> {
+///         let from = usize::from(address);
+///         self.0[from..from + bytes.len()].copy_from_slice(bytes);
+///         match (address, bytes) {
+///             // SLAVE_REG_CTRL: S_PC_DATA is 07h, event FRES.
+///             (0x40, _) => (self.0[0x37], self.0[0x3d]) = (7, 0x01),
+///             // LSTA in PC_CTRL: PC_BUFFER, event FREL.
+///             (0x2c, [1]) => {
+///                 self.0[0x20..0x28].copy_from_slice(b"RESOLUTN");
+///                 self.0[0x05] = 0x02;
+///             }
+///             _ => {}
+///         }
+///         Ok(())
+///     }
+/// }
+///
+/// let mut memory = [0; Registers::LEN];
+/// // FREL and FRES in the online status.
+/// (memory[0x51], memory[0x53]) = (0x02, 0x01);
+/// let mut remote = RemoteReceiver::new(Dialect::TI, Shared(memory));
+///
+/// remote.start_short(ShortRequest::Read(RemoteRegister::SRSSI)).unwrap();
+/// assert_eq!(remote.poll_short(), Ok(Some(7)));
+/// remote.start_long(&LongRequest::read_name(ResourceAddress::RESOLUTN)).unwrap();
+/// let name = loop {
+///     if let Some(data) = remote.poll_long().unwrap() {
+///         break data;
+///     }
+/// };
+/// assert_eq!(name.as_bytes(), b"RESOLUTN");
+/// ```
 #[derive(Debug)]
 pub struct RemoteReceiver<B> {
     bus: B,

@@ -2,10 +2,10 @@
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a test fails by panicking")]
 
 use hdsl::cable::{Cable, Disturbance};
-use hdsl::device::Device;
+use hdsl::device::{Device, Heard};
 use hdsl::master::{Master, Report, State};
 use hdsl::registers::{Interrupts, Register, Registers};
-use hdsl::{Dialect, EncoderId};
+use hdsl::{Dialect, EncoderId, Window};
 
 pub(crate) struct Bench {
     pub(crate) master: Master,
@@ -45,9 +45,15 @@ impl Bench {
 
     pub(crate) fn frame_with(&mut self, late: Option<i16>) -> Report {
         self.position += self.speed;
-        let head = self.cable.down(self.master.transmission().head.bits());
-        let answer = self.device.answer(head, self.position as u64);
-        let samples = self.cable.up(answer);
+        let line = self.cable.down_samples(self.master.transmission().head);
+        let samples = if let Some(heard) = Heard::on_line(&line) {
+            let answer = self.device.answer(heard.bits, self.position as u64);
+            self.cable.up_heard(answer, &heard)
+        } else {
+            // The encoder's own clock goes on.
+            let answer = self.device.answer(Window::EMPTY, self.position as u64);
+            self.cable.up(answer)
+        };
         let report = *self.master.finish(&samples, late).unwrap();
         self.interrupts = self.map.apply(&report);
         report

@@ -197,3 +197,52 @@ fn every_flip_and_truncation_of_every_layout() {
     }
     assert!(Layout::ALL.into_iter().all(|layout| seen.contains(&layout)));
 }
+
+/// Each argument that a response repeats is compared, in the order address, bank, data; the data of a read are not sent.
+#[test]
+fn repeated_arguments() {
+    use crate::error::EchoField::{self, Address, Bank, Coefficient, Id};
+    /// The field that is wrong, what the response has, and what was sent.
+    type Wrong = Option<(EchoField, u32, u32)>;
+    let ea = EncoderAddress::truncate(5);
+    let word = |data, address| Data::Eeprom { data, address };
+    let of_bank = |data, bank, address| Data::EepromBank { data, bank, address, bank_error: false };
+    let read = Operation::EepromRead { address: 0x42 };
+    let address = crate::UserAddress::new(0x42).unwrap();
+    let write = Operation::EepromWrite { address, data: 0x1234 };
+    let bank_read = Operation::EepromReadBank { bank: 3, address: 0x42 };
+    let bank_write = Operation::EepromWriteBank { bank: 3, address: 0x42, data: 0x1234 };
+    let (id, other) = (EncoderId::truncate(0x12_3456), EncoderId::truncate(0x12_3457));
+    let (coefficient, small) = (U19::truncate(0x4_0001), U19::truncate(1));
+    let rows: [(Operation, Data, Wrong); 18] = [
+        (read, word(0xbeef, 0x42), None),
+        (read, word(0xbeef, 0x43), Some((Address, 0x43, 0x42))),
+        (write, word(0x1234, 0x42), None),
+        (write, word(0x1235, 0x42), Some((EchoField::Data, 0x1235, 0x1234))),
+        (write, word(0x1235, 0x43), Some((Address, 0x43, 0x42))),
+        (bank_read, of_bank(0xbeef, 3, 0x42), None),
+        (bank_read, of_bank(0xbeef, 2, 0x42), Some((Bank, 2, 3))),
+        (bank_read, of_bank(0xbeef, 2, 0x43), Some((Address, 0x43, 0x42))),
+        (bank_write, of_bank(0x1234, 3, 0x42), None),
+        (bank_write, of_bank(0x1234, 2, 0x42), Some((Bank, 2, 3))),
+        (bank_write, of_bank(0x1235, 2, 0x42), Some((Bank, 2, 3))),
+        (bank_write, of_bank(0x1235, 3, 0x42), Some((EchoField::Data, 0x1235, 0x1234))),
+        (Operation::IdWrite1 { id }, Data::Id { id: other }, Some((Id, 0x12_3457, 0x12_3456))),
+        (Operation::IdWrite2 { id }, Data::Id { id: other }, Some((Id, 0x12_3457, 0x12_3456))),
+        (Operation::SetAddress2 { id }, Data::Id { id: other }, Some((Id, 0x12_3457, 0x12_3456))),
+        (Operation::IdRead1, Data::Id { id: other }, None),
+        (Operation::CoefficientWrite { coefficient }, Data::Coefficient { coefficient }, None),
+        (
+            Operation::CoefficientWrite { coefficient },
+            Data::Coefficient { coefficient: small },
+            Some((Coefficient, 1, 0x4_0001)),
+        ),
+    ];
+    for (operation, data, wrong) in rows {
+        let request = Request::new(ea, operation);
+        let response = Response::new(ea, request.command(), EncoderStatus::empty(), data);
+        let got = Response::parse(&request.expected(Resolution::default()), &response.emit());
+        let want = wrong.map_or(Ok(response), |(field, got, want)| Err(Error::EchoMismatch { field, got, want }));
+        assert_eq!(got, want, "{operation:?}");
+    }
+}

@@ -92,6 +92,11 @@ fn judge<const N: usize>(bench: &Bench<N>, id: Id, value: u64, shown: &mut Shown
     verdict
 }
 
+/// A response of so many frames with all the idle time between them that a master allows.
+fn longest_ns(rate: BitRate, frames: u64) -> u64 {
+    frames * frame_ns(rate) + (frames - 1) * idle_ns(rate)
+}
+
 /// Law 4: no encoder speaks at `ready_ns` or later that began in time, which for the last of `places` on a bus is as many
 /// longest responses and pauses later. A request that the line repeats is answered twice.
 fn line_is_free<const N: usize>(bench: &Bench<N>, id: Id, at_ns: u64, ready_ns: u64, places: u64, seed: u64) {
@@ -99,13 +104,12 @@ fn line_is_free<const N: usize>(bench: &Bench<N>, id: Id, at_ns: u64, ready_ns: 
     if truth.transmission(id).is_none_or(|sent| sent.end_ns > sent.sent_ns) {
         return;
     }
-    let longest_ns = |units: u64| units * frame_ns(bench.rate) + (units - 1) * idle_ns(bench.rate);
-    let places_ns = (places - 1) * (longest_ns(4) + between_ns(bench.rate));
+    let places_ns = (places - 1) * (longest_ns(bench.rate, 4) + between_ns(bench.rate));
     let last_ns = at_ns + frame_ns(bench.rate) + TIMEOUT_NS + places_ns;
     let in_time = |t: &&Transmission| {
         t.answers == Some(id)
             && t.start_ns <= last_ns
-            && t.end_ns - t.start_ns <= longest_ns(t.units as u64)
+            && t.end_ns - t.start_ns <= longest_ns(bench.rate, t.units as u64)
             && matches!(t.speaker, Speaker::Device(_))
     };
     let late = truth.speaking_from(ready_ns).find(in_time);
@@ -209,6 +213,15 @@ pub fn bus(setup: &Setup, turns: u64, shown: &mut Shown) {
                 Progress::Failed { error, .. } => panic!("seed {seed}: {error}"),
             }
         };
+        // Law 2: before the time of the last place is over, nobody who was asked is given up.
+        let last_ns = at_ns + frame_ns(rate) + TIMEOUT_NS + 8 * longest_ns(rate, 4) + 7 * between_ns(rate);
+        let missing = transaction.bus().missing();
+        assert!(
+            missing.is_empty() || bench.world.now_ns() > last_ns,
+            "seed {seed} turn {turn}: {:08b} given up at {}, not {last_ns}",
+            missing.bits(),
+            bench.world.now_ns()
+        );
         if on_time(&bench, id, at_ns) {
             for ea in asked.iter() {
                 if let Some(reading) = transaction.reading(ea) {

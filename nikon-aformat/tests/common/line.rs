@@ -2,7 +2,9 @@
 
 use nikon_aformat::device::{Device, Encoders, Transmission};
 use nikon_aformat::{BitRate, Frames};
-use servowire_world::{Event, Framing, Host, Id, Message, Rates, Scenario, Stamp, Transmission as Sent, Wire, World};
+use servowire_world::{
+    Event, Framing, Host, Id, Message, Rates, Scenario, Speaker, Stamp, Transmission as Sent, Wire, World,
+};
 
 /// What the host is given at once.
 #[derive(Debug)]
@@ -39,6 +41,9 @@ pub struct Bench<const N: usize> {
     pub handed: Vec<(u64, u64, usize)>,
     /// What each encoder keeps, as it was last seen: a change is an act.
     kept: [Kept; N],
+    /// Frames that the first encoder heard and that no master sent like that, and what others than encoders and master put on
+    /// the line.
+    pub misheard: u64,
     /// Bank and address that are watched.
     pub watch: (u8, u8),
 }
@@ -106,7 +111,7 @@ impl<const N: usize> Bench<N> {
         let watch = (0, 0);
         let kept = encoders.all.map(|device| kept(&device, watch));
         let handed = vec![(0, 0, 0)];
-        Self { world: World::new(wire, scenario), encoders, rate, serial: 0, handed, kept, watch }
+        Self { world: World::new(wire, scenario), encoders, rate, serial: 0, handed, kept, misheard: 0, watch }
     }
 
     /// What each encoder keeps now.
@@ -135,6 +140,8 @@ impl<const N: usize> Bench<N> {
                 Event::Heard { device, unit } => {
                     self.serial += 1;
                     let at = usize::from(device);
+                    let foreign = !matches!(unit.origin.speaker, Speaker::Host | Speaker::Device(_));
+                    self.misheard += u64::from(foreign || at == 0 && unit.damaged);
                     let (content, framed) = unit.bits.content();
                     let serial = self.serial;
                     self.encoders.all[at].set_position(serial as u32 & 0xf_ffff, (serial >> 20) as u32 & 0xffff);

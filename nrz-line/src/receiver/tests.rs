@@ -134,6 +134,26 @@ fn other_formats_are_refused() {
     assert_eq!(Format::new(8, 9), Err(FormatError::ContentBits { got: 9 }));
 }
 
+/// Start bit, 8 or 16 content bits, delimiter.
+#[test]
+fn bits_of_a_field() {
+    assert_eq!([8, 16].map(|bits| Format::new(4, bits).map(Format::field_bits)), [Ok(10), Ok(18)]);
+}
+
+/// A word has 64 samples; what is taken is gone.
+#[test]
+fn samples_that_are_left() {
+    assert_eq!([0, 1, 63, 64, 65, 1000].map(|len| Samples::partial(0, len).len()), [0, 1, 63, 64, 64, 64]);
+    assert_eq!(Samples::new(0).len(), 64);
+    // Ten samples of idle line, a start bit, eight zeros, and no delimiter: the field ends in the middle of its last bit.
+    let mut samples = Samples::partial(0x3ff, 60);
+    let field = Receiver::new(Format::new(4, 8).unwrap()).feed(&mut samples);
+    assert_eq!(
+        (field.map(|f| f.delimiter), samples.len(), samples.is_empty()),
+        (Some(false), 60 - 10 - 9 * 4 - 3, false)
+    );
+}
+
 proptest! {
     /// Sample by sample, run by run and word by word give the same fields, however the input is cut.
     #[test]

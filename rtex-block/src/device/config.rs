@@ -1,5 +1,4 @@
 use super::manners::Manners;
-use crate::builder::builder;
 use crate::error_code::Alarm;
 use crate::header::MacId;
 use crate::position::Gear;
@@ -26,6 +25,8 @@ pub struct OpenCodes {
     pub alarm_attributes: TypeCode,
     /// Parameter: read the initial value.
     pub parameter_initial: TypeCode,
+    /// Parameter: read the number of parameters in a class, which the high byte of the index names.
+    pub parameter_count: TypeCode,
     /// Homing: arm both latches.
     pub latch_arm: u8,
     /// Homing: a motion of the drive to its origin.
@@ -45,6 +46,7 @@ impl OpenCodes {
         alarm_clear: TypeCode::short(0x03),
         alarm_attributes: TypeCode::short(0x76),
         parameter_initial: TypeCode::short(0x77),
+        parameter_count: TypeCode::short(0x7a),
         latch_arm: 0x78,
         homing: 0x79,
         communication_lost: Alarm { main: 80, sub: 0 },
@@ -120,7 +122,7 @@ impl DriveConfig {
         }
     }
 
-    builder! {
+    servowire_core::builder! {
         with_update_ns: update_ns, u32;
         with_communications: communications, u8;
         with_sync_exchanges: sync_exchanges, u16;

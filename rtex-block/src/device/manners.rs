@@ -1,5 +1,3 @@
-use crate::builder::builder;
-
 /// How impolite a modelled drive is. The polite one of [`POLITE`](Self::POLITE) does everything as soon as it can.
 ///
 /// Each of them is allowed by what the documents at hand say, or left open by them; a master has to live with any
@@ -36,6 +34,10 @@ pub struct Manners {
     pub always_in_position: bool,
     /// WNG is set in every answer.
     pub warns: bool,
+    /// An alarm is not cleared by command: that fails with ERR.
+    pub refuses_to_clear: bool,
+    /// The command that clears an alarm is executed, and the alarm is there all the same.
+    pub alarm_stays: bool,
 }
 
 impl Manners {
@@ -54,9 +56,11 @@ impl Manners {
         homed_at_start: false,
         always_in_position: false,
         warns: false,
+        refuses_to_clear: false,
+        alarm_stays: false,
     };
 
-    builder! {
+    servowire_core::builder! {
         with_echo_lag: echo_lag, u8;
         with_in_progress_late: in_progress_late, u16;
         with_servo_off_late: servo_off_late, u16;
@@ -70,6 +74,8 @@ impl Manners {
         with_homed_at_start: homed_at_start, bool;
         with_always_in_position: always_in_position, bool;
         with_warns: warns, bool;
+        with_refuses_to_clear: refuses_to_clear, bool;
+        with_alarm_stays: alarm_stays, bool;
     }
 }
 

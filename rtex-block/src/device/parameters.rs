@@ -57,6 +57,13 @@ impl Parameters {
         self.0.iter().find(|parameter| parameter.pr == pr).map_or(0, |parameter| parameter.value)
     }
 
+    /// Parameters of a class, the high byte of `pr`; `None` if there is no such class.
+    pub(super) fn count(pr: u16) -> Option<i32> {
+        let [class, _] = pr.to_be_bytes();
+        let all = Self::DEFAULT.0.into_iter().filter(|parameter| parameter.pr.to_be_bytes()[0] == class).count();
+        i32::try_from(all).ok().filter(|all| *all > 0)
+    }
+
     /// Whether there is such a parameter.
     pub(super) fn set(&mut self, pr: u16, value: i32, at_once: bool) -> bool {
         let Some(parameter) = self.0.iter_mut().find(|parameter| parameter.pr == pr) else { return false };

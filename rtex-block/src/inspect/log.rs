@@ -5,8 +5,10 @@ use core::fmt;
 use crate::block::{BlockSize, LEN};
 use crate::code::{Code, CyclicCode};
 use crate::command::CommandBlock;
+use crate::control::ControlBits;
 use crate::execution::Execution;
 use crate::header::{MacId, UpdateCounter};
+use crate::noncyclic_response::NonCyclicResponse;
 use crate::position::{Gear, max_step, step};
 use crate::response::ResponseBlock;
 
@@ -17,6 +19,11 @@ use crate::response::ResponseBlock;
 pub enum LogFinding {
     /// The echo of the counter stands still for more than the two communications that an update period can have.
     EchoStands {
+        /// Responses in a row with the same echo.
+        responses: u32,
+    },
+    /// The echo of the counter stood still for longer than that, and goes on.
+    EchoGoesOn {
         /// Responses in a row with the same echo.
         responses: u32,
     },
@@ -46,9 +53,32 @@ pub enum LogFinding {
         /// Of these, with Busy.
         busy: u32,
     },
+    /// An alarm command with Index 0 was answered with another index. Only the read-out of attributes does that: bytes 12-15 are
+    /// no alarm and no warning.
+    Attributes {
+        /// Index_Echo: the alarm that is being issued.
+        alarm: u16,
+        /// Bytes 12-15, byte 12 in bits 7-0.
+        bits: u32,
+    },
+    /// Another request, or the normal command, takes the place of a request that was not answered in more than three
+    /// responses.
+    GivenUp {
+        /// The code of the request.
+        code: Code,
+        /// Responses since the first command with it.
+        responses: u32,
+        /// Of these, with Busy.
+        busy: u32,
+    },
     /// The drive has answered before, and not to the last commands: more than the two communications that an update period
     /// can have.
     NoAnswer {
+        /// Commands without an answer.
+        commands: u32,
+    },
+    /// The drive was silent for longer than that, and answers.
+    AnswersAgain {
         /// Commands without an answer.
         commands: u32,
     },
@@ -56,24 +86,94 @@ pub enum LogFinding {
     NeverAnswered(MacId),
     /// This drive answers and was never sent a command.
     NeverAsked(MacId),
+    /// At the end of the log something of a drive goes on.
+    AtEnd(MacId, Unfinished),
+}
+
+/// What goes on at the end of a log.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[non_exhaustive]
+pub enum Unfinished {
+    /// The echo of the counter stands still.
+    Echo {
+        /// Responses in a row with the same echo.
+        responses: u32,
+    },
+    /// The drive is silent.
+    Silence {
+        /// Commands without an answer.
+        commands: u32,
+    },
+    /// A request is not answered.
+    Request {
+        /// The code of the request.
+        code: Code,
+        /// Responses since the first command with it.
+        responses: u32,
+        /// Of these, with Busy.
+        busy: u32,
+    },
+    /// The code of the commands has not come back.
+    Code {
+        /// The code.
+        code: Code,
+        /// Responses since the first command with it.
+        responses: u32,
+    },
 }
 
 impl fmt::Display for LogFinding {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::EchoStands { responses } => write!(f, "the counter echo stands still for {responses} responses"),
+            Self::EchoGoesOn { responses } => write!(f, "the counter echo goes on after {responses} responses"),
             Self::CounterJumps { from, to } => write!(f, "the counter goes from {from} to {to}"),
             Self::CodeLate { responses } => write!(f, "the code came back after {responses} responses"),
             Self::PositionStep { step, max } => write!(f, "position step {step}, at most {max}: Err27.4"),
             Self::Answered { responses, busy } => {
                 write!(f, "answered after {responses} responses, {busy} of them busy")
             }
+            Self::Attributes { alarm, bits } => {
+                write!(f, "attributes {bits:08X}h of the alarm with index {alarm:04X}h")
+            }
+            Self::GivenUp { code, responses, busy } => {
+                code.write(f)?;
+                write!(f, " is given up after {responses} responses, {busy} of them busy")
+            }
             Self::NoAnswer { commands } => write!(f, "no answer to the last {commands} commands"),
+            Self::AnswersAgain { commands } => write!(f, "answers again after {commands} commands"),
             Self::NeverAnswered(mac_id) => write!(f, "drive {mac_id} never answered"),
             Self::NeverAsked(mac_id) => write!(f, "drive {mac_id} answers and was never sent a command"),
+            Self::AtEnd(mac_id, unfinished) => write!(f, "at the end drive {mac_id} {unfinished}"),
         }
     }
 }
+
+impl fmt::Display for Unfinished {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Echo { responses } => write!(f, "has sent the same counter echo in {responses} responses"),
+            Self::Silence { commands } => write!(f, "has not answered the last {commands} commands"),
+            Self::Request { code, responses, busy } => {
+                f.write_str("has not answered ")?;
+                code.write(f)?;
+                write!(f, " in {responses} responses, {busy} of them busy")
+            }
+            Self::Code { code, responses } => {
+                f.write_str("has not sent back ")?;
+                code.write(f)?;
+                write!(f, " in {responses} responses")
+            }
+        }
+    }
+}
+
+/// Responses, or commands, that are normal between cause and effect: two communications in an update period, and one of delay.
+const NORMAL: u32 = 3;
+
+/// What is asked: the code and bytes 8, 10 and 11.
+type Request = (Code, [u8; 3]);
 
 /// What is kept of a drive.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -86,13 +186,16 @@ struct Track {
     counter: Option<UpdateCounter>,
     sent_twice: bool,
     echo: Option<UpdateCounter>,
-    still: u32,
+    /// Responses in a row with this echo, and whether that was said.
+    same: u32,
+    stands: bool,
     position: Option<i32>,
     /// The code of the commands, and the responses since it is that; `None` once it has come back.
     code: Option<Code>,
     awaited: Option<u32>,
-    /// Responses, and busy ones, since a request is out.
-    request: Option<(u32, u32)>,
+    /// The request that is out, and, until it is answered, the responses and the busy ones of them.
+    request: Option<Request>,
+    open: Option<(u32, u32)>,
 }
 
 impl Track {
@@ -103,12 +206,112 @@ impl Track {
         counter: None,
         sent_twice: false,
         echo: None,
-        still: 0,
+        same: 0,
+        stands: false,
         position: None,
         code: None,
         awaited: None,
         request: None,
+        open: None,
     };
+
+    /// The counter of a command.
+    fn count(&mut self, to: UpdateCounter, nop: bool) -> Option<LogFinding> {
+        let last = self.counter.replace(to);
+        let repeated = last == Some(to) && !self.sent_twice;
+        self.sent_twice = last == Some(to);
+        let from = last.filter(|_| !nop && !repeated)?;
+        (from.next() != to).then_some(LogFinding::CounterJumps { from, to })
+    }
+
+    /// The command position. Without Servo_On the drive follows nothing.
+    fn go(&mut self, block: CommandBlock<'_>, limit: Option<u32>) -> Option<LogFinding> {
+        let at = (block.code().cyclic() == Some(CyclicCode::CyclicPosition)).then(|| block.command_data1());
+        let last = core::mem::replace(&mut self.position, at);
+        let (step, max) = (step(last?, at?), limit?);
+        let on = block.control().contains(ControlBits::SERVO_ON);
+        (on && step.unsigned_abs() > max).then_some(LogFinding::PositionStep { step, max })
+    }
+
+    /// Code and request of a command.
+    fn ask(&mut self, block: CommandBlock<'_>) -> Option<LogFinding> {
+        let code = block.code();
+        if self.code.replace(code) != Some(code) {
+            self.awaited = Some(0);
+        }
+        let [eight, _, ten, eleven, ..] = block.noncyclic_bytes();
+        let request = (!matches!(code.noncyclic_bits(), 0 | 7)).then_some((code, [eight, ten, eleven]));
+        let last = core::mem::replace(&mut self.request, request);
+        if last == request {
+            return None;
+        }
+        let open = core::mem::replace(&mut self.open, request.map(|_| (0, 0)));
+        let ((code, _), (responses, busy)) = last.zip(open)?;
+        (responses > NORMAL).then_some(LogFinding::GivenUp { code, responses, busy })
+    }
+
+    /// The counter of a response. Counters that stand at 0 go out before the start.
+    fn echo(&mut self, echo: UpdateCounter) -> Option<LogFinding> {
+        if self.echo.replace(echo) == Some(echo) {
+            self.same = self.same.saturating_add(1);
+            let started = self.code.is_none_or(|code| code != Code::NOP);
+            let says = self.same == NORMAL && started;
+            self.stands |= says;
+            return says.then_some(LogFinding::EchoStands { responses: NORMAL });
+        }
+        let responses = core::mem::replace(&mut self.same, 1);
+        let stood = core::mem::replace(&mut self.stands, false);
+        (stood && responses > NORMAL).then_some(LogFinding::EchoGoesOn { responses })
+    }
+
+    /// The code of a response.
+    fn come_back(&mut self, code: Code) -> Option<LogFinding> {
+        let responses = self.awaited?.saturating_add(1);
+        if self.code != Some(code) {
+            self.awaited = Some(responses);
+            return None;
+        }
+        self.awaited = None;
+        (responses > NORMAL).then_some(LogFinding::CodeLate { responses })
+    }
+
+    /// The answer in a response, if it is one to the request that is out: with its type code, or an error answer.
+    fn answer(&mut self, block: ResponseBlock<'_>) -> Option<LogFinding> {
+        let ((code, [type_code, ..]), (responses, busy)) = self.request.zip(self.open)?;
+        let responses = responses.saturating_add(1);
+        let [_, _, _, _, _, _, _, _, eight, ..] = *block.bytes();
+        let own = block.code() == code && (block.cmd_error() || eight == type_code);
+        let execution = block.noncyclic().execution().unwrap_or(Execution::empty());
+        let is_busy = own && execution.contains(Execution::BUSY) && !execution.contains(Execution::ERR);
+        if own && !is_busy {
+            self.open = None;
+            return Some(LogFinding::Answered { responses, busy });
+        }
+        self.open = Some((responses, busy.saturating_add(is_busy.into())));
+        None
+    }
+
+    /// The attributes of an alarm, if that is what the answer to the request that is out says.
+    fn attributes(&self, block: ResponseBlock<'_>) -> Option<LogFinding> {
+        let ((_, [_, 0, 0]), NonCyclicResponse::Alarm(results)) = (self.request?, block.noncyclic()) else {
+            return None;
+        };
+        let bits = u32::from_le_bytes(results.data.to_le_bytes());
+        (results.index != 0).then_some(LogFinding::Attributes { alarm: results.index, bits })
+    }
+
+    /// What goes on at the end; a request that is open says more than its code.
+    fn unfinished(&self) -> [Option<Unfinished>; 3] {
+        let echo = (self.stands && self.same > NORMAL).then_some(Unfinished::Echo { responses: self.same });
+        let silent = self.responses > 0 && self.unanswered > NORMAL;
+        let request = self.request.zip(self.open).filter(|(_, (responses, _))| *responses > NORMAL);
+        let late = match (request, self.code.zip(self.awaited)) {
+            (Some(((code, _), (responses, busy))), _) => Some(Unfinished::Request { code, responses, busy }),
+            (None, Some((code, responses))) if responses > NORMAL => Some(Unfinished::Code { code, responses }),
+            _ => None,
+        };
+        [echo, late, silent.then_some(Unfinished::Silence { commands: self.unanswered })]
+    }
 }
 
 /// Looks at the blocks of a log one after the other, of all drives and both directions, 16 or 32 bytes each.
@@ -130,9 +333,9 @@ impl LogAnalysis {
         Self { max_step, tracks: [Track::NEW; MacId::COUNT] }
     }
 
-    /// Takes the next block; of 32 bytes the main half is looked at. Gives what it shows, in no more than three findings.
+    /// Takes the next block; of 32 bytes the main half is looked at. Gives what it shows, in no more than five findings.
     pub fn block(&mut self, bytes: &[u8]) -> impl Iterator<Item = LogFinding> + use<> {
-        let mut found = [None; 3];
+        let mut found = [None; 5];
         if let Some(main) = bytes.first_chunk::<LEN>() {
             if let Ok(command) = CommandBlock::of(main) {
                 found = self.command(command);
@@ -143,16 +346,18 @@ impl LogAnalysis {
         found.into_iter().flatten()
     }
 
-    /// At the end of the log: drives that were only on one side of it.
+    /// At the end of the log: drives that were only on one side of it, and what goes on.
     pub fn end(&self) -> impl Iterator<Item = LogFinding> {
         let both = self.tracks.iter().any(|t| t.commands > 0) && self.tracks.iter().any(|t| t.responses > 0);
-        (0..).zip(&self.tracks).filter(move |_| both).filter_map(|(number, track)| {
-            match (track.commands, track.responses) {
-                (0, 0) => None,
-                (_, 0) => Some(LogFinding::NeverAnswered(MacId::truncate(number))),
-                (0, _) => Some(LogFinding::NeverAsked(MacId::truncate(number))),
+        (0..).zip(&self.tracks).flat_map(move |(number, track)| {
+            let mac_id = MacId::truncate(number);
+            let one_side = match (track.commands, track.responses) {
+                (1.., 0) if both => Some(LogFinding::NeverAnswered(mac_id)),
+                (0, 1..) if both => Some(LogFinding::NeverAsked(mac_id)),
                 _ => None,
-            }
+            };
+            let unfinished = track.unfinished().into_iter().flatten();
+            one_side.into_iter().chain(unfinished.map(move |what| LogFinding::AtEnd(mac_id, what)))
         })
     }
 
@@ -160,76 +365,28 @@ impl LogAnalysis {
         self.tracks.get_mut(usize::from(mac_id.get()))
     }
 
-    fn command(&mut self, block: CommandBlock<'_>) -> [Option<LogFinding>; 3] {
+    fn command(&mut self, block: CommandBlock<'_>) -> [Option<LogFinding>; 5] {
         let limit = self.max_step;
-        let Some(track) = self.track(block.mac_id()) else { return [None; 3] };
+        let Some(track) = self.track(block.mac_id()) else { return [None; 5] };
         track.commands = track.commands.saturating_add(1);
         track.unanswered = track.unanswered.saturating_add(1);
-        // Said once.
-        let silent = (track.responses > 0 && track.unanswered == 3).then_some(LogFinding::NoAnswer { commands: 3 });
-        let nop = block.code() == Code::NOP;
-        let to = block.update_counter();
-        let jump = track.counter.filter(|_| !nop).and_then(|from| {
-            let repeated = from == to && !track.sent_twice;
-            (!repeated && from.next() != to).then_some(LogFinding::CounterJumps { from, to })
-        });
-        track.sent_twice = track.counter == Some(to);
-        track.counter = Some(to);
-
-        let at = (block.code().cyclic() == Some(CyclicCode::CyclicPosition)).then(|| block.command_data1());
-        let moved = track.position.zip(at).map(|(old, new)| step(old, new));
-        // Without Servo_On the drive follows nothing.
-        let on = block.control().contains(crate::control::ControlBits::SERVO_ON);
-        let too_far = moved
-            .filter(|_| on)
-            .zip(limit)
-            .and_then(|(step, max)| (step.unsigned_abs() > max).then_some(LogFinding::PositionStep { step, max }));
-        track.position = at;
-
-        if track.code != Some(block.code()) {
-            track.code = Some(block.code());
-            track.awaited = Some(0);
-            let asks = !matches!(block.code().noncyclic_bits(), 0 | 7);
-            track.request = asks.then_some((0, 0));
-        }
-        [jump, too_far, silent]
+        let silent = track.responses > 0 && track.unanswered == NORMAL;
+        let jump = track.count(block.update_counter(), block.code() == Code::NOP);
+        let too_far = track.go(block, limit);
+        let given_up = track.ask(block);
+        [jump, too_far, given_up, silent.then_some(LogFinding::NoAnswer { commands: NORMAL }), None]
     }
 
-    fn response(&mut self, block: ResponseBlock<'_>) -> [Option<LogFinding>; 3] {
-        let Some(track) = self.track(block.mac_id()) else { return [None; 3] };
+    fn response(&mut self, block: ResponseBlock<'_>) -> [Option<LogFinding>; 5] {
+        let Some(track) = self.track(block.mac_id()) else { return [None; 5] };
+        let commands = core::mem::replace(&mut track.unanswered, 0);
+        let again = track.responses > 0 && commands > NORMAL;
         track.responses = track.responses.saturating_add(1);
-        track.unanswered = 0;
-        let echo = block.update_counter_echo();
-        track.still = if track.echo == Some(echo) { track.still.saturating_add(1) } else { 0 };
-        track.echo = Some(echo);
-        // Said once, when it is more than two communications; counters that stand at 0 go out before the start.
-        let started = track.code.is_none_or(|code| code != Code::NOP);
-        let stands = (track.still == 2 && started).then_some(LogFinding::EchoStands { responses: 3 });
-
-        let mut late = None;
-        if let (Some(waited), Some(code)) = (track.awaited, track.code) {
-            let waited = waited.saturating_add(1);
-            if block.code() == code {
-                track.awaited = None;
-                late = (waited > 3).then_some(LogFinding::CodeLate { responses: waited });
-            } else {
-                track.awaited = Some(waited);
-            }
-        }
-
-        let mut answered = None;
-        if let Some((responses, busy)) = track.request {
-            let responses = responses.saturating_add(1);
-            let own = Some(block.code()) == track.code;
-            let is_busy = own && block.noncyclic().execution().is_some_and(|e| e.contains(Execution::BUSY));
-            if own && !is_busy {
-                track.request = None;
-                answered = Some(LogFinding::Answered { responses, busy });
-            } else {
-                track.request = Some((responses, busy.saturating_add(is_busy.into())));
-            }
-        }
-        [stands, late, answered]
+        let stands = track.echo(block.update_counter_echo());
+        let late = track.come_back(block.code());
+        let answered = track.answer(block);
+        let attributes = answered.and_then(|_| track.attributes(block));
+        [again.then_some(LogFinding::AnswersAgain { commands }), stands, late, answered, attributes]
     }
 }
 

@@ -3,7 +3,6 @@
 use core::num::NonZeroU16;
 
 use super::servo_off::ActiveCode;
-use crate::builder::builder;
 use crate::header::MacId;
 use crate::position::Gear;
 
@@ -37,7 +36,7 @@ impl Limits {
         Self { echo, ready: wait, active: wait, inactive: wait, answer: wait, stop: wait, command_errors: echo }
     }
 
-    builder! {
+    servowire_core::builder! {
         with_ready: ready, u32;
         with_active: active, u32;
         with_inactive: inactive, u32;
@@ -113,7 +112,7 @@ impl AxisConfig {
         }
     }
 
-    builder! {
+    servowire_core::builder! {
         with_gear: gear, Gear;
         with_over_speed: over_speed, Option<u32>;
         with_max_speed: max_speed, Option<u32>;

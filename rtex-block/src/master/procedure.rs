@@ -8,7 +8,7 @@ mod homing;
 mod latch;
 mod parameters;
 
-pub use alarms::{AlarmAttributes, AlarmHistory, Attributes};
+pub use alarms::{AlarmAttributes, AlarmHistory, Attributes, ClearAlarm, ClearableIf, Clearing};
 pub use homing::{Home, SetPosition};
 pub use latch::{Caught, Latch};
 pub use parameters::{Backup, Restore};

@@ -29,6 +29,14 @@ impl<const N: usize> Ring<N> {
     /// A ring that sends `invalid` update periods of invalid data (00h) before the first valid commands. It has 1 to 32
     /// axes; any other number does not compile.
     ///
+    /// ```compile_fail,E0080
+    /// # use core::num::NonZeroU16;
+    /// # use rtex_block::{MacId, master::{ActiveCode, Axis, AxisConfig, Limits, Ring}};
+    /// # let limits = Limits::new(NonZeroU16::MIN, 50);
+    /// # let axis = Axis::new(AxisConfig::new(MacId::new(0).unwrap(), ActiveCode::CyclicPosition, 500_000, limits));
+    /// let ring = Ring::new([axis; 33], 4);
+    /// ```
+    ///
     /// # Errors
     /// [`SameMacId`]
     pub fn new(axes: [Axis; N], invalid: u32) -> Result<Self, SameMacId> {

@@ -12,7 +12,6 @@ use super::ring::{Ring, SameMacId};
 use super::slaves::{Order, Slave, compare};
 use super::state::StopReason;
 use crate::block::{BlockSize, LEN32};
-use crate::builder::builder;
 use crate::header::MacId;
 use crate::pack::{self, SizeMismatch};
 use crate::response::Response;
@@ -45,7 +44,7 @@ impl MasterConfig {
         Self { size, periods, timer, invalid: 4, order: Order::Ring, watchdog: None }
     }
 
-    builder! {
+    servowire_core::builder! {
         with_invalid: invalid, u32;
         with_order: order, Order;
         with_watchdog: watchdog, Option<NonZeroU16>;

@@ -153,7 +153,7 @@ pub enum AskError {
     #[error("no request that is answered")]
     NotARequest,
     /// A reset, or setting a position, with the servo on: the drive would lose its state, or the set-point would stay in
-    /// the old coordinates and make a jump.
+    /// the old coordinates and make a jump. In CP any homing type counts as such whose meaning is not known.
     #[error("not while the servo is on")]
     ServoOn,
 }

@@ -21,6 +21,7 @@ pub const CODES: OpenCodes = OpenCodes {
     alarm_clear: TypeCode::short(0xc4),
     alarm_attributes: TypeCode::short(0xc5),
     parameter_initial: TypeCode::short(0xc6),
+    parameter_count: TypeCode::short(0xc9),
     latch_arm: 0xc7,
     homing: 0xc8,
     communication_lost: Alarm { main: 80, sub: 0 },

@@ -18,7 +18,8 @@ pub enum Began {
 
 impl<P: Port, T: Timer, const N: usize> Driver<'_, P, T, N> {
     /// Waits for the next falling edge of `sync` (XSYNC, or the pin of the external timer), an update period and a half at the
-    /// longest, then exchanges. It may be dropped while it waits; the exchange itself is one step.
+    /// longest, then exchanges. It may be dropped while it waits; the exchange itself is one step. An edge that comes while nobody
+    /// waits is missed: the commands of that period go out once more.
     ///
     /// # Errors
     /// [`Error::Io`](crate::Error::Io); the next exchange goes on. A pin that reports a fault counts as an edge that was lost.
@@ -35,6 +36,21 @@ impl<P: Port, T: Timer, const N: usize> Driver<'_, P, T, N> {
             None => Began::Clock,
         };
         let now_ns = self.clock.now_ns();
-        self.exchange(now_ns).map(|exchanged| (began, exchanged))
+        let began_ns = self.began_ns(now_ns);
+        self.exchange(began_ns).map(|exchanged| (began, exchanged))
+    }
+
+    /// When the period began in which it is `now_ns`. An executor wakes late, and a lost edge is noticed half a period late; so the
+    /// grid of the periods before says it, for which both clocks may differ by 1/4096. Rather too early than too late: the end of
+    /// the period is when the bank is switched.
+    fn began_ns(&self, now_ns: u64) -> u64 {
+        let update_ns = u64::from(self.master().config().periods.update_ns);
+        let past_ns = now_ns.saturating_sub(self.began_ns.unwrap_or(now_ns));
+        let periods = past_ns.checked_div(update_ns).unwrap_or(0);
+        let phase_ns = past_ns.saturating_sub(periods.saturating_mul(update_ns));
+        let drift_ns = periods.saturating_add(1).saturating_mul(update_ns >> 12);
+        // An edge that is early on the grid is a new one, and the grid follows.
+        let late_ns = if phase_ns.saturating_add(drift_ns) < update_ns { phase_ns.saturating_sub(drift_ns) } else { 0 };
+        now_ns.saturating_sub(late_ns)
     }
 }

@@ -5,6 +5,7 @@
 use std::cell::RefCell;
 use std::collections::VecDeque;
 use std::convert::Infallible;
+use std::fmt::Debug;
 use std::future::poll_fn;
 use std::rc::Rc;
 use std::task::Poll;
@@ -14,13 +15,18 @@ use nikon_aformat::master::Line;
 use nikon_aformat::{BitRate, EncoderAddress, RequestFrame, Resolution};
 use servowire_drivers::nikon::{Frame, blocking};
 use servowire_drivers::{Clock, Timer};
-use servowire_world::{Delivery, Event, Framing, Host, Id, Kind, Message, Rates, Scenario, Wire, World};
+use servowire_world::{
+    Delivery, Event, Framing, Host, Id, Kind, Message, Scenario, Speaker, Transmission, Verdict, Wire, World,
+};
+
+use crate::hostile::{Calls, rates};
 
 /// 2.5 Mbit/s: a frame is 7.2 us.
 pub const RATE: BitRate = BitRate::Mbit2_5;
 const WIRE: Wire = Wire { bit_ps: 400_000, framing: Framing::StartStop { width: 16 }, devices: 1 };
 const LOOK_NS: u64 = 100;
-pub const RATES: Rates = Rates { per_million: [6_000; Kind::ALL.len()], longest_ns: 60_000 };
+const FRAME_NS: u64 = 7_200;
+const ANSWER_NS: u64 = 4 * FRAME_NS;
 
 pub struct Bench {
     pub world: World,
@@ -33,6 +39,11 @@ pub struct Bench {
     /// Where it was when the encoders heard the last request.
     pub asked_at: u32,
     pub request: Option<Id>,
+    /// How often the host had been preempted when the last call ended.
+    preempts: u64,
+    /// The port is an SPI, which sends and samples by one clock. The line may delay its request all the same; nothing is asked of
+    /// such a call.
+    pub sampled: bool,
 }
 
 pub type Shared = Rc<RefCell<Bench>>;
@@ -53,7 +64,85 @@ impl Bench {
             shaft: 0,
             asked_at: 0,
             request: None,
+            preempts: 0,
+            sampled: false,
         }))
+    }
+
+    /// Whether the host was preempted in this call: it breaks the latency budget then.
+    pub fn was_preempted(&self) -> bool {
+        self.world.tally().of(Kind::Preempt) > self.preempts
+    }
+
+    /// A call is over and judged.
+    pub fn end_call(&mut self) {
+        self.preempts = self.world.tally().of(Kind::Preempt);
+        let past_ns = self.world.now_ns().saturating_sub(1_000_000);
+        self.world.truth_mut().forget_before(past_ns);
+    }
+
+    /// Judges a call with one encoder by the truth: it was dropped, gave the value of this turn of the shaft, or failed. A value is
+    /// never older than its request, and no call fails whose request and answer came through whole, whatever has happened before.
+    pub fn judge<E: Debug>(&mut self, calls: &mut Calls, outcome: Option<Result<u32, E>>, seed: u64, call: usize) {
+        let Some(request) = self.request else { return };
+        let truth = self.world.truth();
+        let Some(sent) = truth.transmission(request) else { return };
+        // A request that leaves late is answered late.
+        let on_time = |answer: &Transmission| {
+            answer.start_ns < sent.asked_ns + FRAME_NS + 15_000 && answer.end_ns - answer.start_ns == ANSWER_NS
+        };
+        let left = !self.sampled || sent.start_ns == sent.asked_ns && sent.end_ns == sent.sent_ns;
+        // Who samples also sees what no receiver takes for a frame.
+        let own = |t: &Transmission| t.id == request || t.answers == Some(request) || t.end_ns <= sent.start_ns;
+        let alone = !self.sampled || truth.transmissions().all(own);
+        let undisturbed = left && alone && !self.was_preempted() && truth.undisturbed(request);
+        let whole = undisturbed && truth.intact_answers(request).any(on_time);
+        self.verdict(calls, outcome, whole, request, seed, call);
+        self.end_call();
+    }
+
+    /// Judges what a call said of one of several encoders: an answer that came through whole is not lost, whatever became of the
+    /// others.
+    pub fn judge_one<E: Debug>(&self, calls: &mut Calls, ea: u8, outcome: Result<u32, E>, seed: u64, call: usize) {
+        let Some(request) = self.request else { return };
+        let truth = self.world.truth();
+        let Some(sent) = truth.transmission(request) else { return };
+        // A request that comes twice is answered twice.
+        let sent_once = sent.start_ns == sent.asked_ns && sent.end_ns == sent.sent_ns;
+        let now_ns = self.world.now_ns();
+        let on_time = |answer: &Transmission| {
+            let own = answer.speaker == Speaker::Device(ea) && answer.delivered_ns < now_ns;
+            own && answer.start_ns == answer.asked_ns && answer.end_ns - answer.start_ns == ANSWER_NS
+        };
+        let whole = !self.was_preempted() && sent_once && truth.intact_answers(request).any(on_time);
+        self.verdict(calls, Some(outcome), whole, request, seed, call);
+    }
+
+    fn verdict<E: Debug>(
+        &self,
+        calls: &mut Calls,
+        outcome: Option<Result<u32, E>>,
+        whole: bool,
+        request: Id,
+        seed: u64,
+        call: usize,
+    ) {
+        match outcome {
+            None => calls.dropped += 1,
+            Some(Ok(shaft)) => {
+                let verdict = self.world.truth().verdict(request, shaft.into());
+                let old = matches!(verdict, Verdict::Old { .. });
+                assert!(self.was_preempted() || !old, "seed {seed}, call {call}: {verdict:?}");
+                assert!(!whole || verdict == Verdict::Fresh, "seed {seed}, call {call}: {verdict:?}");
+                calls.good += 1;
+                calls.whole += u64::from(whole);
+                calls.forged += u64::from(verdict != Verdict::Fresh);
+            }
+            Some(Err(error)) => {
+                assert!(!whole, "seed {seed}, call {call}: {error:?}");
+                calls.failed += 1;
+            }
+        }
     }
 
     pub fn pass(&mut self, until_ns: u64) {
@@ -61,12 +150,9 @@ impl Bench {
             match self.world.next(until_ns) {
                 Event::Time { .. } => return,
                 Event::Delivered(block) => {
-                    // The last of a block ended at its stamp, the ones before a frame earlier each.
-                    let count = block.units.len();
-                    let frames = block.units.iter().enumerate().map(|(at, unit)| {
+                    let frames = block.units.iter().map(|unit| {
                         let (content, framed) = unit.bits.content();
-                        let end_ns = block.end_ns - 7_200 * (count - 1 - at) as u64;
-                        Frame { content: content as u16, framed, end_ns: self.stamped.then_some(end_ns) }
+                        Frame { content: content as u16, framed, end_ns: self.stamped.then_some(unit.end_ns) }
                     });
                     self.fifo.extend(frames);
                 }
@@ -156,4 +242,15 @@ pub fn deliveries() -> [Delivery; 3] {
 
 pub fn host(echo: bool, delivery: Delivery) -> Host {
     Host { echo, delivery, fifo: 6, ..Host::IDEAL }
+}
+
+/// A host and its faults, for calls with so many encoders: one or two a call.
+pub fn scenario(seed: u64, encoders: u32, delivery: Delivery) -> Scenario {
+    let scenario = Scenario::random(seed, rates(2 + 2 * encoders));
+    Scenario { host: host(scenario.host.echo, delivery), ..scenario }
+}
+
+/// The turn of the shaft in the whole position of an encoder.
+pub fn shaft(response: nikon_aformat::Response) -> u32 {
+    response.abs40().map_or(0, |abs| (abs.get() & 0xf_ffff) as u32)
 }

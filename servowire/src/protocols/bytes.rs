@@ -53,7 +53,12 @@ pub(super) fn decode(
     }
     reader.finish(out)?;
     end?;
-    Ok(())
+    match &reader {
+        Reader::Rtex(decoder) => {
+            decoder.shape_fault().map_or(Ok(()), |what| Err(Fault::new(file, At::File, what).into()))
+        }
+        _ => Ok(()),
+    }
 }
 
 /// The protocol asked for, or the one of which most holds.

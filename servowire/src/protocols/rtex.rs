@@ -7,7 +7,7 @@
 use std::collections::HashMap;
 use std::io;
 
-use rtex_block::inspect::{self, LogAnalysis, LogShape, Report, inspect};
+use rtex_block::inspect::{self, Cause, LogAnalysis, LogShape, Report, inspect};
 use rtex_block::position::Gear;
 use rtex_block::{Error, Header};
 
@@ -60,9 +60,10 @@ impl Decoder {
     /// `sample`: the beginning of the log.
     pub(super) fn new(settings: Settings, sample: &[Burst]) -> Self {
         let read = || sample.iter().filter(|burst| burst.spoilt.is_none()).map(|burst| &burst.bytes);
-        // What a spoilt line has held does not matter, but its place does.
-        let line = vec![0; read().next().map_or(0, Vec::len)];
-        let lines = sample.iter().map(|burst| if burst.spoilt.is_some() { &line } else { &burst.bytes });
+        // What a line has held that is spoilt, or too short or long, does not matter, but its place does.
+        let line = vec![0; most_common(read().map(Vec::len))];
+        let is_whole = |burst: &Burst| burst.spoilt.is_none() && burst.bytes.len() == line.len();
+        let lines = sample.iter().map(|burst| if is_whole(burst) { &burst.bytes } else { &line });
         let bytes: Vec<u8> = lines.flatten().copied().take(SAMPLE).collect();
         let shape = LogShape::guess(&bytes);
         // Lines or records of one block are what they are; a size is guessed where the lines allow both.
@@ -96,6 +97,15 @@ impl Decoder {
         }
         let taken = if size == self.block_size { "" } else { "; try --block-size" };
         Some(format!("the log looks like blocks of {size} bytes{order}{taken}"))
+    }
+
+    /// Why the log as a whole was not read as it was written.
+    pub(super) fn shape_fault(&self) -> Option<&'static str> {
+        match self.shape?.word {
+            1 => None,
+            2 => Some("the bytes of each 16-bit word are exchanged in most of its blocks: pack with shifts"),
+            _ => Some("the bytes of each 32-bit word are in the other order in most of its blocks: pack with shifts"),
+        }
     }
 
     /// A line or record of the log.
@@ -133,13 +143,13 @@ impl Decoder {
         event.map_or(Ok(()), |event| out.event(&event))
     }
 
-    /// The end of the log: drives that were on one side of it only.
+    /// The end of the log: drives that were on one side of it only, and what goes on there.
     pub(super) fn finish(&mut self, out: &mut dyn Sink) -> io::Result<()> {
         let mut notes: Vec<String> = self.analysis.end().map(|finding| finding.to_string()).collect();
         if self.half.as_ref().is_some_and(|half| !half.is_empty()) {
             notes.push("the log ends in the middle of a block".to_owned());
         }
-        if notes.is_empty() || self.settings.mac_id.is_some() {
+        if notes.is_empty() {
             return Ok(());
         }
         let fields = vec![Field::text("note", notes.join("; "))];
@@ -169,7 +179,7 @@ impl Decoder {
         let report = inspect(block);
         let place = self.place(burst, header);
         let mut fields = Vec::new();
-        if report.is_usable {
+        if is_block(&report) {
             let findings: Vec<String> = self.analysis.block(block).map(|finding| finding.to_string()).collect();
             let before = self.last.insert(header.to_byte() & 0x9f, report);
             match before {
@@ -191,12 +201,19 @@ impl Decoder {
         self.settings.mac_id?;
         let field = report.fields().find(|field| field.name == "Response_Data1")?;
         match field.value {
-            inspect::Value::Number(counts) if report.is_usable => {
+            inspect::Value::Number(counts) if is_block(report) => {
                 Some(Position { counts, span: Some(1 << 32), per_turn: None })
             }
             _ => None,
         }
     }
+}
+
+/// The length that most lines have; of several the longest.
+fn most_common(lengths: impl Iterator<Item = usize>) -> usize {
+    let mut counts = HashMap::new();
+    lengths.for_each(|len| *counts.entry(len).or_insert(0_usize) += 1);
+    counts.into_iter().max_by_key(|(len, count)| (*count, *len)).map_or(0, |(len, _)| len)
 }
 
 /// The code, then all that is not 0.
@@ -259,9 +276,15 @@ fn field(field: &inspect::Field) -> Field {
     }
 }
 
+/// Whether it is a block at all. A bus without a device is no drive, although its ones look like a response with an undefined
+/// code.
+fn is_block(report: &Report) -> bool {
+    report.is_usable && report.cause != Some(Cause::AllOnes)
+}
+
 /// A block that a drive takes is good; what strict decoding says of it is a note.
 fn verdict(report: &Report) -> Verdict {
-    let Some(error) = report.error().filter(|_| !report.is_usable) else { return Verdict::Ok };
+    let Some(error) = report.error().filter(|_| !is_block(report)) else { return Verdict::Ok };
     let at = match error {
         Error::Direction { .. } | Error::MacId { .. } => Some(0),
         Error::CyclicCode { .. } | Error::NonCyclicCode { .. } => Some(1),

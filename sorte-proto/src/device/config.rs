@@ -1,7 +1,6 @@
 //! Settings and counters of a device.
 
 use super::PortId;
-use crate::builders::builders;
 use crate::clock::AVERAGE;
 use crate::discovery::Entry;
 use crate::error::Error;
@@ -47,15 +46,15 @@ impl Config {
             start_up_timeout_ns: 20_000_000,
         }
     }
-    builders! {
-        with_lengths lengths: Entry,
-        with_output_len output_len: Option<u16>,
-        with_send_time_ns send_time_ns: Option<u32>,
-        with_slot_ns slot_ns: Option<u32>,
-        with_delay_model delay_model: DelayModel,
-        with_clock_average clock_average: u8,
-        with_missed_frames missed_frames: u8,
-        with_start_up_timeout_ns start_up_timeout_ns: u64,
+    servowire_core::builder! {
+        with_lengths: lengths, Entry;
+        with_output_len: output_len, Option<u16>;
+        with_send_time_ns: send_time_ns, Option<u32>;
+        with_slot_ns: slot_ns, Option<u32>;
+        with_delay_model: delay_model, DelayModel;
+        with_clock_average: clock_average, u8;
+        with_missed_frames: missed_frames, u8;
+        with_start_up_timeout_ns: start_up_timeout_ns, u64;
     }
 }
 

@@ -1,6 +1,5 @@
 //! One port's handler: what the head of a frame does to its state.
 
-use crate::flags::show_flags;
 use crate::frame::MULTICAST;
 use crate::frame_type::FrameType;
 use crate::status::Status;
@@ -88,7 +87,7 @@ bitflags::bitflags! {
     }
 }
 
-show_flags!(PortFlags);
+servowire_core::show_flags!(PortFlags);
 
 /// Measurement that a delay request on the master port starts on the other port.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]

@@ -1,7 +1,5 @@
 //! The STATUS register.
 
-use crate::flags::show_flags;
-
 /// STATUS: faults, with the data sheet's names. It is payload byte 0 of the device frame.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -29,7 +27,7 @@ bitflags::bitflags! {
     }
 }
 
-show_flags!(Status);
+servowire_core::show_flags!(Status);
 
 impl Status {
     /// The six faults; the stall bits are none.

@@ -1,6 +1,5 @@
 //! States, settings and counters of the master.
 
-use crate::builders::builders;
 use crate::line_delay::DelayModel;
 use crate::param::Parameters;
 
@@ -119,26 +118,26 @@ impl Config {
         }
     }
 
-    builders! {
-        with_discovery_frames discovery_frames: u16,
-        with_param_frames param_frames: u16,
-        with_sync_frames sync_frames: u16,
-        with_frame_period_ns frame_period_ns: u64,
-        with_sync_period_ns sync_period_ns: u32,
-        with_cycle_ns cycle_ns: u32,
-        with_answer_timeout_ns answer_timeout_ns: u64,
-        with_param_tries param_tries: u16,
-        with_restart_pause_ns restart_pause_ns: u64,
-        with_min_devices min_devices: u8,
-        with_min_output_len min_output_len: u16,
-        with_payload_len payload_len: u8,
-        with_parameters parameters: Parameters,
-        with_delay_model delay_model: DelayModel,
-        with_retrain_crc_errors retrain_crc_errors: u8,
-        with_retrain_timing_errors retrain_timing_errors: u8,
-        with_stop_cycles stop_cycles: u32,
-        with_max_failures max_failures: u16,
-        with_long_line long_line: bool,
+    servowire_core::builder! {
+        with_discovery_frames: discovery_frames, u16;
+        with_param_frames: param_frames, u16;
+        with_sync_frames: sync_frames, u16;
+        with_frame_period_ns: frame_period_ns, u64;
+        with_sync_period_ns: sync_period_ns, u32;
+        with_cycle_ns: cycle_ns, u32;
+        with_answer_timeout_ns: answer_timeout_ns, u64;
+        with_param_tries: param_tries, u16;
+        with_restart_pause_ns: restart_pause_ns, u64;
+        with_min_devices: min_devices, u8;
+        with_min_output_len: min_output_len, u16;
+        with_payload_len: payload_len, u8;
+        with_parameters: parameters, Parameters;
+        with_delay_model: delay_model, DelayModel;
+        with_retrain_crc_errors: retrain_crc_errors, u8;
+        with_retrain_timing_errors: retrain_timing_errors, u8;
+        with_stop_cycles: stop_cycles, u32;
+        with_max_failures: max_failures, u16;
+        with_long_line: long_line, bool;
     }
 }
 

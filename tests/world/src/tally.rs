@@ -35,9 +35,14 @@ impl Tally {
         self.faults[kind as usize]
     }
 
+    /// All faults.
+    pub fn all_faults(&self) -> u64 {
+        self.faults.iter().sum()
+    }
+
     /// All events: faults, transmissions and units.
     pub fn events(&self) -> u64 {
-        self.faults.iter().sum::<u64>() + self.sent + self.spurious + self.heard + self.for_host
+        self.all_faults() + self.sent + self.spurious + self.heard + self.for_host
     }
 
     /// Takes in another run.

@@ -216,11 +216,14 @@ impl Truth {
     /// at once a 0 wins.
     pub fn sampled(&self, from_ns: u64, count: usize, period_ps: u64, bit_ps: u64) -> Vec<u8> {
         let mut samples = Bits::new();
+        let (from_ps, to_ps) = (from_ns * 1000, from_ns * 1000 + count as u64 * period_ps);
+        let end_ps = |t: &Transmission| t.image_ns * 1000 + t.image.len() as u64 * bit_ps;
+        let near: Vec<_> = self.log.iter().filter(|t| t.image_ns * 1000 < to_ps && end_ps(t) > from_ps).collect();
         for k in 0..count as u64 {
-            let ps = from_ns * 1000 + k * period_ps;
+            let ps = from_ps + k * period_ps;
             let level =
-                |t: &Transmission| ps < t.image_ns * 1000 || t.image.get(((ps - t.image_ns * 1000) / bit_ps) as usize);
-            samples.push(self.log.iter().all(level));
+                |t: &&Transmission| ps < t.image_ns * 1000 || t.image.get(((ps - t.image_ns * 1000) / bit_ps) as usize);
+            samples.push(near.iter().all(level));
         }
         samples.block().to_vec()
     }

@@ -60,9 +60,7 @@ impl EepromAccess {
     }
 
     const fn new(address: Address, write: Option<u8>, page: Option<Page>, polling: Polling) -> Self {
-        let access =
-            Self { address, write, page, polling, phase: Phase::Read, tries: 0, unknown: false, confirmed: false };
-        Self { phase: access.first(), ..access }
+        Self { address, write, page, polling, phase: Phase::Read, tries: 0, unknown: false, confirmed: false }
     }
 
     const fn first(&self) -> Phase {
@@ -288,6 +286,16 @@ mod tests {
         let _ = access.start(0);
         let end = access.receive(Ok(wrote(true, 0x5a)), 0);
         assert_eq!(end, Step::Failed { error: Error::Busy { tries: 1 }, ready_ns: 1000 });
+    }
+
+    /// Two tries: the write whose response was lost, and the reading that shows that it was not done.
+    #[test]
+    fn a_write_is_not_repeated_beyond_the_tries() {
+        let mut access = EepromAccess::write(None, ADDRESS, 0x5a, Polling { max_tries: 2, ..POLLING });
+        let _ = access.start(0);
+        assert_eq!(access.receive(LOST, 0), send(READ, 1000));
+        let end = access.receive(Ok(read(false, 0xff)), 1000);
+        assert_eq!(end, Step::Failed { error: Error::DataMismatch { got: 0xff, want: 0x5a }, ready_ns: 1000 });
     }
 
     /// What was tried for the page does not count against the byte.

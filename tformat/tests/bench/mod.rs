@@ -49,6 +49,12 @@ pub struct Bench {
     pub seen: Seen,
     /// Requests that the encoder believed and nobody sent like that: damage that it cannot see, or another speaker.
     pub forged_requests: u32,
+    /// Bytes that the encoder heard and that the host did not send like that or not then: its count of resets may have begun
+    /// again.
+    pub misheard: u32,
+    /// Readings of position or turns that no master can tell from true ones, or whose damage the XOR does not see. What rests
+    /// on them may be wrong.
+    pub misread: u32,
     /// Whether the shaft moves with every request, so that each response has a value of its own.
     pub moves: bool,
     /// Whether the shaft stands on the boundary of a turn and goes over it and back with every request.
@@ -85,6 +91,8 @@ impl Bench {
             ready_ns: 100_000,
             seen: Seen::default(),
             forged_requests: 0,
+            misheard: 0,
+            misread: 0,
             moves: true,
             trembles: false,
             turn: 0,
@@ -109,6 +117,8 @@ impl Bench {
         let start_ns = not_before_ns.max(self.world.now_ns());
         let mut transaction = Transaction::start(request, self.line, start_ns);
         let id = self.world.send(&Message::bytes(transaction.frame().as_bytes()), start_ns);
+        let late = self.world.truth().transmission(id).is_none_or(|sent| sent.start_ns > sent.asked_ns);
+        self.misheard += u32::from(late);
         let mut late_ns = 0;
         while let Progress::Pending { until_ns } = transaction.progress() {
             self.event(&mut transaction, until_ns + 1, &mut late_ns);
@@ -118,7 +128,10 @@ impl Bench {
             Progress::Failed { error, ready_ns } => (Err(error), ready_ns),
             Progress::Pending { .. } => panic!("it has ended"),
         };
+        let before = self.seen.forged + self.seen.undetected;
         self.judge(request, id, outcome, ready_ns, late_ns);
+        let reset = matches!(request.emit().as_bytes(), [0xba | 0xc2 | 0x62]);
+        self.misread += u32::from(!reset && self.seen.forged + self.seen.undetected > before);
         // The machine drains until the line is free.
         let ended = transaction.progress();
         while self.world.now_ns() < ready_ns {
@@ -173,6 +186,9 @@ impl Bench {
                 let byte = content as u8;
                 let sent =
                     if framed { self.device.byte(byte, unit.end_ns) } else { self.device.framing_error(unit.end_ns) };
+                // Its own answers are not heard by itself.
+                let foreign = !matches!(unit.origin.speaker, Speaker::Host | Speaker::Device(_));
+                self.misheard += u32::from(unit.damaged || foreign);
                 if framed && (unit.damaged || unit.origin.speaker != Speaker::Host) {
                     self.forged_requests += u32::from([0xba, 0xc2, 0x62, 0x32].contains(&byte));
                     self.forged_requests += u32::from(sent.is_some() && byte & 7 != 2);
@@ -220,7 +236,8 @@ impl Bench {
         self.seen.done += 1;
         self.seen.owed += u64::from(truth.intact_answers(id).next().is_some());
         assert!(ready_ns >= sent.asked_ns);
-        if response.abs().is_none() {
+        // Neither the encoder ID nor the EEPROM changes with every request.
+        if !matches!(response.emit().as_bytes(), [_, _, _, _, _, _, ..]) {
             return;
         }
         match truth.verdict(id, tag(response.emit().as_bytes())) {

@@ -208,7 +208,12 @@ impl Drive {
             return Ok(Outcome::Value(words(alarm.unwrap_or(none), 0)));
         }
         if type_code == codes.alarm_clear.get() {
-            self.clear_alarm();
+            if self.config.manners.refuses_to_clear && self.alarm.is_some() {
+                return Ok(Outcome::Failed);
+            }
+            if !self.config.manners.alarm_stays {
+                self.clear_alarm();
+            }
             return Ok(Outcome::Value(0));
         }
         Err(WRONG_TYPE)
@@ -223,6 +228,8 @@ impl Drive {
             self.parameters.written(index)
         } else if type_code == codes.parameter_initial.get() {
             Parameters::DEFAULT.written(index)
+        } else if type_code == codes.parameter_count.get() {
+            Parameters::count(index)
         } else if type_code == codes.parameter_store.get() {
             Some(0)
         } else {

@@ -12,14 +12,18 @@ use crate::noncyclic_response::NonCyclicResponse;
 use crate::response::Response;
 use crate::status::StatusFlags;
 use crate::sub::{SubCode, SubCommand, SubResponse};
-use crate::type_code::{TypeCode, homing};
+use crate::type_code::{Nibble, TypeCode, homing};
 
 /// A request on its way.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub(super) enum Service {
     Idle,
-    Asking(Handshake),
+    Asking {
+        handshake: Handshake,
+        /// It must be over before the servo is switched on.
+        servo_off: bool,
+    },
     /// The outcome is known; the normal command is out until its echo is seen.
     Releasing {
         left: u32,
@@ -39,7 +43,7 @@ impl Service {
     /// What is asked at present.
     pub(super) const fn request(&self) -> Option<NonCyclicCommand> {
         match self {
-            Self::Asking(handshake) => Some(handshake.request()),
+            Self::Asking { handshake, .. } => Some(handshake.request()),
             Self::Idle | Self::Releasing { .. } => None,
         }
     }
@@ -50,45 +54,64 @@ impl Service {
 
     /// Whether what is asked must be over before the servo is switched on.
     pub(super) const fn needs_servo_off(&self) -> bool {
-        match self {
-            Self::Asking(handshake) => needs_servo_off(&handshake.request()),
-            Self::Idle | Self::Releasing { .. } => false,
-        }
+        matches!(self, Self::Asking { servo_off: true, .. })
     }
 }
 
-/// Resets, and the homing types that set a position.
-const fn needs_servo_off(request: &NonCyclicCommand) -> bool {
-    matches!(
-        request,
-        NonCyclicCommand::Reset(_)
-            | NonCyclicCommand::Homing { type_code: homing::SET_ACTUAL_POSITION | homing::SET_COMMAND_POSITION, .. }
-    )
+/// Resets, and the homing types that set a position. `unknown`: the other homing types too, but for the one that reads.
+const fn needs_servo_off(request: &NonCyclicCommand, unknown: bool) -> bool {
+    match request {
+        NonCyclicCommand::Reset(_) => true,
+        NonCyclicCommand::Homing { type_code, .. } => match *type_code {
+            homing::SET_ACTUAL_POSITION | homing::SET_COMMAND_POSITION => true,
+            homing::LATCH_STATE => false,
+            _ => unknown,
+        },
+        _ => false,
+    }
 }
 
 impl Axis {
     /// Sends a non-cyclic command and holds it until it is answered; see [`take_outcome`](Self::take_outcome).
     ///
-    /// A homing type other than those that are confirmed may move the axis or set its position: in CP the set-point knows
-    /// nothing of it, so ask for it in PP, or with the servo off.
+    /// A homing type other than those that are confirmed may give the axis new coordinates. In CP the set-point would stay in
+    /// the old ones, so with the servo on it is refused there; latches have [`ask_latch`](Self::ask_latch).
     ///
     /// # Errors
     /// [`AskError`]; nothing is sent then.
     pub fn ask(&mut self, request: NonCyclicCommand) -> Result<(), AskError> {
         let handshake = Handshake::new(self.config.mac_id, self.mode.cyclic(), request, self.config.limits.answer);
-        self.begin(handshake.ok_or(AskError::NotARequest)?)
+        let servo_off = needs_servo_off(&request, self.mode == ActiveCode::CyclicPosition);
+        self.begin(handshake.ok_or(AskError::NotARequest)?, servo_off)
+    }
+
+    /// Sends a homing command of the latch mode, in any mode and with the servo on or off. `type_code` arms the latches, or
+    /// disarms them, or reads their state ([`homing::LATCH_STATE`]); it must be one that leaves the coordinates alone. Then
+    /// follow Latch_Sel1, Latch_Sel2 and Monitor_Sel. SX-DSV02310, "Latch mode".
+    ///
+    /// # Errors
+    /// [`AskError::Busy`]; [`AskError::ServoOn`] for the types 21h and 22h, which set a position.
+    pub fn ask_latch(
+        &mut self,
+        type_code: u8,
+        [latch_sel1, latch_sel2]: [Nibble; 2],
+        monitor_sel: u8,
+    ) -> Result<(), AskError> {
+        let request = NonCyclicCommand::Homing { type_code, latch_sel1, latch_sel2, monitor_sel, setting_data: 0 };
+        let handshake = Handshake::new(self.config.mac_id, self.mode.cyclic(), request, self.config.limits.answer);
+        self.begin(handshake.ok_or(AskError::NotARequest)?, needs_servo_off(&request, false))
     }
 
     /// Reads the attributes of the alarm that is being issued, with the type code that the drive's manual gives for them.
     /// The answer carries the alarm as its index and the attributes as its data; which bit tells that the alarm can be
-    /// cleared is in the manual too.
+    /// cleared is in the manual too ([`Attributes::is_clearable`](crate::master::procedure::Attributes::is_clearable)).
     ///
     /// # Errors
     /// [`AskError::Busy`]
     pub fn ask_alarm_attributes(&mut self, type_code: TypeCode) -> Result<(), AskError> {
         let (mac_id, limit): (MacId, u32) = (self.config.mac_id, self.config.limits.answer);
         let cyclic = ActiveCode::cyclic(self.mode);
-        self.begin(Handshake::alarm_attributes(mac_id, cyclic, type_code, limit))
+        self.begin(Handshake::alarm_attributes(mac_id, cyclic, type_code, limit), false)
     }
 
     /// Whether a request can be sent now.
@@ -99,7 +122,7 @@ impl Axis {
     /// Update periods until the present request times out; the whole limit if none is under way.
     pub(in crate::master) const fn answer_left(&self) -> u32 {
         match &self.service {
-            Service::Asking(handshake) => handshake.left(),
+            Service::Asking { handshake, .. } => handshake.left(),
             Service::Idle | Service::Releasing { .. } => self.config.limits.answer,
         }
     }
@@ -128,15 +151,15 @@ impl Axis {
         self.sub_outcome.take()
     }
 
-    fn begin(&mut self, handshake: Handshake) -> Result<(), AskError> {
+    fn begin(&mut self, handshake: Handshake, servo_off: bool) -> Result<(), AskError> {
         if !self.can_ask() {
             return Err(AskError::Busy);
         }
         let active = self.state.is_servo_on() || self.status.contains(StatusFlags::SERVO_ACTIVE);
-        if active && needs_servo_off(&handshake.request()) {
+        if active && servo_off {
             return Err(AskError::ServoOn);
         }
-        self.service = Service::Asking(handshake);
+        self.service = Service::Asking { handshake, servo_off };
         self.outcome = None;
         Ok(())
     }
@@ -149,7 +172,7 @@ impl Axis {
         let released = response.is_some_and(|r| r.code.noncyclic_bits() == 0);
         match &mut self.service {
             Service::Idle => {}
-            Service::Asking(handshake) => {
+            Service::Asking { handshake, .. } => {
                 let progress = handshake.receive(response);
                 if !progress.is_pending() {
                     self.outcome = Some(progress);

@@ -6,6 +6,7 @@ use crate::master::axis::Axis;
 use crate::master::progress::{Failure, Progress};
 use crate::noncyclic_command::{Arguments, NonCyclicCommand};
 use crate::noncyclic_response::NonCyclicResponse;
+use crate::status::StatusFlags;
 use crate::type_code::TypeCode;
 
 /// Reads the alarm history, from the latest entry.
@@ -58,6 +59,35 @@ pub struct Attributes {
     pub bits: u32,
 }
 
+impl Attributes {
+    /// Whether the alarm can be cleared, by the bits that the drive's manual names for that.
+    ///
+    /// ```
+    /// use rtex_block::master::procedure::{Attributes, ClearableIf};
+    /// let attributes = Attributes { alarm: 0x2601, bits: 0x0000_0004 };
+    /// assert!(attributes.is_clearable(ClearableIf::Set(0x04)));
+    /// assert!(!attributes.is_clearable(ClearableIf::Unset(0x04)));
+    /// ```
+    pub const fn is_clearable(&self, rule: ClearableIf) -> bool {
+        match rule {
+            ClearableIf::Set(mask) => mask != 0 && self.bits & mask == mask,
+            ClearableIf::Unset(mask) => mask != 0 && self.bits & mask == 0,
+        }
+    }
+}
+
+/// How the attributes of an alarm say that it can be cleared. The documents at hand do not tell, so this is for the reader of
+/// the drive's manual. A mask without a bit says nothing: no alarm is clearable by it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub enum ClearableIf {
+    /// All of these bits are 1 in the attributes of an alarm that can be cleared.
+    Set(u32),
+    /// All of these bits are 0 in the attributes of an alarm that can be cleared.
+    Unset(u32),
+}
+
 /// Reads the attributes of the alarm that is being issued (Index 0).
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -82,6 +112,87 @@ impl AlarmAttributes {
             Progress::Done { .. } => Progress::Failed { error: Failure::TimedOut },
             Progress::Pending { left } => Progress::Pending { left },
             Progress::Failed { error } => Progress::Failed { error },
+        }
+    }
+}
+
+/// How an attempt to clear an alarm ended.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub enum Clearing {
+    /// Alarm is 0. Where it was so from the beginning nothing was sent.
+    Cleared,
+    /// The drive failed to clear it (ERR), or said that it did and Alarm stayed 1: the cause is still there, or the alarm goes
+    /// with the control power only.
+    NotClearable,
+}
+
+/// Clears the alarm and looks whether it is gone: the answer to "can this alarm be cleared?" for which no attribute has to be
+/// known.
+///
+/// An axis with an alarm is stopped; after the alarm [`Axis::clear`](Axis::clear) makes it start again.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct ClearAlarm {
+    ask: Ask,
+    type_code: TypeCode,
+    left: u32,
+    /// Good blocks up to the last call.
+    good: Option<u64>,
+    /// The answer to the command, once it is known.
+    answer: Option<Result<(), Failure>>,
+}
+
+impl ClearAlarm {
+    /// With the type code that clears the present alarm as the drive's manual gives it (Index 0); Alarm has `limit` update
+    /// periods to go to 0 after the answer.
+    pub const fn new(type_code: TypeCode, limit: u32) -> Self {
+        Self { ask: Ask { asked: false }, type_code, left: limit, good: None, answer: None }
+    }
+
+    /// To be called once in every update period.
+    ///
+    /// The command is sent once, and Alarm of the blocks received after its answer decides, not the answer alone.
+    /// [`Failure::CommandError`]: the drive does not know the type code, which says nothing of the alarm.
+    /// [`Failure::TimedOut`]: no answer came and Alarm is still 1, or no block came at all.
+    pub fn receive(&mut self, axis: &mut Axis) -> Progress<Clearing> {
+        let good = axis.counters().good();
+        // Status_Flags are those of the last good block, which may be old.
+        let is_fresh = self.good.replace(good).is_some_and(|last| last != good);
+        let alarm = axis.status().contains(StatusFlags::ALARM);
+        if is_fresh && !alarm && !self.ask.asked {
+            return Progress::Done { value: Clearing::Cleared };
+        }
+        match self.answer {
+            None if self.ask.asked || is_fresh => self.send(axis),
+            Some(Err(Failure::Execution)) if is_fresh => Progress::Done { value: Clearing::NotClearable },
+            answer => self.wait(answer == Some(Ok(())) && is_fresh),
+        }
+    }
+
+    fn send(&mut self, axis: &mut Axis) -> Progress<Clearing> {
+        let request = NonCyclicCommand::Alarm(Arguments { type_code: self.type_code, index: 0, data: 0 });
+        match self.ask.receive(axis, request) {
+            Progress::Done { .. } => self.answer = Some(Ok(())),
+            Progress::Failed { error: error @ (Failure::Execution | Failure::TimedOut) } => {
+                self.answer = Some(Err(error));
+            }
+            Progress::Failed { error } => return Progress::Failed { error },
+            Progress::Pending { left } => return Progress::Pending { left },
+        }
+        Progress::Pending { left: self.left }
+    }
+
+    /// Alarm is 1, or nothing is known of it; `accepted`: though the drive says that it has cleared it.
+    const fn wait(&mut self, accepted: bool) -> Progress<Clearing> {
+        match self.left.checked_sub(1) {
+            Some(left) => {
+                self.left = left;
+                Progress::Pending { left }
+            }
+            None if accepted => Progress::Done { value: Clearing::NotClearable },
+            None => Progress::Failed { error: Failure::TimedOut },
         }
     }
 }

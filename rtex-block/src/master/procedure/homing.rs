@@ -76,7 +76,9 @@ impl SetPosition {
 
 /// Homing by the drive: the command with the caller's type code, and then the end of the drive's motion.
 ///
-/// Only in PP: in the other modes the set-point would know nothing of the motion, nor of the new coordinates.
+/// Only in PP, where the drive generates the position command. In CP the host does: the drive would take up new coordinates
+/// between two set-points, and the next one, still in the old ones, would be a jump by the whole offset. In CV and CT nobody
+/// watches In_Progress, as the drive generates no position command. How a drive homes there is not in the documents at hand.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Home {

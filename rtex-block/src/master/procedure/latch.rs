@@ -4,7 +4,6 @@ use super::Ask;
 use crate::execution::LatchFlags;
 use crate::master::axis::Axis;
 use crate::master::progress::{Failure, Progress};
-use crate::noncyclic_command::NonCyclicCommand;
 use crate::noncyclic_response::NonCyclicResponse;
 use crate::type_code::{Nibble, homing};
 
@@ -85,15 +84,9 @@ impl Latch {
         let pending = Progress::Pending { left };
         // The one that is still to be caught; both are only at the end, which has been said then.
         let place = usize::from(!self.is_awaited(0));
-        let [latch_sel1, latch_sel2] = self.selections;
-        let request = NonCyclicCommand::Homing {
-            type_code: if self.stage == Stage::Arming { self.arm } else { homing::LATCH_STATE },
-            latch_sel1,
-            latch_sel2,
-            monitor_sel: LPOS.get(place).copied().unwrap_or(0),
-            setting_data: 0,
-        };
-        match self.ask.receive(axis, request) {
+        let type_code = if self.stage == Stage::Arming { self.arm } else { homing::LATCH_STATE };
+        let (selections, monitor_sel) = (self.selections, LPOS.get(place).copied().unwrap_or(0));
+        match self.ask.receive_with(axis, |axis| axis.ask_latch(type_code, selections, monitor_sel)) {
             Progress::Done { value: NonCyclicResponse::Homing { latch, monitor_data, .. } } => {
                 self.read(latch, place, monitor_data);
                 let all = !self.is_awaited(0) && !self.is_awaited(1);

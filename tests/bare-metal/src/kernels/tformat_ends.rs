@@ -4,9 +4,12 @@ use tformat::clb::{Outputs, SerialCrc, Tile};
 use tformat::device::{Device, Fault, Transmission};
 use tformat::inspect::{Report, inspect, inspect_bytes};
 use tformat::master::{
-    Counters, EEPROM_POLLING, EepromAccess, ErrorRate, Line, Progress, Reset, Step, Transaction, parse_echoed,
+    Counters, Detection, EEPROM_POLLING, EepromAccess, ErrorRate, Line, MultiTurnZero, Progress, Reset, SingleTurnZero,
+    Step, Transaction, parse_echoed,
 };
-use tformat::{Abm, Abs, Address, Almc, BitRate, Error, ErrorClass, Page, Request, Response, SingleTurn, Window};
+use tformat::{
+    Abm, Abs, Address, Almc, BitRate, Error, ErrorClass, Page, Request, Resolution, Response, SingleTurn, Window,
+};
 
 use super::kernels;
 use crate::self_test::tformat::{ANSWERS, Answer, FLIPS, Flip};
@@ -23,6 +26,19 @@ const ECHOED: [Echoed; 2] = [
     (Request::ReadSingleTurn, false, &[0x02, 0x20, 0xb4, 0xbd, 0x1c, 0x37]),
     (Request::ReadSingleTurn, true, &[0x02, 0x02, 0x20, 0xb4, 0xbd, 0x1c, 0x37]),
 ];
+
+const WIDTHS: Resolution = match Resolution::new(17, 16) {
+    Ok(resolution) => resolution,
+    Err(_) => panic!("possible widths"),
+};
+
+/// The time that a step names.
+fn when<T: Copy>(step: Step<T>) -> u64 {
+    match step {
+        Step::Send { not_before_ns, .. } => not_before_ns,
+        Step::Done { ready_ns, .. } | Step::Failed { ready_ns, .. } => ready_ns,
+    }
+}
 
 kernels! {
     /// A transaction from its start to the last byte of the answer.
@@ -64,6 +80,20 @@ kernels! {
             Step::Send { .. } => reset.receive(Ok(row.want), 100_000),
             end => end,
         }
+    } over ANSWERS;
+
+    /// Both zeros and the detection of the rate, from their starts to the step after one answer.
+    fn tformat_zeros(row: &Answer) -> (u64, u64, u64) {
+        let resolution = Resolution::from_enid(row.bytes.len() as u8).map_or(WIDTHS, |hint| hint.resolution);
+        let mut single = SingleTurnZero::set_and_shift_commutation_angle(resolution, 4);
+        let mut multi = MultiTurnZero::set_and_lose_multi_turn_reference(resolution, 1);
+        let mut detection = Detection::new();
+        let _ = (single.start(0), multi.start(0), detection.start(0));
+        (
+            when(single.receive(Ok(row.want), 100_000)),
+            when(multi.receive(Ok(row.want), 100_000)),
+            when(detection.receive(Ok(row.want), 100_000)),
+        )
     } over ANSWERS;
 
     /// EEPROM access, from its start to the step after one answer.

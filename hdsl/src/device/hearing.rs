@@ -1,0 +1,165 @@
+//! The encoder's ear: from a sampled line to the bits of a head, and the instant at which the position is taken.
+
+use nrz_line::Window;
+
+/// SYNC 001011 and the two ones after it, eight samples a bit, the first in bit 63.
+const LOCK: u64 = 0x0000_ff00_ffff_ffff;
+/// So many samples of [`LOCK`] may be different: two for each of its four edges would be eight, and a wrong bit is eight.
+const TOLERANCE: u32 = 7;
+
+/// What an encoder hears of the head of an H-frame on a line with eight samples a bit.
+///
+/// It locks on the edges of SYNC, so that its clock stands where most of them say; jitter of a sample and glitches of one do not
+/// hurt. The sampling edge is taken where it is, jitter included: that is the instant of the position.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Heard {
+    /// The bits from SYNC to PARA, for [`Device::answer`](super::Device::answer).
+    pub bits: Window,
+    /// The sample at which SYNC begins by the encoder's clock.
+    pub start: u16,
+    /// The first sample after the sampling edge.
+    pub edge: u16,
+}
+
+impl Heard {
+    /// Looks for a head in samples, a byte a bit time of the master, the first of them in bit 7. The line is high before and after
+    /// them. `None` if there is no head that can be read.
+    pub fn on_line(samples: &[u8]) -> Option<Self> {
+        // The shortest head has 26 bits.
+        let last = samples.len().checked_sub(26)?.saturating_mul(8);
+        let start = lock(samples, last)?;
+        let edge = run(samples, start.saturating_add(60), false)?;
+        let rise = run(samples, edge, true)?;
+        // The zero after the ones, and up to seven eighths of a bit more in the bit before it.
+        if !(5..=18).contains(&rise.saturating_sub(edge)) {
+            return None;
+        }
+        // CYCLE RESET begins with this bit; before it is the zero, before that are ones.
+        let reset = rise.saturating_sub(start).saturating_add(4) / 8;
+        let zero = reset.checked_sub(1)?;
+        let mut bits = 0_u128;
+        for at in 0..reset.saturating_add(17) {
+            let middle = start.saturating_add(at.saturating_mul(8));
+            let one = match at {
+                ..8 => majority(samples, middle),
+                _ if at < zero => true,
+                _ if at == zero => false,
+                _ => majority(samples, middle),
+            };
+            bits |= u128::from(one).checked_shl(u32::try_from(at).ok()?)?;
+        }
+        let bits = Window::from_bits(bits, u32::try_from(reset).ok()?.saturating_add(17))?;
+        Some(Self { bits, start: u16::try_from(start).ok()?, edge: u16::try_from(edge).ok()? })
+    }
+}
+
+/// Where SYNC begins: the best of the first places where it can be. (PARA may end like it.)
+fn lock(samples: &[u8], last: usize) -> Option<usize> {
+    let wrong = |place: &usize| (window(samples, *place) ^ LOCK).count_ones();
+    let first = (0..=last).find(|place| wrong(place) <= TOLERANCE)?;
+    (first..first.saturating_add(8)).min_by_key(wrong)
+}
+
+/// 64 samples from `place` on, the first in bit 63.
+fn window(samples: &[u8], place: usize) -> u64 {
+    let byte = |at| samples.get(at).copied().unwrap_or(0xff);
+    let first = place / 8;
+    let eight = u64::from_be_bytes([0, 1, 2, 3, 4, 5, 6, 7].map(|k: usize| byte(first.saturating_add(k))));
+    match place % 8 {
+        0 => eight,
+        part => eight << part | u64::from(byte(first.saturating_add(8))) >> (8_usize.saturating_sub(part)),
+    }
+}
+
+/// A sample; the line is high outside of them.
+fn sample(samples: &[u8], place: usize) -> bool {
+    samples.get(place / 8).is_none_or(|byte| byte << (place % 8) & 0x80 != 0)
+}
+
+/// The level in the middle of the bit that begins at `place`.
+fn majority(samples: &[u8], place: usize) -> bool {
+    [3, 4, 5].into_iter().filter(|k| sample(samples, place.saturating_add(*k))).count() >= 2
+}
+
+/// Where a level begins that lasts: three samples in a row.
+fn run(samples: &[u8], from: usize, level: bool) -> Option<usize> {
+    let lasts = |place: &usize| (0..3).all(|k| sample(samples, place.saturating_add(k)) == level);
+    (from..samples.len().saturating_mul(8)).find(lasts)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::device::code::parameter;
+    use std::vec::Vec;
+
+    /// The line as text, a character a sample, as bytes with the first sample in bit 7.
+    fn pack(line: &str) -> Vec<u8> {
+        let bits: Vec<u8> = line.bytes().map(|level| u8::from(level == b'1')).collect();
+        bits.chunks(8).map(|byte| (0..8).fold(0, |sum, k| sum << 1 | byte.get(k).copied().unwrap_or(1))).collect()
+    }
+
+    /// The head with IDLE, FIRST, MSYNC as printed, with `extra` eighths of ones in the EXTRA window, after `delay` samples.
+    fn head(extra: usize, delay: usize) -> std::string::String {
+        let eight = |bits: &str| bits.chars().flat_map(|bit| [bit; 8]).collect::<std::string::String>();
+        let low = if extra % 8 == 0 { 0 } else { 8 - extra % 8 };
+        let parts = [
+            "1".repeat(delay),
+            eight("00101111"),
+            "1".repeat(extra),
+            "0".repeat(low),
+            eight("0110"),
+            eight("0000"),
+            eight("1001000110"),
+            "1".repeat(40),
+        ];
+        parts.concat()
+    }
+
+    /// Where the edge is, to the sample, free running and in a window of any size.
+    #[test]
+    fn the_instant_is_that_of_the_edge() {
+        for extra in (24..=72).chain([0]) {
+            for delay in (0..=90).step_by(crate::thin(13)) {
+                let heard = Heard::on_line(&pack(&head(extra, delay))).unwrap();
+                assert_eq!((usize::from(heard.start), usize::from(heard.edge)), (delay, delay + 64 + extra));
+                assert_eq!(heard.bits.len() as usize, 26 + extra.div_ceil(8));
+                assert_eq!(parameter(heard.bits), Some(0xd0));
+            }
+        }
+    }
+
+    /// One glitch anywhere moves the edge by a sample back or three on at most, and harms nothing else.
+    #[test]
+    fn a_glitch() {
+        for at in (20..20 + 26 * 8).step_by(crate::thin(7)) {
+            let mut line = pack(&head(0, 20));
+            line[at / 8] ^= 0x80 >> (at % 8);
+            let heard = Heard::on_line(&line).unwrap();
+            assert_eq!((heard.start, parameter(heard.bits)), (20, Some(0xd0)), "{at}");
+            assert!((20 + 63..=20 + 67).contains(&heard.edge), "{at}: {}", heard.edge);
+        }
+    }
+
+    #[test]
+    fn what_is_no_head() {
+        assert_eq!(Heard::on_line(&[0xff; 48]), None);
+        assert_eq!(Heard::on_line(&[0x00; 48]), None);
+        assert_eq!(Heard::on_line(&pack(&head(0, 0))[..25]), None);
+        // A wrong bit of SYNC.
+        for bit in 0..6 {
+            let mut line = pack(&head(0, 16));
+            line[2 + bit] ^= 0xff;
+            assert!(Heard::on_line(&line).and_then(|heard| parameter(heard.bits)).is_none(), "{bit}");
+        }
+        // The level stays low for two bits more, or rises too early.
+        let mut line = pack(&head(0, 0));
+        line[9] = 0;
+        line[10] = 0;
+        assert_eq!(Heard::on_line(&line), None);
+        let mut line = pack(&head(0, 0));
+        line[8] = 0x1f;
+        assert_eq!(Heard::on_line(&line), None);
+    }
+}

@@ -1,0 +1,103 @@
+//! Where the receiver is in its start-up, and why it began anew.
+
+use core::fmt;
+
+use crate::error::Error;
+
+/// Where the receiver is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub enum State {
+    /// Two frames without an answer.
+    Reset,
+    /// Sixteen frames without an answer: the encoder synchronises.
+    Sync,
+    /// Nine frames: sampling index and delay are searched in the test pattern.
+    Start,
+    /// Nine frames: the test pattern has to come at the learned place.
+    Learn,
+    /// Sixteen frames more of the same: line check.
+    Check,
+    /// One frame: the encoder identifier.
+    IdReq,
+    /// Frames with INIT until VSYNC comes.
+    WaitVsync,
+    /// RX0..RX7, V-frame after V-frame.
+    Running,
+}
+
+impl State {
+    /// How many frames the state lasts; `None` if that depends on the encoder.
+    pub const fn frames(self) -> Option<u8> {
+        match self {
+            Self::Reset => Some(2),
+            Self::Sync | Self::Check => Some(16),
+            Self::Start | Self::Learn => Some(9),
+            Self::IdReq => Some(1),
+            Self::WaitVsync | Self::Running => None,
+        }
+    }
+
+    pub(super) const fn next(self) -> Self {
+        match self {
+            Self::Reset => Self::Sync,
+            Self::Sync => Self::Start,
+            Self::Start => Self::Learn,
+            Self::Learn => Self::Check,
+            Self::Check => Self::IdReq,
+            Self::IdReq => Self::WaitVsync,
+            Self::WaitVsync | Self::Running => Self::Running,
+        }
+    }
+}
+
+/// Why the link was started anew.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[non_exhaustive]
+pub enum Cause {
+    /// The application asked for it (PRST).
+    Requested,
+    /// A START frame: no encoder, or the test pattern is not there.
+    Learn(Error),
+    /// A LEARN or CHECK frame: the test pattern came with a wrong bit.
+    Pattern,
+    /// The identifier was damaged or is of an encoder that this receiver does not support.
+    Identifier(Error),
+    /// No VSYNC within the frames that [`Dialect::vsync_frames`] allows.
+    NoVsync,
+    /// The quality monitor has run out.
+    Quality,
+    /// Too many acceleration words in a row could not be used.
+    AccelerationErrors,
+}
+
+impl fmt::Display for State {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.pad(match self {
+            Self::Reset => "RESET",
+            Self::Sync => "SYNC",
+            Self::Start => "START",
+            Self::Learn => "LEARN",
+            Self::Check => "CHECK",
+            Self::IdReq => "IDREQ",
+            Self::WaitVsync => "WAIT VSYNC",
+            Self::Running => "RUNNING",
+        })
+    }
+}
+
+impl fmt::Display for Cause {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Requested => f.write_str("asked for"),
+            Self::Learn(error) | Self::Identifier(error) => error.fmt(f),
+            Self::Pattern => f.write_str("the test pattern came with a wrong bit"),
+            Self::NoVsync => f.write_str("no VSYNC after INIT"),
+            Self::Quality => f.write_str("the quality monitor has run out"),
+            Self::AccelerationErrors => f.write_str("too many acceleration words in a row could not be used"),
+        }
+    }
+}

@@ -1,0 +1,78 @@
+use core::fmt;
+
+/// Writes names with a blank between them: how the crates print a set, `OF BE BA`; `-` for none.
+pub fn write_names<'a>(f: &mut fmt::Formatter<'_>, names: impl IntoIterator<Item = &'a str>) -> fmt::Result {
+    let mut names = names.into_iter();
+    f.write_str(names.next().unwrap_or("-"))?;
+    names.try_for_each(|name| write!(f, " {name}"))
+}
+
+/// `Display`, and behind the calling crate's feature `defmt` also `defmt::Format`, of sets declared with `bitflags` over
+/// `u8` or `u16`: the names of the set bits, then the bits without a name as one number, `LAST 40h`; `-` for the
+/// empty set.
+///
+/// ```
+/// #[derive(Clone, Copy)]
+/// pub struct Lamps(u8);
+/// bitflags::bitflags! {
+///     impl Lamps: u8 {
+///         const GREEN = 1 << 0;
+///         const RED = 1 << 3;
+///     }
+/// }
+/// servowire_core::show_flags!(Lamps);
+///
+/// let texts = [0x00, 0x09, 0x41, 0x40].map(|bits| Lamps::from_bits_retain(bits).to_string());
+/// assert_eq!(texts, ["-", "GREEN RED", "GREEN 40h", "40h"]);
+/// ```
+#[macro_export]
+macro_rules! show_flags {
+    ($($name:ty),+ $(,)?) => {
+        $(
+            impl core::fmt::Display for $name {
+                fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+                    let rest = self.iter_names().fold(*self, |rest, (_, flag)| rest.difference(flag)).bits();
+                    if rest != 0 && rest == self.bits() {
+                        return write!(f, "{rest:02X}h");
+                    }
+                    $crate::write_names(f, self.iter_names().map(|(name, _)| name))?;
+                    if rest == 0 { Ok(()) } else { write!(f, " {rest:02X}h") }
+                }
+            }
+
+            #[cfg(feature = "defmt")]
+            #[cfg_attr(docsrs, doc(cfg(feature = "defmt")))]
+            impl defmt::Format for $name {
+                fn format(&self, f: defmt::Formatter<'_>) {
+                    let (mut rest, mut gap) = (*self, "");
+                    for (name, flag) in self.iter_names() {
+                        rest = rest.difference(flag);
+                        defmt::write!(f, "{=str}{=str}", gap, name);
+                        gap = " ";
+                    }
+                    if !rest.is_empty() {
+                        defmt::write!(f, "{=str}{=u16:02X}h", gap, u16::from(rest.bits()));
+                    } else if self.is_empty() {
+                        defmt::write!(f, "-");
+                    }
+                }
+            }
+        )+
+    };
+}
+
+/// `defmt::Format`, behind the calling crate's feature of this name, that prints what `Display` prints.
+#[macro_export]
+macro_rules! format_as_displayed {
+    ($($name:ty),+ $(,)?) => {
+        $(
+            #[cfg(feature = "defmt")]
+            #[cfg_attr(docsrs, doc(cfg(feature = "defmt")))]
+            impl defmt::Format for $name {
+                fn format(&self, f: defmt::Formatter<'_>) {
+                    defmt::write!(f, "{}", defmt::Display2Format(self));
+                }
+            }
+        )+
+    };
+}
