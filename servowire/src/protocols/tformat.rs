@@ -18,7 +18,7 @@ use crate::line::{LineField, StartStop};
 use crate::output::Sink;
 use crate::protocols::plausible::CUT;
 use describe::Encoder;
-use frame::{Frame, MOST_FIELDS, Pending};
+use frame::{Frame, LATE_ANSWER, MOST_FIELDS, Pending};
 
 pub use describe::FIELDS;
 
@@ -139,6 +139,7 @@ impl Decoder {
         if (at_once || still.is_some()) && !event.verdict.is_ok() {
             self.pending = None;
             self.skipped = frame.end;
+            self.early = Some(frame.end + LATE_ANSWER);
             self.skip = begin.map(|begin| begin + LONGEST_BITS * self.bit).or(still);
             self.cut_until = self.skip;
             return out.event(&Event::cut(frame.place()));
@@ -255,7 +256,7 @@ impl StartStop for Decoder {
 
     fn begin(&mut self, start: i64) {
         self.begin = Some(start);
-        self.early = Some(start + LONGEST_BITS * self.bit + ANSWER_TIMEOUT);
+        self.early = Some(start + LATE_ANSWER);
     }
 
     fn field(&mut self, field: &LineField, out: &mut dyn Sink) -> io::Result<()> {

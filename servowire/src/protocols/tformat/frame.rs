@@ -10,7 +10,7 @@ use crate::protocols::plausible;
 pub(super) const MOST_FIELDS: usize = 16;
 
 /// Twice the nominal time: what begins later and looks like a request is one, in picoseconds.
-const LATE_ANSWER: i64 = 6_000_000;
+pub(super) const LATE_ANSWER: i64 = 6_000_000;
 
 /// Fields that followed each other.
 #[derive(Debug, Clone, Copy, Default)]
