@@ -4,13 +4,13 @@
 //! found by the head of the master; the answer behind it at the delay where its words hold.
 
 mod bits;
+mod score;
 
 use std::io;
 
 use hdsl::frame::{ANSWER_BITS, BIT_RATE, H_FRAME_BITS, Head, Received};
 use hdsl::message::{LongAnswer, Request, Responder};
 use hdsl::sampling::{Delay, TEST_PATTERN};
-use hdsl::symbol::{RunningDisparity, Word};
 use hdsl::{
     Answer, EncoderByte, EncoderId, EncoderSymbol, Error, MasterSymbol, Phase, PositionBits, PositionTracker,
     QualityMonitor, QualityRule, Rule, VFrame, Window,
@@ -20,6 +20,7 @@ use crate::event::{Direction, Event, Field, NO_RESPONSE, Place, Position, Refusa
 use crate::line::{LineDecoder, Rates};
 use crate::output::Sink;
 use bits::Bits;
+use score::{PERFECT, disparity_holds, score};
 
 /// The names of all fields.
 pub const FIELDS: &[&str] = &[
@@ -101,8 +102,6 @@ fn head(bits: &Bits, at: u64) -> Option<(Received, u64)> {
 const HEAD: u128 = 0b1111_0100;
 /// Good words and checks from which an answer is where it was looked for.
 const GOOD: usize = 10;
-/// All of them.
-const PERFECT: usize = 12;
 /// Answers from which the delay is learned, and bits in which they are.
 const LEARNED: usize = 8;
 const LESSON: u64 = 1300;
@@ -429,33 +428,6 @@ fn usual_delay(bits: &Bits, from: u64) -> u32 {
     }
     let best = delays.zip(sums).reduce(|best, next| if next.1 > best.1 { next } else { best });
     best.map_or(0, |(delay, _)| delay)
-}
-
-/// How well an answer stands here: good words, switch bit, check of the acceleration; most for the test pattern.
-fn score(line: Window) -> usize {
-    let Ok(answer) = Answer::parse(Rule::Strict, line) else { return 0 };
-    if line.bits() as u64 & ((1 << ANSWER_BITS) - 1) == TEST_PATTERN {
-        return 20;
-    }
-    let words = answer.words().iter().filter(|word| !word.is_byte_error()).count();
-    let disparity = if disparity_holds(line) { 3 } else { 0 };
-    words + usize::from(answer.switch_ok()) + if answer.delta_delta().is_ok() { 2 } else { 0 } + disparity
-}
-
-/// Whether the running disparity holds from word to word of an answer, whatever it was before.
-fn disparity_holds(line: Window) -> bool {
-    let bits = line.bits();
-    let words = [0, 10, 20, 30, 40, 51].map(|at| Word::truncate((bits >> at) as u16));
-    [RunningDisparity::Minus, RunningDisparity::Plus].into_iter().any(|before| {
-        let mut rd = before;
-        words.into_iter().all(|word| {
-            let holds = word.is_in(rd);
-            if word.disparity() != 0 {
-                rd = rd.other();
-            }
-            holds
-        })
-    })
 }
 
 fn master(head: Received, symbol: Result<MasterSymbol, Error>, place: Place) -> Event {
