@@ -10,7 +10,7 @@ use std::path::Path;
 use servowire::capture::{Capture, Change, Format, Hints, Input, Line, open_input};
 use servowire::event::Event;
 use servowire::fault::Fault;
-use servowire::output::{Output, Printer, Sink};
+use servowire::output::{Origin, Output, Printer};
 use servowire::protocols::{Protocol, Settings};
 
 use crate::byte;
@@ -175,19 +175,9 @@ impl Line for Memory {
 #[derive(Default)]
 struct Counted(u64);
 
-impl Sink for Counted {
-    fn event(&mut self, _: &Event) -> io::Result<()> {
-        self.0 += 1;
-        Ok(())
-    }
-}
-
 impl Printer for Counted {
-    fn begin(&mut self, _: &str) -> io::Result<()> {
-        Ok(())
-    }
-
-    fn end(&mut self) -> io::Result<()> {
+    fn event(&mut self, _: &Origin, _: &Event) -> io::Result<()> {
+        self.0 += 1;
         Ok(())
     }
 }
@@ -212,7 +202,7 @@ pub fn survey(mut data: &[u8]) {
     let edges = changes.len() as u64;
     let memory = Memory { names, changes, end: time + 100 * grid, given: false };
     let mut counted = Counted::default();
-    let mut out = Output::new(&mut counted, None, &|| (), &|_| ());
+    let mut out = Output::new("fuzz", &mut counted, &|| (), &|_| ());
     // A fault is as good an end as any.
     let _ = Protocol::Auto.decode("fuzz", Capture::Edges(Box::new(memory)), &Settings::default(), &mut out);
     assert!(counted.0 <= 16 * edges, "{} events of {edges} edges", counted.0);

@@ -1,28 +1,35 @@
-//! Speed of the decode path: `cargo bench -p servowire`.
+//! Speed of the decode path: `cargo bench -p servowire --bench decode [WORD]`.
 //!
-//! T-Format traffic at 8 samples a bit goes from memory through the reader, the receiver and the protocol into a
-//! tally, as `servowire decode` does it. The plain way beside it asks for every sample on its own.
+//! Traffic at 8 samples a bit goes from memory through the reader, the survey, the receiver and the protocol, as
+//! `servowire decode` does it without options. The plain way beside it asks for every sample on its own.
 #![allow(
     clippy::arithmetic_side_effects,
     clippy::cast_possible_truncation,
     clippy::cast_possible_wrap,
     clippy::cast_precision_loss,
+    clippy::cast_sign_loss,
+    clippy::indexing_slicing,
     clippy::std_instead_of_core,
     clippy::expect_used,
     clippy::unwrap_used
 )]
 
+mod clock;
+#[path = "../tests/random/mod.rs"]
+mod random;
+
 use std::hint::black_box;
 use std::io::{self, Cursor};
 use std::rc::Rc;
-use std::time::Instant;
 
 use nrz_line::{Format, Receiver};
+use random::speech::Kind;
+use random::wire::{Scene, capture};
 use servowire::capture::raw::{Raw, Unit};
 use servowire::capture::{Capture, Input};
 use servowire::event::Event;
 use servowire::line::{LineField, StartStop};
-use servowire::output::{Output, Printer, Sink, Tally};
+use servowire::output::{Origin, Output, Printer, Tally};
 use servowire::protocols::{Protocol, Settings, tformat};
 
 /// Samples a bit.
@@ -33,35 +40,68 @@ const RATE: u64 = 20_000_000;
 const BIT: i64 = 400_000;
 /// ID 3 transactions, about 10^8 samples.
 const TRANSACTIONS: u32 = 80_000;
-/// Runs; the best counts.
-const RUNS: usize = 5;
 
 fn main() {
-    let samples = traffic();
-    let count = samples.len() as f64;
-    let packed: Rc<[u8]> = samples.chunks(8).map(|c| c.iter().rev().fold(0, |b, &s| b << 1 | u8::from(s))).collect();
-    let bytes: Rc<[u8]> = samples.iter().map(|&s| u8::from(s)).collect();
-
-    let plain = best(|| one_by_one(&samples));
-    println!("{:.0} million samples at {N} a bit, {TRANSACTIONS} ID 3 transactions", count / 1e6);
-    let show = |name: &str, seconds: f64| {
-        println!("{name:<34} {:>8.1} million samples/s   {:>5.2} x", count / seconds / 1e6, plain / seconds);
-    };
-    show("sample by sample", plain);
-    show("decode, one sample a byte", best(|| decode(&bytes, Unit::Bytes(1))));
-    show("decode, packed 8 samples a byte", best(|| decode(&packed, Unit::Bit)));
+    let wanted = std::env::args().skip(1).find(|word| !word.starts_with('-')).unwrap_or_default();
+    if Kind::Tformat.name().contains(&wanted) {
+        tformat_lines();
+    }
+    for (kind, bit_rate, count) in [(Kind::Aformat, 4_000_000, 40_000), (Kind::Dsl, 9_375_000, 100_000)] {
+        if !kind.name().contains(&wanted) {
+            continue;
+        }
+        let (samples, frames) = drawn(kind, bit_rate, N as u64, count);
+        println!("{}: {:.0} million samples at {N} a bit", kind.name(), samples.len() as f64 / 1e6);
+        let packed = pack(&samples);
+        let rate = bit_rate * N as u64;
+        show("decode, packed 8 samples a byte", samples.len(), best(frames, || decode(&packed, rate, Unit::Bit)));
+    }
 }
 
-/// Best of some runs, in seconds.
-fn best(mut run: impl FnMut() -> Tally) -> f64 {
-    let mut best = f64::INFINITY;
-    for _ in 0..RUNS {
-        let start = Instant::now();
-        let tally = black_box(run());
-        best = best.min(start.elapsed().as_secs_f64());
-        assert_eq!((tally.ok, tally.refused), (2 * u64::from(TRANSACTIONS), 0));
+fn show(name: &str, samples: usize, seconds: f64) {
+    println!("  {name:<40} {:>8.1} million samples/s", samples as f64 / seconds / 1e6);
+}
+
+fn tformat_lines() {
+    let samples = traffic();
+    let packed = pack(&samples);
+    let bytes: Rc<[u8]> = samples.iter().map(|&s| u8::from(s)).collect();
+    let frames = 2 * u64::from(TRANSACTIONS);
+    let plain = best(frames, || one_by_one(&samples));
+    println!("T-Format: {:.0} million samples at {N} a bit", samples.len() as f64 / 1e6);
+    show("sample by sample", samples.len(), plain);
+    show("decode, one sample a byte", samples.len(), best(frames, || decode(&bytes, RATE, Unit::Bytes(1))));
+    show("decode, packed 8 samples a byte", samples.len(), best(frames, || decode(&packed, RATE, Unit::Bit)));
+}
+
+/// Least time of some runs, in seconds; all `frames` hold.
+fn best(frames: u64, run: impl FnMut() -> Tally) -> f64 {
+    let (seconds, tally) = clock::best(run);
+    assert_eq!((tally.ok, tally.refused), (frames, 0));
+    seconds
+}
+
+/// Eight samples a byte, the oldest in bit 0.
+fn pack(samples: &[bool]) -> Rc<[u8]> {
+    samples.chunks(8).map(|eight| eight.iter().rev().fold(0, |byte, &sample| byte << 1 | u8::from(sample))).collect()
+}
+
+/// Random traffic of a protocol, `per_bit` samples a bit, and the frames of it that a decoder has to say.
+fn drawn(kind: Kind, bit_rate: u64, per_bit: u64, count: u64) -> (Vec<bool>, u64) {
+    let scene = Scene { transactions: (count, count), nominal: Some(bit_rate as f64), ..Scene::clean() };
+    let capture = capture(kind, &scene, 1);
+    let period = 1e12 / (bit_rate * per_bit) as f64;
+    let mut samples = Vec::new();
+    let mut level = true;
+    // Behind an edge, so that the samples lie in the middle of their pieces.
+    for (time, next) in capture.channels[0].edges.iter().copied().chain([(capture.end, true)]) {
+        samples.resize((time as f64 / period).round() as usize, level);
+        level = next;
     }
-    best
+    let due = capture.due[0].events.len() as u64;
+    // Every eighth answer of DSL completes a V-frame, but for the first: that has not begun with a known one.
+    let more = if kind == Kind::Dsl { due / 2 / 8 - 1 } else { 0 };
+    (samples, due + more)
 }
 
 /// An axis that turns; 10 us between transactions.
@@ -91,29 +131,19 @@ fn traffic() -> Vec<bool> {
 /// Takes events and forgets them.
 struct Nowhere;
 
-impl Sink for Nowhere {
-    fn event(&mut self, event: &Event) -> io::Result<()> {
+impl Printer for Nowhere {
+    fn event(&mut self, _: &Origin, event: &Event) -> io::Result<()> {
         black_box(event);
         Ok(())
     }
 }
 
-impl Printer for Nowhere {
-    fn begin(&mut self, _: &str) -> io::Result<()> {
-        Ok(())
-    }
-
-    fn end(&mut self) -> io::Result<()> {
-        Ok(())
-    }
-}
-
-fn decode(data: &Rc<[u8]>, unit: Unit) -> Tally {
+fn decode(data: &Rc<[u8]>, rate: u64, unit: Unit) -> Tally {
     let input = Input::over("memory", Box::new(Cursor::new(Rc::clone(data))));
     let mut nowhere = Nowhere;
-    let mut out = Output::new(&mut nowhere, None, &|| (), &|_| ());
-    let capture = Capture::Samples(Raw::new(input, RATE, unit));
-    Protocol::Tformat.decode("memory", capture, &Settings::default(), &mut out).expect("the traffic is good");
+    let mut out = Output::new("memory", &mut nowhere, &|| (), &|_| ());
+    let capture = Capture::Samples(Raw::new(input, rate, unit));
+    Protocol::Auto.decode("memory", capture, &Settings::default(), &mut out).expect("the traffic is good");
     out.tally
 }
 

@@ -26,7 +26,7 @@ fn main() {
             let row = row(condition, kind, captures);
             let right = 100.0 * f64::from(row.right) / f64::from(captures);
             println!("{:<42} {:<14} {captures:>8} {right:>6.1}% {:>6}", condition.name, kind.name(), row.wrong);
-            if let (Some((seed, why, notes)), false) = (row.first, words.is_empty()) {
+            for (seed, why, notes) in row.faults.iter().filter(|_| !words.is_empty()) {
                 println!("    seed {seed}: {why}\n{notes}");
             }
         }

@@ -3,10 +3,12 @@
 //! One file per format under `capture/`. Every reader streams with fixed buffers and gives the same thing: level
 //! changes of named channels with the time in picoseconds ([`Line`]), or bytes ([`ByteLog`]).
 
+pub mod analyzer;
 pub mod archive;
 pub mod fst;
 pub mod hexlog;
 mod input;
+pub mod isf;
 pub mod ols;
 pub mod pcapng;
 mod pipe;
@@ -109,6 +111,10 @@ pub enum Format {
     /// A table of a logic analyser or an oscilloscope.
     #[value(alias = "saleae-csv")]
     Csv,
+    /// A table of bytes of an analyser of Saleae Logic 2.
+    AnalyzerTable,
+    /// A waveform of a Tektronix oscilloscope (.isf).
+    Isf,
     /// Saleae Logic 2 binary export.
     SaleaeBinary,
     /// A session of sigrok, PulseView (.sr) or DSView (.dsl).
@@ -188,6 +194,10 @@ fn known(head: &[u8]) -> Option<Format> {
         Some(Format::SigrokText)
     } else if begins(&[b";rate:", b";size:", b";channels:"]) {
         Some(Format::Ols)
+    } else if analyzer::looks_like(text) {
+        Some(Format::AnalyzerTable)
+    } else if isf::looks_like(text) {
+        Some(Format::Isf)
     } else if begins(TABLES) {
         Some(Format::Csv)
     } else {
@@ -213,6 +223,8 @@ const TABLES: &[&[u8]] = &[
     b"ch1(v)",
     b"ch1v",
     b"in s,",
+    b"lecroy",
+    b"#,time",
     b"nanoseconds",
     b"microseconds",
     b"milliseconds",
@@ -221,7 +233,10 @@ const TABLES: &[&[u8]] = &[
 impl Format {
     /// Text may be packed; of the others the first bytes are the format's own.
     fn is_text(self) -> bool {
-        matches!(self, Self::Vcd | Self::Csv | Self::SigrokText | Self::Ols | Self::Hex)
+        matches!(
+            self,
+            Self::Vcd | Self::Csv | Self::AnalyzerTable | Self::Isf | Self::SigrokText | Self::Ols | Self::Hex
+        )
     }
 }
 
@@ -244,6 +259,8 @@ fn decoder(mut input: Input, format: Format, hints: Hints) -> Result<Capture, Fa
     Ok(match format {
         Format::Vcd => Capture::Edges(Box::new(vcd::Vcd::new(input)?)),
         Format::Csv => Capture::Edges(Box::new(table::Table::new(input, hints.threshold)?)),
+        Format::AnalyzerTable => Capture::Edges(Box::new(analyzer::Analyzer::new(input)?)),
+        Format::Isf => Capture::Edges(Box::new(isf::Isf::new(input, hints.threshold)?)),
         Format::Session => archive::open(input)?,
         Format::Fst => Capture::Edges(Box::new(fst::Fst::new(input)?)),
         Format::SigrokText => Capture::Edges(Box::new(sigrok_text::SigrokText::new(input)?)),
@@ -267,6 +284,20 @@ fn decoder(mut input: Input, format: Format, hints: Hints) -> Result<Capture, Fa
         }
         Format::Pcapng => Capture::Packets(pcapng::Pcapng::new(input)?),
     })
+}
+
+/// What a file begins with, for people.
+fn seen(head: &[u8]) -> String {
+    let line = head.split(|byte| *byte == b'\n').next().unwrap_or_default();
+    match std::str::from_utf8(line) {
+        Ok(text) if !text.chars().any(|c| c.is_control() && !matches!(c, '\t' | '\r')) => {
+            format!("begins with {:?}", text.trim_end().chars().take(40).collect::<String>())
+        }
+        _ => {
+            let bytes: Vec<String> = head.iter().take(8).map(|byte| format!("{byte:02X}")).collect();
+            format!("begins with the bytes {}", bytes.join(" "))
+        }
+    }
 }
 
 /// The format from the first bytes, else from what was said and from the name.
@@ -294,9 +325,13 @@ fn guess(input: &mut Input, path: &Path, has_rate: bool) -> Result<Format, Fault
         "vcd" => Ok(Format::Vcd),
         "csv" => Ok(Format::Csv),
         "hex" => Ok(Format::Hex),
-        _ => Err(input.fault(
-            At::File,
-            "no format that is known; for raw samples give --rate, for a log of hex bytes --bytes, else --format",
-        )),
+        _ => {
+            let seen = seen(input.peek()?);
+            let what = format!(
+                "{seen}: no format that is known. Export it as CSV, VCD or samples; for raw samples give --rate, for a log \
+                of hex bytes --bytes, else --format"
+            );
+            Err(input.fault(At::File, what))
+        }
     }
 }

@@ -138,17 +138,14 @@ fn one(
             }
         },
     };
-    printer.begin(name)?;
     let progress = || bar.set(meter.get());
     let notes = |text: &str| bar.say(text);
-    let mut out = Output::new(printer, vcd.as_mut(), &progress, &notes);
-    out = out.with_picture(picture.as_mut()).with_filter(&mut filter);
+    let mut out = Output::new(name, printer, &progress, &notes);
+    out = out.with_vcd(vcd.as_mut()).with_picture(picture.as_mut()).with_filter(&mut filter);
+    out.begin()?;
     let end = protocol.decode(name, capture, &arguments.settings(), &mut out);
+    out.end()?;
     let (tally, chosen, refusals) = (out.tally, out.chosen, out.refusals());
-    printer.end()?;
-    if let Some(vcd) = &mut vcd {
-        vcd.finish()?;
-    }
     if let (Some(picture), Some(path)) = (&picture, &arguments.svg) {
         if let Err(e) = picture.draw(path) {
             let what = format!("cannot be drawn: {e}");

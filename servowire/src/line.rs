@@ -178,6 +178,13 @@ pub fn samples(
     out: &mut Output<'_>,
 ) -> Result<(), Stop> {
     let rate = raw.clock().rate();
+    // A sample a bit: what a receiver has read already. Only HIPERFACE DSL is recorded so.
+    let is_stream = |protocol: &Protocol| {
+        *protocol == Protocol::Hdsl && protocol.rates().iter().any(|bit| rate.abs_diff(u64::from(*bit)) * 1000 < rate)
+    };
+    if protocol.of_lines().iter().any(is_stream) {
+        return decode(file, raw, Protocol::Hdsl, settings, out);
+    }
     let slowest = protocol.of_lines().iter().flat_map(|protocol| protocol.rates()).min().copied().unwrap_or(1);
     if let Some(what) = too_coarse(rate, settings.line.bit_rate.unwrap_or(slowest)) {
         return Err(Fault::new(file, At::File, what).into());

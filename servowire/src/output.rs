@@ -44,18 +44,33 @@ pub struct Lane {
     pub rate: u32,
 }
 
-/// A form of output that is written file by file.
-pub trait Printer: Sink {
-    /// A file begins.
-    fn begin(&mut self, file: &str) -> io::Result<()>;
+/// Where events come from: the file, its lines that are decoded, and the one that speaks.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct Origin {
+    /// The name of the file.
+    pub file: String,
+    /// The lines found so far.
+    pub lanes: Vec<Lane>,
+    /// The number of the line that speaks, from 0; a log of bytes has none.
+    pub speaks: usize,
+}
 
-    /// A further line was found; it has the next number, from 0.
-    fn begin_lane(&mut self, _lane: &Lane) -> io::Result<()> {
+impl Origin {
+    /// The line that speaks; none in a log of bytes.
+    pub fn lane(&self) -> Option<&Lane> {
+        self.lanes.get(self.speaks)
+    }
+}
+
+/// A form of output that is written file by file.
+pub trait Printer {
+    /// A file begins.
+    fn begin(&mut self, _origin: &Origin) -> io::Result<()> {
         Ok(())
     }
 
-    /// The events that follow are of this line.
-    fn lane(&mut self, _lane: usize) {}
+    /// The next event.
+    fn event(&mut self, origin: &Origin, event: &Event) -> io::Result<()>;
 
     /// Nothing comes for a while: what is complete is shown.
     fn flush(&mut self) -> io::Result<()> {
@@ -63,7 +78,9 @@ pub trait Printer: Sink {
     }
 
     /// The file is at its end.
-    fn end(&mut self) -> io::Result<()>;
+    fn end(&mut self, _origin: &Origin) -> io::Result<()> {
+        Ok(())
+    }
 }
 
 /// Counts events by their verdict.
@@ -101,20 +118,15 @@ pub struct Output<'a> {
     pub chosen: Tally,
     /// Refused frames by class, with the first cause that was given.
     refused: BTreeMap<&'static str, (u64, Option<String>)>,
-    lane: Option<usize>,
+    origin: Origin,
 }
 
 impl<'a> Output<'a> {
-    /// `printer` gets all events, `vcd` events and changes.
-    pub fn new(
-        printer: &'a mut dyn Printer,
-        vcd: Option<&'a mut vcd::VcdOut>,
-        progress: &'a dyn Fn(),
-        notes: &'a dyn Fn(&str),
-    ) -> Self {
+    /// `printer` gets all events of the file called `file`.
+    pub fn new(file: &str, printer: &'a mut dyn Printer, progress: &'a dyn Fn(), notes: &'a dyn Fn(&str)) -> Self {
         Self {
             printer,
-            vcd,
+            vcd: None,
             picture: None,
             filter: None,
             progress,
@@ -122,8 +134,14 @@ impl<'a> Output<'a> {
             tally: Tally::default(),
             chosen: Tally::default(),
             refused: BTreeMap::new(),
-            lane: None,
+            origin: Origin { file: file.to_owned(), ..Origin::default() },
         }
+    }
+
+    /// Writes events and changes beside each other.
+    #[must_use]
+    pub fn with_vcd(self, vcd: Option<&'a mut vcd::VcdOut>) -> Self {
+        Self { vcd, ..self }
     }
 
     /// Draws the events too.
@@ -143,36 +161,30 @@ impl<'a> Output<'a> {
         self.vcd.is_some()
     }
 
+    /// The file begins.
+    pub fn begin(&mut self) -> io::Result<()> {
+        self.printer.begin(&self.origin)
+    }
+
+    /// The file is at its end.
+    pub fn end(&mut self) -> io::Result<()> {
+        self.printer.end(&self.origin)?;
+        self.vcd.as_mut().map_or(Ok(()), |vcd| vcd.finish())
+    }
+
     /// The channels of the capture. The lines found so far are decoded.
     pub fn channels(&mut self, channels: &[String]) -> io::Result<()> {
-        self.vcd.as_mut().map_or(Ok(()), |vcd| vcd.channels(channels))
+        self.vcd.as_mut().map_or(Ok(()), |vcd| vcd.channels(channels, &self.origin.lanes))
     }
 
     /// A further line is decoded; it has the next number, from 0.
-    pub fn begin_lane(&mut self, lane: Lane) -> io::Result<()> {
-        self.printer.begin_lane(&lane)?;
-        if let Some(picture) = &mut self.picture {
-            picture.begin_lane(lane.clone());
-        }
-        if let Some(vcd) = &mut self.vcd {
-            vcd.begin_lane(lane);
-        }
-        Ok(())
+    pub fn begin_lane(&mut self, lane: Lane) {
+        self.origin.lanes.push(lane);
     }
 
     /// The events that follow are of this line.
-    pub fn lane(&mut self, lane: usize) -> io::Result<()> {
-        if self.lane != Some(lane) {
-            self.lane = Some(lane);
-            self.printer.lane(lane);
-            if let Some(picture) = &mut self.picture {
-                picture.lane(lane);
-            }
-            if let Some(vcd) = &mut self.vcd {
-                vcd.lane(lane);
-            }
-        }
-        Ok(())
+    pub fn lane(&mut self, lane: usize) {
+        self.origin.speaks = lane;
     }
 
     /// A change of any channel.
@@ -217,7 +229,7 @@ impl Sink for Output<'_> {
         self.tally.event(event)?;
         let mut errors = false;
         if let Some(filter) = &mut self.filter {
-            if !filter.takes(self.lane.unwrap_or(0), event) {
+            if !filter.takes(self.origin.speaks, event) {
                 return Ok(());
             }
             errors = filter.errors;
@@ -234,11 +246,11 @@ impl Sink for Output<'_> {
             }
         }
         if let Some(vcd) = &mut self.vcd {
-            vcd.event(event);
+            vcd.event(self.origin.speaks, event);
         }
         if let Some(picture) = &mut self.picture {
-            picture.event(event);
+            picture.event(&self.origin, event);
         }
-        self.printer.event(event)
+        self.printer.event(&self.origin, event)
     }
 }

@@ -99,9 +99,13 @@ impl Protocol {
         let bit = 1e12 / f64::from(rate.max(1));
         match self {
             Self::Tformat => {
-                Some(Box::new(StartStopLine::new(bit, tformat::Decoder::new(bit as i64, settings.tformat))))
+                let decoder = tformat::Decoder::new(bit as i64, settings.tformat);
+                Some(Box::new(StartStopLine::new(bit, decoder, self.weights())))
             }
-            Self::Nikon => Some(Box::new(StartStopLine::new(bit, nikon::Decoder::new(bit as i64, settings.nikon)))),
+            Self::Nikon => {
+                let decoder = nikon::Decoder::new(bit as i64, settings.nikon);
+                Some(Box::new(StartStopLine::new(bit, decoder, self.weights())))
+            }
             Self::Hdsl => Some(Box::new(hdsl::DslLine::new(bit))),
             Self::Auto | Self::Rtex | Self::Sorte => None,
         }

@@ -29,7 +29,10 @@ fn no_file_and_no_content() {
 #[test]
 fn unknown_formats() {
     let bench = Bench::new();
-    bench.decode("noise.dat", [0xaa; 100], &[]).fails_with("for raw samples give --rate");
+    let run = bench.decode("noise.dat", [0xaa; 100], &[]);
+    run.fails_with("begins with the bytes AA AA AA AA AA AA AA AA: no format that is known").fails_with("give --rate");
+    let words = "Dear all,\nplease find attached\n";
+    bench.decode("letter.doc", words, &[]).fails_with("begins with \"Dear all,\": no format that is known");
     bench.decode("session.sr", b"PK\x03\x04....", &[]).fails_with("not a whole zip file");
     bench.decode("a.csv.xz", b"\xfd7zXZ\0....", &[]).fails_with("packed by xz: unpack it first");
     bench.decode("a.raw", [0; 100], &["--format", "packed"]).fails_with("say it with --rate");

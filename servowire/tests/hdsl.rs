@@ -2,6 +2,7 @@
 #![allow(
     clippy::arithmetic_side_effects,
     clippy::cast_possible_truncation,
+    clippy::cast_precision_loss,
     clippy::cast_sign_loss,
     clippy::indexing_slicing,
     clippy::std_instead_of_core,
@@ -9,6 +10,7 @@
 )]
 
 mod common;
+mod random;
 
 #[path = "../examples/render-dsl.rs"]
 #[allow(dead_code, reason = "its main is not needed here")]
@@ -24,6 +26,8 @@ use hdsl::message::{RemoteRegister, ShortRequest};
 use hdsl::sampling::line;
 use hdsl::sync::{Es, Synchroniser};
 use hdsl::{Dialect, EncoderId};
+use random::speech::Kind;
+use random::wire::Scene;
 
 fn capture() -> (std::path::PathBuf, String) {
     let package = Path::new(env!("CARGO_MANIFEST_DIR"));
@@ -83,6 +87,38 @@ fn sampled() -> Vec<u8> {
     }
     // The oldest sample in bit 0.
     samples.iter().map(|byte| byte.reverse_bits()).collect()
+}
+
+/// Bits as a receiver has read them, one sample each, without a protocol being named.
+#[test]
+fn a_stream_of_bits() {
+    let bench = Bench::new();
+    for seed in 1..8 {
+        let capture = random::wire::capture(Kind::Dsl, &Scene::clean(), seed);
+        let period = 1e12 / 9.375e6;
+        let mut bits = Vec::new();
+        let mut level = true;
+        for (time, next) in capture.channels[0].edges.iter().copied().chain([(capture.end, true)]) {
+            bits.resize((time as f64 / period).round() as usize, level);
+            level = next;
+        }
+        let packed: Vec<u8> =
+            bits.chunks(8).map(|eight| eight.iter().rev().fold(0, |byte, bit| byte << 1 | u8::from(*bit))).collect();
+        let run = bench.decode("bits.bin", packed, &["--format", "packed", "--rate", "9.375M", "--json"]);
+        run.is_good();
+        let due = &capture.due[0].events;
+        let said: Vec<_> = run.json().into_iter().filter(|event| event["kind"] != "V-frame").collect();
+        assert_eq!(said.len(), due.len(), "{}", run.err);
+        for (event, due) in said.iter().zip(due) {
+            let same = |(name, value): &(&str, i64)| event["fields"][name].as_i64() == Some(*value);
+            let flags: Vec<_> = due.fields.iter().filter(|field| !same(field)).collect();
+            assert!(event["kind"] == due.kind.as_str() && flags.is_empty(), "{event} is not {due:?}");
+        }
+    }
+    // At another rate four samples a bit are needed.
+    bench
+        .decode("bits.bin", [0x5a; 400], &["--format", "packed", "--rate", "9M"])
+        .fails_with("samples a bit are too few");
 }
 
 #[test]

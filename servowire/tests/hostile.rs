@@ -17,23 +17,13 @@ use std::path::Path;
 use rng::Rng;
 use servowire::capture::{Hints, Input, open_input};
 use servowire::event::Event;
-use servowire::output::{Output, Printer, Sink};
+use servowire::output::{Origin, Output, Printer};
 use servowire::protocols::{Protocol, Settings};
 
 struct Nowhere;
 
-impl Sink for Nowhere {
-    fn event(&mut self, _: &Event) -> io::Result<()> {
-        Ok(())
-    }
-}
-
 impl Printer for Nowhere {
-    fn begin(&mut self, _: &str) -> io::Result<()> {
-        Ok(())
-    }
-
-    fn end(&mut self) -> io::Result<()> {
+    fn event(&mut self, _: &Origin, _: &Event) -> io::Result<()> {
         Ok(())
     }
 }
@@ -42,7 +32,7 @@ fn decode(name: &str, bytes: Vec<u8>) {
     let input = Input::over(name, Box::new(Cursor::new(bytes)));
     let Ok(capture) = open_input(input, Path::new(name), Hints::default()) else { return };
     let mut nowhere = Nowhere;
-    let mut out = Output::new(&mut nowhere, None, &|| (), &|_| ());
+    let mut out = Output::new(name, &mut nowhere, &|| (), &|_| ());
     // A fault is as good an end as any.
     let _ = Protocol::Auto.decode(name, capture, &Settings::default(), &mut out);
 }

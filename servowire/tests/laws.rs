@@ -25,32 +25,22 @@ use servowire::capture::table::Table;
 use servowire::capture::vcd::Vcd;
 use servowire::capture::{ByteLog, Capture, Input};
 use servowire::event::{Direction, Event};
-use servowire::output::{Output, Printer, Sink};
+use servowire::output::{Origin, Output, Printer};
 use servowire::protocols::{Protocol, Settings};
 
 #[derive(Default)]
 struct Collect(Vec<Event>);
 
-impl Sink for Collect {
-    fn event(&mut self, event: &Event) -> io::Result<()> {
-        self.0.push(event.clone());
-        Ok(())
-    }
-}
-
 impl Printer for Collect {
-    fn begin(&mut self, _: &str) -> io::Result<()> {
-        Ok(())
-    }
-
-    fn end(&mut self) -> io::Result<()> {
+    fn event(&mut self, _: &Origin, event: &Event) -> io::Result<()> {
+        self.0.push(event.clone());
         Ok(())
     }
 }
 
 fn decode(capture: Capture) -> Result<Vec<Event>, String> {
     let mut events = Collect::default();
-    let mut out = Output::new(&mut events, None, &|| (), &|_| ());
+    let mut out = Output::new("line", &mut events, &|| (), &|_| ());
     match Protocol::Tformat.decode("line", capture, &Settings::default(), &mut out).map_err(|stop| stop.to_string()) {
         // An inverted line is decoded to its end before it is told.
         Err(told) if !told.contains("the line is inverted") => Err(told),

@@ -14,9 +14,10 @@
 
 mod common;
 
+use std::fmt::Write as _;
 use std::process::{Command, Stdio};
 
-use common::{Bench, Wave, good_traffic, id3};
+use common::{Bench, GOOD_FRAMES, Wave, good_traffic, id3};
 use vcd::{Command as Vcd, Parser};
 
 #[test]
@@ -144,48 +145,81 @@ fn statistics() {
     assert_eq!(json[0]["cycle"]["jitter_ps"], 2_000_000);
 }
 
-#[test]
-fn a_closed_pipe_ends_quietly() {
-    let bench = Bench::new();
-    let mut wave = good_traffic(2.5e6);
-    for k in 0..4000 {
-        wave.exchange(&[0x1a], &id3(k, 0, 0));
-    }
-    let file = bench.file("long.vcd", wave.vcd());
+/// Runs the program with nobody who reads what it prints: it ends well, and this is what it says of it.
+#[track_caller]
+fn unread(arguments: &[&str]) -> String {
     let mut child = Command::new(env!("CARGO_BIN_EXE_servowire"))
-        .args(["decode", "--json", file.to_str().unwrap()])
+        .args(arguments)
+        .stdin(Stdio::null())
         .stdout(Stdio::piped())
         .stderr(Stdio::piped())
         .spawn()
         .unwrap();
     drop(child.stdout.take());
     let output = child.wait_with_output().unwrap();
-    assert!(output.status.success());
-    assert_eq!(String::from_utf8(output.stderr).unwrap().lines().count(), 1);
+    let said = String::from_utf8(output.stderr).unwrap();
+    assert!(output.status.success(), "{arguments:?}: {said}");
+    said
 }
 
 #[test]
-fn a_closed_pipe_ends_the_other_commands_quietly() {
-    let map = Bench::new();
-    let map = map.file("map.bin", [0; 256]);
-    for arguments in [
-        &["timing", "tformat"][..],
-        &["timing", "nikon"],
-        &["registers", map.to_str().unwrap()],
-        &["completions", "bash"],
-        &["man"],
-    ] {
-        let mut child = Command::new(env!("CARGO_BIN_EXE_servowire"))
-            .args(arguments)
-            .stdout(Stdio::piped())
-            .stderr(Stdio::piped())
-            .spawn()
-            .unwrap();
-        drop(child.stdout.take());
-        let output = child.wait_with_output().unwrap();
-        assert!(output.status.success(), "{arguments:?}");
-        assert!(output.stderr.is_empty(), "{arguments:?}: {}", String::from_utf8_lossy(&output.stderr));
+fn a_closed_pipe_ends_every_command_quietly() {
+    let bench = Bench::new();
+    let mut wave = good_traffic(2.5e6);
+    for k in 0..4000 {
+        wave.exchange(&[0x1a], &id3(k, 0, 0));
     }
+    let (file, map) = (bench.file("long.vcd", wave.vcd()), bench.file("map.bin", [0; 256]));
+    let (file, map) = (file.to_str().unwrap(), map.to_str().unwrap());
+    for form in ["--json", "--csv", "--stats", "--errors"] {
+        // What was found is said all the same.
+        assert_eq!(unread(&["decode", form, file]).lines().count(), 1, "{form}");
+    }
+    for arguments in
+        [&["timing", "tformat"][..], &["timing", "nikon"], &["registers", map], &["completions", "bash"], &["man"]]
+    {
+        assert_eq!(unread(arguments), "", "{arguments:?}");
+    }
+}
+
+/// Two lines in the first file, one in the second, none in the log: what is said of one is not said of the next.
+#[test]
+fn files_do_not_mix() {
+    let bench = Bench::new();
+    let wave = good_traffic(2.5e6);
+    let mut both = "$timescale 1 ps $end $var wire 1 ! A $end $var wire 1 % B $end $enddefinitions $end\n".to_owned();
+    let second = wave.edges.iter().map(|(time, level)| (time + 30_000_000, *level, '%'));
+    let mut edges: Vec<_> = wave.edges.iter().map(|(time, level)| (*time, *level, '!')).chain(second).collect();
+    edges.sort_by_key(|(time, ..)| *time);
+    for (time, level, code) in edges {
+        writeln!(both, "#{time} {}{code}", u8::from(level)).unwrap();
+    }
+    let files = [
+        bench.file("two.vcd", both),
+        bench.file("one.vcd", wave.vcd()),
+        bench.file("log.txt", "1A\n1A 20 29 C0 3B 17 00 00 00 C8 37\n"),
+    ];
+    let [two, one, log] = files.each_ref().map(|file| file.to_str().unwrap());
+    let run = common::servowire(&["decode", "--json", two, one, log]);
+    run.is_good();
+    let channels = |file: &str| -> Vec<String> {
+        let events = run.json().into_iter().filter(|event| event["file"] == file);
+        let mut names: Vec<String> =
+            events.map(|event| event["channel"].as_str().unwrap_or("none").to_owned()).collect();
+        names.sort();
+        names.dedup();
+        names
+    };
+    assert_eq!([channels(two), channels(one), channels(log)], [vec!["A", "B"], vec!["line"], vec!["none"]]);
+    let table = common::servowire(&["decode", "--csv", two, one, log]);
+    let rows: Vec<Vec<&str>> = table.out.lines().skip(1).map(|row| row.split(',').take(3).collect()).collect();
+    let of = |file: &str, channel: &str| rows.iter().filter(|row| row[0] == file && row[1] == channel).count();
+    assert_eq!([of(two, "A"), of(two, "B"), of(one, "line"), of(log, "")], [GOOD_FRAMES, GOOD_FRAMES, GOOD_FRAMES, 2]);
+    // In the text a line has a name where there are two; the encoder ID is said anew in each file.
+    let text = common::servowire(&["decode", two, one, log]);
+    let parts: Vec<&str> = text.out.split("\n\n").collect();
+    assert!(parts[0].contains("us  A  <>") && parts[0].contains("us  B  <>") && parts[1].contains("us  <>"));
+    assert!(parts[..3].iter().all(|part| part.contains("ENID 23")), "{}", text.out);
 }
 
 #[test]

@@ -25,7 +25,7 @@ fn random_captures_come_out_right() {
             right += row.right;
             all += row.captures;
             assert_eq!(row.wrong, 0, "{} {}: values that were never sent", condition.name, kind.name());
-            if let Some((seed, why, notes)) = row.first {
+            for (seed, why, notes) in row.faults {
                 writeln!(faults, "{} {}, seed {seed}: {why}\n{notes}", condition.name, kind.name()).unwrap();
             }
         }

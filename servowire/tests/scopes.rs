@@ -158,6 +158,132 @@ fn waveforms_and_analysers() {
     is_read("DSView", &table(heading, |k, v| format!("{:.9},{},0", k as f64 / RATE, u8::from(v > 1.6))));
 }
 
+#[test]
+fn lecroy_owon_and_rohde() {
+    let heading = "LECROYWS424,1234\nSegments,1,SegmentSize,20002\nSegment,TrigTime,TimeSinceSegment1\n\
+        #1,04-Mar-2025 10:00:00,0\nTime,Ampl\n";
+    is_read("LeCroy", &table(heading, |k, v| format!("{:.9e},{v:.5}", time(k))));
+    let mut heading = String::new();
+    for key in 0..22 {
+        let _ = writeln!(heading, "Key {key};{key}.5");
+    }
+    is_read("RTH", &table(&heading, |k, v| format!("{:.9e};{v:.4}", time(k)).replace('.', ",")));
+    is_read("RTH, with points", &table(&heading, |k, v| format!("{:.9e};{v:.4}", time(k))));
+    is_read("RTM", &table("in s,C1 in V\n", |k, v| format!("{:.9e},{v:.4}", time(k))));
+    // The last sample comes first.
+    let last = volts().len() - 1;
+    let rows: Vec<String> = volts()
+        .iter()
+        .enumerate()
+        .map(|(k, v)| format!("{},{:.7},{:.2}\n", last - k, time(k) * 1e3, v * 1e3))
+        .collect();
+    let text: String = ["#,Time(ms),CH1(mV)\n".to_owned()].into_iter().chain(rows.into_iter().rev()).collect();
+    is_read("OWON", &text);
+    let run = Bench::new().decode("owon.csv", "Unit:(mV)\n,CH1\nFrequency,1000\n1,3200.0\n2,3201.0\n3,12.0\n", &[]);
+    run.fails_with("no table with times or a sample rate");
+}
+
+/// A waveform with long words in binary and short ones in ASCII, as the programmer manuals have them.
+#[test]
+fn tektronix_waveforms() {
+    let bench = Bench::new();
+    // 40 mV a step around 1.6 V.
+    let steps: Vec<i16> = volts().iter().map(|volts| ((volts - 1.6) / 0.04).round() as i16).collect();
+    let count = steps.len();
+    let preamble = |encoding: &str, bytes: usize| {
+        format!(
+            ":WFMPRE:BYT_NR {bytes};BIT_NR {};ENCDG {encoding};BN_FMT RI;BYT_OR MSB;NR_PT {count};WFID \"Ch1, DC coupling, \
+            1.0E0 V/div; 2500 points\";PT_FMT Y;XINCR 5.0E-8;PT_OFF 0;XZERO -1.0E-4;XUNIT \"s\";YMULT 4.0E-2;YZERO 1.6E0;\
+            YOFF 0.0E0;YUNIT \"Volts\"",
+            8 * bytes
+        )
+    };
+    let block =
+        |data: &[u8]| [format!("#{}{}", data.len().to_string().len(), data.len()).as_bytes(), data, b"\n"].concat();
+    let byte: Vec<u8> = steps.iter().map(|step| *step as i8 as u8).collect();
+    let word: Vec<u8> = steps.iter().flat_map(|step| step.to_be_bytes()).collect();
+    let text = steps.iter().map(i16::to_string).collect::<Vec<_>>().join(",");
+    let long = preamble("BINARY", 1);
+    let short = long
+        .replace("BYT_NR", "BYT_N")
+        .replace("ENCDG BINARY", "ENC BIN")
+        .replace("XINCR", "XIN")
+        .replace("XZERO", "XZE")
+        .replace("YMULT", "YMU")
+        .replace("YZERO", "YZE")
+        .replace("YOFF", "YOF")
+        .replace("WFID", "WFI")
+        .replace(":WFMPRE:", "");
+    for (name, file) in [
+        ("long.isf", [format!("{long};:CURVE ").into_bytes(), block(&byte)].concat()),
+        ("words.isf", [format!("{};:CURVE ", preamble("BINARY", 2)).into_bytes(), block(&word)].concat()),
+        ("short.isf", [format!("{short};:CURV ").into_bytes(), block(&byte)].concat()),
+        ("ascii.isf", format!("{};:CURVE {text}\n", preamble("ASCII", 1)).into_bytes()),
+    ] {
+        let run = bench.decode(name, &file, &["--json"]);
+        assert_eq!((run.code, run.json().len()), (0, GOOD_FRAMES), "{name}: {}", run.err);
+        assert_eq!(run.json()[0]["channel"], "Ch1");
+        // The first request begins 30 us behind the first sample.
+        let start = run.json()[0]["start_ps"].as_i64().unwrap();
+        assert!((start + 70_000_000).abs() < 100_000, "{start}");
+        let cut = bench.decode("cut.isf", &file[..file.len() - 5000], &["--json"]);
+        assert!(cut.code == 1 && cut.json().len() >= GOOD_FRAMES - 8, "{name}: {}", cut.err);
+        assert!(name == "ascii.isf" || cut.err.contains("the waveform was cut off: "), "{name}: {}", cut.err);
+    }
+    bench.decode("a.isf", format!("{long};"), &[]).fails_with("has no :CURVE behind it");
+    bench.decode("a.isf", long.replace("XINCR", "X"), &[]).fails_with("has no :CURVE behind it");
+    bench.decode("a.isf", long.replace("XINCR", "X") + ";:CURVE #15aaaaa", &[]).fails_with("sample interval (XINCR)");
+    let pairs = long.replace("PT_FMT Y", "PT_FMT ENV") + ";:CURVE #15aaaaa";
+    bench.decode("a.isf", pairs, &[]).fails_with("record without peak detect");
+}
+
+/// Bytes of the analysers of Logic 2, with their times: requests and answers of one, or of two for both directions.
+#[test]
+fn tables_of_analysers() {
+    let bench = Bench::new();
+    let bit = 0.4e-6;
+    let (request, answer) = ([0x1a_u8], common::id3(1000, 7, 0));
+    let (mut table, mut pair, mut single, mut dates) = (
+        "name,type,start_time,duration,\"data\"\n".to_owned(),
+        "name,type,start_time,duration,\"data\",\"error\"\n".to_owned(),
+        "Time [s],Value,Parity Error,Framing Error\n".to_owned(),
+        "start_time,\"data\"\n".to_owned(),
+    );
+    for k in 0..20 {
+        let begin = 0.5 + 1e-4 * f64::from(k);
+        let asked = request.iter().map(|byte| (begin, *byte, "TX"));
+        let from = begin + 10.0 * bit + 3e-6;
+        let said = answer.iter().enumerate().map(|(k, byte)| (from + 10.0 * bit * k as f64, *byte, "RX"));
+        for (time, byte, name) in asked.chain(said) {
+            let _ = writeln!(table, "\"Async Serial\",\"data\",{time:.9},{:.9},0x{byte:02X}", 9.5 * bit);
+            let _ = writeln!(pair, "\"{name}\",\"data\",{time:e},{:e},0b{byte:08b},", 9.5 * bit);
+            let _ = writeln!(single, "{time:.15},0x{byte:02X},,");
+            let _ = writeln!(dates, "2025-03-04T10:00:{:012.9}+00:00,{byte:03}", 7.0 + time);
+        }
+    }
+    for (name, text, channel) in [
+        ("table.csv", &table, "Async Serial"),
+        ("pair.csv", &pair, "TX + RX"),
+        ("single.csv", &single, "bytes"),
+        ("dates.csv", &dates, "bytes"),
+    ] {
+        let run = bench.decode(name, text, &["--json"]);
+        assert_eq!((run.code, run.json().len()), (0, 40), "{name}: {}", run.err);
+        assert!(run.json().iter().all(|event| event["verdict"] == "ok" && event["channel"] == channel), "{}", run.out);
+        assert_eq!(run.json()[1]["delay_ps"].as_i64().map(|delay| (delay + 50_000) / 100_000), Some(30), "{name}");
+    }
+    // What the analyser says of a delimiter is kept; a row that is none costs a row.
+    let lines: Vec<&str> = single.lines().collect();
+    let framed = single.replacen(",0xE8,,", ",0xE8,,Error", 1);
+    bench.decode("framing.csv", &framed, &[]).fails_with("1 of 40 frames refused: delimiter 1");
+    let spoilt = [&lines[..30], &["oops,0x00,,"], &lines[30..]].concat().join("\n");
+    let run = bench.decode("spoilt.csv", &spoilt, &["--json"]);
+    run.fails_with("line 31: \"oops\" is not a time; 1 row was left out");
+    assert_eq!(run.json().len(), 40, "{}", run.err);
+    let letters = "Time [s],Value,Parity Error,Framing Error\n0.1,H,,\n0.2,e,,\n";
+    bench.decode("ascii.csv", letters, &[]).fails_with("export the table with hexadecimal values");
+}
+
 /// The threshold may be said; a wrong one finds nothing.
 #[test]
 fn a_threshold_of_ones_own() {

@@ -5,7 +5,7 @@
 //! follow each other, the names stand above. A column of 0 and 1 is a channel; a column of voltages becomes one, with a
 //! threshold half-way between its levels.
 
-mod cell;
+pub(super) mod cell;
 mod heading;
 
 use std::collections::VecDeque;
@@ -46,7 +46,13 @@ pub struct Table {
     hole: bool,
     gap: Option<i64>,
     over: bool,
+    /// The last row comes first: all changes have to be known before the first is given.
+    backwards: bool,
+    turned: VecDeque<Change>,
 }
+
+/// Changes of a table that is written backwards are held in memory, up to so many.
+const MOST_TURNED: usize = 1 << 20;
 
 /// A column that is a channel.
 struct Column {
@@ -127,7 +133,7 @@ impl Table {
         if u16::try_from(channels.len()).is_err() {
             return Err(Fault::new(&name, At::Line(1), "more than 65535 columns"));
         }
-        let clock = heading
+        let (clock, backwards) = heading
             .times(&waiting)
             .ok_or_else(|| Fault::new(&name, At::Line(1), "neither times nor a sample rate are in the table"))?;
         Ok(Self {
@@ -146,7 +152,38 @@ impl Table {
             hole: false,
             gap: None,
             over: false,
+            backwards,
+            turned: VecDeque::new(),
         })
+    }
+
+    /// Reads a table that is written backwards to its end, as if time ran the other way, and turns it round.
+    fn turn(&mut self) -> Result<(), Fault> {
+        let mut changes = Vec::new();
+        let end = loop {
+            if changes.len() > MOST_TURNED {
+                let what = "its last row comes first, and it is too long to be turned round: save it as VCD or binary";
+                return Err(Fault::new(&self.name, At::File, what));
+            }
+            match self.step(&mut changes) {
+                Ok(true) => {}
+                end => break end,
+            }
+        };
+        // Each channel keeps a level from where it takes the one that is later in the file.
+        let begin = self.now.map_or(0, |now| -now);
+        let mut later: Vec<Option<bool>> = vec![None; self.columns.len()];
+        for Change { time, channel, level } in changes {
+            if let Some(before) = later.get_mut(usize::from(channel)).and_then(|known| known.replace(level)) {
+                self.turned.push_front(Change { time: -time, channel, level: before });
+            }
+        }
+        for (channel, level) in (0_u16..).zip(later) {
+            if let Some(level) = level {
+                self.turned.push_front(Change { time: begin, channel, level });
+            }
+        }
+        end.map(|_| ())
     }
 
     fn step(&mut self, changes: &mut Vec<Change>) -> Result<bool, Fault> {
@@ -189,6 +226,7 @@ impl Table {
             Times::Steps { start, period } => start.saturating_add((self.rows as f64 * period).round() as i64),
             Times::Rate(rate) => Clock::new(rate).time(self.rows),
         };
+        let time = if self.backwards { -time } else { time };
         if let Some(before) = self.now.filter(|before| time < *before) {
             let (now, before) = (time as f64 / SECOND as f64, before as f64 / SECOND as f64);
             return Err(format!("time goes back from {before} s to {now} s"));
@@ -283,6 +321,17 @@ impl Line for Table {
     fn read(&mut self, changes: &mut Vec<Change>) -> Result<bool, Fault> {
         let enough = changes.len() + BLOCK;
         let (first, mut rows) = (changes.len(), 0);
+        if self.backwards && !self.over {
+            self.over = true;
+            self.turn()?;
+        }
+        if self.backwards {
+            changes.extend(self.turned.drain(..BLOCK.min(self.turned.len())));
+            self.now = changes.last().map(|last| last.time).or(self.now);
+            if !self.turned.is_empty() {
+                return Ok(true);
+            }
+        }
         while !self.over && changes.len() < enough && rows < 16 * BLOCK && !(self.hole && changes.len() > first) {
             if rows > 0 && self.waiting.is_empty() && self.lines.input.pauses() {
                 break;

@@ -75,16 +75,20 @@ pub fn duration(text: &str) -> Option<i64> {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Clock {
     rate: u64,
-    /// Picoseconds a sample where that is a whole number, else 0.
-    period: i64,
+    /// So many samples take so many picoseconds, in the smallest whole numbers.
+    samples: u64,
+    picoseconds: u64,
 }
 
 impl Clock {
     /// `rate` in samples a second, 1 to 10^12.
     pub fn new(rate: u64) -> Self {
         let rate = rate.clamp(1, SECOND as u64);
-        let period = if SECOND as u64 % rate == 0 { SECOND / rate as i64 } else { 0 };
-        Self { rate, period }
+        let (mut common, mut rest) = (SECOND as u64, rate);
+        while rest != 0 {
+            (common, rest) = (rest, common % rest);
+        }
+        Self { rate, samples: rate / common, picoseconds: SECOND as u64 / common }
     }
 
     /// Samples a second.
@@ -93,20 +97,26 @@ impl Clock {
     }
 
     /// When sample `index` was taken.
+    #[inline]
     pub fn time(self, index: u64) -> i64 {
-        if self.period != 0 {
-            return (index as i64).saturating_mul(self.period);
+        let time = index.checked_mul(self.picoseconds).and_then(|time| time.checked_add(self.samples / 2));
+        match time {
+            Some(time) if self.samples == 1 => time.min(i64::MAX as u64) as i64,
+            Some(time) => (time / self.samples) as i64,
+            None => self.late(index),
         }
-        let time = (u128::from(index) * SECOND as u128 + u128::from(self.rate) / 2) / u128::from(self.rate);
-        i64::try_from(time).unwrap_or(i64::MAX)
+    }
+
+    /// The same where 64 bits do not hold the product.
+    #[cold]
+    fn late(self, index: u64) -> i64 {
+        let time = u128::from(index) * u128::from(self.picoseconds) + u128::from(self.samples / 2);
+        i64::try_from(time / u128::from(self.samples)).unwrap_or(i64::MAX)
     }
 
     /// The sample nearest to a time that is not negative.
     pub fn index(self, time: i64) -> u64 {
         let time = time.max(0) as u64;
-        if self.period != 0 {
-            return (time + self.period as u64 / 2) / self.period as u64;
-        }
         let index = (u128::from(time) * u128::from(self.rate) + SECOND as u128 / 2) / SECOND as u128;
         u64::try_from(index).unwrap_or(u64::MAX)
     }

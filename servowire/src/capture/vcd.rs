@@ -3,13 +3,17 @@
 //! The header is read as words, whatever its types and attributes; the body by its first letters, line ends or not.
 
 mod header;
+mod tick;
 
 use std::collections::HashMap;
 use std::io::{self, Read};
 
+use memchr::memchr_iter;
+
 use super::{Change, Input, Line};
 use crate::fault::{At, Fault};
 use header::Header;
+use tick::Tick;
 
 /// Changes given at once.
 const BLOCK: usize = 4096;
@@ -23,11 +27,11 @@ pub struct Vcd {
     /// What is unread of the buffer.
     from: usize,
     to: usize,
+    /// The line at the beginning of the buffer.
     line: u64,
     channels: Vec<String>,
     codes: Codes,
-    /// The file's unit of time in femtoseconds.
-    tick: u128,
+    tick: Tick,
     now: i64,
     /// Time of the file's last time stamp in its own unit.
     stamp: u64,
@@ -103,7 +107,7 @@ impl Vcd {
             line,
             channels,
             codes,
-            tick,
+            tick: Tick::new(tick),
             now: 0,
             stamp: 0,
             skipping: false,
@@ -111,12 +115,20 @@ impl Vcd {
         })
     }
 
+    /// The line of what is read next.
+    fn here(&self) -> At {
+        let read = self.buffer.get(..self.from).unwrap_or_default();
+        At::Line(self.line + memchr_iter(b'\n', read).count() as u64)
+    }
+
     fn fault(&self, what: impl Into<String>) -> Fault {
-        self.input.fault(At::Line(self.line), what)
+        self.input.fault(self.here(), what)
     }
 
     /// Moves what is left to the front and reads on.
     fn fill(&mut self) -> Result<(), Fault> {
+        let At::Line(line) = self.here() else { return Ok(()) };
+        self.line = line;
         self.buffer.copy_within(self.from..self.to, 0);
         self.to -= self.from;
         self.from = 0;
@@ -138,9 +150,13 @@ impl Vcd {
         let buffer = std::mem::take(&mut self.buffer);
         let result = loop {
             let rest = buffer.get(self.from..self.to).unwrap_or_default();
+            if !self.skipping {
+                let left = self.plain(rest, changes, enough);
+                self.from = self.to - left;
+            }
+            let rest = buffer.get(self.from..self.to).unwrap_or_default();
             let Some(first) = rest.first() else { break Ok(()) };
             if *first <= b' ' {
-                self.line += u64::from(*first == b'\n');
                 self.from += 1;
                 continue;
             }
@@ -150,15 +166,47 @@ impl Vcd {
             match self.piece(rest, changes) {
                 Ok(Next::Taken(length)) => self.from += length,
                 Ok(Next::More) => break Ok(()),
-                Err(fault) => break Err(fault),
+                Err(what) => break Err(what),
             }
         };
         self.buffer = buffer;
-        result
+        result.map_err(|what| self.fault(what))
+    }
+
+    /// Takes what almost every body is made of, stamps that do not go back and levels of codes of one or two letters,
+    /// as long as they are whole; how much of `rest` is left then.
+    fn plain(&mut self, mut rest: &[u8], changes: &mut Vec<Change>, enough: usize) -> usize {
+        while changes.len() < enough {
+            let (level, code) = match *rest {
+                [0..=b' ', ref behind @ ..] => {
+                    rest = behind;
+                    continue;
+                }
+                [b'#', ref digits @ ..] => {
+                    let Some((stamp, behind)) = stamp(digits) else { break };
+                    let Some(now) = self.tick.time(stamp).filter(|_| stamp >= self.stamp) else { break };
+                    (self.stamp, self.now, rest) = (stamp, now, behind);
+                    continue;
+                }
+                [level @ (b'0' | b'1'), code @ b'!'..=b'~', 0..=b' ', ref behind @ ..] => {
+                    rest = behind;
+                    (level, usize::from(code))
+                }
+                [level @ (b'0' | b'1'), a @ b'!'..=b'~', b @ b'!'..=b'~', 0..=b' ', ref behind @ ..] => {
+                    rest = behind;
+                    (level, usize::from(a) | usize::from(b) << 8)
+                }
+                _ => break,
+            };
+            if let Some(Code { first, width: 1 }) = self.codes.short.get(code).copied().flatten() {
+                changes.push(Change { time: self.now, channel: first, level: level == b'1' });
+            }
+        }
+        rest.len()
     }
 
     /// One stamp, value change or command. At the end of the file a word ends there.
-    fn piece(&mut self, rest: &[u8], changes: &mut Vec<Change>) -> Result<Next, Fault> {
+    fn piece(&mut self, rest: &[u8], changes: &mut Vec<Change>) -> Result<Next, String> {
         let length = word(rest);
         let (text, behind) = rest.split_at(length);
         if behind.is_empty() && !self.ended {
@@ -188,21 +236,21 @@ impl Vcd {
             }
             _ => {
                 let what = format!("unexpected character {:?}", char::from(*first));
-                return Err(self.fault(format!("not VCD in the middle of a value change: {what}")));
+                return Err(format!("not VCD in the middle of a value change: {what}"));
             }
         }
         Ok(Next::Taken(length))
     }
 
     /// The word goes on behind the buffer, or the file ends in it.
-    fn open(&self) -> Result<Next, Fault> {
+    fn open(&self) -> Result<Next, String> {
         if self.ended {
-            return Err(self.fault("the file ends in the middle of a value change: it was cut off"));
+            return Err("the file ends in the middle of a value change: it was cut off".to_owned());
         }
         Ok(Next::More)
     }
 
-    fn time(&mut self, digits: &[u8], cut: bool) -> Result<(), Fault> {
+    fn time(&mut self, digits: &[u8], cut: bool) -> Result<(), String> {
         let whole = digits.split(|byte| *byte == b'.').next().unwrap_or_default();
         let mut stamp = Some(0_u64);
         for digit in whole {
@@ -211,17 +259,16 @@ impl Vcd {
         }
         let Some(stamp) = stamp.filter(|_| !whole.is_empty()) else {
             let text = String::from_utf8_lossy(digits).into_owned();
-            return Err(self.fault(format!("not VCD in the middle of a value change: #{text} is no time")));
+            return Err(format!("not VCD in the middle of a value change: #{text} is no time"));
         };
         if stamp < self.stamp {
             // The last word of a file that was cut off.
             if cut {
-                return Err(self.fault("the file ends in the middle of a time: it was cut off"));
+                return Err("the file ends in the middle of a time: it was cut off".to_owned());
             }
-            return Err(self.fault(format!("time goes back from #{} to #{stamp}", self.stamp)));
+            return Err(format!("time goes back from #{} to #{stamp}", self.stamp));
         }
-        let now = u128::from(stamp).checked_mul(self.tick).and_then(|time| i64::try_from((time + 500) / 1000).ok());
-        self.now = now.ok_or_else(|| self.fault(format!("time #{stamp} is too large")))?;
+        self.now = self.tick.time(stamp).ok_or_else(|| format!("time #{stamp} is too large"))?;
         self.stamp = stamp;
         Ok(())
     }
@@ -234,7 +281,7 @@ impl Vcd {
         rest: &[u8],
         length: usize,
         changes: &mut Vec<Change>,
-    ) -> Result<Next, Fault> {
+    ) -> Result<Next, String> {
         let Some((mut code, mut end)) = second(rest, length) else { return self.open() };
         if kind == b'p' {
             // The strengths of both levels come before the code.
@@ -283,6 +330,20 @@ impl Vcd {
         if let Some(Code { first, width: 1 }) = code {
             changes.push(Change { time: self.now, channel: first, level });
         }
+    }
+}
+
+/// The digits at the front as a number, and what is behind the blank that ends them; none where it is not so.
+fn stamp(digits: &[u8]) -> Option<(u64, &[u8])> {
+    let (mut stamp, mut rest) = (0_u64, digits);
+    while let [digit @ b'0'..=b'9', behind @ ..] = rest {
+        stamp = stamp.wrapping_mul(10).wrapping_add(u64::from(digit - b'0'));
+        rest = behind;
+    }
+    // Nineteen digits fit.
+    match rest {
+        [0..=b' ', behind @ ..] if (1..=19).contains(&(digits.len() - rest.len())) => Some((stamp, behind)),
+        _ => None,
     }
 }
 

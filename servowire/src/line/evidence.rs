@@ -44,6 +44,8 @@ pub(super) struct Evidence {
     pub(super) tally: Tally,
     /// Where sound frames begin, in picoseconds, and what they hold.
     pub(super) starts: Vec<(i64, u64)>,
+    /// Up to when the line was heard.
+    pub(super) until: i64,
 }
 
 impl Evidence {
@@ -57,6 +59,7 @@ impl Evidence {
             silences: 0,
             tally: Tally::default(),
             starts: Vec::new(),
+            until: i64::MAX,
         }
     }
 
@@ -64,15 +67,16 @@ impl Evidence {
         self.score < HOPELESS
     }
 
-    /// Whether most of what sounds here sounds there too, within `near` picoseconds.
+    /// Whether most of what sounds here sounds there too, within `near` picoseconds and as long as both were heard.
     pub(super) fn is_part_of(&self, other: &Self, near: i64) -> bool {
         let heard = |(start, content): &&(i64, u64)| {
             let at = other.starts.partition_point(|(there, _)| *there < start - near);
             let there = other.starts.get(at..).unwrap_or_default();
             there.iter().take_while(|(there, _)| *there <= start + near).any(|(_, same)| same == content)
         };
-        let both = self.starts.iter().filter(heard).count();
-        !self.starts.is_empty() && 10 * both >= 7 * self.starts.len()
+        let own = self.starts.partition_point(|(start, _)| *start <= other.until);
+        let both = self.starts.iter().take(own).filter(heard).count();
+        own > 0 && 10 * both >= 7 * own
     }
 }
 

@@ -2,6 +2,7 @@
 
 use std::io;
 
+use super::evidence::{CERTAIN, Evidence, Weights};
 use super::{EdgeReceiver, Rates, StartStop};
 use crate::event::{Event, Place, Verdict};
 use crate::output::Sink;
@@ -37,9 +38,20 @@ pub trait LineDecoder {
 pub struct StartStopLine<P> {
     receiver: EdgeReceiver,
     protocol: P,
+    weights: Weights,
     bit: i64,
+    /// The level at the beginning was given.
     begun: bool,
+    /// The first changes, as long as it is not known where the first field begins.
+    opening: Vec<(i64, bool)>,
 }
+
+/// Changes from which the first field is found at most.
+const OPENING: usize = 256;
+/// Bits of idle line after which what was said at first is over.
+const OPENED: i64 = 60;
+/// Falling edges that may be the first start bit.
+const STARTS: u32 = 18;
 
 /// The last level of a capture is taken to last. If a frame does not hold so, it was cut off.
 struct Held<'a> {
@@ -58,10 +70,11 @@ impl Sink for Held<'_> {
     }
 }
 
-impl<P: StartStop> StartStopLine<P> {
-    /// `bit`: nominal length in picoseconds.
-    pub fn new(bit: f64, protocol: P) -> Self {
-        Self { receiver: EdgeReceiver::new(bit, P::CONTENT_BITS), protocol, bit: bit as i64, begun: false }
+impl<P: StartStop + Clone> StartStopLine<P> {
+    /// `bit`: nominal length in picoseconds; `weights`: what sound frames of the protocol prove.
+    pub(crate) fn new(bit: f64, protocol: P, weights: Weights) -> Self {
+        let receiver = EdgeReceiver::new(bit, P::CONTENT_BITS);
+        Self { receiver, protocol, weights, bit: bit as i64, begun: false, opening: Vec::new() }
     }
 
     fn give(&mut self, out: &mut dyn Sink) -> io::Result<()> {
@@ -70,19 +83,83 @@ impl<P: StartStop> StartStopLine<P> {
         }
         Ok(())
     }
+
+    fn take(&mut self, time: i64, level: bool, out: &mut dyn Sink) -> io::Result<()> {
+        if self.receiver.change(time, level) { self.give(out) } else { Ok(()) }
+    }
+
+    /// Whether the line is at work when the recording begins, so that the first falling edge need not be a start bit.
+    fn begins_inside(&self) -> bool {
+        match self.opening.as_slice() {
+            [(begin, true), (fall, _), ..] => fall - begin < i64::from(P::CONTENT_BITS + 3) * self.bit,
+            _ => true,
+        }
+    }
+
+    /// What was said at first is over: finds the start bit from which most of it holds, and takes it.
+    fn open(&mut self, out: &mut dyn Sink) -> io::Result<()> {
+        let opening = std::mem::take(&mut self.opening);
+        let whole = 2 * i64::from(P::CONTENT_BITS + 2) * self.bit;
+        let falls = |(_, level): &&(i64, bool)| !level;
+        let first = opening.iter().skip(1).find(falls).map_or(0, |(time, _)| *time);
+        let starts = opening.iter().skip(1).filter(falls).filter(|(time, _)| time - first < whole).count() as u32;
+        let (mut best, mut most) = (0, i64::MIN);
+        for skipped in 0..starts.min(STARTS) {
+            let mut evidence = Evidence::new(self.weights);
+            let receiver = EdgeReceiver::new(self.bit as f64, P::CONTENT_BITS).beginning_at(skipped);
+            let mut trial = Self { receiver, protocol: self.protocol.clone(), opening: Vec::new(), ..*self };
+            for (time, level) in &opening {
+                trial.take(*time, *level, &mut evidence)?;
+            }
+            let end = opening.last().map_or(0, |(time, _)| *time).saturating_add(OPENED * self.bit);
+            trial.finish(end, &mut evidence)?;
+            if evidence.score > most {
+                (best, most) = (skipped, evidence.score);
+            }
+            if skipped == 0 && evidence.score >= CERTAIN && evidence.tally.refused == 0 {
+                break;
+            }
+        }
+        self.receiver = EdgeReceiver::new(self.bit as f64, P::CONTENT_BITS).beginning_at(best);
+        for (time, level) in opening {
+            self.take(time, level, out)?;
+        }
+        Ok(())
+    }
 }
 
-impl<P: StartStop> LineDecoder for StartStopLine<P> {
+impl<P: StartStop + Clone> LineDecoder for StartStopLine<P> {
     fn change(&mut self, time: i64, level: bool, out: &mut dyn Sink) -> io::Result<()> {
         if !self.begun {
             self.begun = true;
             self.protocol.begin(time);
+            self.opening.push((time, level));
+            return Ok(());
         }
-        if self.receiver.change(time, level) { self.give(out) } else { Ok(()) }
+        let Some((last, _)) = self.opening.last() else { return self.take(time, level, out) };
+        let over = self.opening.len() > 1 && time - last > OPENED * self.bit || self.opening.len() >= OPENING;
+        if over {
+            self.open(out)?;
+            return self.take(time, level, out);
+        }
+        self.opening.push((time, level));
+        if self.begins_inside() {
+            return Ok(());
+        }
+        for (time, level) in std::mem::take(&mut self.opening) {
+            self.take(time, level, out)?;
+        }
+        Ok(())
     }
 
     fn reach(&mut self, time: i64, out: &mut dyn Sink) -> io::Result<()> {
-        if self.receiver.reach(time) { self.give(out) } else { Ok(()) }
+        if let [_, .., (last, _)] = self.opening.as_slice() {
+            if time - last <= OPENED * self.bit {
+                return Ok(());
+            }
+            self.open(out)?;
+        }
+        if self.opening.is_empty() && self.receiver.reach(time) { self.give(out) } else { Ok(()) }
     }
 
     fn gap(&mut self, time: i64, out: &mut dyn Sink) -> io::Result<()> {
@@ -93,6 +170,9 @@ impl<P: StartStop> LineDecoder for StartStopLine<P> {
     }
 
     fn finish(&mut self, time: i64, out: &mut dyn Sink) -> io::Result<()> {
+        if !self.opening.is_empty() {
+            self.open(out)?;
+        }
         let mut out = Held { out, end: time + self.bit };
         if self.receiver.finish(time) {
             self.give(&mut out)?;

@@ -34,9 +34,8 @@ pub struct EdgeReceiver {
     fields: Vec<LineField>,
     /// Spikes dropped before the next field.
     dropped: u32,
-    /// The beginning of the capture, until the first burst has been read.
-    begin: Option<i64>,
-    begun: bool,
+    /// Falling edges of the first burst that are no start bits, until it has been read.
+    skipped: u32,
 }
 
 /// Bit rates measured on a line, relative to the nominal one.
@@ -66,6 +65,11 @@ impl Rates {
         (self.count > 0).then(|| self.sum / f64::from(self.count))
     }
 
+    /// Of a line with so many edges and spikes.
+    pub(crate) fn of(edges: u64, spikes: u64) -> Self {
+        Self { spikes, edges, ..Self::default() }
+    }
+
     /// An edge that stays, and the spikes dropped before it.
     pub(crate) fn count_edge(&mut self, spikes: u32) {
         self.spikes += u64::from(spikes);
@@ -93,9 +97,14 @@ impl EdgeReceiver {
             rates: Rates::default(),
             fields: Vec::new(),
             dropped: 0,
-            begin: None,
-            begun: false,
+            skipped: 0,
         }
+    }
+
+    /// The capture begins inside a field: so many falling edges are passed over before the first start bit.
+    #[must_use]
+    pub fn beginning_at(self, skipped: u32) -> Self {
+        Self { skipped, ..self }
     }
 
     /// What was measured so far.
@@ -105,10 +114,6 @@ impl EdgeReceiver {
 
     /// The line takes a level. Says whether there are fields to [`take`](Self::take).
     pub fn change(&mut self, time: i64, level: bool) -> bool {
-        if !self.begun {
-            self.begun = true;
-            self.begin = Some(time);
-        }
         for edge in self.spikes.change(time, level) {
             self.edge(edge);
         }
@@ -184,14 +189,14 @@ impl EdgeReceiver {
     fn read(&mut self, whole: bool) {
         let burst = std::mem::take(&mut self.burst);
         let mut rest = burst.as_slice();
-        let idle = self.longest_high() * self.bit;
-        let at_once = |begin: i64| rest.first().is_some_and(|first| ((first.time - begin) as f64) < idle);
-        if self.begin.take().is_some_and(at_once) {
-            let skip = self.first_field(rest);
-            let (piece, fields) = rest.split_at(skip);
-            if let (Some(first), Some(last), Some(next)) = (piece.first(), piece.last(), fields.first()) {
+        let skipped = std::mem::take(&mut self.skipped) as usize;
+        if skipped > 0 {
+            let mut falls = rest.iter().enumerate().filter(|(_, edge)| !edge.level);
+            let (piece, fields) = rest.split_at(falls.nth(skipped).map_or(rest.len(), |(at, _)| at));
+            if let (Some(first), Some(last)) = (piece.first(), piece.last()) {
                 // How long the level behind its last edge still belongs to it is not known.
-                let (start, end) = (first.time, next.time.min(last.time + self.bit as i64));
+                let end = last.time + self.bit as i64;
+                let (start, end) = (first.time, fields.first().map_or(end, |next| end.min(next.time)));
                 self.fields.push(LineField { content: 0, delimiter: false, start, end, spikes: 0, bits: 0 });
             }
             rest = fields;
@@ -208,35 +213,6 @@ impl EdgeReceiver {
         let kept = burst.len() - rest.len();
         self.burst = burst;
         self.burst.drain(..kept);
-    }
-
-    /// The edge from which on most fields end with a delimiter and begin where the one before ends: where the capture
-    /// begins inside a field, a falling edge need not be a start bit.
-    fn first_field(&self, edges: &[Edge]) -> usize {
-        let whole = f64::from(self.field_bits());
-        let Some(first) = edges.first() else { return 0 };
-        let near = edges
-            .iter()
-            .enumerate()
-            .filter(|(_, edge)| !edge.level && ((edge.time - first.time) as f64) < 2.0 * whole * self.bit);
-        let faults = |from: usize| {
-            let mut faults = 0;
-            let mut start = first.time;
-            for (k, edge) in edges.iter().enumerate().skip(from).filter(|(_, edge)| !edge.level) {
-                let bits = (edge.time - start) as f64 / self.bit;
-                if k > from && bits < whole - 1.0 {
-                    continue;
-                }
-                // A pause between two fields is short or that of another speaker.
-                faults += u32::from(k > from && (whole + 1.0..whole + OTHER_SPEAKER).contains(&bits));
-                start = edge.time;
-                let last =
-                    edges.iter().skip(k).take_while(|next| ((next.time - start) as f64) < (whole - 0.5) * self.bit);
-                faults += u32::from(last.last().is_some_and(|last| !last.level));
-            }
-            faults
-        };
-        near.map(|(k, _)| (k, faults(k))).min_by_key(|(_, faults)| *faults).map_or(0, |(k, _)| k)
     }
 
     /// Edges up to the first pause in which somebody else may have begun.

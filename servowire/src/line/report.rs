@@ -36,7 +36,9 @@ pub(super) fn found(found: &Found, names: &[&str]) -> String {
             let _ = write!(text, " ({:+.1} to {:+.1} % on the line)", off(found.rates.least), off(found.rates.most));
         }
         Some(mean) => {
-            let _ = write!(text, " ({:+.2} % on the line)", off(mean));
+            // No sign for what is no difference.
+            let off = if off(mean).abs() < 0.005 { 0.0 } else { off(mean) };
+            let _ = write!(text, " ({off:+.2} % on the line)");
         }
         None => {}
     }

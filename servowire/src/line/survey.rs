@@ -184,6 +184,7 @@ impl<'a> Candidates<'a> {
             }
         }
         let _ = decoder.finish(end, &mut evidence);
+        evidence.until = end;
         (evidence, decoder.rates())
     }
 

@@ -142,7 +142,7 @@ impl<'a> Watch<'a> {
     /// Nothing has changed until `time`.
     pub(super) fn reach(&mut self, time: i64, out: &mut Output<'_>) -> io::Result<()> {
         for (line, running) in self.lines.iter_mut().enumerate() {
-            out.lane(line)?;
+            out.lane(line);
             running.decoder.reach(time, out)?;
         }
         Ok(())
@@ -154,7 +154,7 @@ impl<'a> Watch<'a> {
             self.holes.push((held.len(), time));
         }
         for (line, running) in self.lines.iter_mut().enumerate() {
-            out.lane(line)?;
+            out.lane(line);
             running.decoder.gap(time, out)?;
             running.wires.forget();
         }
@@ -164,7 +164,7 @@ impl<'a> Watch<'a> {
     /// The capture ends.
     pub(super) fn finish(&mut self, time: i64, out: &mut Output<'_>) -> io::Result<()> {
         for (line, running) in self.lines.iter_mut().enumerate() {
-            out.lane(line)?;
+            out.lane(line);
             running.decoder.finish(time, out)?;
         }
         Ok(())
@@ -308,7 +308,7 @@ impl<'a> Watch<'a> {
             rate,
         };
         out.note(&format!("{}: {}", self.file, report::found(&found, &names)));
-        out.begin_lane(lane)?;
+        out.begin_lane(lane);
         self.lines.push(Running { wires: Wires::new(&found.taps), decoder });
         let mut edges = Vec::new();
         for tap in &found.taps {
@@ -331,7 +331,7 @@ impl<'a> Watch<'a> {
     fn give(&mut self, line: usize, change: Change, out: &mut Output<'_>) -> io::Result<()> {
         let Some(running) = self.lines.get_mut(line) else { return Ok(()) };
         if let Some(level) = running.wires.change(change.channel, change.level) {
-            out.lane(line)?;
+            out.lane(line);
             running.decoder.change(change.time, level, out)?;
         }
         Ok(())

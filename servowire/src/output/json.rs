@@ -4,60 +4,39 @@ use std::io::{self, Write};
 
 use serde::ser::{Serialize, SerializeMap, Serializer};
 
-use super::{Lane, Printer, Sink};
+use super::{Origin, Printer};
 use crate::event::{Direction, Event, Field, Place, Position, Refusal, Value, Verdict};
 
 /// Prints for programs.
 pub struct JsonLines<W> {
     out: W,
-    file: String,
-    lanes: Vec<Lane>,
-    lane: usize,
 }
 
 impl<W: Write> JsonLines<W> {
     /// Writes to `out`.
     pub fn new(out: W) -> Self {
-        Self { out, file: String::new(), lanes: Vec::new(), lane: 0 }
-    }
-}
-
-impl<W: Write> Sink for JsonLines<W> {
-    fn event(&mut self, event: &Event) -> io::Result<()> {
-        serde_json::to_writer(&mut self.out, &Object { file: &self.file, lane: self.lanes.get(self.lane), event })?;
-        self.out.write_all(b"\n")
+        Self { out }
     }
 }
 
 impl<W: Write> Printer for JsonLines<W> {
-    fn begin(&mut self, file: &str) -> io::Result<()> {
-        file.clone_into(&mut self.file);
-        self.lanes.clear();
-        Ok(())
-    }
-
-    fn begin_lane(&mut self, lane: &Lane) -> io::Result<()> {
-        self.lanes.push(lane.clone());
-        Ok(())
-    }
-
-    fn lane(&mut self, lane: usize) {
-        self.lane = lane;
+    fn event(&mut self, origin: &Origin, event: &Event) -> io::Result<()> {
+        serde_json::to_writer(&mut self.out, &Object { origin, event })?;
+        self.out.write_all(b"\n")
     }
 
     fn flush(&mut self) -> io::Result<()> {
         self.out.flush()
     }
 
-    fn end(&mut self) -> io::Result<()> {
+    fn end(&mut self, _: &Origin) -> io::Result<()> {
         self.out.flush()
     }
 }
 
 /// An event as the README describes it; keys that say nothing are left out.
 struct Object<'a> {
-    file: &'a str,
-    lane: Option<&'a Lane>,
+    origin: &'a Origin,
     event: &'a Event,
 }
 
@@ -65,8 +44,8 @@ impl Serialize for Object<'_> {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         let event = self.event;
         let mut map = serializer.serialize_map(None)?;
-        map.serialize_entry("file", self.file)?;
-        if let Some(lane) = self.lane {
+        map.serialize_entry("file", &self.origin.file)?;
+        if let Some(lane) = self.origin.lane() {
             map.serialize_entry("channel", &lane.channel)?;
             map.serialize_entry("protocol", lane.protocol.title())?;
             map.serialize_entry("bit_rate", &lane.rate)?;

@@ -7,7 +7,7 @@ use std::path::Path;
 use plotters::coord::Shift;
 use plotters::prelude::*;
 
-use super::Lane;
+use super::Origin;
 use crate::event::{Event, Place, Position, Verdict};
 
 /// Buckets of a time axis; when there are more, two become one.
@@ -86,6 +86,8 @@ impl<T: Gather> Buckets<T> {
 /// Positions of one line that can be compared with each other.
 #[derive(Debug, Clone)]
 struct Curve {
+    /// The name of the line.
+    name: String,
     turns: bool,
     count: u64,
     values: Buckets<Span>,
@@ -95,8 +97,6 @@ struct Curve {
 #[derive(Debug, Clone)]
 pub struct Picture {
     title: String,
-    lanes: Vec<Lane>,
-    lane: usize,
     /// By line and by the counts after which the value begins again.
     curves: BTreeMap<(usize, Option<u64>), Curve>,
     delays: Buckets<u64>,
@@ -110,8 +110,6 @@ impl Picture {
     pub fn new(title: &str) -> Self {
         Self {
             title: title.to_owned(),
-            lanes: Vec::new(),
-            lane: 0,
             curves: BTreeMap::new(),
             delays: Buckets::new(FIRST_BAR, MOST_BARS),
             errors: BTreeMap::new(),
@@ -119,15 +117,7 @@ impl Picture {
         }
     }
 
-    pub(super) fn begin_lane(&mut self, lane: Lane) {
-        self.lanes.push(lane);
-    }
-
-    pub(super) fn lane(&mut self, lane: usize) {
-        self.lane = lane;
-    }
-
-    pub(super) fn event(&mut self, event: &Event) {
+    pub(super) fn event(&mut self, origin: &Origin, event: &Event) {
         let Place::Time { start, end } = event.place else { return };
         let (first, last) = self.extent.unwrap_or((start, end));
         self.extent = Some((first.min(start), last.max(end)));
@@ -141,13 +131,14 @@ impl Picture {
             self.errors.entry(class).or_insert_with(|| Buckets::new(FIRST, MOST)).add(start, &1);
         }
         if let Some(position) = event.position {
-            self.position(start, position);
+            self.position(origin, start, position);
         }
     }
 
-    fn position(&mut self, time: i64, position: Position) {
+    fn position(&mut self, origin: &Origin, time: i64, position: Position) {
         let turns = position.turns();
-        let curve = self.curves.entry((self.lane, position.span)).or_insert_with(|| Curve {
+        let curve = self.curves.entry((origin.speaks, position.span)).or_insert_with(|| Curve {
+            name: origin.lane().map_or_else(String::new, |lane| lane.channel.clone()),
             turns: turns.is_some(),
             count: 0,
             values: Buckets::new(FIRST, MOST),
@@ -202,16 +193,15 @@ impl Picture {
             .build_cartesian_2d(self.milliseconds(), low - room..high + room)?;
         let unit = if turns { "position in turns" } else { "position in counts" };
         chart.configure_mesh().x_desc("time in ms").y_desc(unit).light_line_style(WHITE).draw()?;
-        for (row, (lane, curve)) in best.iter().enumerate() {
+        for (row, curve) in best.values().enumerate() {
             let colour = Palette99::pick(row).to_rgba();
             let points = curve.values.iter().flat_map(|(time, span)| {
                 let time = time as f64 / 1e9;
                 [(time, span.first), (time, span.least), (time, span.most), (time, span.last)]
             });
-            let name = self.lanes.get(*lane).map_or_else(String::new, |lane| lane.channel.clone());
             chart
                 .draw_series(LineSeries::new(points, colour.stroke_width(1)))?
-                .label(name)
+                .label(curve.name.as_str())
                 .legend(move |(x, y)| PathElement::new(vec![(x, y), (x + 16, y)], colour.stroke_width(2)));
         }
         if best.len() > 1 {

@@ -5,7 +5,7 @@ use std::io::{self, Write};
 
 use serde_json::{Value as Json, json};
 
-use super::{Printer, Sink};
+use super::{Origin, Printer};
 use crate::event::{Direction, Event, Place, Position, Verdict};
 
 /// Jumps of the position that are listed; further ones are counted.
@@ -17,7 +17,6 @@ pub struct Stats<W> {
     json: bool,
     /// Counts that a position may move from one frame to the next.
     limit: Option<u64>,
-    file: String,
     figures: Figures,
 }
 
@@ -171,14 +170,14 @@ impl Figures {
 impl<W: Write> Stats<W> {
     /// `limit`: moves of the position above it are listed as jumps.
     pub fn new(out: W, json: bool, limit: Option<u64>) -> Self {
-        Self { out, json, limit, file: String::new(), figures: Figures::default() }
+        Self { out, json, limit, figures: Figures::default() }
     }
 
-    fn print_text(&mut self) -> io::Result<()> {
+    fn print_text(&mut self, file: &str) -> io::Result<()> {
         let f = &self.figures;
         let refused: u64 = f.refused.values().sum();
         let kinds = f.kinds.iter().map(|(kind, n)| format!("{kind}: {n}")).collect::<Vec<_>>().join(", ");
-        writeln!(self.out, "{}", self.file)?;
+        writeln!(self.out, "{file}")?;
         writeln!(self.out, "  frames        {} requests, {} answers, {} others", f.requests, f.answers, f.others)?;
         writeln!(self.out, "  kinds         {}", if kinds.is_empty() { "none" } else { &kinds })?;
         writeln!(self.out, "  verdicts      {} ok, {refused} refused", f.ok)?;
@@ -201,11 +200,11 @@ impl<W: Write> Stats<W> {
         Ok(())
     }
 
-    fn print_json(&mut self) -> io::Result<()> {
+    fn print_json(&mut self, file: &str) -> io::Result<()> {
         let f = &self.figures;
         let jump = |j: &Jump| json!({ "time_ps": j.time, "from": j.from, "to": j.to, "moved": j.moved });
         let object = json!({
-            "file": self.file, "requests": f.requests, "answers": f.answers, "others": f.others,
+            "file": file, "requests": f.requests, "answers": f.answers, "others": f.others,
             "ok": f.ok, "refused": f.refused, "kinds": f.kinds,
             "cycle": f.cycle.json(), "answer_delay": f.delay.json(),
             "largest_move": f.position.map(|_| f.largest),
@@ -217,26 +216,19 @@ impl<W: Write> Stats<W> {
     }
 }
 
-impl<W: Write> Sink for Stats<W> {
-    fn event(&mut self, event: &Event) -> io::Result<()> {
+impl<W: Write> Printer for Stats<W> {
+    fn event(&mut self, _: &Origin, event: &Event) -> io::Result<()> {
         self.figures.add(event, self.limit);
         Ok(())
     }
-}
 
-impl<W: Write> Printer for Stats<W> {
-    fn begin(&mut self, file: &str) -> io::Result<()> {
-        file.clone_into(&mut self.file);
-        self.figures = Figures::default();
-        Ok(())
-    }
-
-    fn end(&mut self) -> io::Result<()> {
+    fn end(&mut self, origin: &Origin) -> io::Result<()> {
         if self.json {
-            self.print_json()?;
+            self.print_json(&origin.file)?;
         } else {
-            self.print_text()?;
+            self.print_text(&origin.file)?;
         }
+        self.figures = Figures::default();
         self.out.flush()
     }
 }

@@ -3,7 +3,7 @@
 use std::borrow::Cow;
 use std::io::{self, Write};
 
-use super::{Lane, Printer, Sink};
+use super::{Origin, Printer};
 use crate::event::{Direction, Event, Place, Value, Verdict};
 
 /// Columns that every file has; those of the fields follow, and at last what has none.
@@ -33,28 +33,25 @@ const HELD: usize = 512;
 /// Writes a table.
 pub struct Csv<W: Write> {
     out: csv::Writer<W>,
-    file: String,
-    lanes: Vec<Lane>,
-    lane: usize,
     /// Names of the fields that have a column, once the heading is written.
     names: Option<Vec<&'static str>>,
-    /// What waits for the heading, with file and line.
-    held: Vec<(String, Option<Lane>, Event)>,
+    /// What waits for the heading.
+    held: Vec<Event>,
 }
 
 impl<W: Write> Csv<W> {
     /// Writes to `out`.
     pub fn new(out: W) -> Self {
         let out = csv::WriterBuilder::new().flexible(false).from_writer(out);
-        Self { out, file: String::new(), lanes: Vec::new(), lane: 0, names: None, held: Vec::new() }
+        Self { out, names: None, held: Vec::new() }
     }
 
     /// Writes the heading, and what waited for it.
-    fn heading(&mut self) -> io::Result<()> {
+    fn heading(&mut self, origin: &Origin) -> io::Result<()> {
         if self.names.is_none() {
             let mut names: Vec<&'static str> = Vec::new();
-            let of_lanes = self.lanes.iter().flat_map(|lane| lane.protocol.field_names().iter().copied());
-            let of_events = self.held.iter().flat_map(|(_, _, event)| event.fields.iter().map(|field| field.name));
+            let of_lanes = origin.lanes.iter().flat_map(|lane| lane.protocol.field_names().iter().copied());
+            let of_events = self.held.iter().flat_map(|event| event.fields.iter().map(|field| field.name));
             for name in of_lanes.chain(of_events) {
                 if !names.contains(&name) {
                     names.push(name);
@@ -63,16 +60,17 @@ impl<W: Write> Csv<W> {
             self.out.write_record(COLUMNS.into_iter().chain(names.iter().copied()).chain([MORE]))?;
             self.names = Some(names);
         }
-        for (file, lane, event) in std::mem::take(&mut self.held) {
-            self.row(&file, lane.as_ref(), &event)?;
+        for event in std::mem::take(&mut self.held) {
+            self.row(origin, &event)?;
         }
         Ok(())
     }
 
-    fn row(&mut self, file: &str, lane: Option<&Lane>, event: &Event) -> io::Result<()> {
+    fn row(&mut self, origin: &Origin, event: &Event) -> io::Result<()> {
+        let lane = origin.lane();
         let names = self.names.as_deref().unwrap_or_default();
         let out = &mut self.out;
-        out.write_field(file)?;
+        out.write_field(&origin.file)?;
         out.write_field(lane.map_or("", |lane| &lane.channel))?;
         out.write_field(lane.map_or("", |lane| lane.protocol.title()))?;
         match event.place {
@@ -136,45 +134,24 @@ fn cell(value: &Value) -> Cow<'_, str> {
     }
 }
 
-impl<W: Write> Sink for Csv<W> {
-    fn event(&mut self, event: &Event) -> io::Result<()> {
-        if self.names.is_none() && self.lanes.is_empty() {
-            // A log: its fields are those that come.
-            self.held.push((self.file.clone(), None, event.clone()));
-            return if self.held.len() < HELD { Ok(()) } else { self.heading() };
-        }
-        self.heading()?;
-        let (file, lane) = (std::mem::take(&mut self.file), self.lanes.get(self.lane).cloned());
-        let row = self.row(&file, lane.as_ref(), event);
-        self.file = file;
-        row
-    }
-}
-
 impl<W: Write> Printer for Csv<W> {
-    fn begin(&mut self, file: &str) -> io::Result<()> {
-        file.clone_into(&mut self.file);
-        self.lanes.clear();
-        self.lane = 0;
-        Ok(())
-    }
-
-    fn begin_lane(&mut self, lane: &Lane) -> io::Result<()> {
-        self.lanes.push(lane.clone());
-        Ok(())
-    }
-
-    fn lane(&mut self, lane: usize) {
-        self.lane = lane;
+    fn event(&mut self, origin: &Origin, event: &Event) -> io::Result<()> {
+        if self.names.is_none() && origin.lanes.is_empty() {
+            // A log: its fields are those that come.
+            self.held.push(event.clone());
+            return if self.held.len() < HELD { Ok(()) } else { self.heading(origin) };
+        }
+        self.heading(origin)?;
+        self.row(origin, event)
     }
 
     fn flush(&mut self) -> io::Result<()> {
         self.out.flush()
     }
 
-    fn end(&mut self) -> io::Result<()> {
+    fn end(&mut self, origin: &Origin) -> io::Result<()> {
         if !self.held.is_empty() {
-            self.heading()?;
+            self.heading(origin)?;
         }
         self.out.flush()
     }

@@ -11,7 +11,7 @@ use std::io::{self, Write};
 
 use clap::builder::styling::{AnsiColor, Style};
 
-use super::{Lane, Printer, Sink};
+use super::{Origin, Printer};
 use crate::event::{Direction, Event, Field, Place, Value, Verdict};
 
 /// Columns of a line.
@@ -32,9 +32,6 @@ pub struct Text<W> {
     line: Columns,
     /// A good request of each line whose answer may follow.
     held: BTreeMap<usize, Event>,
-    /// Names of the lines, and the one that speaks.
-    lanes: Vec<String>,
-    lane: usize,
     headings: bool,
     /// The widest value of each field so far, so that lines of one kind stand in columns.
     widths: HashMap<&'static str, usize>,
@@ -49,19 +46,25 @@ impl<W: Write> Text<W> {
             out,
             line: Columns { text: String::new(), pieces: Vec::new(), colour },
             held: BTreeMap::new(),
-            lanes: Vec::new(),
-            lane: 0,
             headings,
             widths: HashMap::new(),
             steady: HashMap::new(),
         }
     }
 
-    fn print(&mut self, event: &Event, place: Place, direction: &str) -> io::Result<()> {
+    fn print(
+        &mut self,
+        origin: &Origin,
+        speaks: usize,
+        event: &Event,
+        place: Place,
+        direction: &str,
+    ) -> io::Result<()> {
         self.line.begin(place);
-        if self.lanes.len() > 1 {
-            let widest = self.lanes.iter().map(String::len).max().unwrap_or(0);
-            let _ = write!(self.line.text, "  {:<widest$}", self.lanes.get(self.lane).map_or("", String::as_str));
+        if origin.lanes.len() > 1 {
+            let names = || origin.lanes.iter().map(|lane| lane.channel.as_str());
+            let widest = names().map(str::len).max().unwrap_or(0);
+            let _ = write!(self.line.text, "  {:<widest$}", names().nth(speaks).unwrap_or_default());
         }
         let _ = write!(self.line.text, "  {direction:<2}");
         let _ = write!(self.line.piece(), "{:<4}", event.kind);
@@ -70,7 +73,7 @@ impl<W: Write> Text<W> {
                 continue;
             }
             if STEADY.contains(&field.name) {
-                let known = self.steady.entry((self.lane, field.name)).or_insert_with(|| Value::Text(String::new()));
+                let known = self.steady.entry((speaks, field.name)).or_insert_with(|| Value::Text(String::new()));
                 if *known == field.value {
                     continue;
                 }
@@ -96,9 +99,10 @@ impl<W: Write> Text<W> {
         self.line.write(&mut self.out)
     }
 
-    fn release(&mut self) -> io::Result<()> {
-        match self.held.remove(&self.lane) {
-            Some(request) => self.print(&request, request.place, ">"),
+    /// Prints the request of line `speaks` that waits for its answer.
+    fn release(&mut self, origin: &Origin, speaks: usize) -> io::Result<()> {
+        match self.held.remove(&speaks) {
+            Some(request) => self.print(origin, speaks, &request, request.place, ">"),
             None => Ok(()),
         }
     }
@@ -182,60 +186,47 @@ impl Columns {
     }
 }
 
-impl<W: Write> Sink for Text<W> {
-    fn event(&mut self, event: &Event) -> io::Result<()> {
+impl<W: Write> Printer for Text<W> {
+    fn begin(&mut self, origin: &Origin) -> io::Result<()> {
+        self.steady.clear();
+        if self.headings { writeln!(self.out, "{}", origin.file) } else { Ok(()) }
+    }
+
+    fn event(&mut self, origin: &Origin, event: &Event) -> io::Result<()> {
+        let speaks = origin.speaks;
         match event.direction {
-            Some(Direction::Answer) => match self.held.remove(&self.lane) {
-                Some(request) if event.kind == request.kind => self.print(event, request.place, "<>"),
-                held => {
-                    if let Some(request) = held {
-                        self.print(&request, request.place, ">")?;
+            Some(Direction::Answer) => {
+                if let Some(request) = self.held.remove(&speaks) {
+                    if event.kind == request.kind {
+                        return self.print(origin, speaks, event, request.place, "<>");
                     }
-                    self.print(event, event.place, "<")
+                    self.print(origin, speaks, &request, request.place, ">")?;
                 }
-            },
+                self.print(origin, speaks, event, event.place, "<")
+            }
             Some(Direction::Request) => {
-                self.release()?;
+                self.release(origin, speaks)?;
                 if event.verdict.is_ok() {
-                    self.held.insert(self.lane, event.clone());
+                    self.held.insert(speaks, event.clone());
                     return Ok(());
                 }
-                self.print(event, event.place, ">")
+                self.print(origin, speaks, event, event.place, ">")
             }
             None => {
-                self.release()?;
-                self.print(event, event.place, "")
+                self.release(origin, speaks)?;
+                self.print(origin, speaks, event, event.place, "")
             }
         }
-    }
-}
-
-impl<W: Write> Printer for Text<W> {
-    fn begin(&mut self, file: &str) -> io::Result<()> {
-        if self.headings { writeln!(self.out, "{file}") } else { Ok(()) }
-    }
-
-    fn begin_lane(&mut self, lane: &Lane) -> io::Result<()> {
-        self.lanes.push(lane.channel.clone());
-        Ok(())
-    }
-
-    fn lane(&mut self, lane: usize) {
-        self.lane = lane;
     }
 
     fn flush(&mut self) -> io::Result<()> {
         self.out.flush()
     }
 
-    fn end(&mut self) -> io::Result<()> {
-        for lane in 0..self.lanes.len().max(1) {
-            self.lane = lane;
-            self.release()?;
+    fn end(&mut self, origin: &Origin) -> io::Result<()> {
+        for speaks in 0..origin.lanes.len().max(1) {
+            self.release(origin, speaks)?;
         }
-        self.lanes.clear();
-        self.steady.clear();
-        self.lane = 0;
         if self.headings {
             writeln!(self.out)?;
         }

@@ -1,8 +1,8 @@
 //! The capture again, with the decoded frames beside it as string variables (GTKWave, Surfer).
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, VecDeque};
 use std::fs::File;
-use std::io::{self, BufWriter};
+use std::io::{self, BufWriter, Write};
 use std::path::Path;
 
 use vcd::{IdCode, TimescaleUnit, VarType, Writer};
@@ -20,16 +20,14 @@ const NOTHING: &str = "-";
 /// A VCD being written.
 pub struct VcdOut {
     writer: Writer<BufWriter<File>>,
-    /// Codes of the capture's channels.
-    channels: Vec<IdCode>,
-    /// Lines found before the header was written.
-    lanes: Vec<Lane>,
-    /// The codes of each.
+    /// The capture's channels: the lines that say they are low and high.
+    channels: Vec<[String; 2]>,
+    /// The codes of each line that was found before the header was written.
     strings: Vec<Strings>,
-    /// The line that the events are of.
-    lane: usize,
-    /// What is to be written, in order.
-    waiting: BTreeMap<(i64, u64), Item>,
+    /// Levels that are to be written, in the order of time.
+    levels: VecDeque<Change>,
+    /// Strings that are to be written, by time and as they came.
+    texts: BTreeMap<(i64, u64), (IdCode, String)>,
     sequence: u64,
     /// Time of the capture that is 0 in the file.
     origin: Option<i64>,
@@ -44,46 +42,33 @@ struct Strings {
     fields: Vec<IdCode>,
 }
 
-enum Item {
-    Level(IdCode, bool),
-    Text(IdCode, String),
-}
-
 impl VcdOut {
     /// A new file.
     pub fn create(path: &Path) -> io::Result<Self> {
         Ok(Self {
             writer: Writer::new(BufWriter::new(File::create(path)?)),
             channels: Vec::new(),
-            lanes: Vec::new(),
             strings: Vec::new(),
-            lane: 0,
-            waiting: BTreeMap::new(),
+            levels: VecDeque::new(),
+            texts: BTreeMap::new(),
             sequence: 0,
             origin: None,
             written: None,
         })
     }
 
-    pub(super) fn begin_lane(&mut self, lane: Lane) {
-        self.lanes.push(lane);
-    }
-
-    pub(super) fn lane(&mut self, lane: usize) {
-        self.lane = lane;
-    }
-
     /// Writes the header. A line that is found later has no place in it.
-    pub(super) fn channels(&mut self, channels: &[String]) -> io::Result<()> {
+    pub(super) fn channels(&mut self, channels: &[String], lanes: &[Lane]) -> io::Result<()> {
         let writer = &mut self.writer;
         writer.version("servowire")?;
         writer.timescale(1, TimescaleUnit::NS)?;
         writer.add_module("capture")?;
         for name in channels {
-            self.channels.push(writer.add_wire(1, &word(name))?);
+            let code = writer.add_wire(1, &word(name))?;
+            self.channels.push([format!("0{code}\n"), format!("1{code}\n")]);
         }
         writer.upscope()?;
-        for lane in &self.lanes {
+        for lane in lanes {
             writer.add_module(&format!("decoded_{}", word(&lane.channel)))?;
             let mut string = |name: &str| writer.add_var(VarType::String, 1, name, None);
             let (frame, verdict) = (string("frame")?, string("verdict")?);
@@ -95,8 +80,8 @@ impl VcdOut {
         writer.enddefinitions()
     }
 
-    fn wait(&mut self, time: i64, item: Item) {
-        self.waiting.insert((time, self.sequence), item);
+    fn wait(&mut self, time: i64, code: IdCode, text: String) {
+        self.texts.insert((time, self.sequence), (code, text));
         self.sequence += 1;
     }
 
@@ -106,18 +91,16 @@ impl VcdOut {
             self.origin = Some(change.time.min(0));
             let strings = self.strings.clone();
             for code in strings.iter().flat_map(|s| [s.frame, s.verdict].into_iter().chain(s.fields.clone())) {
-                self.wait(change.time, Item::Text(code, NOTHING.to_owned()));
+                self.wait(change.time, code, NOTHING.to_owned());
             }
         }
-        if let Some(code) = self.channels.get(usize::from(change.channel)).copied() {
-            self.wait(change.time, Item::Level(code, change.level));
-        }
+        self.levels.push_back(*change);
         self.flush_before(change.time.saturating_sub(WINDOW))
     }
 
-    /// A decoded frame.
-    pub(super) fn event(&mut self, event: &Event) {
-        let (Place::Time { start, end }, Some(strings)) = (event.place, self.strings.get(self.lane)) else { return };
+    /// A decoded frame of a line.
+    pub(super) fn event(&mut self, speaks: usize, event: &Event) {
+        let (Place::Time { start, end }, Some(strings)) = (event.place, self.strings.get(speaks)) else { return };
         let side = match event.direction {
             Some(Direction::Request) => "request ",
             Some(Direction::Answer) => "answer ",
@@ -134,31 +117,52 @@ impl VcdOut {
             }
         }
         for (code, text) in shown {
-            self.wait(start, Item::Text(code, word(&text)));
-            self.wait(end, Item::Text(code, NOTHING.to_owned()));
+            self.wait(start, code, word(&text));
+            self.wait(end, code, NOTHING.to_owned());
         }
     }
 
     fn flush_before(&mut self, time: i64) -> io::Result<()> {
-        while let Some(first) = self.waiting.first_entry().filter(|first| first.key().0 < time) {
-            let ((time, _), item) = first.remove_entry();
-            let nanoseconds = (time.saturating_sub(self.origin.unwrap_or(0)).max(0) as u64 + 500) / 1000;
-            // An event older than the window is shown late rather than out of order.
-            let stamp = nanoseconds.max(self.written.unwrap_or(0));
-            if self.written != Some(stamp) {
-                self.writer.timestamp(stamp)?;
-                self.written = Some(stamp);
+        loop {
+            let level = self.levels.front().map(|change| change.time).filter(|at| *at < time);
+            let text = self.texts.first_key_value().map(|((at, _), _)| *at).filter(|at| *at < time);
+            match (level, text) {
+                (None, None) => return Ok(()),
+                (Some(at), text) if text.is_none_or(|text| at <= text) => {
+                    self.stamp(at)?;
+                    let change = self.levels.pop_front();
+                    let lines =
+                        change.and_then(|change| Some((change, self.channels.get(usize::from(change.channel))?)));
+                    if let Some((change, [low, high])) = lines {
+                        self.writer.writer().write_all(if change.level { high } else { low }.as_bytes())?;
+                    }
+                }
+                _ => {
+                    if let Some(((at, _), (code, text))) = self.texts.pop_first() {
+                        self.stamp(at)?;
+                        self.writer.change_string(code, &text)?;
+                    }
+                }
             }
-            match item {
-                Item::Level(code, level) => self.writer.change_scalar(code, level)?,
-                Item::Text(code, text) => self.writer.change_string(code, &text)?,
-            }
+        }
+    }
+
+    /// Goes on to a time. An event older than the window is shown late rather than out of order.
+    fn stamp(&mut self, time: i64) -> io::Result<()> {
+        let nanoseconds = (time.saturating_sub(self.origin.unwrap_or(0)).max(0) as u64 + 500) / 1000;
+        if self.written.is_none_or(|written| written < nanoseconds) {
+            self.written = Some(nanoseconds);
+            let mut digits = itoa::Buffer::new();
+            let out = self.writer.writer();
+            out.write_all(b"#")?;
+            out.write_all(digits.format(nanoseconds).as_bytes())?;
+            out.write_all(b"\n")?;
         }
         Ok(())
     }
 
     /// Writes what is left.
-    pub fn finish(&mut self) -> io::Result<()> {
+    pub(super) fn finish(&mut self) -> io::Result<()> {
         self.flush_before(i64::MAX)?;
         self.writer.flush()
     }

@@ -4,13 +4,13 @@
 //! found by the head of the master; the answer behind it at the delay where its words hold.
 
 mod bits;
+mod score;
 
 use std::io;
 
 use hdsl::frame::{ANSWER_BITS, BIT_RATE, H_FRAME_BITS, Head, Received};
 use hdsl::message::{LongAnswer, Request, Responder};
 use hdsl::sampling::{Delay, TEST_PATTERN};
-use hdsl::symbol::{RunningDisparity, Word};
 use hdsl::{
     Answer, EncoderByte, EncoderId, EncoderSymbol, Error, MasterSymbol, Phase, PositionBits, PositionTracker,
     QualityMonitor, QualityRule, Rule, VFrame, Window,
@@ -20,6 +20,7 @@ use crate::event::{Direction, Event, Field, NO_RESPONSE, Place, Position, Refusa
 use crate::line::{LineDecoder, Rates};
 use crate::output::Sink;
 use bits::Bits;
+use score::{PERFECT, disparity_holds, score};
 
 /// The names of all fields.
 pub const FIELDS: &[&str] = &[
@@ -73,7 +74,7 @@ impl LineDecoder for DslLine {
     }
 
     fn rates(&self) -> Rates {
-        self.bits.rates
+        self.bits.rates()
     }
 }
 
@@ -106,6 +107,11 @@ const LEARNED: usize = 8;
 const LESSON: u64 = 1300;
 const DISPARITY: &str = "all words are in the tables, but not one behind the other: bits of at least one were flipped";
 const PAUSED: &str = "the line rests here, though frames follow each other for ever";
+
+/// Whether a frame is answered by the test pattern or the identifier.
+fn is_start_up(symbol: MasterSymbol) -> bool {
+    matches!(symbol, MasterSymbol::Start | MasterSymbol::Learn | MasterSymbol::Check | MasterSymbol::IdReq)
+}
 
 /// What there is where the head of a frame was due, within three bits.
 fn damage(line: u128) -> (&'static str, String) {
@@ -232,10 +238,16 @@ impl Decoder {
         // The delay of a cable does not change, but it need not be whole bits; between equals the time decides.
         let since = |delay: u32| bits.time(from + u64::from(delay)) - bits.time(from);
         let off = |delay: u32| self.lag.map_or(0, |lag| (since(delay) - lag).abs());
-        let near = [usual, usual + 1, usual.saturating_sub(1)].map(|delay| (delay, score(line(delay))));
         let better = |a: &(u32, usize), b: &(u32, usize)| a.1 > b.1 || a.1 == b.1 && off(a.0) < off(b.0);
-        let (delay, score) =
-            near.into_iter().reduce(|best, next| if better(&next, &best) { next } else { best }).unwrap_or((usual, 0));
+        let mut best = (usual, score(line(usual)));
+        let running = self.lag.is_some_and(|_| off(usual) < bits.half()) && !symbol.is_ok_and(is_start_up);
+        if !running || best.1 < PERFECT {
+            for delay in [usual + 1, usual.saturating_sub(1)] {
+                let next = (delay, score(line(delay)));
+                best = if better(&next, &best) { next } else { best };
+            }
+        }
+        let (delay, score) = best;
         if score >= GOOD {
             let now = since(delay);
             self.lag = Some(self.lag.map_or(now, |lag| lag + (now - lag) / 8));
@@ -298,7 +310,8 @@ impl Decoder {
         self.tracker.step(dd.ok());
         let parameter = answer.parameter();
         let byte = |name, word: hdsl::symbol::Reading| word.byte().ok().map(|byte| Field::hex(name, byte, 2));
-        let mut fields = vec![Field::measured("delay", self.delay.unwrap_or(0), "bit")];
+        let mut fields = Vec::with_capacity(10);
+        fields.push(Field::measured("delay", self.delay.unwrap_or(0), "bit"));
         fields.extend(byte("VERT", answer.vertical()));
         if let Ok(parameter) = parameter {
             fields.push(encoder_symbol(parameter));
@@ -417,35 +430,8 @@ fn usual_delay(bits: &Bits, from: u64) -> u32 {
     best.map_or(0, |(delay, _)| delay)
 }
 
-/// How well an answer stands here: good words, switch bit, check of the acceleration; most for the test pattern.
-fn score(line: Window) -> usize {
-    let Ok(answer) = Answer::parse(Rule::Strict, line) else { return 0 };
-    if line.bits() as u64 & ((1 << ANSWER_BITS) - 1) == TEST_PATTERN {
-        return 20;
-    }
-    let words = answer.words().iter().filter(|word| !word.is_byte_error()).count();
-    let disparity = if disparity_holds(line) { 3 } else { 0 };
-    words + usize::from(answer.switch_ok()) + if answer.delta_delta().is_ok() { 2 } else { 0 } + disparity
-}
-
-/// Whether the running disparity holds from word to word of an answer, whatever it was before.
-fn disparity_holds(line: Window) -> bool {
-    let bits = line.bits();
-    let words = [0, 10, 20, 30, 40, 51].map(|at| Word::truncate((bits >> at) as u16));
-    [RunningDisparity::Minus, RunningDisparity::Plus].into_iter().any(|before| {
-        let mut rd = before;
-        words.into_iter().all(|word| {
-            let holds = word.is_in(rd);
-            if word.disparity() != 0 {
-                rd = rd.other();
-            }
-            holds
-        })
-    })
-}
-
 fn master(head: Received, symbol: Result<MasterSymbol, Error>, place: Place) -> Event {
-    let mut fields = Vec::new();
+    let mut fields = Vec::with_capacity(4);
     fields.extend(symbol.ok().map(|symbol| Field::text("SYMBOL", symbol)));
     fields.push(Field::number("FIRST", head.byte.first()));
     fields.push(Field::number("MSYNC", head.byte.msync()));

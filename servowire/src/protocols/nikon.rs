@@ -18,7 +18,7 @@ use crate::capture::hexlog::Burst;
 use crate::event::{Event, Place, Verdict};
 use crate::line::{LineField, StartStop};
 use crate::output::Sink;
-use crate::protocols::plausible::slipped_bit;
+use crate::protocols::plausible::{CUT, CUT_BITS, joined, slipped_bit};
 use describe::Encoder;
 
 pub use describe::FIELDS;
@@ -78,9 +78,7 @@ impl Group {
             self.raw = field.bits;
         } else if field.bits != 0 && bit > 0 {
             // Somebody seems to begin anew: what he says stands behind.
-            let at = u32::try_from((field.start - self.start() + bit / 2) / bit).unwrap_or(u32::MAX);
-            let below = 1_u128.checked_shl(at).map_or(u128::MAX, |one| one - 1);
-            self.raw &= field.bits.checked_shl(at).unwrap_or(u128::MAX) | below;
+            self.raw = joined(self.raw, field.bits, (field.start - self.start() + bit / 2) / bit);
         }
         self.contents.push(field.content);
         self.starts.push(field.start);
@@ -148,6 +146,7 @@ impl Pending {
 }
 
 /// Finds requests and replies among the frames of a line.
+#[derive(Debug, Clone)]
 pub struct Decoder {
     bit: i64,
     encoder: Encoder,
@@ -257,10 +256,6 @@ impl Decoder {
         }
     }
 }
-
-/// High bits at the end of a whole reply that say more of an idle line than of its check field.
-const CUT_BITS: u32 = 5;
-const CUT: &str = "it was cut: the encoder broke off, or somebody switched the line";
 
 /// What probably spoilt the reply to a request.
 fn cause(group: &Group, request: Request, expected: Option<Expected>) -> Option<String> {

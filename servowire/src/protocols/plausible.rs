@@ -57,6 +57,19 @@ pub(super) fn slipped_bit(raw: u128, len: u32, sound: impl Fn(u128) -> bool) -> 
     })
 }
 
+/// The bits of a line and those that begin at bit `at` of it, the first in bit 0; what nobody drives is 1.
+pub(super) fn joined(bits: u128, behind: u128, at: i64) -> u128 {
+    let at = u32::try_from(at).unwrap_or(u32::MAX);
+    let below = 1_u128.checked_shl(at).map_or(u128::MAX, |one| one - 1);
+    bits & (behind.checked_shl(at).unwrap_or(u128::MAX) | below)
+}
+
+/// What is said of an answer that ends early.
+pub(super) const CUT: &str = "it was cut: the encoder broke off, or somebody switched the line";
+
+/// High bits at the end of a whole answer that say more of an idle line than of its check field.
+pub(super) const CUT_BITS: u32 = 5;
+
 /// Why a request got no answer when the next one came `after` picoseconds behind it: nobody waits so briefly.
 pub(super) fn two_masters(after: i64) -> String {
     let after = after as f64 / 1e6;

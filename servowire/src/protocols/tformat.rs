@@ -16,8 +16,9 @@ use crate::capture::hexlog::Burst;
 use crate::event::{Direction, Event, Verdict};
 use crate::line::{LineField, StartStop};
 use crate::output::Sink;
+use crate::protocols::plausible::CUT;
 use describe::Encoder;
-use frame::{Frame, MOST_FIELDS, Pending};
+use frame::{Frame, LATE_ANSWER, MOST_FIELDS, Pending};
 
 pub use describe::FIELDS;
 
@@ -46,6 +47,7 @@ const ANSWER_TIMEOUT: i64 = 20_000_000;
 const LONGEST_BITS: i64 = 150;
 
 /// Finds the frames among the fields of a line.
+#[derive(Debug, Clone)]
 pub struct Decoder {
     bit: i64,
     encoder: Encoder,
@@ -59,6 +61,10 @@ pub struct Decoder {
     skipped: i64,
     open: Frame,
     pending: Option<Pending>,
+    /// Until when a frame may answer a request that was before the capture, as long as none was sound.
+    early: Option<i64>,
+    /// A frame that may be a request or such an answer: what follows tells.
+    unclear: Option<Frame>,
 }
 
 impl Decoder {
@@ -73,6 +79,8 @@ impl Decoder {
             skipped: 0,
             open: Frame::default(),
             pending: None,
+            early: None,
+            unclear: None,
         }
     }
 
@@ -115,16 +123,23 @@ impl Decoder {
             self.give_up(frame.start(), true, out)?;
         }
         if let Some(pending) = self.pending.take() {
+            self.clear(out)?;
             let event = self.answer(&frame, pending);
             return out.event(&event);
         }
         let event = self.unasked(&frame);
+        let early = self.early.take_if(|_| event.verdict.is_ok()).is_some_and(|until| frame.start() < until);
+        if early && frame.data_id().is_ok_and(|id| id.request_fields() == id.response_fields()) {
+            self.unclear = Some(frame);
+            return Ok(());
+        }
         // With no idle line before it, a bad first frame is only the end of one.
         let at_once = begin.is_some_and(|begin| frame.start() - begin < FIELD_TIMEOUT_BITS * self.bit);
         let still = self.cut_until.take().filter(|until| frame.start() < *until);
         if (at_once || still.is_some()) && !event.verdict.is_ok() {
             self.pending = None;
             self.skipped = frame.end;
+            self.early = Some(frame.end + LATE_ANSWER);
             self.skip = begin.map(|begin| begin + LONGEST_BITS * self.bit).or(still);
             self.cut_until = self.skip;
             return out.event(&Event::cut(frame.place()));
@@ -164,11 +179,17 @@ impl Decoder {
         // With all delimiters in place and one bit wrong, none has slipped.
         let wrong = frame.bytes().iter().fold(0, |crc, byte| crc ^ byte).count_ones();
         let flipped = frame.broken.is_none() && frame.fields == due && wrong == 1;
+        if frame.broken.is_some() && frame.is_one_bit_off(request) {
+            return Some(Cause::Disturbed.to_string());
+        }
+        if !flipped && frame.broken.is_none() && frame.fields == due && frame.ends_idle(request) {
+            return Some(CUT.to_owned());
+        }
         if let Some(slipped) = if flipped { None } else { frame.slipped_bit(request) } {
             return Some(slipped.to_owned());
         }
         if frame.broken.is_none() && frame.fields < due {
-            return Some("it was cut: the encoder broke off, or somebody switched the line".to_owned());
+            return Some(CUT.to_owned());
         }
         cause.map(|cause| cause.to_string())
     }
@@ -194,11 +215,25 @@ impl Decoder {
         describe::request(frame, asked, result)
     }
 
+    /// The unclear frame was a request.
+    fn clear(&mut self, out: &mut dyn Sink) -> io::Result<()> {
+        match self.unclear.take() {
+            Some(frame) => out.event(&describe::request(&frame, frame.data_id().ok(), Request::parse(frame.bytes()))),
+            None => Ok(()),
+        }
+    }
+
     /// The answer did not come until `now`; `asked`: when somebody asked again.
     fn give_up(&mut self, now: i64, asked: bool, out: &mut dyn Sink) -> io::Result<()> {
-        match self.pending.take() {
+        match (self.unclear.take(), self.pending.take()) {
+            // Nobody answers an answer.
+            (Some(frame), Some(Pending { request: Some(request), .. })) => {
+                let event =
+                    self.encoder.answer(&frame, Some(request.data_id()), Response::parse(request, frame.bytes()), None);
+                out.event(&event)
+            }
             // Nobody owes an answer to a damaged request.
-            Some(Pending { request: Some(request), place }) => {
+            (_, Some(Pending { request: Some(request), place })) => {
                 out.event(&describe::silence(request, place, now, asked))
             }
             _ => Ok(()),
@@ -221,6 +256,7 @@ impl StartStop for Decoder {
 
     fn begin(&mut self, start: i64) {
         self.begin = Some(start);
+        self.early = Some(start + LATE_ANSWER);
     }
 
     fn field(&mut self, field: &LineField, out: &mut dyn Sink) -> io::Result<()> {
@@ -241,7 +277,7 @@ impl StartStop for Decoder {
                 self.give_up(field.start, true, out)?;
             }
         }
-        self.open.push(field);
+        self.open.push(field, self.bit);
         let whole = self.pending.is_some_and(|pending| {
             self.open.broken.is_none() && self.open.fields == pending.answer_fields(self.open.first())
         });
@@ -284,13 +320,14 @@ impl StartStop for Decoder {
             let request = self.pending.is_none()
                 && self.open.data_id().is_ok_and(|id| self.open.fields == usize::from(id.request_fields()));
             if recent && !request {
+                self.clear(out)?;
                 return out.event(&Event::cut_off(self.open.place(), "a frame"));
             }
             self.close(out)?;
         }
         match self.pending.and_then(|pending| pending.end()) {
             Some(asked) if end > asked.saturating_add(ANSWER_TIMEOUT) => self.give_up(end, false, out),
-            _ => Ok(()),
+            _ => self.clear(out),
         }
     }
 }

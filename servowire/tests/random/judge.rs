@@ -6,7 +6,7 @@ use std::io;
 use servowire::capture::{Capture as Opened, Change, Line};
 use servowire::event::{Direction, Event, Value, Verdict};
 use servowire::fault::Fault;
-use servowire::output::{Lane, Output, Printer, Sink};
+use servowire::output::{Lane, Origin, Output, Printer};
 use servowire::protocols::{Protocol, Settings};
 
 use super::speech::Expect;
@@ -41,31 +41,23 @@ impl Line for Memory {
 #[derive(Default)]
 struct Keep {
     lanes: Vec<(Lane, Vec<Event>)>,
-    lane: usize,
 }
 
-impl Sink for Keep {
-    fn event(&mut self, event: &Event) -> io::Result<()> {
-        self.lanes[self.lane].1.push(event.clone());
-        Ok(())
+impl Keep {
+    fn lanes(&mut self, origin: &Origin) {
+        self.lanes.extend(origin.lanes.iter().skip(self.lanes.len()).map(|lane| (lane.clone(), Vec::new())));
     }
 }
 
 impl Printer for Keep {
-    fn begin(&mut self, _: &str) -> io::Result<()> {
+    fn event(&mut self, origin: &Origin, event: &Event) -> io::Result<()> {
+        self.lanes(origin);
+        self.lanes[origin.speaks].1.push(event.clone());
         Ok(())
     }
 
-    fn begin_lane(&mut self, lane: &Lane) -> io::Result<()> {
-        self.lanes.push((lane.clone(), Vec::new()));
-        Ok(())
-    }
-
-    fn lane(&mut self, lane: usize) {
-        self.lane = lane;
-    }
-
-    fn end(&mut self) -> io::Result<()> {
+    fn end(&mut self, origin: &Origin) -> io::Result<()> {
+        self.lanes(origin);
         Ok(())
     }
 }
@@ -93,11 +85,12 @@ pub fn decode(capture: &Capture) -> (Vec<(Lane, Vec<Event>)>, String) {
     let mut keep = Keep::default();
     let said = RefCell::new(String::new());
     let notes = |text: &str| said.borrow_mut().extend([text, "\n"]);
-    let mut out = Output::new(&mut keep, None, &|| (), &notes);
+    let mut out = Output::new("x", &mut keep, &|| (), &notes);
     let opened = Opened::Edges(Box::new(memory));
     if let Err(stop) = Protocol::Auto.decode("x", opened, &Settings::default(), &mut out) {
         said.borrow_mut().push_str(&stop.to_string());
     }
+    out.end().unwrap();
     (keep.lanes, said.into_inner())
 }
 

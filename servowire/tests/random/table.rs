@@ -66,21 +66,21 @@ pub struct Row {
     pub captures: u32,
     pub right: u32,
     pub wrong: usize,
-    pub first: Option<(u64, String, String)>,
+    /// Those that are not right: seed, why, what was said.
+    pub faults: Vec<(u64, String, String)>,
 }
 
 /// Draws `captures` captures under a condition.
 pub fn row(condition: &Condition, kind: Kind, captures: u32) -> Row {
-    let mut row = Row { condition: condition.name, kind, captures, right: 0, wrong: 0, first: None };
+    let mut row = Row { condition: condition.name, kind, captures, right: 0, wrong: 0, faults: Vec::new() };
     for k in 0..u64::from(captures) {
         let seed = k * 7919 + condition.name.len() as u64 * 104_729 + kind as u64 * 31;
         let scene = (condition.scene)(&mut Rng::new(seed ^ 0x5eed));
-        // A half-duplex bus alone has a transmit signal of its own; the pair of DSL is one wire for both.
         let outcome = judge(&capture(kind, &scene, seed), scene.inside);
         row.right += u32::from(outcome.right);
         row.wrong += outcome.wrong;
-        if !outcome.right && row.first.is_none() {
-            row.first = Some((seed, outcome.why, outcome.notes));
+        if !outcome.right {
+            row.faults.push((seed, outcome.why, outcome.notes));
         }
     }
     row

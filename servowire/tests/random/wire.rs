@@ -9,6 +9,8 @@ use super::{dsl, speech};
 pub struct Scene {
     /// Samples a bit; none for exact times.
     pub samples: Option<(f64, f64)>,
+    /// The nominal rate in bits a second; none for any of the protocol's.
+    pub nominal: Option<f64>,
     /// Both rates, and that of the encoder alone, off by up to so many parts.
     pub rate: f64,
     pub encoder: f64,
@@ -38,6 +40,7 @@ impl Scene {
     pub fn clean() -> Self {
         Self {
             samples: None,
+            nominal: None,
             rate: 0.0,
             encoder: 0.0,
             inverted: false,
@@ -98,7 +101,7 @@ pub fn capture(kind: Kind, scene: &Scene, seed: u64) -> Capture {
     let mut end = 0.0_f64;
     for k in 0..scene.encoders {
         let kind = if k == 0 { kind } else { rng.pick(&Kind::ALL) };
-        let nominal = 1e12 / rng.pick(kind.rates());
+        let nominal = 1e12 / scene.nominal.unwrap_or_else(|| rng.pick(kind.rates()));
         let off = |rng: &mut Rng, part: f64| 1.0 + rng.between(-part, part);
         let controller = nominal * off(&mut rng, scene.rate);
         let encoder = if scene.encoder > 0.0 { nominal * off(&mut rng, scene.encoder) } else { controller };
@@ -106,8 +109,9 @@ pub fn capture(kind: Kind, scene: &Scene, seed: u64) -> Capture {
         end = end.max(over);
         let begin = if scene.inside { inside(&said, &mut rng) } else { 0.0 };
         let whole = said.iter().filter(|speech| speech.start >= begin);
-        // An answer of DSL cannot be told without its head.
-        let behind = whole.skip_while(|speech| kind == Kind::Dsl && speech.side == Side::Encoder);
+        // An answer of DSL cannot be told without its head, nor that nobody answers without the request.
+        let behind =
+            whole.skip_while(|speech| speech.side == Side::Encoder && (kind == Kind::Dsl || speech.edges.is_empty()));
         let events: Vec<Expect> = behind.filter_map(|speech| speech.expect.clone()).collect();
         let line = |side: &dyn Fn(Side) -> bool| -> Vec<(f64, bool)> {
             let edges = said.iter().filter(|speech| side(speech.side)).flat_map(|speech| speech.edges.iter().copied());
@@ -166,7 +170,9 @@ fn conversation(
     let mut place = |speech: Speech, now: &mut f64| {
         *now += speech.pause * nominal;
         let bit = if speech.side == Side::Controller { controller } else { encoder };
-        let start = *now;
+        // The head of a frame of DSL is whole without the TRAILER before it.
+        let trailer = if kind == Kind::Dsl && speech.bits.len() == 32 { 6.0 } else { 0.0 };
+        let start = *now + trailer * bit;
         let mut edges = Vec::new();
         let mut level = true;
         for next in &speech.bits {

@@ -34,7 +34,7 @@ pub(super) fn number(text: &[u8], comma: bool) -> Option<f64> {
 }
 
 /// A time in parts of a second (`divisor` of them) in picoseconds.
-pub(super) fn time(text: &str, divisor: i64) -> Option<i64> {
+pub(in crate::capture) fn time(text: &str, divisor: i64) -> Option<i64> {
     let text = text.trim();
     if let Some(time) = time::from_decimal(text) {
         return Some(if divisor == 1 { time } else { time.saturating_add(time.signum() * divisor / 2) / divisor });
@@ -47,7 +47,7 @@ pub(super) fn time(text: &str, divisor: i64) -> Option<i64> {
 
 /// `2022-06-24T18:51:08.852112100+00:00` in picoseconds of a day count that wraps after some weeks, which is longer than
 /// any capture.
-pub(super) fn date(text: &str) -> Option<i64> {
+pub(in crate::capture) fn date(text: &str) -> Option<i64> {
     let (day, clock) = text.trim().split_once(['T', ' '])?;
     let mut parts = day.splitn(3, '-').map(str::parse::<i64>);
     let (year, month, day) = (parts.next()?.ok()?, parts.next()?.ok()?, parts.next()?.ok()?);
@@ -71,14 +71,14 @@ pub(super) fn date(text: &str) -> Option<i64> {
 
 /// Makes levels of voltages.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Threshold {
+pub(in crate::capture) struct Threshold {
     low: f64,
     high: f64,
 }
 
 impl Threshold {
     /// Half-way between the levels of some values, or as the user has it; the hysteresis is a tenth of the swing.
-    pub(super) fn find(values: &mut [f64], said: Option<f64>) -> Self {
+    pub(in crate::capture) fn find(values: &mut [f64], said: Option<f64>) -> Self {
         values.sort_by(f64::total_cmp);
         // The few values beyond are overshoot.
         let at = |share: usize| values.get(values.len() * share / 200).copied().unwrap_or(0.0);
@@ -89,7 +89,7 @@ impl Threshold {
     }
 
     /// The level of a voltage behind another level.
-    pub(super) fn level(&self, volts: f64, before: Option<bool>) -> bool {
+    pub(in crate::capture) fn level(&self, volts: f64, before: Option<bool>) -> bool {
         match before {
             Some(true) => volts >= self.low,
             Some(false) => volts > self.high,

@@ -81,6 +81,11 @@ fn titles(line: &str, separator: u8) -> Vec<String> {
     out.into_iter().map(|cell| cell.trim().to_owned()).collect()
 }
 
+/// A remark; `#` may also be the title of a column of numbers.
+fn is_remark(line: &str) -> bool {
+    line.starts_with(';') || line.starts_with('#') && !line.starts_with("#,")
+}
+
 /// Parts of a second in a unit of time.
 fn unit(text: &str) -> Option<i64> {
     match text.trim().trim_matches(['(', ')', '[', ']']).to_ascii_lowercase().as_str() {
@@ -121,7 +126,7 @@ impl Heading {
     pub(super) fn parse(above: &[Vec<u8>], rows: &[&[u8]]) -> Option<Self> {
         let lines: Vec<String> = above.iter().map(|line| String::from_utf8_lossy(line).into_owned()).collect();
         let (remarks, lines): (Vec<&str>, Vec<&str>) =
-            lines.iter().map(String::as_str).partition(|line| line.trim_start().starts_with([';', '#']));
+            lines.iter().map(String::as_str).partition(|line| is_remark(line.trim_start()));
         let last = lines.last().copied().unwrap_or_default();
         let row = rows.first().copied().unwrap_or_default();
         let separator = separator(if row.is_empty() { last.as_bytes() } else { row });
@@ -260,7 +265,7 @@ impl Heading {
     /// Whether a column may hold a channel: it is no column of times.
     pub(super) fn may_be_channel(&self, index: usize) -> bool {
         let name = self.names.get(index).map_or("", String::as_str);
-        self.time.is_none_or(|(time, _)| time != index) && !is_time(name) && !name.eq_ignore_ascii_case("x")
+        self.time.is_none_or(|(time, _)| time != index) && !is_time(name) && !["x", "X", "#"].contains(&name)
     }
 
     /// The name of a column without its unit.
@@ -270,10 +275,10 @@ impl Heading {
         if bare.is_empty() { format!("column {}", index + 1) } else { bare.to_owned() }
     }
 
-    /// How the times are known, now that rows are there.
-    pub(super) fn times(&self, rows: &VecDeque<(u64, Vec<u8>)>) -> Option<Times> {
+    /// How the times are known, now that rows are there, and whether they fall.
+    pub(super) fn times(&self, rows: &VecDeque<(u64, Vec<u8>)>) -> Option<(Times, bool)> {
         if let Some(fixed) = self.fixed {
-            return Some(fixed);
+            return Some((fixed, false));
         }
         let (index, divisor) = self.time?;
         let stamp = |row: &[u8]| {
@@ -282,16 +287,20 @@ impl Heading {
         };
         let first = rows.front().map(|(_, row)| row.as_slice()).unwrap_or_default();
         if self.split(first).get(index).is_some_and(|cell| is_date(cell)) {
-            return Some(Times::Dates { index });
+            return Some((Times::Dates { index }, false));
         }
         let stamps: Vec<i64> = rows.iter().filter_map(|(_, row)| stamp(row)).collect();
-        let repeated = stamps.windows(2).filter(|pair| matches!(pair, [a, b] if a == b)).count();
-        Some(match (stamps.first(), stamps.last()) {
+        let pairs =
+            |is: fn(i64, i64) -> bool| stamps.windows(2).filter(|pair| matches!(pair, [a, b] if is(*a, *b))).count();
+        // A row or two may be mistaken.
+        let falls = stamps.len() > 8 && pairs(|a, b| a > b) > 2 * pairs(|a, b| a < b);
+        let times = match (stamps.first(), stamps.last()) {
             // Stamps with too few digits: the rows are taken at equal distances.
-            (Some(first), Some(last)) if 4 * repeated > stamps.len() && stamps.len() > 64 => {
+            (Some(first), Some(last)) if 4 * pairs(|a, b| a == b) > stamps.len() && stamps.len() > 64 => {
                 Times::Steps { start: *first, period: (last - first) as f64 / (stamps.len() - 1) as f64 }
             }
             _ => Times::Column { index, divisor },
-        })
+        };
+        Some((times, falls))
     }
 }

@@ -9,21 +9,32 @@ use crate::line::{Rates, Spikes};
 
 /// Longest run that is taken bit by bit; a longer one is a pause.
 pub(super) const PAUSE: u64 = 200;
-/// A speaker's bit may be so far from the nominal one.
-const OFF: f64 = 0.06;
-/// How much an edge moves the grid, and the bit length for a run of one bit.
-const FOLLOW: f64 = 0.5;
-const ADAPT: f64 = 0.06;
-/// An edge so far from the grid, in bits, is that of another speaker.
-const ELSEWHERE: f64 = 0.3;
+/// A speaker's bit may be so far from the nominal one, in per cent.
+const OFF: i64 = 6;
+/// An edge so far from the grid, in per cent of a bit, is that of another speaker.
+const ELSEWHERE: i64 = 30;
+/// Parts of a picosecond, in binary digits, in which the length of a bit is kept, and parts of a bit.
+const FINE: u32 = 16;
+const PART: u32 = 40;
+/// How much the distance of an edge from the grid moves the bit length, in parts of a picosecond, by the bits of the run
+/// before it: 0.06 of it behind one bit. Longer runs than these tell nothing.
+const ADAPT: [i64; 11] = {
+    const ONE: i64 = (6 << FINE) / 100;
+    [0, ONE, ONE / 2, ONE / 3, ONE / 4, ONE / 5, ONE / 6, ONE / 7, ONE / 8, ONE / 9, ONE / 10]
+};
 
 /// Bits of the line. The grid follows the edges of whoever drives.
 pub(super) struct Bits {
     spikes: Spikes,
-    nominal: f64,
-    bit: f64,
+    /// The nominal length in picoseconds, and in parts of them.
+    nominal: i64,
+    fine: i64,
+    /// The present length in parts of a picosecond, and its inverse as it was not long ago.
+    bit: i64,
+    inverse: i64,
+    inverse_of: i64,
     /// Where the grid has the last edge, and the level since.
-    last: Option<(f64, bool)>,
+    last: Option<(i64, bool)>,
     /// 64 bits each, the first in bit 0.
     words: Vec<u64>,
     /// Number of the first bit in `words`, a multiple of 64, and of the one behind the last.
@@ -33,28 +44,72 @@ pub(super) struct Bits {
     marks: Vec<(u64, i64)>,
     /// Bit behind a pause too long for its bits to be kept.
     pub(super) paused: Option<u64>,
-    pub(super) rates: Rates,
+    heard: Heard,
+}
+
+/// What was heard of the line: edges, spikes, and bit lengths in parts of a picosecond.
+#[derive(Debug, Clone, Copy)]
+struct Heard {
+    edges: u64,
+    spikes: u64,
+    least: i64,
+    most: i64,
+    sum: i128,
+    count: u32,
 }
 
 impl Bits {
     pub(super) fn new(bit: f64) -> Self {
-        Self {
+        let mut bits = Self {
             spikes: Spikes::new(bit),
-            nominal: bit,
-            bit,
+            nominal: bit as i64,
+            fine: (bit * f64::from(1 << FINE)) as i64,
+            bit: (bit * f64::from(1 << FINE)) as i64,
+            inverse: 0,
+            inverse_of: 0,
             last: None,
             words: Vec::new(),
             first: 0,
             end: 0,
             marks: Vec::new(),
             paused: None,
-            rates: Rates::default(),
-        }
+            heard: Heard { edges: 0, spikes: 0, least: i64::MAX, most: 0, sum: 0, count: 0 },
+        };
+        bits.invert();
+        bits
     }
 
+    /// Length of a bit in picoseconds.
+    fn length(&self) -> f64 {
+        self.bit as f64 / f64::from(1 << FINE)
+    }
+
+    /// Half a bit in picoseconds.
+    pub(super) fn half(&self) -> i64 {
+        self.nominal / 2
+    }
+
+    fn invert(&mut self) {
+        self.inverse_of = self.bit;
+        self.inverse = (1_i64 << (PART + FINE)) / self.bit.max(1);
+    }
+
+    /// What was measured of the line.
+    pub(super) fn rates(&self) -> Rates {
+        let Heard { edges, spikes, least, most, sum, count } = self.heard;
+        let share = |bit: f64| self.fine as f64 / bit;
+        let mut rates = Rates::of(edges, spikes);
+        if count > 0 {
+            rates.measured(share(sum as f64 / f64::from(count)));
+            (rates.least, rates.most) = (share(most as f64), share(least as f64));
+        }
+        rates
+    }
+
+    #[inline]
     pub(super) fn change(&mut self, time: i64, level: bool) {
         if self.last.is_none() {
-            self.last = Some((time as f64, level));
+            self.last = Some((time, level));
             self.marks.push((0, time));
         }
         for edge in self.spikes.change(time, level) {
@@ -71,32 +126,38 @@ impl Bits {
 
     /// The capture ends at `time`; the last level is held for some bits so that what it began can be read.
     pub(super) fn finish(&mut self, time: i64, hold: f64) {
-        self.reach(time.saturating_add(self.bit as i64));
+        self.reach(time.saturating_add(self.length() as i64));
         if let Some((since, level)) = self.last {
-            let until = (time as f64).max(since + hold * self.bit);
-            let count = ((until - since) / self.bit).round().max(0.0) as u64;
+            let until = time.max(since.saturating_add((hold * self.length()) as i64));
+            let count = ((until - since) as f64 / self.length()).round().max(0.0) as u64;
             self.push(level, count.min(PAUSE));
             self.last = None;
         }
     }
 
+    #[inline]
     fn edge(&mut self, time: i64, level: bool, spikes: u32) {
-        self.rates.count_edge(spikes);
+        self.heard.edges += 1;
+        self.heard.spikes += u64::from(spikes);
         let Some((since, before)) = self.last else { return };
-        let run = (time as f64 - since) / self.bit;
-        let count = run.round().max(0.0);
-        let off = run - count;
-        let place = if count > 20.0 || off.abs() > ELSEWHERE {
-            time as f64
-        } else {
-            if count > 0.0 {
-                self.bit += ADAPT * off * self.bit / count;
-                self.bit = self.bit.clamp(self.nominal * (1.0 - OFF), self.nominal * (1.0 + OFF));
-                self.rates.measured(self.nominal / self.bit);
+        let run = time.saturating_sub(since);
+        let longest = (PAUSE as i64 + 50) * self.nominal;
+        if run >= longest {
+            self.pause(time, before, level);
+            return;
+        }
+        // Half a bit, where another speaker begins, always goes the same way.
+        let count = (run * self.inverse + (1 << (PART - 1)) - (1 << (PART - 6))) >> PART;
+        let off = run - ((count * self.bit + (1 << (FINE - 1))) >> FINE);
+        let place = match usize::try_from(count).ok().and_then(|count| ADAPT.get(count)) {
+            Some(part) if off.abs() * 100 <= ELSEWHERE * self.nominal => {
+                self.adapt(off * part);
+                // The grid follows half-way.
+                time - (off >> 1)
             }
-            time as f64 - off * self.bit * (1.0 - FOLLOW)
+            _ => time,
         };
-        let count = count as u64;
+        let count = count.max(0) as u64;
         if count > PAUSE {
             self.paused = Some(self.end + PAUSE);
         }
@@ -105,7 +166,38 @@ impl Bits {
         self.marks.push((self.end, time));
     }
 
+    /// An edge behind a pause.
+    #[cold]
+    fn pause(&mut self, time: i64, before: bool, level: bool) {
+        self.paused = Some(self.end + PAUSE);
+        self.push(before, PAUSE);
+        self.last = Some((time, level));
+        self.marks.push((self.end, time));
+    }
+
+    /// The bit becomes longer by so many parts of a picosecond.
+    #[inline]
+    fn adapt(&mut self, parts: i64) {
+        let most = self.fine / 100 * OFF;
+        self.bit = (self.bit + parts).clamp(self.fine - most, self.fine + most);
+        if (self.bit - self.inverse_of).abs() > self.fine >> 11 {
+            self.invert();
+        }
+        self.heard.least = self.heard.least.min(self.bit);
+        self.heard.most = self.heard.most.max(self.bit);
+        self.heard.sum += i128::from(self.bit);
+        self.heard.count = self.heard.count.saturating_add(1);
+    }
+
     fn push(&mut self, level: bool, count: u64) {
+        let used = self.end % 64;
+        if used != 0 && used + count <= 64 {
+            if let (true, Some(word)) = (level, self.words.last_mut()) {
+                *word |= (u64::MAX >> ((64 - count) & 63)) << used & if count == 0 { 0 } else { u64::MAX };
+            }
+            self.end += count;
+            return;
+        }
         let mut left = count;
         while left > 0 {
             let used = (self.end - self.first) % 64;
@@ -147,12 +239,12 @@ impl Bits {
     pub(super) fn time(&self, at: u64) -> i64 {
         let behind = self.marks.partition_point(|(bit, _)| *bit <= at);
         let Some((bit, time)) = self.marks.get(behind.saturating_sub(1)) else { return 0 };
-        time + ((at as i64 - *bit as i64) as f64 * self.bit) as i64
+        time + ((at as i64 - *bit as i64) as f64 * self.length()) as i64
     }
 
     pub(super) fn place(&self, bits: Range<u64>) -> Place {
         let start = self.time(bits.start);
-        Place::Time { start, end: start + ((bits.end - bits.start) as f64 * self.bit) as i64 }
+        Place::Time { start, end: start + ((bits.end - bits.start) as f64 * self.length()) as i64 }
     }
 
     /// Bits before `at` are of no more interest.

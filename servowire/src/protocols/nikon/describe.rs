@@ -84,6 +84,7 @@ fn arguments(operation: Operation, fields: &mut Vec<Field>) {
 }
 
 /// What is known of the encoder.
+#[derive(Debug, Clone)]
 pub(super) struct Encoder {
     settings: Settings,
     /// By the type word, once the line has carried it.

@@ -28,6 +28,7 @@ pub(super) fn request(frame: &Frame, id: Option<DataId>, result: Result<Request,
 }
 
 /// What is known of the encoder.
+#[derive(Debug, Clone)]
 pub(super) struct Encoder {
     settings: Settings,
     /// By the last ENID on the line.

@@ -10,7 +10,7 @@ use crate::protocols::plausible;
 pub(super) const MOST_FIELDS: usize = 16;
 
 /// Twice the nominal time: what begins later and looks like a request is one, in picoseconds.
-const LATE_ANSWER: i64 = 6_000_000;
+pub(super) const LATE_ANSWER: i64 = 6_000_000;
 
 /// Fields that followed each other.
 #[derive(Debug, Clone, Copy, Default)]
@@ -41,16 +41,19 @@ impl Frame {
     pub(super) fn of_log(line: u64, bytes: &[u8]) -> Self {
         let mut frame = Self { line: Some(line), ..Self::default() };
         for &byte in bytes {
-            frame.push(&LineField { content: byte.into(), delimiter: true, start: 0, end: 0, spikes: 0, bits: 0 });
+            frame.push(&LineField { content: byte.into(), delimiter: true, start: 0, end: 0, spikes: 0, bits: 0 }, 0);
         }
         frame
     }
 
-    /// Takes a field; beyond the most it replaces the last one.
-    pub(super) fn push(&mut self, field: &LineField) {
+    /// Takes a field; beyond the most it replaces the last one. `bit`: its length in picoseconds, 0 in a log.
+    pub(super) fn push(&mut self, field: &LineField, bit: i64) {
         let k = self.fields.min(MOST_FIELDS - 1);
         if self.fields == 0 {
             self.raw = field.bits;
+        } else if field.bits != 0 && bit > 0 {
+            // Somebody seems to begin anew: what he says stands behind.
+            self.raw = plausible::joined(self.raw, field.bits, (field.start - self.start() + bit / 2) / bit);
         }
         if let (Some(byte), Some(start)) = (self.bytes.get_mut(k), self.starts.get_mut(k)) {
             *byte = (field.content & 0xff) as u8;
@@ -70,6 +73,29 @@ impl Frame {
         plausible::slipped_bit(self.raw, len, |bits| {
             Window::from_bits(bits, len).is_some_and(|line| Response::parse_line(request, line).is_ok())
         })
+    }
+
+    /// The bits of the line as long as the whole answer to `request` is.
+    fn answer_line(&self, request: Request) -> Option<(u128, u32)> {
+        let len = 10 * u32::from(request.data_id().response_fields());
+        let mask = 1_u128.checked_shl(len)?.wrapping_sub(1);
+        (self.raw != 0).then_some((self.raw & mask, len))
+    }
+
+    /// Whether one bit the other way would make a sound answer.
+    pub(super) fn is_one_bit_off(&self, request: Request) -> bool {
+        self.answer_line(request).is_some_and(|(bits, len)| {
+            let sound =
+                |bits| Window::from_bits(bits, len).is_some_and(|line| Response::parse_line(request, line).is_ok());
+            (0..len).any(|at| sound(bits ^ 1 << at))
+        })
+    }
+
+    /// Whether the line looks idle where the answer should end.
+    pub(super) fn ends_idle(&self, request: Request) -> bool {
+        let ones = |(bits, len): (u128, u32)| (bits << (128 - len)).leading_ones();
+        // The delimiter is a one by itself.
+        self.answer_line(request).map_or(0, ones) > plausible::CUT_BITS
     }
 
     /// The data ID that the first field asks for or answers.

@@ -1,0 +1,47 @@
+//! The file's unit of time.
+
+/// Turns stamps into picoseconds.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct Tick {
+    femtoseconds: u128,
+    /// The unit, where it is whole picoseconds.
+    picoseconds: Option<i64>,
+}
+
+impl Tick {
+    /// A unit in femtoseconds.
+    pub(super) fn new(femtoseconds: u128) -> Self {
+        let whole = (femtoseconds % 1000 == 0).then_some(femtoseconds / 1000);
+        Self { femtoseconds, picoseconds: whole.and_then(|unit| i64::try_from(unit).ok()) }
+    }
+
+    /// When a stamp was, in picoseconds; none beyond what 63 bits hold.
+    pub(super) fn time(self, stamp: u64) -> Option<i64> {
+        if let Some(unit) = self.picoseconds {
+            return i64::try_from(stamp).ok()?.checked_mul(unit);
+        }
+        let time = u128::from(stamp).checked_mul(self.femtoseconds)?.checked_add(500)? / 1000;
+        i64::try_from(time).ok()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn stamps_are_rounded_and_units_are_not() {
+        let times = |unit, stamp| Tick::new(unit).time(stamp);
+        assert_eq!(times(1_000_000, 17), Some(17_000));
+        assert_eq!(times(10_000, 3), Some(30));
+        // 1 fs: 499 are no picosecond, 500 are one.
+        assert_eq!([times(1, 499), times(1, 500), times(1, 1499)], [Some(0), Some(1), Some(1)]);
+        // 1 s: a hundred days are 8.64e18 ps, more than 106 do not fit.
+        let second = 1_000_000_000_000_000;
+        assert_eq!(times(second, 8_640_000), Some(8_640_000_000_000_000_000));
+        assert_eq!(
+            [times(second, 9_300_000), times(1_000, u64::MAX), times(1, u64::MAX)],
+            [None, None, Some(18_446_744_073_709_552)]
+        );
+    }
+}
