@@ -343,3 +343,57 @@ impl Line {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use sorte_proto::sync0::Variant;
+    use step_profile::{Motors, Parameters as Ramp, Profile, Speed};
+
+    use super::super::power::Power;
+    use super::super::program::Program;
+    use super::*;
+
+    /// A cycle without a frame counts once; the device gives up with the sixth.
+    #[test]
+    fn a_device_waits_for_five_missing_frames() {
+        for (cycles, missed, state) in [(1, 0, State::Exchange), (2, 1, State::Exchange), (6, 5, State::Exchange)] {
+            let mut line = running();
+            line.wait(line.now_ns + cycles * 4000);
+            let device = &line.nodes[1].device;
+            assert_eq!((device.missed_frames(), device.state()), (missed, state), "{cycles} cycles");
+        }
+        let mut line = running();
+        line.wait(line.now_ns + 7 * 4000);
+        assert_ne!(line.nodes[1].device.state(), State::Exchange);
+    }
+
+    /// Two devices that have had a hundred frames.
+    fn running() -> Line {
+        let build = Build { variant: Variant::Lossless, latency_ns: 300, write_ns: 20, tolerance_ns: 100.0 };
+        let mut line = Line::new(Setup {
+            cables_ns: vec![85; 2],
+            cycle_ns: None,
+            build,
+            crystal_ppm: 50.0,
+            drift_ppm: 0.0,
+            jitter_ns: 0.0,
+            asymmetry_ns: 0.0,
+            bit_error_rate: 0.0,
+            unplug: None,
+            driver_fault: None,
+            positions: true,
+            max_lag: 128,
+            seed: 1,
+        });
+        let ramp = Profile::new(Ramp::at(Speed::KHZ_100)).unwrap();
+        let program = Program::turns(Motors::new(3).unwrap(), vec![ramp], 50_000, 1);
+        let mut host = Host::new(Power::new(program, 2, None, 4000), 2, None, 128);
+        let mut record = Recorder::new(2, None, None, 0).unwrap();
+        let mut cycles = 0;
+        while cycles < 100 {
+            cycles += u64::from(matches!(line.step(&mut host, &mut record).unwrap(), Progress::Cycle));
+            assert_eq!(line.nodes[1].device.missed_frames(), 0);
+        }
+        line
+    }
+}
