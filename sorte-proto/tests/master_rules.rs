@@ -356,6 +356,23 @@ fn a_thousand_good_cycles_forgive_a_failure() {
         bench.master.link(false);
         assert_eq!(bench.master.state(), want, "{cycles} cycles");
     }
+    // Neither a cycle with a damaged frame nor one without a device is a good one.
+    for (heard, damaged) in [(&[1, 2][..], true), (&[1][..], false)] {
+        let mut bench = Bench::new(Config::new().with_max_failures(2).with_sync_frames(2));
+        assert!(bench.run(|_, _| None).is_err());
+        bench.now_ns = bench.run(|_, frame| Some(answer(frame, 2))).unwrap();
+        bench.cycles(999);
+        for &address in heard {
+            bench.master.device_frame(&device_frame(address)).unwrap();
+        }
+        let mut frame = device_frame(1);
+        frame[3] ^= 1;
+        assert!(!damaged || bench.master.device_frame(&frame).is_err());
+        bench.now_ns += 4000;
+        assert!(matches!(bench.master.poll(bench.now_ns), Action::Exchange { stop: false, .. }));
+        bench.master.link(false);
+        assert_eq!(bench.master.state(), State::Error, "{heard:?}");
+    }
     let mut tireless = Bench::new(Config::new());
     assert!((0..300).all(|_| tireless.run(|_, _| None).is_err()));
     assert_eq!((tireless.master.state(), counters(&tireless).retrains), (State::Idle, 300));

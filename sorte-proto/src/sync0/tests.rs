@@ -22,6 +22,26 @@ fn pulses(mut axis: Channel, words: &[u16]) -> Vec<(u64, u64)> {
     pulses
 }
 
+/// The output is disarmed and armed again when its pulse is over.
+#[test]
+fn writes_at_the_end_of_a_pulse() {
+    let mut sync0 = Sync0::default();
+    let late: Vec<_> = sync0.cmp7(StartTime::new(600)).into_iter().collect();
+    assert_eq!(late.last(), Some(&Write { register: Register::CmpCfg, value: 0x107 }));
+    let over: Vec<_> = sync0.cmp6().into_iter().map(|write| (write.register, write.value)).collect();
+    assert_eq!(over, [(Register::CmpCfg, 0x103), (Register::SyncCtrl, 2), (Register::SyncCtrl, 3)]);
+}
+
+/// A pulse that ends 3390 ns into its cycle: the published device puts CMP6 at 10 ns, as 0 would be lost in the wrap.
+#[test]
+fn cmp6_is_never_at_0() {
+    for (start, cmp6) in [(1385, 3385), (1390, 10), (1395, 5)] {
+        let mut sync0 = Sync0::new(Variant::Published);
+        let writes: Vec<_> = sync0.cmp7(StartTime::new(start)).into_iter().collect();
+        assert!(writes.contains(&Write { register: Register::Cmp6, value: cmp6 }), "{start}: {writes:?}");
+    }
+}
+
 fn requested(words: &[u16]) -> Vec<u64> {
     (1..).zip(words).filter(|(_, word)| **word != 0).map(|(n, &word)| n * 4000 + u64::from(word)).collect()
 }
