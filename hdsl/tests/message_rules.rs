@@ -2,10 +2,12 @@
 #![allow(missing_docs, clippy::unwrap_used, clippy::arithmetic_side_effects, clippy::cast_sign_loss)]
 
 use hdsl::message::{
-    Access, Data, Length, Limits, LongAnswer, LongRequest, RemoteRegister, Requester, ResourceAddress, ResourceError,
-    Responder, ShortAnswer, ShortRequest,
+    Access, Data, Length, Limits, LongAnswer, LongRequest, Offset, RemoteRegister, Requester, ResourceAddress,
+    ResourceError, Responder, ShortAnswer, ShortRequest,
 };
-use hdsl::{DeltaDelta, Doubt, EncoderSymbol, Error, MasterSymbol, Nibble, Phase, PositionBits, PositionTracker};
+use hdsl::{
+    DeltaDelta, Doubt, EncoderSymbol, Error, MasterSymbol, Nibble, Phase, PositionBits, PositionTracker, crc16,
+};
 
 const PING: RemoteRegister = RemoteRegister::PING;
 
@@ -114,6 +116,24 @@ fn a_write_without_an_offset() {
     assert_eq!(LongRequest::parse(bytes.as_bytes()), Ok(request));
 }
 
+/// OFF_H is 1 and bits 14 to 8 of the offset; without that 1 it is none.
+#[test]
+fn the_marker_of_an_offset() {
+    let request = LongRequest {
+        address: ResourceAddress::RWFILE,
+        indirect: false,
+        offset: Some(Offset::new(0x1234).unwrap()),
+        access: Access::Read(Length::from_code(1)),
+    };
+    let bytes = request.emit().as_bytes().to_vec();
+    assert_eq!(bytes[..4], [0xe5, 0x31, 0x92, 0x34]);
+    assert_eq!(LongRequest::parse(&bytes), Ok(request));
+    let mut unmarked = bytes[..2].to_vec();
+    unmarked.extend([0x12, 0x34]);
+    unmarked.extend(crc16(&unmarked).to_be_bytes());
+    assert_eq!(LongRequest::parse(&unmarked), Err(Error::ShortMessageStart { first: 0x12 }));
+}
+
 /// LLEN is two bits: 0, 2, 4, 8 bytes; data of another length do not exist.
 #[test]
 fn lengths() {
@@ -197,6 +217,25 @@ fn the_fastest_speed() {
             assert_eq!(fast, Err(Doubt::Speed));
         }
     }
+}
+
+/// Two safe positions have to agree after the velocity was corrected; one that does not is none of them.
+#[test]
+fn two_safe_positions_in_a_row() {
+    let mut tracker = PositionTracker::new(PositionBits::MAX);
+    let mut v_frame = |safe: u64| {
+        for _ in 0..8 {
+            tracker.step(Some(DeltaDelta::ZERO));
+        }
+        tracker.align(safe);
+        (tracker.phase(), tracker.fast())
+    };
+    let doubt = Err(Doubt::Alignment);
+    assert_eq!(v_frame(0), (Phase::Velocity, doubt));
+    assert_eq!(v_frame(0), (Phase::Settle, doubt));
+    assert_eq!(v_frame(5), (Phase::Check, doubt));
+    assert_eq!(v_frame(0), (Phase::Check, doubt));
+    assert_eq!(v_frame(0), (Phase::Check, Ok((0, 0))));
 }
 
 /// A safe position that does not agree begins the alignment anew.

@@ -131,6 +131,19 @@ fn check(plan: &Plan, n: u32, limits: Limits, [v0, v1]: [u32; 2]) -> Result<(), 
     Ok(())
 }
 
+/// The first steps are ten million ticks apart: more than the kernel foresees.
+#[test]
+fn steps_that_are_far_apart() {
+    for (n, speed, acceleration) in [(107, 13_346, 3_610), (300, 400_000, 1), (300, 1, 100_000_000), (20_000, 1000, 50)]
+    {
+        for hz in [1_000_000, 84_000_000, 1_000_000_000] {
+            let limits = Limits::new(speed, acceleration).unwrap();
+            let plan = Plan::new(Clock::new(hz).unwrap(), limits, n).unwrap();
+            check(&plan, n, limits, [0, 0]).unwrap();
+        }
+    }
+}
+
 /// Logarithmically spread.
 fn spread(low: f64, high: f64) -> impl Strategy<Value = f64> {
     (low.ln()..high.ln()).prop_map(f64::exp)

@@ -235,9 +235,9 @@ impl<W: Word> Cubic<W> {
     /// between the ticks that are known to be too early and late enough; if it takes long, halving.
     ///
     /// The guess is such that no sum there leaves its word: the way there is 12 steps at most, and so is the way to twice a
-    /// time that is too early.
+    /// time that is too early. So no tick is looked at that is later than that, unless it is known to be before a late one.
     pub(super) fn solve(&self, guess: u64, last: u64) -> (u64, Self) {
-        let (mut early, mut late) = (0, last.max(1));
+        let (mut early, mut late, mut is_known) = (0, last.max(1), false);
         let mut by = guess.max(1).min(late);
         let mut round = 0_u8;
         loop {
@@ -245,7 +245,7 @@ impl<W: Word> Cubic<W> {
             if next.off.is_negative() {
                 early = by;
             } else {
-                late = by;
+                (late, is_known) = (by, true);
                 if next.is_there() {
                     return (by, next);
                 }
@@ -259,7 +259,8 @@ impl<W: Word> Cubic<W> {
             let next = match newton {
                 Some(over) if over < 0 => by.saturating_add(over.unsigned_abs()).min(by.saturating_mul(2)),
                 Some(over) => by.saturating_sub(over.unsigned_abs()),
-                None => early.saturating_add(left >> 1),
+                None if is_known => early.saturating_add(left >> 1),
+                None => by.saturating_mul(2),
             };
             by = next.max(early.saturating_add(1)).min(late.saturating_sub(1));
         }
