@@ -14,7 +14,7 @@ pub struct Transmission {
     /// SYNC to PARA.
     pub head: Head,
     /// Whether an encoder answers: then the line is released after PARA, reception begins one bit later and takes
-    /// [`WINDOW`] bits. Otherwise [`FILLER`](crate::frame::FILLER) is sent.
+    /// [`WINDOW`](crate::sampling::WINDOW) bits. Otherwise [`FILLER`](crate::frame::FILLER) is sent.
     pub answered: bool,
 }
 

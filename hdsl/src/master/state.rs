@@ -66,7 +66,7 @@ pub enum Cause {
     Pattern,
     /// The identifier was damaged or is of an encoder that this receiver does not support.
     Identifier(Error),
-    /// No VSYNC within the frames that [`Dialect::vsync_frames`] allows.
+    /// No VSYNC within the frames that [`Dialect::vsync_frames`](crate::Dialect::vsync_frames) allows.
     NoVsync,
     /// The quality monitor has run out.
     Quality,
