@@ -197,6 +197,19 @@ impl Port {
 mod tests {
     use super::*;
 
+    /// What goes on changed: DISCOVERY (1) and SYNC (5) from the port of the master, and the first DISCOVERY at the last
+    /// device.
+    #[test]
+    fn frames_that_go_on_changed() {
+        let modifies = |state, flags, code| Port { state, flags }.head([255, 0, code, 0]).modifies;
+        let (none, master, last) = (PortFlags::empty(), PortFlags::MASTER_PORT, PortFlags::LAST_DEVICE);
+        for (state, code) in [(State::Discovery, 1), (State::Sync, 5)] {
+            assert!(modifies(state, master, code) && !modifies(state, none, code) && !modifies(state, last, code));
+        }
+        assert!(modifies(State::Idle, last, 1) && !modifies(State::Idle, none, 1));
+        assert!(!modifies(State::Param, master, 2) && !modifies(State::LineDelay, master, 3));
+    }
+
     /// Every state, role, TYPE and STATUS: one step forward at most, and only for the frame the state waits for.
     #[test]
     fn every_head_moves_one_step_at_most() {

@@ -42,6 +42,19 @@ fn cmp6_is_never_at_0() {
     }
 }
 
+/// The timer's registers before and after a word, and the edge that is not before its own time.
+#[test]
+fn registers_and_edges_of_the_timer() {
+    const ALL: [Register; 5] =
+        [Register::CmpCfg, Register::Cmp1, Register::Cmp6, Register::SyncStart, Register::SyncCtrl];
+    let mut axis = Channel::new(Variant::Lossless, 2000, 300);
+    assert_eq!(ALL.map(|register| axis.register(register)), [0x103, 0, 0, 0, 3]);
+    axis.set_start(StartTime::new(600));
+    assert_eq!(axis.next_edge(4595), None);
+    assert_eq!(ALL.map(|register| axis.register(register)), [0x187, 3990, 2600, 120, 2]);
+    assert_eq!(axis.next_edge(4596), Some(Edge { ns: 4595, high: true }));
+}
+
 fn requested(words: &[u16]) -> Vec<u64> {
     (1..).zip(words).filter(|(_, word)| **word != 0).map(|(n, &word)| n * 4000 + u64::from(word)).collect()
 }
