@@ -137,6 +137,22 @@ fn an_error_is_kept_until_a_status_byte_carries_it() {
     }
 }
 
+/// STATUS is the fourth byte: a frame that breaks off in front of it has carried nothing.
+#[test]
+fn an_error_is_kept_by_a_frame_without_a_status_byte() {
+    for (len, kept) in [(0, true), (3, true), (4, false)] {
+        let mut device = device_in(State::Discovery, true);
+        let mut flipped = Discovery::request(false).emit();
+        flipped[2] ^= 2;
+        assert!(device.frame(PortId::A, &mut flipped, ARRIVAL).result.is_err());
+        let mut cut = Discovery::request(false).emit();
+        assert!(device.frame(PortId::A, &mut cut[..len], ARRIVAL).result.is_err());
+        let mut next = Discovery::request(false).emit();
+        assert_eq!(device.frame(PortId::A, &mut next, ARRIVAL).result, Ok(()));
+        assert_eq!(Discovery::parse(&next).unwrap().status.contains(Status::ERROR), kept, "{len} bytes");
+    }
+}
+
 /// Type 4 is defined by the vendor and sent by nobody: whoever gets one goes on as if it had not come.
 #[test]
 fn a_delay_response_is_accepted_and_ignored() {

@@ -21,10 +21,11 @@ FIRMWARE = ROOT / "examples" / "firmware"
 RAM = 0x20000000
 BAND = 0.05
 COLUMNS = ["image", "flash", "static RAM", "stack", "instructions a cycle"]
-# Folder, target, and whether the stack is measured in a run.
+# Folder, target, and whether the stack in the README is that of a run. How deep the interrupts of the STM32F405 nest in QEMU depends on
+# the host, so its README has the bound.
 IMAGES = [
     ("rp2040", "thumbv6m-none-eabi", True),
-    ("stm32f405", "thumbv7em-none-eabihf", True),
+    ("stm32f405", "thumbv7em-none-eabihf", False),
     ("stm32g4", "thumbv7em-none-eabihf", False),
     ("rp2350-hdsl", "thumbv8m.main-none-eabihf", False),
 ]
@@ -87,15 +88,16 @@ def main():
                 path = built / name
                 is_flash, is_ram = sizes(path)
                 bound = stack.bound(objdump, path)
-                used = measured.get((name, "stack")) if runs else bound
+                ran = measured.get((name, "stack"), 0)
+                used = ran if runs else bound
                 counted = kernels[kernel]["O3"] if kernel else measured.get((name, "instructions a cycle"))
                 print(f"{name}: {is_flash} bytes of flash, {is_ram} of static RAM, {used:g} of stack (at most {bound}), {counted:g} instructions a cycle")
                 compare(f"{name}, flash", flash, is_flash)
                 compare(f"{name}, static RAM", ram, is_ram)
                 compare(f"{name}, stack", deep, used)
                 compare(f"{name}, instructions a cycle", count, counted)
-                if used > bound:
-                    faults.append(f"{name}: {used:g} bytes of stack were used, {bound} is the bound")
+                if ran > bound:
+                    faults.append(f"{name}: {ran:g} bytes of stack were used, {bound} is the bound")
         if images:
             faults.append(f"{folder}: the README has no figures of {', '.join(sorted(images))}")
         # In the text: `1,426 (`tformat_transaction`)`.
