@@ -134,6 +134,27 @@ fn weak_signals() {
     }
 }
 
+/// The SDK's firmware looks at TEST2 only where channel 1 is good.
+#[test]
+fn test_2_beside_a_bad_channel_1() {
+    let quality = |damage: u64, test_2: bool| {
+        let mut pair = Pair::running(Dialect::TI);
+        pair.to(7);
+        pair.device.faults.test_2 = test_2;
+        pair.frame(0, None);
+        pair.frame(damage, None);
+        pair.to(6);
+        pair.device.faults.test_2 = false;
+        pair.frame(0, None);
+        pair.frame(0, None);
+        pair.frame(0, None);
+        pair.master.report().quality
+    };
+    assert!(quality(0, true) < quality(0, false));
+    // The first bit of the vertical word.
+    assert_eq!(quality(1 << 60, true), quality(1 << 60, false));
+}
+
 /// Each kind of damage has its counter, and counts once.
 #[test]
 fn counters() {
