@@ -164,7 +164,7 @@ fn run(dialect: Dialect, seed: u64, frames: u64) -> Tally {
 
 #[test]
 fn hostile_frames_give_the_truth_or_nothing() {
-    let frames = std::env::var("HOSTILE_EVENTS").map_or(100_000, |text| text.parse().unwrap());
+    let frames = servowire_world::wanted_events(100_000);
     let first = std::env::var("HOSTILE_SEED").map_or(1, |text| text.parse().unwrap());
     for seed in [first, first + 1] {
         let tally = run(Dialect::SICK, seed, frames / 2);

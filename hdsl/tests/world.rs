@@ -11,7 +11,7 @@ use hdsl::master::{Master, State};
 use hdsl::message::{LongRequest, RemoteRegister, ResourceAddress, ShortRequest};
 use hdsl::sampling::WINDOW;
 use hdsl::{Answer, Dialect, EncoderId, Window};
-use servowire_world::{Bits, Event, Framing, Kind, Message, Rates, Scenario, Tally, Wire, World};
+use servowire_world::{Bits, Event, Framing, Kind, Message, Rates, Scenario, Tally, Wire, World, wanted_events};
 
 /// A bit at 9.375 MBaud, a sample of it, and an H-frame of 108 bits.
 const BIT_PS: u64 = 106_667;
@@ -153,7 +153,7 @@ const KINDS: [Kind; 8] =
 
 #[test]
 fn the_laws_hold_on_a_hostile_line() {
-    let frames = std::env::var("HOSTILE_EVENTS").map_or(20_000, |text| text.parse().unwrap());
+    let frames = wanted_events(20_000);
     let quiet = Rates { longest_ns: 30_000, ..Rates::QUIET };
     let rates = KINDS.into_iter().fold(quiet, |rates, kind| rates.with(kind, 300));
     for seed in [1, 2] {

@@ -23,7 +23,7 @@ use rtex_block::master::{
 use rtex_block::position::Gear;
 use rtex_block::timing::{Periods, TimerSystem};
 use rtex_block::{Alarm, Arguments, BlockSize, CommandBlock, MacId, NonCyclicCommand, SubCode, TypeCode, pack};
-use servowire_world::{Cable, Kind, Rates, Scenario, Tally};
+use servowire_world::{Cable, Draw, Kind, Rates, Scenario, Tally, wanted_events};
 
 const AXES: usize = 4;
 const PERIOD_NS: u64 = 500_000;
@@ -32,33 +32,21 @@ const LIMIT: u16 = 8;
 /// one for the drive to obey, three that its status may be late, and four that frames may be lost meanwhile.
 const OFF_WITHIN: u64 = LIMIT as u64 + 2 + 3 + 4;
 
-/// Numbers without a pattern (xorshift).
-struct Draw(u64);
-
-impl Draw {
-    fn below(&mut self, limit: u64) -> u64 {
-        self.0 ^= self.0 << 13;
-        self.0 ^= self.0 >> 7;
-        self.0 ^= self.0 << 17;
-        (self.0 >> 33) % limit
-    }
-
-    fn manners(&mut self) -> Manners {
-        let mut some = |limit| self.below(limit) as u16;
-        // Up to three exchanges for each flag, but Servo_Active, which has a lateness of its own at servo-off.
-        let late = core::array::from_fn(|bit| if bit == 7 { 0 } else { some(4) as u8 });
-        Manners::POLITE
-            .with_status_late(late)
-            .with_latch_late(some(4) as u8)
-            .with_echo_lag(some(4) as u8)
-            .with_in_progress_late(some(20))
-            .with_servo_off_late(some(4))
-            .with_stale_answers(some(4))
-            .with_always_busy(some(2) == 0)
-            .with_err_while_busy(some(2) == 0)
-            .with_always_in_position(some(2) == 0)
-            .with_warns(some(2) == 0)
-    }
+fn manners(draw: &mut Draw) -> Manners {
+    let mut some = |limit| draw.below(limit) as u16;
+    // Up to three exchanges for each flag, but Servo_Active, which has a lateness of its own at servo-off.
+    let late = core::array::from_fn(|bit| if bit == 7 { 0 } else { some(4) as u8 });
+    Manners::POLITE
+        .with_status_late(late)
+        .with_latch_late(some(4) as u8)
+        .with_echo_lag(some(4) as u8)
+        .with_in_progress_late(some(20))
+        .with_servo_off_late(some(4))
+        .with_stale_answers(some(4))
+        .with_always_busy(some(2) == 0)
+        .with_err_while_busy(some(2) == 0)
+        .with_always_in_position(some(2) == 0)
+        .with_warns(some(2) == 0)
 }
 
 /// One direction to or from a drive: what arrives in a period stays in the memory until something newer comes.
@@ -139,7 +127,7 @@ impl Bench {
             master,
             drives: core::array::from_fn(|place| {
                 let config = DriveConfig::new(mac_id(place), CODES).with_gear(gear(place));
-                Drive::new(config.with_manners(draw.manners()))
+                Drive::new(config.with_manners(manners(draw)))
             }),
             down: core::array::from_fn(|place| Line::new(place as u64 + 1)),
             up: core::array::from_fn(|place| Line::new(place as u64 + 100)),
@@ -231,7 +219,7 @@ impl Bench {
     fn recover(&mut self, draw: &mut Draw) {
         (self.cut, self.turned) = ([false; AXES], [false; AXES]);
         for drive in &mut self.drives {
-            drive.set_config(drive.config().with_manners(draw.manners()));
+            drive.set_config(drive.config().with_manners(manners(draw)));
             drive.set_main_power(true);
         }
         for _ in 0..20 {
@@ -279,18 +267,14 @@ impl Bench {
     }
 }
 
-fn events() -> u64 {
-    std::env::var("HOSTILE_EVENTS").ok().and_then(|text| text.parse().ok()).unwrap_or(100_000)
-}
-
 #[test]
 fn hostile_every_servo_is_off_in_time() {
-    let mut draw = Draw(0x9e37_79b9_7f4a_7c15);
+    let (wanted, mut draw) = (wanted_events(100_000), Draw::default());
     let mut bench = Bench::new(&mut draw);
     let mut faults = [0_u32; 8];
     let mut spurious = 0_u32;
     bench.recover(&mut draw);
-    while bench.now < events() {
+    while bench.now < wanted {
         for _ in 0..30 + draw.below(300) {
             bench.work(&mut draw);
             bench.update();
@@ -328,5 +312,5 @@ fn hostile_every_servo_is_off_in_time() {
     let mut tally = Tally::default();
     bench.down.iter().chain(&bench.up).for_each(|line| tally.add(&line.cable.tally));
     println!("{} update periods, faults by kind {faults:?}, stops by the lines {spurious}\n{tally}", bench.now);
-    assert!(events() < 50_000 || faults.iter().all(|&n| n > 0), "{faults:?}");
+    assert!(wanted < 50_000 || faults.iter().all(|&n| n > 0), "{faults:?}");
 }

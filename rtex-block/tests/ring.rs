@@ -17,6 +17,7 @@ use rtex_block::device::{Drive, DriveConfig, OpenCodes};
 use rtex_block::master::{ActiveCode, Axis, AxisConfig, AxisState, Limits, Received, Ring};
 use rtex_block::position::step;
 use rtex_block::{Alarm, Command, CommandBlock, MacId, Response};
+use servowire_world::Draw;
 
 const AXES: usize = 32;
 const LIMIT: u16 = 8;
@@ -166,18 +167,6 @@ impl Bench {
     }
 }
 
-/// Numbers without a pattern (xorshift).
-struct Draw(u64);
-
-impl Draw {
-    fn below(&mut self, limit: usize) -> usize {
-        self.0 ^= self.0 << 13;
-        self.0 ^= self.0 >> 7;
-        self.0 ^= self.0 << 17;
-        (self.0 >> 33) as usize % limit
-    }
-}
-
 #[test]
 fn starts_moves_and_stops() {
     let mut bench = Bench::new(20);
@@ -208,16 +197,17 @@ fn start_move_and_stop(bench: &mut Bench) {
 fn after_every_fault_every_servo_is_off_in_time() {
     let periods = 40_000;
     let mut bench = Bench::new(5);
-    let mut draw = Draw(0x9e37_79b9_7f4a_7c15);
+    let mut draw = Draw::default();
+    let mut below = |limit: usize| draw.below(limit as u64) as usize;
     let mut faults = [0_u32; 12];
     bench.switch_on();
     while bench.now < periods {
-        for _ in 0..20 + draw.below(400) {
+        for _ in 0..20 + below(400) {
             bench.command_motion();
             bench.update();
             assert_eq!(bench.ring.failure(), None, "at {}", bench.now);
         }
-        let (k, kind) = (draw.below(AXES), draw.below(faults.len()));
+        let (k, kind) = (below(AXES), below(faults.len()));
         faults[kind] += 1;
         if kind < 3 {
             // Too short to matter: one update period without a response, or with a command that is thrown away.

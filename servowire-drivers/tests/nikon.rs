@@ -13,7 +13,7 @@ mod frames;
 mod hostile;
 
 use frames::{Bench, Port, Shared, deliveries, host, line, scenario, shaft};
-use hostile::Calls;
+use hostile::live_through;
 use nikon_aformat::bus::Addresses;
 use nikon_aformat::master::Cycle;
 use nikon_aformat::{EncoderAddress, Operation, Policy, Resolution};
@@ -67,27 +67,23 @@ fn any_fault_is_over_with_the_next_call() {
 /// No value older than its request, and no good answer lost, whatever has happened before.
 #[test]
 fn hostile_events_are_survived() {
-    let (mut calls, mut seed) = (Calls::default(), 0);
-    while calls.go_on() {
+    live_through(|calls, seed| {
         let bench = Bench::with(scenario(seed, 1, deliveries()[seed as usize % 3]), 1, true);
         let mut encoder = driver(&bench);
         for call in 0..100 {
             let result = encoder.read_abs40(EncoderAddress::ZERO).map(|reading| shaft(reading.response));
             assert!(!matches!(result, Err(Error::Closed | Error::NeverQuiet)), "seed {seed}, call {call}: {result:?}");
-            bench.borrow_mut().judge(&mut calls, Some(result), seed, call);
+            bench.borrow_mut().judge(calls, Some(result), seed, call);
         }
-        calls.tally.add(bench.borrow().world.tally());
-        seed += 1;
-    }
-    calls.end();
+        *bench.borrow().world.tally()
+    });
 }
 
 /// The same for three encoders at once: what comes whole of one is not lost, whatever becomes of the others.
 #[test]
 fn hostile_events_on_a_bus_are_survived() {
     let asked = Addresses::first(3);
-    let (mut calls, mut seed) = (Calls::default(), 0);
-    while calls.go_on() {
+    live_through(|calls, seed| {
         let bench = Bench::with(scenario(seed, 3, Delivery::Each), 3, true);
         let mut bus = driver(&bench);
         for call in 0..100 {
@@ -96,15 +92,13 @@ fn hostile_events_on_a_bus_are_survived() {
                 let value = answers.reading(ea).map(|reading| shaft(reading.response)).ok_or("missing");
                 // Somebody repeats an old answer: which one is the encoder's is not known, so none is given.
                 if value.is_ok() || !answers.bus().duplicates().has(ea) {
-                    bench.borrow().judge_one(&mut calls, ea.get(), value, seed, call);
+                    bench.borrow().judge_one(calls, ea.get(), value, seed, call);
                 }
             }
             bench.borrow_mut().end_call();
         }
-        calls.tally.add(bench.borrow().world.tally());
-        seed += 1;
-    }
-    calls.end();
+        *bench.borrow().world.tally()
+    });
 }
 
 /// Bytes one by one, in DMA blocks, at idle: the values are the same.

@@ -15,7 +15,7 @@ mod hostile;
 mod polls;
 
 use frames::{Bench, Port, Shared, deliveries, line, scenario, shaft};
-use hostile::Calls;
+use hostile::live_through;
 use nikon_aformat::bus::Addresses;
 use nikon_aformat::{EncoderAddress, Operation, Resolution};
 use polls::{FOR_EVER, run};
@@ -85,8 +85,7 @@ fn a_future_of_a_bus_may_be_dropped_at_any_point() {
 /// No value older than its request, and no good answer lost, whatever has happened before: calls that were dropped among it.
 #[test]
 fn hostile_events_are_survived() {
-    let (mut calls, mut seed) = (Calls::default(), 0);
-    while calls.go_on() {
+    let calls = live_through(|calls, seed| {
         let bench = Bench::with(scenario(seed, 1, deliveries()[seed as usize % 3]), 1, true);
         let mut encoder = driver(&bench);
         for call in 0..100_usize {
@@ -94,12 +93,10 @@ fn hostile_events_are_survived() {
             let outcome = run(encoder.read_abs40(EncoderAddress::ZERO), polls);
             let outcome = outcome.map(|result| result.map(|reading| shaft(reading.response)));
             assert!(!matches!(outcome, Some(Err(Error::Closed | Error::NeverQuiet))), "seed {seed}, call {call}");
-            bench.borrow_mut().judge(&mut calls, outcome, seed, call);
+            bench.borrow_mut().judge(calls, outcome, seed, call);
         }
-        calls.tally.add(bench.borrow().world.tally());
-        seed += 1;
-    }
-    calls.end();
+        *bench.borrow().world.tally()
+    });
     assert!(calls.dropped > 1_000);
 }
 
@@ -107,8 +104,7 @@ fn hostile_events_are_survived() {
 #[test]
 fn hostile_events_on_a_bus_are_survived() {
     let asked = Addresses::first(3);
-    let (mut calls, mut seed) = (Calls::default(), 0);
-    while calls.go_on() {
+    let calls = live_through(|calls, seed| {
         let bench = Bench::with(scenario(seed, 3, Delivery::Each), 3, true);
         let mut bus = driver(&bench);
         for call in 0..100_usize {
@@ -119,14 +115,12 @@ fn hostile_events_on_a_bus_are_survived() {
                 let value = answers.reading(ea).map(|reading| shaft(reading.response)).ok_or("missing");
                 // Somebody repeats an old answer: which one is the encoder's is not known, so none is given.
                 if value.is_ok() || !answers.bus().duplicates().has(ea) {
-                    bench.borrow().judge_one(&mut calls, ea.get(), value, seed, call);
+                    bench.borrow().judge_one(calls, ea.get(), value, seed, call);
                 }
             }
             bench.borrow_mut().end_call();
         }
-        calls.tally.add(bench.borrow().world.tally());
-        seed += 1;
-    }
-    calls.end();
+        *bench.borrow().world.tally()
+    });
     assert!(calls.dropped > 1_000);
 }

@@ -29,6 +29,7 @@ use rtex_block::timing::{Periods, TimerSystem};
 use rtex_block::{BlockSize, MacId};
 use servowire_drivers::Error;
 use servowire_drivers::rtex::Driver;
+use servowire_world::{Draw, wanted_events};
 
 const LIMIT: u16 = 6;
 
@@ -243,27 +244,8 @@ fn silence_switches_every_servo_off() {
     }
 }
 
-/// Random numbers.
-struct Draw(u64);
-
-impl Draw {
-    fn new() -> Self {
-        Self(0x9e37_79b9_7f4a_7c15)
-    }
-
-    fn below(&mut self, limit: u64) -> u64 {
-        self.0 ^= self.0 << 13;
-        self.0 ^= self.0 >> 7;
-        self.0 ^= self.0 << 17;
-        (self.0 >> 33) % limit
-    }
-}
-
 /// Faults that the driver has to survive; the environment may want more.
-fn faults() -> u64 {
-    let wanted = std::env::var("HOSTILE_EVENTS").ok().and_then(|events| events.parse().ok()).unwrap_or(0);
-    wanted.max(100_000)
-}
+const FAULTS: u64 = 100_000;
 
 /// Faults of the port, lost frames and stalls.
 const KINDS: usize = 3;
@@ -301,9 +283,9 @@ fn is_well<C: servowire_drivers::Clock>(
 /// fault, so the one after that gives every position again, and they are those of the last frames.
 #[test]
 fn hostile_events_are_over_with_the_next_call() {
-    let mut draw = Draw::new();
+    let mut draw = Draw::default();
     let (mut count, mut kinds) = (0, [0_u64; KINDS]);
-    while count < faults() {
+    while count < wanted_events(FAULTS).max(FAULTS) {
         let external = draw.below(2) == 1;
         let ring = Ring::new(external, draw.below(2) == 1);
         let mut driver = on::<u32>(&ring);
@@ -323,7 +305,7 @@ fn hostile_events_are_over_with_the_next_call() {
         }
     }
     println!("{kinds:?}");
-    assert!(count >= 100_000 && kinds.iter().all(|kind| *kind > count / 4));
+    assert!(count >= FAULTS && kinds.iter().all(|kind| *kind > count / 4));
 }
 
 /// The pin of XSYNC: an edge at each frame, but for those that are lost.
@@ -473,9 +455,9 @@ mod asynch {
     /// again.
     #[test]
     fn hostile_events_are_over_with_the_next_call() {
-        let mut draw = Draw::new();
+        let mut draw = Draw::default();
         let (mut count, mut kinds) = (0, [0_u64; KINDS + 2]);
-        while count < faults() {
+        while count < wanted_events(FAULTS).max(FAULTS) {
             let ring = Ring::new(false, draw.below(2) == 1);
             let mut driver = waiting::<u32, _>(&ring, Steps);
             let mut pin = Pin { ring: ring.clone(), lost: false, late_ns: 0 };
@@ -501,6 +483,6 @@ mod asynch {
             }
         }
         println!("{kinds:?}");
-        assert!(count >= 100_000 && kinds.iter().all(|kind| *kind > count / 6));
+        assert!(count >= FAULTS && kinds.iter().all(|kind| *kind > count / 6));
     }
 }

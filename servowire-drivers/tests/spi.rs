@@ -17,7 +17,7 @@ mod hostile;
 mod polls;
 mod sampler;
 
-use hostile::Calls;
+use hostile::live_through;
 use nikon_aformat::{EncoderAddress, Resolution};
 use sampler::Spi;
 use servowire_drivers::samples::Order;
@@ -107,20 +107,17 @@ fn any_fault_is_over_with_the_next_call() {
 /// No value is older than its request, and no good answer is lost, whatever has happened before.
 #[test]
 fn hostile_events_are_survived() {
-    let (mut calls, mut seed) = (Calls::default(), 0);
-    while calls.go_on() {
+    live_through(|calls, seed| {
         let bench = bench::Bench::new(bench::sampled_scenario(seed), bench::Misframed::Dropped);
         let mut buffers = ([0; 48], [0; 160]);
         let port = uart(&bench, seed % 2 == 0, 8, &mut buffers);
         let mut encoder = tformat::blocking::Encoder::new(port, Automatic, bench::Watch(bench.clone()), tformat_line());
         for call in 0..100 {
             let result = encoder.read_all().map(|all| all.abs.get());
-            bench.borrow_mut().judge(&mut calls, Some(result), seed, call);
+            bench.borrow_mut().judge(calls, Some(result), seed, call);
         }
-        calls.tally.add(&bench.borrow().tally());
-        seed += 1;
-    }
-    calls.end();
+        bench.borrow().tally()
+    });
 }
 
 type Frames<'b> = SpiFrames<'b, Spi<frames::Shared>, Automatic, frames::Port>;
@@ -178,8 +175,7 @@ fn faults_of_aformat_are_over_with_the_next_call() {
 /// The same for A-format.
 #[test]
 fn hostile_events_of_aformat_are_survived() {
-    let (mut calls, mut seed) = (Calls::default(), 0);
-    while calls.go_on() {
+    live_through(|calls, seed| {
         let bench = frames::Bench::with(frames::scenario(seed, 1, Delivery::Each), 1, false);
         let mut buffers = ([0; 96], [0; 400]);
         let port = frame_port(&bench, 8, &mut buffers);
@@ -187,12 +183,10 @@ fn hostile_events_of_aformat_are_survived() {
         let mut master = nikon::blocking::Master::new(port, clock, Resolution::default(), frames::line());
         for call in 0..100 {
             let result = master.read_abs40(EncoderAddress::ZERO).map(|reading| frames::shaft(reading.response));
-            bench.borrow_mut().judge(&mut calls, Some(result), seed, call);
+            bench.borrow_mut().judge(calls, Some(result), seed, call);
         }
-        calls.tally.add(bench.borrow().world.tally());
-        seed += 1;
-    }
-    calls.end();
+        *bench.borrow().world.tally()
+    });
 }
 
 #[cfg(feature = "async")]
@@ -252,27 +246,23 @@ mod asynch {
     /// As the blocking ones; every fourth call may be dropped.
     #[test]
     fn hostile_events_are_survived() {
-        let (mut calls, mut seed) = (Calls::default(), 0);
-        while calls.go_on() {
+        let calls = live_through(|calls, seed| {
             let bench = bench::Bench::new(bench::sampled_scenario(seed), bench::Misframed::Dropped);
             let mut buffers = ([0; 48], [0; 160]);
             let mut encoder = encoder(&bench, &mut buffers);
             for call in 0..100_usize {
                 let polls = if call % 4 == 3 { call * 4 + seed as usize % 4 } else { FOR_EVER };
                 let outcome = run(encoder.read_all(), polls).map(|result| result.map(|all| all.abs.get()));
-                bench.borrow_mut().judge(&mut calls, outcome, seed, call);
+                bench.borrow_mut().judge(calls, outcome, seed, call);
             }
-            calls.tally.add(&bench.borrow().tally());
-            seed += 1;
-        }
-        calls.end();
+            bench.borrow().tally()
+        });
         assert!(calls.dropped > 1_000);
     }
 
     #[test]
     fn hostile_events_of_aformat_are_survived() {
-        let (mut calls, mut seed) = (Calls::default(), 0);
-        while calls.go_on() {
+        let calls = live_through(|calls, seed| {
             let bench = frames::Bench::with(frames::scenario(seed, 1, Delivery::Each), 1, false);
             let mut buffers = ([0; 96], [0; 400]);
             let mut master = master(&bench, &mut buffers);
@@ -280,12 +270,10 @@ mod asynch {
                 let polls = if call % 4 == 3 { call * 8 + seed as usize % 8 } else { FOR_EVER };
                 let outcome = run(master.read_abs40(EncoderAddress::ZERO), polls);
                 let outcome = outcome.map(|result| result.map(|reading| frames::shaft(reading.response)));
-                bench.borrow_mut().judge(&mut calls, outcome, seed, call);
+                bench.borrow_mut().judge(calls, outcome, seed, call);
             }
-            calls.tally.add(bench.borrow().world.tally());
-            seed += 1;
-        }
-        calls.end();
+            *bench.borrow().world.tally()
+        });
         assert!(calls.dropped > 1_000);
     }
 }

@@ -19,7 +19,7 @@ use std::task::{Context, Poll, Waker};
 
 use bench::{Bench, Misframed, Pin, Shared, Uart, Watch, line, scenario};
 use embedded_io::{ErrorKind, ErrorType};
-use hostile::Calls;
+use hostile::live_through;
 use polls::{FOR_EVER, Looks, run};
 use servowire_drivers::DriverEnable;
 use servowire_drivers::tformat::asynch::Encoder;
@@ -128,19 +128,16 @@ fn both_drivers_agree() {
 /// A call whose request and answer come through whole is good, whatever has happened before; every fourth call may be dropped.
 #[test]
 fn hostile_events_never_cost_a_good_answer() {
-    let (mut calls, mut seed) = (Calls::default(), 0);
-    while calls.go_on() {
+    let calls = live_through(|calls, seed| {
         let misframed = [Misframed::Dropped, Misframed::Delivered, Misframed::Reported][seed as usize % 3];
         let bench = Bench::new(scenario(seed), misframed);
         let mut encoder = driver_at(&bench, line());
         for call in 0..100_usize {
             let polls = if call % 4 == 3 { call * 7 + seed as usize % 7 } else { FOR_EVER };
             let outcome = run(encoder.read_all(), polls).map(|result| result.map(|all| all.abs.get()));
-            bench.borrow_mut().judge(&mut calls, outcome, seed, call);
+            bench.borrow_mut().judge(calls, outcome, seed, call);
         }
-        calls.tally.add(&bench.borrow().tally());
-        seed += 1;
-    }
-    calls.end();
+        bench.borrow().tally()
+    });
     assert!(calls.dropped > 1_000);
 }

@@ -14,7 +14,7 @@ mod bench;
 mod hostile;
 
 use bench::{Bench, Misframed, Pin, Shared, Uart, Watch, line, place, scenario};
-use hostile::Calls;
+use hostile::live_through;
 use servowire_drivers::tformat::blocking::Encoder;
 use servowire_drivers::{DriverEnable, Error};
 use servowire_world::{Fault, Planned, Scenario, Script, Verdict};
@@ -132,8 +132,7 @@ fn a_babbling_line_is_given_up_and_used_again() {
 #[test]
 fn hostile_events_never_cost_a_good_answer() {
     let resolution = Resolution::new(23, 16).unwrap();
-    let (mut calls, mut seed) = (Calls::default(), 0);
-    while calls.go_on() {
+    live_through(|calls, seed| {
         let misframed = [Misframed::Dropped, Misframed::Delivered, Misframed::Reported][seed as usize % 3];
         let bench = Bench::new(scenario(seed), misframed);
         let mut encoder = driver_at(&bench, line());
@@ -143,12 +142,10 @@ fn hostile_events_never_cost_a_good_answer() {
                 Err(Error::Doubt(Doubt::RequestDamaged { .. })) => calls.failed += 1,
                 result => {
                     let result = result.map(|sample| sample.position.abs);
-                    bench.borrow_mut().judge(&mut calls, Some(result), seed, call);
+                    bench.borrow_mut().judge(calls, Some(result), seed, call);
                 }
             }
         }
-        calls.tally.add(&bench.borrow().tally());
-        seed += 1;
-    }
-    calls.end();
+        bench.borrow().tally()
+    });
 }

@@ -124,7 +124,7 @@ fn bit_errors_are_the_same_for_the_same_seed() {
 /// Every step is made or the motion is stopped in order, and no two axes that run together end apart unnoticed.
 #[test]
 fn hostile_cables_lose_no_step_unnoticed() {
-    let cycles = std::env::var("HOSTILE_EVENTS").unwrap_or_else(|_| "300000".to_owned());
+    let cycles = servowire_world::wanted_events(300_000).to_string();
     for (rate, seed) in [("1e-6", "1"), ("5e-6", "2")] {
         let output = servowire(&["cnc", "--bit-error-rate", rate, "--cycles", &cycles, "--seed", seed]);
         let rows = axes(&text(&output));

@@ -42,7 +42,7 @@ fn hostile_files_of_every_format() {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/samples");
     let mut files: Vec<_> = std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path()).collect();
     files.sort();
-    let rounds = std::env::var("HOSTILE_EVENTS").ok().and_then(|text| text.parse().ok()).unwrap_or(600_u64) / 20;
+    let rounds = servowire_world::wanted_events(600) / 20;
     let mut rng = Rng::new(1);
     for file in files.iter().filter(|file| file.extension().is_none_or(|ending| ending != "md")) {
         let name = file.file_name().unwrap().to_str().unwrap();

@@ -21,7 +21,7 @@ pub const USUAL_EVENTS: u64 = 100_000;
 
 /// Events of this run.
 pub fn events() -> u64 {
-    std::env::var("HOSTILE_EVENTS").ok().and_then(|text| text.parse().ok()).unwrap_or(USUAL_EVENTS)
+    servowire_world::wanted_events(USUAL_EVENTS)
 }
 
 /// The first seed: 0, or what the environment says.

@@ -13,7 +13,7 @@ use embedded_hal::digital::{ErrorType as PinErrorType, OutputPin};
 use embedded_io::{ErrorKind, ErrorType, Read, ReadReady, Write};
 use servowire_drivers::Clock;
 use servowire_world::{
-    Delivery, Event, Framing, Host, Id, Kind, Message, Scenario, Tally, Transmission, Truth, Verdict, Wire, World,
+    Delivery, Event, Framing, Host, Id, Kind, Message, Scenario, Tally, Transmission, Truth, Wire, World,
 };
 use tformat::device::Device;
 use tformat::master::Line;
@@ -101,24 +101,10 @@ impl Bench {
         let alone = !self.sampled || truth.transmissions().all(own);
         let whole =
             left && alone && !preempted && truth.undisturbed(request) && truth.intact_answers(request).any(in_time);
-        match outcome {
-            None => calls.dropped += 1,
-            Some(Ok(shaft)) => {
-                let verdict = truth.verdict(request, shaft.into());
-                let old = matches!(verdict, Verdict::Old { .. });
-                // Nothing in the window of an SPI is older than the request, not even if the host was busy elsewhere.
-                let excused = if self.sampled { !left } else { preempted };
-                assert!(excused || !old, "seed {seed}, call {call}: {verdict:?}");
-                assert!(!whole || verdict == Verdict::Fresh, "seed {seed}, call {call}: {verdict:?}");
-                calls.good += 1;
-                calls.whole += u64::from(whole);
-                calls.forged += u64::from(verdict != Verdict::Fresh);
-            }
-            Some(Err(error)) => {
-                assert!(!whole, "seed {seed}, call {call}: {error:?}");
-                calls.failed += 1;
-            }
-        }
+        // Nothing in the window of an SPI is older than the request, not even if the host was busy elsewhere.
+        let excused = if self.sampled { !left } else { preempted };
+        let outcome = outcome.map(|result| result.map(|shaft| truth.verdict(request, shaft.into())));
+        calls.count(outcome, whole, excused, seed, call);
         let past_ns = self.now_ns().saturating_sub(1_000_000);
         self.world.truth_mut().forget_before(past_ns);
     }

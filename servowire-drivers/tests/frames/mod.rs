@@ -16,7 +16,7 @@ use nikon_aformat::{BitRate, EncoderAddress, RequestFrame, Resolution};
 use servowire_drivers::nikon::{Frame, blocking};
 use servowire_drivers::{Clock, Timer};
 use servowire_world::{
-    Delivery, Event, Framing, Host, Id, Kind, Message, Scenario, Speaker, Transmission, Verdict, Wire, World,
+    Delivery, Event, Framing, Host, Id, Kind, Message, Scenario, Speaker, Transmission, Wire, World,
 };
 
 use crate::hostile::{Calls, rates};
@@ -127,22 +127,8 @@ impl Bench {
         seed: u64,
         call: usize,
     ) {
-        match outcome {
-            None => calls.dropped += 1,
-            Some(Ok(shaft)) => {
-                let verdict = self.world.truth().verdict(request, shaft.into());
-                let old = matches!(verdict, Verdict::Old { .. });
-                assert!(self.was_preempted() || !old, "seed {seed}, call {call}: {verdict:?}");
-                assert!(!whole || verdict == Verdict::Fresh, "seed {seed}, call {call}: {verdict:?}");
-                calls.good += 1;
-                calls.whole += u64::from(whole);
-                calls.forged += u64::from(verdict != Verdict::Fresh);
-            }
-            Some(Err(error)) => {
-                assert!(!whole, "seed {seed}, call {call}: {error:?}");
-                calls.failed += 1;
-            }
-        }
+        let verdict = |shaft: u32| self.world.truth().verdict(request, shaft.into());
+        calls.count(outcome.map(|result| result.map(verdict)), whole, self.was_preempted(), seed, call);
     }
 
     pub fn pass(&mut self, until_ns: u64) {

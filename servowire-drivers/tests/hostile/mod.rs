@@ -2,7 +2,9 @@
 
 #![allow(dead_code, unreachable_pub, reason = "each test uses its part")]
 
-use servowire_world::{Kind, Rates, Tally};
+use std::fmt::Debug;
+
+use servowire_world::{Kind, Rates, Tally, Verdict, wanted_events};
 
 /// Faults that every driver has to survive, whatever the environment says.
 pub const FAULTS: u64 = 100_000;
@@ -14,11 +16,6 @@ pub fn rates(units: u32) -> Rates {
     [Kind::Delay, Kind::Noise, Kind::Foreign, Kind::EchoSwap]
         .into_iter()
         .fold(of_unit, |rates, kind| rates.with(kind, 20_000))
-}
-
-/// As many events (faults, transmissions and units) as the environment wants; 100,000 faults are always wanted.
-pub fn events() -> u64 {
-    std::env::var("HOSTILE_EVENTS").ok().and_then(|events| events.parse().ok()).unwrap_or(0)
 }
 
 /// Calls, counted.
@@ -34,14 +31,55 @@ pub struct Calls {
     pub forged: u64,
 }
 
+/// Scenario after scenario, until there was enough of everything: `play` plays the one of a seed and gives what happened in it.
+pub fn live_through(mut play: impl FnMut(&mut Calls, u64) -> Tally) -> Calls {
+    let mut calls = Calls::default();
+    for seed in 0.. {
+        let happened = play(&mut calls, seed);
+        calls.tally.add(&happened);
+        if !calls.go_on() {
+            break;
+        }
+    }
+    calls.end();
+    calls
+}
+
 impl Calls {
-    /// Whether there has to be more.
-    pub fn go_on(&self) -> bool {
-        self.tally.all_faults() < FAULTS || self.tally.events() < events()
+    /// Counts a call: it was dropped, gave a value of which the truth is known, or failed. `whole`: its answer came through
+    /// unhurt, so it must not be lost. `excused`: the value may be older than the request.
+    pub fn count<E: Debug>(
+        &mut self,
+        outcome: Option<Result<Verdict, E>>,
+        whole: bool,
+        excused: bool,
+        seed: u64,
+        call: usize,
+    ) {
+        match outcome {
+            None => self.dropped += 1,
+            Some(Ok(verdict)) => {
+                assert!(excused || !matches!(verdict, Verdict::Old { .. }), "seed {seed}, call {call}: {verdict:?}");
+                assert!(!whole || verdict == Verdict::Fresh, "seed {seed}, call {call}: {verdict:?}");
+                self.good += 1;
+                self.whole += u64::from(whole);
+                self.forged += u64::from(verdict != Verdict::Fresh);
+            }
+            Some(Err(error)) => {
+                assert!(!whole, "seed {seed}, call {call}: {error:?}");
+                self.failed += 1;
+            }
+        }
+    }
+
+    /// Whether there has to be more: 100,000 faults always, and as many events (faults, transmissions and units) as the environment
+    /// wants.
+    fn go_on(&self) -> bool {
+        self.tally.all_faults() < FAULTS || self.tally.events() < wanted_events(0)
     }
 
     /// Says what there was, and that it was enough of everything.
-    pub fn end(&self) {
+    fn end(&self) {
         let Self { tally, good, failed, whole, dropped, forged } = self;
         println!("{tally}");
         println!("{good} good ({whole} of them unhurt, {forged} forged), {failed} failed, {dropped} dropped");
