@@ -146,7 +146,7 @@ fn main() -> Result<(), Error> {
     println!("{}; {CYCLES} cycles from {} ns of the master's time on", master.network(), end_ns - master.epoch_ns());
     println!("round trips to the first device, shortest and longest: {:?} ns", master.line_delay().extremes());
     for (axis, node) in axes.iter().zip(&nodes) {
-        show(axis, node);
+        show(*axis, node);
         assert_eq!(axis.lag(node.follower.position()), 0);
     }
     // The host of the last device wants its motor driver off the line, and takes the device out.
@@ -159,7 +159,7 @@ fn main() -> Result<(), Error> {
     Ok(())
 }
 
-fn show(axis: &Asked, node: &Node) {
+fn show(axis: Asked, node: &Node) {
     let device = &node.device;
     let address = device.assignment().map_or(0, |place| place.address.get());
     let (asked, lag) = (axis.position(), axis.lag(node.follower.position()));

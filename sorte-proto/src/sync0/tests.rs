@@ -333,3 +333,15 @@ fn assert_walk(mut axis: Channel, words: &[u16]) {
         assert!(changes.iter().all(|change| change.abs_diff(*rise) >= DIR_SETUP_HOLD_NS), "{words:?} {changes:?}");
     }
 }
+
+/// A deferred pulse is programmed when the handler of CMP0 runs, `latency` after the wrap: one before that is missed, and comes
+/// a cycle later.
+#[test]
+fn deferred_programming_misses_what_is_before_its_handler() {
+    for (latency, missed, made) in [(300, 295, 300), (200, 195, 200), (10, 5, 10)] {
+        let of = |second| pulses(Channel::new(Variant::Published, 2000, latency), &[500, second]);
+        let rise = |second: u16| of(second).get(1).map(|pulse| pulse.0);
+        assert_eq!(rise(made), Some(8000 + u64::from(made) + 5), "{latency}");
+        assert_ne!(rise(missed), Some(8000 + u64::from(missed) + 5), "{latency}");
+    }
+}
