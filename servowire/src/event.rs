@@ -22,6 +22,8 @@ pub struct Event {
     pub delay: Option<i64>,
     /// Whether the frame holds.
     pub verdict: Verdict,
+    /// Whether this is no frame but a word about the recording, which is counted nowhere.
+    pub remark: bool,
 }
 
 impl Event {
@@ -33,13 +35,17 @@ impl Event {
         fields: Vec<Field>,
         verdict: Verdict,
     ) -> Self {
-        Self { place, direction, kind: kind.into(), fields, position: None, delay: None, verdict }
+        Self { place, direction, kind: kind.into(), fields, position: None, delay: None, verdict, remark: false }
     }
 
     /// A frame whose beginning the capture does not hold: no fault of the line.
     pub fn cut(place: Place) -> Self {
-        let note = Field::text("note", "the capture begins inside a frame");
-        Self::new(place, None, "cut", vec![note], Verdict::Ok)
+        Self::remark(place, "cut", "the capture begins inside a frame")
+    }
+
+    /// What there is to say about the recording at `place`.
+    pub fn remark(place: Place, kind: &'static str, note: impl Display) -> Self {
+        Self { remark: true, ..Self::new(place, None, kind, vec![Field::text("note", note)], Verdict::Ok) }
     }
 
     /// A piece of a frame, `what`, at the end of the capture: what comes then is not known, so it is not sound.
