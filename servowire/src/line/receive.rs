@@ -114,7 +114,7 @@ impl EdgeReceiver {
 
     /// The line takes a level. Says whether there are fields to [`take`](Self::take).
     pub fn change(&mut self, time: i64, level: bool) -> bool {
-        for edge in self.spikes.change(time, level) {
+        for edge in self.spikes.change(time, level).into_iter().flatten() {
             self.edge(edge);
         }
         !self.fields.is_empty()
@@ -122,7 +122,7 @@ impl EdgeReceiver {
 
     /// The line has not changed until `time`. Says whether there are fields to [`take`](Self::take).
     pub fn reach(&mut self, time: i64) -> bool {
-        for edge in self.spikes.reach(time) {
+        for edge in self.spikes.reach(time).into_iter().flatten() {
             self.edge(edge);
         }
         let Some(last) = self.burst.last() else { return !self.fields.is_empty() };
@@ -135,7 +135,7 @@ impl EdgeReceiver {
 
     /// The capture ends at `time`. A high level is taken to last; a field that ends low is not whole and is left out.
     pub fn finish(&mut self, time: i64) -> bool {
-        for edge in self.spikes.reach(time.saturating_add((self.bit * 2.0) as i64)) {
+        for edge in self.spikes.reach(time.saturating_add((self.bit * 2.0) as i64)).into_iter().flatten() {
             self.edge(edge);
         }
         let open = self.burst.last().is_some_and(|last| !last.level);

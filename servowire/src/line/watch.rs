@@ -6,6 +6,7 @@ use super::lane::{LineDecoder, Tap, Wires};
 use super::report;
 use super::survey::{Candidates, FEWEST, Found, Speech};
 use crate::capture::Change;
+use crate::capture::samples::Samples;
 use crate::output::{Lane, Output};
 use crate::protocols::Settings;
 
@@ -137,6 +138,20 @@ impl<'a> Watch<'a> {
             State::Passed(None) => {}
         }
         Ok(())
+    }
+
+    /// Whether all there is is one channel whose line is decoded, so that nobody else needs its changes.
+    pub(super) fn takes_samples(&self, out: &Output<'_>) -> bool {
+        self.held.is_none() && matches!(self.states.as_slice(), [State::Taken(_)]) && !out.wants_changes()
+    }
+
+    /// The next samples of the only channel.
+    pub(super) fn samples(&mut self, samples: Samples<'_>, out: &mut Output<'_>) -> io::Result<()> {
+        let ([running], [Found { taps, .. }]) = (self.lines.as_mut_slice(), self.found.as_slice()) else {
+            return Ok(());
+        };
+        out.lane(0);
+        running.decoder.samples(samples.turned(taps.iter().any(|tap| tap.inverted)), out)
     }
 
     /// Nothing has changed until `time`.
