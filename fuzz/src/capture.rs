@@ -36,13 +36,9 @@ fn read(format: Option<Format>, data: &[u8], size: usize) -> String {
     let pieces = Pieces { bytes: Cursor::new(data.to_vec()), size };
     let input = Input::over("fuzz", Box::new(pieces.take(MOST)));
     let hints = match format {
-        Some(_) => Hints {
-            format,
-            sample_rate: Some(20_000_000),
-            unit_size: 2,
-            record_size: Some(16),
-            ..Hints::default()
-        },
+        Some(_) => {
+            Hints { format, sample_rate: Some(20_000_000), unit_size: 2, record_size: Some(16), ..Hints::default() }
+        }
         None => Hints::default(),
     };
     let mut said = String::new();

@@ -134,7 +134,8 @@ mod tests {
 
     fn clean(changes: &[(i64, bool)], end: i64) -> Vec<(i64, bool, u32)> {
         let mut spikes = Spikes::new(100.0);
-        let mut out: Vec<Edge> = changes.iter().flat_map(|&(time, level)| spikes.change(time, level)).flatten().collect();
+        let mut out: Vec<Edge> =
+            changes.iter().flat_map(|&(time, level)| spikes.change(time, level)).flatten().collect();
         out.extend(spikes.reach(end).into_iter().flatten());
         out.iter().map(|edge| (edge.time, edge.level, edge.spikes)).collect()
     }

@@ -12,6 +12,8 @@ use crate::protocols::Settings;
 
 /// Changes looked at before decoding begins.
 const PREVIEW: usize = 1 << 16;
+/// The same of a single channel.
+const PREVIEW_OF_ONE: usize = 1 << 12;
 /// Changes of one channel by which it is judged later on.
 const ENOUGH: usize = 1 << 9;
 /// Changes of undecided channels that are kept together.
@@ -106,7 +108,8 @@ impl<'a> Watch<'a> {
     /// Whether it is time for a survey.
     pub(super) fn is_due(&self) -> bool {
         match &self.held {
-            Some(held) => held.len() >= PREVIEW,
+            // Of each channel only the first edges are looked at.
+            Some(held) => held.len() >= PREVIEW.min(self.names.len() * PREVIEW_OF_ONE),
             None => self.due || self.kept >= MOST_KEPT,
         }
     }

@@ -202,8 +202,9 @@ impl Decoder {
             };
             self.missed(bits, at, out)?;
             let symbol = found.byte.symbol();
-            out.event(&master(found, symbol, bits.place(at..at + len)))?;
-            self.message_out(symbol, bits.place(at..at + len), out)?;
+            let place = bits.place(at..at + len);
+            out.event(&master(found, symbol, place))?;
+            self.message_out(symbol, place, out)?;
             self.next = at + len;
             if symbol.is_ok_and(MasterSymbol::is_answered) {
                 let whole = self.next + 1 + u64::from(ANSWER_BITS) <= bits.end();
@@ -265,7 +266,8 @@ impl Decoder {
             None => usual_delay(bits, from),
         };
         // The delay of a cable does not change, but it need not be whole bits; between equals the time decides.
-        let since = |delay: u32| bits.time(from + u64::from(delay)) - bits.time(from);
+        let begin = bits.time(from);
+        let since = |delay: u32| bits.time(from + u64::from(delay)) - begin;
         let off = |delay: u32| self.lag.map_or(0, |lag| (since(delay) - lag).abs());
         let better = |a: &(u32, usize), b: &(u32, usize)| a.1 > b.1 || a.1 == b.1 && off(a.0) < off(b.0);
         let mut best = (usual, score(line(usual)));

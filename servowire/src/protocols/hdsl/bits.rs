@@ -2,6 +2,7 @@
 
 mod grid;
 
+use std::cell::Cell;
 use std::ops::Range;
 
 use hdsl::Window;
@@ -49,6 +50,8 @@ pub(super) struct Bits {
     end: u64,
     /// Places of edges.
     marks: Vec<Mark>,
+    /// The one that was asked for last: the next question is about one near it.
+    asked: Cell<usize>,
     /// Bit behind a pause too long for its bits to be kept.
     pub(super) paused: Option<u64>,
     heard: Heard,
@@ -98,6 +101,7 @@ impl Bits {
             first: 0,
             end: 0,
             marks: Vec::new(),
+            asked: Cell::new(0),
             paused: None,
             heard: Heard { edges: 0, spikes: 0, least: i64::MAX, most: 0, beyond: 0, count: 0 },
         };
@@ -277,10 +281,16 @@ impl Bits {
 
     /// When a bit begins.
     pub(super) fn time(&self, at: u64) -> i64 {
-        let behind = self.marks.partition_point(|mark| mark.bit <= at);
-        let Some(Mark { mut bit, mut time, grid }) = self.marks.get(behind.saturating_sub(1)).copied() else {
-            return 0;
-        };
+        let is_behind = |mark: usize| self.marks.get(mark).is_none_or(|mark| mark.bit > at);
+        let mut mark = self.asked.get().min(self.marks.len());
+        while !is_behind(mark + 1) {
+            mark += 1;
+        }
+        while mark > 0 && is_behind(mark) {
+            mark -= 1;
+        }
+        self.asked.set(mark);
+        let Some(Mark { mut bit, mut time, grid }) = self.marks.get(mark).copied() else { return 0 };
         if let Some(grid) = grid.filter(|_| bit < at) {
             let edge = self.last_edge(bit, at);
             time = grid.clock.time(grid.sample + (edge - bit) * grid::SAMPLES);
@@ -313,5 +323,6 @@ impl Bits {
         self.first += words * 64;
         let keep = self.marks.partition_point(|mark| mark.bit <= self.first).saturating_sub(1);
         self.marks.drain(..keep);
+        self.asked.set(self.asked.get().saturating_sub(keep));
     }
 }
