@@ -31,16 +31,15 @@ impl Read for Pieces {
     }
 }
 
-/// All that a reader says, as text.
-fn read(format: Format, data: &[u8], size: usize) -> String {
+/// All that a reader says, as text; without a format, that of the file's own.
+fn read(format: Option<Format>, data: &[u8], size: usize) -> String {
     let pieces = Pieces { bytes: Cursor::new(data.to_vec()), size };
     let input = Input::over("fuzz", Box::new(pieces.take(MOST)));
-    let hints = Hints {
-        format: Some(format),
-        sample_rate: Some(20_000_000),
-        unit_size: 2,
-        record_size: Some(16),
-        ..Hints::default()
+    let hints = match format {
+        Some(_) => {
+            Hints { format, sample_rate: Some(20_000_000), unit_size: 2, record_size: Some(16), ..Hints::default() }
+        }
+        None => Hints::default(),
     };
     let mut said = String::new();
     match open_input(input, Path::new("fuzz"), hints) {
@@ -103,7 +102,7 @@ fn edges(line: &mut dyn Line, said: &mut String) {
 }
 
 /// The same in one piece and in small ones.
-fn whole_and_in_pieces(format: Format, data: &[u8]) {
+fn whole_and_in_pieces(format: Option<Format>, data: &[u8]) {
     let whole = read(format, data, usize::MAX);
     for size in [1, 7] {
         assert_eq!(read(format, data, size), whole, "{format:?} in pieces of {size}");
@@ -114,7 +113,7 @@ macro_rules! readers {
     ($($(#[$doc:meta])* $name:ident: $format:ident;)*) => {$(
         $(#[$doc])*
         pub fn $name(data: &[u8]) {
-            whole_and_in_pieces(Format::$format, data);
+            whole_and_in_pieces(Some(Format::$format), data);
         }
     )*};
 }
@@ -124,6 +123,10 @@ readers! {
     vcd: Vcd;
     /// Tables.
     table: Csv;
+    /// Tables of bytes.
+    analyzer: AnalyzerTable;
+    /// Waveforms of Tektronix.
+    isf: Isf;
     /// Exports of Logic 2.
     saleae: SaleaeBinary;
     /// Sessions of sigrok and DSView.
@@ -144,6 +147,11 @@ readers! {
     records: Records;
     /// Network captures.
     packets: Pcapng;
+}
+
+/// Whatever the first bytes show it to be, packed or not.
+pub fn any(data: &[u8]) {
+    whole_and_in_pieces(None, data);
 }
 
 /// Channels made of bytes: each is a time since the one before, a channel, and a toggle.

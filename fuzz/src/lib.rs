@@ -20,6 +20,9 @@ pub type Target = fn(&[u8]);
 pub const TARGETS: &[(&str, Target)] = &[
     ("capture_vcd", capture::vcd),
     ("capture_table", capture::table),
+    ("capture_analyzer", capture::analyzer),
+    ("capture_isf", capture::isf),
+    ("capture_any", capture::any),
     ("capture_saleae", capture::saleae),
     ("capture_session", capture::session),
     ("capture_fst", capture::fst),

@@ -15,6 +15,7 @@ mod pipe;
 pub mod raw;
 pub mod records;
 pub mod saleae_binary;
+pub mod samples;
 pub mod sigrok_text;
 pub mod table;
 pub mod time;
@@ -49,6 +50,12 @@ pub trait Line {
     /// The first change of a channel is its level at the beginning. With a fault, the changes before it were
     /// appended; no more will come.
     fn read(&mut self, changes: &mut Vec<Change>) -> Result<bool, Fault>;
+
+    /// The next samples instead of the next changes, of a recording that is one channel of packed samples; nothing of
+    /// another one, or as long as its first level has not been read.
+    fn samples(&mut self) -> Option<Result<samples::Samples<'_>, Fault>> {
+        None
+    }
 
     /// The time up to which the recording was read, in picoseconds.
     fn reached(&self) -> i64;

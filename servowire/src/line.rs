@@ -133,13 +133,19 @@ pub fn decode(
             out.flush()?;
             shown = Instant::now();
         }
-        let more = match line.read(&mut changes) {
-            Ok(more) => more,
-            Err(e) => {
-                fault = Some(e);
-                false
+        let straight = if watch.takes_samples(out) { line.samples() } else { None };
+        let more = match straight {
+            Some(Ok(samples)) => {
+                watch.samples(samples, out)?;
+                Ok(samples.first() != samples.end())
             }
+            Some(Err(fault)) => Err(fault),
+            None => line.read(&mut changes),
         };
+        let more = more.unwrap_or_else(|e| {
+            fault = Some(e);
+            false
+        });
         if let Some(time) = line.gap() {
             watch.gap(time, out)?;
         }

@@ -183,3 +183,95 @@ fn hostile_files_are_bounded() {
     file.into_inner().unwrap();
     assert_eq!(within("names.vcd", &bench.path("names.vcd"), &[], 4.0 * SLOW, 400.0).code, 1);
 }
+
+/// Files of some kilobytes that unpack to a quarter of a gigabyte.
+#[test]
+fn bombs_are_bounded() {
+    const MEGABYTES: usize = 257;
+    let bench = Bench::new();
+    let zeros = vec![0; 1 << 20];
+    let metadata = "[device 1]\ncapturefile=logic-1\ntotal probes=8\nsamplerate=20 MHz\nprobe1=D0\nunitsize=1\n";
+    let header = "[version]\nversion = 3\n[header]\ndevice mode = 0\ntotal samples = 99999999999\ntotal probes = 1\n\
+        samplerate = 20 MHz\nprobe0 = D0\n";
+    for (name, small, large) in [
+        ("bomb.sr", [("version", "2"), ("metadata", metadata)].as_slice(), "logic-1-1"),
+        ("keys.sr", &[("version", "2")], "metadata"),
+        ("bomb.dsl", &[("header", header)], "L-0/0"),
+    ] {
+        let mut zip = zip::ZipWriter::new(create(&bench, name));
+        for (entry, text) in small {
+            zip.start_file(*entry, zip::write::SimpleFileOptions::default()).unwrap();
+            zip.write_all(text.as_bytes()).unwrap();
+        }
+        zip.start_file(large, zip::write::SimpleFileOptions::default()).unwrap();
+        (0..MEGABYTES).for_each(|_| zip.write_all(&zeros).unwrap());
+        zip.finish().unwrap();
+        assert_eq!(within(name, &bench.path(name), &[], 4.0 * SLOW, 64.0).code, 1);
+    }
+    // Zstandard (RFC 8878): a window of 128 KiB, a raw block with the header, blocks of one byte 131,072 times.
+    let mut file = create(&bench, "bomb.vcd.zst");
+    let vcd = b"$timescale 1 ps $end $var wire 1 ! a $end $enddefinitions $end\n";
+    file.write_all(&[0x28, 0xb5, 0x2f, 0xfd, 0, 7 << 3]).unwrap();
+    file.write_all(&(vcd.len() as u32 * 8).to_le_bytes()[..3]).unwrap();
+    file.write_all(vcd).unwrap();
+    for left in (0..MEGABYTES * 8).rev() {
+        file.write_all(&(131_072 * 8 + 2 + u32::from(left == 0)).to_le_bytes()[..3]).unwrap();
+        file.write_all(b"\n").unwrap();
+    }
+    file.into_inner().unwrap();
+    assert_eq!(within("bomb.vcd.zst", &bench.path("bomb.vcd.zst"), &[], 8.0 * SLOW, 64.0).code, 1);
+    // FST packed as a whole: its block says how long it is, and lies.
+    let mut packed = GzEncoder::new(Vec::new(), Compression::best());
+    (0..MEGABYTES).for_each(|_| packed.write_all(&zeros).unwrap());
+    let packed = packed.finish().unwrap();
+    for (name, length) in [("bomb.fst", (MEGABYTES << 20) as u64), ("liar.fst", u64::MAX / 2)] {
+        let mut file = create(&bench, name);
+        file.write_all(b"\xfe").unwrap();
+        file.write_all(&(packed.len() as u64 + 16).to_be_bytes()).unwrap();
+        file.write_all(&length.to_be_bytes()).unwrap();
+        file.write_all(&packed).unwrap();
+        file.into_inner().unwrap();
+        // It is read backwards, so it is held in memory, up to 256 MB.
+        let cost = within(name, &bench.path(name), &[], 4.0 * SLOW, 320.0);
+        assert!(cost.code == 1 && cost.err.contains("more than 256 MB"), "{}", cost.err);
+    }
+}
+
+/// A million rows that are not what they should be, or all at one time; a quotation mark that is never closed.
+#[test]
+fn bad_rows_are_bounded() {
+    let bench = Bench::new();
+    let analyzer = "name,type,start_time,duration,\"data\"\n\"A\",\"data\",0.0001,0.000004,0x1A\n\
+        \"A\",\"data\",0.0002,4e-6,0x20\n";
+    let sigrok = "libsigrok 0.5.2\nAcquisition with 1/1 channels at 20 MHz\n";
+    let isf = ":WFMPRE:ENCDG ASCII;XINCR 1E-7;YMULT 1;:CURVE 1,2,1,2";
+    for (name, begin, row) in [
+        ("bad.csv", "Time [s],Channel 0\n0.0,1\n0.1,0\n", "oops,1\n"),
+        ("back.csv", "Time [s],Channel 0\n0.0,1\n0.1,0\n", "-5,1\n"),
+        ("quoted.csv", "Time [s],Channel 0\n0.0,1\n0.1,0\n", "\"0.2,1\n"),
+        ("bad-bytes.csv", analyzer, "\"A\",\"data\",0.0003,4e-6,oops\n"),
+        ("one-time.csv", analyzer, "\"A\",\"data\",0.0003,4e-6,0x55\n"),
+        ("quoted-bytes.csv", analyzer, "\"A\",\"data\",\"0.0003\n"),
+        ("many-names.csv", "start_time,\"data\",name\n0.1,0x1A,a\n0.2,0x1B,b\n", "0.3,0x1A,c\n"),
+        ("log.txt", "1A 20 29\n1A 20 2A\n", "1A 20 zz\n"),
+        ("bad.bits", sigrok, "D0:0101x101\n"),
+        ("bad.ols", ";Rate: 20000000\n;Channels: 1\n0@0\n", "zz@5\n"),
+        ("bad.isf", isf, ",,,,,,,,"),
+        ("steps.isf", isf, ",1e300,-1e300"),
+    ] {
+        let mut file = create(&bench, name);
+        file.write_all(begin.as_bytes()).unwrap();
+        (0..1_000_000).for_each(|_| file.write_all(row.as_bytes()).unwrap());
+        file.into_inner().unwrap();
+        let cost = within(&format!("{name}, a million rows"), &bench.path(name), &[], 3.0 * SLOW, 64.0);
+        assert!(cost.out.len() + cost.err.len() < 1 << 20, "{} says {}", name, cost.err.len());
+        std::fs::remove_file(bench.path(name)).unwrap();
+    }
+    let mut file = create(&bench, "line-of-bytes.csv");
+    file.write_all(analyzer.as_bytes()).unwrap();
+    let ones = vec![b'1'; 1 << 20];
+    (0..64).for_each(|_| file.write_all(&ones).unwrap());
+    file.into_inner().unwrap();
+    let cost = within("bytes, a line of 64 MB", &bench.path("line-of-bytes.csv"), &[], 2.0 * SLOW, 64.0);
+    assert_eq!(cost.code, 1, "{}", cost.err);
+}

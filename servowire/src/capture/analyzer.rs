@@ -10,9 +10,7 @@
 use std::cmp::Reverse;
 use std::collections::{BinaryHeap, VecDeque};
 
-use csv::{ByteRecord, Reader, ReaderBuilder};
-
-use super::table::cell;
+use super::table::{Lines, cell, titles};
 use super::{Change, Input, Line};
 use crate::fault::{At, Fault};
 
@@ -20,6 +18,8 @@ use crate::fault::{At, Fault};
 const SAMPLE: usize = 4096;
 /// Changes given at once.
 const BLOCK: usize = 4096;
+/// The most edges that are drawn and not given yet; bytes that follow each other leave a few.
+const MOST_DRAWN: usize = 1 << 12;
 /// The most analysers.
 const CHANNELS: usize = 64;
 /// Logic 2 draws a byte from the edge of its start bit to the middle of its delimiter.
@@ -29,7 +29,7 @@ const FIELD_BITS: i64 = 10;
 
 /// A table of bytes behind its heading.
 pub struct Analyzer {
-    rows: Reader<Input>,
+    lines: Lines,
     columns: Columns,
     channels: Vec<String>,
     /// Rows that were read to know the channels.
@@ -102,15 +102,17 @@ impl Columns {
 impl Analyzer {
     /// Reads the heading, and rows enough to know the analysers.
     pub fn new(input: Input) -> Result<Self, Fault> {
-        let mut rows = ReaderBuilder::new().flexible(true).from_reader(input);
-        let heading = rows.byte_headers().map(names).unwrap_or_default();
+        let mut lines = Lines::new(input);
+        let mut heading = Vec::new();
+        lines.next(&mut heading)?;
+        let heading: Vec<String> = cells(&heading).iter().map(|name| name.to_lowercase()).collect();
         let names: Vec<&str> = heading.iter().map(String::as_str).collect();
         let Some(columns) = Columns::of(&names) else {
             let what = "not a table of bytes of Logic 2: it has no columns start_time and data, or Time [s] and Value";
-            return Err(rows.get_ref().fault(At::Line(1), what));
+            return Err(lines.input.fault(At::Line(1), what));
         };
         let mut table = Self {
-            rows,
+            lines,
             columns,
             channels: Vec::new(),
             waiting: VecDeque::new(),
@@ -124,7 +126,7 @@ impl Analyzer {
             first_bad: None,
             over: false,
         };
-        while table.waiting.len() < SAMPLE && (table.waiting.is_empty() || !table.rows.get_ref().pauses()) {
+        while table.waiting.len() < SAMPLE && (table.waiting.is_empty() || !table.lines.input.pauses()) {
             match table.next_row()? {
                 Some(row) => table.waiting.push_back(row),
                 None => break,
@@ -143,7 +145,7 @@ impl Analyzer {
                     None => "fewer than two bytes are in the table".to_owned(),
                 };
                 let line = table.first_bad.as_ref().map_or(1, |(line, _)| *line);
-                return Err(table.rows.get_ref().fault(At::Line(line), what));
+                return Err(table.lines.input.fault(At::Line(line), what));
             }
         }
         Ok(table)
@@ -157,7 +159,7 @@ impl Analyzer {
             return Some(*middle as f64 / DRAWN_BITS);
         }
         let starts: Vec<i64> = self.waiting.iter().map(|(_, row)| row.start).collect();
-        let mut apart: Vec<i64> = starts.iter().zip(starts.iter().skip(1)).map(|(a, b)| b - a).collect();
+        let mut apart: Vec<i64> = starts.iter().zip(starts.iter().skip(1)).map(|(a, b)| b.saturating_sub(*a)).collect();
         apart.retain(|apart| *apart > 0);
         apart.sort_unstable();
         // Neither the least, which may be a mistake, nor one with a pause.
@@ -166,15 +168,13 @@ impl Analyzer {
 
     /// The next row that holds a byte, with its line.
     fn next_row(&mut self) -> Result<Option<(u64, Row)>, Fault> {
-        let mut record = ByteRecord::new();
-        loop {
-            let line = self.rows.position().line();
-            match self.rows.read_byte_record(&mut record) {
-                Ok(false) => return Ok(None),
-                Ok(true) => {}
-                Err(e) => return Err(self.rows.get_ref().fault(At::Line(line), format!("cannot be read: {e}"))),
+        let mut text = Vec::new();
+        while self.lines.next(&mut text)? {
+            if text.is_empty() {
+                continue;
             }
-            match self.row(&record) {
+            let line = self.lines.line;
+            match self.row(&cells(&text)) {
                 Ok(Some(row)) => return Ok(Some((line, row))),
                 Ok(None) => {}
                 Err(what) => {
@@ -183,10 +183,11 @@ impl Analyzer {
                 }
             }
         }
+        Ok(None)
     }
 
-    fn row(&mut self, record: &ByteRecord) -> Result<Option<Row>, String> {
-        let text = |index: usize| String::from_utf8_lossy(record.get(index).unwrap_or_default()).trim().to_owned();
+    fn row(&mut self, cells: &[String]) -> Result<Option<Row>, String> {
+        let text = |index: usize| cells.get(index).cloned().unwrap_or_default();
         let Columns { name, kind, start, duration, value, framing } = self.columns;
         // Rows of other analysers, as of SPI, say what they are.
         if kind.is_some_and(|kind| !matches!(text(kind).as_str(), "data" | "v1frame")) {
@@ -222,6 +223,9 @@ impl Analyzer {
         if row.start < self.now {
             return Err("time goes back".to_owned());
         }
+        if self.drawn.len() > MOST_DRAWN {
+            return Err("more bytes begin here than a line can hold".to_owned());
+        }
         self.now = row.start;
         let channel = channel as u16;
         let bits = u16::from(row.byte) << 1 | u16::from(row.delimiter) << (FIELD_BITS - 1);
@@ -229,12 +233,12 @@ impl Analyzer {
         for at in 0..FIELD_BITS {
             let next = bits >> at & 1 == 1;
             if next != level {
-                self.edge(row.start + (at as f64 * self.bit) as i64, channel, next);
+                self.edge(row.start.saturating_add((at as f64 * self.bit) as i64), channel, next);
             }
             level = next;
         }
         if !level {
-            self.edge(row.start + (FIELD_BITS as f64 * self.bit) as i64, channel, true);
+            self.edge(row.start.saturating_add((FIELD_BITS as f64 * self.bit) as i64), channel, true);
         }
         Ok(())
     }
@@ -253,9 +257,9 @@ impl Analyzer {
     }
 }
 
-fn names(heading: &ByteRecord) -> Vec<String> {
-    let name = |cell: &[u8]| String::from_utf8_lossy(cell).trim_start_matches('\u{feff}').trim().to_lowercase();
-    heading.iter().map(name).collect()
+/// The cells of a line, without their quotes.
+fn cells(line: &[u8]) -> Vec<String> {
+    titles(&String::from_utf8_lossy(line), b',')
 }
 
 /// `0x1A`, `26`, `0b0001 1010`, `0b00011010`
@@ -272,7 +276,7 @@ fn byte(text: &str) -> Option<u8> {
 
 impl Line for Analyzer {
     fn input(&self) -> Option<&Input> {
-        Some(self.rows.get_ref())
+        Some(&self.lines.input)
     }
 
     fn channels(&self) -> &[String] {
@@ -282,7 +286,7 @@ impl Line for Analyzer {
     fn read(&mut self, changes: &mut Vec<Change>) -> Result<bool, Fault> {
         let enough = changes.len() + BLOCK;
         while !self.over && changes.len() < enough {
-            if self.waiting.is_empty() && !changes.is_empty() && self.rows.get_ref().pauses() {
+            if self.waiting.is_empty() && !changes.is_empty() && self.lines.input.pauses() {
                 break;
             }
             let row = match self.waiting.pop_front() {
@@ -297,7 +301,7 @@ impl Line for Analyzer {
             };
             if !std::mem::replace(&mut self.begun, true) {
                 // The lines rest before their first byte.
-                self.now = row.start - (3.0 * FIELD_BITS as f64 * self.bit) as i64;
+                self.now = row.start.saturating_sub((3.0 * FIELD_BITS as f64 * self.bit) as i64);
                 let time = self.now;
                 changes.extend((0..self.channels.len()).map(|channel| Change {
                     time,
@@ -316,7 +320,7 @@ impl Line for Analyzer {
         if let (true, Some((line, what))) = (self.over, self.first_bad.take()) {
             let all = if self.bad == 1 { "row was" } else { "rows were" };
             let what = format!("{what}; {} {all} left out", self.bad);
-            return Err(self.rows.get_ref().fault(At::Line(line), what));
+            return Err(self.lines.input.fault(At::Line(line), what));
         }
         Ok(!self.over)
     }

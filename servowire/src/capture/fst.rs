@@ -3,6 +3,7 @@
 use std::collections::HashMap;
 use std::panic::{self, AssertUnwindSafe};
 
+use flate2::read::GzDecoder;
 use fst_reader::{FstFilter, FstHierarchyEntry, FstReader, FstSignalHandle, FstSignalValue, FstVarType};
 
 use super::input::SeekRead;
@@ -14,6 +15,9 @@ const PARTS: u64 = 64;
 /// The most channels.
 const CHANNELS: usize = 65_535;
 
+/// The type of a block that holds a whole file, packed by gzip; its own length and that of the file follow.
+const WRAPPED: u8 = 254;
+
 const DAMAGED: &str = "not FST as it should be: the file is damaged";
 
 /// The library panics on some damaged files. That is their fault, not ours: it is caught, and nothing is printed.
@@ -23,6 +27,17 @@ fn guarded<T>(call: impl FnOnce() -> T) -> Option<T> {
     let result = panic::catch_unwind(AssertUnwindSafe(call));
     panic::set_hook(hook);
     result.ok()
+}
+
+/// What a file packed as a whole holds. The library would believe what the file says of its own length.
+fn unwrapped(mut input: Input) -> Result<Input, Fault> {
+    if input.peek()?.first() != Some(&WRAPPED) {
+        return Ok(input);
+    }
+    let name = input.name().to_owned();
+    let mut lengths = [0; 1 + 8 + 8];
+    input.read_full(&mut lengths, 1).map_err(|e| input.io_fault(At::File, &e))?;
+    Ok(Input::over(&name, Box::new(GzDecoder::new(input))))
 }
 
 /// An FST file behind its hierarchy.
@@ -47,7 +62,7 @@ impl Fst {
         let name = input.name().to_owned();
         let fault = |what: String| Fault::new(&name, At::File, what);
         let broken = |e: fst_reader::ReaderError| fault(format!("not FST as it should be: {e}"));
-        let source = input.seekable()?;
+        let source = unwrapped(input)?.seekable()?;
         let opened = guarded(|| FstReader::open(source));
         let mut reader = opened.ok_or_else(|| fault(DAMAGED.into()))?.map_err(broken)?;
         let header = reader.get_header();

@@ -194,7 +194,8 @@ fn preamble(input: &mut Input) -> Result<String, Fault> {
         if matches!(byte, b' ' | b'#') {
             let word = text.trim_ascii_end().rsplit(|byte| matches!(byte, b':' | b';')).next().unwrap_or_default();
             if word.eq_ignore_ascii_case(b"CURV") || word.eq_ignore_ascii_case(b"CURVE") {
-                let before = text.len() - word.len() - 1 - usize::from(byte == b' ');
+                // A file that begins with its curve has no sign before the word.
+                let before = text.len().saturating_sub(word.len() + 1 + usize::from(byte == b' '));
                 text.truncate(before);
                 return Ok(String::from_utf8_lossy(&text).into_owned());
             }
@@ -255,5 +256,17 @@ impl Line for Isf {
 
     fn reached(&self) -> i64 {
         (self.start + self.count as f64 * self.period).round() as i64
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_file_that_begins_with_its_curve() {
+        let open = |text: &'static [u8]| Isf::new(Input::embedded("curve", text), None).map(|_| ());
+        let fault = open(b"CURV #14\0\x80\x0b\x43").unwrap_err().to_string();
+        assert!(fault.contains("does not say its sample interval"), "{fault}");
     }
 }

@@ -1,5 +1,6 @@
 //! Samples at a fixed rate without a header: `sigrok-cli -O binary`, memory dumps of an FPGA, the inside of a session.
 
+use super::samples::Samples;
 use super::time::Clock;
 use super::{Change, Input, Line};
 use crate::fault::{At, Fault};
@@ -174,13 +175,26 @@ impl Line for Raw {
         Ok(samples != 0 || self.ragged.is_some())
     }
 
+    fn samples(&mut self) -> Option<Result<Samples<'_>, Fault>> {
+        let before = self.last.filter(|_| self.unit == Unit::Bit)? & 1;
+        let (bytes, samples) = match self.fill() {
+            Ok(got) => got,
+            Err(fault) => return Some(Err(fault)),
+        };
+        let block = self.block.get(..bytes).unwrap_or_default();
+        self.last = Some(block.last().map_or(before, |last| u64::from(last >> 7)));
+        let first = self.samples;
+        self.samples += samples;
+        Some(Ok(Samples::new(block, first, before == 1, self.clock)))
+    }
+
     fn reached(&self) -> i64 {
         self.clock.time(self.samples)
     }
 }
 
 /// Up to 8 bytes as a number.
-fn little_endian(bytes: &[u8]) -> u64 {
+pub(super) fn little_endian(bytes: &[u8]) -> u64 {
     match bytes.first_chunk() {
         Some(whole) => u64::from_le_bytes(*whole),
         None => bytes.iter().rev().fold(0, |word, &byte| word << 8 | u64::from(byte)),

@@ -15,6 +15,7 @@ use super::time::{Clock, SECOND};
 use super::{Change, Input, Line};
 use crate::fault::{At, Fault};
 use cell::{Cell, Threshold};
+pub(super) use heading::titles;
 use heading::{Heading, Times};
 
 /// Changes given at once.
@@ -62,14 +63,19 @@ struct Column {
 }
 
 /// Lines with their numbers.
-struct Lines {
-    input: Input,
-    line: u64,
+pub(super) struct Lines {
+    pub(super) input: Input,
+    /// The number of the last one, from 1.
+    pub(super) line: u64,
 }
 
 impl Lines {
+    pub(super) fn new(input: Input) -> Self {
+        Self { input, line: 0 }
+    }
+
     /// The next line into `text`, without its end; whether there was one.
-    fn next(&mut self, text: &mut Vec<u8>) -> Result<bool, Fault> {
+    pub(super) fn next(&mut self, text: &mut Vec<u8>) -> Result<bool, Fault> {
         text.clear();
         let at = At::Line(self.line + 1);
         let mut limited = self.input.by_ref().take(LONGEST as u64);
@@ -95,7 +101,7 @@ impl Table {
     /// Reads the heading, and rows enough to know the columns.
     pub fn new(input: Input, threshold: Option<f64>) -> Result<Self, Fault> {
         let name = input.name().to_owned();
-        let mut lines = Lines { input, line: 0 };
+        let mut lines = Lines::new(input);
         let mut above: Vec<Vec<u8>> = Vec::new();
         let mut waiting: VecDeque<(u64, Vec<u8>)> = VecDeque::new();
         let mut text = Vec::new();

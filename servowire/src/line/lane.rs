@@ -4,6 +4,7 @@ use std::io;
 
 use super::evidence::{CERTAIN, Evidence, Weights};
 use super::{EdgeReceiver, Rates, StartStop};
+use crate::capture::samples::Samples;
 use crate::event::{Event, Place, Verdict};
 use crate::output::Sink;
 
@@ -20,6 +21,14 @@ pub struct Tap {
 pub trait LineDecoder {
     /// The line takes a level.
     fn change(&mut self, time: i64, level: bool, out: &mut dyn Sink) -> io::Result<()>;
+
+    /// The next samples: the same as their changes.
+    fn samples(&mut self, samples: Samples<'_>, out: &mut dyn Sink) -> io::Result<()> {
+        for (time, level) in samples.changes() {
+            self.change(time, level, out)?;
+        }
+        Ok(())
+    }
 
     /// The line has not changed until `time`.
     fn reach(&mut self, time: i64, out: &mut dyn Sink) -> io::Result<()>;

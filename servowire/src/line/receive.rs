@@ -15,6 +15,8 @@ const STEPS: i32 = 26;
 const OTHER_SPEAKER: f64 = 3.0;
 /// Mean square distance from the grid, in bits, up to which a known bit length is kept.
 const GOOD_FIT: f64 = 0.02;
+/// Mean square distance up to which the bit length heard last is taken without looking at the others.
+const PERFECT_FIT: f64 = 2e-4;
 /// Edges of an open burst that are kept at most; further ones are read as far as whole fields go.
 const MOST_EDGES: usize = 512;
 
@@ -114,7 +116,7 @@ impl EdgeReceiver {
 
     /// The line takes a level. Says whether there are fields to [`take`](Self::take).
     pub fn change(&mut self, time: i64, level: bool) -> bool {
-        for edge in self.spikes.change(time, level) {
+        for edge in self.spikes.change(time, level).into_iter().flatten() {
             self.edge(edge);
         }
         !self.fields.is_empty()
@@ -122,7 +124,7 @@ impl EdgeReceiver {
 
     /// The line has not changed until `time`. Says whether there are fields to [`take`](Self::take).
     pub fn reach(&mut self, time: i64) -> bool {
-        for edge in self.spikes.reach(time) {
+        for edge in self.spikes.reach(time).into_iter().flatten() {
             self.edge(edge);
         }
         let Some(last) = self.burst.last() else { return !self.fields.is_empty() };
@@ -135,7 +137,7 @@ impl EdgeReceiver {
 
     /// The capture ends at `time`. A high level is taken to last; a field that ends low is not whole and is left out.
     pub fn finish(&mut self, time: i64) -> bool {
-        for edge in self.spikes.reach(time.saturating_add((self.bit * 2.0) as i64)) {
+        for edge in self.spikes.reach(time.saturating_add((self.bit * 2.0) as i64)).into_iter().flatten() {
             self.edge(edge);
         }
         let open = self.burst.last().is_some_and(|last| !last.level);
@@ -253,12 +255,13 @@ impl EdgeReceiver {
     /// A field on its grid: its start bit begins with the first edge.
     fn field(&mut self, edges: &[Edge], bit: f64) {
         let Some(first) = edges.first() else { return };
-        let place = |edge: &Edge| (edge.time - first.time) as f64 / bit;
+        let per = 1.0 / bit;
+        let place = |edge: &Edge| (edge.time - first.time) as f64 * per;
         // The first edge is as uncertain as the others: the grid lies where all fit best.
         let whole = f64::from(self.field_bits());
         let (mut sum, mut count) = (0.0, 1.0);
         for at in edges.iter().skip(1).map(place).take_while(|at| *at < whole - 0.4) {
-            sum += at - at.round();
+            sum += at - nearest(at);
             count += 1.0;
         }
         let shift = sum / count;
@@ -268,7 +271,7 @@ impl EdgeReceiver {
             spikes = spikes.saturating_add(edge.spikes);
         }
         for edge in edges.iter().skip(1) {
-            let at = (place(edge) - shift).round().clamp(0.0, whole) as u32;
+            let at = nearest(place(edge) - shift).clamp(0.0, whole) as u32;
             if level && at > from {
                 bits |= ones(at) & !ones(from);
             }
@@ -296,35 +299,41 @@ impl EdgeReceiver {
 
     /// The bit length that fits the edges: one that was heard before if it does, else the best.
     fn fit(&mut self, edges: &[Edge]) -> f64 {
-        let mut best: Option<(f64, usize)> = None;
+        let mut best: Option<(Fit, usize)> = None;
         for (at, bit) in self.heard.iter().enumerate() {
-            let misfit = self.misfit(edges, *bit);
-            if misfit < GOOD_FIT && best.is_none_or(|(least, _)| misfit < least) {
-                best = Some((misfit, at));
-            }
-        }
-        if let Some((_, at)) = best {
-            let bit = self.heard.remove(at);
-            let own = self.slope(edges, bit);
-            let bit = bit + 0.2 * (own - bit);
-            self.heard.insert(0, bit);
-            self.rates.measured(self.bit / bit);
-            return bit;
-        }
-        let step = OFF / f64::from(STEPS);
-        let mut found = (self.misfit(edges, self.bit), self.bit);
-        for k in 1..=STEPS {
-            for side in [-1.0, 1.0] {
-                let bit = self.bit * (1.0 + side * f64::from(k) * step);
-                // Between equals, the one nearer to the nominal rate.
-                let misfit = self.misfit(edges, bit) + 1e-5 * f64::from(k);
-                if misfit < found.0 {
-                    found = (misfit, bit);
+            let fit = self.measure(edges, *bit);
+            if fit.misfit < GOOD_FIT && best.is_none_or(|(least, _)| fit.misfit < least.misfit) {
+                best = Some((fit, at));
+                if at == 0 && fit.misfit < PERFECT_FIT {
+                    break;
                 }
             }
         }
-        let bit = self.slope(edges, found.1);
-        if found.0 < GOOD_FIT && edges.len() > 3 {
+        if let Some((fit, at)) = best {
+            // The last one heard comes first.
+            if let Some(before) = self.heard.get_mut(..=at) {
+                before.rotate_right(1);
+            }
+            let Some(bit) = self.heard.first_mut() else { return self.bit };
+            *bit += 0.2 * (fit.slope(*bit) - *bit);
+            self.rates.measured(self.bit / *bit);
+            return *bit;
+        }
+        let step = OFF / f64::from(STEPS);
+        let mut found = (self.measure(edges, self.bit), self.bit, 0.0);
+        for k in 1..=STEPS {
+            for side in [-1.0, 1.0] {
+                let bit = self.bit * (1.0 + side * f64::from(k) * step);
+                let fit = self.measure(edges, bit);
+                // Between equals, the one nearer to the nominal rate.
+                let distance = 1e-5 * f64::from(k);
+                if fit.misfit + distance < found.0.misfit + found.2 {
+                    found = (fit, bit, distance);
+                }
+            }
+        }
+        let bit = found.0.slope(found.1);
+        if found.0.misfit + found.2 < GOOD_FIT && edges.len() > 3 {
             self.heard.insert(0, bit);
             self.heard.truncate(4);
             self.rates.measured(self.bit / bit);
@@ -332,53 +341,34 @@ impl EdgeReceiver {
         bit
     }
 
-    /// Mean square distance of the edges from the grids of their fields, in bits.
-    fn misfit(&self, edges: &[Edge], bit: f64) -> f64 {
-        let (mut all, mut fields) = (0.0, 0.0);
-        // Sum, sum of squares and number of a field; its first edge lies at 0.
-        let (mut sum, mut squares, mut count) = (0.0, 0.0, 1.0);
-        self.each(edges, bit, |place, first| {
-            if first {
-                all += squares - sum * sum / count;
-                (sum, squares, count) = (0.0, 0.0, 1.0);
-            }
-            let off = place - place.round();
-            sum += off;
-            squares += off * off;
-            count += 1.0;
-            fields += 1.0;
-        });
-        all += squares - sum * sum / count;
-        if fields > 0.0 { all / fields } else { 0.0 }
-    }
-
-    /// The bit length by which the edges lie best, once their places are known from `bit`.
-    fn slope(&self, edges: &[Edge], bit: f64) -> f64 {
-        // Least squares of time over place, each field with an offset of its own.
-        let (mut above, mut below) = (0.0, 0.0);
-        let mut field: Vec<(f64, f64)> = Vec::with_capacity(16);
-        let mut close = |field: &mut Vec<(f64, f64)>| {
-            let count = field.len() as f64;
-            if count > 1.0 {
-                let mean = |pick: fn(&(f64, f64)) -> f64| field.iter().map(pick).sum::<f64>() / count;
-                let (places, times) = (mean(|p| p.0), mean(|p| p.1));
-                for (place, time) in field.iter() {
-                    above += (place - places) * (time - times);
-                    below += (place - places) * (place - places);
-                }
-            }
-            field.clear();
+    /// How the edges lie on the grids of their fields; each field has an offset of its own.
+    fn measure(&self, edges: &[Edge], bit: f64) -> Fit {
+        let (mut all, mut edges_in_all, mut above, mut below) = (0.0, 0.0, 0.0, 0.0);
+        // Sums over a field, whose first edge lies at 0.
+        let (mut count, mut off, mut squares, mut places, mut spread, mut both) = (1.0, 0.0, 0.0, 0.0, 0.0, 0.0);
+        let mut close = |count: f64, off: f64, squares: f64, places: f64, spread: f64, both: f64| {
+            let per = 1.0 / count;
+            all += squares - off * off * per;
+            below += spread - places * places * per;
+            above += both - places * off * per;
         };
         self.each(edges, bit, |place, first| {
             if first {
-                close(&mut field);
-                field.push((0.0, 0.0));
+                close(count, off, squares, places, spread, both);
+                (count, off, squares, places, spread, both) = (1.0, 0.0, 0.0, 0.0, 0.0, 0.0);
             }
-            field.push((place.round(), place));
+            let whole = nearest(place);
+            let distance = place - whole;
+            off += distance;
+            squares += distance * distance;
+            places += whole;
+            spread += whole * whole;
+            both += whole * distance;
+            count += 1.0;
+            edges_in_all += 1.0;
         });
-        close(&mut field);
-        // Few short fields say little.
-        if below < 40.0 { bit } else { bit * (above / below).clamp(0.97, 1.03) }
+        close(count, off, squares, places, spread, both);
+        Fit { misfit: if edges_in_all > 0.0 { all / edges_in_all } else { 0.0 }, above, below }
     }
 
     /// The places of all edges but the first of each field, in bits from the start of the field.
@@ -400,14 +390,46 @@ impl EdgeReceiver {
     }
 }
 
+/// How edges lie on a grid.
+#[derive(Debug, Clone, Copy)]
+struct Fit {
+    /// Mean square distance, in bits.
+    misfit: f64,
+    /// How the distances go with the places, and how far the places are spread: sums of products.
+    above: f64,
+    below: f64,
+}
+
+impl Fit {
+    /// The bit length by which the edges lie best, where `bit` is that of the grid.
+    fn slope(self, bit: f64) -> f64 {
+        // Few short fields say little.
+        if self.below < 40.0 { bit } else { bit * (1.0 + self.above / self.below).clamp(0.97, 1.03) }
+    }
+}
+
+/// The nearest whole number, of what is far from the ends of `i64`; without a call where the processor has no
+/// instruction for it.
+#[inline]
+fn nearest(number: f64) -> f64 {
+    let whole = number as i64 as f64;
+    let rest = number - whole;
+    whole + f64::from(i8::from(rest >= 0.5) - i8::from(rest <= -0.5))
+}
+
 /// Bits of a line from `start` on.
 fn line_bits(edges: &[Edge], start: i64, bit: f64) -> u128 {
-    let place = |edge: &Edge| ((edge.time - start) as f64 / bit).round().clamp(0.0, 128.0) as u32;
+    let per = 1.0 / bit;
+    let place = |edge: &Edge| nearest((edge.time - start) as f64 * per).clamp(0.0, 128.0) as u32;
     let below = |at: u32| 1_u128.checked_shl(at).map_or(u128::MAX, |bit| bit - 1);
     let mut bits = u128::MAX;
     for (k, edge) in edges.iter().enumerate().filter(|(_, edge)| !edge.level) {
+        let from = place(edge);
+        if from >= 128 {
+            break;
+        }
         let until = edges.get(k + 1).map_or(128, place);
-        bits &= !(below(until) & !below(place(edge)));
+        bits &= !(below(until) & !below(from));
     }
     bits
 }

@@ -39,11 +39,7 @@ pub(crate) struct Spikes {
 }
 
 /// Up to two edges: those of a bit that was torn come together.
-pub(crate) type Edges = std::iter::Flatten<std::array::IntoIter<Option<Edge>, 2>>;
-
-fn edges(first: Option<Edge>, second: Option<Edge>) -> Edges {
-    [first, second].into_iter().flatten()
-}
+pub(crate) type Edges = [Option<Edge>; 2];
 
 impl Spikes {
     /// For bits of `bit` picoseconds.
@@ -53,6 +49,7 @@ impl Spikes {
     }
 
     /// The line changes to `level`; the edges before it that are known to last.
+    #[inline]
     pub(crate) fn change(&mut self, time: i64, level: bool) -> Edges {
         let edge = self.reach(time);
         match self.solid {
@@ -76,26 +73,54 @@ impl Spikes {
     }
 
     /// The line has not changed until `time`.
+    #[inline]
     pub(crate) fn reach(&mut self, time: i64) -> Edges {
-        let Some(solid) = self.solid else { return edges(None, None) };
+        let Some(solid) = self.solid else { return [None; 2] };
         if self.edges == 0 || time.saturating_sub(self.since) < self.shortest {
-            return edges(None, None);
+            return [None; 2];
         }
+        if self.edges == 1 {
+            // Nothing but an edge.
+            self.edges = 0;
+            self.solid = Some(self.level);
+            return [Some(self.edge(self.since, self.level)), None];
+        }
+        self.cluster(solid)
+    }
+
+    /// What a cluster of short runs behind `solid` amounts to.
+    #[cold]
+    fn cluster(&mut self, solid: bool) -> Edges {
         let (count, other) = (self.edges, self.other);
         (self.edges, self.other) = (0, 0);
         if self.level != solid {
             self.dropped = self.dropped.saturating_add(count / 2);
             self.solid = Some(self.level);
-            return edges(Some(self.edge(self.since.saturating_sub(other), self.level)), None);
+            return [Some(self.edge(self.since.saturating_sub(other), self.level)), None];
         }
         let whole = (other as f64 / self.bit).round();
         if (other as f64) < TORN_BIT * self.bit {
             self.dropped = self.dropped.saturating_add(count / 2);
-            return edges(None, None);
+            return [None; 2];
         }
         self.dropped = self.dropped.saturating_add(count / 2 - 1);
         let behind = self.begun.saturating_add((whole * self.bit) as i64).min(self.since);
-        edges(Some(self.edge(self.begun, !solid)), Some(self.edge(behind, solid)))
+        [Some(self.edge(self.begun, !solid)), Some(self.edge(behind, solid))]
+    }
+
+    /// The last change of the line and the level since.
+    pub(crate) fn last_change(&self) -> Option<(i64, bool)> {
+        self.solid.map(|_| (self.since, self.level))
+    }
+
+    /// The last change of the line and the level since, where no spike is about.
+    pub(crate) fn settled(&self) -> Option<(i64, bool)> {
+        (self.solid == Some(self.level) && self.edges == 0 && self.dropped == 0).then_some((self.since, self.level))
+    }
+
+    /// The last change was at `time`, and the level since has lasted.
+    pub(crate) fn settle(&mut self, time: i64, level: bool) {
+        (self.solid, self.level, self.since, self.edges, self.other) = (Some(level), level, time, 0, 0);
     }
 
     fn edge(&mut self, time: i64, level: bool) -> Edge {
@@ -109,8 +134,9 @@ mod tests {
 
     fn clean(changes: &[(i64, bool)], end: i64) -> Vec<(i64, bool, u32)> {
         let mut spikes = Spikes::new(100.0);
-        let mut out: Vec<Edge> = changes.iter().flat_map(|&(time, level)| spikes.change(time, level)).collect();
-        out.extend(spikes.reach(end));
+        let mut out: Vec<Edge> =
+            changes.iter().flat_map(|&(time, level)| spikes.change(time, level)).flatten().collect();
+        out.extend(spikes.reach(end).into_iter().flatten());
         out.iter().map(|edge| (edge.time, edge.level, edge.spikes)).collect()
     }
 

@@ -6,11 +6,14 @@ use super::lane::{LineDecoder, Tap, Wires};
 use super::report;
 use super::survey::{Candidates, FEWEST, Found, Speech};
 use crate::capture::Change;
+use crate::capture::samples::Samples;
 use crate::output::{Lane, Output};
 use crate::protocols::Settings;
 
 /// Changes looked at before decoding begins.
 const PREVIEW: usize = 1 << 16;
+/// The same of a single channel.
+const PREVIEW_OF_ONE: usize = 1 << 12;
 /// Changes of one channel by which it is judged later on.
 const ENOUGH: usize = 1 << 9;
 /// Changes of undecided channels that are kept together.
@@ -105,7 +108,8 @@ impl<'a> Watch<'a> {
     /// Whether it is time for a survey.
     pub(super) fn is_due(&self) -> bool {
         match &self.held {
-            Some(held) => held.len() >= PREVIEW,
+            // Of each channel only the first edges are looked at.
+            Some(held) => held.len() >= PREVIEW.min(self.names.len() * PREVIEW_OF_ONE),
             None => self.due || self.kept >= MOST_KEPT,
         }
     }
@@ -137,6 +141,20 @@ impl<'a> Watch<'a> {
             State::Passed(None) => {}
         }
         Ok(())
+    }
+
+    /// Whether all there is is one channel whose line is decoded, so that nobody else needs its changes.
+    pub(super) fn takes_samples(&self, out: &Output<'_>) -> bool {
+        self.held.is_none() && matches!(self.states.as_slice(), [State::Taken(_)]) && !out.wants_changes()
+    }
+
+    /// The next samples of the only channel.
+    pub(super) fn samples(&mut self, samples: Samples<'_>, out: &mut Output<'_>) -> io::Result<()> {
+        let ([running], [Found { taps, .. }]) = (self.lines.as_mut_slice(), self.found.as_slice()) else {
+            return Ok(());
+        };
+        out.lane(0);
+        running.decoder.samples(samples.turned(taps.iter().any(|tap| tap.inverted)), out)
     }
 
     /// Nothing has changed until `time`.

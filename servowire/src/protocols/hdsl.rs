@@ -22,6 +22,7 @@ use hdsl::{
     QualityRule, Rule, VFrame, Window,
 };
 
+use crate::capture::samples::Samples;
 use crate::event::{Direction, Event, Field, NO_RESPONSE, Place, Position, Refusal, Verdict};
 use crate::line::{LineDecoder, Rates};
 use crate::output::Sink;
@@ -43,6 +44,10 @@ pub const RATES: &[u32] = &[BIT_RATE];
 
 /// Bits that have to be there before a frame is looked for: longest head, direction switch, delay, answer.
 const NEED: u64 = 36 + 1 + 12 + ANSWER_BITS as u64;
+/// Bits that are kept to say what there was instead of a frame.
+const KEPT: u64 = 4096;
+/// Bits that are taken together where there are so many.
+const MANY: u64 = 16 * NEED;
 /// Bits between the heads of two frames at most: the longest frame with its stuffing.
 const LONGEST: u64 = 273 + 4;
 
@@ -51,20 +56,37 @@ pub struct DslLine {
     bits: Bits,
     decoder: Decoder,
     bit: f64,
+    /// The sample at which the line changed last, where it comes in samples.
+    since: Option<u64>,
 }
 
 impl DslLine {
     /// `bit`: nominal length in picoseconds.
     pub fn new(bit: f64) -> Self {
-        Self { bits: Bits::new(bit), decoder: Decoder::new(), bit }
+        Self { bits: Bits::new(bit), decoder: Decoder::new(), bit, since: None }
     }
 }
 
 impl LineDecoder for DslLine {
     fn change(&mut self, time: i64, level: bool, out: &mut dyn Sink) -> io::Result<()> {
         self.bits.change(time, level);
-        let enough = if self.decoder.delay.is_none() { LESSON } else { 2 * NEED };
-        if self.bits.end() > self.decoder.next + enough { self.decoder.take(&mut self.bits, NEED, out) } else { Ok(()) }
+        if self.bits.end() > self.enough() { self.decoder.take(&mut self.bits, NEED, out) } else { Ok(()) }
+    }
+
+    fn samples(&mut self, samples: Samples<'_>, out: &mut dyn Sink) -> io::Result<()> {
+        let may_be_on_grid = self.bits.may_be_on_grid(&samples);
+        let (mut at, mut level) = (samples.first(), samples.before());
+        loop {
+            if let Some(since) = self.since.filter(|_| may_be_on_grid) {
+                if let Some(taken) = self.bits.on_grid(&samples, since, at, self.enough()) {
+                    (at, level, self.since) = (taken.next, taken.level, Some(taken.since));
+                }
+            }
+            let Some(next) = samples.change(at, level) else { return Ok(()) };
+            level = !level;
+            self.change(samples.clock().time(next), level, out)?;
+            (self.since, at) = (Some(next), next + 1);
+        }
     }
 
     fn reach(&mut self, time: i64, out: &mut dyn Sink) -> io::Result<()> {
@@ -86,6 +108,13 @@ impl LineDecoder for DslLine {
 
     fn rates(&self) -> Rates {
         self.bits.rates()
+    }
+}
+
+impl DslLine {
+    /// Bits from which on frames are looked for.
+    fn enough(&self) -> u64 {
+        self.decoder.next + if self.decoder.delay.is_none() { LESSON } else { MANY }
     }
 }
 
@@ -196,7 +225,7 @@ impl Decoder {
             }
             self.said.give(self.settled(), out)?;
         }
-        bits.forget(self.next.saturating_sub(LONGEST));
+        bits.forget(self.next.saturating_sub(KEPT));
         Ok(())
     }
 

@@ -68,7 +68,7 @@ fn split(line: &[u8], separator: u8) -> Vec<&[u8]> {
 }
 
 /// Cells of a line of text, where names in quotes may hold the separator.
-fn titles(line: &str, separator: u8) -> Vec<String> {
+pub(in crate::capture) fn titles(line: &str, separator: u8) -> Vec<String> {
     let (mut out, mut cell, mut quoted) = (Vec::new(), String::new(), false);
     for letter in line.chars() {
         match letter {

@@ -1,9 +1,13 @@
 //! Edges of the pair as bits, with the time of each.
 
+mod grid;
+
+use std::cell::Cell;
 use std::ops::Range;
 
 use hdsl::Window;
 
+use crate::capture::time::Clock;
 use crate::event::Place;
 use crate::line::{Rates, Spikes};
 
@@ -13,6 +17,10 @@ pub(super) const PAUSE: u64 = 200;
 const OFF: i64 = 6;
 /// An edge so far from the grid, in per cent of a bit, is that of another speaker.
 const ELSEWHERE: i64 = 30;
+/// An edge so near to the grid, in parts of a bit, is on it: neither the grid nor the bit length follows.
+const ON_GRID: i64 = 32;
+/// Edges behind longer runs than this tell nothing of the bit length.
+pub(super) const LONGEST_RUN: usize = ADAPT.len() - 1;
 /// Parts of a picosecond, in binary digits, in which the length of a bit is kept, and parts of a bit.
 const FINE: u32 = 16;
 const PART: u32 = 40;
@@ -40,11 +48,31 @@ pub(super) struct Bits {
     /// Number of the first bit in `words`, a multiple of 64, and of the one behind the last.
     first: u64,
     end: u64,
-    /// Places of edges: number of the bit, time.
-    marks: Vec<(u64, i64)>,
+    /// Places of edges.
+    marks: Vec<Mark>,
+    /// The one that was asked for last: the next question is about one near it.
+    asked: Cell<usize>,
     /// Bit behind a pause too long for its bits to be kept.
     pub(super) paused: Option<u64>,
     heard: Heard,
+}
+
+/// The place of an edge.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Mark {
+    /// Number of the bit that begins there.
+    pub(super) bit: u64,
+    pub(super) time: i64,
+    /// Up to the next mark all edges lie on a grid of samples.
+    pub(super) grid: Option<Grid>,
+}
+
+/// Where edges lie that have no marks of their own.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Grid {
+    /// Number of the sample at the mark.
+    pub(super) sample: u64,
+    pub(super) clock: Clock,
 }
 
 /// What was heard of the line: edges, spikes, and bit lengths in parts of a picosecond.
@@ -54,7 +82,8 @@ struct Heard {
     spikes: u64,
     least: i64,
     most: i64,
-    sum: i128,
+    /// Of the bit lengths beyond the nominal one, and how many.
+    beyond: i64,
     count: u32,
 }
 
@@ -72,8 +101,9 @@ impl Bits {
             first: 0,
             end: 0,
             marks: Vec::new(),
+            asked: Cell::new(0),
             paused: None,
-            heard: Heard { edges: 0, spikes: 0, least: i64::MAX, most: 0, sum: 0, count: 0 },
+            heard: Heard { edges: 0, spikes: 0, least: i64::MAX, most: 0, beyond: 0, count: 0 },
         };
         bits.invert();
         bits
@@ -96,11 +126,11 @@ impl Bits {
 
     /// What was measured of the line.
     pub(super) fn rates(&self) -> Rates {
-        let Heard { edges, spikes, least, most, sum, count } = self.heard;
+        let Heard { edges, spikes, least, most, beyond, count } = self.heard;
         let share = |bit: f64| self.fine as f64 / bit;
         let mut rates = Rates::of(edges, spikes);
         if count > 0 {
-            rates.measured(share(sum as f64 / f64::from(count)));
+            rates.measured(share(self.fine as f64 + beyond as f64 / f64::from(count)));
             (rates.least, rates.most) = (share(most as f64), share(least as f64));
         }
         rates
@@ -110,16 +140,16 @@ impl Bits {
     pub(super) fn change(&mut self, time: i64, level: bool) {
         if self.last.is_none() {
             self.last = Some((time, level));
-            self.marks.push((0, time));
+            self.mark(time);
         }
-        for edge in self.spikes.change(time, level) {
+        for edge in self.spikes.change(time, level).into_iter().flatten() {
             self.edge(edge.time, edge.level, edge.spikes);
         }
     }
 
     /// The line has not changed until `time`: what is certain of it becomes bits.
     pub(super) fn reach(&mut self, time: i64) {
-        for edge in self.spikes.reach(time) {
+        for edge in self.spikes.reach(time).into_iter().flatten() {
             self.edge(edge.time, edge.level, edge.spikes);
         }
     }
@@ -150,6 +180,10 @@ impl Bits {
         let count = (run * self.inverse + (1 << (PART - 1)) - (1 << (PART - 6))) >> PART;
         let off = run - ((count * self.bit + (1 << (FINE - 1))) >> FINE);
         let place = match usize::try_from(count).ok().and_then(|count| ADAPT.get(count)) {
+            Some(_) if off.abs() * ON_GRID <= self.nominal => {
+                self.measured(1);
+                time
+            }
             Some(part) if off.abs() * 100 <= ELSEWHERE * self.nominal => {
                 self.adapt(off * part);
                 // The grid follows half-way.
@@ -163,7 +197,11 @@ impl Bits {
         }
         self.push(before, count.min(PAUSE));
         self.last = Some((place, level));
-        self.marks.push((self.end, time));
+        self.mark(time);
+    }
+
+    fn mark(&mut self, time: i64) {
+        self.marks.push(Mark { bit: self.end, time, grid: None });
     }
 
     /// An edge behind a pause.
@@ -172,7 +210,7 @@ impl Bits {
         self.paused = Some(self.end + PAUSE);
         self.push(before, PAUSE);
         self.last = Some((time, level));
-        self.marks.push((self.end, time));
+        self.mark(time);
     }
 
     /// The bit becomes longer by so many parts of a picosecond.
@@ -183,10 +221,16 @@ impl Bits {
         if (self.bit - self.inverse_of).abs() > self.fine >> 11 {
             self.invert();
         }
+        self.measured(1);
+    }
+
+    /// So many edges were heard of bits of the present length.
+    #[inline]
+    fn measured(&mut self, edges: u32) {
         self.heard.least = self.heard.least.min(self.bit);
         self.heard.most = self.heard.most.max(self.bit);
-        self.heard.sum += i128::from(self.bit);
-        self.heard.count = self.heard.count.saturating_add(1);
+        self.heard.beyond = self.heard.beyond.saturating_add(i64::from(edges) * (self.bit - self.fine));
+        self.heard.count = self.heard.count.saturating_add(edges);
     }
 
     fn push(&mut self, level: bool, count: u64) {
@@ -237,9 +281,31 @@ impl Bits {
 
     /// When a bit begins.
     pub(super) fn time(&self, at: u64) -> i64 {
-        let behind = self.marks.partition_point(|(bit, _)| *bit <= at);
-        let Some((bit, time)) = self.marks.get(behind.saturating_sub(1)) else { return 0 };
-        time + ((at as i64 - *bit as i64) as f64 * self.length()) as i64
+        let is_behind = |mark: usize| self.marks.get(mark).is_none_or(|mark| mark.bit > at);
+        let mut mark = self.asked.get().min(self.marks.len());
+        while !is_behind(mark + 1) {
+            mark += 1;
+        }
+        while mark > 0 && is_behind(mark) {
+            mark -= 1;
+        }
+        self.asked.set(mark);
+        let Some(Mark { mut bit, mut time, grid }) = self.marks.get(mark).copied() else { return 0 };
+        if let Some(grid) = grid.filter(|_| bit < at) {
+            let edge = self.last_edge(bit, at);
+            time = grid.clock.time(grid.sample + (edge - bit) * grid::SAMPLES);
+            bit = edge;
+        }
+        time + ((at as i64 - bit as i64) as f64 * self.length()) as i64
+    }
+
+    /// The last bit up to `at` that differs from the one before it; `first` where none does.
+    fn last_edge(&self, first: u64, at: u64) -> u64 {
+        // Runs on a grid are short.
+        let from = first.max(at.saturating_sub(LONGEST_RUN as u64)).max(self.first);
+        let bits = self.load(from) as u64;
+        let edges = (bits ^ bits >> 1) & ((1 << at.saturating_sub(from)) - 1);
+        if edges == 0 { first } else { from + 64 - u64::from(edges.leading_zeros()) }
     }
 
     pub(super) fn place(&self, bits: Range<u64>) -> Place {
@@ -255,7 +321,8 @@ impl Bits {
         }
         self.words.drain(..words as usize);
         self.first += words * 64;
-        let keep = self.marks.partition_point(|(bit, _)| *bit <= self.first).saturating_sub(1);
+        let keep = self.marks.partition_point(|mark| mark.bit <= self.first).saturating_sub(1);
         self.marks.drain(..keep);
+        self.asked.set(self.asked.get().saturating_sub(keep));
     }
 }
