@@ -21,7 +21,7 @@ fn random_captures_come_out_right() {
     let mut faults = String::new();
     for condition in CONDITIONS {
         for kind in Kind::ALL {
-            let row = row(condition, kind, CAPTURES);
+            let row = row(condition, kind, 0, CAPTURES);
             right += row.right;
             all += row.captures;
             assert_eq!(row.wrong, 0, "{} {}: values that were never sent", condition.name, kind.name());
