@@ -197,3 +197,32 @@ fn spikes_on_the_idle_line() {
     run.is_good();
     assert_eq!(run.json()[1]["fields"]["spikes"], 1);
 }
+
+/// Where the user names what the line is not, it is said what it looks like.
+#[test]
+fn a_line_of_another_protocol_than_was_said() {
+    let bench = Bench::new();
+    let traffic = good_traffic(2.5e6).vcd();
+    for wrong in [&["-p", "nikon"][..], &["-p", "hdsl"], &["--bit-rate", "4M"], &["-p", "tformat", "--bit-rate", "5M"]]
+    {
+        let run = bench.decode("a.vcd", &traffic, wrong);
+        let frames = common::GOOD_FRAMES;
+        let said = format!("it looks like T-Format at 2.5 Mbit/s: {frames} of {frames} frames hold so");
+        run.fails_with(&said);
+        assert!(run.err.contains("leave out what says otherwise"), "{wrong:?}: {}", run.err);
+    }
+    for right in [&[][..], &["-p", "tformat"], &["--bit-rate", "2.5M"], &["--polarity", "normal"]] {
+        let run = bench.decode("a.vcd", &traffic, right);
+        assert!(!run.is_good().err.contains("looks like"), "{right:?}: {}", run.err);
+    }
+    // Damage is no other protocol.
+    let mut wave = Wave::new(2.5e6);
+    wave.idle_us(20.0);
+    for k in 0..12 {
+        let mut answer = id3(k, 0, 0);
+        answer[4] ^= 1;
+        wave.exchange(&[0x1a], &answer);
+    }
+    let run = bench.decode("a.vcd", wave.vcd(), &["-p", "tformat"]);
+    assert!(!run.err.contains("looks like"), "{}", run.err);
+}
