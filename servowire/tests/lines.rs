@@ -115,6 +115,9 @@ fn only_the_own_requests() {
     assert_eq!(run.json()[3]["reason"], "no answer within 12.0 us");
     let log = bench.decode("echo.txt", "1A\n1A\n", &["--bytes"]);
     log.fails_with("2 of 4 frames refused: no_response 2");
+    let reasons: Vec<_> = log.out.lines().filter_map(|line| Some(line.split_once("no_response: ")?.1)).collect();
+    assert!(reasons[0].starts_with("no answer before the next request"), "{reasons:?}");
+    assert!(reasons[1].starts_with("no answer before the log ends"), "{reasons:?}");
 }
 
 /// Both wires, a direction signal, a slow clock: the wire that decodes the right way up is taken.
