@@ -148,5 +148,5 @@ pub(super) fn silence(
     } else {
         format!("only the request is on the line: {nobody}, A and B exchanged, or not its bit rate")
     };
-    Event::silence(place, kind, what, timeout, now, &cause)
+    Event::silence(place, kind, what, timeout, (now, asked), &cause)
 }

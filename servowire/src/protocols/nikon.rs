@@ -19,7 +19,7 @@ use crate::event::{Event, Place, Verdict};
 use crate::line::{LineField, StartStop};
 use crate::output::Sink;
 use crate::protocols::group::{Group, Widths};
-use crate::protocols::plausible::{CUT, CUT_BITS, slipped_bit};
+use crate::protocols::plausible::{CUT, CUT_BITS, LOST, slipped_bit};
 use describe::Encoder;
 
 pub use describe::FIELDS;
@@ -219,8 +219,13 @@ fn cause(group: &Frames, request: Request, expected: Option<Expected>) -> Option
     let due = usize::from(layout.frames());
     let sound =
         |bits: u128| Window::from_bits(bits, len).is_some_and(|line| Response::parse_line(&expected, line).is_ok());
-    // With one bit wrong, none has slipped.
-    let flipped = (0..len).any(|at| sound(line.bits() ^ 1 << at));
+    // With one bit wrong, none has slipped, unless it is the last 0 before idle line: that is missing too where the reply
+    // was cut in the ones before it, or lost one of several zeros.
+    let wrong = (0..len).find(|at| sound(line.bits() ^ 1 << at));
+    if let Some(at) = wrong.filter(|at| (line.bits() << (128 - len)).leading_ones() >= len - at && *at > 0) {
+        return Some(if line.bits() >> (at - 1) & 1 == 1 { CUT } else { LOST }.to_owned());
+    }
+    let flipped = wrong.is_some();
     let in_place = group.broken.is_none() && group.len() == due;
     if in_place && !flipped && (line.bits() << (128 - len)).leading_ones() >= CUT_BITS {
         return Some(CUT.to_owned());

@@ -291,7 +291,7 @@ impl StartStop for Decoder {
         let is_answer = id(rest).is_ok_and(|id| rest.len() == usize::from(id.response_fields())) && !is_request;
         let asks = burst.direction == Some(Direction::Request);
         if asks || self.pending.is_some_and(|pending| is_request && rest.len() < pending.answer_fields_of(rest)) {
-            self.give_up(0, false, out)?;
+            self.give_up(0, true, out)?;
         }
         if is_answer && self.pending.is_none() {
             return self.take(burst.line, rest, out);
