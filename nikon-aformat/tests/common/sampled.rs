@@ -144,7 +144,8 @@ pub fn lost_frames(setup: &Setup, turns: u16, shown: &mut Shown) {
             // A cut response can look like another request to those that hear it, and be answered.
             let is_answer = line.bench.spoken(tag).is_some_and(|spoken| spoken.code == 4);
             let gapless = is_answer && sent.intact && sent.longest_idle(18) == 0;
-            let before = truth.transmissions().filter(|t| t.id < sent.id).map(|t| t.end_ns).max().unwrap_or(0);
+            let earlier = truth.transmissions().filter(|t| t.start_ns < sent.start_ns);
+            let before = earlier.map(|t| t.end_ns).max().unwrap_or(0);
             // Six idle bits, a little less than the shortest gap between two responses, separate it from what was before.
             let whole = gapless && sent.start_ns >= before + 6 * bit_ps(setup.rate) / 1000;
             assert!(!whole || values.contains(&tag), "seed {seed} turn {turn}: {sent:?} is lost, {heard:?}");
