@@ -21,7 +21,7 @@ pub struct Wave {
 
 impl Wave {
     /// `samples_per_bit` at the nominal rate, a transmitter that is `ppm` parts per million faster (negative: slower,
-    /// down to -999 999), and the `phase` of bit 0 as a fraction of a sample period (2^32 = a whole one).
+    /// down to -999 999, for which all lower numbers stand), and the `phase` of bit 0 as a fraction of a sample period (2^32 = a whole one).
     #[expect(
         clippy::cast_sign_loss,
         clippy::cast_possible_truncation,
@@ -42,5 +42,19 @@ impl Wave {
     pub const fn first_sample(self, bit: u64) -> u64 {
         let time = (self.period as u128).saturating_mul(bit as u128).saturating_add(self.phase as u128);
         (time.saturating_add(u32::MAX as u128) >> 32) as u64
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::Wave;
+
+    /// A millionth of the rate is the lowest: a bit of 8 samples lasts 8 million.
+    #[test]
+    fn the_slowest_transmitter() {
+        for ppm in [-999_999, -1_000_000, -1_000_001, i32::MIN] {
+            assert_eq!(Wave::new(8, ppm, 0).first_sample(1), 8_000_000, "{ppm}");
+        }
+        assert_eq!(Wave::new(8, -999_998, 0).first_sample(1), 4_000_000);
     }
 }
