@@ -93,7 +93,17 @@ impl Guess {
     #[inline(always)]
     pub(super) fn next(&mut self, last: u64) -> Option<u64> {
         self.wait = self.wait.checked_sub(1)?;
-        Some(self.foresee(Cubic::bent).unwrap_or_else(|| self.search(last)))
+        if let Some(tick) = self.foresee(Cubic::bent) {
+            return Some(tick);
+        }
+        if cfg!(target_pointer_width = "64") {
+            // In a copy, lest the run of the stepper has to be in memory.
+            let mut copy = *self;
+            let tick = copy.search(last);
+            *self = copy;
+            return Some(tick);
+        }
+        Some(self.search(last))
     }
 
     /// The tick of the next step, and no look for more in the next ones.

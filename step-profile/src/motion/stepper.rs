@@ -73,10 +73,10 @@ impl Stepper {
             if let Some(tick) = self.rest.single() {
                 return Some(tick);
             }
-            self.run = self.rest.run(curve, frame)?;
+            self.run = self.rest.apart(|rest| rest.run(curve, frame))?;
         }
         let (tick, is_certain) = self.run.step();
-        Some(if is_certain { tick } else { self.rest.exact(tick, self.run.count) })
+        Some(if is_certain { tick } else { self.rest.apart(|rest| rest.exact(tick, self.run.count)) })
     }
 
     /// All steps that are left, in order.
@@ -117,6 +117,19 @@ impl Rest {
     /// Doublings of the steps at constant speed that are foreseen at once: what their interval is rounded by does not add up
     /// to 2^-16 ticks.
     const EVEN: u32 = 15;
+
+    /// Calls with a copy where registers are many: what a reference is taken of has to be in memory, and the run with it.
+    #[inline(always)]
+    fn apart<T>(&mut self, call: impl FnOnce(&mut Self) -> T) -> T {
+        if cfg!(target_pointer_width = "64") {
+            let mut copy = self.clone();
+            let done = call(&mut copy);
+            *self = copy;
+            done
+        } else {
+            call(self)
+        }
+    }
 
     /// The next step, if steps are made one by one.
     #[inline(always)]
