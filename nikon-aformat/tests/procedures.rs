@@ -265,6 +265,10 @@ fn detection_asks_for_a_position_and_the_type_word() {
     assert_eq!(search.start(7), send(EncoderAddress::MAX, Operation::Abs40Mt, 7));
     assert_eq!(search.receive(LOST, 50), Step::Failed { error: Error::NoResponse, ready_ns: 10_050 });
     let _ = search.start(7);
+    // What answers another request tells nothing of who answers this one.
+    let other = said(EA, Command::Abs40, 0, Data::Abs40 { abs: U40::truncate(5) });
+    assert_eq!(search.receive(other, 50), Step::Failed { error: Error::NotCarried, ready_ns: 10_050 });
+    let _ = search.start(7);
     let read = |address, not_before_ns| send(EA, Operation::EepromRead { address }, not_before_ns);
     assert_eq!(search.receive(position, 50), read(0xf7, 10_050));
     assert_eq!(search.receive(word(Command::EepromRead, 0, 0xf7, 1), 60), read(0xf6, 300_060));

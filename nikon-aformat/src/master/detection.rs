@@ -1,4 +1,5 @@
 use super::{EepromRead, Step};
+use crate::command::Command;
 use crate::error::Error;
 use crate::number::EncoderAddress;
 use crate::operation::Operation;
@@ -60,7 +61,8 @@ impl Detection {
         let Some(mut reading) = self.reading else {
             let soon = now_ns.saturating_add(crate::timing::REQUEST_GAP_NS.into());
             return match outcome {
-                Ok(response) => self.read(response.ea, soon),
+                Ok(response) if response.command() == Some(Command::Abs40Mt) => self.read(response.ea, soon),
+                Ok(_) => Step::Failed { error: Error::NotCarried, ready_ns: soon },
                 Err(error) => Step::Failed { error, ready_ns: soon },
             };
         };
