@@ -182,7 +182,7 @@ pub fn path(mut data: &[u8]) {
     let [speed, acceleration, jerk, deviation] = core::array::from_fn(|_| u32::from(byte(&mut data)));
     let limits = Limits::new(speed * 100 + 50, acceleration * 1000 + 500).expect("in range");
     let limits = if jerk == 0 { limits } else { limits.with_jerk(u64::from(jerk) * 100_000).expect("in range") };
-    let axis = AxisSetup { limits, steps_per_m: 80_000 };
+    let axis = AxisSetup::new(limits, 80_000);
     let path = Path::<2, 4>::new(Clock::MICROSECONDS, [axis; 2], deviation).expect("a speed below the clock's");
     let mut watched = Watched { machine: PathMover::new(path), position: [0; 2], now: 0 };
     while let [command, a, b, rest @ ..] = data {

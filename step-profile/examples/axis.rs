@@ -65,7 +65,7 @@ fn run(x: &mut Mover, position: i64, now: &mut u64) {
 
 /// Two axes along a line and a quarter of a circle, after a pause of a second.
 fn corner() -> Result<(), Box<dyn core::error::Error>> {
-    let axis = AxisSetup { limits: Limits::new(20_000, 200_000)?, steps_per_m: 80_000 };
+    let axis = AxisSetup::new(Limits::new(20_000, 200_000)?, 80_000);
     let mut path = Path::<2, 64>::new(Clock::MICROSECONDS, [axis; 2], 20)?;
     path.push([800, 0], 100_000)?;
     for end in Arc::new([10_000, 0], [15_000, 5000], [10_000, 5000], false, 5)? {
@@ -88,7 +88,7 @@ fn corner() -> Result<(), Box<dyn core::error::Error>> {
 
 /// Two axes with a hand on the feed: slower, held, sent on, and told to go home instead.
 fn feed() -> Result<(), Box<dyn core::error::Error>> {
-    let axis = AxisSetup { limits: Limits::new(20_000, 200_000)?.with_jerk(4_000_000)?, steps_per_m: 80_000 };
+    let axis = AxisSetup::new(Limits::new(20_000, 200_000)?.with_jerk(4_000_000)?, 80_000);
     let mut machine = PathMover::new(Path::<2, 8>::new(Clock::MICROSECONDS, [axis; 2], 20)?);
     machine.push([8000, 4000], 100_000, 0)?;
     machine.push([8000, 12_000], 100_000, 0)?;

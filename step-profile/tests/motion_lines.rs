@@ -8,7 +8,7 @@ use step_profile::{Direction, Error};
 
 fn axis(v: u32, a: u32, j: u64, steps_per_m: u32) -> AxisSetup {
     let limits = Limits::new(v, a).unwrap();
-    AxisSetup { limits: if j == 0 { limits } else { limits.with_jerk(j).unwrap() }, steps_per_m }
+    AxisSetup::new(if j == 0 { limits } else { limits.with_jerk(j).unwrap() }, steps_per_m)
 }
 
 /// Runs a line, and checks that no axis leaves it by more than half a step (and a tick). Returns its end.
@@ -128,7 +128,7 @@ fn refusals_leave_the_path_as_it_was() {
     assert_eq!((path.push([20], 5), path.len(), path.target()), (Err(Error::QueueFull), 1, [10]));
     path.not_before(1000);
     assert!(path.next_line().unwrap().all(|pulse| pulse.tick > 1000));
-    let scale = [AxisSetup { steps_per_m: 0, ..axes[0] }];
+    let scale = [AxisSetup::new(axes[0].limits, 0)];
     assert!(matches!(Path::<1, 1>::new(Clock::MICROSECONDS, scale, 5), Err(Error::NoScale)));
 }
 

@@ -216,7 +216,7 @@ fn acceleration(state: &State) -> f64 {
 
 fn axis(v: u32, a: u32, j: u64, steps_per_m: u32) -> AxisSetup {
     let limits = Limits::new(v, a).unwrap();
-    AxisSetup { limits: if j == 0 { limits } else { limits.with_jerk(j).unwrap() }, steps_per_m }
+    AxisSetup::new(if j == 0 { limits } else { limits.with_jerk(j).unwrap() }, steps_per_m)
 }
 
 proptest! {

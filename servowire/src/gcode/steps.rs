@@ -26,7 +26,7 @@ impl Steps {
         steps_per_mm: u32,
         deviation: u32,
     ) -> Result<Self, step_profile::Error> {
-        let axis = AxisSetup { limits, steps_per_m: steps_per_mm * 1000 };
+        let axis = AxisSetup::new(limits, steps_per_mm * 1000);
         let path = Path::new(Clock::NANOSECONDS, [axis; AXES], deviation)?;
         Ok(Self { lines: lines.into_iter(), path, per_mm: f64::from(steps_per_mm), line: None, end: 0 })
     }

@@ -11,11 +11,19 @@ use crate::error::Error;
 /// An axis of a machine.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[non_exhaustive]
 pub struct AxisSetup {
     /// What it can take.
     pub limits: Limits,
     /// Steps a metre, at least 1: 80 steps/mm are 80000.
     pub steps_per_m: u32,
+}
+
+impl AxisSetup {
+    /// Both fields.
+    pub const fn new(limits: Limits, steps_per_m: u32) -> Self {
+        Self { limits, steps_per_m }
+    }
 }
 
 /// How it goes on along a line.
@@ -38,7 +46,7 @@ pub(super) struct Course {
 ///
 /// ```
 /// use step_profile::motion::{AxisSetup, Clock, Limits, Path};
-/// let axis = AxisSetup { limits: Limits::new(20_000, 200_000)?, steps_per_m: 80_000 };
+/// let axis = AxisSetup::new(Limits::new(20_000, 200_000)?, 80_000);
 /// let mut path = Path::<2, 8>::new(Clock::MICROSECONDS, [axis; 2], 20)?;
 /// path.push([800, 400], 100_000)?; // 10 mm and 5 mm, at 100 mm/s
 /// path.push([1600, 800], 100_000)?; // straight on: no stop

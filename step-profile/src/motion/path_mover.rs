@@ -22,7 +22,7 @@ use crate::error::Error;
 ///
 /// ```
 /// use step_profile::motion::{AxisSetup, Clock, Limits, Path, PathMover};
-/// let axis = AxisSetup { limits: Limits::new(20_000, 200_000)?, steps_per_m: 80_000 };
+/// let axis = AxisSetup::new(Limits::new(20_000, 200_000)?, 80_000);
 /// let path = Path::<2, 8>::new(Clock::MICROSECONDS, [axis; 2], 20)?;
 /// let mut machine = PathMover::new(path);
 /// machine.push([8000, 4000], 100_000, 0)?; // to 100 mm, 50 mm at 100 mm/s

@@ -284,7 +284,7 @@ kernels! {
 
     /// Three lines of two axes with their corners, planned and run: 300 steps.
     fn step_profile_motion_lines(move_: &Limited) -> Option<u64> {
-        let axis = AxisSetup { limits: limits(move_)?, steps_per_m: 80_000 };
+        let axis = AxisSetup::new(limits(move_)?, 80_000);
         let mut path = Path::<2, 4>::new(Clock::MICROSECONDS, [axis; 2], 20).ok()?;
         for corner in [[100, 50], [200, 30], [200, 80]] {
             path.push(corner, 100_000).ok()?;
