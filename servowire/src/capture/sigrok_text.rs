@@ -8,6 +8,8 @@ use crate::fault::{At, Fault};
 
 /// Longer lines are none of this format.
 const LONGEST: usize = 1 << 20;
+/// More channels has no device.
+const CHANNELS: usize = 1024;
 
 /// A text of samples behind its two lines of heading.
 pub struct SigrokText {
@@ -50,6 +52,9 @@ impl SigrokText {
             let (name, samples) = file.samples_of(&line)?;
             let again = file.channels.contains(&name);
             if !again {
+                if file.channels.len() == CHANNELS {
+                    return Err(file.input.fault(At::Line(file.line), format!("more than {CHANNELS} channels")));
+                }
                 file.channels.push(name.clone());
             }
             file.waiting.push((name, samples));
@@ -135,11 +140,28 @@ impl Line for SigrokText {
                 Some(line) => lines.push(self.samples_of(&line)?),
             }
         }
-        for (name, samples) in lines {
-            self.take(&name, &samples, changes)?;
+        let mut ragged = false;
+        for round in lines.chunks(self.channels.len().max(1)) {
+            let twice = |(at, (name, _)): (usize, &(String, _))| round.iter().take(at).any(|(known, _)| known == name);
+            if round.iter().enumerate().any(twice) {
+                return Err(self.input.fault(At::Line(self.line), "a channel comes twice in a round of lines"));
+            }
+            // All channels have the same samples; where not, those that all of them have are good.
+            let least = round.iter().map(|(_, samples)| samples.len()).min().unwrap_or(0);
+            for (name, samples) in round {
+                self.take(name, samples.get(..least).unwrap_or_default(), changes)?;
+            }
+            ragged = round.iter().any(|(_, samples)| samples.len() != least);
+            if ragged {
+                break;
+            }
         }
         if let Some(new) = changes.get_mut(first..) {
             new.sort_by_key(|change| change.time);
+        }
+        if ragged {
+            let what = "the lines of a round have different numbers of samples: the file was cut off or is damaged";
+            return Err(self.input.fault(At::Line(self.line), what));
         }
         Ok(more)
     }
