@@ -202,7 +202,7 @@ fn sigrok_text_whose_channels_differ() {
     run.fails_with("the lines of a round have different numbers of samples");
     let run = bench.decode("a.bits", format!("{head}D0:1111\nD1:1111\nD0:1111\nD0:0000\n"), &[]);
     run.fails_with("line 6: a channel comes twice in a round of lines");
-    let many: String = (0..2000).map(|k| format!("D{k}:1111\n")).collect();
+    let many = (0..2000).map(|k| format!("D{k}:1111\n")).collect::<Vec<_>>().concat();
     bench.decode("a.bits", format!("{head}{many}"), &[]).fails_with("more than 1024 channels");
 }
 

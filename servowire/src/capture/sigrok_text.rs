@@ -170,3 +170,22 @@ impl Line for SigrokText {
         self.clock.time(self.samples.iter().copied().min().unwrap_or(0))
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn round_after_round() {
+        let text =
+            b"libsigrok 0.5.2\nAcquisition with 2/2 channels at 1 MHz\nD0:10\nD1:11\nD0:01\nD1:00\n\nD0:11\nD1:01\n";
+        let mut file = SigrokText::new(Input::embedded("rounds", text)).unwrap();
+        let mut changes = Vec::new();
+        while file.read(&mut changes).unwrap() {}
+        let of = |channel| changes.iter().filter(move |change| change.channel == channel);
+        let said = |channel| of(channel).map(|change| (change.time / 1_000_000, change.level)).collect::<Vec<_>>();
+        assert_eq!(said(0), [(0, true), (1, false), (3, true)]);
+        assert_eq!(said(1), [(0, true), (2, false), (5, true)]);
+        assert_eq!(file.reached(), 6_000_000);
+    }
+}
