@@ -190,10 +190,10 @@ pub fn master(mut data: &[u8]) {
 /// ```
 pub fn link(mut data: &[u8]) {
     let dialect = if byte(&mut data) & 1 == 0 { Dialect::SICK } else { Dialect::TI };
-    let clean = Disturbance { delay: u32::from(byte(&mut data)) % 84, ..Disturbance::default() };
+    let clean = Disturbance::default().with_delay(u32::from(byte(&mut data)) % 84);
     let jitter = byte(&mut data) % 4;
     let bit_errors = u32::from(byte(&mut data)) * 100;
-    let mut cable = Cable::new(Disturbance { jitter, bit_errors, ..clean }, 7);
+    let mut cable = Cable::new(clean.with_jitter(jitter).with_bit_errors(bit_errors), 7);
     let mut master = Master::new(dialect);
     let mut encoder = Device::new(EncoderId::new(0x00153).expect("20 bits"));
     let mut position = 1_u64 << 30;

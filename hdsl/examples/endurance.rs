@@ -11,7 +11,7 @@ use hdsl::{Dialect, EncoderId};
 fn main() -> Result<(), Box<dyn core::error::Error>> {
     let frames: u64 = std::env::args().nth(1).map_or(Ok(100_000), |n| n.parse())?;
     // 100 m of cable, every edge up to one sample early or late.
-    let mut cable = Cable::new(Disturbance { jitter: 1, ..Disturbance::metres(100) }, 42);
+    let mut cable = Cable::new(Disturbance::metres(100).with_jitter(1), 42);
     let mut master = Master::new(Dialect::SICK);
     let mut encoder = Device::new(EncoderId::try_from(0x00153)?);
 

@@ -34,7 +34,7 @@ fn hex(bytes: impl IntoIterator<Item = u8>) -> String {
 /// The trace, a line for every H-frame.
 pub(crate) fn trace(dialect: Dialect, metres: u32, frames: u64) -> Result<String, Box<dyn core::error::Error>> {
     let mut text = String::new();
-    let mut cable = Cable::new(Disturbance { jitter: 1, ..Disturbance::metres(metres) }, 1);
+    let mut cable = Cable::new(Disturbance::metres(metres).with_jitter(1), 1);
     let mut master = Master::new(dialect);
     let mut map = Registers::new(&dialect);
     // 24 bits of position, and a start near its end.

@@ -11,6 +11,7 @@ use crate::sampling::WINDOW;
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "arbitrary", derive(arbitrary::Arbitrary))]
+#[non_exhaustive]
 pub struct Disturbance {
     /// From the start of reception to the first bit of an answer, in eighths of a bit (13.333 ns): there and back.
     pub delay: u32,
@@ -27,6 +28,15 @@ pub struct Disturbance {
 }
 
 impl Disturbance {
+    servowire_core::builder! {
+        with_delay: delay, u32;
+        with_down_delay: down_delay, u32;
+        with_jitter: jitter, u8;
+        with_glitches: glitches, u32;
+        with_bit_errors: bit_errors, u32;
+        with_clock_ppm: clock_ppm, i32;
+    }
+
     /// A clean line of `metres`: 5 ns a metre each way, and most of a bit for encoder and transceivers.
     pub const fn metres(metres: u32) -> Self {
         // 3/40 eighths of a bit a ns.
@@ -211,7 +221,7 @@ mod tests {
     proptest! {
         #[test]
         fn a_clean_line_only_delays(bits in 0..1_u64 << 61, delay in 0..88_u32) {
-            let mut simulated = Cable::new(Disturbance { delay, ..Disturbance::default() }, 1);
+            let mut simulated = Cable::new(Disturbance::default().with_delay(delay), 1);
             prop_assert_eq!(simulated.up(Some(bits)), line(bits, delay));
             prop_assert_eq!(simulated.up(None), [0xff; WINDOW]);
         }
@@ -219,7 +229,7 @@ mod tests {
         /// Jitter of one sample never makes a bit error, wherever the receiver learned to sample.
         #[test]
         fn one_sample_of_jitter(bits in 0..1_u64 << 61, delay in 0..84_u32, seed: u64) {
-            let mut simulated = Cable::new(Disturbance { delay, jitter: 1, ..Disturbance::default() }, seed);
+            let mut simulated = Cable::new(Disturbance::default().with_delay(delay).with_jitter(1), seed);
             let learned = Alignment::learn(EdgeRule::Leading, &simulated.up(Some(TEST_PATTERN)));
             prop_assert_eq!(learned.unwrap().bits(&simulated.up(Some(bits))), Ok(bits));
         }
@@ -227,7 +237,7 @@ mod tests {
         /// An encoder whose clock is 2000 ppm off is still read.
         #[test]
         fn clock_offset(bits in 0..1_u64 << 61, ppm in -2000..2000, seed: u64) {
-            let mut simulated = Cable::new(Disturbance { delay: 20, clock_ppm: ppm, jitter: 1, ..Disturbance::default() }, seed);
+            let mut simulated = Cable::new(Disturbance::default().with_delay(20).with_clock_ppm(ppm).with_jitter(1), seed);
             let learned = Alignment::learn(EdgeRule::Leading, &simulated.up(Some(TEST_PATTERN)));
             prop_assert_eq!(learned.unwrap().bits(&simulated.up(Some(bits))), Ok(bits));
         }
@@ -235,7 +245,7 @@ mod tests {
 
     #[test]
     fn rates_are_as_asked_for() {
-        let mut simulated = Cable::new(Disturbance { bit_errors: 10_000, ..Disturbance::default() }, 7);
+        let mut simulated = Cable::new(Disturbance::default().with_bit_errors(10_000), 7);
         // One of a hundred of 61 bits.
         let rounds = if cfg!(miri) { 100 } else { 2000 };
         let wrong: u32 = (0..rounds).map(|_| (simulated.spoilt(0)).count_ones()).sum();

@@ -18,7 +18,7 @@
 //! use hdsl::master::Master;
 //! use hdsl::Dialect;
 //!
-//! let mut cable = Cable::new(Disturbance { jitter: 1, ..Disturbance::metres(40) }, 1);
+//! let mut cable = Cable::new(Disturbance::metres(40).with_jitter(1), 1);
 //! let mut master = Master::new(Dialect::SICK);
 //! let mut encoder = Device::new(EncoderId::try_from(0x00153)?);
 //! for frame in 0..150_u64 {

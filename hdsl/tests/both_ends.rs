@@ -55,7 +55,7 @@ fn a_cable_that_is_too_long() {
 #[test]
 fn one_sample_of_jitter() {
     for eighths in 0..8 {
-        let disturbance = Disturbance { delay: 16 + eighths, jitter: 1, ..Disturbance::default() };
+        let disturbance = Disturbance::default().with_delay(16 + eighths).with_jitter(1);
         let mut bench = Bench::new(Dialect::SICK, 0x00153, disturbance);
         bench.speed = 77;
         bench.lock();

@@ -163,7 +163,7 @@ fn many_edges_are_a_bad_signal() {
 #[test]
 fn edges_register() {
     for (jitter, periods) in [(0, 1), (1, 3)] {
-        let mut bench = Bench::new(Dialect::TI, 0x00153, Disturbance { jitter, delay: 20, ..Disturbance::default() });
+        let mut bench = Bench::new(Dialect::TI, 0x00153, Disturbance::default().with_jitter(jitter).with_delay(20));
         bench.frames(70);
         let [edges] = bench.map.get(Register::Edges);
         assert_eq!(edges.count_ones(), periods, "{edges:08b}");
@@ -177,7 +177,7 @@ fn no_restart_without_a_fault() {
     for dialect in DIALECTS {
         for id in [0x00153, 0x00133, 0x000d3, 0x1_0133, 0x0_f553, 0x0_0053] {
             for delay in [8, 13, 22, 40, 87] {
-                let mut bench = Bench::new(dialect, id, Disturbance { delay, ..Disturbance::default() });
+                let mut bench = Bench::new(dialect, id, Disturbance::default().with_delay(delay));
                 bench.position = 1 << 15;
                 bench.lock();
                 bench.frames(2000);
@@ -371,7 +371,7 @@ fn message_reset() {
 #[test]
 fn stuffing_while_searching() {
     for (delay, stuffing) in [(1, 4), (2, 5), (8, 11), (11, 14)] {
-        let mut bench = Bench::new(Dialect::TI, 0x00153, Disturbance { delay: 8 * delay, ..Disturbance::default() });
+        let mut bench = Bench::new(Dialect::TI, 0x00153, Disturbance::default().with_delay(8 * delay));
         bench.frames(18);
         for _ in 0..9 {
             assert_eq!(

@@ -104,7 +104,7 @@ fn positions_follow_the_edge_within_a_bit() {
 #[test]
 fn jitter_of_the_edge() {
     for dialect in [Dialect::SICK, Dialect::TI] {
-        let disturbance = Disturbance { jitter: 1, ..Disturbance::metres(50) };
+        let disturbance = Disturbance::metres(50).with_jitter(1);
         let mut line = Line::new(dialect, None, disturbance, 3);
         line.speed = 100;
         line.lock();
@@ -125,7 +125,7 @@ fn jitter_of_the_edge() {
 /// instant or nothing.
 #[test]
 fn glitches_both_ways() {
-    let disturbance = Disturbance { jitter: 1, glitches: 200, ..Disturbance::metres(30) };
+    let disturbance = Disturbance::metres(30).with_jitter(1).with_glitches(200);
     let mut line = Line::new(Dialect::SICK, None, disturbance, 0);
     line.speed = 2;
     let (mut good, mut wrong) = (0, 0);

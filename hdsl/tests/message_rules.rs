@@ -71,7 +71,7 @@ fn where_an_answer_ends() {
 /// 64 frames without an answer may pass for a short message, and so many as were set for a long one; the next one ends it.
 #[test]
 fn how_long_to_wait() {
-    let limits = Limits { short_tries: 1, short_frames: 64, long_frames: 100 };
+    let limits = Limits::DEFAULT.with_short_tries(1).with_short_frames(64).with_long_frames(100);
     let mut master = Requester::new(limits);
     master.start_short(ShortRequest::Read(PING)).unwrap();
     while master.transmit() != MasterSymbol::Idle {}

@@ -124,7 +124,7 @@ fn a_message_reset_at_the_encoder() {
 fn the_sign_of_the_clock_offset() {
     // One edge, up at bit 60 or sample 480: 484.8 and 475.2.
     let place = |ppm| {
-        let samples = Cable::new(Disturbance { clock_ppm: ppm, ..Disturbance::default() }, 1).up(Some(1 << 60));
+        let samples = Cable::new(Disturbance::default().with_clock_ppm(ppm), 1).up(Some(1 << 60));
         samples.iter().map(|byte| byte.count_zeros()).sum::<u32>()
     };
     assert_eq!((place(0), place(10_000), place(-10_000)), (480, 484, 475));

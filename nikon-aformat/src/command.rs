@@ -169,6 +169,18 @@ impl Command {
         if self.is_reset() { 8 } else { 1 }
     }
 
+    /// What a reset does to the encoder, in words for a log.
+    pub const fn effect(self) -> Option<&'static str> {
+        match self {
+            Self::ClearStatus => Some("clears alarms"),
+            Self::ClearMultiturn => Some("clears turns"),
+            Self::ClearStatusMultiturn => Some("clears alarms and turns"),
+            Self::SetAddress1 => Some("sets the address"),
+            Self::ZeroPreset => Some("sets the single-turn zero"),
+            _ => None,
+        }
+    }
+
     /// Whether the response comes from the encoder that the request addresses.
     ///
     /// Not so for the multi-response commands, for those that any encoder on a one-to-one line answers (17, 19), and
@@ -292,6 +304,7 @@ mod tests {
         let new = Command::ALL.into_iter().filter(|c| !c.is_in(Version::V2_1)).map(Command::code);
         assert!(new.eq(23..=26));
         assert!(Command::ALL.into_iter().filter(|c| c.repeats() == 8).map(Command::code).eq(8..=12));
+        assert!(Command::ALL.into_iter().filter(|c| c.effect().is_some()).map(Command::code).eq(8..=12));
         for command in Command::ALL {
             assert_eq!(command.mnemonic().ends_with("_MT"), command.is_multi_response());
         }

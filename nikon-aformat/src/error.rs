@@ -170,6 +170,36 @@ servowire_core::errors! {
     }
 }
 
+impl Error {
+    /// The frame in which the fault shows, 0 for the first; none where that is not in one frame, or depends on the length
+    /// of the response: its CRC-8 is in the last.
+    pub const fn frame(self) -> Option<u8> {
+        match self {
+            Self::StartBit { frame } | Self::Delimiter { frame } | Self::FrameCode { frame, .. } => Some(frame),
+            Self::SyncCode { .. }
+            | Self::FixedBit
+            | Self::AddressMismatch { .. }
+            | Self::CommandMismatch { .. }
+            | Self::UnknownCommand { .. } => Some(0),
+            _ => None,
+        }
+    }
+
+    /// The first bit of the part of that [`frame`](Self::frame) that is wrong, in the order of the line: 0 is the start
+    /// bit, 17 the delimiter.
+    pub const fn bit(self) -> Option<u8> {
+        match self {
+            Self::StartBit { .. } => Some(0),
+            Self::Delimiter { .. } => Some(17),
+            Self::SyncCode { .. } => Some(1),
+            Self::FrameCode { .. } | Self::AddressMismatch { .. } => Some(4),
+            Self::CommandMismatch { .. } => Some(7),
+            Self::FixedBit => Some(12),
+            _ => None,
+        }
+    }
+}
+
 /// An argument that a response repeats.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -207,6 +237,24 @@ servowire_core::nom_error!(Error);
 mod tests {
     use super::*;
     use std::string::ToString;
+
+    /// A frame is a start bit, sixteen bits and a delimiter; the information field is the sync code, three bits of address,
+    /// five of command, a fixed bit, and the status. Of a request the frame code stands where the address would.
+    #[test]
+    fn a_fault_is_where_it_shows_on_the_line() {
+        let at = |error: Error| (error.frame(), error.bit());
+        assert_eq!(at(Error::StartBit { frame: 2 }), (Some(2), Some(0)));
+        assert_eq!(at(Error::Delimiter { frame: 5 }), (Some(5), Some(17)));
+        assert_eq!(at(Error::SyncCode { got: 3 }), (Some(0), Some(1)));
+        assert_eq!(at(Error::FrameCode { frame: 1, got: 0, want: 1 }), (Some(1), Some(4)));
+        assert_eq!(at(Error::AddressMismatch { got: 1, want: 0 }), (Some(0), Some(4)));
+        assert_eq!(at(Error::CommandMismatch { got: 1, want: 0 }), (Some(0), Some(7)));
+        // In a request it stands elsewhere than in a response.
+        assert_eq!(at(Error::UnknownCommand { code: 31 }), (Some(0), None));
+        assert_eq!(at(Error::FixedBit), (Some(0), Some(12)));
+        assert_eq!(at(Error::Crc { got: 1, want: 0 }), (None, None));
+        assert_eq!(at(Error::NoResponse), (None, None));
+    }
 
     #[test]
     fn messages_are_sentences_for_a_person() {

@@ -130,7 +130,8 @@ impl Receiver {
     /// # Ok(())
     /// # }
     /// ```
-    #[inline]
+    // Inlined, so that the state stays in registers from word to word.
+    #[inline(always)]
     pub const fn feed(&mut self, samples: &mut Samples) -> Option<Field> {
         while !samples.is_empty() {
             let (word, len) = samples.front();
@@ -150,29 +151,22 @@ impl Receiver {
     #[inline]
     const fn scan(&mut self, word: u32, len: u32) -> u32 {
         let (half, period) = (self.format.middle(), self.format.samples_per_bit());
+        // Bit k: sample k differs from the one before. Behind the last sample there are none.
+        let mut edges = word ^ (word << 1 | self.level);
         let mut level = self.level << 31;
         let mut bits = self.bits;
-        self.move_origin();
-        // The index of the first sample, and of the middle in the word.
-        let mut first = 0_u32;
-        let mut middle = self.left.wrapping_sub(1);
-        // Bit k: sample k differs from the one before.
-        let mut edges = word ^ (word << 1 | self.level);
-        if len < 32 {
-            edges &= 1_u32.wrapping_shl(len).wrapping_sub(1);
-        }
+        // The index of the first sample from the origin, and of the middle in the word.
+        let (first, mut middle);
         if bits == IDLE {
             let falls = edges & !word;
             if falls == 0 {
                 self.level |= (edges != 0) as u32;
                 self.origin = self.origin.wrapping_add(len as u64);
-                self.next = LONG;
-                self.left = LONG;
                 return len;
             }
             let edge = falls.trailing_zeros();
             edges &= (u32::MAX << 1).wrapping_shl(edge);
-            self.origin = self.origin.wrapping_add(edge as u64);
+            self.origin = self.origin.wrapping_add(self.here() as u64).wrapping_add(edge as u64);
             self.start = self.origin;
             first = edge.wrapping_neg();
             level = 0;
@@ -182,6 +176,10 @@ impl Receiver {
                 bits = self.format.mark();
                 middle = middle.wrapping_add(period);
             }
+        } else {
+            self.move_origin();
+            first = 0;
+            middle = self.left.wrapping_sub(1);
         }
         let end = 'line: {
             while edges != 0 {

@@ -6,6 +6,7 @@
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Samples {
+    /// The oldest in bit 0, copies of the youngest one above it.
     low: u32,
     high: u32,
     len: u32,
@@ -18,8 +19,12 @@ impl Samples {
     }
 
     /// The oldest `len` samples of `word`; all 64 where `len` is larger.
+    #[expect(clippy::cast_possible_wrap, clippy::cast_sign_loss, reason = "copies of the top bit come in")]
     pub const fn partial(word: u64, len: u32) -> Self {
         let len = if len > 64 { 64 } else { len };
+        // Up to the top and down again.
+        let above = 64_u32.wrapping_sub(len);
+        let word = (word.wrapping_shl(above) as i64).wrapping_shr(above) as u64;
         Self { low: (word & 0xffff_ffff) as u32, high: (word >> 32) as u32, len }
     }
 
@@ -40,14 +45,16 @@ impl Samples {
     }
 
     /// Takes `count` samples off the front, 1 to 32.
+    #[expect(clippy::cast_possible_wrap, clippy::cast_sign_loss, reason = "copies of the top bit come in")]
     #[inline]
     pub(crate) const fn skip(&mut self, count: u32) {
         self.len = self.len.wrapping_sub(count);
         if count == 32 {
             self.low = self.high;
+            self.high = (self.high as i32 >> 31) as u32;
         } else {
             self.low = self.low.wrapping_shr(count) | self.high.wrapping_shl(32_u32.wrapping_sub(count));
-            self.high = self.high.wrapping_shr(count);
+            self.high = (self.high as i32).wrapping_shr(count) as u32;
         }
     }
 }

@@ -30,7 +30,7 @@ use servowire::capture::{Capture, Input};
 use servowire::event::Event;
 use servowire::line::{LineField, StartStop};
 use servowire::output::{Origin, Output, Printer, Tally};
-use servowire::protocols::{Protocol, Settings, tformat};
+use servowire::protocols::{Protocol, Settings, Widths, tformat};
 
 /// Samples a bit.
 const N: usize = 8;
@@ -149,7 +149,7 @@ fn decode(data: &Rc<[u8]>, rate: u64, unit: Unit) -> Tally {
 
 fn one_by_one(samples: &[bool]) -> Tally {
     let mut receiver = Receiver::new(Format::new(N as u32, 8).unwrap());
-    let mut protocol = tformat::Decoder::new(BIT, tformat::Settings::default());
+    let mut protocol = tformat::Decoder::new(BIT, Widths::default());
     let mut tally = Tally::default();
     let time = |sample: u64| i64::try_from(sample).unwrap() * BIT / N as i64;
     for &sample in samples {

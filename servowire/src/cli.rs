@@ -9,7 +9,7 @@ use rtex_block::position::Gear;
 use crate::capture::{Format, Hints, time};
 use crate::output::filter::Filter;
 use crate::output::say;
-use crate::protocols::{Protocol, Settings, nikon, rtex, tformat};
+use crate::protocols::{Protocol, Settings, Widths, rtex};
 use crate::{cnc, decode, line, profile, registers, talk, timing};
 
 /// Decodes what servo drives, controllers and encoders say to each other.
@@ -324,7 +324,7 @@ impl Decode {
                 bit_rate: self.line.bit_rate,
                 inverted: self.line.polarity.map(|polarity| polarity == Polarity::Inverted),
             },
-            tformat: tformat::Settings {
+            widths: Widths {
                 single_turn_bits: self.tformat.single_turn_bits,
                 multi_turn_bits: self.tformat.multi_turn_bits,
             },
@@ -333,10 +333,6 @@ impl Decode {
                 mac_id: self.rtex.mac_id,
                 period_ns: self.rtex.period,
                 gear: self.rtex.gear.unwrap_or(Gear::UNITY),
-            },
-            nikon: nikon::Settings {
-                single_turn_bits: self.tformat.single_turn_bits,
-                multi_turn_bits: self.tformat.multi_turn_bits,
             },
         }
     }

@@ -22,6 +22,8 @@ pub struct Event {
     pub delay: Option<i64>,
     /// Whether the frame holds.
     pub verdict: Verdict,
+    /// Whether this is no frame but a word about the recording, which is counted nowhere.
+    pub remark: bool,
 }
 
 impl Event {
@@ -33,13 +35,17 @@ impl Event {
         fields: Vec<Field>,
         verdict: Verdict,
     ) -> Self {
-        Self { place, direction, kind: kind.into(), fields, position: None, delay: None, verdict }
+        Self { place, direction, kind: kind.into(), fields, position: None, delay: None, verdict, remark: false }
     }
 
     /// A frame whose beginning the capture does not hold: no fault of the line.
     pub fn cut(place: Place) -> Self {
-        let note = Field::text("note", "the capture begins inside a frame");
-        Self::new(place, None, "cut", vec![note], Verdict::Ok)
+        Self::remark(place, "cut", "the capture begins inside a frame")
+    }
+
+    /// What there is to say about the recording at `place`.
+    pub fn remark(place: Place, kind: &'static str, note: impl Display) -> Self {
+        Self { remark: true, ..Self::new(place, None, kind, vec![Field::text("note", note)], Verdict::Ok) }
     }
 
     /// A piece of a frame, `what`, at the end of the capture: what comes then is not known, so it is not sound.
@@ -47,15 +53,24 @@ impl Event {
         Self::new(place, None, "cut", Vec::new(), Verdict::cut_off(what))
     }
 
-    /// No answer, called `what`, came to the request at `asked` within `timeout`, in picoseconds, or until `now`.
-    pub fn silence(asked: Place, kind: &'static str, what: &str, timeout: i64, now: i64, cause: &str) -> Self {
-        let (place, reason) = match asked {
+    /// No answer, called `what`, came to the request at `place` within `timeout`, in picoseconds, or until `now`, when
+    /// somebody `asked` again or the recording ended.
+    pub fn silence(
+        place: Place,
+        kind: &'static str,
+        what: &str,
+        timeout: i64,
+        (now, asked): (i64, bool),
+        cause: &str,
+    ) -> Self {
+        let (place, reason) = match place {
             Place::Time { end: start, .. } => {
                 let end = start.saturating_add(timeout).min(now);
                 let within = end.saturating_sub(start) as f64 / 1e6;
                 (Place::Time { start, end }, format!("no {what} within {within:.1} us"))
             }
-            Place::Line(_) => (asked, format!("no {what} before the next request")),
+            Place::Line(_) if asked => (place, format!("no {what} before the next request")),
+            Place::Line(_) => (place, format!("no {what} before the log ends")),
         };
         let refusal = Refusal { cause: Some(cause.to_owned()), ..Refusal::new(NO_RESPONSE, reason) };
         Self::new(place, Some(Direction::Answer), kind, Vec::new(), refusal.into())

@@ -83,7 +83,7 @@ pub trait Printer {
     }
 }
 
-/// Counts events by their verdict.
+/// Counts frames by their verdict.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct Tally {
     /// Events that hold.
@@ -95,6 +95,7 @@ pub struct Tally {
 impl Sink for Tally {
     fn event(&mut self, event: &Event) -> io::Result<()> {
         match event.verdict {
+            _ if event.remark => {}
             Verdict::Ok => self.ok += 1,
             Verdict::Refused(_) => self.refused += 1,
         }

@@ -6,6 +6,7 @@
 //! itself. Another kind takes the [`Capture`].
 
 mod bytes;
+mod group;
 pub mod hdsl;
 pub mod nikon;
 mod plausible;
@@ -17,6 +18,8 @@ use crate::capture::Capture;
 use crate::fault::{At, Fault};
 use crate::line::{self, LineDecoder, StartStopLine, Stop, Weights};
 use crate::output::Output;
+
+pub use group::Widths;
 
 /// A protocol by its name on the command line.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
@@ -40,12 +43,10 @@ pub enum Protocol {
 pub struct Settings {
     /// About the line.
     pub line: line::Options,
-    /// About T-Format.
-    pub tformat: tformat::Settings,
+    /// About the encoder.
+    pub widths: Widths,
     /// About RTEX.
     pub rtex: rtex::Settings,
-    /// About A-format.
-    pub nikon: nikon::Settings,
 }
 
 impl Protocol {
@@ -99,11 +100,11 @@ impl Protocol {
         let bit = 1e12 / f64::from(rate.max(1));
         match self {
             Self::Tformat => {
-                let decoder = tformat::Decoder::new(bit as i64, settings.tformat);
+                let decoder = tformat::Decoder::new(bit as i64, settings.widths);
                 Some(Box::new(StartStopLine::new(bit, decoder, self.weights())))
             }
             Self::Nikon => {
-                let decoder = nikon::Decoder::new(bit as i64, settings.nikon);
+                let decoder = nikon::Decoder::new(bit as i64, settings.widths);
                 Some(Box::new(StartStopLine::new(bit, decoder, self.weights())))
             }
             Self::Hdsl => Some(Box::new(hdsl::DslLine::new(bit))),

@@ -109,8 +109,10 @@ fn spoilt(kind: Kind, rng: &mut Rng, rate: f64, spoil: impl Fn(&mut Vec<bool>)) 
 }
 
 /// Of a hundred damaged answers ninety-five causes are right, and no value is taken for good. `field`: bits of one.
+///
+/// `SEED=1234 cargo test -p servowire --test causes -- --nocapture` draws others.
 fn damage_is_told(kind: Kind, rates: &[f64], field: usize, repeats: usize) {
-    let mut rng = Rng::new(7);
+    let mut rng = Rng::new(std::env::var("SEED").ok().and_then(|seed| seed.parse().ok()).unwrap_or(7));
     let mut faults = Vec::new();
     let (mut right, mut all) = (0, 0);
     for k in 0..repeats {
@@ -192,6 +194,37 @@ fn spoilt_link(rng: &mut Rng, spoil: impl Fn(&mut Vec<bool>, &mut Vec<bool>)) ->
     events.into_iter().filter(|event| !early(&event)).collect()
 }
 
+/// Every bit of a frame in turn: TRAILER and the bit between the acceleration and channel 2 carry nothing, so they are
+/// worth a note; of what else is flipped the frame is refused, and none other but by the check of its V-frame.
+#[test]
+fn each_flipped_bit_of_a_dsl_link_is_told() {
+    const TRAILER: usize = 6;
+    const HEAD: usize = TRAILER + 26;
+    const SWITCH: usize = HEAD + 50;
+    let mut rng = Rng::new(11);
+    for at in 0..HEAD + 61 {
+        let events = spoilt_link(&mut rng, |head, answer| match at {
+            0..HEAD => head[at] ^= true,
+            _ => answer[at - HEAD] ^= true,
+        });
+        let refused: Vec<_> = events.iter().filter(|event| event["verdict"] != "ok").collect();
+        let kinds: Vec<_> = refused.iter().map(|event| event["kind"].as_str().unwrap()).collect();
+        let notes = events.iter().filter(|event| event["fields"].get("note").is_some()).count();
+        match at {
+            0..TRAILER | SWITCH => assert_eq!((kinds.len(), notes), (0, 1), "bit {at}: {events:?}"),
+            TRAILER..HEAD => assert_eq!((kinds, notes), (vec!["H-frame"], 0), "bit {at}: {refused:?}"),
+            _ => {
+                // Words one and six are of the V-frame too, whose check sees them but for a data character that became
+                // the control character of the same value.
+                let checked = !(HEAD + 10..SWITCH).contains(&at) && refused[0]["verdict"] != "wrong_kind";
+                let due = if checked { vec!["answer", "V-frame"] } else { vec!["answer"] };
+                assert_eq!((kinds, notes), (due, 0), "bit {at}: {refused:?}");
+                assert_eq!(refused[0]["start_ps"], events[1]["start_ps"], "bit {at}: not the answer that is damaged");
+            }
+        }
+    }
+}
+
 #[test]
 fn damage_to_a_dsl_link_is_told() {
     let mut rng = Rng::new(3);
@@ -199,14 +232,6 @@ fn damage_to_a_dsl_link_is_told() {
         let verdicts = events.iter().map(|event| event["verdict"].as_str().unwrap().to_owned());
         verdicts.filter(|verdict| verdict != "ok").collect()
     };
-    let mut seen = 0;
-    for _ in 0..60 {
-        let at = rng.below(61) as usize;
-        let events = spoilt_link(&mut rng, |_, answer| answer[at] ^= true);
-        // The bit for the change of direction carries nothing; of the last word only the check of the V-frame knows.
-        seen += u32::from(at == 50 || !refused(&events).is_empty());
-    }
-    assert!(seen >= 57, "{seen} of 60 flipped bits of answers are seen");
     for _ in 0..20 {
         // SYNC and SAMPLE of the head, behind the six bits of TRAILER.
         let at = 6 + rng.below(12) as usize;

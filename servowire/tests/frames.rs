@@ -90,15 +90,17 @@ fn eeprom() {
 }
 
 #[test]
-fn resets_say_what_they_clear() {
+fn resets_say_what_they_do() {
     let run = decode(|wave| {
         for cf in [0xba, 0xc2, 0x62] {
             wave.exchange(&[cf], &sealed(&[cf, 0, 1, 2, 3]));
         }
     });
     run.is_good();
-    let said: Vec<_> = run.json().iter().step_by(2).map(|e| e["fields"]["resets"].clone()).collect();
-    assert_eq!(said, ["errors", "single-turn position", "turns and errors"]);
+    let said: Vec<_> = run.json().iter().step_by(2).map(|e| e["fields"]["effect"].clone()).collect();
+    let due =
+        ["clears errors, one of 10", "sets the single-turn zero, one of 10", "clears turns and errors, one of 10"];
+    assert_eq!(said, due);
 }
 
 #[test]

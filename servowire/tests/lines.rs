@@ -115,6 +115,9 @@ fn only_the_own_requests() {
     assert_eq!(run.json()[3]["reason"], "no answer within 12.0 us");
     let log = bench.decode("echo.txt", "1A\n1A\n", &["--bytes"]);
     log.fails_with("2 of 4 frames refused: no_response 2");
+    let reasons: Vec<_> = log.out.lines().filter_map(|line| Some(line.split_once("no_response: ")?.1)).collect();
+    assert!(reasons[0].starts_with("no answer before the next request"), "{reasons:?}");
+    assert!(reasons[1].starts_with("no answer before the log ends"), "{reasons:?}");
 }
 
 /// Both wires, a direction signal, a slow clock: the wire that decodes the right way up is taken.
@@ -196,4 +199,33 @@ fn spikes_on_the_idle_line() {
     let run = bench.decode("a.vcd", wave.vcd(), &["--json"]);
     run.is_good();
     assert_eq!(run.json()[1]["fields"]["spikes"], 1);
+}
+
+/// Where the user names what the line is not, it is said what it looks like.
+#[test]
+fn a_line_of_another_protocol_than_was_said() {
+    let bench = Bench::new();
+    let traffic = good_traffic(2.5e6).vcd();
+    for wrong in [&["-p", "nikon"][..], &["-p", "hdsl"], &["--bit-rate", "4M"], &["-p", "tformat", "--bit-rate", "5M"]]
+    {
+        let run = bench.decode("a.vcd", &traffic, wrong);
+        let frames = common::GOOD_FRAMES;
+        let said = format!("it looks like T-Format at 2.5 Mbit/s: {frames} of {frames} frames hold so");
+        run.fails_with(&said);
+        assert!(run.err.contains("leave out what says otherwise"), "{wrong:?}: {}", run.err);
+    }
+    for right in [&[][..], &["-p", "tformat"], &["--bit-rate", "2.5M"], &["--polarity", "normal"]] {
+        let run = bench.decode("a.vcd", &traffic, right);
+        assert!(!run.is_good().err.contains("looks like"), "{right:?}: {}", run.err);
+    }
+    // Damage is no other protocol.
+    let mut wave = Wave::new(2.5e6);
+    wave.idle_us(20.0);
+    for k in 0..12 {
+        let mut answer = id3(k, 0, 0);
+        answer[4] ^= 1;
+        wave.exchange(&[0x1a], &answer);
+    }
+    let run = bench.decode("a.vcd", wave.vcd(), &["-p", "tformat"]);
+    assert!(!run.err.contains("looks like"), "{}", run.err);
 }

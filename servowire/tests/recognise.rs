@@ -21,7 +21,7 @@ fn random_captures_come_out_right() {
     let mut faults = String::new();
     for condition in CONDITIONS {
         for kind in Kind::ALL {
-            let row = row(condition, kind, CAPTURES);
+            let row = row(condition, kind, 0, CAPTURES);
             right += row.right;
             all += row.captures;
             assert_eq!(row.wrong, 0, "{} {}: values that were never sent", condition.name, kind.name());
@@ -31,4 +31,21 @@ fn random_captures_come_out_right() {
         }
     }
     assert!(100 * right >= 98 * all, "{right} of {all} are right\n{faults}");
+}
+
+/// A request for the position of encoder 0 has three edges behind its first: many bit lengths fit them, and the nominal one is
+/// the likeliest.
+#[test]
+fn a_first_request_of_few_edges() {
+    let drawn = [
+        ("4 to 6 samples a bit", 5014),
+        ("4 to 6 samples a bit", 5086),
+        ("ringing behind 5 to 100 % of the edges", 5068),
+        ("edges jitter by 10 % of a bit", 9028),
+    ];
+    for (name, number) in drawn {
+        let condition = CONDITIONS.iter().find(|condition| condition.name == name).unwrap();
+        let row = row(condition, Kind::Aformat, number, 1);
+        assert_eq!(row.right, 1, "{name}: {:?}", row.faults);
+    }
 }

@@ -382,3 +382,29 @@ fn a_drive_that_never_answers() {
         "drive 5 answers and was never sent a command; drive 7 never answered"
     );
 }
+
+/// What is said of the log as a whole is no frame of it.
+#[test]
+fn a_remark_on_the_log_is_counted_nowhere() {
+    let bench = Bench::new();
+    // A drive that never answers, and eight blocks that are none.
+    let mut all = exchanges();
+    for (command, _) in &mut all {
+        command[0] ^= 2;
+    }
+    let text = hex_log(&all) + &"45507000000000000000000000000000\n".repeat(8);
+    let options = ["--protocol", "rtex", "--bytes"];
+    let run = bench.decode("log.txt", &text, &[&options[..], &["--json"]].concat());
+    run.fails_with("8 of 20 frames refused");
+    let events = run.json();
+    let last = events.last().unwrap();
+    assert_eq!((events.len(), last["kind"].as_str()), (21, Some("log")), "{last}");
+    // It stands at the end of the log.
+    assert_eq!(last["line"], events[19]["line"]);
+    let stats = bench.decode("log.txt", &text, &[&options[..], &["--stats"]].concat());
+    assert!(stats.out.contains("14 requests, 6 answers, 0 others"), "{}", stats.out);
+    assert!(stats.out.contains("12 ok, 8 refused"), "{}", stats.out);
+    // Its line has no verdict, as it is no frame.
+    let shown = bench.decode("log.txt", &text, &options).out;
+    assert!(!shown.trim_end().ends_with("ok"), "{shown}");
+}

@@ -18,6 +18,7 @@ use sorte_proto::{Correction, Direction, Discovery, Error, Pto, Slice, TRANSIT_N
 
 const CABLE_NS: u64 = 50;
 const DEVICES: usize = 3;
+const CYCLES: u32 = 1000;
 
 /// A device with its counter and its axis.
 struct Node {
@@ -77,6 +78,56 @@ fn measure(nodes: &mut [Node], trigger: Trigger, at_ns: u64) {
     assert_eq!(result, Ok(()));
 }
 
+/// One cycle: the master's frame to every device, and a frame of each back. Each axis steps, the second one backwards.
+fn exchange(master: &mut Master, axes: &mut [Asked], nodes: &mut [Node], time_stamp: u16) -> Result<(), Error> {
+    let mut output = vec![0; master.output_len().into()];
+    for ((k, axis), bytes) in axes.iter_mut().enumerate().zip(output.chunks_exact_mut(4)) {
+        let step = Pto::from_step(1000, Direction::from(k == 1)).unwrap_or_default();
+        bytes.copy_from_slice(&axis.slice(step).emit());
+    }
+    let mut frame = [0; 64];
+    let len = master.write_frame(&output, time_stamp, &mut frame)?;
+    for node in nodes {
+        let arrival = 500 + node.device.delay_ns().unwrap_or_default();
+        let taken = node.device.exchange(&frame[..len], arrival, arrival)?;
+        let slice = taken.data.first_chunk().map(|bytes| Slice::parse(*bytes));
+        // The word for the SYNC0 generator.
+        let _word = node.follower.next(slice);
+        node.device.cycle_start();
+        let payload = Feedback { position: node.follower.position(), ..Feedback::default() }.emit();
+        let mut bytes = [0; 6];
+        if let Some(answer) = node.device.answer(payload) {
+            answer.emit_into(&mut bytes)?;
+            master.device_frame(&bytes)?;
+        }
+    }
+    Ok(())
+}
+
+/// Start-up and so many cycles of the exchange; the time of the last one.
+fn run(master: &mut Master, axes: &mut [Asked], nodes: &mut [Node], mut cycles: u32) -> Result<u64, Error> {
+    let mut now_ns = 0;
+    while cycles > 0 {
+        match master.poll(now_ns) {
+            Action::Wait { until_ns } => now_ns = until_ns,
+            Action::Restart { error } => return Err(error),
+            Action::Send { at_ns, frame } => {
+                let mut buffer = [0; Discovery::LEN];
+                let len = frame.emit_into(&mut buffer)?;
+                if let Some((answer, sof_ns)) = carry(nodes, &buffer[..len], at_ns) {
+                    master.receive(&answer, sof_ns)?;
+                }
+            }
+            Action::Exchange { at_ns, time_stamp, .. } => {
+                exchange(master, axes, nodes, time_stamp)?;
+                now_ns = at_ns;
+                cycles -= 1;
+            }
+        }
+    }
+    Ok(now_ns)
+}
+
 fn main() -> Result<(), Error> {
     let mut nodes: Vec<Node> = (0..DEVICES as u64)
         .map(|k| Node {
@@ -91,59 +142,12 @@ fn main() -> Result<(), Error> {
     let mut master = Master::new(master::Config::new());
     master.link(true);
     let mut axes = [Asked::new(); DEVICES];
-    let (mut now_ns, mut cycles) = (0, 0);
-    while cycles < 1000 {
-        match master.poll(now_ns) {
-            Action::Wait { until_ns } => now_ns = until_ns,
-            Action::Restart { error } => return Err(error),
-            Action::Send { at_ns, frame } => {
-                let mut buffer = [0; Discovery::LEN];
-                let len = frame.emit_into(&mut buffer)?;
-                if let Some((answer, sof_ns)) = carry(&mut nodes, &buffer[..len], at_ns) {
-                    master.receive(&answer, sof_ns)?;
-                }
-            }
-            Action::Exchange { at_ns, time_stamp, .. } => {
-                // Each axis steps in every cycle, the second one backwards.
-                let mut output = vec![0; master.output_len().into()];
-                for ((k, axis), bytes) in axes.iter_mut().enumerate().zip(output.chunks_exact_mut(4)) {
-                    let step = Pto::from_step(1000, Direction::from(k == 1)).unwrap_or_default();
-                    bytes.copy_from_slice(&axis.slice(step).emit());
-                }
-                let mut frame = [0; 64];
-                let len = master.write_frame(&output, time_stamp, &mut frame)?;
-                for node in &mut nodes {
-                    let arrival = 500 + node.device.delay_ns().unwrap_or_default();
-                    let taken = node.device.exchange(&frame[..len], arrival, arrival)?;
-                    let slice = taken.data.first_chunk().map(|bytes| Slice::parse(*bytes));
-                    // The word for the SYNC0 generator.
-                    let _word = node.follower.next(slice);
-                    node.device.cycle_start();
-                    let payload = Feedback { position: node.follower.position(), ..Feedback::default() }.emit();
-                    let mut bytes = [0; 6];
-                    if let Some(answer) = node.device.answer(payload) {
-                        answer.emit_into(&mut bytes)?;
-                        master.device_frame(&bytes)?;
-                    }
-                }
-                (now_ns, cycles) = (at_ns, cycles + 1);
-            }
-        }
-    }
-    println!("{}; {} cycles from {} ns of the master's time on", master.network(), cycles, now_ns - master.epoch_ns());
+    let end_ns = run(&mut master, &mut axes, &mut nodes, CYCLES)?;
+    println!("{}; {CYCLES} cycles from {} ns of the master's time on", master.network(), end_ns - master.epoch_ns());
     println!("round trips to the first device, shortest and longest: {:?} ns", master.line_delay().extremes());
     for (axis, node) in axes.iter().zip(&nodes) {
-        let address = node.device.assignment().map_or(0, |place| place.address.get());
-        let (asked, lag) = (axis.position(), axis.lag(node.follower.position()));
-        println!("device {address}: {:?}, asked to {asked}, {lag} steps behind", node.device.state());
-        println!(
-            "  first cycle at {:?} ns of its counter, {:?} as the published device has it",
-            node.device.first_cycle_ns(),
-            node.device.cycle_zero_ns()
-        );
-        let ports = [PortId::A, PortId::B].map(|port| node.device.forwarding(port));
-        println!("  its ports: {ports:?}");
-        assert_eq!(lag, 0);
+        show(*axis, node);
+        assert_eq!(axis.lag(node.follower.position()), 0);
     }
     // The host of the last device wants its motor driver off the line, and takes the device out.
     if let Some(last) = nodes.last_mut() {
@@ -153,4 +157,18 @@ fn main() -> Result<(), Error> {
         println!("and back: {:?}", last.device.state());
     }
     Ok(())
+}
+
+fn show(axis: Asked, node: &Node) {
+    let device = &node.device;
+    let address = device.assignment().map_or(0, |place| place.address.get());
+    let (asked, lag) = (axis.position(), axis.lag(node.follower.position()));
+    println!("device {address}: {:?}, asked to {asked}, {lag} steps behind", device.state());
+    println!(
+        "  first cycle at {:?} ns of its counter, {:?} as the published device has it",
+        device.first_cycle_ns(),
+        device.cycle_zero_ns()
+    );
+    let ports = [PortId::A, PortId::B].map(|port| device.forwarding(port));
+    println!("  its ports: {ports:?}");
 }

@@ -282,7 +282,7 @@ mod tests {
     fn a_line_of_300_devices_gives_the_bytes_of_the_buffered_form() {
         let mut buffered = Discovery::request(true);
         let mut passing = buffered.emit().to_vec();
-        let devices = if cfg!(miri) { 3 } else { 300 };
+        let devices = if cfg!(miri) { 2 } else { 300 };
         for k in 0..devices {
             let lengths = Entry { input: k, output: 300 - k };
             let (out, rewriter) = discovery(&passing, lengths, k + 1 == devices, k % 3 == 0);
@@ -296,7 +296,7 @@ mod tests {
 
     #[test]
     fn every_count_passes_as_in_the_buffered_form() {
-        for count in (0..300).chain([0x1fe, 0x1ff, 0x7f00, 0xfffe, 0xffff]).step_by(crate::stride(152)) {
+        for count in (0..300).chain([0x1fe, 0x1ff, 0x7f00, 0xfffe, 0xffff]).step_by(crate::stride(300)) {
             let mut buffered = Discovery { count, input_total: 0xfffe, ..Discovery::request(false) };
             let (out, rewriter) = discovery(&buffered.emit(), Entry::STOCK, true, false);
             let assignment = buffered.pass(Entry::STOCK, true, false);

@@ -398,3 +398,22 @@ impl Channel {
 const fn earlier(at: u64, ticks: u64) -> u64 {
     if at == NEVER { NEVER } else { at.saturating_sub(ticks) }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The counter goes to 3995 and back to 0, so no event comes of a value beyond that.
+    #[test]
+    fn a_compare_value_the_counter_never_reaches() {
+        for (value, edge) in
+            [(3990, Some(3995)), (3991, Some(4000)), (3995, Some(4000)), (3996, None), (4000, None), (5600, None)]
+        {
+            let mut axis = Channel::new(Variant::Published, 2000, 0);
+            axis.make(Write { register: Register::SyncStart, value: 0 });
+            axis.make(Write { register: Register::Cmp1, value });
+            axis.make(Write { register: Register::CmpCfg, value: 0x107 });
+            assert_eq!(axis.next_edge(20_000).map(|edge| edge.ns), edge, "{value}");
+        }
+    }
+}

@@ -4,6 +4,7 @@ mod arc;
 mod cubic;
 mod curve;
 mod cycle;
+mod guess;
 mod homing;
 mod limits;
 mod line;
@@ -14,6 +15,7 @@ mod phases;
 mod plan;
 mod planner;
 mod real;
+mod run;
 mod slope;
 mod stepper;
 

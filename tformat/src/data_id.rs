@@ -105,6 +105,21 @@ impl DataId {
         Err(Error::UnknownDataId { code })
     }
 
+    /// How often the request is sent for one act: 10 for the resets, else 1.
+    pub const fn repeats(self) -> u8 {
+        if self.effect().is_some() { 10 } else { 1 }
+    }
+
+    /// What a reset does to the encoder, in words for a log.
+    pub const fn effect(self) -> Option<&'static str> {
+        match self {
+            Self::ResetErrors => Some("clears errors"),
+            Self::SetSingleTurnZero => Some("sets the single-turn zero"),
+            Self::ResetTurnsAndErrors => Some("clears turns and errors"),
+            _ => None,
+        }
+    }
+
     /// The control field that carries this data ID.
     pub const fn control_field(self) -> ControlField {
         ControlField::compose(self.code())
@@ -231,6 +246,14 @@ mod tests {
         assert_eq!(DataId::ALL.map(DataId::code), [0, 1, 2, 3, 6, 7, 8, 12, 13]);
         assert_eq!(DataId::ResetTurnsAndErrors.to_string(), "ID C");
         assert_eq!(DataId::ReadAll.control_field().to_string(), "CF 1Ah");
+    }
+
+    /// IDs 7, 8 and C are sent ten times.
+    #[test]
+    fn what_cannot_be_undone_is_said() {
+        assert_eq!(DataId::ALL.map(DataId::repeats), [1, 1, 1, 1, 1, 10, 10, 10, 1]);
+        let said: std::vec::Vec<_> = DataId::ALL.into_iter().filter_map(DataId::effect).collect();
+        assert_eq!(said, ["clears errors", "sets the single-turn zero", "clears turns and errors"]);
     }
 
     #[test]

@@ -142,12 +142,74 @@ servowire_core::errors! {
     }
 }
 
+impl Error {
+    /// The field in which the fault shows, 0 for the control field; none where that is not in one field, or depends on the
+    /// length of the frame: the check field is the last.
+    pub const fn field(self) -> Option<u8> {
+        match self {
+            Self::StartBit { field } | Self::Delimiter { field } => Some(field),
+            // Frames have at most eleven fields.
+            Self::Truncated { got, .. } => Some(got.to_le_bytes()[0]),
+            Self::SinkCode { .. } | Self::Parity { .. } | Self::UnknownDataId { .. } | Self::CfMismatch { .. } => {
+                Some(0)
+            }
+            Self::AddressMismatch { .. } => Some(1),
+            Self::DataMismatch { .. } => Some(2),
+            _ => None,
+        }
+    }
+
+    /// The first wrong bit of that [`field`](Self::field) in the order of the line, where it can be told: 0 is the start
+    /// bit, 1 to 8 are the data bits, 9 is the delimiter.
+    pub const fn bit(self) -> Option<u8> {
+        match self {
+            Self::StartBit { .. } => Some(0),
+            Self::Delimiter { .. } => Some(9),
+            Self::SinkCode { cf } => data_bit(cf & 0b111, 0b010),
+            Self::Parity { .. } => Some(8),
+            Self::CfMismatch { got, want } | Self::AddressMismatch { got, want } | Self::DataMismatch { got, want } => {
+                data_bit(got, want)
+            }
+            _ => None,
+        }
+    }
+}
+
+/// The first data bit that differs, 1 to 8.
+const fn data_bit(got: u8, want: u8) -> Option<u8> {
+    match (got ^ want).trailing_zeros().to_le_bytes() {
+        [8, ..] => None,
+        [equal, ..] => Some(equal.wrapping_add(1)),
+    }
+}
+
 servowire_core::nom_error!(Error);
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use std::string::ToString;
+
+    /// TIDM-1011, table 2-3: a start bit, eight data bits from the least significant, a delimiter; the control field is
+    /// first, its sink code 0 1 0 comes first in it, its parity last.
+    #[test]
+    fn a_fault_is_where_it_shows_on_the_line() {
+        let at = |error: Error| (error.field(), error.bit());
+        assert_eq!(at(Error::StartBit { field: 3 }), (Some(3), Some(0)));
+        assert_eq!(at(Error::Delimiter { field: 10 }), (Some(10), Some(9)));
+        assert_eq!(at(Error::Truncated { got: 5, want: 11 }), (Some(5), None));
+        for (cf, bit) in [(0x1b, 1), (0x18, 2), (0x1e, 3)] {
+            assert_eq!(at(Error::SinkCode { cf }), (Some(0), Some(bit)));
+        }
+        assert_eq!(at(Error::Parity { cf: 0x9a }), (Some(0), Some(8)));
+        assert_eq!(at(Error::UnknownDataId { code: 4 }), (Some(0), None));
+        assert_eq!(at(Error::CfMismatch { got: 0x8a, want: 0x1a }), (Some(0), Some(5)));
+        assert_eq!(at(Error::AddressMismatch { got: 0x12, want: 0x13 }), (Some(1), Some(1)));
+        assert_eq!(at(Error::DataMismatch { got: 0x80, want: 0 }), (Some(2), Some(8)));
+        assert_eq!(at(Error::DataMismatch { got: 7, want: 7 }), (Some(2), None));
+        assert_eq!(at(Error::Crc { got: 1, want: 2 }), (None, None));
+        assert_eq!(at(Error::NoResponse { echo: false }), (None, None));
+    }
 
     #[test]
     fn messages_are_sentences_for_a_person() {

@@ -9,8 +9,8 @@ use bench::{Bench, Seen};
 use proptest::prelude::*;
 use servowire_world::{Kind, Rates, Scenario, Tally, scenarios, wanted_events};
 use tformat::device::Config;
-use tformat::master::{EEPROM_POLLING, EepromAccess, MultiTurnZero, Reset, SingleTurnZero};
-use tformat::{Abm, Abs, Address, Almc, BitRate, Error, Page, Request, Resolution};
+use tformat::master::{EEPROM_POLLING, EepromAccess, MultiTurnZero, Reset, SingleTurnZero, Step};
+use tformat::{Abm, Abs, Address, Almc, BitRate, Error, Page, Request, Resolution, Response};
 
 /// Runs seed after seed until enough has happened, and prints what it was.
 fn runs(name: &str, mut one: impl FnMut(u64) -> Bench) {
@@ -71,7 +71,8 @@ fn done_once_at_most<T>(end: &Result<T, Error>, effects: u32, seed: u64) {
 fn bench(seed: u64, rates: Rates) -> Bench {
     let rate = BitRate::ALL[(seed / 2) as usize % 2];
     let config = Config::numbered((seed * 37) as u16 % Config::NUMBERED);
-    Bench::new(Scenario::random(seed, rates), rate, config, seed % 3 == 0)
+    let bench = Bench::new(Scenario::random(seed, rates), rate, config, seed % 3 == 0);
+    if seed % 4 == 1 { bench.mixing_up(seed) } else { bench }
 }
 
 /// So that ten exchanges in a row are whole in every second run.
@@ -133,17 +134,20 @@ fn zeros<T>(name: &str, set: impl Fn(&mut Bench, u64) -> Result<T, Error>) {
     ends.print(name);
 }
 
-/// Law 5 for ID C: two attempts in a row, the second after whatever became of the first. Ten responses are no proof, but
+/// Law 5 for ID C and ID 8 alone: two attempts in a row, the second after whatever became of the first. Ten responses are no proof, but
 /// what is said to be done and is not has its reason: the encoder heard what nobody had sent then, or an older response was
 /// taken for one of the ten.
 #[test]
-fn hostile_turn_resets() {
+fn hostile_resets() {
     let mut ends = Ends::default();
-    runs("turn resets", |seed| {
+    runs("resets", |seed| {
         let mut bench = bench(seed, MILD);
         bench.moves = false;
         bench.device.set_position(Abs::truncate(5), Abm::truncate(7));
-        let mut reset = Reset::clear_turns_and_lose_multi_turn_reference();
+        let mut reset = match seed % 8 {
+            0 | 1 => Reset::set_single_turn_zero_and_shift_commutation_angle(),
+            _ => Reset::clear_turns_and_lose_multi_turn_reference(),
+        };
         for _ in 0..2 {
             let before = bench.device.effects();
             let step = reset.start(bench.ready_ns);
@@ -160,7 +164,7 @@ fn hostile_turn_resets() {
         }
         bench
     });
-    ends.print("turn resets");
+    ends.print("resets");
 }
 
 /// Errors may be cleared as often as one likes: they are gone when it is done, position and turns are not.
@@ -183,6 +187,23 @@ fn hostile_error_resets() {
     });
 }
 
+/// A write, to the page register too, is sent again only after the cell was read, was not busy, and held something else.
+fn repeated_on_evidence_only(
+    written: &mut Vec<Request>,
+    request: Request,
+    outcome: Result<Response, Error>,
+    seed: u64,
+) {
+    let frame = request.emit();
+    let [0x32, address, data, _] = *frame.as_bytes() else { return };
+    if written.contains(&request) {
+        let got = outcome.map(|response| response.emit().as_bytes().to_vec());
+        let evidence = matches!(got.as_deref(), Ok([0xea, at, holds, _]) if *at == address && *holds != data);
+        assert!(evidence, "seed {seed}: {request} is sent again after {outcome:?}");
+    }
+    written.push(request);
+}
+
 /// Law 5 for the EEPROM: a byte is written once at the most, to the page that was named and to no other, and the end says
 /// what is there.
 #[test]
@@ -192,9 +213,22 @@ fn hostile_eeprom_writes() {
         let mut bench = bench(seed, MILD);
         let (page, cell, data) = (seed as usize % 8, seed as usize % 127, 0x40 + seed as u8 % 64);
         let address = Address::truncate(cell as u8);
+        if seed % 3 == 0 {
+            // The memory is busy: a byte that stays as it is was written before.
+            let at_ns = bench.ready_ns;
+            let _ = bench.exchange(Request::write_eeprom(Address::truncate(126 - cell as u8), 0xff), at_ns);
+        }
         let mut access = EepromAccess::write(Page::new(page as u8), address, data, EEPROM_POLLING);
         let step = access.start(bench.ready_ns);
-        let end = bench.run(step, |outcome, ready_ns| access.receive(outcome, ready_ns));
+        let Step::Send { request, .. } = step else { panic!("an access begins with a request") };
+        let mut written = vec![request];
+        let end = bench.run(step, |outcome, ready_ns| {
+            let step = access.receive(outcome, ready_ns);
+            if let Step::Send { request, .. } = step {
+                repeated_on_evidence_only(&mut written, request, outcome, seed);
+            }
+            step
+        });
         if bench.forged_requests > 0 {
             return bench;
         }

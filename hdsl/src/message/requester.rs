@@ -30,6 +30,7 @@ pub struct Requester {
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "arbitrary", derive(arbitrary::Arbitrary))]
+#[non_exhaustive]
 pub struct Limits {
     /// Times a short message is sent; 0 counts as 1.
     pub short_tries: u8,
@@ -43,6 +44,12 @@ impl Limits {
     /// Three tries of 64 H-frames for a short message; 32000 H-frames for a long one, 369 ms free running and more
     /// than the 254 ms that a resource can state as its time-out.
     pub const DEFAULT: Self = Self { short_tries: 3, short_frames: 64, long_frames: 32_000 };
+
+    servowire_core::builder! {
+        with_short_tries: short_tries, u8;
+        with_short_frames: short_frames, u32;
+        with_long_frames: long_frames, u32;
+    }
 }
 
 impl Default for Limits {
@@ -397,7 +404,7 @@ mod tests {
         master.start_long(long()).unwrap();
         let (_, done) = talk(&mut master, &mut encoder, 40, |_, _| Some(EncoderSymbol::Lnak));
         assert_eq!(done.long, Some(Err(Error::NotAccepted { tries: 1 })));
-        let mut master = Requester::new(Limits { long_frames: 20, ..Limits::DEFAULT });
+        let mut master = Requester::new(Limits::DEFAULT.with_long_frames(20));
         master.start_long(long()).unwrap();
         let (_, done) = talk(&mut master, &mut encoder, 40, |_, _| Some(EncoderSymbol::Idle));
         assert_eq!(done.long, Some(Err(Error::NoAnswer { tries: 1 })));
@@ -424,7 +431,7 @@ mod tests {
         /// is usable afterwards.
         #[test]
         fn noise_gives_no_wrong_data(bad in prop::collection::btree_set(0..200_usize, 0..30)) {
-            let (mut master, mut encoder) = (Requester::new(Limits { long_frames: 60, ..Limits::DEFAULT }), Responder::new());
+            let (mut master, mut encoder) = (Requester::new(Limits::DEFAULT.with_long_frames(60)), Responder::new());
             master.start_long(long()).unwrap();
             master.start_short(read(RemoteRegister::PING)).unwrap();
             let (_, done) = talk(&mut master, &mut encoder, 400, |k, s| (!bad.contains(&k)).then_some(s));

@@ -3,10 +3,10 @@
 use nikon_aformat::bus::Addresses;
 use nikon_aformat::device::{Device, Encoders, Fault};
 use nikon_aformat::master::{BusTransaction, Line, Progress, Transaction};
-use nikon_aformat::{BitRate, EncoderAddress, Operation, Request, Resolution};
+use nikon_aformat::{BitRate, EncoderAddress, Error, Operation, Request, Resolution, Response, Version};
 use servowire_world::{Id, Scenario, Speaker, Tally, Transmission, Verdict};
 
-use super::line::{Bench, between_ns, frame_ns, host_within, idle_ns};
+use super::line::{Bench, Spoken, between_ns, frame_ns, host_within, idle_ns, value_of};
 use super::switches::{Mix, Switches};
 
 /// What a run depends on.
@@ -21,17 +21,72 @@ pub struct Setup {
     pub quiet: bool,
 }
 
+/// A request and the response to it, in numbers of the documents.
+#[derive(Debug, Clone, Copy)]
+struct Asked {
+    operation: Operation,
+    code: u16,
+    frames: u64,
+    /// Whether an encoder of version 2.1 does not know it.
+    is_new: bool,
+}
+
+impl Asked {
+    const fn of(operation: Operation, code: u16, frames: u64, is_new: bool) -> Self {
+        Self { operation, code, frames, is_new }
+    }
+}
+
+/// What is asked of one encoder, and of all: mostly the whole position.
+const SINGLE: [Asked; 6] = [
+    Asked::of(Operation::Abs40, 0, 4, false),
+    Asked::of(Operation::Abs40, 0, 4, false),
+    Asked::of(Operation::Abs40, 0, 4, false),
+    Asked::of(Operation::Abs24Low, 1, 3, false),
+    Asked::of(Operation::Abs24Vel, 23, 5, true),
+    Asked::of(Operation::Abs24VelAcc, 25, 6, true),
+];
+const MULTI: [Asked; 6] = [
+    Asked::of(Operation::Abs40Mt, 4, 4, false),
+    Asked::of(Operation::Abs40Mt, 4, 4, false),
+    Asked::of(Operation::Abs40Mt, 4, 4, false),
+    Asked::of(Operation::Abs24LowMt, 5, 3, false),
+    Asked::of(Operation::Abs24VelMt, 24, 5, true),
+    Asked::of(Operation::Abs24VelAccMt, 26, 6, true),
+];
+
+/// Single turn and turns of the encoders that exist, and of some that the 40 bits allow.
+const WIDTHS: [(u32, u32); 6] = [(20, 16), (17, 16), (24, 16), (17, 23), (22, 18), (20, 20)];
+
+impl Setup {
+    /// Of the encoders of this run.
+    fn widths(&self) -> (u32, u32) {
+        WIDTHS[self.seed as usize / 5 % WIDTHS.len()]
+    }
+
+    fn is_version_3(&self) -> bool {
+        self.seed % 3 != 1
+    }
+
+    fn resolution(&self) -> Resolution {
+        let (single, turns) = self.widths();
+        let resolution = Resolution::new(single as u8, turns as u8).unwrap();
+        resolution.with_version(if self.is_version_3() { Version::V3_0 } else { Version::V2_1 })
+    }
+}
+
 /// Encoders that behave as the switches say; those that are not `present` are silent.
-fn encoders<const N: usize>(
+pub fn encoders<const N: usize>(
     rate: BitRate,
     addresses: [u8; N],
     present: Addresses,
     switches: Switches,
+    resolution: Resolution,
 ) -> Encoders<N, 2> {
     let mut index = 0;
     let all = addresses.map(|ea| {
         let address = EncoderAddress::truncate(ea);
-        let mut device = Device::new(address, Resolution::default(), rate);
+        let mut device = Device::new(address, resolution, rate);
         device.set_behaviour(switches.behaviour(ea, index));
         if present.has(address) {
             index += 1;
@@ -49,6 +104,10 @@ pub struct Shown {
     runs: u64,
     good: u64,
     failed: u64,
+    /// Not sent, because the encoder does not know it.
+    unsent: u64,
+    /// Nothing but the own request came back.
+    echo_alone: u64,
     /// Not seen by the CRC-8, or a foreign speaker's.
     unknown: u64,
     forged: u64,
@@ -92,6 +151,33 @@ fn judge<const N: usize>(bench: &Bench<N>, id: Id, value: u64, shown: &mut Shown
     verdict
 }
 
+/// The position of a response is where the shaft was when it was sent. Of the turns a response of 24 bits has the lowest.
+fn is_where_the_shaft_was<const N: usize>(bench: &Bench<N>, response: &Response, setup: &Setup) {
+    let Some(Spoken { single_turn, turns, code, .. }) = bench.spoken(value_of(response.emit().contents())) else {
+        return;
+    };
+    let (single_bits, turns_bits) = bench.widths;
+    let is_whole = matches!(code, 0 | 4);
+    let shown_bits = if is_whole { turns_bits } else { turns_bits.min(24 - single_bits) };
+    let position = setup.resolution().position(response).unwrap();
+    let shown = (position.single_turn, position.turns, u32::from(position.turns_bits));
+    assert_eq!(shown, (*single_turn, turns & ((1 << shown_bits) - 1), shown_bits), "seed {}", setup.seed);
+    // The counter is cyclic: its upper half stands for what is below 0.
+    let (turns, all) = (i64::from(*turns), 1_i64 << turns_bits);
+    let signed = if turns >= all / 2 { turns - all } else { turns };
+    let want = is_whole.then_some(signed as i32);
+    assert_eq!(setup.resolution().signed_turns(position), want, "seed {}", setup.seed);
+}
+
+/// An own echo is no answer, not even a wrong one: where nothing else came back, nothing did.
+fn is_echo_alone<const N: usize>(bench: &Bench<N>, id: Id, shown: &mut Shown) -> bool {
+    let own = |handed: &servowire_world::Handed| handed.origin.transmission == id && !handed.damaged;
+    let truth = bench.world.truth();
+    let alone = truth.handed_since(id).next().is_some() && truth.handed_since(id).all(own);
+    shown.echo_alone += u64::from(alone);
+    alone
+}
+
 /// A response of so many frames with all the idle time between them that a master allows.
 fn longest_ns(rate: BitRate, frames: u64) -> u64 {
     frames * frame_ns(rate) + (frames - 1) * idle_ns(rate)
@@ -99,21 +185,35 @@ fn longest_ns(rate: BitRate, frames: u64) -> u64 {
 
 /// Law 4: no encoder speaks at `ready_ns` or later that began in time, which for the last of `places` on a bus is as many
 /// longest responses and pauses later. A request that the line repeats is answered twice.
-fn line_is_free<const N: usize>(bench: &Bench<N>, id: Id, at_ns: u64, ready_ns: u64, places: u64, seed: u64) {
+fn line_is_free<const N: usize>(
+    bench: &Bench<N>,
+    id: Id,
+    asked: Asked,
+    at_ns: u64,
+    ready_ns: u64,
+    places: u64,
+    seed: u64,
+) {
     let truth = bench.world.truth();
     if truth.transmission(id).is_none_or(|sent| sent.end_ns > sent.sent_ns) {
         return;
     }
-    let places_ns = (places - 1) * (longest_ns(bench.rate, 4) + between_ns(bench.rate));
+    let places_ns = (places - 1) * (longest_ns(bench.rate, asked.frames) + between_ns(bench.rate));
     let last_ns = at_ns + frame_ns(bench.rate) + TIMEOUT_NS + places_ns;
     let in_time = |t: &&Transmission| {
         t.answers == Some(id)
             && t.start_ns <= last_ns
             && t.end_ns - t.start_ns <= longest_ns(bench.rate, t.units as u64)
             && matches!(t.speaker, Speaker::Device(_))
+            && is_answer(bench, t, asked)
     };
     let late = truth.speaking_from(ready_ns).find(in_time);
     assert!(late.is_none(), "seed {seed}: ready at {ready_ns}, but {late:?}");
+}
+
+/// Whether an encoder repeats the command that was asked; one that heard another request, by damage, answers that.
+fn is_answer<const N: usize>(bench: &Bench<N>, sent: &Transmission, asked: Asked) -> bool {
+    sent.tag.and_then(|tag| bench.spoken(tag)).is_some_and(|spoken| spoken.code == asked.code)
 }
 
 /// How long the masters of these tests wait for a response: the longest turn-around time of the switches, and the longest time
@@ -130,13 +230,23 @@ pub fn single(setup: &Setup, turns: u64, shown: &mut Shown) {
     let line = line(rate);
     let scenario = host_within(setup.scenario.clone(), line.latency_ns);
     switches.note(&mut shown.mix);
-    let mut bench = Bench::new(encoders(rate, [0, 3, 6], Addresses::ALL, switches), rate, scenario);
+    let resolution = setup.resolution();
+    let encoders = encoders(rate, [0, 3, 6], Addresses::ALL, switches, resolution);
+    let mut bench = Bench::new(encoders, rate, scenario).with_encoders(setup.widths(), setup.is_version_3());
     let mut at_ns = 1_000;
-    let failed = shown.failed;
+    let mut lost = 0;
     for turn in 0..turns {
-        let ea = EncoderAddress::truncate([0, 3, 6][(turn % 3) as usize]);
-        let request = Request::new(ea, Operation::Abs40);
-        let mut transaction = Transaction::start(request, Resolution::default(), line, at_ns);
+        // Now and then one that is not there.
+        let is_there = turn % 11 != 10;
+        let ea = EncoderAddress::truncate(if is_there { [0, 3, 6][(turn % 3) as usize] } else { 5 });
+        let asked = SINGLE[((turn + setup.seed) % 6) as usize];
+        let request = Request::new(ea, asked.operation);
+        let mut transaction = Transaction::start(request, resolution, line, at_ns);
+        if let Progress::Failed { error, .. } = transaction.progress() {
+            assert!(matches!(error, Error::UnsupportedInVersion { .. }) && asked.is_new, "seed {seed}: {error}");
+            shown.unsent += 1;
+            continue;
+        }
         let id = bench.send(transaction.frames(), at_ns);
         let end = loop {
             match transaction.progress() {
@@ -154,7 +264,8 @@ pub fn single(setup: &Setup, turns: u64, shown: &mut Shown) {
             Progress::Done { value, ready_ns } => {
                 shown.good += 1;
                 if known {
-                    believed = judge(&bench, id, value.response.abs40().unwrap().get(), shown, setup);
+                    believed = judge(&bench, id, value_of(value.response.emit().contents()), shown, setup);
+                    is_where_the_shaft_was(&bench, &value.response, setup);
                     let sent_ns = at_ns + frame_ns(rate);
                     assert!(value.sampled.earliest_ns.abs_diff(sent_ns) <= 1 && value.sampled.latest_ns >= sent_ns);
                 }
@@ -162,9 +273,10 @@ pub fn single(setup: &Setup, turns: u64, shown: &mut Shown) {
             }
             Progress::Failed { error, ready_ns } => {
                 shown.failed += 1;
+                lost += u64::from(is_there);
                 let mut intact = bench.world.truth().intact_answers(id);
                 let lost = intact.find(|t| {
-                    t.units == 4
+                    is_answer(&bench, t, asked)
                         && t.speaker == Speaker::Device((turn % 3) as u8)
                         && t.delivered_ns < bench.world.now_ns()
                 });
@@ -172,18 +284,20 @@ pub fn single(setup: &Setup, turns: u64, shown: &mut Shown) {
                     !known || lost.is_none_or(|t| bench.is_excused(t)),
                     "seed {seed} turn {turn}: {error}, but {lost:?}"
                 );
+                let silent = is_echo_alone(&bench, id, shown);
+                assert!(!silent || error == Error::NoResponse, "seed {seed} turn {turn}: {error} for the own request");
                 ready_ns
             }
             Progress::Pending { .. } => unreachable!(),
         };
         if known && believed == Verdict::Fresh {
-            line_is_free(&bench, id, at_ns, ready_ns, 1, seed);
+            line_is_free(&bench, id, asked, at_ns, ready_ns, 1, seed);
         }
         at_ns = bench.world.now_ns().max(ready_ns) + turn % 7 * 100;
         bench.world.truth_mut().forget_before(at_ns.saturating_sub(2_000_000));
     }
     if quiet && bench.world.host().fifo == 0 {
-        assert_eq!(failed, shown.failed, "seed {seed}: on a quiet line nothing is lost, {:?}", bench.world.host());
+        assert_eq!(lost, 0, "seed {seed}: on a quiet line nothing is lost, {:?}", bench.world.host());
     }
     shown.runs += 1;
     shown.tally.add(bench.world.tally());
@@ -196,12 +310,20 @@ pub fn bus(setup: &Setup, turns: u64, shown: &mut Shown) {
     let scenario = host_within(setup.scenario.clone(), line.latency_ns);
     switches.note(&mut shown.mix);
     let present = switches.present();
-    let mut bench = Bench::new(encoders(rate, [0, 1, 2, 3, 4, 5, 6, 7], present, switches), rate, scenario);
+    let resolution = setup.resolution();
+    let encoders = encoders(rate, [0, 1, 2, 3, 4, 5, 6, 7], present, switches, resolution);
+    let mut bench = Bench::new(encoders, rate, scenario).with_encoders(setup.widths(), setup.is_version_3());
     let mut at_ns = 1_000;
     for turn in 0..turns {
+        let what = MULTI[((turn + seed) % 6) as usize];
         let asked = Addresses::from_bits((seed.wrapping_mul(0x9e37_79b9) >> (turn % 24)) as u8 | 1 << (turn % 8));
-        let request = Request::new(asked.highest().unwrap(), Operation::Abs40Mt);
-        let mut transaction = BusTransaction::start(request, Resolution::default(), asked, line, at_ns);
+        let request = Request::new(asked.highest().unwrap(), what.operation);
+        let mut transaction = BusTransaction::start(request, resolution, asked, line, at_ns);
+        if let Progress::Failed { error, .. } = transaction.progress() {
+            assert!(matches!(error, Error::UnsupportedInVersion { .. }) && what.is_new, "seed {seed}: {error}");
+            shown.unsent += 1;
+            continue;
+        }
         let id = bench.send(transaction.frames(), at_ns);
         let ready_ns = loop {
             match transaction.progress() {
@@ -214,7 +336,7 @@ pub fn bus(setup: &Setup, turns: u64, shown: &mut Shown) {
             }
         };
         // Law 2: before the time of the last place is over, nobody who was asked is given up.
-        let last_ns = at_ns + frame_ns(rate) + TIMEOUT_NS + 8 * longest_ns(rate, 4) + 7 * between_ns(rate);
+        let last_ns = at_ns + frame_ns(rate) + TIMEOUT_NS + 8 * longest_ns(rate, what.frames) + 7 * between_ns(rate);
         let missing = transaction.bus().missing();
         assert!(
             missing.is_empty() || bench.world.now_ns() > last_ns,
@@ -222,17 +344,23 @@ pub fn bus(setup: &Setup, turns: u64, shown: &mut Shown) {
             missing.bits(),
             bench.world.now_ns()
         );
+        if is_echo_alone(&bench, id, shown) {
+            assert_eq!(transaction.bus().damaged(), 0, "seed {seed} turn {turn}: the own request is counted");
+        }
         if on_time(&bench, id, at_ns) {
             for ea in asked.iter() {
                 if let Some(reading) = transaction.reading(ea) {
                     shown.good += 1;
-                    let _ = judge(&bench, id, reading.response.abs40().unwrap().get(), shown, setup);
+                    let _ = judge(&bench, id, value_of(reading.response.emit().contents()), shown, setup);
+                    is_where_the_shaft_was(&bench, &reading.response, setup);
                     continue;
                 }
                 shown.failed += 1;
                 let mut intact = bench.world.truth().intact_answers(id);
                 let lost = intact.find(|t| {
-                    t.units == 4 && t.speaker == Speaker::Device(ea.get()) && t.delivered_ns < bench.world.now_ns()
+                    is_answer(&bench, t, what)
+                        && t.speaker == Speaker::Device(ea.get())
+                        && t.delivered_ns < bench.world.now_ns()
                 });
                 let doubled = transaction.bus().duplicates().has(ea);
                 assert!(
@@ -240,7 +368,7 @@ pub fn bus(setup: &Setup, turns: u64, shown: &mut Shown) {
                     "seed {seed} turn {turn}: {ea} lost, {lost:?}"
                 );
             }
-            line_is_free(&bench, id, at_ns, ready_ns, 8, seed);
+            line_is_free(&bench, id, what, at_ns, ready_ns, 8, seed);
         }
         at_ns = bench.world.now_ns().max(ready_ns);
         bench.world.truth_mut().forget_before(at_ns.saturating_sub(2_000_000));

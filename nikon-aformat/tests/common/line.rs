@@ -1,7 +1,9 @@
 //! Encoders and a master on the hostile line.
 
+use std::collections::VecDeque;
+
 use nikon_aformat::device::{Device, Encoders, Transmission};
-use nikon_aformat::{BitRate, Frames};
+use nikon_aformat::{Alm, BitRate, Frames};
 use servowire_world::{
     Event, Framing, Host, Id, Message, Rates, Scenario, Speaker, Stamp, Transmission as Sent, Wire, World,
 };
@@ -46,6 +48,29 @@ pub struct Bench<const N: usize> {
     pub misheard: u64,
     /// Bank and address that are watched.
     pub watch: (u8, u8),
+    /// Widths of single turn and turns of all encoders, and whether they speak version 3.0.
+    pub widths: (u32, u32),
+    pub version_3: bool,
+    /// What was said last.
+    spoken: VecDeque<Spoken>,
+    /// Whether the response to a reset that took effect showed it.
+    pub shown_at_once: Vec<bool>,
+    /// The request that made each encoder busy last.
+    busy_by: [Option<Id>; N],
+    /// Writes that reached a busy encoder though nothing held the request up that had made it busy.
+    pub hasty: u64,
+}
+
+/// A response as an encoder sent it.
+#[derive(Debug, Clone, Copy)]
+pub struct Spoken {
+    /// What it is known by.
+    pub tag: u64,
+    /// Command that it repeats; nonsense for commands 21 and 22.
+    pub code: u16,
+    /// Where the shaft was.
+    pub single_turn: u32,
+    pub turns: u32,
 }
 
 /// What an encoder keeps when a request is over.
@@ -111,7 +136,34 @@ impl<const N: usize> Bench<N> {
         let watch = (0, 0);
         let kept = encoders.all.map(|device| kept(&device, watch));
         let handed = vec![(0, 0, 0)];
-        Self { world: World::new(wire, scenario), encoders, rate, serial: 0, handed, kept, misheard: 0, watch }
+        Self {
+            world: World::new(wire, scenario),
+            encoders,
+            rate,
+            serial: 0,
+            handed,
+            kept,
+            misheard: 0,
+            watch,
+            widths: (20, 16),
+            version_3: true,
+            spoken: VecDeque::new(),
+            shown_at_once: Vec::new(),
+            busy_by: [None; N],
+            hasty: 0,
+        }
+    }
+
+    /// With encoders of other widths, or of version 2.1.
+    pub const fn with_encoders(mut self, widths: (u32, u32), version_3: bool) -> Self {
+        self.widths = widths;
+        self.version_3 = version_3;
+        self
+    }
+
+    /// The response with this tag, unless it is long ago.
+    pub fn spoken(&self, tag: u64) -> Option<&Spoken> {
+        self.spoken.iter().find(|spoken| spoken.tag == tag)
     }
 
     /// What each encoder keeps now.
@@ -126,7 +178,13 @@ impl<const N: usize> Bench<N> {
     }
 
     /// Sends the frames of a request, the gaps between them as long as the protocol demands at least.
+    ///
+    /// Commands 23 to 26 and frame code 3 came with version 3.0: an encoder of version 2.1 is never asked with them.
     pub fn send(&mut self, frames: Frames, at_ns: u64) -> Id {
+        let [first, ..] = frames.as_slice() else { panic!("a request without frames") };
+        let (code, frame_code) = (first.content() >> 8 & 0x1f, first.content() >> 3 & 3);
+        let is_new = (23..=26).contains(&code) || frame_code == 3;
+        assert!(self.version_3 || !is_new, "command {code}, frame code {frame_code} sent to an encoder of version 2.1");
         let contents = frames.as_slice().iter().map(|frame| u64::from(frame.content()));
         let gap = 1_000_000_u64.div_ceil(bit_ps(self.rate));
         let message = Message::frames(WIDTH, contents).with_gap_bits(gap as usize);
@@ -144,16 +202,29 @@ impl<const N: usize> Bench<N> {
                     self.misheard += u64::from(foreign || at == 0 && unit.damaged);
                     let (content, framed) = unit.bits.content();
                     let serial = self.serial;
-                    self.encoders.all[at].set_position(serial as u32 & 0xf_ffff, (serial >> 20) as u32 & 0xffff);
+                    let (single_turn, turns) = self.shaft(serial);
+                    self.encoders.all[at].set_position(single_turn, turns);
+                    let was_busy = self.is_busy(at, unit.end_ns);
                     let answer = if framed {
                         self.encoders.all[at].frame(content as u16, unit.end_ns)
                     } else {
                         self.encoders.all[at].framing_error(unit.end_ns);
                         None
                     };
-                    self.note_acts(device, unit.origin.transmission);
+                    let acted = self.note_acts(device, unit.origin.transmission);
                     if let Some(answer) = answer {
-                        self.answer(device, unit.origin.transmission, &answer);
+                        let code = command_of(answer.raw.contents());
+                        // Commands 8 to 12 are resets; 14 and 18 to 20 write.
+                        if acted && !was_busy && (8..=12).contains(&code) {
+                            self.shown_at_once.push(shows_busy_memory(answer.raw.contents()));
+                        }
+                        if was_busy && matches!(code, 14 | 18..=20) {
+                            self.hasty += u64::from(self.busy_by[at].is_some_and(|by| self.left_in_time(by)));
+                        }
+                        self.answer(device, unit.origin.transmission, &answer, (single_turn, turns));
+                    }
+                    if !was_busy && self.is_busy(at, unit.end_ns) {
+                        self.busy_by[at] = Some(unit.origin.transmission);
                     }
                 }
                 Event::Delivered(block) => {
@@ -202,14 +273,36 @@ impl<const N: usize> Bench<N> {
         behind.is_some_and(|block| inside(block) && (split || block.0 < asked_ns))
     }
 
-    fn answer(&mut self, device: u8, request: Id, answer: &Transmission) {
+    /// A place of the shaft that is another one every time; the turns use all their bits.
+    fn shaft(&self, serial: u64) -> (u32, u32) {
+        let (single, turns) = self.widths;
+        let spread = serial.wrapping_mul(0x9e37_79b9_7f4a_7c15) >> 24;
+        ((serial & ((1 << single) - 1)) as u32, (spread & ((1 << turns) - 1)) as u32)
+    }
+
+    fn is_busy(&self, at: usize, now_ns: u64) -> bool {
+        self.encoders.all[at].alm(now_ns).contains(Alm::MEMBUSY)
+    }
+
+    /// Whether a request of the master left when the master believed.
+    fn left_in_time(&self, id: Id) -> bool {
+        let sent = self.world.truth().transmission(id);
+        sent.is_some_and(|sent| sent.speaker == Speaker::Host && sent.start_ns == sent.asked_ns)
+    }
+
+    fn answer(&mut self, device: u8, request: Id, answer: &Transmission, (single_turn, turns): (u32, u32)) {
         let contents = answer.raw.contents();
         let tag = value_of(contents);
+        self.spoken.push_back(Spoken { tag, code: command_of(contents), single_turn, turns });
+        if self.spoken.len() > 400 {
+            self.spoken.pop_front();
+        }
         let message = Message::frames(WIDTH, contents.iter().map(|content| u64::from(*content))).tagged(tag);
         self.world.answer(device, request, &message, answer.at_ns);
     }
 
-    fn note_acts(&mut self, device: u8, request: Id) {
+    /// Whether the encoder did something that it keeps.
+    fn note_acts(&mut self, device: u8, request: Id) -> bool {
         let at = usize::from(device);
         let (old, new) = (self.kept[at], kept(&self.encoders.all[at], self.watch));
         self.kept[at] = new;
@@ -222,6 +315,7 @@ impl<const N: usize> Bench<N> {
         for (what, _) in changed.into_iter().filter(|(_, changed)| *changed) {
             self.world.act(device, what, request);
         }
+        old != new
     }
 }
 
@@ -229,9 +323,21 @@ fn kept(device: &Device<2>, (bank, address): (u8, u8)) -> Kept {
     Kept { zero: device.zero(), word: device.eeprom(bank, address), id: device.id().get(), ea: device.ea().get() }
 }
 
-/// The 40 bits after the information field: what a position is known by.
+/// What a response is known by: all its bits.
 pub fn value_of(contents: &[u16]) -> u64 {
-    contents.iter().skip(1).rev().fold(0_u64, |all, content| all << 16 | u64::from(*content)) & 0xff_ffff_ffff
+    contents
+        .iter()
+        .fold(0xcbf2_9ce4_8422_2325, |hash, content| (hash ^ u64::from(*content)).wrapping_mul(0x0100_0000_01b3))
+}
+
+/// The command in the information field: its bits 6 to 10.
+fn command_of(contents: &[u16]) -> u16 {
+    contents[0] >> 6 & 0x1f
+}
+
+/// Whether ALM of a STATUS has MEMBUSY, its bit 8. ALM is the first thing after the information field.
+fn shows_busy_memory(contents: &[u16]) -> bool {
+    contents[1] >> 8 & 1 == 1
 }
 
 /// How rough a run is, by its seed.

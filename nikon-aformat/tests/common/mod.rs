@@ -4,6 +4,7 @@
 pub mod exchanges;
 pub mod line;
 pub mod procedures;
+pub mod sampled;
 pub mod switches;
 
 use nikon_aformat::{Command, EncoderId, Operation, U19, UserAddress};

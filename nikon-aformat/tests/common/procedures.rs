@@ -6,8 +6,8 @@ use nikon_aformat::device::{Device, Encoders};
 use nikon_aformat::master::{
     Detection, EepromRead, GuardedReset, Line, Progress, Reset, Step, Transaction, VerifiedWrite, Write,
 };
-use nikon_aformat::{Alm, EncoderAddress, EncoderId, Error, Request, Resolution, Response, UserAddress};
-use servowire_world::{Id, Kind, Tally};
+use nikon_aformat::{Alm, EncoderAddress, EncoderId, Error, Operation, Request, Resolution, Response, UserAddress};
+use servowire_world::{Draw, Id, Kind, Tally};
 
 use super::exchanges::Setup;
 use super::line::{Bench, host_within};
@@ -22,6 +22,10 @@ pub struct Run<const N: usize> {
     pub switches: Switches,
     /// Requests that were given up, and from when on the line was said to be free.
     given_up: Vec<(Id, u64)>,
+    /// The host has other things to ask and mixes outcomes up: now and then a procedure is given that of another request,
+    /// which was sent in place of its own.
+    astray: Option<Draw>,
+    pub mixed_up: u64,
 }
 
 /// How often what happened.
@@ -50,7 +54,30 @@ impl<const N: usize> Run<N> {
             device
         });
         let bench = Bench::new(Encoders { all }, rate, scenario);
-        Self { bench, line, at_ns: 1_000, seed, switches, given_up: Vec::new() }
+        let mut draw = Draw::default();
+        for _ in 0..seed % 64 {
+            let _ = draw.below(2);
+        }
+        let astray = matches!(seed % 8, 1 | 2 | 7).then_some(draw);
+        Self { bench, line, at_ns: 1_000, seed, switches, given_up: Vec::new(), astray, mixed_up: 0 }
+    }
+
+    /// What is sent where a procedure wants `request`, another one once in `odds`.
+    fn sent_for(&mut self, request: Request, odds: u64) -> Request {
+        let Some(draw) = &mut self.astray else { return request };
+        if draw.below(odds) > 0 {
+            return request;
+        }
+        let all = &self.bench.encoders.all;
+        let (first, last) = (all[0].ea(), all[N - 1].ea());
+        let other = match draw.below(5) {
+            0 => Request::new(first, Operation::EepromRead { address: 0x33 }),
+            1 => Request::new(first, Operation::ClearStatus),
+            2 | 3 => Request::new(last, Operation::Status),
+            _ => Request::new(first, Operation::Abs40),
+        };
+        self.mixed_up += u64::from(other != request);
+        other
     }
 
     /// The data of the first encoder while they are not determined, as drawn.
@@ -99,9 +126,11 @@ impl<const N: usize> Run<N> {
         mut receive: impl FnMut(Result<Response, Error>, u64) -> Step<T>,
     ) -> Result<T, Error> {
         let mut step = first;
-        for _ in 0..200 {
+        for sent in 0..200 {
             match step {
                 Step::Send { request, not_before_ns } => {
+                    // What guards a procedure stands at its begin.
+                    let request = self.sent_for(request, if sent == 0 { 2 } else { 12 });
                     let (outcome, now_ns) = self.transact(request, not_before_ns);
                     step = receive(outcome, now_ns);
                 }
@@ -130,6 +159,14 @@ impl<const N: usize> Run<N> {
         truth.acts.iter().filter(|act| act.what == what && own(act.request)).count()
     }
 
+    /// The response to the last of a reset's requests shows its effect, or does not, as the encoder is.
+    pub fn shows_the_effect_when_it_should(&mut self) {
+        let want = self.switches.reset_shows_in_the_eighth().1;
+        for shown in self.bench.shown_at_once.drain(..) {
+            assert_eq!(shown, want, "seed {}: the effect of a reset in the eighth response", self.seed);
+        }
+    }
+
     /// A new procedure begins: what went before is over.
     pub fn forget(&mut self) {
         while self.bench.next(self.now_ns()).is_ok() {}
@@ -144,6 +181,7 @@ impl Shown {
     pub fn take<const N: usize>(&mut self, run: &Run<N>) {
         run.switches.note(&mut self.mix);
         self.tally.add(run.bench.world.tally());
+        *self.ends.entry("outcome of another request".to_owned()).or_default() += run.mixed_up;
     }
 
     pub fn ended<T>(&mut self, what: &str, end: Result<T, Error>) {
@@ -169,6 +207,12 @@ pub fn zero_presets(setup: &Setup, noisy: bool, turns: u32, shown: &mut Shown) {
     let mut reset = GuardedReset::new(Reset::set_single_turn_zero_and_shift_commutation_angle(EA));
     for turn in 0..turns {
         run.forget();
+        // Somebody was broken off one short of eight.
+        if !noisy && turn % 2 == 1 {
+            for _ in 0..7 {
+                let _ = run.transact(Request::new(EA, Operation::ZeroPreset), 0);
+            }
+        }
         let (since_ns, misheard) = (run.now_ns(), run.bench.misheard);
         let first = reset.start(since_ns);
         let end = run.drive(first, |outcome, now_ns| reset.receive(outcome, now_ns));
@@ -183,6 +227,12 @@ pub fn zero_presets(setup: &Setup, noisy: bool, turns: u32, shown: &mut Shown) {
             Err(_) => acts == 0,
         };
         assert!(right, "seed {} turn {turn}: {end:?}, and {acts} zero presets", setup.seed);
+        run.shows_the_effect_when_it_should();
+        if let Ok(status) = end {
+            // Command 3 of encoder 3, and by then nothing is stored any more.
+            let first = status.emit().contents()[0];
+            assert_eq!((first >> 6 & 0x1f, first >> 3 & 7), (3, 3), "seed {} turn {turn}: no status", setup.seed);
+        }
         if end == Err(Error::EffectUnknown) {
             // It says how long the encoder may be busy.
             let now_ns = run.now_ns();
@@ -213,6 +263,7 @@ pub fn addresses_by_wire(setup: &Setup, turns: u8, shown: &mut Shown) {
         };
         let seed = setup.seed;
         assert!(right, "seed {seed} turn {turn}: {end:?}, {acts} changes, from {before} to {after}, not {new}");
+        run.shows_the_effect_when_it_should();
         shown.ended("address by wire", end);
     }
     shown.take(&run);
@@ -323,6 +374,8 @@ pub fn writes(setup: &Setup, turns: u16, shown: &mut Shown) {
             Err(_) => word == before && acts == 0,
         };
         assert!(right, "seed {seed} turn {turn}: {end:?}, {acts} writes, {word:x?}");
+        // The encoder said that it is busy, or would have said so.
+        assert!(run.bench.hasty == 0 || run.answered_late(), "seed {seed} turn {turn}: a write to a busy encoder");
         shown.ended("write", end);
     }
     run.forget();

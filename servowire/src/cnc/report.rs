@@ -7,6 +7,7 @@ use sorte_proto::timing::Limit;
 
 use super::host::Host;
 use super::line::Line;
+use super::node::Node;
 
 /// Axes that are listed one by one.
 const LISTED: usize = 16;
@@ -69,6 +70,23 @@ pub(super) fn end(out: &mut dyn Write, line: &Line, host: &Host) -> io::Result<(
     let counters = line.master.counters();
     let seconds = counters.cycles as f64 * f64::from(line.setup.cycle_ns()) * 1e-9;
     writeln!(out, "exchange    {} cycles, {seconds:.3} s of machine time", counters.cycles)?;
+    axes(out, line)?;
+    errors(out, line)?;
+    if host.program.off > 0 {
+        writeln!(out, "drivers     {} words of axes at rest switched their drivers off", host.program.off)?;
+    }
+    for event in &line.events {
+        writeln!(out, "event       {event}")?;
+    }
+    let more = line.event_count - line.events.len() as u64;
+    if more > 0 {
+        writeln!(out, "event       and {more} more")?;
+    }
+    Ok(())
+}
+
+/// A line for each axis: the first ones, those with a fault, and the last one.
+fn axes(out: &mut dyn Write, line: &Line) -> io::Result<()> {
     writeln!(
         out,
         "  axis       asked        made     on time      late      lost  caught up    position  clock error  pulse error"
@@ -94,8 +112,8 @@ pub(super) fn end(out: &mut dyn Write, line: &Line, host: &Host) -> io::Result<(
             t.worst_ns,
         )?;
     }
-    let sum = |of: fn(&super::node::Node) -> u64| line.nodes.iter().map(of).sum::<u64>();
-    let (ordered, bad) = (sum(|n| n.axis.tally.ordered), sum(|n| n.axis.tally.late + n.axis.tally.lost));
+    let ordered = sum(line, |n| n.axis.tally.ordered);
+    let bad = sum(line, |n| n.axis.tally.late + n.axis.tally.lost);
     if bad > 0 {
         writeln!(
             out,
@@ -103,11 +121,17 @@ pub(super) fn end(out: &mut dyn Write, line: &Line, host: &Host) -> io::Result<(
             100.0 * bad as f64 / ordered.max(1) as f64
         )?;
     }
+    Ok(())
+}
+
+/// What the line did to the frames.
+fn errors(out: &mut dyn Write, line: &Line) -> io::Result<()> {
+    let counters = line.master.counters();
     writeln!(
         out,
         "errors      {} bits flipped; devices refused {} frames, the master {}; {} cycles with a frame missing",
         line.noise.flips,
-        sum(|n| n.device.counters().crc_errors),
+        sum(line, |n| n.device.counters().crc_errors),
         counters.crc_errors,
         counters.timing_errors
     )?;
@@ -118,10 +142,7 @@ pub(super) fn end(out: &mut dyn Write, line: &Line, host: &Host) -> io::Result<(
             line.collisions, line.overruns, line.gap_ns
         )?;
     }
-    if host.program.off > 0 {
-        writeln!(out, "drivers     {} words of axes at rest switched their drivers off", host.program.off)?;
-    }
-    let (stamps, undetected) = (sum(|n| n.bad_stamps), sum(|n| n.undetected));
+    let (stamps, undetected) = (sum(line, |n| n.bad_stamps), sum(line, |n| n.undetected));
     if stamps > 0 {
         writeln!(
             out,
@@ -134,14 +155,11 @@ pub(super) fn end(out: &mut dyn Write, line: &Line, host: &Host) -> io::Result<(
             "            {undetected} accepted with wrong data: a CRC-8 lets 1 of 256 random errors pass, and 25 of the 11476 double flips"
         )?;
     }
-    for event in &line.events {
-        writeln!(out, "event       {event}")?;
-    }
-    let more = line.event_count - line.events.len() as u64;
-    if more > 0 {
-        writeln!(out, "event       and {more} more")?;
-    }
     Ok(())
+}
+
+fn sum(line: &Line, of: fn(&Node) -> u64) -> u64 {
+    line.nodes.iter().map(of).sum()
 }
 
 /// What was not as it should be, the gravest first; `None` if every step was made at its time.

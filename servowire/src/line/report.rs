@@ -2,7 +2,7 @@
 
 use std::fmt::Write as _;
 
-use super::survey::{Edges, Found, seen_rate};
+use super::survey::{Edges, Found, Speech, seen_rate};
 use super::watch::Watch;
 use crate::protocols::Protocol;
 
@@ -55,6 +55,19 @@ pub(super) fn found(found: &Found, names: &[&str]) -> String {
         let _ = write!(text, "; {} spikes beside {} edges: check termination", found.rates.spikes, found.rates.edges);
     }
     text
+}
+
+/// `it looks like A-format at 2.5 Mbit/s: 12 of 12 frames hold so; leave out what says otherwise`
+pub(super) fn rather(found: &Found) -> String {
+    let (Speech { protocol, rate }, tally) = (found.speech, found.evidence.tally);
+    let upside = if found.is_inverted() { ", inverted" } else { "" };
+    format!(
+        "it looks like {} at {} Mbit/s{upside}: {} of {} frames hold so; leave out what says otherwise",
+        protocol.title(),
+        mbit(f64::from(rate)),
+        tally.ok,
+        tally.ok + tally.refused
+    )
 }
 
 /// Why no channel can be decoded.

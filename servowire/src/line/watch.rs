@@ -2,13 +2,14 @@
 
 use std::io;
 
+use super::Options;
 use super::lane::{LineDecoder, Tap, Wires};
 use super::report;
 use super::survey::{Candidates, FEWEST, Found, Speech};
 use crate::capture::Change;
 use crate::capture::samples::Samples;
 use crate::output::{Lane, Output};
-use crate::protocols::Settings;
+use crate::protocols::{Protocol, Settings};
 
 /// Changes looked at before decoding begins.
 const PREVIEW: usize = 1 << 16;
@@ -20,6 +21,8 @@ const ENOUGH: usize = 1 << 9;
 const MOST_KEPT: usize = 1 << 20;
 /// What the last chance of a line asks for: a request whose answer came.
 const LEAST: i64 = 4;
+/// Channels that are tried in one survey, the busiest first.
+const MOST_TRIED: usize = 4096;
 /// A channel that was nothing is looked at again after so many times the edges it was judged by.
 const PATIENCE: u64 = 8;
 
@@ -209,11 +212,18 @@ impl<'a> Watch<'a> {
         let first = self.held.is_some();
         let mut readings = Vec::new();
         let mut judged = Vec::new();
+        let mut moving: Vec<(u16, &Vec<(i64, bool)>)> = Vec::new();
         for (channel, state) in (0_u16..).zip(&self.states) {
-            let State::Open(edges) = state else { continue };
-            if edges.len() < FEWEST {
-                continue;
+            if let State::Open(edges) = state {
+                moving.extend((edges.len() >= FEWEST).then_some((channel, edges)));
             }
+        }
+        let many = moving.len();
+        if many > MOST_TRIED {
+            moving.sort_by_key(|(_, edges)| std::cmp::Reverse(edges.len()));
+            moving.truncate(MOST_TRIED);
+        }
+        for (channel, edges) in moving {
             if self.busiest.as_ref().is_none_or(|(_, busiest)| busiest.len() < edges.len()) {
                 self.busiest = Some((channel, edges.iter().take(3000).copied().collect()));
             }
@@ -237,6 +247,12 @@ impl<'a> Watch<'a> {
         let (taken, passed) = self.choose(all, last);
         if early && taken.is_empty() {
             return Ok(());
+        }
+        if last && many > MOST_TRIED && taken.iter().all(|found| !found.is_certain()) {
+            let file = self.file;
+            out.note(&format!(
+                "{file}: {many} channels move, and the {MOST_TRIED} busiest were tried: name one by --channel"
+            ));
         }
         // What sounds in a line that is decoded already is no second one.
         for found in passed {
@@ -326,6 +342,9 @@ impl<'a> Watch<'a> {
             rate,
         };
         out.note(&format!("{}: {}", self.file, report::found(&found, &names)));
+        if let Some(other) = self.rather(&found) {
+            out.note(&format!("{}: {}", self.file, report::rather(&other)));
+        }
         out.begin_lane(lane);
         self.lines.push(Running { wires: Wires::new(&found.taps), decoder });
         let mut edges = Vec::new();
@@ -344,6 +363,18 @@ impl<'a> Watch<'a> {
             }
         }
         Ok(())
+    }
+
+    /// What a line is rather than what the user said it is.
+    fn rather(&self, found: &Found) -> Option<Found> {
+        let [tap] = *found.taps.as_slice() else { return None };
+        let Some(State::Open(edges)) = self.states.get(usize::from(tap.channel)) else { return None };
+        if found.is_certain() || !self.candidates.is_asked_for() {
+            return None;
+        }
+        let settings = Settings { line: Options::default(), ..self.settings().clone() };
+        let other = Candidates::new(Protocol::Auto, &settings, None).read(tap.channel, edges)?;
+        (other.is_certain() && other.evidence.score > 2 * found.evidence.score).then_some(other)
     }
 
     fn give(&mut self, line: usize, change: Change, out: &mut Output<'_>) -> io::Result<()> {

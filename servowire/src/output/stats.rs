@@ -100,6 +100,9 @@ impl Spread {
 
 impl Figures {
     fn add(&mut self, event: &Event, limit: Option<u64>) {
+        if event.remark {
+            return;
+        }
         match event.direction {
             _ if event.verdict.is_silence() => {}
             Some(Direction::Request) => self.requests += 1,

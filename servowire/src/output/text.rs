@@ -95,7 +95,9 @@ impl<W: Write> Text<W> {
         if let Some(delay) = event.delay {
             let _ = write!(self.line.piece(), "+{:.2} us", delay as f64 / 1e6);
         }
-        verdict_text(self.line.piece(), &event.verdict);
+        if !event.remark {
+            verdict_text(self.line.piece(), &event.verdict);
+        }
         self.line.write(&mut self.out)
     }
 

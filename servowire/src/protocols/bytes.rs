@@ -99,9 +99,9 @@ enum Reader {
 impl Reader {
     fn new(protocol: Protocol, settings: &Settings, sample: &[Burst]) -> Self {
         match protocol {
-            Protocol::Nikon => Self::Nikon(Box::new(nikon::Decoder::new(0, settings.nikon))),
+            Protocol::Nikon => Self::Nikon(Box::new(nikon::Decoder::new(0, settings.widths))),
             Protocol::Rtex => Self::Rtex(Box::new(rtex::Decoder::new(settings.rtex, sample))),
-            _ => Self::Tformat(Box::new(tformat::Decoder::new(0, settings.tformat))),
+            _ => Self::Tformat(Box::new(tformat::Decoder::new(0, settings.widths))),
         }
     }
 

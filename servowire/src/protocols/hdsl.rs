@@ -3,30 +3,40 @@
 //! Every run of equal levels is rounded to whole bits, so that the grid follows the edges of whoever drives. A frame is
 //! found by the head of the master; the answer behind it at the delay where its words hold.
 
+mod answer;
 mod bits;
+mod disparity;
+mod head;
+mod said;
 mod score;
+mod words;
 
 use std::io;
+use std::ops::Range;
 
 use hdsl::frame::{ANSWER_BITS, BIT_RATE, H_FRAME_BITS, Head, Received};
 use hdsl::message::{LongAnswer, Request, Responder};
 use hdsl::sampling::{Delay, TEST_PATTERN};
 use hdsl::{
-    Answer, EncoderByte, EncoderId, EncoderSymbol, Error, MasterSymbol, Phase, PositionBits, PositionTracker,
-    QualityMonitor, QualityRule, Rule, VFrame, Window,
+    Answer, EncoderByte, EncoderId, EncoderSymbol, Error, MasterSymbol, PositionBits, PositionTracker, QualityMonitor,
+    QualityRule, Rule, VFrame, Window,
 };
 
 use crate::capture::samples::Samples;
 use crate::event::{Direction, Event, Field, NO_RESPONSE, Place, Position, Refusal, Verdict};
 use crate::line::{LineDecoder, Rates};
 use crate::output::Sink;
+use answer::Break;
 use bits::Bits;
-use score::{PERFECT, disparity_holds, score};
+use disparity::{Carried, Chain};
+use head::Heads;
+use said::Said;
+use score::{PERFECT, score};
 
 /// The names of all fields.
 pub const FIELDS: &[&str] = &[
     "SYMBOL", "FIRST", "MSYNC", "EXTRA", "delay", "VERT", "VSYNC", "PIPE", "DD", "SEC", "POS", "VEL", "SUMMARY",
-    "VPOS", "STATUS2", "VPOS2", "QM", "ENC_ID", "message",
+    "VPOS", "STATUS2", "VPOS2", "QM", "ENC_ID", "message", "note",
 ];
 
 /// Nominal bit rates.
@@ -92,7 +102,8 @@ impl LineDecoder for DslLine {
 
     fn finish(&mut self, time: i64, out: &mut dyn Sink) -> io::Result<()> {
         self.bits.finish(time, 2.0);
-        self.decoder.take(&mut self.bits, u64::from(Head::BITS), out)
+        self.decoder.take(&mut self.bits, u64::from(Head::BITS), out)?;
+        self.decoder.said.give(u64::MAX, out)
     }
 
     fn rates(&self) -> Rates {
@@ -107,51 +118,20 @@ impl DslLine {
     }
 }
 
-/// A head at bit `at`; the partly high last bit of an EXTRA window can have been rounded to one bit more in all.
-fn head(bits: &Bits, at: u64) -> Option<(Received, u64)> {
-    let raw = bits.load(at);
-    // SYNC and the ones of SAMPLE.
-    if raw & 0xff != HEAD {
-        return None;
-    }
-    let line = bits.window(at);
-    if let Ok(head) = Head::parse(line) {
-        return Some((head, head.len.into()));
-    }
-    let ones = (raw >> 8).trailing_ones();
-    if !(3..=10).contains(&ones) || (raw >> (8 + ones)).trailing_zeros() != 2 {
-        return None;
-    }
-    let low = raw & ((1 << (8 + ones)) - 1);
-    let shorter = Window::from_bits(low | raw >> (9 + ones) << (8 + ones), line.len().checked_sub(1)?)?;
-    Head::parse(shorter).ok().map(|head| (head, u64::from(head.len) + 1))
-}
-
-/// SYNC and the two ones of SAMPLE, the first bit in bit 0.
-const HEAD: u128 = 0b1111_0100;
 /// Good words and checks from which an answer is where it was looked for.
 const GOOD: usize = 10;
 /// Answers from which the delay is learned, and bits in which they are.
 const LEARNED: usize = 8;
 const LESSON: u64 = 1300;
-const DISPARITY: &str = "all words are in the tables, but not one behind the other: bits of at least one were flipped";
+const LONE: &str = "a lone nibble between two frames without one is no message: a bit was flipped";
+const TRAILER: &str = "the TRAILER or the stuffing in front of it is damaged";
+/// Bits of TRAILER and of the longest stuffing in front of a head that are looked at.
+const FRONT_BITS: u64 = 120;
 const PAUSED: &str = "the line rests here, though frames follow each other for ever";
 
 /// Whether a frame is answered by the test pattern or the identifier.
 fn is_start_up(symbol: MasterSymbol) -> bool {
     matches!(symbol, MasterSymbol::Start | MasterSymbol::Learn | MasterSymbol::Check | MasterSymbol::IdReq)
-}
-
-/// What there is where the head of a frame was due, within three bits.
-fn damage(line: u128) -> (&'static str, String) {
-    // 0 0 1 0 1 1, 1 1 0, 1 1 0
-    const PATTERN: u128 = 0b0110_1111_0100;
-    let near = (0..=6).map(|at| ((line >> at & 0xfff) ^ PATTERN).count_ones()).min().unwrap_or(12);
-    match near {
-        0 => ("invalid_word", "the parameter word of the head is in no table".to_owned()),
-        1..=2 => ("head", format!("the head of the frame is damaged in {near} bit(s)")),
-        _ => ("missing", "a frame is missing".to_owned()),
-    }
 }
 
 /// What is known of the link so far.
@@ -172,6 +152,19 @@ struct Decoder {
     requests: Responder,
     request: Option<Request>,
     nibbles: Vec<u8>,
+    heads: Heads,
+    /// The last frame carried a nibble; the number of its head, if the one before did not.
+    talks: bool,
+    lone: Option<u64>,
+    carried: Carried,
+    /// The answer before, if it is good and no frame lies between: its number too.
+    chain: Option<(Chain, u64)>,
+    breaks: Vec<Break>,
+    /// Whether a check of the last V-frame failed, of each channel; none while one is not complete.
+    failed: Option<[bool; 2]>,
+    /// VSYNC where it was not due, or not where it was.
+    strays: u8,
+    said: Said,
 }
 
 impl Decoder {
@@ -189,93 +182,133 @@ impl Decoder {
             requests: Responder::new(),
             request: None,
             nibbles: Vec::new(),
+            heads: Heads::default(),
+            talks: false,
+            lone: None,
+            carried: Carried::default(),
+            chain: None,
+            breaks: Vec::new(),
+            failed: None,
+            strays: 0,
+            said: Said::default(),
         }
+    }
+
+    /// Number of the first event of which later frames may still tell.
+    fn settled(&self) -> u64 {
+        let open = [self.lone, self.chain.map(|chain| chain.1), self.breaks.first().map(|first| first.ends)];
+        open.into_iter().flatten().min().unwrap_or(u64::MAX)
     }
 
     /// Takes all frames that are there; fewer than `need` bits are kept for the next time.
     fn take(&mut self, bits: &mut Bits, need: u64, out: &mut dyn Sink) -> io::Result<()> {
         while self.next + need <= bits.end() {
             let at = self.next;
-            let Some((found, len)) = head(bits, at) else {
+            let Some((found, len)) = head::find(bits, at) else {
                 self.next += 1;
                 continue;
             };
-            self.missed(bits, at, out)?;
+            self.missed(bits, at);
             let symbol = found.byte.symbol();
-            let place = bits.place(at..at + len);
-            out.event(&master(found, symbol, place))?;
-            self.message_out(symbol, place, out)?;
+            let running = self.head(found, bits, at..at + len);
             self.next = at + len;
-            if symbol.is_ok_and(MasterSymbol::is_answered) {
+            if symbol.is_ok_and(MasterSymbol::is_answered) || running {
                 let whole = self.next + 1 + u64::from(ANSWER_BITS) <= bits.end();
                 if !whole {
                     break;
                 }
-                self.next = self.answer(symbol, bits, at + len + 1, out)?;
+                // In a link that runs, no frame asks for a pattern or the identifier.
+                let start_up = symbol.ok().filter(|symbol| is_start_up(*symbol) && !found.byte.first());
+                self.next = self.answer(start_up, bits, at + len + 1);
+            } else {
+                self.chain = None;
             }
+            self.said.give(self.settled(), out)?;
         }
         bits.forget(self.next.saturating_sub(KEPT));
         Ok(())
     }
 
+    /// A head with its request; whether it is one of a running link that was damaged.
+    fn head(&mut self, found: Received, bits: &Bits, at: Range<u64>) -> bool {
+        let symbol = found.byte.symbol();
+        let coded = bits.load(at.end - 14) & 0x3fff;
+        let wrong = self.heads.check(found, coded as u16, self.at);
+        let trailer = self.head.is_some() && self.heads.trailer(bits.load(at.start.saturating_sub(FRONT_BITS)));
+        let place = bits.place(at);
+        let damaged = wrong.is_some() && self.delay.is_some();
+        let talks = matches!(symbol, Ok(MasterSymbol::Data(_)));
+        if let Some(number) = self.lone.take().filter(|_| !talks) {
+            self.said.refuse(number, ("lone", LONE.to_owned()));
+        }
+        self.lone = (talks && !self.talks).then(|| self.said.next());
+        self.talks = talks;
+        let mut event = event(place, Direction::Request, "H-frame", master(found, symbol), wrong.map_or(Ok(()), Err));
+        event.fields.extend(trailer.then(|| Field::text("note", TRAILER)));
+        self.said.push(event);
+        self.message_out(symbol, place);
+        damaged
+    }
+
     /// Frames follow each other for ever: says where one should have been before the head at `at`.
-    fn missed(&mut self, bits: &mut Bits, at: u64, out: &mut dyn Sink) -> io::Result<()> {
+    fn missed(&mut self, bits: &mut Bits, at: u64) {
         let Some(last) = self.head.replace(at) else {
             bits.paused = None;
-            return Ok(());
+            return;
         };
         let (apart, usual) = (at - last, self.apart.unwrap_or(u64::from(H_FRAME_BITS)));
         if bits.paused.take_if(|paused| *paused <= at).is_some() {
             let place = bits.place(last..at);
             self.lose(1);
-            out.event(&event(place, Direction::Request, "H-frame", Vec::new(), Err(("gap", PAUSED.to_owned()))))?;
+            let refused = Err(("gap", PAUSED.to_owned()));
+            self.said.push(event(place, Direction::Request, "H-frame", Vec::new(), refused));
         } else if apart > LONGEST || apart + 8 >= 2 * usual {
             let missing = ((apart as f64 / usual as f64).round() as u64).saturating_sub(1).max(1);
             for k in 1..=missing {
                 let due = last + k * apart / (missing + 1);
                 self.lose(1);
-                let (class, what) = damage(bits.load(due.saturating_sub(3)));
+                let refused = head::damage(bits.load(due.saturating_sub(3)));
                 let place = bits.place(due..due + u64::from(Head::BITS));
-                out.event(&event(place, Direction::Request, "H-frame", Vec::new(), Err((class, what))))?;
+                self.said.push(event(place, Direction::Request, "H-frame", Vec::new(), Err(refused)));
             }
         } else {
             self.apart = Some(apart);
         }
-        Ok(())
     }
 
     /// Frames that were not heard: the fast position and the V-frame go on without them.
     fn lose(&mut self, frames: u8) {
         for _ in 0..frames {
             self.tracker.step(None);
-            self.at = None;
         }
+        (self.lone, self.chain) = (None, None);
+        self.lose_v_frame();
+    }
+
+    /// Nobody knows where in a V-frame the next frame is.
+    fn lose_v_frame(&mut self) {
+        (self.at, self.failed, self.strays) = (None, None, 0);
+        self.settle(None);
     }
 
     /// The answer that begins at `from` or some bits later; where to go on.
-    fn answer(
-        &mut self,
-        symbol: Result<MasterSymbol, Error>,
-        bits: &Bits,
-        from: u64,
-        out: &mut dyn Sink,
-    ) -> io::Result<u64> {
+    fn answer(&mut self, start_up: Option<MasterSymbol>, bits: &Bits, from: u64) -> u64 {
         let line = |delay: u32| bits.window(from + u64::from(delay));
         let usual = match self.delay {
             Some(delay) => delay,
             None => usual_delay(bits, from),
         };
-        // The delay of a cable does not change, but it need not be whole bits; between equals the time decides.
-        let begin = bits.time(from);
-        let since = |delay: u32| bits.time(from + u64::from(delay)) - begin;
+        // The delay of a cable does not change, but it need not be whole bits. What is perfect is where it is; of a
+        // damaged answer some words may hold a bit beside it by chance, so there the time decides.
+        let since = |delay: u32| bits.time(from + u64::from(delay)) - bits.time(from);
         let off = |delay: u32| self.lag.map_or(0, |lag| (since(delay) - lag).abs());
-        let better = |a: &(u32, usize), b: &(u32, usize)| a.1 > b.1 || a.1 == b.1 && off(a.0) < off(b.0);
+        let rank = |(delay, score): (u32, usize)| (score >= PERFECT, -off(delay), score);
         let mut best = (usual, score(line(usual)));
-        let running = self.lag.is_some_and(|_| off(usual) < bits.half()) && !symbol.is_ok_and(is_start_up);
+        let running = self.lag.is_some_and(|_| off(usual) < bits.half()) && start_up.is_none();
         if !running || best.1 < PERFECT {
             for delay in [usual + 1, usual.saturating_sub(1)] {
                 let next = (delay, score(line(delay)));
-                best = if better(&next, &best) { next } else { best };
+                best = if rank(next) > rank(best) { next } else { best };
             }
         }
         let (delay, score) = best;
@@ -290,38 +323,41 @@ impl Decoder {
             let class = if silent { NO_RESPONSE } else { "invalid_word" };
             let verdict = Err((class, why.to_owned()));
             self.tracker.step(None);
-            out.event(&event(place, Direction::Answer, "answer", Vec::new(), verdict))?;
+            self.chain = None;
+            self.said.push(event(place, Direction::Answer, "answer", Vec::new(), verdict));
+            if self.at == Some(7) {
+                self.failed = None;
+                self.settle(None);
+            }
             self.at = self.at.map(|at| (at + 1) % 8);
-            return Ok(from);
+            return from;
         }
         self.delay = Some(usual);
         let window = line(delay);
         let end = from + u64::from(delay + ANSWER_BITS);
-        match symbol {
-            Ok(MasterSymbol::Start | MasterSymbol::Learn | MasterSymbol::Check) => {
+        match start_up {
+            None => self.normal(window, place),
+            Some(MasterSymbol::IdReq) => self.identifier(window, place),
+            Some(_) => {
                 let good = window.bits() as u64 & ((1 << ANSWER_BITS) - 1) == TEST_PATTERN;
                 let verdict = if good { Ok(()) } else { Err(("pattern", "the test pattern is damaged".into())) };
-                let mut event = event(
-                    place,
-                    Direction::Answer,
-                    "test pattern",
-                    vec![Field::measured("delay", delay, "bit")],
-                    verdict,
-                );
-                event.delay = None;
-                out.event(&event)?;
+                let fields = vec![Field::measured("delay", delay, "bit")];
+                self.chain = None;
+                self.said.push(event(place, Direction::Answer, "test pattern", fields, verdict));
             }
-            Ok(MasterSymbol::IdReq) => self.identifier(window, place, out)?,
-            _ => self.normal(window, place, out)?,
         }
-        Ok(end)
+        end
     }
 
-    fn identifier(&mut self, window: Window, place: Place, out: &mut dyn Sink) -> io::Result<()> {
+    fn identifier(&mut self, window: Window, place: Place) {
+        self.chain = None;
         let id = Answer::parse(Rule::Strict, window).and_then(EncoderId::from_answer);
         let fields = id.map_or_else(|_| Vec::new(), |id| vec![Field::hex("ENC_ID", id.get(), 5)]);
+        self.said.push(event(place, Direction::Answer, "identifier", fields, id.map(|_| ()).map_err(refusal)));
         if let Ok(bits) = id.and_then(EncoderId::check) {
             *self = Self {
+                said: std::mem::take(&mut self.said),
+                heads: self.heads,
                 delay: self.delay,
                 lag: self.lag,
                 next: self.next,
@@ -331,96 +367,26 @@ impl Decoder {
                 ..Self::new()
             };
         }
-        out.event(&event(place, Direction::Answer, "identifier", fields, id.map(|_| ()).map_err(refusal)))?;
-        Ok(())
-    }
-
-    fn normal(&mut self, window: Window, place: Place, out: &mut dyn Sink) -> io::Result<()> {
-        let Ok(answer) = Answer::parse(Rule::Strict, window) else { return Ok(()) };
-        let dd = answer.delta_delta();
-        self.tracker.step(dd.ok());
-        let parameter = answer.parameter();
-        let byte = |name, word: hdsl::symbol::Reading| word.byte().ok().map(|byte| Field::hex(name, byte, 2));
-        let mut fields = Vec::with_capacity(10);
-        fields.push(Field::measured("delay", self.delay.unwrap_or(0), "bit"));
-        fields.extend(byte("VERT", answer.vertical()));
-        if let Ok(parameter) = parameter {
-            fields.push(encoder_symbol(parameter));
-            fields.push(Field::number("VSYNC", parameter.vsync()));
-        }
-        fields.extend(byte("PIPE", answer.pipe()));
-        fields.extend(dd.ok().map(|dd| Field::number("DD", dd.get())));
-        fields.extend(byte("SEC", answer.secondary()));
-        fields.push(Field::measured("VEL", self.tracker.velocity(), "/frame"));
-        let first = answer.words().into_iter().find_map(|word| word.byte().err()).or(dd.err()).map(refusal);
-        let verdict = match first {
-            Some(refused) => Err(refused),
-            None if !disparity_holds(window) => Err(("disparity", DISPARITY.to_owned())),
-            None => Ok(()),
-        };
-        let mut event = event(place, Direction::Answer, "answer", fields, verdict);
-        if self.tracker.phase() == Phase::Check && !self.tracker.is_unreliable() {
-            event.fields.push(Field::hex("POS", self.tracker.position(), 10));
-            event.position = Some(position(self.tracker.position()));
-        }
-        out.event(&event)?;
-        self.message_in(parameter.ok(), place, out)?;
-        self.v_frame(answer, parameter.is_ok_and(EncoderByte::vsync), place, out)
-    }
-
-    fn v_frame(&mut self, answer: Answer, vsync: bool, place: Place, out: &mut dyn Sink) -> io::Result<()> {
-        if let Some(at) = self.at {
-            self.frame.put(Rule::Strict, at, answer);
-            self.quality.count_answer(at, &answer);
-            if at == 7 {
-                self.end_v_frame(place, out)?;
-            }
-            self.at = Some((at + 1) % 8);
-        }
-        if vsync {
-            self.at = Some(0);
-        }
-        Ok(())
-    }
-
-    fn end_v_frame(&mut self, place: Place, out: &mut dyn Sink) -> io::Result<()> {
-        let VFrame { safe1, safe2 } = self.frame;
-        let safe = safe1.position();
-        self.quality.count_v_frame(&self.frame);
-        match safe {
-            Ok(position) => self.tracker.align(position),
-            Err(_) => self.tracker.no_safe_position(),
-        }
-        let mut fields = vec![Field::hex("SUMMARY", safe1.status(), 2)];
-        fields.extend(safe.ok().map(|position| Field::hex("VPOS", position, 10)));
-        fields.push(Field::hex("STATUS2", safe2.status(), 2));
-        fields.extend(safe2.position().ok().map(|position| Field::hex("VPOS2", position, 10)));
-        fields.push(Field::number("QM", self.quality.value()));
-        let error = safe.err().or(safe2.position().err());
-        let mut event = event(place, Direction::Answer, "V-frame", fields, error.map_or(Ok(()), |e| Err(refusal(e))));
-        event.position = safe.ok().map(position);
-        out.event(&event)?;
-        Ok(())
     }
 
     /// Requests, symbol by symbol.
-    fn message_out(&mut self, symbol: Result<MasterSymbol, Error>, place: Place, out: &mut dyn Sink) -> io::Result<()> {
-        let Ok(symbol) = symbol else { return Ok(()) };
+    fn message_out(&mut self, symbol: Result<MasterSymbol, Error>, place: Place) {
+        let Ok(symbol) = symbol else { return };
         if let Some(request) = self.requests.receive(symbol) {
             self.request = Some(request);
-            out.event(&event(place, Direction::Request, "message", vec![Field::text("message", request)], Ok(())))?;
+            let fields = vec![Field::text("message", request)];
+            self.said.push(event(place, Direction::Request, "message", fields, Ok(())));
         }
-        Ok(())
     }
 
     /// Answers: what was gathered until the next IDLE.
-    fn message_in(&mut self, byte: Option<EncoderByte>, place: Place, out: &mut dyn Sink) -> io::Result<()> {
+    fn message_in(&mut self, byte: Option<EncoderByte>, place: Place) {
         if let Some(Ok(EncoderSymbol::Data(nibble))) = byte.map(EncoderByte::symbol) {
             self.nibbles.push(nibble.get());
-            return Ok(());
+            return;
         }
         let nibbles = std::mem::take(&mut self.nibbles);
-        let (Some(request), false) = (self.request, nibbles.is_empty()) else { return Ok(()) };
+        let (Some(request), false) = (self.request, nibbles.is_empty()) else { return };
         let bytes: Vec<u8> =
             nibbles.chunks(2).map(|pair| pair.iter().fold(0, |byte, nibble| byte << 4 | nibble)).collect();
         let result = match request {
@@ -428,8 +394,7 @@ impl Decoder {
             Request::Long(_) => LongAnswer::parse(&bytes).map(|answer| Field::text("message", answer)),
         };
         let fields = result.iter().cloned().collect();
-        out.event(&event(place, Direction::Answer, "message", fields, result.map(|_| ()).map_err(refusal)))?;
-        Ok(())
+        self.said.push(event(place, Direction::Answer, "message", fields, result.map(|_| ()).map_err(refusal)));
     }
 }
 
@@ -450,7 +415,7 @@ fn usual_delay(bits: &Bits, from: u64) -> u32 {
                 at = bits.end();
                 break;
             }
-            if let Some((_, len)) = head(bits, at) {
+            if let Some((_, len)) = head::find(bits, at) {
                 at += len + 1;
                 break;
             }
@@ -461,7 +426,7 @@ fn usual_delay(bits: &Bits, from: u64) -> u32 {
     best.map_or(0, |(delay, _)| delay)
 }
 
-fn master(head: Received, symbol: Result<MasterSymbol, Error>, place: Place) -> Event {
+fn master(head: Received, symbol: Result<MasterSymbol, Error>) -> Vec<Field> {
     let mut fields = Vec::with_capacity(4);
     fields.extend(symbol.ok().map(|symbol| Field::text("SYMBOL", symbol)));
     fields.push(Field::number("FIRST", head.byte.first()));
@@ -469,15 +434,7 @@ fn master(head: Received, symbol: Result<MasterSymbol, Error>, place: Place) -> 
     if head.extra_bits > 0 {
         fields.push(Field::measured("EXTRA", head.extra_bits, "bit"));
     }
-    event(place, Direction::Request, "H-frame", fields, symbol.map(|_| ()).map_err(refusal))
-}
-
-/// The symbol, or the five bits of one without a meaning.
-fn encoder_symbol(byte: EncoderByte) -> Field {
-    match byte.symbol() {
-        Ok(symbol) => Field::text("SYMBOL", symbol),
-        Err(_) => Field::text("SYMBOL", format_args!("{:02X}h", byte.raw() & 31)),
-    }
+    fields
 }
 
 type Refused = (&'static str, String);

@@ -18,19 +18,11 @@ use crate::capture::hexlog::Burst;
 use crate::event::{Event, Place, Verdict};
 use crate::line::{LineField, StartStop};
 use crate::output::Sink;
-use crate::protocols::plausible::{CUT, CUT_BITS, joined, slipped_bit};
+use crate::protocols::group::{Group, Widths};
+use crate::protocols::plausible::{CUT, CUT_BITS, LOST, slipped_bit};
 use describe::Encoder;
 
 pub use describe::FIELDS;
-
-/// What the frames do not tell.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-pub struct Settings {
-    /// Bits of a turn; otherwise by the type word, if the line carries it.
-    pub single_turn_bits: Option<u8>,
-    /// Bits that count turns; otherwise by the type word, else 16.
-    pub multi_turn_bits: Option<u8>,
-}
 
 /// Nominal bit rates.
 pub const RATES: &[u32] = &[
@@ -54,62 +46,18 @@ const MEMORY_PAUSE: i64 = 50_000_000;
 const REPLY_TIMEOUT_BITS: i64 = 1_000;
 
 /// Frames that belong together.
-#[derive(Debug, Clone, Default)]
-struct Group {
-    contents: Vec<u16>,
-    starts: Vec<i64>,
-    end: i64,
-    /// The first frame whose delimiter read 0.
-    broken: Option<u8>,
-    spikes: u32,
-    /// The bits of the line, the first in bit 0, where they are known.
-    raw: u128,
-    /// The line of a log without times.
-    line: Option<u64>,
-}
+type Frames = Group<u16, { RawResponse::MAX_FRAMES }>;
 
-impl Group {
-    /// `bit`: its length in picoseconds, 0 in a log.
-    fn push(&mut self, field: &LineField, bit: i64) {
-        if !field.delimiter && self.broken.is_none() {
-            self.broken = u8::try_from(self.contents.len()).ok();
-        }
-        if self.contents.is_empty() {
-            self.raw = field.bits;
-        } else if field.bits != 0 && bit > 0 {
-            // Somebody seems to begin anew: what he says stands behind.
-            self.raw = joined(self.raw, field.bits, (field.start - self.start() + bit / 2) / bit);
-        }
-        self.contents.push(field.content);
-        self.starts.push(field.start);
-        self.spikes = self.spikes.saturating_add(field.spikes);
-        self.end = field.end;
-    }
-
-    fn start(&self) -> i64 {
-        self.starts.first().copied().unwrap_or_default()
-    }
-
-    fn place(&self) -> Place {
-        match self.line {
-            Some(line) => Place::Line(line),
-            None => Place::Time { start: self.start(), end: self.end },
-        }
-    }
-
-    fn is_empty(&self) -> bool {
-        self.contents.is_empty()
-    }
-
+impl Frames {
     /// By its first frame.
     fn kind(&self) -> Kind {
-        self.contents.first().map_or(Kind::Other, |first| Kind::of(*first))
+        self.contents().first().map_or(Kind::Other, |first| Kind::of(*first))
     }
 
     /// The frames of the request, as far as they are there.
     fn request(&self) -> Result<Request, Error> {
-        let mut frames = Vec::with_capacity(self.contents.len());
-        for (frame, content) in (0..).zip(&self.contents) {
+        let mut frames = Vec::with_capacity(self.len());
+        for (frame, content) in (0..).zip(self.contents()) {
             if self.broken == Some(frame) {
                 return Err(Error::Delimiter { frame });
             }
@@ -120,7 +68,7 @@ impl Group {
 
     /// Frames of the whole request, as its first frame has it.
     fn request_frames(&self) -> usize {
-        let first = self.contents.first().map(|content| RequestFrame::from_content(*content));
+        let first = self.contents().first().map(|content| RequestFrame::from_content(*content));
         let expected = first.and_then(Result::ok).map(Request::expected_frames);
         expected.and_then(Result::ok).map_or(1, usize::from)
     }
@@ -154,19 +102,19 @@ pub struct Decoder {
     begin: Option<i64>,
     /// Until when the rest of a reply may come in which the capture began.
     cut_until: Option<i64>,
-    open: Group,
+    open: Frames,
     pending: Option<Pending>,
 }
 
 impl Decoder {
     /// `bit`: its length in picoseconds.
-    pub fn new(bit: i64, settings: Settings) -> Self {
+    pub fn new(bit: i64, widths: Widths) -> Self {
         Self {
             bit,
-            encoder: Encoder::new(settings),
+            encoder: Encoder::new(widths),
             begin: None,
             cut_until: None,
-            open: Group::default(),
+            open: Frames::default(),
             pending: None,
         }
     }
@@ -206,14 +154,14 @@ impl Decoder {
         out.event(&event)
     }
 
-    fn request(&mut self, group: &Group, out: &mut dyn Sink) -> io::Result<Event> {
+    fn request(&mut self, group: &Frames, out: &mut dyn Sink) -> io::Result<Event> {
         self.give_up(group.start(), true, out)?;
         let result = group.request();
         self.pending = result.ok().map(|request| Pending { request, place: group.place(), replies: 0 });
         Ok(describe::request(group, result))
     }
 
-    fn reply(&mut self, group: &Group) -> Event {
+    fn reply(&mut self, group: &Frames) -> Event {
         let pending = self.pending.as_mut().map(|pending| {
             pending.replies += 1;
             *pending
@@ -227,13 +175,13 @@ impl Decoder {
         self.answer(group, asked, first.and_then(|pending| pending.end()))
     }
 
-    fn answer(&mut self, group: &Group, asked: Option<Request>, asked_end: Option<i64>) -> Event {
+    fn answer(&mut self, group: &Frames, asked: Option<Request>, asked_end: Option<i64>) -> Event {
         let delay = asked_end.map(|end| group.start() - end);
         let expected = expected(group, asked);
         let result = match (group.broken, expected) {
             (Some(frame), _) => Err(Error::Delimiter { frame }),
             (None, Ok(expected)) => {
-                let reply = RawResponse::from_words(expected.layout(), &group.contents, BitOrder::LsbFirst);
+                let reply = RawResponse::from_words(expected.layout(), group.contents(), BitOrder::LsbFirst);
                 reply.and_then(|reply| Response::parse(&expected, &reply))
             }
             (None, Err(error)) => Err(error),
@@ -258,7 +206,7 @@ impl Decoder {
 }
 
 /// What probably spoilt the reply to a request.
-fn cause(group: &Group, request: Request, expected: Option<Expected>) -> Option<String> {
+fn cause(group: &Frames, request: Request, expected: Option<Expected>) -> Option<String> {
     let layout =
         expected.map_or_else(|| request.expected(Resolution::default()).layout(), |expected| expected.layout());
     let len = layout.line_bits();
@@ -271,9 +219,14 @@ fn cause(group: &Group, request: Request, expected: Option<Expected>) -> Option<
     let due = usize::from(layout.frames());
     let sound =
         |bits: u128| Window::from_bits(bits, len).is_some_and(|line| Response::parse_line(&expected, line).is_ok());
-    // With one bit wrong, none has slipped.
-    let flipped = (0..len).any(|at| sound(line.bits() ^ 1 << at));
-    let in_place = group.broken.is_none() && group.contents.len() == due;
+    // With one bit wrong, none has slipped, unless it is the last 0 before idle line: that is missing too where the reply
+    // was cut in the ones before it, or lost one of several zeros.
+    let wrong = (0..len).find(|at| sound(line.bits() ^ 1 << at));
+    if let Some(at) = wrong.filter(|at| (line.bits() << (128 - len)).leading_ones() >= len - at && *at > 0) {
+        return Some(if line.bits() >> (at - 1) & 1 == 1 { CUT } else { LOST }.to_owned());
+    }
+    let flipped = wrong.is_some();
+    let in_place = group.broken.is_none() && group.len() == due;
     if in_place && !flipped && (line.bits() << (128 - len)).leading_ones() >= CUT_BITS {
         return Some(CUT.to_owned());
     }
@@ -283,21 +236,21 @@ fn cause(group: &Group, request: Request, expected: Option<Expected>) -> Option<
     if let Some(slipped) = slipped_bit(group.raw, len, sound) {
         return Some(slipped.to_owned());
     }
-    if group.broken.is_none() && group.contents.len() < due {
+    if group.broken.is_none() && group.len() < due {
         return Some(CUT.to_owned());
     }
     found.map(|cause| cause.to_string())
 }
 
 /// What a reply has to be: as asked, in the layout that has so many frames; without a request, as it says itself.
-fn expected(group: &Group, asked: Option<Request>) -> Result<Expected, Error> {
-    let frames = group.contents.len();
+fn expected(group: &Frames, asked: Option<Request>) -> Result<Expected, Error> {
+    let frames = group.len();
     let fits = |layout: &Layout| usize::from(layout.frames()) == frames;
     let Some(request) = asked else {
         if frames == usize::from(Layout::Abs17.frames()) {
             return Ok(Expected::new(Layout::Abs17, Command::Abs17));
         }
-        let code = group.contents.first().map_or(31, |first| first >> 6 & 31);
+        let code = group.contents().first().map_or(31, |first| first >> 6 & 31);
         let code = u8::try_from(code).unwrap_or(31);
         let command = Command::from_code(code).ok_or(Error::UnknownCommand { code })?;
         let [standard, _] = command.layouts();
@@ -324,12 +277,12 @@ impl StartStop for Decoder {
         if !self.open.is_empty() && self.is_over(field.start) {
             self.close(out)?;
         }
-        self.open.push(field, self.bit);
+        self.open.push(field.content, field, self.bit);
         let whole = match self.open.kind() {
             Kind::Request => self.open.request_frames(),
             _ => RawResponse::MAX_FRAMES,
         };
-        if self.open.contents.len() >= whole { self.close(out) } else { Ok(()) }
+        if self.open.len() >= whole { self.close(out) } else { Ok(()) }
     }
 
     /// A line of a log, two bytes a frame, the first bit of the line in bit 7 of the first: a request, a reply, or both.
@@ -357,9 +310,9 @@ impl StartStop for Decoder {
         if !self.open.is_empty() {
             let recent = end.is_some_and(|end| end - self.open.end <= PAUSE_BITS * self.bit);
             let short = match self.open.kind() {
-                Kind::Request => self.open.contents.len() < self.open.request_frames(),
+                Kind::Request => self.open.len() < self.open.request_frames(),
                 _ => expected(&self.open, self.pending.map(|pending| pending.request))
-                    .is_ok_and(|expected| self.open.contents.len() < usize::from(expected.layout().frames())),
+                    .is_ok_and(|expected| self.open.len() < usize::from(expected.layout().frames())),
             };
             if recent && short {
                 return out.event(&Event::cut_off(self.open.place(), "a request or reply"));

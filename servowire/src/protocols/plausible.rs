@@ -51,7 +51,7 @@ pub(super) fn slipped_bit(raw: u128, len: u32, sound: impl Fn(u128) -> bool) -> 
         let low = raw & ((1 << at) - 1);
         let more = |bit: u128| (low | bit << at | raw >> at << (at + 1)) & mask;
         if sound(more(0)) || sound(more(1)) {
-            return Some("a bit of it was lost on the way");
+            return Some(LOST);
         }
         sound((low | raw >> (at + 1) << at) & mask).then_some("a bit came twice, or one was added on the way")
     })
@@ -63,6 +63,9 @@ pub(super) fn joined(bits: u128, behind: u128, at: i64) -> u128 {
     let below = 1_u128.checked_shl(at).map_or(u128::MAX, |one| one - 1);
     bits & (behind.checked_shl(at).unwrap_or(u128::MAX) | below)
 }
+
+/// What is said of an answer that came a bit short.
+pub(super) const LOST: &str = "a bit of it was lost on the way";
 
 /// What is said of an answer that ends early.
 pub(super) const CUT: &str = "it was cut: the encoder broke off, or somebody switched the line";

@@ -54,6 +54,8 @@ pub(super) struct Decoder {
     last: HashMap<u8, Report>,
     /// Of the same: the last counter, and the update periods so far.
     updates: HashMap<u8, (u8, i64)>,
+    /// Where the last block was.
+    place: Place,
 }
 
 impl Decoder {
@@ -80,6 +82,7 @@ impl Decoder {
             analysis: LogAnalysis::new(settings.period_ns, settings.gear),
             last: HashMap::new(),
             updates: HashMap::new(),
+            place: Place::Line(0),
         }
     }
 
@@ -152,8 +155,7 @@ impl Decoder {
         if notes.is_empty() {
             return Ok(());
         }
-        let fields = vec![Field::text("note", notes.join("; "))];
-        out.event(&Event::new(Place::Line(0), None, "log", fields, Verdict::Ok))
+        out.event(&Event::remark(self.place, "log", notes.join("; ")))
     }
 
     /// Where a block is: in update periods, if the period is known, else in the log.
@@ -178,6 +180,7 @@ impl Decoder {
         }
         let report = inspect(block);
         let place = self.place(burst, header);
+        self.place = place;
         let mut fields = Vec::new();
         if is_block(&report) {
             let findings: Vec<String> = self.analysis.block(block).map(|finding| finding.to_string()).collect();

@@ -16,20 +16,12 @@ use crate::capture::hexlog::Burst;
 use crate::event::{Direction, Event, Verdict};
 use crate::line::{LineField, StartStop};
 use crate::output::Sink;
+use crate::protocols::group::Widths;
 use crate::protocols::plausible::CUT;
 use describe::Encoder;
 use frame::{Frame, LATE_ANSWER, MOST_FIELDS, Pending};
 
 pub use describe::FIELDS;
-
-/// What the frames do not tell.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-pub struct Settings {
-    /// Bits of a turn; otherwise by the encoder ID.
-    pub single_turn_bits: Option<u8>,
-    /// Bits that count turns; otherwise by the encoder ID.
-    pub multi_turn_bits: Option<u8>,
-}
 
 /// Nominal bit rates.
 pub const RATES: &[u32] = &[BitRate::Mbit2_5.bits_per_second(), BitRate::Mbit5.bits_per_second()];
@@ -69,10 +61,10 @@ pub struct Decoder {
 
 impl Decoder {
     /// `bit`: its length in picoseconds.
-    pub fn new(bit: i64, settings: Settings) -> Self {
+    pub fn new(bit: i64, widths: Widths) -> Self {
         Self {
             bit,
-            encoder: Encoder::new(settings),
+            encoder: Encoder::new(widths),
             begin: None,
             skip: None,
             cut_until: None,
@@ -97,7 +89,7 @@ impl Decoder {
             // A request is over when its answer may follow.
             None => {
                 let request_fields = |id: DataId| usize::from(id.request_fields());
-                self.open.broken.is_some() || self.open.fields >= self.open.data_id().map_or(1, request_fields)
+                self.open.broken.is_some() || self.open.len() >= self.open.data_id().map_or(1, request_fields)
             }
             // Behind a low delimiter the receiver may have skipped fields: the answer lasts as long as a whole one.
             Some(pending) => {
@@ -112,7 +104,7 @@ impl Decoder {
     fn is_answer_alone(&self) -> bool {
         let Ok(id) = self.open.data_id() else { return false };
         let (request, answer) = (usize::from(id.request_fields()), usize::from(id.response_fields()));
-        self.pending.is_none() && self.open.broken.is_none() && self.open.fields == answer && answer > request
+        self.pending.is_none() && self.open.broken.is_none() && self.open.len() == answer && answer > request
     }
 
     /// The open frame is over.
@@ -151,9 +143,9 @@ impl Decoder {
     fn answer(&mut self, frame: &Frame, pending: Pending) -> Event {
         let result = match (frame.broken, pending.request) {
             (Some(field), _) => Err(Error::Delimiter { field }),
-            (None, Some(request)) => Response::parse(request, frame.bytes()),
+            (None, Some(request)) => Response::parse(request, frame.contents()),
             // The encoder refuses a damaged request with an ID 3 frame.
-            (None, None) => AllData::parse(frame.bytes()).and_then(|full| Err(Error::Rejected { sf: full.sf })),
+            (None, None) => AllData::parse(frame.contents()).and_then(|full| Err(Error::Rejected { sf: full.sf })),
         };
         let delay = pending.end().map(|end| frame.start() - end);
         let asked = pending.request.map(Request::data_id);
@@ -167,7 +159,7 @@ impl Decoder {
     /// What probably spoilt the answer to a request.
     fn cause(&self, request: Request, frame: &Frame) -> Option<String> {
         let report = match frame.broken {
-            None => inspect_bytes(request, frame.bytes()),
+            None => inspect_bytes(request, frame.contents()),
             Some(_) => inspect(request, frame.line(self.bit)?),
         };
         // That is what its verdict says already.
@@ -177,18 +169,18 @@ impl Decoder {
         }
         let due = usize::from(request.data_id().response_fields());
         // With all delimiters in place and one bit wrong, none has slipped.
-        let wrong = frame.bytes().iter().fold(0, |crc, byte| crc ^ byte).count_ones();
-        let flipped = frame.broken.is_none() && frame.fields == due && wrong == 1;
+        let wrong = frame.contents().iter().fold(0, |crc, byte| crc ^ byte).count_ones();
+        let flipped = frame.broken.is_none() && frame.len() == due && wrong == 1;
         if frame.broken.is_some() && frame.is_one_bit_off(request) {
             return Some(Cause::Disturbed.to_string());
         }
-        if !flipped && frame.broken.is_none() && frame.fields == due && frame.ends_idle(request) {
+        if !flipped && frame.broken.is_none() && frame.len() == due && frame.ends_idle(request) {
             return Some(CUT.to_owned());
         }
         if let Some(slipped) = if flipped { None } else { frame.slipped_bit(request) } {
             return Some(slipped.to_owned());
         }
-        if frame.broken.is_none() && frame.fields < due {
+        if frame.broken.is_none() && frame.len() < due {
             return Some(CUT.to_owned());
         }
         cause.map(|cause| cause.to_string())
@@ -197,19 +189,19 @@ impl Decoder {
     /// A frame without a request before it: a request, or an answer alone.
     fn unasked(&mut self, frame: &Frame) -> Event {
         let asked = frame.data_id().ok();
-        let longer = |id: DataId| frame.fields > usize::from(id.request_fields());
+        let longer = |id: DataId| frame.len() > usize::from(id.request_fields());
         // More fields than any request has are an answer whatever they hold.
-        if asked.map_or(frame.fields > 4, longer) {
-            let result = match (frame.broken, Request::answered_by(frame.bytes())) {
+        if asked.map_or(frame.len() > 4, longer) {
+            let result = match (frame.broken, Request::answered_by(frame.contents())) {
                 (Some(field), _) => Err(Error::Delimiter { field }),
-                (None, Ok(request)) => Response::parse(request, frame.bytes()),
+                (None, Ok(request)) => Response::parse(request, frame.contents()),
                 (None, Err(error)) => Err(error),
             };
             return self.encoder.answer(frame, asked, result, None);
         }
         let result = match frame.broken {
             Some(field) => Err(Error::Delimiter { field }),
-            None => Request::parse(frame.bytes()),
+            None => Request::parse(frame.contents()),
         };
         self.pending = Some(Pending { request: result.ok(), place: frame.place() });
         describe::request(frame, asked, result)
@@ -218,7 +210,9 @@ impl Decoder {
     /// The unclear frame was a request.
     fn clear(&mut self, out: &mut dyn Sink) -> io::Result<()> {
         match self.unclear.take() {
-            Some(frame) => out.event(&describe::request(&frame, frame.data_id().ok(), Request::parse(frame.bytes()))),
+            Some(frame) => {
+                out.event(&describe::request(&frame, frame.data_id().ok(), Request::parse(frame.contents())))
+            }
             None => Ok(()),
         }
     }
@@ -228,8 +222,12 @@ impl Decoder {
         match (self.unclear.take(), self.pending.take()) {
             // Nobody answers an answer.
             (Some(frame), Some(Pending { request: Some(request), .. })) => {
-                let event =
-                    self.encoder.answer(&frame, Some(request.data_id()), Response::parse(request, frame.bytes()), None);
+                let event = self.encoder.answer(
+                    &frame,
+                    Some(request.data_id()),
+                    Response::parse(request, frame.contents()),
+                    None,
+                );
                 out.event(&event)
             }
             // Nobody owes an answer to a damaged request.
@@ -260,7 +258,7 @@ impl StartStop for Decoder {
     }
 
     fn field(&mut self, field: &LineField, out: &mut dyn Sink) -> io::Result<()> {
-        if self.open.fields > 0 && self.is_over(field.start) {
+        if !self.open.is_empty() && self.is_over(field.start) {
             self.close(out)?;
         }
         if let Some(until) = self.skip {
@@ -271,17 +269,17 @@ impl StartStop for Decoder {
             }
             self.skip = None;
         }
-        if self.open.fields == 0 {
+        if self.open.is_empty() {
             let due = self.pending.and_then(|pending| pending.end()).map(|end| end.saturating_add(ANSWER_TIMEOUT));
             if due.is_some_and(|due| field.start > due) {
                 self.give_up(field.start, true, out)?;
             }
         }
-        self.open.push(field, self.bit);
+        self.open.push((field.content & 0xff) as u8, field, self.bit);
         let whole = self.pending.is_some_and(|pending| {
-            self.open.broken.is_none() && self.open.fields == pending.answer_fields(self.open.first())
+            self.open.broken.is_none() && self.open.len() == pending.answer_fields(self.open.first())
         });
-        if whole || self.is_answer_alone() || self.open.fields == MOST_FIELDS { self.close(out) } else { Ok(()) }
+        if whole || self.is_answer_alone() || self.open.len() == MOST_FIELDS { self.close(out) } else { Ok(()) }
     }
 
     /// A line of a log: requests and answers, one behind the other.
@@ -293,7 +291,7 @@ impl StartStop for Decoder {
         let is_answer = id(rest).is_ok_and(|id| rest.len() == usize::from(id.response_fields())) && !is_request;
         let asks = burst.direction == Some(Direction::Request);
         if asks || self.pending.is_some_and(|pending| is_request && rest.len() < pending.answer_fields_of(rest)) {
-            self.give_up(0, false, out)?;
+            self.give_up(0, true, out)?;
         }
         if is_answer && self.pending.is_none() {
             return self.take(burst.line, rest, out);
@@ -315,10 +313,10 @@ impl StartStop for Decoder {
 
     fn finish(&mut self, end: Option<i64>, out: &mut dyn Sink) -> io::Result<()> {
         let Some(end) = end else { return self.give_up(0, false, out) };
-        if self.open.fields > 0 {
+        if !self.open.is_empty() {
             let recent = end - self.open.end <= FIELD_TIMEOUT_BITS * self.bit;
             let request = self.pending.is_none()
-                && self.open.data_id().is_ok_and(|id| self.open.fields == usize::from(id.request_fields()));
+                && self.open.data_id().is_ok_and(|id| self.open.len() == usize::from(id.request_fields()));
             if recent && !request {
                 self.clear(out)?;
                 return out.event(&Event::cut_off(self.open.place(), "a frame"));

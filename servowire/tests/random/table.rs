@@ -70,10 +70,10 @@ pub struct Row {
     pub faults: Vec<(u64, String, String)>,
 }
 
-/// Draws `captures` captures under a condition.
-pub fn row(condition: &Condition, kind: Kind, captures: u32) -> Row {
+/// Draws `captures` captures under a condition, from number `first` on.
+pub fn row(condition: &Condition, kind: Kind, first: u64, captures: u32) -> Row {
     let mut row = Row { condition: condition.name, kind, captures, right: 0, wrong: 0, faults: Vec::new() };
-    for k in 0..u64::from(captures) {
+    for k in first..first + u64::from(captures) {
         let seed = k * 7919 + condition.name.len() as u64 * 104_729 + kind as u64 * 31;
         let scene = (condition.scene)(&mut Rng::new(seed ^ 0x5eed));
         let outcome = judge(&capture(kind, &scene, seed), scene.inside);

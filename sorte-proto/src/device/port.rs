@@ -216,7 +216,7 @@ mod tests {
         let states = [State::Idle, State::Discovery, State::Param, State::LineDelay, State::Sync, State::Exchange];
         for state in states {
             for flags in (0..32).map(PortFlags::from_bits_retain) {
-                for code in (0..=u8::MAX).step_by(crate::stride(17)) {
+                for code in (0..=u8::MAX).step_by(crate::stride(51)) {
                     for status in (0..=u8::MAX).step_by(crate::stride(51)) {
                         let before = Port { state, flags };
                         let mut port = before;

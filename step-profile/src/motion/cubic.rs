@@ -223,14 +223,6 @@ impl<W: Word> Cubic<W> {
         Self { off: self.off.plus(self.step), ..*self }.solve(guess, last)
     }
 
-    /// As [`solve`](Self::solve), for a guess that is most often wrong by one tick.
-    pub(super) fn beside(&self, guess: u64, last: u64) -> (u64, Self) {
-        let early = self.bent(guess).off.is_negative();
-        let by = if early { guess.saturating_add(1) } else { guess.saturating_sub(1) };
-        let next = self.bent(by);
-        if by <= last && next.is_there() { (by, next) } else { self.solve(guess, last) }
-    }
-
     /// The step after the one that has just been made, `guess` ticks on or as many as it is, up to `last`: Newton's method
     /// between the ticks that are known to be too early and late enough; if it takes long, halving.
     ///
@@ -267,6 +259,7 @@ impl<W: Word> Cubic<W> {
     }
 }
 
+#[expect(clippy::cast_possible_truncation, clippy::cast_possible_wrap, reason = "words in two's complement")]
 impl Cubic<i64> {
     /// The upper words alone say [`is_there`](Self::is_there); near the edges they do not, in a word of 2^26 to a step.
     #[inline(always)]
@@ -276,6 +269,61 @@ impl Cubic<i64> {
         // The lower words make the speed less by one at most.
         let speed = upper(self.v).wrapping_sub(upper(self.h)).wrapping_add(upper(self.j));
         off.wrapping_add(1).wrapping_sub(speed) & !off < 0
+    }
+
+    /// Step, v, h and j without their signs.
+    pub(super) fn sizes(&self) -> [Real; 4] {
+        [self.step, self.v, self.h, self.j].map(|word| Real::new(word.unsigned_abs()))
+    }
+
+    /// Without jerk.
+    pub(super) const fn is_straight(&self) -> bool {
+        self.j == 0
+    }
+
+    /// Whether h and j are not below 0.
+    pub(super) const fn signs(&self) -> (bool, bool) {
+        (self.h >= 0, self.j >= 0)
+    }
+
+    /// At the step that comes 2^`doublings` steps later, if that is made `by` ticks on.
+    #[inline]
+    pub(super) fn onward(&self, by: u64, doublings: u32) -> Self {
+        let off = self.off.wrapping_add(self.step).wrapping_sub(self.step.wrapping_shl(doublings));
+        Self { off, ..*self }.bent(by)
+    }
+
+    /// What the step was due before this tick, in 2^-32 ticks and exact to 2^-14 ticks; less than 0 if it is due after it. `None`
+    /// if that is more than a tick.
+    #[inline]
+    pub(super) fn late(&self) -> Option<i64> {
+        if self.v <= 0 || self.off.unsigned_abs() > self.v.unsigned_abs() {
+            return None;
+        }
+        let up = self.v.leading_zeros().wrapping_sub(1);
+        let (off, v) = ((self.off << up) >> 32, (self.v << up) >> 47);
+        let part = (off as i32).checked_div(v as i32)?;
+        Some(i64::from(part) << 17)
+    }
+
+    /// At a step `steps` before this one, `by` ticks on or, below 0, back.
+    #[cfg(test)]
+    pub(super) fn back(&self, by: i64, steps: u64) -> Self {
+        let Self { off, v, h, j, step } = *self;
+        let off = off + step.wrapping_mul(steps as i64);
+        let (bent, curved) = (j.wrapping_mul(by), h.wrapping_mul(by));
+        Self {
+            off: off.wrapping_add((bent.wrapping_mul(by) + curved + v).wrapping_mul(by)),
+            v: v + 2 * curved + (3 * bent).wrapping_mul(by),
+            ..*self
+        }
+    }
+
+    /// Whether a step `left` before the present one is made later than `by` ticks after it.
+    pub(super) fn is_early(&self, by: u64, left: u32) -> bool {
+        let by = by as i64;
+        let mean = self.j.wrapping_mul(by).wrapping_add(self.h).wrapping_mul(by).wrapping_add(self.v);
+        mean.wrapping_mul(by).wrapping_add(self.off).wrapping_add(self.step.wrapping_mul(left.into())) < 0
     }
 }
 

@@ -1,164 +1,82 @@
 //! From curves to the ticks of steps.
-#![expect(
-    clippy::cast_possible_truncation,
-    clippy::cast_possible_wrap,
-    clippy::cast_sign_loss,
-    reason = "words of wider numbers"
-)]
+#![expect(clippy::cast_possible_truncation, clippy::cast_possible_wrap, reason = "words of wider numbers")]
 
 use super::cubic::Cubic;
 use super::curve::{Bend, Curve, Piece};
+use super::guess::Guess;
 use super::phases::Frame;
 use super::real::{Real, THIRD};
+use super::run::{Row, Run};
 
 /// Makes the steps of an axis on a curve, one after the other.
 ///
-/// Step k falls into the tick nearest to the time at which the position passes k - 1/2. On a piece with an acceleration the
-/// next tick is foreseen from the last two intervals, and the exact position at it says whether that was right.
+/// Step k falls into the tick nearest to the time at which the position passes k - 1/2.
 #[derive(Debug, Clone)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub(super) struct Stepper {
-    /// Tick of the last step, if the speed is not constant.
-    t: u64,
+    run: Run,
+    rest: Rest,
+}
+
+/// What comes after the run.
+#[derive(Debug, Clone)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+struct Rest {
     /// Steps left in this piece.
     left: u32,
     /// Steps made at its end, counted from the origin of the positions.
     until: u32,
     /// The last tick of the piece.
     end: u64,
-    guess: Guess,
     mode: Mode,
     /// Number of the next piece.
     piece: u8,
 }
 
+/// How the steps of a piece are made; the state is that of the last step of the run.
 #[derive(Debug, Clone)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 enum Mode {
-    /// Constant speed: from step to step, and the time of the last one, in 2^-64 ticks.
-    Cruise { interval: u128, time: u128 },
-    /// Constant acceleration.
-    Slope(Cubic<i64>),
-    /// Constant jerk.
-    Bend(Cubic<i64>),
-    /// Either, if it lasts too long for 64 bits; with the last two intervals.
-    Long(Cubic<i128>, u64, u64),
-}
-
-/// Bits of a part of a tick in a [`Guess`], which foresees intervals of up to 2^20 ticks with them.
-const PART: u32 = 11;
-/// Rounds up.
-const CEIL: u32 = (1 << PART) - 1;
-
-/// Foresees intervals, in 2^-11 ticks.
-#[derive(Debug, Clone, Copy)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-struct Guess {
-    /// The last one.
-    interval: u32,
-    /// What it was longer than the one before.
-    change: u32,
-    /// How long before the middle of its tick the last step was due.
-    late: u32,
-    /// Ticks to the next step, rounded up.
-    next: u32,
-    /// Steps a unit: 2^43 over the high word of a step.
-    rate: u32,
-}
-
-impl Guess {
-    /// A step came `by` ticks after the one before; `off` is what the position was past it.
-    #[inline(always)]
-    fn learn(&mut self, by: u32, off: i64) {
-        // The part of a tick is off / speed, and the speed is about a step an interval.
-        let part = (u64::from((off >> 32) as u32).wrapping_mul(self.interval.into()) >> PART) as u32;
-        let late = (u64::from(part).wrapping_mul(self.rate.into()) >> 32) as u32;
-        let interval = (by << PART).wrapping_add(self.late).wrapping_sub(late);
-        // The change changes about as it did before.
-        let change = interval.wrapping_sub(self.interval);
-        let next = change.wrapping_sub(self.change).wrapping_add(change).wrapping_add(interval);
-        self.next = next.wrapping_sub(late).wrapping_add(CEIL);
-        (self.interval, self.change, self.late) = (interval, change, late);
-    }
-
-    /// From the speed alone.
-    fn start(&mut self, cubic: &Cubic<i64>) {
-        let high = (cubic.step >> 32) as u32;
-        self.rate = u32::MAX.checked_div(high >> PART).unwrap_or(0);
-        let ticks = cubic.interval().min(1 << 19);
-        let (interval, off) = ((ticks as u32) << PART, cubic.off.max(0));
-        (self.interval, self.change, self.late) = (interval, 0, 0);
-        self.learn(ticks as u32, off);
-        self.next = interval.wrapping_sub(self.late).wrapping_add(CEIL);
-        (self.interval, self.change) = (interval, 0);
-    }
-
-    /// After a wrong guess the next one is within half an interval of the last.
-    fn bound(&mut self) {
-        let half = self.interval >> 1;
-        self.next = self.next.max(half).min(self.interval.saturating_add(half));
-    }
-
-    #[inline]
-    const fn ticks(&self) -> u32 {
-        self.next >> PART
-    }
+    /// Constant speed: from step to step, and the time, in 2^-64 ticks.
+    Cruise {
+        interval: u128,
+        time: u128,
+    },
+    /// Constant jerk or acceleration: several steps at once, where the intervals change slowly, and step by step.
+    Slow(Row),
+    Fast(Guess),
+    /// The same, if it lasts too long for 64 bits; with the last two intervals.
+    Long {
+        cubic: Cubic<i128>,
+        tick: u64,
+        interval: u64,
+        before: u64,
+    },
 }
 
 impl Stepper {
     /// With no step made.
     pub(super) const fn new() -> Self {
-        Self {
-            t: 0,
-            left: 0,
-            until: 0,
-            end: 0,
-            guess: Guess { interval: 0, change: 0, late: 0, next: 0, rate: 0 },
-            mode: Mode::Cruise { interval: 0, time: 0 },
-            piece: 0,
-        }
+        let mode = Mode::Cruise { interval: 0, time: 0 };
+        Self { run: Run::NONE, rest: Rest { left: 0, until: 0, end: 0, mode, piece: 0 } }
     }
 
     /// Steps made, counted from the origin of the positions.
     pub(super) const fn count(&self) -> u32 {
-        self.until.saturating_sub(self.left)
+        self.rest.until.saturating_sub(self.rest.left).saturating_sub(self.run.count)
     }
 
     /// The tick of the next step.
     #[inline(always)]
     pub(super) fn next(&mut self, curve: &Curve, frame: &Frame) -> Option<u64> {
-        let Some(left) = self.left.checked_sub(1) else { return self.begin(curve, frame) };
-        self.left = left;
-        let by = self.guess.ticks();
-        let there = match &mut self.mode {
-            Mode::Cruise { interval, time } => {
-                *time = time.wrapping_add(*interval);
-                return Some((*time >> 64) as u64);
+        if self.run.count == 0 {
+            if let Some(tick) = self.rest.single() {
+                return Some(tick);
             }
-            Mode::Slope(cubic) => {
-                let there = cubic.straight(by.into());
-                there.is_surely_there().then(|| {
-                    *cubic = there;
-                    there.off
-                })
-            }
-            Mode::Bend(cubic) => {
-                let there = cubic.bent(by.into());
-                there.is_surely_there().then(|| {
-                    *cubic = there;
-                    there.off
-                })
-            }
-            Mode::Long(..) => None,
-        };
-        match there {
-            Some(off) => {
-                self.guess.learn(by, off);
-                self.t = self.t.wrapping_add(by.into());
-            }
-            None => self.correct(),
+            self.run = self.rest.run(curve, frame)?;
         }
-        Some(self.t)
+        let (tick, is_certain) = self.run.step();
+        Some(if is_certain { tick } else { self.rest.exact(tick, self.run.count) })
     }
 
     /// All steps that are left, in order.
@@ -166,91 +84,115 @@ impl Stepper {
         let mut sum = init;
         while let Some(tick) = self.next(curve, frame) {
             sum = take(sum, tick);
-            sum = match self.mode {
-                Mode::Cruise { interval, mut time } => {
-                    for _ in 0..self.left {
-                        time = time.wrapping_add(interval);
-                        sum = take(sum, (time >> 64) as u64);
-                    }
-                    self.left = 0;
-                    sum
+            if let Mode::Cruise { interval, time } = self.rest.mode {
+                let mut time = time.wrapping_sub(interval.wrapping_mul(self.run.count.into()));
+                for _ in 0..self.run.count.wrapping_add(self.rest.left) {
+                    time = time.wrapping_add(interval);
+                    sum = take(sum, (time >> 64) as u64);
                 }
-                Mode::Slope(cubic) => self.foreseen(cubic, Cubic::straight, sum, &mut take),
-                Mode::Bend(cubic) => self.foreseen(cubic, Cubic::bent, sum, &mut take),
-                Mode::Long(..) => sum,
-            };
-        }
-        sum
-    }
-
-    /// The steps of a piece up to its end, or to one that is foreseen wrongly.
-    #[inline(always)]
-    fn foreseen<B>(
-        &mut self,
-        mut cubic: Cubic<i64>,
-        after: impl Fn(&Cubic<i64>, u64) -> Cubic<i64>,
-        mut sum: B,
-        take: &mut impl FnMut(B, u64) -> B,
-    ) -> B {
-        let Self { t, left, guess, mode, .. } = self;
-        let (mut tick, mut more, mut own) = (*t, *left, *guess);
-        while more > 0 {
-            let mut by = own.ticks();
-            let mut there = after(&cubic, by.into());
-            if !there.is_surely_there() {
-                // Most often wrong by one tick.
-                by = if there.off < 0 { by.wrapping_add(1) } else { by.wrapping_sub(1) };
-                there = after(&cubic, by.into());
-                if !there.is_surely_there() {
+                (self.run.count, self.rest.left) = (0, 0);
+                continue;
+            }
+            if let Mode::Fast(guess) = &mut self.rest.mode {
+                (self.rest.left, sum) = guess.fold(self.rest.left, sum, &mut take);
+            }
+            let mut run = self.run;
+            self.run.count = 0;
+            if run.count == 0 {
+                continue;
+            }
+            loop {
+                let (tick, is_certain) = run.step();
+                sum = take(sum, if is_certain { tick } else { self.rest.exact(tick, run.count) });
+                if run.count == 0 {
                     break;
                 }
             }
-            own.learn(by, there.off);
-            (cubic, more, tick) = (there, more.wrapping_sub(1), tick.wrapping_add(by.into()));
-            sum = take(sum, tick);
-        }
-        (*t, *left, *guess) = (tick, more, own);
-        if let Mode::Slope(place) | Mode::Bend(place) = mode {
-            *place = cubic;
         }
         sum
     }
+}
 
-    /// The next step, foreseen wrongly.
+impl Rest {
+    /// Doublings of the steps at constant speed that are foreseen at once: what their interval is rounded by does not add up
+    /// to 2^-16 ticks.
+    const EVEN: u32 = 15;
+
+    /// The next step, if steps are made one by one.
+    #[inline(always)]
+    fn single(&mut self) -> Option<u64> {
+        let Mode::Fast(guess) = &mut self.mode else { return None };
+        let left = self.left.checked_sub(1)?;
+        let tick = guess.next(self.end)?;
+        self.left = left;
+        Some(tick)
+    }
+
+    /// The next steps, one at least.
     #[cold]
     #[inline(never)]
-    fn correct(&mut self) {
-        let last = self.end.saturating_sub(self.t);
-        let by = match &mut self.mode {
-            Mode::Cruise { .. } => 0,
-            Mode::Slope(cubic) | Mode::Bend(cubic) => {
-                let (by, there) = cubic.beside(self.guess.ticks().into(), last);
-                *cubic = there;
-                self.guess.learn(by as u32, there.off.max(0));
-                self.guess.bound();
-                by
+    fn run(&mut self, curve: &Curve, frame: &Frame) -> Option<Run> {
+        if self.left == 0 {
+            return self.begin(curve, frame);
+        }
+        let run = match &mut self.mode {
+            Mode::Cruise { interval, time } => {
+                // As many as there is room for; an interval beyond that has none.
+                let room = (*interval >> 32).leading_zeros().saturating_sub(65).min(Self::EVEN);
+                let count = self.left.min(1 << room);
+                let run = Run::even(count, (*time >> 64) as u64, (*time >> 32) as u32, (*interval >> 32) as u64);
+                *time = time.wrapping_add(interval.wrapping_mul(count.into()));
+                if count == 1 { Run::at((*time >> 64) as u64) } else { run }
             }
-            Mode::Long(cubic, interval, before) => {
+            Mode::Fast(guess) if self.left < Row::LEAST || !guess.is_slow() => Run::at(guess.step(self.end)),
+            Mode::Fast(_) | Mode::Slow(_) => self.row(),
+            Mode::Long { cubic, tick, interval, before } => {
                 let guess = interval.saturating_mul(2).saturating_sub(*before).max(*interval >> 1);
+                let last = self.end.saturating_sub(*tick);
                 let (by, there) = cubic.solve(guess.min(interval.saturating_mul(2)), last);
-                (*cubic, *interval, *before) = (there, by, *interval);
-                by
+                (*cubic, *tick, *interval, *before) = (there, tick.saturating_add(by), by, *interval);
+                Run::at(*tick)
             }
         };
-        self.t = self.t.saturating_add(by);
+        self.left = self.left.saturating_sub(run.count);
+        Some(run)
+    }
+
+    /// Several steps, if that can be; else one.
+    fn row(&mut self) -> Run {
+        if let Mode::Fast(guess) = &self.mode {
+            self.mode = Mode::Slow(Row::new(guess.cubic, guess.tick));
+        }
+        if let Mode::Slow(row) = &mut self.mode {
+            if let Some(run) = row.run(self.left) {
+                return run;
+            }
+            let (cubic, tick) = row.place();
+            self.mode = Mode::Fast(Guess::new(cubic, tick, 16));
+        }
+        if let Mode::Fast(guess) = &mut self.mode { Run::at(guess.step(self.end)) } else { Run::NONE }
+    }
+
+    /// The tick of a step of the run, which is `tick` or the one after it; `left` is what is left of the run.
+    #[cold]
+    #[inline(never)]
+    fn exact(&self, tick: u64, left: u32) -> u64 {
+        match &self.mode {
+            Mode::Cruise { interval, time } => (time.wrapping_sub(interval.wrapping_mul(left.into())) >> 64) as u64,
+            Mode::Slow(row) => row.exact(tick, left),
+            Mode::Fast(_) | Mode::Long { .. } => tick,
+        }
     }
 
     /// The first step of the next piece that has one.
-    #[cold]
-    #[inline(never)]
-    fn begin(&mut self, curve: &Curve, frame: &Frame) -> Option<u64> {
+    fn begin(&mut self, curve: &Curve, frame: &Frame) -> Option<Run> {
         loop {
-            let count = self.count();
+            let count = self.until;
             let (piece, end, until) = frame.piece(curve, self.piece)?;
             self.piece = self.piece.saturating_add(1);
             if until > count {
                 (self.until, self.left) = (until, until.wrapping_sub(count).wrapping_sub(1));
-                return Some(self.enter(count, curve, frame, &piece, end));
+                return Some(Run::at(self.enter(count, curve, frame, &piece, end)));
             }
         }
     }
@@ -283,23 +225,106 @@ impl Stepper {
         };
         let straight = piece.bend == Bend::Flat;
         let inverse = Real::ONE / if straight { scale(piece.a.half(), 2) } else { scale(piece.j.half() * THIRD, 3) };
+        self.end = until.max(tick);
+        let last = self.end.wrapping_sub(tick);
         // A step is 2^58 units at least, if the unit then is neither too large nor a step too short to be foreseen.
         let bits = 58_i32.saturating_sub(inverse.exponent());
-        (self.t, self.end) = (tick, until.max(tick));
-        let last = self.end.wrapping_sub(tick);
-        let by = if (10..=50).contains(&bits) {
+        if (10..=50).contains(&bits) {
             let (by, cubic) = Cubic::new(piece, wait, (inverse, bits, frame.shift as i32), scale, ahead).first(last);
-            self.guess.start(&cubic);
-            self.mode = if straight { Mode::Slope(cubic) } else { Mode::Bend(cubic) };
-            by
-        } else {
-            let bits = 117_i32.saturating_sub(inverse.exponent()).clamp(0, 50);
-            let (by, cubic) = Cubic::new(piece, wait, (inverse, bits, frame.shift as i32), scale, ahead).first(last);
-            let interval = cubic.interval();
-            self.mode = Mode::Long(cubic, interval, interval);
-            by
-        };
-        self.t = tick.saturating_add(by);
-        self.t
+            let tick = tick.saturating_add(by);
+            self.mode = Mode::Fast(Guess::new(cubic, tick, 3));
+            return tick;
+        }
+        let bits = 117_i32.saturating_sub(inverse.exponent()).clamp(0, 50);
+        let (by, cubic) = Cubic::new(piece, wait, (inverse, bits, frame.shift as i32), scale, ahead).first(last);
+        let tick = tick.saturating_add(by);
+        let interval = cubic.interval();
+        self.mode = Mode::Long { cubic, tick, interval, before: interval };
+        tick
+    }
+}
+
+#[cfg(test)]
+#[expect(clippy::cast_sign_loss, reason = "numbers from 0 upwards")]
+mod tests {
+    use super::*;
+    use crate::motion::planner::{Goal, Motion, plan};
+    use crate::motion::{Clock, Limits};
+    use proptest::prelude::*;
+    use std::vec::Vec;
+
+    /// The ticks with every step looked for at the exact position, none foreseen.
+    fn one_by_one(curve: &Curve, frame: &Frame) -> Vec<u64> {
+        let (mut rest, mut ticks) = (Stepper::new().rest, Vec::new());
+        loop {
+            match &mut rest.mode {
+                Mode::Fast(guess) if rest.left > 0 => {
+                    ticks.push(guess.search(rest.end));
+                    rest.left -= 1;
+                }
+                _ => match rest.run(curve, frame) {
+                    Some(mut run) => {
+                        while run.count > 0 {
+                            let (tick, is_certain) = run.step();
+                            ticks.push(if is_certain { tick } else { rest.exact(tick, run.count) });
+                        }
+                    }
+                    None => return ticks,
+                },
+            }
+        }
+    }
+
+    /// How far the foreseen times are from the exact ones at most.
+    fn error(curve: &Curve, frame: &Frame) -> f64 {
+        let (mut rest, mut worst) = (Stepper::new().rest, 0.0);
+        while let Some(run) = rest.run(curve, frame) {
+            if let (Mode::Slow(row), 2..) = (&rest.mode, run.count) {
+                worst = f64::max(worst, row.error(run));
+            }
+        }
+        worst
+    }
+
+    /// Logarithmically spread.
+    fn spread(low: f64, high: f64) -> impl Strategy<Value = f64> {
+        (low.ln()..high.ln()).prop_map(f64::exp)
+    }
+
+    proptest! {
+        #[test]
+        fn what_is_foreseen_is_where_the_position_is(
+            hz in spread(1e3, 1e9),
+            v in spread(1.0, 1e6),
+            a in spread(1.0, 1e9),
+            j in prop_oneof![Just(0.0), spread(1.0, 1e10)],
+            n in prop_oneof![1..300_u32, 1..30_000_u32],
+            ends in prop_oneof![Just([0.0; 2]), [0.0..1.0, 0.0..1.0]],
+        ) {
+            let n = if cfg!(miri) { n % 100 } else { n };
+            let clock = Clock::new(hz as u32).unwrap();
+            let v = (v as u32).min(clock.hz() / 2);
+            let limits = Limits::new(v, a as u32).unwrap();
+            let limits = if j == 0.0 { limits } else { limits.with_jerk(j as u64).unwrap() };
+            let bounds = limits.bounds(clock);
+            let [entry, exit] = ends.map(|part| bounds.v * Real::new((part * 1e6) as u64) / Real::new(1_000_000));
+            let Ok(curve) = plan(Motion::steady(entry), Goal::At(Real::new(n.into()), exit), &bounds) else {
+                return Ok(());
+            };
+            let frame = Frame { to: Some(i64::from(n) << 32), ..Frame::rest(clock.shift(), 0, 0) };
+            let ticks = one_by_one(&curve, &frame);
+            let (mut stepper, mut got) = (Stepper::new(), Vec::new());
+            while let Some(tick) = stepper.next(&curve, &frame) {
+                got.push(tick);
+                prop_assert_eq!(stepper.count() as usize, got.len());
+            }
+            prop_assert_eq!(&got, &ticks);
+            got.clear();
+            Stepper::new().fold(&curve, &frame, (), |(), tick| got.push(tick));
+            prop_assert_eq!(got, ticks);
+            // A third is kept in hand.
+            let error = error(&curve, &frame);
+            prop_assert!(error < 0.021, "{error}");
+        }
     }
 }

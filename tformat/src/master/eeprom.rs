@@ -29,7 +29,7 @@ enum Phase {
 /// **No write is repeated without evidence that it was not done.** After a lost or refused response to a write, to the
 /// page register too, the cell is read: only if it holds another value is it written again. A memory that says that it
 /// is busy is asked by reading. If nothing can be read after a write has been sent, the access ends with
-/// [`Error::EffectUnknown`].
+/// [`Error::EffectUnknown`]. A response that is for another address is refused like one of another kind.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct EepromAccess {
@@ -92,6 +92,10 @@ impl EepromAccess {
             (Ok(other), _) => return self.unclear(mismatch(other, self.request()), ready_ns),
             (Err(error), _) => return self.unclear(error, ready_ns),
         };
+        let (got, want) = (memory.adf.address(), self.cell());
+        if got != want {
+            return self.unclear(Error::AddressMismatch { got: got.get(), want: want.get() }, ready_ns);
+        }
         if memory.adf.busy() {
             // What is busy did not take a write.
             self.unknown &= matches!(self.phase, Phase::CheckPage | Phase::Read);
@@ -168,10 +172,17 @@ impl EepromAccess {
 
     const fn request(&self) -> Request {
         match (self.phase, self.page, self.write) {
-            (Phase::SelectPage, Some(page), _) => Request::write_eeprom(Address::PAGE_REGISTER, page.get()),
-            (Phase::CheckPage, ..) => Request::read_eeprom(Address::PAGE_REGISTER),
-            (Phase::Write, _, Some(data)) => Request::write_eeprom(self.address, data),
-            _ => Request::read_eeprom(self.address),
+            (Phase::SelectPage, Some(page), _) => Request::write_eeprom(self.cell(), page.get()),
+            (Phase::Write, _, Some(data)) => Request::write_eeprom(self.cell(), data),
+            _ => Request::read_eeprom(self.cell()),
+        }
+    }
+
+    /// What the request of this phase is about.
+    const fn cell(&self) -> Address {
+        match self.phase {
+            Phase::SelectPage | Phase::CheckPage => Address::PAGE_REGISTER,
+            Phase::Write | Phase::Read => self.address,
         }
     }
 }
@@ -310,6 +321,29 @@ mod tests {
         let _ = access.receive(LOST, 0);
         let _ = access.receive(LOST, 0);
         assert_eq!(access.receive(Ok(read(false, 7)), 9), Step::Done { value: 7, ready_ns: 9 });
+    }
+
+    /// What another cell holds says nothing of this one, nor of the page register.
+    #[test]
+    fn responses_of_another_address_are_refused() {
+        let mut access = EepromAccess::write(Page::new(2), ADDRESS, 0x5a, POLLING);
+        let _ = access.start(0);
+        let elsewhere = |edf| Ok(Response::ReadEeprom(memory(Address::truncate(6), false, edf)));
+        assert_eq!(access.receive(Ok(wrote(false, 2)), 0), send(CHECK, 1000));
+        assert_eq!(access.receive(elsewhere(2), 0), send(CHECK, 1000));
+        let page = Ok(Response::ReadEeprom(memory(Address::PAGE_REGISTER, false, 2)));
+        assert_eq!(access.receive(page, 0), send(WRITE, 0));
+        assert_eq!(access.receive(Ok(wrote(false, 0x5a)), 0), send(READ, 0));
+        for edf in [0x5a, 0xff] {
+            assert_eq!(access.receive(elsewhere(edf), 0), send(READ, 1000));
+        }
+        let end = access.receive(elsewhere(0x5a), 0);
+        let because = ErrorClass::AddressMismatch;
+        assert_eq!(end, Step::Failed { error: Error::EffectUnknown { because }, ready_ns: 1000 });
+        let mut access = EepromAccess::read(None, ADDRESS, Polling { max_tries: 1, ..POLLING });
+        let _ = access.start(0);
+        let error = Error::AddressMismatch { got: 6, want: 5 };
+        assert_eq!(access.receive(elsewhere(7), 0), Step::Failed { error, ready_ns: 1000 });
     }
 
     /// A read is never taken for the answer to a write, nor the other way round.

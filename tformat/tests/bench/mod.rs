@@ -3,11 +3,12 @@
 use core::fmt;
 
 use servowire_world::{
-    Block, Delivery, Event, Framing, Id, Message, Scenario, Speaker, Stamp, Tally, Transmission, Verdict, Wire, World,
+    Block, Delivery, Draw, Event, Framing, Id, Message, Scenario, Speaker, Stamp, Tally, Transmission, Verdict, Wire,
+    World,
 };
 use tformat::device::{Config, Device};
 use tformat::master::{Line, Progress, Step, Transaction};
-use tformat::{Abm, Abs, BitRate, Error, Request, Response};
+use tformat::{Abm, Abs, Address, BitRate, Error, Request, Resolution, Response};
 
 /// What was seen in a run besides the line's own tally.
 #[derive(Debug, Clone, Copy, Default)]
@@ -62,6 +63,11 @@ pub struct Bench {
     turn: u32,
     budget_ns: u64,
     response_ns: u64,
+    /// Whether the tenth response to a reset shows its effect.
+    tenth_shows_effect: bool,
+    /// The host has other things to ask and mixes outcomes up: now and then a procedure is given that of another request,
+    /// which was sent in place of its own.
+    pub astray: Option<Draw>,
 }
 
 /// What became of one exchange.
@@ -99,14 +105,44 @@ impl Bench {
             // Four bits of turn-around and a field.
             budget_ns: field_ns(rate) * 14 / 10,
             response_ns: 11 * field_ns(rate),
+            tenth_shows_effect: config.tenth_shows_effect,
+            astray: None,
         }
+    }
+
+    /// With a host that mixes outcomes up.
+    pub fn mixing_up(mut self, seed: u64) -> Self {
+        let mut draw = Draw::default();
+        for _ in 0..seed % 64 {
+            let _ = draw.below(2);
+        }
+        self.astray = Some(draw);
+        self
+    }
+
+    /// What is sent where a procedure wants `request`, another one once in twelve times. One reset alone does nothing.
+    fn sent_for(&mut self, request: Request) -> Request {
+        let Some(draw) = &mut self.astray else { return request };
+        if draw.below(12) > 0 {
+            return request;
+        }
+        let all = [
+            Request::ReadAll,
+            Request::ReadMultiTurn,
+            Request::ResetErrors,
+            Request::SetSingleTurnZero,
+            Request::ResetTurnsAndErrors,
+            Request::read_eeprom(Address::truncate(0x33)),
+        ];
+        all[draw.below(6) as usize]
     }
 
     /// One request, judged by the laws of time.
     pub fn exchange(&mut self, request: Request, not_before_ns: u64) -> Exchanged {
         if self.moves {
             self.turn += 1;
-            self.device.set_position(Abs::truncate(self.turn & 0x7f_ffff), Abm::truncate(self.turn & 0xffff));
+            let (abs, abm) = self.shaft();
+            self.device.set_position(Abs::truncate(abs), Abm::truncate(abm));
         }
         if self.trembles {
             // 0x7f_ffff and 0 are neighbours.
@@ -145,6 +181,30 @@ impl Bench {
         Exchanged { outcome, ready_ns: self.ready_ns }
     }
 
+    /// A place of the shaft that is another one every time, in 23 bits; the turns use all 24 bits of ABM.
+    const fn shaft(&self) -> (u32, u32) {
+        (self.turn & 0x7f_ffff, self.turn.wrapping_mul(0x9e_3779) & 0xff_ffff)
+    }
+
+    /// The numbers of a fresh response are where the shaft is.
+    fn is_where_the_shaft_is(&self, response: Response) {
+        let (abs, abm) = self.shaft();
+        let resolution = Resolution::new(23, 24).expect("widths of the fields");
+        // The upper half of a counter in two's complement is below 0.
+        let turns = i64::from(abm) - if abm >= 1 << 23 { 1 << 24 } else { 0 };
+        match response {
+            Response::ReadSingleTurn(single) => assert_eq!(resolution.single_turn(single.abs), Ok(abs)),
+            Response::ReadMultiTurn(multi) => assert_eq!(resolution.turns(multi.abm).map(i64::from), Ok(turns)),
+            Response::ReadAll(all) => {
+                assert_eq!(
+                    resolution.position(all.abs, all.abm).map(|p| (p.abs, i64::from(p.turns))),
+                    Ok((abs, turns))
+                );
+            }
+            _ => {}
+        }
+    }
+
     /// Nothing is sent until `until_ns`.
     pub fn wait(&mut self, until_ns: u64) {
         let mut idle = Transaction::start(Request::ReadAll, self.line, u64::MAX / 2);
@@ -163,6 +223,7 @@ impl Bench {
             match step {
                 Step::Send { request, not_before_ns } => {
                     self.wait(not_before_ns);
+                    let request = self.sent_for(request);
                     let exchanged = self.exchange(request, not_before_ns);
                     step = receive(exchanged.outcome, exchanged.ready_ns);
                 }
@@ -184,8 +245,13 @@ impl Bench {
             Event::Heard { unit, .. } => {
                 let (content, framed) = unit.bits.content();
                 let byte = content as u8;
+                let (effects, abs) = (self.device.effects(), self.device.abs().get());
                 let sent =
                     if framed { self.device.byte(byte, unit.end_ns) } else { self.device.framing_error(unit.end_ns) };
+                if let Some(sent) = sent.filter(|_| byte == 0xc2 && self.device.effects() > effects) {
+                    let want = if self.tenth_shows_effect { 0 } else { abs };
+                    assert_eq!(sent.frame.as_bytes()[2..5], want.to_le_bytes()[..3], "what the tenth response shows");
+                }
                 // Its own answers are not heard by itself.
                 let foreign = !matches!(unit.origin.speaker, Speaker::Host | Speaker::Device(_));
                 self.misheard += u32::from(unit.damaged || foreign);
@@ -236,22 +302,21 @@ impl Bench {
         self.seen.done += 1;
         self.seen.owed += u64::from(truth.intact_answers(id).next().is_some());
         assert!(ready_ns >= sent.asked_ns);
-        // Neither the encoder ID nor the EEPROM changes with every request.
-        if !matches!(response.emit().as_bytes(), [_, _, _, _, _, _, ..]) {
-            return;
-        }
+        // The host was given nothing but its own request and answers to it, whole or not at all.
+        let whole = |t: &Transmission| t.delivered == 0 || t.intact;
+        let foreign = truth.handed_since(id).any(|handed| handed.origin.speaker == Speaker::Foreign);
+        let undisturbed = truth.undisturbed(id) && !foreign && whole(&sent) && truth.answers(id).all(whole);
         match truth.verdict(id, tag(response.emit().as_bytes())) {
+            Verdict::Fresh if self.moves && !self.trembles => self.is_where_the_shaft_is(response),
             Verdict::Fresh => {}
             Verdict::Forged { .. } => self.seen.forged += 1,
             Verdict::Unknown => {
-                let foreign = truth.handed_since(id).any(|handed| handed.origin.speaker == Speaker::Foreign);
-                let intact = truth.undisturbed(id) && !foreign && truth.intact_answers(id).next().is_some();
-                assert!(!intact, "the response {response} was never sent");
+                assert!(!undisturbed, "the response {response} was never sent, nor was anything damaged: {sent:?}");
                 self.seen.undetected += 1;
             }
             // Damage that happens to make an old value: nothing of that answer was handed over since.
             Verdict::Old { of } if truth.handed_since(id).all(|handed| handed.origin.transmission != of) => {
-                assert!(!truth.undisturbed(id) || truth.intact_answers(id).next().is_none(), "invented: {response}");
+                assert!(!undisturbed, "invented: {response} for {sent:?}");
                 self.seen.undetected += 1;
             }
             Verdict::Old { of } => {

@@ -2,8 +2,9 @@
 
 use hdsl::frame::ANSWER_BITS;
 use hdsl::sampling::TEST_PATTERN;
-use hdsl::symbol::{RunningDisparity, Word};
 use hdsl::{Answer, Rule, Window};
+
+use super::disparity::Chain;
 
 /// Every word, the switch bit, the check of the acceleration and the disparity hold.
 pub(super) const PERFECT: usize = 12;
@@ -15,22 +16,6 @@ pub(super) fn score(line: Window) -> usize {
         return 20;
     }
     let words = answer.words().iter().filter(|word| !word.is_byte_error()).count();
-    let disparity = if disparity_holds(line) { 3 } else { 0 };
+    let disparity = if Chain::of(line).holds { 3 } else { 0 };
     words + usize::from(answer.switch_ok()) + if answer.delta_delta().is_ok() { 2 } else { 0 } + disparity
-}
-
-/// Whether the running disparity holds from word to word of an answer, whatever it was before.
-pub(super) fn disparity_holds(line: Window) -> bool {
-    let bits = line.bits();
-    let words = [0, 10, 20, 30, 40, 51].map(|at| Word::truncate((bits >> at) as u16));
-    [RunningDisparity::Minus, RunningDisparity::Plus].into_iter().any(|before| {
-        let mut rd = before;
-        words.into_iter().all(|word| {
-            let holds = word.is_in(rd);
-            if word.disparity() != 0 {
-                rd = rd.other();
-            }
-            holds
-        })
-    })
 }

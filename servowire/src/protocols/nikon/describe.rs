@@ -5,9 +5,10 @@ use nikon_aformat::{
     Body, Command, Data, EncoderStatus, Error, Expected, Operation, Request, Resolution, Response, TypeWord,
 };
 
-use super::{Group, Settings};
+use super::Frames;
 use crate::event::{Direction, Event, Field, Place, Position, Refusal, Value, Verdict};
-use crate::protocols::plausible::{Motion, two_masters};
+use crate::protocols::group::{self, Widths, too_wide};
+use crate::protocols::plausible::Motion;
 
 /// The fields an event may have.
 pub const FIELDS: &[&str] = &[
@@ -32,11 +33,8 @@ pub const FIELDS: &[&str] = &[
     "note",
 ];
 
-/// Nobody gives up an encoder after so short a time, in picoseconds.
-const BRIEF: i64 = 20_000_000;
-
 /// A request as it was on the line.
-pub(super) fn request(group: &Group, result: Result<Request, Error>) -> Event {
+pub(super) fn request(group: &Frames, result: Result<Request, Error>) -> Event {
     let mut fields = Vec::new();
     match result {
         Ok(request) => {
@@ -45,8 +43,8 @@ pub(super) fn request(group: &Group, result: Result<Request, Error>) -> Event {
         }
         Err(_) => fields.push(words(group)),
     }
-    fields.extend(spikes(group));
-    let names: &[&str] = if group.contents.len() > 1 { &["CDF", "MDF", "MDF", "MDF", "MDF"] } else { &["CDF"] };
+    fields.extend(group.spikes());
+    let names: &[&str] = if group.len() > 1 { &["CDF", "MDF", "MDF", "MDF", "MDF"] } else { &["CDF"] };
     let kind = result.map_or("request", |request| request.command().mnemonic());
     Event::new(group.place(), Some(Direction::Request), kind, fields, verdict(group, names, result.err()))
 }
@@ -72,21 +70,15 @@ fn arguments(operation: Operation, fields: &mut Vec<Field>) {
         }
         _ => {}
     }
-    let effect = match operation.command() {
-        Command::ClearStatus => "clears alarms",
-        Command::ClearMultiturn => "clears turns",
-        Command::ClearStatusMultiturn => "clears alarms and turns",
-        Command::SetAddress1 => "sets the address",
-        Command::ZeroPreset => "sets the single-turn zero",
-        _ => return,
-    };
-    fields.push(Field::text("effect", format_args!("{effect}, one of eight")));
+    let command = operation.command();
+    let effect = |effect| Field::text("effect", format_args!("{effect}, one of {}", command.repeats()));
+    fields.extend(command.effect().map(effect));
 }
 
 /// What is known of the encoder.
 #[derive(Debug, Clone)]
 pub(super) struct Encoder {
-    settings: Settings,
+    widths: Widths,
     /// By the type word, once the line has carried it.
     hint: Option<Resolution>,
     /// By address.
@@ -94,14 +86,14 @@ pub(super) struct Encoder {
 }
 
 impl Encoder {
-    pub(super) fn new(settings: Settings) -> Self {
-        Self { settings, hint: None, motion: [Motion::default(); 8] }
+    pub(super) fn new(widths: Widths) -> Self {
+        Self { widths, hint: None, motion: [Motion::default(); 8] }
     }
 
     /// A reply as it was on the line.
     pub(super) fn answer(
         &mut self,
-        group: &Group,
+        group: &Frames,
         expected: Option<Expected>,
         result: Result<Response, Error>,
         delay: Option<i64>,
@@ -112,7 +104,7 @@ impl Encoder {
             Ok(response) => {
                 position = self.response(response, &mut fields);
                 let (crc, _) = response.emit().crc();
-                let received = group.contents.last().map_or(crc, |last| (last >> 8) as u8).reverse_bits();
+                let received = group.contents().last().map_or(crc, |last| (last >> 8) as u8).reverse_bits();
                 fields.push(Field::hex("CRC", received, 2));
                 let motion = self.motion.get_mut(usize::from(response.ea.get()));
                 let moved = position.zip(motion).and_then(|(position, motion)| motion.note(group.place(), position));
@@ -120,7 +112,7 @@ impl Encoder {
             }
             Err(_) => fields.push(words(group)),
         }
-        fields.extend(spikes(group));
+        fields.extend(group.spikes());
         let kind = expected.map_or("reply", |expected| expected.command().mnemonic());
         let names = &["IF", "data", "data", "data", "data", "data"];
         let verdict = verdict(group, names, result.err());
@@ -164,8 +156,7 @@ impl Encoder {
             }),
             Err(Error::NotCarried) => Some(Position { counts, span: Some(1 << bits), per_turn: None }),
             Err(error) => {
-                let text = format!("{error}; taken as {} + {} bits", resolution.st_bits(), resolution.mt_bits());
-                fields.push(Field::text("width", text));
+                fields.push(too_wide(error, resolution.st_bits(), resolution.mt_bits()));
                 None
             }
         }
@@ -207,56 +198,32 @@ impl Encoder {
 
     /// The widths as the user gave them, else as the type word has them.
     fn resolution(&self) -> Option<Resolution> {
-        let Settings { single_turn_bits, multi_turn_bits } = self.settings;
-        let st = single_turn_bits.or(self.hint.map(Resolution::st_bits))?;
-        let mt = multi_turn_bits.or(self.hint.map(Resolution::mt_bits)).unwrap_or(16);
+        let (st, mt) = self.widths.or(self.hint.map(|hint| (hint.st_bits(), hint.mt_bits())))?;
         Resolution::new(st, mt).ok()
     }
 }
 
 /// No reply came to the request at `place` until `now`.
 pub(super) fn silence(request: Request, place: Place, timeout: i64, now: i64, asked: bool) -> Event {
-    let after = match place {
-        Place::Time { end, .. } if asked => now.saturating_sub(end),
-        _ => timeout,
-    };
-    let cause = if after < BRIEF {
-        two_masters(after)
-    } else {
-        "only the request is on the line: no encoder of this address, A and B exchanged, or not its bit rate".to_owned()
-    };
-    let fields = vec![Field::number("EA", request.ea.get())];
-    Event { fields, ..Event::silence(place, request.command().mnemonic(), "reply", timeout, now, &cause) }
+    let kind = request.command().mnemonic();
+    let silence = group::silence(place, kind, "reply", timeout, now, asked, "no encoder of this address");
+    Event { fields: vec![Field::number("EA", request.ea.get())], ..silence }
 }
 
 /// The content bits as vendor documents print them, the first bit of the line in bit 15.
-fn words(group: &Group) -> Field {
-    Field::digits("words", group.contents.iter().map(|content| content.reverse_bits()), 4)
+fn words(group: &Frames) -> Field {
+    Field::digits("words", group.contents().iter().map(|content| content.reverse_bits()), 4)
 }
 
-fn spikes(group: &Group) -> Option<Field> {
-    (group.spikes > 0).then(|| Field::number("spikes", group.spikes))
-}
-
-fn verdict(group: &Group, names: &[&'static str], error: Option<Error>) -> Verdict {
+fn verdict(group: &Frames, names: &[&'static str], error: Option<Error>) -> Verdict {
     let Some(error) = error else { return Verdict::Ok };
-    let last = group.contents.len().saturating_sub(1);
-    let (frame, bit) = match error {
-        Error::StartBit { frame } => (Some(usize::from(frame)), Some(0)),
-        Error::Delimiter { frame } => (Some(usize::from(frame)), Some(17)),
-        Error::Truncated { .. } => (Some(last + 1), None),
-        Error::Crc { .. } => (Some(last), None),
-        Error::FrameCode { frame, .. } => (Some(usize::from(frame)), Some(4)),
-        Error::SyncCode { .. } => (Some(0), Some(1)),
-        Error::AddressMismatch { .. } => (Some(0), Some(4)),
-        Error::CommandMismatch { .. } | Error::UnknownCommand { .. } => (Some(0), Some(7)),
-        Error::FixedBit => (Some(0), Some(12)),
-        _ => (None, None),
+    let frame = match error {
+        Error::Truncated { .. } => Some(group.len()),
+        Error::Crc { .. } => group.len().checked_sub(1),
+        other => other.frame().map(usize::from),
     };
-    let time = frame.map(|frame| group.starts.get(frame).copied().unwrap_or(group.end));
     let disturbed = matches!(error, Error::Crc { .. } | Error::Crc3 { .. });
-    let field = frame.and_then(|frame| names.get(frame)).map(|name| (*name).to_owned());
-    let time = time.filter(|_| group.line.is_none());
     let cause = disturbed.then(|| Cause::Disturbed.to_string());
-    Refusal { field, bit, time, cause, ..Refusal::new(error.class().name(), error) }.into()
+    let why = Refusal { cause, ..Refusal::new(error.class().name(), error) };
+    group.refused(names, frame, error.bit(), why).into()
 }

@@ -4,14 +4,15 @@ use std::sync::LazyLock;
 
 use tformat::{Abs, Adf, AllData, DataId, Error, Memory, Request, Resolution, Response, StatusField};
 
+use super::ANSWER_TIMEOUT;
 use super::frame::Frame;
-use super::{ANSWER_TIMEOUT, Settings};
 use crate::event::{Direction, Event, Field, Place, Position, Refusal, Value, Verdict};
-use crate::protocols::plausible::{Motion, two_masters};
+use crate::protocols::group::{self, Widths, too_wide};
+use crate::protocols::plausible::Motion;
 
 /// The fields an event may have.
 pub const FIELDS: &[&str] =
-    &["SF", "ABS", "ENID", "ABM", "ALMC", "ADF", "EDF", "CRC", "resets", "width", "spikes", "bytes", "note"];
+    &["SF", "ABS", "ENID", "ABM", "ALMC", "ADF", "EDF", "CRC", "effect", "width", "spikes", "bytes", "note"];
 
 /// A request as it was on the line.
 pub(super) fn request(frame: &Frame, id: Option<DataId>, result: Result<Request, Error>) -> Event {
@@ -19,10 +20,10 @@ pub(super) fn request(frame: &Frame, id: Option<DataId>, result: Result<Request,
     match result {
         Ok(Request::WriteEeprom { adf, edf }) => fields.extend([address(adf), Field::hex("EDF", edf, 2)]),
         Ok(Request::ReadEeprom { adf }) => fields.push(address(adf)),
-        Ok(request) => fields.extend(resets(request.data_id())),
-        Err(_) => fields.push(Field::digits("bytes", frame.bytes().iter().copied(), 2)),
+        Ok(request) => fields.extend(effect(request.data_id())),
+        Err(_) => fields.push(bytes(frame)),
     }
-    fields.extend(spikes(frame));
+    fields.extend(frame.spikes());
     let names = id.map_or(&["CF"][..], |id| id.layout().0);
     event(frame, Direction::Request, id, fields, verdict(frame, names, result.err()))
 }
@@ -30,7 +31,7 @@ pub(super) fn request(frame: &Frame, id: Option<DataId>, result: Result<Request,
 /// What is known of the encoder.
 #[derive(Debug, Clone)]
 pub(super) struct Encoder {
-    settings: Settings,
+    widths: Widths,
     /// By the last ENID on the line.
     hint: Option<Resolution>,
     enid: Option<u8>,
@@ -38,8 +39,8 @@ pub(super) struct Encoder {
 }
 
 impl Encoder {
-    pub(super) fn new(settings: Settings) -> Self {
-        Self { settings, hint: None, enid: None, motion: Motion::default() }
+    pub(super) fn new(widths: Widths) -> Self {
+        Self { widths, hint: None, enid: None, motion: Motion::default() }
     }
 
     /// An answer as it was on the line, to `id` where the request was read.
@@ -64,17 +65,17 @@ impl Encoder {
             }
             // A refusal is a sound ID 3 frame with all its values.
             Err(Error::Rejected { .. }) => {
-                if let Ok(full) = AllData::parse(frame.bytes()) {
+                if let Ok(full) = AllData::parse(frame.contents()) {
                     position = self.response(Response::ReadAll(full), &mut fields);
                 }
             }
-            Err(_) => fields.push(Field::digits("bytes", frame.bytes().iter().copied(), 2)),
+            Err(_) => fields.push(bytes(frame)),
         }
         if result.is_ok() {
-            fields.extend(frame.bytes().last().map(|crc| Field::hex("CRC", *crc, 2)));
+            fields.extend(frame.contents().last().map(|crc| Field::hex("CRC", *crc, 2)));
         }
         fields.extend(note);
-        fields.extend(spikes(frame));
+        fields.extend(frame.spikes());
         let names = frame.data_id().ok().or(id).map_or(&["CF"][..], |id| id.layout().1);
         let mut event = event(frame, Direction::Answer, id, fields, verdict(frame, names, result.err()));
         event.position = position;
@@ -88,7 +89,7 @@ impl Encoder {
             Response::ReadSingleTurn(v) => self.single_turn(v.abs, fields),
             Response::ResetErrors(v) | Response::SetSingleTurnZero(v) | Response::ResetTurnsAndErrors(v) => {
                 let position = self.single_turn(v.abs, fields);
-                fields.extend(resets(response.data_id()));
+                fields.extend(effect(response.data_id()));
                 position
             }
             Response::ReadMultiTurn(v) => {
@@ -122,7 +123,10 @@ impl Encoder {
                 span: Some(1 << (resolution.abs_bits() + resolution.abm_bits())),
                 per_turn: Some(resolution.counts_per_turn().into()),
             }),
-            Err(error) => too_wide(error, resolution, fields),
+            Err(error) => {
+                fields.push(too_wide(error, resolution.abs_bits(), resolution.abm_bits()));
+                None
+            }
         }
     }
 
@@ -134,7 +138,10 @@ impl Encoder {
         let turn = Some(resolution.counts_per_turn().into());
         match resolution.single_turn(abs) {
             Ok(counts) => Some(Position { counts: counts.into(), span: turn, per_turn: turn }),
-            Err(error) => too_wide(error, resolution, fields),
+            Err(error) => {
+                fields.push(too_wide(error, resolution.abs_bits(), resolution.abm_bits()));
+                None
+            }
         }
     }
 
@@ -146,9 +153,7 @@ impl Encoder {
 
     /// The widths as the user gave them, else as the encoder ID suggests.
     fn resolution(&self) -> Option<Resolution> {
-        let Settings { single_turn_bits, multi_turn_bits } = self.settings;
-        let abs = single_turn_bits.or(self.hint.map(Resolution::abs_bits))?;
-        let abm = multi_turn_bits.or(self.hint.map(Resolution::abm_bits)).unwrap_or(16);
+        let (abs, abm) = self.widths.or(self.hint.map(|hint| (hint.abs_bits(), hint.abm_bits())))?;
         Resolution::new(abs, abm).ok()
     }
 }
@@ -177,16 +182,8 @@ fn doubts(response: Response, before: Option<u8>) -> Vec<String> {
 
 /// No answer came to the request at `place` until `now`; `asked`: because somebody asked again.
 pub(super) fn silence(request: Request, place: Place, now: i64, asked: bool) -> Event {
-    let after = match place {
-        Place::Time { end, .. } if asked => now.saturating_sub(end),
-        _ => ANSWER_TIMEOUT,
-    };
-    let cause = if after < ANSWER_TIMEOUT {
-        two_masters(after)
-    } else {
-        "only the request is on the line: no encoder, A and B exchanged, or not its bit rate".to_owned()
-    };
-    Event::silence(place, kind(Some(request.data_id())), "answer", ANSWER_TIMEOUT, now, &cause)
+    let kind = kind(Some(request.data_id()));
+    group::silence(place, kind, "answer", ANSWER_TIMEOUT, now, asked, "no encoder")
 }
 
 fn event(frame: &Frame, direction: Direction, id: Option<DataId>, fields: Vec<Field>, verdict: Verdict) -> Event {
@@ -200,15 +197,9 @@ fn kind(id: Option<DataId>) -> &'static str {
     id.and_then(name).unwrap_or("ID ?")
 }
 
-/// What a reset request clears. One of ten has to be seen ten times to have an effect.
-fn resets(id: DataId) -> Option<Field> {
-    let what = match id {
-        DataId::ResetErrors => "errors",
-        DataId::SetSingleTurnZero => "single-turn position",
-        DataId::ResetTurnsAndErrors => "turns and errors",
-        _ => return None,
-    };
-    Some(Field::text("resets", what))
+/// What a reset does: one of ten has to be seen ten times to have an effect.
+fn effect(id: DataId) -> Option<Field> {
+    id.effect().map(|effect| Field::text("effect", format_args!("{effect}, one of {}", id.repeats())))
 }
 
 fn address(adf: Adf) -> Field {
@@ -216,41 +207,15 @@ fn address(adf: Adf) -> Field {
     Field { name: "ADF", value: Value::Flags { raw: adf.bits().into(), digits: 2, set } }
 }
 
-fn spikes(frame: &Frame) -> Option<Field> {
-    (frame.spikes > 0).then(|| Field::number("spikes", frame.spikes))
-}
-
-/// The position does not fit the encoder: said beside the values, which are those of the line.
-fn too_wide(error: Error, resolution: Resolution, fields: &mut Vec<Field>) -> Option<Position> {
-    let text = format!("{error}; taken as {} + {} bits", resolution.abs_bits(), resolution.abm_bits());
-    fields.push(Field::text("width", text));
-    None
+fn bytes(frame: &Frame) -> Field {
+    Field::digits("bytes", frame.contents().iter().copied(), 2)
 }
 
 fn verdict(frame: &Frame, names: &[&'static str], error: Option<Error>) -> Verdict {
     let Some(error) = error else { return Verdict::Ok };
-    let (field, bit) = place(error, frame);
-    // A field that is missing should have begun where the frame ends.
-    let start = field.map(|field| frame.bytes().get(field).and(frame.starts.get(field)).copied().unwrap_or(frame.end));
-    let start = start.filter(|_| frame.line.is_none());
-    let field = field.and_then(|field| names.get(field)).map(|name| (*name).to_owned());
-    Refusal { field, bit, time: start, ..Refusal::new(error.class().name(), error) }.into()
-}
-
-/// The field in which an error shows, and the first bit of it that is wrong: 0 is the start bit.
-fn place(error: Error, frame: &Frame) -> (Option<usize>, Option<u32>) {
-    let differs = |got: u8, want: u8| Some(1 + (got ^ want).trailing_zeros()).filter(|bit| *bit < 9);
-    match error {
-        Error::StartBit { field } => (Some(field.into()), Some(0)),
-        Error::Delimiter { field } => (Some(field.into()), Some(9)),
-        Error::Truncated { got, .. } => (Some(got.into()), None),
-        Error::SinkCode { cf } => (Some(0), differs(cf & 0b111, 0b010)),
-        Error::Parity { .. } => (Some(0), Some(8)),
-        Error::UnknownDataId { .. } => (Some(0), None),
-        Error::CfMismatch { got, want } => (Some(0), differs(got, want)),
-        Error::Crc { .. } => (Some(frame.fields.saturating_sub(1)), None),
-        Error::AddressMismatch { got, want } => (Some(1), differs(got, want)),
-        Error::DataMismatch { got, want } => (Some(2), differs(got, want)),
-        _ => (None, None),
-    }
+    let field = match error {
+        Error::Crc { .. } => frame.len().checked_sub(1),
+        other => other.field().map(usize::from),
+    };
+    frame.refused(names, field, error.bit(), Refusal::new(error.class().name(), error)).into()
 }

@@ -4,6 +4,7 @@ use tformat::{ControlField, DataId, Error, Request, Response, Window};
 
 use crate::event::Place;
 use crate::line::LineField;
+use crate::protocols::group::Group;
 use crate::protocols::plausible;
 
 /// More fields without a pause are no frame.
@@ -13,58 +14,18 @@ pub(super) const MOST_FIELDS: usize = 16;
 pub(super) const LATE_ANSWER: i64 = 6_000_000;
 
 /// Fields that followed each other.
-#[derive(Debug, Clone, Copy, Default)]
-pub(super) struct Frame {
-    pub(super) bytes: [u8; MOST_FIELDS],
-    pub(super) starts: [i64; MOST_FIELDS],
-    pub(super) fields: usize,
-    pub(super) end: i64,
-    /// The first field whose delimiter read 0.
-    pub(super) broken: Option<u8>,
-    pub(super) spikes: u32,
-    /// The bits of the line, the first in bit 0, where they are known.
-    pub(super) raw: u128,
-    /// The line of a log without times.
-    pub(super) line: Option<u64>,
-}
+pub(super) type Frame = Group<u8, MOST_FIELDS>;
 
 impl Frame {
-    pub(super) fn bytes(&self) -> &[u8] {
-        self.bytes.get(..self.fields).unwrap_or_default()
-    }
-
-    pub(super) fn start(&self) -> i64 {
-        self.starts.first().copied().unwrap_or_default()
-    }
-
     /// Bytes without times.
     pub(super) fn of_log(line: u64, bytes: &[u8]) -> Self {
-        let mut frame = Self { line: Some(line), ..Self::default() };
+        let mut frame = Self::default();
+        frame.line = Some(line);
         for &byte in bytes {
-            frame.push(&LineField { content: byte.into(), delimiter: true, start: 0, end: 0, spikes: 0, bits: 0 }, 0);
+            let field = LineField { content: byte.into(), delimiter: true, start: 0, end: 0, spikes: 0, bits: 0 };
+            frame.push(byte, &field, 0);
         }
         frame
-    }
-
-    /// Takes a field; beyond the most it replaces the last one. `bit`: its length in picoseconds, 0 in a log.
-    pub(super) fn push(&mut self, field: &LineField, bit: i64) {
-        let k = self.fields.min(MOST_FIELDS - 1);
-        if self.fields == 0 {
-            self.raw = field.bits;
-        } else if field.bits != 0 && bit > 0 {
-            // Somebody seems to begin anew: what he says stands behind.
-            self.raw = plausible::joined(self.raw, field.bits, (field.start - self.start() + bit / 2) / bit);
-        }
-        if let (Some(byte), Some(start)) = (self.bytes.get_mut(k), self.starts.get_mut(k)) {
-            *byte = (field.content & 0xff) as u8;
-            *start = field.start;
-        }
-        if !field.delimiter && self.broken.is_none() {
-            self.broken = u8::try_from(k).ok();
-        }
-        self.spikes = self.spikes.saturating_add(field.spikes);
-        self.end = field.end;
-        self.fields = k + 1;
     }
 
     /// What makes a sound answer of the bits on the line: one more at a place, or one less.
@@ -105,13 +66,13 @@ impl Frame {
 
     /// The first field, 0 where there is none.
     pub(super) fn first(&self) -> u8 {
-        self.bytes.first().copied().unwrap_or_default()
+        self.contents().first().copied().unwrap_or_default()
     }
 
     /// The bits of the line from the first start bit on, as far as the fields tell: idle line between them.
     pub(super) fn line(&self, bit: i64) -> Option<Window> {
         let mut bits = u128::MAX;
-        for (byte, start) in self.bytes().iter().zip(&self.starts) {
+        for (byte, start) in self.contents().iter().zip(self.starts()) {
             let at = (start - self.start() + bit / 2) / bit.max(1);
             let ten = 1 << 9 | u128::from(*byte) << 1;
             let clear = u32::try_from(at).ok().and_then(|at| 0x3ff_u128.checked_shl(at));
@@ -119,19 +80,12 @@ impl Frame {
                 bits = bits & !clear | ten << at;
             }
         }
-        if let Some(at) = self.broken.and_then(|field| self.starts.get(usize::from(field))) {
+        if let Some(at) = self.broken.and_then(|field| self.starts().get(usize::from(field))) {
             let at = (at - self.start() + bit / 2) / bit.max(1) + 9;
             bits &= !u32::try_from(at).ok().and_then(|at| 1_u128.checked_shl(at)).unwrap_or(0);
         }
         let len = ((self.end - self.start()) / bit.max(1)).clamp(0, 128);
         Window::from_bits(bits, u32::try_from(len).ok()?)
-    }
-
-    pub(super) fn place(&self) -> Place {
-        match self.line {
-            Some(line) => Place::Line(line),
-            None => Place::Time { start: self.start(), end: self.end },
-        }
     }
 }
 
@@ -159,8 +113,8 @@ impl Pending {
         let other = self.request.is_some_and(|request| frame.data_id().is_ok_and(|id| id != request.data_id()));
         (late || other)
             && frame.broken.is_none()
-            && frame.fields < self.answer_fields(frame.first())
-            && frame.data_id().is_ok_and(|id| frame.fields == usize::from(id.request_fields()))
+            && frame.len() < self.answer_fields(frame.first())
+            && frame.data_id().is_ok_and(|id| frame.len() == usize::from(id.request_fields()))
     }
 
     /// Fields of the answer that begins with these bytes.

@@ -258,7 +258,7 @@ kernels! {
         let mut master = Master::new(Dialect::SICK);
         let mut map = Registers::new(&Dialect::SICK);
         let mut encoder = Device::new(EncoderId::truncate(0x00153));
-        let mut line = Cable::new(Disturbance { jitter: 1, ..Disturbance::metres(10) }, 1);
+        let mut line = Cable::new(Disturbance::metres(10).with_jitter(1), 1);
         for frame in 0..*frames {
             let head = line.down(master.transmission().head.bits());
             let samples = line.up(encoder.answer(head, u64::from(frame)));

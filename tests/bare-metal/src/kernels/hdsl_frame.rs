@@ -43,7 +43,7 @@ impl Link {
             master: Master::new(dialect),
             map: Registers::new(&dialect),
             encoder: Device::new(EncoderId::truncate(0x00153)),
-            cable: Cable::new(Disturbance { jitter: 1, delay, ..Disturbance::default() }, 1),
+            cable: Cable::new(Disturbance::default().with_jitter(1).with_delay(delay), 1),
             position: 0,
             count: 0,
         };

@@ -1,0 +1,50 @@
+//! Receivers of a sampled line, on the hostile line.
+//!
+//! `HOSTILE_EVENTS=10000000 cargo test --release -p nikon-aformat --test hostile_line -- --nocapture` prints the mix.
+#![allow(missing_docs, clippy::arithmetic_side_effects, clippy::cast_possible_truncation, clippy::indexing_slicing)]
+#![allow(clippy::unwrap_used, clippy::panic)]
+
+mod common;
+
+use common::exchanges::Setup;
+use common::line::{USUAL_EVENTS, events, first_seed};
+use common::sampled::{Shown, lost_frames, single_flips};
+use common::switches::Switches;
+use nikon_aformat::BitRate;
+use servowire_world::{Kind, Scenario};
+
+/// Runs seeds until enough has happened.
+fn seeds(kind: Kind, run: impl Fn(&Setup, &mut Shown)) -> Shown {
+    let mut shown = Shown::default();
+    for seed in first_seed().. {
+        let setup = Setup {
+            seed,
+            rate: BitRate::ALL[seed as usize % 5],
+            scenario: Scenario::quiet(),
+            switches: Switches::draw(seed),
+            quiet: false,
+        };
+        run(&setup, &mut shown);
+        if shown.tally.events() > events() {
+            break;
+        }
+    }
+    println!("{shown:?}\n{}", shown.tally);
+    assert!(
+        shown.heard > 0 && shown.refused > 0 && shown.tally.of(kind) > 0,
+        "the line was not hostile, or nothing but"
+    );
+    assert!(events() < USUAL_EVENTS || shown.tally.of(kind) > 100, "{:?}", shown.tally);
+    shown
+}
+
+#[test]
+fn hostile_bits() {
+    seeds(Kind::Flip, |setup, shown| single_flips(setup, 200, shown));
+}
+
+#[test]
+fn hostile_frames() {
+    let shown = seeds(Kind::Drop, |setup, shown| lost_frames(setup, 40, shown));
+    assert!(shown.owed > 0);
+}
