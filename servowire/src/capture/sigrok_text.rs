@@ -116,6 +116,26 @@ impl SigrokText {
         }
         Ok(())
     }
+
+    /// Takes lines, round after round; with a fault, those before it are taken.
+    fn rounds(&mut self, lines: &[(String, Vec<bool>)], changes: &mut Vec<Change>) -> Result<(), Fault> {
+        for round in lines.chunks(self.channels.len().max(1)) {
+            let twice = |(at, (name, _)): (usize, &(String, _))| round.iter().take(at).any(|(known, _)| known == name);
+            if round.iter().enumerate().any(twice) {
+                return Err(self.input.fault(At::Line(self.line), "a channel comes twice in a round of lines"));
+            }
+            // All channels have the same samples; where not, those that all of them have are good.
+            let least = round.iter().map(|(_, samples)| samples.len()).min().unwrap_or(0);
+            for (name, samples) in round {
+                self.take(name, samples.get(..least).unwrap_or_default(), changes)?;
+            }
+            if round.iter().any(|(_, samples)| samples.len() != least) {
+                let what = "the lines of a round have different numbers of samples: the file was cut off or is damaged";
+                return Err(self.input.fault(At::Line(self.line), what));
+            }
+        }
+        Ok(())
+    }
 }
 
 impl Line for SigrokText {
@@ -140,29 +160,11 @@ impl Line for SigrokText {
                 Some(line) => lines.push(self.samples_of(&line)?),
             }
         }
-        let mut ragged = false;
-        for round in lines.chunks(self.channels.len().max(1)) {
-            let twice = |(at, (name, _)): (usize, &(String, _))| round.iter().take(at).any(|(known, _)| known == name);
-            if round.iter().enumerate().any(twice) {
-                return Err(self.input.fault(At::Line(self.line), "a channel comes twice in a round of lines"));
-            }
-            // All channels have the same samples; where not, those that all of them have are good.
-            let least = round.iter().map(|(_, samples)| samples.len()).min().unwrap_or(0);
-            for (name, samples) in round {
-                self.take(name, samples.get(..least).unwrap_or_default(), changes)?;
-            }
-            ragged = round.iter().any(|(_, samples)| samples.len() != least);
-            if ragged {
-                break;
-            }
-        }
+        let taken = self.rounds(&lines, changes);
         if let Some(new) = changes.get_mut(first..) {
             new.sort_by_key(|change| change.time);
         }
-        if ragged {
-            let what = "the lines of a round have different numbers of samples: the file was cut off or is damaged";
-            return Err(self.input.fault(At::Line(self.line), what));
-        }
+        taken?;
         Ok(more)
     }
 
