@@ -28,6 +28,7 @@ use std::time::Duration;
 use clock::best;
 use flate2::Compression;
 use flate2::write::GzEncoder;
+use fst_writer::{FstFileType, FstInfo, FstScopeType, FstSignalType, FstVarDirection, FstVarType, open_fst};
 use pcap_file::DataLink;
 use pcap_file::pcap::{PcapHeader, PcapPacket, PcapWriter};
 use random::speech::Kind;
@@ -140,18 +141,33 @@ fn files(edges: &Edges, samples: &[bool]) -> Vec<(&'static str, Format, Vec<u8>)
     for k in 0..200_000_u32 {
         writeln!(dump, "{:08x}: 1a20 29c0 3b17 0000 00c8 371a 2029 c03b  . ).;......7. ).;", 16 * k).unwrap();
     }
-    let sample = |name: &str| {
-        std::fs::read(Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/samples").join(name)).expect("a sample")
-    };
+    let mut analyzer = "name,type,start_time,duration,\"data\"\n".to_owned();
+    for k in 0..200_000_u64 {
+        let start = 4 * k + 20 * (k / 12);
+        writeln!(
+            analyzer,
+            "\"Async Serial\",\"data\",{}.{:06},0.0000038,0x{:02X}",
+            start / 1_000_000,
+            start % 1_000_000,
+            k & 0xff
+        )
+        .unwrap();
+    }
+    let mut isf =
+        b":WFMPRE:BYT_NR 1;BIT_NR 8;ENCDG BINARY;BN_FMT RI;XINCR 5.0E-8;PT_OFF 0;XZERO 0;YMULT 4.0E-2;:CURVE #0"
+            .to_vec();
+    isf.extend(samples.iter().map(|level| if *level { 0x50 } else { 0x01 }));
     vec![
         ("VCD", Format::Vcd, vcd.clone().into_bytes()),
         ("VCD, gzip", Format::Vcd, gzip.finish().unwrap()),
-        ("FST, a sample of 2 kB opened and read", Format::Fst, sample("hpm-uart.fst")),
+        ("FST", Format::Fst, fst(edges)),
         ("sigrok session", Format::Session, session(&bytes)),
         ("DSView session", Format::Session, dsview(&packed)),
         ("Logic 2 binary", Format::SaleaeBinary, saleae(edges)),
         ("Logic 2 CSV", Format::Csv, changes.into_bytes()),
         ("sigrok CSV", Format::Csv, table),
+        ("Logic 2 table of bytes", Format::AnalyzerTable, analyzer.into_bytes()),
+        ("Tektronix waveform", Format::Isf, isf),
         ("oscilloscope CSV", Format::Csv, scope.into_bytes()),
         ("sigrok bits", Format::SigrokText, bits),
         ("sigrok hex", Format::SigrokText, hex),
@@ -163,6 +179,34 @@ fn files(edges: &Edges, samples: &[bool]) -> Vec<(&'static str, Format, Vec<u8>)
         ("binary records", Format::Records, [0x1a; 16].repeat(1_000_000)),
         ("pcap", Format::Pcapng, pcap()),
     ]
+}
+
+/// As the library of GTKWave writes it, a block every 100,000 edges.
+fn fst(edges: &Edges) -> Vec<u8> {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("line.fst");
+    let info = FstInfo {
+        start_time: 0,
+        timescale_exponent: -9,
+        version: String::new(),
+        date: String::new(),
+        file_type: FstFileType::Verilog,
+    };
+    let mut header = open_fst(&path, &info).unwrap();
+    header.scope("top", "", FstScopeType::Module).unwrap();
+    let line =
+        header.var("line", FstSignalType::bit_vec(1), FstVarType::Wire, FstVarDirection::Implicit, None).unwrap();
+    header.up_scope().unwrap();
+    let mut body = header.finish().unwrap();
+    for block in edges.chunks(100_000) {
+        for (time, level) in block {
+            body.time_change(*time as u64 / 1000).unwrap();
+            body.signal_change(line, if *level { b"1" } else { b"0" }).unwrap();
+        }
+        body.flush().unwrap();
+    }
+    body.finish().unwrap();
+    std::fs::read(path).unwrap()
 }
 
 fn saleae(edges: &Edges) -> Vec<u8> {

@@ -5,6 +5,7 @@
 
 pub mod analyzer;
 pub mod archive;
+mod can;
 pub mod fst;
 pub mod hexlog;
 mod input;
@@ -323,6 +324,9 @@ fn guess(input: &mut Input, path: &Path, has_rate: bool) -> Result<Format, Fault
     }
     if let Some((_, name)) = PACKED.iter().find(|(magic, _)| head.starts_with(magic)) {
         return Err(input.fault(At::File, format!("packed by {name}: unpack it first")));
+    }
+    if can::looks_like(head) {
+        return Err(input.fault(At::File, can::REFUSED));
     }
     if hexlog::looks_like(head) {
         return Ok(Format::Hex);

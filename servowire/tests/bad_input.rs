@@ -193,3 +193,39 @@ fn wrong_use() {
     }
     assert_eq!(common::servowire(&["decode", "--vcd", "out.vcd"]).code, 2);
 }
+
+#[test]
+fn sigrok_text_whose_channels_differ() {
+    let bench = Bench::new();
+    let head = "libsigrok 0.5.2\nAcquisition with 2/2 channels at 1 MHz\n";
+    let run = bench.decode("a.bits", format!("{head}D0:11111111 0000\nD1:1111\nD0:1111\nD1:0000\n"), &[]);
+    run.fails_with("the lines of a round have different numbers of samples");
+    let run = bench.decode("a.bits", format!("{head}D0:1111\nD1:1111\nD0:1111\nD0:0000\n"), &[]);
+    run.fails_with("line 6: a channel comes twice in a round of lines");
+    let many = (0..2000).map(|k| format!("D{k}:1111\n")).collect::<Vec<_>>().concat();
+    bench.decode("a.bits", format!("{head}{many}"), &[]).fails_with("more than 1024 channels");
+}
+
+#[test]
+fn fst_whose_lengths_lie() {
+    let bench = Bench::new();
+    let mut header = vec![0; 330];
+    header[7..9].copy_from_slice(&329_u16.to_be_bytes());
+    let with = |block: &[u8]| [&header, block].concat();
+    // A block without a length would be read again and again.
+    bench.decode("a.fst", with(&[1, 0, 0, 0, 0, 0, 0, 0, 0]), &[]).fails_with("not whole: a block ends beyond");
+    bench.decode("a.fst", with(&[1, 0, 0, 0, 0, 0, 0, 1, 0]), &[]).fails_with("not whole: a block ends beyond");
+    let number = |n: u64| n.to_be_bytes();
+    let variables = [&[3][..], &number(24), &number(1 << 60), &number(1 << 60)].concat();
+    bench.decode("a.fst", with(&variables), &[]).fails_with("a list of variables is longer than its block can hold");
+    let times = [&[1][..], &number(8 + 24 + 24), &[0; 24], &number(1), &number(1), &number(1 << 60)].concat();
+    bench.decode("a.fst", with(&times), &[]).fails_with("a table of times is longer than its block can hold");
+}
+
+#[test]
+fn a_log_of_a_can_bus() {
+    let bench = Bench::new();
+    for text in ["  can0  123   [8]  11 22 33 44 55 66 77 88\n", "(1436509052.249713) can0 123#1122334455\n"] {
+        bench.decode("can.log", text, &[]).fails_with("a log of a CAN bus (candump): none of the protocols");
+    }
+}

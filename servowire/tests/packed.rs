@@ -98,7 +98,7 @@ fn words_say_what_edges_say() {
         for (k, scene) in scenes.iter().enumerate() {
             for (kind, bit_rate) in [(Kind::Dsl, 9_375_000), (Kind::Tformat, 2_500_000), (Kind::Aformat, 4_000_000)] {
                 let scene = Scene { nominal: Some(bit_rate as f64), ..scene.clone() };
-                let capture = capture(kind, &scene, round as u64 * 100 + k as u64);
+                let capture = capture(kind, &scene, round * 100 + k as u64);
                 let per_bit = rng.pick(&[8, 8, 8, 16, 5]);
                 // As a crystal has it, a little off at times.
                 let rate = bit_rate * per_bit + rng.pick(&[0, 0, 1, 20_000, 400_000]);

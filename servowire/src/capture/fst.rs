@@ -1,5 +1,7 @@
 //! FST, the packed waveforms of GTKWave and Verilator. Channels are the variables of one bit.
 
+mod blocks;
+
 use std::collections::HashMap;
 use std::panic::{self, AssertUnwindSafe};
 
@@ -62,7 +64,8 @@ impl Fst {
         let name = input.name().to_owned();
         let fault = |what: String| Fault::new(&name, At::File, what);
         let broken = |e: fst_reader::ReaderError| fault(format!("not FST as it should be: {e}"));
-        let source = unwrapped(input)?.seekable()?;
+        let mut source = unwrapped(input)?.seekable()?;
+        blocks::check(source.as_mut()).map_err(fault)?;
         let opened = guarded(|| FstReader::open(source));
         let mut reader = opened.ok_or_else(|| fault(DAMAGED.into()))?.map_err(broken)?;
         let header = reader.get_header();

@@ -8,6 +8,8 @@ use crate::fault::{At, Fault};
 
 /// Longer lines are none of this format.
 const LONGEST: usize = 1 << 20;
+/// More channels has no device.
+const CHANNELS: usize = 1024;
 
 /// A text of samples behind its two lines of heading.
 pub struct SigrokText {
@@ -50,6 +52,9 @@ impl SigrokText {
             let (name, samples) = file.samples_of(&line)?;
             let again = file.channels.contains(&name);
             if !again {
+                if file.channels.len() == CHANNELS {
+                    return Err(file.input.fault(At::Line(file.line), format!("more than {CHANNELS} channels")));
+                }
                 file.channels.push(name.clone());
             }
             file.waiting.push((name, samples));
@@ -111,6 +116,26 @@ impl SigrokText {
         }
         Ok(())
     }
+
+    /// Takes lines, round after round; with a fault, those before it are taken.
+    fn rounds(&mut self, lines: &[(String, Vec<bool>)], changes: &mut Vec<Change>) -> Result<(), Fault> {
+        for round in lines.chunks(self.channels.len().max(1)) {
+            let twice = |(at, (name, _)): (usize, &(String, _))| round.iter().take(at).any(|(known, _)| known == name);
+            if round.iter().enumerate().any(twice) {
+                return Err(self.input.fault(At::Line(self.line), "a channel comes twice in a round of lines"));
+            }
+            // All channels have the same samples; where not, those that all of them have are good.
+            let least = round.iter().map(|(_, samples)| samples.len()).min().unwrap_or(0);
+            for (name, samples) in round {
+                self.take(name, samples.get(..least).unwrap_or_default(), changes)?;
+            }
+            if round.iter().any(|(_, samples)| samples.len() != least) {
+                let what = "the lines of a round have different numbers of samples: the file was cut off or is damaged";
+                return Err(self.input.fault(At::Line(self.line), what));
+            }
+        }
+        Ok(())
+    }
 }
 
 impl Line for SigrokText {
@@ -135,16 +160,34 @@ impl Line for SigrokText {
                 Some(line) => lines.push(self.samples_of(&line)?),
             }
         }
-        for (name, samples) in lines {
-            self.take(&name, &samples, changes)?;
-        }
+        let taken = self.rounds(&lines, changes);
         if let Some(new) = changes.get_mut(first..) {
             new.sort_by_key(|change| change.time);
         }
+        taken?;
         Ok(more)
     }
 
     fn reached(&self) -> i64 {
         self.clock.time(self.samples.iter().copied().min().unwrap_or(0))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn round_after_round() {
+        let text =
+            b"libsigrok 0.5.2\nAcquisition with 2/2 channels at 1 MHz\nD0:10\nD1:11\nD0:01\nD1:00\n\nD0:11\nD1:01\n";
+        let mut file = SigrokText::new(Input::embedded("rounds", text)).unwrap();
+        let mut changes = Vec::new();
+        while file.read(&mut changes).unwrap() {}
+        let of = |channel| changes.iter().filter(move |change| change.channel == channel);
+        let said = |channel| of(channel).map(|change| (change.time / 1_000_000, change.level)).collect::<Vec<_>>();
+        assert_eq!(said(0), [(0, true), (1, false), (3, true)]);
+        assert_eq!(said(1), [(0, true), (2, false), (5, true)]);
+        assert_eq!(file.reached(), 6_000_000);
     }
 }

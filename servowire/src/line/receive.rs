@@ -39,6 +39,8 @@ pub struct EdgeReceiver {
     fields: Vec<LineField>,
     /// Spikes dropped before the next field.
     dropped: u32,
+    /// A line that is high for longer rests, in picoseconds.
+    rest: i64,
     /// Falling edges of the first burst that are no start bits, until it has been read.
     skipped: u32,
 }
@@ -102,6 +104,8 @@ impl EdgeReceiver {
             rates: Rates::default(),
             fields: Vec::new(),
             dropped: 0,
+            // A field is not high for longer.
+            rest: ((f64::from(content_bits) + 3.0) * bit) as i64,
             skipped: 0,
         }
     }
@@ -119,8 +123,12 @@ impl EdgeReceiver {
 
     /// The line takes a level. Says whether there are fields to [`take`](Self::take).
     pub fn change(&mut self, time: i64, level: bool) -> bool {
-        for edge in self.spikes.change(time, level).into_iter().flatten() {
+        if let Some(edge) = self.spikes.plain_change(time, level) {
             self.edge(edge);
+        } else {
+            for edge in self.spikes.change(time, level).into_iter().flatten() {
+                self.edge(edge);
+            }
         }
         !self.fields.is_empty()
     }
@@ -176,8 +184,8 @@ impl EdgeReceiver {
     }
 
     fn edge(&mut self, edge: Edge) {
-        let pause = self.burst.last().map_or(0.0, |last| edge.time.saturating_sub(last.time) as f64);
-        if !edge.level && pause > self.longest_high() * self.bit {
+        let pause = self.burst.last().map_or(0, |last| edge.time.saturating_sub(last.time));
+        if !edge.level && pause > self.rest {
             self.close();
         } else if self.burst.len() >= MOST_EDGES {
             self.read(false);
@@ -224,13 +232,14 @@ impl EdgeReceiver {
     fn speech(&self, edges: &[Edge]) -> usize {
         let bit = self.heard.first().copied().unwrap_or(self.bit);
         let mut start = edges.first().map_or(0, |edge| edge.time);
-        let last = f64::from(self.field_bits()) - 1.0;
+        let last = ((f64::from(self.field_bits()) - 1.0) * bit) as i64;
+        let other = ((f64::from(self.field_bits()) + OTHER_SPEAKER) * bit) as i64;
         for (at, edge) in edges.iter().enumerate().skip(1) {
-            let bits = (edge.time - start) as f64 / bit;
-            if edge.level || bits < last {
+            let time = edge.time - start;
+            if edge.level || time < last {
                 continue;
             }
-            if bits > f64::from(self.field_bits()) + OTHER_SPEAKER {
+            if time > other {
                 return at;
             }
             start = edge.time;
@@ -244,8 +253,8 @@ impl EdgeReceiver {
         let first = self.fields.len();
         let mut rest = edges;
         while let Some(start) = rest.first() {
-            let last = (f64::from(self.field_bits()) - 0.6) * bit;
-            let inside = rest.iter().skip(1).position(|edge| !edge.level && (edge.time - start.time) as f64 > last);
+            let last = start.time + ((f64::from(self.field_bits()) - 0.6) * bit) as i64;
+            let inside = rest.iter().skip(1).position(|edge| !edge.level && edge.time > last);
             let (field, behind) = rest.split_at(inside.map_or(rest.len(), |at| at + 1));
             self.field(field, bit);
             rest = behind;
@@ -412,13 +421,10 @@ impl Fit {
     }
 }
 
-/// The nearest whole number, of what is far from the ends of `i64`; without a call where the processor has no
-/// instruction for it.
+/// The nearest whole number, of what is not below -0.5.
 #[inline]
 fn nearest(number: f64) -> f64 {
-    let whole = number as i64 as f64;
-    let rest = number - whole;
-    whole + f64::from(i8::from(rest >= 0.5) - i8::from(rest <= -0.5))
+    (number + 0.5) as i64 as f64
 }
 
 /// Bits of a line from `start` on.

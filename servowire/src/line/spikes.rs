@@ -48,6 +48,18 @@ impl Spikes {
         Self { bit, shortest, solid: None, level: true, since: 0, edges: 0, other: 0, begun: 0, dropped: 0 }
     }
 
+    /// The same as [`change`](Self::change) where the change before was an edge and nothing else, as nearly always.
+    #[inline]
+    pub(crate) fn plain_change(&mut self, time: i64, level: bool) -> Option<Edge> {
+        let is_plain = self.edges == 1 && level != self.level && time.saturating_sub(self.since) >= self.shortest;
+        is_plain.then(|| {
+            let edge = self.edge(self.since, self.level);
+            (self.solid, self.begun) = (Some(self.level), time);
+            (self.level, self.since) = (level, time);
+            edge
+        })
+    }
+
     /// The line changes to `level`; the edges before it that are known to last.
     #[inline]
     pub(crate) fn change(&mut self, time: i64, level: bool) -> Edges {

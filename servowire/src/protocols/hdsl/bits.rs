@@ -142,6 +142,9 @@ impl Bits {
             self.last = Some((time, level));
             self.mark(time);
         }
+        if let Some(edge) = self.spikes.plain_change(time, level) {
+            return self.edge(edge.time, edge.level, edge.spikes);
+        }
         for edge in self.spikes.change(time, level).into_iter().flatten() {
             self.edge(edge.time, edge.level, edge.spikes);
         }

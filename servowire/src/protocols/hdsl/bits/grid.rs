@@ -11,26 +11,6 @@ use crate::capture::samples::Samples;
 pub(super) const SAMPLES: u64 = 8;
 /// The first sample of each bit.
 const FIRST: u64 = 0x0101_0101_0101_0101;
-/// The longest run between two edges in eight bits, by the edges.
-const APART: [u8; 256] = {
-    let mut table = [0; 256];
-    let mut edges = 0;
-    while edges < 256 {
-        let (mut at, mut last) = (0, 8);
-        while at < 8 {
-            if edges >> at & 1 == 1 {
-                if last < at && table[edges] < (at - last) as u8 {
-                    table[edges] = (at - last) as u8;
-                }
-                last = at;
-            }
-            at += 1;
-        }
-        edges += 1;
-    }
-    table
-};
-
 /// How far samples were taken.
 pub(in super::super) struct Taken {
     /// The number of the first sample behind.
@@ -43,6 +23,22 @@ pub(in super::super) struct Taken {
 /// The first samples of eight bits together, the first in bit 0.
 fn gather(word: u64) -> u64 {
     (word & FIRST).wrapping_mul(0x0102_0408_1020_4080) >> 56
+}
+
+/// The edges of eight bits behind `level`, the first in bit 0; none where one is not on the grid.
+fn edges_in(word: u64, level: bool) -> Option<u64> {
+    let edges = word ^ (word << 1 | u64::from(level));
+    (edges & !FIRST == 0).then(|| gather(edges))
+}
+
+/// Whether each edge of eight bits, of which there is one at least, is no more than `longest` bits behind the one before.
+fn are_near(edges: u64, longest: u64) -> bool {
+    if longest >= SAMPLES - 1 {
+        return true;
+    }
+    let near = (0..longest).fold(0, |near, by| near | edges << by);
+    let between = (1 << edges.ilog2()) - (1 << edges.trailing_zeros());
+    near & between == between
 }
 
 impl Bits {
@@ -65,7 +61,7 @@ impl Bits {
                 return None;
             }
         }
-        if changed != clock.time(since) || self.edges_in(samples.word(next)?, level).is_none() {
+        if changed != clock.time(since) || edges_in(samples.word(next)?, level).is_none() {
             return None;
         }
         // The level has lasted.
@@ -79,7 +75,7 @@ impl Bits {
         let mut edges = 0;
         while self.end + 2 * LONGEST_RUN as u64 <= most {
             let Some(word) = samples.word(next) else { break };
-            let Some(here) = self.edges_in(word, level) else { break };
+            let Some(here) = edges_in(word, level) else { break };
             if here == 0 {
                 if run + SAMPLES > longest {
                     break;
@@ -89,8 +85,7 @@ impl Bits {
                 continue;
             }
             let first = u64::from(here.trailing_zeros());
-            let apart = APART.get(here as usize).copied().unwrap_or(u8::MAX);
-            if run + first > longest || u64::from(apart) > longest {
+            if run + first > longest || !are_near(here, longest) {
                 break;
             }
             let last = u64::from(here.ilog2());
@@ -115,12 +110,6 @@ impl Bits {
             self.measured(edges);
         }
         Some(Taken { next, since, level })
-    }
-
-    /// The edges of eight bits behind `level`, the first in bit 0; none where one is not on the grid.
-    fn edges_in(&self, word: u64, level: bool) -> Option<u64> {
-        let edges = word ^ (word << 1 | u64::from(level));
-        (edges & !FIRST == 0).then(|| gather(edges))
     }
 
     /// The longest run that is on the grid whatever its time was rounded to.
@@ -150,3 +139,30 @@ impl Bits {
 }
 
 const _: () = assert!(LONGEST_RUN as u64 + SAMPLES < PAUSE && LONGEST_RUN < 50);
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn runs_between_the_edges_of_eight_bits() {
+        for edges in 1..256_u64 {
+            let at: Vec<u64> = (0..8).filter(|bit| edges >> bit & 1 == 1).collect();
+            let most = at.windows(2).map(|pair| pair[1] - pair[0]).max().unwrap_or(0);
+            for longest in 1..=10 {
+                assert_eq!(are_near(edges, longest), most <= longest, "{edges:08b} {longest}");
+            }
+        }
+    }
+
+    #[test]
+    fn the_first_samples_of_eight_bits() {
+        for bits in 0..256_u64 {
+            let word = (0..64).fold(0, |word, at| word | (bits >> (at / 8) & 1) << at);
+            assert_eq!(gather(word), bits);
+            let edges = edges_in(word, bits & 1 == 1).unwrap();
+            assert_eq!(edges, bits ^ (bits << 1 & 0xff | bits & 1));
+            assert_eq!(edges_in(word ^ 1 << 12, false), None);
+        }
+    }
+}
