@@ -304,6 +304,30 @@ mod tests {
         (low.ln()..high.ln()).prop_map(f64::exp)
     }
 
+    /// A ramp of 2500 steps up and down: nearly all of them are foreseen, 20 at a time.
+    #[test]
+    fn a_long_ramp_takes_few_looks() {
+        for jerk in [None, Some(1_000_000)] {
+            let limits = Limits::new(50_000, 100_000).unwrap();
+            let limits = jerk.map_or(limits, |jerk| limits.with_jerk(jerk).unwrap());
+            let bounds = limits.bounds(Clock::MICROSECONDS);
+            let goal = Goal::At(Real::new(5000), Real::ZERO);
+            let curve = plan(Motion::steady(Real::ZERO), goal, &bounds).unwrap();
+            let frame = Frame { to: Some(5000 << 32), ..Frame::rest(Clock::MICROSECONDS.shift(), 0, 0) };
+            let (mut rest, mut looks, mut foreseen) = (Stepper::new().rest, 0, 0);
+            loop {
+                if rest.single().is_some() {
+                    continue;
+                }
+                let Some(run) = rest.run(&curve, &frame) else { break };
+                if run.count > 1 {
+                    (looks, foreseen) = (looks + 1, foreseen + run.count);
+                }
+            }
+            assert!(foreseen > 4200 && looks * 18 < foreseen, "{looks} looks for {foreseen} steps");
+        }
+    }
+
     proptest! {
         #[test]
         fn what_is_foreseen_is_where_the_position_is(
