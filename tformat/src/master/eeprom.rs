@@ -118,7 +118,7 @@ impl EepromAccess {
             Ok(memory) => self.answered(memory, ready_ns),
             Err(error) => self.lost(error, ready_ns),
         };
-        if !matches!(step, Step::Send { .. }) {
+        if step.has_ended() {
             self.end = Some(step);
         }
         step

@@ -91,7 +91,7 @@ impl Reset {
             return end;
         }
         let step = self.next(outcome, ready_ns);
-        if !matches!(step, Step::Send { .. }) {
+        if step.has_ended() {
             self.end = Some(step);
         }
         step

@@ -54,7 +54,7 @@ impl SingleTurnZero {
         };
         let near = |from, to| resolution.difference(from, to).unsigned_abs() <= *tolerance;
         let step = witness.receive(outcome, ready_ns, value, near);
-        if !matches!(step, Step::Send { .. }) {
+        if step.has_ended() {
             *end = Some(step);
         }
         step
