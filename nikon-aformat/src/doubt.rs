@@ -28,10 +28,10 @@ pub enum Doubt {
         /// Single-turn and turn bits together.
         width: u8,
     },
-    /// The position was sampled too long ago.
+    /// The position was sampled too long ago, or by a clock that was set back in the meantime.
     #[error("the position is {age_ns} ns old")]
     Old {
-        /// Its age, in ns.
+        /// How far the instant of sampling is away, in ns.
         age_ns: u64,
     },
 }

@@ -36,7 +36,8 @@ impl Reading {
     /// # Errors
     /// [`Doubt::Old`], then as [`Resolution::read`].
     pub fn position(&self, resolution: Resolution, policy: Policy, now_ns: u64) -> Result<Position, Doubt> {
-        let age_ns = now_ns.saturating_sub(self.sampled.earliest_ns);
+        // A clock that was set back makes no position young.
+        let age_ns = now_ns.abs_diff(self.sampled.earliest_ns);
         if age_ns > policy.max_age_ns() {
             return Err(Doubt::Old { age_ns });
         }
