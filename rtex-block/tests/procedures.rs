@@ -14,7 +14,7 @@ mod common;
 use common::{CODES, Pair, limits, monitor, set_position};
 use rtex_block::device::{DriveConfig, Manners};
 use rtex_block::master::procedure::{Backup, Caught, Home, Latch, ReadText, Restore, SetPosition};
-use rtex_block::master::{ActiveCode, AskError, AxisConfig, AxisState, Failure, Progress, Received};
+use rtex_block::master::{ActiveCode, AskError, Axis, AxisConfig, AxisState, Failure, Progress, Received};
 use rtex_block::{
     Arguments, ErrorCode, LatchFlags, MacId, Nibble, NonCyclicCommand, NonCyclicResponse, Pr, ProfileFlags, Response,
     Response32, SubCode, TypeCode,
@@ -94,6 +94,49 @@ fn positions_are_set_once_and_read_back() {
         // APOS.
         assert_eq!((ended, blocks, read), (want, 1, 0x07));
     }
+}
+
+/// A caller that goes on to call after the end: it stays as it was, and the command is not sent again, though the axis is free
+/// for it. The answers to it never come; a position that was set is read back.
+#[test]
+fn what_has_ended_sends_nothing_more() {
+    fn runs<T: PartialEq + Copy + core::fmt::Debug>(
+        mode: ActiveCode,
+        on: bool,
+        code: u8,
+        mut receive: impl FnMut(&mut Axis) -> Progress<T>,
+    ) {
+        let config = AxisConfig::new(MacId::new(9).unwrap(), mode, 500_000, limits());
+        let mut pair = Pair::with(config, DriveConfig::new(MacId::new(9).unwrap(), CODES));
+        pair.until("off", |pair| pair.axis.state() == AxisState::Off);
+        if on {
+            assert!(pair.axis.switch_on());
+            pair.until("on", |pair| pair.axis.state() == AxisState::On);
+        }
+        let (mut sent, mut last, mut end) = (0, 0, None);
+        for _ in 0..2_000 {
+            pair.update();
+            let response = *pair.received.response().unwrap();
+            sent += u32::from(response.code.get() == code && last != code);
+            last = response.code.get();
+            if last == code {
+                let mut block = response.emit();
+                block[8] ^= 1;
+                pair.received = Response::parse(&block).into();
+            }
+            let progress = receive(&mut pair.axis);
+            end = end.or(Some(progress).filter(|progress| !progress.is_pending()));
+            assert_eq!(end.unwrap_or(progress), progress);
+        }
+        assert!(end.is_some() && sent == 1, "{code:#x}: {end:?} after {sent} commands");
+    }
+    let mut home = Home::new(0xc8, 5);
+    runs(ActiveCode::ProfilePosition, true, 0x14, |axis| home.receive(axis));
+    let mut set = SetPosition::actual(77_777);
+    runs(ActiveCode::CyclicPosition, false, 0x24, |axis| set.receive(axis));
+    let mut restore = Restore::new(CODES.parameter_read);
+    let list = [(Pr { class: 7, number: 25 }, 1)];
+    runs(ActiveCode::CyclicPosition, false, 0x26, |axis| restore.receive(axis, &list));
 }
 
 /// The latch counts once it is complete; what was caught before it was armed does not.

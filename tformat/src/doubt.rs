@@ -83,17 +83,17 @@ impl Default for Policy {
 }
 
 impl Policy {
-    /// No alarm is tolerated.
-    pub const STRICT: Self = Self::tolerating(Almc::empty());
+    /// No alarm is tolerated, any age.
+    pub const STRICT: Self = Self { tolerated: Almc::empty(), max_age_ns: u64::MAX };
     /// As one drive does that counts turns: an overflow of the turns is ignored, a low battery is a warning.
-    pub const MULTI_TURN: Self = Self::tolerating(Almc::OF.union(Almc::BA));
+    pub const MULTI_TURN: Self = Self::STRICT.tolerating(Almc::OF.union(Almc::BA));
     /// As the same drive does where turns are not used: what concerns the turns and the battery is ignored.
     pub const SINGLE_TURN: Self =
-        Self::tolerating(Almc::OF.union(Almc::BA).union(Almc::BE).union(Almc::ME).union(Almc::OS));
+        Self::STRICT.tolerating(Almc::OF.union(Almc::BA).union(Almc::BE).union(Almc::ME).union(Almc::OS));
 
-    /// A policy that tolerates these alarms, at any age.
-    pub const fn tolerating(tolerated: Almc) -> Self {
-        Self { tolerated, max_age_ns: u64::MAX }
+    /// In spite of these alarms too.
+    pub const fn tolerating(self, alarms: Almc) -> Self {
+        Self { tolerated: self.tolerated.union(alarms), ..self }
     }
 
     /// Only up to this age, in ns from the instant of sampling.
@@ -234,7 +234,8 @@ mod tests {
     /// Each alarm is a doubt unless the policy tolerates it, in ID 3 and, as far as SF tells, elsewhere.
     #[test]
     fn alarms() {
-        for policy in [Policy::STRICT, Policy::MULTI_TURN, Policy::SINGLE_TURN, Policy::tolerating(Almc::all())] {
+        for policy in [Policy::STRICT, Policy::MULTI_TURN, Policy::SINGLE_TURN, Policy::STRICT.tolerating(Almc::all())]
+        {
             for bits in 0..=255 {
                 let almc = Almc::from_bits_retain(bits);
                 let sf = StatusField::of_alarms(almc).bits();
@@ -255,7 +256,7 @@ mod tests {
     #[test]
     fn a_status_without_its_alarm_is_a_doubt() {
         for (sf, almc, doubtful) in [(0x10, 0, true), (0x20, 0x04, true), (0x10, 0x80, true), (0, 0x84, false)] {
-            let any = Policy::tolerating(Almc::from_bits_retain(almc));
+            let any = Policy::STRICT.tolerating(Almc::from_bits_retain(almc));
             let want = doubtful.then_some(Doubt::Status { sf: StatusField::from_bits_retain(sf) });
             assert_eq!(R23.read(&Response::ReadAll(all(sf, almc)), any).err(), want, "{sf:#x} {almc:#x}");
         }

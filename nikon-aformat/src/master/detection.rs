@@ -25,6 +25,7 @@ pub struct Detection {
 /// An encoder that was found.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Detected {
     /// Its address.
     pub ea: EncoderAddress,

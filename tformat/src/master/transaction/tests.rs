@@ -309,7 +309,7 @@ fn the_age_of_a_position() {
     let response = Response::parse(Request::ReadSingleTurn, &RESPONSE).unwrap();
     let exchange = Exchange { response, sampled_ns: 4_480 };
     let resolution = Resolution::new(23, 16).unwrap();
-    let policy = Policy::tolerating(crate::Almc::all()).with_max_age_ns(125_000);
+    let policy = Policy::STRICT.tolerating(crate::Almc::all()).with_max_age_ns(125_000);
     let at = |now_ns| exchange.single_turn(resolution, policy, now_ns);
     // Before it was sampled: a clock that is read before the exchange, and one that was set back.
     assert_eq!(exchange.single_turn(resolution, policy.with_max_age_ns(4_479), 0), Err(Doubt::Old { age_ns: 4_480 }));
