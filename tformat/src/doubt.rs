@@ -19,7 +19,7 @@ pub enum Doubt {
         /// The status.
         sf: StatusField,
     },
-    /// The encoder says that the request was damaged (CA0, CA1): it may be an answer to something else.
+    /// The encoder says that the request was damaged (CA0, CA1): it may be a response to something else.
     #[error("the request was damaged: [{sf}]")]
     RequestDamaged {
         /// The status.

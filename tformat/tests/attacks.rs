@@ -34,6 +34,26 @@ fn a_line_that_never_falls_silent_does_not_hold_a_transaction() {
     }
 }
 
+/// It is listened to as long as the slowest response lasts: 4 us of request, 10 us to its start bit, eleven fields of 6 us,
+/// and 5.599 us to hand the last one over.
+#[test]
+fn the_slowest_response_is_waited_for_and_nothing_longer() {
+    let mut transaction = Transaction::start(Request::ReadAll, Line::new(BitRate::Mbit2_5), 0);
+    for k in 2..=21 {
+        let _ = transaction.bytes(&[0x1a], 4_000 * k);
+    }
+    assert_eq!(transaction.progress(), Progress::Pending { until_ns: 85_600 });
+    // The logged response, its fields a time-out apart and each handed over at the last moment.
+    let fields = [0x1a, 0x20, 0x29, 0xc0, 0x3b, 0x17, 0x00, 0x00, 0x00, 0xc8, 0x37];
+    let mut transaction = Transaction::start(Request::ReadAll, Line::new(BitRate::Mbit2_5), 0);
+    for (field, k) in fields.into_iter().zip(0..) {
+        let late_ns = 18_000 + 6_000 * k + 5_599;
+        assert!(matches!(transaction.poll(late_ns), Progress::Pending { .. }), "field {k}");
+        let _ = transaction.bytes(&[field], late_ns);
+    }
+    assert!(matches!(transaction.progress(), Progress::Done { ready_ns: 83_599, .. }));
+}
+
 /// Whoever polls when he was told to is not told the same again.
 #[test]
 fn polling_at_the_time_that_was_named_ends_it() {

@@ -339,7 +339,7 @@ mod tests {
         }
     }
 
-    /// Writing, reading, and no answer at all.
+    /// Writing, reading, and no response at all.
     #[test]
     fn polling_is_bounded_and_says_what_is_known() {
         let because = ErrorClass::NoResponse;
@@ -428,7 +428,7 @@ mod tests {
         assert_eq!(access.receive(elsewhere(7), 0), Step::Failed { error, ready_ns: 1000 });
     }
 
-    /// A read is never taken for the answer to a write, nor the other way round.
+    /// A read is never taken for the response to a write, nor the other way round.
     #[test]
     fn responses_of_the_other_kind_are_refused() {
         let mut access = EepromAccess::write(None, ADDRESS, 0x5a, POLLING);
