@@ -13,6 +13,8 @@ use crate::type_word::TypeWord;
 /// The bit rate is part of the encoder's order code and has to be tried out by the caller: no response means another rate.
 /// One drive maker tries 4 Mbit/s first, then 2.5.
 ///
+/// After its supply has been switched on an encoder needs [`POWER_UP_NS`](crate::POWER_UP_NS) before the first request.
+///
 /// On a line with several encoders ask each by its address with [`Detection::of`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
