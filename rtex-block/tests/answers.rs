@@ -141,20 +141,47 @@ fn a_sub_handshake_takes_its_own_answer_only() {
 /// That is no answer to what is asked: it may be under way, or done.
 #[test]
 fn a_block_that_was_thrown_away_refuses_nothing() {
-    for code in [0x11, 0x12, 0x21] {
-        let mut handshake = Handshake::new(mac_id(), CyclicCode::CyclicPosition, monitor(0x07), 5).unwrap();
-        assert_eq!(handshake.receive(Some(&answer(0xaa, 0, code, 0))), Progress::Pending { left: 4 });
-        assert!(matches!(handshake.receive(Some(&answer(0x2a, 0, 0x07, 0))), Progress::Done { .. }));
-        let mut profile = ProfileMove::new(mac_id(), 0x11, 50, 10, 5);
-        let _ = profile.receive(Some(&answer(0x10, 0, 0, 0)));
-        assert!(profile.receive(Some(&answer(0x97, 0x02, code, 0))).is_pending());
-        assert!(profile.receive(Some(&answer(0x17, 0x02, 0x11, 0))).is_pending());
-        assert!(profile.is_moving());
+    assert!([0x11, 0x12, 0x21].into_iter().all(|code| ErrorCode(code).discards_block()));
+    assert!([0x22, 0x2e, 0x31, 0x32, 0x34].into_iter().all(|code| !ErrorCode(code).discards_block()));
+    // A motion of which one block is damaged at any time is made, and made once.
+    for damaged in 0..15 {
+        for bit in [0x01, 0x80] {
+            let mut pair = Pair::on(ActiveCode::ProfilePosition, Manners::POLITE);
+            let start = pair.axis.actual_position();
+            pair.axis.start_move(0x11, 5_000, 2_000_000).unwrap();
+            let mut ended = None;
+            for now in 0..200 {
+                update_with(&mut pair, if now == damaged { bit } else { 0 });
+                ended = ended.or(pair.axis.take_move().filter(|progress| !progress.is_pending()));
+            }
+            assert!(matches!(ended, Some(Progress::Done { .. })), "{damaged} {bit:x}: {ended:?}");
+            assert_eq!(pair.axis.actual_position(), start + 5_000, "{damaged} {bit:x}");
+        }
     }
-    let mut sub = SubHandshake::new(SubCode::Monitor, 0x07, 3, 5).unwrap();
-    let mut block = [0; 32];
-    (block[0], block[1], block[16], block[18]) = (0x89, 0x20, 0x8a, 0x12);
-    assert_eq!(sub.receive(Some(&Response32::parse(&block).unwrap().sub)), Progress::Pending { left: 4 });
+    // Sub_Chk = 0 in one block: the sub-command is asked for again.
+    let mut pair = Pair::new(ActiveCode::CyclicPosition, Manners::POLITE);
+    pair.wide = true;
+    pair.until("off", |pair| pair.axis.can_switch_on());
+    pair.axis.ask_sub(SubCode::Monitor, 0x07, 0).unwrap();
+    let mut outcome = None;
+    for now in 0..20 {
+        pair.axis.receive(pair.sent, &pair.received);
+        pair.sent = pair.counter.next();
+        let mut bytes = pair.axis.send(pair.sent).emit();
+        bytes[16] ^= if now == 1 { 0x80 } else { 0 };
+        pair.received = Response32::parse_strict(&pair.drive.exchange32(&bytes)).into();
+        outcome = outcome.or(pair.axis.take_sub_outcome());
+    }
+    assert!(matches!(outcome, Some(Progress::Done { .. })), "{outcome:?}");
+}
+
+/// An update period of which the command's first byte is damaged.
+fn update_with(pair: &mut Pair, damage: u8) {
+    pair.axis.receive(pair.sent, &pair.received);
+    pair.sent = pair.counter.next();
+    let mut main = pair.axis.send(pair.sent).main.emit();
+    main[0] ^= damage;
+    pair.received = Response::parse_strict(&pair.drive.exchange(&main)).into();
 }
 
 /// One flip in the address of any block while the position is being set: it is set once, and said to be.
@@ -167,11 +194,7 @@ fn a_damaged_block_does_not_spoil_a_request() {
             pair.axis.ask(set_position(0x21, 123_456)).unwrap();
             let mut outcome = None;
             for now in 0..40 {
-                pair.axis.receive(pair.sent, &pair.received);
-                pair.sent = pair.counter.next();
-                let mut main = pair.axis.send(pair.sent).main.emit();
-                main[0] ^= if now == damaged { bit } else { 0 };
-                pair.received = Response::parse_strict(&pair.drive.exchange(&main)).into();
+                update_with(&mut pair, if now == damaged { bit } else { 0 });
                 outcome = outcome.or(pair.axis.take_outcome());
             }
             assert!(matches!(outcome, Some(Progress::Done { .. })), "{damaged} {bit:x}: {outcome:?}");
