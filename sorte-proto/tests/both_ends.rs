@@ -381,8 +381,12 @@ fn devices_that_fall_silent_are_named_and_the_rest_starts_again() {
     line.plug(4);
     let error = line.cycles(first, 100).unwrap();
     assert!(matches!(error, Error::TopologyChanged { .. }), "{error}");
-    assert!(line.start_up().is_ok());
+    let first = line.start_up().unwrap();
     assert_eq!(line.master.network().devices(), 4);
+    // Its processor starts again; the ports forward meanwhile.
+    line.devices[1].reset();
+    assert_eq!(line.cycles(first, 100), Some(Error::DevicesMissing { first: 2, count: 1, cycles: 3 }));
+    assert!(line.start_up().is_ok());
 }
 
 #[test]
