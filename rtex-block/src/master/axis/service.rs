@@ -178,10 +178,12 @@ impl Axis {
             let _ = profile.receive(response);
         }
         let released = response.is_some_and(|r| r.code.noncyclic_bits() == 0);
+        self.unreleased &= !released;
         match &mut self.service {
             Service::Idle => {}
             Service::Asking { handshake, .. } => {
-                let progress = handshake.receive(response);
+                // Echoes tell requests of one kind apart by their index, and not by their data.
+                let progress = handshake.receive(response.filter(|_| !self.unreleased));
                 if !progress.is_pending() {
                     self.outcome = Some(progress);
                     self.service = Service::Releasing { left: self.config.limits.answer };
@@ -189,7 +191,10 @@ impl Axis {
             }
             Service::Releasing { left } => match left.checked_sub(1) {
                 Some(less) if !released => *left = less,
-                _ => self.service = Service::Idle,
+                _ => {
+                    self.unreleased = !released;
+                    self.service = Service::Idle;
+                }
             },
         }
     }
