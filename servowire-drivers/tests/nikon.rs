@@ -149,3 +149,41 @@ fn procedures_run_over_it() {
     assert_eq!(encoder.read_eeprom(EncoderAddress::ZERO, 0), Ok(type_word));
     assert_eq!(bench.borrow().world.truth().clashes(), 0);
 }
+
+/// A port that is held up for 10 ms before its request leaves, by which time the answer is overdue.
+struct HeldUp<'a> {
+    now_ns: &'a std::cell::Cell<u64>,
+    left_ns: Vec<u64>,
+}
+
+impl servowire_drivers::nikon::blocking::FramePort for &mut HeldUp<'_> {
+    type Error = ();
+
+    fn send(&mut self, _: &[nikon_aformat::RequestFrame], _: u32) -> Result<(), ()> {
+        if self.left_ns.is_empty() {
+            self.now_ns.set(self.now_ns.get() + 10_000_000);
+        }
+        self.left_ns.push(self.now_ns.get());
+        Ok(())
+    }
+
+    fn take(&mut self) -> Result<Option<servowire_drivers::nikon::Frame>, ()> {
+        Ok(None)
+    }
+}
+
+/// At 2.5 Mbit/s: 18 bits of request, some 4 us, and three frames of 18 bits.
+#[test]
+fn a_request_that_was_held_up_is_not_followed_into_its_answer() {
+    let now_ns = std::cell::Cell::new(0);
+    let mut port = HeldUp { now_ns: &now_ns, left_ns: Vec::new() };
+    let clock = || {
+        now_ns.set(now_ns.get() + 100);
+        now_ns.get()
+    };
+    let mut encoder = Master::new(&mut port, clock, Resolution::default(), line());
+    assert!(encoder.read_abs40(EncoderAddress::ZERO).is_err());
+    assert!(encoder.read_abs40(EncoderAddress::ZERO).is_err());
+    let left = port.left_ns;
+    assert!(left[1] - left[0] >= 7_200 + 4_000 + 21_600, "{left:?}");
+}

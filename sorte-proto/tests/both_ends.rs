@@ -381,8 +381,12 @@ fn devices_that_fall_silent_are_named_and_the_rest_starts_again() {
     line.plug(4);
     let error = line.cycles(first, 100).unwrap();
     assert!(matches!(error, Error::TopologyChanged { .. }), "{error}");
-    assert!(line.start_up().is_ok());
+    let first = line.start_up().unwrap();
     assert_eq!(line.master.network().devices(), 4);
+    // Its processor starts again; the ports forward meanwhile.
+    line.devices[1].reset();
+    assert_eq!(line.cycles(first, 100), Some(Error::DevicesMissing { first: 2, count: 1, cycles: 3 }));
+    assert!(line.start_up().is_ok());
 }
 
 #[test]
@@ -424,6 +428,52 @@ proptest! {
             prop_assert!(restarts < 3);
         };
         prop_assert_eq!(line.master.network().devices(), 3);
+        prop_assert_eq!(line.cycles(first, 5), None);
+    }
+
+    /// Frames and answers that are lost, come twice or again later, and a master that is polled late: in the end the line runs
+    /// with the right cables and clocks, or it has not begun.
+    #[test]
+    fn whatever_happens_in_the_start_up_the_line_and_the_clocks_are_right(events in proptest::collection::vec(0u8..9, 0..400)) {
+        let mut line = Line::new(vec![50; 3]);
+        let mut events = events.into_iter();
+        let mut old: Option<(Vec<u8>, u64)> = None;
+        let mut restarts = 0;
+        let first = loop {
+            match line.master.poll(line.now_ns) {
+                Action::Wait { until_ns } => line.wait(until_ns),
+                Action::Restart { .. } => restarts += 1,
+                Action::Exchange { at_ns, time_stamp, .. } => break (at_ns, time_stamp),
+                Action::Send { at_ns, frame } => {
+                    prop_assert!(at_ns >= line.now_ns);
+                    let event = events.next().unwrap_or_default();
+                    let mut buffer = [0; Discovery::LEN];
+                    let len = frame.emit_into(&mut buffer).unwrap();
+                    let new = (event != 1).then(|| line.carry(&buffer[..len], at_ns)).flatten();
+                    let heard = match event {
+                        2 => vec![],
+                        3 => vec![new.clone(), new.clone()],
+                        4 => vec![old.clone(), new.clone()],
+                        5 => vec![new.clone(), old.clone()],
+                        _ => vec![new.clone()],
+                    };
+                    for (answer, sof_ns) in heard.into_iter().flatten() {
+                        let _: Result<_, _> = line.master.receive(&answer, sof_ns);
+                    }
+                    old = new.or(old);
+                    if event == 6 {
+                        line.wait(line.now_ns + 7_777);
+                    }
+                }
+            }
+            prop_assert!(restarts < 40);
+        };
+        prop_assert_eq!((line.master.network().devices(), line.master.line_delay().checked()), (3, Ok(50)));
+        for (k, counter) in line.counters.iter().enumerate() {
+            let error = ((first.0 - line.master.epoch_ns()) as u32).abs_diff(counter.at(first.0));
+            prop_assert!(error <= 8 * k as u32 + 1, "device {}: {} ns", k + 1, error);
+            prop_assert_eq!(line.devices[k].state(), device::State::Exchange);
+        }
         prop_assert_eq!(line.cycles(first, 5), None);
     }
 

@@ -247,6 +247,9 @@ fn a_frame_is_handed_out_as_long_before_its_time_as_the_port_needs() {
     let (now_ns, at_ns) = end.unwrap();
     assert_eq!((now_ns, at_ns), (46_240_500, 46_260_500));
     assert_eq!(master.poll(now_ns), Action::Wait { until_ns: now_ns + 4000 });
+    // Without a link there is no time to wait for.
+    master.enable(false);
+    assert_eq!(master.poll(now_ns), Action::Wait { until_ns: u64::MAX });
 }
 
 /// The round trip counts from the start of the request as the port has captured it, if it can.

@@ -58,6 +58,8 @@ pub struct Drive {
     target_speed: i32,
     /// What the next response echoes.
     echo: u8,
+    /// Byte 1 of the block taken last; one that was thrown away is none.
+    taken: u8,
     error: Option<u16>,
     job: Option<Job>,
     /// The request before, whose echoes linger, and for how many answers.
@@ -102,6 +104,7 @@ impl Drive {
             data1: 0,
             target_speed: 0,
             echo: NOP,
+            taken: NOP,
             error: None,
             job: None,
             stale: None,
@@ -360,7 +363,8 @@ impl Drive {
     fn accept(&mut self, block: &[u8; LEN], error: Option<u16>) {
         let [byte0, byte1, c2, c3, d4, d5, d6, d7, noncyclic @ ..] = *block;
         let (cyclic, code) = (byte1 >> 4 & 7, byte1 & 0x0f);
-        let before = core::mem::replace(&mut self.echo, byte1);
+        let before = core::mem::replace(&mut self.taken, byte1);
+        self.echo = byte1;
         self.error = error;
         let goes_together = if cyclic == NOP { code == 0 } else { code != PROFILE || cyclic == PP };
         if error.is_none() && !goes_together {

@@ -179,6 +179,8 @@ impl<F: FramePort, T: Timer> Master<F, T> {
         self.state.soil(worst_ns(line, request, self.resolution, start_ns));
         let gap_bits = line.rate.bits(line.frame_gap_ns);
         self.port.send(request.emit().as_slice(), gap_bits).await.map_err(Error::Io)?;
+        // Whoever had the processor meanwhile has held the request up.
+        self.state.soil(worst_ns(line, request, self.resolution, self.timer.now_ns()));
         let mut progress = transaction.progress();
         loop {
             match progress {

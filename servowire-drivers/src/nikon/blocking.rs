@@ -178,6 +178,8 @@ impl<F: FramePort, C: Clock> Master<F, C> {
         self.state.soil(worst_ns(line, request, self.resolution, start_ns));
         let gap_bits = line.rate.bits(line.frame_gap_ns);
         self.port.send(request.emit().as_slice(), gap_bits).map_err(Error::Io)?;
+        // Whoever had the processor meanwhile has held the request up.
+        self.state.soil(worst_ns(line, request, self.resolution, self.clock.now_ns()));
         loop {
             match self.receive(&mut transaction)? {
                 Progress::Pending { .. } => {}

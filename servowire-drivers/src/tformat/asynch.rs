@@ -122,13 +122,16 @@ impl<U: Read + Write, D: Direction, T: Timer> Encoder<U, D, T> {
     /// [`Error`].
     pub async fn transact(&mut self, request: Request) -> Result<Exchange, Failure<U, D>> {
         self.settle().await?;
-        let on_ns = self.timer.now_ns();
-        // The worst is assumed until the end is known: an early return or a dropped future leaves it so.
-        self.state.soil(worst_ns(&self.line, request, on_ns.saturating_add(self.line.driver_lead_ns.into())));
         let guard = Guard::transmit(&mut self.direction).map_err(Error::Pin)?;
+        let on_ns = self.timer.now_ns();
         self.timer.wait_until(on_ns.saturating_add(self.line.driver_lead_ns.into())).await;
-        let mut transaction = Transaction::start(request, self.line, self.timer.now_ns());
+        let start_ns = self.timer.now_ns();
+        // The worst is assumed until the end is known: an early return or a dropped future leaves it so. So once more after the
+        // request: whoever had the processor meanwhile has held it up.
+        self.state.soil(worst_ns(&self.line, request, start_ns));
+        let mut transaction = Transaction::start(request, self.line, start_ns);
         send(&mut self.uart, request.emit().as_bytes()).await?;
+        self.state.soil(worst_ns(&self.line, request, self.timer.now_ns()));
         // What `flush` means differs between UARTs; by the clock the last bit has left at this time.
         self.timer.wait_until(transaction.request_end_ns()).await;
         guard.receive().map_err(Error::Pin)?;

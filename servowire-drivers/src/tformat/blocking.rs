@@ -116,13 +116,16 @@ impl<U: Read + ReadReady + Write, D: Direction, C: Clock> Encoder<U, D, C> {
     /// [`Error`].
     pub fn transact(&mut self, request: Request) -> Result<Exchange, Failure<U, D>> {
         self.settle()?;
-        let on_ns = self.clock.now_ns();
-        // The worst is assumed until the end is known: an early return leaves it so.
-        self.state.soil(worst_ns(&self.line, request, on_ns.saturating_add(self.line.driver_lead_ns.into())));
         let guard = Guard::transmit(&mut self.direction).map_err(Error::Pin)?;
+        let on_ns = self.clock.now_ns();
         while self.clock.now_ns() < on_ns.saturating_add(self.line.driver_lead_ns.into()) {}
-        let mut transaction = Transaction::start(request, self.line, self.clock.now_ns());
+        let start_ns = self.clock.now_ns();
+        // The worst is assumed until the end is known: an early return leaves it so. So once more after the
+        // request: whoever had the processor meanwhile has held it up.
+        self.state.soil(worst_ns(&self.line, request, start_ns));
+        let mut transaction = Transaction::start(request, self.line, start_ns);
         send(&mut self.uart, request.emit().as_bytes())?;
+        self.state.soil(worst_ns(&self.line, request, self.clock.now_ns()));
         // What `flush` means differs between UARTs; by the clock the last bit has left at this time.
         while self.clock.now_ns() < transaction.request_end_ns() {}
         guard.receive().map_err(Error::Pin)?;

@@ -6,15 +6,19 @@ use std::cell::RefCell;
 use std::collections::VecDeque;
 use std::convert::Infallible;
 use std::fmt::Debug;
+#[cfg(feature = "async")]
 use std::future::poll_fn;
 use std::rc::Rc;
+#[cfg(feature = "async")]
 use std::task::Poll;
 
 use nikon_aformat::device::Device;
 use nikon_aformat::master::Line;
 use nikon_aformat::{BitRate, EncoderAddress, RequestFrame, Resolution};
+use servowire_drivers::Clock;
+#[cfg(feature = "async")]
+use servowire_drivers::Timer;
 use servowire_drivers::nikon::{Frame, blocking};
-use servowire_drivers::{Clock, Timer};
 use servowire_world::{
     Delivery, Event, Framing, Host, Id, Kind, Message, Scenario, Speaker, Transmission, Wire, World,
 };
@@ -210,6 +214,7 @@ impl Clock for Port {
     }
 }
 
+#[cfg(feature = "async")]
 #[cfg(feature = "async")]
 impl Timer for Port {
     async fn wait_until(&mut self, ns: u64) {

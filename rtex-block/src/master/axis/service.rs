@@ -1,6 +1,7 @@
 //! Requests of an axis, in the main and in the sub block.
 
 use super::Axis;
+use crate::error_code::ErrorCode;
 use crate::header::MacId;
 use crate::master::handshake::Handshake;
 use crate::master::progress::Progress;
@@ -69,6 +70,12 @@ const fn needs_servo_off(request: &NonCyclicCommand, unknown: bool) -> bool {
         },
         _ => false,
     }
+}
+
+/// The drive goes on with the block before, so this is no answer: the request is in the next block again, and may be under way
+/// already.
+fn is_thrown_away(response: &Response) -> bool {
+    matches!(response.noncyclic(), NonCyclicResponse::CommandError(code) if code.discards_block())
 }
 
 impl Axis {
@@ -166,14 +173,17 @@ impl Axis {
 
     /// Requests and profile motion.
     pub(super) fn serve(&mut self, response: Option<&Response>) {
+        let response = response.filter(|response| !is_thrown_away(response));
         if let Some(profile) = &mut self.profile {
             let _ = profile.receive(response);
         }
         let released = response.is_some_and(|r| r.code.noncyclic_bits() == 0);
+        self.unreleased &= !released;
         match &mut self.service {
             Service::Idle => {}
             Service::Asking { handshake, .. } => {
-                let progress = handshake.receive(response);
+                // Echoes tell requests of one kind apart by their index, and not by their data.
+                let progress = handshake.receive(response.filter(|_| !self.unreleased));
                 if !progress.is_pending() {
                     self.outcome = Some(progress);
                     self.service = Service::Releasing { left: self.config.limits.answer };
@@ -181,13 +191,17 @@ impl Axis {
             }
             Service::Releasing { left } => match left.checked_sub(1) {
                 Some(less) if !released => *left = less,
-                _ => self.service = Service::Idle,
+                _ => {
+                    self.unreleased = !released;
+                    self.service = Service::Idle;
+                }
             },
         }
     }
 
     /// The sub-command; a drive that answers without sub block leaves it pending.
     pub(super) fn serve_sub(&mut self, response: Option<&SubResponse>) {
+        let response = response.filter(|sub| !sub.error_code().is_some_and(ErrorCode::discards_block));
         let released = response.is_some_and(|r| r.code.get() == 0);
         match &mut self.sub {
             SubService::Idle => {}

@@ -1,0 +1,150 @@
+//! What a drive says may be about an older block: one that it has thrown away, a request before, a motion of something else.
+#![allow(clippy::arithmetic_side_effects, clippy::indexing_slicing, clippy::panic, clippy::unwrap_used, missing_docs)]
+
+mod common;
+
+use core::num::NonZeroU16;
+
+use common::{Pair, limits, set_position};
+use rtex_block::device::Manners;
+use rtex_block::master::procedure::Home;
+use rtex_block::master::{ActiveCode, Axis, AxisConfig, Failure, Limits, Progress, Turn};
+use rtex_block::{
+    Arguments, ErrorCode, MacId, NonCyclicCommand, Response, Response32, StatusFlags, SubCode, TypeCode, UpdateCounter,
+};
+
+fn mac_id() -> MacId {
+    MacId::new(9).unwrap()
+}
+
+/// 0011h, 0012h and 0021h: the drive has thrown the block away and goes on with the one before, which asks for the same.
+/// That is no answer to what is asked: it may be under way, or done.
+#[test]
+fn a_block_that_was_thrown_away_refuses_nothing() {
+    assert!([0x11, 0x12, 0x21].into_iter().all(|code| ErrorCode(code).discards_block()));
+    assert!([0x22, 0x2e, 0x31, 0x32, 0x34].into_iter().all(|code| !ErrorCode(code).discards_block()));
+    // A motion of which one block is damaged at any time is made, and made once.
+    for damaged in 0..15 {
+        for bit in [0x01, 0x80] {
+            let mut pair = Pair::on(ActiveCode::ProfilePosition, Manners::POLITE);
+            let start = pair.axis.actual_position();
+            pair.axis.start_move(0x11, 5_000, 2_000_000).unwrap();
+            let mut ended = None;
+            for now in 0..200 {
+                update_with(&mut pair, if now == damaged { bit } else { 0 });
+                ended = ended.or(pair.axis.take_move().filter(|progress| !progress.is_pending()));
+            }
+            assert!(matches!(ended, Some(Progress::Done { .. })), "{damaged} {bit:x}: {ended:?}");
+            assert_eq!(pair.axis.actual_position(), start + 5_000, "{damaged} {bit:x}");
+        }
+    }
+    // Sub_Chk = 0 in one block: the sub-command is asked for again.
+    let mut pair = Pair::new(ActiveCode::CyclicPosition, Manners::POLITE);
+    pair.wide = true;
+    pair.until("off", |pair| pair.axis.can_switch_on());
+    pair.axis.ask_sub(SubCode::Monitor, 0x07, 0).unwrap();
+    let mut outcome = None;
+    for now in 0..20 {
+        pair.axis.receive(pair.sent, &pair.received);
+        pair.sent = pair.counter.next();
+        let mut bytes = pair.axis.send(pair.sent).emit();
+        bytes[16] ^= if now == 1 { 0x80 } else { 0 };
+        pair.received = Response32::parse_strict(&pair.drive.exchange32(&bytes)).into();
+        outcome = outcome.or(pair.axis.take_sub_outcome());
+    }
+    assert!(matches!(outcome, Some(Progress::Done { .. })), "{outcome:?}");
+}
+
+/// An update period of which the command's first byte is damaged.
+fn update_with(pair: &mut Pair, damage: u8) {
+    pair.axis.receive(pair.sent, &pair.received);
+    pair.sent = pair.counter.next();
+    let mut main = pair.axis.send(pair.sent).main.emit();
+    main[0] ^= damage;
+    pair.received = Response::parse_strict(&pair.drive.exchange(&main)).into();
+}
+
+/// One flip in the address of any block while the position is being set: it is set once, and said to be.
+#[test]
+fn a_damaged_block_does_not_spoil_a_request() {
+    for damaged in 0..12 {
+        for bit in [0x01, 0x80] {
+            let mut pair = Pair::new(ActiveCode::CyclicPosition, Manners::POLITE);
+            pair.until("off", |pair| pair.axis.can_switch_on());
+            pair.axis.ask(set_position(0x21, 123_456)).unwrap();
+            let mut outcome = None;
+            for now in 0..40 {
+                update_with(&mut pair, if now == damaged { bit } else { 0 });
+                outcome = outcome.or(pair.axis.take_outcome());
+            }
+            assert!(matches!(outcome, Some(Progress::Done { .. })), "{damaged} {bit:x}: {outcome:?}");
+            assert_eq!(pair.axis.actual_position(), 123_456);
+        }
+    }
+}
+
+/// The echo of a request holds its index and not its data. A drive that has not echoed the normal command in between is still at
+/// the request before, and a write of another value is not done by that.
+#[test]
+fn an_answer_that_lingers_is_not_that_of_the_next_request() {
+    let limits = Limits::new(NonZeroU16::new(60).unwrap(), 4).with_ready(100);
+    let mut axis = Axis::new(AxisConfig::new(mac_id(), ActiveCode::CyclicPosition, 500_000, limits));
+    let mut counter = UpdateCounter::ZERO;
+    let mut hear = |axis: &mut Axis, code: u8| {
+        counter = counter.next();
+        let mut block = [0; 16];
+        // Parameter write 011h of Pr5.03, or the normal command.
+        let eight = if code == 0x26 { 0x11 } else { 0 };
+        (block[0], block[1], block[2], block[8]) = (0x89 | counter.get() << 5, code, 0x40, eight);
+        (block[10], block[11]) = if code == 0x26 { (3, 5) } else { (0, 0) };
+        axis.receive(Turn::Valid(counter), &Response::parse(&block).into());
+        axis.take_outcome()
+    };
+    let write = |data| NonCyclicCommand::Parameter(Arguments { type_code: TypeCode::short(0x11), index: 0x0503, data });
+    hear(&mut axis, 0x20);
+    axis.ask(write(1)).unwrap();
+    assert!(matches!(hear(&mut axis, 0x26), Some(Progress::Done { .. })));
+    for _ in 0..6 {
+        assert_eq!(hear(&mut axis, 0x26), None);
+    }
+    axis.ask(write(7)).unwrap();
+    let outcomes: Vec<_> = (0..5).filter_map(|_| hear(&mut axis, 0x26)).collect();
+    assert_eq!(outcomes, [Progress::Failed { error: Failure::TimedOut }]);
+    hear(&mut axis, 0x20);
+    axis.ask(write(7)).unwrap();
+    assert!(matches!(hear(&mut axis, 0x26), Some(Progress::Done { .. })));
+}
+
+/// Homing_Complete of the last homing, and a motion of something else that ends: neither is the end of this homing.
+#[test]
+fn homing_begins_when_nothing_moves() {
+    const COMPLETE: StatusFlags = StatusFlags::HOMING_COMPLETE;
+    const MOVES: StatusFlags = StatusFlags::IN_PROGRESS;
+    let config = AxisConfig::new(mac_id(), ActiveCode::ProfilePosition, 500_000, limits());
+    let mut axis = Axis::new(config);
+    let mut counter = UpdateCounter::ZERO;
+    let mut hear = |axis: &mut Axis, code: u8, status: StatusFlags, eight: u8| {
+        counter = counter.next();
+        let [low, high] = status.union(StatusFlags::SERVO_READY).bits().to_le_bytes();
+        let mut block = [0; 16];
+        (block[0], block[1], block[2], block[3], block[8]) = (0x89 | counter.get() << 5, code, low, high, eight);
+        axis.receive(Turn::Valid(counter), &Response::parse(&block).into());
+    };
+    hear(&mut axis, 0x10, COMPLETE.union(MOVES), 0);
+    let mut home = Home::new(0xc8, 50);
+    for _ in 0..5 {
+        hear(&mut axis, 0x10, COMPLETE.union(MOVES), 0);
+        assert!(home.receive(&mut axis).is_pending());
+        assert!(axis.can_ask(), "asked while something moves");
+    }
+    hear(&mut axis, 0x10, COMPLETE, 0);
+    assert!(home.receive(&mut axis).is_pending());
+    for _ in 0..5 {
+        hear(&mut axis, 0x14, COMPLETE, 0xc8);
+        assert!(home.receive(&mut axis).is_pending(), "done by the flag of the homing before");
+    }
+    hear(&mut axis, 0x14, MOVES, 0xc8);
+    assert!(home.receive(&mut axis).is_pending());
+    hear(&mut axis, 0x14, COMPLETE, 0xc8);
+    assert!(matches!(home.receive(&mut axis), Progress::Done { .. }));
+}
