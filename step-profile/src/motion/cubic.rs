@@ -14,6 +14,7 @@ pub(super) trait Word: Copy {
     /// `self` times `by`, plus `more`.
     fn times_plus(self, by: u64, more: Self) -> Self;
     fn is_negative(self) -> bool;
+    fn is_zero(self) -> bool;
     /// Bits of a number above 0; 0 for any other.
     fn bits(self) -> u32;
     /// `self` is from 0 to less than `other`.
@@ -56,6 +57,11 @@ macro_rules! word {
             #[inline]
             fn is_negative(self) -> bool {
                 self < 0
+            }
+
+            #[inline]
+            fn is_zero(self) -> bool {
+                self == 0
             }
 
             fn bits(self) -> u32 {
@@ -138,9 +144,13 @@ impl<W: Word> Cubic<W> {
         let signed = |x: W, up: bool| if up { x } else { zero.minus(x) };
         let Piece { up, bend, .. } = *piece;
         let grows = bend != Bend::Fading;
-        let (bent, then) = (bend != Bend::Flat, piece.after(wait));
+        let bent = bend != Bend::Flat;
         // The first number below the leading one, up or down to a whole number as it is a little later.
-        let (exact, per) = if bent { (scale(then.a.half(), 2), 3) } else { (scale(then.v, 1), 2) };
+        let (exact, per) = if bent {
+            (scale(piece.a.along(piece.j * wait, grows).half(), 2), 3)
+        } else {
+            (scale(piece.v.along(piece.a * wait, up), 1), 2)
+        };
         let units = (exact * inverse).scaled(bits);
         let whole = units.floor();
         let more = if bent { grows } else { up };
@@ -181,6 +191,12 @@ impl<W: Word> Cubic<W> {
             h: self.j.times_plus(by, second),
             ..*self
         }
+    }
+
+    /// At the next step, if that is made `by` ticks on.
+    #[inline(always)]
+    fn at(&self, by: u64) -> Self {
+        if self.j.is_zero() { self.straight(by) } else { self.bent(by) }
     }
 
     /// What the position has grown by since the tick before.
@@ -233,7 +249,7 @@ impl<W: Word> Cubic<W> {
         let mut by = guess.max(1).min(late);
         let mut round = 0_u8;
         loop {
-            let next = self.bent(by);
+            let next = self.at(by);
             if next.off.is_negative() {
                 early = by;
             } else {
@@ -244,7 +260,7 @@ impl<W: Word> Cubic<W> {
             }
             let left = late.saturating_sub(early);
             if left <= 1 {
-                return (late, self.bent(late));
+                return (late, self.at(late));
             }
             round = round.saturating_add(1);
             let newton = next.off.quotient(next.speed()).filter(|_| round < 12);
@@ -261,14 +277,30 @@ impl<W: Word> Cubic<W> {
 
 #[expect(clippy::cast_possible_truncation, clippy::cast_possible_wrap, reason = "words in two's complement")]
 impl Cubic<i64> {
+    /// The upper words of the position past the step, and of what it has grown by since the tick before; the lower words make that
+    /// less by one at most.
+    #[inline(always)]
+    fn upper(&self) -> (i32, i32) {
+        let upper = |word: i64| (word >> 32) as i32;
+        (upper(self.off), upper(self.v).wrapping_sub(upper(self.h)).wrapping_add(upper(self.j)))
+    }
+
     /// The upper words alone say [`is_there`](Self::is_there); near the edges they do not, in a word of 2^26 to a step.
     #[inline(always)]
     pub(super) fn is_surely_there(&self) -> bool {
-        let upper = |word: i64| (word >> 32) as i32;
-        let off = upper(self.off);
-        // The lower words make the speed less by one at most.
-        let speed = upper(self.v).wrapping_sub(upper(self.h)).wrapping_add(upper(self.j));
+        let (off, speed) = self.upper();
         off.wrapping_add(1).wrapping_sub(speed) & !off < 0
+    }
+
+    /// Newton's step to the tick of the step from this one, `by` ticks on; up to twice as far, as in [`solve`](Self::solve).
+    #[inline(always)]
+    pub(super) fn nearer(&self, by: u32) -> Option<u32> {
+        let (off, speed) = self.upper();
+        if speed <= 0 {
+            return None;
+        }
+        let over = off.checked_div_euclid(speed)?;
+        Some(by.saturating_add_signed(over.wrapping_neg()).min(by.saturating_mul(2)))
     }
 
     /// Step, v, h and j without their signs.
@@ -290,7 +322,43 @@ impl Cubic<i64> {
     #[inline]
     pub(super) fn onward(&self, by: u64, doublings: u32) -> Self {
         let off = self.off.wrapping_add(self.step).wrapping_sub(self.step.wrapping_shl(doublings));
-        Self { off, ..*self }.bent(by)
+        Self { off, ..*self }.at(by)
+    }
+
+    /// What the speed has changed by since, and what it was.
+    #[inline]
+    pub(super) const fn change(&self, since: &Self) -> (u64, u64) {
+        (self.v.wrapping_sub(since.v).unsigned_abs(), since.v.unsigned_abs())
+    }
+
+    /// The step was due within two ticks of this one.
+    #[inline]
+    pub(super) const fn is_near(&self) -> bool {
+        self.off.unsigned_abs() >> 1 < self.v.unsigned_abs()
+    }
+
+    /// What is left of a step after `interval` at the speed here, in 2^25 units; the interval is in 2^-7 ticks and wrong by a
+    /// quarter at most.
+    #[inline]
+    pub(super) const fn rest(&self, interval: i64) -> i64 {
+        (self.step << 7).wrapping_sub(self.v.wrapping_mul(interval)) >> 32
+    }
+
+    /// What the position is past the step, times the interval at the speed here in 2^-12 ticks; in 2^48 units.
+    #[inline]
+    pub(super) const fn part(&self, interval: i64) -> i64 {
+        (self.off >> 16).wrapping_mul(interval) >> 32
+    }
+
+    /// What the next of two intervals of `ticks` is longer in units of 2^-15 of them; 0 if that is more than an eighth.
+    pub(super) fn growth(&self, ticks: u64) -> i32 {
+        let more = self.h.wrapping_mul(ticks as i64) << 1;
+        if self.v <= 0 || more.unsigned_abs() > self.v.unsigned_abs() >> 3 {
+            return 0;
+        }
+        let up = self.v.leading_zeros().wrapping_sub(1);
+        let (more, v) = ((more << up) >> 32, (self.v << up) >> 47);
+        (more as i32).checked_div(v as i32).map_or(0, i32::wrapping_neg)
     }
 
     /// What the step was due before this tick, in 2^-32 ticks and exact to 2^-14 ticks; less than 0 if it is due after it. `None`
@@ -310,11 +378,11 @@ impl Cubic<i64> {
     #[cfg(test)]
     pub(super) fn back(&self, by: i64, steps: u64) -> Self {
         let Self { off, v, h, j, step } = *self;
-        let off = off + step.wrapping_mul(steps as i64);
+        let off = off.wrapping_add(step.wrapping_mul(steps as i64));
         let (bent, curved) = (j.wrapping_mul(by), h.wrapping_mul(by));
         Self {
-            off: off.wrapping_add((bent.wrapping_mul(by) + curved + v).wrapping_mul(by)),
-            v: v + 2 * curved + (3 * bent).wrapping_mul(by),
+            off: off.wrapping_add(bent.wrapping_mul(by).wrapping_add(curved).wrapping_add(v).wrapping_mul(by)),
+            v: v.wrapping_add(curved << 1).wrapping_add(bent.wrapping_mul(3).wrapping_mul(by)),
             ..*self
         }
     }

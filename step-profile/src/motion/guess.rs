@@ -7,6 +7,7 @@
 )]
 
 use super::cubic::Cubic;
+use super::run::Row;
 
 /// Bits of a part of a tick in a [`Guess`], which foresees intervals of up to 2^20 ticks with them.
 const PART: u32 = 11;
@@ -29,7 +30,7 @@ pub(super) struct Guess {
     /// Ticks to the next step, rounded up.
     next: u32,
     /// Steps a unit: 2^43 over the high word of a step.
-    rate: u32,
+    pub(super) rate: u32,
     /// Steps until it is worth while to look whether the intervals change slowly.
     wait: u32,
 }
@@ -42,18 +43,49 @@ impl Guess {
         let ticks = cubic.interval().min(1 << 19) as u32;
         let interval = ticks << PART;
         let late = (cubic.late().unwrap_or(0) >> 21) as u32;
-        let next = interval.wrapping_sub(late).wrapping_add(CEIL);
-        Self { cubic, tick, interval, change: 0, late, next, rate, wait }
+        let change = (i64::from(cubic.growth(ticks.into())).wrapping_mul(interval.into()) >> 15) as i32;
+        Self { cubic, tick, interval: 0, change: 0, late, next: 0, rate, wait }.between(interval, change)
     }
 
-    /// Whether the intervals change so slowly that eight steps can be foreseen at once. With i the interval and c its change
-    /// the fourth difference over eight steps is 7680 c³ / i² in a trapezoid; it has to be below 1/8 of a tick.
-    pub(super) fn is_slow(&self) -> bool {
-        if self.wait > 0 {
-            return false;
-        }
-        let (interval, change) = (u64::from(self.interval), u64::from((self.change as i32).unsigned_abs()));
-        change.wrapping_mul(change).saturating_mul(change) <= interval.wrapping_mul(interval) >> 8
+    /// After the last step of a row that cannot go on.
+    pub(super) fn after(row: &Row) -> Self {
+        let (cubic, tick) = row.place();
+        let [interval, change, late] = row.intervals().map(|x| x >> 21);
+        let own = Self { cubic, tick, interval: 0, change: 0, late: late as u32, next: 0, rate: row.rate(), wait: 0 };
+        let own = own.between(interval as u32, change as i32);
+        Self { wait: own.patience().max(16), ..own }
+    }
+
+    /// With the interval at the last step, and what the next one is longer than the one before.
+    fn between(self, interval: u32, change: i32) -> Self {
+        let half = change >> 1;
+        let next = interval.wrapping_add_signed(half).wrapping_sub(self.late).wrapping_add(CEIL);
+        Self { interval: interval.wrapping_add_signed(half.wrapping_neg()), change: change as u32, next, ..self }
+    }
+
+    /// About as many steps until the intervals change so slowly that sixteen can be foreseen at once.
+    ///
+    /// With i the interval and c its change the bend over them is 40,960 c³ / i² in a trapezoid, i / 2c steps from rest, and less in an
+    /// S-curve. It should be below 0.15 ticks, and becomes less with the power of 3.5 of the steps from rest.
+    fn patience(&self) -> u32 {
+        let (interval, change) = (self.interval, (self.change as i32).unsigned_abs());
+        let steps = interval.checked_div(change << 1).unwrap_or(u32::MAX);
+        let is_steep = steps < 128;
+        let wait = if is_steep {
+            128_u32.wrapping_sub(steps)
+        } else {
+            let (interval, change) = (u64::from(interval), u64::from(change));
+            let cubed = (change.wrapping_mul(change) >> 8).wrapping_mul(change);
+            let limit = interval.wrapping_mul(interval) >> 15;
+            if cubed <= limit {
+                return 0;
+            }
+            let doublings = limit.leading_zeros().wrapping_sub(cubed.leading_zeros()).wrapping_add(1);
+            steps.saturating_mul(doublings) >> 3
+        };
+        // Slower and slower: at the end of the piece at most.
+        let end = if self.change as i32 > 0 { steps >> 1 } else { 0 };
+        wait.max(end).max(8)
     }
 
     /// A step came `by` ticks after the one before; `off` is what the position was past it.
@@ -72,13 +104,13 @@ impl Guess {
         (self.interval, self.change, self.late) = (interval, change, late);
     }
 
-    /// The next step, if it is foreseen rightly or wrong by a tick; `after` gives the position so many ticks on.
+    /// The next step, if it is foreseen rightly or Newton's step from there finds it; `after` gives the position so many ticks on.
     #[inline(always)]
     fn foresee(&mut self, after: impl Fn(&Cubic<i64>, u64) -> Cubic<i64>) -> Option<u64> {
         let mut by = self.next >> PART;
         let mut there = after(&self.cubic, by.into());
         if !there.is_surely_there() {
-            by = if there.off < 0 { by.wrapping_add(1) } else { by.wrapping_sub(1) };
+            by = there.nearer(by)?;
             there = after(&self.cubic, by.into());
             if !there.is_surely_there() {
                 return None;
@@ -96,20 +128,30 @@ impl Guess {
         if let Some(tick) = self.foresee(Cubic::bent) {
             return Some(tick);
         }
-        if cfg!(target_pointer_width = "64") {
-            // In a copy, lest the run of the stepper has to be in memory.
-            let mut copy = *self;
-            let tick = copy.search(last);
-            *self = copy;
-            return Some(tick);
-        }
-        Some(self.search(last))
+        Some(if cfg!(target_pointer_width = "64") { self.search_apart(last) } else { self.search(last) })
     }
 
-    /// The tick of the next step, and no look for more in the next ones.
+    /// The tick of the next step of `left`, unless several may be foreseen at once.
+    pub(super) fn single(&mut self, left: u32, last: u64) -> Option<u64> {
+        if self.wait == 0 {
+            self.wait = if left < Row::LEAST { Row::LEAST } else { self.patience() };
+        }
+        self.wait = self.wait.checked_sub(1)?;
+        Some(self.step(last))
+    }
+
+    /// The tick of the next step.
     pub(super) fn step(&mut self, last: u64) -> u64 {
-        self.wait = 16;
         self.foresee(Cubic::bent).unwrap_or_else(|| self.search(last))
+    }
+
+    /// The next step, foreseen wrongly; in a copy, lest all that is known has to be in memory.
+    #[inline(always)]
+    fn search_apart(&mut self, last: u64) -> u64 {
+        let mut copy = *self;
+        let tick = copy.search(last);
+        *self = copy;
+        tick
     }
 
     /// The next step, foreseen wrongly.
@@ -125,35 +167,32 @@ impl Guess {
         self.tick
     }
 
-    /// Up to `left` steps, as long as they are foreseen and it is not worth while to look for more; what is left then.
+    /// Up to `left` steps, as long as it is not worth while to look for more; what is left then.
     #[inline(always)]
-    pub(super) fn fold<B>(&mut self, left: u32, sum: B, take: &mut impl FnMut(B, u64) -> B) -> (u32, B) {
-        let most = left.min(self.wait);
-        let (made, sum) = if self.cubic.is_straight() {
-            self.fold_with(Cubic::straight, most, sum, take)
+    pub(super) fn fold<B>(&mut self, left: u32, last: u64, sum: B, take: &mut impl FnMut(B, u64) -> B) -> (u32, B) {
+        let count = left.min(self.wait);
+        let sum = if self.cubic.is_straight() {
+            self.fold_with(Cubic::straight, (count, last), sum, take)
         } else {
-            self.fold_with(Cubic::bent, most, sum, take)
+            self.fold_with(Cubic::bent, (count, last), sum, take)
         };
-        self.wait = self.wait.wrapping_sub(made);
-        (left.wrapping_sub(made), sum)
+        self.wait = self.wait.wrapping_sub(count);
+        (left.wrapping_sub(count), sum)
     }
 
-    /// The steps made, and the sum.
     #[inline(always)]
     fn fold_with<B>(
         &mut self,
         after: impl Fn(&Cubic<i64>, u64) -> Cubic<i64>,
-        most: u32,
+        (count, last): (u32, u64),
         mut sum: B,
         take: &mut impl FnMut(B, u64) -> B,
-    ) -> (u32, B) {
-        let (mut own, mut more) = (*self, most);
-        while more > 0 {
-            let Some(tick) = own.foresee(&after) else { break };
-            more = more.wrapping_sub(1);
-            sum = take(sum, tick);
+    ) -> B {
+        let mut own = *self;
+        for _ in 0..count {
+            sum = take(sum, if let Some(tick) = own.foresee(&after) { tick } else { own.search_apart(last) });
         }
         *self = own;
-        (most.wrapping_sub(more), sum)
+        sum
     }
 }

@@ -46,24 +46,23 @@ impl Run {
         Self { count, tick, part, first: interval, ..Self::NONE }
     }
 
-    /// The steps from the last one of a row to the next one, with the differences of the times there.
-    #[inline]
-    fn between(row: &Row, [now, more, third]: [i64; 3]) -> Self {
+    /// Sets it to 2^`doublings` steps from one that was due `late` before a tick, on the way of a [`Row`]; false if they change too
+    /// fast.
+    #[inline(always)]
+    fn along(&mut self, way: Way, doublings: u32, tick: u64, late: i64) -> bool {
+        // The same polynomial of steps: f i + s i² + t i³.
+        let (first, second) = (way.first >> doublings, way.second >> doublings.wrapping_mul(2));
+        let third = way.third >> doublings.wrapping_mul(3);
+        let Ok(sixth) = i32::try_from(third.wrapping_mul(6)) else { return false };
         // From the first moment on at which a step may be made, and the tick after it.
-        let time = row.late.wrapping_add(Self::BLUR).wrapping_neg();
-        let tick = row.tick.wrapping_add_signed((time >> 32).wrapping_add(1));
-        let doublings = row.doublings;
-        let count = 1_u32.wrapping_shl(doublings);
-        let second = (more >> doublings.wrapping_mul(2)).wrapping_add(third);
-        // All steps together take what is known: n f + n (n - 1) / 2 s + n (n - 1) (n - 2) / 6 t.
-        let pairs = count.wrapping_mul(count.wrapping_sub(1)) >> 1;
-        let triples = pairs.wrapping_mul(count.wrapping_sub(2)) / 3;
-        let rest = second.wrapping_mul(pairs.into()).wrapping_add(third.wrapping_mul(triples.into()));
-        let first = now.wrapping_sub(rest) >> doublings;
-        // As they were a step ago.
-        let second = second.wrapping_sub(third);
-        let first = first.wrapping_sub(second) as u64;
-        Self { count, tick, part: time as u32, first, second: second.wrapping_sub(third), third: third as i32 }
+        let time = late.wrapping_add(Self::BLUR).wrapping_neg();
+        self.count = 1_u32.wrapping_shl(doublings);
+        self.tick = tick.wrapping_add_signed((time >> 32).wrapping_add(1));
+        self.part = time as u32;
+        self.first = first.wrapping_sub(second).wrapping_add(third) as u64;
+        self.second = (second << 1).wrapping_sub(sixth.into());
+        self.third = sixth;
+        true
     }
 
     /// The next step, and whether its tick is certain; else it may be the tick after that. There has to be one.
@@ -78,14 +77,74 @@ impl Run {
     }
 }
 
-/// The exact position at a step, and the row of the times of steps in a regular spacing before it.
+/// Times of steps from one of them on: s spacings later it is `first` s + `second` s² + `third` s³ later, in 2^-32 ticks.
+#[derive(Debug, Clone, Copy)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+struct Way {
+    first: i64,
+    second: i64,
+    third: i64,
+}
+
+impl Way {
+    /// With half the spacing.
+    const fn half(self) -> Self {
+        Self { first: self.first >> 1, second: self.second >> 2, third: self.third >> 3 }
+    }
+
+    /// With twice the spacing.
+    const fn twice(self) -> Self {
+        Self { first: self.first << 1, second: self.second << 2, third: self.third << 3 }
+    }
+
+    /// The time at 1, and how fast it grows there.
+    #[inline]
+    const fn end(self) -> (i64, i64) {
+        let Self { first, second, third } = self;
+        let sum = first.wrapping_add(second).wrapping_add(third);
+        (sum, sum.wrapping_add(second).wrapping_add(third << 1))
+    }
+
+    /// The one that is `end` at 1 and grows by `fast` there, and the same from there on.
+    #[inline]
+    const fn between(first: i64, end: i64, fast: i64) -> (Self, Self) {
+        let third = first.wrapping_add(fast).wrapping_sub(end << 1);
+        let second = end.wrapping_sub(first).wrapping_sub(third);
+        let then = second.wrapping_add(third << 1).wrapping_add(third);
+        (Self { first, second, third }, Self { first: fast, second: then, third })
+    }
+
+    /// How much it bends, as [`Row`] says, in 2^-10 ticks and not too little; and 2^16 times `second` over `first`. `interval` is
+    /// that of the steps, `first` over 2^`doublings`.
+    #[inline(always)]
+    fn bend(&self, interval: i64, doublings: u32) -> (u32, i32) {
+        let size = self.second.unsigned_abs();
+        let (above, below) = (((size >> doublings) >> 15).wrapping_add(1), (interval >> 31) as u32);
+        let part = u32::try_from(above).unwrap_or(u32::MAX).checked_div(below).unwrap_or(u32::MAX).min(1 << 16);
+        let (second, third) = ((size >> 22) as u32, (self.third >> 22) as i32);
+        let square = (u64::from(second).wrapping_mul(part.into()) >> 16) as u32;
+        let other = (square << 1).wrapping_sub(third as u32) as i32;
+        let sum = square.saturating_add(other.unsigned_abs()).saturating_add(1);
+        let bend = u64::from(sum).wrapping_mul(part.wrapping_mul(5).into()) >> 16;
+        let turn = part as i32;
+        (u32::try_from(bend).unwrap_or(u32::MAX), if self.second < 0 { turn.wrapping_neg() } else { turn })
+    }
+}
+
+/// The exact position at a step, and how the times of the steps after it go on.
 ///
-/// The time of the step after the spacing is foreseen from three differences of that row; the position there gives it with
-/// 14 bits below the point of a tick. In between the times are those of the polynomial through the last four of the row. Its
-/// error is f h⁴ s (s + 1) (s + 2) (1 - s) / 24, with f the fourth derivative somewhere there, h the spacing and s from 0 to
-/// 1, less than f h⁴ / 24. What was foreseen wrongly is f h⁴ somewhere as near. Up to 1/8 of a tick of that is taken
-/// for good, twice in succession and while the intervals change by a sixteenth from one to the next: f then grows less than
-/// sixfold, and the error is below 1/32 of a tick. Otherwise the spacing is halved; it is doubled where there is room.
+/// The time of the step a spacing later is foreseen; the position there says when it is, and the speed how fast the times grow.
+/// In between they are those of the polynomial of third degree that agrees with times and growth at both ends.
+///
+/// How wrong is it? With p the position, the fourth derivative of the time by it is f = (10 p' p'' p''' - 15 p''³) / p'⁷, and the
+/// polynomial is wrong by f h⁴ s² (1 - s)² / 24, with f somewhere between, h the spacing and s from 0 to 1: by f h⁴ / 384 at most.
+/// The jerk p''' is constant, so the size of p'' is greatest at an end. There f, with its two terms taken as if they had the same
+/// sign, is greatest but for p', which changes by a sixteenth at most: (17/16)⁸ = 1.6 times. In the coefficients of the times,
+/// with a = |second| / first, f h⁴ / 24 so taken is the bend 5 a (a² + |2 a² - third / first|) first. So a tenth of the greater
+/// bend is the error. The coefficients at the end are known from the polynomial: `third` is wrong by twice 1.6 of the true bend,
+/// which makes the bend too small by 16 a of it at most. So bend + 16 a · 0.2 ticks is to be below 0.2 ticks. The error then is 0.02
+/// ticks, and 0.005 come from the growth at the ends: Newton's step leaves the square of what was foreseen wrongly, 12 times 1.6 of
+/// the bend, over `first`. Together that is below 1/32.
 #[derive(Debug, Clone, Copy)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub(super) struct Row {
@@ -96,53 +155,46 @@ pub(super) struct Row {
     late: i64,
     /// The spacing is 2^this steps.
     doublings: u32,
-    /// Differences of the times, in 2^-32 ticks.
-    differences: [i64; 3],
-    /// What was foreseen wrongly the last time.
-    missed: u32,
+    /// The times from here on.
+    way: Way,
+    /// Its bend, in 2^-10 ticks; and 2^16 times `second` over `first`.
+    bend: u32,
+    turn: i32,
+    /// Steps a unit: 2^43 over the high word of a step.
+    rate: u32,
     /// Steps of the last run that are not made, for the piece ends before them.
     beyond: u32,
 }
-
-/// 1/8 of a tick.
-const SMOOTH: u32 = 1 << 29;
-/// What a doubling makes [`SMOOTH`] of.
-const SMOOTHER: u32 = SMOOTH >> 4;
 
 impl Row {
     /// Steps of the least spacing.
     pub(super) const LEAST: u32 = 1 << Self::FEW;
     /// Doublings of the spacing, at least and at most.
-    const FEW: u32 = 3;
+    const FEW: u32 = 4;
     const MANY: u32 = 6;
-    /// Differences of more than this are none that can be used.
-    const WIDEST: u64 = 1 << 56;
-    /// Ticks of a spacing that can be doubled.
-    const LONG: u64 = 1 << 28;
+    /// The greatest bend, 0.2 ticks.
+    const SMOOTH: u32 = 205;
+    /// Intervals are below 2^20 ticks.
+    const LONG: u64 = 1 << 52;
 
     /// From the position at the tick of a step. With d the interval at the speed there and p = v x + h x² + j x³, a = h d / v
-    /// and b = j d² / v, the times are d (s - a s² + (2 a² - b) s³ - 5 a (a² - b) s⁴).
-    pub(super) fn new(cubic: Cubic<i64>, tick: u64) -> Self {
+    /// and b = j d² / v, the times are d (s - a s² + (2 a² - b) s³).
+    pub(super) fn new(cubic: Cubic<i64>, tick: u64, rate: u32) -> Self {
         let [step, v, h, j] = cubic.sizes();
-        let spacing = (step / v).scaled(Self::FEW as i32);
-        let per_v = spacing / v;
-        let (a, b) = (h * per_v, j * (per_v * spacing));
+        let first = (step / v).scaled(Self::FEW as i32);
+        let per_v = first / v;
+        let (a, b) = (h * per_v, j * (per_v * first));
         let (up, grows) = cubic.signs();
-        let fixed = |x: Real| x.to_fixed(32).min(Self::WIDEST) as i64;
-        let signed = |x: i64, up: bool| if up { x } else { x.wrapping_neg() };
-        let (square, bend) = (fixed(a.squared() * spacing), signed(fixed(b * spacing), grows));
-        let rest = square.wrapping_sub(bend);
-        let fourth = fixed(a * Real::fixed(rest.unsigned_abs(), 32)).wrapping_mul(5);
-        let fourth = signed(fourth, up != (rest >= 0));
-        let (first, second) = (fixed(spacing), signed(fixed(a * spacing), !up));
-        let third = rest.wrapping_add(square);
-        let times = |[a, b, c, d]: [i64; 4]| {
-            let low = first.wrapping_mul(a).wrapping_add(second.wrapping_mul(b));
-            low.wrapping_add(third.wrapping_mul(c)).wrapping_add(fourth.wrapping_mul(d))
+        let fixed = |x: Real| x.to_fixed(32).min(1 << 60) as i64;
+        let signed = |x: Real, up: bool| if up { fixed(x) } else { fixed(x).wrapping_neg() };
+        let way = Way {
+            first: fixed(first),
+            second: signed(a * first, !up),
+            third: fixed(a.squared().scaled(1) * first).wrapping_sub(signed(b * first, grows)),
         };
-        let differences = [times([1, -1, 1, -1]), times([0, 2, -6, 14]), times([0, 0, 6, -36])];
+        let (bend, turn) = way.bend(way.first >> Self::FEW, Self::FEW);
         let late = cubic.late().unwrap_or(0);
-        Self { cubic, tick, late, doublings: Self::FEW, differences, missed: SMOOTH, beyond: 0 }
+        Self { cubic, tick, late, doublings: Self::FEW, way, bend, turn, rate, beyond: 0 }
     }
 
     /// The position at the last step, and its tick.
@@ -150,40 +202,69 @@ impl Row {
         (self.cubic, self.tick)
     }
 
-    /// The next steps, up to `left` of them; `None` if they change too fast.
+    /// The interval of the steps, what the next one is longer than the last one, and what the step was due before its tick; in
+    /// 2^-32 ticks.
+    pub(super) const fn intervals(&self) -> [i64; 3] {
+        let change = self.way.second >> self.doublings.wrapping_mul(2).wrapping_sub(1);
+        [self.way.first >> self.doublings, change, self.late]
+    }
+
+    /// 2^43 over the high word of a step.
+    pub(super) const fn rate(&self) -> u32 {
+        self.rate
+    }
+
+    /// The next steps, up to `left` of them; none if they change too fast.
     #[inline(never)]
-    pub(super) fn run(&mut self, left: u32) -> Option<Run> {
+    pub(super) fn run(&mut self, left: u32, run: &mut Run) {
         loop {
-            let [first, second, third] = self.differences;
-            let ahead = first.wrapping_add(second).wrapping_add(third);
-            let by = (ahead.wrapping_sub(self.late).wrapping_add(1 << 31) >> 32) as u64;
-            let there = self.cubic.onward(by, self.doublings);
-            let Some(late) = there.late() else {
-                self.halve()?;
-                continue;
-            };
-            let now = ((by << 32) as i64).wrapping_add(self.late).wrapping_sub(late);
-            let more = now.wrapping_sub(first);
-            let bend = more.wrapping_sub(second);
-            let missed = saturated(bend.wrapping_sub(third));
-            let worst = missed.max(self.missed);
-            let (slope, steep) = (more.unsigned_abs(), now as u64 >> 4);
-            let third = bend >> self.doublings.wrapping_mul(3);
-            if worst > SMOOTH || slope > steep || third != i64::from(third as i32) {
-                self.halve()?;
-                continue;
+            if self.look(run) {
+                self.beyond = run.count.saturating_sub(left);
+                run.count = run.count.min(left);
+                return;
             }
-            let mut run = Run::between(self, [now, more, third]);
-            self.beyond = run.count.saturating_sub(left);
-            run.count = run.count.min(left);
-            (self.cubic, self.tick, self.late) = (there, self.tick.wrapping_add(by), late);
-            (self.differences, self.missed) = ([now, more, bend], missed);
-            let is_short = now as u64 >> 32 < Self::LONG;
-            if worst <= SMOOTHER && slope <= steep >> 1 && is_short && self.doublings < Self::MANY {
-                self.double();
+            if self.doublings == Self::FEW {
+                return;
             }
-            return Some(run);
+            self.halve();
         }
+    }
+
+    /// The steps of a spacing, and on to the last of them; false if they change too fast.
+    #[inline(always)]
+    fn look(&mut self, run: &mut Run) -> bool {
+        let (doublings, rate) = (self.doublings, i64::from(self.rate));
+        let (end, fast) = self.way.end();
+        let by = (end.wrapping_sub(self.late).wrapping_add(1 << 31) >> 32) as u64;
+        let cubic = self.cubic.onward(by, doublings);
+        let (faster, size) = cubic.change(&self.cubic);
+        let interval = fast >> doublings;
+        if faster > size >> 4 || !cubic.is_near() || interval as u64 >= Self::LONG {
+            return false;
+        }
+        // Newton's step to the interval at that speed.
+        let rough = interval.wrapping_add(1 << 24) >> 25;
+        let more = (cubic.rest(rough).wrapping_mul(rough) >> 16).wrapping_mul(rate) >> 9;
+        let interval = (rough << 25).wrapping_add(more);
+        let late = cubic.part(interval >> 20).wrapping_mul(rate) >> 7;
+        // At the time of the step, not at the tick.
+        let fast = (interval << doublings).wrapping_sub(late.wrapping_mul(self.turn.into()) >> 15);
+        let end = ((by << 32) as i64).wrapping_add(self.late).wrapping_sub(late);
+        let (passed, way) = Way::between(self.way.first, end, fast);
+        let (bend, turn) = way.bend(interval, doublings);
+        let doubt = turn.unsigned_abs().wrapping_mul(Self::SMOOTH) >> 12;
+        if bend.max(self.bend).saturating_add(doubt) > Self::SMOOTH
+            || !run.along(passed, doublings, self.tick, self.late)
+        {
+            return false;
+        }
+        self.cubic = cubic;
+        (self.tick, self.late) = (self.tick.wrapping_add(by), late);
+        (self.way, self.bend, self.turn) = (way, bend, turn);
+        if bend <= Self::SMOOTH >> 4 && faster <= size >> 5 && doublings < Self::MANY {
+            self.double();
+        }
+        true
     }
 
     /// The tick of a step of the last run that is made at `tick` or just after that; `left` is what is left of the run.
@@ -193,32 +274,17 @@ impl Row {
         tick.wrapping_add(early.into())
     }
 
-    /// Half the spacing; `None` at the least one.
-    fn halve(&mut self) -> Option<()> {
-        if self.doublings == Self::FEW {
-            return None;
-        }
-        let [first, second, third] = self.differences;
-        let third = third >> 3;
-        let second = (second >> 2).wrapping_add(third);
-        self.differences = [first.wrapping_add(second) >> 1, second, third];
-        self.missed >>= 4;
+    /// Half the spacing.
+    const fn halve(&mut self) {
+        (self.way, self.bend, self.turn) = (self.way.half(), self.bend >> 4, self.turn >> 1);
         self.doublings = self.doublings.wrapping_sub(1);
-        Some(())
     }
 
     /// Twice the spacing.
-    fn double(&mut self) {
-        let [first, second, third] = self.differences;
-        self.differences = [(first << 1).wrapping_sub(second), second.wrapping_sub(third) << 2, third << 3];
-        self.missed <<= 4;
+    const fn double(&mut self) {
+        (self.way, self.bend, self.turn) = (self.way.twice(), self.bend << 4, self.turn << 1);
         self.doublings = self.doublings.wrapping_add(1);
     }
-}
-
-/// The size, in as many bits as there are.
-fn saturated(size: i64) -> u32 {
-    u32::try_from(size.unsigned_abs()).unwrap_or(u32::MAX)
 }
 
 #[cfg(test)]

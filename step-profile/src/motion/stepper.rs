@@ -94,7 +94,7 @@ impl Stepper {
                 continue;
             }
             if let Mode::Fast(guess) = &mut self.rest.mode {
-                (self.rest.left, sum) = guess.fold(self.rest.left, sum, &mut take);
+                (self.rest.left, sum) = guess.fold(self.rest.left, self.rest.end, sum, &mut take);
             }
             let mut run = self.run;
             self.run.count = 0;
@@ -148,42 +148,50 @@ impl Rest {
         if self.left == 0 {
             return self.begin(curve, frame);
         }
-        let run = match &mut self.mode {
+        let mut run = Run::NONE;
+        match &mut self.mode {
             Mode::Cruise { interval, time } => {
                 // As many as there is room for; an interval beyond that has none.
                 let room = (*interval >> 32).leading_zeros().saturating_sub(65).min(Self::EVEN);
                 let count = self.left.min(1 << room);
-                let run = Run::even(count, (*time >> 64) as u64, (*time >> 32) as u32, (*interval >> 32) as u64);
+                run = Run::even(count, (*time >> 64) as u64, (*time >> 32) as u32, (*interval >> 32) as u64);
                 *time = time.wrapping_add(interval.wrapping_mul(count.into()));
-                if count == 1 { Run::at((*time >> 64) as u64) } else { run }
+                if count == 1 {
+                    run = Run::at((*time >> 64) as u64);
+                }
             }
-            Mode::Fast(guess) if self.left < Row::LEAST || !guess.is_slow() => Run::at(guess.step(self.end)),
-            Mode::Fast(_) | Mode::Slow(_) => self.row(),
+            Mode::Fast(guess) => match guess.single(self.left, self.end) {
+                Some(tick) => run = Run::at(tick),
+                None => self.row(&mut run),
+            },
+            Mode::Slow(_) => self.row(&mut run),
             Mode::Long { cubic, tick, interval, before } => {
                 let guess = interval.saturating_mul(2).saturating_sub(*before).max(*interval >> 1);
                 let last = self.end.saturating_sub(*tick);
                 let (by, there) = cubic.solve(guess.min(interval.saturating_mul(2)), last);
                 (*cubic, *tick, *interval, *before) = (there, tick.saturating_add(by), by, *interval);
-                Run::at(*tick)
+                run = Run::at(*tick);
             }
-        };
+        }
         self.left = self.left.saturating_sub(run.count);
         Some(run)
     }
 
     /// Several steps, if that can be; else one.
-    fn row(&mut self) -> Run {
+    fn row(&mut self, run: &mut Run) {
         if let Mode::Fast(guess) = &self.mode {
-            self.mode = Mode::Slow(Row::new(guess.cubic, guess.tick));
+            self.mode = Mode::Slow(Row::new(guess.cubic, guess.tick, guess.rate));
         }
         if let Mode::Slow(row) = &mut self.mode {
-            if let Some(run) = row.run(self.left) {
-                return run;
+            row.run(self.left, run);
+            if run.count > 0 {
+                return;
             }
-            let (cubic, tick) = row.place();
-            self.mode = Mode::Fast(Guess::new(cubic, tick, 16));
+            self.mode = Mode::Fast(Guess::after(row));
         }
-        if let Mode::Fast(guess) = &mut self.mode { Run::at(guess.step(self.end)) } else { Run::NONE }
+        if let Mode::Fast(guess) = &mut self.mode {
+            *run = Run::at(guess.step(self.end));
+        }
     }
 
     /// The tick of a step of the run, which is `tick` or the one after it; `left` is what is left of the run.
@@ -339,7 +347,7 @@ mod tests {
             ends in prop_oneof![Just([0.0; 2]), [0.0..1.0, 0.0..1.0]],
         ) {
             let n = if cfg!(miri) { n % 100 } else { n };
-            let clock = Clock::new(hz as u32).unwrap();
+            let clock = Clock::new((hz as u32).max(Clock::MIN_HZ)).unwrap();
             let v = (v as u32).min(clock.hz() / 2);
             let limits = Limits::new(v, a as u32).unwrap();
             let limits = if j == 0.0 { limits } else { limits.with_jerk(j as u64).unwrap() };
@@ -359,9 +367,8 @@ mod tests {
             got.clear();
             Stepper::new().fold(&curve, &frame, (), |(), tick| got.push(tick));
             prop_assert_eq!(got, ticks);
-            // A third is kept in hand.
             let error = error(&curve, &frame);
-            prop_assert!(error < 0.021, "{error}");
+            prop_assert!(error < 0.026, "{error}");
         }
     }
 }
