@@ -89,6 +89,9 @@ pub struct Transaction {
     echoed: u8,
     echo_fault: Option<u8>,
     until_ns: u64,
+    /// When the last field of the longest response is handed over at the latest: a line that does not fall silent is not
+    /// listened to any longer.
+    latest_ns: u64,
     end: Option<(Result<Exchange, Error>, u64)>,
 }
 
@@ -104,11 +107,15 @@ impl Transaction {
             echoed: 0,
             echo_fault: None,
             until_ns: 0,
+            latest_ns: 0,
             end: None,
         };
-        let first_field = transaction.request_end_ns().saturating_add(line.response_timeout_ns.into());
+        let wait_ns = u64::from(line.response_timeout_ns).saturating_add(line.hand_over_ns.into());
+        let waited_ns = transaction.request_end_ns().saturating_add(wait_ns);
+        let fields_ns = u64::from(line.field_timeout_ns).saturating_mul(Frame::MAX_FIELDS as u64);
         Self {
-            until_ns: first_field.saturating_add(transaction.fields_ns(1)).saturating_add(line.hand_over_ns.into()),
+            until_ns: waited_ns.saturating_add(transaction.fields_ns(1)),
+            latest_ns: waited_ns.saturating_add(fields_ns),
             ..transaction
         }
     }
@@ -152,7 +159,7 @@ impl Transaction {
         }
         if self.len > 0 {
             let patience = self.line.field_timeout_ns.saturating_add(self.line.hand_over_ns);
-            self.until_ns = end_ns.saturating_add(patience.into()).min(self.latest_ns());
+            self.until_ns = end_ns.saturating_add(patience.into()).min(self.latest_ns);
         }
         if self.len == self.expected() {
             self.finish(end_ns);
@@ -193,14 +200,6 @@ impl Transaction {
 
     fn fields_ns(&self, fields: u8) -> u64 {
         self.line.rate.fields_ns(fields).into()
-    }
-
-    /// When the last field of the longest response is handed over at the latest: a line that does not fall silent is not
-    /// listened to any longer.
-    fn latest_ns(&self) -> u64 {
-        let fields = u64::from(self.line.field_timeout_ns).saturating_mul(11);
-        let wait = u64::from(self.line.response_timeout_ns).saturating_add(self.line.hand_over_ns.into());
-        self.request_end_ns().saturating_add(wait).saturating_add(fields)
     }
 
     /// Fields of the response that begins with the first byte there is.
