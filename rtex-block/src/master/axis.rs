@@ -69,8 +69,11 @@ pub struct Axis {
     disobeys: bool,
     service: Service,
     outcome: Option<Progress<NonCyclicResponse>>,
+    /// The drive has not been seen to notice the end of the last request.
+    unreleased: bool,
     sub: SubService,
     sub_outcome: Option<Progress<SubResponse>>,
+    sub_unreleased: bool,
     profile: Option<ProfileMove>,
 }
 
@@ -106,8 +109,10 @@ impl Axis {
             disobeys: false,
             service: Service::Idle,
             outcome: None,
+            unreleased: true,
             sub: SubService::Idle,
             sub_outcome: None,
+            sub_unreleased: true,
             profile: None,
         }
     }

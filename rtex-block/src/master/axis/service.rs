@@ -74,6 +74,10 @@ const fn needs_servo_off(request: &NonCyclicCommand, unknown: bool) -> bool {
 impl Axis {
     /// Sends a non-cyclic command and holds it until it is answered; see [`take_outcome`](Self::take_outcome).
     ///
+    /// In between the normal command goes out, until its echo is seen or the time for an answer is over. Where the echo was not
+    /// seen, the drive may not have noticed that there is a new request: its answers do not count until it was, and the
+    /// request times out.
+    ///
     /// A homing type other than those that are confirmed may give the axis new coordinates. In CP the set-point would stay in
     /// the old ones, so with the servo on it is refused there; latches have [`ask_latch`](Self::ask_latch).
     ///
@@ -170,10 +174,12 @@ impl Axis {
             let _ = profile.receive(response);
         }
         let released = response.is_some_and(|r| r.code.noncyclic_bits() == 0);
+        self.unreleased &= !released;
+        let heard = response.filter(|_| !self.unreleased);
         match &mut self.service {
             Service::Idle => {}
             Service::Asking { handshake, .. } => {
-                let progress = handshake.receive(response);
+                let progress = handshake.receive(heard);
                 if !progress.is_pending() {
                     self.outcome = Some(progress);
                     self.service = Service::Releasing { left: self.config.limits.answer };
@@ -181,7 +187,10 @@ impl Axis {
             }
             Service::Releasing { left } => match left.checked_sub(1) {
                 Some(less) if !released => *left = less,
-                _ => self.service = Service::Idle,
+                _ => {
+                    self.unreleased = !released;
+                    self.service = Service::Idle;
+                }
             },
         }
     }
@@ -189,10 +198,12 @@ impl Axis {
     /// The sub-command; a drive that answers without sub block leaves it pending.
     pub(super) fn serve_sub(&mut self, response: Option<&SubResponse>) {
         let released = response.is_some_and(|r| r.code.get() == 0);
+        self.sub_unreleased &= !released;
+        let heard = response.filter(|_| !self.sub_unreleased);
         match &mut self.sub {
             SubService::Idle => {}
             SubService::Asking(handshake) => {
-                let progress = handshake.receive(response);
+                let progress = handshake.receive(heard);
                 if !progress.is_pending() {
                     self.sub_outcome = Some(progress);
                     self.sub = SubService::Releasing { left: self.config.limits.answer };
@@ -200,7 +211,10 @@ impl Axis {
             }
             SubService::Releasing { left } => match left.checked_sub(1) {
                 Some(less) if !released => *left = less,
-                _ => self.sub = SubService::Idle,
+                _ => {
+                    self.sub_unreleased = !released;
+                    self.sub = SubService::Idle;
+                }
             },
         }
     }
