@@ -28,6 +28,12 @@ impl ErrorCode {
     /// 0034h: feed-forward value out of range; the drive keeps the old one.
     pub const FEED_FORWARD: Self = Self(0x0034);
 
+    /// Whether the drive has thrown the whole block away and goes on with the one before: 0011h, 0012h, 0021h. Nothing in the
+    /// block was refused for what it asks. SX-DSV02310, "Command error".
+    pub const fn discards_block(self) -> bool {
+        matches!(self, Self::MAC_ID | Self::DIRECTION | Self::CYCLIC_CODE)
+    }
+
     /// What the number means; `None` if that is not confirmed.
     pub const fn meaning(self) -> Option<&'static str> {
         Some(match self {

@@ -12,7 +12,7 @@ mod common;
 
 use core::num::NonZeroU16;
 
-use common::{CODES, Pair, limits, monitor};
+use common::{CODES, Pair, limits, monitor, set_position};
 use rtex_block::device::{DriveConfig, Manners};
 use rtex_block::master::procedure::{Home, Latch, ReadText};
 use rtex_block::master::{
@@ -21,7 +21,7 @@ use rtex_block::master::{
 };
 use rtex_block::{
     Alarm, Command, CommandBlock, ControlBits, CyclicCode, ErrorCode, MacId, Nibble, NonCyclicCommand, Response,
-    Response32, StatusFlags, SubCode, TypeCode,
+    Response32, StatusFlags, SubCode, TypeCode, UpdateCounter,
 };
 
 fn mac_id() -> MacId {
@@ -135,6 +135,83 @@ fn a_sub_handshake_takes_its_own_answer_only() {
     assert_eq!(new().receive(Some(&answer([0x5a, 7, 3, 0]))), failed);
     let refused = Progress::Failed { error: Failure::CommandError(ErrorCode(0x31)) };
     assert_eq!(new().receive(Some(&answer([0x8a, 0, 0x31, 0]))), refused);
+}
+
+/// 0011h, 0012h and 0021h: the drive has thrown the block away and goes on with the one before, which asks for the same.
+/// That is no answer to what is asked: it may be under way, or done.
+#[test]
+fn a_block_that_was_thrown_away_refuses_nothing() {
+    for code in [0x11, 0x12, 0x21] {
+        let mut handshake = Handshake::new(mac_id(), CyclicCode::CyclicPosition, monitor(0x07), 5).unwrap();
+        assert_eq!(handshake.receive(Some(&answer(0xaa, 0, code, 0))), Progress::Pending { left: 4 });
+        assert!(matches!(handshake.receive(Some(&answer(0x2a, 0, 0x07, 0))), Progress::Done { .. }));
+        let mut profile = ProfileMove::new(mac_id(), 0x11, 50, 10, 5);
+        let _ = profile.receive(Some(&answer(0x10, 0, 0, 0)));
+        assert!(profile.receive(Some(&answer(0x97, 0x02, code, 0))).is_pending());
+        assert!(profile.receive(Some(&answer(0x17, 0x02, 0x11, 0))).is_pending());
+        assert!(profile.is_moving());
+    }
+    let mut sub = SubHandshake::new(SubCode::Monitor, 0x07, 3, 5).unwrap();
+    let mut block = [0; 32];
+    (block[0], block[1], block[16], block[18]) = (0x89, 0x20, 0x8a, 0x12);
+    assert_eq!(sub.receive(Some(&Response32::parse(&block).unwrap().sub)), Progress::Pending { left: 4 });
+}
+
+/// One flip in the address of any block while the position is being set: it is set once, and said to be.
+#[test]
+fn a_damaged_block_does_not_spoil_a_request() {
+    for damaged in 0..12 {
+        for bit in [0x01, 0x80] {
+            let mut pair = Pair::new(ActiveCode::CyclicPosition, Manners::POLITE);
+            pair.until("off", |pair| pair.axis.can_switch_on());
+            pair.axis.ask(set_position(0x21, 123_456)).unwrap();
+            let mut outcome = None;
+            for now in 0..40 {
+                pair.axis.receive(pair.sent, &pair.received);
+                pair.sent = pair.counter.next();
+                let mut main = pair.axis.send(pair.sent).main.emit();
+                main[0] ^= if now == damaged { bit } else { 0 };
+                pair.received = Response::parse_strict(&pair.drive.exchange(&main)).into();
+                outcome = outcome.or(pair.axis.take_outcome());
+            }
+            assert!(matches!(outcome, Some(Progress::Done { .. })), "{damaged} {bit:x}: {outcome:?}");
+            assert_eq!(pair.axis.actual_position(), 123_456);
+        }
+    }
+}
+
+/// Homing_Complete of the last homing, and a motion of something else that ends: neither is the end of this homing.
+#[test]
+fn homing_begins_when_nothing_moves() {
+    const COMPLETE: StatusFlags = StatusFlags::HOMING_COMPLETE;
+    const MOVES: StatusFlags = StatusFlags::IN_PROGRESS;
+    let config = AxisConfig::new(mac_id(), ActiveCode::ProfilePosition, 500_000, limits());
+    let mut axis = Axis::new(config);
+    let mut counter = UpdateCounter::ZERO;
+    let mut hear = |axis: &mut Axis, code: u8, status: StatusFlags, eight: u8| {
+        counter = counter.next();
+        let [low, high] = status.union(StatusFlags::SERVO_READY).bits().to_le_bytes();
+        let mut block = [0; 16];
+        (block[0], block[1], block[2], block[3], block[8]) = (0x89 | counter.get() << 5, code, low, high, eight);
+        axis.receive(Turn::Valid(counter), &Response::parse(&block).into());
+    };
+    hear(&mut axis, 0x10, COMPLETE.union(MOVES), 0);
+    let mut home = Home::new(0xc8, 50);
+    for _ in 0..5 {
+        hear(&mut axis, 0x10, COMPLETE.union(MOVES), 0);
+        assert!(home.receive(&mut axis).is_pending());
+        assert!(axis.can_ask(), "asked while something moves");
+    }
+    hear(&mut axis, 0x10, COMPLETE, 0);
+    assert!(home.receive(&mut axis).is_pending());
+    for _ in 0..5 {
+        hear(&mut axis, 0x14, COMPLETE, 0xc8);
+        assert!(home.receive(&mut axis).is_pending(), "done by the flag of the homing before");
+    }
+    hear(&mut axis, 0x14, MOVES, 0xc8);
+    assert!(home.receive(&mut axis).is_pending());
+    hear(&mut axis, 0x14, COMPLETE, 0xc8);
+    assert!(matches!(home.receive(&mut axis), Progress::Done { .. }));
 }
 
 #[test]

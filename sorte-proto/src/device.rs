@@ -342,7 +342,7 @@ impl Device {
             (State::Sync, Ok(line)) if master => Kind::Sync(SyncRewriter::new(line, self.is_last(), self.error)),
             _ => Kind::Plain(Plain::NEW),
         };
-        Passage::new(kind, self.path(port), idle_last)
+        Passage::new(kind, self.path(port), handler.state, idle_last)
     }
 
     const fn discovery(&self) -> Kind {
@@ -354,6 +354,11 @@ impl Device {
         let state = self.port(port).state;
         let path = passage.path().unwrap_or(Path::Absorb);
         let mut handled = Handled { path, result: Ok(()), trigger: Trigger::None, correction: Correction::None };
+        if state != passage.began_in() {
+            // The device has started again meanwhile.
+            handled.result = Err(Error::WrongState);
+            return handled;
+        }
         if matches!(state, State::Exchange | State::Diag | State::Error) {
             return handled;
         }
@@ -365,6 +370,10 @@ impl Device {
         let Ok(learnt) = learnt else { return handled };
         let head = passage.transit().head();
         handled.trigger = self.port_mut(port).head(head).trigger;
+        if self.port(port.other()).flags.contains(PortFlags::MASTER_PORT) {
+            // What a neighbour sends back without LAST.
+            self.port_mut(port).flags.remove(PortFlags::MASTER_PORT);
+        }
         let master = self.port(port).flags.contains(PortFlags::MASTER_PORT);
         if master && state.waits_for(head) {
             self.alive_ns = arrival.now_ns;

@@ -154,6 +154,12 @@ servowire_core::errors! {
             /// Its number in this phase, from 0.
             frame: u16,
         },
+        /// A start-up frame began before the request that it would answer: it is an answer to an earlier one.
+        #[error("the frame began {early_ns} ns before the request")]
+        BeforeRequest {
+            /// So much earlier.
+            early_ns: u32,
+        },
         /// DISCOVERY found fewer devices than asked for.
         #[error("{got} devices answered, {want} are needed")]
         TooFewDevices {

@@ -10,6 +10,7 @@
 //! ```
 
 mod action;
+mod answers;
 mod config;
 mod cycle;
 
@@ -18,16 +19,20 @@ pub use config::{Config, Counters, State};
 use cycle::Cycle;
 
 use crate::delay_req::DelayReq;
-use crate::discovery::{DiscoveryView, Network};
+use crate::discovery::Network;
 use crate::error::Error;
 use crate::exchange::{DeviceFrameView, write_master_frame};
-use crate::frame::LongFrame;
 use crate::frame_type::FrameType;
 use crate::line_delay::{LineDelay, SAMPLES};
-use crate::param::{Param, ParamView, Parameters};
+use crate::param::{Param, Parameters};
 use crate::status::Status;
-use crate::sync::{Sync, TRANSIT_NS};
-use crate::timing::{TRIGGER_NS, Timing};
+use crate::sync::Sync;
+use crate::timing::TRIGGER_NS;
+
+/// From the last SYNC frame to the first of the exchange: the devices' first cycle.
+const SYNC_TO_EXCHANGE_NS: u64 = 10_000;
+/// When the answer to the last SYNC frame is looked at first.
+const LOOK_NS: u64 = 5000;
 
 /// A master with one port.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -46,8 +51,10 @@ pub struct Master {
     /// PARAM: answers still needed, frames without one.
     remaining: u16,
     unanswered: u16,
-    /// LINE_DELAY: start of the request that is on its way.
-    asked_ns: Option<u64>,
+    /// Start of the start-up frame sent last.
+    sent_ns: u64,
+    /// PARAM, LINE_DELAY: its answer is still to come.
+    asking: bool,
     /// DISCOVERY, SYNC: the answer that is needed has come.
     answered: bool,
     /// SYNC: time stamp of the frame sent last.
@@ -77,6 +84,7 @@ impl Master {
                 format_errors: 0,
                 device_errors: 0,
                 retrains: 0,
+                skipped_cycles: 0,
             },
             network: Network::EMPTY,
             line: LineDelay::new(config.delay_model),
@@ -84,7 +92,8 @@ impl Master {
             next_ns: 0,
             remaining: 0,
             unanswered: 0,
-            asked_ns: None,
+            sent_ns: 0,
+            asking: false,
             answered: false,
             sync_stamp_ns: 0,
             epoch_ns: 0,
@@ -128,7 +137,7 @@ impl Master {
 
     /// The link is up or down. Losing it ends whatever is going on.
     pub fn link(&mut self, up: bool) {
-        if !up && self.state != State::Idle {
+        if !up && !matches!(self.state, State::Idle | State::Error) {
             self.fail(Error::LinkDown);
         }
         self.link = up;
@@ -167,8 +176,22 @@ impl Master {
         }
     }
 
-    /// What to do now. Call it again at once after anything but [`Action::Wait`].
+    /// What to do now. Call it again at once after anything but [`Action::Wait`], and when something has come.
+    ///
+    /// No time in an action has passed: a master that is asked too late leaves cycles out and stays in their raster. A
+    /// frame is handed out [`Config::lead_ns`] before its time.
     pub fn poll(&mut self, now_ns: u64) -> Action {
+        let lead_ns = u64::from(self.config.lead_ns);
+        match self.plan(now_ns.saturating_add(lead_ns)) {
+            Action::Wait { until_ns } if until_ns != u64::MAX => {
+                Action::Wait { until_ns: until_ns.saturating_sub(lead_ns) }
+            }
+            action => action,
+        }
+    }
+
+    /// What there is to do for a frame that can leave at `now_ns` or later.
+    fn plan(&mut self, now_ns: u64) -> Action {
         if let Some(error) = self.pending.take() {
             self.next_ns = now_ns.saturating_add(self.config.restart_pause_ns);
             return Action::Restart { error };
@@ -181,10 +204,8 @@ impl Master {
                 self.enter(State::Discovery, now_ns);
             }
         }
-        if self.state == State::LineDelay {
-            if let Some(asked) = self.asked_ns {
-                return self.await_reflection(asked, now_ns);
-            }
+        if self.state == State::LineDelay && self.asking {
+            return self.await_answer(now_ns, FrameType::DelayReq);
         }
         if now_ns < self.next_ns {
             return Action::Wait { until_ns: self.next_ns };
@@ -200,6 +221,14 @@ impl Master {
         }
     }
 
+    /// The request handed out last has begun at `sof_ns`, as the port has captured it. Round trips count from there; where
+    /// a port does not tell, they count from the time at which the request was to be triggered.
+    pub const fn sent(&mut self, sof_ns: u64) {
+        if matches!(self.state, State::LineDelay) && self.asking {
+            self.sent_ns = sof_ns;
+        }
+    }
+
     fn enter(&mut self, state: State, now_ns: u64) {
         self.state = state;
         self.frame = 0;
@@ -208,7 +237,7 @@ impl Master {
         match state {
             State::Discovery => self.network = Network::EMPTY,
             State::Param => (self.remaining, self.unanswered) = (self.config.param_frames, 0),
-            State::LineDelay => (self.line, self.asked_ns) = (LineDelay::new(self.config.delay_model), None),
+            State::LineDelay => (self.line, self.asking) = (LineDelay::new(self.config.delay_model), false),
             State::Sync => {
                 self.epoch_ns = now_ns;
                 self.next_ns = now_ns.saturating_add(TRIGGER_NS.into());
@@ -218,10 +247,11 @@ impl Master {
         }
     }
 
-    /// One start-up frame at `next_ns`, and the time of the one after it.
-    fn send(&mut self, frame: Outgoing, period_ns: u64) -> Action {
-        let at_ns = self.next_ns;
+    /// One start-up frame at `next_ns`, or now if that has passed, and the time of the one after it.
+    fn send(&mut self, now_ns: u64, frame: Outgoing, period_ns: u64) -> Action {
+        let at_ns = self.next_ns.max(now_ns);
         self.frame = self.frame.saturating_add(1);
+        (self.sent_ns, self.asking) = (at_ns, true);
         self.next_ns = at_ns.saturating_add(period_ns);
         Action::Send { at_ns, frame }
     }
@@ -234,7 +264,7 @@ impl Master {
         let frames = self.config.discovery_frames;
         if self.frame < frames {
             let last = self.is_last(frames);
-            return self.send(Outgoing::Discovery { last }, self.config.frame_period_ns);
+            return self.send(now_ns, Outgoing::Discovery { last }, self.config.frame_period_ns);
         }
         let (got, want) = (self.network.devices(), self.config.min_devices.max(1));
         if !self.answered {
@@ -244,7 +274,7 @@ impl Master {
         } else {
             self.enter(State::Param, now_ns);
         }
-        self.poll(now_ns)
+        self.plan(now_ns)
     }
 
     fn param(&mut self, now_ns: u64) -> Action {
@@ -253,11 +283,11 @@ impl Master {
         } else if self.unanswered < self.config.param_tries {
             self.unanswered = self.unanswered.saturating_add(1);
             let frame = Param::request(self.parameters(), self.remaining == 1);
-            return self.send(Outgoing::Param(frame), self.config.frame_period_ns);
+            return self.send(now_ns, Outgoing::Param(frame), self.config.frame_period_ns);
         } else {
             self.fail(Error::NoAnswer { sent: FrameType::Param, frame: self.frame.saturating_sub(1) });
         }
-        self.poll(now_ns)
+        self.plan(now_ns)
     }
 
     /// What the devices are told: with a long line, the period of the SYNC frames in ticks of 5 ns too.
@@ -269,43 +299,51 @@ impl Master {
     fn delay(&mut self, now_ns: u64) -> Action {
         if !self.line.is_complete() {
             let last = self.is_last(SAMPLES.into());
-            self.asked_ns = Some(self.next_ns);
-            return self.send(Outgoing::DelayReq(DelayReq::of_master(last)), self.config.frame_period_ns);
+            let request = Outgoing::DelayReq(DelayReq::of_master(last));
+            return self.send(now_ns, request, self.config.frame_period_ns);
         }
         match self.line.checked() {
             Ok(_) => self.enter(State::Sync, now_ns),
             Err(error) => self.fail(error),
         }
-        self.poll(now_ns)
+        self.plan(now_ns)
     }
 
-    fn await_reflection(&mut self, asked_ns: u64, now_ns: u64) -> Action {
-        let until_ns = asked_ns.saturating_add(self.config.answer_timeout_ns);
+    /// The frame sent last has so long for its answer.
+    fn await_answer(&mut self, now_ns: u64, sent: FrameType) -> Action {
+        let until_ns = self.sent_ns.saturating_add(self.config.answer_timeout_ns);
         if now_ns < until_ns {
             return Action::Wait { until_ns };
         }
-        self.fail(Error::NoAnswer { sent: FrameType::DelayReq, frame: self.frame.saturating_sub(1) });
-        self.poll(now_ns)
+        self.fail(Error::NoAnswer { sent, frame: self.frame.saturating_sub(1) });
+        self.plan(now_ns)
+    }
+
+    /// The first time of the raster of `period_ns` that has not passed; gives how many have.
+    fn catch_up(&mut self, now_ns: u64, period_ns: u32) -> u64 {
+        let period = u64::from(period_ns.max(1));
+        let late = now_ns.saturating_sub(self.next_ns).div_ceil(period);
+        self.next_ns = self.next_ns.saturating_add(late.saturating_mul(period));
+        late
     }
 
     fn sync(&mut self, now_ns: u64) -> Action {
         let frames = self.config.sync_frames;
-        let period = u64::from(self.config.sync_period_ns);
         if self.frame < frames {
-            let line = self.line.checked().unwrap_or_default();
-            let frame = Sync::of_master(self.time_ns(self.next_ns), line, self.is_last(frames));
+            self.catch_up(now_ns, self.config.sync_period_ns);
+            let (line, last) = (self.line.checked().unwrap_or_default(), self.is_last(frames));
+            let frame = Sync::of_master(self.time_ns(self.next_ns), line, last);
             self.sync_stamp_ns = frame.time_stamp_ns;
-            // Half a period after the last trigger the answers are looked at.
-            let gap = if self.is_last(frames) { period / 2 } else { period };
-            return self.send(Outgoing::Sync(frame), gap);
+            let gap = if last { LOOK_NS } else { self.config.sync_period_ns.into() };
+            return self.send(now_ns, Outgoing::Sync(frame), gap);
         }
-        if self.answered {
-            // The exchange goes on in the raster of the SYNC frames.
-            self.enter(State::Exchange, self.next_ns.saturating_add(period.saturating_sub(period / 2)));
-        } else {
-            self.fail(Error::NoAnswer { sent: FrameType::Sync, frame: frames.saturating_sub(1) });
+        if !self.answered {
+            // A long line takes longer.
+            return self.await_answer(now_ns, FrameType::Sync);
         }
-        self.poll(now_ns)
+        self.enter(State::Exchange, self.sent_ns.saturating_add(SYNC_TO_EXCHANGE_NS));
+        self.catch_up(now_ns, self.config.cycle_ns);
+        self.plan(now_ns)
     }
 
     /// The master's time, modulo 2^32.
@@ -318,13 +356,19 @@ impl Master {
         if let Err(error) = self.close_cycle() {
             self.give_up(error);
         }
-        self.stopping = self.stopping.map(|(error, left)| (error, left.saturating_sub(1)));
-        if let Some((error, 0)) = self.stopping {
-            self.fail(error);
+        match &mut self.stopping {
+            Some((error, 0)) => {
+                let error = *error;
+                self.fail(error);
+            }
+            Some((_, left)) => *left = left.saturating_sub(1),
+            None => {}
         }
         if self.state != State::Exchange {
-            return self.poll(now_ns);
+            return self.plan(now_ns);
         }
+        let skipped = self.catch_up(now_ns, self.config.cycle_ns);
+        self.counters.skipped_cycles = self.counters.skipped_cycles.saturating_add(skipped);
         let (at_ns, cycle) = (self.next_ns, self.counters.cycles);
         self.counters.cycles = cycle.saturating_add(1);
         self.next_ns = at_ns.saturating_add(self.config.cycle_ns.into());
@@ -374,86 +418,6 @@ impl Master {
             return Err(Error::OutputLength { got, want });
         }
         write_master_frame(output, time_stamp, into)
-    }
-
-    /// A start-up frame has come back; `sof_ns`: its start.
-    ///
-    /// # Errors
-    /// What the frame is refused for; [`Error::WrongState`] in IDLE and IO exchange. A bad DISCOVERY answer takes the
-    /// master back to IDLE, everything else just does not count as an answer.
-    pub fn receive(&mut self, frame: &[u8], sof_ns: u64) -> Result<(), Error> {
-        let result = match self.state {
-            State::Idle | State::Exchange | State::Error => return Err(Error::WrongState),
-            State::Discovery => self.discovery_answer(frame),
-            State::Param => ParamView::new(frame).map(|_| {
-                (self.remaining, self.unanswered) = (self.remaining.saturating_sub(1), 0);
-            }),
-            State::LineDelay => self.delay_answer(frame, sof_ns),
-            State::Sync => self.sync_answer(frame),
-        };
-        if let Err(error) = result {
-            self.count(error);
-            if self.state == State::Discovery
-                || matches!(error, Error::LineTooLong { .. } | Error::CycleTooShort { .. })
-            {
-                self.fail(error);
-            }
-        }
-        result
-    }
-
-    /// The vendor defines DELAY_RESP and sends the request back instead: a response tells nothing.
-    fn delay_answer(&mut self, frame: &[u8], sof_ns: u64) -> Result<(), Error> {
-        let frame = LongFrame::new(frame)?;
-        if frame.frame_type() == FrameType::DelayResp {
-            return Ok(());
-        }
-        DelayReq::of(frame)?;
-        if let Some(asked) = self.asked_ns.take() {
-            self.line.add(u32::try_from(sof_ns.saturating_sub(asked)).unwrap_or(u32::MAX));
-        }
-        Ok(())
-    }
-
-    /// Both times have grown by the same hops, so the answer tells how far the last device is.
-    fn sync_answer(&mut self, frame: &[u8]) -> Result<(), Error> {
-        let answer = Sync::parse(frame)?;
-        if !answer.status.contains(Status::LAST | Status::STATE_CHANGE) {
-            return Ok(());
-        }
-        let first = self.line.checked().unwrap_or_default();
-        let hops = answer.time_stamp_ns.wrapping_sub(self.sync_stamp_ns).saturating_sub(TRANSIT_NS.into());
-        let delay_ns = hops.saturating_add(first.into());
-        if delay_ns > u16::MAX.into() && !self.config.long_line {
-            return Err(Error::LineTooLong { delay_ns });
-        }
-        let devices = self.network.devices();
-        let hop = hops.checked_div(u32::from(devices).saturating_sub(1)).unwrap_or_default();
-        let cable = u16::try_from(hop.saturating_sub(TRANSIT_NS.into())).unwrap_or(u16::MAX);
-        let (line_delays_ns, payload_len) = ([first, cable], self.config.payload_len.into());
-        let line = Timing { line_delays_ns: &line_delays_ns, devices, output_len: self.output_len(), payload_len };
-        if let Some(misfit) = line.misfit(self.config.cycle_ns) {
-            return Err(Error::CycleTooShort { device: misfit.device, needs_ns: misfit.needs_ns });
-        }
-        self.answered = true;
-        Ok(())
-    }
-
-    fn discovery_answer(&mut self, frame: &[u8]) -> Result<(), Error> {
-        let answer = DiscoveryView::new(frame)?;
-        if answer.status().contains(Status::LAST) {
-            self.network.take(answer)?;
-            self.answered = true;
-        }
-        Ok(())
-    }
-
-    fn count(&mut self, error: Error) {
-        let counter = match error {
-            Error::BadFcs { .. } | Error::BadCrc8 { .. } => &mut self.counters.crc_errors,
-            _ => &mut self.counters.format_errors,
-        };
-        *counter = counter.saturating_add(1);
     }
 
     /// A device frame of the IO exchange has come. Its payload may be used only if this accepts it.

@@ -340,7 +340,7 @@ fn the_axes_may_come_to_rest_before_the_master_starts_again() {
             }
         }
         assert_eq!(error, Some(Error::TopologyChanged { address: 1 }));
-        assert_eq!(stopping, halt.unwrap_or(999));
+        assert_eq!(stopping, halt.unwrap_or(1000));
         line.now_ns += 30_000_000;
         line.wait(line.now_ns + 1);
     }

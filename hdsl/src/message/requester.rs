@@ -8,7 +8,11 @@ use crate::parameter::{EncoderSymbol, MasterSymbol};
 ///
 /// A short message goes before a long one, and may be sent while the long one waits for its answer; requests are
 /// never mixed nibble by nibble. A short message that is answered with SNAK or not at all is sent again, up to the
-/// limit of tries. A long one is not repeated: LNAK or a wrong CRC end it, and the application decides.
+/// limit of tries, a write too. A long one is not repeated: LNAK or a wrong CRC end it, and the application decides.
+///
+/// What began before the request was out is never its answer. An answer that comes after its request was given up
+/// ([`Error::NoAnswer`]) cannot be told from that of the next request of the same kind: [`reset`](Self::reset) makes the
+/// encoder forget it.
 ///
 /// In every H-frame [`transmit`](Self::transmit) gives the symbol to send and [`receive`](Self::receive) takes the
 /// symbol that came back.
@@ -86,6 +90,13 @@ pub struct Finished {
     pub short: Option<Result<ShortAnswer, Error>>,
     /// The long message. An answer by which the encoder refuses is an answer.
     pub long: Option<Result<LongAnswer, Error>>,
+}
+
+/// Whether a message began after the request was out, in the H-frame of its last nibble at the earliest. `frames`: since the
+/// IDLE after it. What began before answers an earlier request.
+fn is_answer(message: &Gathered, frames: u32) -> bool {
+    let nibbles = message.bytes.as_bytes().len().saturating_mul(2);
+    usize::try_from(frames).is_ok_and(|frames| frames.saturating_add(2) >= nibbles)
 }
 
 impl<T: Copy> Slot<T> {
@@ -248,7 +259,10 @@ impl Requester {
     }
 
     fn complete(&mut self, message: &Gathered, finished: &mut Finished) {
-        if let (true, Slot::Waiting { request, .. }) = (message.is_long(), self.long) {
+        if let (true, Slot::Waiting { request, frames, .. }) = (message.is_long(), self.long) {
+            if !is_answer(message, frames) {
+                return;
+            }
             self.long = Slot::Free;
             finished.long = Some(match message.covered() {
                 Some(covered) => {
@@ -257,7 +271,10 @@ impl Requester {
                 None => LongAnswer::parse(message.bytes.as_bytes()),
             });
         }
-        if let (false, Slot::Waiting { request, .. }) = (message.is_long(), self.short) {
+        if let (false, Slot::Waiting { request, frames, .. }) = (message.is_long(), self.short) {
+            if !is_answer(message, frames) {
+                return;
+            }
             // A wrong one is passed over: the time-out sends the request again.
             if let Some(Ok(answer)) = message.covered().map(|covered| request.answer_of_covered(covered)) {
                 self.short = Slot::Free;
@@ -408,6 +425,26 @@ mod tests {
         master.start_long(long()).unwrap();
         let (_, done) = talk(&mut master, &mut encoder, 40, |_, _| Some(EncoderSymbol::Idle));
         assert_eq!(done.long, Some(Err(Error::NoAnswer { tries: 1 })));
+    }
+
+    /// The answer to a request that was given up comes while the next one for the same register goes out: its data are older
+    /// than the request. Eight nibbles; the request has six and an IDLE.
+    #[test]
+    fn an_answer_that_began_before_its_request_was_out_is_none() {
+        let answer = ShortAnswer { register: RemoteRegister::SRSSI, data: Some(3) }.emit();
+        let nibbles: Vec<u8> = answer.as_bytes().iter().flat_map(|byte| [byte >> 4, byte & 15]).collect();
+        for (begins, taken) in [(0, false), (1, false), (4, false), (5, true), (6, true), (20, true)] {
+            let mut master = Requester::new(Limits::DEFAULT);
+            master.start_short(read(RemoteRegister::SRSSI)).unwrap();
+            let mut done = Finished::default();
+            for frame in 0..40_usize {
+                master.transmit();
+                let nibble = frame.checked_sub(begins).and_then(|at| nibbles.get(at)).copied();
+                let symbol = nibble.map_or(EncoderSymbol::Idle, |nibble| EncoderSymbol::Data(Nibble::truncate(nibble)));
+                done.short = done.short.or(master.receive(Some(symbol)).short);
+            }
+            assert_eq!(done.short.is_some(), taken, "{begins}");
+        }
     }
 
     #[test]

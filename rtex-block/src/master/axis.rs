@@ -285,7 +285,7 @@ impl Axis {
         }
     }
 
-    /// Counts CMD_Error, but for the answer to a request and to the start of a motion.
+    /// Counts CMD_Error, but for the refusal of a request or of the start of a motion.
     fn count_refusals(&mut self, response: Option<&Response>) {
         let Some(response) = response else { return };
         let NonCyclicResponse::CommandError(code) = response.noncyclic() else {
@@ -293,7 +293,7 @@ impl Axis {
             return;
         };
         let asked = self.service != Service::Idle || self.profile.is_some_and(|profile| !profile.is_moving());
-        if response.code.noncyclic_bits() == 0 || !asked {
+        if response.code.noncyclic_bits() == 0 || !asked || code.discards_block() {
             self.refused = self.refused.saturating_add(1);
             if self.refused >= self.config.limits.command_errors.get() {
                 self.stop(StopReason::CommandError(code));

@@ -13,6 +13,7 @@ use crate::type_code::TypeCode;
 ///  put code, type, index, data and hold them
 ///      each response:  C/R or MAC-ID wrong           discard
 ///                      code echo not this code       pending
+///                      CMD_Error, block discarded    pending: the drive goes on with the block before
 ///                      CMD_Error                     rejected
 ///                      echo of type, index or        pending: answer to an older request
 ///                        selections differs
@@ -92,6 +93,10 @@ impl Handshake {
     /// `None` while the answer is due.
     fn read(&self, response: NonCyclicResponse) -> Option<Progress<NonCyclicResponse>> {
         if let NonCyclicResponse::CommandError(code) = response {
+            // The request is in the next block again; it may be under way already.
+            if code.discards_block() {
+                return None;
+            }
             return Some(Progress::Failed { error: Failure::CommandError(code) });
         }
         let execution = response.execution().filter(|_| self.is_echo(&response))?;

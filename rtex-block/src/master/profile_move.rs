@@ -177,10 +177,14 @@ impl ProfileMove {
         }
     }
 
-    /// CMD_Error refuses the start. During the motion it is the damage of one frame: the drive moves on.
+    /// CMD_Error refuses the start, unless the drive has thrown the block away: the one before may have started the motion.
+    /// During the motion it is the damage of one frame: the drive moves on.
     fn refuse(&mut self, response: &Response) {
-        if let (MoveStage::Starting, NonCyclicResponse::CommandError(code)) = (self.stage, response.noncyclic()) {
-            self.fail(Failure::CommandError(code));
+        match (self.stage, response.noncyclic()) {
+            (MoveStage::Starting, NonCyclicResponse::CommandError(code)) if !code.discards_block() => {
+                self.fail(Failure::CommandError(code));
+            }
+            _ => {}
         }
     }
 

@@ -42,6 +42,9 @@ impl SubHandshake {
     /// `None` while the answer is due.
     fn read(&self, response: &SubResponse) -> Option<Progress<SubResponse>> {
         if let Some(code) = response.error_code() {
+            if code.discards_block() {
+                return None;
+            }
             return Some(Progress::Failed { error: Failure::CommandError(code) });
         }
         if response.type_code != self.command.type_code || response.index != self.command.index {

@@ -34,7 +34,7 @@ impl Line {
         record.exchange(at_ns, &sent, false);
 
         for node in &mut self.nodes {
-            node.enter(begin);
+            node.enter(begin, cycle_ns);
         }
         // What the devices tell in this cycle they knew before its master frame was there.
         self.answers(begin, cycle_ns, record);

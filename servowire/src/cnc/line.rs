@@ -1,8 +1,10 @@
 //! Master, cables and devices: the start-up, frame by frame.
 
+use std::collections::VecDeque;
+
 use sorte_proto::device::{self, Arrival, Device, Handled, Path, PortId, State, Trigger};
 use sorte_proto::master::{Action, Config, Master, Outgoing};
-use sorte_proto::timing::{CNC_CYCLE_NS, Timing};
+use sorte_proto::timing::{BYTE_NS, CNC_CYCLE_NS, Timing};
 use sorte_proto::{DelayModel, Discovery, Parameters, TRANSIT_NS};
 
 use super::axis::Build;
@@ -119,6 +121,8 @@ pub(super) struct Line {
     /// Lines for the user: what went wrong, and when; and how many there were.
     pub(super) events: Vec<String>,
     pub(super) event_count: u64,
+    /// Start-up frames on their way back: when they begin and end at the master.
+    returning: VecDeque<(f64, f64, Vec<u8>)>,
     /// A master frame as it is sent and as it travels.
     pub(super) buffers: [Vec<u8>; 2],
     pub(super) output: Vec<u8>,
@@ -154,6 +158,7 @@ impl Line {
             gap_ns: f64::INFINITY,
             events: Vec::new(),
             event_count: 0,
+            returning: VecDeque::new(),
             buffers: [Vec::new(), Vec::new()],
             output: Vec::new(),
             nodes,
@@ -208,6 +213,7 @@ impl Line {
     pub(super) fn step(&mut self, host: &mut Host, record: &mut Recorder) -> Option<Progress> {
         loop {
             match self.master.poll(self.now_ns) {
+                Action::Wait { until_ns } if self.hear(until_ns) => {}
                 Action::Wait { until_ns: u64::MAX } => return None,
                 Action::Wait { until_ns } => self.wait(until_ns),
                 Action::Send { at_ns, frame } => {
@@ -251,6 +257,19 @@ impl Line {
         }
     }
 
+    /// The next start-up frame that has come back by `until_ns`, if there is one.
+    fn hear(&mut self, until_ns: u64) -> bool {
+        let due = self.returning.front().is_some_and(|(_, end, _)| *end <= until_ns as f64);
+        if !due {
+            return false;
+        }
+        let Some((sof, end, answer)) = self.returning.pop_front() else { return false };
+        self.now_ns = self.now_ns.max(end as u64);
+        // What the master refuses, it counts.
+        let _: Result<_, _> = self.master.receive(&answer, sof as u64);
+        true
+    }
+
     fn start_up(&mut self, frame: Outgoing, at_ns: u64, record: &mut Recorder) {
         let kind = match frame {
             Outgoing::Discovery { .. } => 0,
@@ -268,9 +287,9 @@ impl Line {
         if let Some((answer, sof)) = self.carry(bytes, at_ns as f64) {
             let sof_ns = sof as u64;
             record.start_up(sof_ns, frame.preamble(), &answer, true);
-            let captured_ns = (sof + self.jitter()).max(at_ns as f64) as u64;
-            // What the master refuses, it counts.
-            let _: Result<_, _> = self.master.receive(&answer, captured_ns);
+            let captured = (sof + self.jitter()).max(at_ns as f64);
+            let end = sof + answer.len() as f64 * f64::from(BYTE_NS);
+            self.returning.push_back((captured, end, answer));
         }
     }
 

@@ -87,7 +87,7 @@ impl Node {
     }
 
     /// A cycle begins at `begin` of the master's time.
-    pub(super) fn enter(&mut self, begin: f64) {
+    pub(super) fn enter(&mut self, begin: f64, cycle_ns: u64) {
         if self.zero.is_some() || self.device.state() != State::Exchange {
             return;
         }
@@ -95,7 +95,10 @@ impl Node {
         // The counter has 32 bits; the time meant is the one nearby.
         let now = self.clock.at(begin);
         let ahead = first.wrapping_sub(now as i64 as u32) as i32;
-        let zero = now.floor() + f64::from(ahead);
+        let first = now.floor() + f64::from(ahead);
+        // On a long line the master waits for the answer to the last SYNC, and the device's first cycles pass without a frame.
+        let passed = ((now - first) / cycle_ns as f64).round().max(0.0);
+        let zero = first + passed * cycle_ns as f64;
         (self.zero, self.slot) = (Some((zero, begin)), slot.into());
         (self.cycle, self.incoming) = (0, None);
         self.axis.start();

@@ -1,6 +1,6 @@
 //! A start-up frame on its way through a device.
 
-use super::Path;
+use super::{Path, State};
 use crate::cut_through::{DiscoveryRewriter, SyncRewriter, Transit};
 use crate::discovery::Assignment;
 use crate::error::Error;
@@ -14,6 +14,8 @@ use crate::sync::Sync;
 pub struct Passage {
     kind: Kind,
     path: Path,
+    /// State of the port when the frame began.
+    began_in: State,
     /// A last device in IDLE sends back DISCOVERY and nothing else.
     only_discovery: bool,
 }
@@ -67,8 +69,12 @@ pub(super) enum Learnt {
 }
 
 impl Passage {
-    pub(super) const fn new(kind: Kind, path: Path, only_discovery: bool) -> Self {
-        Self { kind, path, only_discovery }
+    pub(super) const fn new(kind: Kind, path: Path, began_in: State, only_discovery: bool) -> Self {
+        Self { kind, path, began_in, only_discovery }
+    }
+
+    pub(super) const fn began_in(&self) -> State {
+        self.began_in
     }
 
     /// The byte to send for the byte received.

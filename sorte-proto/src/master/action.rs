@@ -65,14 +65,14 @@ pub enum Action {
     },
     /// Send a start-up frame.
     Send {
-        /// When it is triggered.
+        /// When it is triggered; not before the time of the poll.
         at_ns: u64,
         /// Which.
         frame: Outgoing,
     },
     /// Send the master frame of a cycle, see [`Master::write_frame`](super::Master::write_frame).
     Exchange {
-        /// When it is triggered.
+        /// When it is triggered; not before the time of the poll.
         at_ns: u64,
         /// Low 16 bits of the master's time then.
         time_stamp: u16,

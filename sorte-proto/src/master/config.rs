@@ -61,12 +61,15 @@ pub struct Config {
     pub sync_period_ns: u32,
     /// Period of the IO exchange in ns.
     pub cycle_ns: u32,
-    /// How long a delay request may take to come back, in ns.
+    /// How long a delay request and the last SYNC frame may take to come back, in ns.
     pub answer_timeout_ns: u64,
     /// PARAM frames in a row that may stay without an answer.
     pub param_tries: u16,
     /// Pause after a failure in ns, so that the devices' start-up states time out.
     pub restart_pause_ns: u64,
+    /// How long before its time a frame is handed out, in ns: what the port needs to take it, if it sends at a time by
+    /// itself. With 0 a frame is to be sent when it is handed out.
+    pub lead_ns: u32,
     /// Devices that DISCOVERY must find.
     pub min_devices: u8,
     /// Output bytes of the master frame at least; 16 keeps all axes in the same cycle whatever their number.
@@ -105,6 +108,7 @@ impl Config {
             answer_timeout_ns: 1_000_000,
             param_tries: 10,
             restart_pause_ns: 30_000_000,
+            lead_ns: 0,
             min_devices: 1,
             min_output_len: 16,
             payload_len: 3,
@@ -128,6 +132,7 @@ impl Config {
         with_answer_timeout_ns: answer_timeout_ns, u64;
         with_param_tries: param_tries, u16;
         with_restart_pause_ns: restart_pause_ns, u64;
+        with_lead_ns: lead_ns, u32;
         with_min_devices: min_devices, u8;
         with_min_output_len: min_output_len, u16;
         with_payload_len: payload_len, u8;
@@ -165,4 +170,6 @@ pub struct Counters {
     pub device_errors: u64,
     /// How often it went back to IDLE.
     pub retrains: u64,
+    /// Cycles of the IO exchange that were left out because [`Master::poll`](super::Master::poll) was called after their time.
+    pub skipped_cycles: u64,
 }

@@ -126,6 +126,10 @@ impl Home {
         let status = axis.status();
         let [complete, moves] =
             [StatusFlags::HOMING_COMPLETE, StatusFlags::IN_PROGRESS].map(|flag| status.contains(flag));
+        if moves && !self.ask.asked && !self.accepted {
+            // The end of another motion would look like that of this one.
+            return self.wait();
+        }
         self.fresh |= (self.ask.asked || self.accepted) && (moves || !complete);
         if !self.accepted {
             match self.ask.receive(axis, command(self.type_code, 0)) {
@@ -137,6 +141,10 @@ impl Home {
         if self.fresh && complete && !moves {
             return Progress::Done { value: () };
         }
+        self.wait()
+    }
+
+    const fn wait(&mut self) -> Progress<()> {
         match self.left.checked_sub(1) {
             Some(left) => {
                 self.left = left;
