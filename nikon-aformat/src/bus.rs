@@ -305,7 +305,7 @@ mod tests {
     #[test]
     fn missing_doubled_damaged_and_uncalled_for() {
         let mut bus = bus(Addresses::first(4));
-        let [a0, a1, a2, _, _, a5, ..] = EncoderAddress::ALL;
+        let [a0, a1, a2, _, _, a5, a6, _] = EncoderAddress::ALL;
         assert_eq!(bus.push(Ok(response(0, 1).emit())).outcome, Ok(response(0, 1)));
         assert!(bus.push(Ok(response(5, 2).emit())).extra);
         assert!(!bus.heard_all());
@@ -319,7 +319,7 @@ mod tests {
         assert!(!bus.heard_all());
         assert_eq!(bus.of(a0), Outcome::Duplicate { first: response(0, 1) });
         assert_eq!((bus.response(a0), bus.of(a1), bus.of(a2)), (None, Outcome::Missing, Outcome::Missing));
-        assert_eq!(bus.of(a5), Outcome::Extra(response(5, 2)));
+        assert_eq!((bus.of(a5), bus.of(a6)), (Outcome::Extra(response(5, 2)), Outcome::NotAsked));
         assert_eq!(bus.missing().bits(), 0b1110);
         assert_eq!((bus.duplicates().bits(), bus.extra().bits()), (1, 0b10_0000));
         assert_eq!((bus.arrived(), bus.damaged(), bus.not_started()), (4, 1, 0));

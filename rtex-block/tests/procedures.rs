@@ -139,6 +139,80 @@ fn what_has_ended_sends_nothing_more() {
     runs(ActiveCode::CyclicPosition, false, 0x26, |axis| restore.receive(axis, &list));
 }
 
+/// The line fails for longer than a request is waited for, just after a write was answered: the drive has not seen the request go,
+/// so to it the next one is the same still, and its old answer is none to the new one. Once it has seen the normal command, it
+/// is asked again.
+#[test]
+fn an_answer_is_not_taken_twice() {
+    let write = |data| {
+        let index = Pr { class: 7, number: 25 }.index();
+        NonCyclicCommand::Parameter(Arguments { type_code: TypeCode::short(0x11), index, data })
+    };
+    let silence = |pair: &mut Pair, received: Received, periods: u32| {
+        for _ in 0..periods {
+            pair.axis.receive(pair.sent, &received);
+            pair.sent = pair.counter.next();
+            let _ = pair.axis.send(pair.sent);
+        }
+    };
+    let mut pair = Pair::new(ActiveCode::CyclicPosition, Manners::POLITE);
+    pair.until("off", |pair| pair.axis.state() == AxisState::Off);
+    pair.axis.ask(write(1)).unwrap();
+    let old = loop {
+        let received = pair.received;
+        pair.update();
+        if pair.axis.take_outcome().is_some() {
+            break received;
+        }
+    };
+    silence(&mut pair, Received::Nothing, 100);
+    pair.axis.ask(write(0)).unwrap();
+    silence(&mut pair, old, 30);
+    assert_eq!(pair.axis.take_outcome(), None);
+    silence(&mut pair, old, 40);
+    assert_eq!(pair.axis.take_outcome(), Some(Progress::Failed { error: Failure::TimedOut }));
+    pair.axis.clear();
+    assert!(matches!(pair.ask(write(0)), Progress::Done { .. }));
+    // A controller that starts anew meets what it has asked before.
+    let mut pair = Pair::new(ActiveCode::CyclicPosition, Manners::POLITE);
+    pair.axis.ask(write(0)).unwrap();
+    silence(&mut pair, old, 40);
+    assert_eq!(pair.axis.take_outcome(), None);
+}
+
+/// The same of a sub-command.
+#[test]
+fn a_sub_answer_is_not_taken_twice() {
+    let silence = |pair: &mut Pair, received: Received, periods: u32| {
+        for _ in 0..periods {
+            pair.axis.receive(pair.sent, &received);
+            pair.sent = pair.counter.next();
+            let _ = pair.axis.send(pair.sent);
+        }
+    };
+    let mut pair = Pair::new(ActiveCode::CyclicPosition, Manners::POLITE);
+    pair.wide = true;
+    pair.until("off", |pair| pair.axis.state() == AxisState::Off);
+    pair.axis.ask_sub(SubCode::Monitor, 0x07, 0).unwrap();
+    let old = loop {
+        let received = pair.received;
+        pair.update();
+        if pair.axis.take_sub_outcome().is_some() {
+            break received;
+        }
+    };
+    silence(&mut pair, Received::Nothing, 100);
+    pair.axis.ask_sub(SubCode::Monitor, 0x07, 0).unwrap();
+    silence(&mut pair, old, 40);
+    assert_eq!(pair.axis.take_sub_outcome(), None);
+    silence(&mut pair, old, 40);
+    assert_eq!(pair.axis.take_sub_outcome(), Some(Progress::Failed { error: Failure::TimedOut }));
+    let mut pair = Pair::new(ActiveCode::CyclicPosition, Manners::POLITE);
+    pair.axis.ask_sub(SubCode::Monitor, 0x07, 0).unwrap();
+    silence(&mut pair, old, 40);
+    assert_eq!(pair.axis.take_sub_outcome(), None);
+}
+
 /// The latch counts once it is complete; what was caught before it was armed does not.
 #[test]
 fn latch_positions() {

@@ -73,6 +73,7 @@ pub struct Axis {
     outcome: Option<Progress<NonCyclicResponse>>,
     sub: SubService,
     sub_outcome: Option<Progress<SubResponse>>,
+    sub_unreleased: bool,
     profile: Option<ProfileMove>,
 }
 
@@ -107,10 +108,11 @@ impl Axis {
             active_off: 0,
             disobeys: false,
             service: Service::Idle,
-            unreleased: false,
             outcome: None,
+            unreleased: true,
             sub: SubService::Idle,
             sub_outcome: None,
+            sub_unreleased: true,
             profile: None,
         }
     }
