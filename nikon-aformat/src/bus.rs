@@ -21,6 +21,8 @@
 //! assert_eq!(bus.of(second), Outcome::Missing);
 //! ```
 
+use core::fmt;
+
 use nrz_line::BitOrder;
 
 use crate::error::Error;
@@ -29,9 +31,8 @@ use crate::number::EncoderAddress;
 use crate::raw_response::RawResponse;
 use crate::response::Response;
 
-/// A set of encoder addresses.
+/// A set of encoder addresses. It prints as they are: `0 2 7`, `-` for none.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "arbitrary", derive(arbitrary::Arbitrary))]
 pub struct Addresses(u8);
@@ -102,9 +103,20 @@ impl Addresses {
     }
 }
 
+impl fmt::Display for Addresses {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        const DIGITS: [&str; 8] = ["0", "1", "2", "3", "4", "5", "6", "7"];
+        let asked = DIGITS.into_iter().enumerate().filter(|(ea, _)| self.0 >> ea & 1 == 1);
+        servowire_core::write_names(f, asked.map(|(_, digit)| digit))
+    }
+}
+
+servowire_core::format_as_displayed!(Addresses);
+
 /// What came from one address.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum Outcome {
     /// Nothing good, and nothing was asked for.
     NotAsked,
@@ -124,6 +136,7 @@ pub enum Outcome {
 /// What was made of one response.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Arrival {
     /// The response, all checks passed, or why it was refused.
     pub outcome: Result<Response, Error>,
@@ -263,6 +276,7 @@ mod tests {
     use crate::status::EncoderStatus;
     use proptest::prelude::*;
     use servowire_core::U24;
+    use std::string::ToString;
 
     const COMMAND: Command = Command::Abs24LowMt;
 
@@ -283,6 +297,8 @@ mod tests {
             (7, Addresses::ALL, Addresses::ALL)
         );
         assert_eq!(Addresses::first(3).with(EncoderAddress::truncate(1)), Addresses::first(3));
+        assert_eq!(Addresses::from_bits(0b1000_0101).to_string(), "0 2 7");
+        assert_eq!(Addresses::NONE.to_string(), "-");
         assert_eq!((Addresses::NONE.highest(), Addresses::first(5).highest()), (None, EncoderAddress::new(4)));
     }
 

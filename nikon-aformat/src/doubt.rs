@@ -5,33 +5,40 @@ use crate::resolution::{Position, Resolution};
 use crate::response::{Body, Response};
 use crate::status::{Alm, EncoderStatus};
 
-/// Why a position must not be used.
+/// Why a position must not be used. The raw fields of the response stay readable.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]
 pub enum Doubt {
     /// Status bits are set that are not tolerated. With [`EncoderStatus::BUSY`] the position is being determined.
-    #[error("the encoder shows {0}")]
-    Status(EncoderStatus),
+    #[error("the encoder shows {es}")]
+    Status {
+        /// Those bits.
+        es: EncoderStatus,
+    },
     /// The one status bit of commands 21 and 22 is set; which of the four it stands for is not told.
     #[error("the encoder shows that something is wrong")]
     AnyStatus,
     /// Alarms are set that are not tolerated.
-    #[error("the encoder shows {0}")]
-    Alarms(Alm),
+    #[error("the encoder shows {alarms}")]
+    Alarms {
+        /// Those alarms.
+        alarms: Alm,
+    },
     /// The response carries no position, only its upper bits, or less than a turn of this encoder.
     #[error("the response carries no whole turn")]
-    NoPosition,
+    Absent,
     /// Bits are set above the widths of the encoder: another encoder, or a wrong [`Resolution`].
     #[error("bits are set above bit {width}, which this encoder leaves 0")]
     UpperBits {
         /// Single-turn and turn bits together.
         width: u8,
     },
-    /// The position was sampled too long ago.
+    /// The position was sampled too long ago, or by a clock that was set back in the meantime.
     #[error("the position is {age_ns} ns old")]
     Old {
-        /// Its age, in ns.
+        /// How far the instant of sampling is away, in ns.
         age_ns: u64,
     },
 }
@@ -40,8 +47,9 @@ pub enum Doubt {
 ///
 /// An encoder whose turns are not used may show [`EncoderStatus::BATT`]; everything else means that the position may be wrong
 /// or that something is about to fail.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Policy {
     status: EncoderStatus,
     alarms: Alm,
@@ -51,6 +59,9 @@ pub struct Policy {
 impl Policy {
     /// Nothing is tolerated, any age.
     pub const STRICT: Self = Self { status: EncoderStatus::empty(), alarms: Alm::empty(), max_age_ns: u64::MAX };
+
+    /// As one drive does where turns are not used: an encoder without its battery shows BATT.
+    pub const SINGLE_TURN: Self = Self::STRICT.tolerating(EncoderStatus::BATT).tolerating_alarms(Alm::BATT);
 
     /// In spite of these status bits too.
     pub const fn tolerating(self, status: EncoderStatus) -> Self {
@@ -97,7 +108,7 @@ impl Resolution {
     /// // an encoder without its battery
     /// let shown = EncoderStatus::BATT | EncoderStatus::ERROR;
     /// let resolution = Resolution::new(17, 16).unwrap_or_default();
-    /// assert_eq!(resolution.read(&response, Policy::STRICT), Err(Doubt::Status(shown)));
+    /// assert_eq!(resolution.read(&response, Policy::STRICT), Err(Doubt::Status { es: shown }));
     /// let position = resolution.read(&response, Policy::STRICT.tolerating(shown));
     /// assert_eq!(position.map(|position| position.single_turn), Ok(86_639));
     /// # Ok::<(), nikon_aformat::Error>(())
@@ -109,17 +120,17 @@ impl Resolution {
         match response.body {
             Body::Abs17 { es_any: true, .. } if !policy.status.is_all() => return Err(Doubt::AnyStatus),
             Body::Full { es, .. } if !policy.status.contains(es) => {
-                return Err(Doubt::Status(es.difference(policy.status)));
+                return Err(Doubt::Status { es: es.difference(policy.status) });
             }
             _ => {}
         }
         if let Some(alm) = response.alm().filter(|alm| !policy.alarms.contains(*alm)) {
-            return Err(Doubt::Alarms(alm.difference(policy.alarms)));
+            return Err(Doubt::Alarms { alarms: alm.difference(policy.alarms) });
         }
         match self.position(response) {
             Ok(position) => Ok(position),
             Err(Error::UpperBits { width }) => Err(Doubt::UpperBits { width }),
-            Err(_) => Err(Doubt::NoPosition),
+            Err(_) => Err(Doubt::Absent),
         }
     }
 }
@@ -146,7 +157,7 @@ mod tests {
         for bits in 0..16 {
             let es = EncoderStatus::from_bits_truncate(bits);
             let whole = response(Command::Abs40, es, Data::Abs40 { abs });
-            let want = if es.is_empty() { Ok(5) } else { Err(Doubt::Status(es)) };
+            let want = if es.is_empty() { Ok(5) } else { Err(Doubt::Status { es }) };
             assert_eq!(twenty.read(&whole, Policy::STRICT).map(|p| p.single_turn), want);
             assert_eq!(twenty.read(&whole, Policy::STRICT.tolerating(es)).map(|p| p.single_turn), Ok(5));
         }
@@ -156,8 +167,20 @@ mod tests {
                 EncoderStatus::empty(),
                 Data::Abs24Status { abs: U24::truncate(5), alm },
             );
-            assert_eq!(twenty.read(&low, Policy::STRICT), Err(Doubt::Alarms(alm)));
+            assert_eq!(twenty.read(&low, Policy::STRICT), Err(Doubt::Alarms { alarms: alm }));
             assert!(twenty.read(&low, Policy::STRICT.tolerating_alarms(alm)).is_ok());
+        }
+    }
+
+    /// The drive whose policy this is lives with BATT where it does not count turns, and with nothing else.
+    #[test]
+    fn an_encoder_without_its_battery_turns_all_the_same() {
+        let twenty = Resolution::new(20, 0).unwrap();
+        let abs = U24::truncate(5);
+        for alm in Alm::all().iter() {
+            let es = EncoderStatus::of_alarms(alm);
+            let low = response(Command::Abs24Status, es, Data::Abs24Status { abs, alm });
+            assert_eq!(twenty.read(&low, Policy::SINGLE_TURN).is_ok(), alm == Alm::BATT, "{alm}");
         }
     }
 
@@ -169,7 +192,7 @@ mod tests {
         let status = Data::Status { alm: Alm::empty(), pm_alm: PmAlm::empty() };
         let short = Response::abs17(EA, none, U17::truncate(5));
         for other in [upper, response(Command::Status, none, status), short] {
-            assert_eq!(twenty.read(&other, Policy::STRICT), Err(Doubt::NoPosition));
+            assert_eq!(twenty.read(&other, Policy::STRICT), Err(Doubt::Absent));
         }
         let seventeen = Resolution::new(17, 16).unwrap();
         assert_eq!(seventeen.read(&short, Policy::STRICT).map(|p| p.single_turn), Ok(5));

@@ -145,9 +145,9 @@ servowire_core::errors! {
             /// Good responses in succession so far.
             done: u8,
         },
-        /// Whether a command that cannot be undone took effect is not known: the response to its last request did not come.
-        /// Find out before it is repeated.
-        #[error("the response to a command that cannot be undone is missing: it may have been done")]
+        /// Whether a command that cannot be undone took effect is not known: the response to its last request did not come,
+        /// or the encoder reports that it could not be stored. Find out before it is repeated.
+        #[error("whether a command that cannot be undone was done is not known")]
         EffectUnknown,
         /// What was written is not what is read back.
         #[error("what was written is not what is read back")]

@@ -45,19 +45,20 @@ fn word(command: Command, es: u8, address: u8, data: u16) -> Result<Response, Er
     said(EA, command, es, Data::Eeprom { data, address })
 }
 
-/// STATUS until it is answered by this encoder and ES0 is clear, a millisecond apart, ten times at the most; then the reset.
+/// STATUS until it is answered by this encoder and ES0 is clear, a millisecond apart, forty times at the most: an access
+/// lasts 30 ms. Then the reset.
 #[test]
 fn a_reset_begins_when_the_encoder_is_idle() {
     let mut guarded = GuardedReset::new(Reset::clear_status(EA));
     let ask = |not_before_ns| send(EA, Operation::Status, not_before_ns);
     for (refused, error) in [
         (LOST, Error::NoResponse),
-        (status(EA, 1, Alm::empty()), Error::Busy { tries: 10 }),
+        (status(EA, 1, Alm::empty()), Error::Busy { tries: 40 }),
         (status(ea(4), 0, Alm::empty()), Error::NotCarried),
         (reset(Command::ClearStatus), Error::NotCarried),
     ] {
         assert_eq!(guarded.start(7), ask(7));
-        for k in 1..10 {
+        for k in 1..40 {
             assert_eq!(guarded.receive(refused, 100 * k), ask(100 * k + MS));
         }
         assert_eq!(guarded.receive(refused, 5), Step::Failed { error, ready_ns: 5 + MS });

@@ -4,9 +4,11 @@
 
 use core::fmt::Debug;
 
+use nikon_aformat::bus::{Arrival, Outcome};
+use nikon_aformat::master::{Reading, Sampled};
 use nikon_aformat::{
-    Alm, EncoderAddress, EncoderId, EncoderStatus, Operation, PmAlm, Request, RequestFrame, Resolution, Temperature,
-    U10, U17, U19, U24, U40, UserAddress, Version,
+    Alm, Doubt, EncoderAddress, EncoderId, EncoderStatus, Error, Operation, PmAlm, Policy, Request, RequestFrame,
+    Resolution, Response, Temperature, U10, U17, U19, U24, U40, UserAddress, Version,
 };
 use serde::Serialize;
 use serde::de::DeserializeOwned;
@@ -80,4 +82,25 @@ fn requests() {
     assert_eq!(serde_json::from_str::<Request>(&text).unwrap(), write);
     assert!(serde_json::from_str::<Request>(&text.replace("239", "240")).is_err());
     assert!(serde_json::from_str::<Request>(&text.replace("\"ea\":7", "\"ea\":8")).is_err());
+}
+
+/// What a master gives, and by what it is judged, come back as they were.
+#[test]
+fn readings_and_doubts() {
+    let es = EncoderStatus::BATT;
+    let response = Response::abs17(EncoderAddress::MAX, es, U17::truncate(77));
+    let reading = Reading { response, sampled: Sampled { earliest_ns: 7_200, latest_ns: 10_000 } };
+    assert_eq!(reading.to_string(), "from 7: ABS17 ES any ABS 0x0004d, sampled from 7200 to 10000 ns");
+    round_trip(reading);
+    round_trip(Outcome::Duplicate { first: response });
+    round_trip(Arrival { outcome: Err(Error::Crc { got: 1, want: 2 }), duplicate: false, extra: true });
+    for doubt in [Doubt::Status { es }, Doubt::AnyStatus, Doubt::Alarms { alarms: Alm::BATT }, Doubt::Absent] {
+        round_trip(doubt);
+    }
+    round_trip(Policy::SINGLE_TURN.with_max_age_ns(125_000));
+}
+
+fn round_trip<T: Serialize + DeserializeOwned + PartialEq + Debug + Copy>(value: T) {
+    let text = serde_json::to_string(&value).unwrap();
+    assert_eq!(serde_json::from_str::<T>(&text).unwrap(), value, "{text}");
 }

@@ -14,7 +14,7 @@ mod common;
 use common::{CODES, Pair, limits, monitor, set_position};
 use rtex_block::device::{DriveConfig, Manners};
 use rtex_block::master::procedure::{Backup, Caught, Home, Latch, ReadText, Restore, SetPosition};
-use rtex_block::master::{ActiveCode, AskError, AxisConfig, AxisState, Failure, Progress, Received};
+use rtex_block::master::{ActiveCode, AskError, Axis, AxisConfig, AxisState, Failure, Progress, Received};
 use rtex_block::{
     Arguments, ErrorCode, LatchFlags, MacId, Nibble, NonCyclicCommand, NonCyclicResponse, Pr, ProfileFlags, Response,
     Response32, SubCode, TypeCode,
@@ -94,6 +94,123 @@ fn positions_are_set_once_and_read_back() {
         // APOS.
         assert_eq!((ended, blocks, read), (want, 1, 0x07));
     }
+}
+
+/// A caller that goes on to call after the end: it stays as it was, and the command is not sent again, though the axis is free
+/// for it. The answers to it never come; a position that was set is read back.
+#[test]
+fn what_has_ended_sends_nothing_more() {
+    fn runs<T: PartialEq + Copy + core::fmt::Debug>(
+        mode: ActiveCode,
+        on: bool,
+        code: u8,
+        mut receive: impl FnMut(&mut Axis) -> Progress<T>,
+    ) {
+        let config = AxisConfig::new(MacId::new(9).unwrap(), mode, 500_000, limits());
+        let mut pair = Pair::with(config, DriveConfig::new(MacId::new(9).unwrap(), CODES));
+        pair.until("off", |pair| pair.axis.state() == AxisState::Off);
+        if on {
+            assert!(pair.axis.switch_on());
+            pair.until("on", |pair| pair.axis.state() == AxisState::On);
+        }
+        let (mut sent, mut last, mut end) = (0, 0, None);
+        for _ in 0..2_000 {
+            pair.update();
+            let response = *pair.received.response().unwrap();
+            sent += u32::from(response.code.get() == code && last != code);
+            last = response.code.get();
+            if last == code {
+                let mut block = response.emit();
+                block[8] ^= 1;
+                pair.received = Response::parse(&block).into();
+            }
+            let progress = receive(&mut pair.axis);
+            end = end.or(Some(progress).filter(|progress| !progress.is_pending()));
+            assert_eq!(end.unwrap_or(progress), progress);
+        }
+        assert!(end.is_some() && sent == 1, "{code:#x}: {end:?} after {sent} commands");
+    }
+    let mut home = Home::new(0xc8, 5);
+    runs(ActiveCode::ProfilePosition, true, 0x14, |axis| home.receive(axis));
+    let mut set = SetPosition::actual(77_777);
+    runs(ActiveCode::CyclicPosition, false, 0x24, |axis| set.receive(axis));
+    let mut restore = Restore::new(CODES.parameter_read);
+    let list = [(Pr { class: 7, number: 25 }, 1)];
+    runs(ActiveCode::CyclicPosition, false, 0x26, |axis| restore.receive(axis, &list));
+}
+
+/// The line fails for longer than a request is waited for, just after a write was answered: the drive has not seen the request go,
+/// so to it the next one is the same still, and its old answer is none to the new one. Once it has seen the normal command, it
+/// is asked again.
+#[test]
+fn an_answer_is_not_taken_twice() {
+    let write = |data| {
+        let index = Pr { class: 7, number: 25 }.index();
+        NonCyclicCommand::Parameter(Arguments { type_code: TypeCode::short(0x11), index, data })
+    };
+    let silence = |pair: &mut Pair, received: Received, periods: u32| {
+        for _ in 0..periods {
+            pair.axis.receive(pair.sent, &received);
+            pair.sent = pair.counter.next();
+            let _ = pair.axis.send(pair.sent);
+        }
+    };
+    let mut pair = Pair::new(ActiveCode::CyclicPosition, Manners::POLITE);
+    pair.until("off", |pair| pair.axis.state() == AxisState::Off);
+    pair.axis.ask(write(1)).unwrap();
+    let old = loop {
+        let received = pair.received;
+        pair.update();
+        if pair.axis.take_outcome().is_some() {
+            break received;
+        }
+    };
+    silence(&mut pair, Received::Nothing, 100);
+    pair.axis.ask(write(0)).unwrap();
+    silence(&mut pair, old, 30);
+    assert_eq!(pair.axis.take_outcome(), None);
+    silence(&mut pair, old, 40);
+    assert_eq!(pair.axis.take_outcome(), Some(Progress::Failed { error: Failure::TimedOut }));
+    pair.axis.clear();
+    assert!(matches!(pair.ask(write(0)), Progress::Done { .. }));
+    // A controller that starts anew meets what it has asked before.
+    let mut pair = Pair::new(ActiveCode::CyclicPosition, Manners::POLITE);
+    pair.axis.ask(write(0)).unwrap();
+    silence(&mut pair, old, 40);
+    assert_eq!(pair.axis.take_outcome(), None);
+}
+
+/// The same of a sub-command.
+#[test]
+fn a_sub_answer_is_not_taken_twice() {
+    let silence = |pair: &mut Pair, received: Received, periods: u32| {
+        for _ in 0..periods {
+            pair.axis.receive(pair.sent, &received);
+            pair.sent = pair.counter.next();
+            let _ = pair.axis.send(pair.sent);
+        }
+    };
+    let mut pair = Pair::new(ActiveCode::CyclicPosition, Manners::POLITE);
+    pair.wide = true;
+    pair.until("off", |pair| pair.axis.state() == AxisState::Off);
+    pair.axis.ask_sub(SubCode::Monitor, 0x07, 0).unwrap();
+    let old = loop {
+        let received = pair.received;
+        pair.update();
+        if pair.axis.take_sub_outcome().is_some() {
+            break received;
+        }
+    };
+    silence(&mut pair, Received::Nothing, 100);
+    pair.axis.ask_sub(SubCode::Monitor, 0x07, 0).unwrap();
+    silence(&mut pair, old, 40);
+    assert_eq!(pair.axis.take_sub_outcome(), None);
+    silence(&mut pair, old, 40);
+    assert_eq!(pair.axis.take_sub_outcome(), Some(Progress::Failed { error: Failure::TimedOut }));
+    let mut pair = Pair::new(ActiveCode::CyclicPosition, Manners::POLITE);
+    pair.axis.ask_sub(SubCode::Monitor, 0x07, 0).unwrap();
+    silence(&mut pair, old, 40);
+    assert_eq!(pair.axis.take_sub_outcome(), None);
 }
 
 /// The latch counts once it is complete; what was caught before it was armed does not.

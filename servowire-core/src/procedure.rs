@@ -58,6 +58,13 @@ pub enum Step<R, T, E> {
     },
 }
 
+impl<R, T, E> Step<R, T, E> {
+    /// Whether the procedure has ended, done or failed: there is nothing to send.
+    pub const fn has_ended(&self) -> bool {
+        !matches!(self, Self::Send { .. })
+    }
+}
+
 /// How often something that is busy is asked, and how many times at the most.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]

@@ -24,9 +24,9 @@ pub enum State {
     Idle,
     /// 01: the request is sent.
     TransmitData,
-    /// 10: the request is out, the answer has not begun.
+    /// 10: the request is out, the response has not begun.
     WaitForStart,
-    /// 11: the answer is received.
+    /// 11: the response is received.
     ReceiveData,
 }
 
@@ -41,7 +41,7 @@ impl State {
         }
     }
 
-    /// State bit s1: the answer is waited for or received.
+    /// State bit s1: the response is waited for or received.
     pub const fn s1(self) -> bool {
         matches!(self, Self::WaitForStart | Self::ReceiveData)
     }
@@ -156,7 +156,7 @@ pub struct Tile {
 
 impl Tile {
     /// `divider` is d, half a bit in CLB cycles; `tx_clocks` is 1 + 10 a field of the request, `rx_clocks` is 10 a
-    /// field of the answer.
+    /// field of the response.
     pub const fn new(divider: u16, tx_clocks: u16, rx_clocks: u16) -> Self {
         Self {
             divider,

@@ -52,17 +52,17 @@ pub enum Fault {
     None,
     /// It does not answer.
     Silent,
-    /// Bit `at` of the answer's line bits is inverted; nothing happens if the answer is shorter.
+    /// Bit `at` of the response's line bits is inverted; nothing happens if the response is shorter.
     FlipBit {
         /// Index, 0..=109.
         at: u8,
     },
-    /// The answer ends after this many fields.
+    /// The response ends after this many fields.
     CutAfter {
         /// Fields that are sent, 1 or more.
         fields: u8,
     },
-    /// The answer's check field is inverted.
+    /// The response's check field is inverted.
     BadCrc,
     /// Every request is taken for a damaged one.
     RejectAll,
@@ -205,7 +205,7 @@ impl<const PAGES: usize> Device<PAGES> {
         &mut self.eeprom
     }
 
-    /// A byte was received without framing error, its delimiter at `now_ns`. Gives the answer once a request is
+    /// A byte was received without framing error, its delimiter at `now_ns`. Gives the response once a request is
     /// complete.
     pub fn byte(&mut self, byte: u8, now_ns: u64) -> Option<Transmission> {
         if self.is_deaf(now_ns) {
@@ -391,7 +391,7 @@ impl<const PAGES: usize> Device<PAGES> {
         Memory { adf: Adf::of(address, busy), edf }
     }
 
-    /// The answer as it leaves, with the fault that is switched on.
+    /// The response as it leaves, with the fault that is switched on.
     fn transmission(&self, response: Response, now_ns: u64) -> Option<Transmission> {
         let sound = response.emit();
         let line = sound.line();

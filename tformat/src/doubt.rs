@@ -19,7 +19,7 @@ pub enum Doubt {
         /// The status.
         sf: StatusField,
     },
-    /// The encoder says that the request was damaged (CA0, CA1): it may be an answer to something else.
+    /// The encoder says that the request was damaged (CA0, CA1): it may be a response to something else.
     #[error("the request was damaged: [{sf}]")]
     RequestDamaged {
         /// The status.
@@ -31,7 +31,8 @@ pub enum Doubt {
         /// Those alarms.
         alarms: Almc,
     },
-    /// EA0 or EA1 of a response without ALMC: some alarm that is not tolerated. ID 3 says which.
+    /// EA0 or EA1 of a response without ALMC: some alarm that is not tolerated. ID 3 says which. In a response to ID 3: one
+    /// that ALMC does not tell.
     #[error("the encoder reports errors: status [{sf}]")]
     Status {
         /// The status.
@@ -54,10 +55,11 @@ pub enum Doubt {
         /// Those of its bits that must be 0.
         excess: u32,
     },
-    /// The position was sampled too long ago; from [`Exchange`](crate::master::Exchange), which knows when.
+    /// The position was sampled too long ago, or by a clock that was set back in the meantime; from
+    /// [`Exchange`](crate::master::Exchange), which knows when.
     #[error("the position is {age_ns} ns old")]
     Old {
-        /// Its age, in ns.
+        /// How far the instant of sampling is away, in ns.
         age_ns: u64,
     },
 }
@@ -81,17 +83,17 @@ impl Default for Policy {
 }
 
 impl Policy {
-    /// No alarm is tolerated.
-    pub const STRICT: Self = Self::tolerating(Almc::empty());
+    /// No alarm is tolerated, any age.
+    pub const STRICT: Self = Self { tolerated: Almc::empty(), max_age_ns: u64::MAX };
     /// As one drive does that counts turns: an overflow of the turns is ignored, a low battery is a warning.
-    pub const MULTI_TURN: Self = Self::tolerating(Almc::OF.union(Almc::BA));
+    pub const MULTI_TURN: Self = Self::STRICT.tolerating(Almc::OF.union(Almc::BA));
     /// As the same drive does where turns are not used: what concerns the turns and the battery is ignored.
     pub const SINGLE_TURN: Self =
-        Self::tolerating(Almc::OF.union(Almc::BA).union(Almc::BE).union(Almc::ME).union(Almc::OS));
+        Self::STRICT.tolerating(Almc::OF.union(Almc::BA).union(Almc::BE).union(Almc::ME).union(Almc::OS));
 
-    /// A policy that tolerates these alarms, at any age.
-    pub const fn tolerating(tolerated: Almc) -> Self {
-        Self { tolerated, max_age_ns: u64::MAX }
+    /// In spite of these alarms too.
+    pub const fn tolerating(self, alarms: Almc) -> Self {
+        Self { tolerated: self.tolerated.union(alarms), ..self }
     }
 
     /// Only up to this age, in ns from the instant of sampling.
@@ -171,6 +173,10 @@ impl Resolution {
             if !alarms.is_empty() {
                 return Err(Doubt::Alarms { alarms });
             }
+            // EA0 and EA1 without the alarm that they stand for: one of the two bytes is wrong.
+            if let Err(doubt) = policy.summary(sf.difference(StatusField::of_alarms(data.almc))) {
+                return Err(doubt);
+            }
             if let Some(hint) = Self::from_enid(data.enid) {
                 if self.checks_upper_bits() && hint.resolution.abs_bits() != self.abs_bits() {
                     return Err(Doubt::OtherEncoder { enid: data.enid, abs_bits: self.abs_bits() });
@@ -228,7 +234,8 @@ mod tests {
     /// Each alarm is a doubt unless the policy tolerates it, in ID 3 and, as far as SF tells, elsewhere.
     #[test]
     fn alarms() {
-        for policy in [Policy::STRICT, Policy::MULTI_TURN, Policy::SINGLE_TURN, Policy::tolerating(Almc::all())] {
+        for policy in [Policy::STRICT, Policy::MULTI_TURN, Policy::SINGLE_TURN, Policy::STRICT.tolerating(Almc::all())]
+        {
             for bits in 0..=255 {
                 let almc = Almc::from_bits_retain(bits);
                 let sf = StatusField::of_alarms(almc).bits();
@@ -243,6 +250,16 @@ mod tests {
         // The drive whose policy this is: OF ignored, BA a warning; without turns BA, BE, ME and OS ignored too.
         assert_eq!((Policy::MULTI_TURN.tolerated.bits(), Policy::SINGLE_TURN.tolerated.bits()), (0x88, 0xe9));
         assert_eq!(Policy::default(), Policy::STRICT);
+    }
+
+    /// SF tells of an alarm that ALMC does not show: an encoder that leaves SF at 0 does not, damage does.
+    #[test]
+    fn a_status_without_its_alarm_is_a_doubt() {
+        for (sf, almc, doubtful) in [(0x10, 0, true), (0x20, 0x04, true), (0x10, 0x80, true), (0, 0x84, false)] {
+            let any = Policy::STRICT.tolerating(Almc::from_bits_retain(almc));
+            let want = doubtful.then_some(Doubt::Status { sf: StatusField::from_bits_retain(sf) });
+            assert_eq!(R23.read(&Response::ReadAll(all(sf, almc)), any).err(), want, "{sf:#x} {almc:#x}");
+        }
     }
 
     #[test]

@@ -55,13 +55,13 @@ pub enum Cause {
     },
     /// Bits are packed most significant first and were read least significant first, or the other way round.
     WrongBitOrder,
-    /// The own request came back, and an answer after it.
+    /// The own request came back, and a response after it.
     OwnEcho,
     /// Only the own request came back: no encoder, or A and B are exchanged on a half-duplex line.
     OnlyEcho,
     /// The line was sampled twice a bit: the real rate is half of the assumed one.
     HalfRate,
-    /// A sound answer to another data ID.
+    /// A sound response to another data ID.
     OtherDataId {
         /// What was answered.
         answered: DataId,
@@ -112,20 +112,20 @@ pub struct Report {
     pub error: Option<Error>,
     /// The most likely cause of it.
     pub cause: Option<Cause>,
-    /// The answer, as it is if nothing is wrong, or as it would be without the cause. For showing to a person only.
+    /// The response, as it is if nothing is wrong, or as it would be without the cause. For showing to a person only.
     pub response: Option<Response>,
-    /// Whether SF and ALMC of an ID 3 answer contradict each other. Compatible encoders leave SF at 0.
+    /// Whether SF and ALMC of an ID 3 response contradict each other. Compatible encoders leave SF at 0.
     pub status_contradicts_alarms: bool,
 }
 
 impl Report {
-    /// The whole fields of the line on its grid, at most as many as the answer has.
+    /// The whole fields of the line on its grid, at most as many as the response has.
     pub fn fields(&self) -> &[RawField] {
         self.fields.get(..usize::from(self.len)).unwrap_or(&self.fields)
     }
 }
 
-/// Looks at line bits that should hold the answer to `request`.
+/// Looks at line bits that should hold the response to `request`.
 pub fn inspect(request: Request, line: Window) -> Report {
     let outcome = Response::parse_line(request, line);
     let (cause, response) = match outcome {
@@ -146,12 +146,12 @@ pub fn inspect(request: Request, line: Window) -> Report {
     report
 }
 
-/// Looks at UART bytes that should hold the answer to `request`.
+/// Looks at UART bytes that should hold the response to `request`.
 pub fn inspect_bytes(request: Request, bytes: &[u8]) -> Report {
     let end = bytes.len().min(Frame::MAX_FIELDS);
     let line = bytes.get(..end).and_then(Frame::new).map_or(Window::EMPTY, Frame::line);
     let mut report = inspect(request, line);
-    // An echo in front pushes the end of the answer out of the eleven fields.
+    // An echo in front pushes the end of the response out of the eleven fields.
     if let Ok(response) = parse_echoed(request, bytes) {
         report.cause = Some(Cause::OwnEcho);
         report.response = Some(response);
@@ -163,7 +163,7 @@ fn contradicts(response: Option<Response>) -> bool {
     matches!(response, Some(Response::ReadAll(full)) if !full.sf.agrees_with(full.almc))
 }
 
-/// Undoes the usual mistakes one by one; the first that gives a sound answer is the cause.
+/// Undoes the usual mistakes one by one; the first that gives a sound response is the cause.
 fn diagnose(request: Request, line: Window, error: Error) -> (Option<Cause>, Option<Response>) {
     let all_ones = line.inverted().bits() == 0;
     match error {
@@ -205,7 +205,7 @@ fn echo(request: Request, line: Window) -> Option<Window> {
     let sent = request.emit().line();
     let rest = line.skip(sent.len())?;
     let same = (line.bits() ^ sent.bits()) & !u128::MAX.wrapping_shl(sent.len()) == 0;
-    // The turn-round is idle line; the first 0 is the start bit of the answer.
+    // The turn-round is idle line; the first 0 is the start bit of the response.
     let turn_round = (!rest.bits()).trailing_zeros();
     if same { rest.skip(turn_round) } else { None }
 }
@@ -236,7 +236,7 @@ fn shifted(request: Request, line: Window) -> Option<(i8, Response)> {
     Response::parse_line(request, early).ok().map(|response| (-1, response))
 }
 
-/// A sound answer to something else.
+/// A sound response to something else.
 fn other_data_id(request: Request, line: Window) -> Option<(DataId, Response)> {
     let cf = Frame::from_line(line, 1).ok()?;
     let answered = ControlField::parse(*cf.as_bytes().first()?).ok()?.data_id().ok()?;
@@ -339,7 +339,7 @@ mod tests {
         fn echoes_are_found((request, response) in exchanges()) {
             let (sent, line) = (request.emit().line(), response.emit().line());
             let only = inspect(request, idle_after(sent, line.len().max(sent.len() + 10)));
-            // The echo of a write to the EEPROM is what its answer looks like.
+            // The echo of a write to the EEPROM is what its response looks like.
             if request.data_id() != DataId::WriteEeprom {
                 prop_assert_eq!(only.cause, Some(Cause::OnlyEcho));
                 let bytes = [request.emit().as_bytes(), response.emit().as_bytes()].concat();

@@ -15,7 +15,7 @@
 //!
 //! // The receiver is on all the time: the UART hears the request and, 3 us later, the six fields of the response.
 //! let progress = transaction.bytes(&[0x02], 4_000);
-//! assert_eq!(progress, Progress::Pending { until_ns: 23_599 });
+//! assert_eq!(progress, Progress::Pending { until_ns: 23_600 });
 //! // The response comes in a DMA block whose last byte ended at 31 us.
 //! let progress = transaction.bytes(&[0x02, 0x20, 0xb4, 0xbd, 0x1c, 0x37], 31_000);
 //! let Progress::Done { value, ready_ns: 31_000 } = progress else { panic!("{progress:?}") };

@@ -56,9 +56,9 @@ impl Request {
         Self::WriteEeprom { adf: Adf::of(address, false), edf }
     }
 
-    /// A request that an answer would fit, from the answer itself: for tools that did not see the request.
+    /// A request that a response would fit, from the response itself: for tools that did not see the request.
     ///
-    /// An EEPROM answer repeats address and data; fields that are missing count as 0.
+    /// An EEPROM response repeats address and data; fields that are missing count as 0.
     ///
     /// # Errors
     /// Those of the control field: [`Error::Truncated`] without any field, [`Error::SinkCode`], [`Error::Parity`],

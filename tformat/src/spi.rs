@@ -9,10 +9,10 @@ use crate::frame::Frame;
 use crate::request::Request;
 use crate::response::Response;
 
-/// The word that idles the transmitter while an answer is received: ten idle bits.
+/// The word that idles the transmitter while a response is received: ten idle bits.
 pub const SPI10_IDLE: u16 = 0x3ff;
 
-/// Most 16-bit words of a transaction that count: a refused EEPROM write, 48 bits and an 11-field answer.
+/// Most 16-bit words of a transaction that count: a refused EEPROM write, 48 bits and an 11-field response.
 pub const SPI16_MAX_WORDS: usize = 10;
 
 /// The fields of a frame as 10-bit SPI words.
@@ -29,7 +29,7 @@ pub fn spi10_words(frame: &Frame) -> impl Iterator<Item = u16> {
     frame.as_bytes().iter().map(|byte| 0x200 | u16::from(byte.reverse_bits()))
 }
 
-/// Decodes the answer to `request` from 10-bit SPI words, without the idle words received during the request.
+/// Decodes the response to `request` from 10-bit SPI words, without the idle words received during the request.
 ///
 /// # Errors
 /// [`Error::StartBit`] and [`Error::Delimiter`] by bits 8 and 9 of the words (the delimiter of the last field is not
@@ -58,10 +58,10 @@ pub fn parse_spi10(request: Request, words: &[u16]) -> Result<Response, Error> {
 /// The transmitted bit stream of a whole transaction in 16-bit words.
 ///
 /// ```text
-///  1 idle bit | request, 10 bits a field | 7 idle bits | idle while the answer comes ...
+///  1 idle bit | request, 10 bits a field | 7 idle bits | idle while the response comes ...
 /// ```
 ///
-/// Gives the words that the request and its answer need, filled with idle bits.
+/// Gives the words that the request and its response need, filled with idle bits.
 pub fn spi16_words(request: Request) -> impl Iterator<Item = u16> {
     let line = request.emit().line();
     let idle = u128::MAX << line.len();
@@ -116,7 +116,7 @@ fn spi16_line(request: Request, words: &[u16]) -> Window {
 
 const MAX_RESPONSE_BITS: u32 = 110;
 
-/// Bit of the 16-bit stream at which the answer begins.
+/// Bit of the 16-bit stream at which the response begins.
 const fn response_start(request: Request) -> u32 {
     (request.data_id().request_fields() as u32).saturating_mul(10).saturating_add(8)
 }

@@ -45,7 +45,7 @@ servowire_core::show_flags!(StatusField);
 impl StatusField {
     /// What the encoder says of a damaged request.
     ///
-    /// After a request for ID 3 one of them is the only sign of the damage: the answer to a damaged request is an ID 3
+    /// After a request for ID 3 one of them is the only sign of the damage: the response to a damaged request is an ID 3
     /// frame too.
     pub const REQUEST_DAMAGED: Self = Self::CA0.union(Self::CA1);
 

@@ -31,7 +31,7 @@ where
     finish(input, Request::parse(input), |request| request.data_id().request_fields())
 }
 
-/// Takes the answer to `request` off the front.
+/// Takes the response to `request` off the front.
 ///
 /// ```
 /// use nom::Parser;
@@ -75,7 +75,7 @@ mod tests {
     use proptest::prelude::*;
 
     proptest! {
-        /// However the bytes are split, the answer comes when its last byte is there, and not before.
+        /// However the bytes are split, the response comes when its last byte is there, and not before.
         #[test]
         fn any_split((asked, answer) in exchanges(), cut in 0..12usize) {
             let frame = answer.emit();

@@ -16,7 +16,7 @@ crate::show::one_line!(BitRate {
     Self::Mbit5 => "5 Mbit/s";
 });
 
-/// Nominal time from the end of a request to the start bit of the answer.
+/// Nominal time from the end of a request to the start bit of the response.
 ///
 /// Not in TIDM-1011; 3 us in the notes of one driver, 3.2 us in the log of another.
 pub const RESPONSE_DELAY_NS: u32 = 3_000;
@@ -46,7 +46,7 @@ impl BitRate {
         self.bit_ns().wrapping_mul(10).wrapping_mul(fields as u32)
     }
 
-    /// Request, [`RESPONSE_DELAY_NS`] and answer in ns, without the cable (5 ns a metre each way).
+    /// Request, [`RESPONSE_DELAY_NS`] and response in ns, without the cable (5 ns a metre each way).
     pub const fn transaction_ns(self, id: DataId) -> u32 {
         self.fields_ns(id.request_fields())
             .wrapping_add(RESPONSE_DELAY_NS)

@@ -120,8 +120,8 @@ impl<'a> Simulated<'a> {
                 Step::Send { request, not_before_ns } => {
                     let outcome = self.transact(request, not_before_ns);
                     step = access.receive(outcome, self.now_ns);
-                    // Two writes with their read-backs, each pair with its own tries.
-                    assert!(self.requests <= 4 * u32::from(polling.max_tries.max(1)) + 4);
+                    // Page, write and read-back with tries of their own, and a look at the page after each lost response.
+                    assert!(self.requests <= 6 * u32::from(polling.max_tries.max(1)) + 6);
                 }
                 Step::Done { value, .. } => return Ok(value),
                 Step::Failed { error, .. } => return Err(error),

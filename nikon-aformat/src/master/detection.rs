@@ -13,17 +13,21 @@ use crate::type_word::TypeWord;
 /// The bit rate is part of the encoder's order code and has to be tried out by the caller: no response means another rate.
 /// One drive maker tries 4 Mbit/s first, then 2.5.
 ///
+/// After its supply has been switched on an encoder needs [`POWER_UP_NS`](crate::POWER_UP_NS) before the first request.
+///
 /// On a line with several encoders ask each by its address with [`Detection::of`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Detection {
     ea: Option<EncoderAddress>,
     reading: Option<EepromRead>,
+    end: Option<Step<Detected>>,
 }
 
 /// An encoder that was found.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Detected {
     /// Its address.
     pub ea: EncoderAddress,
@@ -37,17 +41,18 @@ pub struct Detected {
 impl Detection {
     /// Finds the only encoder on the line, whatever its address.
     pub const fn search() -> Self {
-        Self { ea: None, reading: None }
+        Self { ea: None, reading: None, end: None }
     }
 
     /// Asks the encoder with this address.
     pub const fn of(ea: EncoderAddress) -> Self {
-        Self { ea: Some(ea), reading: None }
+        Self { ea: Some(ea), reading: None, end: None }
     }
 
     /// The first request, at once: command 4 to the highest address, which any encoder answers, or the type word.
     pub const fn start(&mut self, now_ns: u64) -> Step<Detected> {
         self.reading = None;
+        self.end = None;
         match self.ea {
             Some(ea) => self.read(ea, now_ns),
             None => {
@@ -56,17 +61,28 @@ impl Detection {
         }
     }
 
-    /// A transaction ended at `now_ns` with this outcome.
-    pub fn receive(&mut self, outcome: Result<Response, Error>, now_ns: u64) -> Step<Detected> {
+    /// A transaction ended with this outcome; the line is free from `ready_ns` on. Once done or failed it stays so.
+    pub fn receive(&mut self, outcome: Result<Response, Error>, ready_ns: u64) -> Step<Detected> {
+        if let Some(end) = self.end {
+            return end;
+        }
+        let step = self.next(outcome, ready_ns);
+        if step.has_ended() {
+            self.end = Some(step);
+        }
+        step
+    }
+
+    fn next(&mut self, outcome: Result<Response, Error>, ready_ns: u64) -> Step<Detected> {
         let Some(mut reading) = self.reading else {
-            let soon = now_ns.saturating_add(crate::timing::REQUEST_GAP_NS.into());
+            let soon = ready_ns.saturating_add(crate::timing::REQUEST_GAP_NS.into());
             return match outcome {
                 Ok(response) if response.command() == Some(Command::Abs40Mt) => self.read(response.ea, soon),
                 Ok(_) => Step::Failed { error: Error::NotCarried, ready_ns: soon },
                 Err(error) => Step::Failed { error, ready_ns: soon },
             };
         };
-        let step = reading.receive(outcome, now_ns);
+        let step = reading.receive(outcome, ready_ns);
         self.reading = Some(reading);
         match step {
             Step::Send { request, not_before_ns } => Step::Send { request, not_before_ns },

@@ -17,6 +17,9 @@ pub const READ_POLLING: Polling = Polling { interval_ns: READ_BUSY_NS, max_tries
 /// For the status after a write: every millisecond, ten times, on top of the 30 ms that a write takes.
 pub const WRITE_POLLING: Polling = Polling { interval_ns: 1_000_000, max_tries: 10 };
 
+/// Until an encoder is ready: every millisecond, forty times, longer than any access lasts.
+pub(super) const READY_POLLING: Polling = Polling { interval_ns: 1_000_000, max_tries: 40 };
+
 /// Whether ES0 is set.
 pub(super) fn is_busy(response: Response) -> bool {
     response.es().is_some_and(|es| es.contains(EncoderStatus::BUSY))
@@ -46,10 +49,13 @@ pub struct EepromRead {
     polling: Polling,
     /// The data of the first response are never used.
     discard_first: bool,
-    /// No read of this address was broken off, and the memory is not busy.
+    /// The caller knows that no read of this address was broken off, and that the memory is not busy.
     known: bool,
+    /// A read is under way.
+    under_way: bool,
     next: Next,
     tries: u16,
+    end: Option<Step<u16>>,
 }
 
 /// Which response comes next.
@@ -74,16 +80,26 @@ impl EepromRead {
     }
 
     const fn of(request: Request) -> Self {
-        Self { request, polling: READ_POLLING, discard_first: true, known: false, next: Next::Other, tries: 0 }
+        Self {
+            request,
+            polling: READ_POLLING,
+            discard_first: true,
+            known: false,
+            under_way: false,
+            next: Next::Other,
+            tries: 0,
+            end: None,
+        }
     }
 
-    /// With another interval or number of tries.
+    /// With another interval or number of tries; a read takes three requests at the least. After another address was read,
+    /// the memory is left alone for 300 us whatever the interval.
     pub const fn with_polling(self, polling: Polling) -> Self {
         Self { polling, ..self }
     }
 
     /// Begins with the address itself, because it is known that no read of it was broken off and that the memory is not busy: two
-    /// requests instead of three or four. Once a read has failed that is forgotten.
+    /// requests instead of three or four. Once a read has failed or was started again before its end, that is forgotten.
     pub const fn knowing_that_none_was_broken_off(self) -> Self {
         Self { known: true, ..self }
     }
@@ -104,28 +120,46 @@ impl EepromRead {
     /// The first request, at once.
     pub const fn start(&mut self, now_ns: u64) -> Step<u16> {
         self.tries = 0;
+        self.end = None;
+        self.known = self.known && !self.under_way;
+        self.under_way = true;
         self.next = if self.known { Next::First } else { Next::Other };
         Step::Send { request: self.next_request(), not_before_ns: now_ns }
     }
 
-    /// A transaction ended at `now_ns` with this outcome.
+    /// A transaction ended with this outcome; the line is free from `ready_ns` on.
     ///
-    /// A response that is missing or refused counts as a try; [`Error::BankError`] ends the procedure at once.
-    pub fn receive(&mut self, outcome: Result<Response, Error>, now_ns: u64) -> Step<u16> {
+    /// A response that is missing or refused counts as a try; [`Error::BankError`] ends the procedure at once. Once done or
+    /// failed it stays so.
+    pub fn receive(&mut self, outcome: Result<Response, Error>, ready_ns: u64) -> Step<u16> {
+        if let Some(end) = self.end {
+            return end;
+        }
+        let step = self.next(outcome, ready_ns);
+        if step.has_ended() {
+            self.under_way = false;
+            self.end = Some(step);
+        }
+        step
+    }
+
+    fn next(&mut self, outcome: Result<Response, Error>, ready_ns: u64) -> Step<u16> {
         self.tries = self.tries.saturating_add(1);
         let word = outcome.and_then(|response| self.word(response));
+        let mut wait_ns = self.polling.interval_ns;
         let error = match (word, self.next) {
             (Err(error), _) => {
                 self.next = if self.discard_first { Next::Other } else { Next::First };
                 error
             }
-            (Ok((word, false)), Next::Second) => return Step::Done { value: word, ready_ns: now_ns },
+            (Ok((word, false)), Next::Second) => return Step::Done { value: word, ready_ns },
             (Ok((word, false)), Next::First) if !self.discard_first => {
-                return Step::Done { value: word, ready_ns: now_ns };
+                return Step::Done { value: word, ready_ns };
             }
-            // A busy memory has not begun with the other address.
+            // A busy memory has not begun with the other address, and will not begin with this one.
             (Ok((_, busy)), Next::Other) => {
                 self.next = if busy { Next::Other } else { Next::First };
+                wait_ns = wait_ns.max(READ_BUSY_NS);
                 Error::Busy { tries: self.tries }
             }
             (Ok(_), Next::First | Next::Second) => {
@@ -133,7 +167,7 @@ impl EepromRead {
                 Error::Busy { tries: self.tries }
             }
         };
-        let not_before_ns = now_ns.saturating_add(self.polling.interval_ns.into());
+        let not_before_ns = ready_ns.saturating_add(wait_ns.into());
         if self.tries >= self.polling.max_tries || error == Error::BankError {
             // Whether the encoder has the word ready is not known.
             self.known = false;
@@ -207,6 +241,7 @@ mod tests {
             EepromRead::new(EA, 9).knowing_that_none_was_broken_off().trusting_es0_of_the_first_response();
         let _ = trusting.start(0);
         assert_eq!(trusting.receive(Ok(word(1, 0xdead)), 0), Step::Send { request, not_before_ns: 300_000 });
+        assert_eq!(trusting.receive(Ok(word(0, 8)), 3), Step::Done { value: 8, ready_ns: 3 });
         let _ = trusting.start(0);
         assert_eq!(trusting.receive(Ok(word(0, 8)), 3), Step::Done { value: 8, ready_ns: 3 });
     }

@@ -1,15 +1,17 @@
-use super::eeprom::{WRITE_POLLING, is_busy};
+use super::eeprom::{READY_POLLING, is_busy};
 use super::verified::apart;
 use super::{Reset, Step};
 use crate::error::Error;
 use crate::response::Response;
+use crate::status::Alm;
 use crate::timing::REQUEST_GAP_NS;
 
 /// A [`Reset`] that ends as done, not done, or with an unknown effect.
 ///
 /// An encoder counts equal requests, whoever sends them and whenever: after seven of an interrupted reset the first of a new
 /// one takes effect. So another command is sent first, which starts the count again, until it is answered and ES0 is
-/// clear. Then the eight requests follow, one act that is never repeated in part.
+/// clear. Then the eight requests follow, one act that is never repeated in part. Before a zero preset MEMERR has to be clear
+/// too, so that it tells about this one afterwards.
 ///
 /// `Done` rests on the eight responses. An encoder that hears something else in between, as noise on its end of the line, may
 /// start its count again and answer all the same: where a wrong zero is dangerous, compare the position before and after.
@@ -17,7 +19,7 @@ use crate::timing::REQUEST_GAP_NS;
 /// | it ends with | the encoder |
 /// |---|---|
 /// | `Done`, with the response to STATUS | has done it |
-/// | [`Error::Interrupted`], [`Error::Busy`], [`Error::NoResponse`] and other faults of the first response | has **not** done it |
+/// | [`Error::Interrupted`], [`Error::Busy`], [`Error::MemoryFault`], [`Error::NoResponse`] and other faults of the first response | has **not** done it |
 /// | [`Error::EffectUnknown`] | may have done it; it may be busy until `ready_ns` |
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -25,41 +27,58 @@ pub struct GuardedReset {
     reset: Reset,
     started: bool,
     tries: u16,
+    end: Option<Step<Response>>,
 }
 
 impl GuardedReset {
     /// Guards this reset.
     pub const fn new(reset: Reset) -> Self {
-        Self { reset, started: false, tries: 0 }
+        Self { reset, started: false, tries: 0, end: None }
     }
 
     /// The first request, at once.
     pub const fn start(&mut self, now_ns: u64) -> Step<Response> {
         self.started = false;
         self.tries = 0;
+        self.end = None;
         let (request, _) = apart(self.reset.request());
         Step::Send { request, not_before_ns: now_ns }
     }
 
-    /// A transaction ended at `now_ns` with this outcome.
-    pub fn receive(&mut self, outcome: Result<Response, Error>, now_ns: u64) -> Step<Response> {
-        if self.started {
-            return self.reset.receive(outcome, now_ns);
+    /// A transaction ended with this outcome; the line is free from `ready_ns` on. Once done or failed it stays so.
+    pub fn receive(&mut self, outcome: Result<Response, Error>, ready_ns: u64) -> Step<Response> {
+        if let Some(end) = self.end {
+            return end;
         }
+        let step = self.next(outcome, ready_ns);
+        if step.has_ended() {
+            self.end = Some(step);
+        }
+        step
+    }
+
+    fn next(&mut self, outcome: Result<Response, Error>, ready_ns: u64) -> Step<Response> {
+        if self.started {
+            return self.reset.receive(outcome, ready_ns);
+        }
+        let soon_ns = ready_ns.saturating_add(REQUEST_GAP_NS.into());
         let (request, ea) = apart(self.reset.request());
         let error = match outcome {
             Ok(response) if response.command() != Some(request.command()) => Error::NotCarried,
             Ok(response) if ea.is_some_and(|ea| ea != response.ea) => Error::NotCarried,
             Ok(response) if is_busy(response) => Error::Busy { tries: self.tries.saturating_add(1) },
+            Ok(response) if self.reset.is_stored() && response.alm().is_some_and(|alm| alm.contains(Alm::MEMERR)) => {
+                return Step::Failed { error: Error::MemoryFault, ready_ns: soon_ns };
+            }
             Ok(_) => {
                 self.started = true;
-                return self.reset.start(now_ns.saturating_add(REQUEST_GAP_NS.into()));
+                return self.reset.start(soon_ns);
             }
             Err(error) => error,
         };
         self.tries = self.tries.saturating_add(1);
-        let not_before_ns = now_ns.saturating_add(WRITE_POLLING.interval_ns.into());
-        if self.tries >= WRITE_POLLING.max_tries {
+        let not_before_ns = ready_ns.saturating_add(READY_POLLING.interval_ns.into());
+        if self.tries >= READY_POLLING.max_tries {
             return Step::Failed { error, ready_ns: not_before_ns };
         }
         Step::Send { request, not_before_ns }

@@ -6,6 +6,7 @@ use crate::number::EncoderAddress;
 use crate::operation::Operation;
 use crate::request::Request;
 use crate::response::Response;
+use crate::status::Alm;
 use crate::timing::{REQUEST_GAP_NS, WRITE_BUSY_NS};
 
 /// A reset: the same request eight times in succession, a wait of 30 ms, then the status.
@@ -24,6 +25,7 @@ pub struct Reset {
     request: Request,
     done: u8,
     tries: u16,
+    end: Option<Step<Response>>,
 }
 
 impl Reset {
@@ -58,7 +60,7 @@ impl Reset {
     }
 
     const fn of(ea: EncoderAddress, operation: Operation) -> Self {
-        Self { request: Request::new(ea, operation), done: 0, tries: 0 }
+        Self { request: Request::new(ea, operation), done: 0, tries: 0, end: None }
     }
 
     /// The request that is sent eight times.
@@ -80,22 +82,36 @@ impl Reset {
     pub const fn start(&mut self, now_ns: u64) -> Step<Response> {
         self.done = 0;
         self.tries = 0;
+        self.end = None;
         Step::Send { request: self.request, not_before_ns: now_ns }
     }
 
-    /// A transaction ended at `now_ns` with this outcome. The value is the response to STATUS.
+    /// A transaction ended with this outcome; the line is free from `ready_ns` on. The value is the response to STATUS.
     ///
     /// Fails with [`Error::Interrupted`] (not done) if one of the first seven responses does not come, and with
     /// [`Error::EffectUnknown`] if the eighth or the status does not: the encoder may have done it, and be busy for 30 ms.
-    pub fn receive(&mut self, outcome: Result<Response, Error>, now_ns: u64) -> Step<Response> {
-        let soon_ns = now_ns.saturating_add(REQUEST_GAP_NS.into());
+    /// So it does if the status after commands 11 and 12, whose effect is kept in the EEPROM, shows MEMERR. Once done or
+    /// failed it stays so.
+    pub fn receive(&mut self, outcome: Result<Response, Error>, ready_ns: u64) -> Step<Response> {
+        if let Some(end) = self.end {
+            return end;
+        }
+        let step = self.next(outcome, ready_ns);
+        if step.has_ended() {
+            self.end = Some(step);
+        }
+        step
+    }
+
+    fn next(&mut self, outcome: Result<Response, Error>, ready_ns: u64) -> Step<Response> {
+        let soon_ns = ready_ns.saturating_add(REQUEST_GAP_NS.into());
         if self.done >= Self::REQUESTS {
-            return self.status(outcome, now_ns);
+            return self.status(outcome, ready_ns);
         }
         if !outcome.is_ok_and(|response| self.is_answer(response)) {
             let done = core::mem::take(&mut self.done);
             if done >= Self::REQUESTS.saturating_sub(1) {
-                let ready_ns = now_ns.saturating_add(WRITE_BUSY_NS.into());
+                let ready_ns = ready_ns.saturating_add(WRITE_BUSY_NS.into());
                 return Step::Failed { error: Error::EffectUnknown, ready_ns };
             }
             return Step::Failed { error: Error::Interrupted { done }, ready_ns: soon_ns };
@@ -104,7 +120,12 @@ impl Reset {
         if self.done < Self::REQUESTS {
             return Step::Send { request: self.request, not_before_ns: soon_ns };
         }
-        self.ask_status(now_ns.saturating_add(WRITE_BUSY_NS.into()))
+        self.ask_status(ready_ns.saturating_add(WRITE_BUSY_NS.into()))
+    }
+
+    /// Whether the effect is kept in the EEPROM.
+    pub(super) const fn is_stored(&self) -> bool {
+        matches!(self.request.operation, Operation::SetAddress1 | Operation::ZeroPreset)
     }
 
     /// Whether this is the response to the reset. That of command 11 may show the old or the new address.
@@ -117,13 +138,17 @@ impl Reset {
         Step::Send { request: Request::new(self.request.ea, Operation::Status), not_before_ns }
     }
 
-    fn status(&mut self, outcome: Result<Response, Error>, now_ns: u64) -> Step<Response> {
+    fn status(&mut self, outcome: Result<Response, Error>, ready_ns: u64) -> Step<Response> {
         self.tries = self.tries.saturating_add(1);
         match status_of(self.request.ea, outcome) {
-            Ok((value, _)) if !is_busy(value) => return Step::Done { value, ready_ns: now_ns },
-            _ => {}
+            Ok((value, _)) if is_busy(value) => {}
+            Ok((_, alm)) if self.is_stored() && alm.contains(Alm::MEMERR) => {
+                return Step::Failed { error: Error::EffectUnknown, ready_ns };
+            }
+            Ok((value, _)) => return Step::Done { value, ready_ns },
+            Err(_) => {}
         }
-        let not_before_ns = now_ns.saturating_add(WRITE_POLLING.interval_ns.into());
+        let not_before_ns = ready_ns.saturating_add(WRITE_POLLING.interval_ns.into());
         if self.tries >= WRITE_POLLING.max_tries {
             return Step::Failed { error: Error::EffectUnknown, ready_ns: not_before_ns };
         }
@@ -135,7 +160,7 @@ impl Reset {
 mod tests {
     use super::*;
     use crate::data::Data;
-    use crate::status::{Alm, EncoderStatus, PmAlm};
+    use crate::status::{EncoderStatus, PmAlm};
 
     const EA: EncoderAddress = EncoderAddress::MAX;
 

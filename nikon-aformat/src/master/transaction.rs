@@ -1,3 +1,5 @@
+use core::fmt;
+
 use super::hunt::{Block, Found, Hunt};
 use super::{Line, Progress};
 use crate::bus::{Addresses, Bus, Outcome};
@@ -12,6 +14,7 @@ use crate::response::Response;
 /// When a position was sampled: not documented, but after the end of the request and before the response began.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Sampled {
     /// The end of the request, in ns.
     pub earliest_ns: u64,
@@ -21,13 +24,22 @@ pub struct Sampled {
 
 /// A response, and when its values were sampled.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Reading {
     /// What the encoder sent.
     pub response: Response,
     /// When it was sampled.
     pub sampled: Sampled,
 }
+
+impl fmt::Display for Reading {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Sampled { earliest_ns, latest_ns } = self.sampled;
+        write!(f, "{}, sampled from {earliest_ns} to {latest_ns} ns", self.response)
+    }
+}
+
+servowire_core::format_as_displayed!(Reading);
 
 impl Reading {
     /// The position for control at `now_ns`: only if nothing speaks against its use, its age included. See
@@ -36,7 +48,8 @@ impl Reading {
     /// # Errors
     /// [`Doubt::Old`], then as [`Resolution::read`].
     pub fn position(&self, resolution: Resolution, policy: Policy, now_ns: u64) -> Result<Position, Doubt> {
-        let age_ns = now_ns.saturating_sub(self.sampled.earliest_ns);
+        // A clock that was set back makes no position young.
+        let age_ns = now_ns.abs_diff(self.sampled.earliest_ns);
         if age_ns > policy.max_age_ns() {
             return Err(Doubt::Old { age_ns });
         }

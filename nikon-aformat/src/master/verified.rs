@@ -1,4 +1,4 @@
-use super::eeprom::{WRITE_POLLING, is_busy, status_of};
+use super::eeprom::{READY_POLLING, is_busy, status_of};
 use super::{EepromRead, Step, Write};
 use crate::data::Data;
 use crate::error::Error;
@@ -19,7 +19,7 @@ use crate::status::Alm;
 /// |---|---|
 /// | `Done` | has stored it |
 /// | [`Error::NotDone`] | has something else stored |
-/// | [`Error::Busy`], [`Error::MemoryFault`] | was not asked to write, or reports that it failed |
+/// | [`Error::Busy`], [`Error::MemoryFault`], [`Error::BankError`] | was not asked to write, or reports that it failed |
 /// | [`Error::EffectUnknown`] | may have stored it: it cannot be read back |
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -28,6 +28,7 @@ pub struct VerifiedWrite {
     back: Back,
     phase: Phase,
     tries: u16,
+    end: Option<Step<()>>,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -59,12 +60,13 @@ impl VerifiedWrite {
             Operation::CoefficientWrite { .. } => Back::Id(Request::new(ea, Operation::CoefficientRead)),
             _ => Back::Id(Request::new(ea, Operation::IdRead1)),
         };
-        Self { write, back, phase: Phase::Ready, tries: 0 }
+        Self { write, back, phase: Phase::Ready, tries: 0, end: None }
     }
 
     /// The first request, at once.
     pub const fn start(&mut self, now_ns: u64) -> Step<()> {
         self.tries = 0;
+        self.end = None;
         let Request { ea, operation } = self.write.request();
         match operation {
             Operation::IdWrite2 { .. } | Operation::SetAddress2 { .. } => self.begin(now_ns),
@@ -75,18 +77,29 @@ impl VerifiedWrite {
         }
     }
 
-    /// A transaction ended at `now_ns` with this outcome.
-    pub fn receive(&mut self, outcome: Result<Response, Error>, now_ns: u64) -> Step<()> {
+    /// A transaction ended with this outcome; the line is free from `ready_ns` on. Once done or failed it stays so.
+    pub fn receive(&mut self, outcome: Result<Response, Error>, ready_ns: u64) -> Step<()> {
+        if let Some(end) = self.end {
+            return end;
+        }
+        let step = self.next(outcome, ready_ns);
+        if step.has_ended() {
+            self.end = Some(step);
+        }
+        step
+    }
+
+    fn next(&mut self, outcome: Result<Response, Error>, ready_ns: u64) -> Step<()> {
         match self.phase {
-            Phase::Ready => self.ready(outcome, now_ns),
-            Phase::Writing => match self.write.receive(outcome, now_ns) {
+            Phase::Ready => self.ready(outcome, ready_ns),
+            Phase::Writing => match self.write.receive(outcome, ready_ns) {
                 Step::Send { request, not_before_ns } => Step::Send { request, not_before_ns },
-                Step::Failed { error: Error::MemoryFault, ready_ns } => {
-                    Step::Failed { error: Error::MemoryFault, ready_ns }
+                Step::Failed { error: error @ (Error::MemoryFault | Error::BankError), ready_ns } => {
+                    Step::Failed { error, ready_ns }
                 }
                 Step::Done { ready_ns, .. } | Step::Failed { ready_ns, .. } => self.read_back(ready_ns),
             },
-            Phase::ReadingBack => self.compare(outcome, now_ns),
+            Phase::ReadingBack => self.compare(outcome, ready_ns),
         }
     }
 
@@ -96,8 +109,8 @@ impl VerifiedWrite {
         Step::Send { request: self.write.request(), not_before_ns }
     }
 
-    fn ready(&mut self, outcome: Result<Response, Error>, now_ns: u64) -> Step<()> {
-        let soon_ns = now_ns.saturating_add(crate::timing::REQUEST_GAP_NS.into());
+    fn ready(&mut self, outcome: Result<Response, Error>, ready_ns: u64) -> Step<()> {
+        let soon_ns = ready_ns.saturating_add(crate::timing::REQUEST_GAP_NS.into());
         let error = match status_of(self.write.request().ea, outcome) {
             Ok((response, alm)) if !is_busy(response) && !alm.contains(Alm::MEMBUSY) => {
                 if alm.contains(Alm::MEMERR) {
@@ -109,20 +122,18 @@ impl VerifiedWrite {
             Err(error) => error,
         };
         let ask = Request::new(self.write.request().ea, Operation::Status);
-        self.again(ask, error, now_ns)
+        self.again(ask, error, ready_ns)
     }
 
-    /// Asks once more, a millisecond later, up to forty times: longer than any access lasts.
-    fn again(&mut self, request: Request, error: Error, now_ns: u64) -> Step<()> {
+    /// Asks once more, a millisecond later, up to forty times.
+    fn again(&mut self, request: Request, error: Error, ready_ns: u64) -> Step<()> {
         self.tries = self.tries.saturating_add(1);
-        let not_before_ns = now_ns.saturating_add(WRITE_POLLING.interval_ns.into());
-        if self.tries >= Self::MAX_TRIES {
+        let not_before_ns = ready_ns.saturating_add(READY_POLLING.interval_ns.into());
+        if self.tries >= READY_POLLING.max_tries {
             return Step::Failed { error, ready_ns: not_before_ns };
         }
         Step::Send { request, not_before_ns }
     }
-
-    const MAX_TRIES: u16 = 40;
 
     fn read_back(&mut self, not_before_ns: u64) -> Step<()> {
         self.phase = Phase::ReadingBack;
@@ -139,10 +150,10 @@ impl VerifiedWrite {
         }
     }
 
-    fn compare(&mut self, outcome: Result<Response, Error>, now_ns: u64) -> Step<()> {
+    fn compare(&mut self, outcome: Result<Response, Error>, ready_ns: u64) -> Step<()> {
         let written = self.write.request();
         match &mut self.back {
-            Back::Word { read, data } => match read.receive(outcome, now_ns) {
+            Back::Word { read, data } => match read.receive(outcome, ready_ns) {
                 Step::Send { request, not_before_ns } => Step::Send { request, not_before_ns },
                 Step::Done { value, ready_ns } if value == *data => Step::Done { value: (), ready_ns },
                 Step::Done { ready_ns, .. } => Step::Failed { error: Error::NotDone, ready_ns },
@@ -151,9 +162,9 @@ impl VerifiedWrite {
             Back::Id(request) => {
                 let request = *request;
                 match outcome.ok().and_then(|response| same(written, request, response)) {
-                    Some(true) => Step::Done { value: (), ready_ns: now_ns },
-                    Some(false) => Step::Failed { error: Error::NotDone, ready_ns: now_ns },
-                    None => self.again(request, Error::EffectUnknown, now_ns),
+                    Some(true) => Step::Done { value: (), ready_ns },
+                    Some(false) => Step::Failed { error: Error::NotDone, ready_ns },
+                    None => self.again(request, Error::EffectUnknown, ready_ns),
                 }
             }
         }

@@ -1,5 +1,6 @@
 use super::Step;
 use super::eeprom::{WRITE_POLLING, is_busy, status_of};
+use crate::data::Data;
 use crate::error::Error;
 use crate::number::{EncoderAddress, EncoderId, U19, UserAddress};
 use crate::operation::Operation;
@@ -24,6 +25,7 @@ pub struct Write {
     /// Whom to ask for the status, once the write is answered.
     written: Option<EncoderAddress>,
     tries: u16,
+    end: Option<Step<Response>>,
 }
 
 impl Write {
@@ -58,13 +60,14 @@ impl Write {
     }
 
     const fn of(ea: EncoderAddress, operation: Operation) -> Self {
-        Self { request: Request::new(ea, operation), written: None, tries: 0 }
+        Self { request: Request::new(ea, operation), written: None, tries: 0, end: None }
     }
 
     /// The request, at once.
     pub const fn start(&mut self, now_ns: u64) -> Step<Response> {
         self.written = None;
         self.tries = 0;
+        self.end = None;
         Step::Send { request: self.request, not_before_ns: now_ns }
     }
 
@@ -73,31 +76,44 @@ impl Write {
         self.request
     }
 
-    /// A transaction ended at `now_ns` with this outcome. The value is the response to STATUS.
+    /// A transaction ended with this outcome; the line is free from `ready_ns` on. The value is the response to STATUS.
     ///
-    /// Fails with [`Error::EffectUnknown`] if no response to the write or no status comes, and with [`Error::MemoryFault`]
-    /// if MEMERR is set.
-    pub fn receive(&mut self, outcome: Result<Response, Error>, now_ns: u64) -> Step<Response> {
+    /// Fails with [`Error::BankError`] if the encoder has no such bank: nothing was written; with [`Error::EffectUnknown`] if no
+    /// response to this write or no status comes, and with [`Error::MemoryFault`] if MEMERR is set. Once done or failed it
+    /// stays so.
+    pub fn receive(&mut self, outcome: Result<Response, Error>, ready_ns: u64) -> Step<Response> {
+        if let Some(end) = self.end {
+            return end;
+        }
+        let step = self.next(outcome, ready_ns);
+        if step.has_ended() {
+            self.end = Some(step);
+        }
+        step
+    }
+
+    fn next(&mut self, outcome: Result<Response, Error>, ready_ns: u64) -> Step<Response> {
         let Some(ea) = self.written else {
-            let not_before_ns = now_ns.saturating_add(WRITE_BUSY_NS.into());
+            let not_before_ns = ready_ns.saturating_add(WRITE_BUSY_NS.into());
             return match outcome {
-                Ok(response) if response.command() == Some(self.request.command()) => {
+                Ok(response) if self.is_answer(response) => {
                     // Command 19 reaches an encoder of any address; its response says which.
                     let any = matches!(self.request.operation, Operation::IdWrite2 { .. });
                     let ea = if any { response.ea } else { self.request.ea };
                     self.written = Some(ea);
                     Step::Send { request: Request::new(ea, Operation::Status), not_before_ns }
                 }
+                Err(error @ Error::BankError) => Step::Failed { error, ready_ns },
                 _ => Step::Failed { error: Error::EffectUnknown, ready_ns: not_before_ns },
             };
         };
         self.tries = self.tries.saturating_add(1);
-        let not_before_ns = now_ns.saturating_add(WRITE_POLLING.interval_ns.into());
+        let not_before_ns = ready_ns.saturating_add(WRITE_POLLING.interval_ns.into());
         match status_of(ea, outcome) {
             Ok((_, alm)) if alm.contains(Alm::MEMERR) => {
-                return Step::Failed { error: Error::MemoryFault, ready_ns: now_ns };
+                return Step::Failed { error: Error::MemoryFault, ready_ns };
             }
-            Ok((value, _)) if !is_busy(value) => return Step::Done { value, ready_ns: now_ns },
+            Ok((value, _)) if !is_busy(value) => return Step::Done { value, ready_ns },
             _ => {}
         }
         if self.tries >= WRITE_POLLING.max_tries {
@@ -105,13 +121,36 @@ impl Write {
         }
         Step::Send { request: Request::new(ea, Operation::Status), not_before_ns }
     }
+
+    /// Whether this is the response to the write: from the encoder that was asked, with the arguments repeated.
+    fn is_answer(&self, response: Response) -> bool {
+        let Request { ea, operation } = self.request;
+        let repeats = match (operation, response.data()) {
+            (Operation::EepromWrite { address, data }, Some(Data::Eeprom { data: got, address: at })) => {
+                (at, got) == (address.get(), data)
+            }
+            (
+                Operation::EepromWriteBank { bank, address, data },
+                Some(Data::EepromBank { data: got, bank: of, address: at, .. }),
+            ) => (of, at, got) == (bank, address, data),
+            (
+                Operation::IdWrite1 { id } | Operation::IdWrite2 { id } | Operation::SetAddress2 { id },
+                Some(Data::Id { id: got }),
+            ) => got == id,
+            (Operation::CoefficientWrite { coefficient }, Some(Data::Coefficient { coefficient: got })) => {
+                got == coefficient
+            }
+            _ => false,
+        };
+        let own = response.ea == ea || !operation.command().answers_with_own_address();
+        repeats && own && response.command() == Some(operation.command())
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::command::Command;
-    use crate::data::Data;
     use crate::status::{EncoderStatus, PmAlm};
 
     fn status(ea: EncoderAddress, es: u8, alm: Alm) -> Response {

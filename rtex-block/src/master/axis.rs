@@ -68,11 +68,12 @@ pub struct Axis {
     active_off: u32,
     disobeys: bool,
     service: Service,
-    /// The drive has not echoed the normal command since the last request: what it says may still be the answer to that.
-    unreleased: bool,
     outcome: Option<Progress<NonCyclicResponse>>,
+    /// The drive has not been seen to notice the end of the last request.
+    unreleased: bool,
     sub: SubService,
     sub_outcome: Option<Progress<SubResponse>>,
+    sub_unreleased: bool,
     profile: Option<ProfileMove>,
 }
 
@@ -107,10 +108,11 @@ impl Axis {
             active_off: 0,
             disobeys: false,
             service: Service::Idle,
-            unreleased: false,
             outcome: None,
+            unreleased: true,
             sub: SubService::Idle,
             sub_outcome: None,
+            sub_unreleased: true,
             profile: None,
         }
     }

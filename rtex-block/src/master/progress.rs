@@ -34,6 +34,13 @@ impl<T> Progress<T> {
     }
 }
 
+impl<T: Copy> Progress<T> {
+    /// How it ended, if it did.
+    pub(super) const fn ended(&self) -> Option<Self> {
+        if self.is_pending() { None } else { Some(*self) }
+    }
+}
+
 /// Why a procedure failed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]

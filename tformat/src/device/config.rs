@@ -39,7 +39,7 @@ pub enum BusyData {
     Cell,
 }
 
-/// The points that no document decides, and the answer delay. The defaults are those of the reference vectors.
+/// The points that no document decides, and the response delay. The defaults are those of the reference vectors.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -92,7 +92,7 @@ impl Config {
     }
 
     /// The combination with this number, for tests that walk them all: each bit is one switch, above bit 9 comes the
-    /// answer delay (3.0, 3.2, 1.7 or 9 us).
+    /// response delay (3.0, 3.2, 1.7 or 9 us).
     pub const fn numbered(number: u16) -> Self {
         const fn bit(number: u16, at: u32) -> bool {
             number >> at & 1 == 1

@@ -13,7 +13,9 @@ use crate::timing::BitRate;
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Detection {
-    line: Line,
+    /// The one that is tried first, and the other one.
+    lines: [Line; 2],
+    second: bool,
     tries: u8,
 }
 
@@ -23,19 +25,25 @@ impl Detection {
     /// Requests at each rate.
     pub const TRIES: u8 = 3;
 
-    /// With the defaults of [`Line::new`].
+    /// 5 Mbit/s, then 2.5 Mbit/s, with the defaults of [`Line::new`].
     pub const fn new() -> Self {
-        Self { line: Line::new(BitRate::Mbit5), tries: 0 }
+        Self::on([Line::new(BitRate::Mbit5), Line::new(BitRate::Mbit2_5)])
+    }
+
+    /// These two, the first one first: for a host that hands over in blocks, or whose cable is longer.
+    pub const fn on(lines: [Line; 2]) -> Self {
+        Self { lines, second: false, tries: 0 }
     }
 
     /// The line for the next transaction, and the encoder's own when it has been found.
     pub const fn line(&self) -> Line {
-        self.line
+        let [first, second] = self.lines;
+        if self.second { second } else { first }
     }
 
     /// The first request. The supply was switched on at `power_on_ns`.
     pub const fn start(&mut self, power_on_ns: u64) -> Step<AllData> {
-        *self = Self::new();
+        *self = Self::on(self.lines);
         let not_before_ns = power_on_ns.saturating_add(Self::POWER_ON_WAIT_NS);
         Step::Send { request: Request::ReadAll, not_before_ns }
     }
@@ -48,17 +56,18 @@ impl Detection {
             Err(error) => error,
         };
         // A slow encoder may take a fast request for a damaged one and answer at its own rate, in twice the time.
-        let slow_ns = match self.line.rate {
+        let slow_ns = match self.line().rate {
             BitRate::Mbit5 => BitRate::Mbit5.fields_ns(11).into(),
             BitRate::Mbit2_5 => 0,
         };
         let ready_ns = ready_ns.saturating_add(slow_ns);
         self.tries = self.tries.saturating_add(1);
         if self.tries >= Self::TRIES {
-            if self.line.rate == BitRate::Mbit2_5 {
+            if self.second {
                 return Step::Failed { error, ready_ns };
             }
-            *self = Self { line: Line::new(BitRate::Mbit2_5), tries: 0 };
+            self.second = true;
+            self.tries = 0;
         }
         Step::Send { request: Request::ReadAll, not_before_ns: ready_ns }
     }
@@ -98,6 +107,23 @@ mod tests {
         ];
         assert_eq!(seen, want);
         assert!(matches!(step, Step::Failed { error: Error::NoResponse { .. }, .. }));
+    }
+
+    /// A host that hands over a block when the line has been idle for 20 us, and has 30 m more of cable.
+    #[test]
+    fn the_lines_are_those_of_the_host() {
+        let [fast, slow] =
+            [BitRate::Mbit5, BitRate::Mbit2_5].map(|rate| Line::new(rate).with_hand_over(90_000).with_turn_around(500));
+        let mut detection = Detection::on([slow, fast]);
+        let mut seen = Vec::new();
+        let mut step = detection.start(0);
+        while let Step::Send { not_before_ns, .. } = step {
+            seen.push(detection.line());
+            step = detection.receive(LOST, not_before_ns);
+        }
+        assert_eq!(seen, [slow, slow, slow, fast, fast, fast]);
+        let _ = detection.start(0);
+        assert_eq!(detection.line(), slow);
     }
 
     #[test]

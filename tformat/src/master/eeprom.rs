@@ -21,15 +21,32 @@ enum Phase {
     Read,
 }
 
+/// What is known of a write that was sent, to the page register or to the cell.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+struct Sent {
+    /// It may have been done, and nothing that was read tells.
+    unknown: bool,
+    /// It was answered with its own data and without the busy flag.
+    confirmed: bool,
+}
+
+impl Sent {
+    const NONE: Self = Self { unknown: false, confirmed: false };
+    const NOW: Self = Self { unknown: true, confirmed: false };
+}
+
 /// Reads or writes one EEPROM byte: selects the page if one is named and reads the register back, waits while the memory
 /// is busy, and reads a written byte back.
 ///
-/// The result is the byte read. A page is selected by naming it.
+/// The result is the byte read. A page is selected by naming it. After a response that is missing or refused the page
+/// register is read again before anything else: an encoder that has started anew is on page 0.
 ///
 /// **No write is repeated without evidence that it was not done.** After a lost or refused response to a write, to the
 /// page register too, the cell is read: only if it holds another value is it written again. A memory that says that it
 /// is busy is asked by reading. If nothing can be read after a write has been sent, the access ends with
-/// [`Error::EffectUnknown`]. A response that is for another address is refused like one of another kind.
+/// [`Error::EffectUnknown`]. A response that is for another address is refused like one of another kind. Once done or failed
+/// it stays so, until it is started again.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct EepromAccess {
@@ -40,10 +57,13 @@ pub struct EepromAccess {
     phase: Phase,
     /// Requests of this phase and of the writes it looks after that had no success.
     tries: u16,
-    /// A write has been sent, and nothing is known of it yet.
-    unknown: bool,
-    /// The last write was answered with its own data and without the busy flag.
-    confirmed: bool,
+    /// The register has held the page that is named.
+    on_page: bool,
+    /// The selection of the page; a response that is lost after it takes the confirmation away.
+    selection: Sent,
+    /// The write to the cell; `None` as long as it has not been sent.
+    written: Option<Sent>,
+    end: Option<Step<u8>>,
 }
 
 impl EepromAccess {
@@ -60,54 +80,78 @@ impl EepromAccess {
     }
 
     const fn new(address: Address, write: Option<u8>, page: Option<Page>, polling: Polling) -> Self {
-        Self { address, write, page, polling, phase: Phase::Read, tries: 0, unknown: false, confirmed: false }
-    }
-
-    const fn first(&self) -> Phase {
-        match self.page {
-            Some(_) => Phase::SelectPage,
-            None => self.operation(),
+        Self {
+            address,
+            write,
+            page,
+            polling,
+            phase: Phase::Read,
+            tries: 0,
+            on_page: false,
+            selection: Sent::NONE,
+            written: None,
+            end: None,
         }
     }
 
+    /// What is done on the page: the write, once; after that the cell is read.
     const fn operation(&self) -> Phase {
-        match self.write {
-            Some(_) => Phase::Write,
-            None => Phase::Read,
+        match (self.write, self.written) {
+            (Some(_), None) => Phase::Write,
+            _ => Phase::Read,
         }
     }
 
     /// The first request, at once.
     pub const fn start(&mut self, now_ns: u64) -> Step<u8> {
-        self.tries = 0;
-        self.unknown = false;
-        self.enter(self.first(), now_ns)
+        *self = Self::new(self.address, self.write, self.page, self.polling);
+        let first = if self.page.is_some() { Phase::SelectPage } else { self.operation() };
+        self.enter(first, now_ns)
     }
 
     /// A transaction ended with this outcome; the line is free from `ready_ns` on.
     pub fn receive(&mut self, outcome: Result<Response, Error>, ready_ns: u64) -> Step<u8> {
-        let memory = match (outcome, self.phase) {
-            (Ok(Response::WriteEeprom(memory)), Phase::SelectPage | Phase::Write)
-            | (Ok(Response::ReadEeprom(memory)), Phase::CheckPage | Phase::Read) => memory,
-            (Ok(other), _) => return self.unclear(mismatch(other, self.request()), ready_ns),
-            (Err(error), _) => return self.unclear(error, ready_ns),
+        if let Some(end) = self.end {
+            return end;
+        }
+        let step = match self.memory(outcome) {
+            Ok(memory) => self.answered(memory, ready_ns),
+            Err(error) => self.lost(error, ready_ns),
+        };
+        if step.has_ended() {
+            self.end = Some(step);
+        }
+        step
+    }
+
+    /// The response to the request that was sent last; all else is none.
+    fn memory(&self, outcome: Result<Response, Error>) -> Result<Memory, Error> {
+        let memory = match (outcome?, self.phase) {
+            (Response::WriteEeprom(memory), Phase::SelectPage | Phase::Write)
+            | (Response::ReadEeprom(memory), Phase::CheckPage | Phase::Read) => memory,
+            (other, _) => return Err(mismatch(other, self.request())),
         };
         let (got, want) = (memory.adf.address(), self.cell());
-        if got != want {
-            return self.unclear(Error::AddressMismatch { got: got.get(), want: want.get() }, ready_ns);
-        }
+        if got == want { Ok(memory) } else { Err(Error::AddressMismatch { got: got.get(), want: want.get() }) }
+    }
+
+    fn answered(&mut self, memory: Memory, ready_ns: u64) -> Step<u8> {
         if memory.adf.busy() {
             // What is busy did not take a write.
-            self.unknown &= matches!(self.phase, Phase::CheckPage | Phase::Read);
-            return self.unclear(Error::Busy { tries: self.tries.saturating_add(1) }, ready_ns);
+            match self.phase {
+                Phase::SelectPage => self.selection = Sent::NONE,
+                Phase::Write => self.written = Some(Sent::NONE),
+                Phase::CheckPage | Phase::Read => {}
+            }
+            return self.unclear(Error::Busy { tries: self.tries.saturating_add(1) }, self.looking(), ready_ns);
         }
         match self.phase {
             Phase::SelectPage => {
-                self.confirmed = true;
+                self.selection.confirmed = true;
                 self.enter(Phase::CheckPage, ready_ns)
             }
             Phase::Write => {
-                self.confirmed = true;
+                self.written = Some(Sent { unknown: true, confirmed: true });
                 self.tries = 0;
                 self.enter(Phase::Read, ready_ns)
             }
@@ -116,56 +160,77 @@ impl EepromAccess {
         }
     }
 
+    /// No sound response: the encoder may have started anew since the page was looked at.
+    fn lost(&mut self, error: Error, ready_ns: u64) -> Step<u8> {
+        self.selection.confirmed = false;
+        let next = if self.page.is_some() { Phase::CheckPage } else { self.looking() };
+        self.unclear(error, next, ready_ns)
+    }
+
+    /// What was read is read again, what was written is read first.
+    const fn looking(&self) -> Phase {
+        match self.phase {
+            Phase::SelectPage | Phase::CheckPage => Phase::CheckPage,
+            Phase::Write | Phase::Read => Phase::Read,
+        }
+    }
+
     /// The page register holds this.
     fn page_is(&mut self, memory: Memory, ready_ns: u64) -> Step<u8> {
         let want = self.page.map_or(0, Page::get);
+        let Sent { confirmed, .. } = core::mem::replace(&mut self.selection, Sent::NONE);
         if memory.edf == want {
-            self.unknown = false;
-            self.tries = 0;
+            if !self.on_page {
+                self.on_page = true;
+                self.tries = 0;
+            }
             return self.enter(self.operation(), ready_ns);
         }
-        self.differs(memory.edf, want, Phase::SelectPage, ready_ns)
+        self.differs(Error::DataMismatch { got: memory.edf, want }, confirmed, Phase::SelectPage, ready_ns)
     }
 
     /// The cell holds this.
     fn byte_is(&mut self, memory: Memory, ready_ns: u64) -> Step<u8> {
         match self.write {
-            Some(want) if memory.edf != want => self.differs(memory.edf, want, Phase::Write, ready_ns),
+            Some(want) if memory.edf != want => {
+                let Sent { confirmed, .. } = self.written.replace(Sent::NONE).unwrap_or_default();
+                self.differs(Error::DataMismatch { got: memory.edf, want }, confirmed, Phase::Write, ready_ns)
+            }
             _ => Step::Done { value: memory.edf, ready_ns },
         }
     }
 
     /// A write was not done: it shows. It is sent again unless the encoder had said that it took it.
-    fn differs(&mut self, got: u8, want: u8, again: Phase, ready_ns: u64) -> Step<u8> {
-        let error = Error::DataMismatch { got, want };
-        self.unknown = false;
+    fn differs(&mut self, error: Error, confirmed: bool, again: Phase, ready_ns: u64) -> Step<u8> {
         self.tries = self.tries.saturating_add(1);
-        if self.confirmed || self.tries >= self.polling.max_tries {
-            return Step::Failed { error, ready_ns };
+        if confirmed || self.tries >= self.polling.max_tries {
+            return self.failed(error, ready_ns);
         }
         self.enter(again, ready_ns)
     }
 
-    /// No sound answer, or one that says busy: what was read is read again, what was written is read first.
-    fn unclear(&mut self, error: Error, ready_ns: u64) -> Step<u8> {
+    /// Nothing new is known: `next` tells.
+    fn unclear(&mut self, error: Error, next: Phase, ready_ns: u64) -> Step<u8> {
         self.tries = self.tries.saturating_add(1);
         let not_before_ns = ready_ns.saturating_add(self.polling.interval_ns.into());
         if self.tries >= self.polling.max_tries {
-            let error = if self.unknown { Error::EffectUnknown { because: error.class() } } else { error };
-            return Step::Failed { error, ready_ns: not_before_ns };
+            return self.failed(error, not_before_ns);
         }
-        let next = match self.phase {
-            Phase::SelectPage | Phase::CheckPage => Phase::CheckPage,
-            Phase::Write | Phase::Read => Phase::Read,
-        };
         self.enter(next, not_before_ns)
+    }
+
+    fn failed(&self, error: Error, ready_ns: u64) -> Step<u8> {
+        let unknown = self.selection.unknown || self.written.is_some_and(|written| written.unknown);
+        let error = if unknown { Error::EffectUnknown { because: error.class() } } else { error };
+        Step::Failed { error, ready_ns }
     }
 
     const fn enter(&mut self, phase: Phase, not_before_ns: u64) -> Step<u8> {
         self.phase = phase;
-        if matches!(phase, Phase::SelectPage | Phase::Write) {
-            self.unknown = true;
-            self.confirmed = false;
+        match phase {
+            Phase::SelectPage => self.selection = Sent::NOW,
+            Phase::Write => self.written = Some(Sent::NOW),
+            Phase::CheckPage | Phase::Read => {}
         }
         Step::Send { request: self.request(), not_before_ns }
     }
@@ -274,7 +339,7 @@ mod tests {
         }
     }
 
-    /// Writing, reading, and no answer at all.
+    /// Writing, reading, and no response at all.
     #[test]
     fn polling_is_bounded_and_says_what_is_known() {
         let because = ErrorClass::NoResponse;
@@ -318,9 +383,25 @@ mod tests {
         let _ = access.receive(LOST, 0);
         let page = Ok(Response::ReadEeprom(memory(Address::PAGE_REGISTER, false, 2)));
         assert_eq!(access.receive(page, 0), send(READ, 0));
-        let _ = access.receive(LOST, 0);
-        let _ = access.receive(LOST, 0);
+        for _ in 0..2 {
+            assert_eq!(access.receive(LOST, 0), send(CHECK, 1000));
+            assert_eq!(access.receive(page, 1000), send(READ, 1000));
+        }
         assert_eq!(access.receive(Ok(read(false, 7)), 9), Step::Done { value: 7, ready_ns: 9 });
+    }
+
+    /// A page that answers and a cell that does not: looking at the page does not count the tries anew.
+    #[test]
+    fn looking_at_the_page_again_does_not_go_on_for_ever() {
+        let mut access = EepromAccess::read(Page::new(2), ADDRESS, POLLING);
+        let page = Ok(Response::ReadEeprom(memory(Address::PAGE_REGISTER, false, 2)));
+        let mut step = access.start(0);
+        for requests in 1.. {
+            let Step::Send { request, .. } = step else { break };
+            assert!(requests <= 7, "a selection, and three times a page and a cell");
+            step = access.receive(if request == READ { LOST } else { page }, 0);
+        }
+        assert!(matches!(step, Step::Failed { error: Error::NoResponse { .. }, .. }), "{step:?}");
     }
 
     /// What another cell holds says nothing of this one, nor of the page register.
@@ -335,7 +416,8 @@ mod tests {
         assert_eq!(access.receive(page, 0), send(WRITE, 0));
         assert_eq!(access.receive(Ok(wrote(false, 0x5a)), 0), send(READ, 0));
         for edf in [0x5a, 0xff] {
-            assert_eq!(access.receive(elsewhere(edf), 0), send(READ, 1000));
+            assert_eq!(access.receive(elsewhere(edf), 0), send(CHECK, 1000));
+            assert_eq!(access.receive(page, 1000), send(READ, 1000));
         }
         let end = access.receive(elsewhere(0x5a), 0);
         let because = ErrorClass::AddressMismatch;
@@ -346,7 +428,7 @@ mod tests {
         assert_eq!(access.receive(elsewhere(7), 0), Step::Failed { error, ready_ns: 1000 });
     }
 
-    /// A read is never taken for the answer to a write, nor the other way round.
+    /// A read is never taken for the response to a write, nor the other way round.
     #[test]
     fn responses_of_the_other_kind_are_refused() {
         let mut access = EepromAccess::write(None, ADDRESS, 0x5a, POLLING);

@@ -4,6 +4,7 @@ use crate::error::Error;
 use crate::message::SingleTurn;
 use crate::request::Request;
 use crate::response::Response;
+use crate::status::StatusField;
 
 /// A reset: the same one-field request ten times, at least 40 us apart, with no other request in between.
 ///
@@ -18,8 +19,10 @@ use crate::response::Response;
 /// * [`Error::NotDone`] if fewer than ten requests can have been taken;
 /// * [`Error::EffectUnknown`] otherwise.
 ///
-/// The value keeps count if it is started again, so that the requests of an attempt that was broken off are not
-/// forgotten. Confirm the effect by reading ID 3 afterwards; [`SingleTurnZero`](super::SingleTurnZero)
+/// A response whose CA0 or CA1 says that the request was damaged is a refused one: the encoder has not counted it.
+///
+/// Once done or failed it stays so. The value keeps count if it is started again, so that the requests of an attempt that
+/// was broken off are not forgotten. Confirm the effect by reading ID 3 afterwards; [`SingleTurnZero`](super::SingleTurnZero)
 /// does it for ID 8 and [`MultiTurnZero`](super::MultiTurnZero) for ID C.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -29,6 +32,7 @@ pub struct Reset {
     refused: u8,
     /// Requests that the encoder may have taken since the last effect that is known.
     taken: u8,
+    end: Option<Step<SingleTurn>>,
 }
 
 impl Reset {
@@ -60,7 +64,7 @@ impl Reset {
     }
 
     const fn of(request: Request) -> Self {
-        Self { request, answered: 0, refused: 0, taken: 0 }
+        Self { request, answered: 0, refused: 0, taken: 0, end: None }
     }
 
     /// The data ID that is sent.
@@ -77,11 +81,23 @@ impl Reset {
     pub const fn start(&mut self, now_ns: u64) -> Step<SingleTurn> {
         self.answered = 0;
         self.refused = 0;
+        self.end = None;
         self.send(now_ns)
     }
 
     /// A transaction ended with this outcome; the line is free from `ready_ns` on.
     pub fn receive(&mut self, outcome: Result<Response, Error>, ready_ns: u64) -> Step<SingleTurn> {
+        if let Some(end) = self.end {
+            return end;
+        }
+        let step = self.next(outcome, ready_ns);
+        if step.has_ended() {
+            self.end = Some(step);
+        }
+        step
+    }
+
+    fn next(&mut self, outcome: Result<Response, Error>, ready_ns: u64) -> Step<SingleTurn> {
         let spaced_ns = ready_ns.saturating_add(Self::SPACING_NS.into());
         let value = match (outcome, self.request) {
             (Ok(Response::ResetErrors(value)), Request::ResetErrors)
@@ -90,6 +106,9 @@ impl Reset {
             (Ok(other), request) => return self.refuse(mismatch(other, request), ready_ns),
             (Err(error), _) => return self.refuse(error, ready_ns),
         };
+        if value.sf.intersects(StatusField::REQUEST_DAMAGED) {
+            return self.refuse(Error::Rejected { sf: value.sf }, ready_ns);
+        }
         self.answered = self.answered.saturating_add(1);
         if self.answered < Self::REQUESTS {
             return self.send(spaced_ns);
@@ -140,7 +159,6 @@ pub(super) fn mismatch(response: Response, request: Request) -> Error {
 mod tests {
     use super::*;
     use crate::count::Abs;
-    use crate::status::StatusField;
     use std::vec::Vec;
 
     const SINGLE: SingleTurn = SingleTurn { sf: StatusField::from_bits_retain(0), abs: Abs::MAX };

@@ -56,7 +56,8 @@ impl Exchange {
     }
 
     const fn aged(&self, policy: Policy, now_ns: u64) -> Result<(), Doubt> {
-        let age_ns = now_ns.saturating_sub(self.sampled_ns);
+        // A clock that was set back makes no position young.
+        let age_ns = now_ns.abs_diff(self.sampled_ns);
         if age_ns > policy.max_age_ns { Err(Doubt::Old { age_ns }) } else { Ok(()) }
     }
 }
@@ -151,7 +152,7 @@ impl Transaction {
         }
         if self.len > 0 {
             let patience = self.line.field_timeout_ns.saturating_add(self.line.hand_over_ns);
-            self.until_ns = end_ns.saturating_add(patience.into());
+            self.until_ns = end_ns.saturating_add(patience.into()).min(self.latest_ns());
         }
         if self.len == self.expected() {
             self.finish(end_ns);
@@ -184,7 +185,7 @@ impl Transaction {
     /// Where the transaction stands.
     pub const fn progress(&self) -> Progress {
         match self.end {
-            None => Progress::Pending { until_ns: self.until_ns },
+            None => Progress::Pending { until_ns: self.until_ns.saturating_add(1) },
             Some((Ok(value), ready_ns)) => Progress::Done { value, ready_ns },
             Some((Err(error), ready_ns)) => Progress::Failed { error, ready_ns },
         }
@@ -192,6 +193,14 @@ impl Transaction {
 
     fn fields_ns(&self, fields: u8) -> u64 {
         self.line.rate.fields_ns(fields).into()
+    }
+
+    /// When the last field of the longest response is handed over at the latest: a line that does not fall silent is not
+    /// listened to any longer.
+    fn latest_ns(&self) -> u64 {
+        let fields = u64::from(self.line.field_timeout_ns).saturating_mul(11);
+        let wait = u64::from(self.line.response_timeout_ns).saturating_add(self.line.hand_over_ns.into());
+        self.request_end_ns().saturating_add(wait).saturating_add(fields)
     }
 
     /// Fields of the response that begins with the first byte there is.

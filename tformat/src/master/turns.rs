@@ -20,13 +20,14 @@ use crate::response::Response;
 /// * [`Error::NotDone`]: ID C was not sent often enough, or the count is what it was before;
 /// * [`Error::EffectUnknown`]: the count could not be read, or it says nothing because it was at 0 before, or near it.
 ///
-/// ID C is sent at most ten times. Whether the errors are gone is to be seen by ID 3.
+/// ID C is sent at most ten times. Once done or failed it stays so, until it is started again. Whether the errors are gone is to be seen by ID 3.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct MultiTurnZero {
     resolution: Resolution,
     tolerance: u32,
     witness: Witness,
+    end: Option<Step<MultiTurn>>,
 }
 
 impl MultiTurnZero {
@@ -36,24 +37,32 @@ impl MultiTurnZero {
     /// `tolerance`: how far from 0, in turns, the count may be afterwards.
     pub const fn set_and_lose_multi_turn_reference(resolution: Resolution, tolerance: u32) -> Self {
         let reset = Reset::clear_turns_and_lose_multi_turn_reference();
-        Self { resolution, tolerance, witness: Witness::new(reset, Request::ReadMultiTurn, Reset::ZERO_WAIT_NS) }
+        let witness = Witness::new(reset, Request::ReadMultiTurn, Reset::ZERO_WAIT_NS);
+        Self { resolution, tolerance, witness, end: None }
     }
 
     /// The first request, at once.
     pub const fn start(&mut self, now_ns: u64) -> Step<MultiTurn> {
+        self.end = None;
         self.witness.start(now_ns)
     }
 
     /// A transaction ended with this outcome; the line is free from `ready_ns` on.
     pub fn receive(&mut self, outcome: Result<Response, Error>, ready_ns: u64) -> Step<MultiTurn> {
-        let Self { resolution, tolerance, witness } = self;
+        if let Some(end) = self.end {
+            return end;
+        }
+        let Self { resolution, tolerance, witness, end } = self;
         let value = |response| match response {
             Response::ReadMultiTurn(multi) => Some(resolution.turns(multi.abm).map(|_| (multi, multi.abm.get()))),
             _ => None,
         };
-        witness.receive(outcome, ready_ns, value, |from, to| {
-            resolution.turns_between(from, to).unsigned_abs() <= *tolerance
-        })
+        let near = |from, to| resolution.turns_between(from, to).unsigned_abs() <= *tolerance;
+        let step = witness.receive(outcome, ready_ns, value, near);
+        if step.has_ended() {
+            *end = Some(step);
+        }
+        step
     }
 }
 

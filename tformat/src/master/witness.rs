@@ -3,6 +3,7 @@ use super::{Reset, Step};
 use crate::error::{Error, ErrorClass};
 use crate::request::Request;
 use crate::response::Response;
+use crate::status::StatusField;
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -54,7 +55,10 @@ impl Witness {
         if self.phase == Phase::Act {
             return self.act(outcome, ready_ns);
         }
-        let read_out = outcome.and_then(|response| value(response).unwrap_or(Err(mismatch(response, self.request))));
+        let read_out = outcome.and_then(|response| match response.status() {
+            Some(sf) if sf.intersects(StatusField::REQUEST_DAMAGED) => Err(Error::Rejected { sf }),
+            _ => value(response).unwrap_or(Err(mismatch(response, self.request))),
+        });
         match (read_out, self.phase) {
             (Err(error), _) => self.unread(error, ready_ns),
             (Ok((message, now)), Phase::After(act)) => match self.judge(act, now, near) {

@@ -16,13 +16,14 @@ use crate::response::Response;
 /// * [`Error::NotDone`]: ID 8 was not sent often enough, or the position is what it was before;
 /// * [`Error::EffectUnknown`]: the position could not be read, or it says nothing because it was at zero before.
 ///
-/// ID 8 is sent at most ten times.
+/// ID 8 is sent at most ten times. Once done or failed it stays so, until it is started again.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct SingleTurnZero {
     resolution: Resolution,
     tolerance: u32,
     witness: Witness,
+    end: Option<Step<SingleTurn>>,
 }
 
 impl SingleTurnZero {
@@ -32,23 +33,31 @@ impl SingleTurnZero {
     /// `tolerance`: how far from zero, in counts, the shaft may seem to be afterwards.
     pub const fn set_and_shift_commutation_angle(resolution: Resolution, tolerance: u32) -> Self {
         let reset = Reset::set_single_turn_zero_and_shift_commutation_angle();
-        Self { resolution, tolerance, witness: Witness::new(reset, Request::ReadSingleTurn, 0) }
+        Self { resolution, tolerance, witness: Witness::new(reset, Request::ReadSingleTurn, 0), end: None }
     }
 
     /// The first request, at once.
     pub const fn start(&mut self, now_ns: u64) -> Step<SingleTurn> {
+        self.end = None;
         self.witness.start(now_ns)
     }
 
     /// A transaction ended with this outcome; the line is free from `ready_ns` on.
     pub fn receive(&mut self, outcome: Result<Response, Error>, ready_ns: u64) -> Step<SingleTurn> {
-        let Self { resolution, tolerance, witness } = self;
+        if let Some(end) = self.end {
+            return end;
+        }
+        let Self { resolution, tolerance, witness, end } = self;
         let value = |response| match response {
             Response::ReadSingleTurn(single) => Some(resolution.single_turn(single.abs).map(|abs| (single, abs))),
             _ => None,
         };
-        witness
-            .receive(outcome, ready_ns, value, |from, to| resolution.difference(from, to).unsigned_abs() <= *tolerance)
+        let near = |from, to| resolution.difference(from, to).unsigned_abs() <= *tolerance;
+        let step = witness.receive(outcome, ready_ns, value, near);
+        if step.has_ended() {
+            *end = Some(step);
+        }
+        step
     }
 }
 

@@ -15,7 +15,7 @@ pub(crate) fn fulls() -> impl Strategy<Value = AllData> {
     })
 }
 
-/// A request and an answer that a sound encoder may give to it.
+/// A request and a response that a sound encoder may give to it.
 pub(crate) fn exchanges() -> impl Strategy<Value = (Request, Response)> {
     (requests(), fulls(), any::<bool>()).prop_map(|(request, full, busy)| (request, answer(request, full, busy)))
 }
@@ -27,7 +27,7 @@ pub(crate) fn plain_exchanges() -> impl Strategy<Value = (Request, Response)> {
     (requests(), plain, any::<bool>()).prop_map(|(request, data, busy)| (request, answer(request, data, busy)))
 }
 
-/// The answer to `request` of an encoder that knows `full`.
+/// The response to `request` of an encoder that knows `full`.
 fn answer(request: Request, full: AllData, busy: bool) -> Response {
     let single = SingleTurn { sf: full.sf, abs: full.abs };
     match request {

@@ -81,6 +81,10 @@ fn is_thrown_away(response: &Response) -> bool {
 impl Axis {
     /// Sends a non-cyclic command and holds it until it is answered; see [`take_outcome`](Self::take_outcome).
     ///
+    /// In between the normal command goes out, until its echo is seen or the time for an answer is over. Where the echo was not
+    /// seen, the drive may not have noticed that there is a new request: its answers do not count until it was, and the
+    /// request times out.
+    ///
     /// A homing type other than those that are confirmed may give the axis new coordinates. In CP the set-point would stay in
     /// the old ones, so with the servo on it is refused there; latches have [`ask_latch`](Self::ask_latch).
     ///
@@ -179,11 +183,11 @@ impl Axis {
         }
         let released = response.is_some_and(|r| r.code.noncyclic_bits() == 0);
         self.unreleased &= !released;
+        let heard = response.filter(|_| !self.unreleased);
         match &mut self.service {
             Service::Idle => {}
             Service::Asking { handshake, .. } => {
-                // Echoes tell requests of one kind apart by their index, and not by their data.
-                let progress = handshake.receive(response.filter(|_| !self.unreleased));
+                let progress = handshake.receive(heard);
                 if !progress.is_pending() {
                     self.outcome = Some(progress);
                     self.service = Service::Releasing { left: self.config.limits.answer };
@@ -203,10 +207,12 @@ impl Axis {
     pub(super) fn serve_sub(&mut self, response: Option<&SubResponse>) {
         let response = response.filter(|sub| !sub.error_code().is_some_and(ErrorCode::discards_block));
         let released = response.is_some_and(|r| r.code.get() == 0);
+        self.sub_unreleased &= !released;
+        let heard = response.filter(|_| !self.sub_unreleased);
         match &mut self.sub {
             SubService::Idle => {}
             SubService::Asking(handshake) => {
-                let progress = handshake.receive(response);
+                let progress = handshake.receive(heard);
                 if !progress.is_pending() {
                     self.sub_outcome = Some(progress);
                     self.sub = SubService::Releasing { left: self.config.limits.answer };
@@ -214,7 +220,10 @@ impl Axis {
             }
             SubService::Releasing { left } => match left.checked_sub(1) {
                 Some(less) if !released => *left = less,
-                _ => self.sub = SubService::Idle,
+                _ => {
+                    self.sub_unreleased = !released;
+                    self.sub = SubService::Idle;
+                }
             },
         }
     }

@@ -142,21 +142,31 @@ pub struct ClearAlarm {
     good: Option<u64>,
     /// The answer to the command, once it is known.
     answer: Option<Result<(), Failure>>,
+    end: Option<Progress<Clearing>>,
 }
 
 impl ClearAlarm {
     /// With the type code that clears the present alarm as the drive's manual gives it (Index 0); Alarm has `limit` update
     /// periods to go to 0 after the answer.
     pub const fn new(type_code: TypeCode, limit: u32) -> Self {
-        Self { ask: Ask { asked: false }, type_code, left: limit, good: None, answer: None }
+        Self { ask: Ask { asked: false }, type_code, left: limit, good: None, answer: None, end: None }
     }
 
     /// To be called once in every update period.
     ///
     /// The command is sent once, and Alarm of the blocks received after its answer decides, not the answer alone.
     /// [`Failure::CommandError`]: the drive does not know the type code, which says nothing of the alarm.
-    /// [`Failure::TimedOut`]: no answer came and Alarm is still 1, or no block came at all.
+    /// [`Failure::TimedOut`]: no answer came and Alarm is still 1, or no block came at all. Once done or failed it stays so.
     pub fn receive(&mut self, axis: &mut Axis) -> Progress<Clearing> {
+        if let Some(end) = self.end {
+            return end;
+        }
+        let progress = self.next(axis);
+        self.end = progress.ended();
+        progress
+    }
+
+    fn next(&mut self, axis: &mut Axis) -> Progress<Clearing> {
         let good = axis.counters().good();
         // Status_Flags are those of the last good block, which may be old.
         let is_fresh = self.good.replace(good).is_some_and(|last| last != good);

@@ -28,25 +28,35 @@ pub struct SetPosition {
     position: i32,
     /// The command was answered, or not within its limit.
     set: Option<Result<(), Failure>>,
+    end: Option<Progress<i32>>,
 }
 
 impl SetPosition {
     /// Sets the actual position (21h), command units; read back as APOS.
     pub const fn actual(position: i32) -> Self {
-        Self { ask: Ask { asked: false }, type_code: homing::SET_ACTUAL_POSITION, position, set: None }
+        Self { ask: Ask { asked: false }, type_code: homing::SET_ACTUAL_POSITION, position, set: None, end: None }
     }
 
     /// Sets the command position (22h), command units; read back as IPOS, which follows the motor while the servo is off.
     pub const fn command(position: i32) -> Self {
-        Self { ask: Ask { asked: false }, type_code: homing::SET_COMMAND_POSITION, position, set: None }
+        Self { ask: Ask { asked: false }, type_code: homing::SET_COMMAND_POSITION, position, set: None, end: None }
     }
 
     /// To be called once in every update period. `Done` carries the position as read back: a motor that is free may have
     /// turned since.
     ///
     /// The command is never sent twice. If its answer does not come, the position read back decides: `Done` if it is the one
-    /// to be set, otherwise [`Failure::TimedOut`], and the effect is not known.
+    /// to be set, otherwise [`Failure::TimedOut`], and the effect is not known. Once done or failed it stays so.
     pub fn receive(&mut self, axis: &mut Axis) -> Progress<i32> {
+        if let Some(end) = self.end {
+            return end;
+        }
+        let progress = self.next(axis);
+        self.end = progress.ended();
+        progress
+    }
+
+    fn next(&mut self, axis: &mut Axis) -> Progress<i32> {
         let Some(set) = self.set else {
             match self.ask.receive(axis, command(self.type_code, self.position)) {
                 Progress::Done { .. } => self.set = Some(Ok(())),
@@ -88,17 +98,28 @@ pub struct Home {
     accepted: bool,
     /// Homing_Complete was 0, or In_Progress 1: what it says now is not left from an earlier homing.
     fresh: bool,
+    end: Option<Progress<()>>,
 }
 
 impl Home {
     /// A homing of this type; the drive has `limit` update periods after it has accepted the command.
     pub const fn new(type_code: u8, limit: u32) -> Self {
-        Self { ask: Ask { asked: false }, type_code, left: limit, accepted: false, fresh: false }
+        Self { ask: Ask { asked: false }, type_code, left: limit, accepted: false, fresh: false, end: None }
     }
 
     /// To be called once in every update period. `Done` when Homing_Complete is 1 and In_Progress is 0, and at least one of
-    /// them was different since the command was accepted: Homing_Complete may be left from an earlier homing.
+    /// them was different since the command was accepted: Homing_Complete may be left from an earlier homing. Once done or
+    /// failed it stays so: the command is never sent twice.
     pub fn receive(&mut self, axis: &mut Axis) -> Progress<()> {
+        if let Some(end) = self.end {
+            return end;
+        }
+        let progress = self.next(axis);
+        self.end = progress.ended();
+        progress
+    }
+
+    fn next(&mut self, axis: &mut Axis) -> Progress<()> {
         if axis.mode() != ActiveCode::ProfilePosition {
             return Progress::Failed { error: Failure::Mode };
         }

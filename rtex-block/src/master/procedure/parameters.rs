@@ -48,17 +48,30 @@ pub struct Restore {
     read: TypeCode,
     place: usize,
     written: bool,
+    /// It has failed.
+    failed: Option<Failure>,
 }
 
 impl Restore {
     /// With the type code for reading as the drive's manual gives it.
     pub const fn new(read: TypeCode) -> Self {
-        Self { ask: Ask { asked: false }, read, place: 0, written: false }
+        Self { ask: Ask { asked: false }, read, place: 0, written: false, failed: None }
     }
 
     /// To be called once in every update period. [`Failure::Differs`] names the parameter that did not take its value;
-    /// after any other failure the parameter at [`place`](Self::place) may have either value.
+    /// after any other failure the parameter at [`place`](Self::place) may have either value. What has failed stays so.
     pub fn receive(&mut self, axis: &mut Axis, list: &[(Pr, i32)]) -> Progress<()> {
+        if let Some(error) = self.failed {
+            return Progress::Failed { error };
+        }
+        let progress = self.next(axis, list);
+        if let Progress::Failed { error } = progress {
+            self.failed = Some(error);
+        }
+        progress
+    }
+
+    fn next(&mut self, axis: &mut Axis, list: &[(Pr, i32)]) -> Progress<()> {
         let Some((pr, value)) = list.get(self.place).copied() else { return Progress::Done { value: () } };
         let (type_code, data) = if self.written { (self.read, 0) } else { (parameter::WRITE, value) };
         let request = NonCyclicCommand::Parameter(Arguments { type_code, index: pr.index(), data });

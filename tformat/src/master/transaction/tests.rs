@@ -26,8 +26,8 @@ fn run(request: Request, line: Line, bytes: &[(u8, u64)]) -> Result<Response, Er
 
 fn ended(transaction: &mut Transaction) -> Result<Response, Error> {
     if let Progress::Pending { until_ns } = transaction.progress() {
-        assert_eq!(transaction.poll(until_ns), Progress::Pending { until_ns });
-        let _ = transaction.poll(until_ns + 1);
+        assert_eq!(transaction.poll(until_ns - 1), Progress::Pending { until_ns });
+        let _ = transaction.poll(until_ns);
     }
     match transaction.progress() {
         Progress::Done { value, .. } => Ok(value.response),
@@ -75,8 +75,8 @@ fn settings_are_independent() {
 #[test]
 fn an_echo_leaves_the_time_out_as_it_is() {
     let mut transaction = Transaction::start(Request::ReadSingleTurn, LINE, 0);
-    assert_eq!(transaction.bytes(&[0x02], 4_000), Progress::Pending { until_ns: 23_599 });
-    assert_eq!(transaction.poll(23_599), Progress::Pending { until_ns: 23_599 });
+    assert_eq!(transaction.bytes(&[0x02], 4_000), Progress::Pending { until_ns: 23_600 });
+    assert_eq!(transaction.poll(23_599), Progress::Pending { until_ns: 23_600 });
 }
 
 /// The request of 4 us begins at 10 us. Its driver is on 1 us before, and off before the encoder answers.
@@ -85,15 +85,15 @@ fn times_of_a_transaction() {
     let mut transaction = Transaction::start(Request::ReadSingleTurn, LINE, 10_000);
     assert_eq!((transaction.driver_on_ns(), transaction.driver_off_ns()), (9_000, (14_000, 15_600)));
     // 14 us, 10 us to the start bit, 4 us for the field, 5.599 us until it is handed over.
-    assert_eq!(transaction.progress(), Progress::Pending { until_ns: 33_599 });
-    assert_eq!(transaction.poll(33_599), Progress::Pending { until_ns: 33_599 });
+    assert_eq!(transaction.progress(), Progress::Pending { until_ns: 33_600 });
+    assert_eq!(transaction.poll(33_599), Progress::Pending { until_ns: 33_600 });
     // The longest response begun at 24 us is over 44 us later.
     let want = Progress::Failed { error: Error::NoResponse { echo: false }, ready_ns: 68_000 };
     assert_eq!(transaction.poll(33_600), want);
 
     let mut transaction = Transaction::start(Request::ReadSingleTurn, LINE, 10_000);
     // The next field ends 6 us later at the latest.
-    assert_eq!(transaction.bytes(&[0x02], 21_000), Progress::Pending { until_ns: 32_599 });
+    assert_eq!(transaction.bytes(&[0x02], 21_000), Progress::Pending { until_ns: 32_600 });
     let done = transaction.bytes(&RESPONSE[1..], 41_000);
     let response = Response::parse(Request::ReadSingleTurn, &RESPONSE).unwrap();
     assert_eq!(done, Progress::Done { value: Exchange { response, sampled_ns: 14_480 }, ready_ns: 41_000 });
@@ -309,8 +309,10 @@ fn the_age_of_a_position() {
     let response = Response::parse(Request::ReadSingleTurn, &RESPONSE).unwrap();
     let exchange = Exchange { response, sampled_ns: 4_480 };
     let resolution = Resolution::new(23, 16).unwrap();
-    let policy = Policy::tolerating(crate::Almc::all()).with_max_age_ns(125_000);
+    let policy = Policy::STRICT.tolerating(crate::Almc::all()).with_max_age_ns(125_000);
     let at = |now_ns| exchange.single_turn(resolution, policy, now_ns);
+    // Before it was sampled: a clock that is read before the exchange, and one that was set back.
+    assert_eq!(exchange.single_turn(resolution, policy.with_max_age_ns(4_479), 0), Err(Doubt::Old { age_ns: 4_480 }));
     assert_eq!((at(0), at(129_480), at(129_481)), (Ok(1_883_572), Ok(1_883_572), Err(Doubt::Old { age_ns: 125_001 })));
     let strict = exchange.single_turn(resolution, Policy::STRICT, u64::MAX);
     assert!(matches!(strict, Err(Doubt::Status { .. })), "{strict:?}");
