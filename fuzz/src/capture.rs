@@ -86,8 +86,8 @@ fn edges(line: &mut dyn Line, said: &mut String) {
             last = change.time;
             writeln!(said, "{change:?}").unwrap();
         }
-        if let Some(gap) = line.gap() {
-            writeln!(said, "gap until {gap}").unwrap();
+        if let Some(hole) = line.hole() {
+            writeln!(said, "{hole:?}").unwrap();
         }
         match more {
             Ok(true) => {}

@@ -20,13 +20,14 @@ pub mod samples;
 pub mod sigrok_text;
 pub mod table;
 pub mod time;
+mod utf16;
 pub mod vcd;
 
 use std::cell::Cell;
 use std::path::Path;
 use std::rc::Rc;
 
-pub use input::Input;
+pub use input::{Input, Piped};
 
 use crate::fault::{At, Fault};
 
@@ -39,6 +40,15 @@ pub struct Change {
     pub channel: u16,
     /// The level from here on.
     pub level: bool,
+}
+
+/// A part of a recording in which nothing is known of the lines; times in picoseconds.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Hole {
+    /// Where the recording stops.
+    pub from: i64,
+    /// Where it goes on.
+    pub to: i64,
 }
 
 /// A recording of lines.
@@ -61,9 +71,8 @@ pub trait Line {
     /// The time up to which the recording was read, in picoseconds.
     fn reached(&self) -> i64;
 
-    /// Where the recording goes on, if there is a hole in it before what was read last: nothing is known of the lines
-    /// up to this time, in picoseconds.
-    fn gap(&mut self) -> Option<i64> {
+    /// The hole in the recording before what was read last, if there is one.
+    fn hole(&mut self) -> Option<Hole> {
         None
     }
 
@@ -173,6 +182,9 @@ pub fn open(path: &Path, hints: Hints) -> Result<(Capture, Rc<Cell<u64>>), Fault
 /// Opens what comes from `input`; `path` is only looked at for its ending.
 pub fn open_input(input: Input, path: &Path, hints: Hints) -> Result<Capture, Fault> {
     let mut input = if hints.format.is_none_or(Format::is_text) { input.unpacked()? } else { input };
+    if hints.sample_rate.is_none() && hints.record_size.is_none() {
+        input = input.in_utf8()?;
+    }
     let format = match hints.format {
         Some(format) => format,
         None if hints.record_size.is_some() => Format::Records,
@@ -266,7 +278,7 @@ fn decoder(mut input: Input, format: Format, hints: Hints) -> Result<Capture, Fa
     }
     Ok(match format {
         Format::Vcd => Capture::Edges(Box::new(vcd::Vcd::new(input)?)),
-        Format::Csv => Capture::Edges(Box::new(table::Table::new(input, hints.threshold)?)),
+        Format::Csv => Capture::Edges(Box::new(table::Table::new(input, hints)?)),
         Format::AnalyzerTable => Capture::Edges(Box::new(analyzer::Analyzer::new(input)?)),
         Format::Isf => Capture::Edges(Box::new(isf::Isf::new(input, hints.threshold)?)),
         Format::Session => archive::open(input)?,

@@ -177,9 +177,9 @@ pub struct FileArgs {
     /// Samples a second of a raw file, as 24000000 or 24M; a file given with it is raw unless --format says otherwise.
     #[arg(long, value_name = "HZ", value_parser = frequency)]
     pub rate: Option<u64>,
-    /// Bytes a sample of a raw file.
-    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u8).range(1..=8))]
-    pub unit_size: u8,
+    /// Bytes a sample of a raw file, otherwise 1.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u8).range(1..=8))]
+    pub unit_size: Option<u8>,
     /// The files are logs of bytes as hex digits, a burst a line.
     #[arg(long, conflicts_with_all = ["format", "rate"])]
     pub bytes: bool,
@@ -292,6 +292,12 @@ impl Decode {
             (self.file.follow, "--follow"),
             (self.line.channel.is_some(), "--channel"),
             (self.line.tx.is_some(), "--tx"),
+            (self.file.unit_size.is_some(), "--unit-size"),
+            (self.line.bit_rate.is_some(), "--bit-rate"),
+            (self.line.polarity.is_some(), "--polarity"),
+            (self.rtex.block_size.is_some(), "--block-size"),
+            (self.rtex.period.is_some(), "--period"),
+            (self.rtex.mac_id.is_some(), "--mac-id"),
         ];
         said.into_iter().find(|(is, _)| *is).map(|(_, option)| option)
     }
@@ -308,7 +314,7 @@ impl Decode {
         Hints {
             format,
             sample_rate: self.file.rate,
-            unit_size: usize::from(self.file.unit_size),
+            unit_size: usize::from(self.file.unit_size.unwrap_or(1)),
             record_size: self.file.record_size.map(usize::from),
             threshold: self.file.threshold,
             grows: self.file.follow,

@@ -10,7 +10,7 @@ use anstream::{AutoStream, ColorChoice};
 use indicatif::{ProgressBar, ProgressStyle};
 
 use crate::bundled;
-use crate::capture::{self, Capture, Input};
+use crate::capture::{self, Capture, Input, Piped};
 use crate::cli::Decode;
 use crate::fault::{At, Fault};
 use crate::line::Stop;
@@ -28,8 +28,18 @@ const LONG: u64 = 1 << 24;
 /// Decodes all files. 0: all frames good; 1: not so; 2: the options do not go together.
 pub(crate) fn run(arguments: &Decode) -> ExitCode {
     let files = arguments.files.len();
-    let piped = if files == 0 { Input::piped() } else { None };
-    if let (0, None, Some(option)) = (files, &piped, arguments.describes_a_file()) {
+    let described = arguments.describes_a_file();
+    let piped = match if files == 0 { Input::piped(described.is_some()) } else { Piped::Nothing } {
+        Piped::Content(input) => Some(input),
+        Piped::Silence => {
+            eprintln!(
+                "nothing comes from the standard input: the captures of the program are shown; name - to wait for it"
+            );
+            None
+        }
+        Piped::Nothing => None,
+    };
+    if let (0, None, Some(option)) = (files, &piped, described) {
         eprintln!("error: {option} describes a capture: name its file, or - for the standard input");
         return ExitCode::from(2);
     }
@@ -156,7 +166,7 @@ fn one(
         bar.say(&format!("error: {name}: {refusals}"));
     }
     match end {
-        Ok(()) if tally.ok == 0 && tally.refused == 0 => {
+        Ok(()) if tally == Tally::default() => {
             Ok(complain(&Fault::new(name, At::File, "no frame in it: the line is idle, or not of this protocol"), bar))
         }
         Ok(()) if chosen == Tally::default() => {

@@ -48,9 +48,9 @@ impl Event {
         Self { remark: true, ..Self::new(place, None, kind, vec![Field::text("note", note)], Verdict::Ok) }
     }
 
-    /// A piece of a frame, `what`, at the end of the capture: what comes then is not known, so it is not sound.
-    pub fn cut_off(place: Place, what: &str) -> Self {
-        Self::new(place, None, "cut", Vec::new(), Verdict::cut_off(what))
+    /// A piece of a frame at the end of the capture: what comes then is not known, so it is not sound.
+    pub fn cut_off(place: Place) -> Self {
+        Self::new(place, None, "cut", Vec::new(), Verdict::cut_off())
     }
 
     /// No answer, called `what`, came to the request at `place` within `timeout`, in picoseconds, or until `now`, when
@@ -256,10 +256,16 @@ impl From<Refusal> for Verdict {
 }
 
 impl Verdict {
-    /// The capture ends inside `what`: what comes then is not known, so it is not sound.
-    pub fn cut_off(what: &str) -> Self {
+    /// The capture ends inside a frame: what comes then is not known, so it is not sound.
+    pub fn cut_off() -> Self {
         let cause = Some("the file was cut off, or recording stopped there".to_owned());
-        Refusal { cause, ..Refusal::new("truncated", format!("the capture ends inside {what}")) }.into()
+        Refusal { cause, ..Refusal::new("truncated", "the capture ends inside a frame") }.into()
+    }
+
+    /// The recording has a hole that begins inside a frame.
+    pub fn in_a_hole() -> Self {
+        let cause = Some("recording stopped there for a while".to_owned());
+        Refusal { cause, ..Refusal::new("truncated", "a hole in the recording begins inside the frame") }.into()
     }
 
     /// Whether all checks passed.

@@ -146,8 +146,8 @@ pub fn decode(
             fault = Some(e);
             false
         });
-        if let Some(time) = line.gap() {
-            watch.gap(time, out)?;
+        if let Some(hole) = line.hole() {
+            watch.hole(hole, out)?;
         }
         watch.changes(&changes, out)?;
         out.tick();
@@ -202,7 +202,7 @@ pub fn samples(
 /// anything could be decoded, the polarity was only a guess and says nothing.
 fn right_way_up(file: &str, settings: &Settings, found: &[Found], out: &Output<'_>) -> Result<(), Stop> {
     let inverted = found.iter().any(Found::is_inverted);
-    if !inverted || settings.line.inverted.is_some() || out.tally.ok <= out.tally.refused {
+    if !inverted || settings.line.inverted.is_some() || out.tally.ok <= out.tally.faults() {
         return Ok(());
     }
     let what = "the line is inverted: exchange A and B, or say that it is meant so with --polarity inverted";

@@ -13,7 +13,7 @@ use std::fmt;
 use std::io::{self, Write};
 
 use crate::capture::Change;
-use crate::event::{Event, Verdict};
+use crate::event::{Event, NO_RESPONSE, Verdict};
 use crate::protocols::Protocol;
 
 /// Writes to the standard output at once; somebody who does not read on is no fault.
@@ -88,8 +88,17 @@ pub trait Printer {
 pub struct Tally {
     /// Events that hold.
     pub ok: u64,
-    /// Events refused.
+    /// Frames refused.
     pub refused: u64,
+    /// Answers that did not come.
+    pub missing: u64,
+}
+
+impl Tally {
+    /// What is wrong: refused frames and missing answers.
+    pub fn faults(self) -> u64 {
+        self.refused + self.missing
+    }
 }
 
 impl Sink for Tally {
@@ -97,6 +106,7 @@ impl Sink for Tally {
         match event.verdict {
             _ if event.remark => {}
             Verdict::Ok => self.ok += 1,
+            Verdict::Refused(_) if event.verdict.is_silence() => self.missing += 1,
             Verdict::Refused(_) => self.refused += 1,
         }
         Ok(())
@@ -198,15 +208,19 @@ impl<'a> Output<'a> {
         (self.progress)();
     }
 
-    /// The refused frames in a sentence; none where all hold.
+    /// The refused frames and the missing answers in a sentence; none where all hold.
     pub fn refusals(&self) -> Option<String> {
-        let Tally { ok, refused } = self.chosen;
-        let one = |(class, (count, cause)): (&&str, &(u64, Option<String>))| match cause {
-            Some(cause) => format!("{class} {count} ({cause})"),
-            None => format!("{class} {count}"),
-        };
-        let classes = self.refused.iter().map(one).collect::<Vec<_>>().join("; ");
-        (refused > 0).then(|| format!("{refused} of {} frames refused: {classes}", ok + refused))
+        let Tally { ok, refused, missing } = self.chosen;
+        let said = |cause: &Option<String>| cause.as_ref().map_or(String::new(), |cause| format!(" ({cause})"));
+        let one = |(class, (count, cause)): (&&str, &(u64, Option<String>))| format!("{class} {count}{}", said(cause));
+        let classes = self.refused.iter().filter(|(class, _)| **class != NO_RESPONSE).map(one).collect::<Vec<_>>();
+        let frames = format!("{refused} of {} frames refused: {}", ok + refused, classes.join("; "));
+        let cause = self.refused.get(NO_RESPONSE).map_or(String::new(), |(_, cause)| said(cause));
+        let requests = if missing == 1 { "request" } else { "requests" };
+        let silence = format!("{missing} {requests} without an answer: {NO_RESPONSE}{cause}");
+        let both = [(refused > 0).then_some(frames), (missing > 0).then_some(silence)];
+        let both = both.into_iter().flatten().collect::<Vec<_>>().join("; ");
+        (!both.is_empty()).then_some(both)
     }
 
     /// Whether nothing that was asked for can come any more once a recording was read up to `time`.

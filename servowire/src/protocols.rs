@@ -129,8 +129,8 @@ impl Protocol {
         match (self, capture) {
             // Whatever was asked for: the only protocol that has packets.
             (_, Capture::Packets(packets)) => sorte::decode(packets, out),
-            (Self::Sorte, _) => Err(Fault::new(file, At::File, "SORTE is decoded from a pcapng file").into()),
             (_, Capture::Bytes(log)) => bytes::decode(file, log, self, settings, out),
+            (Self::Sorte, _) => Err(Fault::new(file, At::File, "SORTE is decoded from a pcapng file").into()),
             (Self::Rtex, _) => Err(Fault::new(file, At::File, rtex::NO_LINE).into()),
             (_, Capture::Edges(mut line)) => line::decode(file, line.as_mut(), self, settings, out),
             (_, Capture::Samples(mut raw)) => line::samples(file, &mut raw, self, settings, out),

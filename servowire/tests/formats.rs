@@ -14,6 +14,8 @@
 
 mod common;
 
+use std::fmt::Write as _;
+
 use common::{Bench, GOOD_FRAMES, Run, good_traffic};
 
 #[track_caller]
@@ -179,4 +181,91 @@ fn channels_of_a_vcd() {
     all_good(&common::decode(&file, &["--json", "--channel", "m.inner.line"]));
     all_good(&common::decode(&file, &["--json", "--channel", "0"]));
     common::decode(&file, &["--channel", "clock"]).fails_with("no traffic on channel \"clock\": 0 edges");
+}
+
+/// What PowerShell makes of `sigrok-cli ... > file`.
+#[test]
+fn text_in_utf_16() {
+    let bench = Bench::new();
+    let wave = good_traffic(2.5e6);
+    let little = |text: &str| -> Vec<u8> { text.encode_utf16().flat_map(u16::to_le_bytes).collect() };
+    let big = |text: &str| -> Vec<u8> { text.encode_utf16().flat_map(u16::to_be_bytes).collect() };
+    for text in [wave.vcd(), wave.saleae_csv()] {
+        let text = format!("\u{feff}{text}").replace('\n', "\r\n");
+        for bytes in [little(&text), big(&text)] {
+            all_good(&bench.decode("a.txt", bytes, &["--json"]));
+        }
+    }
+    let log = little("\u{feff}1A\r\n1A 20 29 C0 3B 17 00 00 00 C8 37\r\n");
+    assert_eq!(bench.decode("log.txt", log, &["--json"]).is_good().json().len(), 2);
+    // Samples may begin as they like.
+    let mut raw = wave.raw(20e6, 3);
+    raw.splice(0..2, [0xff, 0xfe]);
+    assert_eq!(bench.decode("a.raw", raw, &["--json", "--rate", "20M"]).json().len(), GOOD_FRAMES);
+}
+
+/// Times between two units: `#20.4` of a microsecond.
+#[test]
+fn fractions_of_the_unit_of_a_vcd() {
+    let bench = Bench::new();
+    let wave = good_traffic(2.5e6);
+    let mut text = "$timescale 1 us $end\n$var wire 1 ! line $end\n$enddefinitions $end\n".to_owned();
+    for (time, level) in &wave.edges {
+        write!(text, "#{}.{:06}\n{}!\n", time / 1_000_000, time % 1_000_000, u8::from(*level)).unwrap();
+    }
+    all_good(&bench.decode("a.vcd", &text, &["--json"]));
+    let back = bench.decode("a.vcd", text + "#1.25\n#1.125\n", &["--json"]);
+    back.fails_with("time goes back");
+    bench.decode("b.vcd", wave.vcd() + "#9999999999.x\n", &[]).fails_with("#9999999999.x is no time");
+}
+
+/// Extended VCD: the range of a port stands in the place of its width, a letter a line, then the strengths.
+#[test]
+fn ports_of_several_lines() {
+    let bench = Bench::new();
+    let wave = good_traffic(2.5e6);
+    let mut text = "$timescale 1 ps $end\n$var port [2:0] <0 pair $end\n$enddefinitions $end\n".to_owned();
+    for (time, level) in &wave.edges {
+        // Driven from outside and by the device; the third line is fought for.
+        write!(text, "#{time}\np{}LA 066 600 <0\n", if *level { 'U' } else { 'D' }).unwrap();
+    }
+    let file = bench.file("a.evcd", text);
+    all_good(&common::decode(&file, &["--json"]));
+    all_good(&common::decode(&file, &["--json", "--channel", "pair[2]"]));
+    common::decode(&file, &["--channel", "pair[0]"]).fails_with("no traffic on channel \"pair[0]\"");
+}
+
+/// Drawn levels, as `sigrok-cli -O ascii` writes them: an edge is drawn in the place of the level behind it.
+#[test]
+fn samples_that_are_drawn() {
+    let bench = Bench::new();
+    let samples = good_traffic(2.5e6).samples(20e6);
+    let mut last = samples[0];
+    let mut drawn = String::new();
+    for level in samples {
+        drawn.push(match (last, level) {
+            (true, true) => '"',
+            (false, false) => '.',
+            (false, true) => '/',
+            (true, false) => '\\',
+        });
+        last = level;
+    }
+    let mut text = "libsigrok 0.5.2\nAcquisition with 1/1 channels at 20 MHz\n".to_owned();
+    for line in drawn.as_bytes().chunks(74) {
+        writeln!(text, "A: B:{}", std::str::from_utf8(line).unwrap()).unwrap();
+    }
+    let run = bench.decode("a.txt", text, &["--json"]);
+    all_good(&run);
+    assert_eq!(run.json()[0]["channel"], "A: B");
+}
+
+/// Levels and nothing else: the user knows how fast they were taken.
+#[test]
+fn a_table_without_times() {
+    let bench = Bench::new();
+    let samples = good_traffic(2.5e6).samples(20e6);
+    let text: String = samples.iter().map(|level| if *level { "1\n" } else { "0\n" }).collect();
+    all_good(&bench.decode("a.csv", &text, &["--json", "--format", "csv", "--rate", "20M"]));
+    bench.decode("a.csv", &text, &[]).fails_with("is said with --format csv --rate");
 }

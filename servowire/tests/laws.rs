@@ -23,7 +23,7 @@ use servowire::capture::raw::{Raw, Unit};
 use servowire::capture::saleae_binary::SaleaeBinary;
 use servowire::capture::table::Table;
 use servowire::capture::vcd::Vcd;
-use servowire::capture::{ByteLog, Capture, Input};
+use servowire::capture::{ByteLog, Capture, Hints, Input};
 use servowire::event::{Direction, Event};
 use servowire::output::{Origin, Output, Printer};
 use servowire::protocols::{Protocol, Settings};
@@ -134,7 +134,7 @@ proptest! {
         }
         let capture = match format {
             0 => Vcd::new(input(file)).map(|file| Capture::Edges(Box::new(file))),
-            1 => Table::new(input(file), None).map(|file| Capture::Edges(Box::new(file))),
+            1 => Table::new(input(file), Hints::default()).map(|file| Capture::Edges(Box::new(file))),
             2 => SaleaeBinary::new(input(file)).map(|file| Capture::Edges(Box::new(file))),
             _ => Ok(Capture::Bytes(ByteLog::Hex(HexLog::new(input(file))))),
         };

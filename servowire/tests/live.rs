@@ -145,3 +145,50 @@ fn a_file_that_grows() {
     common::servowire(&["decode", "--follow", session]).fails_with("cannot be followed while it grows");
     assert_eq!(common::servowire(&["decode", "--follow"]).code, 2);
 }
+
+/// Who says what comes is waited for; who does not gets the program's own captures, and is told so.
+#[test]
+fn a_pipe_that_is_silent_at_first() {
+    let mut live = Live::start(&["decode", "--bytes", "--json"]);
+    std::thread::sleep(Duration::from_millis(900));
+    live.write(b"1A\n1A 20 29 C0 3B 17 00 00 00 C8 37\n");
+    live.shows("\"file\":\"standard input\",\"line\":1");
+    assert_eq!(live.end().len(), 1);
+
+    let mut silent = std::process::Command::new(env!("CARGO_BIN_EXE_servowire"))
+        .arg("decode")
+        .stdin(std::process::Stdio::piped())
+        .stdout(std::process::Stdio::piped())
+        .stderr(std::process::Stdio::piped())
+        .spawn()
+        .unwrap();
+    let open = silent.stdin.take();
+    let said = silent.wait_with_output().unwrap();
+    drop(open);
+    assert!(said.status.success());
+    let (out, err) = (String::from_utf8(said.stdout).unwrap(), String::from_utf8(said.stderr).unwrap());
+    assert!(
+        out.contains("captures/hpm-uart-readme.vcd") && err.contains("nothing comes from the standard input"),
+        "{err}"
+    );
+}
+
+/// What describes a file needs one.
+#[test]
+fn options_without_a_file() {
+    for options in [
+        &["--rate", "24M"][..],
+        &["--format", "vcd"],
+        &["--unit-size", "2"],
+        &["--channel", "x"],
+        &["--tx", "a", "--rx", "b"],
+        &["--bit-rate", "2.5M"],
+        &["--polarity", "inverted"],
+        &["--threshold", "1"],
+        &["--block-size", "16"],
+    ] {
+        let run = common::servowire(&[&["decode"], options].concat());
+        assert_eq!(run.code, 2, "{options:?}");
+        assert!(run.err.contains("describes a capture: name its file"), "{}", run.err);
+    }
+}

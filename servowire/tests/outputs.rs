@@ -129,7 +129,7 @@ fn statistics() {
     assert_eq!(run.code, 1);
     for line in [
         "  frames        12 requests, 11 answers, 0 others",
-        "  verdicts      22 ok, 2 refused",
+        "  verdicts      22 ok, 1 refused, 1 answers missing",
         "    crc               1",
         "    no_response       1",
         "  cycle         min 91.000 us, mean 91.545 us, max 93.000 us, jitter 2.000 us peak to peak, 0.934 us rms",

@@ -295,3 +295,26 @@ fn a_threshold_of_ones_own() {
     let _ = writeln!(rows, "{text}oops,1");
     bench.decode("a.csv", &rows, &[]).fails_with("\"oops\" is not a time; this row was left out");
 }
+
+/// Eight lines a column.
+#[test]
+fn pods() {
+    let heading = "X,D7-D0,D15-D8,Start,Increment,\nSequence,Hex,Hex,-1.000000e-04,5.000000e-08\n";
+    let text = table(heading, |k, v| format!("{k},0x{:02X},0x3F,", if v > 1.65 { 0x47 } else { 0x07 }));
+    is_read("MSO1000Z", &text);
+    let run = Bench::new().decode("pod.csv", &text, &["--json", "--channel", "D6"]);
+    assert_eq!(run.is_good().json().len(), GOOD_FRAMES);
+    Bench::new().decode("pod.csv", &text, &["--channel", "D8"]).fails_with("no traffic on channel \"D8\"");
+}
+
+/// Where the line leaves the instrument's range the cell says so, as often as it likes.
+#[test]
+fn beyond_the_range() {
+    let heading = "Zeit;Kanal A\n(\u{3bc}s);(V)\n\n";
+    let text = table(heading, |k, v| {
+        let volts = if v > 3.1 { "\u{221e}".to_owned() } else { format!("{v:.5}").replace('.', ",") };
+        format!("{};{volts}", format!("{:.5}", time(k) * 1e6).replace('.', ","))
+    });
+    assert!(text.matches('\u{221e}').count() > 1000);
+    is_read("PicoScope", &text);
+}

@@ -82,6 +82,9 @@ fn sigrok(name: &str, mut archive: Archive) -> Result<Capture, Fault> {
     let Some(base) = value(&metadata, "capturefile").map(str::to_owned) else {
         return Err(fault("the session has no logic channels: export the analog ones as CSV"));
     };
+    if archive.index_for_name(&base).is_none() && archive.index_for_name(&format!("{base}-1")).is_none() {
+        return Err(fault("the session holds no samples"));
+    }
     let rate = sample_rate(&metadata).ok_or_else(|| fault(NO_RATE))?;
     let unit = value(&metadata, "unitsize").and_then(|size| size.parse().ok()).unwrap_or(1_usize);
     if !(1..=8).contains(&unit) {

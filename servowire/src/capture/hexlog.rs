@@ -17,8 +17,8 @@ use dump::{Dump, Row};
 
 /// The longest line that is read; longer ones are not a log of a servo line.
 const LONGEST: usize = 1 << 16;
-/// Bytes of a dump or an array that are given at once.
-const MOST: usize = 1 << 16;
+/// Bytes of a dump that are given at once, and letters of an array: a frame that lies across the end is lost.
+const MOST: usize = 1 << 24;
 /// Lines by which a log is known where nothing else says that it is one.
 const SEEN: usize = 24;
 /// Lines of bytes for each that is none, where nothing else says that it is a log.
@@ -293,8 +293,8 @@ fn array_line(
                 cells.clear();
                 break;
             }
-            letter if cells.len() < 8 * MOST => cells.push(letter),
-            _ => return Err("an array of more than half a million characters".to_owned()),
+            letter if cells.len() < MOST => cells.push(letter),
+            _ => return Err("an array of more than 16 million characters".to_owned()),
         }
     }
     Ok(())

@@ -11,6 +11,7 @@ use flate2::read::MultiGzDecoder;
 use ruzstd::decoding::StreamingDecoder;
 
 use super::pipe::Pipe;
+use super::utf16::{self, Utf16};
 use crate::fault::{At, Fault};
 
 const BUFFER: usize = 1 << 18;
@@ -50,6 +51,16 @@ pub struct Input {
     pipe: Option<Rc<RefCell<Pipe>>>,
 }
 
+/// What the standard input is where nobody asked for it.
+pub enum Piped {
+    /// A terminal, or at its end.
+    Nothing,
+    /// A pipe that is open and gives nothing for a moment.
+    Silence,
+    /// Something to read.
+    Content(Input),
+}
+
 /// A pipe that somebody else looks at too.
 struct Shared(Rc<RefCell<Pipe>>);
 
@@ -78,13 +89,20 @@ impl Input {
         Ok(Self { path: Some(path.to_path_buf()), ..Self::over(&name, Box::new(file)) })
     }
 
-    /// What comes through a pipe or from a redirected file, if something comes at once.
-    pub fn piped() -> Option<Self> {
+    /// What comes through a pipe or from a redirected file. `wanted`: it is waited for, however long it takes.
+    pub fn piped(wanted: bool) -> Piped {
         if io::stdin().is_terminal() {
-            return None;
+            return Piped::Nothing;
         }
         let mut pipe = Pipe::over(io::stdin(), false);
-        (pipe.is_ready(PATIENCE) && !pipe.is_over()).then(|| Self::over_pipe("standard input", pipe))
+        loop {
+            match (pipe.is_ready(PATIENCE), pipe.is_over()) {
+                (true, true) => return Piped::Nothing,
+                (true, false) => return Piped::Content(Self::over_pipe("standard input", pipe)),
+                (false, _) if wanted => {}
+                (false, _) => return Piped::Silence,
+            }
+        }
     }
 
     fn over_pipe(name: &str, pipe: Pipe) -> Self {
@@ -126,6 +144,14 @@ impl Input {
         // The progress bar counts what was read of the file.
         let unpacked = Self { depth, quiet: true, taken: meter, ..Self::over(&name, reader) };
         unpacked.unpacked()
+    }
+
+    /// Text of two bytes a character as UTF-8.
+    pub fn in_utf8(mut self) -> Result<Self, Fault> {
+        let Some(unit) = utf16::mark(self.peek()?) else { return Ok(self) };
+        let (name, meter) = (self.name.clone(), self.meter());
+        let text = Self::over(&name, Box::new(Utf16::new(self, unit)));
+        Ok(Self { quiet: true, taken: meter, ..text })
     }
 
     /// The same content in a form that can be read backwards.

@@ -10,7 +10,7 @@
 
 use std::path::Path;
 
-use super::{Change, Input, Line, time};
+use super::{Change, Hole, Input, Line, time};
 use crate::fault::{At, Fault};
 
 /// Changes given at once.
@@ -32,7 +32,7 @@ pub struct SaleaeBinary {
     announced: u64,
     read: u64,
     at: u64,
-    gap: Option<i64>,
+    hole: Option<Hole>,
     over: bool,
 }
 
@@ -61,7 +61,12 @@ impl SaleaeBinary {
                 let what = "is the inside of a .sal capture, which is not published: export raw data as CSV or binary";
                 return Err(input.fault(At::Byte(12), what));
             }
-            _ => return Err(input.fault(At::Byte(12), "is not a digital channel; export the digital channels")),
+            _ => {
+                return Err(input.fault(
+                    At::Byte(12),
+                    "is not a digital channel: export the digital ones, or the analog ones as CSV",
+                ));
+            }
         }
         let name =
             Path::new(input.name()).file_stem().map_or_else(|| "line".into(), |s| s.to_string_lossy().into_owned());
@@ -76,7 +81,7 @@ impl SaleaeBinary {
             announced: 0,
             read: 0,
             at: HEADER as u64,
-            gap: None,
+            hole: None,
             over: false,
         };
         if version == 1 {
@@ -116,7 +121,8 @@ impl SaleaeBinary {
         self.announced = u64::from_le_bytes(take(&mut rest));
         self.read = 0;
         if let Some(before) = self.now {
-            self.gap = Some(begin.max(before));
+            let to = begin.max(before);
+            self.hole = Some(Hole { from: self.end.clamp(before, to), to });
         }
         (self.level, self.end) = (level, end);
         let begin = begin.max(self.now.unwrap_or(begin));
@@ -175,8 +181,8 @@ impl Line for SaleaeBinary {
         if self.over && self.read == self.announced { self.end.max(now) } else { now }
     }
 
-    fn gap(&mut self) -> Option<i64> {
-        self.gap.take()
+    fn hole(&mut self) -> Option<Hole> {
+        self.hole.take()
     }
 }
 

@@ -1,4 +1,4 @@
-//! `sigrok-cli -O bits` and `-O hex`: a line of samples for each channel, round after round.
+//! `sigrok-cli -O bits`, `-O hex` and `-O ascii`: a line of samples for each channel, round after round.
 
 use std::io::{BufRead, Read};
 
@@ -82,6 +82,12 @@ impl SigrokText {
     /// `NAME:` and samples: groups of eight are bits, of two hex digits with the oldest sample first.
     fn samples_of(&self, line: &str) -> Result<(String, Vec<bool>), Fault> {
         let only = |rest: &str, digits: fn(char) -> bool| rest.chars().all(|c| c == ' ' || digits(c));
+        // Drawn: a high level, a low one, and either one behind an edge.
+        let drawn = |c: char| matches!(c, '"' | '.' | '/' | '\\');
+        if let Some((name, drawing)) = line.rsplit_once(':').filter(|(_, rest)| !rest.is_empty() && only(rest, drawn)) {
+            let high = |c: char| matches!(c, '"' | '/');
+            return Ok((name.to_owned(), drawing.chars().filter(|c| *c != ' ').map(high).collect()));
+        }
         // A name may hold a colon: the digits begin behind the first one that only digits follow.
         let place =
             line.match_indices(':').find(|(at, _)| only(line.get(at + 1..).unwrap_or(""), |c| c.is_ascii_hexdigit()));

@@ -12,7 +12,7 @@ use std::collections::VecDeque;
 use std::io::{BufRead, Read};
 
 use super::time::{Clock, SECOND};
-use super::{Change, Input, Line};
+use super::{Change, Hints, Hole, Input, Line};
 use crate::fault::{At, Fault};
 use cell::{Cell, Threshold};
 pub(super) use heading::titles;
@@ -44,8 +44,9 @@ pub struct Table {
     /// Rows that could not be read, and the first of them.
     bad: u64,
     first_bad: Option<(u64, String)>,
-    hole: bool,
-    gap: Option<i64>,
+    /// Since when there have been no data.
+    since: Option<i64>,
+    hole: Option<Hole>,
     over: bool,
     /// The last row comes first: all changes have to be known before the first is given.
     backwards: bool,
@@ -55,10 +56,11 @@ pub struct Table {
 /// Changes of a table that is written backwards are held in memory, up to so many.
 const MOST_TURNED: usize = 1 << 20;
 
-/// A column that is a channel.
+/// A channel: a column, or one line of the pod that a column is.
 struct Column {
     index: usize,
     threshold: Option<Threshold>,
+    bit: Option<u8>,
     level: Option<bool>,
 }
 
@@ -99,7 +101,7 @@ impl Lines {
 
 impl Table {
     /// Reads the heading, and rows enough to know the columns.
-    pub fn new(input: Input, threshold: Option<f64>) -> Result<Self, Fault> {
+    pub fn new(input: Input, hints: Hints) -> Result<Self, Fault> {
         let name = input.name().to_owned();
         let mut lines = Lines::new(input);
         let mut above: Vec<Vec<u8>> = Vec::new();
@@ -120,10 +122,10 @@ impl Table {
                 break;
             }
         }
-        let heading =
-            Heading::parse(&above, waiting.iter().map(|(_, row)| row.as_slice()).collect::<Vec<_>>().as_slice());
-        let Some(heading) = heading else {
-            let what = "no table with times or a sample rate and columns of levels or voltages is in it";
+        let rows: Vec<&[u8]> = waiting.iter().map(|(_, row)| row.as_slice()).collect();
+        let Some(heading) = Heading::parse(&above, &rows, hints.sample_rate) else {
+            let what = "no table with times or a sample rate and columns of levels or voltages is in it (the rate of a \
+                table of levels alone is said with --format csv --rate)";
             return Err(Fault::new(&name, At::Line(1), what));
         };
         let mut cells = 0;
@@ -132,7 +134,7 @@ impl Table {
             cells += heading.columns();
             waiting.push_back((lines.line, text.clone()));
         }
-        let (columns, channels) = columns(&heading, &waiting, threshold);
+        let (columns, channels) = columns(&heading, &waiting, hints.threshold);
         if channels.is_empty() {
             return Err(Fault::new(&name, At::Line(1), "no column of levels or voltages is in the table"));
         }
@@ -155,8 +157,8 @@ impl Table {
             rows: 0,
             bad: 0,
             first_bad: None,
-            hole: false,
-            gap: None,
+            since: None,
+            hole: None,
             over: false,
             backwards,
             turned: VecDeque::new(),
@@ -241,6 +243,10 @@ impl Table {
         for column in &self.columns {
             let text = cells.get(column.index).copied().unwrap_or_default();
             let level = match (cell::level(text), &column.threshold) {
+                (Cell::Other, None) if column.bit.is_some() => match (cell::word(text), column.bit) {
+                    (Some(word), Some(bit)) => Some(word >> bit & 1 == 1),
+                    _ => return Err(format!("{:?} is no number in hex", String::from_utf8_lossy(text))),
+                },
                 (Cell::Level(level), None) => Some(level),
                 (Cell::Nothing, _) => None,
                 (_, Some(threshold)) => match cell::number(text, self.heading.comma()) {
@@ -257,11 +263,11 @@ impl Table {
         self.now = Some(time);
         if levels.iter().all(Option::is_none) {
             // No data from here on.
-            self.hole = true;
+            self.since.get_or_insert(time);
             return Ok(());
         }
-        if std::mem::take(&mut self.hole) {
-            self.gap = Some(time);
+        if let Some(from) = self.since.take() {
+            self.hole = Some(Hole { from, to: time });
             self.columns.iter_mut().for_each(|column| column.level = None);
         }
         for ((channel, column), level) in (0_u16..).zip(&mut self.columns).zip(levels) {
@@ -279,16 +285,19 @@ fn columns(heading: &Heading, rows: &VecDeque<(u64, Vec<u8>)>, threshold: Option
     let mut digital = vec![true; heading.columns()];
     let mut numbers: Vec<Vec<f64>> = vec![Vec::new(); heading.columns()];
     let mut other = vec![0_usize; heading.columns()];
+    // The digits of the longest word of a pod.
+    let mut words = vec![0_usize; heading.columns()];
     for (_, row) in rows {
         for (index, text) in heading.split(row).into_iter().enumerate().take(heading.columns()) {
             let kind = cell::level(text);
-            let (Some(digital), Some(numbers), Some(other)) =
-                (digital.get_mut(index), numbers.get_mut(index), other.get_mut(index))
+            let (Some(digital), Some(numbers), Some(other), Some(digits)) =
+                (digital.get_mut(index), numbers.get_mut(index), other.get_mut(index), words.get_mut(index))
             else {
                 continue;
             };
             match (kind, cell::number(text, heading.comma())) {
                 (Cell::Nothing, _) => {}
+                (_, None) if cell::word(text).is_some() => *digits = (text.len() - 2).max(*digits),
                 (kind, Some(number)) => {
                     *digital &= matches!(kind, Cell::Level(_));
                     numbers.push(number);
@@ -302,6 +311,17 @@ fn columns(heading: &Heading, rows: &VecDeque<(u64, Vec<u8>)>, threshold: Option
         if !heading.may_be_channel(index) {
             continue;
         }
+        if let Some(digits @ 1..=16) = words.get(index) {
+            let lines = heading.pod(index, (4 * digits) as u8);
+            columns.extend((0..).zip(&lines).map(|(bit, _)| Column {
+                index,
+                threshold: None,
+                bit: Some(bit),
+                level: None,
+            }));
+            names.extend(lines);
+            continue;
+        }
         let Some(values) =
             numbers.get_mut(index).filter(|values| values.len() > other.get(index).copied().unwrap_or(0))
         else {
@@ -309,7 +329,7 @@ fn columns(heading: &Heading, rows: &VecDeque<(u64, Vec<u8>)>, threshold: Option
         };
         let is_digital = digital.get(index).copied().unwrap_or(false);
         let threshold = if is_digital { None } else { Some(Threshold::find(values, threshold)) };
-        columns.push(Column { index, threshold, level: None });
+        columns.push(Column { index, threshold, bit: None, level: None });
         names.push(heading.name(index));
     }
     (columns, names)
@@ -338,7 +358,11 @@ impl Line for Table {
                 return Ok(true);
             }
         }
-        while !self.over && changes.len() < enough && rows < 16 * BLOCK && !(self.hole && changes.len() > first) {
+        while !self.over
+            && changes.len() < enough
+            && rows < 16 * BLOCK
+            && !(self.since.is_some() && changes.len() > first)
+        {
             if rows > 0 && self.waiting.is_empty() && self.lines.input.pauses() {
                 break;
             }
@@ -362,7 +386,7 @@ impl Line for Table {
         self.now.unwrap_or(0)
     }
 
-    fn gap(&mut self) -> Option<i64> {
-        self.gap.take()
+    fn hole(&mut self) -> Option<Hole> {
+        self.hole.take()
     }
 }

@@ -251,25 +251,29 @@ impl Vcd {
     }
 
     fn time(&mut self, digits: &[u8], cut: bool) -> Result<(), String> {
-        let whole = digits.split(|byte| *byte == b'.').next().unwrap_or_default();
+        let point = digits.iter().position(|byte| *byte == b'.').unwrap_or(digits.len());
+        let (whole, fraction) = digits.split_at(point);
+        let fraction = fraction.get(1..).unwrap_or_default();
         let mut stamp = Some(0_u64);
         for digit in whole {
             let digit = digit.wrapping_sub(b'0');
             stamp = stamp.filter(|_| digit < 10).and_then(|s| s.checked_mul(10)?.checked_add(digit.into()));
         }
-        let Some(stamp) = stamp.filter(|_| !whole.is_empty()) else {
+        let Some(stamp) = stamp.filter(|_| !whole.is_empty() && fraction.iter().all(u8::is_ascii_digit)) else {
             let text = String::from_utf8_lossy(digits).into_owned();
             return Err(format!("not VCD in the middle of a value change: #{text} is no time"));
         };
-        if stamp < self.stamp {
+        let time = self.tick.time_between(stamp, fraction);
+        let (now, between) = time.ok_or_else(|| format!("time #{stamp} is too large"))?;
+        if now < self.now {
             // The last word of a file that was cut off.
             if cut {
                 return Err("the file ends in the middle of a time: it was cut off".to_owned());
             }
             return Err(format!("time goes back from #{} to #{stamp}", self.stamp));
         }
-        self.now = self.tick.time(stamp).ok_or_else(|| format!("time #{stamp} is too large"))?;
-        self.stamp = stamp;
+        // What comes next must not be before it: nothing without a fraction until the next unit.
+        (self.now, self.stamp) = (now, stamp.saturating_add(between.into()));
         Ok(())
     }
 
@@ -306,13 +310,10 @@ impl Vcd {
                 }
             }
             b'p' => {
-                let level = match value.first() {
-                    Some(b'D' | b'd' | b'L' | b'l' | b'0' | b'A' | b'a' | b'B') => b'0',
-                    Some(b'U' | b'u' | b'H' | b'h' | b'1') => b'1',
-                    Some(b'Z' | b'T' | b'F' | b'f') => b'z',
-                    _ => b'x',
-                };
-                self.value(level, self.codes.get(code), changes);
+                let Some(code) = self.codes.get(code) else { return Ok(Next::Taken(end)) };
+                for (bit, state) in (0..code.width).zip(value.iter().rev()) {
+                    self.value(level(*state), Some(Code { first: code.first + bit, width: 1 }), changes);
+                }
             }
             _ => {}
         }
@@ -330,6 +331,16 @@ impl Vcd {
         if let Some(Code { first, width: 1 }) = code {
             changes.push(Change { time: self.now, channel: first, level });
         }
+    }
+}
+
+/// The level of a port's state: who drives it does not matter, but two who disagree make it unknown.
+fn level(state: u8) -> u8 {
+    match state {
+        b'D' | b'd' | b'L' | b'l' | b'0' => b'0',
+        b'U' | b'u' | b'H' | b'h' | b'1' => b'1',
+        b'Z' | b'T' | b'F' | b'f' => b'z',
+        _ => b'x',
     }
 }
 

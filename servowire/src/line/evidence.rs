@@ -82,7 +82,8 @@ impl Evidence {
 
 impl Sink for Evidence {
     fn event(&mut self, event: &Event) -> io::Result<()> {
-        if event.kind == "cut" || event.kind == "gap" {
+        // What the first edges cut off is judged by nobody.
+        if event.kind == "cut" || event.kind == "gap" || event.verdict == Verdict::cut_off() {
             return Ok(());
         }
         self.tally.event(event)?;

@@ -4,6 +4,7 @@ use std::io;
 
 use super::evidence::{CERTAIN, Evidence, Weights};
 use super::{EdgeReceiver, Rates, StartStop};
+use crate::capture::Hole;
 use crate::capture::samples::Samples;
 use crate::event::{Event, Place, Verdict};
 use crate::output::Sink;
@@ -33,8 +34,8 @@ pub trait LineDecoder {
     /// The line has not changed until `time`.
     fn reach(&mut self, time: i64, out: &mut dyn Sink) -> io::Result<()>;
 
-    /// The capture has a hole from the last change to `time`: nothing is known of the line there.
-    fn gap(&mut self, time: i64, out: &mut dyn Sink) -> io::Result<()>;
+    /// The recording has a hole: nothing is known of the line there.
+    fn hole(&mut self, hole: Hole, out: &mut dyn Sink) -> io::Result<()>;
 
     /// The capture ends at `time`.
     fn finish(&mut self, time: i64, out: &mut dyn Sink) -> io::Result<()>;
@@ -62,20 +63,22 @@ const OPENED: i64 = 60;
 /// Falling edges that may be the first start bit.
 const STARTS: u32 = 18;
 
-/// The last level of a capture is taken to last. If a frame does not hold so, it was cut off.
+/// The last level of a recording is taken to last. If a frame does not hold so, it was cut off.
 struct Held<'a> {
     out: &'a mut dyn Sink,
     end: i64,
+    /// What a frame is then.
+    cut: &'a Verdict,
 }
 
 impl Sink for Held<'_> {
     fn event(&mut self, event: &Event) -> io::Result<()> {
-        match (event.place, &event.verdict) {
-            (Place::Time { end, .. }, Verdict::Refused(_)) if end > self.end && !event.verdict.is_silence() => {
-                self.out.event(&Event { fields: Vec::new(), verdict: Verdict::cut_off("a frame"), ..event.clone() })
-            }
-            _ => self.out.event(event),
+        let lasts = matches!(event.place, Place::Time { end, .. } if end > self.end);
+        let refused = !event.verdict.is_ok() && !event.verdict.is_silence();
+        if event.verdict == Verdict::cut_off() || lasts && refused {
+            return self.out.event(&Event { fields: Vec::new(), verdict: self.cut.clone(), ..event.clone() });
         }
+        self.out.event(event)
     }
 }
 
@@ -95,6 +98,18 @@ impl<P: StartStop + Clone> StartStopLine<P> {
 
     fn take(&mut self, time: i64, level: bool, out: &mut dyn Sink) -> io::Result<()> {
         if self.receiver.change(time, level) { self.give(out) } else { Ok(()) }
+    }
+
+    /// Nothing more is known from `time` on; `cut`: what becomes of a frame that is not over.
+    fn end(&mut self, time: i64, cut: &Verdict, out: &mut dyn Sink) -> io::Result<()> {
+        if !self.opening.is_empty() {
+            self.open(out)?;
+        }
+        let mut out = Held { out, end: time.saturating_add(self.bit), cut };
+        if self.receiver.finish(time) {
+            self.give(&mut out)?;
+        }
+        self.protocol.finish(Some(time), &mut out)
     }
 
     /// Whether the line is at work when the recording begins, so that the first falling edge need not be a start bit.
@@ -125,7 +140,7 @@ impl<P: StartStop + Clone> StartStopLine<P> {
             if evidence.score > most {
                 (best, most) = (skipped, evidence.score);
             }
-            if skipped == 0 && evidence.score >= CERTAIN && evidence.tally.refused == 0 {
+            if skipped == 0 && evidence.score >= CERTAIN && evidence.tally.faults() == 0 {
                 break;
             }
         }
@@ -171,22 +186,15 @@ impl<P: StartStop + Clone> LineDecoder for StartStopLine<P> {
         if self.opening.is_empty() && self.receiver.reach(time) { self.give(out) } else { Ok(()) }
     }
 
-    fn gap(&mut self, time: i64, out: &mut dyn Sink) -> io::Result<()> {
-        self.finish(time, out)?;
+    fn hole(&mut self, hole: Hole, out: &mut dyn Sink) -> io::Result<()> {
+        self.end(hole.from, &Verdict::in_a_hole(), out)?;
         self.receiver = EdgeReceiver::new(self.bit as f64, P::CONTENT_BITS);
         self.begun = false;
         Ok(())
     }
 
     fn finish(&mut self, time: i64, out: &mut dyn Sink) -> io::Result<()> {
-        if !self.opening.is_empty() {
-            self.open(out)?;
-        }
-        let mut out = Held { out, end: time + self.bit };
-        if self.receiver.finish(time) {
-            self.give(&mut out)?;
-        }
-        self.protocol.finish(Some(time), &mut out)
+        self.end(time, &Verdict::cut_off(), out)
     }
 
     fn rates(&self) -> Rates {

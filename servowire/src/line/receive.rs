@@ -53,7 +53,7 @@ pub struct Rates {
     /// Fastest.
     pub most: f64,
     sum: f64,
-    count: u32,
+    weight: f64,
     /// Spikes dropped so far.
     pub spikes: u64,
     /// Edges that stayed.
@@ -62,14 +62,14 @@ pub struct Rates {
 
 impl Default for Rates {
     fn default() -> Self {
-        Self { least: f64::INFINITY, most: 0.0, sum: 0.0, count: 0, spikes: 0, edges: 0 }
+        Self { least: f64::INFINITY, most: 0.0, sum: 0.0, weight: 0.0, spikes: 0, edges: 0 }
     }
 }
 
 impl Rates {
     /// The mean rate as a share of the nominal one; none before a field was measured.
     pub fn mean(&self) -> Option<f64> {
-        (self.count > 0).then(|| self.sum / f64::from(self.count))
+        (self.weight > 0.0).then(|| self.sum / self.weight)
     }
 
     /// Of a line with so many edges and spikes.
@@ -87,8 +87,13 @@ impl Rates {
     pub(crate) fn measured(&mut self, rate: f64) {
         self.least = self.least.min(rate);
         self.most = self.most.max(rate);
-        self.sum += rate;
-        self.count += 1;
+        self.weigh(rate, 1.0);
+    }
+
+    /// A rate counts in the mean.
+    fn weigh(&mut self, rate: f64, weight: f64) {
+        self.sum += rate * weight;
+        self.weight += weight;
     }
 }
 
@@ -259,8 +264,20 @@ impl EdgeReceiver {
             self.field(field, bit);
             rest = behind;
         }
+        self.time_fields(first, bit);
         if let Some(field) = self.fields.get_mut(first) {
             field.bits = line_bits(edges, field.start, bit);
+        }
+    }
+
+    /// Fields that follow each other without a pause tell the bit length better than the edges inside them.
+    fn time_fields(&mut self, first: usize, bit: f64) {
+        let fields = self.fields.get(first..).unwrap_or_default();
+        let [begin, .., last] = fields else { return };
+        let (time, bits) =
+            ((last.start - begin.start) as f64, f64::from(self.field_bits()) * (fields.len() - 1) as f64);
+        if (time - bits * bit).abs() < 0.5 * bit {
+            self.rates.weigh(self.bit * bits / time, bits * bits);
         }
     }
 

@@ -6,8 +6,8 @@ use super::Options;
 use super::lane::{LineDecoder, Tap, Wires};
 use super::report;
 use super::survey::{Candidates, FEWEST, Found, Speech};
-use crate::capture::Change;
 use crate::capture::samples::Samples;
+use crate::capture::{Change, Hole};
 use crate::output::{Lane, Output};
 use crate::protocols::{Protocol, Settings};
 
@@ -53,8 +53,8 @@ pub(super) struct Watch<'a> {
     pub(super) found: Vec<Found>,
     /// Changes before the first survey, in their order.
     held: Option<Vec<Change>>,
-    /// Holes between them: number of changes before, time behind.
-    holes: Vec<(usize, i64)>,
+    /// Holes between them, each with the number of changes before it.
+    holes: Vec<(usize, Hole)>,
     kept: usize,
     /// Changes held back when they were judged early.
     tried: usize,
@@ -169,14 +169,14 @@ impl<'a> Watch<'a> {
         Ok(())
     }
 
-    /// A hole in the capture that ends at `time`.
-    pub(super) fn gap(&mut self, time: i64, out: &mut Output<'_>) -> io::Result<()> {
+    /// A hole in the capture.
+    pub(super) fn hole(&mut self, hole: Hole, out: &mut Output<'_>) -> io::Result<()> {
         if let Some(held) = &self.held {
-            self.holes.push((held.len(), time));
+            self.holes.push((held.len(), hole));
         }
         for (line, running) in self.lines.iter_mut().enumerate() {
             out.lane(line);
-            running.decoder.gap(time, out)?;
+            running.decoder.hole(hole, out)?;
             running.wires.forget();
         }
         Ok(())
@@ -392,8 +392,8 @@ impl<'a> Watch<'a> {
         out.channels(self.names)?;
         let mut holes = std::mem::take(&mut self.holes).into_iter().peekable();
         for (at, change) in held.into_iter().enumerate() {
-            while let Some((_, time)) = holes.next_if(|(before, _)| *before <= at) {
-                self.gap(time, out)?;
+            while let Some((_, hole)) = holes.next_if(|(before, _)| *before <= at) {
+                self.hole(hole, out)?;
             }
             if out.wants_changes() {
                 out.change(&change)?;

@@ -6,7 +6,7 @@ use std::io::{self, Write};
 use serde_json::{Value as Json, json};
 
 use super::{Origin, Printer};
-use crate::event::{Direction, Event, Place, Position, Verdict};
+use crate::event::{Direction, Event, NO_RESPONSE, Place, Position, Verdict};
 
 /// Jumps of the position that are listed; further ones are counted.
 const LISTED: usize = 10;
@@ -178,12 +178,14 @@ impl<W: Write> Stats<W> {
 
     fn print_text(&mut self, file: &str) -> io::Result<()> {
         let f = &self.figures;
-        let refused: u64 = f.refused.values().sum();
+        let missing = f.refused.get(NO_RESPONSE).copied().unwrap_or(0);
+        let refused = f.refused.values().sum::<u64>() - missing;
         let kinds = f.kinds.iter().map(|(kind, n)| format!("{kind}: {n}")).collect::<Vec<_>>().join(", ");
         writeln!(self.out, "{file}")?;
         writeln!(self.out, "  frames        {} requests, {} answers, {} others", f.requests, f.answers, f.others)?;
         writeln!(self.out, "  kinds         {}", if kinds.is_empty() { "none" } else { &kinds })?;
-        writeln!(self.out, "  verdicts      {} ok, {refused} refused", f.ok)?;
+        let without = if missing > 0 { format!(", {missing} answers missing") } else { String::new() };
+        writeln!(self.out, "  verdicts      {} ok, {refused} refused{without}", f.ok)?;
         for (class, count) in &f.refused {
             writeln!(self.out, "    {class:<17} {count}")?;
         }

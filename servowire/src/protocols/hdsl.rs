@@ -22,6 +22,7 @@ use hdsl::{
     QualityRule, Rule, VFrame, Window,
 };
 
+use crate::capture::Hole;
 use crate::capture::samples::Samples;
 use crate::event::{Direction, Event, Field, NO_RESPONSE, Place, Position, Refusal, Verdict};
 use crate::line::{LineDecoder, Rates};
@@ -94,8 +95,8 @@ impl LineDecoder for DslLine {
         if self.decoder.delay.is_some() { self.decoder.take(&mut self.bits, NEED, out) } else { Ok(()) }
     }
 
-    fn gap(&mut self, time: i64, out: &mut dyn Sink) -> io::Result<()> {
-        self.finish(time, out)?;
+    fn hole(&mut self, hole: Hole, out: &mut dyn Sink) -> io::Result<()> {
+        self.finish(hole.from, out)?;
         *self = Self::new(self.bit);
         Ok(())
     }

@@ -154,6 +154,11 @@ impl Decoder {
         out.event(&event)
     }
 
+    /// A line of a log could not be read: it may have been the reply that is waited for.
+    pub(super) fn spoilt(&mut self) {
+        self.pending = None;
+    }
+
     fn request(&mut self, group: &Frames, out: &mut dyn Sink) -> io::Result<Event> {
         self.give_up(group.start(), true, out)?;
         let result = group.request();
@@ -270,6 +275,7 @@ impl StartStop for Decoder {
     const CONTENT_BITS: u32 = 16;
 
     fn begin(&mut self, start: i64) {
+        self.cut_until = None;
         self.begin = Some(start);
     }
 
@@ -315,13 +321,17 @@ impl StartStop for Decoder {
                     .is_ok_and(|expected| self.open.len() < usize::from(expected.layout().frames())),
             };
             if recent && short {
-                return out.event(&Event::cut_off(self.open.place(), "a request or reply"));
+                let piece = std::mem::take(&mut self.open);
+                self.pending = None;
+                return out.event(&Event::cut_off(piece.place()));
             }
             self.close(out)?;
         }
         match (end, self.pending.and_then(|pending| pending.end())) {
-            (Some(end), Some(asked)) if end - asked < REPLY_TIMEOUT_BITS * self.bit => Ok(()),
-            (end, _) => self.give_up(end.unwrap_or_default(), false, out),
+            // Its reply may have come later.
+            (Some(end), Some(asked)) if end - asked < REPLY_TIMEOUT_BITS * self.bit => self.pending = None,
+            (end, _) => self.give_up(end.unwrap_or_default(), false, out)?,
         }
+        Ok(())
     }
 }

@@ -238,6 +238,12 @@ impl Decoder {
         }
     }
 
+    /// A line of a log could not be read: it may have been the answer that is waited for.
+    pub(super) fn spoilt(&mut self, out: &mut dyn Sink) -> io::Result<()> {
+        self.pending = None;
+        self.clear(out)
+    }
+
     /// A frame of a log.
     fn take(&mut self, line: u64, bytes: &[u8], out: &mut dyn Sink) -> io::Result<()> {
         let frame = Frame::of_log(line, bytes);
@@ -253,6 +259,7 @@ impl StartStop for Decoder {
     const CONTENT_BITS: u32 = 8;
 
     fn begin(&mut self, start: i64) {
+        (self.skip, self.cut_until) = (None, None);
         self.begin = Some(start);
         self.early = Some(start + LATE_ANSWER);
     }
@@ -318,14 +325,20 @@ impl StartStop for Decoder {
             let request = self.pending.is_none()
                 && self.open.data_id().is_ok_and(|id| self.open.len() == usize::from(id.request_fields()));
             if recent && !request {
+                let piece = std::mem::take(&mut self.open);
+                self.pending = None;
                 self.clear(out)?;
-                return out.event(&Event::cut_off(self.open.place(), "a frame"));
+                return out.event(&Event::cut_off(piece.place()));
             }
             self.close(out)?;
         }
         match self.pending.and_then(|pending| pending.end()) {
             Some(asked) if end > asked.saturating_add(ANSWER_TIMEOUT) => self.give_up(end, false, out),
-            _ => self.clear(out),
+            // Its answer may have come later.
+            _ => {
+                self.pending = None;
+                self.clear(out)
+            }
         }
     }
 }

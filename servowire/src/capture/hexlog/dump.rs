@@ -7,6 +7,9 @@ pub(super) enum Dump {
     InOrder,
     /// Words of two bytes, the lower one last (`hexdump`).
     Swapped,
+    /// Words, the lowest byte last, in so many columns behind the address (`xxd -e`): a short word stands at the right end
+    /// of its place.
+    Little(usize),
     /// Bits (`xxd -b`).
     Bits,
     /// Octal words (`od`): not told from other numbers with certainty.
@@ -51,11 +54,15 @@ impl Dump {
             return None;
         }
         let groups: Vec<&str> = hex_part(rest, colon).split_whitespace().collect();
+        // Of a whole row, or of sixteen bytes in words of four.
+        let columns = if rows.len() > 1 { 1 + hex_part(rest, true).len() } else { 37 };
         let all = |test: &dyn Fn(&&str) -> bool| !groups.is_empty() && groups.iter().all(test);
         Some(if colon && all(&|group| group.len() == 8 && group.bytes().all(|b| matches!(b, b'0' | b'1'))) {
             Self::Bits
         } else if width == 7 && !colon && all(&|group| group.len() == 4) {
             Self::Swapped
+        } else if colon && is_swapped(rest, columns) {
+            Self::Little(columns)
         } else if width == 7 && !colon && all(&|group| group.len() == 6) {
             Self::Octal
         } else {
@@ -70,7 +77,11 @@ impl Dump {
         }
         let (at, rest, _, colon) = address(line).ok_or_else(|| format!("{:?} has no address", line.trim()))?;
         let mut bytes = Vec::new();
-        for group in hex_part(rest, colon).split_whitespace() {
+        let words = match self {
+            Self::Little(columns) => rest.get(..columns).unwrap_or(rest),
+            _ => hex_part(rest, colon),
+        };
+        for group in words.split_whitespace() {
             let group = group.strip_prefix("0x").unwrap_or(group);
             if self == Self::Bits {
                 let byte = u8::from_str_radix(group, 2);
@@ -87,12 +98,27 @@ impl Dump {
             let from = bytes.len();
             let digits = (0..group.len()).step_by(2).filter_map(|k| u8::from_str_radix(group.get(k..k + 2)?, 16).ok());
             bytes.extend(digits);
-            if self == Self::Swapped {
+            if matches!(self, Self::Swapped | Self::Little(_)) {
                 bytes.get_mut(from..).unwrap_or_default().reverse();
             }
         }
         Ok((at, if bytes.is_empty() { Row::End } else { Row::Bytes(bytes) }))
     }
+}
+
+/// Whether the text beside the bytes is theirs if those of each word are taken from its end, and only then.
+fn is_swapped(rest: &str, columns: usize) -> bool {
+    let Some((groups, text)) = rest.split_at_checked(columns) else { return false };
+    let (groups, text) = (groups.split_whitespace().collect::<Vec<_>>(), text.trim());
+    let shown = |group: &str| -> Vec<char> {
+        let byte = |k: usize| u8::from_str_radix(group.get(k..k + 2)?, 16).ok();
+        let bytes = (0..group.len()).step_by(2).filter_map(byte);
+        bytes.map(|byte| if (b' '..=b'~').contains(&byte) { char::from(byte) } else { '.' }).collect()
+    };
+    let straight: String = groups.iter().flat_map(|group| shown(group)).collect();
+    let swapped: String = groups.iter().flat_map(|group| shown(group).into_iter().rev()).collect();
+    let begins = |letters: &str| !letters.trim().is_empty() && text.starts_with(letters.trim());
+    begins(&swapped) && !begins(&straight)
 }
 
 /// The part of a row that is bytes: up to the text in bars, or behind two blanks.
@@ -117,6 +143,9 @@ mod tests {
             ("0000000 a502 ff00\n0000010 8020\n", Some(Dump::Swapped)),
             ("0000000 122402 177400\n0000020 100040\n", Some(Dump::Octal)),
             ("00000000: 00000010 10100101  ..\n", Some(Dump::Bits)),
+            // The same six bytes by `xxd` and by `xxd -e`.
+            ("00000000: 1a20 4142 4344                           . ABCD\n", Some(Dump::InOrder)),
+            ("00000000: 4241201a     4443                     . ABCD\n", Some(Dump::Little(37))),
             ("0x20000000:\t0x1a\t0x20\n0x20000008:\t0x29\n", Some(Dump::InOrder)),
             ("0000   1a 20 29 c0   ....\n0010   1a\n", Some(Dump::InOrder)),
             ("1a2029c0 3b17\n1a2029c1 3b17\n", None),
@@ -133,6 +162,8 @@ mod tests {
         assert_eq!(row(Dump::InOrder, "00000000: 02a5 00ff  2020"), (0, Row::Bytes(vec![2, 0xa5, 0, 0xff])));
         assert_eq!(row(Dump::InOrder, "00000010  20 80 81       | ..|"), (16, Row::Bytes(vec![0x20, 0x80, 0x81])));
         assert_eq!(row(Dump::Swapped, "0000010 8020 0081    "), (16, Row::Bytes(vec![0x20, 0x80, 0x81, 0])));
+        let little = row(Dump::Little(37), "00000010: 01173bc0     0201                    .;....  01");
+        assert_eq!(little, (16, Row::Bytes(vec![0xc0, 0x3b, 0x17, 1, 1, 2])));
         assert_eq!(row(Dump::InOrder, "00000013"), (0x13, Row::End));
         assert_eq!(row(Dump::Bits, "00000000: 00000010 10100101  .."), (0, Row::Bytes(vec![2, 0xa5])));
         assert_eq!(row(Dump::InOrder, "*"), (0, Row::Again));

@@ -15,6 +15,33 @@ pub(super) struct Said {
 /// What a line holds: one burst, or more where it says who spoke.
 pub(super) fn line(text: &str) -> Result<Vec<Said>, String> {
     let text = text.trim_start_matches('\u{feff}').trim();
+    let said = bare(text);
+    // What somebody wrote in front is left out, if bytes follow and nothing else.
+    if said.is_err() { titled(text).map_or(said, |said| Ok(vec![said])) } else { said }
+}
+
+/// `I (1234) encoder: 1A 20 29`, `12:30:00 PM: 1A 20 29`: bytes of two digits behind words that end with a colon, a
+/// bracket or an arrow; these may say who spoke.
+fn titled(text: &str) -> Option<Said> {
+    let is_byte = |word: &str| {
+        let digits = word.strip_prefix("0x").unwrap_or(word);
+        digits.len() == 2 && digits.bytes().all(|digit| digit.is_ascii_hexdigit())
+    };
+    let ends = text.match_indices([':', ']', '>']).map(|(at, end)| at + end.len());
+    let (title, words) = ends.filter_map(|at| text.split_at_checked(at)).find(|(_, behind)| {
+        behind.starts_with(char::is_whitespace) && behind.split_whitespace().all(is_byte) && !behind.trim().is_empty()
+    })?;
+    let speaker = |word: &str| match mark(word, false) {
+        Some(Mark::Speaker(direction)) if word.contains(char::is_alphabetic) => Some(direction),
+        _ => None,
+    };
+    let mut said = Said { direction: title.split_whitespace().filter_map(speaker).next_back(), bytes: Vec::new() };
+    words.split_whitespace().try_for_each(|word| bytes(word, &mut said.bytes)).ok()?;
+    Some(said)
+}
+
+/// A line without words in front of its bytes, but for times and who spoke.
+fn bare(text: &str) -> Result<Vec<Said>, String> {
     if let Some(bytes) = string(text) {
         return Ok(vec![Said { direction: None, bytes: bytes? }]);
     }
@@ -285,13 +312,18 @@ mod tests {
             "2024-10-23T22:23:52.640Z 1A2029",
             "(1436509052.249713) 1A 20 29",
             "0.001234: 1A 20 29",
+            "I (1234) encoder: 1a 20 29",
+            "12:30:00 PM: 1A 20 29",
+            "17 ms: 0x1A 0x20 0x29",
+            "Nov 22 09:15:00 bench axis[3]: 1A 20 29",
+            "COM3 > 1A 20 29",
         ] {
             assert_eq!(alone(text), BYTES, "{text}");
         }
         for text in ["", "  # nothing", "// nothing", "59 0.1 app.exe IRP_MJ_CREATE Serial0 SUCCESS"] {
             assert_eq!(line(text), Ok(Vec::new()), "{text}");
         }
-        for text in ["1A 2", "xyz", "1A 0x", "12 3g", "Hello", "b'\\q\u{416}'"] {
+        for text in ["1A 2", "xyz", "1A 0x", "12 3g", "Hello", "b'\\q\u{416}'", "sent: 1A 2", "error: none"] {
             assert!(line(text).is_err(), "{text}");
         }
         // Three bytes when nothing follows.
@@ -310,6 +342,8 @@ mod tests {
             ("1A -> 1A 20", vec![(None, 1), (rx, 2)]),
             ("> 1A", vec![(tx, 1)]),
             ("<< 1A20", vec![(rx, 2)]),
+            ("COM3 TX: 1A", vec![(tx, 1)]),
+            ("I (1234) rx: 1A 20", vec![(rx, 2)]),
             ("send 1A recv 1A 20 29", vec![(tx, 1), (rx, 3)]),
             ("59 0.00000335 app.exe IRP_MJ_WRITE Serial0 SUCCESS Length 2: 1A 20", vec![(tx, 2)]),
             ("60 0.00000335 app.exe IRP_MJ_READ Serial0 SUCCESS Length 1: 1A", vec![(rx, 1)]),

@@ -21,6 +21,13 @@ pub(super) fn level(text: &[u8]) -> Cell {
     }
 }
 
+/// The lines of a pod: `0x3F`.
+pub(super) fn word(text: &[u8]) -> Option<u64> {
+    let text = std::str::from_utf8(text.trim_ascii()).ok()?;
+    let digits = text.strip_prefix("0x").or_else(|| text.strip_prefix("0X"))?;
+    if digits.bytes().all(|digit| digit.is_ascii_hexdigit()) { u64::from_str_radix(digits, 16).ok() } else { None }
+}
+
 /// A number; `comma`: the decimal mark.
 pub(super) fn number(text: &[u8], comma: bool) -> Option<f64> {
     let text = std::str::from_utf8(text).ok()?.trim();
@@ -80,6 +87,13 @@ impl Threshold {
     /// Half-way between the levels of some values, or as the user has it; the hysteresis is a tenth of the swing.
     pub(in crate::capture) fn find(values: &mut [f64], said: Option<f64>) -> Self {
         values.sort_by(f64::total_cmp);
+        // What is beyond the instrument's range was at its end at least.
+        let inside = |value: &&f64| value.abs() < f64::MAX;
+        if let (Some(&bottom), Some(&top)) = (values.iter().find(inside), values.iter().rfind(inside)) {
+            for value in values.iter_mut() {
+                *value = value.clamp(bottom, top);
+            }
+        }
         // The few values beyond are overshoot.
         let at = |share: usize| values.get(values.len() * share / 200).copied().unwrap_or(0.0);
         let (least, most) =

@@ -43,7 +43,10 @@ pub(super) fn is_row(line: &[u8]) -> bool {
     let comma = separator == b';';
     let cells = split(text.as_bytes(), separator);
     let plain = |cell: &&&[u8]| {
-        !matches!(cell::level(cell), Cell::Other) || cell::number(cell, comma).is_some() || is_date(cell)
+        !matches!(cell::level(cell), Cell::Other)
+            || cell::number(cell, comma).is_some()
+            || cell::word(cell).is_some()
+            || is_date(cell)
     };
     let numbers = cells.iter().filter(|cell| cell::level(cell) != Cell::Nothing).count();
     numbers > 0 && cells.iter().filter(plain).count() == cells.len()
@@ -122,8 +125,8 @@ fn is_units(cells: &[String]) -> bool {
 }
 
 impl Heading {
-    /// From the lines above the first row. None where they tell neither times nor a rate.
-    pub(super) fn parse(above: &[Vec<u8>], rows: &[&[u8]]) -> Option<Self> {
+    /// From the lines above the first row. None where they tell neither times nor a rate, and nobody `knows` it.
+    pub(super) fn parse(above: &[Vec<u8>], rows: &[&[u8]], knows: Option<u64>) -> Option<Self> {
         let lines: Vec<String> = above.iter().map(|line| String::from_utf8_lossy(line).into_owned()).collect();
         let (remarks, lines): (Vec<&str>, Vec<&str>) =
             lines.iter().map(String::as_str).partition(|line| is_remark(line.trim_start()));
@@ -154,6 +157,7 @@ impl Heading {
             Some(line.split_once(':')?.1.trim().to_owned())
         };
         let rate = said("samplerate").or_else(|| said("sample rate")).and_then(|text| time::frequency(&text));
+        let rate = rate.or(knows.map(|rate| rate as f64));
         let channels: Vec<String> = said("channels")
             .map(|text| text.split(',').map(|name| name.trim().to_owned()).collect())
             .unwrap_or_default();
@@ -273,6 +277,22 @@ impl Heading {
         let name = self.names.get(index).map_or("", String::as_str).trim();
         let bare = ["(V)", "(mV)", "(Volt)"].iter().fold(name, |name, unit| name.trim_end_matches(unit).trim_end());
         if bare.is_empty() { format!("column {}", index + 1) } else { bare.to_owned() }
+    }
+
+    /// The names of the lines of a pod of so many bits, the lowest first: those of `D7-D0` are `D0` to `D7`.
+    pub(super) fn pod(&self, index: usize, bits: u8) -> Vec<String> {
+        let name = self.name(index);
+        let part = |text: &str| {
+            let (letters, digits) = text.split_at(text.find(|c: char| c.is_ascii_digit())?);
+            Some((letters.to_owned(), digits.parse::<u8>().ok()?))
+        };
+        let ends = name.split_once('-').and_then(|(most, least)| Some((part(most.trim())?, part(least.trim())?)));
+        match ends {
+            Some(((letters, most), (_, least))) if most >= least && most - least < 64 => {
+                (least..=most).map(|number| format!("{letters}{number}")).collect()
+            }
+            _ => (0..bits).map(|bit| format!("{name}[{bit}]")).collect(),
+        }
     }
 
     /// How the times are known, now that rows are there, and whether they fall.

@@ -208,13 +208,16 @@ fn variable(words: &[Vec<u8>], scopes: &[String]) -> Option<Variable> {
     ) {
         return None;
     }
-    let width: u16 = std::str::from_utf8(width).ok()?.parse().ok().filter(|width| *width > 0)?;
-    let full = text(name);
+    let width = String::from_utf8_lossy(width);
+    // A port has its range in the place of the width.
+    let (width, full) = match bounds(&width) {
+        Some((most, least)) => (most.abs_diff(least).saturating_add(1), format!("{}{width}", text(name))),
+        None => (width.parse().ok()?, text(name)),
+    };
+    let width = u16::try_from(width).ok().filter(|width| *width > 0)?;
     // A range at the end belongs to the width.
     let range = full.rfind('[').and_then(|at| {
-        let inside = full.get(at + 1..)?.strip_suffix(']')?;
-        let (most, least) = inside.split_once(':')?;
-        let (most, least): (i32, i32) = (most.trim().parse().ok()?, least.trim().parse().ok()?);
+        let (most, least) = bounds(full.get(at..)?)?;
         (most.abs_diff(least).saturating_add(1) == u32::from(width)).then_some((at, most, least))
     });
     let (name, most, lowest) = match range {
@@ -224,6 +227,12 @@ fn variable(words: &[Vec<u8>], scopes: &[String]) -> Option<Variable> {
     };
     let scope = scopes.iter().filter(|scope| !scope.is_empty()).cloned().collect::<Vec<_>>().join(".");
     Some(Variable { scope, name, code: code.clone(), width, lowest, falls: most >= lowest })
+}
+
+/// `[7:0]`
+fn bounds(range: &str) -> Option<(i32, i32)> {
+    let (most, least) = range.strip_prefix('[')?.strip_suffix(']')?.split_once(':')?;
+    Some((most.trim().parse().ok()?, least.trim().parse().ok()?))
 }
 
 /// `10 ns`, `1ps`, `1 sec`

@@ -23,11 +23,31 @@ impl Tick {
         let time = u128::from(stamp).checked_mul(self.femtoseconds)?.checked_add(500)? / 1000;
         i64::try_from(time).ok()
     }
+
+    /// When a stamp with digits behind a point was, and whether they are more than zeros.
+    pub(super) fn time_between(self, stamp: u64, fraction: &[u8]) -> Option<(i64, bool)> {
+        let (mut part, mut unit) = (0_u128, self.femtoseconds);
+        for digit in fraction {
+            unit /= 10;
+            part += u128::from(digit.wrapping_sub(b'0')) * unit;
+        }
+        let time = u128::from(stamp).checked_mul(self.femtoseconds)?.checked_add(part + 500)? / 1000;
+        Some((i64::try_from(time).ok()?, part > 0))
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn stamps_between_two_units() {
+        let times = |unit, stamp, fraction: &str| Tick::new(unit).time_between(stamp, fraction.as_bytes());
+        assert_eq!(times(1_000_000_000, 20, "4"), Some((20_400_000, true)));
+        assert_eq!(times(1_000_000, 3, "0"), Some((3_000, false)));
+        assert_eq!(times(1_000_000, 3, "1234567890123456789012345678901234567890"), Some((3_123, true)));
+        assert_eq!(times(1_000, u64::MAX, "9"), None);
+    }
 
     #[test]
     fn stamps_are_rounded_and_units_are_not() {
