@@ -258,6 +258,9 @@ impl Requester {
         self.count(finished);
     }
 
+    /// A message is complete, which is rare: the frames without one stay small.
+    #[cold]
+    #[inline(never)]
     fn complete(&mut self, message: &Gathered, finished: &mut Finished) {
         if let (true, Slot::Waiting { request, frames, .. }) = (message.is_long(), self.long) {
             if !is_answer(message, frames) {
