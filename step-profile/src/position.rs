@@ -198,6 +198,13 @@ mod tests {
     use crate::profile::Parameters;
 
     #[test]
+    fn positions_are_declared() {
+        let mut mode = PositionMode::new(Motors::ALL, Microstep::Div256);
+        mode.set_positions([1, -2, 3, i64::MIN]);
+        assert_eq!(mode.group().positions(), [1, -2, 3, i64::MIN]);
+    }
+
+    #[test]
     #[cfg_attr(miri, ignore = "too long for an interpreter")]
     fn a_quarter_turn_and_its_second_of_rest() {
         let profile = Profile::new(Parameters::at(Speed::KHZ_250)).unwrap();

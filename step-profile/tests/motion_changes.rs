@@ -281,3 +281,22 @@ fn a_step_at_the_end_of_a_phase() {
         last = now;
     }
 }
+
+/// Both ends of the soft limits may be reached, and neither may be passed.
+#[test]
+fn soft_limits_have_two_ends() {
+    let mut mover = mover().with_soft_limits(-40, 30);
+    assert_eq!(mover.move_to(-41, 0), Err(Error::SoftLimit { target: -41 }));
+    assert_eq!(mover.move_to(31, 0), Err(Error::SoftLimit { target: 31 }));
+    for (target, now) in [(-40, 0), (30, 10_000_000)] {
+        mover.move_to(target, now).unwrap();
+        assert!(!mover.is_at_rest(now), "there are steps to come");
+        let mut last = 0;
+        while let Some(pulse) = mover.pulse() {
+            last = pulse.tick;
+        }
+        assert_eq!(mover.position(), target);
+        // Half a step is left.
+        assert!(!mover.is_at_rest(last) && mover.is_at_rest(now + 9_000_000));
+    }
+}

@@ -237,3 +237,33 @@ fn what_cannot_be_done_is_refused_with_what_would_do() {
     let many = Plan::new(Clock::MICROSECONDS, limits, 1 << 31).unwrap_err();
     assert_eq!(many, Error::TooManySteps { steps: 1 << 31, limit: (1 << 31) - 1 });
 }
+
+/// The size and the sign of the jerk in each of the seven phases, in steps/s³; the number of steps, before and after the first.
+#[test]
+fn a_plan_tells_its_jerk_and_its_steps() {
+    let plan = Plan::new(Clock::MICROSECONDS, limits(250_000, 2_000_000, 40_000_000), 51_200).unwrap();
+    let corners: Vec<u64> = plan.corners().collect();
+    let jerks: Vec<i64> = corners.windows(2).map(|pair| plan.at(pair[0].midpoint(pair[1])).jerk).collect();
+    for (got, want) in jerks.iter().zip([1, 0, -1, 0, -1, 0, 1]) {
+        assert!(got.abs_diff((want * 40_000_000) << 16) <= 1 << 16, "{jerks:?}");
+    }
+    assert_eq!(plan.at(0).position, 0);
+    assert_eq!(plan.steps(), 51_200);
+    let mut pulses = plan.pulses();
+    assert_eq!(pulses.size_hint(), (51_200, Some(51_200)));
+    pulses.next().unwrap();
+    assert_eq!(pulses.size_hint(), (51_199, Some(51_199)));
+}
+
+/// Half the clock and 2^31 - 1 steps are allowed; one more is not.
+#[test]
+fn the_last_that_is_allowed() {
+    let clock = Clock::new(1_000_000).unwrap();
+    assert!(Plan::new(clock, limits(500_000, 1_000_000, 0), 10).is_ok());
+    let refused = Plan::new(clock, limits(500_001, 1_000_000, 0), 10);
+    assert!(matches!(refused, Err(Error::SpeedAboveClock { speed: 500_001, limit: 500_000 })));
+    let most = (1_u32 << 31) - 1;
+    assert_eq!(Plan::new(clock, limits(500_000, 1_000_000, 0), most).unwrap().steps(), most);
+    let refused = Plan::new(clock, limits(500_000, 1_000_000, 0), most + 1);
+    assert!(matches!(refused, Err(Error::TooManySteps { steps: 0x8000_0000, limit: 0x7fff_ffff })));
+}

@@ -71,16 +71,15 @@ impl Curve {
     pub(super) const MAX: usize = 8;
 
     pub(super) const fn new() -> Self {
-        let none = Piece {
-            time: Real::ZERO,
-            p: Real::ZERO,
-            v: Real::ZERO,
-            a: Real::ZERO,
-            j: Real::ZERO,
-            up: true,
-            bend: Bend::Flat,
-        };
+        // Nothing but zero bytes: it is cleared, not copied.
+        let none = Real::ZERO;
+        let none = Piece { time: none, p: none, v: none, a: none, j: none, up: false, bend: Bend::Growing };
         Self { pieces: [none; Self::MAX], len: 0, time: Real::ZERO, p: Real::ZERO, skipped: (Real::ZERO, Real::ZERO) }
+    }
+
+    /// Without pieces.
+    pub(super) const fn clear(&mut self) {
+        (self.len, self.time, self.p) = (0, Real::ZERO, Real::ZERO);
     }
 
     pub(super) fn pieces(&self) -> &[Piece] {
@@ -114,12 +113,11 @@ impl Curve {
 
     /// Adds a change of speed.
     pub(super) fn slope(&mut self, slope: &Slope) {
-        let Slope { from, to, edge, flat, j, a } = *slope;
+        let Slope { from, to, edge, flat, j, a, distance: whole, .. } = *slope;
         let (up, dv) = (to > from, from.distance(to));
         if dv.is_zero() {
             return;
         }
-        let whole = slope.distance();
         let bent = (a * edge).half();
         // The middle has the mean speed.
         let first = from.along(bent * THIRD, up) * edge;

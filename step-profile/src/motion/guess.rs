@@ -53,7 +53,7 @@ impl Guess {
         let [interval, change, late] = row.intervals().map(|x| x >> 21);
         let own = Self { cubic, tick, interval: 0, change: 0, late: late as u32, next: 0, rate: row.rate(), wait: 0 };
         let own = own.between(interval as u32, change as i32);
-        Self { wait: own.patience().max(16), ..own }
+        Self { wait: own.patience().max(Row::LEAST), ..own }
     }
 
     /// With the interval at the last step, and what the next one is longer than the one before.

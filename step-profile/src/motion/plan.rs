@@ -4,8 +4,8 @@ use core::fmt;
 use core::iter::FusedIterator;
 
 use super::limits::{Bounds, Clock, Limits};
-use super::phases::{self, Frame, Phases, steps};
-use super::planner::{Goal, Motion, plan};
+use super::phases::{self, Phases, steps};
+use super::planner::{Goal, Motion, plan_into};
 use super::real::Real;
 use super::stepper::Stepper;
 use crate::axis::Direction;
@@ -49,9 +49,13 @@ impl Plan {
         let to = position(steps)?;
         let speed = |hz: u32| (Real::new(hz.into()) / Real::new(clock.moments().into())).min(bounds.v);
         let goal = Goal::At(Real::new(steps.into()), speed(exit));
-        let curve = plan(Motion::steady(speed(entry)), goal, &bounds).map_err(|need| too_short(steps, need))?;
-        let frame = Frame { to: Some(to), ..Frame::rest(clock.shift(), 0, 0) };
-        Ok(Self { clock, phases: Phases { curve, frame } })
+        let mut own = Self { clock, phases: Phases::rest(clock.shift(), 0, 0) };
+        let Phases { curve, frame } = &mut own.phases;
+        frame.to = Some(to);
+        match plan_into(curve, Motion::steady(speed(entry)), goal, &bounds) {
+            Ok(()) => Ok(own),
+            Err(need) => Err(too_short(steps, need)),
+        }
     }
 
     /// The clock of the ticks.

@@ -42,15 +42,25 @@ pub(super) const ENDLESS: Real = Real::fixed(1, -60);
 
 /// The curve; or the least distance that is needed, if there is not as much.
 pub(super) fn plan(start: Motion, goal: Goal, bounds: &Bounds) -> Result<Curve, Real> {
+    let mut curve = Curve::new();
+    match plan_into(&mut curve, start, goal, bounds) {
+        Ok(()) => Ok(curve),
+        Err(need) => Err(need),
+    }
+}
+
+/// The same in its place, an empty curve: it is large.
+pub(super) fn plan_into(curve: &mut Curve, start: Motion, goal: Goal, bounds: &Bounds) -> Result<(), Real> {
     match bounds.jerk {
         Some(jerk) if !start.a.is_zero() => {
             let bend = Bent::new(start, jerk);
-            if start.up { rising(start, &bend, goal, bounds) } else { falling(start, &bend, goal, bounds) }
+            if start.up {
+                rising(curve, start, &bend, goal, bounds)
+            } else {
+                falling(curve, start, &bend, goal, bounds)
+            }
         }
-        _ => {
-            let mut curve = Curve::new();
-            steady(&mut curve, start.v, goal, bounds).map(|()| curve)
-        }
+        _ => steady(curve, start.v, goal, bounds),
     }
 }
 
@@ -79,38 +89,29 @@ impl Bent {
         }
     }
 
-    /// A curve that has begun at the virtual start.
-    fn on_the_slope(&self) -> Curve {
-        let mut curve = Curve::new();
+    /// The curve has begun at the virtual start.
+    const fn on_the_slope(&self, curve: &mut Curve) {
         curve.skipped = (self.edge, self.base.1);
-        curve
-    }
-
-    /// A curve that brings the acceleration to 0.
-    fn coasting(&self, start: Motion) -> Curve {
-        let mut curve = Curve::new();
-        curve.push((self.edge, self.coast.1), [start.v, start.a, self.jerk.j], start.up, Bend::Fading);
-        curve
     }
 }
 
 /// Further up the slope if the goal asks for it, else back to acceleration 0 and on from there.
-fn rising(start: Motion, bent: &Bent, goal: Goal, bounds: &Bounds) -> Result<Curve, Real> {
+fn rising(curve: &mut Curve, start: Motion, bent: &Bent, goal: Goal, bounds: &Bounds) -> Result<(), Real> {
     let from_base = match goal {
         Goal::At(n, exit) => Goal::At(n + bent.base.1, exit),
         speed @ Goal::Speed(_) => speed,
     };
     if let Ok(top) = top(bent.base.0, from_base, bounds) {
         if top >= bent.coast.0 {
-            let mut curve = bent.on_the_slope();
-            return steady(&mut curve, bent.base.0, from_base, bounds).map(|()| curve);
+            bent.on_the_slope(curve);
+            return steady(curve, bent.base.0, from_base, bounds);
         }
     }
-    coast(start, bent, goal, bounds)
+    coast(curve, start, bent, goal, bounds)
 }
 
-fn coast(start: Motion, bent: &Bent, goal: Goal, bounds: &Bounds) -> Result<Curve, Real> {
-    let mut curve = bent.coasting(start);
+/// The acceleration is brought to 0 first.
+fn coast(curve: &mut Curve, start: Motion, bent: &Bent, goal: Goal, bounds: &Bounds) -> Result<(), Real> {
     let rest = match goal {
         Goal::At(n, _) if n + SLACK < bent.coast.1 => {
             return Err(bent.coast.1 + distance(bent.coast.0, Real::ZERO, bounds));
@@ -118,27 +119,27 @@ fn coast(start: Motion, bent: &Bent, goal: Goal, bounds: &Bounds) -> Result<Curv
         Goal::At(n, exit) => Goal::At(n - bent.coast.1, exit),
         speed @ Goal::Speed(_) => speed,
     };
-    steady(&mut curve, bent.coast.0, rest, bounds).map_err(|need| need + bent.coast.1)?;
-    Ok(curve)
+    curve.push((bent.edge, bent.coast.1), [start.v, start.a, bent.jerk.j], start.up, Bend::Fading);
+    steady(curve, bent.coast.0, rest, bounds).map_err(|need| need + bent.coast.1)
 }
 
 /// Off the slope if the goal leaves room for it, else further down it: at least to the speed that the brake has reached,
 /// and as little below as the distance allows.
-fn falling(start: Motion, bent: &Bent, goal: Goal, bounds: &Bounds) -> Result<Curve, Real> {
+fn falling(curve: &mut Curve, start: Motion, bent: &Bent, goal: Goal, bounds: &Bounds) -> Result<(), Real> {
     let ((base, back), (low, _)) = (bent.base, bent.coast);
     let (target, exit) = match goal {
         Goal::Speed(v) if v < low => {
-            let mut curve = bent.on_the_slope();
-            steady(&mut curve, base, goal, bounds)?;
-            return Ok(curve);
+            bent.on_the_slope(curve);
+            return steady(curve, base, goal, bounds);
         }
         Goal::At(n, exit) => (n + back, exit),
-        Goal::Speed(_) => return coast(start, bent, goal, bounds),
+        Goal::Speed(_) => return coast(curve, start, bent, goal, bounds),
     };
     if bounds.v >= low {
-        if let Ok(curve) = coast(start, bent, goal, bounds) {
-            return Ok(curve);
+        if coast(curve, start, bent, goal, bounds).is_ok() {
+            return Ok(());
         }
+        curve.clear();
     }
     let least = distance(base, exit, bounds);
     // Above the speed that is left when the acceleration is back at 0 the slope does not lead there.
@@ -148,16 +149,16 @@ fn falling(start: Motion, bent: &Bent, goal: Goal, bounds: &Bounds) -> Result<Cu
     let need = |v| distance(base, v, bounds) + distance(v, exit, bounds);
     let high = low.min(bounds.v).max(exit);
     let v = crossing(exit, high, target, need);
-    let mut curve = bent.on_the_slope();
-    finish(&mut curve, [base, v, exit], target, bounds);
-    Ok(curve)
+    bent.on_the_slope(curve);
+    finish(curve, [base, v, exit], target, bounds);
+    Ok(())
 }
 
 /// Slope, cruise, slope.
 fn finish(curve: &mut Curve, [from, top, exit]: [Real; 3], n: Real, bounds: &Bounds) {
     let (up, down) = (Slope::new(from, top, bounds), Slope::new(top, exit, bounds));
     curve.slope(&up);
-    curve.cruise(top, n - (up.distance() + down.distance()));
+    curve.cruise(top, n - (up.distance + down.distance));
     curve.slope(&down);
 }
 
@@ -209,7 +210,7 @@ fn top(from: Real, goal: Goal, bounds: &Bounds) -> Result<Real, Real> {
     let high = (low + steep).min(sum.sqrt()).min(bounds.v);
     Ok(climb(low, high, n, |v| {
         let (up, down) = (Slope::new(from, v, bounds), Slope::new(v, exit, bounds));
-        (up.distance() + down.distance(), up.growth(bounds) + down.growth(bounds))
+        (up.distance + down.distance, up.growth(bounds) + down.growth(bounds))
     }))
 }
 
@@ -220,7 +221,7 @@ pub(super) fn greatest(to: Real, n: Real, bounds: &Bounds) -> Real {
         None => most,
         Some(_) => climb(to, most, n, |v| {
             let slope = Slope::new(v, to, bounds);
-            (slope.distance(), slope.growth(bounds))
+            (slope.distance, slope.growth(bounds))
         }),
     }
 }

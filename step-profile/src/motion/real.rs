@@ -306,6 +306,7 @@ mod tests {
             prop_assert!((float(high - low) - (x - y).abs()).abs() <= x.max(y) * 1e-15);
             prop_assert_eq!(low - high, Real::ZERO);
             prop_assert!(high >= low && high.max(low) == high && high.min(low) == low);
+            prop_assert!(low.max(high) == high && low.min(high) == low && low.distance(high) == high.distance(low));
         }
 
         #[test]
@@ -356,5 +357,11 @@ mod tests {
         assert!(reciprocal(1 << 63) > u64::MAX - 16);
         assert_eq!(one.along(one, false), zero);
         near(THIRD, 1.0 / 3.0);
+        assert_eq!(
+            (zero.cmp(&zero), zero.cmp(&one), one.cmp(&zero)),
+            (Ordering::Equal, Ordering::Less, Ordering::Greater)
+        );
+        // 2^64 - 1, to the last bit.
+        assert_eq!(Real::new((1 << 32) - 1) * Real::new((1 << 32) + 1), Real::new(u64::MAX));
     }
 }

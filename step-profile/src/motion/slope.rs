@@ -20,6 +20,9 @@ pub(super) struct Slope {
     pub(super) j: Real,
     /// Size of the acceleration between them.
     pub(super) a: Real,
+    /// How long it takes, and how far it goes.
+    pub(super) time: Real,
+    pub(super) distance: Real,
 }
 
 impl Slope {
@@ -33,11 +36,8 @@ impl Slope {
             }
             Some(jerk) => (jerk.edge, dv * bounds.per_a - jerk.edge, jerk.j, bounds.a),
         };
-        Self { from, to, edge, flat, j, a }
-    }
-
-    pub(super) fn time(&self) -> Real {
-        self.edge.scaled(1) + self.flat
+        let time = edge.scaled(1) + flat;
+        Self { from, to, edge, flat, j, a, time, distance: (from + to).half() * time }
     }
 
     /// How fast the distance grows with the higher speed.
@@ -46,15 +46,11 @@ impl Slope {
             Some(jerk) if self.flat.is_zero() => jerk.per_j / self.edge,
             _ => bounds.per_a,
         };
-        self.time().half() + (self.from + self.to).half() * per_speed
-    }
-
-    pub(super) fn distance(&self) -> Real {
-        (self.from + self.to).half() * self.time()
+        self.time.half() + (self.from + self.to).half() * per_speed
     }
 }
 
 /// The least distance of a change of speed.
 pub(super) fn distance(from: Real, to: Real, bounds: &Bounds) -> Real {
-    Slope::new(from, to, bounds).distance()
+    Slope::new(from, to, bounds).distance
 }
