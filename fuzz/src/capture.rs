@@ -86,8 +86,9 @@ fn edges(line: &mut dyn Line, said: &mut String) {
             last = change.time;
             writeln!(said, "{change:?}").unwrap();
         }
-        if let Some(gap) = line.gap() {
-            writeln!(said, "gap until {gap}").unwrap();
+        if let Some(hole) = line.hole() {
+            assert!(hole.from <= hole.to, "{hole:?}");
+            writeln!(said, "{hole:?}").unwrap();
         }
         match more {
             Ok(true) => {}
