@@ -19,7 +19,7 @@ use crate::event::{Event, Place, Verdict};
 use crate::line::{LineField, StartStop};
 use crate::output::Sink;
 use crate::protocols::group::{Group, Widths};
-use crate::protocols::plausible::{CUT, CUT_BITS, LOST, slipped_bit};
+use crate::protocols::plausible::{CUT, CUT_BITS, LOST, SURELY_CUT_BITS, slipped_bit};
 use describe::Encoder;
 
 pub use describe::FIELDS;
@@ -241,7 +241,8 @@ fn cause(group: &Frames, request: Request, expected: Option<Expected>) -> Option
     }
     let flipped = wrong.is_some();
     let in_place = group.broken.is_none() && group.len() == due;
-    if in_place && !flipped && (line.bits() << (128 - len)).leading_ones() >= CUT_BITS {
+    let idle = (line.bits() << (128 - len)).leading_ones();
+    if in_place && idle >= SURELY_CUT_BITS {
         return Some(CUT.to_owned());
     }
     if flipped {
@@ -250,7 +251,7 @@ fn cause(group: &Frames, request: Request, expected: Option<Expected>) -> Option
     if let Some(slipped) = slipped_bit(group.raw, len, sound) {
         return Some(slipped.to_owned());
     }
-    if group.broken.is_none() && group.len() < due {
+    if in_place && idle >= CUT_BITS || group.broken.is_none() && group.len() < due {
         return Some(CUT.to_owned());
     }
     found.map(|cause| cause.to_string())
