@@ -87,6 +87,7 @@ fn edges(line: &mut dyn Line, said: &mut String) {
             writeln!(said, "{change:?}").unwrap();
         }
         if let Some(hole) = line.hole() {
+            assert!(hole.from <= hole.to, "{hole:?}");
             writeln!(said, "{hole:?}").unwrap();
         }
         match more {

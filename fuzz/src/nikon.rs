@@ -180,7 +180,7 @@ pub fn reception(mut data: &[u8]) {
     assert!(
         bus.asked()
             .iter()
-            .all(|ea| { bus.response(ea).is_some() != (bus.missing().has(ea) || bus.duplicates().has(ea)) })
+            .all(|ea| { bus.response(ea).is_some() != (bus.missing().contains(ea) || bus.duplicates().contains(ea)) })
     );
 }
 

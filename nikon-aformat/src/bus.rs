@@ -63,7 +63,7 @@ impl Addresses {
     }
 
     /// Whether the address is in the set.
-    pub const fn has(self, ea: EncoderAddress) -> bool {
+    pub const fn contains(self, ea: EncoderAddress) -> bool {
         self.0 >> ea.get() & 1 == 1
     }
 
@@ -99,7 +99,7 @@ impl Addresses {
 
     /// The addresses from the lowest up.
     pub fn iter(self) -> impl Iterator<Item = EncoderAddress> {
-        EncoderAddress::ALL.into_iter().filter(move |ea| self.has(*ea))
+        EncoderAddress::ALL.into_iter().filter(move |ea| self.contains(*ea))
     }
 }
 
@@ -192,8 +192,8 @@ impl Bus {
         let (mut duplicate, mut extra) = (false, false);
         match outcome {
             Ok(response) => {
-                extra = !self.asked.has(response.ea);
-                duplicate = self.heard.has(response.ea);
+                extra = !self.asked.contains(response.ea);
+                duplicate = self.heard.contains(response.ea);
                 if duplicate {
                     self.repeated = self.repeated.saturating_add(1);
                     self.doubled = self.doubled.with(response.ea);
@@ -210,10 +210,10 @@ impl Bus {
     /// What came from this address.
     pub fn of(&self, ea: EncoderAddress) -> Outcome {
         match self.good.get(usize::from(ea.get())).copied().flatten() {
-            Some(first) if self.doubled.has(ea) => Outcome::Duplicate { first },
-            Some(response) if self.asked.has(ea) => Outcome::Good(response),
+            Some(first) if self.doubled.contains(ea) => Outcome::Duplicate { first },
+            Some(response) if self.asked.contains(ea) => Outcome::Good(response),
             Some(response) => Outcome::Extra(response),
-            None if self.asked.has(ea) => Outcome::Missing,
+            None if self.asked.contains(ea) => Outcome::Missing,
             None => Outcome::NotAsked,
         }
     }

@@ -229,3 +229,23 @@ fn a_log_of_a_can_bus() {
         bench.decode("can.log", text, &[]).fails_with("a log of a CAN bus (candump): none of the protocols");
     }
 }
+
+/// Packed files that are not whole: what can be unpacked is decoded, and the cut is told.
+#[test]
+fn packed_files_cut_off() {
+    use std::io::Write as _;
+    let bench = Bench::new();
+    let mut wave = good_traffic(2.5e6);
+    for k in 0..2000 {
+        wave.exchange(&[0x1a], &common::id3(77_777 * k, k, 0));
+    }
+    let mut packer = flate2::write::GzEncoder::new(Vec::new(), flate2::Compression::default());
+    packer.write_all(wave.vcd().as_bytes()).unwrap();
+    let packed = packer.finish().unwrap();
+    let run = bench.decode("a.vcd.gz", &packed[..packed.len() / 2], &["--json"]);
+    run.fails_with("what is packed in it ends too early: it was cut off");
+    assert!(run.json().len() > 1000, "{}", run.json().len());
+    bench.decode("b.vcd.gz", &packed[..60], &[]).fails_with("it was cut off");
+    let zstd = std::fs::read(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/samples/hpm-uart.vcd.zst")).unwrap();
+    bench.decode("c.vcd.zst", &zstd[..zstd.len() / 2], &[]).fails_with("it was cut off");
+}

@@ -189,3 +189,24 @@ fn logs_of_words() {
     assert_eq!(run.json()[1]["fields"]["ABS"], 11_981_608);
     assert_eq!(run.json()[2]["fields"]["address"], 0xf6);
 }
+
+/// A recording that begins anywhere in the first request: the reply to it is whole, and so is all behind it.
+#[test]
+fn a_recording_that_begins_inside_a_request() {
+    let bench = Bench::new();
+    for (rate, hertz) in RATES {
+        let (wave, frames) = traffic(rate, hertz);
+        let begin = 50_000_000;
+        let bit = i64::from(rate.bit_ps());
+        for part in 1..36 {
+            let cut = begin + part * bit / 2;
+            let level = wave.edges.iter().take_while(|(time, _)| *time <= cut).last().unwrap().1;
+            let rest = wave.edges.iter().copied().filter(|(time, _)| *time > cut);
+            let mut wave = wave.clone();
+            wave.edges = [(cut, level)].into_iter().chain(rest).collect();
+            let run = decode(&bench, &wave, &[]);
+            let whole = run.json().iter().filter(|event| event["kind"] != "cut").count();
+            assert!(run.code == 0 && (frames - 1..=frames).contains(&whole), "{hertz} {part}: {}", run.out);
+        }
+    }
+}

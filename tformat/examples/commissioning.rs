@@ -25,7 +25,7 @@ fn main() -> Result<(), Box<dyn core::error::Error>> {
         println!("combination {number:4}: {fitted}");
     }
     // An encoder that answers after the master's patience has ended.
-    let slow = Config::new().with_response_delay(90_000);
+    let slow = Config::new().with_response_delay_ns(90_000);
     let ended = fit(&mut Device::<6>::new(0x17, BitRate::Mbit2_5).with_config(slow), line, resolution);
     println!("a slow encoder: {}", ended.unwrap_or_else(|error| error.to_string()));
     Ok(())
@@ -35,12 +35,12 @@ fn main() -> Result<(), Box<dyn core::error::Error>> {
 fn line() -> Line {
     Line::new(BitRate::Mbit2_5)
         .with_echo()
-        .with_driver_lead(1_200)
-        .with_turn_around(1_600)
-        .with_response_timeout(12_000)
-        .with_field_timeout(8_000)
-        .with_hand_over(50_000)
-        .with_sampling(480)
+        .with_driver_lead_ns(1_200)
+        .with_turn_around_ns(1_600)
+        .with_response_timeout_ns(12_000)
+        .with_field_timeout_ns(8_000)
+        .with_hand_over_ns(50_000)
+        .with_sampling_ns(480)
 }
 
 /// 23 bits in the turn and 16 bits of turns, counted from 0 to 65,535; upper bits of a compatible encoder are left alone.

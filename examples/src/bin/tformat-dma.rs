@@ -21,7 +21,7 @@ struct Reader {
 impl Reader {
     fn new() -> Self {
         // A block is handed over up to eleven fields and the idle time after the first of its bytes.
-        let line = Line::new(BitRate::Mbit2_5).with_hand_over(50_000);
+        let line = Line::new(BitRate::Mbit2_5).with_hand_over_ns(50_000);
         Self { line, transaction: None, ready_ns: 0 }
     }
 

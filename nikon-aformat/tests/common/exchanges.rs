@@ -88,7 +88,7 @@ pub fn encoders<const N: usize>(
         let address = EncoderAddress::truncate(ea);
         let mut device = Device::new(address, resolution, rate);
         device.set_behaviour(switches.behaviour(ea, index));
-        if present.has(address) {
+        if present.contains(address) {
             index += 1;
         } else {
             device.set_fault(Fault::Silent);
@@ -362,7 +362,7 @@ pub fn bus(setup: &Setup, turns: u64, shown: &mut Shown) {
                         && t.speaker == Speaker::Device(ea.get())
                         && t.delivered_ns < bench.world.now_ns()
                 });
-                let doubled = transaction.bus().duplicates().has(ea);
+                let doubled = transaction.bus().duplicates().contains(ea);
                 assert!(
                     doubled || lost.is_none_or(|t| bench.is_excused(t)),
                     "seed {seed} turn {turn}: {ea} lost, {lost:?}"

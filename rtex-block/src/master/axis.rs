@@ -68,6 +68,8 @@ pub struct Axis {
     active_off: u32,
     disobeys: bool,
     service: Service,
+    /// The drive has not echoed the normal command since the last request: what it says may still be the answer to that.
+    unreleased: bool,
     outcome: Option<Progress<NonCyclicResponse>>,
     sub: SubService,
     sub_outcome: Option<Progress<SubResponse>>,

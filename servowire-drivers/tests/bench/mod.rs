@@ -286,5 +286,5 @@ pub const HAND_OVER_NS: u64 = 5_000;
 
 /// A line at such a host: a block is handed over up to ten fields after the first of its bytes.
 pub fn line() -> Line {
-    Line::new(BitRate::Mbit2_5).with_hand_over(50_000)
+    Line::new(BitRate::Mbit2_5).with_hand_over_ns(50_000)
 }

@@ -284,8 +284,11 @@ impl BufRead for Input {
     }
 }
 
-/// The system's words without its error number.
+/// The system's words without its error number, and one sentence for all packed files that are not whole.
 fn plain(error: &io::Error) -> String {
     let text = error.to_string();
+    if error.kind() == io::ErrorKind::UnexpectedEof || text.contains("UnexpectedEof") {
+        return "what is packed in it ends too early: it was cut off".to_owned();
+    }
     text.split(" (os error").next().unwrap_or(&text).to_lowercase()
 }

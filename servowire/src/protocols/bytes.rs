@@ -10,6 +10,8 @@ use crate::fault::{At, Fault};
 use crate::line::{StartStop, Stop};
 use crate::output::{Output, Sink, Tally};
 
+/// Bytes of a burst by which it is recognised.
+const MOST_TRIED: usize = 1 << 14;
 /// Bursts by which the protocol is recognised.
 const SAMPLE: usize = 256;
 
@@ -79,17 +81,23 @@ fn recognise(
     settings: &Settings,
     out: &Output<'_>,
 ) -> Result<Reading, &'static str> {
+    let wrapped = may_be_wrapped(bursts);
+    let begin = |burst: &Burst| {
+        let bytes = burst.bytes.get(..MOST_TRIED.min(burst.bytes.len())).unwrap_or_default().to_vec();
+        Burst { bytes, spoilt: burst.spoilt.clone(), ..*burst }
+    };
+    let lines: Vec<Burst> = bursts.iter().map(begin).collect();
+    let joined = lines.iter().flat_map(|burst| burst.bytes.iter().copied()).take(MOST_TRIED).collect();
+    let joined = [Burst::new(1, joined)];
     let tally = |reading: Reading| {
         let mut tally = Tally::default();
-        let mut reader = Reader::new(reading.protocol, settings, bursts);
-        let joined = [Burst::new(1, bursts.iter().flat_map(|burst| burst.bytes.clone()).collect())];
-        let bursts = if reading.wrapped { &joined } else { bursts };
+        let bursts = if reading.wrapped { joined.as_slice() } else { lines.as_slice() };
+        let mut reader = Reader::new(reading.protocol, settings, &lines);
         // A tally takes whatever comes.
         let _ = bursts.iter().try_for_each(|burst| reader.burst(burst, &mut tally));
         let _ = reader.finish(&mut tally);
         tally
     };
-    let wrapped = may_be_wrapped(bursts);
     // Lines as they are come before lines in one piece. A block of RTEX has no check sum, so it comes last among equals;
     // what leaves fewest refused wins.
     let all = [

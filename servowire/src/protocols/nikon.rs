@@ -19,7 +19,7 @@ use crate::event::{Event, Place, Verdict};
 use crate::line::{LineField, StartStop};
 use crate::output::Sink;
 use crate::protocols::group::{Group, Widths};
-use crate::protocols::plausible::{CUT, CUT_BITS, LOST, slipped_bit};
+use crate::protocols::plausible::{CUT, CUT_BITS, LOST, SURELY_CUT_BITS, slipped_bit};
 use describe::Encoder;
 
 pub use describe::FIELDS;
@@ -119,9 +119,14 @@ impl Decoder {
         }
     }
 
-    /// Whether the open group is over before a frame that begins at `start`.
-    fn is_over(&self, start: i64) -> bool {
+    /// Whether the open group is over before a frame that begins at `start`, and may be the first one of what it
+    /// `begins`.
+    fn is_over(&self, start: i64, begins: Kind) -> bool {
         let pause = start - self.open.end;
+        // The frames of a reply follow each other: behind anything else a new one begins.
+        if begins == Kind::Response && self.open.kind() != Kind::Response && 2 * pause > 3 * self.bit {
+            return true;
+        }
         match self.open.kind() {
             Kind::Request => pause > MEMORY_PAUSE,
             _ if pause <= PAUSE_BITS * self.bit => false,
@@ -145,7 +150,11 @@ impl Decoder {
             _ => self.reply(&group),
         };
         // With no idle line before it, a bad first group is only the end of one.
-        let at_once = begin.is_some_and(|begin| group.start() - begin < i64::from(FRAME_BITS) * self.bit);
+        let after = begin.map(|begin| group.start() - begin);
+        let at_once = after.is_some_and(|after| after < i64::from(FRAME_BITS) * self.bit);
+        // Nor is a memory data frame whose command data frame was before it.
+        let no_command = matches!(&event.verdict, Verdict::Refused(refusal) if refusal.class == "frame_code");
+        let at_once = at_once || no_command && after.is_some_and(|after| after < MEMORY_PAUSE);
         let still = self.cut_until.take().is_some_and(|until| group.start() < until);
         if (at_once || still) && !event.verdict.is_ok() {
             self.cut_until = Some(group.start() + LONGEST_BITS * self.bit);
@@ -232,7 +241,8 @@ fn cause(group: &Frames, request: Request, expected: Option<Expected>) -> Option
     }
     let flipped = wrong.is_some();
     let in_place = group.broken.is_none() && group.len() == due;
-    if in_place && !flipped && (line.bits() << (128 - len)).leading_ones() >= CUT_BITS {
+    let idle = (line.bits() << (128 - len)).leading_ones();
+    if in_place && idle >= SURELY_CUT_BITS {
         return Some(CUT.to_owned());
     }
     if flipped {
@@ -241,7 +251,7 @@ fn cause(group: &Frames, request: Request, expected: Option<Expected>) -> Option
     if let Some(slipped) = slipped_bit(group.raw, len, sound) {
         return Some(slipped.to_owned());
     }
-    if group.broken.is_none() && group.len() < due {
+    if in_place && idle >= CUT_BITS || group.broken.is_none() && group.len() < due {
         return Some(CUT.to_owned());
     }
     found.map(|cause| cause.to_string())
@@ -280,7 +290,7 @@ impl StartStop for Decoder {
     }
 
     fn field(&mut self, field: &LineField, out: &mut dyn Sink) -> io::Result<()> {
-        if !self.open.is_empty() && self.is_over(field.start) {
+        if !self.open.is_empty() && self.is_over(field.start, Kind::of(field.content)) {
             self.close(out)?;
         }
         self.open.push(field.content, field, self.bit);

@@ -72,6 +72,9 @@ pub(super) const CUT: &str = "it was cut: the encoder broke off, or somebody swi
 
 /// High bits at the end of a whole answer that say more of an idle line than of its check field.
 pub(super) const CUT_BITS: u32 = 5;
+/// So many are an idle line even if one bit the other way, lost or added would make a frame of an eight-bit check sound:
+/// of what was cut, that is so in a quarter of all cases.
+pub(super) const SURELY_CUT_BITS: u32 = 9;
 
 /// Why a request got no answer when the next one came `after` picoseconds behind it: nobody waits so briefly.
 pub(super) fn two_masters(after: i64) -> String {

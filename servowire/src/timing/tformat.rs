@@ -42,7 +42,7 @@ fn data_id(text: &str) -> Result<DataId, String> {
 impl Arguments {
     pub(super) fn plan(&self) -> Plan {
         let Self { rate, id, cable, turn_around, latency } = *self;
-        let line = Line::new(rate).with_hand_over(latency);
+        let line = Line::new(rate).with_hand_over_ns(latency);
         let way_ns = 5 * i64::from(cable);
         let (request, response) = id.layout();
         let asked_ns = i64::from(rate.fields_ns(id.request_fields()));

@@ -123,13 +123,18 @@ pub fn judge(capture: &Capture, inside: bool) -> Outcome {
             .collect();
         outcome.wrong += said
             .iter()
-            .filter(|event| event.verdict == Verdict::Ok && !due.events.iter().any(|expect| fits(event, expect)))
+            .filter(|event| {
+                event.verdict == Verdict::Ok && !due.before.iter().chain(&due.events).any(|expect| fits(event, expect))
+            })
             .count();
         let mut said = said.as_slice();
         if inside {
             // Pieces of what was cut come first.
+            let all = |skip: &usize| said[*skip..].iter().zip(&due.events).all(|(event, expect)| fits(event, expect));
             let first = due.events.first();
-            let skip = said.iter().position(|event| first.is_some_and(|expect| fits(event, expect))).unwrap_or(0);
+            let skip = (0..said.len().min(3)).find(all);
+            let skip =
+                skip.or(said.iter().position(|event| first.is_some_and(|expect| fits(event, expect)))).unwrap_or(0);
             if skip > 2 {
                 blame(format!("{skip} events before the first whole one"), &mut outcome);
             }

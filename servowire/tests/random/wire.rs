@@ -75,6 +75,8 @@ pub struct Due {
     /// Names of its channels, requests first.
     pub channels: Vec<String>,
     pub events: Vec<Expect>,
+    /// What began before the capture did: enough of it may be there.
+    pub before: Vec<Expect>,
 }
 
 #[derive(Debug, Clone)]
@@ -113,6 +115,8 @@ pub fn capture(kind: Kind, scene: &Scene, seed: u64) -> Capture {
         let behind =
             whole.skip_while(|speech| speech.side == Side::Encoder && (kind == Kind::Dsl || speech.edges.is_empty()));
         let events: Vec<Expect> = behind.filter_map(|speech| speech.expect.clone()).collect();
+        let all = said.iter().filter(|speech| speech.expect.is_some()).count();
+        let before = said.iter().filter_map(|speech| speech.expect.clone()).take(all - events.len()).collect();
         let line = |side: &dyn Fn(Side) -> bool| -> Vec<(f64, bool)> {
             let edges = said.iter().filter(|speech| side(speech.side)).flat_map(|speech| speech.edges.iter().copied());
             [(0.0, true)].into_iter().chain(edges).collect()
@@ -130,7 +134,7 @@ pub fn capture(kind: Kind, scene: &Scene, seed: u64) -> Capture {
         }
         let heard = if scene.apart { 2 } else { 1 };
         let names = wires.iter().take(heard).map(|(name, _)| name.clone()).collect();
-        due.push(Due { kind, channels: names, events });
+        due.push(Due { kind, channels: names, events, before });
         let period = scene.samples.map(|(least, most)| nominal / rng.between(least, most));
         for (name, edges) in wires {
             let edges = imperfect(&edges, nominal, scene, end, &mut rng);

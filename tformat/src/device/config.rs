@@ -126,7 +126,7 @@ impl Config {
     pub const NUMBERED: u16 = 1 << 12;
 
     /// With another delay of the response.
-    pub const fn with_response_delay(self, ns: u32) -> Self {
+    pub const fn with_response_delay_ns(self, ns: u32) -> Self {
         Self { response_delay_ns: ns, ..self }
     }
 }

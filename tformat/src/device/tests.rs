@@ -193,7 +193,7 @@ fn what_is_not_answered_is_a_switch() {
 fn the_response_begins_3_us_after_the_request() {
     let mut device = encoder();
     assert_eq!(send(&mut device, &[0x02], 0).map(|sent| sent.at_ns), Some(7_000));
-    let mut late = encoder().with_config(Config::new().with_response_delay(9_000));
+    let mut late = encoder().with_config(Config::new().with_response_delay_ns(9_000));
     assert_eq!(send(&mut late, &[0x02], 0).map(|sent| sent.at_ns), Some(13_000));
     for number in 0..Config::NUMBERED {
         assert!((1_700..=9_000).contains(&Config::numbered(number).response_delay_ns));

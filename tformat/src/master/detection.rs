@@ -113,7 +113,7 @@ mod tests {
     #[test]
     fn the_lines_are_those_of_the_host() {
         let [fast, slow] =
-            [BitRate::Mbit5, BitRate::Mbit2_5].map(|rate| Line::new(rate).with_hand_over(90_000).with_turn_around(500));
+            [BitRate::Mbit5, BitRate::Mbit2_5].map(|rate| Line::new(rate).with_hand_over_ns(90_000).with_turn_around_ns(500));
         let mut detection = Detection::on([slow, fast]);
         let mut seen = Vec::new();
         let mut step = detection.start(0);

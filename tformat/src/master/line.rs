@@ -56,32 +56,32 @@ impl Line {
     }
 
     /// With another wait for the start bit of the response.
-    pub const fn with_response_timeout(self, ns: u32) -> Self {
+    pub const fn with_response_timeout_ns(self, ns: u32) -> Self {
         Self { response_timeout_ns: ns, ..self }
     }
 
     /// With another wait for the next field.
-    pub const fn with_field_timeout(self, ns: u32) -> Self {
+    pub const fn with_field_timeout_ns(self, ns: u32) -> Self {
         Self { field_timeout_ns: ns, ..self }
     }
 
     /// With another least turn-around of the encoder. The [latency budget](Self::latency_budget_ns) goes with it.
-    pub const fn with_turn_around(self, ns: u32) -> Self {
+    pub const fn with_turn_around_ns(self, ns: u32) -> Self {
         Self { turn_around_ns: ns, ..self }
     }
 
     /// With another time to hand over a byte, for DMA blocks and idle detection.
-    pub const fn with_hand_over(self, ns: u32) -> Self {
+    pub const fn with_hand_over_ns(self, ns: u32) -> Self {
         Self { hand_over_ns: ns, ..self }
     }
 
     /// With another lead of the driver.
-    pub const fn with_driver_lead(self, ns: u32) -> Self {
+    pub const fn with_driver_lead_ns(self, ns: u32) -> Self {
         Self { driver_lead_ns: ns, ..self }
     }
 
     /// With another sampling instant.
-    pub const fn with_sampling(self, ns: u32) -> Self {
+    pub const fn with_sampling_ns(self, ns: u32) -> Self {
         Self { sampling_ns: ns, ..self }
     }
 

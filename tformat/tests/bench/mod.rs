@@ -89,7 +89,7 @@ impl Bench {
                 Delivery::Each => 0,
                 Delivery::Blocks { idle_ns, .. } | Delivery::Idle { idle_ns } => block_ns + idle_ns,
             };
-        let line = line.with_hand_over(line.hand_over_ns.max(hand_over_ns));
+        let line = line.with_hand_over_ns(line.hand_over_ns.max(hand_over_ns));
         Self {
             world: World::new(wire, scenario),
             device: Device::new(0x17, rate).with_config(config),

@@ -16,7 +16,7 @@ use tformat::{Address, BitRate};
 fn line() -> Line {
     let line = Line::new(BitRate::Mbit2_5);
     if cfg!(feature = "emulated") {
-        line.with_response_timeout(500_000_000).with_field_timeout(500_000_000)
+        line.with_response_timeout_ns(500_000_000).with_field_timeout_ns(500_000_000)
     } else {
         line
     }

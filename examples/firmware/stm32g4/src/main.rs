@@ -132,7 +132,7 @@ async fn main(_spawner: Spawner) {
         .expect("64 clocks a bit");
     let _ = writeln!(console, "T-Format master, {} bit/s, core {} Hz", RATE.bits_per_second(), CORE_HZ);
     // A block is handed over up to eleven fields and the idle time after the first of its bytes.
-    let line = Line::new(RATE).with_hand_over(100_000);
+    let line = Line::new(RATE).with_hand_over_ns(100_000);
     let mut ticker = Ticker::every(CYCLE);
     let (mut good, mut bad) = (0_u32, 0_u32);
     loop {

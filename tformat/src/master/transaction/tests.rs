@@ -54,12 +54,12 @@ fn defaults_are_numbers_of_the_sources() {
 fn settings_are_independent() {
     let changed = LINE
         .with_echo()
-        .with_response_timeout(1)
-        .with_field_timeout(2)
-        .with_turn_around(3)
-        .with_hand_over(4)
-        .with_driver_lead(5)
-        .with_sampling(6);
+        .with_response_timeout_ns(1)
+        .with_field_timeout_ns(2)
+        .with_turn_around_ns(3)
+        .with_hand_over_ns(4)
+        .with_driver_lead_ns(5)
+        .with_sampling_ns(6);
     let times = [
         changed.response_timeout_ns,
         changed.field_timeout_ns,
