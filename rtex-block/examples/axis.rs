@@ -6,7 +6,7 @@
 use core::fmt::Debug;
 use core::num::NonZeroU16;
 
-use rtex_block::device::{Drive, DriveConfig, Manners, OpenCodes};
+use rtex_block::device::{Behaviour, Drive, DriveConfig, OpenCodes};
 use rtex_block::master::procedure::{
     AlarmAttributes, AlarmHistory, Backup, ClearAlarm, ClearableIf, Home, Latch, ReadText, Restore, SetPosition,
 };
@@ -74,10 +74,10 @@ fn main() -> Result<(), String> {
     let limits = Limits::new(NonZeroU16::MIN.saturating_add(7), 100).with_ready(400);
     let config = AxisConfig::new(mac_id, ActiveCode::CyclicPosition, 500_000, limits).with_max_speed(Some(5_000_000));
     // A drive that takes its time.
-    let manners = Manners::POLITE.with_stale_answers(2).with_in_progress_late(6).with_latch_late(3);
+    let behaviour = Behaviour::POLITE.with_stale_answers(2).with_in_progress_late(6).with_latch_late(3);
     let mut machine = Machine {
         axis: Axis::new(config),
-        drive: Drive::new(DriveConfig::new(mac_id, OpenCodes::INVENTED).with_manners(manners)),
+        drive: Drive::new(DriveConfig::new(mac_id, OpenCodes::INVENTED).with_behaviour(behaviour)),
         counter: CommandCounter::new(4),
         sent: Turn::Invalid,
         received: Received::Nothing,
@@ -188,7 +188,7 @@ fn what_goes_wrong(machine: &mut Machine) -> Result<(), String> {
     println!("{}", machine.axis.state());
     machine.drive.set_main_power(true);
     // From now on it does not take its time.
-    machine.drive.set_config(machine.drive.config().with_manners(Manners::POLITE));
+    machine.drive.set_config(machine.drive.config().with_behaviour(Behaviour::POLITE));
     machine.axis.clear();
     machine.switch_on()
 }

@@ -3,17 +3,17 @@
 //! [`Drive`] answers commands block by block and moves a simple axis; 32 of them make a ring. [`check`] alone is the
 //! part of it that looks at header, codes and sub block.
 
+mod behaviour;
 mod check;
 mod config;
 mod drive;
 mod literals;
-mod manners;
 mod motion;
 mod parameters;
 mod profile;
 mod wire;
 
+pub use behaviour::Behaviour;
 pub use check::{Verdict, check};
 pub use config::{DriveConfig, OpenCodes};
 pub use drive::Drive;
-pub use manners::Manners;

@@ -13,7 +13,7 @@ mod common;
 
 use common::Pair;
 use proptest::prelude::*;
-use rtex_block::device::Manners;
+use rtex_block::device::Behaviour;
 use rtex_block::master::{ActiveCode, AxisState, Received, StopReason};
 use rtex_block::{
     Alarm, CommandBlock, ControlBits, Nibble, NonCyclicCode, NonCyclicCommand, Response, SubCode, TypeCode,
@@ -123,8 +123,8 @@ proptest! {
     /// each period and both ways round; and a refused set-point changes nothing.
     #[test]
     fn no_caller_gets_around_the_servo_off(actions in proptest::collection::vec(action(), 0..300), polite: bool) {
-        let manners = if polite { Manners::POLITE } else { Manners::POLITE.with_servo_off_late(5).with_echo_lag(2) };
-        let mut pair = Pair::new(ActiveCode::CyclicPosition, manners);
+        let behaviour = if polite { Behaviour::POLITE } else { Behaviour::POLITE.with_servo_off_late(5).with_echo_lag(2) };
+        let mut pair = Pair::new(ActiveCode::CyclicPosition, behaviour);
         pair.until("off", |pair| pair.axis.state() == AxisState::Off);
         for action in actions {
             act(&mut pair, action);

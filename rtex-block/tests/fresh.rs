@@ -6,7 +6,7 @@ mod common;
 use core::num::NonZeroU16;
 
 use common::{Pair, limits, set_position};
-use rtex_block::device::Manners;
+use rtex_block::device::Behaviour;
 use rtex_block::master::procedure::Home;
 use rtex_block::master::{ActiveCode, Axis, AxisConfig, Failure, Limits, Progress, Turn};
 use rtex_block::{
@@ -26,7 +26,7 @@ fn a_block_that_was_thrown_away_refuses_nothing() {
     // A motion of which one block is damaged at any time is made, and made once.
     for damaged in 0..15 {
         for bit in [0x01, 0x80] {
-            let mut pair = Pair::on(ActiveCode::ProfilePosition, Manners::POLITE);
+            let mut pair = Pair::on(ActiveCode::ProfilePosition, Behaviour::POLITE);
             let start = pair.axis.actual_position();
             pair.axis.start_move(0x11, 5_000, 2_000_000).unwrap();
             let mut ended = None;
@@ -39,7 +39,7 @@ fn a_block_that_was_thrown_away_refuses_nothing() {
         }
     }
     // Sub_Chk = 0 in one block: the sub-command is asked for again.
-    let mut pair = Pair::new(ActiveCode::CyclicPosition, Manners::POLITE);
+    let mut pair = Pair::new(ActiveCode::CyclicPosition, Behaviour::POLITE);
     pair.wide = true;
     pair.until("off", |pair| pair.axis.can_switch_on());
     pair.axis.ask_sub(SubCode::Monitor, 0x07, 0).unwrap();
@@ -69,7 +69,7 @@ fn update_with(pair: &mut Pair, damage: u8) {
 fn a_damaged_block_does_not_spoil_a_request() {
     for damaged in 0..12 {
         for bit in [0x01, 0x80] {
-            let mut pair = Pair::new(ActiveCode::CyclicPosition, Manners::POLITE);
+            let mut pair = Pair::new(ActiveCode::CyclicPosition, Behaviour::POLITE);
             pair.until("off", |pair| pair.axis.can_switch_on());
             pair.axis.ask(set_position(0x21, 123_456)).unwrap();
             let mut outcome = None;

@@ -16,7 +16,7 @@ mod common;
 use core::num::NonZeroU16;
 
 use common::CODES;
-use rtex_block::device::{Drive, DriveConfig, Manners};
+use rtex_block::device::{Behaviour, Drive, DriveConfig};
 use rtex_block::master::{
     ActiveCode, Asic, Axis, AxisConfig, AxisState, Fault, Limits, Master, MasterConfig, Phase, Slave, StopPolicy,
 };
@@ -32,11 +32,11 @@ const LIMIT: u16 = 8;
 /// one for the drive to obey, three that its status may be late, and four that frames may be lost meanwhile.
 const OFF_WITHIN: u64 = LIMIT as u64 + 2 + 3 + 4;
 
-fn manners(draw: &mut Draw) -> Manners {
+fn behaviour(draw: &mut Draw) -> Behaviour {
     let mut some = |limit| draw.below(limit) as u16;
     // Up to three exchanges for each flag, but Servo_Active, which has a lateness of its own at servo-off.
     let late = core::array::from_fn(|bit| if bit == 7 { 0 } else { some(4) as u8 });
-    Manners::POLITE
+    Behaviour::POLITE
         .with_status_late(late)
         .with_latch_late(some(4) as u8)
         .with_echo_lag(some(4) as u8)
@@ -127,7 +127,7 @@ impl Bench {
             master,
             drives: core::array::from_fn(|place| {
                 let config = DriveConfig::new(mac_id(place), CODES).with_gear(gear(place));
-                Drive::new(config.with_manners(manners(draw)))
+                Drive::new(config.with_behaviour(behaviour(draw)))
             }),
             down: core::array::from_fn(|place| Line::new(place as u64 + 1)),
             up: core::array::from_fn(|place| Line::new(place as u64 + 100)),
@@ -219,7 +219,7 @@ impl Bench {
     fn recover(&mut self, draw: &mut Draw) {
         (self.cut, self.turned) = ([false; AXES], [false; AXES]);
         for drive in &mut self.drives {
-            drive.set_config(drive.config().with_manners(manners(draw)));
+            drive.set_config(drive.config().with_behaviour(behaviour(draw)));
             drive.set_main_power(true);
         }
         for _ in 0..20 {

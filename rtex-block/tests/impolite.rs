@@ -1,4 +1,4 @@
-//! The master against a drive that is late, forgetful and literal, in every combination of its manners.
+//! The master against a drive that is late, forgetful and literal, in every combination of its behaviour.
 #![allow(
     clippy::arithmetic_side_effects,
     clippy::cast_possible_truncation,
@@ -12,7 +12,7 @@
 mod common;
 
 use common::{CODES, LIMIT, Pair, limits, monitor, set_position};
-use rtex_block::device::{Drive, DriveConfig, Manners};
+use rtex_block::device::{Behaviour, Drive, DriveConfig};
 use rtex_block::master::procedure::{Caught, Home, Latch};
 use rtex_block::master::{
     ActiveCode, AskError, AxisConfig, AxisState, CommandEnded, Failure, MoveStage, Progress, Received, StopReason,
@@ -23,11 +23,11 @@ use rtex_block::{
 };
 
 /// Every switch on or off, and every flag late or not: 2 to the power of 13.
-fn all_manners() -> impl Iterator<Item = Manners> {
+fn all_behaviours() -> impl Iterator<Item = Behaviour> {
     (0..1_u32 << 13).map(|bits| {
         let on = |k: u32| bits >> k & 1 == 1;
         let some = |k: u32, n: u16| if on(k) { n } else { 0 };
-        Manners::POLITE
+        Behaviour::POLITE
             .with_echo_lag(if on(0) { 3 } else { 0 })
             .with_in_progress_late(some(1, 9))
             .with_servo_off_late(some(2, 7))
@@ -45,12 +45,12 @@ fn all_manners() -> impl Iterator<Item = Manners> {
 }
 
 /// Servo on, a cyclic move, a latch, a monitor value, a profile motion, homing, servo off, an alarm.
-fn a_day_of_work(manners: Manners) {
+fn a_day_of_work(behaviour: Behaviour) {
     let mac_id = MacId::new(9).unwrap();
     let config = AxisConfig::new(mac_id, ActiveCode::CyclicPosition, 500_000, limits().with_inactive(40));
-    let mut pair = Pair::with(config, DriveConfig::new(mac_id, CODES).with_manners(manners));
+    let mut pair = Pair::with(config, DriveConfig::new(mac_id, CODES).with_behaviour(behaviour));
     pair.switch_on();
-    assert_eq!(pair.axis.setpoint(), 0, "{manners:?}");
+    assert_eq!(pair.axis.setpoint(), 0, "{behaviour:?}");
     for k in 1..=20 {
         pair.axis.set_position(k * 50).unwrap();
         pair.update();
@@ -60,46 +60,46 @@ fn a_day_of_work(manners: Manners) {
     let mut latch = Latch::second(0xc7, Nibble::new(2).unwrap(), 400);
     (0..40).for_each(|_| {
         pair.update();
-        assert!(latch.receive(&mut pair.axis).is_pending(), "{manners:?}");
+        assert!(latch.receive(&mut pair.axis).is_pending(), "{behaviour:?}");
     });
     pair.drive.trigger(2);
     let caught = Caught { latch1: None, latch2: Some(1_000) };
-    assert_eq!(pair.run(|axis| latch.receive(axis)), Progress::Done { value: caught }, "{manners:?}");
+    assert_eq!(pair.run(|axis| latch.receive(axis)), Progress::Done { value: caught }, "{behaviour:?}");
 
-    let Progress::Done { value } = pair.ask(monitor(0x07)) else { panic!("{manners:?}") };
-    assert_eq!(value.data(), Some(1_000), "{manners:?}");
+    let Progress::Done { value } = pair.ask(monitor(0x07)) else { panic!("{behaviour:?}") };
+    assert_eq!(value.data(), Some(1_000), "{behaviour:?}");
     let failed = pair.ask(monitor(0xee));
-    assert_eq!(failed, Progress::Failed { error: Failure::CommandError(ErrorCode(0x0031)) }, "{manners:?}");
+    assert_eq!(failed, Progress::Failed { error: Failure::CommandError(ErrorCode(0x0031)) }, "{behaviour:?}");
 
     pair.until("free", |pair| pair.axis.can_ask());
     pair.axis.set_mode(ActiveCode::ProfilePosition).unwrap();
     pair.axis.start_move(0x11, 3_000, 2_000_000).unwrap();
     let ended = pair.end_of_move();
-    assert!(matches!(ended, Progress::Done { .. }), "{manners:?}: {ended:?}");
-    assert!((pair.drive.position() - 4_000).abs() < 400, "{manners:?}: at {}", pair.drive.position());
+    assert!(matches!(ended, Progress::Done { .. }), "{behaviour:?}: {ended:?}");
+    assert!((pair.drive.position() - 4_000).abs() < 400, "{behaviour:?}: at {}", pair.drive.position());
     pair.until("at the target", |pair| pair.drive.position() == 4_000);
     let mut home = Home::new(0xc8, 1_000);
-    assert_eq!(pair.run(|axis| home.receive(axis)), Progress::Done { value: () }, "{manners:?}");
+    assert_eq!(pair.run(|axis| home.receive(axis)), Progress::Done { value: () }, "{behaviour:?}");
     pair.until("at the origin", |pair| pair.drive.position() == 0);
 
     pair.axis.switch_off();
     pair.until("off", |pair| pair.axis.state() == AxisState::Off);
     assert!(!pair.drive.is_active());
-    assert_eq!(pair.drive.alarm(), None, "{manners:?}");
+    assert_eq!(pair.drive.alarm(), None, "{behaviour:?}");
     pair.until("free", |pair| pair.axis.can_ask());
     pair.switch_on();
     pair.drive.raise(Alarm { main: 16, sub: 0 });
     let from = pair.now;
     pair.until("stopped", |pair| matches!(pair.axis.state(), AxisState::Stopped(_)));
     // As late as the first of the flags that show it, and the echo lag.
-    assert!(pair.now - from <= 2 + 6 + 3, "{manners:?}");
+    assert!(pair.now - from <= 2 + 6 + 3, "{behaviour:?}");
 }
 
 #[test]
-fn every_combination_of_manners() {
+fn every_combination_of_behaviour() {
     // An opt-level of 1 takes every fifth; release all of them.
     let step = if cfg!(debug_assertions) { 5 } else { 1 };
-    all_manners().step_by(step).for_each(a_day_of_work);
+    all_behaviours().step_by(step).for_each(a_day_of_work);
 }
 
 /// Each flag of byte 2 late by itself, by any number of exchanges.
@@ -109,8 +109,8 @@ fn every_flag_late_by_itself() {
         for late in 1..=15 {
             let mut status_late = [0; 8];
             status_late[flag] = late;
-            let manners = Manners::POLITE.with_status_late(status_late);
-            let mut pair = Pair::on(ActiveCode::ProfilePosition, manners);
+            let behaviour = Behaviour::POLITE.with_status_late(status_late);
+            let mut pair = Pair::on(ActiveCode::ProfilePosition, behaviour);
             pair.axis.start_move(0x11, 20_000, 1_000_000).unwrap();
             let ended = pair.end_of_move();
             assert!(matches!(ended, Progress::Done { .. }), "{flag} {late}: {ended:?}");
@@ -132,8 +132,8 @@ fn every_flag_late_by_itself() {
 #[test]
 fn a_motion_that_starts_late_is_not_done_early() {
     for late in [0, 1, 5, 30] {
-        let manners = Manners::POLITE.with_in_progress_late(late).with_always_in_position(true);
-        let mut pair = Pair::on(ActiveCode::ProfilePosition, manners);
+        let behaviour = Behaviour::POLITE.with_in_progress_late(late).with_always_in_position(true);
+        let mut pair = Pair::on(ActiveCode::ProfilePosition, behaviour);
         pair.axis.start_move(0x11, 20_000, 1_000_000).unwrap();
         let mut started = None;
         let ended = pair.run(|axis| {
@@ -147,17 +147,17 @@ fn a_motion_that_starts_late_is_not_done_early() {
         pair.until("at the target", |pair| pair.drive.position() == 20_000);
     }
     // Without the start the motion fails at its limit; one of no length may do so too.
-    let mut pair = Pair::on(ActiveCode::ProfilePosition, Manners::POLITE.with_in_progress_late(u16::MAX));
+    let mut pair = Pair::on(ActiveCode::ProfilePosition, Behaviour::POLITE.with_in_progress_late(u16::MAX));
     pair.axis.start_move(0x11, 20_000, 1_000_000).unwrap();
     let from = pair.now;
     assert_eq!(pair.end_of_move(), Progress::Failed { error: Failure::NotStarted });
     assert!((60..65).contains(&(pair.now - from)), "{}", pair.now - from);
     // An unknown type is refused at the start.
-    let mut pair = Pair::on(ActiveCode::ProfilePosition, Manners::POLITE);
+    let mut pair = Pair::on(ActiveCode::ProfilePosition, Behaviour::POLITE);
     pair.axis.start_move(0xee, 20_000, 1_000_000).unwrap();
     assert_eq!(pair.end_of_move(), Progress::Failed { error: Failure::CommandError(ErrorCode(0x0031)) });
     // The drive never echoes 10h, so the motion never begins.
-    let mut pair = Pair::on(ActiveCode::ProfilePosition, Manners::POLITE);
+    let mut pair = Pair::on(ActiveCode::ProfilePosition, Behaviour::POLITE);
     pair.axis.start_move(0x11, 20_000, 1_000_000).unwrap();
     for _ in 0..70 {
         if let Received::Main(response) = &mut pair.received {
@@ -171,14 +171,14 @@ fn a_motion_that_starts_late_is_not_done_early() {
 /// ERR counts with Busy or without, and a request that is only busy goes on to its limit.
 #[test]
 fn err_and_busy_in_either_order() {
-    for manners in [Manners::POLITE, Manners::POLITE.with_always_busy(true).with_err_while_busy(true)] {
-        let mut pair = Pair::on(ActiveCode::ProfilePosition, manners);
+    for behaviour in [Behaviour::POLITE, Behaviour::POLITE.with_always_busy(true).with_err_while_busy(true)] {
+        let mut pair = Pair::on(ActiveCode::ProfilePosition, behaviour);
         // Homing of an unknown kind is refused; the drive's own one fails in no state but on.
         pair.axis.switch_off();
         pair.until("off", |pair| pair.axis.state() == AxisState::Off);
         assert_eq!(pair.ask(set_position(0xc8, 0)), Progress::Failed { error: Failure::Execution });
     }
-    let mut pair = Pair::new(ActiveCode::CyclicPosition, Manners::POLITE.with_always_busy(true));
+    let mut pair = Pair::new(ActiveCode::CyclicPosition, Behaviour::POLITE.with_always_busy(true));
     pair.until("off", |pair| pair.axis.state() == AxisState::Off);
     pair.drive = Drive::new(pair.drive.config().with_busy_exchanges(u16::MAX));
     pair.axis.ask(monitor(7)).unwrap();
@@ -188,9 +188,9 @@ fn err_and_busy_in_either_order() {
 /// A position is set with the servo off only, and the servo is not switched on before the drive has answered.
 #[test]
 fn setting_a_position() {
-    for manners in [Manners::POLITE, Manners::POLITE.with_sets_position_while_on(true)] {
+    for behaviour in [Behaviour::POLITE, Behaviour::POLITE.with_sets_position_while_on(true)] {
         for type_code in [0x21, 0x22] {
-            let mut pair = Pair::on(ActiveCode::CyclicPosition, manners);
+            let mut pair = Pair::on(ActiveCode::CyclicPosition, behaviour);
             assert_eq!(pair.axis.ask(set_position(type_code, 9_000)), Err(AskError::ServoOn));
             pair.axis.switch_off();
             assert_eq!(pair.axis.ask(set_position(type_code, 9_000)), Err(AskError::ServoOn));
@@ -205,7 +205,7 @@ fn setting_a_position() {
         }
     }
     for type_code in [0x01, 0x11] {
-        let mut pair = Pair::on(ActiveCode::CyclicPosition, Manners::POLITE);
+        let mut pair = Pair::on(ActiveCode::CyclicPosition, Behaviour::POLITE);
         let reset = NonCyclicCommand::Reset(Arguments { type_code: TypeCode::short(type_code), index: 0, data: 0 });
         assert_eq!(pair.axis.ask(reset), Err(AskError::ServoOn));
     }
@@ -221,13 +221,13 @@ fn homing_types_that_are_not_known() {
         let in_position = mode == CyclicPosition;
         for (type_code, request) in [homing(0x31), homing(0xc8), homing(0x50)] {
             let refused = in_position && type_code != 0x50;
-            let mut pair = Pair::on(mode, Manners::POLITE);
+            let mut pair = Pair::on(mode, Behaviour::POLITE);
             let before = pair.axis;
             assert_eq!(pair.axis.ask(request).err(), refused.then_some(AskError::ServoOn), "{mode:?} {type_code:x}");
             assert_eq!(pair.axis == before, refused);
             pair.axis = before;
             pair.axis.ask_latch(type_code, [Nibble::ZERO; 2], 0x09).unwrap();
-            let mut pair = Pair::new(mode, Manners::POLITE);
+            let mut pair = Pair::new(mode, Behaviour::POLITE);
             pair.until("off", |pair| pair.axis.can_switch_on());
             let before = pair.axis;
             pair.axis.ask(request).unwrap();
@@ -237,7 +237,7 @@ fn homing_types_that_are_not_known() {
             assert!(pair.axis.switch_on());
         }
         for type_code in [0x21, 0x22] {
-            let mut pair = Pair::on(mode, Manners::POLITE);
+            let mut pair = Pair::on(mode, Behaviour::POLITE);
             assert_eq!(pair.axis.ask_latch(type_code, [Nibble::ZERO; 2], 0), Err(AskError::ServoOn));
             assert_eq!(pair.axis.ask(set_position(type_code, 0)), Err(AskError::ServoOn));
         }
@@ -247,13 +247,13 @@ fn homing_types_that_are_not_known() {
 /// Servo_Active that falls by itself, that stays after servo-off, and that comes unasked.
 #[test]
 fn servo_active_that_does_as_it_likes() {
-    let mut pair = Pair::on(ActiveCode::CyclicPosition, Manners::POLITE);
+    let mut pair = Pair::on(ActiveCode::CyclicPosition, Behaviour::POLITE);
     pair.drive.drop_servo();
     pair.until("stopped", |pair| pair.axis.state() == AxisState::Stopped(StopReason::NotActive));
     assert!(!pair.axis.disobeys());
     // Late, within the limit and beyond it.
     for (late, state) in [(10, AxisState::Off), (40, AxisState::Stopped(StopReason::InactiveTimeout))] {
-        let mut pair = Pair::on(ActiveCode::CyclicPosition, Manners::POLITE.with_servo_off_late(late));
+        let mut pair = Pair::on(ActiveCode::CyclicPosition, Behaviour::POLITE.with_servo_off_late(late));
         pair.axis.switch_off();
         let from = pair.now;
         pair.until("over", |pair| pair.axis.state() != AxisState::SwitchingOff);
@@ -263,7 +263,7 @@ fn servo_active_that_does_as_it_likes() {
         assert_eq!(pair.axis.disobeys(), late == 40);
     }
     // Stopped for another reason, the drive stays active: that is reported beside the reason.
-    let mut pair = Pair::on(ActiveCode::CyclicPosition, Manners::POLITE.with_servo_off_late(100));
+    let mut pair = Pair::on(ActiveCode::CyclicPosition, Behaviour::POLITE.with_servo_off_late(100));
     pair.axis.stop(StopReason::Requested);
     (0..12).for_each(|_| pair.update());
     assert!(!pair.axis.disobeys());
@@ -279,7 +279,7 @@ fn an_alarm_in_every_state() {
     let alarm = Alarm { main: 16, sub: 0 };
     let stopped = AxisState::Stopped(StopReason::Alarm);
     for state in 0..4 {
-        let mut pair = Pair::new(ActiveCode::CyclicPosition, Manners::POLITE.with_servo_off_late(8));
+        let mut pair = Pair::new(ActiveCode::CyclicPosition, Behaviour::POLITE.with_servo_off_late(8));
         pair.until("off", |pair| pair.axis.state() == AxisState::Off);
         if state > 0 {
             assert!(pair.axis.switch_on());
@@ -300,12 +300,12 @@ fn an_alarm_in_every_state() {
         assert!(!pair.axis.switch_on());
     }
     // At start-up it is the reason why Servo_Ready did not come.
-    let mut pair = Pair::new(ActiveCode::CyclicPosition, Manners::POLITE);
+    let mut pair = Pair::new(ActiveCode::CyclicPosition, Behaviour::POLITE);
     pair.drive.raise(alarm);
     pair.until("stopped", |pair| pair.axis.state() != AxisState::Starting);
     assert_eq!(pair.axis.state(), stopped);
     // Main power that goes while the servo is off is no failure: the axis waits for it.
-    let mut pair = Pair::new(ActiveCode::CyclicPosition, Manners::POLITE);
+    let mut pair = Pair::new(ActiveCode::CyclicPosition, Behaviour::POLITE);
     pair.until("off", |pair| pair.axis.state() == AxisState::Off);
     pair.drive.set_main_power(false);
     (0..3).for_each(|_| pair.update());
@@ -317,7 +317,7 @@ fn an_alarm_in_every_state() {
 /// CMD_Error counts during a motion as anywhere else; a single one does not end the motion.
 #[test]
 fn cmd_error_during_a_motion() {
-    let mut pair = Pair::on(ActiveCode::ProfilePosition, Manners::POLITE);
+    let mut pair = Pair::on(ActiveCode::ProfilePosition, Behaviour::POLITE);
     pair.axis.start_move(0x11, 1_000_000, 1_000_000).unwrap();
     pair.until("moving", |pair| pair.axis.profile().unwrap().stage() == MoveStage::Moving);
     let spoil = |pair: &mut Pair| {
@@ -359,7 +359,7 @@ fn why_the_echo_stands_still() {
         (|r| *r = Response::parse(&[0; 16]).into(), StopReason::Refused(ErrorClass::Direction)),
     ];
     for (spoil, reason) in cases {
-        let mut pair = Pair::on(ActiveCode::CyclicPosition, Manners::POLITE);
+        let mut pair = Pair::on(ActiveCode::CyclicPosition, Behaviour::POLITE);
         for _ in 0..LIMIT {
             pair.update();
             assert_eq!(pair.axis.state(), AxisState::On);

@@ -12,7 +12,7 @@
 mod common;
 
 use common::{CODES, Pair, limits, monitor, set_position};
-use rtex_block::device::{DriveConfig, Manners};
+use rtex_block::device::{Behaviour, DriveConfig};
 use rtex_block::master::{ActiveCode, AxisConfig, AxisState, Progress, Received, SetpointError, StopReason, Turn};
 use rtex_block::position::Gear;
 use rtex_block::{Alarm, Arguments, ErrorCode, MacId, NonCyclicCommand, TypeCode};
@@ -20,7 +20,7 @@ use rtex_block::{Alarm, Arguments, ErrorCode, MacId, NonCyclicCommand, TypeCode}
 /// Feed-forward goes out while the servo is on, with every command that does not need bytes 12-15 itself, and no longer.
 #[test]
 fn feed_forward_lives_with_the_servo() {
-    let mut pair = Pair::new(ActiveCode::CyclicPosition, Manners::POLITE);
+    let mut pair = Pair::new(ActiveCode::CyclicPosition, Behaviour::POLITE);
     pair.until("off", |pair| pair.axis.state() == AxisState::Off);
     let select = Arguments { type_code: TypeCode::short(0x11), index: 0x0723, data: 2 };
     let _ = pair.ask(NonCyclicCommand::Parameter(select));
@@ -54,7 +54,7 @@ fn feed_forward_lives_with_the_servo() {
 /// on the drive holds the position that it was sent last.
 #[test]
 fn the_set_point_follows_while_switching_on() {
-    let mut pair = Pair::new(ActiveCode::CyclicPosition, Manners::POLITE);
+    let mut pair = Pair::new(ActiveCode::CyclicPosition, Behaviour::POLITE);
     pair.until("off", |pair| pair.axis.can_switch_on());
     assert!(pair.axis.switch_on());
     for turned in (1_000..).step_by(1_000) {
@@ -129,7 +129,7 @@ fn every_change_of_mode() {
     let modes = [CyclicPosition, ProfilePosition, CyclicVelocity, CyclicTorque];
     for from in modes {
         for to in modes {
-            let mut pair = Pair::new(CyclicPosition, Manners::POLITE.with_echo_lag(2));
+            let mut pair = Pair::new(CyclicPosition, Behaviour::POLITE.with_echo_lag(2));
             pair.until("off", |pair| pair.axis.state() == AxisState::Off);
             let _ = pair.ask(set_position(0x21, 700_000));
             pair.switch_on();
@@ -141,7 +141,7 @@ fn every_change_of_mode() {
             assert_eq!((pair.drive.position(), pair.drive.alarm()), (700_000, None), "{from:?} {to:?}");
         }
     }
-    let mut pair = Pair::on(ProfilePosition, Manners::POLITE);
+    let mut pair = Pair::on(ProfilePosition, Behaviour::POLITE);
     pair.axis.start_move(0x11, 100_000, 1_000_000).unwrap();
     assert_eq!(pair.axis.set_mode(CyclicPosition), Err(SetpointError::Busy));
     pair.axis.switch_off();

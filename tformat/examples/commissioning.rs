@@ -4,7 +4,7 @@
 //! The encoder is simulated, under combinations of all that the documents leave open: the master has to cope with each.
 #![allow(clippy::arithmetic_side_effects, reason = "a program on a host")]
 
-use tformat::device::{Config, Device};
+use tformat::device::{Behaviour, Device};
 use tformat::master::{EEPROM_POLLING, EepromAccess, Line, MultiTurnZero, Progress, SingleTurnZero, Step, Transaction};
 use tformat::{Abm, Abs, Address, BitRate, Error, OutOfRange, Page, Request, Resolution, Response};
 
@@ -17,16 +17,16 @@ fn main() -> Result<(), Box<dyn core::error::Error>> {
     println!("driver on at {} ns, off between {earliest} and {latest} ns", transaction.driver_on_ns());
 
     let resolution = resolution()?;
-    for number in (0..Config::NUMBERED).step_by(819) {
-        let mut encoder = Device::<6>::new(0x17, BitRate::Mbit2_5).with_config(Config::numbered(number));
+    for number in (0..Behaviour::NUMBERED).step_by(819) {
+        let mut encoder = Device::<6>::new(0x17, BitRate::Mbit2_5).with_behaviour(Behaviour::numbered(number));
         encoder.set_position(Abs::truncate(0x12_3456), Abm::truncate(700));
         encoder.eeprom_mut()[1][0] = b'?';
         let fitted = fit(&mut encoder, line, resolution)?;
         println!("combination {number:4}: {fitted}");
     }
     // An encoder that answers after the master's patience has ended.
-    let slow = Config::new().with_response_delay_ns(90_000);
-    let ended = fit(&mut Device::<6>::new(0x17, BitRate::Mbit2_5).with_config(slow), line, resolution);
+    let slow = Behaviour::new().with_response_delay_ns(90_000);
+    let ended = fit(&mut Device::<6>::new(0x17, BitRate::Mbit2_5).with_behaviour(slow), line, resolution);
     println!("a slow encoder: {}", ended.unwrap_or_else(|error| error.to_string()));
     Ok(())
 }

@@ -5,7 +5,7 @@
 //! be switched on to see what a master makes of them.
 //!
 //! It is written from the documents with numbers of its own, not with those of the [`master`](crate::master) that it
-//! tests. What the documents leave open is a switch of its [`Config`]; by default a damaged or unknown request is answered
+//! tests. What the documents leave open is a switch of its [`Behaviour`]; by default a damaged or unknown request is answered
 //! with ID 3, with CA0 for a parity error, CA1 for a delimiter error and neither for a wrong check field or data ID; a
 //! wrong sink code is not answered. A write makes the EEPROM busy for 18 ms, in which writes are ignored and every access
 //! is answered with the busy flag, after a read with data 0. Selecting a page takes no time. After power-on the page is 0
@@ -23,7 +23,7 @@
 //! assert_eq!(sent.frame.as_bytes()[2..9], [0x56, 0x34, 0x12, 0x17, 0x07, 0x00, 0x00]);
 //! ```
 
-mod config;
+mod behaviour;
 
 use nrz_line::{Format, Receiver, Window};
 
@@ -39,7 +39,7 @@ use crate::response::Response;
 use crate::status::{Almc, StatusField};
 use crate::timing::BitRate;
 
-pub use config::{AbsentPage, BusyData, Config, Interval};
+pub use behaviour::{AbsentPage, Behaviour, BusyData, Interval};
 
 /// A fault that the encoder or its line is made to have.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
@@ -86,7 +86,7 @@ const STORING_NS: u64 = 18_000_000;
 /// An encoder with `PAGES` pages of EEPROM (6 in Tamagawa's).
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Device<const PAGES: usize> {
-    config: Config,
+    behaviour: Behaviour,
     rate: BitRate,
     enid: u8,
     abs: Abs,
@@ -123,7 +123,7 @@ impl<const PAGES: usize> Device<PAGES> {
     /// An encoder at position 0 without alarms, as after power-on.
     pub const fn new(enid: u8, rate: BitRate) -> Self {
         Self {
-            config: Config::new(),
+            behaviour: Behaviour::new(),
             rate,
             enid,
             abs: Abs::truncate(0),
@@ -149,8 +149,8 @@ impl<const PAGES: usize> Device<PAGES> {
     }
 
     /// With other decisions where the documents leave them open.
-    pub const fn with_config(self, config: Config) -> Self {
-        Self { config, ..self }
+    pub const fn with_behaviour(self, behaviour: Behaviour) -> Self {
+        Self { behaviour, ..self }
     }
 
     /// How often a reset, of either kind, has had its effect since power-on.
@@ -222,7 +222,7 @@ impl<const PAGES: usize> Device<PAGES> {
             Err(error) => {
                 self.damaged();
                 match error {
-                    Error::SinkCode { .. } if !self.config.answers_wrong_sink => None,
+                    Error::SinkCode { .. } if !self.behaviour.answers_wrong_sink => None,
                     Error::Parity { .. } => Some(self.rejection(true, false)),
                     _ => Some(self.rejection(false, false)),
                 }
@@ -239,12 +239,12 @@ impl<const PAGES: usize> Device<PAGES> {
         }
         self.deaf = true;
         self.damaged();
-        let answers = self.config.answers_delimiter_error;
+        let answers = self.behaviour.answers_delimiter_error;
         self.transmission(self.rejection(false, true), now_ns).filter(|_| answers)
     }
 
     fn damaged(&mut self) {
-        if self.config.damage_restarts_count {
+        if self.behaviour.damage_restarts_count {
             self.repeated = None;
         }
     }
@@ -273,7 +273,7 @@ impl<const PAGES: usize> Device<PAGES> {
         let before = SingleTurn { sf: self.sf(), abs: self.single_turn() };
         self.count_resets(request.data_id(), now_ns);
         let after = SingleTurn { sf: self.sf(), abs: self.single_turn() };
-        let reset = if self.config.tenth_shows_effect { after } else { before };
+        let reset = if self.behaviour.tenth_shows_effect { after } else { before };
         match request {
             Request::ReadSingleTurn => Response::ReadSingleTurn(after),
             Request::ReadMultiTurn => Response::ReadMultiTurn(MultiTurn { sf: self.sf(), abm: self.abm }),
@@ -288,7 +288,7 @@ impl<const PAGES: usize> Device<PAGES> {
     }
 
     fn sf(&self) -> StatusField {
-        if self.config.leaves_status_zero { StatusField::empty() } else { StatusField::of_alarms(self.almc) }
+        if self.behaviour.leaves_status_zero { StatusField::empty() } else { StatusField::of_alarms(self.almc) }
     }
 
     /// ABS from the zero that ID 8 set, in the width that the encoder ID names (24 bits for an unknown ID).
@@ -316,18 +316,18 @@ impl<const PAGES: usize> Device<PAGES> {
     /// Ten equal reset requests in a row, 40 us apart or more, do their work.
     fn count_resets(&mut self, id: DataId, now_ns: u64) {
         if !matches!(id, DataId::ResetErrors | DataId::SetSingleTurnZero | DataId::ResetTurnsAndErrors) {
-            if self.config.others_restart_count {
+            if self.behaviour.others_restart_count {
                 self.repeated = None;
             }
             return;
         }
         let field_ns = u64::from(self.rate.fields_ns(1));
         let begin_ns = now_ns.saturating_sub(field_ns);
-        let since_ns = begin_ns.saturating_sub(match self.config.reset_interval {
+        let since_ns = begin_ns.saturating_sub(match self.behaviour.reset_interval {
             Interval::StartToStart => self.last_reset.0,
             Interval::EndToStart => self.last_reset.1,
         });
-        let response_ns = u64::from(self.config.response_delay_ns).saturating_add(field_ns.saturating_mul(6));
+        let response_ns = u64::from(self.behaviour.response_delay_ns).saturating_add(field_ns.saturating_mul(6));
         self.last_reset = (begin_ns, now_ns.saturating_add(response_ns));
         let continues = self.repeated == Some(id) && since_ns >= 40_000;
         self.repeats = if continues { self.repeats.saturating_add(1) } else { 1 };
@@ -358,7 +358,7 @@ impl<const PAGES: usize> Device<PAGES> {
             } else if let Some(cell) = self.cell(address) {
                 *cell = edf;
             }
-            if address != Address::PAGE_REGISTER || self.config.page_select_is_busy {
+            if address != Address::PAGE_REGISTER || self.behaviour.page_select_is_busy {
                 self.busy_until_ns = now_ns.saturating_add(STORING_NS);
             }
         }
@@ -367,7 +367,7 @@ impl<const PAGES: usize> Device<PAGES> {
 
     fn select(&mut self, page: u8) {
         let pages = u8::try_from(PAGES).unwrap_or(u8::MAX);
-        match self.config.absent_page {
+        match self.behaviour.absent_page {
             AbsentPage::Wrapped => self.page = page.checked_rem(pages).unwrap_or(0),
             AbsentPage::Ignored if page < pages => self.page = page,
             AbsentPage::Ignored => {}
@@ -383,7 +383,7 @@ impl<const PAGES: usize> Device<PAGES> {
         let page = self.page;
         let held = self.cell(address).map_or(page, |cell| *cell);
         let busy = now_ns < self.busy_until_ns;
-        let edf = match self.config.busy_data {
+        let edf = match self.behaviour.busy_data {
             BusyData::Zeros if busy => 0,
             BusyData::Ones if busy => 0xff,
             _ => held,
@@ -399,7 +399,7 @@ impl<const PAGES: usize> Device<PAGES> {
         let storing = now_ns < self.storing_until_ns && now_ns.saturating_add(STORING_NS) > self.storing_until_ns;
         let line = match self.fault {
             Fault::Silent => return None,
-            _ if storing && self.config.silent_while_storing => return None,
+            _ if storing && self.behaviour.silent_while_storing => return None,
             Fault::FlipBit { at } if u32::from(at) < line.len() => flipped(line, 1_u128.wrapping_shl(at.into()))?,
             Fault::BadCrc => flipped(line, 0x1fe_u128.wrapping_shl(line.len().saturating_sub(Frame::FIELD_BITS)))?,
             Fault::CutAfter { fields } if (1..sound.fields()).contains(&fields) => {
@@ -409,7 +409,7 @@ impl<const PAGES: usize> Device<PAGES> {
         };
         let fields = u8::try_from(line.len() / Frame::FIELD_BITS).ok()?;
         let frame = Frame::from_line(line, fields).unwrap_or(sound);
-        Some(Transmission { frame, line, at_ns: now_ns.saturating_add(self.config.response_delay_ns.into()) })
+        Some(Transmission { frame, line, at_ns: now_ns.saturating_add(self.behaviour.response_delay_ns.into()) })
     }
 }
 

@@ -8,7 +8,7 @@ mod bench;
 use bench::{Bench, Seen};
 use proptest::prelude::*;
 use servowire_world::{Kind, Rates, Scenario, Tally, scenarios, wanted_events};
-use tformat::device::Config;
+use tformat::device::Behaviour;
 use tformat::master::{EEPROM_POLLING, EepromAccess, MultiTurnZero, Reset, SingleTurnZero, Step};
 use tformat::{Abm, Abs, Address, Almc, BitRate, Error, Page, Request, Resolution, Response};
 
@@ -70,8 +70,8 @@ fn done_once_at_most<T>(end: &Result<T, Error>, effects: u32, seed: u64) {
 
 fn bench(seed: u64, rates: Rates) -> Bench {
     let rate = BitRate::ALL[(seed / 2) as usize % 2];
-    let config = Config::numbered((seed * 37) as u16 % Config::NUMBERED);
-    let bench = Bench::new(Scenario::random(seed, rates), rate, config, seed % 3 == 0);
+    let behaviour = Behaviour::numbered((seed * 37) as u16 % Behaviour::NUMBERED);
+    let bench = Bench::new(Scenario::random(seed, rates), rate, behaviour, seed % 3 == 0);
     if seed % 4 == 1 { bench.mixing_up(seed) } else { bench }
 }
 
@@ -254,9 +254,9 @@ fn hostile_eeprom_writes() {
 proptest! {
     /// Few faults at any places: what fails is cut down to the fewest.
     #[test]
-    fn few_faults(scenario in scenarios(12, 4), config in 0..Config::NUMBERED, fast: bool, hint: bool) {
+    fn few_faults(scenario in scenarios(12, 4), behaviour in 0..Behaviour::NUMBERED, fast: bool, hint: bool) {
         let rate = if fast { BitRate::Mbit5 } else { BitRate::Mbit2_5 };
-        let mut bench = Bench::new(scenario, rate, Config::numbered(config), hint);
+        let mut bench = Bench::new(scenario, rate, Behaviour::numbered(behaviour), hint);
         for k in 0..6 {
             let at_ns = bench.ready_ns;
             let _ = bench.exchange(READS[k % 4], at_ns);

@@ -1,7 +1,7 @@
 //! Master and encoder on the hostile line, with any faults at any places.
 
 use servowire_world::Scenario;
-use tformat::device::Config;
+use tformat::device::Behaviour;
 use tformat::master::{EEPROM_POLLING, EepromAccess, MultiTurnZero, SingleTurnZero};
 use tformat::{Abm, Abs, Address, BitRate, Error, Page, Request, Resolution};
 
@@ -26,8 +26,8 @@ pub fn hostile(mut data: &[u8]) {
     let options = byte(&mut data);
     let request = chosen(&mut data);
     let rate = BitRate::ALL[usize::from(options & 1)];
-    let config = Config::numbered(number % Config::NUMBERED);
-    let mut bench = Bench::new(Scenario::decode(data), rate, config, options & 2 != 0);
+    let behaviour = Behaviour::numbered(number % Behaviour::NUMBERED);
+    let mut bench = Bench::new(Scenario::decode(data), rate, behaviour, options & 2 != 0);
     match options >> 2 & 3 {
         0 => {
             for k in 0..6 {

@@ -1,4 +1,4 @@
-use super::manners::Manners;
+use super::behaviour::Behaviour;
 use crate::error_code::Alarm;
 use crate::header::MacId;
 use crate::position::Gear;
@@ -94,7 +94,7 @@ pub struct DriveConfig {
     /// What is not confirmed.
     pub codes: OpenCodes,
     /// How impolite it is.
-    pub manners: Manners,
+    pub behaviour: Behaviour,
 }
 
 impl DriveConfig {
@@ -118,7 +118,7 @@ impl DriveConfig {
             alarm_attributes: 1,
             homing_distance: -5_000,
             codes,
-            manners: Manners::POLITE,
+            behaviour: Behaviour::POLITE,
         }
     }
 
@@ -138,6 +138,6 @@ impl DriveConfig {
         with_near: near, u32;
         with_alarm_attributes: alarm_attributes, i32;
         with_homing_distance: homing_distance, i32;
-        with_manners: manners, Manners;
+        with_behaviour: behaviour, Behaviour;
     }
 }

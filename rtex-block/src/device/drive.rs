@@ -27,7 +27,7 @@ const HOMING_SPEED: i64 = 1_000_000;
 /// cyclic code are thrown away and the command before stays in force; if that lasts the drive raises Err86.
 ///
 /// It shares neither numbers nor code with the master: blocks are read and written by byte. It is as late, forgetful and
-/// literal as its [`Manners`](super::Manners) say. The motor follows its command position as a first-order lag; that is a model for tests, not for tuning.
+/// literal as its [`Behaviour`](super::Behaviour) say. The motor follows its command position as a first-order lag; that is a model for tests, not for tuning.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Drive {
@@ -88,7 +88,7 @@ impl Drive {
             alarm: None,
             history: [None; 14],
             warning: 0,
-            homed: config.manners.homed_at_start,
+            homed: config.behaviour.homed_at_start,
             latches: [None; 2],
             armed: [false; 2],
             homing: false,
@@ -182,7 +182,7 @@ impl Drive {
         &self.config
     }
 
-    /// Other manners from now on.
+    /// Another behaviour from now on.
     pub const fn set_config(&mut self, config: DriveConfig) {
         self.config = config;
     }
@@ -254,7 +254,7 @@ impl Drive {
             (SHOWN_TORQUE_LIMITED, self.motion.torque_limited),
             (SHOWN_HOMED, self.homed),
             (SHOWN_IN_PROGRESS, progress),
-            (SHOWN_IN_POSITION, settled && !progress || self.config.manners.always_in_position),
+            (SHOWN_IN_POSITION, settled && !progress || self.config.behaviour.always_in_position),
         ];
         set.into_iter().fold(0, |all, (flag, on)| if on { all | flag } else { all })
     }
@@ -267,8 +267,8 @@ impl Drive {
             past[0] = new;
         }
         let ago = |past: &[u8; 16], late: u8| past.get(usize::from(late)).copied().unwrap_or(past[15]);
-        self.latched = ago(&self.comp, self.config.manners.latch_late);
-        let bits = self.config.manners.status_late.into_iter().zip(0..8_u32);
+        self.latched = ago(&self.comp, self.config.behaviour.latch_late);
+        let bits = self.config.behaviour.status_late.into_iter().zip(0..8_u32);
         bits.fold(0, |all, (late, bit)| all | ago(&self.shown, late) & 1_u8.wrapping_shl(bit))
     }
 
@@ -280,7 +280,7 @@ impl Drive {
         let tail = self.noncyclic(shown);
         let present = Block::new(self.config.mac_id.get(), byte1, [shown, self.inputs], response_data1, tail);
         self.pending.rotate_right(1);
-        let out = match usize::from(self.config.manners.echo_lag).checked_sub(1) {
+        let out = match usize::from(self.config.behaviour.echo_lag).checked_sub(1) {
             None => present,
             // What is rotated to the front is the oldest; shorter lags take a younger one.
             Some(lag) => {

@@ -114,7 +114,7 @@ impl Motion {
     /// Servo_On as the drive sees it.
     pub(super) fn request(&mut self, servo_on: bool, config: &DriveConfig) {
         match (servo_on, self.power) {
-            (false, _) => self.release(config.manners.servo_off_late),
+            (false, _) => self.release(config.behaviour.servo_off_late),
             (true, Power::Off) => self.power = Power::SwitchingOn { left: config.servo_on_updates },
             (true, _) => {}
         }

@@ -3,7 +3,7 @@
 
 use core::num::NonZeroU16;
 
-use rtex_block::device::{Drive, DriveConfig, Manners, OpenCodes};
+use rtex_block::device::{Behaviour, Drive, DriveConfig, OpenCodes};
 use rtex_block::master::{
     ActiveCode, Axis, AxisConfig, AxisState, CommandCounter, CommandEnded, Limits, Progress, Received, Turn,
 };
@@ -57,14 +57,14 @@ impl Pair {
         }
     }
 
-    pub fn new(mode: ActiveCode, manners: Manners) -> Self {
+    pub fn new(mode: ActiveCode, behaviour: Behaviour) -> Self {
         let mac_id = MacId::new(9).unwrap();
         let config = AxisConfig::new(mac_id, mode, 500_000, limits());
-        Self::with(config, DriveConfig::new(mac_id, CODES).with_manners(manners))
+        Self::with(config, DriveConfig::new(mac_id, CODES).with_behaviour(behaviour))
     }
 
-    pub fn on(mode: ActiveCode, manners: Manners) -> Self {
-        let mut pair = Self::new(mode, manners);
+    pub fn on(mode: ActiveCode, behaviour: Behaviour) -> Self {
+        let mut pair = Self::new(mode, behaviour);
         pair.switch_on();
         pair
     }

@@ -13,7 +13,7 @@ mod common;
 mod motion;
 
 use common::CODES;
-use rtex_block::device::{Drive, DriveConfig, Manners, check};
+use rtex_block::device::{Behaviour, Drive, DriveConfig, check};
 use rtex_block::{Alarm, BlockSize, MacId};
 
 const ON: [u8; 2] = [0x80, 0];
@@ -202,7 +202,7 @@ fn feed_forward_in_its_range() {
 
 #[test]
 fn resets() {
-    let config = config().with_manners(Manners::POLITE.with_parameters_after_reset(true));
+    let config = config().with_behaviour(Behaviour::POLITE.with_parameters_after_reset(true));
     for (type_code, clears) in [(0x01, true), (0x11, false)] {
         let mut raw = Raw::on(config, 0x20);
         // Not while the servo is on.
@@ -228,8 +228,8 @@ fn resets() {
 /// A forgetful drive answers a new request as often as it was told with what it was asked before.
 #[test]
 fn stale_answers_are_counted() {
-    let manners = Manners::POLITE.with_stale_answers(3);
-    let mut raw = Raw::new(config().with_manners(manners));
+    let behaviour = Behaviour::POLITE.with_stale_answers(3);
+    let mut raw = Raw::new(config().with_behaviour(behaviour));
     raw.hold(3, 0x20, OFF, 0, NOTHING);
     let types = |raw: &mut Raw, code, tail| {
         (0..8)
@@ -257,7 +257,7 @@ fn stale_answers_are_counted() {
 /// is another command.
 #[test]
 fn busy_and_then_done() {
-    let mut raw = Raw::new(config().with_manners(Manners::POLITE.with_always_busy(true)));
+    let mut raw = Raw::new(config().with_behaviour(Behaviour::POLITE.with_always_busy(true)));
     raw.hold(3, 0x20, OFF, 0, NOTHING);
     let read = |raw: &mut Raw, code, tails: &[[u8; 8]]| {
         let answers = tails.iter().map(|tail| raw.send(code, OFF, 0, *tail)).collect::<Vec<_>>();

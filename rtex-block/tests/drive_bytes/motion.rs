@@ -1,7 +1,7 @@
 //! How the modelled drive moves: windows, limits, profile motion, and what its monitor shows of them.
 
 use rtex_block::Alarm;
-use rtex_block::device::Manners;
+use rtex_block::device::Behaviour;
 use rtex_block::position::Gear;
 
 use crate::{NOTHING, OFF, ON, Raw, about, config, number};
@@ -133,7 +133,7 @@ fn position_set_while_it_moves() {
     let mut raw = Raw::on(config(), 0x20);
     let answer = raw.hold(3, 0x24, ON, 0, about(0x21, 0, 5));
     assert_eq!((answer[1], answer[9], raw.drive.position()), (0x24, 0x80, 0));
-    let allowed = config().with_manners(Manners::POLITE.with_sets_position_while_on(true));
+    let allowed = config().with_behaviour(Behaviour::POLITE.with_sets_position_while_on(true));
     for type_code in [0x21, 0x22] {
         let mut raw = Raw::on(allowed, 0x10);
         raw.send(0x17, ON, 100_000, about(0x11, 0, 1_000_000));

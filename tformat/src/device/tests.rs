@@ -56,8 +56,8 @@ fn damage_is_told_in_the_status() {
 }
 
 /// Ten requests for ID C whose starts are `interval` apart, `disturb` after the sixth; whether they had their effect.
-fn resets(config: Config, interval: u64, disturb: impl Fn(&mut Device<6>, u64)) -> bool {
-    let mut device = encoder().with_config(config);
+fn resets(behaviour: Behaviour, interval: u64, disturb: impl Fn(&mut Device<6>, u64)) -> bool {
+    let mut device = encoder().with_behaviour(behaviour);
     for k in 1..=10 {
         let now_ns = k * interval;
         let _ = send(&mut device, &[0x62], now_ns);
@@ -73,8 +73,8 @@ fn resets(config: Config, interval: u64, disturb: impl Fn(&mut Device<6>, u64)) 
 #[test]
 fn the_spacing_of_resets() {
     let nothing = |_: &mut Device<6>, _| {};
-    let start = Config::new();
-    let end = Config { reset_interval: Interval::EndToStart, ..start };
+    let start = Behaviour::new();
+    let end = Behaviour { reset_interval: Interval::EndToStart, ..start };
     assert!(resets(start, 40_000, nothing) && !resets(start, 39_999, nothing));
     assert!(resets(end, 71_000, nothing) && !resets(end, 70_999, nothing));
 }
@@ -86,8 +86,8 @@ fn what_starts_the_count_of_resets_again() {
     let damaged = |device: &mut Device<6>, now_ns| _ = send(device, &[0x12], now_ns);
     let framing = |device: &mut Device<6>, now_ns| _ = device.framing_error(now_ns);
     let another_reset = |device: &mut Device<6>, now_ns| _ = send(device, &[0xba], now_ns);
-    let strict = Config::new();
-    let lax = Config { others_restart_count: false, damage_restarts_count: false, ..strict };
+    let strict = Behaviour::new();
+    let lax = Behaviour { others_restart_count: false, damage_restarts_count: false, ..strict };
     assert!(!resets(strict, 100_000, other) && resets(lax, 100_000, other));
     assert!(!resets(strict, 100_000, damaged) && resets(lax, 100_000, damaged));
     assert!(!resets(strict, 100_000, framing) && resets(lax, 100_000, framing));
@@ -98,8 +98,8 @@ fn what_starts_the_count_of_resets_again() {
 #[test]
 fn the_tenth_response_and_storing() {
     for (shows, silent) in [(false, false), (true, true)] {
-        let config = Config { tenth_shows_effect: shows, silent_while_storing: silent, ..Config::new() };
-        let mut device = encoder().with_config(config);
+        let behaviour = Behaviour { tenth_shows_effect: shows, silent_while_storing: silent, ..Behaviour::new() };
+        let mut device = encoder().with_behaviour(behaviour);
         let mut tenth = None;
         for k in 1..=10 {
             tenth = send(&mut device, &[0xc2], k * 100_000);
@@ -116,12 +116,12 @@ fn the_tenth_response_and_storing() {
 /// A write keeps the memory busy until 18 ms after its request; then it can be written again.
 #[test]
 fn the_memory_is_busy_for_18_ms() {
-    for (data, config) in [
-        (0x00, Config::new()),
-        (0xff, Config { busy_data: BusyData::Ones, ..Config::new() }),
-        (0x5a, Config { busy_data: BusyData::Cell, ..Config::new() }),
+    for (data, behaviour) in [
+        (0x00, Behaviour::new()),
+        (0xff, Behaviour { busy_data: BusyData::Ones, ..Behaviour::new() }),
+        (0x5a, Behaviour { busy_data: BusyData::Cell, ..Behaviour::new() }),
     ] {
-        let mut device = encoder().with_config(config);
+        let mut device = encoder().with_behaviour(behaviour);
         let address = Address::truncate(5);
         let memory = |busy, edf| Memory { adf: Adf::of(address, busy), edf };
         let write = |edf| Request::write_eeprom(address, edf);
@@ -139,7 +139,7 @@ fn the_memory_is_busy_for_18_ms() {
 fn the_page_register() {
     let select = |page| Request::write_eeprom(Address::PAGE_REGISTER, page);
     for (absent, page) in [(AbsentPage::Ignored, 2), (AbsentPage::Wrapped, 3)] {
-        let mut device = encoder().with_config(Config { absent_page: absent, ..Config::new() });
+        let mut device = encoder().with_behaviour(Behaviour { absent_page: absent, ..Behaviour::new() });
         let _ = device.answer(select(2), 100);
         assert_eq!(device.page(), 2);
         // Six pages are numbered 0 to 5.
@@ -156,7 +156,7 @@ fn the_page_register() {
         assert_eq!(device.answer(select(4), 400), Response::WriteEeprom(memory));
         assert_eq!(device.page(), page);
     }
-    let mut slow = encoder().with_config(Config { page_select_is_busy: true, ..Config::new() });
+    let mut slow = encoder().with_behaviour(Behaviour { page_select_is_busy: true, ..Behaviour::new() });
     let _ = slow.answer(select(2), 100);
     let answered = slow.answer(Request::read_eeprom(Address::PAGE_REGISTER), 200);
     assert!(matches!(answered, Response::ReadEeprom(memory) if memory.adf.busy()));
@@ -174,11 +174,11 @@ fn deaf_time() {
 
 #[test]
 fn what_is_not_answered_is_a_switch() {
-    let usual = Config::new();
+    let usual = Behaviour::new();
     let unusual =
-        Config { answers_wrong_sink: true, answers_delimiter_error: false, leaves_status_zero: true, ..usual };
-    for (config, sink, delimiter, status) in [(usual, false, true, 0x20), (unusual, true, false, 0x00)] {
-        let mut device = encoder().with_config(config);
+        Behaviour { answers_wrong_sink: true, answers_delimiter_error: false, leaves_status_zero: true, ..usual };
+    for (behaviour, sink, delimiter, status) in [(usual, false, true, 0x20), (unusual, true, false, 0x00)] {
+        let mut device = encoder().with_behaviour(behaviour);
         device.set_alarms(Almc::BA, true);
         assert_eq!(send(&mut device, &[0x1b], 100_000).is_some(), sink);
         assert_eq!(device.framing_error(200_000).is_some(), delimiter);
@@ -193,12 +193,12 @@ fn what_is_not_answered_is_a_switch() {
 fn the_response_begins_3_us_after_the_request() {
     let mut device = encoder();
     assert_eq!(send(&mut device, &[0x02], 0).map(|sent| sent.at_ns), Some(7_000));
-    let mut late = encoder().with_config(Config::new().with_response_delay_ns(9_000));
+    let mut late = encoder().with_behaviour(Behaviour::new().with_response_delay_ns(9_000));
     assert_eq!(send(&mut late, &[0x02], 0).map(|sent| sent.at_ns), Some(13_000));
-    for number in 0..Config::NUMBERED {
-        assert!((1_700..=9_000).contains(&Config::numbered(number).response_delay_ns));
+    for number in 0..Behaviour::NUMBERED {
+        assert!((1_700..=9_000).contains(&Behaviour::numbered(number).response_delay_ns));
     }
-    assert_eq!(Config::numbered(0), Config::default());
+    assert_eq!(Behaviour::numbered(0), Behaviour::default());
 }
 
 #[test]
@@ -285,25 +285,25 @@ fn the_position_has_the_width_that_the_encoder_id_names() {
 /// Each bit of the number is one switch, and 0 is the default.
 #[test]
 fn combinations_by_their_number() {
-    let usual = Config::new();
+    let usual = Behaviour::new();
     let expected = [
-        Config { reset_interval: Interval::EndToStart, ..usual },
-        Config { others_restart_count: false, ..usual },
-        Config { damage_restarts_count: false, ..usual },
-        Config { tenth_shows_effect: true, ..usual },
-        Config { silent_while_storing: true, ..usual },
-        Config { page_select_is_busy: true, ..usual },
-        Config { absent_page: AbsentPage::Wrapped, ..usual },
-        Config { busy_data: BusyData::Ones, ..usual },
-        Config { leaves_status_zero: true, ..usual },
-        Config { answers_wrong_sink: true, answers_delimiter_error: false, ..usual },
-        Config { response_delay_ns: 3_200, ..usual },
-        Config { response_delay_ns: 1_700, ..usual },
+        Behaviour { reset_interval: Interval::EndToStart, ..usual },
+        Behaviour { others_restart_count: false, ..usual },
+        Behaviour { damage_restarts_count: false, ..usual },
+        Behaviour { tenth_shows_effect: true, ..usual },
+        Behaviour { silent_while_storing: true, ..usual },
+        Behaviour { page_select_is_busy: true, ..usual },
+        Behaviour { absent_page: AbsentPage::Wrapped, ..usual },
+        Behaviour { busy_data: BusyData::Ones, ..usual },
+        Behaviour { leaves_status_zero: true, ..usual },
+        Behaviour { answers_wrong_sink: true, answers_delimiter_error: false, ..usual },
+        Behaviour { response_delay_ns: 3_200, ..usual },
+        Behaviour { response_delay_ns: 1_700, ..usual },
     ];
     for (at, want) in expected.into_iter().enumerate() {
-        assert_eq!(Config::numbered(1 << at), want, "bit {at}");
+        assert_eq!(Behaviour::numbered(1 << at), want, "bit {at}");
     }
-    assert_eq!(Config::numbered(3 << 7), Config { busy_data: BusyData::Cell, leaves_status_zero: true, ..usual });
-    assert_eq!(Config::numbered(3 << 10), Config { response_delay_ns: 9_000, ..usual });
-    assert_eq!(Config::NUMBERED, 4_096);
+    assert_eq!(Behaviour::numbered(3 << 7), Behaviour { busy_data: BusyData::Cell, leaves_status_zero: true, ..usual });
+    assert_eq!(Behaviour::numbered(3 << 10), Behaviour { response_delay_ns: 9_000, ..usual });
+    assert_eq!(Behaviour::NUMBERED, 4_096);
 }

@@ -112,8 +112,8 @@ mod tests {
     /// A host that hands over a block when the line has been idle for 20 us, and has 30 m more of cable.
     #[test]
     fn the_lines_are_those_of_the_host() {
-        let [fast, slow] =
-            [BitRate::Mbit5, BitRate::Mbit2_5].map(|rate| Line::new(rate).with_hand_over_ns(90_000).with_turn_around_ns(500));
+        let [fast, slow] = [BitRate::Mbit5, BitRate::Mbit2_5]
+            .map(|rate| Line::new(rate).with_hand_over_ns(90_000).with_turn_around_ns(500));
         let mut detection = Detection::on([slow, fast]);
         let mut seen = Vec::new();
         let mut step = detection.start(0);

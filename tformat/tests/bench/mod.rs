@@ -6,7 +6,7 @@ use servowire_world::{
     Block, Delivery, Draw, Event, Framing, Id, Message, Scenario, Speaker, Stamp, Tally, Transmission, Verdict, Wire,
     World,
 };
-use tformat::device::{Config, Device};
+use tformat::device::{Behaviour, Device};
 use tformat::master::{Line, Progress, Step, Transaction};
 use tformat::{Abm, Abs, Address, BitRate, Error, Request, Resolution, Response};
 
@@ -77,7 +77,7 @@ pub struct Exchanged {
 }
 
 impl Bench {
-    pub fn new(scenario: Scenario, rate: BitRate, config: Config, hint: bool) -> Self {
+    pub fn new(scenario: Scenario, rate: BitRate, behaviour: Behaviour, hint: bool) -> Self {
         let bit_ps = field_ns(rate) * 100;
         let host = scenario.host;
         let wire = Wire { bit_ps, framing: Framing::StartStop { width: 8 }, devices: 1 };
@@ -92,7 +92,7 @@ impl Bench {
         let line = line.with_hand_over_ns(line.hand_over_ns.max(hand_over_ns));
         Self {
             world: World::new(wire, scenario),
-            device: Device::new(0x17, rate).with_config(config),
+            device: Device::new(0x17, rate).with_behaviour(behaviour),
             line: if hint { line.with_echo() } else { line },
             ready_ns: 100_000,
             seen: Seen::default(),
@@ -105,7 +105,7 @@ impl Bench {
             // Four bits of turn-around and a field.
             budget_ns: field_ns(rate) * 14 / 10,
             response_ns: 11 * field_ns(rate),
-            tenth_shows_effect: config.tenth_shows_effect,
+            tenth_shows_effect: behaviour.tenth_shows_effect,
             astray: None,
         }
     }

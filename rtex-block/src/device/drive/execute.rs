@@ -62,13 +62,13 @@ impl Drive {
                 Outcome::Live(type_code)
             }
         };
-        let manners = self.config.manners;
+        let behaviour = self.config.behaviour;
         let slow = matches!(request.code, RESET | PARAMETER);
-        let busy = if slow || manners.always_busy { self.config.busy_exchanges } else { 0 };
+        let busy = if slow || behaviour.always_busy { self.config.busy_exchanges } else { 0 };
         self.job = Some(Job { request, busy, outcome });
         // What a forgetful drive answers to before it has understood.
         let old = old.unwrap_or_else(|| request.other(matches!(request.code, SYSTEM_ID | PARAMETER)));
-        self.stale = (manners.stale_answers > 0).then_some((old, manners.stale_answers));
+        self.stale = (behaviour.stale_answers > 0).then_some((old, behaviour.stale_answers));
         Ok(())
     }
 
@@ -86,7 +86,7 @@ impl Drive {
         let request = stale.unwrap_or(job.request);
         let mut index = request.index();
         let (err, data) = match job.outcome {
-            Outcome::Failed => (job.busy == 0 || self.config.manners.err_while_busy, 0),
+            Outcome::Failed => (job.busy == 0 || self.config.behaviour.err_while_busy, 0),
             _ if job.busy > 0 => (false, 0),
             Outcome::Value(data) => (false, data),
             Outcome::Live(code) => (false, self.monitor(code, 0).unwrap_or(0)),
@@ -100,7 +100,7 @@ impl Drive {
             _ => job.busy > 0,
         };
         let new = stale.is_none();
-        let execution = Execution { err: err && new, wng: self.config.manners.warns, busy: busy && new };
+        let execution = Execution { err: err && new, wng: self.config.behaviour.warns, busy: busy && new };
         match request.code {
             HOMING | PROFILE => {
                 let flags = if request.code == HOMING { self.latched } else { self.profile_flags() };
@@ -168,7 +168,7 @@ impl Drive {
         let active = self.motion.is_active();
         let (arm, homing) = (u16::from(self.config.codes.latch_arm), u16::from(self.config.codes.homing));
         match request.type_code() {
-            HOMING_ACTUAL | HOMING_COMMAND if active && !self.config.manners.sets_position_while_on => {
+            HOMING_ACTUAL | HOMING_COMMAND if active && !self.config.behaviour.sets_position_while_on => {
                 return Ok(Outcome::Failed);
             }
             kind @ (HOMING_ACTUAL | HOMING_COMMAND) => {
@@ -208,10 +208,10 @@ impl Drive {
             return Ok(Outcome::Value(words(alarm.unwrap_or(none), 0)));
         }
         if type_code == codes.alarm_clear.get() {
-            if self.config.manners.refuses_to_clear && self.alarm.is_some() {
+            if self.config.behaviour.refuses_to_clear && self.alarm.is_some() {
                 return Ok(Outcome::Failed);
             }
-            if !self.config.manners.alarm_stays {
+            if !self.config.behaviour.alarm_stays {
                 self.clear_alarm();
             }
             return Ok(Outcome::Value(0));
@@ -222,7 +222,7 @@ impl Drive {
     fn parameter(&mut self, type_code: u16, index: u16, data: i32) -> Outcomes {
         let codes = self.config.codes;
         let value = if type_code == PARAMETER_WRITE {
-            let at_once = !self.config.manners.parameters_after_reset;
+            let at_once = !self.config.behaviour.parameters_after_reset;
             self.parameters.set(index, data, at_once).then_some(data)
         } else if type_code == codes.parameter_read.get() {
             self.parameters.written(index)
@@ -250,7 +250,7 @@ impl Drive {
         if !from_idle || self.motion.profile.is_some() || !self.motion.is_active() {
             return Ok(Outcome::Failed);
         }
-        self.motion.start(Generator::new(distance), self.config.manners.in_progress_late);
+        self.motion.start(Generator::new(distance), self.config.behaviour.in_progress_late);
         Ok(Outcome::Value(0))
     }
 

@@ -98,6 +98,8 @@ pub(super) fn line(_: &str, row: BusRow) -> Verdict {
     same(
         "every asked encoder is good, doubled or missing",
         &true,
-        &bus.asked().iter().all(|ea| bus.response(ea).is_some() != (bus.missing().contains(ea) || bus.duplicates().contains(ea))),
+        &bus.asked()
+            .iter()
+            .all(|ea| bus.response(ea).is_some() != (bus.missing().contains(ea) || bus.duplicates().contains(ea))),
     )
 }

@@ -6,7 +6,7 @@
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]
-pub struct Manners {
+pub struct Behaviour {
     /// Exchanges by which everything but the counter echo is later than it has to be, 0..=3.
     pub echo_lag: u8,
     /// Update periods from the start of a profile motion to In_Progress = 1; the axis stands as long.
@@ -40,7 +40,7 @@ pub struct Manners {
     pub alarm_stays: bool,
 }
 
-impl Manners {
+impl Behaviour {
     /// As soon as it can.
     pub const POLITE: Self = Self {
         echo_lag: 0,
@@ -79,7 +79,7 @@ impl Manners {
     }
 }
 
-impl Default for Manners {
+impl Default for Behaviour {
     fn default() -> Self {
         Self::POLITE
     }

@@ -45,7 +45,7 @@ pub enum BusyData {
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "arbitrary", derive(arbitrary::Arbitrary))]
 #[non_exhaustive]
-pub struct Config {
+pub struct Behaviour {
     /// From the end of the request to the start bit of the response, in ns. Default 3 000; 3 200 was logged.
     pub response_delay_ns: u32,
     /// What the 40 us between two resets are counted from.
@@ -72,7 +72,7 @@ pub struct Config {
     pub leaves_status_zero: bool,
 }
 
-impl Config {
+impl Behaviour {
     /// As [`Default`].
     pub const fn new() -> Self {
         Self {
@@ -131,7 +131,7 @@ impl Config {
     }
 }
 
-impl Default for Config {
+impl Default for Behaviour {
     fn default() -> Self {
         Self::new()
     }
