@@ -1,5 +1,7 @@
 //! The encoder's answer: 61 bits, six words and the switch bit.
 
+use core::fmt;
+
 use nrz_line::Window;
 
 use crate::acceleration::DeltaDelta;
@@ -184,6 +186,14 @@ impl Answer {
     }
 }
 
+/// The six words in line order: `D1.2 D6.0 K30.7 D0.0 D0.0 D16.5`.
+impl fmt::Display for Answer {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let [vertical, parameter, pipe, high, low, secondary] = self.words();
+        write!(f, "{vertical} {parameter} {pipe} {high} {low} {secondary}")
+    }
+}
+
 /// What an encoder puts into an answer.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -255,6 +265,7 @@ pub(crate) mod tests {
     use super::*;
     use crate::parameter::EncoderSymbol;
     use proptest::prelude::*;
+    use std::string::ToString;
 
     pub(crate) fn characters() -> impl Strategy<Value = Character> {
         prop_oneof![
@@ -277,6 +288,16 @@ pub(crate) mod tests {
 
     fn column(plus: bool) -> RunningDisparity {
         if plus { RunningDisparity::Plus } else { RunningDisparity::Minus }
+    }
+
+    /// D0.0 is 100111 0100 and 011000 1011, K30.7 is 011110 1000 and 100001 0111; no character is ten ones.
+    #[test]
+    fn an_answer_is_printed_word_by_word() {
+        let bits = |text: &str| text.bytes().rev().fold(0_u64, |bits, c| bits << 1 | u64::from(c == b'1'));
+        let line =
+            bits("1001110100 0110001011 0111101000 1001110100 1111111111 0 1000010111".replace(' ', "").as_str());
+        let answer = Answer::from_bits(Rule::Strict, line);
+        assert_eq!(answer.to_string(), "D0.0 D0.0 K30.7 D0.0 ?1111111111 K30.7");
     }
 
     proptest! {

@@ -363,6 +363,16 @@ impl Reading {
     }
 }
 
+/// `D28.5`, `K28.5`; a word that is no good with its ten line bits, the first one first: `?1111111111`.
+impl fmt::Display for Reading {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self.character() {
+            Ok(character) => write!(f, "{character}"),
+            Err(_) => write!(f, "?{:010b}", self.word.get().reverse_bits() >> 6),
+        }
+    }
+}
+
 /// The verdict of a [`DisparityCheck`] on a word.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
