@@ -288,6 +288,8 @@ fn soft_limits_have_two_ends() {
     let mut mover = mover().with_soft_limits(-40, 30);
     assert_eq!(mover.move_to(-41, 0), Err(Error::SoftLimit { target: -41 }));
     assert_eq!(mover.move_to(31, 0), Err(Error::SoftLimit { target: 31 }));
+    assert_eq!(mover.move_to(i64::MIN, 0), Err(Error::SoftLimit { target: i32::MIN }));
+    assert_eq!(mover.move_to(i64::MAX, 0), Err(Error::SoftLimit { target: i32::MAX }));
     for (target, now) in [(-40, 0), (30, 10_000_000)] {
         mover.move_to(target, now).unwrap();
         assert!(!mover.is_at_rest(now), "there are steps to come");
@@ -299,4 +301,56 @@ fn soft_limits_have_two_ends() {
         // Half a step is left.
         assert!(!mover.is_at_rest(last) && mover.is_at_rest(now + 9_000_000));
     }
+}
+
+/// A speed of its own is kept, at most the greatest; an override is a part of it.
+#[test]
+fn velocity_is_what_was_asked_for() {
+    let mut mover = mover();
+    for (asked, percent, want) in [(1234, 100, 1234), (1234, 50, 617), (99_999, 100, 10_000), (8000, 25, 2000)] {
+        let now = mover.due().unwrap_or(0);
+        mover.set_override(percent, now);
+        mover.run(Direction::Reverse, asked, now).unwrap();
+        while mover.due().unwrap() < now + 1_000_000 {
+            mover.pulse().unwrap();
+        }
+        let state = mover.at(now + 1_000_000);
+        assert!((-state.speed).abs_diff(want << 16) <= 1 << 8, "{state}");
+        assert_eq!((state.acceleration, state.jerk), (0, 0));
+    }
+}
+
+#[test]
+fn limits_are_changed_at_rest_only() {
+    let mut mover = mover();
+    let (old, fast) = (mover.limits(), Limits::new(20_000, 1_000_000).unwrap());
+    mover.move_to(500, 0).unwrap();
+    assert_eq!(mover.set_limits(fast, 10), Err(Error::Moving));
+    assert_eq!(mover.limits(), old);
+    let mut slow = 0;
+    while let Some(pulse) = mover.pulse() {
+        slow = pulse.tick;
+    }
+    mover.set_limits(fast, 1_000_000).unwrap();
+    assert_eq!(mover.limits(), fast);
+    let refused = mover.set_limits(Limits::new(500_001, 1).unwrap(), 1_000_000);
+    assert_eq!(refused, Err(Error::SpeedAboveClock { speed: 500_001, limit: 500_000 }));
+    mover.move_to(0, 1_000_000).unwrap();
+    let mut quick = 0;
+    while let Some(pulse) = mover.pulse() {
+        quick = pulse.tick;
+    }
+    // 2 sqrt(n / a) less the last half step, 44.7 ms.
+    assert!((43_000..44_722).contains(&(quick - 1_000_000)) && slow > 100_000, "{quick} {slow}");
+}
+
+#[test]
+fn a_move_has_two_to_the_31_steps_at_most() {
+    let most = (1_i64 << 31) - 1;
+    for (target, steps) in [(most + 1, 1 << 31), (-most - 1, 1 << 31), (i64::MAX, u32::MAX)] {
+        let refused = mover().move_to(target, 0);
+        assert_eq!(refused, Err(Error::TooManySteps { steps, limit: u32::MAX / 2 }));
+    }
+    mover().move_to(-most, 0).unwrap();
+    mover().move_to(most, 0).unwrap();
 }

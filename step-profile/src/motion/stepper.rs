@@ -312,7 +312,7 @@ mod tests {
         (low.ln()..high.ln()).prop_map(f64::exp)
     }
 
-    /// A ramp of 2500 steps up and down: nearly all of them are foreseen, 20 at a time.
+    /// A ramp of 2500 steps up and down: nearly all of them are foreseen, 40 at a time.
     #[test]
     fn a_long_ramp_takes_few_looks() {
         for jerk in [None, Some(1_000_000)] {
@@ -332,7 +332,7 @@ mod tests {
                     (looks, foreseen) = (looks + 1, foreseen + run.count);
                 }
             }
-            assert!(foreseen > 4200 && looks * 18 < foreseen, "{looks} looks for {foreseen} steps");
+            assert!(foreseen > 4450 && looks < 120, "{looks} looks for {foreseen} steps");
         }
     }
 
@@ -367,8 +367,9 @@ mod tests {
             got.clear();
             Stepper::new().fold(&curve, &frame, (), |(), tick| got.push(tick));
             prop_assert_eq!(got, ticks);
+            // Of 1/32. A third is kept in hand.
             let error = error(&curve, &frame);
-            prop_assert!(error < 0.026, "{error}");
+            prop_assert!(error < 0.021, "{error}");
         }
     }
 }
