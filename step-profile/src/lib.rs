@@ -35,4 +35,5 @@ pub use position::{OperatingMode, PositionMode, PositionState};
 pub use profile::{Parameters, Profile, Shape};
 pub use ramp::RampTable;
 pub use ramp_steps::{MoveState, RampStep, RampSteps};
+pub use servowire_core::OutOfRange;
 pub use tone::Tone;
