@@ -16,7 +16,7 @@ servowire_core::errors! {
             limit: u32,
         },
         /// Above 250 kHz two pulses would fall into one cycle.
-        #[error("speed constant {speed} is above 250 kHz, at least {limit} needed")]
+        #[error("{} Hz is above 250 kHz: speed constant {speed}, at least {limit} needed", hertz(*speed))]
         StepRateTooHigh {
             /// Speed constant 2^16 / f\[MHz\], as asked for.
             speed: u32,
@@ -24,7 +24,7 @@ servowire_core::errors! {
             limit: u32,
         },
         /// The first step of the ramp lasts 2^32 ns or longer.
-        #[error("speed constant {speed} makes the first step of the ramp longer than 2^32 ns, at most {limit}")]
+        #[error("at {} Hz the first step of the ramp is longer than 2^32 ns: speed constant {speed}, at most {limit}", hertz(*speed))]
         StepTimeOverflow {
             /// Speed constant 2^16 / f\[MHz\], as asked for.
             speed: u32,
@@ -108,6 +108,11 @@ servowire_core::errors! {
     }
 }
 
+/// The step frequency of a speed constant, 2^16 / f\[MHz\], in Hz.
+fn hertz(speed: u32) -> u64 {
+    65_536_000_000_u64.checked_div(speed.into()).unwrap_or(u64::MAX)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -115,8 +120,8 @@ mod tests {
 
     #[test]
     fn an_error_names_its_limit() {
-        let error = Error::StepRateTooHigh { speed: 1, limit: 262_144 };
-        assert_eq!(error.to_string(), "speed constant 1 is above 250 kHz, at least 262144 needed");
+        let error = Error::StepRateTooHigh { speed: 65_536, limit: 262_144 };
+        assert_eq!(error.to_string(), "1000000 Hz is above 250 kHz: speed constant 65536, at least 262144 needed");
         assert_eq!((error.class(), error.class().name()), (ErrorClass::StepRateTooHigh, "step_rate_too_high"));
     }
 
