@@ -8,12 +8,14 @@
     reason = "a test"
 )]
 
+use nikon_aformat::bus::Addresses;
 use nikon_aformat::master::{
-    Detection, EepromRead, GuardedReset, Polling, Reading, Reset, Sampled, Step, VerifiedWrite, Write,
+    BusTransaction, Detection, EepromRead, GuardedReset, Line, Polling, Progress, Reading, Reset, Sampled, Step,
+    Transaction, VerifiedWrite, Write,
 };
 use nikon_aformat::{
-    Alm, Command, Data, Doubt, EncoderAddress, EncoderId, EncoderStatus, Error, Operation, PmAlm, Policy, Request,
-    Resolution, Response, U17, U19, U40, UserAddress,
+    Alm, BitRate, Command, Data, Doubt, EncoderAddress, EncoderId, EncoderStatus, Error, Operation, PmAlm, Policy,
+    Request, Resolution, Response, U17, U19, U40, UserAddress,
 };
 
 const LOST: Result<Response, Error> = Err(Error::NoResponse);
@@ -245,4 +247,26 @@ fn a_position_from_the_future_is_as_old_as_it_is_far_away() {
     let at = |now_ns| reading.position(Resolution::new(17, 16).unwrap(), policy, now_ns).map(|p| p.single_turn);
     assert_eq!((at(5_000_125_000), at(4_999_875_000)), (Ok(77), Ok(77)));
     assert_eq!(at(17), Err(Doubt::Old { age_ns: 4_999_999_983 }));
+}
+
+/// A FIFO that is emptied at once: all frames carry the time of the last. At 8 Mbit/s a request of one frame is out after
+/// 2.25 us, and the two frames of ABS17 last 4.5 us, so what has ended at 6.7 us began before.
+#[test]
+fn frames_with_one_stamp_are_as_old_as_the_last_of_them() {
+    let response = Response::abs17(EncoderAddress::ZERO, EncoderStatus::empty(), U17::truncate(77));
+    let request = Request::new(EncoderAddress::ZERO, Operation::Abs17);
+    let (line, resolution) = (Line::new(BitRate::Mbit8), Resolution::default());
+    let heard = |end_ns| {
+        let mut single = Transaction::start(request, resolution, line, 0);
+        let asked = Addresses::first(1);
+        let mut bus = BusTransaction::start(request, resolution, asked, line, 0);
+        for content in response.emit().contents() {
+            let _ = single.frame(*content, end_ns);
+            let _ = bus.frame(*content, end_ns);
+        }
+        let alone = matches!(single.progress(), Progress::Done { .. });
+        assert_eq!(alone, bus.reading(EncoderAddress::ZERO).is_some());
+        alone
+    };
+    assert!(!heard(6_100) && !heard(6_749) && heard(20_000));
 }

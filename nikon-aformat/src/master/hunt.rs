@@ -100,10 +100,12 @@ impl Hunt {
         let before = self.got.saturating_sub(1);
         let last_of_block = at.saturating_add(1) == times.count;
         let begun_ns = if last_of_block && before <= at { begun_ns.max(times.begun_of_tail(before)) } else { begun_ns };
-        if begun_ns >= self.from_ns && begins_a_response(first) && !self.is_overtaken(expected, times, at) {
+        // Stamps are never early: if by that of the last frame the first began before the request was out, it did.
+        let began_ns = self.end_ns.saturating_sub(times.line.rate.response_ns(expected.layout()).into());
+        let fresh = begun_ns.min(began_ns) >= self.from_ns;
+        if fresh && begins_a_response(first) && !self.is_overtaken(expected, times, at) {
             let raw = RawResponse::of(self.contents, expected.layout());
             let outcome = Response::parse(expected, &raw);
-            let began_ns = self.end_ns.saturating_sub(times.line.rate.response_ns(expected.layout()).into());
             found(Found { outcome, began_ns, end_ns: self.end_ns });
             if outcome.is_ok() {
                 self.clear();
