@@ -100,6 +100,22 @@ fn write_protection() {
 }
 
 /// Events are cleared by writing 0; writing 1 sets nothing (p. 36).
+/// By TI's rule any register takes what is written; LINK and the quality are those of the receiver from the next frame on, in
+/// the start-up too.
+#[test]
+fn no_link_by_a_write() {
+    for dialect in DIALECTS {
+        let mut master = Master::new(dialect);
+        let mut map = Registers::new(&dialect);
+        for _ in 0..20 {
+            map.write(&mut master, 0x03, 0xff).unwrap();
+            let report = *master.finish_bits(u64::MAX, None, None);
+            let _ = map.apply(&report);
+            assert_eq!((map.link(), map.quality()), (false, 0), "{dialect:?} {:?}", report.state);
+        }
+    }
+}
+
 #[test]
 fn events_are_cleared_by_zeros() {
     for dialect in DIALECTS {

@@ -84,9 +84,8 @@ impl Registers {
             let [_, high, middle, low] = id.get().to_be_bytes();
             self.put(Register::EncId, [high << 4 | high, middle, low]);
         }
-        if report.state > State::IdReq {
-            self.put(Register::MasterQm, [0x80 | report.quality]);
-        }
+        let linked = report.state > State::IdReq;
+        self.put(Register::MasterQm, [if linked { 0x80 | report.quality } else { 0 }]);
         if let Some(signal) = report.signal {
             self.put(Register::Edges, [signal.edges, signal.rssi.get() << 4 | signal.delay.get()]);
         }
