@@ -10,16 +10,19 @@ const [DI, DE, RO] = [2, 3, 4];
 // Number of bits - 1, a wait, the bits: an odd pattern of 60 bits, then one of 27 bits with a wait.
 const WORDS = [59, 0, 0x6a5c3d96, 0x080f3a90 | (1 << 27), 26, 33, 0x06b7_51a1 | (1 << 26)];
 const START_CLOCKS = 12_000;
+// And so long without a request of its own.
+const QUIET_CLOCKS = 1_000;
 
 const chip = new Chip('image', IMAGES + process.argv[2], { hz: HZ });
-for (let t = 0; t < START_CLOCKS; t++) {
+const pio = chip.chip.pio[0];
+for (let t = 0, quiet = 0; t < START_CLOCKS || quiet < QUIET_CLOCKS; t++) {
   chip.input(RO, true);
   chip.clock();
+  quiet = (pio.pinValues >> DE) & 1 ? 0 : quiet + 1;
 }
 // From here on the processor and the DMA stand still.
 chip.chip.core.executeInstruction = () => Number.MAX_SAFE_INTEGER;
 for (const channel of chip.chip.dma.channels) channel.abort();
-const pio = chip.chip.pio[0];
 const [tx, rx] = pio.machines;
 const divider = tx.clockDivInt;
 if (tx.clockDivFrac || rx.clockDivFrac || rx.clockDivInt !== divider) throw new Error('a whole divider, the same for both');
