@@ -14,6 +14,7 @@
 
 mod access;
 mod file;
+mod limits;
 mod long;
 mod requester;
 mod resource;
@@ -22,8 +23,9 @@ mod short;
 
 pub use access::AccessLevel;
 pub use file::{FileName, FileStatus};
+pub use limits::Limits;
 pub use long::{Access, Data, Length, LongAnswer, LongRequest};
-pub use requester::{Finished, Limits, Requester};
+pub use requester::{Finished, Requester};
 pub use resource::{Offset, ResourceAddress, ResourceError, ResourceErrorClass};
 pub use responder::{Request, Responder};
 pub use short::{RemoteRegister, ShortAnswer, ShortRequest};

@@ -8,9 +8,10 @@ use core::num::NonZeroU16;
 use common::{Pair, limits, set_position};
 use rtex_block::device::Behaviour;
 use rtex_block::master::procedure::Home;
-use rtex_block::master::{ActiveCode, Axis, AxisConfig, Failure, Limits, Progress, Turn};
+use rtex_block::master::{ActiveCode, Axis, AxisConfig, AxisState, Failure, Limits, Progress, Received, Turn};
 use rtex_block::{
-    Arguments, ErrorCode, MacId, NonCyclicCommand, Response, Response32, StatusFlags, SubCode, TypeCode, UpdateCounter,
+    Arguments, ErrorCode, MacId, NonCyclicCommand, Pr, Response, Response32, StatusFlags, SubCode, TypeCode,
+    UpdateCounter,
 };
 
 fn mac_id() -> MacId {
@@ -113,6 +114,75 @@ fn an_answer_that_lingers_is_not_that_of_the_next_request() {
     hear(&mut axis, 0x20);
     axis.ask(write(7)).unwrap();
     assert!(matches!(hear(&mut axis, 0x26), Some(Progress::Done { .. })));
+}
+
+/// The axis hears this, and nothing of what it sends comes to the drive.
+fn hears(pair: &mut Pair, received: Received, periods: u32) {
+    for _ in 0..periods {
+        pair.axis.receive(pair.sent, &received);
+        pair.sent = pair.counter.next();
+        let _ = pair.axis.send(pair.sent);
+    }
+}
+
+/// The line fails for longer than a request is waited for, just after a write was answered: the drive has not seen the request go,
+/// so to it the next one is the same still, and its old answer is none to the new one. Once it has seen the normal command, it
+/// is asked again.
+#[test]
+fn an_answer_is_not_taken_twice() {
+    let write = |data| {
+        let index = Pr { class: 7, number: 25 }.index();
+        NonCyclicCommand::Parameter(Arguments { type_code: TypeCode::short(0x11), index, data })
+    };
+    let mut pair = Pair::new(ActiveCode::CyclicPosition, Behaviour::POLITE);
+    pair.until("off", |pair| pair.axis.state() == AxisState::Off);
+    pair.axis.ask(write(1)).unwrap();
+    let old = loop {
+        let received = pair.received;
+        pair.update();
+        if pair.axis.take_outcome().is_some() {
+            break received;
+        }
+    };
+    hears(&mut pair, Received::Nothing, 100);
+    pair.axis.ask(write(0)).unwrap();
+    hears(&mut pair, old, 30);
+    assert_eq!(pair.axis.take_outcome(), None);
+    hears(&mut pair, old, 40);
+    assert_eq!(pair.axis.take_outcome(), Some(Progress::Failed { error: Failure::TimedOut }));
+    pair.axis.clear();
+    assert!(matches!(pair.ask(write(0)), Progress::Done { .. }));
+    // A controller that starts anew meets what it has asked before.
+    let mut pair = Pair::new(ActiveCode::CyclicPosition, Behaviour::POLITE);
+    pair.axis.ask(write(0)).unwrap();
+    hears(&mut pair, old, 40);
+    assert_eq!(pair.axis.take_outcome(), None);
+}
+
+/// The same of a sub-command.
+#[test]
+fn a_sub_answer_is_not_taken_twice() {
+    let mut pair = Pair::new(ActiveCode::CyclicPosition, Behaviour::POLITE);
+    pair.wide = true;
+    pair.until("off", |pair| pair.axis.state() == AxisState::Off);
+    pair.axis.ask_sub(SubCode::Monitor, 0x07, 0).unwrap();
+    let old = loop {
+        let received = pair.received;
+        pair.update();
+        if pair.axis.take_sub_outcome().is_some() {
+            break received;
+        }
+    };
+    hears(&mut pair, Received::Nothing, 100);
+    pair.axis.ask_sub(SubCode::Monitor, 0x07, 0).unwrap();
+    hears(&mut pair, old, 40);
+    assert_eq!(pair.axis.take_sub_outcome(), None);
+    hears(&mut pair, old, 40);
+    assert_eq!(pair.axis.take_sub_outcome(), Some(Progress::Failed { error: Failure::TimedOut }));
+    let mut pair = Pair::new(ActiveCode::CyclicPosition, Behaviour::POLITE);
+    pair.axis.ask_sub(SubCode::Monitor, 0x07, 0).unwrap();
+    hears(&mut pair, old, 40);
+    assert_eq!(pair.axis.take_sub_outcome(), None);
 }
 
 /// Homing_Complete of the last homing, and a motion of something else that ends: neither is the end of this homing.

@@ -58,10 +58,10 @@ pub enum Step<R, T, E> {
     },
 }
 
-impl<R, T, E> Step<R, T, E> {
-    /// Whether the procedure has ended, done or failed: there is nothing to send.
-    pub const fn has_ended(&self) -> bool {
-        !matches!(self, Self::Send { .. })
+impl<R: Copy, T: Copy, E: Copy> Step<R, T, E> {
+    /// How the procedure ended, done or failed; `None` if there is something to send.
+    pub const fn ended(&self) -> Option<Self> {
+        if matches!(self, Self::Send { .. }) { None } else { Some(*self) }
     }
 }
 

@@ -51,8 +51,7 @@ pub struct EepromRead {
     discard_first: bool,
     /// The caller knows that no read of this address was broken off, and that the memory is not busy.
     known: bool,
-    /// A read is under way.
-    under_way: bool,
+    started: bool,
     next: Next,
     tries: u16,
     end: Option<Step<u16>>,
@@ -85,7 +84,7 @@ impl EepromRead {
             polling: READ_POLLING,
             discard_first: true,
             known: false,
-            under_way: false,
+            started: false,
             next: Next::Other,
             tries: 0,
             end: None,
@@ -119,10 +118,11 @@ impl EepromRead {
 
     /// The first request, at once.
     pub const fn start(&mut self, now_ns: u64) -> Step<u16> {
+        // A read that was started and has not ended is broken off by this.
+        self.known = self.known && (!self.started || self.end.is_some());
+        self.started = true;
         self.tries = 0;
         self.end = None;
-        self.known = self.known && !self.under_way;
-        self.under_way = true;
         self.next = if self.known { Next::First } else { Next::Other };
         Step::Send { request: self.next_request(), not_before_ns: now_ns }
     }
@@ -132,14 +132,8 @@ impl EepromRead {
     /// A response that is missing or refused counts as a try; [`Error::BankError`] ends the procedure at once. Once done or
     /// failed it stays so.
     pub fn receive(&mut self, outcome: Result<Response, Error>, ready_ns: u64) -> Step<u16> {
-        if let Some(end) = self.end {
-            return end;
-        }
-        let step = self.next(outcome, ready_ns);
-        if step.has_ended() {
-            self.under_way = false;
-            self.end = Some(step);
-        }
+        let step = self.end.unwrap_or_else(|| self.next(outcome, ready_ns));
+        self.end = step.ended();
         step
     }
 

@@ -93,13 +93,8 @@ impl Reset {
     /// So it does if the status after commands 11 and 12, whose effect is kept in the EEPROM, shows MEMERR. Once done or
     /// failed it stays so.
     pub fn receive(&mut self, outcome: Result<Response, Error>, ready_ns: u64) -> Step<Response> {
-        if let Some(end) = self.end {
-            return end;
-        }
-        let step = self.next(outcome, ready_ns);
-        if step.has_ended() {
-            self.end = Some(step);
-        }
+        let step = self.end.unwrap_or_else(|| self.next(outcome, ready_ns));
+        self.end = step.ended();
         step
     }
 

@@ -79,13 +79,8 @@ impl VerifiedWrite {
 
     /// A transaction ended with this outcome; the line is free from `ready_ns` on. Once done or failed it stays so.
     pub fn receive(&mut self, outcome: Result<Response, Error>, ready_ns: u64) -> Step<()> {
-        if let Some(end) = self.end {
-            return end;
-        }
-        let step = self.next(outcome, ready_ns);
-        if step.has_ended() {
-            self.end = Some(step);
-        }
+        let step = self.end.unwrap_or_else(|| self.next(outcome, ready_ns));
+        self.end = step.ended();
         step
     }
 

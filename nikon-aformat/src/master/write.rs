@@ -82,13 +82,8 @@ impl Write {
     /// response to this write or no status comes, and with [`Error::MemoryFault`] if MEMERR is set. Once done or failed it
     /// stays so.
     pub fn receive(&mut self, outcome: Result<Response, Error>, ready_ns: u64) -> Step<Response> {
-        if let Some(end) = self.end {
-            return end;
-        }
-        let step = self.next(outcome, ready_ns);
-        if step.has_ended() {
-            self.end = Some(step);
-        }
+        let step = self.end.unwrap_or_else(|| self.next(outcome, ready_ns));
+        self.end = step.ended();
         step
     }
 

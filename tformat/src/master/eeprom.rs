@@ -111,17 +111,16 @@ impl EepromAccess {
 
     /// A transaction ended with this outcome; the line is free from `ready_ns` on.
     pub fn receive(&mut self, outcome: Result<Response, Error>, ready_ns: u64) -> Step<u8> {
-        if let Some(end) = self.end {
-            return end;
-        }
-        let step = match self.memory(outcome) {
+        let step = self.end.unwrap_or_else(|| self.next(outcome, ready_ns));
+        self.end = step.ended();
+        step
+    }
+
+    fn next(&mut self, outcome: Result<Response, Error>, ready_ns: u64) -> Step<u8> {
+        match self.memory(outcome) {
             Ok(memory) => self.answered(memory, ready_ns),
             Err(error) => self.lost(error, ready_ns),
-        };
-        if step.has_ended() {
-            self.end = Some(step);
         }
-        step
     }
 
     /// The response to the request that was sent last; all else is none.

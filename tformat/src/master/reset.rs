@@ -87,13 +87,8 @@ impl Reset {
 
     /// A transaction ended with this outcome; the line is free from `ready_ns` on.
     pub fn receive(&mut self, outcome: Result<Response, Error>, ready_ns: u64) -> Step<SingleTurn> {
-        if let Some(end) = self.end {
-            return end;
-        }
-        let step = self.next(outcome, ready_ns);
-        if step.has_ended() {
-            self.end = Some(step);
-        }
+        let step = self.end.unwrap_or_else(|| self.next(outcome, ready_ns));
+        self.end = step.ended();
         step
     }
 

@@ -59,9 +59,7 @@ impl MultiTurnZero {
         };
         let near = |from, to| resolution.turns_between(from, to).unsigned_abs() <= *tolerance;
         let step = witness.receive(outcome, ready_ns, value, near);
-        if step.has_ended() {
-            *end = Some(step);
-        }
+        *end = step.ended();
         step
     }
 }

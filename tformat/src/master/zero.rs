@@ -54,9 +54,7 @@ impl SingleTurnZero {
         };
         let near = |from, to| resolution.difference(from, to).unsigned_abs() <= *tolerance;
         let step = witness.receive(outcome, ready_ns, value, near);
-        if step.has_ended() {
-            *end = Some(step);
-        }
+        *end = step.ended();
         step
     }
 }

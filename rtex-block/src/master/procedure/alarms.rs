@@ -158,10 +158,7 @@ impl ClearAlarm {
     /// [`Failure::CommandError`]: the drive does not know the type code, which says nothing of the alarm.
     /// [`Failure::TimedOut`]: no answer came and Alarm is still 1, or no block came at all. Once done or failed it stays so.
     pub fn receive(&mut self, axis: &mut Axis) -> Progress<Clearing> {
-        if let Some(end) = self.end {
-            return end;
-        }
-        let progress = self.next(axis);
+        let progress = self.end.unwrap_or_else(|| self.next(axis));
         self.end = progress.ended();
         progress
     }

@@ -48,10 +48,7 @@ impl SetPosition {
     /// The command is never sent twice. If its answer does not come, the position read back decides: `Done` if it is the one
     /// to be set, otherwise [`Failure::TimedOut`], and the effect is not known. Once done or failed it stays so.
     pub fn receive(&mut self, axis: &mut Axis) -> Progress<i32> {
-        if let Some(end) = self.end {
-            return end;
-        }
-        let progress = self.next(axis);
+        let progress = self.end.unwrap_or_else(|| self.next(axis));
         self.end = progress.ended();
         progress
     }
@@ -111,10 +108,7 @@ impl Home {
     /// them was different since the command was accepted: Homing_Complete may be left from an earlier homing. Once done or
     /// failed it stays so: the command is never sent twice.
     pub fn receive(&mut self, axis: &mut Axis) -> Progress<()> {
-        if let Some(end) = self.end {
-            return end;
-        }
-        let progress = self.next(axis);
+        let progress = self.end.unwrap_or_else(|| self.next(axis));
         self.end = progress.ended();
         progress
     }

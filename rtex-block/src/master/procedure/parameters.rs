@@ -48,26 +48,20 @@ pub struct Restore {
     read: TypeCode,
     place: usize,
     written: bool,
-    /// It has failed.
-    failed: Option<Failure>,
+    end: Option<Progress<()>>,
 }
 
 impl Restore {
     /// With the type code for reading as the drive's manual gives it.
     pub const fn new(read: TypeCode) -> Self {
-        Self { ask: Ask { asked: false }, read, place: 0, written: false, failed: None }
+        Self { ask: Ask { asked: false }, read, place: 0, written: false, end: None }
     }
 
     /// To be called once in every update period. [`Failure::Differs`] names the parameter that did not take its value;
-    /// after any other failure the parameter at [`place`](Self::place) may have either value. What has failed stays so.
+    /// after any other failure the parameter at [`place`](Self::place) may have either value. Once done or failed it stays so.
     pub fn receive(&mut self, axis: &mut Axis, list: &[(Pr, i32)]) -> Progress<()> {
-        if let Some(error) = self.failed {
-            return Progress::Failed { error };
-        }
-        let progress = self.next(axis, list);
-        if let Progress::Failed { error } = progress {
-            self.failed = Some(error);
-        }
+        let progress = self.end.unwrap_or_else(|| self.next(axis, list));
+        self.end = progress.ended();
         progress
     }
 
