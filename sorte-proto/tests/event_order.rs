@@ -9,6 +9,9 @@
     clippy::unwrap_used
 )]
 
+mod common;
+
+use common::device_in;
 use sorte_proto::device::{self, Arrival, Device, Path, PortId};
 use sorte_proto::master::{Action, Config, Master, Outgoing, State};
 use sorte_proto::{
@@ -346,23 +349,6 @@ fn a_link_that_is_lost_in_error_restarts_nothing() {
 
 const ARRIVAL: Arrival = Arrival { sof_ns: 77_000, counter_ns: 77_700, now_ns: 0 };
 
-/// The only device of its line, in SYNC.
-fn device_in_sync() -> Device {
-    let mut device = Device::new(device::Config::new());
-    device.links(true, false);
-    let frames: [Vec<u8>; 4] = [
-        Discovery::request(false).emit().to_vec(),
-        Discovery::request(true).emit().to_vec(),
-        Param::request(Parameters::CNC, true).emit().to_vec(),
-        DelayReq::of_master(true).emit().to_vec(),
-    ];
-    for mut frame in frames {
-        assert_eq!(device.frame(PortId::A, &mut frame, ARRIVAL).result, Ok(()));
-    }
-    assert_eq!(device.state(), device::State::Sync);
-    device
-}
-
 /// A frame is on its way through the device when its host resets it, its link goes or its time is over: what the rest of the
 /// frame says belongs to a start-up that is no more. A clock that is set then would not be set in the next one.
 #[test]
@@ -374,7 +360,7 @@ fn a_frame_that_began_before_a_restart_teaches_nothing_after_it() {
         Device::enter_error,
     ];
     for restart in restarts {
-        let mut device = device_in_sync();
+        let mut device = device_in(device::State::Sync, true, Parameters::CNC);
         let mut passage = device.begin(PortId::A);
         for byte in Sync::of_master(30_500, 76, true).emit() {
             passage.byte(byte);

@@ -2,12 +2,16 @@
 //! device that the frame passes. They refuse the same frames for the same reason.
 #![allow(clippy::arithmetic_side_effects, clippy::indexing_slicing, clippy::std_instead_of_core, clippy::unwrap_used)]
 
+mod common;
+
+use common::device_in;
 use sorte_proto::cut_through::{DiscoveryRewriter, SyncRewriter};
 use sorte_proto::device::{Arrival, Config, Device, Path, PortId, State, Trigger};
 use sorte_proto::{
     DelayReq, Discovery, Entry, Error, ErrorClass, FrameType, LongFrame, Param, Parameters, Status, Sync, fcs,
 };
 
+const STOCK: Parameters = Parameters::STOCK;
 const ARRIVAL: Arrival = Arrival { sof_ns: 0, counter_ns: 0, now_ns: 0 };
 
 fn frames() -> [Vec<u8>; 4] {
@@ -17,31 +21,6 @@ fn frames() -> [Vec<u8>; 4] {
         DelayReq::of_master(false).emit().to_vec(),
         Sync::of_master(500, 76, false).emit().to_vec(),
     ]
-}
-
-/// A device in the state that waits for a frame, the last of the line or not.
-fn device_in(state: State, last: bool) -> Device {
-    let mut device = Device::new(Config::new());
-    device.links(true, !last);
-    let script = [
-        Discovery::request(false).emit().to_vec(),
-        Discovery::request(true).emit().to_vec(),
-        Param::request(Parameters::STOCK, true).emit().to_vec(),
-        DelayReq::of_master(true).emit().to_vec(),
-    ];
-    for mut frame in script {
-        if device.state() == state {
-            break;
-        }
-        if device.state() == State::LineDelay && !last {
-            for _ in 0..16 {
-                device.delay_reflection(Trigger::Normal, &DelayReq::of_device(false).emit(), 560).unwrap();
-            }
-        }
-        assert_eq!(device.frame(PortId::A, &mut frame, ARRIVAL).result, Ok(()));
-    }
-    assert_eq!(device.state(), state);
-    device
 }
 
 /// What each of them says; a good frame of another type is none of a rewriter's business.
@@ -61,7 +40,7 @@ fn classes(frame: &[u8], devices: &[Device]) -> Vec<Option<ErrorClass>> {
 
 fn devices() -> Vec<Device> {
     let states = [State::Discovery, State::Param, State::LineDelay, State::Sync];
-    states.into_iter().flat_map(|state| [device_in(state, false), device_in(state, true)]).collect()
+    states.into_iter().flat_map(|state| [device_in(state, false, STOCK), device_in(state, true, STOCK)]).collect()
 }
 
 #[test]
@@ -114,7 +93,7 @@ fn a_frame_that_is_wrong_with_a_right_fcs_has_one_reason() {
 #[test]
 fn an_error_is_kept_until_a_status_byte_carries_it() {
     for last in [false, true] {
-        let mut device = device_in(State::Discovery, last);
+        let mut device = device_in(State::Discovery, last, STOCK);
         let mut flipped = Discovery::request(false).emit();
         flipped[2] ^= 2;
         let handled = device.frame(PortId::A, &mut flipped, ARRIVAL);
@@ -141,7 +120,7 @@ fn an_error_is_kept_until_a_status_byte_carries_it() {
 #[test]
 fn an_error_is_kept_by_a_frame_without_a_status_byte() {
     for (len, kept) in [(0, true), (3, true), (4, false)] {
-        let mut device = device_in(State::Discovery, true);
+        let mut device = device_in(State::Discovery, true, STOCK);
         let mut flipped = Discovery::request(false).emit();
         flipped[2] ^= 2;
         assert!(device.frame(PortId::A, &mut flipped, ARRIVAL).result.is_err());
@@ -162,13 +141,13 @@ fn a_delay_response_is_accepted_and_ignored() {
     *trailer = fcs(body).to_le_bytes();
     for state in [State::Discovery, State::Param, State::LineDelay, State::Sync] {
         for last in [false, true] {
-            let mut device = device_in(state, last);
+            let mut device = device_in(state, last, STOCK);
             let before = device.counters();
             assert_eq!(device.frame(PortId::A, &mut response.clone(), ARRIVAL).result, Ok(()));
             assert_eq!((device.state(), device.counters().format_errors), (state, before.format_errors));
         }
     }
-    let mut device = device_in(State::LineDelay, false);
+    let mut device = device_in(State::LineDelay, false, STOCK);
     let (before, counted) = (device.line_delay_next_ns(), device.counters());
     assert_eq!(device.delay_reflection(Trigger::Normal, &response, 560), Ok(()));
     assert_eq!((device.counters().format_errors, device.line_delay_next_ns()), (0, before));
@@ -181,7 +160,7 @@ fn a_delay_response_is_accepted_and_ignored() {
 fn the_path_is_known_before_a_device_has_to_send() {
     for state in [State::Discovery, State::Param, State::LineDelay, State::Sync] {
         for last in [false, true] {
-            let device = device_in(state, last);
+            let device = device_in(state, last, STOCK);
             let want = if last || state == State::LineDelay { Path::Reflect } else { Path::Forward };
             assert_eq!(device.begin(PortId::A).path(), Some(want), "{state:?}");
         }

@@ -8,11 +8,13 @@
     clippy::unwrap_used
 )]
 
+mod common;
+
+use common::device_in;
 use sorte_proto::device::{self, Arrival, Device, PortId};
 use sorte_proto::master::{self, Action, Master, Outgoing};
 use sorte_proto::{
-    Correction, DelayReq, DeviceAddress, DeviceFrame, Discovery, Entry, Error, Param, Parameters, Status, Sync,
-    write_master_frame,
+    Correction, DeviceAddress, DeviceFrame, Discovery, Entry, Error, Parameters, Status, Sync, write_master_frame,
 };
 
 fn answer(frame: Outgoing, devices: u8) -> Vec<u8> {
@@ -184,24 +186,11 @@ fn the_last_sync_needs_last_and_state_change() {
 
 /// The only device of a line that is 76 ns long, in the IO exchange; its last SYNC frame began at 77,000 ns of its counter.
 fn device_in_exchange() -> Device {
-    let mut device = Device::new(device::Config::new());
-    device.links(true, false);
-    let frames: [Vec<u8>; 5] = [
-        Discovery::request(false).emit().to_vec(),
-        Discovery::request(true).emit().to_vec(),
-        Param::request(Parameters::CNC, true).emit().to_vec(),
-        DelayReq::of_master(true).emit().to_vec(),
-        Sync::of_master(30_500, 76, true).emit().to_vec(),
-    ];
-    for mut frame in frames {
-        let arrival = Arrival { sof_ns: 77_000, counter_ns: 77_700, now_ns: 0 };
-        let handled = device.frame(PortId::A, &mut frame, arrival);
-        assert_eq!(handled.result, Ok(()));
-        if frame.len() == 14 {
-            // Time stamp 30,856, 700 ns since the start, 135 ns until the write is made.
-            assert_eq!(handled.correction, Correction::Set { counter_ns: 31_691 });
-        }
-    }
+    let mut device = device_in(device::State::Sync, true, Parameters::CNC);
+    let arrival = Arrival { sof_ns: 77_000, counter_ns: 77_700, now_ns: 0 };
+    let handled = device.frame(PortId::A, &mut Sync::of_master(30_500, 76, true).emit(), arrival);
+    // Time stamp 30,856, 700 ns since the start, 135 ns until the write is made.
+    assert_eq!((handled.result, handled.correction), (Ok(()), Correction::Set { counter_ns: 31_691 }));
     device
 }
 

@@ -210,29 +210,15 @@ impl<'a> Watch<'a> {
 
     fn judge(&mut self, end: bool, early: bool, out: &mut Output<'_>) -> io::Result<()> {
         let first = self.held.is_some();
+        let (judged, many) = self.moving();
         let mut readings = Vec::new();
-        let mut judged = Vec::new();
-        let mut moving: Vec<(u16, &Vec<(i64, bool)>)> = Vec::new();
-        for (channel, state) in (0_u16..).zip(&self.states) {
-            if let State::Open(edges) = state {
-                moving.extend((edges.len() >= FEWEST).then_some((channel, edges)));
-            }
-        }
-        let many = moving.len();
-        if many > MOST_TRIED {
-            moving.sort_by_key(|(_, edges)| std::cmp::Reverse(edges.len()));
-            moving.truncate(MOST_TRIED);
-        }
-        for (channel, edges) in moving {
+        for channel in &judged {
+            let Some(State::Open(edges)) = self.states.get(usize::from(*channel)) else { continue };
             if self.busiest.as_ref().is_none_or(|(_, busiest)| busiest.len() < edges.len()) {
-                self.busiest = Some((channel, edges.iter().take(3000).copied().collect()));
+                self.busiest = Some((*channel, edges.iter().take(3000).copied().collect()));
             }
-            judged.push(channel);
-            if self.candidates.pair().is_some() {
-                continue;
-            }
-            if let Some(found) = self.candidates.read(channel, edges) {
-                readings.push(found);
+            if self.candidates.pair().is_none() {
+                readings.extend(self.candidates.read(*channel, edges));
             }
         }
         readings.extend(self.said_pair());
@@ -263,7 +249,29 @@ impl<'a> Watch<'a> {
         for found in taken {
             self.take(found, out)?;
         }
-        for channel in judged {
+        self.let_go(&judged);
+        if first { self.replay(out) } else { Ok(()) }
+    }
+
+    /// The open channels that move enough to be judged, the busiest of them where they are too many; and how many move.
+    fn moving(&self) -> (Vec<u16>, usize) {
+        let mut moving: Vec<(u16, usize)> = Vec::new();
+        for (channel, state) in (0_u16..).zip(&self.states) {
+            if let State::Open(edges) = state {
+                moving.extend((edges.len() >= FEWEST).then_some((channel, edges.len())));
+            }
+        }
+        let many = moving.len();
+        if many > MOST_TRIED {
+            moving.sort_by_key(|(_, edges)| std::cmp::Reverse(*edges));
+            moving.truncate(MOST_TRIED);
+        }
+        (moving.into_iter().map(|(channel, _)| channel).collect(), many)
+    }
+
+    /// Keeps the edges of those channels no longer that are judged by enough, and of none where all together are too many.
+    fn let_go(&mut self, judged: &[u16]) {
+        for &channel in judged {
             if let Some(State::Open(edges)) = self.states.get(usize::from(channel)) {
                 let enough = edges.len() >= ENOUGH;
                 let after = edges.len() as u64 * PATIENCE;
@@ -280,7 +288,6 @@ impl<'a> Watch<'a> {
             }
             self.kept = 0;
         }
-        if first { self.replay(out) } else { Ok(()) }
     }
 
     /// The pair of channels that the user named.
