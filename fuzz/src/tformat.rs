@@ -114,7 +114,7 @@ pub fn differential(mut data: &[u8]) {
 /// Streams: however the bytes arrive, the same frames come out at the same places.
 ///
 /// ```text
-/// 0..3  request      3  bytes that arrive at once      4..  answers, one behind the other
+/// 0..3  request      3  bytes that arrive at once      4..  answers, one after the other
 /// ```
 pub fn stream(mut data: &[u8]) {
     let asked = chosen(&mut data);
@@ -133,10 +133,10 @@ fn in_parts<'a, T: PartialEq + std::fmt::Debug>(
     let mut rest = data;
     let end = loop {
         match parse(rest) {
-            Ok((behind, value)) => {
-                assert!(behind.len() < rest.len() && data.ends_with(behind));
-                whole.push((data.len() - behind.len(), value));
-                rest = behind;
+            Ok((after, value)) => {
+                assert!(after.len() < rest.len() && data.ends_with(after));
+                whole.push((data.len() - after.len(), value));
+                rest = after;
             }
             Err(error) => break error,
         }
@@ -151,8 +151,8 @@ fn in_parts<'a, T: PartialEq + std::fmt::Debug>(
         arrived = (arrived + step).min(data.len());
         loop {
             match parse(&data[begin..arrived]) {
-                Ok((behind, value)) => {
-                    begin = arrived - behind.len();
+                Ok((after, value)) => {
+                    begin = arrived - after.len();
                     parts.push((begin, value));
                 }
                 Err(Err::Incomplete(_)) => break,

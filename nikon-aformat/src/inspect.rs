@@ -203,7 +203,7 @@ fn diagnose(request: Request, expected: &Expected, line: Window, error: Error) -
     let attempts = [
         (Cause::LineInverted, sound(Some(line.inverted()))),
         (Cause::WrongBitOrder, sound(Some(line.reordered()))),
-        (Cause::OwnEcho, sound(behind_echo(request, line))),
+        (Cause::OwnEcho, sound(after_echo(request, line))),
         (Cause::HalfRate, half_rate(expected, line)),
     ];
     for (cause, response) in attempts {
@@ -214,7 +214,7 @@ fn diagnose(request: Request, expected: &Expected, line: Window, error: Error) -
     if let Some((bits, response)) = shifted(expected, line) {
         return (Some(Cause::Shifted { bits }), Some(response));
     }
-    if behind_echo(request, line).is_some_and(Window::is_empty) {
+    if after_echo(request, line).is_some_and(Window::is_empty) {
         return (Some(Cause::OnlyEcho), None);
     }
     (matches!(error, Error::Crc { .. }).then_some(Cause::Disturbed), None)
@@ -240,7 +240,7 @@ fn other_party(expected: &Expected, line: Window) -> Option<(Cause, Response)> {
 
 /// What follows the own request and the turn-round, if the line begins with the request's only frame; nothing is left if
 /// nobody answers.
-fn behind_echo(request: Request, line: Window) -> Option<Window> {
+fn after_echo(request: Request, line: Window) -> Option<Window> {
     let frames = request.emit();
     let [frame] = frames.as_slice() else { return None };
     let rest = line.skip(FRAME_BITS)?;

@@ -287,7 +287,7 @@ fn hear(receiver: &mut LineReceiver, answers: &[Transmission], empty: &Bus) -> B
     bus
 }
 
-/// Answers as one line, one sample a bit, beginning with the first start bit; idle line behind the last.
+/// Answers as one line, one sample a bit, beginning with the first start bit; idle line after the last.
 fn render(answers: &[Transmission]) -> Vec<bool> {
     let Some(first) = answers.first() else { return Vec::new() };
     let mut line = Vec::new();

@@ -43,7 +43,7 @@ pub struct LineField {
     /// Spikes that were dropped before it or in it.
     pub spikes: u32,
     /// For the first field of a speaker: the bits of the line from its start bit on, as long as he speaks, the first in
-    /// bit 0; those behind are 1. Otherwise 0.
+    /// bit 0; those after it are 1. Otherwise 0.
     pub bits: u128,
 }
 

@@ -61,7 +61,7 @@ fn the_log_says_who_spoke() {
     words.fails_with("no format that is known");
 }
 
-/// Answers of a T-Format encoder as they were given, one behind the other with their requests.
+/// Answers of a T-Format encoder as they were given, one after the other with their requests.
 fn traffic(exchanges: u32) -> Vec<u8> {
     (0..exchanges).flat_map(|k| [vec![0x1a], common::id3(3_915_817 + 37 * k, k % 7, 0)].concat()).collect()
 }

@@ -233,7 +233,7 @@ fn damage_to_a_dsl_link_is_told() {
         verdicts.filter(|verdict| verdict != "ok").collect()
     };
     for _ in 0..20 {
-        // SYNC and SAMPLE of the head, behind the six bits of TRAILER.
+        // SYNC and SAMPLE of the head, after the six bits of TRAILER.
         let at = 6 + rng.below(12) as usize;
         let events = spoilt_link(&mut rng, |head, _| head[at] ^= true);
         assert_eq!(refused(&events).first().map(String::as_str), Some("head"), "bit {at}: {events:?}");

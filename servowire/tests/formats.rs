@@ -235,7 +235,7 @@ fn ports_of_several_lines() {
     common::decode(&file, &["--channel", "pair[0]"]).fails_with("no traffic on channel \"pair[0]\"");
 }
 
-/// Drawn levels, as `sigrok-cli -O ascii` writes them: an edge is drawn in the place of the level behind it.
+/// Drawn levels, as `sigrok-cli -O ascii` writes them: an edge is drawn in the place of the level after it.
 #[test]
 fn samples_that_are_drawn() {
     let bench = Bench::new();

@@ -201,7 +201,7 @@ fn answers_alone() {
 
 /// Nothing is passed over: what follows an answer without a pause is a frame of its own.
 #[test]
-fn fields_behind_an_answer() {
+fn fields_after_an_answer() {
     let run = decode(|wave| {
         wave.exchange(&[0x02], &[&id0(9)[..], &[0x55, 0x66]].concat());
         wave.send(&[&id3(7, 0, 0)[..], &[0x55, 0x66]].concat()).idle_us(40.0);

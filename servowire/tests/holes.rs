@@ -120,7 +120,7 @@ fn a_hole_begins_inside_an_answer() {
     assert!(run.out.contains("a hole in the recording begins inside the frame"), "{}", run.out);
 }
 
-/// The rest of an answer behind a hole is a piece of a frame, and the request before it stays.
+/// The rest of an answer after a hole is a piece of a frame, and the request before it stays.
 #[test]
 fn a_hole_ends_inside_an_answer() {
     let run = reads(begin(4) + 5 * US, begin(4) + 20 * US + 123_456);
@@ -137,7 +137,7 @@ fn a_hole_inside_an_answer() {
     assert_eq!(good(&run), 19);
 }
 
-/// Only the rest of the request stands behind it, and its answer: that one is whole.
+/// Only the rest of the request stands after it, and its answer: that one is whole.
 #[test]
 fn a_hole_ends_inside_a_request() {
     let run = reads(begin(3) + 80 * US, begin(4) + 2 * US + 123_456);

@@ -63,7 +63,7 @@ fn exchange() -> impl Strategy<Value = (Vec<u8>, Vec<u8>)> {
     prop_oneof![six, id2, id3, read, write]
 }
 
-/// Rate, inversion, and exchanges with the delay of the answer and the pause behind it in us.
+/// Rate, inversion, and exchanges with the delay of the answer and the pause after it in us.
 type Traffic = (f64, bool, Vec<((Vec<u8>, Vec<u8>), f64, f64)>);
 
 fn traffic() -> impl Strategy<Value = Traffic> {

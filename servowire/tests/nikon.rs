@@ -190,7 +190,7 @@ fn logs_of_words() {
     assert_eq!(run.json()[2]["fields"]["address"], 0xf6);
 }
 
-/// A recording that begins anywhere in the first request: the reply to it is whole, and so is all behind it.
+/// A recording that begins anywhere in the first request: the reply to it is whole, and so is all after it.
 #[test]
 fn a_recording_that_begins_inside_a_request() {
     let bench = Bench::new();

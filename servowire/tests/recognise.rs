@@ -33,14 +33,14 @@ fn random_captures_come_out_right() {
     assert!(100 * right >= 98 * all, "{right} of {all} are right\n{faults}");
 }
 
-/// A request for the position of encoder 0 has three edges behind its first: many bit lengths fit them, and the nominal one is
+/// A request for the position of encoder 0 has three edges after its first: many bit lengths fit them, and the nominal one is
 /// the likeliest.
 #[test]
 fn a_first_request_of_few_edges() {
     let drawn = [
         ("4 to 6 samples a bit", 5014),
         ("4 to 6 samples a bit", 5086),
-        ("ringing behind 5 to 100 % of the edges", 5068),
+        ("ringing after 5 to 100 % of the edges", 5068),
         ("edges jitter by 10 % of a bit", 9028),
     ];
     for (name, number) in drawn {

@@ -20,7 +20,7 @@ use common::{Bench, GOOD_FRAMES, good_traffic};
 const RATE: f64 = 20e6;
 const START: f64 = -1e-4;
 
-/// Voltages of a line with noise, overshoot behind its edges, and slow edges.
+/// Voltages of a line with noise, overshoot after its edges, and slow edges.
 fn volts() -> Vec<f64> {
     let mut wave = good_traffic(2.5e6);
     wave.idle_us(20.0);
@@ -223,15 +223,15 @@ fn tektronix_waveforms() {
         let run = bench.decode(name, &file, &["--json"]);
         assert_eq!((run.code, run.json().len()), (0, GOOD_FRAMES), "{name}: {}", run.err);
         assert_eq!(run.json()[0]["channel"], "Ch1");
-        // The first request begins 30 us behind the first sample.
+        // The first request begins 30 us after the first sample.
         let start = run.json()[0]["start_ps"].as_i64().unwrap();
         assert!((start + 70_000_000).abs() < 100_000, "{start}");
         let cut = bench.decode("cut.isf", &file[..file.len() - 5000], &["--json"]);
         assert!(cut.code == 1 && cut.json().len() >= GOOD_FRAMES - 8, "{name}: {}", cut.err);
         assert!(name == "ascii.isf" || cut.err.contains("the waveform was cut off: "), "{name}: {}", cut.err);
     }
-    bench.decode("a.isf", format!("{long};"), &[]).fails_with("has no :CURVE behind it");
-    bench.decode("a.isf", long.replace("XINCR", "X"), &[]).fails_with("has no :CURVE behind it");
+    bench.decode("a.isf", format!("{long};"), &[]).fails_with("has no :CURVE after it");
+    bench.decode("a.isf", long.replace("XINCR", "X"), &[]).fails_with("has no :CURVE after it");
     bench.decode("a.isf", long.replace("XINCR", "X") + ";:CURVE #15aaaaa", &[]).fails_with("sample interval (XINCR)");
     let pairs = long.replace("PT_FMT Y", "PT_FMT ENV") + ";:CURVE #15aaaaa";
     bench.decode("a.isf", pairs, &[]).fails_with("record without peak detect");

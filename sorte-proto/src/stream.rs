@@ -108,13 +108,13 @@ mod tests {
         let mut whole = Vec::new();
         let mut rest = &wire[..];
         while !rest.is_empty() {
-            let (behind, ((), frame)) = (preamble::<Error>, long_frame).parse(rest).unwrap();
+            let (after, ((), frame)) = (preamble::<Error>, long_frame).parse(rest).unwrap();
             whole.push(frame.frame_type());
-            for cut in 0..rest.len() - behind.len() {
+            for cut in 0..rest.len() - after.len() {
                 let part = (preamble::<Error>, long_frame).parse(&rest[..cut]);
                 assert!(part.is_err_and(|e| e.is_incomplete()), "{cut}");
             }
-            rest = behind;
+            rest = after;
         }
         assert_eq!(whole, [FrameType::Discovery, FrameType::Param, FrameType::DelayReq, FrameType::Sync]);
     }

@@ -99,7 +99,7 @@ impl Line {
         let mut sof_ns = at_ns;
         for k in 0..self.plugged {
             sof_ns += self.cables[k];
-            // The capture is 280 ns behind the trigger.
+            // The capture is 280 ns after the trigger.
             let handled = self.pass(k, PortId::A, &mut frame, sof_ns + 280);
             if handled.trigger != Trigger::None && k + 1 < self.plugged {
                 self.measure(k, handled.trigger, sof_ns);

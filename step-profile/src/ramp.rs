@@ -48,7 +48,7 @@ impl RampTable {
         &self.0
     }
 
-    /// Entry `index`; the last one for an index behind the end.
+    /// Entry `index`; the last one for an index after the end.
     pub fn entry(&self, index: u8) -> u32 {
         self.0.get(usize::from(index)).copied().unwrap_or(self.last())
     }

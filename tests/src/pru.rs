@@ -286,7 +286,7 @@ mod tests {
         assert_eq!(want.len(), 26);
     }
 
-    /// Table 2 as printed, with XIN right behind its operands, multiplies what was there before.
+    /// Table 2 as printed, with XIN right after its operands, multiplies what was there before.
     #[test]
     fn without_the_instruction_between_the_product_is_the_old_one() {
         let program = Program::step_core();

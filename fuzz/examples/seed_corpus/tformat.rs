@@ -29,10 +29,10 @@ fn chosen(row: &Value) -> Option<Vec<u8>> {
 }
 
 /// The request, one more byte, and what follows.
-fn answer(row: &Value, byte: u8, behind: &[u8]) -> Option<Vec<u8>> {
+fn answer(row: &Value, byte: u8, after: &[u8]) -> Option<Vec<u8>> {
     let mut input = chosen(row)?;
     input.push(byte);
-    input.extend(behind);
+    input.extend(after);
     Some(input)
 }
 

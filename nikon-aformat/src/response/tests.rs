@@ -83,8 +83,8 @@ proptest! {
         prop_assert_eq!(response.layout(), expected.layout());
         prop_assert_eq!(response.ea, request.ea);
         let line = raw.line();
-        let behind = Window::from_bits(line.bits() | u128::from(tail) << line.len(), (line.len() + 16).min(128)).unwrap();
-        prop_assert_eq!(Response::parse_line(&expected, behind), Ok(response));
+        let after = Window::from_bits(line.bits() | u128::from(tail) << line.len(), (line.len() + 16).min(128)).unwrap();
+        prop_assert_eq!(Response::parse_line(&expected, after), Ok(response));
         for order in [BitOrder::LsbFirst, BitOrder::MsbFirst] {
             let mut words: Vec<_> = raw.words(order).collect();
             words.push(tail);

@@ -203,7 +203,7 @@ impl<F: FramePort, T: Timer> Master<F, T> {
         receiver: &mut R,
         until_ns: u64,
     ) -> Result<Progress<R::Value>, Failure<F>> {
-        // The time is over behind `until_ns`, not at it.
+        // The time is over after `until_ns`, not at it.
         let wait = self.timer.wait_until(until_ns.saturating_add(1));
         match race(self.port.take(), wait).await {
             None => Ok(receiver.poll(self.timer.now_ns())),

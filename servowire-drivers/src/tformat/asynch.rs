@@ -154,7 +154,7 @@ impl<U: Read + Write, D: Direction, T: Timer> Encoder<U, D, T> {
     /// Takes what is there, or waits for it; asks the clock only if there is nothing.
     async fn receive(&mut self, transaction: &mut Transaction, until_ns: u64) -> Result<Progress, Failure<U, D>> {
         let mut buffer = [0; MAX_BYTES];
-        // The time is over behind `until_ns`, not at it.
+        // The time is over after `until_ns`, not at it.
         let wait = self.timer.wait_until(until_ns.saturating_add(1));
         match race(self.uart.read(&mut buffer), wait).await {
             None => Ok(transaction.poll(self.timer.now_ns())),

@@ -27,7 +27,7 @@ const DRAWN_BITS: f64 = 9.5;
 /// Bits of a byte on the line.
 const FIELD_BITS: i64 = 10;
 
-/// A table of bytes behind its heading.
+/// A table of bytes after its heading.
 pub struct Analyzer {
     lines: Lines,
     columns: Columns,

@@ -42,7 +42,7 @@ fn unwrapped(mut input: Input) -> Result<Input, Fault> {
     Ok(Input::over(&name, Box::new(GzDecoder::new(input))))
 }
 
-/// An FST file behind its hierarchy.
+/// An FST file after its hierarchy.
 pub struct Fst {
     name: String,
     reader: FstReader<Box<dyn SeekRead>>,

@@ -117,11 +117,11 @@ impl Sample {
     }
 }
 
-/// `= {` or `= [` behind a name.
+/// `= {` or `= [` after a name.
 fn array_begins(text: &str) -> bool {
-    text.split_once('=').is_some_and(|(before, behind)| {
-        let behind = behind.trim_start().trim_start_matches('&');
-        before.contains([']', ':']) && behind.starts_with(['{', '['])
+    text.split_once('=').is_some_and(|(before, after)| {
+        let after = after.trim_start().trim_start_matches('&');
+        before.contains([']', ':']) && after.starts_with(['{', '['])
     })
 }
 
@@ -259,7 +259,7 @@ fn dump_line(
     Ok(())
 }
 
-/// A line of an array in C or Rust: what is between the innermost brackets behind a `=` is a burst.
+/// A line of an array in C or Rust: what is between the innermost brackets after a `=` is a burst.
 fn array_line(
     text: &str,
     number: u64,
@@ -269,8 +269,8 @@ fn array_line(
     let text = text.split("//").next().unwrap_or_default();
     let mut rest = text;
     if !*open {
-        let Some((_, behind)) = text.split_once('=') else { return Ok(()) };
-        (rest, *open) = (behind, true);
+        let Some((_, after)) = text.split_once('=') else { return Ok(()) };
+        (rest, *open) = (after, true);
     }
     for letter in rest.chars() {
         match letter {

@@ -17,7 +17,7 @@ const LONGEST: usize = 1 << 12;
 /// Samples read at once, and looked at for the levels.
 const BLOCK: usize = 1 << 16;
 
-/// A waveform behind its preamble.
+/// A waveform after its preamble.
 pub struct Isf {
     input: Input,
     channel: [String; 1],
@@ -186,7 +186,7 @@ fn preamble(input: &mut Input) -> Result<String, Fault> {
             Err(e) => return Err(input.io_fault(At::File, &e)),
         };
         let Some(byte) = byte.filter(|_| text.len() < LONGEST) else {
-            return Err(input.fault(At::File, "the preamble of the waveform has no :CURVE behind it"));
+            return Err(input.fault(At::File, "the preamble of the waveform has no :CURVE after it"));
         };
         input.consume(1);
         text.push(byte);

@@ -13,7 +13,7 @@ const LONGEST: u64 = 1 << 12;
 /// The most channels.
 const CHANNELS: u32 = 64;
 
-/// An OLS file behind its heading.
+/// An OLS file after its heading.
 pub struct Ols {
     input: Input,
     line: u64,

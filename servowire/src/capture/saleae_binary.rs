@@ -19,7 +19,7 @@ const BLOCK: usize = 4096;
 const HEADER: usize = 16;
 const CHUNK: usize = 28;
 
-/// A binary export behind its header.
+/// A binary export after its header.
 pub struct SaleaeBinary {
     input: Input,
     channel: [String; 1],
@@ -165,7 +165,7 @@ impl Line for SaleaeBinary {
     fn read(&mut self, changes: &mut Vec<Change>) -> Result<bool, Fault> {
         let enough = changes.len() + BLOCK;
         while !self.over && changes.len() < enough {
-            // What a chunk begins with comes behind the hole before it.
+            // What a chunk begins with comes after the hole before it.
             if self.read == self.announced && self.chunks > 0 && self.now.is_some() && changes.len() + BLOCK > enough {
                 break;
             }
@@ -188,7 +188,7 @@ impl Line for SaleaeBinary {
 
 /// The next N bytes; zeros where they are missing, which the length check before rules out.
 fn take<const N: usize>(rest: &mut &[u8]) -> [u8; N] {
-    let Some((first, behind)) = rest.split_first_chunk::<N>() else { return [0; N] };
-    *rest = behind;
+    let Some((first, after)) = rest.split_first_chunk::<N>() else { return [0; N] };
+    *rest = after;
     *first
 }

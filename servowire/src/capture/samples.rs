@@ -32,7 +32,7 @@ impl<'a> Samples<'a> {
         self.first
     }
 
-    /// Number of the sample behind the last one.
+    /// Number of the sample after the last one.
     pub fn end(&self) -> u64 {
         self.first + 8 * self.bytes.len() as u64
     }

@@ -11,7 +11,7 @@ const LONGEST: usize = 1 << 20;
 /// More channels has no device.
 const CHANNELS: usize = 1024;
 
-/// A text of samples behind its two lines of heading.
+/// A text of samples after its two lines of heading.
 pub struct SigrokText {
     input: Input,
     line: u64,
@@ -82,13 +82,13 @@ impl SigrokText {
     /// `NAME:` and samples: groups of eight are bits, of two hex digits with the oldest sample first.
     fn samples_of(&self, line: &str) -> Result<(String, Vec<bool>), Fault> {
         let only = |rest: &str, digits: fn(char) -> bool| rest.chars().all(|c| c == ' ' || digits(c));
-        // Drawn: a high level, a low one, and either one behind an edge.
+        // Drawn: a high level, a low one, and either one after an edge.
         let drawn = |c: char| matches!(c, '"' | '.' | '/' | '\\');
         if let Some((name, drawing)) = line.rsplit_once(':').filter(|(_, rest)| !rest.is_empty() && only(rest, drawn)) {
             let high = |c: char| matches!(c, '"' | '/');
             return Ok((name.to_owned(), drawing.chars().filter(|c| *c != ' ').map(high).collect()));
         }
-        // A name may hold a colon: the digits begin behind the first one that only digits follow.
+        // A name may hold a colon: the digits begin after the first one that only digits follow.
         let place =
             line.match_indices(':').find(|(at, _)| only(line.get(at + 1..).unwrap_or(""), |c| c.is_ascii_hexdigit()));
         let Some((name, rest)) = place.and_then(|(at, _)| Some((line.get(..at)?, line.get(at + 1..)?))) else {

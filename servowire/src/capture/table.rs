@@ -27,7 +27,7 @@ const SAMPLE: usize = 1 << 14;
 /// Cells looked at.
 const SAMPLE_CELLS: usize = 1 << 18;
 
-/// A table behind its heading.
+/// A table after its heading.
 pub struct Table {
     name: String,
     lines: Lines,

@@ -1,4 +1,4 @@
-//! Text as Windows shells redirect it: UTF-16 behind a byte order mark, read as UTF-8.
+//! Text as Windows shells redirect it: UTF-16 after a byte order mark, read as UTF-8.
 
 use std::io::{self, Read};
 

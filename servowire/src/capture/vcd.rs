@@ -20,7 +20,7 @@ const BLOCK: usize = 4096;
 /// Bytes read at once. A word that is longer is no word.
 const BUFFER: usize = 1 << 18;
 
-/// A VCD file behind its header. Channels are the variables of one bit, and the bits of small vectors.
+/// A VCD file after its header. Channels are the variables of one bit, and the bits of small vectors.
 pub struct Vcd {
     input: Input,
     buffer: Vec<u8>,
@@ -87,9 +87,9 @@ impl Codes {
 
 /// What a piece of the body asks for.
 enum Next {
-    /// It was taken; go on behind it.
+    /// It was taken; go on after it.
     Taken(usize),
-    /// It may go on behind the buffer.
+    /// It may go on after the buffer.
     More,
 }
 
@@ -178,22 +178,22 @@ impl Vcd {
     fn plain(&mut self, mut rest: &[u8], changes: &mut Vec<Change>, enough: usize) -> usize {
         while changes.len() < enough {
             let (level, code) = match *rest {
-                [0..=b' ', ref behind @ ..] => {
-                    rest = behind;
+                [0..=b' ', ref after @ ..] => {
+                    rest = after;
                     continue;
                 }
                 [b'#', ref digits @ ..] => {
-                    let Some((stamp, behind)) = stamp(digits) else { break };
+                    let Some((stamp, after)) = stamp(digits) else { break };
                     let Some(now) = self.tick.time(stamp).filter(|_| stamp >= self.stamp) else { break };
-                    (self.stamp, self.now, rest) = (stamp, now, behind);
+                    (self.stamp, self.now, rest) = (stamp, now, after);
                     continue;
                 }
-                [level @ (b'0' | b'1'), code @ b'!'..=b'~', 0..=b' ', ref behind @ ..] => {
-                    rest = behind;
+                [level @ (b'0' | b'1'), code @ b'!'..=b'~', 0..=b' ', ref after @ ..] => {
+                    rest = after;
                     (level, usize::from(code))
                 }
-                [level @ (b'0' | b'1'), a @ b'!'..=b'~', b @ b'!'..=b'~', 0..=b' ', ref behind @ ..] => {
-                    rest = behind;
+                [level @ (b'0' | b'1'), a @ b'!'..=b'~', b @ b'!'..=b'~', 0..=b' ', ref after @ ..] => {
+                    rest = after;
                     (level, usize::from(a) | usize::from(b) << 8)
                 }
                 _ => break,
@@ -208,15 +208,15 @@ impl Vcd {
     /// One stamp, value change or command. At the end of the file a word ends there.
     fn piece(&mut self, rest: &[u8], changes: &mut Vec<Change>) -> Result<Next, String> {
         let length = word(rest);
-        let (text, behind) = rest.split_at(length);
-        if behind.is_empty() && !self.ended {
+        let (text, after) = rest.split_at(length);
+        if after.is_empty() && !self.ended {
             return Ok(Next::More);
         }
         if self.skipping {
             self.skipping = text != b"$end";
             return Ok(Next::Taken(length));
         }
-        let cut = behind.is_empty();
+        let cut = after.is_empty();
         let Some((first, tail)) = text.split_first() else { return Ok(Next::Taken(0)) };
         match first {
             b'#' => self.time(tail, cut)?,
@@ -242,7 +242,7 @@ impl Vcd {
         Ok(Next::Taken(length))
     }
 
-    /// The word goes on behind the buffer, or the file ends in it.
+    /// The word goes on after the buffer, or the file ends in it.
     fn open(&self) -> Result<Next, String> {
         if self.ended {
             return Err("the file ends in the middle of a value change: it was cut off".to_owned());
@@ -344,16 +344,16 @@ fn level(state: u8) -> u8 {
     }
 }
 
-/// The digits at the front as a number, and what is behind the blank that ends them; none where it is not so.
+/// The digits at the front as a number, and what is after the blank that ends them; none where it is not so.
 fn stamp(digits: &[u8]) -> Option<(u64, &[u8])> {
     let (mut stamp, mut rest) = (0_u64, digits);
-    while let [digit @ b'0'..=b'9', behind @ ..] = rest {
+    while let [digit @ b'0'..=b'9', after @ ..] = rest {
         stamp = stamp.wrapping_mul(10).wrapping_add(u64::from(digit - b'0'));
-        rest = behind;
+        rest = after;
     }
     // Nineteen digits fit.
     match rest {
-        [0..=b' ', behind @ ..] if (1..=19).contains(&(digits.len() - rest.len())) => Some((stamp, behind)),
+        [0..=b' ', after @ ..] if (1..=19).contains(&(digits.len() - rest.len())) => Some((stamp, after)),
         _ => None,
     }
 }
@@ -363,7 +363,7 @@ fn word(text: &[u8]) -> usize {
     text.iter().position(|byte| *byte <= b' ').unwrap_or(text.len())
 }
 
-/// The word behind the one that ends at `from`, and where it ends.
+/// The word after the one that ends at `from`, and where it ends.
 fn second(text: &[u8], from: usize) -> Option<(&[u8], usize)> {
     let rest = text.get(from..)?;
     let blanks = rest.iter().position(|byte| *byte > b' ')?;

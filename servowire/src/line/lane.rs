@@ -223,7 +223,7 @@ impl Wires {
         self.level = None;
     }
 
-    /// The level of the line behind a change of a channel, where it changes.
+    /// The level of the line after a change of a channel, where it changes.
     pub fn change(&mut self, channel: u16, level: bool) -> Option<bool> {
         for (tap, own) in self.taps.iter().zip(&mut self.levels) {
             if tap.channel == channel {

@@ -212,7 +212,7 @@ impl EdgeReceiver {
             let mut falls = rest.iter().enumerate().filter(|(_, edge)| !edge.level);
             let (piece, fields) = rest.split_at(falls.nth(skipped).map_or(rest.len(), |(at, _)| at));
             if let (Some(first), Some(last)) = (piece.first(), piece.last()) {
-                // How long the level behind its last edge still belongs to it is not known.
+                // How long the level after its last edge still belongs to it is not known.
                 let end = last.time + self.bit as i64;
                 let (start, end) = (first.time, fields.first().map_or(end, |next| end.min(next.time)));
                 self.fields.push(LineField { content: 0, delimiter: false, start, end, spikes: 0, bits: 0 });
@@ -221,12 +221,12 @@ impl EdgeReceiver {
         }
         while !rest.is_empty() {
             let speech = self.speech(rest);
-            let (now, behind) = rest.split_at(speech.min(rest.len()));
-            if behind.is_empty() && !whole && now.len() < MOST_EDGES / 2 {
+            let (now, after) = rest.split_at(speech.min(rest.len()));
+            if after.is_empty() && !whole && now.len() < MOST_EDGES / 2 {
                 break;
             }
             self.speak(now);
-            rest = behind;
+            rest = after;
         }
         let kept = burst.len() - rest.len();
         self.burst = burst;
@@ -260,9 +260,9 @@ impl EdgeReceiver {
         while let Some(start) = rest.first() {
             let last = start.time + ((f64::from(self.field_bits()) - 0.6) * bit) as i64;
             let inside = rest.iter().skip(1).position(|edge| !edge.level && edge.time > last);
-            let (field, behind) = rest.split_at(inside.map_or(rest.len(), |at| at + 1));
+            let (field, after) = rest.split_at(inside.map_or(rest.len(), |at| at + 1));
             self.field(field, bit);
-            rest = behind;
+            rest = after;
         }
         self.time_fields(first, bit);
         if let Some(field) = self.fields.get_mut(first) {

@@ -100,7 +100,7 @@ impl Spikes {
         self.cluster(solid)
     }
 
-    /// What a cluster of short runs behind `solid` amounts to.
+    /// What a cluster of short runs after `solid` amounts to.
     #[cold]
     fn cluster(&mut self, solid: bool) -> Edges {
         let (count, other) = (self.edges, self.other);
@@ -116,8 +116,8 @@ impl Spikes {
             return [None; 2];
         }
         self.dropped = self.dropped.saturating_add(count / 2 - 1);
-        let behind = self.begun.saturating_add((whole * self.bit) as i64).min(self.since);
-        [Some(self.edge(self.begun, !solid)), Some(self.edge(behind, solid))]
+        let after = self.begun.saturating_add((whole * self.bit) as i64).min(self.since);
+        [Some(self.edge(self.begun, !solid)), Some(self.edge(after, solid))]
     }
 
     /// The last change of the line and the level since.
@@ -171,7 +171,7 @@ mod tests {
 
     #[test]
     fn ringing_is_one_edge_that_keeps_the_times_of_the_levels() {
-        // 10 low, 20 high, then low for good: 20 high lie behind the first edge.
+        // 10 low, 20 high, then low for good: 20 high lie after the first edge.
         let line = [(0, true), (200, false), (210, true), (230, false)];
         assert_eq!(clean(&line, 400), [(220, false, 1)]);
     }

@@ -113,7 +113,7 @@ impl<'a> Candidates<'a> {
         best
     }
 
-    /// The best reading of a channel, and the one behind it.
+    /// The best reading of a channel, and the one after it.
     pub(super) fn read(&self, channel: u16, edges: &Edges) -> Option<Found> {
         let edges = edges.get(..SAMPLE.min(edges.len()))?;
         let mut best: Option<Found> = None;

@@ -29,7 +29,7 @@ pub(super) fn too_wide(error: impl Display, single_turn: u8, multi_turn: u8) -> 
     Field::text("width", format_args!("{error}; taken as {single_turn} + {multi_turn} bits"))
 }
 
-/// Fields that belong together, at most `N`; what comes behind replaces the last one.
+/// Fields that belong together, at most `N`; what comes after replaces the last one.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Group<T, const N: usize> {
     contents: [T; N],
@@ -59,7 +59,7 @@ impl<T: Copy + Default, const N: usize> Group<T, N> {
         if self.len == 0 {
             self.raw = field.bits;
         } else if field.bits != 0 && bit > 0 {
-            // Somebody seems to begin anew: what he says stands behind.
+            // Somebody seems to begin anew: what he says comes after it.
             self.raw = joined(self.raw, field.bits, (field.start - self.start() + bit / 2) / bit);
         }
         if let (Some(place), Some(start)) = (self.contents.get_mut(k), self.starts.get_mut(k)) {

@@ -1,7 +1,7 @@
 //! HIPERFACE DSL: H-frames, answers, V-frames and messages of a recorded pair.
 //!
 //! Every run of equal levels is rounded to whole bits, so that the grid follows the edges of whoever drives. A frame is
-//! found by the head of the master; the answer behind it at the delay where its words hold.
+//! found by the head of the master; the answer after it at the delay where its words hold.
 
 mod answer;
 mod bits;
@@ -399,7 +399,7 @@ impl Decoder {
     }
 }
 
-/// The delay at which most of the answers behind the next heads hold.
+/// The delay at which most of the answers after the next heads hold.
 fn usual_delay(bits: &Bits, from: u64) -> u32 {
     let delays = 0..=u32::from(Delay::MAX.get()) + 1;
     let mut sums = vec![0; delays.clone().count()];
@@ -410,7 +410,7 @@ fn usual_delay(bits: &Bits, from: u64) -> u32 {
         }
         heard += 1;
         at += u64::from(ANSWER_BITS);
-        // The answer behind the next head.
+        // The answer after the next head.
         loop {
             if at + u64::from(Head::BITS) > bits.end() {
                 at = bits.end();

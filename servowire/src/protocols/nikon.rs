@@ -123,7 +123,7 @@ impl Decoder {
     /// `begins`.
     fn is_over(&self, start: i64, begins: Kind) -> bool {
         let pause = start - self.open.end;
-        // The frames of a reply follow each other: behind anything else a new one begins.
+        // The frames of a reply follow each other: after anything else a new one begins.
         if begins == Kind::Response && self.open.kind() != Kind::Response && 2 * pause > 3 * self.bit {
             return true;
         }

@@ -76,7 +76,7 @@ pub(super) const CUT_BITS: u32 = 5;
 /// of what was cut, that is so in a quarter of all cases.
 pub(super) const SURELY_CUT_BITS: u32 = 9;
 
-/// Why a request got no answer when the next one came `after` picoseconds behind it: nobody waits so briefly.
+/// Why a request got no answer when the next one came `after` picoseconds later: nobody waits so briefly.
 pub(super) fn two_masters(after: i64) -> String {
     let after = after as f64 / 1e6;
     format!("another request came {after:.1} us later, before the answer was due to be over: two masters on the line?")

@@ -289,7 +289,7 @@ impl StartStop for Decoder {
         if whole || self.is_answer_alone() || self.open.len() == MOST_FIELDS { self.close(out) } else { Ok(()) }
     }
 
-    /// A line of a log: requests and answers, one behind the other.
+    /// A line of a log: requests and answers, one after the other.
     fn burst(&mut self, burst: &Burst, out: &mut dyn Sink) -> io::Result<()> {
         let mut rest = burst.bytes.as_slice();
         let id = |bytes: &[u8]| ControlField::parse(bytes.first().copied().unwrap_or_default())?.data_id();
@@ -311,9 +311,9 @@ impl StartStop for Decoder {
                 }
                 None => id(rest).map_or(1, |id| usize::from(id.request_fields())),
             };
-            let (frame, behind) = rest.split_at_checked(fields).unwrap_or((rest, &[]));
+            let (frame, after) = rest.split_at_checked(fields).unwrap_or((rest, &[]));
             self.take(burst.line, frame, out)?;
-            rest = behind;
+            rest = after;
         }
         Ok(())
     }

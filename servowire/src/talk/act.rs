@@ -16,7 +16,7 @@ use super::port::{self, Port};
 use super::relay::{self, Said};
 use crate::output::say;
 
-/// Bytes of a page; the address behind them selects the page.
+/// Bytes of a page; the address after them selects the page.
 const PAGE_LEN: u8 = 127;
 
 type Done = Result<ExitCode, Fault>;

@@ -135,7 +135,7 @@ pub fn field(byte: u8) -> Vec<bool> {
     [false].into_iter().chain((0..8).map(|k| byte >> k & 1 == 1)).chain([true]).collect()
 }
 
-/// Bytes with their XOR behind.
+/// Bytes, followed by their XOR.
 pub fn sealed(bytes: &[u8]) -> Vec<u8> {
     let crc = bytes.iter().fold(0, |crc, byte| crc ^ byte);
     [bytes, &[crc]].concat()
@@ -202,7 +202,7 @@ impl Run {
     }
 }
 
-/// Files for the program, deleted behind the test.
+/// Files for the program, deleted when the test ends.
 pub struct Bench(TempDir);
 
 impl Bench {

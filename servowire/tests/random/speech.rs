@@ -77,7 +77,7 @@ fn fields(bytes: &[u8]) -> Vec<bool> {
     bytes.iter().flat_map(|byte| field(*byte)).collect()
 }
 
-/// Bytes with their XOR behind.
+/// Bytes, followed by their XOR.
 fn sealed(bytes: &[u8]) -> Vec<u8> {
     [bytes, &[bytes.iter().fold(0, |crc, byte| crc ^ byte)]].concat()
 }
@@ -179,7 +179,7 @@ pub fn aformat(rng: &mut Rng, answered: bool, delay: f64) -> Vec<Speech> {
     let temperature = rng.below(400);
     let id = rng.below(1 << 24);
     let (data, address) = (rng.below(1 << 16), rng.below(0xf0));
-    // Code, name, data bits behind the information field, expected fields.
+    // Code, name, data bits after the information field, expected fields.
     let (code, name, body, said): (u64, _, Vec<bool>, Vec<(&'static str, i64)>) = match rng.below(9) {
         0 => (1, "ABS24_LOW", lsb(abs, 24), vec![("ABS", (abs & 0xff_ffff) as i64)]),
         1 => (3, "STATUS", [lsb(0x40, 16), lsb(0, 8)].concat(), vec![("ALM", 0x40)]),

@@ -33,7 +33,7 @@ conditions! {
     "inverted": |_, scene| scene.inverted = true;
     "edges jitter by 10 % of a bit": |_, scene| scene.jitter = 0.1;
     "1 to 6 spikes": |_, scene| scene.spikes = (1, 6);
-    "ringing behind 5 to 100 % of the edges": |rng, scene| scene.ringing = rng.pick(&[0.05, 0.1, 0.2, 0.5, 1.0]);
+    "ringing after 5 to 100 % of the edges": |rng, scene| scene.ringing = rng.pick(&[0.05, 0.1, 0.2, 0.5, 1.0]);
     "2 to 7 decoys": |_, scene| scene.decoys = (2, 7);
     "a UART of 2.5 Mbit/s beside": |_, scene| scene.stranger = true;
     "idle for 1 to 200 ms at first": |_, scene| scene.idle = (1.0, 200.0);

@@ -19,7 +19,7 @@ pub struct Scene {
     pub jitter: f64,
     /// Spikes of 0.05 to 0.2 bit anywhere: least and most.
     pub spikes: (u64, u64),
-    /// Share of edges with a spike behind.
+    /// Share of edges with a spike after them.
     pub ringing: f64,
     pub decoys: (u64, u64),
     /// A UART of 2.5 Mbit/s on another channel.
@@ -112,9 +112,9 @@ pub fn capture(kind: Kind, scene: &Scene, seed: u64) -> Capture {
         let begin = if scene.inside { inside(&said, &mut rng) } else { 0.0 };
         let whole = said.iter().filter(|speech| speech.start >= begin);
         // An answer of DSL cannot be told without its head, nor that nobody answers without the request.
-        let behind =
+        let after =
             whole.skip_while(|speech| speech.side == Side::Encoder && (kind == Kind::Dsl || speech.edges.is_empty()));
-        let events: Vec<Expect> = behind.filter_map(|speech| speech.expect.clone()).collect();
+        let events: Vec<Expect> = after.filter_map(|speech| speech.expect.clone()).collect();
         let all = said.iter().filter(|speech| speech.expect.is_some()).count();
         let before = said.iter().filter_map(|speech| speech.expect.clone()).take(all - events.len()).collect();
         let line = |side: &dyn Fn(Side) -> bool| -> Vec<(f64, bool)> {

@@ -21,7 +21,7 @@ pub struct HomingConfig {
     /// After this many steps without a switch the search is given up.
     pub range: u32,
     /// How fast to stop at the switch. The way to rest, v² / 2a, or (v / 2)(v / a + a / j) with a jerk limit, has to fit
-    /// behind it.
+    /// after it.
     pub stop: Limits,
 }
 

@@ -37,7 +37,7 @@ impl Bits {
         self.len == 0
     }
 
-    /// Bit `at`; an idle line, which is 1, behind the end.
+    /// Bit `at`; an idle line, which is 1, after the end.
     pub fn get(&self, at: usize) -> bool {
         at >= self.len || self.bytes[at / 8] >> (at % 8) & 1 == 1
     }
@@ -69,7 +69,7 @@ impl Bits {
         }
     }
 
-    /// The `len` bits from `at` on, idle behind the end.
+    /// The `len` bits from `at` on, idle after the end.
     pub fn slice(&self, at: usize, len: usize) -> Self {
         let mut bits = Self::new();
         (at..at + len).for_each(|k| bits.push(self.get(k)));

@@ -17,7 +17,7 @@ pub struct Arrival {
 /// frame before, or not at all. Chains and rings are built of many.
 ///
 /// A frame is one transmission of one unit. [`Fault::Cut`] leaves the first half of it; a [`Fault::Foreign`] that replays
-/// gives the frame before in its place, one that does not, and [`Fault::Noise`], a short frame of random bytes behind it;
+/// gives the frame before in its place, one that does not, and [`Fault::Noise`], a short frame of random bytes after it;
 /// [`Fault::Repeat`] lets it come again after one more cable delay. The other faults mean nothing here.
 #[derive(Debug)]
 pub struct Cable {

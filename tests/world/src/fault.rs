@@ -17,7 +17,7 @@ pub enum Fault {
         /// For how many bits.
         bits: u16,
     },
-    /// This unit and all behind it do not leave.
+    /// This unit and all after it do not leave.
     Cut,
     /// The whole transmission comes later, possibly into the next request.
     Delay {
@@ -43,7 +43,7 @@ pub enum Fault {
         /// 0: the host, 1...: the devices (modulo their number).
         receiver: u8,
     },
-    /// What the host has received is handed over behind the unit, whatever its delivery is.
+    /// What the host has received is handed over after the unit, whatever its delivery is.
     Split,
     /// From the end of the unit on the host does nothing for a time: no delivery, no look at the clock.
     Preempt {

@@ -43,7 +43,7 @@ fn given(events: &[(u64, Event)]) -> Vec<u8> {
     blocks.flat_map(|block| block.bytes().map(|(byte, _)| byte).collect::<Vec<_>>()).collect()
 }
 
-/// An exchange on a line with these faults: what the host was given, and the world behind it.
+/// An exchange on a line with these faults: what the host was given, and the world after it.
 fn exchange(scenario: Scenario, answer: &[u8]) -> (Vec<u8>, World, Id) {
     let mut world = World::new(UART, scenario);
     let request = world.send(&Message::bytes(&[0x55]), 1_000);
@@ -88,13 +88,13 @@ fn each_fault_does_what_it_says() {
     assert_eq!(echo(Fault::Drop), []);
 }
 
-/// A start bit that is not there: the receiver takes the first 0 behind it for one.
+/// A start bit that is not there: the receiver takes the first 0 after it for one.
 #[test]
 fn a_lost_start_bit_moves_the_byte() {
     // 0 1000 0000 1 becomes 1 1000 0000 1 and 0000000 1 is read from the first 0 on: seven zeros of data, then ones
     let (bytes, ..) = exchange(planned(&[(1, 0, Fault::Flip { bit: 0 })]), &[0b0000_0001]);
     assert_eq!(bytes, [0b1100_0000]);
-    // A delimiter that is 0 is a framing error, and the byte behind it is found by its next falling edge only.
+    // A delimiter that is 0 is a framing error, and the byte after it is found by its next falling edge only.
     let mut world = World::new(UART, planned(&[(1, 0, Fault::Flip { bit: 9 })]));
     world.send(&Message::bytes(&[0x55]), 0);
     let events = run(&mut world, &[0xff, 0x0f], 100_000);

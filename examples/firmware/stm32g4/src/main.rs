@@ -111,7 +111,7 @@ async fn exchange(uart: &mut Uart<'static, Async>, clock: &mut Clock, line: Line
     match progress {
         Progress::Done { value, .. } => Ok(value),
         Progress::Failed { error, .. } => Err(error),
-        // Bytes have come, and too few: the line was idle behind them.
+        // Bytes have come, and too few: the line was idle after them.
         Progress::Pending { until_ns } => match transaction.poll(until_ns.saturating_add(1)) {
             Progress::Done { value, .. } => Ok(value),
             Progress::Failed { error, .. } => Err(error),

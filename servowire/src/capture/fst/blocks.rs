@@ -39,8 +39,8 @@ pub(super) fn check(file: &mut dyn SeekRead) -> Result<(), String> {
         if kind == SKIP && length == 0 {
             break;
         }
-        let behind = (at + 1).checked_add(length).filter(|behind| got > 8 && length >= 8 && *behind <= end);
-        let Some(behind) = behind else {
+        let after = (at + 1).checked_add(length).filter(|after| got > 8 && length >= 8 && *after <= end);
+        let Some(after) = after else {
             return Err("not whole: a block ends beyond the end of the file, so it was cut off or is damaged".into());
         };
         let too_large = |unpacked: u64| unpacked > MOST || unpacked > length * PACKED;
@@ -53,7 +53,7 @@ pub(super) fn check(file: &mut dyn SeekRead) -> Result<(), String> {
         if VALUES.contains(&kind) {
             // The table of times stands last: its length unpacked, packed, and the number of times.
             let mut foot = [0; 24];
-            file.seek(SeekFrom::Start(behind.saturating_sub(24))).map_err(broken)?;
+            file.seek(SeekFrom::Start(after.saturating_sub(24))).map_err(broken)?;
             file.read_exact(&mut foot).map_err(broken)?;
             let foot = u128::from_be_bytes(*foot.last_chunk().unwrap_or(&[0; 16]));
             let times = foot as u64;
@@ -61,7 +61,7 @@ pub(super) fn check(file: &mut dyn SeekRead) -> Result<(), String> {
                 return Err("damaged: a table of times is longer than its block can hold".into());
             }
         }
-        at = behind;
+        at = after;
     }
     file.seek(SeekFrom::Start(0)).map_err(broken)?;
     Ok(())

@@ -7,7 +7,7 @@ pub(super) enum Dump {
     InOrder,
     /// Words of two bytes, the lower one last (`hexdump`).
     Swapped,
-    /// Words, the lowest byte last, in so many columns behind the address (`xxd -e`): a short word stands at the right end
+    /// Words, the lowest byte last, in so many columns after the address (`xxd -e`): a short word stands at the right end
     /// of its place.
     Little(usize),
     /// Bits (`xxd -b`).
@@ -22,11 +22,11 @@ pub(super) enum Row {
     Bytes(Vec<u8>),
     /// The row before it again, up to the next address.
     Again,
-    /// No bytes: the address behind the last.
+    /// No bytes: the address after the last.
     End,
 }
 
-/// The address at the front, what is behind it, and whether a colon parts them.
+/// The address at the front, what is after it, and whether a colon parts them.
 fn address(line: &str) -> Option<(u64, &str, usize, bool)> {
     let bare = line.trim_start();
     let bare = bare.strip_prefix("0x").unwrap_or(bare);
@@ -121,7 +121,7 @@ fn is_swapped(rest: &str, columns: usize) -> bool {
     begins(&swapped) && !begins(&straight)
 }
 
-/// The part of a row that is bytes: up to the text in bars, or behind two blanks.
+/// The part of a row that is bytes: up to the text in bars, or after two blanks.
 fn hex_part(rest: &str, colon: bool) -> &str {
     let rest = rest.split(['|', '>']).next().unwrap_or_default();
     let rest = rest.trim_start();

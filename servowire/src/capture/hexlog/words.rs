@@ -20,7 +20,7 @@ pub(super) fn line(text: &str) -> Result<Vec<Said>, String> {
     if said.is_err() { titled(text).map_or(said, |said| Ok(vec![said])) } else { said }
 }
 
-/// `I (1234) encoder: 1A 20 29`, `12:30:00 PM: 1A 20 29`: bytes of two digits behind words that end with a colon, a
+/// `I (1234) encoder: 1A 20 29`, `12:30:00 PM: 1A 20 29`: bytes of two digits after words that end with a colon, a
 /// bracket or an arrow; these may say who spoke.
 fn titled(text: &str) -> Option<Said> {
     let is_byte = |word: &str| {
@@ -28,8 +28,8 @@ fn titled(text: &str) -> Option<Said> {
         digits.len() == 2 && digits.bytes().all(|digit| digit.is_ascii_hexdigit())
     };
     let ends = text.match_indices([':', ']', '>']).map(|(at, end)| at + end.len());
-    let (title, words) = ends.filter_map(|at| text.split_at_checked(at)).find(|(_, behind)| {
-        behind.starts_with(char::is_whitespace) && behind.split_whitespace().all(is_byte) && !behind.trim().is_empty()
+    let (title, words) = ends.filter_map(|at| text.split_at_checked(at)).find(|(_, after)| {
+        after.starts_with(char::is_whitespace) && after.split_whitespace().all(is_byte) && !after.trim().is_empty()
     })?;
     let speaker = |word: &str| match mark(word, false) {
         Some(Mark::Speaker(direction)) if word.contains(char::is_alphabetic) => Some(direction),
@@ -55,11 +55,11 @@ fn bare(text: &str) -> Result<Vec<Said>, String> {
     let spread = text.replace("><", "> <").replace("}{", "} {").replace("\\x", " 0x");
     // What comes before the first byte may say when.
     let mut rest = spread.trim_start();
-    while let Some((word, behind)) = rest.split_once(char::is_whitespace) {
-        if !is_stamp(word, !behind.trim().is_empty()) {
+    while let Some((word, after)) = rest.split_once(char::is_whitespace) {
+        if !is_stamp(word, !after.trim().is_empty()) {
             break;
         }
-        rest = behind.trim_start();
+        rest = after.trim_start();
     }
     let words = rest.split(|c: char| c.is_whitespace() || matches!(c, ',' | ';')).filter(|word| !word.is_empty());
     let mut out = vec![Said::default()];
@@ -86,10 +86,10 @@ fn bare(text: &str) -> Result<Vec<Said>, String> {
 fn without_remarks(text: &str) -> String {
     let mut out = String::with_capacity(text.len());
     let mut rest = text;
-    while let Some((before, behind)) = rest.split_once("/*") {
+    while let Some((before, after)) = rest.split_once("/*") {
         out.push_str(before);
         out.push(' ');
-        rest = behind.split_once("*/").map_or("", |(_, behind)| behind);
+        rest = after.split_once("*/").map_or("", |(_, after)| after);
     }
     out.push_str(rest);
     let end = out.find('#').into_iter().chain(out.find("//")).min().unwrap_or(out.len());
@@ -251,15 +251,15 @@ fn monitored(text: &str) -> Option<Result<Vec<Said>, String>> {
     if text.contains("IOCTL_SERIAL") {
         return Some(Ok(Vec::new()));
     }
-    let (_, behind) = text.split_once("IRP_MJ_")?;
-    let direction = if behind.starts_with("WRITE") {
+    let (_, after) = text.split_once("IRP_MJ_")?;
+    let direction = if after.starts_with("WRITE") {
         Direction::Request
-    } else if behind.starts_with("READ") {
+    } else if after.starts_with("READ") {
         Direction::Answer
     } else {
         return Some(Ok(Vec::new()));
     };
-    let Some((_, data)) = behind.split_once("Length ").and_then(|(_, length)| length.split_once(':')) else {
+    let Some((_, data)) = after.split_once("Length ").and_then(|(_, length)| length.split_once(':')) else {
         return Some(Ok(Vec::new()));
     };
     let mut out = Vec::new();

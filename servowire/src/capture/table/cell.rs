@@ -102,7 +102,7 @@ impl Threshold {
         Self { low: middle - swing / 20.0, high: middle + swing / 20.0 }
     }
 
-    /// The level of a voltage behind another level.
+    /// The level of a voltage after another level.
     pub(in crate::capture) fn level(&self, volts: f64, before: Option<bool>) -> bool {
         match before {
             Some(true) => volts >= self.low,

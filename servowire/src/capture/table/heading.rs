@@ -138,7 +138,7 @@ impl Heading {
         let only_units =
             |cells: &Vec<String>| is_units(cells) && !cells.iter().any(|cell| is_time(cell) && unit(cell).is_none());
         let units = if heads.last().is_some_and(only_units) { heads.pop() } else { None };
-        // Rigol: first time and period stand behind the units.
+        // Rigol: first time and period stand after the units.
         let steps = if heads.last().is_some_and(|cells| cells.first().is_some_and(|cell| cell == "Sequence")) {
             heads.pop().and_then(|cells| Self::steps(&cells))
         } else {
@@ -179,9 +179,9 @@ impl Heading {
     }
 
     fn find_time(&mut self, units: Option<&[String]>, heads: &[Vec<String>], rate: Option<f64>, channels: usize) {
-        // Rigol: start and increment behind the units; memory saves have t0 and tInc among the names.
+        // Rigol: start and increment after the units; memory saves have t0 and tInc among the names.
         if let (Some(first), Some(last)) = (self.names.first(), heads.last()) {
-            let behind = |key: &str| {
+            let after = |key: &str| {
                 last.iter().find_map(|cell| {
                     Some(
                         cell.replace(' ', "")
@@ -193,7 +193,7 @@ impl Heading {
                     )
                 })
             };
-            if let (Some(start), Some(period)) = (behind("t0="), behind("tInc=")) {
+            if let (Some(start), Some(period)) = (after("t0="), after("tInc=")) {
                 if let (Ok(start), Ok(period)) = (start.parse::<f64>(), period.parse::<f64>()) {
                     self.fixed = Some(Times::Steps { start: (start * 1e12) as i64, period: period * 1e12 });
                     return;

@@ -24,7 +24,7 @@ impl Tick {
         i64::try_from(time).ok()
     }
 
-    /// When a stamp with digits behind a point was, and whether they are more than zeros.
+    /// When a stamp with digits after a point was, and whether they are more than zeros.
     pub(super) fn time_between(self, stamp: u64, fraction: &[u8]) -> Option<(i64, bool)> {
         let (mut part, mut unit) = (0_u128, self.femtoseconds);
         for digit in fraction {

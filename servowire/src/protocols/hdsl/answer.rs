@@ -6,7 +6,7 @@ use super::disparity::Chain;
 use super::{Decoder, Refused, event, position, refusal, words};
 use crate::event::{Direction, Field, Place};
 
-const DISPARITY: &str = "all words are in the tables, but not one behind the other: bits of at least one were flipped";
+const DISPARITY: &str = "all words are in the tables, but not one after the other: bits of at least one were flipped";
 const TAIL: &str =
     "the next answer does not begin at the running disparity that this one leaves: a bit was flipped at its end";
 const FRONT: &str =

@@ -19,13 +19,13 @@ const OFF: i64 = 6;
 const ELSEWHERE: i64 = 30;
 /// An edge so near to the grid, in parts of a bit, is on it: neither the grid nor the bit length follows.
 const ON_GRID: i64 = 32;
-/// Edges behind longer runs than this tell nothing of the bit length.
+/// Edges after longer runs than this tell nothing of the bit length.
 pub(super) const LONGEST_RUN: usize = ADAPT.len() - 1;
 /// Parts of a picosecond, in binary digits, in which the length of a bit is kept, and parts of a bit.
 const FINE: u32 = 16;
 const PART: u32 = 40;
 /// How much the distance of an edge from the grid moves the bit length, in parts of a picosecond, by the bits of the run
-/// before it: 0.06 of it behind one bit. Longer runs than these tell nothing.
+/// before it: 0.06 of it after one bit. Longer runs than these tell nothing.
 const ADAPT: [i64; 11] = {
     const ONE: i64 = (6 << FINE) / 100;
     [0, ONE, ONE / 2, ONE / 3, ONE / 4, ONE / 5, ONE / 6, ONE / 7, ONE / 8, ONE / 9, ONE / 10]
@@ -45,14 +45,14 @@ pub(super) struct Bits {
     last: Option<(i64, bool)>,
     /// 64 bits each, the first in bit 0.
     words: Vec<u64>,
-    /// Number of the first bit in `words`, a multiple of 64, and of the one behind the last.
+    /// Number of the first bit in `words`, a multiple of 64, and of the one after the last.
     first: u64,
     end: u64,
     /// Places of edges.
     marks: Vec<Mark>,
     /// The one that was asked for last: the next question is about one near it.
     asked: Cell<usize>,
-    /// Bit behind a pause too long for its bits to be kept.
+    /// Bit after a pause too long for its bits to be kept.
     pub(super) paused: Option<u64>,
     heard: Heard,
 }
@@ -207,7 +207,7 @@ impl Bits {
         self.marks.push(Mark { bit: self.end, time, grid: None });
     }
 
-    /// An edge behind a pause.
+    /// An edge after a pause.
     #[cold]
     fn pause(&mut self, time: i64, before: bool, level: bool) {
         self.paused = Some(self.end + PAUSE);
@@ -260,7 +260,7 @@ impl Bits {
         }
     }
 
-    /// Number of the bit behind the last one.
+    /// Number of the bit after the last one.
     pub(super) fn end(&self) -> u64 {
         self.end
     }
@@ -271,7 +271,7 @@ impl Bits {
         Window::from_bits(self.load(at), len).unwrap_or(Window::EMPTY)
     }
 
-    /// 128 bits from bit `at` on; behind the end they are 0.
+    /// 128 bits from bit `at` on; after the end they are 0.
     pub(super) fn load(&self, at: u64) -> u128 {
         let from = at.saturating_sub(self.first);
         let word = |k: u64| usize::try_from(from / 64 + k).ok().and_then(|k| self.words.get(k)).copied().unwrap_or(0);
@@ -284,12 +284,12 @@ impl Bits {
 
     /// When a bit begins.
     pub(super) fn time(&self, at: u64) -> i64 {
-        let is_behind = |mark: usize| self.marks.get(mark).is_none_or(|mark| mark.bit > at);
+        let is_after = |mark: usize| self.marks.get(mark).is_none_or(|mark| mark.bit > at);
         let mut mark = self.asked.get().min(self.marks.len());
-        while !is_behind(mark + 1) {
+        while !is_after(mark + 1) {
             mark += 1;
         }
-        while mark > 0 && is_behind(mark) {
+        while mark > 0 && is_after(mark) {
             mark -= 1;
         }
         self.asked.set(mark);

@@ -71,7 +71,7 @@ impl Carried {
 mod tests {
     use super::*;
 
-    /// Words in the order of the line, abcdei fghj; the switch bit behind the fifth.
+    /// Words in the order of the line, abcdei fghj; the switch bit after the fifth.
     fn line(words: [&str; 6]) -> Window {
         let mut text = words[..5].concat();
         text.push(if text.ends_with('1') { '0' } else { '1' });

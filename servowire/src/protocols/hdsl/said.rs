@@ -1,4 +1,4 @@
-//! Events that the frames behind them may still refuse.
+//! Events that the frames after them may still refuse.
 
 use std::collections::VecDeque;
 use std::io;

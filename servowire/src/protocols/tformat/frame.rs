@@ -122,7 +122,7 @@ impl Pending {
         self.answer_fields(bytes.first().copied().unwrap_or_default())
     }
 
-    /// The answer alone, if these bytes are it behind the request: a receiver that is always on hears that first.
+    /// The answer alone, if these bytes are it after the request: a receiver that is always on hears that first.
     pub(super) fn without_echo<'a>(&self, bytes: &'a [u8]) -> &'a [u8] {
         let echo = self.request.map(Request::emit);
         let rest = echo.and_then(|echo| bytes.strip_prefix(echo.as_bytes()));

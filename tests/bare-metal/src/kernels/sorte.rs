@@ -276,7 +276,7 @@ kernels! {
         (master, stream::device_frame::<Error>(3).parse(frame.as_slice()).is_ok())
     } over FRAMES;
 
-    /// The bytes behind a preamble, and both checks over them.
+    /// The bytes after a preamble, and both checks over them.
     fn sorte_checks(wire: &[u8; 12]) -> Result<(u8, u32), Error> {
         strip_preamble(wire).map(|frame| (crc8(frame), fcs(frame)))
     } over [[0x55, 0xd5, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10]];

@@ -248,7 +248,7 @@ struct Learn {
     flip: Option<u32>,
 }
 
-/// A line at eight samples a bit that carries `bits` after `delay` eighths, ones before and behind.
+/// A line at eight samples a bit that carries `bits` after `delay` eighths, ones before and after.
 fn sampled(bits: u64, delay: u32, bytes: usize) -> Vec<u8> {
     let level = |at: u32| at.checked_sub(delay).filter(|at| at / 8 < 61).is_none_or(|at| bits >> (at / 8) & 1 == 1);
     (0..bytes as u32).map(|byte| (0..8).fold(0, |b, k| b << 1 | u8::from(level(byte * 8 + k)))).collect()

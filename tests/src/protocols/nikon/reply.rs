@@ -395,7 +395,7 @@ pub(super) fn unaligned(_: &str, row: UnalignedRow) -> Verdict {
     let layout = layout(&row.layout)?;
     same("frames", &row.frames, &layout.frames())?;
     let start = or_unreadable(Window::read(&row.stream_packed_msb_first.0, row.leading_idle_bits, 1, MsbFirst))?;
-    same("a start bit behind the idle bits", &0, &start.bits())?;
+    same("a start bit after the idle bits", &0, &start.bits())?;
     let reply = received(
         &mut LineReceiver::bits(layout).allowing_idle_between_frames(),
         &row.stream_packed_msb_first,

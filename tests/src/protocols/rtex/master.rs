@@ -77,7 +77,7 @@ pub(super) fn bitflips(rows: &[Row]) -> Vec<Verdict> {
             code: code(row.sent_code.0)?,
         };
         let mut flipped = row.base.0.clone();
-        let byte = flipped.get_mut(row.bit / 8).ok_or_else(|| unreadable("bit behind the block"))?;
+        let byte = flipped.get_mut(row.bit / 8).ok_or_else(|| unreadable("bit after the block"))?;
         *byte ^= 1 << (row.bit % 8);
         same("hex", &row.hex.0, &flipped)?;
         same("class of the base", &"ok".to_owned(), &class(&expected.check(&row.base.0)))?;

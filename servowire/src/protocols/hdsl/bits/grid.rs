@@ -13,7 +13,7 @@ pub(super) const SAMPLES: u64 = 8;
 const FIRST: u64 = 0x0101_0101_0101_0101;
 /// How far samples were taken.
 pub(in super::super) struct Taken {
-    /// The number of the first sample behind.
+    /// The number of the first sample after it.
     pub(in super::super) next: u64,
     /// Where the line changed last, and the level since.
     pub(in super::super) since: u64,
@@ -25,13 +25,13 @@ fn gather(word: u64) -> u64 {
     (word & FIRST).wrapping_mul(0x0102_0408_1020_4080) >> 56
 }
 
-/// The edges of eight bits behind `level`, the first in bit 0; none where one is not on the grid.
+/// The edges of eight bits after `level`, the first in bit 0; none where one is not on the grid.
 fn edges_in(word: u64, level: bool) -> Option<u64> {
     let edges = word ^ (word << 1 | u64::from(level));
     (edges & !FIRST == 0).then(|| gather(edges))
 }
 
-/// Whether each edge of eight bits, of which there is one at least, is no more than `longest` bits behind the one before.
+/// Whether each edge of eight bits, of which there is one at least, is no more than `longest` bits after the one before.
 fn are_near(edges: u64, longest: u64) -> bool {
     if longest >= SAMPLES - 1 {
         return true;
