@@ -127,14 +127,7 @@ fn one(
 ) -> io::Result<bool> {
     let protocol = arguments.protocol;
     let mut filter = arguments.filter();
-    let timeless = matches!(capture, Capture::Bytes(_)) && arguments.rtex.period.is_none();
-    let levels = matches!(capture, Capture::Edges(_) | Capture::Samples(_));
-    let cannot = [
-        (arguments.vcd.is_some() && !levels, "there are no levels in it for a VCD"),
-        (arguments.svg.is_some() && timeless, "a log of bytes has no times for a picture"),
-        (filter.has_times() && timeless, "a log of bytes has no times for --from and --to"),
-    ];
-    if let Some((_, what)) = cannot.into_iter().find(|(is, _)| *is) {
+    if let Some(what) = cannot(arguments, &capture, filter.has_times()) {
         return Ok(complain(&Fault::new(name, At::File, what), bar));
     }
     let mut picture = arguments.svg.as_ref().map(|_| Picture::new(name));
@@ -165,18 +158,28 @@ fn one(
     if let Some(refusals) = &refusals {
         bar.say(&format!("error: {name}: {refusals}"));
     }
-    match end {
-        Ok(()) if tally == Tally::default() => {
-            Ok(complain(&Fault::new(name, At::File, "no frame in it: the line is idle, or not of this protocol"), bar))
-        }
+    let nothing = match end {
+        Ok(()) if tally == Tally::default() => "no frame in it: the line is idle, or not of this protocol".to_owned(),
         Ok(()) if chosen == Tally::default() => {
-            let all = tally.ok + tally.refused;
-            Ok(complain(&Fault::new(name, At::File, format!("none of its {all} frames passes the filter")), bar))
+            format!("none of its {} frames passes the filter", tally.ok + tally.refused)
         }
-        Ok(()) => Ok(refusals.is_none()),
-        Err(Stop::Fault(fault)) => Ok(complain(&fault, bar)),
-        Err(Stop::Output(error)) => Err(error),
-    }
+        Ok(()) => return Ok(refusals.is_none()),
+        Err(Stop::Fault(fault)) => return Ok(complain(&fault, bar)),
+        Err(Stop::Output(error)) => return Err(error),
+    };
+    Ok(complain(&Fault::new(name, At::File, nothing), bar))
+}
+
+/// Why what is asked cannot be had of a capture of its kind.
+fn cannot(arguments: &Decode, capture: &Capture, has_times: bool) -> Option<&'static str> {
+    let timeless = matches!(capture, Capture::Bytes(_)) && arguments.rtex.period.is_none();
+    let levels = matches!(capture, Capture::Edges(_) | Capture::Samples(_));
+    let cannot = [
+        (arguments.vcd.is_some() && !levels, "there are no levels in it for a VCD"),
+        (arguments.svg.is_some() && timeless, "a log of bytes has no times for a picture"),
+        (has_times && timeless, "a log of bytes has no times for --from and --to"),
+    ];
+    cannot.into_iter().find(|(is, _)| *is).map(|(_, what)| what)
 }
 
 /// Says what is wrong; the file is not good.

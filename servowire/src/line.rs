@@ -19,9 +19,9 @@ pub(crate) use spikes::Spikes;
 use survey::{Candidates, Found};
 use watch::Watch;
 
-use crate::capture::Line;
 use crate::capture::hexlog::Burst;
 use crate::capture::raw::Raw;
+use crate::capture::{Change, Line};
 use crate::fault::{At, Fault};
 use crate::output::{Output, Sink};
 use crate::protocols::{Protocol, Settings};
@@ -133,16 +133,7 @@ pub fn decode(
             out.flush()?;
             shown = Instant::now();
         }
-        let straight = if watch.takes_samples(out) { line.samples() } else { None };
-        let more = match straight {
-            Some(Ok(samples)) => {
-                watch.samples(samples, out)?;
-                Ok(samples.first() != samples.end())
-            }
-            Some(Err(fault)) => Err(fault),
-            None => line.read(&mut changes),
-        };
-        let more = more.unwrap_or_else(|e| {
+        let more = read(line, &mut watch, &mut changes, out)?.unwrap_or_else(|e| {
             fault = Some(e);
             false
         });
@@ -173,6 +164,24 @@ pub fn decode(
         return Err(Fault::new(file, At::File, what).into());
     }
     right_way_up(file, settings, &watch.found, out)
+}
+
+/// Takes what comes next as samples where that can be, else as changes; whether there is more, or why it cannot be read.
+fn read(
+    line: &mut dyn Line,
+    watch: &mut Watch<'_>,
+    changes: &mut Vec<Change>,
+    out: &mut Output<'_>,
+) -> io::Result<Result<bool, Fault>> {
+    let straight = if watch.takes_samples(out) { line.samples() } else { None };
+    Ok(match straight {
+        Some(Ok(samples)) => {
+            watch.samples(samples, out)?;
+            Ok(samples.first() != samples.end())
+        }
+        Some(Err(fault)) => Err(fault),
+        None => line.read(changes),
+    })
 }
 
 /// Decodes samples at a fixed rate.

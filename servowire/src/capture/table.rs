@@ -35,7 +35,7 @@ pub struct Table {
     channels: Vec<String>,
     columns: Vec<Column>,
     /// Rows that were read to find the columns.
-    waiting: VecDeque<(u64, Vec<u8>)>,
+    waiting: Waiting,
     clock: Times,
     /// Time of the first row, where times are absolute.
     origin: Option<i64>,
@@ -104,32 +104,15 @@ impl Table {
     pub fn new(input: Input, hints: Hints) -> Result<Self, Fault> {
         let name = input.name().to_owned();
         let mut lines = Lines::new(input);
-        let mut above: Vec<Vec<u8>> = Vec::new();
-        let mut waiting: VecDeque<(u64, Vec<u8>)> = VecDeque::new();
-        let mut text = Vec::new();
-        // Up to the second of two lines of numbers.
-        while lines.next(&mut text)? {
-            if heading::is_row(&text) {
-                waiting.push_back((lines.line, text.clone()));
-                if waiting.len() == 2 {
-                    break;
-                }
-            } else if !text.is_empty() {
-                above.extend(waiting.drain(..).map(|(_, row)| row));
-                above.push(text.clone());
-            }
-            if above.len() > heading::LONGEST {
-                break;
-            }
-        }
+        let (above, mut waiting) = beginning(&mut lines)?;
         let rows: Vec<&[u8]> = waiting.iter().map(|(_, row)| row.as_slice()).collect();
         let Some(heading) = Heading::parse(&above, &rows, hints.sample_rate) else {
             let what = "no table with times or a sample rate and columns of levels or voltages is in it (the rate of a \
                 table of levels alone is said with --format csv --rate)";
             return Err(Fault::new(&name, At::Line(1), what));
         };
-        let mut cells = 0;
-        let enough = |waiting: &VecDeque<_>, lines: &Lines| !waiting.is_empty() && lines.input.pauses();
+        let (mut cells, mut text) = (0, Vec::new());
+        let enough = |waiting: &Waiting, lines: &Lines| !waiting.is_empty() && lines.input.pauses();
         while waiting.len() < SAMPLE && cells < SAMPLE_CELLS && !enough(&waiting, &lines) && lines.next(&mut text)? {
             cells += heading.columns();
             waiting.push_back((lines.line, text.clone()));
@@ -214,6 +197,43 @@ impl Table {
         Ok(true)
     }
 
+    /// The time of a row.
+    fn time(&mut self, cells: &[&[u8]]) -> Result<i64, String> {
+        let text = |index: usize| String::from_utf8_lossy(cells.get(index).copied().unwrap_or_default());
+        let time = match self.clock {
+            Times::Column { index, divisor } => {
+                cell::time(&text(index), divisor).ok_or_else(|| format!("{:?} is not a time", text(index)))?
+            }
+            Times::Dates { index } => {
+                let time =
+                    cell::date(&text(index)).ok_or_else(|| format!("{:?} is not a date and time", text(index)))?;
+                time.saturating_sub(*self.origin.get_or_insert(time))
+            }
+            Times::Steps { start, period } => start.saturating_add((self.rows as f64 * period).round() as i64),
+            Times::Rate(rate) => Clock::new(rate).time(self.rows),
+        };
+        Ok(if self.backwards { -time } else { time })
+    }
+
+    /// The level of a column in a row; none where its cell is empty.
+    fn level(&self, column: &Column, cells: &[&[u8]]) -> Result<Option<bool>, String> {
+        let text = cells.get(column.index).copied().unwrap_or_default();
+        let shown = || String::from_utf8_lossy(text);
+        match (cell::level(text), &column.threshold) {
+            (Cell::Other, None) if column.bit.is_some() => match (cell::word(text), column.bit) {
+                (Some(word), Some(bit)) => Ok(Some(word >> bit & 1 == 1)),
+                _ => Err(format!("{:?} is no number in hex", shown())),
+            },
+            (Cell::Level(level), None) => Ok(Some(level)),
+            (Cell::Nothing, _) => Ok(None),
+            (_, Some(threshold)) => match cell::number(text, self.heading.comma()) {
+                Some(volts) => Ok(Some(threshold.level(volts, column.level))),
+                None => Err(format!("{:?} is no voltage", shown())),
+            },
+            (Cell::Other, None) => Err(format!("{:?}, where a level is 0 or 1", shown())),
+        }
+    }
+
     /// Takes a row, or says what is wrong with it and leaves everything as it was.
     fn row(&mut self, row: &[u8], changes: &mut Vec<Change>) -> Result<(), String> {
         let cells = self.heading.split(row);
@@ -221,44 +241,12 @@ impl Table {
         if cells.len() <= needed {
             return Err(format!("the row has {} columns, the heading {}", cells.len(), self.heading.columns()));
         }
-        let time = match self.clock {
-            Times::Column { index, divisor } => {
-                let text = String::from_utf8_lossy(cells.get(index).copied().unwrap_or_default());
-                cell::time(&text, divisor).ok_or_else(|| format!("{text:?} is not a time"))?
-            }
-            Times::Dates { index } => {
-                let text = String::from_utf8_lossy(cells.get(index).copied().unwrap_or_default());
-                let time = cell::date(&text).ok_or_else(|| format!("{text:?} is not a date and time"))?;
-                time.saturating_sub(*self.origin.get_or_insert(time))
-            }
-            Times::Steps { start, period } => start.saturating_add((self.rows as f64 * period).round() as i64),
-            Times::Rate(rate) => Clock::new(rate).time(self.rows),
-        };
-        let time = if self.backwards { -time } else { time };
+        let time = self.time(&cells)?;
         if let Some(before) = self.now.filter(|before| time < *before) {
             let (now, before) = (time as f64 / SECOND as f64, before as f64 / SECOND as f64);
             return Err(format!("time goes back from {before} s to {now} s"));
         }
-        let mut levels = Vec::with_capacity(self.columns.len());
-        for column in &self.columns {
-            let text = cells.get(column.index).copied().unwrap_or_default();
-            let level = match (cell::level(text), &column.threshold) {
-                (Cell::Other, None) if column.bit.is_some() => match (cell::word(text), column.bit) {
-                    (Some(word), Some(bit)) => Some(word >> bit & 1 == 1),
-                    _ => return Err(format!("{:?} is no number in hex", String::from_utf8_lossy(text))),
-                },
-                (Cell::Level(level), None) => Some(level),
-                (Cell::Nothing, _) => None,
-                (_, Some(threshold)) => match cell::number(text, self.heading.comma()) {
-                    Some(volts) => Some(threshold.level(volts, column.level)),
-                    None => return Err(format!("{:?} is no voltage", String::from_utf8_lossy(text))),
-                },
-                (Cell::Other, None) => {
-                    return Err(format!("{:?}, where a level is 0 or 1", String::from_utf8_lossy(text)));
-                }
-            };
-            levels.push(level);
-        }
+        let levels = self.columns.iter().map(|column| self.level(column, &cells)).collect::<Result<Vec<_>, _>>()?;
         self.rows += 1;
         self.now = Some(time);
         if levels.iter().all(Option::is_none) {
@@ -280,8 +268,33 @@ impl Table {
     }
 }
 
+/// Numbered rows that are read and not yet taken.
+type Waiting = VecDeque<(u64, Vec<u8>)>;
+
+/// The lines of a heading, and the first two rows after it: up to the second of two lines of numbers.
+fn beginning(lines: &mut Lines) -> Result<(Vec<Vec<u8>>, Waiting), Fault> {
+    let mut above: Vec<Vec<u8>> = Vec::new();
+    let mut waiting = Waiting::new();
+    let mut text = Vec::new();
+    while lines.next(&mut text)? {
+        if heading::is_row(&text) {
+            waiting.push_back((lines.line, text.clone()));
+            if waiting.len() == 2 {
+                break;
+            }
+        } else if !text.is_empty() {
+            above.extend(waiting.drain(..).map(|(_, row)| row));
+            above.push(text.clone());
+        }
+        if above.len() > heading::LONGEST {
+            break;
+        }
+    }
+    Ok((above, waiting))
+}
+
 /// Which columns are channels: all cells levels, or all voltages.
-fn columns(heading: &Heading, rows: &VecDeque<(u64, Vec<u8>)>, threshold: Option<f64>) -> (Vec<Column>, Vec<String>) {
+fn columns(heading: &Heading, rows: &Waiting, threshold: Option<f64>) -> (Vec<Column>, Vec<String>) {
     let mut digital = vec![true; heading.columns()];
     let mut numbers: Vec<Vec<f64>> = vec![Vec::new(); heading.columns()];
     let mut other = vec![0_usize; heading.columns()];
