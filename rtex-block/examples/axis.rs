@@ -169,7 +169,8 @@ fn at_a_speed(machine: &mut Machine) -> Result<(), String> {
     for speed in [500_000, -500_000, 0] {
         machine.axis.set_rate(speed).map_err(|error| error.to_string())?;
         (0..200).for_each(|_| machine.update());
-        println!("at {} with {speed} command units/s", machine.axis.actual_position());
+        let position = machine.axis.position(2).map_err(|doubt| doubt.to_string())?;
+        println!("at {position} with {speed} command units/s");
     }
     Ok(())
 }

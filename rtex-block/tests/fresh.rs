@@ -10,7 +10,7 @@ use rtex_block::device::Behaviour;
 use rtex_block::master::procedure::Home;
 use rtex_block::master::{ActiveCode, Axis, AxisConfig, AxisState, Failure, Limits, Progress, Received, Turn};
 use rtex_block::{
-    Arguments, ErrorCode, MacId, NonCyclicCommand, Pr, Response, Response32, StatusFlags, SubCode, TypeCode,
+    Arguments, Doubt, ErrorCode, MacId, NonCyclicCommand, Pr, Response, Response32, StatusFlags, SubCode, TypeCode,
     UpdateCounter,
 };
 
@@ -217,4 +217,40 @@ fn homing_begins_when_nothing_moves() {
     assert!(home.receive(&mut axis).is_pending());
     hear(&mut axis, 0x14, COMPLETE, 0xc8);
     assert!(matches!(home.receive(&mut axis), Progress::Done { .. }));
+}
+
+/// A position is as old as its counter echo. What a drive sends again while its processing stands still is not new, nor is
+/// what it said before its blocks were refused; and nobody switches a servo on by it.
+#[test]
+fn a_position_has_an_age() {
+    let limits = Limits::new(NonZeroU16::new(9).unwrap(), 4).with_ready(100);
+    let mut axis = Axis::new(AxisConfig::new(mac_id(), ActiveCode::CyclicPosition, 500_000, limits));
+    let block = |echo: u8, position: u8, status: u8| {
+        let mut block = [0; 16];
+        (block[0], block[1], block[2], block[4]) = (0x89 | echo << 5, 0x20, status, position);
+        Received::from(Response::parse(&block))
+    };
+    let hear = |axis: &mut Axis, received| axis.receive(Turn::Valid(UpdateCounter::ZERO), &received);
+    assert_eq!(axis.position(u32::MAX), Err(Doubt::Absent));
+    hear(&mut axis, Received::Nothing);
+    assert_eq!(axis.position(u32::MAX), Err(Doubt::Absent));
+    // Servo_Ready, position 77.
+    hear(&mut axis, block(1, 77, 0x40));
+    assert_eq!((axis.position(0), axis.can_switch_on()), (Ok(77), true));
+    // The same block again, one of another drive, none, and one that is no response.
+    let mut other = [0; 16];
+    other[0] = 0x8a;
+    let unlike =
+        [block(1, 77, 0x40), Response::parse(&other).into(), Received::Nothing, Response::parse(&[0; 16]).into()];
+    for (received, age) in unlike.into_iter().zip(1..) {
+        hear(&mut axis, received);
+        assert_eq!(axis.position(age), Ok(77));
+        assert_eq!(axis.position(age - 1), Err(Doubt::Old { updates: age }));
+        assert_eq!((axis.actual_position(), axis.can_switch_on(), axis.switch_on()), (77, false, false));
+    }
+    hear(&mut axis, block(2, 78, 0x40));
+    assert_eq!((axis.position(0), axis.can_switch_on()), (Ok(78), true));
+    // An alarm.
+    hear(&mut axis, block(3, 79, 0x60));
+    assert_eq!((axis.position(0), axis.actual_position()), (Err(Doubt::Alarm), 79));
 }

@@ -16,8 +16,9 @@ use super::state::{AxisState, StopReason};
 use crate::Counters;
 use crate::command::Command;
 use crate::control::ControlBits;
+use crate::doubt::Doubt;
 use crate::error::Error;
-use crate::header::MacId;
+use crate::header::{MacId, UpdateCounter};
 use crate::noncyclic_command::NonCyclicCommand;
 use crate::noncyclic_response::NonCyclicResponse;
 use crate::position::{max_step, max_step_at, step};
@@ -54,6 +55,9 @@ pub struct Axis {
     before: i32,
     last_step: i32,
     actual: i32,
+    /// The last counter echo, and for how many update periods it has stood still.
+    echo: Option<UpdateCounter>,
+    age: u32,
     status: StatusFlags,
     control: ControlBits,
     /// Command_Data3, Sub_Command_Data2 and 3.
@@ -98,6 +102,8 @@ impl Axis {
             before: 0,
             last_step: 0,
             actual: 0,
+            echo: None,
+            age: 0,
             status: StatusFlags::empty(),
             control: ControlBits::empty(),
             feed_forward: [0; 3],
@@ -127,12 +133,30 @@ impl Axis {
         self.state
     }
 
-    /// Response_Data1 of the last response, command units.
+    /// The actual position for control, command units. An age of 0 is that of a block that came with the last
+    /// [`receive`](Self::receive); the drive had measured the position before it sent the block.
+    ///
+    /// # Errors
+    /// [`Doubt::Absent`], then [`Doubt::Old`] beyond `max_age` update periods, then [`Doubt::Alarm`].
+    pub const fn position(&self, max_age: u32) -> Result<i32, Doubt> {
+        if self.echo.is_none() {
+            Err(Doubt::Absent)
+        } else if self.age > max_age {
+            Err(Doubt::Old { updates: self.age })
+        } else if self.status.contains(StatusFlags::ALARM) {
+            Err(Doubt::Alarm)
+        } else {
+            Ok(self.actual)
+        }
+    }
+
+    /// Response_Data1 of the last good response, command units, however old it is; [`position`](Self::position) says whether
+    /// it may be used.
     pub const fn actual_position(&self) -> i32 {
         self.actual
     }
 
-    /// Status_Flags of the last response.
+    /// Status_Flags of the last good response.
     pub const fn status(&self) -> StatusFlags {
         self.status
     }
@@ -148,10 +172,11 @@ impl Axis {
         self.disobeys
     }
 
-    /// Whether the servo is off, the drive ready to switch it on, and no request is under way that would change its
-    /// position or its state.
+    /// Whether the servo is off, the drive ready to switch it on by a block of this update period, and no request is under
+    /// way that would change its position or its state: the command position is the actual one then.
     pub const fn can_switch_on(&self) -> bool {
         matches!(self.state, AxisState::Off)
+            && self.position(0).is_ok()
             && self.status.contains(StatusFlags::SERVO_READY)
             && !self.service.needs_servo_off()
     }
@@ -199,6 +224,7 @@ impl Axis {
     /// runs.
     pub fn receive(&mut self, sent: Turn, received: &Received) {
         let response = self.sound(received);
+        self.grow_old(response);
         if self.state == AxisState::On {
             self.last_step = step(self.before, self.setpoint);
             self.before = self.setpoint;
@@ -274,6 +300,14 @@ impl Axis {
         self.counters.record(&outcome);
         self.last_refusal = outcome.err();
         outcome.ok()
+    }
+
+    /// A position is new with a new counter echo: a drive whose processing stands still goes on to send its last block.
+    fn grow_old(&mut self, response: Option<&Response>) {
+        match response.map(|r| r.update_counter_echo) {
+            echo @ Some(_) if echo != self.echo => (self.echo, self.age) = (echo, 0),
+            _ => self.age = self.age.saturating_add(1),
+        }
     }
 
     /// Why the echo stands still.

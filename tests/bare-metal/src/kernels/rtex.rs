@@ -13,7 +13,7 @@ use rtex_block::master::{
 use rtex_block::position::{self, Gear};
 use rtex_block::timing::{FrameTime, Periods, timer_reload};
 use rtex_block::{
-    Arguments, BlockSize, Code, Command, Command32, CommandBlock, CyclicCode, Error, MacId, NonCyclicCommand,
+    Arguments, BlockSize, Code, Command, Command32, CommandBlock, CyclicCode, Doubt, Error, MacId, NonCyclicCommand,
     NonCyclicResponse, Response, Response32, ResponseBlock, SubCommand, TypeCode, UpdateCounter, pack, stream,
 };
 
@@ -197,6 +197,11 @@ kernels! {
         let _ = axis.set_position(1_010);
         axis.send(Turn::Valid(COUNTER))
     } over [(AXIS, Received::Main(RESPONSE)), (AXIS, Received::Nothing)];
+
+    /// The position for control, or why there is none.
+    fn rtex_axis_position(axis: &Axis) -> Result<i32, Doubt> {
+        axis.position(2)
+    } over [AXIS];
 
     /// An update period of a ring of four axes.
     fn rtex_ring((axes, received): &([Axis; 4], [Received; 4])) -> Option<[Command32; 4]> {
