@@ -69,9 +69,9 @@ macro_rules! receiver {
 receiver!(Transaction => nikon_aformat::master::Reading);
 receiver!(BusTransaction => ());
 
-/// When the longest answer to this request is over, if it began at `start_ns`.
-fn worst_ns(line: Line, request: Request, resolution: Resolution, start_ns: u64) -> u64 {
-    start_ns.saturating_add(line.longest_ns(request, &request.expected(resolution)).into())
+/// How long this request and the longest answer to it take.
+fn longest_ns(line: Line, request: Request, resolution: Resolution) -> u64 {
+    line.longest_ns(request, &request.expected(resolution)).into()
 }
 
 /// The line has to be silent for two frames after something that nobody has asked for.

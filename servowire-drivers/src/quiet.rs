@@ -10,10 +10,13 @@ use crate::race::race;
 const PATIENCE_NS: u64 = 2_000_000;
 
 /// What is known of the line between two calls. It outlives a dropped future.
+#[expect(clippy::struct_field_names, reason = "the unit is part of the name")]
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Line {
     /// Somebody may be talking until then.
     ready_ns: u64,
+    /// How long somebody may be talking after a request that is being handed over, or was when its call ended.
+    leaving_ns: Option<u64>,
     /// How long the line has to be silent after something unasked came.
     silence_ns: u64,
 }
@@ -40,12 +43,20 @@ pub(crate) struct Settling {
 
 impl Line {
     pub(crate) const fn new(silence_ns: u32) -> Self {
-        Self { ready_ns: 0, silence_ns: silence_ns as u64 }
+        Self { ready_ns: 0, leaving_ns: None, silence_ns: silence_ns as u64 }
     }
 
-    /// A request goes out that can keep the line busy until `worst_ns`: to be called before its first byte.
-    pub(crate) const fn soil(&mut self, worst_ns: u64) {
-        self.ready_ns = worst_ns;
+    /// A request begins to go out that can keep the line busy for so long, from whenever it leaves: to be called before its
+    /// first byte. A fault or a dropped future leaves it so until the next call, for nobody has read the clock.
+    pub(crate) const fn begin(&mut self, longest_ns: u64) {
+        self.leaving_ns = Some(longest_ns);
+    }
+
+    /// The request was handed over by `now_ns`. However long that took, the worst is assumed until the end is known.
+    pub(crate) const fn sent(&mut self, now_ns: u64) {
+        if let Some(longest_ns) = self.leaving_ns.take() {
+            self.ready_ns = now_ns.saturating_add(longest_ns);
+        }
     }
 
     /// The exchange has ended, and the line is free from `ready_ns` on.
@@ -60,11 +71,12 @@ impl Line {
     }
 
     /// From when on the line is free.
-    pub(crate) const fn free_ns(&self, now_ns: u64) -> u64 {
+    pub(crate) const fn free_ns(&mut self, now_ns: u64) -> u64 {
+        self.sent(now_ns);
         if self.ready_ns > now_ns { self.ready_ns } else { now_ns }
     }
 
-    pub(crate) const fn settle(&self, now_ns: u64) -> Settling {
+    pub(crate) const fn settle(&mut self, now_ns: u64) -> Settling {
         let limit_ns = self.free_ns(now_ns).saturating_add(PATIENCE_NS);
         Settling { until_ns: self.ready_ns, limit_ns, silence_ns: self.silence_ns }
     }
@@ -93,7 +105,7 @@ impl Settling {
 
 /// Throws away what comes until the line is free; `listen` tells whether something came. Whether it became free.
 pub(crate) fn wait<E>(
-    line: &Line,
+    line: &mut Line,
     clock: &mut impl Clock,
     mut listen: impl FnMut() -> Result<bool, E>,
 ) -> Result<bool, E> {
@@ -115,7 +127,7 @@ pub(crate) fn wait<E>(
 /// The same with a `listen` that ends when something came, and may be dropped before.
 #[cfg(feature = "async")]
 pub(crate) async fn wait_asynch<E>(
-    line: &Line,
+    line: &mut Line,
     timer: &mut impl Timer,
     mut listen: impl AsyncFnMut() -> Result<(), E>,
 ) -> Result<bool, E> {
@@ -141,14 +153,15 @@ mod tests {
 
     #[test]
     fn a_clean_line_is_used_at_once() {
-        let line = Line::new(8_000);
+        let mut line = Line::new(8_000);
         assert_eq!(line.settle(5).poll(5), Settle::Quiet);
     }
 
     #[test]
-    fn a_soiled_line_is_waited_for_and_babble_is_waited_out() {
+    fn a_line_in_use_is_waited_for_and_babble_is_waited_out() {
         let mut line = Line::new(8_000);
-        line.soil(100_000);
+        line.begin(90_000);
+        line.sent(10_000);
         let mut settling = line.settle(10_000);
         assert_eq!(settling.poll(99_999), Settle::Until(100_000));
         settling.heard(20_000);
@@ -160,10 +173,20 @@ mod tests {
         assert_eq!(line.settle(107_000).poll(107_000), Settle::Quiet);
     }
 
+    /// It may have left at any time up to the next call.
+    #[test]
+    fn a_request_that_was_not_seen_to_leave_may_just_have_left() {
+        let mut line = Line::new(8_000);
+        line.begin(90_000);
+        assert_eq!(line.settle(700_000).poll(789_999), Settle::Until(790_000));
+        assert_eq!(line.settle(790_000).poll(790_000), Settle::Quiet);
+        line.begin(90_000);
+        assert_eq!((line.free_ns(800_000), line.free_ns(890_001)), (890_000, 890_001));
+    }
+
     #[test]
     fn an_endless_talker_is_given_up() {
-        let line = Line::new(8_000);
-        let mut settling = line.settle(0);
+        let mut settling = Line::new(8_000).settle(0);
         let mut now_ns = 0;
         while settling.poll(now_ns) != Settle::Never {
             now_ns += 4_000;

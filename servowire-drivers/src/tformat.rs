@@ -30,11 +30,10 @@ impl Sample {
     }
 }
 
-/// When the longest answer to this request is over, if it began at `start_ns`.
-fn worst_ns(line: &Line, request: Request, start_ns: u64) -> u64 {
+/// How long this request and the longest answer to it take.
+fn longest_ns(line: &Line, request: Request) -> u64 {
     let fields = request.emit().fields().saturating_add(12);
-    let wait = u64::from(line.response_timeout_ns).saturating_add(line.rate.fields_ns(fields).into());
-    start_ns.saturating_add(wait)
+    u64::from(line.response_timeout_ns).saturating_add(line.rate.fields_ns(fields).into())
 }
 
 /// The line has to be silent for two fields after something that nobody has asked for.

@@ -11,14 +11,18 @@
 
 mod frames;
 mod hostile;
+mod late;
 
+use embedded_io::ErrorKind;
 use frames::{Bench, Port, Shared, deliveries, host, line, scenario, shaft};
 use hostile::live_through;
+use late::{Late, World};
 use nikon_aformat::bus::Addresses;
-use nikon_aformat::master::Cycle;
-use nikon_aformat::{EncoderAddress, Operation, Policy, Resolution};
+use nikon_aformat::master::{Cycle, Line};
+use nikon_aformat::{BitRate, EncoderAddress, Operation, Policy, RequestFrame, Resolution};
 use servowire_drivers::Error;
-use servowire_drivers::nikon::blocking::Master;
+use servowire_drivers::nikon::Frame;
+use servowire_drivers::nikon::blocking::{FramePort, Master};
 use servowire_world::{Delivery, Fault, Planned, Scenario, Script};
 
 fn driver(bench: &Shared) -> Master<Port, Port> {
@@ -186,4 +190,40 @@ fn a_request_that_was_held_up_is_not_followed_into_its_answer() {
     assert!(encoder.read_abs40(EncoderAddress::ZERO).is_err());
     let left = port.left_ns;
     assert!(left[1] - left[0] >= 7_200 + 4_000 + 21_600, "{left:?}");
+}
+
+/// A port that is kept from its work while a request is handed over, and hears a damaged answer.
+struct Sharing(Late);
+
+impl FramePort for Sharing {
+    type Error = ErrorKind;
+
+    fn send(&mut self, _: &[RequestFrame], _: u32) -> Result<(), ErrorKind> {
+        self.0.take(&[0])?;
+        if self.0.0.borrow().refuses { Err(ErrorKind::Other) } else { Ok(()) }
+    }
+
+    fn take(&mut self) -> Result<Option<Frame>, ErrorKind> {
+        if self.0.complains() { Err(ErrorKind::Other) } else { Ok(None) }
+    }
+}
+
+/// However late the request left, and if the port failed after it had left: the next one does not go out into its answer, which begins
+/// within 1000 bits and needs 72 more.
+#[test]
+fn what_was_held_up_is_not_talked_into() {
+    for stalls_in in 0..60 {
+        for (held_up, refuses) in [(false, false), (true, false), (true, true)] {
+            let late = Late::default();
+            *late.0.borrow_mut() = World { stalls_in: Some(stalls_in), held_up, refuses, ..World::default() };
+            let line = Line::new(BitRate::Mbit4);
+            let mut encoder = Master::new(Sharing(late.clone()), late.clone(), Resolution::default(), line);
+            for call in 1..=2 {
+                late.0.borrow_mut().call = call;
+                assert!(encoder.read_abs40(EncoderAddress::ZERO).is_err());
+            }
+            let (last, next) = late.0.borrow().between().unwrap();
+            assert!(next - last >= 268_000, "{stalls_in} {held_up} {refuses}: {last} {next}");
+        }
+    }
 }

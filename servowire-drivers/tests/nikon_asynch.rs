@@ -12,15 +12,23 @@
 
 mod frames;
 mod hostile;
+mod late;
 mod polls;
 
+use std::future::poll_fn;
+use std::task::Poll;
+
+use embedded_io::ErrorKind;
 use frames::{Bench, Port, Shared, deliveries, line, scenario, shaft};
 use hostile::live_through;
+use late::{Late, World};
 use nikon_aformat::bus::Addresses;
-use nikon_aformat::{EncoderAddress, Operation, Resolution};
-use polls::{FOR_EVER, run};
+use nikon_aformat::master::Line;
+use nikon_aformat::{BitRate, EncoderAddress, Operation, RequestFrame, Resolution};
+use polls::{FOR_EVER, Looks, pause, run};
 use servowire_drivers::Error;
-use servowire_drivers::nikon::asynch::Master;
+use servowire_drivers::nikon::Frame;
+use servowire_drivers::nikon::asynch::{FramePort, Master};
 use servowire_world::{Delivery, Scenario, Verdict};
 
 fn driver(bench: &Shared) -> Master<Port, Port> {
@@ -123,4 +131,43 @@ fn hostile_events_on_a_bus_are_survived() {
         *bench.borrow().world.tally()
     });
     assert!(calls.dropped > 1_000);
+}
+
+/// Another task has the processor while the request is handed over; the answer is damaged.
+struct Sharing(Late);
+
+impl FramePort for Sharing {
+    type Error = ErrorKind;
+
+    async fn send(&mut self, _: &[RequestFrame], _: u32) -> Result<(), ErrorKind> {
+        pause().await;
+        self.0.take(&[0])?;
+        pause().await;
+        if self.0.0.borrow().refuses { Err(ErrorKind::Other) } else { Ok(()) }
+    }
+
+    async fn take(&mut self) -> Result<Frame, ErrorKind> {
+        poll_fn(|_| if self.0.complains() { Poll::Ready(Err(ErrorKind::Other)) } else { Poll::Pending }).await
+    }
+}
+
+/// However late the request left, wherever its future was dropped, and if the port failed after it had left: the next one does not go
+/// out into its answer, which begins within 1000 bits and needs 72 more.
+#[test]
+fn what_was_held_up_is_not_talked_into() {
+    for (held_up, refuses) in [(false, false), (true, false), (true, true)] {
+        for polls in (0..200).chain([FOR_EVER]) {
+            let late = Late::default();
+            *late.0.borrow_mut() = World { held_up, refuses, ..World::default() };
+            let line = Line::new(BitRate::Mbit4);
+            let mut encoder = Master::new(Sharing(late.clone()), Looks(late.clone()), Resolution::default(), line);
+            for (call, polls) in [(1, polls), (2, FOR_EVER)] {
+                late.0.borrow_mut().call = call;
+                assert!(!matches!(run(encoder.read_abs40(EncoderAddress::ZERO), polls), Some(Ok(_))));
+            }
+            if let Some((last, next)) = late.0.borrow().between() {
+                assert!(next - last >= 268_000, "{held_up} {refuses} {polls}: {last} {next}");
+            }
+        }
+    }
 }

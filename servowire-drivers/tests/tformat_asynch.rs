@@ -12,6 +12,7 @@
 
 mod bench;
 mod hostile;
+mod late;
 mod polls;
 
 use std::future::{Future, poll_fn};
@@ -20,13 +21,14 @@ use std::task::{Context, Poll, Waker};
 use bench::{Bench, Misframed, Pin, Shared, Uart, Watch, line, scenario};
 use embedded_io::{ErrorKind, ErrorType};
 use hostile::live_through;
-use polls::{FOR_EVER, Looks, run};
+use late::{Late, World};
+use polls::{FOR_EVER, Looks, pause, run};
 use servowire_drivers::DriverEnable;
 use servowire_drivers::tformat::asynch::Encoder;
 use servowire_drivers::tformat::blocking;
 use servowire_world::{Scenario, Verdict};
-use tformat::BitRate;
 use tformat::master::Line;
+use tformat::{Address, BitRate, Request};
 
 /// The UART as futures that can be dropped.
 struct AsyncUart(Uart);
@@ -52,11 +54,6 @@ impl embedded_io_async::Write for AsyncUart {
         pause().await;
         Ok(())
     }
-}
-
-async fn pause() {
-    let mut asked = false;
-    poll_fn(|_| if std::mem::replace(&mut asked, true) { Poll::Ready(()) } else { Poll::Pending }).await;
 }
 
 /// Time goes on with every look, and every look may be the last.
@@ -140,4 +137,53 @@ fn hostile_events_never_cost_a_good_answer() {
         bench.borrow().tally()
     });
     assert!(calls.dropped > 1_000);
+}
+
+/// Another task has the processor while the request is handed over, a piece at a time.
+#[derive(Clone)]
+struct Sharing(Late);
+
+impl ErrorType for Sharing {
+    type Error = ErrorKind;
+}
+
+impl embedded_io_async::Read for Sharing {
+    async fn read(&mut self, _: &mut [u8]) -> Result<usize, ErrorKind> {
+        poll_fn(|_| if self.0.complains() { Poll::Ready(Err(ErrorKind::Other)) } else { Poll::Pending }).await
+    }
+}
+
+impl embedded_io_async::Write for Sharing {
+    async fn write(&mut self, bytes: &[u8]) -> Result<usize, ErrorKind> {
+        pause().await;
+        self.0.take(bytes)
+    }
+
+    async fn flush(&mut self) -> Result<(), ErrorKind> {
+        pause().await;
+        Ok(())
+    }
+}
+
+/// However late the request left, wherever its future was dropped, and if a part of it was taken only: the next one does not go out
+/// into its answer, which needs the rest of the request, 3 us and four fields.
+#[test]
+fn what_was_held_up_is_not_talked_into() {
+    for (held_up, refuses) in [(false, false), (true, false), (true, true)] {
+        for polls in (0..200).chain([FOR_EVER]) {
+            let late = Late::default();
+            *late.0.borrow_mut() = World { held_up, refuses, pieces: 2, ..World::default() };
+            let line = Line::new(BitRate::Mbit2_5);
+            let mut encoder =
+                Encoder::new(Sharing(late.clone()), servowire_drivers::Automatic, Looks(late.clone()), line);
+            for (call, polls) in [(1, polls), (2, FOR_EVER)] {
+                late.0.borrow_mut().call = call;
+                let outcome = run(encoder.transact(Request::read_eeprom(Address::new(5).unwrap())), polls);
+                assert!(!matches!(outcome, Some(Ok(_))));
+            }
+            if let Some((last, next)) = late.0.borrow().between() {
+                assert!(next - last >= 8_000 + 3_000 + 16_000, "{held_up} {refuses} {polls}: {last} {next}");
+            }
+        }
+    }
 }

@@ -10,7 +10,7 @@ use nikon_aformat::master::{
 };
 use nikon_aformat::{Doubt, EncoderAddress, Operation, Policy, Position, Request, RequestFrame, Resolution, Response};
 
-use super::{Frame, LOST, Receiver, silence_ns, worst_ns};
+use super::{Frame, LOST, Receiver, longest_ns, silence_ns};
 use crate::procedure;
 use crate::quiet;
 use crate::race::race;
@@ -175,12 +175,10 @@ impl<F: FramePort, T: Timer> Master<F, T> {
             Progress::Done { value, .. } => return Ok((transaction, value)),
             Progress::Pending { .. } => {}
         }
-        // The worst is assumed until the end is known: an early return or a dropped future leaves it so.
-        self.state.soil(worst_ns(line, request, self.resolution, start_ns));
+        self.state.begin(longest_ns(line, request, self.resolution));
         let gap_bits = line.rate.bits(line.frame_gap_ns);
         self.port.send(request.emit().as_slice(), gap_bits).await.map_err(Error::Io)?;
-        // Whoever had the processor meanwhile has held the request up.
-        self.state.soil(worst_ns(line, request, self.resolution, self.timer.now_ns()));
+        self.state.sent(self.timer.now_ns());
         let mut progress = transaction.progress();
         loop {
             match progress {
@@ -218,6 +216,10 @@ impl<F: FramePort, T: Timer> Master<F, T> {
             let _: Result<Frame, _> = port.take().await;
             Ok(())
         };
-        if quiet::wait_asynch(&self.state, &mut self.timer, listen).await? { Ok(()) } else { Err(Error::NeverQuiet) }
+        if quiet::wait_asynch(&mut self.state, &mut self.timer, listen).await? {
+            Ok(())
+        } else {
+            Err(Error::NeverQuiet)
+        }
     }
 }

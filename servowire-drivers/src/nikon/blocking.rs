@@ -9,7 +9,7 @@ use nikon_aformat::master::{
 };
 use nikon_aformat::{Doubt, EncoderAddress, Operation, Policy, Position, Request, RequestFrame, Resolution, Response};
 
-use super::{Frame, LOST, Receiver, silence_ns, worst_ns};
+use super::{Frame, LOST, Receiver, longest_ns, silence_ns};
 use crate::procedure;
 use crate::quiet;
 use crate::{Clock, Error};
@@ -174,12 +174,10 @@ impl<F: FramePort, C: Clock> Master<F, C> {
             Progress::Done { value, .. } => return Ok((transaction, value)),
             Progress::Pending { .. } => {}
         }
-        // The worst is assumed until the end is known: an early return leaves it so.
-        self.state.soil(worst_ns(line, request, self.resolution, start_ns));
+        self.state.begin(longest_ns(line, request, self.resolution));
         let gap_bits = line.rate.bits(line.frame_gap_ns);
         self.port.send(request.emit().as_slice(), gap_bits).map_err(Error::Io)?;
-        // Whoever had the processor meanwhile has held the request up.
-        self.state.soil(worst_ns(line, request, self.resolution, self.clock.now_ns()));
+        self.state.sent(self.clock.now_ns());
         loop {
             match self.receive(&mut transaction)? {
                 Progress::Pending { .. } => {}
@@ -207,6 +205,10 @@ impl<F: FramePort, C: Clock> Master<F, C> {
     /// Waits until the line is free, and throws away what comes meanwhile, errors of the port included.
     fn settle(&mut self) -> Result<(), Failure<F>> {
         let port = &mut self.port;
-        if quiet::wait(&self.state, &mut self.clock, || Ok(port.listen()))? { Ok(()) } else { Err(Error::NeverQuiet) }
+        if quiet::wait(&mut self.state, &mut self.clock, || Ok(port.listen()))? {
+            Ok(())
+        } else {
+            Err(Error::NeverQuiet)
+        }
     }
 }

@@ -10,7 +10,7 @@ use embedded_io_async::{Read, Write};
 use tformat::master::{EEPROM_POLLING, EepromAccess, Exchange, Line, Progress, Reset, Step, Transaction};
 use tformat::{Address, AllData, Doubt, Page, Policy, Request, Resolution, Response, SingleTurn};
 
-use super::{MAX_BYTES, Sample, other, silence_ns, worst_ns};
+use super::{MAX_BYTES, Sample, longest_ns, other, silence_ns};
 use crate::direction::Guard;
 use crate::procedure;
 use crate::quiet;
@@ -126,12 +126,10 @@ impl<U: Read + Write, D: Direction, T: Timer> Encoder<U, D, T> {
         let on_ns = self.timer.now_ns();
         self.timer.wait_until(on_ns.saturating_add(self.line.driver_lead_ns.into())).await;
         let start_ns = self.timer.now_ns();
-        // The worst is assumed until the end is known: an early return or a dropped future leaves it so. So once more after the
-        // request: whoever had the processor meanwhile has held it up.
-        self.state.soil(worst_ns(&self.line, request, start_ns));
+        self.state.begin(longest_ns(&self.line, request));
         let mut transaction = Transaction::start(request, self.line, start_ns);
         send(&mut self.uart, request.emit().as_bytes()).await?;
-        self.state.soil(worst_ns(&self.line, request, self.timer.now_ns()));
+        self.state.sent(self.timer.now_ns());
         // What `flush` means differs between UARTs; by the clock the last bit has left at this time.
         self.timer.wait_until(transaction.request_end_ns()).await;
         guard.receive().map_err(Error::Pin)?;
@@ -173,7 +171,11 @@ impl<U: Read + Write, D: Direction, T: Timer> Encoder<U, D, T> {
             Ok(0) => Err(Error::Closed),
             Ok(_) | Err(_) => Ok(()),
         };
-        if quiet::wait_asynch(&self.state, &mut self.timer, listen).await? { Ok(()) } else { Err(Error::NeverQuiet) }
+        if quiet::wait_asynch(&mut self.state, &mut self.timer, listen).await? {
+            Ok(())
+        } else {
+            Err(Error::NeverQuiet)
+        }
     }
 }
 

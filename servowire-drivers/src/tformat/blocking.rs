@@ -6,7 +6,7 @@ use embedded_io::{Read, ReadReady, Write};
 use tformat::master::{EEPROM_POLLING, EepromAccess, Exchange, Line, Progress, Reset, Step, Transaction};
 use tformat::{Address, AllData, Doubt, Page, Policy, Request, Resolution, Response, SingleTurn};
 
-use super::{MAX_BYTES, Sample, other, silence_ns, worst_ns};
+use super::{MAX_BYTES, Sample, longest_ns, other, silence_ns};
 use crate::direction::Guard;
 use crate::procedure;
 use crate::quiet;
@@ -120,12 +120,10 @@ impl<U: Read + ReadReady + Write, D: Direction, C: Clock> Encoder<U, D, C> {
         let on_ns = self.clock.now_ns();
         while self.clock.now_ns() < on_ns.saturating_add(self.line.driver_lead_ns.into()) {}
         let start_ns = self.clock.now_ns();
-        // The worst is assumed until the end is known: an early return leaves it so. So once more after the
-        // request: whoever had the processor meanwhile has held it up.
-        self.state.soil(worst_ns(&self.line, request, start_ns));
+        self.state.begin(longest_ns(&self.line, request));
         let mut transaction = Transaction::start(request, self.line, start_ns);
         send(&mut self.uart, request.emit().as_bytes())?;
-        self.state.soil(worst_ns(&self.line, request, self.clock.now_ns()));
+        self.state.sent(self.clock.now_ns());
         // What `flush` means differs between UARTs; by the clock the last bit has left at this time.
         while self.clock.now_ns() < transaction.request_end_ns() {}
         guard.receive().map_err(Error::Pin)?;
@@ -162,7 +160,7 @@ impl<U: Read + ReadReady + Write, D: Direction, C: Clock> Encoder<U, D, C> {
     /// Waits until the line is free, and throws away what comes meanwhile, errors of the UART included.
     fn settle(&mut self) -> Result<(), Failure<U, D>> {
         let uart = &mut self.uart;
-        let quiet = quiet::wait(&self.state, &mut self.clock, || match uart.read_ready() {
+        let quiet = quiet::wait(&mut self.state, &mut self.clock, || match uart.read_ready() {
             Ok(true) => match uart.read(&mut [0; MAX_BYTES]) {
                 Ok(0) => Err(Error::Closed),
                 Ok(_) | Err(_) => Ok(true),

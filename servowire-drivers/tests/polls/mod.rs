@@ -20,6 +20,12 @@ pub fn run<T>(future: impl Future<Output = T>, most: usize) -> Option<T> {
     })
 }
 
+/// Gives the processor away once.
+pub async fn pause() {
+    let mut asked = false;
+    poll_fn(|_| if std::mem::replace(&mut asked, true) { Poll::Ready(()) } else { Poll::Pending }).await;
+}
+
 /// Waits by looking at the clock at every poll.
 pub struct Looks<C>(pub C);
 
