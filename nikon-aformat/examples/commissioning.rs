@@ -7,7 +7,7 @@
 use nikon_aformat::bus::{Addresses, Bus};
 use nikon_aformat::device::{Behaviour, Device, Encoders};
 use nikon_aformat::master::{
-    EepromRead, GuardedReset, Line, Polling, Progress, Reading, Reset, Step, Transaction, VerifiedWrite, Write,
+    EepromRead, Exchange, GuardedReset, Line, Polling, Progress, Reset, Step, Transaction, VerifiedWrite, Write,
 };
 use nikon_aformat::{
     Alm, BitOrder, BitRate, EncoderAddress, EncoderId, Error, FRAME_BITS, Operation, PmAlm, Policy, Request,
@@ -69,16 +69,16 @@ fn read(bench: &mut Bench<1>, ea: EncoderAddress) -> Result<(), Error> {
     let mut trusting = trusting.trusting_es0_of_the_first_response();
     let first = trusting.start(bench.now_ns);
     println!("wrong: {:#06x}", bench.drive(first, |outcome, now_ns| trusting.receive(outcome, now_ns))?);
-    let reading = bench.transact(Request::new(ea, Operation::Temperature))?;
-    if let Some(temperature) = reading.response.temperature() {
+    let exchange = bench.transact(Request::new(ea, Operation::Temperature))?;
+    if let Some(temperature) = exchange.response.temperature() {
         let (above, below) = (temperature.milli_celsius(), temperature.signed_milli_celsius());
         println!("{above} or, if encoders send negative numbers, {below} thousandths of a degree");
     }
     let resolution = Resolution::default();
-    let reading = bench.transact(Request::new(ea, Operation::Abs24Status))?;
+    let exchange = bench.transact(Request::new(ea, Operation::Abs24Status))?;
     let policy = Policy::STRICT.tolerating_alarms(Alm::BATT).with_max_age_ns(1_000_000);
-    println!("any status bit: {}", reading.response.has_status());
-    match reading.position(resolution, policy, bench.now_ns) {
+    println!("any status bit: {}", exchange.response.has_status());
+    match exchange.position(resolution, policy, bench.now_ns) {
         Ok(position) => println!("{} degrees", resolution.degrees_f32(position.single_turn)),
         Err(doubt) => println!("not to be used: {doubt}"),
     }
@@ -127,7 +127,7 @@ impl<const N: usize> Bench<N> {
     }
 
     /// One request and its response, the frames carried from one end to the other.
-    fn transact(&mut self, request: Request) -> Result<Reading, Error> {
+    fn transact(&mut self, request: Request) -> Result<Exchange, Error> {
         let mut transaction = Transaction::start(request, Resolution::default(), self.line, self.now_ns);
         let frame_ns = u64::from(RATE.bits_ns(FRAME_BITS));
         let mut answers = [None; N];
@@ -160,7 +160,7 @@ impl<const N: usize> Bench<N> {
             match step {
                 Step::Send { request, not_before_ns } => {
                     self.now_ns = self.now_ns.max(not_before_ns);
-                    let outcome = self.transact(request).map(|reading| reading.response);
+                    let outcome = self.transact(request).map(|exchange| exchange.response);
                     step = receive(outcome, self.now_ns);
                 }
                 Step::Done { value, ready_ns } => {

@@ -27,7 +27,7 @@ pub use guarded::GuardedReset;
 pub use line::Line;
 pub use reset::Reset;
 pub use servowire_core::{ErrorRate, Polling};
-pub use transaction::{BusTransaction, Reading, Sampled, Transaction};
+pub use transaction::{BusTransaction, Exchange, Sampled, Transaction};
 pub use verified::VerifiedWrite;
 pub use write::Write;
 

@@ -10,7 +10,7 @@
 
 use nikon_aformat::bus::Addresses;
 use nikon_aformat::master::{
-    BusTransaction, Detection, EepromRead, GuardedReset, Line, Polling, Progress, Reading, Reset, Sampled, Step,
+    BusTransaction, Detection, EepromRead, Exchange, GuardedReset, Line, Polling, Progress, Reset, Sampled, Step,
     Transaction, VerifiedWrite, Write,
 };
 use nikon_aformat::{
@@ -242,9 +242,9 @@ fn a_guarded_reset_waits_for_a_busy_encoder() {
 fn a_position_from_the_future_is_as_old_as_it_is_far_away() {
     let response = Response::abs17(THREE, EncoderStatus::empty(), U17::truncate(77));
     let sampled = Sampled { earliest_ns: 5_000_000_000, latest_ns: 5_000_003_000 };
-    let reading = Reading { response, sampled };
+    let exchange = Exchange { response, sampled };
     let policy = Policy::STRICT.with_max_age_ns(125_000);
-    let at = |now_ns| reading.position(Resolution::new(17, 16).unwrap(), policy, now_ns).map(|p| p.single_turn);
+    let at = |now_ns| exchange.position(Resolution::new(17, 16).unwrap(), policy, now_ns).map(|p| p.single_turn);
     assert_eq!((at(5_000_125_000), at(4_999_875_000)), (Ok(77), Ok(77)));
     assert_eq!(at(17), Err(Doubt::Old { age_ns: 4_999_999_983 }));
 }
@@ -265,7 +265,7 @@ fn frames_with_one_stamp_are_as_old_as_the_last_of_them() {
             let _ = bus.frame(*content, end_ns);
         }
         let alone = matches!(single.progress(), Progress::Done { .. });
-        assert_eq!(alone, bus.reading(EncoderAddress::ZERO).is_some());
+        assert_eq!(alone, bus.exchange(EncoderAddress::ZERO).is_some());
         alone
     };
     assert!(!heard(6_100) && !heard(6_749) && heard(20_000));

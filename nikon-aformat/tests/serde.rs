@@ -5,7 +5,7 @@
 use core::fmt::Debug;
 
 use nikon_aformat::bus::{Arrival, Outcome};
-use nikon_aformat::master::{Reading, Sampled};
+use nikon_aformat::master::{Exchange, Sampled};
 use nikon_aformat::{
     Alm, Doubt, EncoderAddress, EncoderId, EncoderStatus, Error, Operation, PmAlm, Policy, Request, RequestFrame,
     Resolution, Response, Temperature, U10, U17, U19, U24, U40, UserAddress, Version,
@@ -89,9 +89,9 @@ fn requests() {
 fn readings_and_doubts() {
     let es = EncoderStatus::BATT;
     let response = Response::abs17(EncoderAddress::MAX, es, U17::truncate(77));
-    let reading = Reading { response, sampled: Sampled { earliest_ns: 7_200, latest_ns: 10_000 } };
-    assert_eq!(reading.to_string(), "from 7: ABS17 ES any ABS 0x0004d, sampled from 7200 to 10000 ns");
-    round_trip(reading);
+    let exchange = Exchange { response, sampled: Sampled { earliest_ns: 7_200, latest_ns: 10_000 } };
+    assert_eq!(exchange.to_string(), "from 7: ABS17 ES any ABS 0x0004d, sampled from 7200 to 10000 ns");
+    round_trip(exchange);
     round_trip(Outcome::Duplicate { first: response });
     round_trip(Arrival { outcome: Err(Error::Crc { got: 1, want: 2 }), duplicate: false, extra: true });
     for doubt in [Doubt::Status { es }, Doubt::AnyStatus, Doubt::Alarms { alarms: Alm::BATT }, Doubt::Absent] {

@@ -4,7 +4,7 @@
 #![allow(clippy::unwrap_used, clippy::panic)]
 
 use nikon_aformat::bus::{Addresses, Outcome};
-use nikon_aformat::master::{BusTransaction, Cycle, Line, PeriodTooShort, Progress, Reading, Sampled, Transaction};
+use nikon_aformat::master::{BusTransaction, Cycle, Exchange, Line, PeriodTooShort, Progress, Sampled, Transaction};
 use nikon_aformat::{
     BitOrder, BitRate, Command, Data, Doubt, EncoderAddress, EncoderStatus, Error, Operation, Policy, Request,
     Resolution, Response, U40,
@@ -37,7 +37,7 @@ fn start(line: Line) -> Transaction {
 }
 
 /// Frames one by one, the first start bit at `begin_ns`.
-fn feed(transaction: &mut Transaction, contents: &[u16], begin_ns: u64) -> Progress<Reading> {
+fn feed(transaction: &mut Transaction, contents: &[u16], begin_ns: u64) -> Progress<Exchange> {
     for (k, content) in (1..).zip(contents) {
         let _ = transaction.frame(*content, begin_ns + k * FRAME_NS);
     }
@@ -165,7 +165,7 @@ fn when_it_is_over() {
     assert_eq!(feed(&mut silent, &frames(Command::Abs40, 3), 8_000), failed);
 
     let sampled = Sampled { earliest_ns: 4_500, latest_ns: 8_000 };
-    let value = Reading { response: response(Command::Abs40, 3, 0), sampled };
+    let value = Exchange { response: response(Command::Abs40, 3, 0), sampled };
     let done = Progress::Done { value, ready_ns: 8_000 + 18_000 + 10_000 };
     let mut answered = start(LINE);
     assert_eq!(feed(&mut answered, &frames(Command::Abs40, 3), 8_000), done);
@@ -272,7 +272,7 @@ fn a_bus_ends_by_its_addresses() {
     assert_eq!(speaks(&mut all, 1, 30_000), pending);
     let mut lost = all;
     assert_eq!(speaks(&mut all, 2, 52_000), done);
-    let read = |bus: &BusTransaction, address| bus.reading(ea(address)).map(|reading| reading.sampled);
+    let read = |bus: &BusTransaction, address| bus.exchange(ea(address)).map(|exchange| exchange.sampled);
     assert_eq!(read(&all, 1), Some(Sampled { earliest_ns: 4_500, latest_ns: 30_000 }));
     assert_eq!(read(&all, 2), Some(Sampled { earliest_ns: 4_500, latest_ns: 52_000 }));
     assert_eq!((read(&all, 0), all.bus().of(ea(0))), (None, Outcome::Extra(response(Command::Abs40Mt, 0, 0))));
@@ -328,11 +328,11 @@ fn several_responses_in_a_block() {
 fn the_age_of_a_position() {
     let resolution = Resolution::default();
     let sampled = Sampled { earliest_ns: 4_500, latest_ns: 8_000 };
-    let reading = Reading { response: response(Command::Abs40, 3, 77), sampled };
+    let exchange = Exchange { response: response(Command::Abs40, 3, 77), sampled };
     let policy = Policy::STRICT.with_max_age_ns(1_000_000);
-    let at = |now_ns| reading.position(resolution, policy, now_ns).map(|position| position.single_turn);
+    let at = |now_ns| exchange.position(resolution, policy, now_ns).map(|position| position.single_turn);
     assert_eq!((at(0), at(1_004_500), at(1_004_501)), (Ok(77), Ok(77), Err(Doubt::Old { age_ns: 1_000_001 })));
-    assert!(reading.position(resolution, Policy::STRICT, u64::MAX).is_ok());
+    assert!(exchange.position(resolution, Policy::STRICT, u64::MAX).is_ok());
 }
 
 /// The grid of a period stands still.

@@ -66,7 +66,7 @@ macro_rules! receiver {
         }
     };
 }
-receiver!(Transaction => nikon_aformat::master::Reading);
+receiver!(Transaction => nikon_aformat::master::Exchange);
 receiver!(BusTransaction => ());
 
 /// How long this request and the longest answer to it take.

@@ -75,7 +75,7 @@ fn hostile_events_are_survived() {
         let bench = Bench::with(scenario(seed, 1, deliveries()[seed as usize % 3]), 1, true);
         let mut encoder = driver(&bench);
         for call in 0..100 {
-            let result = encoder.read_abs40(EncoderAddress::ZERO).map(|reading| shaft(reading.response));
+            let result = encoder.read_abs40(EncoderAddress::ZERO).map(|exchange| shaft(exchange.response));
             assert!(!matches!(result, Err(Error::Closed | Error::NeverQuiet)), "seed {seed}, call {call}: {result:?}");
             bench.borrow_mut().judge(calls, Some(result), seed, call);
         }
@@ -93,7 +93,7 @@ fn hostile_events_on_a_bus_are_survived() {
         for call in 0..100 {
             let answers = bus.read_all(Operation::Abs40Mt, asked).unwrap();
             for ea in asked.iter() {
-                let value = answers.reading(ea).map(|reading| shaft(reading.response)).ok_or("missing");
+                let value = answers.exchange(ea).map(|exchange| shaft(exchange.response)).ok_or("missing");
                 // Somebody repeats an old answer: which one is the encoder's is not known, so none is given.
                 if value.is_ok() || !answers.bus().duplicates().contains(ea) {
                     bench.borrow().judge_one(calls, ea.get(), value, seed, call);
@@ -129,10 +129,10 @@ fn a_bus_is_read_in_its_cycle() {
     let mut cycle = Cycle::new(1_000_000, 900_000, 50_000).unwrap();
     for turn in 1..=4 {
         let answers = bus.read_cycle(&mut cycle, Operation::Abs40Mt, asked).unwrap();
-        let good: Vec<_> = asked.iter().filter_map(|ea| answers.reading(ea).map(|reading| (ea, reading))).collect();
+        let good: Vec<_> = asked.iter().filter_map(|ea| answers.exchange(ea).map(|exchange| (ea, exchange))).collect();
         let shaft = bench.borrow().asked_at;
-        for (ea, reading) in &good {
-            let abs = reading.response.abs40().unwrap().get();
+        for (ea, exchange) in &good {
+            let abs = exchange.response.abs40().unwrap().get();
             assert_eq!(abs, u64::from(shaft) | (3 + u64::from(ea.get())) << 20);
         }
         assert_eq!(good.len(), if turn == 1 { 4 } else { 5 });

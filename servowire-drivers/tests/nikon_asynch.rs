@@ -61,7 +61,7 @@ fn a_bus_is_read() {
     let asked = Addresses::first(3);
     let answers = run(bus.read_all(Operation::Abs40Mt, asked), FOR_EVER).unwrap().unwrap();
     for ea in asked.iter() {
-        let abs = answers.reading(ea).unwrap().response.abs40().unwrap().get();
+        let abs = answers.exchange(ea).unwrap().response.abs40().unwrap().get();
         assert_eq!(abs, u64::from(bench.borrow().asked_at) | (3 + u64::from(ea.get())) << 20);
     }
     run(bus.clear_status(EncoderAddress::ZERO), FOR_EVER).unwrap().unwrap();
@@ -78,7 +78,7 @@ fn a_future_of_a_bus_may_be_dropped_at_any_point() {
         let second = run(bus.read_all(Operation::Abs40Mt, asked), FOR_EVER).unwrap().unwrap();
         let bench = bench.borrow();
         for ea in asked.iter() {
-            let shaft = shaft(second.reading(ea).unwrap().response);
+            let shaft = shaft(second.exchange(ea).unwrap().response);
             let verdict = bench.world.truth().verdict(bench.request.unwrap(), shaft.into());
             assert_eq!(verdict, Verdict::Fresh, "{ea} after {polls} polls");
         }
@@ -99,7 +99,7 @@ fn hostile_events_are_survived() {
         for call in 0..100_usize {
             let polls = if call % 5 == 4 { call * 5 + seed as usize % 5 } else { FOR_EVER };
             let outcome = run(encoder.read_abs40(EncoderAddress::ZERO), polls);
-            let outcome = outcome.map(|result| result.map(|reading| shaft(reading.response)));
+            let outcome = outcome.map(|result| result.map(|exchange| shaft(exchange.response)));
             assert!(!matches!(outcome, Some(Err(Error::Closed | Error::NeverQuiet))), "seed {seed}, call {call}");
             bench.borrow_mut().judge(calls, outcome, seed, call);
         }
@@ -120,7 +120,7 @@ fn hostile_events_on_a_bus_are_survived() {
             let answers = run(bus.read_all(Operation::Abs40Mt, asked), polls);
             calls.dropped += u64::from(answers.is_none());
             for (ea, answers) in asked.iter().filter_map(|ea| answers.map(|answers| (ea, answers.unwrap()))) {
-                let value = answers.reading(ea).map(|reading| shaft(reading.response)).ok_or("missing");
+                let value = answers.exchange(ea).map(|exchange| shaft(exchange.response)).ok_or("missing");
                 // Somebody repeats an old answer: which one is the encoder's is not known, so none is given.
                 if value.is_ok() || !answers.bus().duplicates().contains(ea) {
                     bench.borrow().judge_one(calls, ea.get(), value, seed, call);

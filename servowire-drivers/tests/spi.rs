@@ -140,16 +140,16 @@ fn aformat_at_an_spi() {
         let clock = frames::Port(bench.clone());
         let mut master = nikon::blocking::Master::new(port, clock, Resolution::default(), frames::line());
         for _ in 0..5 {
-            let reading = master.read_abs40(EncoderAddress::ZERO).unwrap();
-            let abs = reading.response.abs40().unwrap().get();
+            let exchange = master.read_abs40(EncoderAddress::ZERO).unwrap();
+            let abs = exchange.response.abs40().unwrap().get();
             let bench = bench.borrow();
             assert_eq!(abs & 0xf_ffff, u64::from(bench.asked_at));
             let answer = bench.world.truth().answers(bench.request.unwrap()).next().unwrap();
-            assert!(reading.sampled.latest_ns.abs_diff(answer.start_ns) <= 700, "{per_bit}: {reading:?} {answer:?}");
+            assert!(exchange.sampled.latest_ns.abs_diff(answer.start_ns) <= 700, "{per_bit}: {exchange:?} {answer:?}");
         }
         let both = nikon_aformat::bus::Addresses::first(2);
         let answers = master.read_all(nikon_aformat::Operation::Abs40Mt, both).unwrap();
-        assert!(both.iter().all(|ea| answers.reading(ea).is_some()));
+        assert!(both.iter().all(|ea| answers.exchange(ea).is_some()));
         let word = master.read_eeprom(EncoderAddress::ZERO, 9);
         assert!(word.is_ok(), "a request of two frames: {word:?}");
         assert_eq!(bench.borrow().world.truth().clashes(), 0);
@@ -182,7 +182,7 @@ fn hostile_events_of_aformat_are_survived() {
         let clock = frames::Port(bench.clone());
         let mut master = nikon::blocking::Master::new(port, clock, Resolution::default(), frames::line());
         for call in 0..100 {
-            let result = master.read_abs40(EncoderAddress::ZERO).map(|reading| frames::shaft(reading.response));
+            let result = master.read_abs40(EncoderAddress::ZERO).map(|exchange| frames::shaft(exchange.response));
             bench.borrow_mut().judge(calls, Some(result), seed, call);
         }
         *bench.borrow().world.tally()
@@ -269,7 +269,7 @@ mod asynch {
             for call in 0..100_usize {
                 let polls = if call % 4 == 3 { call * 8 + seed as usize % 8 } else { FOR_EVER };
                 let outcome = run(master.read_abs40(EncoderAddress::ZERO), polls);
-                let outcome = outcome.map(|result| result.map(|reading| frames::shaft(reading.response)));
+                let outcome = outcome.map(|result| result.map(|exchange| frames::shaft(exchange.response)));
                 bench.borrow_mut().judge(calls, outcome, seed, call);
             }
             *bench.borrow().world.tally()

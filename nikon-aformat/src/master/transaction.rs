@@ -25,23 +25,23 @@ pub struct Sampled {
 /// A response, and when its values were sampled.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub struct Reading {
+pub struct Exchange {
     /// What the encoder sent.
     pub response: Response,
     /// When it was sampled.
     pub sampled: Sampled,
 }
 
-impl fmt::Display for Reading {
+impl fmt::Display for Exchange {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Sampled { earliest_ns, latest_ns } = self.sampled;
         write!(f, "{}, sampled from {earliest_ns} to {latest_ns} ns", self.response)
     }
 }
 
-servowire_core::format_as_displayed!(Reading);
+servowire_core::format_as_displayed!(Exchange);
 
-impl Reading {
+impl Exchange {
     /// The position for control at `now_ns`: only if nothing speaks against its use, its age included. See
     /// [`Resolution::read`].
     ///
@@ -77,7 +77,7 @@ pub struct Transaction {
     asked_ns: u64,
     until_ns: u64,
     refused: Option<Error>,
-    end: Option<Result<Reading, Error>>,
+    end: Option<Result<Exchange, Error>>,
     ready_ns: u64,
 }
 
@@ -109,12 +109,12 @@ impl Transaction {
 
     /// A frame was received whose start bit and delimiter are right, its delimiter at `end_ns`; `content` are its bits, the first
     /// of the line in bit 0.
-    pub fn frame(&mut self, content: u16, end_ns: u64) -> Progress<Reading> {
+    pub fn frame(&mut self, content: u16, end_ns: u64) -> Progress<Exchange> {
         self.block(&[Some(content)], 0, end_ns)
     }
 
     /// A frame was received whose delimiter, at `end_ns`, reads 0.
-    pub fn framing_error(&mut self, end_ns: u64) -> Progress<Reading> {
+    pub fn framing_error(&mut self, end_ns: u64) -> Progress<Exchange> {
         self.block(&[None], 0, end_ns)
     }
 
@@ -122,13 +122,13 @@ impl Transaction {
     /// begun before `since_ns` (0 if that is not known). `None` stands for a frame whose delimiter reads 0.
     ///
     /// With nothing known of pauses in the block, the response has to be at its end, unless `since_ns` is after the request.
-    pub fn block(&mut self, frames: &[Option<u16>], since_ns: u64, end_ns: u64) -> Progress<Reading> {
+    pub fn block(&mut self, frames: &[Option<u16>], since_ns: u64, end_ns: u64) -> Progress<Exchange> {
         if self.end.is_none() {
             let Self { hunt, line, expected, refused, end, ready_ns, asked_ns, until_ns, .. } = self;
             hunt.take(line, expected, Block { frames, since_ns, end_ns }, |found| match found.outcome {
                 Ok(response) if end.is_none() => {
                     let sampled = Sampled { earliest_ns: *asked_ns, latest_ns: found.began_ns };
-                    *end = Some(Ok(Reading { response, sampled }));
+                    *end = Some(Ok(Exchange { response, sampled }));
                     let others = expected.command().is_multi_response();
                     let free_ns = if others { found.end_ns.max(*until_ns) } else { found.end_ns };
                     *ready_ns = free_ns.saturating_add(line.request_gap_ns.into());
@@ -141,7 +141,7 @@ impl Transaction {
     }
 
     /// Where the transaction stands at `now_ns`; it fails if no answer can come any more.
-    pub fn poll(&mut self, now_ns: u64) -> Progress<Reading> {
+    pub fn poll(&mut self, now_ns: u64) -> Progress<Exchange> {
         if self.end.is_none() && now_ns > self.until_ns {
             let Self { hunt, expected, refused, .. } = self;
             hunt.finish(expected, |Found { outcome, .. }| *refused = refused.or(outcome.err()));
@@ -152,7 +152,7 @@ impl Transaction {
     }
 
     /// Where the transaction stands.
-    pub const fn progress(&self) -> Progress<Reading> {
+    pub const fn progress(&self) -> Progress<Exchange> {
         match self.end {
             None => Progress::Pending { until_ns: self.until_ns.saturating_add(1) },
             Some(Ok(value)) => Progress::Done { value, ready_ns: self.ready_ns },
@@ -283,9 +283,9 @@ impl BusTransaction {
     }
 
     /// The good response of an encoder that was asked, and when its values were sampled.
-    pub fn reading(&self, ea: EncoderAddress) -> Option<Reading> {
+    pub fn exchange(&self, ea: EncoderAddress) -> Option<Exchange> {
         let Outcome::Good(response) = self.bus.of(ea) else { return None };
         let latest_ns = self.began_ns.get(usize::from(ea.get())).copied().unwrap_or(0);
-        Some(Reading { response, sampled: Sampled { earliest_ns: self.asked_ns, latest_ns } })
+        Some(Exchange { response, sampled: Sampled { earliest_ns: self.asked_ns, latest_ns } })
     }
 }

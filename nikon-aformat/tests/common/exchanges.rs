@@ -349,10 +349,10 @@ pub fn bus(setup: &Setup, turns: u64, shown: &mut Shown) {
         }
         if on_time(&bench, id, at_ns) {
             for ea in asked.iter() {
-                if let Some(reading) = transaction.reading(ea) {
+                if let Some(exchange) = transaction.exchange(ea) {
                     shown.good += 1;
-                    let _ = judge(&bench, id, value_of(reading.response.emit().contents()), shown, setup);
-                    is_where_the_shaft_was(&bench, &reading.response, setup);
+                    let _ = judge(&bench, id, value_of(exchange.response.emit().contents()), shown, setup);
+                    is_where_the_shaft_was(&bench, &exchange.response, setup);
                     continue;
                 }
                 shown.failed += 1;

@@ -6,7 +6,7 @@ use core::ops::ControlFlow;
 
 use nikon_aformat::bus::Addresses;
 use nikon_aformat::master::{
-    BusTransaction, Cycle, EepromRead, GuardedReset, Line, Progress, Reading, Reset, Step, Transaction,
+    BusTransaction, Cycle, EepromRead, Exchange, GuardedReset, Line, Progress, Reset, Step, Transaction,
 };
 use nikon_aformat::{Doubt, EncoderAddress, Operation, Policy, Position, Request, RequestFrame, Resolution, Response};
 
@@ -65,20 +65,20 @@ impl<F: FramePort, T: Timer> Master<F, T> {
     /// # Errors
     /// [`Error`], [`Error::Doubt`] among them.
     pub async fn read_position(&mut self, ea: EncoderAddress, policy: Policy) -> Result<Position, Failure<F>> {
-        let reading = self.read_abs40(ea).await?;
-        reading.position(self.resolution, policy, self.timer.now_ns()).map_err(Error::Doubt)
+        let exchange = self.read_abs40(ea).await?;
+        exchange.position(self.resolution, policy, self.timer.now_ns()).map_err(Error::Doubt)
     }
 
     /// Command 0: the whole position. Look at its encoder status before you use it.
     ///
     /// # Errors
     /// [`Error`].
-    pub async fn read_abs40(&mut self, ea: EncoderAddress) -> Result<Reading, Failure<F>> {
+    pub async fn read_abs40(&mut self, ea: EncoderAddress) -> Result<Exchange, Failure<F>> {
         self.transact(Request::new(ea, Operation::Abs40)).await
     }
 
     /// A multi-response command: the answers of all encoders to one request. What came of each
-    /// [`BusTransaction::reading`] says; one that is missing or damaged costs no other one.
+    /// [`BusTransaction::exchange`] says; one that is missing or damaged costs no other one.
     ///
     /// # Errors
     /// [`Error`]. Missing answers are none.
@@ -142,7 +142,7 @@ impl<F: FramePort, T: Timer> Master<F, T> {
                 ControlFlow::Break(end) => return end.map_err(Error::Protocol),
             };
             self.timer.wait_until(not_before_ns).await;
-            let exchanged = self.transact(request).await.map(|reading| reading.response);
+            let exchanged = self.transact(request).await.map(|exchange| exchange.response);
             let outcome = procedure::outcome(exchanged, LOST)?;
             step = receive(outcome, self.state.free_ns(self.timer.now_ns()));
         }
@@ -152,11 +152,11 @@ impl<F: FramePort, T: Timer> Master<F, T> {
     ///
     /// # Errors
     /// [`Error`].
-    pub async fn transact(&mut self, request: Request) -> Result<Reading, Failure<F>> {
+    pub async fn transact(&mut self, request: Request) -> Result<Exchange, Failure<F>> {
         let (resolution, line) = (self.resolution, self.line);
         let start = |now_ns| Transaction::start(request, resolution, line, now_ns);
-        let (_, reading) = self.exchange(request, line, start).await?;
-        Ok(reading)
+        let (_, exchange) = self.exchange(request, line, start).await?;
+        Ok(exchange)
     }
 
     /// One request and all that answers.

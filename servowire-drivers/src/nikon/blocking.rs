@@ -5,7 +5,7 @@ use core::ops::ControlFlow;
 
 use nikon_aformat::bus::Addresses;
 use nikon_aformat::master::{
-    BusTransaction, Cycle, EepromRead, GuardedReset, Line, Progress, Reading, Reset, Step, Transaction,
+    BusTransaction, Cycle, EepromRead, Exchange, GuardedReset, Line, Progress, Reset, Step, Transaction,
 };
 use nikon_aformat::{Doubt, EncoderAddress, Operation, Policy, Position, Request, RequestFrame, Resolution, Response};
 
@@ -65,20 +65,20 @@ impl<F: FramePort, C: Clock> Master<F, C> {
     /// # Errors
     /// [`Error`], [`Error::Doubt`] among them.
     pub fn read_position(&mut self, ea: EncoderAddress, policy: Policy) -> Result<Position, Failure<F>> {
-        let reading = self.read_abs40(ea)?;
-        reading.position(self.resolution, policy, self.clock.now_ns()).map_err(Error::Doubt)
+        let exchange = self.read_abs40(ea)?;
+        exchange.position(self.resolution, policy, self.clock.now_ns()).map_err(Error::Doubt)
     }
 
     /// Command 0: the whole position. Look at its encoder status before you use it.
     ///
     /// # Errors
     /// [`Error`].
-    pub fn read_abs40(&mut self, ea: EncoderAddress) -> Result<Reading, Failure<F>> {
+    pub fn read_abs40(&mut self, ea: EncoderAddress) -> Result<Exchange, Failure<F>> {
         self.transact(Request::new(ea, Operation::Abs40))
     }
 
     /// A multi-response command: the answers of all encoders to one request. What came of each
-    /// [`BusTransaction::reading`] says; one that is missing or damaged costs no other one.
+    /// [`BusTransaction::exchange`] says; one that is missing or damaged costs no other one.
     ///
     /// # Errors
     /// [`Error`]. Missing answers are none.
@@ -141,7 +141,7 @@ impl<F: FramePort, C: Clock> Master<F, C> {
                 ControlFlow::Break(end) => return end.map_err(Error::Protocol),
             };
             while self.clock.now_ns() < not_before_ns {}
-            let exchanged = self.transact(request).map(|reading| reading.response);
+            let exchanged = self.transact(request).map(|exchange| exchange.response);
             let outcome = procedure::outcome(exchanged, LOST)?;
             step = receive(outcome, self.state.free_ns(self.clock.now_ns()));
         }
@@ -151,11 +151,11 @@ impl<F: FramePort, C: Clock> Master<F, C> {
     ///
     /// # Errors
     /// [`Error`].
-    pub fn transact(&mut self, request: Request) -> Result<Reading, Failure<F>> {
+    pub fn transact(&mut self, request: Request) -> Result<Exchange, Failure<F>> {
         let (resolution, line) = (self.resolution, self.line);
         let start = |now_ns| Transaction::start(request, resolution, line, now_ns);
-        let (_, reading) = self.exchange(request, line, start)?;
-        Ok(reading)
+        let (_, exchange) = self.exchange(request, line, start)?;
+        Ok(exchange)
     }
 
     /// One request and all that answers.

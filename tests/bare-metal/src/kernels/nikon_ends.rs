@@ -4,7 +4,7 @@ use nikon_aformat::bus::{Addresses, Bus};
 use nikon_aformat::device::{Device, Transmission};
 use nikon_aformat::inspect::{Report, inspect};
 use nikon_aformat::master::{
-    BusTransaction, Counters, Cycle, Detected, Detection, EepromRead, ErrorRate, Line, Progress, Reading, Reset, Step,
+    BusTransaction, Counters, Cycle, Detected, Detection, EepromRead, ErrorRate, Exchange, Line, Progress, Reset, Step,
     Transaction, Write,
 };
 use nikon_aformat::reception::LineReceiver;
@@ -52,7 +52,7 @@ kernels! {
     } over LONG;
 
     /// A transaction from its start to the last frame of the reply, or to its time-out.
-    fn nikon_transaction(row: &Whole) -> Progress<Reading> {
+    fn nikon_transaction(row: &Whole) -> Progress<Exchange> {
         let mut transaction = Transaction::start(REQUESTS[0], Resolution::default(), LINE, 0);
         let mut now_ns = 3_000;
         let line = Window::read(&row.lsb_first, 0, 72, nikon_aformat::BitOrder::LsbFirst).unwrap_or(Window::EMPTY);
