@@ -11,6 +11,7 @@ mod line;
 mod mover;
 mod path;
 mod path_mover;
+mod peak;
 mod phases;
 mod plan;
 mod planner;

@@ -70,11 +70,15 @@ pub(super) struct Curve {
 impl Curve {
     pub(super) const MAX: usize = 8;
 
-    pub(super) const fn new() -> Self {
-        // Nothing but zero bytes: it is cleared, not copied.
+    /// Nothing but zero bytes: it is cleared, not copied.
+    const EMPTY: Self = {
         let none = Real::ZERO;
         let none = Piece { time: none, p: none, v: none, a: none, j: none, up: false, bend: Bend::Growing };
         Self { pieces: [none; Self::MAX], len: 0, time: Real::ZERO, p: Real::ZERO, skipped: (Real::ZERO, Real::ZERO) }
+    };
+
+    pub(super) const fn new() -> Self {
+        Self::EMPTY
     }
 
     /// Without pieces.
@@ -114,17 +118,24 @@ impl Curve {
     /// Adds a change of speed.
     pub(super) fn slope(&mut self, slope: &Slope) {
         let Slope { from, to, edge, flat, j, a, distance: whole, .. } = *slope;
-        let (up, dv) = (to > from, from.distance(to));
-        if dv.is_zero() {
+        if from == to {
+            return;
+        }
+        let up = to > from;
+        if edge.is_zero() {
+            self.push((flat, whole), [from, a, Real::ZERO], up, Bend::Flat);
             return;
         }
         let bent = (a * edge).half();
-        // The middle has the mean speed.
-        let first = from.along(bent * THIRD, up) * edge;
-        let middle = if edge.is_zero() { whole } else { (from + to).half() * flat };
-        self.push((edge, first), [from, Real::ZERO, j], up, Bend::Growing);
-        self.push((flat, middle), [from.along(bent, up), a, Real::ZERO], up, Bend::Flat);
-        self.push((edge, whole - (first + middle)), [to.along(bent, !up), a, j], up, Bend::Fading);
+        let mut way = from.along(bent * THIRD, up) * edge;
+        self.push((edge, way), [from, Real::ZERO, j], up, Bend::Growing);
+        if !flat.is_zero() {
+            // It has the mean speed.
+            let middle = (from + to).half() * flat;
+            self.push((flat, middle), [from.along(bent, up), a, Real::ZERO], up, Bend::Flat);
+            way = way + middle;
+        }
+        self.push((edge, whole - way), [to.along(bent, !up), a, j], up, Bend::Fading);
     }
 
     /// Adds a stretch at constant speed.

@@ -56,6 +56,11 @@ impl Clock {
         self.0 << self.shift()
     }
 
+    /// A moment, in seconds.
+    pub(super) fn seconds(self) -> Real {
+        Real::ONE / Real::new(self.moments().into())
+    }
+
     /// The tick nearest to a moment, half up.
     pub(super) const fn tick(self, moment: u64) -> u64 {
         let shift = self.shift();
@@ -172,7 +177,11 @@ impl Limits {
 
     /// In steps and moments.
     pub(super) fn bounds(self, clock: Clock) -> Bounds {
-        let moment = Real::ONE / Real::new(clock.moments().into());
+        self.bounds_in(clock.seconds())
+    }
+
+    /// The same, with a moment in seconds.
+    pub(super) fn bounds_in(self, moment: Real) -> Bounds {
         let squared = moment.squared();
         let (speed, acceleration) =
             (Real::new(self.speed.into()) * moment, Real::new(self.acceleration.into()) * squared);

@@ -45,17 +45,31 @@ impl Plan {
     /// # Errors
     /// As [`new`](Self::new), and [`Error::TooShort`] if the change of speed needs more steps.
     pub fn between(clock: Clock, limits: Limits, steps: u32, entry: u32, exit: u32) -> Result<Self, Error> {
-        let bounds = checked(clock, limits)?;
+        check(clock, limits)?;
         let to = position(steps)?;
-        let speed = |hz: u32| (Real::new(hz.into()) / Real::new(clock.moments().into())).min(bounds.v);
+        let moment = clock.seconds();
+        let bounds = limits.bounds_in(moment);
+        let speed = |hz: u32| (Real::new(hz.into()) * moment).min(bounds.v);
         let goal = Goal::At(Real::new(steps.into()), speed(exit));
-        let mut own = Self { clock, phases: Phases::rest(clock.shift(), 0, 0) };
-        let Phases { curve, frame } = &mut own.phases;
-        frame.to = Some(to);
-        match plan_into(curve, Motion::steady(speed(entry)), goal, &bounds) {
-            Ok(()) => Ok(own),
-            Err(need) => Err(too_short(steps, need)),
+        Self::planned(clock, (steps, to), Motion::steady(speed(entry)), goal, &bounds)
+    }
+
+    /// The plan itself, made where it is returned: it is large.
+    fn planned(
+        clock: Clock,
+        (steps, to): (u32, i64),
+        start: Motion,
+        goal: Goal,
+        bounds: &Bounds,
+    ) -> Result<Self, Error> {
+        let mut own = Ok(Self { clock, phases: Phases::rest(clock.shift(), 0, 0) });
+        if let Ok(Self { phases: Phases { curve, frame }, .. }) = &mut own {
+            frame.to = Some(to);
+            if let Err(need) = plan_into(curve, start, goal, bounds) {
+                own = Err(too_short(steps, need));
+            }
         }
+        own
     }
 
     /// The clock of the ticks.
@@ -184,11 +198,15 @@ impl fmt::Display for State {
 }
 
 /// Half the clock at most, so that each tick has one step.
-pub(super) fn checked(clock: Clock, limits: Limits) -> Result<Bounds, Error> {
+fn check(clock: Clock, limits: Limits) -> Result<(), Error> {
     let limit = clock.hz() / 2;
-    if limits.speed() > limit {
-        return Err(Error::SpeedAboveClock { speed: limits.speed(), limit });
-    }
+    let speed = limits.speed();
+    if speed > limit { Err(Error::SpeedAboveClock { speed, limit }) } else { Ok(()) }
+}
+
+/// What follows from limits that the clock allows.
+pub(super) fn checked(clock: Clock, limits: Limits) -> Result<Bounds, Error> {
+    check(clock, limits)?;
     Ok(limits.bounds(clock))
 }
 

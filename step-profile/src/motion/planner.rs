@@ -6,8 +6,9 @@
 
 use super::curve::{Bend, Curve};
 use super::limits::{Bounds, Jerk};
+use super::peak::Peak;
 use super::real::{Real, THIRD};
-use super::slope::{Slope, distance};
+use super::slope::{Slope, distance, most_distance};
 
 /// Speed and acceleration.
 #[derive(Debug, Clone, Copy)]
@@ -150,15 +151,17 @@ fn falling(curve: &mut Curve, start: Motion, bent: &Bent, goal: Goal, bounds: &B
     let high = low.min(bounds.v).max(exit);
     let v = crossing(exit, high, target, need);
     bent.on_the_slope(curve);
-    finish(curve, [base, v, exit], target, bounds);
+    finish(curve, [base, v, exit], Some(target), bounds);
     Ok(())
 }
 
-/// Slope, cruise, slope.
-fn finish(curve: &mut Curve, [from, top, exit]: [Real; 3], n: Real, bounds: &Bounds) {
+/// Slope, cruise for the rest of the distance if there is one to make, slope.
+fn finish(curve: &mut Curve, [from, top, exit]: [Real; 3], n: Option<Real>, bounds: &Bounds) {
     let (up, down) = (Slope::new(from, top, bounds), Slope::new(top, exit, bounds));
     curve.slope(&up);
-    curve.cruise(top, n - (up.distance + down.distance));
+    if let Some(n) = n {
+        curve.cruise(top, n - (up.distance + down.distance));
+    }
     curve.slope(&down);
 }
 
@@ -167,7 +170,8 @@ fn steady(curve: &mut Curve, from: Real, goal: Goal, bounds: &Bounds) -> Result<
     match goal {
         Goal::At(n, exit) => {
             let top = top(from, goal, bounds)?;
-            finish(curve, [from, top, exit], n, bounds);
+            // A peak below the greatest speed is that of slopes that take all of the distance.
+            finish(curve, [from, top, exit], Some(n).filter(|_| top >= bounds.v), bounds);
         }
         Goal::Speed(v) => {
             curve.slope(&Slope::new(from, v, bounds));
@@ -183,72 +187,37 @@ fn top(from: Real, goal: Goal, bounds: &Bounds) -> Result<Real, Real> {
         Goal::At(n, exit) => (n, exit),
         Goal::Speed(v) => return Ok(v),
     };
-    let least = distance(from, exit, bounds);
-    if least > n + SLACK {
-        return Err(least);
+    if most_distance(from, exit, bounds) > n {
+        let least = distance(from, exit, bounds);
+        if least > n + SLACK {
+            return Err(least);
+        }
     }
-    let need = |v| distance(from, v, bounds) + distance(v, exit, bounds);
-    if need(bounds.v) <= n {
-        return Ok(bounds.v);
+    let fits = |v| distance(from, v, bounds) + distance(v, exit, bounds) <= n;
+    let (low, high) = if from > exit { (exit, from) } else { (from, exit) };
+    if high >= bounds.v {
+        return Ok(if fits(bounds.v) { bounds.v } else { high });
     }
-    let low = from.max(exit);
-    if low >= bounds.v {
-        return Ok(low);
+    // The square of the peak speed without a jerk limit; with one it is less.
+    let most = bounds.a * n + (from.squared() + exit.squared()).half();
+    let is_far = bounds.v.squared() <= most;
+    match &bounds.jerk {
+        None if is_far => Ok(bounds.v),
+        None => Ok(most.sqrt().min(bounds.v).max(high)),
+        Some(_) if is_far && fits(bounds.v) => Ok(bounds.v),
+        Some(jerk) => Ok(Peak { low, high, n }.speed(bounds, jerk).min(bounds.v).max(high)),
     }
-    // Without a jerk limit: v² = a n + (v0² + v1²) / 2. With one it is less.
-    let sum = bounds.a * n + (from.squared() + exit.squared()).half();
-    let Some(jerk) = bounds.jerk else { return Ok(sum.sqrt().min(bounds.v).max(low)) };
-    // Both slopes reach the greatest acceleration: v² + (a²/j) v = sum - (v0 + v1) a²/2j.
-    let knee = jerk.knee.half();
-    let rest = sum - (from + exit) * knee;
-    let v = rest / (knee + (knee.squared() + rest).sqrt());
-    if v >= low + jerk.knee {
-        return Ok(v);
-    }
-    // Each slope takes at least dv sqrt(dv / j), both together just n if they begin and end at rest and only jerk.
-    let steep = (n.squared() * jerk.j).scaled(-2).cbrt();
-    let high = (low + steep).min(sum.sqrt()).min(bounds.v);
-    Ok(climb(low, high, n, |v| {
-        let (up, down) = (Slope::new(from, v, bounds), Slope::new(v, exit, bounds));
-        (up.distance + down.distance, up.growth(bounds) + down.growth(bounds))
-    }))
 }
 
 /// The greatest speed from which `to` can be reached within `n`, or the greatest that can be reached from it.
 pub(super) fn greatest(to: Real, n: Real, bounds: &Bounds) -> Real {
-    let most = (to.squared() + (bounds.a * n).scaled(1)).sqrt().min(bounds.v).max(to);
-    match bounds.jerk {
-        None => most,
-        Some(_) => climb(to, most, n, |v| {
-            let slope = Slope::new(v, to, bounds);
-            (slope.distance, slope.growth(bounds))
-        }),
-    }
-}
-
-/// As [`crossing`], for a need that grows with the speed, with how fast it does: Newton's steps from `high` down, over the
-/// root of the speed above `low`, where the need bends upwards. Each of them ends above the speed that is looked for, so the
-/// last one is made a little longer.
-fn climb(low: Real, high: Real, n: Real, need: impl Fn(Real) -> (Real, Real)) -> Real {
-    let mut root = (high - low).sqrt();
-    for round in 0..12_u8 {
-        let speed = low + root.squared();
-        let (got, growth) = need(speed);
-        if got <= n {
-            if round > 0 && (n - got).scaled(14) > n {
-                break;
-            }
-            return speed;
-        }
-        let over = got - n;
-        let step = over / (root * growth).scaled(1);
-        let more = if over.scaled(7) <= n { step.scaled(-7) } else { Real::ZERO };
-        root = root - (step + more);
-        if root.is_zero() {
-            break;
-        }
-    }
-    crossing(low, high, n, |v| need(v).0)
+    let way = n.scaled(1);
+    let speed = match &bounds.jerk {
+        None => (to.squared() + bounds.a * way).sqrt(),
+        // There and back.
+        Some(jerk) => Peak { low: to, high: to, n: way }.speed(bounds, jerk),
+    };
+    speed.min(bounds.v).max(to)
 }
 
 /// The greatest speed at which a motion may end after `n`.
@@ -317,4 +286,43 @@ fn crossing(low: Real, high: Real, n: Real, need: impl Fn(Real) -> Real) -> Real
         rose = Some(got <= n);
     }
     best
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    /// From any speed, also above the greatest one, and any acceleration under way: a curve makes all of its distance, ends with
+    /// the speed that was asked for, and goes on from piece to piece without a jump.
+    #[test]
+    #[cfg_attr(miri, ignore = "too long for an interpreter")]
+    fn a_curve_makes_its_distance() {
+        let thousandths = |n: u64| Real::new(n) / Real::new(1000);
+        let speeds = (1..3000_u64, 0..3000_u64, 0..3000_u64);
+        let all = (speeds, 0..=1000_u64, any::<bool>(), 0..20_000_u64, prop::option::of(1..10_000_u64));
+        proptest!(ProptestConfig::with_cases(20_000), |(((most, from, exit), part, up, n, jerk) in all)| {
+            let bounds = Bounds::new(thousandths(most), Real::ONE, jerk.map(thousandths));
+            let mut start = Motion::steady(thousandths(from));
+            if let Some(jerk) = bounds.jerk {
+                // The speed at which the acceleration began is not below 0, nor that at which it ends.
+                let least = (start.v * jerk.j).scaled(1).sqrt().min(Real::ONE);
+                start = Motion { a: least * thousandths(part), up, ..start };
+            }
+            let (n, exit) = (thousandths(n), thousandths(exit.min(most)));
+            if let Ok(curve) = plan(start, Goal::At(n, exit), &bounds) {
+                let slack = SLACK + n.scaled(-40);
+                prop_assert!(curve.way().distance(n) <= slack, "{:?} of {n:?}: {curve:?}", curve.way());
+                let near = |a: Real, b: Real| a.distance(b) <= Real::fixed(1, 20);
+                for pair in curve.pieces().windows(2) {
+                    let end = pair[0].after(pair[1].time - pair[0].time);
+                    prop_assert!(near(end.p, pair[1].p) && near(end.v, pair[1].v), "{end:?} {curve:?}");
+                }
+                if let Some(last) = curve.pieces().last() {
+                    let end = last.after(curve.time - last.time);
+                    prop_assert!(near(end.p, curve.p) && near(end.v, exit), "{end:?} {exit:?} {curve:?}");
+                }
+            }
+        });
+    }
 }

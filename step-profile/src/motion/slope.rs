@@ -20,8 +20,7 @@ pub(super) struct Slope {
     pub(super) j: Real,
     /// Size of the acceleration between them.
     pub(super) a: Real,
-    /// How long it takes, and how far it goes.
-    pub(super) time: Real,
+    /// How far it goes.
     pub(super) distance: Real,
 }
 
@@ -37,20 +36,17 @@ impl Slope {
             Some(jerk) => (jerk.edge, dv * bounds.per_a - jerk.edge, jerk.j, bounds.a),
         };
         let time = edge.scaled(1) + flat;
-        Self { from, to, edge, flat, j, a, time, distance: (from + to).half() * time }
-    }
-
-    /// How fast the distance grows with the higher speed.
-    pub(super) fn growth(&self, bounds: &Bounds) -> Real {
-        let per_speed = match bounds.jerk {
-            Some(jerk) if self.flat.is_zero() => jerk.per_j / self.edge,
-            _ => bounds.per_a,
-        };
-        self.time.half() + (self.from + self.to).half() * per_speed
+        Self { from, to, edge, flat, j, a, distance: (from + to).half() * time }
     }
 }
 
 /// The least distance of a change of speed.
 pub(super) fn distance(from: Real, to: Real, bounds: &Bounds) -> Real {
-    Slope::new(from, to, bounds).distance
+    if from == to { Real::ZERO } else { Slope::new(from, to, bounds).distance }
+}
+
+/// At least as much, without a root: as if the greatest acceleration were reached.
+pub(super) fn most_distance(from: Real, to: Real, bounds: &Bounds) -> Real {
+    let edge = bounds.jerk.map_or(Real::ZERO, |jerk| jerk.edge);
+    (from + to).half() * (from.distance(to) * bounds.per_a + edge)
 }

@@ -55,6 +55,7 @@ const TRAPEZOID: Limited = Limited { steps: 500, ends: [0; 2], speed: 20_000, ac
 const S_CURVE: Limited = Limited { jerk: 5_000_000, ..TRAPEZOID };
 const S_SHORT: Limited = Limited { steps: 20, ..S_CURVE };
 const S_ENTRY: Limited = Limited { steps: 100, ends: [1000, 500], ..S_CURVE };
+const S_ENTRY_FAST: Limited = Limited { steps: 120, ends: [1900, 500], ..S_CURVE };
 const CRUISE: Limited = Limited { steps: 5000, ends: [20_000; 2], ..TRAPEZOID };
 const LONG_TRAPEZOID: Limited = Limited { steps: 5000, speed: 50_000, ..TRAPEZOID };
 const LONG_S_CURVE: Limited = Limited { jerk: 1_000_000, ..LONG_TRAPEZOID };
@@ -215,10 +216,11 @@ kernels! {
         Some(planned(move_)?.steps())
     } over [S_CURVE, S_SHORT];
 
-    /// An S-curve with entry and exit speed, whose peak has no closed form.
+    /// An S-curve with entry and exit speed, whose peak has no closed form: neither slope reaches the greatest acceleration, one
+    /// of them does.
     fn step_profile_motion_plan_s_entry(move_: &Limited) -> Option<State> {
         Some(planned(move_)?.at(0))
-    } over [S_ENTRY];
+    } over [S_ENTRY, S_ENTRY_FAST];
 
     /// A trapezoid planned, and its 500 steps, all of them on the ramps.
     fn step_profile_motion_ramp_500(move_: &Limited) -> Option<u64> {
