@@ -1,7 +1,7 @@
 //! The position of an axis at whole ticks, in exact integers.
 
 use super::curve::{Bend, Piece};
-use super::real::Real;
+use super::real::{Real, THIRD};
 
 /// The integers of a [`Cubic`]: 64 bits, or 128 where 64 are too few. All sums wrap.
 pub(super) trait Word: Copy {
@@ -24,7 +24,7 @@ pub(super) trait Word: Copy {
 }
 
 macro_rules! word {
-    ($word:ty, $shift:expr, $times_plus:item) => {
+    ($word:ty, $fixed:ident, $shift:expr, $times_plus:item) => {
         #[allow(
             clippy::cast_possible_truncation,
             clippy::cast_possible_wrap,
@@ -34,7 +34,7 @@ macro_rules! word {
         )]
         impl Word for $word {
             fn rounded(x: Real, bits: i32) -> Self {
-                (x.to_wide(bits.saturating_add(1)) as Self).wrapping_add(1) >> 1
+                (x.$fixed(bits.saturating_add(1)) as Self).wrapping_add(1) >> 1
             }
 
             fn power(bits: i32) -> Self {
@@ -93,6 +93,7 @@ macro_rules! word {
 // By halves, in two multiplications with addition of a 32-bit core.
 word!(
     i64,
+    to_fixed,
     49_u32,
     fn times_plus(self, by: u64, more: Self) -> Self {
         if cfg!(target_pointer_width = "32") && by >> 32 == 0 {
@@ -106,6 +107,7 @@ word!(
 );
 word!(
     i128,
+    to_wide,
     113_u32,
     fn times_plus(self, by: u64, more: Self) -> Self {
         self.wrapping_mul(by as i128).wrapping_add(more)
@@ -146,10 +148,10 @@ impl<W: Word> Cubic<W> {
         let grows = bend != Bend::Fading;
         let bent = bend != Bend::Flat;
         // The first number below the leading one, up or down to a whole number as it is a little later.
-        let (exact, per) = if bent {
-            (scale(piece.a.along(piece.j * wait, grows).half(), 2), 3)
+        let (exact, part) = if bent {
+            (scale(piece.a.along(piece.j * wait, grows).half(), 2), THIRD)
         } else {
-            (scale(piece.v.along(piece.a * wait, up), 1), 2)
+            (scale(piece.v.along(piece.a * wait, up), 1), Real::ONE.half())
         };
         let units = (exact * inverse).scaled(bits);
         let whole = units.floor();
@@ -158,14 +160,14 @@ impl<W: Word> Cubic<W> {
             rest if rest.is_zero() || !more => (whole, rest),
             rest => (whole + Real::ONE, Real::ONE - rest),
         };
-        let later = piece.after(wait + (rest / Real::new(per)).scaled(shift.wrapping_sub(bits)));
-        let (ahead, behind) = ahead(later.p);
+        let (p, v) = piece.way(wait + (rest * part).scaled(shift.wrapping_sub(bits)));
+        let (ahead, behind) = ahead(p);
         let fixed = |x: Real| W::rounded(x * inverse, bits);
         let exact = W::rounded(whole, 0);
         let one = W::power(bits);
         Self {
             off: fixed(behind).minus(fixed(ahead)),
-            v: if bent { fixed(scale(later.v, 1)) } else { exact },
+            v: if bent { fixed(scale(v, 1)) } else { exact },
             h: signed(if bent { exact } else { one }, up),
             j: if bent { signed(one, up == grows) } else { zero },
             step: W::rounded(inverse, bits),
