@@ -24,7 +24,7 @@ pub(super) trait Word: Copy {
 }
 
 macro_rules! word {
-    ($word:ty, $fixed:ident, $shift:expr, $times_plus:item) => {
+    ($word:ty, $shift:expr, $times_plus:item) => {
         #[allow(
             clippy::cast_possible_truncation,
             clippy::cast_possible_wrap,
@@ -34,7 +34,11 @@ macro_rules! word {
         )]
         impl Word for $word {
             fn rounded(x: Real, bits: i32) -> Self {
-                (x.$fixed(bits.saturating_add(1)) as Self).wrapping_add(1) >> 1
+                let bits = bits.saturating_add(1);
+                // Most often 64 bits hold it; what is above them is cut off.
+                let is_short = x.exponent().saturating_add(bits) < 64;
+                let twice = if is_short { x.to_fixed(bits) as Self } else { x.to_wide(bits) as Self };
+                twice.wrapping_add(1) >> 1
             }
 
             fn power(bits: i32) -> Self {
@@ -93,7 +97,6 @@ macro_rules! word {
 // By halves, in two multiplications with addition of a 32-bit core.
 word!(
     i64,
-    to_fixed,
     49_u32,
     fn times_plus(self, by: u64, more: Self) -> Self {
         if cfg!(target_pointer_width = "32") && by >> 32 == 0 {
@@ -107,7 +110,6 @@ word!(
 );
 word!(
     i128,
-    to_wide,
     113_u32,
     fn times_plus(self, by: u64, more: Self) -> Self {
         self.wrapping_mul(by as i128).wrapping_add(more)
@@ -400,4 +402,22 @@ impl Cubic<i64> {
 /// 2^(`doublings` - 1), and 0 for none; no more than half the range.
 fn half_power_of_2(doublings: u32) -> u64 {
     1_u64.checked_shl(doublings).unwrap_or(u64::MAX) >> 1
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The lower 63 bits of a number that has more of them, as 0 would be another position.
+    #[test]
+    fn what_is_above_a_word_is_cut_off() {
+        for n in [1, 3, 0x0123_4567_89ab_cdef, u64::MAX] {
+            for bits in 0..60 {
+                let whole = i128::from(n) << bits;
+                assert_eq!(i64::rounded(Real::new(n), bits), (whole << 1) as i64 >> 1, "{n} {bits}");
+                assert_eq!(i128::rounded(Real::new(n), bits), whole, "{n} {bits}");
+            }
+            assert_eq!(i64::rounded(Real::fixed(n, 4), 0), ((i128::from(n) + 8) >> 4) as i64, "{n}");
+        }
+    }
 }
