@@ -1,7 +1,7 @@
 //! The position of an axis at whole ticks, in exact integers.
 
 use super::curve::{Bend, Piece};
-use super::real::Real;
+use super::real::{Real, THIRD};
 
 /// The integers of a [`Cubic`]: 64 bits, or 128 where 64 are too few. All sums wrap.
 pub(super) trait Word: Copy {
@@ -34,7 +34,11 @@ macro_rules! word {
         )]
         impl Word for $word {
             fn rounded(x: Real, bits: i32) -> Self {
-                (x.to_wide(bits.saturating_add(1)) as Self).wrapping_add(1) >> 1
+                let bits = bits.saturating_add(1);
+                // Most often 64 bits hold it; what is above them is cut off.
+                let is_short = x.exponent().saturating_add(bits) < 64;
+                let twice = if is_short { x.to_fixed(bits) as Self } else { x.to_wide(bits) as Self };
+                twice.wrapping_add(1) >> 1
             }
 
             fn power(bits: i32) -> Self {
@@ -146,10 +150,10 @@ impl<W: Word> Cubic<W> {
         let grows = bend != Bend::Fading;
         let bent = bend != Bend::Flat;
         // The first number below the leading one, up or down to a whole number as it is a little later.
-        let (exact, per) = if bent {
-            (scale(piece.a.along(piece.j * wait, grows).half(), 2), 3)
+        let (exact, part) = if bent {
+            (scale(piece.a.along(piece.j * wait, grows).half(), 2), THIRD)
         } else {
-            (scale(piece.v.along(piece.a * wait, up), 1), 2)
+            (scale(piece.v.along(piece.a * wait, up), 1), Real::ONE.half())
         };
         let units = (exact * inverse).scaled(bits);
         let whole = units.floor();
@@ -158,14 +162,14 @@ impl<W: Word> Cubic<W> {
             rest if rest.is_zero() || !more => (whole, rest),
             rest => (whole + Real::ONE, Real::ONE - rest),
         };
-        let later = piece.after(wait + (rest / Real::new(per)).scaled(shift.wrapping_sub(bits)));
-        let (ahead, behind) = ahead(later.p);
+        let (p, v) = piece.way(wait + (rest * part).scaled(shift.wrapping_sub(bits)));
+        let (ahead, behind) = ahead(p);
         let fixed = |x: Real| W::rounded(x * inverse, bits);
         let exact = W::rounded(whole, 0);
         let one = W::power(bits);
         Self {
             off: fixed(behind).minus(fixed(ahead)),
-            v: if bent { fixed(scale(later.v, 1)) } else { exact },
+            v: if bent { fixed(scale(v, 1)) } else { exact },
             h: signed(if bent { exact } else { one }, up),
             j: if bent { signed(one, up == grows) } else { zero },
             step: W::rounded(inverse, bits),
@@ -398,4 +402,22 @@ impl Cubic<i64> {
 /// 2^(`doublings` - 1), and 0 for none; no more than half the range.
 fn half_power_of_2(doublings: u32) -> u64 {
     1_u64.checked_shl(doublings).unwrap_or(u64::MAX) >> 1
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The lower 63 bits of a number that has more of them, as 0 would be another position.
+    #[test]
+    fn what_is_above_a_word_is_cut_off() {
+        for n in [1, 3, 0x0123_4567_89ab_cdef, u64::MAX] {
+            for bits in 0..60 {
+                let whole = i128::from(n) << bits;
+                assert_eq!(i64::rounded(Real::new(n), bits), (whole << 1) as i64 >> 1, "{n} {bits}");
+                assert_eq!(i128::rounded(Real::new(n), bits), whole, "{n} {bits}");
+            }
+            assert_eq!(i64::rounded(Real::fixed(n, 4), 0), ((i128::from(n) + 8) >> 4) as i64, "{n}");
+        }
+    }
 }

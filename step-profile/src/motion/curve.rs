@@ -36,21 +36,20 @@ pub(super) struct Piece {
 impl Piece {
     /// The state `t` after the begin.
     pub(super) fn after(&self, t: Real) -> Self {
-        let Self { time, p, v, a, j, up, bend } = *self;
+        let Self { time, a, j, up, bend, .. } = *self;
+        let (p, v) = self.way(t);
+        Self { time: time + t, p, v, a: a.along(j * t, bend != Bend::Fading), j, up, bend }
+    }
+
+    /// Distance and speed `t` after the begin.
+    pub(super) fn way(&self, t: Real) -> (Real, Real) {
+        let Self { p, v, a, j, up, bend, .. } = *self;
         let growing = bend != Bend::Fading;
         let speed = a * t;
         let bent = j * t.squared().half();
         let dv = speed.along(bent, growing);
         let dp = (speed.half().along(bent * THIRD, growing)) * t;
-        Self {
-            time: time + t,
-            p: p + (v * t).along(dp, up),
-            v: v.along(dv, up),
-            a: a.along(j * t, growing),
-            j,
-            up,
-            bend,
-        }
+        (p + (v * t).along(dp, up), v.along(dv, up))
     }
 }
 

@@ -78,12 +78,11 @@ impl Frame {
         self.to.unwrap_or_else(|| i64::from(steps(self.position(curve, curve.p))) << P)
     }
 
-    /// Piece `at`, cut where the curve was joined, with its end and the steps made then; `None` after the last one.
-    pub(super) fn piece(&self, curve: &Curve, at: u8) -> Option<(Piece, Real, u32)> {
+    /// Piece `at`, with its end and the steps made then, none if that is before the curve was joined; `None` after the last one.
+    pub(super) fn piece<'c>(&self, curve: &'c Curve, at: u8) -> Option<(&'c Piece, Real, u32)> {
         let at = usize::from(at);
         let piece = curve.pieces().get(at)?;
         let (over, _) = curve.skipped;
-        let piece = if piece.time < over { piece.after(over - piece.time) } else { *piece };
         let last = || steps(self.last(curve));
         Some(match curve.pieces().get(at.saturating_add(1)) {
             Some(next) if next.time <= over => (piece, next.time, 0),

@@ -28,9 +28,20 @@ struct Rest {
     until: u32,
     /// The last tick of the piece.
     end: u64,
+    /// Where that was looked for.
+    corner: Corner,
     mode: Mode,
     /// Number of the next piece.
     piece: u8,
+}
+
+/// A time of the curve, the first tick whose middle is not before it, and the moments until then.
+#[derive(Debug, Clone, Copy)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+struct Corner {
+    time: Real,
+    tick: u64,
+    wait: Real,
 }
 
 /// How the steps of a piece are made; the state is that of the last step of the run.
@@ -58,7 +69,8 @@ impl Stepper {
     /// With no step made.
     pub(super) const fn new() -> Self {
         let mode = Mode::Cruise { interval: 0, time: 0 };
-        Self { run: Run::NONE, rest: Rest { left: 0, until: 0, end: 0, mode, piece: 0 } }
+        let corner = Corner { time: Real::HUGE, tick: 0, wait: Real::ZERO };
+        Self { run: Run::NONE, rest: Rest { left: 0, until: 0, end: 0, corner, mode, piece: 0 } }
     }
 
     /// Steps made, counted from the origin of the positions.
@@ -213,9 +225,25 @@ impl Rest {
             self.piece = self.piece.saturating_add(1);
             if until > count {
                 (self.until, self.left) = (until, until.wrapping_sub(count).wrapping_sub(1));
-                return Some(Run::at(self.enter(count, curve, frame, &piece, end)));
+                let joined;
+                let piece = if piece.time < curve.skipped.0 {
+                    joined = piece.after(curve.skipped.0 - piece.time);
+                    &joined
+                } else {
+                    piece
+                };
+                return Some(Run::at(self.enter(count, curve, frame, piece, end)));
             }
         }
+    }
+
+    /// Where a piece begins; most often that is the end of the one before.
+    fn corner(&self, curve: &Curve, frame: &Frame, time: Real) -> Corner {
+        if self.corner.time == time {
+            return self.corner;
+        }
+        let (tick, wait) = frame.sample(curve, time);
+        Corner { time, tick, wait }
     }
 
     fn enter(&mut self, count: u32, curve: &Curve, frame: &Frame, piece: &Piece, end: Real) -> u64 {
@@ -238,15 +266,15 @@ impl Rest {
             self.mode = Mode::Cruise { interval, time: if late { time.wrapping_sub(interval) } else { time } };
             return if late { frame.middle(begin).0 } else { t };
         }
-        let (tick, wait) = frame.sample(curve, piece.time);
-        let (until, _) = frame.sample(curve, end);
+        let Corner { tick, wait, .. } = self.corner(curve, frame, piece.time);
+        self.corner = self.corner(curve, frame, end);
         let ahead = |p: Real| {
             let made = frame.made(curve, p) + over;
             (want - made, made - want)
         };
         let straight = piece.bend == Bend::Flat;
         let inverse = Real::ONE / if straight { scale(piece.a.half(), 2) } else { scale(piece.j.half() * THIRD, 3) };
-        self.end = until.max(tick);
+        self.end = self.corner.tick.max(tick);
         let last = self.end.wrapping_sub(tick);
         // A step is 2^58 units at least, if the unit then is neither too large nor a step too short to be foreseen.
         let bits = 58_i32.saturating_sub(inverse.exponent());
