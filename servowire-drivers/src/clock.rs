@@ -3,7 +3,8 @@
 /// It has to resolve a fraction of a microsecond: an encoder answers 3 us after its request. A cycle counter or a timer that
 /// runs with the system clock will do; every closure that gives nanoseconds is a clock.
 pub trait Clock {
-    /// Nanoseconds from any origin; never backwards.
+    /// Nanoseconds from any origin; never backwards. A timer of 32 bits has to be made longer before it wraps: a clock that was set
+    /// back keeps the next call waiting until it has caught up.
     fn now_ns(&mut self) -> u64;
 }
 

@@ -50,32 +50,56 @@ impl<P: OutputPin> Direction for DriverEnable<P> {
     }
 }
 
-/// Switches the driver off when it is dropped, whatever has happened.
+/// The line driver, and whether it may be on: before the first call, after a future was forgotten, and after a pin that refused.
 #[derive(Debug)]
-pub(crate) struct Guard<'a, D: Direction> {
-    direction: &'a mut D,
+pub(crate) struct Switch<D> {
+    direction: D,
     on: bool,
 }
 
-impl<'a, D: Direction> Guard<'a, D> {
-    pub(crate) fn transmit(direction: &'a mut D) -> Result<Self, D::Error> {
-        let guard = Self { direction, on: true };
-        guard.direction.transmit()?;
-        Ok(guard)
+impl<D> Switch<D> {
+    pub(crate) const fn new(direction: D) -> Self {
+        Self { direction, on: true }
     }
 
-    /// Switches the driver off and tells whether that went well.
-    pub(crate) fn receive(mut self) -> Result<(), D::Error> {
-        self.on = false;
-        self.direction.receive()
+    pub(crate) fn release(self) -> D {
+        self.direction
+    }
+}
+
+impl<D: Direction> Switch<D> {
+    /// Sees to it that the driver is off: before anybody listens.
+    pub(crate) fn off(&mut self) -> Result<(), D::Error> {
+        if self.on {
+            self.direction.receive()?;
+            self.on = false;
+        }
+        Ok(())
+    }
+
+    /// Switches the driver on.
+    pub(crate) fn transmit(&mut self) -> Result<Guard<'_, D>, D::Error> {
+        self.on = true;
+        let guard = Guard(self);
+        guard.0.direction.transmit()?;
+        Ok(guard)
+    }
+}
+
+/// Switches the driver off when it is dropped, whatever has happened.
+#[derive(Debug)]
+pub(crate) struct Guard<'a, D: Direction>(&'a mut Switch<D>);
+
+impl<D: Direction> Guard<'_, D> {
+    /// Switches the driver off and tells whether that went well; if not, it is tried once more.
+    pub(crate) fn receive(self) -> Result<(), D::Error> {
+        self.0.off()
     }
 }
 
 impl<D: Direction> Drop for Guard<'_, D> {
     fn drop(&mut self) {
-        if self.on {
-            // Nobody is there to hear of it; the next call sets the pin again and does.
-            let _: Result<(), _> = self.direction.receive();
-        }
+        // Nobody is there to hear of it; the next call tries again before it listens.
+        let _: Result<(), _> = self.0.off();
     }
 }

@@ -7,16 +7,17 @@ use servowire_core::Step;
 use crate::Error;
 use crate::quiet::Line;
 
-/// The request that is next and its time, or how the procedure has ended; then the line is free from its `ready_ns` on.
+/// The request that is next and its time, or how the procedure has ended; then the line is free from its `ready_ns` on, and not before
+/// that of the last exchange.
 pub(crate) fn next<R, T, E>(step: Step<R, T, E>, line: &mut Line) -> ControlFlow<Result<T, E>, (R, u64)> {
     match step {
         Step::Send { request, not_before_ns } => ControlFlow::Continue((request, not_before_ns)),
         Step::Done { value, ready_ns } => {
-            line.clean(ready_ns);
+            line.keep(ready_ns);
             ControlFlow::Break(Ok(value))
         }
         Step::Failed { error, ready_ns } => {
-            line.clean(ready_ns);
+            line.keep(ready_ns);
             ControlFlow::Break(Err(error))
         }
     }
@@ -49,9 +50,23 @@ mod tests {
         let step: Step<u8, u8, u8> = Step::Done { value: 2, ready_ns: 90 };
         assert_eq!(next(step, &mut line), ControlFlow::Break(Ok(2)));
         assert_eq!(line.settle(89).poll(89), Settle::Until(90));
-        let step: Step<u8, u8, u8> = Step::Failed { error: 3, ready_ns: 50 };
+        let step: Step<u8, u8, u8> = Step::Failed { error: 3, ready_ns: 120 };
         assert_eq!(next(step, &mut line), ControlFlow::Break(Err(3)));
-        assert_eq!(line.settle(50).poll(50), Settle::Quiet);
+        assert_eq!(line.settle(119).poll(119), Settle::Until(120));
+        assert_eq!(line.settle(120).poll(120), Settle::Quiet);
+    }
+
+    /// A procedure that had ended before, or never sent anything, does not know of the exchange before it.
+    #[test]
+    fn an_end_frees_no_line_that_somebody_else_may_be_using() {
+        for step in [Step::Done { value: 2, ready_ns: 0 }, Step::Failed { error: 3, ready_ns: 50 }] {
+            let step: Step<u8, u8, u8> = step;
+            let mut line = Line::new(8_000);
+            line.begin(90_000);
+            line.sent(10_000);
+            assert!(next(step, &mut line).is_break());
+            assert_eq!(line.settle(60_000).poll(99_999), Settle::Until(100_000));
+        }
     }
 
     #[test]

@@ -64,6 +64,11 @@ impl Line {
         self.ready_ns = ready_ns;
     }
 
+    /// A procedure has ended, after which the line is not to be used before `ready_ns`.
+    pub(crate) fn keep(&mut self, ready_ns: u64) {
+        self.ready_ns = self.ready_ns.max(ready_ns);
+    }
+
     /// The exchange has failed at `now_ns`. The rest of an answer may still be coming, even if a UART that drops damaged bytes
     /// shows nothing of it: so the worst stays assumed, and besides the line has to be silent for a while.
     pub(crate) fn failed(&mut self, ready_ns: u64, now_ns: u64) {

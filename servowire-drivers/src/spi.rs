@@ -32,7 +32,7 @@ use embedded_io::ErrorKind;
 use nrz_line::{Field, Format, FormatError, Receiver, Samples};
 
 use crate::Direction;
-use crate::direction::Guard;
+use crate::direction::Switch;
 use crate::samples::{Order, TooShort, reorder, write};
 
 #[cfg(feature = "nikon")]
@@ -126,7 +126,7 @@ enum Heard {
 #[derive(Debug)]
 struct Sampler<'b, S, D> {
     bus: S,
-    direction: D,
+    direction: Switch<D>,
     sampling: Sampling,
     tx: &'b mut [u8],
     rx: &'b mut [u8],
@@ -143,7 +143,17 @@ type Fault<S, D> = SpiError<<S as embedded_hal::spi::ErrorType>::Error, <D as Di
 impl<'b, S, D> Sampler<'b, S, D> {
     const fn new(bus: S, direction: D, sampling: Sampling, tx: &'b mut [u8], rx: &'b mut [u8]) -> Self {
         let receiver = Receiver::new(sampling.format);
-        Self { bus, direction, sampling, tx, rx, receiver, len: 0, at: 0, samples: Samples::partial(0, 0) }
+        Self {
+            bus,
+            direction: Switch::new(direction),
+            sampling,
+            tx,
+            rx,
+            receiver,
+            len: 0,
+            at: 0,
+            samples: Samples::partial(0, 0),
+        }
     }
 
     /// The next field of what was sampled.
@@ -201,7 +211,7 @@ impl<S: SpiBus, D: Direction> Sampler<'_, S, D> {
     /// Sends `bits`. The line driver is off afterwards.
     fn send(&mut self, bits: impl IntoIterator<Item = bool>) -> Result<(), Fault<S, D>> {
         let len = self.prepare(bits)?;
-        let guard = Guard::transmit(&mut self.direction).map_err(SpiError::Pin)?;
+        let guard = self.direction.transmit().map_err(SpiError::Pin)?;
         self.bus.write(self.tx.get(..len).unwrap_or_default()).map_err(SpiError::Spi)?;
         self.bus.flush().map_err(SpiError::Spi)?;
         guard.receive().map_err(SpiError::Pin)
@@ -209,6 +219,7 @@ impl<S: SpiBus, D: Direction> Sampler<'_, S, D> {
 
     /// Samples `len` bytes.
     fn sample(&mut self, len: usize) -> Result<(), Fault<S, D>> {
+        self.direction.off().map_err(SpiError::Pin)?;
         self.idle(len);
         let len = len.min(self.rx.len());
         let window = self.rx.get_mut(..len).unwrap_or_default();
@@ -239,7 +250,7 @@ impl<S: AsyncSpiBus, D: Direction> Sampler<'_, S, D> {
     /// Sends `bits`. The line driver is off afterwards, and when the future is dropped.
     async fn send_asynch(&mut self, bits: impl IntoIterator<Item = bool>) -> Result<(), Fault<S, D>> {
         let len = self.prepare(bits)?;
-        let guard = Guard::transmit(&mut self.direction).map_err(SpiError::Pin)?;
+        let guard = self.direction.transmit().map_err(SpiError::Pin)?;
         self.bus.write(self.tx.get(..len).unwrap_or_default()).await.map_err(SpiError::Spi)?;
         self.bus.flush().await.map_err(SpiError::Spi)?;
         guard.receive().map_err(SpiError::Pin)
@@ -247,6 +258,7 @@ impl<S: AsyncSpiBus, D: Direction> Sampler<'_, S, D> {
 
     /// Samples `len` bytes.
     async fn sample_asynch(&mut self, len: usize) -> Result<(), Fault<S, D>> {
+        self.direction.off().map_err(SpiError::Pin)?;
         self.idle(len);
         let len = len.min(self.rx.len());
         let window = self.rx.get_mut(..len).unwrap_or_default();

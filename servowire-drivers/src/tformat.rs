@@ -19,7 +19,7 @@ const MAX_BYTES: usize = 16;
 pub struct Sample {
     /// The position.
     pub position: Position,
-    /// When the encoder took it, by the driver's clock.
+    /// When the encoder took it, by the driver's clock. If the request was held up on its way out, the position is younger by that.
     pub sampled_ns: u64,
 }
 
@@ -34,6 +34,16 @@ impl Sample {
 fn longest_ns(line: &Line, request: Request) -> u64 {
     let fields = request.emit().fields().saturating_add(12);
     u64::from(line.response_timeout_ns).saturating_add(line.rate.fields_ns(fields).into())
+}
+
+/// When the last bit of the request has left, with a start bit not before `start_ns`, so that the line driver may go off.
+///
+/// What `flush` means differs between UARTs, so the clock says it. A UART that had taken all bytes at `taken_ns`, less than a field
+/// later, may have begun as late as that: a request of which the end is cut off may be another one. One that took longer has waited
+/// for the line.
+fn driver_off_ns(line: &Line, request_end_ns: u64, start_ns: u64, taken_ns: u64) -> u64 {
+    let taking_ns = taken_ns.saturating_sub(start_ns);
+    if taking_ns < line.rate.fields_ns(1).into() { request_end_ns.saturating_add(taking_ns) } else { request_end_ns }
 }
 
 /// The line has to be silent for two fields after something that nobody has asked for.

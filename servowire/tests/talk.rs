@@ -218,6 +218,31 @@ fn faults_are_refused_and_over_with_the_next_exchange() {
     }
 }
 
+/// An output that cannot be written is not the fault of the port; who reads no further has read enough.
+#[test]
+fn the_output_is_not_the_port() {
+    let (bench, port) = simulated(0x17);
+    drop(port);
+    for arguments in [&["read"] as &[_], &["info"], &["watch"], &["eeprom", "dump", "--pages", "1"]] {
+        let mut program = Command::new("timeout");
+        program.args(["20", env!("CARGO_BIN_EXE_servowire"), "talk", "--port", &bench.name]).args(arguments);
+        let full = File::options().write(true).open("/dev/full").unwrap();
+        let output = program.stdout(full).output().unwrap();
+        let said = text(&output);
+        assert_eq!(output.status.code(), Some(1), "{arguments:?}: {said}");
+        assert!(
+            said.contains("the output cannot be written: ") && !said.contains(&bench.name),
+            "{arguments:?}: {said}"
+        );
+        let mut program =
+            program.stdout(std::process::Stdio::piped()).stderr(std::process::Stdio::piped()).spawn().unwrap();
+        drop(program.stdout.take());
+        let output = program.wait_with_output().unwrap();
+        assert_eq!((output.status.code(), text(&output).as_str()), (Some(0), ""), "{arguments:?}");
+    }
+    bench.end();
+}
+
 /// What can be wrong is said in a sentence that names it, with exit code 1, and at once.
 #[test]
 fn what_is_wrong_is_said() {
@@ -282,7 +307,7 @@ fn an_encoder_that_is_not_there_is_said_to_be_so() {
     let program = Command::new("bash")
         .args(["-c", close, "bash", "timeout", "20", env!("CARGO_BIN_EXE_servowire")])
         .args(["talk", "--port", &bench.name, "watch", "--period", "1"])
-        .stdout(std::process::Stdio::null())
+        .stdout(std::process::Stdio::piped())
         .stderr(std::process::Stdio::piped())
         .spawn()
         .unwrap();
@@ -291,6 +316,8 @@ fn an_encoder_that_is_not_there_is_said_to_be_so() {
     let output = program.wait_with_output().unwrap();
     assert_eq!(output.status.code(), Some(1));
     assert!(text(&output).contains(": the port is gone or refuses: "), "{}", text(&output));
+    let counted = String::from_utf8_lossy(&output.stdout);
+    assert!(counted.lines().last().unwrap().ends_with(" good, 0 refused or missing"), "{counted}");
 }
 
 /// Two adapters: the master at one, the encoder at the other, and the program between them.

@@ -35,7 +35,7 @@ impl<'b, S, D, C> SpiFrames<'b, S, D, C> {
 
     /// Gives SPI, direction and clock back.
     pub fn release(self) -> (S, D, C) {
-        (self.sampler.bus, self.sampler.direction, self.clock)
+        (self.sampler.bus, self.sampler.direction.release(), self.clock)
     }
 
     fn frame(&self, field: Field) -> Frame {

@@ -30,7 +30,7 @@ impl<'b, S, D> SpiUart<'b, S, D> {
 
     /// Gives SPI and direction back.
     pub fn release(self) -> (S, D) {
-        (self.sampler.bus, self.sampler.direction)
+        (self.sampler.bus, self.sampler.direction.release())
     }
 
     /// Fields as bytes, the first of them `heard`.

@@ -10,8 +10,8 @@ use embedded_io_async::{Read, Write};
 use tformat::master::{EEPROM_POLLING, EepromAccess, Exchange, Line, Progress, Reset, Step, Transaction};
 use tformat::{Address, AllData, Doubt, Page, Policy, Request, Resolution, Response, SingleTurn};
 
-use super::{MAX_BYTES, Sample, longest_ns, other, silence_ns};
-use crate::direction::Guard;
+use super::{MAX_BYTES, Sample, driver_off_ns, longest_ns, other, silence_ns};
+use crate::direction::Switch;
 use crate::procedure;
 use crate::quiet;
 use crate::race::race;
@@ -25,7 +25,7 @@ pub type Failure<U, D> =
 #[derive(Debug)]
 pub struct Encoder<U, D, T> {
     uart: U,
-    direction: D,
+    direction: Switch<D>,
     timer: T,
     line: Line,
     state: quiet::Line,
@@ -36,12 +36,12 @@ impl<U: Read + Write, D: Direction, T: Timer> Encoder<U, D, T> {
     ///
     /// Whether the receiver is on while the request goes out makes no difference: an echo is known by its time.
     pub fn new(uart: U, direction: D, timer: T, line: Line) -> Self {
-        Self { uart, direction, timer, line, state: quiet::Line::new(silence_ns(&line)) }
+        Self { uart, direction: Switch::new(direction), timer, line, state: quiet::Line::new(silence_ns(&line)) }
     }
 
     /// Gives UART, direction and timer back.
     pub fn release(self) -> (U, D, T) {
-        (self.uart, self.direction, self.timer)
+        (self.uart, self.direction.release(), self.timer)
     }
 
     /// The position, if it may be used, and when it was true: from ID 3, by the rules of [`Resolution::read`].
@@ -121,17 +121,21 @@ impl<U: Read + Write, D: Direction, T: Timer> Encoder<U, D, T> {
     /// # Errors
     /// [`Error`].
     pub async fn transact(&mut self, request: Request) -> Result<Exchange, Failure<U, D>> {
+        self.direction.off().map_err(Error::Pin)?;
         self.settle().await?;
-        let guard = Guard::transmit(&mut self.direction).map_err(Error::Pin)?;
+        let frame = request.emit();
+        let guard = self.direction.transmit().map_err(Error::Pin)?;
         let on_ns = self.timer.now_ns();
         self.timer.wait_until(on_ns.saturating_add(self.line.driver_lead_ns.into())).await;
-        let start_ns = self.timer.now_ns();
         self.state.begin(longest_ns(&self.line, request));
-        let mut transaction = Transaction::start(request, self.line, start_ns);
-        send(&mut self.uart, request.emit().as_bytes()).await?;
+        let start_ns = self.timer.now_ns();
+        send(&mut self.uart, frame.as_bytes()).await?;
+        let taken_ns = self.timer.now_ns();
+        self.uart.flush().await.map_err(Error::Io)?;
         self.state.sent(self.timer.now_ns());
-        // What `flush` means differs between UARTs; by the clock the last bit has left at this time.
-        self.timer.wait_until(transaction.request_end_ns()).await;
+        let mut transaction = Transaction::start(request, self.line, start_ns);
+        let off_ns = driver_off_ns(&self.line, transaction.request_end_ns(), start_ns, taken_ns);
+        self.timer.wait_until(off_ns).await;
         guard.receive().map_err(Error::Pin)?;
         let mut progress = transaction.progress();
         loop {
@@ -185,5 +189,5 @@ async fn send<U: Write, PIN, P, D>(uart: &mut U, mut bytes: &[u8]) -> Result<(),
         let count = uart.write(bytes).await.map_err(Error::Io)?;
         bytes = bytes.get(count..).filter(|_| count > 0).ok_or(Error::Closed)?;
     }
-    uart.flush().await.map_err(Error::Io)
+    Ok(())
 }

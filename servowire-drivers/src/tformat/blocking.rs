@@ -6,8 +6,8 @@ use embedded_io::{Read, ReadReady, Write};
 use tformat::master::{EEPROM_POLLING, EepromAccess, Exchange, Line, Progress, Reset, Step, Transaction};
 use tformat::{Address, AllData, Doubt, Page, Policy, Request, Resolution, Response, SingleTurn};
 
-use super::{MAX_BYTES, Sample, longest_ns, other, silence_ns};
-use crate::direction::Guard;
+use super::{MAX_BYTES, Sample, driver_off_ns, longest_ns, other, silence_ns};
+use crate::direction::Switch;
 use crate::procedure;
 use crate::quiet;
 use crate::{Clock, Direction, Error};
@@ -19,7 +19,7 @@ pub type Failure<U, D> = Error<<U as embedded_io::ErrorType>::Error, <D as Direc
 #[derive(Debug)]
 pub struct Encoder<U, D, C> {
     uart: U,
-    direction: D,
+    direction: Switch<D>,
     clock: C,
     line: Line,
     state: quiet::Line,
@@ -30,12 +30,12 @@ impl<U: Read + ReadReady + Write, D: Direction, C: Clock> Encoder<U, D, C> {
     ///
     /// Whether the receiver is on while the request goes out makes no difference: an echo is known by its time.
     pub fn new(uart: U, direction: D, clock: C, line: Line) -> Self {
-        Self { uart, direction, clock, line, state: quiet::Line::new(silence_ns(&line)) }
+        Self { uart, direction: Switch::new(direction), clock, line, state: quiet::Line::new(silence_ns(&line)) }
     }
 
     /// Gives UART, direction and clock back.
     pub fn release(self) -> (U, D, C) {
-        (self.uart, self.direction, self.clock)
+        (self.uart, self.direction.release(), self.clock)
     }
 
     /// The position, if it may be used, and when it was true: from ID 3, by the rules of [`Resolution::read`].
@@ -115,17 +115,21 @@ impl<U: Read + ReadReady + Write, D: Direction, C: Clock> Encoder<U, D, C> {
     /// # Errors
     /// [`Error`].
     pub fn transact(&mut self, request: Request) -> Result<Exchange, Failure<U, D>> {
+        self.direction.off().map_err(Error::Pin)?;
         self.settle()?;
-        let guard = Guard::transmit(&mut self.direction).map_err(Error::Pin)?;
+        let frame = request.emit();
+        let guard = self.direction.transmit().map_err(Error::Pin)?;
         let on_ns = self.clock.now_ns();
         while self.clock.now_ns() < on_ns.saturating_add(self.line.driver_lead_ns.into()) {}
-        let start_ns = self.clock.now_ns();
         self.state.begin(longest_ns(&self.line, request));
-        let mut transaction = Transaction::start(request, self.line, start_ns);
-        send(&mut self.uart, request.emit().as_bytes())?;
+        let start_ns = self.clock.now_ns();
+        send(&mut self.uart, frame.as_bytes())?;
+        let taken_ns = self.clock.now_ns();
+        self.uart.flush().map_err(Error::Io)?;
         self.state.sent(self.clock.now_ns());
-        // What `flush` means differs between UARTs; by the clock the last bit has left at this time.
-        while self.clock.now_ns() < transaction.request_end_ns() {}
+        let mut transaction = Transaction::start(request, self.line, start_ns);
+        let off_ns = driver_off_ns(&self.line, transaction.request_end_ns(), start_ns, taken_ns);
+        while self.clock.now_ns() < off_ns {}
         guard.receive().map_err(Error::Pin)?;
         loop {
             match self.receive(&mut transaction)? {
@@ -178,5 +182,5 @@ fn send<U: Write, PIN, P, D>(uart: &mut U, mut bytes: &[u8]) -> Result<(), Error
         let count = uart.write(bytes).map_err(Error::Io)?;
         bytes = bytes.get(count..).filter(|_| count > 0).ok_or(Error::Closed)?;
     }
-    uart.flush().map_err(Error::Io)
+    Ok(())
 }

@@ -1,5 +1,6 @@
 //! The commands.
 
+use std::fmt;
 use std::fs;
 use std::io::{self, BufRead, Write};
 use std::path::Path;
@@ -14,12 +15,17 @@ use super::Watch;
 use super::link::{Fault, Link};
 use super::port::{self, Port};
 use super::relay::{self, Said};
-use crate::output::say;
+use crate::output;
 
 /// Bytes of a page; the address after them selects the page.
 const PAGE_LEN: u8 = 127;
 
 type Done = Result<ExitCode, Fault>;
+
+/// Says something to the user. Who reads no further has read enough.
+fn say(text: fmt::Arguments) -> Result<(), Fault> {
+    output::say(text).map_err(Fault::Output)
+}
 
 fn read_all<P: Port>(link: &mut Link<P>) -> Result<AllData, Fault> {
     match link.exchange(Request::ReadAll)? {
@@ -52,10 +58,13 @@ fn line(all: &AllData) -> String {
 pub(super) fn watch<P: Port>(link: &mut Link<P>, watch: &Watch) -> Done {
     let mut csv = table(watch.csv.as_deref(), &["time_s", "abs", "abm", "almc", "fault"])?;
     let (mut good, mut bad, begin) = (0_u64, 0_u64, Instant::now());
-    let mut out = io::stdout().lock();
+    let (mut gone, mut out) = (None, io::stdout());
     while watch.count.is_none_or(|count| good + bad < count) {
         let reading = match read_all(link) {
-            Err(fault @ (Fault::Io(_) | Fault::Port(_))) => return Err(fault),
+            Err(fault @ (Fault::Io(_) | Fault::Port(_))) => {
+                gone = Some(fault);
+                break;
+            }
             reading => reading,
         };
         let time = begin.elapsed().as_secs_f64();
@@ -72,29 +81,35 @@ pub(super) fn watch<P: Port>(link: &mut Link<P>, watch: &Watch) -> Done {
                 (fault.to_string(), [String::new(), String::new(), String::new(), fault.to_string()])
             }
         };
-        if let Some(csv) = &mut csv {
+        if let Some((csv, path)) = &mut csv {
             let record = std::iter::once(format!("{time:.6}")).chain(record);
-            csv.write_record(record).map_err(io::Error::from)?;
+            csv.write_record(record).map_err(io::Error::from).map_err(Fault::file(path))?;
         }
         let errors = bad as f64 * 100.0 / (good + bad) as f64;
         // Over the line before, to the end of the line.
-        write!(out, "\r{text}  {errors:.1} % errors\x1b[K")?;
-        out.flush()?;
+        match write!(out, "\r{text}  {errors:.1} % errors\x1b[K").and_then(|()| out.flush()) {
+            Err(error) if error.kind() == io::ErrorKind::BrokenPipe => break,
+            written => written.map_err(Fault::Output)?,
+        }
         thread::sleep(Duration::from_millis(watch.period));
     }
-    writeln!(out, "\n{good} good, {bad} refused or missing")?;
-    if let Some(mut csv) = csv {
-        csv.flush()?;
+    say(format_args!("\n{good} good, {bad} refused or missing\n"))?;
+    if let Some((mut csv, path)) = csv {
+        csv.flush().map_err(Fault::file(path))?;
     }
-    Ok(if bad == 0 { ExitCode::SUCCESS } else { ExitCode::FAILURE })
+    match gone {
+        Some(fault) => Err(fault),
+        None if bad == 0 => Ok(ExitCode::SUCCESS),
+        None => Ok(ExitCode::FAILURE),
+    }
 }
 
 /// A table in this file, if there is one.
-fn table(path: Option<&Path>, head: &[&str]) -> Result<Option<csv::Writer<fs::File>>, Fault> {
+fn table<'p>(path: Option<&'p Path>, head: &[&str]) -> Result<Option<(csv::Writer<fs::File>, &'p Path)>, Fault> {
     let Some(path) = path else { return Ok(None) };
     let mut csv = csv::Writer::from_writer(fs::File::create(path).map_err(Fault::file(path))?);
     csv.write_record(head).map_err(io::Error::from).map_err(Fault::file(path))?;
-    Ok(Some(csv))
+    Ok(Some((csv, path)))
 }
 
 /// Between a master and its encoder, for ever.
@@ -114,9 +129,9 @@ pub(super) fn relay<M: Port, E: Port>(
         };
         let time = format!("{:.6}", begin.elapsed().as_secs_f64());
         say(format_args!("{time}  {request}  {answer}{fault}\n"))?;
-        if let Some(csv) = &mut csv {
-            csv.write_record([time, request, answer, fault]).map_err(io::Error::from)?;
-            csv.flush()?;
+        if let Some((csv, path)) = &mut csv {
+            csv.write_record([time, request, answer, fault]).map_err(io::Error::from).map_err(Fault::file(path))?;
+            csv.flush().map_err(Fault::file(path))?;
         }
         Ok(())
     };
@@ -191,7 +206,7 @@ pub(super) fn dump<P: Port>(link: &mut Link<P>, file: Option<&Path>, pages: u8) 
     let text = lines.concat();
     match file {
         Some(file) => fs::write(file, text).map_err(Fault::file(file))?,
-        None => io::stdout().write_all(text.as_bytes())?,
+        None => say(format_args!("{text}"))?,
     }
     Ok(ExitCode::SUCCESS)
 }
@@ -223,14 +238,12 @@ pub(super) fn restore<P: Port>(link: &mut Link<P>, file: &Path, yes: bool) -> Do
     let mut written = 0;
     let done = pages.into_iter().try_for_each(|page| write_page(link, page, &mut written));
     let plural = if written == 1 { " was" } else { "s were" };
-    if done.is_err() {
-        say(format_args!(
-            "broken off: {written} byte{plural} written and read back, one more may be; restore again\n"
-        ))?;
+    let said = if done.is_err() {
+        say(format_args!("broken off: {written} byte{plural} written and read back, one more may be; restore again\n"))
     } else {
-        say(format_args!("{written} byte{plural} different, written and read back\n"))?;
-    }
-    done.map(|()| ExitCode::SUCCESS)
+        say(format_args!("{written} byte{plural} different, written and read back\n"))
+    };
+    done.and(said).map(|()| ExitCode::SUCCESS)
 }
 
 /// Writes the bytes of a page that differ, and counts them.
@@ -248,7 +261,10 @@ fn write_page<P: Port>(link: &mut Link<P>, (number, want): (u8, Vec<u8>), writte
 fn confirmed(enid: u8) -> Result<bool, Fault> {
     say(format_args!("The EEPROM of encoder ID {enid:#04x} will be overwritten. Type yes: "))?;
     let mut answer = String::new();
-    io::stdin().lock().read_line(&mut answer)?;
+    io::stdin()
+        .lock()
+        .read_line(&mut answer)
+        .map_err(|error| Fault::Input(format!("no answer can be read: {error}")))?;
     Ok(answer.trim() == "yes")
 }
 

@@ -22,6 +22,9 @@ pub enum Fault {
     /// A file could not be read or written; it is named.
     #[error("{0}")]
     File(String),
+    /// What was to be said could not be.
+    #[error("the output cannot be written: {0}")]
+    Output(io::Error),
     /// The port failed.
     #[error("the port is gone or refuses: {0}")]
     Io(#[from] io::Error),
@@ -46,6 +49,8 @@ pub struct Link<P> {
     timeout: Duration,
     echo: bool,
     began: Instant,
+    /// An answer may still be on its way.
+    owed: bool,
 }
 
 impl Fault {
@@ -56,7 +61,7 @@ impl Fault {
 
     /// Whether it names what has failed itself; all others are of the port.
     pub const fn names_itself(&self) -> bool {
-        matches!(self, Self::Port(_) | Self::File(_))
+        matches!(self, Self::Port(_) | Self::File(_) | Self::Output(_))
     }
 }
 
@@ -66,7 +71,7 @@ impl<P: Port> Link<P> {
     /// # Errors
     /// [`Fault`] if no encoder answers.
     pub fn open(port: P, timeout: Duration) -> Result<Self, Fault> {
-        let mut link = Self { port, timeout, echo: false, began: Instant::now() };
+        let mut link = Self { port, timeout, echo: false, began: Instant::now(), owed: true };
         let mut fault = Fault::Encoder(tformat::Error::NoResponse { echo: false });
         for echo in [true, false, true, false] {
             link.echo = echo;
@@ -95,25 +100,36 @@ impl<P: Port> Link<P> {
     /// [`Fault`].
     pub fn exchange(&mut self, request: Request) -> Result<Response, Fault> {
         self.empty()?;
+        // Until it has come.
+        self.owed = true;
+        let response = self.ask(request)?;
+        self.owed = false;
+        Ok(response)
+    }
+
+    /// A request goes out, and its answer is waited for.
+    fn ask(&mut self, request: Request) -> Result<Response, Fault> {
         let frame = request.emit();
         self.port.write_all(frame.as_bytes())?;
         self.port.flush()?;
         let (mut bytes, end) = (Vec::new(), Instant::now() + self.timeout);
         loop {
             let left = end.saturating_duration_since(Instant::now());
-            if left.is_zero() || bytes.len() > MOST_BYTES {
-                return self.judge(request, &bytes);
-            }
-            self.port.wait(left)?;
+            // What is there is taken, even if the program was kept from running until now.
+            self.port.wait(left.max(Duration::from_millis(1)))?;
             let mut buffer = [0; MOST_BYTES];
             match self.port.read(&mut buffer) {
                 Ok(0) => return Err(io::Error::from(io::ErrorKind::UnexpectedEof).into()),
                 Ok(count) => bytes.extend(buffer.iter().take(count)),
+                Err(error) if is_wait(&error) && left.is_zero() => return self.judge(request, &bytes),
                 Err(error) if is_wait(&error) => continue,
                 Err(error) => return Err(error.into()),
             }
             if let Some(response) = self.find(request, &bytes) {
                 return Ok(response);
+            }
+            if bytes.len() > MOST_BYTES {
+                return self.judge(request, &bytes);
             }
         }
     }
@@ -145,12 +161,13 @@ impl<P: Port> Link<P> {
         }
     }
 
-    /// Reads the line empty.
+    /// Reads the line empty. While an answer is owed, the adapter may be holding it back.
     fn empty(&mut self) -> Result<(), Fault> {
         self.port.forget()?;
-        self.port.wait(Duration::from_millis(1))?;
+        self.port.wait(if self.owed { HELD_BACK } else { Duration::from_millis(1) })?;
         for _ in 0..MOST_BYTES {
             match self.port.read(&mut [0; MOST_BYTES]) {
+                Ok(0) => return Err(io::Error::from(io::ErrorKind::UnexpectedEof).into()),
                 Ok(_) => {}
                 Err(error) if is_wait(&error) => return Ok(()),
                 Err(error) => return Err(error.into()),
@@ -198,6 +215,9 @@ impl<P: Port> Link<P> {
         }
     }
 }
+
+/// How long an adapter may hold a short answer back: 16 ms, the latency timer of FTDI chips, and margin.
+const HELD_BACK: Duration = Duration::from_millis(20);
 
 /// More than any exchange has.
 const MOST_BYTES: usize = 64;

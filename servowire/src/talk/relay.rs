@@ -62,12 +62,12 @@ pub enum Said {
 /// that long.
 ///
 /// # Errors
-/// [`Fault::Io`] of the master's port or of the log; [`Fault::Port`] if that of the encoder is gone.
+/// [`Fault::Io`] of the master's port; [`Fault::Port`] if that of the encoder is gone; that of the log.
 pub fn run<M: Port, E: Port>(
     mut master: M,
     encoder: &mut Link<E>,
     hears_itself: bool,
-    mut log: impl FnMut(&Said) -> io::Result<()>,
+    mut log: impl FnMut(&Said) -> Result<(), Fault>,
     stop: Option<&AtomicBool>,
 ) -> Result<(), Fault> {
     let mut echo = Echo::new(hears_itself);
