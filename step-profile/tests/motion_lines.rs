@@ -123,7 +123,9 @@ fn refusals_leave_the_path_as_it_was() {
     assert!(path.next_line().is_none());
     path.push([0], 5).unwrap();
     assert!(path.is_empty());
-    assert!(matches!(path.push([1 << 40], 5), Err(Error::TooManySteps { .. })));
+    for far in [1 << 31, -(1 << 31), 1 << 40, i64::MIN] {
+        assert!(matches!(path.push([far], 5), Err(Error::TooManySteps { .. })), "{far}");
+    }
     path.push([10], 5).unwrap();
     assert_eq!((path.push([20], 5), path.len(), path.target()), (Err(Error::QueueFull), 1, [10]));
     path.not_before(1000);
@@ -149,4 +151,74 @@ fn a_step_long_after_the_start_of_a_ramp() {
         }
         assert_eq!(slow.len(), 3);
     }
+}
+
+/// The last steps of the first line of two, as a speed in steps/s: that of the corner and what is braked to it over a step
+/// and a half of the faster axis.
+fn speed_at_the_corner(first: [i64; 2], second: [i64; 2], deviation: u32) -> f64 {
+    let axes = [axis(50_000, 100_000, 0, 100_000); 2];
+    let mut path = Path::<2, 4>::new(Clock::NANOSECONDS, axes, deviation).unwrap();
+    path.push(first, 500_000).unwrap();
+    path.push([first[0] + second[0], first[1] + second[1]], 500_000).unwrap();
+    let fast = u8::from(first[1].abs() > first[0].abs());
+    let ticks: Vec<u64> = path.next_line().unwrap().filter(|p| p.axis == fast).map(|p| p.tick).collect();
+    let gap = ticks[ticks.len() - 1] - ticks[ticks.len() - 2];
+    1e9 / gap as f64
+}
+
+/// v² = a δ s / (1 - s) with s the sine of half the angle between the lines, whichever way they lead. Along 3, 4 the slower axis may
+/// have as much speed as the limit of the faster one gives it.
+#[test]
+fn the_speed_at_a_corner_is_that_of_its_angle() {
+    for (sx, sy) in [(1, 1), (1, -1), (-1, 1), (-1, -1)] {
+        for (second, angle) in
+            [([4000, -3000], 90.0_f64), ([-4000, 3000], 90.0), ([3000, 4000], 180.0), ([-3000, -4000], 0.0)]
+        {
+            let turn = |[x, y]: [i64; 2]| [sx * x, sy * y];
+            let got = speed_at_the_corner(turn([3000, 4000]), turn(second), 100);
+            // Along either line the limit of the axis that makes 4 of 5 parts of it counts: a = 100,000 · 5/4.
+            let (a, s) = (125_000.0, (angle.to_radians() / 2.0).sin());
+            let corner = (a * 10.0 * s / (1.0 - s).max(1e-12)).min(2.0 * a * 5000.0);
+            // The faster axis has 4/5 of the speed, and brakes with 100,000 over a step; at the middle of the gap.
+            let want = (corner * 0.64 + 2.0 * 100_000.0).sqrt();
+            assert!(got > want * 0.99 - 60.0 && got < want * 1.01 + 60.0, "{got} for {want} at {angle}°");
+        }
+    }
+    // All but straight on is no corner, however small the deviation: 0.03°.
+    assert!(speed_at_the_corner([1000, 3000], [1001, 3000], 0) > 15_000.0);
+    assert!(speed_at_the_corner([1000, 3000], [1100, 3000], 0) < 700.0);
+}
+
+/// The time goes on from line to line without being rounded.
+#[test]
+fn many_lines_in_motion_take_the_time_of_one() {
+    let axes = [axis(3333, 100_000, 0, 80_000)];
+    let mut path = Path::<1, 300>::new(Clock::MICROSECONDS, axes, 20).unwrap();
+    for part in 1..=300 {
+        path.push([7 * part], u32::MAX).unwrap();
+    }
+    let mut last = 0;
+    while let Some(line) = path.next_line() {
+        last = line.map(|pulse| pulse.tick).last().unwrap();
+    }
+    let whole = Plan::new(Clock::MICROSECONDS, axes[0].limits, 2100).unwrap().pulses().last().unwrap();
+    assert!(last.abs_diff(whole) <= 2, "{last} for {whole}");
+}
+
+/// A line after a rest begins at a half tick: at every other place its steps are those of a plan of its own.
+#[test]
+fn a_line_after_a_rest_begins_on_the_grid() {
+    let axes = [axis(20_000, 400_000, 0, 80_000)];
+    let alone: Vec<u64> = Plan::new(Clock::MICROSECONDS, axes[0].limits, 300).unwrap().pulses().collect();
+    let mut same = 0;
+    for first in 100..140 {
+        let mut path = Path::<1, 2>::new(Clock::MICROSECONDS, axes, 20).unwrap();
+        path.push([first], u32::MAX).unwrap();
+        path.push([first - 300], u32::MAX).unwrap();
+        path.next_line().unwrap();
+        let ticks: Vec<u64> = path.next_line().unwrap().map(|pulse| pulse.tick).collect();
+        let shift = ticks[0] - alone[0];
+        same += u32::from(ticks.iter().zip(&alone).all(|(tick, alone)| tick - alone == shift));
+    }
+    assert!(same >= 12, "{same} of 40");
 }

@@ -397,3 +397,66 @@ fn what_is_in_the_path_is_run() {
     to_rest(&mut machine);
     assert_eq!(machine.position(), [300, 70]);
 }
+
+/// As a hold, but the path ends there: where it says at once, and within the acceleration all the way.
+#[test]
+fn a_stop_takes_the_stopping_distance_over_any_number_of_lines() {
+    for (j, parts, most) in [(0, 1, 502), (0, 40, 502), (0, 200, 502), (2_000_000, 4, 1150)] {
+        let mut machine = two_axes(j);
+        let (mut queued, mut now) = (0, 0);
+        while machine.position()[0] < 4000 {
+            while queued < parts && !machine.is_full() {
+                queued += 1;
+                machine.push([8000 * queued / parts, 0], 1_000_000, now).unwrap();
+            }
+            now = machine.pulse().unwrap().tick;
+        }
+        machine.stop(now);
+        let [end, _] = machine.target();
+        assert!((4440..=4000 + most).contains(&end), "{end} over {parts} lines");
+        while let Some(pulse) = machine.pulse() {
+            let state = machine.at(pulse.tick)[0];
+            assert!(acceleration(&state).abs() <= 100_000.1, "{state:?}");
+        }
+        assert_eq!((machine.position(), machine.is_empty()), ([end, 0], true));
+    }
+}
+
+/// A request on the ramp of a line costs nothing where the next line begins.
+#[test]
+fn the_speed_is_kept_from_line_to_line_after_an_override() {
+    for j in [0, 2_000_000] {
+        let mut machine = two_axes(j);
+        machine.push([3000, 0], 1_000_000, 0).unwrap();
+        machine.push([6000, 0], 1_000_000, 0).unwrap();
+        let now = steps(&mut machine, 200);
+        machine.set_override(90, now);
+        machine.set_override(100, now);
+        let mut last = steps(&mut machine, 2400);
+        for _ in 2600..3400 {
+            let now = machine.pulse().unwrap().tick;
+            assert!((99..=101).contains(&(now - last)), "{} at {:?}", now - last, machine.position());
+            last = now;
+        }
+    }
+}
+
+/// At rest is not before the last step, nor before the half step after it; and what follows does not begin before that.
+#[test]
+fn at_rest_is_when_nothing_moves() {
+    let mut machine = two_axes(0);
+    machine.push([8000, 0], 1_000_000, 0).unwrap();
+    let now = steps(&mut machine, 4000);
+    assert!(!machine.is_at_rest(now) && !machine.is_at_rest(1 << 40));
+    machine.hold(now);
+    let last = to_rest(&mut machine);
+    let rest = (last..last + 10_000).find(|now| machine.is_at_rest(*now)).unwrap();
+    // From 10,000 steps/s with 100,000 steps/s² in 0.1 s.
+    assert!(rest.abs_diff(now + 100_000) <= 1 && rest > last, "{rest} after {now}, {last}");
+    machine.stop(last);
+    machine.resume(last);
+    machine.push([0, 0], 1_000_000, last).unwrap();
+    // Half a step from rest takes sqrt(1 / 100,000) s.
+    let first = machine.due().unwrap();
+    assert!(first >= rest + 3161, "{first} after {rest}");
+}

@@ -203,4 +203,28 @@ mod tests {
         let half: Vec<_> = Arc::new([100, 0], [-100, 0], [0, 0], false, 50).unwrap().collect();
         assert_eq!(half, [[0, 100], [-100, 0]]);
     }
+
+    #[test]
+    fn what_is_just_allowed() {
+        let most = i32::try_from(Arc::MAX_RADIUS).unwrap();
+        assert_eq!(Arc::new([most, 0], [0, most], [0, 0], false, 1 << 29).unwrap().count(), 1);
+        assert!(Arc::new([most + 1, 0], [0, most + 1], [0, 0], false, 1 << 29).is_err());
+        // 5 units and a thousandth of 1000.
+        assert!(Arc::new([1000, 0], [0, 1006], [0, 0], false, 5).is_ok());
+        assert!(Arc::new([1000, 0], [0, 1007], [0, 0], false, 5).is_err());
+        // With 3, 4, 5 the chord is 5 - 4 from the arc: just as much as is allowed, and more.
+        let chords = |error| Arc::new([300, 400], [-300, 400], [0, 0], false, error).unwrap().count();
+        assert_eq!((chords(100), chords(99)), (1, 2));
+    }
+
+    /// 5000 cos 45° = 3535.53; and the roots of 2, 5 and 8 are 1.41, 2.24 and 2.83.
+    #[test]
+    fn all_is_to_the_nearest() {
+        let half: Vec<_> = Arc::new([5000, 0], [0, 5000], [0, 0], false, 500).unwrap().collect();
+        assert_eq!(half, [[3536, 3536], [0, 5000]]);
+        for (from, radius) in [([1, 1], 1), ([1, 2], 2), ([2, 2], 3)] {
+            let refused = Arc::new(from, [100, 0], [0, 0], false, 1);
+            assert!(matches!(refused, Err(Error::ArcRadius { from, to: 100 }) if from == radius), "{refused:?}");
+        }
+    }
 }

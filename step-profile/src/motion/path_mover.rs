@@ -259,7 +259,7 @@ impl<const N: usize, const M: usize> PathMover<N, M> {
     fn here(&self, now: u64) -> Option<(Motion, Start<N>)> {
         let line = self.line.as_ref()?;
         let moment = self.clock().moment(now);
-        let start = Start { made: self.made, whole: true, ..line.start };
+        let start = Start { made: self.made, ..line.start };
         if moment >= line.over() {
             let place = start.place + line.curve.way();
             let rest = Start { place, moment: self.clock().aligned(moment), offset: Real::ZERO, ..start };

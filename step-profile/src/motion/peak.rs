@@ -169,7 +169,7 @@ mod tests {
             // As much more than the least, and about as much as reaches the greatest acceleration once or twice.
             let least = distance(low, high, &bounds);
             check(low, high, least + n * (knee * edge), &bounds)?;
-            for full in [low + knee, high + knee] {
+            for full in [low + knee, (low + high).half() + knee, high + knee] {
                 let far = distance(low, full, &bounds) + distance(full, high, &bounds);
                 check(low, high, far, &bounds)?;
                 check(low, high, far + far.scaled(-50), &bounds)?;

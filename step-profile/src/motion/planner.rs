@@ -193,20 +193,16 @@ fn top(from: Real, goal: Goal, bounds: &Bounds) -> Result<Real, Real> {
             return Err(least);
         }
     }
-    let fits = |v| distance(from, v, bounds) + distance(v, exit, bounds) <= n;
     let (low, high) = if from > exit { (exit, from) } else { (from, exit) };
     if high >= bounds.v {
-        return Ok(if fits(bounds.v) { bounds.v } else { high });
+        let fits = distance(from, bounds.v, bounds) + distance(bounds.v, exit, bounds) <= n;
+        return Ok(if fits { bounds.v } else { high });
     }
-    // The square of the peak speed without a jerk limit; with one it is less.
-    let most = bounds.a * n + (from.squared() + exit.squared()).half();
-    let is_far = bounds.v.squared() <= most;
-    match &bounds.jerk {
-        None if is_far => Ok(bounds.v),
-        None => Ok(most.sqrt().min(bounds.v).max(high)),
-        Some(_) if is_far && fits(bounds.v) => Ok(bounds.v),
-        Some(jerk) => Ok(Peak { low, high, n }.speed(bounds, jerk).min(bounds.v).max(high)),
-    }
+    let peak = match &bounds.jerk {
+        None => (bounds.a * n + (from.squared() + exit.squared()).half()).sqrt(),
+        Some(jerk) => Peak { low, high, n }.speed(bounds, jerk),
+    };
+    Ok(peak.min(bounds.v).max(high))
 }
 
 /// The greatest speed from which `to` can be reached within `n`, or the greatest that can be reached from it.
