@@ -266,3 +266,12 @@ impl Guess {
         sum
     }
 }
+
+#[cfg(test)]
+impl Guess {
+    /// The next step is foreseen rightly.
+    pub(super) fn is_right(&self) -> bool {
+        let mut own = *self;
+        own.foresee(Cubic::bent).is_ok()
+    }
+}
