@@ -238,6 +238,33 @@ fn soft_limits_a_halt_and_a_quick_stop() {
     assert_eq!(mover.position(), 10);
 }
 
+/// Limits below the deceleration that it has: it goes on from where it is, as fast as it is.
+#[test]
+fn a_quick_stop_within_low_limits_does_not_jump() {
+    for (acceleration, jerk) in [(10_000, 1_000_000), (152, 1_282_555), (1, 50_000_000), (99_000, 200_000), (5, 10)] {
+        let limits = Limits::new(20_000, 100_000).unwrap().with_jerk(1_000_000).unwrap();
+        let mut mover = Mover::new(Clock::MICROSECONDS, limits).unwrap();
+        mover.run(Direction::Forward, 20_000, 0).unwrap();
+        let mut now = 0;
+        while now < 400_000 {
+            now = mover.pulse().unwrap().tick;
+        }
+        mover.stop(now);
+        // Slowing down with 90,000 steps/s².
+        let then = now + 90_000;
+        while mover.due().unwrap() <= then {
+            now = mover.pulse().unwrap().tick;
+        }
+        let before = mover.at(now);
+        mover.quick_stop(Limits::new(20_000, acceleration).unwrap().with_jerk(jerk).unwrap(), now);
+        let after = mover.at(now);
+        assert!(before.position.abs_diff(after.position) < 1 << 16, "{acceleration}, {jerk}: {before} {after}");
+        assert!(before.speed.abs_diff(after.speed) < 1 << 8, "{acceleration}, {jerk}: {before} {after}");
+        let next = mover.pulse().map(|pulse| pulse.tick - now);
+        assert!(next.is_some_and(|ticks| (40..90).contains(&ticks)), "{acceleration}, {jerk}: {next:?}");
+    }
+}
+
 /// A step is due in the tick of a request, and the axis is past it by part of a tick: the steps after it are not.
 #[test]
 fn a_step_that_is_due_when_a_request_comes() {

@@ -180,7 +180,8 @@ impl<W: Word> Cubic<W> {
     #[inline(always)]
     pub(super) fn straight(&self, by: u64) -> Self {
         let mean = self.h.times_plus(by, self.v);
-        Self { off: mean.times_plus(by, self.off.minus(self.step)), v: self.h.times_plus(by, mean), ..*self }
+        let (off, v) = (mean.times_plus(by, self.off.minus(self.step)), self.h.times_plus(by, mean));
+        Self { off, v, j: self.j.minus(self.j), ..*self }
     }
 
     /// At the next step, if that is made `by` ticks on.
@@ -296,6 +297,18 @@ impl Cubic<i64> {
         off.wrapping_add(1).wrapping_sub(speed) & !off < 0
     }
 
+    /// The way to the next step, in 2^37 units; 0 if that is behind.
+    #[inline(always)]
+    pub(super) fn ahead(&self) -> i32 {
+        ((self.step >> 37) as i32).wrapping_sub(self.past()).max(0)
+    }
+
+    /// What the position is past the step, in 2^37 units.
+    #[inline(always)]
+    pub(super) const fn past(&self) -> i32 {
+        (self.off >> 37) as i32
+    }
+
     /// Newton's step to the tick of the step from this one, `by` ticks on; up to twice as far, as in [`solve`](Self::solve).
     #[inline(always)]
     pub(super) fn nearer(&self, by: u32) -> Option<u32> {
@@ -379,14 +392,17 @@ impl Cubic<i64> {
     }
 
     /// At a step `steps` before this one, `by` ticks on or, below 0, back.
-    #[cfg(test)]
-    pub(super) fn back(&self, by: i64, steps: u64) -> Self {
+    #[inline(always)]
+    pub(super) const fn back(&self, by: i64, steps: u32) -> Self {
         let Self { off, v, h, j, step } = *self;
         let off = off.wrapping_add(step.wrapping_mul(steps as i64));
-        let (bent, curved) = (j.wrapping_mul(by), h.wrapping_mul(by));
+        let first = j.wrapping_mul(by).wrapping_add(h);
+        let second = j.wrapping_mul(by).wrapping_add(first);
+        let mean = first.wrapping_mul(by).wrapping_add(v);
         Self {
-            off: off.wrapping_add(bent.wrapping_mul(by).wrapping_add(curved).wrapping_add(v).wrapping_mul(by)),
-            v: v.wrapping_add(curved << 1).wrapping_add(bent.wrapping_mul(3).wrapping_mul(by)),
+            off: mean.wrapping_mul(by).wrapping_add(off),
+            v: second.wrapping_mul(by).wrapping_add(mean),
+            h: j.wrapping_mul(by).wrapping_add(second),
             ..*self
         }
     }

@@ -1,4 +1,4 @@
-//! The next step from the last intervals, where they change too fast for a [`Row`](super::run::Row).
+//! The next step from the last ones, where the intervals change too fast for a [`Row`](super::run::Row).
 #![expect(
     clippy::cast_possible_truncation,
     clippy::cast_possible_wrap,
@@ -9,58 +9,63 @@
 use super::cubic::Cubic;
 use super::run::Row;
 
-/// Bits of a part of a tick in a [`Guess`], which foresees intervals of up to 2^20 ticks with them.
-const PART: u32 = 11;
-/// Rounds up.
-const CEIL: u32 = (1 << PART) - 1;
-
-/// Makes a step at a time: foresees it, and looks at the exact position whether that was right. In 2^-11 ticks.
+/// Makes a step at a time: foresees it, and looks at the exact position whether that was right.
+///
+/// A step is foreseen at its way times its pace. The way is how far ahead of the last tick the step is, in 2^37 units of the
+/// [`Cubic`]; a step is less than 2^22 of them. The pace is the time that each of them takes, in 2^-32 ticks. Paces of one step
+/// after the other are foreseen by their differences, and the differences of those.
 #[derive(Debug, Clone, Copy)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub(super) struct Guess {
     /// The position at the last step, and its tick.
     pub(super) cubic: Cubic<i64>,
     pub(super) tick: u64,
-    /// The last interval.
-    interval: u32,
-    /// What it was longer than the one before.
-    change: u32,
-    /// How long before the middle of its tick the last step was due.
-    late: u32,
-    /// Ticks to the next step, rounded up.
-    next: u32,
-    /// Steps a unit: 2^43 over the high word of a step.
-    pub(super) rate: u32,
+    /// The pace that is foreseen for the next step.
+    pace: i32,
+    /// How much that is above the last one.
+    change: i32,
+    /// How much the last difference was above the one before.
+    turn: i32,
+    /// 2^32 over the units of a step.
+    rate: i32,
     /// Steps until it is worth while to look whether the intervals change slowly.
     wait: u32,
 }
 
+/// A step that was foreseen wrongly: its way, and the ticks for that.
+#[derive(Clone, Copy)]
+struct Wrong {
+    way: i32,
+    by: u32,
+}
+
 impl Guess {
+    /// Below so many ticks the way of a step, from tick to tick, can be more than an eighth off a whole step.
+    const SHORT: u32 = 8;
+
     /// From the speed alone, after a step; for so many steps at least.
     pub(super) fn new(cubic: Cubic<i64>, tick: u64, wait: u32) -> Self {
-        let high = (cubic.step >> 32) as u32;
-        let rate = u32::MAX.checked_div(high >> PART).unwrap_or(0);
-        let ticks = cubic.interval().min(1 << 19) as u32;
-        let interval = ticks << PART;
-        let late = (cubic.late().unwrap_or(0) >> 21) as u32;
-        let change = (i64::from(cubic.growth(ticks.into())).wrapping_mul(interval.into()) >> 15) as i32;
-        Self { cubic, tick, interval: 0, change: 0, late, next: 0, rate, wait }.between(interval, change)
+        let ticks = cubic.interval().min(1 << 19);
+        let interval = ticks << 11;
+        let change = i64::from(cubic.growth(ticks)).wrapping_mul(interval as i64) >> 15;
+        Self { wait, ..Self::with([interval as i64, change], cubic, tick) }
     }
 
     /// After the last step of a row that cannot go on.
     pub(super) fn after(row: &Row) -> Self {
         let (cubic, tick) = row.place();
-        let [interval, change, late] = row.intervals().map(|x| x >> 21);
-        let own = Self { cubic, tick, interval: 0, change: 0, late: late as u32, next: 0, rate: row.rate(), wait: 0 };
-        let own = own.between(interval as u32, change as i32);
+        let own = Self::with(row.intervals().map(|x| x >> 21), cubic, tick);
         Self { wait: own.patience().max(Row::LEAST), ..own }
     }
 
-    /// With the interval at the last step, and what the next one is longer than the one before.
-    fn between(self, interval: u32, change: i32) -> Self {
-        let half = change >> 1;
-        let next = interval.wrapping_add_signed(half).wrapping_sub(self.late).wrapping_add(CEIL);
-        Self { interval: interval.wrapping_add_signed(half.wrapping_neg()), change: change as u32, next, ..self }
+    /// With the interval at a step, and what the next one is longer than the last one, in 2^-11 ticks.
+    fn with([interval, change]: [i64; 2], cubic: Cubic<i64>, tick: u64) -> Self {
+        // Of 22 bits.
+        let step = (cubic.step >> 37) as u32;
+        let rate = u32::MAX.checked_div(step).unwrap_or(0) as i32;
+        let pace = |x: i64| (x.wrapping_mul(rate.into()) >> 11) as i32;
+        let [interval, change] = [interval, change].map(pace);
+        Self { cubic, tick, pace: interval.wrapping_add(change >> 1), change, turn: 0, rate, wait: 0 }
     }
 
     /// About as many steps until the intervals change so slowly that sixteen can be foreseen at once.
@@ -68,7 +73,10 @@ impl Guess {
     /// With i the interval and c its change the bend over them is 40,960 c³ / i² in a trapezoid, i / 2c steps from rest, and less in an
     /// S-curve. It should be below 0.15 ticks, and becomes less with the power of 3.5 of the steps from rest.
     fn patience(&self) -> u32 {
-        let (interval, change) = (self.interval, (self.change as i32).unsigned_abs());
+        // In 2^-11 ticks.
+        let step = (self.cubic.step >> 37) as u64;
+        let ticks = |pace: u32| (u64::from(pace).wrapping_mul(step) >> 21) as u32;
+        let (interval, change) = (ticks(self.pace as u32), ticks(self.change.unsigned_abs()));
         let steps = interval.checked_div(change << 1).unwrap_or(u32::MAX);
         let is_steep = steps < 128;
         let wait = if is_steep {
@@ -84,57 +92,95 @@ impl Guess {
             steps.saturating_mul(doublings) >> 3
         };
         // Slower and slower: at the end of the piece at most.
-        let end = if self.change as i32 > 0 { steps >> 1 } else { 0 };
+        let end = if self.change > 0 { steps >> 1 } else { 0 };
         wait.max(end).max(8)
     }
 
-    /// A step came `by` ticks after the one before; `off` is what the position was past it.
+    /// The last step was made `over` 2^-32 ticks earlier than foreseen.
     #[inline(always)]
-    fn learn(&mut self, by: u32, off: i64) {
-        // The part of a tick is off / speed, and the speed is about a step an interval.
-        let part = (u64::from((off >> 32) as u32).wrapping_mul(self.interval.into()) >> PART) as u32;
-        let late = (u64::from(part).wrapping_mul(self.rate.into()) >> 32) as u32;
-        let interval = (by << PART).wrapping_add(self.late).wrapping_sub(late);
-        // The change changes about as it did before.
-        let change = interval.wrapping_sub(self.interval);
-        let next = change.wrapping_sub(self.change).wrapping_add(change).wrapping_add(interval);
-        let next = next.wrapping_sub(late).wrapping_add(CEIL);
-        // None is below 0: the position there would be far away.
-        self.next = next & !((next as i32 >> 31) as u32);
-        (self.interval, self.change, self.late) = (interval, change, late);
+    fn learn(&mut self, over: i64) {
+        let more = (over.wrapping_mul(self.rate.into()) >> 32).wrapping_neg() as i32;
+        // A way is about a step. The second difference stays.
+        self.turn = self.turn.wrapping_add(more);
+        self.change = self.change.wrapping_add(self.turn).wrapping_add(more);
+        self.pace = self.pace.wrapping_add(more).wrapping_add(self.change).max(0);
     }
 
-    /// The next step, if it is foreseen rightly or Newton's step from there finds it; `after` gives the position so many ticks on.
+    /// The time for a way at the pace that is foreseen, in 2^-32 ticks.
     #[inline(always)]
-    fn foresee(&mut self, after: impl Fn(&Cubic<i64>, u64) -> Cubic<i64>) -> Option<u64> {
-        let mut by = self.next >> PART;
-        let mut there = after(&self.cubic, by.into());
-        if !there.is_surely_there() {
-            by = there.nearer(by)?;
-            there = after(&self.cubic, by.into());
-            if !there.is_surely_there() {
-                return None;
-            }
+    fn time(&self, way: i32) -> u64 {
+        u64::from(way as u32).wrapping_mul(u64::from(self.pace as u32))
+    }
+
+    /// Goes on to where the next step is foreseen, and says whether it is there. `after` gives the position so many ticks on.
+    #[inline(always)]
+    fn foresee(&mut self, after: impl Fn(&Cubic<i64>, u64) -> Cubic<i64>) -> Result<u64, Wrong> {
+        let way = self.cubic.ahead();
+        let by = ((self.time(way) >> 32) as u32).wrapping_add(1);
+        // In place: a copy of what was before would be too much for the registers of a small core.
+        self.cubic = after(&self.cubic, by.into());
+        self.tick = self.tick.wrapping_add(by.into());
+        if !self.cubic.is_surely_there() {
+            return Err(Wrong { way, by });
         }
-        self.learn(by, there.off);
-        (self.cubic, self.tick) = (there, self.tick.wrapping_add(by.into()));
+        // Less than a tick; more than half of one is taken wrongly, and mended at the next step.
+        let over = self.time(way.wrapping_add(self.cubic.past())) as i32;
+        self.learn(over.into());
+        Ok(self.tick)
+    }
+
+    /// By one step of Newton's to the next step, from where it was foreseen; if it is not there either, back to the last one.
+    #[inline(always)]
+    fn mend(&mut self, wrong: Wrong) -> Option<u64> {
+        let Wrong { way, by } = wrong;
+        let better = self.cubic.nearer(by).unwrap_or(by);
+        self.go(better.wrapping_sub(by) as i32, 0);
+        if !self.cubic.is_surely_there() {
+            self.go((better as i32).wrapping_neg(), 1);
+            return None;
+        }
+        let way = way.wrapping_add(self.cubic.past());
+        if better < Self::SHORT {
+            self.restart(way, better);
+        } else {
+            self.learn(self.time(way).wrapping_sub(u64::from(better) << 32) as i64);
+        }
         Some(self.tick)
+    }
+
+    /// So many ticks on or, below 0, back, where a step is made that comes `steps` before.
+    #[inline(always)]
+    fn go(&mut self, ticks: i32, steps: u32) {
+        let by = i64::from(ticks);
+        (self.cubic, self.tick) = (self.cubic.back(by, steps), self.tick.wrapping_add_signed(by));
+    }
+
+    /// Foresees from the pace of a step that took `by` ticks for its way, and what it differs from the one before.
+    fn restart(&mut self, way: i32, by: u32) {
+        let up = by.leading_zeros();
+        let pace = u64::from(by.wrapping_shl(up).checked_div(way as u32 >> 11).unwrap_or(0)) << 21 >> up;
+        let pace = pace.min(1 << 29) as i32;
+        let change = pace.wrapping_sub(self.pace.wrapping_sub(self.change));
+        // The next one is within half an interval of this one.
+        let change = change.clamp((pace >> 1).wrapping_neg(), pace >> 1);
+        (self.pace, self.change, self.turn) = (pace.wrapping_add(change), change, 0);
     }
 
     /// The tick of the next step, unless it is worth while to look for more; no tick after `last` is looked at.
     #[inline(always)]
     pub(super) fn next(&mut self, last: u64) -> Option<u64> {
         self.wait = self.wait.checked_sub(1)?;
-        if let Some(tick) = self.foresee(Cubic::bent) {
-            return Some(tick);
-        }
-        Some(if cfg!(target_pointer_width = "64") { self.search_apart(last) } else { self.search(last) })
+        Some(match self.foresee(Cubic::bent) {
+            Ok(tick) => tick,
+            Err(wrong) if cfg!(target_pointer_width = "64") => self.apart(|own| own.look(wrong, last)),
+            Err(wrong) => self.mend(wrong).unwrap_or_else(|| self.search(last)),
+        })
     }
 
     /// The tick of the next step of `left`, unless several may be foreseen at once.
     pub(super) fn single(&mut self, left: u32, last: u64) -> Option<u64> {
         if self.wait == 0 {
-            self.wait = if left < Row::LEAST { Row::LEAST } else { self.patience() };
+            self.wait = if left < 4 * Row::LEAST { left } else { self.patience() };
         }
         self.wait = self.wait.checked_sub(1)?;
         Some(self.step(last))
@@ -142,27 +188,36 @@ impl Guess {
 
     /// The tick of the next step.
     pub(super) fn step(&mut self, last: u64) -> u64 {
-        self.foresee(Cubic::bent).unwrap_or_else(|| self.search(last))
+        match self.foresee(Cubic::bent) {
+            Ok(tick) => tick,
+            Err(wrong) => self.look(wrong, last),
+        }
     }
 
-    /// The next step, foreseen wrongly; in a copy, lest all that is known has to be in memory.
+    /// The tick of the next step, which was foreseen wrongly.
+    #[cold]
+    #[inline(never)]
+    fn look(&mut self, wrong: Wrong, last: u64) -> u64 {
+        self.mend(wrong).unwrap_or_else(|| self.search(last))
+    }
+
+    /// Calls with a copy, lest all that is known has to be in memory.
     #[inline(always)]
-    fn search_apart(&mut self, last: u64) -> u64 {
+    fn apart(&mut self, call: impl FnOnce(&mut Self) -> u64) -> u64 {
         let mut copy = *self;
-        let tick = copy.search(last);
+        let tick = call(&mut copy);
         *self = copy;
         tick
     }
 
-    /// The next step, foreseen wrongly.
+    /// The tick of the next step, from the last one.
     #[cold]
     #[inline(never)]
     pub(super) fn search(&mut self, last: u64) -> u64 {
-        let (by, there) = self.cubic.solve((self.next >> PART).into(), last.saturating_sub(self.tick));
-        self.learn(by as u32, there.off.max(0));
-        // After a wrong guess the next one is within half an interval of the last.
-        let half = self.interval >> 1;
-        self.next = self.next.max(half).min(self.interval.saturating_add(half));
+        let way = self.cubic.ahead();
+        let guess = (self.time(way) >> 32).wrapping_add(1);
+        let (by, there) = self.cubic.solve(guess, last.saturating_sub(self.tick));
+        self.restart(way.wrapping_add(there.past()), by as u32);
         (self.cubic, self.tick) = (there, self.tick.saturating_add(by));
         self.tick
     }
@@ -188,11 +243,35 @@ impl Guess {
         mut sum: B,
         take: &mut impl FnMut(B, u64) -> B,
     ) -> B {
-        let mut own = *self;
-        for _ in 0..count {
-            sum = take(sum, if let Some(tick) = own.foresee(&after) { tick } else { own.search_apart(last) });
+        let (mut own, mut left) = (*self, count);
+        while left > 0 {
+            // What is foreseen rightly in a loop of its own, which has room in the registers.
+            let wrong = loop {
+                match own.foresee(&after) {
+                    Ok(tick) => sum = take(sum, tick),
+                    Err(wrong) => break Some(wrong),
+                }
+                left = left.wrapping_sub(1);
+                if left == 0 {
+                    break None;
+                }
+            };
+            if let Some(wrong) = wrong {
+                let tick = own.mend(wrong);
+                sum = take(sum, if let Some(tick) = tick { tick } else { own.apart(|own| own.search(last)) });
+                left = left.wrapping_sub(1);
+            }
         }
         *self = own;
         sum
+    }
+}
+
+#[cfg(test)]
+impl Guess {
+    /// The next step is foreseen rightly.
+    pub(super) fn is_right(&self) -> bool {
+        let mut own = *self;
+        own.foresee(Cubic::bent).is_ok()
     }
 }

@@ -246,6 +246,19 @@ impl Bounds {
         Self { v, a, per_a: Real::ONE / a, jerk }
     }
 
+    /// High enough for an acceleration that there is already, and for a jerk that leads a deceleration back to 0 before rest.
+    pub(super) fn holding(self, v: Real, (a, up): (Real, bool)) -> Self {
+        let Some(Jerk { j, .. }) = self.jerk else { return self };
+        // Rounding may make it a little more than the jerk that leads there already.
+        let least = if up || v.is_zero() { Real::ZERO } else { (a.squared() / v).half() };
+        let needs_more = least > j + j.scaled(-8);
+        if a > self.a || needs_more {
+            let j = if needs_more { least + least.scaled(-8) } else { j };
+            return Self::new(self.v, self.a.max(a), Some(j));
+        }
+        self
+    }
+
     /// With a lower speed.
     pub(super) fn slower(self, v: Real) -> Self {
         Self { v: self.v.min(v), ..self }

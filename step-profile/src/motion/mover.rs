@@ -229,7 +229,8 @@ impl Mover {
     }
 
     /// Slows down to rest within other limits, higher ones for a limit switch, and forgets the aim. Until it is at rest, moves
-    /// are refused.
+    /// are refused. An acceleration that it has already is kept where the limits are below that, and so is the jerk that it takes
+    /// to end it at rest.
     pub fn quick_stop(&mut self, limits: Limits, now: u64) {
         self.aim = Aim::Rest;
         let bounds = limits.bounds(self.clock);
@@ -351,6 +352,7 @@ impl Mover {
         let made = self.position.abs_diff(self.origin);
         let p = state.p.wrapping_sub(i64::try_from(made).unwrap_or(0) << 32);
         let start = Motion { v: state.v, a: state.a.0, up: state.a.1 };
+        let bounds = &bounds.holding(state.v, state.a);
         let mut frame = Frame { to: None, ..Frame::rest(self.clock.shift(), moment, p) };
         let curve = self.goal(self.direction, bounds).and_then(|(goal, bounds)| match goal {
             Want::At(target) => {

@@ -181,7 +181,8 @@ impl Row {
 
     /// From the position at the tick of a step. With d the interval at the speed there and p = v x + h x² + j x³, a = h d / v
     /// and b = j d² / v, the times are d (s - a s² + (2 a² - b) s³).
-    pub(super) fn new(cubic: Cubic<i64>, tick: u64, rate: u32) -> Self {
+    pub(super) fn new(cubic: Cubic<i64>, tick: u64) -> Self {
+        let rate = u32::MAX.checked_div((cubic.step >> 43) as u32).unwrap_or(0);
         let [step, v, h, j] = cubic.sizes();
         let first = (step / v).scaled(Self::FEW as i32);
         let per_v = first / v;
@@ -204,16 +205,10 @@ impl Row {
         (self.cubic, self.tick)
     }
 
-    /// The interval of the steps, what the next one is longer than the last one, and what the step was due before its tick; in
-    /// 2^-32 ticks.
-    pub(super) const fn intervals(&self) -> [i64; 3] {
+    /// The interval of the steps, and what the next one is longer than the last one, in 2^-32 ticks.
+    pub(super) const fn intervals(&self) -> [i64; 2] {
         let change = self.way.second >> self.doublings.wrapping_mul(2).wrapping_sub(1);
-        [self.way.first >> self.doublings, change, self.late]
-    }
-
-    /// 2^43 over the high word of a step.
-    pub(super) const fn rate(&self) -> u32 {
-        self.rate
+        [self.way.first >> self.doublings, change]
     }
 
     /// The next steps, up to `left` of them; none if they change too fast.
@@ -297,7 +292,7 @@ impl Row {
         let mut worst = 0.0;
         while run.count > 0 {
             let (tick, _) = run.step();
-            let back = u64::from(run.count + self.beyond);
+            let back = run.count + self.beyond;
             let there = self.cubic.back(tick.wrapping_sub(self.tick) as i64, back);
             let late = there.late().expect("within a tick") as f64 / 4_294_967_296.0;
             let part = (f64::from(run.part) + Run::BLUR as f64) / 4_294_967_296.0 - 1.0;

@@ -192,7 +192,7 @@ impl Rest {
     /// Several steps, if that can be; else one.
     fn row(&mut self, run: &mut Run) {
         if let Mode::Fast(guess) = &self.mode {
-            self.mode = Mode::Slow(Row::new(guess.cubic, guess.tick, guess.rate));
+            self.mode = Mode::Slow(Row::new(guess.cubic, guess.tick));
         }
         if let Mode::Slow(row) = &mut self.mode {
             row.run(self.left, run);
@@ -360,7 +360,31 @@ mod tests {
                     (looks, foreseen) = (looks + 1, foreseen + run.count);
                 }
             }
-            assert!(foreseen > 4450 && looks < 120, "{looks} looks for {foreseen} steps");
+            assert!(foreseen > 4400 && looks < 120, "{looks} looks for {foreseen} steps");
+        }
+    }
+
+    /// A ramp of 250 steps up and down: most of them are foreseen rightly from the last three, but near rest.
+    #[test]
+    fn a_short_ramp_is_foreseen_rightly() {
+        for (jerk, most) in [(None, 45), (Some(5_000_000), 46)] {
+            let limits = Limits::new(20_000, 100_000).unwrap();
+            let limits = jerk.map_or(limits, |jerk| limits.with_jerk(jerk).unwrap());
+            let bounds = limits.bounds(Clock::MICROSECONDS);
+            let curve = plan(Motion::steady(Real::ZERO), Goal::At(Real::new(500), Real::ZERO), &bounds).unwrap();
+            let frame = Frame { to: Some(500 << 32), ..Frame::rest(Clock::MICROSECONDS.shift(), 0, 0) };
+            let (mut rest, mut wrong, mut single) = (Stepper::new().rest, 0, 0);
+            loop {
+                if let Mode::Fast(guess) = &rest.mode {
+                    wrong += u32::from(rest.left > 0 && !guess.is_right());
+                }
+                if rest.single().is_some() {
+                    single += 1;
+                } else if rest.run(&curve, &frame).is_none() {
+                    break;
+                }
+            }
+            assert!(single > 350 && wrong < most, "{wrong} of {single} foreseen wrongly");
         }
     }
 
