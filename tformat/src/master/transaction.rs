@@ -63,7 +63,8 @@ impl Exchange {
 }
 
 /// How far a transaction is. `ready_ns` of a failure is the time at which the longest response to the request is over,
-/// however late within the time-out it began.
+/// however late within the time-out it began: eleven fields, one right after the other as encoders send them. Behind a bridge that
+/// pauses between fields, wait for a silent line besides.
 pub type Progress = servowire_core::Progress<Exchange, Error>;
 
 /// Longest request and longest response in bytes.
