@@ -430,3 +430,35 @@ fn a_little_farther_target_keeps_the_brake() {
         assert!(got >= want - 2.0 && got <= want * 1.001, "{got} for {want}, {more} steps farther");
     }
 }
+
+/// 5 steps before the end of a brake it cannot be cut short: the axis goes to the end, and comes back.
+#[test]
+fn a_target_inside_the_last_of_the_brake_is_passed() {
+    let limits = Limits::new(10_000, 100_000).unwrap().with_jerk(2_000_000).unwrap();
+    let mut mover = Mover::new(Clock::MICROSECONDS, limits).unwrap();
+    mover.move_to(4000, 0).unwrap();
+    while mover.due().is_some_and(|due| due <= 525_000) {
+        mover.pulse().unwrap();
+    }
+    mover.move_to(3997, 525_000).unwrap();
+    let mut most = 0;
+    while mover.pulse().is_some() {
+        most = most.max(mover.position());
+    }
+    assert_eq!((most, mover.position()), (4000, 3997));
+}
+
+/// 9500 steps/s of change take 0.095 + 0.05 s, also if the last 500 of them are asked for under way.
+#[test]
+fn a_lower_speed_while_it_brakes_keeps_the_brake() {
+    let limits = Limits::new(10_000, 100_000).unwrap().with_jerk(2_000_000).unwrap();
+    let mut mover = Mover::new(Clock::MICROSECONDS, limits).unwrap();
+    for (speed, from, until) in [(10_000, 0, 1_000_000), (1000, 1_000_000, 1_075_000), (500, 1_075_000, 1_145_100)] {
+        mover.run(Direction::Forward, speed, from).unwrap();
+        while mover.due().is_some_and(|due| due <= until) {
+            mover.pulse().unwrap();
+        }
+    }
+    let state = mover.at(1_145_100);
+    assert!((state.speed >> 16).abs_diff(500) <= 1 && state.acceleration == 0, "{state:?}");
+}

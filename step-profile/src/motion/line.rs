@@ -106,7 +106,7 @@ impl<const N: usize> LinePulses<N> {
         let mut axes = line.steps.map(|steps| {
             let scale = Real::new(steps.unsigned_abs().into()) / line.whole;
             let from = line.place(steps, start.place);
-            (Frame { to: None, offset, scale, from, ..rest }, Stepper::new())
+            (Frame { from, offset, scale, ..rest }, Stepper::new())
         });
         for (((frame, _), made), end) in axes.iter_mut().zip(start.made).zip(line.ends) {
             frame.from = frame.from.saturating_sub(i64::from(made) << P);
