@@ -10,6 +10,8 @@ use core::ops::{Add, Div, Mul, Sub};
 /// can overflow or panic.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+// In two registers of 64 bits where there are any.
+#[cfg_attr(target_pointer_width = "64", repr(align(8)))]
 pub(super) struct Real {
     /// Upper and lower half of `m`: three words, without a gap.
     high: u32,

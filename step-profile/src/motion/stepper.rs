@@ -16,6 +16,8 @@ use super::run::{Row, Run};
 pub(super) struct Stepper {
     run: Run,
     rest: Rest,
+    /// Where the end of the piece was looked for.
+    corner: Corner,
 }
 
 /// What comes after the run.
@@ -28,8 +30,6 @@ struct Rest {
     until: u32,
     /// The last tick of the piece.
     end: u64,
-    /// Where that was looked for.
-    corner: Corner,
     mode: Mode,
     /// Number of the next piece.
     piece: u8,
@@ -42,6 +42,17 @@ struct Corner {
     time: Real,
     tick: u64,
     wait: Real,
+}
+
+impl Corner {
+    /// Where a piece begins; most often that is the end of the one before.
+    fn at(self, curve: &Curve, frame: &Frame, time: Real) -> Self {
+        if self.time == time {
+            return self;
+        }
+        let (tick, wait) = frame.sample(curve, time);
+        Corner { time, tick, wait }
+    }
 }
 
 /// How the steps of a piece are made; the state is that of the last step of the run.
@@ -70,7 +81,7 @@ impl Stepper {
     pub(super) const fn new() -> Self {
         let mode = Mode::Cruise { interval: 0, time: 0 };
         let corner = Corner { time: Real::HUGE, tick: 0, wait: Real::ZERO };
-        Self { run: Run::NONE, rest: Rest { left: 0, until: 0, end: 0, corner, mode, piece: 0 } }
+        Self { run: Run::NONE, rest: Rest { left: 0, until: 0, end: 0, mode, piece: 0 }, corner }
     }
 
     /// Steps made, counted from the origin of the positions.
@@ -85,7 +96,10 @@ impl Stepper {
             if let Some(tick) = self.rest.single() {
                 return Some(tick);
             }
-            self.run = self.rest.apart(|rest| rest.run(curve, frame))?;
+            // In a copy as well.
+            let mut corner = self.corner;
+            self.run = self.rest.apart(|rest| rest.run(curve, frame, &mut corner))?;
+            self.corner = corner;
         }
         let (tick, is_certain) = self.run.step();
         Some(if is_certain { tick } else { self.rest.apart(|rest| rest.exact(tick, self.run.count)) })
@@ -156,9 +170,9 @@ impl Rest {
     /// The next steps, one at least.
     #[cold]
     #[inline(never)]
-    fn run(&mut self, curve: &Curve, frame: &Frame) -> Option<Run> {
+    fn run(&mut self, curve: &Curve, frame: &Frame, corner: &mut Corner) -> Option<Run> {
         if self.left == 0 {
-            return self.begin(curve, frame);
+            return self.begin(curve, frame, corner);
         }
         let mut run = Run::NONE;
         match &mut self.mode {
@@ -218,7 +232,7 @@ impl Rest {
     }
 
     /// The first step of the next piece that has one.
-    fn begin(&mut self, curve: &Curve, frame: &Frame) -> Option<Run> {
+    fn begin(&mut self, curve: &Curve, frame: &Frame, corner: &mut Corner) -> Option<Run> {
         loop {
             let count = self.until;
             let (piece, end, until) = frame.piece(curve, self.piece)?;
@@ -232,21 +246,19 @@ impl Rest {
                 } else {
                     piece
                 };
-                return Some(Run::at(self.enter(count, curve, frame, piece, end)));
+                return Some(Run::at(self.enter(count, curve, frame, (piece, end), corner)));
             }
         }
     }
 
-    /// Where a piece begins; most often that is the end of the one before.
-    fn corner(&self, curve: &Curve, frame: &Frame, time: Real) -> Corner {
-        if self.corner.time == time {
-            return self.corner;
-        }
-        let (tick, wait) = frame.sample(curve, time);
-        Corner { time, tick, wait }
-    }
-
-    fn enter(&mut self, count: u32, curve: &Curve, frame: &Frame, piece: &Piece, end: Real) -> u64 {
+    fn enter(
+        &mut self,
+        count: u32,
+        curve: &Curve,
+        frame: &Frame,
+        (piece, end): (&Piece, Real),
+        corner: &mut Corner,
+    ) -> u64 {
         let scale = |x: Real, power: i32| (x * frame.scale).scaled((frame.shift as i32).wrapping_mul(power));
         let target = (i64::from(count) << 32).wrapping_add(1 << 31);
         // Where the step is made from the begin of the curve on: behind it, if it was due when a request came.
@@ -266,15 +278,15 @@ impl Rest {
             self.mode = Mode::Cruise { interval, time: if late { time.wrapping_sub(interval) } else { time } };
             return if late { frame.middle(begin).0 } else { t };
         }
-        let Corner { tick, wait, .. } = self.corner(curve, frame, piece.time);
-        self.corner = self.corner(curve, frame, end);
+        let Corner { tick, wait, .. } = corner.at(curve, frame, piece.time);
+        *corner = corner.at(curve, frame, end);
         let ahead = |p: Real| {
             let made = frame.made(curve, p) + over;
             (want - made, made - want)
         };
         let straight = piece.bend == Bend::Flat;
         let inverse = Real::ONE / if straight { scale(piece.a.half(), 2) } else { scale(piece.j.half() * THIRD, 3) };
-        self.end = self.corner.tick.max(tick);
+        self.end = corner.tick.max(tick);
         let last = self.end.wrapping_sub(tick);
         // A step is 2^58 units at least, if the unit then is neither too large nor a step too short to be foreseen.
         let bits = 58_i32.saturating_sub(inverse.exponent());
@@ -304,14 +316,15 @@ mod tests {
 
     /// The ticks with every step looked for at the exact position, none foreseen.
     fn one_by_one(curve: &Curve, frame: &Frame) -> Vec<u64> {
-        let (mut rest, mut ticks) = (Stepper::new().rest, Vec::new());
+        let Stepper { mut rest, mut corner, .. } = Stepper::new();
+        let mut ticks = Vec::new();
         loop {
             match &mut rest.mode {
                 Mode::Fast(guess) if rest.left > 0 => {
                     ticks.push(guess.search(rest.end));
                     rest.left -= 1;
                 }
-                _ => match rest.run(curve, frame) {
+                _ => match rest.run(curve, frame, &mut corner) {
                     Some(mut run) => {
                         while run.count > 0 {
                             let (tick, is_certain) = run.step();
@@ -326,8 +339,9 @@ mod tests {
 
     /// How far the foreseen times are from the exact ones at most.
     fn error(curve: &Curve, frame: &Frame) -> f64 {
-        let (mut rest, mut worst) = (Stepper::new().rest, 0.0);
-        while let Some(run) = rest.run(curve, frame) {
+        let Stepper { mut rest, mut corner, .. } = Stepper::new();
+        let mut worst = 0.0;
+        while let Some(run) = rest.run(curve, frame, &mut corner) {
             if let (Mode::Slow(row), 2..) = (&rest.mode, run.count) {
                 worst = f64::max(worst, row.error(run));
             }
@@ -350,12 +364,13 @@ mod tests {
             let goal = Goal::At(Real::new(5000), Real::ZERO);
             let curve = plan(Motion::steady(Real::ZERO), goal, &bounds).unwrap();
             let frame = Frame { to: Some(5000 << 32), ..Frame::rest(Clock::MICROSECONDS.shift(), 0, 0) };
-            let (mut rest, mut looks, mut foreseen) = (Stepper::new().rest, 0, 0);
+            let Stepper { mut rest, mut corner, .. } = Stepper::new();
+            let (mut looks, mut foreseen) = (0, 0);
             loop {
                 if rest.single().is_some() {
                     continue;
                 }
-                let Some(run) = rest.run(&curve, &frame) else { break };
+                let Some(run) = rest.run(&curve, &frame, &mut corner) else { break };
                 if run.count > 1 {
                     (looks, foreseen) = (looks + 1, foreseen + run.count);
                 }
@@ -373,14 +388,15 @@ mod tests {
             let bounds = limits.bounds(Clock::MICROSECONDS);
             let curve = plan(Motion::steady(Real::ZERO), Goal::At(Real::new(500), Real::ZERO), &bounds).unwrap();
             let frame = Frame { to: Some(500 << 32), ..Frame::rest(Clock::MICROSECONDS.shift(), 0, 0) };
-            let (mut rest, mut wrong, mut single) = (Stepper::new().rest, 0, 0);
+            let Stepper { mut rest, mut corner, .. } = Stepper::new();
+            let (mut wrong, mut single) = (0, 0);
             loop {
                 if let Mode::Fast(guess) = &rest.mode {
                     wrong += u32::from(rest.left > 0 && !guess.is_right());
                 }
                 if rest.single().is_some() {
                     single += 1;
-                } else if rest.run(&curve, &frame).is_none() {
+                } else if rest.run(&curve, &frame, &mut corner).is_none() {
                     break;
                 }
             }
