@@ -116,6 +116,17 @@ fn an_answer_that_lingers_is_not_that_of_the_next_request() {
     assert!(matches!(hear(&mut axis, 0x26), Some(Progress::Done { .. })));
 }
 
+/// What the axis heard when that came.
+fn answer(pair: &mut Pair, mut came: impl FnMut(&mut Axis) -> bool) -> Received {
+    loop {
+        let received = pair.received;
+        pair.update();
+        if came(&mut pair.axis) {
+            return received;
+        }
+    }
+}
+
 /// The axis hears this, and nothing of what it sends comes to the drive.
 fn hears(pair: &mut Pair, received: Received, periods: u32) {
     for _ in 0..periods {
@@ -137,13 +148,7 @@ fn an_answer_is_not_taken_twice() {
     let mut pair = Pair::new(ActiveCode::CyclicPosition, Behaviour::POLITE);
     pair.until("off", |pair| pair.axis.state() == AxisState::Off);
     pair.axis.ask(write(1)).unwrap();
-    let old = loop {
-        let received = pair.received;
-        pair.update();
-        if pair.axis.take_outcome().is_some() {
-            break received;
-        }
-    };
+    let old = answer(&mut pair, |axis| axis.take_outcome().is_some());
     hears(&mut pair, Received::Nothing, 100);
     pair.axis.ask(write(0)).unwrap();
     hears(&mut pair, old, 30);
@@ -166,13 +171,7 @@ fn a_sub_answer_is_not_taken_twice() {
     pair.wide = true;
     pair.until("off", |pair| pair.axis.state() == AxisState::Off);
     pair.axis.ask_sub(SubCode::Monitor, 0x07, 0).unwrap();
-    let old = loop {
-        let received = pair.received;
-        pair.update();
-        if pair.axis.take_sub_outcome().is_some() {
-            break received;
-        }
-    };
+    let old = answer(&mut pair, |axis| axis.take_sub_outcome().is_some());
     hears(&mut pair, Received::Nothing, 100);
     pair.axis.ask_sub(SubCode::Monitor, 0x07, 0).unwrap();
     hears(&mut pair, old, 40);

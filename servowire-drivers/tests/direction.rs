@@ -284,13 +284,10 @@ fn an_spi_does_not_listen_with_the_driver_on_either() {
 
 #[cfg(feature = "async")]
 mod asynch {
-    use std::future::Future;
-    use std::task::{Context, Waker};
-
     use servowire_drivers::tformat::asynch::Encoder;
 
     use super::*;
-    use crate::polls::{FOR_EVER, Looks, pause, run};
+    use crate::polls::{FOR_EVER, Looks, forget, pause, run};
 
     impl embedded_io_async::Write for Bench {
         async fn write(&mut self, bytes: &[u8]) -> Result<usize, ErrorKind> {
@@ -331,18 +328,6 @@ mod asynch {
         async fn flush(&mut self) -> Result<(), Self::Error> {
             Ok(())
         }
-    }
-
-    /// Polls so often, and forgets the future.
-    fn forget(future: impl Future, polls: usize) {
-        let mut future = Box::pin(future);
-        let mut context = Context::from_waker(Waker::noop());
-        for _ in 0..polls {
-            if future.as_mut().poll(&mut context).is_ready() {
-                return;
-            }
-        }
-        std::mem::forget(future);
     }
 
     fn encoder(bench: &Bench) -> Encoder<Bench, DriverEnable<Bench>, Looks<Bench>> {

@@ -15,9 +15,6 @@ mod hostile;
 mod late;
 mod polls;
 
-use std::future::poll_fn;
-use std::task::Poll;
-
 use embedded_io::ErrorKind;
 use frames::{Bench, Port, Shared, deliveries, line, scenario, shaft};
 use hostile::live_through;
@@ -147,7 +144,7 @@ impl FramePort for Sharing {
     }
 
     async fn take(&mut self) -> Result<Frame, ErrorKind> {
-        poll_fn(|_| if self.0.complains() { Poll::Ready(Err(ErrorKind::Other)) } else { Poll::Pending }).await
+        Err(self.0.damage().await)
     }
 }
 

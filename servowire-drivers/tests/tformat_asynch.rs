@@ -15,14 +15,14 @@ mod hostile;
 mod late;
 mod polls;
 
-use std::future::{Future, poll_fn};
-use std::task::{Context, Poll, Waker};
+use std::future::poll_fn;
+use std::task::Poll;
 
 use bench::{Bench, Misframed, Pin, Shared, Uart, Watch, line, scenario};
 use embedded_io::{ErrorKind, ErrorType};
 use hostile::live_through;
 use late::{Late, World};
-use polls::{FOR_EVER, Looks, pause, run};
+use polls::{FOR_EVER, Looks, forget, pause, run};
 use servowire_drivers::DriverEnable;
 use servowire_drivers::tformat::asynch::Encoder;
 use servowire_drivers::tformat::blocking;
@@ -93,10 +93,7 @@ fn a_future_may_be_forgotten() {
     for polls in 0..400 {
         let bench = Bench::new(Scenario::quiet(), Misframed::Reported);
         let mut encoder = driver(&bench);
-        let mut future = Box::pin(encoder.read_all());
-        let mut context = Context::from_waker(Waker::noop());
-        let ended = (0..polls).any(|_| future.as_mut().poll(&mut context).is_ready());
-        std::mem::forget(future);
+        let ended = forget(encoder.read_all(), polls);
         let second = run(encoder.read_all(), FOR_EVER).unwrap();
         assert!(second.is_ok(), "after {polls} polls, ended {ended}: {second:?}");
         assert!(!bench.borrow().driver_on);
@@ -149,7 +146,7 @@ impl ErrorType for Sharing {
 
 impl embedded_io_async::Read for Sharing {
     async fn read(&mut self, _: &mut [u8]) -> Result<usize, ErrorKind> {
-        poll_fn(|_| if self.0.complains() { Poll::Ready(Err(ErrorKind::Other)) } else { Poll::Pending }).await
+        Err(self.0.damage().await)
     }
 }
 

@@ -7,7 +7,7 @@ use service::{Service, SubService};
 
 use super::config::{AxisConfig, StopPolicy};
 use super::counter::Turn;
-use super::echo::EchoWatch;
+use super::echo::{EchoWatch, Standstill};
 use super::profile_move::ProfileMove;
 use super::progress::{Failure, Progress};
 use super::received::Received;
@@ -18,7 +18,7 @@ use crate::command::Command;
 use crate::control::ControlBits;
 use crate::doubt::Doubt;
 use crate::error::Error;
-use crate::header::{MacId, UpdateCounter};
+use crate::header::MacId;
 use crate::noncyclic_command::NonCyclicCommand;
 use crate::noncyclic_response::NonCyclicResponse;
 use crate::position::{max_step, max_step_at, step};
@@ -55,9 +55,9 @@ pub struct Axis {
     before: i32,
     last_step: i32,
     actual: i32,
-    /// The last counter echo, and for how many update periods it has stood still.
-    echo: Option<UpdateCounter>,
-    age: u32,
+    /// How old `actual` and `status` are: a position is new with a new counter echo. A drive whose processing stands still
+    /// goes on to send its last block.
+    age: Standstill,
     status: StatusFlags,
     control: ControlBits,
     /// Command_Data3, Sub_Command_Data2 and 3.
@@ -102,8 +102,7 @@ impl Axis {
             before: 0,
             last_step: 0,
             actual: 0,
-            echo: None,
-            age: 0,
+            age: Standstill::new(),
             status: StatusFlags::empty(),
             control: ControlBits::empty(),
             feed_forward: [0; 3],
@@ -133,20 +132,18 @@ impl Axis {
         self.state
     }
 
-    /// The actual position for control, command units. An age of 0 is that of a block that came with the last
-    /// [`receive`](Self::receive); the drive had measured the position before it sent the block.
+    /// The actual position for control: Response_Data1, command units. Its age is counted in update periods since the last
+    /// good block with a new counter echo; 0 is that of a block that came with the last [`receive`](Self::receive). How long
+    /// before its block the drive measured it is not documented. SX-DSV02310, "Update timing".
     ///
     /// # Errors
     /// [`Doubt::Absent`], then [`Doubt::Old`] beyond `max_age` update periods, then [`Doubt::Alarm`].
     pub const fn position(&self, max_age: u32) -> Result<i32, Doubt> {
-        if self.echo.is_none() {
-            Err(Doubt::Absent)
-        } else if self.age > max_age {
-            Err(Doubt::Old { updates: self.age })
-        } else if self.status.contains(StatusFlags::ALARM) {
-            Err(Doubt::Alarm)
-        } else {
-            Ok(self.actual)
+        match self.age.updates() {
+            None => Err(Doubt::Absent),
+            Some(updates) if updates > max_age => Err(Doubt::Old { updates }),
+            Some(_) if self.status.contains(StatusFlags::ALARM) => Err(Doubt::Alarm),
+            Some(_) => Ok(self.actual),
         }
     }
 
@@ -224,13 +221,14 @@ impl Axis {
     /// runs.
     pub fn receive(&mut self, sent: Turn, received: &Received) {
         let response = self.sound(received);
-        self.grow_old(response);
+        let echo = response.map(|r| r.update_counter_echo);
+        self.age.sample(echo);
         if self.state == AxisState::On {
             self.last_step = step(self.before, self.setpoint);
             self.before = self.setpoint;
         }
         if sent != Turn::Invalid {
-            if self.watch.sample(response.map(|r| r.update_counter_echo)) {
+            if self.watch.sample(echo) {
                 self.stop(self.silence());
             }
             self.count_refusals(response);
@@ -300,14 +298,6 @@ impl Axis {
         self.counters.record(&outcome);
         self.last_refusal = outcome.err();
         outcome.ok()
-    }
-
-    /// A position is new with a new counter echo: a drive whose processing stands still goes on to send its last block.
-    fn grow_old(&mut self, response: Option<&Response>) {
-        match response.map(|r| r.update_counter_echo) {
-            echo @ Some(_) if echo != self.echo => (self.echo, self.age) = (echo, 0),
-            _ => self.age = self.age.saturating_add(1),
-        }
     }
 
     /// Why the echo stands still.

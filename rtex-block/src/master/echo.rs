@@ -14,39 +14,60 @@ use crate::header::UpdateCounter;
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct EchoWatch {
     limit: NonZeroU16,
-    last: Option<UpdateCounter>,
-    unchanged: u16,
+    echo: Standstill,
 }
 
 impl EchoWatch {
     /// A watch that trips after `limit` unchanged samples.
     pub const fn new(limit: NonZeroU16) -> Self {
-        Self { limit, last: None, unchanged: 0 }
+        Self { limit, echo: Standstill::new() }
     }
 
     /// Takes a sample; `None` where the update period brought no block of the drive, which counts as unchanged.
     /// Gives whether the watch is tripped.
     pub fn sample(&mut self, echo: Option<UpdateCounter>) -> bool {
-        if self.is_tripped() {
-            return true;
-        }
-        if echo.is_none() || echo == self.last {
-            self.unchanged = self.unchanged.saturating_add(1);
-        } else {
-            self.last = echo;
-            self.unchanged = 0;
+        if !self.is_tripped() {
+            self.echo.sample(echo);
         }
         self.is_tripped()
     }
 
     /// Whether the limit was reached.
     pub const fn is_tripped(&self) -> bool {
-        self.unchanged >= self.limit.get()
+        self.echo.updates >= self.limit.get() as u32
     }
 
     /// Forgets everything: the link was set up anew.
     pub const fn reset(&mut self) {
         *self = Self::new(self.limit);
+    }
+}
+
+/// The last echo of the counter, and how long it has stood still.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub(super) struct Standstill {
+    last: Option<UpdateCounter>,
+    /// Samples since the last one that was another than the one before.
+    updates: u32,
+}
+
+impl Standstill {
+    pub(super) const fn new() -> Self {
+        Self { last: None, updates: 0 }
+    }
+
+    pub(super) fn sample(&mut self, echo: Option<UpdateCounter>) {
+        if echo.is_none() || echo == self.last {
+            self.updates = self.updates.saturating_add(1);
+        } else {
+            (self.last, self.updates) = (echo, 0);
+        }
+    }
+
+    /// For how many samples the echo has stood still; `None` before the first echo.
+    pub(super) const fn updates(self) -> Option<u32> {
+        if self.last.is_some() { Some(self.updates) } else { None }
     }
 }
 

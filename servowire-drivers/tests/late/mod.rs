@@ -3,7 +3,9 @@
 #![allow(dead_code, unreachable_pub, reason = "not every test uses all of it")]
 
 use std::cell::RefCell;
+use std::future::poll_fn;
 use std::rc::Rc;
+use std::task::Poll;
 
 use embedded_io::{ErrorKind, ErrorType};
 
@@ -63,6 +65,11 @@ impl Late {
         let mut world = self.0.borrow_mut();
         let now_ns = world.now_ns;
         world.fault_ns.take_if(|at_ns| *at_ns <= now_ns).is_some()
+    }
+
+    /// Ends when the damage is noticed.
+    pub async fn damage(&self) -> ErrorKind {
+        poll_fn(|_| if self.complains() { Poll::Ready(ErrorKind::Other) } else { Poll::Pending }).await
     }
 }
 

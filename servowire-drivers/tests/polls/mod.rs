@@ -20,6 +20,15 @@ pub fn run<T>(future: impl Future<Output = T>, most: usize) -> Option<T> {
     })
 }
 
+/// Polls at most `most` times, then forgets the future, whose destructor never runs. Whether it ended.
+pub fn forget(future: impl Future, most: usize) -> bool {
+    let mut future = Box::pin(future);
+    let mut context = Context::from_waker(Waker::noop());
+    let ended = (0..most).any(|_| future.as_mut().poll(&mut context).is_ready());
+    std::mem::forget(future);
+    ended
+}
+
 /// Gives the processor away once.
 pub async fn pause() {
     let mut asked = false;

@@ -176,7 +176,8 @@ impl<W: Word> Cubic<W> {
         }
     }
 
-    /// Without jerk: at the next step, if that is made `by` ticks on.
+    /// Without jerk: at the next step, if that is made `by` ticks on. That there is none is written down anew, so that no
+    /// register has to keep it.
     #[inline(always)]
     pub(super) fn straight(&self, by: u64) -> Self {
         let mean = self.h.times_plus(by, self.v);
