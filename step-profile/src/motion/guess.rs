@@ -172,15 +172,19 @@ impl Guess {
         self.wait = self.wait.checked_sub(1)?;
         Some(match self.foresee(Cubic::bent) {
             Ok(tick) => tick,
-            Err(wrong) if cfg!(target_pointer_width = "64") => self.apart(|own| own.look(wrong, last)),
-            Err(wrong) => self.mend(wrong).unwrap_or_else(|| self.search(last)),
+            Err(wrong) => self.apart(|own| own.look(wrong, last)),
         })
+    }
+
+    /// How many of `left` steps are looked for one by one.
+    pub(super) fn singles(&self, left: u32) -> u32 {
+        left.min(self.wait)
     }
 
     /// The tick of the next step of `left`, unless several may be foreseen at once.
     pub(super) fn single(&mut self, left: u32, last: u64) -> Option<u64> {
         if self.wait == 0 {
-            self.wait = if left < 4 * Row::LEAST { left } else { self.patience() };
+            self.wait = if left < 8 * Row::LEAST { left } else { self.patience() };
         }
         self.wait = self.wait.checked_sub(1)?;
         Some(self.step(last))
@@ -225,7 +229,7 @@ impl Guess {
     /// Up to `left` steps, as long as it is not worth while to look for more; what is left then.
     #[inline(always)]
     pub(super) fn fold<B>(&mut self, left: u32, last: u64, sum: B, take: &mut impl FnMut(B, u64) -> B) -> (u32, B) {
-        let count = left.min(self.wait);
+        let count = self.singles(left);
         let sum = if self.cubic.is_straight() {
             self.fold_with(Cubic::straight, (count, last), sum, take)
         } else {

@@ -173,7 +173,7 @@ impl Row {
     pub(super) const LEAST: u32 = 1 << Self::FEW;
     /// Doublings of the spacing, at least and at most.
     const FEW: u32 = 4;
-    const MANY: u32 = 6;
+    const MANY: u32 = 7;
     /// The greatest bend, 0.2 ticks.
     const SMOOTH: u32 = 205;
     /// Intervals are below 2^20 ticks.

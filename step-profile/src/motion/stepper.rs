@@ -14,10 +14,47 @@ use super::run::{Row, Run};
 #[derive(Debug, Clone)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub(super) struct Stepper {
+    batch: Batch,
     run: Run,
     rest: Rest,
     /// Where the end of the piece was looked for.
     corner: Corner,
+}
+
+/// Ticks of steps that are looked for one by one, the last one first. Where registers are few a loop of its own has room in them
+/// for what it needs; where they are many, it is there from step to step, and an array would take it out of them.
+#[derive(Debug, Clone, Copy)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+struct Batch {
+    ticks: [u64; Batch::SIZE],
+    left: u32,
+}
+
+impl Batch {
+    const SIZE: usize = if cfg!(all(target_pointer_width = "64", not(test))) { 0 } else { 16 };
+
+    const NONE: Self = Self { ticks: [0; Self::SIZE], left: 0 };
+
+    /// The next of them.
+    #[inline(always)]
+    fn next(&mut self) -> Option<u64> {
+        self.left = self.left.checked_sub(1)?;
+        self.ticks.get(self.left as usize).copied()
+    }
+
+    /// With those of the next `left` steps that `guess` looks for one by one; what is left then.
+    fn fill(&mut self, guess: &mut Guess, left: u32, last: u64) -> u32 {
+        let count = guess.singles(left).min(Self::SIZE as u32);
+        let mut free = count;
+        guess.fold(count, last, (), &mut |(), tick| {
+            free = free.wrapping_sub(1);
+            if let Some(place) = self.ticks.get_mut(free as usize) {
+                *place = tick;
+            }
+        });
+        self.left = count;
+        left.wrapping_sub(count)
+    }
 }
 
 /// What comes after the run.
@@ -81,59 +118,82 @@ impl Stepper {
     pub(super) const fn new() -> Self {
         let mode = Mode::Cruise { interval: 0, time: 0 };
         let corner = Corner { time: Real::HUGE, tick: 0, wait: Real::ZERO };
-        Self { run: Run::NONE, rest: Rest { left: 0, until: 0, end: 0, mode, piece: 0 }, corner }
+        Self { batch: Batch::NONE, run: Run::NONE, rest: Rest { left: 0, until: 0, end: 0, mode, piece: 0 }, corner }
     }
 
     /// Steps made, counted from the origin of the positions.
     pub(super) const fn count(&self) -> u32 {
-        self.rest.until.saturating_sub(self.rest.left).saturating_sub(self.run.count)
+        self.rest.until.saturating_sub(self.rest.left).saturating_sub(self.run.count).saturating_sub(self.batch.left)
     }
 
     /// The tick of the next step.
     #[inline(always)]
     pub(super) fn next(&mut self, curve: &Curve, frame: &Frame) -> Option<u64> {
         if self.run.count == 0 {
-            if let Some(tick) = self.rest.single() {
+            let single = if Batch::SIZE == 0 { self.rest.single() } else { self.batch.next() };
+            if let Some(tick) = single {
                 return Some(tick);
             }
-            // In a copy as well.
-            let mut corner = self.corner;
-            self.run = self.rest.apart(|rest| rest.run(curve, frame, &mut corner))?;
-            self.corner = corner;
+            self.apart(|own| own.more(curve, frame))?;
         }
         let (tick, is_certain) = self.run.step();
         Some(if is_certain { tick } else { self.rest.apart(|rest| rest.exact(tick, self.run.count)) })
     }
 
+    /// Calls with a copy, as [`Rest::apart`] does.
+    #[inline(always)]
+    fn apart<T>(&mut self, call: impl FnOnce(&mut Self) -> T) -> T {
+        if cfg!(target_pointer_width = "64") {
+            let mut copy = self.clone();
+            let done = call(&mut copy);
+            *self = copy;
+            done
+        } else {
+            call(self)
+        }
+    }
+
+    /// The next steps, one at least.
+    #[cold]
+    #[inline(never)]
+    fn more(&mut self, curve: &Curve, frame: &Frame) -> Option<()> {
+        let Self { batch, run, rest, corner } = self;
+        *run = rest.run(curve, frame, corner)?;
+        if let (1.., Mode::Fast(guess)) = (Batch::SIZE, &mut rest.mode) {
+            rest.left = batch.fill(guess, rest.left, rest.end);
+        }
+        Some(())
+    }
+
     /// All steps that are left, in order.
-    pub(super) fn fold<B>(mut self, curve: &Curve, frame: &Frame, init: B, mut take: impl FnMut(B, u64) -> B) -> B {
-        let mut sum = init;
-        while let Some(tick) = self.next(curve, frame) {
-            sum = take(sum, tick);
-            if let Mode::Cruise { interval, time } = self.rest.mode {
-                let mut time = time.wrapping_sub(interval.wrapping_mul(self.run.count.into()));
-                for _ in 0..self.run.count.wrapping_add(self.rest.left) {
+    pub(super) fn fold<B>(self, curve: &Curve, frame: &Frame, init: B, mut take: impl FnMut(B, u64) -> B) -> B {
+        let Self { mut batch, run, mut rest, mut corner } = self;
+        let (mut sum, mut next) = (init, Some(run));
+        while let Some(mut run) = next {
+            if let Mode::Cruise { interval, time } = rest.mode {
+                // The first step of a piece may be late: not where its time says.
+                if run.count == 1 {
+                    let (tick, is_certain) = run.step();
+                    sum = take(sum, if is_certain { tick } else { rest.exact(tick, 0) });
+                }
+                let mut time = time.wrapping_sub(interval.wrapping_mul(run.count.into()));
+                for _ in 0..run.count.wrapping_add(rest.left) {
                     time = time.wrapping_add(interval);
                     sum = take(sum, (time >> 64) as u64);
                 }
-                (self.run.count, self.rest.left) = (0, 0);
-                continue;
+                (run.count, rest.left) = (0, 0);
             }
-            if let Mode::Fast(guess) = &mut self.rest.mode {
-                (self.rest.left, sum) = guess.fold(self.rest.left, self.rest.end, sum, &mut take);
-            }
-            let mut run = self.run;
-            self.run.count = 0;
-            if run.count == 0 {
-                continue;
-            }
-            loop {
+            while run.count > 0 {
                 let (tick, is_certain) = run.step();
-                sum = take(sum, if is_certain { tick } else { self.rest.exact(tick, run.count) });
-                if run.count == 0 {
-                    break;
-                }
+                sum = take(sum, if is_certain { tick } else { rest.exact(tick, run.count) });
             }
+            while let Some(tick) = batch.next() {
+                sum = take(sum, tick);
+            }
+            if let Mode::Fast(guess) = &mut rest.mode {
+                (rest.left, sum) = guess.fold(rest.left, rest.end, sum, &mut take);
+            }
+            next = rest.run(curve, frame, &mut corner);
         }
         sum
     }
@@ -366,11 +426,7 @@ mod tests {
             let frame = Frame { to: Some(5000 << 32), ..Frame::rest(Clock::MICROSECONDS.shift(), 0, 0) };
             let Stepper { mut rest, mut corner, .. } = Stepper::new();
             let (mut looks, mut foreseen) = (0, 0);
-            loop {
-                if rest.single().is_some() {
-                    continue;
-                }
-                let Some(run) = rest.run(&curve, &frame, &mut corner) else { break };
+            while let Some(run) = rest.run(&curve, &frame, &mut corner) {
                 if run.count > 1 {
                     (looks, foreseen) = (looks + 1, foreseen + run.count);
                 }
@@ -394,14 +450,26 @@ mod tests {
                 if let Mode::Fast(guess) = &rest.mode {
                     wrong += u32::from(rest.left > 0 && !guess.is_right());
                 }
-                if rest.single().is_some() {
-                    single += 1;
-                } else if rest.run(&curve, &frame, &mut corner).is_none() {
-                    break;
-                }
+                let Some(run) = rest.run(&curve, &frame, &mut corner) else { break };
+                single += u32::from(run.count == 1);
             }
             assert!(single > 350 && wrong < most, "{wrong} of {single} foreseen wrongly");
         }
+    }
+
+    /// A step that was due before the piece began is made when it begins, and the next one where it is due.
+    #[test]
+    fn a_late_step_is_the_same_in_a_loop() {
+        let bounds = Limits::new(20_000, 100_000).unwrap().bounds(Clock::MICROSECONDS);
+        let curve = plan(Motion::steady(bounds.v), Goal::At(Real::new(20), bounds.v), &bounds).unwrap();
+        let from = (1 << 31) + (1 << 30);
+        let frame = Frame { from, to: Some(20 << 32), ..Frame::rest(Clock::MICROSECONDS.shift(), 0, 0) };
+        let mut stepper = Stepper::new();
+        let ticks: Vec<u64> = core::iter::from_fn(|| stepper.next(&curve, &frame)).collect();
+        assert_eq!(ticks[..3], [0, 38, 88]);
+        let mut folded = Vec::new();
+        Stepper::new().fold(&curve, &frame, (), |(), tick| folded.push(tick));
+        assert_eq!(folded, ticks);
     }
 
     proptest! {

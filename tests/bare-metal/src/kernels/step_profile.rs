@@ -71,6 +71,15 @@ fn planned(move_: &Limited) -> Option<Plan> {
     Plan::between(Clock::MICROSECONDS, limits(move_)?, move_.steps, entry, exit).ok()
 }
 
+/// A plan, and its steps by the iterator's `next`.
+fn one_by_one(move_: &Limited) -> Option<u64> {
+    let (plan, mut sum) = (planned(move_)?, 0);
+    for tick in plan.pulses() {
+        sum ^= tick;
+    }
+    Some(sum)
+}
+
 /// Takes from a step what a sender needs.
 fn mix(sum: u32, step: RampStep) -> u32 {
     sum ^ step.cnt ^ step.sync_time
@@ -240,6 +249,26 @@ kernels! {
     /// The same of an S-curve.
     fn step_profile_motion_s_ramp_5000(move_: &Limited) -> Option<u64> {
         Some(planned(move_)?.pulses().fold(4, |sum, tick| sum ^ tick))
+    } over [LONG_S_CURVE];
+
+    /// The short trapezoid step by step, as a timer's interrupt takes them.
+    fn step_profile_motion_next_500(move_: &Limited) -> Option<u64> {
+        one_by_one(move_)
+    } over [TRAPEZOID];
+
+    /// The short S-curve step by step.
+    fn step_profile_motion_s_next_500(move_: &Limited) -> Option<u64> {
+        Some(one_by_one(move_)? ^ 1)
+    } over [S_CURVE];
+
+    /// The long trapezoid step by step.
+    fn step_profile_motion_next_5000(move_: &Limited) -> Option<u64> {
+        Some(one_by_one(move_)? ^ 2)
+    } over [LONG_TRAPEZOID];
+
+    /// The long S-curve step by step.
+    fn step_profile_motion_s_next_5000(move_: &Limited) -> Option<u64> {
+        Some(one_by_one(move_)? ^ 3)
     } over [LONG_S_CURVE];
 
     /// 5000 steps at constant speed, and their plan.
