@@ -1,6 +1,7 @@
 //! Motion that a machine can use: trapezoids and S-curves within limits of speed, acceleration and jerk, in integers.
 
 mod arc;
+mod batch;
 mod cubic;
 mod curve;
 mod cycle;

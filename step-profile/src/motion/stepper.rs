@@ -1,6 +1,7 @@
 //! From curves to the ticks of steps.
 #![expect(clippy::cast_possible_truncation, clippy::cast_possible_wrap, reason = "words of wider numbers")]
 
+use super::batch::Batch;
 use super::cubic::Cubic;
 use super::curve::{Bend, Curve, Piece};
 use super::guess::Guess;
@@ -19,42 +20,6 @@ pub(super) struct Stepper {
     rest: Rest,
     /// Where the end of the piece was looked for.
     corner: Corner,
-}
-
-/// Ticks of steps that are looked for one by one, the last one first. Where registers are few a loop of its own has room in them
-/// for what it needs; where they are many, it is there from step to step, and an array would take it out of them.
-#[derive(Debug, Clone, Copy)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-struct Batch {
-    ticks: [u64; Batch::SIZE],
-    left: u32,
-}
-
-impl Batch {
-    const SIZE: usize = if cfg!(all(target_pointer_width = "64", not(test))) { 0 } else { 16 };
-
-    const NONE: Self = Self { ticks: [0; Self::SIZE], left: 0 };
-
-    /// The next of them.
-    #[inline(always)]
-    fn next(&mut self) -> Option<u64> {
-        self.left = self.left.checked_sub(1)?;
-        self.ticks.get(self.left as usize).copied()
-    }
-
-    /// With those of the next `left` steps that `guess` looks for one by one; what is left then.
-    fn fill(&mut self, guess: &mut Guess, left: u32, last: u64) -> u32 {
-        let count = guess.singles(left).min(Self::SIZE as u32);
-        let mut free = count;
-        guess.fold(count, last, (), &mut |(), tick| {
-            free = free.wrapping_sub(1);
-            if let Some(place) = self.ticks.get_mut(free as usize) {
-                *place = tick;
-            }
-        });
-        self.left = count;
-        left.wrapping_sub(count)
-    }
 }
 
 /// What comes after the run.
@@ -137,10 +102,10 @@ impl Stepper {
             self.apart(|own| own.more(curve, frame))?;
         }
         let (tick, is_certain) = self.run.step();
-        Some(if is_certain { tick } else { self.rest.apart(|rest| rest.exact(tick, self.run.count)) })
+        Some(if is_certain { tick } else { self.apart(|own| own.rest.exact(tick, own.run.count)) })
     }
 
-    /// Calls with a copy, as [`Rest::apart`] does.
+    /// Calls with a copy where registers are many: what a reference is taken of has to be in memory, and the run with it.
     #[inline(always)]
     fn apart<T>(&mut self, call: impl FnOnce(&mut Self) -> T) -> T {
         if cfg!(target_pointer_width = "64") {
@@ -203,19 +168,6 @@ impl Rest {
     /// Doublings of the steps at constant speed that are foreseen at once: what their interval is rounded by does not add up
     /// to 2^-16 ticks.
     const EVEN: u32 = 15;
-
-    /// Calls with a copy where registers are many: what a reference is taken of has to be in memory, and the run with it.
-    #[inline(always)]
-    fn apart<T>(&mut self, call: impl FnOnce(&mut Self) -> T) -> T {
-        if cfg!(target_pointer_width = "64") {
-            let mut copy = self.clone();
-            let done = call(&mut copy);
-            *self = copy;
-            done
-        } else {
-            call(self)
-        }
-    }
 
     /// The next step, if steps are made one by one.
     #[inline(always)]
