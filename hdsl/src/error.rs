@@ -15,7 +15,7 @@ servowire_core::errors! {
     pub enum Error {
         /// Fewer bits, samples or bytes than the unit has.
         #[error("{got} of {want} are there")]
-        Truncated {
+        Truncated = 1 {
             /// How many there are.
             got: u16,
             /// How many the unit has.
@@ -23,22 +23,22 @@ servowire_core::errors! {
         },
         /// A 10-bit word stands in neither column of the 8b/10b tables.
         #[error("{word:#05x} (a in bit 0) is no 8b/10b word")]
-        InvalidWord {
+        InvalidWord = 2 {
             /// The word, first line bit in bit 0.
             word: u16,
         },
         /// A special character came where only data may be, or data where a special character must be.
         #[error("character {byte:#04x} is of the wrong kind here")]
-        WrongKind {
+        WrongKind = 3 {
             /// Value of the character.
             byte: u8,
         },
         /// The acceleration channel carries K29.7 K29.7: the encoder has no value for this frame.
         #[error("the encoder reports that it has no acceleration value")]
-        EncoderError,
+        EncoderError = 4,
         /// The CRC-5 of the acceleration word is wrong.
         #[error("the acceleration word has check bits {got:#04x}, computed {want:#04x}")]
-        AccelerationCrc {
+        AccelerationCrc = 5 {
             /// Received.
             got: u8,
             /// Computed.
@@ -46,7 +46,7 @@ servowire_core::errors! {
         },
         /// The CRC-16 of a safe position or a message is wrong.
         #[error("the CRC is {got:#06x}, computed {want:#06x}")]
-        Crc {
+        Crc = 6 {
             /// Received.
             got: u16,
             /// Computed over the received bytes.
@@ -54,34 +54,34 @@ servowire_core::errors! {
         },
         /// The block is sound, but the encoder cannot deliver a position.
         #[error("the encoder cannot deliver a position (mark {mark:#04x})")]
-        PositionInvalid {
+        PositionInvalid = 7 {
             /// FDh in safe channel 1, FBh in safe channel 2.
             mark: u8,
         },
         /// The five symbol bits of a parameter byte have no meaning in this direction.
         #[error("{symbol:#04x} is no symbol of the parameters channel in this direction")]
-        UndefinedSymbol {
+        UndefinedSymbol = 8 {
             /// Bits 4:0 of the byte.
             symbol: u8,
         },
         /// The line stayed high: no encoder answered.
         #[error("no falling edge: nobody answered")]
-        NoEdge,
+        NoEdge = 9,
         /// The test pattern of the start-up is at none of the delays.
         #[error("the test pattern is at none of the delays, sampled at index {index}")]
-        PatternNotFound {
+        PatternNotFound = 10 {
             /// Sampling index that the first edge gave, 0..=7.
             index: u8,
         },
         /// The answer is not the test pattern of the start-up.
         #[error("the answer is not the test pattern")]
-        Pattern,
+        Pattern = 11,
         /// The bits on the line are not the beginning of an H-frame.
         #[error("no SYNC, SAMPLE and CYCLE RESET at the beginning of the frame")]
-        Framing,
+        Framing = 12,
         /// The two copies of the encoder identifier differ.
         #[error("the identifier came as {first:#07x} and as {second:#07x}")]
-        EncoderIdMismatch {
+        EncoderIdMismatch = 13 {
             /// From the vertical, parameter and pipe words.
             first: u32,
             /// From the acceleration words and the other nibble of the pipe word.
@@ -89,25 +89,25 @@ servowire_core::errors! {
         },
         /// The identifier asks for something this receiver does not do.
         #[error("encoder identifier {id:#07x} is not supported")]
-        UnsupportedEncoder {
+        UnsupportedEncoder = 14 {
             /// The 20 bits.
             id: u32,
         },
         /// The answer to a short message begins like a long one.
         #[error("first byte {first:#04x} begins a long message")]
-        LongMessageStart {
+        LongMessageStart = 15 {
             /// First byte of the answer.
             first: u8,
         },
         /// The answer to a long message begins like a short one, or a header byte lacks its marker bit.
         #[error("first byte {first:#04x} begins a short message")]
-        ShortMessageStart {
+        ShortMessageStart = 16 {
             /// The byte.
             first: u8,
         },
         /// A sound message speaks of another register or address, or of the other direction.
         #[error("the answer begins with {got:#06x}, expected {want:#06x}")]
-        Header {
+        Header = 17 {
             /// Received header.
             got: u16,
             /// Header that belongs to the request.
@@ -115,58 +115,58 @@ servowire_core::errors! {
         },
         /// The encoder answered a long message with an error.
         #[error("the encoder refused the long message: {error}")]
-        Resource {
+        Resource = 18 {
             /// Why.
             error: ResourceError,
         },
         /// The encoder did not accept the message (SNAK or LNAK) in any of the tries.
         #[error("the encoder did not accept the message, {tries} tries")]
-        NotAccepted {
+        NotAccepted = 19 {
             /// Times the message was sent.
             tries: u8,
         },
         /// No sound answer within the time-out in any of the tries.
         #[error("no answer to the message, {tries} tries")]
-        NoAnswer {
+        NoAnswer = 20 {
             /// Times the message was sent.
             tries: u8,
         },
         /// The message was dropped by a message reset or a restart of the link.
         #[error("the message was dropped by a reset")]
-        Dropped,
+        Dropped = 21,
         /// A message of this kind is already under way.
         #[error("a message of this kind is under way")]
-        Busy,
+        Busy = 22,
         /// The link is not in the state that the operation needs.
         #[error("the link is not up")]
-        NotLocked,
+        NotLocked = 23,
         /// The number of data bytes is none of 0, 2, 4 and 8.
         #[error("{len} data bytes: a long message carries 0, 2, 4 or 8")]
-        DataLength {
+        DataLength = 24 {
             /// Bytes given.
             len: u8,
         },
         /// The period is shorter than the frames that shall fit into it.
         #[error("the period lacks {missing} line bits for the shortest frames")]
-        PeriodTooShort {
+        PeriodTooShort = 25 {
             /// Bits that are missing, rounded up.
             missing: u32,
         },
         /// The name of a user file is none: 1 to 8 characters 20h..=7Eh, then 00h.
         #[error("this is no name of a user file")]
-        FileName,
+        FileName = 26,
         /// No pulse period is known that the frames could be synchronised with.
         #[error("no pulse period was given")]
-        NoPulse,
+        NoPulse = 27,
         /// The register map has no register at this address.
         #[error("there is no register {address:#04x}")]
-        NoRegister {
+        NoRegister = 28 {
             /// The address.
             address: u8,
         },
         /// The EXTRA window of the start-up arithmetic is outside 4..=9 bits.
         #[error("the EXTRA window would be {extra} bits, 4 to 9 are allowed")]
-        ExtraOutOfRange {
+        ExtraOutOfRange = 29 {
             /// Whole bits a frame.
             extra: u32,
         },

@@ -22,7 +22,7 @@ servowire_core::errors! {
     pub enum Error {
         /// The line ends too early, or the next frame did not come in time.
         #[error("the line ends after {got} of {want} bits")]
-        Truncated {
+        Truncated = 1 {
             /// Line bits that were there.
             got: u16,
             /// Line bits of the whole.
@@ -30,19 +30,19 @@ servowire_core::errors! {
         },
         /// A start bit reads 1.
         #[error("frame {frame}: the start bit is 1")]
-        StartBit {
+        StartBit = 2 {
             /// First frame with this fault.
             frame: u8,
         },
         /// A delimiter reads 0.
         #[error("frame {frame}: the delimiter is 0")]
-        Delimiter {
+        Delimiter = 3 {
             /// First frame with this fault.
             frame: u8,
         },
         /// The CRC-8 of a response is wrong.
         #[error("the CRC-8 is {got:#04x}, computed {want:#04x}")]
-        Crc {
+        Crc = 4 {
             /// Received.
             got: u8,
             /// Computed over the received bits.
@@ -50,7 +50,7 @@ servowire_core::errors! {
         },
         /// The CRC-3 of a request frame is wrong.
         #[error("the CRC-3 is {got:03b}, computed {want:03b}")]
-        Crc3 {
+        Crc3 = 5 {
             /// Received.
             got: u8,
             /// Computed over the received bits.
@@ -58,16 +58,16 @@ servowire_core::errors! {
         },
         /// The sync code is neither that of a request (2) nor that of a response (4), whichever was due.
         #[error("the sync code is {got}: 2 begins a request, 4 a response")]
-        SyncCode {
+        SyncCode = 6 {
             /// Its three bits, the first of the line in bit 0.
             got: u8,
         },
         /// The bit between command code and encoder status is not 0.
         #[error("the fixed bit of the information field is 1")]
-        FixedBit,
+        FixedBit = 7,
         /// Another encoder answered.
         #[error("encoder {got} answered, asked was encoder {want}")]
-        AddressMismatch {
+        AddressMismatch = 8 {
             /// Address in the response.
             got: u8,
             /// Address in the request.
@@ -75,7 +75,7 @@ servowire_core::errors! {
         },
         /// The response answers another command.
         #[error("the response answers command {got}, asked was {want}")]
-        CommandMismatch {
+        CommandMismatch = 9 {
             /// Command code in the response.
             got: u8,
             /// Command code in the request.
@@ -83,10 +83,10 @@ servowire_core::errors! {
         },
         /// The encoder has no such EEPROM bank.
         #[error("the encoder reports a wrong EEPROM bank")]
-        BankError,
+        BankError = 10,
         /// The response repeats another argument than was sent.
         #[error("the response repeats {field} {got:#x}, sent was {want:#x}")]
-        EchoMismatch {
+        EchoMismatch = 11 {
             /// Which argument.
             field: EchoField,
             /// In the response.
@@ -96,7 +96,7 @@ servowire_core::errors! {
         },
         /// A request frame has another frame code than its place in the request demands.
         #[error("frame {frame} of the request has frame code {got}, due was {want}")]
-        FrameCode {
+        FrameCode = 12 {
             /// Index of the frame.
             frame: u8,
             /// Frame code received.
@@ -106,13 +106,13 @@ servowire_core::errors! {
         },
         /// Command code 31, or a number that is no command code.
         #[error("{code} is no command code")]
-        UnknownCommand {
+        UnknownCommand = 13 {
             /// The number.
             code: u8,
         },
         /// The command belongs to a later version of the protocol than the encoder speaks.
         #[error("{command} is not in version {version}")]
-        UnsupportedInVersion {
+        UnsupportedInVersion = 14 {
             /// The command.
             command: Command,
             /// Version of the encoder.
@@ -120,53 +120,53 @@ servowire_core::errors! {
         },
         /// A request writes to an EEPROM address that cannot be written.
         #[error("address {got:#x} is out of range")]
-        AddressRange {
+        AddressRange = 15 {
             /// The number.
             got: u32,
         },
         /// A request carries a number that is too wide for its field.
         #[error("{got:#x} does not fit its field")]
-        DataRange {
+        DataRange = 16 {
             /// The number.
             got: u32,
         },
         /// No response within the time-out.
         #[error("no response")]
-        NoResponse,
+        NoResponse = 17,
         /// The memory stayed busy after all tries.
         #[error("the encoder was still busy after {tries} requests")]
-        Busy {
+        Busy = 18 {
             /// Requests made.
             tries: u16,
         },
         /// A reset was interrupted before the eighth request, so it was **not done**. The eight requests have to be sent anew.
         #[error("no response to the reset after {done} good responses of 8: not done")]
-        Interrupted {
+        Interrupted = 19 {
             /// Good responses in succession so far.
             done: u8,
         },
         /// Whether a command that cannot be undone took effect is not known: the response to its last request did not come,
         /// or the encoder reports that it could not be stored. Find out before it is repeated.
         #[error("whether a command that cannot be undone was done is not known")]
-        EffectUnknown,
+        EffectUnknown = 20,
         /// What was written is not what is read back.
         #[error("what was written is not what is read back")]
-        NotDone,
+        NotDone = 21,
         /// MEMERR is set: an access to the EEPROM failed.
         #[error("the encoder reports a failed access to its EEPROM")]
-        MemoryFault,
+        MemoryFault = 22,
         /// A position has bits set above the width of the encoder: the wrong resolution.
         #[error("the position has bits set above bit {width} that this encoder leaves 0")]
-        UpperBits {
+        UpperBits = 23 {
             /// Single-turn and turn bits of the resolution together.
             width: u8,
         },
         /// The response does not carry what the resolution was asked to make of it.
         #[error("the response carries no such value")]
-        NotCarried,
+        NotCarried = 24,
         /// A `nom` combinator of the caller refused the input.
         #[error("a parser combinator refused the input")]
-        Combinator,
+        Combinator = 25,
     }
 }
 

@@ -6,7 +6,7 @@ servowire_core::errors! {
     pub enum Error {
         /// The slice is shorter than a block.
         #[error("{got} bytes, a block has {want}")]
-        Truncated {
+        Truncated = 1 {
             /// Bytes that were there.
             got: u16,
             /// Bytes that a block has: 16 or 32.
@@ -14,7 +14,7 @@ servowire_core::errors! {
         },
         /// The slice is longer than a block: its end is the end of the block.
         #[error("{got} bytes, a block has {want}")]
-        TooLong {
+        TooLong = 2 {
             /// Bytes that were there; 65535 for more.
             got: u16,
             /// Bytes that a block has: 16 or 32.
@@ -22,13 +22,13 @@ servowire_core::errors! {
         },
         /// C/R (bit 7 of byte 0) says command where a response was due, or the other way round.
         #[error("byte 0 is {byte0:#04x}: the C/R bit tells the wrong direction")]
-        Direction {
+        Direction = 3 {
             /// Byte 0 as received.
             byte0: u8,
         },
         /// The block belongs to another drive.
         #[error("MAC-ID {got}, expected {want}")]
-        MacId {
+        MacId = 4 {
             /// The MAC-ID in the block.
             got: u8,
             /// The MAC-ID that was expected.
@@ -36,37 +36,37 @@ servowire_core::errors! {
         },
         /// Bits 6-4 of byte 1 are 5, 6 or 7. A drive answers 0021h.
         #[error("cyclic code {code} is not defined")]
-        CyclicCode {
+        CyclicCode = 5 {
             /// The code, 5..=7.
             code: u8,
         },
         /// Bits 3-0 of byte 1 are 3, 8, 9 or Bh to Fh. A drive answers 0022h.
         #[error("non-cyclic code {code:x}h is not defined")]
-        NonCyclicCode {
+        NonCyclicCode = 6 {
             /// The code, 0..=15.
             code: u8,
         },
         /// Sub_Chk (bit 7 of byte 16) is 0. A drive answers 0012h in the sub block and executes nothing.
         #[error("byte 16 is {byte16:#04x}: Sub_Chk is not set")]
-        SubChk {
+        SubChk = 7 {
             /// Byte 16 as received.
             byte16: u8,
         },
         /// Bits 3-0 of byte 16 of a command are not 0, 2 or Ah. A drive answers 0022h in the sub block.
         #[error("sub-command code {code:x}h is not defined")]
-        SubCommandCode {
+        SubCommandCode = 8 {
             /// The code, 0..=15.
             code: u8,
         },
         /// Both codes are defined but not for use together (strict decoding only).
         #[error("cyclic and non-cyclic code of {code:02x}h do not go together")]
-        CodePair {
+        CodePair = 9 {
             /// Bits 6-0 of byte 1.
             code: u8,
         },
         /// A bit is 1 that the layout defines as 0 (strict decoding only).
         #[error("byte {byte} has reserved bits {bits:#04x} set")]
-        Reserved {
+        Reserved = 10 {
             /// Number of the byte in the block, 0..=31; the first one at fault.
             byte: u8,
             /// Those of its reserved bits that are 1.
@@ -74,7 +74,7 @@ servowire_core::errors! {
         },
         /// A `nom` combinator of the caller refused the input.
         #[error("a parser combinator refused the input")]
-        Combinator,
+        Combinator = 11,
     }
 }
 

@@ -10,6 +10,9 @@ pub trait Class: Copy + Eq + Debug + 'static {
 
     /// The name in `snake_case`, as logs and test vectors spell it.
     fn name(self) -> &'static str;
+
+    /// The number in logs and in other languages: 1 or more, and never changed.
+    fn number(self) -> u8;
 }
 
 /// An error that belongs to a [`Class`].

@@ -76,6 +76,10 @@ mod tests {
         fn name(self) -> &'static str {
             "kind"
         }
+
+        fn number(self) -> u8 {
+            self.0 as u8 + 1
+        }
     }
 
     #[test]

@@ -5,7 +5,8 @@
 /// * `Error`, `Copy`, `#[non_exhaustive]`, at most 16 bytes, with `defmt::Format` and serde behind the features of these
 ///   names of the calling crate, and `class()`;
 /// * `ErrorClass` with a variant of the same name for each, [`Class`](crate::Class) and [`Classified`](crate::Classified),
-///   `ALL` in the order of declaration, and `name()` in `snake_case`.
+///   `ALL` in the order of declaration, `name()` in `snake_case`, and `number()`, which is written beside the variant and
+///   never changes: logs and programs in other languages keep it. 0 is left for "no error".
 ///
 /// ```
 /// servowire_core::errors! {
@@ -13,7 +14,7 @@
 ///     pub enum Error {
 ///         /// The frame ends too early.
 ///         #[error("{got} of {want} bytes are there")]
-///         Truncated {
+///         Truncated = 1 {
 ///             /// Bytes that were there.
 ///             got: u16,
 ///             /// Bytes of a frame.
@@ -21,7 +22,7 @@
 ///         },
 ///         /// The check byte is wrong.
 ///         #[error("the check byte is wrong")]
-///         BadCrc8,
+///         BadCrc8 = 2,
 ///     }
 /// }
 ///
@@ -29,6 +30,7 @@
 /// assert_eq!(error.to_string(), "3 of 4 bytes are there");
 /// assert_eq!((error.class(), error.class().name()), (ErrorClass::Truncated, "truncated"));
 /// assert_eq!(ErrorClass::ALL.iter().map(|class| class.name()).collect::<Vec<_>>(), ["truncated", "bad_crc8"]);
+/// assert_eq!(ErrorClass::ALL.iter().map(|class| class.number()).collect::<Vec<_>>(), [1, 2]);
 /// ```
 ///
 /// A crate with `nom` parsers adds [`nom_error!`](crate::nom_error).
@@ -39,7 +41,7 @@ macro_rules! errors {
         pub enum Error {
             $(
                 $(#[$variant_meta:meta])*
-                $variant:ident $({ $($fields:tt)* })?
+                $variant:ident = $number:literal $({ $($fields:tt)* })?
             ),* $(,)?
         }
     ) => {
@@ -60,10 +62,11 @@ macro_rules! errors {
         #[cfg_attr(feature = "defmt", derive(defmt::Format))]
         #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
         #[non_exhaustive]
+        #[repr(u8)]
         pub enum ErrorClass {
             $(
                 #[doc = concat!("[`Error::", stringify!($variant), "`]")]
-                $variant
+                $variant = $number
             ),*
         }
 
@@ -78,6 +81,19 @@ macro_rules! errors {
                         const NAME: $crate::private::Snake = $crate::private::snake_case(stringify!($variant));
                         NAME.as_str()
                     })*
+                }
+            }
+
+            /// The number that stands for this class in logs and in other languages: 1 or more, and never changed.
+            pub const fn number(self) -> u8 {
+                self as u8
+            }
+
+            /// The class of this number.
+            pub const fn from_number(number: u8) -> Option<Self> {
+                match number {
+                    $($number => Some(Self::$variant),)*
+                    _ => None,
                 }
             }
         }
@@ -101,11 +117,20 @@ macro_rules! errors {
             const ALL: &'static [Self] = Self::ALL;
 
             fn index(self) -> usize {
-                self as usize
+                enum Place {
+                    $($variant),*
+                }
+                match self {
+                    $(Self::$variant => Place::$variant as usize),*
+                }
             }
 
             fn name(self) -> &'static str {
                 self.name()
+            }
+
+            fn number(self) -> u8 {
+                self.number()
             }
         }
 
@@ -118,6 +143,7 @@ macro_rules! errors {
         }
 
         const _: () = assert!(size_of::<Error>() <= 16, "an error has at most 16 bytes");
+        const _: () = assert!(ErrorClass::from_number(0).is_none(), "0 stands for no error");
     };
 }
 
@@ -130,7 +156,7 @@ macro_rules! errors {
 ///     pub enum Error {
 ///         /// A `nom` combinator of the caller refused the input.
 ///         #[error("a parser combinator refused the input")]
-///         Combinator,
+///         Combinator = 1,
 ///     }
 /// }
 /// servowire_core::nom_error!(Error);

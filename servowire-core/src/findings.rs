@@ -85,6 +85,10 @@ mod tests {
         fn name(self) -> &'static str {
             ["first", "second", "third"][self as usize]
         }
+
+        fn number(self) -> u8 {
+            self as u8 + 1
+        }
     }
 
     #[test]

@@ -8,6 +8,8 @@ extern crate std;
 
 mod builder;
 mod class;
+mod codes;
+mod contract;
 mod counters;
 mod error_rate;
 mod errors;
@@ -15,16 +17,19 @@ mod findings;
 mod number;
 mod procedure;
 mod range;
+mod run;
 mod show;
 pub mod stream;
 
 pub use class::{Class, Classified};
+pub use contract::{Machine, Procedure};
 pub use counters::Counters;
 pub use error_rate::ErrorRate;
 pub use findings::Findings;
 pub use number::U24;
 pub use procedure::{Polling, Progress, Step};
 pub use range::OutOfRange;
+pub use run::{Ended, run, run_async};
 pub use show::write_names;
 
 /// What the macros of this crate name; not for use by hand.

@@ -76,3 +76,42 @@ macro_rules! format_as_displayed {
         )+
     };
 }
+
+/// `Display`, and behind the calling crate's feature `defmt` also `defmt::Format`, by the same format strings, one for each
+/// pattern of the value: the same words on a host and in a log, and no `core::fmt` in firmware.
+///
+/// ```
+/// pub enum Level {
+///     Low { volts: u8 },
+///     Good,
+/// }
+/// servowire_core::one_line!(Level {
+///     Self::Low { volts } => "low, {} V", volts;
+///     Self::Good => "good";
+/// });
+///
+/// assert_eq!(Level::Low { volts: 3 }.to_string(), "low, 3 V");
+/// assert_eq!(Level::Good.to_string(), "good");
+/// ```
+#[macro_export]
+macro_rules! one_line {
+    ($type:ty { $($pattern:pat $(if $guard:expr)? => $format:literal $(, $part:expr)*;)+ }) => {
+        impl core::fmt::Display for $type {
+            fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+                match self {
+                    $($pattern $(if $guard)? => write!(f, $format $(, $part)*),)+
+                }
+            }
+        }
+
+        #[cfg(feature = "defmt")]
+        #[cfg_attr(docsrs, doc(cfg(feature = "defmt")))]
+        impl defmt::Format for $type {
+            fn format(&self, f: defmt::Formatter<'_>) {
+                match self {
+                    $($pattern $(if $guard)? => defmt::write!(f, $format $(, $part)*),)+
+                }
+            }
+        }
+    };
+}

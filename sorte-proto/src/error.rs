@@ -8,7 +8,7 @@ servowire_core::errors! {
     pub enum Error {
         /// Fewer bytes than the frame has.
         #[error("frame of {got} bytes, {want} are needed")]
-        Truncated {
+        Truncated = 1 {
             /// Bytes given.
             got: u16,
             /// Bytes of a frame of this kind; 8 where the kind is not known.
@@ -16,7 +16,7 @@ servowire_core::errors! {
         },
         /// The frame check sequence does not fit the bytes before it.
         #[error("FCS is {got:#010x}, the bytes before it give {want:#010x}")]
-        BadFcs {
+        BadFcs = 2 {
             /// FCS in the frame.
             got: u32,
             /// FCS computed.
@@ -24,19 +24,19 @@ servowire_core::errors! {
         },
         /// DA of a long-header frame is not 255.
         #[error("destination address {got}, only 255 (all) is in use")]
-        WrongDestination {
+        WrongDestination = 3 {
             /// DA in the frame.
             got: u8,
         },
         /// TYPE is not one of 1 to 10.
         #[error("frame type {got} is not known")]
-        UnknownType {
+        UnknownType = 4 {
             /// TYPE in the frame.
             got: u8,
         },
         /// TYPE is known, but not the one asked for.
         #[error("frame type {got} instead of {want}")]
-        UnexpectedType {
+        UnexpectedType = 5 {
             /// TYPE in the frame.
             got: u8,
             /// TYPE asked for.
@@ -44,7 +44,7 @@ servowire_core::errors! {
         },
         /// More bytes than a frame of this kind has.
         #[error("frame of {got} bytes, its kind has {want}")]
-        TooLong {
+        TooLong = 6 {
             /// Bytes given.
             got: u16,
             /// Bytes of this kind.
@@ -52,7 +52,7 @@ servowire_core::errors! {
         },
         /// The CRC-8 of an IO-exchange frame does not fit.
         #[error("CRC-8 is {got:#04x}, the bytes before it give {want:#04x}")]
-        BadCrc8 {
+        BadCrc8 = 7 {
             /// CRC-8 in the frame.
             got: u8,
             /// CRC-8 computed.
@@ -60,25 +60,25 @@ servowire_core::errors! {
         },
         /// SA is not 0 in a master frame, or not 1 to 254 in a device frame.
         #[error("source address {got} does not belong to this kind of frame")]
-        WrongSource {
+        WrongSource = 8 {
             /// SA in the frame.
             got: u8,
         },
         /// The preamble is not 1 to 7 bytes 0x55 followed by 0xD5.
         #[error("preamble is wrong at byte {at}")]
-        BadPreamble {
+        BadPreamble = 9 {
             /// Index of the first byte that does not fit.
             at: u8,
         },
         /// A network of more than 254 devices.
         #[error("device count {count}, 254 is the maximum")]
-        TooManyDevices {
+        TooManyDevices = 10 {
             /// Count in the frame.
             count: u16,
         },
         /// The totals of a discovery frame are not the sums of its entries.
         #[error("total of {got} bytes, the entries sum to {want}")]
-        TableMismatch {
+        TableMismatch = 11 {
             /// Total in the frame.
             got: u16,
             /// Sum of the entries, saturated.
@@ -86,7 +86,7 @@ servowire_core::errors! {
         },
         /// A slice of process data lies outside the output bytes.
         #[error("bytes {offset}..{offset}+{len} are not among the output bytes")]
-        OutsideOutput {
+        OutsideOutput = 12 {
             /// First byte of the slice.
             offset: u16,
             /// Its length.
@@ -94,7 +94,7 @@ servowire_core::errors! {
         },
         /// The output bytes handed over for a master frame are not as many as the line has.
         #[error("{got} output bytes were given, the line has {want}")]
-        OutputLength {
+        OutputLength = 13 {
             /// Bytes given.
             got: u16,
             /// Bytes of the line.
@@ -102,7 +102,7 @@ servowire_core::errors! {
         },
         /// The buffer to write a frame into is too small.
         #[error("buffer of {got} bytes, {want} are needed")]
-        BufferTooSmall {
+        BufferTooSmall = 14 {
             /// Bytes of the buffer.
             got: u16,
             /// Bytes of the frame.
@@ -110,19 +110,19 @@ servowire_core::errors! {
         },
         /// A PTO word between 3991 and 0x7FFE, with or without bit 15, or 0xFFFF.
         #[error("PTO word {raw:#06x} has no meaning")]
-        ReservedPtoValue {
+        ReservedPtoValue = 15 {
             /// The word.
             raw: u16,
         },
         /// A round trip is shorter than the forwarding time, or too long for the 16-bit sum.
         #[error("round trip of {rtt_ns} ns cannot be")]
-        ImplausibleRoundTrip {
+        ImplausibleRoundTrip = 16 {
             /// The round trip, or the mean of 16.
             rtt_ns: u32,
         },
         /// The time stamp of an IO-exchange frame lies outside the window.
         #[error("time stamp {got} is not within the window around {want}")]
-        ImplausibleTimeStamp {
+        ImplausibleTimeStamp = 17 {
             /// Time stamp in the frame.
             got: u16,
             /// Time stamp expected.
@@ -130,7 +130,7 @@ servowire_core::errors! {
         },
         /// A register field holds a code that the data sheet reserves.
         #[error("code {code} of DRV8711 register {register} is reserved")]
-        ReservedCode {
+        ReservedCode = 18 {
             /// Address of the register.
             register: u8,
             /// The code.
@@ -138,7 +138,7 @@ servowire_core::errors! {
         },
         /// A register reads back other than written.
         #[error("DRV8711 register {register} reads {got:#05x}, {want:#05x} was written")]
-        ReadBack {
+        ReadBack = 19 {
             /// Address of the register.
             register: u8,
             /// Value read, bits that always read 0 left out.
@@ -148,7 +148,7 @@ servowire_core::errors! {
         },
         /// A start-up frame was not answered in time.
         #[error("no answer to {sent} frame {frame}")]
-        NoAnswer {
+        NoAnswer = 20 {
             /// TYPE of the frame sent.
             sent: FrameType,
             /// Its number in this phase, from 0.
@@ -156,13 +156,13 @@ servowire_core::errors! {
         },
         /// A start-up frame began before the request that it would answer: it is an answer to an earlier one.
         #[error("the frame began {early_ns} ns before the request")]
-        BeforeRequest {
+        BeforeRequest = 21 {
             /// So much earlier.
             early_ns: u32,
         },
         /// DISCOVERY found fewer devices than asked for.
         #[error("{got} devices answered, {want} are needed")]
-        TooFewDevices {
+        TooFewDevices = 22 {
             /// Devices in the line.
             got: u8,
             /// Devices asked for.
@@ -170,7 +170,7 @@ servowire_core::errors! {
         },
         /// Device frames were missing in too many cycles one after the other.
         #[error("no frame of device {first} for {cycles} cycles, {count} missing in all")]
-        DevicesMissing {
+        DevicesMissing = 23 {
             /// Address of the first that is missing.
             first: u8,
             /// How many are.
@@ -180,25 +180,25 @@ servowire_core::errors! {
         },
         /// Device frames were damaged in too many cycles one after the other.
         #[error("damaged device frames in {cycles} cycles one after the other")]
-        TooManyCrcErrors {
+        TooManyCrcErrors = 24 {
             /// For so many cycles.
             cycles: u8,
         },
         /// A device frame comes from beyond the line, or LAST is set or missing where it was not before.
         #[error("the line has changed: device {address} does not fit what DISCOVERY found")]
-        TopologyChanged {
+        TopologyChanged = 25 {
             /// Who sent the frame.
             address: u8,
         },
         /// The last device is further away than the 16 bits of the delay in SYNC can say.
         #[error("the last device is {delay_ns} ns away, the delay field of SYNC ends at 65535 ns")]
-        LineTooLong {
+        LineTooLong = 26 {
             /// Its delay from the master.
             delay_ns: u32,
         },
         /// The cycle is too short for the line.
         #[error("the cycle is too short from device {device} on, which needs {needs_ns} ns")]
-        CycleTooShort {
+        CycleTooShort = 27 {
             /// The first device that does not fit.
             device: u8,
             /// The cycle that it needs.
@@ -206,13 +206,13 @@ servowire_core::errors! {
         },
         /// The link of the master is down.
         #[error("the link is down")]
-        LinkDown,
+        LinkDown = 28,
         /// The frame does not belong to the present state.
         #[error("the frame does not belong to the present state")]
-        WrongState,
+        WrongState = 29,
         /// A `nom` combinator of the caller refused the input.
         #[error("a parser combinator refused the input")]
-        Combinator,
+        Combinator = 30,
     }
 }
 

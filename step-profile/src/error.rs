@@ -6,10 +6,10 @@ servowire_core::errors! {
     pub enum Error {
         /// A ramp entry has to last one step at least.
         #[error("0 steps a ramp entry, at least 1 needed")]
-        ZeroSegmentLength,
+        ZeroSegmentLength = 1,
         /// 32 ramp entries of this length do not fit a 32-bit step count.
         #[error("{steps_per_entry} steps a ramp entry, at most {limit}")]
-        SegmentTooLong {
+        SegmentTooLong = 2 {
             /// Steps a ramp entry, as asked for.
             steps_per_entry: u32,
             /// The longest: 2^27 - 1.
@@ -17,7 +17,7 @@ servowire_core::errors! {
         },
         /// Above 250 kHz two pulses would fall into one cycle.
         #[error("{} Hz is above 250 kHz: speed constant {speed}, at least {limit} needed", hertz(*speed))]
-        StepRateTooHigh {
+        StepRateTooHigh = 3 {
             /// Speed constant 2^16 / f\[MHz\], as asked for.
             speed: u32,
             /// The smallest: 262144.
@@ -25,7 +25,7 @@ servowire_core::errors! {
         },
         /// The first step of the ramp lasts 2^32 ns or longer.
         #[error("at {} Hz the first step of the ramp is longer than 2^32 ns: speed constant {speed}, at most {limit}", hertz(*speed))]
-        StepTimeOverflow {
+        StepTimeOverflow = 4 {
             /// Speed constant 2^16 / f\[MHz\], as asked for.
             speed: u32,
             /// The largest for this ramp table.
@@ -33,7 +33,7 @@ servowire_core::errors! {
         },
         /// A sync_time lies within a cycle.
         #[error("sync_time {sync_time} ns, at most {limit}")]
-        SyncTimeOutOfRange {
+        SyncTimeOutOfRange = 5 {
             /// Start time of a pulse in ns, as asked for.
             sync_time: u32,
             /// The latest: 3999 ns.
@@ -41,7 +41,7 @@ servowire_core::errors! {
         },
         /// A ramp entry is below 1000 (faster than full speed) or above the entry before it.
         #[error("ramp entry {index} is {entry}, wanted 1000..={limit}")]
-        InvalidRampTable {
+        InvalidRampTable = 6 {
             /// Which entry, 0..=31.
             index: u8,
             /// Its value.
@@ -51,19 +51,19 @@ servowire_core::errors! {
         },
         /// A frequency is a fraction with a denominator of 1 or more.
         #[error("a frequency with denominator 0")]
-        ZeroDenominator,
+        ZeroDenominator = 7,
         /// The speed constant of this frequency does not fit 32 bits.
         #[error("step frequency below 15.26 Hz: its speed constant does not fit 32 bits")]
-        FrequencyTooLow,
+        FrequencyTooLow = 8,
         /// A move (or the wait after it) is still under way.
         #[error("the axis is still moving")]
-        Moving,
+        Moving = 9,
         /// No motor is selected to move.
         #[error("no motor is selected")]
-        NoMotor,
+        NoMotor = 10,
         /// Two steps could fall into one tick of the clock.
         #[error("{speed} steps/s are too many for this clock, at most {limit}")]
-        SpeedAboveClock {
+        SpeedAboveClock = 11 {
             /// Greatest speed in steps/s, as asked for.
             speed: u32,
             /// Half the ticks in a second.
@@ -71,7 +71,7 @@ servowire_core::errors! {
         },
         /// A move has more steps than 31 bits count.
         #[error("a move of {steps} steps, at most {limit}")]
-        TooManySteps {
+        TooManySteps = 12 {
             /// Steps, as asked for.
             steps: u32,
             /// The most: 2^31 - 1.
@@ -79,13 +79,13 @@ servowire_core::errors! {
         },
         /// No room for another line.
         #[error("the queue of lines is full")]
-        QueueFull,
+        QueueFull = 13,
         /// An axis with 0 steps a metre.
         #[error("an axis with 0 steps a metre")]
-        NoScale,
+        NoScale = 14,
         /// The ends of an arc are not on one circle, or it is too large.
         #[error("an arc from a radius of {from} to one of {to}")]
-        ArcRadius {
+        ArcRadius = 15 {
             /// Radius at its begin, in the caller's unit.
             from: u32,
             /// Radius at its end.
@@ -93,13 +93,13 @@ servowire_core::errors! {
         },
         /// A target lies outside the soft limits.
         #[error("target {target} is outside the soft limits")]
-        SoftLimit {
+        SoftLimit = 16 {
             /// The target in steps; the nearest that 32 bits hold.
             target: i32,
         },
         /// The change of speed within the limits needs more steps than there are.
         #[error("{steps} steps are too few, at least {needed} needed")]
-        TooShort {
+        TooShort = 17 {
             /// Steps, as asked for.
             steps: u32,
             /// The least that is enough.

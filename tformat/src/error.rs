@@ -18,19 +18,19 @@ servowire_core::errors! {
     pub enum Error {
         /// A start bit reads 1.
         #[error("field {field}: the start bit is 1")]
-        StartBit {
+        StartBit = 1 {
             /// First field with this fault.
             field: u8,
         },
         /// A delimiter reads 0.
         #[error("field {field}: the delimiter is 0")]
-        Delimiter {
+        Delimiter = 2 {
             /// First field with this fault.
             field: u8,
         },
         /// The frame ends too early, or the next field did not come in time.
         #[error("the frame ends after {got} of {want} fields")]
-        Truncated {
+        Truncated = 3 {
             /// Whole fields that were there.
             got: u16,
             /// Fields of the whole frame.
@@ -38,25 +38,25 @@ servowire_core::errors! {
         },
         /// The control field does not begin with the sink code 0, 1, 0.
         #[error("control field {cf:#04x}: the sink code is not 010")]
-        SinkCode {
+        SinkCode = 4 {
             /// The control field.
             cf: u8,
         },
         /// The parity of the control field is odd.
         #[error("control field {cf:#04x}: the parity is wrong")]
-        Parity {
+        Parity = 5 {
             /// The control field.
             cf: u8,
         },
         /// The control field is well formed, but its data ID is none of the nine documented ones.
         #[error("data ID {code:X} is not documented")]
-        UnknownDataId {
+        UnknownDataId = 6 {
             /// The four bits of the data ID.
             code: u8,
         },
         /// The response answers another data ID than was asked for.
         #[error("the response has control field {got:#04x}, the request had {want:#04x}")]
-        CfMismatch {
+        CfMismatch = 7 {
             /// Control field of the response.
             got: u8,
             /// Control field of the request.
@@ -64,13 +64,13 @@ servowire_core::errors! {
         },
         /// The encoder refused the request: it answered with a sound ID 3 frame that was not asked for.
         #[error("the encoder refused the request: ID 3 response with status [{sf}]")]
-        Rejected {
+        Rejected = 8 {
             /// Status of that frame; CA0 and CA1 name the damage.
             sf: StatusField,
         },
         /// The check field is not the XOR of the fields before it.
         #[error("the check field is {got:#04x}, computed {want:#04x}")]
-        Crc {
+        Crc = 9 {
             /// Received.
             got: u8,
             /// Computed over the received fields.
@@ -78,7 +78,7 @@ servowire_core::errors! {
         },
         /// An EEPROM response speaks of another address.
         #[error("the response is for EEPROM address {got:#04x}, asked was {want:#04x}")]
-        AddressMismatch {
+        AddressMismatch = 10 {
             /// Address in the response.
             got: u8,
             /// Address in the request.
@@ -86,7 +86,7 @@ servowire_core::errors! {
         },
         /// The response to an EEPROM write repeats another data byte, or a byte that was written reads back as another.
         #[error("the EEPROM data is {got:#04x}, written was {want:#04x}")]
-        DataMismatch {
+        DataMismatch = 11 {
             /// Data in the response.
             got: u8,
             /// Data in the request.
@@ -94,7 +94,7 @@ servowire_core::errors! {
         },
         /// On a half-duplex line the request did not come back as it was sent.
         #[error("byte {at} of the echo is {got:#04x}, sent was {want:#04x}")]
-        EchoMismatch {
+        EchoMismatch = 12 {
             /// Index of the byte in the request.
             at: u8,
             /// Received.
@@ -104,19 +104,19 @@ servowire_core::errors! {
         },
         /// No response within the time-out.
         #[error("{}", if *.echo { "only the own request came back: no encoder, or the wires A and B are exchanged" } else { "no response" })]
-        NoResponse {
+        NoResponse = 13 {
             /// Whether the own request was received: the line works, but nobody answers on it.
             echo: bool,
         },
         /// The EEPROM stayed busy, or the encoder did not take a value, after all tries.
         #[error("the EEPROM was still busy after {tries} requests")]
-        Busy {
+        Busy = 14 {
             /// Requests made.
             tries: u16,
         },
         /// The act was not done: fewer requests than it needs can have been taken, or the read-back shows it.
         #[error("not done, after {sent} requests: {because}")]
-        NotDone {
+        NotDone = 15 {
             /// Requests that the encoder may have taken.
             sent: u8,
             /// How it failed.
@@ -124,13 +124,13 @@ servowire_core::errors! {
         },
         /// Whether the act was done is not known. Read back what can be read before it is tried again.
         #[error("whether it was done is not known: {because}")]
-        EffectUnknown {
+        EffectUnknown = 16 {
             /// How it failed.
             because: ErrorClass,
         },
         /// A data field has bits set above the width of the encoder: the wrong resolution, or a damaged frame.
         #[error("data field {value:#08x} has bits set that this encoder leaves 0: {excess:#08x}")]
-        UpperBits {
+        UpperBits = 17 {
             /// The 24-bit field.
             value: u32,
             /// Those of its bits that must be 0.
@@ -138,7 +138,7 @@ servowire_core::errors! {
         },
         /// A `nom` combinator of the caller refused the input.
         #[error("a parser combinator refused the input")]
-        Combinator,
+        Combinator = 18,
     }
 }
 

@@ -1,0 +1,119 @@
+//! What code that is generic over protocols may rely on. Whoever uses one crate calls its inherent methods, which have the
+//! same names; these traits only forward.
+
+use crate::{Progress, Step};
+
+/// One exchange with the other end: what leaves, what is heard of the answer, and how it ends.
+///
+/// A machine does no I/O and reads no clock. It is told what arrived and when that ended, and asked what became of it.
+pub trait Machine {
+    /// What leaves, and when.
+    type Transmission;
+    /// What is heard: bytes of a UART, frames of a line.
+    type Unit: ?Sized;
+    /// What the exchange is made for.
+    type Value;
+    /// Why it fails.
+    type Error;
+
+    /// What is to be sent.
+    fn transmission(&self) -> Self::Transmission;
+
+    /// These units were heard one after the other; the last bit of the last one ended at `end_ns`.
+    fn hear(&mut self, unit: &Self::Unit, end_ns: u64) -> Progress<Self::Value, Self::Error>;
+
+    /// A unit that ended at `end_ns` was damaged in its framing.
+    fn framing_error(&mut self, end_ns: u64) -> Progress<Self::Value, Self::Error>;
+
+    /// Ends the exchange if its time is over at `now_ns`. Hand over what was heard first.
+    fn poll(&mut self, now_ns: u64) -> Progress<Self::Value, Self::Error>;
+
+    /// Where the exchange stands.
+    fn progress(&self) -> Progress<Self::Value, Self::Error>;
+}
+
+/// Something that takes several exchanges: a reset, access to a memory, the search for an encoder.
+pub trait Procedure {
+    /// A message to the other end.
+    type Request;
+    /// A message back.
+    type Response;
+    /// What the procedure is made for.
+    type Value;
+    /// Why it, or one of its exchanges, fails.
+    type Error;
+
+    /// Begins anew at `now_ns`.
+    fn start(&mut self, now_ns: u64) -> Step<Self::Request, Self::Value, Self::Error>;
+
+    /// An exchange ended with this outcome, refused answers included; the line is free from `ready_ns` on.
+    fn receive(
+        &mut self,
+        outcome: Result<Self::Response, Self::Error>,
+        ready_ns: u64,
+    ) -> Step<Self::Request, Self::Value, Self::Error>;
+}
+
+/// Implements [`Machine`](crate::Machine) by the inherent methods of the same names.
+///
+/// `servowire_core::machine!(Transaction { Frame, [u8] => Exchange, Error });`
+#[macro_export]
+macro_rules! machine {
+    ($machine:ty { $transmission:ty, $unit:ty => $value:ty, $error:ty }) => {
+        impl $crate::Machine for $machine {
+            type Transmission = $transmission;
+            type Unit = $unit;
+            type Value = $value;
+            type Error = $error;
+
+            fn transmission(&self) -> $transmission {
+                self.transmission()
+            }
+
+            fn hear(&mut self, unit: &$unit, end_ns: u64) -> $crate::Progress<$value, $error> {
+                self.hear(unit, end_ns)
+            }
+
+            fn framing_error(&mut self, end_ns: u64) -> $crate::Progress<$value, $error> {
+                self.framing_error(end_ns)
+            }
+
+            fn poll(&mut self, now_ns: u64) -> $crate::Progress<$value, $error> {
+                self.poll(now_ns)
+            }
+
+            fn progress(&self) -> $crate::Progress<$value, $error> {
+                self.progress()
+            }
+        }
+    };
+}
+
+/// Implements [`Procedure`](crate::Procedure) by the inherent methods of the same names.
+///
+/// `servowire_core::procedures!(Request => Response, Error { Reset => SingleTurn; Detection => AllData; });`
+#[macro_export]
+macro_rules! procedures {
+    ($request:ty => $response:ty, $error:ty { $($procedure:ty => $value:ty;)+ }) => {
+        $(
+            impl $crate::Procedure for $procedure {
+                type Request = $request;
+                type Response = $response;
+                type Value = $value;
+                type Error = $error;
+
+                fn start(&mut self, now_ns: u64) -> $crate::Step<$request, $value, $error> {
+                    self.start(now_ns)
+                }
+
+                fn receive(
+                    &mut self,
+                    outcome: Result<$response, $error>,
+                    ready_ns: u64,
+                ) -> $crate::Step<$request, $value, $error> {
+                    self.receive(outcome, ready_ns)
+                }
+            }
+        )+
+    };
+}
