@@ -25,6 +25,7 @@ mod range;
 mod run;
 mod show;
 pub mod stream;
+mod time;
 
 #[cfg(not(all(test, loom)))]
 pub use cell::{Cell, Reader, Words, Writer};
@@ -39,6 +40,7 @@ pub use procedure::{Polling, Progress, Step};
 pub use range::OutOfRange;
 pub use run::{Ended, run, run_async};
 pub use show::write_names;
+pub use time::{ClockCheck, ClockError, MAX_TICK_NS, MIN_TICK_HZ, TickRate, TimeBase};
 
 /// What the macros of this crate name; not for use by hand.
 #[doc(hidden)]
