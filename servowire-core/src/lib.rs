@@ -17,6 +17,7 @@ mod procedure;
 mod range;
 mod show;
 pub mod stream;
+mod time;
 
 pub use class::{Class, Classified};
 pub use counters::Counters;
@@ -26,6 +27,7 @@ pub use number::U24;
 pub use procedure::{Polling, Progress, Step};
 pub use range::OutOfRange;
 pub use show::write_names;
+pub use time::{ClockCheck, ClockError, MAX_TICK_NS, MIN_TICK_HZ, TickRate, TimeBase};
 
 /// What the macros of this crate name; not for use by hand.
 #[doc(hidden)]
