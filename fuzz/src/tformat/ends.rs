@@ -4,7 +4,7 @@ use std::convert::Infallible;
 
 use servowire_core::{Ended, Procedure};
 use tformat::device::{Device, Fault};
-use tformat::inspect::{Cause, inspect as look};
+use tformat::inspect::{Cause, LineCause, inspect as look};
 use tformat::master::{EepromAccess, Line, Polling, Progress, Reset, Transaction};
 use tformat::{Abm, Abs, Address, Almc, BitRate, Error, Frame, Page, Request, Response, Window};
 
@@ -196,18 +196,18 @@ pub fn inspect(mut data: &[u8]) {
     let report = look(request, line);
     match Response::parse_line(request, line) {
         Ok(response) => {
-            assert_eq!((report.error, report.cause, report.response), (None, None, Some(response)));
-            assert!(report.findings.is_empty());
+            assert_eq!((report.error(), report.cause(), report.response()), (None, None, Some(response)));
+            assert!(report.findings().is_empty());
         }
         Err(error) => {
-            assert_eq!(report.error, Some(error));
-            assert!(report.findings.contains(error.class()));
+            assert_eq!(report.error(), Some(error));
+            assert!(report.findings().contains(error.class()));
         }
     }
     assert!(report.fields().len() <= usize::from(request.data_id().response_fields()));
-    if let Some(Cause::LineInverted) = report.cause {
-        assert_eq!(Response::parse_line(request, line.inverted()).ok(), report.response);
+    if let Some(Cause::Line(LineCause::LineInverted)) = report.cause() {
+        assert_eq!(Response::parse_line(request, line.inverted()).ok(), report.response());
     }
-    let _ = report.cause.map(|cause| cause.to_string());
+    let _ = report.cause().map(|cause| cause.to_string());
     let _ = tformat::inspect::inspect_bytes(request, data);
 }

@@ -147,7 +147,7 @@ kernels! {
     /// What is wrong with UART bytes, and which kinds of faults that are.
     fn tformat_inspect_bytes((request, _, bytes): &Echoed) -> (Report, usize) {
         let report = inspect_bytes(*request, bytes);
-        (report, report.findings.iter().count() + report.fields().len())
+        (report, report.findings().iter().count() + report.fields().len())
     } over ECHOED;
 
     /// A cycle of the tile.
