@@ -6,6 +6,7 @@
 #[cfg(any(test, feature = "std"))]
 extern crate std;
 
+mod angle;
 mod builder;
 // Under the model there are only the slots: its atomics are not const.
 #[cfg(not(all(test, loom)))]
@@ -27,6 +28,7 @@ mod show;
 pub mod stream;
 mod time;
 
+pub use angle::{Angle, Commutation, Sense};
 #[cfg(not(all(test, loom)))]
 pub use cell::{Cell, Reader, Words, Writer};
 pub use class::{Class, Classified};
