@@ -30,7 +30,9 @@ use core::convert::Infallible;
 use rtex_block::master::{Asic, Fault, Led, Master, Phase, Received, Ring, Slave};
 use rtex_block::timing::TimerSystem;
 use rtex_block::{BlockSize, Command32, MacId, Response, Response32, UpdateCounter};
+use servowire_core::{ClockCheck, ClockError};
 
+use crate::clock::MAX_LOOKS;
 use crate::{Clock, Error};
 pub use port::{Port, Word};
 pub use reception::Reception;
@@ -63,6 +65,7 @@ pub struct Exchanged {
 pub struct Driver<'r, P, C, const N: usize> {
     port: P,
     clock: C,
+    check: ClockCheck,
     master: Master<N>,
     reception: &'r Reception,
     /// Frames of `reception` that the master has heard of.
@@ -98,6 +101,7 @@ impl<'r, P: Port, C: Clock, const N: usize> Driver<'r, P, C, N> {
         Self {
             port,
             clock,
+            check: ClockCheck::new(MAX_LOOKS),
             master,
             reception,
             frames: reception.frames(),
@@ -170,12 +174,12 @@ impl<'r, P: Port, C: Clock, const N: usize> Driver<'r, P, C, N> {
     /// [`control`](Self::control) until the communication runs, for `limit_ns` at the most; it gives the phase that was reached.
     ///
     /// # Errors
-    /// As [`control`](Self::control).
+    /// As [`control`](Self::control), and [`Error::Clock`].
     pub fn start(&mut self, limit_ns: u64) -> Result<Phase, Failure<P>> {
-        let until_ns = self.clock.now_ns().saturating_add(limit_ns);
+        let until_ns = self.now_ns()?.saturating_add(limit_ns);
         loop {
             let phase = self.control()?;
-            if phase == Phase::Running || self.clock.now_ns() >= until_ns {
+            if phase == Phase::Running || self.now_ns()? >= until_ns {
                 return Ok(phase);
             }
         }
@@ -186,7 +190,7 @@ impl<'r, P: Port, C: Clock, const N: usize> Driver<'r, P, C, N> {
     /// the time of the interrupt.
     ///
     /// # Errors
-    /// [`Error::Io`]; the next exchange goes on.
+    /// [`Error::Io`] and [`Error::Clock`]; commands were written if they could be, and the next exchange goes on.
     pub fn exchange(&mut self, began_ns: u64) -> Result<Exchanged, Failure<P>> {
         #[cfg(feature = "async")]
         {
@@ -210,11 +214,10 @@ impl<'r, P: Port, C: Clock, const N: usize> Driver<'r, P, C, N> {
         let commands = self.master.exchange(&received);
         let written = self.write(&commands);
         let frames_late = self.frames_since(began_ns);
-        self.late = self.late.saturating_add((frames_late > 0).into());
-        match (fault, written) {
-            (Some(fault), _) | (None, Err(fault)) => Err(Error::Io(fault)),
-            (None, Ok(())) => Ok(Exchanged { frames_late, torn }),
-        }
+        self.late = self.late.saturating_add(frames_late.is_ok_and(|frames| frames > 0).into());
+        fault.map_or(Ok(()), Err)?;
+        written.map_err(Error::Io)?;
+        Ok(Exchanged { frames_late: frames_late?, torn })
     }
 
     /// Leaves the stop after a time-out, an alarm or a stop of the caller; see [`Master::clear`].
@@ -223,14 +226,14 @@ impl<'r, P: Port, C: Clock, const N: usize> Driver<'r, P, C, N> {
     }
 
     /// The blocks of one frame; `None` if the bank was switched meanwhile each time.
-    fn read(&mut self, began_ns: u64) -> Result<Option<[Received; N]>, P::Error> {
+    fn read(&mut self, began_ns: u64) -> Result<Option<[Received; N]>, Failure<P>> {
         for _ in 0..READS {
-            let before = self.bank(began_ns);
+            let before = self.bank(began_ns)?;
             let mut received = [Received::Nothing; N];
             for (place, received) in received.iter_mut().enumerate() {
-                *received = self.block(place)?;
+                *received = self.block(place).map_err(Error::Io)?;
             }
-            if self.bank(began_ns) == before {
+            if self.bank(began_ns)? == before {
                 return Ok(Some(received));
             }
         }
@@ -238,17 +241,22 @@ impl<'r, P: Port, C: Clock, const N: usize> Driver<'r, P, C, N> {
     }
 
     /// What is another one after each switch of the reception bank: the receive interrupt switches it, or XSYNC.
-    fn bank(&mut self, began_ns: u64) -> u32 {
+    fn bank(&mut self, began_ns: u64) -> Result<u32, ClockError> {
         match self.master.config().timer {
-            TimerSystem::External => self.reception.frames(),
+            TimerSystem::External => Ok(self.reception.frames()),
             TimerSystem::Internal => self.frames_since(began_ns),
         }
     }
 
     /// Frames that have begun since the one at `began_ns`.
-    fn frames_since(&mut self, began_ns: u64) -> u32 {
-        let past_ns = self.clock.now_ns().saturating_sub(began_ns);
-        self.master.config().periods.frames_late(u32::try_from(past_ns).unwrap_or(u32::MAX))
+    fn frames_since(&mut self, began_ns: u64) -> Result<u32, ClockError> {
+        let past_ns = self.now_ns()?.saturating_sub(began_ns);
+        Ok(self.master.config().periods.frames_late(u32::try_from(past_ns).unwrap_or(u32::MAX)))
+    }
+
+    /// A look at the clock.
+    fn now_ns(&mut self) -> Result<u64, ClockError> {
+        self.check.check(self.clock.now_ns()?)
     }
 
     fn block(&mut self, place: usize) -> Result<Received, P::Error> {
