@@ -66,7 +66,7 @@ impl<F: FramePort, T: Timer> Master<F, T> {
     /// [`Error`], [`Error::Doubt`] among them.
     pub async fn read_position(&mut self, ea: EncoderAddress, policy: Policy) -> Result<Position, Failure<F>> {
         let exchange = self.read_abs40(ea).await?;
-        exchange.position(self.resolution, policy, self.timer.now_ns()).map_err(Error::Doubt)
+        exchange.position(self.resolution, policy, self.state.now_ns(&mut self.timer)?).map_err(Error::Doubt)
     }
 
     /// Command 0: the whole position. Look at its encoder status before you use it.
@@ -94,15 +94,15 @@ impl<F: FramePort, T: Timer> Master<F, T> {
     /// [`read_all`](Self::read_all) when the cycle is due: waits for the next start and keeps to its grid.
     ///
     /// # Errors
-    /// [`Error`].
+    /// [`Error`]. After [`Error::Clock`] make a new cycle: the grid of this one is of the time before the clock was set back.
     pub async fn read_cycle(
         &mut self,
         cycle: &mut Cycle,
         operation: Operation,
         asked: Addresses,
     ) -> Result<BusTransaction, Failure<F>> {
-        self.timer.wait_until(cycle.next_ns()).await;
-        cycle.is_due(self.timer.now_ns());
+        self.timer.wait_until(cycle.next_ns()).await?;
+        cycle.is_due(self.state.now_ns(&mut self.timer)?);
         self.read_all(operation, asked).await
     }
 
@@ -112,7 +112,7 @@ impl<F: FramePort, T: Timer> Master<F, T> {
     /// [`Error`]; read the status to see whether they were cleared.
     pub async fn clear_status(&mut self, ea: EncoderAddress) -> Result<Response, Failure<F>> {
         let mut reset = GuardedReset::new(Reset::clear_status(ea));
-        let first = reset.start(self.timer.now_ns());
+        let first = reset.start(self.state.now_ns(&mut self.timer)?);
         self.run(first, |outcome, now_ns| reset.receive(outcome, now_ns)).await
     }
 
@@ -122,7 +122,7 @@ impl<F: FramePort, T: Timer> Master<F, T> {
     /// [`Error`].
     pub async fn read_eeprom(&mut self, ea: EncoderAddress, address: u8) -> Result<u16, Failure<F>> {
         let mut read = EepromRead::new(ea, address);
-        let first = read.start(self.timer.now_ns());
+        let first = read.start(self.state.now_ns(&mut self.timer)?);
         self.run(first, |outcome, now_ns| read.receive(outcome, now_ns)).await
     }
 
@@ -141,10 +141,11 @@ impl<F: FramePort, T: Timer> Master<F, T> {
                 ControlFlow::Continue(next) => next,
                 ControlFlow::Break(end) => return end.map_err(Error::Protocol),
             };
-            self.timer.wait_until(not_before_ns).await;
+            self.timer.wait_until(not_before_ns).await?;
             let exchanged = self.transact(request).await.map(|exchange| exchange.response);
             let outcome = procedure::outcome(exchanged, LOST)?;
-            step = receive(outcome, self.state.free_ns(self.timer.now_ns()));
+            let now_ns = self.state.now_ns(&mut self.timer)?;
+            step = receive(outcome, self.state.free_ns(now_ns));
         }
     }
 
@@ -167,7 +168,7 @@ impl<F: FramePort, T: Timer> Master<F, T> {
         start: impl FnOnce(u64) -> R,
     ) -> Result<(R, R::Value), Failure<F>> {
         self.settle().await?;
-        let start_ns = self.timer.now_ns();
+        let start_ns = self.state.now_ns(&mut self.timer)?;
         let mut transaction = start(start_ns);
         match transaction.progress() {
             // Encoders of this version do not know it, or nobody is asked: nothing is sent.
@@ -178,7 +179,8 @@ impl<F: FramePort, T: Timer> Master<F, T> {
         self.state.begin(longest_ns(line, request, self.resolution));
         let gap_bits = line.rate.bits(line.frame_gap_ns);
         self.port.send(request.emit().as_slice(), gap_bits).await.map_err(Error::Io)?;
-        self.state.sent(self.timer.now_ns());
+        let now_ns = self.state.now_ns(&mut self.timer)?;
+        self.state.sent(now_ns);
         let mut progress = transaction.progress();
         loop {
             match progress {
@@ -188,7 +190,8 @@ impl<F: FramePort, T: Timer> Master<F, T> {
                     return Ok((transaction, value));
                 }
                 Progress::Failed { error, ready_ns } => {
-                    self.state.failed(ready_ns, self.timer.now_ns());
+                    let now_ns = self.state.now_ns(&mut self.timer)?;
+                    self.state.failed(ready_ns, now_ns);
                     return Err(Error::Protocol(error));
                 }
             }
@@ -203,9 +206,9 @@ impl<F: FramePort, T: Timer> Master<F, T> {
     ) -> Result<Progress<R::Value>, Failure<F>> {
         // The time is over after `until_ns`, not at it.
         let wait = self.timer.wait_until(until_ns.saturating_add(1));
-        match race(self.port.take(), wait).await {
-            None => Ok(receiver.poll(self.timer.now_ns())),
-            Some(frame) => Ok(receiver.take(frame.map_err(Error::Io)?, self.timer.now_ns())),
+        match race(self.port.take(), wait).await? {
+            None => Ok(receiver.poll(self.state.now_ns(&mut self.timer)?)),
+            Some(frame) => Ok(receiver.take(frame.map_err(Error::Io)?, self.state.now_ns(&mut self.timer)?)),
         }
     }
 
@@ -214,7 +217,7 @@ impl<F: FramePort, T: Timer> Master<F, T> {
         let port = &mut self.port;
         let listen = async || {
             let _: Result<Frame, _> = port.take().await;
-            Ok(())
+            Ok::<_, Failure<F>>(())
         };
         if quiet::wait_asynch(&mut self.state, &mut self.timer, listen).await? {
             Ok(())
