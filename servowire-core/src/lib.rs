@@ -18,9 +18,12 @@ mod errors;
 mod feedback;
 mod findings;
 mod four_slots;
+mod motion;
 mod number;
 mod procedure;
 mod range;
+#[cfg(not(all(test, loom)))]
+mod shaft;
 mod show;
 pub mod stream;
 
@@ -32,9 +35,12 @@ pub use counters::Counters;
 pub use error_rate::ErrorRate;
 pub use feedback::{Feedback, Policy, Tolerance};
 pub use findings::Findings;
+pub use motion::{Acceleration, Estimate, Motion, Tracker};
 pub use number::U24;
 pub use procedure::{Polling, Progress, Step};
 pub use range::OutOfRange;
+#[cfg(not(all(test, loom)))]
+pub use shaft::{Shaft, ShaftCell, ShaftReader, ShaftWriter};
 pub use show::write_names;
 
 /// What the macros of this crate name; not for use by hand.
