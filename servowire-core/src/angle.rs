@@ -1,5 +1,4 @@
 use core::num::NonZeroU16;
-use core::ops::{Add, Neg, Sub};
 
 /// A fraction of a turn, mechanical or electrical, in units of 2^-32 turn; it wraps at the full turn.
 ///
@@ -7,7 +6,7 @@ use core::ops::{Add, Neg, Sub};
 /// use servowire_core::Angle;
 /// let quarter = Angle::from_counts(1 << 21, 1 << 23);
 /// assert_eq!(quarter.millidegrees(), 90_000);
-/// assert_eq!((quarter - Angle::HALF).millidegrees(), 270_000);
+/// assert_eq!(quarter.wrapping_sub(Angle::HALF).millidegrees(), 270_000);
 /// assert_eq!(quarter.difference(Angle::HALF), -(1 << 30)); // a quarter of a turn behind
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Default)]
@@ -55,6 +54,16 @@ impl Angle {
         if rounded < 360_000 { low(rounded) } else { 0 }
     }
 
+    /// This angle and another one, whole turns dropped.
+    pub const fn wrapping_add(self, other: Self) -> Self {
+        Self(self.0.wrapping_add(other.0))
+    }
+
+    /// This angle less another one.
+    pub const fn wrapping_sub(self, other: Self) -> Self {
+        Self(self.0.wrapping_sub(other.0))
+    }
+
     /// The shorter way to this angle from another one, in units of 2^-32 turn: positive if this one is ahead. Half a turn is
     /// `i32::MIN`.
     pub const fn difference(self, from: Self) -> i32 {
@@ -66,30 +75,6 @@ impl Angle {
 #[expect(clippy::cast_possible_truncation, reason = "what is above is whole turns")]
 const fn low(bits: u64) -> u32 {
     bits as u32
-}
-
-impl Add for Angle {
-    type Output = Self;
-
-    fn add(self, other: Self) -> Self {
-        Self(self.0.wrapping_add(other.0))
-    }
-}
-
-impl Sub for Angle {
-    type Output = Self;
-
-    fn sub(self, other: Self) -> Self {
-        Self(self.0.wrapping_sub(other.0))
-    }
-}
-
-impl Neg for Angle {
-    type Output = Self;
-
-    fn neg(self) -> Self {
-        Self(self.0.wrapping_neg())
-    }
 }
 
 /// Which way the encoder counts while the field of the motor turns forward.
@@ -208,10 +193,8 @@ mod tests {
     #[test]
     fn sums_wrap_and_differences_go_the_shorter_way() {
         let [near, far] = [0x1000_0000, 0xf000_0000].map(Angle::from_bits);
-        assert_eq!(
-            [near + far, far + far, near - far, -near].map(Angle::to_bits),
-            [0, 0xe000_0000, 0x2000_0000, 0xf000_0000]
-        );
+        let sums = [near.wrapping_add(far), far.wrapping_add(far), near.wrapping_sub(far)];
+        assert_eq!(sums.map(Angle::to_bits), [0, 0xe000_0000, 0x2000_0000]);
         assert_eq!((near.difference(far), far.difference(near)), (0x2000_0000, -0x2000_0000));
         assert_eq!(Angle::HALF.difference(Angle::ZERO), i32::MIN);
     }
