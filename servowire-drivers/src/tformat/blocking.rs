@@ -4,9 +4,9 @@ use core::ops::ControlFlow;
 
 use embedded_io::{Read, ReadReady, Write};
 use tformat::master::{EEPROM_POLLING, EepromAccess, Exchange, Line, Progress, Reset, Step, Transaction};
-use tformat::{Address, AllData, Doubt, Page, Policy, Request, Resolution, Response, SingleTurn};
+use tformat::{Address, AllData, Doubt, Page, Policy, Request, Resolution, Response, Sample, SingleTurn};
 
-use super::{MAX_BYTES, Sample, driver_off_ns, longest_ns, other, silence_ns};
+use super::{MAX_BYTES, driver_off_ns, longest_ns, other, silence_ns};
 use crate::direction::Switch;
 use crate::procedure;
 use crate::quiet;
@@ -38,13 +38,14 @@ impl<U: Read + ReadReady + Write, D: Direction, C: Clock> Encoder<U, D, C> {
         (self.uart, self.direction.release(), self.clock)
     }
 
-    /// The position, if it may be used, and when it was true: from ID 3, by the rules of [`Resolution::read`].
+    /// The position, if it may be used, and when it was sampled: from ID 3, by the rules of [`Evidence::at`](tformat::Evidence::at).
+    /// If the request was held up on its way out, the position is younger by that.
     ///
     /// # Errors
     /// [`Error`], [`Error::Doubt`] among them.
     pub fn read_position(&mut self, resolution: Resolution, policy: Policy) -> Result<Sample, Failure<U, D>> {
         let exchange = self.transact(Request::ReadAll)?;
-        Sample::of(exchange, resolution, policy).map_err(Error::Doubt)
+        exchange.evidence(resolution).at(self.clock.now_ns(), policy).map_err(Error::Doubt)
     }
 
     /// ID 3: position, turns, encoder ID and alarms. Look at the alarms before you use the position.

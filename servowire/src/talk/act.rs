@@ -9,7 +9,9 @@ use std::thread;
 use std::time::{Duration, Instant};
 
 use tformat::master::{EEPROM_POLLING, EepromAccess, Reset};
-use tformat::{Address, AllData, BitRate, Page, Request, Resolution, Response};
+use tformat::{
+    Address, AllData, Almc, BitRate, Evidence, Hint, Page, Policy, Request, Resolution, Response, Tolerated,
+};
 
 use super::Watch;
 use super::link::{Fault, Link};
@@ -39,16 +41,20 @@ pub(super) fn read<P: Port>(link: &mut Link<P>) -> Done {
     Ok(ExitCode::SUCCESS)
 }
 
+/// It was read just now, and the alarms stand beside it.
+const SHOWN: Policy = Policy::new(0).tolerating(Tolerated::NOTHING.alarms(Almc::all()));
+
 /// Position, turns and alarms in words.
 fn line(all: &AllData) -> String {
-    let hint = Resolution::from_enid(all.enid);
-    let position = hint.map(|hint| (hint.resolution, hint.resolution.position(all.abs, all.abm)));
-    let place = match position {
-        Some((resolution, Ok(at))) => {
-            let degrees = f64::from(at.abs) * 360.0 / f64::from(resolution.counts_per_turn());
-            format!("{degrees:>10.5} deg  {:>8} counts  turn {}", at.abs, at.turns)
-        }
-        Some((_, Err(error))) => format!("ABS {} ABM {}: {error}", all.abs, all.abm),
+    let place = match Resolution::from_enid(all.enid) {
+        Some(Hint { resolution, .. }) => match Evidence::of(Response::ReadAll(*all), resolution, 0).at(0, SHOWN) {
+            Ok(sample) => {
+                let (counts, turns) = (sample.single_turn(), sample.turns().unwrap_or(0));
+                let degrees = f64::from(counts) * 360.0 / f64::from(resolution.counts_per_turn());
+                format!("{degrees:>10.5} deg  {counts:>8} counts  turn {turns}")
+            }
+            Err(doubt) => format!("ABS {} ABM {}: {doubt}", all.abs, all.abm),
+        },
         None => format!("ABS {} ABM {} (encoder ID {:#04x} says nothing of their widths)", all.abs, all.abm, all.enid),
     };
     let alarms = if all.almc.is_empty() { "no alarms".to_owned() } else { format!("alarms {}", all.almc) };

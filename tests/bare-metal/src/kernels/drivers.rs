@@ -5,8 +5,8 @@ use nikon_aformat::master::Cycle;
 use nikon_aformat::{EncoderAddress, Operation, Policy as StatusPolicy, Position};
 use servowire_drivers::Automatic;
 use servowire_drivers::nikon::blocking::Master;
-use servowire_drivers::tformat::{Sample, blocking::Encoder};
-use tformat::{Address, Page, Policy};
+use servowire_drivers::tformat::blocking::Encoder;
+use tformat::{Address, Page, Policy, Sample};
 
 use super::kernels;
 use crate::self_test::drivers::{ABS40, ALL_DATA, LINE, RESOLUTION, SLOW, WIDTHS};
@@ -22,7 +22,7 @@ kernels! {
     /// A T-Format position with the blocking driver: request, eleven bytes one by one, all checks; a look at the clock for each.
     fn drivers_tformat_position(answer: &Bytes) -> Option<Sample> {
         let mut encoder = Encoder::new(Uart::new(answer), Automatic, steps(4_000), LINE);
-        encoder.read_position(RESOLUTION, Policy::STRICT).ok()
+        encoder.read_position(RESOLUTION, Policy::new(1_000_000)).ok()
     } over [ALL_DATA];
 
     /// An A-format position with the blocking driver: request, four frames one by one, all checks; a look at the clock for each.
