@@ -72,9 +72,10 @@ impl Extra {
     }
 
     /// From the falling edge to the end of the window, in ns rounded up.
-    pub(crate) const fn low_ns(self) -> u64 {
-        // 40/3 ns an eighth.
-        ((self.0.wrapping_neg() % 8) as u64 * 40).div_ceil(3)
+    pub(crate) const fn low_ns(self) -> u8 {
+        let eighths = self.0.wrapping_neg() % 8;
+        // 13 1/3 ns each.
+        eighths.wrapping_mul(13).wrapping_add(eighths.div_ceil(3))
     }
 
     /// The samples of the last bit as they are on the line.
