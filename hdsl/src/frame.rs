@@ -100,19 +100,25 @@ pub struct Head {
     extra: Option<Extra>,
     equalisation: u8,
     para: Word,
+    after: LineDisparity,
 }
 
 impl Head {
     /// Bits without an EXTRA window.
     pub const BITS: u32 = 26;
 
-    /// The head for a parameter byte, and the line disparity after it. `before` is the disparity before
+    /// The head for a parameter byte. `before` is the disparity before
     /// EQUALISATION, so with the ones of the EXTRA window if there is one (the partly high last bit counts as a one).
     #[inline]
-    pub const fn new(byte: ParameterByte, extra: Option<Extra>, before: LineDisparity) -> (Self, LineDisparity) {
-        let (equalisation, d) = before.equalisation();
-        let (para, d) = d.encode(byte);
-        (Self { byte, extra, equalisation, para }, d)
+    pub const fn new(byte: ParameterByte, extra: Option<Extra>, before: LineDisparity) -> Self {
+        let equalised = before.equalisation();
+        let coded = equalised.disparity.encode(byte);
+        Self { byte, extra, equalisation: equalised.bits, para: coded.word, after: coded.disparity }
+    }
+
+    /// The line disparity after the head.
+    pub const fn disparity_after(self) -> LineDisparity {
+        self.after
     }
 
     /// The parameter byte.
@@ -290,10 +296,11 @@ mod tests {
     #[test]
     fn the_frame_adds_up() {
         assert_eq!(Head::BITS + FILLER.len() + TRAILER_BITS, H_FRAME_BITS);
-        let byte = ParameterByte::of(MasterSymbol::Reset, false, false);
-        let (head, d) = Head::new(byte, None, LineDisparity::ZERO);
+        let byte = ParameterByte::of(MasterSymbol::Reset);
+        let head = Head::new(byte, None, LineDisparity::ZERO);
+        let d = head.disparity_after();
         assert_eq!(text(window(head.bits())), "00101111011000000101001011");
-        let (head, _) = Head::new(byte, None, d);
+        let head = Head::new(byte, None, d);
         assert_eq!(text(window(head.bits()).skip(12).take(4)), "1101");
         assert!(text(window(FILLER)).starts_with("0101") && text(window(FILLER)).ends_with("01"));
         assert_eq!(text(Tail { trailer: Trailer::Whole, stuffing: Stuffing(2) }.bits()), "00000011001011001011");
@@ -309,7 +316,7 @@ mod tests {
             for edge in (23..=72).step_by(crate::thin(7)) {
                 for d in -5..=5 {
                     let (byte, extra) = (ParameterByte::new(raw), Extra::new(edge));
-                    let (head, _) = Head::new(byte, extra, LineDisparity::new(d));
+                    let head = Head::new(byte, extra, LineDisparity::new(d));
                     let got = Head::parse(head.bits()).unwrap();
                     assert_eq!((got.byte, got.len), (byte, head.bits().len()));
                     assert_eq!(got.extra_bits, extra.map_or(0, |e| u32::from(e.bits())));
@@ -335,7 +342,7 @@ mod tests {
     /// Every wrong bit of the fixed pattern is refused, every shorter line too.
     #[test]
     fn flips_and_truncations() {
-        let (head, _) = Head::new(ParameterByte::new(0xd0), None, LineDisparity::ZERO);
+        let head = Head::new(ParameterByte::new(0xd0), None, LineDisparity::ZERO);
         let good = head.bits();
         for at in 0..12 {
             let bad = Window::from_bits(good.bits() ^ 1 << at, 26).unwrap();

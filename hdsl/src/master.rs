@@ -57,8 +57,7 @@ use crate::line_code::LineDisparity;
 use crate::message::{Finished, Requester};
 use crate::parameter::{EncoderByte, MasterSymbol};
 use crate::position::AlignmentStage;
-use crate::rssi::EdgeWatch;
-use crate::sampling::{Alignment, TEST_PATTERN, WINDOW};
+use crate::sampling::{Alignment, SampledAnswer, TEST_PATTERN, WINDOW};
 use crate::sync::Synchroniser;
 use link::Link;
 use send::{trailer, transmission};
@@ -80,7 +79,6 @@ pub struct Master {
     state: State,
     /// Frames of the state that are done.
     done: u8,
-    disparity: LineDisparity,
     present: Transmission,
     alignment: Option<Alignment>,
     /// Sample periods with edges of the test pattern, since LEARN.
@@ -120,14 +118,13 @@ impl Master {
 
     fn start(dialect: Dialect, sync: Option<Synchroniser>) -> Self {
         let extra = sync.map(|sync| sync.extra());
-        let (present, disparity) = transmission(State::Reset, MasterSymbol::Reset, false, extra, LineDisparity::ZERO);
+        let present = transmission(State::Reset, MasterSymbol::Reset, false, extra, LineDisparity::ZERO);
         Self {
             dialect,
             sync,
             pulse: sync.map(|sync| sync.period()),
             state: State::Reset,
             done: 0,
-            disparity,
             present,
             alignment: None,
             edges: 0,
@@ -211,8 +208,7 @@ impl Master {
         Ok(match (self.state, self.alignment, samples.first_chunk()) {
             (State::Start, ..) => self.learn(samples),
             (_, Some(alignment), Some(window)) if self.present.answered => {
-                let (bits, watch) = alignment.read_window(window);
-                self.end_sampled(alignment, bits, watch)
+                self.end_sampled(alignment, alignment.read_window(window))
             }
             _ => self.end(u64::MAX, None),
         })
@@ -243,10 +239,7 @@ impl Master {
                 }
                 self.learn(&bytes)
             }
-            (_, Some(alignment)) if self.present.answered => {
-                let (bits, watch) = alignment.read_words(samples);
-                self.end_sampled(alignment, bits, watch)
-            }
+            (_, Some(alignment)) if self.present.answered => self.end_sampled(alignment, alignment.read_words(samples)),
             _ => self.end(u64::MAX, None),
         }
     }
@@ -267,12 +260,12 @@ impl Master {
     }
 
     #[inline]
-    fn end_sampled(&mut self, alignment: Alignment, bits: u64, watch: EdgeWatch) -> &HFrame {
+    fn end_sampled(&mut self, alignment: Alignment, read: SampledAnswer) -> &HFrame {
         if matches!(self.state, State::Learn | State::Check) {
-            self.edges |= watch.edges();
+            self.edges |= read.edges.edges();
         }
-        let signal = SignalQuality { rssi: watch.rssi(), delay: alignment.delay, edges: self.edges };
-        self.end(bits, Some(signal))
+        let signal = SignalQuality { rssi: read.edges.rssi(), delay: alignment.delay, edges: self.edges };
+        self.end(read.bits, Some(signal))
     }
 
     /// Takes the 61 bits of the answer, the first in bit 0, from a front end that finds them itself (an FPGA, a PRU), and

@@ -102,6 +102,17 @@ impl RunningDisparity {
     }
 }
 
+/// A character as it goes out.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct Encoded {
+    /// The word.
+    pub word: Word,
+    /// The running disparity after it.
+    pub disparity: RunningDisparity,
+}
+
 /// The twelve special characters of the code.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -167,7 +178,7 @@ impl Character {
     }
 
     /// Byte and kind; `None` if `k` is set and there is no such special character.
-    pub fn new(byte: u8, k: bool) -> Option<Self> {
+    pub(crate) fn new(byte: u8, k: bool) -> Option<Self> {
         match (k, CONTROLS.contains(&byte)) {
             (false, _) => Some(Self::data(byte)),
             (true, true) => Some(Self(u16::from(byte) | SPECIAL)),
@@ -185,16 +196,17 @@ impl Character {
         self.0 & SPECIAL != 0
     }
 
-    /// The word in the column of `rd`, and the running disparity after it.
+    /// The word in the column of `rd`.
     ///
     /// ```
     /// use hdsl::symbol::{Character, RunningDisparity};
-    /// let (word, after) = Character::data(0x00).encode(RunningDisparity::Minus);
+    /// let coded = Character::data(0x00).encode(RunningDisparity::Minus);
+    /// let (word, after) = (coded.word, coded.disparity);
     /// assert_eq!(word.get(), 0b00_1011_1001); // 100111 0100 on the line
     /// assert_eq!(after, RunningDisparity::Minus);
     /// ```
     #[expect(clippy::indexing_slicing, reason = "a byte is below 256, a column below 2")]
-    pub fn encode(self, rd: RunningDisparity) -> (Word, RunningDisparity) {
+    pub fn encode(self, rd: RunningDisparity) -> Encoded {
         let column = usize::from(rd == RunningDisparity::Plus);
         let bits = if self.is_control() {
             let place = CONTROLS.iter().position(|c| *c == self.byte()).unwrap_or(0);
@@ -203,7 +215,7 @@ impl Character {
             DATA[column][usize::from(self.byte())]
         };
         let word = Word::truncate(bits);
-        (word, rd.after(word))
+        Encoded { word, disparity: rd.after(word) }
     }
 }
 

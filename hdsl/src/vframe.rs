@@ -162,15 +162,17 @@ mod tests {
 
     fn answers(block1: [Character; 8], block2: [Character; 8]) -> [u64; 8] {
         let mut rd = RunningDisparity::Minus;
+        let idle = EncoderByte::of(EncoderSymbol::Idle);
         core::array::from_fn(|at| {
             let content = Content {
                 vertical: block1[at],
-                parameter: EncoderByte::of(EncoderSymbol::Idle, at == 7),
+                parameter: if at == 7 { idle.with_vsync() } else { idle },
                 pipe: Character::control(Control::K30_7),
                 acceleration: Some(DeltaDelta::ZERO),
                 secondary: block2[at],
             };
-            let (bits, after) = content.emit(rd);
+            let coded = content.emit(rd);
+            let (bits, after) = (coded.bits, coded.disparity);
             rd = after;
             bits
         })

@@ -2,7 +2,7 @@
 
 use core::fmt;
 
-use super::{Event, EventS, Register, RegisterRule, Registers};
+use super::{Event, EventS, Events, Register, RegisterRule, Registers};
 use crate::dialect::Dialect;
 use crate::error::Error;
 use crate::message::{Access, Data, Length, LongRequest, ResourceError, ShortRequest};
@@ -140,12 +140,13 @@ impl<B: RegisterBus> RemoteReceiver<B> {
     ///
     /// # Errors
     /// Those of the bus.
-    pub fn take_events(&mut self) -> Result<(Event, EventS), BusError<B::Error>> {
+    pub fn take_events(&mut self) -> Result<Events, BusError<B::Error>> {
         let [high, low] = self.get(Register::EventH)?;
         let [safe] = self.get(Register::EventS)?;
         self.put(Register::EventH, &[!high, !low])?;
         self.put(Register::EventS, &[!safe])?;
-        Ok((Event::from_bits_retain(u16::from_be_bytes([high, low])), EventS::from_bits_retain(safe)))
+        let drive = Event::from_bits_retain(u16::from_be_bytes([high, low]));
+        Ok(Events { drive, safe: EventS::from_bits_retain(safe) })
     }
 
     /// Starts a short message.

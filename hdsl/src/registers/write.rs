@@ -29,8 +29,8 @@ impl Registers {
     /// freezes it for PIPE_D. `None` after the end of the map.
     pub fn read(&mut self, address: u8) -> Option<u8> {
         if address == PIPE_S && self.rule == RegisterRule::Sick {
-            let (status, data) = self.pipe.take();
-            self.put(Register::PipeS, [status, data]);
+            let entry = self.pipe.take();
+            self.put(Register::PipeS, [entry.status, entry.data]);
         }
         self.byte(address)
     }
