@@ -95,6 +95,7 @@ pub(crate) const fn edge_register(time_rest: u8) -> u8 {
 /// The first part of an H-frame, from SYNC to PARA.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct Head {
     byte: ParameterByte,
     extra: Option<Extra>,
@@ -204,7 +205,7 @@ impl Head {
 
 /// What an encoder reads from the head of an H-frame.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct ParsedHead {
     /// The parameter byte.
     pub byte: ParameterByte,
@@ -213,6 +214,11 @@ pub struct ParsedHead {
     /// Bits of the whole head.
     pub len: u32,
 }
+
+servowire_core::one_line!(ParsedHead {
+    Self { byte, extra_bits: 0, .. } => "{}", byte;
+    Self { byte, extra_bits, .. } => "{}, EXTRA of {} bits", byte, extra_bits;
+});
 
 #[expect(clippy::cast_possible_truncation, reason = "lengths of a window are below 129")]
 const fn low16(len: u32) -> u16 {

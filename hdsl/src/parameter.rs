@@ -1,7 +1,5 @@
 //! The parameters channel: one byte an H-frame in each direction.
 
-use core::fmt;
-
 use crate::error::Error;
 
 servowire_core::number! {
@@ -241,58 +239,43 @@ impl EncoderByte {
     }
 }
 
-impl fmt::Display for MasterSymbol {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(match self {
-            Self::Data(nibble) => return write!(f, "{:X}", nibble.get()),
-            Self::Idle => "IDLE",
-            Self::Sync => "SYNC",
-            Self::Start => "START",
-            Self::Learn => "LEARN",
-            Self::Check => "CHECK",
-            Self::IdReq => "IDREQ",
-            Self::Init => "INIT",
-            Self::Reset => "RESET",
-        })
-    }
+servowire_core::one_line!(MasterSymbol {
+    Self::Data(nibble) => "{:X}", nibble.get();
+    Self::Idle => "IDLE";
+    Self::Sync => "SYNC";
+    Self::Start => "START";
+    Self::Learn => "LEARN";
+    Self::Check => "CHECK";
+    Self::IdReq => "IDREQ";
+    Self::Init => "INIT";
+    Self::Reset => "RESET";
+});
+
+servowire_core::one_line!(EncoderSymbol {
+    Self::Data(nibble) => "{:X}", nibble.get();
+    Self::Idle => "IDLE";
+    Self::Snak => "SNAK";
+    Self::Lnak => "LNAK";
+    Self::Init => "INIT";
+});
+
+/// The name of a bit that is set.
+const fn flag(set: bool, name: &'static str) -> &'static str {
+    if set { name } else { "" }
 }
 
-impl fmt::Display for EncoderSymbol {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(match self {
-            Self::Data(nibble) => return write!(f, "{:X}", nibble.get()),
-            Self::Idle => "IDLE",
-            Self::Snak => "SNAK",
-            Self::Lnak => "LNAK",
-            Self::Init => "INIT",
-        })
-    }
-}
+// The symbol, or the five bits of one without a meaning.
+servowire_core::one_line!(ParameterByte {
+    byte if byte.symbol().is_err() =>
+        "{:02X}h{}{}", byte.0 & 31, flag(byte.first(), " FIRST"), flag(byte.msync(), " MSYNC");
+    byte =>
+        "{}{}{}", byte.symbol().unwrap_or(MasterSymbol::Idle), flag(byte.first(), " FIRST"), flag(byte.msync(), " MSYNC");
+});
 
-/// The symbol, or the five bits of one without a meaning.
-fn write_symbol<S: fmt::Display>(f: &mut fmt::Formatter<'_>, symbol: Result<S, Error>, raw: u8) -> fmt::Result {
-    match symbol {
-        Ok(symbol) => symbol.fmt(f),
-        Err(_) => write!(f, "{:02X}h", raw & 31),
-    }
-}
-
-impl fmt::Display for ParameterByte {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write_symbol(f, self.symbol(), self.raw())?;
-        f.write_str(if self.first() { " FIRST" } else { "" })?;
-        f.write_str(if self.msync() { " MSYNC" } else { "" })
-    }
-}
-
-impl fmt::Display for EncoderByte {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write_symbol(f, self.symbol(), self.raw())?;
-        f.write_str(if self.vsync() { " VSYNC" } else { "" })
-    }
-}
-
-servowire_core::format_as_displayed!(MasterSymbol, EncoderSymbol, ParameterByte, EncoderByte);
+servowire_core::one_line!(EncoderByte {
+    byte if byte.symbol().is_err() => "{:02X}h{}", byte.0 & 31, flag(byte.vsync(), " VSYNC");
+    byte => "{}{}", byte.symbol().unwrap_or(EncoderSymbol::Idle), flag(byte.vsync(), " VSYNC");
+});
 
 #[cfg(test)]
 mod tests {

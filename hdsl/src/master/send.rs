@@ -6,8 +6,9 @@ use crate::line_code::LineDisparity;
 use crate::parameter::{MasterSymbol, ParameterByte};
 
 /// What to send from the start of an H-frame.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct Transmission {
     /// Zeros before the frame: 16 after a restart, no need of the protocol.
     pub lead_in: u8,

@@ -44,6 +44,8 @@ impl<E: fmt::Display> fmt::Display for BusError<E> {
     }
 }
 
+impl<E: core::error::Error> core::error::Error for BusError<E> {}
+
 /// A receiver that is reached over a [`RegisterBus`], for example the firmware of the Motor Control SDK or the SICK IP core in the map of
 /// the SDK.
 ///
@@ -226,7 +228,7 @@ impl<B: RegisterBus> RemoteReceiver<B> {
             };
             return Err(BusError::Link(Error::Resource { error }));
         }
-        let length = if header & 0x40 != 0 { Length::from_code(header >> 2) } else { Length::None };
+        let length = if header & 0x40 != 0 { Length::in_header(header) } else { Length::None };
         Data::new(buffer.get(..length.bytes()).unwrap_or(&buffer)).map(Some).map_err(BusError::Link)
     }
 }
