@@ -24,7 +24,7 @@ pub fn symbol(mut data: &[u8]) {
         let word = Word::truncate(u16::from_le_bytes([byte(&mut data), byte(&mut data)]));
         let controls = Control::ALL.into_iter().map(Character::control);
         let found = (0..=255).map(Character::data).chain(controls).find(|character| {
-            [RunningDisparity::Minus, RunningDisparity::Plus].iter().any(|rd| character.encode(*rd).0 == word)
+            [RunningDisparity::Minus, RunningDisparity::Plus].iter().any(|rd| character.encode(*rd).word == word)
         });
         assert_eq!(word.decode(), found);
         let strict = word.read(Rule::Strict);

@@ -1,6 +1,6 @@
 //! What a control loop may use of the positions, judged at the moment of use.
 
-use servowire_core::{Feedback, Tolerance};
+use servowire_core::{Feedback, Tolerance, Words};
 
 use crate::doubt::Doubt;
 
@@ -171,10 +171,136 @@ feedback! {
     SafeEvidence => SafeSample;
 }
 
+/// The numbers that stand for doubts in a cell; 0 is a value.
+const fn number(doubt: Doubt) -> u32 {
+    match doubt {
+        Doubt::Never => 1,
+        Doubt::NoLink => 2,
+        Doubt::Estimated => 3,
+        Doubt::Alignment => 4,
+        Doubt::Speed => 5,
+        Doubt::NoVFrame => 6,
+        Doubt::Stale => 7,
+        Doubt::Withheld => 8,
+        Doubt::Old { .. } => 9,
+    }
+}
+
+/// The doubt with this number; `wide` is what came in the place of the position.
+const fn doubt(number: u32, wide: u64) -> Doubt {
+    match number {
+        2 => Doubt::NoLink,
+        3 => Doubt::Estimated,
+        4 => Doubt::Alignment,
+        5 => Doubt::Speed,
+        6 => Doubt::NoVFrame,
+        7 => Doubt::Stale,
+        8 => Doubt::Withheld,
+        9 => Doubt::Old { age_ns: wide },
+        _ => Doubt::Never,
+    }
+}
+
+/// Low and high word.
+const fn halves(value: u64) -> [u32; 2] {
+    let [a, b, c, d, e, f, g, h] = value.to_le_bytes();
+    [u32::from_le_bytes([a, b, c, d]), u32::from_le_bytes([e, f, g, h])]
+}
+
+const fn whole(low: u32, high: u32) -> u64 {
+    (high as u64) << 32 | low as u64
+}
+
+/// A verdict, a position or the age in a doubt, what came with the position, the instant of sampling.
+const fn pack(verdict: u32, wide: u64, more: u32, sampled_ns: u64) -> [u32; 6] {
+    let ([low, high], [early, late]) = (halves(wide), halves(sampled_ns));
+    [verdict, low, high, more, early, late]
+}
+
+const fn pack_doubt(doubt: Doubt) -> [u32; 6] {
+    let age_ns = if let Doubt::Old { age_ns } = doubt { age_ns } else { 0 };
+    pack(number(doubt), age_ns, 0, 0)
+}
+
+impl Words<6> for Evidence {
+    fn to_words(&self) -> [u32; 6] {
+        match self.0 {
+            Ok(Sample { position, velocity, sampled_ns }) => pack(
+                0,
+                u64::from_le_bytes(position.to_le_bytes()),
+                u32::from_le_bytes(velocity.to_le_bytes()),
+                sampled_ns,
+            ),
+            Err(doubt) => pack_doubt(doubt),
+        }
+    }
+
+    fn from_words([verdict, low, high, velocity, early, late]: [u32; 6]) -> Self {
+        let wide = whole(low, high);
+        Self(match verdict {
+            0 => Ok(Sample {
+                position: i64::from_le_bytes(wide.to_le_bytes()),
+                velocity: i32::from_le_bytes(velocity.to_le_bytes()),
+                sampled_ns: whole(early, late),
+            }),
+            number => Err(doubt(number, wide)),
+        })
+    }
+}
+
+impl Words<6> for SafeEvidence {
+    fn to_words(&self) -> [u32; 6] {
+        match self.0 {
+            Ok(SafeSample { position, summary, sampled_ns }) => {
+                pack(0, u64::from_le_bytes(position.to_le_bytes()), summary.into(), sampled_ns)
+            }
+            Err(doubt) => pack_doubt(doubt),
+        }
+    }
+
+    fn from_words([verdict, low, high, summary, early, late]: [u32; 6]) -> Self {
+        let wide = whole(low, high);
+        let [summary, ..] = summary.to_le_bytes();
+        Self(match verdict {
+            0 => Ok(SafeSample {
+                position: i64::from_le_bytes(wide.to_le_bytes()),
+                summary,
+                sampled_ns: whole(early, late),
+            }),
+            number => Err(doubt(number, wide)),
+        })
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
     use std::string::ToString;
+
+    /// Through a cell and back, the highest and lowest numbers and each doubt.
+    #[test]
+    fn words_come_back() {
+        let doubts = [
+            Doubt::Never,
+            Doubt::NoLink,
+            Doubt::Estimated,
+            Doubt::Alignment,
+            Doubt::Speed,
+            Doubt::NoVFrame,
+            Doubt::Stale,
+            Doubt::Withheld,
+            Doubt::Old { age_ns: 0x1_0000_0002 },
+        ];
+        for told in doubts {
+            assert_eq!(Evidence::from_words(Evidence(Err(told)).to_words()), Evidence(Err(told)));
+            assert_eq!(SafeEvidence::from_words(SafeEvidence(Err(told)).to_words()), SafeEvidence(Err(told)));
+        }
+        let evidence = Evidence(Ok(Sample { position: i64::MIN, velocity: -2, sampled_ns: 0x1_0000_0003 }));
+        assert_eq!(evidence.to_words(), [0, 0, 0x8000_0000, 0xffff_fffe, 3, 1]);
+        assert_eq!(Evidence::from_words(evidence.to_words()), evidence);
+        let safe = SafeEvidence(Ok(SafeSample { position: -1, summary: 0x81, sampled_ns: u64::MAX }));
+        assert_eq!(SafeEvidence::from_words(safe.to_words()), safe);
+    }
 
     const POLICY: Policy = Policy::new(50_000);
 

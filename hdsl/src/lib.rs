@@ -39,7 +39,7 @@ pub(crate) const fn thin(n: usize) -> usize {
 }
 
 pub use acceleration::DeltaDelta;
-pub use answer::{Answer, Content};
+pub use answer::{Answer, Content, EncodedAnswer};
 pub use channel2::{Channel2Findings, Channel2Monitor};
 pub use crc::{CRC_16, RunningCrc16, crc16};
 pub use dialect::Dialect;
@@ -47,7 +47,7 @@ pub use doubt::Doubt;
 pub use encoder_id::{EncoderId, PositionBits};
 pub use error::{Error, ErrorClass};
 pub use evidence::{Evidence, Policy, SafeEvidence, SafeSample, Sample, Tolerated};
-pub use line_code::LineDisparity;
+pub use line_code::{EncodedParameter, Equalisation, LineDisparity};
 pub use nrz_line::Window;
 pub use parameter::{EncoderByte, EncoderSymbol, MasterSymbol, Nibble, ParameterByte};
 pub use position::{AlignmentStage, PositionRegisters, PositionRule, PositionTracker};

@@ -52,13 +52,12 @@ use crate::answer::Answer;
 use crate::dialect::Dialect;
 use crate::encoder_id::{EncoderId, PositionBits};
 use crate::error::Error;
-use crate::frame::{BIT_RATE, Stuffing, Tail, Trailer};
+use crate::frame::{BIT_RATE, Extra, Stuffing, Tail, Trailer};
 use crate::line_code::LineDisparity;
 use crate::message::{Finished, Requester};
 use crate::parameter::{EncoderByte, MasterSymbol};
 use crate::position::AlignmentStage;
-use crate::rssi::EdgeWatch;
-use crate::sampling::{Alignment, TEST_PATTERN, WINDOW};
+use crate::sampling::{Alignment, SampledAnswer, TEST_PATTERN, WINDOW};
 use crate::sync::Synchroniser;
 use link::Link;
 use send::{trailer, transmission};
@@ -80,7 +79,6 @@ pub struct Master {
     state: State,
     /// Frames of the state that are done.
     done: u8,
-    disparity: LineDisparity,
     present: Transmission,
     alignment: Option<Alignment>,
     /// Sample periods with edges of the test pattern, since LEARN.
@@ -93,8 +91,10 @@ pub struct Master {
     /// ACC_ERR_CNT_THRESH.
     threshold: u8,
     restart: bool,
-    /// When the sampling edge of the last H-frame left.
-    sampled_ns: u64,
+    /// When the window of the last answer was over.
+    end_ns: u64,
+    /// By how much its sampling edge was before the end of an EXTRA window, in ns.
+    edge_ns: u8,
     /// How late the external pulse of the present frame was, in eighths of a bit.
     late: Option<i16>,
     /// The next head, if it left before this frame's answer was taken in.
@@ -118,14 +118,13 @@ impl Master {
 
     fn start(dialect: Dialect, sync: Option<Synchroniser>) -> Self {
         let extra = sync.map(|sync| sync.extra());
-        let (present, disparity) = transmission(State::Reset, MasterSymbol::Reset, false, extra, LineDisparity::ZERO);
+        let present = transmission(State::Reset, MasterSymbol::Reset, false, extra, LineDisparity::ZERO);
         Self {
             dialect,
             sync,
             pulse: sync.map(|sync| sync.period()),
             state: State::Reset,
             done: 0,
-            disparity,
             present,
             alignment: None,
             edges: 0,
@@ -136,7 +135,8 @@ impl Master {
             counters: Counters::default(),
             threshold: 0x1f,
             restart: false,
-            sampled_ns: 0,
+            end_ns: 0,
+            edge_ns: 0,
             late: None,
             ahead: None,
             lost: None,
@@ -204,12 +204,11 @@ impl Master {
             let got = u16::try_from(samples.len()).unwrap_or(u16::MAX);
             return Err(Error::Truncated { got, want: 72 });
         }
-        self.note_end(end_ns);
+        self.end_ns = end_ns;
         Ok(match (self.state, self.alignment, samples.first_chunk()) {
             (State::Start, ..) => self.learn(samples),
             (_, Some(alignment), Some(window)) if self.present.answered => {
-                let (bits, watch) = alignment.read_window(window);
-                self.end_sampled(alignment, bits, watch)
+                self.end_sampled(alignment, alignment.read_window(window))
             }
             _ => self.end(u64::MAX, None),
         })
@@ -231,7 +230,7 @@ impl Master {
     /// assert_eq!(master.state(), State::Reset);
     /// ```
     pub fn hear_words(&mut self, samples: &[u32; WINDOW / 4], end_ns: u64) -> &HFrame {
-        self.note_end(end_ns);
+        self.end_ns = end_ns;
         match (self.state, self.alignment) {
             (State::Start, _) => {
                 let mut bytes = [0; WINDOW];
@@ -240,10 +239,7 @@ impl Master {
                 }
                 self.learn(&bytes)
             }
-            (_, Some(alignment)) if self.present.answered => {
-                let (bits, watch) = alignment.read_words(samples);
-                self.end_sampled(alignment, bits, watch)
-            }
+            (_, Some(alignment)) if self.present.answered => self.end_sampled(alignment, alignment.read_words(samples)),
             _ => self.end(u64::MAX, None),
         }
     }
@@ -264,12 +260,12 @@ impl Master {
     }
 
     #[inline]
-    fn end_sampled(&mut self, alignment: Alignment, bits: u64, watch: EdgeWatch) -> &HFrame {
+    fn end_sampled(&mut self, alignment: Alignment, read: SampledAnswer) -> &HFrame {
         if matches!(self.state, State::Learn | State::Check) {
-            self.edges |= watch.edges();
+            self.edges |= read.edges.edges();
         }
-        let signal = SignalQuality { rssi: watch.rssi(), delay: alignment.delay, edges: self.edges };
-        self.end(bits, Some(signal))
+        let signal = SignalQuality { rssi: read.edges.rssi(), delay: alignment.delay, edges: self.edges };
+        self.end(read.bits, Some(signal))
     }
 
     /// Takes the 61 bits of the answer, the first in bit 0, from a front end that finds them itself (an FPGA, a PRU), and
@@ -296,7 +292,7 @@ impl Master {
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
     pub fn hear_bits(&mut self, bits: u64, signal: Option<SignalQuality>, end_ns: u64) -> &HFrame {
-        self.note_end(end_ns);
+        self.end_ns = end_ns;
         self.end(bits, signal)
     }
 
@@ -306,14 +302,15 @@ impl Master {
         self.late = Some(late);
     }
 
-    /// When the sampling edge of the frame left whose window ends then.
-    #[inline]
-    fn note_end(&mut self, end_ns: u64) {
-        self.sampled_ns = end_ns.saturating_sub(SINCE_EDGE_NS);
-        if let Some(extra) = self.present.head.extra() {
-            // The edge is inside the last bit of the window.
-            self.sampled_ns = self.sampled_ns.saturating_sub(extra.low_ns());
-        }
+    /// When the sampling edge of the last H-frame left.
+    const fn sampled_ns(&self) -> u64 {
+        self.end_ns.saturating_sub(SINCE_EDGE_NS).saturating_sub(self.edge_ns as u64)
+    }
+
+    /// A V-frame begins after the present H-frame.
+    fn latch(&mut self) {
+        self.edge_ns = self.present.head.extra().map_or(0, Extra::low_ns);
+        self.link.latch(self.sampled_ns());
     }
 
     fn end(&mut self, bits: u64, signal: Option<SignalQuality>) -> &HFrame {
@@ -342,7 +339,9 @@ impl Master {
         let late = self.late.take();
         let asked = core::mem::take(&mut self.restart).then_some(RestartReason::Requested);
         let restarted = self.lost.take().or(asked).or(outcome.err());
-        self.detour = self.sync.is_some();
+        self.edge_ns = self.present.head.extra().map_or(0, Extra::low_ns);
+        // The frame after one in sync mode has another place of its edge.
+        self.detour = self.sync.is_some() || self.edge_ns != 0;
         if let Some(next) = self.ahead.take() {
             // The next head is out: a restart comes after its frame.
             self.present = next;
@@ -401,7 +400,7 @@ impl Master {
         self.done = self.done.saturating_add(1);
         if answer.parameter().is_ok_and(EncoderByte::vsync) {
             (self.state, self.done) = (State::Running, 0);
-            self.link.latch(self.sampled_ns);
+            self.latch();
             self.h_frame.doubtful = self.dialect.doubt_at_lock;
         } else if self.dialect.vsync_frames != 0 && self.done >= self.dialect.vsync_frames {
             return Err(RestartReason::NoVsync);

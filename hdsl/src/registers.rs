@@ -29,9 +29,9 @@ mod pipe;
 mod write;
 
 pub use bus::{BusError, RegisterBus, RemoteReceiver};
-pub use flags::{Event, EventS, Interrupts, Online1, Online2, OnlineD, Status2};
+pub use flags::{Event, EventS, Events, Interrupts, Online1, Online2, OnlineD, Status2};
 pub use map::Register;
-pub use pipe::PipeFifo;
+pub use pipe::{PipeFifo, PipeReading};
 
 use crate::dialect::Dialect;
 
@@ -200,8 +200,8 @@ impl Registers {
     }
 
     /// Takes the events that happened and clears them.
-    pub fn take_events(&mut self) -> (Event, EventS) {
-        let events = (self.event(), self.event_s());
+    pub fn take_events(&mut self) -> Events {
+        let events = Events { drive: self.event(), safe: self.event_s() };
         self.put(Register::EventH, [0, 0]);
         self.put(Register::EventS, [0]);
         events

@@ -16,9 +16,11 @@ use crate::symbol::{Control, Reading, Rule, Word};
 /// VPOS of a V-frame is the position at the sampling instant of the last H-frame before it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct SafeBlock {
     bytes: [u8; 8],
     /// Of the bytes before the CRC.
+    #[cfg_attr(feature = "serde", serde(skip))]
     crc: RunningCrc16,
     /// Words taken in order.
     len: u8,
@@ -125,6 +127,7 @@ impl SafeBlock {
 /// Both safe channels of a V-frame.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct VFrame {
     /// Vertical channel. Its status byte is SUMMARY: bit n sums up the encoder status register ENC_STn.
     pub safe1: SafeBlock,
@@ -162,15 +165,17 @@ mod tests {
 
     fn answers(block1: [Character; 8], block2: [Character; 8]) -> [u64; 8] {
         let mut rd = RunningDisparity::Minus;
+        let idle = EncoderByte::of(EncoderSymbol::Idle);
         core::array::from_fn(|at| {
             let content = Content {
                 vertical: block1[at],
-                parameter: EncoderByte::of(EncoderSymbol::Idle, at == 7),
+                parameter: if at == 7 { idle.with_vsync() } else { idle },
                 pipe: Character::control(Control::K30_7),
                 acceleration: Some(DeltaDelta::ZERO),
                 secondary: block2[at],
             };
-            let (bits, after) = content.emit(rd);
+            let coded = content.emit(rd);
+            let (bits, after) = (coded.bits, coded.disparity);
             rd = after;
             bits
         })

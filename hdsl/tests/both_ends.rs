@@ -460,6 +460,6 @@ fn a_receiver_behind_a_bus() {
         let map = remote.registers().unwrap();
         assert_eq!((map.vel(), map.quality(), map.link()), (4, 15, true));
         let _ = remote.take_events().unwrap();
-        assert!(!remote.take_events().unwrap().0.intersects(Event::FREL | Event::PRST));
+        assert!(!remote.take_events().unwrap().drive.intersects(Event::FREL | Event::PRST));
     }
 }

@@ -15,7 +15,7 @@ const STILL: [Character; 2] = [Character::data(0x00), Character::data(0x1f)];
 
 /// Six characters as an answer; column RD- for all.
 fn answer([vertical, parameter, pipe, high, low, secondary]: [Character; 6]) -> u64 {
-    let word = |character: Character| u64::from(character.encode(RunningDisparity::Minus).0.get());
+    let word = |character: Character| u64::from(character.encode(RunningDisparity::Minus).word.get());
     let bits = [vertical, parameter, pipe, high, low].into_iter().rev().fold(0, |bits, c| bits << 10 | word(c));
     bits | (!bits >> 49 & 1) << 50 | word(secondary) << 51
 }
@@ -42,7 +42,7 @@ impl Desk {
         for _ in 0..52 {
             desk.feed(TEST_PATTERN);
         }
-        desk.feed(EncoderId::new(0x00153).unwrap().to_answer(Character::data(0), RunningDisparity::Minus).0);
+        desk.feed(EncoderId::new(0x00153).unwrap().to_answer(Character::data(0), RunningDisparity::Minus).bits);
         for _ in 0..56 {
             let _ = desk.good();
         }

@@ -20,7 +20,7 @@ fn hear(device: &mut Device, head: Window, position: u64) -> Option<u64> {
 }
 
 fn head(byte: u8) -> Window {
-    Head::new(ParameterByte::new(byte), None, LineDisparity::ZERO).0.bits()
+    Head::new(ParameterByte::new(byte), None, LineDisparity::ZERO).bits()
 }
 
 /// An encoder that was reset and has synchronised.

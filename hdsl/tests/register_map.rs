@@ -4,7 +4,9 @@
 use hdsl::device::{Device, Fault};
 use hdsl::master::{HFrame, Master, RestartReason, State};
 use hdsl::message::{LongRequest, RemoteRegister, ResourceAddress, ShortRequest};
-use hdsl::registers::{BusError, Event, EventS, Interrupts, Online1, OnlineD, RegisterBus, Registers, RemoteReceiver};
+use hdsl::registers::{
+    BusError, Event, EventS, Events, Interrupts, Online1, OnlineD, RegisterBus, Registers, RemoteReceiver,
+};
 use hdsl::registers::{PipeFifo, Status2};
 use hdsl::symbol::{Character, Control, RunningDisparity, Word};
 use hdsl::{Dialect, EncoderId, Error, MasterSymbol, Rule};
@@ -209,7 +211,7 @@ fn long_messages() {
             assert_eq!(desk.map.write(&mut desk.master, 0x2c, 1), Err(Error::Busy));
             desk.frames(80);
             assert_eq!((desk.map.online_d(), desk.byte(0x2c)), (OnlineD::FIX1 | OnlineD::FREL, 0));
-            assert_eq!(desk.map.take_events(), (Event::FREL, EventS::empty()));
+            assert_eq!(desk.map.take_events(), Events { drive: Event::FREL, safe: EventS::empty() });
             assert_eq!(&desk.map.as_bytes()[0x20..0x20 + want.len()], want);
         };
         // Direct read of 081h, 8 bytes; attribute 3 of it, 2 bytes.
@@ -296,7 +298,7 @@ fn sum_events() {
         let [st0, st1] = [0x40, 0x41].map(|at| RemoteRegister::new(at).unwrap());
         let event = |desk: &mut Desk| {
             let _ = desk.v_frame();
-            desk.map.take_events().0.contains(Event::SUM)
+            desk.map.take_events().drive.contains(Event::SUM)
         };
         desk.write(0x08, 0x02);
         desk.device.resources_mut().set_register(st0, 1);
@@ -343,14 +345,20 @@ fn fixed_bits_of_channel_2() {
 }
 
 fn word(character: Character) -> hdsl::symbol::Reading {
-    character.encode(RunningDisparity::Minus).0.read(Rule::Strict)
+    character.encode(RunningDisparity::Minus).word.read(Rule::Strict)
+}
+
+/// PIPE_S and PIPE_D.
+fn take(fifo: &mut PipeFifo) -> (u8, u8) {
+    let entry = fifo.take();
+    (entry.status, entry.data)
 }
 
 /// The FIFO of the pipe (p. 52-53): order, eight places, what is dropped, what is said with each entry.
 #[test]
 fn pipe_fifo() {
     let mut fifo = PipeFifo::new();
-    assert_eq!((fifo.take(), fifo.len(), fifo.is_empty()), ((4, 0), 0, true));
+    assert_eq!((take(&mut fifo), fifo.len(), fifo.is_empty()), ((4, 0), 0, true));
     // Three times round, so that the places wrap.
     for round in 0..3 {
         for byte in 0..5 {
@@ -359,7 +367,7 @@ fn pipe_fifo() {
         }
         assert_eq!((fifo.len(), fifo.is_empty()), (5, false));
         for byte in 0..5 {
-            assert_eq!(fifo.take(), (0, byte), "{round}");
+            assert_eq!(take(&mut fifo), (0, byte), "{round}");
         }
     }
     // Ten entries: the two oldest are gone, and that is said once, besides what the entry is.
@@ -371,11 +379,11 @@ fn pipe_fifo() {
         fifo.put(word(Character::data(byte)));
     }
     assert_eq!(fifo.len(), 8);
-    assert_eq!((fifo.take(), fifo.take().0), ((9, 0x1c), 2));
+    assert_eq!((take(&mut fifo), take(&mut fifo).0), ((9, 0x1c), 2));
     for byte in 0..6 {
-        assert_eq!(fifo.take(), (0, byte));
+        assert_eq!(take(&mut fifo), (0, byte));
     }
-    assert_eq!(fifo.take(), (4, 0));
+    assert_eq!(take(&mut fifo), (4, 0));
     // Over the bus: PIPE_S takes an entry out and freezes it for PIPE_D; in the SDK PIPE_D is the last byte.
     for dialect in DIALECTS {
         let mut desk = Desk::new(dialect, 0x00153);
@@ -423,7 +431,8 @@ fn accesses_of_a_remote_receiver() {
 
     // Events: those that were read are cleared.
     let mut bus = remote(Dialect::TI, &[(0x04, 0x08), (0x05, 0x22), (0x3d, 0x41)]);
-    assert_eq!(bus.take_events(), Ok((Event::from_bits_retain(0x0822), EventS::from_bits_retain(0x41))));
+    let events = Events { drive: Event::from_bits_retain(0x0822), safe: EventS::from_bits_retain(0x41) };
+    assert_eq!(bus.take_events(), Ok(events));
     assert_eq!(written(bus), [(0x04, vec![0xf7, 0xdd]), (0x3d, vec![0xbe])]);
 
     // Short messages, free (FRES, bit 0 of 53h) and not.

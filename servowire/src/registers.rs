@@ -111,7 +111,8 @@ impl Map {
 
         let masks = format!("{:04X}h", u16::from_be_bytes(self.map.get(Register::MaskH)));
         let interrupts = self.map.masked_events();
-        let (event, event_s) = self.map.take_events();
+        let events = self.map.take_events();
+        let (event, event_s) = (events.drive, events.safe);
         line(out, "events", format_args!("{event}, mask {masks}"))?;
         let [mask_s] = self.map.get(Register::MaskS);
         line(out, "safe events", format_args!("{event_s}, mask {mask_s:02X}h"))?;

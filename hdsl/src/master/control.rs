@@ -11,7 +11,7 @@ use crate::sync::{Es, Synchroniser};
 impl Master {
     /// What there is to say about the fast position after the last H-frame, to be judged where it is used.
     pub fn fast(&self) -> Evidence {
-        self.linked().map_or(Evidence(Err(Doubt::NoLink)), |id| self.link.fast(id, self.sampled_ns))
+        self.linked().map_or(Evidence(Err(Doubt::NoLink)), |id| self.link.fast(id, self.sampled_ns()))
     }
 
     /// What there is to say about the safe position of the last V-frame, to be judged where it is used.

@@ -29,7 +29,7 @@ pub struct SignalQuality {
 ///
 /// What comes once a V-frame or more rarely is there in the one frame that it belongs to.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
 #[non_exhaustive]
 pub struct HFrame {
     /// What to send after the answer.
@@ -47,7 +47,9 @@ pub struct HFrame {
     /// The quality monitor, 0..=15.
     pub quality: u8,
     /// Registers POS and VEL, usable or not: for the register map alone.
+    #[cfg_attr(feature = "serde", serde(skip))]
     pub(crate) pos: u64,
+    #[cfg_attr(feature = "serde", serde(skip))]
     pub(crate) vel: i32,
     /// The flag POS: the fast position is estimated or not aligned.
     pub doubtful: bool,
@@ -66,6 +68,12 @@ pub struct HFrame {
     /// No short message is under way.
     pub short_free: bool,
 }
+
+servowire_core::one_line!(HFrame {
+    Self { restarted: Some(reason), was, .. } => "{}, the link starts anew: {}", was, reason;
+    Self { was, quality, doubtful: true, .. } => "{}, quality {}, fast position doubtful", was, quality;
+    Self { was, quality, .. } => "{}, quality {}", was, quality;
+});
 
 impl HFrame {
     /// Before the first frame.
@@ -133,7 +141,7 @@ impl HFrame {
 }
 
 /// What was counted since the machine was made.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]

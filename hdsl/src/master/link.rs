@@ -223,7 +223,7 @@ impl Master {
         link.last = link.vframe;
         link.is_new = true;
         link.msync = !link.msync;
-        link.latch(self.sampled_ns);
         link.settled = true;
+        self.latch();
     }
 }

@@ -6,8 +6,9 @@ use crate::line_code::LineDisparity;
 use crate::parameter::{MasterSymbol, ParameterByte};
 
 /// What to send from the start of an H-frame.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct Transmission {
     /// Zeros before the frame: 16 after a restart, no need of the protocol.
     pub lead_in: u8,
@@ -57,7 +58,7 @@ impl Master {
             // What the end of this frame will change: after RX7 another V-frame begins.
             let last = self.link.at() == 7;
             let msync = self.link.msync() != last;
-            let (next, _) = transmission(State::Running, self.requester.transmit(), msync, None, LineDisparity::ZERO);
+            let next = transmission(State::Running, self.requester.transmit(), msync, None, LineDisparity::ZERO);
             (self.ahead, self.detour) = (Some(next), true);
         }
         self.ahead
@@ -66,7 +67,7 @@ impl Master {
     /// The head after a frame of a running link that is free running.
     #[inline]
     pub(super) fn following(&mut self) -> Transmission {
-        transmission(State::Running, self.requester.transmit(), self.link.msync(), None, LineDisparity::ZERO).0
+        transmission(State::Running, self.requester.transmit(), self.link.msync(), None, LineDisparity::ZERO)
     }
 
     /// Stuffing after a START frame: time for the search.
@@ -94,16 +95,16 @@ impl Master {
         };
         // The disparity goes on only from frames without an answer.
         let carried = matches!(was, State::Reset | State::Sync) && !restarted;
-        let disparity = if carried { self.disparity } else { LineDisparity::ZERO };
+        let disparity = if carried { self.present.head.disparity_after() } else { LineDisparity::ZERO };
         let msync = self.state == State::Running && self.link.msync();
-        (self.present, self.disparity) = transmission(self.state, symbol, msync, extra, disparity);
+        self.present = transmission(self.state, symbol, msync, extra, disparity);
         if restarted {
             self.present.lead_in = 16;
         }
     }
 }
 
-/// A transmission, and the line disparity after it.
+/// What to send in a frame.
 #[inline]
 pub(super) fn transmission(
     state: State,
@@ -111,15 +112,17 @@ pub(super) fn transmission(
     msync: bool,
     extra: Option<Extra>,
     disparity: LineDisparity,
-) -> (Transmission, LineDisparity) {
-    let byte = ParameterByte::of(symbol, matches!(state, State::WaitVsync | State::Running), msync);
-    let (head, after) = match extra {
+) -> Transmission {
+    let byte = ParameterByte::of(symbol);
+    let byte = if matches!(state, State::WaitVsync | State::Running) { byte.with_first() } else { byte };
+    let byte = if msync { byte.with_msync() } else { byte };
+    let head = match extra {
         // Every answered frame of a free-running link; what is constant here costs nothing.
         None if disparity == LineDisparity::ZERO => Head::new(byte, None, LineDisparity::ZERO),
         None => Head::new(byte, None, disparity),
         Some(extra) => Head::new(byte, Some(extra), disparity.with_ones(extra.bits())),
     };
-    (Transmission { lead_in: 0, head, answered: !matches!(state, State::Reset | State::Sync) }, after)
+    Transmission { lead_in: 0, head, answered: !matches!(state, State::Reset | State::Sync) }
 }
 
 /// How a frame ends that was sent in this state.

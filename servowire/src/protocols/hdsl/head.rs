@@ -104,7 +104,7 @@ impl Heads {
         if head.extra_bits > 0 || !self.answered {
             return true;
         }
-        let (due, _) = Head::new(head.byte, None, LineDisparity::ZERO);
+        let due = Head::new(head.byte, None, LineDisparity::ZERO);
         keeps(&mut self.balanced, coded == u16::from(due.equalisation()) | due.para().get() << 4)
     }
 

@@ -147,8 +147,8 @@ fn locked(dialect: Dialect, pos_bits: u8) -> Result<Bench, Fault> {
     for _ in 0..200 {
         let bits = match bench.master.state() {
             State::Reset | State::Sync | State::Start | State::Learn | State::Check => TEST_PATTERN,
-            State::IdReq => id.to_answer(Character::data(0), RunningDisparity::Minus).0,
-            State::WaitVsync => idle(EncoderByte::of(EncoderSymbol::Idle, true)),
+            State::IdReq => id.to_answer(Character::data(0), RunningDisparity::Minus).bits,
+            State::WaitVsync => idle(EncoderByte::of(EncoderSymbol::Idle).with_vsync()),
             State::Running => return Ok(bench),
         };
         let _ = bench.feed(bits)?;
@@ -165,7 +165,7 @@ fn idle(parameter: EncoderByte) -> u64 {
         acceleration: Some(DeltaDelta::ZERO),
         secondary: Character::data(0),
     };
-    content.emit(RunningDisparity::Minus).0
+    content.emit(RunningDisparity::Minus).bits
 }
 
 #[derive(Deserialize)]
@@ -345,8 +345,9 @@ impl Session {
                 trigger(row, &mut self.bench)?;
             }
             let byte = self.bench.master.transmission().head.byte();
-            sent.push(byte.symbol().map_or(0xff, MasterSymbol::bits));
-            let symbol = EncoderSymbol::from_bits(*symbol).map_err(|e| Fault::Unreadable(e.to_string()))?;
+            sent.push(byte.symbol().map_or(0xff, MasterSymbol::code));
+            let symbol = EncoderSymbol::from_code(*symbol)
+                .ok_or_else(|| Fault::Unreadable(format!("no symbol {symbol:02x}")))?;
             self.bench.feed(self.answers.next(symbol))?;
         }
         same("master_symbols", &row.master_symbols, &sent)?;
@@ -394,14 +395,15 @@ impl Encoder {
         let at = usize::from(self.at);
         let pick = |block: Vec<u8>| block.get(at).copied().unwrap_or(0);
         let status2 = Character::control(Control::K28_0);
+        let byte = EncoderByte::of(symbol);
         let content = Content {
             vertical: Character::data(pick(block(0))),
-            parameter: EncoderByte::of(symbol, at == 7),
+            parameter: if at == 7 { byte.with_vsync() } else { byte },
             pipe: Character::control(Control::K30_7),
             acceleration: Some(DeltaDelta::ZERO),
             secondary: if at == 0 { status2 } else { Character::data(pick(block(0x1c))) },
         };
         self.at = (self.at + 1) % 8;
-        content.emit(RunningDisparity::Minus).0
+        content.emit(RunningDisparity::Minus).bits
     }
 }
