@@ -2,7 +2,7 @@
 
 use core::num::NonZeroU16;
 
-use rtex_block::device::{Drive, DriveConfig, OpenCodes};
+use rtex_block::device::{Drive, DriveConfig, Fault, OpenCodes};
 use rtex_block::inspect::inspect;
 use rtex_block::master::{ActiveCode, Axis, AxisConfig, AxisState, Limits, Heard, Ring};
 use rtex_block::{
@@ -170,19 +170,19 @@ pub fn ring(mut data: &[u8]) {
             assert!(ring.failure().is_none() || view.is_servo_off());
             responses[k] = match event & 15 {
                 1 if k == place => {
-                    drives[k].miss();
+                    drives[k].framing_error();
                     Heard::Nothing
                 }
                 2 if k == place => {
                     sent[usize::from(argument >> 3 & 15)] ^= 1 << (argument & 7);
-                    Response::parse(&drives[k].exchange(&sent)).into()
+                    Response::parse(&drives[k].hear(&sent).unwrap()).into()
                 }
                 3 if k == place => {
-                    let mut received = drives[k].exchange(&sent);
+                    let mut received = drives[k].hear(&sent).unwrap();
                     received[usize::from(argument >> 3 & 15)] ^= 1 << (argument & 7);
                     Response::parse(&received).into()
                 }
-                _ => Response::parse(&drives[k].exchange(&sent)).into(),
+                _ => Response::parse(&drives[k].hear(&sent).unwrap()).into(),
             };
         }
     }
@@ -196,9 +196,9 @@ fn act(event: u8, argument: u8, ring: &mut Ring<2>, place: usize, drive: &mut Dr
         4 => _ = ring.switch_on().ok(),
         5 => ring.switch_off(),
         6 => ring.clear(),
-        7 => drive.raise(Alarm { main: argument, sub: 0 }),
+        7 => drive.set_fault(Fault::Alarm(Alarm { main: argument, sub: 0 })),
         8 => drive.clear_alarm(),
-        9 => drive.set_main_power(argument & 1 == 1),
+        9 => drive.set_fault(if argument & 1 == 1 { Fault::None } else { Fault::NoMainPower }),
         10 => _ = axis.set_position(axis.setpoint().wrapping_add(i32::from(argument) << 11)),
         11 => {
             let code = NonCyclicCode::ALL[usize::from(argument) % 8];
@@ -215,14 +215,14 @@ fn recover(ring: &mut Ring<2>, drives: &mut [Drive; 2], mut responses: [Heard; 2
         if round % 60 == 0 {
             for drive in drives.iter_mut() {
                 drive.clear_alarm();
-                drive.set_main_power(true);
+                drive.set_fault(Fault::None);
             }
             ring.clear();
         }
         ring.switch_on().ok();
         let commands = ring.update(&responses, 0);
         for (k, command) in commands.iter().enumerate() {
-            responses[k] = Response::parse(&drives[k].exchange(&command.main.emit())).into();
+            responses[k] = Response::parse(&drives[k].hear(&command.main.emit()).unwrap()).into();
         }
     }
     assert!(ring.all_are(AxisState::On), "{:?}", ring.failure());

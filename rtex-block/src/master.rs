@@ -31,7 +31,7 @@ pub use echo::{EchoWatch, ReceiveWatchdog};
 pub use handshake::Handshake;
 pub use heard::Heard;
 pub use led::{Led, Pattern, led, pattern};
-pub use phase::{Asic, Fault, Inputs, Phase, PhaseControl};
+pub use phase::{Asic, ControlError, ControlPhase, Inputs, PhaseControl};
 pub use profile_move::{CommandEnded, MoveStage, ProfileMove};
 pub use progress::{Failure, Progress};
 pub use ring::{Ring, RingFailure, SameMacId};

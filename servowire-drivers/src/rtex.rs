@@ -27,7 +27,7 @@ mod reception;
 
 use core::convert::Infallible;
 
-use rtex_block::master::{Asic, Axis, Fault, Heard, Led, Master, Phase, Ring, Slave};
+use rtex_block::master::{Asic, Axis, ControlError, ControlPhase, Heard, Led, Master, Ring, Slave};
 use rtex_block::timing::TimerSystem;
 use rtex_block::{BlockSize, Command32, Evidence, MacId, Response, Response32};
 
@@ -36,7 +36,7 @@ pub use port::{Port, Word};
 pub use reception::Reception;
 
 /// Why a call of a [`Driver`] failed.
-pub type Failure<P> = Error<<P as Port>::Error, Infallible, Fault, Infallible>;
+pub type Failure<P> = Error<<P as Port>::Error, Infallible, ControlError, Infallible>;
 
 /// Words of the longest block, on a bus of bytes.
 const MOST_WORDS: usize = rtex_block::LEN32;
@@ -126,23 +126,23 @@ impl<'r, P: Port, C: Clock, const N: usize> Driver<'r, P, C, N> {
         self.master.ring().axes().get(place).map_or(Evidence::NEVER, Axis::evidence)
     }
 
-    /// One turn of the main loop. Until it gives [`Phase::Running`] interrupts stay off; it writes the first transmit data itself.
+    /// One turn of the main loop. Until it gives [`ControlPhase::Running`] interrupts stay off; it writes the first transmit data itself.
     ///
     /// # Errors
     /// [`Error::Protocol`] with the fault of the phases; [`Error::Io`].
-    pub fn control(&mut self) -> Result<Phase, Failure<P>> {
+    pub fn control(&mut self) -> Result<ControlPhase, Failure<P>> {
         let asic = self.port.state().map_err(Error::Io)?;
         let mut table = [Slave { mac_id: MacId::truncate(0), kind: 0 }; MacId::COUNT];
         let found = match (self.master.phase(), asic) {
-            (Phase::Waiting, Asic::Ready) => self.port.slaves(&mut table).map_err(Error::Io)?,
+            (ControlPhase::Waiting, Asic::Ready) => self.port.slaves(&mut table).map_err(Error::Io)?,
             _ => None,
         };
         let phase = self.master.control(asic, found.map(|count| table.get(..count).unwrap_or(&table)));
-        if phase == Phase::Prepare {
+        if phase == ControlPhase::Prepare {
             let commands = self.master.exchange(&[Heard::Nothing; N], self.clock.now_ns());
             self.write(&commands).map_err(Error::Io)?;
         }
-        match self.master.fault() {
+        match self.master.error() {
             Some(fault) => Err(Error::Protocol(fault)),
             None => Ok(phase),
         }
@@ -152,11 +152,11 @@ impl<'r, P: Port, C: Clock, const N: usize> Driver<'r, P, C, N> {
     ///
     /// # Errors
     /// As [`control`](Self::control).
-    pub fn start(&mut self, limit_ns: u64) -> Result<Phase, Failure<P>> {
+    pub fn start(&mut self, limit_ns: u64) -> Result<ControlPhase, Failure<P>> {
         let until_ns = self.clock.now_ns().saturating_add(limit_ns);
         loop {
             let phase = self.control()?;
-            if phase == Phase::Running || self.clock.now_ns() >= until_ns {
+            if phase == ControlPhase::Running || self.clock.now_ns() >= until_ns {
                 return Ok(phase);
             }
         }

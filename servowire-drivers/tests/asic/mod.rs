@@ -138,16 +138,16 @@ impl Ring {
         self.back_ns = None;
         if self.lose_frames > 0 {
             self.lose_frames -= 1;
-            self.drives.iter_mut().for_each(Drive::miss);
+            self.drives.iter_mut().for_each(Drive::framing_error);
             return;
         }
         self.frames += 1;
         let mut blocks = [[0; 32]; AXES];
         for ((drive, command), block) in self.drives.iter_mut().zip(&self.on_line).zip(&mut blocks) {
             if self.wide {
-                *block = drive.exchange32(command);
+                *block = drive.hear(command).unwrap();
             } else {
-                block[..16].copy_from_slice(&drive.exchange(command[..16].try_into().unwrap()));
+                block[..16].copy_from_slice(&drive.hear(command[..16].try_into().unwrap()).unwrap());
             }
         }
         self.hidden = Answers { frame: self.frames, blocks };

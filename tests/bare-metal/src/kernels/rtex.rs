@@ -6,8 +6,8 @@ use nom::IResult;
 use rtex_block::device::{self, Drive, DriveConfig, OpenCodes};
 use rtex_block::inspect::{self, Report};
 use rtex_block::master::{
-    ActiveCode, Asic, Axis, AxisConfig, CommandCounter, EchoWatch, Expected, Fault, Handshake, Inputs, Led, Limits,
-    Order, Phase, PhaseControl, ProfileMove, Progress, Heard, Reception, Ring, ServoOff, Slave, SlaveInfo, Turn,
+    ActiveCode, Asic, Axis, AxisConfig, CommandCounter, EchoWatch, Expected, ControlError, Handshake, Inputs, Led, Limits,
+    Order, ControlPhase, PhaseControl, ProfileMove, Progress, Heard, Reception, Ring, ServoOff, Slave, SlaveInfo, Turn,
     compare, led,
 };
 use rtex_block::position::{self, Gear};
@@ -213,20 +213,20 @@ kernels! {
     /// An exchange with the drive model.
     fn rtex_drive((drive, command): &(Drive, Command)) -> [u8; 16] {
         let mut drive = *drive;
-        drive.exchange(&command.emit())
+        drive.hear(&command.emit()).unwrap()
     } over [(DRIVE, COMMAND), (DRIVE, ASKING)];
 
     /// A step of the phases.
-    fn rtex_phase(inputs: &Inputs) -> (Phase, Option<Fault>) {
+    fn rtex_phase(inputs: &Inputs) -> (ControlPhase, Option<ControlError>) {
         let mut control = PhaseControl::new();
         control.step(*inputs);
-        (control.phase(), control.fault())
+        (control.phase(), control.error())
     } over [Inputs { asic: Asic::Initial, slave_info: None, tx_ready: false, timeout: false }];
 
     /// What the COM LED shows.
-    fn rtex_led((phase, fault, t_ms): &(Phase, Option<Fault>, u64)) -> Led {
+    fn rtex_led((phase, fault, t_ms): &(ControlPhase, Option<ControlError>, u64)) -> Led {
         led(*phase, *fault, *t_ms)
-    } over [(Phase::Prepare, None, 1_700), (Phase::Running, Some(Fault::Timeout), 20_000)];
+    } over [(ControlPhase::Prepare, None, 1_700), (ControlPhase::Running, Some(ControlError::Timeout), 20_000)];
 
     /// The slaves found against the table.
     fn rtex_slaves(found: &[Slave; 4]) -> SlaveInfo {
