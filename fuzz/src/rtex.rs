@@ -26,8 +26,8 @@ pub fn block(data: &[u8]) {
         (true, false) => response16(data),
         (true, true) => response32(data),
     };
-    assert_eq!(report.is_usable, usable);
-    assert_eq!(report.is_response, data.first().map(|_| response));
+    assert_eq!(report.is_usable(), usable);
+    assert_eq!(report.is_response(), data.first().map(|_| response));
 }
 
 fn command16(data: &[u8]) -> bool {
@@ -108,7 +108,7 @@ fn refused(data: &[u8], want: usize, error: Error) {
             assert!(usize::from(got) == data.len().min(0xffff) && data.len() > want && usize::from(said) == want);
         }
         Error::CyclicCode { code } => assert!(code == data[1] >> 4 & 7 && code > 4),
-        Error::NonCyclicCode { code } => assert!(code == data[1] & 15 && NonCyclicCode::new(code).is_none()),
+        Error::NonCyclicCode { code } => assert!(code == data[1] & 15 && NonCyclicCode::from_code(code).is_none()),
         Error::SubChk { byte16 } => assert!(byte16 == data[16] && byte16 < 0x80),
         Error::SubCommandCode { code } => assert!(code == data[16] & 15 && ![0, 2, 10].contains(&code)),
         error => panic!("{error} is not an error of this block"),
@@ -202,7 +202,7 @@ fn act(event: u8, argument: u8, ring: &mut Ring<2>, place: usize, drive: &mut Dr
         10 => _ = axis.set_position(axis.setpoint().wrapping_add(i32::from(argument) << 11)),
         11 => {
             let code = NonCyclicCode::ALL[usize::from(argument) % 8];
-            let _ = axis.ask(NonCyclicCommand::from_bytes(code, [argument >> 3, 0, 0, 0, 0, 0, 0, 0]));
+            let _ = axis.ask(NonCyclicCommand::parse(code, [argument >> 3, 0, 0, 0, 0, 0, 0, 0]));
         }
         12 => _ = axis.take_outcome(),
         _ => {}

@@ -8,7 +8,8 @@ use core::num::NonZeroU16;
 
 use rtex_block::device::{Behaviour, Drive, DriveConfig, Fault, OpenCodes};
 use rtex_block::master::procedure::{
-    AlarmAttributes, AlarmHistory, Backup, ClearAlarm, ClearableIf, Home, Latch, ReadText, Restore, SetPosition,
+    AlarmAttributes, AlarmHistory, Backup, ClearAlarm, ClearableIf, Home, Latch, ParameterValue, ReadText, Restore,
+    SetPosition,
 };
 use rtex_block::master::{ActiveCode, Axis, AxisConfig, AxisState, CommandCounter, Heard, Limits, Progress, Turn};
 use rtex_block::type_code::{Pr, monitor, parameter, profile, system_id};
@@ -115,11 +116,11 @@ fn set_up(machine: &mut Machine) -> Result<(), String> {
     let kind = machine.run(|axis| text.receive(axis))?;
     let kind = system_id::device_type(kind.as_bytes()).unwrap_or("unknown");
     println!("vendor {}, device type {kind}", String::from_utf8_lossy(vendor.as_bytes()));
-    let mut list = [(Pr { class: 8, number: 1 }, 0), (Pr { class: 8, number: 4 }, 0)];
+    let mut list = [1, 4].map(|number| ParameterValue::new(Pr { class: 8, number }, 0));
     let mut backup = Backup::new(OpenCodes::INVENTED.parameter_read);
     machine.run(|axis| backup.receive(axis, &mut list))?;
-    println!("parameters {list:?}");
-    list[1].1 = 2_000;
+    println!("parameters {}, {}", list[0], list[1]);
+    list[1].value = 2_000;
     let mut restore = Restore::new(OpenCodes::INVENTED.parameter_read);
     machine.run(|axis| restore.receive(axis, &list))?;
     let feed = Pr { class: 7, number: 35 }.index();

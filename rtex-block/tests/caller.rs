@@ -95,7 +95,7 @@ fn act(pair: &mut Pair, action: Action) {
             _ = axis.start_move_with_latch(code, to, at, Nibble::truncate(sel), sel);
         }
         Action::MoveSpeed(at) => _ = axis.set_move_speed(at),
-        Action::Ask(code, bytes) => _ = axis.ask(NonCyclicCommand::from_bytes(code, bytes)),
+        Action::Ask(code, bytes) => _ = axis.ask(NonCyclicCommand::parse(code, bytes)),
         Action::Sub(type_code) => _ = axis.ask_sub(SubCode::Monitor, type_code, 0),
         Action::Mode(k) => _ = axis.set_mode(modes[usize::from(k)]),
         Action::Take => {

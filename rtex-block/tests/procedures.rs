@@ -13,7 +13,7 @@ mod common;
 
 use common::{CODES, Pair, actual, limits, monitor, set_position};
 use rtex_block::device::{Behaviour, DriveConfig, Quirks};
-use rtex_block::master::procedure::{Backup, Caught, Home, Latch, ReadText, Restore, SetPosition};
+use rtex_block::master::procedure::{Backup, Caught, Home, Latch, ParameterValue, ReadText, Restore, SetPosition};
 use rtex_block::master::{ActiveCode, AskError, Axis, AxisConfig, AxisState, Failure, Heard, Progress};
 use rtex_block::{
     Arguments, ErrorCode, LatchFlags, MacId, Nibble, NonCyclicCommand, NonCyclicResponse, Pr, ProfileFlags, Response,
@@ -135,7 +135,7 @@ fn what_has_ended_sends_nothing_more() {
     let mut set = SetPosition::actual(77_777);
     runs(ActiveCode::CyclicPosition, false, 0x24, |axis| set.receive(axis));
     let mut restore = Restore::new(CODES.parameter_read);
-    let list = [(Pr { class: 7, number: 25 }, 1)];
+    let list = [ParameterValue::new(Pr { class: 7, number: 25 }, 1)];
     runs(ActiveCode::CyclicPosition, false, 0x26, |axis| restore.receive(axis, &list));
 }
 
@@ -299,16 +299,16 @@ fn texts_and_parameters() {
         assert_eq!(value.as_bytes(), want);
     }
     let pr = |class, number| Pr { class, number };
-    let mut list = [(pr(7, 25), 0), (pr(8, 1), 0), (pr(8, 4), 0)];
+    let mut list = [pr(7, 25), pr(8, 1), pr(8, 4)].map(|pr| ParameterValue::new(pr, 0));
     let mut backup = Backup::new(CODES.parameter_read);
     assert_eq!(pair.run(|axis| backup.receive(axis, &mut list)), Progress::Done { value: () });
-    assert_eq!(list.map(|(_, value)| value), [1, 1_000, 1_000]);
-    list[1].1 = 77;
+    assert_eq!(list.map(|parameter| parameter.value), [1, 1_000, 1_000]);
+    list[1].value = 77;
     let mut restore = Restore::new(CODES.parameter_read);
     assert_eq!(restore.place(), 0);
     assert_eq!(pair.run(|axis| restore.receive(axis, &list)), Progress::Done { value: () });
     let mut backup = Backup::new(CODES.parameter_read);
-    let mut again = list.map(|(pr, _)| (pr, -1));
+    let mut again = list.map(|parameter| ParameterValue { value: -1, ..parameter });
     assert_eq!(pair.run(|axis| backup.receive(axis, &mut again)), Progress::Done { value: () });
     assert_eq!(again, list);
     // Read with the code for initial values it differs from what was written.
@@ -329,7 +329,7 @@ fn texts_and_parameters() {
     // A parameter that does not exist.
     let mut restore = Restore::new(CODES.parameter_read);
     let refused = Progress::Failed { error: Failure::CommandError(ErrorCode(0x0032)) };
-    assert_eq!(pair.run(|axis| restore.receive(axis, &[(pr(99, 0), 0)])), refused);
+    assert_eq!(pair.run(|axis| restore.receive(axis, &[ParameterValue::new(pr(99, 0), 0)])), refused);
 }
 
 /// A drive whose parameters count only after a reset.

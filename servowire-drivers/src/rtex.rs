@@ -7,14 +7,14 @@
 //! ```text
 //!             external timer                              internal timer
 //!  main loop  control() until it gives Running, then interrupts on; control() and led() for ever
-//!  XINTRX     priority above: reception.frame(), then     priority below: reception.frame()
+//!  XINTRX     priority above: frames.add(), then     priority below: frames.add()
 //!             switch the reception bank
 //!  NC         from the host's timer: exchange()           from the falling edge of XSYNC: exchange()
 //! ```
 //!
 //! In the external-timer system the receive interrupt may switch the reception bank in the middle of an exchange, in the
 //! internal-timer system the ASIC does at XSYNC if the exchange is late; half of the blocks would be of another frame. So the
-//! exchange looks at [`Reception`] and at the clock before and after it reads, and reads once more if the bank was switched between;
+//! exchange looks at [`FrameCount`] and at the clock before and after it reads, and reads once more if the bank was switched between;
 //! if it was again, it takes none. System Design Guide for Master, chapters 1 and 2.
 //!
 //! Every block that the port fails to read or to write is tried again at once. If that fails too, what was not read counts as a
@@ -22,8 +22,8 @@
 
 #[cfg(feature = "async")]
 pub mod asynch;
+mod frame_count;
 mod port;
-mod reception;
 
 use core::convert::Infallible;
 
@@ -32,8 +32,8 @@ use rtex_block::timing::TimerSystem;
 use rtex_block::{BlockSize, Command32, Evidence, MacId, Response, Response32};
 
 use crate::{Clock, Error};
+pub use frame_count::FrameCount;
 pub use port::{Port, Word};
-pub use reception::Reception;
 
 /// Why a call of a [`Driver`] failed.
 pub type Failure<P> = Error<<P as Port>::Error, Infallible, ControlError, Infallible>;
@@ -49,7 +49,7 @@ fn twice<E>(mut transfer: impl FnMut() -> Result<(), E>) -> Result<(), E> {
 }
 
 /// What an exchange was like.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Exchanged {
     /// Communication periods by which the commands go out late, because the exchange ended after the next frame had begun.
@@ -58,14 +58,25 @@ pub struct Exchanged {
     pub torn: bool,
 }
 
+/// What a [`Driver`] was made of.
+#[derive(Debug)]
+pub struct Released<P, C, const N: usize> {
+    /// The port of the ASIC.
+    pub port: P,
+    /// The clock.
+    pub clock: C,
+    /// The master.
+    pub master: Master<N>,
+}
+
 /// A master of `N` axes, and the port of its ASIC.
 #[derive(Debug)]
 pub struct Driver<'r, P, C, const N: usize> {
     port: P,
     clock: C,
     master: Master<N>,
-    reception: &'r Reception,
-    /// Frames of `reception` that the master has heard of.
+    received: &'r FrameCount,
+    /// Frames of `received` that the master has heard of.
     frames: u32,
     late: u32,
     torn: u32,
@@ -75,14 +86,14 @@ pub struct Driver<'r, P, C, const N: usize> {
 }
 
 impl<'r, P: Port, C: Clock, const N: usize> Driver<'r, P, C, N> {
-    /// A driver in PH_INIT. The receive interrupt has the same `reception`.
-    pub fn new(port: P, clock: C, master: Master<N>, reception: &'r Reception) -> Self {
+    /// A driver in PH_INIT. The receive interrupt has the same `received`.
+    pub fn new(port: P, clock: C, master: Master<N>, received: &'r FrameCount) -> Self {
         Self {
             port,
             clock,
             master,
-            reception,
-            frames: reception.frames(),
+            received,
+            frames: received.get(),
             late: 0,
             torn: 0,
             #[cfg(feature = "async")]
@@ -91,8 +102,8 @@ impl<'r, P: Port, C: Clock, const N: usize> Driver<'r, P, C, N> {
     }
 
     /// Gives port, clock and master back.
-    pub fn release(self) -> (P, C, Master<N>) {
-        (self.port, self.clock, self.master)
+    pub fn release(self) -> Released<P, C, N> {
+        Released { port: self.port, clock: self.clock, master: self.master }
     }
 
     /// The master, for reading.
@@ -174,7 +185,7 @@ impl<'r, P: Port, C: Clock, const N: usize> Driver<'r, P, C, N> {
             self.began_ns = Some(began_ns);
         }
         let read = self.read(began_ns);
-        let frames = self.reception.frames();
+        let frames = self.received.get();
         if frames != self.frames {
             self.frames = frames;
             self.master.frame_received();
@@ -220,7 +231,7 @@ impl<'r, P: Port, C: Clock, const N: usize> Driver<'r, P, C, N> {
     /// What is another one after each switch of the reception bank: the receive interrupt switches it, or XSYNC.
     fn bank(&mut self, began_ns: u64) -> u32 {
         match self.master.config().timer {
-            TimerSystem::External => self.reception.frames(),
+            TimerSystem::External => self.received.get(),
             TimerSystem::Internal => self.frames_since(began_ns),
         }
     }

@@ -388,7 +388,7 @@ mod asynch {
         for k in 0..20 {
             pin.lost = k % 5 == 4;
             ring.borrow_mut().let_in();
-            let (began, exchanged) = run(driver.next(&mut pin), FOR_EVER).unwrap().unwrap();
+            let Period { began, exchanged } = run(driver.next(&mut pin), FOR_EVER).unwrap().unwrap();
             assert_eq!(began, if k % 5 == 4 { Began::Clock } else { Began::Edge });
             assert!(!exchanged.torn);
             assert_eq!(driver.master().ring().failure(), None);
@@ -411,7 +411,7 @@ mod asynch {
                 (pin.lost, pin.late_ns) = (lost, late_ns);
                 ring.borrow_mut().read_of.clear();
                 ring.borrow_mut().stall_in = Some((at as u32, COM_NS - late_ns + 3_000));
-                let (_, exchanged) = run(driver.next(&mut pin), FOR_EVER).unwrap().unwrap();
+                let Period { exchanged, .. } = run(driver.next(&mut pin), FOR_EVER).unwrap().unwrap();
                 ring.borrow_mut().stall_in = None;
                 let read = std::mem::take(&mut ring.borrow_mut().read_of);
                 let taken = &read[read.len() - words..];
@@ -435,7 +435,7 @@ mod asynch {
         for polls in 0.. {
             move_on(&mut driver);
             let first = run(driver.next(&mut pin), polls);
-            let (began, exchanged) = run(driver.next(&mut pin), FOR_EVER).unwrap().unwrap();
+            let Period { began, exchanged } = run(driver.next(&mut pin), FOR_EVER).unwrap().unwrap();
             assert_eq!((began, exchanged.frames_late, exchanged.torn), (Began::Edge, 0, false), "after {polls} polls");
             is_well(&ring, &driver, &polls);
             if first.is_some() {
@@ -488,7 +488,7 @@ mod asynch {
                 }
                 let outcome = run(driver.next(&mut pin), polls);
                 // An edge that came while nobody waited has the same consequence as a late exchange.
-                let missed = outcome.map_or(1, |result| result.map_or(0, |(_, exchanged)| exchanged.frames_late));
+                let missed = outcome.map_or(1, |result| result.map_or(0, |period| period.exchanged.frames_late));
                 pin.lost = false;
                 heal(&ring);
                 for _ in 0..2 + missed {

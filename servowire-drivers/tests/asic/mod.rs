@@ -10,7 +10,7 @@ use rtex_block::MacId;
 use rtex_block::device::{Drive, DriveConfig, OpenCodes};
 use rtex_block::master::{Asic, Slave};
 use servowire_drivers::Clock;
-use servowire_drivers::rtex::{Port, Reception, Word};
+use servowire_drivers::rtex::{FrameCount, Port, Word};
 
 pub const AXES: usize = 3;
 /// Communication period.
@@ -49,7 +49,7 @@ pub struct Ring {
     /// When the frame under way comes back.
     back_ns: Option<u64>,
     frames: u32,
-    reception: &'static Reception,
+    reception: &'static FrameCount,
     /// An interrupt that waits for the exchange to end (internal timer).
     pub in_exchange: bool,
     pub interrupt_waits: bool,
@@ -87,7 +87,7 @@ impl Ring {
             next_frame_ns: 0,
             back_ns: None,
             frames: 0,
-            reception: Box::leak(Box::new(Reception::new())),
+            reception: Box::leak(Box::new(FrameCount::new())),
             in_exchange: false,
             interrupt_waits: false,
             read_of: Vec::new(),
@@ -98,7 +98,7 @@ impl Ring {
         }))
     }
 
-    pub fn reception(&self) -> &'static Reception {
+    pub fn reception(&self) -> &'static FrameCount {
         self.reception
     }
 
@@ -153,7 +153,7 @@ impl Ring {
         self.hidden = Answers { frame: self.frames, blocks };
         if self.external {
             // The receive interrupt has the highest priority.
-            self.reception.frame();
+            self.reception.add();
             self.seen = self.hidden;
         } else {
             self.interrupt_waits = true;
@@ -165,7 +165,7 @@ impl Ring {
     pub fn let_in(&mut self) {
         if self.interrupt_waits && !self.in_exchange {
             self.interrupt_waits = false;
-            self.reception.frame();
+            self.reception.add();
         }
     }
 
