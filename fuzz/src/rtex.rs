@@ -2,7 +2,7 @@
 
 use core::num::NonZeroU16;
 
-use rtex_block::device::{Drive, DriveConfig, OpenCodes};
+use rtex_block::device::{Drive, DriveConfig, Fault, OpenCodes};
 use rtex_block::inspect::inspect;
 use rtex_block::master::{ActiveCode, Axis, AxisConfig, AxisState, Limits, Heard, Ring};
 use rtex_block::{
@@ -26,8 +26,8 @@ pub fn block(data: &[u8]) {
         (true, false) => response16(data),
         (true, true) => response32(data),
     };
-    assert_eq!(report.is_usable, usable);
-    assert_eq!(report.is_response, data.first().map(|_| response));
+    assert_eq!(report.is_usable(), usable);
+    assert_eq!(report.is_response(), data.first().map(|_| response));
 }
 
 fn command16(data: &[u8]) -> bool {
@@ -108,7 +108,7 @@ fn refused(data: &[u8], want: usize, error: Error) {
             assert!(usize::from(got) == data.len().min(0xffff) && data.len() > want && usize::from(said) == want);
         }
         Error::CyclicCode { code } => assert!(code == data[1] >> 4 & 7 && code > 4),
-        Error::NonCyclicCode { code } => assert!(code == data[1] & 15 && NonCyclicCode::new(code).is_none()),
+        Error::NonCyclicCode { code } => assert!(code == data[1] & 15 && NonCyclicCode::from_code(code).is_none()),
         Error::SubChk { byte16 } => assert!(byte16 == data[16] && byte16 < 0x80),
         Error::SubCommandCode { code } => assert!(code == data[16] & 15 && ![0, 2, 10].contains(&code)),
         error => panic!("{error} is not an error of this block"),
@@ -170,19 +170,19 @@ pub fn ring(mut data: &[u8]) {
             assert!(ring.failure().is_none() || view.is_servo_off());
             responses[k] = match event & 15 {
                 1 if k == place => {
-                    drives[k].miss();
+                    drives[k].framing_error();
                     Heard::Nothing
                 }
                 2 if k == place => {
                     sent[usize::from(argument >> 3 & 15)] ^= 1 << (argument & 7);
-                    Response::parse(&drives[k].exchange(&sent)).into()
+                    Response::parse(&drives[k].hear(&sent).unwrap()).into()
                 }
                 3 if k == place => {
-                    let mut received = drives[k].exchange(&sent);
+                    let mut received = drives[k].hear(&sent).unwrap();
                     received[usize::from(argument >> 3 & 15)] ^= 1 << (argument & 7);
                     Response::parse(&received).into()
                 }
-                _ => Response::parse(&drives[k].exchange(&sent)).into(),
+                _ => Response::parse(&drives[k].hear(&sent).unwrap()).into(),
             };
         }
     }
@@ -196,13 +196,13 @@ fn act(event: u8, argument: u8, ring: &mut Ring<2>, place: usize, drive: &mut Dr
         4 => _ = ring.switch_on().ok(),
         5 => ring.switch_off(),
         6 => ring.clear(),
-        7 => drive.raise(Alarm { main: argument, sub: 0 }),
+        7 => drive.set_fault(Fault::Alarm(Alarm { main: argument, sub: 0 })),
         8 => drive.clear_alarm(),
-        9 => drive.set_main_power(argument & 1 == 1),
+        9 => drive.set_fault(if argument & 1 == 1 { Fault::None } else { Fault::NoMainPower }),
         10 => _ = axis.set_position(axis.setpoint().wrapping_add(i32::from(argument) << 11)),
         11 => {
             let code = NonCyclicCode::ALL[usize::from(argument) % 8];
-            let _ = axis.ask(NonCyclicCommand::from_bytes(code, [argument >> 3, 0, 0, 0, 0, 0, 0, 0]));
+            let _ = axis.ask(NonCyclicCommand::parse(code, [argument >> 3, 0, 0, 0, 0, 0, 0, 0]));
         }
         12 => _ = axis.take_outcome(),
         _ => {}
@@ -215,14 +215,14 @@ fn recover(ring: &mut Ring<2>, drives: &mut [Drive; 2], mut responses: [Heard; 2
         if round % 60 == 0 {
             for drive in drives.iter_mut() {
                 drive.clear_alarm();
-                drive.set_main_power(true);
+                drive.set_fault(Fault::None);
             }
             ring.clear();
         }
         ring.switch_on().ok();
         let commands = ring.update(&responses, 0);
         for (k, command) in commands.iter().enumerate() {
-            responses[k] = Response::parse(&drives[k].exchange(&command.main.emit())).into();
+            responses[k] = Response::parse(&drives[k].hear(&command.main.emit()).unwrap()).into();
         }
     }
     assert!(ring.all_are(AxisState::On), "{:?}", ring.failure());

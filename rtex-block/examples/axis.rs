@@ -6,9 +6,10 @@
 use core::fmt::Debug;
 use core::num::NonZeroU16;
 
-use rtex_block::device::{Behaviour, Drive, DriveConfig, OpenCodes};
+use rtex_block::device::{Behaviour, Drive, DriveConfig, Fault, OpenCodes};
 use rtex_block::master::procedure::{
-    AlarmAttributes, AlarmHistory, Backup, ClearAlarm, ClearableIf, Home, Latch, ReadText, Restore, SetPosition,
+    AlarmAttributes, AlarmHistory, Backup, ClearAlarm, ClearableIf, Home, Latch, ParameterValue, ReadText, Restore,
+    SetPosition,
 };
 use rtex_block::master::{ActiveCode, Axis, AxisConfig, AxisState, CommandCounter, Heard, Limits, Progress, Turn};
 use rtex_block::type_code::{Pr, monitor, parameter, profile, system_id};
@@ -36,7 +37,7 @@ impl Machine {
         self.axis.hear(self.sent, &self.received, self.now_ns);
         self.sent = self.counter.next();
         let command = self.axis.send(self.sent);
-        self.received = Response32::parse(&self.drive.exchange32(&command.emit())).into();
+        self.received = Response32::parse(&self.drive.hear(&command.emit()).unwrap()).into();
     }
 
     /// The actual position, if it is good for control: at most one update period old.
@@ -87,15 +88,16 @@ fn main() -> Result<(), String> {
     let limits = Limits::new(NonZeroU16::MIN.saturating_add(7), 100).with_ready(400);
     let config = AxisConfig::new(mac_id, ActiveCode::CyclicPosition, 500_000, limits).with_max_speed(Some(5_000_000));
     // A drive that takes its time.
-    let behaviour = Behaviour::POLITE.with_stale_answers(2).with_in_progress_late(6).with_latch_late(3);
+    let behaviour = Behaviour::new().with_stale_answers(2).with_in_progress_late(6).with_latch_late(3);
     let mut machine = Machine {
         axis: Axis::new(config),
-        drive: Drive::new(DriveConfig::new(mac_id, OpenCodes::INVENTED).with_behaviour(behaviour)),
+        drive: Drive::new(DriveConfig::new(mac_id, OpenCodes::INVENTED)),
         counter: CommandCounter::new(4),
         sent: Turn::Invalid,
         received: Heard::Nothing,
         now_ns: 0,
     };
+    machine.drive.set_behaviour(behaviour);
     machine.until(|machine| machine.axis.state() == AxisState::Off)?;
     set_up(&mut machine)?;
     machine.switch_on()?;
@@ -114,11 +116,11 @@ fn set_up(machine: &mut Machine) -> Result<(), String> {
     let kind = machine.run(|axis| text.receive(axis))?;
     let kind = system_id::device_type(kind.as_bytes()).unwrap_or("unknown");
     println!("vendor {}, device type {kind}", String::from_utf8_lossy(vendor.as_bytes()));
-    let mut list = [(Pr { class: 8, number: 1 }, 0), (Pr { class: 8, number: 4 }, 0)];
+    let mut list = [1, 4].map(|number| ParameterValue::new(Pr { class: 8, number }, 0));
     let mut backup = Backup::new(OpenCodes::INVENTED.parameter_read);
     machine.run(|axis| backup.receive(axis, &mut list))?;
-    println!("parameters {list:?}");
-    list[1].1 = 2_000;
+    println!("parameters {}, {}", list[0], list[1]);
+    list[1].value = 2_000;
     let mut restore = Restore::new(OpenCodes::INVENTED.parameter_read);
     machine.run(|axis| restore.receive(axis, &list))?;
     let feed = Pr { class: 7, number: 35 }.index();
@@ -188,23 +190,23 @@ fn at_a_speed(machine: &mut Machine) -> Result<(), String> {
 fn what_goes_wrong(machine: &mut Machine) -> Result<(), String> {
     machine.drive.set_warning(0xa0);
     machine.drive.set_inputs(StatusFlags::HOME.to_bytes()[1]);
-    machine.drive.drop_servo();
+    machine.drive.set_fault(Fault::ServoDrop);
     machine.until(|machine| machine.axis.state() != AxisState::On)?;
     println!("{} [{}]", machine.axis.state(), machine.axis.status());
     machine.axis.clear();
     machine.switch_on()?;
-    machine.drive.set_main_power(false);
+    machine.drive.set_fault(Fault::NoMainPower);
     machine.until(|machine| machine.axis.state() != AxisState::On)?;
     println!("{}", machine.axis.state());
-    machine.drive.set_main_power(true);
+    machine.drive.set_fault(Fault::None);
     // From now on it does not take its time.
-    machine.drive.set_config(machine.drive.config().with_behaviour(Behaviour::POLITE));
+    machine.drive.set_behaviour(Behaviour::new());
     machine.axis.clear();
     machine.switch_on()
 }
 
 fn an_alarm(machine: &mut Machine) -> Result<(), String> {
-    machine.drive.raise(Alarm { main: 16, sub: 0 });
+    machine.drive.set_fault(Fault::Alarm(Alarm { main: 16, sub: 0 }));
     machine.until(|machine| matches!(machine.axis.state(), AxisState::Stopped(_)))?;
     println!("{}", machine.axis.state());
     let mut attributes = AlarmAttributes::new(OpenCodes::INVENTED.alarm_attributes);

@@ -5,7 +5,7 @@
 use core::num::NonZeroU16;
 
 use rtex_block::device::{Drive, DriveConfig, OpenCodes};
-use rtex_block::inspect::inspect;
+use rtex_block::inspect::{Change, inspect};
 use rtex_block::master::{ActiveCode, Axis, AxisConfig, AxisState, Heard, Limits, Ring, SameMacId};
 use rtex_block::{Command32, MacId, Response};
 
@@ -21,18 +21,20 @@ fn main() -> Result<(), SameMacId> {
     let mut before = None;
     for period in 0..16 {
         let [Command32 { main: command, .. }] = ring.update(&[received], period * 500_000);
-        let block = drive.exchange(&command.emit());
+        let block = drive.hear(&command.emit()).unwrap();
         received = Response::parse(&block).into();
 
         println!("{} -> {}   {}", hex(&command.emit()), hex(&block), ring.axes()[0].state());
         let report = inspect(&block);
         if let Some(before) = &before {
-            for (field, old) in report.changes(before).filter(|(field, _)| field.name != "Update_Counter_Echo") {
+            for Change { field, before } in
+                report.changes(before).filter(|change| change.field.name != "Update_Counter_Echo")
+            {
                 println!(
                     "{:36}{}: {} -> {}",
                     "",
                     field.name,
-                    old.map_or(String::new(), |v| v.to_string()),
+                    before.map_or(String::new(), |v| v.to_string()),
                     field.value
                 );
             }

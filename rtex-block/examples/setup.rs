@@ -8,7 +8,7 @@ use std::error::Error;
 
 use rtex_block::master::{ActiveCode, Axis, AxisConfig, Limits, Master, MasterConfig, Slave};
 use rtex_block::position::{Gear, is_within_limit, max_step, max_torque};
-use rtex_block::timing::{A6N, FrameTime, Periods, TimerSystem, timer_reload};
+use rtex_block::timing::{A6N, A6nParameters, FrameTime, Periods, TimerSystem, timer_reload};
 use rtex_block::{BlockSize, Command, MacId, pack, stream};
 
 fn main() -> Result<(), Box<dyn Error>> {
@@ -16,7 +16,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         "update     communication  Pr7.20  Pr7.21  Pr7.91   internal  axes  reload at 50 MHz  late if it ends 20 us before the next"
     );
     for periods in A6N {
-        let (pr7_20, pr7_21, pr7_91) = periods.a6n_parameters();
+        let A6nParameters { pr7_20, pr7_21, pr7_91 } = periods.a6n_parameters();
         let internal = if TimerSystem::Internal.allows(&periods) { "yes" } else { "no" };
         let reload = timer_reload(50_000_000, periods.com_ns).map_or("-".to_owned(), |ticks| ticks.to_string());
         println!(

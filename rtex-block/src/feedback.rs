@@ -26,8 +26,9 @@ impl Tolerated {
 
     /// These flags, in place of those before.
     #[must_use]
-    pub const fn status(self, status: StatusFlags) -> Self {
-        Self { status, ..self }
+    pub const fn status(mut self, status: StatusFlags) -> Self {
+        self.status = status;
+        self
     }
 }
 

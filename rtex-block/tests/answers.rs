@@ -13,7 +13,7 @@ mod common;
 use core::num::NonZeroU16;
 
 use common::{CODES, Pair, limits, monitor};
-use rtex_block::device::{Behaviour, DriveConfig};
+use rtex_block::device::{Behaviour, DriveConfig, Fault};
 use rtex_block::master::procedure::{Home, Latch, ReadText};
 use rtex_block::master::{
     ActiveCode, Axis, AxisConfig, AxisState, Failure, Handshake, Heard, Limits, MoveStage, ProfileMove, Progress, Ring,
@@ -181,7 +181,7 @@ fn a_motion_takes_its_own_answers_only() {
 /// that never echoes it holds the axis up for the limit only.
 #[test]
 fn requests_are_released_by_the_echo() {
-    let mut pair = Pair::new(ActiveCode::CyclicPosition, Behaviour::POLITE.with_echo_lag(3));
+    let mut pair = Pair::new(ActiveCode::CyclicPosition, Behaviour::new().with_echo_lag(3));
     pair.wide = true;
     pair.until("off", |pair| pair.axis.state() == AxisState::Off);
     pair.axis.ask(monitor(0x07)).unwrap();
@@ -203,7 +203,7 @@ fn requests_are_released_by_the_echo() {
     }
     assert_eq!((answered, echoed), ([true; 2], [true; 2]));
     // The echo of the normal command never comes.
-    let mut pair = Pair::new(ActiveCode::CyclicPosition, Behaviour::POLITE);
+    let mut pair = Pair::new(ActiveCode::CyclicPosition, Behaviour::new());
     pair.wide = true;
     pair.until("off", |pair| pair.axis.state() == AxisState::Off);
     pair.axis.ask(monitor(0x07)).unwrap();
@@ -271,7 +271,7 @@ fn which_refusals_count() {
 /// A motion that has ended and was not taken yet leaves the set-point alone.
 #[test]
 fn a_motion_that_is_over_is_over() {
-    let mut pair = Pair::on(ActiveCode::ProfilePosition, Behaviour::POLITE);
+    let mut pair = Pair::on(ActiveCode::ProfilePosition, Behaviour::new());
     pair.axis.start_move(0x11, 30_000, 2_000_000).unwrap();
     pair.until("ended", |pair| pair.axis.profile().unwrap().stage() == MoveStage::Ended);
     pair.until("at the target", |pair| pair.drive.position() == 30_000);
@@ -290,7 +290,7 @@ fn a_motion_that_is_over_is_over() {
 /// The time that a procedure has left is that of its present request.
 #[test]
 fn what_is_left_of_a_limit() {
-    let mut pair = Pair::new(ActiveCode::CyclicPosition, Behaviour::POLITE.with_echo_lag(2));
+    let mut pair = Pair::new(ActiveCode::CyclicPosition, Behaviour::new().with_echo_lag(2));
     pair.until("off", |pair| pair.axis.state() == AxisState::Off);
     let mut text = ReadText::new(TypeCode::short(0x01));
     let left: Vec<_> = (0..6)
@@ -309,7 +309,7 @@ fn what_is_left_of_a_limit() {
 /// What a motion with a latch sends: code 17h with type, Latch_Sel1, Monitor_Sel and speed, which may change.
 #[test]
 fn what_a_motion_sends() {
-    let mut pair = Pair::on(ActiveCode::ProfilePosition, Behaviour::POLITE);
+    let mut pair = Pair::on(ActiveCode::ProfilePosition, Behaviour::new());
     pair.axis.start_move_with_latch(0x11, 3_000_000, 1_000, Nibble::new(3).unwrap(), 0x09).unwrap();
     pair.until("moving", |pair| pair.axis.profile().unwrap().is_moving());
     let block = |pair: &Pair| pair.axis.send(Turn::Valid(pair.counter.last().next())).main.emit();
@@ -423,7 +423,7 @@ fn which_flags_end_a_homing() {
         status.remove(StatusFlags::IN_PROGRESS);
     };
     for (spoil, ends) in [(keep, true), (complete, true), (still, true), (neither, false)] {
-        let mut pair = Pair::on(ActiveCode::ProfilePosition, Behaviour::POLITE);
+        let mut pair = Pair::on(ActiveCode::ProfilePosition, Behaviour::new());
         let mut home = Home::new(0xc8, 1_000);
         let mut ended = Progress::Pending { left: 0 };
         for _ in 0..2_000 {
@@ -446,7 +446,7 @@ fn which_flags_end_a_homing() {
 /// Arming that is refused fails at once.
 #[test]
 fn a_latch_that_cannot_be_armed() {
-    let mut pair = Pair::on(ActiveCode::CyclicPosition, Behaviour::POLITE);
+    let mut pair = Pair::on(ActiveCode::CyclicPosition, Behaviour::new());
     let mut latch = Latch::first(0xee, Nibble::ZERO, 300);
     let refused = Progress::Failed { error: Failure::CommandError(ErrorCode(0x31)) };
     assert_eq!(pair.run(|axis| latch.receive(axis)), refused);
@@ -475,8 +475,8 @@ fn servo_off_after_a_command() {
 /// A servo-off at any time is a servo-off: the block of an axis that an alarm has stopped.
 #[test]
 fn an_alarm_is_answered_with_servo_off() {
-    let mut pair = Pair::on(ActiveCode::CyclicPosition, Behaviour::POLITE);
-    pair.drive.raise(Alarm { main: 16, sub: 0 });
+    let mut pair = Pair::on(ActiveCode::CyclicPosition, Behaviour::new());
+    pair.drive.set_fault(Fault::Alarm(Alarm { main: 16, sub: 0 }));
     (0..3).for_each(|_| pair.update());
     let block = pair.axis.send(Turn::Valid(pair.counter.last().next())).main.emit();
     assert!(CommandBlock::of(&block).unwrap().is_servo_off());

@@ -29,7 +29,7 @@ fn a_block_that_was_thrown_away_refuses_nothing() {
     // A motion of which one block is damaged at any time is made, and made once.
     for damaged in 0..15 {
         for bit in [0x01, 0x80] {
-            let mut pair = Pair::on(ActiveCode::ProfilePosition, Behaviour::POLITE);
+            let mut pair = Pair::on(ActiveCode::ProfilePosition, Behaviour::new());
             let start = pair.actual();
             pair.axis.start_move(0x11, 5_000, 2_000_000).unwrap();
             let mut ended = None;
@@ -42,7 +42,7 @@ fn a_block_that_was_thrown_away_refuses_nothing() {
         }
     }
     // Sub_Chk = 0 in one block: the sub-command is asked for again.
-    let mut pair = Pair::new(ActiveCode::CyclicPosition, Behaviour::POLITE);
+    let mut pair = Pair::new(ActiveCode::CyclicPosition, Behaviour::new());
     pair.wide = true;
     pair.until("off", |pair| pair.axis.can_switch_on().is_ok());
     pair.axis.ask_sub(SubCode::Monitor, 0x07, 0).unwrap();
@@ -52,7 +52,7 @@ fn a_block_that_was_thrown_away_refuses_nothing() {
         pair.sent = pair.counter.next();
         let mut bytes = pair.axis.send(pair.sent).emit();
         bytes[16] ^= if now == 1 { 0x80 } else { 0 };
-        pair.received = Response32::parse_strict(&pair.drive.exchange32(&bytes)).into();
+        pair.received = Response32::parse_strict(&pair.drive.hear(&bytes).unwrap()).into();
         outcome = outcome.or(pair.axis.take_sub_outcome());
     }
     assert!(matches!(outcome, Some(Progress::Done { .. })), "{outcome:?}");
@@ -64,7 +64,7 @@ fn update_with(pair: &mut Pair, damage: u8) {
     pair.sent = pair.counter.next();
     let mut main = pair.axis.send(pair.sent).main.emit();
     main[0] ^= damage;
-    pair.received = Response::parse_strict(&pair.drive.exchange(&main)).into();
+    pair.received = Response::parse_strict(&pair.drive.hear(&main).unwrap()).into();
 }
 
 /// One flip in the address of any block while the position is being set: it is set once, and said to be.
@@ -72,7 +72,7 @@ fn update_with(pair: &mut Pair, damage: u8) {
 fn a_damaged_block_does_not_spoil_a_request() {
     for damaged in 0..12 {
         for bit in [0x01, 0x80] {
-            let mut pair = Pair::new(ActiveCode::CyclicPosition, Behaviour::POLITE);
+            let mut pair = Pair::new(ActiveCode::CyclicPosition, Behaviour::new());
             pair.until("off", |pair| pair.axis.can_switch_on().is_ok());
             pair.axis.ask(set_position(0x21, 123_456)).unwrap();
             let mut outcome = None;
@@ -147,7 +147,7 @@ fn an_answer_is_not_taken_twice() {
         let index = Pr { class: 7, number: 25 }.index();
         NonCyclicCommand::Parameter(Arguments { type_code: TypeCode::short(0x11), index, data })
     };
-    let mut pair = Pair::new(ActiveCode::CyclicPosition, Behaviour::POLITE);
+    let mut pair = Pair::new(ActiveCode::CyclicPosition, Behaviour::new());
     pair.until("off", |pair| pair.axis.state() == AxisState::Off);
     pair.axis.ask(write(1)).unwrap();
     let old = answer(&mut pair, |axis| axis.take_outcome().is_some());
@@ -160,7 +160,7 @@ fn an_answer_is_not_taken_twice() {
     pair.axis.clear();
     assert!(matches!(pair.ask(write(0)), Progress::Done { .. }));
     // A controller that starts anew meets what it has asked before.
-    let mut pair = Pair::new(ActiveCode::CyclicPosition, Behaviour::POLITE);
+    let mut pair = Pair::new(ActiveCode::CyclicPosition, Behaviour::new());
     pair.axis.ask(write(0)).unwrap();
     hears(&mut pair, old, 40);
     assert_eq!(pair.axis.take_outcome(), None);
@@ -169,7 +169,7 @@ fn an_answer_is_not_taken_twice() {
 /// The same of a sub-command.
 #[test]
 fn a_sub_answer_is_not_taken_twice() {
-    let mut pair = Pair::new(ActiveCode::CyclicPosition, Behaviour::POLITE);
+    let mut pair = Pair::new(ActiveCode::CyclicPosition, Behaviour::new());
     pair.wide = true;
     pair.until("off", |pair| pair.axis.state() == AxisState::Off);
     pair.axis.ask_sub(SubCode::Monitor, 0x07, 0).unwrap();
@@ -180,7 +180,7 @@ fn a_sub_answer_is_not_taken_twice() {
     assert_eq!(pair.axis.take_sub_outcome(), None);
     hears(&mut pair, old, 40);
     assert_eq!(pair.axis.take_sub_outcome(), Some(Progress::Failed { error: Failure::TimedOut }));
-    let mut pair = Pair::new(ActiveCode::CyclicPosition, Behaviour::POLITE);
+    let mut pair = Pair::new(ActiveCode::CyclicPosition, Behaviour::new());
     pair.axis.ask_sub(SubCode::Monitor, 0x07, 0).unwrap();
     hears(&mut pair, old, 40);
     assert_eq!(pair.axis.take_sub_outcome(), None);
@@ -278,7 +278,7 @@ fn a_position_has_an_age() {
 /// Each reason for which a servo stays off.
 #[test]
 fn a_servo_that_is_not_switched_on_says_why() {
-    let mut pair = Pair::new(ActiveCode::CyclicPosition, Behaviour::POLITE);
+    let mut pair = Pair::new(ActiveCode::CyclicPosition, Behaviour::new());
     assert_eq!(pair.axis.switch_on(), Err(SwitchOnError::State(AxisState::Starting)));
     pair.until("off", |pair| pair.axis.can_switch_on().is_ok());
     pair.axis.ask(set_position(0x21, 5)).unwrap();

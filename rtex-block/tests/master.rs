@@ -13,10 +13,10 @@ mod common;
 use core::num::NonZeroU16;
 
 use common::{CODES, LIMIT, limits};
-use rtex_block::device::{Drive, DriveConfig};
+use rtex_block::device::{Drive, DriveConfig, Fault};
 use rtex_block::master::{
-    ActiveCode, Asic, Axis, AxisConfig, AxisState, Fault, Led, Master, MasterConfig, MoveStage, Order, Phase, Ring,
-    RingFailure, SameMacId, SetupError, Slave, StopPolicy, StopReason,
+    ActiveCode, Asic, Axis, AxisConfig, AxisState, ControlError, ControlPhase, Led, Master, MasterConfig, MoveStage,
+    Order, Ring, RingFailure, SameMacId, SetupError, Slave, StopPolicy, StopReason,
 };
 use rtex_block::pack::SizeMismatch;
 use rtex_block::timing::{A6N, Periods, TimerSystem};
@@ -72,10 +72,10 @@ impl Bench {
 
     fn start(&mut self) {
         self.master.control(Asic::Initial, None);
-        assert_eq!(self.master.control(Asic::Ready, Some(&table())), Phase::Prepare);
+        assert_eq!(self.master.control(Asic::Ready, Some(&table())), ControlPhase::Prepare);
         self.update();
-        assert_eq!(self.master.control(Asic::Ready, None), Phase::Start);
-        assert_eq!(self.master.control(Asic::Running, None), Phase::Running);
+        assert_eq!(self.master.control(Asic::Ready, None), ControlPhase::Start);
+        assert_eq!(self.master.control(Asic::Running, None), ControlPhase::Running);
     }
 
     fn block(&self, place: usize) -> [u8; 16] {
@@ -91,11 +91,11 @@ impl Bench {
         self.master.exchange_words16(&self.rx, &mut self.tx, 0).unwrap();
         for place in 0..2 {
             if self.cut[place] {
-                self.drives[place].miss();
+                self.drives[place].framing_error();
                 continue;
             }
             let block = self.block(place);
-            let response = self.drives[place].exchange(&block);
+            let response = self.drives[place].hear(&block).unwrap();
             for k in 0..8 {
                 self.rx[place * 8 + k] = u16::from(response[2 * k + 1]) << 8 | u16::from(response[2 * k]);
             }
@@ -139,19 +139,19 @@ fn what_cannot_be_set_up() {
 fn from_reset_to_running() {
     let mut bench = Bench::new(config(BlockSize::Bytes16), ADDRESSES.map(axis));
     bench.rx = [0xffff; 16];
-    assert_eq!((bench.master.phase(), bench.master.led(0)), (Phase::Init, Led::Off));
+    assert_eq!((bench.master.phase(), bench.master.led(0)), (ControlPhase::Init, Led::Off));
     bench.update();
     assert_eq!((bench.block(0)[..4].to_vec(), bench.block(1)[..4].to_vec()), (vec![4, 0, 0, 0], vec![17, 0, 0, 0]));
-    assert_eq!(bench.master.control(Asic::RingConfig, None), Phase::Waiting);
+    assert_eq!(bench.master.control(Asic::RingConfig, None), ControlPhase::Waiting);
     // Nothing is prepared by an exchange in an earlier phase.
-    assert_eq!(bench.master.control(Asic::Ready, Some(&table())), Phase::Prepare);
-    assert_eq!(bench.master.control(Asic::Ready, None), Phase::Prepare);
+    assert_eq!(bench.master.control(Asic::Ready, Some(&table())), ControlPhase::Prepare);
+    assert_eq!(bench.master.control(Asic::Ready, None), ControlPhase::Prepare);
     assert_eq!(
         [0, 499, 500, 999, 1_000].map(|t| bench.master.led(t)),
         [Led::Green, Led::Green, Led::Off, Led::Off, Led::Green]
     );
     bench.update();
-    assert_eq!(bench.master.control(Asic::Ready, None), Phase::Start);
+    assert_eq!(bench.master.control(Asic::Ready, None), ControlPhase::Start);
     assert!(!bench.master.is_running());
     bench.master.control(Asic::Running, None);
     assert!(bench.master.is_running());
@@ -161,19 +161,19 @@ fn from_reset_to_running() {
         counters.push((bench.block(1)[0] >> 5, bench.block(1)[1]));
     }
     assert_eq!(counters, [(0, 0), (0, 0), (1, 0x20), (2, 0x20), (3, 0x20), (0, 0x20)]);
-    assert_eq!((bench.master.led(700), bench.master.fault()), (Led::Green, None));
+    assert_eq!((bench.master.led(700), bench.master.error()), (Led::Green, None));
 }
 
 #[test]
 fn slaves_that_are_not_in_the_table() {
     let turned = [table()[1], table()[0]];
-    for (order, fault) in [(Order::Ring, Some(Fault::SlaveInfoMismatch)), (Order::Any, None)] {
+    for (order, fault) in [(Order::Ring, Some(ControlError::SlaveInfoMismatch)), (Order::Any, None)] {
         let mut bench = Bench::new(config(BlockSize::Bytes16).with_order(order), ADDRESSES.map(axis));
         bench.master.control(Asic::Initial, None);
         bench.master.control(Asic::Ready, Some(&turned));
-        assert_eq!(bench.master.fault(), fault);
+        assert_eq!(bench.master.error(), fault);
         bench.master.clear();
-        assert_eq!(bench.master.fault(), fault);
+        assert_eq!(bench.master.error(), fault);
         assert_eq!(bench.master.led(700) == Led::Red, fault.is_some());
     }
 }
@@ -210,8 +210,8 @@ fn a_wrong_order_is_said_as_such() {
         Some(RingFailure { place: 0, reason: StopReason::WrongMacId(mac_id(17)) })
     );
     assert_eq!(
-        (bench.master.fault(), bench.master.led(0), bench.master.led(600)),
-        (Some(Fault::Timeout), Led::Red, Led::Off)
+        (bench.master.error(), bench.master.led(0), bench.master.led(600)),
+        (Some(ControlError::Timeout), Led::Red, Led::Off)
     );
 }
 
@@ -230,7 +230,7 @@ fn the_receive_watchdog() {
         assert_eq!(bench.state(0), AxisState::On);
     }
     bench.master.exchange_words16(&bench.rx, &mut bench.tx, 0).unwrap();
-    assert_eq!(bench.master.fault(), Some(Fault::Timeout));
+    assert_eq!(bench.master.error(), Some(ControlError::Timeout));
     for place in 0..2 {
         assert_eq!(bench.state(place), AxisState::Stopped(StopReason::ReceiveTimeout));
         assert!(CommandBlock::of(&bench.block(place)).unwrap().is_servo_off());
@@ -238,7 +238,7 @@ fn the_receive_watchdog() {
     // Receptions again, and clearing: the ring can be switched on.
     bench.update();
     bench.master.clear();
-    assert_eq!(bench.master.fault(), None);
+    assert_eq!(bench.master.error(), None);
     bench.until("on", |bench| {
         bench.master.ring_mut().switch_on().ok();
         bench.master.ring().all_are(AxisState::On)
@@ -263,7 +263,7 @@ fn alarm_beside(mode: ActiveCode, policy: StopPolicy) -> Bench {
         }
         bench.update();
     }
-    bench.drives[0].raise(Alarm { main: 16, sub: 0 });
+    bench.drives[0].set_fault(Fault::Alarm(Alarm { main: 16, sub: 0 }));
     bench.until("axis 0 stopped", |bench| {
         let moved = &mut bench.master.ring_mut().axes_mut()[1];
         if mode == ActiveCode::CyclicPosition && moved.state() == AxisState::On {

@@ -13,7 +13,7 @@
 
 use core::num::NonZeroU16;
 
-use rtex_block::device::{Drive, DriveConfig, OpenCodes};
+use rtex_block::device::{Drive, DriveConfig, Fault, OpenCodes};
 use rtex_block::master::{ActiveCode, Axis, AxisConfig, AxisState, Heard, Limits, Ring};
 use rtex_block::position::step;
 use rtex_block::{Alarm, Command, CommandBlock, MacId, Response};
@@ -100,12 +100,12 @@ impl Bench {
                 _ => {}
             }
             if self.lines[k] == Line::Cut {
-                self.drives[k].miss();
+                self.drives[k].framing_error();
                 self.responses[k] = Heard::Nothing;
                 continue;
             }
             let before = self.drives[k].position();
-            let mut response = self.drives[k].exchange(&command);
+            let mut response = self.drives[k].hear(&command).unwrap();
             assert!(step(before, self.drives[k].position()).abs() <= 60_000, "axis {k} jumps at {}", self.now);
             if self.lines[k] == Line::WrongMac {
                 response[0] ^= 1;
@@ -160,7 +160,7 @@ impl Bench {
         self.lines = [Line::Good; AXES];
         for drive in &mut self.drives {
             drive.clear_alarm();
-            drive.set_main_power(true);
+            drive.set_fault(Fault::None);
         }
         self.ring.clear();
         self.switch_on();
@@ -217,8 +217,8 @@ fn after_every_fault_every_servo_is_off_in_time() {
             continue;
         }
         match kind {
-            3 => bench.drives[k].raise(Alarm { main: 16, sub: 0 }),
-            4 => bench.drives[k].set_main_power(false),
+            3 => bench.drives[k].set_fault(Fault::Alarm(Alarm { main: 16, sub: 0 })),
+            4 => bench.drives[k].set_fault(Fault::NoMainPower),
             5 => bench.lines[k] = Line::Deaf,
             6 => bench.lines[k] = Line::Cut,
             7 => bench.lines = [Line::Cut; AXES],

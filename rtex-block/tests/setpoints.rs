@@ -20,7 +20,7 @@ use rtex_block::{Alarm, Arguments, ErrorCode, MacId, NonCyclicCommand, TypeCode}
 /// Feed-forward goes out while the servo is on, with every command that does not need bytes 12-15 itself, and no longer.
 #[test]
 fn feed_forward_lives_with_the_servo() {
-    let mut pair = Pair::new(ActiveCode::CyclicPosition, Behaviour::POLITE);
+    let mut pair = Pair::new(ActiveCode::CyclicPosition, Behaviour::new());
     pair.until("off", |pair| pair.axis.state() == AxisState::Off);
     let select = Arguments { type_code: TypeCode::short(0x11), index: 0x0723, data: 2 };
     let _ = pair.ask(NonCyclicCommand::Parameter(select));
@@ -54,7 +54,7 @@ fn feed_forward_lives_with_the_servo() {
 /// on the drive holds the position that it was sent last.
 #[test]
 fn the_set_point_follows_while_switching_on() {
-    let mut pair = Pair::new(ActiveCode::CyclicPosition, Behaviour::POLITE);
+    let mut pair = Pair::new(ActiveCode::CyclicPosition, Behaviour::new());
     pair.until("off", |pair| pair.axis.can_switch_on().is_ok());
     pair.axis.switch_on().unwrap();
     for turned in (1_000..).step_by(1_000) {
@@ -103,7 +103,7 @@ fn limits_of_set_points() {
             // The drive has the same limit, by its own reckoning.
             let mut block = pair.axis.send(Turn::Valid(pair.counter.last().next())).main;
             block.command_data1 = largest * 2 + 1;
-            pair.drive.exchange(&block.emit());
+            pair.drive.hear(&block.emit()).unwrap();
             assert_eq!(pair.drive.alarm(), Some(Alarm { main: 27, sub: 4 }));
         }
     }
@@ -129,7 +129,7 @@ fn every_change_of_mode() {
     let modes = [CyclicPosition, ProfilePosition, CyclicVelocity, CyclicTorque];
     for from in modes {
         for to in modes {
-            let mut pair = Pair::new(CyclicPosition, Behaviour::POLITE.with_echo_lag(2));
+            let mut pair = Pair::new(CyclicPosition, Behaviour::new().with_echo_lag(2));
             pair.until("off", |pair| pair.axis.state() == AxisState::Off);
             let _ = pair.ask(set_position(0x21, 700_000));
             pair.switch_on();
@@ -141,7 +141,7 @@ fn every_change_of_mode() {
             assert_eq!((pair.drive.position(), pair.drive.alarm()), (700_000, None), "{from:?} {to:?}");
         }
     }
-    let mut pair = Pair::on(ProfilePosition, Behaviour::POLITE);
+    let mut pair = Pair::on(ProfilePosition, Behaviour::new());
     pair.axis.start_move(0x11, 100_000, 1_000_000).unwrap();
     assert_eq!(pair.axis.set_mode(CyclicPosition), Err(SetpointError::Busy));
     pair.axis.switch_off();

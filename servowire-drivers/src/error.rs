@@ -1,6 +1,6 @@
 use servowire_core::ClockError;
 
-/// Why a call failed. `IO` is the error of the UART, `PIN` that of the direction pin, `P` that of the protocol, and
+/// Why a call failed. `IO` is the error of the port (a UART, an SPI, the bus of an ASIC), `PIN` that of the direction pin, `P` that of the protocol, and
 /// `D` its doubts about a position.
 ///
 /// After any of them the next call begins with a clean line: it waits until nobody can be talking any more and throws away
@@ -9,8 +9,8 @@ use servowire_core::ClockError;
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum Error<IO, PIN, P, D> {
-    /// The UART reports a fault: noise, framing, overrun. The exchange is lost.
-    #[error("the UART reports a fault")]
+    /// The port reports a fault: of a UART noise, framing or overrun. The exchange is lost.
+    #[error("the port reports a fault")]
     Io(IO),
     /// The direction pin does.
     #[error("the direction pin reports a fault")]

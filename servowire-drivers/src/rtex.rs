@@ -7,14 +7,14 @@
 //! ```text
 //!             external timer                              internal timer
 //!  main loop  control() until it gives Running, then interrupts on; control() and led() for ever
-//!  XINTRX     priority above: reception.frame(), then     priority below: reception.frame()
+//!  XINTRX     priority above: frames.add(), then     priority below: frames.add()
 //!             switch the reception bank
 //!  NC         from the host's timer: exchange()           from the falling edge of XSYNC: exchange()
 //! ```
 //!
 //! In the external-timer system the receive interrupt may switch the reception bank in the middle of an exchange, in the
 //! internal-timer system the ASIC does at XSYNC if the exchange is late; half of the blocks would be of another frame. So the
-//! exchange looks at [`Reception`] and at the clock before and after it reads, and reads once more if the bank was switched between;
+//! exchange looks at [`FrameCount`] and at the clock before and after it reads, and reads once more if the bank was switched between;
 //! if it was again, it takes none. System Design Guide for Master, chapters 1 and 2.
 //!
 //! Every block that the port fails to read or to write is tried again at once. If that fails too, what was not read counts as a
@@ -22,23 +22,23 @@
 
 #[cfg(feature = "async")]
 pub mod asynch;
+mod frame_count;
 mod port;
-mod reception;
 
 use core::convert::Infallible;
 
-use rtex_block::master::{Asic, Axis, Fault, Heard, Led, Master, Phase, Ring, Slave};
+use rtex_block::master::{Asic, Axis, ControlError, ControlPhase, Heard, Led, Master, Ring, Slave};
 use rtex_block::timing::TimerSystem;
 use rtex_block::{BlockSize, Command32, Evidence, MacId, Response, Response32};
 use servowire_core::{ClockCheck, ClockError};
 
 use crate::clock::MAX_LOOKS;
 use crate::{Clock, Error};
+pub use frame_count::FrameCount;
 pub use port::{Port, Word};
-pub use reception::Reception;
 
 /// Why a call of a [`Driver`] failed.
-pub type Failure<P> = Error<<P as Port>::Error, Infallible, Fault, Infallible>;
+pub type Failure<P> = Error<<P as Port>::Error, Infallible, ControlError, Infallible>;
 
 /// Words of the longest block, on a bus of bytes.
 const MOST_WORDS: usize = rtex_block::LEN32;
@@ -51,13 +51,24 @@ fn twice<E>(mut transfer: impl FnMut() -> Result<(), E>) -> Result<(), E> {
 }
 
 /// What an exchange was like.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Exchanged {
     /// Communication periods by which the commands go out late, because the exchange ended after the next frame had begun.
     pub frames_late: u32,
     /// The bank was switched while the blocks were read, each time: none of them was taken.
     pub torn: bool,
+}
+
+/// What a [`Driver`] was made of.
+#[derive(Debug)]
+pub struct Released<P, C, const N: usize> {
+    /// The port of the ASIC.
+    pub port: P,
+    /// The clock.
+    pub clock: C,
+    /// The master.
+    pub master: Master<N>,
 }
 
 /// A master of `N` axes, and the port of its ASIC.
@@ -67,8 +78,8 @@ pub struct Driver<'r, P, C, const N: usize> {
     clock: C,
     check: ClockCheck,
     master: Master<N>,
-    reception: &'r Reception,
-    /// Frames of `reception` that the master has heard of.
+    received: &'r FrameCount,
+    /// Frames of `received` that the master has heard of.
     frames: u32,
     late: u32,
     torn: u32,
@@ -78,15 +89,15 @@ pub struct Driver<'r, P, C, const N: usize> {
 }
 
 impl<'r, P: Port, C: Clock, const N: usize> Driver<'r, P, C, N> {
-    /// A driver in PH_INIT. The receive interrupt has the same `reception`.
-    pub fn new(port: P, clock: C, master: Master<N>, reception: &'r Reception) -> Self {
+    /// A driver in PH_INIT. The receive interrupt has the same `received`.
+    pub fn new(port: P, clock: C, master: Master<N>, received: &'r FrameCount) -> Self {
         Self {
             port,
             clock,
             check: ClockCheck::new(MAX_LOOKS),
             master,
-            reception,
-            frames: reception.frames(),
+            received,
+            frames: received.get(),
             late: 0,
             torn: 0,
             #[cfg(feature = "async")]
@@ -95,8 +106,8 @@ impl<'r, P: Port, C: Clock, const N: usize> Driver<'r, P, C, N> {
     }
 
     /// Gives port, clock and master back.
-    pub fn release(self) -> (P, C, Master<N>) {
-        (self.port, self.clock, self.master)
+    pub fn release(self) -> Released<P, C, N> {
+        Released { port: self.port, clock: self.clock, master: self.master }
     }
 
     /// The master, for reading.
@@ -130,24 +141,24 @@ impl<'r, P: Port, C: Clock, const N: usize> Driver<'r, P, C, N> {
         self.master.ring().axes().get(place).map_or(Evidence::NEVER, Axis::evidence)
     }
 
-    /// One turn of the main loop. Until it gives [`Phase::Running`] interrupts stay off; it writes the first transmit data itself.
+    /// One turn of the main loop. Until it gives [`ControlPhase::Running`] interrupts stay off; it writes the first transmit data itself.
     ///
     /// # Errors
     /// [`Error::Protocol`] with the fault of the phases; [`Error::Io`]; [`Error::Clock`].
-    pub fn control(&mut self) -> Result<Phase, Failure<P>> {
+    pub fn control(&mut self) -> Result<ControlPhase, Failure<P>> {
         let asic = self.port.state().map_err(Error::Io)?;
         let mut table = [Slave { mac_id: MacId::truncate(0), kind: 0 }; MacId::COUNT];
         let found = match (self.master.phase(), asic) {
-            (Phase::Waiting, Asic::Ready) => self.port.slaves(&mut table).map_err(Error::Io)?,
+            (ControlPhase::Waiting, Asic::Ready) => self.port.slaves(&mut table).map_err(Error::Io)?,
             _ => None,
         };
         let phase = self.master.control(asic, found.map(|count| table.get(..count).unwrap_or(&table)));
-        if phase == Phase::Prepare {
+        if phase == ControlPhase::Prepare {
             let now_ns = self.now_ns()?;
             let commands = self.master.exchange(&[Heard::Nothing; N], now_ns);
             self.write(&commands).map_err(Error::Io)?;
         }
-        match self.master.fault() {
+        match self.master.error() {
             Some(fault) => Err(Error::Protocol(fault)),
             None => Ok(phase),
         }
@@ -157,11 +168,11 @@ impl<'r, P: Port, C: Clock, const N: usize> Driver<'r, P, C, N> {
     ///
     /// # Errors
     /// As [`control`](Self::control).
-    pub fn start(&mut self, limit_ns: u64) -> Result<Phase, Failure<P>> {
+    pub fn start(&mut self, limit_ns: u64) -> Result<ControlPhase, Failure<P>> {
         let until_ns = self.now_ns()?.saturating_add(limit_ns);
         loop {
             let phase = self.control()?;
-            if phase == Phase::Running || self.now_ns()? >= until_ns {
+            if phase == ControlPhase::Running || self.now_ns()? >= until_ns {
                 return Ok(phase);
             }
         }
@@ -179,7 +190,7 @@ impl<'r, P: Port, C: Clock, const N: usize> Driver<'r, P, C, N> {
             self.began_ns = Some(began_ns);
         }
         let read = self.read(began_ns);
-        let frames = self.reception.frames();
+        let frames = self.received.get();
         if frames != self.frames {
             self.frames = frames;
             self.master.frame_received();
@@ -224,7 +235,7 @@ impl<'r, P: Port, C: Clock, const N: usize> Driver<'r, P, C, N> {
     /// What is another one after each switch of the reception bank: the receive interrupt switches it, or XSYNC.
     fn bank(&mut self, began_ns: u64) -> Result<u32, ClockError> {
         match self.master.config().timer {
-            TimerSystem::External => Ok(self.reception.frames()),
+            TimerSystem::External => Ok(self.received.get()),
             TimerSystem::Internal => self.frames_since(began_ns),
         }
     }

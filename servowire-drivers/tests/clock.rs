@@ -17,7 +17,7 @@ use rtex_block::master::{ActiveCode, Asic, Axis, AxisConfig, Limits, Master as H
 use rtex_block::timing::{Periods, TimerSystem};
 use rtex_block::{BlockSize, MacId};
 use servowire_drivers::nikon::{Frame, blocking::FramePort, blocking::Master};
-use servowire_drivers::rtex::{Driver, Port, Reception};
+use servowire_drivers::rtex::{Driver, FrameCount, Port};
 use servowire_drivers::tformat::blocking::Encoder;
 use servowire_drivers::{Automatic, Clock, ClockError, CounterClock, Direction, Error, TickRate};
 
@@ -148,7 +148,7 @@ fn tformat() {
             });
         };
     }
-    let (resolution, policy) = (tformat::Resolution::new(23, 16).unwrap(), tformat::Policy::STRICT);
+    let (resolution, policy) = (tformat::Resolution::new(23, 16).unwrap(), tformat::Policy::new(1_000_000));
     holds!("read_position", |e: &mut Encoder<_, _, _>| e.read_position(resolution, policy));
     holds!("read_all", |e: &mut Encoder<_, _, _>| e.read_all());
     holds!("clear_errors", |e: &mut Encoder<_, _, _>| e.clear_errors());
@@ -209,7 +209,7 @@ impl Port for Stuck<'_> {
     }
 }
 
-static RECEPTION: Reception = Reception::new();
+static RECEIVED: FrameCount = FrameCount::new();
 
 fn host() -> Host<1> {
     let periods = Periods::from_a6n(-1, 1, Some(500_000)).unwrap();
@@ -224,7 +224,7 @@ fn host() -> Host<1> {
 fn rtex() {
     holds("start", |clock| {
         let writes = Cell::new(0);
-        let mut driver = Driver::new(Stuck(&writes), || clock.look(), host(), &RECEPTION);
+        let mut driver = Driver::new(Stuck(&writes), || clock.look(), host(), &RECEIVED);
         std::array::from_fn(|_| driver.start(1_000_000).err())
     });
 }
@@ -233,7 +233,7 @@ fn rtex() {
 #[test]
 fn rtex_commands_go_out_whatever_the_clock_says() {
     let (writes, now_ns) = (Cell::new(0), Cell::new(5_000_000));
-    let mut driver = Driver::new(Stuck(&writes), || now_ns.get(), host(), &RECEPTION);
+    let mut driver = Driver::new(Stuck(&writes), || now_ns.get(), host(), &RECEIVED);
     assert_eq!(driver.exchange(5_000_000).map(|exchanged| exchanged.frames_late), Ok(0));
     now_ns.set(4_000_000);
     let error = driver.exchange(5_500_000).unwrap_err();

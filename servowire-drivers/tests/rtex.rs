@@ -23,7 +23,8 @@ use std::num::NonZeroU16;
 use asic::{AXES, Bus, COM_NS, Drawn, Ring, SWITCHES, Shared, Watch};
 use rtex_block::device::Drive;
 use rtex_block::master::{
-    ActiveCode, Axis, AxisConfig, AxisState, Fault, Limits, Master, MasterConfig, Phase, RingFailure, Slave, StopReason,
+    ActiveCode, Axis, AxisConfig, AxisState, ControlError, ControlPhase, Limits, Master, MasterConfig, RingFailure,
+    Slave, StopReason,
 };
 use rtex_block::timing::{Periods, TimerSystem};
 use rtex_block::{BlockSize, MacId, Policy};
@@ -56,7 +57,10 @@ fn driver<W: Drawn>(ring: &Shared) -> Rtex<W> {
 fn update<W: Drawn>(
     ring: &Shared,
     driver: &mut Rtex<W>,
-) -> Result<servowire_drivers::rtex::Exchanged, Error<(), std::convert::Infallible, Fault, std::convert::Infallible>> {
+) -> Result<
+    servowire_drivers::rtex::Exchanged,
+    Error<(), std::convert::Infallible, ControlError, std::convert::Infallible>,
+> {
     let began_ns = {
         let mut ring = ring.borrow_mut();
         let periods = if ring.external { 2 } else { 1 };
@@ -88,7 +92,7 @@ fn position<W: Drawn, C: servowire_drivers::Clock>(
 
 fn on<W: Drawn>(ring: &Shared) -> Rtex<W> {
     let mut driver = driver::<W>(ring);
-    assert_eq!(driver.start(1_000_000), Ok(Phase::Running));
+    assert_eq!(driver.start(1_000_000), Ok(ControlPhase::Running));
     for _ in 0..400 {
         if driver.ring_mut().switch_on().is_ok() {
             break;
@@ -153,7 +157,7 @@ fn other_slaves_than_in_the_table_are_a_fault() {
     let ring = Ring::new(false, false);
     ring.borrow_mut().found[1].kind = 2;
     let mut driver = driver::<u16>(&ring);
-    assert_eq!(driver.start(1_000_000), Err(Error::Protocol(Fault::SlaveInfoMismatch)));
+    assert_eq!(driver.start(1_000_000), Err(Error::Protocol(ControlError::SlaveInfoMismatch)));
 }
 
 #[test]
@@ -161,7 +165,7 @@ fn a_ring_that_does_not_close_is_waited_for_so_long() {
     let ring = Ring::new(false, false);
     ring.borrow_mut().found = [Slave { mac_id: MacId::truncate(1), kind: 0 }; AXES];
     let mut driver = driver::<u16>(&ring);
-    assert_eq!(driver.start(100), Ok(Phase::Waiting));
+    assert_eq!(driver.start(100), Ok(ControlPhase::Waiting));
 }
 
 /// The bank is switched in the middle of the exchange, after any access, by the receive interrupt or by XSYNC because the exchange is
@@ -235,7 +239,7 @@ fn silence_switches_every_servo_off() {
         }
         let RingFailure { reason, .. } = driver.master().ring().failure().unwrap();
         assert!(matches!(reason, StopReason::EchoTimeout | StopReason::ReceiveTimeout), "{reason}");
-        assert_eq!(driver.control(), Err(Error::Protocol(Fault::Timeout)));
+        assert_eq!(driver.control(), Err(Error::Protocol(ControlError::Timeout)));
         // The ring is back: all are switched on again.
         ring.borrow_mut().lose_frames = 0;
         for drive in &mut ring.borrow_mut().drives {
@@ -384,7 +388,7 @@ mod asynch {
         for k in 0..20 {
             pin.lost = k % 5 == 4;
             ring.borrow_mut().let_in();
-            let (began, exchanged) = run(driver.next(&mut pin), FOR_EVER).unwrap().unwrap();
+            let Period { began, exchanged } = run(driver.next(&mut pin), FOR_EVER).unwrap().unwrap();
             assert_eq!(began, if k % 5 == 4 { Began::Clock } else { Began::Edge });
             assert!(!exchanged.torn);
             assert_eq!(driver.master().ring().failure(), None);
@@ -407,7 +411,7 @@ mod asynch {
                 (pin.lost, pin.late_ns) = (lost, late_ns);
                 ring.borrow_mut().read_of.clear();
                 ring.borrow_mut().stall_in = Some((at as u32, COM_NS - late_ns + 3_000));
-                let (_, exchanged) = run(driver.next(&mut pin), FOR_EVER).unwrap().unwrap();
+                let Period { exchanged, .. } = run(driver.next(&mut pin), FOR_EVER).unwrap().unwrap();
                 ring.borrow_mut().stall_in = None;
                 let read = std::mem::take(&mut ring.borrow_mut().read_of);
                 let taken = &read[read.len() - words..];
@@ -431,7 +435,7 @@ mod asynch {
         for polls in 0.. {
             move_on(&mut driver);
             let first = run(driver.next(&mut pin), polls);
-            let (began, exchanged) = run(driver.next(&mut pin), FOR_EVER).unwrap().unwrap();
+            let Period { began, exchanged } = run(driver.next(&mut pin), FOR_EVER).unwrap().unwrap();
             assert_eq!((began, exchanged.frames_late, exchanged.torn), (Began::Edge, 0, false), "after {polls} polls");
             is_well(&ring, &driver, &polls);
             if first.is_some() {
@@ -484,7 +488,7 @@ mod asynch {
                 }
                 let outcome = run(driver.next(&mut pin), polls);
                 // An edge that came while nobody waited has the same consequence as a late exchange.
-                let missed = outcome.map_or(1, |result| result.map_or(0, |(_, exchanged)| exchanged.frames_late));
+                let missed = outcome.map_or(1, |result| result.map_or(0, |period| period.exchanged.frames_late));
                 pin.lost = false;
                 heal(&ring);
                 for _ in 0..2 + missed {

@@ -7,13 +7,13 @@ use service::{Service, SubService};
 
 use super::config::{AxisConfig, StopPolicy};
 use super::counter::Turn;
+use super::counters::Counters;
 use super::echo::EchoWatch;
 use super::heard::Heard;
 use super::profile_move::ProfileMove;
 use super::progress::{Failure, Progress};
 use super::servo_off::{ActiveCode, ServoOff};
 use super::state::{AxisState, StopReason, SwitchOnError};
-use crate::Counters;
 use crate::command::Command;
 use crate::control::ControlBits;
 use crate::error::Error;

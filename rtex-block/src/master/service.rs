@@ -7,7 +7,7 @@ use super::counter::Turn;
 use super::echo::ReceiveWatchdog;
 use super::heard::Heard;
 use super::led::{Led, led};
-use super::phase::{Asic, Fault, Inputs, Phase, PhaseControl};
+use super::phase::{Asic, ControlError, ControlPhase, Inputs, PhaseControl};
 use super::ring::{Ring, SameMacId};
 use super::slaves::{Order, Slave, compare};
 use super::state::StopReason;
@@ -128,7 +128,7 @@ impl<const N: usize> Master<N> {
 
     /// One turn of the main loop: the state of the ASIC, and the slaves that the ring configuration found, once they are
     /// known.
-    pub fn control(&mut self, asic: Asic, found: Option<&[Slave]>) -> Phase {
+    pub fn control(&mut self, asic: Asic, found: Option<&[Slave]>) -> ControlPhase {
         let slave_info = found.map(|found| compare(&self.table, found, self.config.order));
         let timeout = self.is_timed_out();
         self.phases.step(Inputs { asic, slave_info, tx_ready: self.prepared, timeout });
@@ -137,22 +137,22 @@ impl<const N: usize> Master<N> {
 
     /// Whether cyclic communication runs: only now interrupts are let in.
     pub fn is_running(&self) -> bool {
-        self.phases.phase() == Phase::Running
+        self.phases.phase() == ControlPhase::Running
     }
 
     /// The phase.
-    pub const fn phase(&self) -> Phase {
+    pub const fn phase(&self) -> ControlPhase {
         self.phases.phase()
     }
 
-    /// The fault of the phases.
-    pub const fn fault(&self) -> Option<Fault> {
-        self.phases.fault()
+    /// Why the phases have stopped, if they have.
+    pub const fn error(&self) -> Option<ControlError> {
+        self.phases.error()
     }
 
     /// What the COM LED shows `t_ms` after the start of a lit half-period.
     pub fn led(&self, t_ms: u64) -> Led {
-        led(self.phases.phase(), self.phases.fault(), t_ms)
+        led(self.phases.phase(), self.phases.error(), t_ms)
     }
 
     /// How it was set up.
@@ -182,7 +182,7 @@ impl<const N: usize> Master<N> {
     /// The exchange, with blocks that are decoded already and were heard until `end_ns`.
     pub fn exchange(&mut self, heard: &[Heard; N], end_ns: u64) -> [Command32; N] {
         if !self.is_running() {
-            self.prepared |= self.phases.phase() == Phase::Prepare;
+            self.prepared |= self.phases.phase() == ControlPhase::Prepare;
             return self.ring.axes().each_ref().map(|axis| axis.send(Turn::Invalid));
         }
         if self.watchdog.as_mut().is_some_and(ReceiveWatchdog::tick) {

@@ -61,7 +61,9 @@ impl Pair {
     pub fn new(mode: ActiveCode, behaviour: Behaviour) -> Self {
         let mac_id = MacId::new(9).unwrap();
         let config = AxisConfig::new(mac_id, mode, 500_000, limits());
-        Self::with(config, DriveConfig::new(mac_id, CODES).with_behaviour(behaviour))
+        let mut pair = Self::with(config, DriveConfig::new(mac_id, CODES));
+        pair.drive.set_behaviour(behaviour);
+        pair
     }
 
     pub fn on(mode: ActiveCode, behaviour: Behaviour) -> Self {
@@ -88,9 +90,9 @@ impl Pair {
             assert_eq!(off, !self.axis.state().is_servo_on(), "{}", self.axis.state());
         }
         self.received = if self.wide {
-            Response32::parse_strict(&self.drive.exchange32(&command.emit())).into()
+            Response32::parse_strict(&self.drive.hear(&command.emit()).unwrap()).into()
         } else {
-            Response::parse_strict(&self.drive.exchange(&main)).into()
+            Response::parse_strict(&self.drive.hear(&main).unwrap()).into()
         };
     }
 

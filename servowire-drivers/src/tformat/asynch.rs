@@ -51,7 +51,7 @@ impl<U: Read + Write, D: Direction, T: Timer> Encoder<U, D, T> {
     /// [`Error`], [`Error::Doubt`] among them.
     pub async fn read_position(&mut self, resolution: Resolution, policy: Policy) -> Result<Sample, Failure<U, D>> {
         let exchange = self.transact(Request::ReadAll).await?;
-        exchange.evidence(resolution).at(self.timer.now_ns(), policy).map_err(Error::Doubt)
+        exchange.evidence(resolution).at(self.state.now_ns(&mut self.timer)?, policy).map_err(Error::Doubt)
     }
 
     /// ID 3: position, turns, encoder ID and alarms. Look at the alarms before you use the position.

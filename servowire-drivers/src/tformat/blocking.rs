@@ -45,7 +45,7 @@ impl<U: Read + ReadReady + Write, D: Direction, C: Clock> Encoder<U, D, C> {
     /// [`Error`], [`Error::Doubt`] among them.
     pub fn read_position(&mut self, resolution: Resolution, policy: Policy) -> Result<Sample, Failure<U, D>> {
         let exchange = self.transact(Request::ReadAll)?;
-        exchange.evidence(resolution).at(self.clock.now_ns(), policy).map_err(Error::Doubt)
+        exchange.evidence(resolution).at(self.state.now_ns(&mut self.clock)?, policy).map_err(Error::Doubt)
     }
 
     /// ID 3: position, turns, encoder ID and alarms. Look at the alarms before you use the position.

@@ -6,16 +6,13 @@ use nom::IResult;
 use rtex_block::device::{self, Drive, DriveConfig, OpenCodes};
 use rtex_block::inspect::{self, Report};
 use rtex_block::master::{
-    ActiveCode, Asic, Axis, AxisConfig, CommandCounter, EchoWatch, Expected, Fault, Handshake, Inputs, Led, Limits,
-    Order, Phase, PhaseControl, ProfileMove, Progress, Heard, Reception, Ring, ServoOff, Slave, SlaveInfo, Turn,
+    ActiveCode, Asic, Axis, AxisConfig, CommandCounter, EchoWatch, Expected, ControlError, Handshake, Inputs, Led, Limits,
+    Order, ControlPhase, PhaseControl, ProfileMove, Progress, Heard, Acknowledgement, Checked, Ring, ServoOff, Slave, SlaveInfo, Turn,
     compare, led,
 };
 use rtex_block::position::{self, Gear};
 use rtex_block::timing::{FrameTime, Periods, timer_reload};
-use rtex_block::{
-    Arguments, BlockSize, Code, Command, Command32, CommandBlock, CyclicCode, Doubt, Error, MacId, NonCyclicCommand,
-    NonCyclicResponse, Response, Response32, ResponseBlock, SubCommand, TypeCode, UpdateCounter, pack, stream,
-};
+use rtex_block::{Arguments, BlockSize, Code, Command, Command32, CommandBlock, CyclicCode, Doubt, Error, MacId, NonCyclicCommand, NonCyclicResponse, Policy, Response, Response32, ResponseBlock, Sample, SubCommand, TypeCode, UpdateCounter, pack, stream};
 
 use super::kernels;
 use crate::self_test::rtex::{COMMANDS, Command16, RESPONSES, Response16};
@@ -61,6 +58,8 @@ const HANDSHAKE: Handshake =
         Some(handshake) => handshake,
         None => panic!("a monitor command has an answer"),
     };
+
+const POLICY: Policy = Policy::new(1_000_000);
 
 const DRIVE: Drive = Drive::new(DriveConfig::new(MAC_ID, OpenCodes::INVENTED));
 
@@ -145,7 +144,7 @@ kernels! {
     } over [BLOCK32];
 
     /// The checks of a master.
-    fn rtex_master_check((expected, block): &(Expected, [u8; 16])) -> Result<(Response, Reception), Error> {
+    fn rtex_master_check((expected, block): &(Expected, [u8; 16])) -> Result<Checked, Error> {
         expected.check(block)
     } over [(EXPECTED, NORMAL), (EXPECTED, MONITOR)];
 
@@ -211,22 +210,22 @@ kernels! {
     } over [([axis(5), axis(6), axis(7), axis(8)], [Heard::Main(RESPONSE); 4])];
 
     /// An exchange with the drive model.
-    fn rtex_drive((drive, command): &(Drive, Command)) -> [u8; 16] {
+    fn rtex_drive((drive, command): &(Drive, Command)) -> Option<[u8; 16]> {
         let mut drive = *drive;
-        drive.exchange(&command.emit())
+        drive.hear(&command.emit())
     } over [(DRIVE, COMMAND), (DRIVE, ASKING)];
 
     /// A step of the phases.
-    fn rtex_phase(inputs: &Inputs) -> (Phase, Option<Fault>) {
+    fn rtex_phase(inputs: &Inputs) -> (ControlPhase, Option<ControlError>) {
         let mut control = PhaseControl::new();
         control.step(*inputs);
-        (control.phase(), control.fault())
+        (control.phase(), control.error())
     } over [Inputs { asic: Asic::Initial, slave_info: None, tx_ready: false, timeout: false }];
 
     /// What the COM LED shows.
-    fn rtex_led((phase, fault, t_ms): &(Phase, Option<Fault>, u64)) -> Led {
+    fn rtex_led((phase, fault, t_ms): &(ControlPhase, Option<ControlError>, u64)) -> Led {
         led(*phase, *fault, *t_ms)
-    } over [(Phase::Prepare, None, 1_700), (Phase::Running, Some(Fault::Timeout), 20_000)];
+    } over [(ControlPhase::Prepare, None, 1_700), (ControlPhase::Running, Some(ControlError::Timeout), 20_000)];
 
     /// The slaves found against the table.
     fn rtex_slaves(found: &[Slave; 4]) -> SlaveInfo {
