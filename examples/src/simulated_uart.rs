@@ -93,9 +93,9 @@ impl Write for Uart<'_> {
             let now_ns = self.0.pass(FIELD_NS);
             let mut line = self.0.line.borrow_mut();
             line.put(now_ns, *byte);
-            if let Some(sent) = self.0.encoder.borrow_mut().byte(*byte, now_ns) {
+            if let Some(sent) = self.0.encoder.borrow_mut().hear(&[*byte], now_ns) {
                 for (k, byte) in (1..).zip(sent.frame.as_bytes()) {
-                    line.put(sent.at_ns.wrapping_add(FIELD_NS.wrapping_mul(k)), *byte);
+                    line.put(sent.start_ns.wrapping_add(FIELD_NS.wrapping_mul(k)), *byte);
                 }
             }
         }

@@ -250,8 +250,8 @@ pub fn device(data: &[u8]) {
             continue;
         }
         for answer in encoders.frame(u16::from_le_bytes([event[0], event[1]]), now_ns).into_iter().flatten() {
-            let (got, want) = answer.raw.crc();
-            assert_eq!(got, want);
+            let crc = answer.raw.crc();
+            assert_eq!(crc.got, crc.want);
             assert!(answer.at_ns > now_ns && answer.line == answer.raw.line());
             assert!(RawResponse::from_line(Layout::Abs17, answer.line).is_ok());
         }
@@ -275,8 +275,8 @@ pub fn inspect(mut data: &[u8]) {
     let line = Window::from_bits(u128::from_le_bytes(bytes), len).expect("128 bits at most");
     let report = report(request, Resolution::default(), line);
     let parsed = Response::parse_line(&request.expected(Resolution::default()), line);
-    assert_eq!(report.error, parsed.err());
-    assert_eq!(report.error.is_none(), report.response.is_some() && report.cause.is_none());
-    assert!(parsed.is_err() || report.findings.is_empty());
-    assert!(report.error.is_none() || !report.findings.is_empty());
+    assert_eq!(report.error(), parsed.err());
+    assert_eq!(report.error().is_none(), report.response().is_some() && report.cause().is_none());
+    assert!(parsed.is_err() || report.findings().is_empty());
+    assert!(report.error().is_none() || !report.findings().is_empty());
 }

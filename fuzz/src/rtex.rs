@@ -4,7 +4,7 @@ use core::num::NonZeroU16;
 
 use rtex_block::device::{Drive, DriveConfig, OpenCodes};
 use rtex_block::inspect::inspect;
-use rtex_block::master::{ActiveCode, Axis, AxisConfig, AxisState, Limits, Received, Ring};
+use rtex_block::master::{ActiveCode, Axis, AxisConfig, AxisState, Limits, Heard, Ring};
 use rtex_block::{
     Alarm, Command, Command32, CommandBlock, ControlBits, Error, MacId, NonCyclicCode, NonCyclicCommand,
     NonCyclicResponse, Response, Response32, stream,
@@ -152,7 +152,7 @@ pub fn ring(mut data: &[u8]) {
     };
     let mut ring = Ring::new([axis(0), axis(1)], 2).expect("two addresses");
     let mut drives = [drive(0), drive(1)];
-    let mut responses = [Received::Nothing; 2];
+    let mut responses = [Heard::Nothing; 2];
     let mut started = false;
     for _ in 0..256 {
         if data.is_empty() {
@@ -161,7 +161,7 @@ pub fn ring(mut data: &[u8]) {
         let (event, argument) = (byte(&mut data), byte(&mut data));
         let place = usize::from(event >> 4 & 1);
         act(event & 15, argument, &mut ring, place, &mut drives[place]);
-        let commands = ring.update(&responses);
+        let commands = ring.update(&responses, 0);
         for (k, command) in commands.iter().enumerate() {
             let mut sent = command.main.emit();
             let view = CommandBlock::of(&sent).expect("a command");
@@ -171,7 +171,7 @@ pub fn ring(mut data: &[u8]) {
             responses[k] = match event & 15 {
                 1 if k == place => {
                     drives[k].miss();
-                    Received::Nothing
+                    Heard::Nothing
                 }
                 2 if k == place => {
                     sent[usize::from(argument >> 3 & 15)] ^= 1 << (argument & 7);
@@ -193,7 +193,7 @@ fn act(event: u8, argument: u8, ring: &mut Ring<2>, place: usize, drive: &mut Dr
     let [first, second] = ring.axes_mut();
     let axis = if place == 0 { first } else { second };
     match event {
-        4 => _ = ring.switch_on(),
+        4 => _ = ring.switch_on().ok(),
         5 => ring.switch_off(),
         6 => ring.clear(),
         7 => drive.raise(Alarm { main: argument, sub: 0 }),
@@ -210,7 +210,7 @@ fn act(event: u8, argument: u8, ring: &mut Ring<2>, place: usize, drive: &mut Dr
 }
 
 /// With a good line, no alarms and power, every axis comes on within its limits.
-fn recover(ring: &mut Ring<2>, drives: &mut [Drive; 2], mut responses: [Received; 2]) {
+fn recover(ring: &mut Ring<2>, drives: &mut [Drive; 2], mut responses: [Heard; 2]) {
     for round in 0..120 {
         if round % 60 == 0 {
             for drive in drives.iter_mut() {
@@ -219,8 +219,8 @@ fn recover(ring: &mut Ring<2>, drives: &mut [Drive; 2], mut responses: [Received
             }
             ring.clear();
         }
-        ring.switch_on();
-        let commands = ring.update(&responses);
+        ring.switch_on().ok();
+        let commands = ring.update(&responses, 0);
         for (k, command) in commands.iter().enumerate() {
             responses[k] = Response::parse(&drives[k].exchange(&command.main.emit())).into();
         }

@@ -71,6 +71,12 @@ impl Extra {
         edge_register(self.0 % 8)
     }
 
+    /// From the falling edge to the end of the window, in ns rounded up.
+    pub(crate) const fn low_ns(self) -> u64 {
+        // 40/3 ns an eighth.
+        ((self.0.wrapping_neg() % 8) as u64 * 40).div_ceil(3)
+    }
+
     /// The samples of the last bit as they are on the line.
     const fn last_bit(self) -> u8 {
         if self.0 % 8 == 0 { 0xff } else { self.edge_register() }
@@ -167,7 +173,7 @@ impl Head {
     ///
     /// # Errors
     /// [`Error::Truncated`], [`Error::Framing`], and [`Error::InvalidWord`] for a parameter word that is in no table.
-    pub fn parse(line: Window) -> Result<Received, Error> {
+    pub fn parse(line: Window) -> Result<ParsedHead, Error> {
         let bits = line.bits();
         let truncated = |want: u32| Error::Truncated { got: low16(line.len()), want: low16(want) };
         if line.len() < Self::BITS {
@@ -185,14 +191,14 @@ impl Head {
         let (at, [low, high, ..]) = (extra.wrapping_add(16), (bits >> extra.wrapping_add(16)).to_le_bytes());
         let word = Word::truncate(u16::from_le_bytes([low, high]));
         let byte = ParameterByte::decode(word).ok_or(Error::InvalidWord { word: word.get() })?;
-        Ok(Received { byte, extra_bits: extra, len: at.wrapping_add(Word::BITS) })
+        Ok(ParsedHead { byte, extra_bits: extra, len: at.wrapping_add(Word::BITS) })
     }
 }
 
 /// What an encoder reads from the head of an H-frame.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub struct Received {
+pub struct ParsedHead {
     /// The parameter byte.
     pub byte: ParameterByte,
     /// Bits of the EXTRA window; 0 free running.

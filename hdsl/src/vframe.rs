@@ -69,8 +69,8 @@ impl SafeBlock {
         status
     }
 
-    /// The position as received, good or not.
-    pub const fn raw_position(self) -> u64 {
+    /// VPOS or VPOS2 as received, good or not.
+    pub const fn raw_vpos(self) -> u64 {
         let [_, p4, p3, p2, p1, p0, ..] = self.bytes;
         u64::from_be_bytes([0, 0, 0, p4, p3, p2, p1, p0])
     }
@@ -93,16 +93,17 @@ impl SafeBlock {
 
     /// Whether words and CRC are good; whether the encoder has a position is another matter.
     pub fn is_sound(self) -> bool {
-        matches!(self.position(), Ok(_) | Err(Error::PositionInvalid { .. }))
+        matches!(self.vpos(), Ok(_) | Err(Error::PositionInvalid { .. }))
     }
 
-    /// The safe position, 40 bits.
+    /// VPOS or VPOS2, 40 bits, as a number without a sign. For a position to use there is
+    /// [`Master::safe`](crate::master::Master::safe).
     ///
     /// # Errors
     /// In this order: [`Error::Truncated`] before all eight words are there, [`Error::InvalidWord`] for the first bad word,
     /// [`Error::Crc`], [`Error::PositionInvalid`] if the encoder has no position: five K29.7 in channel 1,
     /// K27.7 first in channel 2. By [`Rule::Reduced`] the value of the top byte alone decides that.
-    pub const fn position(self) -> Result<u64, Error> {
+    pub const fn vpos(self) -> Result<u64, Error> {
         if self.len != 8 {
             return Err(Error::Truncated { got: self.len as u16, want: 8 });
         }
@@ -117,7 +118,7 @@ impl SafeBlock {
             let [_, mark, ..] = self.bytes;
             return Err(Error::PositionInvalid { mark });
         }
-        Ok(self.raw_position())
+        Ok(self.raw_vpos())
     }
 }
 
@@ -197,15 +198,15 @@ mod tests {
             let mut bits = answers(b1, b2);
             let read = |bits: &[u64; 8]| VFrame::of(Rule::Strict, &bits.map(|b| Answer::from_bits(Rule::Strict, b)));
             let good = read(&bits);
-            prop_assert_eq!((good.safe1.position(), good.safe1.status()), (Ok(p1), summary));
-            prop_assert_eq!((good.safe2.position(), good.safe2.status()), (Ok(p2), 0x9c));
+            prop_assert_eq!((good.safe1.vpos(), good.safe1.status()), (Ok(p1), summary));
+            prop_assert_eq!((good.safe2.vpos(), good.safe2.status()), (Ok(p2), 0x9c));
             bits[frame] ^= 1 << (bit + if second { 51 } else { 0 });
             let bad = read(&bits);
             let (hit, other) = if second { (bad.safe2, bad.safe1) } else { (bad.safe1, bad.safe2) };
-            prop_assert!(other.position().is_ok());
+            prop_assert!(other.vpos().is_ok());
             // A flip of one line bit changes up to five bits of one byte: in the covered bytes the CRC sees it, and
             // a changed kind (data or special) of the same value changes nothing.
-            if let Ok(position) = hit.position() {
+            if let Ok(position) = hit.vpos() {
                 prop_assert_eq!(position, if second { p2 } else { p1 });
             }
         }
@@ -220,12 +221,12 @@ mod tests {
         let bits = answers(b1, b2);
         for rule in [Rule::Strict, Rule::Reduced] {
             let frame = VFrame::of(rule, &bits.map(|b| Answer::from_bits(rule, b)));
-            assert_eq!(frame.safe1.position(), Err(Error::PositionInvalid { mark: 0xfd }));
-            assert_eq!(frame.safe2.position(), Err(Error::PositionInvalid { mark: 0xfb }));
+            assert_eq!(frame.safe1.vpos(), Err(Error::PositionInvalid { mark: 0xfd }));
+            assert_eq!(frame.safe2.vpos(), Err(Error::PositionInvalid { mark: 0xfb }));
         }
         // A signed position may begin with FDh: by the tables that is no mark.
         let bits = answers(block(Character::data(0), data(0xfd_0000_0001)), b2);
-        let frame = |rule| VFrame::of(rule, &bits.map(|b| Answer::from_bits(rule, b))).safe1.position();
+        let frame = |rule| VFrame::of(rule, &bits.map(|b| Answer::from_bits(rule, b))).safe1.vpos();
         assert_eq!(frame(Rule::Strict), Ok(0xfd_0000_0001));
         assert_eq!(frame(Rule::Reduced), Err(Error::PositionInvalid { mark: 0xfd }));
     }

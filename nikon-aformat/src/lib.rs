@@ -50,7 +50,7 @@ pub use layout::{FRAME_BITS, Layout};
 pub use nrz_line::{BitOrder, Window};
 pub use number::{EncoderAddress, EncoderId, U10, U17, U19, U40, UserAddress};
 pub use operation::Operation;
-pub use raw_response::RawResponse;
+pub use raw_response::{Crc, RawResponse};
 pub use request::{Frames, Request};
 pub use resolution::{Position, Resolution};
 pub use response::{Body, Response};

@@ -22,6 +22,17 @@ pub struct RawResponse {
     frames: u8,
 }
 
+/// The CRC-8 of a response.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct Crc {
+    /// As it was received.
+    pub got: u8,
+    /// As it was computed over the content bits before it.
+    pub want: u8,
+}
+
 impl RawResponse {
     /// Most frames of a response.
     pub const MAX_FRAMES: usize = MAX_FRAMES as usize;
@@ -88,13 +99,13 @@ impl RawResponse {
         }
     }
 
-    /// The received CRC-8 and the one computed over the content bits before it.
-    pub fn crc(&self) -> (u8, u8) {
+    /// The CRC-8, received and computed.
+    pub fn crc(&self) -> Crc {
         let bytes = bytes(self.contents);
         let len = usize::from(self.frames).wrapping_mul(2);
         let got = bytes.get(len.wrapping_sub(1)).copied().unwrap_or(0);
         let covered = bytes.get(..len.wrapping_sub(1)).unwrap_or(&bytes);
-        (got.reverse_bits(), mirrored(covered).reverse_bits())
+        Crc { got: got.reverse_bits(), want: mirrored(covered).reverse_bits() }
     }
 
     /// The frames of all content bits but the CRC-8, the first of the line in bit 0; the CRC-8 is added.
@@ -109,7 +120,7 @@ impl RawResponse {
 
     /// The frames with the CRC-8 that their other bits demand.
     pub(crate) fn sealed(mut self) -> Self {
-        let (_, crc) = self.crc();
+        let crc = self.crc().want;
         if let Some(last) = self.contents.get_mut(usize::from(self.frames).wrapping_sub(1)) {
             *last = *last & 0xff | u16::from(crc.reverse_bits()) << 8;
         }

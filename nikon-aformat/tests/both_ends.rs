@@ -310,7 +310,7 @@ proptest! {
             now_ns += pause;
             if framed {
                 for answer in encoders.frame(content, now_ns).into_iter().flatten() {
-                    prop_assert_eq!(answer.raw.crc().0, answer.raw.crc().1);
+                    prop_assert_eq!(answer.raw.crc().got, answer.raw.crc().want);
                 }
             } else {
                 encoders.framing_error(now_ns);

@@ -10,9 +10,14 @@ use rtex_block::device::{Behaviour, Drive, DriveConfig, OpenCodes};
 use rtex_block::master::procedure::{
     AlarmAttributes, AlarmHistory, Backup, ClearAlarm, ClearableIf, Home, Latch, ReadText, Restore, SetPosition,
 };
-use rtex_block::master::{ActiveCode, Axis, AxisConfig, AxisState, CommandCounter, Limits, Progress, Received, Turn};
+use rtex_block::master::{ActiveCode, Axis, AxisConfig, AxisState, CommandCounter, Heard, Limits, Progress, Turn};
 use rtex_block::type_code::{Pr, monitor, parameter, profile, system_id};
-use rtex_block::{Alarm, Arguments, ControlBits, MacId, Nibble, NonCyclicCommand, Response32, StatusFlags, SubCode};
+use rtex_block::{
+    Alarm, Arguments, ControlBits, MacId, Nibble, NonCyclicCommand, Policy, Response32, StatusFlags, SubCode,
+};
+
+/// An update period.
+const UPDATE_NS: u64 = 500_000;
 
 /// An axis, its drive, and a perfect line between them, in blocks of 32 bytes.
 struct Machine {
@@ -20,16 +25,24 @@ struct Machine {
     drive: Drive,
     counter: CommandCounter,
     sent: Turn,
-    received: Received,
+    received: Heard,
+    now_ns: u64,
 }
 
 impl Machine {
     /// One update period.
     fn update(&mut self) {
-        self.axis.receive(self.sent, &self.received);
+        self.now_ns += UPDATE_NS;
+        self.axis.hear(self.sent, &self.received, self.now_ns);
         self.sent = self.counter.next();
         let command = self.axis.send(self.sent);
         self.received = Response32::parse(&self.drive.exchange32(&command.emit())).into();
+    }
+
+    /// The actual position, if it is good for control: at most one update period old.
+    fn position(&self) -> Result<i32, String> {
+        let sample = self.axis.evidence().at(self.now_ns, Policy::new(UPDATE_NS));
+        sample.map(|sample| sample.position()).map_err(|doubt| doubt.to_string())
     }
 
     fn until(&mut self, done: impl Fn(&Self) -> bool) -> Result<(), String> {
@@ -63,8 +76,8 @@ impl Machine {
     }
 
     fn switch_on(&mut self) -> Result<(), String> {
-        self.until(|machine| machine.axis.can_switch_on())?;
-        self.axis.switch_on();
+        self.until(|machine| machine.axis.can_switch_on().is_ok())?;
+        self.axis.switch_on().map_err(|error| error.to_string())?;
         self.until(|machine| machine.axis.state() == AxisState::On)
     }
 }
@@ -80,7 +93,8 @@ fn main() -> Result<(), String> {
         drive: Drive::new(DriveConfig::new(mac_id, OpenCodes::INVENTED).with_behaviour(behaviour)),
         counter: CommandCounter::new(4),
         sent: Turn::Invalid,
-        received: Received::Nothing,
+        received: Heard::Nothing,
+        now_ns: 0,
     };
     machine.until(|machine| machine.axis.state() == AxisState::Off)?;
     set_up(&mut machine)?;
@@ -136,11 +150,7 @@ fn by_the_host(machine: &mut Machine) -> Result<(), String> {
             fastest = fastest.max(value.data1);
         }
     }
-    println!(
-        "latched {:?}, at most {fastest} command units/s, now at {}",
-        latch.caught(),
-        machine.axis.actual_position()
-    );
+    println!("latched {:?}, at most {fastest} command units/s, now at {}", latch.caught(), machine.position()?);
     machine.axis.set_feed_forward(0).map_err(|error| error.to_string())?;
     let deviation = Arguments { type_code: monitor::PERR, index: 0, data: 0 };
     println!("deviation {}", machine.ask(NonCyclicCommand::Monitor(deviation))?);
@@ -151,13 +161,13 @@ fn by_the_host(machine: &mut Machine) -> Result<(), String> {
 fn by_the_drive(machine: &mut Machine) -> Result<(), String> {
     machine.axis.set_mode(ActiveCode::ProfilePosition).map_err(|error| error.to_string())?;
     machine.axis.start_move(profile::RELATIVE, 100_000, 1_000_000).map_err(|error| error.to_string())?;
-    machine.until(|machine| machine.axis.actual_position() > 150_000)?;
+    machine.until(|machine| machine.position().is_ok_and(|position| position > 150_000))?;
     machine.axis.set_move_speed(200_000).map_err(|error| error.to_string())?;
     let ended = machine.run(|axis| axis.take_move().unwrap_or(Progress::Pending { left: 0 }))?;
-    println!("motion ended at {}, in position: {}", machine.axis.actual_position(), ended.in_position);
+    println!("motion ended at {}, in position: {}", machine.position()?, ended.in_position);
     let mut home = Home::new(OpenCodes::INVENTED.homing, 4_000);
     machine.run(|axis| home.receive(axis))?;
-    println!("homed, {} from the origin", machine.axis.actual_position());
+    println!("homed, {} from the origin", machine.position()?);
     machine.until(|machine| machine.axis.can_ask())
 }
 
@@ -169,8 +179,7 @@ fn at_a_speed(machine: &mut Machine) -> Result<(), String> {
     for speed in [500_000, -500_000, 0] {
         machine.axis.set_rate(speed).map_err(|error| error.to_string())?;
         (0..200).for_each(|_| machine.update());
-        let position = machine.axis.position(2).map_err(|doubt| doubt.to_string())?;
-        println!("at {position} with {speed} command units/s");
+        println!("at {} with {speed} command units/s", machine.position()?);
     }
     Ok(())
 }

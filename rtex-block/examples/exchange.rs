@@ -6,7 +6,7 @@ use core::num::NonZeroU16;
 
 use rtex_block::device::{Drive, DriveConfig, OpenCodes};
 use rtex_block::inspect::inspect;
-use rtex_block::master::{ActiveCode, Axis, AxisConfig, AxisState, Limits, Received, Ring, SameMacId};
+use rtex_block::master::{ActiveCode, Axis, AxisConfig, AxisState, Heard, Limits, Ring, SameMacId};
 use rtex_block::{Command32, MacId, Response};
 
 fn main() -> Result<(), SameMacId> {
@@ -17,10 +17,10 @@ fn main() -> Result<(), SameMacId> {
     let mut ring = Ring::new([axis], 2)?;
     let mut drive =
         Drive::new(DriveConfig::new(mac_id, OpenCodes::INVENTED).with_sync_exchanges(4).with_servo_on_updates(2));
-    let mut received = Received::Nothing;
+    let mut received = Heard::Nothing;
     let mut before = None;
-    for _ in 0..16 {
-        let [Command32 { main: command, .. }] = ring.update(&[received]);
+    for period in 0..16 {
+        let [Command32 { main: command, .. }] = ring.update(&[received], period * 500_000);
         let block = drive.exchange(&command.emit());
         received = Response::parse(&block).into();
 
@@ -39,7 +39,9 @@ fn main() -> Result<(), SameMacId> {
         }
         before = Some(report);
 
-        ring.switch_on();
+        if ring.all_are(AxisState::Off) {
+            ring.switch_on().unwrap_or_else(|refused| println!("{refused}"));
+        }
         let [axis] = ring.axes_mut();
         if axis.state() == AxisState::On {
             let next = axis.setpoint().wrapping_add(1_000);

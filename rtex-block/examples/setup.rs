@@ -46,9 +46,9 @@ fn memory() -> Result<(), Box<dyn Error>> {
     let config = MasterConfig::new(BlockSize::Bytes32, periods, TimerSystem::Internal);
     let mut master = Master::new(config, [Slave { mac_id, kind: 1 }], [axis])?;
     let (mut bytes, mut words16, mut words32) = ([0; 32], [0; 16], [0; 8]);
-    master.exchange_bytes(&[0; 32], &mut bytes)?;
-    master.exchange_words16(&[0; 16], &mut words16)?;
-    master.exchange_words32(&[0; 8], &mut words32)?;
+    master.exchange_bytes(&[0; 32], &mut bytes, 0)?;
+    master.exchange_words16(&[0; 16], &mut words16, 0)?;
+    master.exchange_words32(&[0; 8], &mut words32, 0)?;
     println!("{:04x} {:08x}", words16[0], words32[0]);
     // Where another processor wrote the bytes, its memory is turned in place.
     let mut image16 = words16.map(u16::to_le);

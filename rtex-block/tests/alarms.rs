@@ -15,7 +15,7 @@ use core::cell::Cell;
 use common::{CODES, Pair, alarm};
 use rtex_block::device::Behaviour;
 use rtex_block::master::procedure::{AlarmAttributes, AlarmHistory, Attributes, ClearAlarm, ClearableIf, Clearing};
-use rtex_block::master::{ActiveCode, AxisState, Failure, Progress, Received, StopReason};
+use rtex_block::master::{ActiveCode, AxisState, Failure, Heard, Progress, StopReason};
 use rtex_block::{Alarm, ErrorCode, Execution, NonCyclicResponse, Response, StatusFlags, TypeCode};
 
 const ALARM: Alarm = Alarm { main: 38, sub: 1 };
@@ -177,8 +177,7 @@ fn clearing_without_an_answer() {
     let (ended, commands, _) = clear(&mut stopped(Behaviour::POLITE.with_alarm_stays(true)), 0xc4, no_answer);
     assert_eq!((ended, commands), (timed_out, 1));
     // No block comes any more: before the command, or after its answer.
-    let (ended, commands, within) =
-        clear(&mut stopped(Behaviour::POLITE), 0xc4, |pair| pair.received = Received::Nothing);
+    let (ended, commands, within) = clear(&mut stopped(Behaviour::POLITE), 0xc4, |pair| pair.received = Heard::Nothing);
     assert_eq!((ended, commands, within), (timed_out, 0, LIMIT + 1));
     for behaviour in [Behaviour::POLITE, Behaviour::POLITE.with_alarm_stays(true)] {
         let mut pair = stopped(behaviour.with_status_late([0, 0, 0, 0, 0, 3, 0, 0]));
@@ -186,7 +185,7 @@ fn clearing_without_an_answer() {
             if pair.axis.can_ask() || pair.received.response().is_some_and(|response| response.code.get() == 0x25) {
                 return;
             }
-            pair.received = Received::Nothing;
+            pair.received = Heard::Nothing;
         });
         assert_eq!((ended, commands), (timed_out, 1), "{behaviour:?}");
     }
@@ -195,7 +194,7 @@ fn clearing_without_an_answer() {
     let (ended, commands, _) = clear(&mut stopped(Behaviour::POLITE.with_refuses_to_clear(true)), 0xc4, |pair| {
         let response = pair.received.response().map(Response::noncyclic);
         if failed.get() {
-            pair.received = Received::Nothing;
+            pair.received = Heard::Nothing;
         }
         failed
             .set(failed.get() || response.and_then(|it| it.execution()).is_some_and(|it| it.contains(Execution::ERR)));
@@ -203,5 +202,5 @@ fn clearing_without_an_answer() {
     assert_eq!((ended, commands, failed.get()), (timed_out, 1, true));
     // An axis whose drive has not answered yet knows of no alarm, nor that there is none.
     let mut pair = Pair::new(ActiveCode::CyclicPosition, Behaviour::POLITE);
-    assert_eq!(clear(&mut pair, 0xc4, |pair| pair.received = Received::Nothing).0, timed_out);
+    assert_eq!(clear(&mut pair, 0xc4, |pair| pair.received = Heard::Nothing).0, timed_out);
 }

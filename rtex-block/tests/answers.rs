@@ -16,8 +16,8 @@ use common::{CODES, Pair, limits, monitor};
 use rtex_block::device::{Behaviour, DriveConfig};
 use rtex_block::master::procedure::{Home, Latch, ReadText};
 use rtex_block::master::{
-    ActiveCode, Axis, AxisConfig, AxisState, Failure, Handshake, Limits, MoveStage, ProfileMove, Progress, Received,
-    Ring, ServoOff, StopPolicy, StopReason, SubHandshake, Turn,
+    ActiveCode, Axis, AxisConfig, AxisState, Failure, Handshake, Heard, Limits, MoveStage, ProfileMove, Progress, Ring,
+    ServoOff, StopPolicy, StopReason, SubHandshake, Turn,
 };
 use rtex_block::{
     Alarm, Command, CommandBlock, ControlBits, CyclicCode, ErrorCode, MacId, Nibble, NonCyclicCommand, Response,
@@ -104,11 +104,11 @@ fn switching_off_without_a_response() {
     pair.switch_on();
     pair.axis.switch_off();
     for _ in 0..5 {
-        pair.received = Received::Nothing;
+        pair.received = Heard::Nothing;
         pair.update();
         assert_eq!(pair.axis.state(), AxisState::SwitchingOff);
     }
-    pair.received = Received::Nothing;
+    pair.received = Heard::Nothing;
     pair.update();
     assert_eq!(pair.axis.state(), AxisState::Stopped(StopReason::InactiveTimeout));
 }
@@ -190,7 +190,7 @@ fn requests_are_released_by_the_echo() {
     let mut echoed = [false; 2];
     for _ in 0..40 {
         // What the axis is about to receive.
-        if let Received::Both(response) = pair.received {
+        if let Heard::Both(response) = pair.received {
             echoed[0] |= answered[0] && response.main.code.get() == 0x20;
             echoed[1] |= answered[1] && response.sub.code.get() == 0x00;
         }
@@ -212,7 +212,7 @@ fn requests_are_released_by_the_echo() {
     let mut free = [None; 2];
     for _ in 0..200 {
         pair.update();
-        if let Received::Both(Response32 { main, sub }) = &mut pair.received {
+        if let Heard::Both(Response32 { main, sub }) = &mut pair.received {
             (main.code, sub.code) = (rtex_block::Code::truncate(0x2a), Nibble::new(0x0a).unwrap());
             let mut block = Response32 { main: *main, sub: *sub }.emit();
             // As long as it is asked the answers are the drive's own.
@@ -257,13 +257,13 @@ fn which_refusals_count() {
     let mut pair = on(ActiveCode::CyclicPosition);
     pair.axis.ask(monitor(0x07)).unwrap();
     pair.update();
-    pair.received = Received::Main(with_first_byte(answer(0xa0, 0xc1, 0x34, 0), 0x89 | pair.counter.last().get() << 5));
+    pair.received = Heard::Main(with_first_byte(answer(0xa0, 0xc1, 0x34, 0), 0x89 | pair.counter.last().get() << 5));
     pair.update();
     assert_eq!(pair.axis.state(), AxisState::Stopped(StopReason::CommandError(ErrorCode(0x34))));
     // A code that was not asked for is refused.
     let mut pair = on(ActiveCode::CyclicPosition);
     pair.update();
-    pair.received = Received::Main(with_first_byte(answer(0xaa, 0xc1, 0x31, 0), 0x89 | pair.counter.last().get() << 5));
+    pair.received = Heard::Main(with_first_byte(answer(0xaa, 0xc1, 0x31, 0), 0x89 | pair.counter.last().get() << 5));
     pair.update();
     assert_eq!(pair.axis.state(), AxisState::Stopped(StopReason::CommandError(ErrorCode(0x31))));
 }
@@ -323,7 +323,7 @@ fn what_a_motion_sends() {
 /// Axis 1 of two that slows down, by the policy; the first has an alarm.
 struct Two {
     ring: Ring<2>,
-    alarm: Received,
+    alarm: Heard,
     echo: u8,
 }
 
@@ -333,10 +333,10 @@ impl Two {
         let axis = |number, mode| AxisConfig::new(MacId::new(number).unwrap(), mode, 500_000, limits);
         let second = axis(9, mode).with_stop(StopPolicy::Decelerate { per_update });
         let ring = Ring::new([axis(8, ActiveCode::CyclicPosition), second].map(Axis::new), 0).unwrap();
-        let mut two = Self { ring, alarm: Received::Nothing, echo: 0 };
+        let mut two = Self { ring, alarm: Heard::Nothing, echo: 0 };
         two.update(0x41);
         two.update(0x41);
-        assert!(two.ring.switch_on());
+        two.ring.switch_on().unwrap();
         two.update(0xc1);
         two.update(0xc1);
         assert!(two.ring.all_are(AxisState::On));
@@ -347,9 +347,9 @@ impl Two {
     fn update(&mut self, status: u8) -> ([u8; 2], i32) {
         let code = 0x20;
         let first = with_first_byte(answer(code, status, 0, 0), 0x88 | self.echo << 5);
-        let first = if self.alarm == Received::Nothing { Received::Main(first) } else { self.alarm };
-        let second = Received::Main(with_first_byte(answer(code, status, 0, 0), 0x89 | self.echo << 5));
-        let [_, command] = self.ring.update(&[first, second]);
+        let first = if self.alarm == Heard::Nothing { Heard::Main(first) } else { self.alarm };
+        let second = Heard::Main(with_first_byte(answer(code, status, 0, 0), 0x89 | self.echo << 5));
+        let [_, command] = self.ring.update(&[first, second], 0);
         self.echo = command.main.update_counter.get();
         let block = command.main.emit();
         ([block[2], block[3]], i32::from_le_bytes(block[4..8].try_into().unwrap()))
@@ -360,7 +360,7 @@ impl Two {
     }
 
     fn fail(&mut self) -> ([u8; 2], i32) {
-        self.alarm = Received::Main(with_first_byte(answer(0x20, 0x61, 0, 0), 0x88 | self.echo << 5));
+        self.alarm = Heard::Main(with_first_byte(answer(0x20, 0x61, 0, 0), 0x88 | self.echo << 5));
         self.update(0xc1)
     }
 }
@@ -390,9 +390,9 @@ fn switching_off_ends_the_deceleration() {
     let mut two = Two::new(ActiveCode::CyclicVelocity, 1);
     two.axis().set_rate(1_000).unwrap();
     two.fail();
-    assert_eq!(two.axis().state(), AxisState::Stopping(StopReason::OtherAxis(0)));
+    assert_eq!(two.axis().state(), AxisState::Stopping(StopReason::OtherAxis { place: 0 }));
     two.ring.switch_off();
-    assert_eq!(two.axis().state(), AxisState::Stopped(StopReason::OtherAxis(0)));
+    assert_eq!(two.axis().state(), AxisState::Stopped(StopReason::OtherAxis { place: 0 }));
     assert_eq!(two.update(0xc1).0, [0, 0]);
 }
 
@@ -404,7 +404,7 @@ fn smooth_stop_beside_the_bits_of_the_caller() {
         two.axis().set_control(control);
         // In_Progress: there is a motion to be ended.
         two.update(0xc3);
-        two.alarm = Received::Main(with_first_byte(answer(0x20, 0x61, 0, 0), 0x88 | two.echo << 5));
+        two.alarm = Heard::Main(with_first_byte(answer(0x20, 0x61, 0, 0), 0x88 | two.echo << 5));
         let ([two_, three], _) = two.update(0xc3);
         assert_eq!((two_, three & 0x40), (0x80, 0x40), "{control}");
         assert_eq!(three & 0x01, u8::from(control == ControlBits::EX_OUT1));
@@ -428,7 +428,7 @@ fn which_flags_end_a_homing() {
         let mut ended = Progress::Pending { left: 0 };
         for _ in 0..2_000 {
             pair.update();
-            if let Received::Main(response) = &mut pair.received {
+            if let Heard::Main(response) = &mut pair.received {
                 spoil(&mut response.status);
             }
             ended = home.receive(&mut pair.axis);

@@ -14,7 +14,7 @@ mod common;
 use common::Pair;
 use proptest::prelude::*;
 use rtex_block::device::Behaviour;
-use rtex_block::master::{ActiveCode, AxisState, Received, StopReason};
+use rtex_block::master::{ActiveCode, AxisState, Heard, StopReason};
 use rtex_block::{
     Alarm, CommandBlock, ControlBits, Nibble, NonCyclicCode, NonCyclicCommand, Response, SubCode, TypeCode,
 };
@@ -81,7 +81,7 @@ fn act(pair: &mut Pair, action: Action) {
     let Pair { axis, drive, .. } = pair;
     match action {
         Action::Nothing => {}
-        Action::SwitchOn => _ = axis.switch_on(),
+        Action::SwitchOn => _ = axis.switch_on().ok(),
         Action::SwitchOff => axis.switch_off(),
         Action::Clear => axis.clear(),
         Action::Stop => axis.stop(StopReason::Requested),
@@ -105,9 +105,9 @@ fn act(pair: &mut Pair, action: Action) {
         Action::ClearAlarm => drive.clear_alarm(),
         Action::Power(on) => drive.set_main_power(on),
         Action::Drop => drive.drop_servo(),
-        Action::Lose => pair.received = Received::Nothing,
+        Action::Lose => pair.received = Heard::Nothing,
         Action::Spoil(bit) => {
-            if let Received::Main(response) = pair.received {
+            if let Heard::Main(response) = pair.received {
                 let mut block = response.emit();
                 block[usize::from(bit / 8)] ^= 1 << (bit % 8);
                 pair.received = Response::parse(&block).into();

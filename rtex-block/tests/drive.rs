@@ -12,7 +12,7 @@ use core::num::NonZeroU16;
 
 use rtex_block::device::{Drive, DriveConfig, OpenCodes};
 use rtex_block::master::{
-    ActiveCode, AskError, Axis, AxisConfig, AxisState, CommandCounter, Failure, Limits, MoveStage, Progress, Received,
+    ActiveCode, AskError, Axis, AxisConfig, AxisState, CommandCounter, Failure, Heard, Limits, MoveStage, Progress,
     SetpointError, StopReason,
 };
 use rtex_block::type_code::{homing, monitor, parameter, profile, system_id};
@@ -66,14 +66,14 @@ impl Pair {
     fn on(mode: ActiveCode) -> Self {
         let mut pair = Self::new(mode);
         pair.until(|pair| pair.axis.state() == AxisState::Off);
-        assert!(pair.axis.switch_on());
+        pair.axis.switch_on().unwrap();
         pair.until(|pair| pair.axis.state() == AxisState::On);
         pair
     }
 
     fn update(&mut self) {
-        let received = self.response.map_or(Received::Nothing, Received::Main);
-        self.axis.receive(self.sent, &received);
+        let received = self.response.map_or(Heard::Nothing, Heard::Main);
+        self.axis.hear(self.sent, &received, 0);
         self.sent = self.counter.next();
         let block = self.drive.exchange(&self.axis.send(self.sent).main.emit());
         self.response = Some(Response::parse_strict(&block).unwrap());
@@ -185,10 +185,10 @@ fn alarms_stop_the_axis_and_can_be_read_and_cleared() {
     assert_eq!(history, Results::alarm_data(Alarm { main: 38, sub: 1 }, 0));
     pair.value(NonCyclicCommand::Alarm(about(CODES.alarm_clear, 0, 0)));
     assert_eq!(pair.drive.alarm(), None);
-    assert!(!pair.axis.switch_on());
+    assert!(pair.axis.switch_on().is_err());
     pair.axis.clear();
     pair.until(|pair| pair.axis.state() == AxisState::Off);
-    assert!(pair.axis.switch_on());
+    pair.axis.switch_on().unwrap();
 }
 
 /// Code 10h, then 17h; the motion ends on its target and the next one can start.
@@ -290,7 +290,7 @@ fn a_move_across_the_wrap() {
         setting_data: i32::MAX - 5,
     });
     pair.update();
-    assert!(pair.axis.switch_on());
+    pair.axis.switch_on().unwrap();
     pair.until(|pair| pair.axis.state() == AxisState::On);
     pair.axis.set_position(i32::MIN + 100).unwrap();
     pair.until(|pair| pair.drive.position() == i32::MIN + 100);
@@ -449,7 +449,7 @@ fn limits_of_the_states() {
     let mut pair = Pair::new(ActiveCode::CyclicPosition);
     pair.drive = Drive::new(pair.drive.config().with_servo_on_updates(u16::MAX));
     pair.until(|pair| pair.axis.state() == AxisState::Off);
-    assert!(pair.axis.switch_on());
+    pair.axis.switch_on().unwrap();
     pair.until(|pair| pair.axis.state() != AxisState::SwitchingOn);
     assert_eq!(pair.axis.state(), AxisState::Stopped(StopReason::ActiveTimeout));
     // A request is never answered.

@@ -18,7 +18,8 @@ use core::num::NonZeroU16;
 use common::CODES;
 use rtex_block::device::{Behaviour, Drive, DriveConfig};
 use rtex_block::master::{
-    ActiveCode, Asic, Axis, AxisConfig, AxisState, Fault, Limits, Master, MasterConfig, Phase, Slave, StopPolicy,
+    ActiveCode, Asic, Axis, AxisConfig, AxisState, Fault, Limits, Master, MasterConfig, Phase, RingFailure, Slave,
+    StopPolicy,
 };
 use rtex_block::position::Gear;
 use rtex_block::timing::{Periods, TimerSystem};
@@ -146,7 +147,7 @@ impl Bench {
     }
 
     fn update(&mut self) {
-        self.master.exchange_words32(&self.rx, &mut self.tx).unwrap();
+        self.master.exchange_words32(&self.rx, &mut self.tx, self.now * PERIOD_NS).unwrap();
         self.judge();
         self.frame();
     }
@@ -193,7 +194,7 @@ impl Bench {
             assert!(by.abs() <= 3_000, "axis {place} jumps by {by} at {}", self.now);
         }
         if any {
-            assert!(!self.master.received());
+            assert!(!self.master.frame_received());
         }
         if self.down.iter().chain(&self.up).map(Line::faults).sum::<u64>() != before {
             self.hurt = self.now;
@@ -229,7 +230,7 @@ impl Bench {
             self.master.clear();
             for _ in 0..400 {
                 self.update();
-                self.master.ring_mut().switch_on();
+                self.master.ring_mut().switch_on().ok();
                 if self.master.ring().all_are(AxisState::On) {
                     assert_eq!(self.master.fault(), None);
                     return;
@@ -282,7 +283,7 @@ fn hostile_every_servo_is_off_in_time() {
                 break;
             }
         }
-        if let Some((place, reason)) = bench.master.ring().failure() {
+        if let Some(RingFailure { place, reason }) = bench.master.ring().failure() {
             // Only what the lines did can have been the cause.
             assert!(bench.now - bench.hurt <= 20, "axis {place} at {}: {reason}", bench.now);
             spurious += 1;

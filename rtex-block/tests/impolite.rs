@@ -11,11 +11,11 @@
 
 mod common;
 
-use common::{CODES, LIMIT, Pair, limits, monitor, set_position};
+use common::{CODES, LIMIT, Pair, actual, limits, monitor, set_position};
 use rtex_block::device::{Behaviour, Drive, DriveConfig};
 use rtex_block::master::procedure::{Caught, Home, Latch};
 use rtex_block::master::{
-    ActiveCode, AskError, AxisConfig, AxisState, CommandEnded, Failure, MoveStage, Progress, Received, StopReason,
+    ActiveCode, AskError, AxisConfig, AxisState, CommandEnded, Failure, Heard, MoveStage, Progress, StopReason,
 };
 use rtex_block::{
     Alarm, Arguments, Code, ErrorClass, ErrorCode, MacId, Nibble, NonCyclicCommand, NonCyclicResponse, Response,
@@ -138,7 +138,7 @@ fn a_motion_that_starts_late_is_not_done_early() {
         let mut started = None;
         let ended = pair.run(|axis| {
             if axis.profile().unwrap().stage() == MoveStage::Moving {
-                started = Some(axis.actual_position());
+                started = Some(actual(axis));
             }
             axis.take_move().unwrap()
         });
@@ -160,7 +160,7 @@ fn a_motion_that_starts_late_is_not_done_early() {
     let mut pair = Pair::on(ActiveCode::ProfilePosition, Behaviour::POLITE);
     pair.axis.start_move(0x11, 20_000, 1_000_000).unwrap();
     for _ in 0..70 {
-        if let Received::Main(response) = &mut pair.received {
+        if let Heard::Main(response) = &mut pair.received {
             response.code = Code::truncate(0x1a);
         }
         pair.update();
@@ -196,7 +196,7 @@ fn setting_a_position() {
             assert_eq!(pair.axis.ask(set_position(type_code, 9_000)), Err(AskError::ServoOn));
             pair.until("off", |pair| pair.axis.state() == AxisState::Off);
             pair.axis.ask(set_position(type_code, 9_000)).unwrap();
-            assert!(!pair.axis.switch_on());
+            assert!(pair.axis.switch_on().is_err());
             assert!(matches!(pair.outcome(), Progress::Done { .. }));
             pair.switch_on();
             assert_eq!((pair.axis.setpoint(), pair.drive.position()), (9_000, 9_000));
@@ -228,13 +228,13 @@ fn homing_types_that_are_not_known() {
             pair.axis = before;
             pair.axis.ask_latch(type_code, [Nibble::ZERO; 2], 0x09).unwrap();
             let mut pair = Pair::new(mode, Behaviour::POLITE);
-            pair.until("off", |pair| pair.axis.can_switch_on());
+            pair.until("off", |pair| pair.axis.can_switch_on().is_ok());
             let before = pair.axis;
             pair.axis.ask(request).unwrap();
-            assert_eq!(pair.axis.switch_on(), !refused, "{mode:?} {type_code:x}");
+            assert_eq!(pair.axis.switch_on().is_err(), refused, "{mode:?} {type_code:x}");
             pair.axis = before;
             pair.axis.ask_latch(type_code, [Nibble::ZERO; 2], 0x09).unwrap();
-            assert!(pair.axis.switch_on());
+            pair.axis.switch_on().unwrap();
         }
         for type_code in [0x21, 0x22] {
             let mut pair = Pair::on(mode, Behaviour::POLITE);
@@ -282,7 +282,7 @@ fn an_alarm_in_every_state() {
         let mut pair = Pair::new(ActiveCode::CyclicPosition, Behaviour::POLITE.with_servo_off_late(8));
         pair.until("off", |pair| pair.axis.state() == AxisState::Off);
         if state > 0 {
-            assert!(pair.axis.switch_on());
+            pair.axis.switch_on().unwrap();
             (0..3).for_each(|_| pair.update());
             assert_eq!(pair.axis.state(), AxisState::SwitchingOn);
         }
@@ -297,7 +297,7 @@ fn an_alarm_in_every_state() {
         pair.drive.raise(alarm);
         (0..3).for_each(|_| pair.update());
         assert_eq!(pair.axis.state(), stopped);
-        assert!(!pair.axis.switch_on());
+        assert!(pair.axis.switch_on().is_err());
     }
     // At start-up it is the reason why Servo_Ready did not come.
     let mut pair = Pair::new(ActiveCode::CyclicPosition, Behaviour::POLITE);
@@ -309,7 +309,7 @@ fn an_alarm_in_every_state() {
     pair.until("off", |pair| pair.axis.state() == AxisState::Off);
     pair.drive.set_main_power(false);
     (0..3).for_each(|_| pair.update());
-    assert_eq!((pair.axis.state(), pair.axis.switch_on()), (AxisState::Starting, false));
+    assert_eq!((pair.axis.state(), pair.axis.switch_on().is_err()), (AxisState::Starting, true));
     pair.drive.set_main_power(true);
     pair.until("off", |pair| pair.axis.state() == AxisState::Off);
 }
@@ -323,7 +323,7 @@ fn cmd_error_during_a_motion() {
     let spoil = |pair: &mut Pair| {
         pair.update();
         let response = *pair.received.response().unwrap();
-        pair.received = Received::Main(response.with_noncyclic(&NonCyclicResponse::CommandError(ErrorCode(0x0021))));
+        pair.received = Heard::Main(response.with_noncyclic(&NonCyclicResponse::CommandError(ErrorCode(0x0021))));
     };
     for _ in 0..3 {
         for _ in 1..LIMIT {
@@ -345,12 +345,12 @@ fn cmd_error_during_a_motion() {
 /// Blocks of another drive in this one's place are named, and so is a memory that holds no responses.
 #[test]
 fn why_the_echo_stands_still() {
-    type Spoil = fn(&mut Received);
+    type Spoil = fn(&mut Heard);
     let cases: [(Spoil, StopReason); 3] = [
-        (|r| *r = Received::Nothing, StopReason::EchoTimeout),
+        (|r| *r = Heard::Nothing, StopReason::EchoTimeout),
         (
             |r| {
-                if let Received::Main(response) = r {
+                if let Heard::Main(response) = r {
                     response.mac_id = MacId::new(3).unwrap();
                 }
             },

@@ -16,7 +16,7 @@ use common::{CODES, LIMIT, limits};
 use rtex_block::device::{Drive, DriveConfig};
 use rtex_block::master::{
     ActiveCode, Asic, Axis, AxisConfig, AxisState, Fault, Led, Master, MasterConfig, MoveStage, Order, Phase, Ring,
-    SameMacId, SetupError, Slave, StopPolicy, StopReason,
+    RingFailure, SameMacId, SetupError, Slave, StopPolicy, StopReason,
 };
 use rtex_block::pack::SizeMismatch;
 use rtex_block::timing::{A6N, Periods, TimerSystem};
@@ -64,7 +64,7 @@ impl Bench {
         let mut bench = Self::new(config(BlockSize::Bytes16), axes);
         bench.start();
         bench.until("on", |bench| {
-            bench.master.ring_mut().switch_on();
+            bench.master.ring_mut().switch_on().ok();
             bench.master.ring().all_are(AxisState::On)
         });
         bench
@@ -88,7 +88,7 @@ impl Bench {
     }
 
     fn update(&mut self) {
-        self.master.exchange_words16(&self.rx, &mut self.tx).unwrap();
+        self.master.exchange_words16(&self.rx, &mut self.tx, 0).unwrap();
         for place in 0..2 {
             if self.cut[place] {
                 self.drives[place].miss();
@@ -100,7 +100,7 @@ impl Bench {
                 self.rx[place * 8 + k] = u16::from(response[2 * k + 1]) << 8 | u16::from(response[2 * k]);
             }
         }
-        self.master.received();
+        self.master.frame_received();
     }
 
     fn until(&mut self, what: &str, mut done: impl FnMut(&mut Self) -> bool) {
@@ -124,14 +124,14 @@ fn what_cannot_be_set_up() {
     let new = |config, axes| Master::new(config, table(), axes).err();
     let good = config(BlockSize::Bytes16);
     assert_eq!(new(good, axes(axis(4), axis(17))), None);
-    assert_eq!(new(good, axes(axis(4), axis(4))), Some(SetupError::SameMacId(SameMacId(mac_id(4)))));
-    assert_eq!(new(good, axes(axis(4), axis(18))), Some(SetupError::Table(mac_id(18))));
-    assert_eq!(new(good, axes(axis(17), axis(4))), Some(SetupError::Table(mac_id(17))));
+    assert_eq!(new(good, axes(axis(4), axis(4))), Some(SetupError::SameMacId(SameMacId { mac_id: mac_id(4) })));
+    assert_eq!(new(good, axes(axis(4), axis(18))), Some(SetupError::Table { mac_id: mac_id(18) }));
+    assert_eq!(new(good, axes(axis(17), axis(4))), Some(SetupError::Table { mac_id: mac_id(17) }));
     let slow = AxisConfig::new(mac_id(17), ActiveCode::CyclicPosition, 1_000_000, limits());
-    assert_eq!(new(good, axes(axis(4), slow)), Some(SetupError::UpdatePeriod(mac_id(17))));
+    assert_eq!(new(good, axes(axis(4), slow)), Some(SetupError::UpdatePeriod { mac_id: mac_id(17) }));
     let half = MasterConfig::new(BlockSize::Bytes16, A6N[6], TimerSystem::Internal);
     assert_eq!(new(half, axes(axis(4), axis(17))), Some(SetupError::Timer));
-    assert_eq!(Ring::new(axes(axis(9), axis(9)), 0).err(), Some(SameMacId(mac_id(9))));
+    assert_eq!(Ring::new(axes(axis(9), axis(9)), 0).err(), Some(SameMacId { mac_id: mac_id(9) }));
 }
 
 /// Before PH_RUNNING an exchange writes NOPs with counter 0 and believes nothing.
@@ -184,16 +184,16 @@ fn memories_of_another_size() {
     let before = bench.master;
     let mut words = [0x1234; 15];
     let refused = Err(SizeMismatch { bytes: 32, words: 15 });
-    assert_eq!(bench.master.exchange_words16(&bench.rx, &mut words), refused);
-    assert_eq!(bench.master.exchange_words16(&words, &mut bench.tx), refused);
-    assert!(bench.master.exchange_words32(&[0; 9], &mut [0; 8]).is_err());
-    assert!(bench.master.exchange_bytes(&[0; 32], &mut [0; 64]).is_err());
+    assert_eq!(bench.master.exchange_words16(&bench.rx, &mut words, 0), refused);
+    assert_eq!(bench.master.exchange_words16(&words, &mut bench.tx, 0), refused);
+    assert!(bench.master.exchange_words32(&[0; 9], &mut [0; 8], 0).is_err());
+    assert!(bench.master.exchange_bytes(&[0; 32], &mut [0; 64], 0).is_err());
     assert_eq!((bench.master, words), (before, [0x1234; 15]));
-    assert!(bench.master.exchange_bytes(&[0; 32], &mut [0; 32]).is_ok());
+    assert!(bench.master.exchange_bytes(&[0; 32], &mut [0; 32], 0).is_ok());
     let mut wide = Bench::new(config(BlockSize::Bytes32), ADDRESSES.map(axis));
-    assert!(wide.master.exchange_bytes(&[0; 32], &mut [0; 32]).is_err());
+    assert!(wide.master.exchange_bytes(&[0; 32], &mut [0; 32], 0).is_err());
     let mut tx = [0xff; 64];
-    wide.master.exchange_bytes(&[0; 64], &mut tx).unwrap();
+    wide.master.exchange_bytes(&[0; 64], &mut tx, 0).unwrap();
     // Sub_Chk is always set, in a NOP too.
     assert_eq!((tx[16], tx[48]), (0x80, 0x80));
 }
@@ -205,7 +205,10 @@ fn a_wrong_order_is_said_as_such() {
     bench.drives.swap(0, 1);
     bench.start();
     bench.until("stopped", |bench| bench.master.ring().failure().is_some());
-    assert_eq!(bench.master.ring().failure(), Some((0, StopReason::WrongMacId(mac_id(17)))));
+    assert_eq!(
+        bench.master.ring().failure(),
+        Some(RingFailure { place: 0, reason: StopReason::WrongMacId(mac_id(17)) })
+    );
     assert_eq!(
         (bench.master.fault(), bench.master.led(0), bench.master.led(600)),
         (Some(Fault::Timeout), Led::Red, Led::Off)
@@ -219,14 +222,14 @@ fn the_receive_watchdog() {
     let mut bench = Bench::new(config(BlockSize::Bytes16).with_watchdog(limit), ADDRESSES.map(axis));
     bench.start();
     bench.until("on", |bench| {
-        bench.master.ring_mut().switch_on();
+        bench.master.ring_mut().switch_on().ok();
         bench.master.ring().all_are(AxisState::On)
     });
     for _ in 0..2 {
-        bench.master.exchange_words16(&bench.rx, &mut bench.tx).unwrap();
+        bench.master.exchange_words16(&bench.rx, &mut bench.tx, 0).unwrap();
         assert_eq!(bench.state(0), AxisState::On);
     }
-    bench.master.exchange_words16(&bench.rx, &mut bench.tx).unwrap();
+    bench.master.exchange_words16(&bench.rx, &mut bench.tx, 0).unwrap();
     assert_eq!(bench.master.fault(), Some(Fault::Timeout));
     for place in 0..2 {
         assert_eq!(bench.state(place), AxisState::Stopped(StopReason::ReceiveTimeout));
@@ -237,7 +240,7 @@ fn the_receive_watchdog() {
     bench.master.clear();
     assert_eq!(bench.master.fault(), None);
     bench.until("on", |bench| {
-        bench.master.ring_mut().switch_on();
+        bench.master.ring_mut().switch_on().ok();
         bench.master.ring().all_are(AxisState::On)
     });
 }
@@ -275,12 +278,12 @@ fn alarm_beside(mode: ActiveCode, policy: StopPolicy) -> Bench {
 fn an_axis_stops_at_once_unless_it_was_told_otherwise() {
     for mode in [ActiveCode::CyclicPosition, ActiveCode::CyclicVelocity, ActiveCode::ProfilePosition] {
         let bench = alarm_beside(mode, StopPolicy::AtOnce);
-        assert_eq!(bench.state(1), AxisState::Stopped(StopReason::OtherAxis(0)));
+        assert_eq!(bench.state(1), AxisState::Stopped(StopReason::OtherAxis { place: 0 }));
         assert!(CommandBlock::of(&bench.block(1)).unwrap().is_servo_off());
     }
     // A torque cannot be slowed down.
     let bench = alarm_beside(ActiveCode::CyclicTorque, StopPolicy::Decelerate { per_update: 1 });
-    assert_eq!(bench.state(1), AxisState::Stopped(StopReason::OtherAxis(0)));
+    assert_eq!(bench.state(1), AxisState::Stopped(StopReason::OtherAxis { place: 0 }));
 }
 
 #[test]
@@ -289,7 +292,7 @@ fn an_axis_slows_down() {
     let position = |bench: &Bench| CommandBlock::of(&bench.block(1)).unwrap().command_data1();
     let mut steps = Vec::new();
     let mut last = position(&bench);
-    while bench.state(1) == AxisState::Stopping(StopReason::OtherAxis(0)) {
+    while bench.state(1) == AxisState::Stopping(StopReason::OtherAxis { place: 0 }) {
         assert!(bench.master.ring_mut().axes_mut()[1].set_position(0).is_err());
         bench.update();
         steps.push(position(&bench) - last);
@@ -297,25 +300,25 @@ fn an_axis_slows_down() {
     }
     // 300 less 40 came in the period of the failure; the last set-point is followed by the servo-off.
     assert_eq!(steps[..6], [220, 180, 140, 100, 60, 20]);
-    assert_eq!(bench.state(1), AxisState::Stopped(StopReason::OtherAxis(0)));
+    assert_eq!(bench.state(1), AxisState::Stopped(StopReason::OtherAxis { place: 0 }));
 
     let mut bench = alarm_beside(ActiveCode::CyclicVelocity, StopPolicy::Decelerate { per_update: 200_000 });
     assert_eq!(position(&bench), 400_000);
     bench.update();
     assert_eq!(position(&bench), 200_000);
     bench.update();
-    assert_eq!(bench.state(1), AxisState::Stopped(StopReason::OtherAxis(0)));
+    assert_eq!(bench.state(1), AxisState::Stopped(StopReason::OtherAxis { place: 0 }));
 
     let mut bench = alarm_beside(ActiveCode::ProfilePosition, StopPolicy::Decelerate { per_update: 1 });
     assert_eq!(bench.block(1)[3] & 0x40, 0x40);
-    bench.until("stopped", |bench| bench.state(1) == AxisState::Stopped(StopReason::OtherAxis(0)));
+    bench.until("stopped", |bench| bench.state(1) == AxisState::Stopped(StopReason::OtherAxis { place: 0 }));
     let status = bench.master.ring().axes()[1].status();
     assert!(status.contains(StatusFlags::SERVO_ACTIVE) && !status.contains(StatusFlags::IN_PROGRESS));
     // Too slow: the limit ends it.
     let mut bench = alarm_beside(ActiveCode::CyclicPosition, StopPolicy::Decelerate { per_update: 0 });
     let from = (0..100).find(|_| {
         bench.update();
-        bench.state(1) == AxisState::Stopped(StopReason::OtherAxis(0))
+        bench.state(1) == AxisState::Stopped(StopReason::OtherAxis { place: 0 })
     });
     assert!((58..62).contains(&from.unwrap()), "{from:?}");
 }
@@ -334,5 +337,5 @@ fn an_axis_goes_on() {
     }
     bench.update();
     assert_eq!(bench.state(0), AxisState::Stopped(StopReason::EchoTimeout));
-    assert_eq!(bench.state(1), AxisState::Stopped(StopReason::OtherAxis(0)));
+    assert_eq!(bench.state(1), AxisState::Stopped(StopReason::OtherAxis { place: 0 }));
 }

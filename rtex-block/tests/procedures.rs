@@ -11,10 +11,10 @@
 
 mod common;
 
-use common::{CODES, Pair, limits, monitor, set_position};
+use common::{CODES, Pair, actual, limits, monitor, set_position};
 use rtex_block::device::{Behaviour, DriveConfig};
 use rtex_block::master::procedure::{Backup, Caught, Home, Latch, ReadText, Restore, SetPosition};
-use rtex_block::master::{ActiveCode, AskError, Axis, AxisConfig, AxisState, Failure, Progress, Received};
+use rtex_block::master::{ActiveCode, AskError, Axis, AxisConfig, AxisState, Failure, Heard, Progress};
 use rtex_block::{
     Arguments, ErrorCode, LatchFlags, MacId, Nibble, NonCyclicCommand, NonCyclicResponse, Pr, ProfileFlags, Response,
     Response32, SubCode, TypeCode,
@@ -29,7 +29,7 @@ fn homing_ends_when_this_homing_ends() {
         let mut reached = Vec::new();
         assert_eq!(
             pair.run(|axis| {
-                reached.push(axis.actual_position());
+                reached.push(actual(axis));
                 home.receive(axis)
             }),
             Progress::Done { value: () }
@@ -110,7 +110,7 @@ fn what_has_ended_sends_nothing_more() {
         let mut pair = Pair::with(config, DriveConfig::new(MacId::new(9).unwrap(), CODES));
         pair.until("off", |pair| pair.axis.state() == AxisState::Off);
         if on {
-            assert!(pair.axis.switch_on());
+            pair.axis.switch_on().unwrap();
             pair.until("on", |pair| pair.axis.state() == AxisState::On);
         }
         let (mut sent, mut last, mut end) = (0, 0, None);
@@ -182,7 +182,7 @@ fn latch_positions() {
                 monitor_sel,
                 monitor_data,
             };
-            pair.received = Received::Main(response.with_noncyclic(&other));
+            pair.received = Heard::Main(response.with_noncyclic(&other));
         }
         assert_eq!(pair.axis.take_outcome(), None);
     }
@@ -250,7 +250,7 @@ fn a_latch_without_a_state_before() {
         if let NonCyclicResponse::Homing { type_code, .. } = response.noncyclic() {
             if type_code == 0x50 && refuse {
                 let refused = NonCyclicResponse::CommandError(ErrorCode(0x0031));
-                pair.received = Received::Main(response.with_noncyclic(&refused));
+                pair.received = Heard::Main(response.with_noncyclic(&refused));
             }
             refuse &= type_code == 0x50;
         }
@@ -374,7 +374,7 @@ fn selected_response_data() {
         let write = Arguments { type_code: TypeCode::short(0x11), index, data: 0x07 };
         assert!(matches!(pair.ask(NonCyclicCommand::Parameter(write)), Progress::Done { .. }));
         (0..4).for_each(|_| pair.update());
-        let Received::Both(Response32 { main, sub }) = pair.received else { panic!() };
+        let Heard::Both(Response32 { main, sub }) = pair.received else { panic!() };
         let mut want = [0; 5];
         want[place] = 4_321;
         assert_eq!([main.response_data2, main.response_data3, sub.data1, sub.data2, sub.data3], want);

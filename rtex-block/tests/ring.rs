@@ -14,7 +14,7 @@
 use core::num::NonZeroU16;
 
 use rtex_block::device::{Drive, DriveConfig, OpenCodes};
-use rtex_block::master::{ActiveCode, Axis, AxisConfig, AxisState, Limits, Received, Ring};
+use rtex_block::master::{ActiveCode, Axis, AxisConfig, AxisState, Heard, Limits, Ring};
 use rtex_block::position::step;
 use rtex_block::{Alarm, Command, CommandBlock, MacId, Response};
 use servowire_world::Draw;
@@ -53,11 +53,11 @@ struct Bench {
     ring: Ring<AXES>,
     drives: [Drive; AXES],
     lines: [Line; AXES],
-    responses: [Received; AXES],
+    responses: [Heard; AXES],
     commands: [Command; AXES],
     /// Responses come one update period later, as when an exchange misses the start of its frame.
     late: bool,
-    held: [Received; AXES],
+    held: [Heard; AXES],
     started: bool,
     now: u64,
 }
@@ -71,10 +71,10 @@ impl Bench {
                 Drive::new(DriveConfig::new(MacId::new(number(k)).unwrap(), OpenCodes::INVENTED))
             }),
             lines: [Line::Good; AXES],
-            responses: [Received::Nothing; AXES],
+            responses: [Heard::Nothing; AXES],
             commands: core::array::from_fn(|k| Command::nop(MacId::new(number(k)).unwrap())),
             late: false,
-            held: [Received::Nothing; AXES],
+            held: [Heard::Nothing; AXES],
             started: false,
             now: 0,
         }
@@ -83,7 +83,7 @@ impl Bench {
     /// One update period: the master reads and writes, then the frame goes round.
     fn update(&mut self) {
         let responses = if self.late { core::mem::replace(&mut self.held, self.responses) } else { self.responses };
-        self.commands = self.ring.update(&responses).map(|command| command.main);
+        self.commands = self.ring.update(&responses, self.now * 500_000).map(|command| command.main);
         self.frame();
     }
 
@@ -101,7 +101,7 @@ impl Bench {
             }
             if self.lines[k] == Line::Cut {
                 self.drives[k].miss();
-                self.responses[k] = Received::Nothing;
+                self.responses[k] = Heard::Nothing;
                 continue;
             }
             let before = self.drives[k].position();
@@ -111,7 +111,7 @@ impl Bench {
                 response[0] ^= 1;
             }
             self.responses[k] =
-                if self.lines[k] == Line::Deaf { Received::Nothing } else { Response::parse(&response).into() };
+                if self.lines[k] == Line::Deaf { Heard::Nothing } else { Response::parse(&response).into() };
         }
     }
 
@@ -137,7 +137,7 @@ impl Bench {
 
     fn switch_on(&mut self) {
         self.until(200, |bench| bench.ring.all_are(AxisState::Off));
-        assert!(self.ring.switch_on());
+        self.ring.switch_on().unwrap();
         self.until(50, |bench| bench.ring.all_are(AxisState::On));
     }
 

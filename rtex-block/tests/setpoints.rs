@@ -13,7 +13,7 @@ mod common;
 
 use common::{CODES, Pair, limits, monitor, set_position};
 use rtex_block::device::{Behaviour, DriveConfig};
-use rtex_block::master::{ActiveCode, AxisConfig, AxisState, Progress, Received, SetpointError, StopReason, Turn};
+use rtex_block::master::{ActiveCode, AxisConfig, AxisState, Heard, Progress, SetpointError, StopReason, Turn};
 use rtex_block::position::Gear;
 use rtex_block::{Alarm, Arguments, ErrorCode, MacId, NonCyclicCommand, TypeCode};
 
@@ -55,15 +55,15 @@ fn feed_forward_lives_with_the_servo() {
 #[test]
 fn the_set_point_follows_while_switching_on() {
     let mut pair = Pair::new(ActiveCode::CyclicPosition, Behaviour::POLITE);
-    pair.until("off", |pair| pair.axis.can_switch_on());
-    assert!(pair.axis.switch_on());
+    pair.until("off", |pair| pair.axis.can_switch_on().is_ok());
+    pair.axis.switch_on().unwrap();
     for turned in (1_000..).step_by(1_000) {
         pair.update();
-        if let Received::Main(response) = &mut pair.received {
+        if let Heard::Main(response) = &mut pair.received {
             response.response_data1 = turned;
         }
         let mut next = pair.axis;
-        next.receive(pair.sent, &pair.received);
+        next.hear(pair.sent, &pair.received, pair.now_ns());
         let block = next.send(Turn::Valid(pair.counter.last().next())).main.emit();
         let is_on = next.state() == AxisState::On;
         let want = if is_on { turned - 1_000 } else { turned };

@@ -6,7 +6,11 @@
 #[cfg(any(test, feature = "std"))]
 extern crate std;
 
+mod angle;
 mod builder;
+// Under the model there are only the slots: its atomics are not const.
+#[cfg(not(all(test, loom)))]
+mod cell;
 mod class;
 mod codes;
 mod contract;
@@ -15,13 +19,18 @@ mod error_rate;
 mod errors;
 mod feedback;
 mod findings;
+mod four_slots;
 mod number;
 mod procedure;
 mod range;
 mod run;
 mod show;
 pub mod stream;
+mod time;
 
+pub use angle::{Angle, Commutation, Sense};
+#[cfg(not(all(test, loom)))]
+pub use cell::{Cell, Reader, Words, Writer};
 pub use class::{Class, Classified};
 pub use contract::{Machine, Procedure};
 pub use counters::Counters;
@@ -33,6 +42,7 @@ pub use procedure::{Polling, Progress, Step};
 pub use range::OutOfRange;
 pub use run::{Ended, run, run_async};
 pub use show::write_names;
+pub use time::{ClockCheck, ClockError, MAX_TICK_NS, MIN_TICK_HZ, TickRate, TimeBase};
 
 /// What the macros of this crate name; not for use by hand.
 #[doc(hidden)]

@@ -27,9 +27,9 @@ mod reception;
 
 use core::convert::Infallible;
 
-use rtex_block::master::{Asic, Fault, Led, Master, Phase, Received, Ring, Slave};
+use rtex_block::master::{Asic, Axis, Fault, Heard, Led, Master, Phase, Ring, Slave};
 use rtex_block::timing::TimerSystem;
-use rtex_block::{BlockSize, Command32, MacId, Response, Response32, UpdateCounter};
+use rtex_block::{BlockSize, Command32, Evidence, MacId, Response, Response32};
 
 use crate::{Clock, Error};
 pub use port::{Port, Word};
@@ -69,27 +69,9 @@ pub struct Driver<'r, P, C, const N: usize> {
     frames: u32,
     late: u32,
     torn: u32,
-    heard: [Heard; N],
     /// When the period of the last exchange began.
     #[cfg(feature = "async")]
     began_ns: Option<u64>,
-}
-
-/// What was last heard of a drive.
-#[derive(Debug, Clone, Copy, Default)]
-struct Heard {
-    echo: Option<UpdateCounter>,
-    /// Of the last exchange.
-    position: Option<i32>,
-}
-
-impl Heard {
-    fn take(&mut self, drive: MacId, received: &Received) {
-        let response = received.response().filter(|response| response.mac_id == drive);
-        let echo = response.map(|response| response.update_counter_echo);
-        self.position = response.filter(|_| echo != self.echo).map(|response| response.response_data1);
-        self.echo = echo.or(self.echo);
-    }
 }
 
 impl<'r, P: Port, C: Clock, const N: usize> Driver<'r, P, C, N> {
@@ -103,7 +85,6 @@ impl<'r, P: Port, C: Clock, const N: usize> Driver<'r, P, C, N> {
             frames: reception.frames(),
             late: 0,
             torn: 0,
-            heard: [Heard::default(); N],
             #[cfg(feature = "async")]
             began_ns: None,
         }
@@ -139,10 +120,10 @@ impl<'r, P: Port, C: Clock, const N: usize> Driver<'r, P, C, N> {
         self.master.led(t_ms)
     }
 
-    /// The actual position of the axis at `place`, command units, if the last exchange brought a new one: a sound block of its drive
-    /// whose counter had gone on.
-    pub fn position(&self, place: usize) -> Option<i32> {
-        self.heard.get(place)?.position
+    /// What is known of the actual position, speed and torque of the axis at `place`; nothing of a place that the ring does not
+    /// have. Its instant is the start of the frame that brought the last new counter echo, by the driver's clock.
+    pub fn evidence(&self, place: usize) -> Evidence {
+        self.master.ring().axes().get(place).map_or(Evidence::NEVER, Axis::evidence)
     }
 
     /// One turn of the main loop. Until it gives [`Phase::Running`] interrupts stay off; it writes the first transmit data itself.
@@ -158,7 +139,7 @@ impl<'r, P: Port, C: Clock, const N: usize> Driver<'r, P, C, N> {
         };
         let phase = self.master.control(asic, found.map(|count| table.get(..count).unwrap_or(&table)));
         if phase == Phase::Prepare {
-            let commands = self.master.exchange(&[Received::Nothing; N]);
+            let commands = self.master.exchange(&[Heard::Nothing; N], self.clock.now_ns());
             self.write(&commands).map_err(Error::Io)?;
         }
         match self.master.fault() {
@@ -196,18 +177,17 @@ impl<'r, P: Port, C: Clock, const N: usize> Driver<'r, P, C, N> {
         let frames = self.reception.frames();
         if frames != self.frames {
             self.frames = frames;
-            self.master.received();
+            self.master.frame_received();
         }
-        let (received, torn, fault) = match read {
-            Ok(Some(received)) => (received, false, None),
-            Ok(None) => ([Received::Nothing; N], true, None),
-            Err(fault) => ([Received::Nothing; N], false, Some(fault)),
+        let (heard, torn, fault) = match read {
+            Ok(Some(heard)) => (heard, false, None),
+            Ok(None) => ([Heard::Nothing; N], true, None),
+            Err(fault) => ([Heard::Nothing; N], false, Some(fault)),
         };
         self.torn = self.torn.saturating_add(torn.into());
-        for ((heard, axis), received) in self.heard.iter_mut().zip(self.master.ring().axes()).zip(&received) {
-            heard.take(axis.config().mac_id, received);
-        }
-        let commands = self.master.exchange(&received);
+        // The frame before brought them: rather too old than too young.
+        let end_ns = began_ns.saturating_sub(self.master.config().periods.com_ns.into());
+        let commands = self.master.exchange(&heard, end_ns);
         let written = self.write(&commands);
         let frames_late = self.frames_since(began_ns);
         self.late = self.late.saturating_add((frames_late > 0).into());
@@ -223,15 +203,15 @@ impl<'r, P: Port, C: Clock, const N: usize> Driver<'r, P, C, N> {
     }
 
     /// The blocks of one frame; `None` if the bank was switched meanwhile each time.
-    fn read(&mut self, began_ns: u64) -> Result<Option<[Received; N]>, P::Error> {
+    fn read(&mut self, began_ns: u64) -> Result<Option<[Heard; N]>, P::Error> {
         for _ in 0..READS {
             let before = self.bank(began_ns);
-            let mut received = [Received::Nothing; N];
-            for (place, received) in received.iter_mut().enumerate() {
-                *received = self.block(place)?;
+            let mut all = [Heard::Nothing; N];
+            for (place, heard) in all.iter_mut().enumerate() {
+                *heard = self.block(place)?;
             }
             if self.bank(began_ns) == before {
-                return Ok(Some(received));
+                return Ok(Some(all));
             }
         }
         Ok(None)
@@ -251,7 +231,7 @@ impl<'r, P: Port, C: Clock, const N: usize> Driver<'r, P, C, N> {
         self.master.config().periods.frames_late(u32::try_from(past_ns).unwrap_or(u32::MAX))
     }
 
-    fn block(&mut self, place: usize) -> Result<Received, P::Error> {
+    fn block(&mut self, place: usize) -> Result<Heard, P::Error> {
         let size = self.master.config().size;
         let (mut words, mut bytes) = ([P::Word::default(); MOST_WORDS], [0; rtex_block::LEN32]);
         let (words, bytes) = block_of::<P>(size, &mut words, &mut bytes);

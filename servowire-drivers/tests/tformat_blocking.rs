@@ -62,7 +62,7 @@ fn a_position_with_alarms_is_a_doubt() {
     assert_eq!((sample.position.abs, sample.position.turns), (place(1), 3));
     let sent = bench.borrow().truth().transmission(bench.borrow().request.unwrap()).unwrap().end_ns;
     assert!(sample.sampled_ns.abs_diff(sent) < 1_000, "within the turn-around");
-    bench.borrow_mut().encoder().set_alarms(Almc::BE, true);
+    bench.borrow_mut().encoder().raise_alarms(Almc::BE);
     let doubt = Error::Doubt(Doubt::Alarms { alarms: Almc::BE });
     assert_eq!(encoder.read_position(resolution, Policy::STRICT), Err(doubt));
     assert!(encoder.read_position(resolution, Policy::SINGLE_TURN).is_ok());

@@ -104,8 +104,8 @@ impl Map {
         line(out, "line", format_args!("RSSI {}, delay {} bits, edges in periods {periods}", delay >> 4, delay & 15))?;
 
         let doubt = if d.contains(OnlineD::POS) { ", not to be used: POS" } else { "" };
-        let position = number(id, map.position());
-        line(out, "fast position", format_args!("{position}, {} steps a frame{doubt}", map.velocity()))?;
+        let position = number(id, map.pos());
+        line(out, "fast position", format_args!("{position}, {} steps a frame{doubt}", map.vel()))?;
         self.safe(out, id)?;
         self.messages(out)?;
 
@@ -127,7 +127,7 @@ impl Map {
             flags if flags.contains(Online1::SCE) => ", not new: SCE",
             _ => "",
         };
-        let position = number(id, map.safe_position());
+        let position = number(id, map.vpos());
         line(out, "safe position", format_args!("{position}, SUMMARY {summary:02X}h, CRC {crc}{stale}"))?;
         let crc = check(map, Register::Status2, Register::VPos2, Register::VPosCrc2);
         let stale = match map.online_2() {
@@ -135,7 +135,7 @@ impl Map {
             flags if flags.contains(Online2::SCE2) => ", not new: SCE2",
             _ => "",
         };
-        let (position, status) = (map.safe_position_2(), map.status_2());
+        let (position, status) = (map.vpos2(), map.status_2());
         let fixed = if status.is_fixed_part_right() { "" } else { " (FIX2 is wrong)" };
         line(out, "safe position 2", format_args!("{position:010X}h, STATUS2 {status}{fixed}, CRC {crc}{stale}"))
     }

@@ -28,7 +28,7 @@ pub struct Resolution {
     pages: u8,
 }
 
-crate::show::one_line!(Resolution { Self { abs_bits, abm_bits, .. } => "{} + {} bits", abs_bits, abm_bits; });
+servowire_core::one_line!(Resolution { Self { abs_bits, abm_bits, .. } => "{} + {} bits", abs_bits, abm_bits; });
 
 /// What an encoder ID suggests.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -54,7 +54,7 @@ pub struct Position {
     pub combined: i64,
 }
 
-crate::show::one_line!(Position { Self { abs, turns, .. } => "turn {}, {} counts", turns, abs; });
+servowire_core::one_line!(Position { Self { abs, turns, .. } => "turn {}, {} counts", turns, abs; });
 
 impl Resolution {
     /// Widths of ABS (1..=24) and ABM (0..=24). Turns are signed, upper bits are checked, the EEPROM has six pages.

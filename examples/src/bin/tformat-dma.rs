@@ -4,7 +4,7 @@
 //! in `main` by a UART: DMA to it, DMA from it into a buffer, its idle interrupt, and a timer.
 
 use tformat::device::Device;
-use tformat::master::{Line, Progress, Transaction};
+use tformat::master::{Line, Progress, Transaction, Transmission};
 use tformat::{Abm, Abs, BitRate, Position, Request, Resolution, Response};
 
 /// After this much silence the UART says that the line is idle: one field.
@@ -26,18 +26,18 @@ impl Reader {
     }
 
     /// The timer of the control loop: what the DMA has to send, if the line is free. Start the receiving DMA before.
-    fn on_cycle(&mut self, now_ns: u64) -> Option<tformat::Frame> {
+    fn on_cycle(&mut self, now_ns: u64) -> Option<Transmission> {
         if self.transaction.is_some() || now_ns < self.ready_ns {
             return None;
         }
         let transaction = Transaction::start(Request::ReadAll, self.line, now_ns);
         self.transaction = Some(transaction);
-        Some(transaction.frame())
+        Some(transaction.transmission())
     }
 
     /// The idle interrupt: all that the DMA has received, whatever it is, and when the last byte of it ended.
     fn on_idle(&mut self, received: &[u8], now_ns: u64) -> Option<Result<Position, String>> {
-        let progress = self.transaction.as_mut()?.bytes(received, now_ns.saturating_sub(IDLE_NS));
+        let progress = self.transaction.as_mut()?.hear(received, now_ns.saturating_sub(IDLE_NS));
         self.end(progress)
     }
 
@@ -71,14 +71,10 @@ fn main() {
         let start_ns = u64::from(cycle).saturating_mul(100_000);
         let Some(request) = reader.on_cycle(start_ns) else { continue };
         encoder.set_position(Abs::truncate(cycle.wrapping_mul(0x11_1111)), Abm::truncate(cycle));
-        let sent_ns = start_ns.saturating_add(4_000);
-        let answer = request.as_bytes().iter().find_map(|byte| encoder.byte(*byte, sent_ns));
+        let answer = encoder.hear(request.frame.as_bytes(), request.end_ns);
         // In the fourth cycle the cable is broken.
         let outcome = match answer.filter(|_| cycle != 4) {
-            Some(answer) => {
-                let end_ns = answer.at_ns.saturating_add(44_000);
-                reader.on_idle(answer.frame.as_bytes(), end_ns.saturating_add(IDLE_NS))
-            }
+            Some(answer) => reader.on_idle(answer.frame.as_bytes(), answer.end_ns.saturating_add(IDLE_NS)),
             None => reader.on_timeout(start_ns.saturating_add(99_000)),
         };
         match outcome {

@@ -57,7 +57,7 @@ impl State {
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]
-pub enum Cause {
+pub enum RestartReason {
     /// The application asked for it (PRST).
     Requested,
     /// A START frame: no encoder, or the test pattern is not there.
@@ -89,7 +89,7 @@ impl fmt::Display for State {
     }
 }
 
-impl fmt::Display for Cause {
+impl fmt::Display for RestartReason {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Requested => f.write_str("asked for"),

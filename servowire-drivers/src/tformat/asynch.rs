@@ -134,7 +134,7 @@ impl<U: Read + Write, D: Direction, T: Timer> Encoder<U, D, T> {
         self.uart.flush().await.map_err(Error::Io)?;
         self.state.sent(self.timer.now_ns());
         let mut transaction = Transaction::start(request, self.line, start_ns);
-        let off_ns = driver_off_ns(&self.line, transaction.request_end_ns(), start_ns, taken_ns);
+        let off_ns = driver_off_ns(&self.line, transaction.transmission().end_ns, start_ns, taken_ns);
         self.timer.wait_until(off_ns).await;
         guard.receive().map_err(Error::Pin)?;
         let mut progress = transaction.progress();
@@ -163,7 +163,7 @@ impl<U: Read + Write, D: Direction, T: Timer> Encoder<U, D, T> {
             Some(count) => {
                 let count = count.map_err(Error::Io)?;
                 let bytes = buffer.get(..count).filter(|bytes| !bytes.is_empty()).ok_or(Error::Closed)?;
-                Ok(transaction.bytes(bytes, self.timer.now_ns()))
+                Ok(transaction.hear(bytes, self.timer.now_ns()))
             }
         }
     }

@@ -128,7 +128,7 @@ impl<U: Read + ReadReady + Write, D: Direction, C: Clock> Encoder<U, D, C> {
         self.uart.flush().map_err(Error::Io)?;
         self.state.sent(self.clock.now_ns());
         let mut transaction = Transaction::start(request, self.line, start_ns);
-        let off_ns = driver_off_ns(&self.line, transaction.request_end_ns(), start_ns, taken_ns);
+        let off_ns = driver_off_ns(&self.line, transaction.transmission().end_ns, start_ns, taken_ns);
         while self.clock.now_ns() < off_ns {}
         guard.receive().map_err(Error::Pin)?;
         loop {
@@ -158,7 +158,7 @@ impl<U: Read + ReadReady + Write, D: Direction, C: Clock> Encoder<U, D, C> {
         let mut buffer = [0; MAX_BYTES];
         let count = self.uart.read(&mut buffer).map_err(Error::Io)?;
         let bytes = buffer.get(..count).filter(|bytes| !bytes.is_empty()).ok_or(Error::Closed)?;
-        Ok(transaction.bytes(bytes, self.clock.now_ns()))
+        Ok(transaction.hear(bytes, self.clock.now_ns()))
     }
 
     /// Waits until the line is free, and throws away what comes meanwhile, errors of the UART included.

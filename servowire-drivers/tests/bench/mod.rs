@@ -141,11 +141,14 @@ impl Bench {
                     let shaft = place(self.turns);
                     self.encoder.set_position(Abs::truncate(shaft), Abm::truncate(3));
                     let now_ns = self.world.now_ns();
-                    let answer =
-                        if framed { self.encoder.byte(byte as u8, now_ns) } else { self.encoder.framing_error(now_ns) };
+                    let answer = if framed {
+                        self.encoder.hear(&[byte as u8], now_ns)
+                    } else {
+                        self.encoder.framing_error(now_ns)
+                    };
                     if let Some(answer) = answer {
                         let message = Message::bytes(answer.frame.as_bytes()).tagged(shaft.into());
-                        self.world.answer(0, unit.origin.transmission, &message, answer.at_ns);
+                        self.world.answer(0, unit.origin.transmission, &message, answer.start_ns);
                     }
                 }
             }

@@ -14,7 +14,7 @@ mod words;
 use std::io;
 use std::ops::Range;
 
-use hdsl::frame::{ANSWER_BITS, BIT_RATE, H_FRAME_BITS, Head, Received};
+use hdsl::frame::{ANSWER_BITS, BIT_RATE, H_FRAME_BITS, Head, ParsedHead};
 use hdsl::message::{LongAnswer, Request, Responder};
 use hdsl::sampling::{Delay, TEST_PATTERN};
 use hdsl::{
@@ -231,7 +231,7 @@ impl Decoder {
     }
 
     /// A head with its request; whether it is one of a running link that was damaged.
-    fn head(&mut self, found: Received, bits: &Bits, at: Range<u64>) -> bool {
+    fn head(&mut self, found: ParsedHead, bits: &Bits, at: Range<u64>) -> bool {
         let symbol = found.byte.symbol();
         let coded = bits.load(at.end - 14) & 0x3fff;
         let wrong = self.heads.check(found, coded as u16, self.at);
@@ -427,7 +427,7 @@ fn usual_delay(bits: &Bits, from: u64) -> u32 {
     best.map_or(0, |(delay, _)| delay)
 }
 
-fn master(head: Received, symbol: Result<MasterSymbol, Error>) -> Vec<Field> {
+fn master(head: ParsedHead, symbol: Result<MasterSymbol, Error>) -> Vec<Field> {
     let mut fields = Vec::with_capacity(4);
     fields.extend(symbol.ok().map(|symbol| Field::text("SYMBOL", symbol)));
     fields.push(Field::number("FIRST", head.byte.first()));

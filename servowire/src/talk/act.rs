@@ -160,9 +160,7 @@ pub(super) fn info<P: Port>(link: &mut Link<P>, name: &str, rate: BitRate) -> Do
 
 pub(super) fn clear_errors<P: Port>(link: &mut Link<P>) -> Done {
     let before = read_all(link)?.almc;
-    let mut reset = Reset::clear_errors();
-    let first = reset.start(link.now_ns());
-    link.run(first, |outcome, now_ns| reset.receive(outcome, now_ns))?;
+    link.run(Reset::clear_errors())?;
     let after = read_all(link)?.almc;
     say(format_args!("alarms before: {}; after: {}\n", name(before), name(after)))?;
     Ok(if after.is_empty() { ExitCode::SUCCESS } else { ExitCode::FAILURE })
@@ -173,15 +171,11 @@ fn name(almc: tformat::Almc) -> String {
 }
 
 fn read_byte<P: Port>(link: &mut Link<P>, page: Option<Page>, address: Address) -> Result<u8, Fault> {
-    let mut access = EepromAccess::read(page, address, EEPROM_POLLING);
-    let first = access.start(link.now_ns());
-    link.run(first, |outcome, now_ns| access.receive(outcome, now_ns))
+    link.run(EepromAccess::read(page, address, EEPROM_POLLING))
 }
 
 fn write_byte<P: Port>(link: &mut Link<P>, address: Address, data: u8) -> Result<u8, Fault> {
-    let mut access = EepromAccess::write(None, address, data, EEPROM_POLLING);
-    let first = access.start(link.now_ns());
-    link.run(first, |outcome, now_ns| access.receive(outcome, now_ns))
+    link.run(EepromAccess::write(None, address, data, EEPROM_POLLING))
 }
 
 /// The bytes of a page, after it was selected. The procedure reads the selection back.

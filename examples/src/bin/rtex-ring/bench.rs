@@ -103,7 +103,7 @@ impl Bench {
 
     /// The NC interrupt: reads the reception memory and writes the transmission memory.
     pub(crate) fn exchange(&mut self) -> Result<(), SizeMismatch> {
-        self.master.exchange_words32(&self.rx, &mut self.tx)
+        self.master.exchange_words32(&self.rx, &mut self.tx, self.now * u64::from(self.periods.update_ns))
     }
 
     /// An update period: the exchange, then the frame goes round. What a silent drive has said last stays in the memory.
@@ -162,7 +162,7 @@ impl Bench {
             let off = fitted.off_at.map_or(f64::NAN, |at| self.time_ms(at));
             let alarm = fitted.drive.alarm().map_or("-".to_owned(), |alarm| alarm.to_string());
             let reason = match self.master.ring().axes().get(place).map(Axis::state) {
-                Some(AxisState::Stopped(StopReason::OtherAxis(other))) => format!("axis {other}"),
+                Some(AxisState::Stopped(StopReason::OtherAxis { place: other })) => format!("axis {other}"),
                 Some(state) => state.to_string(),
                 None => String::new(),
             };

@@ -20,7 +20,7 @@ use std::error::Error;
 use std::process::ExitCode;
 
 use bench::{ASIC, AXES, Bench};
-use rtex_block::master::{Asic, AxisState, Fault, Led, Limits, Phase, StopReason};
+use rtex_block::master::{Asic, AxisState, Fault, Led, Limits, Phase, RingFailure, StopReason};
 use rtex_block::timing::{FrameTime, Periods, TimerSystem};
 
 const HELP: &str = "\
@@ -83,7 +83,7 @@ fn run(out: &str, swapped: bool) -> Result<(), Box<dyn Error>> {
     }
 
     until(&mut bench, &mut lamp, "all drives ready, servo off", AxisState::Off)?;
-    bench.master.ring_mut().switch_on();
+    bench.master.ring_mut().switch_on()?;
     until(&mut bench, &mut lamp, "all servos on", AxisState::On)?;
 
     let begin = bench.now;
@@ -216,7 +216,7 @@ fn until(bench: &mut Bench, lamp: &mut Lamp, what: &str, state: AxisState) -> Re
 fn report_stop(bench: &Bench, silent_at: u64) {
     let after = bench.time_ms(bench.now) - bench.time_ms(silent_at);
     say(bench.time_ms(bench.now), &format!("all servos off, {after:.1} ms after"));
-    if let Some((place, reason @ StopReason::EchoTimeout)) = bench.master.ring().failure() {
+    if let Some(RingFailure { place, reason: reason @ StopReason::EchoTimeout }) = bench.master.ring().failure() {
         println!("{:14}cause: axis {place}, {reason}; fault of the master: {:?}", "", bench.master.fault());
     }
 }

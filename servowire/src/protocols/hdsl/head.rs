@@ -1,6 +1,6 @@
 //! Heads of H-frames: where they are, and whether what they say goes on from the heads before.
 
-use hdsl::frame::{Head, Received};
+use hdsl::frame::{Head, ParsedHead};
 use hdsl::{LineDisparity, MasterSymbol, Window};
 
 use super::Refused;
@@ -12,7 +12,7 @@ const PATTERN: u128 = 0b1111_0100;
 const RULE: u8 = 16;
 
 /// A head at bit `at`; the partly high last bit of an EXTRA window can have been rounded to one bit more in all.
-pub(super) fn find(bits: &Bits, at: u64) -> Option<(Received, u64)> {
+pub(super) fn find(bits: &Bits, at: u64) -> Option<(ParsedHead, u64)> {
     let raw = bits.load(at);
     if raw & 0xff != PATTERN {
         return None;
@@ -62,7 +62,7 @@ pub(super) struct Heads {
 impl Heads {
     /// What is wrong with a head that stands by itself. `coded`: its EQUALISATION and PARA, the first bit in bit 0;
     /// `at`: its place in the V-frame.
-    pub(super) fn check(&mut self, head: Received, coded: u16, at: Option<u8>) -> Option<Refused> {
+    pub(super) fn check(&mut self, head: ParsedHead, coded: u16, at: Option<u8>) -> Option<Refused> {
         let symbol = head.byte.symbol();
         let (balanced, first, msync) =
             (self.is_balanced(head, coded), self.is_first(head, symbol.ok()), self.goes_with_v_frame(head, at));
@@ -100,7 +100,7 @@ impl Heads {
     }
 
     /// In a free-running link the count of the line is 0 before each head that follows an answered frame.
-    fn is_balanced(&mut self, head: Received, coded: u16) -> bool {
+    fn is_balanced(&mut self, head: ParsedHead, coded: u16) -> bool {
         if head.extra_bits > 0 || !self.answered {
             return true;
         }
@@ -109,7 +109,7 @@ impl Heads {
     }
 
     /// FIRST is 0 during start-up, then 1, but for masters that send it in the frames after a pulse only.
-    fn is_first(&mut self, head: Received, symbol: Option<MasterSymbol>) -> bool {
+    fn is_first(&mut self, head: ParsedHead, symbol: Option<MasterSymbol>) -> bool {
         match symbol {
             None => true,
             Some(MasterSymbol::Data(_) | MasterSymbol::Idle | MasterSymbol::Init) => {
@@ -120,7 +120,7 @@ impl Heads {
     }
 
     /// MSYNC is the same in the eight frames of a V-frame and changes from one to the next.
-    fn goes_with_v_frame(&mut self, head: Received, at: Option<u8>) -> bool {
+    fn goes_with_v_frame(&mut self, head: ParsedHead, at: Option<u8>) -> bool {
         let said = head.byte.msync();
         let Some(at) = at else {
             self.msync = None;

@@ -1,6 +1,6 @@
 //! A-format frames as events: names, values, positions, reasons.
 
-use nikon_aformat::inspect::Cause;
+use nikon_aformat::inspect::LineCause;
 use nikon_aformat::{
     Body, Command, Data, EncoderStatus, Error, Expected, Operation, Request, Resolution, Response, TypeWord,
 };
@@ -103,7 +103,7 @@ impl Encoder {
         match result {
             Ok(response) => {
                 position = self.response(response, &mut fields);
-                let (crc, _) = response.emit().crc();
+                let crc = response.emit().crc().want;
                 let received = group.contents().last().map_or(crc, |last| (last >> 8) as u8).reverse_bits();
                 fields.push(Field::hex("CRC", received, 2));
                 let motion = self.motion.get_mut(usize::from(response.ea.get()));
@@ -223,7 +223,7 @@ fn verdict(group: &Frames, names: &[&'static str], error: Option<Error>) -> Verd
         other => other.frame().map(usize::from),
     };
     let disturbed = matches!(error, Error::Crc { .. } | Error::Crc3 { .. });
-    let cause = disturbed.then(|| Cause::Disturbed.to_string());
+    let cause = disturbed.then(|| LineCause::Disturbed.to_string());
     let why = Refusal { cause, ..Refusal::new(error.class().name(), error) };
     group.refused(names, frame, error.bit(), why).into()
 }

@@ -24,7 +24,7 @@ pub(super) fn request(frame: &Frame, id: Option<DataId>, result: Result<Request,
         Err(_) => fields.push(bytes(frame)),
     }
     fields.extend(frame.spikes());
-    let names = id.map_or(&["CF"][..], |id| id.layout().0);
+    let names = id.map_or(&["CF"][..], |id| id.layout().request);
     event(frame, Direction::Request, id, fields, verdict(frame, names, result.err()))
 }
 
@@ -76,7 +76,7 @@ impl Encoder {
         }
         fields.extend(note);
         fields.extend(frame.spikes());
-        let names = frame.data_id().ok().or(id).map_or(&["CF"][..], |id| id.layout().1);
+        let names = frame.data_id().ok().or(id).map_or(&["CF"][..], |id| id.layout().response);
         let mut event = event(frame, Direction::Answer, id, fields, verdict(frame, names, result.err()));
         event.position = position;
         event.delay = delay;

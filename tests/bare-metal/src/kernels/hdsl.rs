@@ -2,7 +2,7 @@
 
 use hdsl::cable::{Cable, Disturbance};
 use hdsl::device::Device;
-use hdsl::frame::{Extra, Head, Received};
+use hdsl::frame::{Extra, Head, ParsedHead};
 use hdsl::master::{Counters, Master};
 use hdsl::message::{Access, Data, Length, LongRequest, RemoteRegister, ResourceAddress, ShortAnswer, ShortRequest};
 use hdsl::registers::{Event, EventS, Register, Registers};
@@ -152,7 +152,7 @@ kernels! {
     /// Eight answers to both safe positions.
     fn hdsl_v_frame(lines: &[u64; 8]) -> (Result<u64, Error>, Result<u64, Error>) {
         let frame = VFrame::of(Rule::Strict, &lines.map(|line| Answer::from_bits(Rule::Strict, line)));
-        (frame.safe1.position(), frame.safe2.position())
+        (frame.safe1.vpos(), frame.safe2.vpos())
     } over GROUPS;
 
     /// The identifier of an encoder.
@@ -172,7 +172,7 @@ kernels! {
             tracker.step(value.and_then(DeltaDelta::new));
         }
         tracker.align(12_345);
-        (tracker.position(), tracker.velocity())
+        (tracker.registers().pos, tracker.registers().vel)
     } over ACCELERATIONS;
 
     /// The same with the position of the SDK.
@@ -182,7 +182,7 @@ kernels! {
             tracker.step(value.and_then(DeltaDelta::new));
         }
         tracker.no_safe_position();
-        (tracker.position(), tracker.velocity())
+        (tracker.registers().pos, tracker.registers().vel)
     } over ACCELERATIONS;
 
     /// One event of the quality monitor.
@@ -193,7 +193,7 @@ kernels! {
     } over SYMBOLS;
 
     /// The head of a frame, and what an encoder reads of it.
-    fn hdsl_head((byte, edge, disparity): &(u8, u8, i8)) -> Result<Received, Error> {
+    fn hdsl_head((byte, edge, disparity): &(u8, u8, i8)) -> Result<ParsedHead, Error> {
         let (head, _) = Head::new(ParameterByte::new(*byte), Extra::new(*edge), LineDisparity::new(*disparity));
         Head::parse(head.bits())
     } over HEADS;
@@ -261,16 +261,16 @@ kernels! {
         let mut line = Cable::new(Disturbance::metres(10).with_jitter(1), 1);
         for frame in 0..*frames {
             let head = line.down(master.transmission().head.bits());
-            let samples = line.up(encoder.answer(head, u64::from(frame)));
+            let samples = line.up(encoder.hear(head, u64::from(frame)));
             if frame == 25 {
                 let _ = master.start_short(ShortRequest::Read(RemoteRegister::PING));
                 let access = Access::Read(Length::Eight);
                 let address = ResourceAddress::RESOLUTN;
                 let _ = master.start_long(LongRequest { address, indirect: false, offset: None, access });
             }
-            let _ = map.apply(master.finish(&samples, None)?);
+            let _ = map.apply(master.hear(&samples, 11_520 * u64::from(frame))?);
         }
-        Ok((master.counters(), map.position()))
+        Ok((master.counters(), map.pos()))
     } over LINKS;
 
     /// What an application does with registers.

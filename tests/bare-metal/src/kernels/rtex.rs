@@ -7,7 +7,7 @@ use rtex_block::device::{self, Drive, DriveConfig, OpenCodes};
 use rtex_block::inspect::{self, Report};
 use rtex_block::master::{
     ActiveCode, Asic, Axis, AxisConfig, CommandCounter, EchoWatch, Expected, Fault, Handshake, Inputs, Led, Limits,
-    Order, Phase, PhaseControl, ProfileMove, Progress, Received, Reception, Ring, ServoOff, Slave, SlaveInfo, Turn,
+    Order, Phase, PhaseControl, ProfileMove, Progress, Heard, Reception, Ring, ServoOff, Slave, SlaveInfo, Turn,
     compare, led,
 };
 use rtex_block::position::{self, Gear};
@@ -191,24 +191,24 @@ kernels! {
     } over [(ProfileMove::new(MAC_ID, 0x11, 1_000, 500, 100), RESPONSE)];
 
     /// An update period of one axis: response in, command out.
-    fn rtex_axis((axis, received): &(Axis, Received)) -> Command32 {
+    fn rtex_axis((axis, received): &(Axis, Heard)) -> Command32 {
         let mut axis = *axis;
-        axis.receive(Turn::Valid(COUNTER), received);
+        axis.hear(Turn::Valid(COUNTER), received, 1_000_000);
         let _ = axis.set_position(1_010);
         axis.send(Turn::Valid(COUNTER))
-    } over [(AXIS, Received::Main(RESPONSE)), (AXIS, Received::Nothing)];
+    } over [(AXIS, Heard::Main(RESPONSE)), (AXIS, Heard::Nothing)];
 
     /// The position for control, or why there is none.
-    fn rtex_axis_position(axis: &Axis) -> Result<i32, Doubt> {
-        axis.position(2)
+    fn rtex_axis_position(axis: &Axis) -> Result<Sample, Doubt> {
+        axis.evidence().at(2_000_000, POLICY)
     } over [AXIS];
 
     /// An update period of a ring of four axes.
-    fn rtex_ring((axes, received): &([Axis; 4], [Received; 4])) -> Option<[Command32; 4]> {
+    fn rtex_ring((axes, received): &([Axis; 4], [Heard; 4])) -> Option<[Command32; 4]> {
         let mut ring = Ring::new(*axes, 0).ok()?;
-        ring.switch_on();
-        Some(ring.update(received))
-    } over [([axis(5), axis(6), axis(7), axis(8)], [Received::Main(RESPONSE); 4])];
+        let _ = ring.switch_on();
+        Some(ring.update(received, 1_000_000))
+    } over [([axis(5), axis(6), axis(7), axis(8)], [Heard::Main(RESPONSE); 4])];
 
     /// An exchange with the drive model.
     fn rtex_drive((drive, command): &(Drive, Command)) -> [u8; 16] {

@@ -208,7 +208,7 @@ struct VFrameRow {
 }
 
 fn safe_class(block: SafeBlock) -> &'static str {
-    match block.position() {
+    match block.vpos() {
         Ok(_) => "ok",
         Err(Error::InvalidWord { .. }) => "byte_error",
         Err(Error::Crc { .. }) => "crc_error",
@@ -218,7 +218,7 @@ fn safe_class(block: SafeBlock) -> &'static str {
 }
 
 fn safe_bytes(block: SafeBlock) -> [Hex; 3] {
-    [Hex(block.status().into()), Hex(block.raw_position()), Hex(block.raw_crc().into())]
+    [Hex(block.status().into()), Hex(block.raw_vpos()), Hex(block.raw_crc().into())]
 }
 
 pub(super) fn vframe(rows: &[Row]) -> Vec<Verdict> {

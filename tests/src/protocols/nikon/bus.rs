@@ -86,7 +86,7 @@ pub(super) fn line(_: &str, row: BusRow) -> Verdict {
     let mut slots = Vec::new();
     for bit in row.line.0 {
         if let Some(reply) = receiver.push(bit) {
-            let crc = reply.ok().map(|reply| reply.crc().0);
+            let crc = reply.ok().map(|reply| reply.crc().got);
             slots.push(Slot::of(bus.push(reply), crc));
         }
     }

@@ -3,7 +3,7 @@
 use nikon_aformat::BitOrder::MsbFirst;
 use nikon_aformat::reception::LineReceiver;
 use nikon_aformat::{
-    Alm, Body, Data, Echo, EchoField, EncoderId, EncoderStatus, Error, Expected, Layout, RawResponse, Resolution,
+    Alm, Body, Crc, Data, Echo, EchoField, EncoderId, EncoderStatus, Error, Expected, Layout, RawResponse, Resolution,
     Response, U19, Version, Window,
 };
 use serde::Deserialize;
@@ -108,7 +108,7 @@ pub(super) fn response(name: &str, row: ResponseRow) -> Verdict {
     let at_offset = or_unreadable(Window::read(&row.packed.0, 0, row.bits, MsbFirst))?;
     same("from packed bytes", &Ok(response), &Response::parse_line(&expected, at_offset))?;
     same("sent again", &Ok(response), &Response::parse(&expected, &response.emit()))?;
-    same("crc", &(row.expect.crc, row.expect.crc), &reply.crc())?;
+    same("crc", &Crc { got: row.expect.crc, want: row.expect.crc }, &reply.crc())?;
     let first = reply.contents().first().copied().unwrap_or(0);
     same("sync", &row.expect.sync, &(first & 7))?;
     same("fixed", &row.expect.fixed, &response.command().map(|_| first >> 11 & 1))?;
@@ -338,7 +338,7 @@ pub(super) fn anchor(_: &str, row: AnchorRow) -> Verdict {
     same("es", &want.es, &es)?;
     same("es_wire_order", &want.es_wire_order.unwrap_or(es.reverse_bits() >> 4), &(es.reverse_bits() >> 4))?;
     same("abs", &want.abs.or(response.abs()), &response.abs())?;
-    let (crc, _) = response.emit().crc();
+    let crc = response.emit().crc().want;
     same("crc", &want.crc, &crc)?;
     same("crc as printed", &want.crc_lsb_first_as_printed.unwrap_or(crc.reverse_bits()), &crc.reverse_bits())?;
     let (Some(single_turn), Some(turns)) = (want.single_turn, want.turns) else { return Ok(()) };

@@ -4,7 +4,7 @@ use core::fmt::Display;
 use core::num::NonZeroU16;
 
 use rtex_block::master::{
-    ActiveCode, Axis, AxisConfig, AxisState, Failure, Handshake, Limits, ProfileMove, Progress, Received, StopReason,
+    ActiveCode, Axis, AxisConfig, AxisState, Failure, Handshake, Heard, Limits, ProfileMove, Progress, StopReason,
     SubHandshake, Turn,
 };
 use rtex_block::position::Gear;
@@ -222,10 +222,10 @@ pub(super) fn axis(rows: &[Row]) -> Vec<Verdict> {
         let mut counter = UpdateCounter::ZERO;
         for step in row.steps {
             let received = match &step.response {
-                Some(bytes) => Received::from(Response::parse(&bytes.0)),
-                None => Received::Nothing,
+                Some(bytes) => Heard::from(Response::parse(&bytes.0)),
+                None => Heard::Nothing,
             };
-            axis.receive(Turn::Valid(counter), &received);
+            axis.hear(Turn::Valid(counter), &received, 0);
             if let Some(action) = step.action {
                 act(&mut axis, action)?;
             }
@@ -244,7 +244,7 @@ fn act(axis: &mut Axis, action: Action) -> Verdict {
     let refused = |e: &dyn Display| unreadable(e.to_string());
     match action {
         // Where it does nothing, state and block say so.
-        Action::SwitchOn => _ = axis.switch_on(),
+        Action::SwitchOn => _ = axis.switch_on().ok(),
         Action::SwitchOff => axis.switch_off(),
         Action::Clear => axis.clear(),
         Action::Stop => axis.stop(StopReason::Requested),
