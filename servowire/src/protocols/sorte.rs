@@ -80,7 +80,7 @@ fn guess(packet: &Packet) -> &'static str {
 type Decoded = Result<(&'static str, Vec<Field>), Error>;
 
 fn long(bytes: &[u8]) -> Decoded {
-    let frame = LongFrame::new(bytes)?;
+    let frame = LongFrame::parse(bytes)?;
     let mut fields = vec![status(frame.status())];
     match frame.frame_type() {
         FrameType::Discovery => {
@@ -109,7 +109,7 @@ fn long(bytes: &[u8]) -> Decoded {
 
 fn exchange(bytes: &[u8]) -> Decoded {
     if bytes.first() == Some(&0) {
-        let view = MasterFrameView::new(bytes.len().saturating_sub(MasterFrameView::OVERHEAD), bytes)?;
+        let view = MasterFrameView::parse(bytes.len().saturating_sub(MasterFrameView::OVERHEAD), bytes)?;
         let mut fields = vec![status(view.status())];
         // Four bytes a device is the CNC machine; anything else is shown as it is.
         if view.output().len() % 4 == 0 && view.output().len() <= 16 {
@@ -121,7 +121,7 @@ fn exchange(bytes: &[u8]) -> Decoded {
         fields.push(Field::measured("time stamp", view.time_stamp(), "ns"));
         return Ok(("master", fields));
     }
-    let view = DeviceFrameView::new(bytes.len().saturating_sub(DeviceFrameView::OVERHEAD), bytes)?;
+    let view = DeviceFrameView::parse(bytes.len().saturating_sub(DeviceFrameView::OVERHEAD), bytes)?;
     Ok(("device", vec![Field::number("SA", view.address().get()), status(view.status()), data(view.payload())]))
 }
 
