@@ -5,6 +5,7 @@
 
 #[cfg(feature = "servowire-core")]
 pub(crate) mod core_time;
+mod core_feedback;
 #[cfg(feature = "deliberate-panic")]
 mod deliberate_panic;
 #[cfg(feature = "servowire-drivers")]
@@ -41,6 +42,7 @@ pub(crate) struct Kernel {
 pub(crate) const ALL: &[&[Kernel]] = &[
     #[cfg(feature = "servowire-core")]
     core_time::KERNELS,
+    core_feedback::KERNELS,
     #[cfg(feature = "nrz-line")]
     nrz_line::KERNELS,
     #[cfg(feature = "hdsl")]

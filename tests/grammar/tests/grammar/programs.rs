@@ -108,7 +108,7 @@ macro_rules! procedure {
 
 /// Evidence is judged where it is used, and travels through a cell.
 macro_rules! feedback {
-    ($krate:ident: $evidence:expr, sampled at $sampled_ns:expr; words $words:literal; $from:literal) => {
+    ($krate:ident: $evidence:expr, sampled at $sampled_ns:expr; $from:literal) => {
         pub(crate) const FEEDBACK: &str = $from;
 
         #[test]
@@ -125,7 +125,7 @@ macro_rules! feedback {
             let doubt: &dyn core::error::Error = &old;
             assert!(doubt.to_string().contains("125001 ns"));
 
-            let mut cell = servowire_core::Cell::<Evidence, $words>::new();
+            let mut cell = $krate::EvidenceCell::new();
             let (mut writer, mut reader) = cell.split();
             assert_eq!(reader.at($sampled_ns, policy), Err(Doubt::Never));
             writer.put(evidence);
@@ -136,7 +136,7 @@ macro_rules! feedback {
 
 /// The other end, with a decision that the documents leave open, and with a fault.
 macro_rules! device {
-    ($krate:ident::$device:ident = $value:expr; with $behaviour:expr; heard $unit:expr, at $end_ns:expr) => {
+    ($krate:ident::$device:ident = $value:expr; with $behaviour:expr; heard($($heard:expr),+), at $end_ns:expr) => {
         pub(crate) const DEVICE: &str = concat!("`", stringify!($device), "`");
 
         #[test]
@@ -146,11 +146,11 @@ macro_rules! device {
             let mut device = $value;
             assert_eq!(Behaviour::new(), Behaviour::default());
             device.set_behaviour($behaviour);
-            assert!(device.hear($unit, $end_ns).is_some());
+            assert!(device.hear($($heard,)+ $end_ns).is_some());
             device.set_fault(Fault::Silent);
-            assert!(device.hear($unit, $end_ns + 1_000_000).is_none());
+            assert!(device.hear($($heard,)+ $end_ns + 1_000_000).is_none());
             device.set_fault(Fault::None);
-            assert!(device.hear($unit, $end_ns + 2_000_000).is_some());
+            assert!(device.hear($($heard,)+ $end_ns + 2_000_000).is_some());
         }
     };
 }
