@@ -18,6 +18,7 @@ mod encoder_id;
 mod error;
 mod evidence;
 pub mod frame;
+pub mod inspect;
 mod line_code;
 pub mod master;
 pub mod message;
