@@ -220,7 +220,10 @@ impl Feedback for Evidence {
     }
 }
 
-/// For a [`servowire_core::Cell`].
+/// Carries evidence from where it is received to where it is used, between two priorities or cores.
+pub type EvidenceCell = servowire_core::Cell<Evidence, 5>;
+
+/// For an [`EvidenceCell`].
 ///
 /// ```text
 ///  word 0, 1   instant of sampling, low half first

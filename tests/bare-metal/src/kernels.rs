@@ -4,8 +4,8 @@
 //! here, one line in [`ALL`], and its figures in `budget.toml` (`run.sh --record` adds them).
 
 #[cfg(feature = "servowire-core")]
-pub(crate) mod core_time;
 mod core_feedback;
+pub(crate) mod core_time;
 #[cfg(feature = "deliberate-panic")]
 mod deliberate_panic;
 #[cfg(feature = "servowire-drivers")]

@@ -4,7 +4,7 @@
 
 /// Decodes a sound unit and refuses a damaged one with an error that has a class, a name, a number and a text.
 macro_rules! decode {
-    ($krate:ident::$unit:ident($($context:ident = $value:expr,)* $data:ident);
+    ($krate:ident::$unit:ident($($context:ident = $value:expr),*; $data:ident);
      sound $sound:expr; damaged $damaged:expr => $class:literal) => {
         pub(crate) const DECODE: &str =
             concat!("`", stringify!($unit), "::parse(", $(stringify!($context), ", ",)* stringify!($data), ")`");
@@ -99,9 +99,9 @@ macro_rules! procedure {
                 let ready_ns = not_before_ns + 50_000;
                 Ok::<_, Infallible>(servowire_core::Ended { outcome: Err($lost), ready_ns })
             });
-            let Ok(servowire_core::Ended { outcome: Err(error), ready_ns }) = ended;
-            let _: $krate::Error = error;
-            assert!(sent > 0 && ready_ns >= 51_000);
+            let Ok(ended) = ended;
+            let error: $krate::Error = ended.outcome.unwrap_err();
+            assert!(sent > 0 && ended.ready_ns >= 51_000, "{error}");
         }
     };
 }
@@ -157,7 +157,7 @@ macro_rules! device {
 
 /// For tools: what is wrong, and what the likely cause is.
 macro_rules! inspect {
-    ($krate:ident::inspect($($context:ident = $value:expr,)* $data:ident); damaged $damaged:expr => $class:literal) => {
+    ($krate:ident::inspect($($context:ident = $value:expr),*; $data:ident); damaged $damaged:expr => $class:literal) => {
         pub(crate) const INSPECT: &str =
             concat!("`inspect(", $(stringify!($context), ", ",)* stringify!($data), ")`");
 

@@ -1,6 +1,6 @@
 use core::convert::Infallible;
 
-use tformat::device::{Behaviour, Device};
+use tformat::device::Device;
 use tformat::master::{Line, Reset};
 use tformat::{BitRate, Error, Request, Resolution, Response, Window};
 
@@ -22,7 +22,7 @@ fn evidence() -> tformat::Evidence {
     tformat::Evidence::of(response, Resolution::new(23, 16).unwrap(), 1_000_000)
 }
 
-decode! { tformat::Response(request = Request::ReadAll, bytes); sound &ALL; damaged &DAMAGED => "crc" }
+decode! { tformat::Response(request = Request::ReadAll; bytes); sound &ALL; damaged &DAMAGED => "crc" }
 encode! { tformat::Request = Request::ReadAll }
 code! { tformat::DataId: 3; unknown 4 }
 exchange! { tformat::Transaction::start(request = Request::ReadAll, line = line()); heard &ALL, at 55_000 }
@@ -33,6 +33,6 @@ device! {
     with Behaviour::new().with_response_delay_ns(5_000);
     heard(&[0x1a]), at 4_000
 }
-inspect! { tformat::inspect(request = Request::ReadAll, line); damaged window(&DAMAGED) => "crc" }
+inspect! { tformat::inspect(request = Request::ReadAll; line); damaged window(&DAMAGED) => "crc" }
 log! { tformat: Request, Response, tformat::master::Exchange, tformat::DataId }
 counters! { tformat }
