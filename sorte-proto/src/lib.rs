@@ -30,6 +30,7 @@ mod frame_type;
 mod hex;
 pub mod host;
 pub mod iep;
+pub mod inspect;
 mod line_delay;
 mod link;
 pub mod master;
