@@ -1,4 +1,4 @@
-use servowire_core::{Feedback, Words};
+use servowire_core::{Angle, Feedback, Shaft, Words};
 
 use crate::count::{Abm, Abs};
 use crate::doubt::Doubt;
@@ -217,6 +217,13 @@ impl Feedback for Evidence {
     #[inline]
     fn at(&self, now_ns: u64, policy: Policy) -> Result<Sample, Doubt> {
         self.at(now_ns, policy)
+    }
+}
+
+/// For a [`servowire_core::ShaftCell`], which also gives the angle of an instant between two samples.
+impl Shaft for Evidence {
+    fn shaft(sample: &Sample) -> (Angle, u64) {
+        (sample.angle(), sample.sampled_ns())
     }
 }
 
