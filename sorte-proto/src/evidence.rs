@@ -123,6 +123,9 @@ impl Feedback for Evidence {
     }
 }
 
+/// Carries evidence from where it is received to where it is used, between two priorities or cores.
+pub type EvidenceCell = servowire_core::Cell<Evidence, 4>;
+
 /// Time, low half first; steps, STATUS of the driver, and in the last byte whether they are there; address and STATUS.
 impl Words<4> for Evidence {
     fn to_words(&self) -> [u32; 4] {

@@ -10,8 +10,8 @@ use nikon_aformat::{
 const EA: EncoderAddress = EncoderAddress::ZERO;
 
 /// Command 0 answered by the encoder at address 0, sampled MSB first: no status, turn 5, 4711 counts.
-const SOUND: [u16; 4] = [0x2000, 0xe648, 0x2140, 0x0077];
-const DAMAGED: [u16; 4] = [0x2000, 0xe648, 0x2140, 0x0076];
+const SOUND: [u16; 4] = [0x2000, 0xe648, 0x5000, 0x0003];
+const DAMAGED: [u16; 4] = [0x2000, 0xe648, 0x5000, 0x0002];
 
 fn request() -> Request {
     Request::new(EA, Operation::Abs40)
