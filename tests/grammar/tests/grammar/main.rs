@@ -5,9 +5,9 @@
 #[macro_use]
 mod programs;
 
-//mod hdsl;
-//mod nikon;
-//mod rtex;
-//mod sorte;
-//mod table;
+mod hdsl;
+mod nikon;
+mod rtex;
+mod sorte;
+mod table;
 mod tformat;

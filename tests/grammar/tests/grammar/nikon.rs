@@ -49,7 +49,7 @@ fn the_words_are_what_they_are_said_to_be() {
     assert_eq!(request().command(), Command::Abs40);
 }
 
-decode! { nikon_aformat::Response(expected = &expected(); raw); sound &raw(SOUND); damaged &raw(DAMAGED) => "crc8" }
+decode! { nikon_aformat::Response(expected = &expected(); raw); sound &raw(SOUND); damaged &raw(DAMAGED) => "crc" }
 encode! { nikon_aformat::Request = request() }
 code! { nikon_aformat::Command: 3; unknown 31 }
 exchange! {
@@ -61,11 +61,11 @@ feedback! { nikon_aformat: evidence(), sampled at 1_000_000; "`exchange.evidence
 device! {
     nikon_aformat::Device = Device::<1>::new(EA, resolution(), BitRate::Mbit4);
     with Behaviour::new().with_turn_around_ns(4_000);
-    heard(&[Some(request().emit().as_slice()[0].content())]), at 6_000
+    heard |at| (&[Some(request().emit().as_slice()[0].content())], at)
 }
 inspect! {
     nikon_aformat::inspect(request = request(), resolution = resolution(); line);
-    damaged window(DAMAGED) => "crc8"
+    damaged window(DAMAGED) => "crc"
 }
 log! { nikon_aformat: Request, Response, nikon_aformat::master::Exchange, Command }
 counters! { nikon_aformat }

@@ -24,12 +24,12 @@ macro_rules! decode {
 
 /// Encodes a message to the other end.
 macro_rules! encode {
-    ($krate:ident::$message:ident = $value:expr) => {
-        pub(crate) const ENCODE: &str = concat!("`", stringify!($message), "::emit()`");
+    ($krate:ident $(:: $message:ident)+ = $value:expr) => {
+        pub(crate) const ENCODE: &str = concat!("`", $(stringify!($message), "::",)+ "emit()`");
 
         #[test]
         fn encode() {
-            let message: $krate::$message = $value;
+            let message: $krate $(:: $message)+ = $value;
             assert_eq!(message.emit(), message.emit());
             assert!(!message.to_string().is_empty());
         }
@@ -38,16 +38,16 @@ macro_rules! encode {
 
 /// A code of the wire becomes an enum and back.
 macro_rules! code {
-    ($krate:ident::$code:ident: $known:expr; unknown $unknown:expr) => {
-        pub(crate) const CODE: &str = concat!("`", stringify!($code), "::from_code(code)`");
+    ($krate:ident $(:: $code:ident)+: $known:expr; unknown $unknown:expr) => {
+        pub(crate) const CODE: &str = concat!("`", $(stringify!($code), "::",)+ "from_code(code)`");
 
         #[test]
         fn code() {
-            let known = $krate::$code::from_code($known).unwrap();
+            let known = <$krate $(:: $code)+>::from_code($known).unwrap();
             assert_eq!(known.code(), $known);
             assert_eq!(known.to_string(), known.name());
-            assert!($krate::$code::ALL.contains(&known));
-            assert_eq!($krate::$code::from_code($unknown), None);
+            assert!(<$krate $(:: $code)+>::ALL.contains(&known));
+            assert_eq!(<$krate $(:: $code)+>::from_code($unknown), None);
         }
     };
 }
@@ -65,8 +65,6 @@ macro_rules! exchange {
             let mut machine = $krate::master::$machine::start($($value,)* 1_000);
             let sent = machine.transmission();
             assert!(sent.start_ns == 1_000 && sent.end_ns > sent.start_ns);
-            assert!(sent.driver_on_ns <= sent.start_ns);
-            assert!(sent.driver_off.earliest_ns >= sent.end_ns && sent.driver_off.latest_ns > sent.driver_off.earliest_ns);
             assert!(matches!(machine.progress(), Progress::Pending { until_ns } if until_ns > sent.end_ns));
             let Progress::Done { value, ready_ns } = machine.hear($unit, $end_ns) else { panic!("no response") };
             assert!(ready_ns >= $end_ns);
@@ -136,7 +134,7 @@ macro_rules! feedback {
 
 /// The other end, with a decision that the documents leave open, and with a fault.
 macro_rules! device {
-    ($krate:ident::$device:ident = $value:expr; with $behaviour:expr; heard($($heard:expr),+), at $end_ns:expr) => {
+    ($krate:ident::$device:ident = $value:expr; with $behaviour:expr; heard |$at:ident| ($($heard:expr),+)) => {
         pub(crate) const DEVICE: &str = concat!("`", stringify!($device), "`");
 
         #[test]
@@ -146,11 +144,12 @@ macro_rules! device {
             let mut device = $value;
             assert_eq!(Behaviour::new(), Behaviour::default());
             device.set_behaviour($behaviour);
-            assert!(device.hear($($heard,)+ $end_ns).is_some());
-            device.set_fault(Fault::Silent);
-            assert!(device.hear($($heard,)+ $end_ns + 1_000_000).is_none());
-            device.set_fault(Fault::None);
-            assert!(device.hear($($heard,)+ $end_ns + 2_000_000).is_some());
+            let answers = [Fault::None, Fault::Silent, Fault::None].into_iter().zip(1..).map(|(fault, ms)| {
+                let $at = ms * 1_000_000_u64;
+                device.set_fault(fault);
+                device.hear($($heard),+).is_some()
+            });
+            assert!(answers.eq([true, false, true]));
         }
     };
 }
@@ -165,7 +164,8 @@ macro_rules! inspect {
         fn inspect() {
             use $krate::inspect::{Cause, Findings, Report};
 
-            let report: Report = $krate::inspect::inspect($($value,)* $damaged);
+            let damaged = $damaged;
+            let report: Report = $krate::inspect::inspect($($value,)* damaged);
             let error: $krate::Error = report.error().unwrap();
             assert_eq!(error.class().name(), $class);
             let findings: Findings = report.findings();

@@ -31,7 +31,7 @@ feedback! { tformat: evidence(), sampled at 1_000_000; "`exchange.evidence(resol
 device! {
     tformat::Device = Device::<6>::new(0x17, BitRate::Mbit2_5);
     with Behaviour::new().with_response_delay_ns(5_000);
-    heard(&[0x1a]), at 4_000
+    heard |at| (&[0x1a], at)
 }
 inspect! { tformat::inspect(request = Request::ReadAll; line); damaged window(&DAMAGED) => "crc" }
 log! { tformat: Request, Response, tformat::master::Exchange, tformat::DataId }
