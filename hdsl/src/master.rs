@@ -79,6 +79,7 @@ pub struct Master {
     state: State,
     /// Frames of the state that are done.
     done: u8,
+    disparity: LineDisparity,
     present: Transmission,
     alignment: Option<Alignment>,
     /// Sample periods with edges of the test pattern, since LEARN.
@@ -118,13 +119,14 @@ impl Master {
 
     fn start(dialect: Dialect, sync: Option<Synchroniser>) -> Self {
         let extra = sync.map(|sync| sync.extra());
-        let present = transmission(State::Reset, MasterSymbol::Reset, false, extra, LineDisparity::ZERO);
+        let (present, disparity) = transmission(State::Reset, MasterSymbol::Reset, false, extra, LineDisparity::ZERO);
         Self {
             dialect,
             sync,
             pulse: sync.map(|sync| sync.period()),
             state: State::Reset,
             done: 0,
+            disparity,
             present,
             alignment: None,
             edges: 0,
