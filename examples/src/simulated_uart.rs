@@ -5,7 +5,7 @@ use core::convert::Infallible;
 
 use embedded_hal::digital::{ErrorType as PinErrorType, OutputPin};
 use embedded_io::{ErrorType, Read, ReadReady, Write};
-use servowire_drivers::Clock;
+use servowire_drivers::{Clock, ClockError};
 use tformat::device::{Device, Fault};
 use tformat::{Abm, Abs, BitRate};
 
@@ -66,8 +66,8 @@ impl Bench {
 
 impl Clock for &Bench {
     /// Every look at the clock costs 100 ns, so that waiting ends.
-    fn now_ns(&mut self) -> u64 {
-        self.pass(100)
+    fn now_ns(&mut self) -> Result<u64, ClockError> {
+        Ok(self.pass(100))
     }
 }
 
@@ -93,9 +93,9 @@ impl Write for Uart<'_> {
             let now_ns = self.0.pass(FIELD_NS);
             let mut line = self.0.line.borrow_mut();
             line.put(now_ns, *byte);
-            if let Some(sent) = self.0.encoder.borrow_mut().byte(*byte, now_ns) {
+            if let Some(sent) = self.0.encoder.borrow_mut().hear(&[*byte], now_ns) {
                 for (k, byte) in (1..).zip(sent.frame.as_bytes()) {
-                    line.put(sent.at_ns.wrapping_add(FIELD_NS.wrapping_mul(k)), *byte);
+                    line.put(sent.start_ns.wrapping_add(FIELD_NS.wrapping_mul(k)), *byte);
                 }
             }
         }

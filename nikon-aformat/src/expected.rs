@@ -5,7 +5,7 @@ use crate::frame::truncated;
 use crate::layout::{FRAME_BITS, Layout};
 use crate::number::{EncoderAddress, EncoderId, U19};
 use crate::operation::Operation;
-use crate::raw_response::RawResponse;
+use crate::raw_response::{Crc, RawResponse};
 
 /// Value of the sync code that begins a response.
 pub(crate) const SYNC_CODE: u8 = 4;
@@ -152,9 +152,9 @@ impl Expected {
         if raw.frames() != self.layout.frames() {
             return truncated(u32::from(raw.frames()).wrapping_mul(FRAME_BITS), want);
         }
-        let (got, computed) = raw.crc();
-        if got != computed {
-            return Error::Crc { got, want: computed };
+        let Crc { got, want } = raw.crc();
+        if got != want {
+            return Error::Crc { got, want };
         }
         let first = raw.contents().first().copied().unwrap_or(0);
         let sync = (first & SYNC) as u8;

@@ -6,7 +6,7 @@
 //! response sound is the cause.
 //!
 //! ```
-//! use nikon_aformat::inspect::{Cause, inspect};
+//! use nikon_aformat::inspect::{Cause, LineCause, inspect};
 //! use nikon_aformat::{Data, EncoderAddress, EncoderStatus, Operation, Resolution, Request, Response, U24};
 //!
 //! let request = Request::new(EncoderAddress::ZERO, Operation::Abs24Low);
@@ -14,27 +14,26 @@
 //! let answer = Response::new(EncoderAddress::ZERO, request.command(), EncoderStatus::empty(), data);
 //! // A and B exchanged: every level is inverted
 //! let report = inspect(request, Resolution::default(), answer.emit().line().inverted());
-//! assert_eq!(report.cause, Some(Cause::LineInverted));
-//! assert_eq!(report.response, Some(answer));
+//! assert_eq!(report.cause(), Some(Cause::Line(LineCause::LineInverted)));
+//! assert_eq!(report.response(), Some(answer));
 //! ```
 
-use core::fmt;
-
-use nrz_line::{BitOrder, Window};
+use nrz_line::{BitOrder, Search, Window};
 
 use crate::command::Command;
 use crate::error::{Error, ErrorClass};
 use crate::expected::Expected;
-use crate::frame::RequestFrame;
 use crate::layout::{FRAME_BITS, Layout};
 use crate::number::EncoderAddress;
-use crate::raw_response::RawResponse;
+use crate::raw_response::{Crc, RawResponse};
 use crate::request::Request;
 use crate::resolution::Resolution;
 use crate::response::Response;
 
+pub use nrz_line::Cause as LineCause;
+
 /// One frame, read without judging it.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct RawFrame {
@@ -73,25 +72,11 @@ impl Kind {
 
 /// What most likely went wrong.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]
 pub enum Cause {
-    /// Every level is inverted: A and B are exchanged, or the receiver's polarity is wrong.
-    LineInverted,
-    /// The response was taken `bits` bits too early (negative: too late).
-    Shifted {
-        /// Idle bits in front of the response; negative: bits of it that are missing.
-        bits: i8,
-    },
-    /// Bits are packed most significant first and were read least significant first, or the other way round.
-    WrongBitOrder,
-    /// The own request came back, and the response after it.
-    OwnEcho,
-    /// Only the own request came back: no encoder, or A and B are exchanged on a half-duplex line.
-    OnlyEcho,
-    /// The line was sampled twice a bit: the real rate is half of the assumed one.
-    HalfRate,
+    /// The line itself was damaged, or is connected or read in a wrong way.
+    Line(LineCause),
     /// A sound response of another encoder.
     OtherEncoder {
         /// Who answered.
@@ -107,39 +92,18 @@ pub enum Cause {
         /// How it was answered.
         layout: Layout,
     },
-    /// The line does not move from 0: short circuit, driver stuck, or no supply.
-    StuckLow,
-    /// The line does not move from 1: nobody answers.
-    StuckHigh,
-    /// Everything is right but the CRC-8: single bits were disturbed.
-    Disturbed,
 }
 
-impl fmt::Display for Cause {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::LineInverted => f.write_str("the line is inverted: exchange A and B, or the polarity of the input"),
-            Self::Shifted { bits } if *bits > 0 => {
-                write!(f, "the response begins {bits} bit(s) later than it was taken")
-            }
-            Self::Shifted { bits } => {
-                write!(f, "{} bit(s) at the beginning of the response are missing", bits.unsigned_abs())
-            }
-            Self::WrongBitOrder => f.write_str("the bits of each byte are in the other order"),
-            Self::OwnEcho => f.write_str("the own request came back before the response: remove the echo"),
-            Self::OnlyEcho => f.write_str("only the own request came back: no encoder, or A and B are exchanged"),
-            Self::HalfRate => f.write_str("the line runs at half the assumed bit rate"),
-            Self::OtherEncoder { ea } => write!(f, "this is a sound response of encoder {ea}"),
-            Self::OtherCommand { answered } => {
-                write!(f, "this is a sound response to command {}, {answered}", answered.code())
-            }
-            Self::OtherLayout { layout } => {
-                write!(f, "this is a sound response in layout {layout}: the encoder's factory setting differs")
-            }
-            Self::StuckLow => f.write_str("the line stays at 0"),
-            Self::StuckHigh => f.write_str("the line stays at 1: nobody answers"),
-            Self::Disturbed => f.write_str("single bits were disturbed"),
-        }
+servowire_core::one_line!(Cause {
+    Self::Line(cause) => "{}", cause;
+    Self::OtherEncoder { ea } => "this is a sound response of encoder {}", ea;
+    Self::OtherCommand { answered } => "this is a sound response to command {}, {}", answered.code(), answered;
+    Self::OtherLayout { layout } => "this is a sound response in layout {}: the encoder's factory setting differs", layout;
+});
+
+impl From<LineCause> for Cause {
+    fn from(cause: LineCause) -> Self {
+        Self::Line(cause)
     }
 }
 
@@ -148,23 +112,53 @@ pub type Findings = servowire_core::Findings<ErrorClass>;
 
 /// What there is to say about a line.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct Report {
+    error: Option<Error>,
+    findings: Findings,
+    cause: Option<Cause>,
+    response: Option<Response>,
+    crc: Option<Crc>,
+    #[cfg_attr(feature = "serde", serde(skip))]
     frames: [RawFrame; RawResponse::MAX_FRAMES],
+    #[cfg_attr(feature = "serde", serde(skip))]
     len: u8,
-    /// Every kind of fault in the line as it was given.
-    pub findings: Findings,
-    /// The fault that a decoder reports.
-    pub error: Option<Error>,
-    /// The most likely cause of it.
-    pub cause: Option<Cause>,
-    /// The response, as it is if nothing is wrong, or as it would be without the cause. For showing to a person only.
-    pub response: Option<Response>,
-    /// Received and computed CRC-8, if the line holds all frames.
-    pub crc: Option<(u8, u8)>,
 }
 
+servowire_core::one_line!(Report {
+    Self { error: Some(error), cause: Some(cause), .. } => "{}; likely cause: {}", error, cause;
+    Self { error: Some(error), .. } => "{}", error;
+    Self { response: Some(response), .. } => "sound: {}", response;
+    // Never: there is a response or an error.
+    _ => "nothing";
+});
+
 impl Report {
+    /// The fault that a decoder reports.
+    pub const fn error(&self) -> Option<Error> {
+        self.error
+    }
+
+    /// Every kind of fault in the line as it was given.
+    pub const fn findings(&self) -> Findings {
+        self.findings
+    }
+
+    /// The most likely cause of the fault.
+    pub const fn cause(&self) -> Option<Cause> {
+        self.cause
+    }
+
+    /// The response, as it is if nothing is wrong, or as it would be without the cause. For showing to a person only.
+    pub const fn response(&self) -> Option<Response> {
+        self.response
+    }
+
+    /// The CRC-8, if the line holds all frames.
+    pub const fn crc(&self) -> Option<Crc> {
+        self.crc
+    }
+
     /// The whole frames of the line on its grid, at most as many as the response has.
     pub fn frames(&self) -> &[RawFrame] {
         self.frames.get(..usize::from(self.len)).unwrap_or(&self.frames)
@@ -181,43 +175,31 @@ pub fn inspect(request: Request, resolution: Resolution, line: Window) -> Report
     };
     let (frames, len) = raw_frames(line, expected.layout());
     let raw = whole(&frames, len, expected.layout());
-    let crc = raw.map(|raw| raw.crc());
-    let error = outcome.err();
-    let mut report = Report { frames, len, findings: Findings::default(), error, cause, response, crc };
+    let (crc, error) = (raw.map(|raw| raw.crc()), outcome.err());
+    let mut report = Report { error, findings: Findings::NONE, cause, response, crc, frames, len };
     report.findings = findings(&report, &expected);
     report
 }
 
-/// Undoes the usual mistakes one by one; the first that gives a sound response is the cause.
+/// The usual mistakes: those of the line, and somebody else's response.
 fn diagnose(request: Request, expected: &Expected, line: Window, error: Error) -> (Option<Cause>, Option<Response>) {
-    if line.inverted().bits() == 0 {
-        return (Some(Cause::StuckHigh), None);
-    }
-    if line.bits() == 0 {
-        return (Some(Cause::StuckLow), None);
+    if let Some(stuck) = LineCause::stuck(line) {
+        return (Some(stuck.into()), None);
     }
     if let Some((cause, response)) = other_party(expected, line) {
         return (Some(cause), Some(response));
     }
-    let sound = |line: Option<Window>| line.and_then(|line| Response::parse_line(expected, line).ok());
-    let attempts = [
-        (Cause::LineInverted, sound(Some(line.inverted()))),
-        (Cause::WrongBitOrder, sound(Some(line.reordered()))),
-        (Cause::OwnEcho, sound(after_echo(request, line))),
-        (Cause::HalfRate, half_rate(expected, line)),
-    ];
-    for (cause, response) in attempts {
-        if response.is_some() {
-            return (Some(cause), response);
-        }
+    let frames = request.emit();
+    let sent = match frames.as_slice() {
+        [frame] => Some(frame.line()),
+        _ => None,
+    };
+    // The first bits are a start bit and two bits of the sync code, all 0, so up to three can be put back.
+    let search = Search::new().with_sent(sent).with_late_bits(20).with_early_bits(3);
+    if let Some(found) = search.find(line, |line| Response::parse_line(expected, line).ok()) {
+        return (Some(found.cause.into()), found.message);
     }
-    if let Some((bits, response)) = shifted(expected, line) {
-        return (Some(Cause::Shifted { bits }), Some(response));
-    }
-    if after_echo(request, line).is_some_and(Window::is_empty) {
-        return (Some(Cause::OnlyEcho), None);
-    }
-    (matches!(error, Error::Crc { .. }).then_some(Cause::Disturbed), None)
+    (matches!(error, Error::Crc { .. }).then_some(LineCause::Disturbed.into()), None)
 }
 
 /// A sound response from somebody else, to something else or in another layout. The CRC-8 is checked in any case.
@@ -236,52 +218,6 @@ fn other_party(expected: &Expected, line: Window) -> Option<(Cause, Response)> {
         let cause = if same { Cause::OtherLayout { layout } } else { Cause::OtherCommand { answered } };
         Some((cause, response))
     })
-}
-
-/// What follows the own request and the turn-round, if the line begins with the request's only frame; nothing is left if
-/// nobody answers.
-fn after_echo(request: Request, line: Window) -> Option<Window> {
-    let frames = request.emit();
-    let [frame] = frames.as_slice() else { return None };
-    let rest = line.skip(FRAME_BITS)?;
-    if RequestFrame::from_line(line) != Ok(*frame) {
-        return None;
-    }
-    rest.skip(rest.bits().trailing_ones().min(rest.len()))
-}
-
-/// Every second bit, if the line shows each twice.
-fn half_rate(expected: &Expected, line: Window) -> Option<Response> {
-    for at in 0..line.len() / 2 {
-        let (a, b) = (line.get(at.wrapping_mul(2)), line.get(at.wrapping_mul(2).wrapping_add(1)));
-        if a != b {
-            return None;
-        }
-    }
-    Response::parse_line(expected, line.decimated()).ok()
-}
-
-/// The response some bits later, or with some bits lost in front that are put back as idle start.
-fn shifted(expected: &Expected, line: Window) -> Option<(i8, Response)> {
-    for bits in 1..=20_i8 {
-        let later = line.skip(bits.unsigned_abs().into());
-        let response = later.and_then(|line| Response::parse_line(expected, line).ok());
-        if let Some(response) = response {
-            return Some((bits, response));
-        }
-    }
-    // The first bits are a start bit and two bits of the sync code, all 0, so up to three can be put back.
-    for bits in 1..=3_u32 {
-        let earlier = line
-            .bits()
-            .checked_shl(bits)
-            .and_then(|all| Window::from_bits(all, line.len().saturating_add(bits).min(128)));
-        let response = earlier.and_then(|line| Response::parse_line(expected, line).ok());
-        if let (Some(response), Ok(bits)) = (response, i8::try_from(bits)) {
-            return Some((bits.wrapping_neg(), response));
-        }
-    }
-    None
 }
 
 #[expect(clippy::cast_possible_truncation, reason = "sixteen bits")]
@@ -315,7 +251,7 @@ fn findings(report: &Report, expected: &Expected) -> Findings {
     add(ErrorClass::Truncated, report.len < expected.layout().frames());
     add(ErrorClass::StartBit, report.frames().iter().any(|frame| !frame.start_ok));
     add(ErrorClass::Delimiter, report.frames().iter().any(|frame| !frame.delimiter_ok));
-    add(ErrorClass::Crc, report.crc.is_some_and(|(got, want)| got != want));
+    add(ErrorClass::Crc, report.crc.is_some_and(|crc| crc.got != crc.want));
     if let Some(first) = report.frames().first().map(|frame| frame.content) {
         let full = expected.layout() != Layout::Abs17;
         let (ea, code) = (first >> 3 & 7, first >> 6 & 31);
@@ -338,7 +274,7 @@ mod tests {
     use std::string::ToString;
 
     fn cause(request: Request, line: Window) -> Option<Cause> {
-        inspect(request, Resolution::default(), line).cause
+        inspect(request, Resolution::default(), line).cause()
     }
 
     fn plain() -> impl Strategy<Value = (Request, Response)> {
@@ -355,31 +291,31 @@ mod tests {
         #[test]
         fn a_good_response_has_no_findings((request, response) in plain()) {
             let report = inspect(request, Resolution::default(), response.emit().line());
-            prop_assert!(report.findings.is_empty() && report.error.is_none() && report.cause.is_none());
-            prop_assert_eq!(report.response, Some(response));
+            prop_assert!(report.findings().is_empty() && report.error().is_none() && report.cause().is_none());
+            prop_assert_eq!(report.response(), Some(response));
             prop_assert_eq!(report.frames().len(), usize::from(response.layout().frames()));
         }
 
         #[test]
         fn usual_mistakes_are_named((request, response) in plain(), idle in 1..20_u32) {
             let line = response.emit().line();
-            prop_assert_eq!(cause(request, line.inverted()), Some(Cause::LineInverted));
+            prop_assert_eq!(cause(request, line.inverted()), Some(Cause::Line(LineCause::LineInverted)));
             let late = window(line.bits() << idle | ((1 << idle) - 1), line.len() + idle);
             let early = line.skip(2).unwrap();
             let early = window(early.bits() | u128::MAX << early.len(), line.len());
             // One in some 100,000 is sound inverted or in the other order too, which is named first.
-            let is_sound = |line| inspect(request, Resolution::default(), line).error.is_none();
+            let is_sound = |line| inspect(request, Resolution::default(), line).error().is_none();
             for (line, bits) in [(late, idle as i8), (early, -2)] {
                 let want = match () {
-                    () if is_sound(line.inverted()) => Cause::LineInverted,
-                    () if is_sound(line.reordered()) => Cause::WrongBitOrder,
-                    () => Cause::Shifted { bits },
+                    () if is_sound(line.inverted()) => Cause::Line(LineCause::LineInverted),
+                    () if is_sound(line.reordered()) => Cause::Line(LineCause::WrongBitOrder),
+                    () => Cause::Line(LineCause::Shifted { bits }),
                 };
                 prop_assert_eq!(cause(request, line), Some(want));
             }
             for at in 1..17 {
                 let report = inspect(request, Resolution::default(), window(line.bits() ^ 1 << at, line.len()));
-                prop_assert!(report.findings.contains(ErrorClass::Crc));
+                prop_assert!(report.findings().contains(ErrorClass::Crc));
             }
         }
 
@@ -389,14 +325,14 @@ mod tests {
             let ea = EncoderAddress::truncate(request.ea.get() + 1);
             let other = Response { ea, ..response };
             let report = inspect(request, Resolution::default(), other.emit().line());
-            prop_assert_eq!((report.cause, report.response), (Some(Cause::OtherEncoder { ea }), Some(other)));
+            prop_assert_eq!((report.cause(), report.response()), (Some(Cause::OtherEncoder { ea }), Some(other)));
         }
 
         /// Whatever is on the line, there is a report, and a value in it only with a sound CRC-8.
         #[test]
         fn anything_goes((request, _) in plain(), bits: u128, len in 0..=128_u32) {
             let report = inspect(request, Resolution::default(), window(bits, len));
-            prop_assert_eq!(report.error.is_none(), report.cause.is_none() && report.response.is_some());
+            prop_assert_eq!(report.error().is_none(), report.cause().is_none() && report.response().is_some());
         }
     }
 
@@ -414,14 +350,14 @@ mod tests {
         let frames = request.emit();
         let echo = frames.as_slice()[0].line();
         let both = echo.bits() | 0b1_1111 << 18 | line.bits() << 23;
-        assert_eq!(cause(request, window(both, 77)), Some(Cause::OwnEcho));
-        assert_eq!(cause(request, window(echo.bits() | u128::MAX << 18, 60)), Some(Cause::OnlyEcho));
+        assert_eq!(cause(request, window(both, 77)), Some(Cause::Line(LineCause::OwnEcho)));
+        assert_eq!(cause(request, window(echo.bits() | u128::MAX << 18, 60)), Some(Cause::Line(LineCause::OnlyEcho)));
         let wide = answer(Data::Abs40Vel { abs: U40::truncate(5), velocity: -1 });
         assert_eq!(cause(request, wide), Some(Cause::OtherLayout { layout: Layout::Abs40Vel }));
-        assert_eq!(cause(request, window(0, 54)), Some(Cause::StuckLow));
-        assert_eq!(cause(request, window(u128::MAX, 54)), Some(Cause::StuckHigh));
+        assert_eq!(cause(request, window(0, 54)), Some(Cause::Line(LineCause::StuckLow)));
+        assert_eq!(cause(request, window(u128::MAX, 54)), Some(Cause::Line(LineCause::StuckHigh)));
         let double = (0..54).fold(0_u128, |bits, at| bits | ((line.bits() >> at & 1) * 3) << (2 * at));
-        assert_eq!(cause(request, window(double, 108)), Some(Cause::HalfRate));
+        assert_eq!(cause(request, window(double, 108)), Some(Cause::Line(LineCause::HalfRate)));
         assert!(Cause::OtherEncoder { ea: EncoderAddress::MAX }.to_string().ends_with("encoder 7"));
         assert_eq!(
             (Kind::of(echo.bits() as u16 >> 1), Kind::of(line.bits() as u16 >> 1)),

@@ -9,6 +9,7 @@ use crate::frame::{MAX_FRAMES, framing, pack, truncated};
 use crate::layout::FRAME_BITS;
 use crate::layout::Layout;
 use crate::text::write_words;
+use crate::units::Units;
 
 /// The frames of one response, 2 to 6: their content bits, framing checked and removed, nothing else judged.
 ///
@@ -20,6 +21,17 @@ use crate::text::write_words;
 pub struct RawResponse {
     contents: [u16; MAX_FRAMES as usize],
     frames: u8,
+}
+
+/// The CRC-8 of a response.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct Crc {
+    /// As it was received.
+    pub got: u8,
+    /// As it was computed over the content bits before it.
+    pub want: u8,
 }
 
 impl RawResponse {
@@ -71,6 +83,11 @@ impl RawResponse {
         self.contents.get(..usize::from(self.frames)).unwrap_or(&self.contents)
     }
 
+    /// The frames as a receiver hears them.
+    pub fn units(&self) -> Units {
+        self.contents().iter().map(|content| Some(*content)).collect()
+    }
+
     /// The content bits as words.
     pub fn words(&self, order: BitOrder) -> impl Iterator<Item = u16> {
         self.contents().iter().map(move |content| match order {
@@ -88,13 +105,13 @@ impl RawResponse {
         }
     }
 
-    /// The received CRC-8 and the one computed over the content bits before it.
-    pub fn crc(&self) -> (u8, u8) {
+    /// The CRC-8, received and computed.
+    pub fn crc(&self) -> Crc {
         let bytes = bytes(self.contents);
         let len = usize::from(self.frames).wrapping_mul(2);
         let got = bytes.get(len.wrapping_sub(1)).copied().unwrap_or(0);
         let covered = bytes.get(..len.wrapping_sub(1)).unwrap_or(&bytes);
-        (got.reverse_bits(), mirrored(covered).reverse_bits())
+        Crc { got: got.reverse_bits(), want: mirrored(covered).reverse_bits() }
     }
 
     /// The frames of all content bits but the CRC-8, the first of the line in bit 0; the CRC-8 is added.
@@ -109,7 +126,7 @@ impl RawResponse {
 
     /// The frames with the CRC-8 that their other bits demand.
     pub(crate) fn sealed(mut self) -> Self {
-        let (_, crc) = self.crc();
+        let crc = self.crc().want;
         if let Some(last) = self.contents.get_mut(usize::from(self.frames).wrapping_sub(1)) {
             *last = *last & 0xff | u16::from(crc.reverse_bits()) << 8;
         }

@@ -6,6 +6,7 @@
 #[cfg(any(test, feature = "std"))]
 extern crate std;
 
+mod cause;
 mod format;
 mod order;
 mod receiver;
@@ -13,6 +14,7 @@ mod samples;
 mod wave;
 mod window;
 
+pub use cause::{Cause, Found, Search};
 pub use format::{Format, FormatError};
 pub use order::BitOrder;
 pub use receiver::{Field, Receiver};

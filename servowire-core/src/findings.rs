@@ -62,6 +62,41 @@ impl<C: Class> defmt::Format for Findings<C> {
     }
 }
 
+/// As a sequence of the classes.
+#[cfg(feature = "serde")]
+#[cfg_attr(docsrs, doc(cfg(feature = "serde")))]
+impl<C: Class + serde::Serialize> serde::Serialize for Findings<C> {
+    fn serialize<S: serde::Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.collect_seq(self.iter())
+    }
+}
+
+#[cfg(feature = "serde")]
+#[cfg_attr(docsrs, doc(cfg(feature = "serde")))]
+impl<'de, C: Class + serde::Deserialize<'de>> serde::Deserialize<'de> for Findings<C> {
+    fn deserialize<D: serde::Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        struct Classes<C>(PhantomData<C>);
+
+        impl<'de, C: Class + serde::Deserialize<'de>> serde::de::Visitor<'de> for Classes<C> {
+            type Value = Findings<C>;
+
+            fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+                f.write_str("a sequence of error classes")
+            }
+
+            fn visit_seq<A: serde::de::SeqAccess<'de>>(self, mut classes: A) -> Result<Findings<C>, A::Error> {
+                let mut found = Findings::NONE;
+                while let Some(class) = classes.next_element()? {
+                    found.insert(class);
+                }
+                Ok(found)
+            }
+        }
+
+        deserializer.deserialize_seq(Classes(PhantomData))
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -69,6 +104,7 @@ mod tests {
     use std::vec::Vec;
 
     #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+    #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
     enum Kind {
         First,
         Second,
@@ -101,5 +137,16 @@ mod tests {
         assert!(found.contains(Kind::First) && !found.contains(Kind::Second) && !found.is_empty());
         assert_eq!(found.iter().collect::<Vec<_>>(), [Kind::First, Kind::Third]);
         assert_eq!(found.to_string(), "first third");
+    }
+    #[cfg(feature = "serde")]
+    #[test]
+    fn written_as_the_classes() {
+        let mut found = Findings::default();
+        assert_eq!(serde_json::to_string(&found).unwrap(), "[]");
+        found.insert(Kind::Third);
+        found.insert(Kind::First);
+        let text = serde_json::to_string(&found).unwrap();
+        assert_eq!(text, r#"["First","Third"]"#);
+        assert_eq!(serde_json::from_str::<Findings<Kind>>(&text).unwrap(), found);
     }
 }

@@ -1,3 +1,5 @@
+use servowire_core::ClockError;
+
 /// Why a call failed. `IO` is the error of the port (a UART, an SPI, the bus of an ASIC), `PIN` that of the direction pin, `P` that of the protocol, and
 /// `D` its doubts about a position.
 ///
@@ -19,6 +21,9 @@ pub enum Error<IO, PIN, P, D> {
     /// Somebody talks without a pause; nothing was sent.
     #[error("the line does not become quiet")]
     NeverQuiet,
+    /// The clock stands, or was set back; whether a request that had begun had its effect is not known.
+    #[error("{0}")]
+    Clock(#[from] ClockError),
     /// No answer, or one that was refused.
     #[error("{0}")]
     Protocol(P),

@@ -41,6 +41,7 @@ pub(crate) fn outcome<T, IO, PIN, P, D>(
 mod tests {
     use super::*;
     use crate::quiet::Settle;
+    use servowire_core::ClockError;
 
     #[test]
     fn an_end_says_when_the_line_is_free() {
@@ -75,7 +76,9 @@ mod tests {
         assert_eq!(outcome::<_, u8, u8, u8, u8>(Ok(1), 9), Ok(Ok(1)));
         assert_eq!(outcome::<u8, u8, u8, u8, u8>(Err(Fault::Protocol(4)), 9), Ok(Err(4)));
         assert_eq!(outcome::<u8, u8, u8, u8, u8>(Err(Fault::Io(4)), 9), Ok(Err(9)));
-        for other in [Fault::Pin(1), Fault::Closed, Fault::NeverQuiet, Fault::Doubt(1)] {
+        for other in
+            [Fault::Pin(1), Fault::Closed, Fault::NeverQuiet, Fault::Clock(ClockError::Stopped), Fault::Doubt(1)]
+        {
             assert_eq!(outcome::<u8, u8, u8, u8, u8>(Err(other), 9), Err(other));
         }
     }

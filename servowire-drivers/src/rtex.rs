@@ -30,7 +30,9 @@ use core::convert::Infallible;
 use rtex_block::master::{Asic, Axis, ControlError, ControlPhase, Heard, Led, Master, Ring, Slave};
 use rtex_block::timing::TimerSystem;
 use rtex_block::{BlockSize, Command32, Evidence, MacId, Response, Response32};
+use servowire_core::{ClockCheck, ClockError};
 
+use crate::clock::MAX_LOOKS;
 use crate::{Clock, Error};
 pub use frame_count::FrameCount;
 pub use port::{Port, Word};
@@ -74,6 +76,7 @@ pub struct Released<P, C, const N: usize> {
 pub struct Driver<'r, P, C, const N: usize> {
     port: P,
     clock: C,
+    check: ClockCheck,
     master: Master<N>,
     received: &'r FrameCount,
     /// Frames of `received` that the master has heard of.
@@ -91,6 +94,7 @@ impl<'r, P: Port, C: Clock, const N: usize> Driver<'r, P, C, N> {
         Self {
             port,
             clock,
+            check: ClockCheck::new(MAX_LOOKS),
             master,
             received,
             frames: received.get(),
@@ -140,7 +144,7 @@ impl<'r, P: Port, C: Clock, const N: usize> Driver<'r, P, C, N> {
     /// One turn of the main loop. Until it gives [`ControlPhase::Running`] interrupts stay off; it writes the first transmit data itself.
     ///
     /// # Errors
-    /// [`Error::Protocol`] with the fault of the phases; [`Error::Io`].
+    /// [`Error::Protocol`] with the fault of the phases; [`Error::Io`]; [`Error::Clock`].
     pub fn control(&mut self) -> Result<ControlPhase, Failure<P>> {
         let asic = self.port.state().map_err(Error::Io)?;
         let mut table = [Slave { mac_id: MacId::truncate(0), kind: 0 }; MacId::COUNT];
@@ -150,7 +154,8 @@ impl<'r, P: Port, C: Clock, const N: usize> Driver<'r, P, C, N> {
         };
         let phase = self.master.control(asic, found.map(|count| table.get(..count).unwrap_or(&table)));
         if phase == ControlPhase::Prepare {
-            let commands = self.master.exchange(&[Heard::Nothing; N], self.clock.now_ns());
+            let now_ns = self.now_ns()?;
+            let commands = self.master.exchange(&[Heard::Nothing; N], now_ns);
             self.write(&commands).map_err(Error::Io)?;
         }
         match self.master.error() {
@@ -164,10 +169,10 @@ impl<'r, P: Port, C: Clock, const N: usize> Driver<'r, P, C, N> {
     /// # Errors
     /// As [`control`](Self::control).
     pub fn start(&mut self, limit_ns: u64) -> Result<ControlPhase, Failure<P>> {
-        let until_ns = self.clock.now_ns().saturating_add(limit_ns);
+        let until_ns = self.now_ns()?.saturating_add(limit_ns);
         loop {
             let phase = self.control()?;
-            if phase == ControlPhase::Running || self.clock.now_ns() >= until_ns {
+            if phase == ControlPhase::Running || self.now_ns()? >= until_ns {
                 return Ok(phase);
             }
         }
@@ -178,7 +183,7 @@ impl<'r, P: Port, C: Clock, const N: usize> Driver<'r, P, C, N> {
     /// the time of the interrupt.
     ///
     /// # Errors
-    /// [`Error::Io`]; the next exchange goes on.
+    /// [`Error::Io`] and [`Error::Clock`]; commands were written if they could be, and the next exchange goes on.
     pub fn exchange(&mut self, began_ns: u64) -> Result<Exchanged, Failure<P>> {
         #[cfg(feature = "async")]
         {
@@ -201,11 +206,10 @@ impl<'r, P: Port, C: Clock, const N: usize> Driver<'r, P, C, N> {
         let commands = self.master.exchange(&heard, end_ns);
         let written = self.write(&commands);
         let frames_late = self.frames_since(began_ns);
-        self.late = self.late.saturating_add((frames_late > 0).into());
-        match (fault, written) {
-            (Some(fault), _) | (None, Err(fault)) => Err(Error::Io(fault)),
-            (None, Ok(())) => Ok(Exchanged { frames_late, torn }),
-        }
+        self.late = self.late.saturating_add(frames_late.is_ok_and(|frames| frames > 0).into());
+        fault.map_or(Ok(()), Err)?;
+        written.map_err(Error::Io)?;
+        Ok(Exchanged { frames_late: frames_late?, torn })
     }
 
     /// Leaves the stop after a time-out, an alarm or a stop of the caller; see [`Master::clear`].
@@ -214,14 +218,14 @@ impl<'r, P: Port, C: Clock, const N: usize> Driver<'r, P, C, N> {
     }
 
     /// The blocks of one frame; `None` if the bank was switched meanwhile each time.
-    fn read(&mut self, began_ns: u64) -> Result<Option<[Heard; N]>, P::Error> {
+    fn read(&mut self, began_ns: u64) -> Result<Option<[Heard; N]>, Failure<P>> {
         for _ in 0..READS {
-            let before = self.bank(began_ns);
+            let before = self.bank(began_ns)?;
             let mut all = [Heard::Nothing; N];
             for (place, heard) in all.iter_mut().enumerate() {
-                *heard = self.block(place)?;
+                *heard = self.block(place).map_err(Error::Io)?;
             }
-            if self.bank(began_ns) == before {
+            if self.bank(began_ns)? == before {
                 return Ok(Some(all));
             }
         }
@@ -229,17 +233,22 @@ impl<'r, P: Port, C: Clock, const N: usize> Driver<'r, P, C, N> {
     }
 
     /// What is another one after each switch of the reception bank: the receive interrupt switches it, or XSYNC.
-    fn bank(&mut self, began_ns: u64) -> u32 {
+    fn bank(&mut self, began_ns: u64) -> Result<u32, ClockError> {
         match self.master.config().timer {
-            TimerSystem::External => self.received.get(),
+            TimerSystem::External => Ok(self.received.get()),
             TimerSystem::Internal => self.frames_since(began_ns),
         }
     }
 
     /// Frames that have begun since the one at `began_ns`.
-    fn frames_since(&mut self, began_ns: u64) -> u32 {
-        let past_ns = self.clock.now_ns().saturating_sub(began_ns);
-        self.master.config().periods.frames_late(u32::try_from(past_ns).unwrap_or(u32::MAX))
+    fn frames_since(&mut self, began_ns: u64) -> Result<u32, ClockError> {
+        let past_ns = self.now_ns()?.saturating_sub(began_ns);
+        Ok(self.master.config().periods.frames_late(u32::try_from(past_ns).unwrap_or(u32::MAX)))
+    }
+
+    /// A look at the clock.
+    fn now_ns(&mut self) -> Result<u64, ClockError> {
+        self.check.check(self.clock.now_ns()?)
     }
 
     fn block(&mut self, place: usize) -> Result<Heard, P::Error> {

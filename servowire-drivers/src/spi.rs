@@ -30,6 +30,7 @@ use embedded_hal_async::spi::SpiBus as AsyncSpiBus;
 
 use embedded_io::ErrorKind;
 use nrz_line::{Field, Format, FormatError, Receiver, Samples};
+use servowire_core::ClockError;
 
 use crate::Direction;
 use crate::direction::Switch;
@@ -99,6 +100,9 @@ pub enum SpiError<S, P> {
     /// Something was on the line outside the window.
     #[error("something is on the line outside the window")]
     Noise,
+    /// The clock stands, or was set back.
+    #[error(transparent)]
+    Clock(#[from] ClockError),
     /// The request does not fit the buffer.
     #[error(transparent)]
     TooShort(#[from] TooShort),
@@ -109,7 +113,7 @@ impl<S: core::fmt::Debug, P: core::fmt::Debug> embedded_io::Error for SpiError<S
         match self {
             Self::Framing | Self::Noise => ErrorKind::InvalidData,
             Self::TooShort(_) => ErrorKind::OutOfMemory,
-            Self::Spi(_) | Self::Pin(_) => ErrorKind::Other,
+            Self::Spi(_) | Self::Pin(_) | Self::Clock(_) => ErrorKind::Other,
         }
     }
 }

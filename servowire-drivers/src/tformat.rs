@@ -7,28 +7,11 @@
 pub mod asynch;
 pub mod blocking;
 
-use tformat::master::{Exchange, Line};
-use tformat::{Doubt, Error, Policy, Position, Request, Resolution};
+use tformat::master::Line;
+use tformat::{Error, Request};
 
 /// Longest request and longest answer together.
 const MAX_BYTES: usize = 16;
-
-/// A position that may be used, and when it was true.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub struct Sample {
-    /// The position.
-    pub position: Position,
-    /// When the encoder took it, by the driver's clock. If the request was held up on its way out, the position is younger by that.
-    pub sampled_ns: u64,
-}
-
-impl Sample {
-    fn of(exchange: Exchange, resolution: Resolution, policy: Policy) -> Result<Self, Doubt> {
-        let position = resolution.read(&exchange.response, policy)?;
-        Ok(Self { position, sampled_ns: exchange.sampled_ns })
-    }
-}
 
 /// How long this request and the longest answer to it take.
 fn longest_ns(line: &Line, request: Request) -> u64 {

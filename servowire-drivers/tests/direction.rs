@@ -21,7 +21,7 @@ use embedded_io::{ErrorKind, ErrorType};
 use servowire_drivers::samples::Order;
 use servowire_drivers::spi::{Sampling, SpiUart};
 use servowire_drivers::tformat::blocking;
-use servowire_drivers::{Automatic, Clock, DriverEnable, Error};
+use servowire_drivers::{Automatic, Clock, ClockError, DriverEnable, Error};
 use tformat::master::Line;
 use tformat::{Address, BitRate, Request};
 
@@ -113,10 +113,10 @@ impl Bench {
 }
 
 impl Clock for Bench {
-    fn now_ns(&mut self) -> u64 {
+    fn now_ns(&mut self) -> Result<u64, ClockError> {
         let mut world = self.0.borrow_mut();
         world.now_ns += 50;
-        world.now_ns
+        Ok(world.now_ns)
     }
 }
 

@@ -332,7 +332,7 @@ mod asynch {
     use servowire_drivers::rtex::Released;
     use servowire_drivers::rtex::asynch::{Began, Period};
 
-    use servowire_drivers::{Clock, Timer};
+    use servowire_drivers::{Clock, ClockError, Timer};
 
     use super::polls::{FOR_EVER, Looks, run};
     use super::*;
@@ -450,20 +450,20 @@ mod asynch {
     struct Steps(Watch);
 
     impl Clock for Steps {
-        fn now_ns(&mut self) -> u64 {
+        fn now_ns(&mut self) -> Result<u64, ClockError> {
             self.0.now_ns()
         }
     }
 
     impl Timer for Steps {
-        async fn wait_until(&mut self, ns: u64) {
+        async fn wait_until(&mut self, ns: u64) -> Result<(), ClockError> {
             poll_fn(|_| {
                 let mut ring = self.0.0.borrow_mut();
                 let until_ns = ns.min(ring.now_ns + 20_000);
                 ring.pass(until_ns);
-                if ring.now_ns >= ns { Poll::Ready(()) } else { Poll::Pending }
+                if ring.now_ns >= ns { Poll::Ready(Ok(())) } else { Poll::Pending }
             })
-            .await;
+            .await
         }
     }
 

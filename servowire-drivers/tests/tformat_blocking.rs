@@ -21,7 +21,10 @@ use servowire_drivers::tformat::blocking::Encoder;
 use servowire_drivers::{DriverEnable, Error};
 use servowire_world::{Fault, Planned, Scenario, Script, Verdict};
 use tformat::master::Line;
-use tformat::{Address, Almc, BitRate, Doubt, Policy, Request, Resolution};
+use tformat::{Address, Almc, BitRate, Doubt, Policy, Request, Resolution, Sample, Tolerated};
+
+/// No alarm, any age.
+const STRICT: Policy = Policy::new(u64::MAX);
 
 fn driver(bench: &Shared) -> Encoder<Uart, DriverEnable<Pin>, Watch> {
     driver_at(bench, Line::new(BitRate::Mbit2_5))
@@ -58,14 +61,14 @@ fn a_position_with_alarms_is_a_doubt() {
     let bench = Bench::new(Scenario::quiet(), Misframed::Dropped);
     let mut encoder = driver(&bench);
     let resolution = Resolution::new(23, 16).unwrap();
-    let sample = encoder.read_position(resolution, Policy::STRICT).unwrap();
-    assert_eq!((sample.position.abs, sample.position.turns), (place(1), 3));
+    let sample = encoder.read_position(resolution, STRICT).unwrap();
+    assert_eq!((sample.single_turn(), sample.turns()), (place(1), Some(3)));
     let sent = bench.borrow().truth().transmission(bench.borrow().request.unwrap()).unwrap().end_ns;
-    assert!(sample.sampled_ns.abs_diff(sent) < 1_000, "within the turn-around");
-    bench.borrow_mut().encoder().set_alarms(Almc::BE, true);
+    assert!(sample.sampled_ns().abs_diff(sent) < 1_000, "within the turn-around");
+    bench.borrow_mut().encoder().raise_alarms(Almc::BE);
     let doubt = Error::Doubt(Doubt::Alarms { alarms: Almc::BE });
-    assert_eq!(encoder.read_position(resolution, Policy::STRICT), Err(doubt));
-    assert!(encoder.read_position(resolution, Policy::SINGLE_TURN).is_ok());
+    assert_eq!(encoder.read_position(resolution, STRICT), Err(doubt));
+    assert!(encoder.read_position(resolution, STRICT.tolerating(Tolerated::SINGLE_TURN)).is_ok());
 }
 
 #[test]
@@ -139,11 +142,11 @@ fn hostile_events_never_cost_a_good_answer() {
         let bench = Bench::new(scenario(seed), misframed);
         let mut encoder = driver_at(&bench, line());
         for call in 0..100 {
-            match encoder.read_position(resolution, Policy::STRICT) {
+            match encoder.read_position(resolution, STRICT) {
                 // The request was damaged on the line, and the encoder says so.
                 Err(Error::Doubt(Doubt::RequestDamaged { .. })) => calls.failed += 1,
                 result => {
-                    let result = result.map(|sample| sample.position.abs);
+                    let result = result.map(Sample::single_turn);
                     bench.borrow_mut().judge(calls, Some(result), seed, call);
                 }
             }

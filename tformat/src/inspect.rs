@@ -5,19 +5,17 @@
 //! late, own echo, wrong rate, wrong data ID) are undone one by one: the one that makes the frame sound is the cause.
 //!
 //! ```
-//! use tformat::inspect::{Cause, inspect};
+//! use tformat::inspect::{Cause, LineCause, inspect};
 //! use tformat::{Abs, Request, Response, SingleTurn, StatusField};
 //!
 //! let answer = Response::ReadSingleTurn(SingleTurn { sf: StatusField::empty(), abs: Abs::truncate(0x1d4b) });
 //! // A and B exchanged: every level is inverted
 //! let report = inspect(Request::ReadSingleTurn, answer.emit().line().inverted());
-//! assert_eq!(report.cause, Some(Cause::LineInverted));
-//! assert_eq!(report.response, Some(answer));
+//! assert_eq!(report.cause(), Some(Cause::Line(LineCause::LineInverted)));
+//! assert_eq!(report.response(), Some(answer));
 //! ```
 
-use core::fmt;
-
-use nrz_line::Window;
+use nrz_line::{Search, Window};
 
 use crate::crc::crc;
 use crate::data_id::{ControlField, DataId};
@@ -26,6 +24,8 @@ use crate::frame::Frame;
 use crate::master::parse_echoed;
 use crate::request::Request;
 use crate::response::Response;
+
+pub use nrz_line::Cause as LineCause;
 
 /// One field, read without judging it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -42,25 +42,11 @@ pub struct RawField {
 
 /// What most likely went wrong.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]
 pub enum Cause {
-    /// Every level is inverted: A and B are exchanged, or the receiver's polarity is wrong.
-    LineInverted,
-    /// The frame was taken `bits` bits too early (negative: too late), as after a glitch at the turn-round.
-    Shifted {
-        /// Idle bits in front of the frame; negative: bits of the frame that are missing.
-        bits: i8,
-    },
-    /// Bits are packed most significant first and were read least significant first, or the other way round.
-    WrongBitOrder,
-    /// The own request came back, and a response after it.
-    OwnEcho,
-    /// Only the own request came back: no encoder, or A and B are exchanged on a half-duplex line.
-    OnlyEcho,
-    /// The line was sampled twice a bit: the real rate is half of the assumed one.
-    HalfRate,
+    /// The line itself was damaged, or is connected or read in a wrong way.
+    Line(LineCause),
     /// A sound response to another data ID.
     OtherDataId {
         /// What was answered.
@@ -68,32 +54,21 @@ pub enum Cause {
     },
     /// A sound ID 3 frame that was not asked for: the encoder found the request damaged.
     RequestRefused,
-    /// The line does not move from 0: short circuit, driver stuck, or no supply.
-    StuckLow,
-    /// The line does not move from 1: nobody answers.
-    StuckHigh,
-    /// Everything is right but the check field: single bits were disturbed.
-    Disturbed,
 }
 
-impl fmt::Display for Cause {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::LineInverted => f.write_str("the line is inverted: exchange A and B, or the polarity of the input"),
-            Self::Shifted { bits } if *bits > 0 => write!(f, "the frame begins {bits} bit(s) later than it was taken"),
-            Self::Shifted { bits } => {
-                write!(f, "{} bit(s) at the beginning of the frame are missing", bits.unsigned_abs())
-            }
-            Self::WrongBitOrder => f.write_str("the bits of each byte are in the other order"),
-            Self::OwnEcho => f.write_str("the own request came back before the answer: remove the echo"),
-            Self::OnlyEcho => f.write_str("only the own request came back: no encoder, or A and B are exchanged"),
-            Self::HalfRate => f.write_str("the line runs at half the assumed bit rate"),
-            Self::OtherDataId { answered } => write!(f, "this is a sound response to {answered}"),
-            Self::RequestRefused => f.write_str("the encoder found the request damaged and answered with ID 3"),
-            Self::StuckLow => f.write_str("the line stays at 0"),
-            Self::StuckHigh => f.write_str("the line stays at 1: nobody answers"),
-            Self::Disturbed => f.write_str("single bits were disturbed"),
-        }
+servowire_core::one_line!(Cause {
+    // The vendor calls a whole response a frame.
+    Self::Line(LineCause::Shifted { bits }) if *bits > 0 => "the frame begins {} bit(s) later than it was taken", bits;
+    Self::Line(LineCause::Shifted { bits }) => "{} bit(s) at the beginning of the frame are missing", bits.unsigned_abs();
+    Self::Line(LineCause::OwnEcho) => "the own request came back before the answer: remove the echo";
+    Self::Line(cause) => "{}", cause;
+    Self::OtherDataId { answered } => "this is a sound response to {}", answered;
+    Self::RequestRefused => "the encoder found the request damaged and answered with ID 3";
+});
+
+impl From<LineCause> for Cause {
+    fn from(cause: LineCause) -> Self {
+        Self::Line(cause)
     }
 }
 
@@ -102,23 +77,52 @@ pub type Findings = servowire_core::Findings<ErrorClass>;
 
 /// What there is to say about a line.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct Report {
+    error: Option<Error>,
+    findings: Findings,
+    cause: Option<Cause>,
+    response: Option<Response>,
+    #[cfg_attr(feature = "serde", serde(skip))]
     fields: [RawField; Frame::MAX_FIELDS],
+    #[cfg_attr(feature = "serde", serde(skip))]
     len: u8,
-    /// Every kind of fault in the line as it was given.
-    pub findings: Findings,
-    /// The fault that a decoder reports.
-    pub error: Option<Error>,
-    /// The most likely cause of it.
-    pub cause: Option<Cause>,
-    /// The response, as it is if nothing is wrong, or as it would be without the cause. For showing to a person only.
-    pub response: Option<Response>,
-    /// Whether SF and ALMC of an ID 3 response contradict each other. Compatible encoders leave SF at 0.
-    pub status_contradicts_alarms: bool,
 }
 
+servowire_core::one_line!(Report {
+    Self { error: Some(error), cause: Some(cause), .. } => "{}; likely cause: {}", error, cause;
+    Self { error: Some(error), .. } => "{}", error;
+    Self { response: Some(response), .. } => "sound: {}", response;
+    // Never: there is a response or an error.
+    _ => "nothing";
+});
+
 impl Report {
+    /// The fault that a decoder reports.
+    pub const fn error(&self) -> Option<Error> {
+        self.error
+    }
+
+    /// Every kind of fault in the line as it was given.
+    pub const fn findings(&self) -> Findings {
+        self.findings
+    }
+
+    /// The most likely cause of the fault.
+    pub const fn cause(&self) -> Option<Cause> {
+        self.cause
+    }
+
+    /// The response, as it is if nothing is wrong, or as it would be without the cause. For showing to a person only.
+    pub const fn response(&self) -> Option<Response> {
+        self.response
+    }
+
+    /// Whether SF and ALMC of an ID 3 response contradict each other. Compatible encoders leave SF at 0.
+    pub const fn status_contradicts_alarms(&self) -> bool {
+        matches!(self.response, Some(Response::ReadAll(full)) if !full.sf.agrees_with(full.almc))
+    }
+
     /// The whole fields of the line on its grid, at most as many as the response has.
     pub fn fields(&self) -> &[RawField] {
         self.fields.get(..usize::from(self.len)).unwrap_or(&self.fields)
@@ -133,15 +137,7 @@ pub fn inspect(request: Request, line: Window) -> Report {
         Err(error) => diagnose(request, line, error),
     };
     let (fields, len) = raw_fields(line, request.data_id().response_fields());
-    let mut report = Report {
-        fields,
-        len,
-        findings: Findings::default(),
-        error: outcome.err(),
-        cause,
-        response,
-        status_contradicts_alarms: contradicts(response),
-    };
+    let mut report = Report { error: outcome.err(), findings: Findings::NONE, cause, response, fields, len };
     report.findings = findings(request, &report);
     report
 }
@@ -153,87 +149,36 @@ pub fn inspect_bytes(request: Request, bytes: &[u8]) -> Report {
     let mut report = inspect(request, line);
     // An echo in front pushes the end of the response out of the eleven fields.
     if let Ok(response) = parse_echoed(request, bytes) {
-        report.cause = Some(Cause::OwnEcho);
+        report.cause = Some(LineCause::OwnEcho.into());
         report.response = Some(response);
     }
     report
 }
 
-fn contradicts(response: Option<Response>) -> bool {
-    matches!(response, Some(Response::ReadAll(full)) if !full.sf.agrees_with(full.almc))
-}
-
-/// Undoes the usual mistakes one by one; the first that gives a sound response is the cause.
+/// The usual mistakes: those of the line, and a response to something else.
 fn diagnose(request: Request, line: Window, error: Error) -> (Option<Cause>, Option<Response>) {
-    let all_ones = line.inverted().bits() == 0;
-    match error {
-        Error::Rejected { .. } => {
-            let response = Response::parse_line(Request::ReadAll, line).ok();
-            return (Some(Cause::RequestRefused), response);
-        }
-        _ if line.is_empty() || all_ones => return (Some(Cause::StuckHigh), None),
-        _ if line.bits() == 0 => return (Some(Cause::StuckLow), None),
-        _ => {}
+    if let Error::Rejected { .. } = error {
+        let response = Response::parse_line(Request::ReadAll, line).ok();
+        return (Some(Cause::RequestRefused), response);
     }
-    let sound = |line: Option<Window>| line.and_then(|line| Response::parse_line(request, line).ok());
-    let attempts = [
-        (Cause::LineInverted, sound(Some(line.inverted()))),
-        (Cause::WrongBitOrder, sound(Some(line.reordered()))),
-        (Cause::OwnEcho, echo(request, line).and_then(|answer| sound(Some(answer)))),
-        (Cause::HalfRate, half_rate(request, line)),
-    ];
-    for (cause, response) in attempts {
-        if response.is_some() {
-            return (Some(cause), response);
-        }
+    if let Some(stuck) = LineCause::stuck(line) {
+        return (Some(stuck.into()), None);
     }
-    if let Some((bits, response)) = shifted(request, line) {
-        return (Some(Cause::Shifted { bits }), Some(response));
-    }
-    if echo(request, line).is_some_and(Window::is_empty) {
-        return (Some(Cause::OnlyEcho), None);
+    let need = u32::from(request.data_id().response_fields()).wrapping_mul(Frame::FIELD_BITS);
+    // Missing bits are completed with idle line at the end; one bit missing was the start bit.
+    let search = Search::new()
+        .with_sent(Some(request.emit().line()))
+        .with_late_bits(9)
+        .with_early_bits(1)
+        .with_complete_to(need);
+    if let Some(found) = search.find(line, |line| Response::parse_line(request, line).ok()) {
+        return (Some(found.cause.into()), found.message);
     }
     if let Some((answered, response)) = other_data_id(request, line) {
         return (Some(Cause::OtherDataId { answered }), Some(response));
     }
     let disturbed = matches!(error, Error::Crc { .. } | Error::Parity { .. } | Error::SinkCode { .. });
-    (disturbed.then_some(Cause::Disturbed), None)
-}
-
-/// What follows the own request and the turn-round, if the line begins with the request; nothing is left if nobody answers.
-fn echo(request: Request, line: Window) -> Option<Window> {
-    let sent = request.emit().line();
-    let rest = line.skip(sent.len())?;
-    let same = (line.bits() ^ sent.bits()) & !u128::MAX.wrapping_shl(sent.len()) == 0;
-    // The turn-round is idle line; the first 0 is the start bit of the response.
-    let turn_round = (!rest.bits()).trailing_zeros();
-    if same { rest.skip(turn_round) } else { None }
-}
-
-/// The response if every second bit of the line is one bit of it: as far as the window reaches, 64 bits.
-fn half_rate(request: Request, line: Window) -> Option<Response> {
-    let (first, second) = (line.decimated(), line.skip(1)?.decimated());
-    // Both samples of each bit are the same.
-    let pairs = Window::from_bits(first.bits(), line.len() / 2)?;
-    if pairs.bits() != second.bits() & !u128::MAX.checked_shl(pairs.len()).unwrap_or(0) {
-        return None;
-    }
-    Response::parse_line(request, pairs).ok()
-}
-
-/// How far the frame is from where it was looked for. Missing bits are completed with idle line at the end.
-fn shifted(request: Request, line: Window) -> Option<(i8, Response)> {
-    let need = u32::from(request.data_id().response_fields()).wrapping_mul(Frame::FIELD_BITS);
-    for bits in 1..=9_i8 {
-        let by = u32::from(bits.unsigned_abs());
-        let late = line.skip(by).and_then(|late| late.padded(need));
-        if let Some(response) = late.and_then(|late| Response::parse_line(request, late).ok()) {
-            return Some((bits, response));
-        }
-    }
-    // One bit missing: it was the start bit.
-    let early = Window::from_bits(line.bits() << 1, line.len().wrapping_add(1).min(Window::MAX_LEN))?;
-    Response::parse_line(request, early).ok().map(|response| (-1, response))
+    (disturbed.then_some(LineCause::Disturbed.into()), None)
 }
 
 /// A sound response to something else.
@@ -310,8 +255,8 @@ mod tests {
         #[test]
         fn a_sound_answer_has_no_cause((request, response) in exchanges()) {
             let report = inspect(request, response.emit().line());
-            prop_assert!(report.findings.is_empty());
-            prop_assert_eq!((report.error, report.cause, report.response), (None, None, Some(response)));
+            prop_assert!(report.findings().is_empty());
+            prop_assert_eq!((report.error(), report.cause(), report.response()), (None, None, Some(response)));
             let bytes = response.emit();
             prop_assert_eq!(report.fields().len(), bytes.as_bytes().len());
             prop_assert!(report.fields().iter().zip(bytes.as_bytes()).all(|(f, b)| f.byte == *b && f.start_ok && f.delimiter_ok));
@@ -323,20 +268,20 @@ mod tests {
             let late = idle_after(window(line.bits() << shift | ((1 << shift) - 1), line.len() + shift), line.len() + 10);
             let early = idle_after(line.skip(1).unwrap(), line.len());
             let cases = [
-                (line.inverted(), Cause::LineInverted),
-                (idle_after(line, line.len().next_multiple_of(8)).reordered(), Cause::WrongBitOrder),
-                (late, Cause::Shifted { bits: shift as i8 }),
-                (early, Cause::Shifted { bits: -1 }),
+                (line.inverted(), Cause::Line(LineCause::LineInverted)),
+                (idle_after(line, line.len().next_multiple_of(8)).reordered(), Cause::Line(LineCause::WrongBitOrder)),
+                (late, Cause::Line(LineCause::Shifted { bits: shift as i8 })),
+                (early, Cause::Line(LineCause::Shifted { bits: -1 })),
             ];
             for (line, cause) in cases {
                 let report = inspect(request, line);
-                prop_assert!(report.error.is_some());
+                prop_assert!(report.error().is_some());
                 // A few lines are sound both inverted and in the other order: the inversion is named.
                 let want = match Response::parse_line(request, line.inverted()) {
-                    Ok(inverted) => (Cause::LineInverted, inverted),
+                    Ok(inverted) => (Cause::Line(LineCause::LineInverted), inverted),
                     Err(_) => (cause, response),
                 };
-                prop_assert_eq!((report.cause, report.response), (Some(want.0), Some(want.1)));
+                prop_assert_eq!((report.cause(), report.response()), (Some(want.0), Some(want.1)));
             }
         }
 
@@ -346,10 +291,10 @@ mod tests {
             let only = inspect(request, idle_after(sent, line.len().max(sent.len() + 10)));
             // The echo of a write to the EEPROM is what its response looks like.
             if request.data_id() != DataId::WriteEeprom {
-                prop_assert_eq!(only.cause, Some(Cause::OnlyEcho));
+                prop_assert_eq!(only.cause(), Some(Cause::Line(LineCause::OnlyEcho)));
                 let bytes = [request.emit().as_bytes(), response.emit().as_bytes()].concat();
                 let both = inspect_bytes(request, &bytes);
-                prop_assert_eq!((both.cause, both.response), (Some(Cause::OwnEcho), Some(response)));
+                prop_assert_eq!((both.cause(), both.response()), (Some(Cause::Line(LineCause::OwnEcho)), Some(response)));
             }
         }
 
@@ -359,7 +304,7 @@ mod tests {
             prop_assume!(line.len() <= 60);
             let doubled = (0..line.len()).fold(0, |bits, at| bits | ((line.bits() >> at & 1) * 3) << (2 * at));
             let report = inspect(request, window(doubled, 2 * line.len()));
-            prop_assert_eq!((report.cause, report.response), (Some(Cause::HalfRate), Some(response)));
+            prop_assert_eq!((report.cause(), report.response()), (Some(Cause::Line(LineCause::HalfRate)), Some(response)));
         }
 
         #[test]
@@ -370,22 +315,25 @@ mod tests {
                 Response::ReadAll(_) => Cause::RequestRefused,
                 _ => Cause::OtherDataId { answered: asked.data_id() },
             };
-            prop_assert_eq!((report.cause, report.response), (Some(want), Some(response)));
+            prop_assert_eq!((report.cause(), report.response()), (Some(want), Some(response)));
         }
 
         /// Any line at all gives a report.
         #[test]
         fn any_line(bits: u128, len in 0..=128_u32, (request, _) in exchanges()) {
             let report = inspect(request, window(bits, len));
-            prop_assert_eq!(report.error.is_some(), !report.findings.is_empty());
+            prop_assert_eq!(report.error().is_some(), !report.findings().is_empty());
         }
     }
 
     #[test]
     fn stuck_lines() {
-        assert_eq!(inspect(Request::ReadSingleTurn, window(0, 110)).cause, Some(Cause::StuckLow));
-        assert_eq!(inspect(Request::ReadSingleTurn, window(u128::MAX, 110)).cause, Some(Cause::StuckHigh));
-        assert_eq!(inspect(Request::ReadSingleTurn, Window::EMPTY).cause, Some(Cause::StuckHigh));
+        assert_eq!(inspect(Request::ReadSingleTurn, window(0, 110)).cause(), Some(Cause::Line(LineCause::StuckLow)));
+        assert_eq!(
+            inspect(Request::ReadSingleTurn, window(u128::MAX, 110)).cause(),
+            Some(Cause::Line(LineCause::StuckHigh))
+        );
+        assert_eq!(inspect(Request::ReadSingleTurn, Window::EMPTY).cause(), Some(Cause::Line(LineCause::StuckHigh)));
     }
 
     #[test]
@@ -393,8 +341,8 @@ mod tests {
         let mut line = Frame::new(&[0x02, 0x20, 0xb4, 0xbd, 0x1c, 0x36]).unwrap().line().bits();
         line ^= 1 << 20 | 1 << 39;
         let report = inspect(Request::ReadSingleTurn, window(line, 60));
-        assert!(report.findings.iter().eq([ErrorClass::StartBit, ErrorClass::Delimiter, ErrorClass::Crc]));
-        assert_eq!(report.error, Some(Error::StartBit { field: 2 }));
+        assert!(report.findings().iter().eq([ErrorClass::StartBit, ErrorClass::Delimiter, ErrorClass::Crc]));
+        assert_eq!(report.error(), Some(Error::StartBit { field: 2 }));
         assert!(!report.fields()[2].start_ok && !report.fields()[3].delimiter_ok);
     }
 
@@ -402,12 +350,15 @@ mod tests {
     fn status_that_contradicts_the_alarms() {
         let mut answer = [0x1a, 0x00, 0, 0, 0, 0x17, 0, 0, 0, 0xc8, 0];
         answer[10] = crc(&answer);
-        assert!(inspect_bytes(Request::ReadAll, &answer).status_contradicts_alarms);
+        assert!(inspect_bytes(Request::ReadAll, &answer).status_contradicts_alarms());
     }
 
     #[test]
     fn causes_are_sentences() {
-        assert_eq!(Cause::Shifted { bits: -1 }.to_string(), "1 bit(s) at the beginning of the frame are missing");
+        assert_eq!(
+            Cause::Line(LineCause::Shifted { bits: -1 }).to_string(),
+            "1 bit(s) at the beginning of the frame are missing"
+        );
         assert_eq!(
             Cause::OtherDataId { answered: DataId::ResetTurnsAndErrors }.to_string(),
             "this is a sound response to ID C"

@@ -28,7 +28,7 @@ pub struct VendorCommand {
     response_fields: u8,
 }
 
-crate::show::one_line!(VendorCommand {
+servowire_core::one_line!(VendorCommand {
     Self { cf, response_fields } => "CF {:02X}h, response of {} fields", cf, response_fields;
 });
 

@@ -12,8 +12,8 @@ fn main() {
     let mut encoder = Encoder::new(Uart::new(&bench), DriverEnable(Pin), &bench, Line::new(BitRate::Mbit2_5));
     for k in 0..5_u32 {
         bench.turn_to(Abs::truncate(k.wrapping_mul(0x11_1111)), Abm::truncate(k));
-        match encoder.read_position(resolution, Policy::STRICT) {
-            Ok(sample) => println!("{}, sampled at {} ns", sample.position, sample.sampled_ns),
+        match encoder.read_position(resolution, Policy::new(500_000)) {
+            Ok(sample) => println!("{sample}"),
             Err(error) => println!("{error:?}"),
         }
     }

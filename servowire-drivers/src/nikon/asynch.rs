@@ -8,9 +8,10 @@ use nikon_aformat::bus::Addresses;
 use nikon_aformat::master::{
     BusTransaction, Cycle, EepromRead, Exchange, GuardedReset, Line, Progress, Reset, Step, Transaction,
 };
-use nikon_aformat::{Doubt, EncoderAddress, Operation, Policy, Position, Request, RequestFrame, Resolution, Response};
+use nikon_aformat::{Doubt, EncoderAddress, Operation, Policy, Request, RequestFrame, Resolution, Response, Sample};
+use servowire_core::Machine;
 
-use super::{Frame, LOST, Receiver, longest_ns, silence_ns};
+use super::{Frame, LOST, hear, longest_ns, silence_ns};
 use crate::procedure;
 use crate::quiet;
 use crate::race::race;
@@ -49,7 +50,7 @@ pub struct Master<F, T> {
 }
 
 impl<F: FramePort, T: Timer> Master<F, T> {
-    /// A line with encoders of this resolution. The port must be asked for frames within `line.latency_ns` of their end, unless it gives their times:
+    /// A line with encoders of this resolution. The port must be asked for frames within `line.latency_budget_ns()` of their end, unless it gives their times:
     /// nothing but the driver may run meanwhile, or give the line a larger budget.
     pub const fn new(port: F, timer: T, resolution: Resolution, line: Line) -> Self {
         Self { port, timer, resolution, line, state: quiet::Line::new(silence_ns(line)) }
@@ -60,13 +61,14 @@ impl<F: FramePort, T: Timer> Master<F, T> {
         (self.port, self.timer)
     }
 
-    /// The position of an encoder, if it may be used: from command 0, by the rules of [`Resolution::read`].
+    /// The position of an encoder, if it may be used, and when it was sampled: from command 0, by the rules of
+    /// [`Evidence::at`](nikon_aformat::Evidence::at).
     ///
     /// # Errors
     /// [`Error`], [`Error::Doubt`] among them.
-    pub async fn read_position(&mut self, ea: EncoderAddress, policy: Policy) -> Result<Position, Failure<F>> {
+    pub async fn read_position(&mut self, ea: EncoderAddress, policy: Policy) -> Result<Sample, Failure<F>> {
         let exchange = self.read_abs40(ea).await?;
-        exchange.position(self.resolution, policy, self.timer.now_ns()).map_err(Error::Doubt)
+        exchange.evidence(self.resolution).at(self.state.now_ns(&mut self.timer)?, policy).map_err(Error::Doubt)
     }
 
     /// Command 0: the whole position. Look at its encoder status before you use it.
@@ -94,15 +96,15 @@ impl<F: FramePort, T: Timer> Master<F, T> {
     /// [`read_all`](Self::read_all) when the cycle is due: waits for the next start and keeps to its grid.
     ///
     /// # Errors
-    /// [`Error`].
+    /// [`Error`]. After [`Error::Clock`] make a new cycle: the grid of this one is of the time before the clock was set back.
     pub async fn read_cycle(
         &mut self,
         cycle: &mut Cycle,
         operation: Operation,
         asked: Addresses,
     ) -> Result<BusTransaction, Failure<F>> {
-        self.timer.wait_until(cycle.next_ns()).await;
-        cycle.is_due(self.timer.now_ns());
+        self.timer.wait_until(cycle.next_ns()).await?;
+        let _ = cycle.is_due(self.state.now_ns(&mut self.timer)?);
         self.read_all(operation, asked).await
     }
 
@@ -112,7 +114,7 @@ impl<F: FramePort, T: Timer> Master<F, T> {
     /// [`Error`]; read the status to see whether they were cleared.
     pub async fn clear_status(&mut self, ea: EncoderAddress) -> Result<Response, Failure<F>> {
         let mut reset = GuardedReset::new(Reset::clear_status(ea));
-        let first = reset.start(self.timer.now_ns());
+        let first = reset.start(self.state.now_ns(&mut self.timer)?);
         self.run(first, |outcome, now_ns| reset.receive(outcome, now_ns)).await
     }
 
@@ -122,7 +124,7 @@ impl<F: FramePort, T: Timer> Master<F, T> {
     /// [`Error`].
     pub async fn read_eeprom(&mut self, ea: EncoderAddress, address: u8) -> Result<u16, Failure<F>> {
         let mut read = EepromRead::new(ea, address);
-        let first = read.start(self.timer.now_ns());
+        let first = read.start(self.state.now_ns(&mut self.timer)?);
         self.run(first, |outcome, now_ns| read.receive(outcome, now_ns)).await
     }
 
@@ -141,10 +143,11 @@ impl<F: FramePort, T: Timer> Master<F, T> {
                 ControlFlow::Continue(next) => next,
                 ControlFlow::Break(end) => return end.map_err(Error::Protocol),
             };
-            self.timer.wait_until(not_before_ns).await;
+            self.timer.wait_until(not_before_ns).await?;
             let exchanged = self.transact(request).await.map(|exchange| exchange.response);
             let outcome = procedure::outcome(exchanged, LOST)?;
-            step = receive(outcome, self.state.free_ns(self.timer.now_ns()));
+            let now_ns = self.state.now_ns(&mut self.timer)?;
+            step = receive(outcome, self.state.free_ns(now_ns));
         }
     }
 
@@ -160,14 +163,14 @@ impl<F: FramePort, T: Timer> Master<F, T> {
     }
 
     /// One request and all that answers.
-    async fn exchange<R: Receiver>(
+    async fn exchange<M: Machine<Unit = [Option<u16>], Error = nikon_aformat::Error>>(
         &mut self,
         request: Request,
         line: Line,
-        start: impl FnOnce(u64) -> R,
-    ) -> Result<(R, R::Value), Failure<F>> {
+        start: impl FnOnce(u64) -> M,
+    ) -> Result<(M, M::Value), Failure<F>> {
         self.settle().await?;
-        let start_ns = self.timer.now_ns();
+        let start_ns = self.state.now_ns(&mut self.timer)?;
         let mut transaction = start(start_ns);
         match transaction.progress() {
             // Encoders of this version do not know it, or nobody is asked: nothing is sent.
@@ -178,7 +181,8 @@ impl<F: FramePort, T: Timer> Master<F, T> {
         self.state.begin(longest_ns(line, request, self.resolution));
         let gap_bits = line.rate.bits(line.frame_gap_ns);
         self.port.send(request.emit().as_slice(), gap_bits).await.map_err(Error::Io)?;
-        self.state.sent(self.timer.now_ns());
+        let now_ns = self.state.now_ns(&mut self.timer)?;
+        self.state.sent(now_ns);
         let mut progress = transaction.progress();
         loop {
             match progress {
@@ -188,7 +192,8 @@ impl<F: FramePort, T: Timer> Master<F, T> {
                     return Ok((transaction, value));
                 }
                 Progress::Failed { error, ready_ns } => {
-                    self.state.failed(ready_ns, self.timer.now_ns());
+                    let now_ns = self.state.now_ns(&mut self.timer)?;
+                    self.state.failed(ready_ns, now_ns);
                     return Err(Error::Protocol(error));
                 }
             }
@@ -196,16 +201,16 @@ impl<F: FramePort, T: Timer> Master<F, T> {
     }
 
     /// Takes what is there, or waits for it; asks the clock only if there is nothing.
-    async fn receive<R: Receiver>(
+    async fn receive<M: Machine<Unit = [Option<u16>], Error = nikon_aformat::Error>>(
         &mut self,
-        receiver: &mut R,
+        machine: &mut M,
         until_ns: u64,
-    ) -> Result<Progress<R::Value>, Failure<F>> {
+    ) -> Result<Progress<M::Value>, Failure<F>> {
         // The time is over after `until_ns`, not at it.
         let wait = self.timer.wait_until(until_ns.saturating_add(1));
-        match race(self.port.take(), wait).await {
-            None => Ok(receiver.poll(self.timer.now_ns())),
-            Some(frame) => Ok(receiver.take(frame.map_err(Error::Io)?, self.timer.now_ns())),
+        match race(self.port.take(), wait).await? {
+            None => Ok(machine.poll(self.state.now_ns(&mut self.timer)?)),
+            Some(frame) => Ok(hear(machine, frame.map_err(Error::Io)?, self.state.now_ns(&mut self.timer)?)),
         }
     }
 
@@ -214,7 +219,7 @@ impl<F: FramePort, T: Timer> Master<F, T> {
         let port = &mut self.port;
         let listen = async || {
             let _: Result<Frame, _> = port.take().await;
-            Ok(())
+            Ok::<_, Failure<F>>(())
         };
         if quiet::wait_asynch(&mut self.state, &mut self.timer, listen).await? {
             Ok(())

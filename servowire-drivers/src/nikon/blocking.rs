@@ -7,9 +7,10 @@ use nikon_aformat::bus::Addresses;
 use nikon_aformat::master::{
     BusTransaction, Cycle, EepromRead, Exchange, GuardedReset, Line, Progress, Reset, Step, Transaction,
 };
-use nikon_aformat::{Doubt, EncoderAddress, Operation, Policy, Position, Request, RequestFrame, Resolution, Response};
+use nikon_aformat::{Doubt, EncoderAddress, Operation, Policy, Request, RequestFrame, Resolution, Response, Sample};
+use servowire_core::Machine;
 
-use super::{Frame, LOST, Receiver, longest_ns, silence_ns};
+use super::{Frame, LOST, hear, longest_ns, silence_ns};
 use crate::procedure;
 use crate::quiet;
 use crate::{Clock, Error};
@@ -49,7 +50,7 @@ pub struct Master<F, C> {
 }
 
 impl<F: FramePort, C: Clock> Master<F, C> {
-    /// A line with encoders of this resolution. The port must be asked for frames within `line.latency_ns` of their end, unless it gives their times:
+    /// A line with encoders of this resolution. The port must be asked for frames within `line.latency_budget_ns()` of their end, unless it gives their times:
     /// nothing but the driver may run meanwhile, or give the line a larger budget.
     pub const fn new(port: F, clock: C, resolution: Resolution, line: Line) -> Self {
         Self { port, clock, resolution, line, state: quiet::Line::new(silence_ns(line)) }
@@ -60,13 +61,14 @@ impl<F: FramePort, C: Clock> Master<F, C> {
         (self.port, self.clock)
     }
 
-    /// The position of an encoder, if it may be used: from command 0, by the rules of [`Resolution::read`].
+    /// The position of an encoder, if it may be used, and when it was sampled: from command 0, by the rules of
+    /// [`Evidence::at`](nikon_aformat::Evidence::at).
     ///
     /// # Errors
     /// [`Error`], [`Error::Doubt`] among them.
-    pub fn read_position(&mut self, ea: EncoderAddress, policy: Policy) -> Result<Position, Failure<F>> {
+    pub fn read_position(&mut self, ea: EncoderAddress, policy: Policy) -> Result<Sample, Failure<F>> {
         let exchange = self.read_abs40(ea)?;
-        exchange.position(self.resolution, policy, self.clock.now_ns()).map_err(Error::Doubt)
+        exchange.evidence(self.resolution).at(self.state.now_ns(&mut self.clock)?, policy).map_err(Error::Doubt)
     }
 
     /// Command 0: the whole position. Look at its encoder status before you use it.
@@ -94,14 +96,14 @@ impl<F: FramePort, C: Clock> Master<F, C> {
     /// [`read_all`](Self::read_all) when the cycle is due: waits for the next start and keeps to its grid.
     ///
     /// # Errors
-    /// [`Error`].
+    /// [`Error`]. After [`Error::Clock`] make a new cycle: the grid of this one is of the time before the clock was set back.
     pub fn read_cycle(
         &mut self,
         cycle: &mut Cycle,
         operation: Operation,
         asked: Addresses,
     ) -> Result<BusTransaction, Failure<F>> {
-        while !cycle.is_due(self.clock.now_ns()) {}
+        while !cycle.is_due(self.state.now_ns(&mut self.clock)?) {}
         self.read_all(operation, asked)
     }
 
@@ -111,7 +113,7 @@ impl<F: FramePort, C: Clock> Master<F, C> {
     /// [`Error`]; read the status to see whether they were cleared.
     pub fn clear_status(&mut self, ea: EncoderAddress) -> Result<Response, Failure<F>> {
         let mut reset = GuardedReset::new(Reset::clear_status(ea));
-        let first = reset.start(self.clock.now_ns());
+        let first = reset.start(self.state.now_ns(&mut self.clock)?);
         self.run(first, |outcome, now_ns| reset.receive(outcome, now_ns))
     }
 
@@ -121,7 +123,7 @@ impl<F: FramePort, C: Clock> Master<F, C> {
     /// [`Error`].
     pub fn read_eeprom(&mut self, ea: EncoderAddress, address: u8) -> Result<u16, Failure<F>> {
         let mut read = EepromRead::new(ea, address);
-        let first = read.start(self.clock.now_ns());
+        let first = read.start(self.state.now_ns(&mut self.clock)?);
         self.run(first, |outcome, now_ns| read.receive(outcome, now_ns))
     }
 
@@ -140,10 +142,11 @@ impl<F: FramePort, C: Clock> Master<F, C> {
                 ControlFlow::Continue(next) => next,
                 ControlFlow::Break(end) => return end.map_err(Error::Protocol),
             };
-            while self.clock.now_ns() < not_before_ns {}
+            self.state.wait_until(&mut self.clock, not_before_ns)?;
             let exchanged = self.transact(request).map(|exchange| exchange.response);
             let outcome = procedure::outcome(exchanged, LOST)?;
-            step = receive(outcome, self.state.free_ns(self.clock.now_ns()));
+            let now_ns = self.state.now_ns(&mut self.clock)?;
+            step = receive(outcome, self.state.free_ns(now_ns));
         }
     }
 
@@ -159,14 +162,14 @@ impl<F: FramePort, C: Clock> Master<F, C> {
     }
 
     /// One request and all that answers.
-    fn exchange<R: Receiver>(
+    fn exchange<M: Machine<Unit = [Option<u16>], Error = nikon_aformat::Error>>(
         &mut self,
         request: Request,
         line: Line,
-        start: impl FnOnce(u64) -> R,
-    ) -> Result<(R, R::Value), Failure<F>> {
+        start: impl FnOnce(u64) -> M,
+    ) -> Result<(M, M::Value), Failure<F>> {
         self.settle()?;
-        let start_ns = self.clock.now_ns();
+        let start_ns = self.state.now_ns(&mut self.clock)?;
         let mut transaction = start(start_ns);
         match transaction.progress() {
             // Encoders of this version do not know it, or nobody is asked: nothing is sent.
@@ -177,7 +180,8 @@ impl<F: FramePort, C: Clock> Master<F, C> {
         self.state.begin(longest_ns(line, request, self.resolution));
         let gap_bits = line.rate.bits(line.frame_gap_ns);
         self.port.send(request.emit().as_slice(), gap_bits).map_err(Error::Io)?;
-        self.state.sent(self.clock.now_ns());
+        let now_ns = self.state.now_ns(&mut self.clock)?;
+        self.state.sent(now_ns);
         loop {
             match self.receive(&mut transaction)? {
                 Progress::Pending { .. } => {}
@@ -186,7 +190,8 @@ impl<F: FramePort, C: Clock> Master<F, C> {
                     return Ok((transaction, value));
                 }
                 Progress::Failed { error, ready_ns } => {
-                    self.state.failed(ready_ns, self.clock.now_ns());
+                    let now_ns = self.state.now_ns(&mut self.clock)?;
+                    self.state.failed(ready_ns, now_ns);
                     return Err(Error::Protocol(error));
                 }
             }
@@ -194,18 +199,21 @@ impl<F: FramePort, C: Clock> Master<F, C> {
     }
 
     /// Takes what is there; asks whether the time is over only if there is nothing.
-    fn receive<R: Receiver>(&mut self, receiver: &mut R) -> Result<Progress<R::Value>, Failure<F>> {
-        let before_ns = self.clock.now_ns();
+    fn receive<M: Machine<Unit = [Option<u16>], Error = nikon_aformat::Error>>(
+        &mut self,
+        machine: &mut M,
+    ) -> Result<Progress<M::Value>, Failure<F>> {
+        let before_ns = self.state.now_ns(&mut self.clock)?;
         Ok(match self.port.take().map_err(Error::Io)? {
-            Some(frame) => receiver.take(frame, self.clock.now_ns()),
-            None => receiver.poll(before_ns),
+            Some(frame) => hear(machine, frame, self.state.now_ns(&mut self.clock)?),
+            None => machine.poll(before_ns),
         })
     }
 
     /// Waits until the line is free, and throws away what comes meanwhile, errors of the port included.
     fn settle(&mut self) -> Result<(), Failure<F>> {
         let port = &mut self.port;
-        if quiet::wait(&mut self.state, &mut self.clock, || Ok(port.listen()))? {
+        if quiet::wait(&mut self.state, &mut self.clock, || Ok::<_, Failure<F>>(port.listen()))? {
             Ok(())
         } else {
             Err(Error::NeverQuiet)

@@ -32,20 +32,20 @@ impl<P: Port, T: Timer, const N: usize> Driver<'_, P, T, N> {
     /// waits is missed: the commands of that period go out once more.
     ///
     /// # Errors
-    /// [`Error::Io`](crate::Error::Io); the next exchange goes on. A pin that reports a fault counts as an edge that was lost.
+    /// [`Error::Io`](crate::Error::Io) and [`Error::Clock`](crate::Error::Clock); the next exchange goes on. A pin that reports a fault counts as an edge that was lost.
     pub async fn next(&mut self, sync: &mut impl Wait) -> Result<Period, Failure<P>> {
         let update_ns = u64::from(self.master().config().periods.update_ns);
-        let until_ns = self.clock.now_ns().saturating_add(update_ns.saturating_mul(3) >> 1);
-        let edge = race(sync.wait_for_falling_edge(), self.clock.wait_until(until_ns)).await;
+        let until_ns = self.now_ns()?.saturating_add(update_ns.saturating_mul(3) >> 1);
+        let edge = race(sync.wait_for_falling_edge(), self.clock.wait_until(until_ns)).await?;
         let began = match edge {
             Some(Ok(())) => Began::Edge,
             Some(Err(_)) => {
-                self.clock.wait_until(until_ns).await;
+                self.clock.wait_until(until_ns).await?;
                 Began::Clock
             }
             None => Began::Clock,
         };
-        let now_ns = self.clock.now_ns();
+        let now_ns = self.now_ns()?;
         let began_ns = self.began_ns(now_ns);
         self.exchange(began_ns).map(|exchanged| Period { began, exchanged })
     }

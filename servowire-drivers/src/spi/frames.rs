@@ -57,7 +57,7 @@ impl<S: SpiBus, D: Direction, C: Clock> blocking::FramePort for SpiFrames<'_, S,
 
     fn send(&mut self, frames: &[RequestFrame], gap_bits: u32) -> Result<(), Self::Error> {
         self.sampler.send(line_bits(units(frames), gap_bits))?;
-        self.began_ns = self.clock.now_ns();
+        self.began_ns = self.clock.now_ns()?;
         self.sampler.sample(usize::MAX)
     }
 
@@ -76,7 +76,7 @@ impl<S: AsyncSpiBus, D: Direction, C: Clock> asynch::FramePort for SpiFrames<'_,
 
     async fn send(&mut self, frames: &[RequestFrame], gap_bits: u32) -> Result<(), Self::Error> {
         self.sampler.send_asynch(line_bits(units(frames), gap_bits)).await?;
-        self.began_ns = self.clock.now_ns();
+        self.began_ns = self.clock.now_ns()?;
         self.sampler.sample_asynch(usize::MAX).await
     }
 

@@ -8,9 +8,9 @@ use core::ops::ControlFlow;
 
 use embedded_io_async::{Read, Write};
 use tformat::master::{EEPROM_POLLING, EepromAccess, Exchange, Line, Progress, Reset, Step, Transaction};
-use tformat::{Address, AllData, Doubt, Page, Policy, Request, Resolution, Response, SingleTurn};
+use tformat::{Address, AllData, Doubt, Page, Policy, Request, Resolution, Response, Sample, SingleTurn};
 
-use super::{MAX_BYTES, Sample, driver_off_ns, longest_ns, other, silence_ns};
+use super::{MAX_BYTES, driver_off_ns, longest_ns, other, silence_ns};
 use crate::direction::Switch;
 use crate::procedure;
 use crate::quiet;
@@ -44,13 +44,14 @@ impl<U: Read + Write, D: Direction, T: Timer> Encoder<U, D, T> {
         (self.uart, self.direction.release(), self.timer)
     }
 
-    /// The position, if it may be used, and when it was true: from ID 3, by the rules of [`Resolution::read`].
+    /// The position, if it may be used, and when it was sampled: from ID 3, by the rules of [`Evidence::at`](tformat::Evidence::at).
+    /// If the request was held up on its way out, the position is younger by that.
     ///
     /// # Errors
     /// [`Error`], [`Error::Doubt`] among them.
     pub async fn read_position(&mut self, resolution: Resolution, policy: Policy) -> Result<Sample, Failure<U, D>> {
         let exchange = self.transact(Request::ReadAll).await?;
-        Sample::of(exchange, resolution, policy).map_err(Error::Doubt)
+        exchange.evidence(resolution).at(self.state.now_ns(&mut self.timer)?, policy).map_err(Error::Doubt)
     }
 
     /// ID 3: position, turns, encoder ID and alarms. Look at the alarms before you use the position.
@@ -70,7 +71,7 @@ impl<U: Read + Write, D: Direction, T: Timer> Encoder<U, D, T> {
     /// [`Error`]; read the alarms to see whether they were cleared.
     pub async fn clear_errors(&mut self) -> Result<SingleTurn, Failure<U, D>> {
         let mut reset = Reset::clear_errors();
-        let first = reset.start(self.timer.now_ns());
+        let first = reset.start(self.state.now_ns(&mut self.timer)?);
         self.run(first, |outcome, now_ns| reset.receive(outcome, now_ns)).await
     }
 
@@ -80,7 +81,7 @@ impl<U: Read + Write, D: Direction, T: Timer> Encoder<U, D, T> {
     /// [`Error`].
     pub async fn read_eeprom(&mut self, page: Option<Page>, address: Address) -> Result<u8, Failure<U, D>> {
         let mut access = EepromAccess::read(page, address, EEPROM_POLLING);
-        let first = access.start(self.timer.now_ns());
+        let first = access.start(self.state.now_ns(&mut self.timer)?);
         self.run(first, |outcome, now_ns| access.receive(outcome, now_ns)).await
     }
 
@@ -90,7 +91,7 @@ impl<U: Read + Write, D: Direction, T: Timer> Encoder<U, D, T> {
     /// [`Error`]: whether the byte was written is not known then. Read it.
     pub async fn write_eeprom(&mut self, page: Option<Page>, address: Address, data: u8) -> Result<u8, Failure<U, D>> {
         let mut access = EepromAccess::write(page, address, data, EEPROM_POLLING);
-        let first = access.start(self.timer.now_ns());
+        let first = access.start(self.state.now_ns(&mut self.timer)?);
         self.run(first, |outcome, now_ns| access.receive(outcome, now_ns)).await
     }
 
@@ -109,10 +110,11 @@ impl<U: Read + Write, D: Direction, T: Timer> Encoder<U, D, T> {
                 ControlFlow::Continue(next) => next,
                 ControlFlow::Break(end) => return end.map_err(Error::Protocol),
             };
-            self.timer.wait_until(not_before_ns).await;
+            self.timer.wait_until(not_before_ns).await?;
             let exchanged = self.transact(request).await.map(|exchange| exchange.response);
             let outcome = procedure::outcome(exchanged, tformat::Error::NoResponse { echo: false })?;
-            step = receive(outcome, self.state.free_ns(self.timer.now_ns()));
+            let now_ns = self.state.now_ns(&mut self.timer)?;
+            step = receive(outcome, self.state.free_ns(now_ns));
         }
     }
 
@@ -125,17 +127,15 @@ impl<U: Read + Write, D: Direction, T: Timer> Encoder<U, D, T> {
         self.settle().await?;
         let frame = request.emit();
         let guard = self.direction.transmit().map_err(Error::Pin)?;
-        let on_ns = self.timer.now_ns();
-        self.timer.wait_until(on_ns.saturating_add(self.line.driver_lead_ns.into())).await;
+        self.state.pause_asynch(&mut self.timer, self.line.driver_lead_ns.into()).await?;
         self.state.begin(longest_ns(&self.line, request));
-        let start_ns = self.timer.now_ns();
-        send(&mut self.uart, frame.as_bytes()).await?;
-        let taken_ns = self.timer.now_ns();
-        self.uart.flush().await.map_err(Error::Io)?;
-        self.state.sent(self.timer.now_ns());
-        let mut transaction = Transaction::start(request, self.line, start_ns);
-        let off_ns = driver_off_ns(&self.line, transaction.request_end_ns(), start_ns, taken_ns);
-        self.timer.wait_until(off_ns).await;
+        let sent = send(&mut self.uart, &mut self.timer, &mut self.state, &self.line, request).await;
+        if matches!(sent, Err(Error::Clock(_))) {
+            // A request of which the end is cut off may be another one: it leaves, by the time that it is now.
+            let request_ns = self.line.rate.fields_ns(frame.fields()).into();
+            let _: Result<(), _> = self.state.pause_asynch(&mut self.timer, request_ns).await;
+        }
+        let mut transaction = sent?;
         guard.receive().map_err(Error::Pin)?;
         let mut progress = transaction.progress();
         loop {
@@ -146,7 +146,8 @@ impl<U: Read + Write, D: Direction, T: Timer> Encoder<U, D, T> {
                     return Ok(value);
                 }
                 Progress::Failed { error, ready_ns } => {
-                    self.state.failed(ready_ns, self.timer.now_ns());
+                    let now_ns = self.state.now_ns(&mut self.timer)?;
+                    self.state.failed(ready_ns, now_ns);
                     return Err(Error::Protocol(error));
                 }
             }
@@ -158,12 +159,12 @@ impl<U: Read + Write, D: Direction, T: Timer> Encoder<U, D, T> {
         let mut buffer = [0; MAX_BYTES];
         // The time is over after `until_ns`, not at it.
         let wait = self.timer.wait_until(until_ns.saturating_add(1));
-        match race(self.uart.read(&mut buffer), wait).await {
-            None => Ok(transaction.poll(self.timer.now_ns())),
+        match race(self.uart.read(&mut buffer), wait).await? {
+            None => Ok(transaction.poll(self.state.now_ns(&mut self.timer)?)),
             Some(count) => {
                 let count = count.map_err(Error::Io)?;
                 let bytes = buffer.get(..count).filter(|bytes| !bytes.is_empty()).ok_or(Error::Closed)?;
-                Ok(transaction.bytes(bytes, self.timer.now_ns()))
+                Ok(transaction.hear(bytes, self.state.now_ns(&mut self.timer)?))
             }
         }
     }
@@ -183,8 +184,27 @@ impl<U: Read + Write, D: Direction, T: Timer> Encoder<U, D, T> {
     }
 }
 
+/// Sends a request, until its last bit has left.
+async fn send<U: Write, PIN, P, D>(
+    uart: &mut U,
+    timer: &mut impl Timer,
+    state: &mut quiet::Line,
+    line: &Line,
+    request: Request,
+) -> Result<Transaction, Error<U::Error, PIN, P, D>> {
+    let start_ns = state.now_ns(timer)?;
+    hand_over(uart, request.emit().as_bytes()).await?;
+    let taken_ns = state.now_ns(timer)?;
+    uart.flush().await.map_err(Error::Io)?;
+    let now_ns = state.now_ns(timer)?;
+    state.sent(now_ns);
+    let transaction = Transaction::start(request, *line, start_ns);
+    timer.wait_until(driver_off_ns(line, transaction.transmission().end_ns, start_ns, taken_ns)).await?;
+    Ok(transaction)
+}
+
 /// Hands all bytes to the UART.
-async fn send<U: Write, PIN, P, D>(uart: &mut U, mut bytes: &[u8]) -> Result<(), Error<U::Error, PIN, P, D>> {
+async fn hand_over<U: Write, PIN, P, D>(uart: &mut U, mut bytes: &[u8]) -> Result<(), Error<U::Error, PIN, P, D>> {
     while !bytes.is_empty() {
         let count = uart.write(bytes).await.map_err(Error::Io)?;
         bytes = bytes.get(count..).filter(|_| count > 0).ok_or(Error::Closed)?;

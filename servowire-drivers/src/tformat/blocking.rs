@@ -4,9 +4,9 @@ use core::ops::ControlFlow;
 
 use embedded_io::{Read, ReadReady, Write};
 use tformat::master::{EEPROM_POLLING, EepromAccess, Exchange, Line, Progress, Reset, Step, Transaction};
-use tformat::{Address, AllData, Doubt, Page, Policy, Request, Resolution, Response, SingleTurn};
+use tformat::{Address, AllData, Doubt, Page, Policy, Request, Resolution, Response, Sample, SingleTurn};
 
-use super::{MAX_BYTES, Sample, driver_off_ns, longest_ns, other, silence_ns};
+use super::{MAX_BYTES, driver_off_ns, longest_ns, other, silence_ns};
 use crate::direction::Switch;
 use crate::procedure;
 use crate::quiet;
@@ -38,13 +38,14 @@ impl<U: Read + ReadReady + Write, D: Direction, C: Clock> Encoder<U, D, C> {
         (self.uart, self.direction.release(), self.clock)
     }
 
-    /// The position, if it may be used, and when it was true: from ID 3, by the rules of [`Resolution::read`].
+    /// The position, if it may be used, and when it was sampled: from ID 3, by the rules of [`Evidence::at`](tformat::Evidence::at).
+    /// If the request was held up on its way out, the position is younger by that.
     ///
     /// # Errors
     /// [`Error`], [`Error::Doubt`] among them.
     pub fn read_position(&mut self, resolution: Resolution, policy: Policy) -> Result<Sample, Failure<U, D>> {
         let exchange = self.transact(Request::ReadAll)?;
-        Sample::of(exchange, resolution, policy).map_err(Error::Doubt)
+        exchange.evidence(resolution).at(self.state.now_ns(&mut self.clock)?, policy).map_err(Error::Doubt)
     }
 
     /// ID 3: position, turns, encoder ID and alarms. Look at the alarms before you use the position.
@@ -64,7 +65,7 @@ impl<U: Read + ReadReady + Write, D: Direction, C: Clock> Encoder<U, D, C> {
     /// [`Error`]; read the alarms to see whether they were cleared.
     pub fn clear_errors(&mut self) -> Result<SingleTurn, Failure<U, D>> {
         let mut reset = Reset::clear_errors();
-        let first = reset.start(self.clock.now_ns());
+        let first = reset.start(self.state.now_ns(&mut self.clock)?);
         self.run(first, |outcome, now_ns| reset.receive(outcome, now_ns))
     }
 
@@ -74,7 +75,7 @@ impl<U: Read + ReadReady + Write, D: Direction, C: Clock> Encoder<U, D, C> {
     /// [`Error`].
     pub fn read_eeprom(&mut self, page: Option<Page>, address: Address) -> Result<u8, Failure<U, D>> {
         let mut access = EepromAccess::read(page, address, EEPROM_POLLING);
-        let first = access.start(self.clock.now_ns());
+        let first = access.start(self.state.now_ns(&mut self.clock)?);
         self.run(first, |outcome, now_ns| access.receive(outcome, now_ns))
     }
 
@@ -84,7 +85,7 @@ impl<U: Read + ReadReady + Write, D: Direction, C: Clock> Encoder<U, D, C> {
     /// [`Error`]: whether the byte was written is not known then. Read it.
     pub fn write_eeprom(&mut self, page: Option<Page>, address: Address, data: u8) -> Result<u8, Failure<U, D>> {
         let mut access = EepromAccess::write(page, address, data, EEPROM_POLLING);
-        let first = access.start(self.clock.now_ns());
+        let first = access.start(self.state.now_ns(&mut self.clock)?);
         self.run(first, |outcome, now_ns| access.receive(outcome, now_ns))
     }
 
@@ -103,10 +104,11 @@ impl<U: Read + ReadReady + Write, D: Direction, C: Clock> Encoder<U, D, C> {
                 ControlFlow::Continue(next) => next,
                 ControlFlow::Break(end) => return end.map_err(Error::Protocol),
             };
-            while self.clock.now_ns() < not_before_ns {}
+            self.state.wait_until(&mut self.clock, not_before_ns)?;
             let exchanged = self.transact(request).map(|exchange| exchange.response);
             let outcome = procedure::outcome(exchanged, tformat::Error::NoResponse { echo: false })?;
-            step = receive(outcome, self.state.free_ns(self.clock.now_ns()));
+            let now_ns = self.state.now_ns(&mut self.clock)?;
+            step = receive(outcome, self.state.free_ns(now_ns));
         }
     }
 
@@ -119,17 +121,14 @@ impl<U: Read + ReadReady + Write, D: Direction, C: Clock> Encoder<U, D, C> {
         self.settle()?;
         let frame = request.emit();
         let guard = self.direction.transmit().map_err(Error::Pin)?;
-        let on_ns = self.clock.now_ns();
-        while self.clock.now_ns() < on_ns.saturating_add(self.line.driver_lead_ns.into()) {}
+        self.state.pause(&mut self.clock, self.line.driver_lead_ns.into())?;
         self.state.begin(longest_ns(&self.line, request));
-        let start_ns = self.clock.now_ns();
-        send(&mut self.uart, frame.as_bytes())?;
-        let taken_ns = self.clock.now_ns();
-        self.uart.flush().map_err(Error::Io)?;
-        self.state.sent(self.clock.now_ns());
-        let mut transaction = Transaction::start(request, self.line, start_ns);
-        let off_ns = driver_off_ns(&self.line, transaction.request_end_ns(), start_ns, taken_ns);
-        while self.clock.now_ns() < off_ns {}
+        let sent = send(&mut self.uart, &mut self.clock, &mut self.state, &self.line, request);
+        if matches!(sent, Err(Error::Clock(_))) {
+            // A request of which the end is cut off may be another one: it leaves, by the time that it is now.
+            let _: Result<(), _> = self.state.pause(&mut self.clock, self.line.rate.fields_ns(frame.fields()).into());
+        }
+        let mut transaction = sent?;
         guard.receive().map_err(Error::Pin)?;
         loop {
             match self.receive(&mut transaction)? {
@@ -139,7 +138,8 @@ impl<U: Read + ReadReady + Write, D: Direction, C: Clock> Encoder<U, D, C> {
                     return Ok(value);
                 }
                 Progress::Failed { error, ready_ns } => {
-                    self.state.failed(ready_ns, self.clock.now_ns());
+                    let now_ns = self.state.now_ns(&mut self.clock)?;
+                    self.state.failed(ready_ns, now_ns);
                     return Err(Error::Protocol(error));
                 }
             }
@@ -150,7 +150,7 @@ impl<U: Read + ReadReady + Write, D: Direction, C: Clock> Encoder<U, D, C> {
     fn receive(&mut self, transaction: &mut Transaction) -> Result<Progress, Failure<U, D>> {
         if !self.uart.read_ready().map_err(Error::Io)? {
             // What came while the clock was read is not late.
-            let now_ns = self.clock.now_ns();
+            let now_ns = self.state.now_ns(&mut self.clock)?;
             if !self.uart.read_ready().map_err(Error::Io)? {
                 return Ok(transaction.poll(now_ns));
             }
@@ -158,7 +158,7 @@ impl<U: Read + ReadReady + Write, D: Direction, C: Clock> Encoder<U, D, C> {
         let mut buffer = [0; MAX_BYTES];
         let count = self.uart.read(&mut buffer).map_err(Error::Io)?;
         let bytes = buffer.get(..count).filter(|bytes| !bytes.is_empty()).ok_or(Error::Closed)?;
-        Ok(transaction.bytes(bytes, self.clock.now_ns()))
+        Ok(transaction.hear(bytes, self.state.now_ns(&mut self.clock)?))
     }
 
     /// Waits until the line is free, and throws away what comes meanwhile, errors of the UART included.
@@ -176,8 +176,27 @@ impl<U: Read + ReadReady + Write, D: Direction, C: Clock> Encoder<U, D, C> {
     }
 }
 
+/// Sends a request, until its last bit has left.
+fn send<U: Write, PIN, P, D>(
+    uart: &mut U,
+    clock: &mut impl Clock,
+    state: &mut quiet::Line,
+    line: &Line,
+    request: Request,
+) -> Result<Transaction, Error<U::Error, PIN, P, D>> {
+    let start_ns = state.now_ns(clock)?;
+    hand_over(uart, request.emit().as_bytes())?;
+    let taken_ns = state.now_ns(clock)?;
+    uart.flush().map_err(Error::Io)?;
+    let now_ns = state.now_ns(clock)?;
+    state.sent(now_ns);
+    let transaction = Transaction::start(request, *line, start_ns);
+    state.wait_until(clock, driver_off_ns(line, transaction.transmission().end_ns, start_ns, taken_ns))?;
+    Ok(transaction)
+}
+
 /// Hands all bytes to the UART.
-fn send<U: Write, PIN, P, D>(uart: &mut U, mut bytes: &[u8]) -> Result<(), Error<U::Error, PIN, P, D>> {
+fn hand_over<U: Write, PIN, P, D>(uart: &mut U, mut bytes: &[u8]) -> Result<(), Error<U::Error, PIN, P, D>> {
     while !bytes.is_empty() {
         let count = uart.write(bytes).map_err(Error::Io)?;
         bytes = bytes.get(count..).filter(|_| count > 0).ok_or(Error::Closed)?;

@@ -9,8 +9,8 @@ use std::rc::Rc;
 use rtex_block::MacId;
 use rtex_block::device::{Drive, DriveConfig, OpenCodes};
 use rtex_block::master::{Asic, Slave};
-use servowire_drivers::Clock;
 use servowire_drivers::rtex::{FrameCount, Port, Word};
+use servowire_drivers::{Clock, ClockError};
 
 pub const AXES: usize = 3;
 /// Communication period.
@@ -276,10 +276,10 @@ impl<W: Drawn> Port for Bus<W> {
 pub struct Watch(pub Shared);
 
 impl Clock for Watch {
-    fn now_ns(&mut self) -> u64 {
+    fn now_ns(&mut self) -> Result<u64, ClockError> {
         let mut ring = self.0.borrow_mut();
         let until_ns = ring.now_ns + 100;
         ring.pass(until_ns);
-        ring.now_ns
+        Ok(ring.now_ns)
     }
 }

@@ -8,7 +8,7 @@ mod describe;
 
 use std::io;
 
-use nikon_aformat::inspect::{Cause, Kind, inspect};
+use nikon_aformat::inspect::{Cause, Kind, LineCause, inspect};
 use nikon_aformat::{
     BitOrder, BitRate, Command, Echo, Error, Expected, FRAME_BITS, Layout, RawResponse, Request, RequestFrame,
     Resolution, Response, Window,
@@ -226,8 +226,8 @@ fn cause(group: &Frames, request: Request, expected: Option<Expected>) -> Option
     let len = layout.line_bits();
     let expected = expected.unwrap_or_else(|| request.expected(Resolution::default()));
     let line = Window::from_bits(group.raw & (1_u128.checked_shl(len)?.wrapping_sub(1)), len)?;
-    let found = if group.raw == 0 { None } else { inspect(request, Resolution::default(), line).cause };
-    if let Some(cause) = found.filter(|cause| *cause != Cause::Disturbed) {
+    let found = if group.raw == 0 { None } else { inspect(request, Resolution::default(), line).cause() };
+    if let Some(cause) = found.filter(|cause| *cause != Cause::Line(LineCause::Disturbed)) {
         return Some(cause.to_string());
     }
     let due = usize::from(layout.frames());
@@ -246,7 +246,7 @@ fn cause(group: &Frames, request: Request, expected: Option<Expected>) -> Option
         return Some(CUT.to_owned());
     }
     if flipped {
-        return Some(Cause::Disturbed.to_string());
+        return Some(LineCause::Disturbed.to_string());
     }
     if let Some(slipped) = slipped_bit(group.raw, len, sound) {
         return Some(slipped.to_owned());

@@ -9,7 +9,7 @@ mod frame;
 
 use std::io;
 
-use tformat::inspect::{Cause, inspect, inspect_bytes};
+use tformat::inspect::{Cause, LineCause, inspect, inspect_bytes};
 use tformat::{AllData, BitRate, ControlField, DataId, Error, Request, Response};
 
 use crate::capture::hexlog::Burst;
@@ -163,8 +163,8 @@ impl Decoder {
             Some(_) => inspect(request, frame.line(self.bit)?),
         };
         // That is what its verdict says already.
-        let cause = report.cause.filter(|cause| *cause != Cause::RequestRefused);
-        if cause.is_some_and(|cause| cause != Cause::Disturbed) {
+        let cause = report.cause().filter(|cause| *cause != Cause::RequestRefused);
+        if cause.is_some_and(|cause| cause != Cause::Line(LineCause::Disturbed)) {
             return cause.map(|cause| cause.to_string());
         }
         let due = usize::from(request.data_id().response_fields());
@@ -172,7 +172,7 @@ impl Decoder {
         let wrong = frame.contents().iter().fold(0, |crc, byte| crc ^ byte).count_ones();
         let flipped = frame.broken.is_none() && frame.len() == due && wrong == 1;
         if frame.broken.is_some() && frame.is_one_bit_off(request) {
-            return Some(Cause::Disturbed.to_string());
+            return Some(LineCause::Disturbed.to_string());
         }
         if !flipped && frame.broken.is_none() && frame.len() == due && frame.ends_idle(request) {
             return Some(CUT.to_owned());

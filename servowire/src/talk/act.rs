@@ -9,7 +9,9 @@ use std::thread;
 use std::time::{Duration, Instant};
 
 use tformat::master::{EEPROM_POLLING, EepromAccess, Reset};
-use tformat::{Address, AllData, BitRate, Page, Request, Resolution, Response};
+use tformat::{
+    Address, AllData, Almc, BitRate, Evidence, Hint, Page, Policy, Request, Resolution, Response, Tolerated,
+};
 
 use super::Watch;
 use super::link::{Fault, Link};
@@ -39,16 +41,20 @@ pub(super) fn read<P: Port>(link: &mut Link<P>) -> Done {
     Ok(ExitCode::SUCCESS)
 }
 
+/// It was read just now, and the alarms stand beside it.
+const SHOWN: Policy = Policy::new(0).tolerating(Tolerated::NOTHING.alarms(Almc::all()));
+
 /// Position, turns and alarms in words.
 fn line(all: &AllData) -> String {
-    let hint = Resolution::from_enid(all.enid);
-    let position = hint.map(|hint| (hint.resolution, hint.resolution.position(all.abs, all.abm)));
-    let place = match position {
-        Some((resolution, Ok(at))) => {
-            let degrees = f64::from(at.abs) * 360.0 / f64::from(resolution.counts_per_turn());
-            format!("{degrees:>10.5} deg  {:>8} counts  turn {}", at.abs, at.turns)
-        }
-        Some((_, Err(error))) => format!("ABS {} ABM {}: {error}", all.abs, all.abm),
+    let place = match Resolution::from_enid(all.enid) {
+        Some(Hint { resolution, .. }) => match Evidence::of(Response::ReadAll(*all), resolution, 0).at(0, SHOWN) {
+            Ok(sample) => {
+                let (counts, turns) = (sample.single_turn(), sample.turns().unwrap_or(0));
+                let degrees = f64::from(counts) * 360.0 / f64::from(resolution.counts_per_turn());
+                format!("{degrees:>10.5} deg  {counts:>8} counts  turn {turns}")
+            }
+            Err(doubt) => format!("ABS {} ABM {}: {doubt}", all.abs, all.abm),
+        },
         None => format!("ABS {} ABM {} (encoder ID {:#04x} says nothing of their widths)", all.abs, all.abm, all.enid),
     };
     let alarms = if all.almc.is_empty() { "no alarms".to_owned() } else { format!("alarms {}", all.almc) };
@@ -160,9 +166,7 @@ pub(super) fn info<P: Port>(link: &mut Link<P>, name: &str, rate: BitRate) -> Do
 
 pub(super) fn clear_errors<P: Port>(link: &mut Link<P>) -> Done {
     let before = read_all(link)?.almc;
-    let mut reset = Reset::clear_errors();
-    let first = reset.start(link.now_ns());
-    link.run(first, |outcome, now_ns| reset.receive(outcome, now_ns))?;
+    link.run(Reset::clear_errors())?;
     let after = read_all(link)?.almc;
     say(format_args!("alarms before: {}; after: {}\n", name(before), name(after)))?;
     Ok(if after.is_empty() { ExitCode::SUCCESS } else { ExitCode::FAILURE })
@@ -173,15 +177,11 @@ fn name(almc: tformat::Almc) -> String {
 }
 
 fn read_byte<P: Port>(link: &mut Link<P>, page: Option<Page>, address: Address) -> Result<u8, Fault> {
-    let mut access = EepromAccess::read(page, address, EEPROM_POLLING);
-    let first = access.start(link.now_ns());
-    link.run(first, |outcome, now_ns| access.receive(outcome, now_ns))
+    link.run(EepromAccess::read(page, address, EEPROM_POLLING))
 }
 
 fn write_byte<P: Port>(link: &mut Link<P>, address: Address, data: u8) -> Result<u8, Fault> {
-    let mut access = EepromAccess::write(None, address, data, EEPROM_POLLING);
-    let first = access.start(link.now_ns());
-    link.run(first, |outcome, now_ns| access.receive(outcome, now_ns))
+    link.run(EepromAccess::write(None, address, data, EEPROM_POLLING))
 }
 
 /// The bytes of a page, after it was selected. The procedure reads the selection back.

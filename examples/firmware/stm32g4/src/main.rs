@@ -94,7 +94,7 @@ fn uart() -> usart::Config {
 /// One request and its answer. The reception is armed before the request goes out: the answer comes 3 us after it.
 async fn exchange(uart: &mut Uart<'static, Async>, clock: &mut Clock, line: Line) -> Result<Exchange, tformat::Error> {
     let mut transaction = Transaction::start(Request::ReadAll, line, clock.now_ns());
-    let frame = transaction.frame();
+    let frame = transaction.transmission().frame;
     let mut buffer = [0; MOST_BYTES];
     let (tx, rx) = uart.split_ref();
     let both = join(rx.read_until_idle(&mut buffer), tx.write(frame.as_bytes()));
@@ -102,7 +102,7 @@ async fn exchange(uart: &mut Uart<'static, Async>, clock: &mut Clock, line: Line
     let now_ns = clock.now_ns();
     let progress = match received {
         Ok((Ok(count), Ok(()))) => {
-            transaction.bytes(buffer.get(..count).unwrap_or_default(), now_ns.saturating_sub(IDLE_NS))
+            transaction.hear(buffer.get(..count).unwrap_or_default(), now_ns.saturating_sub(IDLE_NS))
         }
         // Noise, framing, overrun: all bytes of this reading are gone.
         Ok(_) => transaction.framing_error(now_ns),

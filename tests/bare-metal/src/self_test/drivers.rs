@@ -51,8 +51,8 @@ fn tformat() -> Tally {
         |row| row.0,
         |(_, answer, want)| {
             let mut encoder = Encoder::new(Uart::new(answer), Automatic, steps(4_000), LINE);
-            match encoder.read_position(RESOLUTION, tformat::Policy::STRICT) {
-                Ok(sample) => Some(sample.position.abs) == *want && sample.position.turns == 3,
+            match encoder.read_position(RESOLUTION, tformat::Policy::new(1_000_000)) {
+                Ok(sample) => Some(sample.single_turn()) == *want && sample.turns() == Some(3),
                 Err(Error::Protocol(_)) => want.is_none(),
                 Err(_) => false,
             }
@@ -66,8 +66,8 @@ fn nikon() -> Tally {
         |row| row.0,
         |(_, answer, want)| {
             let mut master = Master::new(Port::new(answer), steps(3_600), WIDTHS, SLOW);
-            match master.read_position(EncoderAddress::truncate(1), nikon_aformat::Policy::STRICT) {
-                Ok(position) => Some(position.single_turn) == *want,
+            match master.read_position(EncoderAddress::truncate(1), nikon_aformat::Policy::new(1_000_000)) {
+                Ok(sample) => Some(sample.single_turn()) == *want,
                 Err(Error::Protocol(_)) => want.is_none(),
                 Err(_) => false,
             }

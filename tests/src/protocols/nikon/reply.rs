@@ -3,12 +3,12 @@
 use nikon_aformat::BitOrder::MsbFirst;
 use nikon_aformat::reception::LineReceiver;
 use nikon_aformat::{
-    Alm, Body, Data, Echo, EchoField, EncoderId, EncoderStatus, Error, Expected, Layout, RawResponse, Resolution,
+    Alm, Body, Crc, Data, Echo, EchoField, EncoderId, EncoderStatus, Error, Expected, Layout, RawResponse, Resolution,
     Response, U19, Version, Window,
 };
 use serde::Deserialize;
 
-use super::value::{alarm_names, notice_names, sixteen};
+use super::value::{alarm_names, notice_names, shown};
 use super::{RowVersion, address, class, command, layout, or_unreadable, resolution, same_name, text, window};
 use crate::hex::{Bits, Bytes, Hex};
 use crate::row::{Fault, Verdict, same};
@@ -108,7 +108,7 @@ pub(super) fn response(name: &str, row: ResponseRow) -> Verdict {
     let at_offset = or_unreadable(Window::read(&row.packed.0, 0, row.bits, MsbFirst))?;
     same("from packed bytes", &Ok(response), &Response::parse_line(&expected, at_offset))?;
     same("sent again", &Ok(response), &Response::parse(&expected, &response.emit()))?;
-    same("crc", &(row.expect.crc, row.expect.crc), &reply.crc())?;
+    same("crc", &Crc { got: row.expect.crc, want: row.expect.crc }, &reply.crc())?;
     let first = reply.contents().first().copied().unwrap_or(0);
     same("sync", &row.expect.sync, &(first & 7))?;
     same("fixed", &row.expect.fixed, &response.command().map(|_| first >> 11 & 1))?;
@@ -187,11 +187,12 @@ struct Rest {
 }
 
 fn position(want: &Fields, got: Response, resolution: Resolution) -> Verdict {
-    let position = resolution.position(&got).ok();
+    let position = shown(resolution, got);
+    let position = position.as_ref();
     same("single_turn", &want.single_turn, &position.map(|p| p.single_turn))?;
     same("turns_visible_bits", &want.turns_visible_bits, &position.map(|p| p.turns_bits))?;
     same("turns", &want.turns, &position.map(|p| p.turns))?;
-    same("turns_signed", &want.turns_signed, &position.and_then(|position| sixteen(resolution, position)))?;
+    same("turns_signed", &want.turns_signed, &position.and_then(|p| p.signed))?;
     same("angle_deg_f64", &want.angle_deg_f64, &position.map(|p| resolution.degrees(p.single_turn)))?;
     let single = position.map(|p| u64::from(resolution.degrees_f32(p.single_turn).to_bits()));
     same("angle_deg_f32_bits", &want.angle_deg_f32_bits.map(|bits| bits.0), &single)
@@ -338,19 +339,19 @@ pub(super) fn anchor(_: &str, row: AnchorRow) -> Verdict {
     same("es", &want.es, &es)?;
     same("es_wire_order", &want.es_wire_order.unwrap_or(es.reverse_bits() >> 4), &(es.reverse_bits() >> 4))?;
     same("abs", &want.abs.or(response.abs()), &response.abs())?;
-    let (crc, _) = response.emit().crc();
+    let crc = response.emit().crc().want;
     same("crc", &want.crc, &crc)?;
     same("crc as printed", &want.crc_lsb_first_as_printed.unwrap_or(crc.reverse_bits()), &crc.reverse_bits())?;
     let (Some(single_turn), Some(turns)) = (want.single_turn, want.turns) else { return Ok(()) };
     // The row does not say the widths: one of those that exist has to fit.
-    let shown = |st_bits| {
+    let fitting = |st_bits| {
         let resolution = Resolution::new(st_bits, 16).ok()?;
-        let position = resolution.position(&response).ok()?;
+        let position = shown(resolution, response)?;
         let angle = format!("{:.9}", resolution.degrees(position.single_turn));
         Some((position.single_turn, position.turns, want.angle_deg.map(|_| angle)))
     };
     let published = (single_turn, turns, want.angle_deg.map(|angle| format!("{angle:.9}")));
-    let fits = [17, 20, 22, 24].into_iter().filter_map(shown).any(|shown| shown == published);
+    let fits = [17, 20, 22, 24].into_iter().filter_map(fitting).any(|shown| shown == published);
     same("position fits a width", &true, &fits)
 }
 

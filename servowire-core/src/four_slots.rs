@@ -1,0 +1,171 @@
+//! Words from one writer to one reader, wait-free for both, by loads and stores alone: Simpson's four slots.
+//!
+//! H. R. Simpson, "Four-slot fully asynchronous communication mechanism", IEE Proceedings 137 E 1 (1990). Two pairs of two
+//! slots: the writer keeps off the pair that the reader has announced, and within a pair it keeps off the newest slot. What
+//! Simpson keeps in two variables of the writer (newest pair, newest slot of each pair) is one word here, stored once a
+//! value, so the reader never sees one without the other.
+//!
+//! Why it holds, whatever the order in which two cores see each other's stores:
+//!
+//! * Never an older value after a newer one, and no older one than the last that was complete: both loads of a reading are
+//!   of `control` alone, and the loads of one variable do not step back.
+//! * No slot is read while it is written. The reader in pair p at its slot i has announced p, passed `Chooses`, and seen in
+//!   `control` that i is the newest of p. The writer comes back to this slot with the second value that it puts into p
+//!   from then on. The first one is not in what the reader saw, so the reader's `Chooses` came before the writer's
+//!   `Begins` of the second, and the writer sees p announced: it takes the other pair. Unless it sees a later announcement;
+//!   that was made behind `Announces`, after the slot had been read, and the writer writes behind `Writes`.
+//! * A slot is whole: it is written before `Publishes`, and read behind `Reads`.
+
+#[cfg(all(test, loom))]
+mod model;
+
+use core::sync::atomic::Ordering;
+
+#[cfg(not(all(test, loom)))]
+use core::sync::atomic::AtomicU32;
+
+#[cfg(all(test, loom))]
+use model::{AtomicU32, Word, fence};
+
+/// A word of a slot.
+#[cfg(not(all(test, loom)))]
+type Word = AtomicU32;
+
+/// `control` before the first value.
+const NOTHING: u32 = 0;
+/// In `control` ever after.
+const SOMETHING: u32 = 1;
+/// In `control`: the newest pair. A pair is named by its first slot, 0 or 2.
+const PAIR: u32 = 2;
+/// In `control`, above so many bits: the newest slot of pair 0, and two bits above it that of pair 2.
+const NEWEST: u32 = 2;
+/// Any slot.
+const SLOT: u32 = 3;
+
+/// What keeps the loads and stores of one end in their order for the other end.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Barrier {
+    /// The writer: the value before is there for the reader before the writer looks which pair is announced.
+    Begins,
+    /// The writer looks which pair is announced before it writes into the other one.
+    Writes,
+    /// The slot is written before it is the newest.
+    Publishes,
+    /// The reader: the slot before is read before another pair is announced.
+    Announces,
+    /// The pair is announced before the reader looks for the newest slot in it.
+    Chooses,
+    /// The newest slot is known before it is read.
+    Reads,
+}
+
+impl Barrier {
+    const fn ordering(self) -> Ordering {
+        match self {
+            // A store before a load of something else: nothing weaker keeps these in order.
+            Self::Begins | Self::Chooses => Ordering::SeqCst,
+            Self::Publishes | Self::Announces => Ordering::Release,
+            Self::Writes | Self::Reads => Ordering::Acquire,
+        }
+    }
+}
+
+/// A value: `W` words and `E` words more.
+type Value<const W: usize, const E: usize> = ([u32; W], [u32; E]);
+
+struct Slot<const W: usize, const E: usize>([Word; W], [Word; E]);
+
+impl<const W: usize, const E: usize> Slot<W, E> {
+    fn store(&self, words: &Value<W, E>) {
+        store(&self.0, &words.0);
+        store(&self.1, &words.1);
+    }
+
+    #[inline]
+    fn load(&self) -> Value<W, E> {
+        (load(&self.0), load(&self.1))
+    }
+}
+
+fn store<const N: usize>(to: &[Word; N], words: &[u32; N]) {
+    for (word, value) in to.iter().zip(words) {
+        word.store(*value, Ordering::Relaxed);
+    }
+}
+
+#[inline]
+fn load<const N: usize>(from: &[Word; N]) -> [u32; N] {
+    let mut words = [0; N];
+    for (value, word) in words.iter_mut().zip(from) {
+        *value = word.load(Ordering::Relaxed);
+    }
+    words
+}
+
+/// Four slots of `W` and `E` words. One end calls [`put`](Self::put), another one [`get`](Self::get).
+pub(crate) struct FourSlots<const W: usize, const E: usize> {
+    /// Stored by the writer alone.
+    control: AtomicU32,
+    /// The pair that the reader is in; stored by the reader alone.
+    announced: AtomicU32,
+    slots: [Slot<W, E>; 4],
+}
+
+impl<const W: usize, const E: usize> FourSlots<W, E> {
+    /// Without a value.
+    #[cfg(not(all(test, loom)))]
+    pub(crate) const fn new() -> Self {
+        let control = AtomicU32::new(NOTHING);
+        Self { control, announced: AtomicU32::new(0), slots: [const { Slot::new() }; 4] }
+    }
+
+    /// Puts a value. Only ever called by one writer.
+    pub(crate) fn put(&self, value: &Value<W, E>) {
+        let control = self.control.load(Ordering::Relaxed);
+        fence(Barrier::Begins);
+        let pair = !self.announced.load(Ordering::Relaxed) & PAIR;
+        fence(Barrier::Writes);
+        let slot = pair | (!newest(control, pair) & 1);
+        if let Some(slot) = self.slots.get(slot as usize) {
+            slot.store(value);
+        }
+        fence(Barrier::Publishes);
+        let other_pair = control & !(SLOT << NEWEST).wrapping_shl(pair) & !PAIR;
+        let control = other_pair | (slot << NEWEST).wrapping_shl(pair) | pair | SOMETHING;
+        self.control.store(control, Ordering::Relaxed);
+    }
+
+    /// The newest value; `None` before the first one. Only ever called by one reader.
+    #[inline]
+    pub(crate) fn get(&self) -> Option<Value<W, E>> {
+        let control = self.control.load(Ordering::Relaxed);
+        if control == NOTHING {
+            return None;
+        }
+        let pair = control & PAIR;
+        fence(Barrier::Announces);
+        self.announced.store(pair, Ordering::Relaxed);
+        fence(Barrier::Chooses);
+        let control = self.control.load(Ordering::Relaxed);
+        fence(Barrier::Reads);
+        self.slots.get(newest(control, pair) as usize).map(Slot::load)
+    }
+}
+
+#[cfg(not(all(test, loom)))]
+impl<const W: usize, const E: usize> Slot<W, E> {
+    const fn new() -> Self {
+        Self([const { Word::new(0) }; W], [const { Word::new(0) }; E])
+    }
+}
+
+/// The newest slot of a pair.
+const fn newest(control: u32, pair: u32) -> u32 {
+    (control.wrapping_shr(pair) >> NEWEST) & SLOT
+}
+
+#[cfg(not(all(test, loom)))]
+#[inline(always)]
+fn fence(barrier: Barrier) {
+    core::sync::atomic::fence(barrier.ordering());
+}

@@ -1,0 +1,34 @@
+//! Time in nanoseconds from a counter that wraps.
+
+mod base;
+mod check;
+mod rate;
+
+pub use base::TimeBase;
+pub use check::ClockCheck;
+pub use rate::{MAX_TICK_NS, MIN_TICK_HZ, TickRate};
+
+/// What is wrong with a clock.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, thiserror::Error)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[non_exhaustive]
+pub enum ClockError {
+    /// Its tick is longer than [`MAX_TICK_NS`].
+    #[error("a clock of {hz} Hz is too coarse, the limit is {limit_hz} Hz")]
+    TooCoarse {
+        /// The rate that was asked for.
+        hz: u32,
+        /// The lowest rate that will do, [`MIN_TICK_HZ`].
+        limit_hz: u32,
+    },
+    /// A reading lies before the last one: the clock was set back or reset, or its counter was not read for too long.
+    #[error("the clock went back by {by_ns} ns")]
+    Backwards {
+        /// By how much, ns.
+        by_ns: u64,
+    },
+    /// It gives the same reading for ever.
+    #[error("the clock stands")]
+    Stopped,
+}

@@ -1,0 +1,69 @@
+use super::ClockError;
+
+/// Sees to it that a wait ends: checks each reading of a clock that somebody else has made, and bounds the looks at one that stands.
+///
+/// A loop that waits for a time never ends on a clock that stands, or was set back, or is a counter of 32 bits that wraps before
+/// that time comes. With the check in it, it does:
+///
+/// ```
+/// use servowire_core::{ClockCheck, ClockError};
+///
+/// fn wait(check: &mut ClockCheck, until_ns: u64, mut now_ns: impl FnMut() -> u64) -> Result<(), ClockError> {
+///     while check.check(now_ns())? < until_ns {}
+///     Ok(())
+/// }
+///
+/// let mut check = ClockCheck::new(10_000);
+/// assert_eq!(wait(&mut check, 5_000, || 4_999), Err(ClockError::Stopped));
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct ClockCheck {
+    last_ns: u64,
+    /// Looks that gave `last_ns` again.
+    looks: u32,
+    max_looks: u32,
+}
+
+impl ClockCheck {
+    /// A clock that gives the same reading again in more than `max_looks` looks counts as standing: choose more than a fast processor
+    /// can make in a tick.
+    pub const fn new(max_looks: u32) -> Self {
+        Self { last_ns: 0, looks: 0, max_looks }
+    }
+
+    /// The last reading, whether it was good or not; 0 before the first one.
+    pub const fn last_ns(&self) -> u64 {
+        self.last_ns
+    }
+
+    /// The reading, if it is sound.
+    ///
+    /// # Errors
+    /// [`ClockError::Backwards`] if it is before the last one, once: the next one is compared with this one.
+    /// [`ClockError::Stopped`] if it was the same too often, until it changes.
+    #[inline]
+    pub const fn check(&mut self, now_ns: u64) -> Result<u64, ClockError> {
+        if now_ns > self.last_ns {
+            self.last_ns = now_ns;
+            self.looks = 0;
+            return Ok(now_ns);
+        }
+        self.check_old(now_ns)
+    }
+
+    /// A reading that is not after the last one.
+    const fn check_old(&mut self, now_ns: u64) -> Result<u64, ClockError> {
+        let by_ns = self.last_ns.saturating_sub(now_ns);
+        if by_ns > 0 {
+            self.last_ns = now_ns;
+            self.looks = 0;
+            return Err(ClockError::Backwards { by_ns });
+        }
+        if self.looks >= self.max_looks {
+            return Err(ClockError::Stopped);
+        }
+        self.looks = self.looks.saturating_add(1);
+        Ok(now_ns)
+    }
+}
