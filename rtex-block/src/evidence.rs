@@ -177,10 +177,14 @@ impl Feedback for Evidence {
     }
 }
 
-/// Position, speed, torque, the instant in two words, and a last one: Status_Flags in bits 15-0, whether there is a sample in
+/// Carries evidence from where it is received to where it is used, between two priorities or cores.
+pub type EvidenceCell = servowire_core::Cell<Evidence, 6>;
+
+/// For an [`EvidenceCell`]: position, speed, torque, the instant in two words, and a last one: Status_Flags in bits 15-0, whether there is a sample in
 /// bit 16, whether it has speed and torque in bit 17, the number of the refusal in bits 31-24.
 impl Words<6> for Evidence {
     #[expect(clippy::cast_possible_truncation, reason = "an instant is cut into its halves")]
+    #[inline]
     fn to_words(&self) -> [u32; 6] {
         let Sample { position, rates, sampled_ns } = self.last();
         let Rates { speed, torque } = rates.unwrap_or(Rates { speed: 0, torque: 0 });
@@ -191,6 +195,7 @@ impl Words<6> for Evidence {
         [position, speed, torque, sampled_ns as u32, (sampled_ns >> 32) as u32, last]
     }
 
+    #[inline]
     fn from_words([position, speed, torque, low, high, last]: [u32; 6]) -> Self {
         let [status_low, status_high, known, refused] = last.to_le_bytes();
         let [position, speed, torque] = [position, speed, torque].map(|word| i32::from_le_bytes(word.to_le_bytes()));
@@ -209,53 +214,6 @@ servowire_core::one_line!(Evidence {
     Self { sample: Some(sample), status, refused: Some(class) } => "{} [{}], then refused: {}", sample, status, class.name();
     Self { sample: None, .. } => "no good block has come yet";
 });
-
-/// Carries evidence from where it is received to where it is used, between two priorities or cores.
-pub type EvidenceCell = servowire_core::Cell<Evidence, 6>;
-
-/// Of word 5: there is a position; there are speed and torque.
-const HAS_SAMPLE: u32 = 1 << 16;
-const HAS_RATES: u32 = 1 << 17;
-
-/// For an [`EvidenceCell`].
-///
-/// ```text
-///  word 0, 1   instant of sampling, low half first
-///  word 2      position
-///  word 3, 4   speed, torque
-///  word 5      Status_Flags in bits 0..=15, what there is in 16 and 17, the number of the refusal in 24..=31
-/// ```
-impl Words<6> for Evidence {
-    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "halves, and bits of the same width")]
-    #[inline]
-    fn to_words(&self) -> [u32; 6] {
-        let Sample { position, rates, sampled_ns } = self.last();
-        let (speed, torque) = rates.map_or((0, 0), |rates| (rates.speed, rates.torque));
-        let refused = self.refused.map_or(0, ErrorClass::number);
-        let marks = u32::from(self.status.bits())
-            | if self.sample.is_some() { HAS_SAMPLE } else { 0 }
-            | if rates.is_some() { HAS_RATES } else { 0 }
-            | u32::from(refused) << 24;
-        [sampled_ns as u32, (sampled_ns >> 32) as u32, position as u32, speed as u32, torque as u32, marks]
-    }
-
-    #[expect(clippy::cast_possible_wrap, reason = "bits of the same width")]
-    #[inline]
-    fn from_words([low, high, position, speed, torque, marks]: [u32; 6]) -> Self {
-        let [status0, status1, _, refused] = marks.to_le_bytes();
-        let rates = Rates { speed: speed as i32, torque: torque as i32 };
-        let sample = Sample {
-            position: position as i32,
-            rates: (marks & HAS_RATES != 0).then_some(rates),
-            sampled_ns: u64::from(high) << 32 | u64::from(low),
-        };
-        Self {
-            sample: (marks & HAS_SAMPLE != 0).then_some(sample),
-            status: StatusFlags::from_bits_retain(u16::from_le_bytes([status0, status1])),
-            refused: ErrorClass::from_number(refused),
-        }
-    }
-}
 
 #[cfg(test)]
 mod tests {
@@ -276,7 +234,7 @@ mod tests {
             assert_eq!(Evidence::from_words(never.to_words()), never);
         }
         let words = Evidence::of(&response(0x20, 0x60), (3 << 32) + 7).refused(Some(ErrorClass::MacId)).to_words();
-        assert_eq!(words, [7, 3, 77, 8, 9, 0x0403_0060]);
+        assert_eq!(words, [77, 8, 9, 7, 3, 0x0403_0060]);
         assert_eq!(Evidence::from_words([0; 6]), Evidence::NEVER);
         assert_eq!(Evidence::from_words([u32::MAX; 6]).at(u64::MAX, Policy::new(0)), Err(Doubt::Alarm));
     }
