@@ -4,7 +4,7 @@ use core::num::NonZeroU16;
 
 use rtex_block::device::{Drive, DriveConfig, Fault, OpenCodes};
 use rtex_block::inspect::inspect;
-use rtex_block::master::{ActiveCode, Axis, AxisConfig, AxisState, Limits, Heard, Ring};
+use rtex_block::master::{ActiveCode, Axis, AxisConfig, AxisState, Heard, Limits, Ring};
 use rtex_block::{
     Alarm, Command, Command32, CommandBlock, ControlBits, Error, MacId, NonCyclicCode, NonCyclicCommand,
     NonCyclicResponse, Response, Response32, stream,
@@ -234,8 +234,8 @@ pub fn drive(data: &[u8]) {
     let mac_id = MacId::new(5).expect("below 32");
     let config = DriveConfig::new(mac_id, OpenCodes::INVENTED).with_sync_exchanges(2).with_servo_on_updates(1);
     let (mut short, mut long) = (Drive::new(config), Drive::new(config));
-    for block in data.chunks_exact(16).filter_map(|block| block.first_chunk()) {
-        let response = Response::parse_strict(&short.exchange(block));
+    for block in data.chunks_exact(16).filter_map(|block| block.first_chunk::<16>()) {
+        let response = Response::parse_strict(&short.hear(block).expect("it is not silent"));
         let response = response.expect("an undefined code is echoed with CMD_Error only, reserved bits are 0");
         assert_eq!(response.mac_id, mac_id);
         assert_eq!(response.update_counter_echo.get(), block[0] >> 5 & 3);
@@ -243,8 +243,9 @@ pub fn drive(data: &[u8]) {
             assert!(short.alarm().is_none());
         }
     }
-    for block in data.chunks_exact(32).filter_map(|block| block.first_chunk()) {
-        let response = Response32::parse_strict(&long.exchange32(block)).expect("a drive writes no reserved bits");
+    for block in data.chunks_exact(32).filter_map(|block| block.first_chunk::<32>()) {
+        let response = Response32::parse_strict(&long.hear(block).expect("it is not silent"));
+        let response = response.expect("a drive writes no reserved bits");
         assert_eq!(response.main.mac_id, mac_id);
     }
 }

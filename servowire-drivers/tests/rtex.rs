@@ -329,7 +329,8 @@ mod asynch {
     use std::future::poll_fn;
     use std::task::Poll;
 
-    use servowire_drivers::rtex::asynch::Began;
+    use servowire_drivers::rtex::Released;
+    use servowire_drivers::rtex::asynch::{Began, Period};
 
     use servowire_drivers::{Clock, ClockError, Timer};
 
@@ -338,8 +339,8 @@ mod asynch {
 
     /// The driver after the start, with a clock that can be waited for.
     fn waiting<W: Drawn, T: Timer>(ring: &Shared, timer: impl Fn(Watch) -> T) -> Driver<'static, Bus<W>, T, AXES> {
-        let (port, watch, master) = on::<W>(ring).release();
-        Driver::new(port, timer(watch), master, ring.borrow().reception())
+        let Released { port, clock, master } = on::<W>(ring).release();
+        Driver::new(port, timer(clock), master, ring.borrow().reception())
     }
 
     struct Pin {

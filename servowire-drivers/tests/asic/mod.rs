@@ -147,7 +147,7 @@ impl Ring {
             if self.wide {
                 *block = drive.hear(command).unwrap();
             } else {
-                block[..16].copy_from_slice(&drive.hear(command[..16].try_into().unwrap()).unwrap());
+                block[..16].copy_from_slice(&drive.hear::<16>(command[..16].try_into().unwrap()).unwrap());
             }
         }
         self.hidden = Answers { frame: self.frames, blocks };
