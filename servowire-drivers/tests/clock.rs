@@ -169,7 +169,7 @@ fn nikon() {
             });
         };
     }
-    holds!("read_position", |m: &mut Master<_, _>, _| m.read_position(ea, nikon_aformat::Policy::STRICT));
+    holds!("read_position", |m: &mut Master<_, _>, _| m.read_position(ea, nikon_aformat::Policy::new(1_000_000)));
     holds!("read_abs40", |m: &mut Master<_, _>, _| m.read_abs40(ea));
     holds!("read_all", |m: &mut Master<_, _>, _| m.read_all(Operation::Abs40Mt, Addresses::first(8)));
     holds!("clear_status", |m: &mut Master<_, _>, _| m.clear_status(ea));

@@ -145,7 +145,7 @@ fn aformat_at_an_spi() {
             let bench = bench.borrow();
             assert_eq!(abs & 0xf_ffff, u64::from(bench.asked_at));
             let answer = bench.world.truth().answers(bench.request.unwrap()).next().unwrap();
-            assert!(exchange.sampled.latest_ns.abs_diff(answer.start_ns) <= 700, "{per_bit}: {exchange:?} {answer:?}");
+            assert!(exchange.began_ns.abs_diff(answer.start_ns) <= 700, "{per_bit}: {exchange:?} {answer:?}");
         }
         let both = nikon_aformat::bus::Addresses::first(2);
         let answers = master.read_all(nikon_aformat::Operation::Abs40Mt, both).unwrap();

@@ -8,9 +8,10 @@ use nikon_aformat::bus::Addresses;
 use nikon_aformat::master::{
     BusTransaction, Cycle, EepromRead, Exchange, GuardedReset, Line, Progress, Reset, Step, Transaction,
 };
-use nikon_aformat::{Doubt, EncoderAddress, Operation, Policy, Position, Request, RequestFrame, Resolution, Response};
+use nikon_aformat::{Doubt, EncoderAddress, Operation, Policy, Request, RequestFrame, Resolution, Response, Sample};
+use servowire_core::Machine;
 
-use super::{Frame, LOST, Receiver, longest_ns, silence_ns};
+use super::{Frame, LOST, hear, longest_ns, silence_ns};
 use crate::procedure;
 use crate::quiet;
 use crate::race::race;
@@ -49,7 +50,7 @@ pub struct Master<F, T> {
 }
 
 impl<F: FramePort, T: Timer> Master<F, T> {
-    /// A line with encoders of this resolution. The port must be asked for frames within `line.latency_ns` of their end, unless it gives their times:
+    /// A line with encoders of this resolution. The port must be asked for frames within `line.latency_budget_ns()` of their end, unless it gives their times:
     /// nothing but the driver may run meanwhile, or give the line a larger budget.
     pub const fn new(port: F, timer: T, resolution: Resolution, line: Line) -> Self {
         Self { port, timer, resolution, line, state: quiet::Line::new(silence_ns(line)) }
@@ -60,13 +61,14 @@ impl<F: FramePort, T: Timer> Master<F, T> {
         (self.port, self.timer)
     }
 
-    /// The position of an encoder, if it may be used: from command 0, by the rules of [`Resolution::read`].
+    /// The position of an encoder, if it may be used, and when it was sampled: from command 0, by the rules of
+    /// [`Evidence::at`](nikon_aformat::Evidence::at).
     ///
     /// # Errors
     /// [`Error`], [`Error::Doubt`] among them.
-    pub async fn read_position(&mut self, ea: EncoderAddress, policy: Policy) -> Result<Position, Failure<F>> {
+    pub async fn read_position(&mut self, ea: EncoderAddress, policy: Policy) -> Result<Sample, Failure<F>> {
         let exchange = self.read_abs40(ea).await?;
-        exchange.position(self.resolution, policy, self.state.now_ns(&mut self.timer)?).map_err(Error::Doubt)
+        exchange.evidence(self.resolution).at(self.state.now_ns(&mut self.timer)?, policy).map_err(Error::Doubt)
     }
 
     /// Command 0: the whole position. Look at its encoder status before you use it.
@@ -102,7 +104,7 @@ impl<F: FramePort, T: Timer> Master<F, T> {
         asked: Addresses,
     ) -> Result<BusTransaction, Failure<F>> {
         self.timer.wait_until(cycle.next_ns()).await?;
-        cycle.is_due(self.state.now_ns(&mut self.timer)?);
+        let _ = cycle.is_due(self.state.now_ns(&mut self.timer)?);
         self.read_all(operation, asked).await
     }
 
@@ -161,12 +163,12 @@ impl<F: FramePort, T: Timer> Master<F, T> {
     }
 
     /// One request and all that answers.
-    async fn exchange<R: Receiver>(
+    async fn exchange<M: Machine<Unit = [Option<u16>], Error = nikon_aformat::Error>>(
         &mut self,
         request: Request,
         line: Line,
-        start: impl FnOnce(u64) -> R,
-    ) -> Result<(R, R::Value), Failure<F>> {
+        start: impl FnOnce(u64) -> M,
+    ) -> Result<(M, M::Value), Failure<F>> {
         self.settle().await?;
         let start_ns = self.state.now_ns(&mut self.timer)?;
         let mut transaction = start(start_ns);
@@ -199,16 +201,16 @@ impl<F: FramePort, T: Timer> Master<F, T> {
     }
 
     /// Takes what is there, or waits for it; asks the clock only if there is nothing.
-    async fn receive<R: Receiver>(
+    async fn receive<M: Machine<Unit = [Option<u16>], Error = nikon_aformat::Error>>(
         &mut self,
-        receiver: &mut R,
+        machine: &mut M,
         until_ns: u64,
-    ) -> Result<Progress<R::Value>, Failure<F>> {
+    ) -> Result<Progress<M::Value>, Failure<F>> {
         // The time is over after `until_ns`, not at it.
         let wait = self.timer.wait_until(until_ns.saturating_add(1));
         match race(self.port.take(), wait).await? {
-            None => Ok(receiver.poll(self.state.now_ns(&mut self.timer)?)),
-            Some(frame) => Ok(receiver.take(frame.map_err(Error::Io)?, self.state.now_ns(&mut self.timer)?)),
+            None => Ok(machine.poll(self.state.now_ns(&mut self.timer)?)),
+            Some(frame) => Ok(hear(machine, frame.map_err(Error::Io)?, self.state.now_ns(&mut self.timer)?)),
         }
     }
 

@@ -7,9 +7,10 @@ use nikon_aformat::bus::Addresses;
 use nikon_aformat::master::{
     BusTransaction, Cycle, EepromRead, Exchange, GuardedReset, Line, Progress, Reset, Step, Transaction,
 };
-use nikon_aformat::{Doubt, EncoderAddress, Operation, Policy, Position, Request, RequestFrame, Resolution, Response};
+use nikon_aformat::{Doubt, EncoderAddress, Operation, Policy, Request, RequestFrame, Resolution, Response, Sample};
+use servowire_core::Machine;
 
-use super::{Frame, LOST, Receiver, longest_ns, silence_ns};
+use super::{Frame, LOST, hear, longest_ns, silence_ns};
 use crate::procedure;
 use crate::quiet;
 use crate::{Clock, Error};
@@ -49,7 +50,7 @@ pub struct Master<F, C> {
 }
 
 impl<F: FramePort, C: Clock> Master<F, C> {
-    /// A line with encoders of this resolution. The port must be asked for frames within `line.latency_ns` of their end, unless it gives their times:
+    /// A line with encoders of this resolution. The port must be asked for frames within `line.latency_budget_ns()` of their end, unless it gives their times:
     /// nothing but the driver may run meanwhile, or give the line a larger budget.
     pub const fn new(port: F, clock: C, resolution: Resolution, line: Line) -> Self {
         Self { port, clock, resolution, line, state: quiet::Line::new(silence_ns(line)) }
@@ -60,13 +61,14 @@ impl<F: FramePort, C: Clock> Master<F, C> {
         (self.port, self.clock)
     }
 
-    /// The position of an encoder, if it may be used: from command 0, by the rules of [`Resolution::read`].
+    /// The position of an encoder, if it may be used, and when it was sampled: from command 0, by the rules of
+    /// [`Evidence::at`](nikon_aformat::Evidence::at).
     ///
     /// # Errors
     /// [`Error`], [`Error::Doubt`] among them.
-    pub fn read_position(&mut self, ea: EncoderAddress, policy: Policy) -> Result<Position, Failure<F>> {
+    pub fn read_position(&mut self, ea: EncoderAddress, policy: Policy) -> Result<Sample, Failure<F>> {
         let exchange = self.read_abs40(ea)?;
-        exchange.position(self.resolution, policy, self.state.now_ns(&mut self.clock)?).map_err(Error::Doubt)
+        exchange.evidence(self.resolution).at(self.state.now_ns(&mut self.clock)?, policy).map_err(Error::Doubt)
     }
 
     /// Command 0: the whole position. Look at its encoder status before you use it.
@@ -160,12 +162,12 @@ impl<F: FramePort, C: Clock> Master<F, C> {
     }
 
     /// One request and all that answers.
-    fn exchange<R: Receiver>(
+    fn exchange<M: Machine<Unit = [Option<u16>], Error = nikon_aformat::Error>>(
         &mut self,
         request: Request,
         line: Line,
-        start: impl FnOnce(u64) -> R,
-    ) -> Result<(R, R::Value), Failure<F>> {
+        start: impl FnOnce(u64) -> M,
+    ) -> Result<(M, M::Value), Failure<F>> {
         self.settle()?;
         let start_ns = self.state.now_ns(&mut self.clock)?;
         let mut transaction = start(start_ns);
@@ -197,11 +199,14 @@ impl<F: FramePort, C: Clock> Master<F, C> {
     }
 
     /// Takes what is there; asks whether the time is over only if there is nothing.
-    fn receive<R: Receiver>(&mut self, receiver: &mut R) -> Result<Progress<R::Value>, Failure<F>> {
+    fn receive<M: Machine<Unit = [Option<u16>], Error = nikon_aformat::Error>>(
+        &mut self,
+        machine: &mut M,
+    ) -> Result<Progress<M::Value>, Failure<F>> {
         let before_ns = self.state.now_ns(&mut self.clock)?;
         Ok(match self.port.take().map_err(Error::Io)? {
-            Some(frame) => receiver.take(frame, self.state.now_ns(&mut self.clock)?),
-            None => receiver.poll(before_ns),
+            Some(frame) => hear(machine, frame, self.state.now_ns(&mut self.clock)?),
+            None => machine.poll(before_ns),
         })
     }
 

@@ -155,11 +155,11 @@ impl Bench {
                     encoder.set_position(self.shaft, 3 + u32::from(device));
                     if !framed {
                         encoder.framing_error(unit.end_ns);
-                    } else if let Some(answer) = encoder.frame(content as u16, unit.end_ns) {
+                    } else if let Some(answer) = encoder.hear(&[Some(content as u16)], unit.end_ns) {
                         self.asked_at = self.shaft;
-                        let contents = answer.raw.contents().iter().map(|content| u64::from(*content));
+                        let contents = answer.frames.contents().iter().map(|content| u64::from(*content));
                         let message = Message::frames(16, contents).tagged(self.shaft.into());
-                        self.world.answer(device, unit.origin.transmission, &message, answer.at_ns);
+                        self.world.answer(device, unit.origin.transmission, &message, answer.start_ns);
                     }
                 }
             }

@@ -2,7 +2,7 @@
 
 use nikon_aformat::bus::Addresses;
 use nikon_aformat::master::Cycle;
-use nikon_aformat::{EncoderAddress, Operation, Policy as StatusPolicy, Position};
+use nikon_aformat::{EncoderAddress, Operation};
 use servowire_drivers::Automatic;
 use servowire_drivers::nikon::blocking::Master;
 use servowire_drivers::tformat::blocking::Encoder;
@@ -26,9 +26,9 @@ kernels! {
     } over [ALL_DATA];
 
     /// An A-format position with the blocking driver: request, four frames one by one, all checks; a look at the clock for each.
-    fn drivers_nikon_position(answer: &Frames) -> Option<Position> {
+    fn drivers_nikon_position(answer: &Frames) -> Option<nikon_aformat::Sample> {
         let mut master = Master::new(Port::new(answer), steps(3_600), WIDTHS, SLOW);
-        master.read_position(EncoderAddress::truncate(1), StatusPolicy::STRICT).ok()
+        master.read_position(EncoderAddress::truncate(1), nikon_aformat::Policy::new(1_000_000)).ok()
     } over [ABS40];
 
     /// Every other call of the T-Format driver, with nobody at the line; the mean of them.

@@ -66,8 +66,8 @@ fn nikon() -> Tally {
         |row| row.0,
         |(_, answer, want)| {
             let mut master = Master::new(Port::new(answer), steps(3_600), WIDTHS, SLOW);
-            match master.read_position(EncoderAddress::truncate(1), nikon_aformat::Policy::STRICT) {
-                Ok(position) => Some(position.single_turn) == *want,
+            match master.read_position(EncoderAddress::truncate(1), nikon_aformat::Policy::new(1_000_000)) {
+                Ok(sample) => Some(sample.single_turn()) == *want,
                 Err(Error::Protocol(_)) => want.is_none(),
                 Err(_) => false,
             }
