@@ -17,10 +17,10 @@ extern crate std;
 mod clock;
 mod direction;
 mod error;
+#[cfg(any(feature = "nikon", feature = "tformat"))]
+mod exchange;
 #[cfg(feature = "nikon")]
 pub mod nikon;
-#[cfg(any(feature = "nikon", feature = "tformat"))]
-mod procedure;
 #[cfg(any(feature = "nikon", feature = "tformat"))]
 mod quiet;
 #[cfg(feature = "async")]

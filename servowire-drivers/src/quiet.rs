@@ -251,6 +251,20 @@ mod tests {
         assert_eq!(line.settle(90_100).poll(90_100), Settle::Quiet);
     }
 
+    /// A procedure that had ended before, or never sent anything, does not know of the exchange before it.
+    #[test]
+    fn the_end_of_a_procedure_frees_no_line_that_somebody_else_may_be_using() {
+        let mut line = Line::new(8_000);
+        line.keep(90);
+        assert_eq!((line.settle(89).poll(89), line.settle(90).poll(90)), (Settle::Until(90), Settle::Quiet));
+        for ready_ns in [0, 50] {
+            line.begin(90_000);
+            line.sent(10_000);
+            line.keep(ready_ns);
+            assert_eq!(line.settle(60_000).poll(99_999), Settle::Until(100_000));
+        }
+    }
+
     #[test]
     fn an_endless_talker_is_given_up() {
         let mut settling = Line::new(8_000).settle(0);

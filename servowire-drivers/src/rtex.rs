@@ -53,6 +53,7 @@ fn twice<E>(mut transfer: impl FnMut() -> Result<(), E>) -> Result<(), E> {
 /// What an exchange was like.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Exchanged {
     /// Communication periods by which the commands go out late, because the exchange ended after the next frame had begun.
     pub frames_late: u32,

@@ -1,7 +1,7 @@
 //! T-Format encoders: Tamagawa and others, 2.5 or 5 Mbit/s, at a plain UART (8N1).
 //!
 //! [`blocking`] spins while it waits, some tens of microseconds a call; [`asynch`] gives the time back. Both have the same
-//! `Encoder` with the same calls.
+//! `Driver` with the same calls.
 
 #[cfg(feature = "async")]
 pub mod asynch;
@@ -9,6 +9,20 @@ pub mod blocking;
 
 use tformat::master::Line;
 use tformat::{Error, Request};
+
+/// What a `Driver` was made of.
+#[derive(Debug, Clone, Copy)]
+pub struct Released<U, D, C> {
+    /// The UART.
+    pub uart: U,
+    /// Who switches the line driver.
+    pub direction: D,
+    /// The clock or timer.
+    pub clock: C,
+}
+
+/// What a lost answer is to a procedure.
+const LOST: Error = Error::NoResponse { echo: false };
 
 /// Longest request and longest answer together.
 const MAX_BYTES: usize = 16;

@@ -13,12 +13,13 @@ use embedded_io::{ErrorType, Read, ReadReady, Write};
 use nikon_aformat::bus::Addresses;
 use nikon_aformat::master::Cycle;
 use nikon_aformat::{EncoderAddress, Operation, RequestFrame};
-use rtex_block::master::{ActiveCode, Asic, Axis, AxisConfig, Limits, Master as Host, MasterConfig, Slave};
+use rtex_block::master::{ActiveCode, Asic, Axis, AxisConfig, Limits, Master, MasterConfig, Slave};
 use rtex_block::timing::{Periods, TimerSystem};
 use rtex_block::{BlockSize, MacId};
-use servowire_drivers::nikon::{Frame, blocking::FramePort, blocking::Master};
+use servowire_drivers::nikon::Frame;
+use servowire_drivers::nikon::blocking::{Driver as Encoders, FramePort};
 use servowire_drivers::rtex::{Driver, FrameCount, Port};
-use servowire_drivers::tformat::blocking::Encoder;
+use servowire_drivers::tformat::blocking::Driver as Encoder;
 use servowire_drivers::{Automatic, Clock, ClockError, CounterClock, Direction, Error, TickRate};
 
 /// Looks from the fault on after which three calls must have ended: several times what those take that poll an EEPROM.
@@ -150,7 +151,7 @@ fn tformat() {
     }
     let (resolution, policy) = (tformat::Resolution::new(23, 16).unwrap(), tformat::Policy::new(1_000_000));
     holds!("read_position", |e: &mut Encoder<_, _, _>| e.read_position(resolution, policy));
-    holds!("read_all", |e: &mut Encoder<_, _, _>| e.read_all());
+    holds!("read_data", |e: &mut Encoder<_, _, _>| e.read_data());
     holds!("clear_errors", |e: &mut Encoder<_, _, _>| e.clear_errors());
     holds!("read_eeprom", |e: &mut Encoder<_, _, _>| e.read_eeprom(None, address));
     holds!("write_eeprom", |e: &mut Encoder<_, _, _>| e.write_eeprom(None, address, 7));
@@ -164,18 +165,18 @@ fn nikon() {
     macro_rules! holds {
         ($name:literal, $call:expr) => {
             holds($name, |clock| {
-                let mut master = Master::new(Silence, || clock.look(), resolution, line);
+                let mut master = Encoders::new(Silence, || clock.look(), resolution, line);
                 std::array::from_fn(|_| $call(&mut master, clock).err())
             });
         };
     }
-    holds!("read_position", |m: &mut Master<_, _>, _| m.read_position(ea, nikon_aformat::Policy::STRICT));
-    holds!("read_abs40", |m: &mut Master<_, _>, _| m.read_abs40(ea));
-    holds!("read_all", |m: &mut Master<_, _>, _| m.read_all(Operation::Abs40Mt, Addresses::first(8)));
-    holds!("clear_status", |m: &mut Master<_, _>, _| m.clear_status(ea));
-    holds!("read_eeprom", |m: &mut Master<_, _>, _| m.read_eeprom(ea, 3));
+    holds!("read_position", |m: &mut Encoders<_, _>, _| m.read_position(ea, nikon_aformat::Policy::new(1_000_000)));
+    holds!("read_abs40", |m: &mut Encoders<_, _>, _| m.read_abs40(ea));
+    holds!("read_bus", |m: &mut Encoders<_, _>, _| m.read_bus(Operation::Abs40Mt, Addresses::first(8)));
+    holds!("clear_status", |m: &mut Encoders<_, _>, _| m.clear_status(ea));
+    holds!("read_eeprom", |m: &mut Encoders<_, _>, _| m.read_eeprom(ea, 3));
     // Half a millisecond after another call.
-    holds!("read_cycle", |m: &mut Master<_, _>, clock: &Bad| {
+    holds!("read_cycle", |m: &mut Encoders<_, _>, clock: &Bad| {
         if let Err(Error::Clock(error)) = m.read_abs40(ea) {
             return Err(Error::Clock(error));
         }
@@ -211,13 +212,13 @@ impl Port for Stuck<'_> {
 
 static RECEIVED: FrameCount = FrameCount::new();
 
-fn host() -> Host<1> {
+fn host() -> Master<1> {
     let periods = Periods::from_a6n(-1, 1, Some(500_000)).unwrap();
     let config = MasterConfig::new(BlockSize::Bytes16, periods, TimerSystem::Internal);
     let mac_id = MacId::truncate(1);
     let limits = Limits::new(NonZeroU16::new(6).unwrap(), 60);
     let axis = Axis::new(AxisConfig::new(mac_id, ActiveCode::CyclicPosition, periods.update_ns, limits));
-    Host::new(config, [Slave { mac_id, kind: 1 }], [axis]).unwrap()
+    Master::new(config, [Slave { mac_id, kind: 1 }], [axis]).unwrap()
 }
 
 #[test]

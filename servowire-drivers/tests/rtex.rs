@@ -21,13 +21,13 @@ use std::marker::PhantomData;
 use std::num::NonZeroU16;
 
 use asic::{AXES, Bus, COM_NS, Drawn, Ring, SWITCHES, Shared, Watch};
-use rtex_block::device::Drive;
+use rtex_block::device::{Drive, Fault};
 use rtex_block::master::{
     ActiveCode, Axis, AxisConfig, AxisState, ControlError, ControlPhase, Limits, Master, MasterConfig, RingFailure,
     Slave, StopReason,
 };
 use rtex_block::timing::{Periods, TimerSystem};
-use rtex_block::{BlockSize, MacId, Policy};
+use rtex_block::{Alarm, BlockSize, Doubt, MacId, Policy};
 use servowire_drivers::Error;
 use servowire_drivers::rtex::Driver;
 use servowire_world::{Draw, wanted_events};
@@ -224,6 +224,27 @@ fn a_fault_of_the_port_is_over_with_the_next_exchange() {
             assert_eq!(driver.master().ring().failure(), None, "{at}");
         }
     }
+}
+
+/// What `Evidence::at` refuses, of a place, of a time and of a drive, is refused of the driver's evidence.
+#[test]
+fn a_doubt_of_the_crate_is_one_of_the_driver() {
+    let ring = Ring::new(true, false);
+    assert_eq!(driver::<u16>(&ring).evidence(0).at(0, Policy::new(u64::MAX)), Err(Doubt::Never));
+    let mut driver = on::<u16>(&ring);
+    update(&ring, &mut driver).unwrap();
+    let now_ns = ring.borrow().now_ns;
+    assert!(driver.evidence(0).at(now_ns, Policy::new(u64::MAX)).is_ok());
+    let old = driver.evidence(0).at(now_ns, Policy::new(1));
+    // The frame before that of the exchange brought it.
+    assert!(matches!(old, Err(Doubt::Old { age_ns }) if age_ns >= COM_NS), "{old:?}");
+    assert_eq!(driver.evidence(AXES).at(now_ns, Policy::new(u64::MAX)), Err(Doubt::Never));
+    ring.borrow_mut().drives[1].set_fault(Fault::Alarm(Alarm::COMMAND_STEP));
+    for _ in 0..4 {
+        update(&ring, &mut driver).unwrap();
+    }
+    let now_ns = ring.borrow().now_ns;
+    assert_eq!(driver.evidence(1).at(now_ns, Policy::new(u64::MAX)), Err(Doubt::Alarm));
 }
 
 /// Frames that do not come: no position is given, and every servo is off within the limit.

@@ -9,6 +9,7 @@ use crate::race::race;
 /// How the period of an exchange began.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum Began {
     /// By the interrupt.
     Edge,
@@ -19,6 +20,7 @@ pub enum Began {
 /// A period that was waited for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Period {
     /// How it began.
     pub began: Began,

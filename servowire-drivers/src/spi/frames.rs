@@ -6,7 +6,7 @@ use embedded_hal_async::spi::SpiBus as AsyncSpiBus;
 use nikon_aformat::RequestFrame;
 use nrz_line::Field;
 
-use super::{Fault, Heard, Sampler, Sampling, SpiError, line_bits};
+use super::{Fault, Heard, Released, ReleasedFrames, Sampler, Sampling, SpiError, line_bits};
 #[cfg(feature = "async")]
 use crate::nikon::asynch;
 use crate::nikon::{Frame, blocking};
@@ -34,8 +34,9 @@ impl<'b, S, D, C> SpiFrames<'b, S, D, C> {
     }
 
     /// Gives SPI, direction and clock back.
-    pub fn release(self) -> (S, D, C) {
-        (self.sampler.bus, self.sampler.direction.release(), self.clock)
+    pub fn release(self) -> ReleasedFrames<S, D, C> {
+        let Released { bus, direction } = self.sampler.release();
+        ReleasedFrames { bus, direction, clock: self.clock }
     }
 
     fn frame(&self, field: Field) -> Frame {
