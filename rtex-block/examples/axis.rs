@@ -36,7 +36,7 @@ impl Machine {
         self.now_ns += UPDATE_NS;
         self.axis.hear(self.sent, &self.received, self.now_ns);
         self.sent = self.counter.next();
-        let command = self.axis.send(self.sent);
+        let command = self.axis.transmission(self.sent);
         self.received = Response32::parse(&self.drive.hear(&command.emit()).unwrap()).into();
     }
 

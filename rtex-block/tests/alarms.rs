@@ -99,7 +99,7 @@ fn clear(pair: &mut Pair, type_code: u16, spoil: impl Fn(&mut Pair)) -> (Progres
         pair.update();
         spoil(pair);
         let progress = procedure.receive(&mut pair.axis);
-        let block = pair.axis.send(pair.sent).main.emit();
+        let block = pair.axis.transmission(pair.sent).main.emit();
         let clears = (block[1], block[8], &block[10..]) == (0x25, type_code as u8, &[0; 6][..]);
         commands += u32::from(clears && !is_out);
         is_out = clears;

@@ -281,7 +281,7 @@ fn a_motion_that_is_over_is_over() {
     pair.until("at the target", |pair| pair.drive.position() == 20_000);
     (0..4).for_each(|_| pair.update());
     pair.axis.set_mode(ActiveCode::CyclicPosition).unwrap();
-    let block = pair.axis.send(Turn::Valid(pair.counter.last().next())).main.emit();
+    let block = pair.axis.transmission(Turn::Valid(pair.counter.last().next())).main.emit();
     assert_eq!(i32::from_le_bytes(block[4..8].try_into().unwrap()), 20_000);
     (0..50).for_each(|_| pair.update());
     assert_eq!((pair.drive.position(), pair.axis.state()), (20_000, AxisState::On));
@@ -312,7 +312,7 @@ fn what_a_motion_sends() {
     let mut pair = Pair::on(ActiveCode::ProfilePosition, Behaviour::new());
     pair.axis.start_move_with_latch(0x11, 3_000_000, 1_000, Nibble::new(3).unwrap(), 0x09).unwrap();
     pair.until("moving", |pair| pair.axis.profile().unwrap().is_moving());
-    let block = |pair: &Pair| pair.axis.send(Turn::Valid(pair.counter.last().next())).main.emit();
+    let block = |pair: &Pair| pair.axis.transmission(Turn::Valid(pair.counter.last().next())).main.emit();
     assert_eq!(block(&pair)[1..4], [0x17, 0x80, 0]);
     assert_eq!(block(&pair)[4..8], 3_000_000_i32.to_le_bytes());
     assert_eq!(block(&pair)[8..], [0x11, 0, 3, 0x09, 0xe8, 0x03, 0, 0]);
@@ -478,7 +478,7 @@ fn an_alarm_is_answered_with_servo_off() {
     let mut pair = Pair::on(ActiveCode::CyclicPosition, Behaviour::new());
     pair.drive.set_fault(Fault::Alarm(Alarm { main: 16, sub: 0 }));
     (0..3).for_each(|_| pair.update());
-    let block = pair.axis.send(Turn::Valid(pair.counter.last().next())).main.emit();
+    let block = pair.axis.transmission(Turn::Valid(pair.counter.last().next())).main.emit();
     assert!(CommandBlock::of(&block).unwrap().is_servo_off());
     assert!(pair.axis.ask(NonCyclicCommand::IDLE).is_err());
 }

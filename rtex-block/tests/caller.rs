@@ -129,7 +129,7 @@ proptest! {
         for action in actions {
             act(&mut pair, action);
             // The axis between two updates, before anything is received.
-            let block = pair.axis.send(pair.counter.next()).main.emit();
+            let block = pair.axis.transmission(pair.counter.next()).main.emit();
             let off = CommandBlock::of(&block).unwrap().is_servo_off();
             prop_assert_eq!(off, !pair.axis.state().is_servo_on());
             pair.update();

@@ -75,7 +75,7 @@ impl Pair {
         let received = self.response.map_or(Heard::Nothing, Heard::Main);
         self.axis.hear(self.sent, &received, 0);
         self.sent = self.counter.next();
-        let block = self.drive.hear(&self.axis.send(self.sent).main.emit()).unwrap();
+        let block = self.drive.hear(&self.axis.transmission(self.sent).main.emit()).unwrap();
         self.response = Some(Response::parse_strict(&block).unwrap());
     }
 
@@ -329,7 +329,7 @@ fn zeros_do_not_switch_off() {
         pair.drive.hear(&zeros).unwrap();
     }
     assert!(pair.drive.is_active());
-    let off = pair.axis.send(pair.sent).main;
+    let off = pair.axis.transmission(pair.sent).main;
     pair.drive.hear(&Command { control: ControlBits::empty(), ..off }.emit()).unwrap();
     assert!(!pair.drive.is_active());
 }
@@ -345,7 +345,7 @@ fn lasting_faults_raise_alarms() {
     ];
     for (spoil, error, alarm) in cases {
         let mut pair = Pair::on(ActiveCode::CyclicPosition);
-        let mut block = pair.axis.send(pair.sent).main.emit();
+        let mut block = pair.axis.transmission(pair.sent).main.emit();
         spoil(&mut block);
         let limit = pair.drive.config().fault_limit;
         for k in 1..=limit {
@@ -379,7 +379,7 @@ fn lasting_faults_raise_alarms() {
 #[test]
 fn a_counter_that_stands_still_raises_err86_2() {
     let mut pair = Pair::on(ActiveCode::CyclicPosition);
-    let block = pair.axis.send(pair.sent).main.emit();
+    let block = pair.axis.transmission(pair.sent).main.emit();
     let limit = pair.drive.config().counter_limit;
     for _ in 0..limit {
         assert_eq!(pair.drive.alarm(), None);

@@ -50,7 +50,7 @@ fn a_block_that_was_thrown_away_refuses_nothing() {
     for now in 0..20 {
         pair.axis.hear(pair.sent, &pair.received, 0);
         pair.sent = pair.counter.next();
-        let mut bytes = pair.axis.send(pair.sent).emit();
+        let mut bytes = pair.axis.transmission(pair.sent).emit();
         bytes[16] ^= if now == 1 { 0x80 } else { 0 };
         pair.received = Response32::parse_strict(&pair.drive.hear(&bytes).unwrap()).into();
         outcome = outcome.or(pair.axis.take_sub_outcome());
@@ -62,7 +62,7 @@ fn a_block_that_was_thrown_away_refuses_nothing() {
 fn update_with(pair: &mut Pair, damage: u8) {
     pair.axis.hear(pair.sent, &pair.received, 0);
     pair.sent = pair.counter.next();
-    let mut main = pair.axis.send(pair.sent).main.emit();
+    let mut main = pair.axis.transmission(pair.sent).main.emit();
     main[0] ^= damage;
     pair.received = Response::parse_strict(&pair.drive.hear(&main).unwrap()).into();
 }
@@ -134,7 +134,7 @@ fn hears(pair: &mut Pair, received: Heard, periods: u32) {
     for _ in 0..periods {
         pair.axis.hear(pair.sent, &received, 0);
         pair.sent = pair.counter.next();
-        let _ = pair.axis.send(pair.sent);
+        let _ = pair.axis.transmission(pair.sent);
     }
 }
 

@@ -64,7 +64,7 @@ fn the_set_point_follows_while_switching_on() {
         }
         let mut next = pair.axis;
         next.hear(pair.sent, &pair.received, pair.now_ns());
-        let block = next.send(Turn::Valid(pair.counter.last().next())).main.emit();
+        let block = next.transmission(Turn::Valid(pair.counter.last().next())).main.emit();
         let is_on = next.state() == AxisState::On;
         let want = if is_on { turned - 1_000 } else { turned };
         assert_eq!((block[2] & 0x80, i32::from_le_bytes(block[4..8].try_into().unwrap())), (0x80, want));
@@ -101,7 +101,7 @@ fn limits_of_set_points() {
         assert_eq!(pair.drive.alarm(), None);
         if over_speed.is_none() {
             // The drive has the same limit, by its own reckoning.
-            let mut block = pair.axis.send(Turn::Valid(pair.counter.last().next())).main;
+            let mut block = pair.axis.transmission(Turn::Valid(pair.counter.last().next())).main;
             block.command_data1 = largest * 2 + 1;
             pair.drive.hear(&block.emit()).unwrap();
             assert_eq!(pair.drive.alarm(), Some(Alarm { main: 27, sub: 4 }));

@@ -35,7 +35,7 @@ use crate::sub::{Command32, SubResponse};
 ///  any ──alarm, time-out, not ready──► Stopped ──clear──► Starting
 ///  On ──another axis fails, policy Decelerate──► Stopping ──stands──► Stopped
 /// ```
-/// Call [`hear`](Self::hear) and then [`send`](Self::send) once in every update period. While the servo is off the
+/// Call [`hear`](Self::hear) and then [`transmission`](Self::transmission) once in every update period. While the servo is off the
 /// command position follows the actual position, so switching on makes no jump. In every state but SwitchingOn, On and
 /// Stopping the command is a [`ServoOff`]: Servo_On = 0 with a code at which the drive looks, whatever the caller does.
 /// SX-DSV02310, "Servo_On"; the extra waiting times of the vendor are not known.
@@ -256,7 +256,7 @@ impl Axis {
     }
 
     /// What to send in this update period; in the 16-byte mode its `main` half alone.
-    pub fn send(&self, turn: Turn) -> Command32 {
+    pub fn transmission(&self, turn: Turn) -> Command32 {
         let mac_id = self.config.mac_id;
         let counter = match turn {
             Turn::Invalid => return Command32 { main: Command::nop(mac_id), sub: self.sub_command([0; 2]) },

@@ -105,7 +105,7 @@ impl<const N: usize> Ring<N> {
         }
         self.share_failures();
         self.sent = self.counter.next();
-        self.axes.each_ref().map(|axis| axis.send(self.sent))
+        self.axes.each_ref().map(|axis| axis.transmission(self.sent))
     }
 
     /// Switches all axes on, if all of them are off and ready.

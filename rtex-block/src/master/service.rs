@@ -183,7 +183,7 @@ impl<const N: usize> Master<N> {
     pub fn exchange(&mut self, heard: &[Heard; N], end_ns: u64) -> [Command32; N] {
         if !self.is_running() {
             self.prepared |= self.phases.phase() == ControlPhase::Prepare;
-            return self.ring.axes().each_ref().map(|axis| axis.send(Turn::Invalid));
+            return self.ring.axes().each_ref().map(|axis| axis.transmission(Turn::Invalid));
         }
         if self.watchdog.as_mut().is_some_and(ReceiveWatchdog::tick) {
             self.ring.stop(StopReason::ReceiveTimeout);

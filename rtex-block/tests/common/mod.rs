@@ -83,7 +83,7 @@ impl Pair {
         self.now += 1;
         self.axis.hear(self.sent, &self.received, self.now_ns());
         self.sent = self.counter.next();
-        let command = self.axis.send(self.sent);
+        let command = self.axis.transmission(self.sent);
         let main = command.main.emit();
         if self.sent != Turn::Invalid {
             let off = CommandBlock::of(&main).unwrap().is_servo_off();

@@ -198,7 +198,7 @@ kernels! {
         let mut axis = *axis;
         axis.hear(Turn::Valid(COUNTER), received, 1_000_000);
         let _ = axis.set_position(1_010);
-        axis.send(Turn::Valid(COUNTER))
+        axis.transmission(Turn::Valid(COUNTER))
     } over [(AXIS, Heard::Main(RESPONSE)), (AXIS, Heard::Nothing)];
 
     /// The position for control, or why there is none.

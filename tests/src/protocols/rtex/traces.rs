@@ -230,7 +230,7 @@ pub(super) fn axis(rows: &[Row]) -> Vec<Verdict> {
                 act(&mut axis, action)?;
             }
             counter = counter.next();
-            let block = axis.send(Turn::Valid(counter)).main.emit();
+            let block = axis.transmission(Turn::Valid(counter)).main.emit();
             same("state", &step.state, &state(axis.state()))?;
             same("sent", &step.sent.0.as_slice(), &block.get(..8).unwrap_or(&[]))?;
             let off = CommandBlock::of(&block).map(CommandBlock::is_servo_off);
