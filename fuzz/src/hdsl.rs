@@ -9,7 +9,7 @@ use hdsl::registers::Registers;
 use hdsl::sampling::{Alignment, EdgeRule, TEST_PATTERN, WINDOW};
 use hdsl::symbol::{Character, Control, Rule, RunningDisparity, Word};
 use hdsl::sync::{Es, Synchroniser};
-use hdsl::{Answer, DeltaDelta, Dialect, EncoderId, Error, Phase, PositionBits, PositionRule, PositionTracker, Window};
+use hdsl::{AlignmentStage, Answer, DeltaDelta, Dialect, EncoderId, Error, Policy, PositionBits, PositionRule, PositionTracker, Window};
 
 use crate::byte;
 
@@ -24,7 +24,7 @@ pub fn symbol(mut data: &[u8]) {
         let word = Word::truncate(u16::from_le_bytes([byte(&mut data), byte(&mut data)]));
         let controls = Control::ALL.into_iter().map(Character::control);
         let found = (0..=255).map(Character::data).chain(controls).find(|character| {
-            [RunningDisparity::Minus, RunningDisparity::Plus].iter().any(|rd| character.encode(*rd).0 == word)
+            [RunningDisparity::Minus, RunningDisparity::Plus].iter().any(|rd| character.encode(*rd).word == word)
         });
         assert_eq!(word.decode(), found);
         let strict = word.read(Rule::Strict);
@@ -116,12 +116,13 @@ pub fn learn(data: &[u8]) {
 /// ```
 pub fn position(mut data: &[u8]) {
     let Some(bits) = PositionBits::new(byte(&mut data)) else { return };
+    let Some(id) = EncoderId::new(u32::from(bits.get() - 8) << 4) else { return };
     let mut tracker = PositionTracker::new(bits);
     let mut other = PositionTracker::with_rule(bits, PositionRule::Ti);
     // Of a position with fewer bits the vendor's receiver takes differences that are too large.
     let mut agree = bits == PositionBits::MAX;
     while !data.is_empty() {
-        let before = tracker.velocity();
+        let before = tracker.registers().vel;
         match byte(&mut data) {
             0 => {
                 let safe = word(&mut data) & bits.mask();
@@ -137,14 +138,16 @@ pub fn position(mut data: &[u8]) {
                 let value = DeltaDelta::from_word(value).ok().filter(|_| event != 2);
                 tracker.step(value);
                 other.step(value);
-                let change = tracker.velocity().wrapping_sub(before).wrapping_shl(8) >> 8;
+                let change = tracker.registers().vel.wrapping_sub(before).wrapping_shl(8) >> 8;
                 assert!((-1024..=1023).contains(&change), "{change}");
                 agree &= value.is_some() || (-1023..=1022).contains(&change);
             }
         }
-        assert!(tracker.position() <= bits.mask() && (-(1 << 23)..1 << 23).contains(&tracker.velocity()));
-        assert!(tracker.fast().is_err() || tracker.phase() == Phase::Check);
-        assert!(!agree || (tracker.position(), tracker.velocity()) == (other.position(), other.velocity()));
+        let (shown, others) = (tracker.registers(), other.registers());
+        assert!(shown.pos <= bits.mask() && (-(1 << 23)..1 << 23).contains(&shown.vel));
+        let usable = tracker.evidence(id, 0).at(0, Policy::new(0)).is_ok();
+        assert!(!usable || tracker.stage() == AlignmentStage::Check);
+        assert!(!agree || (shown.pos, shown.vel) == (others.pos, others.vel));
     }
 }
 
@@ -173,10 +176,12 @@ pub fn master(mut data: &[u8]) {
             }
             _ => core::array::from_fn(|_| byte(&mut data)),
         };
-        let late = (options & 2 != 0).then(|| i16::from(samples[0].cast_signed()));
-        let report = *master.finish(&samples, late).expect("there are enough samples");
-        let _ = map.apply(&report);
-        let restarts = report.restarted.is_some();
+        if options & 2 != 0 {
+            master.hear_pulse(i16::from(samples[0].cast_signed()));
+        }
+        let h_frame = *master.hear(&samples, 0).expect("there are enough samples");
+        let _ = map.apply(&h_frame);
+        let restarts = h_frame.restarted.is_some();
         assert_eq!(restarts, master.state() == State::Reset && master.frame() == 0);
         assert!(map.quality() <= 15 && map.link() == (master.state() > State::IdReq));
         assert!(Head::parse(master.transmission().head.bits()).is_ok());
@@ -210,14 +215,14 @@ pub fn link(mut data: &[u8]) {
         let line = cable.down_samples(master.transmission().head);
         let samples = match Heard::on_line(&line) {
             Some(heard) => {
-                let answer = encoder.answer(heard.bits, position);
+                let answer = encoder.hear(heard.bits, position);
                 cable.up_heard(answer, &heard)
             }
-            None => cable.up(encoder.answer(Window::EMPTY, position)),
+            None => cable.up(encoder.hear(Window::EMPTY, position)),
         };
-        let _ = master.finish(&samples, None).expect("there are enough samples");
+        let _ = master.hear(&samples, 0).expect("there are enough samples");
     }
     assert_eq!(master.state(), State::Running);
-    let fast = master.fast().expect("the clean line brings the position");
-    assert_eq!(fast.position, i64::from(position as u32));
+    let fast = master.fast().at(0, Policy::new(0)).expect("the clean line brings the position");
+    assert_eq!(fast.position(), i64::from(position as u32));
 }

@@ -6,7 +6,10 @@
 use hdsl::cable::{Cable, Disturbance};
 use hdsl::device::Device;
 use hdsl::master::Master;
-use hdsl::{Dialect, EncoderId};
+use hdsl::{Dialect, EncoderId, Policy};
+
+/// A free-running H-frame; the window of its answer ends 10,560 ns after its start.
+const FRAME_NS: u64 = 11_520;
 
 fn main() -> Result<(), Box<dyn core::error::Error>> {
     let frames: u64 = std::env::args().nth(1).map_or(Ok(100_000), |n| n.parse())?;
@@ -20,14 +23,14 @@ fn main() -> Result<(), Box<dyn core::error::Error>> {
         // To and fro, within the 32 bits of the encoder.
         position = if frame & 0x8000 == 0 { position.wrapping_add(3) } else { position.wrapping_sub(3) };
         let head = cable.down(master.transmission().head.bits());
-        let samples = cable.up(encoder.answer(head, position));
-        let report = master.finish(&samples, None)?;
-        if let Some(cause) = report.restarted {
-            println!("frame {frame}: link started anew: {cause}");
+        let samples = cable.up(encoder.hear(head, position));
+        let h_frame = master.hear(&samples, FRAME_NS * frame + 10_560)?;
+        if let Some(reason) = h_frame.restarted {
+            println!("frame {frame}: link started anew: {reason}");
         }
     }
-    let (fast, counters) = (master.fast()?, master.counters());
-    println!("{frames} H-frames: {counters:?}");
-    println!("position {} (encoder {position}), quality {}", fast.position, master.report().quality);
+    let fast = master.fast().at(FRAME_NS * frames, Policy::new(FRAME_NS))?;
+    println!("{frames} H-frames: {:?}", master.counters());
+    println!("position {} (encoder {position}), quality {}", fast.position(), master.h_frame().quality);
     Ok(())
 }

@@ -17,7 +17,7 @@
 use core::fmt::Write;
 
 use hdsl::cable::{Cable, Disturbance};
-use hdsl::device::Device;
+use hdsl::device::{Device, Transmission};
 use hdsl::master::Master;
 use hdsl::message::{LongRequest, RemoteRegister, ResourceAddress, ShortRequest};
 use hdsl::registers::Registers;
@@ -49,15 +49,16 @@ pub(crate) fn trace(dialect: Dialect, metres: u32, frames: u64) -> Result<String
             _ => {}
         }
         let present = master.transmission();
-        let answer = encoder.answer(cable.down(present.head.bits()), position);
+        let answer = encoder.hear(cable.down(present.head.bits()), position);
         // One damaged bit in the acceleration.
-        let answer = if frame == 170 { answer.map(|bits| bits ^ 1 << 35) } else { answer };
+        let answer =
+            if frame == 170 { answer.map(|answer| Transmission { bits: answer.bits ^ 1 << 35 }) } else { answer };
         let samples = cable.up(answer);
         let state = master.state();
-        let report = master.finish(&samples, None)?;
-        map.apply(report);
+        let h_frame = master.hear(&samples, 0)?;
+        map.apply(h_frame);
         let answer = if present.answered { format!("\"{}\"", hex(samples)) } else { "null".to_owned() };
-        let tail: String = report.tail.bits().map(|bit| if bit { '1' } else { '0' }).collect();
+        let tail: String = h_frame.tail.bits().map(|bit| if bit { '1' } else { '0' }).collect();
         writeln!(
             text,
             "{{\"frame\":{frame},\"state\":\"{state}\",\"head\":\"{}\",\"answer\":{answer},\"tail\":\"{tail}\",\"registers\":\"{}\"}}",

@@ -1,5 +1,3 @@
-use core::fmt;
-
 use servowire_core::OutOfRange;
 
 use crate::crc::{crc5, is_crc5_right};
@@ -93,19 +91,15 @@ impl TryFrom<i16> for DeltaDelta {
     }
 }
 
-impl fmt::Display for DeltaDelta {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        fmt::Display::fmt(&self.0, f)
-    }
-}
+servowire_core::one_line!(DeltaDelta {
+    Self(value) => "{}", value;
+});
 
 impl From<DeltaDelta> for i16 {
     fn from(value: DeltaDelta) -> Self {
         value.0
     }
 }
-
-servowire_core::format_as_displayed!(DeltaDelta);
 
 #[cfg(feature = "arbitrary")]
 impl<'a> arbitrary::Arbitrary<'a> for DeltaDelta {

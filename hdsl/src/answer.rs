@@ -58,6 +58,11 @@ impl Answer {
         Ok(Self::from_bits(rule, line.bits() as u64))
     }
 
+    /// The 61 line bits, the first in bit 0.
+    pub const fn bits(self) -> u64 {
+        self.line
+    }
+
     /// Whether it was read by the tables, [`Rule::Strict`].
     pub(crate) const fn is_strict(self) -> bool {
         matches!(self.rule, Rule::Strict)
@@ -186,6 +191,15 @@ impl Answer {
     }
 }
 
+/// As its words in line order.
+#[cfg(feature = "serde")]
+#[cfg_attr(docsrs, doc(cfg(feature = "serde")))]
+impl serde::Serialize for Answer {
+    fn serialize<S: serde::Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.collect_str(self)
+    }
+}
+
 /// The six words in line order: `D1.2 D6.0 K30.7 D0.0 D0.0 D16.5`.
 impl fmt::Display for Answer {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
@@ -212,8 +226,19 @@ pub struct Content {
     pub secondary: Character,
 }
 
+/// An answer as it goes out.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct EncodedAnswer {
+    /// The 61 line bits, the first in bit 0.
+    pub bits: u64,
+    /// The running disparity after them.
+    pub disparity: RunningDisparity,
+}
+
 impl Content {
-    /// The line bits, first bit in bit 0, and the running disparity after them. The switch bit does not count.
+    /// As it goes out. The switch bit does not count in the running disparity.
     ///
     /// ```
     /// use hdsl::symbol::{Character, Control, Rule, RunningDisparity};
@@ -221,17 +246,17 @@ impl Content {
     ///
     /// let content = Content {
     ///     vertical: Character::data(0x42),
-    ///     parameter: EncoderByte::of(EncoderSymbol::Idle, false),
+    ///     parameter: EncoderByte::of(EncoderSymbol::Idle),
     ///     pipe: Character::control(Control::K30_7),
     ///     acceleration: DeltaDelta::new(-3),
     ///     secondary: Character::data(0x17),
     /// };
-    /// let (bits, _) = content.emit(RunningDisparity::Minus);
+    /// let bits = content.emit(RunningDisparity::Minus).bits;
     /// let answer = Answer::from_bits(Rule::Strict, bits);
     /// assert_eq!(answer.vertical().byte(), Ok(0x42));
     /// assert_eq!(answer.delta_delta(), Ok(DeltaDelta::new(-3).unwrap()));
     /// ```
-    pub fn emit(self, rd: RunningDisparity) -> (u64, RunningDisparity) {
+    pub fn emit(self, rd: RunningDisparity) -> EncodedAnswer {
         let acceleration = match self.acceleration {
             Some(value) => value.to_word().to_be_bytes().map(Character::data),
             None => [Character::control(Control::K29_7); 2],
@@ -249,15 +274,15 @@ const fn word(line: u64) -> Word {
 }
 
 /// Six characters as an answer.
-pub(crate) fn emit(characters: [Character; 6], rd: RunningDisparity) -> (u64, RunningDisparity) {
+pub(crate) fn emit(characters: [Character; 6], rd: RunningDisparity) -> EncodedAnswer {
     let (mut bits, mut rd) = (0_u64, rd);
     for (k, character) in (0_u32..).zip(characters) {
-        let (word, after) = character.encode(rd);
+        let coded = character.encode(rd);
         let at = k.wrapping_mul(Word::BITS).wrapping_add(u32::from(k == 5));
-        bits |= u64::from(word.get()) << at;
-        rd = after;
+        bits |= u64::from(coded.word.get()) << at;
+        rd = coded.disparity;
     }
-    (bits | (!bits >> 49 & 1) << 50, rd)
+    EncodedAnswer { bits: bits | (!bits >> 49 & 1) << 50, disparity: rd }
 }
 
 #[cfg(test)]
@@ -303,7 +328,7 @@ pub(crate) mod tests {
     proptest! {
         #[test]
         fn answers_come_back(content in contents(), plus: bool) {
-            let (bits, _) = content.emit(column(plus));
+            let bits = content.emit(column(plus)).bits;
             let answer = Answer::from_bits(Rule::Strict, bits);
             let is = |r: Reading, c: Character| r.word().decode() == Some(c) && r.byte() == Ok(c.byte());
             prop_assert!(is(answer.vertical(), content.vertical) && is(answer.pipe(), content.pipe));
@@ -331,7 +356,7 @@ pub(crate) mod tests {
         /// One flipped bit is seen in the word it is in and in no other, or gives another good word there.
         #[test]
         fn a_flip_stays_in_its_word(content in contents(), plus: bool, at in 0..61_u32) {
-            let (bits, _) = content.emit(column(plus));
+            let bits = content.emit(column(plus)).bits;
             let (good, bad) = (Answer::from_bits(Rule::Strict, bits), Answer::from_bits(Rule::Strict, bits ^ 1 << at));
             let differ = good.words().iter().zip(bad.words()).filter(|(a, b)| *a != b).count();
             prop_assert_eq!(differ, usize::from(at != 50));
@@ -352,12 +377,12 @@ pub(crate) mod tests {
                 // IDLE and K30.7 stand in one column each: the disparity is known before the acceleration.
                 let content = Content {
                     vertical: Character::data(0),
-                    parameter: EncoderByte::of(EncoderSymbol::Idle, false),
+                    parameter: EncoderByte::of(EncoderSymbol::Idle),
                     pipe: Character::control(Control::K30_7),
                     acceleration: DeltaDelta::new(dd),
                     secondary: Character::data(0),
                 };
-                let (bits, _) = content.emit(rd);
+                let bits = content.emit(rd).bits;
                 assert_eq!(Answer::from_bits(Rule::Strict, bits).disparity_violations(), 0);
                 for at in 30..50 {
                     let answer = Answer::from_bits(Rule::Strict, bits ^ 1 << at);
@@ -387,6 +412,6 @@ pub(crate) mod tests {
         }
         let line = Window::from_bits(u128::MAX, 61).unwrap();
         assert!(Answer::parse(Rule::Strict, line).unwrap().vertical().is_byte_error());
-        assert_eq!(EncoderSymbol::Idle.bits(), 0x10);
+        assert_eq!(EncoderSymbol::Idle.code(), 0x10);
     }
 }

@@ -2,7 +2,7 @@
 
 use nrz_line::Window;
 
-use crate::device::Heard;
+use crate::device::{Heard, Transmission};
 use crate::frame::{ANSWER_BITS, Head, SAMPLES_PER_BIT};
 use crate::sampling::WINDOW;
 
@@ -89,21 +89,21 @@ impl Cable {
 
     /// What the master samples of an answer: a byte a bit time, the first sample in bit 7. Without an answer the line
     /// stays high.
-    pub fn up(&mut self, answer: Option<u64>) -> [u8; WINDOW] {
+    pub fn up(&mut self, answer: Option<Transmission>) -> [u8; WINDOW] {
         self.up_from(answer, self.disturbance.delay)
     }
 
     /// The same of an encoder that keeps time by what it has heard: its answer begins one bit after PARA by its own clock.
-    pub fn up_heard(&mut self, answer: Option<u64>, heard: &Heard) -> [u8; WINDOW] {
+    pub fn up_heard(&mut self, answer: Option<Transmission>, heard: &Heard) -> [u8; WINDOW] {
         let there = u32::from(heard.start).saturating_sub(self.disturbance.down_delay);
         let early = self.disturbance.down_delay.saturating_sub(heard.start.into());
         self.up_from(answer, self.disturbance.delay.saturating_add(there).saturating_sub(early))
     }
 
-    fn up_from(&mut self, answer: Option<u64>, delay: u32) -> [u8; WINDOW] {
+    fn up_from(&mut self, answer: Option<Transmission>, delay: u32) -> [u8; WINDOW] {
         let mut words = [0; WINDOW / 8];
-        if let Some(bits) = answer {
-            let bits = self.spoilt(bits);
+        if let Some(answer) = answer {
+            let bits = self.spoilt(answer.bits);
             self.edges(bits, delay, &mut words);
         }
         self.sampled(words)
@@ -222,7 +222,7 @@ mod tests {
         #[test]
         fn a_clean_line_only_delays(bits in 0..1_u64 << 61, delay in 0..88_u32) {
             let mut simulated = Cable::new(Disturbance::default().with_delay(delay), 1);
-            prop_assert_eq!(simulated.up(Some(bits)), line(bits, delay));
+            prop_assert_eq!(simulated.up(Some(Transmission { bits })), line(bits, delay));
             prop_assert_eq!(simulated.up(None), [0xff; WINDOW]);
         }
 
@@ -230,16 +230,16 @@ mod tests {
         #[test]
         fn one_sample_of_jitter(bits in 0..1_u64 << 61, delay in 0..84_u32, seed: u64) {
             let mut simulated = Cable::new(Disturbance::default().with_delay(delay).with_jitter(1), seed);
-            let learned = Alignment::learn(EdgeRule::Leading, &simulated.up(Some(TEST_PATTERN)));
-            prop_assert_eq!(learned.unwrap().bits(&simulated.up(Some(bits))), Ok(bits));
+            let learned = Alignment::learn(EdgeRule::Leading, &simulated.up(Some(Transmission { bits: TEST_PATTERN })));
+            prop_assert_eq!(learned.unwrap().bits(&simulated.up(Some(Transmission { bits }))), Ok(bits));
         }
 
         /// An encoder whose clock is 2000 ppm off is still read.
         #[test]
         fn clock_offset(bits in 0..1_u64 << 61, ppm in -2000..2000, seed: u64) {
             let mut simulated = Cable::new(Disturbance::default().with_delay(20).with_clock_ppm(ppm).with_jitter(1), seed);
-            let learned = Alignment::learn(EdgeRule::Leading, &simulated.up(Some(TEST_PATTERN)));
-            prop_assert_eq!(learned.unwrap().bits(&simulated.up(Some(bits))), Ok(bits));
+            let learned = Alignment::learn(EdgeRule::Leading, &simulated.up(Some(Transmission { bits: TEST_PATTERN })));
+            prop_assert_eq!(learned.unwrap().bits(&simulated.up(Some(Transmission { bits }))), Ok(bits));
         }
     }
 

@@ -38,7 +38,7 @@ servowire_core::show_flags!(Channel2Findings);
 /// ```
 /// use hdsl::{Channel2Findings, Channel2Monitor, VFrame};
 /// let mut monitor = Channel2Monitor::new();
-/// // with every report that has one: monitor.v_frame(&report.v_frame)
+/// // with every H-frame that has one: monitor.v_frame(&h_frame.v_frame)
 /// assert_eq!(monitor.v_frame(&VFrame::default()), Channel2Findings::STALE);
 /// assert_eq!(monitor.age(), 1);
 /// ```
@@ -73,7 +73,7 @@ impl Channel2Monitor {
         findings.set(Channel2Findings::TOG2, before == Some(toggle));
         findings.set(Channel2Findings::ERR2, status.contains(Status2::ERR2));
         findings.set(Channel2Findings::TEST2, status.contains(Status2::TEST2));
-        findings.set(Channel2Findings::VPOS2, matches!(block.position(), Err(Error::PositionInvalid { .. })));
+        findings.set(Channel2Findings::VPOS2, matches!(block.vpos(), Err(Error::PositionInvalid { .. })));
         findings
     }
 

@@ -8,15 +8,15 @@
 //! [`Device::sampling_instant`] is when the position is to be taken.
 //!
 //! It shares no rule of the line with the receiver: code, test pattern, symbols, messages, checks and limits are written down
-//! here once more. What the documents leave to the encoder is a switch in [`Behaviour`], what it can do wrong one in
-//! [`Faults`].
+//! here once more. What the documents leave to the encoder is a switch in [`Behaviour`], what it can do wrong a
+//! [`Fault`].
 //!
 //! ```
 //! use hdsl::EncoderId;
 //! use hdsl::cable::{Cable, Disturbance};
 //! use hdsl::device::{Device, Heard};
 //! use hdsl::master::Master;
-//! use hdsl::Dialect;
+//! use hdsl::{Dialect, Policy};
 //!
 //! let mut cable = Cable::new(Disturbance::metres(40).with_jitter(1), 1);
 //! let mut master = Master::new(Dialect::SICK);
@@ -26,10 +26,11 @@
 //!     let heard = Heard::on_line(&line).ok_or("no head")?;
 //!     // 864 eighths of a bit a frame; the shaft turns by two steps in each.
 //!     let instant = 864 * frame + u64::from(encoder.sampling_instant(&heard));
-//!     let answer = encoder.answer(heard.bits, 2 * instant);
-//!     master.finish(&cable.up_heard(answer, &heard), None)?;
+//!     let answer = encoder.hear(heard.bits, 2 * instant);
+//!     master.hear(&cable.up_heard(answer, &heard), 11_520 * frame + 10_560)?;
 //! }
-//! assert!((master.fast()?.velocity - 2 * 864).abs() <= 2 * 2);
+//! let fast = master.fast().at(11_520 * 150, Policy::new(20_000))?;
+//! assert!((fast.velocity() - 2 * 864).abs() <= 2 * 2);
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
@@ -41,7 +42,7 @@ mod resources;
 
 use nrz_line::Window;
 
-pub use behaviour::{Behaviour, Complement, Disparity, Faults, Overload};
+pub use behaviour::{Acknowledgement, BadHead, Behaviour, Complement, Disparity, Fault, Overload};
 pub use hearing::Heard;
 pub use resources::{Resource, Resources};
 
@@ -53,20 +54,26 @@ use code::Symbol;
 /// The test pattern, first line bit in bit 0: 0100110011001000000100010101110111111011001100110100010011001.
 const PATTERN: u64 = 0x1322_ccdf_ba88_1332;
 
+/// What an encoder sends in an H-frame: its answer begins one bit after PARA.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "arbitrary", derive(arbitrary::Arbitrary))]
+pub struct Transmission {
+    /// The 61 bits of the answer, the first line bit in bit 0.
+    pub bits: u64,
+}
+
 /// An encoder.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Device {
     /// ENC_ID, 20 bits.
     id: u32,
-    /// What the documents leave to it.
-    pub behaviour: Behaviour,
-    /// What it does wrong.
-    pub faults: Faults,
-    /// Registers and resources that messages reach.
-    pub resources: Resources,
-    /// Byte for the pipe channel; `None` sends K30.7.
-    pub pipe: Option<u8>,
+    behaviour: Behaviour,
+    fault: Fault,
+    resources: Resources,
+    pipe: Option<u8>,
     channel: Channel,
     /// Requests so far, for what it forgets.
     requests: u16,
@@ -89,8 +96,8 @@ impl Device {
     pub const fn new(id: EncoderId) -> Self {
         Self {
             id: id.get(),
-            behaviour: Behaviour::PLAIN,
-            faults: Faults::NONE,
+            behaviour: Behaviour::new(),
+            fault: Fault::None,
             resources: Resources::new(),
             pipe: None,
             channel: Channel::new(),
@@ -106,17 +113,41 @@ impl Device {
         }
     }
 
-    /// Takes the head of an H-frame and the position at its sampling edge, and gives the 61 bits of the answer, the
-    /// first line bit in bit 0; `None` if there is none.
+    /// What it makes of the points that the documents leave open.
+    pub const fn set_behaviour(&mut self, behaviour: Behaviour) {
+        self.behaviour = behaviour;
+    }
+
+    /// What it does wrong from now on.
+    pub const fn set_fault(&mut self, fault: Fault) {
+        self.fault = fault;
+    }
+
+    /// The byte for the pipe channel in the next answers; `None` sends K30.7, no data.
+    pub const fn set_pipe(&mut self, byte: Option<u8>) {
+        self.pipe = byte;
+    }
+
+    /// Registers and resources that messages reach.
+    pub const fn resources(&self) -> &Resources {
+        &self.resources
+    }
+
+    /// The same, to be changed from inside the encoder.
+    pub const fn resources_mut(&mut self) -> &mut Resources {
+        &mut self.resources
+    }
+
+    /// Takes the head of an H-frame and the position at its sampling edge, and gives the answer; `None` if there is none.
     ///
     /// Before it has seen RESET and enough SYNC frames it answers nothing. A head that cannot be read is not answered; a
     /// symbol of the master that has no meaning is passed over.
-    pub fn answer(&mut self, head: Window, position: u64) -> Option<u64> {
+    pub fn hear(&mut self, head: Window, position: u64) -> Option<Transmission> {
         let before = self.position;
         self.position = position & self.mask();
         let acceleration = self.measure();
         let Some(byte) = code::parameter(head) else {
-            if !self.behaviour.stalls_on_bad_head {
+            if self.behaviour.bad_head == BadHead::Counts {
                 self.go_on(before);
             }
             return None;
@@ -151,10 +182,10 @@ impl Device {
             }
             _ => self.normal(symbol, before, acceleration),
         };
-        (!self.faults.silent).then_some(answer)
+        (self.fault != Fault::Silent).then_some(Transmission { bits: answer })
     }
 
-    /// When the position for [`answer`](Self::answer) is to be taken, in eighths of a bit (13.333 ns) on the time base of the samples
+    /// When the position for [`hear`](Self::hear) is to be taken, in eighths of a bit (13.333 ns) on the time base of the samples
     /// in which the head was heard: at the sampling edge, and later by [`Behaviour::sampling_lag`].
     pub const fn sampling_instant(&self, heard: &Heard) -> u32 {
         (heard.edge as u32).saturating_add(self.behaviour.sampling_lag as u32)
@@ -240,11 +271,11 @@ impl Device {
         self.take(symbol);
         self.serve();
         let [vertical, secondary] = self.blocks.map(|b| b.get(usize::from(at)).copied().unwrap_or(Symbol::data(0)));
-        let vsync = if at == 7 && !self.faults.no_vsync { 0x80 } else { 0 };
+        let vsync = if at == 7 && self.fault != Fault::NoVsync { 0x80 } else { 0 };
         let parameter = self.channel.speak() | vsync | (self.behaviour.reserved_bits & 3) << 5;
         // K30.7: no data.
         let pipe = self.pipe.map_or(Symbol::special(0xfe), Symbol::data);
-        let [high, low] = match acceleration.filter(|_| !self.faults.no_acceleration) {
+        let [high, low] = match acceleration.filter(|_| self.fault != Fault::NoAcceleration) {
             Some(value) => acceleration_word(value).to_be_bytes().map(Symbol::data),
             // K29.7 twice: no value.
             None => [Symbol::special(0xfd); 2],
@@ -257,31 +288,32 @@ impl Device {
         let Some(request) = self.channel.hear(symbol) else { return };
         self.requests = self.requests.wrapping_add(1);
         let forgotten = self.requests.checked_rem(self.behaviour.forgets_every) == Some(0);
-        if !self.faults.mute && !forgotten {
-            self.channel.wait(request, self.behaviour.latency);
+        if self.fault != Fault::Mute && !forgotten {
+            self.channel.wait(request, self.behaviour.latency_frames);
         }
     }
 
     /// Answers the requests that have waited long enough.
     fn serve(&mut self) {
         for request in self.channel.due().into_iter().flatten() {
-            let answer = self.resources.answer(&request, self.behaviour.acknowledges_with_length);
+            let answer = self.resources.answer(&request, self.behaviour.acknowledgement);
             self.channel.answer(answer);
         }
     }
 
     /// The two safe blocks of a V-frame; `position` is that of the sampling edge before it.
     fn latch(&mut self, position: u64) {
-        let test = if self.faults.test_2 { 0x40 } else { 0 };
-        let error = if self.faults.error_2 { 0x20 } else { 0 };
+        let test = if self.fault == Fault::Test2 { 0x40 } else { 0 };
+        let error = if self.fault == Fault::Error2 { 0x20 } else { 0 };
         let status = if self.toggle { 0x80 } else { 0 } | test | error | 0x1c;
-        self.toggle = self.toggle == self.faults.stuck_toggle;
+        self.toggle = self.toggle == (self.fault == Fault::StuckToggle);
         // Bit 10: positions have a sign.
         let sign =
             if self.id >> 10 & 1 == 1 { self.signed(position) } else { i64::from_le_bytes(position.to_le_bytes()) };
-        let mut first = block(Symbol::data(self.resources.summary()), sign, self.faults.bad_crc);
-        if self.faults.no_position {
-            first = marked(first, [Symbol::special(0xfd); 5], self.faults.bad_crc);
+        let [bad_crc, bad_crc_2] = [Fault::BadCrc, Fault::BadCrc2].map(|fault| self.fault == fault);
+        let mut first = block(Symbol::data(self.resources.summary()), sign, bad_crc);
+        if self.fault == Fault::NoPosition {
+            first = marked(first, [Symbol::special(0xfd); 5], bad_crc);
         }
         // FIX2 is 28: a K28 character.
         let k28 = Symbol::special(status);
@@ -290,10 +322,10 @@ impl Device {
             Complement::Ones => !coarse,
             Complement::Twos => coarse.wrapping_neg(),
         };
-        let mut second = block(k28, second, self.faults.bad_crc_2);
-        if self.faults.no_position_2 {
+        let mut second = block(k28, second, bad_crc_2);
+        if self.fault == Fault::NoPosition2 {
             let [top, rest] = [Symbol::special(0xfb), Symbol::data(0)];
-            second = marked(second, [top, rest, rest, rest, rest], self.faults.bad_crc_2);
+            second = marked(second, [top, rest, rest, rest, rest], bad_crc_2);
         }
         self.blocks = [first, second];
     }

@@ -1,16 +1,16 @@
-use core::fmt;
-
 /// Why a position must not be used.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "arbitrary", derive(arbitrary::Arbitrary))]
 #[non_exhaustive]
 pub enum Doubt {
+    /// There was no H-frame yet.
+    Never,
     /// The link is not up, or was lost.
     NoLink,
     /// The last acceleration word could not be used: the fast position is estimated.
     Estimated,
-    /// The fast position does not agree with the safe one yet, or no more.
+    /// The fast position does not agree with the safe one yet, or no longer.
     Alignment,
     /// The velocity is beyond a sixteenth of the range a frame, where it is known modulo an eighth of the range only.
     Speed,
@@ -20,22 +20,23 @@ pub enum Doubt {
     Stale,
     /// The encoder says that it has no position.
     Withheld,
+    /// The position was sampled too long ago, or by a clock that was set back in the meantime.
+    Old {
+        /// How far the instant of sampling is away, in ns.
+        age_ns: u64,
+    },
 }
 
-impl fmt::Display for Doubt {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(match self {
-            Self::NoLink => "the link is down",
-            Self::Estimated => "the fast position is estimated",
-            Self::Alignment => "the fast position is not aligned with the safe one",
-            Self::Speed => "the speed is beyond a sixteenth of the range a frame",
-            Self::NoVFrame => "no V-frame is complete yet",
-            Self::Stale => "the last V-frame brought no sound safe position",
-            Self::Withheld => "the encoder has no position",
-        })
-    }
-}
+servowire_core::one_line!(Doubt {
+    Self::Never => "there was no H-frame yet";
+    Self::NoLink => "the link is down";
+    Self::Estimated => "the fast position is estimated";
+    Self::Alignment => "the fast position is not aligned with the safe one";
+    Self::Speed => "the speed is beyond a sixteenth of the range a frame";
+    Self::NoVFrame => "no V-frame is complete yet";
+    Self::Stale => "the last V-frame brought no sound safe position";
+    Self::Withheld => "the encoder has no position";
+    Self::Old { age_ns } => "the position is {} ns old", age_ns;
+});
 
 impl core::error::Error for Doubt {}
-
-servowire_core::format_as_displayed!(Doubt);

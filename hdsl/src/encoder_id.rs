@@ -1,4 +1,4 @@
-use crate::answer::{Answer, emit};
+use crate::answer::{Answer, EncodedAnswer, emit};
 use crate::error::Error;
 use crate::ranged::ranged;
 use crate::symbol::{Character, RunningDisparity};
@@ -111,11 +111,11 @@ impl EncoderId {
     /// use hdsl::symbol::{Character, RunningDisparity};
     /// use hdsl::{Answer, EncoderId, Rule};
     /// let id = EncoderId::try_from(0x00153)?;
-    /// let (bits, _) = id.to_answer(Character::data(0), RunningDisparity::Minus);
+    /// let bits = id.to_answer(Character::data(0), RunningDisparity::Minus).bits;
     /// assert_eq!(EncoderId::from_answer(Answer::from_bits(Rule::Strict, bits)), Ok(id));
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
-    pub fn to_answer(self, secondary: Character, rd: RunningDisparity) -> (u64, RunningDisparity) {
+    pub fn to_answer(self, secondary: Character, rd: RunningDisparity) -> EncodedAnswer {
         let [low, middle, high, _] = self.get().to_le_bytes().map(Character::data);
         let pipe = Character::data(high.byte() << 4 | high.byte());
         emit([low, middle, pipe, middle, low, secondary], rd)
@@ -163,7 +163,7 @@ mod tests {
     fn answers() {
         for raw in (0..1 << 20).step_by(97 * crate::thin(397)) {
             let id = EncoderId::new(raw).unwrap();
-            let (bits, _) = id.to_answer(Character::data(0), RunningDisparity::Plus);
+            let bits = id.to_answer(Character::data(0), RunningDisparity::Plus).bits;
             let read = |bits| EncoderId::from_answer(Answer::from_bits(Rule::Strict, bits));
             assert_eq!(read(bits), Ok(id));
             for at in 0..50 {

@@ -71,6 +71,13 @@ impl Extra {
         edge_register(self.0 % 8)
     }
 
+    /// From the falling edge to the end of the window, in ns rounded up.
+    pub(crate) const fn low_ns(self) -> u8 {
+        let eighths = self.0.wrapping_neg() % 8;
+        // 13 1/3 ns each.
+        eighths.wrapping_mul(13).wrapping_add(eighths.div_ceil(3))
+    }
+
     /// The samples of the last bit as they are on the line.
     const fn last_bit(self) -> u8 {
         if self.0 % 8 == 0 { 0xff } else { self.edge_register() }
@@ -88,6 +95,7 @@ pub(crate) const fn edge_register(time_rest: u8) -> u8 {
 /// The first part of an H-frame, from SYNC to PARA.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct Head {
     byte: ParameterByte,
     extra: Option<Extra>,
@@ -99,13 +107,23 @@ impl Head {
     /// Bits without an EXTRA window.
     pub const BITS: u32 = 26;
 
-    /// The head for a parameter byte, and the line disparity after it. `before` is the disparity before
+    /// The head for a parameter byte. `before` is the disparity before
     /// EQUALISATION, so with the ones of the EXTRA window if there is one (the partly high last bit counts as a one).
     #[inline]
-    pub const fn new(byte: ParameterByte, extra: Option<Extra>, before: LineDisparity) -> (Self, LineDisparity) {
-        let (equalisation, d) = before.equalisation();
-        let (para, d) = d.encode(byte);
-        (Self { byte, extra, equalisation, para }, d)
+    pub const fn new(byte: ParameterByte, extra: Option<Extra>, before: LineDisparity) -> Self {
+        Self::coded(byte, extra, before).0
+    }
+
+    /// The same with the line disparity after it.
+    #[inline]
+    pub(crate) const fn coded(
+        byte: ParameterByte,
+        extra: Option<Extra>,
+        before: LineDisparity,
+    ) -> (Self, LineDisparity) {
+        let equalised = before.equalisation();
+        let coded = equalised.disparity.encode(byte);
+        (Self { byte, extra, equalisation: equalised.bits, para: coded.word }, coded.disparity)
     }
 
     /// The parameter byte.
@@ -167,7 +185,7 @@ impl Head {
     ///
     /// # Errors
     /// [`Error::Truncated`], [`Error::Framing`], and [`Error::InvalidWord`] for a parameter word that is in no table.
-    pub fn parse(line: Window) -> Result<Received, Error> {
+    pub fn parse(line: Window) -> Result<ParsedHead, Error> {
         let bits = line.bits();
         let truncated = |want: u32| Error::Truncated { got: low16(line.len()), want: low16(want) };
         if line.len() < Self::BITS {
@@ -185,14 +203,14 @@ impl Head {
         let (at, [low, high, ..]) = (extra.wrapping_add(16), (bits >> extra.wrapping_add(16)).to_le_bytes());
         let word = Word::truncate(u16::from_le_bytes([low, high]));
         let byte = ParameterByte::decode(word).ok_or(Error::InvalidWord { word: word.get() })?;
-        Ok(Received { byte, extra_bits: extra, len: at.wrapping_add(Word::BITS) })
+        Ok(ParsedHead { byte, extra_bits: extra, len: at.wrapping_add(Word::BITS) })
     }
 }
 
 /// What an encoder reads from the head of an H-frame.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub struct Received {
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct ParsedHead {
     /// The parameter byte.
     pub byte: ParameterByte,
     /// Bits of the EXTRA window; 0 free running.
@@ -200,6 +218,11 @@ pub struct Received {
     /// Bits of the whole head.
     pub len: u32,
 }
+
+servowire_core::one_line!(ParsedHead {
+    Self { byte, extra_bits: 0, .. } => "{}", byte;
+    Self { byte, extra_bits, .. } => "{}, EXTRA of {} bits", byte, extra_bits;
+});
 
 #[expect(clippy::cast_possible_truncation, reason = "lengths of a window are below 129")]
 const fn low16(len: u32) -> u16 {
@@ -283,10 +306,10 @@ mod tests {
     #[test]
     fn the_frame_adds_up() {
         assert_eq!(Head::BITS + FILLER.len() + TRAILER_BITS, H_FRAME_BITS);
-        let byte = ParameterByte::of(MasterSymbol::Reset, false, false);
-        let (head, d) = Head::new(byte, None, LineDisparity::ZERO);
+        let byte = ParameterByte::of(MasterSymbol::Reset);
+        let (head, d) = Head::coded(byte, None, LineDisparity::ZERO);
         assert_eq!(text(window(head.bits())), "00101111011000000101001011");
-        let (head, _) = Head::new(byte, None, d);
+        let head = Head::new(byte, None, d);
         assert_eq!(text(window(head.bits()).skip(12).take(4)), "1101");
         assert!(text(window(FILLER)).starts_with("0101") && text(window(FILLER)).ends_with("01"));
         assert_eq!(text(Tail { trailer: Trailer::Whole, stuffing: Stuffing(2) }.bits()), "00000011001011001011");
@@ -302,7 +325,7 @@ mod tests {
             for edge in (23..=72).step_by(crate::thin(7)) {
                 for d in -5..=5 {
                     let (byte, extra) = (ParameterByte::new(raw), Extra::new(edge));
-                    let (head, _) = Head::new(byte, extra, LineDisparity::new(d));
+                    let head = Head::new(byte, extra, LineDisparity::new(d));
                     let got = Head::parse(head.bits()).unwrap();
                     assert_eq!((got.byte, got.len), (byte, head.bits().len()));
                     assert_eq!(got.extra_bits, extra.map_or(0, |e| u32::from(e.bits())));
@@ -328,7 +351,7 @@ mod tests {
     /// Every wrong bit of the fixed pattern is refused, every shorter line too.
     #[test]
     fn flips_and_truncations() {
-        let (head, _) = Head::new(ParameterByte::new(0xd0), None, LineDisparity::ZERO);
+        let head = Head::new(ParameterByte::new(0xd0), None, LineDisparity::ZERO);
         let good = head.bits();
         for at in 0..12 {
             let bad = Window::from_bits(good.bits() ^ 1 << at, 26).unwrap();

@@ -16,7 +16,9 @@ mod dialect;
 mod doubt;
 mod encoder_id;
 mod error;
+mod evidence;
 pub mod frame;
+pub mod inspect;
 mod line_code;
 pub mod master;
 pub mod message;
@@ -38,17 +40,18 @@ pub(crate) const fn thin(n: usize) -> usize {
 }
 
 pub use acceleration::DeltaDelta;
-pub use answer::{Answer, Content};
+pub use answer::{Answer, Content, EncodedAnswer};
 pub use channel2::{Channel2Findings, Channel2Monitor};
 pub use crc::{CRC_16, RunningCrc16, crc16};
 pub use dialect::Dialect;
 pub use doubt::Doubt;
 pub use encoder_id::{EncoderId, PositionBits};
 pub use error::{Error, ErrorClass};
-pub use line_code::LineDisparity;
+pub use evidence::{Evidence, EvidenceCell, Policy, SafeEvidence, SafeSample, Sample, Tolerated};
+pub use line_code::{EncodedParameter, Equalisation, LineDisparity};
 pub use nrz_line::Window;
 pub use parameter::{EncoderByte, EncoderSymbol, MasterSymbol, Nibble, ParameterByte};
-pub use position::{Phase, PositionRule, PositionTracker};
+pub use position::{AlignmentStage, PositionRegisters, PositionRule, PositionTracker};
 pub use quality::{QualityEvent, QualityMonitor, QualityRule};
 pub use servowire_core::OutOfRange;
 pub use symbol::Rule;

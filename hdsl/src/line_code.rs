@@ -17,6 +17,28 @@ use crate::symbol::{FOUR_MORE_ZEROS, NEUTRAL, Rule, SIX_MORE_ZEROS, Word};
 #[cfg_attr(feature = "arbitrary", derive(arbitrary::Arbitrary))]
 pub struct LineDisparity(i8);
 
+/// The EQUALISATION bits of a head.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct Equalisation {
+    /// The four bits, the first line bit in bit 0.
+    pub bits: u8,
+    /// The disparity after them.
+    pub disparity: LineDisparity,
+}
+
+/// The word of a parameter byte.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct EncodedParameter {
+    /// The word.
+    pub word: Word,
+    /// The disparity after it.
+    pub disparity: LineDisparity,
+}
+
 impl LineDisparity {
     /// Balanced.
     pub const ZERO: Self = Self(0);
@@ -40,7 +62,7 @@ impl LineDisparity {
         self.plus(if ones > 127 { 127 } else { i8::from_le_bytes([ones]) })
     }
 
-    /// The four EQUALISATION bits, first line bit in bit 0, and the disparity that counts afterwards.
+    /// The four EQUALISATION bits, and the disparity that counts afterwards.
     ///
     /// ```text
     ///  disparity   bits sent   afterwards
@@ -53,14 +75,20 @@ impl LineDisparity {
     ///
     /// An encoder does not interpret these bits.
     #[inline]
-    pub const fn equalisation(self) -> (u8, Self) {
-        match self.0 {
+    pub const fn equalisation(self) -> Equalisation {
+        let (bits, disparity) = match self.0 {
             -1..=1 => (0b0000, self),
             2..=3 => (0b0100, self.plus(-2)),
             4.. => (0b0000, self.plus(-4)),
             -3..=-2 => (0b1011, self.plus(2)),
             ..=-4 => (0b1111, self.plus(4)),
-        }
+        };
+        Equalisation { bits, disparity }
+    }
+
+    /// The count after a head with this parameter byte; see [`Head::new`](crate::frame::Head::new).
+    pub const fn after_head(self, byte: ParameterByte) -> Self {
+        self.equalisation().disparity.encode(byte).disparity
     }
 
     /// The word for the parameter byte, and the disparity afterwards.
@@ -70,21 +98,22 @@ impl LineDisparity {
     /// 2. the 4-bit block of bits 7:5 in the same way (3 always 0011), by the new d, which it does not change.
     #[inline]
     #[expect(clippy::indexing_slicing, reason = "a byte is below 256")]
-    pub const fn encode(self, byte: ParameterByte) -> (Word, Self) {
+    pub const fn encode(self, byte: ParameterByte) -> EncodedParameter {
         if self.0 != 0 {
             return self.encode_unbalanced(byte);
         }
         let entry = BALANCED[byte.raw() as usize];
-        (Word::truncate(entry & 0x3ff), Self(if entry & MORE_ZEROS != 0 { -2 } else { 0 }))
+        let disparity = Self(if entry & MORE_ZEROS != 0 { -2 } else { 0 });
+        EncodedParameter { word: Word::truncate(entry & 0x3ff), disparity }
     }
 
     #[expect(clippy::indexing_slicing, reason = "five bits are below 32, three below 8")]
-    const fn encode_unbalanced(self, byte: ParameterByte) -> (Word, Self) {
+    const fn encode_unbalanced(self, byte: ParameterByte) -> EncodedParameter {
         let raw = byte.raw();
         let (six, balance) = polarity(SIX_MORE_ZEROS[(raw & 31) as usize], 0x3f, self.0);
         let after = self.plus(balance);
         let (four, _) = polarity(FOUR_MORE_ZEROS[(raw >> 5) as usize], 0x0f, after.0);
-        (Word::truncate(six as u16 | (four as u16) << 6), after)
+        EncodedParameter { word: Word::truncate(six as u16 | (four as u16) << 6), disparity: after }
     }
 }
 
@@ -97,8 +126,8 @@ static BALANCED: [u16; 256] = {
     let mut table = [0; 256];
     let mut raw: u8 = 0;
     loop {
-        let (word, after) = LineDisparity::ZERO.encode_unbalanced(ParameterByte::new(raw));
-        table[raw as usize] = word.get() | if after.0 < 0 { MORE_ZEROS } else { 0 };
+        let coded = LineDisparity::ZERO.encode_unbalanced(ParameterByte::new(raw));
+        table[raw as usize] = coded.word.get() | if coded.disparity.0 < 0 { MORE_ZEROS } else { 0 };
         if raw == 255 {
             break;
         }
@@ -151,7 +180,8 @@ mod tests {
     fn every_byte_at_every_disparity_comes_back() {
         for raw in (0..=255).step_by(crate::thin(51)) {
             for d in i8::MIN..=i8::MAX {
-                let (word, after) = LineDisparity(d).encode(ParameterByte::new(raw));
+                let coded = LineDisparity(d).encode(ParameterByte::new(raw));
+                let (word, after) = (coded.word, coded.disparity);
                 assert_eq!(ParameterByte::decode(word), Some(ParameterByte::new(raw)), "{raw:02x} {d}");
                 assert!(after.0.abs_diff(d) <= 2);
             }
@@ -172,7 +202,7 @@ mod tests {
             (0x90, "1001001101"),
             (0xd0, "1001000110"),
         ] {
-            assert_eq!(LineDisparity::ZERO.encode(ParameterByte::new(raw)).0.get(), bits(text), "{raw:02x}");
+            assert_eq!(LineDisparity::ZERO.encode(ParameterByte::new(raw)).word.get(), bits(text), "{raw:02x}");
         }
     }
 

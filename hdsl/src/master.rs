@@ -1,11 +1,11 @@
 //! The receiver as a machine without I/O.
 //!
 //! Every H-frame has two halves. [`Master::transmission`] says what to send from SYNC to PARA and whether an encoder
-//! answers; [`Master::finish`] takes the samples of the answer and says how the frame ends. What it brought is in the
-//! [`Report`], from which [`Registers::apply`](crate::registers::Registers::apply) makes the register map.
+//! answers; [`Master::hear`] takes the samples of the answer and says how the frame ends. What it brought is in the
+//! [`HFrame`], from which [`Registers::apply`](crate::registers::Registers::apply) makes the register map.
 //!
-//! A position to control with comes from [`Master::fast`], the safe one from [`Master::safe`]; both give a number only
-//! when it may be used.
+//! A position to control with comes from [`Master::fast`], the safe one from [`Master::safe`]; both are evidence, which gives a
+//! number only where it may be used.
 //!
 //! ```text
 //!  RESET -> SYNC -> START -> LEARN -> CHECK -> IDREQ -> WAIT VSYNC -> RX0 ... RX7
@@ -20,46 +20,53 @@
 //! use hdsl::device::Device;
 //! use hdsl::master::{Master, State};
 //! use hdsl::sampling::line;
-//! use hdsl::{Dialect, EncoderId};
+//! use hdsl::{Dialect, EncoderId, Policy};
 //!
 //! let mut master = Master::new(Dialect::SICK);
 //! let mut encoder = Device::new(EncoderId::try_from(0x00153)?);
 //! for frame in 0..150_u64 {
-//!     let answer = encoder.answer(master.transmission().head.bits(), 7 * frame);
+//!     let answer = encoder.hear(master.transmission().head.bits(), 7 * frame);
 //!     // a cable that delays the answer by 11 eighths of a bit
-//!     let samples = answer.map_or([0xff; 72], |bits| line(bits, 11));
-//!     master.finish(&samples, None)?;
+//!     let samples = answer.map_or([0xff; 72], |answer| line(answer.bits, 11));
+//!     // The window of the answer ends 99 bits after the frame began.
+//!     master.hear(&samples, 11_520 * frame + 10_560)?;
 //! }
 //! assert_eq!(master.state(), State::Running);
-//! let fast = master.fast()?;
-//! assert_eq!((fast.velocity, fast.position), (7, 7 * 149));
+//! // At the end of the last frame, for a control loop that lives with positions of the last 20 µs.
+//! let fast = master.fast().at(11_520 * 150, Policy::new(20_000))?;
+//! assert_eq!((fast.velocity(), fast.position()), (7, 7 * 149));
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
 mod control;
+mod h_frame;
 mod link;
-mod report;
 mod send;
 mod state;
 
-pub use report::{Counters, Fast, Report, Safe, Signal};
+pub use h_frame::{Counters, HFrame, SignalQuality};
 pub use send::Transmission;
-pub use state::{Cause, State};
+pub use state::{RestartReason, State};
 
 use crate::answer::Answer;
 use crate::dialect::Dialect;
 use crate::encoder_id::{EncoderId, PositionBits};
 use crate::error::Error;
-use crate::frame::{Stuffing, Tail, Trailer};
+use crate::frame::{BIT_RATE, Extra, Stuffing, Tail, Trailer};
 use crate::line_code::LineDisparity;
 use crate::message::{Finished, Requester};
 use crate::parameter::{EncoderByte, MasterSymbol};
-use crate::position::Phase;
-use crate::rssi::EdgeWatch;
-use crate::sampling::{Alignment, TEST_PATTERN, WINDOW};
+use crate::position::AlignmentStage;
+use crate::sampling::{Alignment, SampledAnswer, TEST_PATTERN, WINDOW};
 use crate::sync::Synchroniser;
 use link::Link;
 use send::{trailer, transmission};
+
+/// Bits from the sampling edge of a frame without an EXTRA window to the end of the window of its answer: those of the head
+/// after it, the direction switch, the answer and its reserve.
+const SINCE_EDGE_BITS: u64 = 18 + 1 + WINDOW as u64;
+/// The same time in ns, rounded up.
+const SINCE_EDGE_NS: u64 = (SINCE_EDGE_BITS * 1_000_000_000).div_ceil(BIT_RATE as u64);
 
 /// The receiver.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -80,15 +87,21 @@ pub struct Master {
     encoder: Option<EncoderId>,
     link: Link,
     requester: Requester,
-    report: Report,
+    h_frame: HFrame,
     counters: Counters,
     /// ACC_ERR_CNT_THRESH.
     threshold: u8,
     restart: bool,
+    /// When the window of the last answer was over.
+    end_ns: u64,
+    /// By how much its sampling edge was before the end of an EXTRA window, in ns.
+    edge_ns: u8,
+    /// How late the external pulse of the present frame was, in eighths of a bit.
+    late: Option<i16>,
     /// The next head, if it left before this frame's answer was taken in.
     ahead: Option<Transmission>,
     /// Why the link is lost, while the frame after the loss is on the line already.
-    lost: Option<Cause>,
+    lost: Option<RestartReason>,
     /// The frame does not end in the usual way: sync mode, a restart that was asked for, or one of the two above.
     detour: bool,
 }
@@ -120,10 +133,13 @@ impl Master {
             encoder: None,
             link: Link::new(&dialect, PositionBits::MAX),
             requester: Requester::new(dialect.messages),
-            report: Report::START,
+            h_frame: HFrame::START,
             counters: Counters::default(),
             threshold: 0x1f,
             restart: false,
+            end_ns: 0,
+            edge_ns: 0,
+            late: None,
             ahead: None,
             lost: None,
             detour: sync.is_some(),
@@ -149,8 +165,8 @@ impl Master {
     }
 
     /// What the last H-frame brought.
-    pub const fn report(&self) -> &Report {
-        &self.report
+    pub const fn h_frame(&self) -> &HFrame {
+        &self.h_frame
     }
 
     /// What was counted.
@@ -169,8 +185,8 @@ impl Master {
     }
 
     /// How far the fast position is aligned with the safe one.
-    pub const fn phase(&self) -> Phase {
-        self.link.phase()
+    pub const fn stage(&self) -> AlignmentStage {
+        self.link.stage()
     }
 
     /// Whether the edge of the present frame belongs to the external pulse; `false` when free running.
@@ -180,23 +196,23 @@ impl Master {
 
     /// Takes the samples of the answer, a byte a bit time with the first sample in bit 7, and ends the H-frame.
     ///
-    /// For a frame without an answer the samples are not looked at. `late` is time(pulse) - time(edge) in eighths of a
-    /// bit if the frame is on a pulse, see [`Synchroniser::next`].
+    /// For a frame without an answer the samples are not looked at. `end_ns` is when the [`WINDOW`] bit times were over, on
+    /// the clock of the application: [`fast`](Self::fast) and [`safe`](Self::safe) count from it when a position was sampled.
     ///
     /// # Errors
     /// [`Error::Truncated`] for fewer than [`WINDOW`] bytes of samples of an answer; nothing has changed then.
-    pub fn finish(&mut self, samples: &[u8], late: Option<i16>) -> Result<&Report, Error> {
+    pub fn hear(&mut self, samples: &[u8], end_ns: u64) -> Result<&HFrame, Error> {
         if self.present.answered && samples.len() < WINDOW {
             let got = u16::try_from(samples.len()).unwrap_or(u16::MAX);
             return Err(Error::Truncated { got, want: 72 });
         }
+        self.end_ns = end_ns;
         Ok(match (self.state, self.alignment, samples.first_chunk()) {
-            (State::Start, ..) => self.learn(samples, late),
+            (State::Start, ..) => self.learn(samples),
             (_, Some(alignment), Some(window)) if self.present.answered => {
-                let (bits, watch) = alignment.read_window(window);
-                self.end_sampled(alignment, bits, watch, late)
+                self.end_sampled(alignment, alignment.read_window(window))
             }
-            _ => self.end(u64::MAX, None, late),
+            _ => self.end(u64::MAX, None),
         })
     }
 
@@ -205,62 +221,61 @@ impl Master {
     ///
     /// ```
     /// use hdsl::Dialect;
-    /// use hdsl::master::{Cause, Master, State};
+    /// use hdsl::master::{Master, RestartReason, State};
     /// # use hdsl::Error;
     /// let mut master = Master::new(Dialect::SICK);
     /// // No encoder: after RESET and SYNC, 18 frames without an answer, the line stays high.
     /// for _ in 0..18 {
-    ///     assert_eq!(master.finish_words(&[u32::MAX; 18], None).restarted, None);
+    ///     assert_eq!(master.hear_words(&[u32::MAX; 18], 0).restarted, None);
     /// }
-    /// assert_eq!(master.finish_words(&[u32::MAX; 18], None).restarted, Some(Cause::Learn(Error::NoEdge)));
+    /// assert_eq!(master.hear_words(&[u32::MAX; 18], 0).restarted, Some(RestartReason::Learn(Error::NoEdge)));
     /// assert_eq!(master.state(), State::Reset);
     /// ```
-    pub fn finish_words(&mut self, samples: &[u32; WINDOW / 4], late: Option<i16>) -> &Report {
+    pub fn hear_words(&mut self, samples: &[u32; WINDOW / 4], end_ns: u64) -> &HFrame {
+        self.end_ns = end_ns;
         match (self.state, self.alignment) {
             (State::Start, _) => {
                 let mut bytes = [0; WINDOW];
                 for (to, from) in bytes.chunks_exact_mut(4).zip(samples) {
                     to.copy_from_slice(&from.to_le_bytes());
                 }
-                self.learn(&bytes, late)
+                self.learn(&bytes)
             }
-            (_, Some(alignment)) if self.present.answered => {
-                let (bits, watch) = alignment.read_words(samples);
-                self.end_sampled(alignment, bits, watch, late)
-            }
-            _ => self.end(u64::MAX, None, late),
+            (_, Some(alignment)) if self.present.answered => self.end_sampled(alignment, alignment.read_words(samples)),
+            _ => self.end(u64::MAX, None),
         }
     }
 
     /// A START frame.
-    fn learn(&mut self, samples: &[u8], late: Option<i16>) -> &Report {
+    fn learn(&mut self, samples: &[u8]) -> &HFrame {
         self.edges = 0;
         match Alignment::learn(self.dialect.edge, samples) {
             Ok(found) => {
                 self.alignment = Some(found);
-                self.end(TEST_PATTERN, None, late)
+                self.end(TEST_PATTERN, None)
             }
             Err(error) => {
-                self.report.begin(self.state, None);
-                self.end_with(Err(Cause::Learn(error)), late)
+                self.h_frame.begin(self.state, None);
+                self.end_with(Err(RestartReason::Learn(error)))
             }
         }
     }
 
     #[inline]
-    fn end_sampled(&mut self, alignment: Alignment, bits: u64, watch: EdgeWatch, late: Option<i16>) -> &Report {
+    fn end_sampled(&mut self, alignment: Alignment, read: SampledAnswer) -> &HFrame {
         if matches!(self.state, State::Learn | State::Check) {
-            self.edges |= watch.edges();
+            self.edges |= read.edges.edges();
         }
-        let signal = Signal { rssi: watch.rssi(), delay: alignment.delay, edges: self.edges };
-        self.end(bits, Some(signal), late)
+        let signal = SignalQuality { rssi: read.edges.rssi(), delay: alignment.delay, edges: self.edges };
+        self.end(read.bits, Some(signal))
     }
 
     /// Takes the 61 bits of the answer, the first in bit 0, from a front end that finds them itself (an FPGA, a PRU), and
     /// ends the H-frame. `signal` is what that front end knows about the quality of the line; without it RSSI does not
     /// count. In START frames too the bits have to be the test pattern.
     ///
-    /// For a frame without an answer the bits are not looked at.
+    /// For a frame without an answer the bits are not looked at. `end_ns` is when the [`WINDOW`] bit times were over in which an
+    /// answer can come, whatever the delay of the cable is.
     ///
     /// ```
     /// use hdsl::device::Device;
@@ -271,41 +286,63 @@ impl Master {
     /// let mut encoder = Device::new(EncoderId::try_from(0x00153)?);
     /// while master.state() != State::Running {
     ///     // A line that stays high is all ones.
-    ///     let bits = encoder.answer(master.transmission().head.bits(), 1000).unwrap_or(u64::MAX);
-    ///     master.finish_bits(bits, None, None);
+    ///     let answer = encoder.hear(master.transmission().head.bits(), 1000);
+    ///     let bits = answer.map_or(u64::MAX, |answer| answer.bits);
+    ///     master.hear_bits(bits, None, 0);
     /// }
     /// assert_eq!(master.encoder_id().map(|id| id.position_bits()), Some(32));
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
-    pub fn finish_bits(&mut self, bits: u64, signal: Option<Signal>, late: Option<i16>) -> &Report {
-        self.end(bits, signal, late)
+    pub fn hear_bits(&mut self, bits: u64, signal: Option<SignalQuality>, end_ns: u64) -> &HFrame {
+        self.end_ns = end_ns;
+        self.end(bits, signal)
     }
 
-    fn end(&mut self, bits: u64, signal: Option<Signal>, late: Option<i16>) -> &Report {
+    /// The external pulse of the present frame came so many eighths of a bit after its sampling edge (negative: before it); to
+    /// be told before the answer is heard, in frames that are [on a pulse](Self::is_on_pulse). See [`Synchroniser::next`].
+    pub const fn hear_pulse(&mut self, late: i16) {
+        self.late = Some(late);
+    }
+
+    /// When the sampling edge of the last H-frame left.
+    const fn sampled_ns(&self) -> u64 {
+        self.end_ns.saturating_sub(SINCE_EDGE_NS).saturating_sub(self.edge_ns as u64)
+    }
+
+    /// A V-frame begins after the present H-frame.
+    fn latch(&mut self) {
+        self.edge_ns = self.present.head.extra().map_or(0, Extra::low_ns);
+        self.link.latch(self.sampled_ns());
+    }
+
+    fn end(&mut self, bits: u64, signal: Option<SignalQuality>) -> &HFrame {
         let bits = bits & (u64::MAX >> 3);
-        self.report.begin(self.state, signal);
+        self.h_frame.begin(self.state, signal);
         let outcome = self.receive(bits);
-        if self.report.was != State::Running || outcome.is_err() || self.detour {
-            return self.end_with(outcome, late);
+        if self.h_frame.was != State::Running || outcome.is_err() || self.detour {
+            return self.end_with(outcome);
         }
+        self.edge_ns = 0;
         self.present = self.following();
         self.go_on()
     }
 
     /// What [`end_with`](Self::end_with) comes to on a running link that is free running: the usual end.
-    fn go_on(&mut self) -> &Report {
+    fn go_on(&mut self) -> &HFrame {
         self.counters.frames = self.counters.frames.wrapping_add(1);
-        self.report.restarted = None;
-        self.report.state = State::Running;
-        self.report.tail = Tail { trailer: Trailer::AfterAnswer, stuffing: Stuffing::MIN };
-        self.report.long_free = self.requester.is_long_free();
-        self.report.short_free = self.requester.is_short_free();
-        &self.report
+        self.h_frame.restarted = None;
+        self.h_frame.state = State::Running;
+        self.h_frame.tail = Tail { trailer: Trailer::AfterAnswer, stuffing: Stuffing::MIN };
+        self.h_frame.long_free = self.requester.is_long_free();
+        self.h_frame.short_free = self.requester.is_short_free();
+        &self.h_frame
     }
 
-    fn end_with(&mut self, outcome: Result<(), Cause>, late: Option<i16>) -> &Report {
-        let asked = core::mem::take(&mut self.restart).then_some(Cause::Requested);
+    fn end_with(&mut self, outcome: Result<(), RestartReason>) -> &HFrame {
+        let late = self.late.take();
+        let asked = core::mem::take(&mut self.restart).then_some(RestartReason::Requested);
         let restarted = self.lost.take().or(asked).or(outcome.err());
+        self.edge_ns = self.present.head.extra().map_or(0, Extra::low_ns);
         self.detour = self.sync.is_some();
         if let Some(next) = self.ahead.take() {
             // The next head is out: a restart comes after its frame.
@@ -315,31 +352,31 @@ impl Master {
             return self.go_on();
         }
         self.counters.frames = self.counters.frames.wrapping_add(1);
-        let was = self.report.was;
+        let was = self.h_frame.was;
         if restarted.is_some() {
             self.begin_again();
         }
         let next = self.sync.as_mut().map(|sync| sync.next(late));
-        self.report.tail = Tail {
+        self.h_frame.tail = Tail {
             trailer: trailer(was, restarted),
             stuffing: next.map_or_else(|| self.search_time(was, restarted), |next| next.stuffing),
         };
         self.prepare(was, next.map(|next| next.extra), restarted.is_some());
-        self.report.restarted = restarted;
-        self.report.state = self.state;
-        self.report.long_free = self.state == State::Running && self.requester.is_long_free();
-        self.report.short_free = self.state == State::Running && self.requester.is_short_free();
-        &self.report
+        self.h_frame.restarted = restarted;
+        self.h_frame.state = self.state;
+        self.h_frame.long_free = self.state == State::Running && self.requester.is_long_free();
+        self.h_frame.short_free = self.state == State::Running && self.requester.is_short_free();
+        &self.h_frame
     }
 
-    fn receive(&mut self, bits: u64) -> Result<(), Cause> {
+    fn receive(&mut self, bits: u64) -> Result<(), RestartReason> {
         match self.state {
             State::Start if bits != TEST_PATTERN => {
-                return Err(Cause::Learn(if bits == u64::MAX >> 3 { Error::NoEdge } else { Error::Pattern }));
+                return Err(RestartReason::Learn(if bits == u64::MAX >> 3 { Error::NoEdge } else { Error::Pattern }));
             }
-            State::Learn | State::Check if bits != TEST_PATTERN => return Err(Cause::Pattern),
+            State::Learn | State::Check if bits != TEST_PATTERN => return Err(RestartReason::Pattern),
             State::Reset | State::Sync | State::Start | State::Learn | State::Check => {}
-            State::IdReq => self.identify(bits).map_err(Cause::Identifier)?,
+            State::IdReq => self.identify(bits).map_err(RestartReason::Identifier)?,
             State::WaitVsync => return self.wait_for_vsync(bits),
             State::Running => return self.run(bits),
         }
@@ -356,36 +393,37 @@ impl Master {
         let bits = id.check()?;
         self.encoder = Some(id);
         self.link = Link::new(&self.dialect, bits);
-        self.report.encoder = Some(id);
+        self.h_frame.encoder = Some(id);
         Ok(())
     }
 
-    fn wait_for_vsync(&mut self, bits: u64) -> Result<(), Cause> {
+    fn wait_for_vsync(&mut self, bits: u64) -> Result<(), RestartReason> {
         let answer = Answer::from_bits(self.dialect.rule, bits);
         self.done = self.done.saturating_add(1);
         if answer.parameter().is_ok_and(EncoderByte::vsync) {
             (self.state, self.done) = (State::Running, 0);
-            self.report.doubtful = self.dialect.doubt_at_lock;
+            self.latch();
+            self.h_frame.doubtful = self.dialect.doubt_at_lock;
         } else if self.dialect.vsync_frames != 0 && self.done >= self.dialect.vsync_frames {
-            return Err(Cause::NoVsync);
+            return Err(RestartReason::NoVsync);
         }
         Ok(())
     }
 
     /// Begins the start-up again. Messages under way end.
     fn begin_again(&mut self) {
-        let was = self.report.was;
+        let was = self.h_frame.was;
         self.counters.restarts = self.counters.restarts.wrapping_add(1);
         (self.state, self.done) = (State::Reset, 0);
         self.link = Link::new(&self.dialect, PositionBits::MAX);
         self.encoder = None;
-        let finished = self.report.finished;
+        let finished = self.h_frame.finished;
         let dropped = self.requester.drop_all();
-        self.report = Report {
+        self.h_frame = HFrame {
             was,
-            signal: self.report.signal,
+            signal: self.h_frame.signal,
             finished: Finished { short: finished.short.or(dropped.short), long: finished.long.or(dropped.long) },
-            ..Report::START
+            ..HFrame::START
         };
     }
 }

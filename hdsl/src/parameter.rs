@@ -1,7 +1,5 @@
 //! The parameters channel: one byte an H-frame in each direction.
 
-use core::fmt;
-
 use crate::error::Error;
 
 servowire_core::number! {
@@ -36,7 +34,7 @@ pub enum MasterSymbol {
 
 impl MasterSymbol {
     /// The five bits.
-    pub const fn bits(self) -> u8 {
+    pub const fn code(self) -> u8 {
         match self {
             Self::Data(nibble) => nibble.get(),
             Self::Idle => 0x10,
@@ -50,12 +48,9 @@ impl MasterSymbol {
         }
     }
 
-    /// From bits 4:0 of `bits`.
-    ///
-    /// # Errors
-    /// [`Error::UndefinedSymbol`] for 11h..18h.
-    pub const fn from_bits(bits: u8) -> Result<Self, Error> {
-        Ok(match bits & 31 {
+    /// From the five bits; `None` for 11h..18h and for more than five bits.
+    pub const fn from_code(code: u8) -> Option<Self> {
+        Some(match code {
             nibble @ 0..=15 => Self::Data(Nibble::truncate(nibble)),
             0x10 => Self::Idle,
             0x19 => Self::Sync,
@@ -65,8 +60,13 @@ impl MasterSymbol {
             0x1d => Self::IdReq,
             0x1e => Self::Init,
             0x1f => Self::Reset,
-            symbol => return Err(Error::UndefinedSymbol { symbol }),
+            _ => return None,
         })
+    }
+
+    /// Whether it belongs to the start-up: frames that are answered by the test pattern or the identifier.
+    pub const fn is_start_up(self) -> bool {
+        matches!(self, Self::Start | Self::Learn | Self::Check | Self::IdReq)
     }
 
     /// Whether an encoder answers a frame with this symbol.
@@ -98,11 +98,21 @@ impl ParameterByte {
         Self(raw)
     }
 
-    /// The byte for a symbol, reserved bit 0.
-    pub const fn of(symbol: MasterSymbol, first: bool, msync: bool) -> Self {
-        let first = if first { Self::FIRST } else { 0 };
-        let msync = if msync { Self::MSYNC } else { 0 };
-        Self(symbol.bits() | first | msync)
+    /// The byte for a symbol, its other bits 0.
+    pub const fn of(symbol: MasterSymbol) -> Self {
+        Self(symbol.code())
+    }
+
+    /// With FIRST.
+    #[must_use]
+    pub const fn with_first(self) -> Self {
+        Self(self.0 | Self::FIRST)
+    }
+
+    /// With MSYNC.
+    #[must_use]
+    pub const fn with_msync(self) -> Self {
+        Self(self.0 | Self::MSYNC)
     }
 
     /// The byte.
@@ -125,7 +135,10 @@ impl ParameterByte {
     /// # Errors
     /// [`Error::UndefinedSymbol`].
     pub const fn symbol(self) -> Result<MasterSymbol, Error> {
-        MasterSymbol::from_bits(self.0)
+        match MasterSymbol::from_code(self.0 & 31) {
+            Some(symbol) => Ok(symbol),
+            None => Err(Error::UndefinedSymbol { symbol: self.0 & 31 }),
+        }
     }
 }
 
@@ -148,7 +161,7 @@ pub enum EncoderSymbol {
 
 impl EncoderSymbol {
     /// The five bits.
-    pub const fn bits(self) -> u8 {
+    pub const fn code(self) -> u8 {
         match self {
             Self::Data(nibble) => nibble.get(),
             Self::Idle => 0x10,
@@ -158,18 +171,15 @@ impl EncoderSymbol {
         }
     }
 
-    /// From bits 4:0 of `bits`.
-    ///
-    /// # Errors
-    /// [`Error::UndefinedSymbol`].
-    pub const fn from_bits(bits: u8) -> Result<Self, Error> {
-        Ok(match bits & 31 {
+    /// From the five bits; `None` for a code without a meaning.
+    pub const fn from_code(code: u8) -> Option<Self> {
+        Some(match code {
             nibble @ 0..=15 => Self::Data(Nibble::truncate(nibble)),
             0x10 => Self::Idle,
             0x15 => Self::Snak,
             0x1a => Self::Lnak,
             0x1f => Self::Init,
-            symbol => return Err(Error::UndefinedSymbol { symbol }),
+            _ => return None,
         })
     }
 }
@@ -196,9 +206,15 @@ impl EncoderByte {
         Self(raw)
     }
 
-    /// The byte for a symbol.
-    pub const fn of(symbol: EncoderSymbol, vsync: bool) -> Self {
-        Self(symbol.bits() | if vsync { Self::VSYNC } else { 0 })
+    /// The byte for a symbol, its other bits 0.
+    pub const fn of(symbol: EncoderSymbol) -> Self {
+        Self(symbol.code())
+    }
+
+    /// With VSYNC.
+    #[must_use]
+    pub const fn with_vsync(self) -> Self {
+        Self(self.0 | Self::VSYNC)
     }
 
     /// The byte.
@@ -216,62 +232,50 @@ impl EncoderByte {
     /// # Errors
     /// [`Error::UndefinedSymbol`].
     pub const fn symbol(self) -> Result<EncoderSymbol, Error> {
-        EncoderSymbol::from_bits(self.0)
+        match EncoderSymbol::from_code(self.0 & 31) {
+            Some(symbol) => Ok(symbol),
+            None => Err(Error::UndefinedSymbol { symbol: self.0 & 31 }),
+        }
     }
 }
 
-impl fmt::Display for MasterSymbol {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(match self {
-            Self::Data(nibble) => return write!(f, "{:X}", nibble.get()),
-            Self::Idle => "IDLE",
-            Self::Sync => "SYNC",
-            Self::Start => "START",
-            Self::Learn => "LEARN",
-            Self::Check => "CHECK",
-            Self::IdReq => "IDREQ",
-            Self::Init => "INIT",
-            Self::Reset => "RESET",
-        })
-    }
+servowire_core::one_line!(MasterSymbol {
+    Self::Data(nibble) => "{:X}", nibble.get();
+    Self::Idle => "IDLE";
+    Self::Sync => "SYNC";
+    Self::Start => "START";
+    Self::Learn => "LEARN";
+    Self::Check => "CHECK";
+    Self::IdReq => "IDREQ";
+    Self::Init => "INIT";
+    Self::Reset => "RESET";
+});
+
+servowire_core::one_line!(EncoderSymbol {
+    Self::Data(nibble) => "{:X}", nibble.get();
+    Self::Idle => "IDLE";
+    Self::Snak => "SNAK";
+    Self::Lnak => "LNAK";
+    Self::Init => "INIT";
+});
+
+/// The name of a bit that is set.
+const fn flag(set: bool, name: &'static str) -> &'static str {
+    if set { name } else { "" }
 }
 
-impl fmt::Display for EncoderSymbol {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(match self {
-            Self::Data(nibble) => return write!(f, "{:X}", nibble.get()),
-            Self::Idle => "IDLE",
-            Self::Snak => "SNAK",
-            Self::Lnak => "LNAK",
-            Self::Init => "INIT",
-        })
-    }
-}
+// The symbol, or the five bits of one without a meaning.
+servowire_core::one_line!(ParameterByte {
+    byte if byte.symbol().is_err() =>
+        "{:02X}h{}{}", byte.0 & 31, flag(byte.first(), " FIRST"), flag(byte.msync(), " MSYNC");
+    byte =>
+        "{}{}{}", byte.symbol().unwrap_or(MasterSymbol::Idle), flag(byte.first(), " FIRST"), flag(byte.msync(), " MSYNC");
+});
 
-/// The symbol, or the five bits of one without a meaning.
-fn write_symbol<S: fmt::Display>(f: &mut fmt::Formatter<'_>, symbol: Result<S, Error>, raw: u8) -> fmt::Result {
-    match symbol {
-        Ok(symbol) => symbol.fmt(f),
-        Err(_) => write!(f, "{:02X}h", raw & 31),
-    }
-}
-
-impl fmt::Display for ParameterByte {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write_symbol(f, self.symbol(), self.raw())?;
-        f.write_str(if self.first() { " FIRST" } else { "" })?;
-        f.write_str(if self.msync() { " MSYNC" } else { "" })
-    }
-}
-
-impl fmt::Display for EncoderByte {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write_symbol(f, self.symbol(), self.raw())?;
-        f.write_str(if self.vsync() { " VSYNC" } else { "" })
-    }
-}
-
-servowire_core::format_as_displayed!(MasterSymbol, EncoderSymbol, ParameterByte, EncoderByte);
+servowire_core::one_line!(EncoderByte {
+    byte if byte.symbol().is_err() => "{:02X}h{}", byte.0 & 31, flag(byte.vsync(), " VSYNC");
+    byte => "{}{}", byte.symbol().unwrap_or(EncoderSymbol::Idle), flag(byte.vsync(), " VSYNC");
+});
 
 #[cfg(test)]
 mod tests {
@@ -299,12 +303,17 @@ mod tests {
             let byte = ParameterByte::new(raw);
             assert_eq!((byte.first(), byte.msync()), (raw >= 128, raw & 64 != 0));
             if let Ok(symbol) = byte.symbol() {
-                assert_eq!(ParameterByte::of(symbol, byte.first(), byte.msync()).raw(), raw & 0xdf);
+                let mut made = ParameterByte::of(symbol);
+                made = if raw & 0x80 != 0 { made.with_first() } else { made };
+                made = if raw & 0x40 != 0 { made.with_msync() } else { made };
+                assert_eq!(made.raw(), raw & 0xdf);
                 master += 1;
             }
             let byte = EncoderByte::new(raw);
             if let Ok(symbol) = byte.symbol() {
-                assert_eq!(EncoderByte::of(symbol, byte.vsync()).raw(), raw & 0x9f);
+                let made = EncoderByte::of(symbol);
+                let made = if raw & 0x80 != 0 { made.with_vsync() } else { made };
+                assert_eq!(made.raw(), raw & 0x9f);
                 encoder += 1;
             }
         }

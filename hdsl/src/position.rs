@@ -3,7 +3,8 @@
 
 use crate::acceleration::DeltaDelta;
 use crate::doubt::Doubt;
-use crate::encoder_id::PositionBits;
+use crate::encoder_id::{EncoderId, PositionBits};
+use crate::evidence::{Evidence, Sample};
 
 const POSITION: u64 = 0xff_ffff_ffff;
 const VELOCITY: u32 = 0xff_ffff;
@@ -29,7 +30,7 @@ pub enum PositionRule {
     /// * The estimate wraps at 16 bits, and goes into the velocity with its sign only if bit 10 is set. While nothing
     ///   wraps both rules estimate the same.
     /// * The alignment subtracts positions as 40-bit numbers whatever the width. If the position passes the end of its
-    ///   range in the V-frame of phase 0, the velocity is then wrong by an eighth of the range, and so is the position
+    ///   range in the V-frame of stage 0, the velocity is then wrong by an eighth of the range, and so is the position
     ///   of seven frames in eight, without any flag.
     Ti,
 }
@@ -40,7 +41,7 @@ pub enum PositionRule {
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "arbitrary", derive(arbitrary::Arbitrary))]
 #[repr(u8)]
-pub enum Phase {
+pub enum AlignmentStage {
     /// 0: the position is not known; the next safe position is taken over.
     #[default]
     Position = 0,
@@ -50,6 +51,25 @@ pub enum Phase {
     Settle = 2,
     /// 3: aligned; every safe position is compared.
     Check = 3,
+}
+
+/// The registers of a receiver that belong to the fast position, by the vendor's names.
+///
+/// They hold numbers whether these are right or not. What may be used comes from [`PositionTracker::evidence`].
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "arbitrary", derive(arbitrary::Arbitrary))]
+pub struct PositionRegisters {
+    /// POS4..POS0, 40 bits. By [`PositionRule::Ti`] it can have bits above the width of the encoder right after stages 0 and
+    /// 1; the next step takes them away.
+    pub pos: u64,
+    /// VEL2..VEL0 with their sign: the velocity in steps an H-frame, 24 bits.
+    pub vel: i32,
+    /// ACC_ERR_CNT without its limit: unusable words since the last usable one.
+    pub acc_err_cnt: u32,
+    /// The flag POS: an estimated value is in the position, or the last check failed.
+    pub pos_flag: bool,
 }
 
 /// Integrates the acceleration words to velocity and position.
@@ -63,7 +83,7 @@ pub enum Phase {
 /// for _ in 0..3 {
 ///     tracker.step(DeltaDelta::new(2));
 /// }
-/// assert_eq!((tracker.velocity(), tracker.position()), (6, 1000 + 2 + 4 + 6));
+/// assert_eq!((tracker.registers().vel, tracker.registers().pos), (6, 1000 + 2 + 4 + 6));
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -79,12 +99,12 @@ pub struct PositionTracker {
     last: i16,
     /// Differences between successive values, the newest first.
     history: [i16; 5],
-    /// Position of phase 0, from which phase 1 learns the error of the velocity.
+    /// Position of stage 0, from which stage 1 learns the error of the velocity.
     reference: u64,
-    phase: Phase,
+    stage: AlignmentStage,
     unreliable: bool,
     errors: u32,
-    /// Safe positions in a row that agreed with the tracked one, in phases 2 and 3.
+    /// Safe positions in a row that agreed with the tracked one, in stages 2 and 3.
     agreed: u8,
 }
 
@@ -106,7 +126,7 @@ impl PositionTracker {
             last: 0,
             history: [0; 5],
             reference: 0,
-            phase: Phase::Position,
+            stage: AlignmentStage::Position,
             unreliable: false,
             errors: 0,
             agreed: 0,
@@ -130,7 +150,7 @@ impl PositionTracker {
     #[cold]
     fn without_value(&mut self) -> (i32, i16) {
         self.errors = self.errors.saturating_add(1);
-        self.phase = Phase::Position;
+        self.stage = AlignmentStage::Position;
         self.agreed = 0;
         self.unreliable = true;
         self.estimate()
@@ -177,15 +197,15 @@ impl PositionTracker {
     /// `safe` is the position at the sampling instant before the V-frame, 40 bits.
     ///
     /// ```text
-    ///  phase 0   pos = safe + relative; x = pos                             -> 1
-    ///  phase 1   x = safe - x is 8 times the error of the velocity:
+    ///  stage 0   pos = safe + relative; x = pos                             -> 1
+    ///  stage 1   x = safe - x is 8 times the error of the velocity:
     ///            vel += x / 8; pos += 2 x                                   -> 2
-    ///  phase 2                                                              -> 3
-    ///  phase 3   safe + relative = pos: aligned; otherwise                  -> 0
+    ///  stage 2                                                              -> 3
+    ///  stage 3   safe + relative = pos: aligned; otherwise                  -> 0
     /// ```
     ///
     /// One V-frame tells the speed modulo an eighth of the range only. The alignment is right for speeds of up to a
-    /// sixteenth of the range a frame; see [`fast`](Self::fast).
+    /// sixteenth of the range a frame; see [`evidence`](Self::evidence).
     pub fn align(&mut self, safe: u64) {
         let relative = i64::from(self.relative);
         let mask = match self.rule {
@@ -194,31 +214,37 @@ impl PositionTracker {
         };
         let expected = safe.wrapping_add_signed(relative) & mask;
         let agrees = (expected ^ self.position) & self.mask == 0;
-        match self.phase {
-            Phase::Position => {
+        match self.stage {
+            AlignmentStage::Position => {
                 self.position = expected;
                 self.reference = expected;
-                self.phase = Phase::Velocity;
+                self.stage = AlignmentStage::Velocity;
             }
-            Phase::Velocity => {
+            AlignmentStage::Velocity => {
                 let x = sign_extend(safe.wrapping_sub(self.reference), mask);
                 let [v0, v1, v2, v3, ..] = (x >> 3).to_le_bytes();
                 self.velocity = self.velocity.wrapping_add(u32::from_le_bytes([v0, v1, v2, v3])) & VELOCITY;
                 self.position = self.position.wrapping_add_signed(x.wrapping_mul(2)) & mask;
-                self.phase = Phase::Settle;
+                self.stage = AlignmentStage::Settle;
             }
-            Phase::Settle => self.phase = Phase::Check,
-            Phase::Check if agrees => self.unreliable = false,
-            Phase::Check => {
-                self.phase = Phase::Position;
+            AlignmentStage::Settle => self.stage = AlignmentStage::Check,
+            AlignmentStage::Check if agrees => self.unreliable = false,
+            AlignmentStage::Check => {
+                self.stage = AlignmentStage::Position;
                 self.unreliable = true;
             }
         }
-        self.agreed = match self.phase {
-            Phase::Check if agrees => self.agreed.saturating_add(1),
+        self.agreed = match self.stage {
+            AlignmentStage::Check if agrees => self.agreed.saturating_add(1),
             _ => 0,
         };
         self.relative = 0;
+    }
+
+    /// What a control loop may use, with the sign that this encoder's positions have. `sampled_ns` is when the sampling edge of
+    /// the last H-frame was.
+    pub fn evidence(&self, id: EncoderId, sampled_ns: u64) -> Evidence {
+        Evidence(self.fast().map(|(raw, velocity)| Sample { position: id.position(raw), velocity, sampled_ns }))
     }
 
     /// Position and velocity, if they may be used.
@@ -232,7 +258,7 @@ impl PositionTracker {
     ///
     /// # Errors
     /// [`Doubt::Estimated`], [`Doubt::Alignment`], [`Doubt::Speed`].
-    pub fn fast(&self) -> Result<(u64, i32), Doubt> {
+    pub(crate) fn fast(&self) -> Result<(u64, i32), Doubt> {
         let velocity = self.velocity();
         let limit =
             1_i32.checked_shl(u32::from(self.bits.get()).saturating_sub(4)).map_or(FASTEST, |limit| limit.min(FASTEST));
@@ -249,7 +275,7 @@ impl PositionTracker {
 
     /// In place of [`align`](Self::align) when the V-frame brought no safe position.
     pub const fn no_safe_position(&mut self) {
-        self.phase = Phase::Position;
+        self.stage = AlignmentStage::Position;
         self.agreed = 0;
         self.unreliable = true;
         self.relative = 0;
@@ -260,30 +286,25 @@ impl PositionTracker {
         self.unreliable = true;
     }
 
-    /// The position, usable or not. By [`PositionRule::Ti`] it can have bits above the width of the encoder right after
-    /// phases 0 and 1; the next step takes them away.
-    pub const fn position(&self) -> u64 {
-        self.position
+    /// What the registers of the receiver show, usable or not: for register maps, not for a control loop.
+    #[inline]
+    pub const fn registers(&self) -> PositionRegisters {
+        PositionRegisters {
+            pos: self.position,
+            vel: self.velocity(),
+            acc_err_cnt: self.errors,
+            pos_flag: self.unreliable,
+        }
     }
 
-    /// The velocity in steps an H-frame, 24 bits, usable or not.
-    pub const fn velocity(&self) -> i32 {
+    /// The velocity with its sign.
+    const fn velocity(&self) -> i32 {
         i32::from_le_bytes((self.velocity << 8).to_le_bytes()) >> 8
     }
 
     /// How far the alignment is.
-    pub const fn phase(&self) -> Phase {
-        self.phase
-    }
-
-    /// The flag POS: an estimated value is in the position, or the last check failed.
-    pub const fn is_unreliable(&self) -> bool {
-        self.unreliable
-    }
-
-    /// ACC_ERR_CNT: unusable words since the last usable one.
-    pub const fn errors(&self) -> u32 {
-        self.errors
+    pub const fn stage(&self) -> AlignmentStage {
+        self.stage
     }
 }
 
@@ -330,9 +351,9 @@ mod tests {
         fn aligns_in_four_v_frames(start in 0..1_i64 << 31, speed in -3000..3000_i64, a in prop::collection::vec(-40..40_i64, 48)) {
             let mut tracker = PositionTracker::new(PositionBits::new(40).unwrap());
             let end = follow(&mut tracker, start + (1 << 33), &a, speed, |_| false);
-            prop_assert_eq!(tracker.phase(), Phase::Check);
-            prop_assert!(!tracker.is_unreliable());
-            prop_assert_eq!(tracker.position(), end.rem_euclid(1 << 40) as u64);
+            prop_assert_eq!(tracker.stage(), AlignmentStage::Check);
+            prop_assert!(!tracker.registers().pos_flag);
+            prop_assert_eq!(tracker.registers().pos, end.rem_euclid(1 << 40) as u64);
         }
 
         /// A lost word is found out and repaired, at the latest in the second round: the first learns a wrong error
@@ -341,8 +362,8 @@ mod tests {
         fn repairs_after_lost_words(speed in -3000..3000_i64, a in prop::collection::vec(-40..40_i64, 128), lost in 33..48_usize) {
             let mut tracker = PositionTracker::new(PositionBits::new(36).unwrap());
             let end = follow(&mut tracker, 1 << 33, &a, speed, |k| k == lost || k == lost + 2);
-            prop_assert!(!tracker.is_unreliable());
-            prop_assert_eq!(tracker.position(), end.rem_euclid(1 << 40) as u64 & tracker.bits.mask());
+            prop_assert!(!tracker.registers().pos_flag);
+            prop_assert_eq!(tracker.registers().pos, end.rem_euclid(1 << 40) as u64 & tracker.bits.mask());
         }
 
         /// As long as nothing wraps both estimators agree.
@@ -358,7 +379,7 @@ mod tests {
                 if matches!(one.last, -1024 | 1023) {
                     return Ok(());
                 }
-                prop_assert_eq!((one.position(), one.velocity()), (two.position(), two.velocity()));
+                prop_assert_eq!((one.registers().pos, one.registers().vel), (two.registers().pos, two.registers().vel));
             }
         }
 
@@ -367,10 +388,10 @@ mod tests {
         fn the_clamped_estimate_has_eleven_bits(a in prop::collection::vec(prop::option::of(-1024..=1023_i16), 60)) {
             let mut tracker = PositionTracker::new(PositionBits::MAX);
             for value in a {
-                let before = tracker.velocity();
+                let before = tracker.registers().vel;
                 tracker.step(value.map(|v| DeltaDelta::new(v).unwrap()));
-                prop_assert!((-1024..=1023).contains(&(tracker.velocity() - before)));
-                prop_assert_eq!(tracker.errors() > 0, value.is_none());
+                prop_assert!((-1024..=1023).contains(&(tracker.registers().vel - before)));
+                prop_assert_eq!(tracker.registers().acc_err_cnt > 0, value.is_none());
             }
         }
     }
@@ -455,9 +476,9 @@ mod tests {
             let mut tracker = PositionTracker::new(PositionBits::MAX);
             for k in 1..100 {
                 tracker.step(if (20..30).contains(&k) { None } else { dd(a) });
-                assert_eq!(i64::from(tracker.velocity()), a * k);
+                assert_eq!(i64::from(tracker.registers().vel), a * k);
             }
-            assert!(tracker.is_unreliable());
+            assert!(tracker.registers().pos_flag);
         }
     }
 
@@ -468,10 +489,10 @@ mod tests {
             tracker.step(dd(0));
             if frame % 8 == 7 {
                 tracker.align(0xff_ffff);
-                assert_eq!(tracker.position(), 0xff_ffff);
+                assert_eq!(tracker.registers().pos, 0xff_ffff);
             }
         }
         tracker.no_safe_position();
-        assert_eq!((tracker.phase(), tracker.is_unreliable()), (Phase::Position, true));
+        assert_eq!((tracker.stage(), tracker.registers().pos_flag), (AlignmentStage::Position, true));
     }
 }

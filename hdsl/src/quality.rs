@@ -119,12 +119,12 @@ impl QualityMonitor {
     ///
     /// let content = Content {
     ///     vertical: Character::data(0),
-    ///     parameter: EncoderByte::of(EncoderSymbol::Idle, true),
+    ///     parameter: EncoderByte::of(EncoderSymbol::Idle).with_vsync(),
     ///     pipe: Character::control(Control::K30_7),
     ///     acceleration: Some(DeltaDelta::ZERO),
     ///     secondary: Character::control(Control::K28_0),
     /// };
-    /// let (bits, _) = content.emit(RunningDisparity::Minus);
+    /// let bits = content.emit(RunningDisparity::Minus).bits;
     /// let mut quality = QualityMonitor::new(QualityRule::Sick);
     /// // VSYNC in its place: 8 + 1. Too early: - 6.
     /// assert_eq!(quality.count_answer(7, &Answer::from_bits(Rule::Strict, bits)), 0);

@@ -16,7 +16,7 @@
 //! memory[0x10..0x15].copy_from_slice(&[0, 0x12, 0x34, 0x56, 0x78]); // POS
 //! memory[0x50..0x52].copy_from_slice(&[0x18, 0x02]); // ONLINE_STATUS_D
 //! let map = Registers::from_bytes(&Dialect::TI, memory);
-//! assert_eq!((map.link(), map.quality(), map.position()), (true, 15, 0x1234_5678));
+//! assert_eq!((map.link(), map.quality(), map.pos()), (true, 15, 0x1234_5678));
 //! assert_eq!(map.online_d().to_string(), "FIX1 POS FREL");
 //! assert!(map.online_d().contains(OnlineD::POS));
 //! ```
@@ -29,9 +29,9 @@ mod pipe;
 mod write;
 
 pub use bus::{BusError, RegisterBus, RemoteReceiver};
-pub use flags::{Event, EventS, Interrupts, Online1, Online2, OnlineD, Status2};
+pub use flags::{Event, EventS, Events, Interrupts, Online1, Online2, OnlineD, Status2};
 pub use map::Register;
-pub use pipe::PipeFifo;
+pub use pipe::{PipeFifo, PipeReading};
 
 use crate::dialect::Dialect;
 
@@ -144,25 +144,26 @@ impl Registers {
         qm & 15
     }
 
-    /// Fast position, 40 bits, usable or not: see ONLINE_STATUS_D, and [`Master::fast`](crate::master::Master::fast) for one
-    /// that is.
-    pub fn position(&self) -> u64 {
+    /// POS4..POS0: the fast position, 40 bits, usable or not: see ONLINE_STATUS_D, and
+    /// [`Master::fast`](crate::master::Master::fast) for one to use.
+    pub fn pos(&self) -> u64 {
         self.get40(Register::Pos)
     }
 
-    /// Speed in steps an H-frame.
-    pub fn velocity(&self) -> i32 {
+    /// VEL2..VEL0: speed in steps an H-frame, usable or not.
+    pub fn vel(&self) -> i32 {
         let [a, b, c] = self.get(Register::Vel);
         i32::from_be_bytes([a, b, c, 0]) >> 8
     }
 
-    /// Safe position 1, 40 bits: the last good one.
-    pub fn safe_position(&self) -> u64 {
+    /// VPOS4..VPOS0: safe position 1, 40 bits: the last good one, of whatever age. For one to use there is
+    /// [`Master::safe`](crate::master::Master::safe).
+    pub fn vpos(&self) -> u64 {
         self.get40(Register::VPos)
     }
 
-    /// Safe position 2, 40 bits. Its relation to safe position 1 depends on the encoder.
-    pub fn safe_position_2(&self) -> u64 {
+    /// VPOS24..VPOS20: safe position 2, 40 bits. Its relation to safe position 1 depends on the encoder.
+    pub fn vpos2(&self) -> u64 {
         self.get40(Register::VPos2)
     }
 
@@ -199,8 +200,8 @@ impl Registers {
     }
 
     /// Takes the events that happened and clears them.
-    pub fn take_events(&mut self) -> (Event, EventS) {
-        let events = (self.event(), self.event_s());
+    pub fn take_events(&mut self) -> Events {
+        let events = Events { drive: self.event(), safe: self.event_s() };
         self.put(Register::EventH, [0, 0]);
         self.put(Register::EventS, [0]);
         events
@@ -243,7 +244,7 @@ mod tests {
         let mut map = Registers::new(&Dialect::TI);
         map.put40(Register::Pos, 0x12_3456_789a);
         map.put(Register::Vel, [0xff, 0xff, 0xfe]);
-        assert_eq!((map.position(), map.velocity()), (0x12_3456_789a, -2));
+        assert_eq!((map.pos(), map.vel()), (0x12_3456_789a, -2));
         assert_eq!(map.byte(0x14), Some(0x9a));
         map.put(Register::EventH, [0x08, 0]);
         map.put(Register::EventS, [0x01]);
@@ -258,6 +259,6 @@ mod tests {
         let bytes = core::array::from_fn(|at| at as u8);
         let map = Registers::from_bytes(&Dialect::TI, bytes);
         assert_eq!(map.as_bytes(), &bytes);
-        assert_eq!((map.position(), map.safe_position_2()), (0x10_1112_1314, 0x47_4849_4a4b));
+        assert_eq!((map.pos(), map.vpos2()), (0x10_1112_1314, 0x47_4849_4a4b));
     }
 }

@@ -129,6 +129,16 @@ pub struct Alignment {
     pub delay: Delay,
 }
 
+/// An answer taken out of its samples.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct SampledAnswer {
+    /// The 61 bits, the first in bit 0.
+    pub bits: u64,
+    /// Where the edges were.
+    pub edges: EdgeWatch,
+}
+
 impl Alignment {
     /// Finds the sampling index from the first falling edge, and the delay from the place of the test pattern.
     ///
@@ -160,7 +170,7 @@ impl Alignment {
     pub fn bits(self, samples: &[u8]) -> Result<u64, Error> {
         match samples.first_chunk() {
             Some(window) => Ok(Words::of_bytes(window, self.delay).bits(self)),
-            None => self.read(samples).map(|(bits, _)| bits),
+            None => self.read(samples).map(|read| read.bits),
         }
     }
 
@@ -168,7 +178,7 @@ impl Alignment {
     ///
     /// # Errors
     /// [`Error::Truncated`] if the samples end before the answer.
-    pub fn read(self, samples: &[u8]) -> Result<(u64, EdgeWatch), Error> {
+    pub fn read(self, samples: &[u8]) -> Result<SampledAnswer, Error> {
         match samples.first_chunk() {
             Some(window) => Ok(self.read_window(window)),
             None => self.read_short(samples),
@@ -176,18 +186,18 @@ impl Alignment {
     }
 
     /// The same of a whole window.
-    pub(crate) fn read_window(self, samples: &[u8; WINDOW]) -> (u64, EdgeWatch) {
+    pub(crate) fn read_window(self, samples: &[u8; WINDOW]) -> SampledAnswer {
         Words::of_bytes(samples, self.delay).read(self)
     }
 
     /// The same of words of four bytes each, the first byte in the low bits: for processors that load whole words only.
-    pub fn read_words(self, samples: &[u32; WINDOW / 4]) -> (u64, EdgeWatch) {
+    pub fn read_words(self, samples: &[u32; WINDOW / 4]) -> SampledAnswer {
         Words::of_words(samples, self.delay).read(self)
     }
 
     /// The same of fewer bytes than a window has, which may be enough for a short delay.
     #[cold]
-    fn read_short(self, samples: &[u8]) -> Result<(u64, EdgeWatch), Error> {
+    fn read_short(self, samples: &[u8]) -> Result<SampledAnswer, Error> {
         room(samples, self.delay)?;
         let mut window = [0xff; WINDOW];
         for (to, from) in window.iter_mut().zip(samples) {
@@ -201,7 +211,7 @@ impl Alignment {
     /// # Errors
     /// [`Error::Truncated`] if the samples end before the answer.
     pub fn rssi(self, samples: &[u8]) -> Result<Rssi, Error> {
-        self.read(samples).map(|(_, watch)| watch.rssi())
+        self.read(samples).map(|read| read.edges.rssi())
     }
 }
 
@@ -303,13 +313,14 @@ mod tests {
                     }
                     let bits = (slow >> from) as u64 & (u64::MAX >> 3);
                     let place = Alignment { index, delay };
-                    assert_eq!((place.read(&samples), place.bits(&samples)), (Ok((bits, watch)), Ok(bits)));
+                    let read = SampledAnswer { bits, edges: watch };
+                    assert_eq!((place.read(&samples), place.bits(&samples)), (Ok(read), Ok(bits)));
                     // Not one byte more than the answer is needed.
                     let short = &samples[..from + 61];
-                    assert_eq!((place.read(short), place.bits(short)), (Ok((bits, watch)), Ok(bits)));
+                    assert_eq!((place.read(short), place.bits(short)), (Ok(read), Ok(bits)));
                     assert!(place.read(&samples[..from + 60]).is_err() && place.bits(&samples[..from + 60]).is_err());
                     let words = core::array::from_fn(|k| u32::from_le_bytes(*samples[4 * k..].first_chunk().unwrap()));
-                    assert_eq!(place.read_words(&words), (bits, watch));
+                    assert_eq!(place.read_words(&words), read);
                 }
             }
         }

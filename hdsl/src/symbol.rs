@@ -102,48 +102,38 @@ impl RunningDisparity {
     }
 }
 
-/// The twelve special characters of the code.
+/// A character as it goes out.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-#[cfg_attr(feature = "arbitrary", derive(arbitrary::Arbitrary))]
-#[repr(u8)]
-#[allow(non_camel_case_types, reason = "the names of the code")]
-#[allow(missing_docs, reason = "the name says which")]
-pub enum Control {
-    K28_0 = 0x1c,
-    K28_1 = 0x3c,
-    K28_2 = 0x5c,
-    K28_3 = 0x7c,
-    K28_4 = 0x9c,
-    K28_5 = 0xbc,
-    K28_6 = 0xdc,
-    K28_7 = 0xfc,
-    K23_7 = 0xf7,
-    /// Safe channel 2 has no position (SICK manual, safe position 2).
-    K27_7 = 0xfb,
-    /// The encoder has no value: acceleration and safe channel 1 (SICK manual).
-    K29_7 = 0xfd,
-    /// The pipe channel has no data in this frame (SICK manual, PIPE_D).
-    K30_7 = 0xfe,
+pub struct Encoded {
+    /// The word.
+    pub word: Word,
+    /// The running disparity after it.
+    pub disparity: RunningDisparity,
 }
 
-impl Control {
-    /// All twelve.
-    pub const ALL: [Self; 12] = [
-        Self::K28_0,
-        Self::K28_1,
-        Self::K28_2,
-        Self::K28_3,
-        Self::K28_4,
-        Self::K28_5,
-        Self::K28_6,
-        Self::K28_7,
-        Self::K23_7,
-        Self::K27_7,
-        Self::K29_7,
-        Self::K30_7,
-    ];
+servowire_core::codes! {
+    /// The twelve special characters of the code.
+    #[allow(non_camel_case_types, reason = "the names of the code")]
+    #[allow(missing_docs, reason = "the name says which")]
+    pub enum Control: u8 {
+        K28_0 = 0x1c => "K28.0",
+        K28_1 = 0x3c => "K28.1",
+        K28_2 = 0x5c => "K28.2",
+        K28_3 = 0x7c => "K28.3",
+        K28_4 = 0x9c => "K28.4",
+        K28_5 = 0xbc => "K28.5",
+        K28_6 = 0xdc => "K28.6",
+        K28_7 = 0xfc => "K28.7",
+        K23_7 = 0xf7 => "K23.7",
+        /// Safe channel 2 has no position (SICK manual, safe position 2).
+        K27_7 = 0xfb => "K27.7",
+        /// The encoder has no value: acceleration and safe channel 1 (SICK manual).
+        K29_7 = 0xfd => "K29.7",
+        /// The pipe channel has no data in this frame (SICK manual, PIPE_D).
+        K30_7 = 0xfe => "K30.7",
+    }
 }
 
 /// A data byte or a special character.
@@ -167,7 +157,7 @@ impl Character {
     }
 
     /// Byte and kind; `None` if `k` is set and there is no such special character.
-    pub fn new(byte: u8, k: bool) -> Option<Self> {
+    pub(crate) fn new(byte: u8, k: bool) -> Option<Self> {
         match (k, CONTROLS.contains(&byte)) {
             (false, _) => Some(Self::data(byte)),
             (true, true) => Some(Self(u16::from(byte) | SPECIAL)),
@@ -185,16 +175,17 @@ impl Character {
         self.0 & SPECIAL != 0
     }
 
-    /// The word in the column of `rd`, and the running disparity after it.
+    /// The word in the column of `rd`.
     ///
     /// ```
     /// use hdsl::symbol::{Character, RunningDisparity};
-    /// let (word, after) = Character::data(0x00).encode(RunningDisparity::Minus);
+    /// let coded = Character::data(0x00).encode(RunningDisparity::Minus);
+    /// let (word, after) = (coded.word, coded.disparity);
     /// assert_eq!(word.get(), 0b00_1011_1001); // 100111 0100 on the line
     /// assert_eq!(after, RunningDisparity::Minus);
     /// ```
     #[expect(clippy::indexing_slicing, reason = "a byte is below 256, a column below 2")]
-    pub fn encode(self, rd: RunningDisparity) -> (Word, RunningDisparity) {
+    pub fn encode(self, rd: RunningDisparity) -> Encoded {
         let column = usize::from(rd == RunningDisparity::Plus);
         let bits = if self.is_control() {
             let place = CONTROLS.iter().position(|c| *c == self.byte()).unwrap_or(0);
@@ -203,7 +194,7 @@ impl Character {
             DATA[column][usize::from(self.byte())]
         };
         let word = Word::truncate(bits);
-        (word, rd.after(word))
+        Encoded { word, disparity: rd.after(word) }
     }
 }
 
@@ -221,15 +212,10 @@ impl From<Character> for (u8, bool) {
     }
 }
 
-/// `D28.5`, `K28.5`.
-impl fmt::Display for Character {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let kind = if self.is_control() { 'K' } else { 'D' };
-        write!(f, "{kind}{}.{}", self.byte() & 31, self.byte() >> 5)
-    }
-}
-
-servowire_core::format_as_displayed!(Character);
+// `D28.5`, `K28.5`.
+servowire_core::one_line!(Character {
+    character => "{}{}.{}", if character.is_control() { 'K' } else { 'D' }, character.byte() & 31, character.byte() >> 5;
+});
 
 /// How a receiver judges a word.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
@@ -360,6 +346,15 @@ impl Reading {
     /// Whether the word is this special character.
     pub const fn is(self, control: Control) -> bool {
         self.entry.0 & (0xff | SPECIAL | INVALID) == control as u16 | SPECIAL
+    }
+}
+
+/// As its word.
+#[cfg(feature = "serde")]
+#[cfg_attr(docsrs, doc(cfg(feature = "serde")))]
+impl serde::Serialize for Reading {
+    fn serialize<S: serde::Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        self.word.serialize(serializer)
     }
 }
 

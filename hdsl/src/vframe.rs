@@ -16,9 +16,11 @@ use crate::symbol::{Control, Reading, Rule, Word};
 /// VPOS of a V-frame is the position at the sampling instant of the last H-frame before it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct SafeBlock {
     bytes: [u8; 8],
     /// Of the bytes before the CRC.
+    #[cfg_attr(feature = "serde", serde(skip))]
     crc: RunningCrc16,
     /// Words taken in order.
     len: u8,
@@ -69,8 +71,8 @@ impl SafeBlock {
         status
     }
 
-    /// The position as received, good or not.
-    pub const fn raw_position(self) -> u64 {
+    /// VPOS or VPOS2 as received, good or not.
+    pub const fn raw_vpos(self) -> u64 {
         let [_, p4, p3, p2, p1, p0, ..] = self.bytes;
         u64::from_be_bytes([0, 0, 0, p4, p3, p2, p1, p0])
     }
@@ -93,16 +95,17 @@ impl SafeBlock {
 
     /// Whether words and CRC are good; whether the encoder has a position is another matter.
     pub fn is_sound(self) -> bool {
-        matches!(self.position(), Ok(_) | Err(Error::PositionInvalid { .. }))
+        matches!(self.vpos(), Ok(_) | Err(Error::PositionInvalid { .. }))
     }
 
-    /// The safe position, 40 bits.
+    /// VPOS or VPOS2, 40 bits, as a number without a sign. For a position to use there is
+    /// [`Master::safe`](crate::master::Master::safe).
     ///
     /// # Errors
     /// In this order: [`Error::Truncated`] before all eight words are there, [`Error::InvalidWord`] for the first bad word,
     /// [`Error::Crc`], [`Error::PositionInvalid`] if the encoder has no position: five K29.7 in channel 1,
     /// K27.7 first in channel 2. By [`Rule::Reduced`] the value of the top byte alone decides that.
-    pub const fn position(self) -> Result<u64, Error> {
+    pub const fn vpos(self) -> Result<u64, Error> {
         if self.len != 8 {
             return Err(Error::Truncated { got: self.len as u16, want: 8 });
         }
@@ -117,13 +120,14 @@ impl SafeBlock {
             let [_, mark, ..] = self.bytes;
             return Err(Error::PositionInvalid { mark });
         }
-        Ok(self.raw_position())
+        Ok(self.raw_vpos())
     }
 }
 
 /// Both safe channels of a V-frame.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct VFrame {
     /// Vertical channel. Its status byte is SUMMARY: bit n sums up the encoder status register ENC_STn.
     pub safe1: SafeBlock,
@@ -161,15 +165,17 @@ mod tests {
 
     fn answers(block1: [Character; 8], block2: [Character; 8]) -> [u64; 8] {
         let mut rd = RunningDisparity::Minus;
+        let idle = EncoderByte::of(EncoderSymbol::Idle);
         core::array::from_fn(|at| {
             let content = Content {
                 vertical: block1[at],
-                parameter: EncoderByte::of(EncoderSymbol::Idle, at == 7),
+                parameter: if at == 7 { idle.with_vsync() } else { idle },
                 pipe: Character::control(Control::K30_7),
                 acceleration: Some(DeltaDelta::ZERO),
                 secondary: block2[at],
             };
-            let (bits, after) = content.emit(rd);
+            let coded = content.emit(rd);
+            let (bits, after) = (coded.bits, coded.disparity);
             rd = after;
             bits
         })
@@ -197,15 +203,15 @@ mod tests {
             let mut bits = answers(b1, b2);
             let read = |bits: &[u64; 8]| VFrame::of(Rule::Strict, &bits.map(|b| Answer::from_bits(Rule::Strict, b)));
             let good = read(&bits);
-            prop_assert_eq!((good.safe1.position(), good.safe1.status()), (Ok(p1), summary));
-            prop_assert_eq!((good.safe2.position(), good.safe2.status()), (Ok(p2), 0x9c));
+            prop_assert_eq!((good.safe1.vpos(), good.safe1.status()), (Ok(p1), summary));
+            prop_assert_eq!((good.safe2.vpos(), good.safe2.status()), (Ok(p2), 0x9c));
             bits[frame] ^= 1 << (bit + if second { 51 } else { 0 });
             let bad = read(&bits);
             let (hit, other) = if second { (bad.safe2, bad.safe1) } else { (bad.safe1, bad.safe2) };
-            prop_assert!(other.position().is_ok());
+            prop_assert!(other.vpos().is_ok());
             // A flip of one line bit changes up to five bits of one byte: in the covered bytes the CRC sees it, and
             // a changed kind (data or special) of the same value changes nothing.
-            if let Ok(position) = hit.position() {
+            if let Ok(position) = hit.vpos() {
                 prop_assert_eq!(position, if second { p2 } else { p1 });
             }
         }
@@ -220,12 +226,12 @@ mod tests {
         let bits = answers(b1, b2);
         for rule in [Rule::Strict, Rule::Reduced] {
             let frame = VFrame::of(rule, &bits.map(|b| Answer::from_bits(rule, b)));
-            assert_eq!(frame.safe1.position(), Err(Error::PositionInvalid { mark: 0xfd }));
-            assert_eq!(frame.safe2.position(), Err(Error::PositionInvalid { mark: 0xfb }));
+            assert_eq!(frame.safe1.vpos(), Err(Error::PositionInvalid { mark: 0xfd }));
+            assert_eq!(frame.safe2.vpos(), Err(Error::PositionInvalid { mark: 0xfb }));
         }
         // A signed position may begin with FDh: by the tables that is no mark.
         let bits = answers(block(Character::data(0), data(0xfd_0000_0001)), b2);
-        let frame = |rule| VFrame::of(rule, &bits.map(|b| Answer::from_bits(rule, b))).safe1.position();
+        let frame = |rule| VFrame::of(rule, &bits.map(|b| Answer::from_bits(rule, b))).safe1.vpos();
         assert_eq!(frame(Rule::Strict), Ok(0xfd_0000_0001));
         assert_eq!(frame(Rule::Reduced), Err(Error::PositionInvalid { mark: 0xfd }));
     }

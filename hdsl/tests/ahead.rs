@@ -3,10 +3,13 @@
 #![allow(clippy::cast_possible_wrap, clippy::cast_sign_loss)]
 
 use hdsl::device::Device;
-use hdsl::master::{Cause, Master, Report, State};
+use hdsl::master::{HFrame, Master, RestartReason, State};
 use hdsl::message::{LongRequest, RemoteRegister, ResourceAddress, ShortRequest};
 use hdsl::sync::Es;
-use hdsl::{Dialect, Doubt, EncoderId, Error, MasterSymbol};
+use hdsl::{Dialect, Doubt, EncoderId, Error, MasterSymbol, Policy, Sample};
+
+/// A free-running frame.
+const FRAME_NS: u64 = 11_520;
 
 /// Both ends; heads leave early where they can.
 struct Early {
@@ -15,6 +18,7 @@ struct Early {
     position: i64,
     /// Bits that are inverted in the answers.
     damage: u64,
+    sampled_ns: u64,
     /// Frames whose head left early.
     heads: u32,
 }
@@ -22,21 +26,26 @@ struct Early {
 impl Early {
     fn new(dialect: Dialect) -> Self {
         let device = Device::new(EncoderId::new(0x00153).unwrap());
-        Self { master: Master::new(dialect), device, position: 1 << 20, damage: 0, heads: 0 }
+        Self { master: Master::new(dialect), device, position: 1 << 20, damage: 0, sampled_ns: 0, heads: 0 }
     }
 
-    fn frame(&mut self) -> Report {
+    fn frame(&mut self) -> HFrame {
         self.position += 321;
         let head = self.master.transmission().head;
-        let bits = self.device.answer(head.bits(), self.position as u64).unwrap_or(u64::MAX);
+        let bits = self.device.hear(head.bits(), self.position as u64).map_or(u64::MAX, |answer| answer.bits);
         let next = self.master.ahead();
         assert_eq!(self.master.ahead(), next);
-        let report = *self.master.finish_bits(bits ^ self.damage, None, None);
+        self.sampled_ns += FRAME_NS;
+        let report = *self.master.hear_bits(bits ^ self.damage, None, self.sampled_ns + 9_707);
         if let Some(next) = next {
             self.heads += 1;
             assert_eq!(self.master.transmission(), next);
         }
         report
+    }
+
+    fn fast(&self) -> Result<Sample, Doubt> {
+        self.master.fast().at(self.sampled_ns, Policy::new(0))
     }
 
     fn lock(dialect: Dialect) -> Self {
@@ -58,8 +67,10 @@ fn the_heads_are_the_same() {
         for _ in 0..300 {
             assert_eq!(both.master.transmission(), plain.transmission());
             let report = both.frame();
-            let bits = device.answer(plain.transmission().head.bits(), both.position as u64).unwrap_or(u64::MAX);
-            assert_eq!(report, *plain.finish_bits(bits, None, None));
+            let bits = device
+                .hear(plain.transmission().head.bits(), both.position as u64)
+                .map_or(u64::MAX, |answer| answer.bits);
+            assert_eq!(report, *plain.hear_bits(bits, None, both.sampled_ns + 9_707));
         }
         // All of RX0..RX7, from the lock on.
         assert_eq!(both.heads, 300 - 61);
@@ -71,7 +82,7 @@ fn the_heads_are_the_same() {
 fn messages_and_positions() {
     for dialect in [Dialect::SICK, Dialect::TI] {
         let mut both = Early::lock(dialect);
-        both.device.resources.set_register(RemoteRegister::PING, 0x5a);
+        both.device.resources_mut().set_register(RemoteRegister::PING, 0x5a);
         for _ in 0..20 {
             both.master.start_short(ShortRequest::Read(RemoteRegister::PING)).unwrap();
             both.master.start_long(LongRequest::read_name(ResourceAddress::RESOLUTN)).unwrap();
@@ -80,9 +91,10 @@ fn messages_and_positions() {
                 let report = both.frame();
                 short = short.or(report.finished.short);
                 long = long.or(report.finished.long);
-                assert_eq!(both.master.fast().map(|fast| (fast.position, fast.velocity)), Ok((both.position, 321)));
-                let safe = both.master.safe().unwrap();
-                assert_eq!(safe.position, both.position - 321 * i64::from(safe.age));
+                assert_eq!(both.fast().map(|fast| (fast.position(), fast.velocity())), Ok((both.position, 321)));
+                let safe = both.master.safe().at(both.sampled_ns, Policy::new(15 * FRAME_NS)).unwrap();
+                let age = (both.sampled_ns - safe.sampled_ns()) / FRAME_NS;
+                assert_eq!(safe.position(), both.position - 321 * age as i64);
             }
             assert_eq!(short.unwrap().unwrap().data, Some(0x5a));
             assert_eq!(long.unwrap().unwrap().result.unwrap().as_bytes(), b"RESOLUTN");
@@ -101,21 +113,22 @@ fn a_loss_while_the_next_frame_is_out() {
     // The head of this frame had left.
     let present = both.master.transmission();
     assert_eq!((present.head.byte().symbol(), present.lead_in), (Ok(MasterSymbol::Idle), 0));
-    assert_eq!((both.master.state(), both.master.report().restarted), (State::Running, None));
-    assert_eq!((both.master.fast(), both.master.safe()), (Err(Doubt::NoLink), Err(Doubt::NoLink)));
+    assert_eq!((both.master.state(), both.master.h_frame().restarted), (State::Running, None));
+    let safe = both.master.safe().at(both.sampled_ns, Policy::new(u64::MAX)).err();
+    assert_eq!((both.fast().err(), safe), (Some(Doubt::NoLink), Some(Doubt::NoLink)));
     assert_eq!(both.master.start_short(ShortRequest::Read(RemoteRegister::PING)), Err(Error::NotLocked));
     assert_eq!((both.master.ahead(), both.master.counters().restarts), (None, 0));
     // A good answer changes nothing.
     both.damage = 0;
     let report = both.frame();
-    assert_eq!((report.restarted, both.master.state()), (Some(Cause::Quality), State::Reset));
+    assert_eq!((report.restarted, both.master.state()), (Some(RestartReason::Quality), State::Reset));
     let present = both.master.transmission();
     assert_eq!((present.head.byte().symbol(), present.lead_in), (Ok(MasterSymbol::Reset), 16));
     assert_eq!(both.master.counters().restarts, 1);
     for _ in 0..150 {
         let _ = both.frame();
     }
-    assert_eq!(both.master.fast().map(|fast| fast.position), Ok(both.position));
+    assert_eq!(both.fast().map(|fast| fast.position()), Ok(both.position));
     assert_eq!(both.master.counters().restarts, 1);
 }
 
@@ -125,17 +138,17 @@ fn a_restart_while_the_next_frame_is_out() {
     for out in [true, false] {
         let mut both = Early::lock(Dialect::SICK);
         assert!(both.master.ahead().is_some());
-        let _ = both.master.finish_bits(u64::MAX, None, None);
+        let _ = both.master.hear_bits(u64::MAX, None, 0);
         if out {
             let _ = both.master.ahead();
         }
         both.master.request_restart();
         assert_eq!(both.master.ahead().is_some(), out);
-        let first = both.master.finish_bits(0, None, None).restarted;
-        assert_eq!(first, (!out).then_some(Cause::Requested));
+        let first = both.master.hear_bits(0, None, 0).restarted;
+        assert_eq!(first, (!out).then_some(RestartReason::Requested));
         if out {
-            let second = both.master.finish_bits(0, None, None).restarted;
-            assert_eq!(second, Some(Cause::Requested));
+            let second = both.master.hear_bits(0, None, 0).restarted;
+            assert_eq!(second, Some(RestartReason::Requested));
         }
         assert_eq!((both.master.state(), both.master.counters().restarts), (State::Reset, 1));
     }

@@ -6,9 +6,9 @@ mod bench;
 
 use bench::Bench;
 use hdsl::cable::Disturbance;
-use hdsl::device::{Complement, Disparity, Overload};
+use hdsl::device::{Acknowledgement, BadHead, Behaviour, Complement, Disparity, Fault, Overload};
 use hdsl::frame::Extra;
-use hdsl::master::{Cause, Master, State};
+use hdsl::master::{Master, RestartReason, State};
 use hdsl::message::{Access, Data, Length, LongRequest, RemoteRegister, ResourceAddress, ResourceError, ShortRequest};
 use hdsl::registers::{BusError, Event, Interrupts, Online1, Online2, OnlineD, Register, RegisterBus, RemoteReceiver};
 use hdsl::symbol::RunningDisparity;
@@ -30,7 +30,7 @@ fn comes_up_at_every_length() {
             bench.frames(4 * 8);
             assert!(bench.aligned());
             let map = bench.map;
-            assert_eq!((map.velocity(), map.quality(), map.link()), (-1234, 15, true));
+            assert_eq!((map.vel(), map.quality(), map.link()), (-1234, 15, true));
             assert_eq!(map.get::<1>(Register::Delay)[0] & 15, delay, "{metres} m");
             for _ in 0..1000 {
                 let _ = bench.frame();
@@ -47,7 +47,7 @@ fn a_cable_that_is_too_long() {
     let mut bench = Bench::on_cable(Dialect::SICK, 130);
     bench.frames(18);
     let report = bench.frame();
-    assert!(matches!(report.restarted, Some(Cause::Learn(Error::PatternNotFound { .. }))));
+    assert!(matches!(report.restarted, Some(RestartReason::Learn(Error::PatternNotFound { .. }))));
     assert_eq!(bench.master.state(), State::Reset);
 }
 
@@ -82,7 +82,7 @@ fn noise_loses_the_link_and_silence_regains_it() {
                 break;
             }
         }
-        assert_eq!(lost, Some(Cause::Quality));
+        assert_eq!(lost, Some(RestartReason::Quality));
         let map = bench.map;
         assert!(
             map.online_d().contains(OnlineD::PRST)
@@ -110,7 +110,7 @@ fn moderate_noise_gives_no_wrong_safe_position() {
             // That of the sampling edge before the V-frame, which ended one frame ago; a head that the encoder could
             // not read makes the V-frame longer.
             shown += 1;
-            let age = bench.position - bench.map.safe_position() as i64;
+            let age = bench.position - bench.map.vpos() as i64;
             assert!(age % 5 == 0 && (9 * 5..=16 * 5).contains(&age), "{age}");
         }
     }
@@ -146,7 +146,7 @@ fn messages_while_the_position_runs() {
         }
         let map = bench.map;
         assert_eq!(&map.get::<8>(Register::PcBuffer), b"MOTOR 42");
-        assert_eq!(bench.device.resources.register(RemoteRegister::PING), 0xa5);
+        assert_eq!(bench.device.resources().register(RemoteRegister::PING), 0xa5);
     }
 }
 
@@ -173,10 +173,10 @@ fn a_refused_long_message() {
 /// What the encoder can do wrong, and what the receiver makes of it.
 #[test]
 fn faults_of_the_encoder() {
-    let faulty = |dialect, change: fn(&mut hdsl::device::Faults)| {
+    let faulty = |dialect, fault| {
         let mut bench = Bench::on_cable(dialect, 0);
         bench.lock();
-        change(&mut bench.device.faults);
+        bench.device.set_fault(fault);
         let mut cause = None;
         for _ in 0..100 {
             cause = cause.or(bench.frame().restarted);
@@ -184,36 +184,36 @@ fn faults_of_the_encoder() {
         (cause, bench.map)
     };
     for dialect in DIALECTS {
-        assert_eq!(faulty(dialect, |f| f.silent = true).0, Some(Cause::Quality));
-        assert_eq!(faulty(dialect, |f| f.no_vsync = true).0, Some(Cause::Quality));
-        let (cause, map) = faulty(dialect, |f| f.no_position = true);
+        assert_eq!(faulty(dialect, Fault::Silent).0, Some(RestartReason::Quality));
+        assert_eq!(faulty(dialect, Fault::NoVsync).0, Some(RestartReason::Quality));
+        let (cause, map) = faulty(dialect, Fault::NoPosition);
         assert!(cause.is_none() && map.online_1().contains(Online1::VPOS) && map.online_d().contains(OnlineD::POS));
-        let (cause, map) = faulty(dialect, |f| f.no_position_2 = true);
+        let (cause, map) = faulty(dialect, Fault::NoPosition2);
         assert!(cause.is_none() && map.online_2().contains(Online2::VPOS2) && !map.online_d().contains(OnlineD::POS));
-        let (_, map) = faulty(dialect, |f| f.bad_crc = true);
+        let (_, map) = faulty(dialect, Fault::BadCrc);
         assert!(map.event_s().contains(hdsl::registers::EventS::SCE));
     }
     // The manual counts a wrong CRC of channel 2, the SDK counts TEST2.
-    assert_eq!(faulty(Dialect::SICK, |f| f.bad_crc_2 = true).0, Some(Cause::Quality));
-    let (cause, map) = faulty(Dialect::TI, |f| f.bad_crc_2 = true);
+    assert_eq!(faulty(Dialect::SICK, Fault::BadCrc2).0, Some(RestartReason::Quality));
+    let (cause, map) = faulty(Dialect::TI, Fault::BadCrc2);
     assert!(cause.is_none() && map.online_2().contains(Online2::SCE2));
-    let (cause, map) = faulty(Dialect::SICK, |f| f.test_2 = true);
+    let (cause, map) = faulty(Dialect::SICK, Fault::Test2);
     assert!(cause.is_none() && map.online_2().contains(Online2::SUM2));
-    assert_eq!(faulty(Dialect::TI, |f| f.test_2 = true).0, Some(Cause::Quality));
+    assert_eq!(faulty(Dialect::TI, Fault::Test2).0, Some(RestartReason::Quality));
     // No acceleration: the SDK restarts after 31 words, the manual stops counting there.
-    assert_eq!(faulty(Dialect::TI, |f| f.no_acceleration = true).0, Some(Cause::AccelerationErrors));
-    let (cause, map) = faulty(Dialect::SICK, |f| f.no_acceleration = true);
+    assert_eq!(faulty(Dialect::TI, Fault::NoAcceleration).0, Some(RestartReason::AccelerationErrors));
+    let (cause, map) = faulty(Dialect::SICK, Fault::NoAcceleration);
     assert_eq!((cause, map.get::<1>(Register::AccErrCnt)), (None, [31]));
 }
 
 #[test]
 fn an_encoder_without_vsync() {
     let mut bench = Bench::on_cable(Dialect::SICK, 0);
-    bench.device.faults.no_vsync = true;
+    bench.device.set_fault(Fault::NoVsync);
     bench.frames(53 + 15);
-    assert_eq!(bench.frame().restarted, Some(Cause::NoVsync));
+    assert_eq!(bench.frame().restarted, Some(RestartReason::NoVsync));
     let mut bench = Bench::on_cable(Dialect::TI, 0);
-    bench.device.faults.no_vsync = true;
+    bench.device.set_fault(Fault::NoVsync);
     bench.frames(1000);
     assert_eq!((bench.master.state(), bench.master.counters().restarts), (State::WaitVsync, 0));
 }
@@ -223,7 +223,7 @@ fn an_encoder_that_is_not_supported() {
     for id in [0x00150, 0x80153, 0x001f3] {
         let mut bench = Bench::new(Dialect::SICK, id, Disturbance::metres(0));
         bench.frames(52);
-        assert_eq!(bench.frame().restarted, Some(Cause::Identifier(Error::UnsupportedEncoder { id })));
+        assert_eq!(bench.frame().restarted, Some(RestartReason::Identifier(Error::UnsupportedEncoder { id })));
     }
 }
 
@@ -233,7 +233,7 @@ fn too_few_samples_change_nothing() {
     bench.lock();
     let before = bench.master;
     for len in 0..72 {
-        let refused = bench.master.finish(&[0xff; 72][..len], None);
+        let refused = bench.master.hear(&[0xff; 72][..len], 0);
         assert_eq!(refused, Err(Error::Truncated { got: len as u16, want: 72 }));
         assert_eq!(bench.master, before);
     }
@@ -289,7 +289,7 @@ fn whatever_the_encoder_makes_of_open_points() {
     for combination in 0..256_u32 {
         let on = |bit: u32| combination >> bit & 1 == 1;
         let mut bench = Bench::on_cable(DIALECTS[usize::from(on(0))], 10);
-        let behaviour = &mut bench.device.behaviour;
+        let mut behaviour = Behaviour::new();
         behaviour.overload = if on(1) { Overload::NoValue } else { Overload::Saturated };
         behaviour.complement = if on(2) { Complement::Twos } else { Complement::Ones };
         behaviour.second_shift = if on(2) { 8 } else { 0 };
@@ -297,9 +297,10 @@ fn whatever_the_encoder_makes_of_open_points() {
         behaviour.reserved_bits = if on(4) { 3 } else { 0 };
         behaviour.sync_frames = if on(5) { 16 } else { 1 };
         behaviour.first_place = if on(6) { 5 } else { 0 };
-        behaviour.stalls_on_bad_head = on(7);
-        behaviour.acknowledges_with_length = on(6);
-        behaviour.latency = if on(7) { 300 } else { 0 };
+        behaviour.bad_head = if on(7) { BadHead::Stalls } else { BadHead::Counts };
+        behaviour.acknowledgement = if on(6) { Acknowledgement::RepeatsLength } else { Acknowledgement::Empty };
+        behaviour.latency_frames = if on(7) { 300 } else { 0 };
+        bench.device.set_behaviour(behaviour);
         bench.speed = -321;
         bench.lock();
         bench.master.start_short(ShortRequest::Write(RemoteRegister::PING, 0x5a)).unwrap();
@@ -311,16 +312,17 @@ fn whatever_the_encoder_makes_of_open_points() {
             let report = bench.frame();
             written = written.or(report.finished.long);
             answered |= report.finished.short.is_some_and(|result| result.is_ok());
-            assert_eq!(bench.master.fast().map(|fast| (fast.position, fast.velocity)), Ok((bench.position, -321)));
-            let safe = bench.master.safe().unwrap();
-            assert_eq!(safe.position, bench.position + 321 * i64::from(safe.age), "{combination}");
+            let fast = bench.fast().unwrap();
+            assert_eq!((fast.position(), fast.velocity()), (bench.position, -321));
+            let (safe, age) = bench.safe().unwrap();
+            assert_eq!(safe, bench.position + 321 * age as i64, "{combination}");
             if let Some(frame) = report.v_frame {
                 assert_eq!(monitor.v_frame(&frame), Channel2Findings::empty());
             }
         }
         assert_eq!(written.map(|end| end.map(|answer| answer.result)), Some(Ok(Ok(Data::NONE))), "{combination}");
         // A latency beyond 64 frames is a message that is not answered in time, and sent again.
-        assert!(answered != on(7) || bench.device.resources.register(RemoteRegister::PING) == 0x5a, "{combination}");
+        assert!(answered != on(7) || bench.device.resources().register(RemoteRegister::PING) == 0x5a, "{combination}");
     }
 }
 
@@ -329,7 +331,7 @@ fn whatever_the_encoder_makes_of_open_points() {
 fn an_overload_is_no_wrong_position() {
     for overload in [Overload::Saturated, Overload::NoValue] {
         let mut bench = Bench::on_cable(Dialect::SICK, 0);
-        bench.device.behaviour.overload = overload;
+        bench.device.set_behaviour(Behaviour::new().with_overload(overload));
         bench.lock();
         let mut positions = [bench.position; 16];
         for frame in 0..400 {
@@ -338,12 +340,12 @@ fn an_overload_is_no_wrong_position() {
             let _ = bench.frame();
             positions.rotate_right(1);
             positions[0] = bench.position;
-            if let Ok(safe) = bench.master.safe() {
-                assert_eq!(safe.position, positions[usize::from(safe.age)], "{frame}");
+            if let Ok((safe, age)) = bench.safe() {
+                assert_eq!(safe, positions[age], "{frame}");
             }
             if overload == Overload::NoValue {
-                let fast = bench.master.fast();
-                assert!(fast.is_err() || fast.unwrap().position == bench.position, "{frame}");
+                let fast = bench.fast();
+                assert!(fast.is_err() || fast.unwrap().position() == bench.position, "{frame}");
             }
         }
     }
@@ -353,13 +355,13 @@ fn an_overload_is_no_wrong_position() {
 #[test]
 fn an_impolite_encoder() {
     let mut bench = Bench::on_cable(Dialect::SICK, 0);
-    bench.device.behaviour.sync_frames = 17;
+    bench.device.set_behaviour(Behaviour::new().with_sync_frames(17));
     bench.frames(18);
-    assert_eq!(bench.frame().restarted, Some(Cause::Learn(Error::NoEdge)));
+    assert_eq!(bench.frame().restarted, Some(RestartReason::Learn(Error::NoEdge)));
 
     let mut bench = Bench::on_cable(Dialect::SICK, 0);
     bench.lock();
-    bench.device.behaviour.forgets_every = 2;
+    bench.device.set_behaviour(Behaviour::new().with_forgets_every(2));
     for _ in 0..6 {
         bench.master.start_short(ShortRequest::Read(RemoteRegister::PING)).unwrap();
         let answered = (0..200).any(|_| bench.frame().finished.short.is_some_and(|result| result.is_ok()));
@@ -370,19 +372,18 @@ fn an_impolite_encoder() {
 /// What the monitor of channel 2 says about each fault of it.
 #[test]
 fn channel_2_is_watched() {
-    type Change = fn(&mut hdsl::device::Faults);
-    let cases: [(Change, Channel2Findings); 6] = [
-        (|_| {}, Channel2Findings::empty()),
-        (|f| f.test_2 = true, Channel2Findings::TEST2),
-        (|f| f.error_2 = true, Channel2Findings::ERR2),
-        (|f| f.stuck_toggle = true, Channel2Findings::TOG2),
-        (|f| f.no_position_2 = true, Channel2Findings::VPOS2),
-        (|f| f.bad_crc_2 = true, Channel2Findings::STALE),
+    let cases = [
+        (Fault::None, Channel2Findings::empty()),
+        (Fault::Test2, Channel2Findings::TEST2),
+        (Fault::Error2, Channel2Findings::ERR2),
+        (Fault::StuckToggle, Channel2Findings::TOG2),
+        (Fault::NoPosition2, Channel2Findings::VPOS2),
+        (Fault::BadCrc2, Channel2Findings::STALE),
     ];
-    for (change, want) in cases {
+    for (fault, want) in cases {
         let mut bench = Bench::on_cable(Dialect::SICK, 0);
         bench.lock();
-        change(&mut bench.device.faults);
+        bench.device.set_fault(fault);
         let mut monitor = Channel2Monitor::new();
         let mut all = Channel2Findings::empty();
         for _ in 0..40 {
@@ -403,13 +404,13 @@ fn signed_positions() {
     bench.speed = -7;
     while bench.position > -5000 {
         let _ = bench.frame();
-        if let Ok(fast) = bench.master.fast() {
-            assert_eq!(fast.position, bench.position);
+        if let Ok(fast) = bench.fast() {
+            assert_eq!(fast.position(), bench.position);
         }
     }
-    let safe = bench.master.safe().unwrap();
-    assert_eq!(safe.position, bench.position + 7 * i64::from(safe.age));
-    assert!(bench.master.fast().unwrap().position < 0 && safe.position < 0);
+    let (safe, age) = bench.safe().unwrap();
+    assert_eq!(safe, bench.position + 7 * age as i64);
+    assert!(bench.fast().unwrap().position() < 0 && safe < 0);
 }
 
 /// The registers of a bench as a bus to a receiver elsewhere: every access lets some frames pass.
@@ -457,8 +458,8 @@ fn a_receiver_behind_a_bus() {
         assert_eq!(refused, Some(BusError::Link(Error::Resource { error: ResourceError::NOT_THERE })));
 
         let map = remote.registers().unwrap();
-        assert_eq!((map.velocity(), map.quality(), map.link()), (4, 15, true));
+        assert_eq!((map.vel(), map.quality(), map.link()), (4, 15, true));
         let _ = remote.take_events().unwrap();
-        assert!(!remote.take_events().unwrap().0.intersects(Event::FREL | Event::PRST));
+        assert!(!remote.take_events().unwrap().drive.intersects(Event::FREL | Event::PRST));
     }
 }

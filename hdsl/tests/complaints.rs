@@ -6,14 +6,15 @@ mod bench;
 
 use bench::Bench;
 use hdsl::cable::Disturbance;
+use hdsl::device::Fault;
 use hdsl::frame::{Stuffing, Tail, Trailer};
-use hdsl::master::{Cause, Master, State};
+use hdsl::master::{Master, RestartReason, State};
 use hdsl::message::{Access, Length, LongRequest, RemoteRegister, ResourceAddress, ShortRequest};
 use hdsl::registers::{Event, EventS, Online1, OnlineD, Register};
 use hdsl::rssi::Rssi;
 use hdsl::symbol::Character;
 use hdsl::sync::{CoreClock, Es, Startup, Synchroniser};
-use hdsl::{Dialect, EncoderId, Phase};
+use hdsl::{AlignmentStage, Dialect, EncoderId};
 
 const DIALECTS: [Dialect; 2] = [Dialect::SICK, Dialect::TI];
 
@@ -119,7 +120,7 @@ fn position_flag_during_the_first_alignment() {
             assert_eq!(bench.map.online_d().contains(OnlineD::POS), shown);
         }
         bench.frames(1);
-        assert_eq!(bench.master.phase(), Phase::Check);
+        assert_eq!(bench.master.stage(), AlignmentStage::Check);
         assert!(!bench.map.online_d().contains(OnlineD::POS));
     }
 }
@@ -132,9 +133,9 @@ fn wrong_crc_stays_until_a_right_one() {
     while bench.master.frame() != 0 {
         let _ = bench.frame();
     }
-    bench.device.faults.bad_crc = true;
+    bench.device.set_fault(Fault::BadCrc);
     bench.frames(8);
-    bench.device.faults.bad_crc = false;
+    bench.device.set_fault(Fault::None);
     for frame in 0..9 {
         let _ = bench.frame();
         // The block's result is shown one frame after its end.
@@ -238,7 +239,7 @@ fn all_forty_bits() {
         bench.frames(100);
         assert!(bench.aligned());
         // The safe position of a V-frame that began some frames ago.
-        let age = bench.position as u64 - bench.map.safe_position();
+        let age = bench.position as u64 - bench.map.vpos();
         assert!(age <= 20 << 9 && age % (1 << 9) == 0);
     }
 }
@@ -251,7 +252,7 @@ fn standstill() {
         bench.lock();
         for _ in 0..100_000 {
             let _ = bench.frame();
-            assert!(bench.aligned() && bench.map.velocity() == 0);
+            assert!(bench.aligned() && bench.map.vel() == 0);
         }
     }
 }
@@ -284,7 +285,7 @@ fn pipe_data() {
     assert_eq!(bench.map.get(Register::PipeD), [0xfe]);
     assert_eq!(bench.frame().pipe_character(), None);
     for byte in 0..=255 {
-        bench.device.pipe = Some(byte);
+        bench.device.set_pipe(Some(byte));
         assert_eq!(bench.frame().pipe_character(), Some(Ok(Character::data(byte))));
         assert_eq!(bench.map.get(Register::PipeD), [byte]);
     }
@@ -292,7 +293,7 @@ fn pipe_data() {
     let mut bench = Bench::on_cable(Dialect::SICK, 0);
     bench.lock();
     for byte in 0..10 {
-        bench.device.pipe = Some(byte);
+        bench.device.set_pipe(Some(byte));
         let _ = bench.frame();
     }
     let mut read = || [bench.map.read(0x2d), bench.map.read(0x2e)].map(Option::unwrap);
@@ -337,7 +338,7 @@ fn protocol_reset() {
         let _ = bench.map.take_events();
         bench.write(register, 0x80);
         let report = bench.frame();
-        assert_eq!(report.restarted, Some(Cause::Requested));
+        assert_eq!(report.restarted, Some(RestartReason::Requested));
         let map = bench.map;
         assert_eq!((map.get(register), map.link()), ([0], false));
         assert!(map.event().contains(Event::PRST) && map.event_s().contains(EventS::PRST));
@@ -382,7 +383,7 @@ fn stuffing_while_searching() {
         assert_eq!(bench.frame().tail.stuffing.get(), 0);
     }
     let mut bench = Bench::on_cable(Dialect::TI, 0);
-    bench.device.faults.silent = true;
+    bench.device.set_fault(Fault::Silent);
     bench.frames(18);
     assert_eq!(bench.frame().tail.stuffing.get(), 16);
 }
@@ -405,7 +406,7 @@ fn summary_events_and_their_mask() {
         bench.lock();
         let _ = bench.map.take_events();
         bench.write(Register::MaskSum, mask);
-        bench.device.resources.set_register(RemoteRegister::new(0x42).unwrap(), 0x10);
+        bench.device.resources_mut().set_register(RemoteRegister::new(0x42).unwrap(), 0x10);
         bench.frames(20);
         let map = bench.map;
         assert_eq!(map.get(Register::SafeSum), [0x04]);

@@ -3,7 +3,7 @@
 #![allow(missing_docs, clippy::arithmetic_side_effects, clippy::unwrap_used, clippy::panic, clippy::indexing_slicing)]
 #![allow(clippy::cast_possible_truncation)]
 
-use hdsl::master::{Cause, Master, State};
+use hdsl::master::{Master, RestartReason, State};
 use hdsl::registers::{Event, EventS, Online1, Online2, OnlineD, Register, Registers};
 use hdsl::sampling::TEST_PATTERN;
 use hdsl::symbol::{Character, Control, RunningDisparity};
@@ -15,7 +15,7 @@ const STILL: [Character; 2] = [Character::data(0x00), Character::data(0x1f)];
 
 /// Six characters as an answer; column RD- for all.
 fn answer([vertical, parameter, pipe, high, low, secondary]: [Character; 6]) -> u64 {
-    let word = |character: Character| u64::from(character.encode(RunningDisparity::Minus).0.get());
+    let word = |character: Character| u64::from(character.encode(RunningDisparity::Minus).word.get());
     let bits = [vertical, parameter, pipe, high, low].into_iter().rev().fold(0, |bits, c| bits << 10 | word(c));
     bits | (!bits >> 49 & 1) << 50 | word(secondary) << 51
 }
@@ -42,7 +42,7 @@ impl Desk {
         for _ in 0..52 {
             desk.feed(TEST_PATTERN);
         }
-        desk.feed(EncoderId::new(0x00153).unwrap().to_answer(Character::data(0), RunningDisparity::Minus).0);
+        desk.feed(EncoderId::new(0x00153).unwrap().to_answer(Character::data(0), RunningDisparity::Minus).bits);
         for _ in 0..56 {
             let _ = desk.good();
         }
@@ -51,8 +51,8 @@ impl Desk {
         desk
     }
 
-    fn feed(&mut self, bits: u64) -> Option<Cause> {
-        let report = self.master.finish_bits(bits, None, None);
+    fn feed(&mut self, bits: u64) -> Option<RestartReason> {
+        let report = self.master.hear_bits(bits, None, 0);
         self.map.apply(report);
         report.restarted
     }
@@ -67,19 +67,19 @@ impl Desk {
         [sealed([0; 6])[at], Character::data(vsync), NONE, STILL[0], STILL[1], second]
     }
 
-    fn good(&mut self) -> Option<Cause> {
+    fn good(&mut self) -> Option<RestartReason> {
         let characters = self.characters();
         self.feed(answer(characters))
     }
 
     /// A good frame with ten equal bits, which are no word, at bit `at` of the answer.
-    fn bad_word(&mut self, at: u32) -> Option<Cause> {
+    fn bad_word(&mut self, at: u32) -> Option<RestartReason> {
         let characters = self.characters();
         self.feed(answer(characters) & !(0x3ff << at))
     }
 
     /// A good frame with another acceleration.
-    fn acceleration(&mut self, high: Character, low: Character) -> Option<Cause> {
+    fn acceleration(&mut self, high: Character, low: Character) -> Option<RestartReason> {
         let [vertical, parameter, pipe, _, _, second] = self.characters();
         self.feed(answer([vertical, parameter, pipe, high, low, second]))
     }
@@ -180,7 +180,7 @@ fn a_damaged_acceleration_word() {
                 let bits = answer([vertical, parameter, pipe, STILL[0], Character::data(low), second]);
                 let _ = desk.feed(bits & !(0x3ff << 30) | high << 30);
                 assert_eq!(
-                    desk.map.velocity() == i32::from(value.get()) && !desk.map.online_d().contains(OnlineD::POS),
+                    desk.map.vel() == i32::from(value.get()) && !desk.map.online_d().contains(OnlineD::POS),
                     used
                 );
                 assert_eq!((desk.quality(), desk.map.get(Register::AccErrCnt)), (13, [u8::from(!used)]));
@@ -210,7 +210,7 @@ fn both_channels() {
             let _ = desk.feed(answer([first[at], parameter, pipe, high, low, second]));
         }
         let _ = desk.good();
-        assert_eq!((desk.map.safe_position_2(), desk.map.get(Register::SafeSum)), (shown, [summary]));
+        assert_eq!((desk.map.vpos2(), desk.map.get(Register::SafeSum)), (shown, [summary]));
         assert!(desk.map.online_1().contains(Online1::SCE) && desk.map.event_s().contains(EventS::SCE));
     }
 }
@@ -223,7 +223,7 @@ fn a_threshold_of_zero() {
     for _ in 0..100 {
         assert_eq!(desk.good(), None);
     }
-    assert_eq!(desk.acceleration(STILL[0], Character::data(0)), Some(Cause::AccelerationErrors));
+    assert_eq!(desk.acceleration(STILL[0], Character::data(0)), Some(RestartReason::AccelerationErrors));
     // Three in a row: the third restarts. The default is 31.
     for (threshold, words) in [(Some(3), 3), (None, 31)] {
         let mut desk = Desk::new(Dialect::TI);
@@ -232,7 +232,7 @@ fn a_threshold_of_zero() {
         }
         for word in 1..=words {
             let cause = desk.acceleration(STILL[0], Character::data(0));
-            assert_eq!(cause, (word == words).then_some(Cause::AccelerationErrors), "{word}");
+            assert_eq!(cause, (word == words).then_some(RestartReason::AccelerationErrors), "{word}");
         }
     }
 }
@@ -272,14 +272,14 @@ fn both_resets_before_the_lock() {
         let mut master = Master::new(dialect);
         let mut map = Registers::new(&dialect);
         for _ in 0..20 {
-            map.apply(master.finish_bits(TEST_PATTERN, None, None));
+            map.apply(master.hear_bits(TEST_PATTERN, None, 0));
         }
         let _ = map.take_events();
         map.write(&mut master, Register::SysCtrl as u8, 0xc0).unwrap();
         assert_eq!(map.get(Register::SysCtrl), [0x80]);
-        let report = *master.finish_bits(TEST_PATTERN, None, None);
+        let report = *master.hear_bits(TEST_PATTERN, None, 0);
         map.apply(&report);
-        assert_eq!((report.restarted, map.get(Register::SysCtrl)), (Some(Cause::Requested), [0x00]));
+        assert_eq!((report.restarted, map.get(Register::SysCtrl)), (Some(RestartReason::Requested), [0x00]));
         assert!(map.event().contains(Event::PRST));
     }
 }

@@ -1,7 +1,7 @@
 //! What the simulated encoder says, word by word, against what the documents print.
 #![allow(missing_docs, clippy::unwrap_used, clippy::indexing_slicing, clippy::arithmetic_side_effects)]
 
-use hdsl::device::{Complement, Device, Overload};
+use hdsl::device::{BadHead, Behaviour, Complement, Device, Fault, Overload};
 use hdsl::frame::Head;
 use hdsl::sampling::TEST_PATTERN;
 use hdsl::{Answer, EncoderId, LineDisparity, ParameterByte, Rule, Window};
@@ -14,8 +14,13 @@ const IDREQ: u8 = 0x1d;
 const INIT: u8 = 0x9e;
 const IDLE: u8 = 0xd0;
 
+/// The bits of the answer.
+fn hear(device: &mut Device, head: Window, position: u64) -> Option<u64> {
+    device.hear(head, position).map(|answer| answer.bits)
+}
+
 fn head(byte: u8) -> Window {
-    Head::new(ParameterByte::new(byte), None, LineDisparity::ZERO).0.bits()
+    Head::new(ParameterByte::new(byte), None, LineDisparity::ZERO).bits()
 }
 
 /// An encoder that was reset and has synchronised.
@@ -25,9 +30,9 @@ fn synchronised(id: u32) -> Device {
 
 fn at_standstill(id: u32, position: u64) -> Device {
     let mut device = Device::new(EncoderId::new(id).unwrap());
-    assert_eq!(device.answer(head(RESET), position), None);
+    assert_eq!(hear(&mut device, head(RESET), position), None);
     for _ in 0..8 {
-        assert_eq!(device.answer(head(SYNC), position), None);
+        assert_eq!(hear(&mut device, head(SYNC), position), None);
     }
     device
 }
@@ -39,8 +44,8 @@ fn words(bits: Option<u64>) -> [u8; 6] {
 
 /// Both safe blocks of the V-frame after the present one, at standstill at this position.
 fn blocks(device: &mut Device, position: u64) -> [[u8; 8]; 2] {
-    while words(device.answer(head(IDLE), position))[1] & 0x80 == 0 {}
-    let frames = [(); 8].map(|()| words(device.answer(head(IDLE), position)));
+    while words(hear(device, head(IDLE), position))[1] & 0x80 == 0 {}
+    let frames = [(); 8].map(|()| words(hear(device, head(IDLE), position)));
     [frames.map(|frame| frame[0]), frames.map(|frame| frame[5])]
 }
 
@@ -52,18 +57,18 @@ fn printed_blocks() {
     assert_eq!(first, [0x00, 0x00, 0x12, 0x34, 0x56, 0x78, 0x32, 0x27]);
     if second[0] & 0x80 != 0 {
         // TOG2 alternates.
-        let _ = [(); 8].map(|()| device.answer(head(IDLE), 0x1234_5678));
+        let _ = [(); 8].map(|()| hear(&mut device, head(IDLE), 0x1234_5678));
         [_, second] = blocks(&mut device, 0x1234_5678);
     }
     assert_eq!(second, [0x1c, 0xff, 0xed, 0xcb, 0xa9, 0x87, 0x7b, 0xd1]);
     // The fault is one wrong bit of the CRC; the two's complement, eight bits coarser.
-    device.faults.bad_crc = true;
-    device.behaviour.complement = Complement::Twos;
-    device.behaviour.second_shift = 8;
+    device.set_fault(Fault::BadCrc);
+    let coarse = Behaviour::new().with_second_shift(8);
+    device.set_behaviour(coarse.with_complement(Complement::Twos));
     let [first, second] = blocks(&mut device, 0x1234_5678);
     assert_eq!(first[6..], [0x32, 0x26]);
     assert_eq!(second[1..6], [0xff, 0xff, 0xed, 0xcb, 0xaa]);
-    device.behaviour.complement = Complement::Ones;
+    device.set_behaviour(coarse);
     let [_, second] = blocks(&mut device, 0x1234_5678);
     assert_eq!(second[1..6], [0xff, 0xff, 0xed, 0xcb, 0xa9]);
 }
@@ -72,14 +77,17 @@ fn printed_blocks() {
 #[test]
 fn status_2() {
     let mut device = synchronised(0x00153);
-    let status: Vec<u8> = (0..48).map(|_| words(device.answer(head(IDLE), 0))[5]).step_by(8).collect();
+    let status: Vec<u8> = (0..48).map(|_| words(hear(&mut device, head(IDLE), 0))[5]).step_by(8).collect();
     assert_eq!(status, [0x1c, 0x9c, 0x1c, 0x9c, 0x1c, 0x9c]);
-    device.faults.test_2 = true;
-    device.faults.stuck_toggle = true;
-    let status: Vec<u8> = (0..24).map(|_| words(device.answer(head(IDLE), 0))[5]).step_by(8).collect();
-    assert_eq!(status, [0x5c, 0x5c, 0x5c]);
-    (device.faults.test_2, device.faults.error_2) = (false, true);
-    assert_eq!(words(device.answer(head(IDLE), 0))[5], 0x3c);
+    for (fault, want) in [
+        (Fault::Test2, [0x5c, 0xdc, 0x5c]),
+        (Fault::Error2, [0xbc, 0x3c, 0xbc]),
+        (Fault::StuckToggle, [0x1c, 0x1c, 0x1c]),
+    ] {
+        device.set_fault(fault);
+        let status: Vec<u8> = (0..24).map(|_| words(hear(&mut device, head(IDLE), 0))[5]).step_by(8).collect();
+        assert_eq!(status, want);
+    }
 }
 
 /// VPOS has 40 bits: above those of the encoder are zeros, or the sign if bit 10 of the identifier says so; an encoder has 40
@@ -105,20 +113,20 @@ fn bits_above_the_position() {
 fn start_up() {
     let mut device = Device::new(EncoderId::new(0x9_0153).unwrap());
     for byte in [START, IDREQ, INIT, IDLE] {
-        assert_eq!(device.answer(head(byte), 0), None);
+        assert_eq!(hear(&mut device, head(byte), 0), None);
     }
     for frames in [7, 7, 8] {
-        assert_eq!(device.answer(head(RESET), 0), None);
+        assert_eq!(hear(&mut device, head(RESET), 0), None);
         for _ in 0..frames {
-            assert_eq!(device.answer(head(SYNC), 0), None);
+            assert_eq!(hear(&mut device, head(SYNC), 0), None);
         }
-        assert_eq!(device.answer(head(START), 0), (frames == 8).then_some(TEST_PATTERN));
+        assert_eq!(hear(&mut device, head(START), 0), (frames == 8).then_some(TEST_PATTERN));
     }
     for byte in [START, 0x1b, 0x1c] {
-        assert_eq!(device.answer(head(byte), 0), Some(TEST_PATTERN));
+        assert_eq!(hear(&mut device, head(byte), 0), Some(TEST_PATTERN));
     }
-    assert_eq!(words(device.answer(head(IDREQ), 0))[..5], [0x53, 0x01, 0x99, 0x01, 0x53]);
-    let vsync = [(); 16].map(|()| words(device.answer(head(INIT), 0))[1] >> 7);
+    assert_eq!(words(hear(&mut device, head(IDREQ), 0))[..5], [0x53, 0x01, 0x99, 0x01, 0x53]);
+    let vsync = [(); 16].map(|()| words(hear(&mut device, head(INIT), 0))[1] >> 7);
     assert_eq!(vsync, [0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 1]);
 }
 
@@ -127,22 +135,22 @@ fn start_up() {
 #[test]
 fn a_reset_in_the_middle() {
     let mut fresh = synchronised(0x00153);
-    let first = [(); 16].map(|()| fresh.answer(head(IDLE), 0));
+    let first = [(); 16].map(|()| hear(&mut fresh, head(IDLE), 0));
     for frames in 8..24 {
         let mut device = synchronised(0x00153);
         // Short read of 7Fh: 7F 8A 44.
         for byte in [0xc7, 0xcf, 0xc8, 0xca, 0xc4, 0xc4] {
-            let _ = device.answer(head(byte), 0);
+            let _ = hear(&mut device, head(byte), 0);
         }
         for _ in 0..frames {
-            let _ = device.answer(head(IDLE), 0);
+            let _ = hear(&mut device, head(IDLE), 0);
         }
-        assert_eq!(device.answer(head(RESET), 0), None);
-        assert_eq!(device.answer(head(START), 0), None);
+        assert_eq!(hear(&mut device, head(RESET), 0), None);
+        assert_eq!(hear(&mut device, head(START), 0), None);
         for _ in 0..8 {
-            assert_eq!(device.answer(head(SYNC), 0), None);
+            assert_eq!(hear(&mut device, head(SYNC), 0), None);
         }
-        assert_eq!([(); 16].map(|()| device.answer(head(IDLE), 0)), first, "{frames}");
+        assert_eq!([(); 16].map(|()| hear(&mut device, head(IDLE), 0)), first, "{frames}");
     }
 }
 
@@ -152,7 +160,7 @@ fn first_means_that_the_link_runs() {
     let mut device = synchronised(0x00153);
     for round in 0..3 {
         for (place, symbol) in [SYNC, START, 0x1b, 0x1c, IDREQ, RESET, 0x10, 0x10].into_iter().enumerate() {
-            let [_, parameter, pipe, ..] = words(device.answer(head(0x80 | symbol), 0));
+            let [_, parameter, pipe, ..] = words(hear(&mut device, head(0x80 | symbol), 0));
             assert_eq!((parameter & 0x80 != 0, pipe), (place == 7, 0xfe), "{round} {symbol:02x}");
         }
     }
@@ -164,14 +172,15 @@ fn heads_that_cannot_be_read() {
     for stalls in [false, true] {
         for lost in 0..=8 {
             let mut device = synchronised(0x00153);
-            device.behaviour.stalls_on_bad_head = stalls;
+            let bad_head = if stalls { BadHead::Stalls } else { BadHead::Counts };
+            device.set_behaviour(Behaviour::new().with_bad_head(bad_head));
             let mut vsync = None;
             for frame in 0..20_u64 {
                 if frame == lost {
-                    assert_eq!(device.answer(Window::EMPTY, 100 * frame), None);
+                    assert_eq!(hear(&mut device, Window::EMPTY, 100 * frame), None);
                     continue;
                 }
-                let [vertical, parameter, ..] = words(device.answer(head(IDLE), 100 * frame));
+                let [vertical, parameter, ..] = words(hear(&mut device, head(IDLE), 100 * frame));
                 if parameter & 0x80 != 0 && vsync.is_none() {
                     vsync = Some(frame);
                 }
@@ -197,9 +206,9 @@ fn heads_that_cannot_be_read() {
 fn reserved_bits() {
     for bits in 0..4 {
         let mut device = synchronised(0x00153);
-        device.behaviour.reserved_bits = bits;
+        device.set_behaviour(Behaviour::new().with_reserved_bits(bits));
         // IDLE is 10h.
-        assert_eq!(words(device.answer(head(IDLE), 0))[1], bits << 5 | 0x10);
+        assert_eq!(words(hear(&mut device, head(IDLE), 0))[1], bits << 5 | 0x10);
     }
 }
 
@@ -216,9 +225,9 @@ fn second_differences() {
     ] {
         for overload in [Overload::Saturated, Overload::NoValue] {
             let mut device = at_standstill(0x00153, 5000);
-            device.behaviour.overload = overload;
-            let _ = (device.answer(head(INIT), 5000), device.answer(head(INIT), 5000));
-            let [_, _, _, high, low, _] = words(device.answer(head(INIT), 5000_u64.wrapping_add_signed(step)));
+            device.set_behaviour(Behaviour::new().with_overload(overload));
+            let _ = (hear(&mut device, head(INIT), 5000), hear(&mut device, head(INIT), 5000));
+            let [_, _, _, high, low, _] = words(hear(&mut device, head(INIT), 5000_u64.wrapping_add_signed(step)));
             let want = if none && overload == Overload::NoValue { [0xfd; 2] } else { word };
             assert_eq!([high, low], want, "{step} {overload:?}");
         }

@@ -73,9 +73,9 @@ fn a_receiver_is_tried_with_the_samples() {
                     let words = core::array::from_fn(|k| {
                         samples[4 * k..4 * k + 4].iter().rev().fold(0, |word, byte| word << 8 | u32::from(*byte))
                     });
-                    master.finish_words(&words, None)
+                    master.hear_words(&words, 0)
                 } else {
-                    master.finish(&samples, None).unwrap()
+                    master.hear(&samples, 0).unwrap()
                 };
                 let tail: String = report.tail.bits().map(|bit| if bit { '1' } else { '0' }).collect();
                 assert_eq!(tail, frame.tail, "{at}");
@@ -95,10 +95,10 @@ fn the_traces_show_what_is_said_of_them() {
         let map = |at: usize| Registers::from_bytes(&dialect, frames[at].registers.as_slice().try_into().unwrap());
         let doubtful = |at: usize| map(at).online_d().contains(OnlineD::POS);
         // Wrap of the 24 bits.
-        assert_eq!((map(98).position(), map(99).position()), (0xff_ffd8, 0));
-        assert_eq!((map(119).velocity(), map(120).velocity(), map(139).position()), (40, -40, 0));
+        assert_eq!((map(98).pos(), map(99).pos()), (0xff_ffd8, 0));
+        assert_eq!((map(119).vel(), map(120).vel(), map(139).pos()), (40, -40, 0));
         assert!(!doubtful(169) && doubtful(170) && !doubtful(199));
-        assert_eq!((map(199).position(), map(199).quality()), ((1 << 24) - 2400, 15));
+        assert_eq!((map(199).pos(), map(199).quality()), ((1 << 24) - 2400, 15));
         // The name that the long message asked for, in PC_BUFFER.
         assert_eq!(&frames[199].registers[0x20..0x28], b"RESOLUTN");
         assert_eq!(frames.iter().filter(|frame| frame.answer.is_none()).count(), 18);

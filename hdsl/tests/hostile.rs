@@ -11,7 +11,11 @@ use hdsl::device::Device;
 use hdsl::master::{Master, State};
 use hdsl::message::{LongRequest, RemoteRegister, ResourceAddress, ShortRequest};
 use hdsl::registers::Registers;
-use hdsl::{Answer, Dialect, EncoderId, Rule, Window};
+use hdsl::{Answer, Dialect, Doubt, EncoderId, Policy, Rule, Window};
+
+/// A free-running frame.
+const FRAME_NS: u64 = 11_520;
+const ANY_AGE: Policy = Policy::new(u64::MAX);
 
 const ANSWER: u64 = u64::MAX >> 3;
 /// 11 bits of acceleration, 24 of position.
@@ -88,27 +92,29 @@ fn run(dialect: Dialect, seed: u64, frames: u64) -> Tally {
     let mut tally = Tally::default();
     // The range is passed every thousand frames or so.
     let mut device = Device::new(ID);
-    device.resources.set_register(RemoteRegister::PING, 0x5a);
+    device.resources_mut().set_register(RemoteRegister::PING, 0x5a);
     let mut master = Master::new(dialect);
     let mut map = Registers::new(&dialect);
     let mut motion = Motion { velocity: 0, positions: [(1 << BITS) - 5; 20] };
     // Frames since an acceleration word that was wrong and passed all checks.
     let (mut since_poison, mut last, mut since_event) = (u32::MAX, 0, 0_u32);
-    for _ in 0..frames {
+    for frame in 0..frames {
         let truth = motion.step(&mut noise);
         let mut head = master.transmission().head.bits();
         if noise.below(2000) == 0 {
             head = Window::from_bits(head.bits() ^ 1 << noise.below(26), head.len()).unwrap();
             *tally.events.entry("head").or_default() += 1;
         }
-        let answer = device.answer(head, motion.at(0) as u64);
-        let (event, bits) = damage(&mut noise, answer.unwrap_or(ANSWER), last);
+        let answer = device.hear(head, motion.at(0) as u64);
+        let (event, bits) = damage(&mut noise, answer.map_or(ANSWER, |answer| answer.bits), last);
         *tally.events.entry(event).or_default() += 1;
-        last = answer.unwrap_or(ANSWER);
+        last = answer.map_or(ANSWER, |answer| answer.bits);
         let accepted = Answer::from_bits(Rule::Strict, bits).delta_delta();
         since_event = if event == "clean" { since_event + 1 } else { 0 };
         let running = master.state() == State::Running;
-        let report = master.finish_bits(bits, None, None);
+        let sampled_ns = (frame + 100) * FRAME_NS;
+        // 91 bits from the edge to the end of the window.
+        let report = master.hear_bits(bits, None, sampled_ns + 9_707);
         map.apply(report);
         tally.restarts += u64::from(report.restarted.is_some());
         for result in [report.finished.short.map(|r| r.map(|a| a.data == Some(0x5a)))].into_iter().flatten() {
@@ -130,28 +136,31 @@ fn run(dialect: Dialect, seed: u64, frames: u64) -> Tally {
             continue;
         }
         // Law: the fast position is the truth; a wrong word that passed CRC-5 is found out at the end of the next V-frame.
-        if let Ok(fast) = master.fast() {
+        if let Ok(fast) = master.fast().at(sampled_ns, Policy::new(0)) {
             tally.fast += 1;
-            if (fast.position, i64::from(fast.velocity)) != (motion.at(0), motion.velocity) {
+            if (fast.position(), i64::from(fast.velocity())) != (motion.at(0), motion.velocity) {
                 assert!(
                     since_poison < 16,
                     "wrong fast position, {since_poison} frames after the last bad word: {fast:?}, truth {} {}, {tracker:?}",
                     motion.at(0),
                     motion.velocity,
-                    tracker = (master.phase(), master.frame(), master.counters(), event, since_event),
+                    tracker = (master.stage(), master.frame(), master.counters(), event, since_event),
                 );
                 tally.explained += 1;
             }
         }
         // Law: the safe position is the true one of its time.
-        if let Ok(safe) = master.safe() {
-            tally.safe += u64::from(safe.age == 8);
-            assert_eq!(safe.position, motion.at(safe.age), "wrong safe position");
+        if let Ok(safe) = master.safe().at(sampled_ns, Policy::new(15 * FRAME_NS)) {
+            let age = (sampled_ns - safe.sampled_ns()) / FRAME_NS;
+            tally.safe += u64::from(age == 8);
+            assert_eq!(safe.position(), motion.at(u8::try_from(age).unwrap()), "wrong safe position");
         }
         // Law: before the lock and after a loss there is nothing.
         if master.state() != State::Running {
             assert!(
-                master.fast().is_err() && master.safe().is_err() && (map.link() == (master.state() > State::IdReq))
+                master.fast().at(sampled_ns, ANY_AGE) == Err(Doubt::NoLink)
+                    && master.safe().at(sampled_ns, ANY_AGE) == Err(Doubt::NoLink)
+                    && (map.link() == (master.state() > State::IdReq))
             );
         }
         if noise.below(300) == 0 {

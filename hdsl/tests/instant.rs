@@ -3,11 +3,16 @@
 #![allow(clippy::cast_possible_truncation, clippy::cast_possible_wrap, clippy::cast_sign_loss)]
 
 use hdsl::cable::{Cable, Disturbance};
-use hdsl::device::{Device, Heard};
+use hdsl::device::{Behaviour, Device, Heard};
 use hdsl::frame::Extra;
 use hdsl::master::Master;
 use hdsl::sync::{Es, Synchroniser};
-use hdsl::{Dialect, EncoderId, Window};
+use hdsl::{Dialect, Doubt, EncoderId, Policy, Sample, Window};
+
+/// Eighths of a bit, 40/3 ns each.
+const fn ns(eighths: i64) -> u64 {
+    (eighths * 40 / 3) as u64
+}
 
 /// A shaft that turns evenly, and the time, in eighths of a bit since the start.
 struct Line {
@@ -27,7 +32,7 @@ impl Line {
     fn new(dialect: Dialect, sync: Option<Synchroniser>, disturbance: Disturbance, lag: u8) -> Self {
         let master = sync.map_or_else(|| Master::new(dialect), |sync| Master::synchronised(dialect, sync));
         let mut device = Device::new(EncoderId::new(0x00153).unwrap());
-        device.behaviour.sampling_lag = lag;
+        device.set_behaviour(Behaviour::new().with_sampling_lag(lag));
         Self { master, device, cable: Cable::new(disturbance, 7), speed: 1, now: 0, edge: 0, instant: 0 }
     }
 
@@ -38,23 +43,33 @@ impl Line {
         self.edge = self.now + 64 + extra;
         let samples = if let Some(heard) = Heard::on_line(&self.cable.down_samples(head)) {
             self.instant = self.now + i64::from(self.device.sampling_instant(&heard));
-            let answer = self.device.answer(heard.bits, (self.speed * self.instant) as u64);
+            let answer = self.device.hear(heard.bits, (self.speed * self.instant) as u64);
             self.cable.up_heard(answer, &heard)
         } else {
             self.instant = self.edge;
-            let answer = self.device.answer(Window::EMPTY, (self.speed * self.instant) as u64);
+            let answer = self.device.hear(Window::EMPTY, (self.speed * self.instant) as u64);
             self.cable.up(answer)
         };
-        let tail = self.master.finish(&samples, None).unwrap().tail;
+        // The head has 26 bits and those of the window; one bit later 72 bits are sampled.
+        let window = (extra + 7) / 8 * 8;
+        let end_ns = ns(self.now + 8 * (26 + 1 + 72) + window);
+        let tail = self.master.hear(&samples, end_ns).unwrap().tail;
         // 108 bits, the bits of the window, and the stuffing.
-        self.now += 864 + (extra + 7) / 8 * 8 + 48 * i64::from(tail.stuffing.get());
+        self.now += 864 + window + 48 * i64::from(tail.stuffing.get());
+    }
+
+    /// The fast position at the sampling edge: its instant is the edge, three roundings to a nanosecond aside.
+    fn fast(&self) -> Result<Sample, Doubt> {
+        let fast = self.master.fast().at(ns(self.edge), Policy::new(3))?;
+        assert!(fast.sampled_ns() <= ns(self.edge));
+        Ok(fast)
     }
 
     fn lock(&mut self) {
         for _ in 0..200 {
             self.frame();
         }
-        assert!(self.master.fast().is_ok());
+        assert!(self.fast().is_ok());
     }
 }
 
@@ -70,10 +85,11 @@ fn the_position_of_the_edge() {
                 line.frame();
                 assert_eq!(line.instant - line.edge, eighths + i64::from(lag));
                 // A step an eighth: the position says the time.
-                let fast = line.master.fast().unwrap();
-                assert_eq!((fast.position, fast.velocity), (line.instant, 864));
-                let safe = line.master.safe().unwrap();
-                assert_eq!(safe.position, line.instant - 864 * i64::from(safe.age));
+                let fast = line.fast().unwrap();
+                assert_eq!((fast.position(), fast.velocity()), (line.instant, 864));
+                let safe = line.master.safe().at(ns(line.edge), Policy::new(16 * 11_520)).unwrap();
+                let age = (ns(line.edge) + 100 - safe.sampled_ns()) / 11_520;
+                assert_eq!(safe.position(), line.instant - 864 * age as i64);
             }
         }
     }
@@ -90,7 +106,7 @@ fn positions_follow_the_edge_within_a_bit() {
     let (mut parts, mut last) = ([0_u32; 8], line.instant);
     for _ in 0..400 {
         line.frame();
-        assert_eq!(line.master.fast().map(|fast| fast.position), Ok(3 * line.instant));
+        assert_eq!(line.fast().map(|fast| fast.position()), Ok(3 * line.instant));
         // The pulse period, to the eighth.
         assert!((line.instant - last - 907).abs() <= 1, "{}", line.instant - last);
         last = line.instant;
@@ -111,7 +127,7 @@ fn jitter_of_the_edge() {
         let mut seen = [0_u32; 3];
         for _ in 0..5000 {
             line.frame();
-            assert_eq!(line.master.fast().map(|fast| fast.position), Ok(100 * line.instant));
+            assert_eq!(line.fast().map(|fast| fast.position()), Ok(100 * line.instant));
             let moved = line.instant - line.edge - 18 - 3;
             seen[usize::try_from(moved + 1).unwrap()] += 1;
         }
@@ -131,10 +147,10 @@ fn glitches_both_ways() {
     let (mut good, mut wrong) = (0, 0);
     for _ in 0..20_000 {
         line.frame();
-        if let Ok(fast) = line.master.fast() {
+        if let Ok(fast) = line.fast() {
             good += 1;
             // A word that passed CRC-5 with two wrong bits is found out at the end of the next V-frame.
-            wrong += u32::from(fast.position != 2 * line.instant);
+            wrong += u32::from(fast.position() != 2 * line.instant);
         }
     }
     let counters = line.master.counters();

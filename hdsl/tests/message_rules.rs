@@ -6,7 +6,8 @@ use hdsl::message::{
     ResourceError, Responder, ShortAnswer, ShortRequest,
 };
 use hdsl::{
-    DeltaDelta, Doubt, EncoderSymbol, Error, MasterSymbol, Nibble, Phase, PositionBits, PositionTracker, crc16,
+    AlignmentStage, DeltaDelta, Doubt, EncoderId, EncoderSymbol, Error, MasterSymbol, Nibble, Policy, PositionBits,
+    PositionTracker, crc16,
 };
 
 const PING: RemoteRegister = RemoteRegister::PING;
@@ -123,7 +124,7 @@ fn the_marker_of_an_offset() {
         address: ResourceAddress::RWFILE,
         indirect: false,
         offset: Some(Offset::new(0x1234).unwrap()),
-        access: Access::Read(Length::from_code(1)),
+        access: Access::Read(Length::Two),
     };
     let bytes = request.emit().as_bytes().to_vec();
     assert_eq!(bytes[..4], [0xe5, 0x31, 0x92, 0x34]);
@@ -137,8 +138,8 @@ fn the_marker_of_an_offset() {
 /// LLEN is two bits: 0, 2, 4, 8 bytes; data of another length do not exist.
 #[test]
 fn lengths() {
-    for (code, bytes) in [(0, 0), (1, 2), (2, 4), (3, 8), (4, 0), (0xfd, 2)] {
-        assert_eq!((Length::from_code(code).bytes(), Length::from_code(code).code()), (bytes, code & 3));
+    for (code, bytes) in [(0, Some(0)), (1, Some(2)), (2, Some(4)), (3, Some(8)), (4, None), (0xfd, None)] {
+        assert_eq!(Length::from_code(code).map(Length::bytes), bytes);
     }
     let four = Data::new(&[1, 2, 3, 4]).unwrap();
     assert_eq!((four.padded(), four.length()), ([1, 2, 3, 4, 0, 0, 0, 0], Length::Four));
@@ -159,6 +160,16 @@ fn a_short_answer_goes_first() {
     assert_eq!((0..2).map(|_| encoder.transmit()).collect::<Vec<_>>()[0], EncoderSymbol::Idle);
 }
 
+/// What is given as a fast position with its speed, of an encoder of so many bits.
+fn fast(tracker: &PositionTracker, id: u32) -> Result<(i64, i32), Doubt> {
+    let evidence = tracker.evidence(EncoderId::new(id).unwrap(), 0);
+    evidence.at(0, Policy::new(0)).map(|fast| (fast.position(), fast.velocity()))
+}
+
+/// Identifiers of encoders with 11 bits of acceleration and 8 or 40 of position.
+const NARROW: u32 = 0x00000;
+const WIDE: u32 = 0x001d3;
+
 /// The estimator of the design document: last + (16 d0 + 8 d1 + 4 d2 + 2 d3 + d4) / 32, rounded down.
 #[test]
 fn estimates() {
@@ -167,10 +178,10 @@ fn estimates() {
         for value in values {
             tracker.step(Some(DeltaDelta::try_from(*value).unwrap()));
         }
-        let before = tracker.velocity();
+        let before = tracker.registers().vel;
         tracker.step(None);
-        assert_eq!(tracker.fast(), Err(Doubt::Estimated));
-        tracker.velocity() - before
+        assert_eq!(fast(&tracker, WIDE), Err(Doubt::Estimated));
+        tracker.registers().vel - before
     };
     // Differences of 32 in all five places: 160 + 31.
     assert_eq!(estimate(&[0, 32, 64, 96, 128, 160]), 160 + 31);
@@ -198,7 +209,7 @@ fn the_fastest_speed() {
             tracker.step(Some(DeltaDelta::ZERO));
         }
         tracker.align(0);
-        assert_eq!(tracker.fast(), Err(Doubt::Alignment));
+        assert_eq!(fast(&tracker, NARROW), Err(Doubt::Alignment));
         let speed = i64::from(speed);
         for frame in 1..8 {
             for _ in 0..8 {
@@ -206,11 +217,11 @@ fn the_fastest_speed() {
             }
             tracker.align((8 * frame * speed).rem_euclid(256) as u64);
             if frame < 3 {
-                assert_eq!(tracker.fast(), Err(Doubt::Alignment), "{frame}");
+                assert_eq!(fast(&tracker, NARROW), Err(Doubt::Alignment), "{frame}");
             }
         }
-        let fast = tracker.fast();
-        let truth = u64::try_from((64 * speed).rem_euclid(256)).unwrap();
+        let fast = fast(&tracker, NARROW);
+        let truth = (64 * speed).rem_euclid(256);
         if allowed {
             assert_eq!(fast, Ok((truth, i32::try_from(speed).unwrap())));
         } else {
@@ -228,14 +239,14 @@ fn two_safe_positions_in_a_row() {
             tracker.step(Some(DeltaDelta::ZERO));
         }
         tracker.align(safe);
-        (tracker.phase(), tracker.fast())
+        (tracker.stage(), fast(&tracker, WIDE))
     };
     let doubt = Err(Doubt::Alignment);
-    assert_eq!(v_frame(0), (Phase::Velocity, doubt));
-    assert_eq!(v_frame(0), (Phase::Settle, doubt));
-    assert_eq!(v_frame(5), (Phase::Check, doubt));
-    assert_eq!(v_frame(0), (Phase::Check, doubt));
-    assert_eq!(v_frame(0), (Phase::Check, Ok((0, 0))));
+    assert_eq!(v_frame(0), (AlignmentStage::Velocity, doubt));
+    assert_eq!(v_frame(0), (AlignmentStage::Settle, doubt));
+    assert_eq!(v_frame(5), (AlignmentStage::Check, doubt));
+    assert_eq!(v_frame(0), (AlignmentStage::Check, doubt));
+    assert_eq!(v_frame(0), (AlignmentStage::Check, Ok((0, 0))));
 }
 
 /// A safe position that does not agree begins the alignment anew.
@@ -248,11 +259,14 @@ fn a_safe_position_that_does_not_agree() {
         }
         tracker.align(0);
     }
-    assert_eq!((tracker.phase(), tracker.is_unreliable(), tracker.fast()), (Phase::Check, false, Ok((0, 0))));
+    assert_eq!(
+        (tracker.stage(), tracker.registers().pos_flag, fast(&tracker, WIDE)),
+        (AlignmentStage::Check, false, Ok((0, 0)))
+    );
     for _ in 0..8 {
         tracker.step(Some(DeltaDelta::ZERO));
     }
     tracker.align(1);
-    assert_eq!((tracker.phase(), tracker.is_unreliable()), (Phase::Position, true));
-    assert_eq!(tracker.fast(), Err(Doubt::Alignment));
+    assert_eq!((tracker.stage(), tracker.registers().pos_flag), (AlignmentStage::Position, true));
+    assert_eq!(fast(&tracker, WIDE), Err(Doubt::Alignment));
 }

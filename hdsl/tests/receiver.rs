@@ -1,14 +1,14 @@
 //! What the receiver reports beside positions: places, counters, causes, quality; each against a number of the documents.
 #![allow(missing_docs, clippy::unwrap_used, clippy::arithmetic_side_effects, clippy::indexing_slicing)]
 
-use hdsl::device::Device;
+use hdsl::device::{Device, Fault};
 use hdsl::frame::Trailer;
-use hdsl::master::{Cause, Master, Signal, State};
+use hdsl::master::{Master, RestartReason, SignalQuality, State};
 use hdsl::message::{LongRequest, RemoteRegister, ResourceAddress, ShortRequest};
 use hdsl::rssi::Rssi;
 use hdsl::sampling::{Delay, TEST_PATTERN, line};
 use hdsl::sync::Es;
-use hdsl::{Dialect, Doubt, EncoderId, Error};
+use hdsl::{Dialect, Doubt, EncoderId, Error, Policy};
 
 /// Both ends without a line between them.
 struct Pair {
@@ -26,14 +26,14 @@ impl Pair {
         for _ in 0..61 + 40 {
             pair.frame(0, None);
         }
-        assert_eq!((pair.master.state(), pair.master.report().quality), (State::Running, 15));
+        assert_eq!((pair.master.state(), pair.master.h_frame().quality), (State::Running, 15));
         pair
     }
 
     /// An H-frame with these bits of the answer inverted.
-    fn frame(&mut self, damage: u64, signal: Option<Signal>) {
-        let answer = self.device.answer(self.master.transmission().head.bits(), 1000);
-        let _ = self.master.finish_bits(answer.map_or(u64::MAX, |bits| bits ^ damage), signal, None);
+    fn frame(&mut self, damage: u64, signal: Option<SignalQuality>) {
+        let answer = self.device.hear(self.master.transmission().head.bits(), 1000);
+        let _ = self.master.hear_bits(answer.map_or(u64::MAX, |answer| answer.bits ^ damage), signal, 0);
     }
 
     /// Up to place `at` of a V-frame.
@@ -60,14 +60,14 @@ fn places_of_the_start_up() {
     ] {
         for frame in 0..frames {
             assert_eq!((pair.master.state(), pair.master.frame()), (state, frame));
-            assert!(!pair.master.report().long_free && !pair.master.report().short_free || state == State::Running);
+            assert!(!pair.master.h_frame().long_free && !pair.master.h_frame().short_free || state == State::Running);
             pair.frame(0, None);
         }
         let known = matches!(state, State::WaitVsync | State::Running);
         assert_eq!(state.frames(), (!known).then_some(frames));
     }
     assert_eq!(pair.master.frame(), 0);
-    assert!(pair.master.report().long_free && pair.master.report().short_free);
+    assert!(pair.master.h_frame().long_free && pair.master.h_frame().short_free);
 }
 
 /// A front end that finds the bits itself: silence is no edge, other bits are no pattern; a wrong bit in LEARN or CHECK begins
@@ -75,18 +75,18 @@ fn places_of_the_start_up() {
 #[test]
 fn causes_in_the_start_up() {
     for (frames, damage, want) in [
-        (18, 1 << 60, Cause::Learn(Error::Pattern)),
-        (18, TEST_PATTERN ^ u64::MAX >> 3, Cause::Learn(Error::NoEdge)),
-        (18 + 9, 1, Cause::Pattern),
-        (18 + 18, 1, Cause::Pattern),
-        (18 + 33, 1 << 60, Cause::Pattern),
+        (18, 1 << 60, RestartReason::Learn(Error::Pattern)),
+        (18, TEST_PATTERN ^ u64::MAX >> 3, RestartReason::Learn(Error::NoEdge)),
+        (18 + 9, 1, RestartReason::Pattern),
+        (18 + 18, 1, RestartReason::Pattern),
+        (18 + 33, 1 << 60, RestartReason::Pattern),
     ] {
         let mut pair = Pair::new(Dialect::SICK);
         for _ in 0..frames {
             pair.frame(0, None);
         }
         pair.frame(damage, None);
-        let report = pair.master.report();
+        let report = pair.master.h_frame();
         assert_eq!((report.restarted, report.state, pair.master.counters().restarts), (Some(want), State::Reset, 1));
     }
     // 53h is D19.2; with its first six bits inverted it is D12.2, 4Ch. Ten zeros are no word.
@@ -98,9 +98,9 @@ fn causes_in_the_start_up() {
         for _ in 0..52 {
             pair.frame(0, None);
         }
-        let bits = pair.device.answer(pair.master.transmission().head.bits(), 1000).unwrap();
-        let _ = pair.master.finish_bits((bits ^ damage) & !zeros, None, None);
-        assert_eq!(pair.master.report().restarted, Some(Cause::Identifier(want)));
+        let bits = pair.device.hear(pair.master.transmission().head.bits(), 1000).unwrap().bits;
+        let _ = pair.master.hear_bits((bits ^ damage) & !zeros, None, 0);
+        assert_eq!(pair.master.h_frame().restarted, Some(RestartReason::Identifier(want)));
         assert_eq!(pair.master.encoder_id(), None);
     }
 }
@@ -112,13 +112,13 @@ fn sixty_one_bits() {
     for _ in 0..20 {
         pair.frame(7 << 61, None);
     }
-    assert_eq!((pair.master.counters().words, pair.master.report().quality), (0, 15));
+    assert_eq!((pair.master.counters().words, pair.master.h_frame().quality), (0, 15));
 }
 
 /// RSSI below 2 costs 4 a frame by the manual, nothing in the SDK (table 21; HDSL firmware).
 #[test]
 fn weak_signals() {
-    let signal = |rssi| Some(Signal { rssi: Rssi::new(rssi).unwrap(), delay: Delay::new(1).unwrap(), edges: 0 });
+    let signal = |rssi| Some(SignalQuality { rssi: Rssi::new(rssi).unwrap(), delay: Delay::new(1).unwrap(), edges: 0 });
     for (dialect, rssi, want) in [
         (Dialect::SICK, 0, 11),
         (Dialect::SICK, 1, 11),
@@ -129,30 +129,30 @@ fn weak_signals() {
         let mut pair = Pair::running(dialect);
         pair.to(3);
         pair.frame(0, signal(rssi));
-        assert_eq!(pair.master.report().quality, want, "{rssi}");
-        assert_eq!(pair.master.report().signal, signal(rssi));
+        assert_eq!(pair.master.h_frame().quality, want, "{rssi}");
+        assert_eq!(pair.master.h_frame().signal, signal(rssi));
     }
 }
 
 /// The SDK's firmware looks at TEST2 only where channel 1 is good.
 #[test]
 fn test_2_beside_a_bad_channel_1() {
-    let quality = |damage: u64, test_2: bool| {
+    let quality = |damage: u64, fault: Fault| {
         let mut pair = Pair::running(Dialect::TI);
         pair.to(7);
-        pair.device.faults.test_2 = test_2;
+        pair.device.set_fault(fault);
         pair.frame(0, None);
         pair.frame(damage, None);
         pair.to(6);
-        pair.device.faults.test_2 = false;
+        pair.device.set_fault(Fault::None);
         pair.frame(0, None);
         pair.frame(0, None);
         pair.frame(0, None);
-        pair.master.report().quality
+        pair.master.h_frame().quality
     };
-    assert!(quality(0, true) < quality(0, false));
+    assert!(quality(0, Fault::Test2) < quality(0, Fault::None));
     // The first bit of the vertical word.
-    assert_eq!(quality(1 << 60, true), quality(1 << 60, false));
+    assert_eq!(quality(1 << 60, Fault::Test2), quality(1 << 60, Fault::None));
 }
 
 /// Each kind of damage has its counter, and counts once.
@@ -166,18 +166,18 @@ fn counters() {
     // The switch bit is the 51st.
     pair.frame(1 << 50, None);
     assert_eq!(pair.master.counters().switch_bits, 1);
-    assert_eq!((pair.master.counters().words, pair.master.report().quality), (0, 15));
+    assert_eq!((pair.master.counters().words, pair.master.h_frame().quality), (0, 15));
     // IDLE, D16.0, with its first six bits inverted is in no table.
     pair.frame(0b11_1111 << 10, None);
-    assert_eq!((pair.master.counters().words, pair.master.report().quality), (1, 14));
+    assert_eq!((pair.master.counters().words, pair.master.h_frame().quality), (1, 14));
     let counters = pair.master.counters();
     assert_eq!((counters.safe1, counters.safe2, counters.acceleration, counters.switch_bits), (0, 0, 0, 1));
     for (channel, want) in [(0, (1, 0)), (51, (0, 1))] {
         let mut pair = Pair::running(Dialect::SICK);
         pair.to(2);
         // Zeros in both channels: ten equal bits.
-        let bits = pair.device.answer(pair.master.transmission().head.bits(), 1000).unwrap() & !(0x3ff << channel);
-        let _ = pair.master.finish_bits(bits, None, None);
+        let bits = pair.device.hear(pair.master.transmission().head.bits(), 1000).unwrap().bits & !(0x3ff << channel);
+        let _ = pair.master.hear_bits(bits, None, 0);
         pair.to(0);
         let counters = pair.master.counters();
         assert_eq!((counters.words, (counters.safe1, counters.safe2)), (1, want), "{channel}");
@@ -190,17 +190,20 @@ fn a_loss_ends_the_messages() {
     let mut pair = Pair::running(Dialect::SICK);
     pair.master.start_short(ShortRequest::Read(RemoteRegister::PING)).unwrap();
     pair.master.start_long(LongRequest::read_name(ResourceAddress::RESOLUTN)).unwrap();
-    let signal = Some(Signal { rssi: Rssi::MAX, delay: Delay::new(3).unwrap(), edges: 0x18 });
+    let signal = Some(SignalQuality { rssi: Rssi::MAX, delay: Delay::new(3).unwrap(), edges: 0x18 });
     for _ in 0..10 {
-        let _ = pair.device.answer(pair.master.transmission().head.bits(), 1000);
-        let _ = pair.master.finish_bits(0, signal, None);
-        if pair.master.report().restarted.is_some() {
+        let _ = pair.device.hear(pair.master.transmission().head.bits(), 1000);
+        let _ = pair.master.hear_bits(0, signal, 0);
+        if pair.master.h_frame().restarted.is_some() {
             break;
         }
-        assert_eq!(pair.master.report().finished, hdsl::message::Finished::default());
+        assert_eq!(pair.master.h_frame().finished, hdsl::message::Finished::default());
     }
-    let report = pair.master.report();
-    assert_eq!((report.restarted, report.was, report.state), (Some(Cause::Quality), State::Running, State::Reset));
+    let report = pair.master.h_frame();
+    assert_eq!(
+        (report.restarted, report.was, report.state),
+        (Some(RestartReason::Quality), State::Running, State::Reset)
+    );
     assert_eq!((report.finished.short, report.finished.long), (Some(Err(Error::Dropped)), Some(Err(Error::Dropped))));
     assert_eq!((report.signal, report.long_free, report.short_free), (signal, false, false));
     assert_eq!((pair.master.state(), pair.master.encoder_id()), (State::Reset, None));
@@ -210,7 +213,7 @@ fn a_loss_ends_the_messages() {
     for _ in 0..101 {
         pair.frame(0, None);
     }
-    assert!(pair.master.report().long_free && pair.master.report().finished.long.is_none());
+    assert!(pair.master.h_frame().long_free && pair.master.h_frame().finished.long.is_none());
 }
 
 /// Messages only after the first whole V-frame (HDSL firmware, flag of the normal flow).
@@ -223,7 +226,7 @@ fn messages_wait_for_a_v_frame() {
         assert_eq!(result, want, "{frame}");
         // A safe position neither.
         let doubt = [Doubt::NoLink, Doubt::NoVFrame][usize::from(frame >= 61)];
-        assert_eq!(pair.master.safe().err(), (frame < 61 + 8).then_some(doubt), "{frame}");
+        assert_eq!(pair.master.safe().at(0, Policy::new(u64::MAX)).err(), (frame < 61 + 8).then_some(doubt), "{frame}");
         if result.is_ok() {
             let dropped = pair.master.reset_messages().unwrap();
             assert_eq!(dropped.short, Some(Err(Error::Dropped)));
@@ -240,11 +243,11 @@ fn messages_wait_for_a_v_frame() {
 fn edges_of_the_start_up() {
     let mut pair = Pair::new(Dialect::SICK);
     for frame in 0..120 {
-        let answer = pair.device.answer(pair.master.transmission().head.bits(), 1000);
+        let answer = pair.device.hear(pair.master.transmission().head.bits(), 1000);
         // Eleven eighths of delay: edges before sample 3. In two CHECK frames and while the link runs they are a sample later.
         let late = [40, 41].contains(&frame) || frame > 90;
-        let samples = answer.map_or([0xff; 72], |bits| line(bits, if late { 12 } else { 11 }));
-        let report = pair.master.finish(&samples, None).unwrap();
+        let samples = answer.map_or([0xff; 72], |answer| line(answer.bits, if late { 12 } else { 11 }));
+        let report = pair.master.hear(&samples, 0).unwrap();
         let want = match frame {
             ..27 => None,
             27..40 => Some(0x08),
@@ -264,18 +267,15 @@ fn frames_without_an_answer() {
     for words in [false, true] {
         let mut pair = Pair::new(Dialect::SICK);
         for _ in 0..19 {
-            let answer = pair.device.answer(pair.master.transmission().head.bits(), 1000);
-            let _ = pair.master.finish(&answer.map_or([0xff; 72], |bits| line(bits, 11)), None).unwrap();
+            let answer = pair.device.hear(pair.master.transmission().head.bits(), 1000);
+            let _ = pair.master.hear(&answer.map_or([0xff; 72], |answer| line(answer.bits, 11)), 0).unwrap();
         }
         pair.master.request_restart();
-        let _ = pair.master.finish(&line(TEST_PATTERN, 11), None).unwrap();
+        let _ = pair.master.hear(&line(TEST_PATTERN, 11), 0).unwrap();
         assert!(pair.master.alignment().is_some() && pair.master.state() == State::Reset);
         for frame in 0..18 {
-            let report = if words {
-                pair.master.finish_words(&[0; 18], None)
-            } else {
-                pair.master.finish(&[0; 72], None).unwrap()
-            };
+            let report =
+                if words { pair.master.hear_words(&[0; 18], 0) } else { pair.master.hear(&[0; 72], 0).unwrap() };
             assert_eq!((report.signal, report.restarted), (None, None), "{frame}");
         }
         assert_eq!(pair.master.state(), State::Start);
@@ -293,10 +293,10 @@ fn trailers() {
         for frame in 0..good {
             pair.frame(0, None);
             let whole = frame < 18;
-            assert_eq!(pair.master.report().tail.trailer == Trailer::Whole, whole, "{frame}");
+            assert_eq!(pair.master.h_frame().tail.trailer == Trailer::Whole, whole, "{frame}");
         }
         pair.frame(1, None);
-        assert_eq!(pair.master.report().tail.trailer, want, "{good}");
+        assert_eq!(pair.master.h_frame().tail.trailer, want, "{good}");
     }
 }
 
@@ -314,7 +314,7 @@ fn a_message_in_sync_mode() {
     for _ in 0..40 {
         assert!(pair.master.transmission().head.extra().is_some());
         pair.frame(0, None);
-        data = data.or(pair.master.report().finished.short);
+        data = data.or(pair.master.h_frame().finished.short);
     }
     assert_eq!(data.unwrap().unwrap().data, Some(7));
 }
@@ -324,13 +324,13 @@ fn a_message_in_sync_mode() {
 fn pipe_words() {
     let mut pair = Pair::running(Dialect::SICK);
     for byte in [Some(0x42), Some(0xfe), None] {
-        pair.device.pipe = byte;
+        pair.device.set_pipe(byte);
         pair.frame(0, None);
-        let got = pair.master.report().pipe_character().map(|character| character.unwrap().byte());
+        let got = pair.master.h_frame().pipe_character().map(|character| character.unwrap().byte());
         assert_eq!(got, byte);
     }
-    let bits = pair.device.answer(pair.master.transmission().head.bits(), 1000).unwrap() & !(0x3ff << 20);
-    let report = pair.master.finish_bits(bits, None, None);
+    let bits = pair.device.hear(pair.master.transmission().head.bits(), 1000).unwrap().bits & !(0x3ff << 20);
+    let report = pair.master.hear_bits(bits, None, 0);
     assert_eq!(report.pipe_character(), Some(Err(Error::InvalidWord { word: 0 })));
 }
 

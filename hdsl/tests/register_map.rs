@@ -1,10 +1,12 @@
 //! The register map: what an application writes and reads, and what the receiver shows, address by address.
 #![allow(missing_docs, clippy::unwrap_used, clippy::arithmetic_side_effects, clippy::indexing_slicing)]
 
-use hdsl::device::Device;
-use hdsl::master::{Cause, Master, Report, State};
+use hdsl::device::{Device, Fault};
+use hdsl::master::{HFrame, Master, RestartReason, State};
 use hdsl::message::{LongRequest, RemoteRegister, ResourceAddress, ShortRequest};
-use hdsl::registers::{BusError, Event, EventS, Interrupts, Online1, OnlineD, RegisterBus, Registers, RemoteReceiver};
+use hdsl::registers::{
+    BusError, Event, EventS, Events, Interrupts, Online1, OnlineD, RegisterBus, Registers, RemoteReceiver,
+};
 use hdsl::registers::{PipeFifo, Status2};
 use hdsl::symbol::{Character, Control, RunningDisparity, Word};
 use hdsl::{Dialect, EncoderId, Error, MasterSymbol, Rule};
@@ -31,9 +33,9 @@ impl Desk {
         desk
     }
 
-    fn frame(&mut self) -> Report {
-        let answer = self.device.answer(self.master.transmission().head.bits(), 0x8765_4321);
-        let report = *self.master.finish_bits(answer.unwrap_or(u64::MAX), None, None);
+    fn frame(&mut self) -> HFrame {
+        let answer = self.device.hear(self.master.transmission().head.bits(), 0x8765_4321);
+        let report = *self.master.hear_bits(answer.map_or(u64::MAX, |answer| answer.bits), None, 0);
         self.lines = self.map.apply(&report);
         report
     }
@@ -109,7 +111,7 @@ fn no_link_by_a_write() {
         let mut map = Registers::new(&dialect);
         for _ in 0..20 {
             map.write(&mut master, 0x03, 0xff).unwrap();
-            let report = *master.finish_bits(u64::MAX, None, None);
+            let report = *master.hear_bits(u64::MAX, None, 0);
             let _ = map.apply(&report);
             assert_eq!((map.link(), map.quality()), (false, 0), "{dialect:?} {:?}", report.state);
         }
@@ -157,7 +159,7 @@ fn resets() {
             // PRST: shown until the link is started anew.
             desk.write(address, 0x80);
             assert_eq!(desk.byte(address), 0x80);
-            assert_eq!(desk.frame().restarted, Some(Cause::Requested));
+            assert_eq!(desk.frame().restarted, Some(RestartReason::Requested));
             assert_eq!((desk.byte(address), desk.map.link(), desk.master.state()), (0, false, State::Reset));
             // Before the lock there is no message to drop.
             desk.write(0x40, 0x3f);
@@ -181,7 +183,7 @@ fn short_messages() {
         assert_eq!(desk.map.write(&mut desk.master, 0x40, 0xfc), Err(Error::Busy));
         assert_eq!(desk.byte(0x40), 0x7f);
         desk.frames(40);
-        assert_eq!(desk.device.resources.register(RemoteRegister::PING), 0xa5);
+        assert_eq!(desk.device.resources().register(RemoteRegister::PING), 0xa5);
         assert_eq!((desk.byte(0x40), desk.map.event_s()), (0x3f, EventS::FRES));
         assert_eq!(desk.map.online_1(), Online1::FIX1 | Online1::FRES);
         desk.write(0x40, 0xfc);
@@ -209,7 +211,7 @@ fn long_messages() {
             assert_eq!(desk.map.write(&mut desk.master, 0x2c, 1), Err(Error::Busy));
             desk.frames(80);
             assert_eq!((desk.map.online_d(), desk.byte(0x2c)), (OnlineD::FIX1 | OnlineD::FREL, 0));
-            assert_eq!(desk.map.take_events(), (Event::FREL, EventS::empty()));
+            assert_eq!(desk.map.take_events(), Events { drive: Event::FREL, safe: EventS::empty() });
             assert_eq!(&desk.map.as_bytes()[0x20..0x20 + want.len()], want);
         };
         // Direct read of 081h, 8 bytes; attribute 3 of it, 2 bytes.
@@ -249,9 +251,9 @@ fn frames_for_a_pulse() {
 fn what_is_shown() {
     let mut desk = Desk::new(Dialect::SICK, 0x7_0153);
     assert_eq!([0x0d, 0x0e, 0x0f].map(|address| desk.byte(address)), [0x77, 0x01, 0x53]);
-    assert_eq!((desk.map.safe_position(), desk.map.position()), (0x8765_4321, 0x8765_4321));
-    assert_eq!(desk.map.safe_position_2(), 0xff_789a_bcde);
-    desk.device.resources.set_register(RemoteRegister::ENC_ST0, 1);
+    assert_eq!((desk.map.vpos(), desk.map.pos()), (0x8765_4321, 0x8765_4321));
+    assert_eq!(desk.map.vpos2(), 0xff_789a_bcde);
+    desk.device.resources_mut().set_register(RemoteRegister::ENC_ST0, 1);
     desk.v_frame();
     assert_eq!((desk.byte(0x36), desk.map.online_1().contains(Online1::SSUM)), (1, true));
     let before = Registers::new(&Dialect::SICK);
@@ -266,23 +268,23 @@ fn interrupt_lines() {
         let new = Interrupts::H_FRAME | Interrupts::VPOS | Interrupts::VPOS2;
         assert_eq!(desk.v_frame(), new);
         // An event without a mask, masks without an event.
-        desk.device.resources.set_register(RemoteRegister::ENC_ST0, 1);
+        desk.device.resources_mut().set_register(RemoteRegister::ENC_ST0, 1);
         assert_eq!(desk.v_frame(), new);
         desk.write(0x08, 0x01);
         for (address, value) in [(0x06, 0x40), (0x07, 0x00), (0x3e, 0x40)] {
             desk.write(address, value);
         }
         let _ = desk.map.take_events();
-        desk.device.resources.set_register(RemoteRegister::ENC_ST0, 0);
+        desk.device.resources_mut().set_register(RemoteRegister::ENC_ST0, 0);
         let _ = desk.v_frame();
         let _ = desk.map.take_events();
         assert_eq!(desk.v_frame(), new);
-        desk.device.resources.set_register(RemoteRegister::ENC_ST0, 1);
+        desk.device.resources_mut().set_register(RemoteRegister::ENC_ST0, 1);
         assert_eq!(desk.v_frame(), new | Interrupts::EVENT | Interrupts::SAFE_EVENT);
         // No position: no line for channel 1.
         desk.write(0x06, 0);
         desk.write(0x3e, 0);
-        desk.device.faults.no_position = true;
+        desk.device.set_fault(Fault::NoPosition);
         let _ = desk.v_frame();
         assert_eq!(desk.v_frame(), Interrupts::H_FRAME | Interrupts::VPOS2);
     }
@@ -296,18 +298,18 @@ fn sum_events() {
         let [st0, st1] = [0x40, 0x41].map(|at| RemoteRegister::new(at).unwrap());
         let event = |desk: &mut Desk| {
             let _ = desk.v_frame();
-            desk.map.take_events().0.contains(Event::SUM)
+            desk.map.take_events().drive.contains(Event::SUM)
         };
         desk.write(0x08, 0x02);
-        desk.device.resources.set_register(st0, 1);
+        desk.device.resources_mut().set_register(st0, 1);
         assert!(!event(&mut desk));
-        desk.device.resources.set_register(st1, 1);
+        desk.device.resources_mut().set_register(st1, 1);
         assert!(event(&mut desk));
         assert_eq!(event(&mut desk), dialect == Dialect::TI);
-        desk.device.resources.set_register(st1, 0);
+        desk.device.resources_mut().set_register(st1, 0);
         let _ = event(&mut desk);
         assert!(!event(&mut desk));
-        desk.device.resources.set_register(st1, 1);
+        desk.device.resources_mut().set_register(st1, 1);
         assert!(event(&mut desk));
     }
 }
@@ -317,15 +319,15 @@ fn sum_events() {
 fn flags_of_channel_1_go() {
     for dialect in DIALECTS {
         let mut desk = Desk::new(dialect, 0x00153);
-        desk.device.faults.no_position = true;
+        desk.device.set_fault(Fault::NoPosition);
         let _ = (desk.v_frame(), desk.v_frame());
         assert!(desk.map.online_1().contains(Online1::VPOS));
-        desk.device.faults.no_position = false;
+        desk.device.set_fault(Fault::None);
         let _ = (desk.v_frame(), desk.v_frame());
         assert_eq!(desk.map.online_1(), Online1::FIX1 | Online1::FRES);
-        desk.device.faults.bad_crc = true;
+        desk.device.set_fault(Fault::BadCrc);
         let _ = desk.v_frame();
-        desk.device.faults.bad_crc = false;
+        desk.device.set_fault(Fault::None);
         while !desk.map.online_1().contains(Online1::SCE) {
             let _ = desk.frame();
         }
@@ -343,14 +345,20 @@ fn fixed_bits_of_channel_2() {
 }
 
 fn word(character: Character) -> hdsl::symbol::Reading {
-    character.encode(RunningDisparity::Minus).0.read(Rule::Strict)
+    character.encode(RunningDisparity::Minus).word.read(Rule::Strict)
+}
+
+/// PIPE_S and PIPE_D.
+fn take(fifo: &mut PipeFifo) -> (u8, u8) {
+    let entry = fifo.take();
+    (entry.status, entry.data)
 }
 
 /// The FIFO of the pipe (p. 52-53): order, eight places, what is dropped, what is said with each entry.
 #[test]
 fn pipe_fifo() {
     let mut fifo = PipeFifo::new();
-    assert_eq!((fifo.take(), fifo.len(), fifo.is_empty()), ((4, 0), 0, true));
+    assert_eq!((take(&mut fifo), fifo.len(), fifo.is_empty()), ((4, 0), 0, true));
     // Three times round, so that the places wrap.
     for round in 0..3 {
         for byte in 0..5 {
@@ -359,7 +367,7 @@ fn pipe_fifo() {
         }
         assert_eq!((fifo.len(), fifo.is_empty()), (5, false));
         for byte in 0..5 {
-            assert_eq!(fifo.take(), (0, byte), "{round}");
+            assert_eq!(take(&mut fifo), (0, byte), "{round}");
         }
     }
     // Ten entries: the two oldest are gone, and that is said once, besides what the entry is.
@@ -371,16 +379,16 @@ fn pipe_fifo() {
         fifo.put(word(Character::data(byte)));
     }
     assert_eq!(fifo.len(), 8);
-    assert_eq!((fifo.take(), fifo.take().0), ((9, 0x1c), 2));
+    assert_eq!((take(&mut fifo), take(&mut fifo).0), ((9, 0x1c), 2));
     for byte in 0..6 {
-        assert_eq!(fifo.take(), (0, byte));
+        assert_eq!(take(&mut fifo), (0, byte));
     }
-    assert_eq!(fifo.take(), (4, 0));
+    assert_eq!(take(&mut fifo), (4, 0));
     // Over the bus: PIPE_S takes an entry out and freezes it for PIPE_D; in the SDK PIPE_D is the last byte.
     for dialect in DIALECTS {
         let mut desk = Desk::new(dialect, 0x00153);
         for byte in [1, 2] {
-            desk.device.pipe = Some(byte);
+            desk.device.set_pipe(Some(byte));
             let _ = desk.frame();
         }
         let read = [0x2d, 0x2e, 0x2e, 0x2d, 0x2e, 0x2d].map(|address| desk.map.read(address).unwrap());
@@ -423,7 +431,8 @@ fn accesses_of_a_remote_receiver() {
 
     // Events: those that were read are cleared.
     let mut bus = remote(Dialect::TI, &[(0x04, 0x08), (0x05, 0x22), (0x3d, 0x41)]);
-    assert_eq!(bus.take_events(), Ok((Event::from_bits_retain(0x0822), EventS::from_bits_retain(0x41))));
+    let events = Events { drive: Event::from_bits_retain(0x0822), safe: EventS::from_bits_retain(0x41) };
+    assert_eq!(bus.take_events(), Ok(events));
     assert_eq!(written(bus), [(0x04, vec![0xf7, 0xdd]), (0x3d, vec![0xbe])]);
 
     // Short messages, free (FRES, bit 0 of 53h) and not.

@@ -6,6 +6,7 @@ mod bench;
 
 use bench::Bench;
 use hdsl::cable::{Cable, Disturbance};
+use hdsl::device::{Behaviour, Fault, Transmission};
 use hdsl::message::{
     Access, Data, Length, LongAnswer, LongRequest, Offset, RemoteRegister, Requester, ResourceAddress, ShortAnswer,
     ShortRequest,
@@ -38,7 +39,7 @@ fn a_long_message_without_an_answer() {
     dialect.messages.long_frames = 100;
     let mut bench = Bench::on_cable(dialect, 0);
     bench.lock();
-    bench.device.faults.mute = true;
+    bench.device.set_fault(Fault::Mute);
     bench.write(Register::PcAdd, 0xcc);
     bench.map.write(&mut bench.master, 0x29, 0x81).unwrap();
     bench.write(Register::PcCtrl, 1);
@@ -47,7 +48,7 @@ fn a_long_message_without_an_answer() {
     let frames = (1..200).find(|_| bench.frame().finished.long.is_some());
     assert!((108..=112).contains(&frames.unwrap()), "{frames:?}");
     assert!(bench.map.event().contains(Event::ANS | Event::FREL) && bench.map.online_d().contains(OnlineD::ANS));
-    bench.device.faults.mute = false;
+    bench.device.set_fault(Fault::None);
     bench.write(Register::PcCtrl, 1);
     bench.frames(100);
     assert!(!bench.map.online_d().contains(OnlineD::ANS) && bench.map.online_d().contains(OnlineD::FREL));
@@ -105,7 +106,7 @@ fn both_bytes_of_the_check() {
 fn a_message_reset_at_the_encoder() {
     let mut bench = Bench::on_cable(Dialect::SICK, 0);
     bench.lock();
-    bench.device.behaviour.latency = 40;
+    bench.device.set_behaviour(Behaviour::new().with_latency_frames(40));
     bench.master.start_long(LongRequest::read_name(ResourceAddress::RESOLUTN)).unwrap();
     bench.frames(30);
     let dropped = bench.master.reset_messages().unwrap();
@@ -124,7 +125,8 @@ fn a_message_reset_at_the_encoder() {
 fn the_sign_of_the_clock_offset() {
     // One edge, up at bit 60 or sample 480: 484.8 and 475.2.
     let place = |ppm| {
-        let samples = Cable::new(Disturbance::default().with_clock_ppm(ppm), 1).up(Some(1 << 60));
+        let samples =
+            Cable::new(Disturbance::default().with_clock_ppm(ppm), 1).up(Some(Transmission { bits: 1 << 60 }));
         samples.iter().map(|byte| byte.count_zeros()).sum::<u32>()
     };
     assert_eq!((place(0), place(10_000), place(-10_000)), (480, 484, 475));
@@ -144,16 +146,16 @@ fn how_long_a_message_is_waited_for() {
 #[test]
 fn a_safe_position_of_before() {
     for (dialect, phase, doubtful) in
-        [(Dialect::SICK, hdsl::Phase::Position, true), (Dialect::TI, hdsl::Phase::Check, false)]
+        [(Dialect::SICK, hdsl::AlignmentStage::Position, true), (Dialect::TI, hdsl::AlignmentStage::Check, false)]
     {
         let mut bench = Bench::on_cable(dialect, 10);
         bench.lock();
         bench.frames(40);
-        bench.device.faults.bad_crc = true;
+        bench.device.set_fault(Fault::BadCrc);
         while bench.master.counters().safe1 == 0 {
             let _ = bench.frame();
         }
-        assert_eq!((bench.master.phase(), bench.master.report().doubtful), (phase, doubtful));
+        assert_eq!((bench.master.stage(), bench.master.h_frame().doubtful), (phase, doubtful));
     }
 }
 
@@ -162,16 +164,16 @@ fn a_safe_position_of_before() {
 fn a_request_that_waits_at_the_encoder() {
     let mut bench = Bench::on_cable(Dialect::SICK, 10);
     bench.lock();
-    bench.device.behaviour.latency = 40;
+    bench.device.set_behaviour(Behaviour::new().with_latency_frames(40));
     bench.master.start_short(ShortRequest::Read(RemoteRegister::PING)).unwrap();
     // Six nibbles and an IDLE: the encoder has it.
     bench.frames(10);
     bench.master.reset_messages().unwrap();
     for _ in 0..120 {
         let head = bench.master.transmission().head.bits();
-        let bits = bench.device.answer(head, bench.position as u64).unwrap();
+        let bits = bench.device.hear(head, bench.position as u64).unwrap().bits;
         let symbol = hdsl::Answer::from_bits(hdsl::Rule::Strict, bits).parameter().unwrap().symbol();
         assert!(matches!(symbol, Ok(EncoderSymbol::Idle | EncoderSymbol::Init)), "{symbol:?}");
-        bench.master.finish_bits(bits, None, None);
+        bench.master.hear_bits(bits, None, 0);
     }
 }

@@ -10,13 +10,15 @@ use hdsl::device::{Device, Heard};
 use hdsl::master::{Master, State};
 use hdsl::message::{LongRequest, RemoteRegister, ResourceAddress, ShortRequest};
 use hdsl::sampling::WINDOW;
-use hdsl::{Answer, Dialect, EncoderId, Window};
+use hdsl::{Answer, Dialect, EncoderId, Policy, Window};
 use servowire_world::{Bits, Event, Framing, Kind, Message, Rates, Scenario, Tally, Wire, World, wanted_events};
 
 /// A bit at 9.375 MBaud, a sample of it, and an H-frame of 108 bits.
 const BIT_PS: u64 = 106_667;
 const SAMPLE_PS: u64 = 13_333;
 const FRAME_NS: u64 = 11_520;
+/// For what is asked in the frame itself.
+const ANY_AGE: Policy = Policy::new(u64::MAX);
 /// 32 bits of position.
 const ID: u32 = 0x00153;
 
@@ -70,7 +72,7 @@ fn run(dialect: Dialect, seed: u64, frames: u64, rates: Rates) -> (Seen, Tally) 
     scenario.host = Scenario::quiet().host;
     let mut world = World::new(Wire { bit_ps: BIT_PS, framing: Framing::Block, devices: 1 }, scenario);
     let (mut master, mut device) = (Master::new(dialect), Device::new(EncoderId::new(ID).unwrap()));
-    device.resources.set_register(RemoteRegister::PING, 0x5a);
+    device.resources_mut().set_register(RemoteRegister::PING, 0x5a);
     let mut motion = Motion { positions: [1 << 31; 20], velocity: 0, acceleration: 0 };
     let (mut seen, mut since_poison) = (Seen::default(), u32::MAX);
     for frame in 0..frames {
@@ -84,11 +86,11 @@ fn run(dialect: Dialect, seed: u64, frames: u64, rates: Rates) -> (Seen, Tally) 
         let line = sampled(&world, begin_ns, 48);
         if let Some(heard) = Heard::on_line(&line) {
             let samples = u64::from(heard.start) + 8 * u64::from(heard.bits.len()) + 8;
-            if let Some(bits) = device.answer(heard.bits, position) {
-                world.answer(0, request, &message(bits.into(), 61), begin_ns + samples * SAMPLE_PS / 1000 + 20);
+            if let Some(answer) = device.hear(heard.bits, position) {
+                world.answer(0, request, &message(answer.bits.into(), 61), begin_ns + samples * SAMPLE_PS / 1000 + 20);
             }
         } else {
-            let _ = device.answer(Window::EMPTY, position);
+            let _ = device.hear(Window::EMPTY, position);
         }
         // The receiver samples from one bit after PARA on.
         let receive_ns = begin_ns + 27 * BIT_PS / 1000;
@@ -98,7 +100,7 @@ fn run(dialect: Dialect, seed: u64, frames: u64, rates: Rates) -> (Seen, Tally) 
         let accepted = master.alignment().and_then(|alignment| alignment.bits(&samples).ok());
         let accepted = accepted.map(|bits| Answer::from_bits(dialect.rule, bits).delta_delta());
         let words = master.counters().words;
-        let report = *master.finish(&samples, None).unwrap();
+        let report = *master.hear(&samples, world.now_ns()).unwrap();
         seen.restarts += u64::from(report.restarted.is_some());
         let poisoned = running && matches!(accepted, Some(Ok(value)) if i64::from(value.get()) != motion.acceleration);
         since_poison = if poisoned { 0 } else { since_poison.saturating_add(1) };
@@ -113,9 +115,9 @@ fn run(dialect: Dialect, seed: u64, frames: u64, rates: Rates) -> (Seen, Tally) 
         }
         // Law: a position is the true one of its instant, or none. A word that was wrong and passed all checks is found out at the
         // end of the next V-frame.
-        if let Ok(fast) = master.fast() {
+        if let Ok(fast) = master.fast().at(begin_ns, ANY_AGE) {
             seen.fast += 1;
-            if (fast.position, i64::from(fast.velocity)) != (motion.positions[0], motion.velocity) {
+            if (fast.position(), i64::from(fast.velocity())) != (motion.positions[0], motion.velocity) {
                 assert!(
                     since_poison < 16,
                     "frame {frame}: {fast:?}, truth {} {}",
@@ -125,9 +127,10 @@ fn run(dialect: Dialect, seed: u64, frames: u64, rates: Rates) -> (Seen, Tally) 
                 seen.explained += 1;
             }
         }
-        if let Ok(safe) = master.safe() {
+        if let Ok(safe) = master.safe().at(begin_ns, ANY_AGE) {
             seen.safe += 1;
-            assert_eq!(safe.position, motion.positions[usize::from(safe.age)], "frame {frame}");
+            let age = (begin_ns + FRAME_NS / 2 - safe.sampled_ns()) / FRAME_NS;
+            assert_eq!(safe.position(), motion.positions[age as usize], "frame {frame}");
         }
         // Law: a message brings what the encoder holds, or an error.
         if let Some(Ok(answer)) = report.finished.short {

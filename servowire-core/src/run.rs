@@ -6,8 +6,9 @@ use core::task::{Context, Poll, Waker};
 use crate::{Procedure, Step};
 
 /// How an exchange ended, as a procedure hears it.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Ended<T, E> {
     /// The answer or the value, or why there is none.
     pub outcome: Result<T, E>,

@@ -4,7 +4,7 @@
 //! that samples ([`spi`](crate::spi)), or a FIFO in an FPGA.
 //!
 //! [`blocking`] spins while it waits, some tens of microseconds a call; [`asynch`] gives the time back. Both have the same
-//! `Master` with the same calls.
+//! `Driver` with the same calls.
 
 #[cfg(feature = "async")]
 pub mod asynch;
@@ -15,8 +15,9 @@ use nikon_aformat::{Error, FRAME_BITS, Request, Resolution};
 use servowire_core::{Machine, Progress};
 
 /// A frame as it came from the line.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Frame {
     /// The 16 bits between start bit and delimiter, the first of the line in bit 0.
     pub content: u16,
@@ -25,6 +26,15 @@ pub struct Frame {
     /// When the delimiter ended, by the clock of the driver. `None` is the time at which the frame is taken: the port has to be
     /// asked soon enough then.
     pub end_ns: Option<u64>,
+}
+
+/// What a `Driver` was made of.
+#[derive(Debug, Clone, Copy)]
+pub struct Released<F, C> {
+    /// The port.
+    pub port: F,
+    /// The clock or timer.
+    pub clock: C,
 }
 
 /// Hands a frame that came from the port at `now_ns` to a transaction, with one encoder or with all on a line.

@@ -104,14 +104,15 @@ impl Map {
         line(out, "line", format_args!("RSSI {}, delay {} bits, edges in periods {periods}", delay >> 4, delay & 15))?;
 
         let doubt = if d.contains(OnlineD::POS) { ", not to be used: POS" } else { "" };
-        let position = number(id, map.position());
-        line(out, "fast position", format_args!("{position}, {} steps a frame{doubt}", map.velocity()))?;
+        let position = number(id, map.pos());
+        line(out, "fast position", format_args!("{position}, {} steps a frame{doubt}", map.vel()))?;
         self.safe(out, id)?;
         self.messages(out)?;
 
         let masks = format!("{:04X}h", u16::from_be_bytes(self.map.get(Register::MaskH)));
         let interrupts = self.map.masked_events();
-        let (event, event_s) = self.map.take_events();
+        let events = self.map.take_events();
+        let (event, event_s) = (events.drive, events.safe);
         line(out, "events", format_args!("{event}, mask {masks}"))?;
         let [mask_s] = self.map.get(Register::MaskS);
         line(out, "safe events", format_args!("{event_s}, mask {mask_s:02X}h"))?;
@@ -127,7 +128,7 @@ impl Map {
             flags if flags.contains(Online1::SCE) => ", not new: SCE",
             _ => "",
         };
-        let position = number(id, map.safe_position());
+        let position = number(id, map.vpos());
         line(out, "safe position", format_args!("{position}, SUMMARY {summary:02X}h, CRC {crc}{stale}"))?;
         let crc = check(map, Register::Status2, Register::VPos2, Register::VPosCrc2);
         let stale = match map.online_2() {
@@ -135,7 +136,7 @@ impl Map {
             flags if flags.contains(Online2::SCE2) => ", not new: SCE2",
             _ => "",
         };
-        let (position, status) = (map.safe_position_2(), map.status_2());
+        let (position, status) = (map.vpos2(), map.status_2());
         let fixed = if status.is_fixed_part_right() { "" } else { " (FIX2 is wrong)" };
         line(out, "safe position 2", format_args!("{position:010X}h, STATUS2 {status}{fixed}, CRC {crc}{stale}"))
     }
@@ -159,7 +160,7 @@ impl Map {
             let [detail, class] = if self.receiver == Receiver::Sick { [first, second] } else { [second, first] };
             format!("refused: {}", ResourceError::new(class, detail))
         } else {
-            let data = buffer.get(..Length::from_code(high >> 2).bytes()).unwrap_or_default();
+            let data = buffer.get(..Length::from_code(high >> 2 & 3).map_or(0, Length::bytes)).unwrap_or_default();
             let text = core::str::from_utf8(data).ok().filter(|text| text.bytes().all(|byte| byte.is_ascii_graphic()));
             let text = text.filter(|text| !text.is_empty()).map(|text| format!(" {text:?}")).unwrap_or_default();
             data.iter().fold(String::from("data"), |text, byte| format!("{text} {byte:02X}")) + &text

@@ -72,9 +72,9 @@ fn sampled() -> Vec<u8> {
         }
         let present = master.transmission();
         samples.extend(present.head.samples());
-        let answer = encoder.answer(present.head.bits(), 1000 + 5 * frame);
-        let received = answer.map_or([0xff; 72], |bits| line(bits, 21));
-        let report = master.finish(&received, None).unwrap();
+        let answer = encoder.hear(present.head.bits(), 1000 + 5 * frame);
+        let received = answer.map_or([0xff; 72], |answer| line(answer.bits, 21));
+        let h_frame = master.hear(&received, 0).unwrap();
         if present.answered {
             // Switch bit, the answer with its reserve, two bits of TRAILER that nobody drives.
             samples.push(0xff);
@@ -83,7 +83,7 @@ fn sampled() -> Vec<u8> {
         } else {
             samples.extend((0..FILLER.len()).map(|at| level(FILLER.get(at).unwrap())));
         }
-        samples.extend(report.tail.bits().map(level));
+        samples.extend(h_frame.tail.bits().map(level));
     }
     // The oldest sample in bit 0.
     samples.iter().map(|byte| byte.reverse_bits()).collect()

@@ -73,8 +73,8 @@ fn simulated(id: u8) -> (Bench, TTYPort) {
 fn hurt(scenario: Scenario, echo: bool) -> (Bench, TTYPort) {
     Bench::new(move |mut master, stop| {
         let mut device = Device::<6>::new(0x17, BitRate::Mbit2_5);
-        device.set_alarms(Almc::OS, true);
-        device.set_alarms(Almc::OS, false);
+        device.raise_alarms(Almc::OS);
+        device.end_alarms(Almc::OS);
         let mut line = Cable::new(0, scenario);
         let (begin, mut shaft) = (Instant::now(), 0);
         master.set_timeout(Duration::from_millis(5)).unwrap();
@@ -88,7 +88,7 @@ fn hurt(scenario: Scenario, echo: bool) -> (Bench, TTYPort) {
                 }
                 shaft += 1;
                 device.set_position(Abs::truncate(shaft), Abm::truncate(2));
-                if let Some(answer) = device.byte(*byte, now_ns) {
+                if let Some(answer) = device.hear(&[*byte], now_ns) {
                     for arrival in line.carry(answer.frame.as_bytes(), 0) {
                         thread::sleep(Duration::from_nanos(arrival.at_ns));
                         // In two pieces, as USB likes it.

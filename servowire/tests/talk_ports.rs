@@ -59,7 +59,7 @@ impl Write for Adapter {
         let (asked, held) = (holding.asked, holding.held);
         holding.device.set_position(Abs::truncate(asked), Abm::truncate(2));
         let mut answer = if holding.echo { bytes.to_vec() } else { Vec::new() };
-        answer.extend(holding.device.byte(bytes[0], u64::from(asked) * 1_000_000).unwrap().frame.as_bytes());
+        answer.extend(holding.device.hear(&bytes[..1], u64::from(asked) * 1_000_000).unwrap().frame.as_bytes());
         holding.coming.push((held, answer));
         Ok(1)
     }

@@ -5,16 +5,16 @@
 
 use tformat::device::{Device, Fault};
 use tformat::master::{Counters, Exchange, Line, Progress, Transaction};
-use tformat::{Abm, Abs, Almc, BitRate, Error, OutOfRange, Policy, Request, Resolution};
+use tformat::{Abm, Abs, Almc, BitRate, Error, OutOfRange, Policy, Request, Resolution, Tolerated};
 
 /// Time of one field at 2.5 Mbit/s.
 const FIELD_NS: u64 = 4_000;
 
 fn main() -> Result<(), OutOfRange> {
     let resolution = Resolution::new(23, 16)?;
-    let policy = Policy::MULTI_TURN.with_max_age_ns(125_000);
+    let policy = Policy::new(125_000).tolerating(Tolerated::MULTI_TURN);
     let mut encoder = Device::<6>::new(0x17, BitRate::Mbit2_5);
-    encoder.set_alarms(Almc::BA, true);
+    encoder.raise_alarms(Almc::BA);
     let mut counters = Counters::new();
 
     for cycle in 0..6_u32 {
@@ -24,14 +24,16 @@ fn main() -> Result<(), OutOfRange> {
         encoder.set_fault(if cycle == 3 { Fault::FlipBit { at: 37 } } else { Fault::None });
 
         // In the sixth the battery is empty.
-        encoder.set_alarms(Almc::BE, cycle == 5);
+        if cycle == 5 {
+            encoder.raise_alarms(Almc::BE);
+        }
 
         let outcome = read(&mut encoder, now_ns);
         counters.record(&outcome);
         match outcome {
             // The raw fields stay readable; control takes a position only if it may be used, and is not older than a cycle.
-            Ok(exchange) => match exchange.position(resolution, policy, now_ns + 60_000) {
-                Ok(position) => println!("{cycle}: {position} at {} ns", exchange.sampled_ns),
+            Ok(exchange) => match exchange.evidence(resolution).at(now_ns + 60_000, policy) {
+                Ok(sample) => println!("{cycle}: {sample}"),
                 Err(doubt) => println!("{cycle}: not to be used, {doubt}: {}", exchange.response),
             },
             Err(error) => println!("{cycle}: refused, {error}"),
@@ -45,13 +47,10 @@ fn main() -> Result<(), OutOfRange> {
 /// One request for ID 3 and its response, the bytes carried from one end to the other.
 fn read(encoder: &mut Device<6>, now_ns: u64) -> Result<Exchange, Error> {
     let mut transaction = Transaction::start(Request::ReadAll, Line::new(BitRate::Mbit2_5), now_ns);
-    let mut sent = None;
-    for (k, byte) in (1..).zip(transaction.frame().as_bytes()) {
-        sent = encoder.byte(*byte, now_ns + FIELD_NS * k);
-    }
-    if let Some(sent) = sent {
-        for (k, byte) in (1..).zip(sent.frame.as_bytes()) {
-            let _ = transaction.bytes(&[*byte], sent.at_ns + FIELD_NS * k);
+    let request = transaction.transmission();
+    if let Some(answer) = encoder.hear(request.frame.as_bytes(), request.end_ns) {
+        for (k, byte) in (1..).zip(answer.frame.as_bytes()) {
+            let _ = transaction.hear(&[*byte], answer.start_ns + FIELD_NS * k);
         }
     }
     match transaction.poll(now_ns + 100_000) {

@@ -58,9 +58,21 @@ impl Adf {
         Self(bits)
     }
 
-    /// The field of an address and a busy flag.
-    pub const fn of(address: Address, busy: bool) -> Self {
-        Self(address.get() | if busy { Self::BUSY } else { 0 })
+    /// The field of an address, not busy: what a master sends.
+    pub const fn of(address: Address) -> Self {
+        Self(address.get())
+    }
+
+    /// With the busy flag, as an encoder answers.
+    #[must_use]
+    pub const fn with_busy(self) -> Self {
+        Self(self.0 | Self::BUSY)
+    }
+
+    /// As an encoder answers whose memory may be busy.
+    pub(crate) const fn answered(address: Address, busy: bool) -> Self {
+        let adf = Self::of(address);
+        if busy { adf.with_busy() } else { adf }
     }
 
     /// The byte.
@@ -79,7 +91,7 @@ impl Adf {
     }
 }
 
-crate::show::one_line!(Adf {
+servowire_core::one_line!(Adf {
     adf if adf.busy() => "{} busy", adf.address();
     adf => "{}", adf.address();
 });
@@ -94,7 +106,7 @@ mod tests {
         for bits in 0..=255 {
             let adf = Adf::from_bits(bits);
             assert_eq!((adf.bits(), adf.address().get(), adf.busy()), (bits, bits % 128, bits > 127));
-            assert_eq!(Adf::of(adf.address(), adf.busy()), adf);
+            assert_eq!(Adf::answered(adf.address(), bits > 127), adf);
         }
         assert_eq!(Adf::from_bits(0x85).to_string(), "5 busy");
         assert_eq!((Address::PAGE_REGISTER.get(), Address::new(128)), (127, None));

@@ -1,5 +1,6 @@
 use crate::error::Error;
 
+servowire_core::codes! {
 /// What a request asks for: the nine documented data IDs.
 ///
 /// | ID | name | request | response |
@@ -20,89 +21,55 @@ use crate::error::Error;
 /// their documents, among them TI's own later ones, agree on the effects given here. A servo drive that trusts the table
 /// shifts its commutation angle when it means to clear an alarm.
 ///
-/// The discriminant is the code.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-#[cfg_attr(feature = "arbitrary", derive(arbitrary::Arbitrary))]
-#[repr(u8)]
-pub enum DataId {
+/// Its code is the four bits cc0..cc3 as a number, 0..=15. It prints as `ID C`.
+pub enum DataId: u8 {
     /// ID 0: reads single-turn data, ABS.
-    ReadSingleTurn = 0x0,
+    ReadSingleTurn = 0x0 => "ID 0",
     /// ID 1: reads multi-turn data, ABM.
-    ReadMultiTurn = 0x1,
+    ReadMultiTurn = 0x1 => "ID 1",
     /// ID 2: reads the encoder ID, ENID.
-    ReadEncoderId = 0x2,
+    ReadEncoderId = 0x2 => "ID 2",
     /// ID 3: reads ABS, ENID, ABM and ALMC.
-    ReadAll = 0x3,
+    ReadAll = 0x3 => "ID 3",
     /// ID 6: writes a byte of the EEPROM.
-    WriteEeprom = 0x6,
+    WriteEeprom = 0x6 => "ID 6",
     /// ID 7, ten times: clears all latched errors.
-    ResetErrors = 0x7,
+    ResetErrors = 0x7 => "ID 7",
     /// ID 8, ten times: makes the present position the single-turn zero. **Shifts the commutation angle of the motor.**
-    SetSingleTurnZero = 0x8,
+    SetSingleTurnZero = 0x8 => "ID 8",
     /// ID C, ten times: clears the multi-turn count and all errors. **The machine loses its multi-turn reference.**
-    ResetTurnsAndErrors = 0xc,
+    ResetTurnsAndErrors = 0xc => "ID C",
     /// ID D: reads a byte of the EEPROM.
-    ReadEeprom = 0xd,
+    ReadEeprom = 0xd => "ID D",
+}
 }
 
-/// The data ID with each of the sixteen codes.
-#[expect(clippy::indexing_slicing, reason = "evaluated when the crate is compiled")]
-const BY_CODE: [Option<DataId>; 16] = {
-    let (mut table, mut at) = ([None; 16], 0);
-    while at < DataId::ALL.len() {
-        table[DataId::ALL[at] as usize] = Some(DataId::ALL[at]);
-        at += 1;
-    }
-    table
-};
+/// The fields of a request and of its response, by name in the order of the line.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub struct Layout {
+    /// Of the request.
+    pub request: &'static [&'static str],
+    /// Of the response.
+    pub response: &'static [&'static str],
+}
 
 impl DataId {
-    /// All nine, in the order of their codes.
-    pub const ALL: [Self; 9] = [
-        Self::ReadSingleTurn,
-        Self::ReadMultiTurn,
-        Self::ReadEncoderId,
-        Self::ReadAll,
-        Self::WriteEeprom,
-        Self::ResetErrors,
-        Self::SetSingleTurnZero,
-        Self::ResetTurnsAndErrors,
-        Self::ReadEeprom,
-    ];
-
-    /// The fields of the request and of the response, by name in the order of the line.
-    pub const fn layout(self) -> (&'static [&'static str], &'static [&'static str]) {
+    /// The fields of the request and of the response.
+    pub const fn layout(self) -> Layout {
         const CF: &[&str] = &["CF"];
-        match self {
+        const SINGLE: &[&str] = &["CF", "SF", "ABS0", "ABS1", "ABS2", "CRC"];
+        const MEMORY: &[&str] = &["CF", "ADF", "EDF", "CRC"];
+        let (request, response): (_, &[&str]) = match self {
             Self::ReadSingleTurn | Self::ResetErrors | Self::SetSingleTurnZero | Self::ResetTurnsAndErrors => {
-                (CF, &["CF", "SF", "ABS0", "ABS1", "ABS2", "CRC"])
+                (CF, SINGLE)
             }
             Self::ReadMultiTurn => (CF, &["CF", "SF", "ABM0", "ABM1", "ABM2", "CRC"]),
             Self::ReadEncoderId => (CF, &["CF", "SF", "ENID", "CRC"]),
             Self::ReadAll => (CF, &["CF", "SF", "ABS0", "ABS1", "ABS2", "ENID", "ABM0", "ABM1", "ABM2", "ALMC", "CRC"]),
-            Self::WriteEeprom => (&["CF", "ADF", "EDF", "CRC"], &["CF", "ADF", "EDF", "CRC"]),
-            Self::ReadEeprom => (&["CF", "ADF", "CRC"], &["CF", "ADF", "EDF", "CRC"]),
-        }
-    }
-
-    /// The four bits cc0..cc3 as a number, 0..=15.
-    pub const fn code(self) -> u8 {
-        self as u8
-    }
-
-    /// The data ID with this code.
-    ///
-    /// # Errors
-    /// [`Error::UnknownDataId`] for the codes that no document describes.
-    pub const fn from_code(code: u8) -> Result<Self, Error> {
-        if code < 16 {
-            #[expect(clippy::indexing_slicing, reason = "compared with the length before")]
-            if let Some(id) = BY_CODE[code as usize] {
-                return Ok(id);
-            }
-        }
-        Err(Error::UnknownDataId { code })
+            Self::WriteEeprom => (MEMORY, MEMORY),
+            Self::ReadEeprom => (&["CF", "ADF", "CRC"], MEMORY),
+        };
+        Layout { request, response }
     }
 
     /// How often the request is sent for one act: 10 for the resets, else 1.
@@ -128,17 +95,15 @@ impl DataId {
     /// Fields of the request, 1, 3 or 4.
     #[expect(clippy::cast_possible_truncation, reason = "4 at the most")]
     pub const fn request_fields(self) -> u8 {
-        self.layout().0.len() as u8
+        self.layout().request.len() as u8
     }
 
     /// Fields of the response, 4, 6 or 11.
     #[expect(clippy::cast_possible_truncation, reason = "11 at the most")]
     pub const fn response_fields(self) -> u8 {
-        self.layout().1.len() as u8
+        self.layout().response.len() as u8
     }
 }
-
-crate::show::one_line!(DataId { id => "ID {:X}", id.code(); });
 
 /// A well-formed control field (CF): its sink code and parity are right. The data ID may be any of the sixteen.
 ///
@@ -157,7 +122,7 @@ crate::show::one_line!(DataId { id => "ID {:X}", id.code(); });
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(try_from = "u8", into = "u8"))]
 pub struct ControlField(u8);
 
-crate::show::one_line!(ControlField { Self(cf) => "CF {:02X}h", cf; });
+servowire_core::one_line!(ControlField { Self(cf) => "CF {:02X}h", cf; });
 
 impl ControlField {
     /// The control field of a data ID code; only the four low bits of `code` count.
@@ -196,7 +161,10 @@ impl ControlField {
     /// # Errors
     /// [`Error::UnknownDataId`] for the seven codes that no document describes.
     pub const fn data_id(self) -> Result<DataId, Error> {
-        DataId::from_code(self.code())
+        match DataId::from_code(self.code()) {
+            Some(id) => Ok(id),
+            None => Err(Error::UnknownDataId { code: self.code() }),
+        }
     }
 }
 
@@ -235,7 +203,7 @@ mod tests {
             let cf = ControlField::compose(code);
             assert_eq!((cf.get(), cf.data_id()), (byte, Err(Error::UnknownDataId { code })));
         }
-        assert_eq!(DataId::from_code(16), Err(Error::UnknownDataId { code: 16 }));
+        assert_eq!((DataId::from_code(0xc), DataId::from_code(16)), (Some(DataId::ResetTurnsAndErrors), None));
     }
 
     /// TIDM-1011, tables 2-4, 2-5 and 2-7.

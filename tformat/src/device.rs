@@ -1,6 +1,6 @@
 //! The encoder's side without I/O: what a simulator or a test bench runs.
 //!
-//! A [`Device`] takes a request byte by byte or bit by bit and says what it answers and when. Position, turns and alarms
+//! A [`Device`] hears a request in bytes or in bits and says what it answers and when. Position, turns and alarms
 //! are set from outside; the EEPROM, the ten-fold resets and the reaction to damaged requests are its own. Faults can
 //! be switched on to see what a master makes of them.
 //!
@@ -18,8 +18,8 @@
 //! let mut encoder = Device::<6>::new(0x17, BitRate::Mbit2_5);
 //! encoder.set_position(Abs::truncate(0x12_3456), Abm::truncate(7));
 //! // the request for ID 3, its delimiter at 4 us
-//! let sent = encoder.byte(0x1a, 4_000).expect("a response");
-//! assert_eq!(sent.at_ns, 7_000);
+//! let sent = encoder.hear(&[0x1a], 4_000).expect("a response");
+//! assert_eq!((sent.start_ns, sent.end_ns), (7_000, 51_000));
 //! assert_eq!(sent.frame.as_bytes()[2..9], [0x56, 0x34, 0x12, 0x17, 0x07, 0x00, 0x00]);
 //! ```
 
@@ -69,15 +69,17 @@ pub enum Fault {
 }
 
 /// What an encoder sends, and when.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Transmission {
     /// The fields as a UART sends them. A fault in a start bit or delimiter is only in [`line`](Self::line).
     pub frame: Frame,
     /// The line bits.
     pub line: Window,
-    /// Time of the first start bit.
-    pub at_ns: u64,
+    /// When the first start bit is on the line, in ns.
+    pub start_ns: u64,
+    /// When the last bit ends, in ns.
+    pub end_ns: u64,
 }
 
 /// Time for which a write keeps the EEPROM busy, and for which a single-turn zero is stored: 18 ms.
@@ -104,7 +106,8 @@ pub struct Device<const PAGES: usize> {
     repeated: Option<DataId>,
     repeats: u8,
     /// Start of the last reset request, and end of the response to it.
-    last_reset: (u64, u64),
+    last_reset_start_ns: u64,
+    last_reset_end_ns: u64,
     received: [u8; 4],
     len: u8,
     /// A request was judged and no pause has come since.
@@ -113,7 +116,7 @@ pub struct Device<const PAGES: usize> {
     bits: Receiver,
 }
 
-/// Line bits at one sample each, for [`Device::bit`].
+/// Line bits at one sample each, for [`Device::hear_bit`].
 const PLAIN_BITS: Format = match Format::new(1, 8) {
     Ok(format) => format,
     Err(_) => panic!(),
@@ -139,7 +142,8 @@ impl<const PAGES: usize> Device<PAGES> {
             effects: 0,
             repeated: None,
             repeats: 0,
-            last_reset: (0, 0),
+            last_reset_start_ns: 0,
+            last_reset_end_ns: 0,
             received: [0; 4],
             len: 0,
             deaf: false,
@@ -148,9 +152,9 @@ impl<const PAGES: usize> Device<PAGES> {
         }
     }
 
-    /// With other decisions where the documents leave them open.
-    pub const fn with_behaviour(self, behaviour: Behaviour) -> Self {
-        Self { behaviour, ..self }
+    /// Decides from now on what the documents leave open.
+    pub const fn set_behaviour(&mut self, behaviour: Behaviour) {
+        self.behaviour = behaviour;
     }
 
     /// How often a reset, of either kind, has had its effect since power-on.
@@ -164,15 +168,16 @@ impl<const PAGES: usize> Device<PAGES> {
         self.abm = abm;
     }
 
-    /// The cause of alarms comes or goes. A latched alarm stays set until a reset finds its cause gone.
-    pub const fn set_alarms(&mut self, alarms: Almc, present: bool) {
-        if present {
-            self.causes = self.causes.union(alarms);
-            self.almc = self.almc.union(alarms);
-        } else {
-            self.causes = self.causes.difference(alarms);
-            self.almc = self.almc.difference(alarms.difference(Almc::LATCHED));
-        }
+    /// The cause of these alarms comes: they are set.
+    pub const fn raise_alarms(&mut self, alarms: Almc) {
+        self.causes = self.causes.union(alarms);
+        self.almc = self.almc.union(alarms);
+    }
+
+    /// The cause of these alarms goes. A latched alarm stays set until a reset finds its cause gone.
+    pub const fn end_alarms(&mut self, alarms: Almc) {
+        self.causes = self.causes.difference(alarms);
+        self.almc = self.almc.difference(alarms.difference(Almc::LATCHED));
     }
 
     /// Switches a fault on or, with [`Fault::None`], off.
@@ -205,10 +210,20 @@ impl<const PAGES: usize> Device<PAGES> {
         &mut self.eeprom
     }
 
-    /// A byte was received without framing error, its delimiter at `now_ns`. Gives the response once a request is
-    /// complete.
-    pub fn byte(&mut self, byte: u8, now_ns: u64) -> Option<Transmission> {
-        if self.is_deaf(now_ns) {
+    /// Bytes were received one after the other without framing error, the delimiter of the last one at `end_ns`. Gives the
+    /// response once a request is complete.
+    pub fn hear(&mut self, bytes: &[u8], end_ns: u64) -> Option<Transmission> {
+        let field_ns = u64::from(self.rate.fields_ns(1));
+        let (mut reply, mut after) = (None, bytes.len() as u64);
+        for byte in bytes {
+            after = after.saturating_sub(1);
+            reply = self.byte(*byte, end_ns.saturating_sub(field_ns.saturating_mul(after))).or(reply);
+        }
+        reply
+    }
+
+    fn byte(&mut self, byte: u8, end_ns: u64) -> Option<Transmission> {
+        if self.is_deaf(end_ns) {
             return None;
         }
         *self.received.get_mut(usize::from(self.len))? = byte;
@@ -217,30 +232,32 @@ impl<const PAGES: usize> Device<PAGES> {
         let request = Request::parse(received.get(..usize::from(self.len))?);
         let response = match request {
             Err(Error::Truncated { .. }) => return None,
-            Ok(_) if self.fault == Fault::RejectAll => Some(self.rejection(false, false)),
-            Ok(request) => Some(self.answer(request, now_ns)),
+            Ok(request) => self.answer(request, end_ns),
             Err(error) => {
                 self.damaged();
                 match error {
                     Error::SinkCode { .. } if !self.behaviour.answers_wrong_sink => None,
-                    Error::Parity { .. } => Some(self.rejection(true, false)),
-                    _ => Some(self.rejection(false, false)),
+                    Error::Parity { .. } => self.unless_silent(self.rejection(StatusField::CA0), end_ns),
+                    _ => self.unless_silent(self.rejection(StatusField::empty()), end_ns),
                 }
             }
         };
         self.deaf = true;
-        self.transmission(response?, now_ns)
+        self.transmission(response?, end_ns)
     }
 
-    /// A byte was received with a framing error: the request is damaged.
-    pub fn framing_error(&mut self, now_ns: u64) -> Option<Transmission> {
-        if self.is_deaf(now_ns) {
+    /// A byte that ended at `end_ns` was received with a framing error: the request is damaged.
+    pub fn framing_error(&mut self, end_ns: u64) -> Option<Transmission> {
+        if self.is_deaf(end_ns) {
             return None;
         }
         self.deaf = true;
         self.damaged();
-        let answers = self.behaviour.answers_delimiter_error;
-        self.transmission(self.rejection(false, true), now_ns).filter(|_| answers)
+        if !self.behaviour.answers_delimiter_error {
+            return None;
+        }
+        let response = self.unless_silent(self.rejection(StatusField::CA1), end_ns)?;
+        self.transmission(response, end_ns)
     }
 
     fn damaged(&mut self) {
@@ -261,15 +278,32 @@ impl<const PAGES: usize> Device<PAGES> {
         self.deaf
     }
 
-    /// One line bit was received, at `now_ns`; the line idles high.
-    pub fn bit(&mut self, level: bool, now_ns: u64) -> Option<Transmission> {
+    /// One line bit was received, which ended at `end_ns`; the line idles high.
+    pub fn hear_bit(&mut self, level: bool, end_ns: u64) -> Option<Transmission> {
         let field = self.bits.push(level)?;
         let [byte, _] = field.content.to_le_bytes();
-        if field.delimiter { self.byte(byte, now_ns) } else { self.framing_error(now_ns) }
+        if field.delimiter { self.byte(byte, end_ns) } else { self.framing_error(end_ns) }
     }
 
-    /// What a sound request that ended at `now_ns` does, and the response to it.
-    pub fn answer(&mut self, request: Request, now_ns: u64) -> Response {
+    /// What a sound request that ended at `now_ns` does, and the response to it; `None` where the encoder is silent. Of the
+    /// faults, those of the line bits do not show here.
+    pub fn answer(&mut self, request: Request, now_ns: u64) -> Option<Response> {
+        let response = match self.fault {
+            Fault::RejectAll => self.rejection(StatusField::empty()),
+            _ => self.obey(request, now_ns),
+        };
+        self.unless_silent(response, now_ns)
+    }
+
+    /// Nothing leaves an encoder that is made silent, or that is at work.
+    fn unless_silent(&self, response: Response, now_ns: u64) -> Option<Response> {
+        // The request that completes the ten is still answered.
+        let storing = now_ns < self.storing_until_ns && now_ns.saturating_add(STORING_NS) > self.storing_until_ns;
+        let silent = self.fault == Fault::Silent || storing && self.behaviour.silent_while_storing;
+        (!silent).then_some(response)
+    }
+
+    fn obey(&mut self, request: Request, now_ns: u64) -> Response {
         let before = SingleTurn { sf: self.sf(), abs: self.single_turn() };
         self.count_resets(request.data_id(), now_ns);
         let after = SingleTurn { sf: self.sf(), abs: self.single_turn() };
@@ -306,11 +340,8 @@ impl<const PAGES: usize> Device<PAGES> {
     }
 
     /// The ID 3 frame that answers a damaged request.
-    fn rejection(&self, parity: bool, delimiter: bool) -> Response {
-        let mut sf = self.sf();
-        sf.set(StatusField::CA0, parity);
-        sf.set(StatusField::CA1, delimiter);
-        Response::ReadAll(self.all_data(sf))
+    fn rejection(&self, damage: StatusField) -> Response {
+        Response::ReadAll(self.all_data(self.sf().union(damage)))
     }
 
     /// Ten equal reset requests in a row, 40 us apart or more, do their work.
@@ -324,11 +355,12 @@ impl<const PAGES: usize> Device<PAGES> {
         let field_ns = u64::from(self.rate.fields_ns(1));
         let begin_ns = now_ns.saturating_sub(field_ns);
         let since_ns = begin_ns.saturating_sub(match self.behaviour.reset_interval {
-            Interval::StartToStart => self.last_reset.0,
-            Interval::EndToStart => self.last_reset.1,
+            Interval::StartToStart => self.last_reset_start_ns,
+            Interval::EndToStart => self.last_reset_end_ns,
         });
         let response_ns = u64::from(self.behaviour.response_delay_ns).saturating_add(field_ns.saturating_mul(6));
-        self.last_reset = (begin_ns, now_ns.saturating_add(response_ns));
+        self.last_reset_start_ns = begin_ns;
+        self.last_reset_end_ns = now_ns.saturating_add(response_ns);
         let continues = self.repeated == Some(id) && since_ns >= 40_000;
         self.repeats = if continues { self.repeats.saturating_add(1) } else { 1 };
         self.repeated = Some(id);
@@ -362,7 +394,7 @@ impl<const PAGES: usize> Device<PAGES> {
                 self.busy_until_ns = now_ns.saturating_add(STORING_NS);
             }
         }
-        Memory { adf: Adf::of(address, busy), edf }
+        Memory { adf: Adf::answered(address, busy), edf }
     }
 
     fn select(&mut self, page: u8) {
@@ -388,18 +420,14 @@ impl<const PAGES: usize> Device<PAGES> {
             BusyData::Ones if busy => 0xff,
             _ => held,
         };
-        Memory { adf: Adf::of(address, busy), edf }
+        Memory { adf: Adf::answered(address, busy), edf }
     }
 
     /// The response as it leaves, with the fault that is switched on.
-    fn transmission(&self, response: Response, now_ns: u64) -> Option<Transmission> {
+    fn transmission(&self, response: Response, end_ns: u64) -> Option<Transmission> {
         let sound = response.emit();
         let line = sound.line();
-        // The request that completes the ten is still answered.
-        let storing = now_ns < self.storing_until_ns && now_ns.saturating_add(STORING_NS) > self.storing_until_ns;
         let line = match self.fault {
-            Fault::Silent => return None,
-            _ if storing && self.behaviour.silent_while_storing => return None,
             Fault::FlipBit { at } if u32::from(at) < line.len() => flipped(line, 1_u128.wrapping_shl(at.into()))?,
             Fault::BadCrc => flipped(line, 0x1fe_u128.wrapping_shl(line.len().saturating_sub(Frame::FIELD_BITS)))?,
             Fault::CutAfter { fields } if (1..sound.fields()).contains(&fields) => {
@@ -409,7 +437,9 @@ impl<const PAGES: usize> Device<PAGES> {
         };
         let fields = u8::try_from(line.len() / Frame::FIELD_BITS).ok()?;
         let frame = Frame::from_line(line, fields).unwrap_or(sound);
-        Some(Transmission { frame, line, at_ns: now_ns.saturating_add(self.behaviour.response_delay_ns.into()) })
+        let start_ns = end_ns.saturating_add(self.behaviour.response_delay_ns.into());
+        let bits_ns = u64::from(line.len()).saturating_mul(self.rate.bit_ns().into());
+        Some(Transmission { frame, line, start_ns, end_ns: start_ns.saturating_add(bits_ns) })
     }
 }
 

@@ -11,16 +11,16 @@
 //! use tformat::{BitRate, Request, Response};
 //!
 //! let mut transaction = Transaction::start(Request::ReadSingleTurn, Line::new(BitRate::Mbit2_5), 0);
-//! assert_eq!(transaction.frame().as_bytes(), [0x02]);
+//! assert_eq!(transaction.transmission().frame.as_bytes(), [0x02]);
 //!
 //! // The receiver is on all the time: the UART hears the request and, 3 us later, the six fields of the response.
-//! let progress = transaction.bytes(&[0x02], 4_000);
+//! let progress = transaction.hear(&[0x02], 4_000);
 //! assert_eq!(progress, Progress::Pending { until_ns: 23_600 });
 //! // The response comes in a DMA block whose last byte ended at 31 us.
-//! let progress = transaction.bytes(&[0x02, 0x20, 0xb4, 0xbd, 0x1c, 0x37], 31_000);
+//! let progress = transaction.hear(&[0x02, 0x20, 0xb4, 0xbd, 0x1c, 0x37], 31_000);
 //! let Progress::Done { value, ready_ns: 31_000 } = progress else { panic!("{progress:?}") };
 //! assert_eq!(value.response.abs().unwrap().get(), 1_883_572);
-//! assert_eq!(value.sampled_ns, 4_480);
+//! assert_eq!((value.sampled_ns, value.began_ns), (4_480, 7_000));
 //! ```
 
 mod detection;
@@ -33,19 +33,29 @@ mod witness;
 mod zero;
 
 use crate::error::{Error, ErrorClass};
+use crate::message::{AllData, MultiTurn, SingleTurn};
 use crate::request::Request;
+use crate::response::Response;
 
 pub use detection::Detection;
 pub use eeprom::EepromAccess;
 pub use line::Line;
 pub use reset::Reset;
 pub use servowire_core::{ErrorRate, Polling};
-pub use transaction::{Exchange, Progress, Transaction, parse_echoed};
+pub use transaction::{DriverOff, Exchange, Progress, Transaction, Transmission, parse_echoed};
 pub use turns::MultiTurnZero;
 pub use zero::SingleTurnZero;
 
 /// What a procedure of several transactions wants next.
 pub type Step<T> = servowire_core::Step<Request, T, Error>;
+
+servowire_core::procedures!(Request => Response, Error {
+    Reset => SingleTurn;
+    SingleTurnZero => SingleTurn;
+    MultiTurnZero => MultiTurn;
+    EepromAccess => u8;
+    Detection => AllData;
+});
 
 /// How many transactions went well, and how many failed with which [`ErrorClass`].
 pub type Counters = servowire_core::Counters<{ ErrorClass::ALL.len() }>;

@@ -77,13 +77,13 @@ pub struct Memory {
     pub edf: u8,
 }
 
-crate::show::one_line!(SingleTurn { Self { sf, abs } => "SF [{}] ABS {}", sf, abs; });
-crate::show::one_line!(MultiTurn { Self { sf, abm } => "SF [{}] ABM {}", sf, abm; });
-crate::show::one_line!(Identification { Self { sf, enid } => "SF [{}] ENID {:02X}h", sf, enid; });
-crate::show::one_line!(AllData {
+servowire_core::one_line!(SingleTurn { Self { sf, abs } => "SF [{}] ABS {}", sf, abs; });
+servowire_core::one_line!(MultiTurn { Self { sf, abm } => "SF [{}] ABM {}", sf, abm; });
+servowire_core::one_line!(Identification { Self { sf, enid } => "SF [{}] ENID {:02X}h", sf, enid; });
+servowire_core::one_line!(AllData {
     Self { sf, abs, enid, abm, almc } => "SF [{}] ABS {} ENID {:02X}h ABM {} ALMC [{}]", sf, abs, enid, abm, almc;
 });
-crate::show::one_line!(Memory { Self { adf, edf } => "ADF {} EDF {:02X}h", adf, edf; });
+servowire_core::one_line!(Memory { Self { adf, edf } => "ADF {} EDF {:02X}h", adf, edf; });
 
 /// The control field of ID 3.
 pub(crate) const CF3: u8 = DataId::ReadAll.control_field().get();

@@ -46,14 +46,14 @@ pub enum Request {
 impl Request {
     /// Reads the EEPROM byte at `address`.
     pub const fn read_eeprom(address: Address) -> Self {
-        Self::ReadEeprom { adf: Adf::of(address, false) }
+        Self::ReadEeprom { adf: Adf::of(address) }
     }
 
     /// Writes `edf` to the EEPROM at `address`; at [`Address::PAGE_REGISTER`] it selects a page.
     ///
     /// Motor makers keep name plate and commutation data in this memory.
     pub const fn write_eeprom(address: Address, edf: u8) -> Self {
-        Self::WriteEeprom { adf: Adf::of(address, false), edf }
+        Self::WriteEeprom { adf: Adf::of(address), edf }
     }
 
     /// A request that a response would fit, from the response itself: for tools that did not see the request.
@@ -66,7 +66,7 @@ impl Request {
     pub fn answered_by(answer: &[u8]) -> Result<Self, Error> {
         let Some(&cf) = answer.first() else { return Err(Error::Truncated { got: 0, want: 1 }) };
         let field = |at: usize| answer.get(at).copied().unwrap_or(0);
-        let adf = Adf::of(Adf::from_bits(field(1)).address(), false);
+        let adf = Adf::of(Adf::from_bits(field(1)).address());
         Ok(Self::of(ControlField::parse(cf)?.data_id()?, adf, field(2)))
     }
 
@@ -133,7 +133,7 @@ impl Request {
     }
 }
 
-crate::show::one_line!(Request {
+servowire_core::one_line!(Request {
     Self::WriteEeprom { adf, edf } => "{} ADF {} EDF {:02X}h", DataId::WriteEeprom, adf, edf;
     Self::ReadEeprom { adf } => "{} ADF {}", DataId::ReadEeprom, adf;
     request => "{}", request.data_id();

@@ -44,7 +44,7 @@ pub enum Response {
     ReadEeprom(Memory),
 }
 
-crate::show::one_line!(Response {
+servowire_core::one_line!(Response {
     Self::ReadAll(data) => "{} {}", DataId::ReadAll, data;
     Self::ReadMultiTurn(data) => "{} {}", DataId::ReadMultiTurn, data;
     Self::ReadEncoderId(data) => "{} {}", DataId::ReadEncoderId, data;

@@ -11,7 +11,7 @@ pub enum BitRate {
     Mbit5,
 }
 
-crate::show::one_line!(BitRate {
+servowire_core::one_line!(BitRate {
     Self::Mbit2_5 => "2.5 Mbit/s";
     Self::Mbit5 => "5 Mbit/s";
 });

@@ -4,7 +4,9 @@
 use tformat::master::{
     EepromAccess, Exchange, Line, MultiTurnZero, Polling, Progress, Reset, SingleTurnZero, Step, Transaction,
 };
-use tformat::{Address, BitRate, Doubt, Error, ErrorClass, Page, Policy, Request, Resolution, Response};
+use tformat::{
+    Address, BitRate, Doubt, Error, ErrorClass, Page, Policy, Request, Resolution, Response, Sample, Tolerated,
+};
 
 const LOST: Result<Response, Error> = Err(Error::NoResponse { echo: false });
 const POLLING: Polling = Polling { interval_ns: 1_000, max_tries: 4 };
@@ -25,7 +27,7 @@ fn a_line_that_never_falls_silent_does_not_hold_a_transaction() {
         let mut now_ns = 4_000;
         while matches!(transaction.progress(), Progress::Pending { .. }) {
             now_ns += 4_000;
-            let _ = transaction.bytes(&[cf], now_ns);
+            let _ = transaction.hear(&[cf], now_ns);
             let _ = transaction.poll(now_ns);
             // 4 us of request, 10 us to the start bit, eleven fields of 6 us, and 5.6 us to hand the last one over.
             assert!(now_ns < 100_000, "still pending after {now_ns} ns");
@@ -40,7 +42,7 @@ fn a_line_that_never_falls_silent_does_not_hold_a_transaction() {
 fn the_slowest_response_is_waited_for_and_nothing_longer() {
     let mut transaction = Transaction::start(Request::ReadAll, Line::new(BitRate::Mbit2_5), 0);
     for k in 2..=21 {
-        let _ = transaction.bytes(&[0x1a], 4_000 * k);
+        let _ = transaction.hear(&[0x1a], 4_000 * k);
     }
     assert_eq!(transaction.progress(), Progress::Pending { until_ns: 85_600 });
     // The logged response, its fields a time-out apart and each handed over at the last moment.
@@ -49,7 +51,7 @@ fn the_slowest_response_is_waited_for_and_nothing_longer() {
     for (field, k) in fields.into_iter().zip(0..) {
         let late_ns = 18_000 + 6_000 * k + 5_599;
         assert!(matches!(transaction.poll(late_ns), Progress::Pending { .. }), "field {k}");
-        let _ = transaction.bytes(&[field], late_ns);
+        let _ = transaction.hear(&[field], late_ns);
     }
     assert!(matches!(transaction.progress(), Progress::Done { ready_ns: 83_599, .. }));
 }
@@ -176,10 +178,10 @@ fn after_a_missing_response_the_page_is_looked_at_again() {
 #[test]
 fn a_position_from_the_future_is_as_old_as_it_is_far_away() {
     let response = response(Request::ReadSingleTurn, &[0x02, 0, 1, 2, 0]).unwrap();
-    let exchange = Exchange { response, sampled_ns: 5_000_000_000 };
+    let exchange = Exchange { response, sampled_ns: 5_000_000_000, began_ns: 5_000_002_520 };
     let resolution = Resolution::new(17, 16).unwrap();
-    let policy = Policy::STRICT.with_max_age_ns(125_000);
-    let at = |now_ns| exchange.single_turn(resolution, policy, now_ns);
+    let policy = Policy::new(125_000).tolerating(Tolerated::SINGLE_TURN);
+    let at = |now_ns| exchange.evidence(resolution).at(now_ns, policy).map(Sample::single_turn);
     assert_eq!((at(5_000_125_000), at(4_999_875_000)), (Ok(0x201), Ok(0x201)));
     assert_eq!(at(17), Err(Doubt::Old { age_ns: 4_999_999_983 }));
 }

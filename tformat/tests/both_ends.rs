@@ -2,10 +2,13 @@
 #![allow(clippy::arithmetic_side_effects, clippy::cast_possible_truncation, clippy::panic, reason = "a test")]
 #![allow(clippy::cast_possible_wrap, clippy::indexing_slicing, clippy::unwrap_used, reason = "a test")]
 
+use core::convert::Infallible;
+
 use nrz_line::{Format, Receiver, Wave};
 use proptest::prelude::*;
-use tformat::device::{Device, Fault, Transmission};
-use tformat::master::{EEPROM_POLLING, EepromAccess, Line, Progress, Reset, Step, Transaction};
+use servowire_core::{Ended, Procedure};
+use tformat::device::{Device, Fault};
+use tformat::master::{EEPROM_POLLING, EepromAccess, Line, Progress, Reset, Transaction};
 use tformat::{Abm, Abs, Adf, Almc, BitRate, DataId, Error, Page, Request, Response, Window};
 
 fn encoder() -> Device<6> {
@@ -14,49 +17,38 @@ fn encoder() -> Device<6> {
     device
 }
 
-/// Sends a request by bytes and gives what the encoder sends.
-fn send(device: &mut Device<6>, bytes: &[u8], now_ns: u64) -> Option<Transmission> {
-    (1..).zip(bytes).fold(None, |sent, (k, byte)| device.byte(*byte, now_ns + 4_000 * k).or(sent))
-}
-
 /// One transaction over UARTs that hear each other; the outcome and the time it ended.
-fn transact(device: &mut Device<6>, request: Request, now_ns: u64) -> (Result<Response, Error>, u64) {
+fn transact(device: &mut Device<6>, request: Request, now_ns: u64) -> Ended<Response, Error> {
     let mut master = Transaction::start(request, Line::new(BitRate::Mbit2_5).with_echo(), now_ns);
     let sent = request.emit();
     for (k, byte) in (1..).zip(sent.as_bytes()) {
-        let _ = master.bytes(&[*byte], now_ns + 4_000 * k);
+        let _ = master.hear(&[*byte], now_ns + 4_000 * k);
     }
-    if let Some(answer) = send(device, sent.as_bytes(), now_ns) {
+    if let Some(answer) = device.hear(sent.as_bytes(), now_ns + 4_000 * sent.as_bytes().len() as u64) {
         for (k, byte) in (1..).zip(answer.frame.as_bytes()) {
-            let _ = master.bytes(&[*byte], answer.at_ns + 4_000 * k);
+            let _ = master.hear(&[*byte], answer.start_ns + 4_000 * k);
         }
     }
     match master.progress() {
-        Progress::Done { value, .. } => (Ok(value.response), now_ns + 60_000),
-        Progress::Failed { error, .. } => (Err(error), now_ns + 60_000),
+        Progress::Done { value, .. } => Ended { outcome: Ok(value.response), ready_ns: now_ns + 60_000 },
+        Progress::Failed { error, .. } => Ended { outcome: Err(error), ready_ns: now_ns + 60_000 },
         Progress::Pending { until_ns } => match master.poll(until_ns + 1) {
-            Progress::Failed { error, .. } => (Err(error), until_ns),
+            Progress::Failed { error, .. } => Ended { outcome: Err(error), ready_ns: until_ns },
             other => panic!("{other:?}"),
         },
     }
 }
 
 /// Runs a procedure to its end.
-macro_rules! run {
-    ($procedure:expr, $device:expr, $now:expr) => {{
-        let mut procedure = $procedure;
-        let mut step = procedure.start($now);
-        loop {
-            match step {
-                Step::Send { request, not_before_ns } => {
-                    let (outcome, end) = transact($device, request, not_before_ns);
-                    step = procedure.receive(outcome, end);
-                }
-                Step::Done { value, ready_ns } => break (Ok(value), ready_ns),
-                Step::Failed { error, ready_ns } => break (Err(error), ready_ns),
-            }
-        }
-    }};
+fn run<P: Procedure<Request = Request, Response = Response, Error = Error>>(
+    mut procedure: P,
+    device: &mut Device<6>,
+    now_ns: u64,
+) -> (Result<P::Value, Error>, u64) {
+    let Ok(ended) = servowire_core::run(&mut procedure, now_ns, |request, not_before_ns| {
+        Ok::<_, Infallible>(transact(device, request, not_before_ns))
+    });
+    (ended.outcome, ended.ready_ns)
 }
 
 proptest! {
@@ -64,26 +56,26 @@ proptest! {
     fn every_request_is_answered_in_kind(id in prop::sample::select(DataId::ALL.to_vec()), address in 0..128_u8, edf: u8) {
         let mut device = encoder();
         let request = Request::of(id, Adf::from_bits(address), edf);
-        let (outcome, _) = transact(&mut device, request, 100_000);
-        prop_assert_eq!(outcome.map(Response::data_id), Ok(request.data_id()));
+        let ended = transact(&mut device, request, 100_000);
+        prop_assert_eq!(ended.outcome.map(Response::data_id), Ok(request.data_id()));
     }
 }
 
 #[test]
 fn resets_do_what_the_table_says() {
     let mut device = encoder();
-    device.set_alarms(Almc::BE | Almc::OH, true);
-    device.set_alarms(Almc::BE, false);
+    device.raise_alarms(Almc::BE | Almc::OH);
+    device.end_alarms(Almc::BE);
     assert_eq!(device.almc().bits(), 0x50);
-    let (done, now_ns) = run!(Reset::clear_errors(), &mut device, 0);
+    let (done, now_ns) = run(Reset::clear_errors(), &mut device, 0);
     assert!(done.is_ok());
     // The cause of the over-heat is still there; position and turns are as before.
     assert_eq!((device.almc().bits(), device.abs().get(), device.abm().get()), (0x10, 0x51_2345, 0xfffe));
-    let (done, now_ns) = run!(Reset::set_single_turn_zero_and_shift_commutation_angle(), &mut device, now_ns);
+    let (done, now_ns) = run(Reset::set_single_turn_zero_and_shift_commutation_angle(), &mut device, now_ns);
     assert!(done.is_ok());
     assert_eq!((device.abs().get(), device.abm().get()), (0, 0xfffe));
-    device.set_alarms(Almc::OH, false);
-    let (done, _) = run!(Reset::clear_turns_and_lose_multi_turn_reference(), &mut device, now_ns);
+    device.end_alarms(Almc::OH);
+    let (done, _) = run(Reset::clear_turns_and_lose_multi_turn_reference(), &mut device, now_ns);
     assert!(done.is_ok());
     assert_eq!((device.almc().bits(), device.abm().get()), (0, 0));
 }
@@ -95,13 +87,13 @@ fn the_whole_eeprom_is_written_and_read_back() {
     for index in (0..762).step_by(31) {
         let (page, address) = Page::locate(index, 6).unwrap();
         let data = (index % 251) as u8;
-        let (value, end) = run!(EepromAccess::write(Some(page), address, data, EEPROM_POLLING), &mut device, now_ns);
+        let (value, end) = run(EepromAccess::write(Some(page), address, data, EEPROM_POLLING), &mut device, now_ns);
         assert_eq!(value, Ok(data));
         now_ns = end;
     }
     for index in (0..762).step_by(31) {
         let (page, address) = Page::locate(index, 6).unwrap();
-        let (value, end) = run!(EepromAccess::read(Some(page), address, EEPROM_POLLING), &mut device, now_ns);
+        let (value, end) = run(EepromAccess::read(Some(page), address, EEPROM_POLLING), &mut device, now_ns);
         assert_eq!(value, Ok((index % 251) as u8));
         now_ns = end;
     }
@@ -115,7 +107,7 @@ fn faults_are_seen_by_the_master() {
     let mut outcome = |fault| {
         device.set_fault(fault);
         now_ns += 1_000_000;
-        transact(&mut device, Request::ReadSingleTurn, now_ns).0
+        transact(&mut device, Request::ReadSingleTurn, now_ns).outcome
     };
     assert_eq!(outcome(Fault::Silent), Err(Error::NoResponse { echo: true }));
     assert!(matches!(outcome(Fault::BadCrc), Err(Error::Crc { .. })));
@@ -125,7 +117,7 @@ fn faults_are_seen_by_the_master() {
     assert!(matches!(outcome(Fault::RejectAll), Err(Error::Rejected { .. })));
     assert!(outcome(Fault::None).is_ok());
     device.set_fault(Fault::FlipBit { at: 9 });
-    let reply = send(&mut device, &[0x02], 20_000_000).unwrap();
+    let reply = device.hear(&[0x02], 20_004_000).unwrap();
     assert_eq!(Response::parse_line(Request::ReadSingleTurn, reply.line), Err(Error::Delimiter { field: 0 }));
 }
 
@@ -168,14 +160,14 @@ fn both_ends_over_a_poor_line() {
         device.set_position(abs, Abm::truncate(k as u32));
         let (request, now_ns) = ([Request::ReadSingleTurn, Request::ReadAll][(k % 2) as usize], k * 1_000_000);
         let mut master = Transaction::start(request, Line::new(BitRate::Mbit2_5), now_ns);
-        let heard = over_the_line(master.frame().line(), &mut seed, false);
+        let heard = over_the_line(master.transmission().frame.line(), &mut seed, false);
         assert_eq!(heard, [(request.emit().as_bytes()[0], true)]);
-        let reply = device.byte(heard[0].0, now_ns + 4_000).unwrap();
+        let reply = device.hear(&[heard[0].0], now_ns + 4_000).unwrap();
         let damaged = next(&mut seed) % 3 == 0;
         let cable_ns = next(&mut seed) % 1_000;
         for (n, (byte, framed)) in (1..).zip(over_the_line(reply.line, &mut seed, damaged)) {
-            let at_ns = reply.at_ns + cable_ns + 4_000 * n;
-            let _ = if framed { master.bytes(&[byte], at_ns) } else { master.framing_error(at_ns) };
+            let at_ns = reply.start_ns + cable_ns + 4_000 * n;
+            let _ = if framed { master.hear(&[byte], at_ns) } else { master.framing_error(at_ns) };
         }
         match master.poll(now_ns + 900_000) {
             Progress::Done { value, .. } => {

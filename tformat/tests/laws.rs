@@ -7,6 +7,7 @@ mod bench;
 
 use bench::{Bench, Seen};
 use proptest::prelude::*;
+use servowire_core::Procedure;
 use servowire_world::{Kind, Rates, Scenario, Tally, scenarios, wanted_events};
 use tformat::device::Behaviour;
 use tformat::master::{EEPROM_POLLING, EepromAccess, MultiTurnZero, Reset, SingleTurnZero, Step};
@@ -100,8 +101,7 @@ fn hostile_zero_presets() {
     zeros("zero presets", |bench, seed| {
         bench.device.set_position(Abs::truncate(0x1000 + seed as u32 % 0x1000), Abm::truncate(3));
         let mut zero = SingleTurnZero::set_and_shift_commutation_angle(Resolution::new(23, 16).unwrap(), 10);
-        let step = zero.start(bench.ready_ns);
-        bench.run(step, |outcome, ready_ns| zero.receive(outcome, ready_ns))
+        bench.run(&mut zero)
     });
 }
 
@@ -112,8 +112,7 @@ fn hostile_turn_zeros() {
         bench.trembles = seed % 2 == 0;
         bench.device.set_position(Abs::truncate(0x7f_ffff), Abm::truncate(0x10 + seed as u32 % 0x1000));
         let mut zero = MultiTurnZero::set_and_lose_multi_turn_reference(Resolution::new(23, 16).unwrap(), 1);
-        let step = zero.start(bench.ready_ns);
-        bench.run(step, |outcome, ready_ns| zero.receive(outcome, ready_ns))
+        bench.run(&mut zero)
     });
 }
 
@@ -150,8 +149,7 @@ fn hostile_resets() {
         };
         for _ in 0..2 {
             let before = bench.device.effects();
-            let step = reset.start(bench.ready_ns);
-            let end = bench.run(step, |outcome, ready_ns| reset.receive(outcome, ready_ns));
+            let end = bench.run(&mut reset);
             let effects = bench.device.effects() - before;
             if bench.forged_requests > 0 {
                 return bench;
@@ -174,11 +172,10 @@ fn hostile_error_resets() {
         let mut bench = bench(seed, MILD);
         bench.moves = false;
         bench.device.set_position(Abs::truncate(5), Abm::truncate(7));
-        bench.device.set_alarms(Almc::CE, true);
-        bench.device.set_alarms(Almc::CE, false);
+        bench.device.raise_alarms(Almc::CE);
+        bench.device.end_alarms(Almc::CE);
         let mut reset = Reset::clear_errors();
-        let step = reset.start(bench.ready_ns);
-        let end = bench.run(step, |outcome, ready_ns| reset.receive(outcome, ready_ns));
+        let end = bench.run(&mut reset);
         if end.is_ok() && bench.misheard == 0 && bench.seen.forged + bench.seen.undetected == 0 {
             assert!(bench.device.almc().is_empty() && bench.device.effects() > 0, "seed {seed}");
         }
@@ -204,6 +201,35 @@ fn repeated_on_evidence_only(
     written.push(request);
 }
 
+/// An access of which each repetition is looked at.
+struct Watched {
+    access: EepromAccess,
+    written: Vec<Request>,
+    seed: u64,
+}
+
+impl Procedure for Watched {
+    type Request = Request;
+    type Response = Response;
+    type Value = u8;
+    type Error = Error;
+
+    fn start(&mut self, now_ns: u64) -> Step<u8> {
+        let step = self.access.start(now_ns);
+        let Step::Send { request, .. } = step else { panic!("an access begins with a request") };
+        self.written = vec![request];
+        step
+    }
+
+    fn receive(&mut self, outcome: Result<Response, Error>, ready_ns: u64) -> Step<u8> {
+        let step = self.access.receive(outcome, ready_ns);
+        if let Step::Send { request, .. } = step {
+            repeated_on_evidence_only(&mut self.written, request, outcome, self.seed);
+        }
+        step
+    }
+}
+
 /// Law 5 for the EEPROM: a byte is written once at the most, to the page that was named and to no other, and the end says
 /// what is there.
 #[test]
@@ -218,17 +244,8 @@ fn hostile_eeprom_writes() {
             let at_ns = bench.ready_ns;
             let _ = bench.exchange(Request::write_eeprom(Address::truncate(126 - cell as u8), 0xff), at_ns);
         }
-        let mut access = EepromAccess::write(Page::new(page as u8), address, data, EEPROM_POLLING);
-        let step = access.start(bench.ready_ns);
-        let Step::Send { request, .. } = step else { panic!("an access begins with a request") };
-        let mut written = vec![request];
-        let end = bench.run(step, |outcome, ready_ns| {
-            let step = access.receive(outcome, ready_ns);
-            if let Step::Send { request, .. } = step {
-                repeated_on_evidence_only(&mut written, request, outcome, seed);
-            }
-            step
-        });
+        let access = EepromAccess::write(Page::new(page as u8), address, data, EEPROM_POLLING);
+        let end = bench.run(&mut Watched { access, written: Vec::new(), seed });
         if bench.forged_requests > 0 {
             return bench;
         }

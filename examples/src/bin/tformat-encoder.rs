@@ -24,7 +24,7 @@ fn main() -> io::Result<()> {
         let pause_ns = if last.elapsed() > PAUSE { 1_000_000 } else { 0 };
         now_ns = now_ns.saturating_add(FIELD_NS).saturating_add(pause_ns);
         last = Instant::now();
-        if let Some(answer) = encoder.byte(request, now_ns) {
+        if let Some(answer) = encoder.hear(&[request], now_ns) {
             shaft = shaft.wrapping_add(1_000);
             now_ns = now_ns.saturating_add(1_000_000);
             output.write_all(answer.frame.as_bytes())?;

@@ -1,8 +1,11 @@
 //! Both ends of the line, driven by any events at any time.
 
+use std::convert::Infallible;
+
+use servowire_core::{Ended, Procedure};
 use tformat::device::{Device, Fault};
 use tformat::inspect::{Cause, LineCause, inspect as look};
-use tformat::master::{EepromAccess, Line, Polling, Progress, Reset, Step, Transaction};
+use tformat::master::{EepromAccess, Line, Polling, Progress, Reset, Transaction};
 use tformat::{Abm, Abs, Address, Almc, BitRate, Error, Frame, Page, Request, Response, Window};
 
 use super::{byte, chosen};
@@ -30,7 +33,7 @@ pub fn master(mut data: &[u8]) {
             count => {
                 let block: Vec<u8> = (0..count * count - 3).map(|_| byte(&mut data)).collect();
                 received.extend(&block);
-                _ = transaction.bytes(&block, now);
+                _ = transaction.hear(&block, now);
             }
         }
     }
@@ -38,7 +41,7 @@ pub fn master(mut data: &[u8]) {
         Progress::Pending { until_ns } => transaction.poll(until_ns + 1),
         end => end,
     };
-    assert_eq!(transaction.bytes(&[0x1a], now), end);
+    assert_eq!(transaction.hear(&[0x1a], now), end);
     assert_eq!(transaction.poll(u64::MAX), end);
     match end {
         Progress::Done { value, ready_ns } => {
@@ -65,8 +68,8 @@ pub fn device(mut data: &[u8]) {
     let address = Address::new(address & 0x7f).expect("seven bits");
     let mut line = Simulated::new(data);
     line.encoder.set_position(Abs::truncate(u32::from(value) << 9), Abm::truncate(7));
-    line.encoder.set_alarms(Almc::CE, true);
-    line.encoder.set_alarms(Almc::CE, false);
+    line.encoder.raise_alarms(Almc::CE);
+    line.encoder.end_alarms(Almc::CE);
     match procedure % 5 {
         0 => {
             let done = line.reset(Reset::clear_errors());
@@ -102,31 +105,28 @@ impl<'a> Simulated<'a> {
 
     /// Whether the reset came to its end.
     fn reset(&mut self, mut reset: Reset) -> bool {
-        let mut step = reset.start(self.now_ns);
-        while let Step::Send { request, not_before_ns } = step {
-            assert_eq!(request.data_id(), reset.data_id());
-            let outcome = self.transact(request, not_before_ns);
-            step = reset.receive(outcome, self.now_ns);
-            assert!(self.requests <= u32::from(Reset::MAX_REFUSED) * u32::from(Reset::REQUESTS));
-        }
-        matches!(step, Step::Done { .. })
+        let limit = u32::from(Reset::MAX_REFUSED) * u32::from(Reset::REQUESTS);
+        self.run(&mut reset, limit).is_ok()
     }
 
     /// The byte that was read or written.
     fn access(&mut self, mut access: EepromAccess, polling: Polling) -> Result<u8, Error> {
-        let mut step = access.start(self.now_ns);
-        loop {
-            match step {
-                Step::Send { request, not_before_ns } => {
-                    let outcome = self.transact(request, not_before_ns);
-                    step = access.receive(outcome, self.now_ns);
-                    // Page, write and read-back with tries of their own, and a look at the page after each lost response.
-                    assert!(self.requests <= 6 * u32::from(polling.max_tries.max(1)) + 6);
-                }
-                Step::Done { value, .. } => return Ok(value),
-                Step::Failed { error, .. } => return Err(error),
-            }
-        }
+        // Page, write and read-back with tries of their own, and a look at the page after each lost response.
+        self.run(&mut access, 6 * u32::from(polling.max_tries.max(1)) + 6)
+    }
+
+    /// A procedure that takes no more requests than `limit`.
+    fn run<P: Procedure<Request = Request, Response = Response, Error = Error>>(
+        &mut self,
+        procedure: &mut P,
+        limit: u32,
+    ) -> Result<P::Value, Error> {
+        let Ok(ended) = servowire_core::run(procedure, self.now_ns, |request, not_before_ns| {
+            let outcome = self.transact(request, not_before_ns);
+            assert!(self.requests <= limit);
+            Ok::<_, Infallible>(Ended { outcome, ready_ns: self.now_ns })
+        });
+        ended.outcome
     }
 
     /// One request over the line, bit by bit, and its answer byte by byte.
@@ -143,15 +143,15 @@ impl<'a> Simulated<'a> {
             _ => Fault::None,
         });
         let mut transaction = Transaction::start(request, Line::new(BitRate::Mbit2_5), self.now_ns);
-        let sent = transaction.frame().line();
+        let sent = transaction.transmission().frame.line();
         let mut reply = None;
         for level in (0..sent.len()).filter_map(|at| sent.get(at)) {
             self.now_ns += 400;
-            reply = reply.or(self.encoder.bit(level, self.now_ns));
+            reply = reply.or(self.encoder.hear_bit(level, self.now_ns));
         }
         if let Some(reply) = reply {
-            assert!(reply.at_ns > self.now_ns);
-            self.now_ns = reply.at_ns;
+            assert!(reply.start_ns > self.now_ns);
+            self.now_ns = reply.start_ns;
             self.receive(&mut transaction, reply.line);
         }
         let end = loop {
@@ -175,7 +175,7 @@ impl<'a> Simulated<'a> {
             let at = field * Frame::FIELD_BITS;
             let [byte, ..] = (line.bits() >> (at + 1)).to_le_bytes();
             let _ = match (line.get(at), line.get(at + 9)) {
-                (Some(false), Some(true)) => transaction.bytes(&[byte], self.now_ns),
+                (Some(false), Some(true)) => transaction.hear(&[byte], self.now_ns),
                 _ => transaction.framing_error(self.now_ns),
             };
         }

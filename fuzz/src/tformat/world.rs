@@ -40,23 +40,20 @@ pub fn hostile(mut data: &[u8]) {
             bench.trembles = options & 16 != 0;
             bench.device.set_position(Abs::truncate(0), Abm::truncate(0x300));
             let mut zero = MultiTurnZero::set_and_lose_multi_turn_reference(widths(), 1);
-            let step = zero.start(bench.ready_ns);
-            let end = bench.run(step, |outcome, ready_ns| zero.receive(outcome, ready_ns));
+            let end = bench.run(&mut zero);
             once(&bench, end.err());
         }
         2 => {
             bench.moves = false;
             bench.device.set_position(Abs::truncate(0x1000), Abm::truncate(3));
             let mut zero = SingleTurnZero::set_and_shift_commutation_angle(widths(), 10);
-            let step = zero.start(bench.ready_ns);
-            let end = bench.run(step, |outcome, ready_ns| zero.receive(outcome, ready_ns));
+            let end = bench.run(&mut zero);
             once(&bench, end.err());
         }
         _ => {
             let (page, address) = (Page::truncate(options >> 4), Address::truncate(number.to_le_bytes()[0]));
             let mut access = EepromAccess::write(Some(page), address, 0x5a, EEPROM_POLLING);
-            let step = access.start(bench.ready_ns);
-            let _ = bench.run(step, |outcome, ready_ns| access.receive(outcome, ready_ns));
+            let _ = bench.run(&mut access);
         }
     }
 }

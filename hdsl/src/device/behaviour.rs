@@ -1,7 +1,7 @@
 use crate::symbol::RunningDisparity;
 
 /// What the documents leave to the encoder.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "arbitrary", derive(arbitrary::Arbitrary))]
@@ -21,40 +21,57 @@ pub struct Behaviour {
     pub sync_frames: u8,
     /// Place in the V-frame of the first normal answer, 0..=7: VSYNC comes 8 - n frames after the first INIT.
     pub first_place: u8,
-    /// A frame whose head it could not read does not count in its V-frame.
-    pub stalls_on_bad_head: bool,
-    /// The acknowledgement of a write repeats LLEN, without data; otherwise LLEN is 0.
-    pub acknowledges_with_length: bool,
+    /// What becomes of a frame whose head it could not read.
+    pub bad_head: BadHead,
+    /// The acknowledgement of a long write.
+    pub acknowledgement: Acknowledgement,
     /// From the sampling edge at the encoder to the instant of its position, in eighths of a bit (13.333 ns). The manual promises
     /// less than 100 ns, so up to 7 (SICK manual, p. 12).
     pub sampling_lag: u8,
     /// H-frames between a request and the first symbol of its answer.
-    pub latency: u16,
+    pub latency_frames: u16,
     /// Every n-th request is forgotten; 0 none.
     pub forgets_every: u16,
 }
 
 impl Behaviour {
     /// A polite encoder.
-    pub const PLAIN: Self = Self {
-        overload: Overload::Saturated,
-        complement: Complement::Ones,
-        second_shift: 0,
-        disparity: Disparity::CarriedOn,
-        reserved_bits: 0,
-        sync_frames: 8,
-        first_place: 0,
-        stalls_on_bad_head: false,
-        acknowledges_with_length: false,
-        sampling_lag: 0,
-        latency: 4,
-        forgets_every: 0,
-    };
+    pub const fn new() -> Self {
+        Self {
+            overload: Overload::Saturated,
+            complement: Complement::Ones,
+            second_shift: 0,
+            disparity: Disparity::CarriedOn,
+            reserved_bits: 0,
+            sync_frames: 8,
+            first_place: 0,
+            bad_head: BadHead::Counts,
+            acknowledgement: Acknowledgement::Empty,
+            sampling_lag: 0,
+            latency_frames: 4,
+            forgets_every: 0,
+        }
+    }
+
+    servowire_core::builder! {
+        with_overload: overload, Overload;
+        with_complement: complement, Complement;
+        with_second_shift: second_shift, u8;
+        with_disparity: disparity, Disparity;
+        with_reserved_bits: reserved_bits, u8;
+        with_sync_frames: sync_frames, u8;
+        with_first_place: first_place, u8;
+        with_bad_head: bad_head, BadHead;
+        with_acknowledgement: acknowledgement, Acknowledgement;
+        with_sampling_lag: sampling_lag, u8;
+        with_latency_frames: latency_frames, u16;
+        with_forgets_every: forgets_every, u16;
+    }
 }
 
 impl Default for Behaviour {
     fn default() -> Self {
-        Self::PLAIN
+        Self::new()
     }
 }
 
@@ -97,50 +114,62 @@ pub enum Disparity {
     EachAnswer(RunningDisparity),
 }
 
-/// What an encoder can be made to do wrong.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+/// What becomes of a frame whose head the encoder could not read.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "arbitrary", derive(arbitrary::Arbitrary))]
+pub enum BadHead {
+    /// It counts in its V-frame.
+    #[default]
+    Counts,
+    /// It does not count: VSYNC comes a frame later.
+    Stalls,
+}
+
+/// The acknowledgement of a long write.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "arbitrary", derive(arbitrary::Arbitrary))]
+pub enum Acknowledgement {
+    /// LLEN is 0.
+    #[default]
+    Empty,
+    /// LLEN is that of the request, though no data follow.
+    RepeatsLength,
+}
+
+/// What an encoder is made to do wrong.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "arbitrary", derive(arbitrary::Arbitrary))]
 #[non_exhaustive]
-pub struct Faults {
-    /// It does not answer.
-    pub silent: bool,
-    /// VSYNC is never set.
-    pub no_vsync: bool,
-    /// The acceleration channel carries K29.7 K29.7.
-    pub no_acceleration: bool,
-    /// Safe channel 1 carries K29.7 in the place of a position.
-    pub no_position: bool,
-    /// Safe channel 2 begins with K27.7.
-    pub no_position_2: bool,
-    /// The CRC of safe channel 1 is wrong.
-    pub bad_crc: bool,
-    /// The CRC of safe channel 2 is wrong.
-    pub bad_crc_2: bool,
-    /// STATUS2 has TEST2 set.
-    pub test_2: bool,
-    /// STATUS2 has ERR2 set.
-    pub error_2: bool,
-    /// TOG2 does not alternate.
-    pub stuck_toggle: bool,
-    /// Messages are received and not answered.
-    pub mute: bool,
-}
-
-impl Faults {
+pub enum Fault {
     /// It does everything right.
-    pub const NONE: Self = Self {
-        silent: false,
-        no_vsync: false,
-        no_acceleration: false,
-        no_position: false,
-        no_position_2: false,
-        bad_crc: false,
-        bad_crc_2: false,
-        test_2: false,
-        error_2: false,
-        stuck_toggle: false,
-        mute: false,
-    };
+    #[default]
+    None,
+    /// It does not answer.
+    Silent,
+    /// VSYNC is never set.
+    NoVsync,
+    /// The acceleration channel carries K29.7 K29.7.
+    NoAcceleration,
+    /// Safe channel 1 carries K29.7 in the place of a position.
+    NoPosition,
+    /// Safe channel 2 begins with K27.7.
+    NoPosition2,
+    /// The CRC of safe channel 1 is wrong.
+    BadCrc,
+    /// The CRC of safe channel 2 is wrong.
+    BadCrc2,
+    /// STATUS2 has TEST2 set.
+    Test2,
+    /// STATUS2 has ERR2 set.
+    Error2,
+    /// TOG2 does not alternate.
+    StuckToggle,
+    /// Messages are received and not answered.
+    Mute,
 }

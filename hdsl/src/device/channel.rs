@@ -201,7 +201,7 @@ impl Channel {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::device::Resources;
+    use crate::device::{Acknowledgement, Resources};
     use std::vec::Vec;
 
     /// What the encoder says to these bytes, sent nibble by nibble, as nibbles.
@@ -211,7 +211,7 @@ mod tests {
         let nibbles = bytes.iter().flat_map(|byte| [byte >> 4, byte & 15]);
         for symbol in nibbles.chain([IDLE]) {
             if let Some(request) = channel.hear(symbol) {
-                channel.answer(resources.answer(&request, false));
+                channel.answer(resources.answer(&request, Acknowledgement::Empty));
             }
         }
         core::iter::repeat_with(|| channel.speak()).take_while(|symbol| *symbol != IDLE).collect()

@@ -11,10 +11,10 @@ const TOLERANCE: u32 = 7;
 ///
 /// It locks on the edges of SYNC, so that its clock stands where most of them say; jitter of a sample and glitches of one do not
 /// hurt. The sampling edge is taken where it is, jitter included: that is the instant of the position.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Heard {
-    /// The bits from SYNC to PARA, for [`Device::answer`](super::Device::answer).
+    /// The bits from SYNC to PARA, for [`Device::hear`](super::Device::hear).
     pub bits: Window,
     /// The sample at which SYNC begins by the encoder's clock.
     pub start: u16,

@@ -1,5 +1,6 @@
 //! What the messages reach in the encoder, with numbers of its own.
 
+use super::behaviour::Acknowledgement;
 use super::channel::Message;
 use crate::message::RemoteRegister;
 
@@ -94,8 +95,8 @@ impl Resources {
     /// use hdsl::message::RemoteRegister;
     /// let mut encoder = Device::new(EncoderId::try_from(0x00153)?);
     /// // Bit 0 of ENC_ST0: the encoder was reset. SUMMARY shows it in every V-frame.
-    /// encoder.resources.set_register(RemoteRegister::ENC_ST0, 0x01);
-    /// assert_eq!(encoder.resources.summary(), 0x01);
+    /// encoder.resources_mut().set_register(RemoteRegister::ENC_ST0, 0x01);
+    /// assert_eq!(encoder.resources().summary(), 0x01);
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
     pub fn set_register(&mut self, register: RemoteRegister, value: u8) {
@@ -104,10 +105,10 @@ impl Resources {
         }
     }
 
-    /// What a sound request does, and the answer to it; with `echo_length` the acknowledgement of a write repeats LLEN.
-    pub(super) fn answer(&mut self, request: &Message, echo_length: bool) -> Message {
+    /// What a sound request does, and the answer to it; writes are acknowledged like this.
+    pub(super) fn answer(&mut self, request: &Message, acknowledgement: Acknowledgement) -> Message {
         match request.bytes() {
-            [first @ 0x80..=0xff, low, rest @ ..] => self.long(*first, *low, rest, echo_length),
+            [first @ 0x80..=0xff, low, rest @ ..] => self.long(*first, *low, rest, acknowledgement),
             [first, rest @ ..] => self.short(*first, rest.first().copied()),
             // Never: a request has a byte.
             [] => Message::new(&[]),
@@ -129,7 +130,7 @@ impl Resources {
     }
 
     /// ADD_H: 1, read, offset, indirect, two bits of length, two of the address.
-    fn long(&mut self, first: u8, low: u8, rest: &[u8], echo_length: bool) -> Message {
+    fn long(&mut self, first: u8, low: u8, rest: &[u8], acknowledgement: Acknowledgement) -> Message {
         let (read, with_offset, indirect) = (first & 0x40 != 0, first & 0x20 != 0, first & 0x10 != 0);
         let (offset, data) = match rest {
             [high, low, data @ ..] if with_offset => (u16::from_be_bytes([high & 0x7f, *low]), data),
@@ -150,7 +151,7 @@ impl Resources {
         };
         match result {
             Ok(data) if read => Message::new(&[&[first & !0x20, low], data.get(..length).unwrap_or(&[])]),
-            Ok(_) if echo_length => Message::new(&[&[first & !0x20, low]]),
+            Ok(_) if acknowledgement == Acknowledgement::RepeatsLength => Message::new(&[&[first & !0x20, low]]),
             Ok(_) => Message::new(&[&[first & !0x2c, low]]),
             // An error is marked where requests have their offset, and has two bytes.
             Err([class, detail]) => Message::new(&[&[first & !0x0c | 0x24, low], &[detail, class]]),
@@ -208,7 +209,7 @@ mod tests {
     use super::*;
 
     fn ask(resources: &mut Resources, request: &[u8]) -> std::vec::Vec<u8> {
-        resources.answer(&Message::new(&[request]), false).bytes().to_vec()
+        resources.answer(&Message::new(&[request]), Acknowledgement::Empty).bytes().to_vec()
     }
 
     /// SICK manual, p. 57: SRSSI keeps the worst value until it is read; writing a status register clears it (p. 79).
@@ -245,7 +246,7 @@ mod tests {
         // Indirect write of four bytes at offset 4, the last place; with and without the length in the acknowledgement.
         let write = [0xb9, 0x31, 0x80, 4, 1, 2, 3, 4];
         assert_eq!(ask(&mut resources, &write), [0x91, 0x31]);
-        assert_eq!(resources.answer(&Message::new(&[&write]), true).bytes(), [0x99, 0x31]);
+        assert_eq!(resources.answer(&Message::new(&[&write]), Acknowledgement::RepeatsLength).bytes(), [0x99, 0x31]);
         assert_eq!(ask(&mut resources, &[0xb9, 0x31, 0x80, 5, 1, 2, 3, 4]), [0xb5, 0x31, 0x13, 0x40]);
         assert_eq!(ask(&mut resources, &[0xdd, 0x31]), [0xdd, 0x31, 0, 0, 0, 0, 1, 2, 3, 4]);
         assert_eq!(ask(&mut resources, &[0xf5, 0x31, 0x80, 6]), [0xd5, 0x31, 3, 4]);

@@ -1,31 +1,30 @@
 //! The application's side of the receiver: positions to use, messages, settings.
 
-use super::{Fast, Master, Safe, State};
+use super::{Master, State};
 use crate::doubt::Doubt;
+use crate::encoder_id::EncoderId;
 use crate::error::Error;
+use crate::evidence::{Evidence, SafeEvidence};
 use crate::message::{Finished, LongRequest, ShortRequest};
 use crate::sync::{Es, Synchroniser};
 
 impl Master {
-    /// The fast position, if it may be used: the truth as long as the real speed stays below a sixteenth of the range a
-    /// frame.
-    ///
-    /// # Errors
-    /// [`Doubt::NoLink`], [`Doubt::Estimated`], [`Doubt::Alignment`], [`Doubt::Speed`].
-    pub fn fast(&self) -> Result<Fast, Doubt> {
-        let (State::Running, None, Some(id)) = (self.state, self.lost, self.encoder) else { return Err(Doubt::NoLink) };
-        let (position, velocity) = self.link.fast()?;
-        Ok(Fast { position: id.position(position), velocity })
+    /// What there is to say about the fast position after the last H-frame, to be judged where it is used.
+    pub fn fast(&self) -> Evidence {
+        self.linked().map_or(Evidence(Err(Doubt::NoLink)), |id| self.link.fast(id, self.sampled_ns()))
     }
 
-    /// The safe position of the last V-frame, if it may be used: words and CRC good, and no mark that the encoder has none.
-    ///
-    /// # Errors
-    /// [`Doubt::NoLink`], [`Doubt::NoVFrame`], [`Doubt::Stale`], [`Doubt::Withheld`].
-    pub fn safe(&self) -> Result<Safe, Doubt> {
-        let (State::Running, None, Some(id)) = (self.state, self.lost, self.encoder) else { return Err(Doubt::NoLink) };
-        let (position, summary) = self.link.safe()?;
-        Ok(Safe { position: id.position(position), age: self.link.at().saturating_add(8), summary })
+    /// What there is to say about the safe position of the last V-frame, to be judged where it is used.
+    pub fn safe(&self) -> SafeEvidence {
+        self.linked().map_or(SafeEvidence(Err(Doubt::NoLink)), |id| self.link.safe(id))
+    }
+
+    /// The encoder of a link that runs.
+    const fn linked(&self) -> Option<EncoderId> {
+        match (self.state, self.lost) {
+            (State::Running, None) => self.encoder,
+            _ => None,
+        }
     }
 
     /// Starts the link anew at the end of the present frame (PRST).
@@ -42,7 +41,7 @@ impl Master {
         Ok(self.requester.reset())
     }
 
-    /// Starts a short message; its end is in [`Report::finished`](super::Report::finished).
+    /// Starts a short message; its end is in [`HFrame::finished`](super::HFrame::finished).
     ///
     /// # Errors
     /// [`Error::NotLocked`] before the first V-frame is complete, [`Error::Busy`].
@@ -51,7 +50,7 @@ impl Master {
         self.requester.start_short(request)
     }
 
-    /// Starts a long message; its end is in [`Report::finished`](super::Report::finished).
+    /// Starts a long message; its end is in [`HFrame::finished`](super::HFrame::finished).
     ///
     /// # Errors
     /// [`Error::NotLocked`] before the first V-frame is complete, [`Error::Busy`].

@@ -1,14 +1,15 @@
 //! The running link: what is done with every answer and every V-frame.
 
-use super::{Cause, Master};
+use super::{Master, RestartReason};
 use crate::acceleration::DeltaDelta;
 use crate::answer::Answer;
 use crate::dialect::Dialect;
 use crate::doubt::Doubt;
-use crate::encoder_id::PositionBits;
+use crate::encoder_id::{EncoderId, PositionBits};
 use crate::error::Error;
+use crate::evidence::{Evidence, SafeEvidence, SafeSample};
 use crate::parameter::{EncoderByte, EncoderSymbol};
-use crate::position::{Phase, PositionTracker};
+use crate::position::{AlignmentStage, PositionTracker};
 use crate::quality::{QualityEvent, QualityMonitor, QualityRule};
 use crate::symbol::Reading;
 use crate::vframe::VFrame;
@@ -30,6 +31,9 @@ pub(super) struct Link {
     is_new: bool,
     /// The last good safe position, or none because the encoder had none.
     last_safe: Option<u64>,
+    /// When the safe position of the last V-frame was sampled, and that of the present one.
+    last_sampled_ns: u64,
+    sampled_ns: u64,
 }
 
 impl Link {
@@ -48,6 +52,8 @@ impl Link {
             last: VFrame::default(),
             is_new: false,
             last_safe: Some(0),
+            last_sampled_ns: 0,
+            sampled_ns: 0,
         }
     }
 
@@ -63,34 +69,41 @@ impl Link {
         self.settled
     }
 
-    pub(super) const fn phase(&self) -> Phase {
-        self.tracker.phase()
+    pub(super) const fn stage(&self) -> AlignmentStage {
+        self.tracker.stage()
     }
 
-    pub(super) fn fast(&self) -> Result<(u64, i32), Doubt> {
-        self.tracker.fast()
+    /// A V-frame begins after the H-frame that was sampled then.
+    pub(super) const fn latch(&mut self, sampled_ns: u64) {
+        (self.last_sampled_ns, self.sampled_ns) = (self.sampled_ns, sampled_ns);
     }
 
-    /// Safe position and SUMMARY of the last V-frame.
-    pub(super) fn safe(&self) -> Result<(u64, u8), Doubt> {
-        if !self.settled {
-            return Err(Doubt::NoVFrame);
-        }
-        match self.last.safe1.position() {
-            Ok(position) => Ok((position, self.last.safe1.status())),
+    pub(super) fn fast(&self, id: EncoderId, sampled_ns: u64) -> Evidence {
+        self.tracker.evidence(id, sampled_ns)
+    }
+
+    /// The safe position of the last V-frame.
+    pub(super) fn safe(&self, id: EncoderId) -> SafeEvidence {
+        SafeEvidence(match self.last.safe1.vpos() {
+            _ if !self.settled => Err(Doubt::NoVFrame),
+            Ok(raw) => Ok(SafeSample {
+                position: id.position(raw),
+                summary: self.last.safe1.status(),
+                sampled_ns: self.last_sampled_ns,
+            }),
             Err(Error::PositionInvalid { .. }) => Err(Doubt::Withheld),
             Err(_) => Err(Doubt::Stale),
-        }
+        })
     }
 }
 
 impl Master {
     /// One H-frame of RX0..RX7.
-    pub(super) fn run(&mut self, bits: u64) -> Result<(), Cause> {
+    pub(super) fn run(&mut self, bits: u64) -> Result<(), RestartReason> {
         let answer = Answer::from_bits(self.dialect.rule, bits);
         self.show_v_frame();
         self.link.vframe.put(self.dialect.rule, self.link.at, answer);
-        self.report.pipe = Some(answer.pipe());
+        self.h_frame.pipe = Some(answer.pipe());
         self.count_words(answer);
         let parameter = answer.parameter().ok();
         self.take_symbol(parameter);
@@ -102,14 +115,14 @@ impl Master {
             self.end_v_frame();
         }
         self.link.at = self.link.at.wrapping_add(1) & 7;
-        self.report.doubtful = self.link.tracker.is_unreliable();
-        self.report.quality = self.link.quality.value();
+        self.h_frame.doubtful = self.link.tracker.registers().pos_flag;
+        self.h_frame.quality = self.link.quality.value();
         if self.link.quality.is_lost() {
-            return Err(Cause::Quality);
+            return Err(RestartReason::Quality);
         }
-        let errors = self.link.tracker.errors();
+        let errors = self.link.tracker.registers().acc_err_cnt;
         if self.dialect.restart_on_acceleration_errors && errors > 0 && errors >= u32::from(self.threshold) {
-            return Err(Cause::AccelerationErrors);
+            return Err(RestartReason::AccelerationErrors);
         }
         Ok(())
     }
@@ -121,7 +134,7 @@ impl Master {
             return;
         }
         let last = self.link.last;
-        self.report.v_frame = Some(last);
+        self.h_frame.v_frame = Some(last);
         // The firmware of the SDK looks at channel 2 only with a good channel 1.
         if self.dialect.quality == QualityRule::Ti && last.safe1.is_sound() && last.safe2.status() & 0x40 != 0 {
             self.link.quality.count(QualityEvent::Test2);
@@ -131,7 +144,7 @@ impl Master {
     /// What is wrong with the words; mostly nothing.
     #[inline]
     fn count_words(&mut self, answer: Answer) {
-        let weak = self.report.signal.is_some_and(|signal| signal.rssi.get() < 2);
+        let weak = self.h_frame.signal.is_some_and(|signal| signal.rssi.get() < 2);
         if weak && self.dialect.quality == QualityRule::Sick {
             self.link.quality.count(QualityEvent::LowRssi);
         }
@@ -146,8 +159,8 @@ impl Master {
 
     fn take_symbol(&mut self, parameter: Option<EncoderByte>) {
         let symbol = parameter.and_then(|byte| byte.symbol().ok());
-        self.report.init = symbol == Some(EncoderSymbol::Init);
-        self.requester.take(symbol, &mut self.report.finished);
+        self.h_frame.init = symbol == Some(EncoderSymbol::Init);
+        self.requester.take(symbol, &mut self.h_frame.finished);
     }
 
     #[inline(always)]
@@ -158,9 +171,10 @@ impl Master {
         };
         let tracker = &mut self.link.tracker;
         tracker.step(value);
-        self.report.position = tracker.position();
-        self.report.velocity = tracker.velocity();
-        self.report.acceleration_errors = tracker.errors();
+        let shown = tracker.registers();
+        self.h_frame.pos = shown.pos;
+        self.h_frame.vel = shown.vel;
+        self.h_frame.acceleration_errors = shown.acc_err_cnt;
     }
 
     /// An acceleration word with something wrong: counted, and used all the same if the dialect does so.
@@ -179,7 +193,7 @@ impl Master {
     /// After RX7: judges the safe channels and aligns the fast position.
     fn end_v_frame(&mut self) {
         let VFrame { safe1, safe2 } = self.link.vframe;
-        let position = safe1.position();
+        let position = safe1.vpos();
         let sound1 = matches!(position, Ok(_) | Err(Error::PositionInvalid { .. }));
         let sound2 = safe2.is_sound();
         let link = &mut self.link;
@@ -210,5 +224,6 @@ impl Master {
         link.is_new = true;
         link.msync = !link.msync;
         link.settled = true;
+        self.latch();
     }
 }

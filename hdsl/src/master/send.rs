@@ -1,13 +1,14 @@
 //! What the receiver sends: the head of the next H-frame, before or after the answer of the present one, and the end of a frame.
 
-use super::{Cause, Master, State};
+use super::{Master, RestartReason, State};
 use crate::frame::{Extra, Head, Stuffing, Trailer};
 use crate::line_code::LineDisparity;
 use crate::parameter::{MasterSymbol, ParameterByte};
 
 /// What to send from the start of an H-frame.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct Transmission {
     /// Zeros before the frame: 16 after a restart, no need of the protocol.
     pub lead_in: u8,
@@ -21,30 +22,32 @@ pub struct Transmission {
 impl Master {
     /// The next head before the answer of the present frame is taken in, for a processor that is not done with an answer when the
     /// next head has to begin: call it while the answer comes in, send the head, and give the samples to
-    /// [`finish`](Self::finish) while it is on the line. The frame has no stuffing then.
+    /// [`hear`](Self::hear) while it is on the line. The frame has no stuffing then.
     ///
     /// What an answer changes comes a frame later on the line. If it is the end of the link, the frame that is out already is
-    /// sent to its end; [`fast`](Self::fast) and [`safe`](Self::safe) give nothing from the loss on, and the report of that frame
-    /// says why the link is started anew.
+    /// sent to its end; [`fast`](Self::fast) and [`safe`](Self::safe) give nothing from the loss on, and what [`hear`](Self::hear) gives for that
+    /// frame says why the link is started anew.
     ///
     /// `None` while the next head depends on the answer: before the link runs, in sync mode, before a restart.
     ///
     /// ```
     /// use hdsl::device::Device;
     /// use hdsl::master::{Master, State};
-    /// use hdsl::{Dialect, EncoderId};
+    /// use hdsl::{Dialect, EncoderId, Policy};
     ///
     /// let mut master = Master::new(Dialect::SICK);
     /// let mut encoder = Device::new(EncoderId::try_from(0x00153)?);
     /// let mut head = master.transmission().head;
     /// for frame in 0..200 {
-    ///     let bits = encoder.answer(head.bits(), 7 * frame).unwrap_or(u64::MAX);
+    ///     let bits = encoder.hear(head.bits(), 7 * frame).map_or(u64::MAX, |answer| answer.bits);
     ///     let next = master.ahead();
     ///     // From here on the next head may be on the line.
-    ///     master.finish_bits(bits, None, None);
+    ///     master.hear_bits(bits, None, 11_520 * frame + 10_560);
     ///     head = next.map_or(master.transmission().head, |next| next.head);
     /// }
-    /// assert_eq!((master.state(), master.fast()?.position), (State::Running, 7 * 199));
+    /// let now_ns = 11_520 * 200;
+    /// let fast = master.fast().at(now_ns, Policy::new(50_000))?;
+    /// assert_eq!((master.state(), fast.position()), (State::Running, 7 * 199));
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
     pub fn ahead(&mut self) -> Option<Transmission> {
@@ -68,7 +71,7 @@ impl Master {
     }
 
     /// Stuffing after a START frame: time for the search.
-    pub(super) fn search_time(&self, was: State, restarted: Option<Cause>) -> Stuffing {
+    pub(super) fn search_time(&self, was: State, restarted: Option<RestartReason>) -> Stuffing {
         let blocks = match (was, restarted, self.alignment) {
             (State::Start, Some(_), _) => 16,
             (State::Start, None, Some(found)) => found.delay.get().saturating_sub(1).saturating_add(4),
@@ -101,7 +104,7 @@ impl Master {
     }
 }
 
-/// A transmission, and the line disparity after it.
+/// What to send in a frame, and the line disparity after it.
 #[inline]
 pub(super) fn transmission(
     state: State,
@@ -110,21 +113,23 @@ pub(super) fn transmission(
     extra: Option<Extra>,
     disparity: LineDisparity,
 ) -> (Transmission, LineDisparity) {
-    let byte = ParameterByte::of(symbol, matches!(state, State::WaitVsync | State::Running), msync);
+    let byte = ParameterByte::of(symbol);
+    let byte = if matches!(state, State::WaitVsync | State::Running) { byte.with_first() } else { byte };
+    let byte = if msync { byte.with_msync() } else { byte };
     let (head, after) = match extra {
         // Every answered frame of a free-running link; what is constant here costs nothing.
-        None if disparity == LineDisparity::ZERO => Head::new(byte, None, LineDisparity::ZERO),
-        None => Head::new(byte, None, disparity),
-        Some(extra) => Head::new(byte, Some(extra), disparity.with_ones(extra.bits())),
+        None if disparity == LineDisparity::ZERO => Head::coded(byte, None, LineDisparity::ZERO),
+        None => Head::coded(byte, None, disparity),
+        Some(extra) => Head::coded(byte, Some(extra), disparity.with_ones(extra.bits())),
     };
     (Transmission { lead_in: 0, head, answered: !matches!(state, State::Reset | State::Sync) }, after)
 }
 
 /// How a frame ends that was sent in this state.
-pub(super) const fn trailer(before: State, restarted: Option<Cause>) -> Trailer {
+pub(super) const fn trailer(before: State, restarted: Option<RestartReason>) -> Trailer {
     match (before, restarted) {
         (State::Reset | State::Sync, _) => Trailer::Whole,
-        (State::Learn, Some(Cause::Pattern)) => Trailer::Cut,
+        (State::Learn, Some(RestartReason::Pattern)) => Trailer::Cut,
         _ => Trailer::AfterAnswer,
     }
 }

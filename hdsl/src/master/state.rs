@@ -54,10 +54,9 @@ impl State {
 
 /// Why the link was started anew.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]
-pub enum Cause {
+pub enum RestartReason {
     /// The application asked for it (PRST).
     Requested,
     /// A START frame: no encoder, or the test pattern is not there.
@@ -74,6 +73,16 @@ pub enum Cause {
     AccelerationErrors,
 }
 
+servowire_core::one_line!(RestartReason {
+    Self::Requested => "asked for";
+    Self::Learn(error) | Self::Identifier(error) => "{}", error;
+    Self::Pattern => "the test pattern came with a wrong bit";
+    Self::NoVsync => "no VSYNC after INIT";
+    Self::Quality => "the quality monitor has run out";
+    Self::AccelerationErrors => "too many acceleration words in a row could not be used";
+});
+
+impl core::error::Error for RestartReason {}
 impl fmt::Display for State {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.pad(match self {
@@ -86,18 +95,5 @@ impl fmt::Display for State {
             Self::WaitVsync => "WAIT VSYNC",
             Self::Running => "RUNNING",
         })
-    }
-}
-
-impl fmt::Display for Cause {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Requested => f.write_str("asked for"),
-            Self::Learn(error) | Self::Identifier(error) => error.fmt(f),
-            Self::Pattern => f.write_str("the test pattern came with a wrong bit"),
-            Self::NoVsync => f.write_str("no VSYNC after INIT"),
-            Self::Quality => f.write_str("the quality monitor has run out"),
-            Self::AccelerationErrors => f.write_str("too many acceleration words in a row could not be used"),
-        }
     }
 }

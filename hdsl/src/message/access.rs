@@ -1,60 +1,22 @@
 //! Requests by what they are for. Those that cannot be undone say so in their name.
 
-use core::fmt;
-
 use super::{Access, Data, Length, LongRequest, Offset, ResourceAddress};
 
-/// Who may access a resource (SICK manual, p. 90). Levels 5..=14 are not defined.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-#[cfg_attr(feature = "arbitrary", derive(arbitrary::Arbitrary))]
-#[repr(u8)]
-pub enum AccessLevel {
-    /// Everybody.
-    Public = 0,
-    /// Operator.
-    Operator = 1,
-    /// Maintenance.
-    Maintenance = 2,
-    /// Authorised client.
-    AuthorisedClient = 3,
-    /// Service.
-    Service = 4,
-    /// Nobody.
-    Never = 15,
-}
-
-impl AccessLevel {
-    /// The number, 0..=4 or 15.
-    pub const fn code(self) -> u8 {
-        self as u8
-    }
-
-    /// From the four low bits; `None` for 5..=14.
-    pub const fn from_code(code: u8) -> Option<Self> {
-        Some(match code & 15 {
-            0 => Self::Public,
-            1 => Self::Operator,
-            2 => Self::Maintenance,
-            3 => Self::AuthorisedClient,
-            4 => Self::Service,
-            15 => Self::Never,
-            _ => return None,
-        })
-    }
-}
-
-impl fmt::Display for AccessLevel {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.pad(match self {
-            Self::Public => "public",
-            Self::Operator => "operator",
-            Self::Maintenance => "maintenance",
-            Self::AuthorisedClient => "authorised client",
-            Self::Service => "service",
-            Self::Never => "never",
-        })
+servowire_core::codes! {
+    /// Who may access a resource (SICK manual, p. 90). Levels 5..=14 are not defined.
+    pub enum AccessLevel: u8 {
+        /// Everybody.
+        Public = 0 => "public",
+        /// Operator.
+        Operator = 1 => "operator",
+        /// Maintenance.
+        Maintenance = 2 => "maintenance",
+        /// Authorised client.
+        AuthorisedClient = 3 => "authorised client",
+        /// Service.
+        Service = 4 => "service",
+        /// Nobody.
+        Never = 15 => "never",
     }
 }
 
@@ -174,7 +136,7 @@ mod tests {
         assert!(!read.is_dangerous() && !LongRequest::count_up().is_dangerous());
         for code in 0..=255 {
             let level = AccessLevel::from_code(code);
-            assert_eq!(level.map(AccessLevel::code), matches!(code & 15, 0..=4 | 15).then_some(code & 15));
+            assert_eq!(level.map(AccessLevel::code), matches!(code, 0..=4 | 15).then_some(code));
         }
     }
 }

@@ -1,7 +1,5 @@
 //! User files in the memory of the encoder: resources 130h to 134h (SICK manual, p. 126-132).
 
-use core::fmt;
-
 use super::{Access, AccessLevel, Data, Length, LongRequest, Offset, ResourceAddress};
 use crate::error::Error;
 
@@ -53,13 +51,9 @@ impl From<FileName> for [u8; 8] {
     }
 }
 
-impl fmt::Display for FileName {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.pad(self.as_str())
-    }
-}
-
-servowire_core::format_as_displayed!(FileName);
+servowire_core::one_line!(FileName {
+    name => "{}", name.as_str();
+});
 
 /// Rights and size of the loaded file, as FILESTAT (132h) gives them.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -84,7 +78,7 @@ impl FileStatus {
         };
         Ok(Self {
             write: AccessLevel::from_code(rights >> 4),
-            read: AccessLevel::from_code(*rights),
+            read: AccessLevel::from_code(*rights & 15),
             size: u16::from_be_bytes([*high, *low]),
         })
     }

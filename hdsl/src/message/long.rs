@@ -1,38 +1,29 @@
-use core::fmt;
-
-use super::resource::write_address;
+use super::resource::Named;
 use super::{MessageBytes, Offset, ResourceAddress, ResourceError, checked};
 use crate::error::Error;
 
-/// LLEN: how many data bytes a long message carries or asks for.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Default)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-#[cfg_attr(feature = "arbitrary", derive(arbitrary::Arbitrary))]
-#[repr(u8)]
-#[allow(missing_docs, reason = "the name says how many")]
-pub enum Length {
-    #[default]
-    None = 0,
-    Two = 1,
-    Four = 2,
-    Eight = 3,
+servowire_core::codes! {
+    /// LLEN: how many data bytes a long message carries or asks for.
+    #[derive(Default)]
+    #[allow(missing_docs, reason = "the name says how many")]
+    pub enum Length: u8 {
+        #[default]
+        None = 0 => "0",
+        Two = 1 => "2",
+        Four = 2 => "4",
+        Eight = 3 => "8",
+    }
 }
 
 impl Length {
-    /// From the two bits LLEN.
-    pub const fn from_code(code: u8) -> Self {
-        match code & 3 {
+    /// LLEN in bits 3:2 of the first byte of a header.
+    pub(crate) const fn in_header(first: u8) -> Self {
+        match first >> 2 & 3 {
             0 => Self::None,
             1 => Self::Two,
             2 => Self::Four,
             _ => Self::Eight,
         }
-    }
-
-    /// The two bits LLEN.
-    pub const fn code(self) -> u8 {
-        self as u8
     }
 
     /// 0, 2, 4 or 8.
@@ -118,15 +109,13 @@ impl From<Data> for (Length, [u8; 8]) {
     }
 }
 
-/// `4D 4F 54 4F`
-impl fmt::Display for Data {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        for (at, byte) in self.as_bytes().iter().enumerate() {
-            write!(f, "{}{byte:02X}", if at == 0 { "" } else { " " })?;
-        }
-        Ok(())
-    }
-}
+servowire_core::one_line!(Data {
+    Self { length: Length::None, .. } => "";
+    Self { length: Length::Two, bytes: [a, b, ..] } => "{:02X} {:02X}", a, b;
+    Self { length: Length::Four, bytes: [a, b, c, d, ..] } => "{:02X} {:02X} {:02X} {:02X}", a, b, c, d;
+    Self { bytes: [b0, b1, b2, b3, b4, b5, b6, b7], .. } =>
+        "{:02X} {:02X} {:02X} {:02X} {:02X} {:02X} {:02X} {:02X}", b0, b1, b2, b3, b4, b5, b6, b7;
+});
 
 /// What a long message wants.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -194,14 +183,14 @@ const fn address(first: u8, second: u8) -> ResourceAddress {
 /// Bytes of a long request that begins with this byte.
 pub(super) const fn request_len(first: u8) -> usize {
     let offset = if first & LOFF != 0 { 2 } else { 0 };
-    let data = if first & LRW == 0 { Length::from_code(first >> 2).bytes() } else { 0 };
+    let data = if first & LRW == 0 { Length::in_header(first).bytes() } else { 0 };
     4_usize.saturating_add(offset).saturating_add(data)
 }
 
 /// Bytes of a long answer that begins with this byte: the acknowledgement of a write has no data whatever its LLEN.
 pub(super) const fn answer_len(first: u8) -> usize {
     let has_data = first & (LRW | LOFF) != 0;
-    4_usize.saturating_add(if has_data { Length::from_code(first >> 2).bytes() } else { 0 })
+    4_usize.saturating_add(if has_data { Length::in_header(first).bytes() } else { 0 })
 }
 
 fn long_start(bytes: &[u8]) -> Result<u8, Error> {
@@ -267,11 +256,8 @@ impl LongRequest {
             offset = Some(Offset::truncate(u16::from_be_bytes([*high, *low])));
             rest = after;
         }
-        let access = if first & LRW != 0 {
-            Access::Read(Length::from_code(first >> 2))
-        } else {
-            Access::Write(Data::new(rest)?)
-        };
+        let access =
+            if first & LRW != 0 { Access::Read(Length::in_header(*first)) } else { Access::Write(Data::new(rest)?) };
         Ok(Self { address: address(*first, *low), indirect: first & LIND != 0, offset, access })
     }
 
@@ -373,34 +359,47 @@ impl LongAnswer {
     }
 }
 
-/// `indirect read of 081h RESOLUTN, 4 bytes, offset 0`
-impl fmt::Display for LongRequest {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(if self.indirect { "indirect " } else { "direct " })?;
-        f.write_str(if self.is_read() { "read of " } else { "write to " })?;
-        write_address(f, self.address)?;
-        match &self.access {
-            Access::Read(length) => write!(f, ", {} bytes", length.bytes())?,
-            Access::Write(data) if data.length() == Length::None => f.write_str(" without data")?,
-            Access::Write(data) => write!(f, ": {data}")?,
+impl LongRequest {
+    const fn verb(&self) -> &'static str {
+        match (self.indirect, self.is_read()) {
+            (true, true) => "indirect read of",
+            (true, false) => "indirect write to",
+            (false, true) => "direct read of",
+            (false, false) => "direct write to",
         }
-        self.offset.map_or(Ok(()), |offset| write!(f, ", offset {offset}"))
     }
-}
 
-/// `081h RESOLUTN holds 00 80 00 00`
-impl fmt::Display for LongAnswer {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write_address(f, self.address)?;
-        match &self.result {
-            Ok(data) if self.read => write!(f, " holds {data}"),
-            Ok(_) => f.write_str(" is written"),
-            Err(error) => write!(f, " refused: {error}"),
+    /// The offset, for a text in which it stands.
+    const fn shown_offset(&self) -> u16 {
+        match self.offset {
+            Some(offset) => offset.get(),
+            None => 0,
         }
     }
 }
 
-servowire_core::format_as_displayed!(Data, LongRequest, LongAnswer);
+// `indirect read of 081h RESOLUTN, 4 bytes, offset 0`
+servowire_core::one_line!(LongRequest {
+    request @ Self { access: Access::Read(length), address, offset: None, .. } =>
+        "{} {}, {} bytes", request.verb(), Named(*address), length.bytes();
+    request @ Self { access: Access::Read(length), address, .. } =>
+        "{} {}, {} bytes, offset {}", request.verb(), Named(*address), length.bytes(), request.shown_offset();
+    request @ Self { access: Access::Write(Data { length: Length::None, .. }), address, offset: None, .. } =>
+        "{} {} without data", request.verb(), Named(*address);
+    request @ Self { access: Access::Write(Data { length: Length::None, .. }), address, .. } =>
+        "{} {} without data, offset {}", request.verb(), Named(*address), request.shown_offset();
+    request @ Self { access: Access::Write(data), address, offset: None, .. } =>
+        "{} {}: {}", request.verb(), Named(*address), data;
+    request @ Self { access: Access::Write(data), address, .. } =>
+        "{} {}: {}, offset {}", request.verb(), Named(*address), data, request.shown_offset();
+});
+
+// `081h RESOLUTN holds 00 80 00 00`
+servowire_core::one_line!(LongAnswer {
+    Self { address, result: Ok(data), read: true, .. } => "{} holds {}", Named(*address), data;
+    Self { address, result: Ok(_), .. } => "{} is written", Named(*address);
+    Self { address, result: Err(error), .. } => "{} refused: {}", Named(*address), error;
+});
 
 #[cfg(feature = "arbitrary")]
 #[cfg_attr(docsrs, doc(cfg(feature = "arbitrary")))]

@@ -52,6 +52,7 @@ enum Slot<T> {
 /// What came to its end in an H-frame.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Finished {
     /// The short message.
     pub short: Option<Result<ShortAnswer, Error>>,

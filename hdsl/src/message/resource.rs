@@ -1,7 +1,5 @@
 //! Addresses of resources, and why an encoder refuses access to one.
 
-use core::fmt;
-
 servowire_core::number! {
     /// Address of a resource, 10 bits (SICK manual, p. 86-133).
     pub struct ResourceAddress(u16, 10);
@@ -100,10 +98,13 @@ addresses! {
 }
 
 /// The address as the manual writes it, with its name: `081h RESOLUTN`.
-pub(super) fn write_address(f: &mut fmt::Formatter<'_>, address: ResourceAddress) -> fmt::Result {
-    write!(f, "{:03X}h", address.get())?;
-    address.name().map_or(Ok(()), |name| write!(f, " {name}"))
-}
+#[derive(Clone, Copy)]
+pub(super) struct Named(pub(super) ResourceAddress);
+
+servowire_core::one_line!(Named {
+    Self(address) if address.name().is_none() => "{:03X}h", address.get();
+    Self(address) => "{:03X}h {}", address.get(), address.name().unwrap_or("");
+});
 
 servowire_core::number! {
     /// Offset within a resource, 15 bits.
@@ -214,19 +215,12 @@ impl ResourceError {
     }
 }
 
-impl fmt::Display for ResourceError {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self.meaning() {
-            Some(meaning) => f.write_str(meaning)?,
-            None => f.write_str("undocumented")?,
-        }
-        write!(f, " (class {:02X}h, detail {:02X}h)", self.class, self.detail)
-    }
-}
+servowire_core::one_line!(ResourceError {
+    error =>
+        "{} (class {:02X}h, detail {:02X}h)", error.meaning().unwrap_or("undocumented"), error.class, error.detail;
+});
 
 impl core::error::Error for ResourceError {}
-
-servowire_core::format_as_displayed!(ResourceError);
 
 #[cfg(test)]
 mod tests {

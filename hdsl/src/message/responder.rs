@@ -2,8 +2,8 @@ use super::{Collector, LongAnswer, LongRequest, MessageBytes, Sender, ShortAnswe
 use crate::parameter::{EncoderSymbol, MasterSymbol};
 
 /// A sound request that an encoder received.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum Request {
     /// Access to a register.
     Short(ShortRequest),
@@ -11,14 +11,10 @@ pub enum Request {
     Long(LongRequest),
 }
 
-impl core::fmt::Display for Request {
-    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
-        match self {
-            Self::Short(request) => request.fmt(f),
-            Self::Long(request) => request.fmt(f),
-        }
-    }
-}
+servowire_core::one_line!(Request {
+    Self::Short(request) => "{}", request;
+    Self::Long(request) => "{}", request;
+});
 
 /// The encoder's side of the parameters channel.
 ///

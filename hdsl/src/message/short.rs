@@ -1,5 +1,3 @@
-use core::fmt;
-
 use servowire_core::OutOfRange;
 
 use super::{MessageBytes, checked};
@@ -180,34 +178,19 @@ impl ShortAnswer {
     }
 }
 
-/// `7Ch`
-impl fmt::Display for RemoteRegister {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{:02X}h", self.0)
-    }
-}
+servowire_core::one_line!(RemoteRegister {
+    Self(address) => "{:02X}h", address;
+});
 
-/// `write register 7Fh = A5h`
-impl fmt::Display for ShortRequest {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Read(register) => write!(f, "read register {register}"),
-            Self::Write(register, value) => write!(f, "write register {register} = {value:02X}h"),
-        }
-    }
-}
+servowire_core::one_line!(ShortRequest {
+    Self::Read(register) => "read register {}", register;
+    Self::Write(register, value) => "write register {} = {:02X}h", register, value;
+});
 
-/// `register 7Ch holds 07h`
-impl fmt::Display for ShortAnswer {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self.data {
-            Some(data) => write!(f, "register {} holds {data:02X}h", self.register),
-            None => write!(f, "register {} is written", self.register),
-        }
-    }
-}
-
-servowire_core::format_as_displayed!(RemoteRegister, ShortRequest, ShortAnswer);
+servowire_core::one_line!(ShortAnswer {
+    Self { register, data: Some(data) } => "register {} holds {:02X}h", register, data;
+    Self { register, data: None } => "register {} is written", register;
+});
 
 #[cfg(feature = "arbitrary")]
 impl<'a> arbitrary::Arbitrary<'a> for RemoteRegister {

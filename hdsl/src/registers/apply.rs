@@ -1,8 +1,8 @@
-//! From the report of an H-frame to the registers.
+//! From what an H-frame brought to the registers.
 
 use super::{Event, EventS, Interrupts, Online1, Online2, OnlineD, Register, RegisterRule, Registers};
 use crate::error::Error;
-use crate::master::{Report, State};
+use crate::master::{HFrame, State};
 use crate::message::LongAnswer;
 use crate::vframe::{SafeBlock, VFrame};
 
@@ -11,25 +11,25 @@ const STATUS_EVENTS: u16 = OnlineD::POS.bits() | OnlineD::QMLW.bits();
 
 impl Registers {
     /// Takes over what an H-frame brought; the interrupt lines that are active then.
-    pub fn apply(&mut self, report: &Report) -> Interrupts {
-        if report.restarted.is_some() {
-            self.messages(report);
+    pub fn apply(&mut self, h_frame: &HFrame) -> Interrupts {
+        if h_frame.restarted.is_some() {
+            self.messages(h_frame);
             self.restart();
             return self.masked_events();
         }
         let mut news = Interrupts::empty();
-        if let Some(frame) = &report.v_frame {
+        if let Some(frame) = &h_frame.v_frame {
             news = match self.rule {
                 RegisterRule::Sick => self.v_frame(frame),
                 RegisterRule::Ti => self.v_frame_ti(frame),
             };
         }
-        self.numbers(report);
-        self.messages(report);
-        self.status(report);
-        if report.state == State::Running {
+        self.numbers(h_frame);
+        self.messages(h_frame);
+        self.status(h_frame);
+        if h_frame.state == State::Running {
             // The sampling instant's frame is over; safe positions come once a V-frame.
-            self.put(Register::PosTx, [if report.v_frame.is_some() { 3 } else { 2 }]);
+            self.put(Register::PosTx, [if h_frame.v_frame.is_some() { 3 } else { 2 }]);
             news.insert(Interrupts::H_FRAME);
         }
         news | self.masked_events()
@@ -79,26 +79,26 @@ impl Registers {
     }
 
     /// What is shown as it is.
-    fn numbers(&mut self, report: &Report) {
-        if let Some(id) = report.encoder {
+    fn numbers(&mut self, h_frame: &HFrame) {
+        if let Some(id) = h_frame.encoder {
             let [_, high, middle, low] = id.get().to_be_bytes();
             self.put(Register::EncId, [high << 4 | high, middle, low]);
         }
-        let linked = report.state > State::IdReq;
-        self.put(Register::MasterQm, [if linked { 0x80 | report.quality } else { 0 }]);
-        if let Some(signal) = report.signal {
+        let linked = h_frame.state > State::IdReq;
+        self.put(Register::MasterQm, [if linked { 0x80 | h_frame.quality } else { 0 }]);
+        if let Some(signal) = h_frame.signal {
             self.put(Register::Edges, [signal.edges, signal.rssi.get() << 4 | signal.delay.get()]);
         }
-        if report.was != State::Running {
+        if h_frame.was != State::Running {
             return;
         }
-        self.put40(Register::Pos, report.position);
-        let [_, velocity @ ..] = report.velocity.to_be_bytes();
+        self.put40(Register::Pos, h_frame.pos);
+        let [_, velocity @ ..] = h_frame.vel.to_be_bytes();
         self.put::<3>(Register::Vel, velocity);
         let most = if self.rule == RegisterRule::Sick { 31 } else { 255 };
-        let errors = u8::try_from(report.acceleration_errors.min(most)).unwrap_or(u8::MAX);
+        let errors = u8::try_from(h_frame.acceleration_errors.min(most)).unwrap_or(u8::MAX);
         self.put(Register::AccErrCnt, [errors]);
-        if let Some(word) = report.pipe {
+        if let Some(word) = h_frame.pipe {
             match self.rule {
                 RegisterRule::Sick => self.pipe.put(word),
                 RegisterRule::Ti => self.put(Register::PipeD, [word.raw()]),
@@ -107,27 +107,27 @@ impl Registers {
     }
 
     /// Online status, and the events that go with it.
-    fn status(&mut self, report: &Report) {
+    fn status(&mut self, h_frame: &HFrame) {
         let (before, mut d) = (self.online_d(), self.online_d());
         let [mut one, mut two] = [self.online_1().bits(), self.online_2().bits()];
-        let low = report.quality < crate::quality::QualityMonitor::LOW;
+        let low = h_frame.quality < crate::quality::QualityMonitor::LOW;
         for (flag, on) in [
-            (OnlineD::PRST, report.state <= State::Check),
-            (OnlineD::POS, report.doubtful),
+            (OnlineD::PRST, h_frame.state <= State::Check),
+            (OnlineD::POS, h_frame.doubtful),
             (OnlineD::QMLW, low),
-            (OnlineD::MIN, report.init),
-            (OnlineD::FREL, report.long_free),
+            (OnlineD::MIN, h_frame.init),
+            (OnlineD::FREL, h_frame.long_free),
         ] {
             d.set(flag, on);
         }
         // These three have the same places in all, and QMLW, PRST in channel 2.
         let common = (OnlineD::PRST | OnlineD::QMLW | OnlineD::MIN).bits();
-        one = one & !common & !Online1::FRES.bits() | d.bits() & common | u16::from(report.short_free);
+        one = one & !common & !Online1::FRES.bits() | d.bits() & common | u16::from(h_frame.short_free);
         let common = (OnlineD::PRST | OnlineD::QMLW).bits();
         two = two & !common | d.bits() & common;
         self.put(Register::OnlineStatus1, one.to_be_bytes());
         self.put(Register::OnlineStatus2, two.to_be_bytes());
-        match &report.finished.long {
+        match &h_frame.finished.long {
             Some(Ok(_)) => d.remove(OnlineD::ANS),
             Some(Err(Error::Dropped)) | None => {}
             Some(Err(_)) => d.insert(OnlineD::ANS),
@@ -139,15 +139,15 @@ impl Registers {
             RegisterRule::Ti => d,
         };
         let mut events = Event::from_bits_retain(arisen.bits() & STATUS_EVENTS);
-        events.set(Event::MIN, report.init);
-        events.set(Event::FREL, d.difference(before).contains(OnlineD::FREL) || report.finished.long.is_some());
-        events.set(Event::ANS, matches!(report.finished.long, Some(Err(error)) if error != Error::Dropped));
+        events.set(Event::MIN, h_frame.init);
+        events.set(Event::FREL, d.difference(before).contains(OnlineD::FREL) || h_frame.finished.long.is_some());
+        events.set(Event::ANS, matches!(h_frame.finished.long, Some(Err(error)) if error != Error::Dropped));
         let mut safe = EventS::empty();
         safe.set(EventS::QMLW, arisen.contains(OnlineD::QMLW));
-        safe.set(EventS::MIN, report.init);
+        safe.set(EventS::MIN, h_frame.init);
         safe.set(
             EventS::FRES,
-            report.state == State::Running && report.was != State::Running || report.finished.short.is_some(),
+            h_frame.state == State::Running && h_frame.was != State::Running || h_frame.finished.short.is_some(),
         );
         if !events.is_empty() {
             self.raise(events);
@@ -158,8 +158,8 @@ impl Registers {
     }
 
     /// The ends of messages.
-    fn messages(&mut self, report: &Report) {
-        if let Some(result) = &report.finished.short {
+    fn messages(&mut self, h_frame: &HFrame) {
+        if let Some(result) = &h_frame.finished.short {
             if let Ok(answer) = result {
                 if let Some(data) = answer.data {
                     self.put(Register::SPcData, [data]);
@@ -167,7 +167,7 @@ impl Registers {
             }
             self.put(Register::SlaveRegCtrl, [0x3f]);
         }
-        if let Some(result) = &report.finished.long {
+        if let Some(result) = &h_frame.finished.long {
             if let Ok(answer) = result {
                 self.long_answer(answer);
             }
@@ -199,10 +199,10 @@ impl Registers {
         let before = one;
         one.set(Online1::SCE, !safe1.is_sound());
         if safe1.is_sound() {
-            let withheld = safe1.position().is_err();
+            let withheld = safe1.vpos().is_err();
             one.set(Online1::VPOS, withheld);
             self.summary(safe1.status(), &mut one);
-            self.put40(Register::VPos, safe1.raw_position());
+            self.put40(Register::VPos, safe1.raw_vpos());
             self.put(Register::VPosCrc, safe1.raw_crc().to_be_bytes());
             news.set(Interrupts::VPOS, !withheld);
         }
@@ -231,7 +231,7 @@ impl Registers {
         let mut news = Interrupts::empty();
         self.summary(safe1.status(), &mut one);
         self.put(Register::VPosCrc, safe1.raw_crc().to_be_bytes());
-        match safe1.position() {
+        match safe1.vpos() {
             Ok(position) => {
                 self.put40(Register::VPos, position);
                 one.remove(Online1::SCE | Online1::VPOS);
@@ -282,9 +282,9 @@ impl Registers {
     fn safe_2(&mut self, safe2: SafeBlock, two: &mut Online2) {
         let status = safe2.status();
         self.put(Register::Status2, [status]);
-        self.put40(Register::VPos2, safe2.raw_position());
+        self.put40(Register::VPos2, safe2.raw_vpos());
         self.put(Register::VPosCrc2, safe2.raw_crc().to_be_bytes());
         two.set(Online2::SUM2, status & 0x60 != 0);
-        two.set(Online2::VPOS2, matches!(safe2.position(), Err(Error::PositionInvalid { .. })));
+        two.set(Online2::VPOS2, matches!(safe2.vpos(), Err(Error::PositionInvalid { .. })));
     }
 }

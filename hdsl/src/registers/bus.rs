@@ -2,7 +2,7 @@
 
 use core::fmt;
 
-use super::{Event, EventS, Register, RegisterRule, Registers};
+use super::{Event, EventS, Events, Register, RegisterRule, Registers};
 use crate::dialect::Dialect;
 use crate::error::Error;
 use crate::message::{Access, Data, Length, LongRequest, ResourceError, ShortRequest};
@@ -43,6 +43,8 @@ impl<E: fmt::Display> fmt::Display for BusError<E> {
         }
     }
 }
+
+impl<E: core::error::Error> core::error::Error for BusError<E> {}
 
 /// A receiver that is reached over a [`RegisterBus`], for example the firmware of the Motor Control SDK or the SICK IP core in the map of
 /// the SDK.
@@ -140,12 +142,13 @@ impl<B: RegisterBus> RemoteReceiver<B> {
     ///
     /// # Errors
     /// Those of the bus.
-    pub fn take_events(&mut self) -> Result<(Event, EventS), BusError<B::Error>> {
+    pub fn take_events(&mut self) -> Result<Events, BusError<B::Error>> {
         let [high, low] = self.get(Register::EventH)?;
         let [safe] = self.get(Register::EventS)?;
         self.put(Register::EventH, &[!high, !low])?;
         self.put(Register::EventS, &[!safe])?;
-        Ok((Event::from_bits_retain(u16::from_be_bytes([high, low])), EventS::from_bits_retain(safe)))
+        let drive = Event::from_bits_retain(u16::from_be_bytes([high, low]));
+        Ok(Events { drive, safe: EventS::from_bits_retain(safe) })
     }
 
     /// Starts a short message.
@@ -225,7 +228,7 @@ impl<B: RegisterBus> RemoteReceiver<B> {
             };
             return Err(BusError::Link(Error::Resource { error }));
         }
-        let length = if header & 0x40 != 0 { Length::from_code(header >> 2) } else { Length::None };
+        let length = if header & 0x40 != 0 { Length::in_header(header) } else { Length::None };
         Data::new(buffer.get(..length.bytes()).unwrap_or(&buffer)).map(Some).map_err(BusError::Link)
     }
 }

@@ -152,6 +152,17 @@ flags! {
     }
 }
 
+/// What happened since it was last asked for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct Events {
+    /// EVENT_H and EVENT_L, of the drive.
+    pub drive: Event,
+    /// EVENT_S, of the safe channels.
+    pub safe: EventS,
+}
+
 impl Status2 {
     /// FIX2, bits 4:0: 11100b.
     pub const fn is_fixed_part_right(self) -> bool {

@@ -23,16 +23,16 @@ struct Entry {
 /// ```
 ///
 /// ```
-/// use hdsl::registers::PipeFifo;
+/// use hdsl::registers::{PipeFifo, PipeReading};
 /// use hdsl::symbol::{Character, Control, Rule, RunningDisparity};
 ///
 /// let mut fifo = PipeFifo::new();
 /// for character in [Character::data(0xfe), Character::control(Control::K30_7)] {
-///     let (word, _) = character.encode(RunningDisparity::Plus);
+///     let word = character.encode(RunningDisparity::Plus).word;
 ///     fifo.put(word.read(Rule::Strict));
 /// }
-/// assert_eq!(fifo.take(), (0x00, 0xfe));
-/// assert_eq!(fifo.take(), (PipeFifo::PEMP, 0x00));
+/// assert_eq!(fifo.take(), PipeReading { status: 0x00, data: 0xfe });
+/// assert_eq!(fifo.take(), PipeReading { status: PipeFifo::PEMP, data: 0x00 });
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -42,6 +42,17 @@ pub struct PipeFifo {
     first: u8,
     len: u8,
     dropped: bool,
+}
+
+/// What is read of the FIFO.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct PipeReading {
+    /// PIPE_S.
+    pub status: u8,
+    /// PIPE_D.
+    pub data: u8,
 }
 
 impl PipeFifo {
@@ -82,16 +93,16 @@ impl PipeFifo {
         }
     }
 
-    /// Takes the oldest entry out: PIPE_S and PIPE_D.
-    pub fn take(&mut self) -> (u8, u8) {
+    /// Takes the oldest entry out.
+    pub fn take(&mut self) -> PipeReading {
         if self.len == 0 {
-            return (Self::PEMP, 0);
+            return PipeReading { status: Self::PEMP, data: 0 };
         }
         let overflow = if core::mem::take(&mut self.dropped) { Self::POVR } else { 0 };
         let entry = self.entries.get(usize::from(self.first)).copied().unwrap_or_default();
         self.first = self.first.wrapping_add(1) % Self::SIZE;
         self.len = self.len.saturating_sub(1);
-        (overflow | entry.flags, entry.byte)
+        PipeReading { status: overflow | entry.flags, data: entry.byte }
     }
 
     /// Entries that wait.

@@ -29,8 +29,8 @@ impl Registers {
     /// freezes it for PIPE_D. `None` after the end of the map.
     pub fn read(&mut self, address: u8) -> Option<u8> {
         if address == PIPE_S && self.rule == RegisterRule::Sick {
-            let (status, data) = self.pipe.take();
-            self.put(Register::PipeS, [status, data]);
+            let entry = self.pipe.take();
+            self.put(Register::PipeS, [entry.status, entry.data]);
         }
         self.byte(address)
     }
@@ -116,7 +116,7 @@ impl Registers {
     /// The long message that PC_ADD, PC_OFF and PC_BUFFER describe.
     fn request_in_registers(&self) -> Result<LongRequest, Error> {
         let [high, low] = self.get(Register::PcAdd);
-        let length = Length::from_code(high >> 2);
+        let length = Length::in_header(high);
         let buffer: [u8; 8] = self.get(Register::PcBuffer);
         let access = if high & 0x40 != 0 {
             Access::Read(length)

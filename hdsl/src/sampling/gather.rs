@@ -3,8 +3,8 @@
 use core::iter::Copied;
 use core::slice::Iter;
 
-use super::{Alignment, Delay, SampleIndex, WINDOW};
-use crate::rssi::{EdgeWatch, WordWatch};
+use super::{Alignment, Delay, SampleIndex, SampledAnswer, WINDOW};
+use crate::rssi::WordWatch;
 
 /// Takes one bit of each of four bytes.
 ///
@@ -86,7 +86,7 @@ impl<'a> Words<Copied<Iter<'a, u32>>> {
 impl<I: Iterator<Item = u32>> Words<I> {
     /// Bits and edges of the answer.
     #[inline(always)]
-    pub(super) fn read(self, alignment: Alignment) -> (u64, EdgeWatch) {
+    pub(super) fn read(self, alignment: Alignment) -> SampledAnswer {
         // Bytes of the first word before the answer; in the last word one more is of the answer.
         let lead = alignment.delay.get() & 3;
         let (gather, eighths) = (Gather::new(alignment.index), u32::from(lead).wrapping_mul(8));
@@ -99,7 +99,7 @@ impl<I: Iterator<Item = u32>> Words<I> {
         let low = self.low.fold(gather.four(self.first), &mut take);
         let high = self.high.fold(0, take);
         watch.step(self.last.swap_bytes(), u32::MAX.wrapping_shl(24_u32.wrapping_sub(eighths)));
-        (whole(low, gather.after(high, self.last), lead), watch.finish(lead))
+        SampledAnswer { bits: whole(low, gather.after(high, self.last), lead), edges: watch.finish(lead) }
     }
 
     /// The bits alone.

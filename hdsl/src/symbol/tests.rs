@@ -12,7 +12,8 @@ fn characters() -> Vec<Character> {
 fn every_character_in_both_columns_comes_back() {
     for character in characters() {
         for rd in BOTH {
-            let (word, after) = character.encode(rd);
+            let coded = character.encode(rd);
+            let (word, after) = (coded.word, coded.disparity);
             assert_eq!(word.decode(), Some(character));
             assert!(word.is_in(rd));
             assert!(matches!(word.disparity(), -2 | 0 | 2));
@@ -31,7 +32,7 @@ fn decoding_equals_a_search() {
         let found: Vec<_> = BOTH
             .into_iter()
             .flat_map(|rd| characters().into_iter().map(move |c| (rd, c)))
-            .filter(|(rd, c)| c.encode(*rd).0 == word)
+            .filter(|(rd, c)| c.encode(*rd).word == word)
             .collect();
         assert!(found.iter().all(|(_, c)| Some(*c) == word.decode()));
         assert_eq!(found.is_empty(), word.decode().is_none());
@@ -51,8 +52,9 @@ fn run_length_is_at_most_five() {
     for first in characters() {
         for second in characters() {
             for rd in BOTH {
-                let (a, rd) = first.encode(rd);
-                let (b, _) = second.encode(rd);
+                let coded = first.encode(rd);
+                let (a, rd) = (coded.word, coded.disparity);
+                let b = second.encode(rd).word;
                 let bits = u32::from(a.get()) | u32::from(b.get()) << 10;
                 let mut run = (1, 0);
                 for k in 1..20 {
@@ -70,13 +72,13 @@ fn run_length_is_at_most_five() {
 fn the_reduced_rule_reads_every_data_character() {
     for byte in 0..=255 {
         for rd in BOTH {
-            let reading = Character::data(byte).encode(rd).0.read(Rule::Reduced);
+            let reading = Character::data(byte).encode(rd).word.read(Rule::Reduced);
             assert_eq!((reading.raw(), reading.is_byte_error()), (byte, false));
         }
     }
     for control in Control::ALL {
         for rd in BOTH {
-            let (word, _) = Character::control(control).encode(rd);
+            let word = Character::control(control).encode(rd).word;
             let reading = word.read(Rule::Reduced);
             assert!(reading.is_special() && !reading.is_byte_error());
             assert_eq!(Rule::Reduced.table().entry(word).in_secondary(Rule::Reduced, word).raw(), control as u8);

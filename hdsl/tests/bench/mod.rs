@@ -3,9 +3,12 @@
 
 use hdsl::cable::{Cable, Disturbance};
 use hdsl::device::{Device, Heard};
-use hdsl::master::{Master, Report, State};
+use hdsl::master::{HFrame, Master, State};
 use hdsl::registers::{Interrupts, Register, Registers};
-use hdsl::{Dialect, EncoderId, Window};
+use hdsl::{Dialect, Doubt, EncoderId, Policy, Sample, Window};
+
+/// A free-running frame.
+const FRAME_NS: u64 = 11_520;
 
 pub(crate) struct Bench {
     pub(crate) master: Master,
@@ -18,6 +21,8 @@ pub(crate) struct Bench {
     /// Position at the last sampling edge.
     pub(crate) position: i64,
     pub(crate) speed: i64,
+    /// When the sampling edge of the last frame was: frames of 11.52 µs.
+    pub(crate) sampled_ns: u64,
 }
 
 impl Bench {
@@ -30,6 +35,7 @@ impl Bench {
             cable: Cable::new(disturbance, 1),
             position: 1 << 30,
             speed: 0,
+            sampled_ns: 0,
         }
     }
 
@@ -39,24 +45,46 @@ impl Bench {
     }
 
     /// One H-frame.
-    pub(crate) fn frame(&mut self) -> Report {
+    pub(crate) fn frame(&mut self) -> HFrame {
         self.frame_with(None)
     }
 
-    pub(crate) fn frame_with(&mut self, late: Option<i16>) -> Report {
+    pub(crate) fn frame_with(&mut self, late: Option<i16>) -> HFrame {
         self.position += self.speed;
         let line = self.cable.down_samples(self.master.transmission().head);
         let samples = if let Some(heard) = Heard::on_line(&line) {
-            let answer = self.device.answer(heard.bits, self.position as u64);
+            let answer = self.device.hear(heard.bits, self.position as u64);
             self.cable.up_heard(answer, &heard)
         } else {
             // The encoder's own clock goes on.
-            let answer = self.device.answer(Window::EMPTY, self.position as u64);
+            let answer = self.device.hear(Window::EMPTY, self.position as u64);
             self.cable.up(answer)
         };
-        let report = *self.master.finish(&samples, late).unwrap();
+        if let Some(late) = late {
+            self.master.hear_pulse(late);
+        }
+        self.sampled_ns += FRAME_NS;
+        // 91 bits from the edge to the end of the window.
+        let report = *self.master.hear(&samples, self.sampled_ns + 9_707).unwrap();
         self.interrupts = self.map.apply(&report);
         report
+    }
+
+    /// The fast position, for a control loop that asks at once.
+    #[allow(dead_code, reason = "not all tests do")]
+    pub(crate) fn fast(&self) -> Result<Sample, Doubt> {
+        let fast = self.master.fast().at(self.sampled_ns, Policy::new(0))?;
+        assert_eq!(fast.sampled_ns(), self.sampled_ns);
+        Ok(fast)
+    }
+
+    /// The safe position, and how many frames old it is.
+    #[allow(dead_code, reason = "not all tests do")]
+    pub(crate) fn safe(&self) -> Result<(i64, usize), Doubt> {
+        let safe = self.master.safe().at(self.sampled_ns, Policy::new(15 * FRAME_NS))?;
+        let age_ns = self.sampled_ns - safe.sampled_ns();
+        assert!(age_ns % FRAME_NS == 0 && (8..=15).contains(&(age_ns / FRAME_NS)), "{age_ns}");
+        Ok((safe.position(), (age_ns / FRAME_NS) as usize))
     }
 
     /// What an application writes over the bus.
@@ -83,6 +111,6 @@ impl Bench {
     }
 
     pub(crate) fn aligned(&self) -> bool {
-        self.master.phase() == hdsl::Phase::Check && self.map.position() == self.position as u64
+        self.master.stage() == hdsl::AlignmentStage::Check && self.map.pos() == self.position as u64
     }
 }

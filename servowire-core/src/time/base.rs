@@ -63,7 +63,7 @@ impl<const BITS: u32> TimeBase<BITS> {
         }
         let ticks = self.ticks.wrapping_add(past >> Self::ABOVE);
         if ticks < self.ticks {
-            self.base_ns = self.base_ns.wrapping_add(self.rate.turn_ns());
+            self.wrap();
         }
         self.ticks = ticks;
         Ok(self.last_ns())
@@ -89,6 +89,13 @@ impl<const BITS: u32> TimeBase<BITS> {
     const fn go_on(&mut self, counter: u32, now_ns: u64) {
         self.ticks = counter << Self::ABOVE >> Self::ABOVE;
         self.base_ns = now_ns.wrapping_sub(self.rate.low_ns(self.ticks));
+    }
+
+    /// Out of line: it is rare, and what it needs would fill the registers of a Cortex-M0+ in every reading.
+    #[cold]
+    #[inline(never)]
+    const fn wrap(&mut self) {
+        self.base_ns = self.base_ns.wrapping_add(self.rate.turn_ns());
     }
 
     #[cold]

@@ -11,7 +11,7 @@ use std::rc::Rc;
 
 use embedded_hal::digital::{ErrorType as PinErrorType, OutputPin};
 use embedded_io::{ErrorKind, ErrorType, Read, ReadReady, Write};
-use servowire_drivers::Clock;
+use servowire_drivers::{Clock, ClockError};
 use servowire_world::{
     Delivery, Event, Framing, Host, Id, Kind, Message, Scenario, Tally, Transmission, Truth, Wire, World,
 };
@@ -141,11 +141,14 @@ impl Bench {
                     let shaft = place(self.turns);
                     self.encoder.set_position(Abs::truncate(shaft), Abm::truncate(3));
                     let now_ns = self.world.now_ns();
-                    let answer =
-                        if framed { self.encoder.byte(byte as u8, now_ns) } else { self.encoder.framing_error(now_ns) };
+                    let answer = if framed {
+                        self.encoder.hear(&[byte as u8], now_ns)
+                    } else {
+                        self.encoder.framing_error(now_ns)
+                    };
                     if let Some(answer) = answer {
                         let message = Message::bytes(answer.frame.as_bytes()).tagged(shaft.into());
-                        self.world.answer(0, unit.origin.transmission, &message, answer.at_ns);
+                        self.world.answer(0, unit.origin.transmission, &message, answer.start_ns);
                     }
                 }
             }
@@ -172,11 +175,11 @@ pub fn place(turn: u32) -> u32 {
 pub struct Watch(pub Shared);
 
 impl Clock for Watch {
-    fn now_ns(&mut self) -> u64 {
+    fn now_ns(&mut self) -> Result<u64, ClockError> {
         let mut bench = self.0.borrow_mut();
         let until_ns = bench.now_ns() + LOOK_NS;
         bench.pass(until_ns);
-        bench.now_ns()
+        Ok(bench.now_ns())
     }
 }
 

@@ -8,7 +8,7 @@ use std::path::Path;
 use std::thread;
 use std::time::{Duration, Instant};
 
-use tformat::master::Step;
+use servowire_core::{Ended, Procedure};
 use tformat::{Request, Response};
 
 use super::port::Port;
@@ -134,31 +134,25 @@ impl<P: Port> Link<P> {
         }
     }
 
-    /// Takes a procedure through its steps.
+    /// Takes a procedure through its exchanges.
     ///
     /// # Errors
     /// [`Fault`]: the procedure's own, or at once one of the port.
-    pub fn run<T>(
+    pub fn run<R: Procedure<Request = Request, Response = Response, Error = tformat::Error>>(
         &mut self,
-        mut step: Step<T>,
-        mut receive: impl FnMut(Result<Response, tformat::Error>, u64) -> Step<T>,
-    ) -> Result<T, Fault> {
-        loop {
-            match step {
-                Step::Send { request, not_before_ns } => {
-                    thread::sleep(Duration::from_nanos(not_before_ns.saturating_sub(self.now_ns())));
-                    let outcome = match self.exchange(request) {
-                        Ok(response) => Ok(response),
-                        Err(Fault::Encoder(error)) => Err(error),
-                        Err(Fault::OnlyEcho) => Err(tformat::Error::NoResponse { echo: true }),
-                        Err(other) => return Err(other),
-                    };
-                    step = receive(outcome, self.now_ns());
-                }
-                Step::Done { value, .. } => return Ok(value),
-                Step::Failed { error, .. } => return Err(error.into()),
-            }
-        }
+        mut procedure: R,
+    ) -> Result<R::Value, Fault> {
+        let ended = servowire_core::run(&mut procedure, self.now_ns(), |request, not_before_ns| {
+            thread::sleep(Duration::from_nanos(not_before_ns.saturating_sub(self.now_ns())));
+            let outcome = match self.exchange(request) {
+                Ok(response) => Ok(response),
+                Err(Fault::Encoder(error)) => Err(error),
+                Err(Fault::OnlyEcho) => Err(tformat::Error::NoResponse { echo: true }),
+                Err(other) => return Err(other),
+            };
+            Ok(Ended { outcome, ready_ns: self.now_ns() })
+        })?;
+        Ok(ended.outcome?)
     }
 
     /// Reads the line empty. While an answer is owed, the adapter may be holding it back.

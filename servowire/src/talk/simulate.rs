@@ -59,7 +59,7 @@ pub fn run<P: Port>(mut port: P, encoder: Encoder, stop: Option<&AtomicBool>) ->
             if echo.is(*byte) {
                 continue;
             }
-            if let Some(answer) = device.byte(*byte, now_ns) {
+            if let Some(answer) = device.hear(&[*byte], now_ns) {
                 port.write_all(answer.frame.as_bytes())?;
                 port.flush()?;
                 echo.sent(answer.frame.as_bytes());

@@ -36,7 +36,7 @@ fn rate(text: &str) -> Result<BitRate, String> {
 
 fn data_id(text: &str) -> Result<DataId, String> {
     let code = u8::from_str_radix(text, 16).map_err(|error| error.to_string())?;
-    DataId::from_code(code).map_err(|error| error.to_string())
+    DataId::from_code(code).ok_or_else(|| tformat::Error::UnknownDataId { code }.to_string())
 }
 
 impl Arguments {
@@ -44,7 +44,7 @@ impl Arguments {
         let Self { rate, id, cable, turn_around, latency } = *self;
         let line = Line::new(rate).with_hand_over_ns(latency);
         let way_ns = 5 * i64::from(cable);
-        let (request, response) = id.layout();
+        let tformat::Layout { request, response } = id.layout();
         let asked_ns = i64::from(rate.fields_ns(id.request_fields()));
         // As the controller sees it: the request travels there, the response back.
         let answer_ns = asked_ns + 2 * way_ns + i64::from(turn_around);

@@ -3,6 +3,9 @@
 //! Each is a symbol of its own, so that `run.sh` finds it in the image and walks what it calls. A protocol is one file
 //! here, one line in [`ALL`], and its figures in `budget.toml` (`run.sh --record` adds them).
 
+#[cfg(feature = "servowire-core")]
+mod core_feedback;
+pub(crate) mod core_time;
 #[cfg(feature = "deliberate-panic")]
 mod deliberate_panic;
 #[cfg(feature = "servowire-drivers")]
@@ -37,6 +40,10 @@ pub(crate) struct Kernel {
 }
 
 pub(crate) const ALL: &[&[Kernel]] = &[
+    #[cfg(feature = "servowire-core")]
+    core_time::KERNELS,
+    #[cfg(feature = "servowire-core")]
+    core_feedback::KERNELS,
     #[cfg(feature = "nrz-line")]
     nrz_line::KERNELS,
     #[cfg(feature = "hdsl")]

@@ -2,6 +2,8 @@
 
 use cortex_m_semihosting::hprintln;
 
+#[cfg(feature = "servowire-core")]
+mod core_time;
 #[cfg(feature = "servowire-drivers")]
 pub(crate) mod drivers;
 #[cfg(feature = "hdsl")]
@@ -30,6 +32,8 @@ pub(crate) struct Tally {
 pub(crate) type Topic = (&'static str, fn() -> Tally);
 
 pub(crate) const ALL: &[&[Topic]] = &[
+    #[cfg(feature = "servowire-core")]
+    core_time::TOPICS,
     #[cfg(feature = "nrz-line")]
     nrz_line::TOPICS,
     #[cfg(feature = "hdsl")]

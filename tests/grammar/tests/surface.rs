@@ -79,20 +79,21 @@ fn apart(arguments: &str) -> Vec<String> {
 /// An argument that is a `bool`, or has one in it; a closure that answers yes or no is no such argument.
 fn has_bool(arguments: &str) -> bool {
     apart(arguments).iter().filter(|argument| !argument.contains("Fn")).any(|argument| {
-        argument.split_once(':').is_some_and(|(_, kind)| {
-            kind.split(|c: char| !c.is_alphanumeric()).any(|word| word == "bool")
-        })
+        argument
+            .split_once(':')
+            .is_some_and(|(_, kind)| kind.split(|c: char| !c.is_alphanumeric()).any(|word| word == "bool"))
     })
 }
 
 /// A tuple with two parts or more among what is given; that of a `nom` parser, rest and value, is its own.
 fn has_tuple(gives: &str) -> bool {
     let gives = gives.split("Fn").next().unwrap_or(gives);
-    !gives.contains("IResult") && gives.match_indices('(').any(|(at, _)| {
-        let before = gives[..at].chars().next_back().unwrap_or(' ');
-        let inside = matching(&gives[at..]).map_or("", |end| &gives[at + 1..at + end]);
-        !before.is_alphanumeric() && inside.contains(',')
-    })
+    !gives.contains("IResult")
+        && gives.match_indices('(').any(|(at, _)| {
+            let before = gives[..at].chars().next_back().unwrap_or(' ');
+            let inside = matching(&gives[at..]).map_or("", |end| &gives[at + 1..at + end]);
+            !before.is_alphanumeric() && inside.contains(',')
+        })
 }
 
 fn sources(folder: &Path, into: &mut Vec<PathBuf>) {
@@ -171,10 +172,8 @@ mod tests {
     pub fn helper(last: bool) -> (u8, u8) {}
 }
 ";
-    let seen: Vec<_> = signatures(text)
-        .iter()
-        .map(|s| (s.name.clone(), has_bool(&s.arguments), has_tuple(&s.gives)))
-        .collect();
+    let seen: Vec<_> =
+        signatures(text).iter().map(|s| (s.name.clone(), has_bool(&s.arguments), has_tuple(&s.gives))).collect();
     let want = [("both", true, true), ("several", true, true), ("none", false, false)];
     assert_eq!(seen, want.map(|(name, bool, tuple)| (name.to_owned(), bool, tuple)));
 }

@@ -93,7 +93,7 @@ fn sign(rd: RunningDisparity) -> i8 {
 type Pair = (crate::hex::Hex, bool);
 
 fn character((byte, k): Pair) -> Result<Character, Fault> {
-    Character::new(byte.0 as u8, k).ok_or_else(|| Fault::Unreadable(format!("no special character {byte:?}")))
+    Character::try_from((byte.0 as u8, k)).map_err(|_| Fault::Unreadable(format!("no special character {byte:?}")))
 }
 
 fn pair(character: Character) -> Pair {

@@ -6,9 +6,13 @@ mod response;
 use serde::Deserialize;
 
 use nrz_line::{Format, Receiver};
+use servowire_core::Ended;
 use tformat::device::Device;
-use tformat::master::{Reset, Step};
-use tformat::{Abm, Abs, Adf, Almc, BitRate, ControlField, DataId, Error, Frame, Request, Resolution, Response, spi};
+use tformat::master::Reset;
+use tformat::{
+    Abm, Abs, Adf, AllData, Almc, BitRate, ControlField, DataId, Doubt, Error, Evidence, Frame, Policy, Request,
+    Resolution, Response, Sample, StatusField, spi,
+};
 
 use crate::hex::{Bits, Bytes, Hex};
 use crate::row::{Check, Row, Verdict, each, same};
@@ -215,17 +219,25 @@ fn position(row: PositionRow) -> Verdict {
     let Ok(resolution) = Resolution::new(row.abs_bits, row.abm_bits) else {
         return same("widths", &"possible", &"refused");
     };
-    let (abs, abm) = (Abs::truncate(row.abs), Abm::truncate(row.abm));
-    let signed = resolution.position(abs, abm);
-    same("high_bits_nonzero", &row.high_bits_nonzero, &matches!(signed, Err(Error::UpperBits { .. })))?;
+    let data = AllData {
+        sf: StatusField::empty(),
+        abs: Abs::truncate(row.abs),
+        enid: 0,
+        abm: Abm::truncate(row.abm),
+        almc: Almc::empty(),
+    };
+    let read = |resolution| Evidence::of(Response::ReadAll(data), resolution, 0).at(0, Policy::new(0));
+    let signed = read(resolution);
+    same("high_bits_nonzero", &row.high_bits_nonzero, &matches!(signed, Err(Doubt::UpperBits { .. })))?;
     if row.high_bits_nonzero {
         return Ok(());
     }
-    let unsigned = resolution.with_unsigned_turns().position(abs, abm).ok();
-    same("combined_unsigned", &row.combined_unsigned, &unsigned.map(|p| p.combined))?;
-    same("turns_signed", &row.turns_signed, &signed.ok().map(|p| p.turns))?;
-    same("combined_signed", &row.combined_signed, &signed.ok().map(|p| p.combined))?;
-    same("fraction32", &row.fraction32, &resolution.fraction(abs).ok())
+    let unsigned = read(resolution.with_unsigned_turns()).ok();
+    let signed = signed.ok();
+    same("combined_unsigned", &row.combined_unsigned, &unsigned.and_then(Sample::counts))?;
+    same("turns_signed", &row.turns_signed, &signed.and_then(Sample::turns))?;
+    same("combined_signed", &row.combined_signed, &signed.and_then(Sample::counts))?;
+    same("fraction32", &row.fraction32, &signed.map(|sample| sample.angle().to_bits()))
 }
 
 #[derive(Deserialize)]
@@ -306,9 +318,9 @@ fn procedures(rows: &[Row]) -> Vec<Verdict> {
                 encoder = (Some(run), Device::new(0x17, BitRate::Mbit2_5));
             }
             let device = &mut encoder.1;
-            let answered = Request::parse(&request.0).map(|asked| device.answer(asked, t_us * 1000));
-            same("response", &Ok(response.0), &answered.map(|r| r.emit().as_bytes().to_vec()))?;
-            let Ok(Response::WriteEeprom(memory) | Response::ReadEeprom(memory)) = answered else {
+            let answered = Request::parse(&request.0).ok().and_then(|asked| device.answer(asked, t_us * 1000));
+            same("response", &Some(response.0), &answered.map(|r| r.emit().as_bytes().to_vec()))?;
+            let Some(Response::WriteEeprom(memory) | Response::ReadEeprom(memory)) = answered else {
                 return same("response", &"of the EEPROM", &"another");
             };
             same("busy", &busy, &memory.adf.busy())?;
@@ -337,18 +349,18 @@ fn procedures(rows: &[Row]) -> Vec<Verdict> {
             same("count", &count, &Reset::REQUESTS)?;
             let mut device = Device::<6>::new(0x17, BitRate::Mbit2_5);
             device.set_position(Abs::truncate(5), Abm::truncate(7));
-            device.set_alarms(Almc::CE, true);
-            device.set_alarms(Almc::CE, false);
+            device.raise_alarms(Almc::CE);
+            device.end_alarms(Almc::CE);
             // A field takes 4 us; the response has six of them and begins when this encoder likes.
             let transaction_ns = u64::from(4 + response_delay_us + 24) * 1000;
             let (mut starts, mut end) = (Vec::new(), 0);
-            let mut step = reset.start(0);
-            while let Step::Send { request: asked, not_before_ns } = step {
+            let ended = servowire_core::run(&mut reset, 0, |asked, not_before_ns| {
                 same("request", &request.0[..], asked.emit().as_bytes())?;
                 starts.push(not_before_ns / 1000);
                 end = not_before_ns + transaction_ns;
-                step = reset.receive(Ok(device.answer(asked, not_before_ns)), end);
-            }
+                let answer = device.answer(asked, not_before_ns);
+                Ok(Ended { outcome: answer.ok_or(Error::NoResponse { echo: false }), ready_ns: end })
+            })?;
             same("earliest_start_us", &earliest_start_us, &starts)?;
             // What the encoder has done: to the position, the turns, the errors.
             let does = match (device.abs().get(), device.abm().get(), device.almc().is_empty()) {
@@ -358,8 +370,8 @@ fn procedures(rows: &[Row]) -> Vec<Verdict> {
                 _ => "something else",
             };
             same("effect", &effect.as_str(), &does)?;
-            let Step::Done { ready_ns, .. } = step else { return same("end", &"done", &"failed") };
-            same("wait_after_us", &wait_after_us, &((ready_ns - end) / 1000))
+            same("end", &"ok".to_owned(), &outcome(&ended.outcome))?;
+            same("wait_after_us", &wait_after_us, &((ended.ready_ns - end) / 1000))
         }
     };
     rows.iter().map(&mut check).collect()

@@ -73,7 +73,7 @@ pub struct Behaviour {
 }
 
 impl Behaviour {
-    /// As [`Default`].
+    /// An encoder as the documents say, and as [`Default`].
     pub const fn new() -> Self {
         Self {
             response_delay_ns: 3_000,
@@ -125,9 +125,19 @@ impl Behaviour {
     /// Combinations that [`numbered`](Self::numbered) gives.
     pub const NUMBERED: u16 = 1 << 12;
 
-    /// With another delay of the response.
-    pub const fn with_response_delay_ns(self, ns: u32) -> Self {
-        Self { response_delay_ns: ns, ..self }
+    servowire_core::builder! {
+        with_response_delay_ns: response_delay_ns, u32;
+        with_reset_interval: reset_interval, Interval;
+        with_count_despite_others: others_restart_count = false;
+        with_count_despite_damage: damage_restarts_count = false;
+        with_effect_in_tenth: tenth_shows_effect = true;
+        with_silence_while_storing: silent_while_storing = true;
+        with_busy_page_select: page_select_is_busy = true;
+        with_absent_page: absent_page, AbsentPage;
+        with_busy_data: busy_data, BusyData;
+        with_wrong_sink_answered: answers_wrong_sink = true;
+        with_delimiter_error_unanswered: answers_delimiter_error = false;
+        with_status_zero: leaves_status_zero = true;
     }
 }
 

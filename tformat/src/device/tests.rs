@@ -8,9 +8,15 @@ fn encoder() -> Device<6> {
     device
 }
 
+fn encoder_with(behaviour: Behaviour) -> Device<6> {
+    let mut device = encoder();
+    device.set_behaviour(behaviour);
+    device
+}
+
 /// Sends a request by bytes and gives the reply.
 fn send(device: &mut Device<6>, bytes: &[u8], now_ns: u64) -> Option<Transmission> {
-    (1..).zip(bytes).fold(None, |reply, (k, byte)| device.byte(*byte, now_ns + 4_000 * k).or(reply))
+    (1..).zip(bytes).fold(None, |reply, (k, byte)| device.hear(&[*byte], now_ns + 4_000 * k).or(reply))
 }
 
 proptest! {
@@ -36,7 +42,7 @@ proptest! {
         let mut now_ns = 0;
         for (byte, gap, framed) in bytes {
             now_ns += gap;
-            let _ = if framed { device.byte(byte, now_ns) } else { device.framing_error(now_ns) };
+            let _ = if framed { device.hear(&[byte], now_ns) } else { device.framing_error(now_ns) };
         }
     }
 }
@@ -57,7 +63,7 @@ fn damage_is_told_in_the_status() {
 
 /// Ten requests for ID C whose starts are `interval` apart, `disturb` after the sixth; whether they had their effect.
 fn resets(behaviour: Behaviour, interval: u64, disturb: impl Fn(&mut Device<6>, u64)) -> bool {
-    let mut device = encoder().with_behaviour(behaviour);
+    let mut device = encoder_with(behaviour);
     for k in 1..=10 {
         let now_ns = k * interval;
         let _ = send(&mut device, &[0x62], now_ns);
@@ -99,7 +105,7 @@ fn what_starts_the_count_of_resets_again() {
 fn the_tenth_response_and_storing() {
     for (shows, silent) in [(false, false), (true, true)] {
         let behaviour = Behaviour { tenth_shows_effect: shows, silent_while_storing: silent, ..Behaviour::new() };
-        let mut device = encoder().with_behaviour(behaviour);
+        let mut device = encoder_with(behaviour);
         let mut tenth = None;
         for k in 1..=10 {
             tenth = send(&mut device, &[0xc2], k * 100_000);
@@ -121,16 +127,16 @@ fn the_memory_is_busy_for_18_ms() {
         (0xff, Behaviour { busy_data: BusyData::Ones, ..Behaviour::new() }),
         (0x5a, Behaviour { busy_data: BusyData::Cell, ..Behaviour::new() }),
     ] {
-        let mut device = encoder().with_behaviour(behaviour);
+        let mut device = encoder_with(behaviour);
         let address = Address::truncate(5);
-        let memory = |busy, edf| Memory { adf: Adf::of(address, busy), edf };
+        let memory = |busy, edf| Memory { adf: Adf::answered(address, busy), edf };
         let write = |edf| Request::write_eeprom(address, edf);
-        assert_eq!(device.answer(write(0x5a), 100), Response::WriteEeprom(memory(false, 0x5a)));
+        assert_eq!(device.answer(write(0x5a), 100), Some(Response::WriteEeprom(memory(false, 0x5a))));
         let read = Request::read_eeprom(address);
-        assert_eq!(device.answer(read, 18_000_099), Response::ReadEeprom(memory(true, data)));
-        assert_eq!(device.answer(write(0x77), 18_000_099), Response::WriteEeprom(memory(true, 0x77)));
-        assert_eq!(device.answer(read, 18_000_100), Response::ReadEeprom(memory(false, 0x5a)));
-        assert_eq!(device.answer(write(0x77), 18_000_100), Response::WriteEeprom(memory(false, 0x77)));
+        assert_eq!(device.answer(read, 18_000_099), Some(Response::ReadEeprom(memory(true, data))));
+        assert_eq!(device.answer(write(0x77), 18_000_099), Some(Response::WriteEeprom(memory(true, 0x77))));
+        assert_eq!(device.answer(read, 18_000_100), Some(Response::ReadEeprom(memory(false, 0x5a))));
+        assert_eq!(device.answer(write(0x77), 18_000_100), Some(Response::WriteEeprom(memory(false, 0x77))));
         assert_eq!(device.eeprom_mut()[0][5], 0x77);
     }
 }
@@ -139,7 +145,7 @@ fn the_memory_is_busy_for_18_ms() {
 fn the_page_register() {
     let select = |page| Request::write_eeprom(Address::PAGE_REGISTER, page);
     for (absent, page) in [(AbsentPage::Ignored, 2), (AbsentPage::Wrapped, 3)] {
-        let mut device = encoder().with_behaviour(Behaviour { absent_page: absent, ..Behaviour::new() });
+        let mut device = encoder_with(Behaviour { absent_page: absent, ..Behaviour::new() });
         let _ = device.answer(select(2), 100);
         assert_eq!(device.page(), 2);
         // Six pages are numbered 0 to 5.
@@ -152,14 +158,14 @@ fn the_page_register() {
         assert_eq!(device.page(), page);
         // Selecting takes no time; while the memory is busy it is ignored.
         let _ = device.answer(Request::write_eeprom(Address::truncate(0), 1), 300);
-        let memory = Memory { adf: Adf::of(Address::PAGE_REGISTER, true), edf: 4 };
-        assert_eq!(device.answer(select(4), 400), Response::WriteEeprom(memory));
+        let memory = Memory { adf: Adf::of(Address::PAGE_REGISTER).with_busy(), edf: 4 };
+        assert_eq!(device.answer(select(4), 400), Some(Response::WriteEeprom(memory)));
         assert_eq!(device.page(), page);
     }
-    let mut slow = encoder().with_behaviour(Behaviour { page_select_is_busy: true, ..Behaviour::new() });
+    let mut slow = encoder_with(Behaviour { page_select_is_busy: true, ..Behaviour::new() });
     let _ = slow.answer(select(2), 100);
     let answered = slow.answer(Request::read_eeprom(Address::PAGE_REGISTER), 200);
-    assert!(matches!(answered, Response::ReadEeprom(memory) if memory.adf.busy()));
+    assert!(matches!(answered, Some(Response::ReadEeprom(memory)) if memory.adf.busy()));
 }
 
 /// What follows a request that was judged is not heard until the line has been idle for half a field.
@@ -167,8 +173,8 @@ fn the_page_register() {
 fn deaf_time() {
     for (gap, heard) in [(6_000, false), (6_001, true)] {
         let mut device = encoder();
-        assert!(device.byte(0x12, 4_000).is_some());
-        assert_eq!(device.byte(0x02, 4_000 + gap).is_some(), heard);
+        assert!(device.hear(&[0x12], 4_000).is_some());
+        assert_eq!(device.hear(&[0x02], 4_000 + gap).is_some(), heard);
     }
 }
 
@@ -178,8 +184,8 @@ fn what_is_not_answered_is_a_switch() {
     let unusual =
         Behaviour { answers_wrong_sink: true, answers_delimiter_error: false, leaves_status_zero: true, ..usual };
     for (behaviour, sink, delimiter, status) in [(usual, false, true, 0x20), (unusual, true, false, 0x00)] {
-        let mut device = encoder().with_behaviour(behaviour);
-        device.set_alarms(Almc::BA, true);
+        let mut device = encoder_with(behaviour);
+        device.raise_alarms(Almc::BA);
         assert_eq!(send(&mut device, &[0x1b], 100_000).is_some(), sink);
         assert_eq!(device.framing_error(200_000).is_some(), delimiter);
         let response =
@@ -192,9 +198,9 @@ fn what_is_not_answered_is_a_switch() {
 #[test]
 fn the_response_begins_3_us_after_the_request() {
     let mut device = encoder();
-    assert_eq!(send(&mut device, &[0x02], 0).map(|sent| sent.at_ns), Some(7_000));
-    let mut late = encoder().with_behaviour(Behaviour::new().with_response_delay_ns(9_000));
-    assert_eq!(send(&mut late, &[0x02], 0).map(|sent| sent.at_ns), Some(13_000));
+    assert_eq!(send(&mut device, &[0x02], 0).map(|sent| sent.start_ns), Some(7_000));
+    let mut late = encoder_with(Behaviour::new().with_response_delay_ns(9_000));
+    assert_eq!(send(&mut late, &[0x02], 0).map(|sent| sent.start_ns), Some(13_000));
     for number in 0..Behaviour::NUMBERED {
         assert!((1_700..=9_000).contains(&Behaviour::numbered(number).response_delay_ns));
     }
@@ -209,7 +215,7 @@ fn bit_by_bit_is_the_same() {
     let mut reply = None;
     for at in 0..line.len() {
         let now_ns = 400 * u64::from(at + 1);
-        reply = by_bits.bit(line.get(at).unwrap(), now_ns).or(reply);
+        reply = by_bits.hear_bit(line.get(at).unwrap(), now_ns).or(reply);
     }
     let mut by_bytes = encoder();
     assert_eq!(reply, send(&mut by_bytes, request.emit().as_bytes(), 0));
@@ -259,8 +265,8 @@ fn faults_that_are_switched_on() {
 fn alarms_and_their_causes() {
     for cf in [0xba, 0x62] {
         let mut device = encoder();
-        device.set_alarms(Almc::OS | Almc::CE | Almc::BA, true);
-        device.set_alarms(Almc::OS | Almc::BA, false);
+        device.raise_alarms(Almc::OS | Almc::CE | Almc::BA);
+        device.end_alarms(Almc::OS | Almc::BA);
         assert_eq!(device.almc(), Almc::OS | Almc::CE);
         for k in 1..=10 {
             assert_eq!(device.effects(), 0);

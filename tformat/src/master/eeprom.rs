@@ -261,16 +261,16 @@ mod tests {
     const POLLING: Polling = Polling { interval_ns: 1000, max_tries: 3 };
     const LOST: Result<Response, Error> = Err(Error::NoResponse { echo: false });
 
-    fn memory(address: Address, busy: bool, edf: u8) -> Memory {
-        Memory { adf: Adf::of(address, busy), edf }
+    const fn memory(address: Address, busy: bool, edf: u8) -> Memory {
+        Memory { adf: Adf::answered(address, busy), edf }
     }
 
     const fn wrote(busy: bool, edf: u8) -> Response {
-        Response::WriteEeprom(Memory { adf: Adf::of(ADDRESS, busy), edf })
+        Response::WriteEeprom(memory(ADDRESS, busy, edf))
     }
 
     const fn read(busy: bool, edf: u8) -> Response {
-        Response::ReadEeprom(Memory { adf: Adf::of(ADDRESS, busy), edf })
+        Response::ReadEeprom(memory(ADDRESS, busy, edf))
     }
 
     fn send(request: Request, not_before_ns: u64) -> Step<u8> {

@@ -3,7 +3,7 @@ use crate::timing::BitRate;
 /// How a controller is connected, and how long it waits.
 ///
 /// The defaults are numbers of the drivers and logs that are known; see each field.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]
@@ -19,10 +19,11 @@ pub struct Line {
     /// Longest time from the end of one field to the end of the next, in ns. Default one and a half field times.
     pub field_timeout_ns: u32,
     /// Shortest time from the end of the request to the start bit of the response, in ns: what begins earlier is no
-    /// response. Default four bits (1.6 or 0.8 us), for which a driver in use keeps the line driven after its request.
+    /// response. Default four bits (1.6 or 0.8 us), for which a driver in use keeps the line driven after its request. The
+    /// [latency budget](Self::latency_budget_ns) goes with it.
     pub turn_around_ns: u32,
     /// Longest time from the end of a byte on the line to its hand-over to the master, in ns: the latency of the
-    /// interrupt, or the size of a DMA block and the time after which idle line is reported. Default the
+    /// interrupt, or the size of a DMA block and the time after which an idle line is reported. Default the
     /// [latency budget](Self::latency_budget_ns).
     pub hand_over_ns: u32,
     /// Time for which the driver is on before the start bit of the request, in ns. Default 1 000, the least that one
@@ -50,39 +51,14 @@ impl Line {
         Self { hand_over_ns, ..line }
     }
 
-    /// With the hint that the receiver is always on.
-    pub const fn with_echo(self) -> Self {
-        Self { echo: true, ..self }
-    }
-
-    /// With another wait for the start bit of the response.
-    pub const fn with_response_timeout_ns(self, ns: u32) -> Self {
-        Self { response_timeout_ns: ns, ..self }
-    }
-
-    /// With another wait for the next field.
-    pub const fn with_field_timeout_ns(self, ns: u32) -> Self {
-        Self { field_timeout_ns: ns, ..self }
-    }
-
-    /// With another least turn-around of the encoder. The [latency budget](Self::latency_budget_ns) goes with it.
-    pub const fn with_turn_around_ns(self, ns: u32) -> Self {
-        Self { turn_around_ns: ns, ..self }
-    }
-
-    /// With another time to hand over a byte, for DMA blocks and idle detection.
-    pub const fn with_hand_over_ns(self, ns: u32) -> Self {
-        Self { hand_over_ns: ns, ..self }
-    }
-
-    /// With another lead of the driver.
-    pub const fn with_driver_lead_ns(self, ns: u32) -> Self {
-        Self { driver_lead_ns: ns, ..self }
-    }
-
-    /// With another sampling instant.
-    pub const fn with_sampling_ns(self, ns: u32) -> Self {
-        Self { sampling_ns: ns, ..self }
+    servowire_core::builder! {
+        with_echo: echo = true;
+        with_response_timeout_ns: response_timeout_ns, u32;
+        with_field_timeout_ns: field_timeout_ns, u32;
+        with_turn_around_ns: turn_around_ns, u32;
+        with_hand_over_ns: hand_over_ns, u32;
+        with_driver_lead_ns: driver_lead_ns, u32;
+        with_sampling_ns: sampling_ns, u32;
     }
 
     /// By how much the end time that the master is told may lie after the end of the byte on the line, in ns: just

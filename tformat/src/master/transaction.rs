@@ -1,71 +1,64 @@
 use super::Line;
-use crate::doubt::{Doubt, Policy};
 use crate::error::Error;
+use crate::evidence::Evidence;
 use crate::frame::Frame;
 use crate::message::CF3;
 use crate::request::Request;
-use crate::resolution::{Position, Resolution};
+use crate::resolution::Resolution;
 use crate::response::{Response, expected_fields};
 
 /// A response with all checks passed, and when its position was taken.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Exchange {
     /// The response.
     pub response: Response,
     /// The instant of sampling by [`Line::sampling_ns`], for extrapolation: it lies between the end of the request and
-    /// the begin of the response.
+    /// the begin of the response. Its age counts from here.
     pub sampled_ns: u64,
+    /// When the first start bit of the response was on the line at the latest, in ns: by then the position had been taken.
+    pub began_ns: u64,
 }
 
-crate::show::one_line!(Exchange { Self { response, sampled_ns } => "{}, sampled at {} ns", response, sampled_ns; });
+servowire_core::one_line!(Exchange { Self { response, sampled_ns, .. } => "{}, sampled at {} ns", response, sampled_ns; });
 
 impl Exchange {
-    /// The position for control at `now_ns`: only if nothing speaks against its use, its age included. See
-    /// [`Resolution::read`].
-    ///
-    /// ```
-    /// use tformat::master::Exchange;
-    /// use tformat::{Doubt, Policy, Request, Resolution, Response};
-    /// let bytes = [0x1a, 0x20, 0x29, 0xc0, 0x3b, 0x17, 0x00, 0x00, 0x00, 0xc8, 0x37];
-    /// let exchange = Exchange { response: Response::parse(Request::ReadAll, &bytes)?, sampled_ns: 4_480 };
-    /// let (resolution, policy) = (Resolution::new(23, 16)?, Policy::SINGLE_TURN.with_max_age_ns(125_000));
-    /// assert_eq!(exchange.position(resolution, policy, 60_000)?.abs, 3_915_817);
-    /// assert_eq!(exchange.position(resolution, policy, 140_000), Err(Doubt::Old { age_ns: 135_520 }));
-    /// # Ok::<(), Box<dyn std::error::Error>>(())
-    /// ```
-    ///
-    /// # Errors
-    /// [`Doubt::Old`], then as [`Resolution::read`].
-    pub const fn position(&self, resolution: Resolution, policy: Policy, now_ns: u64) -> Result<Position, Doubt> {
-        match self.aged(policy, now_ns) {
-            Ok(()) => resolution.read(&self.response, policy),
-            Err(doubt) => Err(doubt),
-        }
+    /// What it says of the position of an encoder with these widths, to be judged where it is used.
+    pub const fn evidence(&self, resolution: Resolution) -> Evidence {
+        Evidence::of(self.response, resolution, self.sampled_ns)
     }
+}
 
-    /// As [`position`](Self::position) for the single-turn position alone, in counts. See [`Resolution::read_single_turn`].
-    ///
-    /// # Errors
-    /// [`Doubt::Old`], then as [`Resolution::read_single_turn`].
-    pub const fn single_turn(&self, resolution: Resolution, policy: Policy, now_ns: u64) -> Result<u32, Doubt> {
-        match self.aged(policy, now_ns) {
-            Ok(()) => resolution.read_single_turn(&self.response, policy),
-            Err(doubt) => Err(doubt),
-        }
-    }
+/// What a master sends, and when.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Transmission {
+    /// The fields.
+    pub frame: Frame,
+    /// When the start bit is on the line, in ns.
+    pub start_ns: u64,
+    /// When the last bit ends, in ns.
+    pub end_ns: u64,
+    /// When the driver is to be switched on, in ns: [`Line::driver_lead_ns`] before the start bit.
+    pub driver_on_ns: u64,
+    /// When the driver is to be switched off.
+    pub driver_off: DriverOff,
+}
 
-    const fn aged(&self, policy: Policy, now_ns: u64) -> Result<(), Doubt> {
-        // A clock that was set back makes no position young.
-        let age_ns = now_ns.abs_diff(self.sampled_ns);
-        if age_ns > policy.max_age_ns { Err(Doubt::Old { age_ns }) } else { Ok(()) }
-    }
+/// The time in which the driver is to be switched off after a request.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct DriverOff {
+    /// Not before this time, in ns: the end of the request.
+    pub earliest_ns: u64,
+    /// Not after this time, in ns: the encoder may begin to answer.
+    pub latest_ns: u64,
 }
 
 /// How far a transaction is. `ready_ns` of a failure is the time at which the longest response to the request is over,
 /// however late within the time-out it began: eleven fields, one right after the other as encoders send them. Behind a bridge that
 /// pauses between fields, wait for a silent line besides.
-pub type Progress = servowire_core::Progress<Exchange, Error>;
+pub type Progress<T = Exchange> = servowire_core::Progress<T, Error>;
 
 /// Longest request and longest response in bytes.
 const MAX_BYTES: usize = 4 + Frame::MAX_FIELDS;
@@ -121,31 +114,22 @@ impl Transaction {
         }
     }
 
-    /// The fields to send.
-    pub const fn frame(&self) -> Frame {
-        self.request.emit()
-    }
-
-    /// The end of the request's last bit.
-    pub fn request_end_ns(&self) -> u64 {
-        self.start_ns.saturating_add(self.fields_ns(self.request.data_id().request_fields()))
-    }
-
-    /// When the driver is to be switched on: [`Line::driver_lead_ns`] before the start bit.
-    pub fn driver_on_ns(&self) -> u64 {
-        self.start_ns.saturating_sub(self.line.driver_lead_ns.into())
-    }
-
-    /// When the driver is to be switched off: not before the first time, the end of the request, and not after the
-    /// second, when the encoder may begin to answer.
-    pub fn driver_off_ns(&self) -> (u64, u64) {
+    /// The fields to send, and when.
+    pub const fn transmission(&self) -> Transmission {
+        let Self { request, line, start_ns, .. } = *self;
         let end_ns = self.request_end_ns();
-        (end_ns, end_ns.saturating_add(self.line.turn_around_ns.into()))
+        Transmission {
+            frame: request.emit(),
+            start_ns,
+            end_ns,
+            driver_on_ns: start_ns.saturating_sub(line.driver_lead_ns as u64),
+            driver_off: DriverOff { earliest_ns: end_ns, latest_ns: end_ns.saturating_add(line.turn_around_ns as u64) },
+        }
     }
 
     /// Bytes were received one after the other, the delimiter of the last one at `end_ns` or, within the latency
     /// budget, before.
-    pub fn bytes(&mut self, bytes: &[u8], end_ns: u64) -> Progress {
+    pub fn hear(&mut self, bytes: &[u8], end_ns: u64) -> Progress {
         if self.end.is_some() || bytes.is_empty() {
             return self.progress();
         }
@@ -199,8 +183,13 @@ impl Transaction {
         }
     }
 
-    fn fields_ns(&self, fields: u8) -> u64 {
-        self.line.rate.fields_ns(fields).into()
+    /// The end of the request's last bit.
+    const fn request_end_ns(&self) -> u64 {
+        self.start_ns.saturating_add(self.fields_ns(self.request.data_id().request_fields()))
+    }
+
+    const fn fields_ns(&self, fields: u8) -> u64 {
+        self.line.rate.fields_ns(fields) as u64
     }
 
     /// Fields of the response that begins with the first byte there is.
@@ -234,7 +223,7 @@ impl Transaction {
     fn drop_earlier(&mut self, end_ns: u64) {
         while self.len > 0 && self.is_earlier(end_ns, self.len) {
             let [got, ..] = self.received;
-            match self.frame().as_bytes().get(usize::from(self.echoed)) {
+            match self.request.emit().as_bytes().get(usize::from(self.echoed)) {
                 Some(want) if *want == got => self.echoed = self.echoed.saturating_add(1),
                 Some(_) => self.echo_fault = self.echo_fault.or(Some(got)),
                 None => {}
@@ -248,7 +237,7 @@ impl Transaction {
     /// No response begins like that: in place of SF there would be a control field, whose low bits are never 0 as the
     /// information bits of SF are; and EDF and CRC of an EEPROM response cannot both be right.
     fn drop_echo_by_content(&mut self) {
-        let sent = self.frame();
+        let sent = self.request.emit();
         let cf = sent.as_bytes().first().copied().unwrap_or(0);
         let heard = self.received.get(..usize::from(self.len)).unwrap_or(&self.received);
         let echo = heard.strip_prefix(sent.as_bytes()).and_then(<[u8]>::first);
@@ -265,7 +254,7 @@ impl Transaction {
         let bytes = self.received.get(..usize::from(self.len)).unwrap_or(&self.received);
         let outcome = match (bytes, self.echo_fault) {
             ([], Some(got)) if self.line.echo => {
-                let want = self.frame().as_bytes().get(usize::from(self.echoed)).copied().unwrap_or(0);
+                let want = self.request.emit().as_bytes().get(usize::from(self.echoed)).copied().unwrap_or(0);
                 Err(Error::EchoMismatch { at: self.echoed, got, want })
             }
             ([], _) => Err(Error::NoResponse { echo: self.echoed == self.request.data_id().request_fields() }),
@@ -274,7 +263,8 @@ impl Transaction {
         match outcome {
             Ok(response) => {
                 let sampled_ns = self.request_end_ns().saturating_add(self.line.sampling_ns.into());
-                self.end = Some((Ok(Exchange { response, sampled_ns }), end_ns));
+                let began_ns = end_ns.saturating_sub(self.fields_ns(self.len));
+                self.end = Some((Ok(Exchange { response, sampled_ns, began_ns }), end_ns));
             }
             Err(error) => self.fail(error, end_ns),
         }
@@ -287,6 +277,8 @@ impl Transaction {
         self.end = Some((Err(error), drained_ns.max(end_ns)));
     }
 }
+
+servowire_core::machine!(Transaction { Transmission, [u8] => Exchange, Error });
 
 /// Decodes all that a UART received since the request began, with the receiver on all the time: the own request, then
 /// the response. For buffers without times; what follows the response is left alone.

@@ -35,12 +35,14 @@ fn answer(request: Request, full: AllData, busy: bool) -> Response {
         Request::ReadMultiTurn => Response::ReadMultiTurn(MultiTurn { sf: full.sf, abm: full.abm }),
         Request::ReadEncoderId => Response::ReadEncoderId(Identification { sf: full.sf, enid: full.enid }),
         Request::ReadAll => Response::ReadAll(full),
-        Request::WriteEeprom { adf, edf } => Response::WriteEeprom(Memory { adf: Adf::of(adf.address(), busy), edf }),
+        Request::WriteEeprom { adf, edf } => {
+            Response::WriteEeprom(Memory { adf: Adf::answered(adf.address(), busy), edf })
+        }
         Request::ResetErrors => Response::ResetErrors(single),
         Request::SetSingleTurnZero => Response::SetSingleTurnZero(single),
         Request::ResetTurnsAndErrors => Response::ResetTurnsAndErrors(single),
         Request::ReadEeprom { adf } => {
-            Response::ReadEeprom(Memory { adf: Adf::of(adf.address(), busy), edf: full.enid })
+            Response::ReadEeprom(Memory { adf: Adf::answered(adf.address(), busy), edf: full.enid })
         }
     }
 }
@@ -153,7 +155,7 @@ proptest! {
 
     #[test]
     fn eeprom_echo(adf: u8, edf: u8, other: u8) {
-        let (adf, other_adf) = (Adf::of(Adf::from_bits(adf).address(), false), Adf::of(Adf::from_bits(other).address(), false));
+        let (adf, other_adf) = (Adf::of(Adf::from_bits(adf).address()), Adf::of(Adf::from_bits(other).address()));
         let write = Request::WriteEeprom { adf, edf };
         let address = Response::parse(write, Response::WriteEeprom(Memory { adf: other_adf, edf }).emit().as_bytes());
         prop_assert_eq!(address.is_ok(), adf == other_adf);
@@ -164,7 +166,7 @@ proptest! {
         let data = Response::parse(write, Response::WriteEeprom(Memory { adf, edf: other }).emit().as_bytes());
         prop_assert_eq!(data.err(), (other != edf).then_some(Error::DataMismatch { got: other, want: edf }));
         // A busy memory did not write; its data byte is not compared.
-        let busy = Memory { adf: Adf::of(adf.address(), true), edf: other };
+        let busy = Memory { adf: Adf::of(adf.address()).with_busy(), edf: other };
         prop_assert_eq!(Response::parse(write, Response::WriteEeprom(busy).emit().as_bytes()), Ok(Response::WriteEeprom(busy)));
     }
 }

@@ -1,14 +1,18 @@
 //! Master and encoder on the hostile line, and who judges the master.
 
+use core::convert::Infallible;
 use core::fmt;
 
+use servowire_core::{Ended, Procedure};
 use servowire_world::{
     Block, Delivery, Draw, Event, Framing, Id, Message, Scenario, Speaker, Stamp, Tally, Transmission, Verdict, Wire,
     World,
 };
 use tformat::device::{Behaviour, Device};
-use tformat::master::{Line, Progress, Step, Transaction};
-use tformat::{Abm, Abs, Address, BitRate, Error, Request, Resolution, Response};
+use tformat::master::{Line, Progress, Transaction};
+use tformat::{
+    Abm, Abs, Address, BitRate, Doubt, Error, Evidence, Policy, Request, Resolution, Response, Sample, Tolerated,
+};
 
 /// What was seen in a run besides the line's own tally.
 #[derive(Debug, Clone, Copy, Default)]
@@ -70,12 +74,6 @@ pub struct Bench {
     pub astray: Option<Draw>,
 }
 
-/// What became of one exchange.
-pub struct Exchanged {
-    pub outcome: Result<Response, Error>,
-    pub ready_ns: u64,
-}
-
 impl Bench {
     pub fn new(scenario: Scenario, rate: BitRate, behaviour: Behaviour, hint: bool) -> Self {
         let bit_ps = field_ns(rate) * 100;
@@ -90,9 +88,11 @@ impl Bench {
                 Delivery::Blocks { idle_ns, .. } | Delivery::Idle { idle_ns } => block_ns + idle_ns,
             };
         let line = line.with_hand_over_ns(line.hand_over_ns.max(hand_over_ns));
+        let mut device = Device::new(0x17, rate);
+        device.set_behaviour(behaviour);
         Self {
             world: World::new(wire, scenario),
-            device: Device::new(0x17, rate).with_behaviour(behaviour),
+            device,
             line: if hint { line.with_echo() } else { line },
             ready_ns: 100_000,
             seen: Seen::default(),
@@ -138,7 +138,7 @@ impl Bench {
     }
 
     /// One request, judged by the laws of time.
-    pub fn exchange(&mut self, request: Request, not_before_ns: u64) -> Exchanged {
+    pub fn exchange(&mut self, request: Request, not_before_ns: u64) -> Ended<Response, Error> {
         if self.moves {
             self.turn += 1;
             let (abs, abm) = self.shaft();
@@ -152,7 +152,7 @@ impl Bench {
         }
         let start_ns = not_before_ns.max(self.world.now_ns());
         let mut transaction = Transaction::start(request, self.line, start_ns);
-        let id = self.world.send(&Message::bytes(transaction.frame().as_bytes()), start_ns);
+        let id = self.world.send(&Message::bytes(transaction.transmission().frame.as_bytes()), start_ns);
         let late = self.world.truth().transmission(id).is_none_or(|sent| sent.start_ns > sent.asked_ns);
         self.misheard += u32::from(late);
         let mut late_ns = 0;
@@ -178,7 +178,7 @@ impl Bench {
         self.ready_ns = ready_ns.max(self.world.now_ns());
         let old_ns = self.world.now_ns().saturating_sub(2_000_000);
         self.world.truth_mut().forget_before(old_ns);
-        Exchanged { outcome, ready_ns: self.ready_ns }
+        Ended { outcome, ready_ns: self.ready_ns }
     }
 
     /// A place of the shaft that is another one every time, in 23 bits; the turns use all 24 bits of ABM.
@@ -192,14 +192,17 @@ impl Bench {
         let resolution = Resolution::new(23, 24).expect("widths of the fields");
         // The upper half of a counter in two's complement is below 0.
         let turns = i64::from(abm) - if abm >= 1 << 23 { 1 << 24 } else { 0 };
+        let sample = |tolerated| Evidence::of(response, resolution, 0).at(0, Policy::new(0).tolerating(tolerated));
         match response {
-            Response::ReadSingleTurn(single) => assert_eq!(resolution.single_turn(single.abs), Ok(abs)),
-            Response::ReadMultiTurn(multi) => assert_eq!(resolution.turns(multi.abm).map(i64::from), Ok(turns)),
-            Response::ReadAll(all) => {
-                assert_eq!(
-                    resolution.position(all.abs, all.abm).map(|p| (p.abs, i64::from(p.turns))),
-                    Ok((abs, turns))
-                );
+            // An encoder that finds the request damaged says so, and its position is a doubt.
+            _ if matches!(sample(Tolerated::NOTHING), Err(Doubt::RequestDamaged { .. })) => {}
+            Response::ReadSingleTurn(_) => {
+                assert_eq!(sample(Tolerated::SINGLE_TURN).map(Sample::single_turn), Ok(abs));
+            }
+            Response::ReadMultiTurn(multi) => assert_eq!(multi.abm.get(), abm),
+            Response::ReadAll(_) => {
+                let position = sample(Tolerated::NOTHING).map(Sample::position);
+                assert_eq!(position.map(|p| p.map(|p| (p.single_turn, i64::from(p.turns)))), Ok(Some((abs, turns))));
             }
             _ => {}
         }
@@ -214,30 +217,20 @@ impl Bench {
     }
 
     /// Runs a procedure to its end.
-    pub fn run<T>(
+    pub fn run<P: Procedure<Request = Request, Response = Response, Error = Error>>(
         &mut self,
-        mut step: Step<T>,
-        mut receive: impl FnMut(Result<Response, Error>, u64) -> Step<T>,
-    ) -> Result<T, Error> {
-        for _ in 0..1_000 {
-            match step {
-                Step::Send { request, not_before_ns } => {
-                    self.wait(not_before_ns);
-                    let request = self.sent_for(request);
-                    let exchanged = self.exchange(request, not_before_ns);
-                    step = receive(exchanged.outcome, exchanged.ready_ns);
-                }
-                Step::Done { value, ready_ns } => {
-                    self.wait(ready_ns);
-                    return Ok(value);
-                }
-                Step::Failed { error, ready_ns } => {
-                    self.wait(ready_ns);
-                    return Err(error);
-                }
-            }
-        }
-        panic!("the procedure does not end");
+        procedure: &mut P,
+    ) -> Result<P::Value, Error> {
+        let mut requests = 0;
+        let Ok(ended) = servowire_core::run(procedure, self.ready_ns, |request, not_before_ns| {
+            requests += 1;
+            assert!(requests < 1_000, "the procedure does not end");
+            self.wait(not_before_ns);
+            let request = self.sent_for(request);
+            Ok::<_, Infallible>(self.exchange(request, not_before_ns))
+        });
+        self.wait(ended.ready_ns);
+        ended.outcome
     }
 
     fn event(&mut self, transaction: &mut Transaction, until_ns: u64, late_ns: &mut u64) {
@@ -246,8 +239,11 @@ impl Bench {
                 let (content, framed) = unit.bits.content();
                 let byte = content as u8;
                 let (effects, abs) = (self.device.effects(), self.device.abs().get());
-                let sent =
-                    if framed { self.device.byte(byte, unit.end_ns) } else { self.device.framing_error(unit.end_ns) };
+                let sent = if framed {
+                    self.device.hear(&[byte], unit.end_ns)
+                } else {
+                    self.device.framing_error(unit.end_ns)
+                };
                 if let Some(sent) = sent.filter(|_| byte == 0xc2 && self.device.effects() > effects) {
                     let want = if self.tenth_shows_effect { 0 } else { abs };
                     assert_eq!(sent.frame.as_bytes()[2..5], want.to_le_bytes()[..3], "what the tenth response shows");
@@ -261,7 +257,7 @@ impl Bench {
                 }
                 if let Some(sent) = sent {
                     let message = Message::bytes(sent.frame.as_bytes()).tagged(tag(sent.frame.as_bytes()));
-                    let _ = self.world.answer(0, unit.origin.transmission, &message, sent.at_ns);
+                    let _ = self.world.answer(0, unit.origin.transmission, &message, sent.start_ns);
                 }
             }
             Event::Delivered(block) => {
@@ -380,11 +376,11 @@ fn feed(transaction: &mut Transaction, block: &Block, field_ns: u64) {
             good.push(*byte);
             continue;
         }
-        let _ = transaction.bytes(&good, end_ns.saturating_sub(field_ns));
+        let _ = transaction.hear(&good, end_ns.saturating_sub(field_ns));
         good.clear();
         let _ = transaction.framing_error(end_ns);
     }
-    let _ = transaction.bytes(&good, block.end_ns);
+    let _ = transaction.hear(&good, block.end_ns);
 }
 
 /// The value that marks a response: its control field, and a sum of all its bytes.

@@ -1,9 +1,11 @@
 //! T-Format over the port: a master that prints positions, and an encoder.
 
+use core::convert::Infallible;
 use core::fmt::{self, Write};
 
+use servowire_core::{Ended, Procedure};
 use tformat::device::Device;
-use tformat::master::{EEPROM_POLLING, EepromAccess, Line, MultiTurnZero, Progress, Step, Transaction};
+use tformat::master::{EEPROM_POLLING, EepromAccess, Line, MultiTurnZero, Progress, Transaction};
 use tformat::{Abm, Abs, Address, BitRate, Error, Request, Resolution, Response};
 
 use crate::board::{Board, Console};
@@ -48,7 +50,7 @@ impl Master {
         transmitter.send(message);
         let outcome = loop {
             let progress = match receiver.take() {
-                Some(Unit { content, framed: true }) => transaction.bytes(&[content as u8], clock.now_ns()),
+                Some(Unit { content, framed: true }) => transaction.hear(&[content as u8], clock.now_ns()),
                 Some(_) => transaction.framing_error(clock.now_ns()),
                 None => transaction.poll(clock.now_ns()),
             };
@@ -64,32 +66,23 @@ impl Master {
     }
 
     /// A procedure of several exchanges.
-    fn run<T>(
+    fn run<P: Procedure<Request = Request, Response = Response, Error = Error>>(
         &mut self,
-        mut step: Step<T>,
-        mut receive: impl FnMut(Result<Response, Error>, u64) -> Step<T>,
-    ) -> Result<T, Error> {
-        loop {
-            let (request, not_before_ns) = match step {
-                Step::Send { request, not_before_ns } => (request, not_before_ns),
-                Step::Done { value, ready_ns } => {
-                    self.free_ns = ready_ns;
-                    return Ok(value);
-                }
-                Step::Failed { error, ready_ns } => {
-                    self.free_ns = ready_ns;
-                    return Err(error);
-                }
-            };
+        mut procedure: P,
+    ) -> Result<P::Value, Error> {
+        let now_ns = self.clock.now_ns();
+        let Ok(ended) = servowire_core::run(&mut procedure, now_ns, |request, not_before_ns| {
             while self.clock.now_ns() < not_before_ns {}
             let (outcome, _) = self.exchange(request, &message(request));
-            step = receive(outcome, self.free_ns.max(self.clock.now_ns()));
-        }
+            Ok::<_, Infallible>(Ended { outcome, ready_ns: self.free_ns.max(self.clock.now_ns()) })
+        });
+        self.free_ns = ended.ready_ns;
+        ended.outcome
     }
 
     /// Does what was typed, and says what came of it.
     fn command(&mut self, command: Command, console: &mut Console) -> fmt::Result {
-        let (address, mut access) = match command {
+        let (address, access) = match command {
             Command::Read { address } => {
                 (address, EepromAccess::read(None, Address::truncate(address), EEPROM_POLLING))
             }
@@ -97,17 +90,14 @@ impl Master {
                 (address, EepromAccess::write(None, Address::truncate(address), data as u8, EEPROM_POLLING))
             }
             Command::LoseMultiTurnReference => {
-                let mut zero = MultiTurnZero::set_and_lose_multi_turn_reference(RESOLUTION, 1);
-                let first = zero.start(self.clock.now_ns());
-                return match self.run(first, |outcome, ready_ns| zero.receive(outcome, ready_ns)) {
+                return match self.run(MultiTurnZero::set_and_lose_multi_turn_reference(RESOLUTION, 1)) {
                     Ok(multi) => writeln!(console, "turns: {}", multi.abm.get()),
                     Err(error) => writeln!(console, "turns: {error}"),
                 };
             }
             Command::Unknown => return console.write_str("?\n"),
         };
-        let first = access.start(self.clock.now_ns());
-        match self.run(first, |outcome, ready_ns| access.receive(outcome, ready_ns)) {
+        match self.run(access) {
             Ok(byte) => writeln!(console, "EEPROM {address:02x}: {byte:02x}"),
             Err(error) => writeln!(console, "EEPROM {address:02x}: {error}"),
         }
@@ -171,7 +161,7 @@ pub fn encoder(rate: BitRate, wait_cycles: u32) -> ! {
     let mut device = Device::<6>::new(ENCODER_ID, rate);
     let mut position = 0x12_3456;
     device.set_position(Abs::truncate(position), TURNS);
-    let mut ahead = Some(prepare(&mut device, Request::ReadAll, &mut position, wait_cycles));
+    let mut ahead = prepare(&mut device, Request::ReadAll, &mut position, wait_cycles);
     let (mut inside, mut last_ns) = (false, 0);
     let _ = writeln!(console, "T-Format encoder, {} bit/s", rate.bits_per_second());
     loop {
@@ -187,14 +177,14 @@ pub fn encoder(rate: BitRate, wait_cycles: u32) -> ! {
         }
         let first = !inside;
         last_ns = clock.now_ns();
-        let reply = if unit.framed { device.byte(byte, last_ns) } else { device.framing_error(last_ns) };
+        let reply = if unit.framed { device.hear(&[byte], last_ns) } else { device.framing_error(last_ns) };
         inside = reply.is_none();
         if let Some(reply) = reply.filter(|_| !started) {
             transmitter.send(&Prepared::new(reply.line.bits(), reply.line.len(), 0));
         }
         let request = READS.into_iter().find(|request| first && unit.framed && control_field(*request) == byte);
         if let Some(request) = request {
-            ahead = Some(prepare(&mut device, request, &mut position, wait_cycles));
+            ahead = prepare(&mut device, request, &mut position, wait_cycles);
         } else if !inside {
             // It may have changed what an answer says, and a repetition is counted: nothing is made ahead now.
             ahead = None;
@@ -210,9 +200,9 @@ fn control_field(request: Request) -> u8 {
 }
 
 /// The shaft moves, and the answer to `request` is made.
-fn prepare(device: &mut Device<6>, request: Request, position: &mut u32, wait_cycles: u32) -> (u8, Prepared) {
+fn prepare(device: &mut Device<6>, request: Request, position: &mut u32, wait_cycles: u32) -> Option<(u8, Prepared)> {
     *position += 1;
     device.set_position(Abs::truncate(*position), device.abm());
-    let answer = device.answer(request, 0).emit().line();
-    (control_field(request), Prepared::new(answer.bits(), answer.len(), wait_cycles))
+    let answer = device.answer(request, 0)?.emit().line();
+    Some((control_field(request), Prepared::new(answer.bits(), answer.len(), wait_cycles)))
 }

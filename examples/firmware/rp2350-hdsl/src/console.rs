@@ -1,5 +1,6 @@
 //! Prints a digit a frame, so that the link is never late for it.
 
+use hdsl::Policy;
 use hdsl::master::Master;
 use rp235x_hal::gpio::bank0::{Gpio0, Gpio1};
 use rp235x_hal::gpio::{FunctionUart, Pin, PullDown};
@@ -8,6 +9,8 @@ use rp235x_hal::uart::{Enabled, UartPeripheral};
 
 type Uart = UartPeripheral<Enabled, UART0, (Pin<Gpio0, FunctionUart, PullDown>, Pin<Gpio1, FunctionUart, PullDown>)>;
 
+/// A position of the last four frames.
+const FRESH: Policy = Policy::new(50_000);
 /// Frames from one line to the next: ten a second.
 const PERIOD: u32 = 4_000;
 const DIGITS: u32 = 16;
@@ -26,9 +29,12 @@ impl Console {
     }
 
     /// A piece of a line, at most as long as the UART's FIFO.
-    pub fn step(&mut self, master: &Master) {
+    pub fn step(&mut self, master: &Master, now_ns: u64) {
         match (self.frame, self.position) {
-            (0, _) => self.position = master.fast().ok().map(|fast| u64::from_ne_bytes(fast.position.to_ne_bytes())),
+            (0, _) => {
+                let fast = master.fast().at(now_ns, FRESH).ok();
+                self.position = fast.map(|fast| u64::from_ne_bytes(fast.position().to_ne_bytes()));
+            }
             (1, Some(_)) => self.put(b"position "),
             (1, None) => self.put(b"no position"),
             (2..18, Some(position)) => {

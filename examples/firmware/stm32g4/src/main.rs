@@ -16,6 +16,7 @@ use embassy_stm32::{bind_interrupts, dma, peripherals};
 use embassy_time::{Duration, Ticker, with_timeout};
 use embedded_io::Write;
 use panic_halt as _;
+use servowire_core::{TickRate, TimeBase};
 use tformat::master::{Exchange, Line, Progress, Transaction};
 use tformat::{BitRate, Request, Response};
 
@@ -38,26 +39,19 @@ const IDLE_NS: u64 = 4_000;
 /// The longest answer, and some noise.
 const MOST_BYTES: usize = 16;
 
-/// The cycle counter, made longer. It has to be looked at every 26 s.
-struct Clock {
-    last: u32,
-    cycles: u64,
-}
+/// The time from the cycle counter, which has to be looked at every 13 s.
+struct Clock(TimeBase<32>);
 
 impl Clock {
     fn new() -> Self {
         let mut core = cortex_m::Peripherals::take().expect("called once");
         core.DCB.enable_trace();
         core.DWT.enable_cycle_counter();
-        Self { last: 0, cycles: 0 }
+        Self(TimeBase::new(TickRate::of::<CORE_HZ>(), DWT::cycle_count()))
     }
 
     fn now_ns(&mut self) -> u64 {
-        let now = DWT::cycle_count();
-        self.cycles += u64::from(now.wrapping_sub(self.last));
-        self.last = now;
-        // 6.25 ns a cycle
-        self.cycles * 25 / 4
+        self.0.now_ns(DWT::cycle_count()).expect("a cycle is shorter than a turn of the counter")
     }
 }
 
@@ -94,7 +88,7 @@ fn uart() -> usart::Config {
 /// One request and its answer. The reception is armed before the request goes out: the answer comes 3 us after it.
 async fn exchange(uart: &mut Uart<'static, Async>, clock: &mut Clock, line: Line) -> Result<Exchange, tformat::Error> {
     let mut transaction = Transaction::start(Request::ReadAll, line, clock.now_ns());
-    let frame = transaction.frame();
+    let frame = transaction.transmission().frame;
     let mut buffer = [0; MOST_BYTES];
     let (tx, rx) = uart.split_ref();
     let both = join(rx.read_until_idle(&mut buffer), tx.write(frame.as_bytes()));
@@ -102,7 +96,7 @@ async fn exchange(uart: &mut Uart<'static, Async>, clock: &mut Clock, line: Line
     let now_ns = clock.now_ns();
     let progress = match received {
         Ok((Ok(count), Ok(()))) => {
-            transaction.bytes(buffer.get(..count).unwrap_or_default(), now_ns.saturating_sub(IDLE_NS))
+            transaction.hear(buffer.get(..count).unwrap_or_default(), now_ns.saturating_sub(IDLE_NS))
         }
         // Noise, framing, overrun: all bytes of this reading are gone.
         Ok(_) => transaction.framing_error(now_ns),

@@ -4,12 +4,15 @@ use std::string::ToString;
 use std::vec::Vec;
 
 fn data() -> impl Strategy<Value = Data> {
-    (0..4_u8, any::<[u8; 8]>()).prop_map(|(code, bytes)| Data::new(&bytes[..Length::from_code(code).bytes()]).unwrap())
+    (0..4_u8, any::<[u8; 8]>())
+        .prop_map(|(code, bytes)| Data::new(&bytes[..Length::ALL[usize::from(code)].bytes()]).unwrap())
 }
 
 pub(crate) fn requests() -> impl Strategy<Value = LongRequest> {
-    let access =
-        prop_oneof![(0..4_u8).prop_map(|code| Access::Read(Length::from_code(code))), data().prop_map(Access::Write),];
+    let access = prop_oneof![
+        (0..4_u8).prop_map(|code| Access::Read(Length::ALL[usize::from(code)])),
+        data().prop_map(Access::Write),
+    ];
     (0..1024_u16, any::<bool>(), prop::option::of(0..1_u16 << 15), access).prop_map(
         |(address, indirect, offset, access)| LongRequest {
             address: ResourceAddress::truncate(address),

@@ -1,9 +1,9 @@
 //! Answers of a link that runs: their words, the running disparity between them, their V-frames.
 
-use hdsl::{Answer, EncoderByte, Error, Phase, Rule, VFrame, Window};
+use hdsl::inspect::{Chain, Expected, inspect};
+use hdsl::{AlignmentStage, Answer, EncoderByte, Error, Rule, VFrame, Window};
 
-use super::disparity::Chain;
-use super::{Decoder, Refused, event, position, refusal, words};
+use super::{Decoder, Refused, event, position, refusal};
 use crate::event::{Direction, Field, Place};
 
 const DISPARITY: &str = "all words are in the tables, but not one after the other: bits of at least one were flipped";
@@ -34,18 +34,20 @@ impl Decoder {
         let dd = answer.delta_delta();
         self.tracker.step(dd.ok());
         let parameter = answer.parameter();
-        let chain = Chain::of(window);
-        let verdict = match words::wrong(answer, self.at) {
-            None if !chain.holds => Err(("disparity", DISPARITY.to_owned())),
+        let report = inspect(Expected::Normal { at: self.at }, window);
+        let chain = report.disparity();
+        let verdict = match report.error() {
+            None if !chain.holds() => Err(("disparity", DISPARITY.to_owned())),
             None => Ok(()),
-            Some(refused) => Err(refused),
+            Some(error) => Err(refusal(error)),
         };
         let sound = verdict.is_ok();
         let verdict = verdict.and_then(|()| self.follow(parameter.is_ok_and(EncoderByte::vsync)));
         let mut event = event(place, Direction::Answer, "answer", self.fields(answer), verdict);
-        if self.tracker.phase() == Phase::Check && !self.tracker.is_unreliable() {
-            event.fields.push(Field::hex("POS", self.tracker.position(), 10));
-            event.position = Some(position(self.tracker.position()));
+        let shown = self.tracker.registers();
+        if self.tracker.stage() == AlignmentStage::Check && !shown.pos_flag {
+            event.fields.push(Field::hex("POS", shown.pos, 10));
+            event.position = Some(position(shown.pos));
         }
         if event.verdict.is_ok() && !answer.switch_ok() {
             event.fields.push(Field::text("note", SWITCH));
@@ -69,7 +71,7 @@ impl Decoder {
         fields.extend(byte("PIPE", answer.pipe()));
         fields.extend(answer.delta_delta().ok().map(|dd| Field::number("DD", dd.get())));
         fields.extend(byte("SEC", answer.secondary()));
-        fields.push(Field::measured("VEL", self.tracker.velocity(), "/frame"));
+        fields.push(Field::measured("VEL", self.tracker.registers().vel, "/frame"));
         fields
     }
 
@@ -144,7 +146,7 @@ impl Decoder {
 
     fn end_v_frame(&mut self, place: Place) {
         let VFrame { safe1, safe2 } = self.frame;
-        let safe = safe1.position();
+        let safe = safe1.vpos();
         self.quality.count_v_frame(&self.frame);
         match safe {
             Ok(position) => self.tracker.align(position),
@@ -153,9 +155,9 @@ impl Decoder {
         let mut fields = vec![Field::hex("SUMMARY", safe1.status(), 2)];
         fields.extend(safe.ok().map(|position| Field::hex("VPOS", position, 10)));
         fields.push(Field::hex("STATUS2", safe2.status(), 2));
-        fields.extend(safe2.position().ok().map(|position| Field::hex("VPOS2", position, 10)));
+        fields.extend(safe2.vpos().ok().map(|position| Field::hex("VPOS2", position, 10)));
         fields.push(Field::number("QM", self.quality.value()));
-        let second = safe2.position();
+        let second = safe2.vpos();
         let error = safe.err().or(second.err());
         let mut event = event(place, Direction::Answer, "V-frame", fields, error.map_or(Ok(()), |e| Err(refusal(e))));
         event.position = safe.ok().map(position);

@@ -2,16 +2,15 @@
 
 use hdsl::cable::{Cable, Disturbance};
 use hdsl::device::Device;
-use hdsl::frame::{Extra, Head, Received};
+use hdsl::frame::{Extra, Head, ParsedHead};
 use hdsl::master::{Counters, Master};
 use hdsl::message::{Access, Data, Length, LongRequest, RemoteRegister, ResourceAddress, ShortAnswer, ShortRequest};
-use hdsl::registers::{Event, EventS, Register, Registers};
-use hdsl::rssi::EdgeWatch;
-use hdsl::sampling::{Alignment, Delay, EdgeRule, SampleIndex, TEST_PATTERN, WINDOW};
-use hdsl::symbol::{Character, DisparityCheck, DisparityStatus, Reading, RunningDisparity, Word};
+use hdsl::registers::{Event, EventS, Events, Register, Registers};
+use hdsl::sampling::{Alignment, Delay, EdgeRule, SampleIndex, SampledAnswer, TEST_PATTERN, WINDOW};
+use hdsl::symbol::{Character, DisparityCheck, DisparityStatus, Encoded, Reading, RunningDisparity, Word};
 use hdsl::sync::{CoreClock, Es, Next, Startup, Synchroniser};
 use hdsl::{
-    Answer, Content, DeltaDelta, Dialect, EncoderByte, EncoderId, EncoderSymbol, Error, LineDisparity, MasterSymbol,
+    Answer, Content, DeltaDelta, Dialect, EncodedAnswer, EncoderByte, EncoderId, EncoderSymbol, Error, LineDisparity, MasterSymbol,
     ParameterByte, PositionBits, PositionRule, PositionTracker, QualityEvent, QualityMonitor, QualityRule, Rule,
     VFrame, crc16,
 };
@@ -108,9 +107,10 @@ fn es_of(es: u8) -> Result<Es, Error> {
 }
 
 fn content(word: u64) -> Content {
+    let idle = EncoderByte::of(EncoderSymbol::Idle);
     Content {
         vertical: Character::data(word.to_le_bytes()[0]),
-        parameter: EncoderByte::of(EncoderSymbol::Idle, word & 1 == 1),
+        parameter: if word & 1 == 1 { idle.with_vsync() } else { idle },
         pipe: Character::control(hdsl::symbol::Control::K30_7),
         acceleration: Some(DeltaDelta::clamp(i64::from(word.to_le_bytes()[1]))),
         secondary: Character::data(word.to_le_bytes()[2]),
@@ -129,7 +129,7 @@ kernels! {
     } over SYMBOLS;
 
     /// A byte to a word.
-    fn hdsl_symbol_encode(word: &u64) -> (Word, RunningDisparity) {
+    fn hdsl_symbol_encode(word: &u64) -> Encoded {
         Character::data(word.to_le_bytes()[0]).encode(RunningDisparity::Plus)
     } over SYMBOLS;
 
@@ -145,14 +145,14 @@ kernels! {
     } over LINES;
 
     /// An answer to send.
-    fn hdsl_answer_emit(word: &u64) -> (u64, RunningDisparity) {
+    fn hdsl_answer_emit(word: &u64) -> EncodedAnswer {
         content(*word).emit(RunningDisparity::Minus)
     } over LINES;
 
     /// Eight answers to both safe positions.
     fn hdsl_v_frame(lines: &[u64; 8]) -> (Result<u64, Error>, Result<u64, Error>) {
         let frame = VFrame::of(Rule::Strict, &lines.map(|line| Answer::from_bits(Rule::Strict, line)));
-        (frame.safe1.position(), frame.safe2.position())
+        (frame.safe1.vpos(), frame.safe2.vpos())
     } over GROUPS;
 
     /// The identifier of an encoder.
@@ -172,7 +172,7 @@ kernels! {
             tracker.step(value.and_then(DeltaDelta::new));
         }
         tracker.align(12_345);
-        (tracker.position(), tracker.velocity())
+        (tracker.registers().pos, tracker.registers().vel)
     } over ACCELERATIONS;
 
     /// The same with the position of the SDK.
@@ -182,7 +182,7 @@ kernels! {
             tracker.step(value.and_then(DeltaDelta::new));
         }
         tracker.no_safe_position();
-        (tracker.position(), tracker.velocity())
+        (tracker.registers().pos, tracker.registers().vel)
     } over ACCELERATIONS;
 
     /// One event of the quality monitor.
@@ -193,14 +193,14 @@ kernels! {
     } over SYMBOLS;
 
     /// The head of a frame, and what an encoder reads of it.
-    fn hdsl_head((byte, edge, disparity): &(u8, u8, i8)) -> Result<Received, Error> {
-        let (head, _) = Head::new(ParameterByte::new(*byte), Extra::new(*edge), LineDisparity::new(*disparity));
+    fn hdsl_head((byte, edge, disparity): &(u8, u8, i8)) -> Result<ParsedHead, Error> {
+        let head = Head::new(ParameterByte::new(*byte), Extra::new(*edge), LineDisparity::new(*disparity));
         Head::parse(head.bits())
     } over HEADS;
 
     /// The head as samples.
     fn hdsl_head_samples((byte, edge, disparity): &(u8, u8, i8)) -> u8 {
-        let (head, _) = Head::new(ParameterByte::new(*byte), Extra::new(*edge), LineDisparity::new(*disparity));
+        let head = Head::new(ParameterByte::new(*byte), Extra::new(*edge), LineDisparity::new(*disparity));
         head.samples().fold(0, |all, byte| all ^ byte)
     } over HEADS;
 
@@ -210,12 +210,12 @@ kernels! {
     } over PATTERNS;
 
     /// The bits, the edges and the RSSI of an answer at a learned place.
-    fn hdsl_read((place, samples): &(Alignment, [u8; WINDOW])) -> Result<(u64, EdgeWatch), Error> {
+    fn hdsl_read((place, samples): &(Alignment, [u8; WINDOW])) -> Result<SampledAnswer, Error> {
         place.read(samples)
     } over PLACED;
 
     /// The same from whole words.
-    fn hdsl_read_words((place, samples): &(Alignment, [u32; WINDOW / 4])) -> (u64, EdgeWatch) {
+    fn hdsl_read_words((place, samples): &(Alignment, [u32; WINDOW / 4])) -> SampledAnswer {
         place.read_words(samples)
     } over PLACED_WORDS;
 
@@ -261,16 +261,16 @@ kernels! {
         let mut line = Cable::new(Disturbance::metres(10).with_jitter(1), 1);
         for frame in 0..*frames {
             let head = line.down(master.transmission().head.bits());
-            let samples = line.up(encoder.answer(head, u64::from(frame)));
+            let samples = line.up(encoder.hear(head, u64::from(frame)));
             if frame == 25 {
                 let _ = master.start_short(ShortRequest::Read(RemoteRegister::PING));
                 let access = Access::Read(Length::Eight);
                 let address = ResourceAddress::RESOLUTN;
                 let _ = master.start_long(LongRequest { address, indirect: false, offset: None, access });
             }
-            let _ = map.apply(master.finish(&samples, None)?);
+            let _ = map.apply(master.hear(&samples, 11_520 * u64::from(frame))?);
         }
-        Ok((master.counters(), map.position()))
+        Ok((master.counters(), map.pos()))
     } over LINKS;
 
     /// What an application does with registers.
@@ -280,7 +280,7 @@ kernels! {
         let [address, value, ..] = word.to_le_bytes();
         let _ = map.write(&mut master, address, value);
         let _ = map.write(&mut master, Register::SysCtrl as u8, 0xc0);
-        let (event, event_s) = map.take_events();
+        let Events { drive: event, safe: event_s } = map.take_events();
         (event, event_s, map.read(address))
     } over SYMBOLS;
 

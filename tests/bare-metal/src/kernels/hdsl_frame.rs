@@ -5,7 +5,7 @@ use core::hint::black_box;
 
 use hdsl::cable::{Cable, Disturbance};
 use hdsl::device::Device;
-use hdsl::master::{Master, Report, State};
+use hdsl::master::{HFrame, Master, State};
 use hdsl::message::{LongRequest, RemoteRegister, ResourceAddress, ShortRequest};
 use hdsl::registers::{Interrupts, Registers};
 use hdsl::sampling::WINDOW;
@@ -31,6 +31,7 @@ struct Received {
     bytes: [u8; WINDOW],
     words: [u32; WINDOW / 4],
     bits: u64,
+    end_ns: u64,
 }
 
 /// What a kernel does with an H-frame.
@@ -69,13 +70,13 @@ impl Link {
             let _ = self.master.start_short(ShortRequest::Read(RemoteRegister::PING));
             let _ = self.master.start_long(LongRequest::read_name(ResourceAddress::RESOLUTN));
         }
-        let answer = self.encoder.answer(self.master.transmission().head.bits(), self.position);
+        let answer = self.encoder.hear(self.master.transmission().head.bits(), self.position);
         let bytes = self.cable.up(answer);
         let mut words = [0; WINDOW / 4];
         for (to, from) in words.iter_mut().zip(bytes.chunks_exact(4)) {
             *to = from.iter().rev().fold(0, |word, byte| word << 8 | u32::from(*byte));
         }
-        Received { bytes, words, bits: answer.unwrap_or(0) }
+        Received { bytes, words, bits: answer.map_or(0, |answer| answer.bits), end_ns: 11_520 * u64::from(self.count) }
     }
 }
 
@@ -84,7 +85,7 @@ impl Link {
 #[inline(never)]
 #[unsafe(no_mangle)]
 extern "Rust" fn hdsl_frame(link: &mut Link, answer: &Received) -> Window {
-    let _ = link.master.finish(&answer.bytes, None);
+    let _ = link.master.hear(&answer.bytes, answer.end_ns);
     link.master.transmission().head.bits()
 }
 
@@ -93,7 +94,7 @@ extern "Rust" fn hdsl_frame(link: &mut Link, answer: &Received) -> Window {
 #[inline(never)]
 #[unsafe(no_mangle)]
 extern "Rust" fn hdsl_frame_words(link: &mut Link, answer: &Received) -> Window {
-    let _ = link.master.finish_words(&answer.words, None);
+    let _ = link.master.hear_words(&answer.words, answer.end_ns);
     link.master.transmission().head.bits()
 }
 
@@ -102,7 +103,7 @@ extern "Rust" fn hdsl_frame_words(link: &mut Link, answer: &Received) -> Window 
 #[inline(never)]
 #[unsafe(no_mangle)]
 extern "Rust" fn hdsl_frame_bits(link: &mut Link, answer: &Received) -> Window {
-    let _ = link.master.finish_bits(answer.bits, None, None);
+    let _ = link.master.hear_bits(answer.bits, None, answer.end_ns);
     link.master.transmission().head.bits()
 }
 
@@ -114,12 +115,12 @@ extern "Rust" fn hdsl_frame_ahead(link: &mut Link, _: &Received) -> Window {
     link.master.ahead().map_or(Window::EMPTY, |next| next.head.bits())
 }
 
-/// The register map, from the report.
+/// The register map, from what the frame brought.
 #[expect(unsafe_code, reason = "the symbol is how run.sh finds the kernel")]
 #[inline(never)]
 #[unsafe(no_mangle)]
-extern "Rust" fn hdsl_frame_registers(map: &mut Registers, report: &Report) -> Interrupts {
-    map.apply(report)
+extern "Rust" fn hdsl_frame_registers(map: &mut Registers, h_frame: &HFrame) -> Interrupts {
+    map.apply(h_frame)
 }
 
 /// No work: what the measurement itself takes.
@@ -149,8 +150,8 @@ fn measure_at(delay: u32, step: Step) -> (u32, u32) {
 
 /// A frame with the register map beside it; the map alone is what is more.
 fn with_registers(link: &mut Link, answer: &Received) -> Window {
-    let _ = link.master.finish(&answer.bytes, None);
-    hdsl_frame_registers(&mut link.map, link.master.report());
+    let _ = link.master.hear(&answer.bytes, answer.end_ns);
+    hdsl_frame_registers(&mut link.map, link.master.h_frame());
     link.master.transmission().head.bits()
 }
 

@@ -1,6 +1,6 @@
 //! T-Format: master, encoder, inspection and the receive logic of the CLB design.
 
-use tformat::clb::{Outputs, SerialCrc, Tile};
+use tformat::clb::{Inputs, Outputs, SerialCrc, Tile};
 use tformat::device::{Device, Fault, Transmission};
 use tformat::inspect::{Report, inspect, inspect_bytes};
 use tformat::master::{
@@ -48,21 +48,21 @@ kernels! {
         let mut now_ns = 4_000;
         for byte in *bytes {
             now_ns += 4_000;
-            let _ = transaction.bytes(&[*byte], now_ns);
+            let _ = transaction.hear(&[*byte], now_ns);
         }
         transaction.progress()
     } over ECHOED;
 
     /// A transaction whose whole answer comes in one block.
     fn tformat_transaction_block((request, _, bytes): &Echoed) -> Progress {
-        Transaction::start(*request, LINE, 0).bytes(bytes, 31_000)
+        Transaction::start(*request, LINE, 0).hear(bytes, 31_000)
     } over ECHOED;
 
     /// A transaction that ends with a framing error or a time-out.
     fn tformat_transaction_fails((request, echo, bytes): &Echoed) -> Progress {
         let mut transaction = Transaction::start(*request, LINE, 0);
         for byte in *bytes {
-            let _ = transaction.bytes(&[*byte], 40_000);
+            let _ = transaction.hear(&[*byte], 40_000);
         }
         if *echo { transaction.framing_error(8_000) } else { transaction.poll(1_000_000) }
     } over ECHOED;
@@ -120,12 +120,12 @@ kernels! {
     fn tformat_device_byte(sent: &Sent) -> Option<Transmission> {
         let mut encoder = Device::<1>::new(0x17, BitRate::Mbit2_5);
         encoder.set_position(Abs::truncate(0x12_3456), Abm::truncate(7));
-        encoder.set_alarms(Almc::CE, !sent.is_empty());
+        encoder.raise_alarms(Almc::CE);
         encoder.set_fault(Fault::FlipBit { at: sent.len() as u8 });
         let mut now_ns = 0;
         sent.iter().fold(None, |reply, byte| {
             now_ns += 4_000;
-            encoder.byte(*byte, now_ns).or(reply)
+            encoder.hear(&[*byte], now_ns).or(reply)
         })
     } over SENT;
 
@@ -135,7 +135,7 @@ kernels! {
         let mut now_ns = 0;
         (0..row.line.len()).filter_map(|at| row.line.get(at)).fold(None, |reply, level| {
             now_ns += 400;
-            encoder.bit(level, now_ns).or(reply)
+            encoder.hear_bit(level, now_ns).or(reply)
         })
     } over FLIPS;
 
@@ -151,10 +151,13 @@ kernels! {
     } over ECHOED;
 
     /// A cycle of the tile.
-    fn tformat_clb_cycle((tile, start, response): &(Tile, bool, bool)) -> (Outputs, Tile) {
+    fn tformat_clb_cycle((tile, inputs): &(Tile, Inputs)) -> (Outputs, Tile) {
         let mut tile = *tile;
-        (tile.cycle(*start, *response), tile)
-    } over [(Tile::new(20, 11, 110), true, true), (Tile::new(24, 11, 60), false, false)];
+        (tile.cycle(*inputs), tile)
+    } over [
+        (Tile::new(20, 11, 110), Inputs { start: true, response: true }),
+        (Tile::new(24, 11, 60), Inputs { start: false, response: false }),
+    ];
 
     /// The check register over the fields of an answer.
     fn tformat_clb_crc(row: &Answer) -> u8 {

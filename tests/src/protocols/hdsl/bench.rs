@@ -1,7 +1,7 @@
 //! A receiver with its register map, fed with answers.
 
 use hdsl::Dialect;
-use hdsl::master::{Master, Report};
+use hdsl::master::{HFrame, Master};
 use hdsl::message::{Access, Offset, ShortRequest};
 use hdsl::registers::{Register, Registers};
 use hdsl::sampling::line;
@@ -23,15 +23,15 @@ impl Bench {
         Self { master: Master::new(dialect), map: Registers::new(&dialect) }
     }
 
-    pub(super) fn finish(&mut self, samples: &[u8]) -> Result<Report, Fault> {
-        let report = *self.master.finish(samples, None).map_err(unreadable)?;
-        let _ = self.map.apply(&report);
-        Ok(report)
+    pub(super) fn hear(&mut self, samples: &[u8]) -> Result<HFrame, Fault> {
+        let h_frame = *self.master.hear(samples, 0).map_err(unreadable)?;
+        let _ = self.map.apply(&h_frame);
+        Ok(h_frame)
     }
 
     /// An answer after one bit of delay.
-    pub(super) fn feed(&mut self, bits: u64) -> Result<Report, Fault> {
-        self.finish(&line(bits, 8))
+    pub(super) fn feed(&mut self, bits: u64) -> Result<HFrame, Fault> {
+        self.hear(&line(bits, 8))
     }
 
     pub(super) fn write(&mut self, address: u8, value: u8) -> Result<(), Fault> {

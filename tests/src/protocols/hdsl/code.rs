@@ -1,7 +1,7 @@
 //! 8b/10b, the checks, and the parameter byte of the master.
 
-use hdsl::symbol::{Character, DisparityCheck, DisparityStatus, Rule, RunningDisparity, Word};
-use hdsl::{CRC_16, DeltaDelta, LineDisparity, ParameterByte, RunningCrc16};
+use hdsl::symbol::{Character, DisparityCheck, DisparityStatus, Encoded, Rule, RunningDisparity, Word};
+use hdsl::{CRC_16, DeltaDelta, EncodedParameter, LineDisparity, ParameterByte, RunningCrc16};
 use serde::Deserialize;
 
 use super::{Line, Pair, disparity, pair, sign};
@@ -20,10 +20,11 @@ struct Encode {
 
 pub(super) fn encode(rows: &[Row]) -> Vec<Verdict> {
     each(rows, |row: Encode| {
-        let character = Character::new(row.byte.0 as u8, row.k);
-        same("character exists", &true, &character.is_some())?;
+        let character = Character::try_from((row.byte.0 as u8, row.k));
+        same("character exists", &true, &character.is_ok())?;
         let got = character.map(|c| c.encode(disparity(row.rd_in)));
-        same("code and rd_out", &Some((row.code.word(), disparity(row.rd_out))), &got)
+        let want = Encoded { word: row.code.word(), disparity: disparity(row.rd_out) };
+        same("code and rd_out", &Ok(want), &got)
     })
 }
 
@@ -88,9 +89,9 @@ pub(super) fn stream(rows: &[Row]) -> Vec<Verdict> {
         let mut rd = disparity(row.rd_in);
         let mut words = Vec::new();
         for sent in &row.sent {
-            let (word, after) = super::character(*sent)?.encode(rd);
-            words.push(word.get());
-            rd = after;
+            let coded = super::character(*sent)?.encode(rd);
+            words.push(coded.word.get());
+            rd = coded.disparity;
         }
         for flip in &row.flips {
             if let Some(word) = words.get_mut(flip / 10) {
@@ -190,7 +191,8 @@ pub(super) fn master_param(rows: &[Row]) -> Vec<Verdict> {
     each(rows, |row: MasterParam| {
         let byte = ParameterByte::new(row.param.0 as u8);
         let got = LineDisparity::new(row.d_in).encode(byte);
-        same("code and d_out", &(row.code.word(), LineDisparity::new(row.d_out)), &got)?;
+        let want = EncodedParameter { word: row.code.word(), disparity: LineDisparity::new(row.d_out) };
+        same("code and d_out", &want, &got)?;
         same("decoded", &Some(byte), &ParameterByte::decode(row.code.word()))
     })
 }

@@ -1,7 +1,7 @@
 //! Traces of the receiver firmware, under its profile.
 
 use hdsl::frame::{FILLER, Trailer};
-use hdsl::master::{Cause, State};
+use hdsl::master::{RestartReason, State};
 use hdsl::registers::{OnlineD, Register, Registers};
 use hdsl::sampling::{TEST_PATTERN, line};
 use hdsl::symbol::{Character, Control, RunningDisparity};
@@ -89,11 +89,11 @@ pub(super) fn fw_startup(rows: &[Row]) -> Vec<Verdict> {
             let silent = frame.3.0.iter().all(|bit| *bit);
             let samples = if silent { [0xff; 72] } else { line(bits64(&frame.3), delay * 8) };
             let before = bench;
-            let report = bench.finish(&samples)?;
-            sent.extend(report.tail.bits());
-            identified &= !matches!(report.restarted, Some(Cause::Identifier(_)));
+            let h_frame = bench.hear(&samples)?;
+            sent.extend(h_frame.tail.bits());
+            identified &= !matches!(h_frame.restarted, Some(RestartReason::Identifier(_)));
             identified |= bench.master.state() == State::WaitVsync;
-            if report.restarted.is_some() && report.tail.trailer != Trailer::Cut {
+            if h_frame.restarted.is_some() && h_frame.tail.trailer != Trailer::Cut {
                 // A row of its own for what was sent when the master gave up, with the registers before that.
                 let Some(gave_up) = frames.next() else { return learned(&row, &bench) };
                 same("gave up", &None, &gave_up.0)?;
@@ -134,8 +134,8 @@ fn next_answered<'a>(
             return Ok(frames.next());
         }
         sent.extend(window(FILLER));
-        let report = bench.finish(&[])?;
-        sent.extend(report.tail.bits());
+        let h_frame = bench.hear(&[])?;
+        sent.extend(h_frame.tail.bits());
     }
 }
 
@@ -147,8 +147,8 @@ fn locked(dialect: Dialect, pos_bits: u8) -> Result<Bench, Fault> {
     for _ in 0..200 {
         let bits = match bench.master.state() {
             State::Reset | State::Sync | State::Start | State::Learn | State::Check => TEST_PATTERN,
-            State::IdReq => id.to_answer(Character::data(0), RunningDisparity::Minus).0,
-            State::WaitVsync => idle(EncoderByte::of(EncoderSymbol::Idle, true)),
+            State::IdReq => id.to_answer(Character::data(0), RunningDisparity::Minus).bits,
+            State::WaitVsync => idle(EncoderByte::of(EncoderSymbol::Idle).with_vsync()),
             State::Running => return Ok(bench),
         };
         let _ = bench.feed(bits)?;
@@ -165,7 +165,7 @@ fn idle(parameter: EncoderByte) -> u64 {
         acceleration: Some(DeltaDelta::ZERO),
         secondary: Character::data(0),
     };
-    content.emit(RunningDisparity::Minus).0
+    content.emit(RunningDisparity::Minus).bits
 }
 
 #[derive(Deserialize)]
@@ -194,7 +194,7 @@ fn link_registers(frame: &LinkFrame, bench: &Bench, noise: bool) -> Verdict {
     let unsure = if noise { min << 32 | min << 16 } else { 0 };
     same("ONLINE_STATUS", &Hex(online.0 & !unsure), &Hex(bytes::<6>(map, Register::OnlineStatusD) & !unsure))?;
     same("ACC_ERR_CNT", errors, &map.get::<1>(Register::AccErrCnt)[0])?;
-    same("align_phase", phase, &(bench.master.phase() as u8))?;
+    same("align_phase", phase, &(bench.master.stage() as u8))?;
     same("VPOS, VPOSCRC", vpos, &Hex(bytes::<7>(map, Register::VPos)))?;
     same("SAFE_SUM", sum, &Hex(bytes::<1>(map, Register::SafeSum)))?;
     same("STATUS2, VPOS2, VPOSCRC2", safe2, &Hex(bytes::<8>(map, Register::Status2)))
@@ -240,8 +240,8 @@ pub(super) fn link_sick(rows: &[Row]) -> Vec<Verdict> {
             if frame.first().is_some_and(|first| first == "LINK_LOST") {
                 same("entry of the loss", &last, &at)?;
                 let (_, answer): (String, Line) = read_frame(at, frame)?;
-                let report = bench.feed(answer.bits as u64)?;
-                same("restarted", &Some(Cause::Quality), &report.restarted)?;
+                let h_frame = bench.feed(answer.bits as u64)?;
+                same("restarted", &Some(RestartReason::Quality), &h_frame.restarted)?;
                 return same("LINK", &false, &bench.map.link());
             }
             link_frame(&mut bench, at, frame, false)?;
@@ -256,8 +256,8 @@ fn read_frame<T: serde::de::DeserializeOwned>(at: usize, frame: Vec<serde_json::
 
 fn link_frame(bench: &mut Bench, at: usize, frame: Vec<serde_json::Value>, noise: bool) -> Verdict {
     let frame: LinkFrame = read_frame(at, frame)?;
-    let report = bench.feed(frame.0.bits as u64)?;
-    same("restarted", &None, &report.restarted)?;
+    let h_frame = bench.feed(frame.0.bits as u64)?;
+    same("restarted", &None, &h_frame.restarted)?;
     link_registers(&frame, bench, noise).map_err(|fault| at_frame(at, fault))
 }
 
@@ -345,8 +345,9 @@ impl Session {
                 trigger(row, &mut self.bench)?;
             }
             let byte = self.bench.master.transmission().head.byte();
-            sent.push(byte.symbol().map_or(0xff, MasterSymbol::bits));
-            let symbol = EncoderSymbol::from_bits(*symbol).map_err(|e| Fault::Unreadable(e.to_string()))?;
+            sent.push(byte.symbol().map_or(0xff, MasterSymbol::code));
+            let symbol = EncoderSymbol::from_code(*symbol)
+                .ok_or_else(|| Fault::Unreadable(format!("no symbol {symbol:02x}")))?;
             self.bench.feed(self.answers.next(symbol))?;
         }
         same("master_symbols", &row.master_symbols, &sent)?;
@@ -394,14 +395,15 @@ impl Encoder {
         let at = usize::from(self.at);
         let pick = |block: Vec<u8>| block.get(at).copied().unwrap_or(0);
         let status2 = Character::control(Control::K28_0);
+        let byte = EncoderByte::of(symbol);
         let content = Content {
             vertical: Character::data(pick(block(0))),
-            parameter: EncoderByte::of(symbol, at == 7),
+            parameter: if at == 7 { byte.with_vsync() } else { byte },
             pipe: Character::control(Control::K30_7),
             acceleration: Some(DeltaDelta::ZERO),
             secondary: if at == 0 { status2 } else { Character::data(pick(block(0x1c))) },
         };
         self.at = (self.at + 1) % 8;
-        content.emit(RunningDisparity::Minus).0
+        content.emit(RunningDisparity::Minus).bits
     }
 }

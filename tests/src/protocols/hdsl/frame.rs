@@ -4,7 +4,9 @@ use hdsl::frame::{Extra, Head};
 use hdsl::rssi::{Rssi, edges as edge_byte, longest_gap};
 use hdsl::sampling::{Alignment, Delay, EdgeRule, SampleIndex, TEST_PATTERN};
 use hdsl::symbol::{Character, Reading, Rule};
-use hdsl::{Answer, Content, DeltaDelta, EncoderByte, Error, LineDisparity, ParameterByte, SafeBlock, VFrame};
+use hdsl::{
+    Answer, Content, DeltaDelta, EncoderByte, Equalisation, Error, LineDisparity, ParameterByte, SafeBlock, VFrame,
+};
 use serde::Deserialize;
 
 use super::{Line, Pair, character, disparity, sign};
@@ -22,20 +24,21 @@ enum MasterHeader {
 pub(super) fn master_header(rows: &[Row]) -> Vec<Verdict> {
     each(rows, |row: MasterHeader| match row {
         MasterHeader::Equalisation { d_in, eq, d_out } => {
-            same("eq and d_out", &(eq.bits as u8, LineDisparity::new(d_out)), &LineDisparity::new(d_in).equalisation())
+            let want = Equalisation { bits: eq.bits as u8, disparity: LineDisparity::new(d_out) };
+            same("eq and d_out", &want, &LineDisparity::new(d_in).equalisation())
         }
         MasterHeader::Free { param, d_in, bits, d_out } => {
             let byte = ParameterByte::new(param.0 as u8);
-            let (head, after) = Head::new(byte, None, LineDisparity::new(d_in));
+            let head = Head::new(byte, None, LineDisparity::new(d_in));
             same("bits", &bits.window(), &head.bits())?;
-            same("d_out", &LineDisparity::new(d_out), &after)?;
+            same("d_out", &LineDisparity::new(d_out), &LineDisparity::new(d_in).after_head(byte))?;
             same("param", &Ok(byte), &Head::parse(bits.window()).map(|got| got.byte))
         }
         MasterHeader::Sync { param, edge_eighths, window_bits, eq, para, samples } => {
             let byte = ParameterByte::new(param.0 as u8);
             let extra = Extra::new(edge_eighths);
             same("window_bits", &Some(window_bits), &extra.map(Extra::bits))?;
-            let (head, _) = Head::new(byte, extra, LineDisparity::ZERO.with_ones(window_bits));
+            let head = Head::new(byte, extra, LineDisparity::ZERO.with_ones(window_bits));
             same("eq", &(eq.bits as u8), &head.equalisation())?;
             same("para", &para.word(), &head.para())?;
             same("samples", &samples.0, &head.samples().collect())?;
@@ -130,10 +133,10 @@ pub(super) fn answer(rows: &[Row]) -> Vec<Verdict> {
                 acceleration: dd,
                 secondary: character(sent.secondary)?,
             };
-            let (bits, rd) = content.emit(disparity(rd_in));
-            let bits = bits ^ row.flip.map_or(0, |flip| 1 << flip);
+            let coded = content.emit(disparity(rd_in));
+            let bits = coded.bits ^ row.flip.map_or(0, |flip| 1 << flip);
             same("bits", &row.bits.bits, &bits.into())?;
-            same("rd_out", &row.rd_out, &Some(sign(rd)))?;
+            same("rd_out", &row.rd_out, &Some(sign(coded.disparity)))?;
         }
         Ok(())
     })
@@ -208,7 +211,7 @@ struct VFrameRow {
 }
 
 fn safe_class(block: SafeBlock) -> &'static str {
-    match block.position() {
+    match block.vpos() {
         Ok(_) => "ok",
         Err(Error::InvalidWord { .. }) => "byte_error",
         Err(Error::Crc { .. }) => "crc_error",
@@ -218,7 +221,7 @@ fn safe_class(block: SafeBlock) -> &'static str {
 }
 
 fn safe_bytes(block: SafeBlock) -> [Hex; 3] {
-    [Hex(block.status().into()), Hex(block.raw_position()), Hex(block.raw_crc().into())]
+    [Hex(block.status().into()), Hex(block.raw_vpos()), Hex(block.raw_crc().into())]
 }
 
 pub(super) fn vframe(rows: &[Row]) -> Vec<Verdict> {

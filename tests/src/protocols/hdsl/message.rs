@@ -116,7 +116,7 @@ pub(super) fn request(
     written: &Bytes,
 ) -> Result<LongRequest, Fault> {
     let access = if read {
-        Access::Read(Length::from_code(llen))
+        Access::Read(Length::from_code(llen).ok_or_else(|| Fault::Unreadable(format!("LLEN {llen}")))?)
     } else {
         let data = data(written)?;
         same("llen", &llen, &data.length().code())?;

@@ -36,8 +36,9 @@ struct After {
     pos_flag: bool,
 }
 
-fn velocity(tracker: &PositionTracker) -> Hex {
-    Hex(i64::from(tracker.velocity()).rem_euclid(1 << 24).unsigned_abs())
+/// VEL, 24 bits.
+fn vel(tracker: &PositionTracker) -> Hex {
+    Hex(i64::from(tracker.registers().vel).rem_euclid(1 << 24).unsigned_abs())
 }
 
 /// All frames by one rule.
@@ -49,18 +50,18 @@ fn run(row: &FastPosition, rule: PositionRule) -> Verdict {
         let value = if frame.byte_error { None } else { word.ok() };
         same("usable", &frame.usable, &value.is_some())?;
         tracker.step(value);
-        same("pos", &frame.pos, &Hex(tracker.position()))?;
-        same("vel", &frame.vel, &velocity(&tracker))?;
+        same("pos", &frame.pos, &Hex(tracker.registers().pos))?;
+        same("vel", &frame.vel, &vel(&tracker))?;
         match (frame.vpos, frame.vpos_valid) {
             (Some(vpos), Some(true)) => tracker.align(vpos.0),
             (_, Some(false)) => tracker.no_safe_position(),
             _ => {}
         }
         let after = After {
-            pos: Hex(tracker.position()),
-            vel: velocity(&tracker),
-            phase: tracker.phase() as u8,
-            pos_flag: tracker.is_unreliable(),
+            pos: Hex(tracker.registers().pos),
+            vel: vel(&tracker),
+            phase: tracker.stage() as u8,
+            pos_flag: tracker.registers().pos_flag,
         };
         if let Some(want) = &frame.after {
             same("after", want, &after)?;

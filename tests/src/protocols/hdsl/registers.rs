@@ -12,7 +12,7 @@ use crate::row::{Fault, Row, Verdict, each, same};
 
 /// Six characters as an answer, switch bit included; every word in column RD-.
 fn answer(characters: [Character; 6]) -> u64 {
-    let words = characters.map(|character| u64::from(character.encode(RunningDisparity::Minus).0.get()));
+    let words = characters.map(|character| u64::from(character.encode(RunningDisparity::Minus).word.get()));
     let five = words.iter().take(5).rev().fold(0, |line, word| line << 10 | word);
     let [.., last] = words;
     five | (1 ^ five >> 49) << 50 | last << 51
@@ -107,7 +107,7 @@ impl Desk {
 
     /// What the master says in the present frame.
     fn symbol(&self) -> Option<u8> {
-        self.bench.master.transmission().head.byte().symbol().ok().map(MasterSymbol::bits)
+        self.bench.master.transmission().head.byte().symbol().ok().map(MasterSymbol::code)
     }
 
     fn v_frame(&mut self, summary: u8, kind: &str) -> Result<(), Fault> {
@@ -237,16 +237,16 @@ pub(super) fn pipe_fifo(rows: &[Row]) -> Vec<Verdict> {
         for (name, first, second) in row.ops {
             match (name.as_str(), first, second.as_bool(), second.as_str()) {
                 ("word", Some(byte), Some(k), _) => {
-                    let (word, _) = super::character((byte, k))?.encode(RunningDisparity::Plus);
+                    let word = super::character((byte, k))?.encode(RunningDisparity::Plus).word;
                     fifo.put(word.read(Rule::Strict));
                 }
                 // Ten equal bits are in no table.
                 ("word", None, None, None) => fifo.put(Word::truncate(0).read(Rule::Strict)),
                 ("read", Some(status), None, data) => {
-                    let (got_status, got_data) = fifo.take();
-                    same("PIPE_S", &status, &Hex(got_status.into()))?;
+                    let entry = fifo.take();
+                    same("PIPE_S", &status, &Hex(entry.status.into()))?;
                     if let Some(data) = data {
-                        same("PIPE_D", data, &format!("{got_data:02x}"))?;
+                        same("PIPE_D", data, &format!("{:02x}", entry.data))?;
                     }
                 }
                 _ => return Err(Fault::Unreadable(format!("unknown operation {name:?} {first:?} {second}"))),

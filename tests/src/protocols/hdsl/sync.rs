@@ -138,7 +138,7 @@ fn fw_head(frame: &FwFrame, nominal: u32) -> Result<bool, Fault> {
     let byte = byte.ok_or_else(|| Fault::Unreadable("PARA is in no table".to_owned()))?;
     same("symbol, FIRST", &(Ok(MasterSymbol::Idle), true), &(byte.symbol(), byte.first()))?;
     let disparity = LineDisparity::ZERO.with_ones(nominal as u8);
-    same("equalisation", &(frame.2.bits as u8), &disparity.equalisation().0)?;
+    same("equalisation", &(frame.2.bits as u8), &disparity.equalisation().bits)?;
     Ok(byte.msync())
 }
 

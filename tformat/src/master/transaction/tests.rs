@@ -1,8 +1,10 @@
 use super::*;
 use crate::address::Address;
+use crate::doubt::Doubt;
 use crate::response::tests::plain_exchanges;
 use crate::status::StatusField;
 use crate::timing::BitRate;
+use crate::tolerated::{Policy, Tolerated};
 use proptest::prelude::*;
 use std::vec::Vec;
 
@@ -19,7 +21,7 @@ fn at(from: u64, bytes: &[u8]) -> Vec<(u8, u64)> {
 fn run(request: Request, line: Line, bytes: &[(u8, u64)]) -> Result<Response, Error> {
     let mut transaction = Transaction::start(request, line, 0);
     for (byte, end_ns) in bytes {
-        let _ = transaction.bytes(&[*byte], *end_ns);
+        let _ = transaction.hear(&[*byte], *end_ns);
     }
     ended(&mut transaction)
 }
@@ -75,7 +77,7 @@ fn settings_are_independent() {
 #[test]
 fn an_echo_leaves_the_time_out_as_it_is() {
     let mut transaction = Transaction::start(Request::ReadSingleTurn, LINE, 0);
-    assert_eq!(transaction.bytes(&[0x02], 4_000), Progress::Pending { until_ns: 23_600 });
+    assert_eq!(transaction.hear(&[0x02], 4_000), Progress::Pending { until_ns: 23_600 });
     assert_eq!(transaction.poll(23_599), Progress::Pending { until_ns: 23_600 });
 }
 
@@ -83,7 +85,12 @@ fn an_echo_leaves_the_time_out_as_it_is() {
 #[test]
 fn times_of_a_transaction() {
     let mut transaction = Transaction::start(Request::ReadSingleTurn, LINE, 10_000);
-    assert_eq!((transaction.driver_on_ns(), transaction.driver_off_ns()), (9_000, (14_000, 15_600)));
+    let sent = transaction.transmission();
+    assert_eq!(
+        (sent.frame.as_bytes(), sent.start_ns, sent.end_ns, sent.driver_on_ns),
+        (&[0x02][..], 10_000, 14_000, 9_000)
+    );
+    assert_eq!(sent.driver_off, DriverOff { earliest_ns: 14_000, latest_ns: 15_600 });
     // 14 us, 10 us to the start bit, 4 us for the field, 5.599 us until it is handed over.
     assert_eq!(transaction.progress(), Progress::Pending { until_ns: 33_600 });
     assert_eq!(transaction.poll(33_599), Progress::Pending { until_ns: 33_600 });
@@ -93,10 +100,11 @@ fn times_of_a_transaction() {
 
     let mut transaction = Transaction::start(Request::ReadSingleTurn, LINE, 10_000);
     // The next field ends 6 us later at the latest.
-    assert_eq!(transaction.bytes(&[0x02], 21_000), Progress::Pending { until_ns: 32_600 });
-    let done = transaction.bytes(&RESPONSE[1..], 41_000);
+    assert_eq!(transaction.hear(&[0x02], 21_000), Progress::Pending { until_ns: 32_600 });
+    let done = transaction.hear(&RESPONSE[1..], 41_000);
     let response = Response::parse(Request::ReadSingleTurn, &RESPONSE).unwrap();
-    assert_eq!(done, Progress::Done { value: Exchange { response, sampled_ns: 14_480 }, ready_ns: 41_000 });
+    let value = Exchange { response, sampled_ns: 14_480, began_ns: 17_000 };
+    assert_eq!(done, Progress::Done { value, ready_ns: 41_000 });
 }
 
 proptest! {
@@ -114,7 +122,7 @@ proptest! {
         for (k, (byte, end_ns)) in bytes.iter().enumerate() {
             block.push(*byte);
             if cuts[k] || k + 1 == bytes.len() {
-                let _ = transaction.bytes(&block, *end_ns);
+                let _ = transaction.hear(&block, *end_ns);
                 block.clear();
             }
         }
@@ -157,12 +165,12 @@ proptest! {
     #[test]
     fn an_end_is_an_end((request, response) in plain_exchanges(), more: [u8; 20]) {
         let mut transaction = Transaction::start(request, LINE, 0);
-        let _ = transaction.bytes(response.emit().as_bytes(), 100_000);
+        let _ = transaction.hear(response.emit().as_bytes(), 100_000);
         let ended = transaction;
         let done = matches!(ended.progress(), Progress::Done { value, ready_ns: 100_000 } if value.response == response);
         prop_assert!(done);
         for byte in more {
-            let _ = transaction.bytes(&[byte], 100_000);
+            let _ = transaction.hear(&[byte], 100_000);
             let _ = transaction.framing_error(100_000);
             let _ = transaction.poll(u64::MAX);
         }
@@ -191,7 +199,7 @@ fn a_write_is_not_done_by_its_own_echo() {
     assert_eq!(only, Err(Error::NoResponse { echo: true }));
     // Nor in a block that is handed over late, with the time of its end.
     let mut transaction = Transaction::start(request, LINE, 0);
-    let _ = transaction.bytes(sent.as_bytes(), 16_000);
+    let _ = transaction.hear(sent.as_bytes(), 16_000);
     assert_eq!(ended(&mut transaction), Err(Error::NoResponse { echo: true }));
 }
 
@@ -204,7 +212,7 @@ fn an_echo_is_never_part_of_a_position() {
         bytes[6] = crate::crc(&bytes[1..6]);
         let mut transaction = Transaction::start(Request::ReadSingleTurn, LINE, 0);
         for byte in bytes {
-            let _ = transaction.bytes(&[byte], 100_000);
+            let _ = transaction.hear(&[byte], 100_000);
         }
         assert_eq!(ended(&mut transaction).map(|r| r.abs().map(crate::Abs::get)), Ok(Some(abs)));
     }
@@ -218,11 +226,11 @@ fn what_is_there_is_taken_before_the_clock_is_asked() {
     for (byte, k) in RESPONSE.iter().zip(1..) {
         let late = if k == 4 { 1_100 } else { 0 };
         let _ = fast.poll(5_000 + 2_000 * k);
-        let _ = fast.bytes(&[*byte], 5_000 + 2_000 * k + late);
+        let _ = fast.hear(&[*byte], 5_000 + 2_000 * k + late);
     }
     assert_eq!(ended(&mut fast), response);
     let mut block = Transaction::start(Request::ReadSingleTurn, LINE, 0);
-    let _ = block.bytes(&RESPONSE, 1_000_000);
+    let _ = block.hear(&RESPONSE, 1_000_000);
     assert_eq!(ended(&mut block), response);
 }
 
@@ -247,7 +255,7 @@ fn a_refusal_is_received_whole() {
     // Behind an echo, in one block.
     let mut transaction = Transaction::start(Request::ReadSingleTurn, LINE, 0);
     let block = [&[0x02], &refusal[..]].concat();
-    let _ = transaction.bytes(&block, 51_000);
+    let _ = transaction.hear(&block, 51_000);
     assert_eq!(ended(&mut transaction), Err(Error::Rejected { sf: StatusField::CA0 }));
 }
 
@@ -255,7 +263,7 @@ fn a_refusal_is_received_whole() {
 #[test]
 fn framing_errors_of_the_uart() {
     let mut plain = Transaction::start(Request::ReadSingleTurn, LINE, 0);
-    let _ = plain.bytes(&[0x02], 11_000);
+    let _ = plain.hear(&[0x02], 11_000);
     let want = Progress::Failed { error: Error::Delimiter { field: 1 }, ready_ns: 58_000 };
     assert_eq!(plain.framing_error(15_000), want);
     let mut late = Transaction::start(Request::ReadSingleTurn, LINE, 0);
@@ -268,7 +276,7 @@ fn framing_errors_of_the_uart() {
 fn a_long_block_ends_with_the_response() {
     let mut transaction = Transaction::start(Request::ReadSingleTurn, LINE, 0);
     let block = [&[0x55; 40], &RESPONSE[..]].concat();
-    let _ = transaction.bytes(&block, 200_000);
+    let _ = transaction.hear(&block, 200_000);
     assert_eq!(ended(&mut transaction), Response::parse(Request::ReadSingleTurn, &RESPONSE));
 }
 
@@ -279,7 +287,7 @@ fn a_long_block_with_an_echo_ends_with_the_response() {
     let request = Request::write_eeprom(Address::truncate(1), 0x5a);
     let mut transaction = Transaction::start(request, LINE, 0);
     let block = [&[0x55; 40], request.emit().as_bytes(), &refusal[..]].concat();
-    let _ = transaction.bytes(&block, 400_000);
+    let _ = transaction.hear(&block, 400_000);
     assert_eq!(ended(&mut transaction), Err(Error::Rejected { sf: StatusField::CA0 }));
 }
 
@@ -303,20 +311,23 @@ fn what_a_uart_received_since_the_request_began() {
     }
 }
 
-/// 125 us old may be used where 125 us are allowed; the alarms of the logged response are a doubt at any age.
+/// The evidence is as old as the instant of sampling: 125 us where 125 us are allowed.
 #[test]
-fn the_age_of_a_position() {
+fn evidence_of_an_exchange() {
     let response = Response::parse(Request::ReadSingleTurn, &RESPONSE).unwrap();
-    let exchange = Exchange { response, sampled_ns: 4_480 };
-    let resolution = Resolution::new(23, 16).unwrap();
-    let policy = Policy::STRICT.tolerating(crate::Almc::all()).with_max_age_ns(125_000);
-    let at = |now_ns| exchange.single_turn(resolution, policy, now_ns);
-    // Before it was sampled: a clock that is read before the exchange, and one that was set back.
-    assert_eq!(exchange.single_turn(resolution, policy.with_max_age_ns(4_479), 0), Err(Doubt::Old { age_ns: 4_480 }));
-    assert_eq!((at(0), at(129_480), at(129_481)), (Ok(1_883_572), Ok(1_883_572), Err(Doubt::Old { age_ns: 125_001 })));
-    let strict = exchange.single_turn(resolution, Policy::STRICT, u64::MAX);
-    assert!(matches!(strict, Err(Doubt::Status { .. })), "{strict:?}");
+    let exchange = Exchange { response, sampled_ns: 4_480, began_ns: 7_000 };
+    let evidence = exchange.evidence(Resolution::new(23, 16).unwrap());
+    let policy = Policy::new(125_000).tolerating(Tolerated::SINGLE_TURN.alarms(crate::Almc::all()));
+    let at = |now_ns| evidence.at(now_ns, policy).map(crate::Sample::single_turn);
+    assert_eq!(
+        (at(4_480), at(129_480), at(129_481)),
+        (Ok(1_883_572), Ok(1_883_572), Err(Doubt::Old { age_ns: 125_001 }))
+    );
+    // EA1 is set in the logged response.
+    assert_eq!(
+        evidence.at(4_480, Policy::new(0).tolerating(Tolerated::SINGLE_TURN)),
+        Err(Doubt::Status { sf: StatusField::EA1 })
+    );
     // ID 0 carries no turns.
-    assert_eq!(exchange.position(resolution, policy, 129_480), Err(Doubt::Absent));
-    assert_eq!(exchange.position(resolution, policy, 129_481), Err(Doubt::Old { age_ns: 125_001 }));
+    assert_eq!(evidence.at(4_480, Policy::new(0)), Err(Doubt::Absent));
 }

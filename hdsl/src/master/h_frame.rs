@@ -1,6 +1,6 @@
 //! What an H-frame brought.
 
-use super::{Cause, State};
+use super::{RestartReason, State};
 use crate::encoder_id::EncoderId;
 use crate::error::Error;
 use crate::frame::{Stuffing, Tail, Trailer};
@@ -16,7 +16,7 @@ use crate::vframe::VFrame;
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "arbitrary", derive(arbitrary::Arbitrary))]
-pub struct Signal {
+pub struct SignalQuality {
     /// RSSI of this answer.
     pub rssi: Rssi,
     /// The delay of the cable, as learned at the start.
@@ -29,9 +29,9 @@ pub struct Signal {
 ///
 /// What comes once a V-frame or more rarely is there in the one frame that it belongs to.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
 #[non_exhaustive]
-pub struct Report {
+pub struct HFrame {
     /// What to send after the answer.
     pub tail: Tail,
     /// State in which the frame was sent.
@@ -39,17 +39,18 @@ pub struct Report {
     /// State of the next frame.
     pub state: State,
     /// Set if the next frame begins a new start-up.
-    pub restarted: Option<Cause>,
+    pub restarted: Option<RestartReason>,
     /// The encoder identifier, in the frame that brought it.
     pub encoder: Option<EncoderId>,
     /// The line, where it was measured.
-    pub signal: Option<Signal>,
+    pub signal: Option<SignalQuality>,
     /// The quality monitor, 0..=15.
     pub quality: u8,
-    /// Fast position, 40 bits, usable or not; see [`Master::fast`](super::Master::fast).
-    pub position: u64,
-    /// Speed in steps an H-frame, usable or not.
-    pub velocity: i32,
+    /// Registers POS and VEL, usable or not: for the register map alone.
+    #[cfg_attr(feature = "serde", serde(skip))]
+    pub(crate) pos: u64,
+    #[cfg_attr(feature = "serde", serde(skip))]
+    pub(crate) vel: i32,
     /// The flag POS: the fast position is estimated or not aligned.
     pub doubtful: bool,
     /// Acceleration words in a row that could not be used.
@@ -68,7 +69,13 @@ pub struct Report {
     pub short_free: bool,
 }
 
-impl Report {
+servowire_core::one_line!(HFrame {
+    Self { restarted: Some(reason), was, .. } => "{}, the link starts anew: {}", was, reason;
+    Self { was, quality, doubtful: true, .. } => "{}, quality {}, fast position doubtful", was, quality;
+    Self { was, quality, .. } => "{}, quality {}", was, quality;
+});
+
+impl HFrame {
     /// Before the first frame.
     pub(super) const START: Self = Self {
         tail: Tail { trailer: Trailer::Whole, stuffing: Stuffing::MIN },
@@ -78,8 +85,8 @@ impl Report {
         encoder: None,
         signal: None,
         quality: QualityMonitor::START,
-        position: 0,
-        velocity: 0,
+        pos: 0,
+        vel: 0,
         doubtful: false,
         acceleration_errors: 0,
         v_frame: None,
@@ -92,7 +99,7 @@ impl Report {
 
     /// Clears what belongs to one frame.
     #[inline]
-    pub(super) fn begin(&mut self, state: State, signal: Option<Signal>) {
+    pub(super) fn begin(&mut self, state: State, signal: Option<SignalQuality>) {
         self.was = state;
         self.signal = signal;
         self.encoder = None;
@@ -114,9 +121,9 @@ impl Report {
     /// let mut data = Vec::new();
     /// for frame in 0..100 {
     ///     // A byte in every tenth frame.
-    ///     encoder.pipe = (frame % 10 == 0).then_some(frame);
-    ///     let bits = encoder.answer(master.transmission().head.bits(), 0).unwrap_or(u64::MAX);
-    ///     if let Some(character) = master.finish_bits(bits, None, None).pipe_character() {
+    ///     encoder.set_pipe((frame % 10 == 0).then_some(frame));
+    ///     let bits = encoder.hear(master.transmission().head.bits(), 0).map_or(u64::MAX, |answer| answer.bits);
+    ///     if let Some(character) = master.hear_bits(bits, None, 0).pipe_character() {
     ///         data.push(character?.byte());
     ///     }
     /// }
@@ -133,33 +140,8 @@ impl Report {
     }
 }
 
-/// A fast position that may be used.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub struct Fast {
-    /// Position in steps at the sampling edge of the last H-frame, with its sign if the encoder's positions have one.
-    pub position: i64,
-    /// Speed in steps an H-frame.
-    pub velocity: i32,
-}
-
-/// A safe position that may be used. It must not close a control loop: it is not in step with the pulse (SICK manual,
-/// p. 67).
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub struct Safe {
-    /// Position in steps, with its sign if the encoder's positions have one.
-    pub position: i64,
-    /// H-frames from its sampling edge to that of the last H-frame, 8..=15.
-    pub age: u8,
-    /// SUMMARY: bit n sums up the encoder status register ENC_STn.
-    pub summary: u8,
-}
-
 /// What was counted since the machine was made.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]
