@@ -2,10 +2,11 @@ use servowire_core::{Feedback, Words};
 
 use crate::abs40::Abs40;
 use crate::doubt::Doubt;
+use crate::marks::Marks;
 use crate::resolution::Resolution;
 use crate::response::{Body, Response};
 use crate::sample::Sample;
-use crate::status::{Alm, EncoderStatus};
+use crate::status::EncoderStatus;
 use crate::tolerated::{Policy, Tolerated};
 
 /// What an encoder has said of its position, and when it was sampled: judged where it is used, by [`at`](Self::at).
@@ -37,86 +38,48 @@ use crate::tolerated::{Policy, Tolerated};
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct Evidence {
     sampled_ns: u64,
-    /// Counts in the turn. With [`Flaw::UpperBits`] the width.
+    /// Counts in the turn. With [`Marks::UPPER_BITS`] the width.
     single_turn: u32,
     turns: i32,
-    alarms: Alm,
-    status: EncoderStatus,
-    flaw: Flaw,
+    marks: Marks,
+    st_bits: u8,
     /// Whether one bit stood for all of the status.
     summed: bool,
-    st_bits: u8,
 }
 
 servowire_core::one_line!(Evidence {
-    Self { flaw: Flaw::Never, .. } => "no position was heard yet";
+    Self { marks, .. } if marks.contains(Marks::NEVER) => "no position was heard yet";
     Self { sampled_ns, .. } => "a position sampled at {} ns", sampled_ns;
 });
 
-/// What is wrong with a response, whatever a user lives with. The turns come first: who does not use them can live with
-/// that.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize))]
-enum Flaw {
-    None,
-    /// It carries fewer bits of the turns than the encoder counts.
-    NoTurns,
-    Never,
-    Absent,
-    UpperBits,
-}
-
-impl Flaw {
-    /// The flaw with this number; [`Never`](Self::Never) for a number that none has.
-    const fn numbered(number: u32) -> Self {
-        match number {
-            0 => Self::None,
-            1 => Self::NoTurns,
-            3 => Self::Absent,
-            4 => Self::UpperBits,
-            _ => Self::Never,
-        }
-    }
-}
-
 impl Evidence {
     /// Nothing was heard yet.
-    pub const NEVER: Self = Self {
-        sampled_ns: 0,
-        single_turn: 0,
-        turns: 0,
-        alarms: Alm::empty(),
-        status: EncoderStatus::empty(),
-        flaw: Flaw::Never,
-        summed: false,
-        st_bits: 1,
-    };
+    pub const NEVER: Self =
+        Self { sampled_ns: 0, single_turn: 0, turns: 0, marks: Marks::NEVER, st_bits: 1, summed: false };
 
     /// What a response says of the position of an encoder with these widths, sampled at `sampled_ns`: for tools and buffers;
     /// a master's [`Exchange`](crate::master::Exchange) knows when that was, and that the response is no older than its request.
     pub const fn of(response: Response, resolution: Resolution, sampled_ns: u64) -> Self {
-        let mut evidence = Self { sampled_ns, flaw: Flaw::Absent, ..Self::NEVER };
-        match response.body {
-            Body::Abs17 { es_any, .. } => {
-                evidence.summed = true;
-                if es_any {
-                    evidence.status = EncoderStatus::all();
-                }
-            }
-            Body::Full { es, .. } => evidence.status = es,
-        }
+        let (status, summed) = match response.body {
+            Body::Abs17 { es_any: true, .. } => (EncoderStatus::all(), true),
+            Body::Abs17 { es_any: false, .. } => (EncoderStatus::empty(), true),
+            Body::Full { es, .. } => (es, false),
+        };
+        let mut marks = Marks::of_status(status);
         if let Some(alarms) = response.alm() {
-            evidence.alarms = alarms;
+            marks = marks.union(Marks::of_alarms(alarms));
         }
-        match response.abs() {
-            Some(abs) => evidence.with_abs(abs, response.layout().abs_bits(), resolution),
-            None => evidence,
-        }
+        let evidence = Self { sampled_ns, marks, summed, ..Self::NEVER };
+        let (Some(abs), abs_bits) = (response.abs(), response.layout().abs_bits()) else {
+            return Self { marks: marks.union(Marks::ABSENT), ..evidence };
+        };
+        evidence.with_abs(abs, abs_bits, resolution)
     }
 
     /// The same of a response that [`Abs40`] has decoded.
     pub const fn of_abs40(response: Abs40, resolution: Resolution, sampled_ns: u64) -> Self {
-        Self { sampled_ns, status: response.es, ..Self::NEVER }.with_abs(response.abs.get(), 40, resolution)
+        let evidence = Self { sampled_ns, marks: Marks::of_status(response.es), ..Self::NEVER };
+        evidence.with_abs(response.abs.get(), 40, resolution)
     }
 
     /// Takes the `abs_bits` lowest position bits, which are all that the response carries.
@@ -124,15 +87,16 @@ impl Evidence {
         let width = resolution.st_bits().wrapping_add(resolution.mt_bits());
         self.st_bits = resolution.st_bits();
         if abs_bits < self.st_bits {
-            self.flaw = Flaw::Absent;
+            self.marks = self.marks.union(Marks::ABSENT);
         } else if abs.wrapping_shr(width as u32) != 0 {
-            (self.flaw, self.single_turn) = (Flaw::UpperBits, width as u32);
+            self.marks = self.marks.union(Marks::UPPER_BITS);
+            self.single_turn = width as u32;
         } else {
             self.single_turn = resolution.single_turn(abs);
             if abs_bits < width {
-                self.flaw = Flaw::NoTurns;
+                self.marks = self.marks.union(Marks::NO_TURNS);
             } else {
-                (self.flaw, self.turns) = (Flaw::None, resolution.turns(abs));
+                self.turns = resolution.turns(abs);
             }
         }
         self
@@ -145,18 +109,12 @@ impl Evidence {
     #[inline]
     pub const fn at(&self, now_ns: u64, policy: Policy) -> Result<Sample, Doubt> {
         let tolerated = policy.tolerated();
-        let young = policy.check_age(now_ns, self.sampled_ns).is_ok();
-        let shown = self.status.difference(tolerated.status).is_empty();
-        if young && self.is_sound(tolerated) && shown && self.alarms.difference(tolerated.alarms).is_empty() {
-            let turns = if tolerated.turns { None } else { Some(self.turns) };
+        if policy.check_age(now_ns, self.sampled_ns).is_ok() && tolerated.objects_to(self.marks).is_empty() {
+            let turns = if tolerated.ignores_turns() { None } else { Some(self.turns) };
             Ok(Sample::new(self.sampled_ns, self.single_turn, turns, self.st_bits))
         } else {
             Err(self.doubt(now_ns, policy))
         }
-    }
-
-    const fn is_sound(&self, tolerated: Tolerated) -> bool {
-        self.flaw as u8 <= if tolerated.turns { Flaw::NoTurns as u8 } else { Flaw::None as u8 }
     }
 
     /// Off the hot path: what speaks against it.
@@ -164,24 +122,22 @@ impl Evidence {
     #[inline(never)]
     #[expect(clippy::cast_possible_truncation, reason = "a width that was stored there")]
     const fn doubt(&self, now_ns: u64, policy: Policy) -> Doubt {
-        if let Flaw::Never = self.flaw {
-            return Doubt::Never;
-        }
-        if let Err(age_ns) = policy.check_age(now_ns, self.sampled_ns) {
-            return Doubt::Old { age_ns };
-        }
-        let tolerated = policy.tolerated();
-        if !self.is_sound(tolerated) {
-            return match self.flaw {
-                Flaw::UpperBits => Doubt::UpperBits { width: self.single_turn as u8 },
-                Flaw::None | Flaw::NoTurns | Flaw::Never | Flaw::Absent => Doubt::Absent,
-            };
-        }
-        let es = self.status.difference(tolerated.status);
-        match (es.is_empty(), self.summed) {
-            (false, true) => Doubt::AnyStatus,
-            (false, false) => Doubt::Status { es },
-            (true, _) => Doubt::Alarms { alarms: self.alarms.difference(tolerated.alarms) },
+        let marks = policy.tolerated().objects_to(self.marks);
+        let (es, alarms) = (marks.status(), marks.alarms());
+        if marks.contains(Marks::NEVER) {
+            Doubt::Never
+        } else if let Err(age_ns) = policy.check_age(now_ns, self.sampled_ns) {
+            Doubt::Old { age_ns }
+        } else if marks.contains(Marks::UPPER_BITS) {
+            Doubt::UpperBits { width: self.single_turn as u8 }
+        } else if marks.intersects(Marks::ABSENT.union(Marks::NO_TURNS)) {
+            Doubt::Absent
+        } else if es.is_empty() {
+            Doubt::Alarms { alarms }
+        } else if self.summed {
+            Doubt::AnyStatus
+        } else {
+            Doubt::Status { es }
         }
     }
 }
@@ -213,32 +169,26 @@ pub type EvidenceCell = servowire_core::Cell<Evidence, 5>;
 ///  word 0, 1   instant of sampling, low half first
 ///  word 2      single turn
 ///  word 3      turns
-///  word 4      ALM in bits 0..=15, ES in 16..=19, flaw in 20..=22, one bit for all of ES in 23, single-turn bits in 24..=29
+///  word 4      ALM in bits 0..=15, ES in 16..=19, what is wrong in 20..=23, single-turn bits in 24..=29, one bit for all of ES in 30
 /// ```
 impl Words<5> for Evidence {
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "halves, and bits of the same width")]
     #[inline]
     fn to_words(&self) -> [u32; 5] {
-        let marks = u32::from(self.alarms.bits())
-            | u32::from(self.status.bits() & 0xf) << 16
-            | (self.flaw as u32) << 20
-            | u32::from(self.summed) << 23
-            | u32::from(self.st_bits) << 24;
+        let marks = self.marks.bits() & 0xff_ffff | u32::from(self.st_bits) << 24 | u32::from(self.summed) << 30;
         [self.sampled_ns as u32, (self.sampled_ns >> 32) as u32, self.single_turn, self.turns as u32, marks]
     }
 
-    #[expect(clippy::cast_possible_truncation, clippy::cast_possible_wrap, reason = "fields are cut out of words")]
+    #[expect(clippy::cast_possible_wrap, reason = "fields are cut out of words")]
     #[inline]
     fn from_words([low, high, single_turn, turns, marks]: [u32; 5]) -> Self {
         Self {
             sampled_ns: u64::from(high) << 32 | u64::from(low),
             single_turn,
             turns: turns as i32,
-            alarms: Alm::from_bits_retain(marks as u16),
-            status: EncoderStatus::from_bits_truncate((marks >> 16) as u8),
-            flaw: Flaw::numbered(marks >> 20 & 7),
-            summed: marks >> 23 & 1 == 1,
+            marks: Marks::from_bits_truncate(marks),
             st_bits: (marks >> 24 & 0x3f) as u8,
+            summed: marks >> 30 & 1 == 1,
         }
     }
 }

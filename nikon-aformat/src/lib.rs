@@ -24,6 +24,7 @@ mod expected;
 mod frame;
 pub mod inspect;
 mod layout;
+mod marks;
 pub mod master;
 mod number;
 mod operation;

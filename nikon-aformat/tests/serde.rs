@@ -103,7 +103,9 @@ fn readings_and_doubts() {
     let evidence = exchange.evidence(Resolution::new(17, 16).unwrap());
     let sample = serde_json::to_value(evidence.at(132_200, policy).unwrap()).unwrap();
     assert_eq!((&sample["single_turn"], &sample["sampled_ns"]), (&serde_json::json!(77), &serde_json::json!(7_200)));
-    assert_eq!(serde_json::to_value(Evidence::NEVER).unwrap()["flaw"], "Never");
+    assert_eq!(serde_json::to_value(Evidence::NEVER).unwrap()["sampled_ns"], 0);
+    let tolerated = serde_json::to_string(&Tolerated::SINGLE_TURN).unwrap();
+    assert_eq!(tolerated, r#"{"status":2,"alarms":1,"any_turns":true}"#);
 }
 
 /// A report is written as what it found; what is read back is its parts.

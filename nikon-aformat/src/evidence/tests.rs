@@ -4,7 +4,7 @@ use crate::data::Data;
 use crate::number::{EncoderAddress, U17, U40};
 use crate::response::tests::exchanges;
 use crate::sample::Position;
-use crate::status::PmAlm;
+use crate::status::{Alm, PmAlm};
 use proptest::prelude::*;
 use servowire_core::U24;
 use std::string::ToString;
@@ -25,7 +25,7 @@ fn judged(resolution: Resolution, response: Response, policy: Policy) -> Result<
 }
 
 /// The turns are not used, and nothing else is tolerated.
-const SINGLE: Tolerated = Tolerated { turns: true, ..Tolerated::NOTHING };
+const SINGLE: Tolerated = Tolerated::ANY_TURNS;
 
 fn response(command: Command, es: EncoderStatus, data: Data) -> Response {
     Response::new(EA, command, es, data)

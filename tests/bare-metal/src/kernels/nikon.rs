@@ -46,9 +46,12 @@ const POSITIONS: [(Resolution, Response); 3] =
 const POLICY: Policy = Policy::new(125_000);
 
 /// Evidence, and when and by whom it is used.
-const VERDICTS: [(Evidence, u64, Policy); 5] = [
+const JUDGED: [(Evidence, u64, Policy); 2] = [
     (whole(EncoderStatus::empty()), 1_040_000, POLICY),
     (whole(EncoderStatus::BATT), 1_040_000, POLICY.tolerating(Tolerated::SINGLE_TURN)),
+];
+
+const DOUBTED: [(Evidence, u64, Policy); 3] = [
     (whole(EncoderStatus::BATT), 1_040_000, POLICY),
     (whole(EncoderStatus::empty()), 1_200_000, POLICY),
     (Evidence::NEVER, 1_040_000, POLICY),
@@ -158,15 +161,20 @@ kernels! {
         Evidence::of(*response, *resolution, 1_000_000)
     } over POSITIONS;
 
-    /// The verdict where the position is used: young, old, with alarms, with and without turns; one that never was.
+    /// The verdict, made where the position is used.
     fn nikon_evidence_at((evidence, now_ns, policy): &(Evidence, u64, Policy)) -> Result<Sample, Doubt> {
         evidence.at(*now_ns, *policy)
-    } over VERDICTS;
+    } over JUDGED;
+
+    /// The same where the position must not be used: old, with alarms, none at all.
+    fn nikon_evidence_doubted((evidence, now_ns, policy): &(Evidence, u64, Policy)) -> Option<Doubt> {
+        evidence.at(*now_ns, *policy).err()
+    } over DOUBTED;
 
     /// Evidence through the words of a cell.
     fn nikon_evidence_words((evidence, _, _): &(Evidence, u64, Policy)) -> Evidence {
         Evidence::from_words(evidence.to_words())
-    } over VERDICTS;
+    } over JUDGED;
 
     /// Angles of a sample.
     fn nikon_sample((evidence, now_ns, policy): &(Evidence, u64, Policy)) -> Option<(u32, u32, i32, Option<i64>)> {
@@ -174,7 +182,7 @@ kernels! {
         let (resolution, single) = (resolution(20, 16), sample.single_turn());
         let angle = (sample.fraction(), resolution.milli_degrees(single), resolution.difference(single, 0));
         Some((angle.0, angle.1, angle.2, sample.counts()))
-    } over VERDICTS;
+    } over JUDGED;
 
     /// The type word as a resolution.
     fn nikon_type_word(word: &u16) -> Option<Resolution> {
