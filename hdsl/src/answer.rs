@@ -58,6 +58,11 @@ impl Answer {
         Ok(Self::from_bits(rule, line.bits() as u64))
     }
 
+    /// The 61 line bits, the first in bit 0.
+    pub const fn bits(self) -> u64 {
+        self.line
+    }
+
     /// Whether it was read by the tables, [`Rule::Strict`].
     pub(crate) const fn is_strict(self) -> bool {
         matches!(self.rule, Rule::Strict)
@@ -183,6 +188,15 @@ impl Answer {
             return Err(Error::WrongKind { byte: if high.is_special() { high_byte } else { low_byte } });
         }
         DeltaDelta::from_bytes([high_byte, low_byte])
+    }
+}
+
+/// As its words in line order.
+#[cfg(feature = "serde")]
+#[cfg_attr(docsrs, doc(cfg(feature = "serde")))]
+impl serde::Serialize for Answer {
+    fn serialize<S: serde::Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.collect_str(self)
     }
 }
 

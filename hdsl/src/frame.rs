@@ -101,7 +101,6 @@ pub struct Head {
     extra: Option<Extra>,
     equalisation: u8,
     para: Word,
-    after: LineDisparity,
 }
 
 impl Head {
@@ -112,14 +111,19 @@ impl Head {
     /// EQUALISATION, so with the ones of the EXTRA window if there is one (the partly high last bit counts as a one).
     #[inline]
     pub const fn new(byte: ParameterByte, extra: Option<Extra>, before: LineDisparity) -> Self {
-        let equalised = before.equalisation();
-        let coded = equalised.disparity.encode(byte);
-        Self { byte, extra, equalisation: equalised.bits, para: coded.word, after: coded.disparity }
+        Self::coded(byte, extra, before).0
     }
 
-    /// The line disparity after the head.
-    pub const fn disparity_after(self) -> LineDisparity {
-        self.after
+    /// The same with the line disparity after it.
+    #[inline]
+    pub(crate) const fn coded(
+        byte: ParameterByte,
+        extra: Option<Extra>,
+        before: LineDisparity,
+    ) -> (Self, LineDisparity) {
+        let equalised = before.equalisation();
+        let coded = equalised.disparity.encode(byte);
+        (Self { byte, extra, equalisation: equalised.bits, para: coded.word }, coded.disparity)
     }
 
     /// The parameter byte.
@@ -303,8 +307,7 @@ mod tests {
     fn the_frame_adds_up() {
         assert_eq!(Head::BITS + FILLER.len() + TRAILER_BITS, H_FRAME_BITS);
         let byte = ParameterByte::of(MasterSymbol::Reset);
-        let head = Head::new(byte, None, LineDisparity::ZERO);
-        let d = head.disparity_after();
+        let (head, d) = Head::coded(byte, None, LineDisparity::ZERO);
         assert_eq!(text(window(head.bits())), "00101111011000000101001011");
         let head = Head::new(byte, None, d);
         assert_eq!(text(window(head.bits()).skip(12).take(4)), "1101");

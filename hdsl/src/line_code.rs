@@ -86,6 +86,11 @@ impl LineDisparity {
         Equalisation { bits, disparity }
     }
 
+    /// The count after a head with this parameter byte; see [`Head::new`](crate::frame::Head::new).
+    pub const fn after_head(self, byte: ParameterByte) -> Self {
+        self.equalisation().disparity.encode(byte).disparity
+    }
+
     /// The word for the parameter byte, and the disparity afterwards.
     ///
     /// 1. the 6-bit block of bits 4:0 (28 gives that of K.28): a neutral block as tabulated (7 always 000111),

@@ -79,6 +79,7 @@ pub struct Master {
     state: State,
     /// Frames of the state that are done.
     done: u8,
+    disparity: LineDisparity,
     present: Transmission,
     alignment: Option<Alignment>,
     /// Sample periods with edges of the test pattern, since LEARN.
@@ -118,13 +119,14 @@ impl Master {
 
     fn start(dialect: Dialect, sync: Option<Synchroniser>) -> Self {
         let extra = sync.map(|sync| sync.extra());
-        let present = transmission(State::Reset, MasterSymbol::Reset, false, extra, LineDisparity::ZERO);
+        let (present, disparity) = transmission(State::Reset, MasterSymbol::Reset, false, extra, LineDisparity::ZERO);
         Self {
             dialect,
             sync,
             pulse: sync.map(|sync| sync.period()),
             state: State::Reset,
             done: 0,
+            disparity,
             present,
             alignment: None,
             edges: 0,
@@ -320,6 +322,7 @@ impl Master {
         if self.h_frame.was != State::Running || outcome.is_err() || self.detour {
             return self.end_with(outcome);
         }
+        self.edge_ns = 0;
         self.present = self.following();
         self.go_on()
     }
@@ -340,8 +343,7 @@ impl Master {
         let asked = core::mem::take(&mut self.restart).then_some(RestartReason::Requested);
         let restarted = self.lost.take().or(asked).or(outcome.err());
         self.edge_ns = self.present.head.extra().map_or(0, Extra::low_ns);
-        // The frame after one in sync mode has another place of its edge.
-        self.detour = self.sync.is_some() || self.edge_ns != 0;
+        self.detour = self.sync.is_some();
         if let Some(next) = self.ahead.take() {
             // The next head is out: a restart comes after its frame.
             self.present = next;

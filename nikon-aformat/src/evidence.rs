@@ -204,6 +204,9 @@ impl Feedback for Evidence {
     }
 }
 
+/// Carries evidence from where it is received to where it is used, between two priorities or cores.
+pub type EvidenceCell = servowire_core::Cell<Evidence, 5>;
+
 /// For a [`servowire_core::Cell`].
 ///
 /// ```text

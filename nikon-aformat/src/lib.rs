@@ -48,7 +48,7 @@ pub use crc::{Crc3, Crc8, crc3, crc8};
 pub use data::Data;
 pub use doubt::Doubt;
 pub use error::{EchoField, Error, ErrorClass};
-pub use evidence::Evidence;
+pub use evidence::{Evidence, EvidenceCell};
 pub use expected::{Echo, Expected};
 pub use frame::{FrameCode, RequestFrame};
 pub use layout::{FRAME_BITS, Layout};

@@ -20,8 +20,6 @@ mod log;
 
 use core::fmt;
 
-use servowire_core::Findings;
-
 pub use fields::{Field, Fields, Value};
 pub use log::{LogAnalysis, LogFinding, LogShape, Unfinished};
 
@@ -107,6 +105,9 @@ impl fmt::Display for Message {
     }
 }
 
+/// The kinds of faults found, as a set.
+pub type Findings = servowire_core::Findings<ErrorClass>;
+
 /// What there is to say about a block.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -164,7 +165,7 @@ impl Report {
     }
 
     /// The classes of all faults.
-    pub fn findings(&self) -> Findings<ErrorClass> {
+    pub fn findings(&self) -> Findings {
         let mut findings = Findings::NONE;
         self.errors().for_each(|error| findings.insert(error.class()));
         findings

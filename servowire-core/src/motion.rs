@@ -36,7 +36,7 @@ impl Acceleration {
 }
 
 /// Times from here on are too long: 2.1 s.
-const TOO_LONG_NS: u64 = 1 << 31;
+const TOO_LONG_NS: u32 = 1 << 31;
 
 /// The motion of a shaft at its last sample, from the last two.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -82,27 +82,28 @@ impl Motion {
     ///
     /// The instants of both samples are taken as exact: an error of them counts with the speed.
     pub fn at(&self, now_ns: u64, max_acceleration: Acceleration) -> Estimate {
-        let time_ns = now_ns.abs_diff(self.sampled_ns);
+        let unknown = Estimate { angle: self.angle, bound: Angle::HALF };
+        let Ok(time_ns) = u32::try_from(now_ns.abs_diff(self.sampled_ns)) else { return unknown };
         if self.span_ns == 0 || time_ns >= TOO_LONG_NS {
-            return Estimate { angle: self.angle, bound: Angle::HALF };
+            return unknown;
         }
-        let turned = times(self.speed.unsigned_abs(), time_ns) >> 16;
+        let turned = Angle::from_bits(low(times(self.speed.unsigned_abs(), time_ns) >> 16));
         let forward = (self.speed < 0) == (now_ns < self.sampled_ns);
-        let turned = Angle::from_bits(low(turned));
         let angle = if forward { self.angle.wrapping_add(turned) } else { self.angle.wrapping_sub(turned) };
         Estimate { angle, bound: self.bound(time_ns, max_acceleration) }
     }
 
     /// The bound of [`at`](Self::at), every term rounded up.
-    fn bound(&self, time_ns: u64, max_acceleration: Acceleration) -> Angle {
+    const fn bound(&self, time_ns: u32, max_acceleration: Acceleration) -> Angle {
         let mean = times(self.speed_error, time_ns) >> 16;
-        // t·(s + t) in 2^16 ns², below 2^47; in 2^-72 turn it is shifted by 72 - 32 - 16 + 1.
-        let area = (time_ns.wrapping_mul(time_ns.wrapping_add(self.span_ns.into())) >> 16).wrapping_add(1);
-        // What does not fit is more than half a turn.
-        let departed = area.saturating_mul(max_acceleration.0.into()) >> 25;
-        // What was rounded down: the way turned, and the two terms above.
-        let bound = departed.saturating_add(mean).saturating_add(self.count.into()).saturating_add(3);
-        if bound < Angle::HALF.to_bits().into() { Angle::from_bits(low(bound)) } else { Angle::HALF }
+        // t·(s + t) in 2^16 ns², below 2^46; times 2^-72 turn/ns², in 2^-32 turn and halved, is a shift by 72 - 16 - 32 + 1.
+        let area = (times(time_ns, time_ns.wrapping_add(self.span_ns)) >> 16).wrapping_add(1);
+        let Acceleration(acceleration) = max_acceleration;
+        let upper = times(low(area >> 32), acceleration) << (32 - 25);
+        let departed = (times(low(area), acceleration) >> 25).wrapping_add(upper);
+        // What was rounded down: the way turned, and two terms here.
+        let bound = departed.wrapping_add(mean).wrapping_add(self.count as u64).wrapping_add(3);
+        if bound < Angle::HALF.to_bits() as u64 { Angle::from_bits(low(bound)) } else { Angle::HALF }
     }
 
     pub(crate) const fn to_words(self) -> [u32; Self::WORDS] {
@@ -119,9 +120,9 @@ impl Motion {
     }
 }
 
-/// A product of a number of 32 bits and a time below [`TOO_LONG_NS`].
-const fn times(number: u32, time_ns: u64) -> u64 {
-    (number as u64).wrapping_mul(time_ns)
+/// A whole product: one instruction of a Cortex-M4.
+const fn times(a: u32, b: u32) -> u64 {
+    (a as u64).wrapping_mul(b as u64)
 }
 
 #[expect(clippy::cast_possible_truncation, reason = "the half that is meant")]
@@ -181,12 +182,12 @@ impl Tracker {
     fn moved(&self, last: Motion, angle: Angle, sampled_ns: u64) -> Motion {
         let standing = Motion::standing(angle, sampled_ns, self.count);
         let span = sampled_ns.checked_sub(last.sampled_ns).and_then(|span| u32::try_from(span).ok());
-        let Some(span_ns) = span.filter(|span| (1..=self.longest_span_ns).contains(span)) else { return standing };
+        let Some(span_ns) = span.filter(|span| *span <= self.longest_span_ns) else { return standing };
         let step = i64::from(angle.difference(last.angle));
         let speed = (step << 16).checked_div(span_ns.into()).map(i32::try_from);
         let error = (u64::from(self.count) << 16).checked_div(span_ns.into()).map(u32::try_from);
         let (Some(Ok(speed)), Some(Ok(error))) = (speed, error) else { return standing };
-        // Both divisions are rounded down.
+        // Both divisions are rounded towards zero.
         Motion { span_ns, speed, speed_error: error.saturating_add(2), ..standing }
     }
 }

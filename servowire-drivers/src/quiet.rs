@@ -50,16 +50,25 @@ impl Line {
     }
 
     /// A look at the clock: every one goes through here, so that no wait is for ever.
+    #[inline(always)]
     pub(crate) fn now_ns(&mut self, clock: &mut impl Clock) -> Result<u64, ClockError> {
         let last_ns = self.check.last_ns();
-        let now_ns = clock.now_ns().and_then(|now_ns| self.check.check(now_ns));
-        if matches!(now_ns, Err(ClockError::Backwards { .. })) {
-            // What the line was to be left alone for is waited for from the next look on.
+        match clock.now_ns().and_then(|now_ns| self.check.check(now_ns)) {
+            Ok(now_ns) => Ok(now_ns),
+            Err(error) => Err(self.lost(error, last_ns)),
+        }
+    }
+
+    /// The clock is wrong. If it was set back, what the line was to be left alone for is waited for from the next look on.
+    #[cold]
+    #[inline(never)]
+    fn lost(&mut self, error: ClockError, last_ns: u64) -> ClockError {
+        if matches!(error, ClockError::Backwards { .. }) {
             let left_ns = self.ready_ns.saturating_sub(last_ns);
             self.leaving_ns = Some(self.leaving_ns.unwrap_or(0).max(left_ns));
             self.ready_ns = 0;
         }
-        now_ns
+        error
     }
 
     /// Waits by looking at the clock.

@@ -160,7 +160,7 @@ impl Map {
             let [detail, class] = if self.receiver == Receiver::Sick { [first, second] } else { [second, first] };
             format!("refused: {}", ResourceError::new(class, detail))
         } else {
-            let data = buffer.get(..Length::from_code(high >> 2).bytes()).unwrap_or_default();
+            let data = buffer.get(..Length::from_code(high >> 2 & 3).map_or(0, Length::bytes)).unwrap_or_default();
             let text = core::str::from_utf8(data).ok().filter(|text| text.bytes().all(|byte| byte.is_ascii_graphic()));
             let text = text.filter(|text| !text.is_empty()).map(|text| format!(" {text:?}")).unwrap_or_default();
             data.iter().fold(String::from("data"), |text, byte| format!("{text} {byte:02X}")) + &text

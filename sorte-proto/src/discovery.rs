@@ -126,6 +126,34 @@ impl<'a> DiscoveryView<'a> {
     }
 }
 
+/// The head and the entries of the devices counted.
+#[cfg(feature = "serde")]
+#[cfg_attr(docsrs, doc(cfg(feature = "serde")))]
+impl serde::Serialize for DiscoveryView<'_> {
+    fn serialize<S: serde::Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        use serde::ser::{SerializeSeq, SerializeStruct};
+
+        struct Entries<'a>(DiscoveryView<'a>);
+
+        impl serde::Serialize for Entries<'_> {
+            fn serialize<S: serde::Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+                let mut entries = serializer.serialize_seq(None)?;
+                self.0.entries().try_for_each(|entry| entries.serialize_element(&entry))?;
+                entries.end()
+            }
+        }
+
+        let mut frame = serializer.serialize_struct("Discovery", 6)?;
+        frame.serialize_field("source", &self.source())?;
+        frame.serialize_field("status", &self.status())?;
+        frame.serialize_field("count", &self.count())?;
+        frame.serialize_field("input_total", &self.input_total())?;
+        frame.serialize_field("output_total", &self.output_total())?;
+        frame.serialize_field("entries", &Entries(*self))?;
+        frame.end()
+    }
+}
+
 /// The values of a discovery frame, all 254 entries with what is in them.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "arbitrary", derive(arbitrary::Arbitrary))]

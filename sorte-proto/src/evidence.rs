@@ -1,6 +1,6 @@
 //! What control may use of a device's frame.
 
-use servowire_core::{Feedback, Tolerance};
+use servowire_core::{Feedback, Tolerance, Words};
 
 use crate::address::DeviceAddress;
 use crate::drv8711;
@@ -123,6 +123,40 @@ impl Feedback for Evidence {
     }
 }
 
+/// Carries evidence from where it is received to where it is used, between two priorities or cores.
+pub type EvidenceCell = servowire_core::Cell<Evidence, 4>;
+
+/// Time, low half first; steps, STATUS of the driver, and in the last byte whether they are there; address and STATUS.
+impl Words<4> for Evidence {
+    fn to_words(&self) -> [u32; 4] {
+        let [a, b, c, d, e, f, g, h] = self.sampled_ns.to_le_bytes();
+        let (slice, there) = match self.told {
+            Some(told) => (told.emit(), 1),
+            None => ([0; InputSlice::LEN], 0),
+        };
+        let [driver, low, high] = slice;
+        let address = self.from.map_or(0, DeviceAddress::get);
+        [
+            u32::from_le_bytes([a, b, c, d]),
+            u32::from_le_bytes([e, f, g, h]),
+            u32::from_le_bytes([driver, low, high, there]),
+            u32::from_le_bytes([address, self.status.bits(), 0, 0]),
+        ]
+    }
+
+    fn from_words([first, second, slice, head]: [u32; 4]) -> Self {
+        let ([a, b, c, d], [e, f, g, h]) = (first.to_le_bytes(), second.to_le_bytes());
+        let [driver, low, high, there] = slice.to_le_bytes();
+        let [address, status, ..] = head.to_le_bytes();
+        Self {
+            sampled_ns: u64::from_le_bytes([a, b, c, d, e, f, g, h]),
+            from: DeviceAddress::new(address),
+            status: Status::from_bits_retain(status),
+            told: (there != 0).then(|| InputSlice::parse([driver, low, high])),
+        }
+    }
+}
+
 /// A position that may be used.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -231,6 +265,18 @@ mod tests {
         let sof =
             Evidence::of(DeviceFrameView::parse(3, &[1, 0, 0, 0, 0, 0x62]).unwrap(), Positions::taken_before_ns(9), 4);
         assert_eq!(sof.at(0, Policy::new(0)).map(Sample::sampled_ns), Ok(0));
+    }
+
+    #[test]
+    fn evidence_goes_through_a_cell_as_it_is() {
+        for evidence in [
+            Evidence::NEVER,
+            heard(Status::LAST | Status::ERROR, [0x81, 0xfe, 0xff]),
+            heard(Status::empty(), [0; 2]),
+            Evidence { sampled_ns: 0x0123_4567_89ab_cdef, ..heard(Status::LAST, [0, 1, 2]) },
+        ] {
+            assert_eq!(Evidence::from_words(evidence.to_words()), evidence);
+        }
     }
 
     #[test]

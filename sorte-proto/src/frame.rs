@@ -46,6 +46,13 @@ impl<'a> LongFrame<'a> {
         Ok(Self { source, frame_type, status: Status::from_bits_retain(status), payload, fcs: got })
     }
 
+    /// A frame whose FCS was taken off, with the one that belongs there; for tools.
+    pub(crate) fn without_fcs(body: &'a [u8]) -> Option<Self> {
+        let &[_, source, code, status, ref payload @ ..] = body else { return None };
+        let frame_type = FrameType::from_code(code)?;
+        Some(Self { source, frame_type, status: Status::from_bits_retain(status), payload, fcs: fcs(body) })
+    }
+
     /// SA: 0 in everything that the published firmware sends.
     pub const fn source(self) -> u8 {
         self.source

@@ -30,6 +30,7 @@ mod frame_type;
 mod hex;
 pub mod host;
 pub mod iep;
+pub mod inspect;
 mod line_delay;
 mod link;
 pub mod master;
@@ -53,7 +54,7 @@ pub use crc::{crc8, crc8_update, fcs};
 pub use delay_req::DelayReq;
 pub use discovery::{Assignment, Discovery, DiscoveryView, Entry, MAX_DEVICES, Member, Network};
 pub use error::{Error, ErrorClass};
-pub use evidence::{Doubt, Evidence, Policy, Positions, Sample, Tolerated};
+pub use evidence::{Doubt, Evidence, EvidenceCell, Policy, Positions, Sample, Tolerated};
 pub use exchange::{
     DeviceFrame, DeviceFrameView, MasterFrame, MasterFrameView, PublishedDeviceFrame, STOCK_INPUT, STOCK_OUTPUT,
     emit_master_frame_into,

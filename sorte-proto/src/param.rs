@@ -261,7 +261,15 @@ impl Param {
     /// # Errors
     /// As [`ParamView::parse`].
     pub fn parse(bytes: &[u8]) -> Result<Self, Error> {
-        let view = ParamView::parse(bytes)?;
+        Self::of(LongFrame::parse(bytes)?)
+    }
+
+    /// Checks that TYPE is 2.
+    ///
+    /// # Errors
+    /// [`Error::UnexpectedType`]
+    pub fn of(frame: LongFrame<'_>) -> Result<Self, Error> {
+        let view = ParamView::of(frame)?;
         Ok(Self { source: view.source(), status: view.status(), parameters: view.parameters() })
     }
 

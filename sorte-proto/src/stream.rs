@@ -33,7 +33,7 @@ where
 ///
 /// ```
 /// use nom::Parser;
-/// use sorte_proto::{DelayReq, Error, FrameType, Preamble, stream};
+/// use sorte_proto::{DelayReq, Error, FrameType, Place, Preamble, stream};
 /// let mut wire = Preamble::Middle.bytes().to_vec();
 /// wire.extend(DelayReq::of_device(Place::Inner).emit());
 /// let (rest, ((), frame)) = (stream::preamble::<Error>, stream::long_frame).parse(&wire[..]).unwrap();

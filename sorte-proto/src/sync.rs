@@ -100,7 +100,15 @@ impl Sync {
     /// # Errors
     /// As [`SyncView::parse`].
     pub fn parse(bytes: &[u8]) -> Result<Self, Error> {
-        let view = SyncView::parse(bytes)?;
+        Self::of(LongFrame::parse(bytes)?)
+    }
+
+    /// Checks that TYPE is 5.
+    ///
+    /// # Errors
+    /// [`Error::UnexpectedType`]
+    pub fn of(frame: LongFrame<'_>) -> Result<Self, Error> {
+        let view = SyncView::of(frame)?;
         Ok(Self {
             source: view.source(),
             status: view.status(),

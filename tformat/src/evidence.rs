@@ -1,4 +1,4 @@
-use servowire_core::{Feedback, Words};
+use servowire_core::{Angle, Feedback, Shaft, Words};
 
 use crate::count::{Abm, Abs};
 use crate::doubt::Doubt;
@@ -220,7 +220,20 @@ impl Feedback for Evidence {
     }
 }
 
-/// For a [`servowire_core::Cell`].
+/// For an [`EvidenceShaftCell`].
+impl Shaft for Evidence {
+    fn shaft(sample: &Sample) -> (Angle, u64) {
+        (sample.angle(), sample.sampled_ns())
+    }
+}
+
+/// Carries evidence from where it is received to where it is used, between two priorities or cores.
+pub type EvidenceCell = servowire_core::Cell<Evidence, 5>;
+
+/// As [`EvidenceCell`], and it also gives the angle of an instant between two samples.
+pub type EvidenceShaftCell = servowire_core::ShaftCell<Evidence, 5>;
+
+/// For an [`EvidenceCell`].
 ///
 /// ```text
 ///  word 0, 1   instant of sampling, low half first

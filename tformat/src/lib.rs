@@ -36,7 +36,7 @@ pub use crc::crc;
 pub use data_id::{ControlField, DataId, Layout};
 pub use doubt::Doubt;
 pub use error::{Error, ErrorClass};
-pub use evidence::Evidence;
+pub use evidence::{Evidence, EvidenceCell, EvidenceShaftCell};
 pub use frame::Frame;
 pub use message::{AllData, Identification, Memory, MultiTurn, SingleTurn};
 pub use nrz_line::{BitOrder, Window};

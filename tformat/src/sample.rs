@@ -1,3 +1,5 @@
+use servowire_core::Angle;
+
 /// Where the shaft is, in the units of a [`Resolution`](crate::Resolution).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -43,9 +45,9 @@ impl Sample {
         self.single_turn
     }
 
-    /// The place in the turn as a fraction of it: 2^32 is a whole turn.
-    pub const fn fraction(self) -> u32 {
-        self.single_turn.wrapping_shl(32_u32.wrapping_sub(self.abs_bits as u32))
+    /// The place in the turn as an angle.
+    pub const fn angle(self) -> Angle {
+        Angle::from_bits(self.single_turn.wrapping_shl(32_u32.wrapping_sub(self.abs_bits as u32)))
     }
 
     /// Turns, if the policy judged them.

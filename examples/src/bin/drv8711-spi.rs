@@ -63,8 +63,8 @@ impl<S: SpiDevice> Drv8711<S> {
     }
 
     /// Switches the motor current on or off; everything else stays.
-    fn enable(&mut self, enable: bool) -> Result<(), Error<S::Error>> {
-        self.written.ctrl = Ctrl { enable, ..self.written.ctrl };
+    fn disable(&mut self) -> Result<(), Error<S::Error>> {
+        self.written.ctrl = Ctrl { enable: false, ..self.written.ctrl };
         self.transfer(Register::Ctrl.write(self.written.value(Register::Ctrl))).map(|_| ())
     }
 

@@ -58,7 +58,7 @@ impl Master {
             // What the end of this frame will change: after RX7 another V-frame begins.
             let last = self.link.at() == 7;
             let msync = self.link.msync() != last;
-            let next = transmission(State::Running, self.requester.transmit(), msync, None, LineDisparity::ZERO);
+            let (next, _) = transmission(State::Running, self.requester.transmit(), msync, None, LineDisparity::ZERO);
             (self.ahead, self.detour) = (Some(next), true);
         }
         self.ahead
@@ -67,7 +67,7 @@ impl Master {
     /// The head after a frame of a running link that is free running.
     #[inline]
     pub(super) fn following(&mut self) -> Transmission {
-        transmission(State::Running, self.requester.transmit(), self.link.msync(), None, LineDisparity::ZERO)
+        transmission(State::Running, self.requester.transmit(), self.link.msync(), None, LineDisparity::ZERO).0
     }
 
     /// Stuffing after a START frame: time for the search.
@@ -95,16 +95,16 @@ impl Master {
         };
         // The disparity goes on only from frames without an answer.
         let carried = matches!(was, State::Reset | State::Sync) && !restarted;
-        let disparity = if carried { self.present.head.disparity_after() } else { LineDisparity::ZERO };
+        let disparity = if carried { self.disparity } else { LineDisparity::ZERO };
         let msync = self.state == State::Running && self.link.msync();
-        self.present = transmission(self.state, symbol, msync, extra, disparity);
+        (self.present, self.disparity) = transmission(self.state, symbol, msync, extra, disparity);
         if restarted {
             self.present.lead_in = 16;
         }
     }
 }
 
-/// What to send in a frame.
+/// What to send in a frame, and the line disparity after it.
 #[inline]
 pub(super) fn transmission(
     state: State,
@@ -112,17 +112,17 @@ pub(super) fn transmission(
     msync: bool,
     extra: Option<Extra>,
     disparity: LineDisparity,
-) -> Transmission {
+) -> (Transmission, LineDisparity) {
     let byte = ParameterByte::of(symbol);
     let byte = if matches!(state, State::WaitVsync | State::Running) { byte.with_first() } else { byte };
     let byte = if msync { byte.with_msync() } else { byte };
-    let head = match extra {
+    let (head, after) = match extra {
         // Every answered frame of a free-running link; what is constant here costs nothing.
-        None if disparity == LineDisparity::ZERO => Head::new(byte, None, LineDisparity::ZERO),
-        None => Head::new(byte, None, disparity),
-        Some(extra) => Head::new(byte, Some(extra), disparity.with_ones(extra.bits())),
+        None if disparity == LineDisparity::ZERO => Head::coded(byte, None, LineDisparity::ZERO),
+        None => Head::coded(byte, None, disparity),
+        Some(extra) => Head::coded(byte, Some(extra), disparity.with_ones(extra.bits())),
     };
-    Transmission { lead_in: 0, head, answered: !matches!(state, State::Reset | State::Sync) }
+    (Transmission { lead_in: 0, head, answered: !matches!(state, State::Reset | State::Sync) }, after)
 }
 
 /// How a frame ends that was sent in this state.

@@ -152,9 +152,16 @@ impl Drive {
         if let Fault::WrongMacId(other) = self.fault {
             response[0] = response[0] & 0xe0 | other.get();
         }
-        let [_, data2, data3] = SUB_RESPONSE_DATA.map(|pr| self.selected(pr, 0));
-        let halves = response.into_iter().chain(self.sub.emit(data2, data3));
-        self.last.iter_mut().zip(halves).for_each(|(to, from)| *to = from);
+        if let Some(half) = self.last.first_chunk_mut() {
+            *half = response;
+        }
+        if sub.is_some() {
+            let [_, data2, data3] = SUB_RESPONSE_DATA.map(|pr| self.selected(pr, 0));
+            let half = self.sub.emit(data2, data3);
+            if let Some(place) = self.last.last_chunk_mut() {
+                *place = half;
+            }
+        }
         let size = if sub.is_some() { BlockSize::Bytes32 } else { BlockSize::Bytes16 };
         self.receive(main, sub.copied(), check(command, size, self.config.mac_id));
         self.last.first_chunk().copied()

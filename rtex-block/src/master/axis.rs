@@ -17,7 +17,7 @@ use super::state::{AxisState, StopReason, SwitchOnError};
 use crate::command::Command;
 use crate::control::ControlBits;
 use crate::error::Error;
-use crate::feedback::Evidence;
+use crate::evidence::Evidence;
 use crate::header::{MacId, UpdateCounter};
 use crate::noncyclic_command::NonCyclicCommand;
 use crate::noncyclic_response::NonCyclicResponse;

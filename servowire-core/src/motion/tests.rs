@@ -162,7 +162,7 @@ fn share() -> impl Strategy<Value = i128> {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { cases: if cfg!(miri) { 4 } else { 20_000 }, ..ProptestConfig::default() })]
+    #![proptest_config(ProptestConfig { cases: if cfg!(miri) { 1 } else { 20_000 }, ..ProptestConfig::default() })]
 
     /// For any motion within the acceleration and the speed that were named the shaft is within the bound.
     #[test]

@@ -9,7 +9,9 @@ use core::ops::ControlFlow;
 use embedded_io_async::{Read, Write};
 use servowire_core::{Ended, Procedure};
 use tformat::master::{EEPROM_POLLING, EepromAccess, Exchange, Line, Progress, Reset, Transaction};
-use tformat::{Address, AllData, Doubt, Evidence, Page, Policy, Request, Resolution, Response, Sample, SingleTurn};
+use tformat::{
+    Address, AllData, Doubt, Evidence, Frame, Page, Policy, Request, Resolution, Response, Sample, SingleTurn,
+};
 
 use super::{LOST, MAX_BYTES, Released, driver_off_ns, longest_ns, other, silence_ns};
 use crate::direction::Switch;
@@ -131,14 +133,15 @@ impl<U: Read + Write, D: Direction, T: Timer> Driver<U, D, T> {
         let guard = self.direction.transmit().map_err(Error::Pin)?;
         self.state.pause_asynch(&mut self.timer, self.line.driver_lead_ns.into()).await?;
         self.state.begin(longest_ns(&self.line, request));
-        let sent = send(&mut self.uart, &mut self.timer, &mut self.state, &self.line, request).await;
+        let request_ns = self.line.rate.fields_ns(frame.fields()).into();
+        let sent = send(&mut self.uart, &mut self.timer, &mut self.state, &self.line, &frame).await;
         if matches!(sent, Err(Error::Clock(_))) {
             // A request of which the end is cut off may be another one: it leaves, by the time that it is now.
-            let request_ns = self.line.rate.fields_ns(frame.fields()).into();
             let _: Result<(), _> = self.state.pause_asynch(&mut self.timer, request_ns).await;
         }
-        let mut transaction = sent?;
+        let start_ns = sent?;
         guard.receive().map_err(Error::Pin)?;
+        let mut transaction = Transaction::start(request, self.line, start_ns);
         let mut progress = transaction.progress();
         loop {
             match exchange::next(progress, &mut self.state, &mut self.timer)? {
@@ -178,23 +181,24 @@ impl<U: Read + Write, D: Direction, T: Timer> Driver<U, D, T> {
     }
 }
 
-/// Sends a request, until its last bit has left.
+/// Sends a request, until its last bit has left: when it began.
 async fn send<U: Write, PIN, P, D>(
     uart: &mut U,
     timer: &mut impl Timer,
     state: &mut quiet::Line,
     line: &Line,
-    request: Request,
-) -> Result<Transaction, Error<U::Error, PIN, P, D>> {
+    frame: &Frame,
+) -> Result<u64, Error<U::Error, PIN, P, D>> {
     let start_ns = state.now_ns(timer)?;
-    hand_over(uart, request.emit().as_bytes()).await?;
+    hand_over(uart, frame.as_bytes()).await?;
     let taken_ns = state.now_ns(timer)?;
     uart.flush().await.map_err(Error::Io)?;
     let now_ns = state.now_ns(timer)?;
     state.sent(now_ns);
-    let transaction = Transaction::start(request, *line, start_ns);
-    timer.wait_until(driver_off_ns(line, transaction.transmission().end_ns, start_ns, taken_ns)).await?;
-    Ok(transaction)
+    let end_ns = start_ns.saturating_add(line.rate.fields_ns(frame.fields()).into());
+    let off_ns = driver_off_ns(line, end_ns, start_ns, taken_ns);
+    timer.wait_until(off_ns).await?;
+    Ok(start_ns)
 }
 
 /// Hands all bytes to the UART.

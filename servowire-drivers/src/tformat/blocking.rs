@@ -5,7 +5,9 @@ use core::ops::ControlFlow;
 use embedded_io::{Read, ReadReady, Write};
 use servowire_core::{Ended, Procedure};
 use tformat::master::{EEPROM_POLLING, EepromAccess, Exchange, Line, Progress, Reset, Transaction};
-use tformat::{Address, AllData, Doubt, Evidence, Page, Policy, Request, Resolution, Response, Sample, SingleTurn};
+use tformat::{
+    Address, AllData, Doubt, Evidence, Frame, Page, Policy, Request, Resolution, Response, Sample, SingleTurn,
+};
 
 use super::{LOST, MAX_BYTES, Released, driver_off_ns, longest_ns, other, silence_ns};
 use crate::direction::Switch;
@@ -125,13 +127,15 @@ impl<U: Read + ReadReady + Write, D: Direction, C: Clock> Driver<U, D, C> {
         let guard = self.direction.transmit().map_err(Error::Pin)?;
         self.state.pause(&mut self.clock, self.line.driver_lead_ns.into())?;
         self.state.begin(longest_ns(&self.line, request));
-        let sent = send(&mut self.uart, &mut self.clock, &mut self.state, &self.line, request);
+        let request_ns = self.line.rate.fields_ns(frame.fields()).into();
+        let sent = send(&mut self.uart, &mut self.clock, &mut self.state, &self.line, &frame);
         if matches!(sent, Err(Error::Clock(_))) {
             // A request of which the end is cut off may be another one: it leaves, by the time that it is now.
-            let _: Result<(), _> = self.state.pause(&mut self.clock, self.line.rate.fields_ns(frame.fields()).into());
+            let _: Result<(), _> = self.state.pause(&mut self.clock, request_ns);
         }
-        let mut transaction = sent?;
+        let start_ns = sent?;
         guard.receive().map_err(Error::Pin)?;
+        let mut transaction = Transaction::start(request, self.line, start_ns);
         loop {
             let progress = self.receive(&mut transaction)?;
             if let ControlFlow::Break(outcome) = exchange::next(progress, &mut self.state, &mut self.clock)? {
@@ -170,23 +174,24 @@ impl<U: Read + ReadReady + Write, D: Direction, C: Clock> Driver<U, D, C> {
     }
 }
 
-/// Sends a request, until its last bit has left.
+/// Sends a request, until its last bit has left: when it began.
 fn send<U: Write, PIN, P, D>(
     uart: &mut U,
     clock: &mut impl Clock,
     state: &mut quiet::Line,
     line: &Line,
-    request: Request,
-) -> Result<Transaction, Error<U::Error, PIN, P, D>> {
+    frame: &Frame,
+) -> Result<u64, Error<U::Error, PIN, P, D>> {
     let start_ns = state.now_ns(clock)?;
-    hand_over(uart, request.emit().as_bytes())?;
+    hand_over(uart, frame.as_bytes())?;
     let taken_ns = state.now_ns(clock)?;
     uart.flush().map_err(Error::Io)?;
     let now_ns = state.now_ns(clock)?;
     state.sent(now_ns);
-    let transaction = Transaction::start(request, *line, start_ns);
-    state.wait_until(clock, driver_off_ns(line, transaction.transmission().end_ns, start_ns, taken_ns))?;
-    Ok(transaction)
+    let end_ns = start_ns.saturating_add(line.rate.fields_ns(frame.fields()).into());
+    let off_ns = driver_off_ns(line, end_ns, start_ns, taken_ns);
+    state.wait_until(clock, off_ns)?;
+    Ok(start_ns)
 }
 
 /// Hands all bytes to the UART.

@@ -8,15 +8,14 @@ mod bits;
 mod disparity;
 mod head;
 mod said;
-mod score;
-mod words;
 
 use std::io;
 use std::ops::Range;
 
 use hdsl::frame::{ANSWER_BITS, BIT_RATE, H_FRAME_BITS, Head, ParsedHead};
+use hdsl::inspect::{Chain, Expected, FRONT_BITS, FoundHead, PERFECT, head_damage, inspect, score};
 use hdsl::message::{LongAnswer, Request, Responder};
-use hdsl::sampling::{Delay, TEST_PATTERN};
+use hdsl::sampling::Delay;
 use hdsl::{
     Answer, EncoderByte, EncoderId, EncoderSymbol, Error, MasterSymbol, PositionBits, PositionTracker, QualityMonitor,
     QualityRule, Rule, VFrame, Window,
@@ -29,10 +28,9 @@ use crate::line::{LineDecoder, Rates};
 use crate::output::Sink;
 use answer::Break;
 use bits::Bits;
-use disparity::{Carried, Chain};
+use disparity::Carried;
 use head::Heads;
 use said::Said;
-use score::{PERFECT, score};
 
 /// The names of all fields.
 pub const FIELDS: &[&str] = &[
@@ -126,14 +124,7 @@ const LEARNED: usize = 8;
 const LESSON: u64 = 1300;
 const LONE: &str = "a lone nibble between two frames without one is no message: a bit was flipped";
 const TRAILER: &str = "the TRAILER or the stuffing in front of it is damaged";
-/// Bits of TRAILER and of the longest stuffing in front of a head that are looked at.
-const FRONT_BITS: u64 = 120;
 const PAUSED: &str = "the line rests here, though frames follow each other for ever";
-
-/// Whether a frame is answered by the test pattern or the identifier.
-fn is_start_up(symbol: MasterSymbol) -> bool {
-    matches!(symbol, MasterSymbol::Start | MasterSymbol::Learn | MasterSymbol::Check | MasterSymbol::IdReq)
-}
 
 /// What is known of the link so far.
 struct Decoder {
@@ -205,12 +196,13 @@ impl Decoder {
     fn take(&mut self, bits: &mut Bits, need: u64, out: &mut dyn Sink) -> io::Result<()> {
         while self.next + need <= bits.end() {
             let at = self.next;
-            let Some((found, len)) = head::find(bits, at) else {
+            let Some(found) = head::find(bits, at) else {
                 self.next += 1;
                 continue;
             };
             self.missed(bits, at);
-            let symbol = found.byte.symbol();
+            let symbol = found.head.byte.symbol();
+            let len = u64::from(found.len);
             let running = self.head(found, bits, at..at + len);
             self.next = at + len;
             if symbol.is_ok_and(MasterSymbol::is_answered) || running {
@@ -219,7 +211,7 @@ impl Decoder {
                     break;
                 }
                 // In a link that runs, no frame asks for a pattern or the identifier.
-                let start_up = symbol.ok().filter(|symbol| is_start_up(*symbol) && !found.byte.first());
+                let start_up = symbol.ok().filter(|symbol| symbol.is_start_up() && !found.head.byte.first());
                 self.next = self.answer(start_up, bits, at + len + 1);
             } else {
                 self.chain = None;
@@ -231,11 +223,12 @@ impl Decoder {
     }
 
     /// A head with its request; whether it is one of a running link that was damaged.
-    fn head(&mut self, found: ParsedHead, bits: &Bits, at: Range<u64>) -> bool {
-        let symbol = found.byte.symbol();
-        let coded = bits.load(at.end - 14) & 0x3fff;
-        let wrong = self.heads.check(found, coded as u16, self.at);
-        let trailer = self.head.is_some() && self.heads.trailer(bits.load(at.start.saturating_sub(FRONT_BITS)));
+    fn head(&mut self, found: FoundHead, bits: &Bits, at: Range<u64>) -> bool {
+        let symbol = found.head.byte.symbol();
+        let wrong = self.heads.check(found.head, bits.window(at.start), self.at);
+        let from = at.start.saturating_sub(FRONT_BITS.into());
+        let front = Window::from_bits(bits.load(from), (at.start - from) as u32).unwrap_or(Window::EMPTY);
+        let trailer = self.head.is_some() && self.heads.trailer(front);
         let place = bits.place(at);
         let damaged = wrong.is_some() && self.delay.is_some();
         let talks = matches!(symbol, Ok(MasterSymbol::Data(_)));
@@ -244,7 +237,8 @@ impl Decoder {
         }
         self.lone = (talks && !self.talks).then(|| self.said.next());
         self.talks = talks;
-        let mut event = event(place, Direction::Request, "H-frame", master(found, symbol), wrong.map_or(Ok(()), Err));
+        let mut event =
+            event(place, Direction::Request, "H-frame", master(found.head, symbol), wrong.map_or(Ok(()), Err));
         event.fields.extend(trailer.then(|| Field::text("note", TRAILER)));
         self.said.push(event);
         self.message_out(symbol, place);
@@ -268,7 +262,7 @@ impl Decoder {
             for k in 1..=missing {
                 let due = last + k * apart / (missing + 1);
                 self.lose(1);
-                let refused = head::damage(bits.load(due.saturating_sub(3)));
+                let refused = head::damage(head_damage(bits.window(due.saturating_sub(3))));
                 let place = bits.place(due..due + u64::from(Head::BITS));
                 self.said.push(event(place, Direction::Request, "H-frame", Vec::new(), Err(refused)));
             }
@@ -340,7 +334,7 @@ impl Decoder {
             None => self.normal(window, place),
             Some(MasterSymbol::IdReq) => self.identifier(window, place),
             Some(_) => {
-                let good = window.bits() as u64 & ((1 << ANSWER_BITS) - 1) == TEST_PATTERN;
+                let good = inspect(Expected::TestPattern, window).error().is_none();
                 let verdict = if good { Ok(()) } else { Err(("pattern", "the test pattern is damaged".into())) };
                 let fields = vec![Field::measured("delay", delay, "bit")];
                 self.chain = None;
@@ -416,8 +410,8 @@ fn usual_delay(bits: &Bits, from: u64) -> u32 {
                 at = bits.end();
                 break;
             }
-            if let Some((_, len)) = head::find(bits, at) {
-                at += len + 1;
+            if let Some(found) = head::find(bits, at) {
+                at += u64::from(found.len) + 1;
                 break;
             }
             at += 1;

@@ -237,7 +237,7 @@ fn position(row: PositionRow) -> Verdict {
     same("combined_unsigned", &row.combined_unsigned, &unsigned.and_then(Sample::counts))?;
     same("turns_signed", &row.turns_signed, &signed.and_then(Sample::turns))?;
     same("combined_signed", &row.combined_signed, &signed.and_then(Sample::counts))?;
-    same("fraction32", &row.fraction32, &signed.map(Sample::fraction))
+    same("fraction32", &row.fraction32, &signed.map(|sample| sample.angle().to_bits()))
 }
 
 #[derive(Deserialize)]

@@ -64,7 +64,7 @@ fn the_units_of_a_position() {
     assert_eq!((signed.turns(), signed.counts()), (Some(-1), Some(-1)));
     let unsigned = at(widths(17, 16).with_unsigned_turns(), 131_071, 0xffff);
     assert_eq!((unsigned.turns(), unsigned.counts()), (Some(65_535), Some(8_589_934_591)));
-    assert_eq!(at(widths(17, 16), 65_536, 0).fraction(), 1 << 31);
+    assert_eq!(at(widths(17, 16), 65_536, 0).angle(), Angle::HALF);
 }
 
 /// Who does not use the turns is not given any, however good or bad they are.
@@ -240,6 +240,6 @@ proptest! {
         let turns = if signed && i64::from(high) * 2 >= full && abm_bits > 0 { i64::from(high) - full } else { i64::from(high) };
         prop_assert_eq!(sample.turns().map(i64::from), Some(turns));
         prop_assert_eq!(sample.counts(), Some(turns * (1 << abs_bits) + i64::from(low)));
-        prop_assert_eq!(u64::from(sample.fraction()), u64::from(low) << (32 - abs_bits));
+        prop_assert_eq!(u64::from(sample.angle().to_bits()), u64::from(low) << (32 - abs_bits));
     }
 }

@@ -58,7 +58,7 @@ pub struct DriverOff {
 /// How far a transaction is. `ready_ns` of a failure is the time at which the longest response to the request is over,
 /// however late within the time-out it began: eleven fields, one right after the other as encoders send them. Behind a bridge that
 /// pauses between fields, wait for a silent line besides.
-pub type Progress = servowire_core::Progress<Exchange, Error>;
+pub type Progress<T = Exchange> = servowire_core::Progress<T, Error>;
 
 /// Longest request and longest response in bytes.
 const MAX_BYTES: usize = 4 + Frame::MAX_FIELDS;

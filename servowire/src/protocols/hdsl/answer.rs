@@ -1,9 +1,9 @@
 //! Answers of a link that runs: their words, the running disparity between them, their V-frames.
 
+use hdsl::inspect::{Chain, Expected, inspect};
 use hdsl::{AlignmentStage, Answer, EncoderByte, Error, Rule, VFrame, Window};
 
-use super::disparity::Chain;
-use super::{Decoder, Refused, event, position, refusal, words};
+use super::{Decoder, Refused, event, position, refusal};
 use crate::event::{Direction, Field, Place};
 
 const DISPARITY: &str = "all words are in the tables, but not one after the other: bits of at least one were flipped";
@@ -34,11 +34,12 @@ impl Decoder {
         let dd = answer.delta_delta();
         self.tracker.step(dd.ok());
         let parameter = answer.parameter();
-        let chain = Chain::of(window);
-        let verdict = match words::wrong(answer, self.at) {
-            None if !chain.holds => Err(("disparity", DISPARITY.to_owned())),
+        let report = inspect(Expected::Normal { at: self.at }, window);
+        let chain = report.disparity();
+        let verdict = match report.error() {
+            None if !chain.holds() => Err(("disparity", DISPARITY.to_owned())),
             None => Ok(()),
-            Some(refused) => Err(refused),
+            Some(error) => Err(refusal(error)),
         };
         let sound = verdict.is_ok();
         let verdict = verdict.and_then(|()| self.follow(parameter.is_ok_and(EncoderByte::vsync)));

@@ -1,46 +1,28 @@
-//! Heads of H-frames: where they are, and whether what they say goes on from the heads before.
+//! Heads of H-frames: whether what they say goes on from the heads before.
 
-use hdsl::frame::{Head, ParsedHead};
-use hdsl::{LineDisparity, MasterSymbol, Window};
+use hdsl::frame::ParsedHead;
+use hdsl::inspect::{FoundHead, HeadDamage, HeadFault, ends_with_trailer, find_head, head_fault, is_coded_for_balance};
+use hdsl::{MasterSymbol, Window};
 
 use super::Refused;
 use super::bits::Bits;
 
-/// SYNC and the two ones of SAMPLE, the first bit in bit 0.
-const PATTERN: u128 = 0b1111_0100;
 /// Heads after which what all of them did is a rule.
 const RULE: u8 = 16;
 
-/// A head at bit `at`; the partly high last bit of an EXTRA window can have been rounded to one bit more in all.
-pub(super) fn find(bits: &Bits, at: u64) -> Option<(ParsedHead, u64)> {
-    let raw = bits.load(at);
-    if raw & 0xff != PATTERN {
-        return None;
-    }
-    let line = bits.window(at);
-    if let Ok(head) = Head::parse(line) {
-        return Some((head, head.len.into()));
-    }
-    let ones = (raw >> 8).trailing_ones();
-    if !(3..=10).contains(&ones) || (raw >> (8 + ones)).trailing_zeros() != 2 {
-        return None;
-    }
-    let low = raw & ((1 << (8 + ones)) - 1);
-    let shorter = Window::from_bits(low | raw >> (9 + ones) << (8 + ones), line.len().checked_sub(1)?)?;
-    Head::parse(shorter).ok().map(|head| (head, u64::from(head.len) + 1))
+/// A head at bit `at`.
+pub(super) fn find(bits: &Bits, at: u64) -> Option<FoundHead> {
+    find_head(bits.window(at))
 }
 
-/// What there is where the head of a frame was due, within three bits.
-pub(super) fn damage(line: u128) -> Refused {
-    // 0 0 1 0 1 1, 1 1 0, 1 1 0
-    const WHOLE: u128 = 0b0110_1111_0100;
-    let near = (0..=6).map(|at| ((line >> at & 0xfff) ^ WHOLE).count_ones()).min().unwrap_or(12);
-    match near {
-        0 => ("invalid_word", "the parameter word of the head is in no table".to_owned()),
-        1 => ("head", "a bit of the frame's head is wrong".to_owned()),
-        2 => ("head", "two bits of the frame's head are wrong".to_owned()),
-        _ => ("missing", "a frame is missing".to_owned()),
-    }
+/// What there is where the head of a frame was due.
+pub(super) fn damage(what: HeadDamage) -> Refused {
+    let class = match what {
+        HeadDamage::Parameter => "invalid_word",
+        HeadDamage::OneBit | HeadDamage::TwoBits => "head",
+        HeadDamage::Missing => "missing",
+    };
+    (class, what.to_string())
 }
 
 /// What the heads of a link did so far.
@@ -60,19 +42,19 @@ pub(super) struct Heads {
 }
 
 impl Heads {
-    /// What is wrong with a head that stands by itself. `coded`: its EQUALISATION and PARA, the first bit in bit 0;
-    /// `at`: its place in the V-frame.
-    pub(super) fn check(&mut self, head: ParsedHead, coded: u16, at: Option<u8>) -> Option<Refused> {
+    /// What is wrong with the head at the beginning of `line`; `at`: its place in the V-frame.
+    pub(super) fn check(&mut self, head: ParsedHead, line: Window, at: Option<u8>) -> Option<Refused> {
         let symbol = head.byte.symbol();
         let (balanced, first, msync) =
-            (self.is_balanced(head, coded), self.is_first(head, symbol.ok()), self.goes_with_v_frame(head, at));
+            (self.is_balanced(head, line), self.is_first(head, symbol.ok()), self.goes_with_v_frame(head, at));
         self.answered = symbol.is_ok_and(MasterSymbol::is_answered);
         let refused = |class, text: &str| Some((class, text.to_owned()));
-        if let Err(error) = symbol {
-            return Some(super::refusal(error));
-        }
-        if head.byte.raw() & 0x20 != 0 {
-            return refused("reserved", "bit 5 of the parameter byte is 1, and it is reserved");
+        if let Some(fault) = head_fault(head) {
+            let class = match fault {
+                HeadFault::UndefinedSymbol { .. } => "undefined_symbol",
+                HeadFault::Reserved => "reserved",
+            };
+            return Some((class, fault.to_string()));
         }
         if !balanced {
             return refused(
@@ -89,23 +71,17 @@ impl Heads {
         None
     }
 
-    /// Whether what stands in front of a head is damaged, against the rule of the frames before: TRAILER, then blocks of
-    /// stuffing. `front`: 120 bits, the last of them before the head.
-    pub(super) fn trailer(&mut self, front: u128) -> bool {
-        // 0 0 1 0 1 1 and what the master drives of TRAILER, 0 0 0 0 1 1, the first bit in bit 0.
-        const STUFFING: u128 = 0b11_0100;
-        const TRAILER: u128 = 0b11_0000;
-        let last = (0..20).map(|k| front >> (114 - 6 * k) & 0x3f).find(|block| *block != STUFFING);
-        !keeps(&mut self.ended, last.is_none_or(|block| block == TRAILER))
+    /// Whether what stands in front of a head is damaged, against the rule of the frames before.
+    pub(super) fn trailer(&mut self, front: Window) -> bool {
+        !keeps(&mut self.ended, ends_with_trailer(front))
     }
 
     /// In a free-running link the count of the line is 0 before each head that follows an answered frame.
-    fn is_balanced(&mut self, head: ParsedHead, coded: u16) -> bool {
+    fn is_balanced(&mut self, head: ParsedHead, line: Window) -> bool {
         if head.extra_bits > 0 || !self.answered {
             return true;
         }
-        let due = Head::new(head.byte, None, LineDisparity::ZERO);
-        keeps(&mut self.balanced, coded == u16::from(due.equalisation()) | due.para().get() << 4)
+        keeps(&mut self.balanced, is_coded_for_balance(head, line))
     }
 
     /// FIRST is 0 during start-up, then 1, but for masters that send it in the frames after a pulse only.

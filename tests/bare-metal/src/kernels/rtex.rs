@@ -7,7 +7,7 @@ use rtex_block::device::{self, Drive, DriveConfig, OpenCodes};
 use rtex_block::inspect::{self, Report};
 use rtex_block::master::{
     ActiveCode, Asic, Axis, AxisConfig, CommandCounter, EchoWatch, Expected, ControlError, Handshake, Inputs, Led, Limits,
-    Order, ControlPhase, PhaseControl, ProfileMove, Progress, Heard, Acknowledgement, Checked, Ring, ServoOff, Slave, SlaveInfo, Turn,
+    Order, ControlPhase, PhaseControl, ProfileMove, Progress, Heard, Checked, Ring, ServoOff, Slave, SlaveInfo, Turn,
     compare, led,
 };
 use rtex_block::position::{self, Gear};

@@ -1,7 +1,7 @@
 //! T-Format: requests and answers in every form.
 
 use nom::{IResult, Parser};
-use servowire_core::Words;
+use servowire_core::{Angle, Words};
 use tformat::{
     Abm, Abs, Adf, AllData, Almc, BitOrder, BitRate, ControlField, DataId, Doubt, Error, Evidence, Frame, Hint, Policy,
     Request, Resolution, Response, Sample, StatusField, Tolerated, VendorCommand, Window, crc, spi, stream,
@@ -195,13 +195,13 @@ kernels! {
     } over JUDGED;
 
     /// A position in the units of a controller, and the way from there to the zero point.
-    fn tformat_sample((evidence, now_ns, policy): &(Evidence, u64, Policy)) -> (u32, Option<i64>, i32) {
+    fn tformat_sample((evidence, now_ns, policy): &(Evidence, u64, Policy)) -> (Angle, Option<i64>, i32) {
         match evidence.at(*now_ns, *policy) {
             Ok(sample) => {
                 let way = POSITIONS[0].0.difference(sample.single_turn(), 0);
-                (sample.fraction(), sample.counts(), way)
+                (sample.angle(), sample.counts(), way)
             }
-            Err(_) => (0, None, 0),
+            Err(_) => (Angle::ZERO, None, 0),
         }
     } over JUDGED;
 

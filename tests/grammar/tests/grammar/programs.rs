@@ -4,7 +4,7 @@
 
 /// Decodes a sound unit and refuses a damaged one with an error that has a class, a name, a number and a text.
 macro_rules! decode {
-    ($krate:ident::$unit:ident($($context:ident = $value:expr,)* $data:ident);
+    ($krate:ident::$unit:ident($($context:ident = $value:expr),*; $data:ident);
      sound $sound:expr; damaged $damaged:expr => $class:literal) => {
         pub(crate) const DECODE: &str =
             concat!("`", stringify!($unit), "::parse(", $(stringify!($context), ", ",)* stringify!($data), ")`");
@@ -24,12 +24,12 @@ macro_rules! decode {
 
 /// Encodes a message to the other end.
 macro_rules! encode {
-    ($krate:ident::$message:ident = $value:expr) => {
-        pub(crate) const ENCODE: &str = concat!("`", stringify!($message), "::emit()`");
+    ($krate:ident $(:: $message:ident)+ = $value:expr) => {
+        pub(crate) const ENCODE: &str = concat!("`", $(stringify!($message), "::",)+ "emit()`");
 
         #[test]
         fn encode() {
-            let message: $krate::$message = $value;
+            let message: $krate $(:: $message)+ = $value;
             assert_eq!(message.emit(), message.emit());
             assert!(!message.to_string().is_empty());
         }
@@ -38,16 +38,16 @@ macro_rules! encode {
 
 /// A code of the wire becomes an enum and back.
 macro_rules! code {
-    ($krate:ident::$code:ident: $known:expr; unknown $unknown:expr) => {
-        pub(crate) const CODE: &str = concat!("`", stringify!($code), "::from_code(code)`");
+    ($krate:ident $(:: $code:ident)+: $known:expr; unknown $unknown:expr) => {
+        pub(crate) const CODE: &str = concat!("`", $(stringify!($code), "::",)+ "from_code(code)`");
 
         #[test]
         fn code() {
-            let known = $krate::$code::from_code($known).unwrap();
+            let known = <$krate $(:: $code)+>::from_code($known).unwrap();
             assert_eq!(known.code(), $known);
             assert_eq!(known.to_string(), known.name());
-            assert!($krate::$code::ALL.contains(&known));
-            assert_eq!($krate::$code::from_code($unknown), None);
+            assert!(<$krate $(:: $code)+>::ALL.contains(&known));
+            assert_eq!(<$krate $(:: $code)+>::from_code($unknown), None);
         }
     };
 }
@@ -65,8 +65,6 @@ macro_rules! exchange {
             let mut machine = $krate::master::$machine::start($($value,)* 1_000);
             let sent = machine.transmission();
             assert!(sent.start_ns == 1_000 && sent.end_ns > sent.start_ns);
-            assert!(sent.driver_on_ns <= sent.start_ns);
-            assert!(sent.driver_off.earliest_ns >= sent.end_ns && sent.driver_off.latest_ns > sent.driver_off.earliest_ns);
             assert!(matches!(machine.progress(), Progress::Pending { until_ns } if until_ns > sent.end_ns));
             let Progress::Done { value, ready_ns } = machine.hear($unit, $end_ns) else { panic!("no response") };
             assert!(ready_ns >= $end_ns);
@@ -99,16 +97,16 @@ macro_rules! procedure {
                 let ready_ns = not_before_ns + 50_000;
                 Ok::<_, Infallible>(servowire_core::Ended { outcome: Err($lost), ready_ns })
             });
-            let Ok(servowire_core::Ended { outcome: Err(error), ready_ns }) = ended;
-            let _: $krate::Error = error;
-            assert!(sent > 0 && ready_ns >= 51_000);
+            let Ok(ended) = ended;
+            let error: $krate::Error = ended.outcome.unwrap_err();
+            assert!(sent > 0 && ended.ready_ns >= 51_000, "{error}");
         }
     };
 }
 
 /// Evidence is judged where it is used, and travels through a cell.
 macro_rules! feedback {
-    ($krate:ident: $evidence:expr, sampled at $sampled_ns:expr; words $words:literal; $from:literal) => {
+    ($krate:ident: $evidence:expr, sampled at $sampled_ns:expr; $from:literal) => {
         pub(crate) const FEEDBACK: &str = $from;
 
         #[test]
@@ -125,7 +123,7 @@ macro_rules! feedback {
             let doubt: &dyn core::error::Error = &old;
             assert!(doubt.to_string().contains("125001 ns"));
 
-            let mut cell = servowire_core::Cell::<Evidence, $words>::new();
+            let mut cell = $krate::EvidenceCell::new();
             let (mut writer, mut reader) = cell.split();
             assert_eq!(reader.at($sampled_ns, policy), Err(Doubt::Never));
             writer.put(evidence);
@@ -136,7 +134,7 @@ macro_rules! feedback {
 
 /// The other end, with a decision that the documents leave open, and with a fault.
 macro_rules! device {
-    ($krate:ident::$device:ident = $value:expr; with $behaviour:expr; heard $unit:expr, at $end_ns:expr) => {
+    ($krate:ident::$device:ident = $value:expr; with $behaviour:expr; heard |$at:ident| ($($heard:expr),+)) => {
         pub(crate) const DEVICE: &str = concat!("`", stringify!($device), "`");
 
         #[test]
@@ -146,18 +144,19 @@ macro_rules! device {
             let mut device = $value;
             assert_eq!(Behaviour::new(), Behaviour::default());
             device.set_behaviour($behaviour);
-            assert!(device.hear($unit, $end_ns).is_some());
-            device.set_fault(Fault::Silent);
-            assert!(device.hear($unit, $end_ns + 1_000_000).is_none());
-            device.set_fault(Fault::None);
-            assert!(device.hear($unit, $end_ns + 2_000_000).is_some());
+            let answers = [Fault::None, Fault::Silent, Fault::None].into_iter().zip(1..).map(|(fault, ms)| {
+                let $at = ms * 1_000_000_u64;
+                device.set_fault(fault);
+                device.hear($($heard),+).is_some()
+            });
+            assert!(answers.eq([true, false, true]));
         }
     };
 }
 
 /// For tools: what is wrong, and what the likely cause is.
 macro_rules! inspect {
-    ($krate:ident::inspect($($context:ident = $value:expr,)* $data:ident); damaged $damaged:expr => $class:literal) => {
+    ($krate:ident::inspect($($context:ident = $value:expr),*; $data:ident); damaged $damaged:expr => $class:literal) => {
         pub(crate) const INSPECT: &str =
             concat!("`inspect(", $(stringify!($context), ", ",)* stringify!($data), ")`");
 
@@ -165,7 +164,8 @@ macro_rules! inspect {
         fn inspect() {
             use $krate::inspect::{Cause, Findings, Report};
 
-            let report: Report = $krate::inspect::inspect($($value,)* $damaged);
+            let damaged = $damaged;
+            let report: Report = $krate::inspect::inspect($($value,)* damaged);
             let error: $krate::Error = report.error().unwrap();
             assert_eq!(error.class().name(), $class);
             let findings: Findings = report.findings();

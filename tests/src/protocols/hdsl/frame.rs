@@ -31,7 +31,7 @@ pub(super) fn master_header(rows: &[Row]) -> Vec<Verdict> {
             let byte = ParameterByte::new(param.0 as u8);
             let head = Head::new(byte, None, LineDisparity::new(d_in));
             same("bits", &bits.window(), &head.bits())?;
-            same("d_out", &LineDisparity::new(d_out), &head.disparity_after())?;
+            same("d_out", &LineDisparity::new(d_out), &LineDisparity::new(d_in).after_head(byte))?;
             same("param", &Ok(byte), &Head::parse(bits.window()).map(|got| got.byte))
         }
         MasterHeader::Sync { param, edge_eighths, window_bits, eq, para, samples } => {

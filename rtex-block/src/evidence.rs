@@ -1,6 +1,6 @@
 //! What a control loop may use of a drive's answers, judged where it is used.
 
-use servowire_core::{Feedback, Tolerance};
+use servowire_core::{Feedback, Tolerance, Words};
 
 use crate::doubt::Doubt;
 use crate::error::ErrorClass;
@@ -177,6 +177,38 @@ impl Feedback for Evidence {
     }
 }
 
+/// Carries evidence from where it is received to where it is used, between two priorities or cores.
+pub type EvidenceCell = servowire_core::Cell<Evidence, 6>;
+
+/// For an [`EvidenceCell`]: position, speed, torque, the instant in two words, and a last one: Status_Flags in bits 15-0, whether there is a sample in
+/// bit 16, whether it has speed and torque in bit 17, the number of the refusal in bits 31-24.
+impl Words<6> for Evidence {
+    #[expect(clippy::cast_possible_truncation, reason = "an instant is cut into its halves")]
+    #[inline]
+    fn to_words(&self) -> [u32; 6] {
+        let Sample { position, rates, sampled_ns } = self.last();
+        let Rates { speed, torque } = rates.unwrap_or(Rates { speed: 0, torque: 0 });
+        let refused = u32::from(self.refused.map_or(0, ErrorClass::number));
+        let known = u32::from(self.sample.is_some()) << 16 | u32::from(rates.is_some()) << 17;
+        let last = u32::from(self.status.bits()) | known | refused << 24;
+        let [position, speed, torque] = [position, speed, torque].map(|value| u32::from_le_bytes(value.to_le_bytes()));
+        [position, speed, torque, sampled_ns as u32, (sampled_ns >> 32) as u32, last]
+    }
+
+    #[inline]
+    fn from_words([position, speed, torque, low, high, last]: [u32; 6]) -> Self {
+        let [status_low, status_high, known, refused] = last.to_le_bytes();
+        let [position, speed, torque] = [position, speed, torque].map(|word| i32::from_le_bytes(word.to_le_bytes()));
+        let rates = (known & 2 != 0).then_some(Rates { speed, torque });
+        let sample = Sample { position, rates, sampled_ns: u64::from(high) << 32 | u64::from(low) };
+        Self {
+            sample: (known & 1 != 0).then_some(sample),
+            status: StatusFlags::from_bytes([status_low, status_high]),
+            refused: ErrorClass::from_number(refused),
+        }
+    }
+}
+
 servowire_core::one_line!(Evidence {
     Self { sample: Some(sample), status, refused: None } => "{} [{}]", sample, status;
     Self { sample: Some(sample), status, refused: Some(class) } => "{} [{}], then refused: {}", sample, status, class.name();
@@ -187,6 +219,25 @@ servowire_core::one_line!(Evidence {
 mod tests {
     use super::*;
     use std::string::ToString;
+
+    #[test]
+    fn every_evidence_comes_back_from_its_words() {
+        let classes = ErrorClass::ALL.iter().map(|class| Some(*class)).chain([None]);
+        for refused in classes {
+            for byte1 in [0x20, 0x2a] {
+                for status in 0..=u8::MAX {
+                    let told = Evidence::of(&response(byte1, status), 0x1234_5678_9abc_def0).refused(refused);
+                    assert_eq!(Evidence::from_words(told.to_words()), told);
+                }
+            }
+            let never = Evidence::NEVER.refused(refused);
+            assert_eq!(Evidence::from_words(never.to_words()), never);
+        }
+        let words = Evidence::of(&response(0x20, 0x60), (3 << 32) + 7).refused(Some(ErrorClass::MacId)).to_words();
+        assert_eq!(words, [77, 8, 9, 7, 3, 0x0403_0060]);
+        assert_eq!(Evidence::from_words([0; 6]), Evidence::NEVER);
+        assert_eq!(Evidence::from_words([u32::MAX; 6]).at(u64::MAX, Policy::new(0)), Err(Doubt::Alarm));
+    }
 
     fn response(byte1: u8, status: u8) -> Response {
         Response::parse(&[0xc5, byte1, status, 0, 77, 0, 0, 0, 8, 0, 0, 0, 9, 0, 0, 0]).unwrap()
@@ -213,6 +264,17 @@ mod tests {
         let refused = Evidence::of(&response(0x20, 0x40), 1_000).refused(Some(ErrorClass::MacId));
         assert_eq!(refused.at(1_100, policy).map(|sample| sample.position()), Ok(77));
         assert_eq!(refused.at(1_200, policy), Err(Doubt::Refused { class: ErrorClass::MacId, age_ns: 200 }));
+    }
+
+    #[test]
+    fn through_a_cell() {
+        let old = Evidence::of(&response(0x20, 0x60), 0x1234_5678_9abc_def0).refused(Some(ErrorClass::Combinator));
+        assert_eq!(old.to_words(), [77, 8, 9, 0x9abc_def0, 0x1234_5678, 0x0b03_0060]);
+        let busy = Evidence::of(&response(0x2a, 0xff), 7);
+        assert_eq!(busy.to_words(), [77, 0, 0, 7, 0, 0x0001_00ff]);
+        for evidence in [Evidence::NEVER, old, busy] {
+            assert_eq!(Evidence::from_words(evidence.to_words()), evidence);
+        }
     }
 
     #[test]
