@@ -447,7 +447,7 @@ fn frames_of_the_start_up_have_their_states_lengths_and_preambles() {
     assert_eq!(idle.hear(&discovery(2, Place::Inner), 0), Err(Error::WrongState));
     let mut bench = running(Config::new());
     // In the exchange every frame is looked at as a device's.
-    let late = bench.master.hear(&discovery(2, Place::Inner), 0).map_err(Error::class);
+    let late = bench.master.hear(&discovery(2, Place::Inner), 0).map(|_| ()).map_err(Error::class);
     assert_eq!((late, counters(&bench).format_errors), (Err(ErrorClass::TooLong), 1));
     let lengths = [
         (Outgoing::Discovery { place: Place::Inner }, 1030, 8),

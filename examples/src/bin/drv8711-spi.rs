@@ -62,7 +62,7 @@ impl<S: SpiDevice> Drv8711<S> {
         Ok(())
     }
 
-    /// Switches the motor current on or off; everything else stays.
+    /// Switches the motor current off; everything else stays.
     fn disable(&mut self) -> Result<(), Error<S::Error>> {
         self.written.ctrl = Ctrl { enable: false, ..self.written.ctrl };
         self.transfer(Register::Ctrl.write(self.written.value(Register::Ctrl))).map(|_| ())

@@ -18,8 +18,10 @@ pub enum Asic {
 
 servowire_core::codes! {
     /// Phase of the control function. PH_INIT is 0, so that cleared memory is the right start.
+    #[derive(Default)]
     pub enum ControlPhase: u8 {
         /// At the start.
+        #[default]
         Init = 0 => "PH_INIT",
         /// For the ring.
         Waiting = 1 => "PH_WAITING",
@@ -29,12 +31,6 @@ servowire_core::codes! {
         Start = 3 => "PH_START",
         /// Cyclic transmission runs.
         Running = 4 => "PH_RUNNING",
-    }
-}
-
-impl Default for ControlPhase {
-    fn default() -> Self {
-        Self::Init
     }
 }
 
@@ -114,7 +110,7 @@ impl PhaseControl {
             (ControlPhase::Init, Asic::Initial | Asic::RingConfig, _) => self.phase = ControlPhase::Waiting,
             (ControlPhase::Waiting, Asic::Ready, Some(SlaveInfo::Match)) => self.phase = ControlPhase::Prepare,
             (ControlPhase::Waiting, Asic::Ready, Some(SlaveInfo::Mismatch)) => {
-                self.error = Some(ControlError::SlaveInfoMismatch)
+                self.error = Some(ControlError::SlaveInfoMismatch);
             }
             (ControlPhase::Prepare, _, _) if inputs.tx_ready => self.phase = ControlPhase::Start,
             (ControlPhase::Start, Asic::Running, _) => self.phase = ControlPhase::Running,

@@ -42,6 +42,7 @@ pub(crate) struct Kernel {
 pub(crate) const ALL: &[&[Kernel]] = &[
     #[cfg(feature = "servowire-core")]
     core_time::KERNELS,
+    #[cfg(feature = "servowire-core")]
     core_feedback::KERNELS,
     #[cfg(feature = "nrz-line")]
     nrz_line::KERNELS,

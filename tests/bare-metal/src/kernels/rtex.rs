@@ -6,13 +6,17 @@ use nom::IResult;
 use rtex_block::device::{self, Drive, DriveConfig, OpenCodes};
 use rtex_block::inspect::{self, Report};
 use rtex_block::master::{
-    ActiveCode, Asic, Axis, AxisConfig, CommandCounter, EchoWatch, Expected, ControlError, Handshake, Inputs, Led, Limits,
-    Order, ControlPhase, PhaseControl, ProfileMove, Progress, Heard, Checked, Ring, ServoOff, Slave, SlaveInfo, Turn,
-    compare, led,
+    ActiveCode, Asic, Axis, AxisConfig, Checked, CommandCounter, ControlError, ControlPhase, EchoWatch, Expected,
+    Handshake, Heard, Inputs, Led, Limits, Order, PhaseControl, ProfileMove, Progress, Ring, ServoOff, Slave,
+    SlaveInfo, Turn, compare, led,
 };
 use rtex_block::position::{self, Gear};
 use rtex_block::timing::{FrameTime, Periods, timer_reload};
-use rtex_block::{Arguments, BlockSize, Code, Command, Command32, CommandBlock, CyclicCode, Doubt, Error, MacId, NonCyclicCommand, NonCyclicResponse, Policy, Response, Response32, ResponseBlock, Sample, SubCommand, TypeCode, UpdateCounter, pack, stream};
+use rtex_block::{
+    Arguments, BlockSize, Code, Command, Command32, CommandBlock, CyclicCode, Doubt, Error, MacId, NonCyclicCommand,
+    NonCyclicResponse, Policy, Response, Response32, ResponseBlock, Sample, SubCommand, TypeCode, UpdateCounter, pack,
+    stream,
+};
 
 use super::kernels;
 use crate::self_test::rtex::{COMMANDS, Command16, RESPONSES, Response16};

@@ -1,6 +1,6 @@
 //! Blocks both ways, what a master finds in them, and servo-off.
 
-use rtex_block::master::{Expected, Acknowledgement, Checked, ServoOff};
+use rtex_block::master::{Acknowledgement, Checked, Expected, ServoOff};
 use rtex_block::{
     BlockSize, Code, Command, CommandBlock, ControlBits, Error, MacId, Response, StatusFlags, UpdateCounter,
 };
