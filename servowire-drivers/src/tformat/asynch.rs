@@ -9,7 +9,9 @@ use core::ops::ControlFlow;
 use embedded_io_async::{Read, Write};
 use servowire_core::{Ended, Procedure};
 use tformat::master::{EEPROM_POLLING, EepromAccess, Exchange, Line, Progress, Reset, Transaction};
-use tformat::{Address, AllData, Doubt, Evidence, Frame, Page, Policy, Request, Resolution, Response, Sample, SingleTurn};
+use tformat::{
+    Address, AllData, Doubt, Evidence, Frame, Page, Policy, Request, Resolution, Response, Sample, SingleTurn,
+};
 
 use super::{LOST, MAX_BYTES, Released, driver_off_ns, longest_ns, other, silence_ns};
 use crate::direction::Switch;

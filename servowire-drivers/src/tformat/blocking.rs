@@ -5,7 +5,9 @@ use core::ops::ControlFlow;
 use embedded_io::{Read, ReadReady, Write};
 use servowire_core::{Ended, Procedure};
 use tformat::master::{EEPROM_POLLING, EepromAccess, Exchange, Line, Progress, Reset, Transaction};
-use tformat::{Address, AllData, Doubt, Evidence, Frame, Page, Policy, Request, Resolution, Response, Sample, SingleTurn};
+use tformat::{
+    Address, AllData, Doubt, Evidence, Frame, Page, Policy, Request, Resolution, Response, Sample, SingleTurn,
+};
 
 use super::{LOST, MAX_BYTES, Released, driver_off_ns, longest_ns, other, silence_ns};
 use crate::direction::Switch;
@@ -135,8 +137,12 @@ impl<U: Read + ReadReady + Write, D: Direction, C: Clock> Driver<U, D, C> {
         guard.receive().map_err(Error::Pin)?;
         let mut transaction = Transaction::start(request, self.line, start_ns);
         loop {
-            let progress = self.receive(&mut transaction)?;
-            if let ControlFlow::Break(outcome) = exchange::next(progress, &mut self.state, &mut self.clock)? {
+            let ended = match self.receive(&mut transaction)? {
+                // At once: a look at the UART that finds nothing is the most frequent one.
+                Progress::Pending { .. } => continue,
+                ended => ended,
+            };
+            if let ControlFlow::Break(outcome) = exchange::next(ended, &mut self.state, &mut self.clock)? {
                 return outcome.map_err(Error::Protocol);
             }
         }
