@@ -23,7 +23,7 @@ fn main() -> Result<(), Error> {
     let resolution = Resolution::default();
     let mut encoder = Device::<2>::new(EncoderAddress::ZERO, resolution, RATE);
     let behaviour =
-        Behaviour::new().with_turn_around_ns(4_000).with_first_read(FirstRead::Ready).with_undetermined(0xdead);
+        Behaviour::new().with_response_delay_ns(4_000).with_first_read(FirstRead::Ready).with_undetermined(0xdead);
     let behaviour = behaviour.with_reset_shows(Shows::Eighth).with_shown_address(ShownAddress::Old);
     // It counts eight requests of a reset even if others are asked in between.
     encoder.set_behaviour(behaviour.with_restart(Restart::Own));

@@ -476,7 +476,7 @@ impl<const BANKS: usize> Device<BANKS> {
         let place = self.behaviour.place.unwrap_or(self.ea.get());
         let slot = if request.command().is_multi_response() { place } else { 0 };
         let slot_ns = self.rate.bits_ns(good.len()).saturating_add(self.rate.response_gap_ns());
-        let wait = self.behaviour.turn_around_ns.saturating_add(slot_ns.saturating_mul(slot.into()));
+        let wait = self.behaviour.response_delay_ns.saturating_add(slot_ns.saturating_mul(slot.into()));
         let start_ns = now_ns.saturating_add(wait.into());
         let end_ns = start_ns.saturating_add(self.rate.bits_ns(line.len()).into());
         Some(Transmission { frames, line, start_ns, end_ns })

@@ -88,7 +88,7 @@ fn when_it_answers() {
     };
     assert_eq!(begin(&mut device, Operation::Abs40, LONG_NS), 2_800);
     assert_eq!(begin(&mut device, Operation::Abs40Mt, 2 * LONG_NS), 2_800 + 3 * 20_000);
-    device.set_behaviour(Behaviour::new().with_turn_around_ns(900).with_place(Some(1)));
+    device.set_behaviour(Behaviour::new().with_response_delay_ns(900).with_place(Some(1)));
     assert_eq!(begin(&mut device, Operation::Abs40Mt, 3 * LONG_NS), 900 + 20_000);
     assert_eq!(begin(&mut device, Operation::Abs40, 4 * LONG_NS), 900);
 }

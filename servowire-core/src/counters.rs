@@ -53,6 +53,12 @@ impl<const N: usize> Counters<N> {
     }
 }
 
+impl<const N: usize> core::fmt::Display for Counters<N> {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        write!(f, "{} good, {} failed", self.good, self.errors())
+    }
+}
+
 /// As a list: what went well, then the failures in the order of the classes.
 #[cfg(feature = "serde")]
 #[cfg_attr(docsrs, doc(cfg(feature = "serde")))]
@@ -135,6 +141,7 @@ mod tests {
         counters.record::<(), _>(&Err(Kind(4)));
         assert_eq!([0, 1, 2, 3, 4].map(|k| counters.of(Kind(k))), [0, 0, 1, 0, 0]);
         assert_eq!((counters.good(), counters.errors(), counters.errors_per_million()), (3, 1, 250_000));
+        assert_eq!(std::format!("{counters}"), "3 good, 1 failed");
     }
 
     #[cfg(feature = "serde")]

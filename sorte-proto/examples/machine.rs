@@ -117,7 +117,7 @@ fn exchange(
             answer.emit_into(&mut bytes)?;
             // These devices send positions, and take them in the cycle of their frame.
             let heard = master.hear(&bytes, at_ns + u64::from(arrival))?;
-            axis.evidence = heard.evidence(Positions::taken_before_ns(4000)).unwrap_or(Evidence::NEVER);
+            axis.evidence = heard.evidence(Positions::taken_before_ns(4000));
         }
     }
     Ok(())

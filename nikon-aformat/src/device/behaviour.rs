@@ -7,7 +7,7 @@
 pub struct Behaviour {
     /// From the last delimiter of a request to the first start bit of the response, in ns. Default 2800, as one vendor's
     /// simulated encoder waits.
-    pub turn_around_ns: u32,
+    pub response_delay_ns: u32,
     /// What ES0 shows in the first response to an EEPROM read. Default [`FirstRead::Busy`].
     pub first_read: FirstRead,
     /// EEPROM data while they are not determined.
@@ -89,7 +89,7 @@ impl Behaviour {
     /// The default readings.
     pub const fn new() -> Self {
         Self {
-            turn_around_ns: 2_800,
+            response_delay_ns: 2_800,
             first_read: FirstRead::Busy,
             undetermined: 0xa5a5,
             reset_shows: Shows::Ninth,
@@ -101,7 +101,7 @@ impl Behaviour {
     }
 
     servowire_core::builder! {
-        with_turn_around_ns: turn_around_ns, u32;
+        with_response_delay_ns: response_delay_ns, u32;
         with_first_read: first_read, FirstRead;
         with_undetermined: undetermined, u16;
         with_reset_shows: reset_shows, Shows;

@@ -75,7 +75,7 @@ impl Switches {
 
     /// How the encoder with address `ea` behaves, of those that are there the one with number `index`.
     pub fn behaviour(self, ea: u8, index: u8) -> Behaviour {
-        let mut behaviour = Behaviour::new().with_turn_around_ns(self.turn_around().1);
+        let mut behaviour = Behaviour::new().with_response_delay_ns(self.turn_around().1);
         if let Some(word) = self.undetermined().1 {
             behaviour = behaviour.with_undetermined(word);
         }

@@ -130,7 +130,7 @@ impl Arguments {
     /// What the encoders answer, in the order of time.
     fn responses(&self, request: Request, on_line: Addresses, asked_ns: u64) -> Vec<Heard> {
         let way_ns = 5 * u64::from(self.cable);
-        let behaviour = Behaviour::new().with_turn_around_ns(self.turn_around);
+        let behaviour = Behaviour::new().with_response_delay_ns(self.turn_around);
         let mut heard: Vec<_> = (0..)
             .zip(on_line.iter())
             .filter_map(|(place, ea)| {

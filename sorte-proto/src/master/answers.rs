@@ -42,11 +42,12 @@ impl<'a> Heard<'a> {
         }
     }
 
-    /// What control may use of it, if it is a device's frame. The caller has to know that the line carries positions.
-    pub fn evidence(self, positions: Positions) -> Option<Evidence> {
+    /// What control may use of it; nothing ([`Evidence::NEVER`]) if it is not a device's frame. The caller has to know that the
+    /// line carries positions.
+    pub fn evidence(self, positions: Positions) -> Evidence {
         match self {
-            Self::StartUp => None,
-            Self::Device { frame, sof_ns } => Some(Evidence::of(frame, positions, sof_ns)),
+            Self::StartUp => Evidence::NEVER,
+            Self::Device { frame, sof_ns } => Evidence::of(frame, positions, sof_ns),
         }
     }
 }

@@ -157,3 +157,14 @@ pub struct Counters {
     /// Cycles of the IO exchange that were left out because [`Master::poll`](super::Master::poll) was called after their time.
     pub skipped_cycles: u64,
 }
+
+impl core::fmt::Display for Counters {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        let Self { cycles, crc_errors, timing_errors, format_errors, device_errors, retrains, skipped_cycles } = self;
+        write!(
+            f,
+            "{cycles} cycles, {skipped_cycles} left out, {timing_errors} with a frame missing; {crc_errors} bad checksums, "
+        )?;
+        write!(f, "{format_errors} other refusals, {device_errors} device errors, {retrains} restarts")
+    }
+}

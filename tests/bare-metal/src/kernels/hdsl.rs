@@ -261,7 +261,7 @@ kernels! {
         let mut line = Cable::new(Disturbance::metres(10).with_jitter(1), 1);
         for frame in 0..*frames {
             let head = line.down(master.transmission().head.bits());
-            let samples = line.up(encoder.hear(head, u64::from(frame)));
+            let samples = line.up(encoder.hear_at(head, u64::from(frame)));
             if frame == 25 {
                 let _ = master.start_short(ShortRequest::Read(RemoteRegister::PING));
                 let access = Access::Read(Length::Eight);

@@ -31,7 +31,7 @@ fn evidence() -> Evidence {
     let (mut master, mut encoder) = (Master::new(Dialect::SICK), encoder());
     for frame in 0..300 {
         let sent = master.transmission();
-        let heard = encoder.hear(sent.head.bits(), 12 * frame);
+        let heard = encoder.hear_at(sent.head.bits(), 12 * frame);
         let bits = heard.map_or(u64::MAX, |sent| sent.bits);
         let _ = master.hear_bits(bits, None, 11_520 * frame + 10_560);
     }
@@ -46,7 +46,7 @@ fn awake() -> (Device, Window) {
     let (mut master, mut encoder) = (Master::new(Dialect::SICK), encoder());
     loop {
         let head = master.transmission().head.bits();
-        match encoder.hear(head, 0) {
+        match encoder.hear_at(head, 0) {
             Some(_) => return (encoder, head),
             None => drop(master.hear_bits(u64::MAX, None, 0).state),
         }
@@ -60,12 +60,12 @@ feedback! { hdsl: evidence(), sampled at SAMPLED_NS; "`master.fast()`, `master.s
 device! {
     hdsl::Device = awake().0;
     with Behaviour::new().with_sync_frames(4);
-    heard |at| (awake().1, at & 0)
+    heard |_at| (awake().1); "head: Window"
 }
 inspect! { hdsl::inspect(expected = Expected::Normal { at: None }; line); damaged damaged() => "invalid_word" }
 log! { hdsl: ShortRequest, hdsl::master::RestartReason, hdsl::message::AccessLevel }
 counters! { hdsl }
 differs! {
-    EXCHANGE: "an H-frame has its own clock: `master.transmission()`, `master.hear(samples, end_ns)`";
+    EXCHANGE: "an H-frame has its own clock: `Master::new(dialect)`, `transmission()`, `hear(samples: &[u8], end_ns)`";
     PROCEDURE: "a message takes many frames: `master.start_short(request)`, its end is in the `HFrame`";
 }

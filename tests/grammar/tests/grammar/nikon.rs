@@ -3,8 +3,8 @@ use core::convert::Infallible;
 use nikon_aformat::device::Device;
 use nikon_aformat::master::{Line, Reset};
 use nikon_aformat::{
-    BitOrder, BitRate, Command, EncoderAddress, EncoderStatus, Error, Evidence, Expected, Layout, Operation, RawResponse,
-    Request, Resolution, Response, Window,
+    BitOrder, BitRate, Command, EncoderAddress, EncoderStatus, Error, Evidence, Expected, Layout, Operation,
+    RawResponse, Request, Resolution, Response, Window,
 };
 
 const EA: EncoderAddress = EncoderAddress::ZERO;
@@ -54,14 +54,14 @@ encode! { nikon_aformat::Request = request() }
 code! { nikon_aformat::Command: 3; unknown 31 }
 exchange! {
     nikon_aformat::Transaction::start(request = request(), resolution = resolution(), line = Line::new(BitRate::Mbit4));
-    heard &heard(), at 60_000
+    heard &heard(); "&[Option<u16>]", at 60_000
 }
 procedure! { nikon_aformat::Reset = Reset::clear_status(EA); lost Error::NoResponse }
 feedback! { nikon_aformat: evidence(), sampled at 1_000_000; "`exchange.evidence(resolution)`" }
 device! {
     nikon_aformat::Device = Device::<1>::new(EA, resolution(), BitRate::Mbit4);
-    with Behaviour::new().with_turn_around_ns(4_000);
-    heard |at| (&[Some(request().emit().as_slice()[0].content())], at)
+    with Behaviour::new().with_response_delay_ns(4_000);
+    heard |at| (request().emit().units().as_slice(), at); "emit().units().as_slice(): &[Option<u16>], end_ns"
 }
 inspect! {
     nikon_aformat::inspect(request = request(), resolution = resolution(); line);

@@ -7,7 +7,7 @@ macro_rules! decode {
     ($krate:ident::$unit:ident($($context:ident = $value:expr),*; $data:ident);
      sound $sound:expr; damaged $damaged:expr => $class:literal) => {
         pub(crate) const DECODE: &str =
-            concat!("`", stringify!($unit), "::parse(", $(stringify!($context), ", ",)* stringify!($data), ")`");
+            concat!("`", stringify!($unit), "::parse(", $(stringify!($value), ", ",)* stringify!($sound), ")`");
 
         #[test]
         fn decode() {
@@ -54,9 +54,12 @@ macro_rules! code {
 
 /// One exchange by the clock: what to send, what was heard, how it ended.
 macro_rules! exchange {
-    ($krate:ident::$machine:ident::start($($name:ident = $value:expr),*); heard $unit:expr, at $end_ns:expr) => {
+    ($krate:ident::$machine:ident::start($($name:ident = $value:expr),*); heard $unit:expr; $kind:literal, at $end_ns:expr) => {
         pub(crate) const EXCHANGE: &str =
-            concat!("`", stringify!($machine), "::start(", $(stringify!($name), ", ",)* "start_ns)`");
+            concat!(
+                "`", stringify!($machine), "::start(", $(stringify!($name), ", ",)* "start_ns)`, `hear(", stringify!($unit), ": ",
+                $kind, ", end_ns)`"
+            );
 
         #[test]
         fn exchange() {
@@ -134,8 +137,8 @@ macro_rules! feedback {
 
 /// The other end, with a decision that the documents leave open, and with a fault.
 macro_rules! device {
-    ($krate:ident::$device:ident = $value:expr; with $behaviour:expr; heard |$at:ident| ($($heard:expr),+)) => {
-        pub(crate) const DEVICE: &str = concat!("`", stringify!($device), "`");
+    ($krate:ident::$device:ident = $value:expr; with $behaviour:expr; heard |$at:ident| ($($heard:expr),+); $hears:literal) => {
+        pub(crate) const DEVICE: &str = concat!("`", stringify!($device), "`; `hear(", $hears, ")`");
 
         #[test]
         fn device() {
@@ -158,7 +161,7 @@ macro_rules! device {
 macro_rules! inspect {
     ($krate:ident::inspect($($context:ident = $value:expr),*; $data:ident); damaged $damaged:expr => $class:literal) => {
         pub(crate) const INSPECT: &str =
-            concat!("`inspect(", $(stringify!($context), ", ",)* stringify!($data), ")`");
+            concat!("`inspect(", $(stringify!($value), ", ",)* stringify!($data), ")`");
 
         #[test]
         fn inspect() {
@@ -211,6 +214,7 @@ macro_rules! counters {
         #[test]
         fn counters() {
             let counters = $krate::master::Counters::default();
+            assert!(counters.to_string().starts_with('0'));
             let again: $krate::master::Counters =
                 serde_json::from_str(&serde_json::to_string(&counters).unwrap()).unwrap();
             assert_eq!(again, counters);

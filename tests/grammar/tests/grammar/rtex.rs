@@ -29,12 +29,12 @@ feedback! { rtex_block: evidence(), sampled at 1_000_000; "`axis.evidence()`" }
 device! {
     rtex_block::Drive = rtex_block::device::Drive::new(DriveConfig::new(mac_id(), OpenCodes::INVENTED));
     with Behaviour::new().with_echo_lag(2);
-    heard |_at| (&command().emit())
+    heard |_at| (&command().emit()); "&command.emit(): &[u8; N]"
 }
 inspect! { rtex_block::inspect(; bytes); damaged &UNDEFINED => "cyclic_code" }
 log! { rtex_block: Command, Response, rtex_block::CyclicCode, rtex_block::master::Failure }
 counters! { rtex_block }
 differs! {
-    EXCHANGE: "an update period has its own clock: `axis.transmission(turn)`, `axis.hear(turn, heard, end_ns)`";
-    PROCEDURE: "counts update periods: `procedure.receive(&mut axis)` gives `Progress`";
+    EXCHANGE: "an update period has its own clock: `Axis::new(config)`, `transmission(turn)`, `hear(turn, &Heard, end_ns)`";
+    PROCEDURE: "counts update periods: `master::procedure::{Home, ClearAlarm, ..}`, `receive(&mut axis)`";
 }

@@ -22,12 +22,12 @@ fn evidence() -> Evidence {
 decode! { sorte_proto::DeviceFrameView(payload_len = 3; bytes); sound &sound(); damaged &damaged() => "bad_crc8" }
 encode! { sorte_proto::DelayReq = DelayReq::of_master(sorte_proto::Place::Last) }
 code! { sorte_proto::FrameType: 5; unknown 11 }
-feedback! { sorte_proto: evidence(), sampled at 1_000_000; "`heard.evidence(positions)`" }
+feedback! { sorte_proto: evidence(), sampled at 1_000_000; "`heard.evidence(Positions)` of what `hear` gave" }
 inspect! { sorte_proto::inspect(during = During::Exchange; bytes); damaged damaged().leak() => "bad_crc8" }
 log! { sorte_proto: DelayReq, DeviceFrame<3>, sorte_proto::FrameType, sorte_proto::master::State }
 counters! { sorte_proto }
 differs! {
-    EXCHANGE: "the line has its own clock: `master.poll(now_ns)`, `master.hear(frame, sof_ns)`";
+    EXCHANGE: "the line has its own clock: `Master::new(config)`, `poll(now_ns)`, `hear(frame: &[u8], sof_ns)`";
     PROCEDURE: "the start-up is part of `Master`";
-    DEVICE: "`Device` is firmware, so it has no faults and no behaviour: `device.hear(port, frame, times)`";
+    DEVICE: "`Device` is firmware, so it has no faults and no behaviour: `hear(PortId, &mut [u8], FrameTimes)`";
 }

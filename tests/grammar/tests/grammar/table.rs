@@ -19,7 +19,7 @@ fn table() -> String {
         "a procedure of several; `start(now_ns)`, `receive(outcome, ready_ns)`": PROCEDURE;
         "evidence, `evidence.at(now_ns, policy)`; `EvidenceCell`": FEEDBACK;
         "the other end; `hear`, `set_behaviour(Behaviour)`, `set_fault(Fault)`": DEVICE;
-        "for tools; `error()`, `findings()`, `cause()`": INSPECT;
+        "for tools: `inspect::inspect`; `error()`, `findings()`, `cause()`": INSPECT;
         "logs and files": LOG;
         "statistics": COUNTERS;
     };
