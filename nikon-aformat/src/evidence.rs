@@ -1,4 +1,4 @@
-use servowire_core::{Feedback, Words};
+use servowire_core::{Angle, Feedback, Shaft, Words};
 
 use crate::abs40::Abs40;
 use crate::doubt::Doubt;
@@ -13,7 +13,7 @@ use crate::tolerated::{Policy, Tolerated};
 ///
 /// Who receives the response makes it, [`Exchange::evidence`](crate::master::Exchange::evidence), and finds out what does not
 /// depend on the user: what the response carries, whether it fits the widths. Who uses the position, in an interrupt of another
-/// priority perhaps, with a [`servowire_core::Cell`] in between, says how old it may be and what he lives with.
+/// priority perhaps, with an [`EvidenceCell`] in between, says how old it may be and what he lives with.
 ///
 /// ```
 /// use nikon_aformat::{
@@ -160,8 +160,19 @@ impl Feedback for Evidence {
     }
 }
 
+/// For an [`EvidenceShaftCell`].
+impl Shaft for Evidence {
+    #[inline]
+    fn shaft(sample: &Sample) -> (Angle, u64) {
+        (sample.angle(), sample.sampled_ns())
+    }
+}
+
 /// Carries evidence from where it is received to where it is used, between two priorities or cores.
 pub type EvidenceCell = servowire_core::Cell<Evidence, 5>;
+
+/// An [`EvidenceCell`] that carries the motion of the shaft too, for a control loop that runs more often than the encoder is read.
+pub type EvidenceShaftCell = servowire_core::ShaftCell<Evidence, 5>;
 
 /// For a [`servowire_core::Cell`].
 ///

@@ -49,7 +49,7 @@ pub use crc::{Crc3, Crc8, crc3, crc8};
 pub use data::Data;
 pub use doubt::Doubt;
 pub use error::{EchoField, Error, ErrorClass};
-pub use evidence::{Evidence, EvidenceCell};
+pub use evidence::{Evidence, EvidenceCell, EvidenceShaftCell};
 pub use expected::{Echo, Expected};
 pub use frame::{FrameCode, RequestFrame};
 pub use layout::{FRAME_BITS, Layout};

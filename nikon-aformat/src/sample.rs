@@ -1,3 +1,5 @@
+use servowire_core::Angle;
+
 /// Where the shaft is, in the units of a [`Resolution`](crate::Resolution).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -44,11 +46,12 @@ impl Sample {
         self.single_turn
     }
 
-    /// The place in the turn as a fraction of it: 2^32 is a whole turn.
-    pub const fn fraction(self) -> u32 {
+    /// The place in the turn as an angle.
+    pub const fn angle(self) -> Angle {
         match self.single_turn.checked_shl(32_u32.wrapping_sub(self.st_bits as u32)) {
-            Some(fraction) => fraction,
-            None => 0,
+            Some(bits) => Angle::from_bits(bits),
+            // Never: an encoder has a bit of single turn at the least.
+            None => Angle::ZERO,
         }
     }
 

@@ -116,7 +116,7 @@ fn age_and_nothing_yet() {
     assert_eq!(Feedback::at(&Evidence::NEVER, u64::MAX, STRICT), Err(Doubt::Never));
 }
 
-/// Turn -1 and three counts of 2^20; a quarter of a turn is a quarter of 2^32.
+/// Turn -1 and three counts of 2^20; a quarter of a turn is 90 degrees.
 #[test]
 fn the_units_of_a_sample() {
     let sample = |abs| {
@@ -127,7 +127,7 @@ fn the_units_of_a_sample() {
     assert_eq!((back.counts(), back.sampled_ns()), (Some(-1_048_573), 34));
     assert_eq!(back.position(), Some(Position { single_turn: 3, turns: -1 }));
     assert_eq!(back.to_string(), "turn -1, 3 counts at 34 ns");
-    assert_eq!(sample(twenty().compose(0x4_0000, 0)).fraction(), 0x4000_0000);
+    assert_eq!(sample(twenty().compose(0x4_0000, 0)).angle().millidegrees(), 90_000);
 }
 
 #[test]

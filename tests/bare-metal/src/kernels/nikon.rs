@@ -180,7 +180,7 @@ kernels! {
     fn nikon_sample((evidence, now_ns, policy): &(Evidence, u64, Policy)) -> Option<(u32, u32, i32, Option<i64>)> {
         let sample = evidence.at(*now_ns, *policy).ok()?;
         let (resolution, single) = (resolution(20, 16), sample.single_turn());
-        let angle = (sample.fraction(), resolution.milli_degrees(single), resolution.difference(single, 0));
+        let angle = (sample.angle().to_bits(), resolution.milli_degrees(single), resolution.difference(single, 0));
         Some((angle.0, angle.1, angle.2, sample.counts()))
     } over JUDGED;
 
