@@ -67,7 +67,7 @@ impl Asked {
         self.steps
     }
 
-    const fn low(&self) -> u16 {
+    const fn low(self) -> u16 {
         let [low, high, ..] = self.steps.to_le_bytes();
         u16::from_le_bytes([low, high])
     }

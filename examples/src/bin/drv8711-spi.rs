@@ -139,7 +139,7 @@ fn main() -> Result<(), Error<ErrorKind>> {
     println!("status: {status}");
     driver.clear(status)?;
     println!("cleared: {:?}", driver.status()?.is_fault());
-    driver.enable(false)?;
+    driver.disable()?;
 
     driver.spi.powered = false;
     match driver.status() {

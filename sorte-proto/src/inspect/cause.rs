@@ -116,7 +116,9 @@ fn without_fcs(body: &[u8]) -> Option<Frame<'_>> {
 /// Whether the inverted bytes end with the FCS of those before, and begin as a frame does.
 fn is_inverted(bytes: &[u8]) -> bool {
     let mut running = RunningFcs::START;
-    bytes.iter().for_each(|byte| running.push(!byte));
+    for byte in bytes {
+        running.push(!byte);
+    }
     running.is_whole() && matches!(bytes, [0, ..]) && bytes.len() >= LongFrame::OVERHEAD
 }
 

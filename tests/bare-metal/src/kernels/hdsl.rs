@@ -10,9 +10,9 @@ use hdsl::sampling::{Alignment, Delay, EdgeRule, SampleIndex, SampledAnswer, TES
 use hdsl::symbol::{Character, DisparityCheck, DisparityStatus, Encoded, Reading, RunningDisparity, Word};
 use hdsl::sync::{CoreClock, Es, Next, Startup, Synchroniser};
 use hdsl::{
-    Answer, Content, DeltaDelta, Dialect, EncodedAnswer, EncoderByte, EncoderId, EncoderSymbol, Error, LineDisparity, MasterSymbol,
-    ParameterByte, PositionBits, PositionRule, PositionTracker, QualityEvent, QualityMonitor, QualityRule, Rule,
-    VFrame, crc16,
+    Answer, Content, DeltaDelta, Dialect, EncodedAnswer, EncoderByte, EncoderId, EncoderSymbol, Error, LineDisparity,
+    MasterSymbol, ParameterByte, PositionBits, PositionRule, PositionTracker, QualityEvent, QualityMonitor,
+    QualityRule, Rule, VFrame, crc16,
 };
 
 use super::kernels;

@@ -6,7 +6,7 @@ use nom::{IResult, Parser};
 use sorte_proto::Link;
 use sorte_proto::Place;
 use sorte_proto::cut_through::{DiscoveryRewriter, PassedDiscovery, SyncRewriter};
-use sorte_proto::device::{self, FrameTimes, Device, Forwarding, Reaction, Passage, Path, PortId};
+use sorte_proto::device::{self, Device, Forwarding, FrameTimes, Passage, Path, PortId, Reaction};
 use sorte_proto::drv8711::{
     self, Apply, Configuration, IsGain, Register, Word, full_scale_microamps, torque_for_microamps,
 };
@@ -17,10 +17,10 @@ use sorte_proto::master::{self, Action, Master, Outgoing};
 use sorte_proto::sync0::{Sync0, Variant, Write, Writes};
 use sorte_proto::timing::{Budget, Timing};
 use sorte_proto::{
-    Clock, Correction, DelayModel, DelayReq, DeviceAddress, DeviceFrame, DeviceFrameView, Direction,
-    Discovery, DiscoveryView, Entry, Error, LineDelay, LongFrame, MasterFrameView, MotorMask, Network, OutOfRange,
-    Param, Parameters, Payload, Pto, Slice, StartTime, Status, Sync, crc8, fcs, stream, strip_preamble,
-    emit_master_frame_into,
+    Clock, Correction, DelayModel, DelayReq, DeviceAddress, DeviceFrame, DeviceFrameView, Direction, Discovery,
+    DiscoveryView, Entry, Error, LineDelay, LongFrame, MasterFrameView, MotorMask, Network, OutOfRange, Param,
+    Parameters, Payload, Pto, Slice, StartTime, Status, Sync, crc8, emit_master_frame_into, fcs, stream,
+    strip_preamble,
 };
 
 use super::kernels;

@@ -1,8 +1,8 @@
 //! The drivers over a transport: an answer becomes a position, a damaged one does not, and silence ends.
 
 use nikon_aformat::{EncoderAddress, Resolution as Widths};
-use servowire_drivers::{nikon, tformat::blocking::Driver};
 use servowire_drivers::{Automatic, Error};
+use servowire_drivers::{nikon, tformat::blocking::Driver};
 use tformat::master::Line;
 use tformat::{BitRate, Resolution};
 

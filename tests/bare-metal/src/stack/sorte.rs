@@ -1,7 +1,7 @@
 //! The SORTE master from link-up into the IO exchange, with one device at its line.
 
 use sorte_proto::Link;
-use sorte_proto::device::{self, FrameTimes, Device, PortId};
+use sorte_proto::device::{self, Device, FrameTimes, PortId};
 use sorte_proto::master::{Action, Config, Master};
 use sorte_proto::{DeviceFrame, Discovery};
 
