@@ -24,13 +24,13 @@ fn main() -> Result<(), Box<dyn core::error::Error>> {
         position = if frame & 0x8000 == 0 { position.wrapping_add(3) } else { position.wrapping_sub(3) };
         let head = cable.down(master.transmission().head.bits());
         let samples = cable.up(encoder.hear_at(head, position));
-        let h_frame = master.hear(&samples, FRAME_NS * frame + 10_560)?;
+        let h_frame = master.hear(&samples, FRAME_NS.saturating_mul(frame).saturating_add(10_560))?;
         if let Some(reason) = h_frame.restarted {
             println!("frame {frame}: link started anew: {reason}");
         }
     }
-    let fast = master.fast().at(FRAME_NS * frames, Policy::new(FRAME_NS))?;
-    println!("{frames} H-frames: {:?}", master.counters());
+    let fast = master.fast().at(FRAME_NS.saturating_mul(frames), Policy::new(FRAME_NS))?;
+    println!("{}", master.counters());
     println!("position {} (encoder {position}), quality {}", fast.position(), master.h_frame().quality);
     Ok(())
 }

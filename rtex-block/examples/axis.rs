@@ -33,11 +33,12 @@ struct Machine {
 impl Machine {
     /// One update period.
     fn update(&mut self) {
-        self.now_ns += UPDATE_NS;
+        self.now_ns = self.now_ns.saturating_add(UPDATE_NS);
         self.axis.hear(self.sent, &self.received, self.now_ns);
         self.sent = self.counter.next();
         let command = self.axis.transmission(self.sent);
-        self.received = Response32::parse(&self.drive.hear(&command.emit()).unwrap()).into();
+        let answer = self.drive.hear(&command.emit());
+        self.received = answer.map_or(Heard::Nothing, |block| Response32::parse(&block).into());
     }
 
     /// The actual position, if it is good for control: at most one update period old.

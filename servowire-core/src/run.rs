@@ -132,9 +132,9 @@ mod tests {
         }
     }
 
-    fn play(
-        answers: &[Result<Result<u8, char>, &'static str>],
-    ) -> (Vec<(u8, u64)>, Result<Ended<u8, char>, &'static str>) {
+    type Played = (Vec<(u8, u64)>, Result<Ended<u8, char>, &'static str>);
+
+    fn play(answers: &[Result<Result<u8, char>, &'static str>]) -> Played {
         let (mut seen, mut answers) = (Vec::new(), answers.iter());
         let ended = run(&mut Three::default(), 100, |request, not_before_ns| {
             seen.push((request, not_before_ns));

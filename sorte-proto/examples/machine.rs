@@ -147,7 +147,7 @@ fn run(master: &mut Master, axes: &mut [Axis], nodes: &mut [Node], mut cycles: u
     Ok(now_ns)
 }
 
-fn main() -> Result<(), Box<dyn std::error::Error>> {
+fn main() -> Result<(), Box<dyn core::error::Error>> {
     let mut nodes: Vec<Node> = (0..DEVICES as u64)
         .map(|k| Node {
             device: Device::new(device::Config::new()),

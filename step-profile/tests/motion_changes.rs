@@ -90,7 +90,7 @@ impl Watched {
         match request {
             Request::MoveTo(target) => self.mover.move_to(target, self.now).unwrap(),
             Request::Run(way, speed) => {
-                self.mover.run(if way { Direction::Reverse } else { Direction::Forward }, speed, self.now).unwrap()
+                self.mover.run(if way { Direction::Reverse } else { Direction::Forward }, speed, self.now).unwrap();
             }
             Request::Override(percent) => self.mover.set_override(percent, self.now),
             Request::Hold => self.mover.hold(self.now),

@@ -1,6 +1,6 @@
 //! Holds the protocol crates to one grammar: the programs of `programs.rs`, pasted for each of them, and the table of
 //! CONTRIBUTING, which follows from the same lines.
-#![allow(missing_docs, unused_macros, clippy::missing_panics_doc, clippy::panic, clippy::unwrap_used)]
+#![allow(clippy::arithmetic_side_effects, clippy::indexing_slicing, clippy::panic, clippy::unwrap_used)]
 
 #[macro_use]
 mod programs;

@@ -26,7 +26,7 @@ fn table() -> String {
     let mut text = String::from("| act | `tformat` | `nikon-aformat` | `hdsl` | `rtex-block` | `sorte-proto` |\n");
     text.push_str("|---|---|---|---|---|---|\n");
     for (act, cells) in rows {
-        text.push_str(&format!("| {act} | {} |\n", cells.join(" | ")));
+        text += &["| ", act, " | ", &cells.join(" | "), " |\n"].concat();
     }
     text
 }
