@@ -19,8 +19,8 @@ fn main() -> Result<(), SameMacId> {
         Drive::new(DriveConfig::new(mac_id, OpenCodes::INVENTED).with_sync_exchanges(4).with_servo_on_updates(2));
     let mut received = Heard::Nothing;
     let mut before = None;
-    for period in 0..16 {
-        let [Command32 { main: command, .. }] = ring.update(&[received], period * 500_000);
+    for now_ns in (0..8_000_000).step_by(500_000) {
+        let [Command32 { main: command, .. }] = ring.update(&[received], now_ns);
         let Some(block) = drive.hear(&command.emit()) else { continue };
         received = Response::parse(&block).into();
 
