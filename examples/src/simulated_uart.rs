@@ -5,7 +5,7 @@ use core::convert::Infallible;
 
 use embedded_hal::digital::{ErrorType as PinErrorType, OutputPin};
 use embedded_io::{ErrorType, Read, ReadReady, Write};
-use servowire_drivers::Clock;
+use servowire_drivers::{Clock, ClockError};
 use tformat::device::{Device, Fault};
 use tformat::{Abm, Abs, BitRate};
 
@@ -66,8 +66,8 @@ impl Bench {
 
 impl Clock for &Bench {
     /// Every look at the clock costs 100 ns, so that waiting ends.
-    fn now_ns(&mut self) -> u64 {
-        self.pass(100)
+    fn now_ns(&mut self) -> Result<u64, ClockError> {
+        Ok(self.pass(100))
     }
 }
 
@@ -148,7 +148,7 @@ impl OutputPin for Pin {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use servowire_drivers::tformat::blocking::Encoder;
+    use servowire_drivers::tformat::blocking::Driver;
     use servowire_drivers::{DriverEnable, Error};
     use tformat::master::Line;
 
@@ -156,17 +156,17 @@ mod tests {
     fn positions_arrive_and_a_fault_is_over_with_the_next_call() {
         let bench = Bench::new(0x17);
         let line = Line::new(BitRate::Mbit2_5);
-        let mut encoder = Encoder::new(Uart::new(&bench), DriverEnable(Pin), &bench, line);
+        let mut encoder = Driver::new(Uart::new(&bench), DriverEnable(Pin), &bench, line);
         for position in [0, 1, 0x7f_ffff] {
             bench.turn_to(Abs::truncate(position), Abm::truncate(3));
-            let all = encoder.read_all().unwrap();
+            let all = encoder.read_data().unwrap();
             assert_eq!((all.abs.get(), all.abm.get(), all.enid), (position, 3, 0x17));
         }
         bench.break_it(Fault::Silent);
-        assert_eq!(encoder.read_all(), Err(Error::Protocol(tformat::Error::NoResponse { echo: true })));
+        assert_eq!(encoder.read_data(), Err(Error::Protocol(tformat::Error::NoResponse { echo: true })));
         bench.break_it(Fault::CutAfter { fields: 2 });
-        assert!(encoder.read_all().is_err());
+        assert!(encoder.read_data().is_err());
         bench.break_it(Fault::None);
-        assert!(encoder.read_all().is_ok());
+        assert!(encoder.read_data().is_ok());
     }
 }

@@ -9,7 +9,10 @@ use hdsl::registers::Registers;
 use hdsl::sampling::{Alignment, EdgeRule, TEST_PATTERN, WINDOW};
 use hdsl::symbol::{Character, Control, Rule, RunningDisparity, Word};
 use hdsl::sync::{Es, Synchroniser};
-use hdsl::{AlignmentStage, Answer, DeltaDelta, Dialect, EncoderId, Error, Policy, PositionBits, PositionRule, PositionTracker, Window};
+use hdsl::{
+    AlignmentStage, Answer, DeltaDelta, Dialect, EncoderId, Error, Policy, PositionBits, PositionRule, PositionTracker,
+    Window,
+};
 
 use crate::byte;
 
@@ -215,10 +218,10 @@ pub fn link(mut data: &[u8]) {
         let line = cable.down_samples(master.transmission().head);
         let samples = match Heard::on_line(&line) {
             Some(heard) => {
-                let answer = encoder.hear(heard.bits, position);
+                let answer = encoder.hear_at(heard.bits, position);
                 cable.up_heard(answer, &heard)
             }
-            None => cable.up(encoder.hear(Window::EMPTY, position)),
+            None => cable.up(encoder.hear_at(Window::EMPTY, position)),
         };
         let _ = master.hear(&samples, 0).expect("there are enough samples");
     }

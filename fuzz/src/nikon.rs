@@ -207,8 +207,8 @@ pub fn master(mut data: &[u8]) {
         let after = match event[2] {
             0 => single.framing_error(now_ns),
             1 => single.poll(now_ns),
-            2 => single.block(block, since_ns, now_ns),
-            _ => single.frame(content, now_ns),
+            2 => single.hear_since(block, since_ns, now_ns),
+            _ => single.hear(&[Some(content)], now_ns),
         };
         if !matches!(before, Progress::Pending { .. }) {
             assert_eq!(before, after);
@@ -217,8 +217,8 @@ pub fn master(mut data: &[u8]) {
         let heard = *bus.bus();
         let _ = match event[2] {
             0 => bus.framing_error(now_ns),
-            2 => bus.block(block, since_ns, now_ns),
-            _ => bus.frame(content, now_ns),
+            2 => bus.hear_since(block, since_ns, now_ns),
+            _ => bus.hear(&[Some(content)], now_ns),
         };
         if over {
             assert_eq!(heard, *bus.bus());
@@ -228,7 +228,7 @@ pub fn master(mut data: &[u8]) {
     assert!(!matches!(bus.poll(u64::MAX), Progress::Pending { .. }));
     if let Progress::Done { value: response, .. } = single.progress() {
         assert_eq!(Response::parse(&request.expected(resolution), &response.response.emit()), Ok(response.response));
-        assert!(response.sampled.latest_ns >= response.sampled.earliest_ns);
+        assert!(response.began_ns >= response.sampled_ns);
     }
 }
 
@@ -249,16 +249,16 @@ pub fn device(data: &[u8]) {
             encoders.framing_error(now_ns);
             continue;
         }
-        for answer in encoders.frame(u16::from_le_bytes([event[0], event[1]]), now_ns).into_iter().flatten() {
-            let crc = answer.raw.crc();
+        for answer in encoders.hear(&[Some(u16::from_le_bytes([event[0], event[1]]))], now_ns).into_iter().flatten() {
+            let crc = answer.frames.crc();
             assert_eq!(crc.got, crc.want);
-            assert!(answer.at_ns > now_ns && answer.line == answer.raw.line());
+            assert!(answer.start_ns > now_ns && answer.line == answer.frames.line());
             assert!(RawResponse::from_line(Layout::Abs17, answer.line).is_ok());
         }
     }
     now_ns += 1_000_000_000;
     let request = Request::new(EncoderAddress::MAX, Operation::Abs40Mt);
-    let answers = encoders.frame(request.emit().as_slice()[0].content(), now_ns);
+    let answers = encoders.hear(&[Some(request.emit().as_slice()[0].content())], now_ns);
     assert!(answers.iter().all(Option::is_some));
 }
 

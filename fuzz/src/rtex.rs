@@ -2,9 +2,9 @@
 
 use core::num::NonZeroU16;
 
-use rtex_block::device::{Drive, DriveConfig, OpenCodes};
+use rtex_block::device::{Drive, DriveConfig, Fault, OpenCodes};
 use rtex_block::inspect::inspect;
-use rtex_block::master::{ActiveCode, Axis, AxisConfig, AxisState, Limits, Received, Ring};
+use rtex_block::master::{ActiveCode, Axis, AxisConfig, AxisState, Heard, Limits, Ring};
 use rtex_block::{
     Alarm, Command, Command32, CommandBlock, ControlBits, Error, MacId, NonCyclicCode, NonCyclicCommand,
     NonCyclicResponse, Response, Response32, stream,
@@ -26,8 +26,8 @@ pub fn block(data: &[u8]) {
         (true, false) => response16(data),
         (true, true) => response32(data),
     };
-    assert_eq!(report.is_usable, usable);
-    assert_eq!(report.is_response, data.first().map(|_| response));
+    assert_eq!(report.is_usable(), usable);
+    assert_eq!(report.is_response(), data.first().map(|_| response));
 }
 
 fn command16(data: &[u8]) -> bool {
@@ -108,7 +108,7 @@ fn refused(data: &[u8], want: usize, error: Error) {
             assert!(usize::from(got) == data.len().min(0xffff) && data.len() > want && usize::from(said) == want);
         }
         Error::CyclicCode { code } => assert!(code == data[1] >> 4 & 7 && code > 4),
-        Error::NonCyclicCode { code } => assert!(code == data[1] & 15 && NonCyclicCode::new(code).is_none()),
+        Error::NonCyclicCode { code } => assert!(code == data[1] & 15 && NonCyclicCode::from_code(code).is_none()),
         Error::SubChk { byte16 } => assert!(byte16 == data[16] && byte16 < 0x80),
         Error::SubCommandCode { code } => assert!(code == data[16] & 15 && ![0, 2, 10].contains(&code)),
         error => panic!("{error} is not an error of this block"),
@@ -152,7 +152,7 @@ pub fn ring(mut data: &[u8]) {
     };
     let mut ring = Ring::new([axis(0), axis(1)], 2).expect("two addresses");
     let mut drives = [drive(0), drive(1)];
-    let mut responses = [Received::Nothing; 2];
+    let mut responses = [Heard::Nothing; 2];
     let mut started = false;
     for _ in 0..256 {
         if data.is_empty() {
@@ -161,7 +161,7 @@ pub fn ring(mut data: &[u8]) {
         let (event, argument) = (byte(&mut data), byte(&mut data));
         let place = usize::from(event >> 4 & 1);
         act(event & 15, argument, &mut ring, place, &mut drives[place]);
-        let commands = ring.update(&responses);
+        let commands = ring.update(&responses, 0);
         for (k, command) in commands.iter().enumerate() {
             let mut sent = command.main.emit();
             let view = CommandBlock::of(&sent).expect("a command");
@@ -170,19 +170,19 @@ pub fn ring(mut data: &[u8]) {
             assert!(ring.failure().is_none() || view.is_servo_off());
             responses[k] = match event & 15 {
                 1 if k == place => {
-                    drives[k].miss();
-                    Received::Nothing
+                    drives[k].framing_error();
+                    Heard::Nothing
                 }
                 2 if k == place => {
                     sent[usize::from(argument >> 3 & 15)] ^= 1 << (argument & 7);
-                    Response::parse(&drives[k].exchange(&sent)).into()
+                    Response::parse(&drives[k].hear(&sent).unwrap()).into()
                 }
                 3 if k == place => {
-                    let mut received = drives[k].exchange(&sent);
+                    let mut received = drives[k].hear(&sent).unwrap();
                     received[usize::from(argument >> 3 & 15)] ^= 1 << (argument & 7);
                     Response::parse(&received).into()
                 }
-                _ => Response::parse(&drives[k].exchange(&sent)).into(),
+                _ => Response::parse(&drives[k].hear(&sent).unwrap()).into(),
             };
         }
     }
@@ -193,16 +193,16 @@ fn act(event: u8, argument: u8, ring: &mut Ring<2>, place: usize, drive: &mut Dr
     let [first, second] = ring.axes_mut();
     let axis = if place == 0 { first } else { second };
     match event {
-        4 => _ = ring.switch_on(),
+        4 => _ = ring.switch_on().ok(),
         5 => ring.switch_off(),
         6 => ring.clear(),
-        7 => drive.raise(Alarm { main: argument, sub: 0 }),
+        7 => drive.set_fault(Fault::Alarm(Alarm { main: argument, sub: 0 })),
         8 => drive.clear_alarm(),
-        9 => drive.set_main_power(argument & 1 == 1),
+        9 => drive.set_fault(if argument & 1 == 1 { Fault::None } else { Fault::NoMainPower }),
         10 => _ = axis.set_position(axis.setpoint().wrapping_add(i32::from(argument) << 11)),
         11 => {
             let code = NonCyclicCode::ALL[usize::from(argument) % 8];
-            let _ = axis.ask(NonCyclicCommand::from_bytes(code, [argument >> 3, 0, 0, 0, 0, 0, 0, 0]));
+            let _ = axis.ask(NonCyclicCommand::parse(code, [argument >> 3, 0, 0, 0, 0, 0, 0, 0]));
         }
         12 => _ = axis.take_outcome(),
         _ => {}
@@ -210,19 +210,19 @@ fn act(event: u8, argument: u8, ring: &mut Ring<2>, place: usize, drive: &mut Dr
 }
 
 /// With a good line, no alarms and power, every axis comes on within its limits.
-fn recover(ring: &mut Ring<2>, drives: &mut [Drive; 2], mut responses: [Received; 2]) {
+fn recover(ring: &mut Ring<2>, drives: &mut [Drive; 2], mut responses: [Heard; 2]) {
     for round in 0..120 {
         if round % 60 == 0 {
             for drive in drives.iter_mut() {
                 drive.clear_alarm();
-                drive.set_main_power(true);
+                drive.set_fault(Fault::None);
             }
             ring.clear();
         }
-        ring.switch_on();
-        let commands = ring.update(&responses);
+        ring.switch_on().ok();
+        let commands = ring.update(&responses, 0);
         for (k, command) in commands.iter().enumerate() {
-            responses[k] = Response::parse(&drives[k].exchange(&command.main.emit())).into();
+            responses[k] = Response::parse(&drives[k].hear(&command.main.emit()).unwrap()).into();
         }
     }
     assert!(ring.all_are(AxisState::On), "{:?}", ring.failure());
@@ -234,8 +234,8 @@ pub fn drive(data: &[u8]) {
     let mac_id = MacId::new(5).expect("below 32");
     let config = DriveConfig::new(mac_id, OpenCodes::INVENTED).with_sync_exchanges(2).with_servo_on_updates(1);
     let (mut short, mut long) = (Drive::new(config), Drive::new(config));
-    for block in data.chunks_exact(16).filter_map(|block| block.first_chunk()) {
-        let response = Response::parse_strict(&short.exchange(block));
+    for block in data.chunks_exact(16).filter_map(|block| block.first_chunk::<16>()) {
+        let response = Response::parse_strict(&short.hear(block).expect("it is not silent"));
         let response = response.expect("an undefined code is echoed with CMD_Error only, reserved bits are 0");
         assert_eq!(response.mac_id, mac_id);
         assert_eq!(response.update_counter_echo.get(), block[0] >> 5 & 3);
@@ -243,8 +243,9 @@ pub fn drive(data: &[u8]) {
             assert!(short.alarm().is_none());
         }
     }
-    for block in data.chunks_exact(32).filter_map(|block| block.first_chunk()) {
-        let response = Response32::parse_strict(&long.exchange32(block)).expect("a drive writes no reserved bits");
+    for block in data.chunks_exact(32).filter_map(|block| block.first_chunk::<32>()) {
+        let response = Response32::parse_strict(&long.hear(block).expect("it is not silent"));
+        let response = response.expect("a drive writes no reserved bits");
         assert_eq!(response.main.mac_id, mac_id);
     }
 }

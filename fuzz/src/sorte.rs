@@ -3,12 +3,12 @@
 
 use nom::Parser;
 use sorte_proto::cut_through::{DiscoveryRewriter, SyncRewriter};
-use sorte_proto::device::{Arrival, Config, Device, PortId, State, Trigger};
+use sorte_proto::device::{Config, Device, FrameTimes, PortId, Reaction, State, Trigger};
 use sorte_proto::iep::Channel;
 use sorte_proto::sync0::{CMP7_NS, MAX_LATENCY_NS, PULSE_NS, Variant};
 use sorte_proto::{
-    DelayReq, DeviceFrame, DeviceFrameView, Discovery, Entry, Error, FrameType, LongFrame, MasterFrame,
-    MasterFrameView, Param, Parameters, StartTime, Status, Sync, fcs, stream, strip_preamble,
+    DelayReq, DeviceFrame, DeviceFrameView, Discovery, Entry, Error, FrameType, Link, LongFrame, MasterFrame,
+    MasterFrameView, Param, Parameters, Place, StartTime, Status, Sync, fcs, stream, strip_preamble,
 };
 
 use crate::byte;
@@ -19,7 +19,7 @@ pub fn frame(data: &[u8]) {
     let streamed = stream::preamble::<Error>(data);
     assert_eq!(body.ok(), streamed.ok().map(|(rest, ())| rest));
 
-    let frame = LongFrame::new(data);
+    let frame = LongFrame::parse(data);
     if let Ok(frame) = frame {
         let known = frame.frame_type().frame_len().is_some();
         assert_eq!(stream::long_frame::<Error>(data).is_ok(), known);
@@ -47,10 +47,10 @@ pub fn frame(data: &[u8]) {
     for len in [0, 3, 16] {
         let whole = data.len() == len + MasterFrameView::OVERHEAD;
         let streamed = stream::master_frame::<Error>(len).parse(data).is_ok();
-        assert!(!whole || streamed == MasterFrameView::new(len, data).is_ok());
+        assert!(!whole || streamed == MasterFrameView::parse(len, data).is_ok());
         let whole = data.len() == len + DeviceFrameView::OVERHEAD;
         let streamed = stream::device_frame::<Error>(len).parse(data).is_ok();
-        assert!(!whole || streamed == DeviceFrameView::new(len, data).is_ok());
+        assert!(!whole || streamed == DeviceFrameView::parse(len, data).is_ok());
     }
 }
 
@@ -61,28 +61,30 @@ pub fn frame(data: &[u8]) {
 /// ```
 pub fn cut_through(mut data: &[u8]) {
     let (flags, number) = (byte(&mut data), byte(&mut data));
-    let (last, error) = (flags & 1 != 0, flags & 2 != 0);
+    let mut adds = Status::empty();
+    adds.set(Status::LAST, flags & 1 != 0);
+    adds.set(Status::ERROR, flags & 2 != 0);
     let mut frame = data.to_vec();
     if let (true, Some((body, trailer))) = (flags & 4 != 0, frame.split_last_chunk_mut()) {
         *trailer = fcs(body).to_le_bytes();
     }
     let lengths = Entry { input: number.into(), output: u16::from(number) << 8 | 1 };
-    let mut rewriter = DiscoveryRewriter::new(lengths, last, error);
+    let mut rewriter = DiscoveryRewriter::new(lengths, adds);
     let passed: Vec<u8> = frame.iter().map(|byte| rewriter.byte(*byte)).collect();
     if let Ok(mut buffered) = Discovery::parse(&frame) {
-        let assignment = buffered.pass(lengths, last, error);
+        let assignment = buffered.pass(lengths, adds);
         // A device says nothing about SA.
-        assert_eq!(rewriter.finish().map(|(_, assignment)| assignment), assignment);
+        assert_eq!(rewriter.finish().map(|passed| passed.assignment), assignment);
         assert_eq!(passed, buffered.emit());
     } else {
         assert!(rewriter.finish().is_err() && Discovery::parse(&passed).is_err());
     }
 
-    let mut rewriter = SyncRewriter::new(number.into(), last, error);
+    let mut rewriter = SyncRewriter::new(number.into(), adds);
     let passed: Vec<u8> = frame.iter().map(|byte| rewriter.byte(*byte)).collect();
     if let Ok(mut buffered) = Sync::parse(&frame) {
         assert_eq!(rewriter.finish(), Ok(buffered));
-        buffered.pass(number.into(), last, error);
+        buffered.pass(number.into(), adds);
         assert_eq!(passed, buffered.emit());
     } else {
         assert!(rewriter.finish().is_err() && Sync::parse(&passed).is_err());
@@ -97,16 +99,16 @@ pub fn cut_through(mut data: &[u8]) {
 pub fn device(mut data: &[u8]) {
     let last = byte(&mut data) & 1 != 0;
     let mut device = Device::new(Config::new());
-    device.links(true, !last);
+    device.set_links(Link::Up, if last { Link::Down } else { Link::Up });
     let mut now_ns = 0;
     while let [command, value, rest @ ..] = data {
         data = rest;
-        let change = value & 1 != 0;
+        let place = if value & 1 == 0 { Place::Inner } else { Place::Last };
         let frame = match command & 7 {
-            0 => Discovery::request(change).emit().to_vec(),
-            1 => Param::request(Parameters::STOCK, change).emit().to_vec(),
-            2 => DelayReq::of_master(change).emit().to_vec(),
-            3 => Sync::of_master(u32::from(*value) * 10_000, 76, change).emit().to_vec(),
+            0 => Discovery::request(place).emit().to_vec(),
+            1 => Param::request(Parameters::STOCK, place).emit().to_vec(),
+            2 => DelayReq::of_master(place).emit().to_vec(),
+            3 => Sync::of_master(u32::from(*value) * 10_000, 76, place).emit().to_vec(),
             4 => {
                 now_ns += u64::from(*value) * 1_000_000;
                 device.poll(now_ns);
@@ -117,9 +119,9 @@ pub fn device(mut data: &[u8]) {
                 continue;
             }
             6 => {
-                let request = DelayReq::of_device(change).emit();
-                let trigger = if change { Trigger::Last } else { Trigger::Normal };
-                assert_eq!(device.delay_reflection(trigger, &request, 360 + u32::from(*value)), Ok(()));
+                let request = DelayReq::of_device(place).emit();
+                let trigger = if place == Place::Last { Trigger::Last } else { Trigger::Normal };
+                assert_eq!(device.hear_reflection(trigger, &request, 360 + u32::from(*value)), Ok(()));
                 continue;
             }
             _ => {
@@ -128,13 +130,13 @@ pub fn device(mut data: &[u8]) {
             }
         };
         let port = if command & 8 == 0 { PortId::A } else { PortId::B };
-        let arrival = Arrival { sof_ns: now_ns as u32, counter_ns: now_ns as u32, now_ns };
+        let times = FrameTimes { sof_ns: now_ns as u32, counter_ns: now_ns as u32, now_ns };
         if command & 16 != 0 {
-            damaged(device, port, frame.clone(), *value, arrival);
+            damaged(device, port, frame.clone(), *value, times);
         }
         let before = device.port(port).state as u8;
         let (length, mut passed) = (frame.len(), frame);
-        device.frame(port, &mut passed, arrival);
+        let _: Reaction = device.hear(port, &mut passed, times);
         assert_eq!(passed.len(), length);
         let after = device.port(port).state as u8;
         assert!(after == before || after == before + 1 || after == 0, "{before} to {after}");
@@ -142,7 +144,7 @@ pub fn device(mut data: &[u8]) {
 }
 
 /// A flip is refused, is not sent on as good, and changes nothing but counters.
-fn damaged(mut device: Device, port: PortId, mut frame: Vec<u8>, value: u8, arrival: Arrival) {
+fn damaged(mut device: Device, port: PortId, mut frame: Vec<u8>, value: u8, times: FrameTimes) {
     let known = |device: &Device| {
         (device.port(PortId::A).state, device.port(PortId::B).state, device.assignment(), device.last_sync())
     };
@@ -150,9 +152,9 @@ fn damaged(mut device: Device, port: PortId, mut frame: Vec<u8>, value: u8, arri
     let bit = usize::from(value) * 31 % (frame.len() * 8);
     frame[bit / 8] ^= 1 << (bit % 8);
     let exchange = device.port(port).state == State::Exchange;
-    let handled = device.frame(port, &mut frame, arrival);
-    assert!(exchange || handled.result.is_err());
-    assert!(exchange || LongFrame::new(&frame).is_err());
+    let reaction = device.hear(port, &mut frame, times);
+    assert!(exchange || reaction.result.is_err());
+    assert!(exchange || LongFrame::parse(&frame).is_err());
     // A line that was never measured makes a device give up at the first SYNC, whatever it is.
     assert!(known(&device) == before || device.state() == State::Idle);
 }
@@ -161,12 +163,12 @@ fn exchange(device: &mut Device, value: u8) {
     let frame = MasterFrame { status: Status::EXCHANGE, output: [value; 16], time_stamp: value.into() };
     let mut bytes = [0; 21];
     assert_eq!(frame.emit_into(&mut bytes), Ok(21));
-    let good = device.exchange(&bytes, 585, 585).map(|output| output.data.to_vec());
+    let good = device.hear_exchange(&bytes, 585, 585).map(|output| output.data.to_vec());
     // A device at a far place owns none of the 16 bytes.
     assert!(good.is_err() || good == Ok(vec![value; 4]));
     assert_eq!(good.is_ok(), device.answer([value; 3]).is_some() && device.assignment().is_some());
     bytes[2] ^= 1;
-    assert!(device.exchange(&bytes, 585, 585).is_err());
+    assert!(device.hear_exchange(&bytes, 585, 585).is_err());
 }
 
 /// Legal steps through the lossless generator: all of them, on time, at full width.

@@ -69,7 +69,7 @@ pub fn axis(mut data: &[u8]) {
     let mut held = Direction::Forward;
     while let [command, value, rest @ ..] = data {
         data = rest;
-        let direction = Direction::from_dir(command & 4 != 0);
+        let direction = if command & 4 == 0 { Direction::Forward } else { Direction::Reverse };
         match command & 3 {
             0 => {
                 let outcome = axis.start(profile, u32::from(*value), direction);
@@ -90,11 +90,11 @@ pub fn axis(mut data: &[u8]) {
             }
             _ => {
                 position = i64::from(*value);
-                axis.set_position(position);
+                axis.set_commanded(position);
             }
         }
         let state = model.as_ref().and_then(|m| m.next).map_or(MoveState::Idle, |step| step.state);
-        assert_eq!((axis.state(), axis.position(), axis.direction()), (state, position, held));
+        assert_eq!((axis.state(), axis.commanded(), axis.direction()), (state, position, held));
     }
 }
 
@@ -224,7 +224,7 @@ impl Watched {
             let pulse = self.machine.pulse().expect("a step is due");
             assert!(pulse.tick == due && due >= self.now, "{pulse:?} before {}", self.now);
             self.position[usize::from(pulse.axis)] += if pulse.direction.dir() { -1 } else { 1 };
-            assert_eq!(self.machine.position(), self.position);
+            assert_eq!(self.machine.commanded(), self.position);
             self.now = due;
         }
         if time < u64::MAX {

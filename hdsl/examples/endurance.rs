@@ -23,7 +23,7 @@ fn main() -> Result<(), Box<dyn core::error::Error>> {
         // To and fro, within the 32 bits of the encoder.
         position = if frame & 0x8000 == 0 { position.wrapping_add(3) } else { position.wrapping_sub(3) };
         let head = cable.down(master.transmission().head.bits());
-        let samples = cable.up(encoder.hear(head, position));
+        let samples = cable.up(encoder.hear_at(head, position));
         let h_frame = master.hear(&samples, FRAME_NS * frame + 10_560)?;
         if let Some(reason) = h_frame.restarted {
             println!("frame {frame}: link started anew: {reason}");

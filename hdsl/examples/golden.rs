@@ -49,7 +49,7 @@ pub(crate) fn trace(dialect: Dialect, metres: u32, frames: u64) -> Result<String
             _ => {}
         }
         let present = master.transmission();
-        let answer = encoder.hear(cable.down(present.head.bits()), position);
+        let answer = encoder.hear_at(cable.down(present.head.bits()), position);
         // One damaged bit in the acceleration.
         let answer =
             if frame == 170 { answer.map(|answer| Transmission { bits: answer.bits ^ 1 << 35 }) } else { answer };

@@ -26,7 +26,7 @@
 //!     let heard = Heard::on_line(&line).ok_or("no head")?;
 //!     // 864 eighths of a bit a frame; the shaft turns by two steps in each.
 //!     let instant = 864 * frame + u64::from(encoder.sampling_instant(&heard));
-//!     let answer = encoder.hear(heard.bits, 2 * instant);
+//!     let answer = encoder.hear_at(heard.bits, 2 * instant);
 //!     master.hear(&cable.up_heard(answer, &heard), 11_520 * frame + 10_560)?;
 //! }
 //! let fast = master.fast().at(11_520 * 150, Policy::new(20_000))?;
@@ -83,6 +83,8 @@ pub struct Device {
     /// Place in the V-frame; `None` before the first normal answer.
     at: Option<u8>,
     toggle: bool,
+    /// Position at the next sampling edge.
+    shaft: u64,
     /// True position at the last sampling edge.
     position: u64,
     /// Position and speed as the receiver can know them from the acceleration words.
@@ -106,6 +108,7 @@ impl Device {
             synchronised: 0,
             at: None,
             toggle: false,
+            shaft: 0,
             position: 0,
             told: 0,
             velocity: 0,
@@ -138,13 +141,24 @@ impl Device {
         &mut self.resources
     }
 
-    /// Takes the head of an H-frame and the position at its sampling edge, and gives the answer; `None` if there is none.
+    /// Turns the shaft: the position at the sampling edge of the next head.
+    pub const fn set_position(&mut self, position: u64) {
+        self.shaft = position;
+    }
+
+    /// As [`hear`](Self::hear), with the position at the sampling edge of this head: for a shaft that turns.
+    pub fn hear_at(&mut self, head: Window, position: u64) -> Option<Transmission> {
+        self.set_position(position);
+        self.hear(head)
+    }
+
+    /// Takes the head of an H-frame and gives the answer; `None` if there is none.
     ///
     /// Before it has seen RESET and enough SYNC frames it answers nothing. A head that cannot be read is not answered; a
     /// symbol of the master that has no meaning is passed over.
-    pub fn hear(&mut self, head: Window, position: u64) -> Option<Transmission> {
+    pub fn hear(&mut self, head: Window) -> Option<Transmission> {
         let before = self.position;
-        self.position = position & self.mask();
+        self.position = self.shaft & self.mask();
         let acceleration = self.measure();
         let Some(byte) = code::parameter(head) else {
             if self.behaviour.bad_head == BadHead::Counts {

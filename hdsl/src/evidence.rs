@@ -222,6 +222,9 @@ const fn pack_doubt(doubt: Doubt) -> [u32; 6] {
     pack(number(doubt), age_ns, 0, 0)
 }
 
+/// Carries evidence from where it is received to where it is used, between two priorities or cores.
+pub type EvidenceCell = servowire_core::Cell<Evidence, 6>;
+
 impl Words<6> for Evidence {
     fn to_words(&self) -> [u32; 6] {
         match self.0 {

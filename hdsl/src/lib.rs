@@ -47,7 +47,7 @@ pub use dialect::Dialect;
 pub use doubt::Doubt;
 pub use encoder_id::{EncoderId, PositionBits};
 pub use error::{Error, ErrorClass};
-pub use evidence::{Evidence, Policy, SafeEvidence, SafeSample, Sample, Tolerated};
+pub use evidence::{Evidence, EvidenceCell, Policy, SafeEvidence, SafeSample, Sample, Tolerated};
 pub use line_code::{EncodedParameter, Equalisation, LineDisparity};
 pub use nrz_line::Window;
 pub use parameter::{EncoderByte, EncoderSymbol, MasterSymbol, Nibble, ParameterByte};

@@ -32,7 +32,7 @@ impl Early {
     fn frame(&mut self) -> HFrame {
         self.position += 321;
         let head = self.master.transmission().head;
-        let bits = self.device.hear(head.bits(), self.position as u64).map_or(u64::MAX, |answer| answer.bits);
+        let bits = self.device.hear_at(head.bits(), self.position as u64).map_or(u64::MAX, |answer| answer.bits);
         let next = self.master.ahead();
         assert_eq!(self.master.ahead(), next);
         self.sampled_ns += FRAME_NS;
@@ -68,7 +68,7 @@ fn the_heads_are_the_same() {
             assert_eq!(both.master.transmission(), plain.transmission());
             let report = both.frame();
             let bits = device
-                .hear(plain.transmission().head.bits(), both.position as u64)
+                .hear_at(plain.transmission().head.bits(), both.position as u64)
                 .map_or(u64::MAX, |answer| answer.bits);
             assert_eq!(report, *plain.hear_bits(bits, None, both.sampled_ns + 9_707));
         }

@@ -16,7 +16,7 @@ const IDLE: u8 = 0xd0;
 
 /// The bits of the answer.
 fn hear(device: &mut Device, head: Window, position: u64) -> Option<u64> {
-    device.hear(head, position).map(|answer| answer.bits)
+    device.hear_at(head, position).map(|answer| answer.bits)
 }
 
 fn head(byte: u8) -> Window {

@@ -105,7 +105,7 @@ fn run(dialect: Dialect, seed: u64, frames: u64) -> Tally {
             head = Window::from_bits(head.bits() ^ 1 << noise.below(26), head.len()).unwrap();
             *tally.events.entry("head").or_default() += 1;
         }
-        let answer = device.hear(head, motion.at(0) as u64);
+        let answer = device.hear_at(head, motion.at(0) as u64);
         let (event, bits) = damage(&mut noise, answer.map_or(ANSWER, |answer| answer.bits), last);
         *tally.events.entry(event).or_default() += 1;
         last = answer.map_or(ANSWER, |answer| answer.bits);

@@ -43,11 +43,11 @@ impl Line {
         self.edge = self.now + 64 + extra;
         let samples = if let Some(heard) = Heard::on_line(&self.cable.down_samples(head)) {
             self.instant = self.now + i64::from(self.device.sampling_instant(&heard));
-            let answer = self.device.hear(heard.bits, (self.speed * self.instant) as u64);
+            let answer = self.device.hear_at(heard.bits, (self.speed * self.instant) as u64);
             self.cable.up_heard(answer, &heard)
         } else {
             self.instant = self.edge;
-            let answer = self.device.hear(Window::EMPTY, (self.speed * self.instant) as u64);
+            let answer = self.device.hear_at(Window::EMPTY, (self.speed * self.instant) as u64);
             self.cable.up(answer)
         };
         // The head has 26 bits and those of the window; one bit later 72 bits are sampled.

@@ -34,7 +34,7 @@ impl Desk {
     }
 
     fn frame(&mut self) -> HFrame {
-        let answer = self.device.hear(self.master.transmission().head.bits(), 0x8765_4321);
+        let answer = self.device.hear_at(self.master.transmission().head.bits(), 0x8765_4321);
         let report = *self.master.hear_bits(answer.map_or(u64::MAX, |answer| answer.bits), None, 0);
         self.lines = self.map.apply(&report);
         report

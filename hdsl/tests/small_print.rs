@@ -171,7 +171,7 @@ fn a_request_that_waits_at_the_encoder() {
     bench.master.reset_messages().unwrap();
     for _ in 0..120 {
         let head = bench.master.transmission().head.bits();
-        let bits = bench.device.hear(head, bench.position as u64).unwrap().bits;
+        let bits = bench.device.hear_at(head, bench.position as u64).unwrap().bits;
         let symbol = hdsl::Answer::from_bits(hdsl::Rule::Strict, bits).parameter().unwrap().symbol();
         assert!(matches!(symbol, Ok(EncoderSymbol::Idle | EncoderSymbol::Init)), "{symbol:?}");
         bench.master.hear_bits(bits, None, 0);

@@ -86,11 +86,11 @@ fn run(dialect: Dialect, seed: u64, frames: u64, rates: Rates) -> (Seen, Tally) 
         let line = sampled(&world, begin_ns, 48);
         if let Some(heard) = Heard::on_line(&line) {
             let samples = u64::from(heard.start) + 8 * u64::from(heard.bits.len()) + 8;
-            if let Some(answer) = device.hear(heard.bits, position) {
+            if let Some(answer) = device.hear_at(heard.bits, position) {
                 world.answer(0, request, &message(answer.bits.into(), 61), begin_ns + samples * SAMPLE_PS / 1000 + 20);
             }
         } else {
-            let _ = device.hear(Window::EMPTY, position);
+            let _ = device.hear_at(Window::EMPTY, position);
         }
         // The receiver samples from one bit after PARA on.
         let receive_ns = begin_ns + 27 * BIT_PS / 1000;

@@ -4,32 +4,36 @@
 //! are simulated, with readings of their own of what the documents leave open.
 #![allow(clippy::arithmetic_side_effects, reason = "a program on a host")]
 
+use core::convert::Infallible;
+
 use nikon_aformat::bus::{Addresses, Bus};
-use nikon_aformat::device::{Behaviour, Device, Encoders};
+use nikon_aformat::device::{Behaviour, Device, Ea, Encoders, FirstRead, Restart, ShownAddress, Shows};
 use nikon_aformat::master::{
-    EepromRead, Exchange, GuardedReset, Line, Polling, Progress, Reset, Step, Transaction, VerifiedWrite, Write,
+    EepromRead, Exchange, GuardedReset, Line, Polling, Progress, Reset, Transaction, VerifiedWrite, Write,
 };
 use nikon_aformat::{
-    Alm, BitOrder, BitRate, EncoderAddress, EncoderId, Error, FRAME_BITS, Operation, PmAlm, Policy, Request,
-    Resolution, Response, Temperature, U10,
+    Alm, BitOrder, BitRate, EncoderAddress, EncoderId, Error, Operation, PmAlm, Policy, Request, Resolution, Response,
+    Temperature, Tolerated, U10,
 };
+use servowire_core::{Ended, Procedure};
 
 const RATE: BitRate = BitRate::Mbit8;
 
 fn main() -> Result<(), Error> {
     let resolution = Resolution::default();
     let mut encoder = Device::<2>::new(EncoderAddress::ZERO, resolution, RATE);
-    let behaviour = Behaviour::new().with_turn_around_ns(4_000).not_busy_in_first_read().with_undetermined(0xdead);
-    let behaviour = behaviour.showing_in_the_eighth().showing_the_old_address();
+    let behaviour =
+        Behaviour::new().with_response_delay_ns(4_000).with_first_read(FirstRead::Ready).with_undetermined(0xdead);
+    let behaviour = behaviour.with_reset_shows(Shows::Eighth).with_shown_address(ShownAddress::Old);
     // It counts eight requests of a reset even if others are asked in between.
-    encoder.set_behaviour(behaviour.counting_its_own_requests());
+    encoder.set_behaviour(behaviour.with_restart(Restart::Own));
     encoder.set_id(EncoderId::truncate(0x00_0001));
     encoder.set_position(0x8_0000, 12);
     encoder.set_temperature(Temperature(U10::truncate(1004)));
     encoder.set_eeprom(1, 0x10, 0xffff);
     // The battery was away, and is back.
-    encoder.set_alarms(Alm::BATT | Alm::MTERR, true);
-    encoder.set_alarms(Alm::BATT | Alm::MTERR, false);
+    encoder.raise_alarms(Alm::BATT | Alm::MTERR);
+    encoder.end_alarms(Alm::BATT | Alm::MTERR);
 
     let mut bench = Bench::new([encoder]);
     let ea = prepare(&mut bench)?;
@@ -42,19 +46,16 @@ fn main() -> Result<(), Error> {
 /// Everything that outlasts the supply, with the encoder alone on the line.
 fn prepare(bench: &mut Bench<1>) -> Result<EncoderAddress, Error> {
     let mut id = VerifiedWrite::new(Write::id_of_the_only_encoder(EncoderId::truncate(0x12_3456)));
-    let first = id.start(bench.now_ns);
-    bench.drive(first, |outcome, now_ns| id.receive(outcome, now_ns))?;
+    bench.run(&mut id)?;
     let ea = EncoderAddress::truncate(5);
     let resets = [Reset::set_address_of_the_only_encoder(ea), Reset::clear_status(ea), Reset::clear_multiturn(ea)];
     for reset in resets.into_iter().chain([Reset::clear_status_and_multiturn(ea)]) {
         println!("{} eight times", reset.command());
         let mut reset = GuardedReset::new(reset);
-        let first = reset.start(bench.now_ns);
-        bench.drive(first, |outcome, now_ns| reset.receive(outcome, now_ns))?;
+        bench.run(&mut reset)?;
     }
     let mut word = VerifiedWrite::new(Write::eeprom_of_bank(ea, 1, 0x10, 0x2026));
-    let first = word.start(bench.now_ns);
-    bench.drive(first, |outcome, now_ns| word.receive(outcome, now_ns))?;
+    bench.run(&mut word)?;
     Ok(ea)
 }
 
@@ -62,13 +63,11 @@ fn prepare(bench: &mut Bench<1>) -> Result<EncoderAddress, Error> {
 fn read(bench: &mut Bench<1>, ea: EncoderAddress) -> Result<(), Error> {
     let polling = Polling { interval_ns: 500_000, max_tries: 6 };
     let mut word = EepromRead::of_bank(ea, 1, 0x10).with_polling(polling);
-    let first = word.start(bench.now_ns);
-    println!("bank 1: {:#06x}", bench.drive(first, |outcome, now_ns| word.receive(outcome, now_ns))?);
+    println!("bank 1: {:#06x}", bench.run(&mut word)?);
     // ES0 is clear in the first response of this encoder, whose data are not determined: trusting it is wrong here.
     let trusting = EepromRead::of_bank(ea, 1, 0x10).knowing_that_none_was_broken_off();
     let mut trusting = trusting.trusting_es0_of_the_first_response();
-    let first = trusting.start(bench.now_ns);
-    println!("wrong: {:#06x}", bench.drive(first, |outcome, now_ns| trusting.receive(outcome, now_ns))?);
+    println!("wrong: {:#06x}", bench.run(&mut trusting)?);
     let exchange = bench.transact(Request::new(ea, Operation::Temperature))?;
     if let Some(temperature) = exchange.response.temperature() {
         let (above, below) = (temperature.milli_celsius(), temperature.signed_milli_celsius());
@@ -76,10 +75,12 @@ fn read(bench: &mut Bench<1>, ea: EncoderAddress) -> Result<(), Error> {
     }
     let resolution = Resolution::default();
     let exchange = bench.transact(Request::new(ea, Operation::Abs24Status))?;
-    let policy = Policy::STRICT.tolerating_alarms(Alm::BATT).with_max_age_ns(1_000_000);
+    // 24 bits do not hold all of its turns: only the single turn is used.
+    let evidence = exchange.evidence(resolution);
+    let policy = Policy::new(1_000_000).tolerating(Tolerated::SINGLE_TURN);
     println!("any status bit: {}", exchange.response.has_status());
-    match exchange.position(resolution, policy, bench.now_ns) {
-        Ok(position) => println!("{} degrees", resolution.degrees_f32(position.single_turn)),
+    match evidence.at(bench.now_ns, policy) {
+        Ok(sample) => println!("{} degrees", resolution.degrees_f32(sample.single_turn())),
         Err(doubt) => println!("not to be used: {doubt}"),
     }
     Ok(())
@@ -89,7 +90,7 @@ fn read(bench: &mut Bench<1>, ea: EncoderAddress) -> Result<(), Error> {
 fn on_a_bus(encoder: &Device<2>) -> Result<(), Error> {
     let mut all = [*encoder; 2];
     for (place, device) in (0..).zip(&mut all) {
-        device.set_behaviour(Behaviour::new().answering_all().at_place(place));
+        device.set_behaviour(Behaviour::new().with_ea(Ea::All).with_place(Some(place)));
         device.set_motion(-1_000, 5);
         device.set_pm_alm(PmAlm::INCW1);
     }
@@ -101,8 +102,8 @@ fn on_a_bus(encoder: &Device<2>) -> Result<(), Error> {
     println!("into the shift register: {:#010x}", cdf.transmit_word());
     let asked = Addresses::NONE.with(encoder.ea()).with(EncoderAddress::ZERO);
     let mut bus = Bus::new(request.expected(Resolution::default()), asked);
-    for answer in bench.encoders.frame(cdf.content(), 10_000).into_iter().flatten() {
-        bus.push_words(answer.raw.contents(), BitOrder::LsbFirst);
+    for answer in bench.encoders.hear(&[Some(cdf.content())], 10_000).into_iter().flatten() {
+        bus.push_words(answer.frames.contents(), BitOrder::LsbFirst);
     }
     println!(
         "missing {:08b}, twice {:08b}, {} never started",
@@ -129,18 +130,11 @@ impl<const N: usize> Bench<N> {
     /// One request and its response, the frames carried from one end to the other.
     fn transact(&mut self, request: Request) -> Result<Exchange, Error> {
         let mut transaction = Transaction::start(request, Resolution::default(), self.line, self.now_ns);
-        let frame_ns = u64::from(RATE.bits_ns(FRAME_BITS));
-        let mut answers = [None; N];
-        for frame in transaction.frames().as_slice() {
-            self.now_ns += frame_ns + u64::from(self.line.frame_gap_ns);
-            answers = self.encoders.frame(frame.content(), self.now_ns);
-        }
-        for answer in answers.into_iter().flatten() {
-            self.now_ns = answer.at_ns;
-            for content in answer.raw.contents() {
-                self.now_ns += frame_ns;
-                let _ = transaction.frame(*content, self.now_ns);
-            }
+        let sent = transaction.transmission();
+        self.now_ns = sent.end_ns;
+        for answer in self.encoders.hear(sent.frames.units().as_slice(), sent.end_ns).into_iter().flatten() {
+            self.now_ns = answer.end_ns;
+            let _ = transaction.hear(answer.units().as_slice(), answer.end_ns);
         }
         match transaction.poll(self.now_ns + 10_000_000) {
             Progress::Done { value, .. } => Ok(value),
@@ -149,26 +143,17 @@ impl<const N: usize> Bench<N> {
         }
     }
 
-    /// A procedure from its first step to its end.
-    fn drive<T: Copy>(
-        &mut self,
-        first: Step<T>,
-        mut receive: impl FnMut(Result<Response, Error>, u64) -> Step<T>,
-    ) -> Result<T, Error> {
-        let mut step = first;
-        loop {
-            match step {
-                Step::Send { request, not_before_ns } => {
-                    self.now_ns = self.now_ns.max(not_before_ns);
-                    let outcome = self.transact(request).map(|exchange| exchange.response);
-                    step = receive(outcome, self.now_ns);
-                }
-                Step::Done { value, ready_ns } => {
-                    self.now_ns = self.now_ns.max(ready_ns);
-                    return Ok(value);
-                }
-                Step::Failed { error, .. } => return Err(error),
-            }
-        }
+    /// A procedure from its start to its end. There is no port that could fail.
+    fn run<P>(&mut self, procedure: &mut P) -> Result<P::Value, Error>
+    where
+        P: Procedure<Request = Request, Response = Response, Error = Error>,
+    {
+        let Ok(Ended { outcome, ready_ns }) = servowire_core::run(procedure, self.now_ns, |request, not_before_ns| {
+            self.now_ns = self.now_ns.max(not_before_ns);
+            let outcome = self.transact(request).map(|exchange| exchange.response);
+            Ok::<_, Infallible>(Ended { outcome, ready_ns: self.now_ns })
+        });
+        self.now_ns = self.now_ns.max(ready_ns);
+        outcome
     }
 }

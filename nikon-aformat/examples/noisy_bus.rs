@@ -100,7 +100,7 @@ fn ask(encoders: &mut Encoders<8, 1>, request: Request, noise: &mut Noise, now_n
         let line = Window::from_bits(bits, FRAME_BITS).unwrap_or(Window::EMPTY);
         match RequestFrame::from_line(line) {
             Err(Error::StartBit { .. } | Error::Delimiter { .. }) => encoders.framing_error(now_ns),
-            _ => answers = encoders.frame((bits >> 1) as u16, now_ns),
+            _ => answers = encoders.hear(&[Some((bits >> 1) as u16)], now_ns),
         }
     }
     answers
@@ -115,9 +115,9 @@ struct Line {
 
 impl Line {
     fn of(answers: &[Option<Transmission>; 8]) -> Self {
-        let first_ns = answers.iter().flatten().map(|answer| answer.at_ns).min().unwrap_or(0);
+        let first_ns = answers.iter().flatten().map(|answer| answer.start_ns).min().unwrap_or(0);
         let place = |answer: &Transmission| {
-            MARGIN + ((answer.at_ns - first_ns) * 1000 / u64::from(BitRate::Mbit16.bit_ps())) as usize
+            MARGIN + ((answer.start_ns - first_ns) * 1000 / u64::from(BitRate::Mbit16.bit_ps())) as usize
         };
         let starts = answers.map(|answer| answer.as_ref().map(place));
         let end = starts.iter().flatten().max().map_or(0, |start| start + 72 + MARGIN);
@@ -148,7 +148,7 @@ impl Line {
 
     /// Whether an accepted response is one that was sent; if not, counts why it was accepted.
     fn judge(&self, raw: &RawResponse, answers: &[Option<Transmission>; 8], tally: &mut Tally) -> bool {
-        let sent = answers.iter().flatten().map(|answer| answer.raw);
+        let sent = answers.iter().flatten().map(|answer| answer.frames);
         if sent.clone().any(|sent| sent == *raw) {
             return true;
         }
@@ -158,7 +158,7 @@ impl Line {
             tally.slipped += 1;
             return false;
         };
-        let wrong = (sent.raw.line().bits() ^ raw.line().bits()).count_ones();
+        let wrong = (sent.frames.line().bits() ^ raw.line().bits()).count_ones();
         tally.unseen_by_crc += 1;
         tally.fewest_bits = Some(tally.fewest_bits.map_or(wrong, |fewest| fewest.min(wrong)));
         false

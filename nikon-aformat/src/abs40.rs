@@ -1,5 +1,3 @@
-use core::fmt;
-
 use nrz_line::{BitOrder, Window};
 
 use crate::contents::sound_four;
@@ -112,13 +110,7 @@ fn refusal(expected: &Expected, line: &[u8; Abs40::LINE_BYTES], order: BitOrder)
     }
 }
 
-impl fmt::Display for Abs40 {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "from {}: ES {} ABS {:#012x}", self.ea, self.es, self.abs.get())
-    }
-}
-
-servowire_core::format_as_displayed!(Abs40);
+servowire_core::one_line!(Abs40 { Self { ea, es, abs } => "from {}: ES {} ABS {:#012x}", ea, es, abs.get(); });
 
 #[cfg(test)]
 mod tests {

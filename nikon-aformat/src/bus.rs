@@ -114,8 +114,7 @@ impl fmt::Display for Addresses {
 servowire_core::format_as_displayed!(Addresses);
 
 /// What came from one address.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum Outcome {
     /// Nothing good, and nothing was asked for.
@@ -133,11 +132,19 @@ pub enum Outcome {
     Missing,
 }
 
+servowire_core::one_line!(Outcome {
+    Self::NotAsked => "not asked";
+    Self::Good(response) => "{}", response;
+    Self::Extra(response) => "not asked: {}", response;
+    Self::Duplicate { first } => "more than one: {}", first;
+    Self::Missing => "missing";
+});
+
 /// What was made of one response.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub struct Arrival {
+pub struct Verdict {
     /// The response, all checks passed, or why it was refused.
     pub outcome: Result<Response, Error>,
     /// Whether a good response from this address came before.
@@ -176,19 +183,19 @@ impl Bus {
     }
 
     /// A response has arrived, or was cut or broken.
-    pub fn push(&mut self, raw: Result<RawResponse, Error>) -> Arrival {
+    pub fn push(&mut self, raw: Result<RawResponse, Error>) -> Verdict {
         self.take(raw.and_then(|raw| Response::parse(&self.expected, &raw)))
     }
 
     /// A response has arrived as words, the content bits of one frame each.
     #[inline(always)]
-    pub fn push_words(&mut self, words: &[u16], order: BitOrder) -> Arrival {
+    pub fn push_words(&mut self, words: &[u16], order: BitOrder) -> Verdict {
         self.take(Response::parse_words(&self.expected, words, order))
     }
 
     /// A response that was judged already.
     #[inline(always)]
-    pub(crate) fn take(&mut self, outcome: Result<Response, Error>) -> Arrival {
+    pub(crate) fn take(&mut self, outcome: Result<Response, Error>) -> Verdict {
         let (mut duplicate, mut extra) = (false, false);
         match outcome {
             Ok(response) => {
@@ -204,7 +211,7 @@ impl Bus {
             }
             Err(_) => self.damaged = self.damaged.saturating_add(1),
         }
-        Arrival { outcome, duplicate, extra }
+        Verdict { outcome, duplicate, extra }
     }
 
     /// What came from this address.

@@ -1,128 +1,78 @@
-use core::fmt;
-
 use crate::layout::Layout;
 
-/// What a request asks for: the command codes (CC) 0 to 30. Code 31 is unassigned.
-///
-/// MT in the names is "multiple transmission", several encoders answer one request; it has nothing to do with turns.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-#[cfg_attr(feature = "arbitrary", derive(arbitrary::Arbitrary))]
-#[repr(u8)]
-#[non_exhaustive]
-pub enum Command {
-    /// Reads the whole position, single turn and turns.
-    Abs40 = 0,
-    /// Reads the low 24 bits of the position.
-    Abs24Low = 1,
-    /// Reads bits 16 to 39 of the position.
-    Abs24High = 2,
-    /// Reads the alarms.
-    Status = 3,
-    /// [`Abs40`](Self::Abs40) of several encoders.
-    Abs40Mt = 4,
-    /// [`Abs24Low`](Self::Abs24Low) of several encoders.
-    Abs24LowMt = 5,
-    /// [`Abs24High`](Self::Abs24High) of several encoders.
-    Abs24HighMt = 6,
-    /// [`Status`](Self::Status) of several encoders.
-    StatusMt = 7,
-    /// Clears the alarms. Takes effect after eight requests in succession.
-    ClearStatus = 8,
-    /// Clears the turns. Takes effect after eight requests in succession.
-    ClearMultiturn = 9,
-    /// Clears alarms and turns. Takes effect after eight requests in succession.
-    ClearStatusMultiturn = 10,
-    /// Gives the only encoder on the line the address in EA. Takes effect after eight requests in succession.
-    SetAddress1 = 11,
-    /// Makes the present position the single-turn zero. **Shifts the commutation angle of the motor.** Takes effect after
-    /// eight requests in succession.
-    ZeroPreset = 12,
-    /// Reads an EEPROM word.
-    EepromRead = 13,
-    /// Writes an EEPROM word.
-    EepromWrite = 14,
-    /// Reads the temperature.
-    Temperature = 15,
-    /// Reads the identification code; with frame code 3 (version 3.0) the velocity coefficient.
-    IdRead1 = 16,
-    /// Reads the identification code of the only encoder on the line, whatever its address.
-    IdRead2 = 17,
-    /// Writes the identification code; with frame code 3 (version 3.0) the velocity coefficient.
-    IdWrite1 = 18,
-    /// Writes the identification code of the only encoder on the line, whatever its address.
-    IdWrite2 = 19,
-    /// Gives the encoder with a certain identification code the address in EA; all others stay silent.
-    SetAddress2 = 20,
-    /// Reads the low 17 bits of the position, the shortest response.
-    Abs17 = 21,
-    /// [`Abs17`](Self::Abs17) of several encoders.
-    Abs17Mt = 22,
-    /// Reads the low 24 bits of the position and the velocity. Version 3.0.
-    Abs24Vel = 23,
-    /// [`Abs24Vel`](Self::Abs24Vel) of several encoders. Version 3.0.
-    Abs24VelMt = 24,
-    /// Reads the low 24 bits of the position, velocity and acceleration. Version 3.0.
-    Abs24VelAcc = 25,
-    /// [`Abs24VelAcc`](Self::Abs24VelAcc) of several encoders. Version 3.0.
-    Abs24VelAccMt = 26,
-    /// Reads the low 24 bits of the position and the alarms.
-    Abs24Status = 27,
-    /// [`Abs24Status`](Self::Abs24Status) of several encoders.
-    Abs24StatusMt = 28,
-    /// Reads the low 24 bits of the position and the temperature.
-    Abs24Temp = 29,
-    /// [`Abs24Temp`](Self::Abs24Temp) of several encoders.
-    Abs24TempMt = 30,
+servowire_core::codes! {
+    /// What a request asks for: the command codes (CC) 0 to 30. Code 31 is unassigned.
+    ///
+    /// MT in the names is "multiple transmission", several encoders answer one request; it has nothing to do with turns.
+    #[non_exhaustive]
+    pub enum Command: u8 {
+        /// Reads the whole position, single turn and turns.
+        Abs40 = 0 => "ABS40",
+        /// Reads the low 24 bits of the position.
+        Abs24Low = 1 => "ABS24_LOW",
+        /// Reads bits 16 to 39 of the position.
+        Abs24High = 2 => "ABS24_HIGH",
+        /// Reads the alarms.
+        Status = 3 => "STATUS",
+        /// [`Abs40`](Self::Abs40) of several encoders.
+        Abs40Mt = 4 => "ABS40_MT",
+        /// [`Abs24Low`](Self::Abs24Low) of several encoders.
+        Abs24LowMt = 5 => "ABS24_LOW_MT",
+        /// [`Abs24High`](Self::Abs24High) of several encoders.
+        Abs24HighMt = 6 => "ABS24_HIGH_MT",
+        /// [`Status`](Self::Status) of several encoders.
+        StatusMt = 7 => "STATUS_MT",
+        /// Clears the alarms. Takes effect after eight requests in succession.
+        ClearStatus = 8 => "CLEAR_STATUS",
+        /// Clears the turns. Takes effect after eight requests in succession.
+        ClearMultiturn = 9 => "CLEAR_MULTITURN",
+        /// Clears alarms and turns. Takes effect after eight requests in succession.
+        ClearStatusMultiturn = 10 => "CLEAR_STATUS_MULTITURN",
+        /// Gives the only encoder on the line the address in EA. Takes effect after eight requests in succession.
+        SetAddress1 = 11 => "SET_ADDRESS_1",
+        /// Makes the present position the single-turn zero. **Shifts the commutation angle of the motor.** Takes effect after
+        /// eight requests in succession.
+        ZeroPreset = 12 => "ZERO_PRESET",
+        /// Reads an EEPROM word.
+        EepromRead = 13 => "EEPROM_READ",
+        /// Writes an EEPROM word.
+        EepromWrite = 14 => "EEPROM_WRITE",
+        /// Reads the temperature.
+        Temperature = 15 => "TEMPERATURE",
+        /// Reads the identification code; with frame code 3 (version 3.0) the velocity coefficient.
+        IdRead1 = 16 => "ID_READ_1",
+        /// Reads the identification code of the only encoder on the line, whatever its address.
+        IdRead2 = 17 => "ID_READ_2",
+        /// Writes the identification code; with frame code 3 (version 3.0) the velocity coefficient.
+        IdWrite1 = 18 => "ID_WRITE_1",
+        /// Writes the identification code of the only encoder on the line, whatever its address.
+        IdWrite2 = 19 => "ID_WRITE_2",
+        /// Gives the encoder with a certain identification code the address in EA; all others stay silent.
+        SetAddress2 = 20 => "SET_ADDRESS_2",
+        /// Reads the low 17 bits of the position, the shortest response.
+        Abs17 = 21 => "ABS17",
+        /// [`Abs17`](Self::Abs17) of several encoders.
+        Abs17Mt = 22 => "ABS17_MT",
+        /// Reads the low 24 bits of the position and the velocity. Version 3.0.
+        Abs24Vel = 23 => "ABS24_VEL",
+        /// [`Abs24Vel`](Self::Abs24Vel) of several encoders. Version 3.0.
+        Abs24VelMt = 24 => "ABS24_VEL_MT",
+        /// Reads the low 24 bits of the position, velocity and acceleration. Version 3.0.
+        Abs24VelAcc = 25 => "ABS24_VEL_ACC",
+        /// [`Abs24VelAcc`](Self::Abs24VelAcc) of several encoders. Version 3.0.
+        Abs24VelAccMt = 26 => "ABS24_VEL_ACC_MT",
+        /// Reads the low 24 bits of the position and the alarms.
+        Abs24Status = 27 => "ABS24_STATUS",
+        /// [`Abs24Status`](Self::Abs24Status) of several encoders.
+        Abs24StatusMt = 28 => "ABS24_STATUS_MT",
+        /// Reads the low 24 bits of the position and the temperature.
+        Abs24Temp = 29 => "ABS24_TEMP",
+        /// [`Abs24Temp`](Self::Abs24Temp) of several encoders.
+        Abs24TempMt = 30 => "ABS24_TEMP_MT",
+    }
 }
 
 impl Command {
-    /// All 31, in the order of their codes.
-    pub const ALL: [Self; 31] = [
-        Self::Abs40,
-        Self::Abs24Low,
-        Self::Abs24High,
-        Self::Status,
-        Self::Abs40Mt,
-        Self::Abs24LowMt,
-        Self::Abs24HighMt,
-        Self::StatusMt,
-        Self::ClearStatus,
-        Self::ClearMultiturn,
-        Self::ClearStatusMultiturn,
-        Self::SetAddress1,
-        Self::ZeroPreset,
-        Self::EepromRead,
-        Self::EepromWrite,
-        Self::Temperature,
-        Self::IdRead1,
-        Self::IdRead2,
-        Self::IdWrite1,
-        Self::IdWrite2,
-        Self::SetAddress2,
-        Self::Abs17,
-        Self::Abs17Mt,
-        Self::Abs24Vel,
-        Self::Abs24VelMt,
-        Self::Abs24VelAcc,
-        Self::Abs24VelAccMt,
-        Self::Abs24Status,
-        Self::Abs24StatusMt,
-        Self::Abs24Temp,
-        Self::Abs24TempMt,
-    ];
-
-    /// The command code, 0..=30.
-    pub const fn code(self) -> u8 {
-        self as u8
-    }
-
-    /// The command with this code; `None` for 31 and all numbers above.
-    pub fn from_code(code: u8) -> Option<Self> {
-        Self::ALL.get(usize::from(code)).copied()
-    }
-
     /// Whether encoders of `version` know the command.
     pub fn is_in(self, version: Version) -> bool {
         self.min_version() <= version
@@ -195,43 +145,6 @@ impl Command {
         matches!(self, Self::Abs17 | Self::Abs17Mt)
     }
 
-    /// The name in capitals, as vendor tools print it.
-    pub const fn mnemonic(self) -> &'static str {
-        match self {
-            Self::Abs40 => "ABS40",
-            Self::Abs24Low => "ABS24_LOW",
-            Self::Abs24High => "ABS24_HIGH",
-            Self::Status => "STATUS",
-            Self::Abs40Mt => "ABS40_MT",
-            Self::Abs24LowMt => "ABS24_LOW_MT",
-            Self::Abs24HighMt => "ABS24_HIGH_MT",
-            Self::StatusMt => "STATUS_MT",
-            Self::ClearStatus => "CLEAR_STATUS",
-            Self::ClearMultiturn => "CLEAR_MULTITURN",
-            Self::ClearStatusMultiturn => "CLEAR_STATUS_MULTITURN",
-            Self::SetAddress1 => "SET_ADDRESS_1",
-            Self::ZeroPreset => "ZERO_PRESET",
-            Self::EepromRead => "EEPROM_READ",
-            Self::EepromWrite => "EEPROM_WRITE",
-            Self::Temperature => "TEMPERATURE",
-            Self::IdRead1 => "ID_READ_1",
-            Self::IdRead2 => "ID_READ_2",
-            Self::IdWrite1 => "ID_WRITE_1",
-            Self::IdWrite2 => "ID_WRITE_2",
-            Self::SetAddress2 => "SET_ADDRESS_2",
-            Self::Abs17 => "ABS17",
-            Self::Abs17Mt => "ABS17_MT",
-            Self::Abs24Vel => "ABS24_VEL",
-            Self::Abs24VelMt => "ABS24_VEL_MT",
-            Self::Abs24VelAcc => "ABS24_VEL_ACC",
-            Self::Abs24VelAccMt => "ABS24_VEL_ACC_MT",
-            Self::Abs24Status => "ABS24_STATUS",
-            Self::Abs24StatusMt => "ABS24_STATUS_MT",
-            Self::Abs24Temp => "ABS24_TEMP",
-            Self::Abs24TempMt => "ABS24_TEMP_MT",
-        }
-    }
-
     /// The two layouts in which the command may be answered, the one of version 2.1 first: for tools that have no request and
     /// no resolution at hand. Twice the same where there is but one.
     pub const fn layouts(self) -> [Layout; 2] {
@@ -259,18 +172,11 @@ impl Command {
     }
 }
 
-impl fmt::Display for Command {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(self.mnemonic())
-    }
-}
-
 /// Version of the protocol that an encoder speaks.
 ///
 /// Version 3.0 adds velocity, acceleration, EEPROM banks, predictive maintenance and a second sensor unit. It is known
 /// from one vendor's driver sources alone; no capture of it was published.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "arbitrary", derive(arbitrary::Arbitrary))]
 #[non_exhaustive]
@@ -281,14 +187,20 @@ pub enum Version {
     V3_0,
 }
 
-impl fmt::Display for Version {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(match self {
+impl Version {
+    /// Both, the older one first.
+    pub const ALL: [Self; 2] = [Self::V2_1, Self::V3_0];
+
+    /// `2.1` or `3.0`.
+    pub const fn name(self) -> &'static str {
+        match self {
             Self::V2_1 => "2.1",
             Self::V3_0 => "3.0",
-        })
+        }
     }
 }
+
+servowire_core::one_line!(Version { version => "{}", version.name(); });
 
 #[cfg(test)]
 mod tests {
@@ -306,7 +218,7 @@ mod tests {
         assert!(Command::ALL.into_iter().filter(|c| c.repeats() == 8).map(Command::code).eq(8..=12));
         assert!(Command::ALL.into_iter().filter(|c| c.effect().is_some()).map(Command::code).eq(8..=12));
         for command in Command::ALL {
-            assert_eq!(command.mnemonic().ends_with("_MT"), command.is_multi_response());
+            assert_eq!(command.name().ends_with("_MT"), command.is_multi_response());
         }
     }
 }

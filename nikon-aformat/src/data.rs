@@ -1,5 +1,3 @@
-use core::fmt;
-
 use servowire_core::U24;
 
 use crate::layout::Layout;
@@ -90,31 +88,22 @@ impl Data {
     }
 }
 
-impl fmt::Display for Data {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match *self {
-            Self::Abs40 { abs } => write!(f, "ABS {:#012x}", abs.get()),
-            Self::Abs24 { abs } => write!(f, "ABS {:#08x}", abs.get()),
-            Self::Abs24High { abs } => write!(f, "ABS high {:#08x}", abs.get()),
-            Self::Status { alm, pm_alm } if pm_alm.is_empty() => write!(f, "ALM {alm}"),
-            Self::Status { alm, pm_alm } => write!(f, "ALM {alm} PM-ALM {pm_alm}"),
-            Self::Eeprom { data, address } => write!(f, "address {address:#04x} data {data:#06x}"),
-            Self::EepromBank { bank_error: true, bank, .. } => write!(f, "no bank {bank:#04x}"),
-            Self::EepromBank { data, bank, address, .. } => {
-                write!(f, "bank {bank:#04x} address {address:#04x} data {data:#06x}")
-            }
-            Self::Temperature { temperature } => write!(f, "temperature {temperature}"),
-            Self::Id { id } => write!(f, "ID {:#08x}", id.get()),
-            Self::Coefficient { coefficient } => write!(f, "coefficient {coefficient}"),
-            Self::Abs24Status { abs, alm } => write!(f, "ABS {:#08x} ALM {alm}", abs.get()),
-            Self::Abs24Temp { abs, temperature } => write!(f, "ABS {:#08x} temperature {temperature}", abs.get()),
-            Self::Abs24Vel { abs, velocity } => write!(f, "ABS {:#08x} velocity {velocity}", abs.get()),
-            Self::Abs24VelAcc { abs, velocity, acceleration } => {
-                write!(f, "ABS {:#08x} velocity {velocity} acceleration {acceleration}", abs.get())
-            }
-            Self::Abs40Vel { abs, velocity } => write!(f, "ABS {:#012x} velocity {velocity}", abs.get()),
-        }
-    }
-}
-
-servowire_core::format_as_displayed!(Data);
+servowire_core::one_line!(Data {
+    Self::Abs40 { abs } => "ABS {:#012x}", abs.get();
+    Self::Abs24 { abs } => "ABS {:#08x}", abs.get();
+    Self::Abs24High { abs } => "ABS high {:#08x}", abs.get();
+    Self::Status { alm, pm_alm } if pm_alm.is_empty() => "ALM {}", alm;
+    Self::Status { alm, pm_alm } => "ALM {} PM-ALM {}", alm, pm_alm;
+    Self::Eeprom { data, address } => "address {:#04x} data {:#06x}", *address, *data;
+    Self::EepromBank { bank_error: true, bank, .. } => "no bank {:#04x}", *bank;
+    Self::EepromBank { data, bank, address, .. } => "bank {:#04x} address {:#04x} data {:#06x}", *bank, *address, *data;
+    Self::Temperature { temperature } => "temperature {}", temperature;
+    Self::Id { id } => "ID {:#08x}", id.get();
+    Self::Coefficient { coefficient } => "coefficient {}", coefficient;
+    Self::Abs24Status { abs, alm } => "ABS {:#08x} ALM {}", abs.get(), alm;
+    Self::Abs24Temp { abs, temperature } => "ABS {:#08x} temperature {}", abs.get(), temperature;
+    Self::Abs24Vel { abs, velocity } => "ABS {:#08x} velocity {}", abs.get(), velocity;
+    Self::Abs24VelAcc { abs, velocity, acceleration } =>
+        "ABS {:#08x} velocity {} acceleration {}", abs.get(), velocity, acceleration;
+    Self::Abs40Vel { abs, velocity } => "ABS {:#012x} velocity {}", abs.get(), velocity;
+});

@@ -1,6 +1,6 @@
 //! The encoder's side without I/O: what a simulator or a test bench runs.
 //!
-//! A [`Device`] takes a request frame by frame and says what it answers and when; an [`Encoders`] is several of them on
+//! A [`Device`] hears a request, frame by frame or all at once, and says what it answers and when; an [`Encoders`] is several of them on
 //! one line. Position, alarms, temperature and the rest are set from outside; EEPROM, addresses, eight-fold resets and
 //! busy times are its own. Faults can be switched on to see what a master makes of them.
 //!
@@ -16,20 +16,20 @@
 //! let mut encoder = Device::<1>::new(EncoderAddress::ZERO, Resolution::default(), BitRate::Mbit4);
 //! encoder.set_position(0x1_2345, 7);
 //! let request = Request::new(EncoderAddress::ZERO, Operation::Abs40);
-//! let frames = request.emit();
-//! let [cdf] = frames.as_slice() else { panic!("one frame") };
-//! // the delimiter of the frame at 4.5 us
-//! let answer = encoder.frame(cdf.content(), 4_500).expect("an answer");
-//! assert_eq!(answer.at_ns, 4_500 + 2_800);
-//! assert_eq!(answer.raw.frames(), 4);
+//! // the delimiter of its only frame at 4.5 us
+//! let answer = encoder.hear(request.emit().units().as_slice(), 4_500).expect("an answer");
+//! assert_eq!((answer.start_ns, answer.end_ns), (7_300, 25_300));
+//! assert_eq!(answer.frames.frames(), 4);
 //! ```
 
 mod behaviour;
 mod encoders;
 mod memory;
+mod transmission;
 
-pub use behaviour::{Behaviour, Ea, Restart, Shows};
+pub use behaviour::{Behaviour, Ea, FirstRead, Restart, ShownAddress, Shows};
 pub use encoders::Encoders;
+pub use transmission::{Fault, Transmission};
 
 use nrz_line::Window;
 
@@ -41,7 +41,6 @@ use crate::frame::RequestFrame;
 use crate::layout::FRAME_BITS;
 use crate::number::{EncoderAddress, EncoderId, U10, U19};
 use crate::operation::Operation;
-use crate::raw_response::RawResponse;
 use crate::request::{Frames, Request};
 use crate::resolution::Resolution;
 use crate::response::Response;
@@ -60,42 +59,15 @@ const BUSY_NS: u32 = 30_000_000;
 /// The frames of another encoder's response follow each other within this many bits.
 const RESPONSE_PAUSE_BITS: u32 = 4;
 
-/// A fault that the encoder or its line is made to have.
+/// What the resets of an encoder have set to 0.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-#[cfg_attr(feature = "arbitrary", derive(arbitrary::Arbitrary))]
-#[non_exhaustive]
-pub enum Fault {
-    /// None.
-    #[default]
-    None,
-    /// It does not answer.
-    Silent,
-    /// Bit `at` of the response's line bits is inverted; nothing happens if the response is shorter.
-    FlipBit {
-        /// Index, 0..=107.
-        at: u8,
-    },
-    /// The line ends after this many bits of the response.
-    CutAfter {
-        /// Bits that are sent.
-        bits: u8,
-    },
-    /// The CRC-8 of the response is inverted.
-    BadCrc,
-}
-
-/// What an encoder sends, and when its start bit begins.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub struct Transmission {
-    /// The frames as they were meant.
-    pub raw: RawResponse,
-    /// The line bits, with the fault.
-    pub line: Window,
-    /// Time of the first start bit.
-    pub at_ns: u64,
+pub struct Zero {
+    /// The single-turn position that counts as 0.
+    pub single_turn: u32,
+    /// The turn that counts as 0.
+    pub turns: u32,
 }
 
 /// An encoder with `BANKS` banks of 256 EEPROM words; one bank is what version 2.1 has.
@@ -107,9 +79,8 @@ pub struct Device<const BANKS: usize> {
     id: EncoderId,
     single_turn: u32,
     turns: u32,
-    /// Subtracted from the position: what the resets have set to 0.
-    zero: u32,
-    turns_zero: u32,
+    /// Subtracted from the position.
+    zero: Zero,
     velocity: i32,
     acceleration: i16,
     coefficient: U19,
@@ -142,8 +113,7 @@ impl<const BANKS: usize> Device<BANKS> {
             id: EncoderId::truncate(0),
             single_turn: 0,
             turns: 0,
-            zero: 0,
-            turns_zero: 0,
+            zero: Zero { single_turn: 0, turns: 0 },
             velocity: 0,
             acceleration: 0,
             coefficient: U19::truncate(0),
@@ -206,19 +176,19 @@ impl<const BANKS: usize> Device<BANKS> {
         self.pm_alm = pm_alm;
     }
 
-    /// The causes of alarms come or go. An alarm stays set until a reset finds its cause gone; BUSY clears by itself.
-    pub const fn set_alarms(&mut self, alarms: Alm, present: bool) {
-        let by_itself = alarms.intersection(Alm::BUSY.union(Alm::BUSY_S));
-        if present {
-            self.causes = self.causes.union(alarms);
-            self.alm = self.alm.union(alarms);
-        } else {
-            self.causes = self.causes.difference(alarms);
-            self.alm = self.alm.difference(by_itself);
-        }
+    /// The cause of these alarms comes: they are set.
+    pub const fn raise_alarms(&mut self, alarms: Alm) {
+        self.causes = self.causes.union(alarms);
+        self.alm = self.alm.union(alarms);
     }
 
-    /// Decides what the documents leave open.
+    /// The cause of these alarms goes. An alarm stays set until a reset finds its cause gone; BUSY clears by itself.
+    pub const fn end_alarms(&mut self, alarms: Alm) {
+        self.causes = self.causes.difference(alarms);
+        self.alm = self.alm.difference(alarms.intersection(Alm::BUSY.union(Alm::BUSY_S)));
+    }
+
+    /// Decides from now on what the documents leave open.
     pub const fn set_behaviour(&mut self, behaviour: Behaviour) {
         self.behaviour = behaviour;
     }
@@ -243,19 +213,34 @@ impl<const BANKS: usize> Device<BANKS> {
         self.memory.set(bank, address, data);
     }
 
-    /// What the resets have set to 0: counts in the turn, and turns.
-    pub const fn zero(&self) -> (u32, u32) {
-        (self.zero, self.turns_zero)
+    /// What the resets have set to 0.
+    pub const fn zero(&self) -> Zero {
+        self.zero
     }
 
     /// The position as a response carries it.
     pub const fn abs(&self) -> crate::number::U40 {
-        self.resolution.compose(self.single_turn.wrapping_sub(self.zero), self.turns.wrapping_sub(self.turns_zero))
+        let Zero { single_turn, turns } = self.zero;
+        self.resolution.compose(self.single_turn.wrapping_sub(single_turn), self.turns.wrapping_sub(turns))
     }
 
-    /// A frame was received whose start bit and delimiter are right, its delimiter at `now_ns`; `content` are its bits, the first
-    /// of the line in bit 0. Gives the answer once a request is complete.
-    pub fn frame(&mut self, content: u16, now_ns: u64) -> Option<Transmission> {
+    /// Frames were heard one after the other, without pauses, the last delimiter at `end_ns`: content bits, the first of the line
+    /// in bit 0, or `None` for one whose delimiter reads 0. Gives the answer once a request is complete.
+    pub fn hear(&mut self, frames: &[Option<u16>], end_ns: u64) -> Option<Transmission> {
+        let frame_ns = u64::from(self.rate.bits_ns(FRAME_BITS));
+        let (mut answer, mut left) = (None, u64::try_from(frames.len()).unwrap_or(u64::MAX));
+        for frame in frames {
+            left = left.saturating_sub(1);
+            let ended_ns = end_ns.saturating_sub(frame_ns.saturating_mul(left));
+            match *frame {
+                Some(content) => answer = self.frame(content, ended_ns).or(answer),
+                None => self.framing_error(ended_ns),
+            }
+        }
+        answer
+    }
+
+    fn frame(&mut self, content: u16, now_ns: u64) -> Option<Transmission> {
         if self.is_deaf(now_ns) {
             return None;
         }
@@ -278,15 +263,15 @@ impl<const BANKS: usize> Device<BANKS> {
             }
             Ok(request) => {
                 self.len = 0;
-                let response = self.answer(request, now_ns)?;
+                let response = self.act(request, now_ns)?;
                 self.send(request, response, now_ns)
             }
         }
     }
 
-    /// A frame was received whose delimiter reads 0: the request is damaged.
-    pub fn framing_error(&mut self, now_ns: u64) {
-        if !self.is_deaf(now_ns) {
+    /// A frame was heard whose delimiter, at `end_ns`, reads 0: the request is damaged.
+    pub fn framing_error(&mut self, end_ns: u64) {
+        if !self.is_deaf(end_ns) {
             self.misheard();
         }
     }
@@ -316,8 +301,13 @@ impl<const BANKS: usize> Device<BANKS> {
         false
     }
 
-    /// What a sound request does, and the answer to it; `None` if it is for another encoder or not understood.
+    /// What a sound request does, and the answer to it; `None` if it is for another encoder or not understood, or with
+    /// [`Fault::Silent`].
     pub fn answer(&mut self, request: Request, now_ns: u64) -> Option<Response> {
+        self.act(request, now_ns).filter(|_| self.fault != Fault::Silent)
+    }
+
+    fn act(&mut self, request: Request, now_ns: u64) -> Option<Response> {
         self.count(request);
         if request.check(self.resolution).is_err() || !self.is_meant(request) {
             return None;
@@ -368,10 +358,12 @@ impl<const BANKS: usize> Device<BANKS> {
             memory => self.access(memory, request.ea, now_ns)?,
         };
         // An access makes the memory busy, and its response shows it.
-        let hidden = is_first_read && !self.behaviour.busy_in_first_read;
+        let hidden = is_first_read && self.behaviour.first_read == FirstRead::Ready;
         let alm = if hidden { self.alm } else { self.alm(now_ns) };
         let ea = match request.command() {
-            Command::SetAddress1 | Command::SetAddress2 if self.behaviour.shows_new_address => request.ea,
+            Command::SetAddress1 | Command::SetAddress2 if self.behaviour.shown_address == ShownAddress::New => {
+                request.ea
+            }
             Command::SetAddress1 | Command::SetAddress2 => old,
             _ => self.ea,
         };
@@ -406,12 +398,12 @@ impl<const BANKS: usize> Device<BANKS> {
         self.repeats = 0;
         self.memory.busy(now_ns, BUSY_NS);
         match command {
-            Command::ZeroPreset => self.zero = self.single_turn,
+            Command::ZeroPreset => self.zero.single_turn = self.single_turn,
             Command::SetAddress1 => self.ea = request.ea,
             _ => {}
         }
         if matches!(command, Command::ClearMultiturn | Command::ClearStatusMultiturn) {
-            self.turns_zero = self.turns;
+            self.zero.turns = self.turns;
         }
         if matches!(command, Command::ClearStatus | Command::ClearStatusMultiturn) {
             self.alm = self.causes;
@@ -469,8 +461,8 @@ impl<const BANKS: usize> Device<BANKS> {
 
     /// The line bits of an answer with the fault that is switched on.
     fn send(&self, request: Request, response: Response, now_ns: u64) -> Option<Transmission> {
-        let raw = response.emit();
-        let good = raw.line();
+        let frames = response.emit();
+        let good = frames.line();
         let crc = 0xff << good.len().saturating_sub(9);
         let line = match self.fault {
             Fault::Silent => None,
@@ -480,11 +472,13 @@ impl<const BANKS: usize> Device<BANKS> {
             Fault::None | Fault::FlipBit { .. } => Some(good),
             Fault::CutAfter { bits } => Window::from_bits(good.bits(), good.len().min(bits.into())),
             Fault::BadCrc => Window::from_bits(good.bits() ^ crc, good.len()),
-        };
+        }?;
         let place = self.behaviour.place.unwrap_or(self.ea.get());
         let slot = if request.command().is_multi_response() { place } else { 0 };
         let slot_ns = self.rate.bits_ns(good.len()).saturating_add(self.rate.response_gap_ns());
-        let wait = self.behaviour.turn_around_ns.saturating_add(slot_ns.saturating_mul(slot.into()));
-        Some(Transmission { raw, line: line?, at_ns: now_ns.saturating_add(wait.into()) })
+        let wait = self.behaviour.response_delay_ns.saturating_add(slot_ns.saturating_mul(slot.into()));
+        let start_ns = now_ns.saturating_add(wait.into());
+        let end_ns = start_ns.saturating_add(self.rate.bits_ns(line.len()).into());
+        Some(Transmission { frames, line, start_ns, end_ns })
     }
 }

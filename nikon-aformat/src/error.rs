@@ -155,13 +155,7 @@ servowire_core::errors! {
         /// MEMERR is set: an access to the EEPROM failed.
         #[error("the encoder reports a failed access to its EEPROM")]
         MemoryFault = 22,
-        /// A position has bits set above the width of the encoder: the wrong resolution.
-        #[error("the position has bits set above bit {width} that this encoder leaves 0")]
-        UpperBits = 23 {
-            /// Single-turn and turn bits of the resolution together.
-            width: u8,
-        },
-        /// The response does not carry what the resolution was asked to make of it.
+        /// The response is sound and to something else than a procedure has asked for.
         #[error("the response carries no such value")]
         NotCarried = 24,
         /// A `nom` combinator of the caller refused the input.
@@ -219,15 +213,22 @@ pub enum EchoField {
     Coefficient,
 }
 
-impl fmt::Display for EchoField {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(match self {
+impl EchoField {
+    /// The name in a sentence.
+    pub const fn name(self) -> &'static str {
+        match self {
             Self::Address => "EEPROM address",
             Self::Bank => "EEPROM bank",
             Self::Data => "EEPROM data",
             Self::Id => "identification code",
             Self::Coefficient => "velocity coefficient",
-        })
+        }
+    }
+}
+
+impl fmt::Display for EchoField {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.pad(self.name())
     }
 }
 

@@ -1,5 +1,3 @@
-use core::fmt;
-
 use nrz_line::{BitOrder, Window};
 
 use crate::contents::{apart, framed};
@@ -7,7 +5,6 @@ use crate::crc::crc3;
 use crate::error::Error;
 use crate::layout::FRAME_BITS;
 use crate::number::EncoderAddress;
-use crate::text::write_words;
 
 pub(crate) const START: u128 = 1 | 1 << 18 | 1 << 36 | 1 << 54 | 1 << 72 | 1 << 90;
 pub(crate) const DELIMITER: u128 = START << 17;
@@ -41,31 +38,23 @@ pub(crate) const MAX_FRAMES: u32 = 6;
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(try_from = "u16", into = "u16"))]
 pub struct RequestFrame(u16);
 
-/// The two bits after the sync code of a request frame.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-#[cfg_attr(feature = "arbitrary", derive(arbitrary::Arbitrary))]
-#[repr(u8)]
-pub enum FrameCode {
-    /// CDF; MDF3 in version 3.0.
-    Fc0 = 0,
-    /// MDF0.
-    Fc1 = 1,
-    /// MDF1.
-    Fc2 = 2,
-    /// MDF2; a CDF for banks and the velocity coefficient in version 3.0.
-    Fc3 = 3,
+servowire_core::codes! {
+    /// The two bits after the sync code of a request frame.
+    pub enum FrameCode: u8 {
+        /// CDF; MDF3 in version 3.0.
+        Fc0 = 0 => "FC0",
+        /// MDF0.
+        Fc1 = 1 => "FC1",
+        /// MDF1.
+        Fc2 = 2 => "FC2",
+        /// MDF2; a CDF for banks and the velocity coefficient in version 3.0.
+        Fc3 = 3 => "FC3",
+    }
 }
 
 impl FrameCode {
     /// The frame code of MDF0, MDF1, MDF2 and MDF3.
     pub const MDF: [Self; 4] = [Self::Fc1, Self::Fc2, Self::Fc3, Self::Fc0];
-
-    /// The number, 0..=3.
-    pub const fn get(self) -> u8 {
-        self as u8
-    }
 
     const fn truncate(bits: u16) -> Self {
         match bits & 3 {
@@ -244,13 +233,7 @@ pub(crate) fn framing(line: Window, frames: u8) -> Error {
     truncated(line.len(), bits)
 }
 
-impl fmt::Display for RequestFrame {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write_words(f, [self.word(BitOrder::MsbFirst)])
-    }
-}
-
-servowire_core::format_as_displayed!(RequestFrame);
+servowire_core::one_line!(RequestFrame { frame => "{:04X}", frame.word(BitOrder::MsbFirst); });
 
 #[cfg(test)]
 mod tests {
@@ -285,7 +268,7 @@ mod tests {
                 assert!((0..18).all(|k| line.get(k) == Some(want[k as usize])) && line.len() == 18);
                 assert_eq!(RequestFrame::from_line(line), Ok(frame));
                 assert_eq!(frame, RequestFrame::cdf(frame.frame_code(), frame.ea(), frame.code()));
-                assert_eq!((frame.frame_code().get(), frame.byte()), (fc as u8, byte));
+                assert_eq!((frame.frame_code().code(), frame.byte()), (fc as u8, byte));
                 for order in [BitOrder::LsbFirst, BitOrder::MsbFirst] {
                     assert_eq!(RequestFrame::from_word(frame.word(order), order), Ok(frame));
                 }

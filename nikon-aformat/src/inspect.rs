@@ -33,7 +33,7 @@ use crate::response::Response;
 pub use nrz_line::Cause as LineCause;
 
 /// One frame, read without judging it.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct RawFrame {

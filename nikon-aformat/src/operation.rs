@@ -1,5 +1,3 @@
-use core::fmt;
-
 use crate::command::{Command, Version};
 use crate::frame::FrameCode;
 use crate::number::{EncoderId, U19, UserAddress};
@@ -198,34 +196,26 @@ impl Operation {
 
 impl Operation {
     /// The name in capitals: that of the command, but for the four of version 3.0 that share a code with another.
-    pub const fn mnemonic(self) -> &'static str {
+    pub const fn name(self) -> &'static str {
         match self {
             Self::EepromReadBank { .. } => "EEPROM_READ_BANK",
             Self::EepromWriteBank { .. } => "EEPROM_WRITE_BANK",
             Self::CoefficientRead => "VELCOEF_READ",
             Self::CoefficientWrite { .. } => "VELCOEF_WRITE",
-            other => other.command().mnemonic(),
+            other => other.command().name(),
         }
     }
 }
 
-impl fmt::Display for Operation {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(self.mnemonic())?;
-        match *self {
-            Self::EepromRead { address } => write!(f, " address {address:#04x}"),
-            Self::EepromWrite { address, data } => write!(f, " address {address} data {data:#06x}"),
-            Self::EepromReadBank { bank, address } => write!(f, " bank {bank:#04x} address {address:#04x}"),
-            Self::EepromWriteBank { bank, address, data } => {
-                write!(f, " bank {bank:#04x} address {address:#04x} data {data:#06x}")
-            }
-            Self::IdWrite1 { id } | Self::IdWrite2 { id } | Self::SetAddress2 { id } => {
-                write!(f, " ID {:#08x}", id.get())
-            }
-            Self::CoefficientWrite { coefficient } => write!(f, " coefficient {coefficient}"),
-            _ => Ok(()),
-        }
-    }
-}
-
-servowire_core::format_as_displayed!(Operation);
+servowire_core::one_line!(Operation {
+    Self::EepromRead { address } => "EEPROM_READ address {:#04x}", *address;
+    Self::EepromWrite { address, data } => "EEPROM_WRITE address {:#04x} data {:#06x}", address.get(), *data;
+    Self::EepromReadBank { bank, address } => "EEPROM_READ_BANK bank {:#04x} address {:#04x}", *bank, *address;
+    Self::EepromWriteBank { bank, address, data } =>
+        "EEPROM_WRITE_BANK bank {:#04x} address {:#04x} data {:#06x}", *bank, *address, *data;
+    Self::IdWrite1 { id } => "ID_WRITE_1 ID {:#08x}", id.get();
+    Self::IdWrite2 { id } => "ID_WRITE_2 ID {:#08x}", id.get();
+    Self::SetAddress2 { id } => "SET_ADDRESS_2 ID {:#08x}", id.get();
+    Self::CoefficientWrite { coefficient } => "VELCOEF_WRITE coefficient {}", coefficient;
+    other => "{}", other.name();
+});

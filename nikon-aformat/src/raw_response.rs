@@ -9,6 +9,7 @@ use crate::frame::{MAX_FRAMES, framing, pack, truncated};
 use crate::layout::FRAME_BITS;
 use crate::layout::Layout;
 use crate::text::write_words;
+use crate::units::Units;
 
 /// The frames of one response, 2 to 6: their content bits, framing checked and removed, nothing else judged.
 ///
@@ -80,6 +81,11 @@ impl RawResponse {
     /// The content bits of the frames, the first of the line in bit 0.
     pub fn contents(&self) -> &[u16] {
         self.contents.get(..usize::from(self.frames)).unwrap_or(&self.contents)
+    }
+
+    /// The frames as a receiver hears them.
+    pub fn units(&self) -> Units {
+        self.contents().iter().map(|content| Some(*content)).collect()
     }
 
     /// The content bits as words.

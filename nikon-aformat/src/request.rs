@@ -13,6 +13,7 @@ use crate::number::{EncoderAddress, EncoderId, U19, UserAddress};
 use crate::operation::Operation;
 use crate::resolution::Resolution;
 use crate::text::write_words;
+use crate::units::Units;
 
 #[cfg(test)]
 pub(crate) mod tests;
@@ -96,7 +97,7 @@ impl Request {
             (FrameCode::Fc3, Some(Command::EepromWrite)) => Ok(5),
             (FrameCode::Fc0, Some(_)) | (FrameCode::Fc3, Some(Command::IdRead1)) => Ok(1),
             (FrameCode::Fc0, None) => Err(Error::UnknownCommand { code: cdf.code() }),
-            (got, _) => Err(Error::FrameCode { frame: 0, got: got.get(), want: 0 }),
+            (got, _) => Err(Error::FrameCode { frame: 0, got: got.code(), want: 0 }),
         }
     }
 
@@ -146,7 +147,7 @@ impl Request {
         match self.operation {
             Operation::Abs40 | Operation::Abs40Mt => Layout::Abs40,
             Operation::Abs24Low | Operation::Abs24LowMt => {
-                if resolution.has_low_with_velocity() {
+                if resolution.has_velocity_in_low() {
                     Layout::Abs40Vel
                 } else {
                     Layout::Abs24
@@ -159,7 +160,7 @@ impl Request {
             | Operation::ClearStatusMultiturn
             | Operation::SetAddress1
             | Operation::ZeroPreset => {
-                if resolution.has_resets_with_position() {
+                if resolution.has_position_in_resets() {
                     Layout::Abs24
                 } else {
                     Layout::Status
@@ -230,7 +231,7 @@ fn check_order(memory: &[RequestFrame]) -> Result<(), Error> {
     };
     for (frame, (got, want)) in (1..).zip(memory.iter().zip(order)) {
         if got.frame_code() != *want {
-            return Err(Error::FrameCode { frame, got: got.frame_code().get(), want: want.get() });
+            return Err(Error::FrameCode { frame, got: got.frame_code().code(), want: want.code() });
         }
     }
     Ok(())
@@ -259,6 +260,11 @@ impl Frames {
     /// The frames.
     pub fn as_slice(&self) -> &[RequestFrame] {
         self.frames.get(..usize::from(self.len)).unwrap_or(&self.frames)
+    }
+
+    /// The frames as a receiver hears them.
+    pub fn units(&self) -> Units {
+        self.as_slice().iter().map(|frame| Some(frame.content())).collect()
     }
 
     /// Line bits from the first start bit to the last delimiter, with `gap_bits` idle bits between two frames.
@@ -311,11 +317,7 @@ impl Frames {
     }
 }
 
-impl fmt::Display for Request {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "to {}: {}", self.ea, self.operation)
-    }
-}
+servowire_core::one_line!(Request { Self { ea, operation } => "to {}: {}", ea, operation; });
 
 impl fmt::Display for Frames {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
@@ -323,4 +325,4 @@ impl fmt::Display for Frames {
     }
 }
 
-servowire_core::format_as_displayed!(Request, Frames);
+servowire_core::format_as_displayed!(Frames);

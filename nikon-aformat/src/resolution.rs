@@ -1,11 +1,7 @@
-use core::fmt;
-
 use servowire_core::OutOfRange;
 
 use crate::command::Version;
-use crate::error::Error;
 use crate::number::U40;
-use crate::response::Response;
 
 /// What the line does not say about an encoder: its widths, its version and its factory settings.
 ///
@@ -27,26 +23,17 @@ pub struct Resolution {
     resets_with_position: bool,
 }
 
-/// Where the shaft is, in the units of a [`Resolution`].
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub struct Position {
-    /// Counts in the turn.
-    pub single_turn: u32,
-    /// Turns, from 0 up, as far as the response shows them.
-    pub turns: u32,
-    /// How many bits of the turns the response shows: all, fewer in 24 bits, none in 17.
-    pub turns_bits: u8,
-}
-
 impl Default for Resolution {
     /// 20 + 16 bits, version 3.0, responses as in version 2.1.
     fn default() -> Self {
-        Self { st_bits: 20, mt_bits: 16, version: Version::V3_0, low_with_velocity: false, resets_with_position: false }
+        Self { st_bits: 20, mt_bits: 16, version: Version::V3_0, ..Self::NARROWEST }
     }
 }
 
 impl Resolution {
+    const NARROWEST: Self =
+        Self { st_bits: 1, mt_bits: 0, version: Version::V2_1, low_with_velocity: false, resets_with_position: false };
+
     /// Widths of the single turn (encoders have 17, 20, 22 or 24 bits) and of the turns (16, or 0 without a counter), for
     /// an encoder of version 2.1.
     ///
@@ -66,7 +53,7 @@ impl Resolution {
         if st.saturating_add(mt) > 40 {
             return Err(OutOfRange::above(st.saturating_add(mt), 40));
         }
-        Ok(Self { st_bits, mt_bits, version: Version::V2_1, low_with_velocity: false, resets_with_position: false })
+        Ok(Self { st_bits, mt_bits, ..Self::NARROWEST })
     }
 
     /// The same of another version. Factory settings of version 3.0 are dropped in version 2.1.
@@ -78,12 +65,12 @@ impl Resolution {
     }
 
     /// The same for an encoder of version 3.0 that answers commands 1 and 5 with the whole position and velocity.
-    pub const fn low_with_velocity(self) -> Self {
+    pub const fn with_velocity_in_low(self) -> Self {
         Self { version: Version::V3_0, low_with_velocity: true, ..self }
     }
 
     /// The same for an encoder of version 3.0 that answers the resets, commands 8 to 12, with its position.
-    pub const fn resets_with_position(self) -> Self {
+    pub const fn with_position_in_resets(self) -> Self {
         Self { version: Version::V3_0, resets_with_position: true, ..self }
     }
 
@@ -103,12 +90,12 @@ impl Resolution {
     }
 
     /// Whether commands 1 and 5 are answered with the whole position and velocity.
-    pub const fn has_low_with_velocity(self) -> bool {
+    pub const fn has_velocity_in_low(self) -> bool {
         self.low_with_velocity
     }
 
     /// Whether the resets are answered with the position.
-    pub const fn has_resets_with_position(self) -> bool {
+    pub const fn has_position_in_resets(self) -> bool {
         self.resets_with_position
     }
 
@@ -117,52 +104,20 @@ impl Resolution {
         1_u64.wrapping_shl(self.st_bits as u32)
     }
 
-    /// Takes the position of a response apart, whatever its status says; for control there is [`read`](Self::read).
-    ///
-    /// # Errors
-    /// [`Error::NotCarried`] if the response shows no position from bit 0 up or less than a whole turn, as 17 bits do of a
-    /// 20-bit encoder; [`Error::UpperBits`] if bits are set above the widths of the resolution.
-    pub const fn position(self, response: &Response) -> Result<Position, Error> {
-        match response.abs() {
-            Some(abs) => self.part(abs, response.layout().abs_bits()),
-            None => Err(Error::NotCarried),
-        }
+    /// The counts in the turn of position bits.
+    #[expect(clippy::cast_possible_truncation, reason = "masked to 32 bits at most")]
+    pub(crate) const fn single_turn(self, abs: u64) -> u32 {
+        (abs & self.counts_per_turn().wrapping_sub(1)) as u32
     }
 
-    /// Takes a whole position apart.
-    ///
-    /// # Errors
-    /// [`Error::UpperBits`] if bits are set above the widths of the resolution.
-    pub const fn split(self, abs: U40) -> Result<Position, Error> {
-        self.part(abs.get(), 40)
-    }
-
-    /// The turns of a position as a signed number, if the response showed all bits of them: with 16 bits -32768..=32767.
-    /// Beyond, the counter wraps round and OVFLOW is raised.
-    #[expect(clippy::cast_possible_wrap, reason = "the wrap is the sign")]
-    pub const fn signed_turns(self, position: Position) -> Option<i32> {
-        if position.turns_bits != self.mt_bits || self.mt_bits == 0 {
-            return None;
+    /// The turns of a whole position; their uppermost bit is the sign.
+    #[expect(clippy::cast_possible_truncation, clippy::cast_possible_wrap, reason = "the wrap is the sign")]
+    pub(crate) const fn turns(self, abs: u64) -> i32 {
+        let turns = abs.wrapping_shr(self.st_bits as u32) as u32;
+        match 32_u32.checked_sub(self.mt_bits as u32) {
+            None | Some(32) => 0,
+            Some(unused) => (turns.wrapping_shl(unused) as i32).wrapping_shr(unused),
         }
-        let unused = 32_u32.saturating_sub(self.mt_bits as u32);
-        Some((position.turns.wrapping_shl(unused) as i32).wrapping_shr(unused))
-    }
-
-    /// Of the position bits `abs` the `abs_bits` lowest are there.
-    #[expect(clippy::cast_possible_truncation, reason = "both parts are masked to 32 bits at most")]
-    const fn part(self, abs: u64, abs_bits: u8) -> Result<Position, Error> {
-        if abs_bits < self.st_bits {
-            return Err(Error::NotCarried);
-        }
-        let width = self.st_bits.wrapping_add(self.mt_bits);
-        if width < 64 && abs >> width != 0 {
-            return Err(Error::UpperBits { width });
-        }
-        let room = abs_bits.saturating_sub(self.st_bits);
-        let turns_bits = if room < self.mt_bits { room } else { self.mt_bits };
-        let single_turn = (abs & self.counts_per_turn().wrapping_sub(1)) as u32;
-        let turns = (abs >> self.st_bits & 1_u64.wrapping_shl(turns_bits as u32).wrapping_sub(1)) as u32;
-        Ok(Position { single_turn, turns, turns_bits })
     }
 
     /// The position bits of single turn and turns together.
@@ -223,8 +178,8 @@ impl TryFrom<Written> for Resolution {
 
     fn try_from(written: Written) -> Result<Self, OutOfRange> {
         let resolution = Self::new(written.st_bits, written.mt_bits)?.with_version(written.version);
-        let resolution = if written.low_with_velocity { resolution.low_with_velocity() } else { resolution };
-        Ok(if written.resets_with_position { resolution.resets_with_position() } else { resolution })
+        let resolution = if written.low_with_velocity { resolution.with_velocity_in_low() } else { resolution };
+        Ok(if written.resets_with_position { resolution.with_position_in_resets() } else { resolution })
     }
 }
 
@@ -246,22 +201,9 @@ impl<'a> arbitrary::Arbitrary<'a> for Resolution {
     }
 }
 
-impl fmt::Display for Resolution {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{} + {} bits, version {}", self.st_bits, self.mt_bits, self.version)
-    }
-}
-
-impl fmt::Display for Position {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        if self.turns_bits == 0 {
-            return write!(f, "{} counts", self.single_turn);
-        }
-        write!(f, "turn {}, {} counts", self.turns, self.single_turn)
-    }
-}
-
-servowire_core::format_as_displayed!(Resolution, Position);
+servowire_core::one_line!(Resolution {
+    Self { st_bits, mt_bits, version, .. } => "{} + {} bits, version {}", st_bits, mt_bits, version;
+});
 
 #[cfg(test)]
 mod tests {
@@ -282,26 +224,12 @@ mod tests {
     fn turns_of_any_width_have_a_sign() {
         for mt_bits in 1..=32_u8 {
             let resolution = Resolution::new(8, mt_bits).unwrap();
-            let signed = |turns: u32| resolution.signed_turns(resolution.split(resolution.compose(0, turns)).unwrap());
-            assert_eq!(signed(u32::MAX), Some(-1), "{mt_bits} bits");
-            assert_eq!(signed(1 << (mt_bits - 1)), Some(-1 << (mt_bits - 1)), "{mt_bits} bits");
-            assert_eq!(signed((1 << (mt_bits - 1)) - 1), i32::try_from((1_u32 << (mt_bits - 1)) - 1).ok());
+            let signed = |turns: u32| resolution.turns(resolution.compose(0, turns).get());
+            assert_eq!(signed(u32::MAX), -1, "{mt_bits} bits");
+            assert_eq!(signed(1 << (mt_bits - 1)), -1 << (mt_bits - 1), "{mt_bits} bits");
+            assert_eq!(u32::try_from(signed((1 << (mt_bits - 1)) - 1)), Ok((1 << (mt_bits - 1)) - 1));
         }
-        let none = Resolution::new(24, 0).unwrap();
-        assert_eq!(none.signed_turns(none.split(U40::truncate(5)).unwrap()), None);
-    }
-
-    #[test]
-    fn what_a_response_shows() {
-        let resolution = Resolution::new(20, 16).unwrap();
-        let abs = resolution.compose(0xabcde, 0x8001);
-        let at = |bits: u8| resolution.part(abs.get() & ((1 << bits) - 1), bits);
-        assert_eq!(at(40), Ok(Position { single_turn: 0xabcde, turns: 0x8001, turns_bits: 16 }));
-        assert_eq!(resolution.signed_turns(at(40).unwrap()), Some(-32_767));
-        assert_eq!(at(24), Ok(Position { single_turn: 0xabcde, turns: 1, turns_bits: 4 }));
-        assert_eq!(resolution.signed_turns(at(24).unwrap()), None);
-        assert_eq!(at(17), Err(Error::NotCarried));
-        assert_eq!(resolution.split(U40::truncate(1 << 36)), Err(Error::UpperBits { width: 36 }));
+        assert_eq!(Resolution::new(24, 0).unwrap().turns(5), 0);
     }
 
     proptest! {
@@ -309,8 +237,9 @@ mod tests {
         fn position_is_the_inverse_of_compose(st in 1..=24_u8, mt in 0..=16_u8, single: u32, turns: u32) {
             let resolution = Resolution::new(st, mt).unwrap();
             let (single, turns) = (single & ((1 << st) - 1), turns & ((1 << mt) - 1));
-            let abs = resolution.compose(single, turns);
-            prop_assert_eq!(resolution.split(abs), Ok(Position { single_turn: single, turns, turns_bits: mt }));
+            let abs = resolution.compose(single, turns).get();
+            let turns_mod = i64::from(resolution.turns(abs)).rem_euclid(1 << mt);
+            prop_assert_eq!((resolution.single_turn(abs), turns_mod), (single, i64::from(turns)));
             prop_assert!(resolution.milli_degrees(single) < 360_000);
             prop_assert_eq!(resolution.fraction(single) >> (32 - st), single);
             prop_assert!((resolution.degrees(single) * 1000.0 - f64::from(resolution.milli_degrees(single))).abs() < 1.001);

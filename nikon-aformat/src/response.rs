@@ -1,5 +1,3 @@
-use core::fmt;
-
 use nrz_line::{BitOrder, Window};
 use servowire_core::U24;
 
@@ -303,15 +301,8 @@ fn refusal(expected: &Expected, raw: Result<RawResponse, Error>) -> Error {
     }
 }
 
-impl fmt::Display for Response {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self.body {
-            Body::Abs17 { es_any, abs } => {
-                write!(f, "from {}: ABS17 ES {} ABS {:#07x}", self.ea, if es_any { "any" } else { "-" }, abs.get())
-            }
-            Body::Full { command, es, data } => write!(f, "from {}: {command} ES {es} {data}", self.ea),
-        }
-    }
-}
-
-servowire_core::format_as_displayed!(Response);
+servowire_core::one_line!(Response {
+    Self { ea, body: Body::Abs17 { es_any: true, abs } } => "from {}: ABS17 ES any ABS {:#07x}", ea, abs.get();
+    Self { ea, body: Body::Abs17 { es_any: false, abs } } => "from {}: ABS17 ES - ABS {:#07x}", ea, abs.get();
+    Self { ea, body: Body::Full { command, es, data } } => "from {}: {} ES {} {}", ea, command, es, data;
+});

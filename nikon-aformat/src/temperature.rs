@@ -1,5 +1,3 @@
-use core::fmt;
-
 use crate::number::U10;
 
 /// A temperature, 10 bits of 0.25 degrees Celsius.
@@ -44,15 +42,10 @@ impl Temperature {
     }
 }
 
-/// The unsigned reading in degrees Celsius, `77.50 C`.
-impl fmt::Display for Temperature {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let raw = self.raw();
-        write!(f, "{}.{:02} C", raw >> 2, (raw & 3).wrapping_mul(25))
-    }
-}
-
-servowire_core::format_as_displayed!(Temperature);
+// The unsigned reading in degrees Celsius, `77.50 C`.
+servowire_core::one_line!(Temperature {
+    temperature => "{}.{:02} C", temperature.raw() >> 2, (temperature.raw() & 3).wrapping_mul(25);
+});
 
 #[cfg(test)]
 mod tests {

@@ -1,5 +1,3 @@
-use core::fmt;
-
 use crate::resolution::Resolution;
 
 /// EEPROM word 0xf6: what kind of encoder it is.
@@ -129,16 +127,10 @@ impl TypeWord {
     }
 }
 
-impl fmt::Display for TypeWord {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self.resolution() {
-            Some(known) => write!(f, "{} + {} bits", known.st_bits(), known.mt_bits()),
-            None => write!(f, "type word {:04x}h of unknown meaning", self.0),
-        }
-    }
-}
-
-servowire_core::format_as_displayed!(TypeWord);
+servowire_core::one_line!(TypeWord {
+    word if word.resolution().is_some() => "{} + {} bits", word.st_bits().unwrap_or(0), word.mt_bits().unwrap_or(0);
+    word => "type word {:04x}h of unknown meaning", word.0;
+});
 
 #[cfg(test)]
 mod tests {

@@ -10,12 +10,12 @@
 
 use nikon_aformat::bus::Addresses;
 use nikon_aformat::master::{
-    BusTransaction, Detection, EepromRead, Exchange, GuardedReset, Line, Polling, Progress, Reset, Sampled, Step,
-    Transaction, VerifiedWrite, Write,
+    BusTransaction, Detection, EepromRead, Exchange, GuardedReset, Line, Polling, Progress, Reset, Step, Transaction,
+    VerifiedWrite, Write,
 };
 use nikon_aformat::{
     Alm, BitRate, Command, Data, Doubt, EncoderAddress, EncoderId, EncoderStatus, Error, Operation, PmAlm, Policy,
-    Request, Resolution, Response, U17, U19, U40, UserAddress,
+    Request, Resolution, Response, Sample, Tolerated, U17, U19, U40, UserAddress,
 };
 
 const LOST: Result<Response, Error> = Err(Error::NoResponse);
@@ -241,10 +241,10 @@ fn a_guarded_reset_waits_for_a_busy_encoder() {
 #[test]
 fn a_position_from_the_future_is_as_old_as_it_is_far_away() {
     let response = Response::abs17(THREE, EncoderStatus::empty(), U17::truncate(77));
-    let sampled = Sampled { earliest_ns: 5_000_000_000, latest_ns: 5_000_003_000 };
-    let exchange = Exchange { response, sampled };
-    let policy = Policy::STRICT.with_max_age_ns(125_000);
-    let at = |now_ns| exchange.position(Resolution::new(17, 16).unwrap(), policy, now_ns).map(|p| p.single_turn);
+    let exchange = Exchange { response, sampled_ns: 5_000_000_000, began_ns: 5_000_003_000 };
+    let resolution = Resolution::new(17, 16).unwrap();
+    let policy = Policy::new(125_000).tolerating(Tolerated::SINGLE_TURN);
+    let at = |now_ns| exchange.evidence(resolution).at(now_ns, policy).map(Sample::single_turn);
     assert_eq!((at(5_000_125_000), at(4_999_875_000)), (Ok(77), Ok(77)));
     assert_eq!(at(17), Err(Doubt::Old { age_ns: 4_999_999_983 }));
 }
@@ -261,8 +261,8 @@ fn frames_with_one_stamp_are_as_old_as_the_last_of_them() {
         let asked = Addresses::first(1);
         let mut bus = BusTransaction::start(request, resolution, asked, line, 0);
         for content in response.emit().contents() {
-            let _ = single.frame(*content, end_ns);
-            let _ = bus.frame(*content, end_ns);
+            let _ = single.hear(&[Some(*content)], end_ns);
+            let _ = bus.hear(&[Some(*content)], end_ns);
         }
         let alone = matches!(single.progress(), Progress::Done { .. });
         assert_eq!(alone, bus.exchange(EncoderAddress::ZERO).is_some());

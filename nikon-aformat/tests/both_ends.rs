@@ -4,11 +4,13 @@
 
 mod common;
 
+use core::convert::Infallible;
+
 use common::every;
 use nikon_aformat::bus::{Addresses, Bus};
 use nikon_aformat::device::{Device, Encoders, Fault, Transmission};
 use nikon_aformat::master::{
-    BusTransaction, Detected, Detection, EepromRead, Line, Progress, Reset, Step, Transaction, Write,
+    BusTransaction, Detected, Detection, EepromRead, Line, Progress, Reset, Transaction, Write,
 };
 use nikon_aformat::reception::LineReceiver;
 use nikon_aformat::{
@@ -16,6 +18,7 @@ use nikon_aformat::{
     Version, Window,
 };
 use proptest::prelude::*;
+use servowire_core::{Ended, Procedure};
 
 const RATE: BitRate = BitRate::Mbit16;
 const LINE: Line = Line::new(RATE);
@@ -46,9 +49,9 @@ fn send<const N: usize, const B: usize>(
     let mut answers = Vec::new();
     for (k, frame) in request.emit().as_slice().iter().enumerate() {
         at += frame_ns + if k > 0 { 1_000 } else { 0 };
-        answers.extend(encoders.frame(frame.content(), at).into_iter().flatten());
+        answers.extend(encoders.hear(&[Some(frame.content())], at).into_iter().flatten());
     }
-    answers.sort_by_key(|answer| answer.at_ns);
+    answers.sort_by_key(|answer| answer.start_ns);
     (at, answers)
 }
 
@@ -64,10 +67,13 @@ fn transact<const N: usize, const B: usize>(
     for answer in answers {
         for frame in 0..answer.line.len() / 18 {
             let bits = answer.line.skip(frame * 18).unwrap().bits();
-            let now_ns = answer.at_ns + u64::from(frame + 1) * 1_125;
+            let now_ns = answer.start_ns + u64::from(frame + 1) * 1_125;
             let framed = bits & 1 == 0 && bits >> 17 & 1 == 1;
-            let _ =
-                if framed { transaction.frame((bits >> 1) as u16, now_ns) } else { transaction.framing_error(now_ns) };
+            let _ = if framed {
+                transaction.hear(&[Some((bits >> 1) as u16)], now_ns)
+            } else {
+                transaction.framing_error(now_ns)
+            };
             match transaction.progress() {
                 Progress::Pending { .. } => {}
                 Progress::Done { value, .. } => return (Ok(value.response), now_ns),
@@ -86,31 +92,29 @@ fn transact<const N: usize, const B: usize>(
 }
 
 /// Drives a procedure to its end; the result, the requests sent and when it ended.
-fn drive<T: core::fmt::Debug, const N: usize, const B: usize>(
+fn drive<P, const N: usize, const B: usize>(
     encoders: &mut Encoders<N, B>,
     resolution: Resolution,
-    first: Step<T>,
-    mut answer: impl FnMut(Result<Response, Error>, u64) -> Step<T>,
-) -> (Result<T, Error>, Vec<Request>, u64) {
-    let (mut step, mut sent) = (first, Vec::new());
-    loop {
-        match step {
-            Step::Send { request, not_before_ns } => {
-                sent.push(request);
-                let (outcome, end) = transact(encoders, request, resolution, not_before_ns);
-                step = answer(outcome, end);
-            }
-            Step::Done { value, ready_ns } => return (Ok(value), sent, ready_ns),
-            Step::Failed { error, ready_ns } => return (Err(error), sent, ready_ns),
-        }
+    procedure: &mut P,
+    now_ns: u64,
+) -> (Result<P::Value, Error>, Vec<Request>, u64)
+where
+    P: Procedure<Request = Request, Response = Response, Error = Error>,
+{
+    let mut sent = Vec::new();
+    let Ok(Ended { outcome, ready_ns }) = servowire_core::run(procedure, now_ns, |request, not_before_ns| {
+        sent.push(request);
         assert!(sent.len() < 100);
-    }
+        let (outcome, ready_ns) = transact(encoders, request, resolution, not_before_ns);
+        Ok::<_, Infallible>(Ended { outcome, ready_ns })
+    });
+    (outcome, sent, ready_ns)
 }
 
 /// Every operation to every encoder is answered by it alone, in the layout that the resolution says, and accepted.
 #[test]
 fn every_operation_to_every_encoder() {
-    for resolution in [Resolution::default(), Resolution::default().low_with_velocity().resets_with_position()] {
+    for resolution in [Resolution::default(), Resolution::default().with_velocity_in_low().with_position_in_resets()] {
         for operation in every(0x21, 1, 0xbeef, 0x10_0003) {
             for to in EncoderAddress::ALL {
                 let mut encoders = eight(resolution);
@@ -125,7 +129,7 @@ fn every_operation_to_every_encoder() {
                 assert_eq!(answers.len(), want, "{operation:?}");
                 let expected = request.expected(resolution);
                 for answer in answers {
-                    assert!(Response::parse(&expected, &answer.raw).is_ok(), "{operation:?} {to}");
+                    assert!(Response::parse(&expected, &answer.frames).is_ok(), "{operation:?} {to}");
                 }
             }
         }
@@ -150,19 +154,16 @@ fn eeprom_written_once_and_read_back() {
     let resolution = Resolution::default();
     let mut encoders = eight(resolution);
     let mut write = Write::eeprom(ea(3), UserAddress::new(0x42).unwrap(), 0x1234);
-    let first = write.start(0);
-    let (end, sent, now_ns) = drive(&mut encoders, resolution, first, |o, t| write.receive(o, t));
+    let (end, sent, now_ns) = drive(&mut encoders, resolution, &mut write, 0);
     assert!(end.is_ok());
     assert_eq!(sent.iter().filter(|r| r.operation.writes()).count(), 1);
     assert_eq!(encoders.all[3].eeprom(0, 0x42), Some(0x1234));
     assert_eq!(encoders.all[2].eeprom(0, 0x42), Some(0xffff));
     let mut read = EepromRead::new(ea(3), 0x42);
-    let first = read.start(now_ns);
-    let (end, sent, now_ns) = drive(&mut encoders, resolution, first, |o, t| read.receive(o, t));
+    let (end, sent, now_ns) = drive(&mut encoders, resolution, &mut read, now_ns);
     assert_eq!((end, sent.len()), (Ok(0x1234), 4));
     let mut read = EepromRead::of_bank(ea(3), 2, 0x42);
-    let first = read.start(now_ns);
-    let (end, ..) = drive(&mut encoders, resolution, first, |o, t| read.receive(o, t));
+    let (end, ..) = drive(&mut encoders, resolution, &mut read, now_ns);
     assert_eq!(end, Err(Error::BankError));
 }
 
@@ -170,17 +171,15 @@ fn eeprom_written_once_and_read_back() {
 fn resets_take_effect_with_the_eighth_request() {
     let resolution = Resolution::default();
     let mut encoders = eight(resolution);
-    encoders.all[5].set_alarms(Alm::BATT | Alm::OVTEMP, true);
-    encoders.all[5].set_alarms(Alm::BATT, false);
+    encoders.all[5].raise_alarms(Alm::BATT | Alm::OVTEMP);
+    encoders.all[5].end_alarms(Alm::BATT);
     let mut reset = Reset::clear_status_and_multiturn(ea(5));
-    let first = reset.start(0);
-    let (end, sent, now_ns) = drive(&mut encoders, resolution, first, |o, t| reset.receive(o, t));
+    let (end, sent, now_ns) = drive(&mut encoders, resolution, &mut reset, 0);
     let status = end.unwrap();
     assert_eq!((sent.len(), status.alm()), (9, Some(Alm::OVTEMP)));
     assert_eq!(encoders.all[5].abs(), resolution.compose(5555, 0));
     let mut reset = Reset::set_single_turn_zero_and_shift_commutation_angle(ea(5));
-    let first = reset.start(now_ns);
-    let (end, ..) = drive(&mut encoders, resolution, first, |o, t| reset.receive(o, t));
+    let (end, ..) = drive(&mut encoders, resolution, &mut reset, now_ns);
     assert!(end.is_ok());
     assert_eq!(encoders.all[5].abs().get(), 0);
 }
@@ -208,13 +207,11 @@ fn addresses_are_given_by_wire_and_by_id() {
     let resolution = Resolution::default();
     let mut one = Encoders::<1, 1> { all: [Device::new(ea(0), resolution, RATE)] };
     let mut reset = Reset::set_address_of_the_only_encoder(ea(6));
-    let first = reset.start(0);
-    let (end, ..) = drive(&mut one, resolution, first, |o, t| reset.receive(o, t));
+    let (end, ..) = drive(&mut one, resolution, &mut reset, 0);
     assert_eq!((end.map(|status| status.ea), one.all[0].ea()), (Ok(ea(6)), ea(6)));
     let mut encoders = eight(resolution);
     let mut write = Write::address(EncoderId::truncate(0x10_0002), ea(7));
-    let first = write.start(0);
-    let (end, ..) = drive(&mut encoders, resolution, first, |o, t| write.receive(o, t));
+    let (end, ..) = drive(&mut encoders, resolution, &mut write, 0);
     // Encoder 7 is there already: both answer STATUS, and the first response is taken.
     assert!(end.is_ok());
     assert_eq!(encoders.all[2].ea(), ea(7));
@@ -228,14 +225,12 @@ fn detection_finds_address_and_widths() {
         let resolution = Resolution::new(st_bits, mt_bits).unwrap();
         let mut one = Encoders::<1, 1> { all: [Device::new(ea(4), resolution, RATE)] };
         let mut detection = Detection::search();
-        let first = detection.start(0);
-        let (end, sent, _) = drive(&mut one, resolution, first, |o, t| detection.receive(o, t));
+        let (end, sent, _) = drive(&mut one, resolution, &mut detection, 0);
         let Ok(Detected { ea: found, resolution: got, .. }) = end else { panic!("{end:?}") };
         assert_eq!((found, got, sent.len()), (ea(4), Some(resolution), 5));
         one.all[0].set_fault(Fault::Silent);
         let mut detection = Detection::of(ea(4));
-        let first = detection.start(0);
-        let (end, ..) = drive(&mut one, resolution, first, |o, t| detection.receive(o, t));
+        let (end, ..) = drive(&mut one, resolution, &mut detection, 0);
         assert_eq!(end.unwrap_err(), Error::NoResponse);
     }
 }
@@ -254,7 +249,7 @@ fn one_fault_costs_one_response() {
             encoders.all[usize::from(bad)].set_fault(fault);
             let mut transaction = BusTransaction::start(request, resolution, Addresses::ALL, LINE, 0);
             let (_, answers) = send(&mut encoders, request, 0);
-            let whole = answers.iter().filter(|a| ends_like(a.line, a.raw.line())).count();
+            let whole = answers.iter().filter(|a| ends_like(a.line, a.frames.line())).count();
             if whole == 8 {
                 continue;
             }
@@ -292,7 +287,7 @@ fn render(answers: &[Transmission]) -> Vec<bool> {
     let Some(first) = answers.first() else { return Vec::new() };
     let mut line = Vec::new();
     for answer in answers {
-        let at = ((answer.at_ns - first.at_ns) * 1000 / u64::from(RATE.bit_ps())) as usize;
+        let at = ((answer.start_ns - first.start_ns) * 1000 / u64::from(RATE.bit_ps())) as usize;
         line.resize(at.max(line.len()), true);
         line.extend((0..answer.line.len()).map(|k| answer.line.get(k) == Some(true)));
     }
@@ -309,8 +304,8 @@ proptest! {
         for (content, pause, framed) in contents {
             now_ns += pause;
             if framed {
-                for answer in encoders.frame(content, now_ns).into_iter().flatten() {
-                    prop_assert_eq!(answer.raw.crc().got, answer.raw.crc().want);
+                for answer in encoders.hear(&[Some(content)], now_ns).into_iter().flatten() {
+                    prop_assert_eq!(answer.frames.crc().got, answer.frames.crc().want);
                 }
             } else {
                 encoders.framing_error(now_ns);

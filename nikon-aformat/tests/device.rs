@@ -3,7 +3,9 @@
 #![allow(clippy::unwrap_used, clippy::panic)]
 
 use nikon_aformat::bus::{Addresses, Bus, Outcome};
-use nikon_aformat::device::{Behaviour, Device, Encoders, Fault, Transmission};
+use nikon_aformat::device::{
+    Behaviour, Device, Ea, Encoders, Fault, FirstRead, Restart, ShownAddress, Shows, Transmission, Zero,
+};
 use nikon_aformat::{
     Alm, BitOrder, BitRate, Command, Data, EncoderAddress, EncoderId, EncoderStatus, Error, Expected, Layout,
     Operation, PmAlm, Request, Resolution, Response, Temperature, U10, U24, UserAddress, Window,
@@ -26,14 +28,14 @@ fn send(device: &mut Device<2>, operation: Operation, now_ns: u64) -> (Option<Tr
     let (mut at_ns, mut answer) = (now_ns, None);
     for frame in Request::new(EA, operation).emit().as_slice() {
         at_ns += 6_000;
-        answer = device.frame(frame.content(), at_ns);
+        answer = device.hear(&[Some(frame.content())], at_ns);
     }
     (answer, at_ns)
 }
 
 fn ask(device: &mut Device<2>, operation: Operation, now_ns: u64) -> Option<Response> {
     let expected = Request::new(EA, operation).expected(Resolution::default()).any_address();
-    send(device, operation, now_ns).0.map(|answer| Response::parse(&expected, &answer.raw).unwrap())
+    send(device, operation, now_ns).0.map(|answer| Response::parse(&expected, &answer.frames).unwrap())
 }
 
 fn data(device: &mut Device<2>, operation: Operation, now_ns: u64) -> Data {
@@ -46,7 +48,7 @@ fn what_is_set_is_answered() {
     device.set_motion(-1000, -5);
     device.set_pm_alm(PmAlm::IFW2);
     device.set_temperature(Temperature(U10::truncate(310)));
-    device.set_alarms(Alm::OVTEMP, true);
+    device.raise_alarms(Alm::OVTEMP);
     let abs = U24::truncate(0x71_2345);
     let want = Data::Abs24VelAcc { abs, velocity: -1000, acceleration: -5 };
     assert_eq!(data(&mut device, Operation::Abs24VelAcc, LONG_NS), want);
@@ -67,12 +69,12 @@ fn what_is_set_is_answered() {
 /// A factory setting of version 3.0: the resets are answered with 24 bits of the position.
 #[test]
 fn resets_are_answered_in_the_layout_of_the_encoder() {
-    let resolution = Resolution::default().resets_with_position();
+    let resolution = Resolution::default().with_position_in_resets();
     let mut device = Device::<1>::new(EA, resolution, RATE);
     device.set_position(0x55, 0);
     let request = Request::new(EA, Operation::ClearStatus);
-    let answer = device.frame(request.emit().as_slice()[0].content(), LONG_NS).unwrap();
-    let response = Response::parse(&request.expected(resolution), &answer.raw).unwrap();
+    let answer = device.hear(&[Some(request.emit().as_slice()[0].content())], LONG_NS).unwrap();
+    let response = Response::parse(&request.expected(resolution), &answer.frames).unwrap();
     assert_eq!(response.data(), Some(Data::Abs24 { abs: U24::truncate(0x55) }));
 }
 
@@ -82,11 +84,11 @@ fn when_it_answers() {
     let mut device = device();
     let begin = |device: &mut Device<2>, operation, now_ns| {
         let (answer, end_ns) = send(device, operation, now_ns);
-        answer.unwrap().at_ns - end_ns
+        answer.unwrap().start_ns - end_ns
     };
     assert_eq!(begin(&mut device, Operation::Abs40, LONG_NS), 2_800);
     assert_eq!(begin(&mut device, Operation::Abs40Mt, 2 * LONG_NS), 2_800 + 3 * 20_000);
-    device.set_behaviour(Behaviour::new().with_turn_around_ns(900).at_place(1));
+    device.set_behaviour(Behaviour::new().with_response_delay_ns(900).with_place(Some(1)));
     assert_eq!(begin(&mut device, Operation::Abs40Mt, 3 * LONG_NS), 900 + 20_000);
     assert_eq!(begin(&mut device, Operation::Abs40, 4 * LONG_NS), 900);
 }
@@ -126,8 +128,8 @@ fn a_damaged_request_is_not_answered() {
                         device.framing_error(now_ns);
                         None
                     }
-                    (true, true) => device.frame(content ^ 0x100, now_ns),
-                    _ => device.frame(*content, now_ns),
+                    (true, true) => device.hear(&[Some(content ^ 0x100)], now_ns),
+                    _ => device.hear(&[Some(*content)], now_ns),
                 };
                 assert_eq!(answer, None, "frame {wrong}");
             }
@@ -135,10 +137,10 @@ fn a_damaged_request_is_not_answered() {
             let last_ns = LONG_NS + 18_000;
             // 18 bits and 20 us later it still counts as a part of it, if the damage was its last frame.
             if wrong == 3 {
-                assert_eq!(device.frame(position, last_ns + 24_500), None);
-                assert!(device.frame(position, last_ns + 24_500 + 24_501).is_some());
+                assert_eq!(device.hear(&[Some(position)], last_ns + 24_500), None);
+                assert!(device.hear(&[Some(position)], last_ns + 24_500 + 24_501).is_some());
             } else {
-                assert!(device.frame(position, last_ns + 24_501).is_some());
+                assert!(device.hear(&[Some(position)], last_ns + 24_501).is_some());
             }
         }
     }
@@ -150,10 +152,10 @@ fn a_request_that_is_not_ended_is_forgotten() {
     let frames = Request::new(EA, Operation::EepromRead { address: 9 }).emit();
     let [cdf, mdf] = frames.as_slice() else { panic!("two frames") };
     let mut device = device();
-    assert_eq!(device.frame(cdf.content(), LONG_NS), None);
-    assert!(device.frame(mdf.content(), LONG_NS + 24_500).is_some());
-    assert_eq!(device.frame(cdf.content(), 2 * LONG_NS), None);
-    assert_eq!(device.frame(mdf.content(), 2 * LONG_NS + 24_501), None);
+    assert_eq!(device.hear(&[Some(cdf.content())], LONG_NS), None);
+    assert!(device.hear(&[Some(mdf.content())], LONG_NS + 24_500).is_some());
+    assert_eq!(device.hear(&[Some(cdf.content())], 2 * LONG_NS), None);
+    assert_eq!(device.hear(&[Some(mdf.content())], 2 * LONG_NS + 24_501), None);
 }
 
 /// What happens between two requests.
@@ -168,7 +170,7 @@ fn the_count_of_a_reset() {
     };
     let other = |device: &mut Device<2>, now_ns| {
         let request = Request::new(EncoderAddress::ZERO, Operation::Status);
-        assert_eq!(device.frame(request.emit().as_slice()[0].content(), now_ns), None);
+        assert_eq!(device.hear(&[Some(request.emit().as_slice()[0].content())], now_ns), None);
     };
     let own = |device: &mut Device<2>, now_ns| {
         let _ = ask(device, Operation::Status, now_ns);
@@ -180,7 +182,7 @@ fn the_count_of_a_reset() {
         for own_count in [false, true] {
             let mut device = device();
             if own_count {
-                device.set_behaviour(Behaviour::new().counting_its_own_requests());
+                device.set_behaviour(Behaviour::new().with_restart(Restart::Own));
             }
             let mut first_done = None;
             for k in 1..=20 {
@@ -189,13 +191,13 @@ fn the_count_of_a_reset() {
                 if k == 3 {
                     between(&mut device, now_ns + LONG_NS / 2);
                 }
-                if first_done.is_none() && device.zero() != (0, 0) {
+                if first_done.is_none() && device.zero() != Zero::default() {
                     first_done = Some(k);
                 }
             }
             let restarts = if own_count { restarts_own_count } else { restarts };
             assert_eq!(first_done, Some(if restarts { 11 } else { 8 }));
-            assert_eq!(device.zero(), (0x1_2345, 0));
+            assert_eq!(device.zero(), Zero { single_turn: 0x1_2345, turns: 0 });
         }
     }
 }
@@ -205,10 +207,10 @@ fn the_count_of_a_reset() {
 fn a_reset_shows_in_the_eighth_or_in_the_ninth() {
     for eighth in [false, true] {
         let mut device = device();
-        device.set_alarms(Alm::BATT, true);
-        device.set_alarms(Alm::BATT, false);
+        device.raise_alarms(Alm::BATT);
+        device.end_alarms(Alm::BATT);
         if eighth {
-            device.set_behaviour(Behaviour::new().showing_in_the_eighth());
+            device.set_behaviour(Behaviour::new().with_reset_shows(Shows::Eighth));
         }
         let shown: Vec<bool> = (1..=9)
             .map(|k| ask(&mut device, Operation::ClearStatus, k * LONG_NS).unwrap().alm().unwrap().contains(Alm::BATT))
@@ -245,7 +247,7 @@ fn nothing_is_written_while_it_is_busy() {
         let mut at_ns = if busy { at_ns + 50_000 } else { at_ns + 100_000_000 };
         for frame in frames.as_slice() {
             at_ns += 6_000;
-            let _ = device.frame(frame.content(), at_ns);
+            let _ = device.hear(&[Some(frame.content())], at_ns);
         }
         assert_eq!(device.ea(), if busy { EA } else { EncoderAddress::MAX });
     }
@@ -255,7 +257,7 @@ fn nothing_is_written_while_it_is_busy() {
 #[test]
 fn how_long_the_memory_is_busy() {
     let read = Operation::EepromRead { address: 9 };
-    for behaviour in [Behaviour::new(), Behaviour::new().not_busy_in_first_read()] {
+    for behaviour in [Behaviour::new(), Behaviour::new().with_first_read(FirstRead::Ready)] {
         let mut device = device();
         device.set_behaviour(behaviour.with_undetermined(0xdead));
         device.set_eeprom(0, 9, 0x1234);
@@ -282,11 +284,11 @@ fn who_answers_a_multi_response_request() {
     for (all, want) in [(false, [false, false, true, true]), (true, [true; 4])] {
         let mut device = device();
         if all {
-            device.set_behaviour(Behaviour::new().answering_all());
+            device.set_behaviour(Behaviour::new().with_ea(Ea::All));
         }
         let answers = (1..).zip([0, 2, 3, 7]).map(|(k, ea)| {
             let request = Request::new(EncoderAddress::truncate(ea), Operation::Abs40Mt);
-            device.frame(request.emit().as_slice()[0].content(), k * LONG_NS).is_some()
+            device.hear(&[Some(request.emit().as_slice()[0].content())], k * LONG_NS).is_some()
         });
         assert!(answers.eq(want));
     }
@@ -298,7 +300,7 @@ fn an_eeprom_word_comes_with_the_second_response() {
     for clear in [false, true] {
         let mut device = device();
         let behaviour = Behaviour::new().with_undetermined(0xdead);
-        device.set_behaviour(if clear { behaviour.not_busy_in_first_read() } else { behaviour });
+        device.set_behaviour(if clear { behaviour.with_first_read(FirstRead::Ready) } else { behaviour });
         device.set_eeprom(1, 9, 0x1234);
         let read = |address| Operation::EepromReadBank { bank: 1, address };
         let mut words = Vec::new();
@@ -325,7 +327,7 @@ fn a_bank_that_is_not_there() {
     {
         let request = Request::new(EA, operation);
         let answer = send(&mut device, operation, LONG_NS).0.unwrap();
-        assert_eq!(Response::parse(&request.expected(Resolution::default()), &answer.raw), Err(Error::BankError));
+        assert_eq!(Response::parse(&request.expected(Resolution::default()), &answer.frames), Err(Error::BankError));
         assert_eq!(device.alm(LONG_NS + 100_000), Alm::empty(), "nothing is read or written");
     }
     let written = data(&mut device, Operation::EepromWriteBank { bank: 1, address: 0xff, data: 3 }, 50 * LONG_NS);
@@ -338,21 +340,21 @@ fn old_or_new_address() {
     for old in [false, true] {
         let mut device = device();
         if old {
-            device.set_behaviour(Behaviour::new().showing_the_old_address());
+            device.set_behaviour(Behaviour::new().with_shown_address(ShownAddress::Old));
         }
         let id = EncoderId::truncate(0x11_2233);
         let frames = Request::new(EncoderAddress::MAX, Operation::SetAddress2 { id }).emit();
         let mut answer = None;
         for (at, frame) in (1..).zip(frames.as_slice()) {
-            answer = device.frame(frame.content(), LONG_NS + at * 6_000);
+            answer = device.hear(&[Some(frame.content())], LONG_NS + at * 6_000);
         }
         let expected = Expected::new(Layout::Id, Command::SetAddress2);
-        let shown = Response::parse(&expected, &answer.unwrap().raw).unwrap().ea;
+        let shown = Response::parse(&expected, &answer.unwrap().frames).unwrap().ea;
         assert_eq!((shown, device.ea()), (if old { EA } else { EncoderAddress::MAX }, EncoderAddress::MAX));
         // Every other response shows its own.
         let request = Request::new(EncoderAddress::MAX, Operation::IdRead1);
-        let answer = device.frame(request.emit().as_slice()[0].content(), 100 * LONG_NS).unwrap();
-        assert!(Response::parse(&request.expected(Resolution::default()), &answer.raw).is_ok());
+        let answer = device.hear(&[Some(request.emit().as_slice()[0].content())], 100 * LONG_NS).unwrap();
+        assert!(Response::parse(&request.expected(Resolution::default()), &answer.frames).is_ok());
     }
 }
 
@@ -368,10 +370,10 @@ fn it_does_not_listen_to_responses() {
         Data::Status { alm: Alm::empty(), pm_alm: PmAlm::empty() },
     );
     let first = other.emit().contents()[0];
-    assert_eq!(device.frame(first, LONG_NS), None);
+    assert_eq!(device.hear(&[Some(first)], LONG_NS), None);
     // 18 + 4 bits at 4 Mbit/s.
-    assert_eq!(device.frame(position, LONG_NS + 5_500), None);
-    assert!(device.frame(position, LONG_NS + 5_500 + 5_501).is_some());
+    assert_eq!(device.hear(&[Some(position)], LONG_NS + 5_500), None);
+    assert!(device.hear(&[Some(position)], LONG_NS + 5_500 + 5_501).is_some());
 }
 
 #[test]
@@ -379,8 +381,8 @@ fn a_framing_error_is_heard_by_all() {
     let mut encoders = Encoders { all: [device(), device()] };
     encoders.framing_error(LONG_NS);
     let position = Request::new(EA, Operation::Abs40).emit().as_slice()[0].content();
-    assert!(encoders.frame(position, LONG_NS + 24_500).iter().all(Option::is_none));
-    assert!(encoders.frame(position, LONG_NS + 100_000).iter().all(Option::is_some));
+    assert!(encoders.hear(&[Some(position)], LONG_NS + 24_500).iter().all(Option::is_none));
+    assert!(encoders.hear(&[Some(position)], LONG_NS + 100_000).iter().all(Option::is_some));
 }
 
 /// What a bus counts: damaged, never started, not asked.

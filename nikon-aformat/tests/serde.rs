@@ -4,11 +4,12 @@
 
 use core::fmt::Debug;
 
-use nikon_aformat::bus::{Arrival, Outcome};
-use nikon_aformat::master::{Exchange, Sampled};
+use nikon_aformat::bus::{Outcome, Verdict};
+use nikon_aformat::inspect::{Cause, Findings, LineCause, inspect};
+use nikon_aformat::master::Exchange;
 use nikon_aformat::{
-    Alm, Doubt, EncoderAddress, EncoderId, EncoderStatus, Error, Operation, PmAlm, Policy, Request, RequestFrame,
-    Resolution, Response, Temperature, U10, U17, U19, U24, U40, UserAddress, Version,
+    Alm, Doubt, EncoderAddress, EncoderId, EncoderStatus, Error, Evidence, Operation, PmAlm, Policy, Request,
+    RequestFrame, Resolution, Response, Temperature, Tolerated, U10, U17, U19, U24, U40, UserAddress, Version,
 };
 use serde::Serialize;
 use serde::de::DeserializeOwned;
@@ -71,7 +72,7 @@ fn widths() {
     }
     // A factory setting of version 3.0 cannot be one of an encoder of version 2.1.
     let read: Resolution = serde_json::from_str(&text(20, 16, "V2_1", true)).unwrap();
-    assert!(!read.has_low_with_velocity() || read.version() == Version::V3_0);
+    assert!(!read.has_velocity_in_low() || read.version() == Version::V3_0);
 }
 
 /// What holds numbers holds no illegal ones.
@@ -89,15 +90,39 @@ fn requests() {
 fn readings_and_doubts() {
     let es = EncoderStatus::BATT;
     let response = Response::abs17(EncoderAddress::MAX, es, U17::truncate(77));
-    let exchange = Exchange { response, sampled: Sampled { earliest_ns: 7_200, latest_ns: 10_000 } };
+    let exchange = Exchange { response, sampled_ns: 7_200, began_ns: 10_000 };
     assert_eq!(exchange.to_string(), "from 7: ABS17 ES any ABS 0x0004d, sampled from 7200 to 10000 ns");
     round_trip(exchange);
     round_trip(Outcome::Duplicate { first: response });
-    round_trip(Arrival { outcome: Err(Error::Crc { got: 1, want: 2 }), duplicate: false, extra: true });
+    round_trip(Verdict { outcome: Err(Error::Crc { got: 1, want: 2 }), duplicate: false, extra: true });
     for doubt in [Doubt::Status { es }, Doubt::AnyStatus, Doubt::Alarms { alarms: Alm::BATT }, Doubt::Absent] {
         round_trip(doubt);
     }
-    round_trip(Policy::SINGLE_TURN.with_max_age_ns(125_000));
+    let policy = Policy::new(125_000).tolerating(Tolerated::SINGLE_TURN.status(EncoderStatus::all()));
+    round_trip(policy);
+    let evidence = exchange.evidence(Resolution::new(17, 16).unwrap());
+    let sample = serde_json::to_value(evidence.at(132_200, policy).unwrap()).unwrap();
+    assert_eq!((&sample["single_turn"], &sample["sampled_ns"]), (&serde_json::json!(77), &serde_json::json!(7_200)));
+    assert_eq!(serde_json::to_value(Evidence::NEVER).unwrap()["sampled_ns"], 0);
+    let tolerated = serde_json::to_string(&Tolerated::SINGLE_TURN).unwrap();
+    assert_eq!(tolerated, r#"{"status":2,"alarms":1,"any_turns":true}"#);
+}
+
+/// A report is written as what it found; what is read back is its parts.
+#[test]
+fn reports() {
+    let request = Request::new(EncoderAddress::ZERO, Operation::Abs17);
+    let answer = Response::abs17(EncoderAddress::ZERO, EncoderStatus::empty(), U17::truncate(77));
+    let report = inspect(request, Resolution::default(), answer.emit().line().inverted());
+    assert_eq!(
+        report.to_string(),
+        "frame 0: the start bit is 1; likely cause: the line is inverted: exchange A and B, or the polarity of the input"
+    );
+    let written = serde_json::to_value(report).unwrap();
+    assert_eq!(serde_json::from_value::<Findings>(written["findings"].clone()).unwrap(), report.findings());
+    assert_eq!(written["cause"], serde_json::json!({ "Line": "LineInverted" }));
+    assert_eq!(serde_json::from_value::<Response>(written["response"].clone()).unwrap(), answer);
+    round_trip(Cause::Line(LineCause::Shifted { bits: -2 }));
 }
 
 fn round_trip<T: Serialize + DeserializeOwned + PartialEq + Debug + Copy>(value: T) {

@@ -4,10 +4,10 @@
 #![allow(clippy::unwrap_used, clippy::panic)]
 
 use nikon_aformat::bus::{Addresses, Outcome};
-use nikon_aformat::master::{BusTransaction, Cycle, Exchange, Line, PeriodTooShort, Progress, Sampled, Transaction};
+use nikon_aformat::master::{BusTransaction, Cycle, Exchange, Line, PeriodTooShort, Progress, Transaction};
 use nikon_aformat::{
     BitOrder, BitRate, Command, Data, Doubt, EncoderAddress, EncoderStatus, Error, Operation, Policy, Request,
-    Resolution, Response, U40,
+    Resolution, Response, Sample, U40,
 };
 
 const LINE: Line = Line::new(BitRate::Mbit4);
@@ -39,7 +39,7 @@ fn start(line: Line) -> Transaction {
 /// Frames one by one, the first start bit at `begin_ns`.
 fn feed(transaction: &mut Transaction, contents: &[u16], begin_ns: u64) -> Progress<Exchange> {
     for (k, content) in (1..).zip(contents) {
-        let _ = transaction.frame(*content, begin_ns + k * FRAME_NS);
+        let _ = transaction.hear(&[Some(*content)], begin_ns + k * FRAME_NS);
     }
     transaction.progress()
 }
@@ -57,7 +57,7 @@ fn ended(mut transaction: Transaction) -> Result<Response, Error> {
 fn when_a_response_may_begin() {
     for (line, first_ns) in [
         (LINE, 5_000),
-        (LINE.with_latency_ns(0), 4_500),
+        (LINE.with_hand_over_ns(0), 4_500),
         (LINE.with_turn_around_ns(2_000), 6_500),
         (LINE.with_turn_around_ns(200), 5_000),
     ] {
@@ -69,7 +69,7 @@ fn when_a_response_may_begin() {
             // In one block, with the time of its end only.
             let mut transaction = start(line);
             let block: Vec<_> = frames(Command::Abs40, 3).into_iter().map(Some).collect();
-            let _ = transaction.block(&block, 0, begin_ns + 4 * FRAME_NS);
+            let _ = transaction.hear(&block, begin_ns + 4 * FRAME_NS);
             assert_eq!(ended(transaction), want, "{begin_ns} in a block");
             // Of a response that is cut off.
             let mut transaction = start(line);
@@ -92,7 +92,7 @@ fn what_is_known_of_the_begin_of_a_block() {
         (&more, 4_499, 200_000, false),
     ] {
         let mut transaction = start(LINE);
-        let _ = transaction.block(block, since_ns, end_ns);
+        let _ = transaction.hear_since(block, since_ns, end_ns);
         assert_eq!(ended(transaction).is_ok(), taken, "{since_ns} {end_ns} {}", block.len());
     }
 }
@@ -103,7 +103,7 @@ fn the_first_response_of_a_block() {
     let (first, second) = (response(Command::Abs40, 3, 1), response(Command::Abs40, 3, 2));
     let block: Vec<_> = [first, second].iter().flat_map(|r| r.emit().contents().to_vec()).map(Some).collect();
     let mut transaction = start(LINE);
-    let _ = transaction.block(&block, 4_500, 100_000);
+    let _ = transaction.hear_since(&block, 4_500, 100_000);
     assert_eq!(ended(transaction), Ok(first));
 }
 
@@ -124,7 +124,7 @@ fn a_repeated_frame_is_no_part_of_a_response() {
         chances += 1;
         let block: Vec<_> = block.into_iter().map(Some).collect();
         let mut transaction = start(LINE);
-        let _ = transaction.block(&block, 4_500, 200_000);
+        let _ = transaction.hear_since(&block, 4_500, 200_000);
         assert_eq!(ended(transaction), Ok(sent));
     }
     assert_eq!(chances, 1, "one byte in 256 is the CRC-8");
@@ -140,7 +140,7 @@ fn pauses_in_a_response() {
             let _ = feed(&mut transaction, &contents[..2], 8_000);
             let rest_ns = 8_000 + 2 * FRAME_NS + pause_ns;
             if blocks {
-                let _ = transaction.block(&[Some(contents[2]), Some(contents[3])], 0, rest_ns + 2 * FRAME_NS);
+                let _ = transaction.hear(&[Some(contents[2]), Some(contents[3])], rest_ns + 2 * FRAME_NS);
             } else {
                 let _ = feed(&mut transaction, &contents[2..], rest_ns);
             }
@@ -164,8 +164,7 @@ fn when_it_is_over() {
     // What has ended stays so.
     assert_eq!(feed(&mut silent, &frames(Command::Abs40, 3), 8_000), failed);
 
-    let sampled = Sampled { earliest_ns: 4_500, latest_ns: 8_000 };
-    let value = Exchange { response: response(Command::Abs40, 3, 0), sampled };
+    let value = Exchange { response: response(Command::Abs40, 3, 0), sampled_ns: 4_500, began_ns: 8_000 };
     let done = Progress::Done { value, ready_ns: 8_000 + 18_000 + 10_000 };
     let mut answered = start(LINE);
     assert_eq!(feed(&mut answered, &frames(Command::Abs40, 3), 8_000), done);
@@ -188,7 +187,7 @@ fn what_is_passed_over() {
     let contents = frames(Command::Abs40, 3);
     for echo_ns in [4_500, 9_000, 100_000] {
         let mut transaction = start(LINE);
-        let _ = transaction.frame(own, echo_ns);
+        let _ = transaction.hear(&[Some(own)], echo_ns);
         assert_eq!(ended(transaction), Err(Error::NoResponse));
         let _ = feed(&mut transaction, &contents, echo_ns + 3_000);
         assert!(ended(transaction).is_ok());
@@ -221,7 +220,7 @@ fn framing_errors() {
         assert_eq!(ended(transaction), Err(fault));
         let mut transaction = start(LINE);
         let since_ns = end_ns - 5_000;
-        let _ = transaction.block(&[None, Some(0)], since_ns, 200_000);
+        let _ = transaction.hear_since(&[None, Some(0)], since_ns, 200_000);
         assert_eq!(ended(transaction), Err(fault));
     }
     for whole in 0..4 {
@@ -257,7 +256,7 @@ fn bus(asked: u8, line: Line) -> BusTransaction {
 /// The response of one encoder, its first start bit at `begin_ns`.
 fn speaks(bus: &mut BusTransaction, address: u8, begin_ns: u64) -> Progress<()> {
     for (k, content) in (1..).zip(frames(Command::Abs40Mt, address)) {
-        let _ = bus.frame(content, begin_ns + k * FRAME_NS);
+        let _ = bus.hear(&[Some(content)], begin_ns + k * FRAME_NS);
     }
     bus.progress()
 }
@@ -272,9 +271,11 @@ fn a_bus_ends_by_its_addresses() {
     assert_eq!(speaks(&mut all, 1, 30_000), pending);
     let mut lost = all;
     assert_eq!(speaks(&mut all, 2, 52_000), done);
-    let read = |bus: &BusTransaction, address| bus.exchange(ea(address)).map(|exchange| exchange.sampled);
-    assert_eq!(read(&all, 1), Some(Sampled { earliest_ns: 4_500, latest_ns: 30_000 }));
-    assert_eq!(read(&all, 2), Some(Sampled { earliest_ns: 4_500, latest_ns: 52_000 }));
+    let read = |bus: &BusTransaction, address| {
+        bus.exchange(ea(address)).map(|exchange| (exchange.sampled_ns, exchange.began_ns))
+    };
+    assert_eq!(read(&all, 1), Some((4_500, 30_000)));
+    assert_eq!(read(&all, 2), Some((4_500, 52_000)));
     assert_eq!((read(&all, 0), all.bus().of(ea(0))), (None, Outcome::Extra(response(Command::Abs40Mt, 0, 0))));
     // It has ended: nothing is taken any more.
     assert_eq!(speaks(&mut all, 2, 80_000), done);
@@ -303,11 +304,11 @@ fn how_long_a_bus_waits() {
 #[test]
 fn a_bus_counts_what_is_damaged() {
     let mut bus = bus(0b111, LINE);
-    let _ = bus.frame(frames(Command::Abs40Mt, 0)[0], 20_000);
+    let _ = bus.hear(&[Some(frames(Command::Abs40Mt, 0)[0])], 20_000);
     let _ = bus.framing_error(20_000 + FRAME_NS);
     assert_eq!(bus.bus().damaged(), 1);
     let _ = speaks(&mut bus, 1, 40_000);
-    let _ = bus.frame(frames(Command::Abs40Mt, 2)[0], 80_000);
+    let _ = bus.hear(&[Some(frames(Command::Abs40Mt, 2)[0])], 80_000);
     let _ = bus.poll(u64::MAX);
     assert_eq!((bus.bus().damaged(), bus.bus().missing().bits()), (2, 0b101));
 }
@@ -319,7 +320,7 @@ fn several_responses_in_a_block() {
     let block: Vec<_> =
         [piece, frames(Command::Abs40Mt, 1), frames(Command::Abs40Mt, 2)].concat().into_iter().map(Some).collect();
     let mut bus = bus(0b110, LINE);
-    let end = bus.block(&block, 4_500, 100_000);
+    let end = bus.hear_since(&block, 4_500, 100_000);
     assert!(matches!(end, Progress::Done { .. }), "{end:?}");
 }
 
@@ -327,12 +328,12 @@ fn several_responses_in_a_block() {
 #[test]
 fn the_age_of_a_position() {
     let resolution = Resolution::default();
-    let sampled = Sampled { earliest_ns: 4_500, latest_ns: 8_000 };
-    let exchange = Exchange { response: response(Command::Abs40, 3, 77), sampled };
-    let policy = Policy::STRICT.with_max_age_ns(1_000_000);
-    let at = |now_ns| exchange.position(resolution, policy, now_ns).map(|position| position.single_turn);
+    let exchange = Exchange { response: response(Command::Abs40, 3, 77), sampled_ns: 4_500, began_ns: 8_000 };
+    let policy = Policy::new(1_000_000);
+    let evidence = exchange.evidence(resolution);
+    let at = |now_ns| evidence.at(now_ns, policy).map(Sample::single_turn);
     assert_eq!((at(0), at(1_004_500), at(1_004_501)), (Ok(77), Ok(77), Err(Doubt::Old { age_ns: 1_000_001 })));
-    assert!(exchange.position(resolution, Policy::STRICT, u64::MAX).is_ok());
+    assert_eq!(evidence.at(1_004_500, policy).map(Sample::sampled_ns), Ok(4_500));
 }
 
 /// The grid of a period stands still.

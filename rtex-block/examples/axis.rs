@@ -6,13 +6,19 @@
 use core::fmt::Debug;
 use core::num::NonZeroU16;
 
-use rtex_block::device::{Behaviour, Drive, DriveConfig, OpenCodes};
+use rtex_block::device::{Behaviour, Drive, DriveConfig, Fault, OpenCodes};
 use rtex_block::master::procedure::{
-    AlarmAttributes, AlarmHistory, Backup, ClearAlarm, ClearableIf, Home, Latch, ReadText, Restore, SetPosition,
+    AlarmAttributes, AlarmHistory, Backup, ClearAlarm, ClearableIf, Home, Latch, ParameterValue, ReadText, Restore,
+    SetPosition,
 };
-use rtex_block::master::{ActiveCode, Axis, AxisConfig, AxisState, CommandCounter, Limits, Progress, Received, Turn};
+use rtex_block::master::{ActiveCode, Axis, AxisConfig, AxisState, CommandCounter, Heard, Limits, Progress, Turn};
 use rtex_block::type_code::{Pr, monitor, parameter, profile, system_id};
-use rtex_block::{Alarm, Arguments, ControlBits, MacId, Nibble, NonCyclicCommand, Response32, StatusFlags, SubCode};
+use rtex_block::{
+    Alarm, Arguments, ControlBits, MacId, Nibble, NonCyclicCommand, Policy, Response32, StatusFlags, SubCode,
+};
+
+/// An update period.
+const UPDATE_NS: u64 = 500_000;
 
 /// An axis, its drive, and a perfect line between them, in blocks of 32 bytes.
 struct Machine {
@@ -20,16 +26,24 @@ struct Machine {
     drive: Drive,
     counter: CommandCounter,
     sent: Turn,
-    received: Received,
+    received: Heard,
+    now_ns: u64,
 }
 
 impl Machine {
     /// One update period.
     fn update(&mut self) {
-        self.axis.receive(self.sent, &self.received);
+        self.now_ns += UPDATE_NS;
+        self.axis.hear(self.sent, &self.received, self.now_ns);
         self.sent = self.counter.next();
-        let command = self.axis.send(self.sent);
-        self.received = Response32::parse(&self.drive.exchange32(&command.emit())).into();
+        let command = self.axis.transmission(self.sent);
+        self.received = Response32::parse(&self.drive.hear(&command.emit()).unwrap()).into();
+    }
+
+    /// The actual position, if it is good for control: at most one update period old.
+    fn position(&self) -> Result<i32, String> {
+        let sample = self.axis.evidence().at(self.now_ns, Policy::new(UPDATE_NS));
+        sample.map(|sample| sample.position()).map_err(|doubt| doubt.to_string())
     }
 
     fn until(&mut self, done: impl Fn(&Self) -> bool) -> Result<(), String> {
@@ -63,8 +77,8 @@ impl Machine {
     }
 
     fn switch_on(&mut self) -> Result<(), String> {
-        self.until(|machine| machine.axis.can_switch_on())?;
-        self.axis.switch_on();
+        self.until(|machine| machine.axis.can_switch_on().is_ok())?;
+        self.axis.switch_on().map_err(|error| error.to_string())?;
         self.until(|machine| machine.axis.state() == AxisState::On)
     }
 }
@@ -74,14 +88,16 @@ fn main() -> Result<(), String> {
     let limits = Limits::new(NonZeroU16::MIN.saturating_add(7), 100).with_ready(400);
     let config = AxisConfig::new(mac_id, ActiveCode::CyclicPosition, 500_000, limits).with_max_speed(Some(5_000_000));
     // A drive that takes its time.
-    let behaviour = Behaviour::POLITE.with_stale_answers(2).with_in_progress_late(6).with_latch_late(3);
+    let behaviour = Behaviour::new().with_stale_answers(2).with_in_progress_late(6).with_latch_late(3);
     let mut machine = Machine {
         axis: Axis::new(config),
-        drive: Drive::new(DriveConfig::new(mac_id, OpenCodes::INVENTED).with_behaviour(behaviour)),
+        drive: Drive::new(DriveConfig::new(mac_id, OpenCodes::INVENTED)),
         counter: CommandCounter::new(4),
         sent: Turn::Invalid,
-        received: Received::Nothing,
+        received: Heard::Nothing,
+        now_ns: 0,
     };
+    machine.drive.set_behaviour(behaviour);
     machine.until(|machine| machine.axis.state() == AxisState::Off)?;
     set_up(&mut machine)?;
     machine.switch_on()?;
@@ -100,11 +116,11 @@ fn set_up(machine: &mut Machine) -> Result<(), String> {
     let kind = machine.run(|axis| text.receive(axis))?;
     let kind = system_id::device_type(kind.as_bytes()).unwrap_or("unknown");
     println!("vendor {}, device type {kind}", String::from_utf8_lossy(vendor.as_bytes()));
-    let mut list = [(Pr { class: 8, number: 1 }, 0), (Pr { class: 8, number: 4 }, 0)];
+    let mut list = [1, 4].map(|number| ParameterValue::new(Pr { class: 8, number }, 0));
     let mut backup = Backup::new(OpenCodes::INVENTED.parameter_read);
     machine.run(|axis| backup.receive(axis, &mut list))?;
-    println!("parameters {list:?}");
-    list[1].1 = 2_000;
+    println!("parameters {}, {}", list[0], list[1]);
+    list[1].value = 2_000;
     let mut restore = Restore::new(OpenCodes::INVENTED.parameter_read);
     machine.run(|axis| restore.receive(axis, &list))?;
     let feed = Pr { class: 7, number: 35 }.index();
@@ -136,11 +152,7 @@ fn by_the_host(machine: &mut Machine) -> Result<(), String> {
             fastest = fastest.max(value.data1);
         }
     }
-    println!(
-        "latched {:?}, at most {fastest} command units/s, now at {}",
-        latch.caught(),
-        machine.axis.actual_position()
-    );
+    println!("latched {:?}, at most {fastest} command units/s, now at {}", latch.caught(), machine.position()?);
     machine.axis.set_feed_forward(0).map_err(|error| error.to_string())?;
     let deviation = Arguments { type_code: monitor::PERR, index: 0, data: 0 };
     println!("deviation {}", machine.ask(NonCyclicCommand::Monitor(deviation))?);
@@ -151,13 +163,13 @@ fn by_the_host(machine: &mut Machine) -> Result<(), String> {
 fn by_the_drive(machine: &mut Machine) -> Result<(), String> {
     machine.axis.set_mode(ActiveCode::ProfilePosition).map_err(|error| error.to_string())?;
     machine.axis.start_move(profile::RELATIVE, 100_000, 1_000_000).map_err(|error| error.to_string())?;
-    machine.until(|machine| machine.axis.actual_position() > 150_000)?;
+    machine.until(|machine| machine.position().is_ok_and(|position| position > 150_000))?;
     machine.axis.set_move_speed(200_000).map_err(|error| error.to_string())?;
     let ended = machine.run(|axis| axis.take_move().unwrap_or(Progress::Pending { left: 0 }))?;
-    println!("motion ended at {}, in position: {}", machine.axis.actual_position(), ended.in_position);
+    println!("motion ended at {}, in position: {}", machine.position()?, ended.in_position);
     let mut home = Home::new(OpenCodes::INVENTED.homing, 4_000);
     machine.run(|axis| home.receive(axis))?;
-    println!("homed, {} from the origin", machine.axis.actual_position());
+    println!("homed, {} from the origin", machine.position()?);
     machine.until(|machine| machine.axis.can_ask())
 }
 
@@ -169,8 +181,7 @@ fn at_a_speed(machine: &mut Machine) -> Result<(), String> {
     for speed in [500_000, -500_000, 0] {
         machine.axis.set_rate(speed).map_err(|error| error.to_string())?;
         (0..200).for_each(|_| machine.update());
-        let position = machine.axis.position(2).map_err(|doubt| doubt.to_string())?;
-        println!("at {position} with {speed} command units/s");
+        println!("at {} with {speed} command units/s", machine.position()?);
     }
     Ok(())
 }
@@ -179,23 +190,23 @@ fn at_a_speed(machine: &mut Machine) -> Result<(), String> {
 fn what_goes_wrong(machine: &mut Machine) -> Result<(), String> {
     machine.drive.set_warning(0xa0);
     machine.drive.set_inputs(StatusFlags::HOME.to_bytes()[1]);
-    machine.drive.drop_servo();
+    machine.drive.set_fault(Fault::ServoDrop);
     machine.until(|machine| machine.axis.state() != AxisState::On)?;
     println!("{} [{}]", machine.axis.state(), machine.axis.status());
     machine.axis.clear();
     machine.switch_on()?;
-    machine.drive.set_main_power(false);
+    machine.drive.set_fault(Fault::NoMainPower);
     machine.until(|machine| machine.axis.state() != AxisState::On)?;
     println!("{}", machine.axis.state());
-    machine.drive.set_main_power(true);
+    machine.drive.set_fault(Fault::None);
     // From now on it does not take its time.
-    machine.drive.set_config(machine.drive.config().with_behaviour(Behaviour::POLITE));
+    machine.drive.set_behaviour(Behaviour::new());
     machine.axis.clear();
     machine.switch_on()
 }
 
 fn an_alarm(machine: &mut Machine) -> Result<(), String> {
-    machine.drive.raise(Alarm { main: 16, sub: 0 });
+    machine.drive.set_fault(Fault::Alarm(Alarm { main: 16, sub: 0 }));
     machine.until(|machine| matches!(machine.axis.state(), AxisState::Stopped(_)))?;
     println!("{}", machine.axis.state());
     let mut attributes = AlarmAttributes::new(OpenCodes::INVENTED.alarm_attributes);

@@ -5,8 +5,8 @@
 use core::num::NonZeroU16;
 
 use rtex_block::device::{Drive, DriveConfig, OpenCodes};
-use rtex_block::inspect::inspect;
-use rtex_block::master::{ActiveCode, Axis, AxisConfig, AxisState, Limits, Received, Ring, SameMacId};
+use rtex_block::inspect::{Change, inspect};
+use rtex_block::master::{ActiveCode, Axis, AxisConfig, AxisState, Heard, Limits, Ring, SameMacId};
 use rtex_block::{Command32, MacId, Response};
 
 fn main() -> Result<(), SameMacId> {
@@ -17,29 +17,33 @@ fn main() -> Result<(), SameMacId> {
     let mut ring = Ring::new([axis], 2)?;
     let mut drive =
         Drive::new(DriveConfig::new(mac_id, OpenCodes::INVENTED).with_sync_exchanges(4).with_servo_on_updates(2));
-    let mut received = Received::Nothing;
+    let mut received = Heard::Nothing;
     let mut before = None;
-    for _ in 0..16 {
-        let [Command32 { main: command, .. }] = ring.update(&[received]);
-        let block = drive.exchange(&command.emit());
+    for period in 0..16 {
+        let [Command32 { main: command, .. }] = ring.update(&[received], period * 500_000);
+        let block = drive.hear(&command.emit()).unwrap();
         received = Response::parse(&block).into();
 
         println!("{} -> {}   {}", hex(&command.emit()), hex(&block), ring.axes()[0].state());
         let report = inspect(&block);
         if let Some(before) = &before {
-            for (field, old) in report.changes(before).filter(|(field, _)| field.name != "Update_Counter_Echo") {
+            for Change { field, before } in
+                report.changes(before).filter(|change| change.field.name != "Update_Counter_Echo")
+            {
                 println!(
                     "{:36}{}: {} -> {}",
                     "",
                     field.name,
-                    old.map_or(String::new(), |v| v.to_string()),
+                    before.map_or(String::new(), |v| v.to_string()),
                     field.value
                 );
             }
         }
         before = Some(report);
 
-        ring.switch_on();
+        if ring.all_are(AxisState::Off) {
+            ring.switch_on().unwrap_or_else(|refused| println!("{refused}"));
+        }
         let [axis] = ring.axes_mut();
         if axis.state() == AxisState::On {
             let next = axis.setpoint().wrapping_add(1_000);

@@ -8,7 +8,7 @@ use std::error::Error;
 
 use rtex_block::master::{ActiveCode, Axis, AxisConfig, Limits, Master, MasterConfig, Slave};
 use rtex_block::position::{Gear, is_within_limit, max_step, max_torque};
-use rtex_block::timing::{A6N, FrameTime, Periods, TimerSystem, timer_reload};
+use rtex_block::timing::{A6N, A6nParameters, FrameTime, Periods, TimerSystem, timer_reload};
 use rtex_block::{BlockSize, Command, MacId, pack, stream};
 
 fn main() -> Result<(), Box<dyn Error>> {
@@ -16,7 +16,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         "update     communication  Pr7.20  Pr7.21  Pr7.91   internal  axes  reload at 50 MHz  late if it ends 20 us before the next"
     );
     for periods in A6N {
-        let (pr7_20, pr7_21, pr7_91) = periods.a6n_parameters();
+        let A6nParameters { pr7_20, pr7_21, pr7_91 } = periods.a6n_parameters();
         let internal = if TimerSystem::Internal.allows(&periods) { "yes" } else { "no" };
         let reload = timer_reload(50_000_000, periods.com_ns).map_or("-".to_owned(), |ticks| ticks.to_string());
         println!(
@@ -46,9 +46,9 @@ fn memory() -> Result<(), Box<dyn Error>> {
     let config = MasterConfig::new(BlockSize::Bytes32, periods, TimerSystem::Internal);
     let mut master = Master::new(config, [Slave { mac_id, kind: 1 }], [axis])?;
     let (mut bytes, mut words16, mut words32) = ([0; 32], [0; 16], [0; 8]);
-    master.exchange_bytes(&[0; 32], &mut bytes)?;
-    master.exchange_words16(&[0; 16], &mut words16)?;
-    master.exchange_words32(&[0; 8], &mut words32)?;
+    master.exchange_bytes(&[0; 32], &mut bytes, 0)?;
+    master.exchange_words16(&[0; 16], &mut words16, 0)?;
+    master.exchange_words32(&[0; 8], &mut words32, 0)?;
     println!("{:04x} {:08x}", words16[0], words32[0]);
     // Where another processor wrote the bytes, its memory is turned in place.
     let mut image16 = words16.map(u16::to_le);

@@ -3,138 +3,61 @@ use core::fmt;
 use crate::error::Error;
 use crate::error_code::ErrorCode;
 
-/// Cyclic command code, bits 6-4 of byte 1: what bytes 4-7 of a command mean.
-///
-/// SX-DSV02310, "Command code list". Codes 5 to 7 are not defined.
+servowire_core::codes! {
+    /// Cyclic command code, bits 6-4 of byte 1: what bytes 4-7 of a command mean.
+    ///
+    /// SX-DSV02310, "Command code list". Codes 5 to 7 are not defined.
+    pub enum CyclicCode: u8 {
+        /// 0: no operation. The drive keeps acting on the previous command and **ignores Control_Bits**, so a NOP
+        /// switches a servo neither on nor off.
+        Nop = 0 => "NOP",
+        /// 1: profile position (PP); bytes 4-7 are Target_Position, command units.
+        ProfilePosition = 1 => "PP",
+        /// 2: cyclic position (CP); bytes 4-7 are Command_Position, command units, absolute.
+        CyclicPosition = 2 => "CP",
+        /// 3: cyclic velocity (CV); bytes 4-7 are Command_Speed, unit by Pr7.25.
+        CyclicVelocity = 3 => "CV",
+        /// 4: cyclic torque or thrust (CT); bytes 4-7 are Command_Torque, 0.1 % of rated.
+        CyclicTorque = 4 => "CT",
+    }
+}
+
+servowire_core::codes! {
+    /// Non-cyclic command code, bits 3-0 of byte 1: what bytes 8-15 mean. The names are the vendor's, in lower case.
+    ///
+    /// SX-DSV02310, "Command code list". Codes 3, 8, 9 and Bh to Fh are not defined.
+    pub enum NonCyclicCode: u8 {
+        /// 0h: normal.
+        Normal = 0 => "normal",
+        /// 1h: reset.
+        Reset = 1 => "reset",
+        /// 2h: system ID.
+        SystemId = 2 => "system ID",
+        /// 4h: homing, position setting, latch.
+        Homing = 4 => "homing",
+        /// 5h: alarm.
+        Alarm = 5 => "alarm",
+        /// 6h: parameter.
+        Parameter = 6 => "parameter",
+        /// 7h: profile; only with [`CyclicCode::ProfilePosition`].
+        Profile = 7 => "profile",
+        /// Ah: monitor.
+        Monitor = 10 => "monitor",
+    }
+}
+
+/// Both codes of a byte 1.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "arbitrary", derive(arbitrary::Arbitrary))]
-#[repr(u8)]
-pub enum CyclicCode {
-    /// 0: no operation. The drive keeps acting on the previous command and **ignores Control_Bits**, so a NOP
-    /// switches a servo neither on nor off.
-    Nop = 0,
-    /// 1: profile position (PP); bytes 4-7 are Target_Position, command units.
-    ProfilePosition = 1,
-    /// 2: cyclic position (CP); bytes 4-7 are Command_Position, command units, absolute.
-    CyclicPosition = 2,
-    /// 3: cyclic velocity (CV); bytes 4-7 are Command_Speed, unit by Pr7.25.
-    CyclicVelocity = 3,
-    /// 4: cyclic torque or thrust (CT); bytes 4-7 are Command_Torque, 0.1 % of rated.
-    CyclicTorque = 4,
+pub struct Codes {
+    /// What bytes 4-7 mean.
+    pub cyclic: CyclicCode,
+    /// What bytes 8-15 mean.
+    pub noncyclic: NonCyclicCode,
 }
 
-impl CyclicCode {
-    /// All that are defined.
-    pub const ALL: [Self; 5] =
-        [Self::Nop, Self::ProfilePosition, Self::CyclicPosition, Self::CyclicVelocity, Self::CyclicTorque];
-
-    /// `None` for a code that is not defined.
-    pub const fn new(code: u8) -> Option<Self> {
-        Some(match code {
-            0 => Self::Nop,
-            1 => Self::ProfilePosition,
-            2 => Self::CyclicPosition,
-            3 => Self::CyclicVelocity,
-            4 => Self::CyclicTorque,
-            _ => return None,
-        })
-    }
-
-    /// The abbreviation of the vendor documents.
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Nop => "NOP",
-            Self::ProfilePosition => "PP",
-            Self::CyclicPosition => "CP",
-            Self::CyclicVelocity => "CV",
-            Self::CyclicTorque => "CT",
-        }
-    }
-}
-
-/// Non-cyclic command code, bits 3-0 of byte 1: what bytes 8-15 mean.
-///
-/// SX-DSV02310, "Command code list". Codes 3, 8, 9 and Bh to Fh are not defined.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-#[cfg_attr(feature = "arbitrary", derive(arbitrary::Arbitrary))]
-#[repr(u8)]
-pub enum NonCyclicCode {
-    /// 0h: normal.
-    Normal = 0,
-    /// 1h: reset.
-    Reset = 1,
-    /// 2h: system ID.
-    SystemId = 2,
-    /// 4h: homing, position setting, latch.
-    Homing = 4,
-    /// 5h: alarm.
-    Alarm = 5,
-    /// 6h: parameter.
-    Parameter = 6,
-    /// 7h: profile; only with [`CyclicCode::ProfilePosition`].
-    Profile = 7,
-    /// Ah: monitor.
-    Monitor = 10,
-}
-
-impl NonCyclicCode {
-    /// All that are defined.
-    pub const ALL: [Self; 8] = [
-        Self::Normal,
-        Self::Reset,
-        Self::SystemId,
-        Self::Homing,
-        Self::Alarm,
-        Self::Parameter,
-        Self::Profile,
-        Self::Monitor,
-    ];
-
-    /// `None` for a code that is not defined.
-    pub const fn new(code: u8) -> Option<Self> {
-        Some(match code {
-            0 => Self::Normal,
-            1 => Self::Reset,
-            2 => Self::SystemId,
-            4 => Self::Homing,
-            5 => Self::Alarm,
-            6 => Self::Parameter,
-            7 => Self::Profile,
-            10 => Self::Monitor,
-            _ => return None,
-        })
-    }
-
-    /// The name of the vendor documents, in lower case.
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Normal => "normal",
-            Self::Reset => "reset",
-            Self::SystemId => "system ID",
-            Self::Homing => "homing",
-            Self::Alarm => "alarm",
-            Self::Parameter => "parameter",
-            Self::Profile => "profile",
-            Self::Monitor => "monitor",
-        }
-    }
-}
-
-impl fmt::Display for CyclicCode {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.pad(self.name())
-    }
-}
-
-impl fmt::Display for NonCyclicCode {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.pad(self.name())
-    }
-}
+servowire_core::one_line!(Codes { Self { cyclic, noncyclic } => "{} {}", cyclic.name(), noncyclic.name(); });
 
 servowire_core::number! {
     /// Bits 6-0 of byte 1, defined or not: a drive echoes an undefined code unchanged.
@@ -175,24 +98,24 @@ impl Code {
 
     /// The cyclic code; `None` if it is not defined.
     pub const fn cyclic(self) -> Option<CyclicCode> {
-        CyclicCode::new(self.cyclic_bits())
+        CyclicCode::from_code(self.cyclic_bits())
     }
 
     /// The non-cyclic code; `None` if it is not defined.
     pub const fn noncyclic(self) -> Option<NonCyclicCode> {
-        NonCyclicCode::new(self.noncyclic_bits())
+        NonCyclicCode::from_code(self.noncyclic_bits())
     }
 
     /// Both codes.
     ///
     /// # Errors
     /// [`Error::CyclicCode`] before [`Error::NonCyclicCode`].
-    pub const fn pair(self) -> Result<(CyclicCode, NonCyclicCode), Error> {
+    pub const fn codes(self) -> Result<Codes, Error> {
         let Some(cyclic) = self.cyclic() else { return Err(Error::CyclicCode { code: self.cyclic_bits() }) };
         let Some(noncyclic) = self.noncyclic() else {
             return Err(Error::NonCyclicCode { code: self.noncyclic_bits() });
         };
-        Ok((cyclic, noncyclic))
+        Ok(Codes { cyclic, noncyclic })
     }
 
     /// The names of both codes with the number, `CP monitor (2Ah)`.
@@ -204,7 +127,7 @@ impl Code {
 
     /// What a drive reports for an undefined code: 0021h before 0022h; `None` if both are defined.
     pub const fn error_code(self) -> Option<ErrorCode> {
-        match self.pair() {
+        match self.codes() {
             Err(Error::CyclicCode { .. }) => Some(ErrorCode::CYCLIC_CODE),
             Err(_) => Some(ErrorCode::NON_CYCLIC_CODE),
             Ok(_) => None,
@@ -216,9 +139,9 @@ impl Code {
     /// Certain: alarm not with NOP, profile with PP only. A working rule for the rest, whose marks in the
     /// vendor's mode tables could not be read: with NOP only 00h, otherwise every defined code.
     pub const fn is_allowed(self) -> bool {
-        match self.pair() {
-            Ok((CyclicCode::Nop, noncyclic)) => matches!(noncyclic, NonCyclicCode::Normal),
-            Ok((cyclic, NonCyclicCode::Profile)) => matches!(cyclic, CyclicCode::ProfilePosition),
+        match self.codes() {
+            Ok(Codes { cyclic: CyclicCode::Nop, noncyclic }) => matches!(noncyclic, NonCyclicCode::Normal),
+            Ok(Codes { cyclic, noncyclic: NonCyclicCode::Profile }) => matches!(cyclic, CyclicCode::ProfilePosition),
             Ok(_) => true,
             Err(_) => false,
         }
@@ -237,8 +160,8 @@ mod tests {
             let (high, low) = (byte >> 4 & 7, byte & 15);
             assert_eq!(code.cyclic().is_some(), high <= 4);
             assert_eq!(code.noncyclic().is_some(), [0, 1, 2, 4, 5, 6, 7, 10].contains(&low));
-            match code.pair() {
-                Ok((cyclic, noncyclic)) => assert_eq!(Code::of(cyclic, noncyclic).get(), byte & 0x7f),
+            match code.codes() {
+                Ok(Codes { cyclic, noncyclic }) => assert_eq!(Code::of(cyclic, noncyclic).get(), byte & 0x7f),
                 Err(Error::CyclicCode { code }) => assert_eq!((code, high > 4), (high, true)),
                 Err(e) => assert_eq!((e, high <= 4), (Error::NonCyclicCode { code: low }, true)),
             }

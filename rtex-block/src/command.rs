@@ -1,7 +1,7 @@
 use core::fmt;
 
 use crate::block::{CODE_BIT7, LEN, exact};
-use crate::code::{Code, CyclicCode};
+use crate::code::{Code, Codes, CyclicCode};
 use crate::control::ControlBits;
 use crate::error::{Error, wrong_direction};
 use crate::header::{Header, MacId, UpdateCounter};
@@ -43,12 +43,12 @@ impl<'a> CommandBlock<'a> {
 
     /// Byte 0 bits 4-0: the drive that is addressed.
     pub const fn mac_id(self) -> MacId {
-        Header::from_byte(self.0[0]).mac_id
+        Header::parse(self.0[0]).mac_id
     }
 
     /// Byte 0 bits 6-5.
     pub const fn update_counter(self) -> UpdateCounter {
-        Header::from_byte(self.0[0]).update_counter
+        Header::parse(self.0[0]).update_counter
     }
 
     /// Byte 1 bit 7, used in the inter-axis full-synchronous mode only.
@@ -97,15 +97,15 @@ impl<'a> CommandBlock<'a> {
     /// # Errors
     /// [`Error::CyclicCode`] or [`Error::NonCyclicCode`] for a code that is not defined.
     pub const fn to_owned(self) -> Result<Command, Error> {
-        match self.code().pair() {
-            Ok((cyclic, noncyclic)) => Ok(Command {
+        match self.code().codes() {
+            Ok(Codes { cyclic, noncyclic }) => Ok(Command {
                 mac_id: self.mac_id(),
                 update_counter: self.update_counter(),
                 tmg_cnt: self.tmg_cnt(),
                 cyclic,
                 control: self.control(),
                 command_data1: self.command_data1(),
-                noncyclic: NonCyclicCommand::from_bytes(noncyclic, self.noncyclic_bytes()),
+                noncyclic: NonCyclicCommand::parse(noncyclic, self.noncyclic_bytes()),
             }),
             Err(e) => Err(e),
         }
@@ -117,8 +117,8 @@ impl<'a> CommandBlock<'a> {
     /// [`Error::CyclicCode`], [`Error::NonCyclicCode`], [`Error::CodePair`] or the first [`Error::Reserved`].
     pub const fn check_strict(self) -> Result<(), Error> {
         let code = self.code();
-        let noncyclic = match code.pair() {
-            Ok((_, noncyclic)) => noncyclic,
+        let noncyclic = match code.codes() {
+            Ok(Codes { noncyclic, .. }) => noncyclic,
             Err(e) => return Err(e),
         };
         if !code.is_allowed() {
@@ -219,9 +219,9 @@ impl Command {
         let header = Header { response: false, update_counter: self.update_counter, mac_id: self.mac_id };
         let [c2, c3] = self.control.to_bytes();
         let [d4, d5, d6, d7] = self.command_data1.to_le_bytes();
-        let [d8, d9, d10, d11, d12, d13, d14, d15] = self.noncyclic.to_bytes();
+        let [d8, d9, d10, d11, d12, d13, d14, d15] = self.noncyclic.emit();
         let one = (self.tmg_cnt as u8) << 7 | self.code().get();
-        [header.to_byte(), one, c2, c3, d4, d5, d6, d7, d8, d9, d10, d11, d12, d13, d14, d15]
+        [header.emit(), one, c2, c3, d4, d5, d6, d7, d8, d9, d10, d11, d12, d13, d14, d15]
     }
 }
 

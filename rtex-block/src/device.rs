@@ -7,13 +7,15 @@ mod behaviour;
 mod check;
 mod config;
 mod drive;
+mod fault;
 mod literals;
 mod motion;
 mod parameters;
 mod profile;
 mod wire;
 
-pub use behaviour::Behaviour;
+pub use behaviour::{Behaviour, Quirks};
 pub use check::{Verdict, check};
 pub use config::{DriveConfig, OpenCodes};
 pub use drive::Drive;
+pub use fault::Fault;

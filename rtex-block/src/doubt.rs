@@ -1,24 +1,37 @@
 //! Why an actual position is not one to control with.
 
-/// Why the actual position of a drive must not be used. What the last good block said stays readable beside it.
+use crate::error::ErrorClass;
+
+/// Why the actual position of a drive must not be used.
 ///
 /// Blocks carry no check sum: a flipped bit of the position itself cannot be seen.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, thiserror::Error)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-#[cfg_attr(feature = "arbitrary", derive(arbitrary::Arbitrary))]
 #[non_exhaustive]
 pub enum Doubt {
     /// No good block has come yet.
-    #[error("no good block has come yet")]
-    Absent,
-    /// The counter echo has stood still, or no good block has come, for longer than is tolerated.
-    #[error("the position is {updates} update periods old")]
+    Never,
+    /// The counter echo has stood still, or no block has come, for longer than the policy allows.
     Old {
-        /// Update periods since the last good block with a new counter echo.
-        updates: u32,
+        /// From the block that brought the last new counter echo until now, ns.
+        age_ns: u64,
+    },
+    /// The position is too old, for the last block was refused.
+    Refused {
+        /// Why it was.
+        class: ErrorClass,
+        /// From the block that brought the last new counter echo until now, ns.
+        age_ns: u64,
     },
     /// The drive reports an alarm: it may have lost its encoder.
-    #[error("the drive reports an alarm")]
     Alarm,
 }
+
+servowire_core::one_line!(Doubt {
+    Self::Never => "no good block has come yet";
+    Self::Old { age_ns } => "the position is {} ns old", age_ns;
+    Self::Refused { class, age_ns } => "the position is {} ns old, the last block was refused: {}", age_ns, class.name();
+    Self::Alarm => "the drive reports an alarm";
+});
+
+impl core::error::Error for Doubt {}

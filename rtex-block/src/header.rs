@@ -54,7 +54,7 @@ pub struct Header {
 
 impl Header {
     /// Takes byte 0 apart; every value is a header.
-    pub const fn from_byte(byte0: u8) -> Self {
+    pub const fn parse(byte0: u8) -> Self {
         Self {
             response: byte0 & 0x80 != 0,
             update_counter: UpdateCounter::truncate(byte0 >> 5),
@@ -63,7 +63,7 @@ impl Header {
     }
 
     /// Byte 0.
-    pub const fn to_byte(self) -> u8 {
+    pub const fn emit(self) -> u8 {
         (self.response as u8) << 7 | self.update_counter.get() << 5 | self.mac_id.get()
     }
 }
@@ -81,8 +81,8 @@ mod tests {
     #[test]
     fn every_byte() {
         for byte in 0..=255 {
-            let header = Header::from_byte(byte);
-            assert_eq!(header.to_byte(), byte);
+            let header = Header::parse(byte);
+            assert_eq!(header.emit(), byte);
             assert_eq!(header.response, byte >= 0x80);
             assert_eq!(
                 u32::from(header.update_counter.get()) * 32 + u32::from(header.mac_id.get()),

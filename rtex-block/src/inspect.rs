@@ -8,7 +8,7 @@
 //!
 //! // Written as 16-bit words by a host that swaps their bytes
 //! let report = inspect(&[0x20, 0x65, 0x00, 0x80, 0x03, 0xe8, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0]);
-//! assert_eq!(report.cause, Some(Cause::SwappedWords16));
+//! assert_eq!(report.cause(), Some(Cause::SwappedWords16));
 //!
 //! let report = inspect(&[0x65, 0x20, 0x80, 0, 0xe8, 0x03, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0]);
 //! assert_eq!(report.error(), None);
@@ -27,15 +27,14 @@ use crate::block::{LEN, LEN32};
 use crate::code::Code;
 use crate::command::{Command, CommandBlock};
 use crate::control::ControlBits;
-use crate::error::Error;
+use crate::error::{Error, ErrorClass};
 use crate::execution::Execution;
 use crate::response::Response;
 use crate::status::StatusFlags;
-use crate::sub::{Command32, Response32};
+use crate::sub::{Command32, Response32, SubCommand, SubResponse};
 
 /// What most likely went wrong.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]
 pub enum Cause {
@@ -51,21 +50,16 @@ pub enum Cause {
     OtherSize,
 }
 
-impl fmt::Display for Cause {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(match self {
-            Self::AllZero => "all bytes are 0: nothing was written here (as a command: a NOP, not a servo-off)",
-            Self::AllOnes => "all bytes are FFh: nothing answers on this bus",
-            Self::SwappedWords16 => "the bytes of each 16-bit word are exchanged: pack with shifts",
-            Self::SwappedWords32 => "the bytes of each 32-bit word are in the other order: pack with shifts",
-            Self::OtherSize => "the size is neither 16 nor 32 bytes",
-        })
-    }
-}
+servowire_core::one_line!(Cause {
+    Self::AllZero => "all bytes are 0: nothing was written here (as a command: a NOP, not a servo-off)";
+    Self::AllOnes => "all bytes are FFh: nothing answers on this bus";
+    Self::SwappedWords16 => "the bytes of each 16-bit word are exchanged: pack with shifts";
+    Self::SwappedWords32 => "the bytes of each 32-bit word are in the other order: pack with shifts";
+    Self::OtherSize => "the size is neither 16 nor 32 bytes";
+});
 
 /// Something about a sound block that its reader should know.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]
 pub enum Note {
@@ -81,31 +75,68 @@ pub enum Note {
     Alarm,
 }
 
-impl fmt::Display for Note {
+servowire_core::one_line!(Note {
+    Self::ServoOnIgnored => "Servo_On in a NOP is ignored";
+    Self::NopIsNotServoOff => "a NOP does not switch the servo off";
+    Self::NotAccepted => "command not accepted";
+    Self::FailedToExecute => "command failed while executing";
+    Self::Alarm => "alarm";
+});
+
+/// A block that lenient decoding takes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
+enum Message {
+    Command(Command),
+    Command32(Command32),
+    Response(Response),
+    Response32(Response32),
+}
+
+impl fmt::Display for Message {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(match self {
-            Self::ServoOnIgnored => "Servo_On in a NOP is ignored",
-            Self::NopIsNotServoOff => "a NOP does not switch the servo off",
-            Self::NotAccepted => "command not accepted",
-            Self::FailedToExecute => "command failed while executing",
-            Self::Alarm => "alarm",
-        })
+        match self {
+            Self::Command(command) => command.fmt(f),
+            Self::Command32(command) => command.fmt(f),
+            Self::Response(response) => response.fmt(f),
+            Self::Response32(response) => response.fmt(f),
+        }
     }
 }
+
+/// The kinds of faults found, as a set.
+pub type Findings = servowire_core::Findings<ErrorClass>;
 
 /// What there is to say about a block.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct Report {
-    /// Whether C/R says response; `None` if there is no byte.
-    pub is_response: Option<bool>,
-    /// Whether lenient decoding, and so a drive, takes the block.
-    pub is_usable: bool,
-    /// The most likely cause of the fault, or of a suspicious block.
-    pub cause: Option<Cause>,
-    findings: [Option<Error>; MOST_FINDINGS],
+    is_response: Option<bool>,
+    message: Option<Message>,
+    cause: Option<Cause>,
+    #[cfg_attr(feature = "serde", serde(serialize_with = "each"))]
+    errors: [Option<Error>; MOST_FINDINGS],
+    #[cfg_attr(feature = "serde", serde(serialize_with = "each"))]
     notes: [Option<Note>; 4],
     fields: Fields,
+}
+
+#[cfg(feature = "serde")]
+fn each<T: serde::Serialize, S: serde::Serializer>(list: &[Option<T>], serializer: S) -> Result<S::Ok, S::Error> {
+    serializer.collect_seq(list.iter().flatten())
+}
+
+/// A field with another value than in the block before.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
+pub struct Change {
+    /// The field as it is.
+    pub field: Field,
+    /// The value that it had; `None` if the block before did not have the field.
+    pub before: Option<Value>,
 }
 
 /// A command of 32 bytes: two codes, bytes 2, 3, 9 and 10, Sub_Chk and the sub code, byte 16. A response: a code, six bytes
@@ -113,14 +144,68 @@ pub struct Report {
 const MOST_FINDINGS: usize = 12;
 
 impl Report {
-    /// The fault that strict decoding reports: the first of the findings.
+    /// Whether C/R says response; `None` if there is no byte.
+    pub const fn is_response(&self) -> Option<bool> {
+        self.is_response
+    }
+
+    /// Whether lenient decoding, and so a drive, takes the block.
+    pub const fn is_usable(&self) -> bool {
+        self.message.is_some()
+    }
+
+    /// The fault that strict decoding reports: the first of them.
     pub const fn error(&self) -> Option<Error> {
-        self.findings[0]
+        self.errors[0]
     }
 
     /// Every fault of the block, in the order of the checks: each as if the ones before it were mended.
-    pub fn findings(&self) -> impl Iterator<Item = Error> {
-        self.findings.into_iter().flatten()
+    pub fn errors(&self) -> impl Iterator<Item = Error> {
+        self.errors.into_iter().flatten()
+    }
+
+    /// The classes of all faults.
+    pub fn findings(&self) -> Findings {
+        let mut findings = Findings::NONE;
+        self.errors().for_each(|error| findings.insert(error.class()));
+        findings
+    }
+
+    /// The most likely cause of the fault, or of a suspicious block.
+    pub const fn cause(&self) -> Option<Cause> {
+        self.cause
+    }
+
+    /// The command, or the main half of it, if lenient decoding takes the block.
+    pub const fn command(&self) -> Option<Command> {
+        match self.message {
+            Some(Message::Command(main) | Message::Command32(Command32 { main, .. })) => Some(main),
+            _ => None,
+        }
+    }
+
+    /// The sub half of a command, if lenient decoding takes the block.
+    pub const fn sub_command(&self) -> Option<SubCommand> {
+        match self.message {
+            Some(Message::Command32(Command32 { sub, .. })) => Some(sub),
+            _ => None,
+        }
+    }
+
+    /// The response, or the main half of it, if lenient decoding takes the block.
+    pub const fn response(&self) -> Option<Response> {
+        match self.message {
+            Some(Message::Response(main) | Message::Response32(Response32 { main, .. })) => Some(main),
+            _ => None,
+        }
+    }
+
+    /// The sub half of a response, if lenient decoding takes the block.
+    pub const fn sub_response(&self) -> Option<SubResponse> {
+        match self.message {
+            Some(Message::Response32(Response32 { sub, .. })) => Some(sub),
+            _ => None,
+        }
     }
 
     /// Every field, in the order of the block; as far as the bytes go.
@@ -136,23 +221,36 @@ impl Report {
     /// The fields that are new or have another value than in `before`, each with the value it had.
     ///
     /// Blocks of opposite direction have no field in common but those of bytes 0 and 1.
-    pub fn changes(&self, before: &Self) -> impl Iterator<Item = (Field, Option<Value>)> {
+    pub fn changes(&self, before: &Self) -> impl Iterator<Item = Change> {
         self.fields.iter().filter_map(move |field| {
             let old = before.fields.iter().find(|old| old.name == field.name).map(|old| old.value);
-            (old != Some(field.value)).then_some((field, old))
+            (old != Some(field.value)).then_some(Change { field, before: old })
         })
+    }
+}
+
+impl fmt::Display for Report {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match &self.message {
+            Some(message) => message.fmt(f)?,
+            None => f.write_str("not usable")?,
+        }
+        self.errors().try_for_each(|error| write!(f, "; {error}"))?;
+        match self.cause {
+            Some(cause) => write!(f, "; {cause}"),
+            None => Ok(()),
+        }
     }
 }
 
 /// Looks at a block of either direction and either size.
 pub fn inspect(bytes: &[u8]) -> Report {
-    let is_response = bytes.first().map(|byte0| byte0 & 0x80 != 0);
-    let findings = findings(bytes);
+    let (errors, message) = (errors(bytes), lenient(bytes));
     Report {
-        is_response,
-        is_usable: lenient(bytes).is_ok(),
-        cause: cause(bytes, findings[0]),
-        findings,
+        is_response: bytes.first().map(|byte0| byte0 & 0x80 != 0),
+        message,
+        cause: cause(bytes, errors[0], message.is_some()),
+        errors,
         notes: notes(bytes),
         fields: Fields::of(bytes),
     }
@@ -171,17 +269,18 @@ fn strict(bytes: &[u8]) -> Result<(), Error> {
     }
 }
 
-fn lenient(bytes: &[u8]) -> Result<(), Error> {
+fn lenient(bytes: &[u8]) -> Option<Message> {
     match (is_response(bytes), bytes.len() > LEN) {
-        (false, false) => Command::parse(bytes).map(drop),
-        (false, true) => Command32::parse(bytes).map(drop),
-        (true, false) => Response::parse(bytes).map(drop),
-        (true, true) => Response32::parse(bytes).map(drop),
+        (false, false) => Command::parse(bytes).map(Message::Command),
+        (false, true) => Command32::parse(bytes).map(Message::Command32),
+        (true, false) => Response::parse(bytes).map(Message::Response),
+        (true, true) => Response32::parse(bytes).map(Message::Response32),
     }
+    .ok()
 }
 
 /// Decodes strictly, mends what is reported, and decodes again.
-fn findings(bytes: &[u8]) -> [Option<Error>; MOST_FINDINGS] {
+fn errors(bytes: &[u8]) -> [Option<Error>; MOST_FINDINGS] {
     let mut copy = [0; LEN32];
     let mut found = [None; MOST_FINDINGS];
     let Some(block) = copy.get_mut(..bytes.len()) else {
@@ -219,7 +318,7 @@ fn mend(block: &mut [u8], error: Error) -> bool {
     }
 }
 
-fn cause(bytes: &[u8], error: Option<Error>) -> Option<Cause> {
+fn cause(bytes: &[u8], error: Option<Error>, is_usable: bool) -> Option<Cause> {
     let size = bytes.len();
     if size != LEN && size != LEN32 {
         return Some(Cause::OtherSize);
@@ -233,7 +332,7 @@ fn cause(bytes: &[u8], error: Option<Error>) -> Option<Cause> {
     error?;
     // A stray bit in a command with sense is no reason to doubt its order.
     let nop = bytes.get(1).is_some_and(|byte1| Code::truncate(*byte1).cyclic_bits() == 0);
-    if lenient(bytes).is_ok() && !nop {
+    if is_usable && !nop {
         return None;
     }
     let sound = |width| {
@@ -291,19 +390,19 @@ mod tests {
     fn causes() {
         let command = Command { command_data1: 1_000, ..Command::idle(MacId::new(5).unwrap(), UpdateCounter::ZERO) };
         let block = Command { control: ControlBits::SERVO_ON, ..command }.emit();
-        assert_eq!(inspect(&block).cause, None);
-        assert_eq!(inspect(&swapped(&block, 2)).cause, Some(Cause::SwappedWords16));
-        assert_eq!(inspect(&swapped(&block, 4)).cause, Some(Cause::SwappedWords32));
+        assert_eq!(inspect(&block).cause(), None);
+        assert_eq!(inspect(&swapped(&block, 2)).cause(), Some(Cause::SwappedWords16));
+        assert_eq!(inspect(&swapped(&block, 4)).cause(), Some(Cause::SwappedWords32));
         let mut stray = block;
         stray[2] |= 0x03;
-        assert_eq!(inspect(&stray).cause, None);
-        assert_eq!(inspect(&[0; 16]).cause, Some(Cause::AllZero));
-        assert_eq!(inspect(&[0xff; 32]).cause, Some(Cause::AllOnes));
+        assert_eq!(inspect(&stray).cause(), None);
+        assert_eq!(inspect(&[0; 16]).cause(), Some(Cause::AllZero));
+        assert_eq!(inspect(&[0xff; 32]).cause(), Some(Cause::AllOnes));
         for size in (0..40).filter(|n| ![16, 32].contains(n)) {
             let report = inspect(&[0x20; 40][..size]);
-            assert_eq!(report.cause, Some(Cause::OtherSize));
+            assert_eq!(report.cause(), Some(Cause::OtherSize));
             assert!(
-                matches!(report.error(), Some(Error::Truncated { .. } | Error::TooLong { .. })) && !report.is_usable
+                matches!(report.error(), Some(Error::Truncated { .. } | Error::TooLong { .. })) && !report.is_usable()
             );
         }
     }
@@ -323,7 +422,27 @@ mod tests {
             Error::Reserved { byte: 9, bits: 0x30 },
             Error::Reserved { byte: 16, bits: 0x40 },
         ];
-        assert!(inspect(&block).findings().eq(want));
+        assert!(inspect(&block).errors().eq(want));
+    }
+
+    #[test]
+    fn values_and_one_line() {
+        let report = inspect(&[0xc5, 0x20, 0xc1, 0, 0xe6, 0x03, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0]);
+        assert_eq!((report.response().map(|r| r.response_data1), report.command()), (Some(998), None));
+        assert_eq!((report.findings(), report.sub_response()), (Findings::NONE, None));
+        assert_eq!(report.to_string(), "from 5 #2 CP normal (20h) [SERVO_ACTIVE SERVO_READY IN_POSITION] 998, 0 0");
+        let mut stray =
+            Command32 { main: Command::idle(MacId::new(5).unwrap(), UpdateCounter::ZERO), sub: SubCommand::IDLE }
+                .emit();
+        stray[2] = 0x01;
+        let report = inspect(&stray);
+        assert_eq!(report.findings().iter().collect::<Vec<_>>(), [ErrorClass::Reserved]);
+        assert_eq!((report.command().is_some(), report.sub_command()), (true, Some(SubCommand::IDLE)));
+        assert!(report.to_string().ends_with("; byte 2 has reserved bits 0x01 set"), "{report}");
+        assert_eq!(
+            inspect(&[]).to_string(),
+            "not usable; 0 bytes, a block has 16; the size is neither 16 nor 32 bytes"
+        );
     }
 
     #[test]
@@ -336,8 +455,10 @@ mod tests {
             ..first
         };
         let (before, after) = (inspect(&first.emit()), inspect(&second.emit()));
-        let changes: Vec<_> =
-            after.changes(&before).map(|(f, old)| (f.name, old.unwrap().to_string(), f.value.to_string())).collect();
+        let changes: Vec<_> = after
+            .changes(&before)
+            .map(|c| (c.field.name, c.before.unwrap().to_string(), c.field.value.to_string()))
+            .collect();
         let text: Vec<_> = changes.iter().map(|(n, a, b)| (*n, a.as_str(), b.as_str())).collect();
         assert_eq!(text, [("Update_Counter", "0", "1"), ("SERVO_ON", "0", "1"), ("Command_Position", "1000", "1010")]);
         assert_eq!(after.changes(&after).count(), 0);
@@ -360,9 +481,9 @@ mod tests {
         fn any_bytes(bytes in proptest::collection::vec(any::<u8>(), 0..48)) {
             let report = inspect(&bytes);
             prop_assert_eq!(report.error(), strict(&bytes).err());
-            prop_assert!(report.is_usable || report.error().is_some());
+            prop_assert!(report.is_usable() || report.error().is_some());
             // The list is long enough: one place is always left.
-            prop_assert!(report.findings().count() < MOST_FINDINGS);
+            prop_assert!(report.errors().count() < MOST_FINDINGS);
             prop_assert_eq!(report.changes(&report).count(), 0);
             if bytes.len() >= LEN {
                 prop_assert!(report.fields().count() >= 5);

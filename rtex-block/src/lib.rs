@@ -14,6 +14,7 @@ pub mod device;
 mod doubt;
 mod error;
 mod error_code;
+mod evidence;
 mod execution;
 mod flags;
 mod header;
@@ -31,24 +32,22 @@ pub mod timing;
 pub mod type_code;
 
 pub use block::{BlockSize, LEN, LEN32};
-pub use code::{Code, CyclicCode, NonCyclicCode};
+pub use code::{Code, Codes, CyclicCode, NonCyclicCode};
 pub use command::{Command, CommandBlock};
 pub use control::ControlBits;
 pub use doubt::Doubt;
 pub use error::{Error, ErrorClass};
 pub use error_code::{Alarm, ErrorCode};
+pub use evidence::{Evidence, EvidenceCell, Policy, Sample, Tolerated};
 pub use execution::{Execution, LatchFlags, ProfileFlags};
 pub use header::{Header, MacId, UpdateCounter};
 pub use noncyclic_command::{Arguments, NonCyclicCommand};
-pub use noncyclic_response::{NonCyclicResponse, Results};
+pub use noncyclic_response::{AlarmAndWarning, NonCyclicResponse, Results};
 pub use response::{Response, ResponseBlock};
 pub use servowire_core::OutOfRange;
 pub use status::StatusFlags;
-pub use sub::{Command32, Response32, SubCode, SubCommand, SubResponse, split32};
+pub use sub::{Command32, Response32, SubCode, SubCommand, SubResponse};
 pub use type_code::{Nibble, Pr, TypeCode};
-
-/// Good blocks, and refused ones by their class.
-pub type Counters = servowire_core::Counters<{ ErrorClass::ALL.len() }>;
 
 /// Step of the tests that walk 16 bits: all values, fewer under Miri.
 #[cfg(test)]

@@ -128,7 +128,7 @@ impl NonCyclicCommand {
     }
 
     /// Bytes 8-15; reserved bits are 0.
-    pub const fn to_bytes(&self) -> [u8; 8] {
+    pub const fn emit(&self) -> [u8; 8] {
         match *self {
             Self::Normal { command_data2, command_data3 } => join(command_data2.to_le_bytes(), command_data3),
             Self::Reset(a) | Self::SystemId(a) | Self::Alarm(a) | Self::Parameter(a) | Self::Monitor(a) => {
@@ -146,7 +146,7 @@ impl NonCyclicCommand {
     }
 
     /// Reads bytes 8-15 by the code; reserved bits are not looked at.
-    pub const fn from_bytes(code: NonCyclicCode, bytes: [u8; 8]) -> Self {
+    pub const fn parse(code: NonCyclicCode, bytes: [u8; 8]) -> Self {
         let [b8, b9, b10, b11, d @ ..] = bytes;
         let data = i32::from_le_bytes(d);
         let arguments = Arguments {

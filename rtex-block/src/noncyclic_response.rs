@@ -37,9 +37,9 @@ impl Results {
 
     /// Alarm and warning of an alarm answer: byte 12 main code, 13 sub code, 14-15 warning code. (When attributes
     /// were asked for, the four bytes carry those instead.)
-    pub const fn alarm(&self) -> (Alarm, u16) {
+    pub const fn alarm(&self) -> AlarmAndWarning {
         let [main, sub, low, high] = self.data.to_le_bytes();
-        (Alarm { main, sub }, u16::from_le_bytes([low, high]))
+        AlarmAndWarning { alarm: Alarm { main, sub }, warning: u16::from_le_bytes([low, high]) }
     }
 
     /// The data of an alarm answer: what [`alarm`](Self::alarm) reads.
@@ -53,6 +53,19 @@ impl Results {
         i32::from_le_bytes([alarm.main, alarm.sub, low, high])
     }
 }
+
+/// What an alarm answer says in bytes 12-15.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "arbitrary", derive(arbitrary::Arbitrary))]
+pub struct AlarmAndWarning {
+    /// Main and sub code, bytes 12 and 13.
+    pub alarm: Alarm,
+    /// Warning code, bytes 14-15; 0 for none.
+    pub warning: u16,
+}
+
+servowire_core::one_line!(AlarmAndWarning { Self { alarm, warning } => "{} warning {:X}h", alarm, warning; });
 
 /// The non-cyclic half of a response, bytes 8-15.
 ///
@@ -125,7 +138,7 @@ pub enum NonCyclicResponse {
 
 impl NonCyclicResponse {
     /// Reads bytes 8-15 by CMD_Error and the echoed code; reserved bits are not looked at.
-    pub const fn from_bytes(cmd_error: bool, noncyclic_bits: u8, bytes: [u8; 8]) -> Self {
+    pub(crate) const fn parse(cmd_error: bool, noncyclic_bits: u8, bytes: [u8; 8]) -> Self {
         let [b8, b9, b10, b11, d @ ..] = bytes;
         if cmd_error {
             return Self::CommandError(ErrorCode(u16::from_le_bytes([b8, b9])));
@@ -138,7 +151,7 @@ impl NonCyclicResponse {
             index: u16::from_le_bytes([b10, b11]),
             data,
         };
-        let Some(code) = NonCyclicCode::new(noncyclic_bits) else {
+        let Some(code) = NonCyclicCode::from_code(noncyclic_bits) else {
             return Self::Undefined { code: noncyclic_bits, bytes };
         };
         match code {
@@ -171,7 +184,7 @@ impl NonCyclicResponse {
     }
 
     /// Bytes 8-15; reserved bits are 0.
-    pub const fn to_bytes(&self) -> [u8; 8] {
+    pub const fn emit(&self) -> [u8; 8] {
         match *self {
             Self::CommandError(code) => {
                 let [low, high] = code.0.to_le_bytes();
@@ -219,7 +232,7 @@ impl NonCyclicResponse {
 
     /// Refuses the first reserved bit of bytes 8-15 that is 1.
     pub(crate) fn check_reserved(cmd_error: bool, noncyclic_bits: u8, bytes: [u8; 8]) -> Result<(), Error> {
-        let masks: [u8; 8] = match (cmd_error, NonCyclicCode::new(noncyclic_bits)) {
+        let masks: [u8; 8] = match (cmd_error, NonCyclicCode::from_code(noncyclic_bits)) {
             (true, _) => [0, 0, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff],
             (false, None | Some(NonCyclicCode::Normal)) => [0; 8],
             (false, Some(NonCyclicCode::Homing)) => [0, 0x2c, 0, 0, 0, 0, 0, 0],
@@ -248,7 +261,7 @@ impl fmt::Display for NonCyclicResponse {
             Self::CommandError(code) => write!(f, "not accepted: {code}"),
             Self::Normal { response_data2, response_data3 } => write!(f, "{response_data2} {response_data3}"),
             Self::Alarm(r) => {
-                let (alarm, warning) = r.alarm();
+                let AlarmAndWarning { alarm, warning } = r.alarm();
                 write!(f, "type {:02X}h index {} {alarm} warning {warning:X}h", r.type_code.get(), r.index)?;
                 write!(f, " (or attributes {:08X}h)", r.data)?;
                 suffix(f, &r.execution)

@@ -43,12 +43,12 @@ impl<'a> ResponseBlock<'a> {
 
     /// Actual_MAC-ID: not an echo, but the address that the drive read from its switches at power-up.
     pub const fn mac_id(self) -> MacId {
-        Header::from_byte(self.0[0]).mac_id
+        Header::parse(self.0[0]).mac_id
     }
 
     /// Update_Counter_Echo; it is back with the next reception, one command earlier than the echo of the code.
     pub const fn update_counter_echo(self) -> UpdateCounter {
-        Header::from_byte(self.0[0]).update_counter
+        Header::parse(self.0[0]).update_counter
     }
 
     /// CMD_Error: the command was not accepted.
@@ -80,7 +80,7 @@ impl<'a> ResponseBlock<'a> {
 
     /// What bytes 8-15 say.
     pub const fn noncyclic(self) -> NonCyclicResponse {
-        NonCyclicResponse::from_bytes(self.cmd_error(), self.code().noncyclic_bits(), self.noncyclic_bytes())
+        NonCyclicResponse::parse(self.cmd_error(), self.code().noncyclic_bits(), self.noncyclic_bytes())
     }
 
     /// Everything at once.
@@ -104,7 +104,7 @@ impl<'a> ResponseBlock<'a> {
     /// [`Error::CyclicCode`], [`Error::NonCyclicCode`] or the first [`Error::Reserved`].
     pub fn check_strict(self) -> Result<(), Error> {
         if !self.cmd_error() {
-            self.code().pair()?;
+            self.code().codes()?;
         }
         NonCyclicResponse::check_reserved(self.cmd_error(), self.code().noncyclic_bits(), self.noncyclic_bytes())
     }
@@ -151,7 +151,7 @@ pub struct Response {
 impl Response {
     /// What bytes 8-15 say.
     pub const fn noncyclic(&self) -> NonCyclicResponse {
-        NonCyclicResponse::from_bytes(self.cmd_error, self.code.noncyclic_bits(), self.noncyclic_bytes())
+        NonCyclicResponse::parse(self.cmd_error, self.code.noncyclic_bits(), self.noncyclic_bytes())
     }
 
     /// With other bytes 8-15, for a simulated drive. CMD_Error is set by [`NonCyclicResponse::CommandError`] and cleared by every
@@ -167,7 +167,7 @@ impl Response {
     /// ```
     #[must_use]
     pub const fn with_noncyclic(self, noncyclic: &NonCyclicResponse) -> Self {
-        let [d8, d9, d10, d11, d12, d13, d14, d15] = noncyclic.to_bytes();
+        let [d8, d9, d10, d11, d12, d13, d14, d15] = noncyclic.emit();
         Self {
             cmd_error: matches!(noncyclic, NonCyclicResponse::CommandError(_)),
             response_data2: i32::from_le_bytes([d8, d9, d10, d11]),
@@ -211,7 +211,7 @@ impl Response {
         let [d4, d5, d6, d7] = self.response_data1.to_le_bytes();
         let [d8, d9, d10, d11, d12, d13, d14, d15] = self.noncyclic_bytes();
         let one = (self.cmd_error as u8) << 7 | self.code.get();
-        [header.to_byte(), one, s2, s3, d4, d5, d6, d7, d8, d9, d10, d11, d12, d13, d14, d15]
+        [header.emit(), one, s2, s3, d4, d5, d6, d7, d8, d9, d10, d11, d12, d13, d14, d15]
     }
 }
 

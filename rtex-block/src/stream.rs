@@ -55,12 +55,24 @@ where
     unit(input, LEN32, Response32::parse)
 }
 
+/// What a log holds of one exchange with one drive.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct Pair {
+    /// The command.
+    pub command: Command,
+    /// The response that came with it.
+    pub response: Response,
+}
+
+servowire_core::one_line!(Pair { Self { command, response } => "{}; {}", command, response; });
+
 /// The command and response of one exchange with one drive, in this order.
-pub fn exchange<'a, E>(input: &'a [u8]) -> IResult<&'a [u8], (Command, Response), E>
+pub fn pair<'a, E>(input: &'a [u8]) -> IResult<&'a [u8], Pair, E>
 where
     E: ParseError<&'a [u8]> + FromExternalError<&'a [u8], Error>,
 {
-    (command, response).parse(input)
+    (command, response).map(|(command, response)| Pair { command, response }).parse(input)
 }
 
 #[cfg(test)]
@@ -85,7 +97,7 @@ mod tests {
         assert_eq!(command::<Error>(&log[16..]), Err(Err::Error(Error::Direction { byte0: 0x83 })));
         assert_eq!(many0_count(command::<Error>).parse(&log[..32]).unwrap().1, 1);
         log[16 + 1] = 0x20;
-        let (rest, (sent, received)) = exchange::<Error>(&log).unwrap();
+        let (rest, Pair { command: sent, response: received }) = pair::<Error>(&log).unwrap();
         assert_eq!((rest.len(), sent.code(), received.code), (8, received.code, sent.code()));
     }
 }

@@ -10,39 +10,15 @@ use crate::execution::Execution;
 use crate::response::{Response, ResponseBlock};
 use crate::type_code::Nibble;
 
-/// Sub_Command_Code, bits 3-0 of byte 16.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-#[cfg_attr(feature = "arbitrary", derive(arbitrary::Arbitrary))]
-#[repr(u8)]
-pub enum SubCode {
-    /// 0h: normal.
-    Normal = 0,
-    /// 2h: system ID.
-    SystemId = 2,
-    /// Ah: monitor.
-    Monitor = 10,
-}
-
-impl SubCode {
-    /// `None` for a code that is not defined in the sub block.
-    pub const fn new(code: u8) -> Option<Self> {
-        Some(match code {
-            0 => Self::Normal,
-            2 => Self::SystemId,
-            10 => Self::Monitor,
-            _ => return None,
-        })
-    }
-
-    /// The name of the vendor documents, in lower case.
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Normal => "normal",
-            Self::SystemId => "system ID",
-            Self::Monitor => "monitor",
-        }
+servowire_core::codes! {
+    /// Sub_Command_Code, bits 3-0 of byte 16. The names are the vendor's, in lower case.
+    pub enum SubCode: u8 {
+        /// 0h: normal.
+        Normal = 0 => "normal",
+        /// 2h: system ID.
+        SystemId = 2 => "system ID",
+        /// Ah: monitor.
+        Monitor = 10 => "monitor",
     }
 }
 
@@ -81,19 +57,21 @@ impl SubCommand {
     ///
     /// # Errors
     /// [`Error::SubChk`], [`Error::SubCommandCode`], in this order.
-    pub const fn from_bytes(bytes: &[u8; LEN]) -> Result<Self, Error> {
+    pub const fn parse(bytes: &[u8; LEN]) -> Result<Self, Error> {
         let byte16 = bytes[0];
         if byte16 & 0x80 == 0 {
             return Err(Error::SubChk { byte16 });
         }
-        let Some(code) = SubCode::new(byte16 & 15) else { return Err(Error::SubCommandCode { code: byte16 & 15 }) };
+        let Some(code) = SubCode::from_code(byte16 & 15) else {
+            return Err(Error::SubCommandCode { code: byte16 & 15 });
+        };
         let [data1, data2, data3] = words(bytes);
         let index = u16::from_le_bytes([bytes[2], bytes[3]]);
         Ok(Self { code, type_code: bytes[1], index, data1, data2, data3 })
     }
 
     /// Bytes 16-31, with Sub_Chk and without reserved bits.
-    pub const fn to_bytes(&self) -> [u8; LEN] {
+    pub const fn emit(&self) -> [u8; LEN] {
         bytes(0x80 | self.code as u8, self.type_code, self.index, [self.data1, self.data2, self.data3])
     }
 }
@@ -132,7 +110,7 @@ pub struct SubResponse {
 
 impl SubResponse {
     /// Reads bytes 16-31; every value is a sub block.
-    pub const fn from_bytes(bytes: &[u8; LEN]) -> Self {
+    pub const fn parse(bytes: &[u8; LEN]) -> Self {
         let [data1, data2, data3] = words(bytes);
         let flags = bytes[0];
         Self {
@@ -148,7 +126,7 @@ impl SubResponse {
     }
 
     /// Bytes 16-31.
-    pub const fn to_bytes(&self) -> [u8; LEN] {
+    pub const fn emit(&self) -> [u8; LEN] {
         let flags = (self.cmd_error as u8) << 7 | self.execution.to_sub();
         bytes(flags | self.code.get(), self.type_code, self.index, [self.data1, self.data2, self.data3])
     }
@@ -180,7 +158,7 @@ const fn bytes(b16: u8, type_code: u8, index: u16, data: [i32; 3]) -> [u8; LEN] 
 ///
 /// # Errors
 /// [`Error::Truncated`] or [`Error::TooLong`] unless there are exactly 32 bytes.
-pub const fn split32(bytes: &[u8]) -> Result<(&[u8; LEN], &[u8; LEN]), Error> {
+pub(crate) const fn split32(bytes: &[u8]) -> Result<(&[u8; LEN], &[u8; LEN]), Error> {
     if let Some((main, sub)) = bytes.split_first_chunk::<LEN>() {
         if let Some((sub, [])) = sub.split_first_chunk::<LEN>() {
             return Ok((main, sub));
@@ -222,7 +200,7 @@ impl Command32 {
             Ok(halves) => halves,
             Err(e) => return Err(e),
         };
-        match (Command::parse(main), SubCommand::from_bytes(sub)) {
+        match (Command::parse(main), SubCommand::parse(sub)) {
             (Ok(main), Ok(sub)) => Ok(Self { main, sub }),
             (Err(e), _) | (_, Err(e)) => Err(e),
         }
@@ -244,7 +222,7 @@ impl Command32 {
 
     /// The block.
     pub fn emit(&self) -> [u8; LEN32] {
-        join32(&self.main.emit(), &self.sub.to_bytes())
+        join32(&self.main.emit(), &self.sub.emit())
     }
 }
 
@@ -271,7 +249,7 @@ impl Response32 {
             Err(e) => return Err(e),
         };
         match ResponseBlock::of(main) {
-            Ok(main) => Ok(Self { main: main.to_owned(), sub: SubResponse::from_bytes(sub) }),
+            Ok(main) => Ok(Self { main: main.to_owned(), sub: SubResponse::parse(sub) }),
             Err(e) => Err(e),
         }
     }
@@ -287,7 +265,7 @@ impl Response32 {
         ResponseBlock::of(main)?.check_strict()?;
         if !response.sub.cmd_error {
             let code = response.sub.code.get();
-            return if SubCode::new(code).is_some() { Ok(response) } else { Err(Error::SubCommandCode { code }) };
+            return if SubCode::from_code(code).is_some() { Ok(response) } else { Err(Error::SubCommandCode { code }) };
         }
         let zero = (16..).zip(sub).filter(|(byte, _)| matches!(byte, 17 | 20..=23));
         for (byte, &bits) in zero {
@@ -300,13 +278,7 @@ impl Response32 {
 
     /// The block.
     pub fn emit(&self) -> [u8; LEN32] {
-        join32(&self.main.emit(), &self.sub.to_bytes())
-    }
-}
-
-impl fmt::Display for SubCode {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.pad(self.name())
+        join32(&self.main.emit(), &self.sub.emit())
     }
 }
 
@@ -320,7 +292,7 @@ impl fmt::Display for SubCommand {
 impl fmt::Display for SubResponse {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str("sub ")?;
-        f.write_str(SubCode::new(self.code.get()).map_or("undefined", SubCode::name))?;
+        f.write_str(SubCode::from_code(self.code.get()).map_or("undefined", SubCode::name))?;
         match self.error_code() {
             Some(code) => write!(f, " not accepted: {code}")?,
             None => write!(f, " type {:02X}h index {}", self.type_code, self.index)?,

@@ -12,6 +12,22 @@ pub struct Periods {
     pub internal_timer: bool,
 }
 
+/// The parameters that choose the periods of an A6N drive.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct A6nParameters {
+    /// Pr7.20: -1 makes Pr7.91 count.
+    pub pr7_20: i32,
+    /// Pr7.21: communication periods in an update period.
+    pub pr7_21: u32,
+    /// Pr7.91: communication period, ns.
+    pub pr7_91: u32,
+}
+
+servowire_core::one_line!(A6nParameters {
+    Self { pr7_20, pr7_21, pr7_91 } => "Pr7.20 = {}, Pr7.21 = {}, Pr7.91 = {}", pr7_20, pr7_21, pr7_91;
+});
+
 impl Periods {
     const fn of(com_ns: u32, per_update: u32, internal_timer: bool) -> Self {
         Self { com_ns, update_ns: com_ns.wrapping_mul(per_update), internal_timer }
@@ -25,10 +41,9 @@ impl Periods {
         }
     }
 
-    /// Pr7.20, Pr7.21 and Pr7.91 of an A6N drive for this pair: -1, the communications an update, and the
-    /// communication period in ns.
-    pub const fn a6n_parameters(&self) -> (i32, u32, u32) {
-        (-1, self.communications(), self.com_ns)
+    /// The parameters of an A6N drive for this pair: -1, the communications an update, and the communication period in ns.
+    pub const fn a6n_parameters(&self) -> A6nParameters {
+        A6nParameters { pr7_20: -1, pr7_21: self.communications(), pr7_91: self.com_ns }
     }
 
     /// Communication periods by which new commands go out late, if the exchange that writes them ends `end_ns` after the
@@ -186,7 +201,7 @@ mod tests {
     #[test]
     fn the_table_agrees_with_its_parameters() {
         for periods in A6N {
-            let (pr7_20, pr7_21, pr7_91) = periods.a6n_parameters();
+            let A6nParameters { pr7_20, pr7_21, pr7_91 } = periods.a6n_parameters();
             assert_eq!(Periods::from_a6n(pr7_20, i32::try_from(pr7_21).unwrap(), Some(pr7_91.into())), Some(periods));
             assert_eq!(periods.update_ns, periods.com_ns * pr7_21);
             assert_eq!(TimerSystem::Internal.allows(&periods), pr7_21 == 1);

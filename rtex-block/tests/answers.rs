@@ -13,11 +13,11 @@ mod common;
 use core::num::NonZeroU16;
 
 use common::{CODES, Pair, limits, monitor};
-use rtex_block::device::{Behaviour, DriveConfig};
+use rtex_block::device::{Behaviour, DriveConfig, Fault};
 use rtex_block::master::procedure::{Home, Latch, ReadText};
 use rtex_block::master::{
-    ActiveCode, Axis, AxisConfig, AxisState, Failure, Handshake, Limits, MoveStage, ProfileMove, Progress, Received,
-    Ring, ServoOff, StopPolicy, StopReason, SubHandshake, Turn,
+    ActiveCode, Axis, AxisConfig, AxisState, Failure, Handshake, Heard, Limits, MoveStage, ProfileMove, Progress, Ring,
+    ServoOff, StopPolicy, StopReason, SubHandshake, Turn,
 };
 use rtex_block::{
     Alarm, Command, CommandBlock, ControlBits, CyclicCode, ErrorCode, MacId, Nibble, NonCyclicCommand, Response,
@@ -104,11 +104,11 @@ fn switching_off_without_a_response() {
     pair.switch_on();
     pair.axis.switch_off();
     for _ in 0..5 {
-        pair.received = Received::Nothing;
+        pair.received = Heard::Nothing;
         pair.update();
         assert_eq!(pair.axis.state(), AxisState::SwitchingOff);
     }
-    pair.received = Received::Nothing;
+    pair.received = Heard::Nothing;
     pair.update();
     assert_eq!(pair.axis.state(), AxisState::Stopped(StopReason::InactiveTimeout));
 }
@@ -181,7 +181,7 @@ fn a_motion_takes_its_own_answers_only() {
 /// that never echoes it holds the axis up for the limit only.
 #[test]
 fn requests_are_released_by_the_echo() {
-    let mut pair = Pair::new(ActiveCode::CyclicPosition, Behaviour::POLITE.with_echo_lag(3));
+    let mut pair = Pair::new(ActiveCode::CyclicPosition, Behaviour::new().with_echo_lag(3));
     pair.wide = true;
     pair.until("off", |pair| pair.axis.state() == AxisState::Off);
     pair.axis.ask(monitor(0x07)).unwrap();
@@ -190,7 +190,7 @@ fn requests_are_released_by_the_echo() {
     let mut echoed = [false; 2];
     for _ in 0..40 {
         // What the axis is about to receive.
-        if let Received::Both(response) = pair.received {
+        if let Heard::Both(response) = pair.received {
             echoed[0] |= answered[0] && response.main.code.get() == 0x20;
             echoed[1] |= answered[1] && response.sub.code.get() == 0x00;
         }
@@ -203,7 +203,7 @@ fn requests_are_released_by_the_echo() {
     }
     assert_eq!((answered, echoed), ([true; 2], [true; 2]));
     // The echo of the normal command never comes.
-    let mut pair = Pair::new(ActiveCode::CyclicPosition, Behaviour::POLITE);
+    let mut pair = Pair::new(ActiveCode::CyclicPosition, Behaviour::new());
     pair.wide = true;
     pair.until("off", |pair| pair.axis.state() == AxisState::Off);
     pair.axis.ask(monitor(0x07)).unwrap();
@@ -212,7 +212,7 @@ fn requests_are_released_by_the_echo() {
     let mut free = [None; 2];
     for _ in 0..200 {
         pair.update();
-        if let Received::Both(Response32 { main, sub }) = &mut pair.received {
+        if let Heard::Both(Response32 { main, sub }) = &mut pair.received {
             (main.code, sub.code) = (rtex_block::Code::truncate(0x2a), Nibble::new(0x0a).unwrap());
             let mut block = Response32 { main: *main, sub: *sub }.emit();
             // As long as it is asked the answers are the drive's own.
@@ -257,13 +257,13 @@ fn which_refusals_count() {
     let mut pair = on(ActiveCode::CyclicPosition);
     pair.axis.ask(monitor(0x07)).unwrap();
     pair.update();
-    pair.received = Received::Main(with_first_byte(answer(0xa0, 0xc1, 0x34, 0), 0x89 | pair.counter.last().get() << 5));
+    pair.received = Heard::Main(with_first_byte(answer(0xa0, 0xc1, 0x34, 0), 0x89 | pair.counter.last().get() << 5));
     pair.update();
     assert_eq!(pair.axis.state(), AxisState::Stopped(StopReason::CommandError(ErrorCode(0x34))));
     // A code that was not asked for is refused.
     let mut pair = on(ActiveCode::CyclicPosition);
     pair.update();
-    pair.received = Received::Main(with_first_byte(answer(0xaa, 0xc1, 0x31, 0), 0x89 | pair.counter.last().get() << 5));
+    pair.received = Heard::Main(with_first_byte(answer(0xaa, 0xc1, 0x31, 0), 0x89 | pair.counter.last().get() << 5));
     pair.update();
     assert_eq!(pair.axis.state(), AxisState::Stopped(StopReason::CommandError(ErrorCode(0x31))));
 }
@@ -271,7 +271,7 @@ fn which_refusals_count() {
 /// A motion that has ended and was not taken yet leaves the set-point alone.
 #[test]
 fn a_motion_that_is_over_is_over() {
-    let mut pair = Pair::on(ActiveCode::ProfilePosition, Behaviour::POLITE);
+    let mut pair = Pair::on(ActiveCode::ProfilePosition, Behaviour::new());
     pair.axis.start_move(0x11, 30_000, 2_000_000).unwrap();
     pair.until("ended", |pair| pair.axis.profile().unwrap().stage() == MoveStage::Ended);
     pair.until("at the target", |pair| pair.drive.position() == 30_000);
@@ -281,7 +281,7 @@ fn a_motion_that_is_over_is_over() {
     pair.until("at the target", |pair| pair.drive.position() == 20_000);
     (0..4).for_each(|_| pair.update());
     pair.axis.set_mode(ActiveCode::CyclicPosition).unwrap();
-    let block = pair.axis.send(Turn::Valid(pair.counter.last().next())).main.emit();
+    let block = pair.axis.transmission(Turn::Valid(pair.counter.last().next())).main.emit();
     assert_eq!(i32::from_le_bytes(block[4..8].try_into().unwrap()), 20_000);
     (0..50).for_each(|_| pair.update());
     assert_eq!((pair.drive.position(), pair.axis.state()), (20_000, AxisState::On));
@@ -290,7 +290,7 @@ fn a_motion_that_is_over_is_over() {
 /// The time that a procedure has left is that of its present request.
 #[test]
 fn what_is_left_of_a_limit() {
-    let mut pair = Pair::new(ActiveCode::CyclicPosition, Behaviour::POLITE.with_echo_lag(2));
+    let mut pair = Pair::new(ActiveCode::CyclicPosition, Behaviour::new().with_echo_lag(2));
     pair.until("off", |pair| pair.axis.state() == AxisState::Off);
     let mut text = ReadText::new(TypeCode::short(0x01));
     let left: Vec<_> = (0..6)
@@ -309,10 +309,10 @@ fn what_is_left_of_a_limit() {
 /// What a motion with a latch sends: code 17h with type, Latch_Sel1, Monitor_Sel and speed, which may change.
 #[test]
 fn what_a_motion_sends() {
-    let mut pair = Pair::on(ActiveCode::ProfilePosition, Behaviour::POLITE);
+    let mut pair = Pair::on(ActiveCode::ProfilePosition, Behaviour::new());
     pair.axis.start_move_with_latch(0x11, 3_000_000, 1_000, Nibble::new(3).unwrap(), 0x09).unwrap();
     pair.until("moving", |pair| pair.axis.profile().unwrap().is_moving());
-    let block = |pair: &Pair| pair.axis.send(Turn::Valid(pair.counter.last().next())).main.emit();
+    let block = |pair: &Pair| pair.axis.transmission(Turn::Valid(pair.counter.last().next())).main.emit();
     assert_eq!(block(&pair)[1..4], [0x17, 0x80, 0]);
     assert_eq!(block(&pair)[4..8], 3_000_000_i32.to_le_bytes());
     assert_eq!(block(&pair)[8..], [0x11, 0, 3, 0x09, 0xe8, 0x03, 0, 0]);
@@ -323,7 +323,7 @@ fn what_a_motion_sends() {
 /// Axis 1 of two that slows down, by the policy; the first has an alarm.
 struct Two {
     ring: Ring<2>,
-    alarm: Received,
+    alarm: Heard,
     echo: u8,
 }
 
@@ -333,10 +333,10 @@ impl Two {
         let axis = |number, mode| AxisConfig::new(MacId::new(number).unwrap(), mode, 500_000, limits);
         let second = axis(9, mode).with_stop(StopPolicy::Decelerate { per_update });
         let ring = Ring::new([axis(8, ActiveCode::CyclicPosition), second].map(Axis::new), 0).unwrap();
-        let mut two = Self { ring, alarm: Received::Nothing, echo: 0 };
+        let mut two = Self { ring, alarm: Heard::Nothing, echo: 0 };
         two.update(0x41);
         two.update(0x41);
-        assert!(two.ring.switch_on());
+        two.ring.switch_on().unwrap();
         two.update(0xc1);
         two.update(0xc1);
         assert!(two.ring.all_are(AxisState::On));
@@ -347,9 +347,9 @@ impl Two {
     fn update(&mut self, status: u8) -> ([u8; 2], i32) {
         let code = 0x20;
         let first = with_first_byte(answer(code, status, 0, 0), 0x88 | self.echo << 5);
-        let first = if self.alarm == Received::Nothing { Received::Main(first) } else { self.alarm };
-        let second = Received::Main(with_first_byte(answer(code, status, 0, 0), 0x89 | self.echo << 5));
-        let [_, command] = self.ring.update(&[first, second]);
+        let first = if self.alarm == Heard::Nothing { Heard::Main(first) } else { self.alarm };
+        let second = Heard::Main(with_first_byte(answer(code, status, 0, 0), 0x89 | self.echo << 5));
+        let [_, command] = self.ring.update(&[first, second], 0);
         self.echo = command.main.update_counter.get();
         let block = command.main.emit();
         ([block[2], block[3]], i32::from_le_bytes(block[4..8].try_into().unwrap()))
@@ -360,7 +360,7 @@ impl Two {
     }
 
     fn fail(&mut self) -> ([u8; 2], i32) {
-        self.alarm = Received::Main(with_first_byte(answer(0x20, 0x61, 0, 0), 0x88 | self.echo << 5));
+        self.alarm = Heard::Main(with_first_byte(answer(0x20, 0x61, 0, 0), 0x88 | self.echo << 5));
         self.update(0xc1)
     }
 }
@@ -390,9 +390,9 @@ fn switching_off_ends_the_deceleration() {
     let mut two = Two::new(ActiveCode::CyclicVelocity, 1);
     two.axis().set_rate(1_000).unwrap();
     two.fail();
-    assert_eq!(two.axis().state(), AxisState::Stopping(StopReason::OtherAxis(0)));
+    assert_eq!(two.axis().state(), AxisState::Stopping(StopReason::OtherAxis { place: 0 }));
     two.ring.switch_off();
-    assert_eq!(two.axis().state(), AxisState::Stopped(StopReason::OtherAxis(0)));
+    assert_eq!(two.axis().state(), AxisState::Stopped(StopReason::OtherAxis { place: 0 }));
     assert_eq!(two.update(0xc1).0, [0, 0]);
 }
 
@@ -404,7 +404,7 @@ fn smooth_stop_beside_the_bits_of_the_caller() {
         two.axis().set_control(control);
         // In_Progress: there is a motion to be ended.
         two.update(0xc3);
-        two.alarm = Received::Main(with_first_byte(answer(0x20, 0x61, 0, 0), 0x88 | two.echo << 5));
+        two.alarm = Heard::Main(with_first_byte(answer(0x20, 0x61, 0, 0), 0x88 | two.echo << 5));
         let ([two_, three], _) = two.update(0xc3);
         assert_eq!((two_, three & 0x40), (0x80, 0x40), "{control}");
         assert_eq!(three & 0x01, u8::from(control == ControlBits::EX_OUT1));
@@ -423,12 +423,12 @@ fn which_flags_end_a_homing() {
         status.remove(StatusFlags::IN_PROGRESS);
     };
     for (spoil, ends) in [(keep, true), (complete, true), (still, true), (neither, false)] {
-        let mut pair = Pair::on(ActiveCode::ProfilePosition, Behaviour::POLITE);
+        let mut pair = Pair::on(ActiveCode::ProfilePosition, Behaviour::new());
         let mut home = Home::new(0xc8, 1_000);
         let mut ended = Progress::Pending { left: 0 };
         for _ in 0..2_000 {
             pair.update();
-            if let Received::Main(response) = &mut pair.received {
+            if let Heard::Main(response) = &mut pair.received {
                 spoil(&mut response.status);
             }
             ended = home.receive(&mut pair.axis);
@@ -446,7 +446,7 @@ fn which_flags_end_a_homing() {
 /// Arming that is refused fails at once.
 #[test]
 fn a_latch_that_cannot_be_armed() {
-    let mut pair = Pair::on(ActiveCode::CyclicPosition, Behaviour::POLITE);
+    let mut pair = Pair::on(ActiveCode::CyclicPosition, Behaviour::new());
     let mut latch = Latch::first(0xee, Nibble::ZERO, 300);
     let refused = Progress::Failed { error: Failure::CommandError(ErrorCode(0x31)) };
     assert_eq!(pair.run(|axis| latch.receive(axis)), refused);
@@ -475,10 +475,10 @@ fn servo_off_after_a_command() {
 /// A servo-off at any time is a servo-off: the block of an axis that an alarm has stopped.
 #[test]
 fn an_alarm_is_answered_with_servo_off() {
-    let mut pair = Pair::on(ActiveCode::CyclicPosition, Behaviour::POLITE);
-    pair.drive.raise(Alarm { main: 16, sub: 0 });
+    let mut pair = Pair::on(ActiveCode::CyclicPosition, Behaviour::new());
+    pair.drive.set_fault(Fault::Alarm(Alarm { main: 16, sub: 0 }));
     (0..3).for_each(|_| pair.update());
-    let block = pair.axis.send(Turn::Valid(pair.counter.last().next())).main.emit();
+    let block = pair.axis.transmission(Turn::Valid(pair.counter.last().next())).main.emit();
     assert!(CommandBlock::of(&block).unwrap().is_servo_off());
     assert!(pair.axis.ask(NonCyclicCommand::IDLE).is_err());
 }

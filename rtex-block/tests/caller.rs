@@ -13,8 +13,8 @@ mod common;
 
 use common::Pair;
 use proptest::prelude::*;
-use rtex_block::device::Behaviour;
-use rtex_block::master::{ActiveCode, AxisState, Received, StopReason};
+use rtex_block::device::{Behaviour, Fault};
+use rtex_block::master::{ActiveCode, AxisState, Heard, StopReason};
 use rtex_block::{
     Alarm, CommandBlock, ControlBits, Nibble, NonCyclicCode, NonCyclicCommand, Response, SubCode, TypeCode,
 };
@@ -81,7 +81,7 @@ fn act(pair: &mut Pair, action: Action) {
     let Pair { axis, drive, .. } = pair;
     match action {
         Action::Nothing => {}
-        Action::SwitchOn => _ = axis.switch_on(),
+        Action::SwitchOn => _ = axis.switch_on().ok(),
         Action::SwitchOff => axis.switch_off(),
         Action::Clear => axis.clear(),
         Action::Stop => axis.stop(StopReason::Requested),
@@ -95,19 +95,19 @@ fn act(pair: &mut Pair, action: Action) {
             _ = axis.start_move_with_latch(code, to, at, Nibble::truncate(sel), sel);
         }
         Action::MoveSpeed(at) => _ = axis.set_move_speed(at),
-        Action::Ask(code, bytes) => _ = axis.ask(NonCyclicCommand::from_bytes(code, bytes)),
+        Action::Ask(code, bytes) => _ = axis.ask(NonCyclicCommand::parse(code, bytes)),
         Action::Sub(type_code) => _ = axis.ask_sub(SubCode::Monitor, type_code, 0),
         Action::Mode(k) => _ = axis.set_mode(modes[usize::from(k)]),
         Action::Take => {
             let _ = (axis.take_outcome(), axis.take_move(), axis.take_sub_outcome());
         }
-        Action::Alarm => drive.raise(Alarm { main: 16, sub: 0 }),
+        Action::Alarm => drive.set_fault(Fault::Alarm(Alarm { main: 16, sub: 0 })),
         Action::ClearAlarm => drive.clear_alarm(),
-        Action::Power(on) => drive.set_main_power(on),
-        Action::Drop => drive.drop_servo(),
-        Action::Lose => pair.received = Received::Nothing,
+        Action::Power(on) => drive.set_fault(if on { Fault::None } else { Fault::NoMainPower }),
+        Action::Drop => drive.set_fault(Fault::ServoDrop),
+        Action::Lose => pair.received = Heard::Nothing,
         Action::Spoil(bit) => {
-            if let Received::Main(response) = pair.received {
+            if let Heard::Main(response) = pair.received {
                 let mut block = response.emit();
                 block[usize::from(bit / 8)] ^= 1 << (bit % 8);
                 pair.received = Response::parse(&block).into();
@@ -123,13 +123,13 @@ proptest! {
     /// each period and both ways round; and a refused set-point changes nothing.
     #[test]
     fn no_caller_gets_around_the_servo_off(actions in proptest::collection::vec(action(), 0..300), polite: bool) {
-        let behaviour = if polite { Behaviour::POLITE } else { Behaviour::POLITE.with_servo_off_late(5).with_echo_lag(2) };
+        let behaviour = if polite { Behaviour::new() } else { Behaviour::new().with_servo_off_late(5).with_echo_lag(2) };
         let mut pair = Pair::new(ActiveCode::CyclicPosition, behaviour);
         pair.until("off", |pair| pair.axis.state() == AxisState::Off);
         for action in actions {
             act(&mut pair, action);
             // The axis between two updates, before anything is received.
-            let block = pair.axis.send(pair.counter.next()).main.emit();
+            let block = pair.axis.transmission(pair.counter.next()).main.emit();
             let off = CommandBlock::of(&block).unwrap().is_servo_off();
             prop_assert_eq!(off, !pair.axis.state().is_servo_on());
             pair.update();

@@ -10,9 +10,9 @@
 
 use core::num::NonZeroU16;
 
-use rtex_block::device::{Drive, DriveConfig, OpenCodes};
+use rtex_block::device::{Drive, DriveConfig, Fault, OpenCodes};
 use rtex_block::master::{
-    ActiveCode, AskError, Axis, AxisConfig, AxisState, CommandCounter, Failure, Limits, MoveStage, Progress, Received,
+    ActiveCode, AskError, Axis, AxisConfig, AxisState, CommandCounter, Failure, Heard, Limits, MoveStage, Progress,
     SetpointError, StopReason,
 };
 use rtex_block::type_code::{homing, monitor, parameter, profile, system_id};
@@ -66,16 +66,16 @@ impl Pair {
     fn on(mode: ActiveCode) -> Self {
         let mut pair = Self::new(mode);
         pair.until(|pair| pair.axis.state() == AxisState::Off);
-        assert!(pair.axis.switch_on());
+        pair.axis.switch_on().unwrap();
         pair.until(|pair| pair.axis.state() == AxisState::On);
         pair
     }
 
     fn update(&mut self) {
-        let received = self.response.map_or(Received::Nothing, Received::Main);
-        self.axis.receive(self.sent, &received);
+        let received = self.response.map_or(Heard::Nothing, Heard::Main);
+        self.axis.hear(self.sent, &received, 0);
         self.sent = self.counter.next();
-        let block = self.drive.exchange(&self.axis.send(self.sent).main.emit());
+        let block = self.drive.hear(&self.axis.transmission(self.sent).main.emit()).unwrap();
         self.response = Some(Response::parse_strict(&block).unwrap());
     }
 
@@ -174,7 +174,7 @@ fn requests_of_every_kind() {
 fn alarms_stop_the_axis_and_can_be_read_and_cleared() {
     let mut pair = Pair::on(ActiveCode::CyclicPosition);
     pair.drive.set_warning(0xa0);
-    pair.drive.raise(Alarm { main: 38, sub: 1 });
+    pair.drive.set_fault(Fault::Alarm(Alarm { main: 38, sub: 1 }));
     pair.until(|pair| matches!(pair.axis.state(), AxisState::Stopped(_)));
     assert_eq!(pair.axis.state(), AxisState::Stopped(StopReason::Alarm));
     assert_eq!(pair.axis.set_position(0), Err(SetpointError::NotOn));
@@ -185,10 +185,10 @@ fn alarms_stop_the_axis_and_can_be_read_and_cleared() {
     assert_eq!(history, Results::alarm_data(Alarm { main: 38, sub: 1 }, 0));
     pair.value(NonCyclicCommand::Alarm(about(CODES.alarm_clear, 0, 0)));
     assert_eq!(pair.drive.alarm(), None);
-    assert!(!pair.axis.switch_on());
+    assert!(pair.axis.switch_on().is_err());
     pair.axis.clear();
     pair.until(|pair| pair.axis.state() == AxisState::Off);
-    assert!(pair.axis.switch_on());
+    pair.axis.switch_on().unwrap();
 }
 
 /// Code 10h, then 17h; the motion ends on its target and the next one can start.
@@ -290,7 +290,7 @@ fn a_move_across_the_wrap() {
         setting_data: i32::MAX - 5,
     });
     pair.update();
-    assert!(pair.axis.switch_on());
+    pair.axis.switch_on().unwrap();
     pair.until(|pair| pair.axis.state() == AxisState::On);
     pair.axis.set_position(i32::MIN + 100).unwrap();
     pair.until(|pair| pair.drive.position() == i32::MIN + 100);
@@ -310,8 +310,8 @@ fn pipeline_of_the_echoes() {
         counter = counter.next();
         let sent = command(counter, if k % 3 == 0 { ask } else { NonCyclicCommand::IDLE });
         let code = sent.code().get();
-        let first = Response::parse(&drive.exchange(&sent.emit())).unwrap();
-        let second = Response::parse(&drive.exchange(&sent.emit())).unwrap();
+        let first = Response::parse(&drive.hear(&sent.emit()).unwrap()).unwrap();
+        let second = Response::parse(&drive.hear(&sent.emit()).unwrap()).unwrap();
         assert_eq!((first.code.get(), first.update_counter_echo), (last_code, counter));
         assert_eq!((second.code.get(), second.update_counter_echo), (code, counter));
         last_code = code;
@@ -326,11 +326,11 @@ fn zeros_do_not_switch_off() {
     let mut zeros = [0; 16];
     zeros[0] = mac_id().get();
     for _ in 0..20 {
-        pair.drive.exchange(&zeros);
+        pair.drive.hear(&zeros).unwrap();
     }
     assert!(pair.drive.is_active());
-    let off = pair.axis.send(pair.sent).main;
-    pair.drive.exchange(&Command { control: ControlBits::empty(), ..off }.emit());
+    let off = pair.axis.transmission(pair.sent).main;
+    pair.drive.hear(&Command { control: ControlBits::empty(), ..off }.emit()).unwrap();
     assert!(!pair.drive.is_active());
 }
 
@@ -345,12 +345,12 @@ fn lasting_faults_raise_alarms() {
     ];
     for (spoil, error, alarm) in cases {
         let mut pair = Pair::on(ActiveCode::CyclicPosition);
-        let mut block = pair.axis.send(pair.sent).main.emit();
+        let mut block = pair.axis.transmission(pair.sent).main.emit();
         spoil(&mut block);
         let limit = pair.drive.config().fault_limit;
         for k in 1..=limit {
             assert!(pair.drive.is_active());
-            let response = Response::parse(&pair.drive.exchange(&block)).unwrap();
+            let response = Response::parse(&pair.drive.hear(&block).unwrap()).unwrap();
             if k > 1 {
                 assert_eq!(response.noncyclic(), NonCyclicResponse::CommandError(error));
                 assert_eq!(response.code.get(), block[1] & 0x7f);
@@ -366,9 +366,9 @@ fn lasting_faults_raise_alarms() {
         let control = ControlBits::SERVO_ON;
         let mut block = Command { control, ..Command::idle(mac_id(), counter) }.emit();
         block[1] = 0x23;
-        pair.drive.exchange(&block);
+        pair.drive.hear(&block).unwrap();
     }
-    let response = Response::parse(&pair.drive.exchange(&[9; 16])).unwrap();
+    let response = Response::parse(&pair.drive.hear(&[9; 16]).unwrap()).unwrap();
     assert_eq!(
         (response.code.get(), response.noncyclic()),
         (0x23, NonCyclicResponse::CommandError(ErrorCode::NON_CYCLIC_CODE))
@@ -379,11 +379,11 @@ fn lasting_faults_raise_alarms() {
 #[test]
 fn a_counter_that_stands_still_raises_err86_2() {
     let mut pair = Pair::on(ActiveCode::CyclicPosition);
-    let block = pair.axis.send(pair.sent).main.emit();
+    let block = pair.axis.transmission(pair.sent).main.emit();
     let limit = pair.drive.config().counter_limit;
     for _ in 0..limit {
         assert_eq!(pair.drive.alarm(), None);
-        pair.drive.exchange(&block);
+        pair.drive.hear(&block).unwrap();
     }
     assert_eq!(pair.drive.alarm(), Some(Alarm::UPDATE_COUNTER));
 }
@@ -398,7 +398,7 @@ fn sub_blocks() {
             counter = counter.next();
             let mut block = Command32 { main: Command::idle(mac_id(), counter), sub }.emit();
             block[16] ^= spoil;
-            seen = Some(Response32::parse(&drive.exchange32(&block)).unwrap());
+            seen = Some(Response32::parse(&drive.hear(&block).unwrap()).unwrap());
         }
         seen.unwrap()
     };
@@ -417,8 +417,8 @@ fn a_pair_of_codes_that_does_not_go_together() {
     let mut drive = Drive::new(DriveConfig::new(mac_id(), CODES));
     let mut block = Command::idle(mac_id(), UpdateCounter::ZERO.next()).emit();
     block[1] = 0x27;
-    drive.exchange(&block);
-    let response = Response::parse(&drive.exchange(&block)).unwrap();
+    drive.hear(&block).unwrap();
+    let response = Response::parse(&drive.hear(&block).unwrap()).unwrap();
     assert_eq!(response.noncyclic(), NonCyclicResponse::CommandError(ErrorCode::CYCLIC_MODE));
     assert_eq!(response.code.cyclic(), Some(CyclicCode::CyclicPosition));
 }
@@ -433,7 +433,7 @@ fn inputs_and_power_show_in_the_status() {
             && pair.axis.status().contains(StatusFlags::SI_MON2)
             && !pair.axis.status().contains(StatusFlags::ALARM)
     );
-    pair.drive.set_main_power(false);
+    pair.drive.set_fault(Fault::NoMainPower);
     pair.until(|pair| pair.axis.state() != AxisState::On);
     assert_eq!(pair.axis.state(), AxisState::Stopped(StopReason::NotReady));
 }
@@ -442,14 +442,14 @@ fn inputs_and_power_show_in_the_status() {
 fn limits_of_the_states() {
     // Servo_Ready never comes.
     let mut pair = Pair::new(ActiveCode::CyclicPosition);
-    pair.drive.set_main_power(false);
+    pair.drive.set_fault(Fault::NoMainPower);
     pair.until(|pair| pair.axis.state() != AxisState::Starting);
     assert_eq!(pair.axis.state(), AxisState::Stopped(StopReason::ReadyTimeout));
     // Servo_Active never comes.
     let mut pair = Pair::new(ActiveCode::CyclicPosition);
     pair.drive = Drive::new(pair.drive.config().with_servo_on_updates(u16::MAX));
     pair.until(|pair| pair.axis.state() == AxisState::Off);
-    assert!(pair.axis.switch_on());
+    pair.axis.switch_on().unwrap();
     pair.until(|pair| pair.axis.state() != AxisState::SwitchingOn);
     assert_eq!(pair.axis.state(), AxisState::Stopped(StopReason::ActiveTimeout));
     // A request is never answered.

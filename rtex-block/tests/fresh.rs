@@ -5,13 +5,15 @@ mod common;
 
 use core::num::NonZeroU16;
 
-use common::{Pair, limits, set_position};
+use common::{Pair, actual, limits, set_position};
 use rtex_block::device::Behaviour;
 use rtex_block::master::procedure::Home;
-use rtex_block::master::{ActiveCode, Axis, AxisConfig, AxisState, Failure, Limits, Progress, Received, Turn};
+use rtex_block::master::{
+    ActiveCode, Axis, AxisConfig, AxisState, Failure, Heard, Limits, Progress, StopReason, SwitchOnError, Turn,
+};
 use rtex_block::{
-    Arguments, Doubt, ErrorCode, MacId, NonCyclicCommand, Pr, Response, Response32, StatusFlags, SubCode, TypeCode,
-    UpdateCounter,
+    Arguments, Doubt, ErrorClass, ErrorCode, MacId, NonCyclicCommand, Policy, Pr, Response, Response32, StatusFlags,
+    SubCode, TypeCode, UpdateCounter,
 };
 
 fn mac_id() -> MacId {
@@ -27,8 +29,8 @@ fn a_block_that_was_thrown_away_refuses_nothing() {
     // A motion of which one block is damaged at any time is made, and made once.
     for damaged in 0..15 {
         for bit in [0x01, 0x80] {
-            let mut pair = Pair::on(ActiveCode::ProfilePosition, Behaviour::POLITE);
-            let start = pair.axis.actual_position();
+            let mut pair = Pair::on(ActiveCode::ProfilePosition, Behaviour::new());
+            let start = pair.actual();
             pair.axis.start_move(0x11, 5_000, 2_000_000).unwrap();
             let mut ended = None;
             for now in 0..200 {
@@ -36,21 +38,21 @@ fn a_block_that_was_thrown_away_refuses_nothing() {
                 ended = ended.or(pair.axis.take_move().filter(|progress| !progress.is_pending()));
             }
             assert!(matches!(ended, Some(Progress::Done { .. })), "{damaged} {bit:x}: {ended:?}");
-            assert_eq!(pair.axis.actual_position(), start + 5_000, "{damaged} {bit:x}");
+            assert_eq!(pair.actual(), start + 5_000, "{damaged} {bit:x}");
         }
     }
     // Sub_Chk = 0 in one block: the sub-command is asked for again.
-    let mut pair = Pair::new(ActiveCode::CyclicPosition, Behaviour::POLITE);
+    let mut pair = Pair::new(ActiveCode::CyclicPosition, Behaviour::new());
     pair.wide = true;
-    pair.until("off", |pair| pair.axis.can_switch_on());
+    pair.until("off", |pair| pair.axis.can_switch_on().is_ok());
     pair.axis.ask_sub(SubCode::Monitor, 0x07, 0).unwrap();
     let mut outcome = None;
     for now in 0..20 {
-        pair.axis.receive(pair.sent, &pair.received);
+        pair.axis.hear(pair.sent, &pair.received, 0);
         pair.sent = pair.counter.next();
-        let mut bytes = pair.axis.send(pair.sent).emit();
+        let mut bytes = pair.axis.transmission(pair.sent).emit();
         bytes[16] ^= if now == 1 { 0x80 } else { 0 };
-        pair.received = Response32::parse_strict(&pair.drive.exchange32(&bytes)).into();
+        pair.received = Response32::parse_strict(&pair.drive.hear(&bytes).unwrap()).into();
         outcome = outcome.or(pair.axis.take_sub_outcome());
     }
     assert!(matches!(outcome, Some(Progress::Done { .. })), "{outcome:?}");
@@ -58,11 +60,11 @@ fn a_block_that_was_thrown_away_refuses_nothing() {
 
 /// An update period of which the command's first byte is damaged.
 fn update_with(pair: &mut Pair, damage: u8) {
-    pair.axis.receive(pair.sent, &pair.received);
+    pair.axis.hear(pair.sent, &pair.received, 0);
     pair.sent = pair.counter.next();
-    let mut main = pair.axis.send(pair.sent).main.emit();
+    let mut main = pair.axis.transmission(pair.sent).main.emit();
     main[0] ^= damage;
-    pair.received = Response::parse_strict(&pair.drive.exchange(&main)).into();
+    pair.received = Response::parse_strict(&pair.drive.hear(&main).unwrap()).into();
 }
 
 /// One flip in the address of any block while the position is being set: it is set once, and said to be.
@@ -70,8 +72,8 @@ fn update_with(pair: &mut Pair, damage: u8) {
 fn a_damaged_block_does_not_spoil_a_request() {
     for damaged in 0..12 {
         for bit in [0x01, 0x80] {
-            let mut pair = Pair::new(ActiveCode::CyclicPosition, Behaviour::POLITE);
-            pair.until("off", |pair| pair.axis.can_switch_on());
+            let mut pair = Pair::new(ActiveCode::CyclicPosition, Behaviour::new());
+            pair.until("off", |pair| pair.axis.can_switch_on().is_ok());
             pair.axis.ask(set_position(0x21, 123_456)).unwrap();
             let mut outcome = None;
             for now in 0..40 {
@@ -79,7 +81,7 @@ fn a_damaged_block_does_not_spoil_a_request() {
                 outcome = outcome.or(pair.axis.take_outcome());
             }
             assert!(matches!(outcome, Some(Progress::Done { .. })), "{damaged} {bit:x}: {outcome:?}");
-            assert_eq!(pair.axis.actual_position(), 123_456);
+            assert_eq!(pair.actual(), 123_456);
         }
     }
 }
@@ -98,7 +100,7 @@ fn an_answer_that_lingers_is_not_that_of_the_next_request() {
         let eight = if code == 0x26 { 0x11 } else { 0 };
         (block[0], block[1], block[2], block[8]) = (0x89 | counter.get() << 5, code, 0x40, eight);
         (block[10], block[11]) = if code == 0x26 { (3, 5) } else { (0, 0) };
-        axis.receive(Turn::Valid(counter), &Response::parse(&block).into());
+        axis.hear(Turn::Valid(counter), &Response::parse(&block).into(), 0);
         axis.take_outcome()
     };
     let write = |data| NonCyclicCommand::Parameter(Arguments { type_code: TypeCode::short(0x11), index: 0x0503, data });
@@ -117,7 +119,7 @@ fn an_answer_that_lingers_is_not_that_of_the_next_request() {
 }
 
 /// What the axis heard when that came.
-fn answer(pair: &mut Pair, mut came: impl FnMut(&mut Axis) -> bool) -> Received {
+fn answer(pair: &mut Pair, mut came: impl FnMut(&mut Axis) -> bool) -> Heard {
     loop {
         let received = pair.received;
         pair.update();
@@ -128,11 +130,11 @@ fn answer(pair: &mut Pair, mut came: impl FnMut(&mut Axis) -> bool) -> Received 
 }
 
 /// The axis hears this, and nothing of what it sends comes to the drive.
-fn hears(pair: &mut Pair, received: Received, periods: u32) {
+fn hears(pair: &mut Pair, received: Heard, periods: u32) {
     for _ in 0..periods {
-        pair.axis.receive(pair.sent, &received);
+        pair.axis.hear(pair.sent, &received, 0);
         pair.sent = pair.counter.next();
-        let _ = pair.axis.send(pair.sent);
+        let _ = pair.axis.transmission(pair.sent);
     }
 }
 
@@ -145,11 +147,11 @@ fn an_answer_is_not_taken_twice() {
         let index = Pr { class: 7, number: 25 }.index();
         NonCyclicCommand::Parameter(Arguments { type_code: TypeCode::short(0x11), index, data })
     };
-    let mut pair = Pair::new(ActiveCode::CyclicPosition, Behaviour::POLITE);
+    let mut pair = Pair::new(ActiveCode::CyclicPosition, Behaviour::new());
     pair.until("off", |pair| pair.axis.state() == AxisState::Off);
     pair.axis.ask(write(1)).unwrap();
     let old = answer(&mut pair, |axis| axis.take_outcome().is_some());
-    hears(&mut pair, Received::Nothing, 100);
+    hears(&mut pair, Heard::Nothing, 100);
     pair.axis.ask(write(0)).unwrap();
     hears(&mut pair, old, 30);
     assert_eq!(pair.axis.take_outcome(), None);
@@ -158,7 +160,7 @@ fn an_answer_is_not_taken_twice() {
     pair.axis.clear();
     assert!(matches!(pair.ask(write(0)), Progress::Done { .. }));
     // A controller that starts anew meets what it has asked before.
-    let mut pair = Pair::new(ActiveCode::CyclicPosition, Behaviour::POLITE);
+    let mut pair = Pair::new(ActiveCode::CyclicPosition, Behaviour::new());
     pair.axis.ask(write(0)).unwrap();
     hears(&mut pair, old, 40);
     assert_eq!(pair.axis.take_outcome(), None);
@@ -167,18 +169,18 @@ fn an_answer_is_not_taken_twice() {
 /// The same of a sub-command.
 #[test]
 fn a_sub_answer_is_not_taken_twice() {
-    let mut pair = Pair::new(ActiveCode::CyclicPosition, Behaviour::POLITE);
+    let mut pair = Pair::new(ActiveCode::CyclicPosition, Behaviour::new());
     pair.wide = true;
     pair.until("off", |pair| pair.axis.state() == AxisState::Off);
     pair.axis.ask_sub(SubCode::Monitor, 0x07, 0).unwrap();
     let old = answer(&mut pair, |axis| axis.take_sub_outcome().is_some());
-    hears(&mut pair, Received::Nothing, 100);
+    hears(&mut pair, Heard::Nothing, 100);
     pair.axis.ask_sub(SubCode::Monitor, 0x07, 0).unwrap();
     hears(&mut pair, old, 40);
     assert_eq!(pair.axis.take_sub_outcome(), None);
     hears(&mut pair, old, 40);
     assert_eq!(pair.axis.take_sub_outcome(), Some(Progress::Failed { error: Failure::TimedOut }));
-    let mut pair = Pair::new(ActiveCode::CyclicPosition, Behaviour::POLITE);
+    let mut pair = Pair::new(ActiveCode::CyclicPosition, Behaviour::new());
     pair.axis.ask_sub(SubCode::Monitor, 0x07, 0).unwrap();
     hears(&mut pair, old, 40);
     assert_eq!(pair.axis.take_sub_outcome(), None);
@@ -197,7 +199,7 @@ fn homing_begins_when_nothing_moves() {
         let [low, high] = status.union(StatusFlags::SERVO_READY).bits().to_le_bytes();
         let mut block = [0; 16];
         (block[0], block[1], block[2], block[3], block[8]) = (0x89 | counter.get() << 5, code, low, high, eight);
-        axis.receive(Turn::Valid(counter), &Response::parse(&block).into());
+        axis.hear(Turn::Valid(counter), &Response::parse(&block).into(), 0);
     };
     hear(&mut axis, 0x10, COMPLETE.union(MOVES), 0);
     let mut home = Home::new(0xc8, 50);
@@ -227,29 +229,63 @@ fn a_position_has_an_age() {
     let block = |echo: u8, position: u8, status: u8| {
         let mut block = [0; 16];
         (block[0], block[1], block[2], block[4]) = (0x89 | echo << 5, 0x20, status, position);
-        Received::from(Response::parse(&block))
+        Heard::from(Response::parse(&block))
     };
-    let hear = |axis: &mut Axis, received| axis.receive(Turn::Valid(UpdateCounter::ZERO), &received);
-    assert_eq!(axis.position(u32::MAX), Err(Doubt::Absent));
-    hear(&mut axis, Received::Nothing);
-    assert_eq!(axis.position(u32::MAX), Err(Doubt::Absent));
+    let hear = |axis: &mut Axis, heard, end_ns| axis.hear(Turn::Valid(UpdateCounter::ZERO), &heard, end_ns);
+    let at = |axis: &Axis, now_ns, max_age_ns| {
+        let sample = axis.evidence().at(now_ns, Policy::new(max_age_ns));
+        sample.map(|sample| (sample.position(), sample.sampled_ns()))
+    };
+    assert_eq!(at(&axis, 0, u64::MAX), Err(Doubt::Never));
+    hear(&mut axis, Heard::Nothing, 500);
+    assert_eq!(at(&axis, 500, u64::MAX), Err(Doubt::Never));
+    assert_eq!(axis.can_switch_on(), Err(SwitchOnError::State(AxisState::Starting)));
     // Servo_Ready, position 77.
-    hear(&mut axis, block(1, 77, 0x40));
-    assert_eq!((axis.position(0), axis.can_switch_on()), (Ok(77), true));
-    // The same block again, one of another drive, none, and one that is no response.
+    hear(&mut axis, block(1, 77, 0x40), 1_000);
+    assert_eq!((at(&axis, 1_000, 0), axis.can_switch_on()), (Ok((77, 1_000)), Ok(())));
+    // The clock makes it old, not the calls.
+    assert_eq!(at(&axis, 1_700, 699), Err(Doubt::Old { age_ns: 700 }));
+    // The same block again, none, one of another drive, and one that is no response.
     let mut other = [0; 16];
     other[0] = 0x8a;
-    let unlike =
-        [block(1, 77, 0x40), Response::parse(&other).into(), Received::Nothing, Response::parse(&[0; 16]).into()];
-    for (received, age) in unlike.into_iter().zip(1..) {
-        hear(&mut axis, received);
-        assert_eq!(axis.position(age), Ok(77));
-        assert_eq!(axis.position(age - 1), Err(Doubt::Old { updates: age }));
-        assert_eq!((axis.actual_position(), axis.can_switch_on(), axis.switch_on()), (77, false, false));
+    let unlike: [(Heard, Option<ErrorClass>); 4] = [
+        (block(1, 77, 0x40), None),
+        (Heard::Nothing, None),
+        (Response::parse(&other).into(), Some(ErrorClass::MacId)),
+        (Response::parse(&[0; 16]).into(), Some(ErrorClass::Direction)),
+    ];
+    for ((heard, class), age_ns) in unlike.into_iter().zip((500..).step_by(500)) {
+        let now_ns = 1_000 + age_ns;
+        hear(&mut axis, heard, now_ns);
+        assert_eq!(at(&axis, now_ns, age_ns), Ok((77, 1_000)));
+        let doubt = match class {
+            Some(class) => Doubt::Refused { class, age_ns },
+            None => Doubt::Old { age_ns },
+        };
+        assert_eq!(at(&axis, now_ns, age_ns - 1), Err(doubt));
+        assert_eq!(axis.can_switch_on(), Err(SwitchOnError::OldPosition));
+        assert_eq!(axis.switch_on(), Err(SwitchOnError::OldPosition));
     }
-    hear(&mut axis, block(2, 78, 0x40));
-    assert_eq!((axis.position(0), axis.can_switch_on()), (Ok(78), true));
+    hear(&mut axis, block(2, 78, 0x40), 3_500);
+    assert_eq!((at(&axis, 3_500, 0), axis.can_switch_on()), (Ok((78, 3_500)), Ok(())));
     // An alarm.
-    hear(&mut axis, block(3, 79, 0x60));
-    assert_eq!((axis.position(0), axis.actual_position()), (Err(Doubt::Alarm), 79));
+    hear(&mut axis, block(3, 79, 0x60), 4_000);
+    assert_eq!(at(&axis, 4_000, 0), Err(Doubt::Alarm));
+    assert_eq!(axis.switch_on(), Err(SwitchOnError::State(AxisState::Stopped(StopReason::Alarm))));
+    assert_eq!(actual(&axis), 79);
+}
+
+/// Each reason for which a servo stays off.
+#[test]
+fn a_servo_that_is_not_switched_on_says_why() {
+    let mut pair = Pair::new(ActiveCode::CyclicPosition, Behaviour::new());
+    assert_eq!(pair.axis.switch_on(), Err(SwitchOnError::State(AxisState::Starting)));
+    pair.until("off", |pair| pair.axis.can_switch_on().is_ok());
+    pair.axis.ask(set_position(0x21, 5)).unwrap();
+    assert_eq!(pair.axis.switch_on(), Err(SwitchOnError::Busy));
+    let answered = pair.outcome();
+    assert!(matches!(answered, Progress::Done { .. }), "{answered:?}");
+    pair.until("free", |pair| pair.axis.can_ask());
+    assert_eq!(pair.axis.switch_on(), Ok(()));
+    assert_eq!(pair.axis.switch_on(), Err(SwitchOnError::State(AxisState::SwitchingOn)));
 }

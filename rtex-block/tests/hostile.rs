@@ -16,9 +16,10 @@ mod common;
 use core::num::NonZeroU16;
 
 use common::CODES;
-use rtex_block::device::{Behaviour, Drive, DriveConfig};
+use rtex_block::device::{Behaviour, Drive, DriveConfig, Fault, Quirks};
 use rtex_block::master::{
-    ActiveCode, Asic, Axis, AxisConfig, AxisState, Fault, Limits, Master, MasterConfig, Phase, Slave, StopPolicy,
+    ActiveCode, Asic, Axis, AxisConfig, AxisState, ControlError, ControlPhase, Limits, Master, MasterConfig,
+    RingFailure, Slave, StopPolicy,
 };
 use rtex_block::position::Gear;
 use rtex_block::timing::{Periods, TimerSystem};
@@ -36,17 +37,19 @@ fn behaviour(draw: &mut Draw) -> Behaviour {
     let mut some = |limit| draw.below(limit) as u16;
     // Up to three exchanges for each flag, but Servo_Active, which has a lateness of its own at servo-off.
     let late = core::array::from_fn(|bit| if bit == 7 { 0 } else { some(4) as u8 });
-    Behaviour::POLITE
+    Behaviour::new()
         .with_status_late(late)
         .with_latch_late(some(4) as u8)
         .with_echo_lag(some(4) as u8)
         .with_in_progress_late(some(20))
         .with_servo_off_late(some(4))
         .with_stale_answers(some(4))
-        .with_always_busy(some(2) == 0)
-        .with_err_while_busy(some(2) == 0)
-        .with_always_in_position(some(2) == 0)
-        .with_warns(some(2) == 0)
+        .with_quirks(
+            [Quirks::ALWAYS_BUSY, Quirks::ERR_WHILE_BUSY, Quirks::ALWAYS_IN_POSITION, Quirks::WARNS]
+                .into_iter()
+                .filter(|_| some(2) == 0)
+                .collect(),
+        )
 }
 
 /// One direction to or from a drive: what arrives in a period stays in the memory until something newer comes.
@@ -122,12 +125,14 @@ impl Bench {
         let config = MasterConfig::new(BlockSize::Bytes32, periods, TimerSystem::Internal).with_watchdog(Some(limit));
         let mut master = Master::new(config, table, core::array::from_fn(axis)).unwrap();
         master.control(Asic::RingConfig, None);
-        assert_eq!(master.control(Asic::Ready, Some(&table)), Phase::Prepare);
+        assert_eq!(master.control(Asic::Ready, Some(&table)), ControlPhase::Prepare);
         let mut bench = Self {
             master,
             drives: core::array::from_fn(|place| {
                 let config = DriveConfig::new(mac_id(place), CODES).with_gear(gear(place));
-                Drive::new(config.with_behaviour(behaviour(draw)))
+                let mut drive = Drive::new(config);
+                drive.set_behaviour(behaviour(draw));
+                drive
             }),
             down: core::array::from_fn(|place| Line::new(place as u64 + 1)),
             up: core::array::from_fn(|place| Line::new(place as u64 + 100)),
@@ -141,19 +146,19 @@ impl Bench {
         };
         bench.update();
         bench.master.control(Asic::Ready, None);
-        assert_eq!(bench.master.control(Asic::Running, None), Phase::Running);
+        assert_eq!(bench.master.control(Asic::Running, None), ControlPhase::Running);
         bench
     }
 
     fn update(&mut self) {
-        self.master.exchange_words32(&self.rx, &mut self.tx).unwrap();
+        self.master.exchange_words32(&self.rx, &mut self.tx, self.now * PERIOD_NS).unwrap();
         self.judge();
         self.frame();
     }
 
     /// The laws of every update period, on the blocks as they are in the memory.
     fn judge(&mut self) {
-        let fault = self.master.fault();
+        let fault = self.master.error();
         for place in 0..AXES {
             let mut block = [0; 32];
             pack::from_words32(&self.tx[place * 8..place * 8 + 8], &mut block).unwrap();
@@ -180,20 +185,20 @@ impl Bench {
             let from = self.drives[place].position();
             let command = if self.cut[place] { None } else { self.down[place].carry(&block, self.now) };
             if let Some(command) = command {
-                let mut response = self.drives[place].exchange32(&command);
+                let mut response = self.drives[place].hear(&command).unwrap();
                 response[0] ^= u8::from(self.turned[place]);
                 if let Some(block) = self.up[place].carry(&response, self.now) {
                     any = true;
                     pack::to_words32(&block, &mut self.rx[words]).unwrap();
                 }
             } else {
-                self.drives[place].miss();
+                self.drives[place].framing_error();
             }
             let by = self.drives[place].position().wrapping_sub(from);
             assert!(by.abs() <= 3_000, "axis {place} jumps by {by} at {}", self.now);
         }
         if any {
-            assert!(!self.master.received());
+            assert!(!self.master.frame_received());
         }
         if self.down.iter().chain(&self.up).map(Line::faults).sum::<u64>() != before {
             self.hurt = self.now;
@@ -219,8 +224,8 @@ impl Bench {
     fn recover(&mut self, draw: &mut Draw) {
         (self.cut, self.turned) = ([false; AXES], [false; AXES]);
         for drive in &mut self.drives {
-            drive.set_config(drive.config().with_behaviour(behaviour(draw)));
-            drive.set_main_power(true);
+            drive.set_behaviour(behaviour(draw));
+            drive.set_fault(Fault::None);
         }
         for _ in 0..20 {
             for drive in &mut self.drives {
@@ -229,9 +234,9 @@ impl Bench {
             self.master.clear();
             for _ in 0..400 {
                 self.update();
-                self.master.ring_mut().switch_on();
+                self.master.ring_mut().switch_on().ok();
                 if self.master.ring().all_are(AxisState::On) {
-                    assert_eq!(self.master.fault(), None);
+                    assert_eq!(self.master.error(), None);
                     return;
                 }
                 if self.master.ring().failure().is_some() {
@@ -282,7 +287,7 @@ fn hostile_every_servo_is_off_in_time() {
                 break;
             }
         }
-        if let Some((place, reason)) = bench.master.ring().failure() {
+        if let Some(RingFailure { place, reason }) = bench.master.ring().failure() {
             // Only what the lines did can have been the cause.
             assert!(bench.now - bench.hurt <= 20, "axis {place} at {}: {reason}", bench.now);
             spurious += 1;
@@ -290,12 +295,12 @@ fn hostile_every_servo_is_off_in_time() {
             let (place, kind) = (draw.below(AXES as u64) as usize, draw.below(faults.len() as u64) as usize);
             faults[kind] += 1;
             match kind {
-                0 => bench.drives[place].raise(Alarm { main: 16, sub: 0 }),
-                1 => bench.drives[place].set_main_power(false),
+                0 => bench.drives[place].set_fault(Fault::Alarm(Alarm { main: 16, sub: 0 })),
+                1 => bench.drives[place].set_fault(Fault::NoMainPower),
                 2 => bench.cut[place] = true,
                 3 => bench.cut = [true; AXES],
                 4 => bench.turned[place] = true,
-                5 => bench.drives[place].drop_servo(),
+                5 => bench.drives[place].set_fault(Fault::ServoDrop),
                 6 => bench.master.ring_mut().switch_off(),
                 // The master hangs: the same blocks go round again and again.
                 _ => (0..LIMIT).for_each(|_| bench.frame()),
@@ -304,7 +309,7 @@ fn hostile_every_servo_is_off_in_time() {
             bench.until("every motor released", OFF_WITHIN + 8, |bench| bench.all_off());
             bench.until("the master knows", OFF_WITHIN, |bench| orderly || bench.master.ring().failure().is_some());
             let by_line = matches!(kind, 2..=4);
-            assert!(!by_line || bench.master.fault() == Some(Fault::Timeout), "kind {kind} at {}", bench.now);
+            assert!(!by_line || bench.master.error() == Some(ControlError::Timeout), "kind {kind} at {}", bench.now);
         }
         bench.until("every motor released", OFF_WITHIN + 8, |bench| bench.all_off());
         bench.recover(&mut draw);

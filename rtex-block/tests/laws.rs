@@ -2,11 +2,12 @@
 #![allow(clippy::arithmetic_side_effects, clippy::cast_possible_truncation, clippy::unwrap_used, missing_docs)]
 
 use proptest::prelude::*;
-use rtex_block::master::{Expected, Reception};
+use rtex_block::master::{Acknowledgement, Checked, Expected};
 use rtex_block::{
-    Alarm, Arguments, BlockSize, Code, Command, Command32, CommandBlock, ControlBits, CyclicCode, Error, ErrorCode,
-    Execution, LatchFlags, MacId, Nibble, NonCyclicCode, NonCyclicCommand, NonCyclicResponse, ProfileFlags, Response,
-    Response32, ResponseBlock, Results, StatusFlags, SubCode, SubCommand, SubResponse, TypeCode, UpdateCounter,
+    Alarm, AlarmAndWarning, Arguments, BlockSize, Code, Command, Command32, CommandBlock, ControlBits, CyclicCode,
+    Error, ErrorCode, Execution, LatchFlags, MacId, Nibble, NonCyclicCode, NonCyclicCommand, NonCyclicResponse,
+    ProfileFlags, Response, Response32, ResponseBlock, Results, StatusFlags, SubCode, SubCommand, SubResponse,
+    TypeCode, UpdateCounter,
 };
 
 fn mac_id() -> impl Strategy<Value = MacId> {
@@ -36,7 +37,7 @@ fn arguments() -> impl Strategy<Value = Arguments> {
 /// A request by its code: any bytes, read by the layout, make one.
 fn request() -> impl Strategy<Value = NonCyclicCommand> {
     (proptest::sample::select(&NonCyclicCode::ALL[..]), any::<[u8; 8]>())
-        .prop_map(|(code, bytes)| NonCyclicCommand::from_bytes(code, bytes))
+        .prop_map(|(code, bytes)| NonCyclicCommand::parse(code, bytes))
 }
 
 fn command() -> impl Strategy<Value = Command> {
@@ -162,7 +163,7 @@ proptest! {
         } else {
             prop_assert_eq!(Response::parse(&main).unwrap().emit(), main);
             prop_assert_eq!(Response32::parse(&whole).unwrap().emit(), whole);
-            prop_assert_eq!(SubResponse::from_bytes(&sub).to_bytes(), sub);
+            prop_assert_eq!(SubResponse::parse(&sub).emit(), sub);
         }
     }
 
@@ -280,7 +281,7 @@ fn messages_print_in_one_line() {
     assert_eq!(write.to_string(), "to 31 #3 CP parameter (26h) [SERVO_ON] 0, type 11h Pr7.20 data -1");
     let whole = Command32 { main: idle, sub: SubCommand::IDLE };
     assert_eq!(whole.to_string(), "to 31 #3 CP normal (20h) [-] 0, 0 0; sub normal type 00h index 0, 0 0 0");
-    let sub = SubResponse::from_bytes(&[0xca, 0, 0x22, 0, 0, 0, 0, 0, 1, 0, 0, 0, 2, 0, 0, 0]);
+    let sub = SubResponse::parse(&[0xca, 0, 0x22, 0, 0, 0, 0, 0, 1, 0, 0, 0, 2, 0, 0, 0]);
     assert_eq!(sub.to_string(), "sub monitor not accepted: 0022h (non-cyclic code not defined), 0 1 2 ERR");
 }
 
@@ -343,11 +344,11 @@ fn flips_that_can_be_noticed() {
         code: Code::CYCLIC_POSITION,
     };
     let base = [0xc9, 0x20, 0xc1, 0x00, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12];
-    assert!(matches!(expected.check(&base), Ok((_, Reception::Accepted))));
+    assert!(matches!(expected.check(&base), Ok(Checked { acknowledgement: Acknowledgement::Accepted, .. })));
     let noticed = |bit: usize| {
         let mut block = base;
         block[bit / 8] ^= 1 << (bit % 8);
-        !matches!(expected.check(&block), Ok((_, Reception::Accepted)))
+        !matches!(expected.check(&block), Ok(Checked { acknowledgement: Acknowledgement::Accepted, .. }))
     };
     assert!((0..16).all(noticed));
     assert!(!(16..128).any(noticed));
@@ -359,7 +360,7 @@ fn alarm_data_come_back() {
     let data = Results::alarm_data(alarm, 0xa5c3);
     assert_eq!(data.to_le_bytes(), [86, 1, 0xc3, 0xa5]);
     let reply = Results { execution: Execution::default(), type_code: TypeCode::short(0), index: 0, data };
-    assert_eq!(reply.alarm(), (alarm, 0xa5c3));
+    assert_eq!(reply.alarm(), AlarmAndWarning { alarm, warning: 0xa5c3 });
     assert_eq!(
         format!("{alarm} {}", ErrorCode::CYCLIC_MODE),
         "Err86.1 002Eh (cyclic command not possible in this mode)"

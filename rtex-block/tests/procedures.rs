@@ -11,10 +11,10 @@
 
 mod common;
 
-use common::{CODES, Pair, limits, monitor, set_position};
-use rtex_block::device::{Behaviour, DriveConfig};
-use rtex_block::master::procedure::{Backup, Caught, Home, Latch, ReadText, Restore, SetPosition};
-use rtex_block::master::{ActiveCode, AskError, Axis, AxisConfig, AxisState, Failure, Progress, Received};
+use common::{CODES, Pair, actual, limits, monitor, set_position};
+use rtex_block::device::{Behaviour, DriveConfig, Quirks};
+use rtex_block::master::procedure::{Backup, Caught, Home, Latch, ParameterValue, ReadText, Restore, SetPosition};
+use rtex_block::master::{ActiveCode, AskError, Axis, AxisConfig, AxisState, Failure, Heard, Progress};
 use rtex_block::{
     Arguments, ErrorCode, LatchFlags, MacId, Nibble, NonCyclicCommand, NonCyclicResponse, Pr, ProfileFlags, Response,
     Response32, SubCode, TypeCode,
@@ -23,13 +23,13 @@ use rtex_block::{
 /// Homing in the drive: Homing_Complete of an earlier homing is not the end of this one.
 #[test]
 fn homing_ends_when_this_homing_ends() {
-    for behaviour in [Behaviour::POLITE, Behaviour::POLITE.with_homed_at_start(true).with_echo_lag(3)] {
+    for behaviour in [Behaviour::new(), Behaviour::new().with_quirks(Quirks::HOMED_AT_START).with_echo_lag(3)] {
         let mut pair = Pair::on(ActiveCode::ProfilePosition, behaviour);
         let mut home = Home::new(0xc8, 1_000);
         let mut reached = Vec::new();
         assert_eq!(
             pair.run(|axis| {
-                reached.push(axis.actual_position());
+                reached.push(actual(axis));
                 home.receive(axis)
             }),
             Progress::Done { value: () }
@@ -38,10 +38,10 @@ fn homing_ends_when_this_homing_ends() {
         pair.until("at the origin", |pair| pair.drive.position() == 0);
         assert_eq!(pair.axis.state(), AxisState::On);
     }
-    let mut pair = Pair::on(ActiveCode::ProfilePosition, Behaviour::POLITE);
+    let mut pair = Pair::on(ActiveCode::ProfilePosition, Behaviour::new());
     let mut home = Home::new(0xc8, 5);
     assert_eq!(pair.run(|axis| home.receive(axis)), Progress::Failed { error: Failure::TimedOut });
-    let mut pair = Pair::on(ActiveCode::CyclicPosition, Behaviour::POLITE);
+    let mut pair = Pair::on(ActiveCode::CyclicPosition, Behaviour::new());
     let mut home = Home::new(0xc8, 5);
     assert_eq!(pair.run(|axis| home.receive(axis)), Progress::Failed { error: Failure::Mode });
 }
@@ -50,12 +50,12 @@ fn homing_ends_when_this_homing_ends() {
 #[test]
 fn positions_are_set_once_and_read_back() {
     for (mut set, want) in [(SetPosition::actual(-4_000), -4_000), (SetPosition::command(77), 77)] {
-        let mut pair = Pair::new(ActiveCode::CyclicPosition, Behaviour::POLITE.with_stale_answers(2));
+        let mut pair = Pair::new(ActiveCode::CyclicPosition, Behaviour::new().with_stale_answers(2));
         pair.until("off", |pair| pair.axis.state() == AxisState::Off);
         assert_eq!(pair.run(|axis| set.receive(axis)), Progress::Done { value: want });
         assert_eq!(pair.drive.position(), want);
     }
-    let mut pair = Pair::on(ActiveCode::CyclicPosition, Behaviour::POLITE);
+    let mut pair = Pair::on(ActiveCode::CyclicPosition, Behaviour::new());
     let refused = Progress::Failed { error: Failure::NotSent(AskError::ServoOn) };
     let mut set = SetPosition::actual(5);
     assert_eq!(pair.run(|axis| set.receive(axis)), refused);
@@ -110,7 +110,7 @@ fn what_has_ended_sends_nothing_more() {
         let mut pair = Pair::with(config, DriveConfig::new(MacId::new(9).unwrap(), CODES));
         pair.until("off", |pair| pair.axis.state() == AxisState::Off);
         if on {
-            assert!(pair.axis.switch_on());
+            pair.axis.switch_on().unwrap();
             pair.until("on", |pair| pair.axis.state() == AxisState::On);
         }
         let (mut sent, mut last, mut end) = (0, 0, None);
@@ -135,14 +135,14 @@ fn what_has_ended_sends_nothing_more() {
     let mut set = SetPosition::actual(77_777);
     runs(ActiveCode::CyclicPosition, false, 0x24, |axis| set.receive(axis));
     let mut restore = Restore::new(CODES.parameter_read);
-    let list = [(Pr { class: 7, number: 25 }, 1)];
+    let list = [ParameterValue::new(Pr { class: 7, number: 25 }, 1)];
     runs(ActiveCode::CyclicPosition, false, 0x26, |axis| restore.receive(axis, &list));
 }
 
 /// The latch counts once it is complete; what was caught before it was armed does not.
 #[test]
 fn latch_positions() {
-    let mut pair = Pair::on(ActiveCode::CyclicPosition, Behaviour::POLITE.with_stale_answers(1));
+    let mut pair = Pair::on(ActiveCode::CyclicPosition, Behaviour::new().with_stale_answers(1));
     pair.drive.trigger(1);
     let mut latch = Latch::first(0xc7, Nibble::new(5).unwrap(), 300);
     for _ in 0..100 {
@@ -182,7 +182,7 @@ fn latch_positions() {
                 monitor_sel,
                 monitor_data,
             };
-            pair.received = Received::Main(response.with_noncyclic(&other));
+            pair.received = Heard::Main(response.with_noncyclic(&other));
         }
         assert_eq!(pair.axis.take_outcome(), None);
     }
@@ -195,7 +195,7 @@ fn latch_positions() {
 fn two_latches() {
     let nibble = |value| Nibble::new(value).unwrap();
     for late in [0, 4, 15] {
-        let behaviour = Behaviour::POLITE.with_latch_late(late).with_echo_lag(1);
+        let behaviour = Behaviour::new().with_latch_late(late).with_echo_lag(1);
         let mut pair = Pair::on(ActiveCode::CyclicPosition, behaviour);
         let mut both = Latch::both(0xc7, [nibble(3), nibble(12)], 600);
         let mut selections = Vec::new();
@@ -240,7 +240,7 @@ fn two_latches() {
 /// A drive that refuses to tell the state before it is armed.
 #[test]
 fn a_latch_without_a_state_before() {
-    let mut pair = Pair::on(ActiveCode::CyclicPosition, Behaviour::POLITE);
+    let mut pair = Pair::on(ActiveCode::CyclicPosition, Behaviour::new());
     let mut latch = Latch::first(0xc7, Nibble::new(1).unwrap(), 300);
     let mut refuse = true;
     let mut triggered = false;
@@ -250,7 +250,7 @@ fn a_latch_without_a_state_before() {
         if let NonCyclicResponse::Homing { type_code, .. } = response.noncyclic() {
             if type_code == 0x50 && refuse {
                 let refused = NonCyclicResponse::CommandError(ErrorCode(0x0031));
-                pair.received = Received::Main(response.with_noncyclic(&refused));
+                pair.received = Heard::Main(response.with_noncyclic(&refused));
             }
             refuse &= type_code == 0x50;
         }
@@ -275,7 +275,7 @@ fn a_latch_without_a_state_before() {
 
 #[test]
 fn a_motion_with_a_latch_shows_it() {
-    let mut pair = Pair::on(ActiveCode::ProfilePosition, Behaviour::POLITE);
+    let mut pair = Pair::on(ActiveCode::ProfilePosition, Behaviour::new());
     let _ = pair.ask(set_position(0xc7, 0));
     pair.until("free", |pair| pair.axis.can_ask());
     let selection = Nibble::new(3).unwrap();
@@ -292,23 +292,23 @@ fn a_motion_with_a_latch_shows_it() {
 
 #[test]
 fn texts_and_parameters() {
-    let mut pair = Pair::new(ActiveCode::CyclicPosition, Behaviour::POLITE.with_stale_answers(2).with_echo_lag(1));
+    let mut pair = Pair::new(ActiveCode::CyclicPosition, Behaviour::new().with_stale_answers(2).with_echo_lag(1));
     for (type_code, want) in [(0x01, &b"Panasonic"[..]), (0x05, b"1"), (0x12, b"DRIVE MODEL"), (0x13, b"00000000")] {
         let mut text = ReadText::new(TypeCode::short(type_code));
         let Progress::Done { value } = pair.run(|axis| text.receive(axis)) else { panic!() };
         assert_eq!(value.as_bytes(), want);
     }
     let pr = |class, number| Pr { class, number };
-    let mut list = [(pr(7, 25), 0), (pr(8, 1), 0), (pr(8, 4), 0)];
+    let mut list = [pr(7, 25), pr(8, 1), pr(8, 4)].map(|pr| ParameterValue::new(pr, 0));
     let mut backup = Backup::new(CODES.parameter_read);
     assert_eq!(pair.run(|axis| backup.receive(axis, &mut list)), Progress::Done { value: () });
-    assert_eq!(list.map(|(_, value)| value), [1, 1_000, 1_000]);
-    list[1].1 = 77;
+    assert_eq!(list.map(|parameter| parameter.value), [1, 1_000, 1_000]);
+    list[1].value = 77;
     let mut restore = Restore::new(CODES.parameter_read);
     assert_eq!(restore.place(), 0);
     assert_eq!(pair.run(|axis| restore.receive(axis, &list)), Progress::Done { value: () });
     let mut backup = Backup::new(CODES.parameter_read);
-    let mut again = list.map(|(pr, _)| (pr, -1));
+    let mut again = list.map(|parameter| ParameterValue { value: -1, ..parameter });
     assert_eq!(pair.run(|axis| backup.receive(axis, &mut again)), Progress::Done { value: () });
     assert_eq!(again, list);
     // Read with the code for initial values it differs from what was written.
@@ -329,13 +329,13 @@ fn texts_and_parameters() {
     // A parameter that does not exist.
     let mut restore = Restore::new(CODES.parameter_read);
     let refused = Progress::Failed { error: Failure::CommandError(ErrorCode(0x0032)) };
-    assert_eq!(pair.run(|axis| restore.receive(axis, &[(pr(99, 0), 0)])), refused);
+    assert_eq!(pair.run(|axis| restore.receive(axis, &[ParameterValue::new(pr(99, 0), 0)])), refused);
 }
 
 /// A drive whose parameters count only after a reset.
 #[test]
 fn speed_in_r_min_after_a_reset() {
-    let mut pair = Pair::new(ActiveCode::CyclicVelocity, Behaviour::POLITE.with_parameters_after_reset(true));
+    let mut pair = Pair::new(ActiveCode::CyclicVelocity, Behaviour::new().with_quirks(Quirks::PARAMETERS_AFTER_RESET));
     pair.until("off", |pair| pair.axis.state() == AxisState::Off);
     let write = Arguments { type_code: TypeCode::short(0x11), index: 0x0719, data: 0 };
     assert!(matches!(pair.ask(NonCyclicCommand::Parameter(write)), Progress::Done { .. }));
@@ -366,7 +366,7 @@ fn speed_in_r_min_after_a_reset() {
 #[test]
 fn selected_response_data() {
     for place in 0..5 {
-        let mut pair = Pair::new(ActiveCode::CyclicPosition, Behaviour::POLITE);
+        let mut pair = Pair::new(ActiveCode::CyclicPosition, Behaviour::new());
         pair.wide = true;
         pair.until("off", |pair| pair.axis.state() == AxisState::Off);
         assert!(matches!(pair.ask(set_position(0x21, 4_321)), Progress::Done { .. }));
@@ -374,7 +374,7 @@ fn selected_response_data() {
         let write = Arguments { type_code: TypeCode::short(0x11), index, data: 0x07 };
         assert!(matches!(pair.ask(NonCyclicCommand::Parameter(write)), Progress::Done { .. }));
         (0..4).for_each(|_| pair.update());
-        let Received::Both(Response32 { main, sub }) = pair.received else { panic!() };
+        let Heard::Both(Response32 { main, sub }) = pair.received else { panic!() };
         let mut want = [0; 5];
         want[place] = 4_321;
         assert_eq!([main.response_data2, main.response_data3, sub.data1, sub.data2, sub.data3], want);
@@ -385,7 +385,7 @@ fn selected_response_data() {
 /// In the 32-byte mode sub-commands run beside requests of the main block.
 #[test]
 fn sub_commands() {
-    let mut pair = Pair::new(ActiveCode::CyclicPosition, Behaviour::POLITE);
+    let mut pair = Pair::new(ActiveCode::CyclicPosition, Behaviour::new());
     pair.wide = true;
     pair.until("off", |pair| pair.axis.state() == AxisState::Off);
     pair.axis.ask(monitor(0x07)).unwrap();
@@ -414,7 +414,7 @@ fn sub_commands() {
 /// Sub_Command_Data2 and 3 go out while the servo is on; the drive holds them by Pr7.36 and Pr7.37.
 #[test]
 fn feed_forward_of_the_sub_block() {
-    let mut pair = Pair::new(ActiveCode::CyclicPosition, Behaviour::POLITE);
+    let mut pair = Pair::new(ActiveCode::CyclicPosition, Behaviour::new());
     pair.wide = true;
     pair.until("off", |pair| pair.axis.state() == AxisState::Off);
     for (index, held) in [(0x0725, [0, -71]), (0x0724, [70, -71])] {

@@ -13,8 +13,8 @@
 
 use core::num::NonZeroU16;
 
-use rtex_block::device::{Drive, DriveConfig, OpenCodes};
-use rtex_block::master::{ActiveCode, Axis, AxisConfig, AxisState, Limits, Received, Ring};
+use rtex_block::device::{Drive, DriveConfig, Fault, OpenCodes};
+use rtex_block::master::{ActiveCode, Axis, AxisConfig, AxisState, Heard, Limits, Ring};
 use rtex_block::position::step;
 use rtex_block::{Alarm, Command, CommandBlock, MacId, Response};
 use servowire_world::Draw;
@@ -53,11 +53,11 @@ struct Bench {
     ring: Ring<AXES>,
     drives: [Drive; AXES],
     lines: [Line; AXES],
-    responses: [Received; AXES],
+    responses: [Heard; AXES],
     commands: [Command; AXES],
     /// Responses come one update period later, as when an exchange misses the start of its frame.
     late: bool,
-    held: [Received; AXES],
+    held: [Heard; AXES],
     started: bool,
     now: u64,
 }
@@ -71,10 +71,10 @@ impl Bench {
                 Drive::new(DriveConfig::new(MacId::new(number(k)).unwrap(), OpenCodes::INVENTED))
             }),
             lines: [Line::Good; AXES],
-            responses: [Received::Nothing; AXES],
+            responses: [Heard::Nothing; AXES],
             commands: core::array::from_fn(|k| Command::nop(MacId::new(number(k)).unwrap())),
             late: false,
-            held: [Received::Nothing; AXES],
+            held: [Heard::Nothing; AXES],
             started: false,
             now: 0,
         }
@@ -83,7 +83,7 @@ impl Bench {
     /// One update period: the master reads and writes, then the frame goes round.
     fn update(&mut self) {
         let responses = if self.late { core::mem::replace(&mut self.held, self.responses) } else { self.responses };
-        self.commands = self.ring.update(&responses).map(|command| command.main);
+        self.commands = self.ring.update(&responses, self.now * 500_000).map(|command| command.main);
         self.frame();
     }
 
@@ -100,18 +100,18 @@ impl Bench {
                 _ => {}
             }
             if self.lines[k] == Line::Cut {
-                self.drives[k].miss();
-                self.responses[k] = Received::Nothing;
+                self.drives[k].framing_error();
+                self.responses[k] = Heard::Nothing;
                 continue;
             }
             let before = self.drives[k].position();
-            let mut response = self.drives[k].exchange(&command);
+            let mut response = self.drives[k].hear(&command).unwrap();
             assert!(step(before, self.drives[k].position()).abs() <= 60_000, "axis {k} jumps at {}", self.now);
             if self.lines[k] == Line::WrongMac {
                 response[0] ^= 1;
             }
             self.responses[k] =
-                if self.lines[k] == Line::Deaf { Received::Nothing } else { Response::parse(&response).into() };
+                if self.lines[k] == Line::Deaf { Heard::Nothing } else { Response::parse(&response).into() };
         }
     }
 
@@ -137,7 +137,7 @@ impl Bench {
 
     fn switch_on(&mut self) {
         self.until(200, |bench| bench.ring.all_are(AxisState::Off));
-        assert!(self.ring.switch_on());
+        self.ring.switch_on().unwrap();
         self.until(50, |bench| bench.ring.all_are(AxisState::On));
     }
 
@@ -160,7 +160,7 @@ impl Bench {
         self.lines = [Line::Good; AXES];
         for drive in &mut self.drives {
             drive.clear_alarm();
-            drive.set_main_power(true);
+            drive.set_fault(Fault::None);
         }
         self.ring.clear();
         self.switch_on();
@@ -217,8 +217,8 @@ fn after_every_fault_every_servo_is_off_in_time() {
             continue;
         }
         match kind {
-            3 => bench.drives[k].raise(Alarm { main: 16, sub: 0 }),
-            4 => bench.drives[k].set_main_power(false),
+            3 => bench.drives[k].set_fault(Fault::Alarm(Alarm { main: 16, sub: 0 })),
+            4 => bench.drives[k].set_fault(Fault::NoMainPower),
             5 => bench.lines[k] = Line::Deaf,
             6 => bench.lines[k] = Line::Cut,
             7 => bench.lines = [Line::Cut; AXES],

@@ -13,14 +13,14 @@ mod common;
 
 use common::{CODES, Pair, limits, monitor, set_position};
 use rtex_block::device::{Behaviour, DriveConfig};
-use rtex_block::master::{ActiveCode, AxisConfig, AxisState, Progress, Received, SetpointError, StopReason, Turn};
+use rtex_block::master::{ActiveCode, AxisConfig, AxisState, Heard, Progress, SetpointError, StopReason, Turn};
 use rtex_block::position::Gear;
 use rtex_block::{Alarm, Arguments, ErrorCode, MacId, NonCyclicCommand, TypeCode};
 
 /// Feed-forward goes out while the servo is on, with every command that does not need bytes 12-15 itself, and no longer.
 #[test]
 fn feed_forward_lives_with_the_servo() {
-    let mut pair = Pair::new(ActiveCode::CyclicPosition, Behaviour::POLITE);
+    let mut pair = Pair::new(ActiveCode::CyclicPosition, Behaviour::new());
     pair.until("off", |pair| pair.axis.state() == AxisState::Off);
     let select = Arguments { type_code: TypeCode::short(0x11), index: 0x0723, data: 2 };
     let _ = pair.ask(NonCyclicCommand::Parameter(select));
@@ -54,17 +54,17 @@ fn feed_forward_lives_with_the_servo() {
 /// on the drive holds the position that it was sent last.
 #[test]
 fn the_set_point_follows_while_switching_on() {
-    let mut pair = Pair::new(ActiveCode::CyclicPosition, Behaviour::POLITE);
-    pair.until("off", |pair| pair.axis.can_switch_on());
-    assert!(pair.axis.switch_on());
+    let mut pair = Pair::new(ActiveCode::CyclicPosition, Behaviour::new());
+    pair.until("off", |pair| pair.axis.can_switch_on().is_ok());
+    pair.axis.switch_on().unwrap();
     for turned in (1_000..).step_by(1_000) {
         pair.update();
-        if let Received::Main(response) = &mut pair.received {
+        if let Heard::Main(response) = &mut pair.received {
             response.response_data1 = turned;
         }
         let mut next = pair.axis;
-        next.receive(pair.sent, &pair.received);
-        let block = next.send(Turn::Valid(pair.counter.last().next())).main.emit();
+        next.hear(pair.sent, &pair.received, pair.now_ns());
+        let block = next.transmission(Turn::Valid(pair.counter.last().next())).main.emit();
         let is_on = next.state() == AxisState::On;
         let want = if is_on { turned - 1_000 } else { turned };
         assert_eq!((block[2] & 0x80, i32::from_le_bytes(block[4..8].try_into().unwrap())), (0x80, want));
@@ -101,9 +101,9 @@ fn limits_of_set_points() {
         assert_eq!(pair.drive.alarm(), None);
         if over_speed.is_none() {
             // The drive has the same limit, by its own reckoning.
-            let mut block = pair.axis.send(Turn::Valid(pair.counter.last().next())).main;
+            let mut block = pair.axis.transmission(Turn::Valid(pair.counter.last().next())).main;
             block.command_data1 = largest * 2 + 1;
-            pair.drive.exchange(&block.emit());
+            pair.drive.hear(&block.emit()).unwrap();
             assert_eq!(pair.drive.alarm(), Some(Alarm { main: 27, sub: 4 }));
         }
     }
@@ -129,7 +129,7 @@ fn every_change_of_mode() {
     let modes = [CyclicPosition, ProfilePosition, CyclicVelocity, CyclicTorque];
     for from in modes {
         for to in modes {
-            let mut pair = Pair::new(CyclicPosition, Behaviour::POLITE.with_echo_lag(2));
+            let mut pair = Pair::new(CyclicPosition, Behaviour::new().with_echo_lag(2));
             pair.until("off", |pair| pair.axis.state() == AxisState::Off);
             let _ = pair.ask(set_position(0x21, 700_000));
             pair.switch_on();
@@ -141,7 +141,7 @@ fn every_change_of_mode() {
             assert_eq!((pair.drive.position(), pair.drive.alarm()), (700_000, None), "{from:?} {to:?}");
         }
     }
-    let mut pair = Pair::on(ProfilePosition, Behaviour::POLITE);
+    let mut pair = Pair::on(ProfilePosition, Behaviour::new());
     pair.axis.start_move(0x11, 100_000, 1_000_000).unwrap();
     assert_eq!(pair.axis.set_mode(CyclicPosition), Err(SetpointError::Busy));
     pair.axis.switch_off();

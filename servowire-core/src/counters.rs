@@ -3,7 +3,7 @@ use crate::{Class, Classified};
 /// How many transactions went well, and how many failed in which of `N` ways.
 ///
 /// Each crate names its own: `type Counters = servowire_core::Counters<{ ErrorClass::ALL.len() }>`.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Counters<const N: usize> {
     good: u64,
@@ -53,6 +53,53 @@ impl<const N: usize> Counters<N> {
     }
 }
 
+impl<const N: usize> core::fmt::Display for Counters<N> {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        write!(f, "{} good, {} failed", self.good, self.errors())
+    }
+}
+
+/// As a list: what went well, then the failures in the order of the classes.
+#[cfg(feature = "serde")]
+#[cfg_attr(docsrs, doc(cfg(feature = "serde")))]
+impl<const N: usize> serde::Serialize for Counters<N> {
+    fn serialize<S: serde::Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.collect_seq(core::iter::once(&self.good).chain(&self.errors))
+    }
+}
+
+#[cfg(feature = "serde")]
+#[cfg_attr(docsrs, doc(cfg(feature = "serde")))]
+impl<'de, const N: usize> serde::Deserialize<'de> for Counters<N> {
+    fn deserialize<D: serde::Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        deserializer.deserialize_seq(List)
+    }
+}
+
+/// Reads the list of [`Counters`].
+#[cfg(feature = "serde")]
+struct List<const N: usize>;
+
+#[cfg(feature = "serde")]
+impl<'de, const N: usize> serde::de::Visitor<'de> for List<N> {
+    type Value = Counters<N>;
+
+    fn expecting(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        write!(f, "a number of good transactions and {N} numbers of failed ones")
+    }
+
+    fn visit_seq<A: serde::de::SeqAccess<'de>>(self, mut list: A) -> Result<Counters<N>, A::Error> {
+        let mut counters = Counters::new();
+        for (at, counter) in core::iter::once(&mut counters.good).chain(&mut counters.errors).enumerate() {
+            *counter = list.next_element()?.ok_or_else(|| serde::de::Error::invalid_length(at, &Self))?;
+        }
+        match list.next_element::<u64>()? {
+            None => Ok(counters),
+            Some(_) => Err(serde::de::Error::custom("there are more counters than classes")),
+        }
+    }
+}
+
 impl<const N: usize> Default for Counters<N> {
     fn default() -> Self {
         Self::new()
@@ -94,6 +141,19 @@ mod tests {
         counters.record::<(), _>(&Err(Kind(4)));
         assert_eq!([0, 1, 2, 3, 4].map(|k| counters.of(Kind(k))), [0, 0, 1, 0, 0]);
         assert_eq!((counters.good(), counters.errors(), counters.errors_per_million()), (3, 1, 250_000));
+        assert_eq!(std::format!("{counters}"), "3 good, 1 failed");
+    }
+
+    #[cfg(feature = "serde")]
+    #[test]
+    fn counters_are_stored_as_a_list() {
+        let counters = Counters::<2> { good: 7, errors: [1, u64::MAX] };
+        let text = serde_json::to_string(&counters).unwrap();
+        assert_eq!(text, "[7,1,18446744073709551615]");
+        assert_eq!(serde_json::from_str::<Counters<2>>(&text).ok(), Some(counters));
+        for bad in ["[7,1]", "[7,1,2,3]", "[]", "7", "[7,-1,2]"] {
+            assert!(serde_json::from_str::<Counters<2>>(bad).is_err(), "{bad}");
+        }
     }
 
     #[test]

@@ -2,8 +2,9 @@
 ///
 /// One error in a hundred thousand transactions is the life of a drive, three in a row is a broken cable. With a
 /// `weight` of 100 and a `limit` of 250 the third error in a row is too much, and so is any rate above one in 101.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct ErrorRate {
     level: u32,
     weight: u32,

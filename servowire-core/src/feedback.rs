@@ -58,7 +58,20 @@ impl<T: Tolerance> Policy<T> {
     /// # Errors
     /// How far the instant of sampling is away, in ns: more than the longest age.
     pub const fn check_age(&self, now_ns: u64, sampled_ns: u64) -> Result<(), u64> {
-        let age_ns = now_ns.abs_diff(sampled_ns);
+        if now_ns < sampled_ns {
+            self.check_ahead(now_ns, sampled_ns)
+        } else {
+            self.within(now_ns.abs_diff(sampled_ns))
+        }
+    }
+
+    /// Out of the way of the ordinary case, so that this one takes no detour.
+    #[cold]
+    const fn check_ahead(&self, now_ns: u64, sampled_ns: u64) -> Result<(), u64> {
+        self.within(sampled_ns.abs_diff(now_ns))
+    }
+
+    const fn within(&self, age_ns: u64) -> Result<(), u64> {
         if age_ns > self.max_age_ns { Err(age_ns) } else { Ok(()) }
     }
 }

@@ -33,12 +33,14 @@ type Word = AtomicU32;
 
 /// `control` before the first value.
 const NOTHING: u32 = 0;
-/// In `control`: there is a value.
-const SOMETHING: u32 = 1 << 3;
-/// In `control`: the newest slot of pair 0; that of pair 1 is the bit above.
-const NEWEST: u32 = 1 << 1;
-/// In `control`: the newest pair.
-const PAIR: u32 = 1;
+/// In `control` ever after.
+const SOMETHING: u32 = 1;
+/// In `control`: the newest pair. A pair is named by its first slot, 0 or 2.
+const PAIR: u32 = 2;
+/// In `control`, above so many bits: the newest slot of pair 0, and two bits above it that of pair 2.
+const NEWEST: u32 = 2;
+/// Any slot.
+const SLOT: u32 = 3;
 
 /// What keeps the loads and stores of one end in their order for the other end.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -93,7 +95,11 @@ fn store<const N: usize>(to: &[Word; N], words: &[u32; N]) {
 
 #[inline]
 fn load<const N: usize>(from: &[Word; N]) -> [u32; N] {
-    from.each_ref().map(|word| word.load(Ordering::Relaxed))
+    let mut words = [0; N];
+    for (value, word) in words.iter_mut().zip(from) {
+        *value = word.load(Ordering::Relaxed);
+    }
+    words
 }
 
 /// Four slots of `W` and `E` words. One end calls [`put`](Self::put), another one [`get`](Self::get).
@@ -114,16 +120,18 @@ impl<const W: usize, const E: usize> FourSlots<W, E> {
     }
 
     /// Puts a value. Only ever called by one writer.
-    pub(crate) fn put(&self, words: &Value<W, E>) {
+    pub(crate) fn put(&self, value: &Value<W, E>) {
         let control = self.control.load(Ordering::Relaxed);
         fence(Barrier::Begins);
-        let pair = !self.announced.load(Ordering::Relaxed) & 1;
+        let pair = !self.announced.load(Ordering::Relaxed) & PAIR;
         fence(Barrier::Writes);
-        let control = (control ^ NEWEST.wrapping_shl(pair)) & !PAIR | pair | SOMETHING;
-        if let Some(slot) = self.slots.get(newest(control, pair)) {
-            slot.store(words);
+        let slot = pair | (!newest(control, pair) & 1);
+        if let Some(slot) = self.slots.get(slot as usize) {
+            slot.store(value);
         }
         fence(Barrier::Publishes);
+        let other_pair = control & !(SLOT << NEWEST).wrapping_shl(pair) & !PAIR;
+        let control = other_pair | (slot << NEWEST).wrapping_shl(pair) | pair | SOMETHING;
         self.control.store(control, Ordering::Relaxed);
     }
 
@@ -140,15 +148,8 @@ impl<const W: usize, const E: usize> FourSlots<W, E> {
         fence(Barrier::Chooses);
         let control = self.control.load(Ordering::Relaxed);
         fence(Barrier::Reads);
-        self.slots.get(newest(control, pair)).map(Slot::load)
+        self.slots.get(newest(control, pair) as usize).map(Slot::load)
     }
-}
-
-/// The newest slot of a pair.
-#[inline]
-const fn newest(control: u32, pair: u32) -> usize {
-    let slot = (control.wrapping_shr(pair) & NEWEST) / NEWEST;
-    (pair << 1 | slot) as usize
 }
 
 #[cfg(not(all(test, loom)))]
@@ -156,6 +157,11 @@ impl<const W: usize, const E: usize> Slot<W, E> {
     const fn new() -> Self {
         Self([const { Word::new(0) }; W], [const { Word::new(0) }; E])
     }
+}
+
+/// The newest slot of a pair.
+const fn newest(control: u32, pair: u32) -> u32 {
+    (control.wrapping_shr(pair) >> NEWEST) & SLOT
 }
 
 #[cfg(not(all(test, loom)))]

@@ -6,6 +6,7 @@
 #[cfg(any(test, feature = "std"))]
 extern crate std;
 
+mod angle;
 mod builder;
 // Under the model there are only the slots: its atomics are not const.
 #[cfg(not(all(test, loom)))]
@@ -19,14 +20,18 @@ mod errors;
 mod feedback;
 mod findings;
 mod four_slots;
+mod motion;
 mod number;
 mod procedure;
 mod range;
 mod run;
+#[cfg(not(all(test, loom)))]
+mod shaft;
 mod show;
 pub mod stream;
 mod time;
 
+pub use angle::{Angle, Commutation, Sense};
 #[cfg(not(all(test, loom)))]
 pub use cell::{Cell, Reader, Words, Writer};
 pub use class::{Class, Classified};
@@ -35,10 +40,13 @@ pub use counters::Counters;
 pub use error_rate::ErrorRate;
 pub use feedback::{Feedback, Policy, Tolerance};
 pub use findings::Findings;
+pub use motion::{Acceleration, Estimate, Motion, Tracker};
 pub use number::U24;
 pub use procedure::{Polling, Progress, Step};
 pub use range::OutOfRange;
 pub use run::{Ended, run, run_async};
+#[cfg(not(all(test, loom)))]
+pub use shaft::{Shaft, ShaftCell, ShaftReader, ShaftWriter};
 pub use show::write_names;
 pub use time::{ClockCheck, ClockError, MAX_TICK_NS, MIN_TICK_HZ, TickRate, TimeBase};
 

@@ -2,8 +2,9 @@
 ///
 /// `T` is what it was made for, `E` why it failed. Both ends say from when on the line is free for the next request:
 /// until then an answer that was given up may still be talking, or the encoder is at work.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[must_use]
 pub enum Progress<T, E> {
     /// Not finished. Poll at this time, if nothing is received before.
@@ -31,8 +32,9 @@ pub enum Progress<T, E> {
 ///
 /// `R` is the request, `T` what the procedure is made for, `E` why it fails. The outcome of each transaction, refused
 /// answers included, is handed to the procedure as it is; the procedure decides whether to try again.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[must_use]
 pub enum Step<R, T, E> {
     /// Do this transaction and report its outcome.
@@ -66,7 +68,7 @@ impl<R: Copy, T: Copy, E: Copy> Step<R, T, E> {
 }
 
 /// How often something that is busy is asked, and how many times at the most.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Polling {

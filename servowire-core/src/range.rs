@@ -1,8 +1,9 @@
 /// A number that its field cannot hold.
 ///
 /// Only numbers that a caller hands over are refused with it; what came over a wire and is wrong is an `Error` of the crate.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, thiserror::Error)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[error("{got} is out of range, the limit is {max}")]
 pub struct OutOfRange {
     /// The number; the nearest that an `i64` holds.

@@ -1,13 +1,11 @@
-//! The one loop that takes a procedure through its exchanges, for those who wait and for those who are woken.
-
-use core::pin::pin;
-use core::task::{Context, Poll, Waker};
+//! The loop that takes a procedure through its exchanges, for those who wait and for those who are woken.
 
 use crate::{Procedure, Step};
 
 /// How an exchange ended, as a procedure hears it.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Ended<T, E> {
     /// The answer or the value, or why there is none.
     pub outcome: Result<T, E>,
@@ -62,12 +60,16 @@ pub fn run<P: Procedure, F>(
     now_ns: u64,
     mut exchange: impl FnMut(P::Request, u64) -> Result<Ended<P::Response, P::Error>, F>,
 ) -> Result<Ended<P::Value, P::Error>, F> {
-    let mut future =
-        pin!(run_async(procedure, now_ns, async |request, not_before_ns| exchange(request, not_before_ns)));
+    // Not by `run_async`: a future can be polled once too often, which is a panic.
+    let mut step = procedure.start(now_ns);
     loop {
-        // Nothing in it waits, so the first look is the last.
-        if let Poll::Ready(ended) = future.as_mut().poll(&mut Context::from_waker(Waker::noop())) {
-            return ended;
+        match step {
+            Step::Send { request, not_before_ns } => {
+                let Ended { outcome, ready_ns } = exchange(request, not_before_ns)?;
+                step = procedure.receive(outcome, ready_ns);
+            }
+            Step::Done { value, ready_ns } => return Ok(Ended { outcome: Ok(value), ready_ns }),
+            Step::Failed { error, ready_ns } => return Ok(Ended { outcome: Err(error), ready_ns }),
         }
     }
 }
@@ -97,6 +99,8 @@ pub async fn run_async<P: Procedure, F>(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use core::pin::pin;
+    use core::task::{Context, Poll, Waker};
     use std::vec::Vec;
 
     /// Sends 1, 2, 3 ... and is done with the third answer; fails with the first refusal.

@@ -1,16 +1,81 @@
+#[cfg(feature = "embassy-time")]
+mod embassy;
+#[cfg(feature = "fugit")]
+mod fugit;
+
+#[cfg(feature = "async")]
+use servowire_core::ClockCheck;
+use servowire_core::{ClockError, TickRate, TimeBase};
+
+#[cfg(feature = "embassy-time")]
+pub use embassy::EmbassyClock;
+#[cfg(feature = "fugit")]
+pub use fugit::{FugitClock, FugitClock32};
+
+/// Looks at a clock that stands: some milliseconds, and ten times as many as a fast processor makes in a tick of 1 us.
+#[cfg(any(feature = "async", feature = "nikon", feature = "rtex", feature = "tformat"))]
+pub(crate) const MAX_LOOKS: u32 = 10_000;
+
 /// A free-running clock.
 ///
-/// It has to resolve a fraction of a microsecond: an encoder answers 3 us after its request. A cycle counter or a timer that
-/// runs with the system clock will do; every closure that gives nanoseconds is a clock.
+/// Its tick has to be 1 us or shorter, better a fraction of that: an encoder answers 3 us after its request. A [`CounterClock`] is
+/// one, made of a cycle counter or a timer, and so is every closure that gives nanoseconds.
+///
+/// The drivers look twice: a clock that goes back, or gives the same reading ten thousand times, ends the call with
+/// [`Error::Clock`](crate::Error::Clock).
 pub trait Clock {
-    /// Nanoseconds from any origin; never backwards. A timer of 32 bits has to be made longer before it wraps: a clock that was set
-    /// back keeps the next call waiting until it has caught up.
-    fn now_ns(&mut self) -> u64;
+    /// Nanoseconds from any origin; never backwards.
+    ///
+    /// # Errors
+    /// What the clock itself has noticed.
+    fn now_ns(&mut self) -> Result<u64, ClockError>;
 }
 
 impl<F: FnMut() -> u64> Clock for F {
-    fn now_ns(&mut self) -> u64 {
-        self()
+    #[inline]
+    fn now_ns(&mut self) -> Result<u64, ClockError> {
+        Ok(self())
+    }
+}
+
+/// A clock made of a counter of `BITS` bits that wraps, by a [`TimeBase`]: a closure reads it, and another look has to come
+/// within half of its range.
+///
+/// ```
+/// use servowire_drivers::{Clock, CounterClock, TickRate};
+///
+/// # let mut cycles = 0_u32;
+/// # let mut cycle_count = || { cycles += 170; cycles };
+/// // a cycle counter at 170 MHz; one that counts down is read inverted, and a SysTick has 24 bits
+/// let mut clock = CounterClock::<_, 32>::new(TickRate::of::<170_000_000>(), || cycle_count());
+/// assert_eq!(clock.now_ns(), Ok(1_000));
+/// ```
+#[derive(Debug, Clone, Copy)]
+pub struct CounterClock<F, const BITS: u32> {
+    counter: F,
+    time: TimeBase<BITS>,
+}
+
+impl<F: FnMut() -> u32, const BITS: u32> CounterClock<F, BITS> {
+    /// Its time is 0 now.
+    pub fn new(rate: TickRate, mut counter: F) -> Self {
+        let time = TimeBase::new(rate, counter());
+        Self { counter, time }
+    }
+}
+
+impl<F, const BITS: u32> CounterClock<F, BITS> {
+    /// The clock has to be looked at again within so many ns; a driver that is not called for longer gives
+    /// [`ClockError::Backwards`].
+    pub const fn read_within_ns(&self) -> u64 {
+        self.time.read_within_ns()
+    }
+}
+
+impl<F: FnMut() -> u32, const BITS: u32> Clock for CounterClock<F, BITS> {
+    #[inline]
+    fn now_ns(&mut self) -> Result<u64, ClockError> {
+        self.time.now_ns((self.counter)())
     }
 }
 
@@ -19,7 +84,10 @@ impl<F: FnMut() -> u64> Clock for F {
 #[allow(async_fn_in_trait, reason = "drivers are used by one executor; Send is left to the implementation")]
 pub trait Timer: Clock {
     /// Ends at `ns`, or at once if that is past.
-    async fn wait_until(&mut self, ns: u64);
+    ///
+    /// # Errors
+    /// Of a clock that would never come there.
+    async fn wait_until(&mut self, ns: u64) -> Result<(), ClockError>;
 }
 
 /// A clock, and a delay to wait with.
@@ -34,44 +102,54 @@ pub struct WithDelay<C, D> {
 
 #[cfg(feature = "async")]
 impl<C: Clock, D> Clock for WithDelay<C, D> {
-    fn now_ns(&mut self) -> u64 {
+    fn now_ns(&mut self) -> Result<u64, ClockError> {
         self.clock.now_ns()
     }
 }
 
 #[cfg(feature = "async")]
 impl<C: Clock, D: embedded_hal_async::delay::DelayNs> Timer for WithDelay<C, D> {
-    async fn wait_until(&mut self, ns: u64) {
+    async fn wait_until(&mut self, ns: u64) -> Result<(), ClockError> {
+        let mut check = ClockCheck::new(MAX_LOOKS);
         loop {
-            let left_ns = ns.saturating_sub(self.clock.now_ns());
+            let left_ns = ns.saturating_sub(check.check(self.clock.now_ns()?)?);
             if left_ns == 0 {
-                return;
+                return Ok(());
             }
             self.delay.delay_ns(u32::try_from(left_ns).unwrap_or(u32::MAX)).await;
         }
     }
 }
 
-/// The clock of embassy-time. Its tick is 1 us by default and may be 31 us: choose a time driver with 1 MHz or more.
-#[cfg(feature = "embassy-time")]
-#[derive(Debug, Clone, Copy, Default)]
-pub struct EmbassyClock;
+#[cfg(all(test, feature = "async"))]
+mod tests {
+    use super::*;
+    use core::cell::Cell;
+    use core::future::Future;
+    use core::pin::pin;
+    use core::task::{Context, Poll, Waker};
 
-#[cfg(feature = "embassy-time")]
-impl Clock for EmbassyClock {
-    fn now_ns(&mut self) -> u64 {
-        let ticks = u128::from(embassy_time::Instant::now().as_ticks());
-        let ns = ticks.saturating_mul(1_000_000_000).checked_div(embassy_time::TICK_HZ.into()).unwrap_or(0);
-        u64::try_from(ns).unwrap_or(u64::MAX)
+    /// Passes so much time for each ns.
+    struct Passes<'a>(&'a Cell<u64>, i64);
+
+    impl embedded_hal_async::delay::DelayNs for Passes<'_> {
+        async fn delay_ns(&mut self, ns: u32) {
+            self.0.set(self.0.get().saturating_add_signed(i64::from(ns) * self.1));
+        }
     }
-}
 
-#[cfg(feature = "embassy-time")]
-impl Timer for EmbassyClock {
-    async fn wait_until(&mut self, ns: u64) {
-        // A tick later rather than earlier.
-        let ticks = u128::from(ns).saturating_mul(embassy_time::TICK_HZ.into()).div_ceil(1_000_000_000);
-        let ticks = u64::try_from(ticks).unwrap_or(u64::MAX);
-        embassy_time::Timer::at(embassy_time::Instant::from_ticks(ticks)).await;
+    /// How a wait ends, and when.
+    fn wait(per_ns: i64) -> (Poll<Result<(), ClockError>>, u64) {
+        let now_ns = Cell::new(1_000_000);
+        let mut timer = WithDelay { clock: || now_ns.get(), delay: Passes(&now_ns, per_ns) };
+        let wait = pin!(timer.wait_until(20_000_000_000)).poll(&mut Context::from_waker(Waker::noop()));
+        (wait, now_ns.get())
+    }
+
+    #[test]
+    fn a_delay_is_waited_for_in_pieces_and_not_for_ever() {
+        assert_eq!(wait(1), (Poll::Ready(Ok(())), 20_000_000_000));
+        assert_eq!(wait(0), (Poll::Ready(Err(ClockError::Stopped)), 1_000_000));
+        assert_eq!(wait(-1), (Poll::Ready(Err(ClockError::Backwards { by_ns: 1_000_000 })), 0));
     }
 }

@@ -1,28 +1,79 @@
-/// Why a call failed. `IO` is the error of the UART, `PIN` that of the direction pin, `P` that of the protocol, and
-/// `D` its doubts about a position.
+use servowire_core::ClockError;
+
+/// Why a call failed. `IO` is the error of the port (a UART, an SPI, the bus of an ASIC), `PIN` that of the direction pin, `P` that
+/// of the protocol, and `D` its doubts about a position. A driver that has no such thing has [`Infallible`] there.
+///
+/// [`Infallible`]: core::convert::Infallible
 ///
 /// After any of them the next call begins with a clean line: it waits until nobody can be talking any more and throws away
 /// what has come.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, thiserror::Error)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]
 pub enum Error<IO, PIN, P, D> {
-    /// The UART reports a fault: noise, framing, overrun. The exchange is lost.
-    #[error("the UART reports a fault")]
+    /// The port reports a fault: a UART noise, framing or overrun, an ASIC a bus that does not answer. The exchange is lost.
+    #[error("the port reports a fault")]
     Io(IO),
-    /// The direction pin does.
+    /// The direction pin reports a fault.
     #[error("the direction pin reports a fault")]
     Pin(PIN),
-    /// The UART takes or gives no bytes any more.
-    #[error("the UART is closed")]
+    /// The port takes or gives nothing any more.
+    #[error("the port is closed")]
     Closed,
     /// Somebody talks without a pause; nothing was sent.
     #[error("the line does not become quiet")]
     NeverQuiet,
-    /// No answer, or one that was refused.
+    /// The clock stands, or was set back; whether a request that had begun had its effect is not known.
+    #[error("{0}")]
+    Clock(#[from] ClockError),
+    /// No answer, or one that was refused; of an RTEX master the reason why its communication does not run.
     #[error("{0}")]
     Protocol(P),
     /// A good answer whose position must not be used.
     #[error("{0}")]
     Doubt(D),
+}
+
+#[cfg(test)]
+mod tests {
+    use super::Error;
+    use core::convert::Infallible;
+    use servowire_core::ClockError;
+    use std::string::ToString;
+
+    type Any = Error<(), (), &'static str, &'static str>;
+
+    /// Of a UART, an SPI or an ASIC alike.
+    #[test]
+    fn texts_name_no_port_that_is_not_there() {
+        let texts = [
+            (Any::Io(()), "the port reports a fault"),
+            (Any::Pin(()), "the direction pin reports a fault"),
+            (Any::Closed, "the port is closed"),
+            (Any::NeverQuiet, "the line does not become quiet"),
+            (Any::Clock(ClockError::Backwards { by_ns: 40 }), "the clock went back by 40 ns"),
+            (Any::Protocol("no answer"), "no answer"),
+            (Any::Doubt("old"), "old"),
+        ];
+        for (error, text) in texts {
+            assert_eq!(error.to_string(), text);
+        }
+    }
+
+    #[test]
+    fn errors_can_be_returned_by_main() {
+        let error: &dyn core::error::Error = &Error::<(), Infallible, &str, Infallible>::NeverQuiet;
+        assert_eq!(error.to_string(), "the line does not become quiet");
+    }
+
+    #[cfg(feature = "serde")]
+    #[test]
+    fn errors_are_data() {
+        type Any = Error<u8, (), u16, u32>;
+        for error in [Any::Io(1), Any::Closed, Any::Clock(ClockError::Stopped), Any::Protocol(2), Any::Doubt(3)] {
+            let text = serde_json::to_string(&error).unwrap();
+            assert_eq!(serde_json::from_str::<Any>(&text).unwrap(), error);
+        }
+    }
 }

@@ -17,10 +17,10 @@ extern crate std;
 mod clock;
 mod direction;
 mod error;
+#[cfg(any(feature = "nikon", feature = "tformat"))]
+mod exchange;
 #[cfg(feature = "nikon")]
 pub mod nikon;
-#[cfg(any(feature = "nikon", feature = "tformat"))]
-mod procedure;
 #[cfg(any(feature = "nikon", feature = "tformat"))]
 mod quiet;
 #[cfg(feature = "async")]
@@ -32,10 +32,13 @@ pub mod spi;
 #[cfg(feature = "tformat")]
 pub mod tformat;
 
-pub use clock::Clock;
 #[cfg(feature = "embassy-time")]
 pub use clock::EmbassyClock;
+pub use clock::{Clock, CounterClock};
+#[cfg(feature = "fugit")]
+pub use clock::{FugitClock, FugitClock32};
 #[cfg(feature = "async")]
 pub use clock::{Timer, WithDelay};
 pub use direction::{Automatic, Direction, DriverEnable};
 pub use error::Error;
+pub use servowire_core::{ClockError, TickRate};

@@ -4,18 +4,20 @@
 //! that samples ([`spi`](crate::spi)), or a FIFO in an FPGA.
 //!
 //! [`blocking`] spins while it waits, some tens of microseconds a call; [`asynch`] gives the time back. Both have the same
-//! `Master` with the same calls.
+//! `Driver` with the same calls.
 
 #[cfg(feature = "async")]
 pub mod asynch;
 pub mod blocking;
 
-use nikon_aformat::master::{BusTransaction, Line, Progress, Transaction};
+use nikon_aformat::master::Line;
 use nikon_aformat::{Error, FRAME_BITS, Request, Resolution};
+use servowire_core::{Machine, Progress};
 
 /// A frame as it came from the line.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Frame {
     /// The 16 bits between start bit and delimiter, the first of the line in bit 0.
     pub content: u16,
@@ -26,48 +28,19 @@ pub struct Frame {
     pub end_ns: Option<u64>,
 }
 
-/// A transaction, with one encoder or with all on a line.
-trait Receiver {
-    /// What it is made for.
-    type Value;
-
-    fn frame(&mut self, content: u16, end_ns: u64) -> Progress<Self::Value>;
-    fn framing_error(&mut self, end_ns: u64) -> Progress<Self::Value>;
-    fn poll(&mut self, now_ns: u64) -> Progress<Self::Value>;
-    fn progress(&self) -> Progress<Self::Value>;
-
-    /// Takes a frame that came from the port at `now_ns`.
-    fn take(&mut self, frame: Frame, now_ns: u64) -> Progress<Self::Value> {
-        let end_ns = frame.end_ns.unwrap_or(now_ns);
-        if frame.framed { self.frame(frame.content, end_ns) } else { self.framing_error(end_ns) }
-    }
+/// What a `Driver` was made of.
+#[derive(Debug, Clone, Copy)]
+pub struct Released<F, C> {
+    /// The port.
+    pub port: F,
+    /// The clock or timer.
+    pub clock: C,
 }
 
-macro_rules! receiver {
-    ($transaction:ty => $value:ty) => {
-        impl Receiver for $transaction {
-            type Value = $value;
-
-            fn frame(&mut self, content: u16, end_ns: u64) -> Progress<$value> {
-                self.frame(content, end_ns)
-            }
-
-            fn framing_error(&mut self, end_ns: u64) -> Progress<$value> {
-                self.framing_error(end_ns)
-            }
-
-            fn poll(&mut self, now_ns: u64) -> Progress<$value> {
-                self.poll(now_ns)
-            }
-
-            fn progress(&self) -> Progress<$value> {
-                self.progress()
-            }
-        }
-    };
+/// Hands a frame that came from the port at `now_ns` to a transaction, with one encoder or with all on a line.
+fn hear<M: Machine<Unit = [Option<u16>]>>(machine: &mut M, frame: Frame, now_ns: u64) -> Progress<M::Value, M::Error> {
+    machine.hear(&[frame.framed.then_some(frame.content)], frame.end_ns.unwrap_or(now_ns))
 }
-receiver!(Transaction => nikon_aformat::master::Exchange);
-receiver!(BusTransaction => ());
 
 /// How long this request and the longest answer to it take.
 fn longest_ns(line: Line, request: Request, resolution: Resolution) -> u64 {

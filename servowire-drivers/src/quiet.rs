@@ -1,8 +1,11 @@
 //! When the line may be used again, without I/O: the rules that the blocking and the async drivers share.
 
+use servowire_core::{ClockCheck, ClockError};
+
 use crate::Clock;
 #[cfg(feature = "async")]
 use crate::Timer;
+use crate::clock::MAX_LOOKS;
 #[cfg(feature = "async")]
 use crate::race::race;
 
@@ -10,9 +13,9 @@ use crate::race::race;
 const PATIENCE_NS: u64 = 2_000_000;
 
 /// What is known of the line between two calls. It outlives a dropped future.
-#[expect(clippy::struct_field_names, reason = "the unit is part of the name")]
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Line {
+    check: ClockCheck,
     /// Somebody may be talking until then.
     ready_ns: u64,
     /// How long somebody may be talking after a request that is being handed over, or was when its call ended.
@@ -43,7 +46,48 @@ pub(crate) struct Settling {
 
 impl Line {
     pub(crate) const fn new(silence_ns: u32) -> Self {
-        Self { ready_ns: 0, leaving_ns: None, silence_ns: silence_ns as u64 }
+        Self { check: ClockCheck::new(MAX_LOOKS), ready_ns: 0, leaving_ns: None, silence_ns: silence_ns as u64 }
+    }
+
+    /// A look at the clock: every one goes through here, so that no wait is for ever.
+    #[inline(always)]
+    pub(crate) fn now_ns(&mut self, clock: &mut impl Clock) -> Result<u64, ClockError> {
+        let last_ns = self.check.last_ns();
+        match clock.now_ns().and_then(|now_ns| self.check.check(now_ns)) {
+            Ok(now_ns) => Ok(now_ns),
+            Err(error) => Err(self.lost(error, last_ns)),
+        }
+    }
+
+    /// The clock is wrong. If it was set back, what the line was to be left alone for is waited for from the next look on.
+    #[cold]
+    #[inline(never)]
+    fn lost(&mut self, error: ClockError, last_ns: u64) -> ClockError {
+        if matches!(error, ClockError::Backwards { .. }) {
+            let left_ns = self.ready_ns.saturating_sub(last_ns);
+            self.leaving_ns = Some(self.leaving_ns.unwrap_or(0).max(left_ns));
+            self.ready_ns = 0;
+        }
+        error
+    }
+
+    /// Waits by looking at the clock.
+    pub(crate) fn wait_until(&mut self, clock: &mut impl Clock, ns: u64) -> Result<(), ClockError> {
+        while self.now_ns(clock)? < ns {}
+        Ok(())
+    }
+
+    /// Waits for so long.
+    #[cfg(feature = "tformat")]
+    pub(crate) fn pause(&mut self, clock: &mut impl Clock, ns: u64) -> Result<(), ClockError> {
+        let now_ns = self.now_ns(clock)?;
+        self.wait_until(clock, now_ns.saturating_add(ns))
+    }
+
+    #[cfg(all(feature = "tformat", feature = "async"))]
+    pub(crate) async fn pause_asynch(&mut self, timer: &mut impl Timer, ns: u64) -> Result<(), ClockError> {
+        let now_ns = self.now_ns(timer)?;
+        timer.wait_until(now_ns.saturating_add(ns)).await
     }
 
     /// A request begins to go out that can keep the line busy for so long, from whenever it leaves: to be called before its
@@ -109,15 +153,16 @@ impl Settling {
 }
 
 /// Throws away what comes until the line is free; `listen` tells whether something came. Whether it became free.
-pub(crate) fn wait<E>(
+pub(crate) fn wait<E: From<ClockError>>(
     line: &mut Line,
     clock: &mut impl Clock,
     mut listen: impl FnMut() -> Result<bool, E>,
 ) -> Result<bool, E> {
-    let mut settling = line.settle(clock.now_ns());
+    let now_ns = line.now_ns(clock)?;
+    let mut settling = line.settle(now_ns);
     loop {
         let heard = listen()?;
-        let now_ns = clock.now_ns();
+        let now_ns = line.now_ns(clock)?;
         if heard {
             settling.heard(now_ns);
         }
@@ -131,16 +176,16 @@ pub(crate) fn wait<E>(
 
 /// The same with a `listen` that ends when something came, and may be dropped before.
 #[cfg(feature = "async")]
-pub(crate) async fn wait_asynch<E>(
+pub(crate) async fn wait_asynch<E: From<ClockError>>(
     line: &mut Line,
     timer: &mut impl Timer,
     mut listen: impl AsyncFnMut() -> Result<(), E>,
 ) -> Result<bool, E> {
-    let mut until_ns = timer.now_ns();
+    let mut until_ns = line.now_ns(timer)?;
     let mut settling = line.settle(until_ns);
     loop {
-        let heard = race(listen(), timer.wait_until(until_ns)).await.transpose()?.is_some();
-        let now_ns = timer.now_ns();
+        let heard = race(listen(), timer.wait_until(until_ns)).await?.transpose()?.is_some();
+        let now_ns = line.now_ns(timer)?;
         if heard {
             settling.heard(now_ns);
         }
@@ -187,6 +232,37 @@ mod tests {
         assert_eq!(line.settle(790_000).poll(790_000), Settle::Quiet);
         line.begin(90_000);
         assert_eq!((line.free_ns(800_000), line.free_ns(890_001)), (890_000, 890_001));
+    }
+
+    /// 60 us of 90 were left when the clock was set back, and none of them has passed for certain.
+    #[test]
+    fn a_line_in_use_stays_so_when_the_clock_is_set_back() {
+        let mut line = Line::new(8_000);
+        line.begin(90_000);
+        assert_eq!(line.now_ns(&mut || 10_000), Ok(10_000));
+        line.sent(10_000);
+        assert_eq!(line.now_ns(&mut || 40_000), Ok(40_000));
+        assert_eq!(line.now_ns(&mut || 500), Err(ClockError::Backwards { by_ns: 39_500 }));
+        assert_eq!(line.settle(700).poll(60_699), Settle::Until(60_700));
+        // The same for a request that was just going out.
+        line.begin(90_000);
+        assert_eq!(line.now_ns(&mut || 0), Err(ClockError::Backwards { by_ns: 500 }));
+        assert_eq!(line.settle(100).poll(90_099), Settle::Until(90_100));
+        assert_eq!(line.settle(90_100).poll(90_100), Settle::Quiet);
+    }
+
+    /// A procedure that had ended before, or never sent anything, does not know of the exchange before it.
+    #[test]
+    fn the_end_of_a_procedure_frees_no_line_that_somebody_else_may_be_using() {
+        let mut line = Line::new(8_000);
+        line.keep(90);
+        assert_eq!((line.settle(89).poll(89), line.settle(90).poll(90)), (Settle::Until(90), Settle::Quiet));
+        for ready_ns in [0, 50] {
+            line.begin(90_000);
+            line.sent(10_000);
+            line.keep(ready_ns);
+            assert_eq!(line.settle(60_000).poll(99_999), Settle::Until(100_000));
+        }
     }
 
     #[test]

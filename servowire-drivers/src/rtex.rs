@@ -7,14 +7,14 @@
 //! ```text
 //!             external timer                              internal timer
 //!  main loop  control() until it gives Running, then interrupts on; control() and led() for ever
-//!  XINTRX     priority above: reception.frame(), then     priority below: reception.frame()
+//!  XINTRX     priority above: frames.add(), then     priority below: frames.add()
 //!             switch the reception bank
 //!  NC         from the host's timer: exchange()           from the falling edge of XSYNC: exchange()
 //! ```
 //!
 //! In the external-timer system the receive interrupt may switch the reception bank in the middle of an exchange, in the
 //! internal-timer system the ASIC does at XSYNC if the exchange is late; half of the blocks would be of another frame. So the
-//! exchange looks at [`Reception`] and at the clock before and after it reads, and reads once more if the bank was switched between;
+//! exchange looks at [`FrameCount`] and at the clock before and after it reads, and reads once more if the bank was switched between;
 //! if it was again, it takes none. System Design Guide for Master, chapters 1 and 2.
 //!
 //! Every block that the port fails to read or to write is tried again at once. If that fails too, what was not read counts as a
@@ -22,21 +22,23 @@
 
 #[cfg(feature = "async")]
 pub mod asynch;
+mod frame_count;
 mod port;
-mod reception;
 
 use core::convert::Infallible;
 
-use rtex_block::master::{Asic, Fault, Led, Master, Phase, Received, Ring, Slave};
+use rtex_block::master::{Asic, Axis, ControlError, ControlPhase, Heard, Led, Master, Ring, Slave};
 use rtex_block::timing::TimerSystem;
-use rtex_block::{BlockSize, Command32, MacId, Response, Response32, UpdateCounter};
+use rtex_block::{BlockSize, Command32, Evidence, MacId, Response, Response32};
+use servowire_core::{ClockCheck, ClockError};
 
+use crate::clock::MAX_LOOKS;
 use crate::{Clock, Error};
+pub use frame_count::FrameCount;
 pub use port::{Port, Word};
-pub use reception::Reception;
 
 /// Why a call of a [`Driver`] failed.
-pub type Failure<P> = Error<<P as Port>::Error, Infallible, Fault, Infallible>;
+pub type Failure<P> = Error<<P as Port>::Error, Infallible, ControlError, Infallible>;
 
 /// Words of the longest block, on a bus of bytes.
 const MOST_WORDS: usize = rtex_block::LEN32;
@@ -49,8 +51,9 @@ fn twice<E>(mut transfer: impl FnMut() -> Result<(), E>) -> Result<(), E> {
 }
 
 /// What an exchange was like.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Exchanged {
     /// Communication periods by which the commands go out late, because the exchange ended after the next frame had begun.
     pub frames_late: u32,
@@ -58,60 +61,54 @@ pub struct Exchanged {
     pub torn: bool,
 }
 
+/// What a [`Driver`] was made of.
+#[derive(Debug)]
+pub struct Released<P, C, const N: usize> {
+    /// The port of the ASIC.
+    pub port: P,
+    /// The clock.
+    pub clock: C,
+    /// The master.
+    pub master: Master<N>,
+}
+
 /// A master of `N` axes, and the port of its ASIC.
 #[derive(Debug)]
 pub struct Driver<'r, P, C, const N: usize> {
     port: P,
     clock: C,
+    check: ClockCheck,
     master: Master<N>,
-    reception: &'r Reception,
-    /// Frames of `reception` that the master has heard of.
+    received: &'r FrameCount,
+    /// Frames of `received` that the master has heard of.
     frames: u32,
     late: u32,
     torn: u32,
-    heard: [Heard; N],
     /// When the period of the last exchange began.
     #[cfg(feature = "async")]
     began_ns: Option<u64>,
 }
 
-/// What was last heard of a drive.
-#[derive(Debug, Clone, Copy, Default)]
-struct Heard {
-    echo: Option<UpdateCounter>,
-    /// Of the last exchange.
-    position: Option<i32>,
-}
-
-impl Heard {
-    fn take(&mut self, drive: MacId, received: &Received) {
-        let response = received.response().filter(|response| response.mac_id == drive);
-        let echo = response.map(|response| response.update_counter_echo);
-        self.position = response.filter(|_| echo != self.echo).map(|response| response.response_data1);
-        self.echo = echo.or(self.echo);
-    }
-}
-
 impl<'r, P: Port, C: Clock, const N: usize> Driver<'r, P, C, N> {
-    /// A driver in PH_INIT. The receive interrupt has the same `reception`.
-    pub fn new(port: P, clock: C, master: Master<N>, reception: &'r Reception) -> Self {
+    /// A driver in PH_INIT. The receive interrupt has the same `received`.
+    pub fn new(port: P, clock: C, master: Master<N>, received: &'r FrameCount) -> Self {
         Self {
             port,
             clock,
+            check: ClockCheck::new(MAX_LOOKS),
             master,
-            reception,
-            frames: reception.frames(),
+            received,
+            frames: received.get(),
             late: 0,
             torn: 0,
-            heard: [Heard::default(); N],
             #[cfg(feature = "async")]
             began_ns: None,
         }
     }
 
     /// Gives port, clock and master back.
-    pub fn release(self) -> (P, C, Master<N>) {
-        (self.port, self.clock, self.master)
+    pub fn release(self) -> Released<P, C, N> {
+        Released { port: self.port, clock: self.clock, master: self.master }
     }
 
     /// The master, for reading.
@@ -139,29 +136,30 @@ impl<'r, P: Port, C: Clock, const N: usize> Driver<'r, P, C, N> {
         self.master.led(t_ms)
     }
 
-    /// The actual position of the axis at `place`, command units, if the last exchange brought a new one: a sound block of its drive
-    /// whose counter had gone on.
-    pub fn position(&self, place: usize) -> Option<i32> {
-        self.heard.get(place)?.position
+    /// What is known of the actual position, speed and torque of the axis at `place`; nothing of a place that the ring does not
+    /// have. Its instant is the start of the frame that brought the last new counter echo, by the driver's clock.
+    pub fn evidence(&self, place: usize) -> Evidence {
+        self.master.ring().axes().get(place).map_or(Evidence::NEVER, Axis::evidence)
     }
 
-    /// One turn of the main loop. Until it gives [`Phase::Running`] interrupts stay off; it writes the first transmit data itself.
+    /// One turn of the main loop. Until it gives [`ControlPhase::Running`] interrupts stay off; it writes the first transmit data itself.
     ///
     /// # Errors
-    /// [`Error::Protocol`] with the fault of the phases; [`Error::Io`].
-    pub fn control(&mut self) -> Result<Phase, Failure<P>> {
+    /// [`Error::Protocol`] with the fault of the phases; [`Error::Io`]; [`Error::Clock`].
+    pub fn control(&mut self) -> Result<ControlPhase, Failure<P>> {
         let asic = self.port.state().map_err(Error::Io)?;
         let mut table = [Slave { mac_id: MacId::truncate(0), kind: 0 }; MacId::COUNT];
         let found = match (self.master.phase(), asic) {
-            (Phase::Waiting, Asic::Ready) => self.port.slaves(&mut table).map_err(Error::Io)?,
+            (ControlPhase::Waiting, Asic::Ready) => self.port.slaves(&mut table).map_err(Error::Io)?,
             _ => None,
         };
         let phase = self.master.control(asic, found.map(|count| table.get(..count).unwrap_or(&table)));
-        if phase == Phase::Prepare {
-            let commands = self.master.exchange(&[Received::Nothing; N]);
+        if phase == ControlPhase::Prepare {
+            let now_ns = self.now_ns()?;
+            let commands = self.master.exchange(&[Heard::Nothing; N], now_ns);
             self.write(&commands).map_err(Error::Io)?;
         }
-        match self.master.fault() {
+        match self.master.error() {
             Some(fault) => Err(Error::Protocol(fault)),
             None => Ok(phase),
         }
@@ -171,11 +169,11 @@ impl<'r, P: Port, C: Clock, const N: usize> Driver<'r, P, C, N> {
     ///
     /// # Errors
     /// As [`control`](Self::control).
-    pub fn start(&mut self, limit_ns: u64) -> Result<Phase, Failure<P>> {
-        let until_ns = self.clock.now_ns().saturating_add(limit_ns);
+    pub fn start(&mut self, limit_ns: u64) -> Result<ControlPhase, Failure<P>> {
+        let until_ns = self.now_ns()?.saturating_add(limit_ns);
         loop {
             let phase = self.control()?;
-            if phase == Phase::Running || self.clock.now_ns() >= until_ns {
+            if phase == ControlPhase::Running || self.now_ns()? >= until_ns {
                 return Ok(phase);
             }
         }
@@ -186,35 +184,33 @@ impl<'r, P: Port, C: Clock, const N: usize> Driver<'r, P, C, N> {
     /// the time of the interrupt.
     ///
     /// # Errors
-    /// [`Error::Io`]; the next exchange goes on.
+    /// [`Error::Io`] and [`Error::Clock`]; commands were written if they could be, and the next exchange goes on.
     pub fn exchange(&mut self, began_ns: u64) -> Result<Exchanged, Failure<P>> {
         #[cfg(feature = "async")]
         {
             self.began_ns = Some(began_ns);
         }
         let read = self.read(began_ns);
-        let frames = self.reception.frames();
+        let frames = self.received.get();
         if frames != self.frames {
             self.frames = frames;
-            self.master.received();
+            self.master.frame_received();
         }
-        let (received, torn, fault) = match read {
-            Ok(Some(received)) => (received, false, None),
-            Ok(None) => ([Received::Nothing; N], true, None),
-            Err(fault) => ([Received::Nothing; N], false, Some(fault)),
+        let (heard, torn, fault) = match read {
+            Ok(Some(heard)) => (heard, false, None),
+            Ok(None) => ([Heard::Nothing; N], true, None),
+            Err(fault) => ([Heard::Nothing; N], false, Some(fault)),
         };
         self.torn = self.torn.saturating_add(torn.into());
-        for ((heard, axis), received) in self.heard.iter_mut().zip(self.master.ring().axes()).zip(&received) {
-            heard.take(axis.config().mac_id, received);
-        }
-        let commands = self.master.exchange(&received);
+        // The frame before brought them: rather too old than too young.
+        let end_ns = began_ns.saturating_sub(self.master.config().periods.com_ns.into());
+        let commands = self.master.exchange(&heard, end_ns);
         let written = self.write(&commands);
         let frames_late = self.frames_since(began_ns);
-        self.late = self.late.saturating_add((frames_late > 0).into());
-        match (fault, written) {
-            (Some(fault), _) | (None, Err(fault)) => Err(Error::Io(fault)),
-            (None, Ok(())) => Ok(Exchanged { frames_late, torn }),
-        }
+        self.late = self.late.saturating_add(frames_late.is_ok_and(|frames| frames > 0).into());
+        fault.map_or(Ok(()), Err)?;
+        written.map_err(Error::Io)?;
+        Ok(Exchanged { frames_late: frames_late?, torn })
     }
 
     /// Leaves the stop after a time-out, an alarm or a stop of the caller; see [`Master::clear`].
@@ -223,35 +219,40 @@ impl<'r, P: Port, C: Clock, const N: usize> Driver<'r, P, C, N> {
     }
 
     /// The blocks of one frame; `None` if the bank was switched meanwhile each time.
-    fn read(&mut self, began_ns: u64) -> Result<Option<[Received; N]>, P::Error> {
+    fn read(&mut self, began_ns: u64) -> Result<Option<[Heard; N]>, Failure<P>> {
         for _ in 0..READS {
-            let before = self.bank(began_ns);
-            let mut received = [Received::Nothing; N];
-            for (place, received) in received.iter_mut().enumerate() {
-                *received = self.block(place)?;
+            let before = self.bank(began_ns)?;
+            let mut all = [Heard::Nothing; N];
+            for (place, heard) in all.iter_mut().enumerate() {
+                *heard = self.block(place).map_err(Error::Io)?;
             }
-            if self.bank(began_ns) == before {
-                return Ok(Some(received));
+            if self.bank(began_ns)? == before {
+                return Ok(Some(all));
             }
         }
         Ok(None)
     }
 
     /// What is another one after each switch of the reception bank: the receive interrupt switches it, or XSYNC.
-    fn bank(&mut self, began_ns: u64) -> u32 {
+    fn bank(&mut self, began_ns: u64) -> Result<u32, ClockError> {
         match self.master.config().timer {
-            TimerSystem::External => self.reception.frames(),
+            TimerSystem::External => Ok(self.received.get()),
             TimerSystem::Internal => self.frames_since(began_ns),
         }
     }
 
     /// Frames that have begun since the one at `began_ns`.
-    fn frames_since(&mut self, began_ns: u64) -> u32 {
-        let past_ns = self.clock.now_ns().saturating_sub(began_ns);
-        self.master.config().periods.frames_late(u32::try_from(past_ns).unwrap_or(u32::MAX))
+    fn frames_since(&mut self, began_ns: u64) -> Result<u32, ClockError> {
+        let past_ns = self.now_ns()?.saturating_sub(began_ns);
+        Ok(self.master.config().periods.frames_late(u32::try_from(past_ns).unwrap_or(u32::MAX)))
     }
 
-    fn block(&mut self, place: usize) -> Result<Received, P::Error> {
+    /// A look at the clock.
+    fn now_ns(&mut self) -> Result<u64, ClockError> {
+        self.check.check(self.clock.now_ns()?)
+    }
+
+    fn block(&mut self, place: usize) -> Result<Heard, P::Error> {
         let size = self.master.config().size;
         let (mut words, mut bytes) = ([P::Word::default(); MOST_WORDS], [0; rtex_block::LEN32]);
         let (words, bytes) = block_of::<P>(size, &mut words, &mut bytes);

@@ -15,8 +15,9 @@
 //! ```
 
 /// How a peripheral of a little-endian processor puts samples into memory.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum Order {
     /// SPI, 8 bits, least significant bit first.
     LsbFirst8,
@@ -94,8 +95,9 @@ pub fn write(
 }
 
 /// The buffer ends before the samples do.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, thiserror::Error)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[error("the buffer is too short for the samples")]
 pub struct TooShort;
 

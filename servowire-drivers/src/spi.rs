@@ -30,6 +30,7 @@ use embedded_hal_async::spi::SpiBus as AsyncSpiBus;
 
 use embedded_io::ErrorKind;
 use nrz_line::{Field, Format, FormatError, Receiver, Samples};
+use servowire_core::ClockError;
 
 use crate::Direction;
 use crate::direction::Switch;
@@ -82,15 +83,37 @@ impl Sampling {
     }
 }
 
+/// What a [`SpiUart`] was made of.
+#[derive(Debug, Clone, Copy)]
+pub struct Released<S, D> {
+    /// The SPI.
+    pub bus: S,
+    /// Who switches the line driver.
+    pub direction: D,
+}
+
+/// What a [`SpiFrames`] was made of.
+#[cfg(feature = "nikon")]
+#[derive(Debug, Clone, Copy)]
+pub struct ReleasedFrames<S, D, C> {
+    /// The SPI.
+    pub bus: S,
+    /// Who switches the line driver.
+    pub direction: D,
+    /// The clock.
+    pub clock: C,
+}
+
 /// What went wrong at the SPI or in what it has sampled.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, thiserror::Error)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]
 pub enum SpiError<S, P> {
     /// The SPI reports a fault.
     #[error("the SPI reports a fault")]
     Spi(S),
-    /// The direction pin does.
+    /// The direction pin reports a fault.
     #[error("the direction pin reports a fault")]
     Pin(P),
     /// A stop bit was 0.
@@ -99,6 +122,9 @@ pub enum SpiError<S, P> {
     /// Something was on the line outside the window.
     #[error("something is on the line outside the window")]
     Noise,
+    /// The clock stands, or was set back.
+    #[error(transparent)]
+    Clock(#[from] ClockError),
     /// The request does not fit the buffer.
     #[error(transparent)]
     TooShort(#[from] TooShort),
@@ -109,7 +135,7 @@ impl<S: core::fmt::Debug, P: core::fmt::Debug> embedded_io::Error for SpiError<S
         match self {
             Self::Framing | Self::Noise => ErrorKind::InvalidData,
             Self::TooShort(_) => ErrorKind::OutOfMemory,
-            Self::Spi(_) | Self::Pin(_) => ErrorKind::Other,
+            Self::Spi(_) | Self::Pin(_) | Self::Clock(_) => ErrorKind::Other,
         }
     }
 }
@@ -154,6 +180,10 @@ impl<'b, S, D> Sampler<'b, S, D> {
             at: 0,
             samples: Samples::partial(0, 0),
         }
+    }
+
+    fn release(self) -> Released<S, D> {
+        Released { bus: self.bus, direction: self.direction.release() }
     }
 
     /// The next field of what was sampled.

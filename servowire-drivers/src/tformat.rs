@@ -1,34 +1,31 @@
 //! T-Format encoders: Tamagawa and others, 2.5 or 5 Mbit/s, at a plain UART (8N1).
 //!
 //! [`blocking`] spins while it waits, some tens of microseconds a call; [`asynch`] gives the time back. Both have the same
-//! `Encoder` with the same calls.
+//! `Driver` with the same calls.
 
 #[cfg(feature = "async")]
 pub mod asynch;
 pub mod blocking;
 
-use tformat::master::{Exchange, Line};
-use tformat::{Doubt, Error, Policy, Position, Request, Resolution};
+use tformat::master::Line;
+use tformat::{Error, Request};
+
+/// What a `Driver` was made of.
+#[derive(Debug, Clone, Copy)]
+pub struct Released<U, D, C> {
+    /// The UART.
+    pub uart: U,
+    /// Who switches the line driver.
+    pub direction: D,
+    /// The clock or timer.
+    pub clock: C,
+}
+
+/// What a lost answer is to a procedure.
+const LOST: Error = Error::NoResponse { echo: false };
 
 /// Longest request and longest answer together.
 const MAX_BYTES: usize = 16;
-
-/// A position that may be used, and when it was true.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub struct Sample {
-    /// The position.
-    pub position: Position,
-    /// When the encoder took it, by the driver's clock. If the request was held up on its way out, the position is younger by that.
-    pub sampled_ns: u64,
-}
-
-impl Sample {
-    fn of(exchange: Exchange, resolution: Resolution, policy: Policy) -> Result<Self, Doubt> {
-        let position = resolution.read(&exchange.response, policy)?;
-        Ok(Self { position, sampled_ns: exchange.sampled_ns })
-    }
-}
 
 /// How long this request and the longest answer to it take.
 fn longest_ns(line: &Line, request: Request) -> u64 {

@@ -21,7 +21,7 @@ use embedded_io::{ErrorKind, ErrorType};
 use servowire_drivers::samples::Order;
 use servowire_drivers::spi::{Sampling, SpiUart};
 use servowire_drivers::tformat::blocking;
-use servowire_drivers::{Automatic, Clock, DriverEnable, Error};
+use servowire_drivers::{Automatic, Clock, ClockError, DriverEnable, Error};
 use tformat::master::Line;
 use tformat::{Address, BitRate, Request};
 
@@ -113,10 +113,10 @@ impl Bench {
 }
 
 impl Clock for Bench {
-    fn now_ns(&mut self) -> u64 {
+    fn now_ns(&mut self) -> Result<u64, ClockError> {
         let mut world = self.0.borrow_mut();
         world.now_ns += 50;
-        world.now_ns
+        Ok(world.now_ns)
     }
 }
 
@@ -201,9 +201,9 @@ impl SpiBus for Bench {
     }
 }
 
-fn encoder(bench: &Bench) -> blocking::Encoder<Bench, DriverEnable<Bench>, Bench> {
+fn encoder(bench: &Bench) -> blocking::Driver<Bench, DriverEnable<Bench>, Bench> {
     let line = Line::new(BitRate::Mbit2_5);
-    blocking::Encoder::new(bench.clone(), DriverEnable(bench.clone()), bench.clone(), line)
+    blocking::Driver::new(bench.clone(), DriverEnable(bench.clone()), bench.clone(), line)
 }
 
 /// What is between the look at the clock and the start bit takes time, more on a small processor. A request of which the end is cut
@@ -274,7 +274,7 @@ fn an_spi_does_not_listen_with_the_driver_on_either() {
         let (mut tx, mut rx) = ([0; 48], [0; 160]);
         let sampling = Sampling::new(Order::MsbFirst8, 8, 8, 2_500_000).unwrap();
         let uart = SpiUart::new(bench.clone(), DriverEnable(bench.clone()), sampling, &mut tx, &mut rx);
-        let mut encoder = blocking::Encoder::new(uart, Automatic, bench.clone(), Line::new(BitRate::Mbit2_5));
+        let mut encoder = blocking::Driver::new(uart, Automatic, bench.clone(), Line::new(BitRate::Mbit2_5));
         for _ in 0..6 {
             let _ = encoder.transact(Request::ReadAll);
         }
@@ -284,7 +284,7 @@ fn an_spi_does_not_listen_with_the_driver_on_either() {
 
 #[cfg(feature = "async")]
 mod asynch {
-    use servowire_drivers::tformat::asynch::Encoder;
+    use servowire_drivers::tformat::asynch::Driver;
 
     use super::*;
     use crate::polls::{FOR_EVER, Looks, forget, pause, run};
@@ -330,8 +330,8 @@ mod asynch {
         }
     }
 
-    fn encoder(bench: &Bench) -> Encoder<Bench, DriverEnable<Bench>, Looks<Bench>> {
-        Encoder::new(bench.clone(), DriverEnable(bench.clone()), Looks(bench.clone()), Line::new(BitRate::Mbit2_5))
+    fn encoder(bench: &Bench) -> Driver<Bench, DriverEnable<Bench>, Looks<Bench>> {
+        Driver::new(bench.clone(), DriverEnable(bench.clone()), Looks(bench.clone()), Line::new(BitRate::Mbit2_5))
     }
 
     #[test]
@@ -369,7 +369,7 @@ mod asynch {
             let sampling = Sampling::new(Order::MsbFirst8, 8, 8, 2_500_000).unwrap();
             let uart = SpiUart::new(bench.clone(), DriverEnable(bench.clone()), sampling, &mut tx, &mut rx);
             let line = Line::new(BitRate::Mbit2_5);
-            let mut encoder = Encoder::new(uart, Automatic, Looks(bench.clone()), line);
+            let mut encoder = Driver::new(uart, Automatic, Looks(bench.clone()), line);
             forget(encoder.transact(Request::ReadAll), polls);
             on += u32::from(bench.0.borrow().on);
             let _ = run(encoder.transact(Request::ReadAll), FOR_EVER);

@@ -12,22 +12,24 @@
 mod frames;
 mod hostile;
 mod late;
+mod refusals;
 
 use embedded_io::ErrorKind;
 use frames::{Bench, Port, Shared, deliveries, host, line, scenario, shaft};
 use hostile::live_through;
 use late::{Late, World};
 use nikon_aformat::bus::Addresses;
-use nikon_aformat::master::{Cycle, Line};
-use nikon_aformat::{BitRate, EncoderAddress, Operation, Policy, RequestFrame, Resolution};
+use nikon_aformat::master::{Cycle, Detection, Line};
+use nikon_aformat::{BitRate, Doubt, EncoderAddress, Operation, Policy, Request, RequestFrame, Resolution};
+use refusals::nikon::{STRICT, rows, widths};
 use servowire_drivers::Error;
 use servowire_drivers::nikon::Frame;
-use servowire_drivers::nikon::blocking::{FramePort, Master};
+use servowire_drivers::nikon::blocking::{Driver, FramePort};
 use servowire_world::{Delivery, Fault, Planned, Scenario, Script};
 
-fn driver(bench: &Shared) -> Master<Port, Port> {
+fn driver(bench: &Shared) -> Driver<Port, Port> {
     let port = Port(bench.clone());
-    Master::new(port.clone(), port, Resolution::default(), line())
+    Driver::new(port.clone(), port, Resolution::default(), line())
 }
 
 #[test]
@@ -39,6 +41,34 @@ fn positions_come() {
         assert_eq!(abs, turn | 3 << 20);
     }
     assert_eq!(bench.borrow().world.truth().clashes(), 0);
+}
+
+/// What `Evidence::at` refuses the driver refuses too, and what it takes is the same sample.
+#[test]
+fn a_doubt_of_the_crate_is_one_of_the_driver() {
+    for row in rows() {
+        let bench = Bench::new(Scenario::quiet());
+        bench.borrow_mut().encoders[0].raise_alarms(row.alarms);
+        let port = Port(bench.clone());
+        let mut encoder = Driver::new(port.clone(), port, row.resolution, line());
+        let refused = encoder.read_position(EncoderAddress::ZERO, row.policy);
+        assert!(matches!(refused, Err(Error::Doubt(doubt)) if (row.is)(doubt)), "{}: {refused:?}", row.what);
+        let evidence = encoder.read_evidence(EncoderAddress::ZERO).unwrap();
+        let refused = evidence.at(bench.borrow().world.now_ns(), row.policy);
+        assert!(refused.is_err_and(row.is), "{}: {refused:?}", row.what);
+    }
+    let bench = Bench::new(Scenario::quiet());
+    let port = Port(bench.clone());
+    let mut encoder = Driver::new(port.clone(), port, widths(20, 16), line());
+    let evidence = encoder.read_evidence(EncoderAddress::ZERO).unwrap();
+    let sample = evidence.at(bench.borrow().world.now_ns(), Policy::new(60_000)).unwrap();
+    assert_eq!((sample.single_turn(), sample.turns()), (1, Some(3)));
+    let sample = encoder.read_position(EncoderAddress::ZERO, Policy::new(60_000)).unwrap();
+    assert_eq!((sample.single_turn(), sample.turns()), (2, Some(3)));
+    // The lower 24 bits say less of the turns than the encoder counts.
+    let request = Request::new(EncoderAddress::ZERO, Operation::Abs24Low);
+    let evidence = encoder.transact(request).unwrap().evidence(widths(20, 16));
+    assert_eq!(evidence.at(bench.borrow().world.now_ns(), STRICT), Err(Doubt::Absent));
 }
 
 /// Each fault alone, in the first exchange: the second one is good. (Noise makes the encoder deaf for the next request, which
@@ -91,7 +121,7 @@ fn hostile_events_on_a_bus_are_survived() {
         let bench = Bench::with(scenario(seed, 3, Delivery::Each), 3, true);
         let mut bus = driver(&bench);
         for call in 0..100 {
-            let answers = bus.read_all(Operation::Abs40Mt, asked).unwrap();
+            let answers = bus.read_bus(Operation::Abs40Mt, asked).unwrap();
             for ea in asked.iter() {
                 let value = answers.exchange(ea).map(|exchange| shaft(exchange.response)).ok_or("missing");
                 // Somebody repeats an old answer: which one is the encoder's is not known, so none is given.
@@ -112,8 +142,8 @@ fn frames_may_come_in_blocks() {
         let bench = Bench::with(Scenario { host: host(false, delivery), ..Scenario::quiet() }, 1, true);
         let mut encoder = driver(&bench);
         for turn in 1..=5_u32 {
-            let position = encoder.read_position(EncoderAddress::ZERO, Policy::STRICT).unwrap();
-            assert_eq!((position.single_turn, position.turns), (turn, 3), "{delivery:?}");
+            let position = encoder.read_position(EncoderAddress::ZERO, Policy::new(100_000)).unwrap();
+            assert_eq!((position.single_turn(), position.turns()), (turn, Some(3)), "{delivery:?}");
         }
         assert_eq!(bench.borrow().world.truth().clashes(), 0);
     }
@@ -151,6 +181,7 @@ fn procedures_run_over_it() {
     encoder.clear_status(EncoderAddress::ZERO).unwrap();
     let type_word = encoder.read_eeprom(EncoderAddress::ZERO, 0).unwrap();
     assert_eq!(encoder.read_eeprom(EncoderAddress::ZERO, 0), Ok(type_word));
+    assert_eq!(encoder.run(&mut Detection::of(EncoderAddress::ZERO)).map(|found| found.ea), Ok(EncoderAddress::ZERO));
     assert_eq!(bench.borrow().world.truth().clashes(), 0);
 }
 
@@ -185,7 +216,7 @@ fn a_request_that_was_held_up_is_not_followed_into_its_answer() {
         now_ns.set(now_ns.get() + 100);
         now_ns.get()
     };
-    let mut encoder = Master::new(&mut port, clock, Resolution::default(), line());
+    let mut encoder = Driver::new(&mut port, clock, Resolution::default(), line());
     assert!(encoder.read_abs40(EncoderAddress::ZERO).is_err());
     assert!(encoder.read_abs40(EncoderAddress::ZERO).is_err());
     let left = port.left_ns;
@@ -217,7 +248,7 @@ fn what_was_held_up_is_not_talked_into() {
             let late = Late::default();
             *late.0.borrow_mut() = World { stalls_in: Some(stalls_in), held_up, refuses, ..World::default() };
             let line = Line::new(BitRate::Mbit4);
-            let mut encoder = Master::new(Sharing(late.clone()), late.clone(), Resolution::default(), line);
+            let mut encoder = Driver::new(Sharing(late.clone()), late.clone(), Resolution::default(), line);
             for call in 1..=2 {
                 late.0.borrow_mut().call = call;
                 assert!(encoder.read_abs40(EncoderAddress::ZERO).is_err());

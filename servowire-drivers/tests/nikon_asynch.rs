@@ -14,23 +14,25 @@ mod frames;
 mod hostile;
 mod late;
 mod polls;
+mod refusals;
 
 use embedded_io::ErrorKind;
 use frames::{Bench, Port, Shared, deliveries, line, scenario, shaft};
 use hostile::live_through;
 use late::{Late, World};
 use nikon_aformat::bus::Addresses;
-use nikon_aformat::master::Line;
-use nikon_aformat::{BitRate, EncoderAddress, Operation, RequestFrame, Resolution};
+use nikon_aformat::master::{Detection, Line};
+use nikon_aformat::{BitRate, Doubt, EncoderAddress, Operation, Policy, Request, RequestFrame, Resolution};
 use polls::{FOR_EVER, Looks, pause, run};
+use refusals::nikon::{STRICT, rows, widths};
 use servowire_drivers::Error;
 use servowire_drivers::nikon::Frame;
-use servowire_drivers::nikon::asynch::{FramePort, Master};
+use servowire_drivers::nikon::asynch::{Driver, FramePort};
 use servowire_world::{Delivery, Scenario, Verdict};
 
-fn driver(bench: &Shared) -> Master<Port, Port> {
+fn driver(bench: &Shared) -> Driver<Port, Port> {
     let port = Port(bench.clone());
-    Master::new(port.clone(), port, Resolution::default(), line())
+    Driver::new(port.clone(), port, Resolution::default(), line())
 }
 
 #[test]
@@ -56,12 +58,50 @@ fn a_bus_is_read() {
     let bench = Bench::with(Scenario::quiet(), 3, false);
     let mut bus = driver(&bench);
     let asked = Addresses::first(3);
-    let answers = run(bus.read_all(Operation::Abs40Mt, asked), FOR_EVER).unwrap().unwrap();
+    let answers = run(bus.read_bus(Operation::Abs40Mt, asked), FOR_EVER).unwrap().unwrap();
     for ea in asked.iter() {
         let abs = answers.exchange(ea).unwrap().response.abs40().unwrap().get();
         assert_eq!(abs, u64::from(bench.borrow().asked_at) | (3 + u64::from(ea.get())) << 20);
     }
     run(bus.clear_status(EncoderAddress::ZERO), FOR_EVER).unwrap().unwrap();
+}
+
+/// What `Evidence::at` refuses the driver refuses too, and what it takes is the same sample.
+#[test]
+fn a_doubt_of_the_crate_is_one_of_the_driver() {
+    for row in rows() {
+        let bench = Bench::new(Scenario::quiet());
+        bench.borrow_mut().encoders[0].raise_alarms(row.alarms);
+        let port = Port(bench.clone());
+        let mut encoder = Driver::new(port.clone(), port, row.resolution, line());
+        let refused = run(encoder.read_position(EncoderAddress::ZERO, row.policy), FOR_EVER).unwrap();
+        assert!(matches!(refused, Err(Error::Doubt(doubt)) if (row.is)(doubt)), "{}: {refused:?}", row.what);
+        let evidence = run(encoder.read_evidence(EncoderAddress::ZERO), FOR_EVER).unwrap().unwrap();
+        let refused = evidence.at(bench.borrow().world.now_ns(), row.policy);
+        assert!(refused.is_err_and(row.is), "{}: {refused:?}", row.what);
+    }
+    let bench = Bench::new(Scenario::quiet());
+    let port = Port(bench.clone());
+    let mut encoder = Driver::new(port.clone(), port, widths(20, 16), line());
+    let evidence = run(encoder.read_evidence(EncoderAddress::ZERO), FOR_EVER).unwrap().unwrap();
+    let sample = evidence.at(bench.borrow().world.now_ns(), Policy::new(60_000)).unwrap();
+    assert_eq!((sample.single_turn(), sample.turns()), (1, Some(3)));
+    let sample = run(encoder.read_position(EncoderAddress::ZERO, Policy::new(60_000)), FOR_EVER).unwrap().unwrap();
+    assert_eq!((sample.single_turn(), sample.turns()), (2, Some(3)));
+    // The lower 24 bits say less of the turns than the encoder counts.
+    let request = Request::new(EncoderAddress::ZERO, Operation::Abs24Low);
+    let evidence = run(encoder.transact(request), FOR_EVER).unwrap().unwrap().evidence(widths(20, 16));
+    assert_eq!(evidence.at(bench.borrow().world.now_ns(), STRICT), Err(Doubt::Absent));
+}
+
+#[test]
+fn procedures_run_over_it() {
+    let bench = Bench::new(Scenario::quiet());
+    let mut encoder = driver(&bench);
+    assert!(run(encoder.clear_status(EncoderAddress::ZERO), FOR_EVER).unwrap().is_ok());
+    let found = run(encoder.run(&mut Detection::of(EncoderAddress::ZERO)), FOR_EVER).unwrap().unwrap();
+    assert_eq!((found.ea, found.type_word.0), (EncoderAddress::ZERO, 17));
+    assert_eq!(bench.borrow().world.truth().clashes(), 0);
 }
 
 /// The same for several encoders at once.
@@ -71,8 +111,8 @@ fn a_future_of_a_bus_may_be_dropped_at_any_point() {
     for polls in 0.. {
         let bench = Bench::with(Scenario::quiet(), 3, false);
         let mut bus = driver(&bench);
-        let first = run(bus.read_all(Operation::Abs40Mt, asked), polls);
-        let second = run(bus.read_all(Operation::Abs40Mt, asked), FOR_EVER).unwrap().unwrap();
+        let first = run(bus.read_bus(Operation::Abs40Mt, asked), polls);
+        let second = run(bus.read_bus(Operation::Abs40Mt, asked), FOR_EVER).unwrap().unwrap();
         let bench = bench.borrow();
         for ea in asked.iter() {
             let shaft = shaft(second.exchange(ea).unwrap().response);
@@ -114,7 +154,7 @@ fn hostile_events_on_a_bus_are_survived() {
         let mut bus = driver(&bench);
         for call in 0..100_usize {
             let polls = if call % 5 == 4 { call * 12 + seed as usize % 12 } else { FOR_EVER };
-            let answers = run(bus.read_all(Operation::Abs40Mt, asked), polls);
+            let answers = run(bus.read_bus(Operation::Abs40Mt, asked), polls);
             calls.dropped += u64::from(answers.is_none());
             for (ea, answers) in asked.iter().filter_map(|ea| answers.map(|answers| (ea, answers.unwrap()))) {
                 let value = answers.exchange(ea).map(|exchange| shaft(exchange.response)).ok_or("missing");
@@ -157,7 +197,7 @@ fn what_was_held_up_is_not_talked_into() {
             let late = Late::default();
             *late.0.borrow_mut() = World { held_up, refuses, ..World::default() };
             let line = Line::new(BitRate::Mbit4);
-            let mut encoder = Master::new(Sharing(late.clone()), Looks(late.clone()), Resolution::default(), line);
+            let mut encoder = Driver::new(Sharing(late.clone()), Looks(late.clone()), Resolution::default(), line);
             for (call, polls) in [(1, polls), (2, FOR_EVER)] {
                 late.0.borrow_mut().call = call;
                 assert!(!matches!(run(encoder.read_abs40(EncoderAddress::ZERO), polls), Some(Ok(_))));

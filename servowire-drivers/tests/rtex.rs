@@ -21,12 +21,13 @@ use std::marker::PhantomData;
 use std::num::NonZeroU16;
 
 use asic::{AXES, Bus, COM_NS, Drawn, Ring, SWITCHES, Shared, Watch};
-use rtex_block::device::Drive;
+use rtex_block::device::{Drive, Fault};
 use rtex_block::master::{
-    ActiveCode, Axis, AxisConfig, AxisState, Fault, Limits, Master, MasterConfig, Phase, Slave, StopReason,
+    ActiveCode, Axis, AxisConfig, AxisState, ControlError, ControlPhase, Limits, Master, MasterConfig, RingFailure,
+    Slave, StopReason,
 };
 use rtex_block::timing::{Periods, TimerSystem};
-use rtex_block::{BlockSize, MacId};
+use rtex_block::{Alarm, BlockSize, Doubt, MacId, Policy};
 use servowire_drivers::Error;
 use servowire_drivers::rtex::Driver;
 use servowire_world::{Draw, wanted_events};
@@ -56,7 +57,10 @@ fn driver<W: Drawn>(ring: &Shared) -> Rtex<W> {
 fn update<W: Drawn>(
     ring: &Shared,
     driver: &mut Rtex<W>,
-) -> Result<servowire_drivers::rtex::Exchanged, Error<(), std::convert::Infallible, Fault, std::convert::Infallible>> {
+) -> Result<
+    servowire_drivers::rtex::Exchanged,
+    Error<(), std::convert::Infallible, ControlError, std::convert::Infallible>,
+> {
     let began_ns = {
         let mut ring = ring.borrow_mut();
         let periods = if ring.external { 2 } else { 1 };
@@ -75,11 +79,22 @@ fn update<W: Drawn>(
     result
 }
 
+/// The actual position, if it is no older than an update period and the frame that brought it, and a little for a late executor.
+fn position<W: Drawn, C: servowire_drivers::Clock>(
+    ring: &Shared,
+    driver: &Driver<'static, Bus<W>, C, AXES>,
+    place: usize,
+) -> Option<i32> {
+    let update_ns = u64::from(driver.master().config().periods.update_ns);
+    let policy = Policy::new(COM_NS + update_ns + 100_000);
+    driver.evidence(place).at(ring.borrow().now_ns, policy).ok().map(|sample| sample.position())
+}
+
 fn on<W: Drawn>(ring: &Shared) -> Rtex<W> {
     let mut driver = driver::<W>(ring);
-    assert_eq!(driver.start(1_000_000), Ok(Phase::Running));
+    assert_eq!(driver.start(1_000_000), Ok(ControlPhase::Running));
     for _ in 0..400 {
-        if driver.ring_mut().switch_on() {
+        if driver.ring_mut().switch_on().is_ok() {
             break;
         }
         update(ring, &mut driver).unwrap();
@@ -109,13 +124,13 @@ fn turns<W: Drawn>(external: bool, wide: bool) {
         move_on(&mut driver);
         let exchanged = update(&ring, &mut driver).unwrap();
         assert_eq!((exchanged.frames_late, exchanged.torn), (0, false));
-        assert!((0..AXES).all(|place| driver.position(place).is_some()));
+        assert!((0..AXES).all(|place| position(&ring, &driver, place).is_some()));
     }
     for _ in 0..60 {
         update(&ring, &mut driver).unwrap();
     }
     for place in 0..AXES {
-        assert_eq!(driver.position(place), Some(500 * (place as i32 + 1)));
+        assert_eq!(position(&ring, &driver, place), Some(500 * (place as i32 + 1)));
         assert_eq!(ring.borrow().drives[place].position(), 500 * (place as i32 + 1));
     }
     assert_eq!((driver.late(), driver.torn()), (0, 0));
@@ -142,7 +157,7 @@ fn other_slaves_than_in_the_table_are_a_fault() {
     let ring = Ring::new(false, false);
     ring.borrow_mut().found[1].kind = 2;
     let mut driver = driver::<u16>(&ring);
-    assert_eq!(driver.start(1_000_000), Err(Error::Protocol(Fault::SlaveInfoMismatch)));
+    assert_eq!(driver.start(1_000_000), Err(Error::Protocol(ControlError::SlaveInfoMismatch)));
 }
 
 #[test]
@@ -150,7 +165,7 @@ fn a_ring_that_does_not_close_is_waited_for_so_long() {
     let ring = Ring::new(false, false);
     ring.borrow_mut().found = [Slave { mac_id: MacId::truncate(1), kind: 0 }; AXES];
     let mut driver = driver::<u16>(&ring);
-    assert_eq!(driver.start(100), Ok(Phase::Waiting));
+    assert_eq!(driver.start(100), Ok(ControlPhase::Waiting));
 }
 
 /// The bank is switched in the middle of the exchange, after any access, by the receive interrupt or by XSYNC because the exchange is
@@ -205,10 +220,31 @@ fn a_fault_of_the_port_is_over_with_the_next_exchange() {
             ring.borrow_mut().fail_in = Some(at);
             update(&ring, &mut driver).unwrap();
             update(&ring, &mut driver).unwrap();
-            assert!((0..AXES).all(|place| driver.position(place).is_some()), "{at}");
+            assert!((0..AXES).all(|place| position(&ring, &driver, place).is_some()), "{at}");
             assert_eq!(driver.master().ring().failure(), None, "{at}");
         }
     }
+}
+
+/// What `Evidence::at` refuses, of a place, of a time and of a drive, is refused of the driver's evidence.
+#[test]
+fn a_doubt_of_the_crate_is_one_of_the_driver() {
+    let ring = Ring::new(true, false);
+    assert_eq!(driver::<u16>(&ring).evidence(0).at(0, Policy::new(u64::MAX)), Err(Doubt::Never));
+    let mut driver = on::<u16>(&ring);
+    update(&ring, &mut driver).unwrap();
+    let now_ns = ring.borrow().now_ns;
+    assert!(driver.evidence(0).at(now_ns, Policy::new(u64::MAX)).is_ok());
+    let old = driver.evidence(0).at(now_ns, Policy::new(1));
+    // The frame before that of the exchange brought it.
+    assert!(matches!(old, Err(Doubt::Old { age_ns }) if age_ns >= COM_NS), "{old:?}");
+    assert_eq!(driver.evidence(AXES).at(now_ns, Policy::new(u64::MAX)), Err(Doubt::Never));
+    ring.borrow_mut().drives[1].set_fault(Fault::Alarm(Alarm::COMMAND_STEP));
+    for _ in 0..4 {
+        update(&ring, &mut driver).unwrap();
+    }
+    let now_ns = ring.borrow().now_ns;
+    assert_eq!(driver.evidence(1).at(now_ns, Policy::new(u64::MAX)), Err(Doubt::Alarm));
 }
 
 /// Frames that do not come: no position is given, and every servo is off within the limit.
@@ -220,11 +256,11 @@ fn silence_switches_every_servo_off() {
         ring.borrow_mut().lose_frames = u32::MAX;
         for period in 0..u32::from(LIMIT) + 2 {
             update(&ring, &mut driver).unwrap();
-            assert!(period == 0 || (0..AXES).all(|place| driver.position(place).is_none()));
+            assert!(period < 2 || (0..AXES).all(|place| position(&ring, &driver, place).is_none()));
         }
-        let (_, reason) = driver.master().ring().failure().unwrap();
+        let RingFailure { reason, .. } = driver.master().ring().failure().unwrap();
         assert!(matches!(reason, StopReason::EchoTimeout | StopReason::ReceiveTimeout), "{reason}");
-        assert_eq!(driver.control(), Err(Error::Protocol(Fault::Timeout)));
+        assert_eq!(driver.control(), Err(Error::Protocol(ControlError::Timeout)));
         // The ring is back: all are switched on again.
         ring.borrow_mut().lose_frames = 0;
         for drive in &mut ring.borrow_mut().drives {
@@ -233,7 +269,7 @@ fn silence_switches_every_servo_off() {
         driver.clear();
         for _ in 0..100 {
             update(&ring, &mut driver).unwrap();
-            driver.ring_mut().switch_on();
+            driver.ring_mut().switch_on().ok();
         }
         assert!(
             driver.master().ring().all_are(AxisState::On),
@@ -272,7 +308,7 @@ fn is_well<C: servowire_drivers::Clock>(
 ) {
     assert_eq!(driver.master().ring().failure(), None, "{what:?}");
     for place in 0..AXES {
-        let said = driver.position(place).unwrap_or_else(|| panic!("{what:?}: no position of {place}"));
+        let said = position(ring, driver, place).unwrap_or_else(|| panic!("{what:?}: no position of {place}"));
         let is = ring.borrow().drives[place].position();
         let per_update = 10 * (place as i32 + 1);
         assert!(is.wrapping_sub(said).unsigned_abs() <= 3 * per_update as u32, "{what:?}: {said}, and it is at {is}");
@@ -314,17 +350,18 @@ mod asynch {
     use std::future::poll_fn;
     use std::task::Poll;
 
-    use servowire_drivers::rtex::asynch::Began;
+    use servowire_drivers::rtex::Released;
+    use servowire_drivers::rtex::asynch::{Began, Period};
 
-    use servowire_drivers::{Clock, Timer};
+    use servowire_drivers::{Clock, ClockError, Timer};
 
     use super::polls::{FOR_EVER, Looks, run};
     use super::*;
 
     /// The driver after the start, with a clock that can be waited for.
     fn waiting<W: Drawn, T: Timer>(ring: &Shared, timer: impl Fn(Watch) -> T) -> Driver<'static, Bus<W>, T, AXES> {
-        let (port, watch, master) = on::<W>(ring).release();
-        Driver::new(port, timer(watch), master, ring.borrow().reception())
+        let Released { port, clock, master } = on::<W>(ring).release();
+        Driver::new(port, timer(clock), master, ring.borrow().reception())
     }
 
     struct Pin {
@@ -373,7 +410,7 @@ mod asynch {
         for k in 0..20 {
             pin.lost = k % 5 == 4;
             ring.borrow_mut().let_in();
-            let (began, exchanged) = run(driver.next(&mut pin), FOR_EVER).unwrap().unwrap();
+            let Period { began, exchanged } = run(driver.next(&mut pin), FOR_EVER).unwrap().unwrap();
             assert_eq!(began, if k % 5 == 4 { Began::Clock } else { Began::Edge });
             assert!(!exchanged.torn);
             assert_eq!(driver.master().ring().failure(), None);
@@ -396,7 +433,7 @@ mod asynch {
                 (pin.lost, pin.late_ns) = (lost, late_ns);
                 ring.borrow_mut().read_of.clear();
                 ring.borrow_mut().stall_in = Some((at as u32, COM_NS - late_ns + 3_000));
-                let (_, exchanged) = run(driver.next(&mut pin), FOR_EVER).unwrap().unwrap();
+                let Period { exchanged, .. } = run(driver.next(&mut pin), FOR_EVER).unwrap().unwrap();
                 ring.borrow_mut().stall_in = None;
                 let read = std::mem::take(&mut ring.borrow_mut().read_of);
                 let taken = &read[read.len() - words..];
@@ -420,7 +457,7 @@ mod asynch {
         for polls in 0.. {
             move_on(&mut driver);
             let first = run(driver.next(&mut pin), polls);
-            let (began, exchanged) = run(driver.next(&mut pin), FOR_EVER).unwrap().unwrap();
+            let Period { began, exchanged } = run(driver.next(&mut pin), FOR_EVER).unwrap().unwrap();
             assert_eq!((began, exchanged.frames_late, exchanged.torn), (Began::Edge, 0, false), "after {polls} polls");
             is_well(&ring, &driver, &polls);
             if first.is_some() {
@@ -434,20 +471,20 @@ mod asynch {
     struct Steps(Watch);
 
     impl Clock for Steps {
-        fn now_ns(&mut self) -> u64 {
+        fn now_ns(&mut self) -> Result<u64, ClockError> {
             self.0.now_ns()
         }
     }
 
     impl Timer for Steps {
-        async fn wait_until(&mut self, ns: u64) {
+        async fn wait_until(&mut self, ns: u64) -> Result<(), ClockError> {
             poll_fn(|_| {
                 let mut ring = self.0.0.borrow_mut();
                 let until_ns = ns.min(ring.now_ns + 20_000);
                 ring.pass(until_ns);
-                if ring.now_ns >= ns { Poll::Ready(()) } else { Poll::Pending }
+                if ring.now_ns >= ns { Poll::Ready(Ok(())) } else { Poll::Pending }
             })
-            .await;
+            .await
         }
     }
 
@@ -473,7 +510,7 @@ mod asynch {
                 }
                 let outcome = run(driver.next(&mut pin), polls);
                 // An edge that came while nobody waited has the same consequence as a late exchange.
-                let missed = outcome.map_or(1, |result| result.map_or(0, |(_, exchanged)| exchanged.frames_late));
+                let missed = outcome.map_or(1, |result| result.map_or(0, |period| period.exchanged.frames_late));
                 pin.lost = false;
                 heal(&ring);
                 for _ in 0..2 + missed {

@@ -46,9 +46,9 @@ fn tformat_at_an_spi() {
         let bench = bench::Bench::new(Scenario::quiet(), bench::Misframed::Dropped);
         let mut buffers = ([0; 48], [0; 160]);
         let port = uart(&bench, msb_first, per_bit, &mut buffers);
-        let mut encoder = tformat::blocking::Encoder::new(port, Automatic, bench::Watch(bench.clone()), tformat_line());
+        let mut encoder = tformat::blocking::Driver::new(port, Automatic, bench::Watch(bench.clone()), tformat_line());
         for _ in 0..5 {
-            let all = encoder.read_all().unwrap();
+            let all = encoder.read_data().unwrap();
             let bench = bench.borrow();
             assert_eq!(bench.truth().verdict(bench.request.unwrap(), all.abs.get().into()), Verdict::Fresh);
             assert!(!bench.driver_on);
@@ -70,8 +70,8 @@ fn a_request_that_does_not_fit_is_refused() {
     let spi = Spi { line: bench.clone(), msb_first: true, per_bit: 8 };
     let pin = DriverEnable(bench::Pin(bench.clone()));
     let port = SpiUart::new(spi, pin, sampling, &mut buffers.0, &mut buffers.1);
-    let mut encoder = tformat::blocking::Encoder::new(port, Automatic, bench::Watch(bench.clone()), tformat_line());
-    assert!(matches!(encoder.read_all(), Err(Error::Io(_))));
+    let mut encoder = tformat::blocking::Driver::new(port, Automatic, bench::Watch(bench.clone()), tformat_line());
+    assert!(matches!(encoder.read_data(), Err(Error::Io(_))));
     assert!(bench.borrow().request.is_none());
 }
 
@@ -96,9 +96,9 @@ fn any_fault_is_over_with_the_next_call() {
             let mut buffers = ([0; 48], [0; 160]);
             let port = uart(&bench, true, 8, &mut buffers);
             let mut encoder =
-                tformat::blocking::Encoder::new(port, Automatic, bench::Watch(bench.clone()), tformat_line());
-            let first = encoder.read_all();
-            let second = encoder.read_all();
+                tformat::blocking::Driver::new(port, Automatic, bench::Watch(bench.clone()), tformat_line());
+            let first = encoder.read_data();
+            let second = encoder.read_data();
             assert!(second.is_ok(), "{fault:?} in unit {unit} of {transmission}: {first:?}, {second:?}");
         }
     }
@@ -111,9 +111,9 @@ fn hostile_events_are_survived() {
         let bench = bench::Bench::new(bench::sampled_scenario(seed), bench::Misframed::Dropped);
         let mut buffers = ([0; 48], [0; 160]);
         let port = uart(&bench, seed % 2 == 0, 8, &mut buffers);
-        let mut encoder = tformat::blocking::Encoder::new(port, Automatic, bench::Watch(bench.clone()), tformat_line());
+        let mut encoder = tformat::blocking::Driver::new(port, Automatic, bench::Watch(bench.clone()), tformat_line());
         for call in 0..100 {
-            let result = encoder.read_all().map(|all| all.abs.get());
+            let result = encoder.read_data().map(|all| all.abs.get());
             bench.borrow_mut().judge(calls, Some(result), seed, call);
         }
         bench.borrow().tally()
@@ -138,17 +138,17 @@ fn aformat_at_an_spi() {
         let mut buffers = ([0; 96], [0; 400]);
         let port = frame_port(&bench, per_bit, &mut buffers);
         let clock = frames::Port(bench.clone());
-        let mut master = nikon::blocking::Master::new(port, clock, Resolution::default(), frames::line());
+        let mut master = nikon::blocking::Driver::new(port, clock, Resolution::default(), frames::line());
         for _ in 0..5 {
             let exchange = master.read_abs40(EncoderAddress::ZERO).unwrap();
             let abs = exchange.response.abs40().unwrap().get();
             let bench = bench.borrow();
             assert_eq!(abs & 0xf_ffff, u64::from(bench.asked_at));
             let answer = bench.world.truth().answers(bench.request.unwrap()).next().unwrap();
-            assert!(exchange.sampled.latest_ns.abs_diff(answer.start_ns) <= 700, "{per_bit}: {exchange:?} {answer:?}");
+            assert!(exchange.began_ns.abs_diff(answer.start_ns) <= 700, "{per_bit}: {exchange:?} {answer:?}");
         }
         let both = nikon_aformat::bus::Addresses::first(2);
-        let answers = master.read_all(nikon_aformat::Operation::Abs40Mt, both).unwrap();
+        let answers = master.read_bus(nikon_aformat::Operation::Abs40Mt, both).unwrap();
         assert!(both.iter().all(|ea| answers.exchange(ea).is_some()));
         let word = master.read_eeprom(EncoderAddress::ZERO, 9);
         assert!(word.is_ok(), "a request of two frames: {word:?}");
@@ -164,7 +164,7 @@ fn faults_of_aformat_are_over_with_the_next_call() {
             let mut buffers = ([0; 96], [0; 400]);
             let port = frame_port(&bench, 8, &mut buffers);
             let clock = frames::Port(bench.clone());
-            let mut master = nikon::blocking::Master::new(port, clock, Resolution::default(), frames::line());
+            let mut master = nikon::blocking::Driver::new(port, clock, Resolution::default(), frames::line());
             let first = master.read_abs40(EncoderAddress::ZERO);
             let second = master.read_abs40(EncoderAddress::ZERO);
             assert!(second.is_ok(), "{fault:?} in unit {unit} of {transmission}: {first:?}, {second:?}");
@@ -180,7 +180,7 @@ fn hostile_events_of_aformat_are_survived() {
         let mut buffers = ([0; 96], [0; 400]);
         let port = frame_port(&bench, 8, &mut buffers);
         let clock = frames::Port(bench.clone());
-        let mut master = nikon::blocking::Master::new(port, clock, Resolution::default(), frames::line());
+        let mut master = nikon::blocking::Driver::new(port, clock, Resolution::default(), frames::line());
         for call in 0..100 {
             let result = master.read_abs40(EncoderAddress::ZERO).map(|exchange| frames::shaft(exchange.response));
             bench.borrow_mut().judge(calls, Some(result), seed, call);
@@ -194,18 +194,18 @@ mod asynch {
     use super::polls::{FOR_EVER, Looks, run};
     use super::*;
 
-    type Encoder<'b> = tformat::asynch::Encoder<Uart<'b>, Automatic, Looks<bench::Watch>>;
-    type Master<'b> = nikon::asynch::Master<Frames<'b>, frames::Port>;
+    type Driver<'b> = tformat::asynch::Driver<Uart<'b>, Automatic, Looks<bench::Watch>>;
+    type Master<'b> = nikon::asynch::Driver<Frames<'b>, frames::Port>;
 
-    fn encoder<'b>(bench: &bench::Shared, buffers: &'b mut ([u8; 48], [u8; 160])) -> Encoder<'b> {
+    fn encoder<'b>(bench: &bench::Shared, buffers: &'b mut ([u8; 48], [u8; 160])) -> Driver<'b> {
         let timer = Looks(bench::Watch(bench.clone()));
-        tformat::asynch::Encoder::new(uart(bench, true, 8, buffers), Automatic, timer, tformat_line())
+        tformat::asynch::Driver::new(uart(bench, true, 8, buffers), Automatic, timer, tformat_line())
     }
 
     fn master<'b>(bench: &frames::Shared, buffers: &'b mut ([u8; 96], [u8; 400])) -> Master<'b> {
         let clock = frames::Port(bench.clone());
         let port = frame_port(bench, 8, buffers);
-        nikon::asynch::Master::new(port, clock, Resolution::default(), frames::line())
+        nikon::asynch::Driver::new(port, clock, Resolution::default(), frames::line())
     }
 
     /// Dropped after each number of polls: the driver is off at once, and the next call is good.
@@ -215,9 +215,9 @@ mod asynch {
             let bench = bench::Bench::new(Scenario::quiet(), bench::Misframed::Dropped);
             let mut buffers = ([0; 48], [0; 160]);
             let mut encoder = encoder(&bench, &mut buffers);
-            let first = run(encoder.read_all(), polls);
+            let first = run(encoder.read_data(), polls);
             assert!(!bench.borrow().driver_on, "after {polls} polls");
-            let abs = run(encoder.read_all(), FOR_EVER).unwrap().unwrap().abs.get();
+            let abs = run(encoder.read_data(), FOR_EVER).unwrap().unwrap().abs.get();
             let bench = bench.borrow();
             let verdict = bench.truth().verdict(bench.request.unwrap(), abs.into());
             assert_eq!((verdict, bench.truth().clashes()), (Verdict::Fresh, 0), "after {polls} polls");
@@ -252,7 +252,7 @@ mod asynch {
             let mut encoder = encoder(&bench, &mut buffers);
             for call in 0..100_usize {
                 let polls = if call % 4 == 3 { call * 4 + seed as usize % 4 } else { FOR_EVER };
-                let outcome = run(encoder.read_all(), polls).map(|result| result.map(|all| all.abs.get()));
+                let outcome = run(encoder.read_data(), polls).map(|result| result.map(|all| all.abs.get()));
                 bench.borrow_mut().judge(calls, outcome, seed, call);
             }
             bench.borrow().tally()
@@ -287,16 +287,16 @@ fn both_as_futures() {
     let mut buffers = ([0; 48], [0; 160]);
     let port = uart(&bench, true, 8, &mut buffers);
     let timer = Looks(bench::Watch(bench.clone()));
-    let mut encoder = tformat::asynch::Encoder::new(port, Automatic, timer, tformat_line());
-    assert!(run(encoder.read_all(), FOR_EVER).unwrap().is_ok());
-    assert!(run(encoder.read_all(), FOR_EVER).unwrap().is_err());
-    assert!(run(encoder.read_all(), FOR_EVER).unwrap().is_ok());
+    let mut encoder = tformat::asynch::Driver::new(port, Automatic, timer, tformat_line());
+    assert!(run(encoder.read_data(), FOR_EVER).unwrap().is_ok());
+    assert!(run(encoder.read_data(), FOR_EVER).unwrap().is_err());
+    assert!(run(encoder.read_data(), FOR_EVER).unwrap().is_ok());
 
     let bench = frames::Bench::with(lost(3, 2, Fault::Drop), 1, false);
     let mut buffers = ([0; 96], [0; 400]);
     let port = frame_port(&bench, 8, &mut buffers);
     let clock = frames::Port(bench.clone());
-    let mut master = nikon::asynch::Master::new(port, clock, Resolution::default(), frames::line());
+    let mut master = nikon::asynch::Driver::new(port, clock, Resolution::default(), frames::line());
     assert!(run(master.read_abs40(EncoderAddress::ZERO), FOR_EVER).unwrap().is_ok());
     assert!(run(master.read_abs40(EncoderAddress::ZERO), FOR_EVER).unwrap().is_err());
     assert!(run(master.read_abs40(EncoderAddress::ZERO), FOR_EVER).unwrap().is_ok());

@@ -13,22 +13,24 @@
 mod bench;
 mod hostile;
 mod late;
+mod refusals;
 
 use bench::{Bench, Misframed, Pin, Shared, Uart, Watch, line, place, scenario};
 use hostile::live_through;
 use late::{Late, World};
-use servowire_drivers::tformat::blocking::Encoder;
+use refusals::tformat::{STRICT, rows, widths};
+use servowire_drivers::tformat::blocking::Driver;
 use servowire_drivers::{DriverEnable, Error};
 use servowire_world::{Fault, Planned, Scenario, Script, Verdict};
-use tformat::master::Line;
-use tformat::{Address, Almc, BitRate, Doubt, Policy, Request, Resolution};
+use tformat::master::{Detection, Line};
+use tformat::{Address, Almc, BitRate, Doubt, Policy, Request, Resolution, Sample, Tolerated};
 
-fn driver(bench: &Shared) -> Encoder<Uart, DriverEnable<Pin>, Watch> {
+fn driver(bench: &Shared) -> Driver<Uart, DriverEnable<Pin>, Watch> {
     driver_at(bench, Line::new(BitRate::Mbit2_5))
 }
 
-fn driver_at(bench: &Shared, line: Line) -> Encoder<Uart, DriverEnable<Pin>, Watch> {
-    Encoder::new(Uart(bench.clone()), DriverEnable(Pin(bench.clone())), Watch(bench.clone()), line)
+fn driver_at(bench: &Shared, line: Line) -> Driver<Uart, DriverEnable<Pin>, Watch> {
+    Driver::new(Uart(bench.clone()), DriverEnable(Pin(bench.clone())), Watch(bench.clone()), line)
 }
 
 fn planned(faults: &[(u16, u8, Fault)]) -> Scenario {
@@ -41,7 +43,7 @@ fn positions_come_and_the_pin_is_right() {
     let bench = Bench::new(Scenario::quiet(), Misframed::Dropped);
     let mut encoder = driver(&bench);
     for _ in 0..10 {
-        let all = encoder.read_all().unwrap();
+        let all = encoder.read_data().unwrap();
         let bench = bench.borrow();
         let request = bench.request.unwrap();
         let truth = bench.truth();
@@ -58,14 +60,36 @@ fn a_position_with_alarms_is_a_doubt() {
     let bench = Bench::new(Scenario::quiet(), Misframed::Dropped);
     let mut encoder = driver(&bench);
     let resolution = Resolution::new(23, 16).unwrap();
-    let sample = encoder.read_position(resolution, Policy::STRICT).unwrap();
-    assert_eq!((sample.position.abs, sample.position.turns), (place(1), 3));
+    let sample = encoder.read_position(resolution, STRICT).unwrap();
+    assert_eq!((sample.single_turn(), sample.turns()), (place(1), Some(3)));
     let sent = bench.borrow().truth().transmission(bench.borrow().request.unwrap()).unwrap().end_ns;
-    assert!(sample.sampled_ns.abs_diff(sent) < 1_000, "within the turn-around");
+    assert!(sample.sampled_ns().abs_diff(sent) < 1_000, "within the turn-around");
     bench.borrow_mut().encoder().raise_alarms(Almc::BE);
     let doubt = Error::Doubt(Doubt::Alarms { alarms: Almc::BE });
-    assert_eq!(encoder.read_position(resolution, Policy::STRICT), Err(doubt));
-    assert!(encoder.read_position(resolution, Policy::SINGLE_TURN).is_ok());
+    assert_eq!(encoder.read_position(resolution, STRICT), Err(doubt));
+    assert!(encoder.read_position(resolution, STRICT.tolerating(Tolerated::SINGLE_TURN)).is_ok());
+}
+
+/// What `Evidence::at` refuses the driver refuses too, and what it takes is the same sample.
+#[test]
+fn a_doubt_of_the_crate_is_one_of_the_driver() {
+    for row in rows() {
+        let bench = Bench::new(Scenario::quiet(), Misframed::Dropped);
+        bench.borrow_mut().encoder().raise_alarms(row.alarms);
+        let mut encoder = driver(&bench);
+        let refused = encoder.read_position(row.resolution, row.policy);
+        assert!(matches!(refused, Err(Error::Doubt(doubt)) if (row.is)(doubt)), "{}: {refused:?}", row.what);
+        let evidence = encoder.read_evidence(row.resolution).unwrap();
+        let refused = evidence.at(bench.borrow().now_ns(), row.policy);
+        assert!(refused.is_err_and(row.is), "{}: {refused:?}", row.what);
+    }
+    let bench = Bench::new(Scenario::quiet(), Misframed::Dropped);
+    let mut encoder = driver(&bench);
+    let evidence = encoder.read_evidence(widths(23, 16)).unwrap();
+    let sample = evidence.at(bench.borrow().now_ns(), Policy::new(60_000)).unwrap();
+    assert_eq!((sample.single_turn(), sample.turns()), (place(1), Some(3)));
+    let sample = encoder.read_position(widths(23, 16), Policy::new(60_000)).unwrap();
+    assert_eq!((sample.single_turn(), sample.turns()), (place(2), Some(3)));
 }
 
 #[test]
@@ -78,6 +102,8 @@ fn procedures_run_over_it() {
     assert_eq!(encoder.read_eeprom(None, address), Ok(0x5a));
     bench.borrow_mut().encoder().eeprom_mut()[0][5] = 7;
     assert_eq!(encoder.read_eeprom(None, address), Ok(7));
+    let found = encoder.run(&mut Detection::new()).unwrap();
+    assert_eq!((found.enid, found.abm.get()), (0x17, 3));
 }
 
 /// Each fault alone, in the answer of the first call: the call fails or not, the second one is good.
@@ -100,12 +126,12 @@ fn any_fault_is_over_with_the_next_call() {
                 for unit in 0..units {
                     let bench = Bench::new(planned(&[(transmission, unit, fault)]), misframed);
                     let mut encoder = driver(&bench);
-                    let first = encoder.read_all();
+                    let first = encoder.read_data();
                     assert!(!bench.borrow().driver_on);
                     // An encoder that says more than its answer may have its say.
                     let rest_ns = bench.borrow().now_ns() + 10_000;
                     bench.borrow_mut().pass(rest_ns);
-                    let second = encoder.read_all();
+                    let second = encoder.read_data();
                     assert!(
                         second.is_ok(),
                         "{fault:?} in unit {unit} of {transmission}, {misframed:?}: {first:?}, {second:?}"
@@ -124,10 +150,10 @@ fn a_babbling_line_is_given_up_and_used_again() {
     let babble = servowire_world::Message::bytes(&[0x55; 1_000]);
     bench.borrow_mut().world().answer(0, id, &babble, 0);
     bench.borrow_mut().pass(50_000);
-    assert_eq!(encoder.read_all(), Err(Error::NeverQuiet));
+    assert_eq!(encoder.read_data(), Err(Error::NeverQuiet));
     assert!(!bench.borrow().driver_on);
     bench.borrow_mut().pass(5_000_000);
-    assert!(encoder.read_all().is_ok());
+    assert!(encoder.read_data().is_ok());
 }
 
 /// Whatever has happened before: a call whose request and answer come through whole is good.
@@ -139,11 +165,11 @@ fn hostile_events_never_cost_a_good_answer() {
         let bench = Bench::new(scenario(seed), misframed);
         let mut encoder = driver_at(&bench, line());
         for call in 0..100 {
-            match encoder.read_position(resolution, Policy::STRICT) {
+            match encoder.read_position(resolution, STRICT) {
                 // The request was damaged on the line, and the encoder says so.
                 Err(Error::Doubt(Doubt::RequestDamaged { .. })) => calls.failed += 1,
                 result => {
-                    let result = result.map(|sample| sample.position.abs);
+                    let result = result.map(Sample::single_turn);
                     bench.borrow_mut().judge(calls, Some(result), seed, call);
                 }
             }
@@ -162,7 +188,7 @@ fn a_fault_after_a_preemption_does_not_send_the_next_request_into_the_answer() {
             *late.0.borrow_mut() =
                 World { stalls_in: Some(stalls_in), held_up, refuses, pieces: 2, ..World::default() };
             let line = Line::new(BitRate::Mbit2_5);
-            let mut encoder = Encoder::new(late.clone(), servowire_drivers::Automatic, late.clone(), line);
+            let mut encoder = Driver::new(late.clone(), servowire_drivers::Automatic, late.clone(), line);
             for call in 1..=2 {
                 late.0.borrow_mut().call = call;
                 assert!(encoder.transact(Request::read_eeprom(Address::new(5).unwrap())).is_err());

@@ -128,7 +128,7 @@ impl Arguments {
             let lines = Part::read(path)?;
             let speed = self
                 .freq
-                .map_or(Part::SPEED, |frequency| (frequency.ratio().0 / u32::from(frequency.ratio().1)).max(1));
+                .map_or(Part::SPEED, |frequency| (frequency.numerator() / u32::from(frequency.denominator())).max(1));
             let limits = Limits::new(speed, self.accel.unwrap_or(Part::ACCELERATION))?;
             let limits = self.jerk.map_or(Ok(limits), |jerk| limits.with_jerk(jerk))?;
             Ok((lines.len(), self.part.steps(lines, limits)?))
@@ -158,12 +158,11 @@ impl Arguments {
 
     /// The shape that is asked for, or all.
     fn moves(&self) -> Result<Vec<Move>, Box<dyn Error>> {
-        let (hz, over) = match (self.tone, self.freq) {
+        let frequency = match (self.tone, self.freq) {
             (Some(tone), _) => tone.frequency(),
             (None, frequency) => frequency.unwrap_or(Frequency::from_hz(1)),
-        }
-        .ratio();
-        let speed = (hz / u32::from(over)).max(1);
+        };
+        let speed = (frequency.numerator() / u32::from(frequency.denominator())).max(1);
         let acceleration = self.accel.ok_or("--shape trapezoid and s-curve need --accel")?;
         let flat = Limits::new(speed, acceleration)?;
         let jerk = self.jerk.unwrap_or(u64::from(acceleration).pow(2) / u64::from(speed) * 10);

@@ -140,7 +140,7 @@ fn what_a_log_looks_like() {
             let mut words: Vec<u16> = Vec::new();
             for frame in request.emit().as_slice() {
                 words.push(frame.content());
-                for answer in encoders.frame(frame.content(), 1_000_000 * k).into_iter().flatten() {
+                for answer in encoders.hear(&[Some(frame.content())], 1_000_000 * k).into_iter().flatten() {
                     // The content of a frame stands between its start bit and its delimiter.
                     let bit = |at: u32| u16::from(answer.line.get(at) == Some(true));
                     words.extend(

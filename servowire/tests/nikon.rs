@@ -59,12 +59,12 @@ fn exchange(wave: &mut Wave, encoders: &mut Encoders<8, 1>, request: Request, ra
         }
         wave.bits(&bits(frame.line()));
         *now_ns += frame_ns;
-        answers.extend(encoders.frame(frame.content(), *now_ns).into_iter().flatten());
+        answers.extend(encoders.hear(&[Some(frame.content())], *now_ns).into_iter().flatten());
     }
-    answers.sort_by_key(|answer| answer.at_ns);
+    answers.sort_by_key(|answer| answer.start_ns);
     for answer in answers {
-        wave.idle_us((answer.at_ns - *now_ns) as f64 / 1000.0).bits(&bits(answer.line));
-        *now_ns = answer.at_ns + u64::from(answer.line.len()) * u64::from(rate.bit_ps()) / 1000;
+        wave.idle_us((answer.start_ns - *now_ns) as f64 / 1000.0).bits(&bits(answer.line));
+        *now_ns = answer.start_ns + u64::from(answer.line.len()) * u64::from(rate.bit_ps()) / 1000;
     }
     wave.idle_us(400.0);
     *now_ns += 400_000;

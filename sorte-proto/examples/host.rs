@@ -6,11 +6,11 @@
 use core::error::Error;
 
 use sorte_proto::DeviceAddress;
-use sorte_proto::host::{DEVICE, DeviceMemory, MASTER, MasterMemory, Place};
+use sorte_proto::host::{DEVICE, DeviceMemory, MASTER, MasterMemory, Region};
 
-fn map(title: &str, places: &[Place]) {
+fn map(title: &str, places: &[Region]) {
     println!("{title}");
-    for Place { name, offset, len } in places {
+    for Region { name, offset, len } in places {
         println!("  {offset:#05x}  {:>4}  {name}", len.map_or_else(|| "?".to_owned(), |len| len.to_string()));
     }
 }
@@ -33,7 +33,7 @@ fn device(ram: &[u8]) {
     let device = DeviceMemory::new(ram);
     println!("address {:?}, {:?} ns from the master", device.address().map(DeviceAddress::get), device.delay_ns());
     println!("line to the next device {:?} ns", device.line_delay_next_ns());
-    println!("last SYNC: time stamp and own counter {:?} ns", device.last_sync_ns());
+    println!("last SYNC: {:?}", device.last_sync());
     println!("good frames {:?}, wrong checks {:?}", device.good_frames(), device.crc_errors());
     println!("missed frames {:?}, retrains {:?}", device.missed_frames(), device.retrains());
     println!("motor driver {:?}", device.driver());

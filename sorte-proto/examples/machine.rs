@@ -11,10 +11,10 @@
     reason = "a simulation on a host"
 )]
 
-use sorte_proto::device::{self, Arrival, Device, Path, PortId, Trigger};
-use sorte_proto::follow::{Asked, Feedback, Follower};
+use sorte_proto::device::{self, Device, FrameTimes, Path, PortId, Trigger};
+use sorte_proto::follow::{Asked, Follower, InputSlice};
 use sorte_proto::master::{self, Action, Master};
-use sorte_proto::{Correction, Direction, Discovery, Error, Pto, Slice, TRANSIT_NS};
+use sorte_proto::{Correction, Direction, Discovery, Error, Evidence, Link, Policy, Positions, Pto, Slice, TRANSIT_NS};
 
 const CABLE_NS: u64 = 50;
 const DEVICES: usize = 3;
@@ -30,16 +30,16 @@ struct Node {
 
 impl Node {
     /// A start-up frame at a port; the hardware captures its start 280 ns after its trigger.
-    fn pass(&mut self, port: PortId, frame: &mut [u8], sof_ns: u64) -> device::Handled {
+    fn pass(&mut self, port: PortId, frame: &mut [u8], sof_ns: u64) -> device::Reaction {
         let counter = |ns: u64, ahead: u64| (ns.wrapping_add(ahead) & 0xffff_ffff) as u32;
         let seen_ns = sof_ns + 280;
         let (sof, now) = (counter(seen_ns, self.ahead_ns), counter(seen_ns + 700, self.ahead_ns));
-        let handled = self.device.frame(port, frame, Arrival { sof_ns: sof, counter_ns: now, now_ns: sof_ns });
-        if let Correction::Set { counter_ns } = handled.correction {
+        let reaction = self.device.hear(port, frame, FrameTimes { sof_ns: sof, counter_ns: now, now_ns: sof_ns });
+        if let Correction::Set { counter_ns } = reaction.correction {
             // The write takes effect 135 ns later.
             self.ahead_ns = u64::from(counter_ns).wrapping_sub(seen_ns + 700 + 135);
         }
-        handled
+        reaction
     }
 }
 
@@ -48,15 +48,15 @@ fn carry(nodes: &mut [Node], frame: &[u8], at_ns: u64) -> Option<(Vec<u8>, u64)>
     let (mut frame, mut sof_ns) = (frame.to_vec(), at_ns);
     for k in 0..nodes.len() {
         sof_ns += CABLE_NS;
-        let handled = nodes.get_mut(k)?.pass(PortId::A, &mut frame, sof_ns);
-        measure(nodes.get_mut(k..)?, handled.trigger, sof_ns);
-        match handled.path {
+        let reaction = nodes.get_mut(k)?.pass(PortId::A, &mut frame, sof_ns);
+        measure(nodes.get_mut(k..)?, reaction.trigger, sof_ns);
+        match reaction.path {
             Path::Forward => sof_ns += u64::from(TRANSIT_NS),
             Path::Absorb => return None,
             Path::Reflect => {
                 sof_ns += 320 + CABLE_NS;
                 for node in nodes.get_mut(..k)?.iter_mut().rev() {
-                    node.pass(PortId::B, &mut frame, sof_ns);
+                    let _neither_corrects_nor_measures = node.pass(PortId::B, &mut frame, sof_ns);
                     sof_ns += u64::from(TRANSIT_NS) + CABLE_NS;
                 }
                 return Some((frame, sof_ns));
@@ -71,41 +71,60 @@ fn measure(nodes: &mut [Node], trigger: Trigger, at_ns: u64) {
     let (Some(request), [first, rest @ ..]) = (Device::delay_request(trigger), nodes) else { return };
     let mut frame = request.emit();
     let Some(next) = rest.first_mut() else { return };
-    let handled = next.pass(PortId::A, &mut frame, at_ns + CABLE_NS);
-    measure(rest, handled.trigger, at_ns);
+    let reaction = next.pass(PortId::A, &mut frame, at_ns + CABLE_NS);
+    measure(rest, reaction.trigger, at_ns);
     // There and back, and 360 ns in the neighbour; 15 ns are what the published rounding loses.
-    let result = first.device.delay_reflection(trigger, &frame, 2 * CABLE_NS as u32 + 375);
+    let result = first.device.hear_reflection(trigger, &frame, 2 * CABLE_NS as u32 + 375);
     assert_eq!(result, Ok(()));
 }
 
-/// One cycle: the master's frame to every device, and a frame of each back. Each axis steps, the second one backwards.
-fn exchange(master: &mut Master, axes: &mut [Asked], nodes: &mut [Node], time_stamp: u16) -> Result<(), Error> {
+/// An axis at the master: what it was asked for, and what its device has told.
+struct Axis {
+    asked: Asked,
+    evidence: Evidence,
+}
+
+/// One cycle at `at_ns`: the master's frame to every device, and a frame of each back. Each axis steps, the second one
+/// backwards.
+fn exchange(
+    master: &mut Master,
+    axes: &mut [Axis],
+    nodes: &mut [Node],
+    at_ns: u64,
+    time_stamp: u16,
+) -> Result<(), Error> {
     let mut output = vec![0; master.output_len().into()];
     for ((k, axis), bytes) in axes.iter_mut().enumerate().zip(output.chunks_exact_mut(4)) {
-        let step = Pto::from_step(1000, Direction::from(k == 1)).unwrap_or_default();
-        bytes.copy_from_slice(&axis.slice(step).emit());
+        let step = Pto::from_step(1000, if k == 1 { Direction::High } else { Direction::Low }).unwrap_or_default();
+        bytes.copy_from_slice(&axis.asked.slice(step).emit());
     }
     let mut frame = [0; 64];
-    let len = master.write_frame(&output, time_stamp, &mut frame)?;
-    for node in nodes {
+    let len = master.emit_into(&output, time_stamp, &mut frame)?;
+    for (node, axis) in nodes.iter_mut().zip(axes) {
         let arrival = 500 + node.device.delay_ns().unwrap_or_default();
-        let taken = node.device.exchange(&frame[..len], arrival, arrival)?;
+        let taken = node.device.hear_exchange(&frame[..len], arrival, arrival)?;
         let slice = taken.data.first_chunk().map(|bytes| Slice::parse(*bytes));
         // The word for the SYNC0 generator.
         let _word = node.follower.next(slice);
         node.device.cycle_start();
-        let payload = Feedback { position: node.follower.position(), ..Feedback::default() }.emit();
+        // A position that it does not know must not look like one.
+        let ordered = node.follower.ordered().unwrap_or_else(|| {
+            node.device.flag_error();
+            0
+        });
         let mut bytes = [0; 6];
-        if let Some(answer) = node.device.answer(payload) {
+        if let Some(answer) = node.device.answer(InputSlice { ordered, ..InputSlice::default() }.emit()) {
             answer.emit_into(&mut bytes)?;
-            master.device_frame(&bytes)?;
+            // These devices send positions, and take them in the cycle of their frame.
+            let heard = master.hear(&bytes, at_ns + u64::from(arrival))?;
+            axis.evidence = heard.evidence(Positions::taken_before_ns(4000));
         }
     }
     Ok(())
 }
 
 /// Start-up and so many cycles of the exchange; the time of the last one.
-fn run(master: &mut Master, axes: &mut [Asked], nodes: &mut [Node], mut cycles: u32) -> Result<u64, Error> {
+fn run(master: &mut Master, axes: &mut [Axis], nodes: &mut [Node], mut cycles: u32) -> Result<u64, Error> {
     let mut now_ns = 0;
     while cycles > 0 {
         match master.poll(now_ns) {
@@ -115,11 +134,11 @@ fn run(master: &mut Master, axes: &mut [Asked], nodes: &mut [Node], mut cycles: 
                 let mut buffer = [0; Discovery::LEN];
                 let len = frame.emit_into(&mut buffer)?;
                 if let Some((answer, sof_ns)) = carry(nodes, &buffer[..len], at_ns) {
-                    master.receive(&answer, sof_ns)?;
+                    master.hear(&answer, sof_ns)?;
                 }
             }
             Action::Exchange { at_ns, time_stamp, .. } => {
-                exchange(master, axes, nodes, time_stamp)?;
+                exchange(master, axes, nodes, at_ns, time_stamp)?;
                 now_ns = at_ns;
                 cycles -= 1;
             }
@@ -128,7 +147,7 @@ fn run(master: &mut Master, axes: &mut [Asked], nodes: &mut [Node], mut cycles: 
     Ok(now_ns)
 }
 
-fn main() -> Result<(), Error> {
+fn main() -> Result<(), Box<dyn std::error::Error>> {
     let mut nodes: Vec<Node> = (0..DEVICES as u64)
         .map(|k| Node {
             device: Device::new(device::Config::new()),
@@ -137,33 +156,39 @@ fn main() -> Result<(), Error> {
         })
         .collect();
     for (k, node) in nodes.iter_mut().enumerate() {
-        node.device.links(true, k + 1 < DEVICES);
+        let next = if k + 1 < DEVICES { Link::Up } else { Link::Down };
+        node.device.set_links(Link::Up, next);
     }
     let mut master = Master::new(master::Config::new());
-    master.link(true);
-    let mut axes = [Asked::new(); DEVICES];
+    master.set_link(Link::Up);
+    let mut axes = [(); DEVICES].map(|()| Axis { asked: Asked::new(), evidence: Evidence::NEVER });
     let end_ns = run(&mut master, &mut axes, &mut nodes, CYCLES)?;
     println!("{}; {CYCLES} cycles from {} ns of the master's time on", master.network(), end_ns - master.epoch_ns());
-    println!("round trips to the first device, shortest and longest: {:?} ns", master.line_delay().extremes());
+    if let Some(trips) = master.line_delay().extremes() {
+        println!("round trips to the first device: {} to {} ns", trips.shortest_ns, trips.longest_ns);
+    }
     for (axis, node) in axes.iter().zip(&nodes) {
-        show(*axis, node);
-        assert_eq!(axis.lag(node.follower.position()), 0);
+        show(node);
+        // What control may use: of this cycle or the one before, and from a driver without a fault.
+        let sample = axis.evidence.at(end_ns, Policy::new(8000))?;
+        let (asked, position) = (axis.asked.asked(), axis.asked.position(sample));
+        println!("  asked to {asked}, its frame says {position}");
+        assert_eq!(asked, position);
     }
     // The host of the last device wants its motor driver off the line, and takes the device out.
     if let Some(last) = nodes.last_mut() {
         last.device.enter_error();
-        println!("taken out: {:?}, its port {:?}", last.device.state(), last.device.forwarding(PortId::A));
+        println!("taken out: {}, its port: {}", last.device.state(), last.device.forwarding(PortId::A));
         last.device.reset();
-        println!("and back: {:?}", last.device.state());
+        println!("and back: {}", last.device.state());
     }
     Ok(())
 }
 
-fn show(axis: Asked, node: &Node) {
+fn show(node: &Node) {
     let device = &node.device;
     let address = device.assignment().map_or(0, |place| place.address.get());
-    let (asked, lag) = (axis.position(), axis.lag(node.follower.position()));
-    println!("device {address}: {:?}, asked to {asked}, {lag} steps behind", device.state());
+    println!("device {address}: {}", device.state());
     println!(
         "  first cycle at {:?} ns of its counter, {:?} as the published device has it",
         device.first_cycle_ns(),

@@ -8,21 +8,22 @@
 use core::error::Error as AnyError;
 
 use nom::Parser;
+use sorte_proto::Place;
 use sorte_proto::stream::{device_frame, long_frame, master_frame, preamble};
 use sorte_proto::{
-    DeviceAddress, DeviceFrame, Discovery, DiscoveryView, Entry, Error, FrameType, Network, Preamble,
-    PublishedDeviceFrame, Status, write_master_frame,
+    DeviceAddress, DeviceFrame, Discovery, DiscoveryView, Entry, Error, FrameType, Member, Network, Preamble,
+    PublishedDeviceFrame, Status, emit_master_frame_into,
 };
 
 fn recording() -> Result<Vec<u8>, Error> {
-    let mut discovery = Discovery::published_request(true);
-    for last in [false, true] {
-        discovery.pass(Entry::STOCK, last, false)?;
+    let mut discovery = Discovery::published_request(Place::Last);
+    for adds in [Status::empty(), Status::LAST] {
+        discovery.pass(Entry::STOCK, adds)?;
     }
     let mut wire = Preamble::Long.bytes().to_vec();
     wire.extend(discovery.emit());
     let mut master = [0; 21];
-    write_master_frame(&[7; 16], 40_500, &mut master)?;
+    emit_master_frame_into(&[7; 16], 40_500, &mut master)?;
     wire.extend(Preamble::Short.bytes());
     wire.extend(master);
     let mut device = [0; 6];
@@ -38,7 +39,7 @@ fn main() -> Result<(), Box<dyn AnyError>> {
         (preamble::<Error>, long_frame).parse(&wire).map_err(|error| format!("start-up: {error:?}"))?;
     println!("{frame}; type nibble {:x}h", frame.status().type_nibble());
     if frame.frame_type() == FrameType::Discovery {
-        for (place, entry) in Network::new(DiscoveryView::of(frame)?)?.assignments() {
+        for Member { assignment: place, lengths: entry } in Network::new(DiscoveryView::of(frame)?)?.members() {
             println!("  device {}: {} bytes out from {}", place.address, entry.output, place.out_offset);
         }
     }

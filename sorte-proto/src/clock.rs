@@ -4,8 +4,7 @@ pub const WRITE_DELAY_NS: u32 = 135;
 pub const AVERAGE: u8 = 16;
 
 /// What the device does to its counter. The IEP counter adds 5 each 5 ns tick, so it counts nanoseconds.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum Correction {
     /// Nothing.
@@ -23,6 +22,12 @@ pub enum Correction {
         ticks: u16,
     },
 }
+
+servowire_core::one_line!(Correction {
+    Self::None => "clock as it is";
+    Self::Set { counter_ns } => "counter = {} ns", counter_ns;
+    Self::Rate { increment, ticks } => "add {} a tick for {} ticks", increment, ticks;
+});
 
 /// Clock discipline of a device: the first SYNC frame sets the counter, then the mean error of each 16 frames is
 /// taken out with ±1 ns a tick.

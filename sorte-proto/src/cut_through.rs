@@ -28,8 +28,8 @@ struct Sender {
 }
 
 impl Sender {
-    const fn new(last: bool, error: bool) -> Self {
-        Self { transit: Transit::START, sent: RunningFcs::START, add: Status::of_device(last, error) }
+    const fn new(add: Status) -> Self {
+        Self { transit: Transit::START, sent: RunningFcs::START, add }
     }
 
     /// Takes a byte that passes as it is, if nobody has to look at it.
@@ -66,6 +66,17 @@ pub struct DiscoveryRewriter {
     carry: bool,
 }
 
+/// A DISCOVERY frame that has passed a device.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct PassedDiscovery {
+    /// STATUS as it was received.
+    pub status: Status,
+    /// What the device has learnt of itself.
+    pub assignment: Assignment,
+}
+
 const DISCOVERY_LEN: u16 = 1030;
 const DISCOVERY_FCS: u16 = DISCOVERY_LEN - 4;
 /// Where the table of entries begins.
@@ -73,9 +84,10 @@ const TABLE: u16 = 10;
 const _: () = assert!(DISCOVERY_LEN as usize == Discovery::LEN);
 
 impl DiscoveryRewriter {
-    /// `last`: the device is the last one; `error`: it has seen a wrong checksum since its previous STATUS byte.
-    pub const fn new(lengths: Entry, last: bool, error: bool) -> Self {
-        let sender = Sender::new(last, error);
+    /// `adds`: what the device sets in STATUS, LAST if it is the last one and ERROR if it has seen a wrong checksum since its
+    /// previous STATUS byte.
+    pub const fn new(lengths: Entry, adds: Status) -> Self {
+        let sender = Sender::new(adds);
         Self { sender, lengths, before: 0, in_offset: 0, out_offset: 0, entry_at: u16::MAX, carry: false }
     }
 
@@ -144,17 +156,17 @@ impl DiscoveryRewriter {
         }
     }
 
-    /// STATUS as it was received, and what the device has learnt.
+    /// What the frame was and what the device has learnt.
     ///
     /// # Errors
-    /// As [`LongFrame::new`](crate::LongFrame::new); [`Error::UnexpectedType`] for a good frame that passed unchanged;
+    /// As [`LongFrame::parse`](crate::LongFrame::parse); [`Error::UnexpectedType`] for a good frame that passed unchanged;
     /// [`Error::TooManyDevices`].
-    pub fn finish(self) -> Result<(Status, Assignment), Error> {
+    pub fn finish(self) -> Result<PassedDiscovery, Error> {
         self.sender.transit.check_type(FrameType::Discovery)?;
         let count = self.before.saturating_add(1);
         let address = next_address(self.before).ok_or(Error::TooManyDevices { count })?;
         let assignment = Assignment { address, in_offset: self.in_offset, out_offset: self.out_offset };
-        Ok((self.sender.transit.status(), assignment))
+        Ok(PassedDiscovery { status: self.sender.transit.status(), assignment })
     }
 
     pub(crate) const fn transit(&self) -> &Transit {
@@ -195,9 +207,9 @@ const SYNC_FCS: u16 = SYNC_LEN - 4;
 const _: () = assert!(SYNC_LEN as usize == Sync::LEN);
 
 impl SyncRewriter {
-    /// `line_delay_next_ns`: the line to the next device; `last`, `error` as with [`DiscoveryRewriter::new`].
-    pub const fn new(line_delay_next_ns: u16, last: bool, error: bool) -> Self {
-        let sender = Sender::new(last, error);
+    /// `line_delay_next_ns`: the line to the next device; `adds` as with [`DiscoveryRewriter::new`].
+    pub const fn new(line_delay_next_ns: u16, adds: Status) -> Self {
+        let sender = Sender::new(adds);
         Self { sender, hop_ns: hop_ns(line_delay_next_ns), time_stamp: 0, delay: 0, carry: false }
     }
 
@@ -241,7 +253,7 @@ impl SyncRewriter {
     /// The frame as it was received.
     ///
     /// # Errors
-    /// As [`LongFrame::new`](crate::LongFrame::new); [`Error::UnexpectedType`] for a good frame that passed unchanged.
+    /// As [`LongFrame::parse`](crate::LongFrame::parse); [`Error::UnexpectedType`] for a good frame that passed unchanged.
     pub fn finish(self) -> Result<Sync, Error> {
         let transit = &self.sender.transit;
         transit.check_type(FrameType::Sync)?;
@@ -261,14 +273,15 @@ mod tests {
 
     use super::*;
     use crate::delay_req::DelayReq;
+    use crate::place::Place;
 
     fn discovery(frame: &[u8], lengths: Entry, last: bool, error: bool) -> (Vec<u8>, DiscoveryRewriter) {
-        let mut rewriter = DiscoveryRewriter::new(lengths, last, error);
+        let mut rewriter = DiscoveryRewriter::new(lengths, Status::of_device(last, error));
         (frame.iter().map(|&byte| rewriter.byte(byte)).collect(), rewriter)
     }
 
     fn sync(frame: &[u8], line: u16, last: bool, error: bool) -> (Vec<u8>, SyncRewriter) {
-        let mut rewriter = SyncRewriter::new(line, last, error);
+        let mut rewriter = SyncRewriter::new(line, Status::of_device(last, error));
         (frame.iter().map(|&byte| rewriter.byte(byte)).collect(), rewriter)
     }
 
@@ -280,15 +293,15 @@ mod tests {
 
     #[test]
     fn a_line_of_300_devices_gives_the_bytes_of_the_buffered_form() {
-        let mut buffered = Discovery::request(true);
+        let mut buffered = Discovery::request(Place::Last);
         let mut passing = buffered.emit().to_vec();
         let devices = if cfg!(miri) { 2 } else { 300 };
         for k in 0..devices {
             let lengths = Entry { input: k, output: 300 - k };
             let (out, rewriter) = discovery(&passing, lengths, k + 1 == devices, k % 3 == 0);
-            let assignment = buffered.pass(lengths, k + 1 == devices, k % 3 == 0);
+            let assignment = buffered.pass(lengths, Status::of_device(k + 1 == devices, k % 3 == 0));
             assert_eq!(out, buffered.emit());
-            assert_eq!(rewriter.finish().map(|(_, a)| a), assignment);
+            assert_eq!(rewriter.finish().map(|passed| passed.assignment), assignment);
             assert_eq!(assignment.is_ok(), k < 254);
             passing = out;
         }
@@ -297,17 +310,17 @@ mod tests {
     #[test]
     fn every_count_passes_as_in_the_buffered_form() {
         for count in (0..300).chain([0x1fe, 0x1ff, 0x7f00, 0xfffe, 0xffff]).step_by(crate::stride(300)) {
-            let mut buffered = Discovery { count, input_total: 0xfffe, ..Discovery::request(false) };
+            let mut buffered = Discovery { count, input_total: 0xfffe, ..Discovery::request(Place::Inner) };
             let (out, rewriter) = discovery(&buffered.emit(), Entry::STOCK, true, false);
-            let assignment = buffered.pass(Entry::STOCK, true, false);
+            let assignment = buffered.pass(Entry::STOCK, Status::LAST);
             assert_eq!(out, buffered.emit(), "{count}");
-            assert_eq!(rewriter.finish().map(|(_, a)| a), assignment);
+            assert_eq!(rewriter.finish().map(|passed| passed.assignment), assignment);
         }
     }
 
     #[test]
     fn no_flip_is_healed() {
-        let good = Sync::of_master(500, 76, false).emit();
+        let good = Sync::of_master(500, 76, Place::Inner).emit();
         for bit in (0..14 * 8).step_by(crate::stride(7)) {
             let mut frame = good;
             frame[bit / 8] ^= 1 << (bit % 8);
@@ -315,7 +328,7 @@ mod tests {
             assert!(Sync::parse(&out).is_err());
             assert!(rewriter.finish().is_err());
         }
-        let good = Discovery::request(false).emit();
+        let good = Discovery::request(Place::Inner).emit();
         for bit in (0..40 * 8).chain(1020 * 8..1030 * 8).step_by(crate::stride(199)) {
             let mut frame = good;
             frame[bit / 8] ^= 1 << (bit % 8);
@@ -327,7 +340,7 @@ mod tests {
 
     #[test]
     fn other_frames_pass_unchanged_and_short_ones_are_refused() {
-        let other = DelayReq::of_master(true).emit();
+        let other = DelayReq::of_master(Place::Last).emit();
         let (out, rewriter) = discovery(&other, Entry::STOCK, true, true);
         assert_eq!(out, other);
         assert_eq!(rewriter.finish(), Err(Error::UnexpectedType { got: 3, want: 1 }));
@@ -335,7 +348,7 @@ mod tests {
         assert_eq!(out, other);
         assert_eq!(rewriter.finish(), Err(Error::UnexpectedType { got: 3, want: 5 }));
 
-        let frame = Sync::of_master(500, 76, false).emit();
+        let frame = Sync::of_master(500, 76, Place::Inner).emit();
         for len in 0..14 {
             let (_, rewriter) = sync(&frame[..len], 1, false, false);
             assert!(matches!(rewriter.finish(), Err(Error::Truncated { .. } | Error::BadFcs { .. })));
@@ -358,7 +371,7 @@ mod tests {
             let received = Sync { source, status: Status::from_bits_retain(status), time_stamp_ns, delay_ns };
             let (out, rewriter) = sync(&received.emit(), line, last, error);
             let mut buffered = received;
-            buffered.pass(line, last, error);
+            buffered.pass(line, Status::of_device(last, error));
             prop_assert_eq!(out, buffered.emit());
             prop_assert_eq!(rewriter.finish(), Ok(received));
         }

@@ -1,8 +1,7 @@
-use core::fmt;
-
 use crate::error::Error;
 use crate::frame::{LongFrame, emit};
 use crate::frame_type::FrameType;
+use crate::place::Place;
 use crate::status::Status;
 
 /// A line-delay request. The neighbour's port sends it back after a fixed time; there is no answer of its own.
@@ -28,21 +27,21 @@ impl DelayReq {
     pub const LEN: usize = LongFrame::OVERHEAD;
 
     /// As the master sends it to the first device.
-    pub const fn of_master(last: bool) -> Self {
-        Self { source: 0, status: if last { Status::FINAL } else { Status::DELAY_REQ } }
+    pub const fn of_master(place: Place) -> Self {
+        Self { source: 0, status: place.choose(Status::FINAL, Status::DELAY_REQ) }
     }
 
     /// As a device sends it to the next one.
-    pub const fn of_device(last: bool) -> Self {
-        Self { source: 0, status: if last { Status::FINAL_DEVICE_DELAY_REQ } else { Status::DELAY_REQ } }
+    pub const fn of_device(place: Place) -> Self {
+        Self { source: 0, status: place.choose(Status::FINAL_DEVICE_DELAY_REQ, Status::DELAY_REQ) }
     }
 
-    /// Checks as [`LongFrame::new`], then that TYPE is 3.
+    /// Checks as [`LongFrame::parse`], then that TYPE is 3.
     ///
     /// # Errors
-    /// As [`LongFrame::new`]; [`Error::UnexpectedType`].
+    /// As [`LongFrame::parse`]; [`Error::UnexpectedType`].
     pub fn parse(bytes: &[u8]) -> Result<Self, Error> {
-        Self::of(LongFrame::new(bytes)?)
+        Self::of(LongFrame::parse(bytes)?)
     }
 
     /// Checks that TYPE is 3.
@@ -60,19 +59,7 @@ impl DelayReq {
     }
 }
 
-impl fmt::Display for DelayReq {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "DELAY_REQ, STATUS {}", self.status)
-    }
-}
-
-#[cfg(feature = "defmt")]
-#[cfg_attr(docsrs, doc(cfg(feature = "defmt")))]
-impl defmt::Format for DelayReq {
-    fn format(&self, f: defmt::Formatter<'_>) {
-        defmt::write!(f, "DELAY_REQ, STATUS {}", self.status);
-    }
-}
+servowire_core::one_line!(DelayReq { Self { status, .. } => "DELAY_REQ, STATUS {}", status; });
 
 #[cfg(test)]
 mod tests {

@@ -1,17 +1,19 @@
 //! The device's side: two ports, and what a device learns from the frames that pass.
 //!
-//! Sans-IO. The caller moves bytes between the ports as [`Handled::path`] says, sends the delay requests and device
+//! Sans-IO. The caller moves bytes between the ports as [`Reaction::path`] says, sends the delay requests and device
 //! frames that are asked for, and writes the corrections into its counter. A frame in a buffer goes through
-//! [`Device::frame`]; a port that forwards byte by byte takes a [`Passage`].
+//! [`Device::hear`]; a port that forwards byte by byte takes a [`Passage`].
 //!
 //! Data are used only after their checksum was found right. (The published device uses them in any case.)
 
 mod config;
+mod heard;
 mod mode;
 mod passage;
 mod port;
 
 pub use config::{Config, Counters, PortCounters};
+pub use heard::{FrameTimes, HeardSync, Output, Path, PortId, Reaction};
 pub use mode::Forwarding;
 pub use passage::Passage;
 pub use port::{Port, PortFlags, Seen, State, Trigger};
@@ -27,84 +29,12 @@ use crate::exchange::{DeviceFrame, MasterFrameView};
 use crate::frame::LongFrame;
 use crate::frame_type::FrameType;
 use crate::line_delay::LineDelay;
+use crate::link::Link;
 use crate::param::Parameters;
+use crate::place::Place;
 use crate::status::Status;
-use crate::sync::{Sync, TRIGGER_TO_CAPTURE_NS};
+use crate::sync::TRIGGER_TO_CAPTURE_NS;
 use crate::timing::{TRIGGER_NS, published_send_time_ns};
-
-/// One of the two ports.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub enum PortId {
-    /// The first.
-    A,
-    /// The second.
-    B,
-}
-
-impl PortId {
-    /// The other one.
-    pub const fn other(self) -> Self {
-        match self {
-            Self::A => Self::B,
-            Self::B => Self::A,
-        }
-    }
-}
-
-/// Where a frame goes.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub enum Path {
-    /// Out of the other port.
-    Forward,
-    /// Out of the port it came in.
-    Reflect,
-    /// Nowhere.
-    Absorb,
-}
-
-/// Times of a frame's reception.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub struct Arrival {
-    /// The device's counter at the start of the frame, in ns.
-    pub sof_ns: u32,
-    /// The device's counter now, in ns.
-    pub counter_ns: u32,
-    /// A clock for the time-outs that nobody sets, in ns.
-    pub now_ns: u64,
-}
-
-/// What came of a frame.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub struct Handled {
-    /// Where it goes.
-    pub path: Path,
-    /// Whether it was good, and if not, why it was not used.
-    pub result: Result<(), Error>,
-    /// Delay request to send on the reverse port; a last device sends none.
-    pub trigger: Trigger,
-    /// What to do to the counter.
-    pub correction: Correction,
-}
-
-/// What the IO exchange gave a device.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub struct Output<'a> {
-    /// Its output bytes.
-    pub data: &'a [u8],
-    /// The master's time at the start of the frame, seen here, in ns.
-    pub reference_ns: u32,
-    /// What to do to the counter.
-    pub correction: Correction,
-}
 
 /// A device with two ports.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -121,7 +51,7 @@ pub struct Device {
     parameters: Option<[u8; Parameters::LEN]>,
     line: LineDelay,
     clock: Clock,
-    last_sync: Option<(Sync, u32)>,
+    last_sync: Option<HeardSync>,
     /// Delay from the master in ns.
     way_ns: Option<u32>,
     received: bool,
@@ -225,21 +155,21 @@ impl Device {
         if self.line.is_complete() { self.line.checked() } else { Err(Error::ImplausibleRoundTrip { rtt_ns: 0 }) }
     }
 
-    /// The SYNC frame received last and the own counter at its start.
-    pub const fn last_sync(&self) -> Option<(Sync, u32)> {
+    /// The SYNC frame heard last.
+    pub const fn last_sync(&self) -> Option<HeardSync> {
         self.last_sync
     }
 
     /// Own counter at the start of the first cycle of the IO exchange as the published device sets it: 10 us after the
     /// last SYNC frame.
     pub fn cycle_zero_ns(&self) -> Option<u32> {
-        self.last_sync.map(|(_, sof_ns)| sof_ns.wrapping_add(10_000))
+        self.last_sync.map(|last| last.sof_ns.wrapping_add(10_000))
     }
 
     /// Own counter at the start of the first cycle of the IO exchange, in the common time: the master triggers its first
     /// frame one SYNC period of 10 us after the last SYNC frame, and a cycle begins 500 ns before its trigger.
     pub fn first_cycle_ns(&self) -> Option<u32> {
-        let ((sync, _), delay_ns) = (self.last_sync?, self.way_ns?);
+        let (HeardSync { sync, .. }, delay_ns) = (self.last_sync?, self.way_ns?);
         let sent_ns = sync.time_stamp_ns.wrapping_sub(TRIGGER_TO_CAPTURE_NS).wrapping_sub(delay_ns);
         Some(sent_ns.wrapping_add(10_000).wrapping_sub(TRIGGER_NS))
     }
@@ -257,7 +187,7 @@ impl Device {
     /// Delay from the master in ns, from the last SYNC frame; beyond 65,535 ns only if the master tells the period of its
     /// SYNC frames, see [`Sync::long_delay_ns`].
     pub fn delay_ns(&self) -> Option<u32> {
-        let (sync, _) = self.last_sync?;
+        let HeardSync { sync, .. } = self.last_sync?;
         // PARAM: a period of its own, in ticks of 5 ns.
         let ticks = self.parameters().map(|parameters| parameters.sync_cycle).filter(|ticks| *ticks > 1000);
         let long = ticks.and_then(|ticks| sync.long_delay_ns(ticks.saturating_mul(5)));
@@ -266,18 +196,18 @@ impl Device {
 
     /// The links have changed. With one link the device is the last one, and that port faces the master. A device that
     /// loses the link to the master starts again.
-    pub fn links(&mut self, a: bool, b: bool) {
+    pub fn set_links(&mut self, a: Link, b: Link) {
         let master_lost = match self.master_port() {
-            Some(PortId::A) => !a,
-            Some(PortId::B) => !b,
+            Some(PortId::A) => a == Link::Down,
+            Some(PortId::B) => b == Link::Down,
             None => false,
         };
         if master_lost && !self.is_out() {
             self.restart();
         }
         let only = match (a, b) {
-            (true, false) => Some(PortId::A),
-            (false, true) => Some(PortId::B),
+            (Link::Up, Link::Down) => Some(PortId::A),
+            (Link::Down, Link::Up) => Some(PortId::B),
             _ => None,
         };
         for port in [PortId::A, PortId::B] {
@@ -331,59 +261,64 @@ impl Device {
         self.missed
     }
 
-    /// A start-up frame begins at `port`. Its bytes go through the [`Passage`], then to [`end`](Self::end).
-    pub fn begin(&self, port: PortId) -> Passage {
+    /// A start-up frame begins at `port`. Its bytes go through the [`Passage`], then to [`hear_passed`](Self::hear_passed).
+    pub fn passage(&self, port: PortId) -> Passage {
         let handler = self.port(port);
         let master = handler.flags.contains(PortFlags::MASTER_PORT);
         let idle_last = handler.state == State::Idle && handler.flags.contains(PortFlags::LAST_DEVICE);
         let kind = match (handler.state, self.line_delay_next_ns()) {
             _ if idle_last => self.discovery(),
             (State::Discovery, _) if master => self.discovery(),
-            (State::Sync, Ok(line)) if master => Kind::Sync(SyncRewriter::new(line, self.is_last(), self.error)),
+            (State::Sync, Ok(line)) if master => Kind::Sync(SyncRewriter::new(line, self.adds())),
             _ => Kind::Plain(Plain::NEW),
         };
         Passage::new(kind, self.path(port), handler.state, idle_last)
     }
 
-    const fn discovery(&self) -> Kind {
-        Kind::Discovery(DiscoveryRewriter::new(self.config.lengths, self.is_last(), self.error))
+    /// What it sets in a STATUS byte that it writes now.
+    const fn adds(&self) -> Status {
+        Status::of_device(self.is_last(), self.error)
     }
 
-    /// A start-up frame that began with [`begin`](Self::begin) has ended at `port`.
-    pub fn end(&mut self, port: PortId, passage: Passage, arrival: Arrival) -> Handled {
+    const fn discovery(&self) -> Kind {
+        Kind::Discovery(DiscoveryRewriter::new(self.config.lengths, self.adds()))
+    }
+
+    /// A start-up frame whose bytes went through a [`passage`](Self::passage) has ended at `port`.
+    pub fn hear_passed(&mut self, port: PortId, passage: Passage, times: FrameTimes) -> Reaction {
         let state = self.port(port).state;
         let path = passage.path().unwrap_or(Path::Absorb);
-        let mut handled = Handled { path, result: Ok(()), trigger: Trigger::None, correction: Correction::None };
+        let mut reaction = Reaction { path, result: Ok(()), trigger: Trigger::None, correction: Correction::None };
         if state != passage.began_in() {
             // The device has started again meanwhile.
-            handled.result = Err(Error::WrongState);
-            return handled;
+            reaction.result = Err(Error::WrongState);
+            return reaction;
         }
         if matches!(state, State::Exchange | State::Diag | State::Error) {
-            return handled;
+            return reaction;
         }
         // A STATUS byte has been written, so the error has been reported.
         self.error &= !passage.has_written_status();
         let learnt = passage.learnt();
-        handled.result = learnt.map(|_| ());
-        self.count(port, handled.result);
-        let Ok(learnt) = learnt else { return handled };
+        reaction.result = learnt.map(|_| ());
+        self.count(port, reaction.result);
+        let Ok(learnt) = learnt else { return reaction };
         let head = passage.transit().head();
-        handled.trigger = self.port_mut(port).head(head).trigger;
+        reaction.trigger = self.port_mut(port).head(head).trigger;
         if self.port(port.other()).flags.contains(PortFlags::MASTER_PORT) {
             // What a neighbour sends back without LAST.
             self.port_mut(port).flags.remove(PortFlags::MASTER_PORT);
         }
         let master = self.port(port).flags.contains(PortFlags::MASTER_PORT);
         if master && state.waits_for(head) {
-            self.alive_ns = arrival.now_ns;
+            self.alive_ns = times.now_ns;
         }
         match learnt {
             Learnt::Place(assignment) => self.assignment = Some(assignment),
             Learnt::Sync(sync) => {
-                self.last_sync = Some((sync, arrival.sof_ns));
+                self.last_sync = Some(HeardSync { sync, sof_ns: times.sof_ns });
                 self.way_ns = self.delay_ns();
-                handled.correction = self.clock.frame(sync.time_stamp_ns, arrival.sof_ns, arrival.counter_ns);
+                reaction.correction = self.clock.frame(sync.time_stamp_ns, times.sof_ns, times.counter_ns);
             }
             Learnt::Parameters(bytes) if master && state == State::Param => {
                 self.parameters = Some(bytes);
@@ -398,19 +333,19 @@ impl Device {
         // A device that cannot rewrite SYNC must not take part: its line delay was never measured.
         let unmeasured = master && state == State::Sync && passage.transit().is_for_all(FrameType::Sync);
         if let (true, Err(error)) = (unmeasured, self.line_delay_next_ns()) {
-            handled.result = Err(error);
+            reaction.result = Err(error);
             self.restart();
         }
-        handled
+        reaction
     }
 
-    /// A whole start-up frame in a buffer, which is rewritten as it will be sent on.
-    pub fn frame(&mut self, port: PortId, frame: &mut [u8], arrival: Arrival) -> Handled {
-        let mut passage = self.begin(port);
+    /// A whole start-up frame was heard at `port`. It is rewritten as it will be sent on.
+    pub fn hear(&mut self, port: PortId, frame: &mut [u8], times: FrameTimes) -> Reaction {
+        let mut passage = self.passage(port);
         for byte in frame.iter_mut() {
             *byte = passage.byte(*byte);
         }
-        self.end(port, passage, arrival)
+        self.hear_passed(port, passage, times)
     }
 
     fn count(&mut self, port: PortId, result: Result<(), Error>) {
@@ -434,17 +369,17 @@ impl Device {
     pub const fn delay_request(trigger: Trigger) -> Option<DelayReq> {
         match trigger {
             Trigger::None => None,
-            Trigger::Normal => Some(DelayReq::of_device(false)),
-            Trigger::Last => Some(DelayReq::of_device(true)),
+            Trigger::Normal => Some(DelayReq::of_device(Place::Inner)),
+            Trigger::Last => Some(DelayReq::of_device(Place::Last)),
         }
     }
 
     /// The own request, which `trigger` had started, has come back to the reverse port after `rtt_ns`.
     ///
     /// # Errors
-    /// As [`LongFrame::new`] and [`DelayReq::of`]; the round trip is then not used.
-    pub fn delay_reflection(&mut self, trigger: Trigger, frame: &[u8], rtt_ns: u32) -> Result<(), Error> {
-        let result = LongFrame::new(frame).and_then(|frame| match frame.frame_type() {
+    /// As [`LongFrame::parse`] and [`DelayReq::of`]; the round trip is then not used.
+    pub fn hear_reflection(&mut self, trigger: Trigger, frame: &[u8], rtt_ns: u32) -> Result<(), Error> {
+        let result = LongFrame::parse(frame).and_then(|frame| match frame.frame_type() {
             // Defined by the vendor, and sent by nobody: it tells nothing.
             FrameType::DelayResp => Ok(false),
             _ => DelayReq::of(frame).map(|_| true),
@@ -466,15 +401,15 @@ impl Device {
     /// the cycle at the start of the frame and now. Frames of the other port just pass.
     ///
     /// # Errors
-    /// As [`MasterFrameView::new`] and [`MasterFrameView::slice`]; [`Error::WrongState`] if the device is not in
+    /// As [`MasterFrameView::parse`] and [`MasterFrameView::slice`]; [`Error::WrongState`] if the device is not in
     /// IO exchange. The frame counts as received even so.
-    pub fn exchange<'a>(&mut self, frame: &'a [u8], sof_ns: u32, counter_ns: u32) -> Result<Output<'a>, Error> {
+    pub fn hear_exchange<'a>(&mut self, frame: &'a [u8], sof_ns: u32, counter_ns: u32) -> Result<Output<'a>, Error> {
         let (State::Exchange, Some(place), Some(delay_ns)) = (self.state(), self.assignment, self.way_ns) else {
             return Err(Error::WrongState);
         };
         self.received = true;
         let output_len = self.config.output_len.or(self.output_total).unwrap_or_default();
-        let taken = MasterFrameView::new(output_len.into(), frame).and_then(|view| {
+        let taken = MasterFrameView::parse(output_len.into(), frame).and_then(|view| {
             Ok((view.slice(place.out_offset, self.config.lengths.output)?, view.reference_ns(delay_ns)))
         });
         self.count(self.reverse_port().other(), taken.map(|_| ()));
@@ -482,6 +417,12 @@ impl Device {
         // Start 500 ns into the cycle, and the way here.
         let expected = delay_ns.saturating_add(TRIGGER_NS);
         Ok(Output { data, reference_ns, correction: self.clock.frame(expected, sof_ns, counter_ns) })
+    }
+
+    /// The next STATUS byte that the device writes carries ERROR, as after a wrong checksum: for firmware that does not know where
+    /// its axis is, see [`follow`](crate::follow).
+    pub const fn flag_error(&mut self) {
+        self.error = true;
     }
 
     /// The own frame of the IO exchange; reports an error once.

@@ -1,9 +1,8 @@
-use core::fmt;
-
 use crate::address::DeviceAddress;
 use crate::error::Error;
 use crate::frame::{LongFrame, MULTICAST, count, emit, refresh_fcs};
 use crate::frame_type::FrameType;
+use crate::place::Place;
 use crate::status::Status;
 
 /// Devices that a discovery frame has room for.
@@ -13,7 +12,6 @@ const PAYLOAD: usize = 6 + TABLE;
 
 /// Process data of one device: its entry in the table of a discovery frame.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "arbitrary", derive(arbitrary::Arbitrary))]
 pub struct Entry {
@@ -47,19 +45,19 @@ impl Entry {
 ///
 /// Only the first `count` entries have a meaning. The rest is whatever the master filled in: the published master
 /// sends a debug pattern there.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub struct DiscoveryView<'a> {
     frame: LongFrame<'a>,
     fields: &'a [u8; PAYLOAD],
 }
 
 impl<'a> DiscoveryView<'a> {
-    /// Checks as [`LongFrame::new`], then that TYPE is 1.
+    /// Checks as [`LongFrame::parse`], then that TYPE is 1.
     ///
     /// # Errors
-    /// As [`LongFrame::new`]; [`Error::UnexpectedType`].
-    pub fn new(bytes: &'a [u8]) -> Result<Self, Error> {
-        Self::of(LongFrame::new(bytes)?)
+    /// As [`LongFrame::parse`]; [`Error::UnexpectedType`].
+    pub fn parse(bytes: &'a [u8]) -> Result<Self, Error> {
+        Self::of(LongFrame::parse(bytes)?)
     }
 
     /// Checks that TYPE is 1.
@@ -128,6 +126,34 @@ impl<'a> DiscoveryView<'a> {
     }
 }
 
+/// The head and the entries of the devices counted.
+#[cfg(feature = "serde")]
+#[cfg_attr(docsrs, doc(cfg(feature = "serde")))]
+impl serde::Serialize for DiscoveryView<'_> {
+    fn serialize<S: serde::Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        use serde::ser::{SerializeSeq, SerializeStruct};
+
+        struct Entries<'a>(DiscoveryView<'a>);
+
+        impl serde::Serialize for Entries<'_> {
+            fn serialize<S: serde::Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+                let mut entries = serializer.serialize_seq(None)?;
+                self.0.entries().try_for_each(|entry| entries.serialize_element(&entry))?;
+                entries.end()
+            }
+        }
+
+        let mut frame = serializer.serialize_struct("Discovery", 6)?;
+        frame.serialize_field("source", &self.source())?;
+        frame.serialize_field("status", &self.status())?;
+        frame.serialize_field("count", &self.count())?;
+        frame.serialize_field("input_total", &self.input_total())?;
+        frame.serialize_field("output_total", &self.output_total())?;
+        frame.serialize_field("entries", &Entries(*self))?;
+        frame.end()
+    }
+}
+
 /// The values of a discovery frame, all 254 entries with what is in them.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "arbitrary", derive(arbitrary::Arbitrary))]
@@ -150,11 +176,11 @@ impl Discovery {
     /// Bytes from DA to FCS.
     pub const LEN: usize = PAYLOAD + LongFrame::OVERHEAD;
 
-    /// As a master sends it, with zeros where the devices will write. `last`: the last DISCOVERY of the start-up.
-    pub const fn request(last: bool) -> Self {
+    /// As a master sends it, with zeros where the devices will write.
+    pub const fn request(place: Place) -> Self {
         Self {
             source: 0,
-            status: if last { Status::FINAL } else { Status::DISCOVERY },
+            status: place.choose(Status::FINAL, Status::DISCOVERY),
             count: 0,
             input_total: 0,
             output_total: 0,
@@ -166,10 +192,10 @@ impl Discovery {
     ///
     /// # Errors
     /// [`Error::BufferTooSmall`]
-    pub fn write_request(last: bool, into: &mut [u8]) -> Result<usize, Error> {
+    pub fn emit_request_into(place: Place, into: &mut [u8]) -> Result<usize, Error> {
         let frame = room(into, Self::LEN)?;
         frame.fill(0);
-        let status = if last { Status::FINAL } else { Status::DISCOVERY };
+        let status = place.choose(Status::FINAL, Status::DISCOVERY);
         if let [da, _, code, flags, ..] = frame {
             (*da, *code, *flags) = (MULTICAST, FrameType::Discovery.code(), status.bits());
         }
@@ -179,8 +205,8 @@ impl Discovery {
 
     /// As the published master sends it: its table is filled with a debug pattern, 31 blocks of 32 bytes holding the
     /// words 16, 48, 80, ... and then 0xBEEF.
-    pub fn published_request(last: bool) -> Self {
-        let mut frame = Self::request(last);
+    pub fn published_request(place: Place) -> Self {
+        let mut frame = Self::request(place);
         for (index, entry) in (0u16..).zip(&mut frame.entries) {
             // The pattern starts with the frame's table, eight entries a block.
             let word = if index < 248 { (index >> 3 << 5).saturating_add(16) } else { 0xbeef };
@@ -189,12 +215,12 @@ impl Discovery {
         frame
     }
 
-    /// Checks as [`DiscoveryView::new`].
+    /// Checks as [`DiscoveryView::parse`].
     ///
     /// # Errors
-    /// As [`DiscoveryView::new`].
+    /// As [`DiscoveryView::parse`].
     pub fn parse(bytes: &[u8]) -> Result<Self, Error> {
-        Ok(DiscoveryView::new(bytes)?.to_owned())
+        Ok(DiscoveryView::parse(bytes)?.to_owned())
     }
 
     /// The frame from DA to FCS.
@@ -211,15 +237,16 @@ impl Discovery {
     }
 
     /// What a device does to the frame that passes: it takes the next address and the present totals as its offsets,
-    /// adds its lengths, and sets its STATUS bits. [`cut_through`](crate::cut_through) does the same byte by byte.
+    /// adds its lengths, and `adds` to STATUS: LAST if it is the last one, ERROR if it has seen a wrong checksum since its previous
+    /// STATUS byte. [`cut_through`](crate::cut_through) does the same byte by byte.
     ///
     /// A device that finds 254 devices before it, or more, makes the count 255 and takes nothing: the master then
     /// refuses the network.
     ///
     /// # Errors
     /// [`Error::TooManyDevices`]
-    pub fn pass(&mut self, lengths: Entry, last: bool, error: bool) -> Result<Assignment, Error> {
-        self.status |= Status::of_device(last, error);
+    pub fn pass(&mut self, lengths: Entry, adds: Status) -> Result<Assignment, Error> {
+        self.status |= adds;
         let before = usize::from(self.count);
         let (Some(entry), Some(address)) = (self.entries.get_mut(before), next_address(self.count)) else {
             let count = self.count.saturating_add(1);
@@ -237,7 +264,6 @@ impl Discovery {
 
 /// What a device knows of itself after DISCOVERY.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Assignment {
     /// Its place in the line.
@@ -246,6 +272,16 @@ pub struct Assignment {
     pub in_offset: u16,
     /// Output bytes of the devices before it: where its own output bytes begin.
     pub out_offset: u16,
+}
+
+/// A device of a line as its master knows it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct Member {
+    /// Its place in the line and in the process data.
+    pub assignment: Assignment,
+    /// Its process data.
+    pub lengths: Entry,
 }
 
 /// The device count after one more device. A passing frame shows its low byte first, so a carry cannot reach the high
@@ -329,14 +365,14 @@ impl Network {
     }
 
     /// Address, lengths and offsets of each device.
-    pub fn assignments(&self) -> impl Iterator<Item = (Assignment, Entry)> + '_ {
+    pub fn members(&self) -> impl Iterator<Item = Member> + '_ {
         let start = (0u16, 0u16);
         self.entries().iter().zip(1..=u8::MAX).scan(start, |(input, output), (&entry, address)| {
             let assignment =
                 Assignment { address: DeviceAddress::new(address)?, in_offset: *input, out_offset: *output };
             *input = input.saturating_add(entry.input);
             *output = output.saturating_add(entry.output);
-            Some((assignment, entry))
+            Some(Member { assignment, lengths: entry })
         })
     }
 }
@@ -347,72 +383,22 @@ pub(crate) fn room(into: &mut [u8], want: usize) -> Result<&mut [u8], Error> {
     into.get_mut(..want).ok_or(Error::BufferTooSmall { got, want: count(want) })
 }
 
-impl fmt::Display for Discovery {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(
-            f,
-            "DISCOVERY {} devices, in {}, out {}, STATUS {}",
-            self.count, self.input_total, self.output_total, self.status
-        )
-    }
-}
-
-#[cfg(feature = "defmt")]
-#[cfg_attr(docsrs, doc(cfg(feature = "defmt")))]
-impl defmt::Format for Discovery {
-    fn format(&self, f: defmt::Formatter<'_>) {
-        defmt::write!(
-            f,
-            "DISCOVERY {=u16} devices, in {=u16}, out {=u16}, STATUS {}",
-            self.count,
-            self.input_total,
-            self.output_total,
-            self.status
-        );
-    }
-}
-
-impl fmt::Display for DiscoveryView<'_> {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(
-            f,
-            "DISCOVERY {} devices, in {}, out {}, STATUS {}",
-            self.count(),
-            self.input_total(),
-            self.output_total(),
-            self.status()
-        )
-    }
-}
-
-#[cfg(feature = "defmt")]
-#[cfg_attr(docsrs, doc(cfg(feature = "defmt")))]
-impl defmt::Format for DiscoveryView<'_> {
-    fn format(&self, f: defmt::Formatter<'_>) {
-        defmt::write!(
-            f,
-            "DISCOVERY {=u16} devices, in {=u16}, out {=u16}, STATUS {}",
-            self.count(),
-            self.input_total(),
-            self.output_total(),
-            self.status()
-        );
-    }
-}
-
-impl fmt::Display for Network {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{} devices, in {}, out {}", self.devices, self.input_total, self.output_total)
-    }
-}
-
-#[cfg(feature = "defmt")]
-#[cfg_attr(docsrs, doc(cfg(feature = "defmt")))]
-impl defmt::Format for Network {
-    fn format(&self, f: defmt::Formatter<'_>) {
-        defmt::write!(f, "{=u8} devices, in {=u16}, out {=u16}", self.devices, self.input_total, self.output_total);
-    }
-}
+servowire_core::one_line!(Discovery {
+    Self { count, input_total, output_total, status, .. } =>
+        "DISCOVERY {} devices, in {}, out {}, STATUS {}", count, input_total, output_total, status;
+});
+servowire_core::one_line!(DiscoveryView<'_> {
+    view => "DISCOVERY {} devices, in {}, out {}, STATUS {}",
+        view.count(), view.input_total(), view.output_total(), view.status();
+});
+servowire_core::one_line!(Network {
+    Self { devices, input_total, output_total, .. } => "{} devices, in {}, out {}", devices, input_total, output_total;
+});
+servowire_core::one_line!(Entry { Self { input, output } => "in {}, out {}", input, output; });
+servowire_core::one_line!(Assignment {
+    Self { address, in_offset, out_offset } => "device {}, in at {}, out at {}", address, in_offset, out_offset;
+});
+servowire_core::one_line!(Member { Self { assignment, lengths } => "{}; {}", assignment, lengths; });
 
 #[cfg(test)]
 mod tests;

@@ -24,7 +24,7 @@ mod fields;
 mod registers;
 mod status;
 
-pub use apply::{Apply, Next};
+pub use apply::Apply;
 pub use codes::{
     DeadTime, DecayMode, DriveTime, IsGain, OcpDeglitch, OcpThreshold, SampleThreshold, SinkCurrent, SourceCurrent,
     StallCount, StallDivider, StepMode,
@@ -50,70 +50,29 @@ pub const WAKE_NS: u32 = 1_000_000;
 const _: () = assert!(PULSE_NS as u32 >= STEP_NS && CNC_CYCLE_NS - PULSE_NS as u32 >= STEP_NS);
 const _: () = assert!(CNC_CYCLE_NS == 1_000_000_000 / MAX_STEP_HZ);
 
-/// The eight registers by their addresses.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-#[cfg_attr(feature = "arbitrary", derive(arbitrary::Arbitrary))]
-#[repr(u8)]
-pub enum Register {
-    /// CTRL
-    Ctrl = 0,
-    /// TORQUE
-    Torque = 1,
-    /// OFF
-    Off = 2,
-    /// BLANK
-    Blank = 3,
-    /// DECAY
-    Decay = 4,
-    /// STALL
-    Stall = 5,
-    /// DRIVE
-    Drive = 6,
-    /// STATUS
-    Status = 7,
+servowire_core::codes! {
+    /// The eight registers by their addresses.
+    pub enum Register: u8 {
+        /// Enable, direction, micro-steps, gain.
+        Ctrl = 0 => "CTRL",
+        /// Current and back-EMF sampling.
+        Torque = 1 => "TORQUE",
+        /// Fixed off time.
+        Off = 2 => "OFF",
+        /// Blanking of the current trip.
+        Blank = 3 => "BLANK",
+        /// Current decay.
+        Decay = 4 => "DECAY",
+        /// Stall detection.
+        Stall = 5 => "STALL",
+        /// Gate drive and over-current protection.
+        Drive = 6 => "DRIVE",
+        /// Faults.
+        Status = 7 => "STATUS",
+    }
 }
 
 impl Register {
-    /// All, by address.
-    pub const ALL: [Self; 8] =
-        [Self::Ctrl, Self::Torque, Self::Off, Self::Blank, Self::Decay, Self::Stall, Self::Drive, Self::Status];
-
-    /// The address, 0..=7.
-    pub const fn address(self) -> u8 {
-        self as u8
-    }
-
-    /// The register at this address, 0..=7.
-    pub const fn at(address: u8) -> Option<Self> {
-        Some(match address {
-            0 => Self::Ctrl,
-            1 => Self::Torque,
-            2 => Self::Off,
-            3 => Self::Blank,
-            4 => Self::Decay,
-            5 => Self::Stall,
-            6 => Self::Drive,
-            7 => Self::Status,
-            _ => return None,
-        })
-    }
-
-    /// The data sheet's name.
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Ctrl => "CTRL",
-            Self::Torque => "TORQUE",
-            Self::Off => "OFF",
-            Self::Blank => "BLANK",
-            Self::Decay => "DECAY",
-            Self::Stall => "STALL",
-            Self::Drive => "DRIVE",
-            Self::Status => "STATUS",
-        }
-    }
-
     /// Value after power-up.
     pub const fn reset_value(self) -> u16 {
         match self {
@@ -139,12 +98,12 @@ impl Register {
 
     /// The word that writes the low 12 bits of `value`.
     pub const fn write(self, value: u16) -> Word {
-        Word((self.address() as u16) << 12 | value & 0xfff)
+        Word((self.code() as u16) << 12 | value & 0xfff)
     }
 
     /// The word that reads it. The answer comes in the same transfer.
     pub const fn read(self) -> Word {
-        Word(0x8000 | (self.address() as u16) << 12)
+        Word(0x8000 | (self.code() as u16) << 12)
     }
 
     /// Whether `read` may be what a register that holds `written` reads.
@@ -154,7 +113,7 @@ impl Register {
     pub const fn verify(self, written: u16, read: u16) -> Result<(), crate::error::Error> {
         let mask = self.read_back_mask();
         let (got, want) = (read & mask, written & mask);
-        if got == want { Ok(()) } else { Err(crate::error::Error::ReadBack { register: self.address(), got, want }) }
+        if got == want { Ok(()) } else { Err(crate::error::Error::ReadBack { register: self.code(), got, want }) }
     }
 }
 
@@ -187,15 +146,15 @@ mod tests {
     #[test]
     fn words_carry_address_and_data() {
         for register in Register::ALL {
-            assert_eq!(Register::at(register.address()), Some(register));
-            assert_eq!(register.read().bits(), 0x8000 | u16::from(register.address()) << 12);
+            assert_eq!(Register::from_code(register.code()), Some(register));
+            assert_eq!(register.read().bits(), 0x8000 | u16::from(register.code()) << 12);
             for value in (0..=u16::MAX).step_by(crate::stride(997)) {
                 let word = register.write(value).bits();
-                assert_eq!(word, u16::from(register.address()) << 12 | value & 0xfff);
+                assert_eq!(word, u16::from(register.code()) << 12 | value & 0xfff);
                 assert_eq!(Word::answer(value.to_be_bytes()), value & 0xfff);
             }
         }
-        assert_eq!(Register::at(8), None);
+        assert_eq!(Register::from_code(8), None);
         assert_eq!(Register::Torque.write(0x1ff).to_bytes(), [0x11, 0xff]);
         let names = ["CTRL", "TORQUE", "OFF", "BLANK", "DECAY", "STALL", "DRIVE", "STATUS"];
         assert_eq!(Register::ALL.map(Register::name), names);

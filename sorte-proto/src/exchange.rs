@@ -1,11 +1,10 @@
-use core::fmt;
-
 use crate::address::DeviceAddress;
 use crate::crc::crc8_step;
 use crate::crc::crc8_update;
 use crate::discovery::room;
 use crate::error::Error;
 use crate::frame::{count, wrong_length};
+use crate::hex::Hex;
 use crate::status::Status;
 
 /// Output bytes of the published master: four devices with four bytes each.
@@ -24,7 +23,8 @@ pub const STOCK_INPUT: usize = 3;
 ///
 /// Device `a` owns the bytes `2 + offset ..` as DISCOVERY told it. The time stamp is inserted while the frame is on
 /// its way and no check covers it: see [`check_time_stamp`](Self::check_time_stamp).
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct MasterFrameView<'a> {
     status: Status,
     output: &'a [u8],
@@ -40,7 +40,7 @@ impl<'a> MasterFrameView<'a> {
     /// # Errors
     /// [`Error::Truncated`], [`Error::TooLong`], [`Error::BadCrc8`], [`Error::WrongSource`]
     #[inline]
-    pub fn new(output_len: usize, bytes: &'a [u8]) -> Result<Self, Error> {
+    pub fn parse(output_len: usize, bytes: &'a [u8]) -> Result<Self, Error> {
         let want = output_len.saturating_add(Self::OVERHEAD);
         if bytes.len() != want {
             return Err(wrong_length(bytes.len(), want));
@@ -104,7 +104,7 @@ impl<'a> MasterFrameView<'a> {
 /// # Errors
 /// [`Error::BufferTooSmall`]
 #[inline]
-pub fn write_master_frame(output: &[u8], time_stamp: u16, into: &mut [u8]) -> Result<usize, Error> {
+pub fn emit_master_frame_into(output: &[u8], time_stamp: u16, into: &mut [u8]) -> Result<usize, Error> {
     write(Status::EXCHANGE, output, time_stamp, into)
 }
 
@@ -133,12 +133,16 @@ impl<const S: usize> MasterFrame<S> {
     /// Bytes from SA to the time stamp.
     pub const LEN: usize = S.saturating_add(MasterFrameView::OVERHEAD);
 
-    /// Checks as [`MasterFrameView::new`].
+    const fn view(&self) -> MasterFrameView<'_> {
+        MasterFrameView { status: self.status, output: &self.output, time_stamp: self.time_stamp }
+    }
+
+    /// Checks as [`MasterFrameView::parse`].
     ///
     /// # Errors
-    /// As [`MasterFrameView::new`].
+    /// As [`MasterFrameView::parse`].
     pub fn parse(bytes: &[u8]) -> Result<Self, Error> {
-        let view = MasterFrameView::new(S, bytes)?;
+        let view = MasterFrameView::parse(S, bytes)?;
         let want = count(Self::LEN);
         let output = view.output().first_chunk().ok_or(Error::Truncated { got: count(bytes.len()), want })?;
         Ok(Self { status: view.status(), output: *output, time_stamp: view.time_stamp() })
@@ -163,7 +167,8 @@ impl<const S: usize> MasterFrame<S> {
 ///
 /// The published firmware contradicts itself here: its comment and its send times describe this frame with p = 3,
 /// its code sends another one, see [`PublishedDeviceFrame`]. This crate takes the designed frame.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct DeviceFrameView<'a> {
     address: DeviceAddress,
     status: Status,
@@ -179,7 +184,7 @@ impl<'a> DeviceFrameView<'a> {
     /// # Errors
     /// [`Error::Truncated`], [`Error::TooLong`], [`Error::BadCrc8`], [`Error::WrongSource`]
     #[inline]
-    pub fn new(payload_len: usize, bytes: &'a [u8]) -> Result<Self, Error> {
+    pub fn parse(payload_len: usize, bytes: &'a [u8]) -> Result<Self, Error> {
         let want = payload_len.saturating_add(Self::OVERHEAD);
         if bytes.len() != want {
             return Err(wrong_length(bytes.len(), want));
@@ -223,12 +228,16 @@ impl<const P: usize> DeviceFrame<P> {
     /// Bytes from SA to the CRC.
     pub const LEN: usize = P.saturating_add(DeviceFrameView::OVERHEAD);
 
-    /// Checks as [`DeviceFrameView::new`].
+    const fn view(&self) -> DeviceFrameView<'_> {
+        DeviceFrameView { address: self.address, status: self.status, payload: &self.payload }
+    }
+
+    /// Checks as [`DeviceFrameView::parse`].
     ///
     /// # Errors
-    /// As [`DeviceFrameView::new`].
+    /// As [`DeviceFrameView::parse`].
     pub fn parse(bytes: &[u8]) -> Result<Self, Error> {
-        let view = DeviceFrameView::new(P, bytes)?;
+        let view = DeviceFrameView::parse(P, bytes)?;
         let want = count(Self::LEN);
         let payload = view.payload().first_chunk().ok_or(Error::Truncated { got: count(bytes.len()), want })?;
         Ok(Self { address: view.address(), status: view.status(), payload: *payload })
@@ -254,6 +263,7 @@ impl<const P: usize> DeviceFrame<P> {
 ///       address  LAST | ERROR  DRV8711 STATUS  0  unusable
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct PublishedDeviceFrame {
     /// Who sends it.
     pub address: DeviceAddress,
@@ -305,87 +315,45 @@ fn seal(frame: &mut [u8], source: u8, status: Status, data: &[u8]) {
     }
 }
 
-impl fmt::Display for MasterFrameView<'_> {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "master, {} output bytes at {}, STATUS {}", self.output.len(), self.time_stamp, self.status)
-    }
+servowire_core::one_line!(MasterFrameView<'_> {
+    Self { status, output, time_stamp } => "master, {} output bytes at {}, STATUS {}", output.len(), time_stamp, status;
+});
+servowire_core::one_line!(DeviceFrameView<'_> {
+    Self { address, status, payload } => "device {}, {}, STATUS {}", address, Hex(payload), status;
+});
+servowire_core::one_line!(PublishedDeviceFrame {
+    Self { address, status, drv8711_status } => "device {}, DRV8711 {:02X}h, STATUS {}", address, drv8711_status, status;
+});
+
+/// What there is for the views there is for values of any length too.
+macro_rules! as_view {
+    ($frame:ident) => {
+        impl<const N: usize> core::fmt::Display for $frame<N> {
+            fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+                self.view().fmt(f)
+            }
+        }
+
+        #[cfg(feature = "defmt")]
+        #[cfg_attr(docsrs, doc(cfg(feature = "defmt")))]
+        impl<const N: usize> defmt::Format for $frame<N> {
+            fn format(&self, f: defmt::Formatter<'_>) {
+                self.view().format(f);
+            }
+        }
+
+        #[cfg(feature = "serde")]
+        #[cfg_attr(docsrs, doc(cfg(feature = "serde")))]
+        impl<const N: usize> serde::Serialize for $frame<N> {
+            fn serialize<S: serde::Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+                self.view().serialize(serializer)
+            }
+        }
+    };
 }
 
-#[cfg(feature = "defmt")]
-#[cfg_attr(docsrs, doc(cfg(feature = "defmt")))]
-impl defmt::Format for MasterFrameView<'_> {
-    fn format(&self, f: defmt::Formatter<'_>) {
-        defmt::write!(
-            f,
-            "master, {=usize} output bytes at {=u16}, STATUS {}",
-            self.output.len(),
-            self.time_stamp,
-            self.status
-        );
-    }
-}
-
-impl<const S: usize> fmt::Display for MasterFrame<S> {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "master, {} output bytes at {}, STATUS {}", self.output.len(), self.time_stamp, self.status)
-    }
-}
-
-#[cfg(feature = "defmt")]
-#[cfg_attr(docsrs, doc(cfg(feature = "defmt")))]
-impl<const S: usize> defmt::Format for MasterFrame<S> {
-    fn format(&self, f: defmt::Formatter<'_>) {
-        defmt::write!(
-            f,
-            "master, {=usize} output bytes at {=u16}, STATUS {}",
-            self.output.len(),
-            self.time_stamp,
-            self.status
-        );
-    }
-}
-
-impl fmt::Display for DeviceFrameView<'_> {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "device {}, {:02X?}, STATUS {}", self.address, self.payload, self.status)
-    }
-}
-
-#[cfg(feature = "defmt")]
-#[cfg_attr(docsrs, doc(cfg(feature = "defmt")))]
-impl defmt::Format for DeviceFrameView<'_> {
-    fn format(&self, f: defmt::Formatter<'_>) {
-        defmt::write!(f, "device {}, {=[u8]:02X}, STATUS {}", self.address, self.payload, self.status);
-    }
-}
-
-impl<const P: usize> fmt::Display for DeviceFrame<P> {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "device {}, {:02X?}, STATUS {}", self.address, self.payload.as_slice(), self.status)
-    }
-}
-
-#[cfg(feature = "defmt")]
-#[cfg_attr(docsrs, doc(cfg(feature = "defmt")))]
-impl<const P: usize> defmt::Format for DeviceFrame<P> {
-    fn format(&self, f: defmt::Formatter<'_>) {
-        defmt::write!(f, "device {}, {=[u8]:02X}, STATUS {}", self.address, self.payload.as_slice(), self.status);
-    }
-}
-
-impl fmt::Display for PublishedDeviceFrame {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "device {}, DRV8711 {:02X}h, STATUS {}", self.address, self.drv8711_status, self.status)
-    }
-}
-
-#[cfg(feature = "defmt")]
-#[cfg_attr(docsrs, doc(cfg(feature = "defmt")))]
-impl defmt::Format for PublishedDeviceFrame {
-    fn format(&self, f: defmt::Formatter<'_>) {
-        defmt::write!(f, "device {}, DRV8711 {=u8:02X}h, STATUS {}", self.address, self.drv8711_status, self.status);
-    }
-}
+as_view!(MasterFrame);
+as_view!(DeviceFrame);
 
 #[cfg(test)]
 mod tests {
@@ -398,7 +366,7 @@ mod tests {
 
     fn master(output: &[u8], time_stamp: u16) -> Vec<u8> {
         let mut bytes = vec![0; output.len() + 5];
-        assert_eq!(write_master_frame(output, time_stamp, &mut bytes), Ok(output.len() + 5));
+        assert_eq!(emit_master_frame_into(output, time_stamp, &mut bytes), Ok(output.len() + 5));
         bytes
     }
 
@@ -408,7 +376,7 @@ mod tests {
         for bit in 0..21 * 8 {
             let mut bytes = good.clone();
             bytes[bit / 8] ^= 1 << (bit % 8);
-            let class = MasterFrameView::new(16, &bytes).map_err(Error::class);
+            let class = MasterFrameView::parse(16, &bytes).map_err(Error::class);
             if bit < 19 * 8 {
                 assert_eq!(class, Err(crate::error::ErrorClass::BadCrc8));
             } else {
@@ -422,11 +390,11 @@ mod tests {
         let good = master(&[1; 16], 0);
         for len in 0..21 {
             let error = Error::Truncated { got: len as u16, want: 21 };
-            assert_eq!(MasterFrameView::new(16, &good[..len]), Err(error));
+            assert_eq!(MasterFrameView::parse(16, &good[..len]), Err(error));
         }
         for output in 0..16 {
             let error = Error::TooLong { got: 21, want: output as u16 + 5 };
-            assert_eq!(MasterFrameView::new(output, &good), Err(error));
+            assert_eq!(MasterFrameView::parse(output, &good), Err(error));
         }
     }
 
@@ -434,8 +402,8 @@ mod tests {
     fn sources_are_told_apart() {
         for source in 0..=u8::MAX {
             let crc = crc8(&[source, 0]);
-            let device = DeviceFrameView::new(0, &[source, 0, crc]).map(|_| ());
-            let master = MasterFrameView::new(0, &[source, 0, crc, 0, 0]).map(|_| ());
+            let device = DeviceFrameView::parse(0, &[source, 0, crc]).map(|_| ());
+            let master = MasterFrameView::parse(0, &[source, 0, crc, 0, 0]).map(|_| ());
             let wrong = Err(Error::WrongSource { got: source });
             assert_eq!(device, if (1..=254).contains(&source) { Ok(()) } else { wrong });
             assert_eq!(master, if source == 0 { Ok(()) } else { wrong });
@@ -445,7 +413,7 @@ mod tests {
     #[test]
     fn a_slice_lies_in_the_output() {
         let bytes = master(&[10, 11, 12, 13], 0);
-        let view = MasterFrameView::new(4, &bytes).unwrap();
+        let view = MasterFrameView::parse(4, &bytes).unwrap();
         assert_eq!(view.slice(1, 2), Ok(&[11, 12][..]));
         assert_eq!(view.slice(4, 0), Ok(&[][..]));
         assert_eq!(view.slice(3, 2), Err(Error::OutsideOutput { offset: 3, len: 2 }));
@@ -458,7 +426,7 @@ mod tests {
             [(100, 90, 10), (90, 100, 10), (5, 65535, 6), (65535, 5, 6), (0, 0x8000, 0x8000)]
         {
             let bytes = master(&[], stamp);
-            let view = MasterFrameView::new(0, &bytes).unwrap();
+            let view = MasterFrameView::parse(0, &bytes).unwrap();
             assert_eq!(view.check_time_stamp(expected, window), Ok(()));
             let error = Error::ImplausibleTimeStamp { got: stamp, want: expected };
             assert_eq!(view.check_time_stamp(expected, window - 1), Err(error));
@@ -469,7 +437,7 @@ mod tests {
     fn a_small_buffer_is_refused_and_left_alone() {
         let mut bytes = [7; 20];
         let error = Err(Error::BufferTooSmall { got: 20, want: 21 });
-        assert_eq!(write_master_frame(&[0; 16], 0, &mut bytes), error);
+        assert_eq!(emit_master_frame_into(&[0; 16], 0, &mut bytes), error);
         assert_eq!(bytes, [7; 20]);
     }
 
@@ -491,7 +459,7 @@ mod tests {
             for bit in 0..48 {
                 let mut wrong = bytes;
                 wrong[bit / 8] ^= 1 << (bit % 8);
-                let class = DeviceFrameView::new(3, &wrong).map_err(Error::class);
+                let class = DeviceFrameView::parse(3, &wrong).map_err(Error::class);
                 prop_assert_eq!(class.err(), Some(crate::error::ErrorClass::BadCrc8));
             }
         }

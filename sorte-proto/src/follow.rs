@@ -4,14 +4,15 @@
 //! word of each [`Slice`], which the reference design leaves free, carries the position that the axis has after the step
 //! of this word, modulo 2^16. A device that missed a frame sees how far it is behind and catches up in cycles that have no
 //! step of their own; if it is too far behind it stops. The reserved bytes of its device frame tell the master how many
-//! steps it has made.
+//! steps it has ordered from its pulse generator: [`Evidence`](crate::Evidence) judges whether that may be used.
 //!
 //! ```text
-//!  Slice         byte 0..2  PTO             byte 2..4  position after it, LSB first
-//!  device frame  byte 0     DRV8711 STATUS  byte 1..3  position of the device, LSB first
+//!  Slice         byte 0..2  PTO             byte 2..4  steps asked for after it, LSB first
+//!  device frame  byte 0     DRV8711 STATUS  byte 1..3  steps ordered, LSB first
 //! ```
 //!
-//! Position counts up with DIR 0 and down with DIR 1.
+//! Both count up with DIR 0 and down with DIR 1, modulo 2^16. A device whose follower does not know yet where the axis is has to
+//! say so with ERROR, see [`Device::flag_error`](crate::device::Device::flag_error).
 //!
 //! ```
 //! use sorte_proto::follow::{Asked, Follower};
@@ -19,15 +20,16 @@
 //! let (mut axis, mut device) = (Asked::new(), Follower::new(128));
 //! let step = Pto::from_step(500, Direction::Low)?;
 //! let rest = Pto::default();
-//! device.next(Some(axis.slice(rest))); // both agree on the position
+//! device.next(Some(axis.slice(rest))); // both agree on where the axis is
 //! axis.slice(step); // this frame is lost
 //! device.next(None);
 //! assert_eq!(device.next(Some(axis.slice(rest))).start().map(|start| start.ns()), Some(1)); // caught up
-//! assert_eq!(axis.lag(device.position()), 0);
+//! assert_eq!(device.ordered().map(|ordered| axis.lag(ordered)), Some(0));
 //! # Ok::<(), sorte_proto::OutOfRange>(())
 //! ```
 
 use crate::drv8711::Status;
+use crate::evidence::Sample;
 use crate::payload::Slice;
 use crate::pto::{Direction, Pto, StartTime};
 
@@ -45,32 +47,40 @@ const fn step(word: Pto) -> i16 {
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Asked {
-    position: i64,
+    steps: i64,
 }
 
 impl Asked {
-    /// At 0.
+    /// Nothing yet.
     pub const fn new() -> Self {
-        Self { position: 0 }
+        Self { steps: 0 }
     }
 
-    /// The word with the position that it leads to.
+    /// The word with the steps asked for after it.
     pub const fn slice(&mut self, word: Pto) -> Slice {
-        self.position = self.position.saturating_add(step(word) as i64);
-        let [low, high, ..] = self.position.to_le_bytes();
-        Slice { pto: word, command: u16::from_le_bytes([low, high]) }
+        self.steps = self.steps.saturating_add(step(word) as i64);
+        Slice { pto: word, command: self.low() }
     }
 
     /// Steps asked for so far, backward ones negative.
-    pub const fn position(&self) -> i64 {
-        self.position
+    pub const fn asked(&self) -> i64 {
+        self.steps
     }
 
-    /// How many steps a device at `position` has still to make. Words that are on their way count too: two cycles with the
-    /// published timing.
-    pub const fn lag(&self, position: u16) -> i16 {
-        let [low, high, ..] = self.position.to_le_bytes();
-        difference(u16::from_le_bytes([low, high]), position)
+    const fn low(self) -> u16 {
+        let [low, high, ..] = self.steps.to_le_bytes();
+        u16::from_le_bytes([low, high])
+    }
+
+    /// How many steps a device that has ordered so many, modulo 2^16, has still to make. Words that are on their way count too:
+    /// two cycles with the published timing.
+    pub const fn lag(&self, ordered: u16) -> i16 {
+        difference(self.low(), ordered)
+    }
+
+    /// The position of a sample in all its bits, in steps: the one nearest to what was asked for.
+    pub const fn position(&self, sample: Sample) -> i64 {
+        self.steps.saturating_sub(self.lag(sample.position()) as i64)
     }
 }
 
@@ -79,12 +89,16 @@ const fn difference(to: u16, from: u16) -> i16 {
     i16::from_le_bytes(to.wrapping_sub(from).to_le_bytes())
 }
 
+const fn way(steps: i16) -> Direction {
+    if steps < 0 { Direction::High } else { Direction::Low }
+}
+
 /// The device's end.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Follower {
-    /// Steps ordered; unknown until the first word.
-    position: Option<u16>,
+    /// Unknown until the first word.
+    ordered: Option<u16>,
     asked: u16,
     direction: Direction,
     /// The cycle before had no pulse.
@@ -96,7 +110,7 @@ pub struct Follower {
 impl Follower {
     /// `max_lag`: steps behind the master beyond which the axis stops. 128 is half a full step at 1/256.
     pub const fn new(max_lag: u16) -> Self {
-        Self { position: None, asked: 0, direction: Direction::Low, quiet: false, stopped: false, max_lag }
+        Self { ordered: None, asked: 0, direction: Direction::Low, quiet: false, stopped: false, max_lag }
     }
 
     /// What the axis does in the next cycle. `slice`: the device's bytes of a good frame; `None` if none came. The first
@@ -104,7 +118,7 @@ impl Follower {
     pub fn next(&mut self, slice: Option<Slice>) -> Pto {
         let word = self.word(slice);
         self.quiet = word.start().is_none();
-        self.position = self.position.map(|position| position.wrapping_add_signed(step(word)));
+        self.ordered = self.ordered.map(|ordered| ordered.wrapping_add_signed(step(word)));
         word
     }
 
@@ -115,8 +129,8 @@ impl Follower {
         };
         self.direction = pto.direction().unwrap_or(self.direction);
         self.asked = command;
-        let position = *self.position.get_or_insert(command.wrapping_add_signed(step(pto).wrapping_neg()));
-        let lag = difference(command, position);
+        let ordered = *self.ordered.get_or_insert(command.wrapping_add_signed(step(pto).wrapping_neg()));
+        let lag = difference(command, ordered);
         self.stopped |= lag.unsigned_abs() > self.max_lag;
         let rest = Pto::NoPulse { direction: self.direction };
         match pto {
@@ -127,23 +141,22 @@ impl Follower {
             Pto::Pulse { .. } => rest,
             // A pulse at the start of this cycle is 4 us and more after any of the cycle before the last, and 4 us and
             // more before any of the next.
-            _ if lag != 0 && self.quiet => Pto::Pulse { start: StartTime::MIN, direction: (lag < 0).into() },
+            _ if lag != 0 && self.quiet => Pto::Pulse { start: StartTime::MIN, direction: way(lag) },
             _ => rest,
         }
     }
 
-    /// Steps made, modulo 2^16: what the device tells the master.
-    pub const fn position(&self) -> u16 {
-        match self.position {
-            Some(position) => position,
-            None => 0,
-        }
+    /// Steps ordered from the pulse generator, modulo 2^16: what the device tells the master. `None` before the first word and
+    /// after [`resume`](Self::resume): nobody knows where the axis is, and the device's frame has to carry ERROR, see
+    /// [`Device::flag_error`](crate::device::Device::flag_error).
+    pub const fn ordered(&self) -> Option<u16> {
+        self.ordered
     }
 
     /// Steps that are missing, as far as the last good frame told.
     pub const fn lag(&self) -> i16 {
-        match self.position {
-            Some(position) => difference(self.asked, position),
+        match self.ordered {
+            Some(ordered) => difference(self.asked, ordered),
             None => 0,
         }
     }
@@ -155,42 +168,38 @@ impl Follower {
 
     /// The host has dealt with the loss: the next word tells anew where the axis is.
     pub const fn resume(&mut self) {
-        (self.stopped, self.position) = (false, None);
+        (self.stopped, self.ordered) = (false, None);
     }
 }
 
-/// Payload of a device frame: status of the driver, and the device's position.
+/// A device's payload in its frame: status of the driver, and the steps that it has ordered.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub struct Feedback {
+#[cfg_attr(feature = "arbitrary", derive(arbitrary::Arbitrary))]
+pub struct InputSlice {
     /// The driver's STATUS.
-    pub status: Status,
-    /// Steps made, modulo 2^16. The reference design sends 0.
-    pub position: u16,
+    pub driver: Status,
+    /// [`Follower::ordered`]. The reference design sends 0, and nothing in the frame says which of the two it is.
+    pub ordered: u16,
 }
 
-impl Feedback {
+impl InputSlice {
     /// Length in bytes.
     pub const LEN: usize = 3;
 
-    /// Any three bytes are a feedback.
-    pub const fn parse([status, low, high]: [u8; Self::LEN]) -> Self {
-        Self { status: Status::from_bits_retain(status), position: u16::from_le_bytes([low, high]) }
+    /// Any three bytes are a payload.
+    pub const fn parse([driver, low, high]: [u8; Self::LEN]) -> Self {
+        Self { driver: Status::from_bits_retain(driver), ordered: u16::from_le_bytes([low, high]) }
     }
 
     /// The bytes in wire order.
     pub const fn emit(self) -> [u8; Self::LEN] {
-        let [low, high] = self.position.to_le_bytes();
-        [self.status.bits(), low, high]
+        let [low, high] = self.ordered.to_le_bytes();
+        [self.driver.bits(), low, high]
     }
 }
 
-impl core::fmt::Display for Feedback {
-    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
-        write!(f, "position {}, DRV8711 {}", self.position, self.status)
-    }
-}
+servowire_core::one_line!(InputSlice { Self { driver, ordered } => "{} steps ordered, DRV8711 {}", ordered, driver; });
 
 #[cfg(test)]
 #[allow(clippy::cast_sign_loss)]
@@ -214,7 +223,7 @@ mod tests {
         for n in (0..=u16::MAX).step_by(crate::stride(997)) {
             let [low, high] = n.to_le_bytes();
             let bytes = [high ^ low, low, high];
-            assert_eq!(Feedback::parse(bytes).emit(), bytes);
+            assert_eq!(InputSlice::parse(bytes).emit(), bytes);
         }
     }
 
@@ -233,17 +242,18 @@ mod tests {
             assert_eq!(device.next(Some(asked.slice(word(3)))), word(3));
             assert!(device.is_stopped());
         }
-        assert_eq!((device.position(), asked.position()), (1, 7));
+        assert_eq!((device.ordered(), asked.asked()), (Some(1), 7));
         device.resume();
+        assert_eq!((device.ordered(), device.lag()), (None, 0), "nobody knows where it is");
         device.next(Some(asked.slice(word(3))));
-        assert_eq!((device.position(), device.lag(), device.is_stopped()), (7, 0, false));
+        assert_eq!((device.ordered(), device.lag(), device.is_stopped()), (Some(7), 0, false));
     }
 
     proptest! {
         /// Whatever is lost: nothing is made twice, steps stay 4 us apart, and after some rest all are made.
         #[test]
         fn every_step_is_made_in_the_end(cycles in proptest::collection::vec((0u8..6, any::<bool>()), 0..200), start: u16) {
-            let mut asked = Asked { position: start.into() };
+            let mut asked = Asked { steps: start.into() };
             let mut device = Follower::new(300);
             let mut made = i64::from(start);
             let mut rises: Vec<u64> = Vec::new();
@@ -255,10 +265,10 @@ mod tests {
                 let done = device.next((!lost).then_some(slice));
                 made += i64::from(step(done));
                 rises.extend(done.start().map(|s| cycle as u64 * 4000 + u64::from(s.ns())));
-                prop_assert_eq!(device.position(), made as u16);
-                prop_assert!(lost || device.lag() == difference(asked.position as u16, made as u16));
+                prop_assert_eq!(device.ordered(), Some(made as u16));
+                prop_assert!(lost || device.lag() == difference(asked.steps as u16, made as u16));
             }
-            prop_assert_eq!((made, device.lag(), device.is_stopped()), (asked.position(), 0, false));
+            prop_assert_eq!((made, device.lag(), device.is_stopped()), (asked.asked(), 0, false));
             // The words themselves may follow a 3990 with a 1000; a step that is caught up never comes too close.
             prop_assert!(rises.windows(2).all(|pair| pair[1] - pair[0] >= 4000 || pair[0] % 4000 == 3990));
         }
@@ -269,7 +279,7 @@ mod tests {
             for kind in kinds {
                 let pto = word(kind);
                 prop_assert_eq!(device.next(Some(asked.slice(pto))), pto);
-                prop_assert_eq!(asked.lag(device.position()), 0);
+                prop_assert_eq!(device.ordered().map(|ordered| asked.lag(ordered)), Some(0));
             }
         }
     }

@@ -1,7 +1,5 @@
 //! What all long-header frames share: everything but the IO exchange.
 
-use core::fmt;
-
 use crate::crc::fcs;
 use crate::error::Error;
 use crate::frame_type::FrameType;
@@ -19,7 +17,8 @@ pub const MULTICAST: u8 = 255;
 /// ```
 ///
 /// Frames of the types [`Out`](FrameType::Out) to [`Recon`](FrameType::Recon) have an opaque payload.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct LongFrame<'a> {
     source: u8,
     frame_type: FrameType,
@@ -37,7 +36,7 @@ impl<'a> LongFrame<'a> {
     /// # Errors
     /// [`Error::Truncated`], [`Error::BadFcs`], [`Error::WrongDestination`], [`Error::UnknownType`],
     /// [`Error::Truncated`] or [`Error::TooLong`] for the type
-    pub fn new(bytes: &'a [u8]) -> Result<Self, Error> {
+    pub fn parse(bytes: &'a [u8]) -> Result<Self, Error> {
         let (Some((body, trailer)), &[da, source, code, status, ..]) = (bytes.split_last_chunk(), bytes) else {
             return Err(truncated(bytes.len()));
         };
@@ -45,6 +44,13 @@ impl<'a> LongFrame<'a> {
         let frame_type = check(bytes.len(), [da, source, code, status], got, want)?;
         let payload = body.get(4..).unwrap_or_default();
         Ok(Self { source, frame_type, status: Status::from_bits_retain(status), payload, fcs: got })
+    }
+
+    /// A frame whose FCS was taken off, with the one that belongs there; for tools.
+    pub(crate) fn without_fcs(body: &'a [u8]) -> Option<Self> {
+        let &[_, source, code, status, ref payload @ ..] = body else { return None };
+        let frame_type = FrameType::from_code(code)?;
+        Some(Self { source, frame_type, status: Status::from_bits_retain(status), payload, fcs: fcs(body) })
     }
 
     /// SA: 0 in everything that the published firmware sends.
@@ -78,20 +84,6 @@ impl<'a> LongFrame<'a> {
             Some(payload) if self.frame_type == want => Ok(payload),
             _ => Err(Error::UnexpectedType { got: self.frame_type.code(), want: want.code() }),
         }
-    }
-}
-
-impl fmt::Display for LongFrame<'_> {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{}, {} bytes, STATUS {}", self.frame_type, self.payload.len(), self.status)
-    }
-}
-
-#[cfg(feature = "defmt")]
-#[cfg_attr(docsrs, doc(cfg(feature = "defmt")))]
-impl defmt::Format for LongFrame<'_> {
-    fn format(&self, f: defmt::Formatter<'_>) {
-        defmt::write!(f, "{=str}, {=usize} bytes, STATUS {}", self.frame_type.name(), self.payload.len(), self.status);
     }
 }
 
@@ -149,6 +141,10 @@ pub(crate) fn count(len: usize) -> u16 {
     u16::try_from(len).unwrap_or(u16::MAX)
 }
 
+servowire_core::one_line!(LongFrame<'_> {
+    Self { frame_type, payload, status, .. } => "{}, {} bytes, STATUS {}", frame_type, payload.len(), status;
+});
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -156,7 +152,7 @@ mod tests {
     #[test]
     fn a_type_without_layout_has_an_opaque_payload() {
         let bytes: [u8; 13] = emit(7, FrameType::Alarm, Status::from_bits_retain(0x85), &[1, 2, 3, 4, 5]);
-        let frame = LongFrame::new(&bytes).unwrap();
+        let frame = LongFrame::parse(&bytes).unwrap();
         assert_eq!(
             (frame.source(), frame.frame_type(), frame.status()),
             (7, FrameType::Alarm, Status::from_bits_retain(0x85))
@@ -167,17 +163,17 @@ mod tests {
     #[test]
     fn the_checks_come_in_their_order() {
         let mut bytes: [u8; 9] = emit(0, FrameType::DelayReq, Status::DELAY_REQ, &[0]);
-        assert_eq!(LongFrame::new(&bytes), Err(Error::TooLong { got: 9, want: 8 }));
+        assert_eq!(LongFrame::parse(&bytes), Err(Error::TooLong { got: 9, want: 8 }));
         bytes[2] = 11;
         refresh_fcs(&mut bytes);
-        assert_eq!(LongFrame::new(&bytes), Err(Error::UnknownType { got: 11 }));
+        assert_eq!(LongFrame::parse(&bytes), Err(Error::UnknownType { got: 11 }));
         bytes[0] = 1;
         refresh_fcs(&mut bytes);
-        assert_eq!(LongFrame::new(&bytes), Err(Error::WrongDestination { got: 1 }));
+        assert_eq!(LongFrame::parse(&bytes), Err(Error::WrongDestination { got: 1 }));
         bytes[8] ^= 1;
-        assert!(matches!(LongFrame::new(&bytes), Err(Error::BadFcs { .. })));
+        assert!(matches!(LongFrame::parse(&bytes), Err(Error::BadFcs { .. })));
         for len in 0..8 {
-            assert_eq!(LongFrame::new(&bytes[..len]), Err(Error::Truncated { got: len as u16, want: 8 }));
+            assert_eq!(LongFrame::parse(&bytes[..len]), Err(Error::Truncated { got: len as u16, want: 8 }));
         }
     }
 }

@@ -22,10 +22,10 @@ use crate::master;
 use crate::param::Parameters;
 use crate::preamble::Preamble;
 
-/// A place in the memory.
+/// A stretch of the memory.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub struct Place {
+pub struct Region {
     /// What is there.
     pub name: &'static str,
     /// First byte.
@@ -34,8 +34,8 @@ pub struct Place {
     pub len: Option<u16>,
 }
 
-const fn place(name: &'static str, offset: u16, len: u16) -> Place {
-    Place { name, offset, len: if len == 0 { None } else { Some(len) } }
+const fn region(name: &'static str, offset: u16, len: u16) -> Region {
+    Region { name, offset, len: if len == 0 { None } else { Some(len) } }
 }
 
 /// DISCOVERY, after the preamble of 8 bytes with which it is stored.
@@ -44,47 +44,47 @@ const _: () =
     assert!(ANSWER == 0x200 + Preamble::Long.bytes().len() && Discovery::LEN == 1030 && Parameters::LEN == 32);
 
 /// The master's data RAM.
-pub const MASTER: [Place; 18] = [
-    place("control", 0x000, 4),
-    place("status", 0x004, 4),
-    place("control parameter", 0x008, 4),
-    place("version", 0x00c, 4),
-    place("port counters: cycles, CRC, timing, format", 0x050, 0),
-    place("retrain counter", 0x070, 0),
-    place("buttons", 0x0c0, 4),
-    place("faders", 0x0c4, 4),
-    place("speed", 0x0c8, 0),
-    place("fstep", 0x0e0, 4),
-    place("step time", 0x0e4, 4),
-    place("pause", 0x0e8, 0),
-    place("CRC-8 table", 0x100, 256),
-    place("discovery answer with preamble", 0x200, 1038),
-    place("output image", 0x700, 0),
-    place("input image", 0x800, 32),
-    place("sin2 table, 32 entries", 0x900, 0),
-    place("acceleration table", 0xa00, 0),
+pub const MASTER: [Region; 18] = [
+    region("control", 0x000, 4),
+    region("status", 0x004, 4),
+    region("control parameter", 0x008, 4),
+    region("version", 0x00c, 4),
+    region("port counters: cycles, CRC, timing, format", 0x050, 0),
+    region("retrain counter", 0x070, 0),
+    region("buttons", 0x0c0, 4),
+    region("faders", 0x0c4, 4),
+    region("speed", 0x0c8, 0),
+    region("fstep", 0x0e0, 4),
+    region("step time", 0x0e4, 4),
+    region("pause", 0x0e8, 0),
+    region("CRC-8 table", 0x100, 256),
+    region("discovery answer with preamble", 0x200, 1038),
+    region("output image", 0x700, 0),
+    region("input image", 0x800, 32),
+    region("sin2 table, 32 entries", 0x900, 0),
+    region("acceleration table", 0xa00, 0),
 ];
 
 /// A device's shared RAM.
-pub const DEVICE: [Place; 18] = [
-    place("delay sum", 0x08, 4),
-    place("line delay to the next device", 0x0c, 2),
-    place("accumulated delay", 0x0e, 2),
-    place("time stamp of SYNC", 0x10, 4),
-    place("receive time of SYNC", 0x14, 4),
-    place("reference of the IO exchange", 0x18, 4),
-    place("address", 0x24, 2),
-    place("frame received", 0x26, 2),
-    place("missed frames", 0x28, 2),
-    place("CRC errors of port 0", 0x50, 2),
-    place("CRC errors of port 1", 0x52, 2),
-    place("good frames of port 0", 0x54, 2),
-    place("good frames of port 1", 0x56, 2),
-    place("retrains", 0x58, 2),
-    place("DRV8711 STATUS", 0x5a, 2),
-    place("input buffer", 0x60, 16),
-    place("output slice", 0x70, 0),
-    place("parameters of PARAM", 0x100, 32),
+pub const DEVICE: [Region; 18] = [
+    region("delay sum", 0x08, 4),
+    region("line delay to the next device", 0x0c, 2),
+    region("accumulated delay", 0x0e, 2),
+    region("time stamp of SYNC", 0x10, 4),
+    region("receive time of SYNC", 0x14, 4),
+    region("reference of the IO exchange", 0x18, 4),
+    region("address", 0x24, 2),
+    region("frame received", 0x26, 2),
+    region("missed frames", 0x28, 2),
+    region("CRC errors of port 0", 0x50, 2),
+    region("CRC errors of port 1", 0x52, 2),
+    region("good frames of port 0", 0x54, 2),
+    region("good frames of port 1", 0x56, 2),
+    region("retrains", 0x58, 2),
+    region("DRV8711 STATUS", 0x5a, 2),
+    region("input buffer", 0x60, 16),
+    region("output slice", 0x70, 0),
+    region("parameters of PARAM", 0x100, 32),
 ];
 
 fn bytes<const N: usize>(ram: &[u8], offset: usize) -> Option<[u8; N]> {
@@ -146,10 +146,10 @@ impl<'a> MasterMemory<'a> {
     /// The answer to DISCOVERY.
     ///
     /// # Errors
-    /// [`Error::Truncated`] if the memory ends before it; as [`DiscoveryView::new`].
+    /// [`Error::Truncated`] if the memory ends before it; as [`DiscoveryView::parse`].
     pub fn discovery(self) -> Result<DiscoveryView<'a>, Error> {
         let image = self.0.get(ANSWER..).unwrap_or_default();
-        DiscoveryView::new(image.get(..Discovery::LEN).unwrap_or(image))
+        DiscoveryView::parse(image.get(..Discovery::LEN).unwrap_or(image))
     }
 
     /// Output image, as many bytes as the caller knows the line to have.
@@ -161,6 +161,17 @@ impl<'a> MasterMemory<'a> {
     pub fn input(self) -> Option<&'a [u8; 32]> {
         self.0.get(0x800..)?.first_chunk()
     }
+}
+
+/// Times of a SYNC frame as a device stores them.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct SyncTimes {
+    /// The time stamp in the frame, in ns.
+    pub time_stamp_ns: u32,
+    /// The device's counter at the start of the frame, in ns.
+    pub sof_ns: u32,
 }
 
 /// A device's shared RAM, or the front of it. What lies beyond its end is `None`.
@@ -183,9 +194,9 @@ impl<'a> DeviceMemory<'a> {
         half(self.0, 0x0e)
     }
 
-    /// Time stamp of the last SYNC frame, and the own counter at its start, in ns.
-    pub fn last_sync_ns(self) -> Option<(u32, u32)> {
-        Some((word(self.0, 0x10)?, word(self.0, 0x14)?))
+    /// Times of the last SYNC frame.
+    pub fn last_sync(self) -> Option<SyncTimes> {
+        Some(SyncTimes { time_stamp_ns: word(self.0, 0x10)?, sof_ns: word(self.0, 0x14)? })
     }
 
     /// The master's time at the start of the last master frame, seen here, in ns.
@@ -238,6 +249,8 @@ mod tests {
     use super::*;
     use crate::discovery::Entry;
     use crate::error::ErrorClass;
+    use crate::place::Place;
+    use crate::status::Status;
 
     #[test]
     fn places_follow_each_other_without_overlap() {
@@ -254,9 +267,9 @@ mod tests {
     fn the_master_shows_its_state_and_the_line() {
         let mut ram = std::vec![0_u8; 0x1000];
         ram[0x000..0x010].copy_from_slice(&[0x41, 0, 0, 0, 0x0d, 0, 0, 0, 0x03, 0x03, 0, 0, 0x78, 0x56, 0x34, 0x12]);
-        let mut answer = Discovery::request(true);
+        let mut answer = Discovery::request(Place::Last);
         for last in [false, false, true] {
-            answer.pass(Entry::STOCK, last, false).unwrap();
+            answer.pass(Entry::STOCK, Status::of_device(last, false)).unwrap();
         }
         ram[0x200..0x208].copy_from_slice(&[0x55, 0x55, 0x55, 0x55, 0x55, 0x55, 0x55, 0xd5]);
         ram[0x208..0x60e].copy_from_slice(&answer.emit());
@@ -288,7 +301,7 @@ mod tests {
         ram[0x24] = 7;
         let host = DeviceMemory::new(&ram);
         assert_eq!((host.line_delay_next_ns(), host.delay_ns()), (Some(0x0d0c), Some(0x0f0e)));
-        assert_eq!(host.last_sync_ns(), Some((0x1312_1110, 0x1716_1514)));
+        assert_eq!(host.last_sync(), Some(SyncTimes { time_stamp_ns: 0x1312_1110, sof_ns: 0x1716_1514 }));
         assert_eq!((host.reference_ns(), host.missed_frames()), (Some(0x1b1a_1918), Some(0x2928)));
         assert_eq!((host.crc_errors(), host.good_frames()), (Some([0x5150, 0x5352]), Some([0x5554, 0x5756])));
         assert_eq!((host.retrains(), host.driver().map(|status| status.bits())), (Some(0x5958), Some(0x5a)));

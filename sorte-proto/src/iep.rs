@@ -21,7 +21,7 @@ use core::hash::{Hash, Hasher};
 
 use crate::pins::{Levels, Pins};
 use crate::pto::{Pto, StartTime};
-use crate::sync0::{Flags, PULSE_NS, Register, Sync0, Variant, Write, Writes};
+use crate::sync0::{PULSE_NS, Register, Sync0, Variant, Write, Writes};
 
 /// One tick of the counter in ns.
 pub const TICK_NS: u64 = 5;
@@ -34,13 +34,17 @@ const NEVER: u64 = u64::MAX;
 
 /// A change of the SYNC0 output.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Edge {
     /// When, in ns since the start.
     pub ns: u64,
     /// To which level.
     pub high: bool,
 }
+
+servowire_core::one_line!(Edge {
+    Self { ns, high: true } => "rises at {} ns", ns;
+    Self { ns, high: false } => "falls at {} ns", ns;
+});
 
 /// Events that wait for the handler.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
@@ -68,10 +72,10 @@ pub struct Served {
     pub levels: Option<Levels>,
 }
 
-/// What happens next.
+/// What changes next.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub enum Happening {
+pub enum Activity {
     /// SYNC0 changes.
     Edge(Edge),
     /// The handler has run.
@@ -237,14 +241,14 @@ impl Channel {
     /// The next edge before `until_ns`.
     pub fn next_edge(&mut self, until_ns: u64) -> Option<Edge> {
         loop {
-            if let Happening::Edge(edge) = self.next(until_ns)? {
+            if let Activity::Edge(edge) = self.next(until_ns)? {
                 return Some(edge);
             }
         }
     }
 
     /// The next edge or run of the handler before `until_ns`.
-    pub fn next(&mut self, until_ns: u64) -> Option<Happening> {
+    pub fn next(&mut self, until_ns: u64) -> Option<Activity> {
         loop {
             let compare = self.cmp0.min(self.cmp1).min(self.cmp6).min(self.cmp7);
             let edge = self.rise.min(self.fall);
@@ -258,7 +262,7 @@ impl Channel {
             } else if self.write == at {
                 self.write_queued();
             } else if edge == at {
-                return Some(Happening::Edge(self.edge()));
+                return Some(Activity::Edge(self.edge()));
             } else {
                 return Some(self.run_handler());
             }
@@ -309,7 +313,7 @@ impl Channel {
     }
 
     /// A cut pulse falls right after the handler, in the same tick.
-    fn run_handler(&mut self) -> Happening {
+    fn run_handler(&mut self) -> Activity {
         let events = core::mem::take(&mut self.pending);
         self.serve = NEVER;
         let (mut writes, mut levels) = ([None; 3], None);
@@ -322,12 +326,11 @@ impl Channel {
             *zero = Some(self.sync0.cmp0());
         }
         if events.cmp7 {
-            let pending = self.sync0.flags().contains(Flags::PENDING_PULSE);
-            levels = self.pins.cmp7(self.word, pending).or(levels);
+            levels = self.pins.cmp7(self.word, self.sync0.flags()).or(levels);
             *seven = Some(self.sync0.cmp7(self.word.start()));
         }
         self.write_all(writes.map(|writes| writes.unwrap_or(Writes::NONE)));
-        Happening::Served(Served { ns: self.now.saturating_mul(TICK_NS), events, writes, levels })
+        Activity::Served(Served { ns: self.now.saturating_mul(TICK_NS), events, writes, levels })
     }
 
     /// At once, or one after the other. The handler never runs while writes of the run before are still to be made.

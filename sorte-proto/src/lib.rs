@@ -22,17 +22,22 @@ pub mod device;
 mod discovery;
 pub mod drv8711;
 mod error;
+mod evidence;
 mod exchange;
 pub mod follow;
 mod frame;
 mod frame_type;
+mod hex;
 pub mod host;
 pub mod iep;
+pub mod inspect;
 mod line_delay;
+mod link;
 pub mod master;
 mod param;
 mod payload;
 pub mod pins;
+mod place;
 mod preamble;
 mod pto;
 mod status;
@@ -47,17 +52,20 @@ pub use address::DeviceAddress;
 pub use clock::{AVERAGE, Clock, Correction, WRITE_DELAY_NS};
 pub use crc::{crc8, crc8_update, fcs};
 pub use delay_req::DelayReq;
-pub use discovery::{Assignment, Discovery, DiscoveryView, Entry, MAX_DEVICES, Network};
+pub use discovery::{Assignment, Discovery, DiscoveryView, Entry, MAX_DEVICES, Member, Network};
 pub use error::{Error, ErrorClass};
+pub use evidence::{Doubt, Evidence, EvidenceCell, Policy, Positions, Sample, Tolerated};
 pub use exchange::{
     DeviceFrame, DeviceFrameView, MasterFrame, MasterFrameView, PublishedDeviceFrame, STOCK_INPUT, STOCK_OUTPUT,
-    write_master_frame,
+    emit_master_frame_into,
 };
 pub use frame::{LongFrame, MULTICAST};
 pub use frame_type::FrameType;
-pub use line_delay::{DelayModel, LineDelay, SAMPLES};
+pub use line_delay::{DelayModel, LineDelay, RoundTrips, SAMPLES};
+pub use link::Link;
 pub use param::{CrcKind, CrcMode, Param, ParamView, Parameters, Topology};
 pub use payload::{MotorMask, Payload, Slice};
+pub use place::Place;
 pub use preamble::{Preamble, strip_preamble};
 pub use pto::{Direction, Pto, Reserved, StartTime};
 pub use status::Status;

@@ -26,6 +26,17 @@ impl DelayModel {
     pub const DEVICE: Self = Self { forward_ns: 360, shift_samples: true };
 }
 
+/// How far round trips lie apart.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct RoundTrips {
+    /// The shortest, in ns.
+    pub shortest_ns: u32,
+    /// The longest, in ns.
+    pub longest_ns: u32,
+}
+
 /// Line delay from round trips.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -66,9 +77,9 @@ impl LineDelay {
         self.count >= SAMPLES
     }
 
-    /// Shortest and longest round trip in ns.
-    pub const fn extremes(&self) -> Option<(u32, u32)> {
-        if self.count == 0 { None } else { Some((self.min, self.max)) }
+    /// Shortest and longest round trip.
+    pub const fn extremes(&self) -> Option<RoundTrips> {
+        if self.count == 0 { None } else { Some(RoundTrips { shortest_ns: self.min, longest_ns: self.max }) }
     }
 
     /// Mean round trip in ns as the published registers hold it, modulo 2^16 (master: 2^12).
@@ -136,7 +147,7 @@ mod tests {
         let before = delay;
         delay.add(4000);
         assert_eq!(delay, before);
-        assert_eq!((delay.count(), delay.extremes()), (16, Some((500, 500))));
+        assert_eq!((delay.count(), delay.extremes()), (16, Some(RoundTrips { shortest_ns: 500, longest_ns: 500 })));
     }
 
     proptest! {

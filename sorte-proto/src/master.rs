@@ -1,6 +1,6 @@
 //! The controller's side: the start-up sequence, then the IO exchange.
 //!
-//! Sans-IO. [`Master::poll`] says what to send and when; [`Master::receive`] takes what comes back. Every wait ends:
+//! Sans-IO. [`Master::poll`] says what to send and when; [`Master::hear`] takes what comes back. Every wait ends:
 //! an answer that does not come, devices that fall silent or a line that changes take the master back to IDLE with an
 //! [`Action::Restart`] that says why, and after a pause it starts again. (The published master waits for ever.)
 //!
@@ -15,17 +15,19 @@ mod config;
 mod cycle;
 
 pub use action::{Action, Outgoing};
+pub use answers::Heard;
 pub use config::{Config, Counters, State};
 use cycle::Cycle;
 
 use crate::delay_req::DelayReq;
 use crate::discovery::Network;
 use crate::error::Error;
-use crate::exchange::{DeviceFrameView, write_master_frame};
+use crate::exchange::emit_master_frame_into;
 use crate::frame_type::FrameType;
 use crate::line_delay::{LineDelay, SAMPLES};
+use crate::link::Link;
 use crate::param::{Param, Parameters};
-use crate::status::Status;
+use crate::place::Place;
 use crate::sync::Sync;
 use crate::timing::TRIGGER_NS;
 
@@ -40,7 +42,7 @@ const LOOK_NS: u64 = 5000;
 pub struct Master {
     config: Config,
     state: State,
-    link: bool,
+    link: Link,
     enabled: bool,
     counters: Counters,
     network: Network,
@@ -75,7 +77,7 @@ impl Master {
         Self {
             config,
             state: State::Idle,
-            link: false,
+            link: Link::Down,
             enabled: true,
             counters: Counters {
                 cycles: 0,
@@ -135,20 +137,22 @@ impl Master {
         self.network.output_total().max(self.config.min_output_len)
     }
 
-    /// The link is up or down. Losing it ends whatever is going on.
-    pub fn link(&mut self, up: bool) {
-        if !up && !matches!(self.state, State::Idle | State::Error) {
+    /// The link has come or gone. Losing it ends whatever is going on.
+    pub fn set_link(&mut self, link: Link) {
+        if link == Link::Down && !matches!(self.state, State::Idle | State::Error) {
             self.fail(Error::LinkDown);
         }
-        self.link = up;
+        self.link = link;
     }
 
-    /// The host's enable bit. Taking it away ends whatever is going on.
-    pub fn enable(&mut self, enabled: bool) {
-        if !enabled {
-            (self.state, self.failures, self.stopping) = (State::Idle, 0, None);
-        }
-        self.enabled = enabled;
+    /// The host sets the enable bit, which is set from the beginning.
+    pub const fn enable(&mut self) {
+        self.enabled = true;
+    }
+
+    /// The host takes the enable bit away: whatever is going on ends.
+    pub const fn disable(&mut self) {
+        (self.state, self.failures, self.stopping, self.enabled) = (State::Idle, 0, None, false);
     }
 
     /// Back to IDLE; [`poll`](Self::poll) reports why.
@@ -197,7 +201,7 @@ impl Master {
             return Action::Restart { error };
         }
         if self.state == State::Idle {
-            if !(self.link && self.enabled) {
+            if self.link == Link::Down || !self.enabled {
                 return Action::Wait { until_ns: u64::MAX };
             }
             if now_ns >= self.next_ns {
@@ -256,15 +260,15 @@ impl Master {
         Action::Send { at_ns, frame }
     }
 
-    fn is_last(&self, frames: u16) -> bool {
-        self.frame.saturating_add(1) >= frames
+    const fn place(&self, frames: u16) -> Place {
+        Place::of(self.frame, frames)
     }
 
     fn discovery(&mut self, now_ns: u64) -> Action {
         let frames = self.config.discovery_frames;
         if self.frame < frames {
-            let last = self.is_last(frames);
-            return self.send(now_ns, Outgoing::Discovery { last }, self.config.frame_period_ns);
+            let place = self.place(frames);
+            return self.send(now_ns, Outgoing::Discovery { place }, self.config.frame_period_ns);
         }
         let (got, want) = (self.network.devices(), self.config.min_devices.max(1));
         if !self.answered {
@@ -282,7 +286,8 @@ impl Master {
             self.enter(State::LineDelay, now_ns);
         } else if self.unanswered < self.config.param_tries {
             self.unanswered = self.unanswered.saturating_add(1);
-            let frame = Param::request(self.parameters(), self.remaining == 1);
+            let place = if self.remaining == 1 { Place::Last } else { Place::Inner };
+            let frame = Param::request(self.parameters(), place);
             return self.send(now_ns, Outgoing::Param(frame), self.config.frame_period_ns);
         } else {
             self.fail(Error::NoAnswer { sent: FrameType::Param, frame: self.frame.saturating_sub(1) });
@@ -298,8 +303,7 @@ impl Master {
 
     fn delay(&mut self, now_ns: u64) -> Action {
         if !self.line.is_complete() {
-            let last = self.is_last(SAMPLES.into());
-            let request = Outgoing::DelayReq(DelayReq::of_master(last));
+            let request = Outgoing::DelayReq(DelayReq::of_master(self.place(SAMPLES.into())));
             return self.send(now_ns, request, self.config.frame_period_ns);
         }
         match self.line.checked() {
@@ -331,10 +335,10 @@ impl Master {
         let frames = self.config.sync_frames;
         if self.frame < frames {
             self.catch_up(now_ns, self.config.sync_period_ns);
-            let (line, last) = (self.line.checked().unwrap_or_default(), self.is_last(frames));
-            let frame = Sync::of_master(self.time_ns(self.next_ns), line, last);
+            let (line, place) = (self.line.checked().unwrap_or_default(), self.place(frames));
+            let frame = Sync::of_master(self.time_ns(self.next_ns), line, place);
             self.sync_stamp_ns = frame.time_stamp_ns;
-            let gap = if last { LOOK_NS } else { self.config.sync_period_ns.into() };
+            let gap = if place == Place::Last { LOOK_NS } else { self.config.sync_period_ns.into() };
             return self.send(now_ns, Outgoing::Sync(frame), gap);
         }
         if !self.answered {
@@ -412,41 +416,11 @@ impl Master {
     ///
     /// # Errors
     /// [`Error::OutputLength`] if `output` has not [`output_len`](Self::output_len) bytes; [`Error::BufferTooSmall`].
-    pub fn write_frame(&self, output: &[u8], time_stamp: u16, into: &mut [u8]) -> Result<usize, Error> {
+    pub fn emit_into(&self, output: &[u8], time_stamp: u16, into: &mut [u8]) -> Result<usize, Error> {
         let (got, want) = (u16::try_from(output.len()).unwrap_or(u16::MAX), self.output_len());
         if got != want {
             return Err(Error::OutputLength { got, want });
         }
-        write_master_frame(output, time_stamp, into)
-    }
-
-    /// A device frame of the IO exchange has come. Its payload may be used only if this accepts it.
-    ///
-    /// # Errors
-    /// As [`DeviceFrameView::new`]; [`Error::TopologyChanged`], which takes the master back to IDLE;
-    /// [`Error::WrongState`] outside the IO exchange.
-    pub fn device_frame<'a>(&mut self, frame: &'a [u8]) -> Result<DeviceFrameView<'a>, Error> {
-        if self.state != State::Exchange {
-            return Err(Error::WrongState);
-        }
-        let view = match DeviceFrameView::new(self.config.payload_len.into(), frame) {
-            Ok(view) => view,
-            Err(error) => {
-                self.cycle.damaged = true;
-                self.count(error);
-                return Err(error);
-            }
-        };
-        let (address, last) = (view.address().get(), self.network.devices());
-        if address > last || view.status().contains(Status::LAST) != (address == last) {
-            let error = Error::TopologyChanged { address };
-            self.give_up(error);
-            return Err(error);
-        }
-        self.cycle.mark(address);
-        if view.status().contains(Status::ERROR) {
-            self.counters.device_errors = self.counters.device_errors.saturating_add(1);
-        }
-        Ok(view)
+        emit_master_frame_into(output, time_stamp, into)
     }
 }

@@ -1,65 +1,37 @@
-use core::fmt;
-
 use crate::error::Error;
 use crate::frame::{LongFrame, emit};
 use crate::frame_type::FrameType;
+use crate::place::Place;
 use crate::status::Status;
 
-/// Shape of the network, a byte of PARAM. Only the line is implemented by the vendor.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-#[cfg_attr(feature = "serde", serde(from = "u8", into = "u8"))]
-pub enum Topology {
-    /// 0: a line.
-    #[default]
-    Line,
-    /// 1: a ring.
-    Ring,
-    /// 2: a redundant ring.
-    RedundantRing,
-    /// Any other code.
-    Unknown(u8),
-}
-
-impl From<u8> for Topology {
-    fn from(code: u8) -> Self {
-        match code {
-            0 => Self::Line,
-            1 => Self::Ring,
-            2 => Self::RedundantRing,
-            code => Self::Unknown(code),
-        }
+servowire_core::codes! {
+    /// Shape of the network, a byte of PARAM. Only the line is implemented by the vendor.
+    #[derive(Default)]
+    pub enum Topology: u8 {
+        /// A line.
+        #[default]
+        Line = 0 => "line",
+        /// A ring.
+        Ring = 1 => "ring",
+        /// A redundant ring.
+        RedundantRing = 2 => "redundant ring",
     }
 }
 
-impl From<Topology> for u8 {
-    fn from(topology: Topology) -> Self {
-        match topology {
-            Topology::Line => 0,
-            Topology::Ring => 1,
-            Topology::RedundantRing => 2,
-            Topology::Unknown(code) => code,
-        }
+servowire_core::codes! {
+    /// Check of the IO-exchange frames, a nibble of `crc_mode`.
+    pub enum CrcKind: u8 {
+        /// No check.
+        None = 0 => "none",
+        /// CRC-32.
+        Crc32 = 1 => "CRC-32",
+        /// CRC-16; the polynomial is not published.
+        Crc16 = 2 => "CRC-16",
+        /// CRC-8, the only one the vendor implements.
+        Crc8 = 3 => "CRC-8",
+        /// CRC-32 with the Castagnoli polynomial.
+        Castagnoli = 4 => "CRC-32C",
     }
-}
-
-/// Check of the IO-exchange frames, a nibble of `crc_mode`.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub enum CrcKind {
-    /// 0: no check.
-    None,
-    /// 1: CRC-32.
-    Crc32,
-    /// 2: CRC-16; the polynomial is not published.
-    Crc16,
-    /// 3: CRC-8, the only one the vendor implements.
-    Crc8,
-    /// 4: CRC-32 with the Castagnoli polynomial.
-    Castagnoli,
-    /// Any other code.
-    Unknown(u8),
 }
 
 /// `crc_mode` of PARAM: low nibble for master frames, high nibble for device frames.
@@ -83,25 +55,14 @@ impl CrcMode {
         self.0
     }
 
-    /// Check of master frames.
-    pub const fn out(self) -> CrcKind {
-        Self::kind(self.0 & 15)
+    /// Check of master frames; `None` for a code without a meaning.
+    pub const fn out(self) -> Option<CrcKind> {
+        CrcKind::from_code(self.0 & 15)
     }
 
-    /// Check of device frames.
-    pub const fn input(self) -> CrcKind {
-        Self::kind(self.0 >> 4)
-    }
-
-    const fn kind(code: u8) -> CrcKind {
-        match code {
-            0 => CrcKind::None,
-            1 => CrcKind::Crc32,
-            2 => CrcKind::Crc16,
-            3 => CrcKind::Crc8,
-            4 => CrcKind::Castagnoli,
-            code => CrcKind::Unknown(code),
-        }
+    /// Check of device frames; `None` for a code without a meaning.
+    pub const fn input(self) -> Option<CrcKind> {
+        CrcKind::from_code(self.0 >> 4)
     }
 }
 
@@ -136,8 +97,8 @@ pub struct Parameters {
     pub t_in_ns: u32,
     /// Application output time in ns.
     pub t_out_ns: u32,
-    /// Shape of the network.
-    pub topology: Topology,
+    /// Shape of the network, the code of a [`Topology`].
+    pub topology: u8,
     /// 0: diagnostics in the payload; 1: in a frame of their own.
     pub diagnostics: u8,
     /// 1: an alarm resets the network.
@@ -167,7 +128,7 @@ impl Parameters {
         ipg_5ns: 52,
         t_in_ns: 0,
         t_out_ns: 0,
-        topology: Topology::Line,
+        topology: Topology::Line.code(),
         diagnostics: 0,
         alarm: 0,
         crc_mode: CrcMode::CRC8,
@@ -204,7 +165,7 @@ impl Parameters {
             ipg_5ns: u32::from_le_bytes([g0, g1, g2, g3]),
             t_in_ns: u32::from_le_bytes([i0, i1, i2, i3]),
             t_out_ns: u32::from_le_bytes([o0, o1, o2, o3]),
-            topology: topology.into(),
+            topology,
             diagnostics,
             alarm,
             crc_mode: CrcMode::from_byte(crc_mode),
@@ -221,28 +182,28 @@ impl Parameters {
         let [g0, g1, g2, g3] = self.ipg_5ns.to_le_bytes();
         let [i0, i1, i2, i3] = self.t_in_ns.to_le_bytes();
         let [o0, o1, o2, o3] = self.t_out_ns.to_le_bytes();
-        let (burst, gap, topology) = (self.delay_burst, self.delay_gap_ms, u8::from(self.topology));
+        let (burst, gap) = (self.delay_burst, self.delay_gap_ms);
         [
             c0, c1, c2, c3, s0, s1, s2, s3, p0, p1, burst, gap, f0, f1, f2, f3, g0, g1, g2, g3, i0, i1, i2, i3, o0, o1,
-            o2, o3, topology, self.diagnostics, self.alarm, self.crc_mode.byte(),
+            o2, o3, self.topology, self.diagnostics, self.alarm, self.crc_mode.byte(),
         ]
     }
 }
 
 /// A PARAM frame in a buffer.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub struct ParamView<'a> {
     frame: LongFrame<'a>,
     bytes: &'a [u8; Parameters::LEN],
 }
 
 impl<'a> ParamView<'a> {
-    /// Checks as [`LongFrame::new`], then that TYPE is 2.
+    /// Checks as [`LongFrame::parse`], then that TYPE is 2.
     ///
     /// # Errors
-    /// As [`LongFrame::new`]; [`Error::UnexpectedType`].
-    pub fn new(bytes: &'a [u8]) -> Result<Self, Error> {
-        Self::of(LongFrame::new(bytes)?)
+    /// As [`LongFrame::parse`]; [`Error::UnexpectedType`].
+    pub fn parse(bytes: &'a [u8]) -> Result<Self, Error> {
+        Self::of(LongFrame::parse(bytes)?)
     }
 
     /// Checks that TYPE is 2.
@@ -290,17 +251,25 @@ impl Param {
     /// Bytes from DA to FCS.
     pub const LEN: usize = Parameters::LEN + LongFrame::OVERHEAD;
 
-    /// As a master sends it. `last`: the last PARAM of the start-up.
-    pub const fn request(parameters: Parameters, last: bool) -> Self {
-        Self { source: 0, status: if last { Status::FINAL_PARAM } else { Status::PARAM }, parameters }
+    /// As a master sends it.
+    pub const fn request(parameters: Parameters, place: Place) -> Self {
+        Self { source: 0, status: place.choose(Status::FINAL_PARAM, Status::PARAM), parameters }
     }
 
-    /// Checks as [`ParamView::new`].
+    /// Checks as [`ParamView::parse`].
     ///
     /// # Errors
-    /// As [`ParamView::new`].
+    /// As [`ParamView::parse`].
     pub fn parse(bytes: &[u8]) -> Result<Self, Error> {
-        let view = ParamView::new(bytes)?;
+        Self::of(LongFrame::parse(bytes)?)
+    }
+
+    /// Checks that TYPE is 2.
+    ///
+    /// # Errors
+    /// [`Error::UnexpectedType`]
+    pub fn of(frame: LongFrame<'_>) -> Result<Self, Error> {
+        let view = ParamView::of(frame)?;
         Ok(Self { source: view.source(), status: view.status(), parameters: view.parameters() })
     }
 
@@ -310,61 +279,12 @@ impl Param {
     }
 }
 
-impl fmt::Display for Parameters {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(
-            f,
-            "cycle {} ns, ipg {} x 5 ns, forward {} ns, CRC {:02X}h",
-            self.cycle_time_ns,
-            self.ipg_5ns,
-            self.delay_fwd_time_ns,
-            self.crc_mode.byte()
-        )
-    }
-}
-
-#[cfg(feature = "defmt")]
-#[cfg_attr(docsrs, doc(cfg(feature = "defmt")))]
-impl defmt::Format for Parameters {
-    fn format(&self, f: defmt::Formatter<'_>) {
-        defmt::write!(
-            f,
-            "cycle {=u32} ns, ipg {=u32} x 5 ns, forward {=u32} ns, CRC {=u8:02X}h",
-            self.cycle_time_ns,
-            self.ipg_5ns,
-            self.delay_fwd_time_ns,
-            self.crc_mode.byte()
-        );
-    }
-}
-
-impl fmt::Display for Param {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "PARAM {}, STATUS {}", self.parameters, self.status)
-    }
-}
-
-#[cfg(feature = "defmt")]
-#[cfg_attr(docsrs, doc(cfg(feature = "defmt")))]
-impl defmt::Format for Param {
-    fn format(&self, f: defmt::Formatter<'_>) {
-        defmt::write!(f, "PARAM {}, STATUS {}", self.parameters, self.status);
-    }
-}
-
-impl fmt::Display for ParamView<'_> {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "PARAM {}, STATUS {}", self.parameters(), self.status())
-    }
-}
-
-#[cfg(feature = "defmt")]
-#[cfg_attr(docsrs, doc(cfg(feature = "defmt")))]
-impl defmt::Format for ParamView<'_> {
-    fn format(&self, f: defmt::Formatter<'_>) {
-        defmt::write!(f, "PARAM {}, STATUS {}", self.parameters(), self.status());
-    }
-}
+servowire_core::one_line!(Parameters {
+    Self { cycle_time_ns, ipg_5ns, delay_fwd_time_ns, crc_mode, .. } =>
+        "cycle {} ns, ipg {} x 5 ns, forward {} ns, CRC {:02X}h", cycle_time_ns, ipg_5ns, delay_fwd_time_ns, crc_mode.byte();
+});
+servowire_core::one_line!(Param { Self { parameters, status, .. } => "PARAM {}, STATUS {}", parameters, status; });
+servowire_core::one_line!(ParamView<'_> { view => "PARAM {}, STATUS {}", view.parameters(), view.status(); });
 
 #[cfg(test)]
 mod tests {
@@ -391,12 +311,11 @@ mod tests {
     fn every_crc_mode_splits_into_two_kinds() {
         for raw in 0..=u8::MAX {
             let (out, input) = (CrcMode(raw).out(), CrcMode(raw).input());
-            assert_eq!(out == CrcKind::Crc8, raw & 15 == 3);
+            assert_eq!(out == Some(CrcKind::Crc8), raw & 15 == 3);
             assert_eq!(input, CrcMode(raw >> 4).out());
             assert_eq!(out, CrcMode(raw & 15).out());
         }
-        for code in 0..=u8::MAX {
-            assert_eq!(u8::from(Topology::from(code)), code);
-        }
+        assert_eq!(Topology::from_code(2), Some(Topology::RedundantRing));
+        assert_eq!((CrcKind::from_code(5), Topology::from_code(3)), (None, None));
     }
 }

@@ -1,5 +1,3 @@
-use core::fmt;
-
 use servowire_core::OutOfRange;
 
 use crate::pto::{Direction, Pto};
@@ -11,7 +9,6 @@ use crate::pto::{Direction, Pto};
 ///        PTO (LSB first) command (LSB first; reserved, 0)
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "arbitrary", derive(arbitrary::Arbitrary))]
 pub struct Slice {
@@ -34,15 +31,6 @@ impl Slice {
     pub const fn emit(self) -> [u8; Self::LEN] {
         let ([p0, p1], [c0, c1]) = (self.pto.word().to_le_bytes(), self.command.to_le_bytes());
         [p0, p1, c0, c1]
-    }
-}
-
-impl fmt::Display for Slice {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self.command {
-            0 => self.pto.fmt(f),
-            command => write!(f, "{} command {command:04X}h", self.pto),
-        }
     }
 }
 
@@ -97,7 +85,6 @@ impl arbitrary::Arbitrary<'_> for MotorMask {
 
 /// The 16 output bytes of the reference machine, device 1 first.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "arbitrary", derive(arbitrary::Arbitrary))]
 pub struct Payload(pub [Slice; 4]);
@@ -153,12 +140,11 @@ impl Payload {
     }
 }
 
-impl fmt::Display for Payload {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let [a, b, c, d] = self.0;
-        write!(f, "{a}, {b}, {c}, {d}")
-    }
-}
+servowire_core::one_line!(Slice {
+    Self { pto, command: 0 } => "{}", pto;
+    Self { pto, command } => "{} command {:04X}h", pto, command;
+});
+servowire_core::one_line!(Payload { Self([a, b, c, d]) => "{}, {}, {}, {}", a, b, c, d; });
 
 #[cfg(test)]
 mod tests {

@@ -1,6 +1,7 @@
 //! DIR and the driver's enable: when they may follow a word.
 
 use crate::pto::{Direction, Pto};
+use crate::sync0::Flags;
 
 /// A general-purpose pin of the AM335x.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -36,7 +37,6 @@ pub const DIR_SETUP_HOLD_NS: u64 = crate::drv8711::DIR_SETUP_HOLD_NS as u64;
 
 /// What the pins carry.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Levels {
     /// DIR.
@@ -72,13 +72,13 @@ impl Pins {
         self.now
     }
 
-    /// CMP7 has taken a word. `pulse_pending`: [`PENDING_PULSE`](crate::sync0::Flags::PENDING_PULSE) as it was before
-    /// this event. Gives the levels to write, if they change.
-    pub fn cmp7(&mut self, word: Pto, pulse_pending: bool) -> Option<Levels> {
+    /// CMP7 has taken a word. `before`: the flags of its [`Sync0`](crate::sync0::Sync0) before this
+    /// event. Gives the levels to write, if they change.
+    pub fn cmp7(&mut self, word: Pto, before: Flags) -> Option<Levels> {
         // A driver-off word holds DIR.
         let direction = word.direction().unwrap_or(self.next.direction);
         self.next = Levels { direction, enabled: word.driver_enabled() };
-        if pulse_pending { None } else { self.follow() }
+        if before.contains(Flags::PENDING_PULSE) { None } else { self.follow() }
     }
 
     /// The pulse is over. Gives the levels to write, if they change.
@@ -98,3 +98,8 @@ impl Default for Pins {
         Self::new()
     }
 }
+
+servowire_core::one_line!(Levels {
+    Self { direction, enabled: true } => "{}, driver on", direction;
+    Self { direction, enabled: false } => "{}, driver off", direction;
+});

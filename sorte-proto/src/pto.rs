@@ -1,20 +1,17 @@
-use core::fmt;
-
 use servowire_core::OutOfRange;
 
 use crate::error::Error;
 
-/// Level of the DIR output of an axis, bit 15 of the PTO word.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-#[cfg_attr(feature = "arbitrary", derive(arbitrary::Arbitrary))]
-pub enum Direction {
-    /// DIR = 0.
-    #[default]
-    Low,
-    /// DIR = 1.
-    High,
+servowire_core::codes! {
+    /// Level of the DIR output of an axis, bit 15 of the PTO word.
+    #[derive(Default)]
+    pub enum Direction: u8 {
+        /// DIR = 0.
+        #[default]
+        Low = 0 => "DIR 0",
+        /// DIR = 1.
+        High = 1 => "DIR 1",
+    }
 }
 
 impl Direction {
@@ -39,15 +36,8 @@ impl Direction {
     }
 }
 
-impl From<bool> for Direction {
-    fn from(high: bool) -> Self {
-        if high { Self::High } else { Self::Low }
-    }
-}
-
 /// When the pulse starts: nanoseconds after the start of the next cycle, 1..=3990.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(try_from = "u16", into = "u16"))]
 pub struct StartTime(u16);
@@ -100,7 +90,6 @@ impl From<StartTime> for u16 {
 
 /// A PTO word without a meaning: 3991..=0x7FFE, the same with bit 15, or 0xFFFF.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(try_from = "Pto", into = "Pto"))]
 pub struct Reserved(u16);
@@ -278,31 +267,6 @@ impl From<Pto> for u16 {
     }
 }
 
-/// `+1234`, `-1`: a pulse so many ns into the cycle, DIR 0 or 1; `+.`, `-.`: no pulse; `off`; `0FA0h?`: reserved.
-impl fmt::Display for Pto {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::NoPulse { direction } => write!(f, "{}.", direction.sign()),
-            Self::Pulse { start, direction } => write!(f, "{}{}", direction.sign(), start.ns()),
-            Self::DriverOff => f.write_str("off"),
-            Self::Reserved(raw) => write!(f, "{:04X}h?", raw.word()),
-        }
-    }
-}
-
-#[cfg(feature = "defmt")]
-#[cfg_attr(docsrs, doc(cfg(feature = "defmt")))]
-impl defmt::Format for Pto {
-    fn format(&self, f: defmt::Formatter<'_>) {
-        match self {
-            Self::NoPulse { direction } => defmt::write!(f, "{=str}.", direction.sign()),
-            Self::Pulse { start, direction } => defmt::write!(f, "{=str}{=u16}", direction.sign(), start.ns()),
-            Self::DriverOff => defmt::write!(f, "off"),
-            Self::Reserved(raw) => defmt::write!(f, "{=u16:04X}h?", raw.word()),
-        }
-    }
-}
-
 #[cfg(feature = "arbitrary")]
 impl arbitrary::Arbitrary<'_> for StartTime {
     fn arbitrary(u: &mut arbitrary::Unstructured<'_>) -> arbitrary::Result<Self> {
@@ -317,6 +281,16 @@ impl arbitrary::Arbitrary<'_> for Pto {
     }
 }
 
+// `+1234`, `-1`: a pulse so many ns into the cycle, DIR 0 or 1; `+.`, `-.`: no pulse; `off`; `0FA0h?`: reserved.
+servowire_core::one_line!(Pto {
+    Self::NoPulse { direction } => "{}.", direction.sign();
+    Self::Pulse { start, direction } => "{}{}", direction.sign(), start.ns();
+    Self::DriverOff => "off";
+    Self::Reserved(raw) => "{:04X}h?", raw.word();
+});
+servowire_core::one_line!(StartTime { Self(ns) => "{} ns", ns; });
+servowire_core::one_line!(Reserved { Self(word) => "{:04X}h", word; });
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -327,15 +301,15 @@ mod tests {
         for word in (0..=u16::MAX).step_by(crate::stride(199)) {
             let pto = Pto::from_word(word);
             assert_eq!(pto.word(), word);
-            let high = word >= 0x8000;
+            let direction = if word >= 0x8000 { Direction::High } else { Direction::Low };
             match word & 0x7fff {
-                0 => assert_eq!(pto, Pto::NoPulse { direction: high.into() }),
+                0 => assert_eq!(pto, Pto::NoPulse { direction }),
                 1..=3990 => assert_eq!(pto.start().map(StartTime::ns), Some(word & 0x7fff)),
                 _ if word == 0x7fff => assert_eq!(pto, Pto::DriverOff),
                 time => assert!(matches!(pto, Pto::Reserved(r) if r.time() == time)),
             }
             assert_eq!(pto.driver_enabled(), word != 0x7fff);
-            assert_eq!(pto.direction(), (word != 0x7fff).then_some(high.into()));
+            assert_eq!(pto.direction(), (word != 0x7fff).then_some(direction));
             assert_eq!(Pto::checked(word).is_err(), matches!(pto, Pto::Reserved(_)));
             assert_eq!(Reserved::new(word).map(Pto::Reserved), Pto::checked(word).is_err().then_some(pto));
             let time = word & 0x7fff;

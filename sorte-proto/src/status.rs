@@ -56,7 +56,7 @@ impl Status {
     }
 
     /// What a device adds to the STATUS byte that it writes or passes on.
-    pub const fn of_device(last: bool, error: bool) -> Self {
+    pub(crate) const fn of_device(last: bool, error: bool) -> Self {
         Self(last as u8 | (error as u8) << 2)
     }
 }

@@ -29,20 +29,20 @@ where
     }
 }
 
-/// Takes a long-header frame off the front, as [`LongFrame::new`]. The length follows from TYPE.
+/// Takes a long-header frame off the front, as [`LongFrame::parse`]. The length follows from TYPE.
 ///
 /// ```
 /// use nom::Parser;
-/// use sorte_proto::{DelayReq, Error, FrameType, Preamble, stream};
+/// use sorte_proto::{DelayReq, Error, FrameType, Place, Preamble, stream};
 /// let mut wire = Preamble::Middle.bytes().to_vec();
-/// wire.extend(DelayReq::of_device(false).emit());
+/// wire.extend(DelayReq::of_device(Place::Inner).emit());
 /// let (rest, ((), frame)) = (stream::preamble::<Error>, stream::long_frame).parse(&wire[..]).unwrap();
 /// assert!(rest.is_empty());
 /// assert_eq!(frame.frame_type(), FrameType::DelayReq);
 /// ```
 ///
 /// # Errors
-/// As [`LongFrame::new`], with `Incomplete` in place of [`Error::Truncated`]; [`Error::UnknownType`] also for the types
+/// As [`LongFrame::parse`], with `Incomplete` in place of [`Error::Truncated`]; [`Error::UnknownType`] also for the types
 /// without a published layout, whose end nobody knows.
 pub fn long_frame<'a, E>(input: &'a [u8]) -> IResult<&'a [u8], LongFrame<'a>, E>
 where
@@ -51,31 +51,31 @@ where
     let &[_, _, code, ..] = input else { return Err(missing(3_usize.saturating_sub(input.len()))) };
     let unknown = Error::UnknownType { got: code };
     let len = FrameType::from_code(code).and_then(FrameType::frame_len).ok_or_else(|| refused(input, unknown))?;
-    unit(input, len, LongFrame::new)
+    unit(input, len, LongFrame::parse)
 }
 
 /// Takes a master frame of the IO exchange with `output_len` output bytes off the front.
 ///
 /// # Errors
-/// As [`MasterFrameView::new`], with `Incomplete` in place of [`Error::Truncated`].
+/// As [`MasterFrameView::parse`], with `Incomplete` in place of [`Error::Truncated`].
 pub fn master_frame<'a, E>(output_len: usize) -> impl Parser<&'a [u8], Output = MasterFrameView<'a>, Error = E>
 where
     E: ParseError<&'a [u8]> + FromExternalError<&'a [u8], Error>,
 {
     let len = output_len.saturating_add(MasterFrameView::OVERHEAD);
-    move |input: &'a [u8]| unit(input, len, |frame| MasterFrameView::new(output_len, frame))
+    move |input: &'a [u8]| unit(input, len, |frame| MasterFrameView::parse(output_len, frame))
 }
 
 /// Takes a device frame of the IO exchange with `payload_len` payload bytes off the front.
 ///
 /// # Errors
-/// As [`DeviceFrameView::new`], with `Incomplete` in place of [`Error::Truncated`].
+/// As [`DeviceFrameView::parse`], with `Incomplete` in place of [`Error::Truncated`].
 pub fn device_frame<'a, E>(payload_len: usize) -> impl Parser<&'a [u8], Output = DeviceFrameView<'a>, Error = E>
 where
     E: ParseError<&'a [u8]> + FromExternalError<&'a [u8], Error>,
 {
     let len = payload_len.saturating_add(DeviceFrameView::OVERHEAD);
-    move |input: &'a [u8]| unit(input, len, |frame| DeviceFrameView::new(payload_len, frame))
+    move |input: &'a [u8]| unit(input, len, |frame| DeviceFrameView::parse(payload_len, frame))
 }
 
 #[cfg(test)]
@@ -86,18 +86,19 @@ mod tests {
     use super::*;
     use crate::delay_req::DelayReq;
     use crate::discovery::Discovery;
-    use crate::exchange::write_master_frame;
+    use crate::exchange::emit_master_frame_into;
     use crate::param::{Param, Parameters};
+    use crate::place::Place;
     use crate::preamble::{Preamble, strip_preamble};
     use crate::status::Status;
     use crate::sync::Sync;
 
     fn stream() -> Vec<u8> {
         let frames: [(Preamble, Vec<u8>); 4] = [
-            (Preamble::Long, Discovery::request(false).emit().to_vec()),
-            (Preamble::Long, Param::request(Parameters::STOCK, true).emit().to_vec()),
-            (Preamble::Middle, DelayReq::of_device(true).emit().to_vec()),
-            (Preamble::Middle, Sync::of_master(500, 76, true).emit().to_vec()),
+            (Preamble::Long, Discovery::request(Place::Inner).emit().to_vec()),
+            (Preamble::Long, Param::request(Parameters::STOCK, Place::Last).emit().to_vec()),
+            (Preamble::Middle, DelayReq::of_device(Place::Last).emit().to_vec()),
+            (Preamble::Middle, Sync::of_master(500, 76, Place::Last).emit().to_vec()),
         ];
         frames.iter().flat_map(|(preamble, frame)| preamble.bytes().iter().chain(frame)).copied().collect()
     }
@@ -122,7 +123,7 @@ mod tests {
     #[test]
     fn the_exchange_is_a_stream_too() {
         let mut wire = [0; 24];
-        let len = write_master_frame(&[0x11; 16], 0x2233, &mut wire).unwrap();
+        let len = emit_master_frame_into(&[0x11; 16], 0x2233, &mut wire).unwrap();
         let (rest, view) = master_frame::<Error>(16).parse(&wire).unwrap();
         assert_eq!((rest, view.output(), view.status()), (&[0; 3][..], &[0x11; 16][..], Status::EXCHANGE));
         for cut in 0..len {

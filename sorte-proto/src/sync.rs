@@ -1,8 +1,7 @@
-use core::fmt;
-
 use crate::error::Error;
 use crate::frame::{LongFrame, emit};
 use crate::frame_type::FrameType;
+use crate::place::Place;
 use crate::status::Status;
 use crate::timing::TRIGGER_NS;
 
@@ -21,19 +20,19 @@ pub const TRANSIT_NS: u16 = 355;
 ///       255  SA  5   STATUS  time stamp  delay  FCS
 ///                            u32         u16
 /// ```
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub struct SyncView<'a> {
     frame: LongFrame<'a>,
     fields: &'a [u8; 6],
 }
 
 impl<'a> SyncView<'a> {
-    /// Checks as [`LongFrame::new`], then that TYPE is 5.
+    /// Checks as [`LongFrame::parse`], then that TYPE is 5.
     ///
     /// # Errors
-    /// As [`LongFrame::new`]; [`Error::UnexpectedType`].
-    pub fn new(bytes: &'a [u8]) -> Result<Self, Error> {
-        Self::of(LongFrame::new(bytes)?)
+    /// As [`LongFrame::parse`]; [`Error::UnexpectedType`].
+    pub fn parse(bytes: &'a [u8]) -> Result<Self, Error> {
+        Self::of(LongFrame::parse(bytes)?)
     }
 
     /// Checks that TYPE is 5.
@@ -87,21 +86,29 @@ impl Sync {
     pub const LEN: usize = 6 + LongFrame::OVERHEAD;
 
     /// As the master sends it: triggered at `trigger_ns` of its time, over a line of `line_delay_ns` to the first device.
-    pub const fn of_master(trigger_ns: u32, line_delay_ns: u16, last: bool) -> Self {
+    pub const fn of_master(trigger_ns: u32, line_delay_ns: u16, place: Place) -> Self {
         Self {
             source: 0,
-            status: if last { Status::FINAL } else { Status::SYNC },
+            status: place.choose(Status::FINAL, Status::SYNC),
             time_stamp_ns: trigger_ns.wrapping_add(line_delay_ns as u32).wrapping_add(TRIGGER_TO_CAPTURE_NS),
             delay_ns: line_delay_ns,
         }
     }
 
-    /// Checks as [`SyncView::new`].
+    /// Checks as [`SyncView::parse`].
     ///
     /// # Errors
-    /// As [`SyncView::new`].
+    /// As [`SyncView::parse`].
     pub fn parse(bytes: &[u8]) -> Result<Self, Error> {
-        let view = SyncView::new(bytes)?;
+        Self::of(LongFrame::parse(bytes)?)
+    }
+
+    /// Checks that TYPE is 5.
+    ///
+    /// # Errors
+    /// [`Error::UnexpectedType`]
+    pub fn of(frame: LongFrame<'_>) -> Result<Self, Error> {
+        let view = SyncView::of(frame)?;
         Ok(Self {
             source: view.source(),
             status: view.status(),
@@ -129,10 +136,11 @@ impl Sync {
     }
 
     /// What a device does to the frame that passes: its own transit and the line to the next device are added to both
-    /// times, which wrap, and its STATUS bits are set. [`cut_through`](crate::cut_through) does the same byte by byte.
-    pub fn pass(&mut self, line_delay_next_ns: u16, last: bool, error: bool) {
+    /// times, which wrap, and `adds` to STATUS: LAST if the device is the last one, ERROR if it has seen a wrong checksum since its
+    /// previous STATUS byte. [`cut_through`](crate::cut_through) does the same byte by byte.
+    pub fn pass(&mut self, line_delay_next_ns: u16, adds: Status) {
         let hop = hop_ns(line_delay_next_ns);
-        self.status |= Status::of_device(last, error);
+        self.status |= adds;
         self.time_stamp_ns = self.time_stamp_ns.wrapping_add(hop);
         let [low, high, ..] = hop.to_le_bytes();
         self.delay_ns = self.delay_ns.wrapping_add(u16::from_le_bytes([low, high]));
@@ -145,45 +153,12 @@ pub(crate) const fn hop_ns(line_delay_next_ns: u16) -> u32 {
     (line_delay_next_ns as u32).saturating_add(TRANSIT_NS as u32)
 }
 
-impl fmt::Display for Sync {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "SYNC at {} ns, delay {} ns, STATUS {}", self.time_stamp_ns, self.delay_ns, self.status)
-    }
-}
-
-#[cfg(feature = "defmt")]
-#[cfg_attr(docsrs, doc(cfg(feature = "defmt")))]
-impl defmt::Format for Sync {
-    fn format(&self, f: defmt::Formatter<'_>) {
-        defmt::write!(
-            f,
-            "SYNC at {=u32} ns, delay {=u16} ns, STATUS {}",
-            self.time_stamp_ns,
-            self.delay_ns,
-            self.status
-        );
-    }
-}
-
-impl fmt::Display for SyncView<'_> {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "SYNC at {} ns, delay {} ns, STATUS {}", self.time_stamp_ns(), self.delay_ns(), self.status())
-    }
-}
-
-#[cfg(feature = "defmt")]
-#[cfg_attr(docsrs, doc(cfg(feature = "defmt")))]
-impl defmt::Format for SyncView<'_> {
-    fn format(&self, f: defmt::Formatter<'_>) {
-        defmt::write!(
-            f,
-            "SYNC at {=u32} ns, delay {=u16} ns, STATUS {}",
-            self.time_stamp_ns(),
-            self.delay_ns(),
-            self.status()
-        );
-    }
-}
+servowire_core::one_line!(Sync {
+    Self { time_stamp_ns, delay_ns, status, .. } => "SYNC at {} ns, delay {} ns, STATUS {}", time_stamp_ns, delay_ns, status;
+});
+servowire_core::one_line!(SyncView<'_> {
+    view => "SYNC at {} ns, delay {} ns, STATUS {}", view.time_stamp_ns(), view.delay_ns(), view.status();
+});
 
 #[cfg(test)]
 mod tests {
@@ -202,11 +177,11 @@ mod tests {
 
         #[test]
         fn the_long_delay_is_the_sum_of_the_hops(round in 0u32..1024, hops in proptest::collection::vec(0u16..1000, 0..254)) {
-            let mut frame = Sync::of_master(500 + 10_000 * round, 85, false);
+            let mut frame = Sync::of_master(500 + 10_000 * round, 85, Place::Inner);
             let mut delay = 85;
             for line in hops {
                 prop_assert_eq!(frame.long_delay_ns(10_000), Some(delay));
-                frame.pass(line, false, false);
+                frame.pass(line, Status::empty());
                 delay += 355 + u32::from(line);
             }
         }
@@ -214,7 +189,7 @@ mod tests {
         #[test]
         fn both_times_grow_by_the_hop(time_stamp_ns: u32, delay_ns: u16, line: u16, last: bool, error: bool) {
             let mut frame = Sync { source: 0, status: Status::SYNC, time_stamp_ns, delay_ns };
-            frame.pass(line, last, error);
+            frame.pass(line, Status::of_device(last, error));
             prop_assert_eq!(frame.time_stamp_ns, (u64::from(time_stamp_ns) + u64::from(line) + 355) as u32);
             prop_assert_eq!(frame.delay_ns, (u64::from(delay_ns) + u64::from(line) + 355) as u16);
             prop_assert_eq!((frame.status.contains(Status::LAST), frame.status.contains(Status::ERROR)), (last, error));

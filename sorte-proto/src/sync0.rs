@@ -109,7 +109,6 @@ impl Flags {
 
 /// A register of the IEP.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Register {
     /// CMP_CFG: which compare events are enabled.
     CmpCfg,
@@ -125,13 +124,22 @@ pub enum Register {
 
 /// A value for a register.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Write {
     /// Where.
     pub register: Register,
     /// What.
     pub value: u16,
 }
+
+servowire_core::one_line!(Register {
+    Self::CmpCfg => "CMP_CFG";
+    Self::Cmp1 => "CMP1";
+    Self::Cmp6 => "CMP6";
+    Self::SyncStart => "SYNC_START";
+    Self::SyncCtrl => "SYNC_CTRL";
+});
+
+servowire_core::one_line!(Write { Self { register, value } => "{} = {}", register, value; });
 
 /// What comes first.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -30,8 +30,9 @@ pub const fn published_send_time_ns(address: DeviceAddress) -> u32 {
 }
 
 /// A line to be timed: how many devices, how far from each other, how many bytes.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct Timing<'a> {
     /// Line delays in ns: master to device 1, device 1 to 2, ...; the last one stands for all after it. Empty: no delay.
     pub line_delays_ns: &'a [u16],
@@ -44,8 +45,8 @@ pub struct Timing<'a> {
 }
 
 /// What limits the cycle.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum Limit {
     /// The end of the master frame at the last device.
     MasterFrame,
@@ -54,8 +55,9 @@ pub enum Limit {
 }
 
 /// End times of one cycle, in ns from its start.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Budget {
     /// Bytes of the master frame with its two preamble bytes.
     pub master_frame_bytes: u32,
@@ -152,8 +154,8 @@ impl Timing<'_> {
 }
 
 /// A cycle that is too short, and for whom.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Misfit {
     /// The first device for which it is.
     pub device: u8,
@@ -189,6 +191,17 @@ impl Timing<'_> {
 }
 
 const _: () = assert!(MAX_DEVICES == DeviceAddress::MAX.get() as usize);
+
+servowire_core::one_line!(Limit {
+    Self::MasterFrame => "the way of the master frame";
+    Self::DeviceFrames => "the device frames";
+});
+servowire_core::one_line!(Misfit {
+    Self { device, needs_ns, limit } =>
+        "the cycle is too short from device {} on, which needs {} ns for {}", device, needs_ns, limit;
+});
+
+impl core::error::Error for Misfit {}
 
 #[cfg(test)]
 mod tests {

@@ -11,7 +11,8 @@
 )]
 
 use proptest::prelude::*;
-use sorte_proto::device::{self, Arrival, Device, Handled, Path, PortId, Trigger};
+use sorte_proto::Link;
+use sorte_proto::device::{self, Device, FrameTimes, Path, PortId, Reaction, Trigger};
 use sorte_proto::master::{self, Action, Master};
 use sorte_proto::{Correction, Discovery, Entry, Error, ErrorClass, FrameType, Parameters};
 
@@ -64,7 +65,7 @@ impl Line {
             flip: None,
             now_ns: 0,
         };
-        line.master.link(true);
+        line.master.set_link(Link::Up);
         line.plug(n);
         line
     }
@@ -72,7 +73,8 @@ impl Line {
     fn plug(&mut self, devices: usize) {
         self.plugged = devices;
         for (k, device) in self.devices.iter_mut().enumerate() {
-            device.links(k < devices, k + 1 < devices);
+            let link = |there: bool| if there { Link::Up } else { Link::Down };
+            device.set_links(link(k < devices), link(k + 1 < devices));
         }
     }
 
@@ -123,10 +125,10 @@ impl Line {
         None
     }
 
-    fn pass(&mut self, k: usize, port: PortId, frame: &mut [u8], sof_ns: u64) -> Handled {
+    fn pass(&mut self, k: usize, port: PortId, frame: &mut [u8], sof_ns: u64) -> Reaction {
         let counter_ns = self.counters[k].at(sof_ns + 700);
-        let arrival = Arrival { sof_ns: self.counters[k].at(sof_ns), counter_ns, now_ns: sof_ns };
-        let handled = self.devices[k].frame(port, frame, arrival);
+        let arrival = FrameTimes { sof_ns: self.counters[k].at(sof_ns), counter_ns, now_ns: sof_ns };
+        let handled = self.devices[k].hear(port, frame, arrival);
         self.counters[k].correct(handled.correction, sof_ns + 700);
         handled
     }
@@ -140,14 +142,14 @@ impl Line {
         }
         if handled.path == Path::Reflect {
             let rtt = 2 * self.cables[k + 1] as u32 + 360;
-            assert_eq!(self.devices[k].delay_reflection(trigger, &frame, rtt), Ok(()));
+            assert_eq!(self.devices[k].hear_reflection(trigger, &frame, rtt), Ok(()));
         }
     }
 
     /// One cycle: what each device took, and what the master took of each device.
     fn exchange(&mut self, output: &[u8], at_ns: u64, time_stamp: u16) -> Vec<Result<Vec<u8>, Error>> {
         let mut frame = vec![0; output.len() + 5];
-        self.master.write_frame(output, time_stamp, &mut frame).unwrap();
+        self.master.emit_into(output, time_stamp, &mut frame).unwrap();
         if let Some(bit) = self.flip.take() {
             let bit = bit % (frame.len() * 8);
             frame[bit / 8] ^= 1 << (bit % 8);
@@ -159,7 +161,7 @@ impl Line {
             sof_ns += self.cables[k] + if k > 0 { 355 } else { 0 };
             let cycle_start = cycle_ns - self.master.epoch_ns();
             let in_cycle = self.counters[k].at(sof_ns).wrapping_sub(cycle_start as u32);
-            let output = self.devices[k].exchange(&frame, in_cycle, in_cycle);
+            let output = self.devices[k].hear_exchange(&frame, in_cycle, in_cycle);
             taken.push(output.map(|o| o.data.to_vec()));
             if let Ok(output) = output {
                 self.counters[k].correct(output.correction, sof_ns);
@@ -168,7 +170,7 @@ impl Line {
             if let Some(answer) = self.devices[k].answer([k as u8, 0, 0]) {
                 let mut bytes = [0; 6];
                 answer.emit_into(&mut bytes).unwrap();
-                let _: Result<_, _> = self.master.device_frame(&bytes);
+                let _: Result<_, _> = self.master.hear(&bytes, 0);
             }
         }
         taken
@@ -185,7 +187,7 @@ impl Line {
                     let mut buffer = [0; Discovery::LEN];
                     let len = frame.emit_into(&mut buffer).unwrap();
                     if let Some((answer, sof_ns)) = self.carry(&buffer[..len], at_ns) {
-                        let _: Result<_, _> = self.master.receive(&answer, sof_ns);
+                        let _: Result<_, _> = self.master.hear(&answer, sof_ns);
                     }
                 }
             }
@@ -245,7 +247,7 @@ fn lines_of_all_lengths_start_and_exchange() {
 fn full_line(config: master::Config) -> Line {
     let mut line = Line::new(vec![85; 254]);
     line.master = Master::new(config.with_sync_frames(64));
-    line.master.link(true);
+    line.master.set_link(Link::Up);
     let entry = Entry { input: 4, output: 1 };
     let config = device::Config::new().with_output_len(None).with_lengths(entry).with_slot_ns(Some(880));
     line.devices.fill(Device::new(config));
@@ -306,7 +308,7 @@ fn a_line_of_254_devices_keeps_its_time() {
 fn the_axes_may_come_to_rest_before_the_master_starts_again() {
     let mut line = Line::new(vec![50; 2]);
     line.master = Master::new(master::Config::new().with_sync_frames(64).with_stop_cycles(1000));
-    line.master.link(true);
+    line.master.set_link(Link::Up);
     for halt in [None, Some(30)] {
         line.plug(2);
         let mut first = line.start_up().unwrap();
@@ -350,16 +352,16 @@ fn the_axes_may_come_to_rest_before_the_master_starts_again() {
 fn a_master_that_fails_again_and_again_stays_in_error() {
     let mut line = Line::new(vec![50; 2]);
     line.master = Master::new(master::Config::new().with_max_failures(3));
-    line.master.link(true);
+    line.master.set_link(Link::Up);
     line.plug(0);
     for n in 1..=3 {
         assert!(line.start_up().is_err());
         assert_eq!(line.master.state() == master::State::Error, n == 3);
     }
     assert_eq!(line.master.poll(u64::MAX - 1), Action::Wait { until_ns: u64::MAX });
-    assert_eq!(line.master.receive(&[], 0), Err(Error::WrongState));
-    line.master.enable(false);
-    line.master.enable(true);
+    assert_eq!(line.master.hear(&[], 0), Err(Error::WrongState));
+    line.master.disable();
+    line.master.enable();
     line.plug(2);
     assert!(line.start_up().is_ok());
 }
@@ -421,7 +423,7 @@ proptest! {
                     let mut buffer = [0; Discovery::LEN];
                     let len = outgoing.emit_into(&mut buffer).unwrap();
                     if let Some((answer, sof_ns)) = line.carry(&buffer[..len], at_ns) {
-                        let _: Result<_, _> = line.master.receive(&answer, sof_ns);
+                        let _: Result<_, _> = line.master.hear(&answer, sof_ns);
                     }
                 }
             }
@@ -458,7 +460,7 @@ proptest! {
                         _ => vec![new.clone()],
                     };
                     for (answer, sof_ns) in heard.into_iter().flatten() {
-                        let _: Result<_, _> = line.master.receive(&answer, sof_ns);
+                        let _: Result<_, _> = line.master.hear(&answer, sof_ns);
                     }
                     old = new.or(old);
                     if event == 6 {

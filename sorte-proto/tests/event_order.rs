@@ -12,11 +12,13 @@
 mod common;
 
 use common::device_in;
-use sorte_proto::device::{self, Arrival, Device, Path, PortId};
+use sorte_proto::Link;
+use sorte_proto::Place;
+use sorte_proto::device::{self, Device, FrameTimes, Path, PortId};
 use sorte_proto::master::{Action, Config, Master, Outgoing, State};
 use sorte_proto::{
     Correction, DelayReq, DeviceAddress, DeviceFrame, Discovery, Entry, Error, ErrorClass, FrameType, Param,
-    Parameters, Status, Sync,
+    Parameters, RoundTrips, Status, Sync,
 };
 
 /// 76 ns of cable and 320 ns in the device.
@@ -25,17 +27,17 @@ const ROUND_TRIP: u64 = 472;
 /// What two devices without a cable between them answer.
 fn answer(frame: Outgoing) -> Vec<u8> {
     match frame {
-        Outgoing::Discovery { last } => {
-            let mut frame = Discovery::request(last);
-            frame.pass(Entry::STOCK, false, false).unwrap();
-            frame.pass(Entry::STOCK, true, false).unwrap();
+        Outgoing::Discovery { place } => {
+            let mut frame = Discovery::request(place);
+            frame.pass(Entry::STOCK, Status::empty()).unwrap();
+            frame.pass(Entry::STOCK, Status::LAST).unwrap();
             frame.emit().to_vec()
         }
         Outgoing::Param(frame) => frame.emit().to_vec(),
         Outgoing::DelayReq(frame) => frame.emit().to_vec(),
         Outgoing::Sync(mut frame) => {
-            frame.pass(0, false, false);
-            frame.pass(0, true, false);
+            frame.pass(0, Status::empty());
+            frame.pass(0, Status::LAST);
             frame.emit().to_vec()
         }
     }
@@ -43,7 +45,7 @@ fn answer(frame: Outgoing) -> Vec<u8> {
 
 fn master(config: Config) -> Master {
     let mut master = Master::new(config);
-    master.link(true);
+    master.set_link(Link::Up);
     master
 }
 
@@ -72,7 +74,7 @@ fn run(master: &mut Master, mut late: impl FnMut() -> u64, mut hear: impl FnMut(
 }
 
 fn hear_once(master: &mut Master, at_ns: u64, frame: Outgoing) {
-    let _: Result<_, _> = master.receive(&answer(frame), at_ns + ROUND_TRIP);
+    let _: Result<_, _> = master.hear(&answer(frame), at_ns + ROUND_TRIP);
 }
 
 /// Ten frames must be answered, and the devices must have had the one with STATE_CHANGE.
@@ -107,8 +109,8 @@ fn the_last_param_needs_its_own_answer() {
         || 0,
         |master, at_ns, frame| match frame {
             Outgoing::Param(_) => {
-                let old = Param::request(Parameters::STOCK, false).emit();
-                let _: Result<_, _> = master.receive(&old, at_ns + ROUND_TRIP);
+                let old = Param::request(Parameters::STOCK, Place::Inner).emit();
+                let _: Result<_, _> = master.hear(&old, at_ns + ROUND_TRIP);
             }
             frame => hear_once(master, at_ns, frame),
         },
@@ -127,7 +129,8 @@ fn a_reflection_that_is_older_than_its_request_is_refused() {
         || 0,
         |master, at_ns, frame| {
             if let Outgoing::DelayReq(_) = frame {
-                let stale = master.receive(&DelayReq::of_master(false).emit(), at_ns.saturating_sub(900_000));
+                let request = DelayReq::of_master(Place::Inner).emit();
+                let stale = master.hear(&request, at_ns.saturating_sub(900_000));
                 assert_eq!(stale, Err(Error::BeforeRequest { early_ns: 900_000 }));
                 refused += 1;
             }
@@ -137,7 +140,7 @@ fn a_reflection_that_is_older_than_its_request_is_refused() {
     assert!(end.is_ok());
     assert_eq!(
         (refused, master.line_delay().extremes(), master.line_delay().checked()),
-        (16, Some((472, 472)), Ok(76))
+        (16, Some(RoundTrips { shortest_ns: 472, longest_ns: 472 }), Ok(76))
     );
 }
 
@@ -145,20 +148,21 @@ fn a_reflection_that_is_older_than_its_request_is_refused() {
 fn old_answers_of_discovery_and_sync_are_refused_and_end_nothing() {
     let mut discovering = master(Config::new());
     let Action::Send { at_ns, frame } = discovering.poll(5_000_000) else { panic!() };
-    let stale = discovering.receive(&answer(frame), at_ns - 1);
+    let answer_before = answer(frame);
+    let stale = discovering.hear(&answer_before, at_ns - 1);
     assert_eq!(stale, Err(Error::BeforeRequest { early_ns: 1 }));
     assert_eq!((discovering.state(), discovering.network().devices()), (State::Discovery, 0));
     // The answer to the last SYNC of the start-up before, which is the same byte for byte.
     let mut syncing = master(Config::new().with_sync_frames(3));
-    let mut final_answer = Sync::of_master(20_500, 76, true);
-    final_answer.pass(0, false, false);
-    final_answer.pass(0, true, false);
+    let mut final_answer = Sync::of_master(20_500, 76, Place::Last);
+    final_answer.pass(0, Status::empty());
+    final_answer.pass(0, Status::LAST);
     let (_, end) = run(
         &mut syncing,
         || 0,
         |master, at_ns, frame| match frame {
             Outgoing::Sync(_) => {
-                let _: Result<_, _> = master.receive(&final_answer.emit(), at_ns - 300);
+                let _: Result<_, _> = master.hear(&final_answer.emit(), at_ns - 300);
             }
             frame => hear_once(master, at_ns, frame),
         },
@@ -173,7 +177,7 @@ fn old_answers_of_discovery_and_sync_are_refused_and_end_nothing() {
         |master, at_ns, frame| match frame {
             Outgoing::Sync(_) if sent < 2 => {
                 sent += 1;
-                let _: Result<_, _> = master.receive(&final_answer.emit(), at_ns + 1000);
+                let _: Result<_, _> = master.hear(&final_answer.emit(), at_ns + 1000);
             }
             Outgoing::Sync(_) => {}
             frame => hear_once(master, at_ns, frame),
@@ -197,7 +201,7 @@ fn one_round_trip_that_cannot_be_spoils_the_measurement() {
             } else {
                 false
             };
-            let _: Result<_, _> = master.receive(&answer(frame), at_ns + if held_up { 30_000 } else { ROUND_TRIP });
+            let _: Result<_, _> = master.hear(&answer(frame), at_ns + if held_up { 30_000 } else { ROUND_TRIP });
         },
     );
     assert_eq!(end, Err(Error::ImplausibleRoundTrip { rtt_ns: 30_000 }));
@@ -251,7 +255,7 @@ fn a_frame_is_handed_out_as_long_before_its_time_as_the_port_needs() {
     assert_eq!((now_ns, at_ns), (46_240_500, 46_260_500));
     assert_eq!(master.poll(now_ns), Action::Wait { until_ns: now_ns + 4000 });
     // Without a link there is no time to wait for.
-    master.enable(false);
+    master.disable();
     assert_eq!(master.poll(now_ns), Action::Wait { until_ns: u64::MAX });
 }
 
@@ -269,7 +273,10 @@ fn a_request_that_left_later_than_planned_is_measured_from_its_start() {
             hear_once(master, at_ns + held_ns, frame);
         },
     );
-    assert_eq!((end.is_ok(), master.line_delay().extremes()), (true, Some((472, 472))));
+    assert_eq!(
+        (end.is_ok(), master.line_delay().extremes()),
+        (true, Some(RoundTrips { shortest_ns: 472, longest_ns: 472 }))
+    );
 }
 
 /// 254 devices 85 ns apart: the answer to SYNC is on its way for 223 us, and the exchange begins in the devices' raster, 10 us
@@ -299,7 +306,7 @@ fn the_answer_of_a_long_line_is_waited_for() {
         if answers.first().is_some_and(|(sof_ns, _)| *sof_ns <= next) {
             let (sof_ns, bytes) = answers.remove(0);
             now_ns = sof_ns;
-            master.receive(&bytes, sof_ns).unwrap();
+            master.hear(&bytes, sof_ns).unwrap();
         }
     }
     assert_eq!(first_ns, Some(last_ns + 10_000 + 224_000));
@@ -324,7 +331,7 @@ fn as_many_cycles_are_left_to_stop_as_the_host_has_asked_for() {
         let mut bytes = [0; 6];
         let (address, status) = (DeviceAddress::new(3).unwrap(), Status::LAST);
         DeviceFrame { address, status, payload: [0; 3] }.emit_into(&mut bytes).unwrap();
-        assert_eq!(master.device_frame(&bytes).map(|_| ()), Err(Error::TopologyChanged { address: 3 }));
+        assert_eq!(master.hear(&bytes, 0).map(|_| ()), Err(Error::TopologyChanged { address: 3 }));
         let mut stopping = 0;
         while let Action::Exchange { stop, .. } = {
             now_ns += 4000;
@@ -341,13 +348,13 @@ fn a_link_that_is_lost_in_error_restarts_nothing() {
     let mut failing = master(Config::new().with_max_failures(1));
     let (_, end) = run(&mut failing, || 0, |_, _, _| {});
     assert!(end.is_err());
-    failing.link(false);
-    failing.link(true);
+    failing.set_link(Link::Down);
+    failing.set_link(Link::Up);
     assert_eq!((failing.state(), failing.counters().retrains), (State::Error, 1));
     assert_eq!(failing.poll(1_000_000_000), Action::Wait { until_ns: u64::MAX });
 }
 
-const ARRIVAL: Arrival = Arrival { sof_ns: 77_000, counter_ns: 77_700, now_ns: 0 };
+const ARRIVAL: FrameTimes = FrameTimes { sof_ns: 77_000, counter_ns: 77_700, now_ns: 0 };
 
 /// A frame is on its way through the device when its host resets it, its link goes or its time is over: what the rest of the
 /// frame says belongs to a start-up that is no more. A clock that is set then would not be set in the next one.
@@ -355,19 +362,19 @@ const ARRIVAL: Arrival = Arrival { sof_ns: 77_000, counter_ns: 77_700, now_ns: 0
 fn a_frame_that_began_before_a_restart_teaches_nothing_after_it() {
     let restarts: [fn(&mut Device); 4] = [
         Device::reset,
-        |device| device.links(false, true),
+        |device| device.set_links(Link::Down, Link::Up),
         |device| assert!(device.poll(50_000_000)),
         Device::enter_error,
     ];
     for restart in restarts {
         let mut device = device_in(device::State::Sync, true, Parameters::CNC);
-        let mut passage = device.begin(PortId::A);
-        for byte in Sync::of_master(30_500, 76, true).emit() {
+        let mut passage = device.passage(PortId::A);
+        for byte in Sync::of_master(30_500, 76, Place::Last).emit() {
             passage.byte(byte);
         }
         restart(&mut device);
         let before = device;
-        let handled = device.end(PortId::A, passage, ARRIVAL);
+        let handled = device.hear_passed(PortId::A, passage, ARRIVAL);
         assert_eq!((handled.result, handled.correction), (Err(Error::WrongState), Correction::None));
         assert_eq!(device, before);
     }
@@ -377,18 +384,18 @@ fn a_frame_that_began_before_a_restart_teaches_nothing_after_it() {
 #[test]
 fn only_one_port_faces_the_master() {
     let mut device = Device::new(device::Config::new());
-    device.links(true, true);
-    let mut frame = Discovery::request(false).emit();
-    assert_eq!(device.frame(PortId::A, &mut frame, ARRIVAL).path, Path::Forward);
+    device.set_links(Link::Up, Link::Up);
+    let mut frame = Discovery::request(Place::Inner).emit();
+    assert_eq!(device.hear(PortId::A, &mut frame, ARRIVAL).path, Path::Forward);
     // Back as it went out.
-    assert_eq!(device.frame(PortId::B, &mut frame, ARRIVAL).path, Path::Forward);
+    assert_eq!(device.hear(PortId::B, &mut frame, ARRIVAL).path, Path::Forward);
     // The second round: counted on the way out, and not again on the way back.
-    let mut frame = Discovery::request(false).emit();
-    device.frame(PortId::A, &mut frame, ARRIVAL).result.unwrap();
+    let mut frame = Discovery::request(Place::Inner).emit();
+    device.hear(PortId::A, &mut frame, ARRIVAL).result.unwrap();
     let mut returning = Discovery::parse(&frame).unwrap();
-    returning.pass(Entry::STOCK, true, false).unwrap();
+    returning.pass(Entry::STOCK, Status::LAST).unwrap();
     let mut bytes = returning.emit();
-    device.frame(PortId::B, &mut bytes, ARRIVAL).result.unwrap();
+    device.hear(PortId::B, &mut bytes, ARRIVAL).result.unwrap();
     assert_eq!(Discovery::parse(&bytes).unwrap(), returning);
     assert_eq!(device.assignment().map(|place| place.address.get()), Some(1));
     assert_eq!(device.master_port(), Some(PortId::A));

@@ -8,20 +8,27 @@
     clippy::unwrap_used
 )]
 
-use sorte_proto::master::{Action, Config, Counters, Master, Outgoing, State};
+use sorte_proto::Link;
+use sorte_proto::Place;
+use sorte_proto::master::{Action, Config, Counters, Heard, Master, Outgoing, State};
 use sorte_proto::{
-    DelayReq, DeviceAddress, DeviceFrame, Discovery, Entry, Error, ErrorClass, FrameType, Param, Parameters, Status,
-    Sync, fcs,
+    DelayReq, DeviceAddress, DeviceFrame, Discovery, Entry, Error, ErrorClass, FrameType, Param, Parameters,
+    RoundTrips, Status, Sync, fcs,
 };
+
+/// What device `n` of so many adds to STATUS.
+fn last_of(n: u8, devices: u8) -> Status {
+    if n == devices { Status::LAST } else { Status::empty() }
+}
 
 const FOREVER: Action = Action::Wait { until_ns: u64::MAX };
 /// 76 ns of cable and 320 ns in the device.
 const ROUND_TRIP: u64 = 472;
 
-fn discovery(devices: u8, last: bool) -> Vec<u8> {
-    let mut frame = Discovery::request(last);
+fn discovery(devices: u8, place: Place) -> Vec<u8> {
+    let mut frame = Discovery::request(place);
     for n in 1..=devices {
-        frame.pass(Entry::STOCK, n == devices, false).unwrap();
+        frame.pass(Entry::STOCK, last_of(n, devices)).unwrap();
     }
     frame.emit().to_vec()
 }
@@ -29,12 +36,12 @@ fn discovery(devices: u8, last: bool) -> Vec<u8> {
 /// What a line of so many devices without cables between them answers.
 fn answer(frame: Outgoing, devices: u8) -> Vec<u8> {
     match frame {
-        Outgoing::Discovery { last } => discovery(devices, last),
+        Outgoing::Discovery { place } => discovery(devices, place),
         Outgoing::Param(frame) => frame.emit().to_vec(),
         Outgoing::DelayReq(frame) => frame.emit().to_vec(),
         Outgoing::Sync(mut frame) => {
             for n in 1..=devices {
-                frame.pass(0, n == devices, false);
+                frame.pass(0, last_of(n, devices));
             }
             frame.emit().to_vec()
         }
@@ -51,7 +58,7 @@ struct Bench {
 impl Bench {
     fn new(config: Config) -> Self {
         let mut master = Master::new(config);
-        master.link(true);
+        master.set_link(Link::Up);
         Self { master, now_ns: 0, sent: Vec::new() }
     }
 
@@ -64,7 +71,7 @@ impl Bench {
                 Action::Send { at_ns, frame } => {
                     self.sent.push((at_ns, frame));
                     if let Some(bytes) = reply(self.sent.len() - 1, frame) {
-                        let _: Result<_, _> = self.master.receive(&bytes, at_ns + ROUND_TRIP);
+                        let _: Result<_, _> = self.master.hear(&bytes, at_ns + ROUND_TRIP);
                     }
                 }
                 Action::Exchange { at_ns, .. } => return Ok(at_ns),
@@ -82,7 +89,7 @@ impl Bench {
                 Action::Send { at_ns, frame } => {
                     bench.sent.push((at_ns, frame));
                     if kind(frame) != state {
-                        bench.master.receive(&answer(frame, 2), at_ns + ROUND_TRIP).unwrap();
+                        bench.master.hear(&answer(frame, 2), at_ns + ROUND_TRIP).unwrap();
                     }
                 }
                 other => panic!("{other:?}"),
@@ -95,7 +102,7 @@ impl Bench {
     fn cycles(&mut self, count: u32) {
         for _ in 0..count {
             for address in [1, 2] {
-                self.master.device_frame(&device_frame(address)).unwrap();
+                self.master.hear(&device_frame(address), 0).unwrap();
             }
             self.now_ns += 4000;
             assert!(matches!(self.master.poll(self.now_ns), Action::Exchange { stop: false, .. }));
@@ -119,7 +126,7 @@ fn running(config: Config) -> Bench {
 }
 
 fn device_frame(address: u8) -> [u8; 6] {
-    let (address, status) = (DeviceAddress::new(address).unwrap(), Status::of_device(address == 2, false));
+    let (address, status) = (DeviceAddress::new(address).unwrap(), last_of(address, 2));
     let mut bytes = [0; 6];
     DeviceFrame { address, status, payload: [0; 3] }.emit_into(&mut bytes).unwrap();
     bytes
@@ -129,16 +136,16 @@ fn device_frame(address: u8) -> [u8; 6] {
 fn nothing_happens_without_link_and_enable() {
     let mut master = Master::new(Config::new());
     assert_eq!(master.poll(0), FOREVER);
-    master.link(false);
+    master.set_link(Link::Down);
     assert_eq!((master.poll(0), master.counters().retrains), (FOREVER, 0));
-    master.link(true);
-    master.enable(false);
+    master.set_link(Link::Up);
+    master.disable();
     assert_eq!(master.poll(0), FOREVER);
-    master.enable(true);
-    assert!(matches!(master.poll(0), Action::Send { at_ns: 0, frame: Outgoing::Discovery { last: false } }));
+    master.enable();
+    assert!(matches!(master.poll(0), Action::Send { at_ns: 0, frame: Outgoing::Discovery { place: Place::Inner } }));
     // Up again, enabled again: nothing new.
-    master.link(true);
-    master.enable(true);
+    master.set_link(Link::Up);
+    master.enable();
     assert_eq!((master.state(), master.counters()), (State::Discovery, Counters::default()));
     assert_eq!(master.poll(999_999), Action::Wait { until_ns: 1_000_000 });
     assert!(matches!(master.poll(1_000_000), Action::Send { at_ns: 1_000_000, .. }));
@@ -147,15 +154,15 @@ fn nothing_happens_without_link_and_enable() {
 #[test]
 fn a_link_that_is_lost_ends_it_and_an_enable_bit_that_is_taken_stops_it() {
     let mut bench = running(Config::new());
-    bench.master.enable(false);
+    bench.master.disable();
     assert_eq!((bench.master.state(), bench.master.poll(bench.now_ns)), (State::Idle, FOREVER));
     let mut bench = running(Config::new());
-    bench.master.link(false);
+    bench.master.set_link(Link::Down);
     assert_eq!(bench.master.poll(bench.now_ns), Action::Restart { error: Error::LinkDown });
     assert_eq!((bench.master.state(), bench.master.counters().retrains), (State::Idle, 1));
     assert_eq!(bench.master.poll(bench.now_ns), FOREVER);
     // A pause of 30 ms, and from the beginning.
-    bench.master.link(true);
+    bench.master.set_link(Link::Up);
     let ready_ns = bench.now_ns + 30_000_000;
     assert_eq!(bench.master.poll(bench.now_ns), Action::Wait { until_ns: ready_ns });
     assert_eq!(bench.master.poll(ready_ns - 1), Action::Wait { until_ns: ready_ns });
@@ -169,9 +176,9 @@ fn too_few_devices_and_silence_are_told_apart() {
     assert_eq!(none.run(|_, _| None), Err(Some(Error::NoAnswer { sent: FrameType::Discovery, frame: 9 })));
     for (asked, found, want) in [(0, 0, 1), (3, 2, 3)] {
         let mut bench = Bench::new(Config::new().with_min_devices(asked));
-        let mut empty = Discovery::request(false);
+        let mut empty = Discovery::request(Place::Inner);
         empty.status |= Status::LAST;
-        let reply = if found == 0 { empty.emit().to_vec() } else { discovery(found, false) };
+        let reply = if found == 0 { empty.emit().to_vec() } else { discovery(found, Place::Inner) };
         let error = bench.run(|_, _| Some(reply.clone()));
         assert_eq!(error, Err(Some(Error::TooFewDevices { got: found, want })));
         assert_eq!(bench.sent.len(), 10);
@@ -202,7 +209,7 @@ fn discovery_needs_an_answer_of_the_last_device() {
     let Counters { crc_errors, format_errors, retrains, .. } = counters(&bench);
     assert_eq!((bench.sent.len(), crc_errors, format_errors, retrains), (1, 1, 0, 1));
     let mut bench = Bench::new(Config::new());
-    let error = bench.run(|_, _| Some(DelayReq::of_master(false).emit().to_vec()));
+    let error = bench.run(|_, _| Some(DelayReq::of_master(Place::Inner).emit().to_vec()));
     assert_eq!(error, Err(Some(Error::UnexpectedType { got: 3, want: 1 })));
     assert_eq!((counters(&bench).crc_errors, counters(&bench).format_errors), (0, 1));
 }
@@ -245,9 +252,9 @@ fn ten_param_frames_must_be_answered_and_ten_in_a_row_may_not_be() {
     assert!(patient.is_ok());
     // A damaged answer is none, and no reason to give up either.
     let mut bench = Bench::until(Config::new(), State::Param);
-    let mut damaged = Param::request(Parameters::STOCK, false).emit();
+    let mut damaged = Param::request(Parameters::STOCK, Place::Inner).emit();
     damaged[8] ^= 1;
-    assert_eq!(bench.master.receive(&damaged, bench.now_ns).map_err(Error::class), Err(ErrorClass::BadFcs));
+    assert_eq!(bench.master.hear(&damaged, bench.now_ns).map_err(Error::class), Err(ErrorClass::BadFcs));
     assert_eq!((bench.master.state(), counters(&bench).crc_errors, counters(&bench).retrains), (State::Param, 1, 0));
 }
 
@@ -267,11 +274,11 @@ fn a_delay_request_has_a_millisecond_to_come_back() {
     let until_ns = asked_ns + 1_000_000;
     assert_eq!(bench.master.poll(asked_ns), Action::Wait { until_ns });
     // DELAY_RESP tells nothing.
-    let mut response = DelayReq::of_device(false).emit();
+    let mut response = DelayReq::of_device(Place::Inner).emit();
     (response[2], response[3]) = (FrameType::DelayResp.code(), 0x30);
     let (body, trailer) = response.split_last_chunk_mut().unwrap();
     *trailer = fcs(body).to_le_bytes();
-    assert_eq!(bench.master.receive(&response, asked_ns + 500), Ok(()));
+    assert_eq!(bench.master.hear(&response, asked_ns + 500), Ok(Heard::StartUp));
     assert_eq!(bench.master.line_delay().count(), 0);
     assert_eq!(bench.master.poll(until_ns - 1), Action::Wait { until_ns });
     let error = Error::NoAnswer { sent: FrameType::DelayReq, frame: 0 };
@@ -279,19 +286,24 @@ fn a_delay_request_has_a_millisecond_to_come_back() {
     // One answer to one request.
     let mut bench = Bench::until(Config::new(), State::LineDelay);
     for _ in 0..3 {
-        bench.master.receive(&DelayReq::of_master(false).emit(), asked_ns + ROUND_TRIP).unwrap();
+        bench.master.hear(&DelayReq::of_master(Place::Inner).emit(), asked_ns + ROUND_TRIP).unwrap();
     }
-    assert_eq!((bench.master.line_delay().count(), bench.master.line_delay().extremes()), (1, Some((472, 472))));
+    assert_eq!(
+        (bench.master.line_delay().count(), bench.master.line_delay().extremes()),
+        (1, Some(RoundTrips { shortest_ns: 472, longest_ns: 472 }))
+    );
 }
 
 #[test]
 fn a_round_trip_that_cannot_be_ends_it() {
     let mut bench = Bench::new(Config::new());
-    let fast = |master: &mut Master, at_ns: u64, frame| master.receive(&answer(frame, 2), at_ns + 319);
+    let fast = |master: &mut Master, at_ns: u64, frame| master.hear(&answer(frame, 2), at_ns + 319).map(|_| ());
     let error = loop {
         match bench.master.poll(bench.now_ns) {
             Action::Wait { until_ns } => bench.now_ns = until_ns,
-            Action::Send { at_ns, frame } => fast(&mut bench.master, at_ns, frame).unwrap(),
+            Action::Send { at_ns, frame } => {
+                fast(&mut bench.master, at_ns, frame).unwrap();
+            }
             Action::Restart { error } => break error,
             Action::Exchange { .. } => panic!("it runs"),
         }
@@ -314,7 +326,7 @@ fn the_longest_line_is_the_one_that_the_delay_field_holds() {
         let mut bench = Bench::new(config.with_cycle_ns(1_000_000).with_sync_frames(2));
         bench.run(|_, frame| match frame {
             Outgoing::Sync(mut frame) => {
-                frame.pass(0, true, false);
+                frame.pass(0, Status::LAST);
                 frame.time_stamp_ns += beyond_ns;
                 Some(frame.emit().to_vec())
             }
@@ -334,8 +346,8 @@ fn the_cycle_is_looked_at_with_the_measured_cables() {
         let mut bench = Bench::new(Config::new().with_cycle_ns(cycle_ns).with_sync_frames(2));
         bench.run(|_, frame| match frame {
             Outgoing::Sync(mut frame) => {
-                frame.pass(1000, false, false);
-                frame.pass(0, true, false);
+                frame.pass(1000, Status::empty());
+                frame.pass(0, Status::LAST);
                 Some(frame.emit().to_vec())
             }
             frame => Some(answer(frame, 2)),
@@ -353,7 +365,7 @@ fn a_thousand_good_cycles_forgive_a_failure() {
         assert!(bench.run(|_, _| None).is_err());
         bench.now_ns = bench.run(|_, frame| Some(answer(frame, 2))).unwrap();
         bench.cycles(cycles);
-        bench.master.link(false);
+        bench.master.set_link(Link::Down);
         assert_eq!(bench.master.state(), want, "{cycles} cycles");
     }
     // Neither a cycle with a damaged frame nor one without a device is a good one.
@@ -363,14 +375,14 @@ fn a_thousand_good_cycles_forgive_a_failure() {
         bench.now_ns = bench.run(|_, frame| Some(answer(frame, 2))).unwrap();
         bench.cycles(999);
         for &address in heard {
-            bench.master.device_frame(&device_frame(address)).unwrap();
+            bench.master.hear(&device_frame(address), 0).unwrap();
         }
         let mut frame = device_frame(1);
         frame[3] ^= 1;
-        assert!(!damaged || bench.master.device_frame(&frame).is_err());
+        assert!(!damaged || bench.master.hear(&frame, 0).is_err());
         bench.now_ns += 4000;
         assert!(matches!(bench.master.poll(bench.now_ns), Action::Exchange { stop: false, .. }));
-        bench.master.link(false);
+        bench.master.set_link(Link::Down);
         assert_eq!(bench.master.state(), State::Error, "{heard:?}");
     }
     let mut tireless = Bench::new(Config::new());
@@ -384,7 +396,7 @@ fn what_is_missing_is_counted_and_named() {
     bench.cycles(5);
     let mut error = None;
     for n in 0..3 {
-        bench.master.device_frame(&device_frame(1)).unwrap();
+        bench.master.hear(&device_frame(1), 0).unwrap();
         bench.now_ns += 4000;
         match bench.master.poll(bench.now_ns) {
             Action::Exchange { .. } => assert!(n < 2),
@@ -401,7 +413,7 @@ fn what_is_missing_is_counted_and_named() {
 fn a_device_frame_must_fit_what_discovery_found() {
     let changed = |bytes: [u8; 6]| {
         let mut bench = running(Config::new());
-        let result = bench.master.device_frame(&bytes).map(|_| ());
+        let result = bench.master.hear(&bytes, 0).map(|_| ());
         (result, bench.master.poll(bench.now_ns))
     };
     let of = |address: u8, status: Status| {
@@ -417,30 +429,31 @@ fn a_device_frame_must_fit_what_discovery_found() {
     }
     assert_eq!(changed(device_frame(2)).0, Ok(()));
     let mut bench = running(Config::new());
-    bench.master.device_frame(&of(1, Status::ERROR)).unwrap();
-    bench.master.device_frame(&of(2, Status::LAST)).unwrap();
+    bench.master.hear(&of(1, Status::ERROR), 0).unwrap();
+    bench.master.hear(&of(2, Status::LAST), 0).unwrap();
     assert_eq!(counters(&bench).device_errors, 1);
     let mut damaged = device_frame(1);
     damaged[3] ^= 1;
-    assert!(bench.master.device_frame(&damaged).is_err());
-    assert!(bench.master.device_frame(&damaged[..5]).is_err());
+    assert!(bench.master.hear(&damaged, 0).is_err());
+    assert!(bench.master.hear(&damaged[..5], 0).is_err());
     assert_eq!((counters(&bench).crc_errors, counters(&bench).format_errors), (1, 1));
     let mut idle = Master::new(Config::new());
-    assert_eq!(idle.device_frame(&device_frame(1)).map(|_| ()), Err(Error::WrongState));
+    assert_eq!(idle.hear(&device_frame(1), 0), Err(Error::WrongState));
 }
 
 #[test]
 fn frames_of_the_start_up_have_their_states_lengths_and_preambles() {
     let mut idle = Master::new(Config::new());
-    assert_eq!(idle.receive(&discovery(2, false), 0), Err(Error::WrongState));
+    assert_eq!(idle.hear(&discovery(2, Place::Inner), 0), Err(Error::WrongState));
     let mut bench = running(Config::new());
-    assert_eq!(bench.master.receive(&discovery(2, false), 0), Err(Error::WrongState));
-    assert_eq!(counters(&bench).format_errors, 0);
+    // In the exchange every frame is looked at as a device's.
+    let late = bench.master.hear(&discovery(2, Place::Inner), 0).map(|_| ()).map_err(Error::class);
+    assert_eq!((late, counters(&bench).format_errors), (Err(ErrorClass::TooLong), 1));
     let lengths = [
-        (Outgoing::Discovery { last: false }, 1030, 8),
-        (Outgoing::Param(Param::request(Parameters::STOCK, false)), 40, 8),
-        (Outgoing::DelayReq(DelayReq::of_master(false)), 8, 8),
-        (Outgoing::Sync(Sync::of_master(500, 76, false)), 14, 4),
+        (Outgoing::Discovery { place: Place::Inner }, 1030, 8),
+        (Outgoing::Param(Param::request(Parameters::STOCK, Place::Inner)), 40, 8),
+        (Outgoing::DelayReq(DelayReq::of_master(Place::Inner)), 8, 8),
+        (Outgoing::Sync(Sync::of_master(500, 76, Place::Inner)), 14, 4),
     ];
     for (frame, len, preamble) in lengths {
         let mut buffer = [0; 1030];
@@ -456,8 +469,8 @@ fn the_master_frame_has_as_many_bytes_as_the_line_and_sixteen_at_least() {
     let mut bench = running(Config::new());
     let mut buffer = [0; 64];
     assert_eq!(bench.master.output_len(), 16);
-    assert_eq!(bench.master.write_frame(&[1; 16], 7, &mut buffer), Ok(21));
-    assert_eq!(bench.master.write_frame(&[1; 8], 7, &mut buffer), Err(Error::OutputLength { got: 8, want: 16 }));
+    assert_eq!(bench.master.emit_into(&[1; 16], 7, &mut buffer), Ok(21));
+    assert_eq!(bench.master.emit_into(&[1; 8], 7, &mut buffer), Err(Error::OutputLength { got: 8, want: 16 }));
     bench = Bench::new(Config::new().with_cycle_ns(8000).with_sync_frames(2));
     bench.run(|_, frame| Some(answer(frame, 5))).unwrap();
     assert_eq!((bench.master.output_len(), bench.master.network().devices()), (20, 5));

@@ -5,35 +5,37 @@
 mod common;
 
 use common::device_in;
+use sorte_proto::Link;
+use sorte_proto::Place;
 use sorte_proto::cut_through::{DiscoveryRewriter, SyncRewriter};
-use sorte_proto::device::{Arrival, Config, Device, Path, PortId, State, Trigger};
+use sorte_proto::device::{Config, Device, FrameTimes, Path, PortId, State, Trigger};
 use sorte_proto::{
     DelayReq, Discovery, Entry, Error, ErrorClass, FrameType, LongFrame, Param, Parameters, Status, Sync, fcs,
 };
 
 const STOCK: Parameters = Parameters::STOCK;
-const ARRIVAL: Arrival = Arrival { sof_ns: 0, counter_ns: 0, now_ns: 0 };
+const ARRIVAL: FrameTimes = FrameTimes { sof_ns: 0, counter_ns: 0, now_ns: 0 };
 
 fn frames() -> [Vec<u8>; 4] {
     [
-        Discovery::request(false).emit().to_vec(),
-        Param::request(Parameters::STOCK, false).emit().to_vec(),
-        DelayReq::of_master(false).emit().to_vec(),
-        Sync::of_master(500, 76, false).emit().to_vec(),
+        Discovery::request(Place::Inner).emit().to_vec(),
+        Param::request(Parameters::STOCK, Place::Inner).emit().to_vec(),
+        DelayReq::of_master(Place::Inner).emit().to_vec(),
+        Sync::of_master(500, 76, Place::Inner).emit().to_vec(),
     ]
 }
 
 /// What each of them says; a good frame of another type is none of a rewriter's business.
 fn classes(frame: &[u8], devices: &[Device]) -> Vec<Option<ErrorClass>> {
-    let mut discovery = DiscoveryRewriter::new(Entry::STOCK, false, false);
-    let mut sync = SyncRewriter::new(85, false, false);
+    let mut discovery = DiscoveryRewriter::new(Entry::STOCK, Status::empty());
+    let mut sync = SyncRewriter::new(85, Status::empty());
     for byte in frame {
         discovery.byte(*byte);
         sync.byte(*byte);
     }
-    let buffered = LongFrame::new(frame).map(|_| ());
+    let buffered = LongFrame::parse(frame).map(|_| ());
     let mut all = vec![buffered, discovery.finish().map(|_| ()), sync.finish().map(|_| ())];
-    all.extend(devices.iter().map(|device| device.clone().frame(PortId::A, &mut frame.to_vec(), ARRIVAL).result));
+    all.extend(devices.iter().map(|device| device.clone().hear(PortId::A, &mut frame.to_vec(), ARRIVAL).result));
     let class = |result: Result<(), Error>| result.err().map(Error::class);
     all.into_iter().map(class).filter(|class| *class != Some(ErrorClass::UnexpectedType)).collect()
 }
@@ -94,24 +96,24 @@ fn a_frame_that_is_wrong_with_a_right_fcs_has_one_reason() {
 fn an_error_is_kept_until_a_status_byte_carries_it() {
     for last in [false, true] {
         let mut device = device_in(State::Discovery, last, STOCK);
-        let mut flipped = Discovery::request(false).emit();
+        let mut flipped = Discovery::request(Place::Inner).emit();
         flipped[2] ^= 2;
-        let handled = device.frame(PortId::A, &mut flipped, ARRIVAL);
+        let handled = device.hear(PortId::A, &mut flipped, ARRIVAL);
         assert_eq!(handled.result.map_err(Error::class), Err(ErrorClass::BadFcs), "last: {last}");
         // Frames that the rewriter lets pass unchanged, one of them damaged in DA.
-        let mut foreign = DelayReq::of_master(false).emit();
+        let mut foreign = DelayReq::of_master(Place::Inner).emit();
         let sent = foreign;
-        assert_eq!(device.frame(PortId::A, &mut foreign, ARRIVAL).result, Ok(()));
+        assert_eq!(device.hear(PortId::A, &mut foreign, ARRIVAL).result, Ok(()));
         assert_eq!(foreign, sent);
         let counters = device.counters();
         assert_eq!((counters.crc_errors, counters.format_errors), (1, 0));
         assert_eq!((counters.a.crc_errors, counters.b.crc_errors), (1, 0));
 
-        let mut next = Discovery::request(false).emit();
-        assert_eq!(device.frame(PortId::A, &mut next, ARRIVAL).result, Ok(()));
+        let mut next = Discovery::request(Place::Inner).emit();
+        assert_eq!(device.hear(PortId::A, &mut next, ARRIVAL).result, Ok(()));
         assert!(Discovery::parse(&next).unwrap().status.contains(Status::ERROR), "last: {last}");
-        let mut after = Discovery::request(false).emit();
-        assert_eq!(device.frame(PortId::A, &mut after, ARRIVAL).result, Ok(()));
+        let mut after = Discovery::request(Place::Inner).emit();
+        assert_eq!(device.hear(PortId::A, &mut after, ARRIVAL).result, Ok(()));
         assert!(!Discovery::parse(&after).unwrap().status.contains(Status::ERROR), "last: {last}");
     }
 }
@@ -121,13 +123,13 @@ fn an_error_is_kept_until_a_status_byte_carries_it() {
 fn an_error_is_kept_by_a_frame_without_a_status_byte() {
     for (len, kept) in [(0, true), (3, true), (4, false)] {
         let mut device = device_in(State::Discovery, true, STOCK);
-        let mut flipped = Discovery::request(false).emit();
+        let mut flipped = Discovery::request(Place::Inner).emit();
         flipped[2] ^= 2;
-        assert!(device.frame(PortId::A, &mut flipped, ARRIVAL).result.is_err());
-        let mut cut = Discovery::request(false).emit();
-        assert!(device.frame(PortId::A, &mut cut[..len], ARRIVAL).result.is_err());
-        let mut next = Discovery::request(false).emit();
-        assert_eq!(device.frame(PortId::A, &mut next, ARRIVAL).result, Ok(()));
+        assert!(device.hear(PortId::A, &mut flipped, ARRIVAL).result.is_err());
+        let mut cut = Discovery::request(Place::Inner).emit();
+        assert!(device.hear(PortId::A, &mut cut[..len], ARRIVAL).result.is_err());
+        let mut next = Discovery::request(Place::Inner).emit();
+        assert_eq!(device.hear(PortId::A, &mut next, ARRIVAL).result, Ok(()));
         assert_eq!(Discovery::parse(&next).unwrap().status.contains(Status::ERROR), kept, "{len} bytes");
     }
 }
@@ -135,7 +137,7 @@ fn an_error_is_kept_by_a_frame_without_a_status_byte() {
 /// Type 4 is defined by the vendor and sent by nobody: whoever gets one goes on as if it had not come.
 #[test]
 fn a_delay_response_is_accepted_and_ignored() {
-    let mut response = DelayReq::of_device(false).emit();
+    let mut response = DelayReq::of_device(Place::Inner).emit();
     (response[2], response[3]) = (FrameType::DelayResp.code(), 0x30);
     let (body, trailer) = response.split_last_chunk_mut().unwrap();
     *trailer = fcs(body).to_le_bytes();
@@ -143,13 +145,13 @@ fn a_delay_response_is_accepted_and_ignored() {
         for last in [false, true] {
             let mut device = device_in(state, last, STOCK);
             let before = device.counters();
-            assert_eq!(device.frame(PortId::A, &mut response.clone(), ARRIVAL).result, Ok(()));
+            assert_eq!(device.hear(PortId::A, &mut response.clone(), ARRIVAL).result, Ok(()));
             assert_eq!((device.state(), device.counters().format_errors), (state, before.format_errors));
         }
     }
     let mut device = device_in(State::LineDelay, false, STOCK);
     let (before, counted) = (device.line_delay_next_ns(), device.counters());
-    assert_eq!(device.delay_reflection(Trigger::Normal, &response, 560), Ok(()));
+    assert_eq!(device.hear_reflection(Trigger::Normal, &response, 560), Ok(()));
     assert_eq!((device.counters().format_errors, device.line_delay_next_ns()), (0, before));
     // It came to the port that does not face the master.
     assert_eq!((device.counters().a, device.counters().b.good_frames), (counted.a, counted.b.good_frames + 1));
@@ -162,13 +164,13 @@ fn the_path_is_known_before_a_device_has_to_send() {
         for last in [false, true] {
             let device = device_in(state, last, STOCK);
             let want = if last || state == State::LineDelay { Path::Reflect } else { Path::Forward };
-            assert_eq!(device.begin(PortId::A).path(), Some(want), "{state:?}");
+            assert_eq!(device.passage(PortId::A).path(), Some(want), "{state:?}");
         }
     }
     let mut idle = Device::new(Config::new());
-    idle.links(true, false);
+    idle.set_links(Link::Up, Link::Down);
     for (frame, want) in frames().into_iter().zip([Path::Reflect, Path::Absorb, Path::Absorb, Path::Absorb]) {
-        let mut passage = idle.begin(PortId::A);
+        let mut passage = idle.passage(PortId::A);
         for (at, byte) in frame.iter().enumerate() {
             passage.byte(*byte);
             assert_eq!(passage.path(), (at >= 2).then_some(want), "byte {at}");

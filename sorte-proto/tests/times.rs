@@ -11,23 +11,30 @@
 mod common;
 
 use common::device_in;
-use sorte_proto::device::{self, Arrival, Device, PortId};
-use sorte_proto::master::{self, Action, Master, Outgoing};
+use sorte_proto::Link;
+use sorte_proto::Place;
+use sorte_proto::device::{self, Device, FrameTimes, PortId};
+use sorte_proto::master::{self, Action, Heard, Master, Outgoing};
 use sorte_proto::{
-    Correction, DeviceAddress, DeviceFrame, Discovery, Entry, Error, Parameters, Status, Sync, write_master_frame,
+    Correction, DeviceAddress, DeviceFrame, Discovery, Entry, Error, Parameters, Status, Sync, emit_master_frame_into,
 };
+
+/// What device `n` of so many adds to STATUS.
+fn last_of(n: u8, devices: u8) -> Status {
+    if n == devices { Status::LAST } else { Status::empty() }
+}
 
 fn answer(frame: Outgoing, devices: u8) -> Vec<u8> {
     match frame {
-        Outgoing::Discovery { last } => {
-            let mut frame = Discovery::request(last);
+        Outgoing::Discovery { place } => {
+            let mut frame = Discovery::request(place);
             for n in 1..=devices {
-                frame.pass(Entry::STOCK, n == devices, false).unwrap();
+                frame.pass(Entry::STOCK, last_of(n, devices)).unwrap();
             }
             frame.emit().to_vec()
         }
         Outgoing::Sync(mut frame) => {
-            frame.pass(0, true, false);
+            frame.pass(0, Status::LAST);
             frame.emit().to_vec()
         }
         Outgoing::Param(frame) => frame.emit().to_vec(),
@@ -38,7 +45,7 @@ fn answer(frame: Outgoing, devices: u8) -> Vec<u8> {
 /// A master in the IO exchange with two devices, and what it did until then.
 fn running(config: master::Config) -> (Master, Vec<(u64, Outgoing)>, (u64, u16)) {
     let mut master = Master::new(config);
-    master.link(true);
+    master.set_link(Link::Up);
     let (mut sent, mut now_ns) = (Vec::new(), 0);
     loop {
         match master.poll(now_ns) {
@@ -46,7 +53,7 @@ fn running(config: master::Config) -> (Master, Vec<(u64, Outgoing)>, (u64, u16))
             Action::Send { at_ns, frame } => {
                 sent.push((at_ns, frame));
                 // 472 ns of round trip: a line of 76 ns.
-                assert_eq!(master.receive(&answer(frame, 2), at_ns + 472), Ok(()));
+                assert_eq!(master.hear(&answer(frame, 2), at_ns + 472), Ok(Heard::StartUp));
             }
             Action::Exchange { at_ns, time_stamp, cycle, .. } => {
                 assert_eq!(cycle, 0);
@@ -68,7 +75,7 @@ fn the_start_up_has_the_published_times() {
             if n < 36 { (n / 10, n as u64 * 1_000_000) } else { (9, 36_000_500 + (n as u64 - 36) * 10_000) };
         assert_eq!(*at_ns, want, "frame {n}");
         match frame {
-            Outgoing::Discovery { last } => assert_eq!((phase, *last), (0, n == 9)),
+            Outgoing::Discovery { place } => assert_eq!((phase, *place == Place::Last), (0, n == 9)),
             Outgoing::Param(_) => assert_eq!(phase, 1),
             Outgoing::DelayReq(_) => assert!(phase == 2 || phase == 3),
             Outgoing::Sync(frame) => {
@@ -100,7 +107,7 @@ fn each_cycle_has_its_own_time_stamp() {
 }
 
 fn device_frame(address: u8) -> [u8; 6] {
-    let status = Status::of_device(address == 2, false);
+    let status = if address == 2 { Status::LAST } else { Status::empty() };
     let mut bytes = [0; 6];
     DeviceFrame { address: DeviceAddress::new(address).unwrap(), status, payload: [0; 3] }
         .emit_into(&mut bytes)
@@ -109,7 +116,7 @@ fn device_frame(address: u8) -> [u8; 6] {
 }
 
 fn good_frame(master: &mut Master, address: u8) {
-    assert!(master.device_frame(&device_frame(address)).is_ok());
+    assert!(master.hear(&device_frame(address), 0).is_ok());
 }
 
 /// Runs cycles in which `bad(n)` devices are heard right; gives the cycle in which the master gave up.
@@ -119,7 +126,7 @@ fn cycles(master: &mut Master, mut at_ns: u64, frames: impl Fn(u32) -> [Option<b
             let mut bytes = device_frame(address);
             bytes[2] ^= u8::from(good == Some(false));
             if good.is_some() {
-                let _: Result<_, _> = master.device_frame(&bytes);
+                let _: Result<_, _> = master.hear(&bytes, 0);
             }
         }
         at_ns += 4000;
@@ -163,18 +170,18 @@ fn the_master_gives_up_after_three_bad_cycles_in_a_row() {
 fn the_last_sync_needs_last_and_state_change() {
     for (status, want) in [(0x09, true), (0x08, false), (0x01, false), (0x00, false), (0x0d, true)] {
         let mut master = Master::new(master::Config::new().with_sync_frames(4));
-        master.link(true);
+        master.set_link(Link::Up);
         let mut now_ns = 0;
         let ran = loop {
             match master.poll(now_ns) {
                 Action::Wait { until_ns } => now_ns = until_ns,
                 Action::Send { at_ns, frame: Outgoing::Sync(mut frame) } => {
-                    frame.pass(0, false, false);
+                    frame.pass(0, Status::empty());
                     frame.status = Status::from_bits_retain(status);
-                    let _: Result<_, _> = master.receive(&frame.emit(), at_ns + 472);
+                    let _: Result<_, _> = master.hear(&frame.emit(), at_ns + 472);
                 }
                 Action::Send { at_ns, frame } => {
-                    let _: Result<_, _> = master.receive(&answer(frame, 2), at_ns + 472);
+                    let _: Result<_, _> = master.hear(&answer(frame, 2), at_ns + 472);
                 }
                 Action::Exchange { .. } => break true,
                 Action::Restart { .. } => break false,
@@ -187,8 +194,8 @@ fn the_last_sync_needs_last_and_state_change() {
 /// The only device of a line that is 76 ns long, in the IO exchange; its last SYNC frame began at 77,000 ns of its counter.
 fn device_in_exchange() -> Device {
     let mut device = device_in(device::State::Sync, true, Parameters::CNC);
-    let arrival = Arrival { sof_ns: 77_000, counter_ns: 77_700, now_ns: 0 };
-    let handled = device.frame(PortId::A, &mut Sync::of_master(30_500, 76, true).emit(), arrival);
+    let arrival = FrameTimes { sof_ns: 77_000, counter_ns: 77_700, now_ns: 0 };
+    let handled = device.hear(PortId::A, &mut Sync::of_master(30_500, 76, Place::Last).emit(), arrival);
     // Time stamp 30,856, 700 ns since the start, 135 ns until the write is made.
     assert_eq!((handled.result, handled.correction), (Ok(()), Correction::Set { counter_ns: 31_691 }));
     device
@@ -211,10 +218,10 @@ fn a_device_enters_the_exchange_ten_microseconds_after_the_last_sync() {
 fn in_the_exchange_a_frame_is_expected_at_its_delay_and_500_ns() {
     let mut device = device_in_exchange();
     let mut frame = [0; 21];
-    write_master_frame(&[7; 16], 1000, &mut frame).unwrap();
+    emit_master_frame_into(&[7; 16], 1000, &mut frame).unwrap();
     for n in 1..=16 {
         // 23 ns late each time.
-        let output = device.exchange(&frame, 500 + 76 + 23, 2000).unwrap();
+        let output = device.hear_exchange(&frame, 500 + 76 + 23, 2000).unwrap();
         assert_eq!(output.reference_ns, 1076);
         let want = if n == 16 { Correction::Rate { increment: 4, ticks: 23 } } else { Correction::None };
         assert_eq!(output.correction, want);
@@ -222,7 +229,7 @@ fn in_the_exchange_a_frame_is_expected_at_its_delay_and_500_ns() {
     // A sum of 0 counts as positive.
     for n in 1..=16 {
         let want = if n == 16 { Correction::Rate { increment: 6, ticks: 0 } } else { Correction::None };
-        assert_eq!(device.exchange(&frame, 500 + 76, 2000).unwrap().correction, want);
+        assert_eq!(device.hear_exchange(&frame, 500 + 76, 2000).unwrap().correction, want);
     }
 }
 
@@ -231,13 +238,13 @@ fn in_the_exchange_a_frame_is_expected_at_its_delay_and_500_ns() {
 fn an_error_is_told_once() {
     let mut device = device_in_exchange();
     let mut frame = [0; 21];
-    write_master_frame(&[7; 16], 1000, &mut frame).unwrap();
+    emit_master_frame_into(&[7; 16], 1000, &mut frame).unwrap();
     frame[3] ^= 1;
     let mut told = Vec::new();
     for _ in 0..3 {
         told.push(device.answer([0; 3]).unwrap().status.bits());
         if told.len() == 1 {
-            assert!(matches!(device.exchange(&frame, 576, 2000), Err(Error::BadCrc8 { .. })));
+            assert!(matches!(device.hear_exchange(&frame, 576, 2000), Err(Error::BadCrc8 { .. })));
         }
     }
     // LAST; LAST and ERROR; LAST.

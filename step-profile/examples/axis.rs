@@ -3,7 +3,9 @@
 //! `cargo run -p step-profile --example axis`
 #![allow(clippy::arithmetic_side_effects)]
 
-use step_profile::motion::{Arc, AxisSetup, Clock, Homing, HomingConfig, HomingState, Limits, Mover, Path, PathMover};
+use step_profile::motion::{
+    Arc, AxisSetup, Clock, Homing, HomingConfig, HomingState, Limits, Mover, Path, PathMover, Switch, Turning,
+};
 use step_profile::{Direction, Error, Frequency, Microstep, Parameters, Profile, RampTable, Speed};
 
 /// Where the reference switch closes, seen from where the axis is switched on.
@@ -11,7 +13,7 @@ const SWITCH: i64 = -700;
 
 fn main() -> Result<(), Box<dyn core::error::Error>> {
     // A motor driver for 1/8 steps, and what its control register is told.
-    let microstep = Microstep::new(3).ok_or("no such profile")?;
+    let microstep = Microstep::from_code(3).ok_or("no such profile")?;
     println!("{microstep:?}: CTRL.MODE {:#05x}", microstep.ctrl_field());
 
     let limits = Limits::new(20_000, 200_000)?.with_jerk(4_000_000)?;
@@ -19,7 +21,7 @@ fn main() -> Result<(), Box<dyn core::error::Error>> {
     let hard = limits.without_jerk();
     let mut x = Mover::new(Clock::MICROSECONDS, limits)?.with_reversal_pause(500);
     let config = HomingConfig::new(Direction::Reverse, 4000, 400, 5000, hard).with_back_off(100);
-    let mut homing = Homing::start(config, &mut x, false, 0)?;
+    let mut homing = Homing::start(config, &mut x, Switch::Open, 0)?;
     let mut now = 0;
     let mut made = 0;
     while !matches!(homing.state(), HomingState::Done | HomingState::Failed) {
@@ -30,9 +32,9 @@ fn main() -> Result<(), Box<dyn core::error::Error>> {
             }
             None => now += 1000,
         }
-        homing.poll(&mut x, made <= SWITCH, now)?;
+        homing.poll(&mut x, if made <= SWITCH { Switch::Closed } else { Switch::Open }, now)?;
     }
-    println!("homed at {now} us: {:?}, position {} after {made} steps", homing.state(), x.position());
+    println!("homed at {now} us: {:?}, position {} after {made} steps", homing.state(), x.commanded());
 
     // Work, with other limits and between soft ones.
     x.set_limits(limits.with_speed(15_000)?, now)?;
@@ -57,7 +59,7 @@ fn main() -> Result<(), Box<dyn core::error::Error>> {
 
 /// Takes steps until it is there.
 fn run(x: &mut Mover, position: i64, now: &mut u64) {
-    while x.position() < position {
+    while x.commanded() < position {
         let Some(pulse) = x.pulse() else { return };
         *now = pulse.tick;
     }
@@ -68,7 +70,7 @@ fn corner() -> Result<(), Box<dyn core::error::Error>> {
     let axis = AxisSetup::new(Limits::new(20_000, 200_000)?, 80_000);
     let mut path = Path::<2, 64>::new(Clock::MICROSECONDS, [axis; 2], 20)?;
     path.push([800, 0], 100_000)?;
-    for end in Arc::new([10_000, 0], [15_000, 5000], [10_000, 5000], false, 5)? {
+    for end in Arc::new([10_000, 0], [15_000, 5000], [10_000, 5000], Turning::Counterclockwise, 5)? {
         path.push(end.map(|um| i64::from(um) * 80 / 1000), 100_000)?;
     }
     path.not_before(1_000_000);
@@ -95,25 +97,25 @@ fn feed() -> Result<(), Box<dyn core::error::Error>> {
     let mut now = 0;
     while let Some(pulse) = machine.pulse() {
         now = pulse.tick;
-        match machine.position() {
+        match machine.commanded() {
             [1000, _] if pulse.axis == 0 => machine.set_override(50, now),
             [3000, _] if pulse.axis == 0 => machine.hold(now),
             _ => {}
         }
     }
     now += 1_000_000;
-    println!("held at {:?}, {} lines left, at rest: {}", machine.position(), machine.len(), machine.is_at_rest(now));
+    println!("held at {:?}, {} lines left, at rest: {}", machine.commanded(), machine.len(), machine.is_at_rest(now));
     machine.set_override(120, now);
     machine.resume(now);
     while let Some(pulse) = machine.pulse() {
         now = pulse.tick;
-        if machine.position() == [8000, 6000] {
+        if machine.commanded() == [8000, 6000] {
             machine.stop(now);
             println!("a stop from {} ends at {:?}", machine.at(now)[1], machine.target());
             machine.move_to([0, 0], 200_000, now)?;
         }
     }
-    println!("home: {:?}, halted: {}", machine.position(), machine.is_halted());
+    println!("home: {:?}, halted: {}", machine.commanded(), machine.is_halted());
     Ok(())
 }
 

@@ -3,7 +3,7 @@
 //! `cargo run -p step-profile --example phase_zero`
 #![allow(clippy::arithmetic_side_effects)]
 
-use step_profile::{Error, Parameters, Profile, RampTable, Speed};
+use step_profile::{Error, NamedSpeed, Parameters, Profile, RampTable, Speed};
 
 fn main() -> Result<(), Error> {
     let sum: u32 = RampTable::SIN2.entries().iter().sum();
@@ -12,7 +12,7 @@ fn main() -> Result<(), Error> {
 
     println!("A full turn, 51200 steps. Pulses whose sync_time a PTO word cannot carry:\n");
     println!("     speed  initial sync_time      0 (read as no pulse)  3991..=3999 (reserved)");
-    for (hz, speed) in Speed::NAMED {
+    for NamedSpeed { hz, speed } in Speed::NAMED {
         for init_sync in [0, Parameters::INIT_SYNC] {
             let profile = Profile::new(Parameters::at(speed).with_init_sync(init_sync))?;
             let (mut silent, mut reserved) = (0, 0);

@@ -20,6 +20,6 @@ fn main() -> Result<(), Error> {
         cycles += 1;
     }
     println!("{} notes: {pulses} pulses to four motors in {} ms", song.len(), cycles * 4 / 1000);
-    println!("each motor turned by {:?} steps of 1/51200 turn", dance.group().positions());
+    println!("each motor turned by {:?} steps of 1/51200 turn", dance.group().commanded());
     Ok(())
 }

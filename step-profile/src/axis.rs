@@ -4,45 +4,35 @@ use crate::error::Error;
 use crate::profile::Profile;
 use crate::ramp_steps::{MoveState, RampSteps};
 
-/// The DIR signal of a stepper driver.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-#[cfg_attr(feature = "arbitrary", derive(arbitrary::Arbitrary))]
-pub enum Direction {
-    /// DIR = 0; positions count upwards.
-    #[default]
-    Forward,
-    /// DIR = 1; positions count downwards.
-    Reverse,
+servowire_core::codes! {
+    /// The DIR signal of a stepper driver; the code is its level, bit 15 of the PTO word (TIDEP0061, section 2.4.2).
+    #[derive(Default)]
+    pub enum Direction: u8 {
+        /// DIR = 0; steps count upwards.
+        #[default]
+        Forward = 0 => "forward",
+        /// DIR = 1; steps count downwards.
+        Reverse = 1 => "reverse",
+    }
 }
 
 impl Direction {
-    /// The level of DIR: bit 15 of the PTO word (TIDEP0061, section 2.4.2).
+    /// Whether DIR is high.
     pub const fn dir(self) -> bool {
         matches!(self, Self::Reverse)
     }
 
-    /// The direction of a level of DIR.
-    pub const fn from_dir(dir: bool) -> Self {
-        if dir { Self::Reverse } else { Self::Forward }
+    /// The way of so many steps; forward for 0.
+    pub(crate) const fn of(steps: i64) -> Self {
+        if steps < 0 { Self::Reverse } else { Self::Forward }
     }
 
-    /// `position` one step on.
-    pub(crate) const fn advance(self, position: i64) -> i64 {
+    /// `steps` one step on.
+    pub(crate) const fn advance(self, steps: i64) -> i64 {
         match self {
-            Self::Forward => position.wrapping_add(1),
-            Self::Reverse => position.wrapping_sub(1),
+            Self::Forward => steps.wrapping_add(1),
+            Self::Reverse => steps.wrapping_sub(1),
         }
-    }
-}
-
-impl fmt::Display for Direction {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.pad(match self {
-            Self::Forward => "forward",
-            Self::Reverse => "reverse",
-        })
     }
 }
 
@@ -96,7 +86,7 @@ impl fmt::Display for Command {
 /// let mut axis = Axis::new();
 /// axis.start(profile, 3, Direction::Reverse)?;
 /// let pulses = (0..1000).filter(|_| matches!(axis.tick(), Command::Pulse { .. })).count();
-/// assert_eq!((pulses, axis.position()), (3, -3));
+/// assert_eq!((pulses, axis.commanded()), (3, -3));
 /// # Ok::<_, step_profile::Error>(())
 /// ```
 #[derive(Debug, Clone, Default)]
@@ -107,13 +97,13 @@ pub struct Axis<'t> {
     /// Cycles before the cycle of that pulse.
     wait: u32,
     direction: Direction,
-    position: i64,
+    commanded: i64,
 }
 
 impl<'t> Axis<'t> {
-    /// An axis at rest at position 0, DIR = 0.
+    /// An axis at rest, nothing commanded yet, DIR = 0.
     pub const fn new() -> Self {
-        Self { steps: None, wait: 0, direction: Direction::Forward, position: 0 }
+        Self { steps: None, wait: 0, direction: Direction::Forward, commanded: 0 }
     }
 
     /// Starts a move of `steps` steps. The next [`tick`](Self::tick) is cycle 0 of the move.
@@ -150,7 +140,7 @@ impl<'t> Axis<'t> {
             Some(next) => self.wait = next.cnt.saturating_sub(1),
             None => self.steps = None,
         }
-        self.position = direction.advance(self.position);
+        self.commanded = direction.advance(self.commanded);
         Command::Pulse { direction, sync_time }
     }
 
@@ -175,14 +165,14 @@ impl<'t> Axis<'t> {
         self.direction
     }
 
-    /// Steps made forward less steps made in reverse.
-    pub const fn position(&self) -> i64 {
-        self.position
+    /// Steps commanded so far, forward less reverse ones. No shaft is looked at: what the motor has made of them is not known here.
+    pub const fn commanded(&self) -> i64 {
+        self.commanded
     }
 
-    /// Declares the present position to be `position`, a reference for instance.
-    pub fn set_position(&mut self, position: i64) {
-        self.position = position;
+    /// Declares that so many steps lead to where the axis is, 0 at a reference for instance.
+    pub fn set_commanded(&mut self, steps: i64) {
+        self.commanded = steps;
     }
 }
 
@@ -231,7 +221,7 @@ mod tests {
             let mut axis = Axis::new();
             axis.start(profile, n, Direction::Forward).unwrap();
             prop_assert_eq!(pulses(&mut axis, end), steps);
-            prop_assert_eq!((axis.position(), axis.state()), (i64::from(n), MoveState::Idle));
+            prop_assert_eq!((axis.commanded(), axis.state()), (i64::from(n), MoveState::Idle));
         }
 
         /// Every move that is given up ends at standstill, within the steps it had.
@@ -246,7 +236,7 @@ mod tests {
             prop_assert_eq!(axis.state(), MoveState::Idle);
             prop_assert!(before + after <= n as usize);
             prop_assert!(before > 0 || after == 0);
-            prop_assert_eq!(axis.position(), i64::try_from(before + after).unwrap());
+            prop_assert_eq!(axis.commanded(), i64::try_from(before + after).unwrap());
         }
     }
 
@@ -254,7 +244,7 @@ mod tests {
     fn dir_is_held_and_a_refused_start_changes_nothing() {
         let profile = profile(262_144, 1, 1000);
         let mut axis = Axis::new();
-        axis.set_position(10);
+        axis.set_commanded(10);
         axis.start(profile, 3, Direction::Reverse).unwrap();
         for _ in 0..500 {
             assert_eq!(axis.start(profile, 9, Direction::Forward), Err(Error::Moving));
@@ -262,10 +252,10 @@ mod tests {
         }
         assert_eq!(axis.state(), MoveState::RampUp);
         assert_eq!(pulses(&mut axis, 1000).len(), 2);
-        assert_eq!((axis.position(), axis.direction()), (7, Direction::Reverse));
+        assert_eq!((axis.commanded(), axis.direction()), (7, Direction::Reverse));
         axis.start(profile, 0, Direction::Forward).unwrap();
         assert_eq!(axis.tick(), Command::Hold { direction: Direction::Reverse });
-        assert_eq!(Direction::from_dir(axis.direction().dir()), Direction::Reverse);
+        assert_eq!(axis.direction().code(), 1);
     }
 
     #[test]
@@ -281,6 +271,6 @@ mod tests {
             }
         }
         assert_eq!(counts, [100; 4]);
-        assert!(axes.0.iter().all(|axis| axis.position() == 100));
+        assert!(axes.0.iter().all(|axis| axis.commanded() == 100));
     }
 }

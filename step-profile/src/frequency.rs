@@ -3,10 +3,10 @@ use core::fmt;
 use crate::error::Error;
 
 /// A step frequency as a fraction in Hz.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-#[cfg_attr(feature = "serde", serde(try_from = "(u32, u16)", into = "(u32, u16)"))]
+#[cfg_attr(feature = "serde", serde(try_from = "Ratio"))]
 pub struct Frequency {
     numerator: u32,
     denominator: u16,
@@ -37,9 +37,14 @@ impl Frequency {
         }
     }
 
-    /// Numerator and denominator in Hz, as given.
-    pub const fn ratio(self) -> (u32, u16) {
-        (self.numerator, self.denominator)
+    /// The numerator in Hz, as given.
+    pub const fn numerator(self) -> u32 {
+        self.numerator
+    }
+
+    /// The denominator, as given: 1 or more.
+    pub const fn denominator(self) -> u16 {
+        self.denominator
     }
 
     /// Steps in `ms` milliseconds at this frequency, rounded half up; 2^32 - 1 if there are more.
@@ -63,17 +68,20 @@ impl fmt::Display for Frequency {
     }
 }
 
-impl TryFrom<(u32, u16)> for Frequency {
-    type Error = Error;
-
-    fn try_from((numerator, denominator): (u32, u16)) -> Result<Self, Error> {
-        Self::from_ratio(numerator, denominator).ok_or(Error::ZeroDenominator)
-    }
+/// A frequency that is still to be checked.
+#[cfg(feature = "serde")]
+#[derive(serde::Deserialize)]
+struct Ratio {
+    numerator: u32,
+    denominator: u16,
 }
 
-impl From<Frequency> for (u32, u16) {
-    fn from(frequency: Frequency) -> Self {
-        frequency.ratio()
+#[cfg(feature = "serde")]
+impl TryFrom<Ratio> for Frequency {
+    type Error = Error;
+
+    fn try_from(Ratio { numerator, denominator }: Ratio) -> Result<Self, Error> {
+        Self::from_ratio(numerator, denominator).ok_or(Error::ZeroDenominator)
     }
 }
 
@@ -83,6 +91,17 @@ impl<'a> arbitrary::Arbitrary<'a> for Frequency {
     fn arbitrary(u: &mut arbitrary::Unstructured<'a>) -> arbitrary::Result<Self> {
         Ok(Self { numerator: u.arbitrary()?, denominator: u.int_in_range(1..=u16::MAX)? })
     }
+}
+
+/// One of the speeds that TI's `sorte_master_cfg.inc` names.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct NamedSpeed {
+    /// Steps a second.
+    pub hz: u32,
+    /// Its constant.
+    pub speed: Speed,
 }
 
 /// The speed constant 2^16 / f\[MHz\]: the period of full speed in microseconds, 16.16 fixed point.
@@ -118,17 +137,17 @@ impl Speed {
     pub const HZ_100: Self = Self(655_360_000);
 
     /// The ten speeds of TI's `sorte_master_cfg.inc`, in Hz, the fastest first.
-    pub const NAMED: [(u32, Self); 10] = [
-        (250_000, Self::KHZ_250),
-        (160_000, Self::KHZ_160),
-        (100_000, Self::KHZ_100),
-        (50_000, Self::KHZ_50),
-        (20_000, Self::KHZ_20),
-        (10_000, Self::KHZ_10),
-        (5_000, Self::KHZ_5),
-        (2_000, Self::KHZ_2),
-        (1_000, Self::KHZ_1),
-        (100, Self::HZ_100),
+    pub const NAMED: [NamedSpeed; 10] = [
+        NamedSpeed { hz: 250_000, speed: Self::KHZ_250 },
+        NamedSpeed { hz: 160_000, speed: Self::KHZ_160 },
+        NamedSpeed { hz: 100_000, speed: Self::KHZ_100 },
+        NamedSpeed { hz: 50_000, speed: Self::KHZ_50 },
+        NamedSpeed { hz: 20_000, speed: Self::KHZ_20 },
+        NamedSpeed { hz: 10_000, speed: Self::KHZ_10 },
+        NamedSpeed { hz: 5_000, speed: Self::KHZ_5 },
+        NamedSpeed { hz: 2_000, speed: Self::KHZ_2 },
+        NamedSpeed { hz: 1_000, speed: Self::KHZ_1 },
+        NamedSpeed { hz: 100, speed: Self::HZ_100 },
     ];
 
     /// The constant itself, as the host interface word `speed` carries it.
@@ -188,7 +207,7 @@ mod tests {
 
     #[test]
     fn named_speeds_are_exact() {
-        for (hz, speed) in Speed::NAMED {
+        for NamedSpeed { hz, speed } in Speed::NAMED {
             assert_eq!(u64::from(speed.raw()) * u64::from(hz), 65_536_000_000);
             assert_eq!(Speed::from_hz(hz), Ok(speed));
         }
@@ -218,7 +237,7 @@ mod tests {
         assert_eq!(Speed::from_hz(16), Ok(Speed(4_096_000_000)));
         assert_eq!(Frequency::from_ratio(1, 0), None);
         assert_eq!(Frequency::of_tone(90), None);
-        assert_eq!(Frequency::of_tone(91).map(Frequency::ratio), Some((4900, 187)));
+        assert_eq!(Frequency::of_tone(91), Frequency::from_ratio(4900, 187));
         assert_eq!(Frequency::of_tone(u32::MAX), None);
         assert_eq!(Frequency::from_hz(u32::MAX).steps_in(u16::MAX), u32::MAX);
     }

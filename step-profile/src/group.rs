@@ -48,13 +48,13 @@ impl Motors {
 pub struct Group<'t> {
     axis: Axis<'t>,
     motors: Motors,
-    positions: [i64; 4],
+    commanded: [i64; 4],
 }
 
 impl<'t> Group<'t> {
-    /// The selected motors at rest, all four at position 0.
+    /// The selected motors at rest, nothing commanded yet.
     pub const fn new(motors: Motors) -> Self {
-        Self { axis: Axis::new(), motors, positions: [0; 4] }
+        Self { axis: Axis::new(), motors, commanded: [0; 4] }
     }
 
     /// Selects other motors.
@@ -84,9 +84,9 @@ impl<'t> Group<'t> {
     pub fn tick(&mut self) -> [Command; 4] {
         let command = self.axis.tick();
         if let Command::Pulse { direction, .. } = command {
-            for (position, selected) in self.positions.iter_mut().zip(self.motors.selected()) {
+            for (steps, selected) in self.commanded.iter_mut().zip(self.motors.selected()) {
                 if selected {
-                    *position = direction.advance(*position);
+                    *steps = direction.advance(*steps);
                 }
             }
         }
@@ -108,14 +108,14 @@ impl<'t> Group<'t> {
         self.motors
     }
 
-    /// Motor by motor, steps made forward less steps made in reverse.
-    pub const fn positions(&self) -> [i64; 4] {
-        self.positions
+    /// Motor by motor, the steps commanded so far, forward less reverse ones.
+    pub const fn commanded(&self) -> [i64; 4] {
+        self.commanded
     }
 
-    /// Declares where the motors are, at a reference for instance.
-    pub fn set_positions(&mut self, positions: [i64; 4]) {
-        self.positions = positions;
+    /// Declares how many steps lead to where the motors are, 0 at a reference for instance.
+    pub fn set_commanded(&mut self, steps: [i64; 4]) {
+        self.commanded = steps;
     }
 }
 
@@ -158,9 +158,9 @@ mod tests {
         for _ in 0..2000 {
             group.tick();
         }
-        assert_eq!((group.positions(), group.motors()), ([2, 0, 5, 0], Motors::M1));
-        group.set_positions([0; 4]);
-        assert_eq!(group.positions(), [0; 4]);
+        assert_eq!((group.commanded(), group.motors()), ([2, 0, 5, 0], Motors::M1));
+        group.set_commanded([0; 4]);
+        assert_eq!(group.commanded(), [0; 4]);
         group.start(profile, 3, Direction::Reverse).unwrap();
         group.abort();
         assert_eq!(group.state(), MoveState::Idle);

@@ -27,7 +27,7 @@ pub use arithmetic::{Arithmetic, corrected};
 pub use axis::{Axes, Axis, Command, Direction};
 pub use dance::{Dance, Note};
 pub use error::{Error, ErrorClass};
-pub use frequency::{Frequency, Speed};
+pub use frequency::{Frequency, NamedSpeed, Speed};
 pub use group::{Group, Motors};
 pub use interval::{CYCLE_NS, Interval, StepTime, step_time_ns};
 pub use microstep::{Microstep, Turn};

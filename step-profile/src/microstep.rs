@@ -1,71 +1,31 @@
-use core::fmt;
-
-use servowire_core::OutOfRange;
-
-/// Micro-step profile of a DRV8711 with a 1.8° motor: 200 full steps a turn, 1/1 to 1/256 step.
-///
-/// TIDEP0061, section 2.1; profile codes 0..=8 of TI's `sorte_master_cfg.inc`.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-#[cfg_attr(feature = "arbitrary", derive(arbitrary::Arbitrary))]
-#[repr(u8)]
-pub enum Microstep {
-    /// 200 steps a turn.
-    Full = 0,
-    /// 400 steps a turn.
-    Half = 1,
-    /// 800 steps a turn.
-    Quarter = 2,
-    /// 1600 steps a turn.
-    Div8 = 3,
-    /// 3200 steps a turn.
-    Div16 = 4,
-    /// 6400 steps a turn.
-    Div32 = 5,
-    /// 12800 steps a turn.
-    Div64 = 6,
-    /// 25600 steps a turn.
-    Div128 = 7,
-    /// 51200 steps a turn. (Section 2.3.1 prints 512000, section 2.1 has it right: 200 · 256.)
-    Div256 = 8,
+servowire_core::codes! {
+    /// Micro-step profile of a DRV8711 with a 1.8° motor: 200 full steps a turn, 1/1 to 1/256 step. The code is also the value
+    /// of MODE in the DRV8711's CTRL register.
+    ///
+    /// TIDEP0061, section 2.1; profile codes 0..=8 of TI's `sorte_master_cfg.inc`.
+    pub enum Microstep: u8 {
+        /// 200 steps a turn.
+        Full = 0 => "1/1",
+        /// 400 steps a turn.
+        Half = 1 => "1/2",
+        /// 800 steps a turn.
+        Quarter = 2 => "1/4",
+        /// 1600 steps a turn.
+        Div8 = 3 => "1/8",
+        /// 3200 steps a turn.
+        Div16 = 4 => "1/16",
+        /// 6400 steps a turn.
+        Div32 = 5 => "1/32",
+        /// 12800 steps a turn.
+        Div64 = 6 => "1/64",
+        /// 25600 steps a turn.
+        Div128 = 7 => "1/128",
+        /// 51200 steps a turn. (Section 2.3.1 prints 512000, section 2.1 has it right: 200 · 256.)
+        Div256 = 8 => "1/256",
+    }
 }
 
 impl Microstep {
-    /// All profiles in the order of their codes.
-    pub const ALL: [Self; 9] = [
-        Self::Full,
-        Self::Half,
-        Self::Quarter,
-        Self::Div8,
-        Self::Div16,
-        Self::Div32,
-        Self::Div64,
-        Self::Div128,
-        Self::Div256,
-    ];
-
-    /// The profile of a code; `None` above 8.
-    pub const fn new(code: u8) -> Option<Self> {
-        Some(match code {
-            0 => Self::Full,
-            1 => Self::Half,
-            2 => Self::Quarter,
-            3 => Self::Div8,
-            4 => Self::Div16,
-            5 => Self::Div32,
-            6 => Self::Div64,
-            7 => Self::Div128,
-            8 => Self::Div256,
-            _ => return None,
-        })
-    }
-
-    /// The profile code, 0..=8; also the value of MODE in the DRV8711's CTRL register.
-    pub const fn code(self) -> u8 {
-        self as u8
-    }
-
     /// MODE in its place in the CTRL register, bits 6..3 (DRV8711 data sheet SLVSC40, CTRL register).
     pub const fn ctrl_field(self) -> u16 {
         (self as u16) << 3
@@ -91,21 +51,6 @@ impl Microstep {
     }
 }
 
-impl TryFrom<u8> for Microstep {
-    type Error = OutOfRange;
-
-    fn try_from(code: u8) -> Result<Self, OutOfRange> {
-        Self::new(code).ok_or_else(|| OutOfRange::above(code.into(), Self::Div256.code().into()))
-    }
-}
-
-/// `1/256`.
-impl fmt::Display for Microstep {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "1/{}", self.microsteps())
-    }
-}
-
 /// The moves of position mode in TI's `sorte_master_cfg.inc`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -128,14 +73,14 @@ mod tests {
     #[test]
     fn codes_and_turns() {
         for (code, profile) in (0..).zip(Microstep::ALL) {
-            assert_eq!(Microstep::new(code), Some(profile));
+            assert_eq!(Microstep::from_code(code), Some(profile));
             assert_eq!(profile.code(), code);
             assert_eq!(profile.steps(Turn::Full), profile.steps(Turn::Quarter) * 4);
             assert_eq!(profile.steps(Turn::Ten), profile.steps(Turn::Full) * 10);
             assert_eq!(profile.steps_per_turn(), 200 * profile.microsteps());
         }
         assert_eq!(Microstep::Div256.steps_per_turn(), 51_200);
-        assert_eq!(Microstep::try_from(9), Err(OutOfRange { got: 9, max: 8 }));
+        assert_eq!(Microstep::from_code(9), None);
         assert_eq!(Microstep::Div256.to_string(), "1/256");
     }
 }

@@ -21,12 +21,12 @@ mod run;
 mod slope;
 mod stepper;
 
-pub use arc::Arc;
+pub use arc::{Arc, Turning};
 pub use cycle::{PtoMover, Reload, Reloads};
-pub use homing::{Homing, HomingConfig, HomingState};
+pub use homing::{Homing, HomingConfig, HomingState, Switch};
 pub use limits::{Clock, Limits};
 pub use line::{AxisPulse, LinePulses};
 pub use mover::{Mover, Pulse};
 pub use path::{AxisSetup, Path};
 pub use path_mover::PathMover;
-pub use plan::{Plan, Pulses, State};
+pub use plan::{Plan, Pulses, Setpoint};

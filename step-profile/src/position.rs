@@ -1,7 +1,3 @@
-use core::fmt;
-
-use servowire_core::OutOfRange;
-
 use crate::axis::{Command, Direction};
 use crate::error::Error;
 use crate::group::{Group, Motors};
@@ -9,99 +5,37 @@ use crate::microstep::{Microstep, Turn};
 use crate::profile::Profile;
 use crate::ramp_steps::MoveState;
 
-/// The operating modes of TI's `sorte_master_cfg.inc`.
-///
-/// TIDEP0061 describes position and dance, and so does this crate; the others are numbers alone.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-#[repr(u8)]
-pub enum OperatingMode {
-    /// Turns by a number of steps: [`PositionMode`].
-    Position = 0,
-    /// Not described.
-    Speed = 1,
-    /// Not described.
-    Ramp = 2,
-    /// Tones: [`Dance`](crate::Dance).
-    Dance = 3,
-    /// Not described.
-    Manual = 4,
-}
-
-impl OperatingMode {
-    /// The mode of a code; `None` above 4.
-    pub const fn new(code: u8) -> Option<Self> {
-        Some(match code {
-            0 => Self::Position,
-            1 => Self::Speed,
-            2 => Self::Ramp,
-            3 => Self::Dance,
-            4 => Self::Manual,
-            _ => return None,
-        })
-    }
-
-    /// The code, 0..=4.
-    pub const fn code(self) -> u8 {
-        self as u8
+servowire_core::codes! {
+    /// The operating modes of TI's `sorte_master_cfg.inc`.
+    ///
+    /// TIDEP0061 describes position and dance, and so does this crate; the others are numbers alone.
+    pub enum OperatingMode: u8 {
+        /// Turns by a number of steps: [`PositionMode`].
+        Position = 0 => "position",
+        /// Not described.
+        Speed = 1 => "speed",
+        /// Not described.
+        Ramp = 2 => "ramp",
+        /// Tones: [`Dance`](crate::Dance).
+        Dance = 3 => "dance",
+        /// Not described.
+        Manual = 4 => "manual",
     }
 }
 
-impl TryFrom<u8> for OperatingMode {
-    type Error = OutOfRange;
-
-    fn try_from(code: u8) -> Result<Self, OutOfRange> {
-        Self::new(code).ok_or_else(|| OutOfRange::above(code.into(), Self::Manual.code().into()))
-    }
-}
-
-impl fmt::Display for OperatingMode {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.pad(match self {
-            Self::Position => "position",
-            Self::Speed => "speed",
-            Self::Ramp => "ramp",
-            Self::Dance => "dance",
-            Self::Manual => "manual",
-        })
-    }
-}
-
-/// The states of position mode, numbered as in TI's `sorte_master_cfg.inc`.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-#[repr(u8)]
-pub enum PositionState {
-    /// Ready for the next turn.
-    Idle = 0,
-    /// One second of rest after a turn.
-    Wait = 1,
-    /// A quarter turn is under way.
-    QuarterTurn = 2,
-    /// A full turn is under way.
-    FullTurn = 3,
-    /// Ten turns are under way.
-    TenTurns = 4,
-}
-
-impl PositionState {
-    /// The number of the state, 0..=4.
-    pub const fn code(self) -> u8 {
-        self as u8
-    }
-}
-
-impl fmt::Display for PositionState {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.pad(match self {
-            Self::Idle => "idle",
-            Self::Wait => "wait",
-            Self::QuarterTurn => "quarter turn",
-            Self::FullTurn => "full turn",
-            Self::TenTurns => "ten turns",
-        })
+servowire_core::codes! {
+    /// The states of position mode, numbered as in TI's `sorte_master_cfg.inc`.
+    pub enum PositionState: u8 {
+        /// Ready for the next turn.
+        Idle = 0 => "idle",
+        /// One second of rest after a turn.
+        Wait = 1 => "wait",
+        /// A quarter turn is under way.
+        QuarterTurn = 2 => "quarter turn",
+        /// A full turn is under way.
+        FullTurn = 3 => "full turn",
+        /// Ten turns are under way.
+        TenTurns = 4 => "ten turns",
     }
 }
 
@@ -181,8 +115,8 @@ impl<'t> PositionMode<'t> {
     }
 
     /// Declares where the motors are: what a turn to the reference position is made for.
-    pub fn set_positions(&mut self, positions: [i64; 4]) {
-        self.group.set_positions(positions);
+    pub fn set_commanded(&mut self, positions: [i64; 4]) {
+        self.group.set_commanded(positions);
     }
 
     /// The motors: selection, positions, ramp state.
@@ -200,8 +134,8 @@ mod tests {
     #[test]
     fn positions_are_declared() {
         let mut mode = PositionMode::new(Motors::ALL, Microstep::Div256);
-        mode.set_positions([1, -2, 3, i64::MIN]);
-        assert_eq!(mode.group().positions(), [1, -2, 3, i64::MIN]);
+        mode.set_commanded([1, -2, 3, i64::MIN]);
+        assert_eq!(mode.group().commanded(), [1, -2, 3, i64::MIN]);
     }
 
     #[test]
@@ -217,7 +151,7 @@ mod tests {
         }
         let [_, last, ..] = mode.tick();
         assert!(matches!(last, Command::Pulse { .. }));
-        assert_eq!(mode.group().positions(), [0, -12_800, 0, 0]);
+        assert_eq!(mode.group().commanded(), [0, -12_800, 0, 0]);
         for _ in 0..PositionMode::REST {
             assert_eq!(mode.state(), PositionState::Wait);
             assert_eq!(mode.select(Motors::ALL), Err(Error::Moving));
@@ -240,8 +174,8 @@ mod tests {
             assert_eq!(mode.state(), state);
             mode.abort();
             mode.tick();
-            assert_eq!((mode.state(), mode.group().positions()), (PositionState::Wait, [0; 4]));
-            mode.set_positions([0; 4]);
+            assert_eq!((mode.state(), mode.group().commanded()), (PositionState::Wait, [0; 4]));
+            mode.set_commanded([0; 4]);
             for _ in 0..PositionMode::REST {
                 mode.tick();
             }
@@ -258,9 +192,9 @@ mod tests {
             OperatingMode::Manual,
         ];
         for (code, mode) in (0..).zip(codes) {
-            assert_eq!(OperatingMode::new(code), Some(mode));
+            assert_eq!(OperatingMode::from_code(code), Some(mode));
         }
-        assert_eq!(OperatingMode::try_from(5), Err(OutOfRange { got: 5, max: 4 }));
+        assert_eq!(OperatingMode::from_code(5), None);
         assert_eq!(OperatingMode::Manual.code(), 4);
         let states = [
             (PositionState::Idle, 0),

@@ -50,9 +50,10 @@ impl Parameters<'static> {
 }
 
 impl<'t> Parameters<'t> {
-    /// With `steps` steps a ramp entry (K), 1..=134217727.
-    pub const fn with_steps_per_entry(self, steps: u32) -> Self {
-        Self { steps_per_entry: steps, ..self }
+    servowire_core::builder! {
+        with_steps_per_entry: steps_per_entry, u32;
+        with_init_sync: init_sync, u32;
+        with_arithmetic: arithmetic, Arithmetic;
     }
 
     /// With the shortest ramp whose acceleration stays within `acceleration` in steps/s²: it sets the steps a ramp entry.
@@ -61,6 +62,7 @@ impl<'t> Parameters<'t> {
     /// to entry, and the mean over the ramp is far below it; [`motion`](crate::motion) uses an acceleration fully. Call it
     /// after [`with_table`](Self::with_table). An acceleration of 0, or one that needs longer entries than there are, is
     /// refused by [`Profile::new`].
+    #[must_use]
     pub fn with_acceleration(self, acceleration: u32) -> Self {
         // Hz · R = 65536·10^6. Speed at an entry s: 1000 f / s, time of it: K s / 1000 f.
         let hz_squared = 65_536_000_000_u128.pow(2);
@@ -79,22 +81,13 @@ impl<'t> Parameters<'t> {
         self.with_steps_per_entry(if acceleration == 0 { u32::MAX } else { steps.max(1) })
     }
 
-    /// With a sync_time before the first step, 0..=3999 ns.
-    pub const fn with_init_sync(self, ns: u32) -> Self {
-        Self { init_sync: ns, ..self }
-    }
-
     /// With a ramp of one's own.
+    #[must_use]
     pub const fn with_table<'a>(self, table: &'a RampTable) -> Parameters<'a>
     where
         't: 'a,
     {
         Parameters { table, ..self }
-    }
-
-    /// With another arithmetic of the steps.
-    pub const fn with_arithmetic(self, arithmetic: Arithmetic) -> Self {
-        Self { arithmetic, ..self }
     }
 }
 

@@ -339,7 +339,7 @@ mod tests {
         for hz in [59_848, 56_959, 47_006, 31_456, 29_924, 23_503, 23_044, 21_135, 20_880] {
             assert!(frequencies.contains(&hz), "{hz}");
         }
-        assert!(Speed::NAMED.iter().all(|&(_, speed)| !wrong(speed)));
+        assert!(Speed::NAMED.iter().all(|named| !wrong(named.speed)));
     }
 
     #[test]

@@ -3,7 +3,7 @@
 #![allow(clippy::unwrap_used)]
 
 use proptest::prelude::*;
-use step_profile::motion::{Clock, Limits, Mover, State};
+use step_profile::motion::{Clock, Limits, Mover, Setpoint};
 use step_profile::{Direction, Error};
 
 #[derive(Debug, Clone, Copy)]
@@ -44,7 +44,7 @@ impl Watched {
         Self { mover, limits, hz: hz.into(), last: None, position: 0, now: 0, told: 0 }
     }
 
-    fn limits_hold(&self, s: State) -> Result<(), TestCaseError> {
+    fn limits_hold(&self, s: Setpoint) -> Result<(), TestCaseError> {
         let within = |value: i64, limit: f64| (value as f64 / 65536.0).abs() <= limit * (1.0 + 1e-6) + 0.01;
         let (a, j) = (f64::from(self.limits.acceleration()), self.limits.jerk().map_or(0.0, |j| j as f64));
         prop_assert!(within(s.speed, f64::from(self.limits.speed()) + a * 1e-9), "{s:?}");
@@ -62,7 +62,7 @@ impl Watched {
             prop_assert_eq!(pulse.tick, due);
             prop_assert!(self.last.is_none_or(|last| pulse.tick > last), "{pulse:?} after {:?}", self.last);
             self.position += if pulse.direction == Direction::Forward { 1 } else { -1 };
-            prop_assert_eq!(self.mover.position(), self.position);
+            prop_assert_eq!(self.mover.commanded(), self.position);
             self.limits_hold(before)?;
             // The position of the plan is within half a step of the motor, and of a tick.
             let off = (before.position - (self.position << 32)).abs() as f64 / 2_f64.powi(32);
@@ -89,7 +89,9 @@ impl Watched {
         let direction = self.mover.direction();
         match request {
             Request::MoveTo(target) => self.mover.move_to(target, self.now).unwrap(),
-            Request::Run(way, speed) => self.mover.run(Direction::from_dir(way), speed, self.now).unwrap(),
+            Request::Run(way, speed) => {
+                self.mover.run(if way { Direction::Reverse } else { Direction::Forward }, speed, self.now).unwrap()
+            }
             Request::Override(percent) => self.mover.set_override(percent, self.now),
             Request::Hold => self.mover.hold(self.now),
             Request::Resume => self.mover.resume(self.now),
@@ -183,7 +185,7 @@ fn held_twice_resumed_while_stopping_and_told_to_stay() {
     while let Some(pulse) = mover.pulse() {
         now = pulse.tick;
     }
-    let stopped = mover.position();
+    let stopped = mover.commanded();
     assert!((510..1700).contains(&stopped), "{stopped}");
     now += 1_000_000;
     assert!(mover.is_at_rest(now));
@@ -192,7 +194,7 @@ fn held_twice_resumed_while_stopping_and_told_to_stay() {
     assert_eq!(mover.due(), None);
     mover.move_to(2000, now).unwrap();
     while mover.pulse().is_some() {}
-    assert_eq!(mover.position(), 2000);
+    assert_eq!(mover.commanded(), 2000);
 }
 
 #[test]
@@ -204,7 +206,7 @@ fn soft_limits_a_halt_and_a_quick_stop() {
     while let Some(pulse) = mover.pulse() {
         now = pulse.tick;
     }
-    assert_eq!(mover.position(), 900);
+    assert_eq!(mover.commanded(), 900);
     let turned = mover.due();
     assert_eq!(turned, None);
     let rest = now + 1_000_000;
@@ -227,15 +229,15 @@ fn soft_limits_a_halt_and_a_quick_stop() {
     for _ in 0..200 {
         now = mover.pulse().unwrap().tick;
     }
-    let position = mover.position();
-    assert_eq!(mover.set_position(0, now), Err(Error::Moving));
+    let position = mover.commanded();
+    assert_eq!(mover.set_commanded(0, now), Err(Error::Moving));
     mover.halt(now);
-    assert_eq!((mover.position(), mover.due(), mover.is_halted()), (position, None, true));
-    mover.set_position(0, now + 1).unwrap();
+    assert_eq!((mover.commanded(), mover.due(), mover.is_halted()), (position, None, true));
+    mover.set_commanded(0, now + 1).unwrap();
     mover.move_to(10, now + 1).unwrap();
     assert!(!mover.is_halted());
     while mover.pulse().is_some() {}
-    assert_eq!(mover.position(), 10);
+    assert_eq!(mover.commanded(), 10);
 }
 
 /// Limits below the deceleration that it has: it goes on from where it is, as fast as it is.
@@ -325,7 +327,7 @@ fn soft_limits_have_two_ends() {
         while let Some(pulse) = mover.pulse() {
             last = pulse.tick;
         }
-        assert_eq!(mover.position(), target);
+        assert_eq!(mover.commanded(), target);
         // Half a step is left.
         assert!(!mover.is_at_rest(last) && mover.is_at_rest(now + 9_000_000));
     }
@@ -397,7 +399,7 @@ fn another_target(target: i64) -> u64 {
     while let Some(pulse) = mover.pulse() {
         last = pulse.tick;
     }
-    assert_eq!(mover.position(), target);
+    assert_eq!(mover.commanded(), target);
     (last..=1 << 21).find(|now| mover.is_at_rest(*now)).unwrap()
 }
 
@@ -443,9 +445,9 @@ fn a_target_inside_the_last_of_the_brake_is_passed() {
     mover.move_to(3997, 525_000).unwrap();
     let mut most = 0;
     while mover.pulse().is_some() {
-        most = most.max(mover.position());
+        most = most.max(mover.commanded());
     }
-    assert_eq!((most, mover.position()), (4000, 3997));
+    assert_eq!((most, mover.commanded()), (4000, 3997));
 }
 
 /// 9500 steps/s of change take 0.095 + 0.05 s, also if the last 500 of them are asked for under way.

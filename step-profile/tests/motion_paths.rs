@@ -5,7 +5,7 @@
 use std::collections::VecDeque;
 
 use proptest::prelude::*;
-use step_profile::motion::{AxisSetup, Clock, Limits, Path, PathMover, Plan, State};
+use step_profile::motion::{AxisSetup, Clock, Limits, Path, PathMover, Plan, Setpoint};
 use step_profile::{Direction, Error};
 
 const N: usize = 3;
@@ -101,7 +101,7 @@ impl Watched {
             let middle = self.position[i] * 2;
             self.position[i] += if pulse.direction == Direction::Forward { 1 } else { -1 };
             let middle = (middle + self.position[i] * 2) << 30;
-            prop_assert_eq!(self.machine.position(), self.position);
+            prop_assert_eq!(self.machine.commanded(), self.position);
             // Half a tick from where the unrounded axis is in the middle of the step.
             let s = before[i];
             let slack = (speed(&s).abs() / HZ * 0.5 + acceleration(&s).abs() / HZ / HZ) * 2_f64.powi(32);
@@ -202,15 +202,15 @@ impl Watched {
 }
 
 /// Where a line begins all axes are at whole steps.
-fn begins(states: &[State; N]) -> bool {
+fn begins(states: &[Setpoint; N]) -> bool {
     states.iter().all(|state| state.position.trailing_zeros() >= 32)
 }
 
-fn speed(state: &State) -> f64 {
+fn speed(state: &Setpoint) -> f64 {
     state.speed as f64 / 65536.0
 }
 
-fn acceleration(state: &State) -> f64 {
+fn acceleration(state: &Setpoint) -> f64 {
     state.acceleration as f64 / 65536.0
 }
 
@@ -276,7 +276,7 @@ fn a_hold_takes_the_stopping_distance_over_any_number_of_lines() {
         let mut machine = two_axes(j);
         let mut queued = 0;
         let mut now = 0;
-        while machine.position()[0] < 4000 {
+        while machine.commanded()[0] < 4000 {
             while queued < parts && !machine.is_full() {
                 queued += 1;
                 machine.push([8000 * queued / parts, 0], 1_000_000, now).unwrap();
@@ -287,7 +287,7 @@ fn a_hold_takes_the_stopping_distance_over_any_number_of_lines() {
         assert!(speed > if parts > 4 { 9000.0 } else { 9999.0 }, "{speed} over {parts} lines");
         machine.hold(now);
         to_rest(&mut machine);
-        let way = machine.position()[0] - 4000;
+        let way = machine.commanded()[0] - 4000;
         // With jerk a line ends at acceleration 0: the last that is left too fast costs more of the way.
         assert!((least - 60..=least + if j == 0 { 2 } else { 400 }).contains(&way), "{way} steps over {parts} lines");
         assert!(machine.is_at_rest(now + 2_000_000) && !machine.is_empty());
@@ -306,11 +306,11 @@ fn an_override_scales_the_feed_and_not_the_limits() {
         assert!((speed(&machine.at(now)[0]) - want).abs() < 0.1, "{:?} at {percent} %", machine.at(now)[0]);
         machine.set_override(0, now);
         to_rest(&mut machine);
-        let held = machine.position()[0];
+        let held = machine.commanded()[0];
         assert!((10_000..12_000).contains(&held), "{held}");
         machine.set_override(100, now + 1_000_000);
         to_rest(&mut machine);
-        assert_eq!(machine.position(), [20_000, 0]);
+        assert_eq!(machine.commanded(), [20_000, 0]);
     }
 }
 
@@ -323,9 +323,9 @@ fn a_line_that_is_added_in_time_costs_no_stop() {
         let now = steps(&mut machine, 2000);
         machine.push([8000, 4000], 1_000_000, now).unwrap();
         let mut slowest = f64::MAX;
-        while machine.position()[0] < 7000 {
+        while machine.commanded()[0] < 7000 {
             let now = machine.pulse().unwrap().tick;
-            slowest = slowest.min(if machine.position()[0] > 2000 { speed(&machine.at(now)[0]) } else { f64::MAX });
+            slowest = slowest.min(if machine.commanded()[0] > 2000 { speed(&machine.at(now)[0]) } else { f64::MAX });
         }
         assert!(slowest > 9999.0, "{slowest}");
         let end = to_rest(&mut machine);
@@ -351,14 +351,14 @@ fn a_stop_says_where_it_ends_and_a_new_target_begins_there() {
     machine.set_override(30, now);
     machine.push([end[0], 200], 1_000_000, now).unwrap();
     to_rest(&mut machine);
-    assert_eq!((machine.position(), machine.is_empty()), ([end[0], 200], true));
+    assert_eq!((machine.commanded(), machine.is_empty()), ([end[0], 200], true));
     machine.set_override(100, 10_000_000);
     machine.push([0, 200], 1_000_000, 10_000_000).unwrap();
     let now = steps(&mut machine, 1000);
     machine.move_to([end[0], -70], 1_000_000, now).unwrap();
     assert_eq!(machine.len(), 2);
     to_rest(&mut machine);
-    assert_eq!(machine.position(), [end[0], -70]);
+    assert_eq!(machine.commanded(), [end[0], -70]);
 }
 
 #[test]
@@ -372,14 +372,14 @@ fn refusals_change_nothing_and_a_halt_keeps_the_position() {
     assert!(matches!(machine.move_to([0, 1 << 40], 5, now), Err(Error::TooManySteps { .. })));
     assert_eq!(machine.push([0, 0], 5, now), Err(Error::QueueFull));
     assert_eq!((machine.due(), machine.target()), (due, target));
-    let position = machine.position();
+    let position = machine.commanded();
     machine.halt(now);
-    assert_eq!((machine.due(), machine.position(), machine.target()), (None, position, position));
+    assert_eq!((machine.due(), machine.commanded(), machine.target()), (None, position, position));
     assert!(machine.is_halted() && machine.is_empty() && machine.is_at_rest(now + 1));
     machine.push([0, 0], 1_000_000, now + 10).unwrap();
     assert!(!machine.is_halted() && machine.due() > Some(now + 10));
     while machine.pulse().is_some() {}
-    assert_eq!(machine.position(), [0, 0]);
+    assert_eq!(machine.commanded(), [0, 0]);
 }
 
 /// A path that has lines in it already, and one that has run some.
@@ -391,11 +391,11 @@ fn what_is_in_the_path_is_run() {
     path.next_line().unwrap().for_each(drop);
     path.push([300, 70], 1_000_000).unwrap();
     let mut machine = PathMover::new(path);
-    assert_eq!((machine.position(), machine.target(), machine.due()), ([100, 50], [300, 70], None));
+    assert_eq!((machine.commanded(), machine.target(), machine.due()), ([100, 50], [300, 70], None));
     machine.resume(5_000_000);
     assert!(machine.due() > Some(5_000_000));
     to_rest(&mut machine);
-    assert_eq!(machine.position(), [300, 70]);
+    assert_eq!(machine.commanded(), [300, 70]);
 }
 
 /// As a hold, but the path ends there: where it says at once, and within the acceleration all the way.
@@ -404,7 +404,7 @@ fn a_stop_takes_the_stopping_distance_over_any_number_of_lines() {
     for (j, parts, most) in [(0, 1, 502), (0, 40, 502), (0, 200, 502), (2_000_000, 4, 1150)] {
         let mut machine = two_axes(j);
         let (mut queued, mut now) = (0, 0);
-        while machine.position()[0] < 4000 {
+        while machine.commanded()[0] < 4000 {
             while queued < parts && !machine.is_full() {
                 queued += 1;
                 machine.push([8000 * queued / parts, 0], 1_000_000, now).unwrap();
@@ -420,7 +420,7 @@ fn a_stop_takes_the_stopping_distance_over_any_number_of_lines() {
             assert!(acceleration(&state).abs() <= 100_000.1, "{state:?}");
             last = pulse.tick;
         }
-        assert_eq!((machine.position(), machine.is_empty()), ([end, 0], true));
+        assert_eq!((machine.commanded(), machine.is_empty()), ([end, 0], true));
         // From 9000 steps/s at least, with 100,000 steps/s², but for the last half step.
         assert!(last - now >= 84_000, "at rest in {} over {parts} lines", last - now);
     }
@@ -440,7 +440,7 @@ fn the_speed_is_kept_from_line_to_line_after_an_override() {
         for step in 200..3400 {
             let now = machine.pulse().unwrap().tick;
             let most = if step < 2600 { 1000 } else { 101 };
-            assert!((99..=most).contains(&(now - last)), "{} at {:?}", now - last, machine.position());
+            assert!((99..=most).contains(&(now - last)), "{} at {:?}", now - last, machine.commanded());
             last = now;
         }
     }

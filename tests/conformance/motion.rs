@@ -11,11 +11,16 @@ use step_profile::{Arithmetic, Axis, Command, Direction, Parameters, Profile, Sp
 /// What the word and the 5 ns of the timer may do to a step, in ns.
 const ERROR: core::ops::RangeInclusive<i64> = -14..=9;
 
+/// The level of DIR, which both crates give the same code.
+fn level(direction: Direction) -> sorte_proto::Direction {
+    sorte_proto::Direction::from_code(direction.code()).unwrap()
+}
+
 fn word(command: Command) -> Pto {
     match command {
         Command::Disable => Pto::DriverOff,
-        Command::Hold { direction } => Pto::NoPulse { direction: direction.dir().into() },
-        Command::Pulse { direction, sync_time } => Pto::from_step(sync_time, direction.dir().into()).unwrap(),
+        Command::Hold { direction } => Pto::NoPulse { direction: level(direction) },
+        Command::Pulse { direction, sync_time } => Pto::from_step(sync_time, level(direction)).unwrap(),
     }
 }
 

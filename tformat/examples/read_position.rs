@@ -5,14 +5,14 @@
 
 use tformat::device::{Device, Fault};
 use tformat::master::{Counters, Exchange, Line, Progress, Transaction};
-use tformat::{Abm, Abs, Almc, BitRate, Error, OutOfRange, Policy, Request, Resolution};
+use tformat::{Abm, Abs, Almc, BitRate, Error, OutOfRange, Policy, Request, Resolution, Tolerated};
 
 /// Time of one field at 2.5 Mbit/s.
 const FIELD_NS: u64 = 4_000;
 
 fn main() -> Result<(), OutOfRange> {
     let resolution = Resolution::new(23, 16)?;
-    let policy = Policy::MULTI_TURN.with_max_age_ns(125_000);
+    let policy = Policy::new(125_000).tolerating(Tolerated::MULTI_TURN);
     let mut encoder = Device::<6>::new(0x17, BitRate::Mbit2_5);
     encoder.raise_alarms(Almc::BA);
     let mut counters = Counters::new();
@@ -32,8 +32,8 @@ fn main() -> Result<(), OutOfRange> {
         counters.record(&outcome);
         match outcome {
             // The raw fields stay readable; control takes a position only if it may be used, and is not older than a cycle.
-            Ok(exchange) => match exchange.position(resolution, policy, now_ns + 60_000) {
-                Ok(position) => println!("{cycle}: {position} at {} ns", exchange.sampled_ns),
+            Ok(exchange) => match exchange.evidence(resolution).at(now_ns + 60_000, policy) {
+                Ok(sample) => println!("{cycle}: {sample}"),
                 Err(doubt) => println!("{cycle}: not to be used, {doubt}: {}", exchange.response),
             },
             Err(error) => println!("{cycle}: refused, {error}"),

@@ -16,31 +16,31 @@
 
 #![expect(clippy::needless_bitwise_bool, reason = "the equations as they are wired")]
 
-/// State (s1, s0) of FRAME_STATE, TIDM-1011 tables 2-13 and 2-14.
+servowire_core::codes! {
+    /// State of FRAME_STATE, TIDM-1011 tables 2-13 and 2-14. Its code is s1 in bit 1 and s0 in bit 0.
+    pub enum State: u8 {
+        /// 00: nothing happens.
+        Idle = 0 => "IDLE",
+        /// 01: the request is sent.
+        TransmitData = 1 => "TRANSMIT_DATA",
+        /// 10: the request is out, the response has not begun.
+        WaitForStart = 2 => "WAIT_FOR_START",
+        /// 11: the response is received.
+        ReceiveData = 3 => "RECEIVE_DATA",
+    }
+}
+
+/// The inputs of the state machine.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub enum State {
-    /// 00: nothing happens.
-    Idle,
-    /// 01: the request is sent.
-    TransmitData,
-    /// 10: the request is out, the response has not begun.
-    WaitForStart,
-    /// 11: the response is received.
-    ReceiveData,
+pub struct Events {
+    /// e1, CLOCK_COUNT_COMPLETE.
+    pub clock_count_complete: bool,
+    /// e0, TRANSMIT_OR_RECEIVE_STARTED.
+    pub started: bool,
 }
 
 impl State {
-    /// From the two state bits.
-    pub const fn from_bits(s1: bool, s0: bool) -> Self {
-        match (s1, s0) {
-            (false, false) => Self::Idle,
-            (false, true) => Self::TransmitData,
-            (true, false) => Self::WaitForStart,
-            (true, true) => Self::ReceiveData,
-        }
-    }
-
     /// State bit s1: the response is waited for or received.
     pub const fn s1(self) -> bool {
         matches!(self, Self::WaitForStart | Self::ReceiveData)
@@ -56,12 +56,18 @@ impl State {
         self.s1() | self.s0()
     }
 
-    /// The next state. `e1` is CLOCK_COUNT_COMPLETE, `e0` is TRANSMIT_OR_RECEIVE_STARTED.
-    pub const fn next(self, e1: bool, e0: bool) -> Self {
+    /// The next state.
+    pub const fn next(self, events: Events) -> Self {
+        let Events { clock_count_complete: e1, started: e0 } = events;
         let (s1, s0) = (self.s1(), self.s0());
         let next_s0 = (!s1 & !s0 & e0) | (!s1 & s0 & !e1) | (s1 & s0 & !e1) | (s1 & !s0 & e0);
         let next_s1 = (!s1 & s0 & e1) | (s1 & s0 & !e1) | (s1 & !s0);
-        Self::from_bits(next_s1, next_s0)
+        match (next_s1, next_s0) {
+            (false, false) => Self::Idle,
+            (false, true) => Self::TransmitData,
+            (true, false) => Self::WaitForStart,
+            (true, true) => Self::ReceiveData,
+        }
     }
 }
 
@@ -111,6 +117,16 @@ impl SerialCrc {
     pub const fn register(self) -> u8 {
         self.0
     }
+}
+
+/// What the tile is given in one cycle.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Inputs {
+    /// A pulse of START_OPERATION.
+    pub start: bool,
+    /// The level of the receiver's pin.
+    pub response: bool,
 }
 
 /// What the tile puts out in one cycle.
@@ -183,9 +199,8 @@ impl Tile {
         self.divider.saturating_mul(2).saturating_sub(1)
     }
 
-    /// One CLB cycle: the outputs in it, then the registers for the next one. `start` is a pulse of START_OPERATION,
-    /// `response` the level of the receiver's pin.
-    pub const fn cycle(&mut self, start: bool, response: bool) -> Outputs {
+    /// One CLB cycle: the outputs in it, then the registers for the next one.
+    pub const fn cycle(&mut self, inputs: Inputs) -> Outputs {
         let rising = self.state.s0() && self.counter0 == self.divider;
         let outputs = Outputs {
             state: self.state,
@@ -193,17 +208,17 @@ impl Tile {
             clock_rises: rising,
             transmit_enable: self.transmit_enable,
         };
-        self.advance(start, response);
+        self.advance(inputs);
         outputs
     }
 
-    const fn advance(&mut self, start: bool, response: bool) {
+    const fn advance(&mut self, Inputs { start, response }: Inputs) {
         let edge = self.seen != self.seen_before;
         let falling = edge && !self.seen;
         let at_match1 = self.state.s0() && self.counter0 == self.match1();
         let e1 = self.counter1 == self.match2 && self.counter1 != 0;
         let e0 = lut1(start, falling, self.state);
-        let next = self.state.next(e1, e0);
+        let next = self.state.next(Events { clock_count_complete: e1, started: e0 });
         self.transmit_enable = match (self.state, next) {
             (State::Idle, State::TransmitData) => true,
             (State::TransmitData, State::TransmitData) => self.transmit_enable,
@@ -240,9 +255,10 @@ mod tests {
             (WaitForStart, [WaitForStart, ReceiveData, ReceiveData, WaitForStart]),
         ];
         for (state, next) in table {
-            let got = [(false, false), (false, true), (true, true), (true, false)].map(|(e1, e0)| state.next(e1, e0));
+            let got = [(false, false), (false, true), (true, true), (true, false)]
+                .map(|(clock_count_complete, started)| state.next(Events { clock_count_complete, started }));
             assert_eq!(got, next, "{state:?}");
-            assert_eq!(State::from_bits(state.s1(), state.s0()), state);
+            assert_eq!(State::from_code(u8::from(state.s1()) << 1 | u8::from(state.s0())), Some(state));
         }
     }
 
@@ -267,7 +283,7 @@ mod tests {
         for cycle in 0..4000_u64 {
             let bit = cycle.checked_sub(falls).map(|since| since / (2 * d));
             let level = bit.is_none_or(|bit| bit % 3 != 0);
-            let out = tile.cycle(cycle == 59, level);
+            let out = tile.cycle(Inputs { start: cycle == 59, response: level });
             if entered.last().unwrap().1 != out.state {
                 entered.push((cycle, out.state));
                 if out.state == WaitForStart {

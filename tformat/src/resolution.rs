@@ -42,20 +42,6 @@ pub struct Hint {
     pub documented: bool,
 }
 
-/// Where the shaft is, in the units of a [`Resolution`].
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub struct Position {
-    /// Counts in the turn, 0..2^abs_bits.
-    pub abs: u32,
-    /// Turns: 0..2^abm_bits, or -2^(abm_bits-1)..2^(abm_bits-1) if they are signed.
-    pub turns: i32,
-    /// turns * 2^abs_bits + abs, in counts; at most 48 bits wide.
-    pub combined: i64,
-}
-
-servowire_core::one_line!(Position { Self { abs, turns, .. } => "turn {}, {} counts", turns, abs; });
-
 impl Resolution {
     /// Widths of ABS (1..=24) and ABM (0..=24). Turns are signed, upper bits are checked, the EEPROM has six pages.
     ///
@@ -71,11 +57,13 @@ impl Resolution {
     }
 
     /// With turns counted from 0 up.
+    #[must_use]
     pub const fn with_unsigned_turns(self) -> Self {
         Self { signed_turns: false, ..self }
     }
 
     /// For an encoder that puts something else into the upper bits: they are cut off, not checked.
+    #[must_use]
     pub const fn with_upper_bits_ignored(self) -> Self {
         Self { checks_upper_bits: false, ..self }
     }
@@ -159,19 +147,13 @@ impl Resolution {
     }
 
     /// The single-turn position in counts.
-    ///
-    /// # Errors
-    /// [`Error::UpperBits`].
-    pub const fn single_turn(self, abs: Abs) -> Result<u32, Error> {
+    pub(crate) const fn single_turn(self, abs: Abs) -> Result<u32, Error> {
         self.cut(abs.get(), self.abs_bits)
     }
 
     /// The number of turns.
-    ///
-    /// # Errors
-    /// [`Error::UpperBits`].
     #[expect(clippy::cast_possible_wrap, reason = "24 bits fit")]
-    pub const fn turns(self, abm: Abm) -> Result<i32, Error> {
+    pub(crate) const fn turns(self, abm: Abm) -> Result<i32, Error> {
         match self.cut(abm.get(), self.abm_bits) {
             Ok(turns) if self.signed_turns => Ok(sign_extend(turns, self.abm_bits)),
             Ok(turns) => Ok(turns as i32),
@@ -179,36 +161,11 @@ impl Resolution {
         }
     }
 
-    /// Both parts as one position.
-    ///
-    /// # Errors
-    /// [`Error::UpperBits`] of ABS, then of ABM.
-    ///
-    /// ABS and ABM are types of their own: exchanging them does not compile.
-    ///
-    /// ```compile_fail,E0308
-    /// # let (resolution, abs, abm) = (tformat::Resolution::new(17, 16)?, tformat::Abs::MAX, tformat::Abm::MAX);
-    /// resolution.position(abm, abs);
-    /// # Ok::<(), tformat::OutOfRange>(())
-    /// ```
-    pub const fn position(self, abs: Abs, abm: Abm) -> Result<Position, Error> {
-        match (self.single_turn(abs), self.turns(abm)) {
-            (Ok(abs), Ok(turns)) => {
-                let combined = (turns as i64).wrapping_shl(self.abs_bits as u32) | abs as i64;
-                Ok(Position { abs, turns, combined })
-            }
-            (Err(error), _) | (_, Err(error)) => Err(error),
-        }
-    }
-
-    /// The single-turn position as a fraction of a turn: 2^32 is a whole one.
-    ///
-    /// # Errors
-    /// [`Error::UpperBits`].
-    pub const fn fraction(self, abs: Abs) -> Result<u32, Error> {
-        match self.single_turn(abs) {
-            Ok(counts) => Ok(counts.wrapping_shl(32_u32.wrapping_sub(self.abs_bits as u32))),
-            Err(error) => Err(error),
+    /// Whether an encoder with this ID has another number of single-turn bits, as far as the ID says.
+    pub(crate) const fn contradicts(self, enid: u8) -> bool {
+        match Self::from_enid(enid) {
+            Some(hint) => self.checks_upper_bits && hint.resolution.abs_bits != self.abs_bits,
+            None => false,
         }
     }
 
@@ -307,15 +264,6 @@ mod tests {
     }
 
     #[test]
-    fn position_of_a_17_bit_encoder() {
-        let position = P17.position(abs(131_071), abm(0xffff)).unwrap();
-        assert_eq!(position, Position { abs: 131_071, turns: -1, combined: -1 });
-        let unsigned = P17.with_unsigned_turns().position(abs(131_071), abm(0xffff)).unwrap();
-        assert_eq!((unsigned.turns, unsigned.combined), (65_535, 8_589_934_591));
-        assert_eq!(P17.fraction(abs(65_536)), Ok(1 << 31));
-    }
-
-    #[test]
     fn upper_bits_are_refused_or_cut_off() {
         assert_eq!(P17.single_turn(abs(0x2_0001)), Err(Error::UpperBits { value: 0x2_0001, excess: 0x2_0000 }));
         assert_eq!(P17.turns(abm(0x1_0000)), Err(Error::UpperBits { value: 0x1_0000, excess: 0x1_0000 }));
@@ -365,18 +313,6 @@ mod tests {
     }
 
     proptest! {
-        #[test]
-        fn combined_is_turns_and_counts(abs_bits in 1..=24_u8, abm_bits in 0..=24_u8, low: u32, high: u32, signed: bool) {
-            let resolution = Resolution::new(abs_bits, abm_bits).unwrap();
-            let resolution = if signed { resolution } else { resolution.with_unsigned_turns() };
-            let (low, high) = (low & ((1 << abs_bits) - 1), high & ((1 << abm_bits) - 1));
-            let position = resolution.position(abs(low), abm(high)).unwrap();
-            let full = 1_i64 << abm_bits;
-            let turns = if signed && i64::from(high) * 2 >= full && abm_bits > 0 { i64::from(high) - full } else { i64::from(high) };
-            prop_assert_eq!(i64::from(position.turns), turns);
-            prop_assert_eq!(position.combined, turns * (1 << abs_bits) + i64::from(low));
-        }
-
         #[test]
         fn difference_wraps(abs_bits in 1..=24_u8, from: u32, to: u32) {
             let resolution = Resolution::new(abs_bits, 0).unwrap();

@@ -63,6 +63,13 @@ impl StatusField {
         let ea1 = if almc.intersects(Almc::IN_EA1) { Self::EA1 } else { Self(0) };
         ea0.union(ea1)
     }
+
+    /// All alarms that EA0 and EA1 may stand for.
+    pub(crate) const fn alarms_behind(self) -> Almc {
+        let ea0 = if self.contains(Self::EA0) { Almc::CE } else { Almc(0) };
+        let ea1 = if self.contains(Self::EA1) { Almc::IN_EA1 } else { Almc(0) };
+        ea0.union(ea1)
+    }
 }
 
 /// The error byte (ALMC) of an ID 3 response.

@@ -21,7 +21,7 @@ use crate::frame::{Frame, count};
 #[cfg_attr(
     feature = "serde",
     derive(serde::Serialize, serde::Deserialize),
-    serde(try_from = "(u8, u8)", into = "(u8, u8)")
+    serde(try_from = "Lengths", into = "Lengths")
 )]
 pub struct VendorCommand {
     cf: u8,
@@ -91,17 +91,27 @@ impl VendorCommand {
     }
 }
 
-impl TryFrom<(u8, u8)> for VendorCommand {
+/// A command as it is written down.
+#[cfg(feature = "serde")]
+#[derive(serde::Serialize, serde::Deserialize)]
+struct Lengths {
+    cf: u8,
+    response_fields: u8,
+}
+
+#[cfg(feature = "serde")]
+impl TryFrom<Lengths> for VendorCommand {
     type Error = OutOfRange;
 
-    fn try_from((cf, response_fields): (u8, u8)) -> Result<Self, OutOfRange> {
+    fn try_from(Lengths { cf, response_fields }: Lengths) -> Result<Self, OutOfRange> {
         Self::new(cf, response_fields)
     }
 }
 
-impl From<VendorCommand> for (u8, u8) {
-    fn from(command: VendorCommand) -> Self {
-        (command.cf, command.response_fields)
+#[cfg(feature = "serde")]
+impl From<VendorCommand> for Lengths {
+    fn from(VendorCommand { cf, response_fields }: VendorCommand) -> Self {
+        Self { cf, response_fields }
     }
 }
 

@@ -4,7 +4,9 @@
 use tformat::master::{
     EepromAccess, Exchange, Line, MultiTurnZero, Polling, Progress, Reset, SingleTurnZero, Step, Transaction,
 };
-use tformat::{Address, BitRate, Doubt, Error, ErrorClass, Page, Policy, Request, Resolution, Response};
+use tformat::{
+    Address, BitRate, Doubt, Error, ErrorClass, Page, Policy, Request, Resolution, Response, Sample, Tolerated,
+};
 
 const LOST: Result<Response, Error> = Err(Error::NoResponse { echo: false });
 const POLLING: Polling = Polling { interval_ns: 1_000, max_tries: 4 };
@@ -178,8 +180,8 @@ fn a_position_from_the_future_is_as_old_as_it_is_far_away() {
     let response = response(Request::ReadSingleTurn, &[0x02, 0, 1, 2, 0]).unwrap();
     let exchange = Exchange { response, sampled_ns: 5_000_000_000, began_ns: 5_000_002_520 };
     let resolution = Resolution::new(17, 16).unwrap();
-    let policy = Policy::STRICT.with_max_age_ns(125_000);
-    let at = |now_ns| exchange.single_turn(resolution, policy, now_ns);
+    let policy = Policy::new(125_000).tolerating(Tolerated::SINGLE_TURN);
+    let at = |now_ns| exchange.evidence(resolution).at(now_ns, policy).map(Sample::single_turn);
     assert_eq!((at(5_000_125_000), at(4_999_875_000)), (Ok(0x201), Ok(0x201)));
     assert_eq!(at(17), Err(Doubt::Old { age_ns: 4_999_999_983 }));
 }

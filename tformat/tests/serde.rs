@@ -6,9 +6,10 @@ use core::fmt::Debug;
 
 use serde::Serialize;
 use serde::de::DeserializeOwned;
+use tformat::master::Exchange;
 use tformat::{
-    Abm, Abs, Address, Adf, AllData, Almc, BitRate, ControlField, DataId, Error, ErrorClass, Page, Request, Resolution,
-    Response, StatusField, VendorCommand,
+    Abm, Abs, Address, Adf, AllData, Almc, BitRate, ControlField, DataId, Doubt, Error, ErrorClass, Evidence, Page,
+    Policy, Request, Resolution, Response, StatusField, Tolerated, VendorCommand,
 };
 
 fn refused<T: DeserializeOwned + Debug>(json: &str) -> String {
@@ -57,9 +58,28 @@ fn impossible_resolutions_are_refused() {
 #[test]
 fn impossible_vendor_commands_are_refused() {
     for fields in [0, 1, 12, 255] {
-        assert!(refused::<VendorCommand>(&format!("[20,{fields}]")).contains("out of range"));
+        assert!(
+            refused::<VendorCommand>(&format!(r#"{{"cf":20,"response_fields":{fields}}}"#)).contains("out of range")
+        );
     }
     round_trip(VendorCommand::new(20, 11).unwrap());
+}
+
+/// A position is written down with all that it says; only evidence makes one.
+#[test]
+fn samples_and_evidence_are_written_down() {
+    let data = AllData::parse(&[0x1a, 0x20, 0x29, 0xc0, 0x3b, 0x17, 0, 0, 0, 0xc8, 0x37]).unwrap();
+    let evidence = Evidence::of(Response::ReadAll(data), Resolution::new(23, 16).unwrap(), 480);
+    let policy = Policy::new(0).tolerating(Tolerated::SINGLE_TURN);
+    let json = serde_json::to_value(evidence.at(480, policy).unwrap()).unwrap();
+    let want = serde_json::json!({"sampled_ns": 480, "single_turn": 3_915_817, "turns": null, "abs_bits": 23});
+    assert_eq!(json, want);
+    assert_eq!(serde_json::to_value(evidence).unwrap()["sampled_ns"], 480);
+    round_trip(policy);
+    for doubt in [Doubt::Never, Doubt::Old { age_ns: u64::MAX }, evidence.at(480, Policy::new(0)).unwrap_err()] {
+        round_trip(doubt);
+    }
+    round_trip(Exchange { response: Response::ReadAll(data), sampled_ns: 4_480, began_ns: 7_000 });
 }
 
 #[test]

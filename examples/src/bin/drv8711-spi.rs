@@ -9,8 +9,8 @@ use core::fmt;
 
 use embedded_hal::spi::{self, ErrorKind, ErrorType, Operation, SpiDevice};
 use sorte_proto::drv8711::{
-    Apply, Configuration, Ctrl, DecayMode, IsGain, Next, Register, Status, StepMode, Torque, Word,
-    full_scale_microamps, torque_for_microamps,
+    Apply, Configuration, Ctrl, DecayMode, IsGain, Register, Status, StepMode, Torque, Word, full_scale_microamps,
+    torque_for_microamps,
 };
 
 /// Why the driver gave up.
@@ -54,17 +54,17 @@ impl<S: SpiDevice> Drv8711<S> {
     /// Writes and verifies everything, CTRL with its enable bit last. Wait 1 ms after waking the chip.
     fn apply(&mut self, configuration: Configuration) -> Result<(), Error<S::Error>> {
         let mut apply = Apply::new(configuration);
-        while let Next::Transfer(word) = apply.next() {
+        while let Some(word) = apply.transmission() {
             let answer = self.transfer(word)?;
-            apply.answer(answer).map_err(Error::Chip)?;
+            apply.hear(answer).map_err(Error::Chip)?;
         }
         self.written = configuration;
         Ok(())
     }
 
-    /// Switches the motor current on or off; everything else stays.
-    fn enable(&mut self, enable: bool) -> Result<(), Error<S::Error>> {
-        self.written.ctrl = Ctrl { enable, ..self.written.ctrl };
+    /// Switches the motor current off; everything else stays.
+    fn disable(&mut self) -> Result<(), Error<S::Error>> {
+        self.written.ctrl = Ctrl { enable: false, ..self.written.ctrl };
         self.transfer(Register::Ctrl.write(self.written.value(Register::Ctrl))).map(|_| ())
     }
 
@@ -99,8 +99,8 @@ impl SpiDevice for Chip {
     fn transaction(&mut self, operations: &mut [Operation<'_, u8>]) -> Result<(), ErrorKind> {
         let [Operation::TransferInPlace(bytes)] = operations else { return Err(spi::ErrorKind::Other) };
         let word = u16::from_be_bytes(bytes.first_chunk().copied().ok_or(ErrorKind::Other)?);
-        let register = Register::at(word.to_be_bytes()[0] >> 4 & 7).ok_or(ErrorKind::Other)?;
-        let held = self.registers.get_mut(usize::from(register.address())).ok_or(ErrorKind::Other)?;
+        let register = Register::from_code(word.to_be_bytes()[0] >> 4 & 7).ok_or(ErrorKind::Other)?;
+        let held = self.registers.get_mut(usize::from(register.code())).ok_or(ErrorKind::Other)?;
         let answer = if !self.powered {
             0xffff
         } else if word & 0x8000 != 0 {
@@ -139,7 +139,7 @@ fn main() -> Result<(), Error<ErrorKind>> {
     println!("status: {status}");
     driver.clear(status)?;
     println!("cleared: {:?}", driver.status()?.is_fault());
-    driver.enable(false)?;
+    driver.disable()?;
 
     driver.spi.powered = false;
     match driver.status() {

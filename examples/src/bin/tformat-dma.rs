@@ -4,8 +4,8 @@
 //! in `main` by a UART: DMA to it, DMA from it into a buffer, its idle interrupt, and a timer.
 
 use tformat::device::Device;
-use tformat::master::{Line, Progress, Transaction, Transmission};
-use tformat::{Abm, Abs, BitRate, Position, Request, Resolution, Response};
+use tformat::master::{Exchange, Line, Progress, Transaction, Transmission};
+use tformat::{Abm, Abs, BitRate, Evidence, Policy, Request, Resolution};
 
 /// After this much silence the UART says that the line is idle: one field.
 const IDLE_NS: u64 = 4_000;
@@ -36,21 +36,21 @@ impl Reader {
     }
 
     /// The idle interrupt: all that the DMA has received, whatever it is, and when the last byte of it ended.
-    fn on_idle(&mut self, received: &[u8], now_ns: u64) -> Option<Result<Position, String>> {
+    fn on_idle(&mut self, received: &[u8], now_ns: u64) -> Option<Result<Evidence, String>> {
         let progress = self.transaction.as_mut()?.hear(received, now_ns.saturating_sub(IDLE_NS));
         self.end(progress)
     }
 
     /// A timer at the time that `Progress::Pending` has said, or simply the next cycle: the answer has not come.
-    fn on_timeout(&mut self, now_ns: u64) -> Option<Result<Position, String>> {
+    fn on_timeout(&mut self, now_ns: u64) -> Option<Result<Evidence, String>> {
         let progress = self.transaction.as_mut()?.poll(now_ns);
         self.end(progress)
     }
 
-    fn end(&mut self, progress: Progress) -> Option<Result<Position, String>> {
+    fn end(&mut self, progress: Progress) -> Option<Result<Evidence, String>> {
         let (result, ready_ns) = match progress {
             Progress::Pending { .. } => return None,
-            Progress::Done { value, ready_ns } => (position(value.response), ready_ns),
+            Progress::Done { value, ready_ns } => (evidence(value), ready_ns),
             Progress::Failed { error, ready_ns } => (Err(error.to_string()), ready_ns),
         };
         self.transaction = None;
@@ -59,9 +59,9 @@ impl Reader {
     }
 }
 
-fn position(response: Response) -> Result<Position, String> {
+fn evidence(exchange: Exchange) -> Result<Evidence, String> {
     let resolution = Resolution::new(23, 16).map_err(|error| error.to_string())?;
-    resolution.read(&response, tformat::Policy::STRICT).map_err(|doubt| doubt.to_string())
+    Ok(exchange.evidence(resolution))
 }
 
 fn main() {
@@ -78,7 +78,11 @@ fn main() {
             None => reader.on_timeout(start_ns.saturating_add(99_000)),
         };
         match outcome {
-            Some(Ok(position)) => println!("{position}"),
+            // Where the current is controlled: an interrupt of another priority takes it out of a `servowire_core::Cell`.
+            Some(Ok(evidence)) => match evidence.at(start_ns.saturating_add(90_000), Policy::new(100_000)) {
+                Ok(sample) => println!("{sample}"),
+                Err(doubt) => println!("{doubt}"),
+            },
             Some(Err(error)) => println!("{error}"),
             None => println!("still waiting"),
         }

@@ -122,7 +122,7 @@ impl HFrame {
     /// for frame in 0..100 {
     ///     // A byte in every tenth frame.
     ///     encoder.set_pipe((frame % 10 == 0).then_some(frame));
-    ///     let bits = encoder.hear(master.transmission().head.bits(), 0).map_or(u64::MAX, |answer| answer.bits);
+    ///     let bits = encoder.hear_at(master.transmission().head.bits(), 0).map_or(u64::MAX, |answer| answer.bits);
     ///     if let Some(character) = master.hear_bits(bits, None, 0).pipe_character() {
     ///         data.push(character?.byte());
     ///     }
@@ -160,4 +160,12 @@ pub struct Counters {
     pub safe2: u32,
     /// Answers with a wrong switch bit.
     pub switch_bits: u32,
+}
+
+impl core::fmt::Display for Counters {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        let Self { frames, restarts, words, acceleration, safe1, safe2, switch_bits } = self;
+        write!(f, "{frames} frames, {restarts} restarts; bad: {words} words, {acceleration} accelerations, ")?;
+        write!(f, "{safe1} and {safe2} safe blocks, {switch_bits} switch bits")
+    }
 }

@@ -53,11 +53,11 @@ impl Bench {
         self.position += self.speed;
         let line = self.cable.down_samples(self.master.transmission().head);
         let samples = if let Some(heard) = Heard::on_line(&line) {
-            let answer = self.device.hear(heard.bits, self.position as u64);
+            let answer = self.device.hear_at(heard.bits, self.position as u64);
             self.cable.up_heard(answer, &heard)
         } else {
             // The encoder's own clock goes on.
-            let answer = self.device.hear(Window::EMPTY, self.position as u64);
+            let answer = self.device.hear_at(Window::EMPTY, self.position as u64);
             self.cable.up(answer)
         };
         if let Some(late) = late {

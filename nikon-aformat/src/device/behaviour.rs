@@ -7,9 +7,9 @@
 pub struct Behaviour {
     /// From the last delimiter of a request to the first start bit of the response, in ns. Default 2800, as one vendor's
     /// simulated encoder waits.
-    pub turn_around_ns: u32,
-    /// Whether ES0 is set in the first response to an EEPROM read. Default: yes.
-    pub busy_in_first_read: bool,
+    pub response_delay_ns: u32,
+    /// What ES0 shows in the first response to an EEPROM read. Default [`FirstRead::Busy`].
+    pub first_read: FirstRead,
     /// EEPROM data while they are not determined.
     pub undetermined: u16,
     /// The response that shows the effect of a reset first. Default [`Shows::Ninth`] ("Nikon Protocol Design").
@@ -19,10 +19,34 @@ pub struct Behaviour {
     /// Place among the responses to a multi-response request, 0..=7; `None` is the own address, whoever else is there. Give
     /// other numbers where the responses close up.
     pub place: Option<u8>,
-    /// Whether the responses to commands 11 and 20 show the new address. Default: yes.
-    pub shows_new_address: bool,
+    /// Which address the responses to commands 11 and 20 show. Default [`ShownAddress::New`].
+    pub shown_address: ShownAddress,
     /// What starts the count of a reset again. Default [`Restart::Any`].
     pub restart: Restart,
+}
+
+/// What ES0 shows in the first response to an EEPROM read.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "arbitrary", derive(arbitrary::Arbitrary))]
+pub enum FirstRead {
+    /// That the memory is at work.
+    Busy,
+    /// Nothing.
+    Ready,
+}
+
+/// Which address the response to an address setting shows.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "arbitrary", derive(arbitrary::Arbitrary))]
+pub enum ShownAddress {
+    /// The new one.
+    New,
+    /// The old one.
+    Old,
 }
 
 /// What starts the count of a reset again, besides another request to the same encoder.
@@ -65,55 +89,26 @@ impl Behaviour {
     /// The default readings.
     pub const fn new() -> Self {
         Self {
-            turn_around_ns: 2_800,
-            busy_in_first_read: true,
+            response_delay_ns: 2_800,
+            first_read: FirstRead::Busy,
             undetermined: 0xa5a5,
             reset_shows: Shows::Ninth,
             ea: Ea::Highest,
             place: None,
-            shows_new_address: true,
+            shown_address: ShownAddress::New,
             restart: Restart::Any,
         }
     }
 
-    /// With another turn-around time.
-    pub const fn with_turn_around_ns(self, turn_around_ns: u32) -> Self {
-        Self { turn_around_ns, ..self }
-    }
-
-    /// With ES0 clear in the first response to an EEPROM read.
-    pub const fn not_busy_in_first_read(self) -> Self {
-        Self { busy_in_first_read: false, ..self }
-    }
-
-    /// With the effect of a reset in the response to the eighth request.
-    pub const fn showing_in_the_eighth(self) -> Self {
-        Self { reset_shows: Shows::Eighth, ..self }
-    }
-
-    /// Answering every multi-response request.
-    pub const fn answering_all(self) -> Self {
-        Self { ea: Ea::All, ..self }
-    }
-
-    /// With this place among the responses to a multi-response request.
-    pub const fn at_place(self, place: u8) -> Self {
-        Self { place: Some(place), ..self }
-    }
-
-    /// With these EEPROM data while they are not determined.
-    pub const fn with_undetermined(self, undetermined: u16) -> Self {
-        Self { undetermined, ..self }
-    }
-
-    /// With a count of resets that only other requests to the same encoder start again.
-    pub const fn counting_its_own_requests(self) -> Self {
-        Self { restart: Restart::Own, ..self }
-    }
-
-    /// With the old address in the responses to commands 11 and 20.
-    pub const fn showing_the_old_address(self) -> Self {
-        Self { shows_new_address: false, ..self }
+    servowire_core::builder! {
+        with_response_delay_ns: response_delay_ns, u32;
+        with_first_read: first_read, FirstRead;
+        with_undetermined: undetermined, u16;
+        with_reset_shows: reset_shows, Shows;
+        with_ea: ea, Ea;
+        with_place: place, Option<u8>;
+        with_shown_address: shown_address, ShownAddress;
+        with_restart: restart, Restart;
     }
 }
 

@@ -8,19 +8,19 @@ pub struct Encoders<const N: usize, const BANKS: usize> {
 }
 
 impl<const N: usize, const BANKS: usize> Encoders<N, BANKS> {
-    /// A frame was received by all of them; gives what each answers.
-    pub fn frame(&mut self, content: u16, now_ns: u64) -> [Option<Transmission>; N] {
+    /// Frames were heard by all of them, as by [`Device::hear`]; gives what each answers.
+    pub fn hear(&mut self, frames: &[Option<u16>], end_ns: u64) -> [Option<Transmission>; N] {
         let mut answers = [None; N];
         for (answer, device) in answers.iter_mut().zip(&mut self.all) {
-            *answer = device.frame(content, now_ns);
+            *answer = device.hear(frames, end_ns);
         }
         answers
     }
 
-    /// A frame was received whose delimiter reads 0.
-    pub fn framing_error(&mut self, now_ns: u64) {
+    /// A frame was heard whose delimiter, at `end_ns`, reads 0.
+    pub fn framing_error(&mut self, end_ns: u64) {
         for device in &mut self.all {
-            device.framing_error(now_ns);
+            device.framing_error(end_ns);
         }
     }
 }

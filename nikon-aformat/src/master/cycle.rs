@@ -29,8 +29,9 @@ pub struct Cycle {
 }
 
 /// A period in which the transaction does not fit.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, thiserror::Error)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[error("a period of {period_ns} ns is too short: the transaction needs {min_ns} ns")]
 pub struct PeriodTooShort {
     /// Period asked for.
@@ -53,6 +54,7 @@ impl Cycle {
     }
 
     /// Whether a start is due at `now_ns`; if so, the next one is a period later.
+    #[must_use]
     pub fn is_due(&mut self, now_ns: u64) -> bool {
         let Some(late) = now_ns.checked_sub(self.next_ns) else { return false };
         let period = u64::from(self.period_ns);

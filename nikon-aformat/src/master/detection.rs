@@ -25,8 +25,7 @@ pub struct Detection {
 }
 
 /// An encoder that was found.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Detected {
     /// Its address.
@@ -37,6 +36,8 @@ pub struct Detected {
     /// version.
     pub resolution: Option<Resolution>,
 }
+
+servowire_core::one_line!(Detected { Self { ea, type_word, .. } => "encoder {}: {}", ea, type_word; });
 
 impl Detection {
     /// Finds the only encoder on the line, whatever its address.

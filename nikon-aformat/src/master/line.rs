@@ -5,7 +5,7 @@ use crate::request::Request;
 use crate::timing::{BitRate, FRAME_GAP_NS, REQUEST_GAP_NS};
 
 /// How a controller is connected, and how long it waits.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]
@@ -24,12 +24,13 @@ pub struct Line {
     pub idle_in_response_ns: u32,
     /// Longest idle time between two responses on a bus, in ns. Default twice [`BitRate::response_gap_ns`].
     pub idle_between_responses_ns: u32,
-    /// Latency budget: by how much the end time of a frame that is handed over may be late, in ns. A response that begins
-    /// sooner than this after the request is not taken, because it may have begun before.
+    /// Longest time from the end of a frame on the line to its hand-over to the master, where that is taken for its end, in ns:
+    /// the [latency budget](Self::latency_budget_ns). A response that begins sooner than this after the request is not taken,
+    /// because it may have begun before.
     ///
     /// Default a quarter of [`BitRate::response_gap_ns`], 375 ns to 750 ns, which is below seven bits, the turn-around time of
     /// one vendor's simulated encoder.
-    pub latency_ns: u32,
+    pub hand_over_ns: u32,
     /// Least time from the end of a transaction to the next request, in ns. Default [`REQUEST_GAP_NS`].
     pub request_gap_ns: u32,
     /// The highest address on the line, asked or not. What EA of a multi-response request means is not documented, and
@@ -48,40 +49,27 @@ impl Line {
             response_timeout_ns: rate.bits_ns(1000),
             idle_in_response_ns: gap_ns / 4,
             idle_between_responses_ns: gap_ns.saturating_mul(2),
-            latency_ns: gap_ns / 4,
+            hand_over_ns: gap_ns / 4,
             request_gap_ns: REQUEST_GAP_NS,
             highest: EncoderAddress::MAX,
         }
     }
 
-    /// With another gap between the frames of a request.
-    pub const fn with_frame_gap_ns(self, frame_gap_ns: u32) -> Self {
-        Self { frame_gap_ns, ..self }
+    servowire_core::builder! {
+        with_frame_gap_ns: frame_gap_ns, u32;
+        with_turn_around_ns: turn_around_ns, u32;
+        with_response_timeout_ns: response_timeout_ns, u32;
+        with_idle_in_response_ns: idle_in_response_ns, u32;
+        with_idle_between_responses_ns: idle_between_responses_ns, u32;
+        with_hand_over_ns: hand_over_ns, u32;
+        with_request_gap_ns: request_gap_ns, u32;
+        with_highest: highest, EncoderAddress;
     }
 
-    /// With the least turn-around time of the encoders on this line.
-    pub const fn with_turn_around_ns(self, turn_around_ns: u32) -> Self {
-        Self { turn_around_ns, ..self }
-    }
-
-    /// With another wait for the response.
-    pub const fn with_response_timeout_ns(self, response_timeout_ns: u32) -> Self {
-        Self { response_timeout_ns, ..self }
-    }
-
-    /// With another bound for the idle time between the frames of a response.
-    pub const fn with_idle_in_response_ns(self, idle_in_response_ns: u32) -> Self {
-        Self { idle_in_response_ns, ..self }
-    }
-
-    /// With another latency budget.
-    pub const fn with_latency_ns(self, latency_ns: u32) -> Self {
-        Self { latency_ns, ..self }
-    }
-
-    /// With the highest address on the line.
-    pub const fn with_highest(self, highest: EncoderAddress) -> Self {
-        Self { highest, ..self }
+    /// By how much the end time that the master is told may lie after the end of a frame on the line, in ns. Frames may be
+    /// handed over at any later time, as long as it is told when they ended.
+    pub const fn latency_budget_ns(&self) -> u32 {
+        self.hand_over_ns
     }
 
     /// Line time of a request in ns, its gaps included.
@@ -103,7 +91,10 @@ impl Line {
         let response = self.response_ns(expected.layout());
         let before = if expected.command().is_multi_response() { self.highest.get() as u32 } else { 0 };
         let others = response.saturating_add(self.idle_between_responses_ns).saturating_mul(before);
-        self.response_timeout_ns.saturating_add(others).saturating_add(response).saturating_add(self.latency_ns)
+        self.response_timeout_ns
+            .saturating_add(others)
+            .saturating_add(response)
+            .saturating_add(self.latency_budget_ns())
     }
 
     /// The time after which a transaction is over in any case, in ns from its start.
@@ -124,12 +115,13 @@ impl Line {
 
     /// How much later than the end of the request a frame has to begin by its stamp, in ns, to be an answer for certain.
     pub(super) const fn early_ns(&self) -> u64 {
-        (if self.turn_around_ns > self.latency_ns { self.turn_around_ns } else { self.latency_ns }) as u64
+        (if self.turn_around_ns > self.latency_budget_ns() { self.turn_around_ns } else { self.latency_budget_ns() })
+            as u64
     }
 
     /// Idle time by their stamps after which two frames do not belong together, in ns.
     pub(super) const fn pause_ns(&self) -> u64 {
-        self.idle_in_response_ns.saturating_add(self.latency_ns) as u64
+        self.idle_in_response_ns.saturating_add(self.latency_budget_ns()) as u64
     }
 }
 
@@ -147,7 +139,7 @@ mod tests {
         assert_eq!(all.map(|line| line.frame_gap_ns), [1_000; 5]);
         assert_eq!(all.map(|line| line.response_timeout_ns), [400_000, 250_000, 150_000, 125_000, 62_500]);
         assert_eq!(all.map(|line| line.idle_between_responses_ns), [6_000, 4_000, 4_000, 3_000, 3_000]);
-        assert_eq!(all.map(|line| line.latency_ns), [750, 500, 500, 375, 375]);
+        assert_eq!(all.map(|line| line.hand_over_ns), [750, 500, 500, 375, 375]);
         assert_eq!(all.map(|line| line.idle_in_response_ns), [750, 500, 500, 375, 375]);
         assert_eq!(all.map(|line| (line.turn_around_ns, line.request_gap_ns, line.highest.get())), [(0, 10_000, 7); 5]);
     }
@@ -156,15 +148,15 @@ mod tests {
     #[test]
     fn the_budget_leaves_the_gap_of_a_bus_visible() {
         for line in BitRate::ALL.map(Line::new) {
-            assert!(line.pause_ns() < u64::from(line.rate.response_gap_ns() - line.latency_ns));
-            assert!(line.latency_ns < line.rate.bits_ns(7));
+            assert!(line.pause_ns() < u64::from(line.rate.response_gap_ns() - line.hand_over_ns));
+            assert!(line.hand_over_ns < line.rate.bits_ns(7));
         }
     }
 
     /// 18 bits and the gaps of a request, 72 bits of a response, 1000 bits of waiting, at 16 Mbit/s.
     #[test]
     fn times_of_a_transaction() {
-        let line = Line::new(BitRate::Mbit16).with_idle_in_response_ns(0).with_latency_ns(0);
+        let line = Line::new(BitRate::Mbit16).with_idle_in_response_ns(0).with_hand_over_ns(0);
         let of = |operation| Request::new(EncoderAddress::ZERO, operation);
         let (one, all) = (of(Operation::Abs40), of(Operation::Abs40Mt));
         let expected = |request: Request| request.expected(Resolution::default());
@@ -180,7 +172,7 @@ mod tests {
         assert_eq!(two.longest_ns(all, &expected(all)), 1_125 + 62_500 + 2 * 4_500 + 3_000);
         let idle = line.with_idle_in_response_ns(100);
         assert_eq!(idle.longest_ns(one, &expected(one)), 1_125 + 62_500 + 4_800);
-        assert_eq!(idle.with_latency_ns(50).longest_ns(one, &expected(one)), 1_125 + 62_500 + 4_850);
-        assert_eq!((line.with_turn_around_ns(9).early_ns(), line.with_latency_ns(7).early_ns()), (9, 7));
+        assert_eq!(idle.with_hand_over_ns(50).longest_ns(one, &expected(one)), 1_125 + 62_500 + 4_850);
+        assert_eq!((line.with_turn_around_ns(9).early_ns(), line.with_hand_over_ns(7).early_ns()), (9, 7));
     }
 }

@@ -1,60 +1,48 @@
-use core::fmt;
-
 use super::hunt::{Block, Found, Hunt};
 use super::{Line, Progress};
 use crate::bus::{Addresses, Bus, Outcome};
-use crate::doubt::{Doubt, Policy};
 use crate::error::Error;
+use crate::evidence::Evidence;
 use crate::expected::Expected;
 use crate::number::EncoderAddress;
 use crate::request::{Frames, Request};
-use crate::resolution::{Position, Resolution};
+use crate::resolution::Resolution;
 use crate::response::Response;
 
-/// When a position was sampled: not documented, but after the end of the request and before the response began.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub struct Sampled {
-    /// The end of the request, in ns.
-    pub earliest_ns: u64,
-    /// The first start bit of the response, in ns; late by no more than [`Line::latency_ns`].
-    pub latest_ns: u64,
-}
-
-/// A response, and when its values were sampled.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+/// A response with all checks passed, and when its values were sampled: not documented, but after the end of the request and
+/// before the response began.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Exchange {
     /// What the encoder sent.
     pub response: Response,
-    /// When it was sampled.
-    pub sampled: Sampled,
+    /// The earliest instant of sampling, in ns: the end of the request. Its age counts from here.
+    pub sampled_ns: u64,
+    /// The latest one, in ns: the first start bit of the response; late by no more than [`Line::latency_budget_ns`].
+    pub began_ns: u64,
 }
 
-impl fmt::Display for Exchange {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Sampled { earliest_ns, latest_ns } = self.sampled;
-        write!(f, "{}, sampled from {earliest_ns} to {latest_ns} ns", self.response)
-    }
-}
-
-servowire_core::format_as_displayed!(Exchange);
+servowire_core::one_line!(Exchange {
+    Self { response, sampled_ns, began_ns } => "{}, sampled from {} to {} ns", response, sampled_ns, began_ns;
+});
 
 impl Exchange {
-    /// The position for control at `now_ns`: only if nothing speaks against its use, its age included. See
-    /// [`Resolution::read`].
-    ///
-    /// # Errors
-    /// [`Doubt::Old`], then as [`Resolution::read`].
-    pub fn position(&self, resolution: Resolution, policy: Policy, now_ns: u64) -> Result<Position, Doubt> {
-        // A clock that was set back makes no position young.
-        let age_ns = now_ns.abs_diff(self.sampled.earliest_ns);
-        if age_ns > policy.max_age_ns() {
-            return Err(Doubt::Old { age_ns });
-        }
-        resolution.read(&self.response, policy)
+    /// What the response says about the position, to be judged where it is used.
+    pub const fn evidence(&self, resolution: Resolution) -> Evidence {
+        Evidence::of(self.response, resolution, self.sampled_ns)
     }
+}
+
+/// What a master sends, and when.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Transmission {
+    /// The frames, with [`Line::frame_gap_ns`] between two.
+    pub frames: Frames,
+    /// When the first start bit is on the line, in ns.
+    pub start_ns: u64,
+    /// When the last delimiter ends, in ns.
+    pub end_ns: u64,
 }
 
 /// One request and its response, frame by frame or in blocks.
@@ -74,6 +62,7 @@ pub struct Transaction {
     expected: Expected,
     line: Line,
     hunt: Hunt,
+    start_ns: u64,
     asked_ns: u64,
     until_ns: u64,
     refused: Option<Error>,
@@ -82,53 +71,53 @@ pub struct Transaction {
 }
 
 impl Transaction {
-    /// Begins a transaction with an encoder of this resolution; the first start bit of the request is at `now_ns`.
+    /// Begins a transaction with an encoder of this resolution; the first start bit of the request is at `start_ns`.
     ///
     /// A request that encoders of this version do not understand fails at once with
     /// [`Error::UnsupportedInVersion`] and is not to be sent.
-    pub fn start(request: Request, resolution: Resolution, line: Line, now_ns: u64) -> Self {
+    pub fn start(request: Request, resolution: Resolution, line: Line, start_ns: u64) -> Self {
         let expected = request.expected(resolution);
-        let asked_ns = now_ns.saturating_add(line.request_ns(request).into());
+        let asked_ns = start_ns.saturating_add(line.request_ns(request).into());
         Self {
             request,
             expected,
             line,
             hunt: Hunt::new(asked_ns),
+            start_ns,
             asked_ns,
             until_ns: asked_ns.saturating_add(line.answered_ns(&expected).into()),
             refused: None,
             end: request.check(resolution).err().map(Err),
-            ready_ns: now_ns,
+            ready_ns: start_ns,
         }
     }
 
-    /// The frames to send.
-    pub const fn frames(&self) -> Frames {
-        self.request.emit()
+    /// What is to be sent, and when.
+    pub const fn transmission(&self) -> Transmission {
+        Transmission { frames: self.request.emit(), start_ns: self.start_ns, end_ns: self.asked_ns }
     }
 
-    /// A frame was received whose start bit and delimiter are right, its delimiter at `end_ns`; `content` are its bits, the first
-    /// of the line in bit 0.
-    pub fn frame(&mut self, content: u16, end_ns: u64) -> Progress<Exchange> {
-        self.block(&[Some(content)], 0, end_ns)
-    }
-
-    /// A frame was received whose delimiter, at `end_ns`, reads 0.
-    pub fn framing_error(&mut self, end_ns: u64) -> Progress<Exchange> {
-        self.block(&[None], 0, end_ns)
-    }
-
-    /// Frames were received together, as a DMA block or when the line went idle: the last delimiter at `end_ns`, none of them
-    /// begun before `since_ns` (0 if that is not known). `None` stands for a frame whose delimiter reads 0.
+    /// Frames were heard one after the other, one alone, a DMA block or what came until the line went idle: the last delimiter
+    /// at `end_ns`. Each is its content bits, the first of the line in bit 0; `None` stands for a frame whose delimiter reads 0.
     ///
-    /// With nothing known of pauses in the block, the response has to be at its end, unless `since_ns` is after the request.
-    pub fn block(&mut self, frames: &[Option<u16>], since_ns: u64, end_ns: u64) -> Progress<Exchange> {
+    /// Nothing is known of pauses in a block, so the response has to be at its end. With pauses in it there is [`hear_since`](Self::hear_since).
+    pub fn hear(&mut self, frames: &[Option<u16>], end_ns: u64) -> Progress<Exchange> {
+        self.hear_since(frames, 0, end_ns)
+    }
+
+    /// A frame was heard whose delimiter, at `end_ns`, reads 0.
+    pub fn framing_error(&mut self, end_ns: u64) -> Progress<Exchange> {
+        self.hear(&[None], end_ns)
+    }
+
+    /// As [`hear`](Self::hear), where it is known that none of the frames began before `since_ns`: the time at which the receiver
+    /// was switched on. If that is after the request, a response may stand anywhere in the block.
+    pub fn hear_since(&mut self, frames: &[Option<u16>], since_ns: u64, end_ns: u64) -> Progress<Exchange> {
         if self.end.is_none() {
             let Self { hunt, line, expected, refused, end, ready_ns, asked_ns, until_ns, .. } = self;
             hunt.take(line, expected, Block { frames, since_ns, end_ns }, |found| match found.outcome {
                 Ok(response) if end.is_none() => {
-                    let sampled = Sampled { earliest_ns: *asked_ns, latest_ns: found.began_ns };
-                    *end = Some(Ok(Exchange { response, sampled }));
+                    *end = Some(Ok(Exchange { response, sampled_ns: *asked_ns, began_ns: found.began_ns }));
                     let others = expected.command().is_multi_response();
                     let free_ns = if others { found.end_ns.max(*until_ns) } else { found.end_ns };
                     *ready_ns = free_ns.saturating_add(line.request_gap_ns.into());
@@ -173,6 +162,7 @@ pub struct BusTransaction {
     line: Line,
     hunt: Hunt,
     bus: Bus,
+    start_ns: u64,
     asked_ns: u64,
     began_ns: [u64; 8],
     until_ns: u64,
@@ -182,20 +172,20 @@ pub struct BusTransaction {
 }
 
 impl BusTransaction {
-    /// Begins a transaction with encoders of this resolution; the first start bit of the request is at `now_ns`.
+    /// Begins a transaction with encoders of this resolution; the first start bit of the request is at `start_ns`.
     ///
     /// What EA of the request means to the encoders is not documented. [`Addresses::highest`] of those that are asked is
     /// the most likely reading; [`Line::highest`] covers the others.
     ///
     /// A request that encoders of this version do not understand fails at once with
     /// [`Error::UnsupportedInVersion`] and is not to be sent.
-    pub fn start(request: Request, resolution: Resolution, asked: Addresses, line: Line, now_ns: u64) -> Self {
+    pub fn start(request: Request, resolution: Resolution, asked: Addresses, line: Line, start_ns: u64) -> Self {
         let expected = request.expected(resolution).any_address();
         let line = match asked.highest() {
             Some(highest) => line.with_highest(line.highest.max(highest)),
             None => line,
         };
-        let asked_ns = now_ns.saturating_add(line.request_ns(request).into());
+        let asked_ns = start_ns.saturating_add(line.request_ns(request).into());
         let refused = request.check(resolution).err();
         Self {
             request,
@@ -203,37 +193,37 @@ impl BusTransaction {
             line,
             hunt: Hunt::new(asked_ns),
             bus: Bus::new(expected, asked),
+            start_ns,
             asked_ns,
             began_ns: [0; 8],
             until_ns: asked_ns.saturating_add(line.answered_ns(&expected).into()),
             ended: asked.is_empty() || refused.is_some(),
             refused,
-            ready_ns: now_ns,
+            ready_ns: start_ns,
         }
     }
 
-    /// The frames to send.
-    pub const fn frames(&self) -> Frames {
-        self.request.emit()
+    /// What is to be sent, and when.
+    pub const fn transmission(&self) -> Transmission {
+        Transmission { frames: self.request.emit(), start_ns: self.start_ns, end_ns: self.asked_ns }
     }
 
-    /// A frame was received whose start bit and delimiter are right, its delimiter at `end_ns`; `content` are its bits, the first
-    /// of the line in bit 0.
-    pub fn frame(&mut self, content: u16, end_ns: u64) -> Progress<()> {
-        self.block(&[Some(content)], 0, end_ns)
-    }
-
-    /// A frame was received whose delimiter, at `end_ns`, reads 0.
-    pub fn framing_error(&mut self, end_ns: u64) -> Progress<()> {
-        self.block(&[None], 0, end_ns)
-    }
-
-    /// Frames were received together: the last delimiter at `end_ns`, none of them begun before `since_ns` (0 if that is not
-    /// known). `None` stands for a frame whose delimiter reads 0.
+    /// Frames were heard one after the other, one alone, a DMA block or what came until the line went idle: the last delimiter
+    /// at `end_ns`. Each is its content bits, the first of the line in bit 0; `None` stands for a frame whose delimiter reads 0.
     ///
-    /// With nothing known of pauses in the block, only a response at its end is taken, unless `since_ns` is after the
-    /// request: give the time at which the receiver was switched on.
-    pub fn block(&mut self, frames: &[Option<u16>], since_ns: u64, end_ns: u64) -> Progress<()> {
+    /// Nothing is known of pauses in a block, so only a response at its end is taken. With pauses in it there is [`hear_since`](Self::hear_since).
+    pub fn hear(&mut self, frames: &[Option<u16>], end_ns: u64) -> Progress<()> {
+        self.hear_since(frames, 0, end_ns)
+    }
+
+    /// A frame was heard whose delimiter, at `end_ns`, reads 0.
+    pub fn framing_error(&mut self, end_ns: u64) -> Progress<()> {
+        self.hear(&[None], end_ns)
+    }
+
+    /// As [`hear`](Self::hear), where it is known that none of the frames began before `since_ns`: the time at which the receiver
+    /// was switched on. If that is after the request, a response may stand anywhere in the block.
+    pub fn hear_since(&mut self, frames: &[Option<u16>], since_ns: u64, end_ns: u64) -> Progress<()> {
         if !self.ended {
             let Self { hunt, line, expected, bus, began_ns, .. } = self;
             hunt.take(line, expected, Block { frames, since_ns, end_ns }, |found| {
@@ -285,7 +275,10 @@ impl BusTransaction {
     /// The good response of an encoder that was asked, and when its values were sampled.
     pub fn exchange(&self, ea: EncoderAddress) -> Option<Exchange> {
         let Outcome::Good(response) = self.bus.of(ea) else { return None };
-        let latest_ns = self.began_ns.get(usize::from(ea.get())).copied().unwrap_or(0);
-        Some(Exchange { response, sampled: Sampled { earliest_ns: self.asked_ns, latest_ns } })
+        let began_ns = self.began_ns.get(usize::from(ea.get())).copied().unwrap_or(0);
+        Some(Exchange { response, sampled_ns: self.asked_ns, began_ns })
     }
 }
+
+servowire_core::machine!(Transaction { Transmission, [Option<u16>] => Exchange, Error });
+servowire_core::machine!(BusTransaction { Transmission, [Option<u16>] => (), Error });

@@ -63,7 +63,7 @@ fn all_beginnings_are_judged() {
         for code in 0..32 {
             let cdf = RequestFrame::cdf(frame_code, EncoderAddress::ZERO, code);
             let got = Request::expected_frames(cdf);
-            let refused = Error::FrameCode { frame: 0, got: frame_code.get(), want: 0 };
+            let refused = Error::FrameCode { frame: 0, got: frame_code.code(), want: 0 };
             match (frame_code, code) {
                 (FrameCode::Fc0, 31) => assert_eq!(got, Err(Error::UnknownCommand { code })),
                 (FrameCode::Fc0, _) | (FrameCode::Fc3, 13 | 14 | 16 | 18) => assert!(matches!(got, Ok(1..=5))),

@@ -37,8 +37,8 @@ pub(crate) fn answer(request: Request, resolution: Resolution, es: EncoderStatus
 pub(crate) fn resolutions() -> impl Strategy<Value = Resolution> {
     any::<[bool; 2]>().prop_map(|[low, reset]| {
         let resolution = Resolution::default();
-        let resolution = if low { resolution.low_with_velocity() } else { resolution };
-        if reset { resolution.resets_with_position() } else { resolution }
+        let resolution = if low { resolution.with_velocity_in_low() } else { resolution };
+        if reset { resolution.with_position_in_resets() } else { resolution }
     })
 }
 
@@ -173,7 +173,7 @@ proptest! {
 /// Every single wrong bit and every truncation of the response to every operation: all fifteen layouts.
 #[test]
 fn every_flip_and_truncation_of_every_layout() {
-    let odd = Resolution::default().low_with_velocity().resets_with_position();
+    let odd = Resolution::default().with_velocity_in_low().with_position_in_resets();
     let mut seen = Vec::new();
     for resolution in [Resolution::default(), odd] {
         for operation in crate::request::tests::every(0x5a, 3, 0xbeef, 0x12_3456) {

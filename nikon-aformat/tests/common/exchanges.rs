@@ -3,7 +3,10 @@
 use nikon_aformat::bus::Addresses;
 use nikon_aformat::device::{Device, Encoders, Fault};
 use nikon_aformat::master::{BusTransaction, Line, Progress, Transaction};
-use nikon_aformat::{BitRate, EncoderAddress, Error, Operation, Request, Resolution, Response, Version};
+use nikon_aformat::{
+    Alm, BitRate, Doubt, EncoderAddress, EncoderStatus, Error, Evidence, Operation, Policy, Request, Resolution,
+    Response, Sample, Tolerated, Version,
+};
 use servowire_world::{Id, Scenario, Speaker, Tally, Transmission, Verdict};
 
 use super::line::{Bench, Spoken, between_ns, frame_ns, host_within, idle_ns, value_of};
@@ -151,22 +154,26 @@ fn judge<const N: usize>(bench: &Bench<N>, id: Id, value: u64, shown: &mut Shown
     verdict
 }
 
-/// The position of a response is where the shaft was when it was sent. Of the turns a response of 24 bits has the lowest.
+/// The position of a response is where the shaft was when it was sent. A response that does not hold all bits of the turns gives
+/// none of them.
 fn is_where_the_shaft_was<const N: usize>(bench: &Bench<N>, response: &Response, setup: &Setup) {
     let Some(Spoken { single_turn, turns, code, .. }) = bench.spoken(value_of(response.emit().contents())) else {
         return;
     };
     let (single_bits, turns_bits) = bench.widths;
-    let is_whole = matches!(code, 0 | 4);
-    let shown_bits = if is_whole { turns_bits } else { turns_bits.min(24 - single_bits) };
-    let position = setup.resolution().position(response).unwrap();
-    let shown = (position.single_turn, position.turns, u32::from(position.turns_bits));
-    assert_eq!(shown, (*single_turn, turns & ((1 << shown_bits) - 1), shown_bits), "seed {}", setup.seed);
+    // Whatever the encoder shows, and however old it is.
+    let at = |tolerated: Tolerated| {
+        let policy = Policy::new(0).tolerating(tolerated.status(EncoderStatus::all()).alarms(Alm::all()));
+        Evidence::of(*response, setup.resolution(), 0).at(0, policy)
+    };
+    let single = at(Tolerated::SINGLE_TURN).map(Sample::single_turn);
+    assert_eq!(single, Ok(*single_turn), "seed {}", setup.seed);
     // The counter is cyclic: its upper half stands for what is below 0.
     let (turns, all) = (i64::from(*turns), 1_i64 << turns_bits);
     let signed = if turns >= all / 2 { turns - all } else { turns };
-    let want = is_whole.then_some(signed as i32);
-    assert_eq!(setup.resolution().signed_turns(position), want, "seed {}", setup.seed);
+    let is_whole = matches!(code, 0 | 4) || single_bits + turns_bits <= 24;
+    let want = if is_whole { Ok(Some(signed as i32)) } else { Err(Doubt::Absent) };
+    assert_eq!(at(Tolerated::NOTHING).map(Sample::turns), want, "seed {}", setup.seed);
 }
 
 /// An own echo is no answer, not even a wrong one: where nothing else came back, nothing did.
@@ -228,7 +235,7 @@ fn line(rate: BitRate) -> Line {
 pub fn single(setup: &Setup, turns: u64, shown: &mut Shown) {
     let Setup { seed, rate, switches, quiet, .. } = *setup;
     let line = line(rate);
-    let scenario = host_within(setup.scenario.clone(), line.latency_ns);
+    let scenario = host_within(setup.scenario.clone(), line.latency_budget_ns());
     switches.note(&mut shown.mix);
     let resolution = setup.resolution();
     let encoders = encoders(rate, [0, 3, 6], Addresses::ALL, switches, resolution);
@@ -247,11 +254,11 @@ pub fn single(setup: &Setup, turns: u64, shown: &mut Shown) {
             shown.unsent += 1;
             continue;
         }
-        let id = bench.send(transaction.frames(), at_ns);
+        let id = bench.send(transaction.transmission().frames, at_ns);
         let end = loop {
             match transaction.progress() {
                 Progress::Pending { until_ns } => match bench.next(until_ns) {
-                    Ok(block) => drop(transaction.block(&block.frames, block.since_ns, block.end_ns)),
+                    Ok(block) => drop(transaction.hear_since(&block.frames, block.since_ns, block.end_ns)),
                     Err(now_ns) => drop(transaction.poll(now_ns)),
                 },
                 end => break end,
@@ -267,7 +274,7 @@ pub fn single(setup: &Setup, turns: u64, shown: &mut Shown) {
                     believed = judge(&bench, id, value_of(value.response.emit().contents()), shown, setup);
                     is_where_the_shaft_was(&bench, &value.response, setup);
                     let sent_ns = at_ns + frame_ns(rate);
-                    assert!(value.sampled.earliest_ns.abs_diff(sent_ns) <= 1 && value.sampled.latest_ns >= sent_ns);
+                    assert!(value.sampled_ns.abs_diff(sent_ns) <= 1 && value.began_ns >= sent_ns);
                 }
                 ready_ns
             }
@@ -307,7 +314,7 @@ pub fn single(setup: &Setup, turns: u64, shown: &mut Shown) {
 pub fn bus(setup: &Setup, turns: u64, shown: &mut Shown) {
     let Setup { seed, rate, switches, .. } = *setup;
     let line = line(rate);
-    let scenario = host_within(setup.scenario.clone(), line.latency_ns);
+    let scenario = host_within(setup.scenario.clone(), line.latency_budget_ns());
     switches.note(&mut shown.mix);
     let present = switches.present();
     let resolution = setup.resolution();
@@ -324,11 +331,11 @@ pub fn bus(setup: &Setup, turns: u64, shown: &mut Shown) {
             shown.unsent += 1;
             continue;
         }
-        let id = bench.send(transaction.frames(), at_ns);
+        let id = bench.send(transaction.transmission().frames, at_ns);
         let ready_ns = loop {
             match transaction.progress() {
                 Progress::Pending { until_ns } => match bench.next(until_ns) {
-                    Ok(block) => drop(transaction.block(&block.frames, block.since_ns, block.end_ns)),
+                    Ok(block) => drop(transaction.hear_since(&block.frames, block.since_ns, block.end_ns)),
                     Err(now_ns) => drop(transaction.poll(now_ns)),
                 },
                 Progress::Done { ready_ns, .. } => break ready_ns,

@@ -76,7 +76,7 @@ pub struct Spoken {
 /// What an encoder keeps when a request is over.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Kept {
-    pub zero: (u32, u32),
+    pub zero: nikon_aformat::device::Zero,
     pub word: Option<u16>,
     pub id: u32,
     pub ea: u8,
@@ -206,17 +206,17 @@ impl<const N: usize> Bench<N> {
                     self.encoders.all[at].set_position(single_turn, turns);
                     let was_busy = self.is_busy(at, unit.end_ns);
                     let answer = if framed {
-                        self.encoders.all[at].frame(content as u16, unit.end_ns)
+                        self.encoders.all[at].hear(&[Some(content as u16)], unit.end_ns)
                     } else {
                         self.encoders.all[at].framing_error(unit.end_ns);
                         None
                     };
                     let acted = self.note_acts(device, unit.origin.transmission);
                     if let Some(answer) = answer {
-                        let code = command_of(answer.raw.contents());
+                        let code = command_of(answer.frames.contents());
                         // Commands 8 to 12 are resets; 14 and 18 to 20 write.
                         if acted && !was_busy && (8..=12).contains(&code) {
-                            self.shown_at_once.push(shows_busy_memory(answer.raw.contents()));
+                            self.shown_at_once.push(shows_busy_memory(answer.frames.contents()));
                         }
                         if was_busy && matches!(code, 14 | 18..=20) {
                             self.hasty += u64::from(self.busy_by[at].is_some_and(|by| self.left_in_time(by)));
@@ -291,14 +291,14 @@ impl<const N: usize> Bench<N> {
     }
 
     fn answer(&mut self, device: u8, request: Id, answer: &Transmission, (single_turn, turns): (u32, u32)) {
-        let contents = answer.raw.contents();
+        let contents = answer.frames.contents();
         let tag = value_of(contents);
         self.spoken.push_back(Spoken { tag, code: command_of(contents), single_turn, turns });
         if self.spoken.len() > 400 {
             self.spoken.pop_front();
         }
         let message = Message::frames(WIDTH, contents.iter().map(|content| u64::from(*content))).tagged(tag);
-        self.world.answer(device, request, &message, answer.at_ns);
+        self.world.answer(device, request, &message, answer.start_ns);
     }
 
     /// Whether the encoder did something that it keeps.

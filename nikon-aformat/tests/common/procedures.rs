@@ -1,5 +1,6 @@
 //! Procedures on the hostile line: what cannot be undone, and what is read back.
 
+use core::convert::Infallible;
 use std::collections::BTreeMap;
 
 use nikon_aformat::device::{Device, Encoders};
@@ -7,6 +8,7 @@ use nikon_aformat::master::{
     Detection, EepromRead, GuardedReset, Line, Progress, Reset, Step, Transaction, VerifiedWrite, Write,
 };
 use nikon_aformat::{Alm, EncoderAddress, EncoderId, Error, Operation, Request, Resolution, Response, UserAddress};
+use servowire_core::{Ended, Procedure};
 use servowire_world::{Draw, Id, Kind, Tally};
 
 use super::exchanges::Setup;
@@ -44,7 +46,7 @@ impl<const N: usize> Run<N> {
         scenario.script.rates = without.iter().fold(scenario.script.rates, |rates, kind| rates.with(*kind, 0));
         scenario.script.planned.retain(|planned| !without.contains(&planned.fault.kind()));
         let line = Line::new(rate).with_response_timeout_ns(20_000);
-        let scenario = host_within(scenario, line.latency_ns);
+        let scenario = host_within(scenario, line.latency_budget_ns());
         let mut index = 0;
         let all = addresses.map(|ea| {
             let mut device = Device::<2>::new(EncoderAddress::truncate(ea), Resolution::default(), rate);
@@ -92,11 +94,11 @@ impl<const N: usize> Run<N> {
         // Nothing happens on the line meanwhile.
         while self.bench.next(self.at_ns).is_ok() {}
         let mut transaction = Transaction::start(request, Resolution::default(), self.line, self.at_ns);
-        let id = self.bench.send(transaction.frames(), self.at_ns);
+        let id = self.bench.send(transaction.transmission().frames, self.at_ns);
         loop {
             match transaction.progress() {
                 Progress::Pending { until_ns } => match self.bench.next(until_ns) {
-                    Ok(block) => drop(transaction.block(&block.frames, block.since_ns, block.end_ns)),
+                    Ok(block) => drop(transaction.hear_since(&block.frames, block.since_ns, block.end_ns)),
                     Err(now_ns) => drop(transaction.poll(now_ns)),
                 },
                 Progress::Done { value, ready_ns } => {
@@ -120,31 +122,21 @@ impl<const N: usize> Run<N> {
         self.given_up.iter().any(late)
     }
 
-    pub fn drive<T: Copy>(
-        &mut self,
-        first: Step<T>,
-        mut receive: impl FnMut(Result<Response, Error>, u64) -> Step<T>,
-    ) -> Result<T, Error> {
-        let mut step = first;
-        for sent in 0..200 {
-            match step {
-                Step::Send { request, not_before_ns } => {
-                    // What guards a procedure stands at its begin.
-                    let request = self.sent_for(request, if sent == 0 { 2 } else { 12 });
-                    let (outcome, now_ns) = self.transact(request, not_before_ns);
-                    step = receive(outcome, now_ns);
-                }
-                Step::Done { value, ready_ns } => {
-                    self.at_ns = self.at_ns.max(ready_ns);
-                    return Ok(value);
-                }
-                Step::Failed { error, ready_ns } => {
-                    self.at_ns = self.at_ns.max(ready_ns);
-                    return Err(error);
-                }
-            }
-        }
-        panic!("seed {}: a procedure without end", self.seed)
+    pub fn drive<P>(&mut self, procedure: &mut P, now_ns: u64) -> Result<P::Value, Error>
+    where
+        P: Procedure<Request = Request, Response = Response, Error = Error>,
+    {
+        let mut sent = 0;
+        let Ok(Ended { outcome, ready_ns }) = servowire_core::run(procedure, now_ns, |request, not_before_ns| {
+            assert!(sent < 200, "seed {}: a procedure without end", self.seed);
+            // What guards a procedure stands at its begin.
+            let request = self.sent_for(request, if sent == 0 { 2 } else { 12 });
+            sent += 1;
+            let (outcome, ready_ns) = self.transact(request, not_before_ns);
+            Ok::<_, Infallible>(Ended { outcome, ready_ns })
+        });
+        self.at_ns = self.at_ns.max(ready_ns);
+        outcome
     }
 
     pub fn now_ns(&self) -> u64 {
@@ -214,8 +206,7 @@ pub fn zero_presets(setup: &Setup, noisy: bool, turns: u32, shown: &mut Shown) {
             }
         }
         let (since_ns, misheard) = (run.now_ns(), run.bench.misheard);
-        let first = reset.start(since_ns);
-        let end = run.drive(first, |outcome, now_ns| reset.receive(outcome, now_ns));
+        let end = run.drive(&mut reset, since_ns);
         let acts = run.acts("zero", since_ns);
         let unknowable = run.bench.misheard > misheard || run.answered_late();
         if end.is_ok() && acts == 0 {
@@ -252,8 +243,7 @@ pub fn addresses_by_wire(setup: &Setup, turns: u8, shown: &mut Shown) {
         let (since_ns, before) = (run.now_ns(), run.bench.kept()[0].ea);
         let new = (before + 1 + turn) % 8;
         let mut reset = GuardedReset::new(Reset::set_address_of_the_only_encoder(EncoderAddress::truncate(new)));
-        let first = reset.start(since_ns);
-        let end = run.drive(first, |outcome, now_ns| reset.receive(outcome, now_ns));
+        let end = run.drive(&mut reset, since_ns);
         let (acts, after) = (run.acts("address", since_ns), run.bench.kept()[0].ea);
         let right = match end {
             // It may have been there already.
@@ -283,8 +273,7 @@ pub fn addresses_by_id(setup: &Setup, turns: u8, shown: &mut Shown) {
         }
         let id = EncoderId::truncate(before[which].id);
         let mut write = VerifiedWrite::new(Write::address(id, EncoderAddress::truncate(new)));
-        let first = write.start(since_ns);
-        let end = run.drive(first, |outcome, now_ns| write.receive(outcome, now_ns));
+        let end = run.drive(&mut write, since_ns);
         let (acts, after) = (run.acts("address", since_ns), run.bench.kept());
         let right = match end {
             Ok(()) => acts == 1 && after[which].ea == new,
@@ -311,8 +300,8 @@ pub fn detections(setup: &Setup, turns: u16, shown: &mut Shown) {
             0 => Detection::search(),
             _ => Detection::of(EncoderAddress::truncate(ea)),
         };
-        let first = detection.start(run.now_ns());
-        let end = run.drive(first, |outcome, now_ns| detection.receive(outcome, now_ns));
+        let now_ns = run.now_ns();
+        let end = run.drive(&mut detection, now_ns);
         if let Ok(found) = end {
             assert_eq!((found.ea.get(), found.type_word.0), (ea, word), "seed {} turn {turn}", setup.seed);
             let widths = found.resolution.map(|resolution| (resolution.st_bits(), resolution.mt_bits()));
@@ -335,8 +324,8 @@ pub fn eeprom_reads(setup: &Setup, turns: u16, shown: &mut Shown) {
         run.bench.encoders.all[0].set_eeprom(0, 0x22, words(turn)[1]);
         run.undetermined(words(turn.wrapping_sub(1))[which]);
         let read = &mut reads[which];
-        let first = read.start(run.now_ns());
-        let end = run.drive(first, |outcome, now_ns| read.receive(outcome, now_ns));
+        let now_ns = run.now_ns();
+        let end = run.drive(read, now_ns);
         let stored = words(turn)[which];
         let seed = setup.seed;
         assert!(end.is_err() || end == Ok(stored), "seed {seed} turn {turn}: {end:x?} instead of {stored:x}");
@@ -365,8 +354,7 @@ pub fn writes(setup: &Setup, turns: u16, shown: &mut Shown) {
         }
         let mut write = VerifiedWrite::new(Write::eeprom(EA, UserAddress::new(0x42).unwrap(), data));
         let since_ns = run.now_ns();
-        let first = write.start(since_ns);
-        let end = run.drive(first, |outcome, now_ns| write.receive(outcome, now_ns));
+        let end = run.drive(&mut write, since_ns);
         let (acts, word) = (run.acts("word", since_ns), run.bench.kept()[0].word);
         let right = match end {
             Ok(()) => word == Some(data) && acts == 1,
@@ -382,8 +370,7 @@ pub fn writes(setup: &Setup, turns: u16, shown: &mut Shown) {
     let (since_ns, before) = (run.now_ns(), run.bench.kept()[0].id);
     let id = EncoderId::truncate(seed as u32 % 0x10_0000);
     let mut write = VerifiedWrite::new(Write::id(EA, id));
-    let first = write.start(since_ns);
-    let end = run.drive(first, |outcome, now_ns| write.receive(outcome, now_ns));
+    let end = run.drive(&mut write, since_ns);
     let (acts, after) = (run.acts("id", since_ns), run.bench.kept()[0].id);
     let right = match end {
         Ok(()) => after == id.get() && acts == 1,

@@ -34,7 +34,7 @@ impl<const N: usize> Sampled<N> {
         let mut encoders = encoders(setup.rate, addresses, Addresses::ALL, setup.switches, Resolution::default());
         for (encoder, ea) in encoders.all.iter_mut().zip(addresses) {
             // Soon, and in ascending order.
-            encoder.set_behaviour(setup.switches.behaviour(ea, ea).with_turn_around_ns(900).at_place(ea));
+            encoder.set_behaviour(setup.switches.behaviour(ea, ea).with_response_delay_ns(900).with_place(Some(ea)));
         }
         let scenario = Scenario { host: Host::IDEAL, script };
         Self { bench: Bench::new(encoders, setup.rate, scenario), setup: setup.clone(), at_ns: 1_000 }

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use nikon_aformat::bus::Addresses;
-use nikon_aformat::device::Behaviour;
+use nikon_aformat::device::{Behaviour, Ea, FirstRead, Restart, ShownAddress, Shows};
 
 use super::line::{USUAL_EVENTS, events};
 
@@ -75,29 +75,29 @@ impl Switches {
 
     /// How the encoder with address `ea` behaves, of those that are there the one with number `index`.
     pub fn behaviour(self, ea: u8, index: u8) -> Behaviour {
-        let mut behaviour = Behaviour::new().with_turn_around_ns(self.turn_around().1);
+        let mut behaviour = Behaviour::new().with_response_delay_ns(self.turn_around().1);
         if let Some(word) = self.undetermined().1 {
             behaviour = behaviour.with_undetermined(word);
         }
         if !self.busy_in_first_read().1 {
-            behaviour = behaviour.not_busy_in_first_read();
+            behaviour = behaviour.with_first_read(FirstRead::Ready);
         }
         if self.reset_shows_in_the_eighth().1 {
-            behaviour = behaviour.showing_in_the_eighth();
+            behaviour = behaviour.with_reset_shows(Shows::Eighth);
         }
         if self.all_answer().1 {
-            behaviour = behaviour.answering_all();
+            behaviour = behaviour.with_ea(Ea::All);
         }
         if self.shows_old_address().1 {
-            behaviour = behaviour.showing_the_old_address();
+            behaviour = behaviour.with_shown_address(ShownAddress::Old);
         }
         if self.counts_its_own().1 {
-            behaviour = behaviour.counting_its_own_requests();
+            behaviour = behaviour.with_restart(Restart::Own);
         }
         match self.order().1 {
             Order::Slots => behaviour,
-            Order::ClosedUp => behaviour.at_place(index),
-            Order::Descending => behaviour.at_place(7 - ea),
+            Order::ClosedUp => behaviour.with_place(Some(index)),
+            Order::Descending => behaviour.with_place(Some(7 - ea)),
         }
     }
 

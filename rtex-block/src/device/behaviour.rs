@@ -1,10 +1,37 @@
-/// How impolite a modelled drive is. The polite one of [`POLITE`](Self::POLITE) does everything as soon as it can.
+use crate::flags::flag_set;
+
+flag_set! {
+    /// What a modelled drive does that the documents at hand allow, or leave open.
+    pub struct Quirks(u16) {
+        /// Every request is busy for as long as a parameter write.
+        ALWAYS_BUSY = 1 << 0;
+        /// A request that fails says ERR while it is still busy.
+        ERR_WHILE_BUSY = 1 << 1;
+        /// A position can be set with the servo on; otherwise that fails with ERR.
+        SETS_POSITION_WHILE_ON = 1 << 2;
+        /// Most parameters count only after a reset of type 011h or 001h.
+        PARAMETERS_AFTER_RESET = 1 << 3;
+        /// Homing_Complete is 1 from power-up on, if this is set before the first exchange.
+        HOMED_AT_START = 1 << 4;
+        /// In_Position is 1 during the standstill before a profile motion, and during the motion too.
+        ALWAYS_IN_POSITION = 1 << 5;
+        /// WNG is set in every answer.
+        WARNS = 1 << 6;
+        /// An alarm is not cleared by command: that fails with ERR.
+        REFUSES_TO_CLEAR = 1 << 7;
+        /// The command that clears an alarm is executed, and the alarm is there all the same.
+        ALARM_STAYS = 1 << 8;
+    }
+}
+
+/// How impolite a modelled drive is. A new one is polite: it does everything as soon as it can.
 ///
 /// Each of them is allowed by what the documents at hand say, or left open by them; a master has to live with any
 /// combination.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "arbitrary", derive(arbitrary::Arbitrary))]
 #[non_exhaustive]
 pub struct Behaviour {
     /// Exchanges by which everything but the counter echo is later than it has to be, 0..=3.
@@ -20,45 +47,23 @@ pub struct Behaviour {
     pub status_late: [u8; 8],
     /// Exchanges by which Latch_Comp1 and 2 are shown later than they are so, 0..=15.
     pub latch_late: u8,
-    /// Every request is busy for as long as a parameter write.
-    pub always_busy: bool,
-    /// A request that fails says ERR while it is still busy.
-    pub err_while_busy: bool,
-    /// A position can be set with the servo on; otherwise that fails with ERR.
-    pub sets_position_while_on: bool,
-    /// Most parameters count only after a reset of type 011h or 001h.
-    pub parameters_after_reset: bool,
-    /// Homing_Complete is 1 from power-up on.
-    pub homed_at_start: bool,
-    /// In_Position is 1 during the standstill before a profile motion, and during the motion too.
-    pub always_in_position: bool,
-    /// WNG is set in every answer.
-    pub warns: bool,
-    /// An alarm is not cleared by command: that fails with ERR.
-    pub refuses_to_clear: bool,
-    /// The command that clears an alarm is executed, and the alarm is there all the same.
-    pub alarm_stays: bool,
+    /// What else it does.
+    pub quirks: Quirks,
 }
 
 impl Behaviour {
-    /// As soon as it can.
-    pub const POLITE: Self = Self {
-        echo_lag: 0,
-        in_progress_late: 0,
-        servo_off_late: 0,
-        stale_answers: 0,
-        status_late: [0; 8],
-        latch_late: 0,
-        always_busy: false,
-        err_while_busy: false,
-        sets_position_while_on: false,
-        parameters_after_reset: false,
-        homed_at_start: false,
-        always_in_position: false,
-        warns: false,
-        refuses_to_clear: false,
-        alarm_stays: false,
-    };
+    /// As soon as it can, and without quirks.
+    pub const fn new() -> Self {
+        Self {
+            echo_lag: 0,
+            in_progress_late: 0,
+            servo_off_late: 0,
+            stale_answers: 0,
+            status_late: [0; 8],
+            latch_late: 0,
+            quirks: Quirks::empty(),
+        }
+    }
 
     servowire_core::builder! {
         with_echo_lag: echo_lag, u8;
@@ -67,20 +72,17 @@ impl Behaviour {
         with_stale_answers: stale_answers, u16;
         with_status_late: status_late, [u8; 8];
         with_latch_late: latch_late, u8;
-        with_always_busy: always_busy, bool;
-        with_err_while_busy: err_while_busy, bool;
-        with_sets_position_while_on: sets_position_while_on, bool;
-        with_parameters_after_reset: parameters_after_reset, bool;
-        with_homed_at_start: homed_at_start, bool;
-        with_always_in_position: always_in_position, bool;
-        with_warns: warns, bool;
-        with_refuses_to_clear: refuses_to_clear, bool;
-        with_alarm_stays: alarm_stays, bool;
+        with_quirks: quirks, Quirks;
+    }
+
+    /// Whether it does this.
+    pub(super) const fn does(&self, quirk: Quirks) -> bool {
+        self.quirks.contains(quirk)
     }
 }
 
 impl Default for Behaviour {
     fn default() -> Self {
-        Self::POLITE
+        Self::new()
     }
 }

@@ -1,4 +1,3 @@
-use super::behaviour::Behaviour;
 use crate::error_code::Alarm;
 use crate::header::MacId;
 use crate::position::Gear;
@@ -93,8 +92,6 @@ pub struct DriveConfig {
     pub homing_distance: i32,
     /// What is not confirmed.
     pub codes: OpenCodes,
-    /// How impolite it is.
-    pub behaviour: Behaviour,
 }
 
 impl DriveConfig {
@@ -118,7 +115,6 @@ impl DriveConfig {
             alarm_attributes: 1,
             homing_distance: -5_000,
             codes,
-            behaviour: Behaviour::POLITE,
         }
     }
 
@@ -138,6 +134,5 @@ impl DriveConfig {
         with_near: near, u32;
         with_alarm_attributes: alarm_attributes, i32;
         with_homing_distance: homing_distance, i32;
-        with_behaviour: behaviour, Behaviour;
     }
 }

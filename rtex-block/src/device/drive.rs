@@ -3,8 +3,10 @@ mod sub_block;
 
 use execute::Job;
 
+use super::behaviour::{Behaviour, Quirks};
 use super::check::{Verdict, check};
 use super::config::DriveConfig;
+use super::fault::Fault;
 use super::literals::{
     CP, CT, CV, ERR27_4, ERR86_2, ERR91_1, HARD_STOP, NON_CYCLIC, NOP, PAUSE, PP, PROFILE, PROFILE_IDLE, SERVO_ON,
     SHOWN_ACTIVE, SHOWN_ALARM, SHOWN_HOMED, SHOWN_IN_POSITION, SHOWN_IN_PROGRESS, SHOWN_READY, SHOWN_TORQUE_LIMITED,
@@ -15,23 +17,27 @@ use super::parameters::{ACCELERATION, DECELERATION, Parameters, RESPONSE_DATA, S
 use super::profile::Ramp;
 use super::wire::{Block, Request, Sub};
 use crate::block::{BlockSize, LEN, LEN32};
+use crate::command::Command;
 use crate::error_code::Alarm;
+use crate::response::Response;
 
 /// Command units per second.
 const HOMING_SPEED: i64 = 1_000_000;
 
-/// A model of a drive: every exchange takes a command block and gives a response block.
+/// A model of a drive: in every communication period it hears a command block and gives a response block.
 ///
 /// The response to command N carries the counter of command N and everything else as it was after command N - 1,
 /// so the echo of a code comes one command later than the echo of the counter. Blocks with a fault in header or
 /// cyclic code are thrown away and the command before stays in force; if that lasts the drive raises Err86.
 ///
 /// It shares neither numbers nor code with the master: blocks are read and written by byte. It is as late, forgetful and
-/// literal as its [`Behaviour`](super::Behaviour) say. The motor follows its command position as a first-order lag; that is a model for tests, not for tuning.
+/// literal as its [`Behaviour`] says, and what goes wrong is its [`Fault`]. The motor follows its command position as a first-order lag; that is a model for tests, not for tuning.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Drive {
     config: DriveConfig,
+    behaviour: Behaviour,
+    fault: Fault,
     parameters: Parameters,
     motion: Motion,
     alarm: Option<Alarm>,
@@ -43,7 +49,6 @@ pub struct Drive {
     homing: bool,
     feed_forward: i32,
     sub_feed_forward: [i32; 2],
-    main_power: bool,
     /// Byte 3 of a response.
     inputs: u8,
     /// Byte 2 of the responses, and Latch_Comp, as they would have been without lateness; the latest first.
@@ -65,6 +70,8 @@ pub struct Drive {
     /// The request before, whose echoes linger, and for how many answers.
     stale: Option<(Request, u16)>,
     sub: Sub,
+    /// The response sent last.
+    last: [u8; LEN32],
     /// Responses that are not out yet.
     pending: [Block; 3],
     /// Supervision.
@@ -83,18 +90,19 @@ impl Drive {
         let silent = Block::new(config.mac_id.get(), NOP, [0; 2], 0, [0; 8]);
         Self {
             config,
+            behaviour: Behaviour::new(),
+            fault: Fault::None,
             parameters: Parameters::DEFAULT,
             motion: Motion::new(),
             alarm: None,
             history: [None; 14],
             warning: 0,
-            homed: config.behaviour.homed_at_start,
+            homed: false,
             latches: [None; 2],
             armed: [false; 2],
             homing: false,
             feed_forward: 0,
             sub_feed_forward: [0; 2],
-            main_power: true,
             inputs: 0,
             shown: [0; 16],
             comp: [0; 16],
@@ -109,6 +117,7 @@ impl Drive {
             job: None,
             stale: None,
             sub: Sub::Done(0, 0, 0, 0),
+            last: [0; LEN32],
             pending: [silent; 3],
             exchanges: 0,
             faults: 0,
@@ -120,29 +129,51 @@ impl Drive {
         }
     }
 
-    /// One exchange in the 16-byte mode.
-    pub fn exchange(&mut self, command: &[u8; LEN]) -> [u8; LEN] {
-        let response = self.response(command[0]);
-        self.receive(command, None, check(command, BlockSize::Bytes16, self.config.mac_id));
-        response
-    }
-
-    /// One exchange in the 32-byte mode.
-    pub fn exchange32(&mut self, command: &[u8; LEN32]) -> [u8; LEN32] {
-        let [_, data2, data3] = SUB_RESPONSE_DATA.map(|pr| self.selected(pr, 0));
-        let sub = self.sub.emit(data2, data3);
-        let mut response = [0; LEN32];
-        let halves = self.response(command[0]).into_iter().chain(sub);
-        response.iter_mut().zip(halves).for_each(|(to, from)| *to = from);
-        let verdict = check(command, BlockSize::Bytes32, self.config.mac_id);
-        if let (Some(main), Some(rest)) = (command.first_chunk(), command.last_chunk()) {
-            self.receive(main, Some(*rest), verdict);
+    /// One exchange: a command block of 16 or 32 bytes comes in, and the response goes out; `None` if the drive is silent. A
+    /// block of any other size does not compile.
+    ///
+    /// ```compile_fail,E0080
+    /// # use rtex_block::{MacId, device::{Drive, DriveConfig, OpenCodes}};
+    /// let mut drive = Drive::new(DriveConfig::new(MacId::truncate(0), OpenCodes::INVENTED));
+    /// drive.hear(&[0; 17]);
+    /// ```
+    pub fn hear<const N: usize>(&mut self, command: &[u8; N]) -> Option<[u8; N]> {
+        const { assert!(N == LEN || N == LEN32, "a block has 16 or 32 bytes") };
+        match self.fault {
+            Fault::Silent => {
+                self.framing_error();
+                return None;
+            }
+            Fault::StaleEcho => return self.last.first_chunk().copied(),
+            _ => {}
         }
-        response
+        let (main, sub) = (command.first_chunk::<LEN>()?, command.get(LEN..)?.first_chunk::<LEN>());
+        let mut response = self.response(main[0]);
+        if let Fault::WrongMacId(other) = self.fault {
+            response[0] = response[0] & 0xe0 | other.get();
+        }
+        if let Some(half) = self.last.first_chunk_mut() {
+            *half = response;
+        }
+        if sub.is_some() {
+            let [_, data2, data3] = SUB_RESPONSE_DATA.map(|pr| self.selected(pr, 0));
+            let half = self.sub.emit(data2, data3);
+            if let Some(place) = self.last.last_chunk_mut() {
+                *place = half;
+            }
+        }
+        let size = if sub.is_some() { BlockSize::Bytes32 } else { BlockSize::Bytes16 };
+        self.receive(main, sub.copied(), check(command, size, self.config.mac_id));
+        self.last.first_chunk().copied()
     }
 
-    /// A communication period in which no frame came.
-    pub fn miss(&mut self) {
+    /// As [`hear`](Self::hear), with messages in place of bytes.
+    pub fn answer(&mut self, command: &Command) -> Option<Response> {
+        Response::parse(&self.hear(&command.emit())?).ok()
+    }
+
+    /// A communication period in which no frame came, or a damaged one.
+    pub fn framing_error(&mut self) {
         self.lost = self.lost.saturating_add(1);
         if self.lost == self.config.lost_limit {
             self.raise(self.config.codes.communication_lost);
@@ -182,13 +213,26 @@ impl Drive {
         &self.config
     }
 
-    /// Another behaviour from now on.
-    pub const fn set_config(&mut self, config: DriveConfig) {
-        self.config = config;
+    /// It behaves like this from now on.
+    pub const fn set_behaviour(&mut self, behaviour: Behaviour) {
+        self.behaviour = behaviour;
+        if self.exchanges == 0 {
+            self.homed = behaviour.does(Quirks::HOMED_AT_START);
+        }
+    }
+
+    /// It does this wrong from now on, in place of what it did before.
+    pub fn set_fault(&mut self, fault: Fault) {
+        self.fault = fault;
+        match fault {
+            Fault::Alarm(alarm) => self.raise(alarm),
+            Fault::NoMainPower | Fault::ServoDrop => self.motion.release(0),
+            Fault::None | Fault::Silent | Fault::StaleEcho | Fault::WrongMacId(_) => {}
+        }
     }
 
     /// Raises an alarm: the motor is released at once. An alarm that is already there stays.
-    pub fn raise(&mut self, alarm: Alarm) {
+    fn raise(&mut self, alarm: Alarm) {
         if self.alarm.is_none() {
             self.alarm = Some(alarm);
             self.history.rotate_right(1);
@@ -202,19 +246,6 @@ impl Drive {
         self.alarm = None;
         self.faults = 0;
         self.wrong_counts = 0;
-    }
-
-    /// Switches main power; without it the drive is not ready.
-    pub fn set_main_power(&mut self, on: bool) {
-        self.main_power = on;
-        if !on {
-            self.motion.release(0);
-        }
-    }
-
-    /// The motor is released without an alarm, and Servo_Ready stays 1.
-    pub fn drop_servo(&mut self) {
-        self.motion.release(0);
     }
 
     /// Puts a warning; 0 for none.
@@ -239,7 +270,9 @@ impl Drive {
 
     /// Servo_Ready: main power, no alarm, synchronised.
     pub const fn is_ready(&self) -> bool {
-        self.main_power && self.alarm.is_none() && self.exchanges >= self.config.sync_exchanges
+        !matches!(self.fault, Fault::NoMainPower)
+            && self.alarm.is_none()
+            && self.exchanges >= self.config.sync_exchanges
     }
 
     /// Byte 2 as it is.
@@ -254,7 +287,7 @@ impl Drive {
             (SHOWN_TORQUE_LIMITED, self.motion.torque_limited),
             (SHOWN_HOMED, self.homed),
             (SHOWN_IN_PROGRESS, progress),
-            (SHOWN_IN_POSITION, settled && !progress || self.config.behaviour.always_in_position),
+            (SHOWN_IN_POSITION, settled && !progress || self.behaviour.does(Quirks::ALWAYS_IN_POSITION)),
         ];
         set.into_iter().fold(0, |all, (flag, on)| if on { all | flag } else { all })
     }
@@ -267,8 +300,8 @@ impl Drive {
             past[0] = new;
         }
         let ago = |past: &[u8; 16], late: u8| past.get(usize::from(late)).copied().unwrap_or(past[15]);
-        self.latched = ago(&self.comp, self.config.behaviour.latch_late);
-        let bits = self.config.behaviour.status_late.into_iter().zip(0..8_u32);
+        self.latched = ago(&self.comp, self.behaviour.latch_late);
+        let bits = self.behaviour.status_late.into_iter().zip(0..8_u32);
         bits.fold(0, |all, (late, bit)| all | ago(&self.shown, late) & 1_u8.wrapping_shl(bit))
     }
 
@@ -280,7 +313,7 @@ impl Drive {
         let tail = self.noncyclic(shown);
         let present = Block::new(self.config.mac_id.get(), byte1, [shown, self.inputs], response_data1, tail);
         self.pending.rotate_right(1);
-        let out = match usize::from(self.config.behaviour.echo_lag).checked_sub(1) {
+        let out = match usize::from(self.behaviour.echo_lag).checked_sub(1) {
             None => present,
             // What is rotated to the front is the oldest; shorter lags take a younger one.
             Some(lag) => {
@@ -383,7 +416,7 @@ impl Drive {
         self.control = u16::from_le_bytes([c2, c3]);
         self.data1 = i32::from_le_bytes([d4, d5, d6, d7]);
         let servo_on = self.control & SERVO_ON != 0 && self.is_ready();
-        self.motion.request(servo_on, &self.config);
+        self.motion.request(servo_on, &self.config, self.behaviour.servo_off_late);
         if NON_CYCLIC.contains(&code) {
             let request = Request { code, bytes: noncyclic };
             if code == PROFILE {

@@ -112,9 +112,9 @@ impl Motion {
     }
 
     /// Servo_On as the drive sees it.
-    pub(super) fn request(&mut self, servo_on: bool, config: &DriveConfig) {
+    pub(super) fn request(&mut self, servo_on: bool, config: &DriveConfig, off_late: u16) {
         match (servo_on, self.power) {
-            (false, _) => self.release(config.behaviour.servo_off_late),
+            (false, _) => self.release(off_late),
             (true, Power::Off) => self.power = Power::SwitchingOn { left: config.servo_on_updates },
             (true, _) => {}
         }

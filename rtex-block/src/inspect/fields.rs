@@ -16,6 +16,7 @@ use crate::sub::{SubResponse, split32};
 /// A value of a field.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub enum Value {
     /// A number, shown in decimal.
     Number(i64),
@@ -54,6 +55,7 @@ impl fmt::Display for Value {
 /// A field of a block.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct Field {
     /// Its name in the vendor documents.
     pub name: &'static str,
@@ -72,6 +74,14 @@ const MOST: usize = 42;
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Fields([Option<Field>; MOST]);
+
+#[cfg(feature = "serde")]
+#[cfg_attr(docsrs, doc(cfg(feature = "serde")))]
+impl serde::Serialize for Fields {
+    fn serialize<S: serde::Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.collect_seq(self.iter())
+    }
+}
 
 impl Fields {
     pub(super) fn iter(&self) -> impl Iterator<Item = Field> {
@@ -131,7 +141,7 @@ impl List {
     }
 
     fn header(&mut self, byte0: u8, counter: &'static str, mac_id: &'static str) {
-        let header = Header::from_byte(byte0);
+        let header = Header::parse(byte0);
         self.add(counter, 0, 0, Value::Number(header.update_counter.get().into()));
         self.add(mac_id, 0, 0, Value::Number(header.mac_id.get().into()));
     }
@@ -153,7 +163,7 @@ impl List {
         };
         self.word(name, 4, block.command_data1());
         if let Some(code) = block.code().noncyclic() {
-            self.request(&NonCyclicCommand::from_bytes(code, block.noncyclic_bytes()));
+            self.request(&NonCyclicCommand::parse(code, block.noncyclic_bytes()));
         }
     }
 
@@ -266,7 +276,7 @@ impl List {
     }
 
     fn sub_command(&mut self, sub: &[u8; LEN]) {
-        let like = SubResponse::from_bytes(sub);
+        let like = SubResponse::parse(sub);
         // The flags of a response are where a command has Sub_Chk and reserved bits.
         self.bit("Sub_Chk", 16, like.cmd_error);
         self.byte("Sub_Command_Code", 16, like.code.get());
@@ -278,7 +288,7 @@ impl List {
     }
 
     fn sub_response(&mut self, sub: &[u8; LEN]) {
-        let sub = SubResponse::from_bytes(sub);
+        let sub = SubResponse::parse(sub);
         self.bit("Sub_CMD_Err", 16, sub.cmd_error);
         self.bit("Sub_ERR", 16, sub.execution.contains(Execution::ERR));
         self.bit("Sub_WNG", 16, sub.execution.contains(Execution::WNG));

@@ -7,18 +7,18 @@ use service::{Service, SubService};
 
 use super::config::{AxisConfig, StopPolicy};
 use super::counter::Turn;
-use super::echo::{EchoWatch, Standstill};
+use super::counters::Counters;
+use super::echo::EchoWatch;
+use super::heard::Heard;
 use super::profile_move::ProfileMove;
 use super::progress::{Failure, Progress};
-use super::received::Received;
 use super::servo_off::{ActiveCode, ServoOff};
-use super::state::{AxisState, StopReason};
-use crate::Counters;
+use super::state::{AxisState, StopReason, SwitchOnError};
 use crate::command::Command;
 use crate::control::ControlBits;
-use crate::doubt::Doubt;
 use crate::error::Error;
-use crate::header::MacId;
+use crate::evidence::Evidence;
+use crate::header::{MacId, UpdateCounter};
 use crate::noncyclic_command::NonCyclicCommand;
 use crate::noncyclic_response::NonCyclicResponse;
 use crate::position::{max_step, max_step_at, step};
@@ -35,7 +35,7 @@ use crate::sub::{Command32, SubResponse};
 ///  any ──alarm, time-out, not ready──► Stopped ──clear──► Starting
 ///  On ──another axis fails, policy Decelerate──► Stopping ──stands──► Stopped
 /// ```
-/// Call [`receive`](Self::receive) and then [`send`](Self::send) once in every update period. While the servo is off the
+/// Call [`hear`](Self::hear) and then [`transmission`](Self::transmission) once in every update period. While the servo is off the
 /// command position follows the actual position, so switching on makes no jump. In every state but SwitchingOn, On and
 /// Stopping the command is a [`ServoOff`]: Servo_On = 0 with a code at which the drive looks, whatever the caller does.
 /// SX-DSV02310, "Servo_On"; the extra waiting times of the vendor are not known.
@@ -54,11 +54,12 @@ pub struct Axis {
     /// The set-point before, and the step between them.
     before: i32,
     last_step: i32,
-    actual: i32,
-    /// How old `actual` and `status` are: a position is new with a new counter echo. A drive whose processing stands still
-    /// goes on to send its last block.
-    age: Standstill,
-    status: StatusFlags,
+    /// Of the last good block, with the instant of the last new counter echo: a drive whose processing stands still goes on to
+    /// send its last block.
+    evidence: Evidence,
+    echo: Option<UpdateCounter>,
+    /// This update period brought a new counter echo.
+    is_fresh: bool,
     control: ControlBits,
     /// Command_Data3, Sub_Command_Data2 and 3.
     feed_forward: [i32; 3],
@@ -101,9 +102,9 @@ impl Axis {
             setpoint: 0,
             before: 0,
             last_step: 0,
-            actual: 0,
-            age: Standstill::new(),
-            status: StatusFlags::empty(),
+            evidence: Evidence::NEVER,
+            echo: None,
+            is_fresh: false,
             control: ControlBits::empty(),
             feed_forward: [0; 3],
             watch: EchoWatch::new(config.limits.echo),
@@ -132,30 +133,19 @@ impl Axis {
         self.state
     }
 
-    /// The actual position for control: Response_Data1, command units. Its age is counted in update periods since the last
-    /// good block with a new counter echo; 0 is that of a block that came with the last [`receive`](Self::receive). How long
-    /// before its block the drive measured it is not documented. SX-DSV02310, "Update timing".
-    ///
-    /// # Errors
-    /// [`Doubt::Absent`], then [`Doubt::Old`] beyond `max_age` update periods, then [`Doubt::Alarm`].
-    pub const fn position(&self, max_age: u32) -> Result<i32, Doubt> {
-        match self.age.updates() {
-            None => Err(Doubt::Absent),
-            Some(updates) if updates > max_age => Err(Doubt::Old { updates }),
-            Some(_) if self.status.contains(StatusFlags::ALARM) => Err(Doubt::Alarm),
-            Some(_) => Ok(self.actual),
-        }
-    }
-
-    /// Response_Data1 of the last good response, command units, however old it is; [`position`](Self::position) says whether
-    /// it may be used.
-    pub const fn actual_position(&self) -> i32 {
-        self.actual
+    /// What is known of the actual position (Response_Data1), speed and torque. Its instant is that of the block that brought
+    /// the last new counter echo, as [`hear`](Self::hear) was told.
+    pub const fn evidence(&self) -> Evidence {
+        let refused = match self.last_refusal {
+            Some(error) => Some(error.class()),
+            None => None,
+        };
+        self.evidence.refused(refused)
     }
 
     /// Status_Flags of the last good response.
     pub const fn status(&self) -> StatusFlags {
-        self.status
+        self.evidence.status()
     }
 
     /// Blocks of the drive that were sound, and those that were refused, by class.
@@ -169,22 +159,36 @@ impl Axis {
         self.disobeys
     }
 
-    /// Whether the servo is off, the drive ready to switch it on by a block of this update period, and no request is under
-    /// way that would change its position or its state: the command position is the actual one then.
-    pub const fn can_switch_on(&self) -> bool {
-        matches!(self.state, AxisState::Off)
-            && self.position(0).is_ok()
-            && self.status.contains(StatusFlags::SERVO_READY)
-            && !self.service.needs_servo_off()
+    /// Whether the servo can be switched on: it is off, the drive ready by a new block of this update period, and no request is
+    /// under way that would change its position or its state. The command position is the actual one then.
+    ///
+    /// # Errors
+    /// [`SwitchOnError`]: the first reason why not.
+    pub const fn can_switch_on(&self) -> Result<(), SwitchOnError> {
+        let status = self.evidence.status();
+        if !matches!(self.state, AxisState::Off) {
+            Err(SwitchOnError::State(self.state))
+        } else if !self.is_fresh {
+            Err(SwitchOnError::OldPosition)
+        } else if status.contains(StatusFlags::ALARM) {
+            Err(SwitchOnError::Alarm)
+        } else if !status.contains(StatusFlags::SERVO_READY) {
+            Err(SwitchOnError::NotReady)
+        } else if self.service.needs_servo_off() {
+            Err(SwitchOnError::Busy)
+        } else {
+            Ok(())
+        }
     }
 
-    /// Switches the servo on, from `Off`; gives whether it did anything.
-    pub fn switch_on(&mut self) -> bool {
-        let able = self.can_switch_on();
-        if able {
-            self.enter(AxisState::SwitchingOn, self.config.limits.active);
-        }
-        able
+    /// Switches the servo on, from `Off`.
+    ///
+    /// # Errors
+    /// [`SwitchOnError`]; nothing has changed then.
+    pub fn switch_on(&mut self) -> Result<(), SwitchOnError> {
+        self.can_switch_on()?;
+        self.enter(AxisState::SwitchingOn, self.config.limits.active);
+        Ok(())
     }
 
     /// Switches the servo off. A stopped axis stays stopped.
@@ -217,12 +221,12 @@ impl Axis {
         }
     }
 
-    /// Takes what an update period brought: the drive's response to what was `sent`. While invalid data go out no limit
-    /// runs.
-    pub fn receive(&mut self, sent: Turn, received: &Received) {
-        let response = self.sound(received);
+    /// Takes what an update period brought, heard until `end_ns`: the drive's response to what was `sent`. While invalid data
+    /// go out no limit runs.
+    pub fn hear(&mut self, sent: Turn, heard: &Heard, end_ns: u64) {
+        let response = self.sound(heard);
         let echo = response.map(|r| r.update_counter_echo);
-        self.age.sample(echo);
+        self.is_fresh = echo.is_some() && echo != self.echo;
         if self.state == AxisState::On {
             self.last_step = step(self.before, self.setpoint);
             self.before = self.setpoint;
@@ -233,15 +237,16 @@ impl Axis {
             }
             self.count_refusals(response);
             self.serve(response);
-            self.serve_sub(response.and(received.sub()));
+            self.serve_sub(response.and(heard.sub()));
             if let Some(response) = response {
                 self.supervise(response.status);
             }
             self.wait();
         }
         if let Some(response) = response {
-            self.status = response.status;
-            self.actual = response.response_data1;
+            self.echo = echo;
+            let sampled_ns = if self.is_fresh { end_ns } else { self.evidence.last().sampled_ns() };
+            self.evidence = Evidence::of(response, sampled_ns);
         }
         match self.state {
             AxisState::On => {}
@@ -251,7 +256,7 @@ impl Axis {
     }
 
     /// What to send in this update period; in the 16-byte mode its `main` half alone.
-    pub fn send(&self, turn: Turn) -> Command32 {
+    pub fn transmission(&self, turn: Turn) -> Command32 {
         let mac_id = self.config.mac_id;
         let counter = match turn {
             Turn::Invalid => return Command32 { main: Command::nop(mac_id), sub: self.sub_command([0; 2]) },
@@ -275,7 +280,7 @@ impl Axis {
 
     /// The axis at `place` has failed; `at_once` where the communication has.
     pub(super) fn share_failure(&mut self, place: u8, at_once: bool) {
-        let reason = StopReason::OtherAxis(place);
+        let reason = StopReason::OtherAxis { place };
         match (self.state, self.config.stop) {
             _ if at_once => self.stop(reason),
             (AxisState::Stopping(_), _) | (_, StopPolicy::None) => {}
@@ -288,9 +293,9 @@ impl Axis {
     }
 
     /// The response, if it is sound and the drive's own; every block is counted.
-    fn sound<'a>(&mut self, received: &'a Received) -> Option<&'a Response> {
-        let outcome = match (received, received.response()) {
-            (Received::Refused(error), _) => Err(*error),
+    fn sound<'a>(&mut self, heard: &'a Heard) -> Option<&'a Response> {
+        let outcome = match (heard, heard.response()) {
+            (Heard::Refused(error), _) => Err(*error),
             (_, Some(response)) if response.mac_id == self.config.mac_id => Ok(response),
             (_, Some(response)) => Err(Error::MacId { got: response.mac_id.get(), want: self.config.mac_id.get() }),
             (_, None) => return None,
@@ -356,7 +361,7 @@ impl Axis {
     /// The limit of the present state.
     fn wait(&mut self) {
         let reason = match self.state {
-            AxisState::Starting if self.status.contains(StatusFlags::ALARM) => StopReason::Alarm,
+            AxisState::Starting if self.status().contains(StatusFlags::ALARM) => StopReason::Alarm,
             AxisState::Starting => StopReason::ReadyTimeout,
             AxisState::SwitchingOn => StopReason::ActiveTimeout,
             AxisState::SwitchingOff => StopReason::InactiveTimeout,
@@ -371,7 +376,7 @@ impl Axis {
 
     /// The set-point of an axis that does not move by command.
     fn rest(&mut self) {
-        self.setpoint = if self.mode == ActiveCode::CyclicPosition { self.actual } else { 0 };
+        self.setpoint = if self.mode == ActiveCode::CyclicPosition { self.evidence.last().position() } else { 0 };
         self.before = self.setpoint;
         self.last_step = 0;
     }
@@ -394,7 +399,7 @@ impl Axis {
                 self.setpoint = less(self.setpoint);
                 self.setpoint == 0
             }
-            ActiveCode::ProfilePosition => !self.status.contains(StatusFlags::IN_PROGRESS),
+            ActiveCode::ProfilePosition => !self.status().contains(StatusFlags::IN_PROGRESS),
             ActiveCode::CyclicTorque => true,
         };
         if stands {

@@ -25,10 +25,9 @@ pub struct Expected {
 ///
 /// The first two are no faults by themselves: the counter comes back with the next reception, the code one
 /// command later, so the usual pair is (code N - 1, counter N). SX-DSV02310, "Update timing".
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub enum Reception {
+pub enum Acknowledgement {
     /// The counter is not the one last sent.
     CounterNotEchoed,
     /// The code is not the one last sent.
@@ -39,6 +38,25 @@ pub enum Reception {
     Accepted,
 }
 
+servowire_core::one_line!(Acknowledgement {
+    Self::CounterNotEchoed => "the counter is not echoed";
+    Self::CodeNotYetEchoed => "the code is not yet echoed";
+    Self::CommandError(code) => "command not accepted: {}", code;
+    Self::Accepted => "accepted";
+});
+
+/// A response of the right drive, with what it tells about the command last sent.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct Checked {
+    /// The response.
+    pub response: Response,
+    /// What it tells.
+    pub acknowledgement: Acknowledgement,
+}
+
+servowire_core::one_line!(Checked { Self { response, acknowledgement } => "{}: {}", response, acknowledgement; });
+
 impl Expected {
     /// Makes the checks that a master can make, in this order: length, C/R, MAC-ID; then counter, code, CMD_Error.
     ///
@@ -47,7 +65,7 @@ impl Expected {
     ///
     /// # Errors
     /// [`Error::Truncated`], [`Error::TooLong`], [`Error::Direction`] or [`Error::MacId`]: nothing of such a block may be used.
-    pub const fn check(&self, bytes: &[u8]) -> Result<(Response, Reception), Error> {
+    pub const fn check(&self, bytes: &[u8]) -> Result<Checked, Error> {
         let parsed = match self.size {
             BlockSize::Bytes16 => Response::parse(bytes),
             BlockSize::Bytes32 => match split32(bytes) {
@@ -62,15 +80,15 @@ impl Expected {
         if response.mac_id.get() != self.mac_id.get() {
             return Err(Error::MacId { got: response.mac_id.get(), want: self.mac_id.get() });
         }
-        let reception = if response.update_counter_echo.get() != self.update_counter.get() {
-            Reception::CounterNotEchoed
+        let acknowledgement = if response.update_counter_echo.get() != self.update_counter.get() {
+            Acknowledgement::CounterNotEchoed
         } else if response.code.get() != self.code.get() {
-            Reception::CodeNotYetEchoed
+            Acknowledgement::CodeNotYetEchoed
         } else if let NonCyclicResponse::CommandError(code) = response.noncyclic() {
-            Reception::CommandError(code)
+            Acknowledgement::CommandError(code)
         } else {
-            Reception::Accepted
+            Acknowledgement::Accepted
         };
-        Ok((response, reception))
+        Ok(Checked { response, acknowledgement })
     }
 }

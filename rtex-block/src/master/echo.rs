@@ -64,16 +64,11 @@ impl Standstill {
             (self.last, self.updates) = (echo, 0);
         }
     }
-
-    /// For how many samples the echo has stood still; `None` before the first echo.
-    pub(super) const fn updates(self) -> Option<u32> {
-        if self.last.is_some() { Some(self.updates) } else { None }
-    }
 }
 
 /// Notices that receptions stop, where the receive interrupt (XINTRX) is used.
 ///
-/// Its handler calls [`received`](Self::received), the NC interrupt [`tick`](Self::tick). In the internal-timer system the
+/// Its handler calls [`frame_received`](Self::frame_received), the NC interrupt [`tick`](Self::tick). In the internal-timer system the
 /// receive interrupt must have the lower priority of the two, in the external-timer system the higher. System Design
 /// Guide for Master, chapters 1 and 2.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -90,7 +85,7 @@ impl ReceiveWatchdog {
     }
 
     /// A frame was received. A watchdog that has tripped stays so.
-    pub const fn received(&mut self) {
+    pub const fn frame_received(&mut self) {
         if !self.is_tripped() {
             self.ticks = 0;
         }
@@ -117,11 +112,11 @@ mod tests {
         let mut watchdog = ReceiveWatchdog::new(NonZeroU16::new(2).unwrap());
         for _ in 0..5 {
             assert!(!watchdog.tick());
-            watchdog.received();
+            watchdog.frame_received();
         }
         assert!(!watchdog.tick());
         assert!(watchdog.tick());
-        watchdog.received();
+        watchdog.frame_received();
         assert!(watchdog.is_tripped() && watchdog.tick());
     }
 

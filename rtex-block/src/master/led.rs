@@ -1,4 +1,4 @@
-use super::phase::{Fault, Phase};
+use super::phase::{ControlError, ControlPhase};
 
 /// What the COM LED of the master shows at a moment. Green and red exclude each other.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -28,12 +28,12 @@ pub enum Pattern {
 /// In the guide's table the text "flashing green" stands in the row of PH_PREPARE, and the rows of PH_WAITING and
 /// PH_START are blank; read here as one cell over the three rows. The other possible reading has PH_WAITING dark
 /// and PH_PREPARE and PH_START flashing.
-const BY_PHASE: [(Phase, Pattern); 5] = [
-    (Phase::Init, Pattern::Steady(Led::Off)),
-    (Phase::Waiting, Pattern::Flashing(Led::Green)),
-    (Phase::Prepare, Pattern::Flashing(Led::Green)),
-    (Phase::Start, Pattern::Flashing(Led::Green)),
-    (Phase::Running, Pattern::Steady(Led::Green)),
+const BY_PHASE: [(ControlPhase, Pattern); 5] = [
+    (ControlPhase::Init, Pattern::Steady(Led::Off)),
+    (ControlPhase::Waiting, Pattern::Flashing(Led::Green)),
+    (ControlPhase::Prepare, Pattern::Flashing(Led::Green)),
+    (ControlPhase::Start, Pattern::Flashing(Led::Green)),
+    (ControlPhase::Running, Pattern::Steady(Led::Green)),
 ];
 
 /// Half of a flashing period, ms.
@@ -41,16 +41,16 @@ const HALF_MS: u64 = 500;
 
 /// The pattern of a state. A fault is shown in any phase: a time-out flashing red, slaves that do not match the
 /// table steady red.
-pub fn pattern(phase: Phase, fault: Option<Fault>) -> Pattern {
+pub fn pattern(phase: ControlPhase, fault: Option<ControlError>) -> Pattern {
     match fault {
-        Some(Fault::Timeout) => Pattern::Flashing(Led::Red),
-        Some(Fault::SlaveInfoMismatch) => Pattern::Steady(Led::Red),
+        Some(ControlError::Timeout) => Pattern::Flashing(Led::Red),
+        Some(ControlError::SlaveInfoMismatch) => Pattern::Steady(Led::Red),
         None => BY_PHASE.iter().find(|(p, _)| *p == phase).map_or(Pattern::Steady(Led::Off), |(_, pattern)| *pattern),
     }
 }
 
 /// What the LED shows `t_ms` after the start of a lit half-period. System Design Guide for Master, "COM LED".
-pub fn led(phase: Phase, fault: Option<Fault>, t_ms: u64) -> Led {
+pub fn led(phase: ControlPhase, fault: Option<ControlError>, t_ms: u64) -> Led {
     match pattern(phase, fault) {
         Pattern::Steady(led) => led,
         Pattern::Flashing(led) if t_ms % (2 * HALF_MS) < HALF_MS => led,

@@ -16,42 +16,41 @@ pub enum Asic {
     Running,
 }
 
-/// Phase of the control function. PH_INIT is 0, so that cleared memory is the right start.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Default)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-#[cfg_attr(feature = "arbitrary", derive(arbitrary::Arbitrary))]
-#[repr(u8)]
-pub enum Phase {
-    /// PH_INIT.
-    #[default]
-    Init = 0,
-    /// PH_WAITING: for the ring.
-    Waiting = 1,
-    /// PH_PREPARE: for the first transmit data.
-    Prepare = 2,
-    /// PH_START: for cyclic transmission.
-    Start = 3,
-    /// PH_RUNNING.
-    Running = 4,
+servowire_core::codes! {
+    /// Phase of the control function. PH_INIT is 0, so that cleared memory is the right start.
+    #[derive(Default)]
+    pub enum ControlPhase: u8 {
+        /// At the start.
+        #[default]
+        Init = 0 => "PH_INIT",
+        /// For the ring.
+        Waiting = 1 => "PH_WAITING",
+        /// For the first transmit data.
+        Prepare = 2 => "PH_PREPARE",
+        /// For cyclic transmission.
+        Start = 3 => "PH_START",
+        /// Cyclic transmission runs.
+        Running = 4 => "PH_RUNNING",
+    }
 }
 
-impl Phase {
-    /// All, in order.
-    pub const ALL: [Self; 5] = [Self::Init, Self::Waiting, Self::Prepare, Self::Start, Self::Running];
-}
-
-/// A fault that stops the phases.
+/// Why the phases stop.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "arbitrary", derive(arbitrary::Arbitrary))]
-pub enum Fault {
+pub enum ControlError {
     /// The slaves found are not those of the table, or a MAC-ID is there twice. It stays until the system is reset.
     SlaveInfoMismatch,
     /// Reception stopped in PH_RUNNING.
     Timeout,
 }
+
+servowire_core::one_line!(ControlError {
+    Self::SlaveInfoMismatch => "the slaves are not those of the table";
+    Self::Timeout => "nothing is received any more";
+});
+
+impl core::error::Error for ControlError {}
 
 /// What a step of the phases looks at.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -76,52 +75,54 @@ pub struct Inputs {
 ///   INITIAL or   slaves match    transmit       RUNNING
 ///   RING-CONFIG  (else fault)    data written
 /// ```
-/// At most one transition a step, no way back, and nothing moves once there is a fault. The names of the phases
-/// and the two faults are from the System Design Guide for Master; its figures of the transitions were not
+/// At most one transition a step, no way back, and nothing moves once there is an error. The names of the phases
+/// and the two errors are from the System Design Guide for Master; its figures of the transitions were not
 /// available, so the conditions are this crate's reading.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct PhaseControl {
-    phase: Phase,
-    fault: Option<Fault>,
+    phase: ControlPhase,
+    error: Option<ControlError>,
 }
 
 impl PhaseControl {
     /// In PH_INIT.
     pub const fn new() -> Self {
-        Self { phase: Phase::Init, fault: None }
+        Self { phase: ControlPhase::Init, error: None }
     }
 
     /// The present phase.
-    pub const fn phase(&self) -> Phase {
+    pub const fn phase(&self) -> ControlPhase {
         self.phase
     }
 
-    /// The fault, if there is one.
-    pub const fn fault(&self) -> Option<Fault> {
-        self.fault
+    /// Why the phases have stopped, if they have.
+    pub const fn error(&self) -> Option<ControlError> {
+        self.error
     }
 
     /// One step; call it from the main loop.
     pub const fn step(&mut self, inputs: Inputs) {
-        if self.fault.is_some() {
+        if self.error.is_some() {
             return;
         }
         match (self.phase, inputs.asic, inputs.slave_info) {
-            (Phase::Init, Asic::Initial | Asic::RingConfig, _) => self.phase = Phase::Waiting,
-            (Phase::Waiting, Asic::Ready, Some(SlaveInfo::Match)) => self.phase = Phase::Prepare,
-            (Phase::Waiting, Asic::Ready, Some(SlaveInfo::Mismatch)) => self.fault = Some(Fault::SlaveInfoMismatch),
-            (Phase::Prepare, _, _) if inputs.tx_ready => self.phase = Phase::Start,
-            (Phase::Start, Asic::Running, _) => self.phase = Phase::Running,
-            (Phase::Running, _, _) if inputs.timeout => self.fault = Some(Fault::Timeout),
+            (ControlPhase::Init, Asic::Initial | Asic::RingConfig, _) => self.phase = ControlPhase::Waiting,
+            (ControlPhase::Waiting, Asic::Ready, Some(SlaveInfo::Match)) => self.phase = ControlPhase::Prepare,
+            (ControlPhase::Waiting, Asic::Ready, Some(SlaveInfo::Mismatch)) => {
+                self.error = Some(ControlError::SlaveInfoMismatch);
+            }
+            (ControlPhase::Prepare, _, _) if inputs.tx_ready => self.phase = ControlPhase::Start,
+            (ControlPhase::Start, Asic::Running, _) => self.phase = ControlPhase::Running,
+            (ControlPhase::Running, _, _) if inputs.timeout => self.error = Some(ControlError::Timeout),
             _ => {}
         }
     }
 
     /// Forgets a time-out, so that the ring can be cleared. A mismatch of the slaves stays: only a system reset releases it.
     pub const fn release_timeout(&mut self) {
-        if matches!(self.fault, Some(Fault::Timeout)) {
-            self.fault = None;
+        if matches!(self.error, Some(ControlError::Timeout)) {
+            self.error = None;
         }
     }
 }

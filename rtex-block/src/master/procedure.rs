@@ -11,7 +11,7 @@ mod parameters;
 pub use alarms::{AlarmAttributes, AlarmHistory, Attributes, ClearAlarm, ClearableIf, Clearing};
 pub use homing::{Home, SetPosition};
 pub use latch::{Caught, Latch};
-pub use parameters::{Backup, Restore};
+pub use parameters::{Backup, ParameterValue, Restore};
 
 use super::axis::Axis;
 use super::progress::{Failure, Progress};

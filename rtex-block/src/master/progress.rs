@@ -5,7 +5,7 @@ use crate::error_code::ErrorCode;
 use crate::type_code::Pr;
 
 /// How far a procedure is. Its time is counted in update periods.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[must_use]
@@ -27,6 +27,16 @@ pub enum Progress<T> {
     },
 }
 
+impl<T: fmt::Display> fmt::Display for Progress<T> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Pending { left } => write!(f, "pending, {left} update periods left"),
+            Self::Done { value } => write!(f, "done: {value}"),
+            Self::Failed { error } => write!(f, "failed: {error}"),
+        }
+    }
+}
+
 impl<T> Progress<T> {
     /// Whether it goes on.
     pub const fn is_pending(&self) -> bool {
@@ -43,7 +53,6 @@ impl<T: Copy> Progress<T> {
 
 /// Why a procedure failed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]
 pub enum Failure {
@@ -65,17 +74,15 @@ pub enum Failure {
     Differs(Pr),
 }
 
-impl fmt::Display for Failure {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Execution => f.write_str("failed while it was executed (ERR)"),
-            Self::CommandError(code) => write!(f, "not accepted: {code}"),
-            Self::TimedOut => f.write_str("no answer in time"),
-            Self::ServoOff => f.write_str("the servo was switched off"),
-            Self::NotSent(error) => write!(f, "not sent: {error}"),
-            Self::Mode => f.write_str("the axis is in another mode"),
-            Self::Differs(pr) => write!(f, "{pr} did not take its value"),
-            Self::NotStarted => f.write_str("the motion did not start in time"),
-        }
-    }
-}
+servowire_core::one_line!(Failure {
+    Self::Execution => "failed while it was executed (ERR)";
+    Self::CommandError(code) => "not accepted: {}", code;
+    Self::TimedOut => "no answer in time";
+    Self::ServoOff => "the servo was switched off";
+    Self::NotSent(error) => "not sent: {}", error;
+    Self::Mode => "the axis is in another mode";
+    Self::Differs(pr) => "{} did not take its value", pr;
+    Self::NotStarted => "the motion did not start in time";
+});
+
+impl core::error::Error for Failure {}

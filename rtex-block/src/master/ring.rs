@@ -1,7 +1,7 @@
 use super::axis::Axis;
 use super::counter::{CommandCounter, Turn};
-use super::received::Received;
-use super::state::{AxisState, StopReason};
+use super::heard::Heard;
+use super::state::{AxisState, RingSwitchOnError, StopReason};
 use crate::header::MacId;
 use crate::sub::Command32;
 
@@ -20,10 +20,30 @@ pub struct Ring<const N: usize> {
 }
 
 /// Two axes of a ring have the same address.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[error("two axes have the MAC-ID {0}")]
-pub struct SameMacId(pub MacId);
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct SameMacId {
+    /// The address.
+    pub mac_id: MacId,
+}
+
+servowire_core::one_line!(SameMacId { Self { mac_id } => "two axes have the MAC-ID {}", mac_id; });
+
+impl core::error::Error for SameMacId {}
+
+/// The axis that stopped a ring.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct RingFailure {
+    /// Its place in the ring.
+    pub place: u8,
+    /// Why it stopped.
+    pub reason: StopReason,
+}
+
+servowire_core::one_line!(RingFailure { Self { place, reason } => "axis {}: {}", place, reason; });
+
+impl core::error::Error for RingFailure {}
 
 impl<const N: usize> Ring<N> {
     /// A ring that sends `invalid` update periods of invalid data (00h) before the first valid commands. It has 1 to 32
@@ -46,7 +66,7 @@ impl<const N: usize> Ring<N> {
             let mac_id = axis.config().mac_id;
             let bit = 1_u32.wrapping_shl(mac_id.get().into());
             if seen & bit != 0 {
-                return Err(SameMacId(mac_id));
+                return Err(SameMacId { mac_id });
             }
             seen |= bit;
         }
@@ -68,35 +88,38 @@ impl<const N: usize> Ring<N> {
         &self.counter
     }
 
-    /// Place and reason of the axis that stopped the ring.
-    pub fn failure(&self) -> Option<(usize, StopReason)> {
-        let place = usize::from(self.failed?);
-        match self.axes.get(place)?.state() {
-            AxisState::Stopped(reason) => Some((place, reason)),
+    /// The axis that stopped the ring.
+    pub fn failure(&self) -> Option<RingFailure> {
+        let place = self.failed?;
+        match self.axes.get(usize::from(place))?.state() {
+            AxisState::Stopped(reason) => Some(RingFailure { place, reason }),
             _ => None,
         }
     }
 
-    /// Takes the responses to the last commands and gives the next commands; in the 16-byte mode their `main` halves alone
-    /// go out.
-    pub fn update(&mut self, received: &[Received; N]) -> [Command32; N] {
-        for (axis, received) in self.axes.iter_mut().zip(received) {
-            axis.receive(self.sent, received);
+    /// Takes the responses to the last commands, heard until `end_ns`, and gives the next commands; in the 16-byte mode their
+    /// `main` halves alone go out.
+    pub fn update(&mut self, heard: &[Heard; N], end_ns: u64) -> [Command32; N] {
+        for (axis, heard) in self.axes.iter_mut().zip(heard) {
+            axis.hear(self.sent, heard, end_ns);
         }
         self.share_failures();
         self.sent = self.counter.next();
-        self.axes.each_ref().map(|axis| axis.send(self.sent))
+        self.axes.each_ref().map(|axis| axis.transmission(self.sent))
     }
 
-    /// Switches all axes on, if all of them are off and ready; gives whether they were.
-    pub fn switch_on(&mut self) -> bool {
-        let able = self.axes.iter().all(Axis::can_switch_on);
-        if able {
-            self.axes.iter_mut().for_each(|axis| {
-                axis.switch_on();
-            });
+    /// Switches all axes on, if all of them are off and ready.
+    ///
+    /// # Errors
+    /// [`RingSwitchOnError`]: the first axis that is not; none is switched on then.
+    pub fn switch_on(&mut self) -> Result<(), RingSwitchOnError> {
+        for (axis, place) in self.axes.iter().zip(0..) {
+            axis.can_switch_on().map_err(|error| RingSwitchOnError { place, error })?;
         }
-        able
+        for (axis, place) in self.axes.iter_mut().zip(0..) {
+            axis.switch_on().map_err(|error| RingSwitchOnError { place, error })?;
+        }
+        Ok(())
     }
 
     /// Switches all axes off.

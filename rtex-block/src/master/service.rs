@@ -5,9 +5,9 @@ use core::num::NonZeroU16;
 use super::axis::Axis;
 use super::counter::Turn;
 use super::echo::ReceiveWatchdog;
+use super::heard::Heard;
 use super::led::{Led, led};
-use super::phase::{Asic, Fault, Inputs, Phase, PhaseControl};
-use super::received::Received;
+use super::phase::{Asic, ControlError, ControlPhase, Inputs, PhaseControl};
 use super::ring::{Ring, SameMacId};
 use super::slaves::{Order, Slave, compare};
 use super::state::StopReason;
@@ -34,7 +34,7 @@ pub struct MasterConfig {
     pub invalid: u32,
     /// Whether the slave table is in the order of the ring; it is unless changed.
     pub order: Order,
-    /// Update periods without [`Master::received`] that count as a time-out; `None` where the receive interrupt is not used.
+    /// Update periods without [`Master::frame_received`] that count as a time-out; `None` where the receive interrupt is not used.
     pub watchdog: Option<NonZeroU16>,
 }
 
@@ -52,8 +52,9 @@ impl MasterConfig {
 }
 
 /// Why a master cannot be set up.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, thiserror::Error)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]
 pub enum SetupError {
     /// Two axes have the same address.
@@ -63,11 +64,17 @@ pub enum SetupError {
     #[error("the periods do not work with the timer system")]
     Timer,
     /// An axis reckons with another update period.
-    #[error("the axis of drive {0} has another update period")]
-    UpdatePeriod(MacId),
+    #[error("the axis of drive {mac_id} has another update period")]
+    UpdatePeriod {
+        /// The drive of the axis.
+        mac_id: MacId,
+    },
     /// The slave table does not list the axis in its place.
-    #[error("the slave table does not list drive {0} in the place of its axis")]
-    Table(MacId),
+    #[error("the slave table does not list drive {mac_id} in the place of its axis")]
+    Table {
+        /// The drive of the axis.
+        mac_id: MacId,
+    },
 }
 
 /// A master: phases, slave table, COM LED, receive watchdog and the ring of axes.
@@ -77,7 +84,7 @@ pub enum SetupError {
 /// * The NC interrupt calls one of the `exchange` functions: it reads the blocks of the last reception and writes the next
 ///   commands, before anything else is calculated. In the external-timer system it comes from the host's timer, in the
 ///   internal-timer system from XSYNC.
-/// * The receive interrupt (XINTRX), where it is used, calls [`received`](Self::received). External timer: its priority is
+/// * The receive interrupt (XINTRX), where it is used, calls [`frame_received`](Self::frame_received). External timer: its priority is
 ///   above that of the NC interrupt, and it switches the reception bank. Internal timer: its priority is below.
 ///
 /// The exchange must be over before the next frame starts. If it is not, the bank switch is put off and the commands go out
@@ -109,10 +116,10 @@ impl<const N: usize> Master<N> {
         for (slave, axis) in table.iter().zip(ring.axes()) {
             let axis = axis.config();
             if axis.update_ns != config.periods.update_ns {
-                return Err(SetupError::UpdatePeriod(axis.mac_id));
+                return Err(SetupError::UpdatePeriod { mac_id: axis.mac_id });
             }
             if axis.mac_id != slave.mac_id {
-                return Err(SetupError::Table(axis.mac_id));
+                return Err(SetupError::Table { mac_id: axis.mac_id });
             }
         }
         let watchdog = config.watchdog.map(ReceiveWatchdog::new);
@@ -121,7 +128,7 @@ impl<const N: usize> Master<N> {
 
     /// One turn of the main loop: the state of the ASIC, and the slaves that the ring configuration found, once they are
     /// known.
-    pub fn control(&mut self, asic: Asic, found: Option<&[Slave]>) -> Phase {
+    pub fn control(&mut self, asic: Asic, found: Option<&[Slave]>) -> ControlPhase {
         let slave_info = found.map(|found| compare(&self.table, found, self.config.order));
         let timeout = self.is_timed_out();
         self.phases.step(Inputs { asic, slave_info, tx_ready: self.prepared, timeout });
@@ -130,22 +137,22 @@ impl<const N: usize> Master<N> {
 
     /// Whether cyclic communication runs: only now interrupts are let in.
     pub fn is_running(&self) -> bool {
-        self.phases.phase() == Phase::Running
+        self.phases.phase() == ControlPhase::Running
     }
 
     /// The phase.
-    pub const fn phase(&self) -> Phase {
+    pub const fn phase(&self) -> ControlPhase {
         self.phases.phase()
     }
 
-    /// The fault of the phases.
-    pub const fn fault(&self) -> Option<Fault> {
-        self.phases.fault()
+    /// Why the phases have stopped, if they have.
+    pub const fn error(&self) -> Option<ControlError> {
+        self.phases.error()
     }
 
     /// What the COM LED shows `t_ms` after the start of a lit half-period.
     pub fn led(&self, t_ms: u64) -> Led {
-        led(self.phases.phase(), self.phases.fault(), t_ms)
+        led(self.phases.phase(), self.phases.error(), t_ms)
     }
 
     /// How it was set up.
@@ -165,54 +172,61 @@ impl<const N: usize> Master<N> {
 
     /// From the receive interrupt: a frame has come. Gives whether the handler has to switch the reception bank, which is so
     /// in the external-timer system.
-    pub const fn received(&mut self) -> bool {
+    pub const fn frame_received(&mut self) -> bool {
         if let Some(watchdog) = &mut self.watchdog {
-            watchdog.received();
+            watchdog.frame_received();
         }
         self.config.timer.reception_first()
     }
 
-    /// The exchange, with blocks that are decoded already.
-    pub fn exchange(&mut self, received: &[Received; N]) -> [Command32; N] {
+    /// The exchange, with blocks that are decoded already and were heard until `end_ns`.
+    pub fn exchange(&mut self, heard: &[Heard; N], end_ns: u64) -> [Command32; N] {
         if !self.is_running() {
-            self.prepared |= self.phases.phase() == Phase::Prepare;
-            return self.ring.axes().each_ref().map(|axis| axis.send(Turn::Invalid));
+            self.prepared |= self.phases.phase() == ControlPhase::Prepare;
+            return self.ring.axes().each_ref().map(|axis| axis.transmission(Turn::Invalid));
         }
         if self.watchdog.as_mut().is_some_and(ReceiveWatchdog::tick) {
             self.ring.stop(StopReason::ReceiveTimeout);
         }
-        let commands = self.ring.update(received);
+        let commands = self.ring.update(heard, end_ns);
         let timeout = self.is_timed_out();
         self.phases.step(Inputs { asic: Asic::Running, slave_info: None, tx_ready: true, timeout });
         commands
     }
 
-    /// The exchange over memory of bytes: the blocks of all axes one after the other, in the order of the axes.
+    /// The exchange over memory of bytes, heard until `end_ns`: the blocks of all axes one after the other, in the order of the axes.
     ///
     /// # Errors
     /// [`SizeMismatch`] unless each memory has the size of all blocks; nothing is read or written then.
-    pub fn exchange_bytes(&mut self, rx: &[u8], tx: &mut [u8]) -> Result<(), SizeMismatch> {
-        self.over(rx, tx, 1, |words, block| block.copy_from_slice(words), |block, words| words.copy_from_slice(block))
+    pub fn exchange_bytes(&mut self, rx: &[u8], tx: &mut [u8], end_ns: u64) -> Result<(), SizeMismatch> {
+        self.over(
+            rx,
+            tx,
+            end_ns,
+            1,
+            |words, block| block.copy_from_slice(words),
+            |block, words| words.copy_from_slice(block),
+        )
     }
 
     /// The exchange over memory of 16-bit words, packed as [`pack`] says.
     ///
     /// # Errors
     /// [`SizeMismatch`] unless each memory has the size of all blocks; nothing is read or written then.
-    pub fn exchange_words16(&mut self, rx: &[u16], tx: &mut [u16]) -> Result<(), SizeMismatch> {
+    pub fn exchange_words16(&mut self, rx: &[u16], tx: &mut [u16], end_ns: u64) -> Result<(), SizeMismatch> {
         // The sizes are compared before.
         let read = |words: &[u16], block: &mut [u8]| pack::from_words16(words, block).unwrap_or(());
-        self.over(rx, tx, 2, read, |block, words| pack::to_words16(block, words).unwrap_or(()))
+        self.over(rx, tx, end_ns, 2, read, |block, words| pack::to_words16(block, words).unwrap_or(()))
     }
 
     /// The exchange over memory of 32-bit words, packed as [`pack`] says.
     ///
     /// # Errors
     /// [`SizeMismatch`] unless each memory has the size of all blocks; nothing is read or written then.
-    pub fn exchange_words32(&mut self, rx: &[u32], tx: &mut [u32]) -> Result<(), SizeMismatch> {
+    pub fn exchange_words32(&mut self, rx: &[u32], tx: &mut [u32], end_ns: u64) -> Result<(), SizeMismatch> {
         // The sizes are compared before.
         let read = |words: &[u32], block: &mut [u8]| pack::from_words32(words, block).unwrap_or(());
-        self.over(rx, tx, 4, read, |block, words| pack::to_words32(block, words).unwrap_or(()))
+        self.over(rx, tx, end_ns, 4, read, |block, words| pack::to_words32(block, words).unwrap_or(()))
     }
 
     /// Leaves the stop after a time-out, an alarm or a stop of the caller: every axis waits for Servo_Ready again. A mismatch
@@ -232,6 +246,7 @@ impl<const N: usize> Master<N> {
         &mut self,
         rx: &[W],
         tx: &mut [W],
+        end_ns: u64,
         width: usize,
         read: impl Fn(&[W], &mut [u8]),
         write: impl Fn(&[u8], &mut [W]),
@@ -244,18 +259,18 @@ impl<const N: usize> Master<N> {
             }
         }
         let words = size.checked_div(width).unwrap_or(size);
-        let mut received = [Received::Nothing; N];
-        for (received, words) in received.iter_mut().zip(rx.chunks_exact(words)) {
+        let mut all = [Heard::Nothing; N];
+        for (heard, words) in all.iter_mut().zip(rx.chunks_exact(words)) {
             let mut memory = [0; LEN32];
             if let Some(block) = memory.get_mut(..size) {
                 read(words, block);
-                *received = match self.config.size {
+                *heard = match self.config.size {
                     BlockSize::Bytes16 => Response::parse(block).into(),
                     BlockSize::Bytes32 => Response32::parse(block).into(),
                 };
             }
         }
-        for (command, words) in self.exchange(&received).iter().zip(tx.chunks_exact_mut(words)) {
+        for (command, words) in self.exchange(&all, end_ns).iter().zip(tx.chunks_exact_mut(words)) {
             if let Some(block) = command.emit().get(..size) {
                 write(block, words);
             }

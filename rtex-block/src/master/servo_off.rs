@@ -4,20 +4,18 @@ use crate::command::Command;
 use crate::control::ControlBits;
 use crate::header::{MacId, UpdateCounter};
 
-/// The cyclic codes with which a drive looks at Servo_On: all but NOP.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-#[cfg_attr(feature = "arbitrary", derive(arbitrary::Arbitrary))]
-pub enum ActiveCode {
-    /// PP.
-    ProfilePosition,
-    /// CP.
-    CyclicPosition,
-    /// CV.
-    CyclicVelocity,
-    /// CT.
-    CyclicTorque,
+servowire_core::codes! {
+    /// The cyclic codes with which a drive looks at Servo_On: all but NOP.
+    pub enum ActiveCode: u8 {
+        /// PP.
+        ProfilePosition = 1 => "PP",
+        /// CP.
+        CyclicPosition = 2 => "CP",
+        /// CV.
+        CyclicVelocity = 3 => "CV",
+        /// CT.
+        CyclicTorque = 4 => "CT",
+    }
 }
 
 impl ActiveCode {

@@ -1,14 +1,11 @@
 //! States of an axis, why it stops, and what it refuses.
 
-use core::fmt;
-
 use crate::error::ErrorClass;
 use crate::error_code::ErrorCode;
 use crate::header::MacId;
 
 /// Why an axis was stopped.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]
 pub enum StopReason {
@@ -35,8 +32,11 @@ pub enum StopReason {
     InactiveTimeout,
     /// The command was not accepted for the limit; the last Error_Code.
     CommandError(ErrorCode),
-    /// The axis at this place of the ring failed.
-    OtherAxis(u8),
+    /// Another axis failed.
+    OtherAxis {
+        /// Its place in the ring.
+        place: u8,
+    },
     /// The caller stopped it.
     Requested,
 }
@@ -48,29 +48,26 @@ impl StopReason {
     }
 }
 
-impl fmt::Display for StopReason {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::EchoTimeout => f.write_str("the counter echo stands still"),
-            Self::WrongMacId(other) => write!(f, "the blocks come from drive {other}"),
-            Self::Refused(class) => write!(f, "every block was refused: {class}"),
-            Self::ReceiveTimeout => f.write_str("nothing is received"),
-            Self::Alarm => f.write_str("alarm"),
-            Self::NotReady => f.write_str("Servo_Ready went to 0"),
-            Self::NotActive => f.write_str("Servo_Active went to 0"),
-            Self::ReadyTimeout => f.write_str("Servo_Ready did not come"),
-            Self::ActiveTimeout => f.write_str("Servo_Active did not come"),
-            Self::InactiveTimeout => f.write_str("Servo_Active did not go"),
-            Self::CommandError(code) => write!(f, "command not accepted: {code}"),
-            Self::OtherAxis(place) => write!(f, "axis {place} has failed"),
-            Self::Requested => f.write_str("stopped by the caller"),
-        }
-    }
-}
+servowire_core::one_line!(StopReason {
+    Self::EchoTimeout => "the counter echo stands still";
+    Self::WrongMacId(other) => "the blocks come from drive {}", other;
+    Self::Refused(class) => "every block was refused: {}", class.name();
+    Self::ReceiveTimeout => "nothing is received";
+    Self::Alarm => "alarm";
+    Self::NotReady => "Servo_Ready went to 0";
+    Self::NotActive => "Servo_Active went to 0";
+    Self::ReadyTimeout => "Servo_Ready did not come";
+    Self::ActiveTimeout => "Servo_Active did not come";
+    Self::InactiveTimeout => "Servo_Active did not go";
+    Self::CommandError(code) => "command not accepted: {}", code;
+    Self::OtherAxis { place } => "axis {} has failed", place;
+    Self::Requested => "stopped by the caller";
+});
+
+impl core::error::Error for StopReason {}
 
 /// State of an axis. Servo_On is 1 in `SwitchingOn`, `On` and `Stopping`, and in no other state.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum AxisState {
     /// Waiting for Servo_Ready, Servo_On = 0.
@@ -96,23 +93,61 @@ impl AxisState {
     }
 }
 
-impl fmt::Display for AxisState {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Starting => f.write_str("starting"),
-            Self::Off => f.write_str("off"),
-            Self::SwitchingOn => f.write_str("switching on"),
-            Self::On => f.write_str("on"),
-            Self::Stopping(reason) => write!(f, "stopping: {reason}"),
-            Self::SwitchingOff => f.write_str("switching off"),
-            Self::Stopped(reason) => write!(f, "stopped: {reason}"),
-        }
-    }
+servowire_core::one_line!(AxisState {
+    Self::Starting => "starting";
+    Self::Off => "off";
+    Self::SwitchingOn => "switching on";
+    Self::On => "on";
+    Self::Stopping(reason) => "stopping: {}", reason;
+    Self::SwitchingOff => "switching off";
+    Self::Stopped(reason) => "stopped: {}", reason;
+});
+
+/// Why an axis cannot be switched on.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[non_exhaustive]
+pub enum SwitchOnError {
+    /// Its servo is not off: the state that it is in.
+    State(AxisState),
+    /// This update period brought no position: no good block, or one with the counter echo of the block before.
+    OldPosition,
+    /// The drive reports an alarm.
+    Alarm,
+    /// Servo_Ready is 0.
+    NotReady,
+    /// A request is under way that changes the position or the state of the drive.
+    Busy,
 }
 
+servowire_core::one_line!(SwitchOnError {
+    Self::State(state) => "the axis is {}", state;
+    Self::OldPosition => "no new position has come in this update period";
+    Self::Alarm => "the drive reports an alarm";
+    Self::NotReady => "the drive is not ready";
+    Self::Busy => "a request is under way that needs the servo off";
+});
+
+impl core::error::Error for SwitchOnError {}
+
+/// An axis of a ring that cannot be switched on: so none is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct RingSwitchOnError {
+    /// Its place in the ring.
+    pub place: u8,
+    /// Why.
+    pub error: SwitchOnError,
+}
+
+servowire_core::one_line!(RingSwitchOnError { Self { place, error } => "axis {}: {}", place, error; });
+
+impl core::error::Error for RingSwitchOnError {}
+
 /// A set-point or a mode that an axis does not take; it keeps the one before.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, thiserror::Error)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]
 pub enum SetpointError {
     /// The axis is not on.

@@ -29,7 +29,7 @@ impl SubHandshake {
 
     /// Takes what one update period brought: the sub block of the drive's response, `None` if there was none.
     pub fn receive(&mut self, response: Option<&SubResponse>) -> Progress<SubResponse> {
-        let progress = response.filter(|r| r.code.get() == self.command.code as u8).and_then(|r| self.read(r));
+        let progress = response.filter(|r| r.code.get() == self.command.code.code()).and_then(|r| self.read(r));
         progress.unwrap_or_else(|| match self.left.checked_sub(1) {
             Some(left) => {
                 self.left = left;

@@ -5,10 +5,11 @@ use core::num::NonZeroU16;
 
 use rtex_block::device::{Behaviour, Drive, DriveConfig, OpenCodes};
 use rtex_block::master::{
-    ActiveCode, Axis, AxisConfig, AxisState, CommandCounter, CommandEnded, Limits, Progress, Received, Turn,
+    ActiveCode, Axis, AxisConfig, AxisState, CommandCounter, CommandEnded, Heard, Limits, Progress, Turn,
 };
 use rtex_block::{
-    Alarm, Arguments, CommandBlock, MacId, Nibble, NonCyclicCommand, NonCyclicResponse, Response, Response32, TypeCode,
+    Alarm, Arguments, CommandBlock, MacId, Nibble, NonCyclicCommand, NonCyclicResponse, Policy, Response, Response32,
+    Tolerated, TypeCode,
 };
 
 /// The drive's numbers that are not confirmed.
@@ -34,7 +35,7 @@ pub struct Pair {
     pub drive: Drive,
     pub counter: CommandCounter,
     pub sent: Turn,
-    pub received: Received,
+    pub received: Heard,
     /// 32-byte blocks.
     pub wide: bool,
     pub now: u32,
@@ -51,7 +52,7 @@ impl Pair {
             drive: Drive::new(drive),
             counter: CommandCounter::new(3),
             sent: Turn::Invalid,
-            received: Received::Nothing,
+            received: Heard::Nothing,
             wide: false,
             now: 0,
         }
@@ -60,7 +61,9 @@ impl Pair {
     pub fn new(mode: ActiveCode, behaviour: Behaviour) -> Self {
         let mac_id = MacId::new(9).unwrap();
         let config = AxisConfig::new(mac_id, mode, 500_000, limits());
-        Self::with(config, DriveConfig::new(mac_id, CODES).with_behaviour(behaviour))
+        let mut pair = Self::with(config, DriveConfig::new(mac_id, CODES));
+        pair.drive.set_behaviour(behaviour);
+        pair
     }
 
     pub fn on(mode: ActiveCode, behaviour: Behaviour) -> Self {
@@ -70,27 +73,37 @@ impl Pair {
     }
 
     pub fn switch_on(&mut self) {
-        self.until("off", |pair| pair.axis.can_switch_on());
-        assert!(self.axis.switch_on());
+        self.until("off", |pair| pair.axis.can_switch_on().is_ok());
+        self.axis.switch_on().unwrap();
         self.until("on", |pair| pair.axis.state() == AxisState::On);
     }
 
     /// One update period. The law of the servo-off is checked in each.
     pub fn update(&mut self) {
         self.now += 1;
-        self.axis.receive(self.sent, &self.received);
+        self.axis.hear(self.sent, &self.received, self.now_ns());
         self.sent = self.counter.next();
-        let command = self.axis.send(self.sent);
+        let command = self.axis.transmission(self.sent);
         let main = command.main.emit();
         if self.sent != Turn::Invalid {
             let off = CommandBlock::of(&main).unwrap().is_servo_off();
             assert_eq!(off, !self.axis.state().is_servo_on(), "{}", self.axis.state());
         }
         self.received = if self.wide {
-            Response32::parse_strict(&self.drive.exchange32(&command.emit())).into()
+            Response32::parse_strict(&self.drive.hear(&command.emit()).unwrap()).into()
         } else {
-            Response::parse_strict(&self.drive.exchange(&main)).into()
+            Response::parse_strict(&self.drive.hear(&main).unwrap()).into()
         };
+    }
+
+    /// When the blocks of the last update period were heard.
+    pub fn now_ns(&self) -> u64 {
+        u64::from(self.now) * 500_000
+    }
+
+    /// The actual position, however old it is and in spite of an alarm.
+    pub fn actual(&self) -> i32 {
+        actual(&self.axis)
     }
 
     pub fn until(&mut self, what: &str, done: impl Fn(&Self) -> bool) {
@@ -133,6 +146,12 @@ impl Pair {
     pub fn end_of_move(&mut self) -> Progress<CommandEnded> {
         self.run(|axis| axis.take_move().unwrap())
     }
+}
+
+/// The actual position, however old it is and in spite of an alarm.
+pub fn actual(axis: &Axis) -> i32 {
+    let policy = Policy::new(u64::MAX).tolerating(Tolerated::ALARM);
+    axis.evidence().at(0, policy).unwrap().position()
 }
 
 pub fn monitor(type_code: u8) -> NonCyclicCommand {

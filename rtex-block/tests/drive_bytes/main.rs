@@ -13,7 +13,7 @@ mod common;
 mod motion;
 
 use common::CODES;
-use rtex_block::device::{Behaviour, Drive, DriveConfig, check};
+use rtex_block::device::{Behaviour, Drive, DriveConfig, Fault, Quirks, check};
 use rtex_block::{Alarm, BlockSize, MacId};
 
 const ON: [u8; 2] = [0x80, 0];
@@ -64,7 +64,7 @@ impl Raw {
     /// Sends a command; the response is to the one before.
     fn send(&mut self, code: u8, control: [u8; 2], data1: i32, tail: [u8; 8]) -> [u8; 16] {
         let block = self.block(code, control, data1, tail);
-        let response = self.drive.exchange(&block);
+        let response = self.drive.hear(&block).unwrap();
         assert_eq!(response[0], 0x80 | block[0]);
         response
     }
@@ -93,6 +93,34 @@ impl Raw {
     }
 }
 
+/// Each fault of the model, by its bytes.
+#[test]
+fn faults_byte_by_byte() {
+    let mut raw = Raw::on(config().with_lost_limit(3), 0x20);
+    let good = raw.hold(3, 0x20, ON, 0, NOTHING);
+    raw.drive.set_fault(Fault::WrongMacId(MacId::new(30).unwrap()));
+    let block = raw.block(0x20, ON, 0, NOTHING);
+    assert_eq!(raw.drive.hear(&block).unwrap()[..3], [0x9e | block[0] & 0x60, 0x20, good[2]]);
+    // Its processing stands still: the same bytes, whatever is sent, and the motor as it was.
+    raw.drive.set_fault(Fault::None);
+    let last = raw.send(0x20, ON, 0, NOTHING);
+    raw.drive.set_fault(Fault::StaleEcho);
+    for _ in 0..9 {
+        let block = raw.block(0x20, OFF, 0, NOTHING);
+        assert_eq!(raw.drive.hear(&block), Some(last));
+    }
+    assert!(raw.drive.is_active());
+    // Off the ring it says nothing, and misses the frames as it does without any.
+    raw.drive.set_fault(Fault::Silent);
+    for period in 0..3 {
+        assert!(raw.drive.is_active(), "{period}");
+        assert_eq!(raw.drive.hear(&block), None);
+    }
+    assert_eq!((raw.drive.is_active(), raw.drive.alarm()), (false, Some(Alarm { main: 80, sub: 0 })));
+    raw.drive.set_fault(Fault::None);
+    assert!(raw.drive.alarm().is_some());
+}
+
 /// Ready as soon as as many exchanges are over as it needs for synchronisation.
 #[test]
 fn ready_when_it_is_synchronised() {
@@ -114,15 +142,15 @@ fn status_byte_by_byte() {
     raw.drive.set_inputs(0);
     assert_eq!(raw.hold(4, 0x20, ON, 0, NOTHING)[2], 0xc1);
     // Main power that comes again takes nothing away; main power that goes releases the motor at once.
-    raw.drive.set_main_power(true);
+    raw.drive.set_fault(Fault::None);
     assert!(raw.drive.is_active());
-    raw.drive.set_main_power(false);
+    raw.drive.set_fault(Fault::NoMainPower);
     assert!(!raw.drive.is_active());
     assert_eq!(raw.send(0x20, OFF, 0, NOTHING)[2], 0x01);
-    raw.drive.set_main_power(true);
+    raw.drive.set_fault(Fault::None);
     assert_eq!(raw.ask(0x24, about(0x21, 0, 500))[2], 0x45);
     assert_eq!(raw.drive.position(), 500);
-    raw.drive.raise(Alarm { main: 16, sub: 0 });
+    raw.drive.set_fault(Fault::Alarm(Alarm { main: 16, sub: 0 }));
     assert_eq!(raw.send(0x20, OFF, 0, NOTHING)[2], 0x25);
     // An unknown homing type is refused.
     let refused = raw.ask(0x24, about(0xee, 0, 0));
@@ -137,7 +165,7 @@ fn faults_count_from_synchronisation_on() {
             assert_eq!(raw.drive.alarm(), None, "{k}");
             let mut block = raw.block(0x20, OFF, 0, NOTHING);
             spoil(&mut block);
-            raw.drive.exchange(&block);
+            raw.drive.hear(&block).unwrap();
         }
         assert!(matches!(raw.drive.alarm(), Some(Alarm { main: 86, sub: 0 | 2 })));
     }
@@ -151,10 +179,10 @@ fn sub_blocks_byte_by_byte() {
         for _ in 0..2 {
             block[..16].copy_from_slice(&raw.block(0x20, ON, at, NOTHING));
             block[16..18].copy_from_slice(&[byte16, 0x07]);
-            raw.drive.exchange32(&block);
+            raw.drive.hear(&block).unwrap();
         }
         block[..16].copy_from_slice(&raw.block(0x20, ON, at, NOTHING));
-        (raw.drive.exchange32(&block)[16..20].to_vec(), raw.drive.position())
+        (raw.drive.hear(&block).unwrap()[16..20].to_vec(), raw.drive.position())
     };
     // Sub_Chk = 0: the main command is not executed either.
     assert_eq!(both(400, 0x0a), (vec![0x8a, 0, 0x12, 0], 0));
@@ -202,13 +230,14 @@ fn feed_forward_in_its_range() {
 
 #[test]
 fn resets() {
-    let config = config().with_behaviour(Behaviour::POLITE.with_parameters_after_reset(true));
+    let behaviour = Behaviour::new().with_quirks(Quirks::PARAMETERS_AFTER_RESET);
     for (type_code, clears) in [(0x01, true), (0x11, false)] {
-        let mut raw = Raw::on(config, 0x20);
+        let mut raw = Raw::on(config(), 0x20);
+        raw.drive.set_behaviour(behaviour);
         // Not while the servo is on.
         let answer = raw.hold(12, 0x21, ON, 0, about(type_code, 0, 0));
         assert_eq!((answer[1], answer[9]), (0x21, 0x80));
-        raw.drive.raise(Alarm { main: 16, sub: 0 });
+        raw.drive.set_fault(Fault::Alarm(Alarm { main: 16, sub: 0 }));
         let refused = raw.ask(0x21, about(0x02, 0, 0));
         assert_eq!((refused[1], refused[8]), (0xa1, 0x31));
         let refused = raw.ask(0x21, about(type_code, 1, 0));
@@ -228,8 +257,9 @@ fn resets() {
 /// A forgetful drive answers a new request as often as it was told with what it was asked before.
 #[test]
 fn stale_answers_are_counted() {
-    let behaviour = Behaviour::POLITE.with_stale_answers(3);
-    let mut raw = Raw::new(config().with_behaviour(behaviour));
+    let behaviour = Behaviour::new().with_stale_answers(3);
+    let mut raw = Raw::new(config());
+    raw.drive.set_behaviour(behaviour);
     raw.hold(3, 0x20, OFF, 0, NOTHING);
     let types = |raw: &mut Raw, code, tail| {
         (0..8)
@@ -257,7 +287,8 @@ fn stale_answers_are_counted() {
 /// is another command.
 #[test]
 fn busy_and_then_done() {
-    let mut raw = Raw::new(config().with_behaviour(Behaviour::POLITE.with_always_busy(true)));
+    let mut raw = Raw::new(config());
+    raw.drive.set_behaviour(Behaviour::new().with_quirks(Quirks::ALWAYS_BUSY));
     raw.hold(3, 0x20, OFF, 0, NOTHING);
     let read = |raw: &mut Raw, code, tails: &[[u8; 8]]| {
         let answers = tails.iter().map(|tail| raw.send(code, OFF, 0, *tail)).collect::<Vec<_>>();

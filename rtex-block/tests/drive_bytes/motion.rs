@@ -1,7 +1,7 @@
 //! How the modelled drive moves: windows, limits, profile motion, and what its monitor shows of them.
 
 use rtex_block::Alarm;
-use rtex_block::device::Behaviour;
+use rtex_block::device::{Behaviour, Quirks};
 use rtex_block::position::Gear;
 
 use crate::{NOTHING, OFF, ON, Raw, about, config, number};
@@ -56,9 +56,9 @@ fn two_communications() {
     let twice = |raw: &mut Raw, at| {
         let block = raw.block(0x20, ON, at, NOTHING);
         let before = raw.drive.position();
-        raw.drive.exchange(&block);
+        raw.drive.hear(&block).unwrap();
         let middle = raw.drive.position();
-        raw.drive.exchange(&block);
+        raw.drive.hear(&block).unwrap();
         (middle - before, raw.drive.position() - middle)
     };
     for _ in 0..40 {
@@ -69,7 +69,7 @@ fn two_communications() {
     // The third time is one too many.
     let block = raw.block(0x20, ON, 1_000, NOTHING);
     for alarm in [None, None, Some(Alarm { main: 86, sub: 2 })] {
-        raw.drive.exchange(&block);
+        raw.drive.hear(&block).unwrap();
         assert_eq!(raw.drive.alarm(), alarm);
     }
 }
@@ -133,9 +133,10 @@ fn position_set_while_it_moves() {
     let mut raw = Raw::on(config(), 0x20);
     let answer = raw.hold(3, 0x24, ON, 0, about(0x21, 0, 5));
     assert_eq!((answer[1], answer[9], raw.drive.position()), (0x24, 0x80, 0));
-    let allowed = config().with_behaviour(Behaviour::POLITE.with_sets_position_while_on(true));
+    let allowed = Behaviour::new().with_quirks(Quirks::SETS_POSITION_WHILE_ON);
     for type_code in [0x21, 0x22] {
-        let mut raw = Raw::on(allowed, 0x10);
+        let mut raw = Raw::on(config(), 0x10);
+        raw.drive.set_behaviour(allowed);
         raw.send(0x17, ON, 100_000, about(0x11, 0, 1_000_000));
         raw.hold(200, 0x17, ON, 100_000, about(0x11, 0, 1_000_000));
         let deviation = raw.monitor(0x1a, ON, 0, 0x01);

@@ -20,7 +20,8 @@ use super::ClockError;
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct ClockCheck {
     last_ns: u64,
-    /// Looks that gave `last_ns` again.
+    /// The reading that was last seen twice, and how often more.
+    stood_ns: u64,
     looks: u32,
     max_looks: u32,
 }
@@ -29,7 +30,7 @@ impl ClockCheck {
     /// A clock that gives the same reading again in more than `max_looks` looks counts as standing: choose more than a fast processor
     /// can make in a tick.
     pub const fn new(max_looks: u32) -> Self {
-        Self { last_ns: 0, looks: 0, max_looks }
+        Self { last_ns: 0, stood_ns: 0, looks: 0, max_looks }
     }
 
     /// The last reading, whether it was good or not; 0 before the first one.
@@ -46,24 +47,32 @@ impl ClockCheck {
     pub const fn check(&mut self, now_ns: u64) -> Result<u64, ClockError> {
         if now_ns > self.last_ns {
             self.last_ns = now_ns;
-            self.looks = 0;
             return Ok(now_ns);
         }
-        self.check_old(now_ns)
+        match self.refuse(now_ns) {
+            None => Ok(now_ns),
+            Some(error) => Err(error),
+        }
     }
 
-    /// A reading that is not after the last one.
-    const fn check_old(&mut self, now_ns: u64) -> Result<u64, ClockError> {
+    /// What is wrong with a reading that is not after the last one.
+    #[cold]
+    #[inline(never)]
+    const fn refuse(&mut self, now_ns: u64) -> Option<ClockError> {
         let by_ns = self.last_ns.saturating_sub(now_ns);
+        self.last_ns = now_ns;
         if by_ns > 0 {
-            self.last_ns = now_ns;
             self.looks = 0;
-            return Err(ClockError::Backwards { by_ns });
+            return Some(ClockError::Backwards { by_ns });
+        }
+        if self.stood_ns != now_ns {
+            self.stood_ns = now_ns;
+            self.looks = 0;
         }
         if self.looks >= self.max_looks {
-            return Err(ClockError::Stopped);
+            return Some(ClockError::Stopped);
         }
         self.looks = self.looks.saturating_add(1);
-        Ok(now_ns)
+        None
     }
 }

@@ -6,12 +6,15 @@ use core::ops::ControlFlow;
 
 use nikon_aformat::bus::Addresses;
 use nikon_aformat::master::{
-    BusTransaction, Cycle, EepromRead, Exchange, GuardedReset, Line, Progress, Reset, Step, Transaction,
+    BusTransaction, Cycle, EepromRead, Exchange, GuardedReset, Line, Progress, Reset, Transaction,
 };
-use nikon_aformat::{Doubt, EncoderAddress, Operation, Policy, Position, Request, RequestFrame, Resolution, Response};
+use nikon_aformat::{
+    Doubt, EncoderAddress, Evidence, Operation, Policy, Request, RequestFrame, Resolution, Response, Sample,
+};
+use servowire_core::{Ended, Machine, Procedure};
 
-use super::{Frame, LOST, Receiver, longest_ns, silence_ns};
-use crate::procedure;
+use super::{Frame, LOST, Released, hear, longest_ns, silence_ns};
+use crate::exchange;
 use crate::quiet;
 use crate::race::race;
 use crate::{Error, Timer};
@@ -35,12 +38,12 @@ pub trait FramePort {
     async fn take(&mut self) -> Result<Frame, Self::Error>;
 }
 
-/// Why a call of a [`Master`] failed.
+/// Why a call of a [`Driver`] failed.
 pub type Failure<F> = Error<<F as FramePort>::Error, Infallible, nikon_aformat::Error, Doubt>;
 
 /// The controller's end of a line with up to eight encoders of one resolution.
 #[derive(Debug)]
-pub struct Master<F, T> {
+pub struct Driver<F, T> {
     port: F,
     timer: T,
     resolution: Resolution,
@@ -48,28 +51,38 @@ pub struct Master<F, T> {
     state: quiet::Line,
 }
 
-impl<F: FramePort, T: Timer> Master<F, T> {
-    /// A line with encoders of this resolution. The port must be asked for frames within `line.latency_ns` of their end, unless it gives their times:
+impl<F: FramePort, T: Timer> Driver<F, T> {
+    /// A line with encoders of this resolution. The port must be asked for frames within `line.latency_budget_ns()` of their end, unless it gives their times:
     /// nothing but the driver may run meanwhile, or give the line a larger budget.
     pub const fn new(port: F, timer: T, resolution: Resolution, line: Line) -> Self {
         Self { port, timer, resolution, line, state: quiet::Line::new(silence_ns(line)) }
     }
 
     /// Gives port and timer back.
-    pub fn release(self) -> (F, T) {
-        (self.port, self.timer)
+    pub fn release(self) -> Released<F, T> {
+        Released { port: self.port, clock: self.timer }
     }
 
-    /// The position of an encoder, if it may be used: from command 0, by the rules of [`Resolution::read`].
+    /// The position of an encoder, if it may be used now, and when it was sampled: [`read_evidence`](Self::read_evidence),
+    /// judged at once by the rules of [`Evidence::at`]. The answer alone has 72 bits, so it is never younger than those.
     ///
     /// # Errors
     /// [`Error`], [`Error::Doubt`] among them.
-    pub async fn read_position(&mut self, ea: EncoderAddress, policy: Policy) -> Result<Position, Failure<F>> {
-        let exchange = self.read_abs40(ea).await?;
-        exchange.position(self.resolution, policy, self.timer.now_ns()).map_err(Error::Doubt)
+    pub async fn read_position(&mut self, ea: EncoderAddress, policy: Policy) -> Result<Sample, Failure<F>> {
+        let evidence = self.read_evidence(ea).await?;
+        evidence.at(self.state.now_ns(&mut self.timer)?, policy).map_err(Error::Doubt)
     }
 
-    /// Command 0: the whole position. Look at its encoder status before you use it.
+    /// What an encoder says of its position, from command 0, to be judged where it is used.
+    ///
+    /// # Errors
+    /// [`Error`].
+    pub async fn read_evidence(&mut self, ea: EncoderAddress) -> Result<Evidence, Failure<F>> {
+        Ok(self.read_abs40(ea).await?.evidence(self.resolution))
+    }
+
+    /// Command 0: the field for the whole position and the encoder status, as they came. For a position that may be used take
+    /// [`read_position`](Self::read_position).
     ///
     /// # Errors
     /// [`Error`].
@@ -81,8 +94,8 @@ impl<F: FramePort, T: Timer> Master<F, T> {
     /// [`BusTransaction::exchange`] says; one that is missing or damaged costs no other one.
     ///
     /// # Errors
-    /// [`Error`]. Missing answers are none.
-    pub async fn read_all(&mut self, operation: Operation, asked: Addresses) -> Result<BusTransaction, Failure<F>> {
+    /// [`Error`]. An answer that is missing is no error.
+    pub async fn read_bus(&mut self, operation: Operation, asked: Addresses) -> Result<BusTransaction, Failure<F>> {
         let request = Request::new(asked.highest().unwrap_or(EncoderAddress::MAX), operation);
         let line = self.line.with_highest(self.line.highest.max(request.ea));
         let (resolution, plain) = (self.resolution, self.line);
@@ -91,19 +104,19 @@ impl<F: FramePort, T: Timer> Master<F, T> {
         Ok(transaction)
     }
 
-    /// [`read_all`](Self::read_all) when the cycle is due: waits for the next start and keeps to its grid.
+    /// [`read_bus`](Self::read_bus) when the cycle is due: waits for the next start and keeps to its grid.
     ///
     /// # Errors
-    /// [`Error`].
+    /// [`Error`]. After [`Error::Clock`] make a new cycle: the grid of this one is of the time before the clock was set back.
     pub async fn read_cycle(
         &mut self,
         cycle: &mut Cycle,
         operation: Operation,
         asked: Addresses,
     ) -> Result<BusTransaction, Failure<F>> {
-        self.timer.wait_until(cycle.next_ns()).await;
-        cycle.is_due(self.timer.now_ns());
-        self.read_all(operation, asked).await
+        self.timer.wait_until(cycle.next_ns()).await?;
+        let _ = cycle.is_due(self.state.now_ns(&mut self.timer)?);
+        self.read_bus(operation, asked).await
     }
 
     /// Command 8, eight times: clears the alarms of an encoder. Position and turns stay.
@@ -111,9 +124,7 @@ impl<F: FramePort, T: Timer> Master<F, T> {
     /// # Errors
     /// [`Error`]; read the status to see whether they were cleared.
     pub async fn clear_status(&mut self, ea: EncoderAddress) -> Result<Response, Failure<F>> {
-        let mut reset = GuardedReset::new(Reset::clear_status(ea));
-        let first = reset.start(self.timer.now_ns());
-        self.run(first, |outcome, now_ns| reset.receive(outcome, now_ns)).await
+        self.run(&mut GuardedReset::new(Reset::clear_status(ea))).await
     }
 
     /// Command 13: the word at an address of the EEPROM. Writing is a procedure for [`run`](Self::run).
@@ -121,31 +132,27 @@ impl<F: FramePort, T: Timer> Master<F, T> {
     /// # Errors
     /// [`Error`].
     pub async fn read_eeprom(&mut self, ea: EncoderAddress, address: u8) -> Result<u16, Failure<F>> {
-        let mut read = EepromRead::new(ea, address);
-        let first = read.start(self.timer.now_ns());
-        self.run(first, |outcome, now_ns| read.receive(outcome, now_ns)).await
+        self.run(&mut EepromRead::new(ea, address)).await
     }
 
-    /// A procedure of several transactions: does what its steps ask for and hands the outcomes to `receive`.
+    /// A procedure of several transactions: does what its steps ask for.
     ///
     /// # Errors
-    /// [`Error`]: that of the procedure, for which a fault of the port is a lost answer; [`Error::NeverQuiet`] at once, and
-    /// then whether the last request had its effect is not known.
-    pub async fn run<V>(
-        &mut self,
-        mut step: Step<V>,
-        mut receive: impl FnMut(Result<Response, nikon_aformat::Error>, u64) -> Step<V>,
-    ) -> Result<V, Failure<F>> {
-        loop {
-            let (request, not_before_ns) = match procedure::next(step, &mut self.state) {
-                ControlFlow::Continue(next) => next,
-                ControlFlow::Break(end) => return end.map_err(Error::Protocol),
-            };
-            self.timer.wait_until(not_before_ns).await;
+    /// [`Error`]: that of the procedure, for which a fault of the port is a lost answer; [`Error::NeverQuiet`] and
+    /// [`Error::Clock`] at once, and then whether the last request had its effect is not known.
+    pub async fn run<P>(&mut self, procedure: &mut P) -> Result<P::Value, Failure<F>>
+    where
+        P: Procedure<Request = Request, Response = Response, Error = nikon_aformat::Error>,
+    {
+        let now_ns = self.state.now_ns(&mut self.timer)?;
+        let exchange = async |request, not_before_ns| {
+            self.timer.wait_until(not_before_ns).await?;
             let exchanged = self.transact(request).await.map(|exchange| exchange.response);
-            let outcome = procedure::outcome(exchanged, LOST)?;
-            step = receive(outcome, self.state.free_ns(self.timer.now_ns()));
-        }
+            exchange::ended(exchanged, LOST, &mut self.state, &mut self.timer)
+        };
+        let Ended { outcome, ready_ns } = servowire_core::run_async(procedure, now_ns, exchange).await?;
+        self.state.keep(ready_ns);
+        outcome.map_err(Error::Protocol)
     }
 
     /// One request and its answer.
@@ -160,14 +167,14 @@ impl<F: FramePort, T: Timer> Master<F, T> {
     }
 
     /// One request and all that answers.
-    async fn exchange<R: Receiver>(
+    async fn exchange<M: Machine<Unit = [Option<u16>], Error = nikon_aformat::Error>>(
         &mut self,
         request: Request,
         line: Line,
-        start: impl FnOnce(u64) -> R,
-    ) -> Result<(R, R::Value), Failure<F>> {
+        start: impl FnOnce(u64) -> M,
+    ) -> Result<(M, M::Value), Failure<F>> {
         self.settle().await?;
-        let start_ns = self.timer.now_ns();
+        let start_ns = self.state.now_ns(&mut self.timer)?;
         let mut transaction = start(start_ns);
         match transaction.progress() {
             // Encoders of this version do not know it, or nobody is asked: nothing is sent.
@@ -178,34 +185,30 @@ impl<F: FramePort, T: Timer> Master<F, T> {
         self.state.begin(longest_ns(line, request, self.resolution));
         let gap_bits = line.rate.bits(line.frame_gap_ns);
         self.port.send(request.emit().as_slice(), gap_bits).await.map_err(Error::Io)?;
-        self.state.sent(self.timer.now_ns());
+        let now_ns = self.state.now_ns(&mut self.timer)?;
+        self.state.sent(now_ns);
         let mut progress = transaction.progress();
         loop {
-            match progress {
-                Progress::Pending { until_ns } => progress = self.receive(&mut transaction, until_ns).await?,
-                Progress::Done { value, ready_ns } => {
-                    self.state.clean(ready_ns);
-                    return Ok((transaction, value));
-                }
-                Progress::Failed { error, ready_ns } => {
-                    self.state.failed(ready_ns, self.timer.now_ns());
-                    return Err(Error::Protocol(error));
+            match exchange::next(progress, &mut self.state, &mut self.timer)? {
+                ControlFlow::Continue(until_ns) => progress = self.receive(&mut transaction, until_ns).await?,
+                ControlFlow::Break(outcome) => {
+                    return outcome.map(|value| (transaction, value)).map_err(Error::Protocol);
                 }
             }
         }
     }
 
     /// Takes what is there, or waits for it; asks the clock only if there is nothing.
-    async fn receive<R: Receiver>(
+    async fn receive<M: Machine<Unit = [Option<u16>], Error = nikon_aformat::Error>>(
         &mut self,
-        receiver: &mut R,
+        machine: &mut M,
         until_ns: u64,
-    ) -> Result<Progress<R::Value>, Failure<F>> {
+    ) -> Result<Progress<M::Value>, Failure<F>> {
         // The time is over after `until_ns`, not at it.
         let wait = self.timer.wait_until(until_ns.saturating_add(1));
-        match race(self.port.take(), wait).await {
-            None => Ok(receiver.poll(self.timer.now_ns())),
-            Some(frame) => Ok(receiver.take(frame.map_err(Error::Io)?, self.timer.now_ns())),
+        match race(self.port.take(), wait).await? {
+            None => Ok(machine.poll(self.state.now_ns(&mut self.timer)?)),
+            Some(frame) => Ok(hear(machine, frame.map_err(Error::Io)?, self.state.now_ns(&mut self.timer)?)),
         }
     }
 
@@ -214,7 +217,7 @@ impl<F: FramePort, T: Timer> Master<F, T> {
         let port = &mut self.port;
         let listen = async || {
             let _: Result<Frame, _> = port.take().await;
-            Ok(())
+            Ok::<_, Failure<F>>(())
         };
         if quiet::wait_asynch(&mut self.state, &mut self.timer, listen).await? {
             Ok(())

@@ -5,12 +5,15 @@ use core::ops::ControlFlow;
 
 use nikon_aformat::bus::Addresses;
 use nikon_aformat::master::{
-    BusTransaction, Cycle, EepromRead, Exchange, GuardedReset, Line, Progress, Reset, Step, Transaction,
+    BusTransaction, Cycle, EepromRead, Exchange, GuardedReset, Line, Progress, Reset, Transaction,
 };
-use nikon_aformat::{Doubt, EncoderAddress, Operation, Policy, Position, Request, RequestFrame, Resolution, Response};
+use nikon_aformat::{
+    Doubt, EncoderAddress, Evidence, Operation, Policy, Request, RequestFrame, Resolution, Response, Sample,
+};
+use servowire_core::{Ended, Machine, Procedure};
 
-use super::{Frame, LOST, Receiver, longest_ns, silence_ns};
-use crate::procedure;
+use super::{Frame, LOST, Released, hear, longest_ns, silence_ns};
+use crate::exchange;
 use crate::quiet;
 use crate::{Clock, Error};
 
@@ -35,12 +38,12 @@ pub trait FramePort {
     }
 }
 
-/// Why a call of a [`Master`] failed.
+/// Why a call of a [`Driver`] failed.
 pub type Failure<F> = Error<<F as FramePort>::Error, Infallible, nikon_aformat::Error, Doubt>;
 
 /// The controller's end of a line with up to eight encoders of one resolution.
 #[derive(Debug)]
-pub struct Master<F, C> {
+pub struct Driver<F, C> {
     port: F,
     clock: C,
     resolution: Resolution,
@@ -48,28 +51,38 @@ pub struct Master<F, C> {
     state: quiet::Line,
 }
 
-impl<F: FramePort, C: Clock> Master<F, C> {
-    /// A line with encoders of this resolution. The port must be asked for frames within `line.latency_ns` of their end, unless it gives their times:
+impl<F: FramePort, C: Clock> Driver<F, C> {
+    /// A line with encoders of this resolution. The port must be asked for frames within `line.latency_budget_ns()` of their end, unless it gives their times:
     /// nothing but the driver may run meanwhile, or give the line a larger budget.
     pub const fn new(port: F, clock: C, resolution: Resolution, line: Line) -> Self {
         Self { port, clock, resolution, line, state: quiet::Line::new(silence_ns(line)) }
     }
 
     /// Gives port and clock back.
-    pub fn release(self) -> (F, C) {
-        (self.port, self.clock)
+    pub fn release(self) -> Released<F, C> {
+        Released { port: self.port, clock: self.clock }
     }
 
-    /// The position of an encoder, if it may be used: from command 0, by the rules of [`Resolution::read`].
+    /// The position of an encoder, if it may be used now, and when it was sampled: [`read_evidence`](Self::read_evidence),
+    /// judged at once by the rules of [`Evidence::at`]. The answer alone has 72 bits, so it is never younger than those.
     ///
     /// # Errors
     /// [`Error`], [`Error::Doubt`] among them.
-    pub fn read_position(&mut self, ea: EncoderAddress, policy: Policy) -> Result<Position, Failure<F>> {
-        let exchange = self.read_abs40(ea)?;
-        exchange.position(self.resolution, policy, self.clock.now_ns()).map_err(Error::Doubt)
+    pub fn read_position(&mut self, ea: EncoderAddress, policy: Policy) -> Result<Sample, Failure<F>> {
+        let evidence = self.read_evidence(ea)?;
+        evidence.at(self.state.now_ns(&mut self.clock)?, policy).map_err(Error::Doubt)
     }
 
-    /// Command 0: the whole position. Look at its encoder status before you use it.
+    /// What an encoder says of its position, from command 0, to be judged where it is used.
+    ///
+    /// # Errors
+    /// [`Error`].
+    pub fn read_evidence(&mut self, ea: EncoderAddress) -> Result<Evidence, Failure<F>> {
+        Ok(self.read_abs40(ea)?.evidence(self.resolution))
+    }
+
+    /// Command 0: the field for the whole position and the encoder status, as they came. For a position that may be used take
+    /// [`read_position`](Self::read_position).
     ///
     /// # Errors
     /// [`Error`].
@@ -81,8 +94,8 @@ impl<F: FramePort, C: Clock> Master<F, C> {
     /// [`BusTransaction::exchange`] says; one that is missing or damaged costs no other one.
     ///
     /// # Errors
-    /// [`Error`]. Missing answers are none.
-    pub fn read_all(&mut self, operation: Operation, asked: Addresses) -> Result<BusTransaction, Failure<F>> {
+    /// [`Error`]. An answer that is missing is no error.
+    pub fn read_bus(&mut self, operation: Operation, asked: Addresses) -> Result<BusTransaction, Failure<F>> {
         let request = Request::new(asked.highest().unwrap_or(EncoderAddress::MAX), operation);
         let line = self.line.with_highest(self.line.highest.max(request.ea));
         let (resolution, plain) = (self.resolution, self.line);
@@ -91,18 +104,18 @@ impl<F: FramePort, C: Clock> Master<F, C> {
         Ok(transaction)
     }
 
-    /// [`read_all`](Self::read_all) when the cycle is due: waits for the next start and keeps to its grid.
+    /// [`read_bus`](Self::read_bus) when the cycle is due: waits for the next start and keeps to its grid.
     ///
     /// # Errors
-    /// [`Error`].
+    /// [`Error`]. After [`Error::Clock`] make a new cycle: the grid of this one is of the time before the clock was set back.
     pub fn read_cycle(
         &mut self,
         cycle: &mut Cycle,
         operation: Operation,
         asked: Addresses,
     ) -> Result<BusTransaction, Failure<F>> {
-        while !cycle.is_due(self.clock.now_ns()) {}
-        self.read_all(operation, asked)
+        while !cycle.is_due(self.state.now_ns(&mut self.clock)?) {}
+        self.read_bus(operation, asked)
     }
 
     /// Command 8, eight times: clears the alarms of an encoder. Position and turns stay.
@@ -110,9 +123,7 @@ impl<F: FramePort, C: Clock> Master<F, C> {
     /// # Errors
     /// [`Error`]; read the status to see whether they were cleared.
     pub fn clear_status(&mut self, ea: EncoderAddress) -> Result<Response, Failure<F>> {
-        let mut reset = GuardedReset::new(Reset::clear_status(ea));
-        let first = reset.start(self.clock.now_ns());
-        self.run(first, |outcome, now_ns| reset.receive(outcome, now_ns))
+        self.run(&mut GuardedReset::new(Reset::clear_status(ea)))
     }
 
     /// Command 13: the word at an address of the EEPROM. Writing is a procedure for [`run`](Self::run).
@@ -120,31 +131,27 @@ impl<F: FramePort, C: Clock> Master<F, C> {
     /// # Errors
     /// [`Error`].
     pub fn read_eeprom(&mut self, ea: EncoderAddress, address: u8) -> Result<u16, Failure<F>> {
-        let mut read = EepromRead::new(ea, address);
-        let first = read.start(self.clock.now_ns());
-        self.run(first, |outcome, now_ns| read.receive(outcome, now_ns))
+        self.run(&mut EepromRead::new(ea, address))
     }
 
-    /// A procedure of several transactions: does what its steps ask for and hands the outcomes to `receive`.
+    /// A procedure of several transactions: does what its steps ask for.
     ///
     /// # Errors
-    /// [`Error`]: that of the procedure, for which a fault of the port is a lost answer; [`Error::NeverQuiet`] at once, and
-    /// then whether the last request had its effect is not known.
-    pub fn run<V>(
-        &mut self,
-        mut step: Step<V>,
-        mut receive: impl FnMut(Result<Response, nikon_aformat::Error>, u64) -> Step<V>,
-    ) -> Result<V, Failure<F>> {
-        loop {
-            let (request, not_before_ns) = match procedure::next(step, &mut self.state) {
-                ControlFlow::Continue(next) => next,
-                ControlFlow::Break(end) => return end.map_err(Error::Protocol),
-            };
-            while self.clock.now_ns() < not_before_ns {}
+    /// [`Error`]: that of the procedure, for which a fault of the port is a lost answer; [`Error::NeverQuiet`] and
+    /// [`Error::Clock`] at once, and then whether the last request had its effect is not known.
+    pub fn run<P>(&mut self, procedure: &mut P) -> Result<P::Value, Failure<F>>
+    where
+        P: Procedure<Request = Request, Response = Response, Error = nikon_aformat::Error>,
+    {
+        let now_ns = self.state.now_ns(&mut self.clock)?;
+        let exchange = |request, not_before_ns| {
+            self.state.wait_until(&mut self.clock, not_before_ns)?;
             let exchanged = self.transact(request).map(|exchange| exchange.response);
-            let outcome = procedure::outcome(exchanged, LOST)?;
-            step = receive(outcome, self.state.free_ns(self.clock.now_ns()));
-        }
+            exchange::ended(exchanged, LOST, &mut self.state, &mut self.clock)
+        };
+        let Ended { outcome, ready_ns } = servowire_core::run(procedure, now_ns, exchange)?;
+        self.state.keep(ready_ns);
+        outcome.map_err(Error::Protocol)
     }
 
     /// One request and its answer.
@@ -159,14 +166,14 @@ impl<F: FramePort, C: Clock> Master<F, C> {
     }
 
     /// One request and all that answers.
-    fn exchange<R: Receiver>(
+    fn exchange<M: Machine<Unit = [Option<u16>], Error = nikon_aformat::Error>>(
         &mut self,
         request: Request,
         line: Line,
-        start: impl FnOnce(u64) -> R,
-    ) -> Result<(R, R::Value), Failure<F>> {
+        start: impl FnOnce(u64) -> M,
+    ) -> Result<(M, M::Value), Failure<F>> {
         self.settle()?;
-        let start_ns = self.clock.now_ns();
+        let start_ns = self.state.now_ns(&mut self.clock)?;
         let mut transaction = start(start_ns);
         match transaction.progress() {
             // Encoders of this version do not know it, or nobody is asked: nothing is sent.
@@ -177,35 +184,32 @@ impl<F: FramePort, C: Clock> Master<F, C> {
         self.state.begin(longest_ns(line, request, self.resolution));
         let gap_bits = line.rate.bits(line.frame_gap_ns);
         self.port.send(request.emit().as_slice(), gap_bits).map_err(Error::Io)?;
-        self.state.sent(self.clock.now_ns());
+        let now_ns = self.state.now_ns(&mut self.clock)?;
+        self.state.sent(now_ns);
         loop {
-            match self.receive(&mut transaction)? {
-                Progress::Pending { .. } => {}
-                Progress::Done { value, ready_ns } => {
-                    self.state.clean(ready_ns);
-                    return Ok((transaction, value));
-                }
-                Progress::Failed { error, ready_ns } => {
-                    self.state.failed(ready_ns, self.clock.now_ns());
-                    return Err(Error::Protocol(error));
-                }
+            let progress = self.receive(&mut transaction)?;
+            if let ControlFlow::Break(outcome) = exchange::next(progress, &mut self.state, &mut self.clock)? {
+                return outcome.map(|value| (transaction, value)).map_err(Error::Protocol);
             }
         }
     }
 
     /// Takes what is there; asks whether the time is over only if there is nothing.
-    fn receive<R: Receiver>(&mut self, receiver: &mut R) -> Result<Progress<R::Value>, Failure<F>> {
-        let before_ns = self.clock.now_ns();
+    fn receive<M: Machine<Unit = [Option<u16>], Error = nikon_aformat::Error>>(
+        &mut self,
+        machine: &mut M,
+    ) -> Result<Progress<M::Value>, Failure<F>> {
+        let before_ns = self.state.now_ns(&mut self.clock)?;
         Ok(match self.port.take().map_err(Error::Io)? {
-            Some(frame) => receiver.take(frame, self.clock.now_ns()),
-            None => receiver.poll(before_ns),
+            Some(frame) => hear(machine, frame, self.state.now_ns(&mut self.clock)?),
+            None => machine.poll(before_ns),
         })
     }
 
     /// Waits until the line is free, and throws away what comes meanwhile, errors of the port included.
     fn settle(&mut self) -> Result<(), Failure<F>> {
         let port = &mut self.port;
-        if quiet::wait(&mut self.state, &mut self.clock, || Ok(port.listen()))? {
+        if quiet::wait(&mut self.state, &mut self.clock, || Ok::<_, Failure<F>>(port.listen()))? {
             Ok(())
         } else {
             Err(Error::NeverQuiet)

@@ -7,13 +7,25 @@ use crate::Timer;
 use crate::race::race;
 
 /// How the period of an exchange began.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum Began {
     /// By the interrupt.
     Edge,
     /// By the clock, for the edge did not come: it was lost, or the ASIC has stopped, which the echo watch notices.
     Clock,
+}
+
+/// A period that was waited for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct Period {
+    /// How it began.
+    pub began: Began,
+    /// What its exchange was like.
+    pub exchanged: Exchanged,
 }
 
 impl<P: Port, T: Timer, const N: usize> Driver<'_, P, T, N> {
@@ -22,22 +34,22 @@ impl<P: Port, T: Timer, const N: usize> Driver<'_, P, T, N> {
     /// waits is missed: the commands of that period go out once more.
     ///
     /// # Errors
-    /// [`Error::Io`](crate::Error::Io); the next exchange goes on. A pin that reports a fault counts as an edge that was lost.
-    pub async fn next(&mut self, sync: &mut impl Wait) -> Result<(Began, Exchanged), Failure<P>> {
+    /// [`Error::Io`](crate::Error::Io) and [`Error::Clock`](crate::Error::Clock); the next exchange goes on. A pin that reports a fault counts as an edge that was lost.
+    pub async fn next(&mut self, sync: &mut impl Wait) -> Result<Period, Failure<P>> {
         let update_ns = u64::from(self.master().config().periods.update_ns);
-        let until_ns = self.clock.now_ns().saturating_add(update_ns.saturating_mul(3) >> 1);
-        let edge = race(sync.wait_for_falling_edge(), self.clock.wait_until(until_ns)).await;
+        let until_ns = self.now_ns()?.saturating_add(update_ns.saturating_mul(3) >> 1);
+        let edge = race(sync.wait_for_falling_edge(), self.clock.wait_until(until_ns)).await?;
         let began = match edge {
             Some(Ok(())) => Began::Edge,
             Some(Err(_)) => {
-                self.clock.wait_until(until_ns).await;
+                self.clock.wait_until(until_ns).await?;
                 Began::Clock
             }
             None => Began::Clock,
         };
-        let now_ns = self.clock.now_ns();
+        let now_ns = self.now_ns()?;
         let began_ns = self.began_ns(now_ns);
-        self.exchange(began_ns).map(|exchanged| (began, exchanged))
+        self.exchange(began_ns).map(|exchanged| Period { began, exchanged })
     }
 
     /// When the period began in which it is `now_ns`. An executor wakes late, and a lost edge is noticed half a period late; so the

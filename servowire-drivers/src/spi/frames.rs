@@ -6,7 +6,7 @@ use embedded_hal_async::spi::SpiBus as AsyncSpiBus;
 use nikon_aformat::RequestFrame;
 use nrz_line::Field;
 
-use super::{Fault, Heard, Sampler, Sampling, SpiError, line_bits};
+use super::{Fault, Heard, Released, ReleasedFrames, Sampler, Sampling, SpiError, line_bits};
 #[cfg(feature = "async")]
 use crate::nikon::asynch;
 use crate::nikon::{Frame, blocking};
@@ -34,8 +34,9 @@ impl<'b, S, D, C> SpiFrames<'b, S, D, C> {
     }
 
     /// Gives SPI, direction and clock back.
-    pub fn release(self) -> (S, D, C) {
-        (self.sampler.bus, self.sampler.direction.release(), self.clock)
+    pub fn release(self) -> ReleasedFrames<S, D, C> {
+        let Released { bus, direction } = self.sampler.release();
+        ReleasedFrames { bus, direction, clock: self.clock }
     }
 
     fn frame(&self, field: Field) -> Frame {
@@ -57,7 +58,7 @@ impl<S: SpiBus, D: Direction, C: Clock> blocking::FramePort for SpiFrames<'_, S,
 
     fn send(&mut self, frames: &[RequestFrame], gap_bits: u32) -> Result<(), Self::Error> {
         self.sampler.send(line_bits(units(frames), gap_bits))?;
-        self.began_ns = self.clock.now_ns();
+        self.began_ns = self.clock.now_ns()?;
         self.sampler.sample(usize::MAX)
     }
 
@@ -76,7 +77,7 @@ impl<S: AsyncSpiBus, D: Direction, C: Clock> asynch::FramePort for SpiFrames<'_,
 
     async fn send(&mut self, frames: &[RequestFrame], gap_bits: u32) -> Result<(), Self::Error> {
         self.sampler.send_asynch(line_bits(units(frames), gap_bits)).await?;
-        self.began_ns = self.clock.now_ns();
+        self.began_ns = self.clock.now_ns()?;
         self.sampler.sample_asynch(usize::MAX).await
     }
 

@@ -5,7 +5,7 @@ use embedded_hal::spi::SpiBus;
 use embedded_hal_async::spi::SpiBus as AsyncSpiBus;
 use embedded_io::{ErrorType, Read, ReadReady, Write};
 
-use super::{Fault, Heard, Sampler, Sampling, SpiError, line_bits};
+use super::{Fault, Heard, Released, Sampler, Sampling, SpiError, line_bits};
 use crate::Direction;
 
 /// A UART made of an SPI, for the T-Format drivers: give them [`Automatic`](crate::Automatic) as direction, for this one switches
@@ -29,8 +29,8 @@ impl<'b, S, D> SpiUart<'b, S, D> {
     }
 
     /// Gives SPI and direction back.
-    pub fn release(self) -> (S, D) {
-        (self.sampler.bus, self.sampler.direction.release())
+    pub fn release(self) -> Released<S, D> {
+        self.sampler.release()
     }
 
     /// Fields as bytes, the first of them `heard`.

@@ -3,21 +3,24 @@
 use core::ops::ControlFlow;
 
 use embedded_io::{Read, ReadReady, Write};
-use tformat::master::{EEPROM_POLLING, EepromAccess, Exchange, Line, Progress, Reset, Step, Transaction};
-use tformat::{Address, AllData, Doubt, Page, Policy, Request, Resolution, Response, SingleTurn};
+use servowire_core::{Ended, Procedure};
+use tformat::master::{EEPROM_POLLING, EepromAccess, Exchange, Line, Progress, Reset, Transaction};
+use tformat::{
+    Address, AllData, Doubt, Evidence, Frame, Page, Policy, Request, Resolution, Response, Sample, SingleTurn,
+};
 
-use super::{MAX_BYTES, Sample, driver_off_ns, longest_ns, other, silence_ns};
+use super::{LOST, MAX_BYTES, Released, driver_off_ns, longest_ns, other, silence_ns};
 use crate::direction::Switch;
-use crate::procedure;
+use crate::exchange;
 use crate::quiet;
 use crate::{Clock, Direction, Error};
 
-/// Why a call of an [`Encoder`] failed.
+/// Why a call of an [`Driver`] failed.
 pub type Failure<U, D> = Error<<U as embedded_io::ErrorType>::Error, <D as Direction>::Error, tformat::Error, Doubt>;
 
 /// An encoder, alone at its UART.
 #[derive(Debug)]
-pub struct Encoder<U, D, C> {
+pub struct Driver<U, D, C> {
     uart: U,
     direction: Switch<D>,
     clock: C,
@@ -25,7 +28,7 @@ pub struct Encoder<U, D, C> {
     state: quiet::Line,
 }
 
-impl<U: Read + ReadReady + Write, D: Direction, C: Clock> Encoder<U, D, C> {
+impl<U: Read + ReadReady + Write, D: Direction, C: Clock> Driver<U, D, C> {
     /// An encoder at this UART, set to the rate of `line`, 8 data bits, no parity, one stop bit.
     ///
     /// Whether the receiver is on while the request goes out makes no difference: an echo is known by its time.
@@ -34,24 +37,35 @@ impl<U: Read + ReadReady + Write, D: Direction, C: Clock> Encoder<U, D, C> {
     }
 
     /// Gives UART, direction and clock back.
-    pub fn release(self) -> (U, D, C) {
-        (self.uart, self.direction.release(), self.clock)
+    pub fn release(self) -> Released<U, D, C> {
+        Released { uart: self.uart, direction: self.direction.release(), clock: self.clock }
     }
 
-    /// The position, if it may be used, and when it was true: from ID 3, by the rules of [`Resolution::read`].
+    /// The position, if it may be used now, and when it was sampled: [`read_evidence`](Self::read_evidence), judged at
+    /// once by the rules of [`Evidence::at`]. The answer alone lasts 44 us at 2.5 Mbit/s and 22 us at 5, so it is never younger.
     ///
     /// # Errors
     /// [`Error`], [`Error::Doubt`] among them.
     pub fn read_position(&mut self, resolution: Resolution, policy: Policy) -> Result<Sample, Failure<U, D>> {
-        let exchange = self.transact(Request::ReadAll)?;
-        Sample::of(exchange, resolution, policy).map_err(Error::Doubt)
+        let evidence = self.read_evidence(resolution)?;
+        evidence.at(self.state.now_ns(&mut self.clock)?, policy).map_err(Error::Doubt)
     }
 
-    /// ID 3: position, turns, encoder ID and alarms. Look at the alarms before you use the position.
+    /// What the encoder says of its position, from ID 3, to be judged where it is used. If the request was held up on its
+    /// way out, the position is younger by that.
     ///
     /// # Errors
     /// [`Error`].
-    pub fn read_all(&mut self) -> Result<AllData, Failure<U, D>> {
+    pub fn read_evidence(&mut self, resolution: Resolution) -> Result<Evidence, Failure<U, D>> {
+        Ok(self.transact(Request::ReadAll)?.evidence(resolution))
+    }
+
+    /// ID 3: the fields for position, turns, encoder ID and alarms as they came. For a position that may be used take
+    /// [`read_position`](Self::read_position).
+    ///
+    /// # Errors
+    /// [`Error`].
+    pub fn read_data(&mut self) -> Result<AllData, Failure<U, D>> {
         match self.transact(Request::ReadAll)?.response {
             Response::ReadAll(all) => Ok(all),
             _ => Err(Error::Protocol(other(Request::ReadAll))),
@@ -63,9 +77,7 @@ impl<U: Read + ReadReady + Write, D: Direction, C: Clock> Encoder<U, D, C> {
     /// # Errors
     /// [`Error`]; read the alarms to see whether they were cleared.
     pub fn clear_errors(&mut self) -> Result<SingleTurn, Failure<U, D>> {
-        let mut reset = Reset::clear_errors();
-        let first = reset.start(self.clock.now_ns());
-        self.run(first, |outcome, now_ns| reset.receive(outcome, now_ns))
+        self.run(&mut Reset::clear_errors())
     }
 
     /// ID D: the byte at `address`, on the page that is selected now if `page` is `None`.
@@ -73,9 +85,7 @@ impl<U: Read + ReadReady + Write, D: Direction, C: Clock> Encoder<U, D, C> {
     /// # Errors
     /// [`Error`].
     pub fn read_eeprom(&mut self, page: Option<Page>, address: Address) -> Result<u8, Failure<U, D>> {
-        let mut access = EepromAccess::read(page, address, EEPROM_POLLING);
-        let first = access.start(self.clock.now_ns());
-        self.run(first, |outcome, now_ns| access.receive(outcome, now_ns))
+        self.run(&mut EepromAccess::read(page, address, EEPROM_POLLING))
     }
 
     /// ID 6: writes a byte and reads it back. Motor makers keep commutation data in this memory: know what is there.
@@ -83,31 +93,27 @@ impl<U: Read + ReadReady + Write, D: Direction, C: Clock> Encoder<U, D, C> {
     /// # Errors
     /// [`Error`]: whether the byte was written is not known then. Read it.
     pub fn write_eeprom(&mut self, page: Option<Page>, address: Address, data: u8) -> Result<u8, Failure<U, D>> {
-        let mut access = EepromAccess::write(page, address, data, EEPROM_POLLING);
-        let first = access.start(self.clock.now_ns());
-        self.run(first, |outcome, now_ns| access.receive(outcome, now_ns))
+        self.run(&mut EepromAccess::write(page, address, data, EEPROM_POLLING))
     }
 
-    /// A procedure of several transactions: does what its steps ask for and hands the outcomes to `receive`.
+    /// A procedure of several transactions: does what its steps ask for.
     ///
     /// # Errors
     /// [`Error`]: that of the procedure, for which a fault of the UART is a lost answer; or at once one of the pin or of a line
     /// that cannot be used, and then whether the last request had its effect is not known.
-    pub fn run<T>(
-        &mut self,
-        mut step: Step<T>,
-        mut receive: impl FnMut(Result<Response, tformat::Error>, u64) -> Step<T>,
-    ) -> Result<T, Failure<U, D>> {
-        loop {
-            let (request, not_before_ns) = match procedure::next(step, &mut self.state) {
-                ControlFlow::Continue(next) => next,
-                ControlFlow::Break(end) => return end.map_err(Error::Protocol),
-            };
-            while self.clock.now_ns() < not_before_ns {}
+    pub fn run<P>(&mut self, procedure: &mut P) -> Result<P::Value, Failure<U, D>>
+    where
+        P: Procedure<Request = Request, Response = Response, Error = tformat::Error>,
+    {
+        let now_ns = self.state.now_ns(&mut self.clock)?;
+        let exchange = |request, not_before_ns| {
+            self.state.wait_until(&mut self.clock, not_before_ns)?;
             let exchanged = self.transact(request).map(|exchange| exchange.response);
-            let outcome = procedure::outcome(exchanged, tformat::Error::NoResponse { echo: false })?;
-            step = receive(outcome, self.state.free_ns(self.clock.now_ns()));
-        }
+            exchange::ended(exchanged, LOST, &mut self.state, &mut self.clock)
+        };
+        let Ended { outcome, ready_ns } = servowire_core::run(procedure, now_ns, exchange)?;
+        self.state.keep(ready_ns);
+        outcome.map_err(Error::Protocol)
     }
 
     /// One request and its answer.
@@ -119,29 +125,25 @@ impl<U: Read + ReadReady + Write, D: Direction, C: Clock> Encoder<U, D, C> {
         self.settle()?;
         let frame = request.emit();
         let guard = self.direction.transmit().map_err(Error::Pin)?;
-        let on_ns = self.clock.now_ns();
-        while self.clock.now_ns() < on_ns.saturating_add(self.line.driver_lead_ns.into()) {}
+        self.state.pause(&mut self.clock, self.line.driver_lead_ns.into())?;
         self.state.begin(longest_ns(&self.line, request));
-        let start_ns = self.clock.now_ns();
-        send(&mut self.uart, frame.as_bytes())?;
-        let taken_ns = self.clock.now_ns();
-        self.uart.flush().map_err(Error::Io)?;
-        self.state.sent(self.clock.now_ns());
-        let mut transaction = Transaction::start(request, self.line, start_ns);
-        let off_ns = driver_off_ns(&self.line, transaction.transmission().end_ns, start_ns, taken_ns);
-        while self.clock.now_ns() < off_ns {}
+        let request_ns = self.line.rate.fields_ns(frame.fields()).into();
+        let sent = send(&mut self.uart, &mut self.clock, &mut self.state, &self.line, &frame);
+        if matches!(sent, Err(Error::Clock(_))) {
+            // A request of which the end is cut off may be another one: it leaves, by the time that it is now.
+            let _: Result<(), _> = self.state.pause(&mut self.clock, request_ns);
+        }
+        let start_ns = sent?;
         guard.receive().map_err(Error::Pin)?;
+        let mut transaction = Transaction::start(request, self.line, start_ns);
         loop {
-            match self.receive(&mut transaction)? {
-                Progress::Pending { .. } => {}
-                Progress::Done { value, ready_ns } => {
-                    self.state.clean(ready_ns);
-                    return Ok(value);
-                }
-                Progress::Failed { error, ready_ns } => {
-                    self.state.failed(ready_ns, self.clock.now_ns());
-                    return Err(Error::Protocol(error));
-                }
+            let ended = match self.receive(&mut transaction)? {
+                // At once: a look at the UART that finds nothing is the most frequent one.
+                Progress::Pending { .. } => continue,
+                ended => ended,
+            };
+            if let ControlFlow::Break(outcome) = exchange::next(ended, &mut self.state, &mut self.clock)? {
+                return outcome.map_err(Error::Protocol);
             }
         }
     }
@@ -150,7 +152,7 @@ impl<U: Read + ReadReady + Write, D: Direction, C: Clock> Encoder<U, D, C> {
     fn receive(&mut self, transaction: &mut Transaction) -> Result<Progress, Failure<U, D>> {
         if !self.uart.read_ready().map_err(Error::Io)? {
             // What came while the clock was read is not late.
-            let now_ns = self.clock.now_ns();
+            let now_ns = self.state.now_ns(&mut self.clock)?;
             if !self.uart.read_ready().map_err(Error::Io)? {
                 return Ok(transaction.poll(now_ns));
             }
@@ -158,7 +160,7 @@ impl<U: Read + ReadReady + Write, D: Direction, C: Clock> Encoder<U, D, C> {
         let mut buffer = [0; MAX_BYTES];
         let count = self.uart.read(&mut buffer).map_err(Error::Io)?;
         let bytes = buffer.get(..count).filter(|bytes| !bytes.is_empty()).ok_or(Error::Closed)?;
-        Ok(transaction.hear(bytes, self.clock.now_ns()))
+        Ok(transaction.hear(bytes, self.state.now_ns(&mut self.clock)?))
     }
 
     /// Waits until the line is free, and throws away what comes meanwhile, errors of the UART included.
@@ -176,8 +178,28 @@ impl<U: Read + ReadReady + Write, D: Direction, C: Clock> Encoder<U, D, C> {
     }
 }
 
+/// Sends a request, until its last bit has left: when it began.
+fn send<U: Write, PIN, P, D>(
+    uart: &mut U,
+    clock: &mut impl Clock,
+    state: &mut quiet::Line,
+    line: &Line,
+    frame: &Frame,
+) -> Result<u64, Error<U::Error, PIN, P, D>> {
+    let start_ns = state.now_ns(clock)?;
+    hand_over(uart, frame.as_bytes())?;
+    let taken_ns = state.now_ns(clock)?;
+    uart.flush().map_err(Error::Io)?;
+    let now_ns = state.now_ns(clock)?;
+    state.sent(now_ns);
+    let end_ns = start_ns.saturating_add(line.rate.fields_ns(frame.fields()).into());
+    let off_ns = driver_off_ns(line, end_ns, start_ns, taken_ns);
+    state.wait_until(clock, off_ns)?;
+    Ok(start_ns)
+}
+
 /// Hands all bytes to the UART.
-fn send<U: Write, PIN, P, D>(uart: &mut U, mut bytes: &[u8]) -> Result<(), Error<U::Error, PIN, P, D>> {
+fn hand_over<U: Write, PIN, P, D>(uart: &mut U, mut bytes: &[u8]) -> Result<(), Error<U::Error, PIN, P, D>> {
     while !bytes.is_empty() {
         let count = uart.write(bytes).map_err(Error::Io)?;
         bytes = bytes.get(count..).filter(|_| count > 0).ok_or(Error::Closed)?;

@@ -9,8 +9,8 @@ use std::rc::Rc;
 use rtex_block::MacId;
 use rtex_block::device::{Drive, DriveConfig, OpenCodes};
 use rtex_block::master::{Asic, Slave};
-use servowire_drivers::Clock;
-use servowire_drivers::rtex::{Port, Reception, Word};
+use servowire_drivers::rtex::{FrameCount, Port, Word};
+use servowire_drivers::{Clock, ClockError};
 
 pub const AXES: usize = 3;
 /// Communication period.
@@ -49,7 +49,7 @@ pub struct Ring {
     /// When the frame under way comes back.
     back_ns: Option<u64>,
     frames: u32,
-    reception: &'static Reception,
+    reception: &'static FrameCount,
     /// An interrupt that waits for the exchange to end (internal timer).
     pub in_exchange: bool,
     pub interrupt_waits: bool,
@@ -87,7 +87,7 @@ impl Ring {
             next_frame_ns: 0,
             back_ns: None,
             frames: 0,
-            reception: Box::leak(Box::new(Reception::new())),
+            reception: Box::leak(Box::new(FrameCount::new())),
             in_exchange: false,
             interrupt_waits: false,
             read_of: Vec::new(),
@@ -98,7 +98,7 @@ impl Ring {
         }))
     }
 
-    pub fn reception(&self) -> &'static Reception {
+    pub fn reception(&self) -> &'static FrameCount {
         self.reception
     }
 
@@ -138,22 +138,22 @@ impl Ring {
         self.back_ns = None;
         if self.lose_frames > 0 {
             self.lose_frames -= 1;
-            self.drives.iter_mut().for_each(Drive::miss);
+            self.drives.iter_mut().for_each(Drive::framing_error);
             return;
         }
         self.frames += 1;
         let mut blocks = [[0; 32]; AXES];
         for ((drive, command), block) in self.drives.iter_mut().zip(&self.on_line).zip(&mut blocks) {
             if self.wide {
-                *block = drive.exchange32(command);
+                *block = drive.hear(command).unwrap();
             } else {
-                block[..16].copy_from_slice(&drive.exchange(command[..16].try_into().unwrap()));
+                block[..16].copy_from_slice(&drive.hear::<16>(command[..16].try_into().unwrap()).unwrap());
             }
         }
         self.hidden = Answers { frame: self.frames, blocks };
         if self.external {
             // The receive interrupt has the highest priority.
-            self.reception.frame();
+            self.reception.add();
             self.seen = self.hidden;
         } else {
             self.interrupt_waits = true;
@@ -165,7 +165,7 @@ impl Ring {
     pub fn let_in(&mut self) {
         if self.interrupt_waits && !self.in_exchange {
             self.interrupt_waits = false;
-            self.reception.frame();
+            self.reception.add();
         }
     }
 
@@ -276,10 +276,10 @@ impl<W: Drawn> Port for Bus<W> {
 pub struct Watch(pub Shared);
 
 impl Clock for Watch {
-    fn now_ns(&mut self) -> u64 {
+    fn now_ns(&mut self) -> Result<u64, ClockError> {
         let mut ring = self.0.borrow_mut();
         let until_ns = ring.now_ns + 100;
         ring.pass(until_ns);
-        ring.now_ns
+        Ok(ring.now_ns)
     }
 }

@@ -11,7 +11,7 @@ use std::rc::Rc;
 
 use embedded_hal::digital::{ErrorType as PinErrorType, OutputPin};
 use embedded_io::{ErrorKind, ErrorType, Read, ReadReady, Write};
-use servowire_drivers::Clock;
+use servowire_drivers::{Clock, ClockError};
 use servowire_world::{
     Delivery, Event, Framing, Host, Id, Kind, Message, Scenario, Tally, Transmission, Truth, Wire, World,
 };
@@ -175,11 +175,11 @@ pub fn place(turn: u32) -> u32 {
 pub struct Watch(pub Shared);
 
 impl Clock for Watch {
-    fn now_ns(&mut self) -> u64 {
+    fn now_ns(&mut self) -> Result<u64, ClockError> {
         let mut bench = self.0.borrow_mut();
         let until_ns = bench.now_ns() + LOOK_NS;
         bench.pass(until_ns);
-        bench.now_ns()
+        Ok(bench.now_ns())
     }
 }
 

@@ -15,10 +15,10 @@ use std::task::Poll;
 use nikon_aformat::device::Device;
 use nikon_aformat::master::Line;
 use nikon_aformat::{BitRate, EncoderAddress, RequestFrame, Resolution};
-use servowire_drivers::Clock;
 #[cfg(feature = "async")]
 use servowire_drivers::Timer;
 use servowire_drivers::nikon::{Frame, blocking};
+use servowire_drivers::{Clock, ClockError};
 use servowire_world::{
     Delivery, Event, Framing, Host, Id, Kind, Message, Scenario, Speaker, Transmission, Wire, World,
 };
@@ -155,11 +155,11 @@ impl Bench {
                     encoder.set_position(self.shaft, 3 + u32::from(device));
                     if !framed {
                         encoder.framing_error(unit.end_ns);
-                    } else if let Some(answer) = encoder.frame(content as u16, unit.end_ns) {
+                    } else if let Some(answer) = encoder.hear(&[Some(content as u16)], unit.end_ns) {
                         self.asked_at = self.shaft;
-                        let contents = answer.raw.contents().iter().map(|content| u64::from(*content));
+                        let contents = answer.frames.contents().iter().map(|content| u64::from(*content));
                         let message = Message::frames(16, contents).tagged(self.shaft.into());
-                        self.world.answer(device, unit.origin.transmission, &message, answer.at_ns);
+                        self.world.answer(device, unit.origin.transmission, &message, answer.start_ns);
                     }
                 }
             }
@@ -206,19 +206,23 @@ impl servowire_drivers::nikon::asynch::FramePort for Port {
 }
 
 impl Clock for Port {
-    fn now_ns(&mut self) -> u64 {
+    fn now_ns(&mut self) -> Result<u64, ClockError> {
         let mut bench = self.0.borrow_mut();
         let until_ns = bench.world.now_ns() + LOOK_NS;
         bench.pass(until_ns);
-        bench.world.now_ns()
+        Ok(bench.world.now_ns())
     }
 }
 
 #[cfg(feature = "async")]
 #[cfg(feature = "async")]
 impl Timer for Port {
-    async fn wait_until(&mut self, ns: u64) {
-        poll_fn(|_| if self.now_ns() >= ns { Poll::Ready(()) } else { Poll::Pending }).await;
+    async fn wait_until(&mut self, ns: u64) -> Result<(), ClockError> {
+        poll_fn(|_| match self.now_ns() {
+            Ok(now_ns) if now_ns < ns => Poll::Pending,
+            end => Poll::Ready(end.map(drop)),
+        })
+        .await
     }
 }
 

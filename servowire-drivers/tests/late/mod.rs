@@ -8,6 +8,7 @@ use std::rc::Rc;
 use std::task::Poll;
 
 use embedded_io::{ErrorKind, ErrorType};
+use servowire_drivers::{Clock, ClockError};
 
 /// What happens at the line.
 #[derive(Default)]
@@ -73,9 +74,9 @@ impl Late {
     }
 }
 
-impl servowire_drivers::Clock for Late {
-    fn now_ns(&mut self) -> u64 {
-        self.look()
+impl Clock for Late {
+    fn now_ns(&mut self) -> Result<u64, ClockError> {
+        Ok(self.look())
     }
 }
 

@@ -5,7 +5,7 @@ use std::future::{Future, poll_fn};
 use std::pin::pin;
 use std::task::{Context, Poll, Waker};
 
-use servowire_drivers::{Clock, Timer};
+use servowire_drivers::{Clock, ClockError, Timer};
 
 /// More polls than any call needs.
 pub const FOR_EVER: usize = 1_000_000;
@@ -39,13 +39,17 @@ pub async fn pause() {
 pub struct Looks<C>(pub C);
 
 impl<C: Clock> Clock for Looks<C> {
-    fn now_ns(&mut self) -> u64 {
+    fn now_ns(&mut self) -> Result<u64, ClockError> {
         self.0.now_ns()
     }
 }
 
 impl<C: Clock> Timer for Looks<C> {
-    async fn wait_until(&mut self, ns: u64) {
-        poll_fn(|_| if self.0.now_ns() >= ns { Poll::Ready(()) } else { Poll::Pending }).await;
+    async fn wait_until(&mut self, ns: u64) -> Result<(), ClockError> {
+        poll_fn(|_| match self.0.now_ns() {
+            Ok(now_ns) if now_ns < ns => Poll::Pending,
+            end => Poll::Ready(end.map(drop)),
+        })
+        .await
     }
 }

@@ -2,7 +2,7 @@
 
 use core::fmt;
 
-use sorte_proto::drv8711::{Apply, Configuration, Next, Register, Status, StepMode};
+use sorte_proto::drv8711::{Apply, Configuration, Register, Status, StepMode};
 
 /// Time of a word at the 500 kHz of the SPI, in ns: so old can the STATUS be that a device tells.
 const WORD_NS: u64 = 32_000;
@@ -77,8 +77,8 @@ impl Driver {
         configuration.ctrl.enable = true;
         configuration.ctrl.mode = StepMode::Div256;
         let mut apply = Apply::new(configuration);
-        while let Next::Transfer(word) = apply.next() {
-            apply.answer(self.transfer(word.bits()).to_be_bytes())?;
+        while let Some(word) = apply.transmission() {
+            apply.hear(self.transfer(word.bits()).to_be_bytes())?;
         }
         Ok(())
     }

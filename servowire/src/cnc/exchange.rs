@@ -1,7 +1,8 @@
 //! One cycle of the IO exchange over the line.
 
 use sorte_proto::device::State;
-use sorte_proto::follow::Feedback;
+use sorte_proto::follow::InputSlice;
+use sorte_proto::master::Heard;
 use sorte_proto::timing::BYTE_NS;
 use sorte_proto::{DeviceFrame, MasterFrameView, Pto, TRANSIT_NS};
 
@@ -16,7 +17,7 @@ const PREAMBLE: usize = 2;
 /// From the end of the master frame until the device has checked it and taken its slice: 119 instructions of the
 /// published receive path, and the table of its CRC.
 const RECEIVE_NS: f64 = 800.0;
-const DEVICE_FRAME: usize = DeviceFrame::<{ Feedback::LEN }>::LEN;
+const DEVICE_FRAME: usize = DeviceFrame::<{ InputSlice::LEN }>::LEN;
 /// Generator period that a step is made in: the second after the cycle that brought its word.
 const PERIOD_NS: f64 = 4000.0;
 
@@ -103,7 +104,7 @@ impl Line {
         output.resize(len, 0);
         into.resize(len + MasterFrameView::OVERHEAD, 0);
         // The length is the line's.
-        let _: Result<_, _> = self.master.write_frame(&output, time_stamp, into);
+        let _: Result<_, _> = self.master.emit_into(&output, time_stamp, into);
         self.output = output;
     }
 
@@ -114,8 +115,8 @@ impl Line {
         for k in 0..self.plugged {
             way += self.cable_back(k) + if k > 0 { f64::from(TRANSIT_NS) } else { 0.0 };
             let Some(node) = self.nodes.get_mut(k) else { return };
-            let Some((sent, feedback)) = node.answer(cycle_ns, positions) else { continue };
-            let Some(answer) = node.device.answer(feedback.emit()) else { continue };
+            let Some((sent, input)) = node.answer(cycle_ns, positions) else { continue };
+            let Some(answer) = node.device.answer(input.emit()) else { continue };
             let mut frame = [0; DEVICE_FRAME];
             if answer.emit_into(&mut frame).is_err() {
                 continue;
@@ -137,9 +138,9 @@ impl Line {
                 continue;
             }
             // What the master refuses, it counts.
-            let Ok(view) = self.master.device_frame(&frame) else { continue };
-            if let Some(payload) = view.payload().first_chunk() {
-                node.reported(Feedback::parse(*payload), positions);
+            let heard = self.master.hear(&frame, start.max(begin) as u64).ok().and_then(Heard::device);
+            if let Some(payload) = heard.and_then(|frame| frame.payload().first_chunk()) {
+                node.reported(InputSlice::parse(*payload), positions);
             }
         }
     }

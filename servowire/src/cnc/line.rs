@@ -2,7 +2,8 @@
 
 use std::collections::VecDeque;
 
-use sorte_proto::device::{self, Arrival, Device, Handled, Path, PortId, State, Trigger};
+use sorte_proto::Link;
+use sorte_proto::device::{self, Device, FrameTimes, Path, PortId, Reaction, State, Trigger};
 use sorte_proto::master::{Action, Config, Master, Outgoing};
 use sorte_proto::timing::{BYTE_NS, CNC_CYCLE_NS, Timing};
 use sorte_proto::{DelayModel, Discovery, Parameters, TRANSIT_NS};
@@ -164,7 +165,7 @@ impl Line {
             nodes,
             setup,
         };
-        line.master.link(true);
+        line.master.set_link(Link::Up);
         for (device, node) in (1..).zip(&mut line.nodes) {
             // A driver without supply from the beginning does not take its registers either.
             if let Some((_, _, fault)) =
@@ -181,10 +182,11 @@ impl Line {
     pub(super) fn plug(&mut self, devices: usize) {
         self.plugged = devices;
         for (k, node) in self.nodes.iter_mut().enumerate() {
-            node.device.links(k < devices, k + 1 < devices);
+            let link = |there| if there { Link::Up } else { Link::Down };
+            node.device.set_links(link(k < devices), link(k + 1 < devices));
         }
         if devices == 0 {
-            self.master.link(false);
+            self.master.set_link(Link::Down);
         }
     }
 
@@ -266,7 +268,7 @@ impl Line {
         let Some((sof, end, answer)) = self.returning.pop_front() else { return false };
         self.now_ns = self.now_ns.max(end as u64);
         // What the master refuses, it counts.
-        let _: Result<_, _> = self.master.receive(&answer, sof as u64);
+        let _: Result<_, _> = self.master.hear(&answer, sof as u64);
         true
     }
 
@@ -300,9 +302,9 @@ impl Line {
         for k in 0..self.plugged {
             sof_ns += self.cable(k);
             self.noise.pass(&mut frame);
-            let handled = self.pass(k, PortId::A, &mut frame, sof_ns)?;
-            self.measure(k, handled.trigger, sof_ns);
-            match handled.path {
+            let reaction = self.pass(k, PortId::A, &mut frame, sof_ns)?;
+            self.measure(k, reaction.trigger, sof_ns);
+            match reaction.path {
                 Path::Forward => sof_ns += f64::from(TRANSIT_NS),
                 Path::Absorb => return None,
                 Path::Reflect => {
@@ -327,18 +329,18 @@ impl Line {
         Some((frame, sof_ns + self.cable_back(0)))
     }
 
-    fn pass(&mut self, k: usize, port: PortId, frame: &mut [u8], sof_ns: f64) -> Option<Handled> {
+    fn pass(&mut self, k: usize, port: PortId, frame: &mut [u8], sof_ns: f64) -> Option<Reaction> {
         let jitter = self.jitter();
         let node = self.nodes.get_mut(k)?;
         let captured = sof_ns + CAPTURE_NS;
-        let arrival = Arrival {
+        let times = FrameTimes {
             sof_ns: node.clock.read(captured + jitter),
             counter_ns: node.clock.read(captured + HANDLER_NS),
             now_ns: sof_ns as u64,
         };
-        let handled = node.device.frame(port, frame, arrival);
-        node.clock.correct(handled.correction, captured + HANDLER_NS);
-        Some(handled)
+        let reaction = node.device.hear(port, frame, times);
+        node.clock.correct(reaction.correction, captured + HANDLER_NS);
+        Some(reaction)
     }
 
     /// Device k measures the line to the next one, which then does the same.
@@ -347,9 +349,9 @@ impl Line {
         let mut frame = request.emit();
         let (out, back) = (self.cable(k + 1), self.cable_back(k + 1));
         self.noise.pass(&mut frame);
-        let Some(handled) = self.pass(k + 1, PortId::A, &mut frame, at_ns + out) else { return };
-        self.measure(k + 1, handled.trigger, at_ns);
-        if handled.path != Path::Reflect {
+        let Some(reaction) = self.pass(k + 1, PortId::A, &mut frame, at_ns + out) else { return };
+        self.measure(k + 1, reaction.trigger, at_ns);
+        if reaction.path != Path::Reflect {
             return;
         }
         self.noise.pass(&mut frame);
@@ -358,7 +360,7 @@ impl Line {
             // Both captures are on the 5 ns grid, so the measured time varies by a tick.
             let sent = node.clock.read(at_ns);
             let rtt = node.clock.read(at_ns + out + back + DEVICE_REFLECTION_NS + jitter).wrapping_sub(sent);
-            let _: Result<_, _> = node.device.delay_reflection(trigger, &frame, rtt);
+            let _: Result<_, _> = node.device.hear_reflection(trigger, &frame, rtt);
         }
     }
 }

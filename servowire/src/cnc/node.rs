@@ -2,7 +2,7 @@
 
 use sorte_proto::device::{Config, Device, State};
 use sorte_proto::drv8711;
-use sorte_proto::follow::{Asked, Feedback, Follower};
+use sorte_proto::follow::{Asked, Follower, InputSlice};
 use sorte_proto::{Error, Pto, Slice};
 
 use super::axis::{Axis, Build, Incoming, Seen};
@@ -139,18 +139,18 @@ impl Node {
     }
 
     /// When the own frame of this cycle leaves, and the frame's payload.
-    pub(super) fn answer(&mut self, cycle_ns: u64, positions: bool) -> Option<(f64, Feedback)> {
+    pub(super) fn answer(&mut self, cycle_ns: u64, positions: bool) -> Option<(f64, InputSlice)> {
         let (zero, _) = self.zero?;
-        let position = if positions { self.follower.position() } else { 0 };
+        let ordered = if positions { self.follower.ordered().unwrap_or_default() } else { 0 };
         let at = self.clock.when(zero + (self.cycle * cycle_ns) as f64 + self.slot);
-        let status = self.axis.driver.status(self.cycle * cycle_ns);
-        Some((at, Feedback { status, position }))
+        let driver = self.axis.driver.status(self.cycle * cycle_ns);
+        Some((at, InputSlice { driver, ordered }))
     }
 
     /// The master has got the device's frame.
-    pub(super) fn reported(&mut self, feedback: Feedback, positions: bool) {
-        self.lag = if positions { self.before.lag(feedback.position) } else { 0 };
-        self.status = feedback.status;
+    pub(super) fn reported(&mut self, input: InputSlice, positions: bool) {
+        self.lag = if positions { self.before.lag(input.ordered) } else { 0 };
+        self.status = input.driver;
     }
 
     /// The master frame of the cycle that [`run`](Self::run) has just gone through.
@@ -159,7 +159,7 @@ impl Node {
         let own = (zero as i64 as u32).wrapping_add(((self.cycle - 1) * received.cycle_ns) as u32);
         let in_cycle = |ns: f64| self.clock.read(ns).wrapping_sub(own);
         let (sof_ns, now_ns) = (in_cycle(received.sof), in_cycle(received.done));
-        let output = self.device.exchange(received.frame, sof_ns, now_ns);
+        let output = self.device.hear_exchange(received.frame, sof_ns, now_ns);
         let slice = output.ok().and_then(|output| output.data.first_chunk()).map(|bytes| Slice::parse(*bytes));
         if let Ok(output) = output {
             self.clock.correct(output.correction, received.done);

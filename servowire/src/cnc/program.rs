@@ -73,7 +73,7 @@ impl Program {
             Self::Part(part) => return part.next(words),
             Self::Turns { group, profiles, steps, done, moves } => {
                 if group.state() == MoveState::Idle && done < moves {
-                    let direction = step_profile::Direction::from_dir(*done % 2 == 1);
+                    let direction = way(*done);
                     let profile = profiles.get((*done % profiles.len().max(1) as u64) as usize);
                     // The group is idle and has motors, so the move begins.
                     if let Some(profile) = profile {
@@ -85,7 +85,7 @@ impl Program {
             }
             Self::Independent { axes, done, moves } => {
                 if axes.iter().all(|(axis, ..)| axis.state() == MoveState::Idle) && done < moves {
-                    let direction = step_profile::Direction::from_dir(*done % 2 == 1);
+                    let direction = way(*done);
                     for (axis, profile, steps) in axes.iter_mut() {
                         // The axis is idle, so the move begins.
                         let _: Result<_, _> = axis.start(*profile, *steps, direction);
@@ -161,13 +161,23 @@ impl Follower {
     }
 }
 
+/// There, and back again.
+fn way(done: u64) -> step_profile::Direction {
+    if done % 2 == 1 { step_profile::Direction::Reverse } else { step_profile::Direction::Forward }
+}
+
+fn level(direction: step_profile::Direction) -> Direction {
+    match direction {
+        step_profile::Direction::Forward => Direction::Low,
+        step_profile::Direction::Reverse => Direction::High,
+    }
+}
+
 /// A command as the wire carries it.
 fn word(command: Command) -> Pto {
     match command {
         Command::Disable => Pto::DriverOff,
-        Command::Hold { direction } => Pto::NoPulse { direction: Direction::from(direction.dir()) },
-        Command::Pulse { direction, sync_time } => {
-            Pto::from_step(sync_time, Direction::from(direction.dir())).unwrap_or_default()
-        }
+        Command::Hold { direction } => Pto::NoPulse { direction: level(direction) },
+        Command::Pulse { direction, sync_time } => Pto::from_step(sync_time, level(direction)).unwrap_or_default(),
     }
 }

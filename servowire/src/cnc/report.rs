@@ -93,7 +93,7 @@ fn axes(out: &mut dyn Write, line: &Line) -> io::Result<()> {
     )?;
     for (k, node) in line.nodes.iter().enumerate() {
         let t = node.axis.tally;
-        let troubled = t.late > 0 || t.lost > 0 || node.axis.position != node.asked.position();
+        let troubled = t.late > 0 || t.lost > 0 || node.axis.position != node.asked.asked();
         if k >= LISTED && !troubled && k + 1 < line.nodes.len() {
             continue;
         }
@@ -182,7 +182,7 @@ pub(super) fn verdict(line: &Line, host: &Host) -> Option<String> {
         return Some("no axis was asked to move".to_owned());
     }
     for (k, node) in line.nodes.iter().enumerate() {
-        let (axis, t, asked) = (k + 1, node.axis.tally, node.asked.position());
+        let (axis, t, asked) = (k + 1, node.axis.tally, node.asked.asked());
         if t.asked > 0 && t.moved == 0 {
             return Some(format!(
                 "axis {axis} never moved: {} steps were asked, {} pulses made",

@@ -1,7 +1,7 @@
 //! What a part program says, as straight lines.
 
 use gcode::{Block, Code, Value};
-use step_profile::motion::Arc;
+use step_profile::motion::{Arc, Turning};
 
 use super::AXES;
 use crate::fault::{At, Fault};
@@ -175,14 +175,15 @@ impl State<'_> {
             }
             self.lines.push(Line { to, feed });
         } else {
-            self.arc(to, words, motion == 2, feed)?;
+            let turning = if motion == 2 { Turning::Clockwise } else { Turning::Counterclockwise };
+            self.arc(to, words, turning, feed)?;
         }
         self.at = to;
         Ok(())
     }
 
     /// Chords; Z goes with them.
-    fn arc(&mut self, to: [f64; AXES], words: &Words, clockwise: bool, feed: Option<u32>) -> Result<(), String> {
+    fn arc(&mut self, to: [f64; AXES], words: &Words, turning: Turning, feed: Option<u32>) -> Result<(), String> {
         if words.center.iter().all(Option::is_none) {
             return Err("an arc needs its center: I and J, from where it begins".to_owned());
         }
@@ -190,7 +191,7 @@ impl State<'_> {
         let [i, j] = words.center.map(|away| away.unwrap_or(0.0) * self.unit);
         let center = [from[0] + i, from[1] + j];
         let units = |[x, y]: [f64; 2]| [(x * 1e4).round() as i32, (y * 1e4).round() as i32];
-        let arc = Arc::new(units([from[0], from[1]]), units([to[0], to[1]]), units(center), clockwise, CHORD);
+        let arc = Arc::new(units([from[0], from[1]]), units([to[0], to[1]]), units(center), turning, CHORD);
         let chords: Vec<_> = arc
             .map_err(|e| format!("{e}, in 0.1 um: begin and end are not on one circle around I and J, or it is none"))?
             .collect();

@@ -161,7 +161,7 @@ impl Decoder {
     /// Where a block is: in update periods, if the period is known, else in the log.
     fn place(&mut self, burst: &Burst, header: Header) -> Place {
         let counter = header.update_counter.get();
-        let (last, updates) = self.updates.entry(header.to_byte() & 0x9f).or_insert((counter, 0));
+        let (last, updates) = self.updates.entry(header.emit() & 0x9f).or_insert((counter, 0));
         *updates += i64::from(counter.wrapping_sub(*last) & 3);
         *last = counter;
         match self.settings.period_ns {
@@ -174,7 +174,7 @@ impl Decoder {
     }
 
     fn block(&mut self, burst: &Burst, block: &[u8]) -> Option<Event> {
-        let header = Header::from_byte(block.first().copied()?);
+        let header = Header::parse(block.first().copied()?);
         if self.settings.mac_id.is_some_and(|only| only != header.mac_id.get()) {
             return None;
         }
@@ -184,7 +184,7 @@ impl Decoder {
         let mut fields = Vec::new();
         if is_block(&report) {
             let findings: Vec<String> = self.analysis.block(block).map(|finding| finding.to_string()).collect();
-            let before = self.last.insert(header.to_byte() & 0x9f, report);
+            let before = self.last.insert(header.emit() & 0x9f, report);
             match before {
                 Some(before) => changed(&report, &before, &mut fields),
                 None => whole(&report, block, &mut fields),
@@ -228,7 +228,7 @@ fn whole(report: &Report, block: &[u8], fields: &mut Vec<Field>) {
     };
     let (codes, data): (Vec<_>, Vec<_>) = others.into_iter().filter(shown).partition(|field| field.first == 1);
     fields.extend(codes.iter().map(field));
-    let name = if report.is_response == Some(true) { "Status_Flags" } else { "Control_Bits" };
+    let name = if report.is_response() == Some(true) { "Status_Flags" } else { "Control_Bits" };
     fields.push(flag_field(&flags, block, name));
     fields.extend(data.iter().map(field));
 }
@@ -237,7 +237,10 @@ fn whole(report: &Report, block: &[u8], fields: &mut Vec<Field>) {
 fn changed(report: &Report, before: &Report, fields: &mut Vec<Field>) {
     let code = report.fields().find(|field| matches!(field.value, inspect::Value::Code(_)));
     fields.extend(code.as_ref().map(field));
-    for (new, old) in report.changes(before).filter(|(new, _)| !matches!(new.value, inspect::Value::Code(_))) {
+    for inspect::Change { field: new, before: old } in report.changes(before) {
+        if matches!(new.value, inspect::Value::Code(_)) {
+            continue;
+        }
         match (new.value, old) {
             (inspect::Value::Number(counter), Some(inspect::Value::Number(last))) if new.first == 0 => {
                 if counter != (last + 1) % 4 {
@@ -251,8 +254,8 @@ fn changed(report: &Report, before: &Report, fields: &mut Vec<Field>) {
 
 fn notes(report: &Report, findings: Vec<String>, fields: &mut Vec<Field>) {
     let said = report.notes().map(|note| note.to_string());
-    let strict = report.findings().map(|error| error.to_string());
-    let cause = report.cause.map(|cause| cause.to_string());
+    let strict = report.errors().map(|error| error.to_string());
+    let cause = report.cause().map(|cause| cause.to_string());
     let text = findings.into_iter().chain(said).chain(strict).chain(cause).collect::<Vec<_>>().join("; ");
     if !text.is_empty() {
         fields.push(Field::text("note", text));
@@ -282,7 +285,7 @@ fn field(field: &inspect::Field) -> Field {
 /// Whether it is a block at all. A bus without a device is no drive, although its ones look like a response with an undefined
 /// code.
 fn is_block(report: &Report) -> bool {
-    report.is_usable && report.cause != Some(Cause::AllOnes)
+    report.is_usable() && report.cause() != Some(Cause::AllOnes)
 }
 
 /// A block that a drive takes is good; what strict decoding says of it is a note.
@@ -295,6 +298,6 @@ fn verdict(report: &Report) -> Verdict {
         _ => None,
     };
     let field = at.map(|byte: u8| format!("byte {byte}"));
-    let cause = report.cause.map(|cause| cause.to_string());
+    let cause = report.cause().map(|cause| cause.to_string());
     Refusal { field, cause, ..Refusal::new(error.class().name(), error) }.into()
 }

@@ -6,9 +6,8 @@
 use std::fmt::Write as _;
 
 use pcap_file::DataLink;
-use sorte_proto::{
-    DeviceFrameView, DiscoveryView, Error, FrameType, LongFrame, MasterFrameView, ParamView, Slice, Status, SyncView,
-};
+use sorte_proto::inspect::{During, Frame, inspect};
+use sorte_proto::{FrameType, Param, Status};
 
 use crate::capture::pcapng::{Packet, Pcapng};
 use crate::event::{Direction, Event, Field, Place, Refusal, Verdict};
@@ -52,10 +51,13 @@ pub(super) fn decode(mut capture: Pcapng, out: &mut Output<'_>) -> Result<(), St
 }
 
 fn event(packet: &Packet) -> Event {
-    let frame = if packet.link == DataLink::ETHERNET { long(&packet.bytes) } else { exchange(&packet.bytes) };
-    let (kind, fields, verdict) = match frame {
-        Ok((kind, fields)) => (kind, fields, Verdict::Ok),
-        Err(error) => (guess(packet), Vec::new(), Refusal::new(error.class().name(), error).into()),
+    let during = if packet.link == DataLink::ETHERNET { During::StartUp } else { During::Exchange };
+    let report = inspect(during, &packet.bytes);
+    let kind = report.kind().name();
+    let (fields, verdict) = match (report.error(), report.frame()) {
+        (None, Some(frame)) => (fields(&frame), Verdict::Ok),
+        (None, None) => (Vec::new(), Verdict::Ok),
+        (Some(error), _) => (Vec::new(), Refusal::new(error.class().name(), error).into()),
     };
     let direction = match (packet.link, packet.inbound) {
         (DataLink::ETHERNET, Some(true)) => Some(Direction::Answer),
@@ -67,62 +69,45 @@ fn event(packet: &Packet) -> Event {
     Event::new(place, direction, kind, fields, verdict)
 }
 
-/// What a refused packet was meant to be.
-fn guess(packet: &Packet) -> &'static str {
-    let code = packet.bytes.get(2).copied().and_then(FrameType::from_code);
-    match (packet.link, packet.bytes.first()) {
-        (DataLink::ETHERNET, _) => code.map_or("?", FrameType::name),
-        (_, Some(0)) => "master",
-        _ => "device",
+fn fields(frame: &Frame<'_>) -> Vec<Field> {
+    match frame {
+        Frame::Discovery(view) => vec![
+            status(view.status()),
+            Field::number("devices", view.count()),
+            Field::number("in", view.input_total()),
+            Field::number("out", view.output_total()),
+        ],
+        Frame::Param(Param { status: bits, parameters, .. }) => vec![
+            status(*bits),
+            Field::measured("cycle_time", parameters.cycle_time_ns, "ns"),
+            Field::number("delay_burst", parameters.delay_burst),
+            Field::measured("ipg", i64::from(parameters.ipg_5ns) * 5, "ns"),
+            Field::hex("crc_mode", parameters.crc_mode.byte(), 2),
+        ],
+        Frame::Sync(sync) => vec![
+            status(sync.status),
+            Field::measured("time stamp", sync.time_stamp_ns, "ns"),
+            Field::measured("delay", sync.delay_ns, "ns"),
+        ],
+        Frame::DelayReq(request) => vec![status(request.status)],
+        Frame::Other(frame) if frame.frame_type() == FrameType::DelayResp => vec![status(frame.status())],
+        Frame::Other(frame) => vec![status(frame.status()), data(frame.payload())],
+        Frame::Master(view) => {
+            let mut fields = vec![status(view.status())];
+            // Four bytes a device is the CNC machine; anything else is shown as it is.
+            match frame.cnc_slices() {
+                Some(slices) => {
+                    fields.extend(PTO.into_iter().zip(slices).map(|(name, slice)| Field::text(name, slice.pto)));
+                }
+                None => fields.push(data(view.output())),
+            }
+            fields.push(Field::measured("time stamp", view.time_stamp(), "ns"));
+            fields
+        }
+        Frame::Device(view) => {
+            vec![Field::number("SA", view.address().get()), status(view.status()), data(view.payload())]
+        }
     }
-}
-
-type Decoded = Result<(&'static str, Vec<Field>), Error>;
-
-fn long(bytes: &[u8]) -> Decoded {
-    let frame = LongFrame::new(bytes)?;
-    let mut fields = vec![status(frame.status())];
-    match frame.frame_type() {
-        FrameType::Discovery => {
-            let view = DiscoveryView::of(frame)?;
-            fields.push(Field::number("devices", view.count()));
-            fields.push(Field::number("in", view.input_total()));
-            fields.push(Field::number("out", view.output_total()));
-        }
-        FrameType::Param => {
-            let parameters = ParamView::of(frame)?.parameters();
-            fields.push(Field::measured("cycle_time", parameters.cycle_time_ns, "ns"));
-            fields.push(Field::number("delay_burst", parameters.delay_burst));
-            fields.push(Field::measured("ipg", i64::from(parameters.ipg_5ns) * 5, "ns"));
-            fields.push(Field::hex("crc_mode", parameters.crc_mode.byte(), 2));
-        }
-        FrameType::Sync => {
-            let view = SyncView::of(frame)?;
-            fields.push(Field::measured("time stamp", view.time_stamp_ns(), "ns"));
-            fields.push(Field::measured("delay", view.delay_ns(), "ns"));
-        }
-        FrameType::DelayReq | FrameType::DelayResp => {}
-        _ => fields.push(data(frame.payload())),
-    }
-    Ok((frame.frame_type().name(), fields))
-}
-
-fn exchange(bytes: &[u8]) -> Decoded {
-    if bytes.first() == Some(&0) {
-        let view = MasterFrameView::new(bytes.len().saturating_sub(MasterFrameView::OVERHEAD), bytes)?;
-        let mut fields = vec![status(view.status())];
-        // Four bytes a device is the CNC machine; anything else is shown as it is.
-        if view.output().len() % 4 == 0 && view.output().len() <= 16 {
-            let slices = view.output().chunks_exact(4).filter_map(|bytes| bytes.first_chunk());
-            fields.extend(PTO.into_iter().zip(slices).map(|(name, bytes)| Field::text(name, Slice::parse(*bytes).pto)));
-        } else {
-            fields.push(data(view.output()));
-        }
-        fields.push(Field::measured("time stamp", view.time_stamp(), "ns"));
-        return Ok(("master", fields));
-    }
-    let view = DeviceFrameView::new(bytes.len().saturating_sub(DeviceFrameView::OVERHEAD), bytes)?;
-    Ok(("device", vec![Field::number("SA", view.address().get()), status(view.status()), data(view.payload())]))
 }
 
 /// Bytes that are shown as they are, without spaces.

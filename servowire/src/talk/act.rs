@@ -9,7 +9,9 @@ use std::thread;
 use std::time::{Duration, Instant};
 
 use tformat::master::{EEPROM_POLLING, EepromAccess, Reset};
-use tformat::{Address, AllData, BitRate, Page, Request, Resolution, Response};
+use tformat::{
+    Address, AllData, Almc, BitRate, Evidence, Hint, Page, Policy, Request, Resolution, Response, Tolerated,
+};
 
 use super::Watch;
 use super::link::{Fault, Link};
@@ -27,7 +29,7 @@ fn say(text: fmt::Arguments) -> Result<(), Fault> {
     output::say(text).map_err(Fault::Output)
 }
 
-fn read_all<P: Port>(link: &mut Link<P>) -> Result<AllData, Fault> {
+fn read_data<P: Port>(link: &mut Link<P>) -> Result<AllData, Fault> {
     match link.exchange(Request::ReadAll)? {
         Response::ReadAll(all) => Ok(all),
         _ => Err(Fault::Input("the answer is to another request".to_owned())),
@@ -35,20 +37,24 @@ fn read_all<P: Port>(link: &mut Link<P>) -> Result<AllData, Fault> {
 }
 
 pub(super) fn read<P: Port>(link: &mut Link<P>) -> Done {
-    say(format_args!("{}\n", line(&read_all(link)?)))?;
+    say(format_args!("{}\n", line(&read_data(link)?)))?;
     Ok(ExitCode::SUCCESS)
 }
 
+/// It was read just now, and the alarms stand beside it.
+const SHOWN: Policy = Policy::new(0).tolerating(Tolerated::NOTHING.alarms(Almc::all()));
+
 /// Position, turns and alarms in words.
 fn line(all: &AllData) -> String {
-    let hint = Resolution::from_enid(all.enid);
-    let position = hint.map(|hint| (hint.resolution, hint.resolution.position(all.abs, all.abm)));
-    let place = match position {
-        Some((resolution, Ok(at))) => {
-            let degrees = f64::from(at.abs) * 360.0 / f64::from(resolution.counts_per_turn());
-            format!("{degrees:>10.5} deg  {:>8} counts  turn {}", at.abs, at.turns)
-        }
-        Some((_, Err(error))) => format!("ABS {} ABM {}: {error}", all.abs, all.abm),
+    let place = match Resolution::from_enid(all.enid) {
+        Some(Hint { resolution, .. }) => match Evidence::of(Response::ReadAll(*all), resolution, 0).at(0, SHOWN) {
+            Ok(sample) => {
+                let (counts, turns) = (sample.single_turn(), sample.turns().unwrap_or(0));
+                let degrees = f64::from(counts) * 360.0 / f64::from(resolution.counts_per_turn());
+                format!("{degrees:>10.5} deg  {counts:>8} counts  turn {turns}")
+            }
+            Err(doubt) => format!("ABS {} ABM {}: {doubt}", all.abs, all.abm),
+        },
         None => format!("ABS {} ABM {} (encoder ID {:#04x} says nothing of their widths)", all.abs, all.abm, all.enid),
     };
     let alarms = if all.almc.is_empty() { "no alarms".to_owned() } else { format!("alarms {}", all.almc) };
@@ -60,7 +66,7 @@ pub(super) fn watch<P: Port>(link: &mut Link<P>, watch: &Watch) -> Done {
     let (mut good, mut bad, begin) = (0_u64, 0_u64, Instant::now());
     let (mut gone, mut out) = (None, io::stdout());
     while watch.count.is_none_or(|count| good + bad < count) {
-        let reading = match read_all(link) {
+        let reading = match read_data(link) {
             Err(fault @ (Fault::Io(_) | Fault::Port(_))) => {
                 gone = Some(fault);
                 break;
@@ -139,7 +145,7 @@ pub(super) fn relay<M: Port, E: Port>(
 }
 
 pub(super) fn info<P: Port>(link: &mut Link<P>, name: &str, rate: BitRate) -> Done {
-    let all = read_all(link)?;
+    let all = read_data(link)?;
     let widths = match Resolution::from_enid(all.enid) {
         Some(hint) if hint.documented => {
             format!("{} bits a turn, {} of turns", hint.resolution.abs_bits(), hint.resolution.abm_bits())
@@ -159,9 +165,9 @@ pub(super) fn info<P: Port>(link: &mut Link<P>, name: &str, rate: BitRate) -> Do
 }
 
 pub(super) fn clear_errors<P: Port>(link: &mut Link<P>) -> Done {
-    let before = read_all(link)?.almc;
+    let before = read_data(link)?.almc;
     link.run(Reset::clear_errors())?;
-    let after = read_all(link)?.almc;
+    let after = read_data(link)?.almc;
     say(format_args!("alarms before: {}; after: {}\n", name(before), name(after)))?;
     Ok(if after.is_empty() { ExitCode::SUCCESS } else { ExitCode::FAILURE })
 }
@@ -225,7 +231,7 @@ fn parse(text: &str) -> Result<Vec<(u8, Vec<u8>)>, Fault> {
 pub(super) fn restore<P: Port>(link: &mut Link<P>, file: &Path, yes: bool) -> Done {
     let text = fs::read_to_string(file).map_err(Fault::file(file))?;
     let pages = parse(&text).map_err(|fault| Fault::File(format!("{}: {fault}", file.display())))?;
-    let all = read_all(link)?;
+    let all = read_data(link)?;
     if !yes && !confirmed(all.enid)? {
         return Err(Fault::Input("nothing was written".to_owned()));
     }

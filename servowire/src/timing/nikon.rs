@@ -61,7 +61,7 @@ fn rate(text: &str) -> Result<BitRate, String> {
 }
 
 fn command(text: &str) -> Result<Command, String> {
-    let named = Command::ALL.into_iter().find(|command| command.mnemonic().eq_ignore_ascii_case(text));
+    let named = Command::ALL.into_iter().find(|command| command.name().eq_ignore_ascii_case(text));
     let coded = text.parse().ok().and_then(Command::from_code);
     named.or(coded).ok_or_else(|| "a name as ABS40 or STATUS_MT, or a code from 0 to 30".to_owned())
 }
@@ -130,18 +130,15 @@ impl Arguments {
     /// What the encoders answer, in the order of time.
     fn responses(&self, request: Request, on_line: Addresses, asked_ns: u64) -> Vec<Heard> {
         let way_ns = 5 * u64::from(self.cable);
-        let behaviour = Behaviour::new().with_turn_around_ns(self.turn_around);
+        let behaviour = Behaviour::new().with_response_delay_ns(self.turn_around);
         let mut heard: Vec<_> = (0..)
             .zip(on_line.iter())
             .filter_map(|(place, ea)| {
                 let mut encoder = Device::<1>::new(ea, Resolution::default(), self.rate);
-                encoder.set_behaviour(if self.closed_up { behaviour.at_place(place) } else { behaviour });
-                let frames = request.emit();
-                let contents = frames.as_slice().iter().map(|frame| frame.content());
-                let answer = contents.filter_map(|content| encoder.frame(content, asked_ns + way_ns)).last()?;
-                let contents = answer.raw.contents().to_vec();
-                let start_ns = answer.at_ns + way_ns;
-                let end_ns = start_ns + u64::from(self.rate.bits_ns(answer.raw.line().len()));
+                encoder.set_behaviour(if self.closed_up { behaviour.with_place(Some(place)) } else { behaviour });
+                let answer = encoder.hear(request.emit().units().as_slice(), asked_ns + way_ns)?;
+                let contents = answer.frames.contents().to_vec();
+                let (start_ns, end_ns) = (answer.start_ns + way_ns, answer.end_ns + way_ns);
                 let who = ENCODERS.get(usize::from(ea.get())).copied()?;
                 Some(Heard { who, contents, start_ns, end_ns })
             })
@@ -164,7 +161,7 @@ fn free(request: Request, on_line: Addresses, line: Line, responses: &[Heard]) -
         let start = || BusTransaction::start(request, Resolution::default(), on_line, line, 0);
         let (mut heard, mut lost) = (start(), start());
         for (content, end_ns) in frames() {
-            let _ = heard.frame(content, end_ns);
+            let _ = heard.hear(&[Some(content)], end_ns);
         }
         match (heard.progress(), lost.poll(u64::MAX)) {
             (Progress::Done { ready_ns, .. }, Progress::Done { ready_ns: fault_ns, .. }) => Ok((ready_ns, fault_ns)),
@@ -174,7 +171,7 @@ fn free(request: Request, on_line: Addresses, line: Line, responses: &[Heard]) -
         let start = || Transaction::start(request, Resolution::default(), line, 0);
         let (mut heard, mut lost) = (start(), start());
         for (content, end_ns) in frames() {
-            let _ = heard.frame(content, end_ns);
+            let _ = heard.hear(&[Some(content)], end_ns);
         }
         match (heard.progress(), lost.poll(u64::MAX)) {
             (Progress::Done { ready_ns, .. }, Progress::Failed { ready_ns: fault_ns, .. }) => Ok((ready_ns, fault_ns)),
@@ -249,7 +246,7 @@ mod tests {
     fn every_command() {
         for command in Command::ALL {
             let plan = Arguments { command: Some(command), ..arguments(BitRate::Mbit8, &[0]) }.plan().unwrap();
-            assert!(plan.title.contains(command.mnemonic()), "{}", plan.title);
+            assert!(plan.title.contains(command.name()), "{}", plan.title);
             let frames = request_frames(command);
             assert!(plan.bars[0].what.contains(&format!("{frames} x 18")), "{plan}");
         }

@@ -89,7 +89,7 @@ impl Transit {
         self.received.is_whole()
     }
 
-    /// The checks of [`LongFrame::new`](crate::frame::LongFrame::new), made by the same function.
+    /// The checks of [`LongFrame::parse`](crate::frame::LongFrame::parse), made by the same function.
     pub(crate) fn check(&self) -> Result<FrameType, Error> {
         let want = if self.is_whole() { self.trailer } else { self.received.before(self.trailer) };
         check(self.at.into(), self.head, self.trailer, want)

@@ -66,7 +66,6 @@ impl Default for Config {
 
 /// What a device counts, at both ports together and at each.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]
 pub struct Counters {
@@ -83,6 +82,11 @@ pub struct Counters {
     /// Of these, at [`PortId::B`].
     pub b: PortCounters,
 }
+
+servowire_core::one_line!(Counters {
+    Self { good_frames, crc_errors, format_errors, retrains, .. } =>
+        "{} good frames, {} bad checksums, {} other refusals, {} restarts", good_frames, crc_errors, format_errors, retrains;
+});
 
 /// What a device counts at one of its ports. A port that forwards by hardware sees no frames.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]

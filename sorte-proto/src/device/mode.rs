@@ -5,7 +5,6 @@ use super::{Device, PortId, State};
 
 /// What a port of the published hardware does with the frames that come in. It changes at the end of a frame.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum Forwarding {
     /// Auto-forward: the hardware sends them on by itself, 320 ns after they begin.
@@ -62,11 +61,21 @@ impl Device {
     }
 }
 
+servowire_core::one_line!(Forwarding {
+    Self::Auto => "auto-forward";
+    Self::Rewrite => "rewrite";
+    Self::Reflect => "reflect";
+    Self::HostSend => "host sends";
+    Self::TimeTriggered => "time-triggered";
+});
+
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::device::{Arrival, Config, Path};
+    use crate::device::{Config, FrameTimes, Path};
     use crate::discovery::Discovery;
+    use crate::link::Link;
+    use crate::place::Place;
 
     const STATES: [State; 8] = [
         State::Idle,
@@ -96,12 +105,12 @@ mod tests {
         for (code, (state, modes)) in (0..).zip(STATES.into_iter().zip(modes)) {
             assert_eq!((state.code(), State::from_code(code)), (code, Some(state)));
             let mut device = Device::new(Config::new());
-            device.links(true, true);
+            device.set_links(Link::Up, Link::Up);
             device.a.flags |= PortFlags::MASTER_PORT;
             (device.a.state, device.b.state) = (state, state);
             assert_eq!([device.forwarding(PortId::A), device.forwarding(PortId::B)], [modes[0], modes[1]], "{state:?}");
             let mut last = Device::new(Config::new());
-            last.links(false, true);
+            last.set_links(Link::Down, Link::Up);
             last.b.state = state;
             assert_eq!(last.forwarding(PortId::B), modes[2], "{state:?}");
         }
@@ -112,25 +121,25 @@ mod tests {
     fn a_device_in_error_lets_frames_pass_and_says_nothing_until_it_is_reset() {
         for last in [false, true] {
             let mut device = Device::new(Config::new());
-            device.links(true, !last);
-            let mut frame = Discovery::request(false).emit();
-            let arrival = Arrival { sof_ns: 0, counter_ns: 0, now_ns: 0 };
-            assert_eq!(device.frame(PortId::A, &mut frame, arrival).result, Ok(()));
+            device.set_links(Link::Up, if last { Link::Down } else { Link::Up });
+            let mut frame = Discovery::request(Place::Inner).emit();
+            let arrival = FrameTimes { sof_ns: 0, counter_ns: 0, now_ns: 0 };
+            assert_eq!(device.hear(PortId::A, &mut frame, arrival).result, Ok(()));
             device.enter_error();
-            let mut frame = Discovery::request(true).emit();
-            let handled = device.frame(PortId::A, &mut frame, arrival);
+            let mut frame = Discovery::request(Place::Last).emit();
+            let handled = device.hear(PortId::A, &mut frame, arrival);
             assert_eq!(handled.path, if last { Path::Reflect } else { Path::Forward });
-            assert_eq!((frame, device.state()), (Discovery::request(true).emit(), State::Error));
+            assert_eq!((frame, device.state()), (Discovery::request(Place::Last).emit(), State::Error));
             assert!(!device.poll(u64::MAX) && device.answer([0; 3]).is_none());
             assert!((0..20).all(|_| !device.cycle_start()));
-            assert!(device.exchange(&[0; 21], 0, 0).is_err());
+            assert!(device.hear_exchange(&[0; 21], 0, 0).is_err());
             // A link that comes and goes does not end it.
-            device.links(false, true);
-            device.links(true, !last);
+            device.set_links(Link::Down, Link::Up);
+            device.set_links(Link::Up, if last { Link::Down } else { Link::Up });
             assert_eq!(device.state(), State::Error);
             device.reset();
             assert_eq!((device.state(), device.counters().retrains), (State::Idle, 1));
-            assert_eq!(device.frame(PortId::A, &mut frame, arrival).result, Ok(()));
+            assert_eq!(device.hear(PortId::A, &mut frame, arrival).result, Ok(()));
             assert_eq!(device.state(), State::Discovery);
         }
     }

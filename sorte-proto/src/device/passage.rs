@@ -134,11 +134,11 @@ impl Passage {
         }
     }
 
-    /// The checks of [`LongFrame::new`](crate::LongFrame::new), then what the frame says. A good frame of another type
+    /// The checks of [`LongFrame::parse`](crate::LongFrame::parse), then what the frame says. A good frame of another type
     /// than the one that is rewritten says nothing.
     pub(super) fn learnt(&self) -> Result<Learnt, Error> {
         let learnt = match &self.kind {
-            Kind::Discovery(rewriter) => rewriter.finish().map(|(_, assignment)| Learnt::Place(assignment)),
+            Kind::Discovery(rewriter) => rewriter.finish().map(|passed| Learnt::Place(passed.assignment)),
             Kind::Sync(rewriter) => rewriter.finish().map(Learnt::Sync),
             Kind::Plain(plain) => plain.transit.check().map(|frame_type| match frame_type {
                 FrameType::Param => Learnt::Parameters(plain.stored),

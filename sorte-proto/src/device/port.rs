@@ -4,53 +4,32 @@ use crate::frame::MULTICAST;
 use crate::frame_type::FrameType;
 use crate::status::Status;
 
-/// State of a device, by the published codes.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-#[non_exhaustive]
-#[repr(u8)]
-pub enum State {
-    /// 0: waits for DISCOVERY.
-    #[default]
-    Idle = 0,
-    /// 1: gets address and offsets.
-    Discovery = 1,
-    /// 2: gets the parameters.
-    Param = 2,
-    /// 3: measures the line to the next device.
-    LineDelay = 3,
-    /// 4: sets its clock.
-    Sync = 4,
-    /// 5: IOEX, the IO exchange.
-    Exchange = 5,
-    /// 6: diagnosis. The published firmware has the code and does nothing there; this crate never enters it.
-    Diag = 6,
-    /// 7: out of the line's work until the host resets the device, see [`Device::enter_error`](super::Device::enter_error).
-    Error = 7,
+servowire_core::codes! {
+    /// State of a device, by the published codes.
+    #[derive(Default)]
+    #[non_exhaustive]
+    pub enum State: u8 {
+        /// Waits for DISCOVERY.
+        #[default]
+        Idle = 0 => "IDLE",
+        /// Gets address and offsets.
+        Discovery = 1 => "DISCOVERY",
+        /// Gets the parameters.
+        Param = 2 => "PARAM",
+        /// Measures the line to the next device.
+        LineDelay = 3 => "LINE_DELAY",
+        /// Sets its clock.
+        Sync = 4 => "SYNC",
+        /// The IO exchange.
+        Exchange = 5 => "IOEX",
+        /// Diagnosis. The published firmware has the code and does nothing there; this crate never enters it.
+        Diag = 6 => "DIAG",
+        /// Out of the line's work until the host resets the device, see [`Device::enter_error`](super::Device::enter_error).
+        Error = 7 => "ERROR",
+    }
 }
 
 impl State {
-    /// The published code.
-    pub const fn code(self) -> u8 {
-        self as u8
-    }
-
-    /// The state with this code.
-    pub const fn from_code(code: u8) -> Option<Self> {
-        Some(match code {
-            0 => Self::Idle,
-            1 => Self::Discovery,
-            2 => Self::Param,
-            3 => Self::LineDelay,
-            4 => Self::Sync,
-            5 => Self::Exchange,
-            6 => Self::Diag,
-            7 => Self::Error,
-            _ => return None,
-        })
-    }
-
     /// Whether this is the head of a frame the state acts on.
     pub(super) fn waits_for(self, [da, _, code, _]: [u8; 4]) -> bool {
         da == MULTICAST && self.frame_type().is_some_and(|t| t.code() == code)
@@ -89,18 +68,18 @@ bitflags::bitflags! {
 
 servowire_core::show_flags!(PortFlags);
 
-/// Measurement that a delay request on the master port starts on the other port.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub enum Trigger {
-    /// None.
-    #[default]
-    None = 0,
-    /// 1: one of the sixteen.
-    Normal = 1,
-    /// 2: the last; its request carries STATE_CHANGE.
-    Last = 2,
+servowire_core::codes! {
+    /// Measurement that a delay request on the master port starts on the other port.
+    #[derive(Default)]
+    pub enum Trigger: u8 {
+        /// None.
+        #[default]
+        None = 0 => "none",
+        /// One of the sixteen.
+        Normal = 1 => "normal",
+        /// The last; its request carries STATE_CHANGE.
+        Last = 2 => "last",
+    }
 }
 
 /// What a handler found out from the head of a frame.

@@ -2,11 +2,13 @@ use proptest::prelude::*;
 use std::vec::Vec;
 
 use super::*;
+use crate::place::Place;
+use crate::status::Status;
 
 fn pass_all(lengths: &[Entry]) -> Discovery {
-    let mut frame = Discovery::request(false);
+    let mut frame = Discovery::request(Place::Inner);
     for (k, entry) in lengths.iter().enumerate() {
-        frame.pass(*entry, k + 1 == lengths.len(), false).unwrap();
+        frame.pass(*entry, Status::of_device(k + 1 == lengths.len(), false)).unwrap();
     }
     frame
 }
@@ -17,29 +19,29 @@ fn a_full_line_ends_exactly_at_the_fcs() {
     let bytes = frame.emit();
     assert_eq!(bytes.len(), 1030);
     assert_eq!(&bytes[1022..1026], &[4, 0, 4, 0]);
-    let network = Network::new(DiscoveryView::new(&bytes).unwrap()).unwrap();
+    let network = Network::new(DiscoveryView::parse(&bytes).unwrap()).unwrap();
     assert_eq!((network.devices(), network.input_total(), network.output_total()), (254, 1016, 1016));
-    assert_eq!(network.assignments().last().unwrap().0.out_offset, 1012);
+    assert_eq!(network.members().last().unwrap().assignment.out_offset, 1012);
 }
 
 #[test]
 fn a_request_without_a_copy_is_the_same() {
-    for last in [false, true] {
+    for place in [Place::Inner, Place::Last] {
         let mut buffer = [0x55; 1031];
-        assert_eq!(Discovery::write_request(last, &mut buffer), Ok(1030));
-        assert_eq!((&buffer[..1030], buffer[1030]), (&Discovery::request(last).emit()[..], 0x55));
+        assert_eq!(Discovery::emit_request_into(place, &mut buffer), Ok(1030));
+        assert_eq!((&buffer[..1030], buffer[1030]), (&Discovery::request(place).emit()[..], 0x55));
     }
     let error = Error::BufferTooSmall { got: 1029, want: 1030 };
-    assert_eq!(Discovery::write_request(true, &mut [0; 1029]), Err(error));
+    assert_eq!(Discovery::emit_request_into(Place::Last, &mut [0; 1029]), Err(error));
 }
 
 #[test]
 fn the_255th_device_is_an_error_that_the_master_sees() {
     let mut frame = pass_all(&[Entry::STOCK; 254]);
     for _ in 0..2 {
-        assert!(matches!(frame.pass(Entry::STOCK, true, false), Err(Error::TooManyDevices { .. })));
+        assert!(matches!(frame.pass(Entry::STOCK, Status::LAST), Err(Error::TooManyDevices { .. })));
         let bytes = frame.emit();
-        let answer = DiscoveryView::new(&bytes).unwrap();
+        let answer = DiscoveryView::parse(&bytes).unwrap();
         assert_eq!(Network::new(answer), Err(Error::TooManyDevices { count: 255 }));
         assert_eq!(frame.output_total, 1016);
     }
@@ -49,16 +51,16 @@ fn the_255th_device_is_an_error_that_the_master_sees() {
 fn totals_that_are_not_the_sums_are_refused() {
     let frame = pass_all(&[Entry { input: 2, output: 6 }, Entry { input: 1, output: 1 }]);
     let good = frame.emit();
-    assert!(DiscoveryView::new(&good).and_then(Network::new).is_ok());
+    assert!(DiscoveryView::parse(&good).and_then(Network::new).is_ok());
     for (at, want) in [(6, 3), (8, 7)] {
         let mut bytes = good;
         bytes[at] += 1;
         refresh_fcs(&mut bytes);
         let error = Error::TableMismatch { got: want + 1, want };
-        assert_eq!(DiscoveryView::new(&bytes).and_then(Network::new), Err(error));
+        assert_eq!(DiscoveryView::parse(&bytes).and_then(Network::new), Err(error));
     }
     let huge = pass_all(&[Entry { input: 0xffff, output: 0 }, Entry { input: 0xffff, output: 0 }]).emit();
-    assert!(matches!(DiscoveryView::new(&huge).and_then(Network::new), Err(Error::TableMismatch { .. })));
+    assert!(matches!(DiscoveryView::parse(&huge).and_then(Network::new), Err(Error::TableMismatch { .. })));
 }
 
 fn entries() -> impl Strategy<Value = Vec<Entry>> {
@@ -69,15 +71,15 @@ proptest! {
     #[test]
     fn offsets_are_running_sums(lengths in entries()) {
         let frame = pass_all(&lengths);
-        let network = Network::new(DiscoveryView::new(&frame.emit()).unwrap()).unwrap();
+        let network = Network::new(DiscoveryView::parse(&frame.emit()).unwrap()).unwrap();
         let mut sums = (0, 0);
-        for ((assignment, entry), want) in network.assignments().zip(&lengths) {
+        for (Member { assignment, lengths: entry }, want) in network.members().zip(&lengths) {
             prop_assert_eq!((assignment.in_offset, assignment.out_offset), sums);
             prop_assert_eq!(entry, *want);
             sums = (sums.0 + entry.input, sums.1 + entry.output);
         }
         prop_assert_eq!((network.input_total(), network.output_total()), sums);
-        prop_assert_eq!(network.assignments().count(), lengths.len());
+        prop_assert_eq!(network.members().count(), lengths.len());
     }
 
     #[test]

@@ -14,29 +14,19 @@ const ORDER: [Register; 7] = [
     Register::Ctrl,
 ];
 
-/// What the caller does next.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub enum Next {
-    /// Send this word, and hand the two bytes received to [`Apply::answer`].
-    Transfer(Word),
-    /// Everything is written and reads back.
-    Done,
-}
-
 /// Writes each register and reads it back before the next one. CTRL, which switches the motor on, is written only if
 /// all others are right.
 ///
 /// ```
-/// use sorte_proto::drv8711::{Apply, Configuration, Next};
+/// use sorte_proto::drv8711::{Apply, Configuration};
 /// let mut chip = [0u16; 8]; // stands for the SPI
 /// let mut apply = Apply::new(Configuration::default());
-/// while let Next::Transfer(word) = apply.next() {
+/// while let Some(word) = apply.transmission() {
 ///     let register = usize::from(word.bits() >> 12 & 7);
 ///     if word.bits() & 0x8000 == 0 {
 ///         chip[register] = word.bits() & 0xfff;
 ///     }
-///     apply.answer(chip[register].to_be_bytes())?;
+///     apply.hear(chip[register].to_be_bytes())?;
 /// }
 /// assert_eq!(chip[0], 0xc10);
 /// # Ok::<(), sorte_proto::Error>(())
@@ -61,20 +51,18 @@ impl Apply {
         ORDER.get(usize::from(self.done)).copied()
     }
 
-    /// What to do next.
-    pub fn next(&self) -> Next {
-        match self.register() {
-            None => Next::Done,
-            Some(register) if self.written => Next::Transfer(register.read()),
-            Some(register) => Next::Transfer(register.write(self.configuration.value(register))),
-        }
+    /// The word to send; the two bytes that come back meanwhile go to [`hear`](Self::hear). `None` when everything is written
+    /// and reads back.
+    pub fn transmission(&self) -> Option<Word> {
+        let register = self.register()?;
+        Some(if self.written { register.read() } else { register.write(self.configuration.value(register)) })
     }
 
     /// The two bytes that came back while the word was sent.
     ///
     /// # Errors
     /// [`Error::ReadBack`]; the same register is then written again.
-    pub fn answer(&mut self, miso: [u8; 2]) -> Result<(), Error> {
+    pub fn hear(&mut self, miso: [u8; 2]) -> Result<(), Error> {
         let Some(register) = self.register() else { return Ok(()) };
         if !self.written {
             self.written = true;
@@ -98,9 +86,9 @@ mod tests {
     fn run(configuration: Configuration, dead: Option<Register>) -> (Result<(), Error>, Vec<u16>) {
         let mut chip = Register::ALL.map(Register::reset_value);
         let (mut apply, mut written) = (Apply::new(configuration), Vec::new());
-        while let Next::Transfer(word) = apply.next() {
-            let register = Register::at((word.bits() >> 12 & 7) as u8).unwrap();
-            let place = &mut chip[usize::from(register.address())];
+        while let Some(word) = apply.transmission() {
+            let register = Register::from_code((word.bits() >> 12 & 7) as u8).unwrap();
+            let place = &mut chip[usize::from(register.code())];
             if word.bits() & 0x8000 == 0 {
                 written.push(word.bits());
                 if dead != Some(register) {
@@ -109,7 +97,7 @@ mod tests {
             }
             // The upper nibble is undefined.
             let answer = 0xa000 | *place & register.read_back_mask();
-            if let Err(error) = apply.answer(answer.to_be_bytes()) {
+            if let Err(error) = apply.hear(answer.to_be_bytes()) {
                 return (Err(error), written);
             }
         }
@@ -143,7 +131,7 @@ mod tests {
             [Register::Torque, Register::Off, Register::Blank, Register::Decay, Register::Stall, Register::Drive]
         {
             let (result, written) = run(other_everywhere(), Some(dead));
-            assert!(matches!(result, Err(Error::ReadBack { register, .. }) if register == dead.address()));
+            assert!(matches!(result, Err(Error::ReadBack { register, .. }) if register == dead.code()));
             assert!(written.iter().all(|word| word >> 12 != 0));
         }
     }
@@ -153,17 +141,17 @@ mod tests {
     fn a_register_that_did_not_take_its_value_is_written_again() {
         let mut apply = Apply::new(other_everywhere());
         for _ in 0..3 {
-            let Next::Transfer(word) = apply.next() else { panic!("done") };
+            let Some(word) = apply.transmission() else { panic!("done") };
             // TORQUE 1, SMPLTH code 4.
             assert_eq!(word.bits(), 0x1401);
-            assert_eq!(apply.answer([0, 0]), Ok(()));
-            let Next::Transfer(word) = apply.next() else { panic!("done") };
+            assert_eq!(apply.hear([0, 0]), Ok(()));
+            let Some(word) = apply.transmission() else { panic!("done") };
             assert_eq!(word.bits(), 0x9000);
-            assert!(apply.answer([0, 0]).is_err());
+            assert!(apply.hear([0, 0]).is_err());
         }
-        assert_eq!(apply.next(), Next::Transfer(Register::Torque.write(0x401)));
-        apply.answer([0, 0]).unwrap();
-        assert_eq!(apply.answer([0xf0, 0x01]), Ok(()), "bit 10 reads 0");
-        assert_eq!(apply.next(), Next::Transfer(Register::Off.write(0x031)));
+        assert_eq!(apply.transmission(), Some(Register::Torque.write(0x401)));
+        apply.hear([0, 0]).unwrap();
+        assert_eq!(apply.hear([0xf0, 0x01]), Ok(()), "bit 10 reads 0");
+        assert_eq!(apply.transmission(), Some(Register::Off.write(0x031)));
     }
 }

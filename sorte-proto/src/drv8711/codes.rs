@@ -30,80 +30,63 @@ impl Code for u8 {
     }
 }
 
-/// An enum over all codes of a two- or three-bit field.
-macro_rules! codes {
-    ($(#[$doc:meta])* $name:ident { $($(#[$variant_doc:meta])* $variant:ident = $code:literal),+ $(,)? }) => {
-        $(#[$doc])*
-        #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-        #[cfg_attr(feature = "defmt", derive(defmt::Format))]
-        #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-        #[cfg_attr(feature = "arbitrary", derive(arbitrary::Arbitrary))]
-        #[repr(u8)]
-        pub enum $name { $($(#[$variant_doc])* $variant = $code),+ }
+macro_rules! field_codes {
+    ($($name:ident)+) => {
+        $(
+            impl Code for $name {
+                fn to(self) -> u16 {
+                    self.code().into()
+                }
 
-        impl $name {
-            /// The code in the register.
-            pub const fn code(self) -> u8 {
-                self as u8
-            }
-
-            /// The value of a code; `None` if the data sheet reserves it.
-            pub const fn from_code(code: u8) -> Option<Self> {
-                match code {
-                    $($code => Some(Self::$variant),)+
-                    _ => None,
+                fn from(register: Register, code: u16) -> Result<Self, Error> {
+                    let [_, code] = code.to_be_bytes();
+                    Self::from_code(code).ok_or(Error::ReservedCode { register: register.code(), code })
                 }
             }
-        }
-
-        impl Code for $name {
-            fn to(self) -> u16 {
-                self.code().into()
-            }
-
-            fn from(register: Register, code: u16) -> Result<Self, Error> {
-                let [_, code] = code.to_be_bytes();
-                Self::from_code(code).ok_or(Error::ReservedCode { register: register.address(), code })
-            }
-        }
+        )+
     };
 }
 
-codes! {
+field_codes! {
+    StepMode IsGain DeadTime SampleThreshold DecayMode StallCount StallDivider OcpThreshold OcpDeglitch DriveTime
+    SinkCurrent SourceCurrent
+}
+
+servowire_core::codes! {
     /// MODE: micro-steps for each full step.
-    StepMode {
+    pub enum StepMode: u8 {
         /// 1
-        Full = 0,
+        Full = 0 => "1",
         /// 2
-        Div2 = 1,
+        Div2 = 1 => "1/2",
         /// 4
-        Div4 = 2,
+        Div4 = 2 => "1/4",
         /// 8
-        Div8 = 3,
+        Div8 = 3 => "1/8",
         /// 16
-        Div16 = 4,
+        Div16 = 4 => "1/16",
         /// 32
-        Div32 = 5,
+        Div32 = 5 => "1/32",
         /// 64
-        Div64 = 6,
+        Div64 = 6 => "1/64",
         /// 128
-        Div128 = 7,
+        Div128 = 7 => "1/128",
         /// 256: 51 200 for a turn of a motor with 200 steps.
-        Div256 = 8,
+        Div256 = 8 => "1/256",
     }
 }
 
-codes! {
+servowire_core::codes! {
     /// ISGAIN: gain of the sense amplifier.
-    IsGain {
+    pub enum IsGain: u8 {
         /// 5
-        X5 = 0,
+        X5 = 0 => "5",
         /// 10
-        X10 = 1,
+        X10 = 1 => "10",
         /// 20
-        X20 = 2,
+        X20 = 2 => "20",
         /// 40
-        X40 = 3,
+        X40 = 3 => "40",
     }
 }
 
@@ -119,155 +102,155 @@ impl IsGain {
     }
 }
 
-codes! {
+servowire_core::codes! {
     /// DTIME: dead time of the bridges.
-    DeadTime {
+    pub enum DeadTime: u8 {
         /// 400 ns
-        Ns400 = 0,
+        Ns400 = 0 => "400 ns",
         /// 450 ns
-        Ns450 = 1,
+        Ns450 = 1 => "450 ns",
         /// 650 ns
-        Ns650 = 2,
+        Ns650 = 2 => "650 ns",
         /// 850 ns
-        Ns850 = 3,
+        Ns850 = 3 => "850 ns",
     }
 }
 
-codes! {
+servowire_core::codes! {
     /// SMPLTH: sample time of the back EMF.
-    SampleThreshold {
+    pub enum SampleThreshold: u8 {
         /// 50 us
-        Us50 = 0,
+        Us50 = 0 => "50 us",
         /// 100 us
-        Us100 = 1,
+        Us100 = 1 => "100 us",
         /// 200 us
-        Us200 = 2,
+        Us200 = 2 => "200 us",
         /// 300 us
-        Us300 = 3,
+        Us300 = 3 => "300 us",
         /// 400 us
-        Us400 = 4,
+        Us400 = 4 => "400 us",
         /// 600 us
-        Us600 = 5,
+        Us600 = 5 => "600 us",
         /// 800 us
-        Us800 = 6,
+        Us800 = 6 => "800 us",
         /// 1000 us
-        Us1000 = 7,
+        Us1000 = 7 => "1000 us",
     }
 }
 
-codes! {
+servowire_core::codes! {
     /// DECMOD: how the current decays.
-    DecayMode {
+    pub enum DecayMode: u8 {
         /// Slow.
-        Slow = 0,
+        Slow = 0 => "slow",
         /// Slow while the current rises, mixed while it falls.
-        SlowMixed = 1,
+        SlowMixed = 1 => "slow/mixed",
         /// Fast.
-        Fast = 2,
+        Fast = 2 => "fast",
         /// Mixed.
-        Mixed = 3,
+        Mixed = 3 => "mixed",
         /// Slow while the current rises, auto mixed while it falls.
-        SlowAutoMixed = 4,
+        SlowAutoMixed = 4 => "slow/auto mixed",
         /// Auto mixed.
-        AutoMixed = 5,
+        AutoMixed = 5 => "auto mixed",
     }
 }
 
-codes! {
+servowire_core::codes! {
     /// SDCNT: steps without back EMF that make a stall.
-    StallCount {
+    pub enum StallCount: u8 {
         /// 1
-        Steps1 = 0,
+        Steps1 = 0 => "1",
         /// 2
-        Steps2 = 1,
+        Steps2 = 1 => "2",
         /// 4
-        Steps4 = 2,
+        Steps4 = 2 => "4",
         /// 8
-        Steps8 = 3,
+        Steps8 = 3 => "8",
     }
 }
 
-codes! {
+servowire_core::codes! {
     /// VDIV: divider of the back EMF.
-    StallDivider {
+    pub enum StallDivider: u8 {
         /// 32
-        Div32 = 0,
+        Div32 = 0 => "32",
         /// 16
-        Div16 = 1,
+        Div16 = 1 => "16",
         /// 8
-        Div8 = 2,
+        Div8 = 2 => "8",
         /// 4
-        Div4 = 3,
+        Div4 = 3 => "4",
     }
 }
 
-codes! {
+servowire_core::codes! {
     /// OCPTH: threshold of the over-current protection.
-    OcpThreshold {
+    pub enum OcpThreshold: u8 {
         /// 250 mV
-        Mv250 = 0,
+        Mv250 = 0 => "250 mV",
         /// 500 mV
-        Mv500 = 1,
+        Mv500 = 1 => "500 mV",
         /// 750 mV
-        Mv750 = 2,
+        Mv750 = 2 => "750 mV",
         /// 1000 mV
-        Mv1000 = 3,
+        Mv1000 = 3 => "1000 mV",
     }
 }
 
-codes! {
+servowire_core::codes! {
     /// OCPDEG: deglitch time of the over-current protection.
-    OcpDeglitch {
+    pub enum OcpDeglitch: u8 {
         /// 1 us
-        Us1 = 0,
+        Us1 = 0 => "1 us",
         /// 2 us
-        Us2 = 1,
+        Us2 = 1 => "2 us",
         /// 4 us
-        Us4 = 2,
+        Us4 = 2 => "4 us",
         /// 8 us
-        Us8 = 3,
+        Us8 = 3 => "8 us",
     }
 }
 
-codes! {
+servowire_core::codes! {
     /// TDRIVEN, TDRIVEP: how long the gate drive is on.
-    DriveTime {
+    pub enum DriveTime: u8 {
         /// 250 ns
-        Ns250 = 0,
+        Ns250 = 0 => "250 ns",
         /// 500 ns
-        Ns500 = 1,
+        Ns500 = 1 => "500 ns",
         /// 1000 ns
-        Ns1000 = 2,
+        Ns1000 = 2 => "1000 ns",
         /// 2000 ns
-        Ns2000 = 3,
+        Ns2000 = 3 => "2000 ns",
     }
 }
 
-codes! {
+servowire_core::codes! {
     /// IDRIVEN: gate current of the low side.
-    SinkCurrent {
+    pub enum SinkCurrent: u8 {
         /// 100 mA
-        Ma100 = 0,
+        Ma100 = 0 => "100 mA",
         /// 200 mA
-        Ma200 = 1,
+        Ma200 = 1 => "200 mA",
         /// 300 mA
-        Ma300 = 2,
+        Ma300 = 2 => "300 mA",
         /// 400 mA
-        Ma400 = 3,
+        Ma400 = 3 => "400 mA",
     }
 }
 
-codes! {
+servowire_core::codes! {
     /// IDRIVEP: gate current of the high side.
-    SourceCurrent {
+    pub enum SourceCurrent: u8 {
         /// 50 mA
-        Ma50 = 0,
+        Ma50 = 0 => "50 mA",
         /// 100 mA
-        Ma100 = 1,
+        Ma100 = 1 => "100 mA",
         /// 150 mA
-        Ma150 = 2,
+        Ma150 = 2 => "150 mA",
         /// 200 mA
-        Ma200 = 3,
+        Ma200 = 3 => "200 mA",
     }
 }
 

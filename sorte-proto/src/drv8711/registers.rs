@@ -217,7 +217,7 @@ mod tests {
             match back {
                 Ok(back) => assert_eq!(back, value & known),
                 Err(Error::ReservedCode { register: address, code }) => {
-                    assert_eq!(address, register.address());
+                    assert_eq!(address, register.code());
                     let (shift, first_reserved) = if register == Register::Ctrl { (3, 9) } else { (8, 6) };
                     assert!(code >= first_reserved);
                     assert_eq!(u16::from(code), value >> shift & if register == Register::Ctrl { 15 } else { 7 });

@@ -5,17 +5,18 @@ use crate::discovery::Discovery;
 use crate::discovery::room;
 use crate::error::Error;
 use crate::param::Param;
+use crate::place::Place;
 use crate::preamble::Preamble;
 use crate::sync::Sync;
 
 /// A start-up frame to send.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum Outgoing {
     /// DISCOVERY; see [`Discovery::request`].
     Discovery {
-        /// The last of this phase.
-        last: bool,
+        /// Whether it is the last of its phase.
+        place: Place,
     },
     /// PARAM
     Param(Param),
@@ -40,7 +41,7 @@ impl Outgoing {
     /// [`Error::BufferTooSmall`]; [`Discovery::LEN`] is always enough.
     pub fn emit_into(&self, into: &mut [u8]) -> Result<usize, Error> {
         match self {
-            Self::Discovery { last } => Discovery::write_request(*last, into),
+            Self::Discovery { place } => Discovery::emit_request_into(*place, into),
             Self::Param(frame) => put(into, &frame.emit()),
             Self::DelayReq(frame) => put(into, &frame.emit()),
             Self::Sync(frame) => put(into, &frame.emit()),
@@ -55,7 +56,7 @@ fn put(into: &mut [u8], frame: &[u8]) -> Result<usize, Error> {
 
 /// What to do now.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[must_use]
 pub enum Action {
     /// Nothing before `until_ns`, unless something comes.
@@ -70,7 +71,7 @@ pub enum Action {
         /// Which.
         frame: Outgoing,
     },
-    /// Send the master frame of a cycle, see [`Master::write_frame`](super::Master::write_frame).
+    /// Send the master frame of a cycle, see [`Master::emit_into`](super::Master::emit_into).
     Exchange {
         /// When it is triggered; not before the time of the poll.
         at_ns: u64,
@@ -88,3 +89,19 @@ pub enum Action {
         error: Error,
     },
 }
+
+servowire_core::one_line!(Outgoing {
+    Self::Discovery { place: Place::Last } => "last DISCOVERY";
+    Self::Discovery { place: Place::Inner } => "DISCOVERY";
+    Self::Param(frame) => "{}", frame;
+    Self::DelayReq(frame) => "{}", frame;
+    Self::Sync(frame) => "{}", frame;
+});
+servowire_core::one_line!(Action {
+    Self::Wait { until_ns: u64::MAX } => "wait for link and enable";
+    Self::Wait { until_ns } => "wait until {} ns", until_ns;
+    Self::Send { at_ns, frame } => "send {} at {} ns", frame, at_ns;
+    Self::Exchange { at_ns, cycle, stop: false, .. } => "cycle {} at {} ns", cycle, at_ns;
+    Self::Exchange { at_ns, cycle, stop: true, .. } => "cycle {} at {} ns, stopping", cycle, at_ns;
+    Self::Restart { error } => "restart: {}", error;
+});

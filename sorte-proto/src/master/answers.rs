@@ -4,6 +4,8 @@ use super::{Master, State};
 use crate::delay_req::DelayReq;
 use crate::discovery::DiscoveryView;
 use crate::error::Error;
+use crate::evidence::{Evidence, Positions};
+use crate::exchange::DeviceFrameView;
 use crate::frame::LongFrame;
 use crate::frame_type::FrameType;
 use crate::param::ParamView;
@@ -11,16 +13,57 @@ use crate::status::Status;
 use crate::sync::{Sync, TRANSIT_NS};
 use crate::timing::Timing;
 
+/// What a good frame was.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
+pub enum Heard<'a> {
+    /// A start-up frame that has come back.
+    StartUp,
+    /// A device's frame of the IO exchange.
+    Device {
+        /// The frame.
+        frame: DeviceFrameView<'a>,
+        /// Its start, in ns.
+        sof_ns: u64,
+    },
+}
+
+servowire_core::one_line!(Heard<'_> {
+    Self::StartUp => "start-up frame";
+    Self::Device { frame, sof_ns } => "{} at {} ns", frame, sof_ns;
+});
+
+impl<'a> Heard<'a> {
+    /// The device's frame, if it is one.
+    pub const fn device(self) -> Option<DeviceFrameView<'a>> {
+        match self {
+            Self::StartUp => None,
+            Self::Device { frame, .. } => Some(frame),
+        }
+    }
+
+    /// What control may use of it; nothing ([`Evidence::NEVER`]) if it is not a device's frame. The caller has to know that the
+    /// line carries positions.
+    pub fn evidence(self, positions: Positions) -> Evidence {
+        match self {
+            Self::StartUp => Evidence::NEVER,
+            Self::Device { frame, sof_ns } => Evidence::of(frame, positions, sof_ns),
+        }
+    }
+}
+
 impl Master {
-    /// A start-up frame has come back; `sof_ns`: its start.
+    /// A frame was heard that began at `sof_ns`: a start-up frame that has come back, or a device's frame of the IO exchange. Its
+    /// payload may be used only if this accepts it.
     ///
     /// # Errors
-    /// What the frame is refused for; [`Error::BeforeRequest`] if it began before the frame that it would answer;
-    /// [`Error::WrongState`] in IDLE, IO exchange and ERROR. A bad DISCOVERY answer takes the master back to IDLE, everything
-    /// else just does not count as an answer.
-    pub fn receive(&mut self, frame: &[u8], sof_ns: u64) -> Result<(), Error> {
+    /// What the frame is refused for: as [`LongFrame::parse`] and as [`DeviceFrameView::parse`]; [`Error::BeforeRequest`] if it
+    /// began before the frame that it would answer; [`Error::WrongState`] in IDLE and ERROR. A bad DISCOVERY answer and
+    /// [`Error::TopologyChanged`] take the master back to IDLE, everything else just does not count.
+    pub fn hear<'a>(&mut self, frame: &'a [u8], sof_ns: u64) -> Result<Heard<'a>, Error> {
         let result = match self.state {
-            State::Idle | State::Exchange | State::Error => return Err(Error::WrongState),
+            State::Idle | State::Error => return Err(Error::WrongState),
+            State::Exchange => return self.device_frame(frame).map(|frame| Heard::Device { frame, sof_ns }),
             State::Discovery => self.discovery_answer(frame, sof_ns),
             State::Param => self.param_answer(frame, sof_ns),
             State::LineDelay => self.delay_answer(frame, sof_ns),
@@ -35,7 +78,29 @@ impl Master {
                 self.fail(error);
             }
         }
-        result
+        result.map(|()| Heard::StartUp)
+    }
+
+    fn device_frame<'a>(&mut self, frame: &'a [u8]) -> Result<DeviceFrameView<'a>, Error> {
+        let view = match DeviceFrameView::parse(self.config.payload_len.into(), frame) {
+            Ok(view) => view,
+            Err(error) => {
+                self.cycle.damaged = true;
+                self.count(error);
+                return Err(error);
+            }
+        };
+        let (address, last) = (view.address().get(), self.network.devices());
+        if address > last || view.status().contains(Status::LAST) != (address == last) {
+            let error = Error::TopologyChanged { address };
+            self.give_up(error);
+            return Err(error);
+        }
+        self.cycle.mark(address);
+        if view.status().contains(Status::ERROR) {
+            self.counters.device_errors = self.counters.device_errors.saturating_add(1);
+        }
+        Ok(view)
     }
 
     /// What began before the request is not its answer.
@@ -47,7 +112,7 @@ impl Master {
     }
 
     fn discovery_answer(&mut self, frame: &[u8], sof_ns: u64) -> Result<(), Error> {
-        let answer = DiscoveryView::new(frame)?;
+        let answer = DiscoveryView::parse(frame)?;
         self.is_fresh(sof_ns)?;
         if answer.status().contains(Status::LAST) {
             self.network.take(answer)?;
@@ -58,7 +123,7 @@ impl Master {
 
     /// A frame is answered once, and the one with STATE_CHANGE by one that has it too.
     fn param_answer(&mut self, frame: &[u8], sof_ns: u64) -> Result<(), Error> {
-        let answer = ParamView::new(frame)?;
+        let answer = ParamView::parse(frame)?;
         self.is_fresh(sof_ns)?;
         let last = self.remaining == 1;
         if self.asking && answer.status().contains(Status::STATE_CHANGE) == last {
@@ -70,7 +135,7 @@ impl Master {
 
     /// The vendor defines DELAY_RESP and sends the request back instead: a response tells nothing.
     fn delay_answer(&mut self, frame: &[u8], sof_ns: u64) -> Result<(), Error> {
-        let frame = LongFrame::new(frame)?;
+        let frame = LongFrame::parse(frame)?;
         if frame.frame_type() == FrameType::DelayResp {
             return Ok(());
         }

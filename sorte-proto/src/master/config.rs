@@ -3,43 +3,27 @@
 use crate::line_delay::DelayModel;
 use crate::param::Parameters;
 
-/// State of the master, by the codes that the published one shows to its host.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-#[non_exhaustive]
-#[repr(u8)]
-pub enum State {
-    /// Waits for link and enable, or until the pause after a failure is over.
-    #[default]
-    Idle = 0,
-    /// 1: counts the devices.
-    Discovery = 1,
-    /// 2: tells them the parameters.
-    Param = 2,
-    /// 3: measures the line to the first device.
-    LineDelay = 3,
-    /// 4: sets the devices' clocks.
-    Sync = 4,
-    /// 5: exchanges data.
-    Exchange = 5,
-    /// 6: has failed too often and waits for the host to take the enable bit away and give it again.
-    Error = 6,
-}
-
-impl State {
-    /// The state with this code: the low three bits of the status register that the host reads; 7 has no meaning.
-    pub const fn from_code(code: u8) -> Option<Self> {
-        Some(match code {
-            0 => Self::Idle,
-            1 => Self::Discovery,
-            2 => Self::Param,
-            3 => Self::LineDelay,
-            4 => Self::Sync,
-            5 => Self::Exchange,
-            6 => Self::Error,
-            _ => return None,
-        })
+servowire_core::codes! {
+    /// State of the master, by the codes that the published one shows to its host: the low three bits of its status register,
+    /// where 7 has no meaning.
+    #[derive(Default)]
+    #[non_exhaustive]
+    pub enum State: u8 {
+        /// Waits for link and enable, or until the pause after a failure is over.
+        #[default]
+        Idle = 0 => "IDLE",
+        /// Counts the devices.
+        Discovery = 1 => "DISCOVERY",
+        /// Tells them the parameters.
+        Param = 2 => "PARAM",
+        /// Measures the line to the first device.
+        LineDelay = 3 => "LINE_DELAY",
+        /// Sets the devices' clocks.
+        Sync = 4 => "SYNC",
+        /// Exchanges data.
+        Exchange = 5 => "IOEX",
+        /// Has failed too often and waits for the host to take the enable bit away and give it again.
+        Error = 6 => "ERROR",
     }
 }
 
@@ -172,4 +156,15 @@ pub struct Counters {
     pub retrains: u64,
     /// Cycles of the IO exchange that were left out because [`Master::poll`](super::Master::poll) was called after their time.
     pub skipped_cycles: u64,
+}
+
+impl core::fmt::Display for Counters {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        let Self { cycles, crc_errors, timing_errors, format_errors, device_errors, retrains, skipped_cycles } = self;
+        write!(
+            f,
+            "{cycles} cycles, {skipped_cycles} left out, {timing_errors} with a frame missing; {crc_errors} bad checksums, "
+        )?;
+        write!(f, "{format_errors} other refusals, {device_errors} device errors, {retrains} restarts")
+    }
 }

@@ -4,7 +4,7 @@ use std::vec::Vec;
 use proptest::prelude::*;
 
 use super::*;
-use crate::iep::{Channel, Edge, Happening};
+use crate::iep::{Activity, Channel, Edge};
 
 /// Rise and fall of every pulse for the words given, and three cycles more.
 fn pulses(mut axis: Channel, words: &[u16]) -> Vec<(u64, u64)> {
@@ -248,7 +248,7 @@ fn the_handler_never_runs_without_an_event() {
     let mut axis = Channel::new(Variant::Lossless, CMP7_NS, 100);
     let mut served = 0;
     while let Some(happening) = axis.next(40_000) {
-        if let Happening::Served(run) = happening {
+        if let Activity::Served(run) = happening {
             assert!(run.events.cmp0 || run.events.cmp6 || run.events.cmp7);
             served += 1;
         }
@@ -303,7 +303,7 @@ fn assert_walk(mut axis: Channel, words: &[u16]) {
     use crate::pins::DIR_SETUP_HOLD_NS;
     use crate::pto::{Direction, Pto};
     let (mut rises, mut falls, mut changes, mut dir) = (Vec::new(), 0, Vec::new(), Direction::Low);
-    let direction = |n: usize| Direction::from(n % 2 == 0);
+    let direction = |n: usize| if n % 2 == 0 { Direction::High } else { Direction::Low };
     for (n, &start) in words.iter().chain(&[0; 3]).enumerate() {
         axis.set_word(match StartTime::new(start) {
             Some(start) => Pto::Pulse { start, direction: direction(n) },
@@ -311,12 +311,12 @@ fn assert_walk(mut axis: Channel, words: &[u16]) {
         });
         while let Some(happening) = axis.next(4000 * (n as u64 + 1)) {
             match happening {
-                Happening::Edge(Edge { ns, high: true }) => rises.push((ns, dir)),
-                Happening::Edge(Edge { ns, .. }) => {
+                Activity::Edge(Edge { ns, high: true }) => rises.push((ns, dir)),
+                Activity::Edge(Edge { ns, .. }) => {
                     falls += 1;
                     assert_eq!(ns - rises[falls - 1].0, u64::from(PULSE_NS), "{words:?}");
                 }
-                Happening::Served(served) => {
+                Activity::Served(served) => {
                     if let Some(levels) = served.levels {
                         changes.push(served.ns);
                         dir = levels.direction;

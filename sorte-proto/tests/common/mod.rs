@@ -1,19 +1,19 @@
 //! A device on its way through the start-up, for several test programs.
 #![allow(clippy::std_instead_of_core, clippy::unwrap_used, unreachable_pub)]
 
-use sorte_proto::device::{Arrival, Config, Device, PortId, State, Trigger};
-use sorte_proto::{DelayReq, Discovery, Param, Parameters};
+use sorte_proto::device::{Config, Device, FrameTimes, PortId, State, Trigger};
+use sorte_proto::{DelayReq, Discovery, Link, Param, Parameters, Place};
 
 /// A device in the state that waits for a frame, the last of the line or not. Its frames begin at 77,000 ns of its counter.
 pub fn device_in(state: State, last: bool, parameters: Parameters) -> Device {
-    let arrival = Arrival { sof_ns: 77_000, counter_ns: 77_700, now_ns: 0 };
+    let arrival = FrameTimes { sof_ns: 77_000, counter_ns: 77_700, now_ns: 0 };
     let mut device = Device::new(Config::new());
-    device.links(true, !last);
+    device.set_links(Link::Up, if last { Link::Down } else { Link::Up });
     let script = [
-        Discovery::request(false).emit().to_vec(),
-        Discovery::request(true).emit().to_vec(),
-        Param::request(parameters, true).emit().to_vec(),
-        DelayReq::of_master(true).emit().to_vec(),
+        Discovery::request(Place::Inner).emit().to_vec(),
+        Discovery::request(Place::Last).emit().to_vec(),
+        Param::request(parameters, Place::Last).emit().to_vec(),
+        DelayReq::of_master(Place::Last).emit().to_vec(),
     ];
     for mut frame in script {
         if device.state() == state {
@@ -21,10 +21,10 @@ pub fn device_in(state: State, last: bool, parameters: Parameters) -> Device {
         }
         if device.state() == State::LineDelay && !last {
             for _ in 0..16 {
-                device.delay_reflection(Trigger::Normal, &DelayReq::of_device(false).emit(), 560).unwrap();
+                device.hear_reflection(Trigger::Normal, &DelayReq::of_device(Place::Inner).emit(), 560).unwrap();
             }
         }
-        assert_eq!(device.frame(PortId::A, &mut frame, arrival).result, Ok(()));
+        assert_eq!(device.hear(PortId::A, &mut frame, arrival).result, Ok(()));
     }
     assert_eq!(device.state(), state);
     device

@@ -5,15 +5,26 @@ use crate::error::Error;
 /// A place in a plane, in any unit: 0.1 µm reaches 107 m.
 type Point = [i32; 2];
 
+/// Which way an arc turns, seen with the second axis to the left of the first.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub enum Turning {
+    /// G2 of a part program.
+    Clockwise,
+    /// G3 of a part program.
+    Counterclockwise,
+}
+
 /// The chords of an arc, in integers: the ends of straight lines, the last one where the arc ends.
 ///
 /// The arc is halved until no chord is further from it than asked for; the ends of the chords are on the circle to 2 units,
 /// so a chord is off by `error` + 2 units at most.
 ///
 /// ```
-/// use step_profile::motion::Arc;
+/// use step_profile::motion::{Arc, Turning};
 /// // A quarter of a circle of 10 mm, counter-clockwise, in µm, exact to 5 µm.
-/// let chords: Vec<_> = Arc::new([10_000, 0], [0, 10_000], [0, 0], false, 5)?.collect();
+/// let chords: Vec<_> = Arc::new([10_000, 0], [0, 10_000], [0, 0], Turning::Counterclockwise, 5)?.collect();
 /// assert_eq!((chords.len(), chords[31]), (32, [0, 10_000]));
 /// # Ok::<_, step_profile::Error>(())
 /// ```
@@ -44,7 +55,8 @@ impl Arc {
     /// # Errors
     /// [`Error::ArcRadius`] without a radius, with one above [`MAX_RADIUS`](Self::MAX_RADIUS), and if that of the two ends
     /// differs by more than `error` and a thousandth.
-    pub fn new(from: Point, to: Point, center: Point, clockwise: bool, error: u32) -> Result<Self, Error> {
+    pub fn new(from: Point, to: Point, center: Point, turning: Turning, error: u32) -> Result<Self, Error> {
+        let clockwise = turning == Turning::Clockwise;
         let (at, end) = (away(from, center), away(to, center));
         let (radius, other) = (length(at), length(end));
         let tolerance = i64::from(error.max(1)).saturating_add(radius / 1000);
@@ -148,6 +160,10 @@ fn length(a: [i64; 2]) -> i64 {
 #[expect(clippy::cast_precision_loss, clippy::cast_sign_loss, reason = "compared within a unit")]
 mod tests {
     use super::*;
+
+    fn turning(clockwise: bool) -> Turning {
+        if clockwise { Turning::Clockwise } else { Turning::Counterclockwise }
+    }
     use proptest::prelude::*;
     use std::vec::Vec;
 
@@ -172,7 +188,7 @@ mod tests {
             });
             let (from, to) = (on(a), on(if clockwise { a - sweep } else { a + sweep }));
             prop_assume!(from != to && radius > 50);
-            let chords: Vec<_> = Arc::new(from, to, center, clockwise, error).unwrap().collect();
+            let chords: Vec<_> = Arc::new(from, to, center, turning(clockwise), error).unwrap().collect();
             prop_assert_eq!(*chords.last().unwrap(), to);
             let rel = |p: [i32; 2]| [f64::from(p[0] - center[0]), f64::from(p[1] - center[1])];
             let (mut last, mut turned) = (rel(from), 0.0);
@@ -195,35 +211,40 @@ mod tests {
 
     #[test]
     fn a_whole_circle_and_what_is_none() {
-        let circle: Vec<_> = Arc::new([7000, 2000], [7000, 2000], [2000, 2000], true, 1500).unwrap().collect();
+        let circle: Vec<_> =
+            Arc::new([7000, 2000], [7000, 2000], [2000, 2000], Turning::Clockwise, 1500).unwrap().collect();
         assert_eq!(circle, [[2000, -3000], [-3000, 2000], [2000, 7000], [7000, 2000]]);
         for (from, to) in [([5, 5], [9, 9]), ([15, 5], [5, 25]), ([i32::MAX, 5], [i32::MAX, 5])] {
-            assert!(matches!(Arc::new(from, to, [5, 5], false, 1), Err(Error::ArcRadius { .. })), "{from:?}");
+            assert!(
+                matches!(Arc::new(from, to, [5, 5], Turning::Counterclockwise, 1), Err(Error::ArcRadius { .. })),
+                "{from:?}"
+            );
         }
-        let half: Vec<_> = Arc::new([100, 0], [-100, 0], [0, 0], false, 50).unwrap().collect();
+        let half: Vec<_> = Arc::new([100, 0], [-100, 0], [0, 0], Turning::Counterclockwise, 50).unwrap().collect();
         assert_eq!(half, [[0, 100], [-100, 0]]);
     }
 
     #[test]
     fn what_is_just_allowed() {
         let most = i32::try_from(Arc::MAX_RADIUS).unwrap();
-        assert_eq!(Arc::new([most, 0], [0, most], [0, 0], false, 1 << 29).unwrap().count(), 1);
-        assert!(Arc::new([most + 1, 0], [0, most + 1], [0, 0], false, 1 << 29).is_err());
+        assert_eq!(Arc::new([most, 0], [0, most], [0, 0], Turning::Counterclockwise, 1 << 29).unwrap().count(), 1);
+        assert!(Arc::new([most + 1, 0], [0, most + 1], [0, 0], Turning::Counterclockwise, 1 << 29).is_err());
         // 5 units and a thousandth of 1000.
-        assert!(Arc::new([1000, 0], [0, 1006], [0, 0], false, 5).is_ok());
-        assert!(Arc::new([1000, 0], [0, 1007], [0, 0], false, 5).is_err());
+        assert!(Arc::new([1000, 0], [0, 1006], [0, 0], Turning::Counterclockwise, 5).is_ok());
+        assert!(Arc::new([1000, 0], [0, 1007], [0, 0], Turning::Counterclockwise, 5).is_err());
         // With 3, 4, 5 the chord is 5 - 4 from the arc: just as much as is allowed, and more.
-        let chords = |error| Arc::new([300, 400], [-300, 400], [0, 0], false, error).unwrap().count();
+        let chords =
+            |error| Arc::new([300, 400], [-300, 400], [0, 0], Turning::Counterclockwise, error).unwrap().count();
         assert_eq!((chords(100), chords(99)), (1, 2));
     }
 
     /// 5000 cos 45° = 3535.53; and the roots of 2, 5 and 8 are 1.41, 2.24 and 2.83.
     #[test]
     fn all_is_to_the_nearest() {
-        let half: Vec<_> = Arc::new([5000, 0], [0, 5000], [0, 0], false, 500).unwrap().collect();
+        let half: Vec<_> = Arc::new([5000, 0], [0, 5000], [0, 0], Turning::Counterclockwise, 500).unwrap().collect();
         assert_eq!(half, [[3536, 3536], [0, 5000]]);
         for (from, radius) in [([1, 1], 1), ([1, 2], 2), ([2, 2], 3)] {
-            let refused = Arc::new(from, [100, 0], [0, 0], false, 1);
+            let refused = Arc::new(from, [100, 0], [0, 0], Turning::Counterclockwise, 1);
             assert!(matches!(refused, Err(Error::ArcRadius { from, to: 100 }) if from == radius), "{refused:?}");
         }
     }

@@ -163,6 +163,6 @@ mod tests {
         }
         let plan = Plan::new(Clock::NANOSECONDS, limits, 5000).unwrap();
         assert_eq!(times, plan.pulses().collect::<Vec<_>>());
-        assert_eq!((axis.now(), axis.mover().position()), (80_000_000, -5000));
+        assert_eq!((axis.now(), axis.mover().commanded()), (80_000_000, -5000));
     }
 }

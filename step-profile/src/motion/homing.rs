@@ -31,10 +31,20 @@ impl HomingConfig {
         Self { direction, seek, approach, back_off: range / 10, range, stop }
     }
 
-    /// With another way back, in steps.
-    pub const fn with_back_off(self, steps: u32) -> Self {
-        Self { back_off: steps, ..self }
+    servowire_core::builder! {
+        with_back_off: back_off, u32;
     }
+}
+
+/// The reference switch.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub enum Switch {
+    /// The axis is not at it.
+    Open,
+    /// The axis is at it, or beyond it.
+    Closed,
 }
 
 /// How far a homing is.
@@ -78,12 +88,12 @@ impl Homing {
     ///
     /// # Errors
     /// [`Error::Moving`] if the axis is not at rest.
-    pub fn start(config: HomingConfig, mover: &mut Mover, closed: bool, now: u64) -> Result<Self, Error> {
+    pub fn start(config: HomingConfig, mover: &mut Mover, switch: Switch, now: u64) -> Result<Self, Error> {
         if !mover.is_at_rest(now) {
             return Err(Error::Moving);
         }
-        let mut new = Self { config, state: HomingState::Seeking, mark: mover.position() };
-        if closed {
+        let mut new = Self { config, state: HomingState::Seeking, mark: mover.commanded() };
+        if switch == Switch::Closed {
             new.back_off(mover, now)?;
         } else {
             mover.run(config.direction, config.seek, now)?;
@@ -100,8 +110,9 @@ impl Homing {
     ///
     /// # Errors
     /// Those of the requests to the axis; the homing stays where it is then.
-    pub fn poll(&mut self, mover: &mut Mover, closed: bool, now: u64) -> Result<HomingState, Error> {
-        let position = mover.position();
+    pub fn poll(&mut self, mover: &mut Mover, switch: Switch, now: u64) -> Result<HomingState, Error> {
+        let closed = switch == Switch::Closed;
+        let position = mover.commanded();
         let rest = mover.is_at_rest(now);
         match self.state {
             HomingState::Seeking | HomingState::Approaching if closed => {
@@ -126,7 +137,7 @@ impl Homing {
                 }
             }
             HomingState::Settling if rest => {
-                mover.set_position(position.saturating_sub(self.mark), now)?;
+                mover.set_commanded(position.saturating_sub(self.mark), now)?;
                 self.state = HomingState::Done;
             }
             _ => {}
@@ -136,7 +147,7 @@ impl Homing {
 
     fn back_off(&mut self, mover: &mut Mover, now: u64) -> Result<(), Error> {
         let by = i64::from(self.config.back_off);
-        let position = mover.position();
+        let position = mover.commanded();
         let target = match self.config.direction {
             Direction::Forward => position.saturating_sub(by),
             Direction::Reverse => position.saturating_add(by),
@@ -150,6 +161,10 @@ impl Homing {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    fn switch(closed: bool) -> Switch {
+        if closed { Switch::Closed } else { Switch::Open }
+    }
     use crate::motion::Clock;
 
     const DIRECTIONS: [Direction; 2] = [Direction::Forward, Direction::Reverse];
@@ -167,14 +182,14 @@ mod tests {
         let (config, mut mover) = parts(direction);
         let sign = if direction.dir() { -1 } else { 1 };
         let (mut real, mut far) = (0, 0);
-        let mut homing = Homing::start(config, &mut mover, at <= 0, 0).unwrap();
+        let mut homing = Homing::start(config, &mut mover, switch(at <= 0), 0).unwrap();
         for now in (0..20_000_000).step_by(20) {
             while mover.due().is_some_and(|due| due <= now) {
                 let pulse = mover.pulse().unwrap();
                 real += if pulse.direction.dir() { -1 } else { 1 };
                 far = far.max(real * sign);
             }
-            homing.poll(&mut mover, real * sign >= at, now).unwrap();
+            homing.poll(&mut mover, switch(real * sign >= at), now).unwrap();
         }
         (homing.state(), real, far, mover)
     }
@@ -187,7 +202,7 @@ mod tests {
                 let (state, real, far, mover) = home(direction, at);
                 assert_eq!(state, HomingState::Done, "{direction} {at}");
                 let sign = if direction.dir() { -1 } else { 1 };
-                assert_eq!(real - mover.position(), at * sign, "{direction} {at}");
+                assert_eq!(real - mover.commanded(), at * sign, "{direction} {at}");
                 // v² / 2a of the stop: 40 steps, and what a poll takes.
                 assert!(far - at.max(0) <= 45, "{direction} {at}: {far}");
             }
@@ -199,13 +214,13 @@ mod tests {
     fn no_switch_and_a_switch_that_stays_closed() {
         for direction in DIRECTIONS {
             let (state, real, _, mover) = home(direction, 6000);
-            assert_eq!((state, mover.position()), (HomingState::Failed, real));
+            assert_eq!((state, mover.commanded()), (HomingState::Failed, real));
             assert!(real.abs() < 6000);
             let (state, ..) = home(direction, -5000);
             assert_eq!(state, HomingState::Failed);
         }
         let (config, mut mover) = parts(Direction::Forward);
         mover.move_to(50, 0).unwrap();
-        assert_eq!(Homing::start(config, &mut mover, false, 0).unwrap_err(), Error::Moving);
+        assert_eq!(Homing::start(config, &mut mover, Switch::Open, 0).unwrap_err(), Error::Moving);
     }
 }

@@ -113,7 +113,7 @@ impl<const N: usize> LinePulses<N> {
             frame.to = start.whole.then_some(i64::from(end.saturating_sub(made)) << P);
         }
         let end = axes.first().map_or(moment, |(frame, _)| frame.end(curve));
-        let directions = line.steps.map(|steps| Direction::from_dir(steps < 0));
+        let directions = line.steps.map(|steps| Direction::of(steps.into()));
         let mut new = Self { clock, curve: *curve, axes, due: [None; N], directions, start, end };
         for ((frame, stepper), due) in new.axes.iter_mut().zip(&mut new.due) {
             *due = stepper.next(&new.curve, frame);

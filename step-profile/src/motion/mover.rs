@@ -2,7 +2,7 @@
 
 use super::limits::{Bounds, Clock, Limits};
 use super::phases::{Frame, P, Phases};
-use super::plan::{State, checked};
+use super::plan::{Setpoint, checked};
 use super::planner::{Goal, Motion, plan};
 use super::real::Real;
 use super::stepper::Stepper;
@@ -46,11 +46,11 @@ enum Aim {
 /// let mut x = Mover::new(Clock::MICROSECONDS, Limits::new(20_000, 100_000)?)?;
 /// x.move_to(3000, 0)?;
 /// while let Some(pulse) = x.pulse() {
-///     if x.position() == 1000 {
+///     if x.commanded() == 1000 {
 ///         x.move_to(-50, pulse.tick)?; // it stops, and comes back
 ///     }
 /// }
-/// assert_eq!(x.position(), -50);
+/// assert_eq!(x.commanded(), -50);
 /// # Ok::<_, Box<dyn std::error::Error>>(())
 /// ```
 #[derive(Debug, Clone)]
@@ -64,7 +64,7 @@ pub struct Mover {
     direction: Direction,
     /// Position of the motor where the position of the plan is 0.
     origin: i64,
-    position: i64,
+    commanded: i64,
     /// Tick of the next step.
     due: Option<u64>,
     /// Tick from which on it may come.
@@ -94,7 +94,7 @@ impl Mover {
             stepper: Stepper::new(),
             direction: Direction::Forward,
             origin: 0,
-            position: 0,
+            commanded: 0,
             due: None,
             free: 0,
             aim: Aim::Rest,
@@ -128,7 +128,7 @@ impl Mover {
     pub fn pulse(&mut self) -> Option<Pulse> {
         let tick = self.due?;
         let pulse = Pulse { tick, direction: self.direction };
-        self.position = self.direction.advance(self.position);
+        self.commanded = self.direction.advance(self.commanded);
         self.free = tick.saturating_add(1);
         let Phases { curve, frame } = &self.phases;
         self.due = self.stepper.next(curve, frame).map(|due| due.max(self.free));
@@ -140,9 +140,9 @@ impl Mover {
         Some(pulse)
     }
 
-    /// Steps made forward less steps made in reverse.
-    pub const fn position(&self) -> i64 {
-        self.position
+    /// Steps commanded so far, forward less reverse ones. What the motor has made of them is not known here.
+    pub const fn commanded(&self) -> i64 {
+        self.commanded
     }
 
     /// DIR of the next step, or of the last one at rest.
@@ -151,8 +151,8 @@ impl Mover {
     }
 
     /// Position, speed, acceleration and jerk at a tick that is not before the last step.
-    pub fn at(&self, now: u64) -> State {
-        let state = State::new(self.clock, self.phases.at(self.clock.moment(now)));
+    pub fn at(&self, now: u64) -> Setpoint {
+        let state = Setpoint::new(self.clock, self.phases.at(self.clock.moment(now)));
         state.on_axis(self.origin, self.direction)
     }
 
@@ -178,7 +178,7 @@ impl Mover {
                 return Err(Error::SoftLimit { target: clamp(target) });
             }
         }
-        let away = target.abs_diff(self.position);
+        let away = target.abs_diff(self.commanded);
         if away > u64::from(u32::MAX / 2) {
             return Err(Error::TooManySteps { steps: u32::try_from(away).unwrap_or(u32::MAX), limit: u32::MAX / 2 });
         }
@@ -246,15 +246,15 @@ impl Mover {
         self.rest(moment);
     }
 
-    /// Declares the present position at rest, a reference for instance.
+    /// Declares at rest that so many steps lead to where the axis is, 0 at a reference for instance.
     ///
     /// # Errors
     /// [`Error::Moving`] before it is at rest.
-    pub fn set_position(&mut self, position: i64, now: u64) -> Result<(), Error> {
+    pub fn set_commanded(&mut self, steps: i64, now: u64) -> Result<(), Error> {
         if !self.is_at_rest(now) {
             return Err(Error::Moving);
         }
-        self.position = position;
+        self.commanded = steps;
         self.aim = Aim::Rest;
         self.rest(self.phases.end());
         Ok(())
@@ -293,7 +293,7 @@ impl Mover {
 
     /// At rest, the position of the plan is 0 where the motor is.
     fn rest(&mut self, moment: u64) {
-        self.origin = self.position;
+        self.origin = self.commanded;
         self.phases = Phases::rest(self.clock.shift(), moment, 0);
         self.stepper = Stepper::new();
     }
@@ -312,8 +312,8 @@ impl Mover {
             && self.percent > 0
             && match self.aim {
                 Aim::Rest => false,
-                Aim::At(target) => target != self.position,
-                Aim::Run(direction, _) => self.soft.is_none_or(|soft| edge(soft, direction) != self.position),
+                Aim::At(target) => target != self.commanded,
+                Aim::Run(direction, _) => self.soft.is_none_or(|soft| edge(soft, direction) != self.commanded),
             }
     }
 
@@ -338,7 +338,7 @@ impl Mover {
     fn adopt(&mut self, next: Option<Phases>) {
         self.due = None;
         if let Some(phases) = next {
-            self.origin = self.position;
+            self.origin = self.commanded;
             self.stepper = Stepper::new();
             let begin = phases.frame.begin.div_ceil(self.clock.moment(1));
             self.due = self.stepper.next(&phases.curve, &phases.frame).map(|due| due.max(self.free).max(begin));
@@ -349,14 +349,14 @@ impl Mover {
     /// The plan of an axis in motion. Its positions count from the steps made.
     fn onward(&self, moment: u64, bounds: &Bounds) -> Option<Phases> {
         let state = self.phases.at(moment);
-        let made = self.position.abs_diff(self.origin);
+        let made = self.commanded.abs_diff(self.origin);
         let p = state.p.wrapping_sub(i64::try_from(made).unwrap_or(0) << 32);
         let start = Motion { v: state.v, a: state.a.0, up: state.a.1 };
         let bounds = &bounds.holding(state.v, state.a);
         let mut frame = Frame { to: None, ..Frame::rest(self.clock.shift(), moment, p) };
         let curve = self.goal(self.direction, bounds).and_then(|(goal, bounds)| match goal {
             Want::At(target) => {
-                let left = ahead(self.position, target, self.direction)?;
+                let left = ahead(self.commanded, target, self.direction)?;
                 let to = i64::from(left) << 32;
                 frame.to = Some(to);
                 let distance = Real::fixed(u64::try_from(to.checked_sub(p)?).ok()?, P);
@@ -384,7 +384,7 @@ impl Mover {
             return None;
         }
         let direction = match self.aim {
-            Aim::At(target) if target < self.position => Direction::Reverse,
+            Aim::At(target) if target < self.commanded => Direction::Reverse,
             Aim::Run(direction, _) => direction,
             _ => Direction::Forward,
         };
@@ -396,7 +396,7 @@ impl Mover {
         let start = Motion::steady(Real::ZERO);
         let curve = self.goal(direction, bounds).and_then(|(goal, bounds)| match goal {
             Want::At(target) => {
-                let left = ahead(self.position, target, direction)?;
+                let left = ahead(self.commanded, target, direction)?;
                 frame.to = Some(i64::from(left) << 32);
                 plan(start, Goal::At(Real::new(left.into()), Real::ZERO), &bounds).ok()
             }

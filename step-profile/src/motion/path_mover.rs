@@ -3,7 +3,7 @@
 use super::limits::Clock;
 use super::line::{AxisPulse, LinePulses, Start};
 use super::path::{Course, Path};
-use super::plan::State;
+use super::plan::Setpoint;
 use super::planner::Motion;
 use super::real::Real;
 use crate::error::Error;
@@ -27,15 +27,15 @@ use crate::error::Error;
 /// let mut machine = PathMover::new(path);
 /// machine.push([8000, 4000], 100_000, 0)?; // to 100 mm, 50 mm at 100 mm/s
 /// while let Some(pulse) = machine.pulse() {
-///     if machine.position()[0] == 2000 {
+///     if machine.commanded()[0] == 2000 {
 ///         machine.hold(pulse.tick); // slows down along the line
 ///     }
 /// }
 /// let now = 1_000_000;
-/// assert!(machine.is_at_rest(now) && machine.position()[0] < 4000);
+/// assert!(machine.is_at_rest(now) && machine.commanded()[0] < 4000);
 /// machine.resume(now);
 /// while machine.pulse().is_some() {}
-/// assert_eq!(machine.position(), [8000, 4000]);
+/// assert_eq!(machine.commanded(), [8000, 4000]);
 /// # Ok::<_, Box<dyn std::error::Error>>(())
 /// ```
 #[derive(Debug, Clone)]
@@ -49,7 +49,7 @@ pub struct PathMover<const N: usize, const M: usize> {
     exit: Real,
     /// Steps of it that have been made.
     made: [u32; N],
-    position: [i64; N],
+    commanded: [i64; N],
     /// Positions where the positions of its plan are 0.
     origin: [i64; N],
     /// Ticks from which on the next steps may come.
@@ -70,7 +70,7 @@ impl<const N: usize, const M: usize> PathMover<N, M> {
             line: None,
             exit: Real::ZERO,
             made: [0; N],
-            position,
+            commanded: position,
             origin: position,
             free: [0; N],
             percent: 100,
@@ -98,7 +98,7 @@ impl<const N: usize, const M: usize> PathMover<N, M> {
             *due = due.map(|due| due.max(free));
         }
         if let (Some(made), Some(own), Some(position)) =
-            (self.made.get_mut(at), self.free.get_mut(at), self.position.get_mut(at))
+            (self.made.get_mut(at), self.free.get_mut(at), self.commanded.get_mut(at))
         {
             (*made, *own) = (made.saturating_add(1), free);
             *position = pulse.direction.advance(*position);
@@ -107,9 +107,9 @@ impl<const N: usize, const M: usize> PathMover<N, M> {
         Some(pulse)
     }
 
-    /// Steps made forward less steps made in reverse, of each axis.
-    pub const fn position(&self) -> [i64; N] {
-        self.position
+    /// Steps commanded so far of each axis, forward less reverse ones. What the motors have made of them is not known here.
+    pub const fn commanded(&self) -> [i64; N] {
+        self.commanded
     }
 
     /// Where the last line ends, in steps; after a [`stop`](Self::stop) where that will end.
@@ -134,13 +134,13 @@ impl<const N: usize, const M: usize> PathMover<N, M> {
 
     /// Position, speed, acceleration and jerk of each axis at a tick that is not before the last step. Between the last step
     /// of a line and its end, half a step later, they are those of the end.
-    pub fn at(&self, now: u64) -> [State; N] {
+    pub fn at(&self, now: u64) -> [Setpoint; N] {
         let moment = self.clock().moment(now);
-        let mut states = self.position.map(|position| State::at_rest(position.saturating_mul(1 << 32)));
+        let mut states = self.commanded.map(|position| Setpoint::at_rest(position.saturating_mul(1 << 32)));
         if let Some(line) = &self.line {
             let own = line.axes.iter().zip(line.directions).zip(self.origin);
             for (state, (((frame, _), direction), origin)) in states.iter_mut().zip(own) {
-                let there = State::new(self.clock(), frame.at(&line.curve, moment));
+                let there = Setpoint::new(self.clock(), frame.at(&line.curve, moment));
                 *state = there.on_axis(origin, direction);
             }
         }
@@ -208,7 +208,7 @@ impl<const N: usize, const M: usize> PathMover<N, M> {
     /// from there. Both leave the path as it was.
     pub fn move_to(&mut self, target: [i64; N], feed: u32, now: u64) -> Result<(), Error> {
         let end = self.end_of_stop(now);
-        let from = end.map_or(self.position, |(end, _)| self.path.place(end, self.begun()));
+        let from = end.map_or(self.commanded, |(end, _)| self.path.place(end, self.begun()));
         Path::<N, M>::steps(from, target)?;
         if end.is_some_and(|((at, _), _)| at.saturating_add(1) >= M) || M == 0 {
             return Err(Error::QueueFull);
@@ -238,7 +238,7 @@ impl<const N: usize, const M: usize> PathMover<N, M> {
 
     /// Where the first line begins, in steps.
     fn begun(&self) -> [i64; N] {
-        let mut from = self.position;
+        let mut from = self.commanded;
         if let Some(line) = &self.line {
             for ((from, made), direction) in from.iter_mut().zip(self.made).zip(line.directions) {
                 let made = i64::from(made);
@@ -251,7 +251,7 @@ impl<const N: usize, const M: usize> PathMover<N, M> {
     /// At rest with an empty queue, from a tick on.
     fn leave(&mut self, now: u64) {
         let moment = self.clock().moment(now).max(self.path.start().moment);
-        self.path.clear(self.position, moment);
+        self.path.clear(self.commanded, moment);
         (self.line, self.made, self.exit) = (None, [0; N], Real::ZERO);
     }
 
@@ -347,7 +347,7 @@ impl<const N: usize, const M: usize> PathMover<N, M> {
         for (due, free) in line.due.iter_mut().zip(self.free) {
             *due = due.map(|due| due.max(free).max(begin));
         }
-        (self.line, self.exit, self.origin) = (Some(line), course.exit, self.position);
+        (self.line, self.exit, self.origin) = (Some(line), course.exit, self.commanded);
     }
 
     /// Takes lines out that are over, and begins the next one.

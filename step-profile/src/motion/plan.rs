@@ -93,8 +93,8 @@ impl Plan {
     }
 
     /// Where the move is and how fast, at a tick after its start.
-    pub fn at(&self, tick: u64) -> State {
-        State::new(self.clock, self.phases.at(self.clock.moment(tick)))
+    pub fn at(&self, tick: u64) -> Setpoint {
+        Setpoint::new(self.clock, self.phases.at(self.clock.moment(tick)))
     }
 
     /// Begins of the phases of constant jerk, and the end, in ticks.
@@ -140,7 +140,7 @@ impl FusedIterator for Pulses<'_> {}
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub struct State {
+pub struct Setpoint {
     /// In 2^-32 steps.
     pub position: i64,
     /// In 2^-16 steps/s.
@@ -151,7 +151,7 @@ pub struct State {
     pub jerk: i64,
 }
 
-impl State {
+impl Setpoint {
     /// At rest at a position in 2^-32 steps.
     pub(super) const fn at_rest(position: i64) -> Self {
         Self { position, speed: 0, acceleration: 0, jerk: 0 }
@@ -187,7 +187,7 @@ impl State {
 }
 
 /// `12.250 steps, 800 steps/s, -4000 steps/s²`.
-impl fmt::Display for State {
+impl fmt::Display for Setpoint {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let thousandths = i128::from(self.position).saturating_mul(1000) >> 32;
         let (sign, size) = (if thousandths < 0 { "-" } else { "" }, thousandths.unsigned_abs());

@@ -29,13 +29,27 @@ pub(crate) fn start(mut timer: SYST) {
 /// Instructions of one call of `kernel`, in tenths and as the mean over `inputs`, without those of an empty call.
 pub(crate) fn tenths<I, O>(kernel: fn(&'static I) -> O, inputs: &'static [I]) -> u32 {
     let rounds = CALLS.div_ceil(inputs.len());
-    let ticks = ticks(kernel, inputs, rounds).saturating_sub(ticks(nothing::<I, O>, inputs, rounds));
-    (ticks * INSTRUCTIONS_PER_TICK * 10 / (rounds * inputs.len()) as u64) as u32
+    let (kernel, empty) = black_box((kernel, nothing::<I, O> as fn(&'static I) -> _));
+    each(ticks(kernel, inputs, rounds), ticks(empty, inputs, rounds), rounds * inputs.len())
+}
+
+/// The same of a kernel that works on a state.
+#[cfg(feature = "servowire-core")]
+pub(crate) fn tenths_on<S, I, O>(state: &mut S, kernel: fn(&mut S, &'static I) -> O, inputs: &'static [I]) -> u32 {
+    let rounds = CALLS.div_ceil(inputs.len());
+    let (kernel, empty) = black_box((kernel, nothing_on::<S, I, O> as fn(&mut S, &'static I) -> _));
+    let with = ticks(|input| kernel(state, input), inputs, rounds);
+    let without = ticks(|input| empty(state, input), inputs, rounds);
+    each(with, without, rounds * inputs.len())
+}
+
+/// Tenths of an instruction for each call, from the ticks of all calls with and without what is measured.
+fn each(with: u64, without: u64, calls: usize) -> u32 {
+    (with.saturating_sub(without) * INSTRUCTIONS_PER_TICK * 10 / calls as u64) as u32
 }
 
 #[inline(never)]
-fn ticks<I, O>(kernel: fn(&'static I) -> O, inputs: &'static [I], rounds: usize) -> u64 {
-    let kernel = black_box(kernel);
+fn ticks<I, O>(mut kernel: impl FnMut(&'static I) -> O, inputs: &'static [I], rounds: usize) -> u64 {
     let (mut sum, mut begin) = (0_u64, SYST::get_current());
     for _ in 0..rounds {
         for input in inputs {
@@ -52,6 +66,12 @@ fn ticks<I, O>(kernel: fn(&'static I) -> O, inputs: &'static [I], rounds: usize)
 /// The empty call: takes and gives the same as a kernel and does nothing.
 #[inline(never)]
 fn nothing<I, O>(_: &'static I) -> MaybeUninit<O> {
+    MaybeUninit::uninit()
+}
+
+#[cfg(feature = "servowire-core")]
+#[inline(never)]
+fn nothing_on<S, I, O>(_: &mut S, _: &'static I) -> MaybeUninit<O> {
     MaybeUninit::uninit()
 }
 

@@ -4,6 +4,7 @@
 //! here, one line in [`ALL`], and its figures in `budget.toml` (`run.sh --record` adds them).
 
 #[cfg(feature = "servowire-core")]
+mod core_feedback;
 pub(crate) mod core_time;
 #[cfg(feature = "deliberate-panic")]
 mod deliberate_panic;
@@ -41,6 +42,8 @@ pub(crate) struct Kernel {
 pub(crate) const ALL: &[&[Kernel]] = &[
     #[cfg(feature = "servowire-core")]
     core_time::KERNELS,
+    #[cfg(feature = "servowire-core")]
+    core_feedback::KERNELS,
     #[cfg(feature = "nrz-line")]
     nrz_line::KERNELS,
     #[cfg(feature = "hdsl")]

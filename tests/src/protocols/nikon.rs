@@ -48,9 +48,9 @@ fn each<T: de::DeserializeOwned>(rows: &[Row], check: impl Fn(&str, T) -> Verdic
     rows.iter().map(verdict).collect()
 }
 
-/// The name of a row against the mnemonic of its command.
+/// The name of a row against the name of its command.
 fn same_name(name: &str, command: Command) -> Verdict {
-    if name.is_empty() { Ok(()) } else { same("name", &name, &command.mnemonic()) }
+    if name.is_empty() { Ok(()) } else { same("name", &name, &command.name()) }
 }
 
 /// The rows' name of an error.

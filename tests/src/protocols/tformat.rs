@@ -9,7 +9,10 @@ use nrz_line::{Format, Receiver};
 use servowire_core::Ended;
 use tformat::device::Device;
 use tformat::master::Reset;
-use tformat::{Abm, Abs, Adf, Almc, BitRate, ControlField, DataId, Error, Frame, Request, Resolution, Response, spi};
+use tformat::{
+    Abm, Abs, Adf, AllData, Almc, BitRate, ControlField, DataId, Doubt, Error, Evidence, Frame, Policy, Request,
+    Resolution, Response, Sample, StatusField, spi,
+};
 
 use crate::hex::{Bits, Bytes, Hex};
 use crate::row::{Check, Row, Verdict, each, same};
@@ -216,17 +219,25 @@ fn position(row: PositionRow) -> Verdict {
     let Ok(resolution) = Resolution::new(row.abs_bits, row.abm_bits) else {
         return same("widths", &"possible", &"refused");
     };
-    let (abs, abm) = (Abs::truncate(row.abs), Abm::truncate(row.abm));
-    let signed = resolution.position(abs, abm);
-    same("high_bits_nonzero", &row.high_bits_nonzero, &matches!(signed, Err(Error::UpperBits { .. })))?;
+    let data = AllData {
+        sf: StatusField::empty(),
+        abs: Abs::truncate(row.abs),
+        enid: 0,
+        abm: Abm::truncate(row.abm),
+        almc: Almc::empty(),
+    };
+    let read = |resolution| Evidence::of(Response::ReadAll(data), resolution, 0).at(0, Policy::new(0));
+    let signed = read(resolution);
+    same("high_bits_nonzero", &row.high_bits_nonzero, &matches!(signed, Err(Doubt::UpperBits { .. })))?;
     if row.high_bits_nonzero {
         return Ok(());
     }
-    let unsigned = resolution.with_unsigned_turns().position(abs, abm).ok();
-    same("combined_unsigned", &row.combined_unsigned, &unsigned.map(|p| p.combined))?;
-    same("turns_signed", &row.turns_signed, &signed.ok().map(|p| p.turns))?;
-    same("combined_signed", &row.combined_signed, &signed.ok().map(|p| p.combined))?;
-    same("fraction32", &row.fraction32, &resolution.fraction(abs).ok())
+    let unsigned = read(resolution.with_unsigned_turns()).ok();
+    let signed = signed.ok();
+    same("combined_unsigned", &row.combined_unsigned, &unsigned.and_then(Sample::counts))?;
+    same("turns_signed", &row.turns_signed, &signed.and_then(Sample::turns))?;
+    same("combined_signed", &row.combined_signed, &signed.and_then(Sample::counts))?;
+    same("fraction32", &row.fraction32, &signed.map(|sample| sample.angle().to_bits()))
 }
 
 #[derive(Deserialize)]

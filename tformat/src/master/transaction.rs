@@ -1,14 +1,14 @@
 use super::Line;
-use crate::doubt::{Doubt, Policy};
 use crate::error::Error;
+use crate::evidence::Evidence;
 use crate::frame::Frame;
 use crate::message::CF3;
 use crate::request::Request;
-use crate::resolution::{Position, Resolution};
+use crate::resolution::Resolution;
 use crate::response::{Response, expected_fields};
 
 /// A response with all checks passed, and when its position was taken.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Exchange {
     /// The response.
@@ -23,44 +23,9 @@ pub struct Exchange {
 servowire_core::one_line!(Exchange { Self { response, sampled_ns, .. } => "{}, sampled at {} ns", response, sampled_ns; });
 
 impl Exchange {
-    /// The position for control at `now_ns`: only if nothing speaks against its use, its age included. See
-    /// [`Resolution::read`].
-    ///
-    /// ```
-    /// use tformat::master::Exchange;
-    /// use tformat::{Doubt, Policy, Request, Resolution, Response};
-    /// let bytes = [0x1a, 0x20, 0x29, 0xc0, 0x3b, 0x17, 0x00, 0x00, 0x00, 0xc8, 0x37];
-    /// let exchange = Exchange { response: Response::parse(Request::ReadAll, &bytes)?, sampled_ns: 4_480, began_ns: 7_000 };
-    /// let (resolution, policy) = (Resolution::new(23, 16)?, Policy::SINGLE_TURN.with_max_age_ns(125_000));
-    /// assert_eq!(exchange.position(resolution, policy, 60_000)?.abs, 3_915_817);
-    /// assert_eq!(exchange.position(resolution, policy, 140_000), Err(Doubt::Old { age_ns: 135_520 }));
-    /// # Ok::<(), Box<dyn std::error::Error>>(())
-    /// ```
-    ///
-    /// # Errors
-    /// [`Doubt::Old`], then as [`Resolution::read`].
-    pub const fn position(&self, resolution: Resolution, policy: Policy, now_ns: u64) -> Result<Position, Doubt> {
-        match self.aged(policy, now_ns) {
-            Ok(()) => resolution.read(&self.response, policy),
-            Err(doubt) => Err(doubt),
-        }
-    }
-
-    /// As [`position`](Self::position) for the single-turn position alone, in counts. See [`Resolution::read_single_turn`].
-    ///
-    /// # Errors
-    /// [`Doubt::Old`], then as [`Resolution::read_single_turn`].
-    pub const fn single_turn(&self, resolution: Resolution, policy: Policy, now_ns: u64) -> Result<u32, Doubt> {
-        match self.aged(policy, now_ns) {
-            Ok(()) => resolution.read_single_turn(&self.response, policy),
-            Err(doubt) => Err(doubt),
-        }
-    }
-
-    const fn aged(&self, policy: Policy, now_ns: u64) -> Result<(), Doubt> {
-        // A clock that was set back makes no position young.
-        let age_ns = now_ns.abs_diff(self.sampled_ns);
-        if age_ns > policy.max_age_ns { Err(Doubt::Old { age_ns }) } else { Ok(()) }
+    /// What it says of the position of an encoder with these widths, to be judged where it is used.
+    pub const fn evidence(&self, resolution: Resolution) -> Evidence {
+        Evidence::of(self.response, resolution, self.sampled_ns)
     }
 }
 
@@ -93,7 +58,7 @@ pub struct DriverOff {
 /// How far a transaction is. `ready_ns` of a failure is the time at which the longest response to the request is over,
 /// however late within the time-out it began: eleven fields, one right after the other as encoders send them. Behind a bridge that
 /// pauses between fields, wait for a silent line besides.
-pub type Progress = servowire_core::Progress<Exchange, Error>;
+pub type Progress<T = Exchange> = servowire_core::Progress<T, Error>;
 
 /// Longest request and longest response in bytes.
 const MAX_BYTES: usize = 4 + Frame::MAX_FIELDS;

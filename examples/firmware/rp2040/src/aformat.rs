@@ -1,12 +1,16 @@
 //! A-format over the port: a master that prints positions, and an encoder.
 
+use core::convert::Infallible;
 use core::fmt::{self, Write as _};
 
 use nikon_aformat::device::Device;
-use nikon_aformat::master::{EepromRead, GuardedReset, Line, Progress, Reset, Step, Transaction, VerifiedWrite, Write};
+use nikon_aformat::master::{
+    EepromRead, Exchange, GuardedReset, Line, Progress, Reset, Transaction, VerifiedWrite, Write,
+};
 use nikon_aformat::{
     BitRate, EncoderAddress, Error, FRAME_BITS, Operation, Request, Resolution, Response, UserAddress,
 };
+use servowire_core::{Ended, Procedure};
 
 use crate::board::{Board, Console};
 use crate::clock::Clock;
@@ -46,7 +50,7 @@ struct Master {
 
 impl Master {
     /// One request and its answer, when the line is free. How long they took.
-    fn exchange(&mut self, request: Request, message: &Prepared) -> (Result<Response, Error>, u64) {
+    fn exchange(&mut self, request: Request, message: &Prepared) -> (Result<Exchange, Error>, u64) {
         let Self { clock, transmitter, receiver, line, free_ns } = self;
         let frame_ns = u64::from(line.rate.bits_ns(FRAME_BITS));
         receiver.settle(clock, *free_ns, 2 * frame_ns);
@@ -54,7 +58,7 @@ impl Master {
         let mut transaction = Transaction::start(request, Resolution::default(), *line, began_ns);
         transmitter.send(message);
         // The receiver is on again from the end of the request on, so nothing that comes is older.
-        let since_ns = began_ns + u64::from(line.request_ns(request));
+        let since_ns = transaction.transmission().end_ns;
         let (mut frames, mut count, mut last_ns) = ([None; MOST_FRAMES], 0, 0);
         let outcome = loop {
             let unit = receiver.take();
@@ -72,13 +76,13 @@ impl Master {
                 None if count > 0 && now_ns > last_ns + frame_ns + frame_ns / 2 => {
                     let block = &frames[..count];
                     count = 0;
-                    transaction.block(block, since_ns, last_ns)
+                    transaction.hear_since(block, since_ns, last_ns)
                 }
                 None => transaction.poll(now_ns),
             };
             let (end, ready_ns) = match progress {
                 Progress::Pending { .. } => continue,
-                Progress::Done { value, ready_ns } => (Ok(value.response), ready_ns),
+                Progress::Done { value, ready_ns } => (Ok(value), ready_ns),
                 Progress::Failed { error, ready_ns } => (Err(error), ready_ns),
             };
             *free_ns = ready_ns;
@@ -88,48 +92,37 @@ impl Master {
     }
 
     /// A procedure of several exchanges.
-    fn run<T>(
-        &mut self,
-        mut step: Step<T>,
-        mut receive: impl FnMut(Result<Response, Error>, u64) -> Step<T>,
-    ) -> Result<T, Error> {
-        loop {
-            let (request, not_before_ns) = match step {
-                Step::Send { request, not_before_ns } => (request, not_before_ns),
-                Step::Done { value, ready_ns } => {
-                    self.free_ns = ready_ns;
-                    return Ok(value);
-                }
-                Step::Failed { error, ready_ns } => {
-                    self.free_ns = ready_ns;
-                    return Err(error);
-                }
-            };
+    fn run<P>(&mut self, procedure: &mut P) -> Result<P::Value, Error>
+    where
+        P: Procedure<Request = Request, Response = Response, Error = Error>,
+    {
+        let now_ns = self.clock.now_ns();
+        let Ok(Ended { outcome, ready_ns }) = servowire_core::run(procedure, now_ns, |request, not_before_ns| {
             while self.clock.now_ns() < not_before_ns {}
             let (outcome, _) = self.exchange(request, &message(request, self.line));
-            step = receive(outcome, self.free_ns.max(self.clock.now_ns()));
-        }
+            let ready_ns = self.free_ns.max(self.clock.now_ns());
+            Ok::<_, Infallible>(Ended { outcome: outcome.map(|exchange| exchange.response), ready_ns })
+        });
+        self.free_ns = ready_ns;
+        outcome
     }
 
     /// Does what was typed, and says what came of it.
     fn command(&mut self, command: Command, console: &mut Console) -> fmt::Result {
         let ea = EncoderAddress::ZERO;
-        let now_ns = self.clock.now_ns();
         match command {
             Command::Read { address } => self.say_word(address, console),
             Command::Write { address, data } => {
                 let Some(user) = UserAddress::new(address) else { return console.write_str("that is not for users\n") };
                 let mut write = VerifiedWrite::new(Write::eeprom(ea, user, data));
-                let first = write.start(now_ns);
-                match self.run(first, |outcome, now_ns| write.receive(outcome, now_ns)) {
+                match self.run(&mut write) {
                     Ok(()) => self.say_word(address, console),
                     Err(error) => writeln!(console, "EEPROM {address:02x}: {error}"),
                 }
             }
             Command::LoseMultiTurnReference => {
                 let mut reset = GuardedReset::new(Reset::clear_multiturn(ea));
-                let first = reset.start(now_ns);
-                match self.run(first, |outcome, now_ns| reset.receive(outcome, now_ns)) {
+                match self.run(&mut reset) {
                     Ok(_) => console.write_str("turns: cleared\n"),
                     Err(error) => writeln!(console, "turns: {error}"),
                 }
@@ -140,8 +133,7 @@ impl Master {
 
     fn say_word(&mut self, address: u8, console: &mut Console) -> fmt::Result {
         let mut read = EepromRead::new(EncoderAddress::ZERO, address);
-        let first = read.start(self.clock.now_ns());
-        match self.run(first, |outcome, now_ns| read.receive(outcome, now_ns)) {
+        match self.run(&mut read) {
             Ok(word) => writeln!(console, "EEPROM {address:02x}: {word:04x}"),
             Err(error) => writeln!(console, "EEPROM {address:02x}: {error}"),
         }
@@ -171,7 +163,7 @@ pub fn master(rate: BitRate) -> ! {
     let port = rate_of(rate).expect("a rate of this port");
     let Board { mut console, clock, transmitter, receiver, channel } = Board::new(port, 16);
     let receiver = RingReceiver::new(channel, receiver);
-    let line = Line::new(rate).with_response_timeout_ns(RESPONSE_TIMEOUT_NS).with_latency_ns(LATENCY_NS);
+    let line = Line::new(rate).with_response_timeout_ns(RESPONSE_TIMEOUT_NS).with_hand_over_ns(LATENCY_NS);
     let mut master = Master { clock, transmitter, receiver, line, free_ns: 0 };
     let mut typed = Typed::default();
     let request = Request::new(EncoderAddress::ZERO, Operation::Abs40);
@@ -180,15 +172,14 @@ pub fn master(rate: BitRate) -> ! {
     let _ = writeln!(console, "A-format master, {} bit/s", rate.bits_per_second());
     loop {
         let (outcome, took_ns) = master.exchange(request, &message);
-        match outcome.map(|response| response.abs40()) {
-            Ok(Some(abs)) => {
+        match outcome {
+            Ok(exchange) => {
                 good += 1;
                 if good % 16 == 1 {
-                    let abs = abs.get();
+                    let abs = exchange.response.abs().unwrap_or(0);
                     let _ = writeln!(console, "abs {abs} in {took_ns} ns, {good} good, {bad} bad");
                 }
             }
-            Ok(None) => {}
             Err(error) => {
                 bad += 1;
                 let _ = writeln!(console, "fault: {error}, {good} good, {bad} bad");
@@ -224,11 +215,10 @@ pub fn encoder(rate: BitRate, wait_cycles: u32) -> ! {
             transmitter.send(message);
         }
         let now_ns = clock.now_ns();
+        let reply = device.hear(&[unit.framed.then_some(unit.content)], now_ns);
         if !unit.framed {
-            device.framing_error(now_ns);
             continue;
         }
-        let reply = device.frame(unit.content, now_ns);
         let answered = reply.is_some();
         if let Some(reply) = reply.filter(|_| !started) {
             transmitter.send(&Prepared::new(reply.line.bits(), reply.line.len(), 0));

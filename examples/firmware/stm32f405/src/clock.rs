@@ -2,6 +2,7 @@
 
 use cortex_m::peripheral::SYST;
 use cortex_m::peripheral::syst::SystClkSource;
+use servowire_drivers::{CounterClock, TickRate};
 use stm32_metapac::flash::vals::Latency;
 use stm32_metapac::rcc::vals::{Hpre, Pllm, Plln, Pllp, Pllsrc, Ppre, Sw};
 use stm32_metapac::{FLASH, RCC};
@@ -68,32 +69,11 @@ fn ready(mut look: impl FnMut() -> bool) -> bool {
     (0..LOOKS).any(|_| look())
 }
 
-/// The SysTick of 24 bits, made longer. It has to be looked at every 100 ms.
-pub struct Clock {
-    timer: SYST,
-    last: u32,
-    ticks: u64,
-}
-
-impl Clock {
-    /// Starts it.
-    pub fn new(mut timer: SYST) -> Self {
-        timer.set_clock_source(SystClkSource::Core);
-        timer.set_reload(0x00ff_ffff);
-        timer.clear_current();
-        timer.enable_counter();
-        Self { timer, last: 0, ticks: 0 }
-    }
-}
-
-impl servowire_drivers::Clock for Clock {
-    #[inline]
-    fn now_ns(&mut self) -> u64 {
-        // It counts down.
-        let now = self.timer.cvr.read();
-        self.ticks += u64::from(self.last.wrapping_sub(now) & 0x00ff_ffff);
-        self.last = now;
-        // 6.25 ns a tick
-        self.ticks * 25 / 4
-    }
+/// Starts the SysTick, which counts 24 bits down. It has to be looked at every 52 ms.
+pub fn time(mut timer: SYST) -> CounterClock<impl FnMut() -> u32, 24> {
+    timer.set_clock_source(SystClkSource::Core);
+    timer.set_reload(0x00ff_ffff);
+    timer.clear_current();
+    timer.enable_counter();
+    CounterClock::new(TickRate::of::<CORE_HZ>(), move || !timer.cvr.read())
 }

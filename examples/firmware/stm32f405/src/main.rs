@@ -9,7 +9,7 @@ mod uart;
 use core::fmt::Write;
 
 use panic_halt as _;
-use servowire_drivers::{Clock as _, DriverEnable, Error, tformat::blocking::Encoder};
+use servowire_drivers::{DriverEnable, Error, tformat::blocking::Driver};
 use tformat::master::Line;
 use tformat::{Address, BitRate};
 
@@ -28,16 +28,16 @@ fn main() -> ! {
     let source = clock::start();
     let core = cortex_m::Peripherals::take().expect("called once");
     let (uart, de, mut console) = uart::start(BitRate::Mbit2_5.bits_per_second());
-    let mut clock = clock::Clock::new(core.SYST);
+    let clock = clock::time(core.SYST);
     let _ = writeln!(console, "T-Format master, 2500000 bit/s, clock {source:?}");
-    let mut encoder = Encoder::new(uart, DriverEnable(de), || clock.now_ns(), line());
+    let mut encoder = Driver::new(uart, DriverEnable(de), clock, line());
     match encoder.read_eeprom(None, Address::truncate(0)) {
         Ok(byte) => drop(writeln!(console, "EEPROM 0: {byte:02x}")),
         Err(error) => drop(writeln!(console, "EEPROM: {error}")),
     }
     let (mut good, mut bad) = (0_u32, 0_u32);
     loop {
-        match encoder.read_all() {
+        match encoder.read_data() {
             Ok(all) => {
                 good += 1;
                 if good % 16 == 1 {

@@ -16,6 +16,7 @@ use embassy_stm32::{bind_interrupts, dma, peripherals};
 use embassy_time::{Duration, Ticker, with_timeout};
 use embedded_io::Write;
 use panic_halt as _;
+use servowire_core::{TickRate, TimeBase};
 use tformat::master::{Exchange, Line, Progress, Transaction};
 use tformat::{BitRate, Request, Response};
 
@@ -38,26 +39,19 @@ const IDLE_NS: u64 = 4_000;
 /// The longest answer, and some noise.
 const MOST_BYTES: usize = 16;
 
-/// The cycle counter, made longer. It has to be looked at every 26 s.
-struct Clock {
-    last: u32,
-    cycles: u64,
-}
+/// The time from the cycle counter, which has to be looked at every 13 s.
+struct Clock(TimeBase<32>);
 
 impl Clock {
     fn new() -> Self {
         let mut core = cortex_m::Peripherals::take().expect("called once");
         core.DCB.enable_trace();
         core.DWT.enable_cycle_counter();
-        Self { last: 0, cycles: 0 }
+        Self(TimeBase::new(TickRate::of::<CORE_HZ>(), DWT::cycle_count()))
     }
 
     fn now_ns(&mut self) -> u64 {
-        let now = DWT::cycle_count();
-        self.cycles += u64::from(now.wrapping_sub(self.last));
-        self.last = now;
-        // 6.25 ns a cycle
-        self.cycles * 25 / 4
+        self.0.now_ns(DWT::cycle_count()).expect("a cycle is shorter than a turn of the counter")
     }
 }
 

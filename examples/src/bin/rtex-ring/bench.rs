@@ -2,7 +2,7 @@
 
 use core::f64::consts::TAU;
 
-use rtex_block::device::{Drive, DriveConfig, OpenCodes};
+use rtex_block::device::{Drive, DriveConfig, Fault, OpenCodes};
 use rtex_block::master::{
     ActiveCode, Asic, Axis, AxisConfig, AxisState, Limits, Master, MasterConfig, SetpointError, SetupError, Slave,
     StopReason,
@@ -37,7 +37,6 @@ fn slave_table() -> [Slave; AXES] {
 struct Fitted {
     drive: Drive,
     kind: u16,
-    silent: bool,
     /// When its servo went off.
     off_at: Option<u64>,
 }
@@ -73,7 +72,7 @@ impl Bench {
                 // Drives do not get ready at the same moment.
                 let config = DriveConfig::new(mac_id(switches.into()), OpenCodes::INVENTED)
                     .with_sync_exchanges(20 + switches * 3);
-                Fitted { drive: Drive::new(config), kind, silent: false, off_at: None }
+                Fitted { drive: Drive::new(config), kind, off_at: None }
             })
             .collect();
         if swapped {
@@ -103,7 +102,7 @@ impl Bench {
 
     /// The NC interrupt: reads the reception memory and writes the transmission memory.
     pub(crate) fn exchange(&mut self) -> Result<(), SizeMismatch> {
-        self.master.exchange_words32(&self.rx, &mut self.tx)
+        self.master.exchange_words32(&self.rx, &mut self.tx, self.now * u64::from(self.periods.update_ns))
     }
 
     /// An update period: the exchange, then the frame goes round. What a silent drive has said last stays in the memory.
@@ -114,12 +113,10 @@ impl Bench {
             self.drives.iter_mut().zip(self.tx.chunks_exact(WORDS).zip(self.rx.chunks_exact_mut(WORDS)))
         {
             let was_active = fitted.drive.is_active();
-            if fitted.silent {
-                fitted.drive.miss();
-            } else {
-                let mut block = [0; 16];
-                pack::from_words32(tx, &mut block)?;
-                pack::to_words32(&fitted.drive.exchange(&block), rx)?;
+            let mut block = [0; 16];
+            pack::from_words32(tx, &mut block)?;
+            if let Some(response) = fitted.drive.hear(&block) {
+                pack::to_words32(&response, rx)?;
             }
             if was_active && !fitted.drive.is_active() {
                 fitted.off_at = Some(self.now);
@@ -146,7 +143,7 @@ impl Bench {
     /// Takes a drive off the ring.
     pub(crate) fn silence(&mut self, place: usize) {
         if let Some(fitted) = self.drives.get_mut(place) {
-            fitted.silent = true;
+            fitted.drive.set_fault(Fault::Silent);
         }
     }
 
@@ -162,7 +159,7 @@ impl Bench {
             let off = fitted.off_at.map_or(f64::NAN, |at| self.time_ms(at));
             let alarm = fitted.drive.alarm().map_or("-".to_owned(), |alarm| alarm.to_string());
             let reason = match self.master.ring().axes().get(place).map(Axis::state) {
-                Some(AxisState::Stopped(StopReason::OtherAxis(other))) => format!("axis {other}"),
+                Some(AxisState::Stopped(StopReason::OtherAxis { place: other })) => format!("axis {other}"),
                 Some(state) => state.to_string(),
                 None => String::new(),
             };

@@ -20,7 +20,7 @@ use std::error::Error;
 use std::process::ExitCode;
 
 use bench::{ASIC, AXES, Bench};
-use rtex_block::master::{Asic, AxisState, Fault, Led, Limits, Phase, StopReason};
+use rtex_block::master::{Asic, AxisState, ControlError, ControlPhase, Led, Limits, RingFailure, StopReason};
 use rtex_block::timing::{FrameTime, Periods, TimerSystem};
 
 const HELP: &str = "\
@@ -78,12 +78,12 @@ fn run(out: &str, swapped: bool) -> Result<(), Box<dyn Error>> {
     let mut bench = Bench::new(periods, LIMITS, swapped)?;
     let mut lamp = Lamp::default();
     start_communication(&mut bench, &mut lamp)?;
-    if let Some(fault) = bench.master.fault() {
+    if let Some(fault) = bench.master.error() {
         return Err(format!("the ring does not start: {fault:?}").into());
     }
 
     until(&mut bench, &mut lamp, "all drives ready, servo off", AxisState::Off)?;
-    bench.master.ring_mut().switch_on();
+    bench.master.ring_mut().switch_on()?;
     until(&mut bench, &mut lamp, "all servos on", AxisState::On)?;
 
     let begin = bench.now;
@@ -115,8 +115,8 @@ fn run(out: &str, swapped: bool) -> Result<(), Box<dyn Error>> {
     let shown = bench.history.partition_point(|(at, _)| *at <= end);
     plot::positions(out, bench.history.get(..shown).unwrap_or_default(), &marks)?;
     println!("positions: {out}");
-    match (bench.master.fault(), stopped_at) {
-        (Some(Fault::Timeout), Some(_)) => Ok(()),
+    match (bench.master.error(), stopped_at) {
+        (Some(ControlError::Timeout), Some(_)) => Ok(()),
         other => Err(format!("the ring did not stop as it must: {other:?}").into()),
     }
 }
@@ -143,19 +143,19 @@ fn periods() -> Result<Periods, String> {
     }
 }
 
-/// Phase, fault and COM LED as they were shown last. A flashing LED begins lit when its pattern does.
+/// ControlPhase, fault and COM LED as they were shown last. A flashing LED begins lit when its pattern does.
 #[derive(Default)]
 struct Lamp {
     since_ms: u64,
-    state: Option<(Phase, Option<Fault>)>,
-    shown: Option<(Phase, Led)>,
+    state: Option<(ControlPhase, Option<ControlError>)>,
+    shown: Option<(ControlPhase, Led)>,
 }
 
 impl Lamp {
     /// The end of a turn of the main loop.
     fn show(&mut self, bench: &Bench, time_ms: u64, asic: Asic) {
         let master = &bench.master;
-        let state = (master.phase(), master.fault());
+        let state = (master.phase(), master.error());
         let pattern = |(phase, fault)| rtex_block::master::pattern(phase, fault);
         if self.state.map(pattern) != Some(pattern(state)) {
             self.since_ms = time_ms;
@@ -163,7 +163,7 @@ impl Lamp {
         self.state = Some(state);
         let now = (master.phase(), master.led(time_ms - self.since_ms));
         if self.shown != Some(now) {
-            let fault = master.fault().map_or(String::new(), |fault| format!(", fault {fault:?}"));
+            let fault = master.error().map_or(String::new(), |fault| format!(", fault {fault:?}"));
             say(time_ms as f64, &format!("ASIC {asic:?}, phase {:?}{fault}, COM LED {:?}", now.0, now.1));
             self.shown = Some(now);
         }
@@ -179,11 +179,11 @@ fn start_communication(bench: &mut Bench, lamp: &mut Lamp) -> Result<(), Box<dyn
         let Some((_, asic)) = ASIC.iter().rev().find(|(from, _)| *from <= time_ms) else { continue };
         // The slaves are known once the ring is closed.
         bench.master.control(*asic, (*asic == Asic::Ready).then_some(&found));
-        if bench.master.phase() == Phase::Prepare {
+        if bench.master.phase() == ControlPhase::Prepare {
             bench.exchange()?;
         }
         lamp.show(bench, time_ms, *asic);
-        if bench.master.is_running() || bench.master.fault().is_some() && time_ms > running {
+        if bench.master.is_running() || bench.master.error().is_some() && time_ms > running {
             return Ok(());
         }
     }
@@ -216,7 +216,7 @@ fn until(bench: &mut Bench, lamp: &mut Lamp, what: &str, state: AxisState) -> Re
 fn report_stop(bench: &Bench, silent_at: u64) {
     let after = bench.time_ms(bench.now) - bench.time_ms(silent_at);
     say(bench.time_ms(bench.now), &format!("all servos off, {after:.1} ms after"));
-    if let Some((place, reason @ StopReason::EchoTimeout)) = bench.master.ring().failure() {
-        println!("{:14}cause: axis {place}, {reason}; fault of the master: {:?}", "", bench.master.fault());
+    if let Some(RingFailure { place, reason: reason @ StopReason::EchoTimeout }) = bench.master.ring().failure() {
+        println!("{:14}cause: axis {place}, {reason}; fault of the master: {:?}", "", bench.master.error());
     }
 }

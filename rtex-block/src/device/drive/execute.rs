@@ -1,6 +1,7 @@
 //! Execution of non-cyclic commands.
 
 use super::Drive;
+use crate::device::behaviour::Quirks;
 use crate::device::literals::{
     ALARM, APOS, ASPD, HOMING, HOMING_ACTUAL, HOMING_COMMAND, HOMING_LATCH, IPOS, LATCH_COMP1, LATCH_COMP2, LPOS1,
     LPOS2, MONITOR, MPOS, MSPD, NEAR, NORMAL, OVERLOAD, PARAMETER, PARAMETER_WRITE, PERR, PROFILE, PROFILE_RELATIVE,
@@ -62,9 +63,9 @@ impl Drive {
                 Outcome::Live(type_code)
             }
         };
-        let behaviour = self.config.behaviour;
+        let behaviour = self.behaviour;
         let slow = matches!(request.code, RESET | PARAMETER);
-        let busy = if slow || behaviour.always_busy { self.config.busy_exchanges } else { 0 };
+        let busy = if slow || behaviour.does(Quirks::ALWAYS_BUSY) { self.config.busy_exchanges } else { 0 };
         self.job = Some(Job { request, busy, outcome });
         // What a forgetful drive answers to before it has understood.
         let old = old.unwrap_or_else(|| request.other(matches!(request.code, SYSTEM_ID | PARAMETER)));
@@ -86,7 +87,7 @@ impl Drive {
         let request = stale.unwrap_or(job.request);
         let mut index = request.index();
         let (err, data) = match job.outcome {
-            Outcome::Failed => (job.busy == 0 || self.config.behaviour.err_while_busy, 0),
+            Outcome::Failed => (job.busy == 0 || self.behaviour.does(Quirks::ERR_WHILE_BUSY), 0),
             _ if job.busy > 0 => (false, 0),
             Outcome::Value(data) => (false, data),
             Outcome::Live(code) => (false, self.monitor(code, 0).unwrap_or(0)),
@@ -100,7 +101,7 @@ impl Drive {
             _ => job.busy > 0,
         };
         let new = stale.is_none();
-        let execution = Execution { err: err && new, wng: self.config.behaviour.warns, busy: busy && new };
+        let execution = Execution { err: err && new, wng: self.behaviour.does(Quirks::WARNS), busy: busy && new };
         match request.code {
             HOMING | PROFILE => {
                 let flags = if request.code == HOMING { self.latched } else { self.profile_flags() };
@@ -168,7 +169,7 @@ impl Drive {
         let active = self.motion.is_active();
         let (arm, homing) = (u16::from(self.config.codes.latch_arm), u16::from(self.config.codes.homing));
         match request.type_code() {
-            HOMING_ACTUAL | HOMING_COMMAND if active && !self.config.behaviour.sets_position_while_on => {
+            HOMING_ACTUAL | HOMING_COMMAND if active && !self.behaviour.does(Quirks::SETS_POSITION_WHILE_ON) => {
                 return Ok(Outcome::Failed);
             }
             kind @ (HOMING_ACTUAL | HOMING_COMMAND) => {
@@ -208,10 +209,10 @@ impl Drive {
             return Ok(Outcome::Value(words(alarm.unwrap_or(none), 0)));
         }
         if type_code == codes.alarm_clear.get() {
-            if self.config.behaviour.refuses_to_clear && self.alarm.is_some() {
+            if self.behaviour.does(Quirks::REFUSES_TO_CLEAR) && self.alarm.is_some() {
                 return Ok(Outcome::Failed);
             }
-            if !self.config.behaviour.alarm_stays {
+            if !self.behaviour.does(Quirks::ALARM_STAYS) {
                 self.clear_alarm();
             }
             return Ok(Outcome::Value(0));
@@ -222,7 +223,7 @@ impl Drive {
     fn parameter(&mut self, type_code: u16, index: u16, data: i32) -> Outcomes {
         let codes = self.config.codes;
         let value = if type_code == PARAMETER_WRITE {
-            let at_once = !self.config.behaviour.parameters_after_reset;
+            let at_once = !self.behaviour.does(Quirks::PARAMETERS_AFTER_RESET);
             self.parameters.set(index, data, at_once).then_some(data)
         } else if type_code == codes.parameter_read.get() {
             self.parameters.written(index)
@@ -250,7 +251,7 @@ impl Drive {
         if !from_idle || self.motion.profile.is_some() || !self.motion.is_active() {
             return Ok(Outcome::Failed);
         }
-        self.motion.start(Generator::new(distance), self.config.behaviour.in_progress_late);
+        self.motion.start(Generator::new(distance), self.behaviour.in_progress_late);
         Ok(Outcome::Value(0))
     }
 

@@ -166,7 +166,7 @@ impl Axis {
         if !self.can_ask() {
             return Err(AskError::Busy);
         }
-        let active = self.state.is_servo_on() || self.status.contains(StatusFlags::SERVO_ACTIVE);
+        let active = self.state.is_servo_on() || self.status().contains(StatusFlags::SERVO_ACTIVE);
         if active && servo_off {
             return Err(AskError::ServoOn);
         }

@@ -39,7 +39,7 @@ impl Axis {
             AxisState::SwitchingOn | AxisState::Stopping(_) | AxisState::SwitchingOff => {
                 return Err(SetpointError::NotOn);
             }
-            AxisState::On if self.is_moving() || self.status.contains(StatusFlags::IN_PROGRESS) => {
+            AxisState::On if self.is_moving() || self.status().contains(StatusFlags::IN_PROGRESS) => {
                 return Err(SetpointError::Busy);
             }
             _ => {}

@@ -33,7 +33,7 @@ impl AlarmHistory {
         let request = NonCyclicCommand::Alarm(Arguments { type_code: self.type_code, index: self.index, data: 0 });
         match self.ask.receive(axis, request) {
             Progress::Done { value: NonCyclicResponse::Alarm(results) } => {
-                (*place, _) = results.alarm();
+                *place = results.alarm().alarm;
                 self.index = self.index.saturating_add(1);
                 Progress::Pending { left: axis.answer_left() }
             }

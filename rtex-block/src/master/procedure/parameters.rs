@@ -6,6 +6,26 @@ use crate::master::progress::{Failure, Progress};
 use crate::noncyclic_command::{Arguments, NonCyclicCommand};
 use crate::type_code::{Pr, TypeCode, parameter};
 
+/// A parameter with its value.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "arbitrary", derive(arbitrary::Arbitrary))]
+pub struct ParameterValue {
+    /// Which one.
+    pub pr: Pr,
+    /// Its value.
+    pub value: i32,
+}
+
+impl ParameterValue {
+    /// A value of a parameter.
+    pub const fn new(pr: Pr, value: i32) -> Self {
+        Self { pr, value }
+    }
+}
+
+servowire_core::one_line!(ParameterValue { Self { pr, value } => "{} = {}", pr, value; });
+
 /// Reads a list of parameters.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -21,9 +41,9 @@ impl Backup {
         Self { ask: Ask { asked: false }, read, place: 0 }
     }
 
-    /// To be called once in every update period; fills the second half of each pair.
-    pub fn receive(&mut self, axis: &mut Axis, list: &mut [(Pr, i32)]) -> Progress<()> {
-        let Some((pr, value)) = list.get_mut(self.place) else { return Progress::Done { value: () } };
+    /// To be called once in every update period; fills in the values.
+    pub fn receive(&mut self, axis: &mut Axis, list: &mut [ParameterValue]) -> Progress<()> {
+        let Some(ParameterValue { pr, value }) = list.get_mut(self.place) else { return Progress::Done { value: () } };
         let request = NonCyclicCommand::Parameter(Arguments { type_code: self.read, index: pr.index(), data: 0 });
         match self.ask.receive(axis, request) {
             Progress::Done { value: response } => {
@@ -59,14 +79,16 @@ impl Restore {
 
     /// To be called once in every update period. [`Failure::Differs`] names the parameter that did not take its value;
     /// after any other failure the parameter at [`place`](Self::place) may have either value. Once done or failed it stays so.
-    pub fn receive(&mut self, axis: &mut Axis, list: &[(Pr, i32)]) -> Progress<()> {
+    pub fn receive(&mut self, axis: &mut Axis, list: &[ParameterValue]) -> Progress<()> {
         let progress = self.end.unwrap_or_else(|| self.next(axis, list));
         self.end = progress.ended();
         progress
     }
 
-    fn next(&mut self, axis: &mut Axis, list: &[(Pr, i32)]) -> Progress<()> {
-        let Some((pr, value)) = list.get(self.place).copied() else { return Progress::Done { value: () } };
+    fn next(&mut self, axis: &mut Axis, list: &[ParameterValue]) -> Progress<()> {
+        let Some(ParameterValue { pr, value }) = list.get(self.place).copied() else {
+            return Progress::Done { value: () };
+        };
         let (type_code, data) = if self.written { (self.read, 0) } else { (parameter::WRITE, value) };
         let request = NonCyclicCommand::Parameter(Arguments { type_code, index: pr.index(), data });
         match self.ask.receive(axis, request) {

@@ -2,7 +2,8 @@
 
 use nikon_aformat::inspect::LineCause;
 use nikon_aformat::{
-    Body, Command, Data, EncoderStatus, Error, Expected, Operation, Request, Resolution, Response, TypeWord,
+    Alm, Body, Command, Data, Doubt, EncoderStatus, Error, Evidence, Expected, Operation, Policy, Request, Resolution,
+    Response, Tolerated, TypeWord,
 };
 
 use super::Frames;
@@ -45,7 +46,7 @@ pub(super) fn request(group: &Frames, result: Result<Request, Error>) -> Event {
     }
     fields.extend(group.spikes());
     let names: &[&str] = if group.len() > 1 { &["CDF", "MDF", "MDF", "MDF", "MDF"] } else { &["CDF"] };
-    let kind = result.map_or("request", |request| request.command().mnemonic());
+    let kind = result.map_or("request", |request| request.command().name());
     Event::new(group.place(), Some(Direction::Request), kind, fields, verdict(group, names, result.err()))
 }
 
@@ -113,7 +114,7 @@ impl Encoder {
             Err(_) => fields.push(words(group)),
         }
         fields.extend(group.spikes());
-        let kind = expected.map_or("reply", |expected| expected.command().mnemonic());
+        let kind = expected.map_or("reply", |expected| expected.command().name());
         let names = &["IF", "data", "data", "data", "data", "data"];
         let verdict = verdict(group, names, result.err());
         let mut event = Event::new(group.place(), Some(Direction::Answer), kind, fields, verdict);
@@ -148,15 +149,17 @@ impl Encoder {
         let Some(resolution) = self.resolution() else {
             return Some(Position { counts, span: Some(1 << bits), per_turn: None });
         };
-        match resolution.position(&response) {
-            Ok(position) => Some(Position {
+        // Where the fields put the shaft, for looking at. What else speaks against it stands beside it.
+        let shown = Tolerated::SINGLE_TURN.status(EncoderStatus::all()).alarms(Alm::all());
+        match Evidence::of(response, resolution, 0).at(0, Policy::new(0).tolerating(shown)) {
+            Ok(_) => Some(Position {
                 counts,
-                span: Some(1 << (resolution.st_bits() + position.turns_bits)),
+                span: Some(1 << bits.min(resolution.st_bits() + resolution.mt_bits())),
                 per_turn: Some(resolution.counts_per_turn()),
             }),
-            Err(Error::NotCarried) => Some(Position { counts, span: Some(1 << bits), per_turn: None }),
-            Err(error) => {
-                fields.push(too_wide(error, resolution.st_bits(), resolution.mt_bits()));
+            Err(Doubt::Absent) => Some(Position { counts, span: Some(1 << bits), per_turn: None }),
+            Err(doubt) => {
+                fields.push(too_wide(doubt, resolution.st_bits(), resolution.mt_bits()));
                 None
             }
         }
@@ -205,7 +208,7 @@ impl Encoder {
 
 /// No reply came to the request at `place` until `now`.
 pub(super) fn silence(request: Request, place: Place, timeout: i64, now: i64, asked: bool) -> Event {
-    let kind = request.command().mnemonic();
+    let kind = request.command().name();
     let silence = group::silence(place, kind, "reply", timeout, now, asked, "no encoder of this address");
     Event { fields: vec![Field::number("EA", request.ea.get())], ..silence }
 }

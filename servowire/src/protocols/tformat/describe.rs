@@ -2,7 +2,10 @@
 
 use std::sync::LazyLock;
 
-use tformat::{Abs, Adf, AllData, DataId, Error, Memory, Request, Resolution, Response, StatusField};
+use tformat::{
+    Abm, Abs, Adf, AllData, Almc, DataId, Doubt, Error, Evidence, Memory, Policy, Request, Resolution, Response,
+    Sample, StatusField, Tolerated,
+};
 
 use super::ANSWER_TIMEOUT;
 use super::frame::Frame;
@@ -117,14 +120,14 @@ impl Encoder {
         fields.push(Field::number("ABM", full.abm.get()));
         fields.push(Field::flags("ALMC", &full.almc, 2));
         let resolution = self.resolution()?;
-        match resolution.position(full.abs, full.abm) {
-            Ok(position) => Some(Position {
-                counts: position.combined,
+        match shown(full, resolution, Tolerated::NOTHING) {
+            Ok(sample) => Some(Position {
+                counts: sample.counts()?,
                 span: Some(1 << (resolution.abs_bits() + resolution.abm_bits())),
                 per_turn: Some(resolution.counts_per_turn().into()),
             }),
-            Err(error) => {
-                fields.push(too_wide(error, resolution.abs_bits(), resolution.abm_bits()));
+            Err(doubt) => {
+                fields.push(too_wide(doubt, resolution.abs_bits(), resolution.abm_bits()));
                 None
             }
         }
@@ -136,10 +139,10 @@ impl Encoder {
             return Some(Position { counts: abs.get().into(), span: None, per_turn: None });
         };
         let turn = Some(resolution.counts_per_turn().into());
-        match resolution.single_turn(abs) {
-            Ok(counts) => Some(Position { counts: counts.into(), span: turn, per_turn: turn }),
-            Err(error) => {
-                fields.push(too_wide(error, resolution.abs_bits(), resolution.abm_bits()));
+        match shown(AllData { abs, ..NOTHING }, resolution, Tolerated::SINGLE_TURN) {
+            Ok(sample) => Some(Position { counts: sample.single_turn().into(), span: turn, per_turn: turn }),
+            Err(doubt) => {
+                fields.push(too_wide(doubt, resolution.abs_bits(), resolution.abm_bits()));
                 None
             }
         }
@@ -156,6 +159,16 @@ impl Encoder {
         let (abs, abm) = self.widths.or(self.hint.map(|hint| (hint.abs_bits(), hint.abm_bits())))?;
         Resolution::new(abs, abm).ok()
     }
+}
+
+const NOTHING: AllData =
+    AllData { sf: StatusField::empty(), abs: Abs::truncate(0), enid: 0, abm: Abm::truncate(0), almc: Almc::empty() };
+
+/// Where the fields put the shaft, for looking at. What else speaks against it stands beside it: alarms, damage, another
+/// encoder ID.
+fn shown(full: AllData, resolution: Resolution, tolerated: Tolerated) -> Result<Sample, Doubt> {
+    let fields = AllData { abs: full.abs, abm: full.abm, ..NOTHING };
+    Evidence::of(Response::ReadAll(fields), resolution, 0).at(0, Policy::new(0).tolerating(tolerated))
 }
 
 /// What an answer says that hardly goes together; `before`: the encoder ID until now.

@@ -2,11 +2,10 @@
 
 use nikon_aformat::bus::Addresses;
 use nikon_aformat::master::Cycle;
-use nikon_aformat::{EncoderAddress, Operation, Policy as StatusPolicy, Position};
+use nikon_aformat::{EncoderAddress, Operation};
 use servowire_drivers::Automatic;
-use servowire_drivers::nikon::blocking::Master;
-use servowire_drivers::tformat::{Sample, blocking::Encoder};
-use tformat::{Address, Page, Policy};
+use servowire_drivers::{nikon, tformat::blocking::Driver};
+use tformat::{Address, Page, Policy, Sample};
 
 use super::kernels;
 use crate::self_test::drivers::{ABS40, ALL_DATA, LINE, RESOLUTION, SLOW, WIDTHS};
@@ -21,22 +20,22 @@ const CALLS: [u8; 5] = [0, 1, 2, 3, 4];
 kernels! {
     /// A T-Format position with the blocking driver: request, eleven bytes one by one, all checks; a look at the clock for each.
     fn drivers_tformat_position(answer: &Bytes) -> Option<Sample> {
-        let mut encoder = Encoder::new(Uart::new(answer), Automatic, steps(4_000), LINE);
-        encoder.read_position(RESOLUTION, Policy::STRICT).ok()
+        let mut encoder = Driver::new(Uart::new(answer), Automatic, steps(4_000), LINE);
+        encoder.read_position(RESOLUTION, Policy::new(1_000_000)).ok()
     } over [ALL_DATA];
 
     /// An A-format position with the blocking driver: request, four frames one by one, all checks; a look at the clock for each.
-    fn drivers_nikon_position(answer: &Frames) -> Option<Position> {
-        let mut master = Master::new(Port::new(answer), steps(3_600), WIDTHS, SLOW);
-        master.read_position(EncoderAddress::truncate(1), StatusPolicy::STRICT).ok()
+    fn drivers_nikon_position(answer: &Frames) -> Option<nikon_aformat::Sample> {
+        let mut master = nikon::blocking::Driver::new(Port::new(answer), steps(3_600), WIDTHS, SLOW);
+        master.read_position(EncoderAddress::truncate(1), nikon_aformat::Policy::new(1_000_000)).ok()
     } over [ABS40];
 
     /// Every other call of the T-Format driver, with nobody at the line; the mean of them.
     fn drivers_tformat_silence(call: &u8) -> bool {
-        let mut encoder = Encoder::new(Uart::new(&[]), Automatic, steps(4_000), LINE);
+        let mut encoder = Driver::new(Uart::new(&[]), Automatic, steps(4_000), LINE);
         let address = Address::truncate(5);
         match *call {
-            0 => encoder.read_all().is_err(),
+            0 => encoder.read_data().is_err(),
             1 => encoder.clear_errors().is_err(),
             2 => encoder.read_eeprom(Page::new(1), address).is_err(),
             3 => encoder.write_eeprom(None, address, *call).is_err(),
@@ -46,11 +45,11 @@ kernels! {
 
     /// The same of the A-format driver, a bus in its cycle among them.
     fn drivers_nikon_silence(call: &u8) -> bool {
-        let mut master = Master::new(Port::new(&[]), steps(3_600), WIDTHS, SLOW);
+        let mut master = nikon::blocking::Driver::new(Port::new(&[]), steps(3_600), WIDTHS, SLOW);
         let ea = EncoderAddress::truncate(*call);
         match *call {
             0 => master.read_abs40(ea).is_err(),
-            1 => master.read_all(Operation::Abs40Mt, Addresses::first(8)).is_err(),
+            1 => master.read_bus(Operation::Abs40Mt, Addresses::first(8)).is_err(),
             2 => match Cycle::new(1_000_000, 900_000, 0) {
                 Ok(mut cycle) => master.read_cycle(&mut cycle, Operation::Abs40Mt, Addresses::first(3)).is_err(),
                 Err(_) => true,

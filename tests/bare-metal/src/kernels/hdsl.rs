@@ -10,9 +10,9 @@ use hdsl::sampling::{Alignment, Delay, EdgeRule, SampleIndex, SampledAnswer, TES
 use hdsl::symbol::{Character, DisparityCheck, DisparityStatus, Encoded, Reading, RunningDisparity, Word};
 use hdsl::sync::{CoreClock, Es, Next, Startup, Synchroniser};
 use hdsl::{
-    Answer, Content, DeltaDelta, Dialect, EncodedAnswer, EncoderByte, EncoderId, EncoderSymbol, Error, LineDisparity, MasterSymbol,
-    ParameterByte, PositionBits, PositionRule, PositionTracker, QualityEvent, QualityMonitor, QualityRule, Rule,
-    VFrame, crc16,
+    Answer, Content, DeltaDelta, Dialect, EncodedAnswer, EncoderByte, EncoderId, EncoderSymbol, Error, LineDisparity,
+    MasterSymbol, ParameterByte, PositionBits, PositionRule, PositionTracker, QualityEvent, QualityMonitor,
+    QualityRule, Rule, VFrame, crc16,
 };
 
 use super::kernels;
@@ -261,7 +261,7 @@ kernels! {
         let mut line = Cable::new(Disturbance::metres(10).with_jitter(1), 1);
         for frame in 0..*frames {
             let head = line.down(master.transmission().head.bits());
-            let samples = line.up(encoder.hear(head, u64::from(frame)));
+            let samples = line.up(encoder.hear_at(head, u64::from(frame)));
             if frame == 25 {
                 let _ = master.start_short(ShortRequest::Read(RemoteRegister::PING));
                 let access = Access::Read(Length::Eight);

@@ -70,7 +70,7 @@ impl Link {
             let _ = self.master.start_short(ShortRequest::Read(RemoteRegister::PING));
             let _ = self.master.start_long(LongRequest::read_name(ResourceAddress::RESOLUTN));
         }
-        let answer = self.encoder.hear(self.master.transmission().head.bits(), self.position);
+        let answer = self.encoder.hear_at(self.master.transmission().head.bits(), self.position);
         let bytes = self.cable.up(answer);
         let mut words = [0; WINDOW / 4];
         for (to, from) in words.iter_mut().zip(bytes.chunks_exact(4)) {

@@ -2,11 +2,12 @@
 
 use nikon_aformat::bus::{Addresses, Bus};
 use nikon_aformat::{
-    Abs40, Alm, BitOrder, BitRate, Command, Crc3, Crc8, EncoderAddress, EncoderStatus, Error, Expected, Frames,
-    Operation, Position, RawResponse, Request, RequestFrame, Resolution, Response, TypeWord, U24, U40, UserAddress,
-    Version, Window, crc3, crc8, stream,
+    Abs40, Alm, BitOrder, BitRate, Command, Crc, Crc3, Crc8, Doubt, EncoderAddress, EncoderStatus, Error, Evidence,
+    Expected, Frames, Operation, Policy, RawResponse, Request, RequestFrame, Resolution, Response, Sample, Tolerated,
+    TypeWord, U24, U40, UserAddress, Version, Window, crc3, crc8, stream,
 };
 use nom::{IResult, Parser};
+use servowire_core::Words;
 
 use super::kernels;
 use crate::self_test::nikon::{REPLIES, Replied, WHOLE, Whole};
@@ -41,6 +42,25 @@ const fn resolution(st_bits: u8, mt_bits: u8) -> Resolution {
 /// Profiles and positions.
 const POSITIONS: [(Resolution, Response); 3] =
     [(resolution(17, 16), EMITTED[0]), (resolution(20, 16), EMITTED[1]), (resolution(24, 0), EMITTED[2])];
+
+const POLICY: Policy = Policy::new(125_000);
+
+/// Evidence, and when and by whom it is used.
+const JUDGED: [(Evidence, u64, Policy); 2] = [
+    (whole(EncoderStatus::empty()), 1_040_000, POLICY),
+    (whole(EncoderStatus::BATT), 1_040_000, POLICY.tolerating(Tolerated::SINGLE_TURN)),
+];
+
+const DOUBTED: [(Evidence, u64, Policy); 3] = [
+    (whole(EncoderStatus::BATT), 1_040_000, POLICY),
+    (whole(EncoderStatus::empty()), 1_200_000, POLICY),
+    (Evidence::NEVER, 1_040_000, POLICY),
+];
+
+const fn whole(es: EncoderStatus) -> Evidence {
+    let data = nikon_aformat::Data::Abs40 { abs: U40::truncate(0x1_2345_6789) };
+    Evidence::of(Response::new(EncoderAddress::ZERO, Command::Abs40, es, data), resolution(20, 16), 1_000_000)
+}
 
 /// The bytes of a request, two a frame, and how many.
 const SENT: [([u8; 4], usize); 2] = [([0x44, 0x03, 0, 0], 2), ([0x40, 0xb0, 0x5b, 0x78], 4)];
@@ -92,7 +112,7 @@ kernels! {
     } over WHOLE;
 
     /// Frames of a reply, their check field and line bits.
-    fn nikon_reply(row: &Replied) -> Option<((u8, u8), Window, u16)> {
+    fn nikon_reply(row: &Replied) -> Option<(Crc, Window, u16)> {
         let reply = RawResponse::from_words(row.expected.layout(), row.words, BitOrder::MsbFirst).ok()?;
         Some((reply.crc(), reply.line(), reply.words(BitOrder::MsbFirst).fold(0, |all, word| all ^ word)))
     } over REPLIES;
@@ -136,12 +156,33 @@ kernels! {
         (crc8(bytes), mixed, crc3(u16::from(a)) ^ Crc3::new().bit(b & 1 == 1).get())
     } over [[0x20, 0x85, 0xf6, 0x4a, 0x80, 0x09, 0x80]];
 
-    /// Single turn, turns and angle of a position.
-    fn nikon_position((resolution, response): &(Resolution, Response)) -> Result<(Position, u32, u32, i32), Error> {
-        let position = resolution.position(response)?;
-        let single = position.single_turn;
-        Ok((position, resolution.fraction(single), resolution.milli_degrees(single), resolution.difference(single, 0)))
+    /// What a response says of the position, for the one who uses it.
+    fn nikon_evidence_of((resolution, response): &(Resolution, Response)) -> Evidence {
+        Evidence::of(*response, *resolution, 1_000_000)
     } over POSITIONS;
+
+    /// The verdict, made where the position is used.
+    fn nikon_evidence_at((evidence, now_ns, policy): &(Evidence, u64, Policy)) -> Result<Sample, Doubt> {
+        evidence.at(*now_ns, *policy)
+    } over JUDGED;
+
+    /// The same where the position must not be used: old, with alarms, none at all.
+    fn nikon_evidence_doubted((evidence, now_ns, policy): &(Evidence, u64, Policy)) -> Option<Doubt> {
+        evidence.at(*now_ns, *policy).err()
+    } over DOUBTED;
+
+    /// Evidence through the words of a cell.
+    fn nikon_evidence_words((evidence, _, _): &(Evidence, u64, Policy)) -> Evidence {
+        Evidence::from_words(evidence.to_words())
+    } over JUDGED;
+
+    /// Angles of a sample.
+    fn nikon_sample((evidence, now_ns, policy): &(Evidence, u64, Policy)) -> Option<(u32, u32, i32, Option<i64>)> {
+        let sample = evidence.at(*now_ns, *policy).ok()?;
+        let (resolution, single) = (resolution(20, 16), sample.single_turn());
+        let angle = (sample.angle().to_bits(), resolution.milli_degrees(single), resolution.difference(single, 0));
+        Some((angle.0, angle.1, angle.2, sample.counts()))
+    } over JUDGED;
 
     /// The type word as a resolution.
     fn nikon_type_word(word: &u16) -> Option<Resolution> {

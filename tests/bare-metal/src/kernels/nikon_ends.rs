@@ -33,11 +33,11 @@ fn contents(line: Window) -> impl Iterator<Item = u16> {
 fn answer(request: Request) -> Option<Transmission> {
     let mut encoder = Device::<1>::new(EncoderAddress::ZERO, Resolution::default(), BitRate::Mbit16);
     encoder.set_position(77, 3);
-    encoder.set_alarms(Alm::BATT, true);
+    encoder.raise_alarms(Alm::BATT);
     let mut now_ns = 0;
     request.emit().as_slice().iter().fold(None, |answer, frame| {
         now_ns += 2_000;
-        encoder.frame(frame.content(), now_ns).or(answer)
+        encoder.hear(&[Some(frame.content())], now_ns).or(answer)
     })
 }
 
@@ -58,7 +58,7 @@ kernels! {
         let line = Window::read(&row.lsb_first, 0, 72, nikon_aformat::BitOrder::LsbFirst).unwrap_or(Window::EMPTY);
         for content in contents(line) {
             now_ns += 1_125;
-            let _ = transaction.frame(content, now_ns);
+            let _ = transaction.hear(&[Some(content)], now_ns);
         }
         let _ = transaction.framing_error(now_ns);
         transaction.poll(1_000_000)
@@ -71,7 +71,7 @@ kernels! {
         let mut now_ns = 3_000;
         for content in contents(line) {
             now_ns += 1_125;
-            let _ = transaction.frame(content, now_ns);
+            let _ = transaction.hear(&[Some(content)], now_ns);
         }
         let _ = (transaction.framing_error(now_ns + 5_000), transaction.poll(10_000_000));
         let bus: &Bus = transaction.bus();
@@ -94,7 +94,7 @@ kernels! {
         let mut detection = Detection::search();
         let outcome = answer(*request).ok_or(Error::NoResponse);
         let resolution = Resolution::default();
-        let outcome = outcome.and_then(|answer| Response::parse(&request.expected(resolution), &answer.raw));
+        let outcome = outcome.and_then(|answer| Response::parse(&request.expected(resolution), &answer.frames));
         let _ = (read.start(0), write.start(0), detection.start(0));
         (read.receive(outcome, 1), write.receive(outcome, 1), detection.receive(outcome, 1))
     } over REQUESTS;

@@ -6,15 +6,16 @@ use nom::IResult;
 use rtex_block::device::{self, Drive, DriveConfig, OpenCodes};
 use rtex_block::inspect::{self, Report};
 use rtex_block::master::{
-    ActiveCode, Asic, Axis, AxisConfig, CommandCounter, EchoWatch, Expected, Fault, Handshake, Inputs, Led, Limits,
-    Order, Phase, PhaseControl, ProfileMove, Progress, Received, Reception, Ring, ServoOff, Slave, SlaveInfo, Turn,
-    compare, led,
+    ActiveCode, Asic, Axis, AxisConfig, Checked, CommandCounter, ControlError, ControlPhase, EchoWatch, Expected,
+    Handshake, Heard, Inputs, Led, Limits, Order, PhaseControl, ProfileMove, Progress, Ring, ServoOff, Slave,
+    SlaveInfo, Turn, compare, led,
 };
 use rtex_block::position::{self, Gear};
 use rtex_block::timing::{FrameTime, Periods, timer_reload};
 use rtex_block::{
     Arguments, BlockSize, Code, Command, Command32, CommandBlock, CyclicCode, Doubt, Error, MacId, NonCyclicCommand,
-    NonCyclicResponse, Response, Response32, ResponseBlock, SubCommand, TypeCode, UpdateCounter, pack, stream,
+    NonCyclicResponse, Policy, Response, Response32, ResponseBlock, Sample, SubCommand, TypeCode, UpdateCounter, pack,
+    stream,
 };
 
 use super::kernels;
@@ -61,6 +62,8 @@ const HANDSHAKE: Handshake =
         Some(handshake) => handshake,
         None => panic!("a monitor command has an answer"),
     };
+
+const POLICY: Policy = Policy::new(1_000_000);
 
 const DRIVE: Drive = Drive::new(DriveConfig::new(MAC_ID, OpenCodes::INVENTED));
 
@@ -145,7 +148,7 @@ kernels! {
     } over [BLOCK32];
 
     /// The checks of a master.
-    fn rtex_master_check((expected, block): &(Expected, [u8; 16])) -> Result<(Response, Reception), Error> {
+    fn rtex_master_check((expected, block): &(Expected, [u8; 16])) -> Result<Checked, Error> {
         expected.check(block)
     } over [(EXPECTED, NORMAL), (EXPECTED, MONITOR)];
 
@@ -191,42 +194,42 @@ kernels! {
     } over [(ProfileMove::new(MAC_ID, 0x11, 1_000, 500, 100), RESPONSE)];
 
     /// An update period of one axis: response in, command out.
-    fn rtex_axis((axis, received): &(Axis, Received)) -> Command32 {
+    fn rtex_axis((axis, received): &(Axis, Heard)) -> Command32 {
         let mut axis = *axis;
-        axis.receive(Turn::Valid(COUNTER), received);
+        axis.hear(Turn::Valid(COUNTER), received, 1_000_000);
         let _ = axis.set_position(1_010);
-        axis.send(Turn::Valid(COUNTER))
-    } over [(AXIS, Received::Main(RESPONSE)), (AXIS, Received::Nothing)];
+        axis.transmission(Turn::Valid(COUNTER))
+    } over [(AXIS, Heard::Main(RESPONSE)), (AXIS, Heard::Nothing)];
 
     /// The position for control, or why there is none.
-    fn rtex_axis_position(axis: &Axis) -> Result<i32, Doubt> {
-        axis.position(2)
+    fn rtex_axis_position(axis: &Axis) -> Result<Sample, Doubt> {
+        axis.evidence().at(2_000_000, POLICY)
     } over [AXIS];
 
     /// An update period of a ring of four axes.
-    fn rtex_ring((axes, received): &([Axis; 4], [Received; 4])) -> Option<[Command32; 4]> {
+    fn rtex_ring((axes, received): &([Axis; 4], [Heard; 4])) -> Option<[Command32; 4]> {
         let mut ring = Ring::new(*axes, 0).ok()?;
-        ring.switch_on();
-        Some(ring.update(received))
-    } over [([axis(5), axis(6), axis(7), axis(8)], [Received::Main(RESPONSE); 4])];
+        let _ = ring.switch_on();
+        Some(ring.update(received, 1_000_000))
+    } over [([axis(5), axis(6), axis(7), axis(8)], [Heard::Main(RESPONSE); 4])];
 
     /// An exchange with the drive model.
-    fn rtex_drive((drive, command): &(Drive, Command)) -> [u8; 16] {
+    fn rtex_drive((drive, command): &(Drive, Command)) -> Option<[u8; 16]> {
         let mut drive = *drive;
-        drive.exchange(&command.emit())
+        drive.hear(&command.emit())
     } over [(DRIVE, COMMAND), (DRIVE, ASKING)];
 
     /// A step of the phases.
-    fn rtex_phase(inputs: &Inputs) -> (Phase, Option<Fault>) {
+    fn rtex_phase(inputs: &Inputs) -> (ControlPhase, Option<ControlError>) {
         let mut control = PhaseControl::new();
         control.step(*inputs);
-        (control.phase(), control.fault())
+        (control.phase(), control.error())
     } over [Inputs { asic: Asic::Initial, slave_info: None, tx_ready: false, timeout: false }];
 
     /// What the COM LED shows.
-    fn rtex_led((phase, fault, t_ms): &(Phase, Option<Fault>, u64)) -> Led {
+    fn rtex_led((phase, fault, t_ms): &(ControlPhase, Option<ControlError>, u64)) -> Led {
         led(*phase, *fault, *t_ms)
-    } over [(Phase::Prepare, None, 1_700), (Phase::Running, Some(Fault::Timeout), 20_000)];
+    } over [(ControlPhase::Prepare, None, 1_700), (ControlPhase::Running, Some(ControlError::Timeout), 20_000)];
 
     /// The slaves found against the table.
     fn rtex_slaves(found: &[Slave; 4]) -> SlaveInfo {

@@ -3,22 +3,24 @@
 use core::hint::black_box;
 
 use nom::{IResult, Parser};
-use sorte_proto::cut_through::{DiscoveryRewriter, SyncRewriter};
-use sorte_proto::device::{self, Arrival, Device, Forwarding, Handled, Passage, Path, PortId};
+use sorte_proto::Link;
+use sorte_proto::Place;
+use sorte_proto::cut_through::{DiscoveryRewriter, PassedDiscovery, SyncRewriter};
+use sorte_proto::device::{self, Device, Forwarding, FrameTimes, Passage, Path, PortId, Reaction};
 use sorte_proto::drv8711::{
-    self, Apply, Configuration, IsGain, Next, Register, full_scale_microamps, torque_for_microamps,
+    self, Apply, Configuration, IsGain, Register, Word, full_scale_microamps, torque_for_microamps,
 };
-use sorte_proto::follow::{Asked, Feedback, Follower};
+use sorte_proto::follow::{Asked, Follower, InputSlice};
 use sorte_proto::host::{DeviceMemory, MasterMemory};
 use sorte_proto::iep::{Channel, Edge};
 use sorte_proto::master::{self, Action, Master, Outgoing};
 use sorte_proto::sync0::{Sync0, Variant, Write, Writes};
 use sorte_proto::timing::{Budget, Timing};
 use sorte_proto::{
-    Assignment, Clock, Correction, DelayModel, DelayReq, DeviceAddress, DeviceFrame, DeviceFrameView, Direction,
-    Discovery, DiscoveryView, Entry, Error, LineDelay, LongFrame, MasterFrameView, MotorMask, Network, OutOfRange,
-    Param, Parameters, Payload, Pto, Slice, StartTime, Status, Sync, crc8, fcs, stream, strip_preamble,
-    write_master_frame,
+    Clock, Correction, DelayModel, DelayReq, DeviceAddress, DeviceFrame, DeviceFrameView, Direction, Discovery,
+    DiscoveryView, Entry, Error, LineDelay, LongFrame, MasterFrameView, MotorMask, Network, OutOfRange, Param,
+    Parameters, Payload, Pto, Slice, StartTime, Status, Sync, crc8, emit_master_frame_into, fcs, stream,
+    strip_preamble,
 };
 
 use super::kernels;
@@ -97,8 +99,8 @@ const DISCOVERY: [u8; 1030] = {
 /// Bytes through a device, one after the other; the last that it sends.
 fn through(frame: &[u8]) -> (u8, Option<Path>) {
     let mut device = Device::new(device::Config::new());
-    device.links(true, false);
-    let mut passage = device.begin(PortId::A);
+    device.set_links(Link::Up, Link::Down);
+    let mut passage = device.passage(PortId::A);
     let mut last = 0;
     for byte in frame {
         last = pass(&mut passage, *byte);
@@ -116,13 +118,13 @@ kernels! {
     /// The master frame of four devices, into a buffer as firmware has it.
     fn sorte_master_frame_build((output, time_stamp): &([u8; 16], u16)) -> Buffer {
         let mut buffer = Buffer([0; 24]);
-        let _ = write_master_frame(output, *time_stamp, &mut buffer.0);
+        let _ = emit_master_frame_into(output, *time_stamp, &mut buffer.0);
         buffer
     } over OUTPUTS;
 
     /// The check of a master frame, the slice of device 3, and the reference time.
     fn sorte_master_frame_check(frame: &[u8; 21]) -> Result<([u8; 4], u32), Error> {
-        let view = MasterFrameView::new(16, frame)?;
+        let view = MasterFrameView::parse(16, frame)?;
         match view.slice(8, 4)?.first_chunk() {
             Some(slice) => Ok((*slice, view.reference_ns(440))),
             None => Err(Error::OutsideOutput { offset: 8, len: 4 }),
@@ -138,7 +140,7 @@ kernels! {
 
     /// The check of a device frame.
     fn sorte_device_frame_check(frame: &[u8; 6]) -> Result<DeviceFrameView<'static>, Error> {
-        DeviceFrameView::new(3, frame)
+        DeviceFrameView::parse(3, frame)
     } over DEVICE_FRAMES;
 
     /// CMP6 of the step pulse generator, from all of its states.
@@ -188,14 +190,14 @@ kernels! {
 
     /// SYNC through a device, byte by byte.
     fn sorte_sync_rewrite(frame: &[u8; 14]) -> ([u8; 14], Result<Sync, Error>) {
-        let mut rewriter = SyncRewriter::new(76, false, true);
+        let mut rewriter = SyncRewriter::new(76, Status::ERROR);
         let passed = frame.map(|byte| rewriter.byte(byte));
         (passed, rewriter.finish())
     } over [SYNC];
 
     /// 64 bytes of DISCOVERY through a device.
-    fn sorte_discovery_rewrite(frame: &[u8; 64]) -> ([u8; 64], Result<(Status, Assignment), Error>) {
-        let mut rewriter = DiscoveryRewriter::new(Entry::STOCK, true, false);
+    fn sorte_discovery_rewrite(frame: &[u8; 64]) -> ([u8; 64], Result<PassedDiscovery, Error>) {
+        let mut rewriter = DiscoveryRewriter::new(Entry::STOCK, Status::LAST);
         let passed = frame.map(|byte| rewriter.byte(byte));
         (passed, rewriter.finish())
     } over [[0xff; 64], {
@@ -228,19 +230,19 @@ kernels! {
             let slice = asked.slice(Pto::from_word(*word));
             last = follower.next((!lost).then_some(slice));
         }
-        let feedback = Feedback { position: follower.position(), ..Feedback::default() };
-        (last, asked.lag(Feedback::parse(feedback.emit()).position), feedback.emit())
+        let input = InputSlice { ordered: follower.ordered().unwrap_or_default(), ..InputSlice::default() };
+        (last, asked.lag(InputSlice::parse(input.emit()).ordered), input.emit())
     } over [[0_u16, 1000, 0], [1000, 2000, 3000], [1000, 0x8001, 0x7fff]];
 
     /// A long-header frame with its checks.
     fn sorte_long_frame(frame: &[u8; 14]) -> Result<LongFrame<'static>, Error> {
-        LongFrame::new(frame)
+        LongFrame::parse(frame)
     } over [SYNC];
 
     /// SYNC read and written.
     fn sorte_sync_frame(frame: &[u8; 14]) -> Result<[u8; 14], Error> {
         let mut sync = Sync::parse(frame)?;
-        sync.pass(85, true, false);
+        sync.pass(85, Status::LAST);
         Ok(sync.emit())
     } over [SYNC];
 
@@ -251,16 +253,16 @@ kernels! {
 
     /// PARAM written, and what a device takes of it.
     fn sorte_param(parameters: &Parameters) -> Result<Param, Error> {
-        Param::parse(&Param::request(*parameters, true).emit())
+        Param::parse(&Param::request(*parameters, Place::Last).emit())
     } over [Parameters::STOCK, Parameters::CNC];
 
     /// DISCOVERY of one device: written, passed, read, and the network it tells.
     fn sorte_discovery(lengths: &Entry) -> Result<(u8, u16), Error> {
-        let mut frame = Discovery::request(true);
-        frame.pass(*lengths, true, false)?;
+        let mut frame = Discovery::request(Place::Last);
+        frame.pass(*lengths, Status::LAST)?;
         let bytes = frame.emit();
-        let network = Network::new(DiscoveryView::new(&bytes)?)?;
-        let last = network.assignments().last().map_or(0, |(assignment, _)| assignment.out_offset);
+        let network = Network::new(DiscoveryView::parse(&bytes)?)?;
+        let last = network.members().last().map_or(0, |member| member.assignment.out_offset);
         Ok((network.devices(), network.output_total().saturating_add(last)))
     } over [Entry::STOCK];
 
@@ -308,29 +310,29 @@ kernels! {
     /// The master from IDLE to its first frame, and an answer that does not fit.
     fn sorte_master((frame, sof_ns): &([u8; 14], u64)) -> (Action, Result<(), Error>, usize) {
         let mut master = Master::new(master::Config::default());
-        master.link(true);
+        master.set_link(Link::Up);
         let first = master.poll(0);
         let mut buffer = [0; 64];
         let written = match first {
-            Action::Send { frame: Outgoing::Discovery { .. }, .. } => Outgoing::Sync(Sync::of_master(500, 76, true)),
-            _ => Outgoing::Discovery { last: true },
+            Action::Send { frame: Outgoing::Discovery { .. }, .. } => Outgoing::Sync(Sync::of_master(500, 76, Place::Last)),
+            _ => Outgoing::Discovery { place: Place::Last },
         };
         let len = written.emit_into(&mut buffer).unwrap_or_default();
-        let answer = master.receive(frame, *sof_ns);
+        let answer = master.hear(frame, *sof_ns).map(|_| ());
         let _ = master.poll(*sof_ns);
-        let _ = master.device_frame(frame);
-        let _ = master.write_frame(frame, 0, &mut buffer);
+        let _ = master.hear(frame, *sof_ns);
+        let _ = master.emit_into(frame, 0, &mut buffer);
         (first, answer, len)
     } over [(SYNC, 3130_u64)];
 
     /// A device in IDLE takes a start-up frame.
-    fn sorte_device((frame, port): &([u8; 14], PortId)) -> (Handled, bool) {
+    fn sorte_device((frame, port): &([u8; 14], PortId)) -> (Reaction, bool) {
         let mut device = Device::new(device::Config::default());
-        device.links(true, false);
+        device.set_links(Link::Up, Link::Down);
         let mut frame = *frame;
-        let handled = device.frame(*port, &mut frame, Arrival { sof_ns: 0, counter_ns: 0, now_ns: 0 });
+        let handled = device.hear(*port, &mut frame, FrameTimes { sof_ns: 0, counter_ns: 0, now_ns: 0 });
         let restarted = device.poll(u64::MAX) | device.cycle_start();
-        let _ = device.delay_reflection(handled.trigger, &frame, 500);
+        let _ = device.hear_reflection(handled.trigger, &frame, 500);
         let _ = device.answer([0; 3]);
         let _ = (device.line_delay_next_ns(), device.cycle_zero_ns(), device.send_time_ns(), device.parameters());
         (handled, restarted)
@@ -357,7 +359,7 @@ kernels! {
     fn sorte_device_exchange(frame: &[u8; 21]) -> bool {
         // A device in any state.
         let mut device = black_box(Device::new(device::Config::default()));
-        device.exchange(frame, 940, 1640).is_ok()
+        device.hear_exchange(frame, 940, 1640).is_ok()
     } over FRAMES;
 
     /// Ten cycles of the timer model with a pulse each.
@@ -372,12 +374,12 @@ kernels! {
     } over [1000_u16, 2600];
 
     /// A configuration of the motor driver to its first two words, and a refusal.
-    fn sorte_drv8711_apply(configuration: &Configuration) -> (Next, Next, bool) {
+    fn sorte_drv8711_apply(configuration: &Configuration) -> (Option<Word>, Option<Word>, bool) {
         let mut apply = Apply::new(*configuration);
-        let first = apply.next();
-        let _ = apply.answer([0, 0]);
-        let second = apply.next();
-        (first, second, apply.answer([0xff, 0xff]).is_ok())
+        let first = apply.transmission();
+        let _ = apply.hear([0, 0]);
+        let second = apply.transmission();
+        (first, second, apply.hear([0xff, 0xff]).is_ok())
     } over [CONFIGURATION];
 
     /// The registers from their values.

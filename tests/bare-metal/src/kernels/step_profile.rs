@@ -1,6 +1,6 @@
 //! step-profile: single step times, whole moves, axes by the cycle, tables and parameters.
 
-use step_profile::motion::{AxisSetup, Clock, Limits, Mover, Path, Plan, PtoMover, Reloads, State};
+use step_profile::motion::{AxisSetup, Clock, Limits, Mover, Path, Plan, PtoMover, Reloads, Setpoint};
 use step_profile::{
     Arithmetic, Axes, Axis, Command, Dance, Direction, Error, Frequency, Group, Microstep, Motors, MoveState, Note,
     OperatingMode, Parameters, PositionMode, PositionState, Profile, RampStep, RampTable, Shape, Speed, StepTime, Tone,
@@ -142,7 +142,7 @@ kernels! {
             axis.tick();
         }
         axis.abort();
-        Ok((axis.position(), axis.state()))
+        Ok((axis.commanded(), axis.state()))
     } over GIVEN;
 
     /// Four independent axes for 1000 cycles.
@@ -167,12 +167,12 @@ kernels! {
         group.start(profile(given)?, RAMPS, Direction::Forward)?;
         let commands = group.tick();
         group.abort();
-        Ok((commands, group.positions()))
+        Ok((commands, group.commanded()))
     } over GIVEN;
 
     /// A turn of position mode, given up.
     fn step_profile_position_mode(given: &Given) -> Result<([Command; 4], PositionState), Error> {
-        let mut mode = PositionMode::new(Motors::ALL, Microstep::new(given.2.to_le_bytes()[0]).ok_or(Error::NoMotor)?);
+        let mut mode = PositionMode::new(Motors::ALL, Microstep::from_code(given.2.to_le_bytes()[0]).ok_or(Error::NoMotor)?);
         mode.select(Motors::M2)?;
         mode.start(profile(given)?, Turn::Ten, Direction::Reverse)?;
         mode.abort();
@@ -211,8 +211,8 @@ kernels! {
 
     /// Micro-step profile and operating mode from their codes.
     fn step_profile_codes(code: &u8) -> Option<(u16, u32, OperatingMode)> {
-        let profile = Microstep::new(*code)?;
-        Some((profile.ctrl_field(), profile.steps(Turn::Quarter), OperatingMode::new(*code)?))
+        let profile = Microstep::from_code(*code)?;
+        Some((profile.ctrl_field(), profile.steps(Turn::Quarter), OperatingMode::from_code(*code)?))
     } over [0, 4, 8, 9];
 
     /// A trapezoid is planned.
@@ -227,7 +227,7 @@ kernels! {
 
     /// An S-curve with entry and exit speed, whose peak has no closed form: neither slope reaches the greatest acceleration, one
     /// of them does.
-    fn step_profile_motion_plan_s_entry(move_: &Limited) -> Option<State> {
+    fn step_profile_motion_plan_s_entry(move_: &Limited) -> Option<Setpoint> {
         Some(planned(move_)?.at(0))
     } over [S_ENTRY, S_ENTRY_FAST];
 
@@ -277,7 +277,7 @@ kernels! {
     } over [CRUISE];
 
     /// An axis that is told another target after 200 of 1000 steps, and held, and sent on.
-    fn step_profile_motion_mover(move_: &Limited) -> Option<(i64, State)> {
+    fn step_profile_motion_mover(move_: &Limited) -> Option<(i64, Setpoint)> {
         let mut mover = Mover::new(Clock::MICROSECONDS, limits(move_)?).ok()?.with_soft_limits(-5000, 5000);
         mover.move_to(1000, 0).ok()?;
         let mut now = 0;
@@ -292,8 +292,8 @@ kernels! {
         mover.quick_stop(limits(move_)?, now);
         let state = mover.at(now);
         mover.halt(now);
-        mover.set_position(0, now + 1).ok()?;
-        Some((mover.position(), state))
+        mover.set_commanded(0, now + 1).ok()?;
+        Some((mover.commanded(), state))
     } over [TRAPEZOID, S_CURVE];
 
     /// 100 cycles of a PTO axis.

@@ -1,9 +1,10 @@
 //! T-Format: requests and answers in every form.
 
 use nom::{IResult, Parser};
+use servowire_core::{Angle, Words};
 use tformat::{
-    Abm, Abs, Adf, AllData, Almc, BitOrder, BitRate, ControlField, DataId, Error, Frame, Hint, Position, Request,
-    Resolution, Response, StatusField, VendorCommand, Window, crc, spi, stream,
+    Abm, Abs, Adf, AllData, Almc, BitOrder, BitRate, ControlField, DataId, Doubt, Error, Evidence, Frame, Hint, Policy,
+    Request, Resolution, Response, Sample, StatusField, Tolerated, VendorCommand, Window, crc, spi, stream,
 };
 
 use super::kernels;
@@ -19,11 +20,32 @@ const REQUESTS: [Request; 3] = [
 /// Their fields, and how many there are.
 const SENT: [([u8; 4], usize); 3] = [([0x1a, 0, 0, 0], 1), ([0xea, 0x35, 0xdf, 0], 3), ([0x32, 0x7f, 0x01, 0x4c], 4)];
 
-/// An encoder of 23 and 16 bits with signed turns, one of 17 and 16 with unsigned ones; ABS and ABM of each.
-const POSITIONS: [(Resolution, Abs, Abm); 2] = [
-    (resolution(23, 16), Abs::truncate(0x3b_c029), Abm::truncate(0xfffe)),
-    (resolution(17, 16).with_unsigned_turns(), Abs::truncate(0x1_c029), Abm::truncate(7)),
+/// A response to ID 3 without alarms, of an encoder of 23 and 16 bits with signed turns, and of one of 17 and 16 with unsigned
+/// ones.
+const POSITIONS: [(Resolution, Response); 2] = [
+    (resolution(23, 16), all_data(0x3b_c029, 0x17, 0xfffe)),
+    (resolution(17, 16).with_unsigned_turns(), all_data(0x1_c029, 0x11, 7)),
 ];
+
+const fn all_data(abs: u32, enid: u8, abm: u32) -> Response {
+    Response::ReadAll(AllData {
+        sf: StatusField::empty(),
+        abs: Abs::truncate(abs),
+        enid,
+        abm: Abm::truncate(abm),
+        almc: Almc::empty(),
+    })
+}
+
+/// Evidence sampled at 1 ms, the time at which it is judged, and the policy: a position that counts turns, and one that does
+/// not; evidence that is too old, or has an alarm, is for the panic walk, which sees all paths.
+const JUDGED: [(Evidence, u64, Policy); 2] = {
+    let [(first, one), (second, other)] = POSITIONS;
+    [
+        (Evidence::of(one, first, 1_000_000), 1_090_000, Policy::new(125_000).tolerating(Tolerated::MULTI_TURN)),
+        (Evidence::of(other, second, 1_000_000), 1_090_000, Policy::new(125_000).tolerating(Tolerated::SINGLE_TURN)),
+    ]
+};
 
 const fn resolution(abs_bits: u8, abm_bits: u8) -> Resolution {
     match Resolution::new(abs_bits, abm_bits) {
@@ -157,15 +179,31 @@ kernels! {
         crc(row.bytes)
     } over ANSWERS;
 
-    /// ABS and ABM as one position.
-    fn tformat_position((resolution, abs, abm): &(Resolution, Abs, Abm)) -> Result<Position, Error> {
-        resolution.position(*abs, *abm)
+    /// What a response says of the position, made where it is received.
+    fn tformat_evidence((resolution, response): &(Resolution, Response)) -> Evidence {
+        Evidence::of(*response, *resolution, 1_000_000)
     } over POSITIONS;
 
-    /// The fraction of a turn, and the way from there to the zero point.
-    fn tformat_fraction((resolution, abs, _): &(Resolution, Abs, Abm)) -> Result<(u32, i32), Error> {
-        Ok((resolution.fraction(*abs)?, resolution.difference(resolution.single_turn(*abs)?, 0)))
-    } over POSITIONS;
+    /// The verdict, made where the position is used.
+    fn tformat_evidence_at((evidence, now_ns, policy): &(Evidence, u64, Policy)) -> Result<Sample, Doubt> {
+        evidence.at(*now_ns, *policy)
+    } over JUDGED;
+
+    /// Evidence as the words of a cell, and back.
+    fn tformat_evidence_words((evidence, ..): &(Evidence, u64, Policy)) -> Evidence {
+        Evidence::from_words(evidence.to_words())
+    } over JUDGED;
+
+    /// A position in the units of a controller, and the way from there to the zero point.
+    fn tformat_sample((evidence, now_ns, policy): &(Evidence, u64, Policy)) -> (Angle, Option<i64>, i32) {
+        match evidence.at(*now_ns, *policy) {
+            Ok(sample) => {
+                let way = POSITIONS[0].0.difference(sample.single_turn(), 0);
+                (sample.angle(), sample.counts(), way)
+            }
+            Err(_) => (Angle::ZERO, None, 0),
+        }
+    } over JUDGED;
 
     /// What an encoder ID suggests.
     fn tformat_from_enid(enid: &u8) -> Option<Hint> {

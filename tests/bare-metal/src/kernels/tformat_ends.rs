@@ -1,6 +1,6 @@
 //! T-Format: master, encoder, inspection and the receive logic of the CLB design.
 
-use tformat::clb::{Outputs, SerialCrc, Tile};
+use tformat::clb::{Inputs, Outputs, SerialCrc, Tile};
 use tformat::device::{Device, Fault, Transmission};
 use tformat::inspect::{Report, inspect, inspect_bytes};
 use tformat::master::{
@@ -151,10 +151,13 @@ kernels! {
     } over ECHOED;
 
     /// A cycle of the tile.
-    fn tformat_clb_cycle((tile, start, response): &(Tile, bool, bool)) -> (Outputs, Tile) {
+    fn tformat_clb_cycle((tile, inputs): &(Tile, Inputs)) -> (Outputs, Tile) {
         let mut tile = *tile;
-        (tile.cycle(*start, *response), tile)
-    } over [(Tile::new(20, 11, 110), true, true), (Tile::new(24, 11, 60), false, false)];
+        (tile.cycle(*inputs), tile)
+    } over [
+        (Tile::new(20, 11, 110), Inputs { start: true, response: true }),
+        (Tile::new(24, 11, 60), Inputs { start: false, response: false }),
+    ];
 
     /// The check register over the fields of an answer.
     fn tformat_clb_crc(row: &Answer) -> u8 {

@@ -1,9 +1,8 @@
 //! The drivers over a transport: an answer becomes a position, a damaged one does not, and silence ends.
 
 use nikon_aformat::{EncoderAddress, Resolution as Widths};
-use servowire_drivers::nikon::blocking::Master;
-use servowire_drivers::tformat::blocking::Encoder;
 use servowire_drivers::{Automatic, Error};
+use servowire_drivers::{nikon, tformat::blocking::Driver};
 use tformat::master::Line;
 use tformat::{BitRate, Resolution};
 
@@ -50,9 +49,9 @@ fn tformat() -> Tally {
         &TFORMAT,
         |row| row.0,
         |(_, answer, want)| {
-            let mut encoder = Encoder::new(Uart::new(answer), Automatic, steps(4_000), LINE);
-            match encoder.read_position(RESOLUTION, tformat::Policy::STRICT) {
-                Ok(sample) => Some(sample.position.abs) == *want && sample.position.turns == 3,
+            let mut encoder = Driver::new(Uart::new(answer), Automatic, steps(4_000), LINE);
+            match encoder.read_position(RESOLUTION, tformat::Policy::new(1_000_000)) {
+                Ok(sample) => Some(sample.single_turn()) == *want && sample.turns() == Some(3),
                 Err(Error::Protocol(_)) => want.is_none(),
                 Err(_) => false,
             }
@@ -65,9 +64,9 @@ fn nikon() -> Tally {
         &NIKON,
         |row| row.0,
         |(_, answer, want)| {
-            let mut master = Master::new(Port::new(answer), steps(3_600), WIDTHS, SLOW);
-            match master.read_position(EncoderAddress::truncate(1), nikon_aformat::Policy::STRICT) {
-                Ok(position) => Some(position.single_turn) == *want,
+            let mut master = nikon::blocking::Driver::new(Port::new(answer), steps(3_600), WIDTHS, SLOW);
+            match master.read_position(EncoderAddress::truncate(1), nikon_aformat::Policy::new(1_000_000)) {
+                Ok(sample) => Some(sample.single_turn()) == *want,
                 Err(Error::Protocol(_)) => want.is_none(),
                 Err(_) => false,
             }

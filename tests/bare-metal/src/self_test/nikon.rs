@@ -1,7 +1,8 @@
 //! Replies of all layouts from line bits and words, ABS40 in both bit orders, refused flips, request frames.
 
 use nikon_aformat::{
-    Abs40, BitOrder, Command, Crc, EncoderAddress, ErrorClass, Expected, Layout, RawResponse, RequestFrame, Response, Window,
+    Abs40, BitOrder, Command, Crc, EncoderAddress, ErrorClass, Expected, Layout, RawResponse, RequestFrame, Response,
+    Window,
 };
 
 use super::{Tally, Topic, each};
@@ -72,7 +73,8 @@ fn replies() -> Tally {
             let reply = RawResponse::from_line(row.expected.layout(), row.line);
             from_line == Response::parse_words(&row.expected, row.words, BitOrder::MsbFirst)
                 && from_line.is_ok_and(|response| response.abs() == row.abs && response.ea.get() == row.ea)
-                && reply.is_ok_and(|reply| reply.crc() == Crc { got: row.crc, want: row.crc } && reply.line() == row.line)
+                && reply
+                    .is_ok_and(|reply| reply.crc() == Crc { got: row.crc, want: row.crc } && reply.line() == row.line)
         },
     )
 }

@@ -1,6 +1,6 @@
 //! Blocks both ways, what a master finds in them, and servo-off.
 
-use rtex_block::master::{Expected, Reception, ServoOff};
+use rtex_block::master::{Acknowledgement, Checked, Expected, ServoOff};
 use rtex_block::{
     BlockSize, Code, Command, CommandBlock, ControlBits, Error, MacId, Response, StatusFlags, UpdateCounter,
 };
@@ -107,10 +107,10 @@ fn checks() -> Tally {
                 Some(Err(Error::Truncated { .. } | Error::TooLong { .. })) => "wrong_length",
                 Some(Err(Error::Direction { .. })) => "not_a_response",
                 Some(Err(Error::MacId { .. })) => "mac_id_mismatch",
-                Some(Ok((_, Reception::CounterNotEchoed))) => "counter_not_echoed",
-                Some(Ok((_, Reception::CodeNotYetEchoed))) => "code_not_yet_echoed",
-                Some(Ok((_, Reception::CommandError(_)))) => "command_error",
-                Some(Ok((_, Reception::Accepted))) => "ok",
+                Some(Ok(Checked { acknowledgement: Acknowledgement::CounterNotEchoed, .. })) => "counter_not_echoed",
+                Some(Ok(Checked { acknowledgement: Acknowledgement::CodeNotYetEchoed, .. })) => "code_not_yet_echoed",
+                Some(Ok(Checked { acknowledgement: Acknowledgement::CommandError(_), .. })) => "command_error",
+                Some(Ok(Checked { acknowledgement: Acknowledgement::Accepted, .. })) => "ok",
                 _ => "",
             };
             class == row.class

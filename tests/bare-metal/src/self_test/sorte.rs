@@ -1,7 +1,7 @@
 //! SORTE rows: master frames good and bad, words, the step pulse generator.
 
 use sorte_proto::sync0::{Register, Sync0, Variant, Write};
-use sorte_proto::{Error, ErrorClass, MasterFrameView, Pto, Slice, StartTime, write_master_frame};
+use sorte_proto::{Error, ErrorClass, MasterFrameView, Pto, Slice, StartTime, emit_master_frame_into};
 
 use super::{Tally, Topic, each};
 
@@ -35,9 +35,9 @@ fn ioex_master() -> Tally {
         |_| "of ioex_master",
         |row| {
             let mut frame = [0; 21];
-            write_master_frame(&row.output, row.time_stamp, &mut frame) == Ok(21)
+            emit_master_frame_into(&row.output, row.time_stamp, &mut frame) == Ok(21)
                 && frame == row.frame
-                && MasterFrameView::new(16, &frame).is_ok_and(|view| view.output() == row.output)
+                && MasterFrameView::parse(16, &frame).is_ok_and(|view| view.output() == row.output)
         },
     )
 }
@@ -46,7 +46,7 @@ fn ioex_master_negative() -> Tally {
     each(
         REFUSED,
         |_| "of ioex_master_negative",
-        |(frame, want)| MasterFrameView::new(16, frame).map(|_| ()).map_err(Error::class) == want.map_or(Ok(()), Err),
+        |(frame, want)| MasterFrameView::parse(16, frame).map(|_| ()).map_err(Error::class) == want.map_or(Ok(()), Err),
     )
 }
 

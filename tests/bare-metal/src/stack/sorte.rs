@@ -1,6 +1,7 @@
 //! The SORTE master from link-up into the IO exchange, with one device at its line.
 
-use sorte_proto::device::{self, Arrival, Device, PortId};
+use sorte_proto::Link;
+use sorte_proto::device::{self, Device, FrameTimes, PortId};
 use sorte_proto::master::{Action, Config, Master};
 use sorte_proto::{DeviceFrame, Discovery};
 
@@ -17,8 +18,8 @@ pub(super) fn master() -> u32 {
     let mut master = Master::new(Config::new().with_sync_frames(20));
     let mut device = Device::new(device::Config::new());
     let mut buffer = [0; Discovery::LEN];
-    device.links(true, false);
-    master.link(true);
+    device.set_links(Link::Up, Link::Down);
+    master.set_link(Link::Up);
     let (mut now_ns, mut deepest) = (0, 0);
     for _ in 0..1000 {
         let mut action = Action::Wait { until_ns: 0 };
@@ -29,9 +30,9 @@ pub(super) fn master() -> u32 {
                 let mut len = 0;
                 deepest = deepest.max(of(|| len = frame.emit_into(&mut buffer).unwrap_or_default()));
                 let Some(bytes) = buffer.get_mut(..len) else { break };
-                device.frame(PortId::A, bytes, Arrival { sof_ns: 0, counter_ns: 0, now_ns: at_ns });
+                let _ = device.hear(PortId::A, bytes, FrameTimes { sof_ns: 0, counter_ns: 0, now_ns: at_ns });
                 let mut taken = Ok(());
-                deepest = deepest.max(of(|| taken = master.receive(bytes, at_ns + ROUND_TRIP)));
+                deepest = deepest.max(of(|| taken = master.hear(bytes, at_ns + ROUND_TRIP).map(|_| ())));
                 if taken.is_err() {
                     break;
                 }
@@ -40,12 +41,12 @@ pub(super) fn master() -> u32 {
             Action::Exchange { time_stamp, cycle, .. } => {
                 let mut len = 0;
                 deepest = deepest.max(of(|| {
-                    len = master.write_frame(&[0; 16], time_stamp, &mut buffer).unwrap_or_default();
+                    len = master.emit_into(&[0; 16], time_stamp, &mut buffer).unwrap_or_default();
                 }));
                 let answer = device.answer([0; 3]).and_then(|frame| frame.emit_into(&mut buffer).ok());
                 let Some(bytes) = buffer.get(..answer.unwrap_or_default()) else { break };
                 let mut good = false;
-                deepest = deepest.max(of(|| good = master.device_frame(bytes).is_ok()));
+                deepest = deepest.max(of(|| good = master.hear(bytes, now_ns).is_ok()));
                 if !good || bytes.len() != DeviceFrame::<3>::LEN || len != 21 {
                     break;
                 }

@@ -1,6 +1,6 @@
 //! Several encoders answering one request.
 
-use nikon_aformat::bus::{Addresses, Arrival, Bus};
+use nikon_aformat::bus::{Addresses, Bus, Verdict as Judged};
 use nikon_aformat::reception::LineReceiver;
 use nikon_aformat::{Data, Expected};
 use serde::Deserialize;
@@ -46,14 +46,14 @@ impl Slot {
         Self { error: Some(error.to_owned()), ..Self::default() }
     }
 
-    fn of(arrival: Arrival, received_crc: Option<u8>) -> Self {
-        let response = match arrival.outcome {
+    fn of(judged: Judged, received_crc: Option<u8>) -> Self {
+        let response = match judged.outcome {
             Ok(response) => response,
             Err(error) => return Self::error(class(error)),
         };
         let mut slot = Self {
             ok: Some(true),
-            duplicate: arrival.duplicate.then_some(true),
+            duplicate: judged.duplicate.then_some(true),
             ea: Some(response.ea.get()),
             crc: received_crc,
             es: response.es().map(|es| es.bits()),

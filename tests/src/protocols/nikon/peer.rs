@@ -10,6 +10,7 @@ use nikon_aformat::{
 use serde::Deserialize;
 
 use super::reply::words;
+use super::value::shown;
 use super::{class, command, or_unreadable};
 use crate::hex::Hex;
 use crate::row::{Verdict, same};
@@ -91,9 +92,9 @@ fn position(driver: &Driver, response: Response, resolution: Resolution) -> Verd
         return same("abs", &driver.abs, &abs.get().into());
     }
     let Some(abs) = response.abs() else { return Ok(()) };
-    let position = resolution.position(&response).ok();
+    let position = shown(resolution, response);
     let whole = response.abs40().is_some();
-    let single_turn = position.map(|p| u64::from(p.single_turn));
+    let single_turn = position.as_ref().map(|p| u64::from(p.single_turn));
     same("abs", &driver.abs, &single_turn.filter(|_| whole).unwrap_or(abs))?;
     let Some(position) = position else { return Ok(()) };
     same("multi_turn", &driver.multi_turn, &position.turns)?;

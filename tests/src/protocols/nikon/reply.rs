@@ -8,7 +8,7 @@ use nikon_aformat::{
 };
 use serde::Deserialize;
 
-use super::value::{alarm_names, notice_names, sixteen};
+use super::value::{alarm_names, notice_names, shown};
 use super::{RowVersion, address, class, command, layout, or_unreadable, resolution, same_name, text, window};
 use crate::hex::{Bits, Bytes, Hex};
 use crate::row::{Fault, Verdict, same};
@@ -187,11 +187,12 @@ struct Rest {
 }
 
 fn position(want: &Fields, got: Response, resolution: Resolution) -> Verdict {
-    let position = resolution.position(&got).ok();
+    let position = shown(resolution, got);
+    let position = position.as_ref();
     same("single_turn", &want.single_turn, &position.map(|p| p.single_turn))?;
     same("turns_visible_bits", &want.turns_visible_bits, &position.map(|p| p.turns_bits))?;
     same("turns", &want.turns, &position.map(|p| p.turns))?;
-    same("turns_signed", &want.turns_signed, &position.and_then(|position| sixteen(resolution, position)))?;
+    same("turns_signed", &want.turns_signed, &position.and_then(|p| p.signed))?;
     same("angle_deg_f64", &want.angle_deg_f64, &position.map(|p| resolution.degrees(p.single_turn)))?;
     let single = position.map(|p| u64::from(resolution.degrees_f32(p.single_turn).to_bits()));
     same("angle_deg_f32_bits", &want.angle_deg_f32_bits.map(|bits| bits.0), &single)
@@ -343,14 +344,14 @@ pub(super) fn anchor(_: &str, row: AnchorRow) -> Verdict {
     same("crc as printed", &want.crc_lsb_first_as_printed.unwrap_or(crc.reverse_bits()), &crc.reverse_bits())?;
     let (Some(single_turn), Some(turns)) = (want.single_turn, want.turns) else { return Ok(()) };
     // The row does not say the widths: one of those that exist has to fit.
-    let shown = |st_bits| {
+    let fitting = |st_bits| {
         let resolution = Resolution::new(st_bits, 16).ok()?;
-        let position = resolution.position(&response).ok()?;
+        let position = shown(resolution, response)?;
         let angle = format!("{:.9}", resolution.degrees(position.single_turn));
         Some((position.single_turn, position.turns, want.angle_deg.map(|_| angle)))
     };
     let published = (single_turn, turns, want.angle_deg.map(|angle| format!("{angle:.9}")));
-    let fits = [17, 20, 22, 24].into_iter().filter_map(shown).any(|shown| shown == published);
+    let fits = [17, 20, 22, 24].into_iter().filter_map(fitting).any(|shown| shown == published);
     same("position fits a width", &true, &fits)
 }
 

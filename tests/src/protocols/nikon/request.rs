@@ -12,7 +12,7 @@ use crate::hex::{Bits, Bytes, Hex};
 use crate::row::{Fault, Verdict, same};
 
 fn frame_code(fc: u8) -> Result<FrameCode, Fault> {
-    let found = FrameCode::MDF.into_iter().find(|code| code.get() == fc);
+    let found = FrameCode::from_code(fc);
     found.ok_or_else(|| Fault::Unreadable(format!("no frame code {fc}")))
 }
 
@@ -102,7 +102,7 @@ pub(super) fn judged(_: &str, row: JudgedRow) -> Verdict {
     match (row.expect, RequestFrame::from_line(window(&row.wire.0)?)) {
         (JudgedFrame::Error { error }, got) => same("error", &Err(error.as_str()), &got.map_err(class)),
         (JudgedFrame::Good { fc, ea, cc, byte }, got) => {
-            let fields = got.map(|frame| (frame.frame_code().get(), frame.ea().get(), frame.code(), frame.byte()));
+            let fields = got.map(|frame| (frame.frame_code().code(), frame.ea().get(), frame.code(), frame.byte()));
             same("fields", &Ok((fc, ea, cc, byte)), &fields)
         }
     }
@@ -206,7 +206,7 @@ pub(super) fn transaction(name: &str, row: TransactionRow) -> Verdict {
     same("multi_response", &row.multi_response, &command.is_multi_response())?;
     let resolution = match row.profile.as_str() {
         "standard" => Resolution::default(),
-        "factory_option" => Resolution::default().low_with_velocity().resets_with_position(),
+        "factory_option" => Resolution::default().with_velocity_in_low().with_position_in_resets(),
         other => return Err(Fault::Unreadable(format!("no profile {other:?}"))),
     };
     let layout = request.layout(resolution);

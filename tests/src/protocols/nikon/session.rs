@@ -2,9 +2,10 @@
 //! lets pass.
 
 use nikon_aformat::BitOrder::MsbFirst;
-use nikon_aformat::master::{EepromRead, Reset, Step, Write};
+use nikon_aformat::master::{EepromRead, Reset, Write};
 use nikon_aformat::{Error, Request, Resolution, Response, UserAddress};
 use serde::Deserialize;
+use servowire_core::{Ended, Procedure};
 
 use super::reply::words;
 use super::{address, class, command, or_unreadable};
@@ -45,7 +46,7 @@ pub(super) fn procedure(_: &str, row: ProcedureRow) -> Verdict {
     match row {
         ProcedureRow::EepromRead { ea, addr, steps, expect } => {
             let mut read = EepromRead::new(address(ea)?, addr).knowing_that_none_was_broken_off();
-            let end = drive(&steps, read.start(0), |outcome, now_ns| read.receive(outcome, now_ns))?;
+            let end = drive(&steps, &mut read)?;
             let real = match end {
                 Ok(data) => Outcome { data: Some(data), ..Outcome::default() },
                 Err(error) => failure(error),
@@ -54,7 +55,7 @@ pub(super) fn procedure(_: &str, row: ProcedureRow) -> Verdict {
         }
         ProcedureRow::EepromWrite { ea, addr, data, steps, expect } => {
             let mut write = Write::eeprom(address(ea)?, or_unreadable(UserAddress::try_from(addr))?, data);
-            let end = drive(&steps, write.start(0), |outcome, now_ns| write.receive(outcome, now_ns))?;
+            let end = drive(&steps, &mut write)?;
             let real = match end {
                 Ok(_) => Outcome { ok: Some(true), ..Outcome::default() },
                 Err(error) => failure(error),
@@ -87,12 +88,10 @@ fn reset(cmd: u8, ea: u32, steps: &[StepRow], expect: &Outcome) -> Verdict {
         12 => Reset::set_single_turn_zero_and_shift_commutation_angle(ea),
         code => return Err(Fault::Unreadable(format!("command {code} is no reset"))),
     };
-    let first = reset.start(0);
-    let mut sent = 0;
-    let end = drive(steps, first, |outcome, now_ns| {
-        sent += usize::from(reset.done() < Reset::REQUESTS);
-        reset.receive(outcome, now_ns)
-    })?;
+    let end = drive(steps, &mut reset)?;
+    // All of the reset's requests were compared with the rows.
+    let frames: Vec<_> = reset.request().emit().as_slice().iter().map(|frame| frame.word(MsbFirst)).collect();
+    let sent = steps.iter().filter(|row| words(&row.tx) == frames).count();
     let mut real = match end {
         Ok(status) => Outcome { alm_after: status.alm().map(|alm| alm.bits()), ..Outcome::default() },
         Err(error) => failure(error),
@@ -102,38 +101,38 @@ fn reset(cmd: u8, ea: u32, steps: &[StepRow], expect: &Outcome) -> Verdict {
 }
 
 /// Plays the steps: each has to be the request that the procedure wants, sent after the wait that the step before names.
-fn drive<T: std::fmt::Debug>(
-    steps: &[StepRow],
-    first: Step<T>,
-    mut answer: impl FnMut(Result<Response, Error>, u64) -> Step<T>,
-) -> Result<Result<T, Error>, Fault> {
-    let mut step = first;
-    for row in steps {
-        let Step::Send { request, not_before_ns } = step else {
-            return Err(Fault::Differs { what: "steps", expected: "more".to_owned(), real: format!("{step:?}") });
+fn drive<P>(steps: &[StepRow], procedure: &mut P) -> Result<Result<P::Value, Error>, Fault>
+where
+    P: Procedure<Request = Request, Response = Response, Error = Error>,
+{
+    let (mut rows, mut played, mut ended_ns) = (steps.iter(), None::<&StepRow>, 0);
+    let wait = |row: &StepRow, ended_ns: u64, not_before_ns: u64| {
+        let then = match not_before_ns - ended_ns {
+            300_000 => "wait_300us_and_repeat",
+            30_000_000 => "wait_30ms",
+            _ => "repeat",
+        };
+        same("then", &row.then.as_str(), &then)
+    };
+    let ended = servowire_core::run(procedure, 0, |request, not_before_ns| {
+        if let Some(row) = played {
+            wait(row, ended_ns, not_before_ns)?;
+        }
+        let Some(row) = rows.next() else {
+            return Err(Fault::Differs { what: "steps", expected: "the end".to_owned(), real: request.to_string() });
         };
         let sent: Vec<u16> = request.emit().as_slice().iter().map(|frame| frame.word(MsbFirst)).collect();
         same("tx", &words(&row.tx), &sent)?;
-        let outcome = reply(row, request)?;
-        let now_ns = not_before_ns + 100_000;
-        step = answer(outcome, now_ns);
-        let then = match step {
-            Step::Send { not_before_ns, .. } => match not_before_ns - now_ns {
-                300_000 => "wait_300us_and_repeat",
-                30_000_000 => "wait_30ms",
-                _ => "repeat",
-            },
-            Step::Done { .. } => "done",
-            Step::Failed { .. } => "restart_count",
-        };
+        (played, ended_ns) = (Some(row), not_before_ns + 100_000);
+        Ok(Ended { outcome: reply(row, request)?, ready_ns: ended_ns })
+    })?;
+    let then = if ended.outcome.is_ok() { "done" } else { "restart_count" };
+    if let Some(row) = played {
         same("then", &row.then.as_str(), &then)?;
     }
-    match step {
-        Step::Done { value, .. } => Ok(Ok(value)),
-        Step::Failed { error, .. } => Ok(Err(error)),
-        Step::Send { .. } => {
-            Err(Fault::Differs { what: "steps", expected: "the end".to_owned(), real: format!("{step:?}") })
-        }
+    match rows.next() {
+        None => Ok(ended.outcome),
+        Some(_) => Err(Fault::Differs { what: "steps", expected: "more".to_owned(), real: then.to_owned() }),
     }
 }
 

@@ -1,7 +1,8 @@
 //! Check values, positions, alarms, temperatures, times.
 
 use nikon_aformat::{
-    Alm, Battery, BitRate, Crc3, Crc8, EncoderStatus, PmAlm, Resolution, Temperature, TypeWord, U10, U40, Version, crc3,
+    Alm, Battery, BitRate, Command, Crc3, Crc8, Data, EncoderAddress, EncoderStatus, Evidence, PmAlm, Policy,
+    Resolution, Response, Temperature, Tolerated, TypeWord, U10, U40, Version, crc3,
 };
 use serde::Deserialize;
 
@@ -139,10 +140,25 @@ pub(super) struct MathRow {
     abs40_from_high_and_low: u64,
 }
 
-/// The rows show a sign only where there are 16 bits of turns.
-pub(super) fn sixteen(resolution: Resolution, position: nikon_aformat::Position) -> Option<i16> {
-    let signed = resolution.signed_turns(position).filter(|_| position.turns_bits == 16);
-    signed.and_then(|turns| i16::try_from(turns).ok())
+/// The position of a response as the rows have it: of the turns whatever bits the response holds, with a sign only where there
+/// are 16. The crate gives them whole or not at all.
+pub(super) struct Shown {
+    pub(super) single_turn: u32,
+    pub(super) turns_bits: u8,
+    pub(super) turns: u32,
+    pub(super) signed: Option<i16>,
+}
+
+pub(super) fn shown(resolution: Resolution, response: Response) -> Option<Shown> {
+    let at = |tolerated: Tolerated| {
+        let tolerated = tolerated.status(EncoderStatus::all()).alarms(Alm::all());
+        Evidence::of(response, resolution, 0).at(0, Policy::new(0).tolerating(tolerated)).ok()
+    };
+    let single_turn = at(Tolerated::SINGLE_TURN)?.single_turn();
+    let turns_bits = response.layout().abs_bits().saturating_sub(resolution.st_bits()).min(resolution.mt_bits());
+    let turns = response.abs()? >> resolution.st_bits() & ((1 << turns_bits) - 1);
+    let signed = at(Tolerated::NOTHING).and_then(nikon_aformat::Sample::turns).filter(|_| turns_bits == 16);
+    Some(Shown { single_turn, turns_bits, turns: turns as u32, signed: signed.and_then(|turns| turns.try_into().ok()) })
 }
 
 pub(super) fn decode_math(_: &str, row: MathRow) -> Verdict {
@@ -153,10 +169,11 @@ pub(super) fn decode_math(_: &str, row: MathRow) -> Verdict {
     same("abs17", &row.abs17, &abs.low17().get())?;
     let joined = U40::from_halves(abs.low24(), abs.high24()).map(U40::get);
     same("abs40_from_high_and_low", &Some(row.abs40_from_high_and_low), &joined)?;
-    let position = or_unreadable(resolution.split(abs))?;
+    let whole = Response::new(EncoderAddress::ZERO, Command::Abs40, EncoderStatus::empty(), Data::Abs40 { abs });
+    let position = or_unreadable(shown(resolution, whole).ok_or("a position with bits above the widths"))?;
     same("single_turn", &row.single_turn, &position.single_turn)?;
     same("turns", &row.turns, &position.turns)?;
-    same("turns_signed", &row.turns_signed, &sixteen(resolution, position))?;
+    same("turns_signed", &row.turns_signed, &position.signed)?;
     same("angle_deg_f64", &row.angle_deg_f64, &resolution.degrees(position.single_turn))?;
     let single = u64::from(resolution.degrees_f32(position.single_turn).to_bits());
     same("angle_deg_f32_bits", &row.angle_deg_f32_bits.0, &single)?;

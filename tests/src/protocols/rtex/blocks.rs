@@ -29,7 +29,7 @@ struct ZeroRow {
 pub(super) fn header_byte0(rows: &[Row]) -> Vec<Verdict> {
     each(rows, |row: ZeroRow| {
         let byte = row.byte0.0 as u8;
-        let header = Header::from_byte(byte);
+        let header = Header::parse(byte);
         same("c_r", &row.c_r, &header.response.into())?;
         same("update_counter", &row.update_counter, &header.update_counter.get())?;
         same("mac_id", &row.mac_id, &header.mac_id.get())?;
@@ -38,7 +38,7 @@ pub(super) fn header_byte0(rows: &[Row]) -> Vec<Verdict> {
             update_counter: counter(row.update_counter)?,
             mac_id: mac_id(row.mac_id)?,
         };
-        same("byte0", &byte, &made.to_byte())
+        same("byte0", &byte, &made.emit())
     })
 }
 

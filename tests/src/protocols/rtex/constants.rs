@@ -1,6 +1,6 @@
 //! Numbers of the documents against the constants of the crate.
 
-use rtex_block::master::{Led, Phase, led};
+use rtex_block::master::{ControlPhase, Led, led};
 use rtex_block::position::MAX_PULSES_PER_S;
 use rtex_block::timing::FrameTime;
 use rtex_block::type_code::{self, homing, monitor, parameter, profile, reset, system_id};
@@ -143,7 +143,7 @@ fn other(name: &str) -> Option<u64> {
         "index.pr7_20" => Pr { class: 7, number: 20 }.index().into(),
         "frame.one_axis_ns" => FrameTime::GUIDE.one_ns.into(),
         "frame.full_ns" => FrameTime::GUIDE.full_ns.into(),
-        "led.half_period_ms" => (0..10_000).find(|t_ms| led(Phase::Prepare, None, *t_ms) == Led::Off)?,
+        "led.half_period_ms" => (0..10_000).find(|t_ms| led(ControlPhase::Prepare, None, *t_ms) == Led::Off)?,
         _ => return None,
     })
 }

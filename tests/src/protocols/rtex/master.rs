@@ -2,28 +2,28 @@
 
 use core::num::NonZeroU16;
 
-use rtex_block::device;
 use rtex_block::master::{
-    CommandCounter, EchoWatch, Expected, Failure, Handshake, Progress, Reception, ServoOff, Turn,
+    Acknowledgement, Checked, CommandCounter, EchoWatch, Expected, Failure, Handshake, Progress, ServoOff, Turn,
 };
 use rtex_block::{
     BlockSize, Command, CommandBlock, ControlBits, Error, Execution, MacId, NonCyclicCode, NonCyclicCommand, Response,
 };
+use rtex_block::{Codes, device};
 use serde::Deserialize;
 
 use super::fields::{code, counter, mac_id, size, unreadable};
 use crate::hex::{Bytes, Hex};
 use crate::row::{Fault, Row, Verdict, each, same};
 
-fn class(result: &Result<(Response, Reception), Error>) -> String {
+fn class(result: &Result<Checked, Error>) -> String {
     match result {
         Err(Error::Truncated { .. } | Error::TooLong { .. }) => "wrong_length",
         Err(Error::Direction { .. }) => "not_a_response",
         Err(Error::MacId { .. }) => "mac_id_mismatch",
-        Ok((_, Reception::CounterNotEchoed)) => "counter_not_echoed",
-        Ok((_, Reception::CodeNotYetEchoed)) => "code_not_yet_echoed",
-        Ok((_, Reception::CommandError(_))) => "command_error",
-        Ok((_, Reception::Accepted)) => "ok",
+        Ok(Checked { acknowledgement: Acknowledgement::CounterNotEchoed, .. }) => "counter_not_echoed",
+        Ok(Checked { acknowledgement: Acknowledgement::CodeNotYetEchoed, .. }) => "code_not_yet_echoed",
+        Ok(Checked { acknowledgement: Acknowledgement::CommandError(_), .. }) => "command_error",
+        Ok(Checked { acknowledgement: Acknowledgement::Accepted, .. }) => "ok",
         Err(other) => return other.to_string(),
     }
     .to_owned()
@@ -220,10 +220,10 @@ struct Done {
 }
 
 fn request(keys: &RequestKeys) -> Result<(rtex_block::CyclicCode, NonCyclicCommand), Fault> {
-    let (cyclic, noncyclic) = code(keys.code.0)?.pair().map_err(|e| unreadable(e.to_string()))?;
+    let Codes { cyclic, noncyclic } = code(keys.code.0)?.codes().map_err(|e| unreadable(e.to_string()))?;
     let [type_low, type_high] = keys.type_code.to_le_bytes();
     let [index_low, index_high] = keys.index.to_le_bytes();
-    Ok((cyclic, NonCyclicCommand::from_bytes(noncyclic, [type_low, type_high, index_low, index_high, 0, 0, 0, 0])))
+    Ok((cyclic, NonCyclicCommand::parse(noncyclic, [type_low, type_high, index_low, index_high, 0, 0, 0, 0])))
 }
 
 pub(super) fn noncyclic_traces(rows: &[Row]) -> Vec<Verdict> {

@@ -1,6 +1,6 @@
 //! Phases, LED, periods, timers and positions.
 
-use rtex_block::master::{Asic, Fault, Inputs, Led, Phase, PhaseControl, SlaveInfo, led as led_at};
+use rtex_block::master::{Asic, ControlError, ControlPhase, Inputs, Led, PhaseControl, SlaveInfo, led as led_at};
 use rtex_block::position::{Gear, is_within_limit, step};
 use rtex_block::timing::{FrameTime, Periods, timer_reload as reload};
 use serde::Deserialize;
@@ -22,7 +22,7 @@ enum PhaseName {
     Running,
 }
 
-impl From<PhaseName> for Phase {
+impl From<PhaseName> for ControlPhase {
     fn from(name: PhaseName) -> Self {
         match name {
             PhaseName::Init => Self::Init,
@@ -41,7 +41,7 @@ enum FaultName {
     Timeout,
 }
 
-impl From<FaultName> for Fault {
+impl From<FaultName> for ControlError {
     fn from(name: FaultName) -> Self {
         match name {
             FaultName::SlaveInfoMismatch => Self::SlaveInfoMismatch,
@@ -113,15 +113,15 @@ struct PhaseTrace {
 pub(super) fn phase_traces(rows: &[Row]) -> Vec<Verdict> {
     each(rows, |row: PhaseTrace| {
         let mut control = PhaseControl::new();
-        let seen: Vec<(Phase, Option<Fault>)> = row
+        let seen: Vec<(ControlPhase, Option<ControlError>)> = row
             .steps
             .iter()
             .map(|step| {
                 control.step(step.into());
-                (control.phase(), control.fault())
+                (control.phase(), control.error())
             })
             .collect();
-        let want: Vec<_> = row.after.iter().map(|a| (a.phase.into(), a.fault.map(Fault::from))).collect();
+        let want: Vec<_> = row.after.iter().map(|a| (a.phase.into(), a.fault.map(ControlError::from))).collect();
         same("after", &want, &seen)
     })
 }
@@ -137,7 +137,7 @@ struct LedRow {
 
 pub(super) fn led(rows: &[Row]) -> Vec<Verdict> {
     each(rows, |row: LedRow| {
-        let shown = match led_at(row.phase.into(), row.fault.map(Fault::from), row.t_ms) {
+        let shown = match led_at(row.phase.into(), row.fault.map(ControlError::from), row.t_ms) {
             Led::Off => "off",
             Led::Green => "green",
             Led::Red => "red",

@@ -4,13 +4,13 @@ use core::fmt::Display;
 use core::num::NonZeroU16;
 
 use rtex_block::master::{
-    ActiveCode, Axis, AxisConfig, AxisState, Failure, Handshake, Limits, ProfileMove, Progress, Received, StopReason,
+    ActiveCode, Axis, AxisConfig, AxisState, Failure, Handshake, Heard, Limits, ProfileMove, Progress, StopReason,
     SubHandshake, Turn,
 };
 use rtex_block::position::Gear;
 use rtex_block::{
-    CommandBlock, ControlBits, Error, ErrorCode, Execution, NonCyclicCommand, NonCyclicResponse, Response, SubCode,
-    SubResponse, UpdateCounter,
+    Codes, CommandBlock, ControlBits, Error, ErrorCode, Execution, NonCyclicCommand, NonCyclicResponse, Response,
+    SubCode, SubResponse, UpdateCounter,
 };
 use serde::Deserialize;
 use serde_json::{Value, json};
@@ -60,9 +60,9 @@ struct HandshakeRow {
 
 pub(super) fn handshake(rows: &[Row]) -> Vec<Verdict> {
     each(rows, |row: HandshakeRow| {
-        let (cyclic, noncyclic) = code(row.code.0)?.pair().map_err(|e| unreadable(e.to_string()))?;
+        let Codes { cyclic, noncyclic } = code(row.code.0)?.codes().map_err(|e| unreadable(e.to_string()))?;
         let [b8, b9, b10, b11] = row.bytes8_11.0.try_into().map_err(|_| unreadable("bytes8_11 is not four bytes"))?;
-        let request = NonCyclicCommand::from_bytes(noncyclic, [b8, b9, b10, b11, 0, 0, 0, 0]);
+        let request = NonCyclicCommand::parse(noncyclic, [b8, b9, b10, b11, 0, 0, 0, 0]);
         let own = mac_id(row.mac_id)?;
         let handshake = match request {
             NonCyclicCommand::Alarm(a) if row.attributes == 1 => {
@@ -106,12 +106,12 @@ struct SubRow {
 
 pub(super) fn sub(rows: &[Row]) -> Vec<Verdict> {
     each(rows, |row: SubRow| {
-        let code = SubCode::new(row.code).ok_or_else(|| unreadable("not a sub-command"))?;
+        let code = SubCode::from_code(row.code).ok_or_else(|| unreadable("not a sub-command"))?;
         let handshake = SubHandshake::new(code, row.type_code, row.index, row.limit);
         let mut handshake = handshake.ok_or_else(|| unreadable("a sub-command without a handshake"))?;
         let mut seen = Vec::new();
         for bytes in &row.responses {
-            let sub = bytes.0.first_chunk().map(SubResponse::from_bytes);
+            let sub = bytes.0.first_chunk().map(SubResponse::parse);
             seen.push(progress(
                 handshake.receive(sub.as_ref()),
                 |value| json!({ "data": value.data1, "warning": u8::from(value.execution.contains(Execution::WNG)) }),
@@ -222,15 +222,15 @@ pub(super) fn axis(rows: &[Row]) -> Vec<Verdict> {
         let mut counter = UpdateCounter::ZERO;
         for step in row.steps {
             let received = match &step.response {
-                Some(bytes) => Received::from(Response::parse(&bytes.0)),
-                None => Received::Nothing,
+                Some(bytes) => Heard::from(Response::parse(&bytes.0)),
+                None => Heard::Nothing,
             };
-            axis.receive(Turn::Valid(counter), &received);
+            axis.hear(Turn::Valid(counter), &received, 0);
             if let Some(action) = step.action {
                 act(&mut axis, action)?;
             }
             counter = counter.next();
-            let block = axis.send(Turn::Valid(counter)).main.emit();
+            let block = axis.transmission(Turn::Valid(counter)).main.emit();
             same("state", &step.state, &state(axis.state()))?;
             same("sent", &step.sent.0.as_slice(), &block.get(..8).unwrap_or(&[]))?;
             let off = CommandBlock::of(&block).map(CommandBlock::is_servo_off);
@@ -244,7 +244,7 @@ fn act(axis: &mut Axis, action: Action) -> Verdict {
     let refused = |e: &dyn Display| unreadable(e.to_string());
     match action {
         // Where it does nothing, state and block say so.
-        Action::SwitchOn => _ = axis.switch_on(),
+        Action::SwitchOn => _ = axis.switch_on().ok(),
         Action::SwitchOff => axis.switch_off(),
         Action::Clear => axis.clear(),
         Action::Stop => axis.stop(StopReason::Requested),

@@ -3,7 +3,7 @@
 use serde::Deserialize;
 use sha2::{Digest, Sha256};
 use sorte_proto::cut_through::{DiscoveryRewriter, SyncRewriter};
-use sorte_proto::{Discovery, Entry, Status, Sync};
+use sorte_proto::{Discovery, Entry, Place, Status, Sync};
 
 use super::Origin;
 use crate::hex::Bytes;
@@ -50,6 +50,14 @@ pub(super) fn discovery(rows: &[Row]) -> Vec<Verdict> {
     rows.iter().map(|row| row.read().and_then(|hop: Hop| check_hop(&mut pass, &hop))).collect()
 }
 
+/// What a device adds to STATUS.
+pub(super) fn adds(last: bool, error: bool) -> Status {
+    let mut adds = Status::empty();
+    adds.set(Status::LAST, last);
+    adds.set(Status::ERROR, error);
+    adds
+}
+
 fn check_hop(pass: &mut Option<Pass>, row: &Hop) -> Verdict {
     let (Some(status), false) = (row.rx_head.0.get(3), row.number == 0) else {
         return Err(Fault::Unreadable("rx_head, hop".to_owned()));
@@ -58,12 +66,13 @@ fn check_hop(pass: &mut Option<Pass>, row: &Hop) -> Verdict {
     let goes_on = |p: &Pass| {
         p.chain == row.chain && p.hop < row.number && p.frame.status.contains(Status::STATE_CHANGE) == last_round
     };
+    let place = if last_round { Place::Last } else { Place::Inner };
     let mut current = match pass.take() {
         Some(current) if goes_on(&current) => current,
-        _ => Pass { chain: row.chain, hop: 0, frame: Discovery::published_request(last_round) },
+        _ => Pass { chain: row.chain, hop: 0, frame: Discovery::published_request(place) },
     };
     while current.hop + 1 < row.number {
-        let _: Result<_, _> = current.frame.pass(Entry::STOCK, false, false);
+        let _: Result<_, _> = current.frame.pass(Entry::STOCK, Status::empty());
         current.hop += 1;
     }
     // What the row shows of the frame before must be what we have; an error flag of an unlisted hop is taken from it.
@@ -71,15 +80,16 @@ fn check_hop(pass: &mut Option<Pass>, row: &Hop) -> Verdict {
     let before = current.frame.emit();
     same("rx_head", &Some(&row.rx_head.0[..]), &before.get(..row.rx_head.0.len()))?;
 
-    let (last, error) = (row.is_last, row.prev_frame_crc_error);
-    let mut rewriter = DiscoveryRewriter::new(Entry::STOCK, last, error);
+    let last = row.is_last;
+    let adds = adds(last, row.prev_frame_crc_error);
+    let mut rewriter = DiscoveryRewriter::new(Entry::STOCK, adds);
     let passed: Vec<u8> = before.iter().map(|&byte| rewriter.byte(byte)).collect();
-    let assignment = current.frame.pass(Entry::STOCK, last, error);
+    let assignment = current.frame.pass(Entry::STOCK, adds);
     current.hop = row.number;
     let after = current.frame.emit();
 
     same("cut through", &after.to_vec(), &passed)?;
-    same("cut through", &assignment, &rewriter.finish().map(|(_, assignment)| assignment))?;
+    same("cut through", &assignment, &rewriter.finish().map(|passed| passed.assignment))?;
     let got = assignment.map(|a| (a.address.get(), a.in_offset, a.out_offset));
     same("device", &Ok((row.device.address, row.device.in_offset, row.device.out_offset)), &got)?;
     same("len", &row.len, &after.len())?;
@@ -126,14 +136,15 @@ pub(super) fn sync(rows: &[Row]) -> Vec<Verdict> {
         for (index, hop) in row.hops.into_iter().enumerate() {
             same("hop", &hop.hop, &(index + 1))?;
             same("rx", &hop.rx.0, &wire)?;
-            let (line, last, error) = (hop.line_delay_next, hop.is_last, hop.prev_frame_crc_error);
-            let mut rewriter = SyncRewriter::new(line, last, error);
+            let (line, last) = (hop.line_delay_next, hop.is_last);
+            let adds = adds(last, hop.prev_frame_crc_error);
+            let mut rewriter = SyncRewriter::new(line, adds);
             let passed: Vec<u8> = wire.iter().map(|&byte| rewriter.byte(byte)).collect();
             same("tx", &hop.tx.0, &passed)?;
             let received = rewriter.finish();
             same("buffered", &received, &Sync::parse(&wire))?;
             let buffered = received.map(|mut frame| {
-                frame.pass(line, last, error);
+                frame.pass(line, adds);
                 frame.emit().to_vec()
             });
             same("buffered tx", &Ok(&hop.tx.0), &buffered.as_ref())?;

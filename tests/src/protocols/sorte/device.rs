@@ -1,8 +1,8 @@
 //! State machine of a device.
 
 use serde::Deserialize;
-use sorte_proto::device::{Arrival, Config, Device, Port, PortFlags, PortId, State, Trigger};
-use sorte_proto::{DelayReq, Discovery, Param, Parameters, Sync};
+use sorte_proto::device::{Config, Device, FrameTimes, Port, PortFlags, PortId, Reaction, State, Trigger};
+use sorte_proto::{DelayReq, Discovery, Link, Param, Parameters, Place, Sync};
 
 use super::Origin;
 use crate::hex::Bytes;
@@ -51,17 +51,6 @@ struct Cycle {
     restart: bool,
 }
 
-const STATES: [(State, &str); 8] = [
-    (State::Idle, "IDLE"),
-    (State::Discovery, "DISCOVERY"),
-    (State::Param, "PARAM"),
-    (State::LineDelay, "LINE_DELAY"),
-    (State::Sync, "SYNC"),
-    (State::Exchange, "IOEX"),
-    (State::Diag, "DIAG"),
-    (State::Error, "ERROR"),
-];
-
 const FLAGS: [(PortFlags, &str); 5] = [
     (PortFlags::LAST_DEVICE, "LAST_DEVICE"),
     (PortFlags::MASTER_PORT, "MASTER_PORT"),
@@ -71,7 +60,7 @@ const FLAGS: [(PortFlags, &str); 5] = [
 ];
 
 fn name(state: State) -> String {
-    STATES.iter().find(|(s, _)| *s == state).map_or("?", |(_, name)| name).to_owned()
+    state.name().to_owned()
 }
 
 fn flags(names: &[String]) -> Result<PortFlags, Fault> {
@@ -83,7 +72,7 @@ fn flags(names: &[String]) -> Result<PortFlags, Fault> {
 pub(super) fn device_state(rows: &[Row]) -> Vec<Verdict> {
     each(rows, |row: DeviceRow| match row {
         DeviceRow::Frame(row) => {
-            let state = STATES.iter().find(|(_, name)| *name == row.state).map(|(state, _)| *state);
+            let state = State::ALL.into_iter().find(|state| state.name() == row.state);
             let state = state.ok_or_else(|| Fault::Unreadable(format!("state {}", row.state)))?;
             let mut port = Port { state, flags: flags(&row.flags)? };
             let head = match &row.frame_head {
@@ -97,18 +86,18 @@ pub(super) fn device_state(rows: &[Row]) -> Vec<Verdict> {
             same("state_after", &row.state_after, &name(port.state))?;
             same("flags_after", &flags(&row.flags_after)?, &port.flags)?;
             same("forwards_modified_copy", &row.forwards_modified_copy, &seen.modifies)?;
-            same("line_delay_trigger", &row.line_delay_trigger, &(seen.trigger as u8))
+            same("line_delay_trigger", &row.line_delay_trigger, &seen.trigger.code())
         }
         DeviceRow::Monitor(row) => {
             let mut device = taken_to(State::Exchange, true);
             // The first cycle start after the last SYNC frame finds a frame before it.
-            let _: Result<_, _> = device.exchange(&[], 0, 0);
+            let _: Result<_, _> = device.hear_exchange(&[], 0, 0);
             device.cycle_start();
             for (index, cycle) in row.cycles.into_iter().enumerate() {
                 same("cycle", &cycle.number, &(index + 1))?;
                 if cycle.frame_received {
                     // Whatever it is, it counts.
-                    let _: Result<_, _> = device.exchange(&[], 0, 0);
+                    let _: Result<_, _> = device.hear_exchange(&[], 0, 0);
                 }
                 let before = device.missed_frames();
                 let restart = device.cycle_start();
@@ -125,21 +114,21 @@ pub(super) fn device_state(rows: &[Row]) -> Vec<Verdict> {
 /// A device, last in the line or not, taken to `state` by good frames.
 fn taken_to(state: State, last: bool) -> Device {
     let mut device = Device::new(Config::default());
-    device.links(true, !last);
+    device.set_links(Link::Up, if last { Link::Down } else { Link::Up });
     let frames = [
-        Discovery::request(false).emit().to_vec(),
-        Discovery::request(true).emit().to_vec(),
-        Param::request(Parameters::STOCK, true).emit().to_vec(),
-        DelayReq::of_master(true).emit().to_vec(),
-        Sync::of_master(500, 76, true).emit().to_vec(),
+        Discovery::request(Place::Inner).emit().to_vec(),
+        Discovery::request(Place::Last).emit().to_vec(),
+        Param::request(Parameters::STOCK, Place::Last).emit().to_vec(),
+        DelayReq::of_master(Place::Last).emit().to_vec(),
+        Sync::of_master(500, 76, Place::Last).emit().to_vec(),
     ];
     for mut frame in frames {
         if device.state() == State::LineDelay && !last {
             measure(&mut device);
         }
         if device.state() != state {
-            let handled = device.frame(PortId::A, &mut frame, arrival(0));
-            assert_eq!(handled.result, Ok(()));
+            let reaction = device.hear(PortId::A, &mut frame, heard(0));
+            assert_eq!(reaction.result, Ok(()));
         }
     }
     assert_eq!(device.state(), state);
@@ -151,19 +140,19 @@ fn measure(device: &mut Device) {
     for n in 1..=16 {
         let trigger = if n == 16 { Trigger::Last } else { Trigger::Normal };
         let request = Device::delay_request(trigger).map(|request| request.emit()).unwrap_or_default();
-        assert_eq!(device.delay_reflection(trigger, &request, 560), Ok(()));
+        assert_eq!(device.hear_reflection(trigger, &request, 560), Ok(()));
     }
 }
 
-fn arrival(sof_ns: u32) -> Arrival {
-    Arrival { sof_ns, counter_ns: sof_ns, now_ns: 0 }
+fn heard(sof_ns: u32) -> FrameTimes {
+    FrameTimes { sof_ns, counter_ns: sof_ns, now_ns: 0 }
 }
 
 /// State after a DISCOVERY frame.
 pub(super) fn after_discovery(frame: &[u8], last: bool) -> String {
     let mut device = taken_to(State::Discovery, last);
-    let handled = device.frame(PortId::A, &mut frame.to_vec(), arrival(0));
-    assert_eq!(handled.result, Ok(()));
+    let reaction = device.hear(PortId::A, &mut frame.to_vec(), heard(0));
+    assert_eq!(reaction.result, Ok(()));
     name(device.state())
 }
 
@@ -171,7 +160,7 @@ pub(super) fn after_discovery(frame: &[u8], last: bool) -> String {
 pub(super) fn after_param(frame: &[u8]) -> (String, Option<[u8; 32]>) {
     let mut device = taken_to(State::Param, true);
     let mut passed = frame.to_vec();
-    device.frame(PortId::A, &mut passed, arrival(0));
+    let _: Reaction = device.hear(PortId::A, &mut passed, heard(0));
     assert_eq!(passed, frame, "PARAM is not changed");
     (name(device.state()), device.parameters().map(|parameters| parameters.emit()))
 }
@@ -179,6 +168,6 @@ pub(super) fn after_param(frame: &[u8]) -> (String, Option<[u8; 32]>) {
 /// State after a SYNC frame, and the receive time that the device has stored.
 pub(super) fn after_sync(frame: &[u8], last: bool, sof_ns: u32) -> (String, Option<u32>) {
     let mut device = taken_to(State::Sync, last);
-    device.frame(PortId::A, &mut frame.to_vec(), arrival(sof_ns));
-    (name(device.state()), device.last_sync().map(|(_, sof_ns)| sof_ns))
+    let _: Reaction = device.hear(PortId::A, &mut frame.to_vec(), heard(sof_ns));
+    (name(device.state()), device.last_sync().map(|last| last.sof_ns))
 }

@@ -67,7 +67,7 @@ enum Drv8711 {
 }
 
 fn register(name: &str, address: u8) -> Result<Register, Fault> {
-    let register = Register::at(address).ok_or_else(|| Fault::Unreadable(format!("address {address}")))?;
+    let register = Register::from_code(address).ok_or_else(|| Fault::Unreadable(format!("address {address}")))?;
     same("register", &name, &register.name())?;
     Ok(register)
 }

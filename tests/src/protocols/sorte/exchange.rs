@@ -3,10 +3,11 @@
 use serde::Deserialize;
 use sorte_proto::timing::published_send_time_ns;
 use sorte_proto::{
-    DeviceAddress, DeviceFrame, DeviceFrameView, Entry, Error, MasterFrameView, Preamble, Pto, PublishedDeviceFrame,
-    Slice, Status, strip_preamble, write_master_frame,
+    DeviceAddress, DeviceFrame, DeviceFrameView, Entry, Error, MasterFrameView, Place, Preamble, Pto,
+    PublishedDeviceFrame, Slice, Status, emit_master_frame_into, strip_preamble,
 };
 
+use super::chain::adds;
 use super::{Origin, outcome};
 use crate::hex::{Bytes, Hex};
 use crate::row::{Fault, Row, Verdict, each, same};
@@ -54,7 +55,7 @@ struct Sized {
 
 fn build(output: &[u8], time_stamp: u16) -> Vec<u8> {
     let mut frame = vec![0; output.len() + MasterFrameView::OVERHEAD];
-    let len = write_master_frame(output, time_stamp, &mut frame);
+    let len = emit_master_frame_into(output, time_stamp, &mut frame);
     assert_eq!(len, Ok(frame.len()));
     frame
 }
@@ -74,7 +75,7 @@ pub(super) fn master(rows: &[Row]) -> Vec<Verdict> {
             same("frame", &row.frame.0, &frame)?;
             same("wire", &row.wire.0, &on_wire(Preamble::Short, &frame))?;
             same("stripped", &Ok(&frame[..]), &strip_preamble(&row.wire.0))?;
-            let view = MasterFrameView::new(row.out_data.0.len(), &row.frame.0).map_err(refused)?;
+            let view = MasterFrameView::parse(row.out_data.0.len(), &row.frame.0).map_err(refused)?;
             same("tx_timestamp", &row.tx_timestamp, &view.time_stamp())?;
             for (index, device) in row.devices.into_iter().enumerate() {
                 let len = device.slice.0.len();
@@ -89,13 +90,13 @@ pub(super) fn master(rows: &[Row]) -> Vec<Verdict> {
             Ok(())
         }
         MasterRow::Sized(row) => {
-            let mut discovery = sorte_proto::Discovery::request(false);
+            let mut discovery = sorte_proto::Discovery::request(Place::Inner);
             for (&output, &offset) in row.out_lengths.iter().zip(&row.out_offsets) {
-                let assignment = discovery.pass(Entry { input: 0, output }, false, false);
+                let assignment = discovery.pass(Entry { input: 0, output }, Status::empty());
                 same("out_offsets", &Ok(offset), &assignment.map(|a| a.out_offset))?;
             }
             let total = discovery.output_total;
-            let view = MasterFrameView::new(total.into(), &row.frame.0).map_err(refused)?;
+            let view = MasterFrameView::parse(total.into(), &row.frame.0).map_err(refused)?;
             same("frame", &row.frame.0, &build(view.output(), row.tx_timestamp))?;
             same("crc8", &row.frame.0.get(usize::from(total) + 2).map(|&crc| crc.into()), &Some(row.crc8.0))?;
             let slices = row.out_offsets.iter().zip(&row.out_lengths).map(|(&offset, &len)| view.slice(offset, len));
@@ -119,14 +120,14 @@ struct MasterNegative {
 
 pub(super) fn master_negative(rows: &[Row]) -> Vec<Verdict> {
     each(rows, |row: MasterNegative| {
-        same("expect", &row.expect, &outcome(&MasterFrameView::new(16, &row.frame.0)))?;
+        same("expect", &row.expect, &outcome(&MasterFrameView::parse(16, &row.frame.0)))?;
         let (Some(byte), Some(bit)) = (row.byte, row.bit) else { return Ok(()) };
         // The flip undone is a good frame.
         let mut whole = row.frame.0;
         if let Some(flipped) = whole.get_mut(byte) {
             *flipped ^= 1 << bit;
         }
-        same("byte, bit", &"Ok".to_owned(), &outcome(&MasterFrameView::new(16, &whole)))
+        same("byte, bit", &"Ok".to_owned(), &outcome(&MasterFrameView::parse(16, &whole)))
     })
 }
 
@@ -187,10 +188,10 @@ fn payload_len(layout: &str) -> Result<usize, Fault> {
 pub(super) fn device(rows: &[Row]) -> Vec<Verdict> {
     each(rows, |row: DeviceRow| match row {
         DeviceRow::Designed(row) => {
-            let view = DeviceFrameView::new(payload_len(&row.layout)?, &row.frame.0).map_err(refused)?;
+            let view = DeviceFrameView::parse(payload_len(&row.layout)?, &row.frame.0).map_err(refused)?;
             same("address", &row.address, &view.address().get())?;
             same("status", &Status::from_bits_retain(row.status), &view.status())?;
-            same("last, error", &Status::from_bits_retain(row.status), &Status::of_device(row.last, row.error))?;
+            same("last, error", &Status::from_bits_retain(row.status), &adds(row.last, row.error))?;
             same("payload", &&row.payload.0[..], &view.payload())?;
             same("wire", &row.wire.0, &on_wire(Preamble::Short, &row.frame.0))?;
             if let Ok(payload) = view.payload().try_into() {
@@ -204,11 +205,11 @@ pub(super) fn device(rows: &[Row]) -> Vec<Verdict> {
         }
         DeviceRow::Refused(row) => {
             let len = payload_len(&row.layout)?;
-            same("expect", &row.expect, &outcome(&DeviceFrameView::new(len, &row.frame.0)))
+            same("expect", &row.expect, &outcome(&DeviceFrameView::parse(len, &row.frame.0)))
         }
         DeviceRow::Published(row) => {
             let address = DeviceAddress::try_from(row.address).map_err(|error| Fault::Unreadable(error.to_string()))?;
-            let status = Status::of_device(row.last, row.error);
+            let status = adds(row.last, row.error);
             let frame = PublishedDeviceFrame { address, status, drv8711_status: row.drv_status };
             let mut wire = on_wire(Preamble::Short, &frame.emit_without_crc());
             same("wire_without_crc", &row.wire_without_crc.0, &wire)?;

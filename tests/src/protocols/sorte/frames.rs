@@ -102,7 +102,7 @@ impl From<Fields> for Parameters {
             ipg_5ns: f.ipg_5ns,
             t_in_ns: f.t_in_ns,
             t_out_ns: f.t_out_ns,
-            topology: f.topology.into(),
+            topology: f.topology,
             diagnostics: f.diagnostics,
             alarm: f.alarm,
             crc_mode: CrcMode::from_byte(f.crc_mode),
@@ -115,7 +115,7 @@ pub(super) fn param(rows: &[Row]) -> Vec<Verdict> {
         let frame = Param { source: 0, status: Status::from_bits_retain(row.status), parameters: row.fields.into() };
         same("frame", &row.frame.0, &frame.emit().to_vec())?;
         same("fields", &Ok(frame), &Param::parse(&row.frame.0))?;
-        let stored = ParamView::new(&row.frame.0).map(|view| view.bytes().to_vec());
+        let stored = ParamView::parse(&row.frame.0).map(|view| view.bytes().to_vec());
         same("device_stores_payload", &Ok(row.device_stores_payload.0.clone()), &stored)?;
         let (state, stored) = super::device::after_param(&row.frame.0);
         same("state_after", &row.state_after, &state)?;
@@ -168,7 +168,7 @@ pub(super) fn negative(rows: &[Row]) -> Vec<Verdict> {
             same("type", &"Ok".to_owned(), &outcome(&parse(&row.kind, frame)))
         }
         Negative::Frame(row) => {
-            same("expect", &row.expect, &outcome(&LongFrame::new(&row.frame.0)))?;
+            same("expect", &row.expect, &outcome(&LongFrame::parse(&row.frame.0)))?;
             same("by its type", &row.expect, &outcome(&parse(&row.kind, &row.frame.0)))
         }
     })

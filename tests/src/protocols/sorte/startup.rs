@@ -4,9 +4,10 @@ use std::collections::BTreeMap;
 
 use serde::Deserialize;
 use sorte_proto::host::MasterMemory;
-use sorte_proto::master::{Action, Config, Master, Outgoing};
+use sorte_proto::master::{Action, Config, Heard, Master, Outgoing};
 use sorte_proto::{
-    Discovery, Entry, FrameType, LineDelay, MasterFrameView, Preamble, Sync, strip_preamble, write_master_frame,
+    Discovery, Entry, FrameType, LineDelay, Link, MasterFrameView, Place, Preamble, Status, Sync,
+    emit_master_frame_into, strip_preamble,
 };
 
 use super::Origin;
@@ -96,7 +97,7 @@ struct HostView {
 /// frames until the first of the exchange, with the times at which they are triggered.
 fn start_up(devices: u8, rtt_ns: &[u32]) -> (Vec<(u64, Outgoing)>, Master) {
     let mut master = Master::new(Config::default());
-    master.link(true);
+    master.set_link(Link::Up);
     let (mut sent, mut now_ns, mut rtt) = (Vec::new(), 0, rtt_ns.iter());
     loop {
         match master.poll(now_ns) {
@@ -105,24 +106,29 @@ fn start_up(devices: u8, rtt_ns: &[u32]) -> (Vec<(u64, Outgoing)>, Master) {
                 sent.push((at_ns, frame));
                 let answer = answer(frame, devices);
                 let after = if let Outgoing::DelayReq(_) = frame { rtt.next().copied().unwrap_or(400) } else { 400 };
-                assert_eq!(master.receive(&answer, at_ns + u64::from(after)), Ok(()));
+                assert_eq!(master.hear(&answer, at_ns + u64::from(after)), Ok(Heard::StartUp));
             }
             Action::Exchange { .. } | Action::Restart { .. } => return (sent, master),
         }
     }
 }
 
+/// What device `n` of so many adds to STATUS.
+fn last_of<T: PartialEq>(n: T, devices: T) -> Status {
+    if n == devices { Status::LAST } else { Status::empty() }
+}
+
 fn answer(frame: Outgoing, devices: u8) -> Vec<u8> {
     match frame {
-        Outgoing::Discovery { last } => {
-            let mut frame = Discovery::request(last);
+        Outgoing::Discovery { place } => {
+            let mut frame = Discovery::request(place);
             for n in 1..=devices {
-                assert!(frame.pass(Entry::STOCK, n == devices, false).is_ok());
+                assert!(frame.pass(Entry::STOCK, last_of(n, devices)).is_ok());
             }
             frame.emit().to_vec()
         }
         Outgoing::Sync(mut frame) => {
-            frame.pass(0, true, false);
+            frame.pass(0, Status::LAST);
             frame.emit().to_vec()
         }
         Outgoing::Param(frame) => frame.emit().to_vec(),
@@ -151,8 +157,8 @@ fn code(name: &str) -> Result<FrameType, Fault> {
 
 /// The frame with its preamble; DISCOVERY with the debug pattern that the published master fills it with.
 fn wire(frame: &Outgoing) -> Vec<u8> {
-    if let Outgoing::Discovery { last } = frame {
-        return on_wire(Preamble::Long, &Discovery::published_request(*last).emit());
+    if let Outgoing::Discovery { place } = frame {
+        return on_wire(Preamble::Long, &Discovery::published_request(*place).emit());
     }
     let mut buffer = [0; Discovery::LEN];
     let len = frame.emit_into(&mut buffer).unwrap_or_default();
@@ -178,7 +184,7 @@ pub(super) fn master_startup(rows: &[Row]) -> Vec<Verdict> {
             // When our master triggers it, on its own time.
             let triggered = frames.get(usize::from(row.index)).map(|(at_ns, _)| at_ns.wrapping_sub(master.epoch_ns()));
             same("cmp3_ns", &Some(u64::from(row.cmp3_ns)), &triggered)?;
-            let last = row.index + 1 == row.of;
+            let last = if row.index + 1 == row.of { Place::Last } else { Place::Inner };
             let frame = Sync::of_master(row.cmp3_ns, row.line_delay_ns, last);
             same("timestamp_ns", &row.timestamp_ns, &frame.time_stamp_ns)?;
             same("wire", &row.wire.0, &on_wire(Preamble::Middle, &frame.emit()))?;
@@ -190,7 +196,7 @@ pub(super) fn master_startup(rows: &[Row]) -> Vec<Verdict> {
         StartupRow::Exchange(row) => {
             same("frame", &"IOEX_MASTER", &row.frame.as_str())?;
             let mut frame = vec![0; row.out_data.0.len() + MasterFrameView::OVERHEAD];
-            let len = write_master_frame(&row.out_data.0, row.tx_timestamp, &mut frame);
+            let len = emit_master_frame_into(&row.out_data.0, row.tx_timestamp, &mut frame);
             same("len", &Ok(frame.len()), &len)?;
             same("wire", &row.wire.0, &on_wire(Preamble::Short, &frame))?;
             let crc8 = frame.len().checked_sub(3).and_then(|at| frame.get(at)).copied();
@@ -217,9 +223,9 @@ pub(super) fn master_startup(rows: &[Row]) -> Vec<Verdict> {
             let ram = [&[0; 0x200][..], image].concat();
             same("devices", &Some(row.count), &MasterMemory::new(&ram).devices())?;
             // The answer that our master gets from as many devices begins the same way.
-            let mut frame = Discovery::published_request(true);
+            let mut frame = Discovery::published_request(Place::Last);
             for n in 1..=row.count {
-                let _: Result<_, _> = frame.pass(Entry::STOCK, n == row.count, false);
+                let _: Result<_, _> = frame.pass(Entry::STOCK, last_of(n, row.count));
             }
             let head = strip_preamble(image).unwrap_or_default();
             same("rx_image_head", &Some(head), &frame.emit().get(..head.len()))

@@ -1,7 +1,7 @@
 //! The SYNC0 generator: event by event, and in closed loop with an ideal timer.
 
 use serde::Deserialize;
-use sorte_proto::iep::{Channel, Edge, Events, Happening};
+use sorte_proto::iep::{Activity, Channel, Edge, Events};
 use sorte_proto::sync0::{Flags, PULSE_NS, Register, Sync0, Variant, Write, Writes};
 use sorte_proto::{Pto, StartTime};
 
@@ -187,8 +187,8 @@ pub(super) fn figures(rows: &[Row]) -> Vec<Verdict> {
         let axis = Channel::new(Variant::Published, row.cmp7_ns, row.handler_latency_ns);
         let mut trace = row.trace.iter();
         let pulses = run(axis, &row.pto_in_cycle, |axis, word, happening| match happening {
-            Happening::Edge(_) => Ok(()),
-            Happening::Served(served) => {
+            Activity::Edge(_) => Ok(()),
+            Activity::Served(served) => {
                 let Some(traced) = trace.next() else {
                     return Err(Fault::Unreadable("the trace is too short".to_owned()));
                 };
@@ -252,7 +252,7 @@ pub(super) fn closed_loop(rows: &[Row]) -> Vec<Verdict> {
 fn run(
     mut axis: Channel,
     words: &[u16],
-    mut watch: impl FnMut(&Channel, u16, Happening) -> Verdict,
+    mut watch: impl FnMut(&Channel, u16, Activity) -> Verdict,
 ) -> Result<Vec<(u64, u64)>, Fault> {
     let mut pulses = Vec::new();
     let mut up = None;
@@ -261,9 +261,9 @@ fn run(
         while let Some(happening) = axis.next(end) {
             watch(&axis, word, happening)?;
             match happening {
-                Happening::Edge(Edge { ns, high: true }) => up = Some(ns),
-                Happening::Edge(Edge { ns, high: false }) => pulses.extend(up.take().map(|rise| (rise, ns))),
-                Happening::Served(_) => {}
+                Activity::Edge(Edge { ns, high: true }) => up = Some(ns),
+                Activity::Edge(Edge { ns, high: false }) => pulses.extend(up.take().map(|rise| (rise, ns))),
+                Activity::Served(_) => {}
             }
         }
     }

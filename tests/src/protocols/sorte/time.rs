@@ -2,7 +2,7 @@
 
 use serde::Deserialize;
 use sorte_proto::timing::{CNC_CYCLE_NS, Timing};
-use sorte_proto::{Clock, Correction, DelayModel, DelayReq, DeviceAddress, LineDelay, Preamble};
+use sorte_proto::{Clock, Correction, DelayModel, DelayReq, DeviceAddress, LineDelay, Place, Preamble};
 
 use super::Origin;
 use super::exchange::on_wire;
@@ -62,8 +62,10 @@ pub(super) fn line_delay(rows: &[Row]) -> Vec<Verdict> {
             Ok(())
         }
         DelayRow::Wires(row) => {
-            for (last, wire) in [(false, row.device_delay_req_wire), (true, row.device_last_delay_req_wire)] {
-                same("wire", &wire.0, &on_wire(Preamble::Middle, &DelayReq::of_device(last).emit()))?;
+            for (place, wire) in
+                [(Place::Inner, row.device_delay_req_wire), (Place::Last, row.device_last_delay_req_wire)]
+            {
+                same("wire", &wire.0, &on_wire(Preamble::Middle, &DelayReq::of_device(place).emit()))?;
             }
             Ok(())
         }

@@ -210,7 +210,7 @@ pub(super) fn cycle_stream(rows: &[Row]) -> Vec<Verdict> {
 
 fn stream(row: &StreamRow, profile: Profile<'_>) -> Verdict {
     let mut axis = Axis::new();
-    let direction = Direction::from_dir(row.dir == 1);
+    let direction = Direction::from_code(row.dir).ok_or_else(|| Fault::Unreadable("dir".to_owned()))?;
     axis.start(profile, row.n, direction).map_err(|e| Fault::Unreadable(format!("the start is refused: {e}")))?;
     let mut hashes = Hashes::new();
     let (mut first, mut pulses) = (Vec::new(), Vec::new());

@@ -1,7 +1,7 @@
 //! Ramp table, speeds, tones, micro-step profiles, parameters.
 
 use serde::Deserialize;
-use step_profile::{Error, Frequency, Microstep, Parameters, Profile, RampTable, Speed, Tone, Turn};
+use step_profile::{Error, Frequency, Microstep, NamedSpeed, Parameters, Profile, RampTable, Speed, Tone, Turn};
 use step_profile::{pru_exact, step_time_ns};
 
 use crate::row::{Fault, Row, Verdict, each, same};
@@ -53,7 +53,7 @@ pub(super) fn speed_const(rows: &[Row]) -> Vec<Verdict> {
         same("speed_const", &Ok(row.speed_const), &speed.map(Speed::raw))?;
         let speed = Speed::from_raw(row.speed_const);
         if row.named {
-            same("named", &true, &Speed::NAMED.contains(&(row.f_hz, speed)))?;
+            same("named", &true, &Speed::NAMED.contains(&NamedSpeed { hz: row.f_hz, speed }))?;
         }
         let profile = Profile::new(Parameters::at(speed));
         let overflow = matches!(profile, Err(Error::StepTimeOverflow { .. }));
@@ -110,7 +110,7 @@ fn speed_of(frequency: Frequency) -> u32 {
 
 /// In lowest terms.
 fn in_khz(frequency: Frequency) -> String {
-    let (numerator, denominator) = frequency.ratio();
+    let (numerator, denominator) = (frequency.numerator(), frequency.denominator());
     let denominator = u32::from(denominator) * 1000;
     let (mut a, mut b) = (numerator, denominator);
     while b > 0 {
@@ -121,7 +121,7 @@ fn in_khz(frequency: Frequency) -> String {
 
 /// Rounded to two decimals.
 fn rounded_khz(frequency: Frequency) -> String {
-    let (numerator, denominator) = frequency.ratio();
+    let (numerator, denominator) = (frequency.numerator(), frequency.denominator());
     let hundredths = (u64::from(numerator) + u64::from(denominator) * 5) / (u64::from(denominator) * 10);
     format!("{}.{:02}", hundredths / 100, hundredths % 100)
 }
@@ -144,8 +144,8 @@ struct MicrostepRow {
 
 pub(super) fn microstep(rows: &[Row]) -> Vec<Verdict> {
     each(rows, |row: MicrostepRow| {
-        let profile = Microstep::try_from(row.profile_code)
-            .map_err(|e| Fault::Unreadable(format!("the profile code is refused: {e}")))?;
+        let profile = Microstep::from_code(row.profile_code)
+            .ok_or_else(|| Fault::Unreadable("the profile code is refused".to_owned()))?;
         same("microsteps", &row.microsteps, &profile.microsteps())?;
         same("steps_per_rev", &row.steps_per_rev, &profile.steps_per_turn())?;
         same("steps_per_rev", &row.steps_per_rev, &profile.steps(Turn::Full))?;

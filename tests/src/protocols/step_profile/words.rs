@@ -11,14 +11,20 @@ use crate::row::{Fault, Row, Verdict, each, same};
 pub(super) fn pto(command: Command) -> Result<Pto, OutOfRange> {
     match command {
         Command::Disable => Ok(Pto::DriverOff),
-        Command::Hold { direction } => Ok(Pto::NoPulse { direction: direction.dir().into() }),
-        Command::Pulse { direction, sync_time } => Pto::from_step(sync_time, direction.dir().into()),
+        Command::Hold { direction } => Ok(Pto::NoPulse { direction: level(direction) }),
+        Command::Pulse { direction, sync_time } => Pto::from_step(sync_time, level(direction)),
     }
+}
+
+/// The level of DIR, which both crates give the same code.
+fn level(direction: step_profile::Direction) -> Direction {
+    Direction::from_code(direction.code()).unwrap_or_default()
 }
 
 /// The command of a word; `None` for a reserved one.
 fn command(pto: Pto) -> Option<Command> {
-    let direction = step_profile::Direction::from_dir(pto.direction().is_some_and(Direction::is_high));
+    let code = pto.direction().unwrap_or_default().code();
+    let direction = step_profile::Direction::from_code(code).unwrap_or_default();
     match pto {
         Pto::DriverOff => Some(Command::Disable),
         Pto::NoPulse { .. } => Some(Command::Hold { direction }),
@@ -52,7 +58,7 @@ enum Word {
 pub(super) fn pto_word(rows: &[Row]) -> Vec<Verdict> {
     each(rows, |row: Word| match row {
         Word::Encode { sync, dir, word, wire_le, shifted_ns, error } => {
-            let direction = step_profile::Direction::from_dir(dir != 0);
+            let direction = step_profile::Direction::from_code(dir).unwrap_or_default();
             let pto = pto(Command::Pulse { direction, sync_time: sync });
             same("error", &error, &pto.err().map(|_| "SyncTimeOutOfRange".to_owned()))?;
             let pto = pto.ok();

@@ -1,8 +1,10 @@
 use super::*;
 use crate::address::Address;
+use crate::doubt::Doubt;
 use crate::response::tests::plain_exchanges;
 use crate::status::StatusField;
 use crate::timing::BitRate;
+use crate::tolerated::{Policy, Tolerated};
 use proptest::prelude::*;
 use std::vec::Vec;
 
@@ -309,20 +311,23 @@ fn what_a_uart_received_since_the_request_began() {
     }
 }
 
-/// 125 us old may be used where 125 us are allowed; the alarms of the logged response are a doubt at any age.
+/// The evidence is as old as the instant of sampling: 125 us where 125 us are allowed.
 #[test]
-fn the_age_of_a_position() {
+fn evidence_of_an_exchange() {
     let response = Response::parse(Request::ReadSingleTurn, &RESPONSE).unwrap();
     let exchange = Exchange { response, sampled_ns: 4_480, began_ns: 7_000 };
-    let resolution = Resolution::new(23, 16).unwrap();
-    let policy = Policy::STRICT.tolerating(crate::Almc::all()).with_max_age_ns(125_000);
-    let at = |now_ns| exchange.single_turn(resolution, policy, now_ns);
-    // Before it was sampled: a clock that is read before the exchange, and one that was set back.
-    assert_eq!(exchange.single_turn(resolution, policy.with_max_age_ns(4_479), 0), Err(Doubt::Old { age_ns: 4_480 }));
-    assert_eq!((at(0), at(129_480), at(129_481)), (Ok(1_883_572), Ok(1_883_572), Err(Doubt::Old { age_ns: 125_001 })));
-    let strict = exchange.single_turn(resolution, Policy::STRICT, u64::MAX);
-    assert!(matches!(strict, Err(Doubt::Status { .. })), "{strict:?}");
+    let evidence = exchange.evidence(Resolution::new(23, 16).unwrap());
+    let policy = Policy::new(125_000).tolerating(Tolerated::SINGLE_TURN.alarms(crate::Almc::all()));
+    let at = |now_ns| evidence.at(now_ns, policy).map(crate::Sample::single_turn);
+    assert_eq!(
+        (at(4_480), at(129_480), at(129_481)),
+        (Ok(1_883_572), Ok(1_883_572), Err(Doubt::Old { age_ns: 125_001 }))
+    );
+    // EA1 is set in the logged response.
+    assert_eq!(
+        evidence.at(4_480, Policy::new(0).tolerating(Tolerated::SINGLE_TURN)),
+        Err(Doubt::Status { sf: StatusField::EA1 })
+    );
     // ID 0 carries no turns.
-    assert_eq!(exchange.position(resolution, policy, 129_480), Err(Doubt::Absent));
-    assert_eq!(exchange.position(resolution, policy, 129_481), Err(Doubt::Old { age_ns: 125_001 }));
+    assert_eq!(evidence.at(4_480, Policy::new(0)), Err(Doubt::Absent));
 }

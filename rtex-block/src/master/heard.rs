@@ -4,8 +4,8 @@ use crate::sub::{Response32, SubResponse};
 
 /// What an update period brought from one drive.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub enum Received {
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub enum Heard {
     /// No block.
     Nothing,
     /// A block that was refused.
@@ -16,7 +16,7 @@ pub enum Received {
     Both(Response32),
 }
 
-impl Received {
+impl Heard {
     /// The main half of a sound block.
     pub const fn response(&self) -> Option<&Response> {
         match self {
@@ -34,13 +34,20 @@ impl Received {
     }
 }
 
-impl From<Result<Response, Error>> for Received {
+servowire_core::one_line!(Heard {
+    Self::Nothing => "nothing";
+    Self::Refused(error) => "refused: {}", error;
+    Self::Main(response) => "{}", response;
+    Self::Both(Response32 { main, sub }) => "{}; {}", main, sub;
+});
+
+impl From<Result<Response, Error>> for Heard {
     fn from(parsed: Result<Response, Error>) -> Self {
         parsed.map_or_else(Self::Refused, Self::Main)
     }
 }
 
-impl From<Result<Response32, Error>> for Received {
+impl From<Result<Response32, Error>> for Heard {
     fn from(parsed: Result<Response32, Error>) -> Self {
         parsed.map_or_else(Self::Refused, Self::Both)
     }

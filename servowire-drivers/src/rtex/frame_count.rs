@@ -3,36 +3,36 @@ use core::sync::atomic::{AtomicU32, Ordering};
 /// What the receive interrupt (XINTRX) tells the exchange: that a frame has come. A `static` for both.
 ///
 /// ```
-/// use servowire_drivers::rtex::Reception;
+/// use servowire_drivers::rtex::FrameCount;
 ///
-/// static RECEPTION: Reception = Reception::new();
+/// static FRAMES: FrameCount = FrameCount::new();
 ///
 /// fn on_xintrx(switch_bank: impl FnOnce()) {
-///     RECEPTION.frame();
+///     FRAMES.add();
 ///     switch_bank(); // in the external-timer system
 /// }
 /// # on_xintrx(|| ());
-/// # assert_eq!(RECEPTION.frames(), 1);
+/// # assert_eq!(FRAMES.get(), 1);
 /// ```
 #[derive(Debug, Default)]
-pub struct Reception {
+pub struct FrameCount {
     frames: AtomicU32,
 }
 
-impl Reception {
+impl FrameCount {
     /// No frame yet.
     pub const fn new() -> Self {
         Self { frames: AtomicU32::new(0) }
     }
 
     /// A frame has come. To be called by the receive interrupt and nothing else, before it switches the bank.
-    pub fn frame(&self) {
+    pub fn add(&self) {
         // One writer, so no read-modify-write is needed, which small processors do not have.
-        self.frames.store(self.frames().wrapping_add(1), Ordering::Release);
+        self.frames.store(self.get().wrapping_add(1), Ordering::Release);
     }
 
     /// Frames so far, modulo 2^32.
-    pub fn frames(&self) -> u32 {
+    pub fn get(&self) -> u32 {
         self.frames.load(Ordering::Acquire)
     }
 }

@@ -1,0 +1,99 @@
+use servowire_core::Tolerance;
+
+use crate::marks::Marks;
+use crate::status::{Alm, EncoderStatus};
+
+/// Up to which age, and in spite of what, a position may be used.
+///
+/// ```
+/// use nikon_aformat::{EncoderStatus, Policy, Tolerated};
+/// // Two cycles of a 16 kHz loop, and an encoder without its battery whose turns are not used.
+/// const COMMUTATION: Policy = Policy::new(125_000).tolerating(Tolerated::SINGLE_TURN);
+/// assert_eq!(COMMUTATION.max_age_ns(), 125_000);
+/// ```
+pub type Policy = servowire_core::Policy<Tolerated>;
+
+/// In spite of what a position may be used: status bits, and alarms where a response carries them.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(from = "Written", into = "Written"))]
+pub struct Tolerated(Marks);
+
+impl Tolerated {
+    /// Nothing.
+    pub const NOTHING: Self = Self(Marks::empty());
+
+    #[cfg(test)]
+    pub(crate) const ANY_TURNS: Self = Self(Marks::NO_TURNS);
+
+    /// As one drive does where turns are not used: an encoder without its battery shows BATT. The turns are not judged then, and
+    /// the [`Sample`](crate::Sample) does not have them. Everything else means that the position may be wrong or that something
+    /// is about to fail.
+    pub const SINGLE_TURN: Self = Self(Marks::NO_TURNS).status(EncoderStatus::BATT).alarms(Alm::BATT);
+
+    /// These status bits too.
+    #[must_use]
+    pub const fn status(self, status: EncoderStatus) -> Self {
+        Self(self.0.union(Marks::of_status(status)))
+    }
+
+    /// These alarms too.
+    #[must_use]
+    pub const fn alarms(self, alarms: Alm) -> Self {
+        Self(self.0.union(Marks::of_alarms(alarms)))
+    }
+
+    /// What of these marks is not tolerated.
+    #[inline]
+    pub(crate) const fn objects_to(self, marks: Marks) -> Marks {
+        marks.difference(self.0)
+    }
+
+    /// Whether turns may be anything, or missing: they are not used.
+    #[inline]
+    pub(crate) const fn ignores_turns(self) -> bool {
+        self.0.contains(Marks::NO_TURNS)
+    }
+}
+
+servowire_core::one_line!(Tolerated {
+    Self(marks) if marks.contains(Marks::NO_TURNS) =>
+        "status {} and alarms {}, any turns", marks.status(), marks.alarms();
+    Self(marks) => "status {} and alarms {}", marks.status(), marks.alarms();
+});
+
+impl Tolerance for Tolerated {
+    const NOTHING: Self = Self::NOTHING;
+}
+
+/// What is tolerated, as it is written down.
+#[derive(Clone, Copy)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "arbitrary", derive(arbitrary::Arbitrary))]
+#[cfg(any(feature = "serde", feature = "arbitrary"))]
+struct Written {
+    status: EncoderStatus,
+    alarms: Alm,
+    any_turns: bool,
+}
+
+#[cfg(any(feature = "serde", feature = "arbitrary"))]
+impl From<Written> for Tolerated {
+    fn from(Written { status, alarms, any_turns }: Written) -> Self {
+        let turns = if any_turns { Marks::NO_TURNS } else { Marks::empty() };
+        Self(turns).status(status).alarms(alarms)
+    }
+}
+
+#[cfg(feature = "serde")]
+impl From<Tolerated> for Written {
+    fn from(Tolerated(marks): Tolerated) -> Self {
+        Self { status: marks.status(), alarms: marks.alarms(), any_turns: marks.contains(Marks::NO_TURNS) }
+    }
+}
+
+#[cfg(feature = "arbitrary")]
+impl<'a> arbitrary::Arbitrary<'a> for Tolerated {
+    fn arbitrary(from: &mut arbitrary::Unstructured<'a>) -> arbitrary::Result<Self> {
+        from.arbitrary::<Written>().map(Self::from)
+    }
+}

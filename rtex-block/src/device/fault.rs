@@ -1,0 +1,35 @@
+use crate::error_code::Alarm;
+use crate::header::MacId;
+
+/// What a modelled drive is made to do wrong, one thing at a time.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "arbitrary", derive(arbitrary::Arbitrary))]
+#[non_exhaustive]
+pub enum Fault {
+    /// Nothing. An alarm that was raised stays until it is cleared.
+    #[default]
+    None,
+    /// It is off the ring: it hears no frame and sends none.
+    Silent,
+    /// Its processing stands still: it sends its last block again and again, and hears nothing.
+    StaleEcho,
+    /// It sends another Actual_MAC-ID than the address that it hears.
+    WrongMacId(MacId),
+    /// The main power is gone: the motor is released, and the drive is not ready.
+    NoMainPower,
+    /// The motor is released once, without an alarm; Servo_Ready stays 1.
+    ServoDrop,
+    /// It raises this alarm once, and releases the motor. An alarm that is already there stays.
+    Alarm(Alarm),
+}
+
+servowire_core::one_line!(Fault {
+    Self::None => "no fault";
+    Self::Silent => "silent";
+    Self::StaleEcho => "sends its last block again";
+    Self::WrongMacId(mac_id) => "sends MAC-ID {}", mac_id;
+    Self::NoMainPower => "no main power";
+    Self::ServoDrop => "drops the servo";
+    Self::Alarm(alarm) => "raises {}", alarm;
+});

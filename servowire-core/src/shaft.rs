@@ -1,0 +1,260 @@
+use core::marker::PhantomData;
+
+use crate::angle::{Angle, Commutation};
+use crate::cell::Words;
+use crate::feedback::{Feedback, Policy};
+use crate::four_slots::FourSlots;
+use crate::motion::{Acceleration, Estimate, Motion, Tracker};
+
+/// Feedback of where a shaft is.
+pub trait Shaft: Feedback {
+    /// The angle within the turn, and the instant of sampling in ns.
+    fn shaft(sample: &Self::Sample) -> (Angle, u64);
+}
+
+/// A [`Cell`](crate::Cell) that carries the motion of the shaft beside the evidence: for a control loop that runs more
+/// often than the encoder is read, or at other times.
+///
+/// The writer finds angle and speed, with divisions; the reader needs none for the electrical angle of this instant and the
+/// bound of its error. It takes 4 × (`W` + 7) + 2 words of memory.
+///
+/// ```
+/// use servowire_core::{Acceleration, Angle, Commutation, Policy, Sense, ShaftCell, Tracker};
+/// # use servowire_core::{Feedback, Shaft, Words};
+/// # #[derive(Clone, Copy)]
+/// # struct Evidence { count: u32, sampled_ns: Option<u64> }
+/// # #[derive(Debug, Clone, Copy, PartialEq)]
+/// # enum Doubt { Never, Old { age_ns: u64 } }
+/// # impl Feedback for Evidence {
+/// #     type Tolerated = ();
+/// #     type Sample = (u32, u64);
+/// #     type Doubt = Doubt;
+/// #     const NEVER: Self = Self { count: 0, sampled_ns: None };
+/// #     fn at(&self, now_ns: u64, policy: Policy<()>) -> Result<(u32, u64), Doubt> {
+/// #         let sampled_ns = self.sampled_ns.ok_or(Doubt::Never)?;
+/// #         policy.check_age(now_ns, sampled_ns).map_err(|age_ns| Doubt::Old { age_ns })?;
+/// #         Ok((self.count, sampled_ns))
+/// #     }
+/// # }
+/// # impl Words<3> for Evidence {
+/// #     fn to_words(&self) -> [u32; 3] {
+/// #         let sampled_ns = self.sampled_ns.unwrap_or(0);
+/// #         [self.count, sampled_ns as u32, (sampled_ns >> 32) as u32]
+/// #     }
+/// #     fn from_words([count, low, high]: [u32; 3]) -> Self {
+/// #         let sampled_ns = u64::from(high) << 32 | u64::from(low);
+/// #         Self { count, sampled_ns: (sampled_ns != 0).then_some(sampled_ns) }
+/// #     }
+/// # }
+/// # impl Shaft for Evidence {
+/// #     fn shaft((count, sampled_ns): &(u32, u64)) -> (Angle, u64) {
+/// #         (Angle::from_counts(*count, 1 << 20), *sampled_ns)
+/// #     }
+/// # }
+/// // An encoder with 20 bits on a servo that never exceeds 100 turns per second and 2000 turns per second squared.
+/// let tracker = Tracker::new(1 << 20, 100).unwrap();
+/// let acceleration = Acceleration::from_turns_per_s2(2_000).unwrap();
+/// let commutation = Commutation::new(4, Angle::ZERO, Sense::Up).unwrap();
+/// let policy = Policy::new(125_000);
+///
+/// let mut cell = ShaftCell::<Evidence, 3>::new();
+/// let (mut writer, mut reader) = cell.split(tracker);
+/// // where answers are received: 5000 counts in 62.5 µs are 76 turns per second
+/// writer.put(Evidence { count: 10_000, sampled_ns: Some(1_000_000) }, 1_010_000, policy);
+/// writer.put(Evidence { count: 15_000, sampled_ns: Some(1_062_500) }, 1_072_500, policy);
+/// // where the current is controlled, 31.25 µs after the last sample: 17500 counts, times four
+/// let field = reader.angle(1_093_750, policy, commutation, acceleration)?;
+/// assert_eq!(field.angle.millidegrees(), 24_033);
+/// assert_eq!(field.bound.millidegrees(), 6);
+/// # Ok::<(), Doubt>(())
+/// ```
+pub struct ShaftCell<F, const W: usize> {
+    slots: FourSlots<W, { Motion::WORDS }>,
+    evidence: PhantomData<F>,
+}
+
+impl<F: Shaft + Words<W>, const W: usize> ShaftCell<F, W> {
+    /// With [`Feedback::NEVER`] in it.
+    pub const fn new() -> Self {
+        Self { slots: FourSlots::new(), evidence: PhantomData }
+    }
+
+    /// Its two ends, as those of [`Cell`](crate::Cell::split). What is in the cell stays there; the speed begins anew.
+    pub const fn split(&mut self, tracker: Tracker) -> (ShaftWriter<'_, F, W>, ShaftReader<'_, F, W>) {
+        let slots = &self.slots;
+        (ShaftWriter { slots, tracker, evidence: PhantomData }, ShaftReader { slots, evidence: PhantomData })
+    }
+}
+
+impl<F: Shaft + Words<W>, const W: usize> Default for ShaftCell<F, W> {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+/// The end of a [`ShaftCell`] where evidence is received.
+pub struct ShaftWriter<'a, F, const W: usize> {
+    slots: &'a FourSlots<W, { Motion::WORDS }>,
+    tracker: Tracker,
+    evidence: PhantomData<F>,
+}
+
+impl<F: Shaft + Words<W>, const W: usize> ShaftWriter<'_, F, W> {
+    /// Puts the newest evidence, in place of all before.
+    ///
+    /// The policy, that of the reader as a rule, decides which evidence goes into the speed. After a doubt the speed is not
+    /// known until there are two good samples again, as in the beginning.
+    pub fn put(&mut self, evidence: F, now_ns: u64, policy: Policy<F::Tolerated>) {
+        let motion = if let Ok(sample) = evidence.at(now_ns, policy) {
+            let (angle, sampled_ns) = F::shaft(&sample);
+            self.tracker.sample(angle, sampled_ns)
+        } else {
+            self.tracker.interrupt()
+        };
+        self.slots.put(&(evidence.to_words(), motion.to_words()));
+    }
+}
+
+/// The end of a [`ShaftCell`] where evidence is used.
+pub struct ShaftReader<'a, F, const W: usize> {
+    slots: &'a FourSlots<W, { Motion::WORDS }>,
+    evidence: PhantomData<F>,
+}
+
+impl<F: Shaft + Words<W>, const W: usize> ShaftReader<'_, F, W> {
+    /// The value of the newest evidence, if it may be used at this time.
+    ///
+    /// # Errors
+    /// Why it must not be used.
+    #[inline]
+    pub fn at(&mut self, now_ns: u64, policy: Policy<F::Tolerated>) -> Result<F::Sample, F::Doubt> {
+        self.latest().at(now_ns, policy)
+    }
+
+    /// Speed and mechanical angle, if the newest evidence may be used at this time.
+    ///
+    /// # Errors
+    /// Why it must not be used.
+    #[inline]
+    pub fn motion(&mut self, now_ns: u64, policy: Policy<F::Tolerated>) -> Result<Motion, F::Doubt> {
+        let (evidence, motion) = self.newest();
+        evidence.at(now_ns, policy).map(|_| motion)
+    }
+
+    /// The electrical angle at this time, if the newest evidence may be used. Compare the bound with what the drive can
+    /// stand: where the speed is not known it is half a turn.
+    ///
+    /// # Errors
+    /// Why it must not be used.
+    #[inline]
+    pub fn angle(
+        &mut self,
+        now_ns: u64,
+        policy: Policy<F::Tolerated>,
+        commutation: Commutation,
+        max_acceleration: Acceleration,
+    ) -> Result<Estimate, F::Doubt> {
+        let Estimate { angle, bound } = self.motion(now_ns, policy)?.at(now_ns, max_acceleration);
+        Ok(Estimate { angle: commutation.electrical(angle), bound: commutation.bound(bound) })
+    }
+
+    /// The newest evidence, not judged.
+    #[inline]
+    pub fn latest(&mut self) -> F {
+        self.newest().0
+    }
+
+    #[inline]
+    fn newest(&self) -> (F, Motion) {
+        match self.slots.get() {
+            Some((words, motion)) => (F::from_words(words), Motion::from_words(motion)),
+            None => (F::NEVER, Motion::UNKNOWN),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::angle::Sense;
+
+    /// A count of 2^16, good or not, and its instant; never if this is 0.
+    #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+    struct Count(u32, bool, u32);
+
+    #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+    enum Doubt {
+        Never,
+        Bad,
+        Old(u64),
+    }
+
+    impl Feedback for Count {
+        type Tolerated = ();
+        type Sample = Self;
+        type Doubt = Doubt;
+        const NEVER: Self = Self(0, true, 0);
+
+        fn at(&self, now_ns: u64, policy: Policy<()>) -> Result<Self, Doubt> {
+            match *self {
+                Self(_, _, 0) => Err(Doubt::Never),
+                Self(_, false, _) => Err(Doubt::Bad),
+                Self(_, true, ns) => policy.check_age(now_ns, ns.into()).map_err(Doubt::Old).map(|()| *self),
+            }
+        }
+    }
+
+    impl Shaft for Count {
+        fn shaft(Self(count, _, ns): &Self) -> (Angle, u64) {
+            (Angle::from_counts(*count, 1 << 16), (*ns).into())
+        }
+    }
+
+    impl Words<3> for Count {
+        fn to_words(&self) -> [u32; 3] {
+            [self.0, self.1.into(), self.2]
+        }
+
+        fn from_words([count, good, ns]: [u32; 3]) -> Self {
+            Self(count, good != 0, ns)
+        }
+    }
+
+    const POLICY: Policy<()> = Policy::new(100_000);
+
+    /// An electrical angle in degrees, and whether anything is known.
+    fn field(reader: &mut ShaftReader<'_, Count, 3>, now_ns: u64) -> Result<(u32, bool), Doubt> {
+        let commutation = Commutation::new(2, Angle::from_millidegrees(90_000), Sense::Down).unwrap();
+        let acceleration = Acceleration::from_turns_per_s2(1_000).unwrap();
+        let estimate = reader.angle(now_ns, POLICY, commutation, acceleration)?;
+        Ok(((estimate.angle.millidegrees() + 500) / 1_000, estimate.bound != Angle::HALF))
+    }
+
+    #[test]
+    fn the_field_goes_on_between_samples_until_they_are_old() {
+        let mut cell = ShaftCell::<Count, 3>::new();
+        let (mut writer, mut reader) = cell.split(Tracker::new(1 << 16, 1_000).unwrap());
+        assert_eq!((field(&mut reader, 1_000), reader.latest()), (Err(Doubt::Never), Count::NEVER));
+        // 1/64 of a turn in 100 µs: 5.6 degrees of the shaft, 11.25 of the field, backward from 90.
+        writer.put(Count(0, true, 1_000_000), 1_000_000, POLICY);
+        assert_eq!(field(&mut reader, 1_000_000), Ok((90, false)));
+        writer.put(Count(1 << 10, true, 1_100_000), 1_100_000, POLICY);
+        assert_eq!([1_100_000, 1_200_000].map(|now| field(&mut reader, now)), [Ok((79, true)), Ok((68, true))]);
+        assert_eq!(field(&mut reader, 1_200_001), Err(Doubt::Old(100_001)));
+        assert_eq!(reader.at(1_200_000, POLICY), Ok(Count(1 << 10, true, 1_100_000)));
+        // 156 turns per second.
+        assert_eq!(reader.motion(1_100_000, POLICY).map(|motion| motion.speed()), Ok(Some(43_980_465)));
+    }
+
+    #[test]
+    fn after_a_doubt_the_speed_begins_anew() {
+        let mut cell = ShaftCell::<Count, 3>::new();
+        let (mut writer, mut reader) = cell.split(Tracker::new(1 << 16, 1_000).unwrap());
+        let known = [true, true, false, true, true].iter().zip(1..).map(|(good, k)| {
+            let ns = k * 50_000;
+            writer.put(Count(7, *good, ns), ns.into(), POLICY);
+            field(&mut reader, ns.into()).map(|(_, known)| known)
+        });
+        assert!(known.eq([Ok(false), Ok(true), Err(Doubt::Bad), Ok(false), Ok(true)]));
+    }
+}
