@@ -8,8 +8,9 @@ use hdsl::device::Device;
 use hdsl::master::Master;
 use hdsl::{Dialect, EncoderId, Policy};
 
-/// A free-running H-frame; the window of its answer ends 10,560 ns after its start.
+/// A free-running H-frame, and when in it the window of its answer ends.
 const FRAME_NS: u64 = 11_520;
+const WINDOW_NS: u64 = 10_560;
 
 fn main() -> Result<(), Box<dyn core::error::Error>> {
     let frames: u64 = std::env::args().nth(1).map_or(Ok(100_000), |n| n.parse())?;
@@ -18,18 +19,19 @@ fn main() -> Result<(), Box<dyn core::error::Error>> {
     let mut master = Master::new(Dialect::SICK);
     let mut encoder = Device::new(EncoderId::try_from(0x00153)?);
 
-    let mut position = 0_u64;
+    let (mut position, mut start_ns) = (0_u64, 0_u64);
     for frame in 0..frames {
         // To and fro, within the 32 bits of the encoder.
         position = if frame & 0x8000 == 0 { position.wrapping_add(3) } else { position.wrapping_sub(3) };
         let head = cable.down(master.transmission().head.bits());
         let samples = cable.up(encoder.hear_at(head, position));
-        let h_frame = master.hear(&samples, FRAME_NS * frame + 10_560)?;
+        let h_frame = master.hear(&samples, start_ns.saturating_add(WINDOW_NS))?;
+        start_ns = start_ns.saturating_add(FRAME_NS);
         if let Some(reason) = h_frame.restarted {
             println!("frame {frame}: link started anew: {reason}");
         }
     }
-    let fast = master.fast().at(FRAME_NS * frames, Policy::new(FRAME_NS))?;
+    let fast = master.fast().at(start_ns, Policy::new(FRAME_NS))?;
     println!("{frames} H-frames: {:?}", master.counters());
     println!("position {} (encoder {position}), quality {}", fast.position(), master.h_frame().quality);
     Ok(())

@@ -38,7 +38,7 @@ fn a_sound_answer_has_no_fault() {
 #[test]
 fn mistakes_and_their_causes() {
     let good = line(content());
-    let doubled = (0..61).fold(0, |all, at| all | (good >> at & 1) * 3 << (2 * at));
+    let doubled = (0..61).fold(0, |all, at| all | ((good >> at & 1) * 3) << (2 * at));
     let ones = |bits: u32| (1_u128 << bits) - 1;
     for (line, cause) in [
         (window(good, 61).inverted(), LineCause::LineInverted),
@@ -49,7 +49,7 @@ fn mistakes_and_their_causes() {
         let report = inspect(NORMAL, line);
         assert!(report.error().is_some(), "{cause}");
         assert_eq!(report.cause(), Some(Cause::Line(cause)));
-        assert_eq!(report.answer().map(|answer| answer.bits()), Some(good as u64));
+        assert_eq!(report.answer().map(Answer::bits), Some(good as u64));
     }
     for (bits, cause) in [(0, LineCause::StuckLow), (u128::MAX, LineCause::StuckHigh)] {
         let report = inspect(NORMAL, window(bits, 73));
