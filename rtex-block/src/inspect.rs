@@ -113,9 +113,11 @@ pub type Findings = servowire_core::Findings<ErrorClass>;
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct Report {
+    error: Option<Error>,
+    findings: Findings,
+    cause: Option<Cause>,
     is_response: Option<bool>,
     message: Option<Message>,
-    cause: Option<Cause>,
     #[cfg_attr(feature = "serde", serde(serialize_with = "each"))]
     errors: [Option<Error>; MOST_FINDINGS],
     #[cfg_attr(feature = "serde", serde(serialize_with = "each"))]
@@ -156,7 +158,7 @@ impl Report {
 
     /// The fault that strict decoding reports: the first of them.
     pub const fn error(&self) -> Option<Error> {
-        self.errors[0]
+        self.error
     }
 
     /// Every fault of the block, in the order of the checks: each as if the ones before it were mended.
@@ -165,10 +167,8 @@ impl Report {
     }
 
     /// The classes of all faults.
-    pub fn findings(&self) -> Findings {
-        let mut findings = Findings::NONE;
-        self.errors().for_each(|error| findings.insert(error.class()));
-        findings
+    pub const fn findings(&self) -> Findings {
+        self.findings
     }
 
     /// The most likely cause of the fault, or of a suspicious block.
@@ -246,7 +246,11 @@ impl fmt::Display for Report {
 /// Looks at a block of either direction and either size.
 pub fn inspect(bytes: &[u8]) -> Report {
     let (errors, message) = (errors(bytes), lenient(bytes));
+    let mut findings = Findings::NONE;
+    errors.iter().flatten().for_each(|error| findings.insert(error.class()));
     Report {
+        error: errors[0],
+        findings,
         is_response: bytes.first().map(|byte0| byte0 & 0x80 != 0),
         message,
         cause: cause(bytes, errors[0], message.is_some()),

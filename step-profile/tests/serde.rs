@@ -16,7 +16,7 @@ fn round_trip<T: PartialEq + Debug + serde::Serialize + serde::de::DeserializeOw
 #[test]
 fn values_are_plain() {
     round_trip(&Motors::ALL, "15");
-    round_trip(&Tone::Cis.frequency(), "[13136900,187]");
+    round_trip(&Tone::Cis.frequency(), r#"{"numerator":13136900,"denominator":187}"#);
     round_trip(&Note::p125(Tone::A, 7), r#"{"speed":580294,"steps":14117,"pause":7}"#);
     round_trip(&Microstep::Div256, r#""Div256""#);
     let pulse = Command::Pulse { direction: Direction::Reverse, sync_time: 3999 };

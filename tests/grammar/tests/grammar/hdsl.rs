@@ -53,14 +53,14 @@ fn awake() -> (Device, Window) {
     }
 }
 
-decode! { hdsl::Answer(rule = Rule::Strict; line); sound line(61); damaged short() => "truncated" }
+decode! { hdsl::Answer(Rule, Window); with (Rule::Strict); sound line(61); damaged short() => "truncated" }
 encode! { hdsl::message::ShortRequest = ShortRequest::Read(RemoteRegister::SRSSI) }
 code! { hdsl::message::AccessLevel: 3; unknown 7 }
-feedback! { hdsl: evidence(), sampled at SAMPLED_NS; "`master.fast()`, `master.safe()`" }
+feedback! { hdsl: evidence(), sampled at SAMPLED_NS; "`master.fast()`; `master.safe()` gives `SafeEvidence`" }
 device! {
-    hdsl::Device = awake().0;
+    hdsl::"Device::new(id)" = awake().0;
     with Behaviour::new().with_sync_frames(4);
-    heard |_at| (awake().1); "head: Window"
+    heard |_at| (awake().1); "Window)"
 }
 inspect! { hdsl::inspect(expected = Expected::Normal { at: None }; line); damaged damaged() => "invalid_word" }
 log! { hdsl: ShortRequest, hdsl::master::RestartReason, hdsl::message::AccessLevel }

@@ -49,7 +49,7 @@ fn the_words_are_what_they_are_said_to_be() {
     assert_eq!(request().command(), Command::Abs40);
 }
 
-decode! { nikon_aformat::Response(expected = &expected(); raw); sound &raw(SOUND); damaged &raw(DAMAGED) => "crc" }
+decode! { nikon_aformat::Response(&Expected, &RawResponse); with (&expected()); sound &raw(SOUND); damaged &raw(DAMAGED) => "crc" }
 encode! { nikon_aformat::Request = request() }
 code! { nikon_aformat::Command: 3; unknown 31 }
 exchange! {
@@ -59,9 +59,9 @@ exchange! {
 procedure! { nikon_aformat::Reset = Reset::clear_status(EA); lost Error::NoResponse }
 feedback! { nikon_aformat: evidence(), sampled at 1_000_000; "`exchange.evidence(resolution)`" }
 device! {
-    nikon_aformat::Device = Device::<1>::new(EA, resolution(), BitRate::Mbit4);
+    nikon_aformat::"Device::<BANKS>::new(ea, resolution, rate)" = Device::<1>::new(EA, resolution(), BitRate::Mbit4);
     with Behaviour::new().with_response_delay_ns(4_000);
-    heard |at| (request().emit().units().as_slice(), at); "emit().units().as_slice(): &[Option<u16>], end_ns"
+    heard |at| (request().emit().units().as_slice(), at); "&[Option<u16>], end_ns)`, of a request `emit().units().as_slice()"
 }
 inspect! {
     nikon_aformat::inspect(request = request(), resolution = resolution(); line);

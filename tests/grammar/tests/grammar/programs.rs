@@ -4,10 +4,10 @@
 
 /// Decodes a sound unit and refuses a damaged one with an error that has a class, a name, a number and a text.
 macro_rules! decode {
-    ($krate:ident::$unit:ident($($context:ident = $value:expr),*; $data:ident);
+    ($krate:ident::$unit:ident($($argument:ty),+); with ($($value:expr),*);
      sound $sound:expr; damaged $damaged:expr => $class:literal) => {
         pub(crate) const DECODE: &str =
-            concat!("`", stringify!($unit), "::parse(", $(stringify!($value), ", ",)* stringify!($sound), ")`");
+            concat!("`", stringify!($unit), "::parse", stringify!(($($argument),+)), "`");
 
         #[test]
         fn decode() {
@@ -57,8 +57,7 @@ macro_rules! exchange {
     ($krate:ident::$machine:ident::start($($name:ident = $value:expr),*); heard $unit:expr; $kind:literal, at $end_ns:expr) => {
         pub(crate) const EXCHANGE: &str =
             concat!(
-                "`", stringify!($machine), "::start(", $(stringify!($name), ", ",)* "start_ns)`, `hear(", stringify!($unit), ": ",
-                $kind, ", end_ns)`"
+                "`", stringify!($machine), "::start(", $(stringify!($name), ", ",)* "start_ns)`, `hear(", $kind, ", end_ns)`"
             );
 
         #[test]
@@ -137,8 +136,8 @@ macro_rules! feedback {
 
 /// The other end, with a decision that the documents leave open, and with a fault.
 macro_rules! device {
-    ($krate:ident::$device:ident = $value:expr; with $behaviour:expr; heard |$at:ident| ($($heard:expr),+); $hears:literal) => {
-        pub(crate) const DEVICE: &str = concat!("`", stringify!($device), "`; `hear(", $hears, ")`");
+    ($krate:ident::$device:literal = $value:expr; with $behaviour:expr; heard |$at:ident| ($($heard:expr),+); $hears:literal) => {
+        pub(crate) const DEVICE: &str = concat!("`", $device, "`; `hear(", $hears, "`");
 
         #[test]
         fn device() {

@@ -22,19 +22,19 @@ fn evidence() -> Evidence {
     Evidence::of(&Response::parse(&SOUND).unwrap(), 1_000_000)
 }
 
-decode! { rtex_block::Response(; bytes); sound &SOUND; damaged &DAMAGED => "direction" }
+decode! { rtex_block::Response(&[u8]); with (); sound &SOUND; damaged &DAMAGED => "direction" }
 encode! { rtex_block::Command = command() }
 code! { rtex_block::CyclicCode: 2; unknown 5 }
 feedback! { rtex_block: evidence(), sampled at 1_000_000; "`axis.evidence()`" }
 device! {
-    rtex_block::Drive = rtex_block::device::Drive::new(DriveConfig::new(mac_id(), OpenCodes::INVENTED));
+    rtex_block::"Drive::new(DriveConfig)" = rtex_block::device::Drive::new(DriveConfig::new(mac_id(), OpenCodes::INVENTED));
     with Behaviour::new().with_echo_lag(2);
-    heard |_at| (&command().emit()); "&command.emit(): &[u8; N]"
+    heard |_at| (&command().emit()); "&[u8; N])`, of a command `&emit()"
 }
 inspect! { rtex_block::inspect(; bytes); damaged &UNDEFINED => "cyclic_code" }
 log! { rtex_block: Command, Response, rtex_block::CyclicCode, rtex_block::master::Failure }
 counters! { rtex_block }
 differs! {
-    EXCHANGE: "an update period has its own clock: `Axis::new(config)`, `transmission(turn)`, `hear(turn, &Heard, end_ns)`";
-    PROCEDURE: "counts update periods: `master::procedure::{Home, ClearAlarm, ..}`, `receive(&mut axis)`";
+    EXCHANGE: "an update period has its own clock: `Axis::new(AxisConfig)`, `transmission(Turn)`, `hear(Turn, &Heard, end_ns)`";
+    PROCEDURE: "counts update periods: `new` of `master::procedure::{Home, ClearAlarm, ..}`, then `receive(&mut axis)` in each";
 }

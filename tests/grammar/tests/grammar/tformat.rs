@@ -22,16 +22,16 @@ fn evidence() -> tformat::Evidence {
     tformat::Evidence::of(response, Resolution::new(23, 16).unwrap(), 1_000_000)
 }
 
-decode! { tformat::Response(request = Request::ReadAll; bytes); sound &ALL; damaged &DAMAGED => "crc" }
+decode! { tformat::Response(Request, &[u8]); with (Request::ReadAll); sound &ALL; damaged &DAMAGED => "crc" }
 encode! { tformat::Request = Request::ReadAll }
 code! { tformat::DataId: 3; unknown 4 }
 exchange! { tformat::Transaction::start(request = Request::ReadAll, line = line()); heard &ALL; "&[u8]", at 55_000 }
 procedure! { tformat::Reset = Reset::clear_errors(); lost Error::NoResponse { echo: false } }
 feedback! { tformat: evidence(), sampled at 1_000_000; "`exchange.evidence(resolution)`" }
 device! {
-    tformat::Device = Device::<6>::new(0x17, BitRate::Mbit2_5);
+    tformat::"Device::<PAGES>::new(enid, rate)" = Device::<6>::new(0x17, BitRate::Mbit2_5);
     with Behaviour::new().with_response_delay_ns(5_000);
-    heard |at| (&[0x1a], at); "bytes: &[u8], end_ns"
+    heard |at| (&[0x1a], at); "&[u8], end_ns)"
 }
 inspect! { tformat::inspect(request = Request::ReadAll; line); damaged window(&DAMAGED) => "crc" }
 log! { tformat: Request, Response, tformat::master::Exchange, tformat::DataId }
