@@ -185,7 +185,7 @@ impl Device {
     }
 
     /// Delay from the master in ns, from the last SYNC frame; beyond 65,535 ns only if the master tells the period of its
-    /// SYNC frames, see [`Sync::long_delay_ns`].
+    /// SYNC frames, see [`Sync::long_delay_ns`](crate::Sync::long_delay_ns).
     pub fn delay_ns(&self) -> Option<u32> {
         let HeardSync { sync, .. } = self.last_sync?;
         // PARAM: a period of its own, in ticks of 5 ns.

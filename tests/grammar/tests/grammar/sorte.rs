@@ -29,5 +29,5 @@ counters! { sorte_proto }
 differs! {
     EXCHANGE: "the line has its own clock: `Master::new(config)`, `poll(now_ns)`, `hear(frame: &[u8], sof_ns)`";
     PROCEDURE: "the start-up is part of `Master`";
-    DEVICE: "`Device` is firmware, so it has no faults and no behaviour: `hear(PortId, &mut [u8], FrameTimes)`";
+    DEVICE: "`Device` is firmware, so it has no faults and no behaviour: `hear(device::PortId, &mut [u8], device::FrameTimes)`";
 }
