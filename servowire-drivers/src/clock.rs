@@ -12,16 +12,17 @@ pub use embassy::EmbassyClock;
 #[cfg(feature = "fugit")]
 pub use fugit::{FugitClock, FugitClock32};
 
-/// Looks at a clock that stands: some milliseconds, and ten times as many as a fast processor makes in a tick of 1 us.
-#[cfg(any(feature = "async", feature = "nikon", feature = "rtex", feature = "tformat"))]
-pub(crate) const MAX_LOOKS: u32 = 10_000;
+/// Looks at a clock that stands: some 30 ms of a fast processor, 0.3 s of a slow one. In a tick of 1 us it makes a hundred, but the
+/// timer of an emulator can stand for thousands while its host is busy.
+#[cfg(any(feature = "nikon", feature = "rtex", feature = "tformat"))]
+pub(crate) const MAX_LOOKS: u32 = 200_000;
 
 /// A free-running clock.
 ///
 /// Its tick has to be 1 us or shorter, better a fraction of that: an encoder answers 3 us after its request. A [`CounterClock`] is
 /// one, made of a cycle counter or a timer, and so is every closure that gives nanoseconds.
 ///
-/// The drivers look twice: a clock that goes back, or gives the same reading ten thousand times, ends the call with
+/// The drivers look twice: a clock that goes back, or gives the same reading 200,000 times, ends the call with
 /// [`Error::Clock`](crate::Error::Clock).
 pub trait Clock {
     /// Nanoseconds from any origin; never backwards.
@@ -90,6 +91,10 @@ pub trait Timer: Clock {
     async fn wait_until(&mut self, ns: u64) -> Result<(), ClockError>;
 }
 
+/// Delays that pass on a clock that stands.
+#[cfg(feature = "async")]
+const MAX_DELAYS: u32 = 1_000;
+
 /// A clock, and a delay to wait with.
 #[cfg(feature = "async")]
 #[derive(Debug, Clone, Copy)]
@@ -110,7 +115,7 @@ impl<C: Clock, D> Clock for WithDelay<C, D> {
 #[cfg(feature = "async")]
 impl<C: Clock, D: embedded_hal_async::delay::DelayNs> Timer for WithDelay<C, D> {
     async fn wait_until(&mut self, ns: u64) -> Result<(), ClockError> {
-        let mut check = ClockCheck::new(MAX_LOOKS);
+        let mut check = ClockCheck::new(MAX_DELAYS);
         loop {
             let left_ns = ns.saturating_sub(check.check(self.clock.now_ns()?)?);
             if left_ns == 0 {

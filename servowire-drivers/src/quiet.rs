@@ -50,7 +50,7 @@ impl Line {
     }
 
     /// A look at the clock: every one goes through here, so that no wait is for ever.
-    #[inline(always)]
+    #[inline]
     pub(crate) fn now_ns(&mut self, clock: &mut impl Clock) -> Result<u64, ClockError> {
         let last_ns = self.check.last_ns();
         match clock.now_ns().and_then(|now_ns| self.check.check(now_ns)) {

@@ -23,7 +23,7 @@ use servowire_drivers::tformat::blocking::Driver as Encoder;
 use servowire_drivers::{Automatic, Clock, ClockError, CounterClock, Direction, Error, TickRate};
 
 /// Looks from the fault on after which three calls must have ended: several times what those take that poll an EEPROM.
-const PATIENCE: u32 = 1_000_000;
+const PATIENCE: u32 = 2_000_000;
 /// Time from look to look, ns.
 const STEP_NS: u64 = 2_000;
 

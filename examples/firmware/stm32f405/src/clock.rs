@@ -69,11 +69,11 @@ fn ready(mut look: impl FnMut() -> bool) -> bool {
     (0..LOOKS).any(|_| look())
 }
 
-/// Starts the SysTick, which counts 24 bits down. It has to be looked at every 52 ms.
+/// Starts the SysTick, which counts 24 bits down with an eighth of the core clock. It has to be looked at every 0.4 s.
 pub fn time(mut timer: SYST) -> CounterClock<impl FnMut() -> u32, 24> {
-    timer.set_clock_source(SystClkSource::Core);
+    timer.set_clock_source(SystClkSource::External);
     timer.set_reload(0x00ff_ffff);
     timer.clear_current();
     timer.enable_counter();
-    CounterClock::new(TickRate::of::<CORE_HZ>(), move || !timer.cvr.read())
+    CounterClock::new(TickRate::of::<{ CORE_HZ / 8 }>(), move || !timer.cvr.read())
 }

@@ -7,5 +7,5 @@ use tformat::BitRate;
 
 #[rp2040_hal::entry]
 fn main() -> ! {
-    servowire_rp2040::tformat::encoder(BitRate::Mbit5, 137)
+    servowire_rp2040::tformat::encoder(BitRate::Mbit5, 144)
 }

@@ -7,5 +7,5 @@ use tformat::BitRate;
 
 #[rp2040_hal::entry]
 fn main() -> ! {
-    servowire_rp2040::tformat::encoder(BitRate::Mbit2_5, 64)
+    servowire_rp2040::tformat::encoder(BitRate::Mbit2_5, 68)
 }
