@@ -1,11 +1,8 @@
 //! What a drive says may be about an older block: one that it has thrown away, a request before, a motion of something else.
-#![allow(clippy::arithmetic_side_effects, clippy::indexing_slicing, clippy::panic, clippy::unwrap_used, missing_docs)]
-
-mod common;
 
 use core::num::NonZeroU16;
 
-use common::{Pair, actual, limits, set_position};
+use crate::common::{Pair, actual, limits, set_position};
 use rtex_block::device::Behaviour;
 use rtex_block::master::procedure::Home;
 use rtex_block::master::{

@@ -1,17 +1,6 @@
 //! Set-points: their limits, what they do from mode to mode and while the servo goes on, and feed-forward.
-#![allow(
-    clippy::arithmetic_side_effects,
-    clippy::cast_possible_truncation,
-    clippy::cast_possible_wrap,
-    clippy::indexing_slicing,
-    clippy::panic,
-    clippy::unwrap_used,
-    missing_docs
-)]
 
-mod common;
-
-use common::{CODES, Pair, limits, monitor, set_position};
+use crate::common::{CODES, Pair, limits, monitor, set_position};
 use rtex_block::device::{Behaviour, DriveConfig};
 use rtex_block::master::{ActiveCode, AxisConfig, AxisState, Heard, Progress, SetpointError, StopReason, Turn};
 use rtex_block::position::Gear;

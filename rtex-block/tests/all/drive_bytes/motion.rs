@@ -4,7 +4,7 @@ use rtex_block::Alarm;
 use rtex_block::device::{Behaviour, Quirks};
 use rtex_block::position::Gear;
 
-use crate::{NOTHING, OFF, ON, Raw, about, config, number};
+use super::{NOTHING, OFF, ON, Raw, about, config, number};
 
 /// The motor makes up a quarter of the deviation: 25 of 100, so 75 are left.
 #[test]

@@ -1,21 +1,10 @@
 //! A master and four impolite drives over lines that lose, delay and repeat blocks, with faults that last.
 //!
-//! `HOSTILE_EVENTS=10000000 cargo test --release -p rtex-block --test hostile` runs ten million update periods.
-#![allow(
-    clippy::arithmetic_side_effects,
-    clippy::cast_possible_truncation,
-    clippy::cast_possible_wrap,
-    clippy::indexing_slicing,
-    clippy::panic,
-    clippy::unwrap_used,
-    missing_docs
-)]
-
-mod common;
+//! `HOSTILE_EVENTS=10000000 cargo test --release -p rtex-block --test all hostile::` runs ten million update periods.
 
 use core::num::NonZeroU16;
 
-use common::CODES;
+use crate::common::CODES;
 use rtex_block::device::{Behaviour, Drive, DriveConfig, Fault, Quirks};
 use rtex_block::master::{
     ActiveCode, Asic, Axis, AxisConfig, AxisState, ControlError, ControlPhase, Limits, Master, MasterConfig,

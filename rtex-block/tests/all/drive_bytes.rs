@@ -1,18 +1,8 @@
 //! The modelled drive by the bytes that it takes and gives; nothing of the crate's codec is used.
-#![allow(
-    clippy::arithmetic_side_effects,
-    clippy::cast_possible_truncation,
-    clippy::indexing_slicing,
-    clippy::panic,
-    clippy::unwrap_used,
-    missing_docs
-)]
 
-#[path = "../common/mod.rs"]
-mod common;
 mod motion;
 
-use common::CODES;
+use crate::common::CODES;
 use rtex_block::device::{Behaviour, Drive, DriveConfig, Fault, Quirks, check};
 use rtex_block::{Alarm, BlockSize, MacId};
 

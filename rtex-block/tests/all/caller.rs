@@ -1,17 +1,6 @@
 //! Whatever a caller does to an axis, at any time.
-#![allow(
-    clippy::arithmetic_side_effects,
-    clippy::cast_possible_truncation,
-    clippy::cast_possible_wrap,
-    clippy::indexing_slicing,
-    clippy::panic,
-    clippy::unwrap_used,
-    missing_docs
-)]
 
-mod common;
-
-use common::Pair;
+use crate::common::Pair;
 use proptest::prelude::*;
 use rtex_block::device::{Behaviour, Fault};
 use rtex_block::master::{ActiveCode, AxisState, Heard, StopReason};

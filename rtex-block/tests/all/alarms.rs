@@ -1,18 +1,8 @@
 //! Alarms: their attributes, their history, and whether one can be cleared.
-#![allow(
-    clippy::arithmetic_side_effects,
-    clippy::cast_possible_truncation,
-    clippy::indexing_slicing,
-    clippy::panic,
-    clippy::unwrap_used,
-    missing_docs
-)]
-
-mod common;
 
 use core::cell::Cell;
 
-use common::{CODES, Pair, alarm, limits};
+use crate::common::{CODES, Pair, alarm, limits};
 use rtex_block::device::{Behaviour, DriveConfig, Fault, Quirks};
 use rtex_block::master::procedure::{AlarmAttributes, AlarmHistory, Attributes, ClearAlarm, ClearableIf, Clearing};
 use rtex_block::master::{ActiveCode, AxisConfig, AxisState, Failure, Heard, Progress, StopReason};

@@ -1,5 +1,4 @@
 //! Laws of the codec: exhaustive where the domain is small, drawn otherwise.
-#![allow(clippy::arithmetic_side_effects, clippy::cast_possible_truncation, clippy::unwrap_used, missing_docs)]
 
 use proptest::prelude::*;
 use rtex_block::master::{Acknowledgement, Checked, Expected};

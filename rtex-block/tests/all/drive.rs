@@ -1,12 +1,4 @@
 //! One axis and one drive: requests, profile motion, modes, supervision, and the pipeline of the echoes.
-#![allow(
-    clippy::arithmetic_side_effects,
-    clippy::cast_possible_truncation,
-    clippy::indexing_slicing,
-    clippy::panic,
-    clippy::unwrap_used,
-    missing_docs
-)]
 
 use core::num::NonZeroU16;
 

@@ -1,18 +1,8 @@
 //! The master as a service: set-up, phases, memory of words, watchdog, LED, stop policies.
-#![allow(
-    clippy::arithmetic_side_effects,
-    clippy::cast_possible_truncation,
-    clippy::indexing_slicing,
-    clippy::panic,
-    clippy::unwrap_used,
-    missing_docs
-)]
-
-mod common;
 
 use core::num::NonZeroU16;
 
-use common::{CODES, LIMIT, limits};
+use crate::common::{CODES, LIMIT, limits};
 use rtex_block::device::{Drive, DriveConfig, Fault};
 use rtex_block::master::{
     ActiveCode, Asic, Axis, AxisConfig, AxisState, ControlError, ControlPhase, Led, Master, MasterConfig, MoveStage,

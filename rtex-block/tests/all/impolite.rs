@@ -1,17 +1,6 @@
 //! The master against a drive that is late, forgetful and literal, in every combination of its behaviour.
-#![allow(
-    clippy::arithmetic_side_effects,
-    clippy::cast_possible_truncation,
-    clippy::cast_possible_wrap,
-    clippy::indexing_slicing,
-    clippy::panic,
-    clippy::unwrap_used,
-    missing_docs
-)]
 
-mod common;
-
-use common::{CODES, LIMIT, Pair, actual, limits, monitor, set_position};
+use crate::common::{CODES, LIMIT, Pair, actual, limits, monitor, set_position};
 use rtex_block::device::{Behaviour, Drive, DriveConfig, Fault, Quirks};
 use rtex_block::master::procedure::{Caught, Home, Latch};
 use rtex_block::master::{

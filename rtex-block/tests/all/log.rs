@@ -1,11 +1,4 @@
 //! What a log shows between its blocks, by hand-written bytes.
-#![allow(
-    clippy::arithmetic_side_effects,
-    clippy::cast_possible_truncation,
-    clippy::indexing_slicing,
-    clippy::unwrap_used,
-    missing_docs
-)]
 
 use rtex_block::inspect::{LogAnalysis, LogFinding, LogShape, Unfinished};
 use rtex_block::position::Gear;

@@ -1,15 +1,6 @@
 //! A master and 32 drives on a simulated ring, with faults.
 //!
 //! `tests/hostile.rs` runs longer, with impolite drives.
-#![allow(
-    clippy::arithmetic_side_effects,
-    clippy::cast_possible_truncation,
-    clippy::cast_possible_wrap,
-    clippy::indexing_slicing,
-    clippy::panic,
-    clippy::unwrap_used,
-    missing_docs
-)]
 
 use core::num::NonZeroU16;
 

@@ -1,18 +1,8 @@
 //! What a master takes for an answer, and what it leaves alone.
-#![allow(
-    clippy::arithmetic_side_effects,
-    clippy::cast_possible_truncation,
-    clippy::indexing_slicing,
-    clippy::panic,
-    clippy::unwrap_used,
-    missing_docs
-)]
-
-mod common;
 
 use core::num::NonZeroU16;
 
-use common::{CODES, Pair, limits, monitor};
+use crate::common::{CODES, Pair, limits, monitor};
 use rtex_block::device::{Behaviour, DriveConfig, Fault};
 use rtex_block::master::procedure::{Home, Latch, ReadText};
 use rtex_block::master::{

@@ -1,6 +1,4 @@
 //! No illegal value can be deserialised.
-#![cfg(feature = "serde")]
-#![allow(clippy::unwrap_used, missing_docs)]
 
 use core::fmt::Debug;
 

@@ -1,17 +1,6 @@
 //! Texts, parameters, homing, latch and sub-commands, against a drive that shares no number with the master.
-#![allow(
-    clippy::arithmetic_side_effects,
-    clippy::cast_possible_truncation,
-    clippy::cast_possible_wrap,
-    clippy::indexing_slicing,
-    clippy::panic,
-    clippy::unwrap_used,
-    missing_docs
-)]
 
-mod common;
-
-use common::{CODES, Pair, actual, limits, monitor, set_position};
+use crate::common::{CODES, Pair, actual, limits, monitor, set_position};
 use rtex_block::device::{Behaviour, DriveConfig, Quirks};
 use rtex_block::master::procedure::{Backup, Caught, Home, Latch, ParameterValue, ReadText, Restore, SetPosition};
 use rtex_block::master::{ActiveCode, AskError, Axis, AxisConfig, AxisState, Failure, Heard, Progress};
