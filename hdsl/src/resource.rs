@@ -65,7 +65,7 @@ addresses! {
     ERRORLOG = 0x0cc,
     /// Usage histogram, 4 bytes a class.
     USAGEHIS = 0x0cd,
-    /// **Reset or shut-down of the encoder**, see [`LongRequest::reset_encoder`](super::LongRequest::reset_encoder).
+    /// **Reset or shut-down of the encoder**, see [`LongRequest::reset_encoder`](crate::message::LongRequest::reset_encoder).
     RESET = 0x100,
     /// **Counting direction**; the encoder resets itself afterwards.
     COUNTDIR = 0x102,
@@ -99,7 +99,7 @@ addresses! {
 
 /// The address as the manual writes it, with its name: `081h RESOLUTN`.
 #[derive(Clone, Copy)]
-pub(super) struct Named(pub(super) ResourceAddress);
+pub(crate) struct Named(pub(crate) ResourceAddress);
 
 servowire_core::one_line!(Named {
     Self(address) if address.name().is_none() => "{:03X}h", address.get();

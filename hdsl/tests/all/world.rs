@@ -1,10 +1,8 @@
 //! Both ends on the hostile line of `tests/world`, which knows nothing of them: it drops, delays, repeats, cuts and flips what
 //! they send, and lets others speak. Both hear it as samples.
 //!
-//! `HOSTILE_EVENTS=1000000 cargo test --release -p hdsl --test world -- --nocapture` runs as many H-frames and prints what
+//! `HOSTILE_EVENTS=1000000 cargo test --release -p hdsl --test all world:: -- --nocapture` runs as many H-frames and prints what
 //! happened in them.
-#![allow(missing_docs, clippy::arithmetic_side_effects, clippy::unwrap_used, clippy::indexing_slicing)]
-#![allow(clippy::cast_possible_wrap, clippy::cast_sign_loss)]
 
 use hdsl::device::{Device, Heard};
 use hdsl::master::{Master, State};
@@ -86,11 +84,11 @@ fn run(dialect: Dialect, seed: u64, frames: u64, rates: Rates) -> (Seen, Tally) 
         let line = sampled(&world, begin_ns, 48);
         if let Some(heard) = Heard::on_line(&line) {
             let samples = u64::from(heard.start) + 8 * u64::from(heard.bits.len()) + 8;
-            if let Some(answer) = device.hear_at(heard.bits, position) {
+            if let Some(answer) = device.set_position(position).hear(heard.bits) {
                 world.answer(0, request, &message(answer.bits.into(), 61), begin_ns + samples * SAMPLE_PS / 1000 + 20);
             }
         } else {
-            let _ = device.hear_at(Window::EMPTY, position);
+            let _ = device.set_position(position).hear(Window::EMPTY);
         }
         // The receiver samples from one bit after PARA on.
         let receive_ns = begin_ns + 27 * BIT_PS / 1000;

@@ -1,14 +1,24 @@
 //! Master, line and encoder on one bench.
-#![allow(clippy::unwrap_used, clippy::panic, reason = "a test fails by panicking")]
 
-use hdsl::cable::{Cable, Disturbance};
+use crate::cable::{Cable, Disturbance};
 use hdsl::device::{Device, Heard};
 use hdsl::master::{HFrame, Master, State};
+use hdsl::message::{Access, Data, LongRequest, Offset, ResourceAddress};
 use hdsl::registers::{Interrupts, Register, Registers};
 use hdsl::{Dialect, Doubt, EncoderId, Policy, Sample, Window};
 
 /// A free-running frame.
 const FRAME_NS: u64 = 11_520;
+
+/// A write into the loaded user file.
+pub(crate) fn write_file(address: u16, bytes: &[u8]) -> LongRequest {
+    LongRequest {
+        address: ResourceAddress::RWFILE,
+        indirect: true,
+        offset: Offset::new(address),
+        access: Access::Write(Data::new(bytes).unwrap()),
+    }
+}
 
 pub(crate) struct Bench {
     pub(crate) master: Master,
@@ -53,11 +63,11 @@ impl Bench {
         self.position += self.speed;
         let line = self.cable.down_samples(self.master.transmission().head);
         let samples = if let Some(heard) = Heard::on_line(&line) {
-            let answer = self.device.hear_at(heard.bits, self.position as u64);
+            let answer = self.device.set_position(self.position as u64).hear(heard.bits);
             self.cable.up_heard(answer, &heard)
         } else {
             // The encoder's own clock goes on.
-            let answer = self.device.hear_at(Window::EMPTY, self.position as u64);
+            let answer = self.device.set_position(self.position as u64).hear(Window::EMPTY);
             self.cable.up(answer)
         };
         if let Some(late) = late {
@@ -71,7 +81,6 @@ impl Bench {
     }
 
     /// The fast position, for a control loop that asks at once.
-    #[allow(dead_code, reason = "not all tests do")]
     pub(crate) fn fast(&self) -> Result<Sample, Doubt> {
         let fast = self.master.fast().at(self.sampled_ns, Policy::new(0))?;
         assert_eq!(fast.sampled_ns(), self.sampled_ns);
@@ -79,7 +88,6 @@ impl Bench {
     }
 
     /// The safe position, and how many frames old it is.
-    #[allow(dead_code, reason = "not all tests do")]
     pub(crate) fn safe(&self) -> Result<(i64, usize), Doubt> {
         let safe = self.master.safe().at(self.sampled_ns, Policy::new(15 * FRAME_NS))?;
         let age_ns = self.sampled_ns - safe.sampled_ns();
@@ -88,7 +96,6 @@ impl Bench {
     }
 
     /// What an application writes over the bus.
-    #[allow(dead_code, reason = "not all tests do")]
     pub(crate) fn write(&mut self, register: Register, value: u8) {
         self.map.write(&mut self.master, register as u8, value).unwrap();
     }

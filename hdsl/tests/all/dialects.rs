@@ -1,7 +1,5 @@
 //! Where the two dialects differ in an H-frame, one test each; numbers of the manual (table 21) and of the firmware of the
 //! Motor Control SDK 09.02 (`datalink.asm`, `transport.asm`).
-#![allow(missing_docs, clippy::arithmetic_side_effects, clippy::unwrap_used, clippy::panic, clippy::indexing_slicing)]
-#![allow(clippy::cast_possible_truncation)]
 
 use hdsl::master::{Master, RestartReason, State};
 use hdsl::registers::{Event, EventS, Online1, Online2, OnlineD, Register, Registers};

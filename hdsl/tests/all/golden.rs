@@ -1,5 +1,4 @@
 //! The golden traces are what the generator makes, and enough to try a receiver with.
-#![allow(missing_docs, clippy::unwrap_used, clippy::panic, clippy::arithmetic_side_effects, clippy::indexing_slicing)]
 
 use hdsl::Dialect;
 use hdsl::master::{Master, State};
@@ -7,11 +6,11 @@ use hdsl::message::{LongRequest, RemoteRegister, ResourceAddress, ShortRequest};
 use hdsl::registers::{OnlineD, Registers};
 
 #[allow(dead_code, reason = "its main")]
-#[path = "../examples/golden.rs"]
+#[path = "../../examples/golden.rs"]
 mod generator;
 
-const SICK: &str = include_str!("golden/sick-20m.jsonl");
-const TI: &str = include_str!("golden/ti-100m.jsonl");
+const SICK: &str = include_str!("../golden/sick-20m.jsonl");
+const TI: &str = include_str!("../golden/ti-100m.jsonl");
 
 #[test]
 fn the_generator_makes_the_same_traces() {

@@ -1,6 +1,4 @@
 //! The next head leaves before the answer of the present frame is taken in.
-#![allow(missing_docs, clippy::unwrap_used, clippy::arithmetic_side_effects)]
-#![allow(clippy::cast_possible_wrap, clippy::cast_sign_loss)]
 
 use hdsl::device::Device;
 use hdsl::master::{HFrame, Master, RestartReason, State};
@@ -32,7 +30,8 @@ impl Early {
     fn frame(&mut self) -> HFrame {
         self.position += 321;
         let head = self.master.transmission().head;
-        let bits = self.device.hear_at(head.bits(), self.position as u64).map_or(u64::MAX, |answer| answer.bits);
+        let bits =
+            self.device.set_position(self.position as u64).hear(head.bits()).map_or(u64::MAX, |answer| answer.bits);
         let next = self.master.ahead();
         assert_eq!(self.master.ahead(), next);
         self.sampled_ns += FRAME_NS;
@@ -68,7 +67,8 @@ fn the_heads_are_the_same() {
             assert_eq!(both.master.transmission(), plain.transmission());
             let report = both.frame();
             let bits = device
-                .hear_at(plain.transmission().head.bits(), both.position as u64)
+                .set_position(both.position as u64)
+                .hear(plain.transmission().head.bits())
                 .map_or(u64::MAX, |answer| answer.bits);
             assert_eq!(report, *plain.hear_bits(bits, None, both.sampled_ns + 9_707));
         }

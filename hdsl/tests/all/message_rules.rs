@@ -1,5 +1,4 @@
 //! Messages nibble by nibble: what ends one, what is none, and how long one is waited for; and the estimate of a position.
-#![allow(missing_docs, clippy::unwrap_used, clippy::arithmetic_side_effects, clippy::cast_sign_loss)]
 
 use hdsl::message::{
     Access, Data, Length, Limits, LongAnswer, LongRequest, Offset, RemoteRegister, Requester, ResourceAddress,
@@ -87,7 +86,7 @@ fn how_long_to_wait() {
 /// The acknowledgement of a write carries no data, whatever its LLEN; its header says none.
 #[test]
 fn acknowledgements() {
-    let write = LongRequest::write_file(hdsl::message::Offset::truncate(0), Data::new(b"42").unwrap());
+    let write = crate::bench::write_file(0, b"42");
     for llen in 0..4 {
         let first = 0x91 | llen << 2;
         let [high, low] = hdsl::crc16(&[first, 0x31]).to_be_bytes();

@@ -1,5 +1,4 @@
 //! What the receiver reports beside positions: places, counters, causes, quality; each against a number of the documents.
-#![allow(missing_docs, clippy::unwrap_used, clippy::arithmetic_side_effects, clippy::indexing_slicing)]
 
 use hdsl::device::{Device, Fault};
 use hdsl::frame::Trailer;
@@ -32,7 +31,7 @@ impl Pair {
 
     /// An H-frame with these bits of the answer inverted.
     fn frame(&mut self, damage: u64, signal: Option<SignalQuality>) {
-        let answer = self.device.hear_at(self.master.transmission().head.bits(), 1000);
+        let answer = self.device.set_position(1000).hear(self.master.transmission().head.bits());
         let _ = self.master.hear_bits(answer.map_or(u64::MAX, |answer| answer.bits ^ damage), signal, 0);
     }
 
@@ -98,7 +97,7 @@ fn causes_in_the_start_up() {
         for _ in 0..52 {
             pair.frame(0, None);
         }
-        let bits = pair.device.hear_at(pair.master.transmission().head.bits(), 1000).unwrap().bits;
+        let bits = pair.device.set_position(1000).hear(pair.master.transmission().head.bits()).unwrap().bits;
         let _ = pair.master.hear_bits((bits ^ damage) & !zeros, None, 0);
         assert_eq!(pair.master.h_frame().restarted, Some(RestartReason::Identifier(want)));
         assert_eq!(pair.master.encoder_id(), None);
@@ -176,8 +175,8 @@ fn counters() {
         let mut pair = Pair::running(Dialect::SICK);
         pair.to(2);
         // Zeros in both channels: ten equal bits.
-        let bits =
-            pair.device.hear_at(pair.master.transmission().head.bits(), 1000).unwrap().bits & !(0x3ff << channel);
+        let bits = pair.device.set_position(1000).hear(pair.master.transmission().head.bits()).unwrap().bits
+            & !(0x3ff << channel);
         let _ = pair.master.hear_bits(bits, None, 0);
         pair.to(0);
         let counters = pair.master.counters();
@@ -193,7 +192,7 @@ fn a_loss_ends_the_messages() {
     pair.master.start_long(LongRequest::read_name(ResourceAddress::RESOLUTN)).unwrap();
     let signal = Some(SignalQuality { rssi: Rssi::MAX, delay: Delay::new(3).unwrap(), edges: 0x18 });
     for _ in 0..10 {
-        let _ = pair.device.hear_at(pair.master.transmission().head.bits(), 1000);
+        let _ = pair.device.set_position(1000).hear(pair.master.transmission().head.bits());
         let _ = pair.master.hear_bits(0, signal, 0);
         if pair.master.h_frame().restarted.is_some() {
             break;
@@ -232,7 +231,7 @@ fn messages_wait_for_a_v_frame() {
             let dropped = pair.master.reset_messages().unwrap();
             assert_eq!(dropped.short, Some(Err(Error::Dropped)));
         } else {
-            assert_eq!(pair.master.start_long(LongRequest::directory()), Err(Error::NotLocked));
+            assert_eq!(pair.master.start_long(LongRequest::read_name(ResourceAddress::DIR)), Err(Error::NotLocked));
             assert_eq!(pair.master.reset_messages(), Err(Error::NotLocked));
         }
         pair.frame(0, None);
@@ -244,7 +243,7 @@ fn messages_wait_for_a_v_frame() {
 fn edges_of_the_start_up() {
     let mut pair = Pair::new(Dialect::SICK);
     for frame in 0..120 {
-        let answer = pair.device.hear_at(pair.master.transmission().head.bits(), 1000);
+        let answer = pair.device.set_position(1000).hear(pair.master.transmission().head.bits());
         // Eleven eighths of delay: edges before sample 3. In two CHECK frames and while the link runs they are a sample later.
         let late = [40, 41].contains(&frame) || frame > 90;
         let samples = answer.map_or([0xff; 72], |answer| line(answer.bits, if late { 12 } else { 11 }));
@@ -268,7 +267,7 @@ fn frames_without_an_answer() {
     for words in [false, true] {
         let mut pair = Pair::new(Dialect::SICK);
         for _ in 0..19 {
-            let answer = pair.device.hear_at(pair.master.transmission().head.bits(), 1000);
+            let answer = pair.device.set_position(1000).hear(pair.master.transmission().head.bits());
             let _ = pair.master.hear(&answer.map_or([0xff; 72], |answer| line(answer.bits, 11)), 0).unwrap();
         }
         pair.master.request_restart();
@@ -330,7 +329,8 @@ fn pipe_words() {
         let got = pair.master.h_frame().pipe_character().map(|character| character.unwrap().byte());
         assert_eq!(got, byte);
     }
-    let bits = pair.device.hear_at(pair.master.transmission().head.bits(), 1000).unwrap().bits & !(0x3ff << 20);
+    let bits =
+        pair.device.set_position(1000).hear(pair.master.transmission().head.bits()).unwrap().bits & !(0x3ff << 20);
     let report = pair.master.hear_bits(bits, None, 0);
     assert_eq!(report.pipe_character(), Some(Err(Error::InvalidWord { word: 0 })));
 }

@@ -1,11 +1,7 @@
 //! Master and encoder talk to each other over a simulated line.
-#![allow(missing_docs, clippy::arithmetic_side_effects, clippy::unwrap_used)]
-#![allow(clippy::cast_possible_truncation, clippy::cast_possible_wrap, clippy::cast_sign_loss)]
 
-mod bench;
-
-use bench::Bench;
-use hdsl::cable::Disturbance;
+use crate::bench::Bench;
+use crate::cable::Disturbance;
 use hdsl::device::{Acknowledgement, BadHead, Behaviour, Complement, Disparity, Fault, Overload};
 use hdsl::frame::Extra;
 use hdsl::master::{Master, RestartReason, State};

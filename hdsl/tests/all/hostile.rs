@@ -1,9 +1,7 @@
 //! A hostile line: what is given as a position is the truth, or explained.
 //!
-//! `HOSTILE_EVENTS=100000000 cargo test --release -p hdsl --test hostile -- --nocapture` runs as many H-frames and prints
+//! `HOSTILE_EVENTS=100000000 cargo test --release -p hdsl --test all hostile:: -- --nocapture` runs as many H-frames and prints
 //! what happened in them; `HOSTILE_SEED` gives others.
-#![allow(missing_docs, clippy::arithmetic_side_effects, clippy::unwrap_used, clippy::panic, clippy::indexing_slicing)]
-#![allow(clippy::cast_possible_truncation, clippy::cast_possible_wrap, clippy::cast_sign_loss)]
 
 use std::collections::BTreeMap;
 
@@ -105,7 +103,7 @@ fn run(dialect: Dialect, seed: u64, frames: u64) -> Tally {
             head = Window::from_bits(head.bits() ^ 1 << noise.below(26), head.len()).unwrap();
             *tally.events.entry("head").or_default() += 1;
         }
-        let answer = device.hear_at(head, motion.at(0) as u64);
+        let answer = device.set_position(motion.at(0) as u64).hear(head);
         let (event, bits) = damage(&mut noise, answer.map_or(ANSWER, |answer| answer.bits), last);
         *tally.events.entry(event).or_default() += 1;
         last = answer.map_or(ANSWER, |answer| answer.bits);

@@ -1,14 +1,10 @@
 //! Details that a slip would change without anybody noticing.
-#![allow(missing_docs, clippy::arithmetic_side_effects, clippy::unwrap_used, clippy::panic, clippy::indexing_slicing)]
-#![allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
 
-mod bench;
-
-use bench::Bench;
-use hdsl::cable::{Cable, Disturbance};
+use crate::bench::Bench;
+use crate::cable::{Cable, Disturbance};
 use hdsl::device::{Behaviour, Fault, Transmission};
 use hdsl::message::{
-    Access, Data, Length, LongAnswer, LongRequest, Offset, RemoteRegister, Requester, ResourceAddress, ShortAnswer,
+    Access, Data, Length, LongAnswer, LongRequest, RemoteRegister, Requester, ResourceAddress, ShortAnswer,
     ShortRequest,
 };
 use hdsl::registers::{Event, OnlineD, Register};
@@ -19,7 +15,7 @@ use hdsl::{Dialect, EncoderSymbol, Error, MasterSymbol, crc16};
 fn an_offset_in_the_registers() {
     let mut bench = Bench::on_cable(Dialect::SICK, 0);
     bench.lock();
-    let write = LongRequest::write_file(Offset::truncate(0), Data::new(b"MOTOR 42").unwrap());
+    let write = crate::bench::write_file(0, b"MOTOR 42");
     bench.master.start_long(write).unwrap();
     bench.frames(100);
     // Indirect read of two bytes of 131h, with and without the offset 6 that stands in PC_OFF.
@@ -171,7 +167,7 @@ fn a_request_that_waits_at_the_encoder() {
     bench.master.reset_messages().unwrap();
     for _ in 0..120 {
         let head = bench.master.transmission().head.bits();
-        let bits = bench.device.hear_at(head, bench.position as u64).unwrap().bits;
+        let bits = bench.device.set_position(bench.position as u64).hear(head).unwrap().bits;
         let symbol = hdsl::Answer::from_bits(hdsl::Rule::Strict, bits).parameter().unwrap().symbol();
         assert!(matches!(symbol, Ok(EncoderSymbol::Idle | EncoderSymbol::Init)), "{symbol:?}");
         bench.master.hear_bits(bits, None, 0);

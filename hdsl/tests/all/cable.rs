@@ -1,44 +1,52 @@
 //! A simulated cable between master and encoder: delay, jitter, glitches, bit errors and the encoder's clock.
 
-use nrz_line::Window;
+#![allow(dead_code, reason = "fuzz targets, examples and kernels take it too, and none of them all of it")]
 
-use crate::device::{Heard, Transmission};
-use crate::frame::{ANSWER_BITS, Head, SAMPLES_PER_BIT};
-use crate::sampling::WINDOW;
+use hdsl::Window;
+use hdsl::device::{Heard, Transmission};
+use hdsl::frame::{ANSWER_BITS, Head, SAMPLES_PER_BIT};
+use hdsl::sampling::WINDOW;
 
 /// What the line does to what passes. All zero is a perfect line of no length.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-#[cfg_attr(feature = "arbitrary", derive(arbitrary::Arbitrary))]
-#[non_exhaustive]
-pub struct Disturbance {
+pub(crate) struct Disturbance {
     /// From the start of reception to the first bit of an answer, in eighths of a bit (13.333 ns): there and back.
-    pub delay: u32,
+    pub(crate) delay: u32,
     /// How much of that is on the way to the encoder.
-    pub down_delay: u32,
+    pub(crate) down_delay: u32,
     /// Every edge is moved by up to this many samples either way.
-    pub jitter: u8,
+    pub(crate) jitter: u8,
     /// Samples that are inverted, of a million.
-    pub glitches: u32,
+    pub(crate) glitches: u32,
     /// Bits that are inverted, of a million, in each direction.
-    pub bit_errors: u32,
+    pub(crate) bit_errors: u32,
     /// How much the bits of an answer are longer than the master's, in parts of a million. (Heads are too short to show it.)
-    pub clock_ppm: i32,
+    pub(crate) clock_ppm: i32,
 }
 
 impl Disturbance {
-    servowire_core::builder! {
-        with_delay: delay, u32;
-        with_down_delay: down_delay, u32;
-        with_jitter: jitter, u8;
-        with_glitches: glitches, u32;
-        with_bit_errors: bit_errors, u32;
-        with_clock_ppm: clock_ppm, i32;
+    pub(crate) const fn with_delay(self, delay: u32) -> Self {
+        Self { delay, ..self }
+    }
+
+    pub(crate) const fn with_jitter(self, jitter: u8) -> Self {
+        Self { jitter, ..self }
+    }
+
+    pub(crate) const fn with_glitches(self, glitches: u32) -> Self {
+        Self { glitches, ..self }
+    }
+
+    pub(crate) const fn with_bit_errors(self, bit_errors: u32) -> Self {
+        Self { bit_errors, ..self }
+    }
+
+    pub(crate) const fn with_clock_ppm(self, clock_ppm: i32) -> Self {
+        Self { clock_ppm, ..self }
     }
 
     /// A clean line of `metres`: 5 ns a metre each way, and most of a bit for encoder and transceivers.
-    pub const fn metres(metres: u32) -> Self {
+    pub(crate) const fn metres(metres: u32) -> Self {
         // 3/40 eighths of a bit a ns.
         let delay = metres.saturating_mul(10).saturating_mul(3) / 40;
         let down_delay = metres.saturating_mul(5).saturating_mul(3) / 40;
@@ -48,21 +56,20 @@ impl Disturbance {
 
 /// The cable with its source of noise. A seed gives always the same noise.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub struct Cable {
+pub(crate) struct Cable {
     /// What happens to what passes.
-    pub disturbance: Disturbance,
+    pub(crate) disturbance: Disturbance,
     noise: Noise,
 }
 
 impl Cable {
     /// With a seed for the noise.
-    pub const fn new(disturbance: Disturbance, seed: u64) -> Self {
+    pub(crate) const fn new(disturbance: Disturbance, seed: u64) -> Self {
         Self { disturbance, noise: Noise(seed.wrapping_mul(2).wrapping_add(1)) }
     }
 
     /// The head of an H-frame as it reaches the encoder.
-    pub fn down(&mut self, head: Window) -> Window {
+    pub(crate) fn down(&mut self, head: Window) -> Window {
         let mut bits = head.bits();
         for at in 0..head.len() {
             bits ^= u128::from(self.noise.hits(self.disturbance.bit_errors)) << at;
@@ -72,7 +79,7 @@ impl Cable {
 
     /// The head of an H-frame as it reaches the encoder, at eight samples a bit: a byte each, its first sample in bit 7. The time of
     /// the first sample is that at which SYNC leaves the master.
-    pub fn down_samples(&mut self, head: Head) -> [u8; DOWN_WINDOW] {
+    pub(crate) fn down_samples(&mut self, head: Head) -> [u8; DOWN_WINDOW] {
         let mut words = [0; DOWN_WINDOW / 8];
         let mut high = true;
         for (at, byte) in (0_u32..).step_by(8).zip(head.samples()) {
@@ -89,12 +96,12 @@ impl Cable {
 
     /// What the master samples of an answer: a byte a bit time, the first sample in bit 7. Without an answer the line
     /// stays high.
-    pub fn up(&mut self, answer: Option<Transmission>) -> [u8; WINDOW] {
+    pub(crate) fn up(&mut self, answer: Option<Transmission>) -> [u8; WINDOW] {
         self.up_from(answer, self.disturbance.delay)
     }
 
     /// The same of an encoder that keeps time by what it has heard: its answer begins one bit after PARA by its own clock.
-    pub fn up_heard(&mut self, answer: Option<Transmission>, heard: &Heard) -> [u8; WINDOW] {
+    pub(crate) fn up_heard(&mut self, answer: Option<Transmission>, heard: &Heard) -> [u8; WINDOW] {
         let there = u32::from(heard.start).saturating_sub(self.disturbance.down_delay);
         let early = self.disturbance.down_delay.saturating_sub(heard.start.into());
         self.up_from(answer, self.disturbance.delay.saturating_add(there).saturating_sub(early))
@@ -170,7 +177,7 @@ impl Cable {
 }
 
 /// Bytes of samples in which the encoder hears a head: 35 bits with the longest EXTRA window, and room for a delay of 13.
-pub const DOWN_WINDOW: usize = 48;
+pub(crate) const DOWN_WINDOW: usize = 48;
 
 // In words of 64 samples.
 const _: () = assert!(WINDOW % 8 == 0 && DOWN_WINDOW % 8 == 0);
@@ -190,7 +197,6 @@ fn fill(words: &mut [u64]) {
 
 /// A small generator of pseudo-random numbers (xorshift).
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 struct Noise(u64);
 
 impl Noise {
@@ -209,48 +215,5 @@ impl Noise {
     /// True `rate` times of a million.
     const fn hits(&mut self, rate: u32) -> bool {
         rate != 0 && self.below(1_000_000) < rate as u64
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::sampling::{Alignment, EdgeRule, TEST_PATTERN, line};
-    use proptest::prelude::*;
-
-    proptest! {
-        #[test]
-        fn a_clean_line_only_delays(bits in 0..1_u64 << 61, delay in 0..88_u32) {
-            let mut simulated = Cable::new(Disturbance::default().with_delay(delay), 1);
-            prop_assert_eq!(simulated.up(Some(Transmission { bits })), line(bits, delay));
-            prop_assert_eq!(simulated.up(None), [0xff; WINDOW]);
-        }
-
-        /// Jitter of one sample never makes a bit error, wherever the receiver learned to sample.
-        #[test]
-        fn one_sample_of_jitter(bits in 0..1_u64 << 61, delay in 0..84_u32, seed: u64) {
-            let mut simulated = Cable::new(Disturbance::default().with_delay(delay).with_jitter(1), seed);
-            let learned = Alignment::learn(EdgeRule::Leading, &simulated.up(Some(Transmission { bits: TEST_PATTERN })));
-            prop_assert_eq!(learned.unwrap().bits(&simulated.up(Some(Transmission { bits }))), Ok(bits));
-        }
-
-        /// An encoder whose clock is 2000 ppm off is still read.
-        #[test]
-        fn clock_offset(bits in 0..1_u64 << 61, ppm in -2000..2000, seed: u64) {
-            let mut simulated = Cable::new(Disturbance::default().with_delay(20).with_clock_ppm(ppm).with_jitter(1), seed);
-            let learned = Alignment::learn(EdgeRule::Leading, &simulated.up(Some(Transmission { bits: TEST_PATTERN })));
-            prop_assert_eq!(learned.unwrap().bits(&simulated.up(Some(Transmission { bits }))), Ok(bits));
-        }
-    }
-
-    #[test]
-    fn rates_are_as_asked_for() {
-        let mut simulated = Cable::new(Disturbance::default().with_bit_errors(10_000), 7);
-        // One of a hundred of 61 bits.
-        let rounds = if cfg!(miri) { 100 } else { 2000 };
-        let wrong: u32 = (0..rounds).map(|_| (simulated.spoilt(0)).count_ones()).sum();
-        assert!((rounds * 61 / 125..rounds * 61 / 80).contains(&wrong), "{wrong}");
-        // 5 ns a metre each way are 37.5 samples for 100 m.
-        assert_eq!((Disturbance::metres(100).delay, Disturbance::metres(100).down_delay), (82, 37));
     }
 }

@@ -1,5 +1,4 @@
 //! What the simulated encoder says, word by word, against what the documents print.
-#![allow(missing_docs, clippy::unwrap_used, clippy::indexing_slicing, clippy::arithmetic_side_effects)]
 
 use hdsl::device::{BadHead, Behaviour, Complement, Device, Fault, Overload};
 use hdsl::frame::Head;
@@ -16,7 +15,7 @@ const IDLE: u8 = 0xd0;
 
 /// The bits of the answer.
 fn hear(device: &mut Device, head: Window, position: u64) -> Option<u64> {
-    device.hear_at(head, position).map(|answer| answer.bits)
+    device.set_position(position).hear(head).map(|answer| answer.bits)
 }
 
 fn head(byte: u8) -> Window {

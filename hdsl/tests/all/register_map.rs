@@ -1,5 +1,4 @@
 //! The register map: what an application writes and reads, and what the receiver shows, address by address.
-#![allow(missing_docs, clippy::unwrap_used, clippy::arithmetic_side_effects, clippy::indexing_slicing)]
 
 use hdsl::device::{Device, Fault};
 use hdsl::master::{HFrame, Master, RestartReason, State};
@@ -34,7 +33,7 @@ impl Desk {
     }
 
     fn frame(&mut self) -> HFrame {
-        let answer = self.device.hear_at(self.master.transmission().head.bits(), 0x8765_4321);
+        let answer = self.device.set_position(0x8765_4321).hear(self.master.transmission().head.bits());
         let report = *self.master.hear_bits(answer.map_or(u64::MAX, |answer| answer.bits), None, 0);
         self.lines = self.map.apply(&report);
         report
@@ -451,7 +450,7 @@ fn accesses_of_a_remote_receiver() {
     assert_eq!((bus.poll_short(), written(bus)), (Ok(Some(7)), vec![(0x3d, vec![0xfe])]));
 
     // Long messages, free (FREL, bit 1 of 51h) and not.
-    let request = LongRequest::write_file(hdsl::message::Offset::truncate(6), hdsl::message::Data::new(b"42").unwrap());
+    let request = crate::bench::write_file(6, b"42");
     let mut bus = remote(Dialect::TI, &[(0x51, 0xfd)]);
     assert_eq!(bus.start_long(&request), Err(BusError::Link(Error::Busy)));
     assert_eq!(written(bus), []);

@@ -1,11 +1,7 @@
 //! What the release notes of the vendor's receiver list as open or fixed, one test each. The numbers are theirs.
-#![allow(missing_docs, clippy::arithmetic_side_effects, clippy::unwrap_used)]
-#![allow(clippy::cast_possible_truncation, clippy::cast_possible_wrap, clippy::cast_sign_loss)]
 
-mod bench;
-
-use bench::Bench;
-use hdsl::cable::Disturbance;
+use crate::bench::Bench;
+use crate::cable::Disturbance;
 use hdsl::device::Fault;
 use hdsl::frame::{Stuffing, Tail, Trailer};
 use hdsl::master::{Master, RestartReason, State};

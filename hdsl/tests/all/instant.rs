@@ -1,8 +1,6 @@
 //! A position has an instant: the sampling edge as the encoder hears it.
-#![allow(missing_docs, clippy::arithmetic_side_effects, clippy::unwrap_used)]
-#![allow(clippy::cast_possible_truncation, clippy::cast_possible_wrap, clippy::cast_sign_loss)]
 
-use hdsl::cable::{Cable, Disturbance};
+use crate::cable::{Cable, Disturbance};
 use hdsl::device::{Behaviour, Device, Heard};
 use hdsl::frame::Extra;
 use hdsl::master::Master;
@@ -43,11 +41,11 @@ impl Line {
         self.edge = self.now + 64 + extra;
         let samples = if let Some(heard) = Heard::on_line(&self.cable.down_samples(head)) {
             self.instant = self.now + i64::from(self.device.sampling_instant(&heard));
-            let answer = self.device.hear_at(heard.bits, (self.speed * self.instant) as u64);
+            let answer = self.device.set_position((self.speed * self.instant) as u64).hear(heard.bits);
             self.cable.up_heard(answer, &heard)
         } else {
             self.instant = self.edge;
-            let answer = self.device.hear_at(Window::EMPTY, (self.speed * self.instant) as u64);
+            let answer = self.device.set_position((self.speed * self.instant) as u64).hear(Window::EMPTY);
             self.cable.up(answer)
         };
         // The head has 26 bits and those of the window; one bit later 72 bits are sampled.
