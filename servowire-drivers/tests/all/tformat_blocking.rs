@@ -1,24 +1,9 @@
 //! The blocking driver on the hostile line.
 
-#![cfg(feature = "tformat")]
-#![allow(
-    clippy::arithmetic_side_effects,
-    clippy::cast_possible_truncation,
-    clippy::expect_used,
-    clippy::panic,
-    clippy::std_instead_of_core,
-    clippy::unwrap_used
-)]
-
-mod bench;
-mod hostile;
-mod late;
-mod refusals;
-
-use bench::{Bench, Misframed, Pin, Shared, Uart, Watch, line, place, scenario};
-use hostile::live_through;
-use late::{Late, World};
-use refusals::tformat::{STRICT, rows, widths};
+use crate::bench::{Bench, Misframed, Pin, Shared, Uart, Watch, line, place, scenario};
+use crate::hostile::live_through;
+use crate::late::{Late, World};
+use crate::refusals::tformat::{STRICT, rows, widths};
 use servowire_drivers::tformat::blocking::Driver;
 use servowire_drivers::{DriverEnable, Error};
 use servowire_world::{Fault, Planned, Scenario, Script, Verdict};

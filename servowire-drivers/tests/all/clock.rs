@@ -1,9 +1,6 @@
 //! No call waits for ever on a clock that stands, was set back, or wraps after 32 bits: all calls of the blocking drivers, the clock
 //! failing at any of their looks, with nobody at the line.
 
-#![cfg(all(feature = "tformat", feature = "nikon", feature = "rtex"))]
-#![allow(clippy::arithmetic_side_effects, clippy::panic, clippy::std_instead_of_core, clippy::unwrap_used)]
-
 use std::cell::Cell;
 use std::convert::Infallible;
 use std::fmt::Debug;

@@ -1,7 +1,5 @@
 //! A ring with its communication ASIC: banks of memory, frames, interrupts, and time that goes on with every access.
 
-#![allow(dead_code, unreachable_pub, reason = "each test uses its part")]
-
 use std::cell::RefCell;
 use std::marker::PhantomData;
 use std::rc::Rc;

@@ -1,7 +1,5 @@
 //! A-format encoders on a hostile line behind a port of frames whose time runs by the look at the clock.
 
-#![allow(dead_code, unreachable_pub, reason = "each test uses its part")]
-
 use std::cell::RefCell;
 use std::collections::VecDeque;
 use std::convert::Infallible;

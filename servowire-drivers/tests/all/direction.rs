@@ -1,17 +1,5 @@
 //! The pin of the line driver: on for the whole of the request, off before the answer, and off whenever somebody listens.
 
-#![cfg(feature = "tformat")]
-#![allow(
-    clippy::arithmetic_side_effects,
-    clippy::cast_possible_truncation,
-    clippy::indexing_slicing,
-    clippy::std_instead_of_core,
-    clippy::unwrap_used
-)]
-
-#[cfg(feature = "async")]
-mod polls;
-
 use std::cell::RefCell;
 use std::rc::Rc;
 

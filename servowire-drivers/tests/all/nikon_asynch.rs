@@ -1,30 +1,14 @@
 //! The async A-format driver: futures that are dropped at every point, and the hostile line.
 
-#![cfg(all(feature = "nikon", feature = "async"))]
-#![allow(
-    clippy::arithmetic_side_effects,
-    clippy::cast_possible_truncation,
-    clippy::indexing_slicing,
-    clippy::panic,
-    clippy::std_instead_of_core,
-    clippy::unwrap_used
-)]
-
-mod frames;
-mod hostile;
-mod late;
-mod polls;
-mod refusals;
-
+use crate::frames::{Bench, Port, Shared, deliveries, line, scenario, shaft};
+use crate::hostile::live_through;
+use crate::late::{Late, World};
+use crate::polls::{FOR_EVER, Looks, pause, run};
+use crate::refusals::nikon::{STRICT, rows, widths};
 use embedded_io::ErrorKind;
-use frames::{Bench, Port, Shared, deliveries, line, scenario, shaft};
-use hostile::live_through;
-use late::{Late, World};
 use nikon_aformat::bus::Addresses;
 use nikon_aformat::master::{Detection, Line};
 use nikon_aformat::{BitRate, Doubt, EncoderAddress, Operation, Policy, Request, RequestFrame, Resolution};
-use polls::{FOR_EVER, Looks, pause, run};
-use refusals::nikon::{STRICT, rows, widths};
 use servowire_drivers::Error;
 use servowire_drivers::nikon::Frame;
 use servowire_drivers::nikon::asynch::{Driver, FramePort};

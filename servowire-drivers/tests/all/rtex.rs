@@ -1,26 +1,9 @@
 //! The RTEX driver at a simulated ASIC: both timer systems, all widths of the bus, and faults.
 
-#![cfg(feature = "rtex")]
-#![allow(
-    clippy::arithmetic_side_effects,
-    clippy::cast_possible_truncation,
-    clippy::cast_possible_wrap,
-    clippy::cast_sign_loss,
-    clippy::indexing_slicing,
-    clippy::missing_panics_doc,
-    clippy::panic,
-    clippy::std_instead_of_core,
-    clippy::unwrap_used
-)]
-
-mod asic;
-#[cfg(feature = "async")]
-mod polls;
-
 use std::marker::PhantomData;
 use std::num::NonZeroU16;
 
-use asic::{AXES, Bus, COM_NS, Drawn, Ring, SWITCHES, Shared, Watch};
+use crate::asic::{AXES, Bus, COM_NS, Drawn, Ring, SWITCHES, Shared, Watch};
 use rtex_block::device::{Drive, Fault};
 use rtex_block::master::{
     ActiveCode, Axis, AxisConfig, AxisState, ControlError, ControlPhase, Limits, Master, MasterConfig, RingFailure,
@@ -355,8 +338,8 @@ mod asynch {
 
     use servowire_drivers::{Clock, ClockError, Timer};
 
-    use super::polls::{FOR_EVER, Looks, run};
     use super::*;
+    use crate::polls::{FOR_EVER, Looks, run};
 
     /// The driver after the start, with a clock that can be waited for.
     fn waiting<W: Drawn, T: Timer>(ring: &Shared, timer: impl Fn(Watch) -> T) -> Driver<'static, Bus<W>, T, AXES> {

@@ -1,7 +1,5 @@
 //! How much a hostile test has to live through, and what becomes of its calls.
 
-#![allow(dead_code, unreachable_pub, reason = "each test uses its part")]
-
 use std::fmt::Debug;
 
 use servowire_world::{Kind, Rates, Tally, Verdict, wanted_events};

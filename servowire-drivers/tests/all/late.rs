@@ -1,7 +1,5 @@
 //! A UART that another task keeps from its work: 10 ms pass while a request is handed to it, some of it may be refused, and the answer
 //! is damaged in its middle, 15 us after the request.
-#![allow(dead_code, unreachable_pub, reason = "not every test uses all of it")]
-
 use std::cell::RefCell;
 use std::future::poll_fn;
 use std::rc::Rc;

@@ -1,30 +1,14 @@
 //! The async driver on the hostile line: the same as the blocking one, and futures that are dropped at every point.
 
-#![cfg(all(feature = "tformat", feature = "async"))]
-#![allow(
-    clippy::arithmetic_side_effects,
-    clippy::cast_possible_truncation,
-    clippy::indexing_slicing,
-    clippy::panic,
-    clippy::std_instead_of_core,
-    clippy::unwrap_used
-)]
-
-mod bench;
-mod hostile;
-mod late;
-mod polls;
-mod refusals;
-
 use std::future::poll_fn;
 use std::task::Poll;
 
-use bench::{Bench, Misframed, Pin, Shared, Uart, Watch, line, place, scenario};
+use crate::bench::{Bench, Misframed, Pin, Shared, Uart, Watch, line, place, scenario};
+use crate::hostile::live_through;
+use crate::late::{Late, World};
+use crate::polls::{FOR_EVER, Looks, forget, pause, run};
+use crate::refusals::tformat::{rows, widths};
 use embedded_io::{ErrorKind, ErrorType};
-use hostile::live_through;
-use late::{Late, World};
-use polls::{FOR_EVER, Looks, forget, pause, run};
-use refusals::tformat::{rows, widths};
 use servowire_drivers::tformat::{asynch, blocking};
 use servowire_drivers::{DriverEnable, Error};
 use servowire_world::{Scenario, Verdict};

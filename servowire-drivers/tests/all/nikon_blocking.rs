@@ -1,27 +1,13 @@
 //! The A-format driver on the hostile line.
 
-#![cfg(feature = "nikon")]
-#![allow(
-    clippy::arithmetic_side_effects,
-    clippy::cast_possible_truncation,
-    clippy::panic,
-    clippy::std_instead_of_core,
-    clippy::unwrap_used
-)]
-
-mod frames;
-mod hostile;
-mod late;
-mod refusals;
-
+use crate::frames::{Bench, Port, Shared, deliveries, host, line, scenario, shaft};
+use crate::hostile::live_through;
+use crate::late::{Late, World};
+use crate::refusals::nikon::{STRICT, rows, widths};
 use embedded_io::ErrorKind;
-use frames::{Bench, Port, Shared, deliveries, host, line, scenario, shaft};
-use hostile::live_through;
-use late::{Late, World};
 use nikon_aformat::bus::Addresses;
 use nikon_aformat::master::{Cycle, Detection, Line};
 use nikon_aformat::{BitRate, Doubt, EncoderAddress, Operation, Policy, Request, RequestFrame, Resolution};
-use refusals::nikon::{STRICT, rows, widths};
 use servowire_drivers::Error;
 use servowire_drivers::nikon::Frame;
 use servowire_drivers::nikon::blocking::{Driver, FramePort};

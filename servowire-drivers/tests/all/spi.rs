@@ -1,25 +1,9 @@
 //! T-Format and A-format through an SPI that samples the hostile line.
 
-#![cfg(all(feature = "tformat", feature = "nikon"))]
-#![allow(
-    clippy::arithmetic_side_effects,
-    clippy::cast_possible_truncation,
-    clippy::indexing_slicing,
-    clippy::panic,
-    clippy::std_instead_of_core,
-    clippy::unwrap_used
-)]
-
-mod bench;
-mod frames;
-mod hostile;
-#[cfg(feature = "async")]
-mod polls;
-mod sampler;
-
-use hostile::live_through;
+use crate::hostile::live_through;
+use crate::sampler::Spi;
+use crate::{bench, frames};
 use nikon_aformat::{EncoderAddress, Resolution};
-use sampler::Spi;
 use servowire_drivers::samples::Order;
 use servowire_drivers::spi::{Sampling, SpiFrames, SpiUart};
 use servowire_drivers::{Automatic, DriverEnable, Error, nikon, tformat};
@@ -191,8 +175,8 @@ fn hostile_events_of_aformat_are_survived() {
 
 #[cfg(feature = "async")]
 mod asynch {
-    use super::polls::{FOR_EVER, Looks, run};
     use super::*;
+    use crate::polls::{FOR_EVER, Looks, run};
 
     type Driver<'b> = tformat::asynch::Driver<Uart<'b>, Automatic, Looks<bench::Watch>>;
     type Master<'b> = nikon::asynch::Driver<Frames<'b>, frames::Port>;
@@ -281,7 +265,7 @@ mod asynch {
 #[cfg(feature = "async")]
 #[test]
 fn both_as_futures() {
-    use polls::{FOR_EVER, Looks, run};
+    use crate::polls::{FOR_EVER, Looks, run};
 
     let bench = bench::Bench::new(lost(3, 2, Fault::Drop), bench::Misframed::Dropped);
     let mut buffers = ([0; 48], [0; 160]);

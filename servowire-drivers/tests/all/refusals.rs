@@ -1,8 +1,5 @@
 //! What the protocol crates refuse at the moment of use, for the drivers to refuse too.
 
-#![allow(dead_code, unreachable_pub, reason = "each test uses its part")]
-#![allow(clippy::unwrap_used)]
-
 /// T-Format: an encoder with 23 bits a turn, in turn 3.
 #[cfg(feature = "tformat")]
 pub mod tformat {

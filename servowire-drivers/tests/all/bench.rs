@@ -1,8 +1,5 @@
 //! An encoder on a hostile line behind a UART whose time runs by the look at the clock.
 
-#![allow(dead_code, unreachable_pub, reason = "each test uses its part")]
-#![allow(clippy::expect_used)]
-
 use std::cell::RefCell;
 use std::collections::VecDeque;
 use std::convert::Infallible;

@@ -1,7 +1,5 @@
 //! An SPI that sends onto the hostile line and samples it.
 
-#![allow(dead_code, unreachable_pub, reason = "each test uses its part")]
-
 use std::convert::Infallible;
 
 use embedded_hal::spi::{ErrorType, SpiBus};

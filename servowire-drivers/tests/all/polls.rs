@@ -1,6 +1,4 @@
 //! An executor that counts its polls, and a timer on a clock that goes on with every look.
-#![allow(dead_code, unreachable_pub, reason = "not every test uses all of it")]
-
 use std::future::{Future, poll_fn};
 use std::pin::pin;
 use std::task::{Context, Poll, Waker};

@@ -1,15 +1,5 @@
 //! Facts about the world itself: what must hold whatever is sent through it.
 
-#![allow(
-    clippy::arithmetic_side_effects,
-    clippy::cast_possible_truncation,
-    clippy::expect_used,
-    clippy::identity_op,
-    clippy::indexing_slicing,
-    clippy::panic,
-    clippy::unwrap_used
-)]
-
 use proptest::prelude::*;
 use servowire_world::*;
 
