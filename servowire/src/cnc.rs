@@ -26,7 +26,7 @@ use std::process::ExitCode;
 use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
 use sorte_proto::sync0::Variant;
-use step_profile::motion::{Limits, PtoMover};
+use step_motion::{Limits, PtoMover};
 use step_profile::{Frequency, Motors, Parameters, Profile, Speed};
 
 use crate::gcode::{AXES, Part};

@@ -36,9 +36,3 @@ fn words_and_bytes_of_which_all_are_legal() {
     only::<Pto>(|n| n <= 0xffff);
     only::<Reserved>(|n| matches!(n & 0x7fff, 3991..=0x7ffe) && n <= 0xffff || n == 0xffff);
 }
-
-#[test]
-fn a_code_that_the_data_sheet_reserves_has_no_name() {
-    assert!(serde_json::from_str::<drv8711::DecayMode>("\"AutoMixed\"").is_ok());
-    assert!(serde_json::from_str::<drv8711::DecayMode>("6").is_err());
-}
