@@ -15,6 +15,9 @@ mod drv8711;
 #[cfg(feature = "hdsl")]
 mod hdsl;
 #[cfg(feature = "hdsl")]
+#[path = "../../../hdsl/tests/all/cable.rs"]
+mod hdsl_cable;
+#[cfg(feature = "hdsl")]
 mod hdsl_frame;
 #[cfg(feature = "nikon-aformat")]
 mod nikon;
