@@ -1,15 +1,13 @@
 //! The laws of time on a hostile line: what cannot be undone, and what is read back.
 //!
-//! `HOSTILE_EVENTS=10000000 cargo test --release -p nikon-aformat --test hostile_procedures -- --nocapture` prints the mix.
-#![allow(missing_docs, clippy::arithmetic_side_effects, clippy::cast_possible_truncation, clippy::indexing_slicing)]
-#![allow(clippy::unwrap_used, clippy::panic)]
+//! `HOSTILE_EVENTS=10000000 cargo test --release -p nikon-aformat --test all hostile_procedures:: -- --nocapture` prints the mix.
 
-mod common;
-
-use common::exchanges::Setup;
-use common::line::{USUAL_EVENTS, events, first_seed, rates};
-use common::procedures::{Shown, addresses_by_id, addresses_by_wire, detections, eeprom_reads, writes, zero_presets};
-use common::switches::{Switches, assert_all_drawn};
+use crate::common::exchanges::Setup;
+use crate::common::line::{USUAL_EVENTS, events, first_seed, rates};
+use crate::common::procedures::{
+    Shown, addresses_by_id, addresses_by_wire, detections, eeprom_reads, writes, zero_presets,
+};
+use crate::common::switches::{Switches, assert_all_drawn};
 use nikon_aformat::BitRate;
 use servowire_world::Scenario;
 

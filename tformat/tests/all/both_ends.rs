@@ -1,6 +1,4 @@
 //! Master and encoder on one line.
-#![allow(clippy::arithmetic_side_effects, clippy::cast_possible_truncation, clippy::panic, reason = "a test")]
-#![allow(clippy::cast_possible_wrap, clippy::indexing_slicing, clippy::unwrap_used, reason = "a test")]
 
 use core::convert::Infallible;
 

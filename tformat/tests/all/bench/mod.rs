@@ -201,8 +201,8 @@ impl Bench {
             }
             Response::ReadMultiTurn(multi) => assert_eq!(multi.abm.get(), abm),
             Response::ReadAll(_) => {
-                let position = sample(Tolerated::NOTHING).map(Sample::position);
-                assert_eq!(position.map(|p| p.map(|p| (p.single_turn, i64::from(p.turns)))), Ok(Some((abs, turns))));
+                let position = sample(Tolerated::NOTHING).map(|at| (at.single_turn(), at.turns().map(i64::from)));
+                assert_eq!(position, Ok((abs, Some(turns))));
             }
             _ => {}
         }

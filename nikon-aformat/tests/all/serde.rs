@@ -1,6 +1,4 @@
 //! No illegal value can be deserialised: `cargo test -p nikon-aformat --features serde`.
-#![cfg(feature = "serde")]
-#![allow(missing_docs, clippy::unwrap_used)]
 
 use core::fmt::Debug;
 

@@ -1,5 +1,4 @@
 //! Attacks on the masters, each with bytes and times of its own: no simulated encoder, no simulated line.
-#![allow(clippy::arithmetic_side_effects, clippy::unwrap_used, clippy::panic, missing_docs, reason = "a test")]
 
 use tformat::master::{
     EepromAccess, Exchange, Line, MultiTurnZero, Polling, Progress, Reset, SingleTurnZero, Step, Transaction,

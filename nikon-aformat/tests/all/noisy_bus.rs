@@ -1,8 +1,7 @@
 //! The example `noisy_bus`, shorter: nothing wrong is accepted beyond what an 8-bit check cannot see.
-#![allow(missing_docs, clippy::std_instead_of_core)]
 
 #[expect(dead_code, reason = "the example's own main")]
-#[path = "../examples/noisy_bus.rs"]
+#[path = "../../examples/noisy_bus.rs"]
 mod example;
 
 use example::run;

@@ -1,12 +1,8 @@
 //! Both ends talk to each other.
-#![allow(missing_docs, clippy::arithmetic_side_effects, clippy::cast_possible_truncation, clippy::indexing_slicing)]
-#![allow(clippy::unwrap_used, clippy::panic)]
-
-mod common;
 
 use core::convert::Infallible;
 
-use common::every;
+use crate::common::every;
 use nikon_aformat::bus::{Addresses, Bus};
 use nikon_aformat::device::{Device, Encoders, Fault, Transmission};
 use nikon_aformat::master::{

@@ -1,7 +1,5 @@
 //! Times of transactions, by hand: 4 Mbit/s, 18 bits are 4.5 us; by default 500 ns of latency, 500 ns of idle time in a response,
 //! 250 us of waiting, 4 us between two responses, 10 us up to the next request.
-#![allow(missing_docs, clippy::arithmetic_side_effects, clippy::cast_possible_truncation, clippy::indexing_slicing)]
-#![allow(clippy::unwrap_used, clippy::panic)]
 
 use nikon_aformat::bus::{Addresses, Outcome};
 use nikon_aformat::master::{BusTransaction, Cycle, Exchange, Line, PeriodTooShort, Progress, Transaction};

@@ -1,6 +1,4 @@
 //! Procedures step by step: what they send, when, and how they end.
-#![allow(missing_docs, clippy::arithmetic_side_effects, clippy::cast_possible_truncation, clippy::indexing_slicing)]
-#![allow(clippy::unwrap_used, clippy::panic, clippy::unnecessary_wraps)]
 
 use nikon_aformat::master::{Detected, Detection, EepromRead, GuardedReset, Reset, Step, VerifiedWrite, Write};
 use nikon_aformat::{

@@ -1,12 +1,4 @@
 //! Attacks on the procedures, each with responses and times of its own: no simulated encoder, no simulated line.
-#![allow(
-    clippy::arithmetic_side_effects,
-    clippy::unwrap_used,
-    clippy::panic,
-    clippy::unnecessary_wraps,
-    missing_docs,
-    reason = "a test"
-)]
 
 use nikon_aformat::bus::Addresses;
 use nikon_aformat::master::{

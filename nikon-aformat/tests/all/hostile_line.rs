@@ -1,15 +1,11 @@
 //! Receivers of a sampled line, on the hostile line.
 //!
-//! `HOSTILE_EVENTS=10000000 cargo test --release -p nikon-aformat --test hostile_line -- --nocapture` prints the mix.
-#![allow(missing_docs, clippy::arithmetic_side_effects, clippy::cast_possible_truncation, clippy::indexing_slicing)]
-#![allow(clippy::unwrap_used, clippy::panic)]
+//! `HOSTILE_EVENTS=10000000 cargo test --release -p nikon-aformat --test all hostile_line:: -- --nocapture` prints the mix.
 
-mod common;
-
-use common::exchanges::Setup;
-use common::line::{USUAL_EVENTS, events, first_seed};
-use common::sampled::{Shown, lost_frames, single_flips};
-use common::switches::Switches;
+use crate::common::exchanges::Setup;
+use crate::common::line::{USUAL_EVENTS, events, first_seed};
+use crate::common::sampled::{Shown, lost_frames, single_flips};
+use crate::common::switches::Switches;
 use nikon_aformat::BitRate;
 use servowire_world::{Kind, Scenario};
 

@@ -1,14 +1,10 @@
 //! The laws of time on a hostile line: single transactions and buses.
 //!
-//! `HOSTILE_EVENTS=10000000 cargo test --release -p nikon-aformat --test hostile -- --nocapture` prints the mix.
-#![allow(missing_docs, clippy::arithmetic_side_effects, clippy::cast_possible_truncation, clippy::indexing_slicing)]
-#![allow(clippy::unwrap_used, clippy::panic)]
+//! `HOSTILE_EVENTS=10000000 cargo test --release -p nikon-aformat --test all hostile:: -- --nocapture` prints the mix.
 
-mod common;
-
-use common::exchanges::{Setup, Shown, bus, single};
-use common::line::{USUAL_EVENTS, events, first_seed, rates};
-use common::switches::{Switches, assert_all_drawn};
+use crate::common::exchanges::{Setup, Shown, bus, single};
+use crate::common::line::{USUAL_EVENTS, events, first_seed, rates};
+use crate::common::switches::{Switches, assert_all_drawn};
 use nikon_aformat::BitRate;
 use servowire_world::{Kind, Scenario};
 

@@ -1,5 +1,4 @@
 //! What the tests of both ends share.
-#![allow(unreachable_pub, dead_code, missing_docs)]
 
 pub mod exchanges;
 pub mod line;

@@ -1,11 +1,6 @@
 //! The laws of time on the hostile line. `HOSTILE_EVENTS` says how many events for each test: 100,000 unless it is set.
-#![allow(clippy::arithmetic_side_effects, clippy::cast_possible_truncation, clippy::panic, reason = "a test")]
-#![allow(clippy::expect_used, clippy::indexing_slicing, clippy::unwrap_used, reason = "a test")]
-#![allow(clippy::missing_docs_in_private_items, missing_docs, unreachable_pub, dead_code, reason = "a test")]
 
-mod bench;
-
-use bench::{Bench, Seen};
+use crate::bench::{Bench, Seen};
 use proptest::prelude::*;
 use servowire_core::Procedure;
 use servowire_world::{Kind, Rates, Scenario, Tally, scenarios, wanted_events};

@@ -1,6 +1,4 @@
 //! The simulated encoder, by the frames that go in and the responses that come out.
-#![allow(missing_docs, clippy::arithmetic_side_effects, clippy::cast_possible_truncation, clippy::indexing_slicing)]
-#![allow(clippy::unwrap_used, clippy::panic)]
 
 use nikon_aformat::bus::{Addresses, Bus, Outcome};
 use nikon_aformat::device::{

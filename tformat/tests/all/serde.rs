@@ -1,6 +1,4 @@
 //! No illegal value can be deserialised, and every legal one comes back as it was.
-#![cfg(feature = "serde")]
-#![allow(clippy::expect_used, clippy::unwrap_used, reason = "a test")]
 
 use core::fmt::Debug;
 
