@@ -1,17 +1,7 @@
 //! What comes twice, late, early or not at all, and machines that are asked too late: the order of events that a line and a
 //! busy processor can bring about.
-#![allow(
-    clippy::arithmetic_side_effects,
-    clippy::cast_possible_truncation,
-    clippy::indexing_slicing,
-    clippy::panic,
-    clippy::std_instead_of_core,
-    clippy::unwrap_used
-)]
 
-mod common;
-
-use common::device_in;
+use crate::common::device_in;
 use sorte_proto::Link;
 use sorte_proto::Place;
 use sorte_proto::device::{self, Device, FrameTimes, Path, PortId};

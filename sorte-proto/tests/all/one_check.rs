@@ -1,10 +1,7 @@
 //! One law for the three places where a start-up frame is checked: a frame in a buffer, the cut-through rewriters, and a
 //! device that the frame passes. They refuse the same frames for the same reason.
-#![allow(clippy::arithmetic_side_effects, clippy::indexing_slicing, clippy::std_instead_of_core, clippy::unwrap_used)]
 
-mod common;
-
-use common::device_in;
+use crate::common::device_in;
 use sorte_proto::Link;
 use sorte_proto::Place;
 use sorte_proto::cut_through::{DiscoveryRewriter, SyncRewriter};

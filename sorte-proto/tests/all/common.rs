@@ -1,11 +1,10 @@
 //! A device on its way through the start-up, for several test programs.
-#![allow(clippy::std_instead_of_core, clippy::unwrap_used, unreachable_pub)]
 
 use sorte_proto::device::{Config, Device, FrameTimes, PortId, State, Trigger};
 use sorte_proto::{DelayReq, Discovery, Link, Param, Parameters, Place};
 
 /// A device in the state that waits for a frame, the last of the line or not. Its frames begin at 77,000 ns of its counter.
-pub fn device_in(state: State, last: bool, parameters: Parameters) -> Device {
+pub(crate) fn device_in(state: State, last: bool, parameters: Parameters) -> Device {
     let arrival = FrameTimes { sof_ns: 77_000, counter_ns: 77_700, now_ns: 0 };
     let mut device = Device::new(Config::new());
     device.set_links(Link::Up, if last { Link::Down } else { Link::Up });

@@ -1,6 +1,4 @@
 //! No illegal value can be deserialised.
-#![cfg(feature = "serde")]
-#![allow(clippy::std_instead_of_core, clippy::unwrap_used)]
 
 use std::fmt::Debug;
 

@@ -1,5 +1,4 @@
 //! Rules of a device, one by one: which frames it listens to at which port, when it gives up, and what it keeps then.
-#![allow(clippy::arithmetic_side_effects, clippy::indexing_slicing, clippy::std_instead_of_core, clippy::unwrap_used)]
 
 use sorte_proto::Link;
 use sorte_proto::Place;

@@ -1,16 +1,6 @@
 //! Times and limits of master and device as numbers of the published firmware, not of the functions under test.
-#![allow(
-    clippy::arithmetic_side_effects,
-    clippy::cast_possible_truncation,
-    clippy::indexing_slicing,
-    clippy::panic,
-    clippy::std_instead_of_core,
-    clippy::unwrap_used
-)]
 
-mod common;
-
-use common::device_in;
+use crate::common::device_in;
 use sorte_proto::Link;
 use sorte_proto::Place;
 use sorte_proto::device::{self, Device, FrameTimes, PortId};

@@ -1,15 +1,5 @@
 //! Master and devices on a simulated line.
 
-#![allow(
-    clippy::arithmetic_side_effects,
-    clippy::cast_possible_truncation,
-    clippy::cast_possible_wrap,
-    clippy::indexing_slicing,
-    clippy::panic,
-    clippy::std_instead_of_core,
-    clippy::unwrap_used
-)]
-
 use proptest::prelude::*;
 use sorte_proto::Link;
 use sorte_proto::device::{self, Device, FrameTimes, Path, PortId, Reaction, Trigger};

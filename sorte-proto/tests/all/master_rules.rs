@@ -1,12 +1,4 @@
 //! Rules of the master, one by one: when it waits, what it counts as an answer, why it gives up, and what it counts.
-#![allow(
-    clippy::arithmetic_side_effects,
-    clippy::cast_possible_truncation,
-    clippy::indexing_slicing,
-    clippy::panic,
-    clippy::std_instead_of_core,
-    clippy::unwrap_used
-)]
 
 use sorte_proto::Link;
 use sorte_proto::Place;
