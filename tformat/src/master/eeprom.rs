@@ -173,7 +173,12 @@ impl EepromAccess {
             }
             Phase::CheckBefore | Phase::CheckAfter => {
                 let confirmed = core::mem::replace(&mut self.selection, Sent::Not) == Sent::Confirmed;
-                self.differs(Error::DataMismatch { got: edf, want: self.page.get() }, confirmed, Phase::Select, ready_ns)
+                self.differs(
+                    Error::DataMismatch { got: edf, want: self.page.get() },
+                    confirmed,
+                    Phase::Select,
+                    ready_ns,
+                )
             }
         }
     }
