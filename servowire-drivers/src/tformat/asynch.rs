@@ -86,11 +86,11 @@ impl<U: Read + Write, D: Direction, T: Timer> Driver<U, D, T> {
         self.run(&mut Reset::clear_errors()).await
     }
 
-    /// ID D: the byte at `address`, on the page that is selected now if `page` is `None`.
+    /// ID D: the byte at `address` of `page`, which is looked at before and after.
     ///
     /// # Errors
     /// [`Error`].
-    pub async fn read_eeprom(&mut self, page: Option<Page>, address: Address) -> Result<u8, Failure<U, D>> {
+    pub async fn read_eeprom(&mut self, page: Page, address: Address) -> Result<u8, Failure<U, D>> {
         self.run(&mut EepromAccess::read(page, address, EEPROM_POLLING)).await
     }
 
@@ -98,7 +98,7 @@ impl<U: Read + Write, D: Direction, T: Timer> Driver<U, D, T> {
     ///
     /// # Errors
     /// [`Error`]: whether the byte was written is not known then. Read it.
-    pub async fn write_eeprom(&mut self, page: Option<Page>, address: Address, data: u8) -> Result<u8, Failure<U, D>> {
+    pub async fn write_eeprom(&mut self, page: Page, address: Address, data: u8) -> Result<u8, Failure<U, D>> {
         self.run(&mut EepromAccess::write(page, address, data, EEPROM_POLLING)).await
     }
 

@@ -80,11 +80,11 @@ impl<U: Read + ReadReady + Write, D: Direction, C: Clock> Driver<U, D, C> {
         self.run(&mut Reset::clear_errors())
     }
 
-    /// ID D: the byte at `address`, on the page that is selected now if `page` is `None`.
+    /// ID D: the byte at `address` of `page`, which is looked at before and after.
     ///
     /// # Errors
     /// [`Error`].
-    pub fn read_eeprom(&mut self, page: Option<Page>, address: Address) -> Result<u8, Failure<U, D>> {
+    pub fn read_eeprom(&mut self, page: Page, address: Address) -> Result<u8, Failure<U, D>> {
         self.run(&mut EepromAccess::read(page, address, EEPROM_POLLING))
     }
 
@@ -92,7 +92,7 @@ impl<U: Read + ReadReady + Write, D: Direction, C: Clock> Driver<U, D, C> {
     ///
     /// # Errors
     /// [`Error`]: whether the byte was written is not known then. Read it.
-    pub fn write_eeprom(&mut self, page: Option<Page>, address: Address, data: u8) -> Result<u8, Failure<U, D>> {
+    pub fn write_eeprom(&mut self, page: Page, address: Address, data: u8) -> Result<u8, Failure<U, D>> {
         self.run(&mut EepromAccess::write(page, address, data, EEPROM_POLLING))
     }
 

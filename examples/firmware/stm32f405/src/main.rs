@@ -11,7 +11,7 @@ use core::fmt::Write;
 use panic_halt as _;
 use servowire_drivers::{DriverEnable, Error, tformat::blocking::Driver};
 use tformat::master::Line;
-use tformat::{Address, BitRate};
+use tformat::{Address, BitRate, Page};
 
 fn line() -> Line {
     let line = Line::new(BitRate::Mbit2_5);
@@ -31,7 +31,7 @@ fn main() -> ! {
     let clock = clock::time(core.SYST);
     let _ = writeln!(console, "T-Format master, 2500000 bit/s, clock {source:?}");
     let mut encoder = Driver::new(uart, DriverEnable(de), clock, line());
-    match encoder.read_eeprom(None, Address::truncate(0)) {
+    match encoder.read_eeprom(Page::truncate(0), Address::truncate(0)) {
         Ok(byte) => drop(writeln!(console, "EEPROM 0: {byte:02x}")),
         Err(error) => drop(writeln!(console, "EEPROM: {error}")),
     }
