@@ -69,7 +69,7 @@ pub struct Arguments {
     steps: u32,
     /// Step frequencies in Hz; they take turns from move to move. 250000, or 249000 with --published-sync0: at 250 kHz
     /// all steps have the same phase, and that machine is at home there. In a longer cycle motion is as much slower.
-    #[arg(long, value_name = "HZ", value_delimiter = ',', value_parser = crate::cli::hertz)]
+    #[arg(long, value_name = "HZ", value_delimiter = ',', value_parser = crate::units::hertz)]
     freq: Vec<u32>,
     /// Steps that each of the 32 ramp entries lasts.
     #[arg(long, value_name = "N", default_value_t = 1)]
