@@ -11,7 +11,7 @@
     )
 )]
 
-#[cfg(test)]
+#[cfg(any(test, feature = "arbitrary"))]
 extern crate std;
 
 #[cfg(any(feature = "nikon", feature = "tformat"))]
@@ -20,6 +20,8 @@ mod twins;
 
 mod clock;
 mod direction;
+#[cfg(feature = "drv8711")]
+pub mod drv8711;
 mod error;
 #[cfg(any(feature = "nikon", feature = "tformat"))]
 mod exchange;
