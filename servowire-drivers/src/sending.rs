@@ -1,6 +1,7 @@
 //! A request on its way out, with the line driver on.
 
 use servowire_core::ClockError;
+use tformat::master::Line;
 
 use crate::direction::Switch;
 use crate::leaving::Leaving;
@@ -18,21 +19,7 @@ pub(crate) struct Sending<'a, D: Direction, C: Clock> {
     leaving: Option<Leaving>,
     /// Fields that a `write` has been asked to take and that may be on their way.
     asked: usize,
-    /// The longest that a whole request may still need to leave.
-    longest_ns: u64,
-    window_ns: u64,
     start_ns: Option<u64>,
-}
-
-/// Times of a request, ns.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct Times {
-    /// A field.
-    pub(crate) field_ns: u32,
-    /// All of its fields.
-    pub(crate) fields_ns: u32,
-    /// From its end to the earliest answer.
-    pub(crate) window_ns: u32,
 }
 
 /// When a request began to leave, and by how much the driver went off too late after it.
@@ -47,14 +34,13 @@ impl<'a, D: Direction, C: Clock> Sending<'a, D, C> {
     pub(crate) fn begin(
         switch: &'a mut Switch<D>,
         clock: &'a mut C,
-        line: &'a mut quiet::Line,
-        times: Times,
+        state: &'a mut quiet::Line,
+        line: &Line,
     ) -> Result<Self, D::Error> {
-        let leaving = switch.worst().map(|worst| Leaving::new(worst, times.field_ns, times.window_ns));
-        let window_ns = u64::from(times.window_ns);
-        // What the pin and the UART need has been found to fit the window.
-        let longest_ns = window_ns.saturating_mul(2).saturating_add(times.fields_ns.into());
-        let sending = Self { switch, clock, line, leaving, asked: 0, longest_ns, window_ns, start_ns: None };
+        // The line is driven on after a request for as long as nobody answers.
+        let (field_ns, window_ns) = (line.rate.fields_ns(1), line.turn_around_ns);
+        let leaving = switch.worst().map(|worst| Leaving::new(worst, field_ns, window_ns));
+        let sending = Self { switch, clock, line: state, leaving, asked: 0, start_ns: None };
         sending.switch.on()?;
         Ok(sending)
     }
@@ -68,7 +54,7 @@ impl<'a, D: Direction, C: Clock> Sending<'a, D, C> {
 
     /// How many of these fields are to be handed over at once: the time of the first one is the time of the request.
     pub(crate) const fn piece<'b>(&self, fields: &'b [u8]) -> &'b [u8] {
-        match fields.split_first_chunk::<1>() {
+        match fields.split_at_checked(1) {
             Some((first, _)) if self.leaving.is_some() && self.start_ns.is_none() => first,
             _ => fields,
         }
@@ -89,7 +75,7 @@ impl<'a, D: Direction, C: Clock> Sending<'a, D, C> {
         if let Some(leaving) = &mut self.leaving {
             leaving.taken(fields, before_ns, after_ns);
             // One field that was held up may have begun to leave as late as that, and nothing before it is an answer to it.
-            if after_ns.saturating_sub(before_ns) > self.window_ns {
+            if leaving.is_late(before_ns, after_ns) {
                 start_ns = after_ns;
             }
         }
@@ -121,12 +107,14 @@ impl<D: Direction, C: Clock> Drop for Sending<'_, D, C> {
         if !self.switch.is_on() {
             return;
         }
-        if let Some(leaving) = self.leaving.as_mut().filter(|_| self.asked > 0) {
-            let now_ns = self.line.now_ns(self.clock).unwrap_or(self.line.last_ns());
-            leaving.taken(self.asked, now_ns, now_ns);
-        }
-        if let Some(off_ns) = self.off_ns() {
-            self.line.sit_out(self.clock, off_ns, self.longest_ns);
+        if let Some(leaving) = &mut self.leaving {
+            if self.asked > 0 {
+                let now_ns = self.line.now_ns(self.clock).unwrap_or(self.line.last_ns());
+                leaving.taken(self.asked, now_ns, now_ns);
+            }
+            if let Some(off_ns) = leaving.off_ns() {
+                self.line.sit_out(self.clock, off_ns, leaving.longest_ns());
+            }
         }
         // Nobody is there to hear of it; the next call tries again before it listens.
         let _: Result<(), _> = self.switch.off();

@@ -1,23 +1,12 @@
 //! Waits by giving the time back. Every future may be dropped at any point: the next call waits until the line is free. Whether
 //! a request that changes the encoder has had its effect is not known then.
 
-use core::convert::Infallible;
-use core::ops::ControlFlow;
+use nikon_aformat::RequestFrame;
+use servowire_core::run_async as run;
 
-use nikon_aformat::bus::Addresses;
-use nikon_aformat::master::{
-    BusTransaction, Cycle, EepromRead, Exchange, GuardedReset, Line, Progress, Reset, Transaction,
-};
-use nikon_aformat::{
-    Doubt, EncoderAddress, Evidence, Operation, Policy, Request, RequestFrame, Resolution, Response, Sample,
-};
-use servowire_core::{ClockError, Machine, Procedure, run_async as run};
-
-use super::{Frame, LOST, Released, hear, longest_ns, silence_ns};
-use crate::exchange;
-use crate::quiet::{self, Settle};
+use super::Frame;
+use crate::Timer;
 use crate::race::race;
-use crate::{Error, Timer};
 
 /// What sends and receives frames.
 #[allow(async_fn_in_trait, reason = "drivers are used by one executor; Send is left to the implementation")]

@@ -1,21 +1,11 @@
 //! Waits by spinning.
 
-use core::convert::Infallible;
-use core::ops::ControlFlow;
+use nikon_aformat::RequestFrame;
+use servowire_core::run;
 
-use nikon_aformat::bus::Addresses;
-use nikon_aformat::master::{
-    BusTransaction, Cycle, EepromRead, Exchange, GuardedReset, Line, Progress, Reset, Transaction,
-};
-use nikon_aformat::{
-    Doubt, EncoderAddress, Evidence, Operation, Policy, Request, RequestFrame, Resolution, Response, Sample,
-};
-use servowire_core::{ClockError, Machine, Procedure, run};
-
-use super::{Frame, LOST, Released, hear, longest_ns, silence_ns};
-use crate::exchange;
-use crate::quiet::{self, Settle, spin};
-use crate::{Clock, Error};
+use super::Frame;
+use crate::Clock;
+use crate::quiet::spin;
 
 /// What sends and receives frames.
 pub trait FramePort {

@@ -2,6 +2,22 @@
 
 macro_rules! driver {
     ($wait:ident, $clock:path $(, $asynch:tt)?) => {
+        use core::convert::Infallible;
+        use core::ops::ControlFlow;
+
+        use nikon_aformat::bus::Addresses;
+        use nikon_aformat::master::{
+            BusTransaction, Cycle, EepromRead, Exchange, GuardedReset, Line, Progress, Reset, Transaction,
+        };
+        use nikon_aformat::{
+            Doubt, EncoderAddress, Evidence, Operation, Policy, Request, Resolution, Response, Sample,
+        };
+        use servowire_core::{ClockError, Machine, Procedure};
+
+        use super::{LOST, Released, hear, longest_ns, silence_ns};
+        use crate::quiet::{self, Settle};
+        use crate::{Error, exchange};
+
         /// Why a call of a [`Driver`] failed.
         pub type Failure<F> = Error<<F as FramePort>::Error, Infallible, nikon_aformat::Error, Doubt>;
 

@@ -5,23 +5,11 @@
 //! The UART's `read` should be free of side effects when it is dropped, as that of buffered UARTs is; otherwise bytes are lost,
 //! which costs the exchange in which it happens. Its `write` should take all bytes or none when it is dropped.
 
-use core::ops::ControlFlow;
-
 use embedded_io_async::{ErrorType, Read, Write};
-use servowire_core::{ClockError, Procedure, run_async as run};
-use tformat::master::{Detection, EEPROM_POLLING, EepromAccess, Exchange, Line, Reset, Transaction};
-use tformat::{
-    Address, AllData, BitRate, Doubt, Evidence, Page, Policy, Request, Resolution, Response, Sample, SingleTurn,
-};
+use servowire_core::run_async as run;
 
-use super::tuning::{Tuned, Tuning};
-use super::{LOST, MAX_BYTES, Released, all_data, longest_ns, refused, silence_ns, times};
-use crate::direction::Switch;
-use crate::exchange;
-use crate::quiet::{self, Settle};
+use crate::Timer;
 use crate::race::race;
-use crate::sending::Sending;
-use crate::{Direction, Error, PinTooSlow, Timer};
 
 driver!(awaited, [Read, Write], Timer, async);
 

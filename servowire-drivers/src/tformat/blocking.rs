@@ -1,21 +1,10 @@
 //! Waits by spinning.
 
-use core::ops::ControlFlow;
-
 use embedded_io::{ErrorType, Read, ReadReady, Write};
-use servowire_core::{ClockError, Procedure, run};
-use tformat::master::{Detection, EEPROM_POLLING, EepromAccess, Exchange, Line, Reset, Transaction};
-use tformat::{
-    Address, AllData, BitRate, Doubt, Evidence, Page, Policy, Request, Resolution, Response, Sample, SingleTurn,
-};
+use servowire_core::run;
 
-use super::tuning::{Tuned, Tuning};
-use super::{LOST, MAX_BYTES, Released, all_data, longest_ns, refused, silence_ns, times};
-use crate::direction::Switch;
-use crate::exchange;
-use crate::quiet::{self, Settle, spin};
-use crate::sending::Sending;
-use crate::{Clock, Direction, Error, PinTooSlow};
+use crate::Clock;
+use crate::quiet::spin;
 
 driver!(spun, [Read, ReadReady, Write], Clock);
 

@@ -2,6 +2,21 @@
 
 macro_rules! driver {
     ($wait:ident, [$($uart:path),+], $clock:path $(, $asynch:tt)?) => {
+        use core::ops::ControlFlow;
+
+        use servowire_core::{ClockError, Procedure};
+        use tformat::master::{Detection, EEPROM_POLLING, EepromAccess, Exchange, Line, Reset, Transaction};
+        use tformat::{
+            Address, AllData, BitRate, Doubt, Evidence, Page, Policy, Request, Resolution, Response, Sample, SingleTurn,
+        };
+
+        use super::tuning::{Tuned, Tuning};
+        use super::{LOST, MAX_BYTES, Released, all_data, longest_ns, refused, silence_ns};
+        use crate::direction::Switch;
+        use crate::quiet::{self, Settle};
+        use crate::sending::Sending;
+        use crate::{Direction, Error, PinTooSlow, exchange};
+
         /// Why a call of a [`Driver`] failed.
         pub type Failure<U, D> = Error<<U as ErrorType>::Error, <D as Direction>::Error, tformat::Error, Doubt>;
 
@@ -117,19 +132,14 @@ macro_rules! driver {
                 mut detection: Detection,
                 mut set_rate: impl FnMut(&mut U, BitRate) -> Result<(), U::Error>,
             ) -> Result<AllData, Failure<U, D>> {
-                let now_ns = self.state.now_ns(&mut self.clock)?;
-                let exchange = $($asynch)? |Tuned { request, line }, not_before_ns| {
-                    $wait!(sleep(&mut self.state, &mut self.clock, not_before_ns))?;
-                    self.direction.check(line.turn_around_ns)?;
-                    self.line = line;
-                    set_rate(&mut self.uart, line.rate).map_err(Error::Io)?;
-                    self.state.set_silence_ns(silence_ns(&line));
-                    let exchanged = $wait!(self.transact(request)).map(|exchange| exchange.response);
-                    exchange::ended(exchanged, LOST, &mut self.state, &mut self.clock)
+                let tune = |driver: &mut Self, Tuned { request, line }| {
+                    driver.direction.check(line.turn_around_ns)?;
+                    driver.line = line;
+                    driver.state.set_silence_ns(silence_ns(&line));
+                    set_rate(&mut driver.uart, line.rate).map_err(Error::Io)?;
+                    Ok(request)
                 };
-                let ended = $wait!(run(&mut Tuning(&mut detection), now_ns, exchange))?;
-                self.state.keep(ended.ready_ns);
-                ended.outcome.map_err(Error::Protocol)
+                $wait!(self.drive(&mut Tuning(&mut detection), tune))
             }
 
             /// A procedure of several transactions at the driver's rate: does what its steps ask for. [`Detection`] has a
@@ -142,9 +152,18 @@ macro_rules! driver {
             where
                 P: Procedure<Request = Request, Response = Response, Error = tformat::Error>,
             {
+                $wait!(self.drive(procedure, |_, request| Ok(request)))
+            }
+
+            $($asynch)? fn drive<P: Procedure<Response = Response, Error = tformat::Error>>(
+                &mut self,
+                procedure: &mut P,
+                mut tune: impl FnMut(&mut Self, P::Request) -> Result<Request, Failure<U, D>>,
+            ) -> Result<P::Value, Failure<U, D>> {
                 let now_ns = self.state.now_ns(&mut self.clock)?;
                 let exchange = $($asynch)? |request, not_before_ns| {
                     $wait!(sleep(&mut self.state, &mut self.clock, not_before_ns))?;
+                    let request = tune(self, request)?;
                     let exchanged = $wait!(self.transact(request)).map(|exchange| exchange.response);
                     exchange::ended(exchanged, LOST, &mut self.state, &mut self.clock)
                 };
@@ -205,9 +224,8 @@ macro_rules! driver {
             $($asynch)? fn send(&mut self, request: Request) -> Result<u64, Failure<U, D>> {
                 let (line, frame) = (self.line, request.emit());
                 self.late_ns = 0;
-                let mut sending =
-                    Sending::begin(&mut self.direction, &mut self.clock, &mut self.state, times(&line, frame.fields()))
-                        .map_err(Error::Pin)?;
+                let mut sending = Sending::begin(&mut self.direction, &mut self.clock, &mut self.state, &line)
+                    .map_err(Error::Pin)?;
                 if let Some(ns) = sending.lead_until_ns(line.driver_lead_ns)? {
                     $wait!(sleep(sending.line, sending.clock, ns))?;
                 }
