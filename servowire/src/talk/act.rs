@@ -17,7 +17,7 @@ use super::Watch;
 use super::link::{Fault, Link};
 use super::port::{self, Port};
 use super::relay::{self, Said};
-use crate::output;
+use crate::terminal;
 
 /// Bytes of a page; the address after them selects the page.
 const PAGE_LEN: u8 = 127;
@@ -26,7 +26,7 @@ type Done = Result<ExitCode, Fault>;
 
 /// Says something to the user. Who reads no further has read enough.
 fn say(text: fmt::Arguments) -> Result<(), Fault> {
-    output::say(text).map_err(Fault::Output)
+    terminal::say(text).map_err(Fault::Output)
 }
 
 fn read_data<P: Port>(link: &mut Link<P>) -> Result<AllData, Fault> {

@@ -20,7 +20,7 @@ const CALLS: [u8; 5] = [0, 1, 2, 3, 4];
 kernels! {
     /// A T-Format position with the blocking driver: request, eleven bytes one by one, all checks; a look at the clock for each.
     fn drivers_tformat_position(answer: &Bytes) -> Option<Sample> {
-        let mut encoder = Driver::new(Uart::new(answer), Automatic, steps(4_000), LINE);
+        let mut encoder = Driver::new(Uart::new(answer), Automatic, steps(4_000), LINE).ok()?;
         encoder.read_position(RESOLUTION, Policy::new(1_000_000)).ok()
     } over [ALL_DATA];
 
@@ -32,7 +32,7 @@ kernels! {
 
     /// Every other call of the T-Format driver, with nobody at the line; the mean of them.
     fn drivers_tformat_silence(call: &u8) -> bool {
-        let mut encoder = Driver::new(Uart::new(&[]), Automatic, steps(4_000), LINE);
+        let Ok(mut encoder) = Driver::new(Uart::new(&[]), Automatic, steps(4_000), LINE) else { return false };
         let address = Address::truncate(5);
         match *call {
             0 => encoder.read_data().is_err(),
