@@ -96,13 +96,13 @@ macro_rules! driver {
                 $wait!(self.run(&mut Reset::clear_errors()))
             }
 
-            /// ID D: the byte at `address`, on the page that is selected now if `page` is `None`.
+            /// ID D: the byte at `address` of `page`, which is looked at before and after.
             ///
             /// # Errors
             /// [`Error`].
             pub $($asynch)? fn read_eeprom(
                 &mut self,
-                page: Option<Page>,
+                page: Page,
                 address: Address,
             ) -> Result<u8, Failure<U, D>> {
                 $wait!(self.run(&mut EepromAccess::read(page, address, EEPROM_POLLING)))
@@ -114,7 +114,7 @@ macro_rules! driver {
             /// [`Error`]: whether the byte was written is not known then. Read it.
             pub $($asynch)? fn write_eeprom(
                 &mut self,
-                page: Option<Page>,
+                page: Page,
                 address: Address,
                 data: u8,
             ) -> Result<u8, Failure<U, D>> {
