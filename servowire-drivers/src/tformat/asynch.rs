@@ -1,29 +1,31 @@
-//! Waits by giving the time back. Every future may be dropped at any point: the driver is then switched off at once, and the
-//! next call waits until the line is free. Whether a request that changes the encoder has had its effect is not known then.
+//! Waits by giving the time back. Every future may be dropped at any point: a request that has begun goes out whole, for which the
+//! destructor waits some microseconds if software switches the line driver, and the next call waits until the line is free.
+//! Whether a request that changes the encoder has had its effect is not known then.
 //!
 //! The UART's `read` should be free of side effects when it is dropped, as that of buffered UARTs is; otherwise bytes are lost,
-//! which costs the exchange in which it happens.
+//! which costs the exchange in which it happens. Its `write` should take all bytes or none when it is dropped.
 
 use core::ops::ControlFlow;
 
-use embedded_io_async::{Read, Write};
-use servowire_core::{Ended, Procedure};
-use tformat::master::{EEPROM_POLLING, EepromAccess, Exchange, Line, Progress, Reset, Transaction};
+use embedded_io_async::{ErrorType, Read, Write};
+use servowire_core::{ClockError, Procedure, run_async as run};
+use tformat::master::{Detection, EEPROM_POLLING, EepromAccess, Exchange, Line, Reset, Transaction};
 use tformat::{
-    Address, AllData, Doubt, Evidence, Frame, Page, Policy, Request, Resolution, Response, Sample, SingleTurn,
+    Address, AllData, BitRate, Doubt, Evidence, Page, Policy, Request, Resolution, Response, Sample, SingleTurn,
 };
 
-use super::{LOST, MAX_BYTES, Released, driver_off_ns, longest_ns, other, silence_ns};
+use super::tuning::{Tuned, Tuning};
+use super::{LOST, MAX_BYTES, Released, all_data, longest_ns, refused, silence_ns, times};
 use crate::direction::Switch;
 use crate::exchange;
-use crate::quiet;
+use crate::quiet::{self, Settle};
 use crate::race::race;
-use crate::{Direction, Error, Timer};
+use crate::sending::Sending;
+use crate::{Direction, Error, PinTooSlow, Timer};
 
-/// Why a call of an [`Driver`] failed.
-pub type Failure<U, D> =
-    Error<<U as embedded_io_async::ErrorType>::Error, <D as Direction>::Error, tformat::Error, Doubt>;
+driver!(awaited, [Read, Write], Timer, async);
 
+<<<<<<< HEAD
 /// An encoder, alone at its UART.
 #[derive(Debug)]
 pub struct Driver<U, D, T> {
@@ -86,11 +88,11 @@ impl<U: Read + Write, D: Direction, T: Timer> Driver<U, D, T> {
         self.run(&mut Reset::clear_errors()).await
     }
 
-    /// ID D: the byte at `address`, on the page that is selected now if `page` is `None`.
+    /// ID D: the byte at `address` of `page`, which is looked at before and after.
     ///
     /// # Errors
     /// [`Error`].
-    pub async fn read_eeprom(&mut self, page: Option<Page>, address: Address) -> Result<u8, Failure<U, D>> {
+    pub async fn read_eeprom(&mut self, page: Page, address: Address) -> Result<u8, Failure<U, D>> {
         self.run(&mut EepromAccess::read(page, address, EEPROM_POLLING)).await
     }
 
@@ -98,7 +100,7 @@ impl<U: Read + Write, D: Direction, T: Timer> Driver<U, D, T> {
     ///
     /// # Errors
     /// [`Error`]: whether the byte was written is not known then. Read it.
-    pub async fn write_eeprom(&mut self, page: Option<Page>, address: Address, data: u8) -> Result<u8, Failure<U, D>> {
+    pub async fn write_eeprom(&mut self, page: Page, address: Address, data: u8) -> Result<u8, Failure<U, D>> {
         self.run(&mut EepromAccess::write(page, address, data, EEPROM_POLLING)).await
     }
 
@@ -183,29 +185,19 @@ impl<U: Read + Write, D: Direction, T: Timer> Driver<U, D, T> {
 
 /// Sends a request, until its last bit has left: when it began.
 async fn send<U: Write, PIN, P, D>(
+=======
+/// What comes until a time, or an error of the UART.
+async fn read<U: Read>(
+>>>>>>> drivers
     uart: &mut U,
+    bytes: &mut [u8],
+    _: &mut quiet::Line,
     timer: &mut impl Timer,
-    state: &mut quiet::Line,
-    line: &Line,
-    frame: &Frame,
-) -> Result<u64, Error<U::Error, PIN, P, D>> {
-    let start_ns = state.now_ns(timer)?;
-    hand_over(uart, frame.as_bytes()).await?;
-    let taken_ns = state.now_ns(timer)?;
-    uart.flush().await.map_err(Error::Io)?;
-    let now_ns = state.now_ns(timer)?;
-    state.sent(now_ns);
-    let end_ns = start_ns.saturating_add(line.rate.fields_ns(frame.fields()).into());
-    let off_ns = driver_off_ns(line, end_ns, start_ns, taken_ns);
-    timer.wait_until(off_ns).await?;
-    Ok(start_ns)
+    until_ns: u64,
+) -> Result<Option<Result<usize, U::Error>>, ClockError> {
+    race(uart.read(bytes), timer.wait_until(until_ns)).await
 }
 
-/// Hands all bytes to the UART.
-async fn hand_over<U: Write, PIN, P, D>(uart: &mut U, mut bytes: &[u8]) -> Result<(), Error<U::Error, PIN, P, D>> {
-    while !bytes.is_empty() {
-        let count = uart.write(bytes).await.map_err(Error::Io)?;
-        bytes = bytes.get(count..).filter(|_| count > 0).ok_or(Error::Closed)?;
-    }
-    Ok(())
+async fn sleep(_: &mut quiet::Line, timer: &mut impl Timer, until_ns: u64) -> Result<(), ClockError> {
+    timer.wait_until(until_ns).await
 }

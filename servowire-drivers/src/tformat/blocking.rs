@@ -2,22 +2,24 @@
 
 use core::ops::ControlFlow;
 
-use embedded_io::{Read, ReadReady, Write};
-use servowire_core::{Ended, Procedure};
-use tformat::master::{EEPROM_POLLING, EepromAccess, Exchange, Line, Progress, Reset, Transaction};
+use embedded_io::{ErrorType, Read, ReadReady, Write};
+use servowire_core::{ClockError, Procedure, run};
+use tformat::master::{Detection, EEPROM_POLLING, EepromAccess, Exchange, Line, Reset, Transaction};
 use tformat::{
-    Address, AllData, Doubt, Evidence, Frame, Page, Policy, Request, Resolution, Response, Sample, SingleTurn,
+    Address, AllData, BitRate, Doubt, Evidence, Page, Policy, Request, Resolution, Response, Sample, SingleTurn,
 };
 
-use super::{LOST, MAX_BYTES, Released, driver_off_ns, longest_ns, other, silence_ns};
+use super::tuning::{Tuned, Tuning};
+use super::{LOST, MAX_BYTES, Released, all_data, longest_ns, refused, silence_ns, times};
 use crate::direction::Switch;
 use crate::exchange;
-use crate::quiet;
-use crate::{Clock, Direction, Error};
+use crate::quiet::{self, Settle, spin};
+use crate::sending::Sending;
+use crate::{Clock, Direction, Error, PinTooSlow};
 
-/// Why a call of an [`Driver`] failed.
-pub type Failure<U, D> = Error<<U as embedded_io::ErrorType>::Error, <D as Direction>::Error, tformat::Error, Doubt>;
+driver!(spun, [Read, ReadReady, Write], Clock);
 
+<<<<<<< HEAD
 /// An encoder, alone at its UART.
 #[derive(Debug)]
 pub struct Driver<U, D, C> {
@@ -80,11 +82,11 @@ impl<U: Read + ReadReady + Write, D: Direction, C: Clock> Driver<U, D, C> {
         self.run(&mut Reset::clear_errors())
     }
 
-    /// ID D: the byte at `address`, on the page that is selected now if `page` is `None`.
+    /// ID D: the byte at `address` of `page`, which is looked at before and after.
     ///
     /// # Errors
     /// [`Error`].
-    pub fn read_eeprom(&mut self, page: Option<Page>, address: Address) -> Result<u8, Failure<U, D>> {
+    pub fn read_eeprom(&mut self, page: Page, address: Address) -> Result<u8, Failure<U, D>> {
         self.run(&mut EepromAccess::read(page, address, EEPROM_POLLING))
     }
 
@@ -92,7 +94,7 @@ impl<U: Read + ReadReady + Write, D: Direction, C: Clock> Driver<U, D, C> {
     ///
     /// # Errors
     /// [`Error`]: whether the byte was written is not known then. Read it.
-    pub fn write_eeprom(&mut self, page: Option<Page>, address: Address, data: u8) -> Result<u8, Failure<U, D>> {
+    pub fn write_eeprom(&mut self, page: Page, address: Address, data: u8) -> Result<u8, Failure<U, D>> {
         self.run(&mut EepromAccess::write(page, address, data, EEPROM_POLLING))
     }
 
@@ -180,29 +182,23 @@ impl<U: Read + ReadReady + Write, D: Direction, C: Clock> Driver<U, D, C> {
 
 /// Sends a request, until its last bit has left: when it began.
 fn send<U: Write, PIN, P, D>(
+=======
+/// What comes until a time, or an error of the UART.
+fn read<U: Read + ReadReady>(
+>>>>>>> drivers
     uart: &mut U,
+    bytes: &mut [u8],
+    line: &mut quiet::Line,
     clock: &mut impl Clock,
-    state: &mut quiet::Line,
-    line: &Line,
-    frame: &Frame,
-) -> Result<u64, Error<U::Error, PIN, P, D>> {
-    let start_ns = state.now_ns(clock)?;
-    hand_over(uart, frame.as_bytes())?;
-    let taken_ns = state.now_ns(clock)?;
-    uart.flush().map_err(Error::Io)?;
-    let now_ns = state.now_ns(clock)?;
-    state.sent(now_ns);
-    let end_ns = start_ns.saturating_add(line.rate.fields_ns(frame.fields()).into());
-    let off_ns = driver_off_ns(line, end_ns, start_ns, taken_ns);
-    state.wait_until(clock, off_ns)?;
-    Ok(start_ns)
+    until_ns: u64,
+) -> Result<Option<Result<usize, U::Error>>, ClockError> {
+    spin(line, clock, until_ns, || match uart.read_ready() {
+        Ok(true) => Some(uart.read(bytes)),
+        Ok(false) => None,
+        Err(error) => Some(Err(error)),
+    })
 }
 
-/// Hands all bytes to the UART.
-fn hand_over<U: Write, PIN, P, D>(uart: &mut U, mut bytes: &[u8]) -> Result<(), Error<U::Error, PIN, P, D>> {
-    while !bytes.is_empty() {
-        let count = uart.write(bytes).map_err(Error::Io)?;
-        bytes = bytes.get(count..).filter(|_| count > 0).ok_or(Error::Closed)?;
-    }
-    Ok(())
+fn sleep(line: &mut quiet::Line, clock: &mut impl Clock, until_ns: u64) -> Result<(), ClockError> {
+    line.wait_until(clock, until_ns)
 }
