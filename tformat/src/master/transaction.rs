@@ -76,6 +76,8 @@ pub struct Transaction {
     request: Request,
     line: Line,
     start_ns: u64,
+    /// What began before is no response.
+    earliest_ns: u64,
     /// What may be the response.
     received: [u8; MAX_BYTES],
     len: u8,
@@ -96,6 +98,7 @@ impl Transaction {
             request,
             line,
             start_ns,
+            earliest_ns: 0,
             received: [0; MAX_BYTES],
             len: 0,
             echoed: 0,
@@ -105,9 +108,11 @@ impl Transaction {
             end: None,
         };
         let wait_ns = u64::from(line.response_timeout_ns).saturating_add(line.hand_over_ns.into());
-        let waited_ns = transaction.request_end_ns().saturating_add(wait_ns);
+        let end_ns = transaction.request_end_ns();
+        let waited_ns = end_ns.saturating_add(wait_ns);
         let fields_ns = u64::from(line.field_timeout_ns).saturating_mul(Frame::MAX_FIELDS as u64);
         Self {
+            earliest_ns: end_ns.saturating_add(line.turn_around_ns.into()),
             until_ns: waited_ns.saturating_add(transaction.fields_ns(1)),
             latest_ns: waited_ns.saturating_add(fields_ns),
             ..transaction
@@ -215,8 +220,7 @@ impl Transaction {
 
     /// Whether the first of `fields` fields that end at `end_ns` began before a response can begin.
     fn is_earlier(&self, end_ns: u64, fields: u8) -> bool {
-        let earliest = self.request_end_ns().saturating_add(self.line.turn_around_ns.into());
-        end_ns < earliest.saturating_add(self.fields_ns(fields))
+        end_ns < self.earliest_ns.saturating_add(self.fields_ns(fields))
     }
 
     /// Drops what began before a response can begin: the echo, and what was on the line before.
@@ -237,13 +241,15 @@ impl Transaction {
     /// No response begins like that: in place of SF there would be a control field, whose low bits are never 0 as the
     /// information bits of SF are; and EDF and CRC of an EEPROM response cannot both be right.
     fn drop_echo_by_content(&mut self) {
-        let sent = self.request.emit();
-        let cf = sent.as_bytes().first().copied().unwrap_or(0);
-        let heard = self.received.get(..usize::from(self.len)).unwrap_or(&self.received);
-        let echo = heard.strip_prefix(sent.as_bytes()).and_then(<[u8]>::first);
-        if echo.is_some_and(|next| *next == cf || *next == CF3) {
-            self.echoed = sent.fields();
-            for _ in 0..sent.fields() {
+        let fields = self.request.data_id().request_fields();
+        let cf = self.request.data_id().control_field().get();
+        let next = self.received.get(usize::from(fields)).filter(|_| self.len > fields);
+        // Looked at first, for it is hardly ever so.
+        if next.is_some_and(|next| *next == cf || *next == CF3)
+            && self.received.starts_with(self.request.emit().as_bytes())
+        {
+            self.echoed = fields;
+            for _ in 0..fields {
                 self.drop_front();
             }
         }
