@@ -150,8 +150,8 @@ fn tformat() {
     holds!("read_position", |e: &mut Encoder<_, _, _>| e.read_position(resolution, policy));
     holds!("read_data", |e: &mut Encoder<_, _, _>| e.read_data());
     holds!("clear_errors", |e: &mut Encoder<_, _, _>| e.clear_errors());
-    holds!("read_eeprom", |e: &mut Encoder<_, _, _>| e.read_eeprom(None, address));
-    holds!("write_eeprom", |e: &mut Encoder<_, _, _>| e.write_eeprom(None, address, 7));
+    holds!("read_eeprom", |e: &mut Encoder<_, _, _>| e.read_eeprom(tformat::Page::truncate(0), address));
+    holds!("write_eeprom", |e: &mut Encoder<_, _, _>| e.write_eeprom(tformat::Page::truncate(0), address, 7));
     holds!("transact", |e: &mut Encoder<_, _, _>| e.transact(tformat::Request::ReadSingleTurn));
 }
 

@@ -13,7 +13,7 @@ use servowire_drivers::tformat::{asynch, blocking};
 use servowire_drivers::{DirectionPin, Error};
 use servowire_world::{Scenario, Verdict};
 use tformat::master::{Line, Reset};
-use tformat::{Address, Almc, BitRate, Policy, Request};
+use tformat::{Address, Almc, BitRate, Page, Policy, Request};
 
 /// The UART as futures that can be dropped.
 struct AsyncUart(Uart);
@@ -112,7 +112,7 @@ fn procedures_run_over_it() {
     let bench = Bench::new(Scenario::quiet(), Misframed::Dropped);
     let mut encoder = driver(&bench);
     let address = Address::new(5).unwrap();
-    assert_eq!(run(encoder.write_eeprom(None, address, 0x5a), FOR_EVER), Some(Ok(0x5a)));
+    assert_eq!(run(encoder.write_eeprom(Page::truncate(0), address, 0x5a), FOR_EVER), Some(Ok(0x5a)));
     assert_eq!(bench.borrow_mut().encoder().eeprom_mut()[0][5], 0x5a);
     bench.borrow_mut().encoder().raise_alarms(Almc::BE);
     bench.borrow_mut().encoder().end_alarms(Almc::BE);

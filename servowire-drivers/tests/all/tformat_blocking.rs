@@ -8,7 +8,7 @@ use servowire_drivers::tformat::blocking::Driver;
 use servowire_drivers::{DirectionPin, Error};
 use servowire_world::{Fault, Planned, Scenario, Script, Verdict};
 use tformat::master::{Detection, Line};
-use tformat::{Address, Almc, BitRate, Doubt, Policy, Request, Resolution, Sample, Tolerated};
+use tformat::{Address, Almc, BitRate, Doubt, Page, Policy, Request, Resolution, Sample, Tolerated};
 
 fn driver(bench: &Shared) -> Driver<Uart, DirectionPin<Pin>, Watch> {
     driver_at(bench, Line::new(BitRate::Mbit2_5))
@@ -83,10 +83,10 @@ fn procedures_run_over_it() {
     let mut encoder = driver(&bench);
     encoder.clear_errors().unwrap();
     let address = Address::new(5).unwrap();
-    assert_eq!(encoder.write_eeprom(None, address, 0x5a), Ok(0x5a));
-    assert_eq!(encoder.read_eeprom(None, address), Ok(0x5a));
+    assert_eq!(encoder.write_eeprom(Page::truncate(0), address, 0x5a), Ok(0x5a));
+    assert_eq!(encoder.read_eeprom(Page::truncate(0), address), Ok(0x5a));
     bench.borrow_mut().encoder().eeprom_mut()[0][5] = 7;
-    assert_eq!(encoder.read_eeprom(None, address), Ok(7));
+    assert_eq!(encoder.read_eeprom(Page::truncate(0), address), Ok(7));
     let found = encoder.run(&mut Detection::new()).unwrap();
     assert_eq!((found.enid, found.abm.get()), (0x17, 3));
 }

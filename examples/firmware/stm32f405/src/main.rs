@@ -11,7 +11,7 @@ use core::fmt::Write;
 use panic_halt as _;
 use servowire_drivers::{DirectionPin, Error, Worst, tformat::blocking::Driver};
 use tformat::master::Line;
-use tformat::{Address, BitRate};
+use tformat::{Address, BitRate, Page};
 
 /// The UART begins with its next bit clock; the interrupt of a byte, which may come in between, takes less than 0.9 us; a tick of the
 /// clock is 50 ns.
@@ -36,7 +36,7 @@ fn main() -> ! {
     let _ = writeln!(console, "T-Format master, 2500000 bit/s, clock {source:?}");
     let pin = DirectionPin::new(de, WORST);
     let mut encoder = Driver::new(uart, pin, clock, line()).expect("1.4 us fit four bits");
-    match encoder.read_eeprom(None, Address::truncate(0)) {
+    match encoder.read_eeprom(Page::truncate(0), Address::truncate(0)) {
         Ok(byte) => drop(writeln!(console, "EEPROM 0: {byte:02x}")),
         Err(error) => drop(writeln!(console, "EEPROM: {error}")),
     }

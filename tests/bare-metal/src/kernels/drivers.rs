@@ -37,8 +37,8 @@ kernels! {
         match *call {
             0 => encoder.read_data().is_err(),
             1 => encoder.clear_errors().is_err(),
-            2 => encoder.read_eeprom(Page::new(1), address).is_err(),
-            3 => encoder.write_eeprom(None, address, *call).is_err(),
+            2 => encoder.read_eeprom(Page::truncate(1), address).is_err(),
+            3 => encoder.write_eeprom(Page::truncate(0), address, *call).is_err(),
             _ => encoder.transact(tformat::Request::ReadSingleTurn).is_err(),
         }
     } over CALLS;
