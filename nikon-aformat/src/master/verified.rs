@@ -177,10 +177,8 @@ impl VerifiedWrite {
         match &mut self.back {
             Back::Word { read, data } => match read.receive(outcome, ready_ns) {
                 Step::Failed { ready_ns, .. } => Step::Failed { error: Error::EffectUnknown, ready_ns },
-                step => step.and_then(|value, ready_ns| match value == *data {
-                    true => Step::Done { value: (), ready_ns },
-                    false => Step::Failed { error: Error::NotDone, ready_ns },
-                }),
+                Step::Done { value, ready_ns } if value != *data => Step::Failed { error: Error::NotDone, ready_ns },
+                step => step.and_then(|_, ready_ns| Step::Done { value: (), ready_ns }),
             },
             Back::Id(request) => {
                 let request = *request;
