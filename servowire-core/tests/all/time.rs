@@ -1,5 +1,4 @@
 //! Time from wrapping counters, against exact arithmetic of 128 bits.
-#![allow(clippy::arithmetic_side_effects, clippy::cast_possible_truncation, reason = "a test may")]
 
 use proptest::prelude::*;
 use servowire_core::{ClockCheck, ClockError, MAX_TICK_NS, MIN_TICK_HZ, TickRate, TimeBase};
