@@ -72,7 +72,7 @@ fn sampled() -> Vec<u8> {
         }
         let present = master.transmission();
         samples.extend(present.head.samples());
-        let answer = encoder.hear_at(present.head.bits(), 1000 + 5 * frame);
+        let answer = encoder.set_position(1000 + 5 * frame).hear(present.head.bits());
         let received = answer.map_or([0xff; 72], |answer| line(answer.bits, 21));
         let h_frame = master.hear(&received, 0).unwrap();
         if present.answered {

@@ -13,6 +13,9 @@ mod drivers;
 #[cfg(feature = "hdsl")]
 mod hdsl;
 #[cfg(feature = "hdsl")]
+#[path = "../../../hdsl/tests/all/cable.rs"]
+mod hdsl_cable;
+#[cfg(feature = "hdsl")]
 mod hdsl_frame;
 #[cfg(feature = "nikon-aformat")]
 mod nikon;
