@@ -7,7 +7,7 @@
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[must_use]
 pub enum Progress<T, E> {
-    /// Not finished. Poll at this time, if nothing is received before.
+    /// Not finished. Poll at this time if nothing is received earlier.
     Pending {
         /// When the wait is over, in ns.
         until_ns: u64,
