@@ -11,11 +11,13 @@
     )
 )]
 
-#[cfg(test)]
+#[cfg(any(test, feature = "arbitrary"))]
 extern crate std;
 
 mod clock;
 mod direction;
+#[cfg(feature = "drv8711")]
+pub mod drv8711;
 mod error;
 #[cfg(any(feature = "nikon", feature = "tformat"))]
 mod exchange;

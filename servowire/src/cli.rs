@@ -352,11 +352,6 @@ pub(crate) fn frequency(text: &str) -> Result<u64, String> {
     }
 }
 
-/// A frequency that fits into 32 bits.
-pub(crate) fn hertz(text: &str) -> Result<u32, String> {
-    u32::try_from(frequency(text)?).map_err(|_| format!("\"{text}\" is more than 4 GHz"))
-}
-
 /// Rates for which the receiver's grid of 80 samples a bit can be laid.
 fn bit_rate(text: &str) -> Result<u32, String> {
     match frequency(text)? {

@@ -7,7 +7,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use step_profile::motion::Limits;
+use step_motion::Limits;
 
 use crate::fault::{At, Fault};
 pub(crate) use lines::Line;
@@ -44,7 +44,7 @@ impl Part {
     }
 
     /// Its steps, with the same limits for all axes; ticks are ns.
-    pub(crate) fn steps(&self, lines: Vec<Line>, limits: Limits) -> Result<Steps, step_profile::Error> {
+    pub(crate) fn steps(&self, lines: Vec<Line>, limits: Limits) -> Result<Steps, step_motion::Error> {
         Steps::new(lines, limits, self.steps_per_mm, self.deviation)
     }
 }

@@ -17,7 +17,7 @@ use std::process::ExitCode;
 use clap::{Args, ValueEnum};
 use motion::Move;
 use ramp::Record;
-use step_profile::motion::Limits;
+use step_motion::Limits;
 use step_profile::{Arithmetic, Frequency, Parameters, Profile, Speed, Tone};
 
 use crate::capture::time;

@@ -9,7 +9,7 @@ use super::chosen;
 use crate::byte;
 
 #[allow(dead_code, unreachable_pub, clippy::pedantic, reason = "the bench of the tests; not all of it is used")]
-#[path = "../../../tformat/tests/bench/mod.rs"]
+#[path = "../../../tformat/tests/all/bench/mod.rs"]
 mod bench;
 
 use bench::Bench;

@@ -1,7 +1,7 @@
 //! What a part program says, as straight lines.
 
 use gcode::{Block, Code, Value};
-use step_profile::motion::{Arc, Turning};
+use step_motion::{Arc, Turning};
 
 use super::AXES;
 use crate::fault::{At, Fault};

@@ -109,12 +109,7 @@ impl EepromAccess {
         self.enter(first, now_ns)
     }
 
-    /// A transaction ended with this outcome; the line is free from `ready_ns` on.
-    pub fn receive(&mut self, outcome: Result<Response, Error>, ready_ns: u64) -> Step<u8> {
-        let step = self.end.unwrap_or_else(|| self.next(outcome, ready_ns));
-        self.end = step.ended();
-        step
-    }
+    servowire_core::receive! { u8 }
 
     fn next(&mut self, outcome: Result<Response, Error>, ready_ns: u64) -> Step<u8> {
         match self.memory(outcome) {

@@ -85,12 +85,7 @@ impl Reset {
         self.send(now_ns)
     }
 
-    /// A transaction ended with this outcome; the line is free from `ready_ns` on.
-    pub fn receive(&mut self, outcome: Result<Response, Error>, ready_ns: u64) -> Step<SingleTurn> {
-        let step = self.end.unwrap_or_else(|| self.next(outcome, ready_ns));
-        self.end = step.ended();
-        step
-    }
+    servowire_core::receive! { SingleTurn }
 
     fn next(&mut self, outcome: Result<Response, Error>, ready_ns: u64) -> Step<SingleTurn> {
         let spaced_ns = ready_ns.saturating_add(Self::SPACING_NS.into());
