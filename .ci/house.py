@@ -265,8 +265,9 @@ def drawn(text, names):
         return rows[y][x] if 0 <= y < len(rows) and 0 <= x < len(rows[y]) else " "
 
     def under(y, x):
-        row = {name for (y2, _), name in places.items() if y2 == y}
-        return frozenset(row if at(y - 1, x) == "▼" and rows[y - 1].count("▼") == 1 else {places[y, x]})
+        if at(y - 1, x) == "▼" and rows[y - 1].count("▼") == 1:
+            return frozenset(name for (y2, _), name in places.items() if y2 == y)
+        return frozenset({places[y, x]} if (y, x) in places else ())
 
     pairs, seen = set(), set()
     for start in [(y, x) for y, row in enumerate(rows) for x in range(len(row)) if row[x] in LINES]:
@@ -277,8 +278,10 @@ def drawn(text, names):
         for y, x in work:
             for dy, dx in LINES[at(y, x)]:
                 place = (y + dy, x + dx)
-                if place in places and dy:
-                    above, below = (above | {places[place]}, below) if dy < 0 else (above, below | {under(*place)})
+                if dy > 0 and under(*place):
+                    below.add(under(*place))
+                elif dy < 0 and place in places:
+                    above.add(places[place])
                 elif (-dy, -dx) in LINES.get(at(*place), ()) and place not in seen:
                     seen.add(place)
                     work.append(place)

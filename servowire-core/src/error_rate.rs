@@ -61,6 +61,14 @@ mod tests {
     }
 
     #[test]
+    fn a_full_bucket_stays_full() {
+        let mut rate = ErrorRate::new(u32::MAX - 1, u32::MAX - 2);
+        assert!(rate.record(&BAD) && rate.record(&BAD) && rate.record(&BAD));
+        assert_eq!(rate.level(), u32::MAX);
+        assert!(rate.record(&GOOD) && !rate.record(&GOOD));
+    }
+
+    #[test]
     fn the_limit_itself_is_not_exceeded() {
         let mut rate = ErrorRate::new(100, 200);
         assert!(!rate.record(&BAD) && !rate.record(&BAD));

@@ -401,6 +401,23 @@ mod tests {
         assert!(known.eq([Ok(false), Ok(true), Err(Doubt::Bad), Ok(false), Ok(true)]));
     }
 
+    /// What is too old for the position is too old for the speed.
+    #[test]
+    fn evidence_that_comes_late_is_no_sample_of_the_speed() {
+        let mut cell = ShaftCell::<Count, 3>::new();
+        let (mut writer, mut reader) = cell.split(Tracker::new(1 << 16, 1_000).unwrap());
+        let mut known = |sampled_ns: u32, put_ns| {
+            writer.put(Count(7, true, sampled_ns), put_ns, POLICY);
+            reader.motion(sampled_ns.into(), POLICY).map(|motion| motion.speed())
+        };
+        assert_eq!(known(50_000, 60_000), Ok(None));
+        assert_eq!(known(100_000, 200_000), Ok(Some(0)));
+        // 1 ns more than the longest age.
+        assert_eq!(known(150_000, 250_001), Ok(None));
+        assert_eq!(known(200_000, 210_000), Ok(None));
+        assert_eq!(known(250_000, 260_000), Ok(Some(0)));
+    }
+
     /// Whoever splits a cell again finds what was in it, and a speed that starts anew.
     #[test]
     fn a_cell_that_is_split_again_keeps_its_value() {
