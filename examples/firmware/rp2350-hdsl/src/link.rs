@@ -1,0 +1,44 @@
+//! Core 0: the link.
+
+use hdsl::Evidence;
+use hdsl::master::{Master, State, Transmission};
+
+use servowire_core::Writer;
+
+use crate::frame::{RUNNING, STARTING};
+use crate::front_end::{Late, Line, WINDOW_END_NS};
+
+/// Keeps the link until the processor or DMA is late. `first`: the head of a RESET frame, which the line sends already, since
+/// `start_ns`.
+pub fn run(line: &mut Line, master: &mut Master, feedback: &mut Writer<'_, Evidence, 6>, first: &Transmission, start_ns: u64) -> Result<(), Late> {
+    let (mut number, mut begin_ns, mut length) = (0_u32, start_ns, STARTING);
+    loop {
+        // The next head leaves before the answer of this frame is there, which leaves a whole frame of time for it.
+        let ahead = master.ahead();
+        // Two frames leave no time for what follows from their answer, so one goes between: at the end of a link a RESET more
+        // than it asks for, and IDREQ a second time.
+        let between = match master.state() {
+            State::Running if ahead.is_none() => Some(*first),
+            State::IdReq => Some(master.transmission()),
+            _ => None,
+        };
+        if let Some(next) = ahead.or(between) {
+            line.send(number.wrapping_add(1), &next);
+        }
+        let next = if ahead.is_some() { RUNNING } else { STARTING };
+        let samples = line.window(number, next)?;
+        master.hear_words(&samples, begin_ns + WINDOW_END_NS);
+        feedback.put(master.fast());
+        number = number.wrapping_add(1);
+        begin_ns += length.ns();
+        length = next;
+        if between.is_some() {
+            line.send(number.wrapping_add(1), &master.transmission());
+            line.window(number, STARTING)?;
+            number = number.wrapping_add(1);
+            begin_ns += STARTING.ns();
+        } else if ahead.is_none() {
+            line.send(number, &master.transmission());
+        }
+    }
+}
