@@ -80,6 +80,7 @@ impl LongRequest {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::message::Length;
 
     /// Header bytes of the manual's examples: 54 read 2 bytes, 58 read 4, 5C read 8, 7C with an offset, 11 write without
     /// data, 1D write 8 (to addresses below 100h: 54 becomes D4 on the line, with its marker bit).
