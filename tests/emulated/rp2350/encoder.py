@@ -112,7 +112,7 @@ class Encoder:
         symbol, first = byte & 31, byte >> 7
         self.sampled = ([self.position(edge)] + self.sampled)[:3]
         if not first and symbol in (RESET, SYNC):
-            self.frame, self.truth = 0, []
+            self.frame = 0
             return None
         self.answers += 1
         if not first and symbol in (START, LEARN, CHECK):

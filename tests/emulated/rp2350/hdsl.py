@@ -4,7 +4,7 @@ fast its processors are.
     python hdsl.py IMAGE
 
 The image runs unmodified with processors at half speed more and less, with slow flash and slow DMA, on a sound line and on one that
-damages every third answer. Each run has to give frames of whole bits and constant length, positions that are right, and nothing late.
+damages one answer in twelve. Each run has to give frames of whole bits and constant length, positions that are right, and nothing late.
 What it prints are the margins: how long a head was in memory before its frame began, at the least.
 """
 
@@ -85,7 +85,7 @@ def flips(seed, one_in):
 def run(image, damage_after=None, **speed):
     """One run of so many frames: the line, its frames, the margins, what the console said."""
     state = {"running": 0}
-    wrong = flips(1, 3)
+    wrong = flips(1, 12)
     line = Line(shaft, lambda bits: wrong(bits) if damage_after and state["running"] > damage_after else bits)
     chip = Chip(image, line.inputs, line.changed, **speed)
     ring = chip.symbol(FRAMES_SYMBOL)
@@ -150,7 +150,7 @@ def main():
     for damage_after in (None, 60):
         first = None
         for name, speed in runs.items():
-            name = f"{name}, every third answer damaged" if damage_after else name
+            name = f"{name}, an answer in twelve damaged" if damage_after else name
             line, chip, begun, margins = run(image, damage_after, **speed)
             check(name, line, chip, begun, margins, damage_after is not None)
             positions(name, line, chip)

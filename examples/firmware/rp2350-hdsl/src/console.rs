@@ -20,7 +20,7 @@ const FRESH: Policy = Policy::new(3 * RUNNING.ns());
 const PERIOD_NS: u64 = 100_000_000;
 
 /// A line in each period, and at once when the position comes or goes: the position, or why there is none. It never ends.
-pub fn run(mut uart: Uart, mut feedback: Reader<'_, Evidence, 6>, now_ns: impl Fn() -> u64) -> ! {
+pub fn run(mut uart: Uart, mut feedback: Reader<'_, Evidence, 10>, now_ns: impl Fn() -> u64) -> ! {
     let _ = write!(
         uart,
         "servowire {} {}, {} positions a second, DI 2, DE 3, RO 4\r\n",

@@ -33,6 +33,11 @@ impl Length {
         Self { bits: H_FRAME_BITS + blocks * STUFFING_BITS }
     }
 
+    /// The blocks of stuffing in it.
+    pub const fn stuffing(self) -> Stuffing {
+        Stuffing::new(((self.bits - H_FRAME_BITS) / STUFFING_BITS) as u8).expect("it was made of them")
+    }
+
     /// In nanoseconds.
     pub const fn ns(self) -> u64 {
         self.bits as u64 * 320 / 3

@@ -10,7 +10,7 @@ use crate::front_end::{Late, Line, WINDOW_END_NS};
 
 /// Keeps the link until the processor or DMA is late. `first`: the head of a RESET frame, which the line sends already, since
 /// `start_ns`.
-pub fn run(line: &mut Line, master: &mut Master, feedback: &mut Writer<'_, Evidence, 6>, first: &Transmission, start_ns: u64) -> Result<(), Late> {
+pub fn run(line: &mut Line, master: &mut Master, feedback: &mut Writer<'_, Evidence, 10>, first: &Transmission, start_ns: u64) -> Result<(), Late> {
     let (mut number, mut begin_ns, mut length) = (0_u32, start_ns, STARTING);
     loop {
         // The next head leaves before the answer of this frame is there, which leaves a whole frame of time for it.
@@ -28,17 +28,19 @@ pub fn run(line: &mut Line, master: &mut Master, feedback: &mut Writer<'_, Evide
         let next = if ahead.is_some() { RUNNING } else { STARTING };
         let samples = line.window(number, next)?;
         master.hear_words(&samples, begin_ns + WINDOW_END_NS);
-        feedback.put(master.fast());
-        number = number.wrapping_add(1);
         begin_ns += length.ns();
         length = next;
+        number = number.wrapping_add(1);
+        // The line cannot wait; who uses the position can.
+        if ahead.is_none() {
+            let at = if between.is_some() { number.wrapping_add(1) } else { number };
+            line.send(at, &master.transmission());
+        }
+        feedback.put(master.fast());
         if between.is_some() {
-            line.send(number.wrapping_add(1), &master.transmission());
             line.window(number, STARTING)?;
             number = number.wrapping_add(1);
             begin_ns += STARTING.ns();
-        } else if ahead.is_none() {
-            line.send(number, &master.transmission());
         }
     }
 }

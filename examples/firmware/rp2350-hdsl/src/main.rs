@@ -78,6 +78,7 @@ fn main() -> ! {
 
     loop {
         let mut master = Master::new(Dialect::SICK);
+        master.set_stuffing(frame::RUNNING.stuffing());
         let first = master.transmission();
         let mut line = front_end.start(first.head);
         let _ = link::run(&mut line, &mut master, &mut feedback, &first, now_ns());
