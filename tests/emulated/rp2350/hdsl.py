@@ -117,7 +117,7 @@ def check(name, line, chip, begun, margins, damaged=False):
     if not damaged:
         first = lengths.index(RUNNING)
         assert set(lengths[first:]) == {RUNNING}, f"{name}: the link was begun anew"
-        assert len(lengths) - first > FRAMES * 2 // 3, f"{name}: {first} frames to start"
+        assert len(lengths) - first > FRAMES // 2, f"{name}: {first} frames to start"
     least = {bits: min((m for b, m in margins if b == bits), default=None) for bits in (STARTING, RUNNING)}
     print(f"{name}: {len(begun)} frames, {line.encoder.answers} answers; a head is ready at the least", end=" ")
     print(", ".join(f"{clocks:.0f} clocks before a frame of {bits} bits" for bits, clocks in least.items() if clocks is not None), end="")

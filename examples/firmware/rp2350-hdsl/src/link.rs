@@ -15,11 +15,12 @@ pub fn run(line: &mut Line, master: &mut Master, feedback: &mut Writer<'_, Evide
     loop {
         // The next head leaves before the answer of this frame is there, which leaves a whole frame of time for it.
         let ahead = master.ahead();
-        // Two frames leave no time for what follows from their answer, so one goes between: at the end of a link a RESET more
-        // than it asks for, and IDREQ a second time.
+        // What may follow from an answer takes longer than its frame leaves, so one goes between that nobody looks at: while the
+        // link starts the same frame once more, at its end a RESET more than it asks for. Not while it waits for VSYNC, of which
+        // no frame may be left out.
         let between = match master.state() {
             State::Running if ahead.is_none() => Some(*first),
-            State::IdReq => Some(master.transmission()),
+            State::Start | State::Learn | State::Check | State::IdReq => Some(master.transmission()),
             _ => None,
         };
         if let Some(next) = ahead.or(between) {
