@@ -23,7 +23,7 @@ const PERIOD_NS: u64 = 100_000_000;
 pub fn run(mut uart: Uart, mut feedback: Reader<'_, Evidence, 10>, now_ns: impl Fn() -> u64) -> ! {
     let _ = write!(
         uart,
-        "servowire {} {}, {} positions a second, DI 2, DE 3, RO 4\r\n",
+        "{} {}, {} positions a second, DI 2, DE 3, RO 4\r\n",
         env!("CARGO_PKG_NAME"),
         env!("CARGO_PKG_VERSION"),
         1_000_000_000 / RUNNING.ns(),
@@ -31,18 +31,19 @@ pub fn run(mut uart: Uart, mut feedback: Reader<'_, Evidence, 10>, now_ns: impl 
     let (mut next_ns, mut late, mut known) = (now_ns(), 0, false);
     loop {
         let feedback = feedback.at(now_ns(), FRESH);
-        if now_ns() >= next_ns || feedback.is_ok() != known {
-            known = feedback.is_ok();
-            next_ns = now_ns() + PERIOD_NS;
-            let _ = match feedback {
-                Ok(sample) => write!(uart, "position {}\r\n", sample.position()),
-                Err(doubt) => write!(uart, "no position: {doubt}\r\n"),
-            };
+        if now_ns() < next_ns && feedback.is_ok() == known {
+            continue;
         }
+        known = feedback.is_ok();
+        next_ns = now_ns() + PERIOD_NS;
+        let _ = match feedback {
+            Ok(sample) => write!(uart, "position {}\r\n", sample.position()),
+            Err(doubt) => write!(uart, "no position: {doubt}\r\n"),
+        };
         let count = LATE.load(Ordering::Relaxed);
         if count != late {
             late = count;
-            let _ = write!(uart, "this program was late; the link was begun anew, {late} times by now\r\n");
+            let _ = write!(uart, "late: the link was begun anew {late} times because a head was not ready\r\n");
         }
     }
 }

@@ -10,7 +10,13 @@ use crate::front_end::{Late, Line, WINDOW_END_NS};
 
 /// Keeps the link until the processor or DMA is late. `first`: the head of a RESET frame, which the line sends already, since
 /// `start_ns`.
-pub fn run(line: &mut Line, master: &mut Master, feedback: &mut Writer<'_, Evidence, 10>, first: &Transmission, start_ns: u64) -> Result<(), Late> {
+pub fn run(
+    line: &mut Line,
+    master: &mut Master,
+    feedback: &mut Writer<'_, Evidence, 10>,
+    first: &Transmission,
+    start_ns: u64,
+) -> Result<(), Late> {
     let (mut number, mut begin_ns, mut length) = (0_u32, start_ns, STARTING);
     loop {
         // The next head leaves before the answer of this frame is there, which leaves a whole frame of time for it.
