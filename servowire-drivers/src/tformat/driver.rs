@@ -94,13 +94,13 @@ macro_rules! driver {
                 $wait!(self.run(&mut Reset::clear_errors()))
             }
 
-            /// ID D: the byte at `address`, on the page that is selected now if `page` is `None`.
+            /// ID D: the byte at `address` of `page`, which is looked at before and after.
             ///
             /// # Errors
             /// [`Error`].
             pub $($asynch)? fn read_eeprom(
                 &mut self,
-                page: Option<Page>,
+                page: Page,
                 address: Address,
             ) -> Result<u8, Failure<U, D>> {
                 $wait!(self.run(&mut EepromAccess::read(page, address, EEPROM_POLLING)))
@@ -112,7 +112,7 @@ macro_rules! driver {
             /// [`Error`]: whether the byte was written is not known then. Read it.
             pub $($asynch)? fn write_eeprom(
                 &mut self,
-                page: Option<Page>,
+                page: Page,
                 address: Address,
                 data: u8,
             ) -> Result<u8, Failure<U, D>> {
@@ -233,7 +233,7 @@ macro_rules! driver {
                 if let Some(ns) = sending.lead_until_ns(line.driver_lead_ns)? {
                     $wait!(sleep(sending.line, sending.clock, ns))?;
                 }
-                sending.line.begin(longest_ns(&line, request));
+                sending.line.begin(longest_ns(&line, &frame));
                 let mut fields = frame.as_bytes();
                 while !fields.is_empty() {
                     let piece = sending.piece(fields);
