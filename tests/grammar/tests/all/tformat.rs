@@ -19,7 +19,7 @@ fn window(bytes: &[u8]) -> Window {
 
 fn evidence() -> tformat::Evidence {
     let response = Response::parse(Request::ReadAll, &ALL).unwrap();
-    tformat::Evidence::of(response, Resolution::new(23, 16).unwrap(), 1_000_000)
+    tformat::Evidence::of(response, Resolution::new(23, 16).unwrap(), 5_000_000_000)
 }
 
 decode! { tformat::Response(Request, &[u8]); with (Request::ReadAll); sound &ALL; damaged &DAMAGED => "crc" }
@@ -27,7 +27,7 @@ encode! { tformat::Request = Request::ReadAll }
 code! { tformat::DataId: 3; unknown 4 }
 exchange! { tformat::Transaction::start(request = Request::ReadAll, line = line()); heard &ALL; "&[u8]", at 55_000 }
 procedure! { tformat::Reset = Reset::clear_errors(); lost Error::NoResponse { echo: false } }
-feedback! { tformat: evidence(), sampled at 1_000_000; "`exchange.evidence(resolution)`" }
+feedback! { tformat: evidence(), sampled at 5_000_000_000; "`exchange.evidence(resolution)`" }
 device! {
     tformat::"Device::<PAGES>::new(enid, rate)" = Device::<6>::new(0x17, BitRate::Mbit2_5);
     with Behaviour::new().with_response_delay_ns(5_000);

@@ -106,6 +106,15 @@ macro_rules! procedure {
     };
 }
 
+/// Of what can be deserialised there are two of these, and a call does not compile.
+pub(crate) trait Unread<A> {
+    fn is_never_read() {}
+}
+
+impl<T> Unread<()> for T {}
+
+impl<T: serde::de::DeserializeOwned> Unread<u8> for T {}
+
 /// Evidence is judged where it is used, and travels through a cell.
 macro_rules! feedback {
     ($krate:ident: $evidence:expr, sampled at $sampled_ns:expr; $from:literal) => {
@@ -129,7 +138,15 @@ macro_rules! feedback {
             let (mut writer, mut reader) = cell.split();
             assert_eq!(reader.at($sampled_ns, policy), Err(Doubt::Never));
             writer.put(evidence);
-            assert_eq!(reader.at($sampled_ns, policy), evidence.at($sampled_ns, policy));
+            assert_eq!(reader.at($sampled_ns + 125_000, policy), Ok(sample));
+            assert_eq!(reader.at($sampled_ns + 125_001, policy), Err(old));
+            let strict = Policy::new(0);
+            assert_eq!(reader.at($sampled_ns, strict), Ok(sample));
+            assert_eq!(reader.at($sampled_ns + 1, strict), Err(Doubt::Old { age_ns: 1 }));
+
+            // What a file holds is a message at best.
+            <Evidence as crate::programs::Unread<_>>::is_never_read();
+            <Sample as crate::programs::Unread<_>>::is_never_read();
         }
     };
 }

@@ -19,13 +19,13 @@ fn command() -> Command {
 }
 
 fn evidence() -> Evidence {
-    Evidence::of(&Response::parse(&SOUND).unwrap(), 1_000_000)
+    Evidence::of(&Response::parse(&SOUND).unwrap(), 5_000_000_000)
 }
 
 decode! { rtex_block::Response(&[u8]); with (); sound &SOUND; damaged &DAMAGED => "direction" }
 encode! { rtex_block::Command = command() }
 code! { rtex_block::CyclicCode: 2; unknown 5 }
-feedback! { rtex_block: evidence(), sampled at 1_000_000; "`axis.evidence()`" }
+feedback! { rtex_block: evidence(), sampled at 5_000_000_000; "`axis.evidence()`" }
 device! {
     rtex_block::"Drive::new(DriveConfig)" = rtex_block::device::Drive::new(DriveConfig::new(mac_id(), OpenCodes::INVENTED));
     with Behaviour::new().with_echo_lag(2);

@@ -1,6 +1,5 @@
 //! From a move to the edges of STEP: an axis of step-profile, the PTO words of sorte-proto, and its SYNC0 handler on an
 //! ideal timer. No step is lost, and none is more than a few nanoseconds from where it belongs.
-#![allow(missing_docs, clippy::arithmetic_side_effects, clippy::unwrap_used)]
 
 use proptest::prelude::*;
 use sorte_proto::Pto;

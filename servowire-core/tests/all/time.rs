@@ -1,5 +1,4 @@
 //! Time from wrapping counters, against exact arithmetic of 128 bits.
-#![allow(clippy::arithmetic_side_effects, clippy::cast_possible_truncation, reason = "a test may")]
 
 use proptest::prelude::*;
 use servowire_core::{ClockCheck, ClockError, MAX_TICK_NS, MIN_TICK_HZ, TickRate, TimeBase};
@@ -151,6 +150,25 @@ fn a_counter_of_24_bits_that_counts_down() {
     assert_eq!(time.now_ns(!0x00ff_ffff), Ok(139_810_133)); // a whole turn, 16,777,216
 }
 
+/// A small counter wraps often, and after 2^32 ticks so does the word in which they are counted.
+#[test]
+fn a_small_counter_counts_on_for_ever() {
+    fn run<const BITS: u32>(hz: u32) {
+        let mut time = TimeBase::<BITS>::new(TickRate::new(hz).unwrap(), 77);
+        let step = (1_u32 << (BITS - 1)) - 1;
+        let (mut ticks, mut last_ns) = (0_u64, 0);
+        while ticks < 3 << 32 {
+            ticks += u64::from(step);
+            let ns = time.now_ns((ticks as u32).wrapping_add(77)).unwrap();
+            assert!(ns > last_ns && is_true(ns, ticks.into(), hz), "{BITS} bits: {ticks} ticks are not {ns} ns");
+            last_ns = ns;
+        }
+    }
+    run::<16>(170_000_000);
+    run::<24>(120_000_000);
+    run::<31>(1_000_003);
+}
+
 #[test]
 fn the_time_between_two_readings() {
     let rate = TickRate::of::<170_000_000>();
@@ -188,6 +206,11 @@ fn a_clock_that_stands_or_goes_back_is_noticed() {
     assert_eq!([check.check(3), check.check(3), check.check(3)], [Ok(3); 3]);
     assert_eq!(check.check(3), Err(ClockError::Stopped));
     assert_eq!(check.check(u64::MAX), Ok(u64::MAX));
+    // Set back to the very reading at which it stood: it has only just got there.
+    let mut check = ClockCheck::new(1);
+    assert_eq!([check.check(7), check.check(7), check.check(7)], [Ok(7), Ok(7), Err(ClockError::Stopped)]);
+    assert_eq!([check.check(8), check.check(7)], [Ok(8), Err(ClockError::Backwards { by_ns: 1 })]);
+    assert_eq!([check.check(7), check.check(7)], [Ok(7), Err(ClockError::Stopped)]);
 }
 
 proptest! {

@@ -1,5 +1,4 @@
 //! The runner refuses what it cannot run, instead of passing over it.
-#![allow(missing_docs, clippy::unwrap_used)]
 
 use std::fs;
 use std::path::Path;

@@ -1,5 +1,4 @@
 //! Every row of every vector file of the project passes.
-#![allow(missing_docs)]
 
 use std::path::Path;
 

@@ -16,13 +16,13 @@ fn damaged() -> Vec<u8> {
 
 fn evidence() -> Evidence {
     let bytes = sound();
-    Evidence::of(DeviceFrameView::parse(3, &bytes).unwrap(), Positions::taken_before_ns(0), 1_000_000)
+    Evidence::of(DeviceFrameView::parse(3, &bytes).unwrap(), Positions::taken_before_ns(0), 5_000_000_000)
 }
 
 decode! { sorte_proto::DeviceFrameView(usize, &[u8]); with (3); sound &sound(); damaged &damaged() => "bad_crc8" }
 encode! { sorte_proto::DelayReq = DelayReq::of_master(sorte_proto::Place::Last) }
 code! { sorte_proto::FrameType: 5; unknown 11 }
-feedback! { sorte_proto: evidence(), sampled at 1_000_000; "`master.hear(frame, sof_ns)?.evidence(Positions)`" }
+feedback! { sorte_proto: evidence(), sampled at 5_000_000_000; "`master.hear(frame, sof_ns)?.evidence(Positions)`" }
 inspect! { sorte_proto::inspect(during = During::Exchange; bytes); damaged damaged().leak() => "bad_crc8" }
 log! { sorte_proto: DelayReq, DeviceFrame<3>, sorte_proto::FrameType, sorte_proto::master::State }
 counters! { sorte_proto }

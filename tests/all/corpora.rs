@@ -1,5 +1,4 @@
 //! The fuzz targets hold on every input of their corpora, so that a machine without a fuzzer checks them too.
-#![allow(missing_docs, clippy::std_instead_of_core)]
 
 use std::fs;
 use std::path::Path;

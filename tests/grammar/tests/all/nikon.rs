@@ -38,12 +38,12 @@ fn window(words: [u16; 4]) -> Window {
 }
 
 fn evidence() -> Evidence {
-    Evidence::of(Response::parse(&expected(), &raw(SOUND)).unwrap(), resolution(), 1_000_000)
+    Evidence::of(Response::parse(&expected(), &raw(SOUND)).unwrap(), resolution(), 5_000_000_000)
 }
 
 #[test]
 fn the_words_are_what_they_are_said_to_be() {
-    let sample = evidence().at(1_000_000, nikon_aformat::Policy::new(0)).unwrap();
+    let sample = evidence().at(5_000_000_000, nikon_aformat::Policy::new(0)).unwrap();
     assert_eq!((sample.single_turn(), sample.turns()), (4711, Some(5)));
     assert_eq!(Response::parse(&expected(), &raw(SOUND)).unwrap().es(), Some(EncoderStatus::empty()));
     assert_eq!(request().command(), Command::Abs40);
@@ -57,7 +57,7 @@ exchange! {
     heard &heard(); "&[Option<u16>]", at 60_000
 }
 procedure! { nikon_aformat::Reset = Reset::clear_status(EA); lost Error::NoResponse }
-feedback! { nikon_aformat: evidence(), sampled at 1_000_000; "`exchange.evidence(resolution)`" }
+feedback! { nikon_aformat: evidence(), sampled at 5_000_000_000; "`exchange.evidence(resolution)`" }
 device! {
     nikon_aformat::"Device::<BANKS>::new(ea, resolution, rate)" = Device::<1>::new(EA, resolution(), BitRate::Mbit4);
     with Behaviour::new().with_response_delay_ns(4_000);

@@ -26,20 +26,22 @@ fn encoder() -> Device {
     Device::new(EncoderId::try_from(0x00153).unwrap())
 }
 
-/// Of a link that has run for 300 H-frames; the last one ended at 3.45 ms.
+/// Of a link that has run for 300 H-frames; the last one ended 3.45 ms after its start.
 fn evidence() -> Evidence {
     let (mut master, mut encoder) = (Master::new(Dialect::SICK), encoder());
     for frame in 0..300 {
         let sent = master.transmission();
         let heard = encoder.set_position(12 * frame).hear(sent.head.bits());
         let bits = heard.map_or(u64::MAX, |sent| sent.bits);
-        let _ = master.hear_bits(bits, None, 11_520 * frame + 10_560);
+        let _ = master.hear_bits(bits, None, STARTED_NS + 11_520 * frame + 10_560);
     }
     assert_eq!(master.state(), State::Running);
     master.fast()
 }
 
-const SAMPLED_NS: u64 = 11_520 * 299 + 853;
+/// An instant that needs more than 32 bits.
+const STARTED_NS: u64 = 5_000_000_000;
+const SAMPLED_NS: u64 = STARTED_NS + 11_520 * 299 + 853;
 
 /// RESET and the SYNC frames that an encoder wants before it answers.
 fn awake() -> (Device, Window) {

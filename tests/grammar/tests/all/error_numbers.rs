@@ -6,7 +6,7 @@ use std::collections::BTreeSet;
 
 use servowire_core::Class;
 
-const RECORDED: &str = include_str!("../error-numbers.txt");
+const RECORDED: &str = include_str!("../../error-numbers.txt");
 
 fn lines<C: Class>(name: &str) -> impl Iterator<Item = String> {
     C::ALL.iter().map(move |class| format!("{name} {} {}", class.number(), class.name()))
