@@ -29,7 +29,7 @@ use sorte_proto::sync0::Variant;
 use step_motion::{Limits, PtoMover};
 use step_profile::{Frequency, Motors, Parameters, Profile, Speed};
 
-use crate::capture::time;
+use servowire_decode::time;
 use crate::gcode::{AXES, Part};
 
 use axis::Build;

@@ -9,8 +9,8 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 use step_motion::Limits;
 
-use crate::fault::{At, Fault};
 pub(crate) use lines::Line;
+use servowire_decode::fault::{At, Fault};
 pub(crate) use steps::Steps;
 
 /// Axes of a part program: X, Y and Z.

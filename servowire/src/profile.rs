@@ -20,8 +20,8 @@ use ramp::Record;
 use step_motion::Limits;
 use step_profile::{Arithmetic, Frequency, Parameters, Profile, Speed, Tone};
 
-use crate::capture::time;
 use crate::gcode::Part;
+use servowire_decode::time;
 
 /// Times of the steps of a move on a 4 us cycle.
 ///

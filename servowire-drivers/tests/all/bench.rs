@@ -8,7 +8,7 @@ use std::rc::Rc;
 
 use embedded_hal::digital::{ErrorType as PinErrorType, OutputPin};
 use embedded_io::{ErrorKind, ErrorType, Read, ReadReady, Write};
-use servowire_drivers::{Clock, ClockError};
+use servowire_drivers::{Clock, ClockError, Worst};
 use servowire_world::{
     Delivery, Event, Framing, Host, Id, Kind, Message, Scenario, Tally, Transmission, Truth, Wire, World,
 };
@@ -21,6 +21,8 @@ use crate::hostile::{Calls, rates};
 const WIRE: Wire = Wire { bit_ps: 400_000, framing: Framing::StartStop { width: 8 }, devices: 1 };
 /// A look at the clock.
 const LOOK_NS: u64 = 100;
+/// This UART sends at once, and a wait is over within a look. Its clock is exact.
+pub const WORST: Worst = Worst { uart_start_ns: 0, wake_ns: LOOK_NS as u32, clock_ns: 1 };
 
 /// What a UART does with a byte whose stop bit is wrong: the three ways of the HALs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -45,3 +45,5 @@ mod spi;
 mod tformat_asynch;
 #[cfg(feature = "tformat")]
 mod tformat_blocking;
+#[cfg(feature = "tformat")]
+mod whole;

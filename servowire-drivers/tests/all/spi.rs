@@ -6,10 +6,10 @@ use crate::{bench, frames};
 use nikon_aformat::{EncoderAddress, Resolution};
 use servowire_drivers::samples::Order;
 use servowire_drivers::spi::{Sampling, SpiFrames, SpiUart};
-use servowire_drivers::{Automatic, DriverEnable, Error, nikon, tformat};
+use servowire_drivers::{Automatic, DirectionPin, Error, nikon, tformat};
 use servowire_world::{Delivery, Fault, Planned, Scenario, Script, Verdict};
 
-type Uart<'b> = SpiUart<'b, Spi<bench::Shared>, DriverEnable<bench::Pin>>;
+type Uart<'b> = SpiUart<'b, Spi<bench::Shared>, DirectionPin<bench::Pin>>;
 
 fn uart<'b>(bench: &bench::Shared, msb_first: bool, per_bit: u8, buffers: &'b mut ([u8; 48], [u8; 160])) -> Uart<'b> {
     let order = if msb_first { Order::MsbFirst8 } else { Order::LsbFirst8 };
@@ -17,7 +17,13 @@ fn uart<'b>(bench: &bench::Shared, msb_first: bool, per_bit: u8, buffers: &'b mu
     bench.borrow_mut().sampled = true;
     let spi = Spi { line: bench.clone(), msb_first, per_bit: per_bit.into() };
     let window = sampling.bytes(12_000 + 44_000);
-    SpiUart::new(spi, DriverEnable(bench::Pin(bench.clone())), sampling, &mut buffers.0, &mut buffers.1[..window])
+    SpiUart::new(
+        spi,
+        DirectionPin::new(bench::Pin(bench.clone()), bench::WORST),
+        sampling,
+        &mut buffers.0,
+        &mut buffers.1[..window],
+    )
 }
 
 fn tformat_line() -> ::tformat::master::Line {
@@ -30,7 +36,8 @@ fn tformat_at_an_spi() {
         let bench = bench::Bench::new(Scenario::quiet(), bench::Misframed::Dropped);
         let mut buffers = ([0; 48], [0; 160]);
         let port = uart(&bench, msb_first, per_bit, &mut buffers);
-        let mut encoder = tformat::blocking::Driver::new(port, Automatic, bench::Watch(bench.clone()), tformat_line());
+        let mut encoder =
+            tformat::blocking::Driver::new(port, Automatic, bench::Watch(bench.clone()), tformat_line()).unwrap();
         for _ in 0..5 {
             let all = encoder.read_data().unwrap();
             let bench = bench.borrow();
@@ -40,8 +47,8 @@ fn tformat_at_an_spi() {
             assert!((sent.end_ns..sent.end_ns + 3_000).contains(&bench.off_at_ns), "before the encoder answers");
         }
         let address = ::tformat::Address::new(5).unwrap();
-        assert_eq!(encoder.write_eeprom(None, address, 0x5a), Ok(0x5a), "{msb_first} {per_bit}");
-        assert_eq!(encoder.read_eeprom(None, address), Ok(0x5a));
+        assert_eq!(encoder.write_eeprom(::tformat::Page::truncate(0), address, 0x5a), Ok(0x5a), "{msb_first} {per_bit}");
+        assert_eq!(encoder.read_eeprom(::tformat::Page::truncate(0), address), Ok(0x5a));
         assert_eq!(bench.borrow().truth().clashes(), 0);
     }
 }
@@ -52,9 +59,10 @@ fn a_request_that_does_not_fit_is_refused() {
     let mut buffers = ([0; 8], [0; 160]);
     let sampling = Sampling::new(Order::MsbFirst8, 8, 8, 2_500_000).unwrap();
     let spi = Spi { line: bench.clone(), msb_first: true, per_bit: 8 };
-    let pin = DriverEnable(bench::Pin(bench.clone()));
+    let pin = DirectionPin::new(bench::Pin(bench.clone()), bench::WORST);
     let port = SpiUart::new(spi, pin, sampling, &mut buffers.0, &mut buffers.1);
-    let mut encoder = tformat::blocking::Driver::new(port, Automatic, bench::Watch(bench.clone()), tformat_line());
+    let mut encoder =
+        tformat::blocking::Driver::new(port, Automatic, bench::Watch(bench.clone()), tformat_line()).unwrap();
     assert!(matches!(encoder.read_data(), Err(Error::Io(_))));
     assert!(bench.borrow().request.is_none());
 }
@@ -80,7 +88,7 @@ fn any_fault_is_over_with_the_next_call() {
             let mut buffers = ([0; 48], [0; 160]);
             let port = uart(&bench, true, 8, &mut buffers);
             let mut encoder =
-                tformat::blocking::Driver::new(port, Automatic, bench::Watch(bench.clone()), tformat_line());
+                tformat::blocking::Driver::new(port, Automatic, bench::Watch(bench.clone()), tformat_line()).unwrap();
             let first = encoder.read_data();
             let second = encoder.read_data();
             assert!(second.is_ok(), "{fault:?} in unit {unit} of {transmission}: {first:?}, {second:?}");
@@ -95,7 +103,8 @@ fn hostile_events_are_survived() {
         let bench = bench::Bench::new(bench::sampled_scenario(seed), bench::Misframed::Dropped);
         let mut buffers = ([0; 48], [0; 160]);
         let port = uart(&bench, seed % 2 == 0, 8, &mut buffers);
-        let mut encoder = tformat::blocking::Driver::new(port, Automatic, bench::Watch(bench.clone()), tformat_line());
+        let mut encoder =
+            tformat::blocking::Driver::new(port, Automatic, bench::Watch(bench.clone()), tformat_line()).unwrap();
         for call in 0..100 {
             let result = encoder.read_data().map(|all| all.abs.get());
             bench.borrow_mut().judge(calls, Some(result), seed, call);
@@ -183,7 +192,7 @@ mod asynch {
 
     fn encoder<'b>(bench: &bench::Shared, buffers: &'b mut ([u8; 48], [u8; 160])) -> Driver<'b> {
         let timer = Looks(bench::Watch(bench.clone()));
-        tformat::asynch::Driver::new(uart(bench, true, 8, buffers), Automatic, timer, tformat_line())
+        tformat::asynch::Driver::new(uart(bench, true, 8, buffers), Automatic, timer, tformat_line()).unwrap()
     }
 
     fn master<'b>(bench: &frames::Shared, buffers: &'b mut ([u8; 96], [u8; 400])) -> Master<'b> {
@@ -271,7 +280,7 @@ fn both_as_futures() {
     let mut buffers = ([0; 48], [0; 160]);
     let port = uart(&bench, true, 8, &mut buffers);
     let timer = Looks(bench::Watch(bench.clone()));
-    let mut encoder = tformat::asynch::Driver::new(port, Automatic, timer, tformat_line());
+    let mut encoder = tformat::asynch::Driver::new(port, Automatic, timer, tformat_line()).unwrap();
     assert!(run(encoder.read_data(), FOR_EVER).unwrap().is_ok());
     assert!(run(encoder.read_data(), FOR_EVER).unwrap().is_err());
     assert!(run(encoder.read_data(), FOR_EVER).unwrap().is_ok());

@@ -3,17 +3,17 @@
 use std::future::poll_fn;
 use std::task::Poll;
 
-use crate::bench::{Bench, Misframed, Pin, Shared, Uart, Watch, line, place, scenario};
+use crate::bench::{Bench, Misframed, Pin, Shared, Uart, WORST, Watch, line, place, scenario};
 use crate::hostile::live_through;
 use crate::late::{Late, World};
 use crate::polls::{FOR_EVER, Looks, forget, pause, run};
 use crate::refusals::tformat::{rows, widths};
 use embedded_io::{ErrorKind, ErrorType};
 use servowire_drivers::tformat::{asynch, blocking};
-use servowire_drivers::{DriverEnable, Error};
+use servowire_drivers::{DirectionPin, Error};
 use servowire_world::{Scenario, Verdict};
 use tformat::master::{Line, Reset};
-use tformat::{Address, Almc, BitRate, Policy, Request};
+use tformat::{Address, Almc, BitRate, Page, Policy, Request};
 
 /// The UART as futures that can be dropped.
 struct AsyncUart(Uart);
@@ -42,15 +42,15 @@ impl embedded_io_async::Write for AsyncUart {
 }
 
 /// Time goes on with every look, and every look may be the last.
-type Driver = asynch::Driver<AsyncUart, DriverEnable<Pin>, Looks<Watch>>;
+type Driver = asynch::Driver<AsyncUart, DirectionPin<Pin>, Looks<Watch>>;
 
 fn driver(bench: &Shared) -> Driver {
     driver_at(bench, Line::new(BitRate::Mbit2_5))
 }
 
 fn driver_at(bench: &Shared, line: Line) -> Driver {
-    let pin = DriverEnable(Pin(bench.clone()));
-    Driver::new(AsyncUart(Uart(bench.clone())), pin, Looks(Watch(bench.clone())), line)
+    let pin = DirectionPin::new(Pin(bench.clone()), WORST);
+    Driver::new(AsyncUart(Uart(bench.clone())), pin, Looks(Watch(bench.clone())), line).unwrap()
 }
 
 /// Dropped after each number of polls: the driver is off at once, and the next call is good.
@@ -112,7 +112,7 @@ fn procedures_run_over_it() {
     let bench = Bench::new(Scenario::quiet(), Misframed::Dropped);
     let mut encoder = driver(&bench);
     let address = Address::new(5).unwrap();
-    assert_eq!(run(encoder.write_eeprom(None, address, 0x5a), FOR_EVER), Some(Ok(0x5a)));
+    assert_eq!(run(encoder.write_eeprom(Page::truncate(0), address, 0x5a), FOR_EVER), Some(Ok(0x5a)));
     assert_eq!(bench.borrow_mut().encoder().eeprom_mut()[0][5], 0x5a);
     bench.borrow_mut().encoder().raise_alarms(Almc::BE);
     bench.borrow_mut().encoder().end_alarms(Almc::BE);
@@ -127,9 +127,9 @@ fn both_drivers_agree() {
     for seed in 0..20 {
         let bench = |seed| Bench::new(scenario(seed), Misframed::Delivered);
         let (one, other) = (bench(seed), bench(seed));
-        let pin = DriverEnable(Pin(one.clone()));
+        let pin = DirectionPin::new(Pin(one.clone()), WORST);
         let mut spinning =
-            blocking::Driver::new(Uart(one.clone()), pin, Watch(one.clone()), Line::new(BitRate::Mbit2_5));
+            blocking::Driver::new(Uart(one.clone()), pin, Watch(one.clone()), Line::new(BitRate::Mbit2_5)).unwrap();
         let mut waiting = driver(&other);
         let calls = (0..30).filter(|_| {
             let [one, other] = [spinning.read_data().is_ok(), run(waiting.read_data(), FOR_EVER).unwrap().is_ok()];
@@ -193,7 +193,8 @@ fn what_was_held_up_is_not_talked_into() {
             *late.0.borrow_mut() = World { held_up, refuses, pieces: 2, ..World::default() };
             let line = Line::new(BitRate::Mbit2_5);
             let mut encoder =
-                asynch::Driver::new(Sharing(late.clone()), servowire_drivers::Automatic, Looks(late.clone()), line);
+                asynch::Driver::new(Sharing(late.clone()), servowire_drivers::Automatic, Looks(late.clone()), line)
+                    .unwrap();
             for (call, polls) in [(1, polls), (2, FOR_EVER)] {
                 late.0.borrow_mut().call = call;
                 let outcome = run(encoder.transact(Request::read_eeprom(Address::new(5).unwrap())), polls);

@@ -1,21 +1,21 @@
 //! The blocking driver on the hostile line.
 
-use crate::bench::{Bench, Misframed, Pin, Shared, Uart, Watch, line, place, scenario};
+use crate::bench::{Bench, Misframed, Pin, Shared, Uart, WORST, Watch, line, place, scenario};
 use crate::hostile::live_through;
 use crate::late::{Late, World};
 use crate::refusals::tformat::{STRICT, rows, widths};
 use servowire_drivers::tformat::blocking::Driver;
-use servowire_drivers::{DriverEnable, Error};
+use servowire_drivers::{DirectionPin, Error};
 use servowire_world::{Fault, Planned, Scenario, Script, Verdict};
 use tformat::master::{Detection, Line};
-use tformat::{Address, Almc, BitRate, Doubt, Policy, Request, Resolution, Sample, Tolerated};
+use tformat::{Address, Almc, BitRate, Doubt, Page, Policy, Request, Resolution, Sample, Tolerated};
 
-fn driver(bench: &Shared) -> Driver<Uart, DriverEnable<Pin>, Watch> {
+fn driver(bench: &Shared) -> Driver<Uart, DirectionPin<Pin>, Watch> {
     driver_at(bench, Line::new(BitRate::Mbit2_5))
 }
 
-fn driver_at(bench: &Shared, line: Line) -> Driver<Uart, DriverEnable<Pin>, Watch> {
-    Driver::new(Uart(bench.clone()), DriverEnable(Pin(bench.clone())), Watch(bench.clone()), line)
+fn driver_at(bench: &Shared, line: Line) -> Driver<Uart, DirectionPin<Pin>, Watch> {
+    Driver::new(Uart(bench.clone()), DirectionPin::new(Pin(bench.clone()), WORST), Watch(bench.clone()), line).unwrap()
 }
 
 fn planned(faults: &[(u16, u8, Fault)]) -> Scenario {
@@ -83,10 +83,10 @@ fn procedures_run_over_it() {
     let mut encoder = driver(&bench);
     encoder.clear_errors().unwrap();
     let address = Address::new(5).unwrap();
-    assert_eq!(encoder.write_eeprom(None, address, 0x5a), Ok(0x5a));
-    assert_eq!(encoder.read_eeprom(None, address), Ok(0x5a));
+    assert_eq!(encoder.write_eeprom(Page::truncate(0), address, 0x5a), Ok(0x5a));
+    assert_eq!(encoder.read_eeprom(Page::truncate(0), address), Ok(0x5a));
     bench.borrow_mut().encoder().eeprom_mut()[0][5] = 7;
-    assert_eq!(encoder.read_eeprom(None, address), Ok(7));
+    assert_eq!(encoder.read_eeprom(Page::truncate(0), address), Ok(7));
     let found = encoder.run(&mut Detection::new()).unwrap();
     assert_eq!((found.enid, found.abm.get()), (0x17, 3));
 }
@@ -173,7 +173,7 @@ fn a_fault_after_a_preemption_does_not_send_the_next_request_into_the_answer() {
             *late.0.borrow_mut() =
                 World { stalls_in: Some(stalls_in), held_up, refuses, pieces: 2, ..World::default() };
             let line = Line::new(BitRate::Mbit2_5);
-            let mut encoder = Driver::new(late.clone(), servowire_drivers::Automatic, late.clone(), line);
+            let mut encoder = Driver::new(late.clone(), servowire_drivers::Automatic, late.clone(), line).unwrap();
             for call in 1..=2 {
                 late.0.borrow_mut().call = call;
                 assert!(encoder.transact(Request::read_eeprom(Address::new(5).unwrap())).is_err());

@@ -4,7 +4,7 @@ use gcode::{Block, Code, Value};
 use step_motion::{Arc, Turning};
 
 use super::AXES;
-use crate::fault::{At, Fault};
+use servowire_decode::fault::{At, Fault};
 
 /// A straight line of a part program.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -113,7 +113,7 @@ fn what_has_ended_sends_nothing_more() {
     }
 
     let address = Address::new(5).unwrap();
-    let mut access = EepromAccess::write(Page::new(2), address, 0x5a, POLLING);
+    let mut access = EepromAccess::write(Page::truncate(2), address, 0x5a, POLLING);
     let _ = access.start(0);
     let mut end = access.receive(LOST, 0);
     while let Step::Send { .. } = end {
@@ -139,9 +139,9 @@ fn after_a_missing_response_the_page_is_looked_at_again() {
         for write_it in [false, true] {
             let (mut cells, mut page, mut sent) = ([0x11, 0x22, 0x33], 0_usize, 0);
             let mut access = if write_it {
-                EepromAccess::write(Page::new(2), address, 0x5a, POLLING)
+                EepromAccess::write(Page::truncate(2), address, 0x5a, POLLING)
             } else {
-                EepromAccess::read(Page::new(2), address, POLLING)
+                EepromAccess::read(Page::truncate(2), address, POLLING)
             };
             let mut step = access.start(0);
             let mut order = Vec::new();

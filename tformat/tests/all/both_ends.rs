@@ -85,13 +85,13 @@ fn the_whole_eeprom_is_written_and_read_back() {
     for index in (0..762).step_by(31) {
         let (page, address) = Page::locate(index, 6).unwrap();
         let data = (index % 251) as u8;
-        let (value, end) = run(EepromAccess::write(Some(page), address, data, EEPROM_POLLING), &mut device, now_ns);
+        let (value, end) = run(EepromAccess::write(page, address, data, EEPROM_POLLING), &mut device, now_ns);
         assert_eq!(value, Ok(data));
         now_ns = end;
     }
     for index in (0..762).step_by(31) {
         let (page, address) = Page::locate(index, 6).unwrap();
-        let (value, end) = run(EepromAccess::read(Some(page), address, EEPROM_POLLING), &mut device, now_ns);
+        let (value, end) = run(EepromAccess::read(page, address, EEPROM_POLLING), &mut device, now_ns);
         assert_eq!(value, Ok((index % 251) as u8));
         now_ns = end;
     }

@@ -239,7 +239,7 @@ fn hostile_eeprom_writes() {
             let at_ns = bench.ready_ns;
             let _ = bench.exchange(Request::write_eeprom(Address::truncate(126 - cell as u8), 0xff), at_ns);
         }
-        let access = EepromAccess::write(Page::new(page as u8), address, data, EEPROM_POLLING);
+        let access = EepromAccess::write(Page::truncate(page as u8), address, data, EEPROM_POLLING);
         let end = bench.run(&mut Watched { access, written: Vec::new(), seed });
         if bench.forged_requests > 0 {
             return bench;
