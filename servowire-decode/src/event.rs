@@ -5,6 +5,8 @@ use std::fmt::{Display, Write as _};
 
 use bitflags::Flags;
 
+use crate::time::Time;
+
 /// A frame, or the absence of one that was due.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Event {
@@ -60,13 +62,13 @@ impl Event {
         kind: &'static str,
         what: &str,
         timeout: i64,
-        (now, asked): (i64, bool),
+        (now, asked): (Time, bool),
         cause: &str,
     ) -> Self {
         let (place, reason) = match place {
             Place::Time { end: start, .. } => {
-                let end = start.saturating_add(timeout).min(now);
-                let within = end.saturating_sub(start) as f64 / 1e6;
+                let end = (start + timeout).min(now);
+                let within = (end - start) as f64 / 1e6;
                 (Place::Time { start, end }, format!("no {what} within {within:.1} us"))
             }
             Place::Line(_) if asked => (place, format!("no {what} before the next request")),
@@ -83,9 +85,9 @@ pub enum Place {
     /// In picoseconds of the capture's time.
     Time {
         /// The first edge.
-        start: i64,
+        start: Time,
         /// The end of the last bit.
-        end: i64,
+        end: Time,
     },
     /// A line of a log without times.
     Line(u64),
@@ -237,7 +239,7 @@ pub struct Refusal {
     /// The bit of that field, in the order of the line.
     pub bit: Option<u32>,
     /// When that was, in picoseconds.
-    pub time: Option<i64>,
+    pub time: Option<Time>,
     /// What probably caused it.
     pub cause: Option<String>,
 }

@@ -25,6 +25,7 @@ use crate::fault::{At, Fault, Stop};
 use crate::output::Output;
 use crate::protocols::meant;
 use crate::settings::{Options, Settings};
+use crate::time::Time;
 
 /// Decodes a recording of lines that is pushed in piece by piece: edges in, events out.
 pub struct PushDecoder {
@@ -63,7 +64,7 @@ impl PushDecoder {
 
     /// Nothing else has changed until `time`. To be called after each piece: what was held back to see what it is, is
     /// judged here.
-    pub fn reach(&mut self, time: i64, out: &mut Output<'_>) -> io::Result<()> {
+    pub fn reach(&mut self, time: Time, out: &mut Output<'_>) -> io::Result<()> {
         if self.watch.is_due() {
             self.watch.survey(false, out)?;
         }
@@ -71,19 +72,19 @@ impl PushDecoder {
     }
 
     /// Nothing comes for a while: what is certain so far is decoded and shown.
-    pub fn pause(&mut self, time: i64, out: &mut Output<'_>) -> io::Result<()> {
+    pub fn pause(&mut self, time: Time, out: &mut Output<'_>) -> io::Result<()> {
         self.watch.early(out)?;
         self.watch.reach(time, out)?;
         out.flush()
     }
 
     /// The recording ends at `time`. Lines of which nothing was found, or that were upside down, are a fault.
-    pub fn finish(mut self, time: i64, out: &mut Output<'_>) -> Result<(), Stop> {
+    pub fn finish(mut self, time: Time, out: &mut Output<'_>) -> Result<(), Stop> {
         self.end(time, out)?;
         self.judge(out).map_err(Stop::Fault)
     }
 
-    fn end(&mut self, time: i64, out: &mut Output<'_>) -> io::Result<()> {
+    fn end(&mut self, time: Time, out: &mut Output<'_>) -> io::Result<()> {
         self.watch.survey(true, out)?;
         self.watch.finish(time, out)
     }

@@ -250,7 +250,7 @@ fn frames_for_a_pulse() {
 fn what_is_shown() {
     let mut desk = Desk::new(Dialect::SICK, 0x7_0153);
     assert_eq!([0x0d, 0x0e, 0x0f].map(|address| desk.byte(address)), [0x77, 0x01, 0x53]);
-    assert_eq!((desk.map.vpos(), desk.map.pos()), (0x8765_4321, 0x8765_4321));
+    assert_eq!((desk.map.vpos(), desk.map.pos()), (0x8765_4321, Some(0x8765_4321)));
     assert_eq!(desk.map.vpos2(), 0xff_789a_bcde);
     desk.device.resources_mut().set_register(RemoteRegister::ENC_ST0, 1);
     desk.v_frame();

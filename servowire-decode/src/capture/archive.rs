@@ -14,7 +14,7 @@ use super::kinds::Capture;
 use super::raw::{Raw, Unit};
 use super::recording::{Change, Line};
 use crate::fault::{At, Fault};
-use crate::time::{self, Clock};
+use crate::time::{self, Clock, Time};
 
 /// Longer lists of keys are none.
 const MOST_KEYS: u64 = 1 << 20;
@@ -350,7 +350,7 @@ impl Line for Dsview {
         Ok(true)
     }
 
-    fn reached(&self) -> i64 {
+    fn reached(&self) -> Time {
         self.clock.time(self.reached)
     }
 }

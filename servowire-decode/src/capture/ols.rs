@@ -5,7 +5,7 @@ use std::io::{BufRead, Read};
 use super::input::Input;
 use super::recording::{Change, Line};
 use crate::fault::{At, Fault};
-use crate::time::{self, Clock};
+use crate::time::{self, Clock, Time};
 
 /// Changes given at once.
 const BLOCK: usize = 4096;
@@ -120,7 +120,7 @@ impl Line for Ols {
         Ok(true)
     }
 
-    fn reached(&self) -> i64 {
+    fn reached(&self) -> Time {
         self.clock.time(self.sample)
     }
 }

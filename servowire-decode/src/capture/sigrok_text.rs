@@ -5,7 +5,7 @@ use std::io::{BufRead, Read};
 use super::input::Input;
 use super::recording::{Change, Line};
 use crate::fault::{At, Fault};
-use crate::time::{self, Clock};
+use crate::time::{self, Clock, Time};
 
 /// Longer lines are none of this format.
 const LONGEST: usize = 1 << 20;
@@ -175,7 +175,7 @@ impl Line for SigrokText {
         Ok(more)
     }
 
-    fn reached(&self) -> i64 {
+    fn reached(&self) -> Time {
         self.clock.time(self.samples.iter().copied().min().unwrap_or(0))
     }
 }
@@ -192,9 +192,9 @@ mod tests {
         let mut changes = Vec::new();
         while file.read(&mut changes).unwrap() {}
         let of = |channel| changes.iter().filter(move |change| change.channel == channel);
-        let said = |channel| of(channel).map(|change| (change.time / 1_000_000, change.level)).collect::<Vec<_>>();
+        let said = |channel| of(channel).map(|change| (change.time.ps() / 1_000_000, change.level)).collect::<Vec<_>>();
         assert_eq!(said(0), [(0, true), (1, false), (3, true)]);
         assert_eq!(said(1), [(0, true), (2, false), (5, true)]);
-        assert_eq!(file.reached(), 6_000_000);
+        assert_eq!(file.reached().ps(), 6_000_000);
     }
 }

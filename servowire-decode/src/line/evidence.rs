@@ -5,6 +5,7 @@ use std::io;
 
 use crate::event::{Direction, Event, Place, Value, Verdict};
 use crate::sink::{Sink, Tally};
+use crate::time::Time;
 
 /// Bits of proof in the sound frames of a protocol: what of a frame is fixed or checked.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
@@ -43,9 +44,9 @@ pub(super) struct Evidence {
     /// All frames by their verdict.
     pub(super) tally: Tally,
     /// Where sound frames begin, in picoseconds, and what they hold.
-    pub(super) starts: Vec<(i64, u64)>,
+    pub(super) starts: Vec<(Time, u64)>,
     /// Up to when the line was heard.
-    pub(super) until: i64,
+    pub(super) until: Time,
 }
 
 impl Evidence {
@@ -59,7 +60,7 @@ impl Evidence {
             silences: 0,
             tally: Tally::default(),
             starts: Vec::new(),
-            until: i64::MAX,
+            until: Time::MAX,
         }
     }
 
@@ -69,10 +70,10 @@ impl Evidence {
 
     /// Whether most of what sounds here sounds there too, within `near` picoseconds and as long as both were heard.
     pub(super) fn is_part_of(&self, other: &Self, near: i64) -> bool {
-        let heard = |(start, content): &&(i64, u64)| {
-            let at = other.starts.partition_point(|(there, _)| *there < start - near);
+        let heard = |(start, content): &&(Time, u64)| {
+            let at = other.starts.partition_point(|(there, _)| *there < *start - near);
             let there = other.starts.get(at..).unwrap_or_default();
-            there.iter().take_while(|(there, _)| *there <= start + near).any(|(_, same)| same == content)
+            there.iter().take_while(|(there, _)| *there <= *start + near).any(|(_, same)| same == content)
         };
         let own = self.starts.partition_point(|(start, _)| *start <= other.until);
         let both = self.starts.iter().take(own).filter(heard).count();

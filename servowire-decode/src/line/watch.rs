@@ -11,6 +11,7 @@ use crate::output::Output;
 use crate::output::printer::Lane;
 use crate::recognition::Note;
 use crate::settings::{Options, Settings};
+use crate::time::Time;
 
 /// Changes looked at before decoding begins.
 const PREVIEW: usize = 1 << 16;
@@ -31,7 +32,7 @@ const PATIENCE: u64 = 8;
 #[derive(Debug, Clone)]
 enum State {
     /// Not judged yet.
-    Open(Vec<(i64, bool)>),
+    Open(Vec<(Time, bool)>),
     /// Part of a line that is decoded.
     Taken(usize),
     /// Nothing, or more of what is decoded already; looked at again after so many edges, if at all.
@@ -64,7 +65,7 @@ pub(super) struct Watch {
     /// The user named the channels, and everything else is of no interest.
     named: bool,
     /// For messages when nothing was found: the busiest channel's first edges.
-    busiest: Option<(u16, Vec<(i64, bool)>)>,
+    busiest: Option<(u16, Vec<(Time, bool)>)>,
     /// Edges by channel.
     moves: Vec<u64>,
 }
@@ -172,7 +173,7 @@ impl Watch {
     }
 
     /// Nothing has changed until `time`.
-    pub(super) fn reach(&mut self, time: i64, out: &mut Output<'_>) -> io::Result<()> {
+    pub(super) fn reach(&mut self, time: Time, out: &mut Output<'_>) -> io::Result<()> {
         for (line, running) in self.lines.iter_mut().enumerate() {
             out.lane(line);
             running.decoder.reach(time, out)?;
@@ -194,7 +195,7 @@ impl Watch {
     }
 
     /// The capture ends.
-    pub(super) fn finish(&mut self, time: i64, out: &mut Output<'_>) -> io::Result<()> {
+    pub(super) fn finish(&mut self, time: Time, out: &mut Output<'_>) -> io::Result<()> {
         for (line, running) in self.lines.iter_mut().enumerate() {
             out.lane(line);
             running.decoder.finish(time, out)?;

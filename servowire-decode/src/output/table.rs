@@ -75,7 +75,7 @@ impl<W: Write> Csv<W> {
         out.write_field(lane.map_or("", |lane| lane.protocol.title()))?;
         match event.place {
             Place::Line(line) => [line.to_string(), String::new(), String::new()],
-            Place::Time { start, end } => [String::new(), microseconds(start), microseconds(end)],
+            Place::Time { start, end } => [String::new(), microseconds(start.ps()), microseconds(end.ps())],
         }
         .iter()
         .try_for_each(|field| out.write_field(field))?;
@@ -88,7 +88,7 @@ impl<W: Write> Csv<W> {
         out.write_field(event.position.map_or_else(String::new, |position| position.counts.to_string()))?;
         let turns = event.position.and_then(|position| position.turns());
         out.write_field(turns.map_or_else(String::new, |turns| turns.to_string()))?;
-        out.write_field(event.delay.map_or_else(String::new, microseconds))?;
+        out.write_field(event.delay.map_or_else(String::new, |delay| microseconds(delay.into())))?;
         match &event.verdict {
             Verdict::Ok => ["ok", "", "", ""].iter().try_for_each(|field| out.write_field(field))?,
             Verdict::Refused(refusal) => {
@@ -112,7 +112,7 @@ impl<W: Write> Csv<W> {
 }
 
 /// Picoseconds as microseconds, exactly.
-fn microseconds(time: i64) -> String {
+fn microseconds(time: i128) -> String {
     let sign = if time < 0 { "-" } else { "" };
     let time = time.unsigned_abs();
     format!("{sign}{}.{:06}", time / 1_000_000, time % 1_000_000)

@@ -4,6 +4,7 @@ use std::fmt::Display;
 
 use crate::event::{Event, Field, Place, Refusal};
 use crate::line::start_stop::LineField;
+use crate::time::Time;
 
 use super::plausible::{joined, two_masters};
 
@@ -16,9 +17,9 @@ pub(super) fn too_wide(error: impl Display, single_turn: u8, multi_turn: u8) -> 
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Group<T, const N: usize> {
     contents: [T; N],
-    starts: [i64; N],
+    starts: [Time; N],
     len: usize,
-    pub(super) end: i64,
+    pub(super) end: Time,
     /// The first field whose delimiter read 0.
     pub(super) broken: Option<u8>,
     spikes: u32,
@@ -30,8 +31,8 @@ pub(super) struct Group<T, const N: usize> {
 
 impl<T: Copy + Default, const N: usize> Default for Group<T, N> {
     fn default() -> Self {
-        let (contents, starts) = ([T::default(); N], [0; N]);
-        Self { contents, starts, len: 0, end: 0, broken: None, spikes: 0, raw: 0, line: None }
+        let (contents, starts) = ([T::default(); N], [Time::ZERO; N]);
+        Self { contents, starts, len: 0, end: Time::ZERO, broken: None, spikes: 0, raw: 0, line: None }
     }
 }
 
@@ -63,7 +64,7 @@ impl<T: Copy + Default, const N: usize> Group<T, N> {
     }
 
     /// When each field began.
-    pub(super) fn starts(&self) -> &[i64] {
+    pub(super) fn starts(&self) -> &[Time] {
         self.starts.get(..self.len).unwrap_or_default()
     }
 
@@ -76,7 +77,7 @@ impl<T: Copy + Default, const N: usize> Group<T, N> {
         self.len == 0
     }
 
-    pub(super) fn start(&self) -> i64 {
+    pub(super) fn start(&self) -> Time {
         self.starts().first().copied().unwrap_or_default()
     }
 
@@ -118,12 +119,12 @@ pub(super) fn silence(
     kind: &'static str,
     what: &str,
     timeout: i64,
-    now: i64,
+    now: Time,
     asked: bool,
     nobody: &str,
 ) -> Event {
     let after = match place {
-        Place::Time { end, .. } if asked => now.saturating_sub(end),
+        Place::Time { end, .. } if asked => now - end,
         _ => timeout,
     };
     let cause = if after < BRIEF {

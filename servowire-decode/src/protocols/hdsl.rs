@@ -5,8 +5,6 @@
 
 mod bits;
 mod decoder;
-mod disparity;
-mod head;
 mod refused;
 mod said;
 
@@ -25,6 +23,7 @@ use crate::line::lane::LineDecoder;
 use crate::line::receive::Rates;
 use crate::settings::Settings;
 use crate::sink::Sink;
+use crate::time::Time;
 
 /// The names of all fields.
 const FIELDS: &[&str] = &[
@@ -92,7 +91,7 @@ impl DslLine {
 }
 
 impl LineDecoder for DslLine {
-    fn change(&mut self, time: i64, level: bool, out: &mut dyn Sink) -> io::Result<()> {
+    fn change(&mut self, time: Time, level: bool, out: &mut dyn Sink) -> io::Result<()> {
         self.bits.change(time, level);
         if self.bits.end() > self.decoder.enough() { self.decoder.take(&mut self.bits, out) } else { Ok(()) }
     }
@@ -113,7 +112,7 @@ impl LineDecoder for DslLine {
         }
     }
 
-    fn reach(&mut self, time: i64, out: &mut dyn Sink) -> io::Result<()> {
+    fn reach(&mut self, time: Time, out: &mut dyn Sink) -> io::Result<()> {
         self.bits.reach(time);
         if self.decoder.is_running() { self.decoder.take(&mut self.bits, out) } else { Ok(()) }
     }
@@ -124,7 +123,7 @@ impl LineDecoder for DslLine {
         Ok(())
     }
 
-    fn finish(&mut self, time: i64, out: &mut dyn Sink) -> io::Result<()> {
+    fn finish(&mut self, time: Time, out: &mut dyn Sink) -> io::Result<()> {
         self.bits.finish(time, 2.0);
         self.decoder.finish(&mut self.bits, out)
     }

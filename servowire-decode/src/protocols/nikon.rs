@@ -25,6 +25,7 @@ use crate::line::start_stop::{LineField, StartStop};
 use crate::protocols::plausible::{CUT, CUT_BITS, LOST, SURELY_CUT_BITS, slipped_bit};
 use crate::settings::{Settings, Widths};
 use crate::sink::Sink;
+use crate::time::Time;
 use describe::Encoder;
 use frames::Frames;
 
@@ -99,7 +100,7 @@ struct Pending {
 
 impl Pending {
     /// When it ended; none in a log without times.
-    fn end(&self) -> Option<i64> {
+    fn end(&self) -> Option<Time> {
         match self.place {
             Place::Time { end, .. } => Some(end),
             Place::Line(_) => None,
@@ -113,9 +114,9 @@ pub struct Decoder {
     bit: i64,
     encoder: Encoder,
     /// Begin of the capture, until the first group has been seen.
-    begin: Option<i64>,
+    begin: Option<Time>,
     /// Until when the rest of a reply may come in which the capture began.
-    cut_until: Option<i64>,
+    cut_until: Option<Time>,
     open: Frames,
     pending: Option<Pending>,
 }
@@ -135,7 +136,7 @@ impl Decoder {
 
     /// Whether the open group is over before a frame that begins at `start`, and may be the first one of what it
     /// `begins`.
-    fn is_over(&self, start: i64, begins: Kind) -> bool {
+    fn is_over(&self, start: Time, begins: Kind) -> bool {
         let pause = start - self.open.end;
         // The frames of a reply follow each other: after anything else a new one begins.
         if begins == Kind::Response && self.open.kind() != Kind::Response && 2 * pause > 3 * self.bit {
@@ -198,7 +199,7 @@ impl Decoder {
         self.answer(group, asked, first.and_then(|pending| pending.end()))
     }
 
-    fn answer(&mut self, group: &Frames, asked: Option<Request>, asked_end: Option<i64>) -> Event {
+    fn answer(&mut self, group: &Frames, asked: Option<Request>, asked_end: Option<Time>) -> Event {
         let delay = asked_end.map(|end| group.start() - end);
         let expected = expected(group, asked);
         let result = match (group.broken, expected) {
@@ -217,7 +218,7 @@ impl Decoder {
     }
 
     /// No reply came until `now`; `asked`: when somebody asked again.
-    fn give_up(&mut self, now: i64, asked: bool, out: &mut dyn Sink) -> io::Result<()> {
+    fn give_up(&mut self, now: Time, asked: bool, out: &mut dyn Sink) -> io::Result<()> {
         match self.pending.take() {
             Some(pending) if pending.replies == 0 => {
                 let timeout = REPLY_TIMEOUT_BITS * self.bit;
@@ -293,7 +294,7 @@ fn expected(group: &Frames, asked: Option<Request>) -> Result<Expected, Error> {
 impl StartStop for Decoder {
     const CONTENT_BITS: u32 = 16;
 
-    fn begin(&mut self, start: i64) {
+    fn begin(&mut self, start: Time) {
         self.cut_until = None;
         self.begin = Some(start);
     }
@@ -310,7 +311,7 @@ impl StartStop for Decoder {
         if self.open.len() >= whole { self.close(out) } else { Ok(()) }
     }
 
-    fn finish(&mut self, end: i64, out: &mut dyn Sink) -> io::Result<()> {
+    fn finish(&mut self, end: Time, out: &mut dyn Sink) -> io::Result<()> {
         if !self.open.is_empty() {
             let recent = end - self.open.end <= PAUSE_BITS * self.bit;
             let short = match self.open.kind() {
@@ -347,7 +348,10 @@ impl LogDecoder for Decoder {
             let line = Some(burst.line);
             self.open.line = line;
             let content = word.reverse_bits();
-            self.field(&LineField { content, delimiter: true, start: 0, end: 0, spikes: 0, bits: 0 }, out)?;
+            self.field(
+                &LineField { content, delimiter: true, start: Time::ZERO, end: Time::ZERO, spikes: 0, bits: 0 },
+                out,
+            )?;
         }
         if self.open.is_empty() {
             self.open.line = None;
@@ -362,6 +366,6 @@ impl LogDecoder for Decoder {
     }
 
     fn end(&mut self, out: &mut dyn Sink) -> io::Result<()> {
-        self.give_up(0, false, out)
+        self.give_up(Time::ZERO, false, out)
     }
 }

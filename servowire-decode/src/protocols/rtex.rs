@@ -15,6 +15,7 @@ use crate::codec::{Codec, LogDecoder, Names};
 use crate::event::{Direction, Event, Field, Place, Position, Refusal, Value, Verdict};
 use crate::settings::{self, Settings};
 use crate::sink::Sink;
+use crate::time::Time;
 
 /// RTEX in the table.
 pub(super) struct Rtex;
@@ -114,7 +115,7 @@ impl Decoder {
         *last = counter;
         match self.settings.period_ns {
             Some(period_ns) => {
-                let start = *updates * i64::from(period_ns) * 1_000;
+                let start = Time::from_ps(i128::from(*updates) * i128::from(period_ns) * 1_000);
                 Place::Time { start, end: start }
             }
             None => Place::Line(burst.line),

@@ -73,7 +73,7 @@ fn event(packet: &Packet) -> Event {
         (DataLink::ETHERNET, Some(false)) => Some(Direction::Request),
         _ => None,
     };
-    let end = packet.time.saturating_add(BYTE.saturating_mul(packet.bytes.len() as i64));
+    let end = packet.time + BYTE.saturating_mul(packet.bytes.len() as i64);
     let place = Place::Time { start: packet.time, end };
     Event::new(place, direction, kind, fields, verdict)
 }

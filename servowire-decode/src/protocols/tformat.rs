@@ -22,6 +22,7 @@ use crate::line::start_stop::{LineField, StartStop};
 use crate::protocols::plausible::CUT;
 use crate::settings::{Settings, Widths};
 use crate::sink::Sink;
+use crate::time::Time;
 use describe::Encoder;
 use frame::{ANSWER_TIMEOUT, Frame, LATE_ANSWER, MOST_FIELDS, Pending};
 
@@ -80,17 +81,17 @@ pub struct Decoder {
     bit: i64,
     encoder: Encoder,
     /// Begin of the capture, until the first frame has been seen.
-    begin: Option<i64>,
+    begin: Option<Time>,
     /// Until when the rest of a frame is passed over in which the capture began.
-    skip: Option<i64>,
+    skip: Option<Time>,
     /// Until when another piece of that frame may come.
-    cut_until: Option<i64>,
+    cut_until: Option<Time>,
     /// The end of what was passed over.
-    skipped: i64,
+    skipped: Time,
     open: Frame,
     pending: Option<Pending>,
     /// Until when a frame may answer a request that was before the capture, as long as none was sound.
-    early: Option<i64>,
+    early: Option<Time>,
     /// A frame that may be a request or such an answer: what follows tells.
     unclear: Option<Frame>,
 }
@@ -104,7 +105,7 @@ impl Decoder {
             begin: None,
             skip: None,
             cut_until: None,
-            skipped: 0,
+            skipped: Time::ZERO,
             open: Frame::default(),
             pending: None,
             early: None,
@@ -113,7 +114,7 @@ impl Decoder {
     }
 
     /// Whether the open frame is over before a field that begins at `start`.
-    fn is_over(&self, start: i64) -> bool {
+    fn is_over(&self, start: Time) -> bool {
         let pause = start - self.open.end;
         if pause > FIELD_TIMEOUT_BITS * self.bit {
             return true;
@@ -254,7 +255,7 @@ impl Decoder {
     }
 
     /// The answer did not come until `now`; `asked`: when somebody asked again.
-    fn give_up(&mut self, now: i64, asked: bool, out: &mut dyn Sink) -> io::Result<()> {
+    fn give_up(&mut self, now: Time, asked: bool, out: &mut dyn Sink) -> io::Result<()> {
         match (self.unclear.take(), self.pending.take()) {
             // Nobody answers an answer.
             (Some(frame), Some(Pending { request: Some(request), .. })) => {
@@ -288,7 +289,7 @@ impl Decoder {
 impl StartStop for Decoder {
     const CONTENT_BITS: u32 = 8;
 
-    fn begin(&mut self, start: i64) {
+    fn begin(&mut self, start: Time) {
         (self.skip, self.cut_until) = (None, None);
         self.begin = Some(start);
         self.early = Some(start + LATE_ANSWER);
@@ -307,7 +308,7 @@ impl StartStop for Decoder {
             self.skip = None;
         }
         if self.open.is_empty() {
-            let due = self.pending.and_then(|pending| pending.end()).map(|end| end.saturating_add(ANSWER_TIMEOUT));
+            let due = self.pending.and_then(|pending| pending.end()).map(|end| end + ANSWER_TIMEOUT);
             if due.is_some_and(|due| field.start > due) {
                 self.give_up(field.start, true, out)?;
             }
@@ -319,7 +320,7 @@ impl StartStop for Decoder {
         if whole || self.is_answer_alone() || self.open.len() == MOST_FIELDS { self.close(out) } else { Ok(()) }
     }
 
-    fn finish(&mut self, end: i64, out: &mut dyn Sink) -> io::Result<()> {
+    fn finish(&mut self, end: Time, out: &mut dyn Sink) -> io::Result<()> {
         if !self.open.is_empty() {
             let recent = end - self.open.end <= FIELD_TIMEOUT_BITS * self.bit;
             let request = self.pending.is_none()
@@ -333,7 +334,7 @@ impl StartStop for Decoder {
             self.close(out)?;
         }
         match self.pending.and_then(|pending| pending.end()) {
-            Some(asked) if end > asked.saturating_add(ANSWER_TIMEOUT) => self.give_up(end, false, out),
+            Some(asked) if end > asked + ANSWER_TIMEOUT => self.give_up(end, false, out),
             // Its answer may have come later.
             _ => {
                 self.pending = None;
@@ -353,7 +354,7 @@ impl LogDecoder for Decoder {
         let is_answer = id(rest).is_ok_and(|id| rest.len() == usize::from(id.response_fields())) && !is_request;
         let asks = burst.direction == Some(Direction::Request);
         if asks || self.pending.is_some_and(|pending| is_request && rest.len() < pending.answer_fields_of(rest)) {
-            self.give_up(0, true, out)?;
+            self.give_up(Time::ZERO, true, out)?;
         }
         if is_answer && self.pending.is_none() {
             return self.take(burst.line, rest, out);
@@ -379,6 +380,6 @@ impl LogDecoder for Decoder {
     }
 
     fn end(&mut self, out: &mut dyn Sink) -> io::Result<()> {
-        self.give_up(0, false, out)
+        self.give_up(Time::ZERO, false, out)
     }
 }

@@ -33,11 +33,12 @@ driver!(awaited, Timer, async);
 /// The frame that comes until a time, or an error of the port.
 async fn take<F: FramePort>(
     port: &mut F,
-    _: &mut quiet::Line,
+    line: &mut quiet::Line,
     timer: &mut impl Timer,
     until_ns: u64,
-) -> Result<Option<Result<Frame, F::Error>>, ClockError> {
-    race(port.take(), timer.wait_until(until_ns)).await
+) -> Result<Heard<Result<Frame, F::Error>>, ClockError> {
+    let what = race(port.take(), timer.wait_until(until_ns)).await?;
+    Ok(Heard { what, now_ns: line.now_ns(timer)? })
 }
 
 async fn sleep(_: &mut quiet::Line, timer: &mut impl Timer, until_ns: u64) -> Result<(), ClockError> {

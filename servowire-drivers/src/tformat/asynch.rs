@@ -17,11 +17,12 @@ driver!(awaited, [Read, Write], Timer, async);
 async fn read<U: Read>(
     uart: &mut U,
     bytes: &mut [u8],
-    _: &mut quiet::Line,
+    line: &mut quiet::Line,
     timer: &mut impl Timer,
     until_ns: u64,
-) -> Result<Option<Result<usize, U::Error>>, ClockError> {
-    race(uart.read(bytes), timer.wait_until(until_ns)).await
+) -> Result<Heard<Result<usize, U::Error>>, ClockError> {
+    let what = race(uart.read(bytes), timer.wait_until(until_ns)).await?;
+    Ok(Heard { what, now_ns: line.now_ns(timer)? })
 }
 
 async fn sleep(_: &mut quiet::Line, timer: &mut impl Timer, until_ns: u64) -> Result<(), ClockError> {

@@ -3,6 +3,7 @@
 #![allow(clippy::cast_sign_loss, clippy::indexing_slicing, clippy::panic, clippy::unwrap_used)]
 
 mod changes;
+mod laws;
 mod lines;
 mod paths;
 mod plans;

@@ -97,6 +97,8 @@ pub struct Transaction {
 
 impl Transaction {
     /// Begins a transaction; the start bit of the request is on the line at `start_ns`.
+    ///
+    /// On a line whose settings leave no time for a response it fails at once with [`Error::Line`], and nothing is to be sent.
     pub fn start(request: Request, line: Line, start_ns: u64) -> Self {
         let frame = request.emit();
         let asked_ns = start_ns.saturating_add(line.rate.fields_ns(frame.fields()).into());
@@ -119,7 +121,7 @@ impl Transaction {
             refused: None,
             heard_ns: asked_ns,
             until_ns,
-            end: None,
+            end: if line.leaves_time() { None } else { Some((Err(Error::Line), start_ns)) },
         }
     }
 
@@ -270,15 +272,15 @@ impl Transaction {
     fn judge(&mut self, ended_ns: u64, after: &[u8], found: &mut Option<Result<Exchange, Error>>) {
         while self.len > 0 && self.len >= self.expected() {
             let heard = self.received.get(..usize::from(self.len)).unwrap_or(&self.received);
-            // A response to a write repeats it.
-            if heard == self.frame.as_bytes() && after.first().is_some_and(|next| self.begins_a_response(*next)) {
+            // A response to a write repeats it: the first of two is the echo.
+            if heard == self.frame.as_bytes() && is_sound(&Response::parse(self.request, after)) {
                 self.echoed = self.frame.fields();
                 self.len = 0;
                 return;
             }
             let fresh = ended_ns.saturating_sub(self.fields_ns(heard.len().saturating_sub(1))) >= self.earliest_ns;
             match Response::parse(self.request, heard) {
-                outcome @ (Ok(_) | Err(Error::Rejected { .. })) if fresh => {
+                outcome if fresh && is_sound(&outcome) => {
                     let began_ns = ended_ns.saturating_sub(self.fields_ns(heard.len()));
                     let sampled_ns = self.asked_ns.saturating_add(self.line.sampling_ns.into());
                     let outcome = outcome.map(|response| Exchange { response, sampled_ns, began_ns });
@@ -342,6 +344,11 @@ impl Transaction {
         };
         self.end = Some((outcome, ready_ns));
     }
+}
+
+/// Whether a response came whole, a refusal too.
+const fn is_sound(outcome: &Result<Response, Error>) -> bool {
+    matches!(outcome, Ok(_) | Err(Error::Rejected { .. }))
 }
 
 servowire_core::machine!(Transaction { Transmission, [u8] => Exchange, Error });

@@ -11,6 +11,7 @@ use crate::event::{Direction, Event, Field, Place, Position, Refusal, Value, Ver
 use crate::protocols::group::{self, too_wide};
 use crate::protocols::plausible::Motion;
 use crate::settings::Widths;
+use crate::time::Time;
 
 /// The fields an event may have.
 pub(super) const FIELDS: &[&str] = &[
@@ -208,7 +209,7 @@ impl Encoder {
 }
 
 /// No reply came to the request at `place` until `now`.
-pub(super) fn silence(request: Request, place: Place, timeout: i64, now: i64, asked: bool) -> Event {
+pub(super) fn silence(request: Request, place: Place, timeout: i64, now: Time, asked: bool) -> Event {
     let kind = request.command().name();
     let silence = group::silence(place, kind, "reply", timeout, now, asked, "no encoder of this address");
     Event { fields: vec![Field::number("EA", request.ea.get())], ..silence }

@@ -12,6 +12,7 @@ use crate::event::{Direction, Event, Field, Place, Position, Refusal, Value, Ver
 use crate::protocols::group::{self, too_wide};
 use crate::protocols::plausible::Motion;
 use crate::settings::Widths;
+use crate::time::Time;
 
 /// The fields an event may have.
 pub(super) const FIELDS: &[&str] =
@@ -194,7 +195,7 @@ fn doubts(response: Response, before: Option<u8>) -> Vec<String> {
 }
 
 /// No answer came to the request at `place` until `now`; `asked`: because somebody asked again.
-pub(super) fn silence(request: Request, place: Place, now: i64, asked: bool) -> Event {
+pub(super) fn silence(request: Request, place: Place, now: Time, asked: bool) -> Event {
     let kind = kind(Some(request.data_id()));
     group::silence(place, kind, "answer", ANSWER_TIMEOUT, now, asked, "no encoder")
 }
