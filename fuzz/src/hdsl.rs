@@ -1,6 +1,5 @@
 //! HIPERFACE DSL.
 
-use hdsl::cable::{Cable, Disturbance};
 use hdsl::device::{Device, Heard};
 use hdsl::frame::Head;
 use hdsl::master::{Master, State};
@@ -14,7 +13,11 @@ use hdsl::{
     Window,
 };
 
+#[path = "../../hdsl/tests/all/cable.rs"]
+mod cable;
+
 use crate::byte;
+use cable::{Cable, Disturbance};
 
 /// Eight bytes off the front.
 fn word(data: &mut &[u8]) -> u64 {
@@ -218,10 +221,10 @@ pub fn link(mut data: &[u8]) {
         let line = cable.down_samples(master.transmission().head);
         let samples = match Heard::on_line(&line) {
             Some(heard) => {
-                let answer = encoder.hear_at(heard.bits, position);
+                let answer = encoder.set_position(position).hear(heard.bits);
                 cable.up_heard(answer, &heard)
             }
-            None => cable.up(encoder.hear_at(Window::EMPTY, position)),
+            None => cable.up(encoder.set_position(position).hear(Window::EMPTY)),
         };
         let _ = master.hear(&samples, 0).expect("there are enough samples");
     }

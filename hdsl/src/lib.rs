@@ -8,7 +8,6 @@ extern crate std;
 
 mod acceleration;
 mod answer;
-pub mod cable;
 mod channel2;
 mod crc;
 pub mod device;
@@ -27,6 +26,7 @@ mod position;
 mod quality;
 mod ranged;
 pub mod registers;
+mod resource;
 pub mod rssi;
 pub mod sampling;
 pub mod symbol;

@@ -25,7 +25,7 @@
 //! let mut master = Master::new(Dialect::SICK);
 //! let mut encoder = Device::new(EncoderId::try_from(0x00153)?);
 //! for frame in 0..150_u64 {
-//!     let answer = encoder.hear_at(master.transmission().head.bits(), 7 * frame);
+//!     let answer = encoder.set_position(7 * frame).hear(master.transmission().head.bits());
 //!     // a cable that delays the answer by 11 eighths of a bit
 //!     let samples = answer.map_or([0xff; 72], |answer| line(answer.bits, 11));
 //!     // The window of the answer ends 99 bits after the frame began.
@@ -286,7 +286,7 @@ impl Master {
     /// let mut encoder = Device::new(EncoderId::try_from(0x00153)?);
     /// while master.state() != State::Running {
     ///     // A line that stays high is all ones.
-    ///     let answer = encoder.hear_at(master.transmission().head.bits(), 1000);
+    ///     let answer = encoder.set_position(1000).hear(master.transmission().head.bits());
     ///     let bits = answer.map_or(u64::MAX, |answer| answer.bits);
     ///     master.hear_bits(bits, None, 0);
     /// }

@@ -117,3 +117,22 @@ macro_rules! procedures {
         )+
     };
 }
+
+/// The inherent method `receive` of a procedure with a field `end` and a method `next` that does the work: once it has ended it
+/// stays so, whatever it is told.
+///
+/// `servowire_core::receive! { SingleTurn }`
+#[macro_export]
+macro_rules! receive {
+    ($(#[$more:meta])* $value:ty) => {
+        /// A transaction ended with this outcome; the line is free from `ready_ns` on. Once done or failed it stays so, until it
+        /// is started again.
+        ///
+        $(#[$more])*
+        pub fn receive(&mut self, outcome: Result<Response, Error>, ready_ns: u64) -> Step<$value> {
+            let step = self.end.unwrap_or_else(|| self.next(outcome, ready_ns));
+            self.end = step.ended();
+            step
+        }
+    };
+}

@@ -97,6 +97,48 @@ impl<'de, C: Class + serde::Deserialize<'de>> serde::Deserialize<'de> for Findin
     }
 }
 
+/// What the inspection of a serial line has in common: `Findings`, a `Cause` that may be one of the line, and of
+/// `Report`, whose fields `error`, `findings` and `cause` these are, the getters and the words for a person. Arms that are named
+/// come after those of a fault.
+///
+/// `servowire_core::report! { Self { response: Some(response), .. } => "sound: {}", response; }`
+#[macro_export]
+macro_rules! report {
+    ($($sound:tt)+) => {
+        impl From<LineCause> for Cause {
+            fn from(cause: LineCause) -> Self {
+                Self::Line(cause)
+            }
+        }
+
+        /// The kinds of faults found, as a set.
+        pub type Findings = $crate::Findings<ErrorClass>;
+
+        $crate::one_line!(Report {
+            Self { error: Some(error), cause: Some(cause), .. } => "{}; likely cause: {}", error, cause;
+            Self { error: Some(error), .. } => "{}", error;
+            $($sound)+
+        });
+
+        impl Report {
+            /// The first fault, as a decoder reports it.
+            pub const fn error(&self) -> Option<Error> {
+                self.error
+            }
+
+            /// Every kind of fault in what was given.
+            pub const fn findings(&self) -> Findings {
+                self.findings
+            }
+
+            /// The most likely cause of the fault.
+            pub const fn cause(&self) -> Option<Cause> {
+                self.cause
+            }
+        }
+    };
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

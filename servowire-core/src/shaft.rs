@@ -173,6 +173,149 @@ impl<F: Shaft + Words<W>, const W: usize> ShaftReader<'_, F, W> {
     }
 }
 
+/// `Evidence`, `Sample`, `EvidenceCell` and `EvidenceShaftCell` of a protocol whose encoders count turns.
+///
+/// All that can speak against a position stands in one word of marks, so that one mask says what is tolerated of it. What the
+/// marks mean is the protocol's: in scope are its `Policy`, `Tolerated` (with `objects_to(marks)` and `ignores_turns()`),
+/// `Doubt`, the mark `NEVER`, `single_turn_bits(marks)`, and it writes `Evidence::doubt`, which names what speaks against a
+/// position. The fields are private to the module in which this stands, so nobody else makes a sample.
+#[macro_export]
+macro_rules! shaft_evidence {
+    ($(#[$about:meta])* Evidence) => {
+        $(#[$about])*
+        #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+        #[cfg_attr(feature = "serde", derive(serde::Serialize))]
+        pub struct Evidence {
+            sampled_ns: u64,
+            single_turn: u32,
+            turns: i32,
+            marks: u32,
+        }
+
+        $crate::one_line!(Evidence {
+            Self { marks, .. } if marks & NEVER != 0 => "no position was heard yet";
+            Self { sampled_ns, .. } => "a position sampled at {} ns", sampled_ns;
+        });
+
+        impl Evidence {
+            /// Nothing was heard yet.
+            pub const NEVER: Self = Self { sampled_ns: 0, single_turn: 0, turns: 0, marks: NEVER };
+
+            /// The position, if nothing speaks against its use at `now_ns`.
+            ///
+            /// # Errors
+            /// [`Doubt`], in the order in which its variants are declared.
+            #[inline]
+            pub const fn at(&self, now_ns: u64, policy: Policy) -> Result<Sample, Doubt> {
+                let Self { sampled_ns, single_turn, turns, marks } = *self;
+                let tolerated = policy.tolerated();
+                if policy.check_age(now_ns, sampled_ns).is_ok() && tolerated.objects_to(marks) == 0 {
+                    let turns = if tolerated.ignores_turns() { None } else { Some(turns) };
+                    Ok(Sample { sampled_ns, single_turn, turns, bits: single_turn_bits(marks) })
+                } else {
+                    Err(self.doubt(now_ns, policy))
+                }
+            }
+        }
+
+        impl Default for Evidence {
+            fn default() -> Self {
+                Self::NEVER
+            }
+        }
+
+        impl $crate::Feedback for Evidence {
+            type Tolerated = Tolerated;
+            type Sample = Sample;
+            type Doubt = Doubt;
+            const NEVER: Self = Self::NEVER;
+
+            #[inline]
+            fn at(&self, now_ns: u64, policy: Policy) -> Result<Sample, Doubt> {
+                self.at(now_ns, policy)
+            }
+        }
+
+        /// For an [`EvidenceShaftCell`].
+        impl $crate::Shaft for Evidence {
+            #[inline]
+            fn shaft(sample: &Sample) -> ($crate::Angle, u64) {
+                (sample.angle(), sample.sampled_ns())
+            }
+        }
+
+        /// Carries evidence from where it is received to where it is used, between two priorities or cores.
+        pub type EvidenceCell = $crate::Cell<Evidence, 5>;
+
+        /// As [`EvidenceCell`], and it also gives the angle of an instant between two samples.
+        pub type EvidenceShaftCell = $crate::ShaftCell<Evidence, 5>;
+
+        /// For an [`EvidenceCell`]: the instant of sampling, low half first, single turn, turns, marks.
+        impl $crate::Words<5> for Evidence {
+            #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "halves, and bits of one width")]
+            #[inline]
+            fn to_words(&self) -> [u32; 5] {
+                let Self { sampled_ns, single_turn, turns, marks } = *self;
+                [sampled_ns as u32, (sampled_ns >> 32) as u32, single_turn, turns as u32, marks]
+            }
+
+            #[allow(clippy::cast_possible_wrap, reason = "bits of one width")]
+            #[inline]
+            fn from_words([low, high, single_turn, turns, marks]: [u32; 5]) -> Self {
+                Self { sampled_ns: u64::from(high) << 32 | u64::from(low), single_turn, turns: turns as i32, marks }
+            }
+        }
+
+        /// A position that may be used, and when it was sampled: from [`Evidence::at`].
+        ///
+        /// It has turns where the policy judged them. With [`Tolerated::SINGLE_TURN`] they may be anything, and are not here.
+        #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+        #[cfg_attr(feature = "serde", derive(serde::Serialize))]
+        pub struct Sample {
+            sampled_ns: u64,
+            single_turn: u32,
+            turns: Option<i32>,
+            bits: u8,
+        }
+
+        $crate::one_line!(Sample {
+            Self { single_turn, turns: Some(turns), sampled_ns, .. } =>
+                "turn {}, {} counts at {} ns", turns, single_turn, sampled_ns;
+            Self { single_turn, turns: None, sampled_ns, .. } => "{} counts at {} ns", single_turn, sampled_ns;
+        });
+
+        impl Sample {
+            /// When it was sampled, in ns by the clock of the master, as the exchange says. Its age counts from here.
+            pub const fn sampled_ns(self) -> u64 {
+                self.sampled_ns
+            }
+
+            /// Counts in the turn.
+            pub const fn single_turn(self) -> u32 {
+                self.single_turn
+            }
+
+            /// The place in the turn as an angle.
+            pub const fn angle(self) -> $crate::Angle {
+                $crate::Angle::from_bits(self.single_turn.wrapping_shl(32_u32.wrapping_sub(self.bits as u32)))
+            }
+
+            /// Turns, if the policy judged them.
+            pub const fn turns(self) -> Option<i32> {
+                self.turns
+            }
+
+            /// Both parts in counts, turns times the counts of a turn and the single turn; if the policy judged the turns.
+            pub const fn counts(self) -> Option<i64> {
+                match self.turns {
+                    Some(turns) => Some((turns as i64).wrapping_shl(self.bits as u32) | self.single_turn as i64),
+                    None => None,
+                }
+            }
+        }
+    };
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -38,7 +38,7 @@ pub(crate) fn ended<T, IO, PIN, P, D>(
     let outcome = match exchanged {
         Ok(value) => Ok(value),
         Err(Error::Protocol(error)) => Err(error),
-        Err(Error::Io(_)) => Err(lost),
+        Err(Error::Io(_) | Error::DriverLate { .. }) => Err(lost),
         Err(other) => return Err(other),
     };
     let now_ns = line.now_ns(clock)?;
@@ -64,14 +64,14 @@ mod tests {
     fn a_good_answer_frees_the_line_and_a_refused_one_does_not() {
         let (flow, mut line) = after(Progress::Pending { until_ns: 70_000 });
         assert_eq!(flow, ControlFlow::Continue(70_000));
-        assert_eq!(line.settle(30_000).poll(30_000), Settle::Until(100_000));
+        assert_eq!(line.settle(30_000).next(false, 30_000), Settle::Until(100_000));
         let (flow, mut line) = after(Progress::Done { value: 2, ready_ns: 25_000 });
         assert_eq!(flow, ControlFlow::Break(Ok(2)));
-        assert_eq!(line.settle(24_999).poll(24_999), Settle::Until(25_000));
-        assert_eq!(line.settle(25_000).poll(25_000), Settle::Quiet);
+        assert_eq!(line.settle(24_999).next(false, 24_999), Settle::Until(25_000));
+        assert_eq!(line.settle(25_000).next(false, 25_000), Settle::Quiet);
         let (flow, mut line) = after(Progress::Failed { error: 3, ready_ns: 25_000 });
         assert_eq!(flow, ControlFlow::Break(Err(3)));
-        assert_eq!(line.settle(30_000).poll(99_999), Settle::Until(100_000));
+        assert_eq!(line.settle(30_000).next(false, 99_999), Settle::Until(100_000));
     }
 
     #[test]
@@ -79,7 +79,9 @@ mod tests {
         let heard = |exchanged| ended(exchanged, 9, &mut Line::new(8_000), &mut || 5_000);
         assert_eq!(heard(Ok(1)), Ok(Ended { outcome: Ok(1), ready_ns: 5_000 }));
         assert_eq!(heard(Err(Fault::Protocol(4))), Ok(Ended { outcome: Err(4), ready_ns: 5_000 }));
-        assert_eq!(heard(Err(Fault::Io(4))), Ok(Ended { outcome: Err(9), ready_ns: 5_000 }));
+        for fault in [Fault::Io(4), Fault::DriverLate { by_ns: 4 }] {
+            assert_eq!(heard(Err(fault)), Ok(Ended { outcome: Err(9), ready_ns: 5_000 }));
+        }
         for other in
             [Fault::Pin(1), Fault::Closed, Fault::NeverQuiet, Fault::Clock(ClockError::Stopped), Fault::Doubt(1)]
         {

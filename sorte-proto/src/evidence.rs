@@ -5,7 +5,7 @@ use servowire_core::{Feedback, Tolerance, Words};
 use crate::address::DeviceAddress;
 use crate::drv8711;
 use crate::exchange::DeviceFrameView;
-use crate::follow::InputSlice;
+use crate::payload::InputSlice;
 use crate::status::Status;
 
 /// The devices of a line send positions, as [`follow`](crate::follow) says: an extension of this crate. The reference design

@@ -122,7 +122,7 @@ impl HFrame {
     /// for frame in 0..100 {
     ///     // A byte in every tenth frame.
     ///     encoder.set_pipe((frame % 10 == 0).then_some(frame));
-    ///     let bits = encoder.hear_at(master.transmission().head.bits(), 0).map_or(u64::MAX, |answer| answer.bits);
+    ///     let bits = encoder.set_position(0).hear(master.transmission().head.bits()).map_or(u64::MAX, |answer| answer.bits);
     ///     if let Some(character) = master.hear_bits(bits, None, 0).pipe_character() {
     ///         data.push(character?.byte());
     ///     }

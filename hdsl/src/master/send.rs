@@ -39,7 +39,7 @@ impl Master {
     /// let mut encoder = Device::new(EncoderId::try_from(0x00153)?);
     /// let mut head = master.transmission().head;
     /// for frame in 0..200 {
-    ///     let bits = encoder.hear_at(head.bits(), 7 * frame).map_or(u64::MAX, |answer| answer.bits);
+    ///     let bits = encoder.set_position(7 * frame).hear(head.bits()).map_or(u64::MAX, |answer| answer.bits);
     ///     let next = master.ahead();
     ///     // From here on the next head may be on the line.
     ///     master.hear_bits(bits, None, 11_520 * frame + 10_560);

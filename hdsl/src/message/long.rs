@@ -1,6 +1,6 @@
-use super::resource::Named;
-use super::{MessageBytes, Offset, ResourceAddress, ResourceError, checked};
+use super::bytes::{MessageBytes, checked};
 use crate::error::Error;
+use crate::resource::{Named, Offset, ResourceAddress, ResourceError};
 
 servowire_core::codes! {
     /// LLEN: how many data bytes a long message carries or asks for.
@@ -202,6 +202,26 @@ fn long_start(bytes: &[u8]) -> Result<u8, Error> {
 }
 
 impl LongRequest {
+    /// Reads the value of a resource, from the beginning.
+    pub const fn read(address: ResourceAddress, length: Length) -> Self {
+        Self { address, indirect: true, offset: None, access: Access::Read(length) }
+    }
+
+    /// Reads the value of a resource from `offset` on.
+    pub const fn read_at(address: ResourceAddress, offset: Offset, length: Length) -> Self {
+        Self { address, indirect: true, offset: Some(offset), access: Access::Read(length) }
+    }
+
+    /// Reads the eight characters of a resource's name.
+    pub const fn read_name(address: ResourceAddress) -> Self {
+        Self { address, indirect: false, offset: None, access: Access::Read(Length::Eight) }
+    }
+
+    /// Reads an attribute of a resource, two bytes: 1 data size, 2 read level, 3 write level, 4 time-out in ms, 5 data type.
+    pub const fn read_attribute(address: ResourceAddress, attribute: Offset) -> Self {
+        Self { address, indirect: false, offset: Some(attribute), access: Access::Read(Length::Two) }
+    }
+
     const fn is_read(&self) -> bool {
         matches!(self.access, Access::Read(_))
     }

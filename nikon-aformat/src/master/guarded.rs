@@ -45,12 +45,7 @@ impl GuardedReset {
         Step::Send { request, not_before_ns: now_ns }
     }
 
-    /// A transaction ended with this outcome; the line is free from `ready_ns` on. Once done or failed it stays so.
-    pub fn receive(&mut self, outcome: Result<Response, Error>, ready_ns: u64) -> Step<Response> {
-        let step = self.end.unwrap_or_else(|| self.next(outcome, ready_ns));
-        self.end = step.ended();
-        step
-    }
+    servowire_core::receive! { Response }
 
     fn next(&mut self, outcome: Result<Response, Error>, ready_ns: u64) -> Step<Response> {
         if self.started {

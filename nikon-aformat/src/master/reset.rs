@@ -86,16 +86,13 @@ impl Reset {
         Step::Send { request: self.request, not_before_ns: now_ns }
     }
 
-    /// A transaction ended with this outcome; the line is free from `ready_ns` on. The value is the response to STATUS.
-    ///
-    /// Fails with [`Error::Interrupted`] (not done) if one of the first seven responses does not come, and with
-    /// [`Error::EffectUnknown`] if the eighth or the status does not: the encoder may have done it, and be busy for 30 ms.
-    /// So it does if the status after commands 11 and 12, whose effect is kept in the EEPROM, shows MEMERR. Once done or
-    /// failed it stays so.
-    pub fn receive(&mut self, outcome: Result<Response, Error>, ready_ns: u64) -> Step<Response> {
-        let step = self.end.unwrap_or_else(|| self.next(outcome, ready_ns));
-        self.end = step.ended();
-        step
+    servowire_core::receive! {
+        /// The value is the response to STATUS.
+        ///
+        /// Fails with [`Error::Interrupted`] (not done) if one of the first seven responses does not come, and with
+        /// [`Error::EffectUnknown`] if the eighth or the status does not: the encoder may have done it, and be busy for 30 ms.
+        /// So it does if the status after commands 11 and 12, whose effect is kept in the EEPROM, shows MEMERR.
+        Response
     }
 
     fn next(&mut self, outcome: Result<Response, Error>, ready_ns: u64) -> Step<Response> {

@@ -3,11 +3,13 @@
 use std::cell::RefCell;
 use std::io;
 
-use servowire::capture::{Capture as Opened, Change, Line};
-use servowire::event::{Direction, Event, Value, Verdict};
-use servowire::fault::Fault;
-use servowire::output::{Lane, Origin, Output, Printer};
-use servowire::protocols::{Protocol, Settings};
+use servowire_decode::capture::{Capture as Opened, Change, Line};
+use servowire_decode::event::{Direction, Event, Value, Verdict};
+use servowire_decode::fault::Fault;
+use servowire_decode::output::Output;
+use servowire_decode::output::printer::{Lane, Origin, Printer};
+use servowire_decode::recognition::Note;
+use servowire_decode::settings::Settings;
 
 use super::speech::Expect;
 use super::wire::Capture;
@@ -84,10 +86,10 @@ pub fn decode(capture: &Capture) -> (Vec<(Lane, Vec<Event>)>, String) {
     let memory = Memory { names, changes, at: 0, end: capture.end };
     let mut keep = Keep::default();
     let said = RefCell::new(String::new());
-    let notes = |text: &str| said.borrow_mut().extend([text, "\n"]);
-    let mut out = Output::new("x", &mut keep, &|| (), &notes);
+    let notes = |note: &Note| said.borrow_mut().push_str(&format!("{note}\n"));
+    let mut out = Output::new("x", &mut keep).with_notes(&notes);
     let opened = Opened::Edges(Box::new(memory));
-    if let Err(stop) = Protocol::Auto.decode("x", opened, &Settings::default(), &mut out) {
+    if let Err(stop) = servowire_decode::decode("x", opened, None, &Settings::default(), &mut out) {
         said.borrow_mut().push_str(&stop.to_string());
     }
     out.end().unwrap();

@@ -18,7 +18,9 @@ fn no_number_has_changed() {
         .chain(lines::<nikon_aformat::ErrorClass>("nikon-aformat"))
         .chain(lines::<hdsl::ErrorClass>("hdsl"))
         .chain(lines::<rtex_block::ErrorClass>("rtex-block"))
+        .chain(lines::<servowire_drivers::drv8711::ErrorClass>("servowire-drivers/drv8711"))
         .chain(lines::<sorte_proto::ErrorClass>("sorte-proto"))
+        .chain(lines::<step_motion::ErrorClass>("step-motion"))
         .chain(lines::<step_profile::ErrorClass>("step-profile"))
         .collect();
     let recorded: BTreeSet<String> =

@@ -7,7 +7,7 @@ use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-const CRATES: [&str; 9] = [
+const CRATES: [&str; 10] = [
     "servowire-core",
     "nrz-line",
     "tformat",
@@ -15,6 +15,7 @@ const CRATES: [&str; 9] = [
     "hdsl",
     "rtex-block",
     "sorte-proto",
+    "step-motion",
     "step-profile",
     "servowire-drivers",
 ];

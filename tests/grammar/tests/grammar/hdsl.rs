@@ -31,7 +31,7 @@ fn evidence() -> Evidence {
     let (mut master, mut encoder) = (Master::new(Dialect::SICK), encoder());
     for frame in 0..300 {
         let sent = master.transmission();
-        let heard = encoder.hear_at(sent.head.bits(), 12 * frame);
+        let heard = encoder.set_position(12 * frame).hear(sent.head.bits());
         let bits = heard.map_or(u64::MAX, |sent| sent.bits);
         let _ = master.hear_bits(bits, None, 11_520 * frame + 10_560);
     }
@@ -46,7 +46,7 @@ fn awake() -> (Device, Window) {
     let (mut master, mut encoder) = (Master::new(Dialect::SICK), encoder());
     loop {
         let head = master.transmission().head.bits();
-        match encoder.hear_at(head, 0) {
+        match encoder.set_position(0).hear(head) {
             Some(_) => return (encoder, head),
             None => drop(master.hear_bits(u64::MAX, None, 0).state),
         }
@@ -55,7 +55,7 @@ fn awake() -> (Device, Window) {
 
 decode! { hdsl::Answer(Rule, Window); with (Rule::Strict); sound line(61); damaged short() => "truncated" }
 encode! { hdsl::message::ShortRequest = ShortRequest::Read(RemoteRegister::SRSSI) }
-code! { hdsl::message::AccessLevel: 3; unknown 7 }
+code! { hdsl::message::Length: 3; unknown 7 }
 feedback! { hdsl: evidence(), sampled at SAMPLED_NS; "`master.fast()`; `master.safe()` gives `SafeEvidence`" }
 device! {
     hdsl::"Device::new(id)" = awake().0;
@@ -63,7 +63,7 @@ device! {
     heard |_at| (awake().1); "Window)"
 }
 inspect! { hdsl::inspect(expected = Expected::Normal { at: None }; line); damaged damaged() => "invalid_word" }
-log! { hdsl: ShortRequest, hdsl::master::RestartReason, hdsl::message::AccessLevel }
+log! { hdsl: ShortRequest, hdsl::master::RestartReason, hdsl::message::Length }
 counters! { hdsl }
 differs! {
     EXCHANGE: "an H-frame has its own clock: `Master::new(dialect)`, `transmission()`, `hear(samples: &[u8], end_ns)`";
