@@ -11,7 +11,7 @@ use rtex_block::inspect::{self, Cause, LogAnalysis, LogShape, Report, Trouble, i
 use rtex_block::{Error, Header};
 
 use crate::capture::hexlog::Burst;
-use crate::codec::{Codec, LogDecoder, Names};
+use crate::codec::{Codec, Facts, LogDecoder};
 use crate::event::{Direction, Event, Field, Place, Position, Refusal, Span, Value, Verdict};
 use crate::settings::{self, Settings};
 use crate::sink::Sink;
@@ -21,27 +21,22 @@ use crate::time::Time;
 pub(super) struct Rtex;
 
 impl Codec for Rtex {
-    fn names(&self) -> &'static Names {
-        &Names {
-            name: "rtex",
-            title: "RTEX",
-            about: "Panasonic RTEX data blocks, from logs of bytes",
-            needs: "RTEX blocks are read from logs of bytes: hex digits with --bytes, binary with --record-size",
+    fn facts(&self) -> &'static Facts {
+        const {
+            &Facts {
+                name: "rtex",
+                title: "RTEX",
+                about: "Panasonic RTEX data blocks, from logs of bytes",
+                needs: "RTEX blocks are read from logs of bytes: hex digits with --bytes, binary with --record-size",
+                // A block has no check sum, and a log no levels for a VCD of fields.
+                checked: false,
+                ..Facts::NONE
+            }
         }
-    }
-
-    /// A log of blocks has no levels, so there is no VCD to hold its fields.
-    fn fields(&self) -> &'static [&'static str] {
-        &[]
     }
 
     fn log(&self, settings: &Settings, sample: &[Burst]) -> Option<Box<dyn LogDecoder>> {
         Some(Box::new(Decoder::new(settings.rtex, sample)))
-    }
-
-    /// A block has no check sum.
-    fn is_checked(&self) -> bool {
-        false
     }
 }
 
