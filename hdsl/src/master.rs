@@ -97,6 +97,9 @@ pub struct Master {
     end_ns: u64,
     /// From the end of a window to that of the next one, and half a frame: if it takes longer a frame was lost.
     longest_ns: u32,
+    /// Blocks of stuffing after a frame of a running link that is free running, and `longest_ns` of it.
+    stuffing: Stuffing,
+    usual_ns: u32,
     /// Number of the last H-frame that was heard.
     number: u32,
     /// Steps of a turn for the angle in a sample; 0 if they are not known.
@@ -148,6 +151,8 @@ impl Master {
             restart: false,
             end_ns: 0,
             longest_ns: u32::MAX,
+            stuffing: Stuffing::MIN,
+            usual_ns: FREE_RUNNING_NS,
             number: u32::MAX,
             steps_per_turn: 0,
             latency_ns: 0,
@@ -351,8 +356,8 @@ impl Master {
         self.counters.frames = self.counters.frames.wrapping_add(1);
         self.h_frame.restarted = None;
         self.h_frame.state = State::Running;
-        self.longest_ns = FREE_RUNNING_NS;
-        self.h_frame.tail = Tail { trailer: Trailer::AfterAnswer, stuffing: Stuffing::MIN };
+        self.longest_ns = self.usual_ns;
+        self.h_frame.tail = Tail { trailer: Trailer::AfterAnswer, stuffing: self.stuffing };
         self.h_frame.long_free = self.requester.is_long_free();
         self.h_frame.short_free = self.requester.is_short_free();
         &self.h_frame

@@ -60,6 +60,17 @@ pub enum Step<R, T, E> {
     },
 }
 
+impl<R, T, E> Step<R, T, E> {
+    /// What a procedure wants next that is made of this one: `done` goes on when it has succeeded.
+    pub fn and_then<U>(self, done: impl FnOnce(T, u64) -> Step<R, U, E>) -> Step<R, U, E> {
+        match self {
+            Self::Send { request, not_before_ns } => Step::Send { request, not_before_ns },
+            Self::Done { value, ready_ns } => done(value, ready_ns),
+            Self::Failed { error, ready_ns } => Step::Failed { error, ready_ns },
+        }
+    }
+}
+
 impl<R: Copy, T: Copy, E: Copy> Step<R, T, E> {
     /// How the procedure ended, done or failed; `None` if there is something to send.
     pub const fn ended(&self) -> Option<Self> {

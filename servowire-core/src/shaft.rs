@@ -178,10 +178,11 @@ impl<F: Shaft + Words<W>, const W: usize> ShaftReader<'_, F, W> {
 /// All that can speak against a position stands in one word of marks, so that one mask says what is tolerated of it. What the
 /// marks mean is the protocol's: in scope are its `Policy`, `Tolerated` (with `objects_to(marks)` and `ignores_turns()`),
 /// `Doubt`, the mark `NEVER`, `single_turn_bits(marks)`, and it writes `Evidence::doubt`, which names what speaks against a
-/// position. The fields are private to the module in which this stands, so nobody else makes a sample.
+/// position. The fields are private to the module in which this stands, so nobody else makes a sample. The last word is the name
+/// of the field for the width of the single turn, in files.
 #[macro_export]
 macro_rules! shaft_evidence {
-    ($(#[$about:meta])* Evidence) => {
+    ($(#[$about:meta])* Evidence, $bits:ident) => {
         $(#[$about])*
         #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
         #[cfg_attr(feature = "serde", derive(serde::Serialize))]
@@ -211,7 +212,7 @@ macro_rules! shaft_evidence {
                 let tolerated = policy.tolerated();
                 if policy.check_age(now_ns, sampled_ns).is_ok() && tolerated.objects_to(marks) == 0 {
                     let turns = if tolerated.ignores_turns() { None } else { Some(turns) };
-                    Ok(Sample { sampled_ns, single_turn, turns, bits: single_turn_bits(marks) })
+                    Ok(Sample { sampled_ns, single_turn, turns, $bits: single_turn_bits(marks) })
                 } else {
                     Err(self.doubt(now_ns, policy))
                 }
@@ -275,7 +276,7 @@ macro_rules! shaft_evidence {
             sampled_ns: u64,
             single_turn: u32,
             turns: Option<i32>,
-            bits: u8,
+            $bits: u8,
         }
 
         $crate::one_line!(Sample {
@@ -297,7 +298,7 @@ macro_rules! shaft_evidence {
 
             /// The place in the turn as an angle.
             pub const fn angle(self) -> $crate::Angle {
-                $crate::Angle::from_bits(self.single_turn.wrapping_shl(32_u32.wrapping_sub(self.bits as u32)))
+                $crate::Angle::from_bits(self.single_turn.wrapping_shl(32_u32.wrapping_sub(self.$bits as u32)))
             }
 
             /// Turns, if the policy judged them.
@@ -308,7 +309,7 @@ macro_rules! shaft_evidence {
             /// Both parts in counts, turns times the counts of a turn and the single turn; if the policy judged the turns.
             pub const fn counts(self) -> Option<i64> {
                 match self.turns {
-                    Some(turns) => Some((turns as i64).wrapping_shl(self.bits as u32) | self.single_turn as i64),
+                    Some(turns) => Some((turns as i64).wrapping_shl(self.$bits as u32) | self.single_turn as i64),
                     None => None,
                 }
             }

@@ -5,6 +5,7 @@ use crate::doubt::Doubt;
 use crate::encoder_id::EncoderId;
 use crate::error::Error;
 use crate::evidence::{Evidence, SafeEvidence};
+use crate::frame::Stuffing;
 use crate::message::{Finished, LongRequest, ShortRequest};
 use crate::sync::{Es, Synchroniser};
 
@@ -35,6 +36,13 @@ impl Master {
     /// Steps of a turn, RESOLUTN (resource 081h) of a rotary encoder: for [`Sample::angle`](crate::Sample::angle). 0 for none.
     pub const fn set_steps_per_turn(&mut self, steps: u32) {
         self.steps_per_turn = steps;
+    }
+
+    /// Blocks of stuffing after each H-frame of a running link that is free running, 0 at first. A frame lasts 11.52 µs and 0.64 µs a
+    /// block: for a processor that needs more time, or another rate of positions. [`ahead`](Self::ahead) goes with it.
+    pub const fn set_stuffing(&mut self, stuffing: Stuffing) {
+        self.stuffing = stuffing;
+        self.usual_ns = FREE_RUNNING_NS.wrapping_add((stuffing.get() as u32).wrapping_mul(640));
     }
 
     /// How long after its edge has left the master an encoder samples: 5 ns a metre of cable, and up to 100 ns of its own (SICK

@@ -165,26 +165,20 @@ impl VerifiedWrite {
     fn read_back(&mut self, not_before_ns: u64) -> Step<()> {
         self.phase = Phase::ReadingBack;
         self.tries = 0;
-        match &mut self.back {
-            Back::Word { read, .. } => match read.start(not_before_ns) {
-                Step::Send { request, not_before_ns } => Step::Send { request, not_before_ns },
-                // Never: a read begins with a request.
-                Step::Done { ready_ns, .. } | Step::Failed { ready_ns, .. } => {
-                    Step::Failed { error: Error::EffectUnknown, ready_ns }
-                }
-            },
-            Back::Id(request) => Step::Send { request: *request, not_before_ns },
-        }
+        let request = match &mut self.back {
+            Back::Word { read, .. } => read.begin(),
+            Back::Id(request) => *request,
+        };
+        Step::Send { request, not_before_ns }
     }
 
     fn compare(&mut self, outcome: Result<Response, Error>, ready_ns: u64) -> Step<()> {
         let written = self.write.request();
         match &mut self.back {
             Back::Word { read, data } => match read.receive(outcome, ready_ns) {
-                Step::Send { request, not_before_ns } => Step::Send { request, not_before_ns },
-                Step::Done { value, ready_ns } if value == *data => Step::Done { value: (), ready_ns },
-                Step::Done { ready_ns, .. } => Step::Failed { error: Error::NotDone, ready_ns },
                 Step::Failed { ready_ns, .. } => Step::Failed { error: Error::EffectUnknown, ready_ns },
+                Step::Done { value, ready_ns } if value != *data => Step::Failed { error: Error::NotDone, ready_ns },
+                step => step.and_then(|_, ready_ns| Step::Done { value: (), ready_ns }),
             },
             Back::Id(request) => {
                 let request = *request;

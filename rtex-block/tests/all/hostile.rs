@@ -8,7 +8,7 @@ use crate::common::CODES;
 use rtex_block::device::{Behaviour, Drive, DriveConfig, Fault, Quirks};
 use rtex_block::master::{
     ActiveCode, Asic, Axis, AxisConfig, AxisState, ControlError, ControlPhase, Limits, Master, MasterConfig,
-    RingFailure, Slave, StopPolicy,
+    RingFailure, Slave, StopCategory,
 };
 use rtex_block::position::Gear;
 use rtex_block::timing::{Periods, TimerSystem};
@@ -103,11 +103,11 @@ fn gear(place: usize) -> Gear {
 impl Bench {
     fn new(draw: &mut Draw) -> Self {
         let limit = NonZeroU16::new(LIMIT).unwrap();
-        let limits = Limits::new(limit, 80).with_ready(200).with_stop(6);
-        let policies = [StopPolicy::AtOnce, StopPolicy::Decelerate { per_update: 40 }];
+        let limits = Limits::new(limit, 80).with_ready(Some(200)).with_stop(6);
+        let policies = [StopCategory::Zero, StopCategory::One];
         let axis = |place: usize| {
             let config = AxisConfig::new(mac_id(place), ActiveCode::CyclicPosition, 500_000, limits);
-            Axis::new(config.with_stop(policies[place % 2]).with_gear(gear(place)))
+            Axis::new(config.with_stop(Some(policies[place % 2])).with_deceleration(40).with_gear(gear(place)))
         };
         let table: [Slave; AXES] = core::array::from_fn(|place| Slave { mac_id: mac_id(place), kind: 3 });
         let periods = Periods::from_a6n(3, 1, None).unwrap();
@@ -140,7 +140,7 @@ impl Bench {
     }
 
     fn update(&mut self) {
-        self.master.exchange_words32(&self.rx, &mut self.tx, self.now * PERIOD_NS).unwrap();
+        self.master.exchange_words(&self.rx, &mut self.tx, self.now * PERIOD_NS).unwrap();
         self.judge();
         self.frame();
     }
@@ -150,7 +150,7 @@ impl Bench {
         let fault = self.master.error();
         for place in 0..AXES {
             let mut block = [0; 32];
-            pack::from_words32(&self.tx[place * 8..place * 8 + 8], &mut block).unwrap();
+            pack::from_words(&self.tx[place * 8..place * 8 + 8], &mut block).unwrap();
             let main = *block.first_chunk().unwrap();
             let view = CommandBlock::of(&main).unwrap();
             self.started |= view.obeys_control();
@@ -170,7 +170,7 @@ impl Bench {
         for place in 0..AXES {
             let words = place * 8..place * 8 + 8;
             let mut block = [0; 32];
-            pack::from_words32(&self.tx[words.clone()], &mut block).unwrap();
+            pack::from_words(&self.tx[words.clone()], &mut block).unwrap();
             let from = self.drives[place].position();
             let command = if self.cut[place] { None } else { self.down[place].carry(&block, self.now) };
             if let Some(command) = command {
@@ -178,7 +178,7 @@ impl Bench {
                 response[0] ^= u8::from(self.turned[place]);
                 if let Some(block) = self.up[place].carry(&response, self.now) {
                     any = true;
-                    pack::to_words32(&block, &mut self.rx[words]).unwrap();
+                    pack::to_words(&block, &mut self.rx[words]).unwrap();
                 }
             } else {
                 self.drives[place].framing_error();

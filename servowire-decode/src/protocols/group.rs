@@ -2,7 +2,7 @@
 
 use std::fmt::Display;
 
-use crate::event::{Event, Field, Place, Refusal};
+use crate::event::{Event, Field, Place, Refusal, Span};
 use crate::line::start_stop::LineField;
 use crate::time::Time;
 
@@ -66,6 +66,24 @@ impl<T: Copy + Default, const N: usize> Group<T, N> {
     /// When each field began.
     pub(super) fn starts(&self) -> &[Time] {
         self.starts.get(..self.len).unwrap_or_default()
+    }
+
+    /// Where content bits `first` to `last` are, counted from 0 through the contents of all fields.
+    pub(super) fn span(&self, first: u32, last: u32) -> Option<Span> {
+        let width = 8 * size_of::<T>() as u32;
+        // A field as its speaker sent it, with start bit and delimiter.
+        let field = self.end - *self.starts().last()?;
+        let at = |bit: u32, after: u32| {
+            let within = 1 + bit % width;
+            let start = *self.starts().get((bit / width) as usize)?;
+            Some((bit / width * (width + 2) + within, start + field * i64::from(within + after) / i64::from(width + 2)))
+        };
+        let ((first, start), (last, end)) = (at(first, 0)?, at(last, 1)?);
+        let place = match self.place() {
+            Place::Time { .. } => Place::Time { start, end },
+            line @ Place::Line(_) => line,
+        };
+        Some(Span { first, last, place })
     }
 
     /// Number of fields.

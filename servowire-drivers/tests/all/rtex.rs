@@ -30,7 +30,7 @@ fn driver<W: Drawn>(ring: &Shared) -> Rtex<W> {
     let size = if wide { BlockSize::Bytes32 } else { BlockSize::Bytes16 };
     let config = MasterConfig::new(size, periods, timer).with_watchdog(Some(limit));
     let ids = SWITCHES.map(|switches| MacId::new(switches).unwrap());
-    let limits = Limits::new(limit, 60).with_ready(200);
+    let limits = Limits::new(limit, 60).with_ready(Some(200));
     let axes = ids.map(|id| Axis::new(AxisConfig::new(id, ActiveCode::CyclicPosition, periods.update_ns, limits)));
     let master = Master::new(config, ids.map(|mac_id| Slave { mac_id, kind: 1 }), axes).unwrap();
     Driver::new(Bus(ring.clone(), PhantomData), Watch(ring.clone()), master, reception)

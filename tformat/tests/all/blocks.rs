@@ -132,7 +132,7 @@ fn what_is_told_late_is_not_younger() {
         let line = Line::new(rate);
         assert_eq!(u64::from(line.latency_budget_ns()), budget_ns);
         let stale = checked(&[0x02, 0x00, 0x01, 0x02, 0x03]);
-        for began_ns in (0..=field_ns + field_ns / 10 - 1).step_by(100).chain([field_ns + 1]) {
+        for began_ns in (0..field_ns + field_ns / 10).step_by(100).chain([field_ns + 1]) {
             for late_ns in (0..=budget_ns).step_by(100) {
                 let mut alone = Transaction::start(Request::ReadSingleTurn, line, 0);
                 let mut block = alone;

@@ -230,7 +230,9 @@ impl Procedure for Watched {
     }
 
     fn receive(&mut self, outcome: Result<Response, Error>, ready_ns: u64) -> Step<u8> {
-        outcome.into_iter().for_each(|response| self.heard(response));
+        if let Ok(response) = outcome {
+            self.heard(response);
+        }
         let step = self.access.receive(outcome, ready_ns);
         if let Step::Send { request, .. } = step {
             self.send(request);
