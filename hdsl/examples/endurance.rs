@@ -3,10 +3,14 @@
 //!
 //! Ten million H-frames are two minutes of a free-running link.
 
-use hdsl::cable::{Cable, Disturbance};
 use hdsl::device::Device;
 use hdsl::master::Master;
 use hdsl::{Dialect, EncoderId, Policy};
+
+#[path = "../tests/all/cable.rs"]
+mod cable;
+
+use cable::{Cable, Disturbance};
 
 /// A free-running H-frame; the window of its answer ends 10,560 ns after its start.
 const FRAME_NS: u64 = 11_520;
@@ -23,7 +27,7 @@ fn main() -> Result<(), Box<dyn core::error::Error>> {
         // To and fro, within the 32 bits of the encoder.
         position = if frame & 0x8000 == 0 { position.wrapping_add(3) } else { position.wrapping_sub(3) };
         let head = cable.down(master.transmission().head.bits());
-        let samples = cable.up(encoder.hear_at(head, position));
+        let samples = cable.up(encoder.set_position(position).hear(head));
         let h_frame = master.hear(&samples, FRAME_NS.saturating_mul(frame).saturating_add(10_560))?;
         if let Some(reason) = h_frame.restarted {
             println!("frame {frame}: link started anew: {reason}");

@@ -16,12 +16,16 @@
 
 use core::fmt::Write;
 
-use hdsl::cable::{Cable, Disturbance};
 use hdsl::device::{Device, Transmission};
 use hdsl::master::Master;
 use hdsl::message::{LongRequest, RemoteRegister, ResourceAddress, ShortRequest};
 use hdsl::registers::Registers;
 use hdsl::{Dialect, EncoderId};
+
+#[path = "../tests/all/cable.rs"]
+mod cable;
+
+use cable::{Cable, Disturbance};
 
 fn hex(bytes: impl IntoIterator<Item = u8>) -> String {
     bytes.into_iter().fold(String::new(), |mut text, byte| {
@@ -49,7 +53,7 @@ pub(crate) fn trace(dialect: Dialect, metres: u32, frames: u64) -> Result<String
             _ => {}
         }
         let present = master.transmission();
-        let answer = encoder.hear_at(cable.down(present.head.bits()), position);
+        let answer = encoder.set_position(position).hear(cable.down(present.head.bits()));
         // One damaged bit in the acceleration.
         let answer =
             if frame == 170 { answer.map(|answer| Transmission { bits: answer.bits ^ 1 << 35 }) } else { answer };

@@ -1,7 +1,5 @@
 //! The encoder's answer: 61 bits, six words and the switch bit.
 
-use core::fmt;
-
 use nrz_line::Window;
 
 use crate::acceleration::DeltaDelta;
@@ -18,7 +16,6 @@ use crate::symbol::{Character, Control, Entry, Reading, Rule, RunningDisparity, 
 ///                                                       inverse of bit 49
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Answer {
     line: u64,
     vertical: Entry,
@@ -200,13 +197,12 @@ impl serde::Serialize for Answer {
     }
 }
 
-/// The six words in line order: `D1.2 D6.0 K30.7 D0.0 D0.0 D16.5`.
-impl fmt::Display for Answer {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let [vertical, parameter, pipe, high, low, secondary] = self.words();
-        write!(f, "{vertical} {parameter} {pipe} {high} {low} {secondary}")
-    }
-}
+// The six words in line order: `D1.2 D6.0 K30.7 D0.0 D0.0 D16.5`.
+servowire_core::one_line!(Answer {
+    answer => "{} {} {} {} {} {}",
+        answer.vertical(), answer.parameter_word(), answer.pipe(),
+        answer.acceleration_words()[0], answer.acceleration_words()[1], answer.secondary();
+});
 
 /// What an encoder puts into an answer.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]

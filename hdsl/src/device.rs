@@ -13,24 +13,25 @@
 //!
 //! ```
 //! use hdsl::EncoderId;
-//! use hdsl::cable::{Cable, Disturbance};
 //! use hdsl::device::{Device, Heard};
 //! use hdsl::master::Master;
+//! use hdsl::sampling::line;
 //! use hdsl::{Dialect, Policy};
 //!
-//! let mut cable = Cable::new(Disturbance::metres(40).with_jitter(1), 1);
 //! let mut master = Master::new(Dialect::SICK);
 //! let mut encoder = Device::new(EncoderId::try_from(0x00153)?);
 //! for frame in 0..150_u64 {
-//!     let line = cable.down_samples(master.transmission().head);
-//!     let heard = Heard::on_line(&line).ok_or("no head")?;
+//!     let sent: Vec<u8> = master.transmission().head.samples().collect();
+//!     let heard = Heard::on_line(&sent).ok_or("no head")?;
 //!     // 864 eighths of a bit a frame; the shaft turns by two steps in each.
 //!     let instant = 864 * frame + u64::from(encoder.sampling_instant(&heard));
-//!     let answer = encoder.hear_at(heard.bits, 2 * instant);
-//!     master.hear(&cable.up_heard(answer, &heard), 11_520 * frame + 10_560)?;
+//!     let answer = encoder.set_position(2 * instant).hear(heard.bits);
+//!     // The answer comes 9 eighths of a bit late.
+//!     let samples = answer.map_or([0xff; 72], |answer| line(answer.bits, 9));
+//!     master.hear(&samples, 11_520 * frame + 10_560)?;
 //! }
 //! let fast = master.fast().at(11_520 * 150, Policy::new(20_000))?;
-//! assert!((fast.velocity() - 2 * 864).abs() <= 2 * 2);
+//! assert_eq!(fast.velocity(), 2 * 864);
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
@@ -141,15 +142,11 @@ impl Device {
         &mut self.resources
     }
 
-    /// Turns the shaft: the position at the sampling edge of the next head.
-    pub const fn set_position(&mut self, position: u64) {
+    /// Turns the shaft: the position in steps at the sampling edge of the next head. What is beyond the width of the encoder is
+    /// dropped.
+    pub const fn set_position(&mut self, position: u64) -> &mut Self {
         self.shaft = position;
-    }
-
-    /// As [`hear`](Self::hear), with the position at the sampling edge of this head: for a shaft that turns.
-    pub fn hear_at(&mut self, head: Window, position: u64) -> Option<Transmission> {
-        self.set_position(position);
-        self.hear(head)
+        self
     }
 
     /// Takes the head of an H-frame and gives the answer; `None` if there is none.

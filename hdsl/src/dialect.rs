@@ -1,9 +1,33 @@
 use crate::message::Limits;
 use crate::position::PositionRule;
 use crate::quality::QualityRule;
-use crate::registers::RegisterRule;
 use crate::sampling::EdgeRule;
 use crate::symbol::Rule;
+
+/// What the register map shows, and when events are raised.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "arbitrary", derive(arbitrary::Arbitrary))]
+pub enum RegisterRule {
+    /// The SICK manual, p. 31-55.
+    ///
+    /// * Each safe channel shows its last valid block, whatever the other does; a bad word or a wrong CRC sets SCE. If the
+    ///   encoder has no position VPOS shows FDh five times.
+    /// * An event is raised when its status arises, and again only after that has gone. MIN alone is raised in every
+    ///   frame.
+    /// * What the receiver writes cannot be written; ACC_ERR_CNT stops at 31; an error code of a long message stands in
+    ///   PC_BUFFER with its detail first, as on the line; the pipe has a FIFO.
+    #[default]
+    Sick,
+    /// The firmware of the Motor Control SDK.
+    ///
+    /// * SUMMARY and VPOSCRC are shown as received; channel 2 is shown only with a good channel 1, and a bad word in it
+    ///   leaves SCE2 as it was.
+    /// * POS and QMLW are raised in every frame while they last.
+    /// * The map is memory: everything can be written. An error code stands in PC_BUFFER with its class first.
+    Ti,
+}
 
 /// Where receivers differ, and which way to go.
 ///

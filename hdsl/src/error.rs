@@ -1,4 +1,4 @@
-use crate::message::ResourceError;
+use crate::resource::ResourceError;
 
 servowire_core::errors! {
     /// Why something received was refused, or something asked for cannot be done.

@@ -25,7 +25,7 @@
 //! let mut master = Master::new(Dialect::SICK);
 //! let mut encoder = Device::new(EncoderId::try_from(0x00153)?);
 //! for frame in 0..150_u64 {
-//!     let answer = encoder.hear_at(master.transmission().head.bits(), 7 * frame);
+//!     let answer = encoder.set_position(7 * frame).hear(master.transmission().head.bits());
 //!     // a cable that delays the answer by 11 eighths of a bit
 //!     let samples = answer.map_or([0xff; 72], |answer| line(answer.bits, 11));
 //!     // The window of the answer ends 99 bits after the frame began.
@@ -56,7 +56,6 @@ use crate::frame::{BIT_RATE, Extra, Stuffing, Tail, Trailer};
 use crate::line_code::LineDisparity;
 use crate::message::{Finished, Requester};
 use crate::parameter::{EncoderByte, MasterSymbol};
-use crate::position::AlignmentStage;
 use crate::sampling::{Alignment, SampledAnswer, TEST_PATTERN, WINDOW};
 use crate::sync::Synchroniser;
 use link::Link;
@@ -65,6 +64,8 @@ use send::{trailer, transmission};
 /// Bits from the sampling edge of a frame without an EXTRA window to the end of the window of its answer: those of the head
 /// after it, the direction switch, the answer and its reserve.
 const SINCE_EDGE_BITS: u64 = 18 + 1 + WINDOW as u64;
+/// A free-running frame and a half, in ns.
+const FREE_RUNNING_NS: u32 = 17_280;
 /// The same time in ns, rounded up.
 const SINCE_EDGE_NS: u64 = (SINCE_EDGE_BITS * 1_000_000_000).div_ceil(BIT_RATE as u64);
 
@@ -94,6 +95,14 @@ pub struct Master {
     restart: bool,
     /// When the window of the last answer was over.
     end_ns: u64,
+    /// From the end of a window to that of the next one, and half a frame: if it takes longer a frame was lost.
+    longest_ns: u32,
+    /// Number of the last H-frame that was heard.
+    number: u32,
+    /// Steps of a turn for the angle in a sample; 0 if they are not known.
+    steps_per_turn: u32,
+    /// From the sampling edge at the master to the sampling in the encoder.
+    latency_ns: u16,
     /// By how much its sampling edge was before the end of an EXTRA window, in ns.
     edge_ns: u8,
     /// How late the external pulse of the present frame was, in eighths of a bit.
@@ -131,13 +140,17 @@ impl Master {
             alignment: None,
             edges: 0,
             encoder: None,
-            link: Link::new(&dialect, PositionBits::MAX),
+            link: Link::new(&dialect, EncoderId::truncate(0), PositionBits::MAX),
             requester: Requester::new(dialect.messages),
             h_frame: HFrame::START,
             counters: Counters::default(),
             threshold: 0x1f,
             restart: false,
             end_ns: 0,
+            longest_ns: u32::MAX,
+            number: u32::MAX,
+            steps_per_turn: 0,
+            latency_ns: 0,
             edge_ns: 0,
             late: None,
             ahead: None,
@@ -184,11 +197,6 @@ impl Master {
         self.encoder
     }
 
-    /// How far the fast position is aligned with the safe one.
-    pub const fn stage(&self) -> AlignmentStage {
-        self.link.stage()
-    }
-
     /// Whether the edge of the present frame belongs to the external pulse; `false` when free running.
     pub fn is_on_pulse(&self) -> bool {
         self.sync.is_some_and(|sync| sync.is_on_pulse())
@@ -206,7 +214,7 @@ impl Master {
             let got = u16::try_from(samples.len()).unwrap_or(u16::MAX);
             return Err(Error::Truncated { got, want: 72 });
         }
-        self.end_ns = end_ns;
+        self.frame_ends(end_ns);
         Ok(match (self.state, self.alignment, samples.first_chunk()) {
             (State::Start, ..) => self.learn(samples),
             (_, Some(alignment), Some(window)) if self.present.answered => {
@@ -232,7 +240,7 @@ impl Master {
     /// assert_eq!(master.state(), State::Reset);
     /// ```
     pub fn hear_words(&mut self, samples: &[u32; WINDOW / 4], end_ns: u64) -> &HFrame {
-        self.end_ns = end_ns;
+        self.frame_ends(end_ns);
         match (self.state, self.alignment) {
             (State::Start, _) => {
                 let mut bytes = [0; WINDOW];
@@ -286,7 +294,7 @@ impl Master {
     /// let mut encoder = Device::new(EncoderId::try_from(0x00153)?);
     /// while master.state() != State::Running {
     ///     // A line that stays high is all ones.
-    ///     let answer = encoder.hear_at(master.transmission().head.bits(), 1000);
+    ///     let answer = encoder.set_position(1000).hear(master.transmission().head.bits());
     ///     let bits = answer.map_or(u64::MAX, |answer| answer.bits);
     ///     master.hear_bits(bits, None, 0);
     /// }
@@ -294,7 +302,7 @@ impl Master {
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
     pub fn hear_bits(&mut self, bits: u64, signal: Option<SignalQuality>, end_ns: u64) -> &HFrame {
-        self.end_ns = end_ns;
+        self.frame_ends(end_ns);
         self.end(bits, signal)
     }
 
@@ -304,9 +312,20 @@ impl Master {
         self.late = Some(late);
     }
 
-    /// When the sampling edge of the last H-frame left.
+    /// Another H-frame was heard. If it ended too late one was lost of which nobody told, and with it the position.
+    #[inline]
+    fn frame_ends(&mut self, end_ns: u64) {
+        if end_ns.saturating_sub(self.end_ns) > self.longest_ns.into() {
+            self.link.interrupt();
+        }
+        self.end_ns = end_ns;
+        self.number = self.number.wrapping_add(1);
+    }
+
+    /// When the encoder sampled in the last H-frame.
     const fn sampled_ns(&self) -> u64 {
-        self.end_ns.saturating_sub(SINCE_EDGE_NS).saturating_sub(self.edge_ns as u64)
+        let since_edge_ns = SINCE_EDGE_NS.wrapping_add(self.edge_ns as u64).saturating_sub(self.latency_ns as u64);
+        self.end_ns.saturating_sub(since_edge_ns)
     }
 
     /// A V-frame begins after the present H-frame.
@@ -332,6 +351,7 @@ impl Master {
         self.counters.frames = self.counters.frames.wrapping_add(1);
         self.h_frame.restarted = None;
         self.h_frame.state = State::Running;
+        self.longest_ns = FREE_RUNNING_NS;
         self.h_frame.tail = Tail { trailer: Trailer::AfterAnswer, stuffing: Stuffing::MIN };
         self.h_frame.long_free = self.requester.is_long_free();
         self.h_frame.short_free = self.requester.is_short_free();
@@ -362,6 +382,7 @@ impl Master {
             stuffing: next.map_or_else(|| self.search_time(was, restarted), |next| next.stuffing),
         };
         self.prepare(was, next.map(|next| next.extra), restarted.is_some());
+        self.longest_ns = self.present_ns();
         self.h_frame.restarted = restarted;
         self.h_frame.state = self.state;
         self.h_frame.long_free = self.state == State::Running && self.requester.is_long_free();
@@ -392,7 +413,7 @@ impl Master {
         let id = EncoderId::from_answer(answer)?;
         let bits = id.check()?;
         self.encoder = Some(id);
-        self.link = Link::new(&self.dialect, bits);
+        self.link = Link::new(&self.dialect, id, bits);
         self.h_frame.encoder = Some(id);
         Ok(())
     }
@@ -403,7 +424,6 @@ impl Master {
         if answer.parameter().is_ok_and(EncoderByte::vsync) {
             (self.state, self.done) = (State::Running, 0);
             self.latch();
-            self.h_frame.doubtful = self.dialect.doubt_at_lock;
         } else if self.dialect.vsync_frames != 0 && self.done >= self.dialect.vsync_frames {
             return Err(RestartReason::NoVsync);
         }
@@ -415,7 +435,7 @@ impl Master {
         let was = self.h_frame.was;
         self.counters.restarts = self.counters.restarts.wrapping_add(1);
         (self.state, self.done) = (State::Reset, 0);
-        self.link = Link::new(&self.dialect, PositionBits::MAX);
+        self.link = Link::new(&self.dialect, EncoderId::truncate(0), PositionBits::MAX);
         self.encoder = None;
         let finished = self.h_frame.finished;
         let dropped = self.requester.drop_all();

@@ -7,63 +7,68 @@ servowire_core::number! {
     pub struct Nibble(u8, 4);
 }
 
-/// What the master says in bits 4:0 of its parameter byte.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-#[cfg_attr(feature = "arbitrary", derive(arbitrary::Arbitrary))]
-pub enum MasterSymbol {
-    /// 00h..0Fh: four bits of a message.
-    Data(Nibble),
-    /// 10h: nothing to say.
-    Idle,
-    /// 19h: synchronise; no answer.
-    Sync,
-    /// 1Ah: answer with the test pattern, the delay is being searched.
-    Start,
-    /// 1Bh: answer with the test pattern at the learned delay.
-    Learn,
-    /// 1Ch: line check, answer with the test pattern.
-    Check,
-    /// 1Dh: answer with the encoder identifier.
-    IdReq,
-    /// 1Eh: drop all messages; in the start-up also wait for VSYNC.
-    Init,
-    /// 1Fh: reset the link; no answer.
-    Reset,
+/// Declares what an end can say in bits 4:0 of its parameter byte: four bits of a message, or a code with a name.
+macro_rules! symbols {
+    ($(#[$meta:meta])* pub enum $name:ident { $($(#[$doc:meta])* $symbol:ident = $code:literal => $text:literal,)* }) => {
+        $(#[$meta])*
+        #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+        #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+        #[cfg_attr(feature = "arbitrary", derive(arbitrary::Arbitrary))]
+        pub enum $name {
+            /// 00h..0Fh: four bits of a message.
+            Data(Nibble),
+            $($(#[$doc])* $symbol,)*
+        }
+
+        impl $name {
+            /// The five bits.
+            pub const fn code(self) -> u8 {
+                match self {
+                    Self::Data(nibble) => nibble.get(),
+                    $(Self::$symbol => $code,)*
+                }
+            }
+
+            /// From the five bits; `None` for a code without a meaning, and for more than five bits.
+            pub const fn from_code(code: u8) -> Option<Self> {
+                Some(match code {
+                    nibble @ 0..=15 => Self::Data(Nibble::truncate(nibble)),
+                    $($code => Self::$symbol,)*
+                    _ => return None,
+                })
+            }
+        }
+
+        servowire_core::one_line!($name {
+            Self::Data(nibble) => "{:X}", nibble.get();
+            $(Self::$symbol => $text;)*
+        });
+    };
+}
+
+symbols! {
+    /// What the master says in bits 4:0 of its parameter byte.
+    pub enum MasterSymbol {
+        /// 10h: nothing to say.
+        Idle = 0x10 => "IDLE",
+        /// 19h: synchronise; no answer.
+        Sync = 0x19 => "SYNC",
+        /// 1Ah: answer with the test pattern, the delay is being searched.
+        Start = 0x1a => "START",
+        /// 1Bh: answer with the test pattern at the learned delay.
+        Learn = 0x1b => "LEARN",
+        /// 1Ch: line check, answer with the test pattern.
+        Check = 0x1c => "CHECK",
+        /// 1Dh: answer with the encoder identifier.
+        IdReq = 0x1d => "IDREQ",
+        /// 1Eh: drop all messages; in the start-up also wait for VSYNC.
+        Init = 0x1e => "INIT",
+        /// 1Fh: reset the link; no answer.
+        Reset = 0x1f => "RESET",
+    }
 }
 
 impl MasterSymbol {
-    /// The five bits.
-    pub const fn code(self) -> u8 {
-        match self {
-            Self::Data(nibble) => nibble.get(),
-            Self::Idle => 0x10,
-            Self::Sync => 0x19,
-            Self::Start => 0x1a,
-            Self::Learn => 0x1b,
-            Self::Check => 0x1c,
-            Self::IdReq => 0x1d,
-            Self::Init => 0x1e,
-            Self::Reset => 0x1f,
-        }
-    }
-
-    /// From the five bits; `None` for 11h..18h and for more than five bits.
-    pub const fn from_code(code: u8) -> Option<Self> {
-        Some(match code {
-            nibble @ 0..=15 => Self::Data(Nibble::truncate(nibble)),
-            0x10 => Self::Idle,
-            0x19 => Self::Sync,
-            0x1a => Self::Start,
-            0x1b => Self::Learn,
-            0x1c => Self::Check,
-            0x1d => Self::IdReq,
-            0x1e => Self::Init,
-            0x1f => Self::Reset,
-            _ => return None,
-        })
-    }
-
     /// Whether it belongs to the start-up: frames that are answered by the test pattern or the identifier.
     pub const fn is_start_up(self) -> bool {
         matches!(self, Self::Start | Self::Learn | Self::Check | Self::IdReq)
@@ -142,45 +147,17 @@ impl ParameterByte {
     }
 }
 
-/// What the encoder says in bits 4:0 of its parameter byte.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-#[cfg_attr(feature = "arbitrary", derive(arbitrary::Arbitrary))]
-pub enum EncoderSymbol {
-    /// 00h..0Fh: four bits of a message.
-    Data(Nibble),
-    /// 10h: nothing to say.
-    Idle,
-    /// 15h: the short message was not understood.
-    Snak,
-    /// 1Ah: the long message was not understood.
-    Lnak,
-    /// 1Fh: the message state was reset.
-    Init,
-}
-
-impl EncoderSymbol {
-    /// The five bits.
-    pub const fn code(self) -> u8 {
-        match self {
-            Self::Data(nibble) => nibble.get(),
-            Self::Idle => 0x10,
-            Self::Snak => 0x15,
-            Self::Lnak => 0x1a,
-            Self::Init => 0x1f,
-        }
-    }
-
-    /// From the five bits; `None` for a code without a meaning.
-    pub const fn from_code(code: u8) -> Option<Self> {
-        Some(match code {
-            nibble @ 0..=15 => Self::Data(Nibble::truncate(nibble)),
-            0x10 => Self::Idle,
-            0x15 => Self::Snak,
-            0x1a => Self::Lnak,
-            0x1f => Self::Init,
-            _ => return None,
-        })
+symbols! {
+    /// What the encoder says in bits 4:0 of its parameter byte.
+    pub enum EncoderSymbol {
+        /// 10h: nothing to say.
+        Idle = 0x10 => "IDLE",
+        /// 15h: the short message was not understood.
+        Snak = 0x15 => "SNAK",
+        /// 1Ah: the long message was not understood.
+        Lnak = 0x1a => "LNAK",
+        /// 1Fh: the message state was reset.
+        Init = 0x1f => "INIT",
     }
 }
 
@@ -238,26 +215,6 @@ impl EncoderByte {
         }
     }
 }
-
-servowire_core::one_line!(MasterSymbol {
-    Self::Data(nibble) => "{:X}", nibble.get();
-    Self::Idle => "IDLE";
-    Self::Sync => "SYNC";
-    Self::Start => "START";
-    Self::Learn => "LEARN";
-    Self::Check => "CHECK";
-    Self::IdReq => "IDREQ";
-    Self::Init => "INIT";
-    Self::Reset => "RESET";
-});
-
-servowire_core::one_line!(EncoderSymbol {
-    Self::Data(nibble) => "{:X}", nibble.get();
-    Self::Idle => "IDLE";
-    Self::Snak => "SNAK";
-    Self::Lnak => "LNAK";
-    Self::Init => "INIT";
-});
 
 /// The name of a bit that is set.
 const fn flag(set: bool, name: &'static str) -> &'static str {

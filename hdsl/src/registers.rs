@@ -9,16 +9,17 @@
 //!
 //! ```
 //! use hdsl::Dialect;
-//! use hdsl::registers::{OnlineD, Registers};
+//! use hdsl::registers::{Register, Registers};
 //!
 //! let mut memory = [0_u8; Registers::LEN];
 //! memory[0x03] = 0x8f; // MASTER_QM
 //! memory[0x10..0x15].copy_from_slice(&[0, 0x12, 0x34, 0x56, 0x78]); // POS
 //! memory[0x50..0x52].copy_from_slice(&[0x18, 0x02]); // ONLINE_STATUS_D
 //! let map = Registers::from_bytes(&Dialect::TI, memory);
-//! assert_eq!((map.link(), map.quality(), map.pos()), (true, 15, 0x1234_5678));
+//! assert_eq!((map.link(), map.quality(), map.pos()), (true, 15, None));
 //! assert_eq!(map.online_d().to_string(), "FIX1 POS FREL");
-//! assert!(map.online_d().contains(OnlineD::POS));
+//! // POS: the position is estimated or not aligned.
+//! assert_eq!(map.get(Register::Pos), [0, 0x12, 0x34, 0x56, 0x78]);
 //! ```
 
 mod apply;
@@ -34,39 +35,27 @@ pub use map::Register;
 pub use pipe::{PipeFifo, PipeReading};
 
 use crate::dialect::Dialect;
-
-/// What the register map shows, and when events are raised.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-#[cfg_attr(feature = "arbitrary", derive(arbitrary::Arbitrary))]
-pub enum RegisterRule {
-    /// The SICK manual, p. 31-55.
-    ///
-    /// * Each safe channel shows its last valid block, whatever the other does; a bad word or a wrong CRC sets SCE. If the
-    ///   encoder has no position VPOS shows FDh five times.
-    /// * An event is raised when its status arises, and again only after that has gone. MIN alone is raised in every
-    ///   frame.
-    /// * What the receiver writes cannot be written; ACC_ERR_CNT stops at 31; an error code of a long message stands in
-    ///   PC_BUFFER with its detail first, as on the line; the pipe has a FIFO.
-    #[default]
-    Sick,
-    /// The firmware of the Motor Control SDK.
-    ///
-    /// * SUMMARY and VPOSCRC are shown as received; channel 2 is shown only with a good channel 1, and a bad word in it
-    ///   leaves SCE2 as it was.
-    /// * POS and QMLW are raised in every frame while they last.
-    /// * The map is memory: everything can be written. An error code stands in PC_BUFFER with its class first.
-    Ti,
-}
+pub use crate::dialect::RegisterRule;
+use crate::encoder_id::PositionBits;
+use crate::fast::FastPosition;
+use crate::position::{AlignmentStage, PositionTracker};
+use crate::vframe::VFrame;
 
 /// An image of the register map.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Registers {
     bytes: [u8; Self::LEN],
-    rule: RegisterRule,
+    dialect: Dialect,
     pipe: PipeFifo,
+    /// POS and VEL by the rule of the dialect.
+    tracker: PositionTracker,
+    /// What may be used of them; none of a foreign image.
+    fast: Option<FastPosition>,
+    /// The blocks of a V-frame, which are shown one H-frame after its end.
+    v_frame: Option<VFrame>,
+    /// The last good safe position, or none because the encoder had none.
+    last_safe: Option<u64>,
 }
 
 impl Registers {
@@ -88,7 +77,15 @@ impl Registers {
 
     /// An image that was read from somewhere else.
     pub const fn from_bytes(dialect: &Dialect, bytes: [u8; Self::LEN]) -> Self {
-        Self { bytes, rule: dialect.registers, pipe: PipeFifo::new() }
+        Self {
+            bytes,
+            dialect: *dialect,
+            pipe: PipeFifo::new(),
+            tracker: PositionTracker::new(PositionBits::MAX),
+            fast: None,
+            v_frame: None,
+            last_safe: Some(0),
+        }
     }
 
     /// All bytes.
@@ -144,16 +141,30 @@ impl Registers {
         qm & 15
     }
 
-    /// POS4..POS0: the fast position, 40 bits, usable or not: see ONLINE_STATUS_D, and
-    /// [`Master::fast`](crate::master::Master::fast) for one to use.
-    pub fn pos(&self) -> u64 {
-        self.get40(Register::Pos)
+    /// POS4..POS0: the fast position, 40 bits, if it may be used: the link is up and POS is clear, and in a map that is kept with
+    /// [`apply`](Self::apply) what [`Master::fast`](crate::master::Master::fast) gives is the same. A receiver that is
+    /// elsewhere can show a position that is not aligned without saying so.
+    pub fn pos(&self) -> Option<u64> {
+        self.shown().map(|(pos, _)| pos)
     }
 
-    /// VEL2..VEL0: speed in steps an H-frame, usable or not.
-    pub fn vel(&self) -> i32 {
+    /// VEL2..VEL0: speed in steps an H-frame, if the position may be used.
+    pub fn vel(&self) -> Option<i32> {
+        self.shown().map(|(_, vel)| vel)
+    }
+
+    fn shown(&self) -> Option<(u64, i32)> {
+        let pos = self.get40(Register::Pos);
         let [a, b, c] = self.get(Register::Vel);
-        i32::from_be_bytes([a, b, c, 0]) >> 8
+        let vel = i32::from_be_bytes([a, b, c, 0]) >> 8;
+        let claimed = self.link() && !self.online_d().contains(OnlineD::POS);
+        let agrees = self.fast.is_none_or(|fast| fast.is_at(pos, vel));
+        (claimed && agrees).then_some((pos, vel))
+    }
+
+    /// How far POS is aligned with the safe position.
+    pub const fn stage(&self) -> AlignmentStage {
+        self.tracker.stage()
     }
 
     /// VPOS4..VPOS0: safe position 1, 40 bits: the last good one, of whatever age. For one to use there is
@@ -244,7 +255,9 @@ mod tests {
         let mut map = Registers::new(&Dialect::TI);
         map.put40(Register::Pos, 0x12_3456_789a);
         map.put(Register::Vel, [0xff, 0xff, 0xfe]);
-        assert_eq!((map.pos(), map.vel()), (0x12_3456_789a, -2));
+        assert_eq!((map.pos(), map.vel()), (None, None));
+        map.put(Register::MasterQm, [0x88]);
+        assert_eq!((map.pos(), map.vel()), (Some(0x12_3456_789a), Some(-2)));
         assert_eq!(map.byte(0x14), Some(0x9a));
         map.put(Register::EventH, [0x08, 0]);
         map.put(Register::EventS, [0x01]);
@@ -259,6 +272,6 @@ mod tests {
         let bytes = core::array::from_fn(|at| at as u8);
         let map = Registers::from_bytes(&Dialect::TI, bytes);
         assert_eq!(map.as_bytes(), &bytes);
-        assert_eq!((map.pos(), map.vpos2()), (0x10_1112_1314, 0x47_4849_4a4b));
+        assert_eq!((map.vpos(), map.vpos2()), (0x19_1a1b_1c1d, 0x47_4849_4a4b));
     }
 }

@@ -17,8 +17,6 @@ mod table;
 use table::{CONTROL, CONTROLS, DATA, DECODE, INVALID, MINUS, PLUS, REDUCED, SPECIAL, Table};
 pub(crate) use table::{FOUR_MORE_ZEROS, NEUTRAL, SIX_MORE_ZEROS};
 
-use core::fmt;
-
 use crate::error::Error;
 
 servowire_core::number! {
@@ -286,7 +284,6 @@ impl Entry {
 
 /// What a receiver makes of a word.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Reading {
     entry: Entry,
     word: Word,
@@ -358,15 +355,11 @@ impl serde::Serialize for Reading {
     }
 }
 
-/// `D28.5`, `K28.5`; a word that is no good with its ten line bits, the first one first: `?1111111111`.
-impl fmt::Display for Reading {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self.character() {
-            Ok(character) => write!(f, "{character}"),
-            Err(_) => write!(f, "?{:010b}", self.word.get().reverse_bits() >> 6),
-        }
-    }
-}
+// `D28.5`, `K28.5`; a word that is no good with its ten line bits, the first one first: `?1111111111`.
+servowire_core::one_line!(Reading {
+    reading if reading.is_byte_error() => "?{:010b}", reading.word.get().reverse_bits() >> 6;
+    reading => "{}", Character(reading.entry.0 & 0x1ff);
+});
 
 /// The verdict of a [`DisparityCheck`] on a word.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]

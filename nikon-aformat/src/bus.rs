@@ -238,6 +238,11 @@ impl Bus {
         self.asked
     }
 
+    /// The addresses that sent a good response, asked or not.
+    pub(crate) const fn heard(&self) -> Addresses {
+        self.heard
+    }
+
     /// The addresses that were asked and sent nothing good.
     pub const fn missing(&self) -> Addresses {
         self.asked.without(self.heard)

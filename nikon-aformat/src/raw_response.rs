@@ -5,9 +5,8 @@ use nrz_line::{BitOrder, Window};
 use crate::contents::{Contents, apart, framed, together};
 use crate::crc::{mirrored, next_word};
 use crate::error::Error;
-use crate::frame::{MAX_FRAMES, framing, pack, truncated};
-use crate::layout::FRAME_BITS;
-use crate::layout::Layout;
+use crate::frame::{framing, pack, truncated};
+use crate::layout::{FRAME_BITS, Layout, MAX_FRAMES};
 use crate::text::write_words;
 use crate::units::Units;
 

@@ -1,6 +1,6 @@
 use servowire_core::Tolerance;
 
-use crate::marks::Marks;
+use crate::marks::{NO_TURNS, OBJECTIONS, of_alarms, of_status};
 use crate::status::{Alm, EncoderStatus};
 
 /// Up to which age, and in spite of what, a position may be used.
@@ -15,85 +15,58 @@ pub type Policy = servowire_core::Policy<Tolerated>;
 
 /// In spite of what a position may be used: status bits, and alarms where a response carries them.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(from = "Written", into = "Written"))]
-pub struct Tolerated(Marks);
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "arbitrary", derive(arbitrary::Arbitrary))]
+pub struct Tolerated {
+    status: EncoderStatus,
+    alarms: Alm,
+    /// Turns may be anything, or missing: they are not used.
+    any_turns: bool,
+}
 
 impl Tolerated {
     /// Nothing.
-    pub const NOTHING: Self = Self(Marks::empty());
+    pub const NOTHING: Self = Self { status: EncoderStatus::empty(), alarms: Alm::empty(), any_turns: false };
 
     #[cfg(test)]
-    pub(crate) const ANY_TURNS: Self = Self(Marks::NO_TURNS);
+    pub(crate) const ANY_TURNS: Self = Self { any_turns: true, ..Self::NOTHING };
 
     /// As one drive does where turns are not used: an encoder without its battery shows BATT. The turns are not judged then, and
     /// the [`Sample`](crate::Sample) does not have them. Everything else means that the position may be wrong or that something
     /// is about to fail.
-    pub const SINGLE_TURN: Self = Self(Marks::NO_TURNS).status(EncoderStatus::BATT).alarms(Alm::BATT);
+    pub const SINGLE_TURN: Self = Self { status: EncoderStatus::BATT, alarms: Alm::BATT, any_turns: true };
 
     /// These status bits too.
     #[must_use]
     pub const fn status(self, status: EncoderStatus) -> Self {
-        Self(self.0.union(Marks::of_status(status)))
+        Self { status: self.status.union(status), ..self }
     }
 
     /// These alarms too.
     #[must_use]
     pub const fn alarms(self, alarms: Alm) -> Self {
-        Self(self.0.union(Marks::of_alarms(alarms)))
+        Self { alarms: self.alarms.union(alarms), ..self }
     }
 
     /// What of these marks is not tolerated.
     #[inline]
-    pub(crate) const fn objects_to(self, marks: Marks) -> Marks {
-        marks.difference(self.0)
+    pub(crate) const fn objects_to(self, marks: u32) -> u32 {
+        let turns = if self.any_turns { NO_TURNS } else { 0 };
+        marks & OBJECTIONS & !(turns | of_status(self.status) | of_alarms(self.alarms))
     }
 
-    /// Whether turns may be anything, or missing: they are not used.
+    /// Whether turns may be anything.
     #[inline]
     pub(crate) const fn ignores_turns(self) -> bool {
-        self.0.contains(Marks::NO_TURNS)
+        self.any_turns
     }
 }
 
 servowire_core::one_line!(Tolerated {
-    Self(marks) if marks.contains(Marks::NO_TURNS) =>
-        "status {} and alarms {}, any turns", marks.status(), marks.alarms();
-    Self(marks) => "status {} and alarms {}", marks.status(), marks.alarms();
+    Self { status, alarms, any_turns: true } => "status {} and alarms {}, any turns", status, alarms;
+    Self { status, alarms, any_turns: false } => "status {} and alarms {}", status, alarms;
 });
 
 impl Tolerance for Tolerated {
     const NOTHING: Self = Self::NOTHING;
-}
-
-/// What is tolerated, as it is written down.
-#[derive(Clone, Copy)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-#[cfg_attr(feature = "arbitrary", derive(arbitrary::Arbitrary))]
-#[cfg(any(feature = "serde", feature = "arbitrary"))]
-struct Written {
-    status: EncoderStatus,
-    alarms: Alm,
-    any_turns: bool,
-}
-
-#[cfg(any(feature = "serde", feature = "arbitrary"))]
-impl From<Written> for Tolerated {
-    fn from(Written { status, alarms, any_turns }: Written) -> Self {
-        let turns = if any_turns { Marks::NO_TURNS } else { Marks::empty() };
-        Self(turns).status(status).alarms(alarms)
-    }
-}
-
-#[cfg(feature = "serde")]
-impl From<Tolerated> for Written {
-    fn from(Tolerated(marks): Tolerated) -> Self {
-        Self { status: marks.status(), alarms: marks.alarms(), any_turns: marks.contains(Marks::NO_TURNS) }
-    }
-}
-
-#[cfg(feature = "arbitrary")]
-impl<'a> arbitrary::Arbitrary<'a> for Tolerated {
-    fn arbitrary(from: &mut arbitrary::Unstructured<'a>) -> arbitrary::Result<Self> {
-        from.arbitrary::<Written>().map(Self::from)
-    }
 }

@@ -22,8 +22,8 @@ pub fn write_names<'a>(f: &mut fmt::Formatter<'_>, names: impl IntoIterator<Item
 /// }
 /// servowire_core::show_flags!(Lamps);
 ///
-/// let texts = [0x00, 0x09, 0x41, 0x40].map(|bits| Lamps::from_bits_retain(bits).to_string());
-/// assert_eq!(texts, ["-", "GREEN RED", "GREEN 40h", "40h"]);
+/// let texts = [0x00, 0x09, 0x41, 0x40, 0x03, 0x02].map(|bits| Lamps::from_bits_retain(bits).to_string());
+/// assert_eq!(texts, ["-", "GREEN RED", "GREEN 40h", "40h", "GREEN 02h", "02h"]);
 /// ```
 #[macro_export]
 macro_rules! show_flags {

@@ -128,24 +128,6 @@ servowire_core::errors! {
             /// Time stamp expected.
             want: u16,
         },
-        /// A register field holds a code that the data sheet reserves.
-        #[error("code {code} of DRV8711 register {register} is reserved")]
-        ReservedCode = 18 {
-            /// Address of the register.
-            register: u8,
-            /// The code.
-            code: u8,
-        },
-        /// A register reads back other than written.
-        #[error("DRV8711 register {register} reads {got:#05x}, {want:#05x} was written")]
-        ReadBack = 19 {
-            /// Address of the register.
-            register: u8,
-            /// Value read, bits that always read 0 left out.
-            got: u16,
-            /// Value written, the same bits left out.
-            want: u16,
-        },
         /// A start-up frame was not answered in time.
         #[error("no answer to {sent} frame {frame}")]
         NoAnswer = 20 {
@@ -213,6 +195,39 @@ servowire_core::errors! {
         /// A `nom` combinator of the caller refused the input.
         #[error("a parser combinator refused the input")]
         Combinator = 30,
+        /// The frame of a device comes too close to the one before it, for the jitter of the ports that both pass.
+        #[error("the frame of device {device} comes {gap_ns} ns after the one before it, {needs_ns} ns are needed")]
+        GapTooShort = 31 {
+            /// Whose frame.
+            device: u8,
+            /// From the end of the one before, at the master; negative: they overlap.
+            gap_ns: i32,
+            /// What six sigma of jitter need.
+            needs_ns: u32,
+        },
+        /// A device would have to send before its cycle begins: its cable is longer than a slot.
+        #[error("device {device} would have to send {early_ns} ns before the cycle")]
+        SendBeforeCycle = 32 {
+            /// Which.
+            device: u8,
+            /// So much before.
+            early_ns: u32,
+        },
+        /// A frame of the IO exchange began at a time that is none of its sender's.
+        #[error("the frame began {off_ns} ns away from its time")]
+        OutsideWindow = 33 {
+            /// From the nearest time at which it was expected.
+            off_ns: i32,
+        },
+        /// A frame of this sender has come in this cycle already.
+        #[error("a second frame of {address} in one cycle")]
+        Doubled = 34 {
+            /// Who sent it; 0: the master.
+            address: u8,
+        },
+        /// A frame of the IO exchange belongs to a cycle that is over.
+        #[error("the frame belongs to a cycle that is over")]
+        CycleOver = 35,
     }
 }
 

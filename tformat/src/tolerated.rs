@@ -1,5 +1,6 @@
 use servowire_core::Tolerance;
 
+use crate::marks::{NO_TURNS, OBJECTIONS, WIDE_TURNS};
 use crate::status::Almc;
 
 /// Up to which age, and in spite of which alarms, a position may be used.
@@ -20,9 +21,9 @@ pub type Policy = servowire_core::Policy<Tolerated>;
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Tolerated {
-    pub(crate) alarms: Almc,
+    alarms: Almc,
     /// Turns may be anything, or missing: they are not used.
-    pub(crate) turns: bool,
+    turns: bool,
 }
 
 impl Tolerated {
@@ -39,6 +40,19 @@ impl Tolerated {
     #[must_use]
     pub const fn alarms(self, alarms: Almc) -> Self {
         Self { alarms: self.alarms.union(alarms), ..self }
+    }
+
+    /// What of these marks is not tolerated.
+    #[inline]
+    pub(crate) const fn objects_to(self, marks: u32) -> u32 {
+        let turns = if self.turns { NO_TURNS | WIDE_TURNS } else { 0 };
+        marks & OBJECTIONS & !(turns | self.alarms.bits() as u32)
+    }
+
+    /// Whether turns may be anything.
+    #[inline]
+    pub(crate) const fn ignores_turns(self) -> bool {
+        self.turns
     }
 }
 

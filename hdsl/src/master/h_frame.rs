@@ -1,6 +1,7 @@
 //! What an H-frame brought.
 
 use super::{RestartReason, State};
+use crate::acceleration::DeltaDelta;
 use crate::encoder_id::EncoderId;
 use crate::error::Error;
 use crate::frame::{Stuffing, Tail, Trailer};
@@ -46,16 +47,11 @@ pub struct HFrame {
     pub signal: Option<SignalQuality>,
     /// The quality monitor, 0..=15.
     pub quality: u8,
-    /// Registers POS and VEL, usable or not: for the register map alone.
-    #[cfg_attr(feature = "serde", serde(skip))]
-    pub(crate) pos: u64,
-    #[cfg_attr(feature = "serde", serde(skip))]
-    pub(crate) vel: i32,
-    /// The flag POS: the fast position is estimated or not aligned.
-    pub doubtful: bool,
+    /// The acceleration, of a running link and if its word can be used.
+    pub acceleration: Option<DeltaDelta>,
     /// Acceleration words in a row that could not be used.
     pub acceleration_errors: u32,
-    /// The safe blocks of a V-frame, one H-frame after its end.
+    /// The safe blocks, in the last H-frame of a V-frame.
     pub v_frame: Option<VFrame>,
     /// The word of the pipe channel, K30.7 included.
     pub pipe: Option<Reading>,
@@ -71,7 +67,7 @@ pub struct HFrame {
 
 servowire_core::one_line!(HFrame {
     Self { restarted: Some(reason), was, .. } => "{}, the link starts anew: {}", was, reason;
-    Self { was, quality, doubtful: true, .. } => "{}, quality {}, fast position doubtful", was, quality;
+    Self { was: State::Running, quality, acceleration: None, .. } => "RUNNING, quality {}, no acceleration", quality;
     Self { was, quality, .. } => "{}, quality {}", was, quality;
 });
 
@@ -85,9 +81,7 @@ impl HFrame {
         encoder: None,
         signal: None,
         quality: QualityMonitor::START,
-        pos: 0,
-        vel: 0,
-        doubtful: false,
+        acceleration: None,
         acceleration_errors: 0,
         v_frame: None,
         pipe: None,
@@ -103,6 +97,7 @@ impl HFrame {
         self.was = state;
         self.signal = signal;
         self.encoder = None;
+        self.acceleration = None;
         self.v_frame = None;
         self.pipe = None;
         self.init = false;
@@ -122,7 +117,7 @@ impl HFrame {
     /// for frame in 0..100 {
     ///     // A byte in every tenth frame.
     ///     encoder.set_pipe((frame % 10 == 0).then_some(frame));
-    ///     let bits = encoder.hear_at(master.transmission().head.bits(), 0).map_or(u64::MAX, |answer| answer.bits);
+    ///     let bits = encoder.set_position(0).hear(master.transmission().head.bits()).map_or(u64::MAX, |answer| answer.bits);
     ///     if let Some(character) = master.hear_bits(bits, None, 0).pipe_character() {
     ///         data.push(character?.byte());
     ///     }

@@ -1,7 +1,7 @@
 //! What the receiver sends: the head of the next H-frame, before or after the answer of the present one, and the end of a frame.
 
 use super::{Master, RestartReason, State};
-use crate::frame::{Extra, Head, Stuffing, Trailer};
+use crate::frame::{Extra, H_FRAME_BITS, Head, STUFFING_BITS, Stuffing, Trailer};
 use crate::line_code::LineDisparity;
 use crate::parameter::{MasterSymbol, ParameterByte};
 
@@ -39,7 +39,7 @@ impl Master {
     /// let mut encoder = Device::new(EncoderId::try_from(0x00153)?);
     /// let mut head = master.transmission().head;
     /// for frame in 0..200 {
-    ///     let bits = encoder.hear_at(head.bits(), 7 * frame).map_or(u64::MAX, |answer| answer.bits);
+    ///     let bits = encoder.set_position(7 * frame).hear(head.bits()).map_or(u64::MAX, |answer| answer.bits);
     ///     let next = master.ahead();
     ///     // From here on the next head may be on the line.
     ///     master.hear_bits(bits, None, 11_520 * frame + 10_560);
@@ -68,6 +68,16 @@ impl Master {
     #[inline]
     pub(super) fn following(&mut self) -> Transmission {
         transmission(State::Running, self.requester.transmit(), self.link.msync(), None, LineDisparity::ZERO).0
+    }
+
+    /// From the end of one window to that of the next one, which is that of `present`, and half a free-running frame, in ns.
+    pub(super) fn present_ns(&self) -> u32 {
+        let extra = self.present.head.extra().map_or(0, |extra| extra.bits().into());
+        let bits = H_FRAME_BITS
+            .wrapping_add(extra)
+            .wrapping_add(STUFFING_BITS.wrapping_mul(self.h_frame.tail.stuffing.get().into()));
+        // 106.67 ns each.
+        bits.wrapping_add(H_FRAME_BITS / 2).wrapping_mul(320) / 3
     }
 
     /// Stuffing after a START frame: time for the search.

@@ -1,12 +1,9 @@
 //! Where the receiver is in its start-up, and why it began anew.
 
-use core::fmt;
-
 use crate::error::Error;
 
 /// Where the receiver is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum State {
     /// Two frames without an answer.
@@ -83,17 +80,14 @@ servowire_core::one_line!(RestartReason {
 });
 
 impl core::error::Error for RestartReason {}
-impl fmt::Display for State {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.pad(match self {
-            Self::Reset => "RESET",
-            Self::Sync => "SYNC",
-            Self::Start => "START",
-            Self::Learn => "LEARN",
-            Self::Check => "CHECK",
-            Self::IdReq => "IDREQ",
-            Self::WaitVsync => "WAIT VSYNC",
-            Self::Running => "RUNNING",
-        })
-    }
-}
+
+servowire_core::one_line!(State {
+    Self::Reset => "RESET";
+    Self::Sync => "SYNC";
+    Self::Start => "START";
+    Self::Learn => "LEARN";
+    Self::Check => "CHECK";
+    Self::IdReq => "IDREQ";
+    Self::WaitVsync => "WAIT VSYNC";
+    Self::Running => "RUNNING";
+});

@@ -1,6 +1,7 @@
 //! Requests by what they are for. Those that cannot be undone say so in their name.
 
-use super::{Access, Data, Length, LongRequest, Offset, ResourceAddress};
+use super::long::{Access, Data, LongRequest};
+use crate::resource::{Offset, ResourceAddress};
 
 servowire_core::codes! {
     /// Who may access a resource (SICK manual, p. 90). Levels 5..=14 are not defined.
@@ -21,26 +22,6 @@ servowire_core::codes! {
 }
 
 impl LongRequest {
-    /// Reads the value of a resource, from the beginning.
-    pub const fn read(address: ResourceAddress, length: Length) -> Self {
-        Self { address, indirect: true, offset: None, access: Access::Read(length) }
-    }
-
-    /// Reads the value of a resource from `offset` on.
-    pub const fn read_at(address: ResourceAddress, offset: Offset, length: Length) -> Self {
-        Self { address, indirect: true, offset: Some(offset), access: Access::Read(length) }
-    }
-
-    /// Reads the eight characters of a resource's name.
-    pub const fn read_name(address: ResourceAddress) -> Self {
-        Self { address, indirect: false, offset: None, access: Access::Read(Length::Eight) }
-    }
-
-    /// Reads an attribute of a resource, two bytes: 1 data size, 2 read level, 3 write level, 4 time-out in ms, 5 data type.
-    pub const fn read_attribute(address: ResourceAddress, attribute: Offset) -> Self {
-        Self { address, indirect: false, offset: Some(attribute), access: Access::Read(Length::Two) }
-    }
-
     /// Resets the encoder (RID 100h, SICK manual, p. 114). It saves its lifetime data and does not answer; the link starts
     /// anew, and a position that is not saved by the encoder is lost.
     pub const fn reset_encoder() -> Self {
@@ -99,6 +80,7 @@ impl LongRequest {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::message::Length;
 
     /// Header bytes of the manual's examples: 54 read 2 bytes, 58 read 4, 5C read 8, 7C with an offset, 11 write without
     /// data, 1D write 8 (to addresses below 100h: 54 becomes D4 on the line, with its marker bit).

@@ -1,7 +1,9 @@
 //! User files in the memory of the encoder: resources 130h to 134h (SICK manual, p. 126-132).
 
-use super::{Access, AccessLevel, Data, Length, LongRequest, Offset, ResourceAddress};
+use super::access::AccessLevel;
+use super::long::{Access, Data, Length, LongRequest};
 use crate::error::Error;
+use crate::resource::{Offset, ResourceAddress};
 
 /// Name of a user file: 1 to 8 characters 20h..=7Eh, filled up with 00h. Case counts.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]

@@ -1,6 +1,6 @@
-use super::resource::Named;
-use super::{MessageBytes, Offset, ResourceAddress, ResourceError, checked};
+use super::bytes::{MessageBytes, checked};
 use crate::error::Error;
+use crate::resource::{Named, Offset, ResourceAddress, ResourceError};
 
 servowire_core::codes! {
     /// LLEN: how many data bytes a long message carries or asks for.
@@ -202,6 +202,26 @@ fn long_start(bytes: &[u8]) -> Result<u8, Error> {
 }
 
 impl LongRequest {
+    /// Reads the value of a resource, from the beginning.
+    pub const fn read(address: ResourceAddress, length: Length) -> Self {
+        Self { address, indirect: true, offset: None, access: Access::Read(length) }
+    }
+
+    /// Reads the value of a resource from `offset` on.
+    pub const fn read_at(address: ResourceAddress, offset: Offset, length: Length) -> Self {
+        Self { address, indirect: true, offset: Some(offset), access: Access::Read(length) }
+    }
+
+    /// Reads the eight characters of a resource's name.
+    pub const fn read_name(address: ResourceAddress) -> Self {
+        Self { address, indirect: false, offset: None, access: Access::Read(Length::Eight) }
+    }
+
+    /// Reads an attribute of a resource, two bytes: 1 data size, 2 read level, 3 write level, 4 time-out in ms, 5 data type.
+    pub const fn read_attribute(address: ResourceAddress, attribute: Offset) -> Self {
+        Self { address, indirect: false, offset: Some(attribute), access: Access::Read(Length::Two) }
+    }
+
     const fn is_read(&self) -> bool {
         matches!(self.access, Access::Read(_))
     }
@@ -265,7 +285,7 @@ impl LongRequest {
     ///
     /// # Errors
     /// In this order: [`Error::Truncated`], [`Error::ShortMessageStart`], [`Error::Crc`], [`Error::Header`] if a
-    /// sound answer is for another request, [`Error::Resource`] if the encoder refused.
+    /// sound answer is for another request or brings less or more than was asked for, [`Error::Resource`] if the encoder refused.
     pub fn parse_answer(&self, bytes: &[u8]) -> Result<Data, Error> {
         let answer = LongAnswer::parse(bytes)?;
         self.check_answer(answer)?;
@@ -274,8 +294,12 @@ impl LongRequest {
 
     /// Whether a sound answer belongs to this request.
     pub(super) fn check_answer(&self, answer: LongAnswer) -> Result<(), Error> {
-        let want = header(self.address, self.is_read(), false, self.indirect, Length::None);
-        let got = header(answer.address, answer.read, false, answer.indirect, Length::None);
+        let (wanted, length) = match (&self.access, &answer.result) {
+            (Access::Read(length), Ok(data)) => (*length, data.length),
+            _ => (Length::None, Length::None),
+        };
+        let want = header(self.address, self.is_read(), false, self.indirect, wanted);
+        let got = header(answer.address, answer.read, false, answer.indirect, length);
         if got != want {
             return Err(Error::Header { got: u16::from_be_bytes(got), want: u16::from_be_bytes(want) });
         }
@@ -339,7 +363,7 @@ impl LongAnswer {
     ///
     /// # Errors
     /// [`Error::Truncated`], [`Error::ShortMessageStart`], [`Error::Crc`]; [`Error::DataLength`] for an error answer
-    /// without its two bytes.
+    /// of another length than two bytes.
     pub fn parse(bytes: &[u8]) -> Result<Self, Error> {
         let first = long_start(bytes)?;
         Self::of_covered(checked(bytes, answer_len(first))?)
@@ -352,8 +376,8 @@ impl LongAnswer {
         };
         let result = match (first & LOFF != 0, rest) {
             (false, data) => Ok(Data::new(data)?),
-            (true, [detail, class, ..]) => Err(ResourceError::new(*class, *detail)),
-            (true, _) => return Err(Error::DataLength { len: 0 }),
+            (true, [detail, class]) => Err(ResourceError::new(*class, *detail)),
+            (true, other) => return Err(Error::DataLength { len: u8::try_from(other.len()).unwrap_or(u8::MAX) }),
         };
         Ok(Self { address: address(*first, *low), read: first & LRW != 0, indirect: first & LIND != 0, result })
     }

@@ -1,6 +1,8 @@
-use super::{
-    Collector, Gathered, Limits, LongAnswer, LongRequest, MessageBytes, Sender, ShortAnswer, ShortRequest, answer_len,
-};
+use super::bytes::MessageBytes;
+use super::limits::Limits;
+use super::long::{LongAnswer, LongRequest};
+use super::nibbles::{Collector, Gathered, Sender, answer_len};
+use super::short::{ShortAnswer, ShortRequest};
 use crate::error::Error;
 use crate::parameter::{EncoderSymbol, MasterSymbol};
 

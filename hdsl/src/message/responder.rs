@@ -1,4 +1,7 @@
-use super::{Collector, LongAnswer, LongRequest, MessageBytes, Sender, ShortAnswer, ShortRequest, request_len};
+use super::bytes::MessageBytes;
+use super::long::{LongAnswer, LongRequest};
+use super::nibbles::{Collector, Sender, request_len};
+use super::short::{ShortAnswer, ShortRequest};
 use crate::parameter::{EncoderSymbol, MasterSymbol};
 
 /// A sound request that an encoder received.

@@ -1,6 +1,6 @@
 use servowire_core::OutOfRange;
 
-use super::{MessageBytes, checked};
+use super::bytes::{MessageBytes, checked};
 use crate::error::Error;
 
 /// A register of the encoder, 40h..=7Fh.
@@ -108,7 +108,7 @@ impl ShortRequest {
     /// [`Error::Truncated`], [`Error::LongMessageStart`], [`Error::Crc`].
     pub fn parse(bytes: &[u8]) -> Result<Self, Error> {
         let first = short_start(bytes)?;
-        Self::of_covered(checked(bytes, super::request_len(first))?)
+        Self::of_covered(checked(bytes, super::nibbles::request_len(first))?)
     }
 
     /// From the bytes before a right CRC.
@@ -129,7 +129,7 @@ impl ShortRequest {
     /// request, so a changed direction shows as a wrong CRC.
     pub fn parse_answer(self, bytes: &[u8]) -> Result<ShortAnswer, Error> {
         short_start(bytes)?;
-        self.answer_of_covered(checked(bytes, super::answer_len(self.first()))?)
+        self.answer_of_covered(checked(bytes, super::nibbles::answer_len(self.first()))?)
     }
 
     /// From the bytes before a right CRC.

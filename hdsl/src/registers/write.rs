@@ -28,7 +28,7 @@ impl Registers {
     /// Reads a register as an application does over the bus: reading PIPE_S takes the oldest entry out of the FIFO and
     /// freezes it for PIPE_D. `None` after the end of the map.
     pub fn read(&mut self, address: u8) -> Option<u8> {
-        if address == PIPE_S && self.rule == RegisterRule::Sick {
+        if address == PIPE_S && self.dialect.registers == RegisterRule::Sick {
             let entry = self.pipe.take();
             self.put(Register::PipeS, [entry.status, entry.data]);
         }
@@ -47,7 +47,7 @@ impl Registers {
     /// [`Error::NoRegister`] after the end of the map. The register keeps its value then.
     pub fn write(&mut self, master: &mut Master, address: u8, value: u8) -> Result<(), Error> {
         let Some(present) = self.byte(address) else { return Err(Error::NoRegister { address }) };
-        if self.rule == RegisterRule::Sick && is_read_only(address) {
+        if self.dialect.registers == RegisterRule::Sick && is_read_only(address) {
             return Ok(());
         }
         match address {
@@ -80,11 +80,11 @@ impl Registers {
                 self.free(Register::OnlineStatusD, 2);
             }
             // In the SICK core a write to the counter sets its threshold.
-            ACC_ERR_CNT | ACC_ERR_CNT_THRESH if self.rule == RegisterRule::Sick => {
+            ACC_ERR_CNT | ACC_ERR_CNT_THRESH if self.dialect.registers == RegisterRule::Sick => {
                 self.threshold(master, value.min(31));
             }
             ACC_ERR_CNT_THRESH => self.threshold(master, value),
-            PC_ADD if self.rule == RegisterRule::Sick => self.set_byte(address, value | 0x80),
+            PC_ADD if self.dialect.registers == RegisterRule::Sick => self.set_byte(address, value | 0x80),
             _ => self.set_byte(address, value),
         }
         Ok(())

@@ -62,12 +62,7 @@ impl Detection {
         }
     }
 
-    /// A transaction ended with this outcome; the line is free from `ready_ns` on. Once done or failed it stays so.
-    pub fn receive(&mut self, outcome: Result<Response, Error>, ready_ns: u64) -> Step<Detected> {
-        let step = self.end.unwrap_or_else(|| self.next(outcome, ready_ns));
-        self.end = step.ended();
-        step
-    }
+    servowire_core::receive! { Detected }
 
     fn next(&mut self, outcome: Result<Response, Error>, ready_ns: u64) -> Step<Detected> {
         let Some(mut reading) = self.reading else {

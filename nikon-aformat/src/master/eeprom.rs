@@ -127,14 +127,9 @@ impl EepromRead {
         Step::Send { request: self.next_request(), not_before_ns: now_ns }
     }
 
-    /// A transaction ended with this outcome; the line is free from `ready_ns` on.
-    ///
-    /// A response that is missing or refused counts as a try; [`Error::BankError`] ends the procedure at once. Once done or
-    /// failed it stays so.
-    pub fn receive(&mut self, outcome: Result<Response, Error>, ready_ns: u64) -> Step<u16> {
-        let step = self.end.unwrap_or_else(|| self.next(outcome, ready_ns));
-        self.end = step.ended();
-        step
+    servowire_core::receive! {
+        /// A response that is missing or refused counts as a try; [`Error::BankError`] ends the procedure at once.
+        u16
     }
 
     fn next(&mut self, outcome: Result<Response, Error>, ready_ns: u64) -> Step<u16> {

@@ -1,6 +1,5 @@
 //! HIPERFACE DSL: symbols, answers, checks, position, messages, sync, and both machines.
 
-use hdsl::cable::{Cable, Disturbance};
 use hdsl::device::Device;
 use hdsl::frame::{Extra, Head, ParsedHead};
 use hdsl::master::{Counters, Master};
@@ -15,6 +14,7 @@ use hdsl::{
     QualityRule, Rule, VFrame, crc16,
 };
 
+use super::hdsl_cable::{Cable, Disturbance};
 use super::kernels;
 use crate::self_test::hdsl::{ANSWERS, WORDS};
 
@@ -261,7 +261,7 @@ kernels! {
         let mut line = Cable::new(Disturbance::metres(10).with_jitter(1), 1);
         for frame in 0..*frames {
             let head = line.down(master.transmission().head.bits());
-            let samples = line.up(encoder.hear_at(head, u64::from(frame)));
+            let samples = line.up(encoder.set_position(u64::from(frame)).hear(head));
             if frame == 25 {
                 let _ = master.start_short(ShortRequest::Read(RemoteRegister::PING));
                 let access = Access::Read(Length::Eight);

@@ -3,7 +3,6 @@
 
 use core::hint::black_box;
 
-use hdsl::cable::{Cable, Disturbance};
 use hdsl::device::Device;
 use hdsl::master::{HFrame, Master, State};
 use hdsl::message::{LongRequest, RemoteRegister, ResourceAddress, ShortRequest};
@@ -12,6 +11,7 @@ use hdsl::sampling::WINDOW;
 use hdsl::{Dialect, EncoderId, Window};
 
 use super::Kernel;
+use super::hdsl_cable::{Cable, Disturbance};
 use crate::count;
 
 const FRAMES: u32 = 4000;
@@ -70,7 +70,7 @@ impl Link {
             let _ = self.master.start_short(ShortRequest::Read(RemoteRegister::PING));
             let _ = self.master.start_long(LongRequest::read_name(ResourceAddress::RESOLUTN));
         }
-        let answer = self.encoder.hear_at(self.master.transmission().head.bits(), self.position);
+        let answer = self.encoder.set_position(self.position).hear(self.master.transmission().head.bits());
         let bytes = self.cable.up(answer);
         let mut words = [0; WINDOW / 4];
         for (to, from) in words.iter_mut().zip(bytes.chunks_exact(4)) {

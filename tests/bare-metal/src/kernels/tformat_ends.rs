@@ -99,7 +99,7 @@ kernels! {
     /// EEPROM access, from its start to the step after one answer.
     fn tformat_eeprom(row: &Answer) -> Step<u8> {
         let (page, address) = Page::locate(300, Page::COUNT).unwrap_or((Page::MAX, Address::PAGE_REGISTER));
-        let mut access = EepromAccess::write(Some(page), address, row.bytes.len() as u8, EEPROM_POLLING);
+        let mut access = EepromAccess::write(page, address, row.bytes.len() as u8, EEPROM_POLLING);
         match access.start(0) {
             Step::Send { .. } => access.receive(Ok(row.want), 100_000),
             end => end,

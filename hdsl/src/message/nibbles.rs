@@ -1,0 +1,125 @@
+//! A message nibble by nibble, one an H-frame.
+
+use super::bytes::MessageBytes;
+use super::long;
+use crate::crc::RunningCrc16;
+use crate::parameter::Nibble;
+
+/// A message on its way out: one nibble an H-frame, its CRC grows along.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub(super) struct Sender {
+    body: MessageBytes,
+    crc: RunningCrc16,
+    at: u8,
+}
+
+impl Sender {
+    pub(super) const fn new(body: MessageBytes) -> Self {
+        Self { body, crc: RunningCrc16::new(), at: 0 }
+    }
+
+    /// The next nibble; `None` after the last one of the CRC.
+    pub(super) fn next(&mut self) -> Option<Nibble> {
+        let at = self.at / 2;
+        let [high, low] = self.crc.finish().to_be_bytes();
+        let byte = match self.body.as_bytes().get(usize::from(at)) {
+            Some(byte) => *byte,
+            None if at == self.body.len() => high,
+            None if at == self.body.len().saturating_add(1) => low,
+            None => return None,
+        };
+        let second = self.at % 2 == 1;
+        if second && at < self.body.len() {
+            self.crc.update(byte);
+        }
+        self.at = self.at.saturating_add(1);
+        Some(Nibble::truncate(if second { byte } else { byte >> 4 }))
+    }
+}
+
+/// A message that is complete.
+pub(super) struct Gathered {
+    pub(super) bytes: MessageBytes,
+    sound: bool,
+}
+
+impl Gathered {
+    /// The bytes before the CRC if it is right.
+    pub(super) fn covered(&self) -> Option<&[u8]> {
+        let (covered, _) = self.bytes.as_bytes().split_last_chunk::<2>()?;
+        self.sound.then_some(covered)
+    }
+
+    pub(super) fn is_long(&self) -> bool {
+        self.bytes.as_bytes().first().is_some_and(|first| first & 0x80 != 0)
+    }
+}
+
+/// Gathers the nibbles of one message; the length follows from the first byte.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub(super) struct Collector {
+    bytes: MessageBytes,
+    crc: RunningCrc16,
+    high: Option<Nibble>,
+    /// An IDLE was seen since the last message.
+    ready: bool,
+}
+
+impl Collector {
+    pub(super) const fn new() -> Self {
+        Self { bytes: MessageBytes::EMPTY, crc: RunningCrc16::new(), high: None, ready: true }
+    }
+
+    /// Something that is no nibble ends what was being gathered.
+    #[inline]
+    pub(super) const fn idle(&mut self) {
+        if !self.ready || self.high.is_some() || self.bytes.len() != 0 {
+            *self = Self::new();
+        }
+    }
+
+    /// The message is complete; the next one begins after an IDLE.
+    pub(super) const fn finish(&mut self) -> Gathered {
+        let gathered = Gathered { bytes: self.bytes, sound: self.crc.is_residue() };
+        *self = Self { ready: false, ..Self::new() };
+        gathered
+    }
+
+    /// Takes a nibble. Gives the message when `length`, told the first byte, says that it is complete.
+    pub(super) fn nibble(&mut self, nibble: Nibble, length: impl Fn(u8) -> usize) -> Option<Gathered> {
+        if !self.ready {
+            return None;
+        }
+        match self.high.take() {
+            None => self.high = Some(nibble),
+            Some(high) => {
+                let byte = high.get() << 4 | nibble.get();
+                self.crc.update(byte);
+                self.bytes.push(&[byte]);
+            }
+        }
+        let first = self.bytes.as_bytes().first()?;
+        let complete = self.high.is_none() && usize::from(self.bytes.len()) >= length(*first).min(MessageBytes::MAX);
+        complete.then(|| self.finish())
+    }
+}
+
+/// Bytes of an answer that begins with this byte, CRC included.
+pub(super) const fn answer_len(first: u8) -> usize {
+    match (first & 0x80 != 0, first & 0x40 != 0) {
+        (false, true) => 4,
+        (false, false) => 3,
+        (true, _) => long::answer_len(first),
+    }
+}
+
+/// Bytes of a request that begins with this byte, CRC included.
+pub(super) const fn request_len(first: u8) -> usize {
+    match (first & 0x80 != 0, first & 0x40 != 0) {
+        (false, true) => 3,
+        (false, false) => 4,
+        (true, _) => long::request_len(first),
+    }
+}

@@ -1,0 +1,185 @@
+//! A hostile line: what is given as a position is the truth, or explained.
+//!
+//! `HOSTILE_EVENTS=100000000 cargo test --release -p hdsl --test all hostile:: -- --nocapture` runs as many H-frames and prints
+//! what happened in them; `HOSTILE_SEED` gives others.
+
+use std::collections::BTreeMap;
+
+use hdsl::device::Device;
+use hdsl::master::{Master, State};
+use hdsl::message::{LongRequest, RemoteRegister, ResourceAddress, ShortRequest};
+use hdsl::registers::Registers;
+use hdsl::{Answer, Dialect, Doubt, EncoderId, Policy, Rule, Window};
+
+/// A free-running frame.
+const FRAME_NS: u64 = 11_520;
+const ANY_AGE: Policy = Policy::new(u64::MAX);
+
+const ANSWER: u64 = u64::MAX >> 3;
+/// 11 bits of acceleration, 24 of position.
+const ID: EncoderId = EncoderId::truncate(0x000d3);
+const BITS: u32 = 24;
+
+struct Noise(u64);
+
+impl Noise {
+    fn next(&mut self) -> u64 {
+        self.0 ^= self.0 << 13;
+        self.0 ^= self.0 >> 7;
+        self.0 ^= self.0 << 17;
+        self.0.wrapping_mul(0x2545_f491_4f6c_dd1d)
+    }
+
+    fn below(&mut self, limit: u64) -> u64 {
+        ((u128::from(self.next()) * u128::from(limit)) >> 64) as u64
+    }
+}
+
+/// The motion, and what an encoder without errors would say about it.
+struct Motion {
+    velocity: i64,
+    /// Positions at the last sampling edges, the newest first.
+    positions: [i64; 20],
+}
+
+impl Motion {
+    fn step(&mut self, noise: &mut Noise) -> i64 {
+        let jerk = noise.below(81) as i64 - 40;
+        let wanted = if self.velocity.abs() > 30_000 { -jerk.abs() * self.velocity.signum() } else { jerk };
+        self.velocity += wanted;
+        self.positions.rotate_right(1);
+        self.positions[0] = self.positions[1] + self.velocity;
+        wanted
+    }
+
+    /// The position `age` frames ago, as an encoder of this width counts it.
+    fn at(&self, age: u8) -> i64 {
+        self.positions[usize::from(age)].rem_euclid(1 << BITS)
+    }
+}
+
+/// What happens to an answer.
+fn damage(noise: &mut Noise, answer: u64, last: u64) -> (&'static str, u64) {
+    let flip = |noise: &mut Noise, bits: u64, count: u32| (0..count).fold(bits, |bits, _| bits ^ 1 << noise.below(61));
+    match noise.below(1000) {
+        0..=3 => ("one flip", flip(noise, answer, 1)),
+        4..=6 => ("two flips", flip(noise, answer, 2)),
+        7 => ("three flips", flip(noise, answer, 3)),
+        8 => ("burst", answer ^ (noise.below(1 << 10)) << noise.below(52)),
+        9 => ("stale", last),
+        10 => ("silence", ANSWER),
+        11 if noise.below(8) == 0 => ("any bits", noise.next() & ANSWER),
+        12 if noise.below(8) == 0 => ("inverted", !answer & ANSWER),
+        _ => ("clean", answer),
+    }
+}
+
+#[derive(Default)]
+struct Tally {
+    events: BTreeMap<&'static str, u64>,
+    fast: u64,
+    explained: u64,
+    safe: u64,
+    messages: u64,
+    restarts: u64,
+    identifiers: u64,
+}
+
+fn run(dialect: Dialect, seed: u64, frames: u64) -> Tally {
+    let mut noise = Noise(seed);
+    let mut tally = Tally::default();
+    // The range is passed every thousand frames or so.
+    let mut device = Device::new(ID);
+    device.resources_mut().set_register(RemoteRegister::PING, 0x5a);
+    let mut master = Master::new(dialect);
+    let mut map = Registers::new(&dialect);
+    let mut motion = Motion { velocity: 0, positions: [(1 << BITS) - 5; 20] };
+    // Frames since an acceleration word that was wrong and passed all checks.
+    let (mut since_poison, mut last, mut since_event) = (u32::MAX, 0, 0_u32);
+    for frame in 0..frames {
+        let truth = motion.step(&mut noise);
+        let mut head = master.transmission().head.bits();
+        if noise.below(2000) == 0 {
+            head = Window::from_bits(head.bits() ^ 1 << noise.below(26), head.len()).unwrap();
+            *tally.events.entry("head").or_default() += 1;
+        }
+        let answer = device.set_position(motion.at(0) as u64).hear(head);
+        let (event, bits) = damage(&mut noise, answer.map_or(ANSWER, |answer| answer.bits), last);
+        *tally.events.entry(event).or_default() += 1;
+        last = answer.map_or(ANSWER, |answer| answer.bits);
+        let accepted = Answer::from_bits(Rule::Strict, bits).delta_delta();
+        since_event = if event == "clean" { since_event + 1 } else { 0 };
+        let running = master.state() == State::Running;
+        let sampled_ns = (frame + 100) * FRAME_NS;
+        // 91 bits from the edge to the end of the window.
+        let report = master.hear_bits(bits, None, sampled_ns + 9_707);
+        map.apply(report);
+        tally.restarts += u64::from(report.restarted.is_some());
+        for result in [report.finished.short.map(|r| r.map(|a| a.data == Some(0x5a)))].into_iter().flatten() {
+            tally.messages += u64::from(result.is_ok());
+            assert!(result.unwrap_or(true), "a short message brought other data");
+        }
+        if let Some(Ok(answer)) = report.finished.long {
+            tally.messages += 1;
+            assert_eq!(answer.result.unwrap().as_bytes(), b"RESOLUTN");
+        }
+        let poisoned = running && accepted.is_ok_and(|value| i64::from(value.get()) != truth);
+        since_poison = if poisoned { 0 } else { since_poison.saturating_add(1) };
+
+        // The identifier comes once and without check bits: an application knows which encoder it has and compares. (The line
+        // inverted for that one frame gives another one.)
+        if master.encoder_id().is_some_and(|id| id != ID) {
+            tally.identifiers += 1;
+            master.request_restart();
+            continue;
+        }
+        // Law: the fast position is the truth; a wrong word that passed CRC-5 is found out at the end of the next V-frame.
+        if let Ok(fast) = master.fast().at(sampled_ns, Policy::new(0)) {
+            tally.fast += 1;
+            if (fast.position(), i64::from(fast.velocity())) != (motion.at(0), motion.velocity) {
+                assert!(
+                    since_poison < 16,
+                    "wrong fast position, {since_poison} frames after the last bad word: {fast:?}, truth {} {}, {tracker:?}",
+                    motion.at(0),
+                    motion.velocity,
+                    tracker = (map.stage(), master.frame(), master.counters(), event, since_event),
+                );
+                tally.explained += 1;
+            }
+        }
+        // Law: the safe position is the true one of its time.
+        if let Ok(safe) = master.safe().at(sampled_ns, Policy::new(15 * FRAME_NS)) {
+            let age = (sampled_ns - safe.sampled_ns()) / FRAME_NS;
+            tally.safe += u64::from(age == 8);
+            assert_eq!(safe.position(), motion.at(u8::try_from(age).unwrap()), "wrong safe position");
+        }
+        // Law: before the lock and after a loss there is nothing.
+        if master.state() != State::Running {
+            assert!(
+                master.fast().at(sampled_ns, ANY_AGE) == Err(Doubt::NoLink)
+                    && master.safe().at(sampled_ns, ANY_AGE) == Err(Doubt::NoLink)
+                    && (map.link() == (master.state() > State::IdReq))
+            );
+        }
+        if noise.below(300) == 0 {
+            let _ = master.start_short(ShortRequest::Read(RemoteRegister::PING));
+            let _ = master.start_long(LongRequest::read_name(ResourceAddress::RESOLUTN));
+        }
+    }
+    tally
+}
+
+#[test]
+fn hostile_frames_give_the_truth_or_nothing() {
+    let frames = servowire_world::wanted_events(100_000);
+    let first = std::env::var("HOSTILE_SEED").map_or(1, |text| text.parse().unwrap());
+    for seed in [first, first + 1] {
+        let tally = run(Dialect::SICK, seed, frames / 2);
+        println!(
+            "{} fast positions, {} of them wrong for up to 16 frames after a word that passed CRC-5; {} safe positions; \
+             {} messages; {} restarts; {} wrong identifiers; {:?}",
+            tally.fast, tally.explained, tally.safe, tally.messages, tally.restarts, tally.identifiers, tally.events
+        );
+        assert!(tally.fast > frames / 20 && tally.safe > frames / 200 && tally.messages > 0);
+    }
+}

@@ -1,0 +1,28 @@
+//! All tests of the crate through its public interface, in one binary.
+#![allow(
+    clippy::arithmetic_side_effects,
+    clippy::cast_possible_truncation,
+    clippy::cast_possible_wrap,
+    clippy::indexing_slicing,
+    clippy::panic,
+    clippy::unwrap_used,
+    missing_docs
+)]
+
+mod alarms;
+mod answers;
+mod caller;
+mod common;
+mod drive;
+mod drive_bytes;
+mod fresh;
+mod hostile;
+mod impolite;
+mod laws;
+mod log;
+mod master;
+mod procedures;
+mod ring;
+#[cfg(feature = "serde")]
+mod serde;
+mod setpoints;
