@@ -5,7 +5,7 @@ use core::convert::Infallible;
 
 use embedded_hal::digital::{ErrorType as PinErrorType, OutputPin};
 use embedded_io::{ErrorType, Read, ReadReady, Write};
-use servowire_drivers::{Clock, ClockError};
+use servowire_drivers::{Clock, ClockError, Worst};
 use tformat::device::{Device, Fault};
 use tformat::{Abm, Abs, BitRate};
 
@@ -17,6 +17,8 @@ const FIELD_NS: u64 = 4_000;
 pub struct Bench {
     encoder: RefCell<Device<6>>,
     now_ns: Cell<u64>,
+    /// When what the master has handed over has left.
+    sent_ns: Cell<u64>,
     /// Bytes on their way to the master, each with the time of its end.
     line: RefCell<Line>,
 }
@@ -45,7 +47,7 @@ impl Bench {
     /// An encoder with this encoder ID.
     pub fn new(enid: u8) -> Self {
         let encoder = RefCell::new(Device::new(enid, BitRate::Mbit2_5));
-        Self { encoder, now_ns: Cell::new(0), line: RefCell::default() }
+        Self { encoder, now_ns: Cell::new(0), sent_ns: Cell::new(0), line: RefCell::default() }
     }
 
     /// Turns the shaft.
@@ -90,10 +92,11 @@ impl ErrorType for Uart<'_> {
 impl Write for Uart<'_> {
     fn write(&mut self, bytes: &[u8]) -> Result<usize, Infallible> {
         for byte in bytes {
-            let now_ns = self.0.pass(FIELD_NS);
+            let end_ns = self.0.sent_ns.get().max(self.0.now_ns.get()).wrapping_add(FIELD_NS);
+            self.0.sent_ns.set(end_ns);
             let mut line = self.0.line.borrow_mut();
-            line.put(now_ns, *byte);
-            if let Some(sent) = self.0.encoder.borrow_mut().hear(&[*byte], now_ns) {
+            line.put(end_ns, *byte);
+            if let Some(sent) = self.0.encoder.borrow_mut().hear(&[*byte], end_ns) {
                 for (k, byte) in (1..).zip(sent.frame.as_bytes()) {
                     line.put(sent.start_ns.wrapping_add(FIELD_NS.wrapping_mul(k)), *byte);
                 }
@@ -127,6 +130,9 @@ impl Read for Uart<'_> {
     }
 }
 
+/// This UART begins at once, and looks at its clock last 100 ns.
+pub const WORST: Worst = Worst { uart_start_ns: 0, wake_ns: 100, clock_ns: 100 };
+
 /// A driver-enable pin that is not there.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Pin;
@@ -149,14 +155,14 @@ impl OutputPin for Pin {
 mod tests {
     use super::*;
     use servowire_drivers::tformat::blocking::Driver;
-    use servowire_drivers::{DriverEnable, Error};
+    use servowire_drivers::{DirectionPin, Error};
     use tformat::master::Line;
 
     #[test]
     fn positions_arrive_and_a_fault_is_over_with_the_next_call() {
         let bench = Bench::new(0x17);
         let line = Line::new(BitRate::Mbit2_5);
-        let mut encoder = Driver::new(Uart::new(&bench), DriverEnable(Pin), &bench, line);
+        let mut encoder = Driver::new(Uart::new(&bench), DirectionPin::new(Pin, WORST), &bench, line).unwrap();
         for position in [0, 1, 0x7f_ffff] {
             bench.turn_to(Abs::truncate(position), Abm::truncate(3));
             let all = encoder.read_data().unwrap();

@@ -10,6 +10,7 @@ pub mod nikon;
 pub mod nrz_line;
 pub mod rtex;
 pub mod sorte;
+pub mod step_motion;
 pub mod step_profile;
 pub mod tformat;
 
@@ -58,10 +59,10 @@ pub const TARGETS: &[(&str, Target)] = &[
     ("sorte_cut_through", sorte::cut_through),
     ("sorte_device", sorte::device),
     ("sorte_sync0", sorte::sync0),
+    ("step_motion_plan", step_motion::plan),
+    ("step_motion_path", step_motion::path),
     ("step_profile_step", step_profile::step),
     ("step_profile_axis", step_profile::axis),
-    ("step_profile_motion", step_profile::motion),
-    ("step_profile_path", step_profile::path),
     ("tformat_request", tformat::request),
     ("tformat_response", tformat::response),
     ("tformat_differential", tformat::differential),
@@ -77,4 +78,9 @@ fn byte(data: &mut &[u8]) -> u8 {
     let Some((first, rest)) = data.split_first() else { return 0 };
     *data = rest;
     *first
+}
+
+/// Takes four bytes off the front, low byte first.
+fn word(data: &mut &[u8]) -> u32 {
+    u32::from_le_bytes([byte(data), byte(data), byte(data), byte(data)])
 }

@@ -1,16 +1,11 @@
-//! step-profile: single steps against wider integers, an axis against the steps of its moves, plans and paths against their laws.
+//! step-profile: single steps against wider integers, an axis against the steps of its moves.
 
-use step_profile::motion::{AxisSetup, Clock, Limits, Path, PathMover, Plan};
 use step_profile::{
     Arithmetic, Axis, Command, Direction, Error, MoveState, Parameters, Profile, RampStep, RampSteps, RampTable, Speed,
     corrected, pru_exact, step_time_ns,
 };
 
-use crate::byte;
-
-fn word(data: &mut &[u8]) -> u32 {
-    u32::from_le_bytes([byte(data), byte(data), byte(data), byte(data)])
-}
+use crate::{byte, word};
 
 /// One step: ramp entry, speed constant and previous sync_time, four bytes each, low byte first.
 pub fn step(mut data: &[u8]) {
@@ -130,105 +125,4 @@ fn tick(axis: &mut Axis<'_>, model: &mut Option<Model<'_>>, held: Direction) -> 
         *model = None;
     }
     moved
-}
-
-/// Steps of a plan that are looked at.
-const LOOKED_AT: u32 = 4000;
-
-/// A plan of any limits: speed, acceleration, steps, entry speed, exit speed and clock, four bytes each, and eight of jerk,
-/// low byte first; 0 is no jerk limit.
-pub fn motion(mut data: &[u8]) {
-    let [speed, acceleration, steps, entry, exit, hz, low, high] = core::array::from_fn(|_| word(&mut data));
-    let jerk = u64::from(high) << 32 | u64::from(low);
-    let Ok(limits) = Limits::new(speed, acceleration) else { return };
-    let limits = if jerk == 0 { Ok(limits) } else { limits.with_jerk(jerk) };
-    let (Ok(limits), Some(clock)) = (limits, Clock::new(hz)) else { return };
-    let plan = match Plan::between(clock, limits, steps, entry, exit) {
-        Ok(plan) => plan,
-        Err(Error::SpeedAboveClock { .. }) => return assert!(speed > hz / 2),
-        Err(Error::TooManySteps { .. }) => return assert!(steps > u32::MAX / 2),
-        Err(Error::TooShort { needed, .. }) => {
-            assert!(needed > steps);
-            if needed <= u32::MAX / 2 {
-                assert!(Plan::between(clock, limits, needed, entry, exit).is_ok(), "{needed} steps are not enough");
-            }
-            return;
-        }
-        Err(e) => panic!("{e}"),
-    };
-    assert_eq!(plan.steps(), steps);
-    let mut last = None;
-    let mut made = 0_i64;
-    for tick in plan.pulses().take(LOOKED_AT as usize) {
-        assert!(last.is_none_or(|last| tick > last) && tick <= plan.duration(), "step {made} at {tick} after {last:?}");
-        (last, made) = (Some(tick), made + 1);
-        let state = plan.at(tick);
-        // Per mille of the limits, and the part of a tick that a corner may be off.
-        let most = |limit: u64, part: u64| (i128::from(limit) + i128::from(limit / 1000 + part)) << 16;
-        assert!(i128::from(state.speed) <= most(speed.into(), 1 + u64::from(acceleration >> 28)), "{state}");
-        assert!(i128::from(state.acceleration.abs()) <= most(acceleration.into(), 1 + (jerk >> 28)), "{state}");
-    }
-    assert_eq!(made, i64::from(steps.min(LOOKED_AT)));
-    assert_eq!(plan.at(plan.duration() + 1).position, i64::from(steps) << 32);
-}
-
-/// Two axes along a path, and requests to them: limits of the axes in four bytes, then commands of three.
-///
-/// ```text
-/// 0     speed / 100     1     acceleration / 1000     2     jerk / 100000, 0 for none     3     deviation at corners in um
-/// 4..   command, and two values: a line, a new target, time, an override, hold, resume, stop, halt
-/// ```
-pub fn path(mut data: &[u8]) {
-    let [speed, acceleration, jerk, deviation] = core::array::from_fn(|_| u32::from(byte(&mut data)));
-    let limits = Limits::new(speed * 100 + 50, acceleration * 1000 + 500).expect("in range");
-    let limits = if jerk == 0 { limits } else { limits.with_jerk(u64::from(jerk) * 100_000).expect("in range") };
-    let axis = AxisSetup::new(limits, 80_000);
-    let path = Path::<2, 4>::new(Clock::MICROSECONDS, [axis; 2], deviation).expect("a speed below the clock's");
-    let mut watched = Watched { machine: PathMover::new(path), position: [0; 2], now: 0 };
-    while let [command, a, b, rest @ ..] = data {
-        data = rest;
-        let to = [a, b].map(|value| i64::from(i8::from_le_bytes([*value])) * 4);
-        let (now, machine) = (watched.now, &mut watched.machine);
-        match command & 7 {
-            0 => {
-                let full = machine.is_full();
-                assert_eq!(machine.push(to, 200_000, now).is_err(), full);
-            }
-            1 => drop(machine.move_to(to, 50_000, now)),
-            2 => watched.until(now + (u64::from(*a) << (b & 15))),
-            3 => machine.set_override(u16::from(*a), now),
-            4 => machine.hold(now),
-            5 => machine.resume(now),
-            6 => machine.stop(now),
-            _ => machine.halt(now),
-        }
-    }
-    let now = watched.now;
-    watched.machine.set_override(100, now);
-    watched.machine.resume(now);
-    watched.until(u64::MAX);
-    assert_eq!((watched.position, watched.machine.is_empty()), (watched.machine.target(), true));
-    assert!(watched.machine.is_at_rest(u64::MAX >> 24));
-}
-
-struct Watched {
-    machine: PathMover<2, 4>,
-    position: [i64; 2],
-    now: u64,
-}
-
-impl Watched {
-    /// Takes all steps before a time: each later than the one before, and one at a time.
-    fn until(&mut self, time: u64) {
-        while let Some(due) = self.machine.due().filter(|due| *due < time) {
-            let pulse = self.machine.pulse().expect("a step is due");
-            assert!(pulse.tick == due && due >= self.now, "{pulse:?} before {}", self.now);
-            self.position[usize::from(pulse.axis)] += if pulse.direction.dir() { -1 } else { 1 };
-            assert_eq!(self.machine.commanded(), self.position);
-            self.now = due;
-        }
-        if time < u64::MAX {
-            self.now = self.now.max(time);
-        }
-    }
 }

@@ -44,7 +44,7 @@ pub type Policy = servowire_core::Policy<Tolerated>;
 
 /// A fast position that may be used.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
 #[cfg_attr(feature = "arbitrary", derive(arbitrary::Arbitrary))]
 pub struct Sample {
     pub(crate) position: i64,
@@ -111,7 +111,7 @@ servowire_core::one_line!(Sample {
 /// What there is to say about the fast position after an H-frame: from [`Master::fast`](crate::master::Master::fast).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
 #[cfg_attr(feature = "arbitrary", derive(arbitrary::Arbitrary))]
 pub struct Evidence {
     pub(crate) doubt: Option<Doubt>,
@@ -174,7 +174,7 @@ impl Shaft for Evidence {
 /// A safe position that may be used. It must not close a control loop: it is not in step with the pulse (SICK manual,
 /// p. 67).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
 #[cfg_attr(feature = "arbitrary", derive(arbitrary::Arbitrary))]
 pub struct SafeSample {
     pub(crate) position: i64,
@@ -207,7 +207,7 @@ servowire_core::one_line!(SafeSample {
 /// What there is to say about the safe position after an H-frame: from [`Master::safe`](crate::master::Master::safe).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
 #[cfg_attr(feature = "arbitrary", derive(arbitrary::Arbitrary))]
 pub struct SafeEvidence(pub(crate) Result<SafeSample, Doubt>);
 

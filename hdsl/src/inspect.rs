@@ -24,6 +24,7 @@
 
 mod disparity;
 mod head;
+mod rules;
 
 use nrz_line::{Search, Window};
 
@@ -41,6 +42,7 @@ pub use head::{
     is_coded_for_balance,
 };
 pub use nrz_line::Cause as LineCause;
+pub use rules::{BrokenRule, CarriedDisparity, HeadRules};
 
 /// What a frame is answered with.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -74,15 +76,6 @@ servowire_core::one_line!(Cause {
     Self::TestPattern => "this is the test pattern: the encoder has not heard what it was asked for";
 });
 
-impl From<LineCause> for Cause {
-    fn from(cause: LineCause) -> Self {
-        Self::Line(cause)
-    }
-}
-
-/// The kinds of faults found, as a set.
-pub type Findings = servowire_core::Findings<ErrorClass>;
-
 /// What there is to say about an answer.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
@@ -94,30 +87,12 @@ pub struct Report {
     answer: Option<Answer>,
 }
 
-servowire_core::one_line!(Report {
-    Self { error: Some(error), cause: Some(cause), .. } => "{}; likely cause: {}", error, cause;
-    Self { error: Some(error), .. } => "{}", error;
+servowire_core::report! {
     Self { disparity, .. } if !disparity.holds() => "all words are good, but not one after the other";
     _ => "sound";
-});
+}
 
 impl Report {
-    /// The first fault of the answer: of its words in line order, of a character that is none of its channel, of the check bits of
-    /// the acceleration, of the encoder's symbol.
-    pub const fn error(&self) -> Option<Error> {
-        self.error
-    }
-
-    /// Every kind of fault in the answer as it was given.
-    pub const fn findings(&self) -> Findings {
-        self.findings
-    }
-
-    /// The most likely cause of the fault.
-    pub const fn cause(&self) -> Option<Cause> {
-        self.cause
-    }
-
     /// What the words say of the running disparity. Where no other fault is and this does not hold, bits of at least one word
     /// were flipped.
     pub const fn disparity(&self) -> Chain {

@@ -65,8 +65,9 @@ use send::{trailer, transmission};
 /// Bits from the sampling edge of a frame without an EXTRA window to the end of the window of its answer: those of the head
 /// after it, the direction switch, the answer and its reserve.
 const SINCE_EDGE_BITS: u64 = 18 + 1 + WINDOW as u64;
-/// A free-running frame and a half, in ns.
-const FREE_RUNNING_NS: u32 = 17_280;
+/// Half a free-running frame in ns, and one and a half.
+const HALF_FRAME_NS: u32 = 5_760;
+const FREE_RUNNING_NS: u32 = 3 * HALF_FRAME_NS;
 /// The same time in ns, rounded up.
 const SINCE_EDGE_NS: u64 = (SINCE_EDGE_BITS * 1_000_000_000).div_ceil(BIT_RATE as u64);
 
@@ -98,6 +99,9 @@ pub struct Master {
     end_ns: u64,
     /// From the end of a window to that of the next one, and half a frame: if it takes longer a frame was lost.
     longest_ns: u32,
+    /// Blocks of stuffing after a frame of a running link that is free running, and `longest_ns` of it.
+    stuffing: Stuffing,
+    usual_ns: u32,
     /// Steps of a turn for the angle in a sample; 0 if they are not known.
     steps_per_turn: u32,
     /// From the sampling edge at the master to the sampling in the encoder.
@@ -147,6 +151,8 @@ impl Master {
             restart: false,
             end_ns: 0,
             longest_ns: u32::MAX,
+            stuffing: Stuffing::MIN,
+            usual_ns: FREE_RUNNING_NS,
             steps_per_turn: 0,
             latency_ns: 0,
             edge_ns: 0,
@@ -365,8 +371,8 @@ impl Master {
         self.counters.frames = self.counters.frames.wrapping_add(1);
         self.h_frame.restarted = None;
         self.h_frame.state = State::Running;
-        self.longest_ns = FREE_RUNNING_NS;
-        self.h_frame.tail = Tail { trailer: Trailer::AfterAnswer, stuffing: Stuffing::MIN };
+        self.longest_ns = self.usual_ns;
+        self.h_frame.tail = Tail { trailer: Trailer::AfterAnswer, stuffing: self.stuffing };
         self.h_frame.long_free = self.requester.is_long_free();
         self.h_frame.short_free = self.requester.is_short_free();
         &self.h_frame

@@ -1,8 +1,7 @@
 use nrz_line::{BitOrder, Window};
 
 use crate::crc::next;
-use crate::frame::{DELIMITER, MAX_FRAMES, START};
-use crate::layout::FRAME_BITS;
+use crate::layout::{DELIMITER, FRAME_BITS, MAX_FRAMES, START};
 
 /// The content bits of a response, 16 a frame and back to back, in the words of a 32-bit core: the first of the line in bit 0 of
 /// the first word. What stands after the last frame is 0.

@@ -3,23 +3,8 @@ use nrz_line::{BitOrder, Window};
 use crate::contents::{apart, framed};
 use crate::crc::crc3;
 use crate::error::Error;
-use crate::layout::FRAME_BITS;
+use crate::layout::{DELIMITER, FRAME_BITS, MAX_FRAMES};
 use crate::number::EncoderAddress;
-
-pub(crate) const START: u128 = 1 | 1 << 18 | 1 << 36 | 1 << 54 | 1 << 72 | 1 << 90;
-pub(crate) const DELIMITER: u128 = START << 17;
-const _: () = {
-    let content = START * 0x1_fffe;
-    assert!(
-        START & DELIMITER == 0
-            && (START | DELIMITER) & content == 0
-            && START | DELIMITER | content == (1 << (18 * MAX_FRAMES)) - 1,
-        "start bits, content bits and delimiters partition the longest response"
-    );
-};
-
-/// Frames of the longest response.
-pub(crate) const MAX_FRAMES: u32 = 6;
 
 /// One frame of a request: a command data frame (CDF) or one of the memory data frames MDF0 to MDF3.
 ///

@@ -3,6 +3,23 @@ use core::fmt;
 /// Bits of one frame on the line, in both directions: start bit 0, 16 content bits, delimiter 1.
 pub const FRAME_BITS: u32 = 18;
 
+/// The start bits of the longest response.
+pub(crate) const START: u128 = 1 | 1 << 18 | 1 << 36 | 1 << 54 | 1 << 72 | 1 << 90;
+/// Its delimiters.
+pub(crate) const DELIMITER: u128 = START << 17;
+const _: () = {
+    let content = START * 0x1_fffe;
+    assert!(
+        START & DELIMITER == 0
+            && (START | DELIMITER) & content == 0
+            && START | DELIMITER | content == (1 << (18 * MAX_FRAMES)) - 1,
+        "start bits, content bits and delimiters partition the longest response"
+    );
+};
+
+/// Frames of the longest response.
+pub(crate) const MAX_FRAMES: u32 = 6;
+
 /// What a response carries between its information field and its CRC-8.
 ///
 /// ```text

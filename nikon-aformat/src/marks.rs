@@ -1,52 +1,47 @@
-use bitflags::bitflags;
+//! All that can speak against a position, in one word, so that one mask says what is tolerated of it.
+//!
+//! ```text
+//!  30      29 ... 24  23     22          21      20        19 ... 16  15 ... 0
+//!  SUMMED  st_bits    NEVER  UPPER_BITS  ABSENT  NO_TURNS  ES         ALM
+//! ```
 
 use crate::status::{Alm, EncoderStatus};
 
-/// All that can speak against a position, in one word, so that one mask says what is tolerated of it.
-///
-/// ```text
-///  bit  23     22          21      20        19 ... 16  15 ... 0
-///       NEVER  UPPER_BITS  ABSENT  NO_TURNS  ES         ALM
-/// ```
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize))]
-pub(crate) struct Marks(u32);
+/// The response carries fewer bits of the turns than the encoder counts.
+pub(crate) const NO_TURNS: u32 = 1 << 20;
+/// It carries not even a whole turn.
+pub(crate) const ABSENT: u32 = 1 << 21;
+/// Bits are set above the widths. The single turn is the width.
+pub(crate) const UPPER_BITS: u32 = 1 << 22;
+/// There was no response.
+pub(crate) const NEVER: u32 = 1 << 23;
+/// One bit stood for all of the status.
+pub(crate) const SUMMED: u32 = 1 << 30;
 
-bitflags! {
-    impl Marks: u32 {
-        /// The response carries fewer bits of the turns than the encoder counts.
-        const NO_TURNS = 1 << 20;
-        /// It carries not even a whole turn.
-        const ABSENT = 1 << 21;
-        /// Bits are set above the widths.
-        const UPPER_BITS = 1 << 22;
-        /// There was no response.
-        const NEVER = 1 << 23;
+/// All that speaks against a position.
+pub(crate) const OBJECTIONS: u32 = 0x00ff_ffff;
 
-        const _ = 0xff_ffff;
-    }
+pub(crate) const fn of_status(status: EncoderStatus) -> u32 {
+    (status.bits() as u32 & 0xf) << 16
 }
 
-impl Marks {
-    /// Status bits.
-    pub(crate) const fn of_status(status: EncoderStatus) -> Self {
-        Self((status.bits() as u32 & 0xf) << 16)
-    }
+pub(crate) const fn of_alarms(alarms: Alm) -> u32 {
+    alarms.bits() as u32
+}
 
-    /// Alarms.
-    pub(crate) const fn of_alarms(alarms: Alm) -> Self {
-        Self(alarms.bits() as u32)
-    }
+pub(crate) const fn of_bits(st_bits: u8) -> u32 {
+    (st_bits as u32) << 24
+}
 
-    /// The status bits among them.
-    #[expect(clippy::cast_possible_truncation, reason = "four bits are kept")]
-    pub(crate) const fn status(self) -> EncoderStatus {
-        EncoderStatus::from_bits_truncate((self.0 >> 16) as u8)
-    }
+pub(crate) const fn status(marks: u32) -> EncoderStatus {
+    EncoderStatus::from_bits_truncate(marks.to_le_bytes()[2])
+}
 
-    /// The alarms among them.
-    #[expect(clippy::cast_possible_truncation, reason = "the lower half")]
-    pub(crate) const fn alarms(self) -> Alm {
-        Alm::from_bits_retain(self.0 as u16)
-    }
+pub(crate) const fn alarms(marks: u32) -> Alm {
+    let [low, high, ..] = marks.to_le_bytes();
+    Alm::from_bits_retain(u16::from_le_bytes([low, high]))
+}
+
+pub(crate) const fn single_turn_bits(marks: u32) -> u8 {
+    marks.to_le_bytes()[3] & 0x3f
 }

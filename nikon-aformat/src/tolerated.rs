@@ -1,6 +1,6 @@
 use servowire_core::Tolerance;
 
-use crate::marks::Marks;
+use crate::marks::{NO_TURNS, OBJECTIONS, alarms, of_alarms, of_status, status};
 use crate::status::{Alm, EncoderStatus};
 
 /// Up to which age, and in spite of what, a position may be used.
@@ -16,49 +16,48 @@ pub type Policy = servowire_core::Policy<Tolerated>;
 /// In spite of what a position may be used: status bits, and alarms where a response carries them.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(from = "Written", into = "Written"))]
-pub struct Tolerated(Marks);
+pub struct Tolerated(u32);
 
 impl Tolerated {
     /// Nothing.
-    pub const NOTHING: Self = Self(Marks::empty());
+    pub const NOTHING: Self = Self(0);
 
     #[cfg(test)]
-    pub(crate) const ANY_TURNS: Self = Self(Marks::NO_TURNS);
+    pub(crate) const ANY_TURNS: Self = Self(NO_TURNS);
 
     /// As one drive does where turns are not used: an encoder without its battery shows BATT. The turns are not judged then, and
     /// the [`Sample`](crate::Sample) does not have them. Everything else means that the position may be wrong or that something
     /// is about to fail.
-    pub const SINGLE_TURN: Self = Self(Marks::NO_TURNS).status(EncoderStatus::BATT).alarms(Alm::BATT);
+    pub const SINGLE_TURN: Self = Self(NO_TURNS).status(EncoderStatus::BATT).alarms(Alm::BATT);
 
     /// These status bits too.
     #[must_use]
     pub const fn status(self, status: EncoderStatus) -> Self {
-        Self(self.0.union(Marks::of_status(status)))
+        Self(self.0 | of_status(status))
     }
 
     /// These alarms too.
     #[must_use]
     pub const fn alarms(self, alarms: Alm) -> Self {
-        Self(self.0.union(Marks::of_alarms(alarms)))
+        Self(self.0 | of_alarms(alarms))
     }
 
     /// What of these marks is not tolerated.
     #[inline]
-    pub(crate) const fn objects_to(self, marks: Marks) -> Marks {
-        marks.difference(self.0)
+    pub(crate) const fn objects_to(self, marks: u32) -> u32 {
+        marks & OBJECTIONS & !self.0
     }
 
     /// Whether turns may be anything, or missing: they are not used.
     #[inline]
     pub(crate) const fn ignores_turns(self) -> bool {
-        self.0.contains(Marks::NO_TURNS)
+        self.0 & NO_TURNS != 0
     }
 }
 
 servowire_core::one_line!(Tolerated {
-    Self(marks) if marks.contains(Marks::NO_TURNS) =>
-        "status {} and alarms {}, any turns", marks.status(), marks.alarms();
-    Self(marks) => "status {} and alarms {}", marks.status(), marks.alarms();
+    Self(marks) if marks & NO_TURNS != 0 => "status {} and alarms {}, any turns", status(*marks), alarms(*marks);
+    Self(marks) => "status {} and alarms {}", status(*marks), alarms(*marks);
 });
 
 impl Tolerance for Tolerated {
@@ -66,7 +65,6 @@ impl Tolerance for Tolerated {
 }
 
 /// What is tolerated, as it is written down.
-#[derive(Clone, Copy)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "arbitrary", derive(arbitrary::Arbitrary))]
 #[cfg(any(feature = "serde", feature = "arbitrary"))]
@@ -79,15 +77,14 @@ struct Written {
 #[cfg(any(feature = "serde", feature = "arbitrary"))]
 impl From<Written> for Tolerated {
     fn from(Written { status, alarms, any_turns }: Written) -> Self {
-        let turns = if any_turns { Marks::NO_TURNS } else { Marks::empty() };
-        Self(turns).status(status).alarms(alarms)
+        Self(if any_turns { NO_TURNS } else { 0 }).status(status).alarms(alarms)
     }
 }
 
 #[cfg(feature = "serde")]
 impl From<Tolerated> for Written {
-    fn from(Tolerated(marks): Tolerated) -> Self {
-        Self { status: marks.status(), alarms: marks.alarms(), any_turns: marks.contains(Marks::NO_TURNS) }
+    fn from(tolerated: Tolerated) -> Self {
+        Self { status: status(tolerated.0), alarms: alarms(tolerated.0), any_turns: tolerated.ignores_turns() }
     }
 }
 

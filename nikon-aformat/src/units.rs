@@ -1,4 +1,4 @@
-use crate::raw_response::RawResponse;
+use crate::layout::MAX_FRAMES;
 
 /// Frames as a receiver with hardware framing hears them: what [`Transaction::hear`](crate::master::Transaction::hear) and
 /// [`Device::hear`](crate::device::Device::hear) take.
@@ -7,7 +7,7 @@ use crate::raw_response::RawResponse;
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Units {
-    units: [Option<u16>; RawResponse::MAX_FRAMES],
+    units: [Option<u16>; MAX_FRAMES as usize],
     len: u8,
 }
 

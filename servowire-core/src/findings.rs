@@ -14,12 +14,12 @@ impl<C: Class> Findings<C> {
     /// No fault.
     pub const NONE: Self = Self { bits: 0, classes: PhantomData };
 
-    /// Whether a fault of this class was found.
+    /// Returns whether a fault of this class was found.
     pub fn contains(self, class: C) -> bool {
         self.bits & bit(class) != 0
     }
 
-    /// Whether no fault was found.
+    /// Returns whether no fault was found.
     pub const fn is_empty(self) -> bool {
         self.bits == 0
     }
@@ -97,6 +97,48 @@ impl<'de, C: Class + serde::Deserialize<'de>> serde::Deserialize<'de> for Findin
     }
 }
 
+/// What the inspection of a serial line has in common: `Findings`, a `Cause` that may be one of the line, and of
+/// `Report`, whose fields `error`, `findings` and `cause` these are, the getters and the words for a person. Arms that are named
+/// come after those of a fault.
+///
+/// `servowire_core::report! { Self { response: Some(response), .. } => "sound: {}", response; }`
+#[macro_export]
+macro_rules! report {
+    ($($sound:tt)+) => {
+        impl From<LineCause> for Cause {
+            fn from(cause: LineCause) -> Self {
+                Self::Line(cause)
+            }
+        }
+
+        /// The kinds of faults found, as a set.
+        pub type Findings = $crate::Findings<ErrorClass>;
+
+        $crate::one_line!(Report {
+            Self { error: Some(error), cause: Some(cause), .. } => "{}; likely cause: {}", error, cause;
+            Self { error: Some(error), .. } => "{}", error;
+            $($sound)+
+        });
+
+        impl Report {
+            /// The first fault, as a decoder reports it.
+            pub const fn error(&self) -> Option<Error> {
+                self.error
+            }
+
+            /// Every kind of fault in what was given.
+            pub const fn findings(&self) -> Findings {
+                self.findings
+            }
+
+            /// The most likely cause of the fault.
+            pub const fn cause(&self) -> Option<Cause> {
+                self.cause
+            }
+        }
+    };
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -138,6 +180,39 @@ mod tests {
         assert_eq!(found.iter().collect::<Vec<_>>(), [Kind::First, Kind::Third]);
         assert_eq!(found.to_string(), "first third");
     }
+
+    /// A class by its place, of more than a set holds.
+    #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+    struct Place(usize);
+
+    impl Class for Place {
+        const ALL: &'static [Self] = &[Self(0), Self(31), Self(32), Self(63), Self(64)];
+
+        fn index(self) -> usize {
+            self.0
+        }
+
+        fn name(self) -> &'static str {
+            "place"
+        }
+
+        fn number(self) -> u8 {
+            self.0 as u8 + 1
+        }
+    }
+
+    #[test]
+    fn up_to_64_classes_are_told_apart() {
+        for place in [0, 31, 32, 63] {
+            let mut found = Findings::NONE;
+            found.insert(Place(place));
+            assert_eq!(found.iter().collect::<Vec<_>>(), [Place(place)]);
+        }
+        let mut found = Findings::NONE;
+        found.insert(Place(64));
+        assert!(found.is_empty() && !found.contains(Place(64)));
+    }
+
     #[cfg(feature = "serde")]
     #[test]
     fn written_as_the_classes() {

@@ -28,6 +28,7 @@ mod run;
 #[cfg(not(all(test, loom)))]
 mod shaft;
 mod show;
+mod step_dir;
 pub mod stream;
 mod time;
 
@@ -48,6 +49,7 @@ pub use run::{Ended, run, run_async};
 #[cfg(not(all(test, loom)))]
 pub use shaft::{Shaft, ShaftCell, ShaftReader, ShaftWriter};
 pub use show::write_names;
+pub use step_dir::{Command, Direction};
 pub use time::{ClockCheck, ClockError, MAX_TICK_NS, MIN_TICK_HZ, TickRate, TimeBase};
 
 /// What the macros of this crate name; not for use by hand.

@@ -79,7 +79,7 @@ impl<F: Shaft + Words<W>, const W: usize> ShaftCell<F, W> {
         Self { slots: FourSlots::new(), evidence: PhantomData }
     }
 
-    /// Its two ends, as those of [`Cell`](crate::Cell::split). What is in the cell stays there; the speed begins anew.
+    /// The two ends, as those of [`Cell`](crate::Cell::split). The cell keeps what it holds; the next sample is a first one.
     pub const fn split(&mut self, tracker: Tracker) -> (ShaftWriter<'_, F, W>, ShaftReader<'_, F, W>) {
         let slots = &self.slots;
         (ShaftWriter { slots, tracker, evidence: PhantomData }, ShaftReader { slots, evidence: PhantomData })
@@ -103,7 +103,7 @@ impl<F: Shaft + Words<W>, const W: usize> ShaftWriter<'_, F, W> {
     /// Puts the newest evidence, in place of all before.
     ///
     /// The policy, that of the reader as a rule, decides which evidence goes into the speed. After a doubt the speed is not
-    /// known until there are two good samples again, as in the beginning.
+    /// known until there are two good samples again, as at the start.
     pub fn put(&mut self, evidence: F, now_ns: u64, policy: Policy<F::Tolerated>) {
         let motion = if let Ok(sample) = evidence.at(now_ns, policy) {
             let (angle, sampled_ns) = F::shaft(&sample);
@@ -171,6 +171,150 @@ impl<F: Shaft + Words<W>, const W: usize> ShaftReader<'_, F, W> {
             None => (F::NEVER, Motion::UNKNOWN),
         }
     }
+}
+
+/// `Evidence`, `Sample`, `EvidenceCell` and `EvidenceShaftCell` of a protocol whose encoders count turns.
+///
+/// All that can speak against a position stands in one word of marks, so that one mask says what is tolerated of it. What the
+/// marks mean is the protocol's: in scope are its `Policy`, `Tolerated` (with `objects_to(marks)` and `ignores_turns()`),
+/// `Doubt`, the mark `NEVER`, `single_turn_bits(marks)`, and it writes `Evidence::doubt`, which names what speaks against a
+/// position. The fields are private to the module in which this stands, so nobody else makes a sample. The last word is the name
+/// of the field for the width of the single turn, in files.
+#[macro_export]
+macro_rules! shaft_evidence {
+    ($(#[$about:meta])* Evidence, $bits:ident) => {
+        $(#[$about])*
+        #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+        #[cfg_attr(feature = "serde", derive(serde::Serialize))]
+        pub struct Evidence {
+            sampled_ns: u64,
+            single_turn: u32,
+            turns: i32,
+            marks: u32,
+        }
+
+        $crate::one_line!(Evidence {
+            Self { marks, .. } if marks & NEVER != 0 => "no position was heard yet";
+            Self { sampled_ns, .. } => "a position sampled at {} ns", sampled_ns;
+        });
+
+        impl Evidence {
+            /// Nothing was heard yet.
+            pub const NEVER: Self = Self { sampled_ns: 0, single_turn: 0, turns: 0, marks: NEVER };
+
+            /// The position, if nothing speaks against its use at `now_ns`.
+            ///
+            /// # Errors
+            /// [`Doubt`], in the order in which its variants are declared.
+            #[inline]
+            pub const fn at(&self, now_ns: u64, policy: Policy) -> Result<Sample, Doubt> {
+                let Self { sampled_ns, single_turn, turns, marks } = *self;
+                let tolerated = policy.tolerated();
+                if policy.check_age(now_ns, sampled_ns).is_ok() && tolerated.objects_to(marks) == 0 {
+                    let turns = if tolerated.ignores_turns() { None } else { Some(turns) };
+                    Ok(Sample { sampled_ns, single_turn, turns, $bits: single_turn_bits(marks) })
+                } else {
+                    Err(self.doubt(now_ns, policy))
+                }
+            }
+        }
+
+        impl Default for Evidence {
+            fn default() -> Self {
+                Self::NEVER
+            }
+        }
+
+        impl $crate::Feedback for Evidence {
+            type Tolerated = Tolerated;
+            type Sample = Sample;
+            type Doubt = Doubt;
+            const NEVER: Self = Self::NEVER;
+
+            #[inline]
+            fn at(&self, now_ns: u64, policy: Policy) -> Result<Sample, Doubt> {
+                self.at(now_ns, policy)
+            }
+        }
+
+        /// For an [`EvidenceShaftCell`].
+        impl $crate::Shaft for Evidence {
+            #[inline]
+            fn shaft(sample: &Sample) -> ($crate::Angle, u64) {
+                (sample.angle(), sample.sampled_ns())
+            }
+        }
+
+        /// Carries evidence from where it is received to where it is used, between two priorities or cores.
+        pub type EvidenceCell = $crate::Cell<Evidence, 5>;
+
+        /// As [`EvidenceCell`], and it also gives the angle of an instant between two samples.
+        pub type EvidenceShaftCell = $crate::ShaftCell<Evidence, 5>;
+
+        /// For an [`EvidenceCell`]: the instant of sampling, low half first, single turn, turns, marks.
+        impl $crate::Words<5> for Evidence {
+            #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "halves, and bits of one width")]
+            #[inline]
+            fn to_words(&self) -> [u32; 5] {
+                let Self { sampled_ns, single_turn, turns, marks } = *self;
+                [sampled_ns as u32, (sampled_ns >> 32) as u32, single_turn, turns as u32, marks]
+            }
+
+            #[allow(clippy::cast_possible_wrap, reason = "bits of one width")]
+            #[inline]
+            fn from_words([low, high, single_turn, turns, marks]: [u32; 5]) -> Self {
+                Self { sampled_ns: u64::from(high) << 32 | u64::from(low), single_turn, turns: turns as i32, marks }
+            }
+        }
+
+        /// A position that may be used, and when it was sampled: from [`Evidence::at`].
+        ///
+        /// It has turns where the policy judged them. With [`Tolerated::SINGLE_TURN`] they may be anything, and are not here.
+        #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+        #[cfg_attr(feature = "serde", derive(serde::Serialize))]
+        pub struct Sample {
+            sampled_ns: u64,
+            single_turn: u32,
+            turns: Option<i32>,
+            $bits: u8,
+        }
+
+        $crate::one_line!(Sample {
+            Self { single_turn, turns: Some(turns), sampled_ns, .. } =>
+                "turn {}, {} counts at {} ns", turns, single_turn, sampled_ns;
+            Self { single_turn, turns: None, sampled_ns, .. } => "{} counts at {} ns", single_turn, sampled_ns;
+        });
+
+        impl Sample {
+            /// When it was sampled, in ns by the clock of the master, as the exchange says. Its age counts from here.
+            pub const fn sampled_ns(self) -> u64 {
+                self.sampled_ns
+            }
+
+            /// Counts in the turn.
+            pub const fn single_turn(self) -> u32 {
+                self.single_turn
+            }
+
+            /// The place in the turn as an angle.
+            pub const fn angle(self) -> $crate::Angle {
+                $crate::Angle::from_bits(self.single_turn.wrapping_shl(32_u32.wrapping_sub(self.$bits as u32)))
+            }
+
+            /// Turns, if the policy judged them.
+            pub const fn turns(self) -> Option<i32> {
+                self.turns
+            }
+
+            /// Both parts in counts, turns times the counts of a turn and the single turn; if the policy judged the turns.
+            pub const fn counts(self) -> Option<i64> {
+                match self.turns {
+                    Some(turns) => Some((turns as i64).wrapping_shl(self.$bits as u32) | self.single_turn as i64),
+                    None => None,
+                }
+            }
+        }
+    };
 }
 
 #[cfg(test)]
@@ -256,5 +400,37 @@ mod tests {
             field(&mut reader, ns.into()).map(|(_, known)| known)
         });
         assert!(known.eq([Ok(false), Ok(true), Err(Doubt::Bad), Ok(false), Ok(true)]));
+    }
+
+    /// What is too old for the position is too old for the speed.
+    #[test]
+    fn evidence_that_comes_late_is_no_sample_of_the_speed() {
+        let mut cell = ShaftCell::<Count, 3>::new();
+        let (mut writer, mut reader) = cell.split(Tracker::new(1 << 16, 1_000).unwrap());
+        let mut known = |sampled_ns: u32, put_ns| {
+            writer.put(Count(7, true, sampled_ns), put_ns, POLICY);
+            reader.motion(sampled_ns.into(), POLICY).map(|motion| motion.speed())
+        };
+        assert_eq!(known(50_000, 60_000), Ok(None));
+        assert_eq!(known(100_000, 200_000), Ok(Some(0)));
+        // 1 ns more than the longest age.
+        assert_eq!(known(150_000, 250_001), Ok(None));
+        assert_eq!(known(200_000, 210_000), Ok(None));
+        assert_eq!(known(250_000, 260_000), Ok(Some(0)));
+    }
+
+    /// Whoever splits a cell again finds what was in it, and a speed that starts anew.
+    #[test]
+    fn a_cell_that_is_split_again_keeps_its_value() {
+        let mut cell = ShaftCell::<Count, 3>::new();
+        let tracker = Tracker::new(1 << 16, 1_000).unwrap();
+        let (mut writer, _) = cell.split(tracker);
+        writer.put(Count(7, true, 50_000), 50_000, POLICY);
+        writer.put(Count(7, true, 100_000), 100_000, POLICY);
+        let (mut writer, mut reader) = cell.split(tracker);
+        assert_eq!(reader.latest(), Count(7, true, 100_000));
+        assert_eq!(reader.motion(100_000, POLICY).map(|motion| motion.speed()), Ok(Some(0)));
+        writer.put(Count(7, true, 150_000), 150_000, POLICY);
+        assert_eq!(reader.motion(150_000, POLICY).map(|motion| motion.speed()), Ok(None));
     }
 }

@@ -1,16 +1,11 @@
 #[cfg(feature = "embassy-time")]
-mod embassy;
+pub(crate) mod embassy;
 #[cfg(feature = "fugit")]
-mod fugit;
+pub(crate) mod fugit;
 
 #[cfg(feature = "async")]
 use servowire_core::ClockCheck;
 use servowire_core::{ClockError, TickRate, TimeBase};
-
-#[cfg(feature = "embassy-time")]
-pub use embassy::EmbassyClock;
-#[cfg(feature = "fugit")]
-pub use fugit::{FugitClock, FugitClock32};
 
 /// Looks at a clock that stands: some 30 ms of a fast processor, 0.3 s of a slow one. In a tick of 1 us it makes a hundred, but the
 /// timer of an emulator can stand for thousands while its host is busy.

@@ -16,6 +16,8 @@ pub trait Direction {
     /// # Errors
     /// That of the pin.
     fn receive(&mut self) -> Result<(), Self::Error>;
+    /// How inexact that is at the worst, if software does it; `None` if the hardware does, and needs no time for it.
+    fn worst(&self) -> Option<Worst>;
 }
 
 /// The UART or the adapter does it: hardware driver enable. Prefer it where there is one.
@@ -32,21 +34,101 @@ impl Direction for Automatic {
     fn receive(&mut self) -> Result<(), Infallible> {
         Ok(())
     }
+
+    fn worst(&self) -> Option<Worst> {
+        None
+    }
 }
 
-/// A pin at DE, or at DE and /RE tied: high while sending.
-#[derive(Debug, Clone, Copy)]
-pub struct DriverEnable<P>(pub P);
+/// How inexactly software switches the line driver, at the worst: numbers of the board, the HAL and the executor, which a library
+/// cannot know. None of them has a default.
+///
+/// The driver has to go off after the last bit of a request and before the encoder may answer, four bits later (1.6 us at
+/// 2.5 Mbit/s, 0.8 us at 5) if `turn_around_ns` of the line says nothing else. `uart_start_ns + wake_ns + 2 * clock_ns` have to fit
+/// in between: the time is read once when the request begins, and once when it ends. What does not fit is refused when the
+/// [`Driver`](crate::tformat::blocking::Driver) is made, with [`PinTooSlow`].
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct Worst {
+    /// From the return of `write` to the start bit on the line, ns: the UART waits for its next bit clock (up to 400 ns at 2.5 Mbit/s),
+    /// a buffered one for its interrupt, one with DMA for its set-up. Add what the request lasts longer at a rate that is
+    /// slow: 1 % of four fields are 160 ns. Understated, requests are cut off.
+    pub uart_start_ns: u32,
+    /// From the time at which the pin is to be switched until it is, ns: the latency of interrupts that are served meanwhile, of the executor
+    /// and its timer for futures, and of the pin. Understated, the driver goes off while the encoder answers, which is reported.
+    pub wake_ns: u32,
+    /// A tick of the clock, ns: 6 for a cycle counter at 170 MHz, 1 000 for a timer of 1 MHz, which is too long.
+    /// Understated, requests are cut off.
+    pub clock_ns: u32,
+}
 
-impl<P: OutputPin> Direction for DriverEnable<P> {
+/// The line driver cannot be switched off between the end of a request and the answer for certain.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, thiserror::Error)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[error("the direction pin is too slow: {missing_ns} ns are missing in a window of {window_ns} ns")]
+pub struct PinTooSlow {
+    /// By how much it has to be better, ns.
+    pub missing_ns: u32,
+    /// From the end of a request to the earliest answer, ns.
+    pub window_ns: u32,
+}
+
+#[cfg(feature = "tformat")]
+impl Worst {
+    /// Whether the window is long enough for it.
+    pub(crate) fn check(self, window_ns: u32) -> Result<(), PinTooSlow> {
+        let clock_ns = self.clock_ns.saturating_mul(2);
+        let needed_ns = self.uart_start_ns.saturating_add(self.wake_ns).saturating_add(clock_ns);
+        match needed_ns.saturating_sub(window_ns) {
+            0 => Ok(()),
+            missing_ns => Err(PinTooSlow { missing_ns, window_ns }),
+        }
+    }
+}
+
+/// A pin at DE, or at DE and /RE tied: high while sending, switched by software.
+///
+/// ```
+/// use servowire_drivers::{DirectionPin, Worst};
+///
+/// # fn make<P: embedded_hal::digital::OutputPin>(pin: P) -> DirectionPin<P> {
+/// // a UART without a buffer, interrupts of up to 0.8 us, a cycle counter at 170 MHz
+/// DirectionPin::new(pin, Worst { uart_start_ns: 400, wake_ns: 800, clock_ns: 6 })
+/// # }
+/// ```
+#[derive(Debug, Clone, Copy)]
+pub struct DirectionPin<P> {
+    pin: P,
+    worst: Worst,
+}
+
+impl<P> DirectionPin<P> {
+    /// This pin, switched no worse than this.
+    pub const fn new(pin: P, worst: Worst) -> Self {
+        Self { pin, worst }
+    }
+
+    /// Gives the pin back.
+    pub fn release(self) -> P {
+        self.pin
+    }
+}
+
+impl<P: OutputPin> Direction for DirectionPin<P> {
     type Error = P::Error;
 
     fn transmit(&mut self) -> Result<(), P::Error> {
-        self.0.set_high()
+        self.pin.set_high()
     }
 
     fn receive(&mut self) -> Result<(), P::Error> {
-        self.0.set_low()
+        self.pin.set_low()
+    }
+
+    fn worst(&self) -> Option<Worst> {
+        Some(self.worst)
     }
 }
 
@@ -77,11 +159,32 @@ impl<D: Direction> Switch<D> {
         Ok(())
     }
 
-    /// Switches the driver on.
-    pub(crate) fn transmit(&mut self) -> Result<Guard<'_, D>, D::Error> {
+    /// Switches the driver on. Whoever does has to see to it that it goes off.
+    pub(crate) fn on(&mut self) -> Result<(), D::Error> {
         self.on = true;
+        self.direction.transmit()
+    }
+
+    #[cfg(feature = "tformat")]
+    pub(crate) const fn is_on(&self) -> bool {
+        self.on
+    }
+
+    #[cfg(feature = "tformat")]
+    pub(crate) fn worst(&self) -> Option<Worst> {
+        self.direction.worst()
+    }
+
+    #[cfg(feature = "tformat")]
+    /// Whether it can be switched within such a window.
+    pub(crate) fn check(&self, window_ns: u32) -> Result<(), PinTooSlow> {
+        self.worst().map_or(Ok(()), |worst| worst.check(window_ns))
+    }
+
+    /// Switches the driver on until the guard is dropped.
+    pub(crate) fn transmit(&mut self) -> Result<Guard<'_, D>, D::Error> {
         let guard = Guard(self);
-        guard.0.direction.transmit()?;
+        guard.0.on()?;
         Ok(guard)
     }
 }
@@ -101,5 +204,24 @@ impl<D: Direction> Drop for Guard<'_, D> {
     fn drop(&mut self) {
         // Nobody is there to hear of it; the next call tries again before it listens.
         let _: Result<(), _> = self.0.off();
+    }
+}
+
+#[cfg(all(test, feature = "tformat"))]
+mod tests {
+    use super::*;
+
+    /// Four bits are 1,600 ns at 2.5 Mbit/s. A clock counts twice.
+    #[test]
+    fn what_is_missing_is_said() {
+        let worst = |uart_start_ns, wake_ns, clock_ns| Worst { uart_start_ns, wake_ns, clock_ns };
+        assert_eq!(worst(400, 1_000, 100).check(1_600), Ok(()));
+        for worse in [worst(401, 1_000, 100), worst(400, 1_001, 100)] {
+            assert_eq!(worse.check(1_600), Err(PinTooSlow { missing_ns: 1, window_ns: 1_600 }));
+        }
+        assert_eq!(worst(400, 1_000, 101).check(1_600), Err(PinTooSlow { missing_ns: 2, window_ns: 1_600 }));
+        // The usual clock of embassy-time, whatever else is true.
+        assert_eq!(worst(0, 0, 1_000).check(1_600), Err(PinTooSlow { missing_ns: 400, window_ns: 1_600 }));
+        assert!(worst(u32::MAX, u32::MAX, u32::MAX).check(0).is_err());
     }
 }

@@ -1,5 +1,7 @@
 use servowire_core::ClockError;
 
+use crate::PinTooSlow;
+
 /// Why a call failed. `IO` is the error of the port (a UART, an SPI, the bus of an ASIC), `PIN` that of the direction pin, `P` that
 /// of the protocol, and `D` its doubts about a position. A driver that has no such thing has [`Infallible`] there.
 ///
@@ -18,6 +20,16 @@ pub enum Error<IO, PIN, P, D> {
     /// The direction pin reports a fault.
     #[error("the direction pin reports a fault")]
     Pin(PIN),
+    /// The direction pin cannot keep the window at the rate that a search for the encoder has come to; nothing was sent.
+    #[error(transparent)]
+    PinTooSlow(#[from] PinTooSlow),
+    /// There was no sound answer, and the line driver may have gone off when the encoder had begun to answer: later than
+    /// [`Worst`](crate::Worst) allows.
+    #[error("the line driver went off up to {by_ns} ns too late")]
+    DriverLate {
+        /// By how much at the worst, ns.
+        by_ns: u64,
+    },
     /// The port takes or gives nothing any more.
     #[error("the port is closed")]
     Closed,
@@ -50,6 +62,7 @@ mod tests {
         let texts = [
             (Any::Io(()), "the port reports a fault"),
             (Any::Pin(()), "the direction pin reports a fault"),
+            (Any::DriverLate { by_ns: 40 }, "the line driver went off up to 40 ns too late"),
             (Any::Closed, "the port is closed"),
             (Any::NeverQuiet, "the line does not become quiet"),
             (Any::Clock(ClockError::Backwards { by_ns: 40 }), "the clock went back by 40 ns"),

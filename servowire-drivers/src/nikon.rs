@@ -6,6 +6,9 @@
 //! [`blocking`] spins while it waits, some tens of microseconds a call; [`asynch`] gives the time back. Both have the same
 //! `Driver` with the same calls.
 
+#[macro_use]
+mod driver;
+
 #[cfg(feature = "async")]
 pub mod asynch;
 pub mod blocking;

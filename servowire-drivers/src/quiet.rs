@@ -3,14 +3,14 @@
 use servowire_core::{ClockCheck, ClockError};
 
 use crate::Clock;
-#[cfg(feature = "async")]
-use crate::Timer;
 use crate::clock::MAX_LOOKS;
-#[cfg(feature = "async")]
-use crate::race::race;
 
 /// How long a driver waits for a line that does not become quiet.
 const PATIENCE_NS: u64 = 2_000_000;
+
+/// How often a clock may be set back while a request leaves.
+#[cfg(feature = "tformat")]
+const CLOCK_FAULTS: u32 = 3;
 
 /// What is known of the line between two calls. It outlives a dropped future.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -42,6 +42,8 @@ pub(crate) struct Settling {
     until_ns: u64,
     limit_ns: u64,
     silence_ns: u64,
+    /// The time of the last look at the line.
+    looked_ns: u64,
 }
 
 impl Line {
@@ -49,13 +51,23 @@ impl Line {
         Self { check: ClockCheck::new(MAX_LOOKS), ready_ns: 0, leaving_ns: None, silence_ns: silence_ns as u64 }
     }
 
+    /// The bits have another length from now on.
+    #[cfg(feature = "tformat")]
+    pub(crate) const fn set_silence_ns(&mut self, silence_ns: u32) {
+        self.silence_ns = silence_ns as u64;
+    }
+
     /// A look at the clock: every one goes through here, so that no wait is for ever.
     #[inline]
     pub(crate) fn now_ns(&mut self, clock: &mut impl Clock) -> Result<u64, ClockError> {
-        let last_ns = self.check.last_ns();
-        match clock.now_ns().and_then(|now_ns| self.check.check(now_ns)) {
+        let now_ns = match clock.now_ns() {
+            Ok(now_ns) => now_ns,
+            Err(error) => return Err(self.lost(error, self.check.last_ns())),
+        };
+        match self.check.check(now_ns) {
             Ok(now_ns) => Ok(now_ns),
-            Err(error) => Err(self.lost(error, last_ns)),
+            Err(error @ ClockError::Backwards { by_ns }) => Err(self.lost(error, now_ns.saturating_add(by_ns))),
+            Err(error) => Err(error),
         }
     }
 
@@ -77,17 +89,24 @@ impl Line {
         Ok(())
     }
 
-    /// Waits for so long.
+    /// The last reading.
     #[cfg(feature = "tformat")]
-    pub(crate) fn pause(&mut self, clock: &mut impl Clock, ns: u64) -> Result<(), ClockError> {
-        let now_ns = self.now_ns(clock)?;
-        self.wait_until(clock, now_ns.saturating_add(ns))
+    pub(crate) const fn last_ns(&self) -> u64 {
+        self.check.last_ns()
     }
 
-    #[cfg(all(feature = "tformat", feature = "async"))]
-    pub(crate) async fn pause_asynch(&mut self, timer: &mut impl Timer, ns: u64) -> Result<(), ClockError> {
-        let now_ns = self.now_ns(timer)?;
-        timer.wait_until(now_ns.saturating_add(ns)).await
+    /// Waits by looking at the clock until `ns`, which is at most `longest_ns` ahead. If the clock is set back, nothing of that has
+    /// passed for certain; one that stands has been looked at for longer.
+    #[cfg(feature = "tformat")]
+    pub(crate) fn sit_out(&mut self, clock: &mut impl Clock, mut ns: u64, longest_ns: u64) {
+        for _ in 0..CLOCK_FAULTS {
+            let from_ns = self.now_ns(clock).unwrap_or(self.last_ns());
+            ns = ns.min(from_ns.saturating_add(longest_ns));
+            match self.wait_until(clock, ns) {
+                Err(ClockError::Backwards { .. }) => ns = u64::MAX,
+                _ => return,
+            }
+        }
     }
 
     /// A request begins to go out that can keep the line busy for so long, from whenever it leaves: to be called before its
@@ -127,24 +146,23 @@ impl Line {
 
     pub(crate) const fn settle(&mut self, now_ns: u64) -> Settling {
         let limit_ns = self.free_ns(now_ns).saturating_add(PATIENCE_NS);
-        Settling { until_ns: self.ready_ns, limit_ns, silence_ns: self.silence_ns }
+        Settling { until_ns: self.ready_ns, limit_ns, silence_ns: self.silence_ns, looked_ns: now_ns }
     }
 }
 
 impl Settling {
-    /// Something came that nobody has asked for, or the UART complained.
-    pub(crate) const fn heard(&mut self, now_ns: u64) {
+    /// What had come by `now_ns` has been thrown away. Whether there was something that nobody has asked for, or a complaint.
+    pub(crate) const fn next(&mut self, heard: bool, now_ns: u64) -> Settle {
         let until_ns = now_ns.saturating_add(self.silence_ns);
-        if until_ns > self.until_ns {
+        // A processor that was elsewhere for long has not listened for long.
+        let looked_ns = self.looked_ns;
+        self.looked_ns = now_ns;
+        if heard && until_ns > self.until_ns {
             self.until_ns = until_ns;
         }
-    }
-
-    /// What had come by `now_ns` has been thrown away.
-    pub(crate) const fn poll(&self, now_ns: u64) -> Settle {
         if now_ns >= self.until_ns {
             Settle::Quiet
-        } else if now_ns >= self.limit_ns {
+        } else if looked_ns >= self.limit_ns {
             Settle::Never
         } else {
             Settle::Until(self.until_ns)
@@ -152,48 +170,30 @@ impl Settling {
     }
 }
 
-/// Throws away what comes until the line is free; `listen` tells whether something came. Whether it became free.
-pub(crate) fn wait<E: From<ClockError>>(
-    line: &mut Line,
-    clock: &mut impl Clock,
-    mut listen: impl FnMut() -> Result<bool, E>,
-) -> Result<bool, E> {
-    let now_ns = line.now_ns(clock)?;
-    let mut settling = line.settle(now_ns);
-    loop {
-        let heard = listen()?;
-        let now_ns = line.now_ns(clock)?;
-        if heard {
-            settling.heard(now_ns);
-        }
-        match settling.poll(now_ns) {
-            Settle::Quiet => return Ok(true),
-            Settle::Never => return Ok(false),
-            Settle::Until(_) => {}
-        }
-    }
+/// What a wait gave, and the time after it.
+pub(crate) struct Heard<T> {
+    pub(crate) what: Option<T>,
+    pub(crate) now_ns: u64,
 }
 
-/// The same with a `listen` that ends when something came, and may be dropped before.
-#[cfg(feature = "async")]
-pub(crate) async fn wait_asynch<E: From<ClockError>>(
+/// Looks until there is something, at the latest until `until_ns`. What came while the clock was read is not late.
+#[inline(always)]
+pub(crate) fn spin<T>(
     line: &mut Line,
-    timer: &mut impl Timer,
-    mut listen: impl AsyncFnMut() -> Result<(), E>,
-) -> Result<bool, E> {
-    let mut until_ns = line.now_ns(timer)?;
-    let mut settling = line.settle(until_ns);
+    clock: &mut impl Clock,
+    until_ns: u64,
+    mut look: impl FnMut() -> Option<T>,
+) -> Result<Heard<T>, ClockError> {
+    let mut over_ns = None;
     loop {
-        let heard = race(listen(), timer.wait_until(until_ns)).await?.transpose()?.is_some();
-        let now_ns = line.now_ns(timer)?;
-        if heard {
-            settling.heard(now_ns);
+        let what = look();
+        match (over_ns, what) {
+            (_, Some(what)) => return Ok(Heard { what: Some(what), now_ns: line.now_ns(clock)? }),
+            (Some(now_ns), None) => return Ok(Heard { what: None, now_ns }),
+            (None, None) => {}
         }
-        match settling.poll(now_ns) {
-            Settle::Quiet => return Ok(true),
-            Settle::Never => return Ok(false),
-            Settle::Until(ns) => until_ns = ns,
-        }
+        let now_ns = line.now_ns(clock)?;
+        over_ns = (now_ns >= until_ns).then_some(now_ns);
     }
 }
 
@@ -204,7 +204,7 @@ mod tests {
     #[test]
     fn a_clean_line_is_used_at_once() {
         let mut line = Line::new(8_000);
-        assert_eq!(line.settle(5).poll(5), Settle::Quiet);
+        assert_eq!(line.settle(5).next(false, 5), Settle::Quiet);
     }
 
     #[test]
@@ -213,14 +213,35 @@ mod tests {
         line.begin(90_000);
         line.sent(10_000);
         let mut settling = line.settle(10_000);
-        assert_eq!(settling.poll(99_999), Settle::Until(100_000));
-        settling.heard(20_000);
-        assert_eq!(settling.poll(99_999), Settle::Until(100_000));
-        settling.heard(99_000);
-        assert_eq!(settling.poll(106_999), Settle::Until(107_000));
-        assert_eq!(settling.poll(107_000), Settle::Quiet);
+        assert_eq!(settling.next(false, 99_999), Settle::Until(100_000));
+        let _ = settling.next(true, 20_000);
+        assert_eq!(settling.next(false, 99_999), Settle::Until(100_000));
+        let _ = settling.next(true, 99_000);
+        assert_eq!(settling.next(false, 106_999), Settle::Until(107_000));
+        assert_eq!(settling.next(false, 107_000), Settle::Quiet);
         line.clean(107_000);
-        assert_eq!(line.settle(107_000).poll(107_000), Settle::Quiet);
+        assert_eq!(line.settle(107_000).next(false, 107_000), Settle::Quiet);
+    }
+
+    /// After a request of 10 us an answer may be talking until 100 us, unless it is known better.
+    #[test]
+    fn a_good_answer_frees_the_line_and_a_refused_one_does_not() {
+        let sent = || {
+            let mut line = Line::new(8_000);
+            line.begin(90_000);
+            line.sent(10_000);
+            line
+        };
+        assert_eq!(sent().settle(30_000).next(false, 30_000), Settle::Until(100_000));
+        let mut good = sent();
+        good.clean(25_000);
+        assert_eq!(good.settle(24_999).next(false, 24_999), Settle::Until(25_000));
+        assert_eq!(good.settle(25_000).next(false, 25_000), Settle::Quiet);
+        let mut refused = sent();
+        refused.failed(25_000, 20_000);
+        assert_eq!(refused.settle(30_000).next(false, 99_999), Settle::Until(100_000));
+        refused.failed(25_000, 99_000);
+        assert_eq!(refused.settle(99_000).next(false, 99_000), Settle::Until(107_000));
     }
 
     /// It may have left at any time up to the next call.
@@ -228,8 +249,8 @@ mod tests {
     fn a_request_that_was_not_seen_to_leave_may_just_have_left() {
         let mut line = Line::new(8_000);
         line.begin(90_000);
-        assert_eq!(line.settle(700_000).poll(789_999), Settle::Until(790_000));
-        assert_eq!(line.settle(790_000).poll(790_000), Settle::Quiet);
+        assert_eq!(line.settle(700_000).next(false, 789_999), Settle::Until(790_000));
+        assert_eq!(line.settle(790_000).next(false, 790_000), Settle::Quiet);
         line.begin(90_000);
         assert_eq!((line.free_ns(800_000), line.free_ns(890_001)), (890_000, 890_001));
     }
@@ -243,12 +264,12 @@ mod tests {
         line.sent(10_000);
         assert_eq!(line.now_ns(&mut || 40_000), Ok(40_000));
         assert_eq!(line.now_ns(&mut || 500), Err(ClockError::Backwards { by_ns: 39_500 }));
-        assert_eq!(line.settle(700).poll(60_699), Settle::Until(60_700));
+        assert_eq!(line.settle(700).next(false, 60_699), Settle::Until(60_700));
         // The same for a request that was just going out.
         line.begin(90_000);
         assert_eq!(line.now_ns(&mut || 0), Err(ClockError::Backwards { by_ns: 500 }));
-        assert_eq!(line.settle(100).poll(90_099), Settle::Until(90_100));
-        assert_eq!(line.settle(90_100).poll(90_100), Settle::Quiet);
+        assert_eq!(line.settle(100).next(false, 90_099), Settle::Until(90_100));
+        assert_eq!(line.settle(90_100).next(false, 90_100), Settle::Quiet);
     }
 
     /// A procedure that had ended before, or never sent anything, does not know of the exchange before it.
@@ -256,24 +277,34 @@ mod tests {
     fn the_end_of_a_procedure_frees_no_line_that_somebody_else_may_be_using() {
         let mut line = Line::new(8_000);
         line.keep(90);
-        assert_eq!((line.settle(89).poll(89), line.settle(90).poll(90)), (Settle::Until(90), Settle::Quiet));
+        assert_eq!(
+            (line.settle(89).next(false, 89), line.settle(90).next(false, 90)),
+            (Settle::Until(90), Settle::Quiet)
+        );
         for ready_ns in [0, 50] {
             line.begin(90_000);
             line.sent(10_000);
             line.keep(ready_ns);
-            assert_eq!(line.settle(60_000).poll(99_999), Settle::Until(100_000));
+            assert_eq!(line.settle(60_000).next(false, 99_999), Settle::Until(100_000));
         }
+    }
+
+    /// One byte was there when the processor came back.
+    #[test]
+    fn nobody_is_given_up_for_the_processors_absence() {
+        let mut settling = Line::new(8_000).settle(0);
+        assert_eq!(settling.next(true, 10_000_000), Settle::Until(10_008_000));
+        assert_eq!(settling.next(false, 10_008_000), Settle::Quiet);
     }
 
     #[test]
     fn an_endless_talker_is_given_up() {
         let mut settling = Line::new(8_000).settle(0);
         let mut now_ns = 0;
-        while settling.poll(now_ns) != Settle::Never {
+        while settling.next(true, now_ns) != Settle::Never {
             now_ns += 4_000;
-            settling.heard(now_ns);
             assert!(now_ns < 3_000_000, "for ever");
         }
-        assert_eq!(now_ns, 2_000_000);
+        assert_eq!(now_ns, 2_004_000);
     }
 }

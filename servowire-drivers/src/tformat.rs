@@ -3,12 +3,16 @@
 //! [`blocking`] spins while it waits, some tens of microseconds a call; [`asynch`] gives the time back. Both have the same
 //! `Driver` with the same calls.
 
+#[macro_use]
+mod driver;
+mod tuning;
+
 #[cfg(feature = "async")]
 pub mod asynch;
 pub mod blocking;
 
 use tformat::master::Line;
-use tformat::{Error, Request};
+use tformat::{AllData, Error, Frame, Request, Response};
 
 /// What a `Driver` was made of.
 #[derive(Debug, Clone, Copy)]
@@ -28,19 +32,17 @@ const LOST: Error = Error::NoResponse { echo: false };
 const MAX_BYTES: usize = 16;
 
 /// How long this request and the longest answer to it take.
-fn longest_ns(line: &Line, request: Request) -> u64 {
-    let fields = request.emit().fields().saturating_add(12);
+fn longest_ns(line: &Line, request: &Frame) -> u64 {
+    let fields = request.fields().saturating_add(12);
     u64::from(line.response_timeout_ns).saturating_add(line.rate.fields_ns(fields).into())
 }
 
-/// When the last bit of the request has left, with a start bit not before `start_ns`, so that the line driver may go off.
-///
-/// What `flush` means differs between UARTs, so the clock says it. A UART that had taken all bytes at `taken_ns`, less than a field
-/// later, may have begun as late as that: a request of which the end is cut off may be another one. One that took longer has waited
-/// for the line.
-fn driver_off_ns(line: &Line, request_end_ns: u64, start_ns: u64, taken_ns: u64) -> u64 {
-    let taking_ns = taken_ns.saturating_sub(start_ns);
-    if taking_ns < line.rate.fields_ns(1).into() { request_end_ns.saturating_add(taking_ns) } else { request_end_ns }
+/// Why there was no answer: not for a reason of the encoder, if the line was still driven when it began to answer.
+fn refused<IO, PIN, D>(error: Error, late_ns: u64) -> crate::Error<IO, PIN, Error, D> {
+    match late_ns {
+        0 => crate::Error::Protocol(error),
+        by_ns => crate::Error::DriverLate { by_ns },
+    }
 }
 
 /// The line has to be silent for two fields after something that nobody has asked for.
@@ -48,8 +50,13 @@ fn silence_ns(line: &Line) -> u32 {
     line.rate.fields_ns(2)
 }
 
-/// The answer to another request than was sent. Never: the transaction checks it.
-fn other(request: Request) -> Error {
-    let want = request.data_id().control_field().get();
-    Error::CfMismatch { got: want, want }
+fn all_data(response: Response) -> Result<AllData, Error> {
+    match response {
+        Response::ReadAll(all) => Ok(all),
+        // Never: the transaction checks it.
+        other => Err(Error::CfMismatch {
+            got: other.data_id().control_field().get(),
+            want: Request::ReadAll.data_id().control_field().get(),
+        }),
+    }
 }

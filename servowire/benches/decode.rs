@@ -25,12 +25,16 @@ use std::rc::Rc;
 use nrz_line::{Format, Receiver};
 use random::speech::Kind;
 use random::wire::{Scene, capture};
-use servowire::capture::raw::{Raw, Unit};
-use servowire::capture::{Capture, Input};
-use servowire::event::Event;
-use servowire::line::{LineField, StartStop};
-use servowire::output::{Origin, Output, Printer, Tally};
-use servowire::protocols::{Protocol, Settings, Widths, tformat};
+use servowire_decode::capture::raw::{Raw, Unit};
+use servowire_decode::capture::{Capture, Input};
+use servowire_decode::event::Event;
+use servowire_decode::line::{LineField, StartStop};
+use servowire_decode::output::Output;
+use servowire_decode::output::printer::{Origin, Printer};
+use servowire_decode::protocols::tformat;
+use servowire_decode::settings::{Settings, Widths};
+use servowire_decode::sink::Tally;
+use servowire_decode::time::Time;
 
 /// Samples a bit.
 const N: usize = 8;
@@ -139,11 +143,11 @@ impl Printer for Nowhere {
 }
 
 fn decode(data: &Rc<[u8]>, rate: u64, unit: Unit) -> Tally {
-    let input = Input::over("memory", Box::new(Cursor::new(Rc::clone(data))));
+    let input = Input::over("memory", Cursor::new(Rc::clone(data)));
     let mut nowhere = Nowhere;
-    let mut out = Output::new("memory", &mut nowhere, &|| (), &|_| ());
+    let mut out = Output::new("memory", &mut nowhere);
     let capture = Capture::Samples(Raw::new(input, rate, unit));
-    Protocol::Auto.decode("memory", capture, &Settings::default(), &mut out).expect("the traffic is good");
+    servowire_decode::decode("memory", capture, None, &Settings::default(), &mut out).expect("the traffic is good");
     out.tally
 }
 
@@ -151,7 +155,7 @@ fn one_by_one(samples: &[bool]) -> Tally {
     let mut receiver = Receiver::new(Format::new(N as u32, 8).unwrap());
     let mut protocol = tformat::Decoder::new(BIT, Widths::default());
     let mut tally = Tally::default();
-    let time = |sample: u64| i64::try_from(sample).unwrap() * BIT / N as i64;
+    let time = |sample: u64| Time::from_ps(i128::from(sample) * i128::from(BIT) / N as i128);
     for &sample in samples {
         if let Some(field) = receiver.push(sample) {
             let start = time(field.start);
@@ -160,6 +164,6 @@ fn one_by_one(samples: &[bool]) -> Tally {
             protocol.field(&field, &mut tally).unwrap();
         }
     }
-    protocol.finish(Some(time(samples.len() as u64)), &mut tally).unwrap();
+    protocol.finish(time(samples.len() as u64), &mut tally).unwrap();
     tally
 }

@@ -20,8 +20,9 @@ mod clock;
 mod random;
 
 use std::fmt::Write as _;
+use std::fs::File;
 use std::hint::black_box;
-use std::io::{Cursor, Write};
+use std::io::{BufWriter, Cursor, Write};
 use std::path::Path;
 use std::time::Duration;
 
@@ -33,10 +34,12 @@ use pcap_file::DataLink;
 use pcap_file::pcap::{PcapHeader, PcapPacket, PcapWriter};
 use random::speech::Kind;
 use random::wire::{Scene, capture};
-use servowire::capture::{Capture, Change, Format, Hints, Input, Line, open_input};
-use servowire::event::Event;
-use servowire::output::vcd::VcdOut;
-use servowire::output::{Origin, Output, Printer};
+use servowire_decode::capture::{Capture, Change, Format, Hints, Input, Line, open};
+use servowire_decode::event::Event;
+use servowire_decode::output::Output;
+use servowire_decode::output::printer::{Origin, Printer};
+use servowire_decode::output::vcd::VcdOut;
+use servowire_decode::time::Time;
 use zip::ZipWriter;
 use zip::write::SimpleFileOptions;
 
@@ -256,7 +259,7 @@ fn pcap() -> Vec<u8> {
 
 /// Reads a file to its end; the number of what was in it.
 fn read(file: &[u8], format: Format) -> String {
-    let input = Input::over("memory", Box::new(Cursor::new(file.to_vec())));
+    let input = Input::over("memory", Cursor::new(file.to_vec()));
     let hints = Hints {
         format: Some(format),
         sample_rate: Some(RATE as u64),
@@ -264,7 +267,7 @@ fn read(file: &[u8], format: Format) -> String {
         record_size: Some(16),
         ..Hints::default()
     };
-    match open_input(input, Path::new("memory"), hints).expect("the file is sound") {
+    match open(input, hints).expect("the file is sound") {
         Capture::Edges(mut line) => changes(line.as_mut()),
         Capture::Samples(mut raw) => changes(&mut raw),
         Capture::Bytes(mut log) => {
@@ -304,12 +307,12 @@ impl Printer for Nowhere {
 }
 
 fn write(edges: &Edges, path: &Path) -> String {
-    let mut vcd = VcdOut::create(path).unwrap();
+    let mut vcd = VcdOut::new(BufWriter::new(File::create(path).unwrap()));
     let mut nowhere = Nowhere;
-    let mut out = Output::new("memory", &mut nowhere, &|| (), &|_| ()).with_vcd(Some(&mut vcd));
+    let mut out = Output::new("memory", &mut nowhere).with_vcd(Some(&mut vcd));
     out.channels(&["line".to_owned()]).unwrap();
     for (time, level) in edges {
-        out.change(&Change { time: *time, channel: 0, level: *level }).unwrap();
+        out.change(&Change { time: Time::from_ps((*time).into()), channel: 0, level: *level }).unwrap();
     }
     out.end().unwrap();
     format!("{} edges", edges.len())

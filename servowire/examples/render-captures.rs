@@ -51,7 +51,7 @@ const LEAD: u64 = 10_000;
 fn main() -> Result<(), Box<dyn Error>> {
     let package = Path::new(env!("CARGO_MANIFEST_DIR"));
     for (file, text) in render(&package.join("../tests/vectors/tformat/responses.jsonl"))? {
-        let path = package.join("captures").join(file);
+        let path = package.join("../servowire-decode/captures").join(file);
         fs::write(&path, text)?;
         println!("{}", path.display());
     }

@@ -21,7 +21,7 @@ const RELEASED: u64 = 1 + 61 + 12 + 2;
 fn main() -> Result<(), Box<dyn Error>> {
     let package = Path::new(env!("CARGO_MANIFEST_DIR"));
     let text = render(&package.join("../tests/vectors/hdsl/fw_startup.jsonl"))?;
-    let path = package.join("captures").join(FILE);
+    let path = package.join("../servowire-decode/captures").join(FILE);
     fs::write(&path, text)?;
     println!("{}", path.display());
     Ok(())

@@ -26,10 +26,11 @@ use std::process::ExitCode;
 use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
 use sorte_proto::sync0::Variant;
-use step_profile::motion::{Limits, PtoMover};
+use step_motion::{Limits, PtoMover};
 use step_profile::{Frequency, Motors, Parameters, Profile, Speed};
 
 use crate::gcode::{AXES, Part};
+use servowire_decode::time;
 
 use axis::Build;
 use driver::Fault;
@@ -69,7 +70,7 @@ pub struct Arguments {
     steps: u32,
     /// Step frequencies in Hz; they take turns from move to move. 250000, or 249000 with --published-sync0: at 250 kHz
     /// all steps have the same phase, and that machine is at home there. In a longer cycle motion is as much slower.
-    #[arg(long, value_name = "HZ", value_delimiter = ',', value_parser = crate::cli::hertz)]
+    #[arg(long, value_name = "HZ", value_delimiter = ',', value_parser = hertz)]
     freq: Vec<u32>,
     /// Steps that each of the 32 ramp entries lasts.
     #[arg(long, value_name = "N", default_value_t = 1)]
@@ -156,6 +157,14 @@ pub struct Arguments {
     /// Write the motors' sound.
     #[arg(long, value_name = "OUT")]
     wav: Option<PathBuf>,
+}
+
+/// A frequency that fits into 32 bits.
+fn hertz(text: &str) -> Result<u32, String> {
+    match time::frequency(text).map(f64::round) {
+        Some(hertz) if (1.0..=f64::from(u32::MAX)).contains(&hertz) => Ok(hertz as u32),
+        _ => Err(format!("\"{text}\" is not a frequency from 1 Hz to 4 GHz, as 100k or 250000")),
+    }
 }
 
 fn probability(text: &str) -> Result<f64, String> {

@@ -1,26 +1,32 @@
 //! `servowire decode`: files in, frames out.
 
-use std::cell::Cell;
+mod arguments;
+
+use std::fs::{self, File};
 use std::io::{self, BufWriter, IsTerminal, Write};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
-use std::rc::Rc;
 
 use anstream::{AutoStream, ColorChoice};
 use indicatif::{ProgressBar, ProgressStyle};
 
-use crate::bundled;
-use crate::capture::{self, Capture, Input, Piped};
-use crate::cli::Decode;
-use crate::fault::{At, Fault};
-use crate::line::Stop;
-use crate::output::json::JsonLines;
-use crate::output::picture::Picture;
-use crate::output::stats::Stats;
-use crate::output::table::Csv;
-use crate::output::text::Text;
-use crate::output::vcd::VcdOut;
-use crate::output::{Output, Printer, Tally};
+use servowire_decode::capture::{self, Capture, Format, Hints, Input};
+use servowire_decode::fault::{At, Fault, Stop};
+use servowire_decode::output::Output;
+use servowire_decode::output::json::JsonLines;
+use servowire_decode::output::printer::Printer;
+use servowire_decode::output::stats::Stats;
+use servowire_decode::output::table::Csv;
+use servowire_decode::output::text::Text;
+use servowire_decode::output::vcd::VcdOut;
+use servowire_decode::protocols::CODECS;
+use servowire_decode::recognition::Note;
+use servowire_decode::sink::Tally;
+
+pub(crate) use arguments::Decode;
+
+use crate::files::{self, Piped};
+use crate::picture::Picture;
 
 /// Files from this size on have a progress bar.
 const LONG: u64 = 1 << 24;
@@ -29,7 +35,7 @@ const LONG: u64 = 1 << 24;
 pub(crate) fn run(arguments: &Decode) -> ExitCode {
     let files = arguments.files.len();
     let described = arguments.describes_a_file();
-    let piped = match if files == 0 { Input::piped(described.is_some()) } else { Piped::Nothing } {
+    let piped = match if files == 0 { files::piped(described.is_some()) } else { Piped::Nothing } {
         Piped::Content(input) => Some(input),
         Piped::Silence => {
             eprintln!(
@@ -43,7 +49,7 @@ pub(crate) fn run(arguments: &Decode) -> ExitCode {
         eprintln!("error: {option} describes a capture: name its file, or - for the standard input");
         return ExitCode::from(2);
     }
-    if files == 0 && piped.is_none() && bundled::of(arguments.protocol).is_empty() {
+    if files == 0 && piped.is_none() && bundled(arguments).is_empty() {
         eprintln!("error: no captures of this protocol come with the program: name a file");
         return ExitCode::from(2);
     }
@@ -88,44 +94,41 @@ pub(crate) fn run(arguments: &Decode) -> ExitCode {
 fn all(arguments: &Decode, piped: Option<Input>, printer: &mut dyn Printer) -> io::Result<bool> {
     let mut good = true;
     if let Some(input) = piped {
-        let (bar, meter) = (Bar { bar: None }, input.meter());
-        return match capture::open_input(input, Path::new("-"), arguments.hints()) {
-            Ok(capture) => one(arguments, "standard input", capture, &bar, &meter, printer),
-            Err(fault) => Ok(complain(&fault, &bar)),
-        };
+        return one(arguments, Ok(input), arguments.hints(), &Bar { bar: None }, printer);
     }
     for path in &arguments.files {
-        let name = if path.as_os_str() == "-" { "standard input".to_owned() } else { path.display().to_string() };
-        let opened = capture::open(path, arguments.hints());
         let bar = Bar::new(path);
-        good &= match opened {
-            Ok((capture, meter)) => one(arguments, &name, capture, &bar, &meter, printer)?,
-            Err(fault) => complain(&fault, &bar),
-        };
+        good &= one(arguments, files::open(path, arguments.file.follow), arguments.hints(), &bar, printer)?;
         bar.finish();
     }
     if arguments.files.is_empty() {
-        for (name, bytes) in bundled::of(arguments.protocol) {
-            let bar = Bar { bar: None };
-            good &= match capture::open_embedded(name, bytes) {
-                Ok(capture) => one(arguments, name, capture, &bar, &Rc::default(), printer)?,
-                Err(fault) => complain(&fault, &bar),
-            };
+        for (name, bytes) in bundled(arguments) {
+            let hints = Hints { format: Some(Format::Vcd), ..Hints::default() };
+            good &= one(arguments, Ok(Input::over(name, *bytes)), hints, &Bar { bar: None }, printer)?;
         }
     }
     Ok(good)
 }
 
+/// The captures that come with the program, of the protocol that is meant.
+fn bundled(arguments: &Decode) -> &'static [(&'static str, &'static [u8])] {
+    arguments.protocol.0.or(CODECS.first().copied()).map_or(&[], |codec| codec.captures())
+}
+
 /// Decodes one file; whether it was good.
 fn one(
     arguments: &Decode,
-    name: &str,
-    capture: Capture,
+    input: Result<Input, Fault>,
+    hints: Hints,
     bar: &Bar,
-    meter: &Rc<Cell<u64>>,
     printer: &mut dyn Printer,
 ) -> io::Result<bool> {
-    let protocol = arguments.protocol;
+    let opened = input.and_then(|input| Ok((input.name().to_owned(), input.meter(), capture::open(input, hints)?)));
+    let (name, meter, capture) = match opened {
+        Ok((name, meter, capture)) => (name, meter, capture),
+        Err(fault) => return Ok(complain(&fault, bar)),
+    };
+    let name = name.as_str();
     let mut filter = arguments.filter();
     if let Some(what) = cannot(arguments, &capture, filter.has_times()) {
         return Ok(complain(&Fault::new(name, At::File, what), bar));
@@ -133,8 +136,8 @@ fn one(
     let mut picture = arguments.svg.as_ref().map(|_| Picture::new(name));
     let mut vcd = match &arguments.vcd {
         None => None,
-        Some(path) => match VcdOut::create(path) {
-            Ok(vcd) => Some(vcd),
+        Some(path) => match File::create(path) {
+            Ok(file) => Some(VcdOut::new(BufWriter::new(file))),
             Err(e) => {
                 let file = path.display().to_string();
                 return Ok(complain(&Fault::new(&file, At::File, format!("cannot be created: {e}")), bar));
@@ -142,15 +145,16 @@ fn one(
         },
     };
     let progress = || bar.set(meter.get());
-    let notes = |text: &str| bar.say(text);
-    let mut out = Output::new(name, printer, &progress, &notes);
-    out = out.with_vcd(vcd.as_mut()).with_picture(picture.as_mut()).with_filter(&mut filter);
+    let notes = |note: &Note| bar.say(&note.to_string());
+    let beside = picture.as_mut().map(|picture| picture as &mut dyn Printer);
+    let mut out = Output::new(name, printer).with_progress(&progress).with_notes(&notes);
+    out = out.with_vcd(vcd.as_mut()).with_beside(beside).with_filter(&mut filter);
     out.begin()?;
-    let end = protocol.decode(name, capture, &arguments.settings(), &mut out);
+    let end = servowire_decode::decode(name, capture, arguments.protocol.0, &arguments.settings(), &mut out);
     out.end()?;
     let (tally, chosen, refusals) = (out.tally, out.chosen, out.refusals());
     if let (Some(picture), Some(path)) = (&picture, &arguments.svg) {
-        if let Err(e) = picture.draw(path) {
+        if let Err(e) = picture.draw().and_then(|svg| Ok(fs::write(path, svg)?)) {
             let what = format!("cannot be drawn: {e}");
             return Ok(complain(&Fault::new(&path.display().to_string(), At::File, what), bar));
         }

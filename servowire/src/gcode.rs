@@ -7,10 +7,10 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use step_profile::motion::Limits;
+use step_motion::Limits;
 
-use crate::fault::{At, Fault};
 pub(crate) use lines::Line;
+use servowire_decode::fault::{At, Fault};
 pub(crate) use steps::Steps;
 
 /// Axes of a part program: X, Y and Z.
@@ -44,7 +44,7 @@ impl Part {
     }
 
     /// Its steps, with the same limits for all axes; ticks are ns.
-    pub(crate) fn steps(&self, lines: Vec<Line>, limits: Limits) -> Result<Steps, step_profile::Error> {
+    pub(crate) fn steps(&self, lines: Vec<Line>, limits: Limits) -> Result<Steps, step_motion::Error> {
         Steps::new(lines, limits, self.steps_per_mm, self.deviation)
     }
 }

@@ -8,18 +8,16 @@
     clippy::std_instead_of_core
 )]
 
-pub mod bundled;
-pub mod capture;
 pub mod cli;
 pub mod cnc;
 mod decode;
-pub mod event;
-pub mod fault;
+mod files;
 mod gcode;
-pub mod line;
-pub mod output;
+mod picture;
+mod pipe;
 pub mod profile;
-pub mod protocols;
 pub mod registers;
 pub mod talk;
+mod terminal;
 pub mod timing;
+mod units;

@@ -17,11 +17,11 @@ use std::process::ExitCode;
 use clap::{Args, ValueEnum};
 use motion::Move;
 use ramp::Record;
-use step_profile::motion::Limits;
+use step_motion::Limits;
 use step_profile::{Arithmetic, Frequency, Parameters, Profile, Speed, Tone};
 
-use crate::capture::time;
 use crate::gcode::Part;
+use servowire_decode::time;
 
 /// Times of the steps of a move on a 4 us cycle.
 ///

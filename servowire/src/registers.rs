@@ -12,7 +12,7 @@ use hdsl::message::{Length, ResourceAddress, ResourceError};
 use hdsl::registers::{Online1, Online2, OnlineD, Register, Registers};
 use hdsl::{Dialect, EncoderId, crc16};
 
-use crate::output::say;
+use crate::terminal::say;
 
 /// The register map of a HIPERFACE DSL receiver in words: link, positions, status, events, messages.
 ///

@@ -12,7 +12,7 @@ use std::process::ExitCode;
 
 use clap::{Args, Subcommand};
 
-use crate::output::say;
+use crate::terminal::say;
 
 /// Who is on the line when: the shortest cycle and the worst fault of an exchange with encoders.
 #[derive(Debug, Args)]

@@ -1,38 +1,8 @@
-//! The stepper driver DRV8711: registers, SPI words, and the sequence that sets it up. Data in, words out; the SPI
-//! itself is the caller's.
-//!
-//! ```text
-//!  bit 15    14 13 12  11 ............ 0
-//!      read  address   data               MSB first, SPI mode 0, chip select high, taken when it falls
-//! ```
+//! What the wire and the pins need of the stepper driver DRV8711: its STATUS byte in the device frame, and its limits. The chip
+//! itself is set up by the feature `drv8711` of `servowire-drivers`.
 //!
 //! From the DRV8711 data sheet (SLVSC40), section 7.6, and the design guide of the 4-axis CNC router (TIDEP-0061),
 //! section 2.1.
-//!
-//! ```
-//! use sorte_proto::drv8711::{Configuration, Ctrl, Register, StepMode};
-//! let mut setup = Configuration::default();
-//! setup.ctrl = Ctrl { enable: true, mode: StepMode::Div256, ..setup.ctrl };
-//! assert_eq!(setup.value(Register::Ctrl), 0xc41);
-//! assert_eq!(Register::Ctrl.write(setup.value(Register::Ctrl)).bits(), 0x0c41);
-//! ```
-
-mod apply;
-mod codes;
-mod current;
-mod fields;
-mod registers;
-mod status;
-
-pub use apply::Apply;
-pub use codes::{
-    DeadTime, DecayMode, DriveTime, IsGain, OcpDeglitch, OcpThreshold, SampleThreshold, SinkCurrent, SourceCurrent,
-    StallCount, StallDivider, StepMode,
-};
-pub use current::{full_scale_microamps, torque_for_microamps};
-pub use fields::Field;
-pub use registers::{Blank, Configuration, Ctrl, Decay, Drive, Off, Stall, Torque};
-pub use status::Status;
 
 use crate::sync0::PULSE_NS;
 use crate::timing::CNC_CYCLE_NS;
@@ -50,123 +20,83 @@ pub const WAKE_NS: u32 = 1_000_000;
 const _: () = assert!(PULSE_NS as u32 >= STEP_NS && CNC_CYCLE_NS - PULSE_NS as u32 >= STEP_NS);
 const _: () = assert!(CNC_CYCLE_NS == 1_000_000_000 / MAX_STEP_HZ);
 
-servowire_core::codes! {
-    /// The eight registers by their addresses.
-    pub enum Register: u8 {
-        /// Enable, direction, micro-steps, gain.
-        Ctrl = 0 => "CTRL",
-        /// Current and back-EMF sampling.
-        Torque = 1 => "TORQUE",
-        /// Fixed off time.
-        Off = 2 => "OFF",
-        /// Blanking of the current trip.
-        Blank = 3 => "BLANK",
-        /// Current decay.
-        Decay = 4 => "DECAY",
-        /// Stall detection.
-        Stall = 5 => "STALL",
-        /// Gate drive and over-current protection.
-        Drive = 6 => "DRIVE",
-        /// Faults.
-        Status = 7 => "STATUS",
+/// STATUS: faults, with the data sheet's names. It is payload byte 0 of the device frame.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "arbitrary", derive(arbitrary::Arbitrary))]
+pub struct Status(u8);
+
+bitflags::bitflags! {
+    impl Status: u8 {
+        /// Overtemperature shutdown: too hot.
+        const OTS = 1 << 0;
+        /// Over-current in bridge A.
+        const AOCP = 1 << 1;
+        /// Over-current in bridge B.
+        const BOCP = 1 << 2;
+        /// Predriver fault in bridge A.
+        const APDF = 1 << 3;
+        /// Predriver fault in bridge B.
+        const BPDF = 1 << 4;
+        /// Undervoltage lockout: supply too low.
+        const UVLO = 1 << 5;
+        /// Stall.
+        const STD = 1 << 6;
+        /// Stall, latched.
+        const STDLAT = 1 << 7;
     }
 }
 
-impl Register {
-    /// Value after power-up.
-    pub const fn reset_value(self) -> u16 {
-        match self {
-            Self::Ctrl => 0xc10,
-            Self::Torque => 0x1ff,
-            Self::Off => 0x030,
-            Self::Blank => 0x080,
-            Self::Decay => 0x110,
-            Self::Stall => 0x040,
-            Self::Drive => 0xa59,
-            Self::Status => 0x000,
-        }
+servowire_core::show_flags!(Status);
+
+impl Status {
+    /// The six faults; the stall bits are none.
+    pub const FAULTS: Self = Self(0x3f);
+    /// The value that clears the six fault bits and leaves the stall bits: writing 0 clears.
+    pub const CLEAR_FAULTS: u16 = 0xfc0;
+    /// The value that clears all bits.
+    pub const CLEAR_ALL: u16 = 0;
+
+    /// From the register's value; its upper four bits are reserved and left out.
+    pub const fn of_register(value: u16) -> Self {
+        let [_, low] = value.to_be_bytes();
+        Self(low)
     }
 
-    /// Bits that read back as written. Bit 10 of TORQUE, the top of SMPLTH, is taken but always reads 0, so a driver has
-    /// to remember what it wrote.
-    pub const fn read_back_mask(self) -> u16 {
-        match self {
-            Self::Torque => 0xfff & !(1 << 10),
-            _ => 0xfff,
-        }
+    /// Whether one of the six faults is set.
+    pub const fn is_fault(self) -> bool {
+        self.intersects(Self::FAULTS)
     }
 
-    /// The word that writes the low 12 bits of `value`.
-    pub const fn write(self, value: u16) -> Word {
-        Word((self.code() as u16) << 12 | value & 0xfff)
+    /// All ones: with the fault pin inactive, the chip has no supply. Reading back OFF tells a dead bus.
+    pub const fn looks_unpowered(self) -> bool {
+        self.is_all()
     }
 
-    /// The word that reads it. The answer comes in the same transfer.
-    pub const fn read(self) -> Word {
-        Word(0x8000 | (self.code() as u16) << 12)
-    }
-
-    /// Whether `read` may be what a register that holds `written` reads.
-    ///
-    /// # Errors
-    /// [`Error::ReadBack`](crate::error::Error::ReadBack)
-    pub const fn verify(self, written: u16, read: u16) -> Result<(), crate::error::Error> {
-        let mask = self.read_back_mask();
-        let (got, want) = (read & mask, written & mask);
-        if got == want { Ok(()) } else { Err(crate::error::Error::ReadBack { register: self.code(), got, want }) }
-    }
-}
-
-/// One SPI word.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub struct Word(u16);
-
-impl Word {
-    /// The 16 bits.
-    pub const fn bits(self) -> u16 {
-        self.0
-    }
-
-    /// The bytes in the order they are sent.
-    pub const fn to_bytes(self) -> [u8; 2] {
-        self.0.to_be_bytes()
-    }
-
-    /// Data in the answer to a read. Its upper four bits are undefined.
-    pub const fn answer(miso: [u8; 2]) -> u16 {
-        u16::from_be_bytes(miso) & 0xfff
+    /// The value that clears exactly the bits that are set here.
+    pub const fn clear_these(self) -> u16 {
+        !(self.0 as u16) & 0xfff
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::string::ToString;
 
     #[test]
-    fn words_carry_address_and_data() {
-        for register in Register::ALL {
-            assert_eq!(Register::from_code(register.code()), Some(register));
-            assert_eq!(register.read().bits(), 0x8000 | u16::from(register.code()) << 12);
-            for value in (0..=u16::MAX).step_by(crate::stride(997)) {
-                let word = register.write(value).bits();
-                assert_eq!(word, u16::from(register.code()) << 12 | value & 0xfff);
-                assert_eq!(Word::answer(value.to_be_bytes()), value & 0xfff);
+    fn every_status_byte_has_its_bits() {
+        for byte in 0..=u8::MAX {
+            let status = Status::from_bits_retain(byte);
+            for high in 0..16 {
+                assert_eq!(Status::of_register(high << 8 | u16::from(byte)), status);
             }
+            assert_eq!(status.is_fault(), byte & 0x3f != 0);
+            assert_eq!(status.looks_unpowered(), byte == 0xff);
+            // Writing 0 clears: what is left are the bits that were not set.
+            assert_eq!(status.clear_these(), 0xfff - u16::from(byte));
         }
-        assert_eq!(Register::from_code(8), None);
-        assert_eq!(Register::Torque.write(0x1ff).to_bytes(), [0x11, 0xff]);
-        let names = ["CTRL", "TORQUE", "OFF", "BLANK", "DECAY", "STALL", "DRIVE", "STATUS"];
-        assert_eq!(Register::ALL.map(Register::name), names);
-    }
-
-    #[test]
-    fn only_bit_10_of_torque_may_differ() {
-        for register in Register::ALL {
-            for bit in 0..12 {
-                let good = register.verify(0xfff, 0xfff & !(1 << bit)).is_ok();
-                assert_eq!(good, register == Register::Torque && bit == 10);
-            }
-        }
+        assert_eq!(Status::CLEAR_FAULTS & 0x3f, 0);
+        assert_eq!((Status::OTS | Status::UVLO | Status::STDLAT).to_string(), "OTS UVLO STDLAT");
     }
 }

@@ -128,24 +128,6 @@ servowire_core::errors! {
             /// Time stamp expected.
             want: u16,
         },
-        /// A register field holds a code that the data sheet reserves.
-        #[error("code {code} of DRV8711 register {register} is reserved")]
-        ReservedCode = 18 {
-            /// Address of the register.
-            register: u8,
-            /// The code.
-            code: u8,
-        },
-        /// A register reads back other than written.
-        #[error("DRV8711 register {register} reads {got:#05x}, {want:#05x} was written")]
-        ReadBack = 19 {
-            /// Address of the register.
-            register: u8,
-            /// Value read, bits that always read 0 left out.
-            got: u16,
-            /// Value written, the same bits left out.
-            want: u16,
-        },
         /// A start-up frame was not answered in time.
         #[error("no answer to {sent} frame {frame}")]
         NoAnswer = 20 {

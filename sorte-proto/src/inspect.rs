@@ -21,29 +21,19 @@ mod cause;
 mod frame;
 
 pub use cause::Cause;
-pub use frame::{Frame, Kind};
+pub use frame::{During, Frame, Kind};
+
+use frame::cnc_slices;
 
 use crate::crc::fcs;
 use crate::discovery::{DiscoveryView, MAX_DEVICES, Network};
 use crate::error::{Error, ErrorClass};
 use crate::frame::{LongFrame, MULTICAST};
 use crate::frame_type::FrameType;
-use crate::payload::Slice;
 use crate::pto::Pto;
 
 /// The kinds of faults found, as a set.
 pub type Findings = servowire_core::Findings<ErrorClass>;
-
-/// What the line was doing when the frame was taken: it alone says which kinds of frames there are.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub enum During {
-    /// The start-up: long-header frames with FCS.
-    StartUp,
-    /// The IO exchange: master and device frames with CRC-8, of any length.
-    Exchange,
-}
 
 /// What there is to say about a frame.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -141,13 +131,6 @@ fn of_exchange(bytes: &[u8], findings: &mut Findings) {
     if words.into_iter().any(|word| matches!(word, Pto::Reserved(_))) {
         findings.insert(ErrorClass::ReservedPtoValue);
     }
-}
-
-/// The slices of output bytes that may be those of the CNC machine: four bytes for each of at most four devices.
-fn cnc_slices(output: &[u8]) -> impl Iterator<Item = Slice> + '_ {
-    let cnc = output.len() % 4 == 0 && output.len() <= 16;
-    let output = if cnc { output } else { &[] };
-    output.chunks_exact(4).filter_map(|bytes| bytes.first_chunk()).map(|bytes| Slice::parse(*bytes))
 }
 
 #[cfg(test)]

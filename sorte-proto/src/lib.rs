@@ -28,7 +28,6 @@ pub mod follow;
 mod frame;
 mod frame_type;
 mod hex;
-pub mod host;
 pub mod iep;
 pub mod inspect;
 mod line_delay;

@@ -1,5 +1,6 @@
 use servowire_core::OutOfRange;
 
+use crate::drv8711;
 use crate::pto::{Direction, Pto};
 
 /// A device's share of the master frame in the CNC application: four bytes.
@@ -145,6 +146,35 @@ servowire_core::one_line!(Slice {
     Self { pto, command } => "{} command {:04X}h", pto, command;
 });
 servowire_core::one_line!(Payload { Self([a, b, c, d]) => "{}, {}, {}, {}", a, b, c, d; });
+
+/// A device's payload in its frame: status of the driver, and the steps that it has ordered.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "arbitrary", derive(arbitrary::Arbitrary))]
+pub struct InputSlice {
+    /// The driver's STATUS.
+    pub driver: drv8711::Status,
+    /// [`Follower::ordered`](crate::follow::Follower::ordered). The reference design sends 0, and nothing in the frame says which of the two it is.
+    pub ordered: u16,
+}
+
+impl InputSlice {
+    /// Length in bytes.
+    pub const LEN: usize = 3;
+
+    /// Any three bytes are a payload.
+    pub const fn parse([driver, low, high]: [u8; Self::LEN]) -> Self {
+        Self { driver: drv8711::Status::from_bits_retain(driver), ordered: u16::from_le_bytes([low, high]) }
+    }
+
+    /// The bytes in wire order.
+    pub const fn emit(self) -> [u8; Self::LEN] {
+        let [low, high] = self.ordered.to_le_bytes();
+        [self.driver.bits(), low, high]
+    }
+}
+
+servowire_core::one_line!(InputSlice { Self { driver, ordered } => "{} steps ordered, DRV8711 {}", ordered, driver; });
 
 #[cfg(test)]
 mod tests {

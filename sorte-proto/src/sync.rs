@@ -3,11 +3,13 @@ use crate::frame::{LongFrame, emit};
 use crate::frame_type::FrameType;
 use crate::place::Place;
 use crate::status::Status;
-use crate::timing::TRIGGER_NS;
 
 /// From the trigger of a SYNC frame to the capture of its start at the receiver without the cable: 280 ns, which is
 /// 3.5 byte times of preamble (coded as 100 + 180 in the published master).
 pub const TRIGGER_TO_CAPTURE_NS: u32 = 280;
+
+/// Trigger of the master frame in its cycle, of the first device's frame, and of the first SYNC frame, in ns.
+pub const TRIGGER_NS: u32 = 500;
 
 /// What one device adds to the way of a SYNC frame beside the cable: 320 ns until its port starts to send, and 35 ns
 /// of hardware latency.

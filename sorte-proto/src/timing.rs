@@ -3,11 +3,10 @@
 use crate::address::DeviceAddress;
 use crate::discovery::MAX_DEVICES;
 use crate::sync::TRANSIT_NS;
+pub use crate::sync::TRIGGER_NS;
 
 /// One byte at 100 Mbit/s, in ns.
 pub const BYTE_NS: u32 = 80;
-/// Trigger of the master frame in its cycle, and of the first device's frame, in ns.
-pub const TRIGGER_NS: u32 = 500;
 /// Gap between two device frames on the way to the master, in ns.
 pub const GAP_NS: u32 = 240;
 /// Cycle time of the CNC machine, in ns.

@@ -61,50 +61,6 @@ servowire_core::errors! {
         /// No motor is selected to move.
         #[error("no motor is selected")]
         NoMotor = 10,
-        /// Two steps could fall into one tick of the clock.
-        #[error("{speed} steps/s are too many for this clock, at most {limit}")]
-        SpeedAboveClock = 11 {
-            /// Greatest speed in steps/s, as asked for.
-            speed: u32,
-            /// Half the ticks in a second.
-            limit: u32,
-        },
-        /// A move has more steps than 31 bits count.
-        #[error("a move of {steps} steps, at most {limit}")]
-        TooManySteps = 12 {
-            /// Steps, as asked for.
-            steps: u32,
-            /// The most: 2^31 - 1.
-            limit: u32,
-        },
-        /// No room for another line.
-        #[error("the queue of lines is full")]
-        QueueFull = 13,
-        /// An axis with 0 steps a metre.
-        #[error("an axis with 0 steps a metre")]
-        NoScale = 14,
-        /// The ends of an arc are not on one circle, or it is too large.
-        #[error("an arc from a radius of {from} to one of {to}")]
-        ArcRadius = 15 {
-            /// Radius at its begin, in the caller's unit.
-            from: u32,
-            /// Radius at its end.
-            to: u32,
-        },
-        /// A target lies outside the soft limits.
-        #[error("target {target} is outside the soft limits")]
-        SoftLimit = 16 {
-            /// The target in steps; the nearest that 32 bits hold.
-            target: i32,
-        },
-        /// The change of speed within the limits needs more steps than there are.
-        #[error("{steps} steps are too few, at least {needed} needed")]
-        TooShort = 17 {
-            /// Steps, as asked for.
-            steps: u32,
-            /// The least that is enough.
-            needed: u32,
-        },
     }
 }
 

@@ -1,4 +1,6 @@
-use crate::axis::{Axis, Command, Direction};
+use servowire_core::{Command, Direction};
+
+use crate::axis::Axis;
 use crate::error::Error;
 use crate::profile::Profile;
 use crate::ramp_steps::MoveState;

@@ -1,4 +1,5 @@
-use crate::axis::{Command, Direction};
+use servowire_core::{Command, Direction};
+
 use crate::error::Error;
 use crate::group::{Group, Motors};
 use crate::microstep::{Microstep, Turn};

@@ -4,7 +4,6 @@ use crate::frequency::Speed;
 use crate::interval::{CYCLE_NS, step_time_ns};
 use crate::pru_exact;
 use crate::ramp::RampTable;
-use crate::ramp_steps::RampSteps;
 use crate::runs::Runs;
 
 /// What a speed profile is made of.
@@ -59,7 +58,7 @@ impl<'t> Parameters<'t> {
     /// With the shortest ramp whose acceleration stays within `acceleration` in steps/s²: it sets the steps a ramp entry.
     ///
     /// The acceleration is that from the middle of a ramp entry to the middle of the next. Within it the speed jumps from entry
-    /// to entry, and the mean over the ramp is far below it; [`motion`](crate::motion) uses an acceleration fully. Call it
+    /// to entry, and the mean over the ramp is far below it; the crate `step-motion` uses an acceleration fully. Call it
     /// after [`with_table`](Self::with_table). An acceleration of 0, or one that needs longer entries than there are, is
     /// refused by [`Profile::new`].
     #[must_use]
@@ -182,11 +181,6 @@ impl<'t> Profile<'t> {
             fractions = fractions.saturating_add(u64::from(run.len).saturating_mul(u64::from(time.fraction)));
         }
         ns.saturating_add(fractions >> 16)
-    }
-
-    /// The steps of a move of `steps` steps, from standstill to standstill.
-    pub const fn steps(self, steps: u32) -> RampSteps<'t> {
-        RampSteps::new(self, steps)
     }
 }
 

@@ -89,6 +89,13 @@ pub struct RampSteps<'t> {
     fraction: u32,
 }
 
+impl<'t> Profile<'t> {
+    /// The steps of a move of `steps` steps, from standstill to standstill.
+    pub const fn steps(self, steps: u32) -> RampSteps<'t> {
+        RampSteps::new(self, steps)
+    }
+}
+
 impl<'t> RampSteps<'t> {
     pub(crate) const fn new(profile: Profile<'t>, steps: u32) -> Self {
         let shape = profile.shape(steps);

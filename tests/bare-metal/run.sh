@@ -15,7 +15,7 @@ cd "$(dirname "$0")"
 target=thumbv7em-none-eabihf
 # The Cortex-M0+, and what is measured for it. The Cortex-M4 that QEMU emulates executes its code too.
 target_m0=thumbv6m-none-eabi
-protocols_m0=(servowire-core hdsl step-profile)
+protocols_m0=(servowire-core hdsl step-motion step-profile)
 images=$CARGO_TARGET_DIR/images
 # The default features are the protocols.
 protocols=$(sed -n 's/^default = \[\(.*\)\]$/\1/p' Cargo.toml | tr -d '",')

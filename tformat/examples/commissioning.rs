@@ -63,7 +63,7 @@ fn fit(encoder: &mut Device<6>, line: Line, resolution: Resolution) -> Result<St
     let single = host.run(&mut SingleTurnZero::set_and_shift_commutation_angle(resolution, 4))?;
     let multi = host.run(&mut MultiTurnZero::set_and_lose_multi_turn_reference(resolution, 1))?;
     for (address, byte) in (0..).zip(NAME) {
-        let mut access = EepromAccess::write(Page::new(1), Address::truncate(address), *byte, EEPROM_POLLING);
+        let mut access = EepromAccess::write(Page::truncate(1), Address::truncate(address), *byte, EEPROM_POLLING);
         assert_eq!(host.run(&mut access)?, *byte, "it was read back");
     }
     Ok(format!("{single}, {multi}, a name of {} bytes, after {} ms", NAME.len(), host.now_ns / 1_000_000))

@@ -114,10 +114,10 @@ servowire_core::errors! {
             /// Requests made.
             tries: u16,
         },
-        /// The act was not done: fewer requests than it needs can have been taken, or the read-back shows it.
+        /// The act was not done: reading back shows it.
         #[error("not done, after {sent} requests: {because}")]
         NotDone = 15 {
-            /// Requests that the encoder may have taken.
+            /// Requests that were sent.
             sent: u8,
             /// How it failed.
             because: ErrorClass,
@@ -139,6 +139,12 @@ servowire_core::errors! {
         /// A `nom` combinator of the caller refused the input.
         #[error("a parser combinator refused the input")]
         Combinator = 18,
+        /// Two sound responses came in one block: which one answers the request is not known.
+        #[error("two responses came to one request")]
+        TwoResponses = 19,
+        /// The settings of the line leave no time for a response: nothing is to be sent.
+        #[error("the settings of the line leave no time for a response")]
+        Line = 20,
     }
 }
 

@@ -66,15 +66,6 @@ servowire_core::one_line!(Cause {
     Self::RequestRefused => "the encoder found the request damaged and answered with ID 3";
 });
 
-impl From<LineCause> for Cause {
-    fn from(cause: LineCause) -> Self {
-        Self::Line(cause)
-    }
-}
-
-/// The kinds of faults found, as a set.
-pub type Findings = servowire_core::Findings<ErrorClass>;
-
 /// What there is to say about a line.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
@@ -89,30 +80,13 @@ pub struct Report {
     len: u8,
 }
 
-servowire_core::one_line!(Report {
-    Self { error: Some(error), cause: Some(cause), .. } => "{}; likely cause: {}", error, cause;
-    Self { error: Some(error), .. } => "{}", error;
+servowire_core::report! {
     Self { response: Some(response), .. } => "sound: {}", response;
     // Never: there is a response or an error.
     _ => "nothing";
-});
+}
 
 impl Report {
-    /// The fault that a decoder reports.
-    pub const fn error(&self) -> Option<Error> {
-        self.error
-    }
-
-    /// Every kind of fault in the line as it was given.
-    pub const fn findings(&self) -> Findings {
-        self.findings
-    }
-
-    /// The most likely cause of the fault.
-    pub const fn cause(&self) -> Option<Cause> {
-        self.cause
-    }
-
     /// The response, as it is if nothing is wrong, or as it would be without the cause. For showing to a person only.
     pub const fn response(&self) -> Option<Response> {
         self.response

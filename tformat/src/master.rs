@@ -10,14 +10,15 @@
 //! use tformat::master::{Line, Progress, Transaction};
 //! use tformat::{BitRate, Request, Response};
 //!
-//! let mut transaction = Transaction::start(Request::ReadSingleTurn, Line::new(BitRate::Mbit2_5), 0);
+//! // The receiver is on all the time, and a block is handed over when the line has been idle for a while.
+//! let line = Line::new(BitRate::Mbit2_5).with_hand_over_ns(40_000);
+//! let mut transaction = Transaction::start(Request::ReadSingleTurn, line, 0);
 //! assert_eq!(transaction.transmission().frame.as_bytes(), [0x02]);
 //!
-//! // The receiver is on all the time: the UART hears the request and, 3 us later, the six fields of the response.
-//! let progress = transaction.hear(&[0x02], 4_000);
-//! assert_eq!(progress, Progress::Pending { until_ns: 23_600 });
-//! // The response comes in a DMA block whose last byte ended at 31 us.
-//! let progress = transaction.hear(&[0x02, 0x20, 0xb4, 0xbd, 0x1c, 0x37], 31_000);
+//! // Nothing was handed over yet when it is polled; it wants to be polled again at 58 us.
+//! assert_eq!(transaction.poll(30_000), Progress::Pending { until_ns: 58_001 });
+//! // The request as it was heard and, 3 us later, the six fields of the response; the last byte ended at 31 us.
+//! let progress = transaction.hear(&[0x02, 0x02, 0x20, 0xb4, 0xbd, 0x1c, 0x37], 31_000);
 //! let Progress::Done { value, ready_ns: 31_000 } = progress else { panic!("{progress:?}") };
 //! assert_eq!(value.response.abs().unwrap().get(), 1_883_572);
 //! assert_eq!((value.sampled_ns, value.began_ns), (4_480, 7_000));

@@ -5,8 +5,8 @@ use servowire_world::Scenario;
 
 use crate::byte;
 
-#[allow(clippy::pedantic, reason = "what the tests share")]
-#[path = "../../../nikon-aformat/tests/common/mod.rs"]
+#[allow(dead_code, unreachable_pub, clippy::pedantic, reason = "what the tests share")]
+#[path = "../../../nikon-aformat/tests/all/common/mod.rs"]
 mod common;
 
 use common::exchanges::{self, Setup};

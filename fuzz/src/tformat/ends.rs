@@ -78,7 +78,7 @@ pub fn device(mut data: &[u8]) {
         1 => _ = line.reset(Reset::clear_turns_and_lose_multi_turn_reference()),
         2 => _ = line.reset(Reset::set_single_turn_zero_and_shift_commutation_angle()),
         3 => {
-            let written = line.access(EepromAccess::write(Some(page), address, value, polling), polling);
+            let written = line.access(EepromAccess::write(page, address, value, polling), polling);
             if written.is_ok() && address != Address::PAGE_REGISTER {
                 // The encoder has six pages: on another nothing is written.
                 assert_eq!(line.encoder.page(), page.get());
@@ -86,7 +86,7 @@ pub fn device(mut data: &[u8]) {
                 assert_eq!(cells[usize::from(address.get())], value);
             }
         }
-        _ => _ = line.access(EepromAccess::read(None, address, polling), polling),
+        _ => _ = line.access(EepromAccess::read(page, address, polling), polling),
     }
 }
 

@@ -9,7 +9,7 @@ use super::chosen;
 use crate::byte;
 
 #[allow(dead_code, unreachable_pub, clippy::pedantic, reason = "the bench of the tests; not all of it is used")]
-#[path = "../../../tformat/tests/bench/mod.rs"]
+#[path = "../../../tformat/tests/all/bench/mod.rs"]
 mod bench;
 
 use bench::Bench;
@@ -52,7 +52,7 @@ pub fn hostile(mut data: &[u8]) {
         }
         _ => {
             let (page, address) = (Page::truncate(options >> 4), Address::truncate(number.to_le_bytes()[0]));
-            let mut access = EepromAccess::write(Some(page), address, 0x5a, EEPROM_POLLING);
+            let mut access = EepromAccess::write(page, address, 0x5a, EEPROM_POLLING);
             let _ = bench.run(&mut access);
         }
     }

@@ -3,10 +3,10 @@ use crate::command::Command;
 use crate::data::Data;
 use crate::number::{EncoderAddress, U17, U40};
 use crate::response::tests::exchanges;
-use crate::sample::Position;
 use crate::status::{Alm, PmAlm};
 use proptest::prelude::*;
 use servowire_core::U24;
+use servowire_core::{Feedback, Words};
 use std::string::ToString;
 
 const EA: EncoderAddress = EncoderAddress::ZERO;
@@ -20,7 +20,6 @@ fn twenty() -> Resolution {
 
 fn judged(resolution: Resolution, response: Response, policy: Policy) -> Result<(u32, Option<i32>), Doubt> {
     let sample = Evidence::of(response, resolution, 7).at(7, policy)?;
-    assert_eq!(sample.position().map(|position| position.turns), sample.turns());
     Ok((sample.single_turn(), sample.turns()))
 }
 
@@ -125,7 +124,7 @@ fn the_units_of_a_sample() {
     };
     let back = sample(twenty().compose(3, u32::MAX));
     assert_eq!((back.counts(), back.sampled_ns()), (Some(-1_048_573), 34));
-    assert_eq!(back.position(), Some(Position { single_turn: 3, turns: -1 }));
+    assert_eq!((back.single_turn(), back.turns()), (3, Some(-1)));
     assert_eq!(back.to_string(), "turn -1, 3 counts at 34 ns");
     assert_eq!(sample(twenty().compose(0x4_0000, 0)).angle().millidegrees(), 90_000);
 }

@@ -118,23 +118,23 @@ impl EepromRead {
 
     /// The first request, at once.
     pub const fn start(&mut self, now_ns: u64) -> Step<u16> {
+        Step::Send { request: self.begin(), not_before_ns: now_ns }
+    }
+
+    /// The first request.
+    pub(super) const fn begin(&mut self) -> Request {
         // A read that was started and has not ended is broken off by this.
         self.known = self.known && (!self.started || self.end.is_some());
         self.started = true;
         self.tries = 0;
         self.end = None;
         self.next = if self.known { Next::First } else { Next::Other };
-        Step::Send { request: self.next_request(), not_before_ns: now_ns }
+        self.next_request()
     }
 
-    /// A transaction ended with this outcome; the line is free from `ready_ns` on.
-    ///
-    /// A response that is missing or refused counts as a try; [`Error::BankError`] ends the procedure at once. Once done or
-    /// failed it stays so.
-    pub fn receive(&mut self, outcome: Result<Response, Error>, ready_ns: u64) -> Step<u16> {
-        let step = self.end.unwrap_or_else(|| self.next(outcome, ready_ns));
-        self.end = step.ended();
-        step
+    servowire_core::receive! {
+        /// A response that is missing or refused counts as a try; [`Error::BankError`] ends the procedure at once.
+        u16
     }
 
     fn next(&mut self, outcome: Result<Response, Error>, ready_ns: u64) -> Step<u16> {

@@ -76,15 +76,13 @@ impl Write {
         self.request
     }
 
-    /// A transaction ended with this outcome; the line is free from `ready_ns` on. The value is the response to STATUS.
-    ///
-    /// Fails with [`Error::BankError`] if the encoder has no such bank: nothing was written; with [`Error::EffectUnknown`] if no
-    /// response to this write or no status comes, and with [`Error::MemoryFault`] if MEMERR is set. Once done or failed it
-    /// stays so.
-    pub fn receive(&mut self, outcome: Result<Response, Error>, ready_ns: u64) -> Step<Response> {
-        let step = self.end.unwrap_or_else(|| self.next(outcome, ready_ns));
-        self.end = step.ended();
-        step
+    servowire_core::receive! {
+        /// The value is the response to STATUS.
+        ///
+        /// Fails with [`Error::BankError`] if the encoder has no such bank: nothing was written; with [`Error::EffectUnknown`] if no
+        /// response to this write or no status comes, and with [`Error::MemoryFault`] if MEMERR is set, by this write or since
+        /// before.
+        Response
     }
 
     fn next(&mut self, outcome: Result<Response, Error>, ready_ns: u64) -> Step<Response> {

@@ -50,6 +50,8 @@ pub struct ProfileMove {
     target_speed: i32,
     stage: MoveStage,
     progress: Progress<CommandEnded>,
+    /// Why it is being broken off.
+    broken: Option<Failure>,
     latch_sel1: Nibble,
     monitor_sel: u8,
     flags: ProfileFlags,
@@ -71,6 +73,7 @@ impl ProfileMove {
             target_speed,
             stage: MoveStage::Preparing,
             progress: Progress::Pending { left: limit },
+            broken: None,
             latch_sel1: Nibble::ZERO,
             monitor_sel: 0,
             flags: ProfileFlags::empty(),
@@ -108,7 +111,7 @@ impl ProfileMove {
     }
 
     /// How far it is.
-    pub const fn progress(&self) -> Progress<CommandEnded> {
+    pub(super) const fn progress(&self) -> Progress<CommandEnded> {
         self.progress
     }
 
@@ -132,10 +135,14 @@ impl ProfileMove {
         self.monitor_data
     }
 
-    /// Ends it without the drive's doing.
-    pub(super) const fn abandon(&mut self, error: Failure) {
-        if self.progress.is_pending() {
-            self.fail(error);
+    /// It ends for this reason and no other: at once, or, where the drive `slows` down, with In_Progress. An end that is not
+    /// `confirmed` was one of this kind.
+    pub(super) fn break_off(&mut self, error: Failure, confirmed: bool, slows: bool) {
+        match self.progress {
+            Progress::Pending { .. } if slows => _ = self.broken.get_or_insert(error),
+            Progress::Pending { .. } => self.fail(self.broken.unwrap_or(error)),
+            Progress::Done { .. } if !confirmed => self.fail(error),
+            Progress::Done { .. } | Progress::Failed { .. } => {}
         }
     }
 
@@ -169,6 +176,8 @@ impl ProfileMove {
             self.fail(Failure::Execution);
         } else if moves {
             self.stage = MoveStage::Moving;
+        } else if let (MoveStage::Moving, Some(error)) = (self.stage, self.broken) {
+            self.fail(error);
         } else if self.stage == MoveStage::Moving {
             let in_position = response.status.contains(StatusFlags::IN_POSITION);
             let warning = execution.contains(Execution::WNG);

@@ -1,21 +1,11 @@
 //! Waits by spinning.
 
-use core::convert::Infallible;
-use core::ops::ControlFlow;
+use nikon_aformat::RequestFrame;
+use servowire_core::run;
 
-use nikon_aformat::bus::Addresses;
-use nikon_aformat::master::{
-    BusTransaction, Cycle, EepromRead, Exchange, GuardedReset, Line, Progress, Reset, Transaction,
-};
-use nikon_aformat::{
-    Doubt, EncoderAddress, Evidence, Operation, Policy, Request, RequestFrame, Resolution, Response, Sample,
-};
-use servowire_core::{Ended, Machine, Procedure};
-
-use super::{Frame, LOST, Released, hear, longest_ns, silence_ns};
-use crate::exchange;
-use crate::quiet;
-use crate::{Clock, Error};
+use super::Frame;
+use crate::Clock;
+use crate::quiet::spin;
 
 /// What sends and receives frames.
 pub trait FramePort {
@@ -32,187 +22,21 @@ pub trait FramePort {
     /// # Errors
     /// Those of the port: the exchange is lost.
     fn take(&mut self) -> Result<Option<Frame>, Self::Error>;
-    /// Whether something is on the line that nobody has asked for, frames or not; it is thrown away.
-    fn listen(&mut self) -> bool {
-        !matches!(self.take(), Ok(None))
-    }
 }
 
-/// Why a call of a [`Driver`] failed.
-pub type Failure<F> = Error<<F as FramePort>::Error, Infallible, nikon_aformat::Error, Doubt>;
+driver!(spun, Clock);
 
-/// The controller's end of a line with up to eight encoders of one resolution.
-#[derive(Debug)]
-pub struct Driver<F, C> {
-    port: F,
-    clock: C,
-    resolution: Resolution,
-    line: Line,
-    state: quiet::Line,
+/// The frame that comes until a time, or an error of the port.
+#[inline(always)]
+fn take<F: FramePort>(
+    port: &mut F,
+    line: &mut quiet::Line,
+    clock: &mut impl Clock,
+    until_ns: u64,
+) -> Result<Heard<Result<Frame, F::Error>>, ClockError> {
+    spin(line, clock, until_ns, || port.take().transpose())
 }
 
-impl<F: FramePort, C: Clock> Driver<F, C> {
-    /// A line with encoders of this resolution. The port must be asked for frames within `line.latency_budget_ns()` of their end, unless it gives their times:
-    /// nothing but the driver may run meanwhile, or give the line a larger budget.
-    pub const fn new(port: F, clock: C, resolution: Resolution, line: Line) -> Self {
-        Self { port, clock, resolution, line, state: quiet::Line::new(silence_ns(line)) }
-    }
-
-    /// Gives port and clock back.
-    pub fn release(self) -> Released<F, C> {
-        Released { port: self.port, clock: self.clock }
-    }
-
-    /// The position of an encoder, if it may be used now, and when it was sampled: [`read_evidence`](Self::read_evidence),
-    /// judged at once by the rules of [`Evidence::at`]. The answer alone has 72 bits, so it is never younger than those.
-    ///
-    /// # Errors
-    /// [`Error`], [`Error::Doubt`] among them.
-    pub fn read_position(&mut self, ea: EncoderAddress, policy: Policy) -> Result<Sample, Failure<F>> {
-        let evidence = self.read_evidence(ea)?;
-        evidence.at(self.state.now_ns(&mut self.clock)?, policy).map_err(Error::Doubt)
-    }
-
-    /// What an encoder says of its position, from command 0, to be judged where it is used.
-    ///
-    /// # Errors
-    /// [`Error`].
-    pub fn read_evidence(&mut self, ea: EncoderAddress) -> Result<Evidence, Failure<F>> {
-        Ok(self.read_abs40(ea)?.evidence(self.resolution))
-    }
-
-    /// Command 0: the field for the whole position and the encoder status, as they came. For a position that may be used take
-    /// [`read_position`](Self::read_position).
-    ///
-    /// # Errors
-    /// [`Error`].
-    pub fn read_abs40(&mut self, ea: EncoderAddress) -> Result<Exchange, Failure<F>> {
-        self.transact(Request::new(ea, Operation::Abs40))
-    }
-
-    /// A multi-response command: the answers of all encoders to one request. What came of each
-    /// [`BusTransaction::exchange`] says; one that is missing or damaged costs no other one.
-    ///
-    /// # Errors
-    /// [`Error`]. An answer that is missing is no error.
-    pub fn read_bus(&mut self, operation: Operation, asked: Addresses) -> Result<BusTransaction, Failure<F>> {
-        let request = Request::new(asked.highest().unwrap_or(EncoderAddress::MAX), operation);
-        let line = self.line.with_highest(self.line.highest.max(request.ea));
-        let (resolution, plain) = (self.resolution, self.line);
-        let start = |now_ns| BusTransaction::start(request, resolution, asked, plain, now_ns);
-        let (transaction, ()) = self.exchange(request, line, start)?;
-        Ok(transaction)
-    }
-
-    /// [`read_bus`](Self::read_bus) when the cycle is due: waits for the next start and keeps to its grid.
-    ///
-    /// # Errors
-    /// [`Error`]. After [`Error::Clock`] make a new cycle: the grid of this one is of the time before the clock was set back.
-    pub fn read_cycle(
-        &mut self,
-        cycle: &mut Cycle,
-        operation: Operation,
-        asked: Addresses,
-    ) -> Result<BusTransaction, Failure<F>> {
-        while !cycle.is_due(self.state.now_ns(&mut self.clock)?) {}
-        self.read_bus(operation, asked)
-    }
-
-    /// Command 8, eight times: clears the alarms of an encoder. Position and turns stay.
-    ///
-    /// # Errors
-    /// [`Error`]; read the status to see whether they were cleared.
-    pub fn clear_status(&mut self, ea: EncoderAddress) -> Result<Response, Failure<F>> {
-        self.run(&mut GuardedReset::new(Reset::clear_status(ea)))
-    }
-
-    /// Command 13: the word at an address of the EEPROM. Writing is a procedure for [`run`](Self::run).
-    ///
-    /// # Errors
-    /// [`Error`].
-    pub fn read_eeprom(&mut self, ea: EncoderAddress, address: u8) -> Result<u16, Failure<F>> {
-        self.run(&mut EepromRead::new(ea, address))
-    }
-
-    /// A procedure of several transactions: does what its steps ask for.
-    ///
-    /// # Errors
-    /// [`Error`]: that of the procedure, for which a fault of the port is a lost answer; [`Error::NeverQuiet`] and
-    /// [`Error::Clock`] at once, and then whether the last request had its effect is not known.
-    pub fn run<P>(&mut self, procedure: &mut P) -> Result<P::Value, Failure<F>>
-    where
-        P: Procedure<Request = Request, Response = Response, Error = nikon_aformat::Error>,
-    {
-        let now_ns = self.state.now_ns(&mut self.clock)?;
-        let exchange = |request, not_before_ns| {
-            self.state.wait_until(&mut self.clock, not_before_ns)?;
-            let exchanged = self.transact(request).map(|exchange| exchange.response);
-            exchange::ended(exchanged, LOST, &mut self.state, &mut self.clock)
-        };
-        let Ended { outcome, ready_ns } = servowire_core::run(procedure, now_ns, exchange)?;
-        self.state.keep(ready_ns);
-        outcome.map_err(Error::Protocol)
-    }
-
-    /// One request and its answer.
-    ///
-    /// # Errors
-    /// [`Error`].
-    pub fn transact(&mut self, request: Request) -> Result<Exchange, Failure<F>> {
-        let (resolution, line) = (self.resolution, self.line);
-        let start = |now_ns| Transaction::start(request, resolution, line, now_ns);
-        let (_, exchange) = self.exchange(request, line, start)?;
-        Ok(exchange)
-    }
-
-    /// One request and all that answers.
-    fn exchange<M: Machine<Unit = [Option<u16>], Error = nikon_aformat::Error>>(
-        &mut self,
-        request: Request,
-        line: Line,
-        start: impl FnOnce(u64) -> M,
-    ) -> Result<(M, M::Value), Failure<F>> {
-        self.settle()?;
-        let start_ns = self.state.now_ns(&mut self.clock)?;
-        let mut transaction = start(start_ns);
-        match transaction.progress() {
-            // Encoders of this version do not know it, or nobody is asked: nothing is sent.
-            Progress::Failed { error, .. } => return Err(Error::Protocol(error)),
-            Progress::Done { value, .. } => return Ok((transaction, value)),
-            Progress::Pending { .. } => {}
-        }
-        self.state.begin(longest_ns(line, request, self.resolution));
-        let gap_bits = line.rate.bits(line.frame_gap_ns);
-        self.port.send(request.emit().as_slice(), gap_bits).map_err(Error::Io)?;
-        let now_ns = self.state.now_ns(&mut self.clock)?;
-        self.state.sent(now_ns);
-        loop {
-            let progress = self.receive(&mut transaction)?;
-            if let ControlFlow::Break(outcome) = exchange::next(progress, &mut self.state, &mut self.clock)? {
-                return outcome.map(|value| (transaction, value)).map_err(Error::Protocol);
-            }
-        }
-    }
-
-    /// Takes what is there; asks whether the time is over only if there is nothing.
-    fn receive<M: Machine<Unit = [Option<u16>], Error = nikon_aformat::Error>>(
-        &mut self,
-        machine: &mut M,
-    ) -> Result<Progress<M::Value>, Failure<F>> {
-        let before_ns = self.state.now_ns(&mut self.clock)?;
-        Ok(match self.port.take().map_err(Error::Io)? {
-            Some(frame) => hear(machine, frame, self.state.now_ns(&mut self.clock)?),
-            None => machine.poll(before_ns),
-        })
-    }
-
-    /// Waits until the line is free, and throws away what comes meanwhile, errors of the port included.
-    fn settle(&mut self) -> Result<(), Failure<F>> {
-        let port = &mut self.port;
-        if quiet::wait(&mut self.state, &mut self.clock, || Ok::<_, Failure<F>>(port.listen()))? {
-            Ok(())
-        } else {
-            Err(Error::NeverQuiet)
-        }
-    }
+fn sleep(line: &mut quiet::Line, clock: &mut impl Clock, until_ns: u64) -> Result<(), ClockError> {
+    line.wait_until(clock, until_ns)
 }

@@ -2,7 +2,7 @@
 
 use core::fmt;
 
-use sorte_proto::drv8711::{Apply, Configuration, Register, Status, StepMode};
+use servowire_drivers::drv8711::{self, Apply, Configuration, Register, Status, StepMode};
 
 /// Time of a word at the 500 kHz of the SPI, in ns: so old can the STATUS be that a device tells.
 const WORD_NS: u64 = 32_000;
@@ -72,7 +72,7 @@ impl Driver {
     }
 
     /// The registers of the reference motor: 1/256 steps, and the motor driven.
-    pub(super) fn set_up(&mut self) -> Result<(), sorte_proto::Error> {
+    pub(super) fn set_up(&mut self) -> Result<(), drv8711::Error> {
         let mut configuration = Configuration::default();
         configuration.ctrl.enable = true;
         configuration.ctrl.mode = StepMode::Div256;
@@ -126,7 +126,7 @@ mod tests {
         assert!(driver.drives());
         let mut dead = Driver::new();
         dead.hit(Fault::Unpowered);
-        assert!(matches!(dead.set_up(), Err(sorte_proto::Error::ReadBack { register: 1, .. })));
+        assert!(matches!(dead.set_up(), Err(drv8711::Error::ReadBack { register: 1, .. })));
         assert!(!dead.drives() && dead.status(0).looks_unpowered());
     }
 

@@ -3,9 +3,9 @@
 //! The words of the program are steps at times. Here time runs at a rate of 0 to 1, so all axes slow down together and stay on
 //! their path, whatever the program is; steps only move apart, so 4 us between two of an axis stay 4 us at least.
 
-use sorte_proto::{Direction, Pto, StartTime};
+use sorte_proto::{Pto, StartTime};
 
-use super::power::Power;
+use super::power::{Power, rest};
 
 /// Change of the rate in a cycle: from full speed to rest in 5000 cycles, 20 ms at 4 us.
 const SLOPE: f64 = 1.0 / 5000.0;
@@ -83,13 +83,5 @@ impl Feed {
                 *out = Pto::Pulse { start: StartTime::truncate(ns), direction };
             }
         }
-    }
-}
-
-/// The word without its step.
-pub(super) fn rest(word: Pto) -> Pto {
-    match word {
-        Pto::DriverOff => Pto::DriverOff,
-        word => Pto::NoPulse { direction: word.direction().unwrap_or(Direction::Low) },
     }
 }

@@ -3,7 +3,7 @@
 use sorte_proto::device::{Config, Device, State};
 use sorte_proto::drv8711;
 use sorte_proto::follow::{Asked, Follower, InputSlice};
-use sorte_proto::{Error, Pto, Slice};
+use sorte_proto::{Pto, Slice};
 
 use super::axis::{Axis, Build, Incoming, Seen};
 use super::clock::Clock;
@@ -24,7 +24,7 @@ pub(super) struct Node {
     pub(super) lag: i16,
     pub(super) status: drv8711::Status,
     /// Whether the driver took its registers.
-    pub(super) set_up: Result<(), Error>,
+    pub(super) set_up: Result<(), servowire_drivers::drv8711::Error>,
     incoming: Option<Incoming>,
     /// Own counter and master's time at the start of the first cycle; `None` outside the IO exchange.
     zero: Option<(f64, f64)>,

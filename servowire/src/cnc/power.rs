@@ -1,9 +1,8 @@
 //! Motor drivers that are switched off while their axis has nothing to do, and woken in time.
 
-use sorte_proto::Pto;
 use sorte_proto::drv8711::WAKE_NS;
+use sorte_proto::{Direction, Pto};
 
-use super::feed::rest;
 use super::program::Program;
 
 /// Cycles more than the chip needs: the pins follow a word with the next cycle, and a step may be early in its own.
@@ -69,6 +68,14 @@ impl Power {
 
     pub(super) fn is_over(&self) -> bool {
         self.waking == 0 && self.program.is_over()
+    }
+}
+
+/// The word without its step.
+pub(super) fn rest(word: Pto) -> Pto {
+    match word {
+        Pto::DriverOff => Pto::DriverOff,
+        word => Pto::NoPulse { direction: word.direction().unwrap_or(Direction::Low) },
     }
 }
 

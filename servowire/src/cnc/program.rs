@@ -6,7 +6,7 @@
 use std::collections::VecDeque;
 
 use sorte_proto::{Direction, Pto};
-use step_profile::motion::AxisPulse;
+use step_motion::AxisPulse;
 use step_profile::{Axis, Command, Dance, Group, Motors, MoveState, Note, Parameters, Profile, Tone};
 
 use crate::gcode::{AXES, Steps};

@@ -1,10 +1,10 @@
 //! What a part program says, as straight lines.
 
 use gcode::{Block, Code, Value};
-use step_profile::motion::{Arc, Turning};
+use step_motion::{Arc, Turning};
 
 use super::AXES;
-use crate::fault::{At, Fault};
+use servowire_decode::fault::{At, Fault};
 
 /// A straight line of a part program.
 #[derive(Debug, Clone, Copy, PartialEq)]

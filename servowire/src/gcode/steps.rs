@@ -2,7 +2,7 @@
 
 use std::vec::IntoIter;
 
-use step_profile::motion::{AxisPulse, AxisSetup, Clock, Limits, LinePulses, Path};
+use step_motion::{AxisPulse, AxisSetup, Clock, Limits, LinePulses, Path};
 
 use super::{AXES, Line};
 
@@ -25,7 +25,7 @@ impl Steps {
         limits: Limits,
         steps_per_mm: u32,
         deviation: u32,
-    ) -> Result<Self, step_profile::Error> {
+    ) -> Result<Self, step_motion::Error> {
         let axis = AxisSetup::new(limits, steps_per_mm * 1000);
         let path = Path::new(Clock::NANOSECONDS, [axis; AXES], deviation)?;
         Ok(Self { lines: lines.into_iter(), path, per_mm: f64::from(steps_per_mm), line: None, end: 0 })

@@ -62,7 +62,7 @@ pub(super) fn svg(title: &str, moves: &[Move]) -> Result<String, Box<dyn Error>>
 mod tests {
     use super::*;
     use crate::profile::stroke::geometry::nothing_is_covered;
-    use step_profile::motion::Limits;
+    use step_motion::Limits;
     use step_profile::{Parameters, Profile, Speed};
 
     #[test]

@@ -2,8 +2,8 @@
 
 use std::io::{self, Write};
 
-use step_profile::motion::{Clock, Limits, Plan};
-use step_profile::{Error, MoveState, Profile};
+use step_motion::{Clock, Error, Limits, Plan};
+use step_profile::{MoveState, Profile};
 
 use super::ramp::{pulse_ns, stretches};
 

@@ -6,8 +6,8 @@ use std::io::{self, BufWriter, Write};
 use std::path::Path;
 
 use plotters::prelude::*;
+use step_motion::AxisPulse;
 use step_profile::Direction;
-use step_profile::motion::AxisPulse;
 use vcd::{IdCode, TimescaleUnit, Value, Writer};
 
 use super::Arguments;

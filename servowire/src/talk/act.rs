@@ -14,10 +14,11 @@ use tformat::{
 };
 
 use super::Watch;
-use super::link::{Fault, Link};
+use super::fault::Fault;
+use super::link::Link;
 use super::port::{self, Port};
 use super::relay::{self, Said};
-use crate::output;
+use crate::terminal;
 
 /// Bytes of a page; the address after them selects the page.
 const PAGE_LEN: u8 = 127;
@@ -26,7 +27,7 @@ type Done = Result<ExitCode, Fault>;
 
 /// Says something to the user. Who reads no further has read enough.
 fn say(text: fmt::Arguments) -> Result<(), Fault> {
-    output::say(text).map_err(Fault::Output)
+    terminal::say(text).map_err(Fault::Output)
 }
 
 fn read_data<P: Port>(link: &mut Link<P>) -> Result<AllData, Fault> {
@@ -176,24 +177,22 @@ fn name(almc: tformat::Almc) -> String {
     if almc.is_empty() { "none".to_owned() } else { almc.to_string() }
 }
 
-fn read_byte<P: Port>(link: &mut Link<P>, page: Option<Page>, address: Address) -> Result<u8, Fault> {
-    link.run(EepromAccess::read(page, address, EEPROM_POLLING))
+fn page(number: u8) -> Result<Page, Fault> {
+    Page::new(number).ok_or_else(|| Fault::Input(format!("there is no page {number}")))
 }
 
-fn write_byte<P: Port>(link: &mut Link<P>, address: Address, data: u8) -> Result<u8, Fault> {
-    link.run(EepromAccess::write(None, address, data, EEPROM_POLLING))
-}
-
-/// The bytes of a page, after it was selected. The procedure reads the selection back.
+/// The bytes of a page. The procedure looks at the selection before and after each.
 fn read_page<P: Port>(link: &mut Link<P>, number: u8) -> Result<Vec<u8>, Fault> {
-    let page = Page::new(number).ok_or_else(|| Fault::Input(format!("there is no page {number}")))?;
-    read_byte(link, Some(page), Address::truncate(0)).map_err(|fault| match fault {
-        Fault::Encoder(tformat::Error::DataMismatch { got, .. }) => {
-            Fault::Input(format!("the encoder stays on page {got}: it has no page {number}"))
-        }
-        fault => fault,
-    })?;
-    (0..PAGE_LEN).map(|address| read_byte(link, None, Address::truncate(address))).collect()
+    let page = page(number)?;
+    let read = |address| {
+        link.run(EepromAccess::read(page, Address::truncate(address), EEPROM_POLLING)).map_err(|fault| match fault {
+            Fault::Encoder(tformat::Error::DataMismatch { got, .. }) => {
+                Fault::Input(format!("the encoder stays on page {got}: it has no page {number}"))
+            }
+            fault => fault,
+        })
+    };
+    (0..PAGE_LEN).map(read).collect()
 }
 
 pub(super) fn dump<P: Port>(link: &mut Link<P>, file: Option<&Path>, pages: u8) -> Done {
@@ -248,10 +247,10 @@ pub(super) fn restore<P: Port>(link: &mut Link<P>, file: &Path, yes: bool) -> Do
 
 /// Writes the bytes of a page that differ, and counts them.
 fn write_page<P: Port>(link: &mut Link<P>, (number, want): (u8, Vec<u8>), written: &mut u32) -> Result<(), Fault> {
-    let have = read_page(link, number)?;
+    let (have, page) = (read_page(link, number)?, page(number)?);
     for ((address, want), have) in (0..PAGE_LEN).zip(want).zip(have) {
         if want != have {
-            write_byte(link, Address::truncate(address), want)?;
+            let _ = link.run(EepromAccess::write(page, Address::truncate(address), want, EEPROM_POLLING))?;
             *written += 1;
         }
     }

@@ -3,11 +3,14 @@
 use std::cell::RefCell;
 use std::io;
 
-use servowire::capture::{Capture as Opened, Change, Line};
-use servowire::event::{Direction, Event, Value, Verdict};
-use servowire::fault::Fault;
-use servowire::output::{Lane, Origin, Output, Printer};
-use servowire::protocols::{Protocol, Settings};
+use servowire_decode::capture::{Capture as Opened, Change, Line};
+use servowire_decode::event::{Direction, Event, Value, Verdict};
+use servowire_decode::fault::Fault;
+use servowire_decode::output::Output;
+use servowire_decode::output::printer::{Lane, Origin, Printer};
+use servowire_decode::recognition::Note;
+use servowire_decode::settings::Settings;
+use servowire_decode::time::Time;
 
 use super::speech::Expect;
 use super::wire::Capture;
@@ -17,7 +20,7 @@ struct Memory {
     names: Vec<String>,
     changes: Vec<Change>,
     at: usize,
-    end: i64,
+    end: Time,
 }
 
 impl Line for Memory {
@@ -32,7 +35,7 @@ impl Line for Memory {
         Ok(self.at < self.changes.len())
     }
 
-    fn reached(&self) -> i64 {
+    fn reached(&self) -> Time {
         if self.at == self.changes.len() { self.end } else { self.changes[self.at].time }
     }
 }
@@ -77,17 +80,21 @@ pub struct Outcome {
 pub fn decode(capture: &Capture) -> (Vec<(Lane, Vec<Event>)>, String) {
     let mut changes: Vec<Change> = Vec::new();
     for (channel, line) in (0_u16..).zip(&capture.channels) {
-        changes.extend(line.edges.iter().map(|(time, level)| Change { time: *time, channel, level: *level }));
+        changes.extend(line.edges.iter().map(|(time, level)| Change {
+            time: Time::from_ps((*time).into()),
+            channel,
+            level: *level,
+        }));
     }
     changes.sort_by_key(|change| change.time);
     let names = capture.channels.iter().map(|channel| channel.name.clone()).collect();
-    let memory = Memory { names, changes, at: 0, end: capture.end };
+    let memory = Memory { names, changes, at: 0, end: Time::from_ps(capture.end.into()) };
     let mut keep = Keep::default();
     let said = RefCell::new(String::new());
-    let notes = |text: &str| said.borrow_mut().extend([text, "\n"]);
-    let mut out = Output::new("x", &mut keep, &|| (), &notes);
+    let notes = |note: &Note| said.borrow_mut().push_str(&format!("{note}\n"));
+    let mut out = Output::new("x", &mut keep).with_notes(&notes);
     let opened = Opened::Edges(Box::new(memory));
-    if let Err(stop) = Protocol::Auto.decode("x", opened, &Settings::default(), &mut out) {
+    if let Err(stop) = servowire_decode::decode("x", opened, None, &Settings::default(), &mut out) {
         said.borrow_mut().push_str(&stop.to_string());
     }
     out.end().unwrap();

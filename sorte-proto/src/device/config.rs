@@ -1,6 +1,6 @@
 //! Settings and counters of a device.
 
-use super::PortId;
+use super::heard::PortId;
 use crate::clock::AVERAGE;
 use crate::discovery::Entry;
 use crate::error::Error;

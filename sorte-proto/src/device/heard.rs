@@ -1,6 +1,6 @@
 //! What a device hears, and what it makes of it.
 
-use super::Trigger;
+use super::port::Trigger;
 use crate::clock::Correction;
 use crate::error::Error;
 use crate::hex::Hex;

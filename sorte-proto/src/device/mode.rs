@@ -1,7 +1,8 @@
 //! What the ports do with frames in each state, and the state that only the host ends.
 
-use super::port::PortFlags;
-use super::{Device, PortId, State};
+use super::heard::PortId;
+use super::machine::Device;
+use super::port::{PortFlags, State};
 
 /// What a port of the published hardware does with the frames that come in. It changes at the end of a frame.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]

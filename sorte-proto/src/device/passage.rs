@@ -1,6 +1,7 @@
 //! A start-up frame on its way through a device.
 
-use super::{Path, State};
+use super::heard::Path;
+use super::port::State;
 use crate::cut_through::{DiscoveryRewriter, SyncRewriter, Transit};
 use crate::discovery::Assignment;
 use crate::error::Error;

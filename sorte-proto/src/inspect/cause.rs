@@ -1,4 +1,4 @@
-use super::{During, Frame};
+use super::frame::{During, Frame};
 use crate::crc::RunningFcs;
 use crate::error::Error;
 use crate::exchange::{DeviceFrameView, MasterFrameView};

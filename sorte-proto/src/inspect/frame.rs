@@ -1,4 +1,3 @@
-use super::{During, cnc_slices};
 use crate::delay_req::DelayReq;
 use crate::discovery::DiscoveryView;
 use crate::error::Error;
@@ -8,6 +7,17 @@ use crate::frame_type::FrameType;
 use crate::param::Param;
 use crate::payload::Slice;
 use crate::sync::Sync;
+
+/// What the line was doing when the frame was taken: it alone says which kinds of frames there are.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub enum During {
+    /// The start-up: long-header frames with FCS.
+    StartUp,
+    /// The IO exchange: master and device frames with CRC-8, of any length.
+    Exchange,
+}
 
 /// What a frame is, or was meant to be.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -114,3 +124,10 @@ servowire_core::one_line!(Frame<'_> {
     Self::Master(frame) => "{}", frame;
     Self::Device(frame) => "{}", frame;
 });
+
+/// The slices of output bytes that may be those of the CNC machine: four bytes for each of at most four devices.
+pub(super) fn cnc_slices(output: &[u8]) -> impl Iterator<Item = Slice> + '_ {
+    let cnc = output.len() % 4 == 0 && output.len() <= 16;
+    let output = if cnc { output } else { &[] };
+    output.chunks_exact(4).filter_map(|bytes| bytes.first_chunk()).map(|bytes| Slice::parse(*bytes))
+}

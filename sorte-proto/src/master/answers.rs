@@ -1,10 +1,11 @@
 //! What comes back in the start-up, and what counts as an answer.
 
-use super::{Master, State};
+use super::config::State;
+use super::heard::Heard;
+use super::machine::Master;
 use crate::delay_req::DelayReq;
 use crate::discovery::DiscoveryView;
 use crate::error::Error;
-use crate::evidence::{Evidence, Positions};
 use crate::exchange::DeviceFrameView;
 use crate::frame::LongFrame;
 use crate::frame_type::FrameType;
@@ -12,45 +13,6 @@ use crate::param::ParamView;
 use crate::status::Status;
 use crate::sync::{Sync, TRANSIT_NS};
 use crate::timing::Timing;
-
-/// What a good frame was.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize))]
-pub enum Heard<'a> {
-    /// A start-up frame that has come back.
-    StartUp,
-    /// A device's frame of the IO exchange.
-    Device {
-        /// The frame.
-        frame: DeviceFrameView<'a>,
-        /// Its start, in ns.
-        sof_ns: u64,
-    },
-}
-
-servowire_core::one_line!(Heard<'_> {
-    Self::StartUp => "start-up frame";
-    Self::Device { frame, sof_ns } => "{} at {} ns", frame, sof_ns;
-});
-
-impl<'a> Heard<'a> {
-    /// The device's frame, if it is one.
-    pub const fn device(self) -> Option<DeviceFrameView<'a>> {
-        match self {
-            Self::StartUp => None,
-            Self::Device { frame, .. } => Some(frame),
-        }
-    }
-
-    /// What control may use of it; nothing ([`Evidence::NEVER`]) if it is not a device's frame. The caller has to know that the
-    /// line carries positions.
-    pub fn evidence(self, positions: Positions) -> Evidence {
-        match self {
-            Self::StartUp => Evidence::NEVER,
-            Self::Device { frame, sof_ns } => Evidence::of(frame, positions, sof_ns),
-        }
-    }
-}
 
 impl Master {
     /// A frame was heard that began at `sof_ns`: a start-up frame that has come back, or a device's frame of the IO exchange. Its

@@ -10,6 +10,8 @@ pub(crate) mod core_time;
 mod deliberate_panic;
 #[cfg(feature = "servowire-drivers")]
 mod drivers;
+#[cfg(feature = "servowire-drivers")]
+mod drv8711;
 #[cfg(feature = "hdsl")]
 mod hdsl;
 #[cfg(feature = "hdsl")]
@@ -27,6 +29,8 @@ pub(crate) mod nrz_line;
 mod rtex;
 #[cfg(feature = "sorte-proto")]
 mod sorte;
+#[cfg(feature = "step-motion")]
+mod step_motion;
 #[cfg(feature = "step-profile")]
 mod step_profile;
 #[cfg(feature = "tformat")]
@@ -61,6 +65,8 @@ pub(crate) const ALL: &[&[Kernel]] = &[
     rtex::KERNELS,
     #[cfg(feature = "sorte-proto")]
     sorte::KERNELS,
+    #[cfg(feature = "step-motion")]
+    step_motion::KERNELS,
     #[cfg(feature = "step-profile")]
     step_profile::KERNELS,
     #[cfg(feature = "tformat")]
@@ -69,6 +75,8 @@ pub(crate) const ALL: &[&[Kernel]] = &[
     tformat_ends::KERNELS,
     #[cfg(feature = "servowire-drivers")]
     drivers::KERNELS,
+    #[cfg(feature = "servowire-drivers")]
+    drv8711::KERNELS,
     #[cfg(feature = "deliberate-panic")]
     deliberate_panic::KERNELS,
 ];

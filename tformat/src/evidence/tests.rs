@@ -1,8 +1,10 @@
 use super::*;
+use crate::count::{Abm, Abs};
 use crate::message::{AllData, MultiTurn, SingleTurn};
 use crate::response::tests::exchanges;
-use crate::sample::Position;
+use crate::status::Almc;
 use proptest::prelude::*;
+use servowire_core::{Angle, Words};
 use std::string::ToString;
 use std::vec::Vec;
 
@@ -47,7 +49,6 @@ fn doubt(evidence: Evidence, policy: Policy) -> Option<Doubt> {
 fn a_position_without_doubt() {
     let sample = all(data(0, 0)).at(1_000, STRICT).unwrap();
     assert_eq!((sample.single_turn(), sample.turns(), sample.sampled_ns()), (0x12_3456, Some(-2), 1_000));
-    assert_eq!(sample.position(), Some(Position { single_turn: 0x12_3456, turns: -2 }));
     assert_eq!(sample.to_string(), "turn -2, 1193046 counts at 1000 ns");
     let without_turns = single(0, widths(23, 0)).at(1_000, STRICT).unwrap();
     assert_eq!((without_turns.single_turn(), without_turns.turns()), (7, Some(0)));
@@ -72,7 +73,7 @@ fn the_units_of_a_position() {
 fn a_single_turn_has_no_turns() {
     let without = |evidence: Evidence| {
         let sample = evidence.at(1_000, SINGLE_TURN).unwrap();
-        assert_eq!((sample.turns(), sample.position(), sample.counts()), (None, None, None));
+        assert_eq!((sample.turns(), sample.counts()), (None, None));
         sample.single_turn()
     };
     assert_eq!(without(all(data(0, 0))), 0x12_3456);

@@ -3,7 +3,7 @@ use servowire_core::Polling;
 use super::Step;
 use super::reset::mismatch;
 use crate::address::{Address, Page};
-use crate::error::Error;
+use crate::error::{Error, ErrorClass};
 use crate::message::Memory;
 use crate::request::Request;
 use crate::response::Response;
@@ -11,215 +11,206 @@ use crate::response::Response;
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 enum Phase {
+    /// The page register is read, before the cell is.
+    CheckBefore,
     /// The page is written to the register.
-    SelectPage,
-    /// The register is read back.
-    CheckPage,
+    Select,
     /// The byte is written.
     Write,
     /// The byte is read: because that is what was asked for, or to see what became of a write.
     Read,
+    /// The register is read again: the cell was that of the page.
+    CheckAfter,
 }
 
 /// What is known of a write that was sent, to the page register or to the cell.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
-struct Sent {
+enum Sent {
+    /// It was not sent, or reading has shown that it was not done.
+    Not,
     /// It may have been done, and nothing that was read tells.
-    unknown: bool,
+    Unknown,
     /// It was answered with its own data and without the busy flag.
-    confirmed: bool,
+    Confirmed,
 }
 
-impl Sent {
-    const NONE: Self = Self { unknown: false, confirmed: false };
-    const NOW: Self = Self { unknown: true, confirmed: false };
-}
-
-/// Reads or writes one EEPROM byte: selects the page if one is named and reads the register back, waits while the memory
-/// is busy, and reads a written byte back.
+/// Reads or writes one EEPROM byte of a page.
 ///
-/// The result is the byte read. A page is selected by naming it. After a response that is missing or refused the page
-/// register is read again before anything else: an encoder that has started anew is on page 0.
+/// An encoder that has started anew is on page 0 and does not say so. So the page register is read before and after every
+/// access; the page is selected if the register holds another one. A written byte is read back, and the access waits while
+/// the memory is busy. The result is the byte read.
 ///
 /// **No write is repeated without evidence that it was not done.** After a lost or refused response to a write, to the
-/// page register too, the cell is read: only if it holds another value is it written again. A memory that says that it
-/// is busy is asked by reading. If nothing can be read after a write has been sent, the access ends with
-/// [`Error::EffectUnknown`]. A response that is for another address is refused like one of another kind. Once done or failed
-/// it stays so, until it is started again.
+/// page register too, the cell is read: only if it holds another value, on the page that was named, is it written again. A
+/// memory that says that it is busy is asked by reading. It ends with [`Error::EffectUnknown`] if nothing can be read after a
+/// write has been sent, or if the register then holds another page: the write may have gone there. A response that is for
+/// another address is refused like one of another kind. Once done or failed it stays so, until it is started again.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct EepromAccess {
+    page: Page,
     address: Address,
     write: Option<u8>,
-    page: Option<Page>,
     polling: Polling,
     phase: Phase,
-    /// Requests of this phase and of the writes it looks after that had no success.
+    /// Requests without success since the page was found for the first time, or the write was taken.
     tries: u16,
-    /// The register has held the page that is named.
+    /// The register has held the page.
     on_page: bool,
-    /// The selection of the page; a response that is lost after it takes the confirmation away.
     selection: Sent,
-    /// The write to the cell; `None` as long as it has not been sent.
-    written: Option<Sent>,
+    written: Sent,
+    /// What the cell held.
+    value: u8,
     end: Option<Step<u8>>,
 }
 
 impl EepromAccess {
-    /// Reads the byte at `address`, on the page that is selected now if `page` is `None`.
-    pub const fn read(page: Option<Page>, address: Address, polling: Polling) -> Self {
-        Self::new(address, None, page, polling)
+    /// Reads the byte at `address` of `page`.
+    pub const fn read(page: Page, address: Address, polling: Polling) -> Self {
+        Self::new(page, address, None, polling)
     }
 
-    /// Writes `data` to `address`, then reads it back.
+    /// Writes `data` to `address` of `page`, then reads it back.
     ///
     /// Motor makers keep name plate and commutation data in this memory: know what is at the address.
-    pub const fn write(page: Option<Page>, address: Address, data: u8, polling: Polling) -> Self {
-        Self::new(address, Some(data), page, polling)
+    pub const fn write(page: Page, address: Address, data: u8, polling: Polling) -> Self {
+        Self::new(page, address, Some(data), polling)
     }
 
-    const fn new(address: Address, write: Option<u8>, page: Option<Page>, polling: Polling) -> Self {
+    const fn new(page: Page, address: Address, write: Option<u8>, polling: Polling) -> Self {
         Self {
+            page,
             address,
             write,
-            page,
             polling,
-            phase: Phase::Read,
+            phase: Phase::CheckBefore,
             tries: 0,
             on_page: false,
-            selection: Sent::NONE,
-            written: None,
+            selection: Sent::Not,
+            written: Sent::Not,
+            value: 0,
             end: None,
-        }
-    }
-
-    /// What is done on the page: the write, once; after that the cell is read.
-    const fn operation(&self) -> Phase {
-        match (self.write, self.written) {
-            (Some(_), None) => Phase::Write,
-            _ => Phase::Read,
         }
     }
 
     /// The first request, at once.
     pub const fn start(&mut self, now_ns: u64) -> Step<u8> {
-        *self = Self::new(self.address, self.write, self.page, self.polling);
-        let first = if self.page.is_some() { Phase::SelectPage } else { self.operation() };
-        self.enter(first, now_ns)
+        *self = Self::new(self.page, self.address, self.write, self.polling);
+        self.enter(Phase::CheckBefore, now_ns)
     }
 
-    /// A transaction ended with this outcome; the line is free from `ready_ns` on.
-    pub fn receive(&mut self, outcome: Result<Response, Error>, ready_ns: u64) -> Step<u8> {
-        let step = self.end.unwrap_or_else(|| self.next(outcome, ready_ns));
-        self.end = step.ended();
-        step
-    }
+    servowire_core::receive! { u8 }
 
     fn next(&mut self, outcome: Result<Response, Error>, ready_ns: u64) -> Step<u8> {
-        match self.memory(outcome) {
-            Ok(memory) => self.answered(memory, ready_ns),
-            Err(error) => self.lost(error, ready_ns),
+        let error = match self.memory(outcome) {
+            Ok(memory) if !memory.adf.busy() => return self.answered(memory.edf, ready_ns),
+            Ok(_) => {
+                // What is busy did not take a write.
+                match self.phase {
+                    Phase::Select => self.selection = Sent::Not,
+                    Phase::Write => self.written = Sent::Not,
+                    Phase::CheckBefore | Phase::Read | Phase::CheckAfter => {}
+                }
+                Error::Busy { tries: self.tries.saturating_add(1) }
+            }
+            Err(error) => error,
+        };
+        let not_before_ns = ready_ns.saturating_add(self.polling.interval_ns.into());
+        if self.is_given_up() {
+            return self.failed(error, not_before_ns);
         }
+        // What was read is read again, what was written is read first.
+        self.enter(
+            match self.phase {
+                Phase::Select => Phase::CheckBefore,
+                Phase::Write => Phase::Read,
+                read => read,
+            },
+            not_before_ns,
+        )
     }
 
     /// The response to the request that was sent last; all else is none.
     fn memory(&self, outcome: Result<Response, Error>) -> Result<Memory, Error> {
         let memory = match (outcome?, self.phase) {
-            (Response::WriteEeprom(memory), Phase::SelectPage | Phase::Write)
-            | (Response::ReadEeprom(memory), Phase::CheckPage | Phase::Read) => memory,
+            (Response::WriteEeprom(memory), Phase::Select | Phase::Write)
+            | (Response::ReadEeprom(memory), Phase::CheckBefore | Phase::Read | Phase::CheckAfter) => memory,
             (other, _) => return Err(mismatch(other, self.request())),
         };
         let (got, want) = (memory.adf.address(), self.cell());
         if got == want { Ok(memory) } else { Err(Error::AddressMismatch { got: got.get(), want: want.get() }) }
     }
 
-    fn answered(&mut self, memory: Memory, ready_ns: u64) -> Step<u8> {
-        if memory.adf.busy() {
-            // What is busy did not take a write.
-            match self.phase {
-                Phase::SelectPage => self.selection = Sent::NONE,
-                Phase::Write => self.written = Some(Sent::NONE),
-                Phase::CheckPage | Phase::Read => {}
-            }
-            return self.unclear(Error::Busy { tries: self.tries.saturating_add(1) }, self.looking(), ready_ns);
-        }
+    fn answered(&mut self, edf: u8, ready_ns: u64) -> Step<u8> {
+        let on_page = edf == self.page.get();
         match self.phase {
-            Phase::SelectPage => {
-                self.selection.confirmed = true;
-                self.enter(Phase::CheckPage, ready_ns)
+            Phase::Select => {
+                self.selection = Sent::Confirmed;
+                self.enter(Phase::CheckBefore, ready_ns)
             }
             Phase::Write => {
-                self.written = Some(Sent { unknown: true, confirmed: true });
+                self.written = Sent::Confirmed;
                 self.tries = 0;
                 self.enter(Phase::Read, ready_ns)
             }
-            Phase::CheckPage => self.page_is(memory, ready_ns),
-            Phase::Read => self.byte_is(memory, ready_ns),
-        }
-    }
-
-    /// No sound response: the encoder may have started anew since the page was looked at.
-    fn lost(&mut self, error: Error, ready_ns: u64) -> Step<u8> {
-        self.selection.confirmed = false;
-        let next = if self.page.is_some() { Phase::CheckPage } else { self.looking() };
-        self.unclear(error, next, ready_ns)
-    }
-
-    /// What was read is read again, what was written is read first.
-    const fn looking(&self) -> Phase {
-        match self.phase {
-            Phase::SelectPage | Phase::CheckPage => Phase::CheckPage,
-            Phase::Write | Phase::Read => Phase::Read,
-        }
-    }
-
-    /// The page register holds this.
-    fn page_is(&mut self, memory: Memory, ready_ns: u64) -> Step<u8> {
-        let want = self.page.map_or(0, Page::get);
-        let Sent { confirmed, .. } = core::mem::replace(&mut self.selection, Sent::NONE);
-        if memory.edf == want {
-            if !self.on_page {
-                self.on_page = true;
-                self.tries = 0;
+            Phase::Read => {
+                self.value = edf;
+                self.enter(Phase::CheckAfter, ready_ns)
             }
-            return self.enter(self.operation(), ready_ns);
+            Phase::CheckBefore if on_page => {
+                self.selection = Sent::Not;
+                if !self.on_page {
+                    self.on_page = true;
+                    self.tries = 0;
+                }
+                self.enter(if self.write.is_some() { Phase::Write } else { Phase::Read }, ready_ns)
+            }
+            Phase::CheckAfter if on_page => self.judge(ready_ns),
+            // The write may have gone to the other page.
+            Phase::CheckAfter if self.written != Sent::Not => {
+                Step::Failed { error: Error::EffectUnknown { because: ErrorClass::DataMismatch }, ready_ns }
+            }
+            Phase::CheckBefore | Phase::CheckAfter => {
+                let confirmed = core::mem::replace(&mut self.selection, Sent::Not) == Sent::Confirmed;
+                self.differs(
+                    Error::DataMismatch { got: edf, want: self.page.get() },
+                    confirmed,
+                    Phase::Select,
+                    ready_ns,
+                )
+            }
         }
-        self.differs(Error::DataMismatch { got: memory.edf, want }, confirmed, Phase::SelectPage, ready_ns)
     }
 
-    /// The cell holds this.
-    fn byte_is(&mut self, memory: Memory, ready_ns: u64) -> Step<u8> {
+    /// The cell of the page holds the value that was read.
+    fn judge(&mut self, ready_ns: u64) -> Step<u8> {
+        let Self { value, .. } = *self;
         match self.write {
-            Some(want) if memory.edf != want => {
-                let Sent { confirmed, .. } = self.written.replace(Sent::NONE).unwrap_or_default();
-                self.differs(Error::DataMismatch { got: memory.edf, want }, confirmed, Phase::Write, ready_ns)
+            Some(want) if value != want => {
+                let confirmed = core::mem::replace(&mut self.written, Sent::Not) == Sent::Confirmed;
+                self.differs(Error::DataMismatch { got: value, want }, confirmed, Phase::Write, ready_ns)
             }
-            _ => Step::Done { value: memory.edf, ready_ns },
+            _ => Step::Done { value, ready_ns },
         }
     }
 
     /// A write was not done: it shows. It is sent again unless the encoder had said that it took it.
     fn differs(&mut self, error: Error, confirmed: bool, again: Phase, ready_ns: u64) -> Step<u8> {
-        self.tries = self.tries.saturating_add(1);
-        if confirmed || self.tries >= self.polling.max_tries {
+        if confirmed || self.is_given_up() {
             return self.failed(error, ready_ns);
         }
         self.enter(again, ready_ns)
     }
 
-    /// Nothing new is known: `next` tells.
-    fn unclear(&mut self, error: Error, next: Phase, ready_ns: u64) -> Step<u8> {
+    /// Counts a request without success.
+    const fn is_given_up(&mut self) -> bool {
         self.tries = self.tries.saturating_add(1);
-        let not_before_ns = ready_ns.saturating_add(self.polling.interval_ns.into());
-        if self.tries >= self.polling.max_tries {
-            return self.failed(error, not_before_ns);
-        }
-        self.enter(next, not_before_ns)
+        self.tries >= self.polling.max_tries
     }
 
     fn failed(&self, error: Error, ready_ns: u64) -> Step<u8> {
-        let unknown = self.selection.unknown || self.written.is_some_and(|written| written.unknown);
+        let unknown = self.selection != Sent::Not || self.written != Sent::Not;
         let error = if unknown { Error::EffectUnknown { because: error.class() } } else { error };
         Step::Failed { error, ready_ns }
     }
@@ -227,17 +218,17 @@ impl EepromAccess {
     const fn enter(&mut self, phase: Phase, not_before_ns: u64) -> Step<u8> {
         self.phase = phase;
         match phase {
-            Phase::SelectPage => self.selection = Sent::NOW,
-            Phase::Write => self.written = Some(Sent::NOW),
-            Phase::CheckPage | Phase::Read => {}
+            Phase::Select => self.selection = Sent::Unknown,
+            Phase::Write => self.written = Sent::Unknown,
+            Phase::CheckBefore | Phase::Read | Phase::CheckAfter => {}
         }
         Step::Send { request: self.request(), not_before_ns }
     }
 
     const fn request(&self) -> Request {
-        match (self.phase, self.page, self.write) {
-            (Phase::SelectPage, Some(page), _) => Request::write_eeprom(self.cell(), page.get()),
-            (Phase::Write, _, Some(data)) => Request::write_eeprom(self.cell(), data),
+        match (self.phase, self.write) {
+            (Phase::Select, _) => Request::write_eeprom(self.cell(), self.page.get()),
+            (Phase::Write, Some(data)) => Request::write_eeprom(self.cell(), data),
             _ => Request::read_eeprom(self.cell()),
         }
     }
@@ -245,194 +236,11 @@ impl EepromAccess {
     /// What the request of this phase is about.
     const fn cell(&self) -> Address {
         match self.phase {
-            Phase::SelectPage | Phase::CheckPage => Address::PAGE_REGISTER,
+            Phase::CheckBefore | Phase::Select | Phase::CheckAfter => Address::PAGE_REGISTER,
             Phase::Write | Phase::Read => self.address,
         }
     }
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::ErrorClass;
-    use crate::address::Adf;
-
-    const ADDRESS: Address = Address::truncate(5);
-    const POLLING: Polling = Polling { interval_ns: 1000, max_tries: 3 };
-    const LOST: Result<Response, Error> = Err(Error::NoResponse { echo: false });
-
-    const fn memory(address: Address, busy: bool, edf: u8) -> Memory {
-        Memory { adf: Adf::answered(address, busy), edf }
-    }
-
-    const fn wrote(busy: bool, edf: u8) -> Response {
-        Response::WriteEeprom(memory(ADDRESS, busy, edf))
-    }
-
-    const fn read(busy: bool, edf: u8) -> Response {
-        Response::ReadEeprom(memory(ADDRESS, busy, edf))
-    }
-
-    fn send(request: Request, not_before_ns: u64) -> Step<u8> {
-        Step::Send { request, not_before_ns }
-    }
-
-    const WRITE: Request = Request::write_eeprom(ADDRESS, 0x5a);
-    const READ: Request = Request::read_eeprom(ADDRESS);
-    const SELECT: Request = Request::write_eeprom(Address::PAGE_REGISTER, 2);
-    const CHECK: Request = Request::read_eeprom(Address::PAGE_REGISTER);
-
-    #[test]
-    fn a_write_selects_the_page_checks_it_writes_and_reads_back() {
-        let mut access = EepromAccess::write(Page::new(2), ADDRESS, 0x5a, POLLING);
-        assert_eq!(access.start(0), send(SELECT, 0));
-        let selected = Ok(Response::WriteEeprom(memory(Address::PAGE_REGISTER, false, 2)));
-        assert_eq!(access.receive(selected, 10), send(CHECK, 10));
-        let page = Ok(Response::ReadEeprom(memory(Address::PAGE_REGISTER, false, 2)));
-        assert_eq!(access.receive(page, 15), send(WRITE, 15));
-        assert_eq!(access.receive(Ok(wrote(false, 0x5a)), 20), send(READ, 20));
-        assert_eq!(access.receive(Ok(read(true, 0)), 30), send(READ, 1030));
-        assert_eq!(access.receive(Ok(read(false, 0x5a)), 1040), Step::Done { value: 0x5a, ready_ns: 1040 });
-    }
-
-    /// An encoder that has no such page answers the selection and keeps another: nothing is written.
-    #[test]
-    fn a_page_that_does_not_come_is_an_error() {
-        let mut access = EepromAccess::write(Page::new(2), ADDRESS, 0x5a, POLLING);
-        let _ = access.start(0);
-        let _ = access.receive(Ok(Response::WriteEeprom(memory(Address::PAGE_REGISTER, false, 2))), 0);
-        let step = access.receive(Ok(Response::ReadEeprom(memory(Address::PAGE_REGISTER, false, 0))), 7);
-        assert_eq!(step, Step::Failed { error: Error::DataMismatch { got: 0, want: 2 }, ready_ns: 7 });
-    }
-
-    /// A selection while the memory is busy was not taken: the register shows it, and the page is selected again.
-    #[test]
-    fn a_busy_answer_to_a_selection_is_followed_by_reading_the_register() {
-        let mut access = EepromAccess::read(Page::new(2), ADDRESS, POLLING);
-        let _ = access.start(0);
-        let busy = access.receive(Ok(Response::WriteEeprom(memory(Address::PAGE_REGISTER, true, 2))), 0);
-        assert_eq!(busy, send(CHECK, 1000));
-        let other = access.receive(Ok(Response::ReadEeprom(memory(Address::PAGE_REGISTER, false, 0))), 1000);
-        assert_eq!(other, send(SELECT, 1000));
-    }
-
-    #[test]
-    fn a_byte_that_did_not_stick_is_an_error() {
-        let mut access = EepromAccess::write(None, ADDRESS, 0x5a, POLLING);
-        assert_eq!(access.start(0), send(WRITE, 0));
-        let _ = access.receive(Ok(wrote(false, 0x5a)), 0);
-        let step = access.receive(Ok(read(false, 0xff)), 7);
-        assert_eq!(step, Step::Failed { error: Error::DataMismatch { got: 0xff, want: 0x5a }, ready_ns: 7 });
-    }
-
-    /// After a lost response the cell is read; it is written again only if it holds another value.
-    #[test]
-    fn a_write_is_repeated_only_when_the_cell_differs() {
-        for holds in [0x5a, 0xff] {
-            let mut access = EepromAccess::write(None, ADDRESS, 0x5a, POLLING);
-            let _ = access.start(0);
-            assert_eq!(access.receive(LOST, 0), send(READ, 1000));
-            let step = access.receive(Ok(read(false, holds)), 1000);
-            let want = if holds == 0x5a { Step::Done { value: 0x5a, ready_ns: 1000 } } else { send(WRITE, 1000) };
-            assert_eq!(step, want);
-        }
-    }
-
-    /// Writing, reading, and no response at all.
-    #[test]
-    fn polling_is_bounded_and_says_what_is_known() {
-        let because = ErrorClass::NoResponse;
-        let mut access = EepromAccess::write(None, ADDRESS, 0x5a, POLLING);
-        let _ = access.start(0);
-        let _ = access.receive(LOST, 0);
-        let _ = access.receive(LOST, 0);
-        let end = access.receive(LOST, 0);
-        assert_eq!(end, Step::Failed { error: Error::EffectUnknown { because }, ready_ns: 1000 });
-
-        let mut access = EepromAccess::read(None, ADDRESS, POLLING);
-        let _ = access.start(0);
-        let _ = access.receive(Ok(read(true, 0)), 0);
-        let _ = access.receive(LOST, 0);
-        let end = access.receive(Ok(read(true, 0)), 0);
-        assert_eq!(end, Step::Failed { error: Error::Busy { tries: 3 }, ready_ns: 1000 });
-
-        // A write to a busy memory was not taken.
-        let mut access = EepromAccess::write(None, ADDRESS, 0x5a, Polling { max_tries: 1, ..POLLING });
-        let _ = access.start(0);
-        let end = access.receive(Ok(wrote(true, 0x5a)), 0);
-        assert_eq!(end, Step::Failed { error: Error::Busy { tries: 1 }, ready_ns: 1000 });
-    }
-
-    /// Two tries: the write whose response was lost, and the reading that shows that it was not done.
-    #[test]
-    fn a_write_is_not_repeated_beyond_the_tries() {
-        let mut access = EepromAccess::write(None, ADDRESS, 0x5a, Polling { max_tries: 2, ..POLLING });
-        let _ = access.start(0);
-        assert_eq!(access.receive(LOST, 0), send(READ, 1000));
-        let end = access.receive(Ok(read(false, 0xff)), 1000);
-        assert_eq!(end, Step::Failed { error: Error::DataMismatch { got: 0xff, want: 0x5a }, ready_ns: 1000 });
-    }
-
-    /// What was tried for the page does not count against the byte.
-    #[test]
-    fn each_phase_has_its_own_tries() {
-        let mut access = EepromAccess::read(Page::new(2), ADDRESS, POLLING);
-        let _ = access.start(0);
-        let _ = access.receive(LOST, 0);
-        let _ = access.receive(LOST, 0);
-        let page = Ok(Response::ReadEeprom(memory(Address::PAGE_REGISTER, false, 2)));
-        assert_eq!(access.receive(page, 0), send(READ, 0));
-        for _ in 0..2 {
-            assert_eq!(access.receive(LOST, 0), send(CHECK, 1000));
-            assert_eq!(access.receive(page, 1000), send(READ, 1000));
-        }
-        assert_eq!(access.receive(Ok(read(false, 7)), 9), Step::Done { value: 7, ready_ns: 9 });
-    }
-
-    /// A page that answers and a cell that does not: looking at the page does not count the tries anew.
-    #[test]
-    fn looking_at_the_page_again_does_not_go_on_for_ever() {
-        let mut access = EepromAccess::read(Page::new(2), ADDRESS, POLLING);
-        let page = Ok(Response::ReadEeprom(memory(Address::PAGE_REGISTER, false, 2)));
-        let mut step = access.start(0);
-        for requests in 1.. {
-            let Step::Send { request, .. } = step else { break };
-            assert!(requests <= 7, "a selection, and three times a page and a cell");
-            step = access.receive(if request == READ { LOST } else { page }, 0);
-        }
-        assert!(matches!(step, Step::Failed { error: Error::NoResponse { .. }, .. }), "{step:?}");
-    }
-
-    /// What another cell holds says nothing of this one, nor of the page register.
-    #[test]
-    fn responses_of_another_address_are_refused() {
-        let mut access = EepromAccess::write(Page::new(2), ADDRESS, 0x5a, POLLING);
-        let _ = access.start(0);
-        let elsewhere = |edf| Ok(Response::ReadEeprom(memory(Address::truncate(6), false, edf)));
-        assert_eq!(access.receive(Ok(wrote(false, 2)), 0), send(CHECK, 1000));
-        assert_eq!(access.receive(elsewhere(2), 0), send(CHECK, 1000));
-        let page = Ok(Response::ReadEeprom(memory(Address::PAGE_REGISTER, false, 2)));
-        assert_eq!(access.receive(page, 0), send(WRITE, 0));
-        assert_eq!(access.receive(Ok(wrote(false, 0x5a)), 0), send(READ, 0));
-        for edf in [0x5a, 0xff] {
-            assert_eq!(access.receive(elsewhere(edf), 0), send(CHECK, 1000));
-            assert_eq!(access.receive(page, 1000), send(READ, 1000));
-        }
-        let end = access.receive(elsewhere(0x5a), 0);
-        let because = ErrorClass::AddressMismatch;
-        assert_eq!(end, Step::Failed { error: Error::EffectUnknown { because }, ready_ns: 1000 });
-        let mut access = EepromAccess::read(None, ADDRESS, Polling { max_tries: 1, ..POLLING });
-        let _ = access.start(0);
-        let error = Error::AddressMismatch { got: 6, want: 5 };
-        assert_eq!(access.receive(elsewhere(7), 0), Step::Failed { error, ready_ns: 1000 });
-    }
-
-    /// A read is never taken for the response to a write, nor the other way round.
-    #[test]
-    fn responses_of_the_other_kind_are_refused() {
-        let mut access = EepromAccess::write(None, ADDRESS, 0x5a, POLLING);
-        let _ = access.start(0);
-        assert_eq!(access.receive(Ok(read(false, 0x5a)), 0), send(READ, 1000));
-        assert_eq!(access.receive(Ok(wrote(false, 0x5a)), 0), send(READ, 1000));
-    }
-}
+mod tests;

@@ -23,8 +23,8 @@ pub struct Line {
     /// [latency budget](Self::latency_budget_ns) goes with it.
     pub turn_around_ns: u32,
     /// Longest time from the end of a byte on the line to its hand-over to the master, in ns: the latency of the
-    /// interrupt, or the size of a DMA block and the time after which an idle line is reported. Default the
-    /// [latency budget](Self::latency_budget_ns).
+    /// interrupt, or the size of a DMA block and the time after which an idle line is reported. Default just below the
+    /// turn-around and one field, 5 599 or 2 799: so late an echo is still told by its time.
     pub hand_over_ns: u32,
     /// Time for which the driver is on before the start bit of the request, in ns. Default 1 000, the least that one
     /// driver asks for; TI's design does with one bit.
@@ -37,18 +37,17 @@ pub struct Line {
 impl Line {
     /// A line without echo and with the default times.
     pub const fn new(rate: BitRate) -> Self {
-        let line = Self {
+        let turn_around_ns = rate.bit_ns().saturating_mul(4);
+        Self {
             rate,
             echo: false,
             response_timeout_ns: 10_000,
             field_timeout_ns: rate.bit_ns().saturating_mul(15),
-            turn_around_ns: rate.bit_ns().saturating_mul(4),
-            hand_over_ns: 0,
+            turn_around_ns,
+            hand_over_ns: turn_around_ns.saturating_add(rate.fields_ns(1)).saturating_sub(1),
             driver_lead_ns: 1_000,
             sampling_ns: 480,
-        };
-        let hand_over_ns = line.latency_budget_ns();
-        Self { hand_over_ns, ..line }
+        }
     }
 
     servowire_core::builder! {
@@ -61,12 +60,19 @@ impl Line {
         with_sampling_ns: sampling_ns, u32;
     }
 
-    /// By how much the end time that the master is told may lie after the end of the byte on the line, in ns: just
-    /// below the turn-around and one field, 5.599 us at 2.5 Mbit/s and 2.799 us at 5 Mbit/s by default.
+    /// Whether a response can come at all: it has to begin after the turn-around and before the time-out, and its fields last
+    /// as long as fields do.
+    pub(super) const fn leaves_time(&self) -> bool {
+        self.turn_around_ns <= self.response_timeout_ns && self.field_timeout_ns >= self.rate.fields_ns(1)
+    }
+
+    /// By how much the end time that the master is told may lie after the end of the byte on the line, in ns: a bit less than
+    /// the turn-around, 1.2 us at 2.5 Mbit/s and 0.6 us at 5 Mbit/s by default.
     ///
-    /// Within it no byte of the own request, and nothing that was on the line before, is taken for a response. A block
-    /// may be handed over at any later time, as long as it is told when it ended.
+    /// Within it no response that began before the request had left the line, or within a bit after it, is taken. A block may be
+    /// handed over at any later time, as long as it is told when it ended. The own request is told by its time up to the
+    /// turn-around and one field.
     pub const fn latency_budget_ns(self) -> u32 {
-        self.turn_around_ns.saturating_add(self.rate.fields_ns(1)).saturating_sub(1)
+        self.turn_around_ns.saturating_sub(self.rate.bit_ns())
     }
 }

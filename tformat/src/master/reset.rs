@@ -13,25 +13,20 @@ use crate::status::StatusField;
 /// or a damaged one starts the count again is not said either.
 ///
 /// The ten requests are one act. Clearing errors (ID 7) can do no harm twice: a refused response starts the count again,
-/// and the third ends it. ID 8 and ID C are **never sent again by themselves**: after a refused or lost response they
-/// end with
-///
-/// * [`Error::NotDone`] if fewer than ten requests can have been taken;
-/// * [`Error::EffectUnknown`] otherwise.
+/// and the third ends it. ID 8 and ID C are **never sent again by themselves**: a refused or lost response ends them with
+/// [`Error::EffectUnknown`], for the encoder counts requests, whoever sent them and whenever. Nine that were left in it by an
+/// attempt that was broken off, and one more, are ten.
 ///
 /// A response whose CA0 or CA1 says that the request was damaged is a refused one: the encoder has not counted it.
 ///
-/// Once done or failed it stays so. The value keeps count if it is started again, so that the requests of an attempt that
-/// was broken off are not forgotten. Confirm the effect by reading ID 3 afterwards; [`SingleTurnZero`](super::SingleTurnZero)
-/// does it for ID 8 and [`MultiTurnZero`](super::MultiTurnZero) for ID C.
+/// Confirm the effect by reading ID 3 afterwards; [`SingleTurnZero`](super::SingleTurnZero) does it for ID 8 and
+/// [`MultiTurnZero`](super::MultiTurnZero) for ID C, after whatever has happened before.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Reset {
     request: Request,
     answered: u8,
     refused: u8,
-    /// Requests that the encoder may have taken since the last effect that is known.
-    taken: u8,
     end: Option<Step<SingleTurn>>,
 }
 
@@ -64,7 +59,7 @@ impl Reset {
     }
 
     const fn of(request: Request) -> Self {
-        Self { request, answered: 0, refused: 0, taken: 0, end: None }
+        Self { request, answered: 0, refused: 0, end: None }
     }
 
     /// The data ID that is sent.
@@ -85,12 +80,7 @@ impl Reset {
         self.send(now_ns)
     }
 
-    /// A transaction ended with this outcome; the line is free from `ready_ns` on.
-    pub fn receive(&mut self, outcome: Result<Response, Error>, ready_ns: u64) -> Step<SingleTurn> {
-        let step = self.end.unwrap_or_else(|| self.next(outcome, ready_ns));
-        self.end = step.ended();
-        step
-    }
+    servowire_core::receive! { SingleTurn }
 
     fn next(&mut self, outcome: Result<Response, Error>, ready_ns: u64) -> Step<SingleTurn> {
         let spaced_ns = ready_ns.saturating_add(Self::SPACING_NS.into());
@@ -108,13 +98,10 @@ impl Reset {
         if self.answered < Self::REQUESTS {
             return self.send(spaced_ns);
         }
-        // An encoder that had started its count again in between still counts.
-        self.taken = Self::REQUESTS.saturating_sub(1);
         Step::Done { value, ready_ns: ready_ns.saturating_add(self.wait_ns()) }
     }
 
-    const fn send(&mut self, not_before_ns: u64) -> Step<SingleTurn> {
-        self.taken = self.taken.saturating_add(1);
+    const fn send(&self, not_before_ns: u64) -> Step<SingleTurn> {
         Step::Send { request: self.request, not_before_ns }
     }
 
@@ -135,12 +122,8 @@ impl Reset {
             }
             return Step::Failed { error, ready_ns: spaced_ns };
         }
-        let because = error.class();
-        if self.taken < Self::REQUESTS {
-            return Step::Failed { error: Error::NotDone { sent: self.taken, because }, ready_ns: spaced_ns };
-        }
         let stored_ns = spaced_ns.max(ready_ns.saturating_add(self.wait_ns()));
-        Step::Failed { error: Error::EffectUnknown { because }, ready_ns: stored_ns }
+        Step::Failed { error: Error::EffectUnknown { because: error.class() }, ready_ns: stored_ns }
     }
 }
 
@@ -215,7 +198,7 @@ mod tests {
         }
     }
 
-    /// One lost response ends ID 8 and ID C: nine requests cannot have had an effect, ten may have.
+    /// One lost response ends ID 8 and ID C, the first one too: what the encoder had counted before is not known.
     #[test]
     fn what_cannot_be_undone_is_not_sent_again() {
         for lost in 1..=10 {
@@ -232,45 +215,23 @@ mod tests {
                     let _ = reset.receive(Ok(response), 0);
                 }
                 let because = crate::ErrorClass::NoResponse;
-                let want = match lost {
-                    10 => Step::Failed { error: Error::EffectUnknown { because }, ready_ns: wait },
-                    sent => Step::Failed { error: Error::NotDone { sent, because }, ready_ns: 40_000 },
-                };
+                let want = Step::Failed { error: Error::EffectUnknown { because }, ready_ns: wait };
                 assert_eq!(reset.receive(LOST, 0), want);
             }
         }
     }
 
+    /// Three refused responses end clearing errors, each time that it is started.
     #[test]
-    fn the_requests_of_a_broken_attempt_are_not_forgotten() {
-        let mut reset = Reset::set_single_turn_zero_and_shift_commutation_angle();
-        let _ = reset.start(0);
-        for _ in 1..6 {
-            let _ = reset.receive(Ok(Response::SetSingleTurnZero(SINGLE)), 0);
+    fn each_start_counts_its_own_refusals() {
+        let mut reset = Reset::clear_errors();
+        for _ in 0..2 {
+            let _ = reset.start(0);
+            for _ in 0..2 {
+                assert!(matches!(reset.receive(LOST, 0), Step::Send { .. }));
+            }
+            assert!(matches!(reset.receive(LOST, 0), Step::Failed { .. }));
         }
-        let sixth = reset.receive(LOST, 0);
-        assert!(matches!(sixth, Step::Failed { error: Error::NotDone { sent: 6, .. }, .. }), "{sixth:?}");
-        let _ = reset.start(0);
-        for _ in 1..4 {
-            let _ = reset.receive(Ok(Response::SetSingleTurnZero(SINGLE)), 0);
-        }
-        let tenth = reset.receive(LOST, 0);
-        assert!(matches!(tenth, Step::Failed { error: Error::EffectUnknown { .. }, .. }), "{tenth:?}");
-    }
-
-    /// Ten responses do not prove the effect: noise may have made the encoder start its count again.
-    #[test]
-    fn after_ten_responses_an_encoder_may_still_count() {
-        let mut reset = Reset::clear_turns_and_lose_multi_turn_reference();
-        let _ = reset.start(0);
-        for _ in 0..9 {
-            let _ = reset.receive(Ok(Response::ResetTurnsAndErrors(SINGLE)), 0);
-        }
-        let tenth = reset.receive(Ok(Response::ResetTurnsAndErrors(SINGLE)), 0);
-        assert!(matches!(tenth, Step::Done { .. }));
-        let _ = reset.start(0);
-        let first = reset.receive(LOST, 0);
-        assert!(matches!(first, Step::Failed { error: Error::EffectUnknown { .. }, .. }), "{first:?}");
     }
 
     /// A refusal is no evidence: it may answer noise on the line, and the tenth request was taken all the same.

@@ -1,11 +1,12 @@
 use super::Line;
+use crate::data_id::DataId;
 use crate::error::Error;
 use crate::evidence::Evidence;
 use crate::frame::Frame;
 use crate::message::CF3;
 use crate::request::Request;
 use crate::resolution::Resolution;
-use crate::response::{Response, expected_fields};
+use crate::response::Response;
 
 /// A response with all checks passed, and when its position was taken.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -60,28 +61,39 @@ pub struct DriverOff {
 /// pauses between fields, wait for a silent line besides.
 pub type Progress<T = Exchange> = servowire_core::Progress<T, Error>;
 
-/// Longest request and longest response in bytes.
-const MAX_BYTES: usize = 4 + Frame::MAX_FIELDS;
-
 /// One request and its response, as a UART receives them: byte by byte, or in blocks.
 ///
-/// No byte that began before the request had left the line is ever part of the response, as long as the end times that
-/// the machine is told are late by less than the [latency budget](Line::latency_budget_ns). An echo of the request is
-/// known by its time; in a block it is known by its place, counted back from the end, and by its content.
+/// Every byte of a block is placed by counting back from its end. No byte that began before the request had left the line is
+/// ever part of the response, as long as the end times that the machine is told are late by less than the
+/// [latency budget](Line::latency_budget_ns). An echo of the request is known by its time, and where that does not tell, by its
+/// content. What stands before or after a sound response costs nothing; two sound responses in one block are
+/// [`Error::TwoResponses`].
 ///
 /// Once done or failed it stays so: until `ready_ns` go on to give it what arrives, and it is thrown away.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Transaction {
     request: Request,
+    frame: Frame,
     line: Line,
+    /// The control field of the request and of its response, and how many fields that has.
+    cf: u8,
+    fields: u8,
     start_ns: u64,
+    /// The end of the request's last bit.
+    asked_ns: u64,
+    /// When the first field of a response has ended at the earliest.
+    earliest_ns: u64,
     /// What may be the response.
-    received: [u8; MAX_BYTES],
+    received: [u8; Frame::MAX_FIELDS],
     len: u8,
     /// Bytes of the own request that came back, and the first that came back as another.
     echoed: u8,
     echo_fault: Option<u8>,
+    /// Why the first bytes that were as many as a response has were none.
+    refused: Option<Error>,
+    /// End of the last byte.
+    heard_ns: u64,
     until_ns: u64,
     /// When the last field of the longest response is handed over at the latest: a line that does not fall silent is not
     /// listened to any longer.
@@ -91,35 +103,42 @@ pub struct Transaction {
 
 impl Transaction {
     /// Begins a transaction; the start bit of the request is on the line at `start_ns`.
+    ///
+    /// On a line whose settings leave no time for a response it fails at once with [`Error::Line`], and nothing is to be sent.
     pub fn start(request: Request, line: Line, start_ns: u64) -> Self {
-        let transaction = Self {
+        let frame = request.emit();
+        let asked_ns = start_ns.saturating_add(line.rate.fields_ns(frame.fields()).into());
+        let field_ns = u64::from(line.rate.fields_ns(1));
+        let wait_ns = u64::from(line.response_timeout_ns).saturating_add(line.hand_over_ns.into());
+        let waited_ns = asked_ns.saturating_add(wait_ns);
+        let fields_ns = u64::from(line.field_timeout_ns).saturating_mul(Frame::MAX_FIELDS as u64);
+        let id = request.data_id();
+        Self {
             request,
+            frame,
             line,
+            cf: id.control_field().get(),
+            fields: id.response_fields(),
             start_ns,
-            received: [0; MAX_BYTES],
+            asked_ns,
+            earliest_ns: asked_ns.saturating_add(line.turn_around_ns.into()).saturating_add(field_ns),
+            received: [0; Frame::MAX_FIELDS],
             len: 0,
             echoed: 0,
             echo_fault: None,
-            until_ns: 0,
-            latest_ns: 0,
-            end: None,
-        };
-        let wait_ns = u64::from(line.response_timeout_ns).saturating_add(line.hand_over_ns.into());
-        let waited_ns = transaction.request_end_ns().saturating_add(wait_ns);
-        let fields_ns = u64::from(line.field_timeout_ns).saturating_mul(Frame::MAX_FIELDS as u64);
-        Self {
-            until_ns: waited_ns.saturating_add(transaction.fields_ns(1)),
+            refused: None,
+            heard_ns: asked_ns,
+            until_ns: waited_ns.saturating_add(field_ns),
             latest_ns: waited_ns.saturating_add(fields_ns),
-            ..transaction
+            end: if line.leaves_time() { None } else { Some((Err(Error::Line), start_ns)) },
         }
     }
 
     /// The fields to send, and when.
     pub const fn transmission(&self) -> Transmission {
-        let Self { request, line, start_ns, .. } = *self;
-        let end_ns = self.request_end_ns();
+        let Self { frame, line, start_ns, asked_ns: end_ns, .. } = *self;
         Transmission {
-            frame: request.emit(),
+            frame,
             start_ns,
             end_ns,
             driver_on_ns: start_ns.saturating_sub(line.driver_lead_ns as u64),
@@ -129,38 +148,46 @@ impl Transaction {
 
     /// Bytes were received one after the other, the delimiter of the last one at `end_ns` or, within the latency
     /// budget, before.
+    ///
+    /// A pause in a block shifts what stands before it: hand over separately what a pause as long as the request and four
+    /// fields divides, 20 us at 2.5 Mbit/s.
     pub fn hear(&mut self, bytes: &[u8], end_ns: u64) -> Progress {
         if self.end.is_some() || bytes.is_empty() {
             return self.progress();
         }
-        for byte in bytes {
-            self.push(*byte);
+        let (mut rest, mut found) = (bytes, None);
+        while let [byte, after @ ..] = rest {
+            rest = after;
+            self.take(*byte, end_ns.saturating_sub(self.fields_ns(after.len())), after, &mut found);
         }
-        self.drop_earlier(end_ns);
-        self.drop_echo_by_content();
-        // The response ends where the block ends: what is too much was there before.
-        while self.len > self.expected() {
-            self.drop_front();
-        }
-        if self.len > 0 {
-            let patience = self.line.field_timeout_ns.saturating_add(self.line.hand_over_ns);
-            self.until_ns = end_ns.saturating_add(patience.into()).min(self.latest_ns);
-        }
-        if self.len == self.expected() {
-            self.finish(end_ns);
+        self.heard_ns = end_ns;
+        match (found, self.refused) {
+            (Some(outcome), _) => self.finish(outcome),
+            (None, Some(error)) if self.len == 0 => self.finish(Err(error)),
+            (None, _) if self.len > 0 => {
+                let patience = self.line.field_timeout_ns.saturating_add(self.line.hand_over_ns);
+                self.until_ns = end_ns.saturating_add(patience.into()).min(self.latest_ns).max(self.until_ns);
+            }
+            (None, _) => {}
         }
         self.progress()
     }
 
     /// The UART reports a framing error for the byte that ended at `end_ns`.
     ///
-    /// In a response it ends the transaction with [`Error::Delimiter`]; in the echo it is only remembered.
+    /// In a response it ends the transaction with [`Error::Delimiter`]. Before one it is only remembered: the response may
+    /// still come.
     pub fn framing_error(&mut self, end_ns: u64) -> Progress {
         if self.end.is_none() {
-            if self.is_earlier(end_ns, 1) {
+            self.heard_ns = end_ns;
+            if end_ns < self.earliest_ns {
                 self.echo_fault = self.echo_fault.or(Some(0));
             } else {
-                self.fail(Error::Delimiter { field: self.len }, end_ns);
+                let error = Error::Delimiter { field: self.len };
+                self.refused = self.refused.or(Some(error));
+                if self.len > 0 || end_ns > self.until_ns {
+                    self.finish(Err(error));
+                }
             }
         }
         self.progress()
@@ -169,7 +196,7 @@ impl Transaction {
     /// Ends the transaction if its time is over.
     pub fn poll(&mut self, now_ns: u64) -> Progress {
         if self.end.is_none() && now_ns > self.until_ns {
-            self.finish(self.until_ns);
+            self.give_up();
         }
         self.progress()
     }
@@ -183,99 +210,141 @@ impl Transaction {
         }
     }
 
-    /// The end of the request's last bit.
-    const fn request_end_ns(&self) -> u64 {
-        self.start_ns.saturating_add(self.fields_ns(self.request.data_id().request_fields()))
+    fn fields_ns(&self, fields: usize) -> u64 {
+        u64::from(self.line.rate.fields_ns(1)).saturating_mul(fields as u64)
     }
 
-    const fn fields_ns(&self, fields: u8) -> u64 {
-        self.line.rate.fields_ns(fields) as u64
-    }
-
-    /// Fields of the response that begins with the first byte there is.
-    fn expected(&self) -> u8 {
-        let [cf, ..] = self.received;
-        expected_fields(self.request.data_id(), cf)
-    }
-
-    fn push(&mut self, byte: u8) {
-        if usize::from(self.len) == MAX_BYTES {
-            self.drop_front();
+    /// One byte more, which ended at `ended_ns` at the latest; these came after it in the same block.
+    fn take(&mut self, byte: u8, ended_ns: u64, after: &[u8], found: &mut Option<Result<Exchange, Error>>) {
+        if ended_ns < self.earliest_ns {
+            return self.early(byte);
+        }
+        if self.len == 1 && self.contradicts(byte) {
+            self.forget_echo();
         }
         if let Some(place) = self.received.get_mut(usize::from(self.len)) {
             *place = byte;
             self.len = self.len.saturating_add(1);
         }
-    }
-
-    fn drop_front(&mut self) {
-        self.received.rotate_left(1);
-        self.len = self.len.saturating_sub(1);
-    }
-
-    /// Whether the first of `fields` fields that end at `end_ns` began before a response can begin.
-    fn is_earlier(&self, end_ns: u64, fields: u8) -> bool {
-        let earliest = self.request_end_ns().saturating_add(self.line.turn_around_ns.into());
-        end_ns < earliest.saturating_add(self.fields_ns(fields))
-    }
-
-    /// Drops what began before a response can begin: the echo, and what was on the line before.
-    fn drop_earlier(&mut self, end_ns: u64) {
-        while self.len > 0 && self.is_earlier(end_ns, self.len) {
-            let [got, ..] = self.received;
-            match self.request.emit().as_bytes().get(usize::from(self.echoed)) {
-                Some(want) if *want == got => self.echoed = self.echoed.saturating_add(1),
-                Some(_) => self.echo_fault = self.echo_fault.or(Some(got)),
-                None => {}
-            }
-            self.drop_front();
+        if self.len >= self.expected() {
+            self.judge(ended_ns, after, found);
         }
     }
 
-    /// Drops an echo whose time does not tell: the request, and a control field after it.
-    ///
-    /// No response begins like that: in place of SF there would be a control field, whose low bits are never 0 as the
-    /// information bits of SF are; and EDF and CRC of an EEPROM response cannot both be right.
-    fn drop_echo_by_content(&mut self) {
-        let sent = self.request.emit();
-        let cf = sent.as_bytes().first().copied().unwrap_or(0);
+    /// What began before a response can begin: the echo, and what was on the line before.
+    fn early(&mut self, got: u8) {
+        self.len = 0;
+        match self.frame.as_bytes().get(usize::from(self.echoed)) {
+            Some(want) if *want == got => self.echoed = self.echoed.saturating_add(1),
+            Some(_) => self.echo_fault = self.echo_fault.or(Some(got)),
+            None => {}
+        }
+    }
+
+    /// Fields of the response that begins with the first byte there is.
+    const fn expected(&self) -> u8 {
+        let [cf, ..] = self.received;
+        if cf == CF3 { DataId::ReadAll.response_fields() } else { self.fields }
+    }
+
+    const fn begins_a_response(&self, byte: u8) -> bool {
+        byte == self.cf || byte == CF3
+    }
+
+    /// Whether this byte after the first shows that the first was the end of an echo: in place of SF there is a control field,
+    /// whose low bits are never 0 as the information bits of SF are.
+    const fn contradicts(&self, second: u8) -> bool {
+        let [cf, ..] = self.received;
+        let eeprom = matches!(self.request.data_id(), DataId::ReadEeprom | DataId::WriteEeprom);
+        (cf == CF3 || !eeprom) && self.begins_a_response(second)
+    }
+
+    /// The first byte was the last one of the own request.
+    fn forget_echo(&mut self) {
+        let [first, ..] = self.received;
+        if self.frame.as_bytes().last() == Some(&first) {
+            self.echoed = self.frame.fields();
+        }
+        self.len = 0;
+    }
+
+    /// The bytes are as many as a response has.
+    fn judge(&mut self, ended_ns: u64, after: &[u8], found: &mut Option<Result<Exchange, Error>>) {
+        while self.len > 0 && self.len >= self.expected() {
+            let heard = self.received.get(..usize::from(self.len)).unwrap_or(&self.received);
+            // A response to a write repeats it: the first of two is the echo.
+            if heard == self.frame.as_bytes() && is_sound(&Response::parse(self.request, after)) {
+                self.echoed = self.frame.fields();
+                self.len = 0;
+                return;
+            }
+            let fresh = ended_ns.saturating_sub(self.fields_ns(heard.len().saturating_sub(1))) >= self.earliest_ns;
+            match Response::parse(self.request, heard) {
+                outcome if fresh && is_sound(&outcome) => {
+                    let began_ns = ended_ns.saturating_sub(self.fields_ns(heard.len()));
+                    let sampled_ns = self.asked_ns.saturating_add(self.line.sampling_ns.into());
+                    let outcome = outcome.map(|response| Exchange { response, sampled_ns, began_ns });
+                    *found = Some(if found.is_some() { Err(Error::TwoResponses) } else { outcome });
+                    self.len = 0;
+                }
+                outcome => {
+                    self.refused = self.refused.or(outcome.err());
+                    self.drop_first();
+                }
+            }
+        }
+    }
+
+    /// Drops the first byte, and all up to the next with which a response may begin.
+    #[cold]
+    fn drop_first(&mut self) {
+        loop {
+            self.received.rotate_left(1);
+            self.len = self.len.saturating_sub(1);
+            let [first, second, ..] = self.received;
+            if self.len == 0 || self.begins_a_response(first) && !(self.len > 1 && self.contradicts(second)) {
+                break;
+            }
+        }
+    }
+
+    /// No more will come.
+    #[cold]
+    fn give_up(&mut self) {
         let heard = self.received.get(..usize::from(self.len)).unwrap_or(&self.received);
-        let echo = heard.strip_prefix(sent.as_bytes()).and_then(<[u8]>::first);
-        if echo.is_some_and(|next| *next == cf || *next == CF3) {
-            self.echoed = sent.fields();
-            for _ in 0..sent.fields() {
-                self.drop_front();
+        let error = match (self.refused, heard, self.echo_fault) {
+            (Some(error), ..) => error,
+            (None, [], Some(got)) if self.line.echo => {
+                let want = self.frame.as_bytes().get(usize::from(self.echoed)).copied().unwrap_or(0);
+                Error::EchoMismatch { at: self.echoed, got, want }
             }
-        }
-    }
-
-    /// The response is whole, or no more of it will come.
-    fn finish(&mut self, end_ns: u64) {
-        let bytes = self.received.get(..usize::from(self.len)).unwrap_or(&self.received);
-        let outcome = match (bytes, self.echo_fault) {
-            ([], Some(got)) if self.line.echo => {
-                let want = self.request.emit().as_bytes().get(usize::from(self.echoed)).copied().unwrap_or(0);
-                Err(Error::EchoMismatch { at: self.echoed, got, want })
-            }
-            ([], _) => Err(Error::NoResponse { echo: self.echoed == self.request.data_id().request_fields() }),
-            (bytes, _) => Response::parse(self.request, bytes),
+            (None, [], _) => Error::NoResponse { echo: self.echoed == self.frame.fields() },
+            (None, heard, _) => match Response::parse(self.request, heard) {
+                Err(error) => error,
+                // Never: there are fewer bytes than a response has.
+                Ok(_) => Error::NoResponse { echo: false },
+            },
         };
-        match outcome {
-            Ok(response) => {
-                let sampled_ns = self.request_end_ns().saturating_add(self.line.sampling_ns.into());
-                let began_ns = end_ns.saturating_sub(self.fields_ns(self.len));
-                self.end = Some((Ok(Exchange { response, sampled_ns, began_ns }), end_ns));
-            }
-            Err(error) => self.fail(error, end_ns),
+        let mut found = None;
+        while self.len > 0 && found.is_none() {
+            self.drop_first();
+            self.judge(self.heard_ns, &[], &mut found);
         }
+        self.finish(found.unwrap_or(Err(error)));
     }
 
-    /// Ends with an error: the longest response, begun as late as it may, is over at `ready_ns`.
-    fn fail(&mut self, error: Error, end_ns: u64) {
-        let latest = self.request_end_ns().saturating_add(self.line.response_timeout_ns.into());
-        let drained_ns = latest.saturating_add(self.fields_ns(11));
-        self.end = Some((Err(error), drained_ns.max(end_ns)));
+    /// Ends. After an error the line is free when the longest response, begun as late as it may, is over.
+    fn finish(&mut self, outcome: Result<Exchange, Error>) {
+        let over_ns = self.asked_ns.saturating_add(self.line.response_timeout_ns.into());
+        let drained_ns = over_ns.saturating_add(self.fields_ns(Frame::MAX_FIELDS));
+        let ready_ns = if outcome.is_ok() { self.heard_ns } else { drained_ns.max(self.heard_ns) };
+        self.end = Some((outcome, ready_ns));
     }
+}
+
+/// Whether a response came whole, a refusal too.
+const fn is_sound(outcome: &Result<Response, Error>) -> bool {
+    matches!(outcome, Ok(_) | Err(Error::Rejected { .. }))
 }
 
 servowire_core::machine!(Transaction { Transmission, [u8] => Exchange, Error });

@@ -17,10 +17,13 @@ use crate::response::Response;
 /// in general and 0 if the shaft is known to stand elsewhere. The result is the count read afterwards, within the tolerance
 /// of 0. Otherwise it ends with
 ///
-/// * [`Error::NotDone`]: ID C was not sent often enough, or the count is what it was before;
-/// * [`Error::EffectUnknown`]: the count could not be read, or it says nothing because it was at 0 before, or near it.
+/// * [`Error::NotDone`]: the count is what it was before;
+/// * [`Error::EffectUnknown`]: the count could not be read afterwards, or it says nothing: it was at 0 before, or near it, or is
+///   neither there nor where it was;
+/// * the error of the exchange, if the count could not be read before: nothing was sent.
 ///
-/// ID C is sent at most ten times. Once done or failed it stays so, until it is started again. Whether the errors are gone is to be seen by ID 3.
+/// It judges by the two counts alone, so it may begin after any past. ID C is sent at most ten times. Once done or failed it
+/// stays so, until it is started again. Whether the errors are gone is to be seen by ID 3.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct MultiTurnZero {
@@ -37,7 +40,7 @@ impl MultiTurnZero {
     /// `tolerance`: how far from 0, in turns, the count may be afterwards.
     pub const fn set_and_lose_multi_turn_reference(resolution: Resolution, tolerance: u32) -> Self {
         let reset = Reset::clear_turns_and_lose_multi_turn_reference();
-        let witness = Witness::new(reset, Request::ReadMultiTurn, Reset::ZERO_WAIT_NS);
+        let witness = Witness::new(reset, Request::ReadMultiTurn);
         Self { resolution, tolerance, witness, end: None }
     }
 
@@ -114,8 +117,9 @@ mod tests {
         for after in [0, 1, 0xffff] {
             assert!(matches!(run(700, 0, Some(after)).0, Step::Done { value, .. } if value == multi(after)));
         }
+        // Neither 0 nor what it was: something has happened.
         for after in [2, 0xfffe] {
-            assert!(matches!(run(700, 0, Some(after)).0, Step::Failed { error: Error::NotDone { sent: 10, .. }, .. }));
+            assert!(matches!(run(700, 0, Some(after)).0, Step::Failed { error: Error::EffectUnknown { .. }, .. }));
         }
     }
 
@@ -126,10 +130,11 @@ mod tests {
             assert!(matches!(step, Step::Failed { error: Error::NotDone { sent: 10, .. }, .. }), "{step:?}");
             assert_eq!(sent, 10);
         }
-        // Nine requests have no effect: nothing is read.
-        let (step, sent) = run(700, 9, Some(0));
+        let (step, sent) = run(700, 9, Some(700));
         assert!(matches!(step, Step::Failed { error: Error::NotDone { sent: 9, .. }, .. }), "{step:?}");
         assert_eq!(sent, 9);
+        // One request, and nine that somebody else had left in the encoder.
+        assert!(matches!(run(700, 1, Some(0)), (Step::Done { .. }, 1)));
     }
 
     /// After a lost response, turns that were near 0 before say nothing, nor does another count than before.
@@ -150,8 +155,7 @@ mod tests {
     #[test]
     fn a_count_that_is_too_wide_says_nothing() {
         let (step, sent) = run(0x1_0000, 0, Some(0));
-        let because = ErrorClass::UpperBits;
-        assert!(matches!(step, Step::Failed { error: Error::NotDone { sent: 0, because: got }, .. } if got == because));
+        assert!(matches!(step, Step::Failed { error: Error::UpperBits { .. }, .. }), "{step:?}");
         assert_eq!(sent, 0);
     }
 }

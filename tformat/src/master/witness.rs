@@ -1,6 +1,7 @@
 use super::reset::mismatch;
 use super::{Reset, Step};
 use crate::error::{Error, ErrorClass};
+use crate::message::SingleTurn;
 use crate::request::Request;
 use crate::response::Response;
 use crate::status::StatusField;
@@ -16,17 +17,17 @@ enum Phase {
     After(Result<(), ErrorClass>),
 }
 
-/// A reset that makes a value 0, between two readings of the value that tell what became of it.
+/// A reset that makes a value 0, between two readings of the value that tell what became of it. How many requests were sent and
+/// answered tells nothing: the encoder may have counted some before, or have begun anew.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub(super) struct Witness {
     reset: Reset,
     /// Reads the value.
     request: Request,
-    /// From the end of the reset to the second reading, beyond what the reset waits itself.
-    settling_ns: u32,
     phase: Phase,
     before: u32,
+    sent: u8,
     tries: u8,
 }
 
@@ -34,12 +35,13 @@ impl Witness {
     /// Times that the value is read before it is given up.
     pub(super) const MAX_READS: u8 = 3;
 
-    pub(super) const fn new(reset: Reset, request: Request, settling_ns: u32) -> Self {
-        Self { reset, request, settling_ns, phase: Phase::Before, before: 0, tries: 0 }
+    pub(super) const fn new(reset: Reset, request: Request) -> Self {
+        Self { reset, request, phase: Phase::Before, before: 0, sent: 0, tries: 0 }
     }
 
     /// The first request, at once.
     pub(super) const fn start<T>(&mut self, now_ns: u64) -> Step<T> {
+        self.sent = 0;
         self.enter(Phase::Before, now_ns)
     }
 
@@ -53,7 +55,8 @@ impl Witness {
         near: impl Fn(u32, u32) -> bool,
     ) -> Step<T> {
         if self.phase == Phase::Act {
-            return self.act(outcome, ready_ns);
+            let step = self.reset.receive(outcome, ready_ns);
+            return self.act(step, ready_ns);
         }
         let read_out = outcome.and_then(|response| match response.status() {
             Some(sf) if sf.intersects(StatusField::REQUEST_DAMAGED) => Err(Error::Rejected { sf }),
@@ -68,27 +71,24 @@ impl Witness {
             (Ok((_, now)), _) => {
                 self.before = now;
                 self.phase = Phase::Act;
-                match self.reset.start(ready_ns.saturating_add(Reset::SPACING_NS.into())) {
-                    Step::Send { request, not_before_ns } => Step::Send { request, not_before_ns },
-                    // Never: a reset begins with a request.
-                    Step::Done { ready_ns, .. } => self.enter(Phase::After(Ok(())), ready_ns),
-                    Step::Failed { error, ready_ns } => Step::Failed { error, ready_ns },
-                }
+                let step = self.reset.start(ready_ns.saturating_add(Reset::SPACING_NS.into()));
+                self.act(step, ready_ns)
             }
         }
     }
 
-    fn act<T>(&mut self, outcome: Result<Response, Error>, ready_ns: u64) -> Step<T> {
-        match self.reset.receive(outcome, ready_ns) {
-            Step::Send { request, not_before_ns } => Step::Send { request, not_before_ns },
-            Step::Done { ready_ns, .. } => self.look(Ok(()), ready_ns),
-            Step::Failed { error: Error::EffectUnknown { because }, ready_ns } => self.look(Err(because), ready_ns),
-            Step::Failed { error, ready_ns } => Step::Failed { error, ready_ns },
-        }
-    }
-
-    fn look<T>(&mut self, act: Result<(), ErrorClass>, ready_ns: u64) -> Step<T> {
-        self.enter(Phase::After(act), ready_ns.saturating_add(self.settling_ns.into()))
+    /// What the reset wants, and the second reading however it ends: 18 ms later, as long as an encoder may store.
+    fn act<T>(&mut self, step: Step<SingleTurn>, ready_ns: u64) -> Step<T> {
+        let act = match step {
+            Step::Send { request, not_before_ns } => {
+                self.sent = self.sent.saturating_add(1);
+                return Step::Send { request, not_before_ns };
+            }
+            Step::Done { .. } => Ok(()),
+            Step::Failed { error: Error::EffectUnknown { because }, .. } => Err(because),
+            Step::Failed { error, .. } => Err(error.class()),
+        };
+        self.enter(Phase::After(act), ready_ns.saturating_add(Reset::ZERO_WAIT_NS.into()))
     }
 
     const fn enter<T>(&mut self, phase: Phase, not_before_ns: u64) -> Step<T> {
@@ -101,29 +101,25 @@ impl Witness {
         Step::Send { request: self.request, not_before_ns }
     }
 
-    /// The value could not be read.
+    /// The value could not be read. Before the act the encoder may be storing what an earlier one has set.
     fn unread<T>(&mut self, error: Error, ready_ns: u64) -> Step<T> {
         self.tries = self.tries.saturating_add(1);
+        let before = self.phase == Phase::Before;
         if self.tries < Self::MAX_READS {
-            return self.read(ready_ns);
+            return self.read(if before { ready_ns.saturating_add(Reset::ZERO_WAIT_NS.into()) } else { ready_ns });
         }
-        let because = error.class();
-        let error = match self.phase {
-            Phase::After(_) => Error::EffectUnknown { because },
-            _ => Error::NotDone { sent: 0, because },
-        };
+        let error = if before { error } else { Error::EffectUnknown { because: error.class() } };
         Step::Failed { error, ready_ns }
     }
 
-    /// What the value after the ten requests says of them.
+    /// What the value after the requests says of them.
     fn judge(&self, act: Result<(), ErrorClass>, now: u32, near: impl Fn(u32, u32) -> bool) -> Result<(), Error> {
-        match act {
-            _ if near(0, now) && (act.is_ok() || !near(0, self.before)) => Ok(()),
-            Ok(()) => Err(Error::NotDone { sent: Reset::REQUESTS, because: ErrorClass::DataMismatch }),
-            Err(because) if near(self.before, now) && !near(0, now) => {
-                Err(Error::NotDone { sent: Reset::REQUESTS, because })
-            }
-            Err(because) => Err(Error::EffectUnknown { because }),
+        let because = act.err().unwrap_or(ErrorClass::DataMismatch);
+        let unmoved = near(self.before, now);
+        match near(0, now) {
+            true if act.is_ok() || !unmoved && !near(0, self.before) => Ok(()),
+            false if unmoved => Err(Error::NotDone { sent: self.sent, because }),
+            _ => Err(Error::EffectUnknown { because }),
         }
     }
 }

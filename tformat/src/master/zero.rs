@@ -13,10 +13,13 @@ use crate::response::Response;
 /// The shaft has to stand still. The result is the position read afterwards, within the tolerance of 0. Otherwise it
 /// ends with
 ///
-/// * [`Error::NotDone`]: ID 8 was not sent often enough, or the position is what it was before;
-/// * [`Error::EffectUnknown`]: the position could not be read, or it says nothing because it was at zero before.
+/// * [`Error::NotDone`]: the position is what it was before;
+/// * [`Error::EffectUnknown`]: the position could not be read afterwards, or it says nothing: it was at zero before, or is
+///   neither there nor where it was;
+/// * the error of the exchange, if the position could not be read before: nothing was sent.
 ///
-/// ID 8 is sent at most ten times. Once done or failed it stays so, until it is started again.
+/// It judges by the two positions alone, so it may begin after any past: an attempt that was broken off, a controller that has
+/// started anew, another master. ID 8 is sent at most ten times. Once done or failed it stays so, until it is started again.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct SingleTurnZero {
@@ -33,7 +36,7 @@ impl SingleTurnZero {
     /// `tolerance`: how far from zero, in counts, the shaft may seem to be afterwards.
     pub const fn set_and_shift_commutation_angle(resolution: Resolution, tolerance: u32) -> Self {
         let reset = Reset::set_single_turn_zero_and_shift_commutation_angle();
-        Self { resolution, tolerance, witness: Witness::new(reset, Request::ReadSingleTurn, 0), end: None }
+        Self { resolution, tolerance, witness: Witness::new(reset, Request::ReadSingleTurn), end: None }
     }
 
     /// The first request, at once.
@@ -106,21 +109,26 @@ mod tests {
 
     #[test]
     fn a_zero_that_does_not_show_is_not_done() {
-        for (before, lost, after, sent) in [(5_000, 0, 5_000, 10), (5_000, 0, 5, 10), (5_000, 10, 5_003, 10)] {
+        for (before, lost, after, sent) in [(5_000, 0, 5_000, 10), (5_000, 10, 5_003, 10), (5_000, 3, 5_000, 3)] {
             let (step, requests) = run(before, lost, Some(after));
             assert!(matches!(step, Step::Failed { error: Error::NotDone { sent: got, .. }, .. } if got == sent));
-            assert_eq!(requests, 10);
+            assert_eq!(requests, sent);
         }
-        // Nine requests have no effect, and there is nothing to see.
-        let (step, requests) = run(5_000, 9, None);
-        assert!(matches!(step, Step::Failed { error: Error::NotDone { sent: 9, .. }, .. }), "{step:?}");
-        assert_eq!(requests, 9);
+    }
+
+    /// Nine requests were left in the encoder by somebody who did not live to see the tenth: the first one here is that, and
+    /// the encoder stores in silence.
+    #[test]
+    fn what_an_earlier_attempt_began_is_seen() {
+        assert!(matches!(run(5_000, 1, Some(0)), (Step::Done { .. }, 1)));
+        let (step, sent) = run(5_000, 1, None);
+        assert!(matches!(step, Step::Failed { error: Error::EffectUnknown { .. }, .. }) && sent == 1, "{step:?}");
     }
 
     #[test]
     fn what_cannot_be_seen_is_unknown() {
         let because = ErrorClass::NoResponse;
-        for (before, after) in [(5_000, None), (1, Some(1)), (5_000, Some(9_000))] {
+        for (before, after) in [(5_000, None), (1, Some(1)), (5_000, Some(9_000)), (5_000, Some(5)), (6, Some(3))] {
             let (step, requests) = run(before, 10, after);
             assert!(
                 matches!(step, Step::Failed { error: Error::EffectUnknown { because: got }, .. } if got == because)
@@ -134,11 +142,11 @@ mod tests {
     fn without_a_position_before_nothing_is_sent() {
         let mut zero = SingleTurnZero::set_and_shift_commutation_angle(Resolution::new(17, 16).unwrap(), 4);
         let _ = zero.start(0);
-        let again = Step::Send { request: Request::ReadSingleTurn, not_before_ns: 7 };
+        // An encoder that stores is silent for 18 ms.
+        let again = Step::Send { request: Request::ReadSingleTurn, not_before_ns: 18_000_007 };
         for _ in 0..2 {
             assert_eq!(zero.receive(LOST, 7), again);
         }
-        let because = ErrorClass::NoResponse;
-        assert_eq!(zero.receive(LOST, 7), Step::Failed { error: Error::NotDone { sent: 0, because }, ready_ns: 7 });
+        assert_eq!(zero.receive(LOST, 7), Step::Failed { error: Error::NoResponse { echo: false }, ready_ns: 7 });
     }
 }

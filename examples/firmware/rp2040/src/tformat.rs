@@ -6,7 +6,7 @@ use core::fmt::{self, Write};
 use servowire_core::{Ended, Procedure};
 use tformat::device::Device;
 use tformat::master::{EEPROM_POLLING, EepromAccess, Line, MultiTurnZero, Progress, Transaction};
-use tformat::{Abm, Abs, Address, BitRate, Error, Request, Resolution, Response};
+use tformat::{Abm, Abs, Address, BitRate, Error, Page, Request, Resolution, Response};
 
 use crate::board::{Board, Console};
 use crate::clock::Clock;
@@ -84,10 +84,10 @@ impl Master {
     fn command(&mut self, command: Command, console: &mut Console) -> fmt::Result {
         let (address, access) = match command {
             Command::Read { address } => {
-                (address, EepromAccess::read(None, Address::truncate(address), EEPROM_POLLING))
+                (address, EepromAccess::read(Page::truncate(0), Address::truncate(address), EEPROM_POLLING))
             }
             Command::Write { address, data } => {
-                (address, EepromAccess::write(None, Address::truncate(address), data as u8, EEPROM_POLLING))
+                (address, EepromAccess::write(Page::truncate(0), Address::truncate(address), data as u8, EEPROM_POLLING))
             }
             Command::LoseMultiTurnReference => {
                 return match self.run(MultiTurnZero::set_and_lose_multi_turn_reference(RESOLUTION, 1)) {

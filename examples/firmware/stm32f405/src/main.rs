@@ -9,9 +9,13 @@ mod uart;
 use core::fmt::Write;
 
 use panic_halt as _;
-use servowire_drivers::{DriverEnable, Error, tformat::blocking::Driver};
+use servowire_drivers::{DirectionPin, Error, Worst, tformat::blocking::Driver};
 use tformat::master::Line;
-use tformat::{Address, BitRate};
+use tformat::{Address, BitRate, Page};
+
+/// The UART begins with its next bit clock; the interrupt of a byte, which may come in between, takes less than 0.9 us; a tick of the
+/// clock is 50 ns.
+const WORST: Worst = Worst { uart_start_ns: 400, wake_ns: 900, clock_ns: 50 };
 
 fn line() -> Line {
     let line = Line::new(BitRate::Mbit2_5);
@@ -30,8 +34,9 @@ fn main() -> ! {
     let (uart, de, mut console) = uart::start(BitRate::Mbit2_5.bits_per_second());
     let clock = clock::time(core.SYST);
     let _ = writeln!(console, "T-Format master, 2500000 bit/s, clock {source:?}");
-    let mut encoder = Driver::new(uart, DriverEnable(de), clock, line());
-    match encoder.read_eeprom(None, Address::truncate(0)) {
+    let pin = DirectionPin::new(de, WORST);
+    let mut encoder = Driver::new(uart, pin, clock, line()).expect("1.4 us fit four bits");
+    match encoder.read_eeprom(Page::truncate(0), Address::truncate(0)) {
         Ok(byte) => drop(writeln!(console, "EEPROM 0: {byte:02x}")),
         Err(error) => drop(writeln!(console, "EEPROM: {error}")),
     }

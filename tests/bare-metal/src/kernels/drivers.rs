@@ -20,32 +20,32 @@ const CALLS: [u8; 5] = [0, 1, 2, 3, 4];
 kernels! {
     /// A T-Format position with the blocking driver: request, eleven bytes one by one, all checks; a look at the clock for each.
     fn drivers_tformat_position(answer: &Bytes) -> Option<Sample> {
-        let mut encoder = Driver::new(Uart::new(answer), Automatic, steps(4_000), LINE);
+        let mut encoder = Driver::new(Uart::new(answer), Automatic, steps(4_000), LINE).ok()?;
         encoder.read_position(RESOLUTION, Policy::new(1_000_000)).ok()
     } over [ALL_DATA];
 
     /// An A-format position with the blocking driver: request, four frames one by one, all checks; a look at the clock for each.
     fn drivers_nikon_position(answer: &Frames) -> Option<nikon_aformat::Sample> {
-        let mut master = nikon::blocking::Driver::new(Port::new(answer), steps(3_600), WIDTHS, SLOW);
+        let mut master = nikon::blocking::Driver::new(Port::new(answer), steps(7_200), WIDTHS, SLOW);
         master.read_position(EncoderAddress::truncate(1), nikon_aformat::Policy::new(1_000_000)).ok()
     } over [ABS40];
 
     /// Every other call of the T-Format driver, with nobody at the line; the mean of them.
     fn drivers_tformat_silence(call: &u8) -> bool {
-        let mut encoder = Driver::new(Uart::new(&[]), Automatic, steps(4_000), LINE);
+        let Ok(mut encoder) = Driver::new(Uart::new(&[]), Automatic, steps(4_000), LINE) else { return false };
         let address = Address::truncate(5);
         match *call {
             0 => encoder.read_data().is_err(),
             1 => encoder.clear_errors().is_err(),
-            2 => encoder.read_eeprom(Page::new(1), address).is_err(),
-            3 => encoder.write_eeprom(None, address, *call).is_err(),
+            2 => encoder.read_eeprom(Page::truncate(1), address).is_err(),
+            3 => encoder.write_eeprom(Page::truncate(0), address, *call).is_err(),
             _ => encoder.transact(tformat::Request::ReadSingleTurn).is_err(),
         }
     } over CALLS;
 
     /// The same of the A-format driver, a bus in its cycle among them.
     fn drivers_nikon_silence(call: &u8) -> bool {
-        let mut master = nikon::blocking::Driver::new(Port::new(&[]), steps(3_600), WIDTHS, SLOW);
+        let mut master = nikon::blocking::Driver::new(Port::new(&[]), steps(7_200), WIDTHS, SLOW);
         let ea = EncoderAddress::truncate(*call);
         match *call {
             0 => master.read_abs40(ea).is_err(),

@@ -49,7 +49,7 @@ fn tformat() -> Tally {
         &TFORMAT,
         |row| row.0,
         |(_, answer, want)| {
-            let mut encoder = Driver::new(Uart::new(answer), Automatic, steps(4_000), LINE);
+            let Ok(mut encoder) = Driver::new(Uart::new(answer), Automatic, steps(4_000), LINE) else { return false };
             match encoder.read_position(RESOLUTION, tformat::Policy::new(1_000_000)) {
                 Ok(sample) => Some(sample.single_turn()) == *want && sample.turns() == Some(3),
                 Err(Error::Protocol(_)) => want.is_none(),
@@ -64,7 +64,7 @@ fn nikon() -> Tally {
         &NIKON,
         |row| row.0,
         |(_, answer, want)| {
-            let mut master = nikon::blocking::Driver::new(Port::new(answer), steps(3_600), WIDTHS, SLOW);
+            let mut master = nikon::blocking::Driver::new(Port::new(answer), steps(7_200), WIDTHS, SLOW);
             match master.read_position(EncoderAddress::truncate(1), nikon_aformat::Policy::new(1_000_000)) {
                 Ok(sample) => Some(sample.single_turn()) == *want,
                 Err(Error::Protocol(_)) => want.is_none(),

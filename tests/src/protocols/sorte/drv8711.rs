@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use serde::Deserialize;
-use sorte_proto::drv8711::{IsGain, Register, Word, full_scale_microamps};
+use servowire_drivers::drv8711::{IsGain, Register, Word, full_scale_microamps};
 
 use super::Origin;
 use crate::hex::{Bytes, Hex};

@@ -1,0 +1,32 @@
+//! All tests of the crate through its public interface, in one binary.
+#![allow(
+    clippy::arithmetic_side_effects,
+    clippy::cast_possible_truncation,
+    clippy::cast_possible_wrap,
+    clippy::indexing_slicing,
+    clippy::panic,
+    clippy::unwrap_used,
+    missing_docs
+)]
+
+mod alarms;
+mod answers;
+mod caller;
+mod common;
+mod drive;
+mod drive_bytes;
+mod endings;
+mod fresh;
+mod hostile;
+mod impolite;
+mod laws;
+mod log;
+mod master;
+mod places_in_time;
+mod procedures;
+mod ring;
+mod runner;
+#[cfg(feature = "serde")]
+mod serde;
+mod setpoints;
+mod stops;

@@ -1,0 +1,84 @@
+//! File formats by their names, and what the user said about the files.
+
+/// File formats.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Format {
+    /// Value change dump.
+    Vcd,
+    /// A table of levels or voltages.
+    Csv,
+    /// A table of bytes of an analyser of Saleae Logic 2.
+    AnalyzerTable,
+    /// A waveform of a Tektronix oscilloscope.
+    Isf,
+    /// Saleae Logic 2 binary export.
+    SaleaeBinary,
+    /// A session of sigrok, PulseView or DSView.
+    Session,
+    /// FST.
+    Fst,
+    /// Text of sigrok-cli.
+    SigrokText,
+    /// A file of the OLS client.
+    Ols,
+    /// One sample in one or more whole bytes, a bit a channel.
+    Raw,
+    /// One channel, eight samples a byte, the oldest in bit 0.
+    Packed,
+    /// Bytes as hex digits.
+    Hex,
+    /// Binary records of one size.
+    Records,
+    /// Packets of a network capture.
+    Pcapng,
+}
+
+impl Format {
+    /// All of them: with their names on a command line, the one to show first, and a line for its help.
+    pub const ALL: [(Self, &'static [&'static str], &'static str); 14] = [
+        (Self::Vcd, &["vcd"], "Value change dump (IEEE 1364)"),
+        (Self::Csv, &["csv", "saleae-csv"], "A table of a logic analyser or an oscilloscope"),
+        (Self::AnalyzerTable, &["analyzer-table"], "A table of bytes of an analyser of Saleae Logic 2"),
+        (Self::Isf, &["isf"], "A waveform of a Tektronix oscilloscope (.isf)"),
+        (Self::SaleaeBinary, &["saleae-binary"], "Saleae Logic 2 binary export"),
+        (Self::Session, &["session"], "A session of sigrok, PulseView (.sr) or DSView (.dsl)"),
+        (Self::Fst, &["fst"], "FST, as GTKWave and Verilator write it"),
+        (Self::SigrokText, &["sigrok-text"], "Text of sigrok-cli -O bits or -O hex"),
+        (Self::Ols, &["ols"], "A file of the OLS client, or of sigrok-cli -O ols"),
+        (Self::Raw, &["raw"], "One sample in one or more whole bytes, a bit a channel (sigrok-cli -O binary)"),
+        (Self::Packed, &["packed"], "One channel, eight samples a byte, the oldest in bit 0"),
+        (Self::Hex, &["hex"], "Bytes as hex digits, a burst a line"),
+        (Self::Records, &["records"], "Binary records of one size (--record-size), a burst each"),
+        (Self::Pcapng, &["pcapng", "pcap"], "Packets of a network capture, pcap or pcapng"),
+    ];
+
+    /// Text may be packed; of the others the first bytes are the format's own.
+    pub(super) fn is_text(self) -> bool {
+        matches!(
+            self,
+            Self::Vcd | Self::Csv | Self::AnalyzerTable | Self::Isf | Self::SigrokText | Self::Ols | Self::Hex
+        )
+    }
+}
+
+/// Makes a call from which it comes back even if that panics. Somebody who has none calls the argument.
+pub type Guard = fn(&mut dyn FnMut());
+
+/// What the user said about the files.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Hints {
+    /// The format; otherwise it is found from the content and the name.
+    pub format: Option<Format>,
+    /// Samples a second of a raw file.
+    pub sample_rate: Option<u64>,
+    /// Bytes a sample of a raw file.
+    pub unit_size: usize,
+    /// Bytes of a record.
+    pub record_size: Option<usize>,
+    /// The voltage above which a column of a table is high; otherwise half-way between its levels.
+    pub threshold: Option<f64>,
+    /// The file still grows: its end is waited for.
+    pub grows: bool,
+    /// How the library for FST is called, which panics on some damaged files; otherwise straight.
+    pub guard: Option<Guard>,
+}

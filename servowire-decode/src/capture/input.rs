@@ -1,0 +1,266 @@
+//! The file below a reader: buffered, metered for the progress bar, with faults that carry its name.
+
+use std::cell::Cell;
+use std::io::{self, BufRead, BufReader, Cursor, Read, Seek, SeekFrom};
+use std::rc::Rc;
+
+use flate2::read::MultiGzDecoder;
+use ruzstd::decoding::StreamingDecoder;
+
+use super::utf16::{self, Utf16};
+use crate::fault::{At, Fault};
+
+const BUFFER: usize = 1 << 18;
+
+/// Bytes by which a file is known.
+pub(super) const HEAD: usize = 1 << 12;
+
+/// Files inside files are unpacked so deep.
+const DEEPEST: u8 = 4;
+/// What has to be read backwards and cannot is held in memory, up to so many bytes.
+const MOST_HELD: u64 = 1 << 28;
+
+/// A reader that can go back.
+pub trait SeekRead: BufRead + Seek {}
+
+impl<R: BufRead + Seek> SeekRead for R {}
+
+/// What is recorded while it is read: a pipe, or a file that still grows.
+pub trait Live: Read {
+    /// Whether something is there, or the end; may wait for a moment.
+    fn is_ready(&mut self) -> bool;
+
+    /// Whether what is complete should be shown although more comes all the time; asked after each block.
+    fn is_overdue(&mut self) -> bool;
+}
+
+/// What is below a file.
+enum Source {
+    Stream(Box<dyn Read>),
+    File(Box<dyn SeekRead>),
+    Live(Box<dyn Live>),
+}
+
+impl Source {
+    fn live(&mut self) -> Option<&mut dyn Live> {
+        if let Self::Live(source) = self { Some(source.as_mut()) } else { None }
+    }
+}
+
+impl Read for Source {
+    fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
+        match self {
+            Self::Stream(source) => source.read(buffer),
+            Self::File(source) => source.read(buffer),
+            Self::Live(source) => source.read(buffer),
+        }
+    }
+}
+
+/// An open file.
+pub struct Input {
+    name: String,
+    depth: u8,
+    reader: BufReader<Source>,
+    /// The beginning, gathered to see what it is, and how much of it was taken.
+    head: Vec<u8>,
+    head_taken: usize,
+    taken: Rc<Cell<u64>>,
+    /// Somebody else counts.
+    quiet: bool,
+}
+
+impl Input {
+    /// Any reader.
+    pub fn over(name: &str, reader: impl Read + 'static) -> Self {
+        Self::of(name, Source::Stream(Box::new(reader)))
+    }
+
+    /// A reader that can go back: formats that are read backwards need not be held in memory.
+    pub fn seeking(name: &str, reader: impl SeekRead + 'static) -> Self {
+        Self::of(name, Source::File(Box::new(reader)))
+    }
+
+    /// What is recorded while it is read.
+    pub fn live(name: &str, source: impl Live + 'static) -> Self {
+        Self::of(name, Source::Live(Box::new(source)))
+    }
+
+    fn of(name: &str, source: Source) -> Self {
+        Self {
+            name: name.to_owned(),
+            depth: 0,
+            quiet: false,
+            reader: BufReader::with_capacity(BUFFER, source),
+            head: Vec::new(),
+            head_taken: 0,
+            taken: Rc::default(),
+        }
+    }
+
+    /// Whether it may be silent for a while.
+    pub fn is_live(&self) -> bool {
+        matches!(self.reader.get_ref(), Source::Live(_))
+    }
+
+    /// Whether what is complete should be shown now.
+    pub fn is_due(&mut self) -> bool {
+        self.reader.get_mut().live().is_some_and(Live::is_overdue) || self.pauses()
+    }
+
+    /// Whether a read would have to wait: nothing is there, and nothing comes for a moment.
+    pub fn pauses(&mut self) -> bool {
+        self.head_taken == self.head.len() && self.waits()
+    }
+
+    /// Unpacks gzip and zstd, as often as they are packed.
+    pub fn unpacked(mut self) -> Result<Self, Fault> {
+        let head = self.peek()?;
+        let packed = match head {
+            [0x1f, 0x8b, 0x08, ..] => Some(true),
+            [0x28, 0xb5, 0x2f, 0xfd, ..] | [0x50..=0x5f, 0x2a, 0x4d, 0x18, ..] => Some(false),
+            _ => None,
+        };
+        let Some(gzip) = packed else { return Ok(self) };
+        if self.depth >= DEEPEST {
+            return Err(self.fault(At::File, "is packed into itself too often"));
+        }
+        let (name, depth, meter) = (self.name.clone(), self.depth + 1, self.meter());
+        let unpacked = if gzip {
+            Self::over(&name, MultiGzDecoder::new(self))
+        } else {
+            match StreamingDecoder::new(self) {
+                Ok(decoder) => Self::over(&name, decoder),
+                Err(e) => return Err(Fault::new(&name, At::File, format!("cannot be unpacked (zstd): {e}"))),
+            }
+        };
+        // The progress bar counts what was read of the file.
+        Self { depth, quiet: true, taken: meter, ..unpacked }.unpacked()
+    }
+
+    /// Text of two bytes a character as UTF-8.
+    pub fn in_utf8(mut self) -> Result<Self, Fault> {
+        let Some(unit) = utf16::mark(self.peek()?) else { return Ok(self) };
+        let (name, meter) = (self.name.clone(), self.meter());
+        let text = Self::over(&name, Utf16::new(self, unit));
+        Ok(Self { quiet: true, taken: meter, ..text })
+    }
+
+    /// The same content in a form that can be read backwards.
+    pub fn seekable(mut self) -> Result<Box<dyn SeekRead>, Fault> {
+        if let Source::File(file) = self.reader.get_mut() {
+            let mut file = std::mem::replace(file, Box::new(Cursor::new(Vec::new())));
+            file.seek(SeekFrom::Start(0)).map_err(|e| self.io_fault(At::File, &e))?;
+            return Ok(file);
+        }
+        let mut bytes = Vec::new();
+        let read = self.by_ref().take(MOST_HELD + 1).read_to_end(&mut bytes);
+        read.map_err(|e| self.io_fault(At::File, &e))?;
+        if bytes.len() as u64 > MOST_HELD {
+            let what = format!("more than {} MB of this format have to be a file, not a stream", MOST_HELD >> 20);
+            return Err(self.fault(At::File, what));
+        }
+        Ok(Box::new(Cursor::new(bytes)))
+    }
+
+    /// The beginning of the file without taking it: 4 KiB, or all there are.
+    pub fn peek(&mut self) -> Result<&[u8], Fault> {
+        while self.head.len() < HEAD && self.head_taken == 0 && (self.head.is_empty() || !self.waits()) {
+            let name = &self.name;
+            let more = self.reader.fill_buf();
+            let more = more.map_err(|e| Fault::new(name, At::File, format!("cannot be read: {}", plain(&e))))?;
+            let count = more.len().min(HEAD - self.head.len());
+            self.head.extend_from_slice(more.get(..count).unwrap_or_default());
+            self.reader.consume(count);
+            if count == 0 {
+                break;
+            }
+        }
+        Ok(self.head.get(self.head_taken..).unwrap_or_default())
+    }
+
+    /// Whether nothing more than the head is there for a moment.
+    fn waits(&mut self) -> bool {
+        self.reader.buffer().is_empty() && self.reader.get_mut().live().is_some_and(|source| !source.is_ready())
+    }
+
+    /// The name for messages.
+    pub fn name(&self) -> &str {
+        &self.name
+    }
+
+    /// Bytes taken so far, shared with the progress bar.
+    pub fn meter(&self) -> Rc<Cell<u64>> {
+        Rc::clone(&self.taken)
+    }
+
+    /// A fault of this file.
+    pub fn fault(&self, at: At, what: impl Into<String>) -> Fault {
+        Fault::new(&self.name, at, what)
+    }
+
+    /// The reader ended with an error at `at`.
+    pub fn io_fault(&self, at: At, error: &io::Error) -> Fault {
+        self.fault(at, format!("cannot be read: {}", plain(error)))
+    }
+
+    fn count(&self, bytes: usize) {
+        if !self.quiet {
+            self.taken.set(self.taken.get() + bytes as u64);
+        }
+    }
+
+    /// Fills `buffer` as far as the file goes; of one that pauses, with the whole units of `unit` bytes that are there.
+    pub fn read_full(&mut self, buffer: &mut [u8], unit: usize) -> io::Result<usize> {
+        let mut filled = 0;
+        while let Some(free) = buffer.get_mut(filled..).filter(|free| !free.is_empty()) {
+            if filled > 0 && filled % unit == 0 && self.pauses() {
+                break;
+            }
+            match self.read(free) {
+                Ok(0) => break,
+                Ok(n) => filled += n,
+                Err(e) if e.kind() == io::ErrorKind::Interrupted => {}
+                Err(e) => return Err(e),
+            }
+        }
+        Ok(filled)
+    }
+}
+
+impl Read for Input {
+    fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
+        let mut head = self.head.get(self.head_taken..).unwrap_or_default();
+        let n = if head.is_empty() { self.reader.read(buffer)? } else { head.read(buffer)? };
+        self.head_taken = self.head.len().min(self.head_taken + n);
+        self.count(n);
+        Ok(n)
+    }
+}
+
+impl BufRead for Input {
+    fn fill_buf(&mut self) -> io::Result<&[u8]> {
+        match self.head.get(self.head_taken..) {
+            Some(head) if !head.is_empty() => Ok(head),
+            _ => self.reader.fill_buf(),
+        }
+    }
+
+    fn consume(&mut self, amount: usize) {
+        self.count(amount);
+        if self.head_taken < self.head.len() {
+            self.head_taken = self.head.len().min(self.head_taken + amount);
+        } else {
+            self.reader.consume(amount);
+        }
+    }
+}
+
+/// The system's words without its error number, and one sentence for all packed files that are not whole.
+fn plain(error: &io::Error) -> String {
+    let text = error.to_string();
+    if error.kind() == io::ErrorKind::UnexpectedEof || text.contains("UnexpectedEof") {
+        return "what is packed in it ends too early: it was cut off".to_owned();
+    }
+    text.split(" (os error").next().unwrap_or(&text).to_lowercase()
+}

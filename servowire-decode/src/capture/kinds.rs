@@ -1,0 +1,46 @@
+//! What a file turns out to be.
+
+use super::hexlog::{Burst, HexLog};
+use super::pcapng::Pcapng;
+use super::raw::Raw;
+use super::recording::Line;
+use super::records::Records;
+use crate::fault::Fault;
+
+/// An opened file.
+pub enum Capture {
+    /// Changes with their times: VCD, Saleae.
+    Edges(Box<dyn Line>),
+    /// Samples at a fixed rate.
+    Samples(Raw),
+    /// Bytes without time.
+    Bytes(ByteLog),
+    /// Packets of a network.
+    Packets(Pcapng),
+}
+
+/// Bytes without time, in bursts.
+pub enum ByteLog {
+    /// Hex digits, a burst a line.
+    Hex(HexLog),
+    /// Records of one size.
+    Records(Records),
+}
+
+impl ByteLog {
+    /// The next burst; none at the end.
+    pub fn burst(&mut self) -> Result<Option<Burst>, Fault> {
+        match self {
+            Self::Hex(log) => log.burst(),
+            Self::Records(log) => log.burst(),
+        }
+    }
+
+    /// Whether the next burst has to be waited for.
+    pub fn pauses(&mut self) -> bool {
+        match self {
+            Self::Hex(log) => log.input().pauses(),
+            Self::Records(log) => log.input().pauses(),
+        }
+    }
+}

@@ -1,0 +1,195 @@
+//! Samples at a fixed rate without a header: `sigrok-cli -O binary`, memory dumps of an FPGA, the inside of a session.
+
+use super::input::Input;
+use super::recording::{Change, Line};
+use super::samples::{Samples, little_endian};
+use crate::fault::{At, Fault};
+use crate::time::{Clock, Time};
+
+/// How a file holds a sample.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Unit {
+    /// One channel, eight samples a byte, the oldest in bit 0.
+    Bit,
+    /// So many bytes a sample, little endian, bit k = channel k.
+    Bytes(usize),
+}
+
+/// Bytes read at once: a multiple of 64 samples of every unit.
+const BLOCK: usize = 1 << 16;
+
+/// A file of samples.
+pub struct Raw {
+    input: Input,
+    unit: Unit,
+    clock: Clock,
+    channels: Vec<String>,
+    /// The channel of each bit of a sample.
+    of_bit: Vec<Option<u16>>,
+    block: Vec<u8>,
+    /// The last sample, for the changes.
+    last: Option<u64>,
+    samples: u64,
+    /// Reported when the whole samples before it have been taken.
+    ragged: Option<Fault>,
+}
+
+impl Raw {
+    /// `rate` in samples a second. Channels are called by their numbers.
+    pub fn new(input: Input, rate: u64, unit: Unit) -> Self {
+        let bits = match unit {
+            Unit::Bit => 1,
+            Unit::Bytes(n) => 8 * n.clamp(1, 8) as u16,
+        };
+        Self::with_channels(input, rate, unit, (0..bits).map(|bit| (bit, bit.to_string())).collect())
+    }
+
+    /// `channels`: bit of the sample and name.
+    pub fn with_channels(input: Input, rate: u64, unit: Unit, channels: Vec<(u16, String)>) -> Self {
+        let unit = match unit {
+            Unit::Bit => Unit::Bit,
+            Unit::Bytes(n) => Unit::Bytes(n.clamp(1, 8)),
+        };
+        let mut of_bit = vec![None; 64];
+        for (channel, (bit, _)) in (0..).zip(&channels) {
+            if let Some(place) = of_bit.get_mut(usize::from(*bit)) {
+                *place = Some(channel);
+            }
+        }
+        let channels = channels.into_iter().map(|(_, name)| name).collect();
+        Self {
+            input,
+            unit,
+            clock: Clock::new(rate),
+            channels,
+            of_bit,
+            block: vec![0; BLOCK],
+            last: None,
+            samples: 0,
+            ragged: None,
+        }
+    }
+
+    /// Between sample numbers and times.
+    pub fn clock(&self) -> Clock {
+        self.clock
+    }
+
+    /// Reads a block; gives its length in bytes and in samples, 0 at the end.
+    fn fill(&mut self) -> Result<(usize, u64), Fault> {
+        if let Some(fault) = self.ragged.take() {
+            return Err(fault);
+        }
+        let Unit::Bytes(n) = self.unit else {
+            let at = At::Byte(self.samples / 8);
+            let got = self.input.read_full(&mut self.block, 1).map_err(|e| self.input.io_fault(at, &e))?;
+            return Ok((got, got as u64 * 8));
+        };
+        let at = self.samples * n as u64;
+        let buffer = self.block.get_mut(..BLOCK / 8 / n * 8 * n).unwrap_or_default();
+        let got = self.input.read_full(buffer, n).map_err(|e| self.input.io_fault(At::Byte(at), &e))?;
+        let rest = got % n;
+        if rest != 0 {
+            let what = format!("{rest} bytes are left, where a sample has {n}: cut off, or another --unit-size");
+            self.ragged = Some(self.input.fault(At::Byte(at + (got - rest) as u64), what));
+        }
+        Ok((got - rest, (got / n) as u64))
+    }
+
+    /// The changes between the last sample and the next ones, whose bits are the channels.
+    fn differences(&mut self, bytes: usize, changes: &mut Vec<Change>) {
+        let block = self.block.get(..bytes).unwrap_or_default();
+        let mask =
+            (0..64).filter(|bit| self.of_bit.get(*bit).copied().flatten().is_some()).fold(0, |m, bit| m | 1 << bit);
+        let mut last = self.last;
+        let (clock, of_bit) = (self.clock, &self.of_bit);
+        let mut see = |last: &mut Option<u64>, index: u64, sample: u64| {
+            let mut changed = last.map_or(mask, |last| (last ^ sample) & mask);
+            *last = Some(sample);
+            while changed != 0 {
+                let bit = changed.trailing_zeros();
+                if let Some(channel) = of_bit.get(bit as usize).copied().flatten() {
+                    changes.push(Change { time: clock.time(index), channel, level: sample >> bit & 1 == 1 });
+                }
+                changed &= changed - 1;
+            }
+        };
+        match self.unit {
+            Unit::Bit => {
+                for (index, chunk) in (self.samples..).step_by(64).zip(block.chunks(8)) {
+                    let (word, count) = (little_endian(chunk), 8 * chunk.len() as u64);
+                    if last.is_none() {
+                        see(&mut last, index, word & 1);
+                    }
+                    // A one where a sample differs from the one before.
+                    let before = last.unwrap_or(0);
+                    let mut edges = word ^ (word << 1 | before);
+                    if count < 64 {
+                        edges &= (1 << count) - 1;
+                    }
+                    while edges != 0 {
+                        let at = u64::from(edges.trailing_zeros());
+                        see(&mut last, index + at, word >> at & 1);
+                        edges &= edges - 1;
+                    }
+                }
+            }
+            Unit::Bytes(1) => {
+                for (index, eight) in (self.samples..).step_by(8).zip(block.chunks(8)) {
+                    // Eight samples like the one before: nothing to see.
+                    let same = last.is_some_and(|last| little_endian(eight) == (last & 0xff) * 0x0101_0101_0101_0101);
+                    if !same {
+                        for (k, sample) in (0..).zip(eight) {
+                            if last != Some(u64::from(*sample)) {
+                                see(&mut last, index + k, u64::from(*sample));
+                            }
+                        }
+                    }
+                }
+            }
+            Unit::Bytes(n) => {
+                for (index, sample) in (self.samples..).zip(block.chunks(n)) {
+                    let sample = little_endian(sample);
+                    if last != Some(sample) {
+                        see(&mut last, index, sample);
+                    }
+                }
+            }
+        }
+        self.last = last;
+    }
+}
+
+impl Line for Raw {
+    fn input(&mut self) -> Option<&mut Input> {
+        Some(&mut self.input)
+    }
+
+    fn channels(&self) -> &[String] {
+        &self.channels
+    }
+
+    fn read(&mut self, changes: &mut Vec<Change>) -> Result<bool, Fault> {
+        let (bytes, samples) = self.fill()?;
+        self.differences(bytes, changes);
+        self.samples += samples;
+        Ok(samples != 0 || self.ragged.is_some())
+    }
+
+    fn samples(&mut self) -> Option<Result<Samples<'_>, Fault>> {
+        let before = self.last.filter(|_| self.unit == Unit::Bit)? & 1;
+        let (bytes, samples) = match self.fill() {
+            Ok(got) => got,
+            Err(fault) => return Some(Err(fault)),
+        };
+        let block = self.block.get(..bytes).unwrap_or_default();
+        self.last = Some(block.last().map_or(before, |last| u64::from(last >> 7)));
+        let first = self.samples;
+        self.samples += samples;
+        Some(Ok(Samples::new(block, first, before == 1, self.clock)))
+    }
+
+    fn reached(&self) -> Time {
+        self.clock.time(self.samples)
+    }
+}

@@ -1,0 +1,57 @@
+//! A recording of lines, whatever the format of its file.
+
+use super::input::Input;
+use super::samples::Samples;
+use crate::fault::Fault;
+use crate::time::Time;
+
+/// A channel takes a level.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Change {
+    /// When, in picoseconds of the capture's own time (negative before its trigger).
+    pub time: Time,
+    /// Index into [`Line::channels`].
+    pub channel: u16,
+    /// The level from here on.
+    pub level: bool,
+}
+
+/// A part of a recording in which nothing is known of the lines; times in picoseconds.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Hole {
+    /// Where the recording stops.
+    pub from: Time,
+    /// Where it goes on.
+    pub to: Time,
+}
+
+/// A recording of lines.
+pub trait Line {
+    /// The channels by name. A change refers to them by index.
+    fn channels(&self) -> &[String];
+
+    /// Appends the next changes, in the order of time, and says whether there may be more.
+    ///
+    /// The first change of a channel is its level at the beginning. With a fault, the changes before it were
+    /// appended; no more will come.
+    fn read(&mut self, changes: &mut Vec<Change>) -> Result<bool, Fault>;
+
+    /// The next samples instead of the next changes, of a recording that is one channel of packed samples; nothing of
+    /// another one, or as long as its first level has not been read.
+    fn samples(&mut self) -> Option<Result<Samples<'_>, Fault>> {
+        None
+    }
+
+    /// The time up to which the recording was read, in picoseconds.
+    fn reached(&self) -> Time;
+
+    /// The hole in the recording before what was read last, if there is one.
+    fn hole(&mut self) -> Option<Hole> {
+        None
+    }
+
+    /// What is read, if it is read as it comes.
+    fn input(&mut self) -> Option<&mut Input> {
+        None
+    }
+}

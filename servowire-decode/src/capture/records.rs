@@ -1,0 +1,40 @@
+//! Binary records of one size: what a host copied out of a reception memory, one after the other.
+
+use super::hexlog::Burst;
+use super::input::Input;
+use crate::fault::{At, Fault};
+
+/// A log of records.
+pub struct Records {
+    input: Input,
+    size: usize,
+    record: u64,
+}
+
+impl Records {
+    /// A log from its beginning; `size` in bytes.
+    pub fn new(input: Input, size: usize) -> Self {
+        Self { input, size: size.max(1), record: 0 }
+    }
+
+    /// The file that is read.
+    pub(super) fn input(&mut self) -> &mut Input {
+        &mut self.input
+    }
+
+    /// The next record, numbered from 1; none at the end.
+    pub fn burst(&mut self) -> Result<Option<Burst>, Fault> {
+        let mut bytes = vec![0; self.size];
+        self.record += 1;
+        let at = At::Byte(self.record.saturating_sub(1).saturating_mul(self.size as u64));
+        match self.input.read_full(&mut bytes, self.size) {
+            Ok(0) => Ok(None),
+            Ok(got) if got == self.size => Ok(Some(Burst::new(self.record, bytes))),
+            Ok(got) => {
+                let what = format!("the last record has {got} of {} bytes: it was cut off", self.size);
+                Err(self.input.fault(at, what))
+            }
+            Err(e) => Err(self.input.io_fault(at, &e)),
+        }
+    }
+}

@@ -1,0 +1,149 @@
+//! A block of packed samples, as a decoder takes it that needs no edges one by one.
+
+use crate::time::{Clock, Time};
+
+/// Samples of one channel, eight a byte, the oldest in bit 0.
+#[derive(Debug, Clone, Copy)]
+pub struct Samples<'a> {
+    bytes: &'a [u8],
+    /// Number of the first sample.
+    first: u64,
+    /// The level of the sample before it, or of itself where there is none.
+    before: bool,
+    clock: Clock,
+    inverted: bool,
+}
+
+impl<'a> Samples<'a> {
+    /// `first`: number of the first sample; `before`: the level of the one before it.
+    pub fn new(bytes: &'a [u8], first: u64, before: bool, clock: Clock) -> Self {
+        Self { bytes, first, before, clock, inverted: false }
+    }
+
+    /// The same line upside down, or not.
+    #[must_use]
+    pub fn turned(self, inverted: bool) -> Self {
+        Self { inverted: self.inverted != inverted, before: self.before != inverted, ..self }
+    }
+
+    /// Number of the first sample.
+    pub fn first(&self) -> u64 {
+        self.first
+    }
+
+    /// Number of the sample after the last one.
+    pub fn end(&self) -> u64 {
+        self.first + 8 * self.bytes.len() as u64
+    }
+
+    /// The level before the first sample.
+    pub fn before(&self) -> bool {
+        self.before
+    }
+
+    /// Between sample numbers and times.
+    pub fn clock(&self) -> Clock {
+        self.clock
+    }
+
+    /// 64 samples from number `at` on, the oldest in bit 0, where all of them are there.
+    #[inline]
+    pub fn word(&self, at: u64) -> Option<u64> {
+        let place = at.checked_sub(self.first)?;
+        let nine = self.bytes.get((place / 8) as usize..)?.get(..9);
+        let word = match (nine, place % 8) {
+            (Some(nine), by) => {
+                let (low, high) = nine.split_at(8);
+                // Of the ninth byte the lowest `by` bits are taken.
+                little_endian(low) >> by | u64::from(*high.first()?) << 1 << (63 - by)
+            }
+            (None, 0) => u64::from_le_bytes(*self.bytes.get((place / 8) as usize..)?.first_chunk()?),
+            (None, _) => return None,
+        };
+        Some(if self.inverted { !word } else { word })
+    }
+
+    /// The number of the first sample from `at` on whose level is not `level`.
+    #[inline]
+    pub fn change(&self, mut at: u64, level: bool) -> Option<u64> {
+        let same = if level { u64::MAX } else { 0 };
+        while let Some(word) = self.word(at) {
+            if word != same {
+                return Some(at + u64::from((word ^ same).trailing_zeros()));
+            }
+            at += 64;
+        }
+        self.last_change(at, level)
+    }
+
+    /// The same in the last samples.
+    #[cold]
+    fn last_change(&self, at: u64, level: bool) -> Option<u64> {
+        (at..self.end()).find(|at| {
+            let place = at - self.first;
+            let byte = self.bytes.get((place / 8) as usize).copied().unwrap_or(0);
+            (byte >> (place % 8) & 1 == 1) != (level != self.inverted)
+        })
+    }
+
+    /// All changes, by time.
+    #[inline]
+    pub fn changes(self) -> impl Iterator<Item = (Time, bool)> + 'a {
+        let (mut at, mut level) = (self.first, self.before);
+        std::iter::from_fn(move || {
+            let next = self.change(at, level)?;
+            (at, level) = (next + 1, !level);
+            Some((self.clock.time(next), level))
+        })
+    }
+}
+
+/// Up to 8 bytes as a number.
+pub(super) fn little_endian(bytes: &[u8]) -> u64 {
+    match bytes.first_chunk() {
+        Some(whole) => u64::from_le_bytes(*whole),
+        None => bytes.iter().rev().fold(0, |word, &byte| word << 8 | u64::from(byte)),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    /// One sample after the other.
+    fn plain(bytes: &[u8], before: bool) -> Vec<(Time, bool)> {
+        let mut level = before;
+        let mut out = Vec::new();
+        for at in 0..8 * bytes.len() {
+            let next = bytes[at / 8] >> (at % 8) & 1 == 1;
+            if next != level {
+                out.push((Time::from_ps(at as i128 * 1_000_000), next));
+            }
+            level = next;
+        }
+        out
+    }
+
+    proptest! {
+        #[test]
+        fn changes_are_those_of_the_samples(
+            bytes in proptest::collection::vec(prop_oneof![Just(0_u8), Just(0xff), any::<u8>()], 0..80),
+            before: bool,
+            inverted: bool,
+        ) {
+            let samples = Samples::new(&bytes, 64, before, Clock::new(1_000_000)).turned(inverted);
+            let want: Vec<_> =
+                plain(&bytes, before).iter().map(|(time, level)| (*time + 64_000_000, *level != inverted)).collect();
+            prop_assert_eq!(samples.changes().collect::<Vec<_>>(), want);
+        }
+
+        #[test]
+        fn a_word_is_64_samples(bytes in proptest::collection::vec(any::<u8>(), 8..20), by in 0..100_u64) {
+            let samples = Samples::new(&bytes, 0, false, Clock::new(1));
+            let bit = |at: u64| u64::from(bytes[(at / 8) as usize] >> (at % 8) & 1);
+            let want = (by + 64 <= 8 * bytes.len() as u64).then(|| (0..64).fold(0, |word, k| word | bit(by + k) << k));
+            prop_assert_eq!(samples.word(by), want);
+        }
+    }
+}

@@ -1,0 +1,130 @@
+//! What every protocol gives: one row of the table in `protocols.rs`.
+
+use std::fmt;
+use std::io;
+
+use crate::capture::hexlog::Burst;
+use crate::capture::pcapng::Packet;
+use crate::event::{Event, Place, Refusal};
+use crate::line::evidence::Weights;
+use crate::line::lane::LineDecoder;
+use crate::settings::Settings;
+use crate::sink::Sink;
+
+/// What a protocol is called, and what is said of it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Names {
+    /// On a command line.
+    pub name: &'static str,
+    /// As people write it.
+    pub title: &'static str,
+    /// A line about it, for the help of a program.
+    pub about: &'static str,
+    /// What it is decoded from, for somebody who has something else.
+    pub needs: &'static str,
+}
+
+/// A protocol: its names, what it is decoded from, its decoders.
+pub trait Codec: Sync {
+    /// What it is called.
+    fn names(&self) -> &'static Names;
+
+    /// The names of all fields that its events on a line or in packets may have.
+    fn fields(&self) -> &'static [&'static str];
+
+    /// Published recordings: names and contents, each a VCD.
+    fn captures(&self) -> &'static [(&'static str, &'static [u8])] {
+        &[]
+    }
+
+    /// Its nominal bit rates on a recorded line; none where there is no such line.
+    fn rates(&self) -> &'static [u32] {
+        &[]
+    }
+
+    /// What its frames prove on a recorded line.
+    fn weights(&self) -> Weights {
+        Weights::default()
+    }
+
+    /// A decoder for one idle-high line at `rate` bits a second.
+    fn line(&self, _rate: u32, _settings: &Settings) -> Option<Box<dyn LineDecoder>> {
+        None
+    }
+
+    /// Whether it has one rate, by the clock of its master: a recording may hold one sample a bit.
+    fn is_clocked(&self) -> bool {
+        false
+    }
+
+    /// Whether an answer says what it is without its request.
+    fn answers_alone(&self) -> bool {
+        true
+    }
+
+    /// A decoder for a log of bytes that begins with `sample`.
+    fn log(&self, _settings: &Settings, _sample: &[Burst]) -> Option<Box<dyn LogDecoder>> {
+        None
+    }
+
+    /// Whether a frame in a log carries a check, so that it is not found where there is none.
+    fn is_checked(&self) -> bool {
+        true
+    }
+
+    /// A packet of a network as an event.
+    fn packet(&self, _packet: &Packet) -> Option<Event> {
+        None
+    }
+}
+
+impl dyn Codec {
+    /// Its name as people write it.
+    pub fn title(&self) -> &'static str {
+        self.names().title
+    }
+}
+
+/// Two are the same if their names are.
+impl PartialEq for dyn Codec {
+    fn eq(&self, other: &Self) -> bool {
+        self.names() == other.names()
+    }
+}
+
+impl Eq for dyn Codec {}
+
+impl fmt::Debug for dyn Codec {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.names().name)
+    }
+}
+
+/// Turns a log of bytes into events.
+pub trait LogDecoder {
+    /// What there is to say of the log as a whole, before its frames.
+    fn note(&self) -> Option<String> {
+        None
+    }
+
+    /// Bytes that followed each other, without times.
+    fn burst(&mut self, burst: &Burst, out: &mut dyn Sink) -> io::Result<()>;
+
+    /// A burst, or what stands in the place of one.
+    fn take(&mut self, burst: &Burst, out: &mut dyn Sink) -> io::Result<()> {
+        let Some(what) = &burst.spoilt else { return self.burst(burst, out) };
+        self.spoilt(out)?;
+        out.event(&Event::new(Place::Line(burst.line), None, "line", Vec::new(), Refusal::new("hex", what).into()))
+    }
+
+    /// A line of the log could not be read: it may have been the answer that is waited for.
+    fn spoilt(&mut self, out: &mut dyn Sink) -> io::Result<()>;
+
+    /// The log ends.
+    fn end(&mut self, out: &mut dyn Sink) -> io::Result<()>;
+
+    /// Why the log as a whole was not read as it was written.
+    fn fault(&self) -> Option<&'static str> {
+        None
+    }
+}

@@ -1,0 +1,41 @@
+//! From a capture to events, whatever it is.
+
+use crate::capture::Capture;
+use crate::codec::Codec;
+use crate::fault::{At, Fault, Stop};
+use crate::output::Output;
+use crate::protocols::{CODECS, meant};
+use crate::settings::Settings;
+use crate::sink::Sink;
+use crate::{line, log};
+
+/// Decodes a capture called `file` to its end; `protocol`: otherwise it is found. What comes out before a fault has been
+/// given to `out`.
+pub fn decode(
+    file: &str,
+    capture: Capture,
+    protocol: Option<&'static dyn Codec>,
+    settings: &Settings,
+    out: &mut Output<'_>,
+) -> Result<(), Stop> {
+    let of_lines = || meant(protocol).any(|codec| !codec.rates().is_empty());
+    match (capture, protocol) {
+        // Whatever was asked for: what has packets.
+        (Capture::Packets(mut packets), _) => {
+            while let Some(packet) = packets.packet()? {
+                for event in CODECS.iter().filter_map(|codec| codec.packet(&packet)) {
+                    out.event(&event)?;
+                }
+                if packets.is_live() {
+                    out.flush()?;
+                }
+                out.tick();
+            }
+            Ok(())
+        }
+        (Capture::Bytes(bytes), _) => log::decode(file, bytes, protocol, settings, out),
+        (_, Some(asked)) if !of_lines() => Err(Fault::new(file, At::File, asked.names().needs).into()),
+        (Capture::Edges(mut line), _) => line::decode(file, line.as_mut(), protocol, settings, out),
+        (Capture::Samples(mut raw), _) => line::samples(file, &mut raw, protocol, settings, out),
+    }
+}

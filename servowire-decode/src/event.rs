@@ -1,0 +1,337 @@
+//! What was said on a line: the one form into which every protocol decodes and from which every output prints.
+
+use std::borrow::Cow;
+use std::fmt::{Display, Write as _};
+
+use bitflags::Flags;
+
+use crate::time::Time;
+
+/// A frame, or the absence of one that was due.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Event {
+    /// Where in the capture.
+    pub place: Place,
+    /// Who spoke.
+    pub direction: Option<Direction>,
+    /// The kind of frame in the protocol's own words, as "ID 3".
+    pub kind: Cow<'static, str>,
+    /// The fields in the order of the line.
+    pub fields: Vec<Field>,
+    /// The position that the frame carries.
+    pub position: Option<Position>,
+    /// For an answer: time since the end of its request, in picoseconds.
+    pub delay: Option<i64>,
+    /// Whether the frame holds.
+    pub verdict: Verdict,
+    /// Whether this is no frame but a word about the recording, which is counted nowhere.
+    pub remark: bool,
+}
+
+impl Event {
+    /// Without position and delay.
+    pub fn new(
+        place: Place,
+        direction: Option<Direction>,
+        kind: impl Into<Cow<'static, str>>,
+        fields: Vec<Field>,
+        verdict: Verdict,
+    ) -> Self {
+        Self { place, direction, kind: kind.into(), fields, position: None, delay: None, verdict, remark: false }
+    }
+
+    /// Says where fields are, by their names.
+    #[must_use]
+    pub(crate) fn locate(mut self, span: impl Fn(&str) -> Option<Span>) -> Self {
+        self.fields.iter_mut().for_each(|field| field.span = span(field.name));
+        self
+    }
+
+    /// A frame whose beginning the capture does not hold: no fault of the line.
+    pub fn cut(place: Place) -> Self {
+        Self::remark(place, "cut", "the capture begins inside a frame")
+    }
+
+    /// What there is to say about the recording at `place`.
+    pub fn remark(place: Place, kind: &'static str, note: impl Display) -> Self {
+        Self { remark: true, ..Self::new(place, None, kind, vec![Field::text("note", note)], Verdict::Ok) }
+    }
+
+    /// A piece of a frame at the end of the capture: what comes then is not known, so it is not sound.
+    pub fn cut_off(place: Place) -> Self {
+        Self::new(place, None, "cut", Vec::new(), Verdict::cut_off())
+    }
+
+    /// No answer, called `what`, came to the request at `place` within `timeout`, in picoseconds, or until `now`, when
+    /// somebody `asked` again or the recording ended.
+    pub fn silence(
+        place: Place,
+        kind: &'static str,
+        what: &str,
+        timeout: i64,
+        (now, asked): (Time, bool),
+        cause: &str,
+    ) -> Self {
+        let (place, reason) = match place {
+            Place::Time { end: start, .. } => {
+                let end = (start + timeout).min(now);
+                let within = (end - start) as f64 / 1e6;
+                (Place::Time { start, end }, format!("no {what} within {within:.1} us"))
+            }
+            Place::Line(_) if asked => (place, format!("no {what} before the next request")),
+            Place::Line(_) => (place, format!("no {what} before the log ends")),
+        };
+        let refusal = Refusal { cause: Some(cause.to_owned()), ..Refusal::new(NO_RESPONSE, reason) };
+        Self::new(place, Some(Direction::Answer), kind, Vec::new(), refusal.into())
+    }
+}
+
+/// Where in a capture.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Place {
+    /// In picoseconds of the capture's time.
+    Time {
+        /// The first edge.
+        start: Time,
+        /// The end of the last bit.
+        end: Time,
+    },
+    /// A line of a log without times.
+    Line(u64),
+}
+
+/// Who spoke on a line with two ends.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Direction {
+    /// The controller.
+    Request,
+    /// The encoder or drive.
+    Answer,
+}
+
+/// A field of a frame.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Field {
+    /// As the protocol's documents spell it.
+    pub name: &'static str,
+    /// What it held.
+    pub value: Value,
+    /// Where it is; none of what is said of the frame as a whole, whose place is that of the event.
+    pub span: Option<Span>,
+}
+
+/// Where a field is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Span {
+    /// Its first bit on the line, counted from 0 at the beginning of the frame.
+    pub first: u32,
+    /// Its last bit.
+    pub last: u32,
+    /// From when to when these bits were on the line.
+    pub place: Place,
+}
+
+impl Span {
+    /// Bits `first` to `last` of a frame at `place`, of `count` bits that follow each other.
+    pub(crate) fn even(place: Place, count: u32, first: u32, last: u32) -> Self {
+        let place = match place {
+            Place::Time { start, end } => {
+                let at = |bit: u32| start + (end - start) / i64::from(count.max(1)) * i64::from(bit);
+                Place::Time { start: at(first), end: if last + 1 == count { end } else { at(last + 1) } }
+            }
+            line @ Place::Line(_) => line,
+        };
+        Self { first, last, place }
+    }
+}
+
+impl Field {
+    /// A field that is said of the frame as a whole.
+    pub fn new(name: &'static str, value: Value) -> Self {
+        Self { name, value, span: None }
+    }
+
+    /// A number without a unit.
+    pub fn number(name: &'static str, value: impl Into<i64>) -> Self {
+        Self::measured(name, value, "")
+    }
+
+    /// A number with its unit.
+    pub fn measured(name: &'static str, value: impl Into<i64>, unit: &'static str) -> Self {
+        Self::new(name, Value::Number { value: value.into(), unit })
+    }
+
+    /// A code or check value of so many hex digits.
+    pub fn hex(name: &'static str, value: impl Into<u64>, digits: usize) -> Self {
+        Self::new(name, Value::Hex { value: value.into(), digits })
+    }
+
+    /// Named bits, by the names that the protocol's crate gives them.
+    pub fn flags<F: Flags<Bits: Into<u64>>>(name: &'static str, flags: &F, digits: usize) -> Self {
+        let set = flags.iter_names().map(|(name, _)| name).collect();
+        Self::new(name, Value::Flags { raw: flags.bits().into(), digits, set })
+    }
+
+    /// What displays itself.
+    pub fn text(name: &'static str, what: impl Display) -> Self {
+        Self::new(name, Value::Text(what.to_string()))
+    }
+
+    /// Bytes or words in hex, so many digits each, a space between them.
+    pub fn digits(name: &'static str, values: impl IntoIterator<Item = impl Into<u64>>, digits: usize) -> Self {
+        let mut text = String::new();
+        for value in values {
+            let space = if text.is_empty() { "" } else { " " };
+            // A String takes everything.
+            let _ = write!(text, "{space}{:0digits$X}", value.into());
+        }
+        Self::new(name, Value::Text(text))
+    }
+}
+
+/// A value with what is needed to print it.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Value {
+    /// A number; the unit may be empty.
+    Number {
+        /// The number.
+        value: i64,
+        /// Its unit.
+        unit: &'static str,
+    },
+    /// A measured value with a fraction.
+    Decimal {
+        /// The number.
+        value: f64,
+        /// Its unit.
+        unit: &'static str,
+    },
+    /// A code or check value, printed in hex.
+    Hex {
+        /// The value.
+        value: u64,
+        /// Hex digits to print.
+        digits: usize,
+    },
+    /// Named bits.
+    Flags {
+        /// All bits.
+        raw: u64,
+        /// Hex digits to print.
+        digits: usize,
+        /// Names of the bits that are set.
+        set: Vec<&'static str>,
+    },
+    /// Anything else.
+    Text(String),
+}
+
+/// A position.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Position {
+    /// Counts, turns included where the frame carries them.
+    pub counts: i64,
+    /// Counts after which the value begins again, where it does.
+    pub span: Option<u64>,
+    /// Counts of a turn, where the resolution is known and the axis turns.
+    pub per_turn: Option<u64>,
+}
+
+impl Position {
+    /// In turns, where the resolution is known.
+    pub fn turns(&self) -> Option<f64> {
+        self.per_turn.map(|counts| self.counts as f64 / counts as f64)
+    }
+
+    /// The way from `before`, the shorter one where the value wraps.
+    pub fn moved_from(&self, before: &Self) -> i64 {
+        let way = self.counts.wrapping_sub(before.counts);
+        let Some(span) = self.span.and_then(|span| i64::try_from(span).ok()).filter(|span| *span > 0) else {
+            return way;
+        };
+        let way = way.rem_euclid(span);
+        if way > span / 2 { way - span } else { way }
+    }
+}
+
+/// Whether a frame holds.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Verdict {
+    /// All checks passed.
+    Ok,
+    /// A check failed.
+    Refused(Box<Refusal>),
+}
+
+/// The class of an answer that was due and did not come.
+pub const NO_RESPONSE: &str = "no_response";
+
+/// Why a frame was refused.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Refusal {
+    /// The class of the check, for statistics: `crc`, `delimiter`, `no_response` ...
+    pub class: &'static str,
+    /// A sentence with what came and what was due.
+    pub reason: String,
+    /// The field by its name.
+    pub field: Option<String>,
+    /// The bit of that field, in the order of the line.
+    pub bit: Option<u32>,
+    /// When that was, in picoseconds.
+    pub time: Option<Time>,
+    /// What probably caused it.
+    pub cause: Option<String>,
+}
+
+impl Refusal {
+    /// Why, and nothing of where.
+    pub fn new(class: &'static str, reason: impl Display) -> Self {
+        Self { class, reason: reason.to_string(), field: None, bit: None, time: None, cause: None }
+    }
+}
+
+impl From<Refusal> for Verdict {
+    fn from(refusal: Refusal) -> Self {
+        Self::Refused(Box::new(refusal))
+    }
+}
+
+impl Verdict {
+    /// The capture ends inside a frame: what comes then is not known, so it is not sound.
+    pub fn cut_off() -> Self {
+        let cause = Some("the file was cut off, or recording stopped there".to_owned());
+        Refusal { cause, ..Refusal::new("truncated", "the capture ends inside a frame") }.into()
+    }
+
+    /// The recording has a hole that begins inside a frame.
+    pub fn in_a_hole() -> Self {
+        let cause = Some("recording stopped there for a while".to_owned());
+        Refusal { cause, ..Refusal::new("truncated", "a hole in the recording begins inside the frame") }.into()
+    }
+
+    /// Whether all checks passed.
+    pub fn is_ok(&self) -> bool {
+        *self == Self::Ok
+    }
+
+    /// Whether this is no frame but the absence of one.
+    pub fn is_silence(&self) -> bool {
+        matches!(self, Self::Refused(refusal) if refusal.class == NO_RESPONSE)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_shorter_way_round() {
+        let at = |counts| Position { counts, span: Some(100), per_turn: None };
+        assert_eq!(at(1).moved_from(&at(99)), 2);
+        assert_eq!(at(99).moved_from(&at(1)), -2);
+        assert_eq!(at(50).moved_from(&at(0)), 50);
+        assert_eq!(at(-1).moved_from(&at(0)), -1);
+        let linear = |counts| Position { counts, span: None, per_turn: None };
+        assert_eq!(linear(-70).moved_from(&linear(99)), -169);
+    }
+}

@@ -1,0 +1,74 @@
+//! What is wrong with an input file, in a sentence that a person can act on.
+
+use std::fmt;
+use std::io;
+
+/// A file that could not be read, or only in part.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("{file}{at}: {what}")]
+pub struct Fault {
+    /// The file as the user named it.
+    pub file: String,
+    /// Where in the file.
+    pub at: At,
+    /// What is wrong and, where it is known, what to do.
+    pub what: String,
+}
+
+/// A place in a file.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum At {
+    /// The file as a whole.
+    File,
+    /// A line of a text file, from 1.
+    Line(u64),
+    /// An offset in a binary file, from 0.
+    Byte(u64),
+}
+
+impl fmt::Display for At {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::File => Ok(()),
+            Self::Line(line) => write!(f, ", line {line}"),
+            Self::Byte(byte) => write!(f, ", byte {byte}"),
+        }
+    }
+}
+
+impl Fault {
+    /// A fault of `file`.
+    pub fn new(file: &str, at: At, what: impl Into<String>) -> Self {
+        Self { file: file.to_owned(), at, what: what.into() }
+    }
+}
+
+/// Why decoding ended early.
+#[derive(Debug)]
+pub enum Stop {
+    /// The input is broken from here on, or nothing in it can be decoded.
+    Fault(Fault),
+    /// The output takes no more.
+    Output(io::Error),
+}
+
+impl From<Fault> for Stop {
+    fn from(fault: Fault) -> Self {
+        Self::Fault(fault)
+    }
+}
+
+impl From<io::Error> for Stop {
+    fn from(error: io::Error) -> Self {
+        Self::Output(error)
+    }
+}
+
+impl fmt::Display for Stop {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Fault(fault) => fault.fmt(f),
+            Self::Output(error) => write!(f, "cannot write: {error}"),
+        }
+    }
+}

@@ -1,0 +1,84 @@
+//! Logs of bytes: which protocol they hold, and its events.
+
+mod recognise;
+
+use std::io;
+
+use recognise::recognise;
+
+use crate::capture::ByteLog;
+use crate::capture::hexlog::Burst;
+use crate::codec::{Codec, LogDecoder};
+use crate::fault::{At, Fault, Stop};
+use crate::output::Output;
+use crate::recognition::Note;
+use crate::settings::Settings;
+use crate::sink::Sink;
+
+/// Bursts by which the protocol is recognised.
+const SAMPLE: usize = 256;
+
+/// Decodes a log; of an unknown protocol, by the one of which most holds.
+pub(crate) fn decode(
+    file: &str,
+    mut log: ByteLog,
+    protocol: Option<&'static dyn Codec>,
+    settings: &Settings,
+    out: &mut Output<'_>,
+) -> Result<(), Stop> {
+    let mut bursts = Vec::new();
+    let mut end = Ok(true);
+    while bursts.len() < SAMPLE && end == Ok(true) && (bursts.is_empty() || !log.pauses()) {
+        match log.burst() {
+            Ok(Some(burst)) => bursts.push(burst),
+            Ok(None) => end = Ok(false),
+            Err(fault) => end = Err(fault),
+        }
+    }
+    let reading = recognise(&bursts, protocol, settings, out);
+    let (reading, mut reader) = reading.map_err(|what| Fault::new(file, At::File, what))?;
+    if let Some(note) = reader.note() {
+        out.note(&Note::Shape(note));
+    }
+    let mut whole = reading.wrapped.then(|| Burst::new(1, Vec::new()));
+    for burst in bursts {
+        join(reader.as_mut(), burst, &mut whole, out)?;
+    }
+    while end == Ok(true) {
+        if log.pauses() {
+            out.flush()?;
+        }
+        out.tick();
+        match log.burst() {
+            Ok(Some(burst)) => join(reader.as_mut(), burst, &mut whole, out)?,
+            Ok(None) => end = Ok(false),
+            Err(fault) => end = Err(fault),
+        }
+    }
+    if let Some(whole) = whole.filter(|whole| !whole.bytes.is_empty()) {
+        reader.take(&whole, out)?;
+    }
+    reader.end(out)?;
+    end?;
+    reader.fault().map_or(Ok(()), |what| Err(Fault::new(file, At::File, what).into()))
+}
+
+/// Takes a burst; of lines in one piece, when they are complete.
+fn join(reader: &mut dyn LogDecoder, burst: Burst, whole: &mut Option<Burst>, out: &mut dyn Sink) -> io::Result<()> {
+    match whole {
+        Some(whole) if burst.spoilt.is_none() && whole.bytes.len() < MOST_JOINED => {
+            whole.bytes.extend(burst.bytes);
+            Ok(())
+        }
+        Some(whole) => {
+            let line = burst.line;
+            let before = std::mem::replace(whole, Burst::new(line, Vec::new()));
+            reader.take(&before, out)?;
+            reader.take(&burst, out)
+        }
+        None => reader.take(&burst, out),
+    }
+}
+
+/// Bytes of lines that are taken in one piece, at most.
+const MOST_JOINED: usize = 1 << 24;

@@ -1,0 +1,133 @@
+//! Which protocol a log of bytes holds, and whether its lines are its bursts.
+
+use crate::capture::hexlog::Burst;
+use crate::codec::{Codec, LogDecoder};
+use crate::output::Output;
+use crate::protocols::CODECS;
+use crate::recognition::Note;
+use crate::settings::Settings;
+use crate::sink::Tally;
+
+/// Bytes of a burst by which it is recognised.
+const MOST_TRIED: usize = 1 << 14;
+/// Per cent of the frames that hold where a log is what it was taken for.
+const SURE: u64 = 80;
+/// Lines of fewer bytes are written as they came.
+const NARROW: usize = 8;
+
+/// What a log may be.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct Reading {
+    pub(super) protocol: &'static dyn Codec,
+    /// Its lines are as long as the tool that wrote them makes them, wherever the frames end.
+    pub(super) wrapped: bool,
+}
+
+/// All of them. Lines as they are come before lines in one piece. What has no check comes last among equals, and only as it
+/// is; what leaves fewest refused wins.
+fn readings() -> impl Iterator<Item = Reading> {
+    let of = |checked: bool, wrapped: bool| {
+        let codecs = CODECS.iter().filter(move |codec| codec.is_checked() == checked);
+        codecs.map(move |protocol| Reading { protocol: *protocol, wrapped })
+    };
+    of(true, false).chain(of(true, true)).chain(of(false, false))
+}
+
+/// The reading that was asked for, or the one of which most holds, and a decoder for it.
+pub(super) fn recognise(
+    bursts: &[Burst],
+    protocol: Option<&'static dyn Codec>,
+    settings: &Settings,
+    out: &Output<'_>,
+) -> Result<(Reading, Box<dyn LogDecoder>), &'static str> {
+    let sample = Sample::new(bursts, settings);
+    let reading = match protocol {
+        None => {
+            let (best, reading) = sample.best(|_| true).ok_or("no protocol of logs")?;
+            // That it is the first of the table goes without saying.
+            if best.ok > 0 && CODECS.first() != Some(&reading.protocol) {
+                out.note(&Note::Log { protocol: reading.protocol, share: share(best) });
+            }
+            reading
+        }
+        Some(asked) => {
+            let best = sample.best(|known| known == asked);
+            if let Some((tally, protocol)) = sample.rather(asked, best.map_or(0, |(tally, _)| share(tally))) {
+                out.note(&Note::LogRather { protocol, tally });
+            }
+            best.ok_or(asked.names().needs)?.1
+        }
+    };
+    let reader = reading.protocol.log(settings, bursts).ok_or(reading.protocol.names().needs)?;
+    Ok((reading, reader))
+}
+
+/// The first bursts of a log, as they are tried.
+struct Sample<'a> {
+    lines: Vec<Burst>,
+    /// All of them in one piece, where the lines may be those of a dump.
+    joined: Option<[Burst; 1]>,
+    settings: &'a Settings,
+}
+
+impl<'a> Sample<'a> {
+    fn new(bursts: &[Burst], settings: &'a Settings) -> Self {
+        let begin = |burst: &Burst| {
+            let bytes = burst.bytes.get(..MOST_TRIED.min(burst.bytes.len())).unwrap_or_default().to_vec();
+            Burst { bytes, spoilt: burst.spoilt.clone(), ..*burst }
+        };
+        let lines: Vec<Burst> = bursts.iter().map(begin).collect();
+        let joined = may_be_wrapped(bursts).then(|| {
+            let bytes = lines.iter().flat_map(|burst| burst.bytes.iter().copied()).take(MOST_TRIED).collect();
+            [Burst::new(1, bytes)]
+        });
+        Self { lines, joined, settings }
+    }
+
+    /// What holds by this reading; `None` where the lines are none of a dump, or nobody decodes logs.
+    fn tally(&self, reading: Reading) -> Option<Tally> {
+        let bursts = if reading.wrapped { self.joined.as_ref()?.as_slice() } else { self.lines.as_slice() };
+        let mut tally = Tally::default();
+        let mut reader = reading.protocol.log(self.settings, &self.lines)?;
+        // A tally takes whatever comes.
+        let _ = bursts.iter().try_for_each(|burst| reader.take(burst, &mut tally));
+        let _ = reader.end(&mut tally);
+        Some(tally)
+    }
+
+    /// The reading of which most holds, among those of the protocols that are meant.
+    fn best(&self, meant: impl Fn(&'static dyn Codec) -> bool) -> Option<(Tally, Reading)> {
+        let tried = readings().filter(|reading| meant(reading.protocol));
+        let tried = tried.filter_map(|reading| Some((self.tally(reading)?, reading)));
+        tried.reduce(|best, next| if share(next.0) > share(best.0) { next } else { best })
+    }
+
+    /// What the log is rather than what was asked for, of which `held` per cent hold.
+    fn rather(&self, asked: &'static dyn Codec, held: u64) -> Option<(Tally, &'static dyn Codec)> {
+        let (other, reading) = self.best(|known| known != asked)?;
+        // Of what has no check not one may be refused, and hardly anything hold as it was meant.
+        let sure = if reading.protocol.is_checked() {
+            share(other) >= SURE && 2 * held <= share(other)
+        } else {
+            share(other) == 100 && 10 * held <= 100
+        };
+        (other.ok > 1 && sure).then_some((other, reading.protocol))
+    }
+}
+
+/// Whether all lines have as many bytes as a dump's, but for the last.
+fn may_be_wrapped(bursts: &[Burst]) -> bool {
+    let Some((last, rest)) = bursts.split_last() else { return false };
+    let width = bursts.first().map_or(0, |first| first.bytes.len());
+    let said = |burst: &Burst| burst.direction.is_some() || burst.spoilt.is_some();
+    width >= NARROW
+        && !rest.is_empty()
+        && rest.iter().all(|burst| burst.bytes.len() == width)
+        && last.bytes.len() <= width
+        && !bursts.iter().any(said)
+}
+
+/// Frames that hold, in per cent.
+fn share(tally: Tally) -> u64 {
+    (100 * tally.ok).checked_div(tally.ok + tally.faults()).unwrap_or(0)
+}

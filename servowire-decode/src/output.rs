@@ -1,0 +1,193 @@
+//! Where events go: text, JSON Lines, a VCD beside, statistics.
+
+pub mod filter;
+pub mod json;
+pub mod printer;
+pub mod stats;
+pub mod table;
+pub mod text;
+pub mod vcd;
+
+use std::collections::BTreeMap;
+use std::io;
+
+use printer::{Lane, Origin, Printer};
+
+use crate::capture::Change;
+use crate::event::{Event, NO_RESPONSE, Verdict};
+use crate::recognition::Note;
+use crate::sink::{Sink, Tally};
+use crate::time::Time;
+
+/// All outputs of one file together.
+pub struct Output<'a> {
+    printer: &'a mut dyn Printer,
+    vcd: Option<&'a mut vcd::VcdOut>,
+    beside: Option<&'a mut dyn Printer>,
+    filter: Option<&'a mut filter::Filter>,
+    /// Called after every block that was read.
+    progress: Option<&'a dyn Fn()>,
+    /// Takes what the user should know but did not ask for.
+    notes: Option<&'a dyn Fn(&Note)>,
+    /// Frames so far.
+    pub tally: Tally,
+    /// Those of them that were asked for.
+    pub chosen: Tally,
+    /// Refused frames by class, with the first cause that was given.
+    refused: BTreeMap<&'static str, (u64, Option<String>)>,
+    origin: Origin,
+}
+
+impl<'a> Output<'a> {
+    /// `printer` gets all events of the file called `file`.
+    pub fn new(file: &str, printer: &'a mut dyn Printer) -> Self {
+        Self {
+            printer,
+            vcd: None,
+            beside: None,
+            filter: None,
+            progress: None,
+            notes: None,
+            tally: Tally::default(),
+            chosen: Tally::default(),
+            refused: BTreeMap::new(),
+            origin: Origin { file: file.to_owned(), ..Origin::default() },
+        }
+    }
+
+    /// Writes events and changes beside each other.
+    #[must_use]
+    pub fn with_vcd(self, vcd: Option<&'a mut vcd::VcdOut>) -> Self {
+        Self { vcd, ..self }
+    }
+
+    /// A second printer gets the events too.
+    #[must_use]
+    pub fn with_beside(self, beside: Option<&'a mut dyn Printer>) -> Self {
+        Self { beside, ..self }
+    }
+
+    /// Called after every block that was read.
+    #[must_use]
+    pub fn with_progress(self, progress: &'a dyn Fn()) -> Self {
+        Self { progress: Some(progress), ..self }
+    }
+
+    /// Takes what the user should know but did not ask for.
+    #[must_use]
+    pub fn with_notes(self, notes: &'a dyn Fn(&Note)) -> Self {
+        Self { notes: Some(notes), ..self }
+    }
+
+    /// Only what passes is shown.
+    #[must_use]
+    pub fn with_filter(self, filter: &'a mut filter::Filter) -> Self {
+        Self { filter: Some(filter), ..self }
+    }
+
+    /// Whether the changes of the line have a taker.
+    pub fn wants_changes(&self) -> bool {
+        self.vcd.is_some()
+    }
+
+    /// The file begins.
+    pub fn begin(&mut self) -> io::Result<()> {
+        self.printer.begin(&self.origin)
+    }
+
+    /// The file is at its end.
+    pub fn end(&mut self) -> io::Result<()> {
+        self.printer.end(&self.origin)?;
+        self.vcd.as_mut().map_or(Ok(()), |vcd| vcd.finish())
+    }
+
+    /// The channels of the capture. The lines found so far are decoded.
+    pub fn channels(&mut self, channels: &[String]) -> io::Result<()> {
+        self.vcd.as_mut().map_or(Ok(()), |vcd| vcd.channels(channels, &self.origin.lanes))
+    }
+
+    /// A further line is decoded; it has the next number, from 0.
+    pub fn begin_lane(&mut self, lane: Lane) {
+        self.origin.lanes.push(lane);
+    }
+
+    /// The events that follow are of this line.
+    pub fn lane(&mut self, lane: usize) {
+        self.origin.speaks = lane;
+    }
+
+    /// A change of any channel.
+    pub fn change(&mut self, change: &Change) -> io::Result<()> {
+        self.vcd.as_mut().map_or(Ok(()), |vcd| vcd.change(change))
+    }
+
+    /// A block was read.
+    pub fn tick(&self) {
+        if let Some(progress) = self.progress {
+            progress();
+        }
+    }
+
+    /// The refused frames and the missing answers in a sentence; none where all hold.
+    pub fn refusals(&self) -> Option<String> {
+        let Tally { ok, refused, missing } = self.chosen;
+        let said = |cause: &Option<String>| cause.as_ref().map_or(String::new(), |cause| format!(" ({cause})"));
+        let one = |(class, (count, cause)): (&&str, &(u64, Option<String>))| format!("{class} {count}{}", said(cause));
+        let classes = self.refused.iter().filter(|(class, _)| **class != NO_RESPONSE).map(one).collect::<Vec<_>>();
+        let frames = format!("{refused} of {} frames refused: {}", ok + refused, classes.join("; "));
+        let cause = self.refused.get(NO_RESPONSE).map_or(String::new(), |(_, cause)| said(cause));
+        let requests = if missing == 1 { "request" } else { "requests" };
+        let silence = format!("{missing} {requests} without an answer: {NO_RESPONSE}{cause}");
+        let both = [(refused > 0).then_some(frames), (missing > 0).then_some(silence)];
+        let both = both.into_iter().flatten().collect::<Vec<_>>().join("; ");
+        (!both.is_empty()).then_some(both)
+    }
+
+    /// Whether nothing that was asked for can come any more once a recording was read up to `time`.
+    pub fn is_over(&self, time: Time) -> bool {
+        self.filter.as_ref().is_some_and(|filter| filter.is_over(time))
+    }
+
+    /// Nothing comes for a while: what is complete is shown.
+    pub fn flush(&mut self) -> io::Result<()> {
+        self.printer.flush()
+    }
+
+    /// Something the user should know.
+    pub fn note(&self, note: &Note) {
+        if let Some(notes) = self.notes {
+            notes(note);
+        }
+    }
+}
+
+impl Sink for Output<'_> {
+    fn event(&mut self, event: &Event) -> io::Result<()> {
+        self.tally.event(event)?;
+        let mut errors = false;
+        if let Some(filter) = &mut self.filter {
+            if !filter.takes(self.origin.speaks, event) {
+                return Ok(());
+            }
+            errors = filter.errors;
+        }
+        self.chosen.event(event)?;
+        if errors && event.verdict.is_ok() {
+            return Ok(());
+        }
+        if let Verdict::Refused(refusal) = &event.verdict {
+            let (count, cause) = self.refused.entry(refusal.class).or_default();
+            *count += 1;
+            if cause.is_none() {
+                cause.clone_from(&refusal.cause);
+            }
+        }
+        if let Some(vcd) = &mut self.vcd {
+            vcd.event(self.origin.speaks, event);
+        }
+        if let Some(beside) = &mut self.beside {
+            beside.event(&self.origin, event)?;
+        }
+        self.printer.event(&self.origin, event)
+    }
+}

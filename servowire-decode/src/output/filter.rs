@@ -1,0 +1,126 @@
+//! Which frames are shown.
+
+use std::collections::BTreeMap;
+
+use crate::event::{Direction, Event, Place, Value};
+use crate::time::Time;
+
+/// What the user wants to see; what is left empty lets everything through.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct Filter {
+    kinds: Vec<String>,
+    address: Option<i64>,
+    from: Option<Time>,
+    to: Option<Time>,
+    /// Only what is refused.
+    pub(super) errors: bool,
+    /// By line: whether the last request passed by its address.
+    passed: BTreeMap<usize, bool>,
+}
+
+/// Fields that hold an address, by the protocols' names.
+const ADDRESSES: [&str; 2] = ["EA", "SA"];
+
+/// After the last time that is asked for, reading goes on for so long: frames that began before it end, in picoseconds.
+const REST: i64 = 10_000_000_000;
+
+impl Filter {
+    /// `kinds`: the whole name or its last word, in any case; `address`: of an encoder, drive or device; `times`: the
+    /// first, and the one from which on nothing is shown, in picoseconds; `errors`: only what is refused.
+    pub fn new(kinds: Vec<String>, address: Option<i64>, times: (Option<Time>, Option<Time>), errors: bool) -> Self {
+        let (from, to) = times;
+        Self { kinds, address, from, to, errors, passed: BTreeMap::new() }
+    }
+
+    /// Whether times matter.
+    pub fn has_times(&self) -> bool {
+        self.from.is_some() || self.to.is_some()
+    }
+
+    /// Whether nothing of interest can come any more once a recording was read up to `time`.
+    pub(super) fn is_over(&self, time: Time) -> bool {
+        self.to.is_some_and(|to| time > to + REST)
+    }
+
+    /// Whether an event of line `lane` is asked for; of those that are, only the refused ones may be shown.
+    pub(super) fn takes(&mut self, lane: usize, event: &Event) -> bool {
+        // The address first: it is remembered from the request for an answer that does not tell it.
+        self.is_addressed(lane, event) && self.is_kind(event) && self.is_in_time(event)
+    }
+
+    fn is_kind(&self, event: &Event) -> bool {
+        let same = |kind: &String| {
+            event.kind.eq_ignore_ascii_case(kind)
+                || event.kind.rsplit(' ').next().is_some_and(|last| last.eq_ignore_ascii_case(kind))
+        };
+        self.kinds.is_empty() || self.kinds.iter().any(same)
+    }
+
+    fn is_in_time(&self, event: &Event) -> bool {
+        match event.place {
+            Place::Time { start, end } => {
+                self.from.is_none_or(|from| end > from) && self.to.is_none_or(|to| start < to)
+            }
+            Place::Line(_) => true,
+        }
+    }
+
+    fn is_addressed(&mut self, lane: usize, event: &Event) -> bool {
+        let Some(wanted) = self.address else { return true };
+        let said = event.fields.iter().find(|field| ADDRESSES.contains(&field.name)).and_then(|f| match f.value {
+            Value::Number { value, .. } => Some(value),
+            _ => None,
+        });
+        // RTEX has the address in the kind: `cmd 5`.
+        let said = said.or_else(|| event.kind.strip_prefix("cmd ").or(event.kind.strip_prefix("rsp "))?.parse().ok());
+        let passes = match said {
+            Some(address) => address == wanted,
+            None => event.direction == Some(Direction::Answer) && self.passed.get(&lane).copied().unwrap_or(false),
+        };
+        if event.direction == Some(Direction::Request) {
+            self.passed.insert(lane, passes);
+        }
+        passes
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::event::{Field, Verdict};
+
+    fn event(direction: Direction, kind: &'static str, address: Option<i64>, start: i128) -> Event {
+        let start = Time::from_ps(start);
+        let fields = address.map(|address| Field::number("EA", address)).into_iter().collect();
+        Event::new(Place::Time { start, end: start + 10 }, Some(direction), kind, fields, Verdict::Ok)
+    }
+
+    #[test]
+    fn kinds_by_name_or_last_word() {
+        let mut filter = Filter { kinds: vec!["3".to_owned(), "abs40".to_owned()], ..Filter::default() };
+        assert!(filter.takes(0, &event(Direction::Answer, "ID 3", None, 0)));
+        assert!(filter.takes(0, &event(Direction::Answer, "ABS40", None, 0)));
+        assert!(!filter.takes(0, &event(Direction::Answer, "ID D", None, 0)));
+        assert!(!filter.takes(0, &event(Direction::Answer, "ABS40_MT", None, 0)));
+    }
+
+    #[test]
+    fn an_answer_without_address_goes_with_its_request() {
+        let mut filter = Filter { address: Some(2), ..Filter::default() };
+        assert!(!filter.takes(0, &event(Direction::Request, "ABS40", Some(1), 0)));
+        assert!(!filter.takes(0, &event(Direction::Answer, "ABS40", None, 0)));
+        assert!(filter.takes(0, &event(Direction::Request, "ABS40", Some(2), 0)));
+        assert!(filter.takes(0, &event(Direction::Answer, "ABS40", None, 0)));
+        // On another line nobody has asked.
+        assert!(!filter.takes(1, &event(Direction::Answer, "ABS40", None, 0)));
+        assert!(filter.takes(0, &event(Direction::Answer, "rsp 2", None, 0)));
+    }
+
+    #[test]
+    fn times_from_and_to() {
+        let mut filter = Filter { from: Some(Time::from_ps(100)), to: Some(Time::from_ps(200)), ..Filter::default() };
+        let takes = [85, 95, 150, 199, 200].map(|start| filter.takes(0, &event(Direction::Answer, "x", None, start)));
+        assert_eq!(takes, [false, true, true, true, false]);
+        assert!(!filter.is_over(Time::from_ps(200)) && filter.is_over(Time::from_ps(10_000_000_201)));
+    }
+}

@@ -1,0 +1,58 @@
+//! A form of output, and what it is told beside the events.
+
+use std::io;
+
+use crate::codec::Codec;
+use crate::event::Event;
+
+/// A line of a capture that is decoded.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Lane {
+    /// The name of its channel, or of its two.
+    pub channel: String,
+    /// Its channels by index.
+    pub channels: Vec<u16>,
+    /// What is spoken on it.
+    pub protocol: &'static dyn Codec,
+    /// Bits a second, as the protocol has it.
+    pub rate: u32,
+}
+
+/// Where events come from: the file, its lines that are decoded, and the one that speaks.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct Origin {
+    /// The name of the file.
+    pub file: String,
+    /// The lines found so far.
+    pub lanes: Vec<Lane>,
+    /// The number of the line that speaks, from 0; a log of bytes has none.
+    pub speaks: usize,
+}
+
+impl Origin {
+    /// The line that speaks; none in a log of bytes.
+    pub fn lane(&self) -> Option<&Lane> {
+        self.lanes.get(self.speaks)
+    }
+}
+
+/// A form of output that is written file by file.
+pub trait Printer {
+    /// A file begins.
+    fn begin(&mut self, _origin: &Origin) -> io::Result<()> {
+        Ok(())
+    }
+
+    /// The next event.
+    fn event(&mut self, origin: &Origin, event: &Event) -> io::Result<()>;
+
+    /// Nothing comes for a while: what is complete is shown.
+    fn flush(&mut self) -> io::Result<()> {
+        Ok(())
+    }
+
+    /// The file is at its end.
+    fn end(&mut self, _origin: &Origin) -> io::Result<()> {
+        Ok(())
+    }
+}

@@ -1,0 +1,240 @@
+//! Figures over a whole capture instead of its frames.
+
+use std::collections::BTreeMap;
+use std::io::{self, Write};
+
+use serde_json::{Value as Json, json};
+
+use super::printer::{Origin, Printer};
+use crate::event::{Direction, Event, NO_RESPONSE, Place, Position, Verdict};
+use crate::time::Time;
+
+/// Jumps of the position that are listed; further ones are counted.
+const LISTED: usize = 10;
+
+/// Collects figures and prints them at the end of a file.
+pub struct Stats<W> {
+    out: W,
+    json: bool,
+    /// Counts that a position may move from one frame to the next.
+    limit: Option<u64>,
+    figures: Figures,
+}
+
+#[derive(Debug, Default)]
+struct Figures {
+    requests: u64,
+    answers: u64,
+    others: u64,
+    ok: u64,
+    kinds: BTreeMap<String, u64>,
+    refused: BTreeMap<&'static str, u64>,
+    /// Start of the last frame of the side that keeps the cycle.
+    last_start: Option<(Option<Direction>, Time)>,
+    cycle: Spread,
+    delay: Spread,
+    position: Option<(Time, Position)>,
+    /// Positions in frames without a time.
+    untimed: u64,
+    largest: u64,
+    jumps: u64,
+    listed: Vec<Jump>,
+}
+
+#[derive(Debug, Clone, Copy)]
+struct Jump {
+    time: Time,
+    from: i64,
+    to: i64,
+    moved: i64,
+}
+
+/// Least, most, mean and deviation of a series, in picoseconds.
+#[derive(Debug, Clone, Copy, Default)]
+struct Spread {
+    count: u64,
+    min: i64,
+    max: i64,
+    mean: f64,
+    squares: f64,
+}
+
+impl Spread {
+    fn add(&mut self, value: i64) {
+        (self.min, self.max) =
+            if self.count == 0 { (value, value) } else { (self.min.min(value), self.max.max(value)) };
+        self.count += 1;
+        let apart = value as f64 - self.mean;
+        self.mean += apart / self.count as f64;
+        self.squares += apart * (value as f64 - self.mean);
+    }
+
+    fn deviation(&self) -> f64 {
+        if self.count < 2 { 0.0 } else { (self.squares / (self.count - 1) as f64).sqrt() }
+    }
+
+    fn text(&self) -> String {
+        if self.count == 0 {
+            return "none seen".to_owned();
+        }
+        let us = |ps: f64| ps / 1e6;
+        format!(
+            "min {:.3} us, mean {:.3} us, max {:.3} us, jitter {:.3} us peak to peak, {:.3} us rms",
+            us(self.min as f64),
+            us(self.mean),
+            us(self.max as f64),
+            us((self.max - self.min) as f64),
+            us(self.deviation())
+        )
+    }
+
+    fn json(&self) -> Json {
+        if self.count == 0 {
+            return Json::Null;
+        }
+        json!({
+            "count": self.count, "min_ps": self.min, "mean_ps": self.mean, "max_ps": self.max,
+            "jitter_ps": self.max - self.min, "rms_ps": self.deviation(),
+        })
+    }
+}
+
+impl Figures {
+    fn add(&mut self, event: &Event, limit: Option<u64>) {
+        if event.remark {
+            return;
+        }
+        match event.direction {
+            _ if event.verdict.is_silence() => {}
+            Some(Direction::Request) => self.requests += 1,
+            Some(Direction::Answer) => self.answers += 1,
+            None => self.others += 1,
+        }
+        match &event.verdict {
+            Verdict::Ok => {
+                self.ok += 1;
+                // A request and its answer are one of a kind.
+                if event.direction != Some(Direction::Request) {
+                    *self.kinds.entry(event.kind.to_string()).or_default() += 1;
+                }
+            }
+            Verdict::Refused(refusal) => *self.refused.entry(refusal.class).or_default() += 1,
+        }
+        if let Some(delay) = event.delay {
+            self.delay.add(delay);
+        }
+        let Place::Time { start, .. } = event.place else {
+            self.untimed += u64::from(event.position.is_some());
+            return;
+        };
+        if event.verdict.is_silence() {
+            return;
+        }
+        self.keep_cycle(event.direction, start);
+        if let Some(position) = event.position {
+            self.follow(start, position, limit);
+        }
+    }
+
+    /// What there must be to tell jumps, and is not.
+    fn missing(&self) -> Option<&'static str> {
+        match (self.position, self.untimed) {
+            (Some(_), _) => None,
+            (None, 0) => Some("no position of a single axis is seen (a log of RTEX blocks needs --mac-id)"),
+            (None, _) => Some("the positions have no times (a log of RTEX blocks needs --period)"),
+        }
+    }
+
+    /// The cycle is that of the requests; on a line without them, that of the frames there are.
+    fn keep_cycle(&mut self, direction: Option<Direction>, start: Time) {
+        match self.last_start {
+            Some((side, last)) if side == direction => self.cycle.add(start - last),
+            Some(_) if direction == Some(Direction::Request) => self.cycle = Spread::default(),
+            Some(_) => return,
+            None => {}
+        }
+        self.last_start = Some((direction, start));
+    }
+
+    fn follow(&mut self, time: Time, position: Position, limit: Option<u64>) {
+        // Single-turn and multi-turn positions are not compared with each other.
+        let before = self.position.replace((time, position)).filter(|(_, before)| before.span == position.span);
+        let Some((_, before)) = before else { return };
+        let moved = position.moved_from(&before);
+        self.largest = self.largest.max(moved.unsigned_abs());
+        if limit.is_some_and(|limit| moved.unsigned_abs() > limit) {
+            self.jumps += 1;
+            if self.listed.len() < LISTED {
+                self.listed.push(Jump { time, from: before.counts, to: position.counts, moved });
+            }
+        }
+    }
+}
+
+impl<W: Write> Stats<W> {
+    /// `limit`: moves of the position above it are listed as jumps.
+    pub fn new(out: W, json: bool, limit: Option<u64>) -> Self {
+        Self { out, json, limit, figures: Figures::default() }
+    }
+
+    fn print_text(&mut self, file: &str) -> io::Result<()> {
+        let f = &self.figures;
+        let missing = f.refused.get(NO_RESPONSE).copied().unwrap_or(0);
+        let refused = f.refused.values().sum::<u64>() - missing;
+        let kinds = f.kinds.iter().map(|(kind, n)| format!("{kind}: {n}")).collect::<Vec<_>>().join(", ");
+        writeln!(self.out, "{file}")?;
+        writeln!(self.out, "  frames        {} requests, {} answers, {} others", f.requests, f.answers, f.others)?;
+        writeln!(self.out, "  kinds         {}", if kinds.is_empty() { "none" } else { &kinds })?;
+        let without = if missing > 0 { format!(", {missing} answers missing") } else { String::new() };
+        writeln!(self.out, "  verdicts      {} ok, {refused} refused{without}", f.ok)?;
+        for (class, count) in &f.refused {
+            writeln!(self.out, "    {class:<17} {count}")?;
+        }
+        writeln!(self.out, "  cycle         {}", f.cycle.text())?;
+        writeln!(self.out, "  answer delay  {}", f.delay.text())?;
+        if f.position.is_some() {
+            writeln!(self.out, "  largest move  {} counts", f.largest)?;
+        }
+        if let (Some(_), Some(missing)) = (self.limit, f.missing()) {
+            writeln!(self.out, "  jumps         not known: {missing}")?;
+        } else if let Some(limit) = self.limit {
+            writeln!(self.out, "  jumps         {} of more than {limit} counts", f.jumps)?;
+            for Jump { time, from, to, moved } in &f.listed {
+                writeln!(self.out, "    {:>14.3} us  {from} to {to}: {moved:+}", time.us())?;
+            }
+        }
+        Ok(())
+    }
+
+    fn print_json(&mut self, file: &str) -> io::Result<()> {
+        let f = &self.figures;
+        let jump = |j: &Jump| json!({ "time_ps": j.time, "from": j.from, "to": j.to, "moved": j.moved });
+        let object = json!({
+            "file": file, "requests": f.requests, "answers": f.answers, "others": f.others,
+            "ok": f.ok, "refused": f.refused, "kinds": f.kinds,
+            "cycle": f.cycle.json(), "answer_delay": f.delay.json(),
+            "largest_move": f.position.map(|_| f.largest),
+            "jumps": self.limit.filter(|_| f.missing().is_none()).map(|_| f.jumps),
+            "jumps_listed": f.listed.iter().map(jump).collect::<Vec<_>>(),
+        });
+        serde_json::to_writer(&mut self.out, &object)?;
+        self.out.write_all(b"\n")
+    }
+}
+
+impl<W: Write> Printer for Stats<W> {
+    fn event(&mut self, _: &Origin, event: &Event) -> io::Result<()> {
+        self.figures.add(event, self.limit);
+        Ok(())
+    }
+
+    fn end(&mut self, origin: &Origin) -> io::Result<()> {
+        if self.json {
+            self.print_json(&origin.file)?;
+        } else {
+            self.print_text(&origin.file)?;
+        }
+        self.figures = Figures::default();
+        self.out.flush()
+    }
+}

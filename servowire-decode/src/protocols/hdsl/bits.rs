@@ -1,0 +1,334 @@
+//! Edges of the pair as bits, with the time of each.
+
+mod grid;
+
+use std::cell::Cell;
+use std::ops::Range;
+
+use hdsl::Window;
+
+use crate::event::Place;
+use crate::line::receive::Rates;
+use crate::line::spikes::Spikes;
+use crate::time::{Clock, Time};
+
+/// Samples of a bit on a grid of samples.
+pub(super) const SAMPLES: u64 = 8;
+/// Longest run that is taken bit by bit; a longer one is a pause.
+pub(super) const PAUSE: u64 = 200;
+/// A speaker's bit may be so far from the nominal one, in per cent.
+const OFF: i64 = 6;
+/// An edge so far from the grid, in per cent of a bit, is that of another speaker.
+const ELSEWHERE: i64 = 30;
+/// An edge so near to the grid, in parts of a bit, is on it: neither the grid nor the bit length follows.
+const ON_GRID: i64 = 32;
+/// Edges after longer runs than this tell nothing of the bit length.
+pub(super) const LONGEST_RUN: usize = ADAPT.len() - 1;
+/// Parts of a picosecond, in binary digits, in which the length of a bit is kept, and parts of a bit.
+const FINE: u32 = 16;
+const PART: u32 = 40;
+/// How much the distance of an edge from the grid moves the bit length, in parts of a picosecond, by the bits of the run
+/// before it: 0.06 of it after one bit. Longer runs than these tell nothing.
+const ADAPT: [i64; 11] = {
+    const ONE: i64 = (6 << FINE) / 100;
+    [0, ONE, ONE / 2, ONE / 3, ONE / 4, ONE / 5, ONE / 6, ONE / 7, ONE / 8, ONE / 9, ONE / 10]
+};
+
+/// Bits of the line. The grid follows the edges of whoever drives.
+pub(super) struct Bits {
+    spikes: Spikes,
+    /// The nominal length in picoseconds, and in parts of them.
+    nominal: i64,
+    fine: i64,
+    /// The present length in parts of a picosecond, and its inverse as it was not long ago.
+    bit: i64,
+    inverse: i64,
+    inverse_of: i64,
+    /// Where the grid has the last edge, and the level since.
+    last: Option<(Time, bool)>,
+    /// 64 bits each, the first in bit 0.
+    words: Vec<u64>,
+    /// Number of the first bit in `words`, a multiple of 64, and of the one after the last.
+    first: u64,
+    end: u64,
+    /// Places of edges.
+    marks: Vec<Mark>,
+    /// The one that was asked for last: the next question is about one near it.
+    asked: Cell<usize>,
+    /// Bit after a pause too long for its bits to be kept.
+    pub(super) paused: Option<u64>,
+    heard: Heard,
+}
+
+/// The place of an edge.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Mark {
+    /// Number of the bit that begins there.
+    pub(super) bit: u64,
+    pub(super) time: Time,
+    /// Up to the next mark all edges lie on a grid of samples.
+    pub(super) grid: Option<Grid>,
+}
+
+/// Where edges lie that have no marks of their own.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Grid {
+    /// Number of the sample at the mark.
+    pub(super) sample: u64,
+    pub(super) clock: Clock,
+}
+
+/// What was heard of the line: edges, spikes, and bit lengths in parts of a picosecond.
+#[derive(Debug, Clone, Copy)]
+struct Heard {
+    edges: u64,
+    spikes: u64,
+    least: i64,
+    most: i64,
+    /// Of the bit lengths beyond the nominal one, and how many.
+    beyond: i64,
+    count: u32,
+}
+
+impl Bits {
+    pub(super) fn new(bit: f64) -> Self {
+        let mut bits = Self {
+            spikes: Spikes::new(bit),
+            nominal: bit as i64,
+            fine: (bit * f64::from(1 << FINE)) as i64,
+            bit: (bit * f64::from(1 << FINE)) as i64,
+            inverse: 0,
+            inverse_of: 0,
+            last: None,
+            words: Vec::new(),
+            first: 0,
+            end: 0,
+            marks: Vec::new(),
+            asked: Cell::new(0),
+            paused: None,
+            heard: Heard { edges: 0, spikes: 0, least: i64::MAX, most: 0, beyond: 0, count: 0 },
+        };
+        bits.invert();
+        bits
+    }
+
+    /// Length of a bit in picoseconds.
+    fn length(&self) -> f64 {
+        self.bit as f64 / f64::from(1 << FINE)
+    }
+
+    /// Half a bit in picoseconds.
+    pub(super) fn half(&self) -> i64 {
+        self.nominal / 2
+    }
+
+    fn invert(&mut self) {
+        self.inverse_of = self.bit;
+        self.inverse = (1_i64 << (PART + FINE)) / self.bit.max(1);
+    }
+
+    /// What was measured of the line.
+    pub(super) fn rates(&self) -> Rates {
+        let Heard { edges, spikes, least, most, beyond, count } = self.heard;
+        let share = |bit: f64| self.fine as f64 / bit;
+        let mut rates = Rates::of(edges, spikes);
+        if count > 0 {
+            rates.measured(share(self.fine as f64 + beyond as f64 / f64::from(count)));
+            (rates.least, rates.most) = (share(most as f64), share(least as f64));
+        }
+        rates
+    }
+
+    #[inline]
+    pub(super) fn change(&mut self, time: Time, level: bool) {
+        if self.last.is_none() {
+            self.last = Some((time, level));
+            self.mark(time);
+        }
+        if let Some(edge) = self.spikes.plain_change(time, level) {
+            return self.edge(edge.time, edge.level, edge.spikes);
+        }
+        for edge in self.spikes.change(time, level).into_iter().flatten() {
+            self.edge(edge.time, edge.level, edge.spikes);
+        }
+    }
+
+    /// The line has not changed until `time`: what is certain of it becomes bits.
+    pub(super) fn reach(&mut self, time: Time) {
+        for edge in self.spikes.reach(time).into_iter().flatten() {
+            self.edge(edge.time, edge.level, edge.spikes);
+        }
+    }
+
+    /// The capture ends at `time`; the last level is held for some bits so that what it began can be read.
+    pub(super) fn finish(&mut self, time: Time, hold: f64) {
+        self.reach(time + self.length() as i64);
+        if let Some((since, level)) = self.last {
+            let until = time.max(since + (hold * self.length()) as i64);
+            let count = ((until - since) as f64 / self.length()).round().max(0.0) as u64;
+            self.push(level, count.min(PAUSE));
+            self.last = None;
+        }
+    }
+
+    #[inline]
+    fn edge(&mut self, time: Time, level: bool, spikes: u32) {
+        self.heard.edges += 1;
+        self.heard.spikes += u64::from(spikes);
+        let Some((since, before)) = self.last else { return };
+        let run = time - since;
+        let longest = (PAUSE as i64 + 50) * self.nominal;
+        if run >= longest {
+            self.pause(time, before, level);
+            return;
+        }
+        // Half a bit, where another speaker begins, always goes the same way.
+        let count = (run * self.inverse + (1 << (PART - 1)) - (1 << (PART - 6))) >> PART;
+        let off = run - ((count * self.bit + (1 << (FINE - 1))) >> FINE);
+        let place = match usize::try_from(count).ok().and_then(|count| ADAPT.get(count)) {
+            Some(_) if off.abs() * ON_GRID <= self.nominal => {
+                self.measured(1);
+                time
+            }
+            Some(part) if off.abs() * 100 <= ELSEWHERE * self.nominal => {
+                self.adapt(off * part);
+                // The grid follows half-way.
+                time - (off >> 1)
+            }
+            _ => time,
+        };
+        let count = count.max(0) as u64;
+        if count > PAUSE {
+            self.paused = Some(self.end + PAUSE);
+        }
+        self.push(before, count.min(PAUSE));
+        self.last = Some((place, level));
+        self.mark(time);
+    }
+
+    fn mark(&mut self, time: Time) {
+        self.marks.push(Mark { bit: self.end, time, grid: None });
+    }
+
+    /// An edge after a pause.
+    #[cold]
+    fn pause(&mut self, time: Time, before: bool, level: bool) {
+        self.paused = Some(self.end + PAUSE);
+        self.push(before, PAUSE);
+        self.last = Some((time, level));
+        self.mark(time);
+    }
+
+    /// The bit becomes longer by so many parts of a picosecond.
+    #[inline]
+    fn adapt(&mut self, parts: i64) {
+        let most = self.fine / 100 * OFF;
+        self.bit = (self.bit + parts).clamp(self.fine - most, self.fine + most);
+        if (self.bit - self.inverse_of).abs() > self.fine >> 11 {
+            self.invert();
+        }
+        self.measured(1);
+    }
+
+    /// So many edges were heard of bits of the present length.
+    #[inline]
+    fn measured(&mut self, edges: u32) {
+        self.heard.least = self.heard.least.min(self.bit);
+        self.heard.most = self.heard.most.max(self.bit);
+        self.heard.beyond = self.heard.beyond.saturating_add(i64::from(edges) * (self.bit - self.fine));
+        self.heard.count = self.heard.count.saturating_add(edges);
+    }
+
+    fn push(&mut self, level: bool, count: u64) {
+        let used = self.end % 64;
+        if used != 0 && used + count <= 64 {
+            if let (true, Some(word)) = (level, self.words.last_mut()) {
+                *word |= (u64::MAX >> ((64 - count) & 63)) << used & if count == 0 { 0 } else { u64::MAX };
+            }
+            self.end += count;
+            return;
+        }
+        let mut left = count;
+        while left > 0 {
+            let used = (self.end - self.first) % 64;
+            if used == 0 {
+                self.words.push(0);
+            }
+            let now = left.min(64 - used);
+            if let (true, Some(word)) = (level, self.words.last_mut()) {
+                *word |= (u64::MAX >> (64 - now)) << used;
+            }
+            self.end += now;
+            left -= now;
+        }
+    }
+
+    /// Number of the bit after the last one.
+    pub(super) fn end(&self) -> u64 {
+        self.end
+    }
+
+    /// Up to 128 bits from bit `at` on.
+    pub(super) fn window(&self, at: u64) -> Window {
+        let len = self.end.saturating_sub(at).min(128) as u32;
+        Window::from_bits(self.load(at), len).unwrap_or(Window::EMPTY)
+    }
+
+    /// 128 bits from bit `at` on; after the end they are 0.
+    pub(super) fn load(&self, at: u64) -> u128 {
+        let from = at.saturating_sub(self.first);
+        let word = |k: u64| usize::try_from(from / 64 + k).ok().and_then(|k| self.words.get(k)).copied().unwrap_or(0);
+        let low = u128::from(word(0)) | u128::from(word(1)) << 64;
+        match from % 64 {
+            0 => low,
+            by => low >> by | u128::from(word(2)) << (128 - by),
+        }
+    }
+
+    /// When a bit begins.
+    pub(super) fn time(&self, at: u64) -> Time {
+        let is_after = |mark: usize| self.marks.get(mark).is_none_or(|mark| mark.bit > at);
+        let mut mark = self.asked.get().min(self.marks.len());
+        while !is_after(mark + 1) {
+            mark += 1;
+        }
+        while mark > 0 && is_after(mark) {
+            mark -= 1;
+        }
+        self.asked.set(mark);
+        let Some(Mark { mut bit, mut time, grid }) = self.marks.get(mark).copied() else { return Time::ZERO };
+        if let Some(grid) = grid.filter(|_| bit < at) {
+            let edge = self.last_edge(bit, at);
+            time = grid.clock.time(grid.sample + (edge - bit) * SAMPLES);
+            bit = edge;
+        }
+        time + ((at as i64 - bit as i64) as f64 * self.length()) as i64
+    }
+
+    /// The last bit up to `at` that differs from the one before it; `first` where none does.
+    fn last_edge(&self, first: u64, at: u64) -> u64 {
+        // Runs on a grid are short.
+        let from = first.max(at.saturating_sub(LONGEST_RUN as u64)).max(self.first);
+        let bits = self.load(from) as u64;
+        let edges = (bits ^ bits >> 1) & ((1 << at.saturating_sub(from)) - 1);
+        if edges == 0 { first } else { from + 64 - u64::from(edges.leading_zeros()) }
+    }
+
+    pub(super) fn place(&self, bits: Range<u64>) -> Place {
+        let start = self.time(bits.start);
+        Place::Time { start, end: start + ((bits.end - bits.start) as f64 * self.length()) as i64 }
+    }
+
+    /// Bits before `at` are of no more interest.
+    pub(super) fn forget(&mut self, at: u64) {
+        let words = (at.saturating_sub(self.first) / 64).min(self.words.len() as u64);
+        if words < 64 {
+            return;
+        }
+        self.words.drain(..words as usize);
+        self.first += words * 64;
+        let keep = self.marks.partition_point(|mark| mark.bit <= self.first).saturating_sub(1);
+        self.marks.drain(..keep);
+        self.asked.set(self.asked.get().saturating_sub(keep));
+    }
+}

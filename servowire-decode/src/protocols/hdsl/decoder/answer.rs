@@ -1,0 +1,186 @@
+//! Answers of a link that runs: their words, the running disparity between them, their V-frames.
+
+use hdsl::frame::ANSWER_BITS;
+use hdsl::inspect::{Chain, Expected, inspect};
+use hdsl::{AlignmentStage, Answer, EncoderByte, Error, Rule, VFrame, Window};
+
+use super::super::refused::{Refused, event, position, refusal};
+use super::{Break, Decoder};
+use crate::event::{Direction, Field, Place, Span};
+
+const DISPARITY: &str = "all words are in the tables, but not one after the other: bits of at least one were flipped";
+const TAIL: &str =
+    "the next answer does not begin at the running disparity that this one leaves: a bit was flipped at its end";
+const FRONT: &str =
+    "it does not begin at the running disparity that the answer before leaves: a bit was flipped at its front";
+const BETWEEN: &str =
+    "the running disparity does not go on from one answer to the next: a bit was flipped between their middles";
+const STRAY: &str = "VSYNC is due in each eighth answer, and only there";
+const SWITCH: &str = "the switch bit is not the inverse of the bit before it";
+/// The answer at hand is the last of a V-frame of which the others are not known.
+const LAST: u8 = 8;
+
+impl Decoder {
+    pub(super) fn normal(&mut self, window: Window, place: Place) {
+        let Ok(answer) = Answer::parse(Rule::Strict, window) else { return };
+        let dd = answer.delta_delta();
+        self.tracker.step(dd.ok());
+        let parameter = answer.parameter();
+        let report = inspect(Expected::Normal { at: self.at }, window);
+        let chain = report.disparity();
+        let verdict = match report.error() {
+            None if !chain.holds() => Err(("disparity", DISPARITY.to_owned())),
+            None => Ok(()),
+            Some(error) => Err(refusal(error)),
+        };
+        let sound = verdict.is_ok();
+        let verdict = verdict.and_then(|()| self.follow(parameter.is_ok_and(EncoderByte::vsync)));
+        let event = event(place, Direction::Answer, "answer", self.fields(answer), verdict);
+        let mut event = event.locate(|name| {
+            let (first, last) = match name {
+                "VERT" => (0, 9),
+                "SYMBOL" | "VSYNC" => (10, 19),
+                "PIPE" => (20, 29),
+                // The switch bit comes after it.
+                "DD" => (30, 49),
+                "SEC" => (51, 60),
+                _ => return None,
+            };
+            Some(Span::even(place, ANSWER_BITS.into(), first, last))
+        });
+        let shown = self.tracker.registers();
+        if self.tracker.stage() == AlignmentStage::Check && !shown.pos_flag {
+            event.fields.push(Field::hex("POS", shown.pos, 10));
+            event.position = Some(position(shown.pos));
+        }
+        if event.verdict.is_ok() && !answer.switch_ok() {
+            event.fields.push(Field::text("note", SWITCH));
+        }
+        let number = self.said.next();
+        self.said.push(event);
+        self.join(sound.then_some((chain, number)));
+        self.message_in(parameter.ok(), place);
+        self.v_frame(answer, place);
+    }
+
+    fn fields(&self, answer: Answer) -> Vec<Field> {
+        let byte = |name, word: hdsl::symbol::Reading| word.byte().ok().map(|byte| Field::hex(name, byte, 2));
+        let mut fields = Vec::with_capacity(10);
+        fields.push(Field::measured("delay", self.delay.unwrap_or(0), "bit"));
+        fields.extend(byte("VERT", answer.vertical()));
+        if let Ok(parameter) = answer.parameter() {
+            fields.push(encoder_symbol(parameter));
+            fields.push(Field::number("VSYNC", parameter.vsync()));
+        }
+        fields.extend(byte("PIPE", answer.pipe()));
+        fields.extend(answer.delta_delta().ok().map(|dd| Field::number("DD", dd.get())));
+        fields.extend(byte("SEC", answer.secondary()));
+        fields.push(Field::measured("VEL", self.tracker.registers().vel, "/frame"));
+        fields
+    }
+
+    /// Follows VSYNC of an answer that is good so far; one that is not due is passed over, but not two.
+    fn follow(&mut self, vsync: bool) -> Result<(), Refused> {
+        let due = self.at.map(|at| at == 7);
+        if due.is_none_or(|due| due == vsync) {
+            self.strays = 0;
+            // The answer itself is the last of its V-frame.
+            self.at = self.at.or(vsync.then_some(LAST));
+            return Ok(());
+        }
+        self.strays += 1;
+        if self.strays > 1 {
+            self.lose_v_frame();
+            self.at = vsync.then_some(LAST);
+        }
+        Err(("vsync", STRAY.to_owned()))
+    }
+
+    /// Whether a good answer goes on from the one before.
+    fn join(&mut self, next: Option<(Chain, u64)>) {
+        let (before, Some((chain, begins))) = (std::mem::replace(&mut self.chain, next), next) else { return };
+        let Some((Some(goes_on), ends)) = before.map(|(before, ends)| (before.goes_on_in(chain), ends)) else { return };
+        if !goes_on && self.carried.is_rule() {
+            let first_failed = if self.at == Some(0) { self.failed.map(|[_, second]| second) } else { None };
+            self.breaks.push(Break { ends, begins, first_failed });
+            let told = match self.at {
+                Some(0) => first_failed.is_some(),
+                Some(at) => at < LAST,
+                None => false,
+            };
+            if !told {
+                self.settle(None);
+            }
+        }
+        self.carried.note(goes_on);
+    }
+
+    /// With the checks of the V-frame it is known on which side of a break a bit was flipped: the last word of an answer
+    /// is of channel 2, the first of the next of channel 1.
+    pub(super) fn settle(&mut self, failed: Option<[bool; 2]>) {
+        for Break { ends, begins, first_failed } in std::mem::take(&mut self.breaks) {
+            let sides = failed.map(|[first, second]| (first_failed.unwrap_or(second), first));
+            let (tail, front, what) = match sides {
+                Some((true, false)) => (true, false, TAIL),
+                Some((false, _)) => (false, true, FRONT),
+                _ => (true, true, BETWEEN),
+            };
+            for (_, number) in [(tail, ends), (front, begins)].into_iter().filter(|side| side.0) {
+                self.said.refuse(number, ("disparity", what.to_owned()));
+            }
+        }
+    }
+
+    fn v_frame(&mut self, answer: Answer, place: Place) {
+        match self.at {
+            Some(LAST) => {}
+            Some(at) => {
+                self.frame.put(Rule::Strict, at, answer);
+                self.quality.count_answer(at, &answer);
+                if at == 7 {
+                    self.end_v_frame(place);
+                }
+                self.at = Some((at + 1) % 8);
+                return;
+            }
+            None => return,
+        }
+        (self.at, self.failed) = (Some(0), None);
+    }
+
+    fn end_v_frame(&mut self, place: Place) {
+        let VFrame { safe1, safe2 } = self.frame;
+        let safe = safe1.vpos();
+        self.quality.count_v_frame(&self.frame);
+        match safe {
+            Ok(position) => self.tracker.align(position),
+            Err(_) => self.tracker.no_safe_position(),
+        }
+        let mut fields = vec![Field::hex("SUMMARY", safe1.status(), 2)];
+        fields.extend(safe.ok().map(|position| Field::hex("VPOS", position, 10)));
+        fields.push(Field::hex("STATUS2", safe2.status(), 2));
+        fields.extend(safe2.vpos().ok().map(|position| Field::hex("VPOS2", position, 10)));
+        fields.push(Field::number("QM", self.quality.value()));
+        let second = safe2.vpos();
+        let error = safe.err().or(second.err());
+        let mut event = event(place, Direction::Answer, "V-frame", fields, error.map_or(Ok(()), |e| Err(refusal(e))));
+        event.position = safe.ok().map(position);
+        self.said.push(event);
+        let failed = [is_damage(safe.err()), is_damage(second.err())];
+        self.failed = Some(failed);
+        self.settle(Some(failed));
+    }
+}
+
+/// The symbol, or the five bits of one without a meaning.
+fn encoder_symbol(byte: EncoderByte) -> Field {
+    match byte.symbol() {
+        Ok(symbol) => Field::text("SYMBOL", symbol),
+        Err(_) => Field::text("SYMBOL", format_args!("{:02X}h", byte.raw() & 31)),
+    }
+}
+
+/// Whether it is a block that was damaged, and not one that says there is no position.
+fn is_damage(error: Option<Error>) -> bool {
+    error.is_some_and(|error| matches!(error, Error::InvalidWord { .. } | Error::WrongKind { .. } | Error::Crc { .. }))
+}

@@ -1,0 +1,246 @@
+//! T-Format frames as events: names, values, positions, reasons.
+
+use std::sync::LazyLock;
+
+use tformat::{
+    Abm, Abs, Adf, AllData, Almc, DataId, Doubt, Error, Evidence, Memory, Policy, Request, Resolution, Response,
+    Sample, StatusField, Tolerated,
+};
+
+use super::frame::{ANSWER_TIMEOUT, Frame};
+use crate::event::{Direction, Event, Field, Place, Position, Refusal, Value, Verdict};
+use crate::protocols::group::{self, too_wide};
+use crate::protocols::plausible::Motion;
+use crate::settings::Widths;
+use crate::time::Time;
+
+/// The fields an event may have.
+pub(super) const FIELDS: &[&str] =
+    &["SF", "ABS", "ENID", "ABM", "ALMC", "ADF", "EDF", "CRC", "effect", "width", "spikes", "bytes", "note"];
+
+/// A request as it was on the line.
+pub(super) fn request(frame: &Frame, id: Option<DataId>, result: Result<Request, Error>) -> Event {
+    let mut fields = Vec::new();
+    match result {
+        Ok(Request::WriteEeprom { adf, edf }) => fields.extend([address(adf), Field::hex("EDF", edf, 2)]),
+        Ok(Request::ReadEeprom { adf }) => fields.push(address(adf)),
+        Ok(request) => fields.extend(effect(request.data_id())),
+        Err(_) => fields.push(bytes(frame)),
+    }
+    fields.extend(frame.spikes());
+    let names = id.map_or(&["CF"][..], |id| id.layout().request);
+    located(event(frame, Direction::Request, id, fields, verdict(frame, names, result.err())), frame, names)
+}
+
+/// What is known of the encoder.
+#[derive(Debug, Clone)]
+pub(super) struct Encoder {
+    widths: Widths,
+    /// By the last ENID on the line.
+    hint: Option<Resolution>,
+    enid: Option<u8>,
+    motion: Motion,
+}
+
+impl Encoder {
+    pub(super) fn new(widths: Widths) -> Self {
+        Self { widths, hint: None, enid: None, motion: Motion::default() }
+    }
+
+    /// An answer as it was on the line, to `id` where the request was read.
+    pub(super) fn answer(
+        &mut self,
+        frame: &Frame,
+        id: Option<DataId>,
+        result: Result<Response, Error>,
+        delay: Option<i64>,
+    ) -> Event {
+        let mut fields = Vec::with_capacity(8);
+        let (mut position, mut note) = (None, None);
+        match result {
+            Ok(response) => {
+                let before = self.enid;
+                position = self.response(response, &mut fields);
+                let moved = position.and_then(|position| self.motion.note(frame.place(), position));
+                let notes: Vec<String> = doubts(response, before).into_iter().chain(moved).collect();
+                if !notes.is_empty() {
+                    note = Some(Field::text("note", notes.join("; ")));
+                }
+            }
+            // A refusal is a sound ID 3 frame with all its values.
+            Err(Error::Rejected { .. }) => {
+                if let Ok(full) = AllData::parse(frame.contents()) {
+                    position = self.response(Response::ReadAll(full), &mut fields);
+                }
+            }
+            Err(_) => fields.push(bytes(frame)),
+        }
+        if result.is_ok() {
+            fields.extend(frame.contents().last().map(|crc| Field::hex("CRC", *crc, 2)));
+        }
+        fields.extend(note);
+        fields.extend(frame.spikes());
+        let names = frame.data_id().ok().or(id).map_or(&["CF"][..], |id| id.layout().response);
+        let event = event(frame, Direction::Answer, id, fields, verdict(frame, names, result.err()));
+        let mut event = located(event, frame, names);
+        event.position = position;
+        event.delay = delay;
+        event
+    }
+
+    fn response(&mut self, response: Response, fields: &mut Vec<Field>) -> Option<Position> {
+        fields.extend(response.status().map(|sf| Field::flags("SF", &sf, 2)));
+        match response {
+            Response::ReadSingleTurn(v) => self.single_turn(v.abs, fields),
+            Response::ResetErrors(v) | Response::SetSingleTurnZero(v) | Response::ResetTurnsAndErrors(v) => {
+                let position = self.single_turn(v.abs, fields);
+                fields.extend(effect(response.data_id()));
+                position
+            }
+            Response::ReadMultiTurn(v) => {
+                fields.push(Field::number("ABM", v.abm.get()));
+                None
+            }
+            Response::ReadEncoderId(v) => {
+                self.identify(v.enid, fields);
+                None
+            }
+            Response::ReadAll(full) => self.full(full, fields),
+            Response::WriteEeprom(Memory { adf, edf }) | Response::ReadEeprom(Memory { adf, edf }) => {
+                fields.push(address(adf));
+                if !adf.busy() {
+                    fields.push(Field::hex("EDF", edf, 2));
+                }
+                None
+            }
+        }
+    }
+
+    fn full(&mut self, full: AllData, fields: &mut Vec<Field>) -> Option<Position> {
+        fields.push(Field::number("ABS", full.abs.get()));
+        self.identify(full.enid, fields);
+        fields.push(Field::number("ABM", full.abm.get()));
+        fields.push(Field::flags("ALMC", &full.almc, 2));
+        let resolution = self.resolution()?;
+        match shown(full, resolution, Tolerated::NOTHING) {
+            Ok(sample) => Some(Position {
+                counts: sample.counts()?,
+                span: Some(1 << (resolution.abs_bits() + resolution.abm_bits())),
+                per_turn: Some(resolution.counts_per_turn().into()),
+            }),
+            Err(doubt) => {
+                fields.push(too_wide(doubt, resolution.abs_bits(), resolution.abm_bits()));
+                None
+            }
+        }
+    }
+
+    fn single_turn(&self, abs: Abs, fields: &mut Vec<Field>) -> Option<Position> {
+        fields.push(Field::number("ABS", abs.get()));
+        let Some(resolution) = self.resolution() else {
+            return Some(Position { counts: abs.get().into(), span: None, per_turn: None });
+        };
+        let turn = Some(resolution.counts_per_turn().into());
+        match shown(AllData { abs, ..NOTHING }, resolution, Tolerated::SINGLE_TURN) {
+            Ok(sample) => Some(Position { counts: sample.single_turn().into(), span: turn, per_turn: turn }),
+            Err(doubt) => {
+                fields.push(too_wide(doubt, resolution.abs_bits(), resolution.abm_bits()));
+                None
+            }
+        }
+    }
+
+    fn identify(&mut self, enid: u8, fields: &mut Vec<Field>) {
+        fields.push(Field::number("ENID", enid));
+        self.enid = Some(enid);
+        self.hint = Resolution::from_enid(enid).map(|hint| hint.resolution);
+    }
+
+    /// The widths as the user gave them, else as the encoder ID suggests.
+    fn resolution(&self) -> Option<Resolution> {
+        let (abs, abm) = self.widths.or(self.hint.map(|hint| (hint.abs_bits(), hint.abm_bits())))?;
+        Resolution::new(abs, abm).ok()
+    }
+}
+
+const NOTHING: AllData =
+    AllData { sf: StatusField::empty(), abs: Abs::truncate(0), enid: 0, abm: Abm::truncate(0), almc: Almc::empty() };
+
+/// Where the fields put the shaft, for looking at. What else speaks against it stands beside it: alarms, damage, another
+/// encoder ID.
+fn shown(full: AllData, resolution: Resolution, tolerated: Tolerated) -> Result<Sample, Doubt> {
+    let fields = AllData { abs: full.abs, abm: full.abm, ..NOTHING };
+    Evidence::of(Response::ReadAll(fields), resolution, 0).at(0, Policy::new(0).tolerating(tolerated))
+}
+
+/// What an answer says that hardly goes together; `before`: the encoder ID until now.
+fn doubts(response: Response, before: Option<u8>) -> Vec<String> {
+    let mut out = Vec::new();
+    let enid = match response {
+        Response::ReadEncoderId(v) => Some(v.enid),
+        Response::ReadAll(full) => Some(full.enid),
+        _ => None,
+    };
+    if let (Some(before), Some(enid)) = (before, enid.filter(|enid| before.is_some_and(|before| before != *enid))) {
+        out.push(format!(
+            "the encoder ID was {before} and is {enid}: another encoder, or damage that CRC does not see"
+        ));
+    }
+    if let Response::ReadAll(full) = response {
+        // Encoders that leave SF at 0 do so always.
+        if full.sf.bits() != 0 && !full.sf.agrees_with(full.almc) {
+            out.push(format!("SF does not say what ALMC says: {} is due", StatusField::of_alarms(full.almc)));
+        }
+    }
+    out
+}
+
+/// No answer came to the request at `place` until `now`; `asked`: because somebody asked again.
+pub(super) fn silence(request: Request, place: Place, now: Time, asked: bool) -> Event {
+    let kind = kind(Some(request.data_id()));
+    group::silence(place, kind, "answer", ANSWER_TIMEOUT, now, asked, "no encoder")
+}
+
+fn event(frame: &Frame, direction: Direction, id: Option<DataId>, fields: Vec<Field>, verdict: Verdict) -> Event {
+    Event::new(frame.place(), Some(direction), kind(id), fields, verdict)
+}
+
+/// With the places of its fields, which have these `names` on the line: ABS is ABS0 to ABS2.
+fn located(event: Event, frame: &Frame, names: &[&str]) -> Event {
+    event.locate(|name| {
+        let part = |known: &&str| known.trim_end_matches(|digit: char| digit.is_ascii_digit()) == name;
+        let first = names.iter().position(part)? as u32;
+        let last = names.iter().rposition(part)? as u32;
+        frame.span(8 * first, 8 * last + 7)
+    })
+}
+
+/// The data ID as it displays itself, written once and not for every frame.
+fn kind(id: Option<DataId>) -> &'static str {
+    static NAMES: LazyLock<[(DataId, String); 9]> = LazyLock::new(|| DataId::ALL.map(|id| (id, id.to_string())));
+    let name = |id| NAMES.iter().find(|(known, _)| *known == id).map(|(_, name)| name.as_str());
+    id.and_then(name).unwrap_or("ID ?")
+}
+
+/// What a reset does: one of ten has to be seen ten times to have an effect.
+fn effect(id: DataId) -> Option<Field> {
+    id.effect().map(|effect| Field::text("effect", format_args!("{effect}, one of {}", id.repeats())))
+}
+
+fn address(adf: Adf) -> Field {
+    let set = if adf.busy() { vec!["busy"] } else { Vec::new() };
+    Field::new("ADF", Value::Flags { raw: adf.bits().into(), digits: 2, set })
+}
+
+fn bytes(frame: &Frame) -> Field {
+    Field::digits("bytes", frame.contents().iter().copied(), 2)
+}
+
+fn verdict(frame: &Frame, names: &[&'static str], error: Option<Error>) -> Verdict {
+    let Some(error) = error else { return Verdict::Ok };
+    let field = match error {
+        Error::Crc { .. } => frame.len().checked_sub(1),
+        other => other.field().map(usize::from),
+    };
+    frame.refused(names, field, error.bit(), Refusal::new(error.class().name(), error)).into()
+}

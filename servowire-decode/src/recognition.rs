@@ -1,0 +1,150 @@
+//! What was recognised of a capture, and why: values that print as a sentence.
+
+use std::fmt;
+
+use crate::codec::Codec;
+use crate::line::receive::Rates;
+use crate::sink::Tally;
+
+/// Spikes are worth a word from one in so many edges on.
+const SPIKY: u64 = 50;
+
+/// A rate in bits a second as Mbit/s.
+pub(crate) fn mbit(rate: f64) -> f64 {
+    rate / 1e6
+}
+
+/// What is said on a line, and what speaks for it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Recognition {
+    /// Its channel by name, or that of the requests and that of the answers.
+    pub channels: Vec<String>,
+    /// The protocol.
+    pub protocol: &'static dyn Codec,
+    /// The rate of the protocol in bits a second.
+    pub rate: u32,
+    /// Whether the line is decoded upside down.
+    pub inverted: bool,
+    /// The level at which the line rests, where it does.
+    pub idle: Option<bool>,
+    /// The rate that the runs of the line look like, in bits a second.
+    pub seen: Option<f64>,
+    /// What was measured on the line.
+    pub rates: Rates,
+    /// The first frames by their verdict.
+    pub tally: Tally,
+    /// The next best protocol and rate of the same channel, if it is close.
+    pub rival: Option<(&'static dyn Codec, u32)>,
+}
+
+/// `channel "A" idles high, 2.5 Mbit/s (+0.00 % on the line): T-Format, 24 of 24 frames hold`
+impl fmt::Display for Recognition {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self.channels.as_slice() {
+            [tx, rx] => write!(f, "channels \"{tx}\" (requests) and \"{rx}\" (answers)"),
+            channels => write!(f, "channel \"{}\"", channels.join(" + ")),
+        }?;
+        let rests = match (self.inverted, self.idle) {
+            (false, Some(false)) => "taken as idling high, though it idles low (A and B swapped?)",
+            (false, _) if self.channels.len() > 1 => "idle high",
+            (false, _) => "idles high",
+            (true, Some(true)) => "taken as idling low, though it idles high",
+            (true, _) => "idles low (A and B swapped) and is decoded inverted",
+        };
+        let rate = f64::from(self.rate);
+        write!(f, " {rests}, {} Mbit/s", mbit(rate))?;
+        let off = |share: f64| (share - 1.0) * 100.0;
+        let strange = self.seen.filter(|seen| (seen / rate - 1.0).abs() > 0.1);
+        match (strange, self.rates.mean()) {
+            (Some(seen), _) => write!(f, ", though the runs look like {:.3} Mbit/s", mbit(seen))?,
+            (None, Some(_)) if off(self.rates.most) - off(self.rates.least) > 1.0 => {
+                write!(f, " ({:+.1} to {:+.1} % on the line)", off(self.rates.least), off(self.rates.most))?;
+            }
+            (None, Some(mean)) => {
+                // No sign for what is no difference.
+                let off = if off(mean).abs() < 0.005 { 0.0 } else { off(mean) };
+                write!(f, " ({off:+.2} % on the line)")?;
+            }
+            (None, None) => {}
+        }
+        let Tally { ok, refused, .. } = self.tally;
+        write!(f, ": {}, {ok} of {} frames hold", self.protocol.title(), ok + refused)?;
+        if let Some((protocol, rate)) = self.rival {
+            write!(f, "; next {} at {} Mbit/s", protocol.title(), mbit(f64::from(rate)))?;
+        }
+        if self.rates.spikes * SPIKY > self.rates.edges {
+            write!(f, "; {} spikes beside {} edges: check termination", self.rates.spikes, self.rates.edges)?;
+        }
+        Ok(())
+    }
+}
+
+/// What somebody who decodes a capture should know and did not ask for.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Note {
+    /// A line was found.
+    Line {
+        /// The file.
+        file: String,
+        /// What is on the line.
+        line: Recognition,
+    },
+    /// A line is something else than what it was said to be.
+    LineRather {
+        /// The file.
+        file: String,
+        /// What it looks like.
+        line: Recognition,
+    },
+    /// More channels move than are tried.
+    Channels {
+        /// The file.
+        file: String,
+        /// How many move.
+        moving: usize,
+        /// How many were tried.
+        tried: usize,
+    },
+    /// A log of bytes was recognised.
+    Log {
+        /// The protocol.
+        protocol: &'static dyn Codec,
+        /// The first frames that hold, in per cent.
+        share: u64,
+    },
+    /// A log is something else than what it was said to be.
+    LogRather {
+        /// The protocol.
+        protocol: &'static dyn Codec,
+        /// The first frames by their verdict.
+        tally: Tally,
+    },
+    /// What a log looks like as a whole.
+    Shape(String),
+}
+
+impl fmt::Display for Note {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let so = "frames hold so; leave out what says otherwise";
+        match self {
+            Self::Line { file, line } => write!(f, "{file}: {line}"),
+            Self::LineRather { file, line } => {
+                let (title, Tally { ok, refused, .. }) = (line.protocol.title(), line.tally);
+                let upside = if line.inverted { ", inverted" } else { "" };
+                let rate = mbit(f64::from(line.rate));
+                write!(f, "{file}: it looks like {title} at {rate} Mbit/s{upside}: {ok} of {} {so}", ok + refused)
+            }
+            Self::Channels { file, moving, tried } => {
+                write!(f, "{file}: {moving} channels move, and the {tried} busiest were tried: name one by --channel")
+            }
+            Self::Log { protocol, share } => {
+                write!(f, "taken as {}, of which {share} % of the first frames hold", protocol.title())
+            }
+            Self::LogRather { protocol, tally } => {
+                let (ok, all) = (tally.ok, tally.ok + tally.faults());
+                write!(f, "it looks like {}: {ok} of {all} {so}", protocol.title())
+            }
+            Self::Shape(text) => f.write_str(text),
+        }
+    }
+}

@@ -1,0 +1,41 @@
+//! Where events go one by one, and the simplest place: a tally.
+
+use std::io;
+
+use crate::event::{Event, Verdict};
+
+/// Takes events in the order of the line.
+pub trait Sink {
+    /// The next event.
+    fn event(&mut self, event: &Event) -> io::Result<()>;
+}
+
+/// Counts frames by their verdict.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct Tally {
+    /// Events that hold.
+    pub ok: u64,
+    /// Frames refused.
+    pub refused: u64,
+    /// Answers that did not come.
+    pub missing: u64,
+}
+
+impl Tally {
+    /// What is wrong: refused frames and missing answers.
+    pub fn faults(self) -> u64 {
+        self.refused + self.missing
+    }
+}
+
+impl Sink for Tally {
+    fn event(&mut self, event: &Event) -> io::Result<()> {
+        match event.verdict {
+            _ if event.remark => {}
+            Verdict::Ok => self.ok += 1,
+            Verdict::Refused(_) if event.verdict.is_silence() => self.missing += 1,
+            Verdict::Refused(_) => self.refused += 1,
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,284 @@
+//! Instants of a capture, and what the formats write of them.
+
+use std::fmt;
+use std::ops::{Add, AddAssign, Neg, Sub};
+
+use serde::{Serialize, Serializer};
+
+/// Picoseconds in a second.
+pub const SECOND: i64 = 1_000_000_000_000;
+
+/// An instant of a capture in picoseconds: since its beginning or its trigger (before that it is negative), or since 1970 where
+/// the format tells the date. There is room for any number of years; what lies between two instants is a plain number of
+/// picoseconds, which ends at 106 days.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct Time(i128);
+
+impl Time {
+    /// Where a capture begins that does not say it otherwise.
+    pub const ZERO: Self = Self(0);
+    /// After all captures.
+    pub const MAX: Self = Self(i128::MAX);
+
+    /// From picoseconds.
+    pub const fn from_ps(picoseconds: i128) -> Self {
+        Self(picoseconds)
+    }
+
+    /// In picoseconds.
+    pub const fn ps(self) -> i128 {
+        self.0
+    }
+
+    /// In microseconds, nearly.
+    pub fn us(self) -> f64 {
+        self.0 as f64 / 1e6
+    }
+
+    /// The same instant on a clock that is 0 at `origin`.
+    #[must_use]
+    pub const fn since(self, origin: Self) -> Self {
+        Self(self.0.saturating_sub(origin.0))
+    }
+}
+
+impl Add<i64> for Time {
+    type Output = Self;
+
+    fn add(self, picoseconds: i64) -> Self {
+        Self(self.0.saturating_add(picoseconds.into()))
+    }
+}
+
+impl AddAssign<i64> for Time {
+    fn add_assign(&mut self, picoseconds: i64) {
+        *self = *self + picoseconds;
+    }
+}
+
+impl Sub<i64> for Time {
+    type Output = Self;
+
+    fn sub(self, picoseconds: i64) -> Self {
+        Self(self.0.saturating_sub(picoseconds.into()))
+    }
+}
+
+/// The way from one to the other, at most 106 days.
+impl Sub for Time {
+    type Output = i64;
+
+    #[inline]
+    fn sub(self, before: Self) -> i64 {
+        let way = self.0.saturating_sub(before.0);
+        i64::try_from(way).unwrap_or(if way < 0 { i64::MIN } else { i64::MAX })
+    }
+}
+
+impl Neg for Time {
+    type Output = Self;
+
+    fn neg(self) -> Self {
+        Self(self.0.saturating_neg())
+    }
+}
+
+impl fmt::Display for Time {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        self.0.fmt(f)
+    }
+}
+
+impl Serialize for Time {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.serialize_i128(self.0)
+    }
+}
+
+/// Longer times are none: 30 million years.
+const MOST: i128 = 1_000_000_000_000_000_000_000_000_000;
+
+/// Decimal seconds (`-0.000012345`, `1.5e-6`) in picoseconds; digits beyond are dropped.
+pub fn from_decimal(text: &str) -> Option<Time> {
+    let text = text.trim();
+    let (negative, digits) = match text.strip_prefix('-') {
+        Some(rest) => (true, rest),
+        None => (false, text.strip_prefix('+').unwrap_or(text)),
+    };
+    let (whole, part) = digits.split_once('.').unwrap_or((digits, ""));
+    let all_digits = |s: &str| s.bytes().all(|b| b.is_ascii_digit());
+    if whole.is_empty() && part.is_empty() {
+        return None;
+    }
+    if !all_digits(whole) || !all_digits(part) {
+        // Only an exponent is left as a legal form.
+        return if text.contains(['e', 'E']) { from_seconds(text.parse().ok()?) } else { None };
+    }
+    let whole: i128 = if whole.is_empty() { 0 } else { whole.parse().ok()? };
+    let part = part.bytes().chain(std::iter::repeat(b'0')).take(12).fold(0, |n, b| n * 10 + i128::from(b - b'0'));
+    let time = whole.checked_mul(SECOND.into())?.checked_add(part)?;
+    (time < MOST).then_some(Time(if negative { -time } else { time }))
+}
+
+/// Seconds as a floating point number in picoseconds; nothing for what no capture can hold.
+pub fn from_seconds(seconds: f64) -> Option<Time> {
+    let time = (seconds * 1e12).round();
+    (time.abs() < MOST as f64).then_some(Time(time as i128))
+}
+
+/// A frequency in hertz as people and files write it: digits, a prefix of the powers of a thousand, `Hz` in any case.
+/// A small `m` is meant as mega, as sigrok has it.
+pub fn frequency(text: &str) -> Option<f64> {
+    let bare = text.trim();
+    let bare = match bare.len().checked_sub(2).map(|at| (bare.get(..at), bare.get(at..))) {
+        Some((Some(before), Some(unit))) if unit.eq_ignore_ascii_case("hz") => before.trim_end(),
+        _ => bare,
+    };
+    let last = bare.chars().last()?;
+    let factor = match last.to_ascii_lowercase() {
+        'k' => 1e3,
+        'm' => 1e6,
+        'g' => 1e9,
+        't' => 1e12,
+        'p' => 1e15,
+        'e' => 1e18,
+        _ => 1.0,
+    };
+    let digits = if factor > 1.0 { bare.get(..bare.len() - 1)? } else { bare };
+    let number: f64 = digits.trim().parse().ok()?;
+    (number.is_finite() && number >= 0.0).then_some(number * factor)
+}
+
+/// A time as people write it, with its unit: `500us`, `0.5 ms`, `-2s`; in picoseconds.
+pub fn duration(text: &str) -> Option<Time> {
+    let bare = text.trim();
+    let digits = bare.trim_end_matches(char::is_alphabetic);
+    let picoseconds = match bare.get(digits.len()..)? {
+        "ps" => 1.0,
+        "ns" => 1e3,
+        "us" | "µs" | "μs" => 1e6,
+        "ms" => 1e9,
+        "s" => 1e12,
+        _ => return None,
+    };
+    let number: f64 = digits.trim_end().parse().ok()?;
+    from_seconds(number * picoseconds / 1e12)
+}
+
+/// Sample indices in picoseconds and back.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Clock {
+    rate: u64,
+    /// So many samples take so many picoseconds, in the smallest whole numbers.
+    samples: u64,
+    picoseconds: u64,
+}
+
+impl Clock {
+    /// `rate` in samples a second, 1 to 10^12.
+    pub fn new(rate: u64) -> Self {
+        let rate = rate.clamp(1, SECOND as u64);
+        let (mut common, mut rest) = (SECOND as u64, rate);
+        while rest != 0 {
+            (common, rest) = (rest, common % rest);
+        }
+        Self { rate, samples: rate / common, picoseconds: SECOND as u64 / common }
+    }
+
+    /// Samples a second.
+    pub fn rate(self) -> u64 {
+        self.rate
+    }
+
+    /// When sample `index` was taken.
+    #[inline]
+    pub fn time(self, index: u64) -> Time {
+        let time = index.checked_mul(self.picoseconds).and_then(|time| time.checked_add(self.samples / 2));
+        match time {
+            Some(time) if self.samples == 1 => Time(time.into()),
+            Some(time) => Time((time / self.samples).into()),
+            None => self.late(index),
+        }
+    }
+
+    /// The same where 64 bits do not hold the product.
+    #[cold]
+    fn late(self, index: u64) -> Time {
+        let time = u128::from(index) * u128::from(self.picoseconds) + u128::from(self.samples / 2);
+        Time((time / u128::from(self.samples)) as i128)
+    }
+
+    /// The sample nearest to a time that is not negative.
+    pub fn index(self, time: Time) -> u64 {
+        let index =
+            time.0.max(0).saturating_mul(self.rate.into()).saturating_add(i128::from(SECOND / 2)) / i128::from(SECOND);
+        u64::try_from(index).unwrap_or(u64::MAX)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    #[test]
+    fn decimal_seconds() {
+        for (text, want) in [
+            ("0", Some(0)),
+            ("0.000000000", Some(0)),
+            ("-0.000012345", Some(-12_345_000)),
+            (" 1.5 ", Some(1_500_000_000_000)),
+            (".25", Some(250_000_000_000)),
+            ("0.0000000000019", Some(1)),
+            ("4.8e-07", Some(480_000)),
+            ("1.2.3", None),
+            ("", None),
+            (".", None),
+            ("one", None),
+            ("2021-05-12T10:00:00", None),
+            ("9999999999999999", None),
+            ("1e300", None),
+        ] {
+            assert_eq!(from_decimal(text).map(Time::ps), want, "{text:?}");
+        }
+    }
+
+    #[test]
+    fn times_with_units() {
+        for (text, want) in [
+            ("500us", Some(500_000_000)),
+            ("0.5 ms", Some(500_000_000)),
+            ("-2s", Some(-2_000_000_000_000)),
+            ("1e3ns", Some(1_000_000)),
+            ("7 µs", Some(7_000_000)),
+            ("5", None),
+            ("us", None),
+            ("5 h", None),
+            ("", None),
+            ("1e30s", None),
+        ] {
+            assert_eq!(duration(text).map(Time::ps), want, "{text:?}");
+        }
+    }
+
+    #[test]
+    fn years_are_no_limit() {
+        // 100 years after 1970, to the picosecond.
+        let late = from_decimal("3155760000.000000000001").unwrap();
+        assert_eq!(late.ps(), 3_155_760_000_000_000_000_001);
+        assert_eq!((late + 1 - late, late.since(late + -5).ps()), (1, 5));
+        // Between two instants lie at most 106 days.
+        assert_eq!([late - Time::ZERO, Time::ZERO - late], [i64::MAX, i64::MIN]);
+        assert_eq!(Clock::new(1).time(u64::MAX).ps(), i128::from(u64::MAX) * 1_000_000_000_000);
+        assert!([Time::MAX + 1, Time::MAX - -1, -(-Time::MAX - 1)].iter().all(|time| *time == Time::MAX));
+    }
+
+    proptest! {
+        #[test]
+        fn a_sample_has_one_time(rate in 1..=1_000_000_000_u64, index in 0..1_u64 << 40) {
+            let clock = Clock::new(rate);
+            prop_assume!(u128::from(index) * SECOND as u128 / u128::from(rate) < 9_000_000_000_000_000_000);
+            prop_assert_eq!(clock.index(clock.time(index)), index);
+        }
+    }
+}

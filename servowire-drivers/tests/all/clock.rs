@@ -1,0 +1,305 @@
+//! No call waits for ever on a clock that stands, was set back, or wraps after 32 bits: all calls of the blocking drivers, the clock
+//! failing at any of their looks, with nobody at the line.
+
+use std::cell::Cell;
+use std::convert::Infallible;
+use std::fmt::Debug;
+use std::num::NonZeroU16;
+
+use embedded_io::{ErrorType, Read, ReadReady, Write};
+use nikon_aformat::bus::Addresses;
+use nikon_aformat::master::Cycle;
+use nikon_aformat::{EncoderAddress, Operation, RequestFrame};
+use rtex_block::master::{ActiveCode, Asic, Axis, AxisConfig, Limits, Master, MasterConfig, Slave};
+use rtex_block::timing::{Periods, TimerSystem};
+use rtex_block::{BlockSize, MacId};
+use servowire_drivers::nikon::Frame;
+use servowire_drivers::nikon::blocking::{Driver as Encoders, FramePort};
+use servowire_drivers::rtex::{Driver, FrameCount, Port};
+use servowire_drivers::tformat::blocking::Driver as Encoder;
+use servowire_drivers::{Automatic, Clock, ClockError, CounterClock, Direction, Error, TickRate, Worst};
+
+/// Looks from the fault on after which three calls must have ended: several times what those take that poll an EEPROM.
+const PATIENCE: u32 = 2_000_000;
+/// Time from look to look, ns.
+const STEP_NS: u64 = 2_000;
+
+/// What is wrong with the clock, from one of its looks on.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Wrong {
+    Nothing,
+    Stands,
+    /// It begins at 0 again.
+    Reset,
+    /// It has 32 bits, which are over at that look.
+    Wraps,
+}
+
+/// A clock that goes on with every look, until something is wrong.
+struct Bad {
+    looks: Cell<u32>,
+    wrong: Wrong,
+    at: u32,
+}
+
+impl Bad {
+    fn new(wrong: Wrong, at: u32) -> Self {
+        Self { looks: Cell::new(0), wrong, at }
+    }
+
+    fn look(&self) -> u64 {
+        let look = self.looks.get();
+        self.looks.set(look + 1);
+        assert!(look < self.at.saturating_add(PATIENCE), "{:?} from look {} on: for ever", self.wrong, self.at);
+        let past_ns = |looks: u32| u64::from(looks) * STEP_NS;
+        let begin_ns = (1 << 32) - past_ns(self.at);
+        match self.wrong {
+            Wrong::Stands => begin_ns + past_ns(look.min(self.at)),
+            Wrong::Reset if look >= self.at => past_ns(look - self.at),
+            Wrong::Wraps => (begin_ns + past_ns(look)) & 0xffff_ffff,
+            Wrong::Nothing | Wrong::Reset => begin_ns + past_ns(look),
+        }
+    }
+}
+
+/// Three calls end without fault of the clock if nothing is wrong with it. If it fails in one of the first two, that is told, once if it
+/// goes on, and no call is for ever.
+fn holds<IO: Debug, PIN: Debug, P: Debug, D: Debug>(
+    name: &str,
+    calls: impl Fn(&Bad) -> [Option<Error<IO, PIN, P, D>>; 3],
+) {
+    let good = Bad::new(Wrong::Nothing, 0);
+    for error in calls(&good) {
+        assert!(!matches!(error, Some(Error::Clock(_))), "{name}: {error:?}");
+    }
+    let looks = good.looks.get() * 2 / 3;
+    for wrong in [Wrong::Stands, Wrong::Reset, Wrong::Wraps] {
+        let mut at = 1;
+        while at < looks {
+            let errors = calls(&Bad::new(wrong, at)).map(|error| match error {
+                Some(Error::Clock(error)) => Some(error),
+                _ => None,
+            });
+            let told = if wrong == Wrong::Stands {
+                // And it goes on standing.
+                errors[2] == Some(ClockError::Stopped)
+            } else {
+                let mut told = errors.iter().flatten();
+                matches!((told.next(), told.next()), (Some(ClockError::Backwards { .. }), None))
+            };
+            assert!(told, "{name}, {wrong:?} from look {at} of {looks} on: {errors:?}");
+            at += 1 + at / 9;
+        }
+    }
+}
+
+/// A UART at which nobody answers, and a port.
+struct Silence;
+
+impl ErrorType for Silence {
+    type Error = Infallible;
+}
+
+impl Write for Silence {
+    fn write(&mut self, bytes: &[u8]) -> Result<usize, Infallible> {
+        Ok(bytes.len())
+    }
+
+    fn flush(&mut self) -> Result<(), Infallible> {
+        Ok(())
+    }
+}
+
+impl ReadReady for Silence {
+    fn read_ready(&mut self) -> Result<bool, Infallible> {
+        Ok(false)
+    }
+}
+
+impl Read for Silence {
+    fn read(&mut self, _: &mut [u8]) -> Result<usize, Infallible> {
+        Ok(0)
+    }
+}
+
+impl FramePort for Silence {
+    type Error = Infallible;
+
+    fn send(&mut self, _: &[RequestFrame], _: u32) -> Result<(), Infallible> {
+        Ok(())
+    }
+
+    fn take(&mut self) -> Result<Option<Frame>, Infallible> {
+        Ok(None)
+    }
+}
+
+#[test]
+fn tformat() {
+    let line = tformat::master::Line::new(tformat::BitRate::Mbit2_5);
+    let address = tformat::Address::truncate(5);
+    macro_rules! holds {
+        ($name:literal, $call:expr) => {
+            holds($name, |clock| {
+                let mut encoder = Encoder::new(Silence, Automatic, || clock.look(), line).unwrap();
+                std::array::from_fn(|_| $call(&mut encoder).err())
+            });
+        };
+    }
+    let (resolution, policy) = (tformat::Resolution::new(23, 16).unwrap(), tformat::Policy::new(1_000_000));
+    holds!("read_position", |e: &mut Encoder<_, _, _>| e.read_position(resolution, policy));
+    holds!("read_data", |e: &mut Encoder<_, _, _>| e.read_data());
+    holds!("clear_errors", |e: &mut Encoder<_, _, _>| e.clear_errors());
+    holds!("read_eeprom", |e: &mut Encoder<_, _, _>| e.read_eeprom(tformat::Page::truncate(0), address));
+    holds!("write_eeprom", |e: &mut Encoder<_, _, _>| e.write_eeprom(tformat::Page::truncate(0), address, 7));
+    holds!("transact", |e: &mut Encoder<_, _, _>| e.transact(tformat::Request::ReadSingleTurn));
+}
+
+#[test]
+fn nikon() {
+    let line = nikon_aformat::master::Line::new(nikon_aformat::BitRate::Mbit2_5);
+    let (resolution, ea) = (nikon_aformat::Resolution::default(), EncoderAddress::ZERO);
+    macro_rules! holds {
+        ($name:literal, $call:expr) => {
+            holds($name, |clock| {
+                let mut master = Encoders::new(Silence, || clock.look(), resolution, line);
+                std::array::from_fn(|_| $call(&mut master, clock).err())
+            });
+        };
+    }
+    holds!("read_position", |m: &mut Encoders<_, _>, _| m.read_position(ea, nikon_aformat::Policy::new(1_000_000)));
+    holds!("read_abs40", |m: &mut Encoders<_, _>, _| m.read_abs40(ea));
+    holds!("read_bus", |m: &mut Encoders<_, _>, _| m.read_bus(Operation::Abs40Mt, Addresses::first(8)));
+    holds!("clear_status", |m: &mut Encoders<_, _>, _| m.clear_status(ea));
+    holds!("read_eeprom", |m: &mut Encoders<_, _>, _| m.read_eeprom(ea, 3));
+    // Half a millisecond after another call.
+    holds!("read_cycle", |m: &mut Encoders<_, _>, clock: &Bad| {
+        if let Err(Error::Clock(error)) = m.read_abs40(ea) {
+            return Err(Error::Clock(error));
+        }
+        let mut cycle = Cycle::new(1_000_000, 900_000, clock.look() + 500_000).unwrap();
+        m.read_cycle(&mut cycle, Operation::Abs40Mt, Addresses::first(3))
+    });
+}
+
+/// An ASIC that never gets ready, and the blocks that were written to it.
+struct Stuck<'a>(&'a Cell<u32>);
+
+impl Port for Stuck<'_> {
+    type Word = u16;
+    type Error = Infallible;
+
+    fn state(&mut self) -> Result<Asic, Infallible> {
+        Ok(Asic::RingConfig)
+    }
+
+    fn slaves(&mut self, _: &mut [Slave]) -> Result<Option<usize>, Infallible> {
+        Ok(None)
+    }
+
+    fn read(&mut self, _: usize, _: &mut [u16]) -> Result<(), Infallible> {
+        Ok(())
+    }
+
+    fn write(&mut self, _: usize, _: &[u16]) -> Result<(), Infallible> {
+        self.0.set(self.0.get() + 1);
+        Ok(())
+    }
+}
+
+static RECEIVED: FrameCount = FrameCount::new();
+
+fn host() -> Master<1> {
+    let periods = Periods::from_a6n(-1, 1, Some(500_000)).unwrap();
+    let config = MasterConfig::new(BlockSize::Bytes16, periods, TimerSystem::Internal);
+    let mac_id = MacId::truncate(1);
+    let limits = Limits::new(NonZeroU16::new(6).unwrap(), 60);
+    let axis = Axis::new(AxisConfig::new(mac_id, ActiveCode::CyclicPosition, periods.update_ns, limits));
+    Master::new(config, [Slave { mac_id, kind: 1 }], [axis]).unwrap()
+}
+
+#[test]
+fn rtex() {
+    holds("start", |clock| {
+        let writes = Cell::new(0);
+        let mut driver = Driver::new(Stuck(&writes), || clock.look(), host(), &RECEIVED);
+        std::array::from_fn(|_| driver.start(1_000_000).err())
+    });
+}
+
+/// Drives stop without commands.
+#[test]
+fn rtex_commands_go_out_whatever_the_clock_says() {
+    let (writes, now_ns) = (Cell::new(0), Cell::new(5_000_000));
+    let mut driver = Driver::new(Stuck(&writes), || now_ns.get(), host(), &RECEIVED);
+    assert_eq!(driver.exchange(5_000_000).map(|exchanged| exchanged.frames_late), Ok(0));
+    now_ns.set(4_000_000);
+    let error = driver.exchange(5_500_000).unwrap_err();
+    assert_eq!(error, Error::Clock(ClockError::Backwards { by_ns: 1_000_000 }));
+    assert_eq!(writes.get(), 2);
+    assert!(driver.exchange(4_000_000).is_ok());
+}
+
+/// A pin that says when it went off, by the true time.
+struct Timed<'a> {
+    looks: &'a Cell<u32>,
+    on: u32,
+    shortest: &'a Cell<u32>,
+}
+
+impl Direction for Timed<'_> {
+    type Error = Infallible;
+
+    fn transmit(&mut self) -> Result<(), Infallible> {
+        self.on = self.looks.get();
+        Ok(())
+    }
+
+    fn receive(&mut self) -> Result<(), Infallible> {
+        if self.on > 0 {
+            self.shortest.set(self.shortest.get().min(self.looks.get() - self.on));
+        }
+        self.on = 0;
+        Ok(())
+    }
+
+    fn worst(&self) -> Option<Worst> {
+        Some(Worst { uart_start_ns: 0, wake_ns: 100, clock_ns: 100 })
+    }
+}
+
+/// A request without its end may be another one: ID 0 is ID 8 then. One byte lasts 4 us, and the clock is looked at every 100 ns.
+#[test]
+fn no_request_is_cut_off_when_the_clock_is_set_back() {
+    let line = tformat::master::Line::new(tformat::BitRate::Mbit2_5);
+    for at in 0..200 {
+        let (looks, shortest) = (Cell::new(0), Cell::new(u32::MAX));
+        let clock = || {
+            looks.set(looks.get() + 1);
+            let look = looks.get();
+            100 * u64::from(if look >= at { look - at } else { look + 1_000_000 })
+        };
+        let pin = Timed { looks: &looks, on: 0, shortest: &shortest };
+        let mut encoder = Encoder::new(Silence, pin, clock, line).unwrap();
+        let error = encoder.transact(tformat::Request::ReadSingleTurn).unwrap_err();
+        // With the lead of 1 us and a tick, unless nothing had been sent yet.
+        let before = matches!(error, Error::Clock(_)) && shortest.get() <= 13;
+        assert!(before || shortest.get() >= 40, "set back at look {at}: the pin was on for {} looks", shortest.get());
+    }
+}
+
+#[test]
+fn a_counter_of_a_processor_is_a_clock() {
+    // A cycle counter at 160 MHz, and a SysTick, which counts down 24 bits.
+    let cycles = Cell::new(0xffff_fff0_u32);
+    let rate = TickRate::of::<160_000_000>();
+    let mut clock = CounterClock::<_, 32>::new(rate, || cycles.get());
+    let mut systick = CounterClock::<_, 24>::new(rate, || !(0x00ff_ffff - (cycles.get() & 0x00ff_ffff)));
+    for (step, ns) in [(16, 100), (0, 100), (1_600, 10_100), (8_000_000, 50_010_100)] {
+        cycles.set(cycles.get().wrapping_add(step));
+        assert_eq!((clock.now_ns(), systick.now_ns()), (Ok(ns), Ok(ns)));
+    }
+    assert_eq!((clock.read_within_ns(), systick.read_within_ns()), (13_421_772_793, 52_428_793));
+    cycles.set(0);
+    assert_eq!(clock.now_ns(), Err(ClockError::Backwards { by_ns: 50_010_000 }));
+}

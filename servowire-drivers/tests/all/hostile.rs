@@ -1,0 +1,90 @@
+//! How much a hostile test has to live through, and what becomes of its calls.
+
+use std::fmt::Debug;
+
+use servowire_world::{Kind, Rates, Tally, Verdict, wanted_events};
+
+/// Faults that every driver has to survive, whatever the environment says.
+pub const FAULTS: u64 = 100_000;
+
+/// Every kind of fault, about one a call, and none so long that it reaches over several calls. Those of a whole transmission have
+/// fewer places than those of a unit, so they are more frequent there.
+pub fn rates(units: u32) -> Rates {
+    let of_unit = Rates { per_million: [96_000 / units; Kind::ALL.len()], longest_ns: 60_000 };
+    [Kind::Delay, Kind::Noise, Kind::Foreign, Kind::EchoSwap]
+        .into_iter()
+        .fold(of_unit, |rates, kind| rates.with(kind, 20_000))
+}
+
+/// Calls, counted.
+#[derive(Debug, Default)]
+pub struct Calls {
+    pub tally: Tally,
+    pub good: u64,
+    pub failed: u64,
+    /// Of the good ones: with an answer that nothing had hurt, which must not be lost.
+    pub whole: u64,
+    pub dropped: u64,
+    /// Good values that are no answer to the request, or nobody's: the check of the protocol does not see it.
+    pub forged: u64,
+}
+
+/// Scenario after scenario, until there was enough of everything: `play` plays the one of a seed and gives what happened in it.
+pub fn live_through(mut play: impl FnMut(&mut Calls, u64) -> Tally) -> Calls {
+    let mut calls = Calls::default();
+    for seed in 0.. {
+        let happened = play(&mut calls, seed);
+        calls.tally.add(&happened);
+        if !calls.go_on() {
+            break;
+        }
+    }
+    calls.end();
+    calls
+}
+
+impl Calls {
+    /// Counts a call: it was dropped, gave a value of which the truth is known, or failed. `whole`: its answer came through
+    /// unhurt, so it must not be lost. `excused`: the value may be older than the request.
+    pub fn count<E: Debug>(
+        &mut self,
+        outcome: Option<Result<Verdict, E>>,
+        whole: bool,
+        excused: bool,
+        seed: u64,
+        call: usize,
+    ) {
+        match outcome {
+            None => self.dropped += 1,
+            Some(Ok(verdict)) => {
+                assert!(excused || !matches!(verdict, Verdict::Old { .. }), "seed {seed}, call {call}: {verdict:?}");
+                assert!(!whole || verdict == Verdict::Fresh, "seed {seed}, call {call}: {verdict:?}");
+                self.good += 1;
+                self.whole += u64::from(whole);
+                self.forged += u64::from(verdict != Verdict::Fresh);
+            }
+            Some(Err(error)) => {
+                assert!(!whole, "seed {seed}, call {call}: {error:?}");
+                self.failed += 1;
+            }
+        }
+    }
+
+    /// Whether there has to be more: 100,000 faults always, and as many events (faults, transmissions and units) as the environment
+    /// wants.
+    fn go_on(&self) -> bool {
+        self.tally.all_faults() < FAULTS || self.tally.events() < wanted_events(0)
+    }
+
+    /// Says what there was, and that it was enough of everything.
+    fn end(&self) {
+        let Self { tally, good, failed, whole, dropped, forged } = self;
+        println!("{tally}");
+        println!("{good} good ({whole} of them unhurt, {forged} forged), {failed} failed, {dropped} dropped");
+        assert!(tally.all_faults() >= FAULTS);
+        for kind in Kind::ALL {
+            assert!(tally.of(kind) >= FAULTS / 100, "{kind:?} only {} times", tally.of(kind));
+        }
+        assert!(*whole > FAULTS / 10 && *failed > FAULTS / 10 && *forged < FAULTS / 100);
+    }
+}

@@ -1,0 +1,103 @@
+//! A source that may be silent for a while: a pipe, or a file that still grows.
+
+use std::io::{self, Read};
+use std::sync::mpsc::{self, Receiver, RecvTimeoutError};
+use std::thread;
+use std::time::Duration;
+
+/// Bytes read at once.
+const CHUNK: usize = 1 << 16;
+/// Chunks that wait to be taken.
+const AHEAD: usize = 4;
+/// How often it is looked whether a file has grown.
+const LOOK: Duration = Duration::from_millis(50);
+
+/// Reads in a thread of its own, so that one can ask whether something is there.
+pub(crate) struct Pipe {
+    chunks: Receiver<io::Result<Vec<u8>>>,
+    chunk: Vec<u8>,
+    taken: usize,
+    fault: Option<io::Error>,
+    ended: bool,
+}
+
+impl Pipe {
+    /// `grows`: the end of the source is not the end.
+    pub(crate) fn over(mut source: impl Read + Send + 'static, grows: bool) -> Self {
+        let (send, chunks) = mpsc::sync_channel(AHEAD);
+        thread::spawn(move || {
+            loop {
+                let mut bytes = vec![0; CHUNK];
+                let chunk = match source.read(&mut bytes) {
+                    Ok(0) if grows => {
+                        thread::sleep(LOOK);
+                        continue;
+                    }
+                    Ok(0) => return,
+                    Ok(n) => {
+                        bytes.truncate(n);
+                        Ok(bytes)
+                    }
+                    Err(e) if e.kind() == io::ErrorKind::Interrupted => continue,
+                    Err(e) => Err(e),
+                };
+                let over = chunk.is_err();
+                if send.send(chunk).is_err() || over {
+                    return;
+                }
+            }
+        });
+        Self { chunks, chunk: Vec::new(), taken: 0, fault: None, ended: false }
+    }
+
+    fn is_empty(&self) -> bool {
+        self.taken == self.chunk.len() && self.fault.is_none() && !self.ended
+    }
+
+    fn take(&mut self, chunk: io::Result<Vec<u8>>) {
+        self.taken = 0;
+        match chunk {
+            Ok(chunk) => self.chunk = chunk,
+            Err(fault) => (self.chunk, self.fault) = (Vec::new(), Some(fault)),
+        }
+    }
+
+    /// Whether a read gives something, or the end, within `patience`.
+    pub(crate) fn is_ready(&mut self, patience: Duration) -> bool {
+        if self.is_empty() {
+            match self.chunks.recv_timeout(patience) {
+                Ok(chunk) => self.take(chunk),
+                Err(RecvTimeoutError::Disconnected) => self.ended = true,
+                Err(RecvTimeoutError::Timeout) => return false,
+            }
+        }
+        true
+    }
+
+    /// Whether it has ended.
+    pub(crate) fn is_over(&self) -> bool {
+        self.ended && self.taken == self.chunk.len()
+    }
+}
+
+impl Read for Pipe {
+    fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
+        if self.is_empty() {
+            match self.chunks.recv() {
+                Ok(chunk) => self.take(chunk),
+                Err(_) => self.ended = true,
+            }
+        }
+        if let Some(fault) = self.fault.take() {
+            self.ended = true;
+            return Err(fault);
+        }
+        let rest = self.chunk.get(self.taken..).unwrap_or_default();
+        let count = rest.len().min(buffer.len());
+        if let (Some(to), Some(from)) = (buffer.get_mut(..count), rest.get(..count)) {
+            to.copy_from_slice(from);
+        }
+        self.taken += count;
+        Ok(count)
+    }
+}

@@ -1,0 +1,13 @@
+//! The standard output.
+
+use std::fmt;
+use std::io::{self, Write};
+
+/// Writes to the standard output at once; somebody who does not read on is no fault.
+pub(crate) fn say(text: fmt::Arguments) -> io::Result<()> {
+    let mut out = io::stdout().lock();
+    match out.write_fmt(text).and_then(|()| out.flush()) {
+        Err(e) if e.kind() != io::ErrorKind::BrokenPipe => Err(e),
+        _ => Ok(()),
+    }
+}

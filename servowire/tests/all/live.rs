@@ -1,0 +1,184 @@
+//! What comes live: pipes and files that grow.
+
+use std::io::{BufRead, BufReader, Write};
+use std::process::{Child, Command, Stdio};
+use std::sync::mpsc::{self, Receiver};
+use std::time::Duration;
+
+use crate::common;
+use crate::common::{Bench, Wave, id3};
+
+/// Longer than any line may take.
+const LONG: Duration = Duration::from_secs(20);
+
+/// A running program and the lines it prints.
+struct Live {
+    child: Child,
+    lines: Receiver<String>,
+}
+
+impl Live {
+    fn start(arguments: &[&str]) -> Self {
+        let mut child = Command::new(env!("CARGO_BIN_EXE_servowire"))
+            .args(arguments)
+            .stdin(Stdio::piped())
+            .stdout(Stdio::piped())
+            .stderr(Stdio::null())
+            .spawn()
+            .unwrap();
+        let (send, lines) = mpsc::channel();
+        let out = BufReader::new(child.stdout.take().unwrap());
+        std::thread::spawn(move || out.lines().map_while(Result::ok).for_each(|line| drop(send.send(line))));
+        Self { child, lines }
+    }
+
+    fn write(&mut self, bytes: &[u8]) {
+        self.child.stdin.as_mut().unwrap().write_all(bytes).unwrap();
+    }
+
+    #[track_caller]
+    fn shows(&self, words: &str) {
+        let line = self.lines.recv_timeout(LONG).expect("nothing was shown");
+        assert!(line.contains(words), "{line:?} instead of {words:?}");
+    }
+
+    /// The lines that are left when the input is closed.
+    fn end(mut self) -> Vec<String> {
+        drop(self.child.stdin.take());
+        self.child.wait().unwrap();
+        self.lines.iter().collect()
+    }
+}
+
+/// `count` exchanges with positions from `from` on.
+fn exchanges(from: u32, count: u32) -> Wave {
+    let mut wave = Wave::new(2.5e6);
+    wave.idle_us(20.0);
+    for k in 0..count {
+        wave.exchange(&[0x1a], &id3(from + k, 0, 0));
+    }
+    wave
+}
+
+#[test]
+fn samples_from_a_pipe() {
+    let mut live = Live::start(&["decode", "--rate", "20M", "--format", "packed", "-"]);
+    // Whole bytes of eight samples.
+    live.write(&exchanges(100, 4).packed(20e6));
+    for k in 100..104 {
+        live.shows(&format!("ABS {k} "));
+    }
+    // Half an exchange shows nothing; the other half completes it.
+    let next = exchanges(500, 2).packed(20e6);
+    live.write(&next[..60]);
+    std::thread::sleep(Duration::from_millis(300));
+    assert!(live.lines.try_recv().is_err());
+    live.write(&next[60..]);
+    live.shows("ABS 500 ");
+    live.shows("ABS 501 ");
+    assert_eq!(live.end(), Vec::<String>::new());
+}
+
+#[test]
+fn a_vcd_from_a_pipe() {
+    let mut live = Live::start(&["decode"]);
+    let vcd = exchanges(7, 6).vcd();
+    // Up to the middle of an exchange, of a line.
+    let cut = vcd.len() * 3 / 4;
+    live.write(&vcd.as_bytes()[..cut]);
+    for k in 7..11 {
+        live.shows(&format!("ABS {k} "));
+    }
+    live.write(&vcd.as_bytes()[cut..]);
+    live.shows("ABS 11 ");
+    live.shows("ABS 12 ");
+    assert_eq!(live.end(), Vec::<String>::new());
+}
+
+#[test]
+fn a_log_and_a_table_from_a_pipe() {
+    let mut live = Live::start(&["decode", "--bytes", "--json", "-"]);
+    live.write(b"1A\n1A 20 29 C0 3B 17 00 00 00 C8 37\n");
+    live.shows("\"line\":1");
+    live.shows("\"line\":2");
+    live.write(b"1A\n");
+    live.shows("\"line\":3");
+    assert_eq!(live.end().len(), 1, "the request without an answer is said at the end");
+
+    let mut live = Live::start(&["decode", "--format", "csv", "-"]);
+    let table = exchanges(3, 4).saleae_csv();
+    live.write(table.as_bytes());
+    for k in 3..6 {
+        live.shows(&format!("ABS {k} "));
+    }
+    assert_eq!(live.end().len(), 1);
+}
+
+#[test]
+fn a_file_that_grows() {
+    let bench = Bench::new();
+    let vcd = exchanges(40, 8).vcd();
+    let (first, second) = vcd.split_at(vcd.len() / 2);
+    let path = bench.file("grows.vcd", first);
+    let mut live = Live::start(&["decode", "--follow", path.to_str().unwrap()]);
+    for k in 40..43 {
+        live.shows(&format!("ABS {k} "));
+    }
+    std::fs::OpenOptions::new().append(true).open(&path).unwrap().write_all(second.as_bytes()).unwrap();
+    for k in 43..47 {
+        live.shows(&format!("ABS {k} "));
+    }
+    live.child.kill().unwrap();
+    live.child.wait().unwrap();
+    // What is complete only at its end cannot be followed.
+    let session = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/samples/hpm-uart.fst");
+    common::servowire(&["decode", "--follow", session]).fails_with("cannot be followed while it grows");
+    assert_eq!(common::servowire(&["decode", "--follow"]).code, 2);
+}
+
+/// Who says what comes is waited for; who does not gets the program's own captures, and is told so.
+#[test]
+fn a_pipe_that_is_silent_at_first() {
+    let mut live = Live::start(&["decode", "--bytes", "--json"]);
+    std::thread::sleep(Duration::from_millis(900));
+    live.write(b"1A\n1A 20 29 C0 3B 17 00 00 00 C8 37\n");
+    live.shows("\"file\":\"standard input\",\"line\":1");
+    assert_eq!(live.end().len(), 1);
+
+    let mut silent = std::process::Command::new(env!("CARGO_BIN_EXE_servowire"))
+        .arg("decode")
+        .stdin(std::process::Stdio::piped())
+        .stdout(std::process::Stdio::piped())
+        .stderr(std::process::Stdio::piped())
+        .spawn()
+        .unwrap();
+    let open = silent.stdin.take();
+    let said = silent.wait_with_output().unwrap();
+    drop(open);
+    assert!(said.status.success());
+    let (out, err) = (String::from_utf8(said.stdout).unwrap(), String::from_utf8(said.stderr).unwrap());
+    assert!(
+        out.contains("captures/hpm-uart-readme.vcd") && err.contains("nothing comes from the standard input"),
+        "{err}"
+    );
+}
+
+/// What describes a file needs one.
+#[test]
+fn options_without_a_file() {
+    for options in [
+        &["--rate", "24M"][..],
+        &["--format", "vcd"],
+        &["--unit-size", "2"],
+        &["--channel", "x"],
+        &["--tx", "a", "--rx", "b"],
+        &["--bit-rate", "2.5M"],
+        &["--polarity", "inverted"],
+        &["--threshold", "1"],
+        &["--block-size", "16"],
+    ] {
+        let run = common::servowire(&[&["decode"], options].concat());
+        assert_eq!(run.code, 2, "{options:?}");
+        assert!(run.err.contains("describes a capture: name its file"), "{}", run.err);
+    }
+}

@@ -1,0 +1,419 @@
+//! `talk` over pseudo-terminals: against its own encoder, and against one on a line with faults. A pseudo-terminal has no bit
+//! rate and no time, so this tests content, order and recovery.
+
+#![cfg(target_os = "linux")]
+
+use std::fs::File;
+use std::io::{Read, Write};
+use std::process::{Command, Output};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::thread::{self, JoinHandle};
+use std::time::{Duration, Instant};
+
+use serialport::{SerialPort, TTYPort};
+use servowire::talk::fault::Fault;
+use servowire::talk::link::Link;
+use servowire::talk::{relay, simulate};
+use servowire_world::{Cable, Kind, Rates, Scenario, Tally};
+use tformat::device::Device;
+use tformat::{Abm, Abs, Address, Almc, BitRate, Request, Response};
+
+/// An encoder in a thread of its own at the other end of a pseudo-terminal.
+struct Bench {
+    name: String,
+    stop: Arc<AtomicBool>,
+    encoder: Option<JoinHandle<Tally>>,
+    /// As long as this is open, the encoder's end is; the program locks the port for itself.
+    _kept: Option<File>,
+}
+
+impl Bench {
+    fn new(encoder: impl FnOnce(TTYPort, &AtomicBool) -> Tally + Send + 'static) -> (Self, TTYPort) {
+        let (master, slave) = TTYPort::pair().unwrap();
+        let stop = Arc::new(AtomicBool::new(false));
+        let seen = Arc::clone(&stop);
+        let encoder = Some(thread::spawn(move || encoder(master, &seen)));
+        let name = slave.name().unwrap();
+        let kept = File::options().read(true).write(true).open(&name);
+        (Self { name, stop, encoder, _kept: kept.ok() }, slave)
+    }
+
+    fn end(mut self) -> Tally {
+        self.stop.store(true, Ordering::Relaxed);
+        self.encoder.take().unwrap().join().unwrap()
+    }
+
+    /// The program at this port.
+    fn talk(&self, arguments: &[&str]) -> Output {
+        Command::new(env!("CARGO_BIN_EXE_servowire"))
+            .args(["talk", "--port", &self.name])
+            .args(arguments)
+            .output()
+            .unwrap()
+    }
+}
+
+/// The encoder of `talk simulate`.
+fn simulated(id: u8) -> (Bench, TTYPort) {
+    Bench::new(move |master, stop| {
+        let encoder = simulate::Encoder { rate: BitRate::Mbit2_5, id, rpm: 0.0, echo: false };
+        simulate::run(Box::new(master), encoder, Some(stop)).unwrap();
+        Tally::default()
+    })
+}
+
+/// An encoder whose answers go through a line with these faults, and whose requests come back if `echo`.
+fn hurt(scenario: Scenario, echo: bool) -> (Bench, TTYPort) {
+    Bench::new(move |mut master, stop| {
+        let mut device = Device::<6>::new(0x17, BitRate::Mbit2_5);
+        device.raise_alarms(Almc::OS);
+        device.end_alarms(Almc::OS);
+        let mut line = Cable::new(0, scenario);
+        let (begin, mut shaft) = (Instant::now(), 0);
+        master.set_timeout(Duration::from_millis(5)).unwrap();
+        while !stop.load(Ordering::Relaxed) {
+            let mut buffer = [0; 64];
+            let Ok(count) = master.read(&mut buffer) else { continue };
+            let now_ns = u64::try_from(begin.elapsed().as_nanos()).unwrap();
+            for byte in &buffer[..count] {
+                if echo {
+                    master.write_all(&[*byte]).unwrap();
+                }
+                shaft += 1;
+                device.set_position(Abs::truncate(shaft), Abm::truncate(2));
+                if let Some(answer) = device.hear(&[*byte], now_ns) {
+                    for arrival in line.carry(answer.frame.as_bytes(), 0) {
+                        thread::sleep(Duration::from_nanos(arrival.at_ns));
+                        // In two pieces, as USB likes it.
+                        let (first, second) = arrival.bytes.split_at(arrival.bytes.len() / 3);
+                        master.write_all(first).unwrap();
+                        thread::sleep(Duration::from_micros(200));
+                        master.write_all(second).unwrap();
+                    }
+                }
+            }
+        }
+        line.tally
+    })
+}
+
+fn text(output: &Output) -> String {
+    String::from_utf8_lossy(&output.stdout).into_owned() + &String::from_utf8_lossy(&output.stderr)
+}
+
+#[test]
+fn the_program_reads_what_its_own_encoder_says() {
+    let (bench, port) = simulated(0x17);
+    drop(port);
+    let output = bench.talk(&["read"]);
+    assert!(output.status.success(), "{}", text(&output));
+    assert_eq!(text(&output), "   0.00000 deg         0 counts  turn 0  no alarms\n");
+    let output = bench.talk(&["info"]);
+    assert!(text(&output).starts_with("encoder ID 0x17: 23 bits a turn, 16 of turns\n"), "{}", text(&output));
+    assert!(text(&output).contains("does not hear itself"));
+    let output = bench.talk(&["clear-errors"]);
+    assert_eq!(text(&output), "alarms before: none; after: none\n");
+    let folder = tempfile::tempdir().unwrap();
+    let csv = folder.path().join("out.csv");
+    let output = bench.talk(&["watch", "--count", "3", "--period", "1", "--csv", csv.to_str().unwrap()]);
+    assert!(text(&output).ends_with("3 good, 0 refused or missing\n"), "{}", text(&output));
+    assert_eq!(std::fs::read_to_string(csv).unwrap().lines().count(), 4);
+    bench.end();
+}
+
+#[test]
+fn eeproms_are_dumped_and_restored_only_when_one_insists() {
+    let (bench, port) = simulated(0x11);
+    drop(port);
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("eeprom");
+    let file = file.to_str().unwrap();
+    let output = bench.talk(&["eeprom", "dump", "--pages", "2", file]);
+    assert!(output.status.success(), "{}", text(&output));
+    let dump = std::fs::read_to_string(file).unwrap();
+    assert_eq!(dump.lines().count(), 2);
+    assert!(dump.starts_with("0: ff ff"));
+    std::fs::write(file, dump.replacen("1: ff ff", "1: 12 ff", 1)).unwrap();
+    let output = bench.talk(&["eeprom", "restore", file]);
+    assert_eq!(output.status.code(), Some(2), "without the option it is wrong use");
+    let output = bench.talk(&["eeprom", "restore", "--overwrite-eeprom", file]);
+    assert!(text(&output).contains("nothing was written"), "{}", text(&output));
+    let output = bench.talk(&["eeprom", "restore", "--overwrite-eeprom", "--yes", file]);
+    assert!(text(&output).starts_with("1 byte was different"), "{}", text(&output));
+    let output = bench.talk(&["eeprom", "dump", "--pages", "2"]);
+    assert_eq!(text(&output), dump.replacen("1: ff ff", "1: 12 ff", 1));
+    bench.end();
+}
+
+#[test]
+fn the_echo_is_found_and_taken_away() {
+    for echo in [false, true] {
+        let (bench, port) = hurt(Scenario::quiet(), echo);
+        let mut link = Link::open(Box::new(port), Duration::from_millis(50)).unwrap();
+        assert_eq!(link.echo(), echo);
+        let write = Request::write_eeprom(Address::truncate(3), 0x77);
+        let Response::WriteEeprom(memory) = link.exchange(write).unwrap() else { panic!() };
+        assert_eq!((memory.adf.busy(), memory.edf), (false, 0x77));
+        bench.end();
+    }
+}
+
+/// A request that comes back, and nothing else, is no answer: not even a write, whose answer looks the same.
+#[test]
+fn an_echo_alone_is_no_answer() {
+    let (bench, port) = hurt(Scenario::quiet(), true);
+    let mut link = Link::open(Box::new(port), Duration::from_millis(30)).unwrap();
+    // from here on nobody is there
+    bench.end();
+    assert!(link.exchange(Request::write_eeprom(Address::truncate(3), 0x77)).is_err());
+
+    let (bench, port) = Bench::new(|mut master, stop| {
+        master.set_timeout(Duration::from_millis(5)).unwrap();
+        while !stop.load(Ordering::Relaxed) {
+            let mut byte = [0];
+            if master.read(&mut byte).is_ok() {
+                master.write_all(&byte).unwrap();
+            }
+        }
+        Tally::default()
+    });
+    let fault = Link::open(Box::new(port), Duration::from_millis(20)).unwrap_err();
+    assert!(matches!(fault, Fault::OnlyEcho), "{fault}");
+    bench.end();
+}
+
+/// Whatever the line does, a value that is accepted was sent, and the next exchange on a good line is good.
+#[test]
+fn faults_are_refused_and_over_with_the_next_exchange() {
+    let rates = Rates { longest_ns: 2_000_000, ..Rates::QUIET }
+        .with(Kind::Drop, 50_000)
+        .with(Kind::Flip, 100_000)
+        .with(Kind::Cut, 100_000)
+        .with(Kind::Delay, 100_000)
+        .with(Kind::Repeat, 50_000)
+        .with(Kind::Noise, 50_000);
+    for echo in [false, true] {
+        let (bench, port) = hurt(Scenario::random(7, rates), echo);
+        let mut link = (0..5)
+            .find_map(|_| Link::open(Box::new(port.try_clone_native().unwrap()), Duration::from_millis(15)).ok())
+            .unwrap();
+        let (mut good, mut last) = (0, 0);
+        for _ in 0..150 {
+            if let Ok(Response::ReadAll(all)) = link.exchange(Request::ReadAll) {
+                assert!(all.abs.get() > last, "{} after {last}: an old answer", all.abs);
+                assert_eq!((all.abm.get(), all.enid), (2, 0x17));
+                (good, last) = (good + 1, all.abs.get());
+            }
+        }
+        let tally = bench.end();
+        println!("{good} of 150 good; {tally}");
+        assert!(good > 75);
+    }
+}
+
+/// An output that cannot be written is not the fault of the port; who reads no further has read enough.
+#[test]
+fn the_output_is_not_the_port() {
+    let (bench, port) = simulated(0x17);
+    drop(port);
+    for arguments in [&["read"] as &[_], &["info"], &["watch"], &["eeprom", "dump", "--pages", "1"]] {
+        let mut program = Command::new("timeout");
+        program.args(["20", env!("CARGO_BIN_EXE_servowire"), "talk", "--port", &bench.name]).args(arguments);
+        let full = File::options().write(true).open("/dev/full").unwrap();
+        let output = program.stdout(full).output().unwrap();
+        let said = text(&output);
+        assert_eq!(output.status.code(), Some(1), "{arguments:?}: {said}");
+        assert!(
+            said.contains("the output cannot be written: ") && !said.contains(&bench.name),
+            "{arguments:?}: {said}"
+        );
+        let mut program =
+            program.stdout(std::process::Stdio::piped()).stderr(std::process::Stdio::piped()).spawn().unwrap();
+        drop(program.stdout.take());
+        let output = program.wait_with_output().unwrap();
+        assert_eq!((output.status.code(), text(&output).as_str()), (Some(0), ""), "{arguments:?}");
+    }
+    bench.end();
+}
+
+/// What can be wrong is said in a sentence that names it, with exit code 1, and at once.
+#[test]
+fn what_is_wrong_is_said() {
+    let (bench, port) = simulated(0x17);
+    drop(port);
+    let at = |port: &str, arguments: &[&str]| {
+        let begin = Instant::now();
+        let mut program = Command::new(env!("CARGO_BIN_EXE_servowire"));
+        let output = program.args(["talk", "--port", port]).args(arguments).output().unwrap();
+        assert!(begin.elapsed() < Duration::from_secs(10));
+        assert_eq!(output.status.code(), Some(1), "{}", text(&output));
+        String::from_utf8(output.stderr).unwrap()
+    };
+    assert!(at("/dev/ttyNone", &["read"]).starts_with("/dev/ttyNone: there is no such port; there "));
+    assert!(at("/dev/null", &["read"]).starts_with("/dev/null: this is no serial port"));
+    assert!(at("/", &["read"]).starts_with("/: this is no serial port"));
+    let said = at(&bench.name, &["simulate", "--encoder", "/dev/ttyNone"]);
+    assert!(said.starts_with("/dev/ttyNone: there is no such port"), "{said}");
+    let folder = tempfile::tempdir().unwrap();
+    let missing = folder.path().join("no/file");
+    let missing = missing.to_str().unwrap();
+    for arguments in [
+        &["eeprom", "restore", "--overwrite-eeprom", "--yes", missing] as &[_],
+        &["eeprom", "dump", "--pages", "1", missing],
+        &["watch", "--csv", missing],
+    ] {
+        assert!(at(&bench.name, arguments).starts_with(&format!("{missing}: ")), "{arguments:?}");
+    }
+    let empty = folder.path().join("empty");
+    File::create(&empty).unwrap();
+    let empty = empty.to_str().unwrap();
+    let said = at(&bench.name, &["eeprom", "restore", "--overwrite-eeprom", "--yes", empty]);
+    assert_eq!(said, format!("{empty}: there is no page in it\n"));
+    let said = at(&bench.name, &["eeprom", "dump", "--pages", "7"]);
+    assert!(said.ends_with("it has no page 6\n"), "{said}");
+    bench.end();
+}
+
+/// Nobody at the other end; and a port that goes away while the program reads.
+#[test]
+fn an_encoder_that_is_not_there_is_said_to_be_so() {
+    let (bench, port) = Bench::new(|_, stop| {
+        while !stop.load(Ordering::Relaxed) {
+            thread::sleep(Duration::from_millis(5));
+        }
+        Tally::default()
+    });
+    drop(port);
+    for arguments in [&["read"] as &[_], &["watch"], &["info"], &["clear-errors"], &["eeprom", "dump"]] {
+        let output = bench.talk(arguments);
+        assert_eq!(output.status.code(), Some(1));
+        let said = text(&output);
+        let want = "no response: is the encoder's power on, is 2.5 Mbit/s its rate, are A and B the right way round?\n";
+        assert!(said.ends_with(want), "{said}");
+    }
+    bench.end();
+
+    let (bench, port) = simulated(0x17);
+    drop(port);
+    // Our end of the pseudo-terminal is inherited; as long as the program has it open itself, it does not go away.
+    let close = "for f in /proc/self/fd/*; do f=${f##*/}; [ $f -lt 3 ] || eval \"exec $f>&-\"; done; exec \"$@\"";
+    let program = Command::new("bash")
+        .args(["-c", close, "bash", "timeout", "20", env!("CARGO_BIN_EXE_servowire")])
+        .args(["talk", "--port", &bench.name, "watch", "--period", "1"])
+        .stdout(std::process::Stdio::piped())
+        .stderr(std::process::Stdio::piped())
+        .spawn()
+        .unwrap();
+    thread::sleep(Duration::from_millis(500));
+    bench.end();
+    let output = program.wait_with_output().unwrap();
+    assert_eq!(output.status.code(), Some(1));
+    assert!(text(&output).contains(": the port is gone or refuses: "), "{}", text(&output));
+    let counted = String::from_utf8_lossy(&output.stdout);
+    assert!(counted.lines().last().unwrap().ends_with(" good, 0 refused or missing"), "{counted}");
+}
+
+/// Two adapters: the master at one, the encoder at the other, and the program between them.
+#[test]
+fn a_man_in_the_middle_passes_on_and_logs() {
+    let (encoder, encoder_port) = simulated(0x17);
+    drop(encoder_port);
+    let (master, ours) = TTYPort::pair().unwrap();
+    let folder = tempfile::tempdir().unwrap();
+    let csv = folder.path().join("log.csv");
+    let name = ours.name().unwrap();
+    // Open by name, so that the master's end lives on until the program has the port for itself.
+    let kept = File::options().read(true).write(true).open(&name).unwrap();
+    drop(ours);
+    let mut program = Command::new(env!("CARGO_BIN_EXE_servowire"))
+        .args(["talk", "--port", &name, "simulate", "--encoder", &encoder.name])
+        .args(["--csv", csv.to_str().unwrap()])
+        .stdout(std::process::Stdio::null())
+        .spawn()
+        .unwrap();
+    let mut master: Box<dyn SerialPort> = Box::new(master);
+    // The program begins with a look at the encoder.
+    let mut link = (0..100)
+        .find_map(|_| {
+            thread::sleep(Duration::from_millis(20));
+            Link::open(master.try_clone().unwrap(), Duration::from_millis(300)).ok()
+        })
+        .unwrap();
+    let write = Request::write_eeprom(Address::truncate(3), 0x77);
+    let Response::WriteEeprom(memory) = link.exchange(write).unwrap() else { panic!() };
+    assert_eq!(memory.edf, 0x77);
+    for _ in 0..5 {
+        assert!(matches!(link.exchange(Request::ReadAll), Ok(Response::ReadAll(all)) if all.enid == 0x17));
+    }
+    master.write_all(&[0x55]).unwrap();
+    let end = Instant::now() + Duration::from_secs(5);
+    let log = loop {
+        let log = std::fs::read_to_string(&csv).unwrap();
+        if log.contains("no request: [55]") || Instant::now() > end {
+            break log;
+        }
+        thread::sleep(Duration::from_millis(20));
+    };
+    program.kill().unwrap();
+    program.wait().unwrap();
+    drop(kept);
+    encoder.end();
+    assert!(log.starts_with("time_s,request,answer,fault\n"), "{log}");
+    let asked = |request: Request| {
+        let request = request.to_string();
+        log.lines().filter(|line| line.split(',').nth(1) == Some(&request)).count()
+    };
+    assert!(asked(Request::ReadAll) >= 6, "{log}");
+    assert_eq!(asked(write), 1, "a write is passed on once: {log}");
+    assert!(log.contains("no request: [55]"), "{log}");
+}
+
+/// What the encoder does not answer well is logged and not passed on; a request may come in pieces, and after a pause it is none.
+#[test]
+fn only_good_answers_are_passed_on() {
+    for echo in [false, true] {
+        let (bench, port) = hurt(Scenario::quiet(), false);
+        let mut encoder = Link::open(Box::new(port), Duration::from_millis(50)).unwrap();
+        let (mut master, ours) = TTYPort::pair().unwrap();
+        master.set_timeout(Duration::from_secs(1)).unwrap();
+        let stop = Arc::new(AtomicBool::new(false));
+        let seen = Arc::clone(&stop);
+        let relay = thread::spawn(move || {
+            let mut said = Vec::new();
+            let log = |entry: &relay::Said| {
+                said.push(format!("{entry:?}"));
+                Ok(())
+            };
+            let ours: Box<dyn SerialPort> = Box::new(ours);
+            let end = relay::run(ours, &mut encoder, echo, log, Some(&seen));
+            (said, end)
+        });
+        let mut answer = [0; 11];
+        master.write_all(&[0x1a]).unwrap();
+        master.read_exact(&mut answer).unwrap();
+        assert_eq!(answer[0], 0x1a);
+        if echo {
+            // The adapter hears what it has sent.
+            master.write_all(&answer).unwrap();
+        }
+        // Reads the EEPROM at 3, in two pieces.
+        let request = Request::read_eeprom(Address::truncate(3)).emit();
+        master.write_all(&request.as_bytes()[..1]).unwrap();
+        master.write_all(&request.as_bytes()[1..]).unwrap();
+        master.read_exact(&mut answer[..4]).unwrap();
+        assert!(Response::parse(Request::read_eeprom(Address::truncate(3)), &answer[..4]).is_ok());
+        bench.end();
+        // The encoder is gone: no answer.
+        master.set_timeout(Duration::from_millis(150)).unwrap();
+        thread::sleep(Duration::from_millis(150));
+        master.write_all(&[0x1a]).unwrap();
+        assert!(master.read(&mut answer).is_err());
+        stop.store(true, Ordering::Relaxed);
+        let (said, end) = relay.join().unwrap();
+        assert!(end.unwrap_err().to_string().starts_with("the encoder's port is gone"));
+        let requests = said.iter().filter(|entry| entry.starts_with("Request")).count();
+        assert_eq!(requests, 3, "{said:?}");
+        assert!(said.last().unwrap().contains("Err"), "{said:?}");
+    }
+}

@@ -1,0 +1,418 @@
+//! The machine: what a device learns from the frames that pass.
+
+use super::config::{Config, Counters};
+use super::heard::{FrameTimes, HeardSync, Output, Path, PortId, Reaction};
+use super::passage::{Kind, Learnt, Passage, Plain};
+use super::port::{Port, PortFlags, State, Trigger};
+use crate::clock::{Clock, Correction};
+use crate::cut_through::{DiscoveryRewriter, SyncRewriter};
+use crate::delay_req::DelayReq;
+use crate::discovery::Assignment;
+use crate::error::Error;
+use crate::exchange::{DeviceFrame, MasterFrameView};
+use crate::frame::LongFrame;
+use crate::frame_type::FrameType;
+use crate::line_delay::LineDelay;
+use crate::link::Link;
+use crate::param::Parameters;
+use crate::place::Place;
+use crate::status::Status;
+use crate::sync::TRIGGER_TO_CAPTURE_NS;
+use crate::timing::{TRIGGER_NS, published_send_time_ns};
+
+/// A device with two ports.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Device {
+    config: Config,
+    pub(super) a: Port,
+    pub(super) b: Port,
+    counters: Counters,
+    /// Goes into the next STATUS byte the device writes.
+    error: bool,
+    assignment: Option<Assignment>,
+    output_total: Option<u16>,
+    parameters: Option<[u8; Parameters::LEN]>,
+    line: LineDelay,
+    clock: Clock,
+    last_sync: Option<HeardSync>,
+    /// Delay from the master in ns.
+    way_ns: Option<u32>,
+    received: bool,
+    missed: u8,
+    /// When a frame of the present state came last.
+    alive_ns: u64,
+}
+
+impl Device {
+    /// A device without links.
+    pub const fn new(config: Config) -> Self {
+        const PORT: Port = Port { state: State::Idle, flags: PortFlags::empty() };
+        Self {
+            config,
+            a: PORT,
+            b: PORT,
+            counters: Counters::ZERO,
+            error: false,
+            assignment: None,
+            output_total: None,
+            parameters: None,
+            line: LineDelay::new(config.delay_model),
+            clock: Clock::averaging(config.clock_average),
+            last_sync: None,
+            way_ns: None,
+            received: false,
+            missed: 0,
+            alive_ns: 0,
+        }
+    }
+
+    /// The counters.
+    pub const fn counters(&self) -> Counters {
+        self.counters
+    }
+
+    /// A port's handler.
+    pub const fn port(&self, port: PortId) -> &Port {
+        match port {
+            PortId::A => &self.a,
+            PortId::B => &self.b,
+        }
+    }
+
+    pub(super) const fn port_mut(&mut self, port: PortId) -> &mut Port {
+        match port {
+            PortId::A => &mut self.a,
+            PortId::B => &mut self.b,
+        }
+    }
+
+    /// The port that faces the master, once it is known.
+    pub const fn master_port(&self) -> Option<PortId> {
+        if self.a.flags.contains(PortFlags::MASTER_PORT) {
+            Some(PortId::A)
+        } else if self.b.flags.contains(PortFlags::MASTER_PORT) {
+            Some(PortId::B)
+        } else {
+            None
+        }
+    }
+
+    /// The port that does not face the master; B while none is known to.
+    fn reverse_port(&self) -> PortId {
+        self.master_port().map_or(PortId::B, PortId::other)
+    }
+
+    /// State of the port that faces the master.
+    pub fn state(&self) -> State {
+        self.master_port().map_or(State::Idle, |port| self.port(port).state)
+    }
+
+    /// Whether only one port is linked.
+    pub const fn is_last(&self) -> bool {
+        self.a.flags.contains(PortFlags::LAST_DEVICE) || self.b.flags.contains(PortFlags::LAST_DEVICE)
+    }
+
+    /// Whether the host has taken it out of the line's work.
+    fn is_out(&self) -> bool {
+        self.a.state == State::Error
+    }
+
+    /// Address and offsets, from the last DISCOVERY.
+    pub const fn assignment(&self) -> Option<Assignment> {
+        self.assignment
+    }
+
+    /// What the master told all devices.
+    pub fn parameters(&self) -> Option<Parameters> {
+        self.parameters.as_ref().map(Parameters::parse)
+    }
+
+    /// The line to the next device in ns, once it is measured; 0 for a last device.
+    ///
+    /// # Errors
+    /// [`Error::ImplausibleRoundTrip`]; with 0 ns if round trips are missing.
+    pub const fn line_delay_next_ns(&self) -> Result<u16, Error> {
+        if self.is_last() {
+            return Ok(0);
+        }
+        if self.line.is_complete() { self.line.checked() } else { Err(Error::ImplausibleRoundTrip { rtt_ns: 0 }) }
+    }
+
+    /// The SYNC frame heard last.
+    pub const fn last_sync(&self) -> Option<HeardSync> {
+        self.last_sync
+    }
+
+    /// Own counter at the start of the first cycle of the IO exchange as the published device sets it: 10 us after the
+    /// last SYNC frame.
+    pub fn cycle_zero_ns(&self) -> Option<u32> {
+        self.last_sync.map(|last| last.sof_ns.wrapping_add(10_000))
+    }
+
+    /// Own counter at the start of the first cycle of the IO exchange, in the common time: the master triggers its first
+    /// frame one SYNC period of 10 us after the last SYNC frame, and a cycle begins 500 ns before its trigger.
+    pub fn first_cycle_ns(&self) -> Option<u32> {
+        let (HeardSync { sync, .. }, delay_ns) = (self.last_sync?, self.way_ns?);
+        let sent_ns = sync.time_stamp_ns.wrapping_sub(TRIGGER_TO_CAPTURE_NS).wrapping_sub(delay_ns);
+        Some(sent_ns.wrapping_add(10_000).wrapping_sub(TRIGGER_NS))
+    }
+
+    /// When to send the own frame, in ns of the common time.
+    pub fn send_time_ns(&self) -> Option<u32> {
+        let address = self.assignment?.address;
+        let slot = self.config.slot_ns.map(|slot| {
+            let slots = slot.saturating_mul(address.hops_before().into());
+            TRIGGER_NS.saturating_add(slots).saturating_sub(self.delay_ns().unwrap_or_default())
+        });
+        self.config.send_time_ns.or(slot).or_else(|| Some(published_send_time_ns(address)))
+    }
+
+    /// Delay from the master in ns, from the last SYNC frame; beyond 65,535 ns only if the master tells the period of its
+    /// SYNC frames, see [`Sync::long_delay_ns`](crate::Sync::long_delay_ns).
+    pub fn delay_ns(&self) -> Option<u32> {
+        let HeardSync { sync, .. } = self.last_sync?;
+        // PARAM: a period of its own, in ticks of 5 ns.
+        let ticks = self.parameters().map(|parameters| parameters.sync_cycle).filter(|ticks| *ticks > 1000);
+        let long = ticks.and_then(|ticks| sync.long_delay_ns(ticks.saturating_mul(5)));
+        Some(long.unwrap_or(sync.delay_ns.into()))
+    }
+
+    /// The links have changed. With one link the device is the last one, and that port faces the master. A device that
+    /// loses the link to the master starts again.
+    pub fn set_links(&mut self, a: Link, b: Link) {
+        let master_lost = match self.master_port() {
+            Some(PortId::A) => a == Link::Down,
+            Some(PortId::B) => b == Link::Down,
+            None => false,
+        };
+        if master_lost && !self.is_out() {
+            self.restart();
+        }
+        let only = match (a, b) {
+            (Link::Up, Link::Down) => Some(PortId::A),
+            (Link::Down, Link::Up) => Some(PortId::B),
+            _ => None,
+        };
+        for port in [PortId::A, PortId::B] {
+            let handler = self.port_mut(port);
+            handler.flags.remove(PortFlags::LAST_DEVICE);
+            if only == Some(port) {
+                handler.flags |= PortFlags::LAST_DEVICE | PortFlags::MASTER_PORT;
+            } else if handler.state == State::Idle {
+                handler.flags = PortFlags::empty();
+            }
+        }
+    }
+
+    /// Back to IDLE: address, clock and line delay are forgotten.
+    pub(super) fn restart(&mut self) {
+        let last_device = |port: Port| {
+            let last = port.flags.contains(PortFlags::LAST_DEVICE);
+            if last { PortFlags::LAST_DEVICE | PortFlags::MASTER_PORT } else { PortFlags::empty() }
+        };
+        let (a, b) = (last_device(self.a), last_device(self.b));
+        let retrains = self.counters.retrains.saturating_add(1);
+        let counters = Counters { retrains, ..self.counters };
+        *self = Self { counters, error: self.error, ..Self::new(self.config) };
+        (self.a.flags, self.b.flags) = (a, b);
+    }
+
+    /// Looks at the time: a start-up state that has waited too long for its frame gives up. Returns whether it has.
+    pub fn poll(&mut self, now_ns: u64) -> bool {
+        let waits = !matches!(self.state(), State::Idle | State::Exchange | State::Diag | State::Error);
+        let late = waits && now_ns.saturating_sub(self.alive_ns) > self.config.start_up_timeout_ns;
+        if late {
+            self.restart();
+        }
+        late
+    }
+
+    /// A cycle of the IO exchange begins. The sixth without a frame since the one before makes the device start again;
+    /// returns whether it has.
+    pub fn cycle_start(&mut self) -> bool {
+        self.missed = if self.received { 0 } else { self.missed.saturating_add(1) };
+        self.received = false;
+        let lost = self.missed > self.config.missed_frames && !self.is_out();
+        if lost {
+            self.restart();
+        }
+        lost
+    }
+
+    /// Cycle starts without a frame since the last frame.
+    pub const fn missed_frames(&self) -> u8 {
+        self.missed
+    }
+
+    /// A start-up frame begins at `port`. Its bytes go through the [`Passage`], then to [`hear_passed`](Self::hear_passed).
+    pub fn passage(&self, port: PortId) -> Passage {
+        let handler = self.port(port);
+        let master = handler.flags.contains(PortFlags::MASTER_PORT);
+        let idle_last = handler.state == State::Idle && handler.flags.contains(PortFlags::LAST_DEVICE);
+        let kind = match (handler.state, self.line_delay_next_ns()) {
+            _ if idle_last => self.discovery(),
+            (State::Discovery, _) if master => self.discovery(),
+            (State::Sync, Ok(line)) if master => Kind::Sync(SyncRewriter::new(line, self.adds())),
+            _ => Kind::Plain(Plain::NEW),
+        };
+        Passage::new(kind, self.path(port), handler.state, idle_last)
+    }
+
+    /// What it sets in a STATUS byte that it writes now.
+    const fn adds(&self) -> Status {
+        Status::of_device(self.is_last(), self.error)
+    }
+
+    const fn discovery(&self) -> Kind {
+        Kind::Discovery(DiscoveryRewriter::new(self.config.lengths, self.adds()))
+    }
+
+    /// A start-up frame whose bytes went through a [`passage`](Self::passage) has ended at `port`.
+    pub fn hear_passed(&mut self, port: PortId, passage: Passage, times: FrameTimes) -> Reaction {
+        let state = self.port(port).state;
+        let path = passage.path().unwrap_or(Path::Absorb);
+        let mut reaction = Reaction { path, result: Ok(()), trigger: Trigger::None, correction: Correction::None };
+        if state != passage.began_in() {
+            // The device has started again meanwhile.
+            reaction.result = Err(Error::WrongState);
+            return reaction;
+        }
+        if matches!(state, State::Exchange | State::Diag | State::Error) {
+            return reaction;
+        }
+        // A STATUS byte has been written, so the error has been reported.
+        self.error &= !passage.has_written_status();
+        let learnt = passage.learnt();
+        reaction.result = learnt.map(|_| ());
+        self.count(port, reaction.result);
+        let Ok(learnt) = learnt else { return reaction };
+        let head = passage.transit().head();
+        reaction.trigger = self.port_mut(port).head(head).trigger;
+        if self.port(port.other()).flags.contains(PortFlags::MASTER_PORT) {
+            // What a neighbour sends back without LAST.
+            self.port_mut(port).flags.remove(PortFlags::MASTER_PORT);
+        }
+        let master = self.port(port).flags.contains(PortFlags::MASTER_PORT);
+        if master && state.waits_for(head) {
+            self.alive_ns = times.now_ns;
+        }
+        match learnt {
+            Learnt::Place(assignment) => self.assignment = Some(assignment),
+            Learnt::Sync(sync) => {
+                self.last_sync = Some(HeardSync { sync, sof_ns: times.sof_ns });
+                self.way_ns = self.delay_ns();
+                reaction.correction = self.clock.frame(sync.time_stamp_ns, times.sof_ns, times.counter_ns);
+            }
+            Learnt::Parameters(bytes) if master && state == State::Param => {
+                self.parameters = Some(bytes);
+                self.line = LineDelay::new(self.config.delay_model);
+            }
+            Learnt::Parameters(_) | Learnt::Nothing => {}
+        }
+        if self.is_last() || passage.transit().status().contains(Status::LAST) {
+            self.output_total = passage.output_total().or(self.output_total);
+        }
+        self.port_mut(port).end_of_frame();
+        // A device that cannot rewrite SYNC must not take part: its line delay was never measured.
+        let unmeasured = master && state == State::Sync && passage.transit().is_for_all(FrameType::Sync);
+        if let (true, Err(error)) = (unmeasured, self.line_delay_next_ns()) {
+            reaction.result = Err(error);
+            self.restart();
+        }
+        reaction
+    }
+
+    /// A whole start-up frame was heard at `port`. It is rewritten as it will be sent on.
+    pub fn hear(&mut self, port: PortId, frame: &mut [u8], times: FrameTimes) -> Reaction {
+        let mut passage = self.passage(port);
+        for byte in frame.iter_mut() {
+            *byte = passage.byte(*byte);
+        }
+        self.hear_passed(port, passage, times)
+    }
+
+    fn count(&mut self, port: PortId, result: Result<(), Error>) {
+        self.counters.count(port, result);
+        self.error |= matches!(result, Err(Error::BadFcs { .. } | Error::BadCrc8 { .. }));
+    }
+
+    fn path(&self, port: PortId) -> Path {
+        let handler = self.port(port);
+        let master = handler.flags.contains(PortFlags::MASTER_PORT);
+        match handler.state {
+            State::LineDelay if master => Path::Reflect,
+            State::LineDelay => Path::Absorb,
+            State::Exchange if self.is_last() => Path::Absorb,
+            _ if self.is_last() => Path::Reflect,
+            _ => Path::Forward,
+        }
+    }
+
+    /// The delay request to send for a trigger.
+    pub const fn delay_request(trigger: Trigger) -> Option<DelayReq> {
+        match trigger {
+            Trigger::None => None,
+            Trigger::Normal => Some(DelayReq::of_device(Place::Inner)),
+            Trigger::Last => Some(DelayReq::of_device(Place::Last)),
+        }
+    }
+
+    /// The own request, which `trigger` had started, has come back to the reverse port after `rtt_ns`.
+    ///
+    /// # Errors
+    /// As [`LongFrame::parse`] and [`DelayReq::of`]; the round trip is then not used.
+    pub fn hear_reflection(&mut self, trigger: Trigger, frame: &[u8], rtt_ns: u32) -> Result<(), Error> {
+        let result = LongFrame::parse(frame).and_then(|frame| match frame.frame_type() {
+            // Defined by the vendor, and sent by nobody: it tells nothing.
+            FrameType::DelayResp => Ok(false),
+            _ => DelayReq::of(frame).map(|_| true),
+        });
+        let port = self.reverse_port();
+        self.count(port, result.map(|_| ()));
+        if !result? {
+            return Ok(());
+        }
+        self.line.add(rtt_ns);
+        if trigger == Trigger::Last && self.master_port().is_some() {
+            self.port_mut(port).enter(State::Sync);
+            self.port_mut(port).end_of_frame();
+        }
+        Ok(())
+    }
+
+    /// A master frame of the IO exchange at the port that faces the master. `sof_ns`, `counter_ns`: the counter within
+    /// the cycle at the start of the frame and now. Frames of the other port just pass.
+    ///
+    /// # Errors
+    /// As [`MasterFrameView::parse`] and [`MasterFrameView::slice`]; [`Error::WrongState`] if the device is not in
+    /// IO exchange. The frame counts as received even so.
+    pub fn hear_exchange<'a>(&mut self, frame: &'a [u8], sof_ns: u32, counter_ns: u32) -> Result<Output<'a>, Error> {
+        let (State::Exchange, Some(place), Some(delay_ns)) = (self.state(), self.assignment, self.way_ns) else {
+            return Err(Error::WrongState);
+        };
+        self.received = true;
+        let output_len = self.config.output_len.or(self.output_total).unwrap_or_default();
+        let taken = MasterFrameView::parse(output_len.into(), frame).and_then(|view| {
+            Ok((view.slice(place.out_offset, self.config.lengths.output)?, view.reference_ns(delay_ns)))
+        });
+        self.count(self.reverse_port().other(), taken.map(|_| ()));
+        let (data, reference_ns) = taken?;
+        // Start 500 ns into the cycle, and the way here.
+        let expected = delay_ns.saturating_add(TRIGGER_NS);
+        Ok(Output { data, reference_ns, correction: self.clock.frame(expected, sof_ns, counter_ns) })
+    }
+
+    /// The next STATUS byte that the device writes carries ERROR, as after a wrong checksum: for firmware that does not know where
+    /// its axis is, see [`follow`](crate::follow).
+    pub const fn flag_error(&mut self) {
+        self.error = true;
+    }
+
+    /// The own frame of the IO exchange; reports an error once.
+    pub fn answer<const P: usize>(&mut self, payload: [u8; P]) -> Option<DeviceFrame<P>> {
+        let (State::Exchange, Some(place)) = (self.state(), self.assignment) else { return None };
+        let status = Status::of_device(self.is_last(), core::mem::take(&mut self.error));
+        Some(DeviceFrame { address: place.address, status, payload })
+    }
+}

@@ -1,0 +1,490 @@
+//! Master and devices on a simulated line.
+
+use proptest::prelude::*;
+use sorte_proto::Link;
+use sorte_proto::device::{self, Device, FrameTimes, Path, PortId, Reaction, Trigger};
+use sorte_proto::master::{self, Action, Master};
+use sorte_proto::{Correction, Discovery, Entry, Error, ErrorClass, FrameType, Parameters};
+
+/// A device's counter: right after SYNC it should read the master's time.
+#[derive(Clone, Copy)]
+struct Counter {
+    /// What it is ahead of the simulation's time, in ns.
+    ahead: i64,
+}
+
+impl Counter {
+    fn at(self, now_ns: u64) -> u32 {
+        now_ns.wrapping_add_signed(self.ahead) as u32
+    }
+
+    fn correct(&mut self, correction: Correction, now_ns: u64) {
+        match correction {
+            Correction::None => {}
+            // The write takes effect 135 ns later.
+            Correction::Set { counter_ns } => self.ahead = i64::from(counter_ns) - i64::try_from(now_ns + 135).unwrap(),
+            Correction::Rate { increment: 6, ticks } => self.ahead += i64::from(ticks),
+            Correction::Rate { ticks, .. } => self.ahead -= i64::from(ticks),
+        }
+    }
+}
+
+struct Line {
+    master: Master,
+    devices: Vec<Device>,
+    counters: Vec<Counter>,
+    /// In front of each device, in ns.
+    cables: Vec<u64>,
+    /// Devices that are reached.
+    plugged: usize,
+    /// Flips this bit of the next frame that goes over the first cable.
+    flip: Option<usize>,
+    now_ns: u64,
+}
+
+impl Line {
+    fn new(cables: Vec<u64>) -> Self {
+        let n = cables.len();
+        let config = device::Config::new();
+        let mut line = Self {
+            master: Master::new(master::Config::new().with_sync_frames(64)),
+            devices: vec![Device::new(config); n],
+            counters: (0..n).map(|k| Counter { ahead: 123_456_789 * i64::try_from(k).unwrap() }).collect(),
+            cables,
+            plugged: 0,
+            flip: None,
+            now_ns: 0,
+        };
+        line.master.set_link(Link::Up);
+        line.plug(n);
+        line
+    }
+
+    fn plug(&mut self, devices: usize) {
+        self.plugged = devices;
+        for (k, device) in self.devices.iter_mut().enumerate() {
+            let link = |there: bool| if there { Link::Up } else { Link::Down };
+            device.set_links(link(k < devices), link(k + 1 < devices));
+        }
+    }
+
+    fn wait(&mut self, until_ns: u64) {
+        let cycles = (until_ns - self.now_ns) / 4000;
+        self.now_ns = until_ns;
+        for device in &mut self.devices {
+            device.poll(until_ns);
+            for _ in 0..cycles.min(6) {
+                if device.state() == device::State::Exchange {
+                    device.cycle_start();
+                }
+            }
+        }
+    }
+
+    /// A start-up frame goes out to the end of the line and comes back.
+    fn carry(&mut self, frame: &[u8], at_ns: u64) -> Option<(Vec<u8>, u64)> {
+        let mut frame = frame.to_vec();
+        if let Some(bit) = self.flip.take() {
+            let bit = bit % (frame.len() * 8);
+            frame[bit / 8] ^= 1 << (bit % 8);
+        }
+        let mut sof_ns = at_ns;
+        for k in 0..self.plugged {
+            sof_ns += self.cables[k];
+            // The capture is 280 ns after the trigger.
+            let handled = self.pass(k, PortId::A, &mut frame, sof_ns + 280);
+            if handled.trigger != Trigger::None && k + 1 < self.plugged {
+                self.measure(k, handled.trigger, sof_ns);
+            }
+            match handled.path {
+                Path::Forward => sof_ns += 355,
+                Path::Absorb => return None,
+                Path::Reflect => {
+                    sof_ns += 320;
+                    for back in (0..k).rev() {
+                        sof_ns += self.cables[back + 1];
+                        if self.pass(back, PortId::B, &mut frame, sof_ns).path != Path::Forward {
+                            return None;
+                        }
+                        sof_ns += 355;
+                    }
+                    return Some((frame, sof_ns + self.cables[0]));
+                }
+            }
+        }
+        None
+    }
+
+    fn pass(&mut self, k: usize, port: PortId, frame: &mut [u8], sof_ns: u64) -> Reaction {
+        let counter_ns = self.counters[k].at(sof_ns + 700);
+        let arrival = FrameTimes { sof_ns: self.counters[k].at(sof_ns), counter_ns, now_ns: sof_ns };
+        let handled = self.devices[k].hear(port, frame, arrival);
+        self.counters[k].correct(handled.correction, sof_ns + 700);
+        handled
+    }
+
+    /// Device k measures the line to the next one, which does the same to its next.
+    fn measure(&mut self, k: usize, trigger: Trigger, at_ns: u64) {
+        let mut frame = Device::delay_request(trigger).unwrap().emit();
+        let handled = self.pass(k + 1, PortId::A, &mut frame, at_ns + self.cables[k + 1]);
+        if handled.trigger != Trigger::None && k + 2 < self.plugged {
+            self.measure(k + 1, handled.trigger, at_ns);
+        }
+        if handled.path == Path::Reflect {
+            let rtt = 2 * self.cables[k + 1] as u32 + 360;
+            assert_eq!(self.devices[k].hear_reflection(trigger, &frame, rtt), Ok(()));
+        }
+    }
+
+    /// One cycle: what each device took, and what the master took of each device.
+    fn exchange(&mut self, output: &[u8], at_ns: u64, time_stamp: u16) -> Vec<Result<Vec<u8>, Error>> {
+        let mut frame = vec![0; output.len() + 5];
+        self.master.emit_into(output, time_stamp, &mut frame).unwrap();
+        if let Some(bit) = self.flip.take() {
+            let bit = bit % (frame.len() * 8);
+            frame[bit / 8] ^= 1 << (bit % 8);
+        }
+        let cycle_ns = at_ns - 500;
+        let mut sof_ns = at_ns;
+        let mut taken = Vec::new();
+        for k in 0..self.plugged {
+            sof_ns += self.cables[k] + if k > 0 { 355 } else { 0 };
+            let cycle_start = cycle_ns - self.master.epoch_ns();
+            let in_cycle = self.counters[k].at(sof_ns).wrapping_sub(cycle_start as u32);
+            let output = self.devices[k].hear_exchange(&frame, in_cycle, in_cycle);
+            taken.push(output.map(|o| o.data.to_vec()));
+            if let Ok(output) = output {
+                self.counters[k].correct(output.correction, sof_ns);
+            }
+            self.devices[k].cycle_start();
+            if let Some(answer) = self.devices[k].answer([k as u8, 0, 0]) {
+                let mut bytes = [0; 6];
+                answer.emit_into(&mut bytes).unwrap();
+                let _: Result<_, _> = self.master.hear(&bytes, 0);
+            }
+        }
+        taken
+    }
+
+    /// Runs until the first cycle, or until the master gives up.
+    fn start_up(&mut self) -> Result<(u64, u16), Error> {
+        loop {
+            match self.master.poll(self.now_ns) {
+                Action::Wait { until_ns } => self.wait(until_ns),
+                Action::Restart { error } => return Err(error),
+                Action::Exchange { at_ns, time_stamp, .. } => return Ok((at_ns, time_stamp)),
+                Action::Send { at_ns, frame } => {
+                    let mut buffer = [0; Discovery::LEN];
+                    let len = frame.emit_into(&mut buffer).unwrap();
+                    if let Some((answer, sof_ns)) = self.carry(&buffer[..len], at_ns) {
+                        let _: Result<_, _> = self.master.hear(&answer, sof_ns);
+                    }
+                }
+            }
+        }
+    }
+
+    /// Cycles until the master gives up, `most` at most.
+    fn cycles(&mut self, first: (u64, u16), most: u32) -> Option<Error> {
+        let (mut at_ns, mut time_stamp) = first;
+        for n in 0..most {
+            let output: Vec<u8> = (0..self.master.output_len()).map(|k| k as u8 ^ n as u8).collect();
+            let taken = self.exchange(&output, at_ns, time_stamp);
+            for (k, data) in taken.into_iter().enumerate() {
+                // A device that was plugged in just now is not in the exchange.
+                let entry = self.master.network().entries().get(k).map_or(4, |entry| usize::from(entry.output));
+                let own = output[entry * k..entry * (k + 1)].to_vec();
+                assert_eq!(data, if self.devices[k].assignment().is_some() { Ok(own) } else { Err(Error::WrongState) });
+            }
+            loop {
+                match self.master.poll(self.now_ns) {
+                    Action::Wait { until_ns } => self.now_ns = until_ns,
+                    Action::Exchange { at_ns: at, time_stamp: stamp, .. } => {
+                        (at_ns, time_stamp) = (at, stamp);
+                        break;
+                    }
+                    Action::Restart { error } => return Some(error),
+                    Action::Send { .. } => panic!("start-up in the exchange"),
+                }
+            }
+        }
+        None
+    }
+}
+
+#[test]
+fn lines_of_all_lengths_start_and_exchange() {
+    for devices in [1, 2, 3, 4] {
+        let mut line = Line::new((0..devices).map(|k| 20 + 37 * k).collect());
+        let first = line.start_up().unwrap();
+        assert_eq!(u64::from(line.master.network().devices()), devices);
+        for (k, device) in line.devices.iter().enumerate() {
+            let place = device.assignment().unwrap();
+            assert_eq!((usize::from(place.address.get()), usize::from(place.out_offset)), (k + 1, 4 * k));
+            assert_eq!(device.parameters(), Some(Parameters::STOCK));
+            assert_eq!(device.state(), device::State::Exchange);
+            // The clocks agree with the master's, but for the rounding of the line delays: 8 ns a device.
+            let master_ns = (first.0 - line.master.epoch_ns()) as u32;
+            let error = master_ns.abs_diff(line.counters[k].at(first.0));
+            assert!(error <= 8 * k as u32 + 1, "device {}: {error} ns", k + 1);
+        }
+        assert_eq!(line.cycles(first, 200), None);
+        assert_eq!(line.master.counters().timing_errors, 0);
+    }
+}
+
+/// 254 devices of which each has 85 ns of cable in front of it, and a byte of process data.
+fn full_line(config: master::Config) -> Line {
+    let mut line = Line::new(vec![85; 254]);
+    line.master = Master::new(config.with_sync_frames(64));
+    line.master.set_link(Link::Up);
+    let entry = Entry { input: 4, output: 1 };
+    let config = device::Config::new().with_output_len(None).with_lengths(entry).with_slot_ns(Some(880));
+    line.devices.fill(Device::new(config));
+    line.plug(254);
+    line
+}
+
+#[test]
+fn a_line_that_the_delay_field_cannot_hold_is_refused_with_its_length() {
+    let mut line = full_line(master::Config::new().with_cycle_ns(224_000));
+    // 253 hops of 355 + 85 ns, less what the measurement of a hop loses, and the cable of the first.
+    let delay_ns = match line.start_up() {
+        Err(Error::LineTooLong { delay_ns }) => delay_ns,
+        other => panic!("{other:?}"),
+    };
+    assert!((253 * 430..=253 * 440 + 85).contains(&delay_ns), "{delay_ns}");
+}
+
+#[test]
+fn a_cycle_that_is_too_short_names_the_device_that_breaks_it() {
+    let mut line = full_line(master::Config::new().with_cycle_ns(40_000).with_long_line(true));
+    // The master frame of 261 bytes ends at 500 + 20,880 + 85 + 440 (a - 1) ns: above 40 us from a = 44 on, with 1 ns a hop
+    // lost in the measurement.
+    assert_eq!(line.start_up(), Err(Error::CycleTooShort { device: 44, needs_ns: 40_342 }));
+    let mut line = Line::new(vec![10; 5]);
+    assert_eq!(line.start_up(), Err(Error::CycleTooShort { device: 5, needs_ns: 4670 }));
+}
+
+/// The clocks agree at the end of the start-up and after ten thousand cycles, but for what the published measurement of
+/// the line delay loses: up to 8 ns a device.
+#[test]
+fn a_line_of_254_devices_keeps_its_time() {
+    let mut line = full_line(master::Config::new().with_cycle_ns(224_000).with_long_line(true));
+    let first = line.start_up().unwrap();
+    assert_eq!(line.master.network().devices(), 254);
+    assert_eq!(line.master.output_len(), 254);
+    assert_eq!(line.devices.last().unwrap().assignment().unwrap().out_offset, 253);
+    assert!(line.devices.last().unwrap().delay_ns().unwrap() > 65_535);
+    let check = |line: &Line, now_ns: u64| {
+        for (k, counter) in line.counters.iter().enumerate() {
+            let master_ns = now_ns - line.master.epoch_ns();
+            let error = i64::from(counter.at(now_ns).wrapping_sub(master_ns as u32) as i32);
+            assert!((-8 * k as i64 - 1..=1).contains(&error), "device {}: {error} ns", k + 1);
+        }
+    };
+    check(&line, first.0);
+    assert_eq!(line.cycles(first, 10_000), None);
+    check(&line, line.now_ns);
+    let slots: Vec<u32> = line.devices.iter().map(|device| device.send_time_ns().unwrap()).collect();
+    // 500 + 880 (a - 1) ns, less the way: back to back at the master.
+    for (k, slot) in slots.iter().enumerate() {
+        let arrival = i64::from(*slot) + 85 + 440 * k as i64;
+        assert!((arrival - (500 + 880 * k as i64)).abs() <= 8 * k as i64 + 1, "device {}", k + 1);
+    }
+}
+
+#[test]
+fn the_axes_may_come_to_rest_before_the_master_starts_again() {
+    let mut line = Line::new(vec![50; 2]);
+    line.master = Master::new(master::Config::new().with_sync_frames(64).with_stop_cycles(1000));
+    line.master.set_link(Link::Up);
+    for halt in [None, Some(30)] {
+        line.plug(2);
+        let mut first = line.start_up().unwrap();
+        assert_eq!(line.cycles(first, 10), None);
+        line.plug(1);
+        let (mut stopping, mut error) = (0, None);
+        for _ in 0..2000 {
+            let output = vec![0; usize::from(line.master.output_len())];
+            line.exchange(&output, first.0, first.1);
+            if halt == Some(stopping) {
+                line.master.halted();
+            }
+            loop {
+                match line.master.poll(line.now_ns) {
+                    Action::Wait { until_ns } => line.now_ns = until_ns,
+                    Action::Exchange { at_ns, time_stamp, stop, .. } => {
+                        assert!(stop || stopping == 0);
+                        stopping += u32::from(stop);
+                        first = (at_ns, time_stamp);
+                        break;
+                    }
+                    Action::Restart { error: why } => {
+                        error = Some(why);
+                        break;
+                    }
+                    Action::Send { .. } => panic!("start-up in the exchange"),
+                }
+            }
+            if error.is_some() {
+                break;
+            }
+        }
+        assert_eq!(error, Some(Error::TopologyChanged { address: 1 }));
+        assert_eq!(stopping, halt.unwrap_or(1000));
+        line.now_ns += 30_000_000;
+        line.wait(line.now_ns + 1);
+    }
+}
+
+#[test]
+fn a_master_that_fails_again_and_again_stays_in_error() {
+    let mut line = Line::new(vec![50; 2]);
+    line.master = Master::new(master::Config::new().with_max_failures(3));
+    line.master.set_link(Link::Up);
+    line.plug(0);
+    for n in 1..=3 {
+        assert!(line.start_up().is_err());
+        assert_eq!(line.master.state() == master::State::Error, n == 3);
+    }
+    assert_eq!(line.master.poll(u64::MAX - 1), Action::Wait { until_ns: u64::MAX });
+    assert_eq!(line.master.hear(&[], 0), Err(Error::WrongState));
+    line.master.disable();
+    line.master.enable();
+    line.plug(2);
+    assert!(line.start_up().is_ok());
+}
+
+#[test]
+fn devices_that_fall_silent_are_named_and_the_rest_starts_again() {
+    let mut line = Line::new(vec![50; 4]);
+    let first = line.start_up().unwrap();
+    assert_eq!(line.cycles(first, 10), None);
+    line.plug(2);
+    let error = line.cycles(first, 100).unwrap();
+    // Device 2 is the last one now and says so.
+    assert!(matches!(error, Error::TopologyChanged { address: 2 }), "{error}");
+    let first = line.start_up().unwrap();
+    assert_eq!(line.master.network().devices(), 2);
+    assert_eq!(line.cycles(first, 10), None);
+    assert_eq!(line.master.counters().retrains, 1);
+    // Back in: the master does not see them until it starts again.
+    line.plug(4);
+    let error = line.cycles(first, 100).unwrap();
+    assert!(matches!(error, Error::TopologyChanged { .. }), "{error}");
+    let first = line.start_up().unwrap();
+    assert_eq!(line.master.network().devices(), 4);
+    // Its processor starts again; the ports forward meanwhile.
+    line.devices[1].reset();
+    assert_eq!(line.cycles(first, 100), Some(Error::DevicesMissing { first: 2, count: 1, cycles: 3 }));
+    assert!(line.start_up().is_ok());
+}
+
+#[test]
+fn every_wait_ends_with_what_was_missing() {
+    let mut line = Line::new(vec![50; 2]);
+    line.plug(0);
+    assert_eq!(line.start_up(), Err(Error::NoAnswer { sent: FrameType::Discovery, frame: 9 }));
+    line.plug(2);
+    let first = line.start_up().unwrap();
+    line.plug(0);
+    let error = line.cycles(first, 100);
+    assert_eq!(error, Some(Error::DevicesMissing { first: 1, count: 2, cycles: 3 }));
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 64, ..ProptestConfig::default() })]
+
+    /// A bit flip anywhere in a start-up frame is found, nothing of it is used, and in the end the line runs.
+    #[test]
+    fn a_flip_in_the_start_up_only_costs_time(frame in 0u32..100, bit: usize) {
+        let mut line = Line::new(vec![50; 3]);
+        let mut sent = 0;
+        let mut restarts = 0;
+        let first = loop {
+            match line.master.poll(line.now_ns) {
+                Action::Wait { until_ns } => line.wait(until_ns),
+                Action::Restart { .. } => restarts += 1,
+                Action::Exchange { at_ns, time_stamp, .. } => break (at_ns, time_stamp),
+                Action::Send { at_ns, frame: outgoing } => {
+                    line.flip = (sent == frame).then_some(bit);
+                    sent += 1;
+                    let mut buffer = [0; Discovery::LEN];
+                    let len = outgoing.emit_into(&mut buffer).unwrap();
+                    if let Some((answer, sof_ns)) = line.carry(&buffer[..len], at_ns) {
+                        let _: Result<_, _> = line.master.hear(&answer, sof_ns);
+                    }
+                }
+            }
+            prop_assert!(restarts < 3);
+        };
+        prop_assert_eq!(line.master.network().devices(), 3);
+        prop_assert_eq!(line.cycles(first, 5), None);
+    }
+
+    /// Frames and answers that are lost, come twice or again later, and a master that is polled late: in the end the line runs
+    /// with the right cables and clocks, or it has not begun.
+    #[test]
+    fn whatever_happens_in_the_start_up_the_line_and_the_clocks_are_right(events in proptest::collection::vec(0u8..9, 0..400)) {
+        let mut line = Line::new(vec![50; 3]);
+        let mut events = events.into_iter();
+        let mut old: Option<(Vec<u8>, u64)> = None;
+        let mut restarts = 0;
+        let first = loop {
+            match line.master.poll(line.now_ns) {
+                Action::Wait { until_ns } => line.wait(until_ns),
+                Action::Restart { .. } => restarts += 1,
+                Action::Exchange { at_ns, time_stamp, .. } => break (at_ns, time_stamp),
+                Action::Send { at_ns, frame } => {
+                    prop_assert!(at_ns >= line.now_ns);
+                    let event = events.next().unwrap_or_default();
+                    let mut buffer = [0; Discovery::LEN];
+                    let len = frame.emit_into(&mut buffer).unwrap();
+                    let new = (event != 1).then(|| line.carry(&buffer[..len], at_ns)).flatten();
+                    let heard = match event {
+                        2 => vec![],
+                        3 => vec![new.clone(), new.clone()],
+                        4 => vec![old.clone(), new.clone()],
+                        5 => vec![new.clone(), old.clone()],
+                        _ => vec![new.clone()],
+                    };
+                    for (answer, sof_ns) in heard.into_iter().flatten() {
+                        let _: Result<_, _> = line.master.hear(&answer, sof_ns);
+                    }
+                    old = new.or(old);
+                    if event == 6 {
+                        line.wait(line.now_ns + 7_777);
+                    }
+                }
+            }
+            prop_assert!(restarts < 40);
+        };
+        prop_assert_eq!((line.master.network().devices(), line.master.line_delay().checked()), (3, Ok(50)));
+        for (k, counter) in line.counters.iter().enumerate() {
+            let error = ((first.0 - line.master.epoch_ns()) as u32).abs_diff(counter.at(first.0));
+            prop_assert!(error <= 8 * k as u32 + 1, "device {}: {} ns", k + 1, error);
+            prop_assert_eq!(line.devices[k].state(), device::State::Exchange);
+        }
+        prop_assert_eq!(line.cycles(first, 5), None);
+    }
+
+    /// A flip in the exchange: every device refuses the frame, unless it hit the time stamp.
+    #[test]
+    fn a_flip_in_the_exchange_is_never_used(bit in 0usize..168, output: [u8; 16]) {
+        let mut line = Line::new(vec![50; 4]);
+        let (at_ns, time_stamp) = line.start_up().unwrap();
+        line.flip = Some(bit);
+        let taken = line.exchange(&output, at_ns, time_stamp);
+        for (k, data) in taken.into_iter().enumerate() {
+            if bit < 19 * 8 {
+                prop_assert_eq!(data.map_err(Error::class), Err(ErrorClass::BadCrc8));
+                prop_assert_eq!(line.devices[k].counters().crc_errors, 1);
+            } else {
+                prop_assert_eq!(data, Ok(output[4 * k..4 * k + 4].to_vec()));
+            }
+        }
+        // The device frames have reported it.
+        prop_assert_eq!(line.master.counters().device_errors, if bit < 19 * 8 { 4 } else { 0 });
+    }
+}

@@ -1,0 +1,242 @@
+//! Times and limits of master and device as numbers of the published firmware, not of the functions under test.
+
+use crate::common::device_in;
+use sorte_proto::Link;
+use sorte_proto::Place;
+use sorte_proto::device::{self, Device, FrameTimes, PortId};
+use sorte_proto::master::{self, Action, Heard, Master, Outgoing};
+use sorte_proto::{
+    Correction, DeviceAddress, DeviceFrame, Discovery, Entry, Error, Parameters, Status, Sync, emit_master_frame_into,
+};
+
+/// What device `n` of so many adds to STATUS.
+fn last_of(n: u8, devices: u8) -> Status {
+    if n == devices { Status::LAST } else { Status::empty() }
+}
+
+fn answer(frame: Outgoing, devices: u8) -> Vec<u8> {
+    match frame {
+        Outgoing::Discovery { place } => {
+            let mut frame = Discovery::request(place);
+            for n in 1..=devices {
+                frame.pass(Entry::STOCK, last_of(n, devices)).unwrap();
+            }
+            frame.emit().to_vec()
+        }
+        Outgoing::Sync(mut frame) => {
+            frame.pass(0, Status::LAST);
+            frame.emit().to_vec()
+        }
+        Outgoing::Param(frame) => frame.emit().to_vec(),
+        Outgoing::DelayReq(frame) => frame.emit().to_vec(),
+    }
+}
+
+/// A master in the IO exchange with two devices, and what it did until then.
+fn running(config: master::Config) -> (Master, Vec<(u64, Outgoing)>, (u64, u16)) {
+    let mut master = Master::new(config);
+    master.set_link(Link::Up);
+    let (mut sent, mut now_ns) = (Vec::new(), 0);
+    loop {
+        match master.poll(now_ns) {
+            Action::Wait { until_ns } => now_ns = until_ns,
+            Action::Send { at_ns, frame } => {
+                sent.push((at_ns, frame));
+                // 472 ns of round trip: a line of 76 ns.
+                assert_eq!(master.hear(&answer(frame, 2), at_ns + 472), Ok(Heard::StartUp));
+            }
+            Action::Exchange { at_ns, time_stamp, cycle, .. } => {
+                assert_eq!(cycle, 0);
+                return (master, sent, (at_ns, time_stamp));
+            }
+            Action::Restart { error } => panic!("{error}"),
+        }
+    }
+}
+
+/// 10 DISCOVERY, 10 PARAM and 16 DELAY_REQ a millisecond apart, 1024 SYNC every 10 us at 500, 10500, ... of the master's
+/// time, and the first frame of the exchange after 46.24 ms.
+#[test]
+fn the_start_up_has_the_published_times() {
+    let (master, sent, (first_ns, stamp)) = running(master::Config::new());
+    assert_eq!(sent.len(), 10 + 10 + 16 + 1024);
+    for (n, (at_ns, frame)) in sent.iter().enumerate() {
+        let (phase, want) =
+            if n < 36 { (n / 10, n as u64 * 1_000_000) } else { (9, 36_000_500 + (n as u64 - 36) * 10_000) };
+        assert_eq!(*at_ns, want, "frame {n}");
+        match frame {
+            Outgoing::Discovery { place } => assert_eq!((phase, *place == Place::Last), (0, n == 9)),
+            Outgoing::Param(_) => assert_eq!(phase, 1),
+            Outgoing::DelayReq(_) => assert!(phase == 2 || phase == 3),
+            Outgoing::Sync(frame) => {
+                let sync = n as u32 - 36;
+                assert_eq!((frame.time_stamp_ns, frame.delay_ns), (500 + 10_000 * sync + 76 + 280, 76));
+                assert_eq!(frame.status.bits(), if sync == 1023 { 0x08 } else { 0x40 });
+            }
+        }
+    }
+    assert_eq!((first_ns, master.epoch_ns()), (46_240_500, 36_000_000));
+    // The time stamp is that of this frame: 10,240,500 modulo 65,536.
+    assert_eq!(stamp, 16_884);
+}
+
+#[test]
+fn each_cycle_has_its_own_time_stamp() {
+    let (mut master, _, (mut at_ns, mut stamp)) = running(master::Config::new());
+    for cycle in 1..100 {
+        for address in 1..=2 {
+            good_frame(&mut master, address);
+        }
+        let Action::Wait { until_ns } = master.poll(at_ns) else { panic!("no wait") };
+        assert_eq!(until_ns, at_ns + 4000);
+        let Action::Exchange { at_ns: at, time_stamp, cycle: number, stop } = master.poll(until_ns) else { panic!() };
+        assert_eq!((at, number, stop), (at_ns + 4000, cycle, false));
+        assert_eq!(time_stamp, stamp.wrapping_add(4000));
+        (at_ns, stamp) = (at, time_stamp);
+    }
+}
+
+fn device_frame(address: u8) -> [u8; 6] {
+    let status = if address == 2 { Status::LAST } else { Status::empty() };
+    let mut bytes = [0; 6];
+    DeviceFrame { address: DeviceAddress::new(address).unwrap(), status, payload: [0; 3] }
+        .emit_into(&mut bytes)
+        .unwrap();
+    bytes
+}
+
+fn good_frame(master: &mut Master, address: u8) {
+    assert!(master.hear(&device_frame(address), 0).is_ok());
+}
+
+/// Runs cycles in which `bad(n)` devices are heard right; gives the cycle in which the master gave up.
+fn cycles(master: &mut Master, mut at_ns: u64, frames: impl Fn(u32) -> [Option<bool>; 2]) -> Option<(u32, Error)> {
+    for n in 0..100 {
+        for (address, good) in (1..).zip(frames(n)) {
+            let mut bytes = device_frame(address);
+            bytes[2] ^= u8::from(good == Some(false));
+            if good.is_some() {
+                let _: Result<_, _> = master.hear(&bytes, 0);
+            }
+        }
+        at_ns += 4000;
+        if let Action::Restart { error } = master.poll(at_ns) {
+            return Some((n, error));
+        }
+    }
+    None
+}
+
+/// Three cycles in a row with a damaged frame, or with one missing; two and a good one never.
+#[test]
+fn the_master_gives_up_after_three_bad_cycles_in_a_row() {
+    let run = |frames: fn(u32) -> [Option<bool>; 2]| {
+        let (mut master, _, (at_ns, _)) = running(master::Config::new());
+        cycles(&mut master, at_ns, frames)
+    };
+    assert_eq!(run(|_| [Some(true), Some(true)]), None);
+    assert_eq!(run(|n| if n < 5 { [Some(true); 2] } else { [Some(true), None] }).map(|(n, _)| n), Some(7));
+    assert_eq!(
+        run(|n| if n < 5 { [Some(true); 2] } else { [None, Some(true)] }),
+        Some((7, Error::DevicesMissing { first: 1, count: 1, cycles: 3 }))
+    );
+    assert_eq!(run(|n| if n % 3 == 2 { [Some(true); 2] } else { [Some(true), None] }), None);
+    // A damaged frame is a missing one too, so the limits are told apart with one of them off.
+    let damaged = |limits: fn(master::Config) -> master::Config, frames: fn(u32) -> [Option<bool>; 2]| {
+        let (mut master, _, (at_ns, _)) = running(limits(master::Config::new()));
+        cycles(&mut master, at_ns, frames)
+    };
+    let crc = |config: master::Config| config.with_retrain_timing_errors(0);
+    assert_eq!(damaged(crc, |_| [Some(false), Some(true)]), Some((2, Error::TooManyCrcErrors { cycles: 3 })));
+    assert_eq!(damaged(crc, |n| if n % 3 == 2 { [Some(true); 2] } else { [Some(false), Some(true)] }), None);
+    let none = |config: master::Config| config.with_retrain_timing_errors(0).with_retrain_crc_errors(0);
+    assert_eq!(damaged(none, |_| [Some(false), None]), None);
+    let five = |config: master::Config| config.with_retrain_timing_errors(0).with_retrain_crc_errors(5);
+    assert_eq!(damaged(five, |_| [Some(true), Some(false)]).map(|(n, _)| n), Some(4));
+}
+
+/// SYNC is over only with an answer that has passed the last device and carries STATE_CHANGE.
+#[test]
+fn the_last_sync_needs_last_and_state_change() {
+    for (status, want) in [(0x09, true), (0x08, false), (0x01, false), (0x00, false), (0x0d, true)] {
+        let mut master = Master::new(master::Config::new().with_sync_frames(4));
+        master.set_link(Link::Up);
+        let mut now_ns = 0;
+        let ran = loop {
+            match master.poll(now_ns) {
+                Action::Wait { until_ns } => now_ns = until_ns,
+                Action::Send { at_ns, frame: Outgoing::Sync(mut frame) } => {
+                    frame.pass(0, Status::empty());
+                    frame.status = Status::from_bits_retain(status);
+                    let _: Result<_, _> = master.hear(&frame.emit(), at_ns + 472);
+                }
+                Action::Send { at_ns, frame } => {
+                    let _: Result<_, _> = master.hear(&answer(frame, 2), at_ns + 472);
+                }
+                Action::Exchange { .. } => break true,
+                Action::Restart { .. } => break false,
+            }
+        };
+        assert_eq!(ran, want, "STATUS {status:#04x}");
+    }
+}
+
+/// The only device of a line that is 76 ns long, in the IO exchange; its last SYNC frame began at 77,000 ns of its counter.
+fn device_in_exchange() -> Device {
+    let mut device = device_in(device::State::Sync, true, Parameters::CNC);
+    let arrival = FrameTimes { sof_ns: 77_000, counter_ns: 77_700, now_ns: 0 };
+    let handled = device.hear(PortId::A, &mut Sync::of_master(30_500, 76, Place::Last).emit(), arrival);
+    // Time stamp 30,856, 700 ns since the start, 135 ns until the write is made.
+    assert_eq!((handled.result, handled.correction), (Ok(()), Correction::Set { counter_ns: 31_691 }));
+    device
+}
+
+#[test]
+fn a_device_enters_the_exchange_ten_microseconds_after_the_last_sync() {
+    let device = device_in_exchange();
+    assert_eq!(device.cycle_zero_ns(), Some(87_000));
+    // In the common time: triggered at 30,500, the next frame at 40,500, its cycle 500 ns before.
+    assert_eq!((device.first_cycle_ns(), device.delay_ns()), (Some(40_000), Some(76)));
+    // The first address sends at 500 ns and owns the first bytes.
+    let place = device.assignment().unwrap();
+    assert_eq!((place.address.get(), place.in_offset, place.out_offset), (1, 0, 0));
+    assert_eq!(device.send_time_ns(), Some(500));
+}
+
+/// The clock's target in the exchange is the delay plus 500, and the reference time is the stamp plus the delay.
+#[test]
+fn in_the_exchange_a_frame_is_expected_at_its_delay_and_500_ns() {
+    let mut device = device_in_exchange();
+    let mut frame = [0; 21];
+    emit_master_frame_into(&[7; 16], 1000, &mut frame).unwrap();
+    for n in 1..=16 {
+        // 23 ns late each time.
+        let output = device.hear_exchange(&frame, 500 + 76 + 23, 2000).unwrap();
+        assert_eq!(output.reference_ns, 1076);
+        let want = if n == 16 { Correction::Rate { increment: 4, ticks: 23 } } else { Correction::None };
+        assert_eq!(output.correction, want);
+    }
+    // A sum of 0 counts as positive.
+    for n in 1..=16 {
+        let want = if n == 16 { Correction::Rate { increment: 6, ticks: 0 } } else { Correction::None };
+        assert_eq!(device.hear_exchange(&frame, 500 + 76, 2000).unwrap().correction, want);
+    }
+}
+
+/// A damaged master frame is told in the next device frame, and not in the one after it.
+#[test]
+fn an_error_is_told_once() {
+    let mut device = device_in_exchange();
+    let mut frame = [0; 21];
+    emit_master_frame_into(&[7; 16], 1000, &mut frame).unwrap();
+    frame[3] ^= 1;
+    let mut told = Vec::new();
+    for _ in 0..3 {
+        told.push(device.answer([0; 3]).unwrap().status.bits());
+        if told.len() == 1 {
+            assert!(matches!(device.hear_exchange(&frame, 576, 2000), Err(Error::BadCrc8 { .. })));
+        }
+    }
+    // LAST; LAST and ERROR; LAST.
+    assert_eq!(told, [0x01, 0x05, 0x01]);
+}

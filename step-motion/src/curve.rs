@@ -1,0 +1,147 @@
+//! Pieces of constant jerk, one after the other.
+
+use crate::real::{Real, THIRD};
+use crate::slope::Slope;
+
+/// What the acceleration of a piece does.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub(super) enum Bend {
+    /// It grows from its start.
+    Growing,
+    /// It keeps its size, maybe 0.
+    Flat,
+    /// It becomes less.
+    Fading,
+}
+
+/// A piece of constant jerk: its state at its begin.
+#[derive(Debug, Clone, Copy)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub(super) struct Piece {
+    /// Begin, on the curve's time.
+    pub(super) time: Real,
+    /// Distance from the begin of the curve.
+    pub(super) p: Real,
+    pub(super) v: Real,
+    /// Size of the acceleration.
+    pub(super) a: Real,
+    /// Size of the jerk.
+    pub(super) j: Real,
+    /// The acceleration speeds up.
+    pub(super) up: bool,
+    pub(super) bend: Bend,
+}
+
+impl Piece {
+    /// The state `t` after the begin.
+    pub(super) fn after(&self, t: Real) -> Self {
+        let Self { time, a, j, up, bend, .. } = *self;
+        let (p, v) = self.way(t);
+        Self { time: time + t, p, v, a: a.along(j * t, bend != Bend::Fading), j, up, bend }
+    }
+
+    /// Distance and speed `t` after the begin.
+    pub(super) fn way(&self, t: Real) -> (Real, Real) {
+        let Self { p, v, a, j, up, bend, .. } = *self;
+        let growing = bend != Bend::Fading;
+        let speed = a * t;
+        let bent = j * t.squared().half();
+        let dv = speed.along(bent, growing);
+        let dp = (speed.half().along(bent * THIRD, growing)) * t;
+        (p + (v * t).along(dp, up), v.along(dv, up))
+    }
+}
+
+/// Up to eight pieces: back to acceleration 0, a slope, a cruise, a slope.
+#[derive(Debug, Clone, Copy)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub(super) struct Curve {
+    pieces: [Piece; Curve::MAX],
+    len: usize,
+    /// Where the next piece begins.
+    pub(super) time: Real,
+    pub(super) p: Real,
+    /// Time of the curve that was over before it was planned, and the distance made in it.
+    pub(super) skipped: (Real, Real),
+}
+
+impl Curve {
+    pub(super) const MAX: usize = 8;
+
+    /// Nothing but zero bytes: it is cleared, not copied.
+    const EMPTY: Self = {
+        let none = Real::ZERO;
+        let none = Piece { time: none, p: none, v: none, a: none, j: none, up: false, bend: Bend::Growing };
+        Self { pieces: [none; Self::MAX], len: 0, time: Real::ZERO, p: Real::ZERO, skipped: (Real::ZERO, Real::ZERO) }
+    };
+
+    pub(super) const fn new() -> Self {
+        Self::EMPTY
+    }
+
+    /// Without pieces.
+    pub(super) const fn clear(&mut self) {
+        (self.len, self.time, self.p) = (0, Real::ZERO, Real::ZERO);
+    }
+
+    pub(super) fn pieces(&self) -> &[Piece] {
+        self.pieces.get(..self.len).unwrap_or(&[])
+    }
+
+    /// The state at a time of the curve, also before its begin and after its end; `None` without pieces.
+    pub(super) fn at(&self, time: Real) -> Option<Piece> {
+        let pieces = self.pieces();
+        let piece = pieces.iter().rev().find(|piece| piece.time <= time).or(pieces.first())?;
+        Some(piece.after(time - piece.time))
+    }
+
+    /// The distance that is planned: from where the curve was joined to its end.
+    pub(super) fn way(&self) -> Real {
+        self.p - self.skipped.1
+    }
+
+    /// Adds a piece with its duration and distance; one without duration is left out.
+    pub(super) fn push(&mut self, (lasts, distance): (Real, Real), [v, a, j]: [Real; 3], up: bool, bend: Bend) {
+        if lasts.is_zero() {
+            return;
+        }
+        let piece = Piece { time: self.time, p: self.p, v, a, j, up, bend };
+        if let Some(place) = self.pieces.get_mut(self.len) {
+            *place = piece;
+            self.len = self.len.saturating_add(1);
+        }
+        (self.time, self.p) = (self.time + lasts, self.p + distance);
+    }
+
+    /// Adds a change of speed.
+    pub(super) fn slope(&mut self, slope: &Slope) {
+        let Slope { from, to, edge, flat, j, a, distance: whole, .. } = *slope;
+        if from == to {
+            return;
+        }
+        let up = to > from;
+        if edge.is_zero() {
+            self.push((flat, whole), [from, a, Real::ZERO], up, Bend::Flat);
+            return;
+        }
+        let bent = (a * edge).half();
+        let mut way = from.along(bent * THIRD, up) * edge;
+        self.push((edge, way), [from, Real::ZERO, j], up, Bend::Growing);
+        if !flat.is_zero() {
+            // It has the mean speed.
+            let middle = (from + to).half() * flat;
+            self.push((flat, middle), [from.along(bent, up), a, Real::ZERO], up, Bend::Flat);
+            way = way + middle;
+        }
+        self.push((edge, whole - way), [to.along(bent, !up), a, j], up, Bend::Fading);
+    }
+
+    /// Adds a stretch at constant speed.
+    pub(super) fn cruise(&mut self, v: Real, distance: Real) {
+        if distance.is_zero() || v.is_zero() {
+            return;
+        }
+        self.push((distance / v, distance), [v, Real::ZERO, Real::ZERO], true, Bend::Flat);
+    }
+}

@@ -1,0 +1,226 @@
+//! Finding the reference switch.
+
+use crate::error::Error;
+use crate::limits::Limits;
+use crate::mover::Mover;
+use servowire_core::Direction;
+
+/// How an axis looks for its switch.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[non_exhaustive]
+pub struct HomingConfig {
+    /// Where the switch is.
+    pub direction: Direction,
+    /// Speed of the search, in steps/s.
+    pub seek: u32,
+    /// Speed of the second, exact approach, in steps/s.
+    pub approach: u32,
+    /// How far to go back before it, in steps.
+    pub back_off: u32,
+    /// After this many steps without a switch the search is given up.
+    pub range: u32,
+    /// How fast to stop at the switch. The way to rest, v² / 2a, or (v / 2)(v / a + a / j) with a jerk limit, has to fit
+    /// after it.
+    pub stop: Limits,
+}
+
+impl HomingConfig {
+    /// Back off by a tenth of the range, and stop as `stop` says.
+    pub const fn new(direction: Direction, seek: u32, approach: u32, range: u32, stop: Limits) -> Self {
+        Self { direction, seek, approach, back_off: range / 10, range, stop }
+    }
+
+    servowire_core::builder! {
+        with_back_off: back_off, u32;
+    }
+}
+
+/// The reference switch.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub enum Switch {
+    /// The axis is not at it.
+    Open,
+    /// The axis is at it, or beyond it.
+    Closed,
+}
+
+/// How far a homing is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[non_exhaustive]
+pub enum HomingState {
+    /// Looking for the switch.
+    Seeking,
+    /// On the switch, slowing down.
+    Stopping,
+    /// Going back from it.
+    BackingOff,
+    /// Approaching it slowly.
+    Approaching,
+    /// On the switch again, slowing down.
+    Settling,
+    /// At rest; position 0 is where the switch closed.
+    Done,
+    /// No switch within the range, or it stays closed. The axis is stopped and its position is not a reference.
+    Failed,
+}
+
+/// Finds a reference switch: fast towards it, back, and slowly towards it again. Position 0 is the step at which it closes
+/// the second time.
+///
+/// Call [`poll`](Self::poll) with the level of the switch often, at least once a step of the approach; take the steps from
+/// the [`Mover`] as ever.
+#[derive(Debug, Clone)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[expect(missing_copy_implementations, reason = "a copy would go on from a state that is over")]
+pub struct Homing {
+    config: HomingConfig,
+    state: HomingState,
+    /// Position at the begin of the state, or of the switch.
+    mark: i64,
+}
+
+impl Homing {
+    /// Begins; a switch that is closed already is left first.
+    ///
+    /// # Errors
+    /// [`Error::Moving`] if the axis is not at rest.
+    pub fn start(config: HomingConfig, mover: &mut Mover, switch: Switch, now: u64) -> Result<Self, Error> {
+        if !mover.is_at_rest(now) {
+            return Err(Error::Moving);
+        }
+        let mut new = Self { config, state: HomingState::Seeking, mark: mover.commanded() };
+        if switch == Switch::Closed {
+            new.back_off(mover, now)?;
+        } else {
+            mover.run(config.direction, config.seek, now)?;
+        }
+        Ok(new)
+    }
+
+    /// What it is doing.
+    pub const fn state(&self) -> HomingState {
+        self.state
+    }
+
+    /// Looks at the switch, and tells the axis what follows from it.
+    ///
+    /// # Errors
+    /// Those of the requests to the axis; the homing stays where it is then.
+    pub fn poll(&mut self, mover: &mut Mover, switch: Switch, now: u64) -> Result<HomingState, Error> {
+        let closed = switch == Switch::Closed;
+        let position = mover.commanded();
+        let rest = mover.is_at_rest(now);
+        match self.state {
+            HomingState::Seeking | HomingState::Approaching if closed => {
+                mover.quick_stop(self.config.stop, now);
+                let again = self.state == HomingState::Approaching;
+                self.state = if again { HomingState::Settling } else { HomingState::Stopping };
+                self.mark = position;
+            }
+            HomingState::Seeking | HomingState::Approaching
+                if rest || position.abs_diff(self.mark) > u64::from(self.config.range) =>
+            {
+                mover.stop(now);
+                self.state = HomingState::Failed;
+            }
+            HomingState::Stopping if rest => self.back_off(mover, now)?,
+            HomingState::BackingOff if rest => {
+                if closed {
+                    self.state = HomingState::Failed;
+                } else {
+                    mover.run(self.config.direction, self.config.approach, now)?;
+                    (self.state, self.mark) = (HomingState::Approaching, position);
+                }
+            }
+            HomingState::Settling if rest => {
+                mover.set_commanded(position.saturating_sub(self.mark), now)?;
+                self.state = HomingState::Done;
+            }
+            _ => {}
+        }
+        Ok(self.state)
+    }
+
+    fn back_off(&mut self, mover: &mut Mover, now: u64) -> Result<(), Error> {
+        let by = i64::from(self.config.back_off);
+        let position = mover.commanded();
+        let target = match self.config.direction {
+            Direction::Forward => position.saturating_sub(by),
+            Direction::Reverse => position.saturating_add(by),
+        };
+        mover.move_to(target, now)?;
+        self.state = HomingState::BackingOff;
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn switch(closed: bool) -> Switch {
+        if closed { Switch::Closed } else { Switch::Open }
+    }
+    use crate::limits::Clock;
+
+    const DIRECTIONS: [Direction; 2] = [Direction::Forward, Direction::Reverse];
+
+    fn parts(direction: Direction) -> (HomingConfig, Mover) {
+        let limits = Limits::new(10_000, 50_000).unwrap().with_jerk(1_000_000).unwrap();
+        let hard = Limits::new(10_000, 200_000).unwrap();
+        let config = HomingConfig::new(direction, 4000, 300, 5000, hard).with_back_off(200);
+        (config, Mover::new(Clock::MICROSECONDS, limits).unwrap())
+    }
+
+    /// Homes with a switch that is closed `at` this many steps ahead and beyond; where the motor really is in the end, and
+    /// the farthest it was.
+    fn home(direction: Direction, at: i64) -> (HomingState, i64, i64, Mover) {
+        let (config, mut mover) = parts(direction);
+        let sign = if direction.dir() { -1 } else { 1 };
+        let (mut real, mut far) = (0, 0);
+        let mut homing = Homing::start(config, &mut mover, switch(at <= 0), 0).unwrap();
+        for now in (0..20_000_000).step_by(20) {
+            while mover.due().is_some_and(|due| due <= now) {
+                let pulse = mover.pulse().unwrap();
+                real += if pulse.direction.dir() { -1 } else { 1 };
+                far = far.max(real * sign);
+            }
+            homing.poll(&mut mover, switch(real * sign >= at), now).unwrap();
+        }
+        (homing.state(), real, far, mover)
+    }
+
+    #[test]
+    #[cfg_attr(miri, ignore = "too long for an interpreter")]
+    fn the_switch_is_found_to_the_step() {
+        for direction in DIRECTIONS {
+            for at in [1, 700, 3000, -100] {
+                let (state, real, far, mover) = home(direction, at);
+                assert_eq!(state, HomingState::Done, "{direction} {at}");
+                let sign = if direction.dir() { -1 } else { 1 };
+                assert_eq!(real - mover.commanded(), at * sign, "{direction} {at}");
+                // v² / 2a of the stop: 40 steps, and what a poll takes.
+                assert!(far - at.max(0) <= 45, "{direction} {at}: {far}");
+            }
+        }
+    }
+
+    #[test]
+    #[cfg_attr(miri, ignore = "too long for an interpreter")]
+    fn no_switch_and_a_switch_that_stays_closed() {
+        for direction in DIRECTIONS {
+            let (state, real, _, mover) = home(direction, 6000);
+            assert_eq!((state, mover.commanded()), (HomingState::Failed, real));
+            assert!(real.abs() < 6000);
+            let (state, ..) = home(direction, -5000);
+            assert_eq!(state, HomingState::Failed);
+        }
+        let (config, mut mover) = parts(Direction::Forward);
+        mover.move_to(50, 0).unwrap();
+        assert_eq!(Homing::start(config, &mut mover, Switch::Open, 0).unwrap_err(), Error::Moving);
+    }
+}

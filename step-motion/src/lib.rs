@@ -1,0 +1,48 @@
+#![doc = include_str!("../README.md")]
+#![no_std]
+#![cfg_attr(docsrs, feature(doc_cfg))]
+#![cfg_attr(test, allow(clippy::arithmetic_side_effects, clippy::cast_possible_truncation))]
+
+#[cfg(any(test, feature = "std"))]
+extern crate std;
+
+mod arc;
+mod axis;
+mod batch;
+mod cubic;
+mod curve;
+mod cutter;
+mod cycle;
+mod error;
+mod guess;
+mod homing;
+mod limits;
+mod line;
+mod mover;
+mod path;
+mod path_mover;
+mod peak;
+mod phases;
+mod plan;
+mod planner;
+mod queue;
+mod real;
+mod run;
+mod slope;
+mod step_timer;
+mod stepper;
+
+pub use arc::{Arc, Turning};
+pub use axis::{Axis, Work};
+pub use cycle::{PtoMover, Reload, Reloads};
+pub use error::{Error, ErrorClass};
+pub use homing::{Homing, HomingConfig, HomingState, Switch};
+pub use limits::{Clock, Limits};
+pub use line::{AxisPulse, LinePulses};
+pub use mover::{Mover, Pulse};
+pub use path::{AxisSetup, Path};
+pub use path_mover::PathMover;
+pub use plan::{Plan, Pulses, Setpoint};
+pub use queue::Queue;
+pub use servowire_core::{Command, Direction, OutOfRange};
+pub use step_timer::{Fired, StepTimer};

@@ -1,0 +1,310 @@
+//! What a machine can take, in the units of its data sheet, and the clock that its steps are counted with.
+
+use core::fmt;
+
+use servowire_core::OutOfRange;
+
+use crate::real::Real;
+
+/// The clock of a timer: ticks a second, 1000 to 2^30 - 1.
+///
+/// 1 MHz is a common timer; [`NANOSECONDS`](Self::NANOSECONDS) suits the 4 µs cycle of TIDEP0061, whose PTO words are in ns.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(try_from = "u32", into = "u32"))]
+pub struct Clock(u32);
+
+impl Clock {
+    /// A tick is a nanosecond.
+    pub const NANOSECONDS: Self = Self(1_000_000_000);
+    /// A tick is a microsecond.
+    pub const MICROSECONDS: Self = Self(1_000_000);
+    /// The slowest, in ticks a second.
+    pub const MIN_HZ: u32 = 1000;
+    /// The fastest, in ticks a second: 2^30 - 1.
+    pub const MAX_HZ: u32 = (1 << 30) - 1;
+
+    /// `None` outside 1000..=2^30 - 1.
+    pub const fn new(hz: u32) -> Option<Self> {
+        if hz < Self::MIN_HZ || hz > Self::MAX_HZ { None } else { Some(Self(hz)) }
+    }
+
+    /// Ticks a second.
+    pub const fn hz(self) -> u32 {
+        self.0
+    }
+
+    /// A tick has 2^shift moments; moments are 0.47 to 0.93 ns.
+    pub(super) const fn shift(self) -> u32 {
+        self.0.leading_zeros().saturating_sub(1)
+    }
+
+    /// Half a tick, in moments: how exactly steps are found, for the tick is rounded from it.
+    pub(super) const fn grid(self) -> u32 {
+        1 << self.shift().saturating_sub(1)
+    }
+
+    /// The next half tick.
+    pub(super) const fn aligned(self, moment: u64) -> u64 {
+        let mask = (self.grid() as u64).wrapping_sub(1);
+        moment.saturating_add(mask) & !mask
+    }
+
+    /// Moments a second: 2^30 to 2^31.
+    pub(super) const fn moments(self) -> u32 {
+        self.0 << self.shift()
+    }
+
+    /// A moment, in seconds.
+    pub(super) fn seconds(self) -> Real {
+        Real::ONE / Real::new(self.moments().into())
+    }
+
+    /// The tick nearest to a moment, half up.
+    pub(super) const fn tick(self, moment: u64) -> u64 {
+        let shift = self.shift();
+        moment.saturating_add(1 << shift.saturating_sub(1)) >> shift
+    }
+
+    /// The moment at which a tick begins; the last one there is for a tick beyond it.
+    pub(super) const fn moment(self, tick: u64) -> u64 {
+        let shift = self.shift();
+        if tick > u64::MAX >> shift { u64::MAX } else { tick << shift }
+    }
+}
+
+impl TryFrom<u32> for Clock {
+    type Error = OutOfRange;
+
+    fn try_from(hz: u32) -> Result<Self, OutOfRange> {
+        Self::new(hz).ok_or_else(|| range(hz.into(), Self::MIN_HZ.into(), Self::MAX_HZ.into()))
+    }
+}
+
+impl From<Clock> for u32 {
+    fn from(clock: Clock) -> Self {
+        clock.0
+    }
+}
+
+impl fmt::Display for Clock {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{} Hz", self.0)
+    }
+}
+
+/// The limit that `got` passes.
+fn range(got: u64, min: u64, max: u64) -> OutOfRange {
+    OutOfRange::above(got, if got < min { min } else { max })
+}
+
+/// Greatest speed, acceleration and jerk of an axis.
+///
+/// ```
+/// use step_motion::Limits;
+/// let limits = Limits::new(20_000, 50_000)?.with_jerk(1_000_000)?;
+/// assert_eq!((limits.speed(), limits.acceleration(), limits.jerk()), (20_000, 50_000, Some(1_000_000)));
+/// # Ok::<_, servowire_core::OutOfRange>(())
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(try_from = "(u32, u32, Option<u64>)", into = "(u32, u32, Option<u64>)"))]
+pub struct Limits {
+    speed: u32,
+    acceleration: u32,
+    jerk: Option<u64>,
+}
+
+impl Limits {
+    /// The greatest acceleration, in steps/s²: 2^31 - 1.
+    pub const MAX_ACCELERATION: u32 = (1 << 31) - 1;
+    /// The greatest jerk, in steps/s³: 2^44 - 1.
+    pub const MAX_JERK: u64 = (1 << 44) - 1;
+
+    /// `speed` in steps/s, `acceleration` in steps/s², each at least 1. Without a jerk limit a move is a trapezoid.
+    ///
+    /// # Errors
+    /// [`OutOfRange`] for 0, and for an acceleration above [`MAX_ACCELERATION`](Self::MAX_ACCELERATION).
+    pub fn new(speed: u32, acceleration: u32) -> Result<Self, OutOfRange> {
+        if speed == 0 {
+            return Err(range(0, 1, u32::MAX.into()));
+        }
+        if acceleration == 0 || acceleration > Self::MAX_ACCELERATION {
+            return Err(range(acceleration.into(), 1, Self::MAX_ACCELERATION.into()));
+        }
+        Ok(Self { speed, acceleration, jerk: None })
+    }
+
+    /// With `jerk` in steps/s³, at least 1: a move is an S-curve.
+    ///
+    /// # Errors
+    /// [`OutOfRange`] for 0 and above [`MAX_JERK`](Self::MAX_JERK).
+    pub fn with_jerk(self, jerk: u64) -> Result<Self, OutOfRange> {
+        if jerk == 0 || jerk > Self::MAX_JERK {
+            return Err(range(jerk, 1, Self::MAX_JERK));
+        }
+        Ok(Self { jerk: Some(jerk), ..self })
+    }
+
+    /// Without a jerk limit.
+    pub const fn without_jerk(self) -> Self {
+        Self { jerk: None, ..self }
+    }
+
+    /// With another speed in steps/s, at least 1.
+    ///
+    /// # Errors
+    /// [`OutOfRange`] for 0.
+    pub fn with_speed(self, speed: u32) -> Result<Self, OutOfRange> {
+        if speed == 0 { Err(range(0, 1, u32::MAX.into())) } else { Ok(Self { speed, ..self }) }
+    }
+
+    /// Greatest speed in steps/s.
+    pub const fn speed(self) -> u32 {
+        self.speed
+    }
+
+    /// Greatest acceleration in steps/s².
+    pub const fn acceleration(self) -> u32 {
+        self.acceleration
+    }
+
+    /// Greatest jerk in steps/s³, if it is limited.
+    pub const fn jerk(self) -> Option<u64> {
+        self.jerk
+    }
+
+    /// In steps and moments.
+    pub(super) fn bounds(self, clock: Clock) -> Bounds {
+        self.bounds_in(clock.seconds())
+    }
+
+    /// The same, with a moment in seconds.
+    pub(super) fn bounds_in(self, moment: Real) -> Bounds {
+        let squared = moment.squared();
+        let (speed, acceleration) =
+            (Real::new(self.speed.into()) * moment, Real::new(self.acceleration.into()) * squared);
+        Bounds::new(speed, acceleration, self.jerk.map(|jerk| Real::new(jerk) * squared * moment))
+    }
+}
+
+impl TryFrom<(u32, u32, Option<u64>)> for Limits {
+    type Error = OutOfRange;
+
+    fn try_from((speed, acceleration, jerk): (u32, u32, Option<u64>)) -> Result<Self, OutOfRange> {
+        let limits = Self::new(speed, acceleration)?;
+        jerk.map_or(Ok(limits), |jerk| limits.with_jerk(jerk))
+    }
+}
+
+impl From<Limits> for (u32, u32, Option<u64>) {
+    fn from(limits: Limits) -> Self {
+        (limits.speed, limits.acceleration, limits.jerk)
+    }
+}
+
+/// `20000 steps/s, 50000 steps/s², 1000000 steps/s³`.
+impl fmt::Display for Limits {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{} steps/s, {} steps/s²", self.speed, self.acceleration)?;
+        self.jerk.map_or(Ok(()), |jerk| write!(f, ", {jerk} steps/s³"))
+    }
+}
+
+/// [`Limits`] for a planner: units of length and of time are whatever its caller uses.
+#[derive(Debug, Clone, Copy)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub(super) struct Bounds {
+    pub(super) v: Real,
+    pub(super) a: Real,
+    /// 1 / a.
+    pub(super) per_a: Real,
+    pub(super) jerk: Option<Jerk>,
+}
+
+/// A jerk limit and what follows from it.
+#[derive(Debug, Clone, Copy)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub(super) struct Jerk {
+    pub(super) j: Real,
+    /// 1 / j.
+    pub(super) per_j: Real,
+    /// Time to the greatest acceleration, a / j.
+    pub(super) edge: Real,
+    /// Change of speed that just reaches the greatest acceleration, a² / j.
+    pub(super) knee: Real,
+}
+
+impl Bounds {
+    pub(super) fn new(v: Real, a: Real, j: Option<Real>) -> Self {
+        let jerk = j.map(|j| {
+            let per_j = Real::ONE / j;
+            let edge = a * per_j;
+            Jerk { j, per_j, edge, knee: a * edge }
+        });
+        Self { v, a, per_a: Real::ONE / a, jerk }
+    }
+
+    /// High enough for an acceleration that there is already, and for a jerk that leads a deceleration back to 0 before rest.
+    pub(super) fn holding(self, v: Real, (a, up): (Real, bool)) -> Self {
+        let Some(Jerk { j, .. }) = self.jerk else { return self };
+        // Rounding may make it a little more than the jerk that leads there already.
+        let least = if up || v.is_zero() { Real::ZERO } else { (a.squared() / v).half() };
+        let needs_more = least > j + j.scaled(-8);
+        if a > self.a || needs_more {
+            let j = if needs_more { least + least.scaled(-8) } else { j };
+            return Self::new(self.v, self.a.max(a), Some(j));
+        }
+        self
+    }
+
+    /// The higher of both in each; no limit is the highest.
+    pub(super) fn or_higher(self, other: &Self) -> Self {
+        let jerk = self.jerk.zip(other.jerk).map(|(own, other)| own.j.max(other.j));
+        Self::new(self.v.max(other.v), self.a.max(other.a), jerk)
+    }
+
+    /// With a lower speed.
+    pub(super) fn slower(self, v: Real) -> Self {
+        Self { v: self.v.min(v), ..self }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::string::ToString;
+
+    #[test]
+    fn every_limit_has_its_range() {
+        assert_eq!(Limits::new(0, 1), Err(OutOfRange { got: 0, max: 1 }));
+        assert_eq!(Limits::new(1, 0), Err(OutOfRange { got: 0, max: 1 }));
+        assert_eq!(Limits::new(1, 1 << 31), Err(OutOfRange { got: 1 << 31, max: (1 << 31) - 1 }));
+        let limits = Limits::new(u32::MAX, (1 << 31) - 1).unwrap();
+        assert_eq!(limits.with_jerk(0), Err(OutOfRange { got: 0, max: 1 }));
+        assert_eq!(limits.with_jerk(1 << 44), Err(OutOfRange { got: 1 << 44, max: (1 << 44) - 1 }));
+        let jerky = limits.with_jerk((1 << 44) - 1).unwrap();
+        assert_eq!(jerky.without_jerk(), limits);
+        assert!(limits.with_speed(0).is_err());
+        assert_eq!(limits.with_speed(7).unwrap().speed(), 7);
+        assert_eq!(Limits::new(20, 5).unwrap().with_jerk(9).unwrap().to_string(), "20 steps/s, 5 steps/s², 9 steps/s³");
+    }
+
+    #[test]
+    fn a_moment_is_a_fraction_of_a_tick() {
+        assert_eq!((Clock::new(999), Clock::new(1 << 30)), (None, None));
+        assert!(Clock::try_from(7).is_err());
+        for hz in [1000, 1001, 250_000, 1_000_000, 72_000_000, 1_000_000_000, (1 << 30) - 1] {
+            let clock = Clock::new(hz).unwrap();
+            assert!((1 << 30..=u32::MAX / 2).contains(&clock.moments()), "{clock}");
+            assert!(clock.shift() >= 1);
+            let half = 1 << (clock.shift() - 1);
+            for tick in [0, 1, 1 << 40] {
+                let moment = clock.moment(tick);
+                assert_eq!([0, half - 1, half].map(|by| clock.tick(moment + by)), [tick, tick, tick + 1]);
+            }
+        }
+    }
+}

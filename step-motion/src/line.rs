@@ -1,0 +1,167 @@
+//! A straight line of several axes, and its steps.
+
+use crate::curve::{Curve, Piece};
+use crate::limits::{Bounds, Clock};
+use crate::phases::{self, Frame, P};
+use crate::planner::Motion;
+use crate::real::Real;
+use crate::stepper::Stepper;
+use servowire_core::Direction;
+
+/// A line that waits or runs.
+#[derive(Debug, Clone, Copy)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub(super) struct Line<const N: usize> {
+    /// Steps of each axis to its end.
+    pub(super) steps: [i32; N],
+    /// Length in units: steps of the finest axis.
+    pub(super) whole: Real,
+    /// Where it is left: at its end, or where a stop has cut it off.
+    pub(super) length: Real,
+    /// Steps made there, of each axis.
+    pub(super) ends: [u32; N],
+    /// What the axes can take, along the line, in units.
+    pub(super) bounds: Bounds,
+    /// The speed that was asked for.
+    pub(super) feed: Real,
+    /// Greatest speed at its begin, for the corner.
+    pub(super) corner: Real,
+    /// Cut off by a stop.
+    pub(super) cut: bool,
+    /// The speed at which a stop that ends later leaves it.
+    pub(super) leave: Option<Real>,
+}
+
+impl<const N: usize> Line<N> {
+    pub(super) fn new(steps: [i32; N], whole: Real, bounds: Bounds, (feed, corner): (Real, Real)) -> Self {
+        let ends = steps.map(i32::unsigned_abs);
+        Self { steps, whole, length: whole, ends, bounds, feed, corner, cut: false, leave: None }
+    }
+
+    /// With the speed at a part of what was asked for, and never more than the axes can take.
+    pub(super) fn bounds(&self, part: Real) -> Bounds {
+        self.bounds.slower(self.feed * part)
+    }
+
+    /// Steps that each axis has made at a place of the line; all at its end.
+    pub(super) fn steps_at(&self, place: Real) -> [u32; N] {
+        if place >= self.length {
+            return self.ends;
+        }
+        self.steps.map(|steps| phases::steps(self.place(steps, place)).min(steps.unsigned_abs()))
+    }
+
+    /// The position of an axis at a place of the line, in 2^-32 steps.
+    fn place(&self, steps: i32, at: Real) -> i64 {
+        let place = Real::new(steps.unsigned_abs().into()) * at / self.whole;
+        i64::try_from(place.to_fixed(P)).unwrap_or(i64::MAX)
+    }
+}
+
+/// A step of an axis.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct AxisPulse {
+    /// Which axis, from 0.
+    pub axis: u8,
+    /// Tick of the clock.
+    pub tick: u64,
+    /// DIR.
+    pub direction: Direction,
+}
+
+/// Where and when a curve begins on a line, and how it ends.
+#[derive(Debug, Clone, Copy)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub(super) struct Start<const N: usize> {
+    /// In units from the begin of the line.
+    pub(super) place: Real,
+    /// Steps of the line that have been made.
+    pub(super) made: [u32; N],
+    pub(super) moment: u64,
+    /// What it begins later than that, less than half a tick.
+    pub(super) offset: Real,
+    /// It ends with the line, not at a rest before that.
+    pub(super) whole: bool,
+}
+
+/// The steps of a line, of all axes in the order of time.
+#[derive(Debug, Clone)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct LinePulses<const N: usize> {
+    clock: Clock,
+    pub(super) curve: Curve,
+    pub(super) axes: [(Frame, Stepper); N],
+    pub(super) due: [Option<u64>; N],
+    pub(super) directions: [Direction; N],
+    pub(super) start: Start<N>,
+    end: u64,
+}
+
+impl<const N: usize> LinePulses<N> {
+    pub(super) fn new(clock: Clock, curve: &Curve, line: &Line<N>, start: Start<N>) -> Self {
+        let Start { moment, offset, .. } = start;
+        let rest = Frame::rest(clock.shift(), moment, 0);
+        let mut axes = line.steps.map(|steps| {
+            let scale = Real::new(steps.unsigned_abs().into()) / line.whole;
+            let from = line.place(steps, start.place);
+            (Frame { from, offset, scale, ..rest }, Stepper::new())
+        });
+        for (((frame, _), made), end) in axes.iter_mut().zip(start.made).zip(line.ends) {
+            frame.from = frame.from.saturating_sub(i64::from(made) << P);
+            frame.to = start.whole.then_some(i64::from(end.saturating_sub(made)) << P);
+        }
+        let end = axes.first().map_or(moment, |(frame, _)| frame.end(curve));
+        let directions = line.steps.map(|steps| Direction::of(steps.into()));
+        let mut new = Self { clock, curve: *curve, axes, due: [None; N], directions, start, end };
+        for ((frame, stepper), due) in new.axes.iter_mut().zip(&mut new.due) {
+            *due = stepper.next(&new.curve, frame);
+        }
+        new
+    }
+
+    /// Tick at which the line ends.
+    pub const fn end(&self) -> u64 {
+        self.clock.tick(self.end)
+    }
+
+    /// Moment at which its curve is over.
+    pub(super) const fn over(&self) -> u64 {
+        self.end
+    }
+
+    /// Speed and acceleration along the line at a moment, and the place on it.
+    pub(super) fn motion(&self, moment: u64) -> (Motion, Real) {
+        let piece = self.axes.first().and_then(|(frame, _)| self.curve.at(frame.time(&self.curve, moment)));
+        let Some(Piece { p, v, a, up, .. }) = piece else { return (Motion::steady(Real::ZERO), self.start.place) };
+        (Motion { v, a, up }, self.start.place + (p - self.curve.skipped.1))
+    }
+
+    /// The next step: which axis, and when.
+    pub(super) fn first(&self) -> Option<(u64, usize)> {
+        self.due.iter().enumerate().filter_map(|(axis, due)| due.map(|due| (due, axis))).min()
+    }
+
+    /// Takes it.
+    pub(super) fn advance(&mut self, at: usize) {
+        if let (Some((frame, stepper)), Some(due)) = (self.axes.get_mut(at), self.due.get_mut(at)) {
+            *due = stepper.next(&self.curve, frame);
+        }
+    }
+
+    pub(super) fn pulse(&self, (tick, at): (u64, usize)) -> AxisPulse {
+        let direction = self.directions.get(at).copied().unwrap_or_default();
+        AxisPulse { axis: u8::try_from(at).unwrap_or(u8::MAX), tick, direction }
+    }
+}
+
+impl<const N: usize> Iterator for LinePulses<N> {
+    type Item = AxisPulse;
+
+    fn next(&mut self) -> Option<AxisPulse> {
+        let first = self.first()?;
+        self.advance(first.1);
+        Some(self.pulse(first))
+    }
+}

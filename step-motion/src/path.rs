@@ -1,0 +1,439 @@
+//! Straight lines in several axes, one after the other.
+
+use crate::curve::Curve;
+use crate::error::Error;
+use crate::limits::{Bounds, Clock, Limits};
+use crate::line::{Line, LinePulses, Start};
+use crate::plan::checked;
+use crate::planner::{Goal, Motion, SLACK, fastest_exit, greatest, plan, slowest_exit};
+use crate::real::Real;
+
+/// An axis of a machine.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[non_exhaustive]
+pub struct AxisSetup {
+    /// What it can take.
+    pub limits: Limits,
+    /// Steps a metre, at least 1: 80 steps/mm are 80000.
+    pub steps_per_m: u32,
+}
+
+impl AxisSetup {
+    /// Both fields.
+    pub const fn new(limits: Limits, steps_per_m: u32) -> Self {
+        Self { limits, steps_per_m }
+    }
+}
+
+/// How it goes on along a line.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Course {
+    pub(super) curve: Curve,
+    /// The speed at its end.
+    pub(super) exit: Real,
+    /// It ends with the line, not at a rest before that.
+    pub(super) whole: bool,
+}
+
+/// A queue of up to `M` straight lines in `N` axes.
+///
+/// Each line has one speed profile, along it; every axis follows the line within its own limits and takes its steps where
+/// the line passes k - 1/2 of them, so that no axis is ever more than half a step off. At a corner the machine keeps as
+/// much speed as if it rounded it with the given deviation; there the speed of an axis jumps by design, within the
+/// deviation. [`next_line`](Self::next_line) looks ahead over all lines that are in the queue: it never runs faster than lets it stop
+/// at the end of the last one.
+///
+/// ```
+/// use step_motion::{AxisSetup, Clock, Limits, Path};
+/// let axis = AxisSetup::new(Limits::new(20_000, 200_000)?, 80_000);
+/// let mut path = Path::<2, 8>::new(Clock::MICROSECONDS, [axis; 2], 20)?;
+/// path.push([800, 400], 100_000)?; // 10 mm and 5 mm, at 100 mm/s
+/// path.push([1600, 800], 100_000)?; // straight on: no stop
+/// let mut steps = [0, 0];
+/// while let Some(line) = path.next_line() {
+///     for pulse in line {
+///         steps[usize::from(pulse.axis)] += 1;
+///     }
+/// }
+/// assert_eq!(steps, [1600, 800]);
+/// # Ok::<_, Box<dyn std::error::Error>>(())
+/// ```
+#[derive(Debug, Clone)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Path<const N: usize, const M: usize> {
+    clock: Clock,
+    axes: [AxisSetup; N],
+    /// Units a metre: the steps of the finest axis.
+    unit: Real,
+    /// In units.
+    deviation: Real,
+    lines: [Option<Line<N>>; M],
+    /// Number of the first line, and how many there are.
+    first: usize,
+    len: usize,
+    /// Direction and length of the line before the next one pushed, in units.
+    before: Option<([i32; N], Real)>,
+    /// Where the last line ends.
+    target: [i64; N],
+    /// Speed at which the next line begins, in units a moment.
+    speed: Real,
+    moment: u64,
+    /// What it begins later than that, less than half a tick.
+    offset: Real,
+}
+
+impl<const N: usize, const M: usize> Path<N, M> {
+    /// At rest at position 0 of all axes. `deviation` at corners in µm; 0 stops at each corner.
+    ///
+    /// # Errors
+    /// [`Error::SpeedAboveClock`] above half the clock, [`Error::NoScale`] for an axis with 0 steps a metre.
+    pub fn new(clock: Clock, axes: [AxisSetup; N], deviation: u32) -> Result<Self, Error> {
+        for axis in &axes {
+            checked(clock, axis.limits)?;
+            if axis.steps_per_m == 0 {
+                return Err(Error::NoScale);
+            }
+        }
+        let finest = axes.iter().map(|axis| axis.steps_per_m).max().unwrap_or(1);
+        let unit = Real::new(finest.into());
+        Ok(Self {
+            clock,
+            axes,
+            unit,
+            deviation: unit * Real::new(deviation.into()) / Real::new(1_000_000),
+            lines: [None; M],
+            first: 0,
+            len: 0,
+            before: None,
+            target: [0; N],
+            speed: Real::ZERO,
+            moment: 0,
+            offset: Real::ZERO,
+        })
+    }
+
+    /// Lines in the queue.
+    pub const fn len(&self) -> usize {
+        self.len
+    }
+
+    /// Whether the queue is empty.
+    pub const fn is_empty(&self) -> bool {
+        self.len == 0
+    }
+
+    /// Whether no line can be pushed.
+    pub const fn is_full(&self) -> bool {
+        self.len >= M
+    }
+
+    /// Where the last line ends, in steps.
+    pub const fn target(&self) -> [i64; N] {
+        self.target
+    }
+
+    /// Adds a line to `target` in steps, at most at `feed` in µm/s, at least 1. A line of no length adds nothing.
+    ///
+    /// # Errors
+    /// [`Error::QueueFull`]; [`Error::TooManySteps`] for a line of more than 2^31 - 1 steps.
+    pub fn push(&mut self, target: [i64; N], feed: u32) -> Result<(), Error> {
+        if self.is_full() {
+            return Err(Error::QueueFull);
+        }
+        let steps = Self::steps(self.target, target)?;
+        let length = self.length(&steps);
+        if length.is_zero() {
+            return Ok(());
+        }
+        let (bounds, feed) = self.bounds(&steps, length, feed.max(1));
+        let corner = match self.before {
+            Some((before, long)) => self.corner((&before, long), (&steps, length), bounds.a),
+            None => Real::ZERO,
+        };
+        let place = self.first.wrapping_add(self.len).checked_rem(M).and_then(|at| self.lines.get_mut(at));
+        if let Some(place) = place {
+            *place = Some(Line::new(steps, length, bounds, (feed, corner)));
+            self.len = self.len.saturating_add(1);
+            self.before = Some((steps, length));
+            self.target = target;
+        }
+        Ok(())
+    }
+
+    /// Plans the first line of the queue and takes it out. It begins where and when the one before it ends; after a rest no
+    /// earlier than [`not_before`](Self::not_before).
+    pub fn next_line(&mut self) -> Option<LinePulses<N>> {
+        let line = self.line(0)?;
+        let Course { curve, exit, .. } = self.begin(0, self.speed, Some(Real::ONE))?;
+        let start = self.start();
+        self.finish(&curve, start.moment, start.offset, exit);
+        Some(LinePulses::new(self.clock, &curve, &line, start))
+    }
+
+    /// Steps of each axis from one position to another.
+    pub(super) fn steps(from: [i64; N], to: [i64; N]) -> Result<[i32; N], Error> {
+        let mut steps = [0; N];
+        for ((to, from), step) in to.iter().zip(from).zip(&mut steps) {
+            let away = to.checked_sub(from).and_then(|away| i32::try_from(away).ok()).filter(|away| *away > i32::MIN);
+            *step = away.ok_or(Error::TooManySteps { steps: u32::MAX, limit: u32::MAX / 2 })?;
+        }
+        Ok(steps)
+    }
+
+    pub(super) const fn clock(&self) -> Clock {
+        self.clock
+    }
+
+    /// Speed at which the first line begins.
+    pub(super) const fn speed(&self) -> Real {
+        self.speed
+    }
+
+    /// Where the first line begins, in steps.
+    pub(super) fn origin(&self) -> [i64; N] {
+        let mut at = self.target;
+        for line in (0..self.len).filter_map(|at| self.line(at)) {
+            for (at, steps) in at.iter_mut().zip(line.steps) {
+                *at = at.saturating_sub(steps.into());
+            }
+        }
+        at
+    }
+
+    /// Where and when the first line begins.
+    pub(super) const fn start(&self) -> Start<N> {
+        Start { place: Real::ZERO, made: [0; N], moment: self.moment, offset: self.offset, whole: true }
+    }
+
+    /// Takes the first line out, whose last curve has begun at a moment and an offset, and ends with a speed.
+    pub(super) fn finish(&mut self, curve: &Curve, moment: u64, offset: Real, exit: Real) {
+        // Between lines in motion the time goes on exactly; after a rest with half a tick.
+        let grid = u64::from(self.clock.grid());
+        let time = offset + (curve.time - curve.skipped.0);
+        let whole = time.to_fixed(0) & grid.wrapping_neg();
+        self.moment = moment.saturating_add(whole);
+        self.offset = time - Real::new(whole);
+        if exit.is_zero() && !self.offset.is_zero() {
+            (self.moment, self.offset) = (self.moment.saturating_add(grid), Real::ZERO);
+        }
+        self.speed = exit;
+        if let Some(place) = self.lines.get_mut(self.first) {
+            *place = None;
+        }
+        self.first = self.first.wrapping_add(1).checked_rem(M).unwrap_or(0);
+        self.len = self.len.saturating_sub(1);
+        if self.len == 0 {
+            self.before = None;
+        }
+    }
+
+    /// From a motion at a place on line `at`. With `part` of the speeds that were asked for; without one it brakes at once, and
+    /// may come to rest before the end. `None` if rounding leaves no way.
+    pub(super) fn course(&self, at: usize, start: Motion, place: Real, part: Option<Real>) -> Option<Course> {
+        let line = self.line(at)?;
+        let left = line.length - place;
+        let (bounds, wish) = if let Some(part) = part {
+            let bounds = line.bounds(part);
+            (bounds, self.exit(at, part).min(fastest_exit(start, left, &bounds)))
+        } else {
+            let stop = plan(start, Goal::Speed(Real::ZERO), &line.bounds).ok();
+            if let Some(curve) = stop.filter(|curve| curve.way() <= left + SLACK) {
+                let whole = line.cut || left <= curve.way() + SLACK;
+                return Some(Course { curve, exit: Real::ZERO, whole });
+            }
+            (line.bounds.slower(start.v), Real::ZERO)
+        };
+        let to = |exit| {
+            let curve = plan(start, Goal::At(left, exit), &bounds).ok()?;
+            Some(Course { curve, exit, whole: true })
+        };
+        if line.leave.is_some() {
+            return line.leave.and_then(to);
+        }
+        to(wish).or_else(|| {
+            let most = self.most(at);
+            let slowest = slowest_exit(start, left, wish, &bounds).min(most);
+            [slowest, most, Real::ZERO].into_iter().find_map(to)
+        })
+    }
+
+    /// From the begin of line `at`, at a speed. If rounding leaves no way, it goes on at that.
+    pub(super) fn begin(&self, at: usize, speed: Real, part: Option<Real>) -> Option<Course> {
+        let line = self.line(at)?;
+        Some(self.course(at, Motion::steady(speed), Real::ZERO, part).unwrap_or_else(|| {
+            let mut curve = Curve::new();
+            curve.cruise(speed, line.length);
+            Course { curve, exit: speed, whole: true }
+        }))
+    }
+
+    /// On which line and where on it a stop ends that goes on at a speed at the begin of line `at`.
+    pub(super) fn end_of_stop(&self, at: usize, mut speed: Real) -> (usize, Real) {
+        for at in at..self.len {
+            let Some(Course { curve, exit, .. }) = self.begin(at, speed, None) else { break };
+            if exit.is_zero() {
+                return (at, curve.way());
+            }
+            speed = exit;
+        }
+        let last = self.len.saturating_sub(1);
+        (last, self.line(last).map_or(Real::ZERO, |line| line.length))
+    }
+
+    /// The line that is cut off, and where.
+    pub(super) fn end_of_cut(&self) -> Option<(usize, Real)> {
+        (0..self.len).find_map(|at| self.line(at).filter(|line| line.cut).map(|line| (at, line.length)))
+    }
+
+    /// The position in whole steps at a place on line `at`, if the first line begins at `from`.
+    /// `made`: the steps made on the first line; there is no way back to before them.
+    pub(super) fn place(&self, (at, place): (usize, Real), from: [i64; N], made: [u32; N]) -> [i64; N] {
+        let mut to = from;
+        for i in 0..=at {
+            let Some(line) = self.line(i) else { break };
+            let mut ends = if i == at { line.steps_at(place) } else { line.ends };
+            if i == 0 {
+                ends = at_least(ends, made);
+            }
+            for ((to, end), steps) in to.iter_mut().zip(ends).zip(line.steps) {
+                let way = i64::from(end);
+                *to = to.saturating_add(if steps < 0 { way.wrapping_neg() } else { way });
+            }
+        }
+        to
+    }
+
+    /// The queue as far as a place on line `at`, if the first line begins at `from` and a stop leaves it at `exit`.
+    pub(super) fn cut(&mut self, (at, place): (usize, Real), from: [i64; N], made: [u32; N], exit: Real) {
+        self.target = self.place((at, place), from, made);
+        let mut speed = exit;
+        for i in 0..self.len {
+            let exit =
+                if i == 0 || i >= at { speed } else { self.begin(i, speed, None).map_or(speed, |course| course.exit) };
+            let entry = self.first.wrapping_add(i).checked_rem(M).and_then(|at| self.lines.get_mut(at));
+            match entry {
+                Some(Some(line)) if i < at => line.leave = line.leave.or(Some(exit)),
+                Some(Some(line)) if i == at => {
+                    line.ends = line.steps_at(place);
+                    if i == 0 {
+                        line.ends = at_least(line.ends, made);
+                    }
+                    (line.length, line.cut) = (place.min(line.length), true);
+                }
+                Some(entry) => *entry = None,
+                None => {}
+            }
+            speed = exit;
+        }
+        (self.len, self.before) = (at.saturating_add(1).min(self.len), None);
+    }
+
+    /// Empty, at rest at a position from a moment on.
+    pub(super) fn clear(&mut self, position: [i64; N], moment: u64) {
+        (self.lines, self.len, self.before, self.target) = ([None; M], 0, None, position);
+        (self.speed, self.moment, self.offset) = (Real::ZERO, self.clock.aligned(moment), Real::ZERO);
+    }
+
+    /// After a rest, the next line begins no earlier than this tick.
+    pub fn not_before(&mut self, tick: u64) {
+        if self.speed.is_zero() {
+            self.moment = self.moment.max(self.clock.moment(tick));
+        }
+    }
+
+    /// Line `at` of the queue.
+    pub(super) fn line(&self, at: usize) -> Option<Line<N>> {
+        if at >= self.len {
+            return None;
+        }
+        let place = self.first.wrapping_add(at).checked_rem(M)?;
+        self.lines.get(place).copied().flatten()
+    }
+
+    /// The speed at which line `at` is to end so that all that follow can slow down in time: from the last one back.
+    pub(super) fn exit(&self, at: usize, part: Real) -> Real {
+        self.slow_down(at, part, greatest)
+    }
+
+    /// The greatest speed at which line `at` may end, whatever was asked for: one from which each line that follows can be
+    /// left at its corner's speed or, which takes less way than some speeds between, come to rest at its end.
+    fn most(&self, at: usize) -> Real {
+        let fastest = |to, n, bounds: &Bounds| greatest(to, n, bounds).max(greatest(Real::ZERO, n, bounds));
+        self.slow_down(at, Real::HUGE, fastest)
+    }
+
+    fn slow_down(&self, at: usize, part: Real, fastest: impl Fn(Real, Real, &Bounds) -> Real) -> Real {
+        let mut speed = Real::ZERO;
+        for at in (at.saturating_add(1)..self.len).rev() {
+            if let (Some(before), Some(line)) = (self.line(at.wrapping_sub(1)), self.line(at)) {
+                let bounds = line.bounds(part);
+                let most = line.corner.min(before.bounds(part).v).min(bounds.v);
+                speed = fastest(speed, line.length, &bounds).min(most);
+            }
+        }
+        speed
+    }
+
+    /// How far an axis moves, in units.
+    fn way(&self, axis: usize, steps: i32) -> Real {
+        let scale = self.axes.get(axis).map_or(1, |axis| axis.steps_per_m);
+        Real::new(steps.unsigned_abs().into()) * self.unit / Real::new(scale.into())
+    }
+
+    fn length(&self, steps: &[i32; N]) -> Real {
+        let squares = steps.iter().enumerate().map(|(axis, &steps)| self.way(axis, steps).squared());
+        squares.fold(Real::ZERO, |sum, square| sum + square).sqrt()
+    }
+
+    /// Along the line, what every axis can take, and the speed that is asked for.
+    fn bounds(&self, steps: &[i32; N], length: Real, feed: u32) -> (Bounds, Real) {
+        let second = Real::new(self.clock.moments().into());
+        let feed = self.unit * Real::new(feed.into()) / (Real::new(1_000_000) * second);
+        let (mut v, mut a, mut j) = (Real::HUGE, Real::HUGE, None);
+        for (axis, &steps) in self.axes.iter().zip(steps).filter(|(_, steps)| **steps != 0) {
+            let own = axis.limits.bounds(self.clock);
+            let part = length / Real::new(steps.unsigned_abs().into());
+            (v, a) = (v.min(own.v * part), a.min(own.a * part));
+            if let Some(jerk) = own.jerk {
+                let most = jerk.j * part;
+                j = Some(j.map_or(most, |j: Real| j.min(most)));
+            }
+        }
+        (Bounds::new(v, a, j), feed)
+    }
+
+    /// The speed at a corner: v² = a δ s / (1 - s), with s the sine of half the angle between the lines; straight on it is
+    /// 1. 1 - s as (1 - s²) / (1 + s), which keeps its digits.
+    fn corner(&self, (from, long): (&[i32; N], Real), (to, length): (&[i32; N], Real), a: Real) -> Real {
+        let (mut along, mut against) = (Real::ZERO, Real::ZERO);
+        for (axis, (&before, &after)) in from.iter().zip(to).enumerate() {
+            let product = (self.way(axis, before) / long) * (self.way(axis, after) / length);
+            if (before < 0) == (after < 0) {
+                along = along + product;
+            } else {
+                against = against + product;
+            }
+        }
+        // Twice s², and twice 1 - s².
+        let one = Real::new(1);
+        let (open, shut) = ((one + along) - against, (one + against) - along);
+        let straight = Real::fixed(1, 20);
+        if shut < straight {
+            return Real::HUGE;
+        }
+        if open < straight {
+            return Real::ZERO;
+        }
+        let s = open.half().sqrt();
+        (a * self.deviation * s * (one + s) / shut.half()).sqrt()
+    }
+}
+
+/// A step falls into the nearest tick, so it may have been made before the place where it belongs.
+fn at_least<const N: usize>(mut ends: [u32; N], made: [u32; N]) -> [u32; N] {
+    for (end, made) in ends.iter_mut().zip(made) {
+        *end = made.max(*end);
+    }
+    ends
+}

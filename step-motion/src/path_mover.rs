@@ -1,0 +1,373 @@
+//! A path that can be held, slowed down and left at any time.
+
+use crate::error::Error;
+use crate::limits::Clock;
+use crate::line::{AxisPulse, LinePulses, Start};
+use crate::path::{Course, Path};
+use crate::plan::Setpoint;
+use crate::planner::Motion;
+use crate::real::Real;
+
+/// Runs the lines of a [`Path`] and takes requests at any tick: feed hold, feed override, lines added while it moves, and a
+/// new target.
+///
+/// Each request is a new plan along the path, from the present place, speed and acceleration: within the limits of every
+/// axis, never off the line by more than half a step, and with no step lost. What cannot end on the present line goes on
+/// along the next ones.
+///
+/// [`due`](Self::due) is the tick of the next step of any axis: load it into a compare timer, take the step with
+/// [`pulse`](Self::pulse) when it is there, and load the next. After a request load it again, for it may have moved. A line
+/// is planned in the call that takes the last step of the one before it, half a step before it begins; a request in that time
+/// takes effect where it begins.
+///
+/// ```
+/// use step_motion::{AxisSetup, Clock, Limits, Path, PathMover};
+/// let axis = AxisSetup::new(Limits::new(20_000, 200_000)?, 80_000);
+/// let path = Path::<2, 8>::new(Clock::MICROSECONDS, [axis; 2], 20)?;
+/// let mut machine = PathMover::new(path);
+/// machine.push([8000, 4000], 100_000, 0)?; // to 100 mm, 50 mm at 100 mm/s
+/// while let Some(pulse) = machine.pulse() {
+///     if machine.commanded()[0] == 2000 {
+///         machine.hold(pulse.tick); // slows down along the line
+///     }
+/// }
+/// let now = 1_000_000;
+/// assert!(machine.is_at_rest(now) && machine.commanded()[0] < 4000);
+/// machine.resume(now);
+/// while machine.pulse().is_some() {}
+/// assert_eq!(machine.commanded(), [8000, 4000]);
+/// # Ok::<_, Box<dyn std::error::Error>>(())
+/// ```
+#[derive(Debug, Clone)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct PathMover<const N: usize, const M: usize> {
+    /// Its first line is the one that runs.
+    path: Path<N, M>,
+    /// The first line, once it has begun.
+    line: Option<LinePulses<N>>,
+    /// Speed at its end.
+    exit: Real,
+    /// Steps of it that have been made.
+    made: [u32; N],
+    commanded: [i64; N],
+    /// Positions where the positions of its plan are 0.
+    origin: [i64; N],
+    /// Ticks from which on the next steps may come.
+    free: [u64; N],
+    percent: u16,
+    held: bool,
+    /// A stop is under way: what runs has been cut off.
+    stopping: bool,
+    halted: bool,
+}
+
+impl<const N: usize, const M: usize> PathMover<N, M> {
+    /// At rest at the end of what `path` has run. The lines in it begin with the first request.
+    pub fn new(path: Path<N, M>) -> Self {
+        let position = path.origin();
+        Self {
+            path,
+            line: None,
+            exit: Real::ZERO,
+            made: [0; N],
+            commanded: position,
+            origin: position,
+            free: [0; N],
+            percent: 100,
+            held: false,
+            stopping: false,
+            halted: false,
+        }
+    }
+
+    /// The tick of the next step; `None` if there is none to come.
+    pub fn due(&self) -> Option<u64> {
+        self.line.as_ref()?.first().map(|(tick, _)| tick)
+    }
+
+    /// Takes the next step.
+    #[inline]
+    pub fn pulse(&mut self) -> Option<AxisPulse> {
+        let line = self.line.as_mut()?;
+        let first = line.first()?;
+        let (tick, at) = first;
+        let pulse = line.pulse(first);
+        line.advance(at);
+        let free = tick.saturating_add(1);
+        if let Some(due) = line.due.get_mut(at) {
+            *due = due.map(|due| due.max(free));
+        }
+        if let (Some(made), Some(own), Some(position)) =
+            (self.made.get_mut(at), self.free.get_mut(at), self.commanded.get_mut(at))
+        {
+            (*made, *own) = (made.saturating_add(1), free);
+            *position = pulse.direction.advance(*position);
+        }
+        self.settle();
+        Some(pulse)
+    }
+
+    /// Steps commanded so far of each axis, forward less reverse ones. What the motors have made of them is not known here.
+    pub const fn commanded(&self) -> [i64; N] {
+        self.commanded
+    }
+
+    /// Where the last line ends, in steps; after a [`stop`](Self::stop) where that will end.
+    pub const fn target(&self) -> [i64; N] {
+        self.path.target()
+    }
+
+    /// Lines in the queue, with the one that runs.
+    pub const fn len(&self) -> usize {
+        self.path.len()
+    }
+
+    /// Whether no line runs or waits.
+    pub const fn is_empty(&self) -> bool {
+        self.path.is_empty()
+    }
+
+    /// Whether no line can be pushed.
+    pub const fn is_full(&self) -> bool {
+        self.path.is_full()
+    }
+
+    /// Position, speed, acceleration and jerk of each axis at a tick that is not before the last step. Between the last step
+    /// of a line and its end, half a step later, they are those of the end.
+    pub fn at(&self, now: u64) -> [Setpoint; N] {
+        let moment = self.clock().moment(now);
+        let mut states = self.commanded.map(|position| Setpoint::at_rest(position.saturating_mul(1 << 32)));
+        if let Some(line) = &self.line {
+            let own = line.axes.iter().zip(line.directions).zip(self.origin);
+            for (state, (((frame, _), direction), origin)) in states.iter_mut().zip(own) {
+                let there = Setpoint::new(self.clock(), frame.at(&line.curve, moment));
+                *state = there.on_axis(origin, direction);
+            }
+        }
+        states
+    }
+
+    /// Whether all axes stand still at a tick, with nothing to come (or held).
+    pub fn is_at_rest(&self, now: u64) -> bool {
+        let over = self.line.as_ref().map_or(self.path.start().moment, LinePulses::over);
+        self.due().is_none() && self.clock().moment(now) >= over
+    }
+
+    /// Whether the last stop was [`halt`](Self::halt): the steps are counted, but the motors may have run on.
+    pub const fn is_halted(&self) -> bool {
+        self.halted
+    }
+
+    /// Adds a line to `target` in steps, at most at `feed` in µm/s, at least 1. A line that runs does not slow down for its
+    /// end any more than the corner asks for.
+    ///
+    /// # Errors
+    /// As [`Path::push`].
+    pub fn push(&mut self, target: [i64; N], feed: u32, now: u64) -> Result<(), Error> {
+        self.path.push(target, feed)?;
+        self.halted = false;
+        let other = |part| self.path.exit(0, part) != self.exit;
+        if self.line.is_none() || self.part().is_some_and(other) {
+            self.replan(now);
+        }
+        Ok(())
+    }
+
+    /// Feed override, in percent of the speeds that the lines were pushed with. The axes' limits and the speeds at corners
+    /// stay what they are, so more than 100 is faster only where those allow it. 0 holds.
+    pub fn set_override(&mut self, percent: u16, now: u64) {
+        self.percent = percent;
+        self.replan(now);
+    }
+
+    /// Feed hold: slows down to rest along the path, and keeps the rest of it.
+    pub fn hold(&mut self, now: u64) {
+        self.held = true;
+        self.replan(now);
+    }
+
+    /// Goes on after a [`hold`](Self::hold), also while it still slows down.
+    pub fn resume(&mut self, now: u64) {
+        self.held = false;
+        self.replan(now);
+    }
+
+    /// Slows down to rest along the path and forgets the rest of it. What is pushed from now on begins where it comes to
+    /// rest.
+    pub fn stop(&mut self, now: u64) {
+        match self.end_of_stop(now) {
+            Some(end) => self.cut(end, now),
+            None => self.leave(now),
+        }
+    }
+
+    /// A new target: slows down to rest along the path, forgets the rest of it, and goes straight to `target` from there.
+    ///
+    /// # Errors
+    /// [`Error::QueueFull`] if the way to rest takes all lines of a full queue; [`Error::TooManySteps`] more than 2^31 - 1 steps
+    /// from there. Both leave the path as it was.
+    pub fn move_to(&mut self, target: [i64; N], feed: u32, now: u64) -> Result<(), Error> {
+        let end = self.end_of_stop(now);
+        let from = end.map_or(self.commanded, |(end, _)| self.path.place(end, self.begun(), self.made));
+        Path::<N, M>::steps(from, target)?;
+        if end.is_some_and(|((at, _), _)| at.saturating_add(1) >= M) || M == 0 {
+            return Err(Error::QueueFull);
+        }
+        self.stop(now);
+        self.push(target, feed, now)
+    }
+
+    /// No further step, and the path is forgotten. The positions are those of the steps made; motors at speed run on and
+    /// lose them.
+    pub fn halt(&mut self, now: u64) {
+        self.halted = !self.is_at_rest(now);
+        let free = self.free.iter().copied().max().unwrap_or(0);
+        (self.held, self.stopping) = (false, false);
+        self.leave(now.max(free));
+    }
+
+    const fn clock(&self) -> Clock {
+        self.path.clock()
+    }
+
+    /// Part of the speeds that were asked for; `None` to brake.
+    fn part(&self) -> Option<Real> {
+        let brakes = self.held || self.stopping || self.percent == 0;
+        (!brakes).then(|| Real::new(self.percent.into()) / Real::new(100))
+    }
+
+    /// The tick of a request. Machines that move are somewhere between their last step and the next one, whatever the caller's
+    /// clock says.
+    fn tick(&self, now: u64) -> u64 {
+        let last = self.free.iter().copied().max().unwrap_or(0).saturating_sub(1);
+        let now = now.max(last);
+        self.due().map_or(now, |due| now.min(due))
+    }
+
+    /// Where the first line begins, in steps.
+    fn begun(&self) -> [i64; N] {
+        let mut from = self.commanded;
+        if let Some(line) = &self.line {
+            for ((from, made), direction) in from.iter_mut().zip(self.made).zip(line.directions) {
+                let made = i64::from(made);
+                *from = from.saturating_sub(if direction.dir() { made.wrapping_neg() } else { made });
+            }
+        }
+        from
+    }
+
+    /// At rest with an empty queue, from a tick on.
+    fn leave(&mut self, now: u64) {
+        let moment = self.clock().moment(now).max(self.path.start().moment);
+        self.path.clear(self.commanded, moment);
+        (self.line, self.made, self.exit) = (None, [0; N], Real::ZERO);
+    }
+
+    /// The motion from which a new plan starts; `None` if the plan that there is ends before it, at the end of the line.
+    fn here(&self, now: u64) -> Option<(Motion, Start<N>)> {
+        let line = self.line.as_ref()?;
+        let moment = self.clock().moment(self.tick(now));
+        let start = Start { made: self.made, ..line.start };
+        if moment >= line.over() {
+            let place = start.place + line.curve.way();
+            let rest = Start { place, moment: self.clock().aligned(moment), offset: Real::ZERO, ..start };
+            return (!line.start.whole).then(|| (Motion::steady(Real::ZERO), rest));
+        }
+        let begin = line.start.moment;
+        let (motion, place) = line.motion(moment.max(begin));
+        Some((motion, if moment <= begin { start } else { Start { place, moment, offset: Real::ZERO, ..start } }))
+    }
+
+    /// On which line and where on it a stop ends, and the speed at which it leaves the first one; `None` at rest.
+    fn end_of_stop(&self, now: u64) -> Option<((usize, Real), Real)> {
+        self.line.as_ref()?;
+        if self.stopping {
+            return self.path.end_of_cut().map(|end| (end, self.exit));
+        }
+        let first = self.path.line(0)?;
+        let here = self.here(now);
+        if here.as_ref().is_some_and(|(motion, _)| motion.v.is_zero()) && self.due().is_none() {
+            return None;
+        }
+        let course =
+            here.and_then(|(motion, start)| Some((start.place, self.path.course(0, motion, start.place, None)?)));
+        let (place, exit) = match course {
+            Some((place, Course { curve, exit, .. })) => (place + curve.way(), exit),
+            None => (first.length, self.exit),
+        };
+        Some((if exit.is_zero() { (0, place) } else { self.path.end_of_stop(1, exit) }, exit))
+    }
+
+    /// Leaves the path at a place, and the first line at a speed.
+    fn cut(&mut self, (end, exit): ((usize, Real), Real), now: u64) {
+        self.path.cut(end, self.begun(), self.made, exit);
+        if !self.stopping {
+            self.stopping = true;
+            self.plan(now);
+        }
+        self.settle();
+    }
+
+    /// The way on after a request.
+    fn replan(&mut self, now: u64) {
+        if self.stopping {
+            return;
+        }
+        if self.line.is_none() {
+            self.path.not_before(now);
+            self.begin();
+        } else {
+            self.plan(now);
+        }
+        self.settle();
+    }
+
+    /// Plans the rest of the line that runs.
+    fn plan(&mut self, now: u64) {
+        let Some((motion, start)) = self.here(now) else { return };
+        let part = self.part();
+        if let Some(course) = self.path.course(0, motion, start.place, part) {
+            self.adopt(&course, start);
+        }
+    }
+
+    /// Begins the first line.
+    fn begin(&mut self) {
+        (self.line, self.made, self.exit) = (None, [0; N], Real::ZERO);
+        let part = self.part();
+        if self.path.speed().is_zero() && part.is_none() {
+            return;
+        }
+        if let Some(course) = self.path.begin(0, self.path.speed(), part) {
+            self.adopt(&course, self.path.start());
+        }
+    }
+
+    /// Puts a curve in the place of the one that runs, unless rounding has left it without the steps that are left.
+    fn adopt(&mut self, course: &Course, start: Start<N>) {
+        let Some(first) = self.path.line(0) else { return };
+        let start = Start { whole: course.whole, ..start };
+        let mut line = LinePulses::new(self.clock(), &course.curve, &first, start);
+        if course.whole && line.first().is_none() && self.made != first.ends {
+            return;
+        }
+        let begin = start.moment.div_ceil(self.clock().moment(1));
+        for (due, free) in line.due.iter_mut().zip(self.free) {
+            *due = due.map(|due| due.max(free).max(begin));
+        }
+        (self.line, self.exit, self.origin) = (Some(line), course.exit, self.commanded);
+    }
+
+    /// Takes lines out that are over, and begins the next one.
+    fn settle(&mut self) {
+        for _ in 0..=M {
+            let (Some(line), Some(first)) = (&self.line, self.path.line(0)) else { return };
+            if line.first().is_some() || self.made != first.ends {
+                return;
+            }
+            self.path.finish(&line.curve, line.start.moment, line.start.offset, self.exit);
+            self.stopping &= !first.cut;
+            self.begin();
+        }
+    }
+}

@@ -1,0 +1,161 @@
+//! A curve on the time and in the steps of one axis.
+
+use crate::curve::{Bend, Curve, Piece};
+use crate::real::Real;
+
+/// Fraction bits of a position.
+pub(super) const P: i32 = 32;
+
+/// Where an axis is on a curve: its positions are in 2^-32 steps, its times in moments.
+#[derive(Debug, Clone, Copy)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub(super) struct Frame {
+    /// A tick has 2^shift moments.
+    pub(super) shift: u32,
+    /// Moment at which the curve begins.
+    pub(super) begin: u64,
+    /// Position at which it begins.
+    pub(super) from: i64,
+    /// Position at which it ends, if that is known; else where the curve leads.
+    pub(super) to: Option<i64>,
+    /// What the curve begins later than `begin`, less than half a tick.
+    pub(super) offset: Real,
+    /// Steps of the axis in a unit of the curve.
+    pub(super) scale: Real,
+    /// The last piece has no end.
+    pub(super) endless: bool,
+}
+
+/// A state on a curve.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct State {
+    /// Position.
+    pub(super) p: i64,
+    /// Speed, never below 0, in steps a moment.
+    pub(super) v: Real,
+    /// Size of the acceleration, and whether it speeds up.
+    pub(super) a: (Real, bool),
+    /// Size of the jerk, and whether it adds to the speed.
+    pub(super) j: (Real, bool),
+}
+
+impl Frame {
+    /// At rest at a position.
+    pub(super) const fn rest(shift: u32, moment: u64, at: i64) -> Self {
+        let (offset, scale) = (Real::ZERO, Real::ONE);
+        Self { shift, begin: moment, from: at, to: Some(at), offset, scale, endless: false }
+    }
+
+    /// Moments from `begin` to a time of the curve.
+    pub(super) fn since(&self, curve: &Curve, time: Real) -> Real {
+        self.offset + (time - curve.skipped.0)
+    }
+
+    /// The time of the curve at a moment.
+    pub(super) fn time(&self, curve: &Curve, moment: u64) -> Real {
+        (Real::new(moment.saturating_sub(self.begin)) + curve.skipped.0) - self.offset
+    }
+
+    /// Steps from `from` to a place of the curve.
+    pub(super) fn made(&self, curve: &Curve, p: Real) -> Real {
+        (p - curve.skipped.1) * self.scale
+    }
+
+    fn position(&self, curve: &Curve, p: Real) -> i64 {
+        let behind = curve.skipped.1;
+        let (back, size) = if p < behind { (true, behind - p) } else { (false, p - behind) };
+        let way = i64::try_from((size * self.scale).to_fixed(P)).unwrap_or(i64::MAX);
+        if back { self.from.saturating_sub(way) } else { self.from.saturating_add(way) }
+    }
+
+    /// Moment at which the curve is over.
+    pub(super) fn end(&self, curve: &Curve) -> u64 {
+        self.begin.saturating_add(self.since(curve, curve.time).to_fixed(0))
+    }
+
+    /// Position at its end: that of the motor, which is at a whole step.
+    pub(super) fn last(&self, curve: &Curve) -> i64 {
+        self.to.unwrap_or_else(|| i64::from(steps(self.position(curve, curve.p))) << P)
+    }
+
+    /// Piece `at`, with its end and the steps made then, none if that is before the curve was joined; `None` after the last one.
+    pub(super) fn piece<'c>(&self, curve: &'c Curve, at: u8) -> Option<(&'c Piece, Real, u32)> {
+        let at = usize::from(at);
+        let piece = curve.pieces().get(at)?;
+        let (over, _) = curve.skipped;
+        let last = || steps(self.last(curve));
+        Some(match curve.pieces().get(at.saturating_add(1)) {
+            Some(next) if next.time <= over => (piece, next.time, 0),
+            Some(next) => (
+                piece,
+                next.time,
+                steps(self.position(curve, next.p)).min(if self.endless { u32::MAX } else { last() }),
+            ),
+            None => (piece, curve.time, if self.endless { u32::MAX } else { last() }),
+        })
+    }
+
+    /// The first middle of a tick that is not before a time of the curve: the tick, and the moments until then. A step
+    /// falls into the tick at whose middle it is made.
+    pub(super) fn sample(&self, curve: &Curve, time: Real) -> (u64, Real) {
+        let (tick, past) = self.middle(self.since(curve, time));
+        if past.is_zero() { (tick.saturating_sub(1), past) } else { (tick, Real::new(1 << self.shift) - past) }
+    }
+
+    /// The tick nearest to a time since `begin`, and the moments since it began to be that.
+    pub(super) fn middle(&self, since: Real) -> (u64, Real) {
+        let shift = self.shift;
+        let tick = 1_u64 << shift;
+        let part = (self.begin & tick.wrapping_sub(1)).wrapping_add(tick >> 1);
+        let time = since + Real::new(part);
+        let whole = time.to_fixed(0) >> shift;
+        ((self.begin >> shift).saturating_add(whole), time - Real::new(whole << shift))
+    }
+
+    /// The state at a moment; at rest after the end.
+    pub(super) fn at(&self, curve: &Curve, moment: u64) -> State {
+        let rest = State { p: self.last(curve), v: Real::ZERO, a: (Real::ZERO, true), j: (Real::ZERO, true) };
+        if !self.endless && moment >= self.end(curve) {
+            return rest;
+        }
+        let Some(Piece { p, v, a, j, up, bend, .. }) = curve.at(self.time(curve, moment)) else { return rest };
+        State {
+            p: self.position(curve, p),
+            v: v * self.scale,
+            a: (a * self.scale, up),
+            j: (j * self.scale, up == (bend != Bend::Fading)),
+        }
+    }
+}
+
+/// The curve of one axis.
+#[derive(Debug, Clone)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub(super) struct Phases {
+    pub(super) curve: Curve,
+    pub(super) frame: Frame,
+}
+
+impl Phases {
+    /// At rest.
+    pub(super) const fn rest(shift: u32, moment: u64, at: i64) -> Self {
+        Self { curve: Curve::new(), frame: Frame::rest(shift, moment, at) }
+    }
+
+    pub(super) fn end(&self) -> u64 {
+        self.frame.end(&self.curve)
+    }
+
+    pub(super) fn last(&self) -> i64 {
+        self.frame.last(&self.curve)
+    }
+
+    pub(super) fn at(&self, moment: u64) -> State {
+        self.frame.at(&self.curve, moment)
+    }
+}
+
+/// Steps made at a position: step k falls where the position is k - 1/2.
+pub(super) fn steps(p: i64) -> u32 {
+    u32::try_from(p.saturating_add(1 << 31) >> P).unwrap_or(if p < 0 { 0 } else { u32::MAX })
+}

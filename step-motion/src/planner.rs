@@ -1,0 +1,324 @@
+//! The fastest curve from a state to a speed, over a distance or without end.
+//!
+//! All curves are made of slopes between speeds at acceleration 0. A state with an acceleration lies on a slope that began
+//! earlier, at its *virtual start*, so a curve may begin in the middle of a slope. Only where the acceleration has to change
+//! its sign it is brought to 0 first.
+
+use crate::curve::{Bend, Curve};
+use crate::limits::{Bounds, Jerk};
+use crate::peak::Peak;
+use crate::real::{Real, THIRD};
+use crate::slope::{Slope, distance, most_distance};
+
+/// Speed and acceleration.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Motion {
+    pub(super) v: Real,
+    /// Size of the acceleration.
+    pub(super) a: Real,
+    /// The acceleration speeds up.
+    pub(super) up: bool,
+}
+
+impl Motion {
+    pub(super) const fn steady(v: Real) -> Self {
+        Self { v, a: Real::ZERO, up: true }
+    }
+}
+
+/// Where a curve leads.
+#[derive(Debug, Clone, Copy)]
+pub(super) enum Goal {
+    /// This far, with this speed at the end.
+    At(Real, Real),
+    /// To this speed, wherever that is.
+    Speed(Real),
+}
+
+/// Distances may be this much too short, in steps: what rounding leaves.
+pub(super) const SLACK: Real = Real::fixed(1, 16);
+
+/// The speed at which an endless curve ends is cruised for this many moments.
+pub(super) const ENDLESS: Real = Real::fixed(1, -60);
+
+/// The curve; or the least distance that is needed, if there is not as much.
+pub(super) fn plan(start: Motion, goal: Goal, bounds: &Bounds) -> Result<Curve, Real> {
+    let mut curve = Curve::new();
+    match plan_into(&mut curve, start, goal, bounds) {
+        Ok(()) => Ok(curve),
+        Err(need) => Err(need),
+    }
+}
+
+/// The same in its place, an empty curve: it is large.
+pub(super) fn plan_into(curve: &mut Curve, start: Motion, goal: Goal, bounds: &Bounds) -> Result<(), Real> {
+    match bounds.jerk {
+        Some(jerk) if !start.a.is_zero() => {
+            let bend = Bent::new(start, jerk);
+            if start.up {
+                rising(curve, start, &bend, goal, bounds)
+            } else {
+                falling(curve, start, &bend, goal, bounds)
+            }
+        }
+        _ => steady(curve, start.v, goal, bounds),
+    }
+}
+
+/// What an acceleration under way means.
+struct Bent {
+    jerk: Jerk,
+    /// Time since the virtual start, and time until the acceleration is back at 0.
+    edge: Real,
+    /// Speed and distance back to the virtual start.
+    base: (Real, Real),
+    /// Speed and distance ahead when the acceleration is back at 0.
+    coast: (Real, Real),
+}
+
+impl Bent {
+    fn new(Motion { v, a, up }: Motion, jerk: Jerk) -> Self {
+        let edge = a * jerk.per_j;
+        let dv = (a * edge).half();
+        let bow = a * edge.squared() * THIRD;
+        let (base, coast) = (v.along(dv, !up), v.along(dv, up));
+        Self {
+            jerk,
+            edge,
+            base: (base, (base * edge).along(bow.half(), up)),
+            coast: (coast, (v * edge).along(bow, up)),
+        }
+    }
+
+    /// The curve has begun at the virtual start.
+    const fn on_the_slope(&self, curve: &mut Curve) {
+        curve.skipped = (self.edge, self.base.1);
+    }
+}
+
+/// Further up the slope if the goal asks for it, else back to acceleration 0 and on from there.
+fn rising(curve: &mut Curve, start: Motion, bent: &Bent, goal: Goal, bounds: &Bounds) -> Result<(), Real> {
+    let from_base = match goal {
+        Goal::At(n, exit) => Goal::At(n + bent.base.1, exit),
+        speed @ Goal::Speed(_) => speed,
+    };
+    if let Ok(top) = top(bent.base.0, from_base, bounds) {
+        if top >= bent.coast.0 {
+            bent.on_the_slope(curve);
+            return steady(curve, bent.base.0, from_base, bounds);
+        }
+    }
+    coast(curve, start, bent, goal, bounds)
+}
+
+/// The acceleration is brought to 0 first.
+fn coast(curve: &mut Curve, start: Motion, bent: &Bent, goal: Goal, bounds: &Bounds) -> Result<(), Real> {
+    let rest = match goal {
+        Goal::At(n, _) if n + SLACK < bent.coast.1 => {
+            return Err(bent.coast.1 + distance(bent.coast.0, Real::ZERO, bounds));
+        }
+        Goal::At(n, exit) => Goal::At(n - bent.coast.1, exit),
+        speed @ Goal::Speed(_) => speed,
+    };
+    curve.push((bent.edge, bent.coast.1), [start.v, start.a, bent.jerk.j], start.up, Bend::Fading);
+    steady(curve, bent.coast.0, rest, bounds).map_err(|need| need + bent.coast.1)
+}
+
+/// Off the slope if the goal leaves room for it, else further down it: at least to the speed that the brake has reached,
+/// and as little below as the distance allows.
+fn falling(curve: &mut Curve, start: Motion, bent: &Bent, goal: Goal, bounds: &Bounds) -> Result<(), Real> {
+    let ((base, back), (low, _)) = (bent.base, bent.coast);
+    let (target, exit) = match goal {
+        Goal::Speed(v) if v < low => {
+            bent.on_the_slope(curve);
+            return steady(curve, base, goal, bounds);
+        }
+        Goal::At(n, exit) => (n + back, exit),
+        Goal::Speed(_) => return coast(curve, start, bent, goal, bounds),
+    };
+    if bounds.v >= low {
+        if coast(curve, start, bent, goal, bounds).is_ok() {
+            return Ok(());
+        }
+        curve.clear();
+    }
+    let least = distance(base, exit, bounds);
+    // Above the speed that is left when the acceleration is back at 0 the slope does not lead there.
+    if least > target + SLACK || exit > low {
+        return Err(least - back);
+    }
+    let need = |v| distance(base, v, bounds) + distance(v, exit, bounds);
+    let high = low.min(bounds.v).max(exit);
+    let v = crossing(exit, high, target, need);
+    bent.on_the_slope(curve);
+    finish(curve, [base, v, exit], Some(target), bounds);
+    Ok(())
+}
+
+/// Slope, cruise for the rest of the distance if there is one to make, slope.
+fn finish(curve: &mut Curve, [from, top, exit]: [Real; 3], n: Option<Real>, bounds: &Bounds) {
+    let (up, down) = (Slope::new(from, top, bounds), Slope::new(top, exit, bounds));
+    curve.slope(&up);
+    if let Some(n) = n {
+        curve.cruise(top, n - (up.distance + down.distance));
+    }
+    curve.slope(&down);
+}
+
+/// From a speed at acceleration 0.
+fn steady(curve: &mut Curve, from: Real, goal: Goal, bounds: &Bounds) -> Result<(), Real> {
+    match goal {
+        Goal::At(n, exit) => {
+            let top = top(from, goal, bounds)?;
+            // A peak below the greatest speed is that of slopes that take all of the distance.
+            finish(curve, [from, top, exit], Some(n).filter(|_| top >= bounds.v), bounds);
+        }
+        Goal::Speed(v) => {
+            curve.slope(&Slope::new(from, v, bounds));
+            curve.cruise(v, v * ENDLESS);
+        }
+    }
+    Ok(())
+}
+
+/// The speed between the two slopes.
+fn top(from: Real, goal: Goal, bounds: &Bounds) -> Result<Real, Real> {
+    let (n, exit) = match goal {
+        Goal::At(n, exit) => (n, exit),
+        Goal::Speed(v) => return Ok(v),
+    };
+    if most_distance(from, exit, bounds) > n {
+        let least = distance(from, exit, bounds);
+        if least > n + SLACK {
+            return Err(least);
+        }
+    }
+    let (low, high) = if from > exit { (exit, from) } else { (from, exit) };
+    if high >= bounds.v {
+        let fits = distance(from, bounds.v, bounds) + distance(bounds.v, exit, bounds) <= n;
+        return Ok(if fits { bounds.v } else { high });
+    }
+    let peak = match &bounds.jerk {
+        None => (bounds.a * n + (from.squared() + exit.squared()).half()).sqrt(),
+        Some(jerk) => Peak { low, high, n }.speed(bounds, jerk),
+    };
+    Ok(peak.min(bounds.v).max(high))
+}
+
+/// The greatest speed from which `to` can be reached within `n`, or the greatest that can be reached from it.
+pub(super) fn greatest(to: Real, n: Real, bounds: &Bounds) -> Real {
+    let way = n.scaled(1);
+    let speed = match &bounds.jerk {
+        None => (to.squared() + bounds.a * way).sqrt(),
+        // There and back.
+        Some(jerk) => Peak { low: to, high: to, n: way }.speed(bounds, jerk),
+    };
+    speed.min(bounds.v).max(to)
+}
+
+/// The greatest speed at which a motion may end after `n`.
+pub(super) fn fastest_exit(start: Motion, n: Real, bounds: &Bounds) -> Real {
+    match bounds.jerk.filter(|_| !start.a.is_zero()).map(|jerk| Bent::new(start, jerk)) {
+        None => greatest(start.v, n, bounds),
+        Some(Bent { base, .. }) if start.up => greatest(base.0, n + base.1, bounds),
+        Some(Bent { coast, .. }) => greatest(coast.0, n - coast.1, bounds),
+    }
+}
+
+/// The speed nearest to `exit` from above at which a motion that brakes at once may end after `n`.
+///
+/// A jerk-limited brake to a lower speed may be shorter than one to a higher speed, for it has more of its way at the
+/// greatest acceleration. What is found is the end of the speeds that the way lasts for, from the present one down.
+pub(super) fn slowest_exit(start: Motion, n: Real, exit: Real, bounds: &Bounds) -> Real {
+    let (from, least, n) = match bounds.jerk.filter(|_| !start.a.is_zero()).map(|jerk| Bent::new(start, jerk)) {
+        None => (start.v, Real::ZERO, n),
+        Some(Bent { coast, .. }) if start.up => (coast.0, Real::ZERO, n - coast.1),
+        Some(Bent { base, coast, .. }) => (base.0, base.0 - coast.0, n + base.1),
+    };
+    if from <= exit {
+        return from;
+    }
+    match bounds.jerk {
+        None => (from.squared() - (bounds.a * n).scaled(1)).sqrt().max(exit),
+        Some(_) => from - crossing(least, (from - exit).max(least), n, |by| distance(from, from - by, bounds)),
+    }
+}
+
+/// The largest speed between `low` and `high`, as near as it matters, from and to which `need` is not above `n`. It is not
+/// `low`.
+///
+/// Near `low` the need grows with the root of the speed above it, and that root is what is searched: false position, with
+/// the end that stays weighed less (Illinois), and halving if that takes long.
+fn crossing(low: Real, high: Real, n: Real, need: impl Fn(Real) -> Real) -> Real {
+    let top = need(high);
+    if top <= n {
+        return high;
+    }
+    let (base, mut best) = (low, low);
+    let (mut low, mut high) = (Real::ZERO, (high - low).sqrt());
+    let mut left = n - need(base);
+    let (mut below, mut above, mut rose) = (left, top - n, None);
+    for round in 0..40_u8 {
+        let width = high - low;
+        if left.scaled(14) <= n || width.scaled(40) <= high {
+            break;
+        }
+        let part = if round % 16 > 8 { width.half() } else { width * (below / (below + above)) };
+        let middle = low + part;
+        let speed = base + middle.squared();
+        let got = need(speed);
+        if got <= n {
+            left = n - got;
+            (low, best, below) = (middle, speed, left);
+            if rose == Some(true) {
+                above = above.half();
+            }
+        } else {
+            (high, above) = (middle, got - n);
+            if rose == Some(false) {
+                below = below.half();
+            }
+        }
+        rose = Some(got <= n);
+    }
+    best
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    /// From any speed, also above the greatest one, and any acceleration under way: a curve makes all of its distance, ends with
+    /// the speed that was asked for, and goes on from piece to piece without a jump.
+    #[test]
+    #[cfg_attr(miri, ignore = "too long for an interpreter")]
+    fn a_curve_makes_its_distance() {
+        let thousandths = |n: u64| Real::new(n) / Real::new(1000);
+        let speeds = (1..3000_u64, 0..3000_u64, 0..3000_u64);
+        let all = (speeds, 0..=1000_u64, any::<bool>(), 0..20_000_u64, prop::option::of(1..10_000_u64));
+        proptest!(ProptestConfig::with_cases(20_000), |(((most, from, exit), part, up, n, jerk) in all)| {
+            let bounds = Bounds::new(thousandths(most), Real::ONE, jerk.map(thousandths));
+            let mut start = Motion::steady(thousandths(from));
+            if let Some(jerk) = bounds.jerk {
+                // The speed at which the acceleration began is not below 0, nor that at which it ends.
+                let least = (start.v * jerk.j).scaled(1).sqrt().min(Real::ONE);
+                start = Motion { a: least * thousandths(part), up, ..start };
+            }
+            let (n, exit) = (thousandths(n), thousandths(exit.min(most)));
+            if let Ok(curve) = plan(start, Goal::At(n, exit), &bounds) {
+                let slack = SLACK + n.scaled(-40);
+                prop_assert!(curve.way().distance(n) <= slack, "{:?} of {n:?}: {curve:?}", curve.way());
+                let near = |a: Real, b: Real| a.distance(b) <= Real::fixed(1, 20);
+                for pair in curve.pieces().windows(2) {
+                    let end = pair[0].after(pair[1].time - pair[0].time);
+                    prop_assert!(near(end.p, pair[1].p) && near(end.v, pair[1].v), "{end:?} {curve:?}");
+                }
+                if let Some(last) = curve.pieces().last() {
+                    let end = last.after(curve.time - last.time);
+                    prop_assert!(near(end.p, curve.p) && near(end.v, exit), "{end:?} {exit:?} {curve:?}");
+                }
+            }
+        });
+    }
+}

@@ -1,0 +1,52 @@
+//! One change of speed.
+
+use crate::limits::Bounds;
+use crate::real::Real;
+
+/// From one speed to another in the least time: jerk, constant acceleration, jerk back; without a jerk limit the middle
+/// alone.
+///
+/// With dv the change of speed, a² / j <= dv reaches the greatest acceleration and takes dv / a + a / j. A smaller one
+/// takes 2 sqrt(dv / j) and has no middle. The distance is the mean of both speeds times the time in either case.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Slope {
+    pub(super) from: Real,
+    pub(super) to: Real,
+    /// Time of either jerk.
+    pub(super) edge: Real,
+    /// Time at constant acceleration.
+    pub(super) flat: Real,
+    /// Size of the jerk.
+    pub(super) j: Real,
+    /// Size of the acceleration between them.
+    pub(super) a: Real,
+    /// How far it goes.
+    pub(super) distance: Real,
+}
+
+impl Slope {
+    pub(super) fn new(from: Real, to: Real, bounds: &Bounds) -> Self {
+        let dv = from.distance(to);
+        let (edge, flat, j, a) = match bounds.jerk {
+            None => (Real::ZERO, dv * bounds.per_a, Real::ZERO, bounds.a),
+            Some(jerk) if dv < jerk.knee => {
+                let edge = (dv * jerk.per_j).sqrt();
+                (edge, Real::ZERO, jerk.j, jerk.j * edge)
+            }
+            Some(jerk) => (jerk.edge, dv * bounds.per_a - jerk.edge, jerk.j, bounds.a),
+        };
+        let time = edge.scaled(1) + flat;
+        Self { from, to, edge, flat, j, a, distance: (from + to).half() * time }
+    }
+}
+
+/// The least distance of a change of speed.
+pub(super) fn distance(from: Real, to: Real, bounds: &Bounds) -> Real {
+    if from == to { Real::ZERO } else { Slope::new(from, to, bounds).distance }
+}
+
+/// At least as much, without a root: as if the greatest acceleration were reached.
+pub(super) fn most_distance(from: Real, to: Real, bounds: &Bounds) -> Real {
+    let edge = bounds.jerk.map_or(Real::ZERO, |jerk| jerk.edge);
+    (from + to).half() * (from.distance(to) * bounds.per_a + edge)
+}

@@ -1,0 +1,222 @@
+//! Lines in several axes: on the line, within the limits of every axis, at rest only where it must be.
+
+use proptest::prelude::*;
+use step_motion::{AxisPulse, AxisSetup, Clock, Direction, Error, Limits, Path, Plan};
+
+fn axis(v: u32, a: u32, j: u64, steps_per_m: u32) -> AxisSetup {
+    let limits = Limits::new(v, a).unwrap();
+    AxisSetup::new(if j == 0 { limits } else { limits.with_jerk(j).unwrap() }, steps_per_m)
+}
+
+/// Runs a line, and checks that no axis leaves it by more than half a step (and a tick). Returns its end.
+fn follow<const N: usize>(
+    line: impl Iterator<Item = AxisPulse>,
+    from: [i64; N],
+    to: [i64; N],
+    axes: &[AxisSetup; N],
+    hz: f64,
+) -> Result<u64, TestCaseError> {
+    let mut at = from;
+    let mut last: [Option<u64>; N] = [None; N];
+    let mut now = 0;
+    for pulse in line {
+        let i = usize::from(pulse.axis);
+        prop_assert!(pulse.tick >= now, "{pulse:?} after {now}");
+        now = pulse.tick;
+        at[i] += if pulse.direction == Direction::Forward { 1 } else { -1 };
+        if let Some(last) = last[i] {
+            let least = hz / f64::from(axes[i].limits.speed());
+            prop_assert!((now - last) as f64 >= least - 1.01, "{pulse:?} after {last}");
+        }
+        last[i] = Some(now);
+        // Where the line is when this axis is between two steps.
+        let n = (to[i] - from[i]).abs() as f64;
+        let part = (((at[i] - from[i]).abs() as f64) - 0.5) / n;
+        for k in 0..N {
+            let want = from[k] as f64 + part * (to[k] - from[k]) as f64;
+            let slack = f64::from(axes[k].limits.speed()) / hz;
+            prop_assert!((at[k] as f64 - want).abs() <= 0.5 + slack + 1e-6, "axis {k} at {} for {want}", at[k]);
+        }
+    }
+    prop_assert_eq!(at, to);
+    Ok(now)
+}
+
+proptest! {
+    #[test]
+    fn lines_of_three_axes(
+        corners in prop::collection::vec([-600..600_i64, -600..600_i64, -200..200_i64], 1..14),
+        feed in 1000..300_000_u32,
+        deviation in 0..200_u32,
+        j in prop_oneof![Just(0_u64), 100_000..100_000_000_u64],
+    ) {
+        let axes = [axis(20_000, 400_000, j, 80_000), axis(15_000, 200_000, j, 80_000), axis(4000, 50_000, 0, 400_000)];
+        let clock = Clock::new(72_000_000).unwrap();
+        let mut path = Path::<3, 6>::new(clock, axes, deviation).unwrap();
+        let mut corners = corners.into_iter().peekable();
+        let (mut at, mut ends) = ([0; 3], std::collections::VecDeque::new());
+        let mut end = 0;
+        loop {
+            while let Some(corner) = corners.next_if(|_| !path.is_full()) {
+                if corner != path.target() {
+                    ends.push_back(corner);
+                }
+                path.push(corner, feed).unwrap();
+            }
+            let Some(line) = path.next_line() else { break };
+            let to = ends.pop_front().unwrap();
+            prop_assert!(line.end() >= end);
+            end = line.end();
+            let last = follow(line, at, to, &axes, 72e6)?;
+            prop_assert!(last <= end);
+            at = to;
+        }
+        prop_assert!(ends.is_empty() && path.is_empty());
+    }
+}
+
+/// Straight on, a line in ten parts takes as long as in one; with a stop at each corner ten times the ramps.
+#[test]
+fn look_ahead_over_a_straight_line() {
+    let axes = [axis(20_000, 400_000, 0, 80_000), axis(20_000, 400_000, 0, 80_000)];
+    let run = |parts: i64, deviation: u32, zigzag: i64| {
+        let mut path = Path::<2, 16>::new(Clock::MICROSECONDS, axes, deviation).unwrap();
+        for part in 1..=parts {
+            path.push([part * 10_000 / parts, (part % 2) * zigzag], 1_000_000).unwrap();
+        }
+        let mut end = 0;
+        while let Some(line) = path.next_line() {
+            end = line.end();
+        }
+        end
+    };
+    let whole = run(1, 10, 0);
+    assert_eq!(whole, Plan::new(Clock::MICROSECONDS, axes[0].limits, 10_000).unwrap().duration());
+    assert!(run(10, 10, 0).abs_diff(whole) <= 2, "{} for {whole}", run(10, 10, 0));
+    assert!(run(10, 0, 500) > run(10, 50, 500));
+    assert!(run(10, 50, 500) > run(10, 500, 500));
+    assert!(run(10, 500, 500) > whole);
+}
+
+/// At a right angle s = sin 45°, so v² = a δ / (sqrt 2 - 1).
+#[test]
+fn the_speed_at_a_right_angle() {
+    let axes = [axis(50_000, 100_000, 0, 100_000); 2];
+    let mut path = Path::<2, 4>::new(Clock::NANOSECONDS, axes, 100).unwrap();
+    path.push([3000, 0], 500_000).unwrap();
+    path.push([3000, 3000], 500_000).unwrap();
+    let before: Vec<u64> = path.next_line().unwrap().map(|pulse| pulse.tick).collect();
+    let gap = (before[2999] - before[2998]) as f64 / 1e9;
+    // a = 1 m/s², δ = 100 µm: 15.54 mm/s, or 1554 steps/s; a step and a half before it is 1640.
+    let corner = (100_000.0 * 10.0 / (2_f64.sqrt() - 1.0)).sqrt();
+    let want = (corner * corner + 2.0 * 100_000.0).sqrt();
+    assert!((1.0 / gap - want).abs() < 2.0, "{} steps/s for {want}", 1.0 / gap);
+}
+
+#[test]
+fn refusals_leave_the_path_as_it_was() {
+    let axes = [axis(1000, 1000, 0, 1000)];
+    let mut path = Path::<1, 1>::new(Clock::MICROSECONDS, axes, 5).unwrap();
+    assert!(path.next_line().is_none());
+    path.push([0], 5).unwrap();
+    assert!(path.is_empty());
+    for far in [1 << 31, -(1 << 31), 1 << 40, i64::MIN] {
+        assert!(matches!(path.push([far], 5), Err(Error::TooManySteps { .. })), "{far}");
+    }
+    path.push([10], 5).unwrap();
+    assert_eq!((path.push([20], 5), path.len(), path.target()), (Err(Error::QueueFull), 1, [10]));
+    path.not_before(1000);
+    assert!(path.next_line().unwrap().all(|pulse| pulse.tick > 1000));
+    let scale = [AxisSetup::new(axes[0].limits, 0)];
+    assert!(matches!(Path::<1, 1>::new(Clock::MICROSECONDS, scale, 5), Err(Error::NoScale)));
+}
+
+/// An axis with three steps on a line whose ramps last 20 s: the first one is 11.5 s away, on the ramp.
+#[test]
+fn a_step_long_after_the_start_of_a_ramp() {
+    let axes = [axis(20_000, 1000, 0, 80_000); 2];
+    for hz in [1_000_000, 1_000_000_000] {
+        let mut path = Path::<2, 2>::new(Clock::new(hz).unwrap(), axes, 0).unwrap();
+        path.push([400_000, 3], u32::MAX).unwrap();
+        let slow: Vec<u64> =
+            path.next_line().unwrap().filter(|pulse| pulse.axis == 1).map(|pulse| pulse.tick).collect();
+        let (half, hz) = ((400_000_f64 / 1000.0).sqrt(), f64::from(hz));
+        let first = (2.0 * 400_000.0 / 6.0 / 1000.0_f64).sqrt();
+        let want = [first, half, 2.0 * half - first].map(|seconds| seconds * hz);
+        for (tick, want) in slow.iter().zip(want) {
+            assert!((*tick as f64 - want).abs() <= 0.51 + want * 1e-12, "{slow:?} for {want}");
+        }
+        assert_eq!(slow.len(), 3);
+    }
+}
+
+/// The last steps of the first line of two, as a speed in steps/s: that of the corner and what is braked to it over a step
+/// and a half of the faster axis.
+fn speed_at_the_corner(first: [i64; 2], second: [i64; 2], deviation: u32) -> f64 {
+    let axes = [axis(50_000, 100_000, 0, 100_000); 2];
+    let mut path = Path::<2, 4>::new(Clock::NANOSECONDS, axes, deviation).unwrap();
+    path.push(first, 500_000).unwrap();
+    path.push([first[0] + second[0], first[1] + second[1]], 500_000).unwrap();
+    let fast = u8::from(first[1].abs() > first[0].abs());
+    let ticks: Vec<u64> = path.next_line().unwrap().filter(|p| p.axis == fast).map(|p| p.tick).collect();
+    let gap = ticks[ticks.len() - 1] - ticks[ticks.len() - 2];
+    1e9 / gap as f64
+}
+
+/// v² = a δ s / (1 - s) with s the sine of half the angle between the lines, whichever way they lead. Along 3, 4 the slower axis may
+/// have as much speed as the limit of the faster one gives it.
+#[test]
+fn the_speed_at_a_corner_is_that_of_its_angle() {
+    for (sx, sy) in [(1, 1), (1, -1), (-1, 1), (-1, -1)] {
+        for (second, angle) in
+            [([4000, -3000], 90.0_f64), ([-4000, 3000], 90.0), ([3000, 4000], 180.0), ([-3000, -4000], 0.0)]
+        {
+            let turn = |[x, y]: [i64; 2]| [sx * x, sy * y];
+            let got = speed_at_the_corner(turn([3000, 4000]), turn(second), 100);
+            // Along either line the limit of the axis that makes 4 of 5 parts of it counts: a = 100,000 · 5/4.
+            let (a, s) = (125_000.0, (angle.to_radians() / 2.0).sin());
+            let corner = (a * 10.0 * s / (1.0 - s).max(1e-12)).min(2.0 * a * 5000.0);
+            // The faster axis has 4/5 of the speed, and brakes with 100,000 over a step; at the middle of the gap.
+            let want = (corner * 0.64 + 2.0 * 100_000.0).sqrt();
+            assert!(got > want * 0.99 - 60.0 && got < want * 1.01 + 60.0, "{got} for {want} at {angle}°");
+        }
+    }
+    // All but straight on is no corner, however small the deviation: 0.03°.
+    assert!(speed_at_the_corner([1000, 3000], [1001, 3000], 0) > 15_000.0);
+    assert!(speed_at_the_corner([1000, 3000], [1100, 3000], 0) < 700.0);
+}
+
+/// The time goes on from line to line without being rounded.
+#[test]
+fn many_lines_in_motion_take_the_time_of_one() {
+    let axes = [axis(3333, 100_000, 0, 80_000)];
+    let mut path = Path::<1, 300>::new(Clock::MICROSECONDS, axes, 20).unwrap();
+    for part in 1..=300 {
+        path.push([7 * part], u32::MAX).unwrap();
+    }
+    let mut ticks = Vec::new();
+    while let Some(line) = path.next_line() {
+        ticks.extend(line.map(|pulse| pulse.tick));
+    }
+    let whole = Plan::new(Clock::MICROSECONDS, axes[0].limits, 2100).unwrap();
+    let other = ticks.iter().zip(whole.pulses()).filter(|(tick, alone)| **tick != *alone).count();
+    assert!(ticks.len() == 2100 && other <= 20, "{other} ticks are others");
+}
+
+/// A line after a rest begins at a half tick: at every other place its steps are those of a plan of its own.
+#[test]
+fn a_line_after_a_rest_begins_on_the_grid() {
+    let axes = [axis(20_000, 400_000, 0, 80_000)];
+    let alone: Vec<u64> = Plan::new(Clock::MICROSECONDS, axes[0].limits, 300).unwrap().pulses().collect();
+    let mut same = 0;
+    for first in 100..140 {
+        let mut path = Path::<1, 2>::new(Clock::MICROSECONDS, axes, 20).unwrap();
+        path.push([first], u32::MAX).unwrap();
+        path.push([first - 300], u32::MAX).unwrap();
+        path.next_line().unwrap();
+        let ticks: Vec<u64> = path.next_line().unwrap().map(|pulse| pulse.tick).collect();
+        let shift = ticks[0] - alone[0];
+        same += u32::from(ticks.iter().zip(&alone).all(|(tick, alone)| tick - alone == shift));
+    }
+    assert!(same >= 12, "{same} of 40");
+}

@@ -1,0 +1,12 @@
+//! What the crate promises, seen from outside.
+#![allow(missing_docs, clippy::arithmetic_side_effects, clippy::cast_possible_truncation, clippy::cast_precision_loss)]
+#![allow(clippy::cast_sign_loss, clippy::indexing_slicing, clippy::panic, clippy::unwrap_used)]
+
+mod changes;
+mod laws;
+mod lines;
+mod paths;
+mod plans;
+mod queue;
+#[cfg(feature = "serde")]
+mod serde;

@@ -1,0 +1,294 @@
+//! The laws of time on the hostile line. `HOSTILE_EVENTS` says how many events for each test: 100,000 unless it is set.
+
+use std::collections::BTreeMap;
+
+use crate::bench::{Bench, Seen};
+use proptest::prelude::*;
+use servowire_core::Procedure;
+use servowire_world::{Kind, Rates, Scenario, Tally, scenarios, wanted_events};
+use tformat::device::Behaviour;
+use tformat::master::{EEPROM_POLLING, EepromAccess, MultiTurnZero, Reset, SingleTurnZero, Step};
+use tformat::{Abm, Abs, Address, Almc, BitRate, Error, Page, Request, Resolution, Response};
+
+/// Runs seed after seed until enough has happened, and prints what it was.
+fn runs(name: &str, mut one: impl FnMut(u64) -> Bench) {
+    let (mut tally, mut seen, mut seed) = (Tally::default(), Seen::default(), 0);
+    let wanted = wanted_events(100_000);
+    while tally.events() < wanted {
+        let bench = one(seed);
+        tally.add(&bench.tally());
+        let s = bench.seen;
+        seen.done += s.done;
+        seen.failed += s.failed;
+        seen.owed += s.owed;
+        seen.forged += s.forged;
+        seen.undetected += s.undetected;
+        seen.beyond_budget += s.beyond_budget;
+        seed += 1;
+    }
+    println!("{name}: {seed} seeds, {tally}; {seen}");
+    assert!(seen.done > 0 && seen.failed > 0 && seen.owed > 0, "the line was not hostile, or nothing but");
+    for kind in Kind::ALL {
+        assert!(tally.of(kind) > 0, "{kind:?} never happened");
+    }
+}
+
+/// How acts that cannot be undone have ended.
+#[derive(Debug, Default)]
+struct Ends {
+    done: u32,
+    unknown: u32,
+    not_done: u32,
+}
+
+impl Ends {
+    fn count<T>(&mut self, end: &Result<T, Error>) {
+        *match end {
+            Ok(_) => &mut self.done,
+            Err(Error::EffectUnknown { .. }) => &mut self.unknown,
+            Err(_) => &mut self.not_done,
+        } += 1;
+    }
+
+    fn print(&self, name: &str) {
+        println!("{name}: {} done, {} unknown, {} not done", self.done, self.unknown, self.not_done);
+        assert!(self.done > 0 && self.unknown > 0, "{self:?}");
+    }
+}
+
+/// Law 5: one effect at the most, and the end says whether there was one. Any other error is that of the first exchange: nothing
+/// was sent that has an effect.
+fn done_once_at_most<T>(end: &Result<T, Error>, effects: u32, seed: u64) {
+    assert!(effects <= 1, "{effects} effects, seed {seed}");
+    match end {
+        Ok(_) => assert_eq!(effects, 1, "seed {seed}"),
+        Err(Error::EffectUnknown { .. }) => {}
+        Err(error) => assert_eq!(effects, 0, "{error}, seed {seed}"),
+    }
+}
+
+fn bench(seed: u64, rates: Rates) -> Bench {
+    let rate = BitRate::ALL[(seed / 2) as usize % 2];
+    let behaviour = Behaviour::numbered((seed * 37) as u16 % Behaviour::NUMBERED);
+    let bench = Bench::new(Scenario::random(seed, rates), rate, behaviour, seed % 3 == 0);
+    if seed % 4 == 1 { bench.mixing_up(seed) } else { bench }
+}
+
+/// So that ten exchanges in a row are whole in every second run.
+const MILD: Rates = Rates { per_million: [700; Kind::ALL.len()], longest_ns: 100_000 };
+
+const READS: [Request; 4] = [Request::ReadSingleTurn, Request::ReadAll, Request::ReadMultiTurn, Request::ReadEncoderId];
+
+/// Laws 1 to 4 for single transactions, under all switches of the encoder.
+#[test]
+fn hostile_transactions() {
+    runs("transactions", |seed| {
+        let mut bench = bench(seed, Rates::ROUGH);
+        for k in 0..60_usize {
+            let request = READS[[0, 1, 0, 2, 0, 3][k % 6]];
+            let at_ns = bench.ready_ns + (seed + k as u64) % 3 * 5_000;
+            let _ = bench.exchange(request, at_ns);
+        }
+        bench
+    });
+}
+
+/// Law 5: one zero at the most, and the three ends mean what they say, whatever an attempt that was dropped has left in the
+/// encoder.
+#[test]
+fn hostile_zero_presets() {
+    zeros("zero presets", Request::SetSingleTurnZero, |bench, seed| {
+        bench.device.set_position(Abs::truncate(0x1000 + seed as u32 % 0x1000), Abm::truncate(3));
+        let mut zero = SingleTurnZero::set_and_shift_commutation_angle(Resolution::new(23, 16).unwrap(), 10);
+        bench.run(&mut zero)
+    });
+}
+
+/// Law 5 for ID C that is read back, with a shaft that trembles on the boundary of a turn.
+#[test]
+fn hostile_turn_zeros() {
+    zeros("turn zeros", Request::ResetTurnsAndErrors, |bench, seed| {
+        bench.trembles = seed % 2 == 0;
+        bench.device.set_position(Abs::truncate(0x7f_ffff), Abm::truncate(0x10 + seed as u32 % 0x1000));
+        let mut zero = MultiTurnZero::set_and_lose_multi_turn_reference(Resolution::new(23, 16).unwrap(), 1);
+        bench.run(&mut zero)
+    });
+}
+
+/// A zero that is read back, in every scenario. In two of three runs up to nine requests of an attempt went before that nobody
+/// saw the end of.
+fn zeros<T>(name: &str, request: Request, set: impl Fn(&mut Bench, u64) -> Result<T, Error>) {
+    let mut ends = Ends::default();
+    runs(name, |seed| {
+        let mut bench = bench(seed, MILD);
+        bench.moves = false;
+        bench.device.set_position(Abs::truncate(0x1000), Abm::truncate(0x100));
+        for _ in 0..if seed % 3 == 0 { 0 } else { 1 + seed % 9 } {
+            let at_ns = bench.ready_ns + 41_000;
+            bench.wait(at_ns);
+            let _ = bench.exchange(request, at_ns);
+        }
+        let earlier = bench.device.effects();
+        let end = set(&mut bench, seed);
+        // What was taken for a response to ID 8 or C is no excuse: it is read back. A wrong reading is one.
+        if bench.forged_requests + bench.misread == 0 {
+            done_once_at_most(&end, bench.device.effects() - earlier, seed);
+            ends.count(&end);
+        }
+        bench
+    });
+    ends.print(name);
+    assert!(ends.not_done > 0, "{ends:?}");
+}
+
+/// Law 5 for ID C and ID 8 alone: two attempts in a row, the second after whatever became of the first. Ten responses are no proof, but
+/// what is said to be done and is not has its reason: the encoder heard what nobody had sent then, or an older response was
+/// taken for one of the ten.
+#[test]
+fn hostile_resets() {
+    let mut ends = Ends::default();
+    runs("resets", |seed| {
+        let mut bench = bench(seed, MILD);
+        bench.moves = false;
+        bench.device.set_position(Abs::truncate(5), Abm::truncate(7));
+        let mut reset = match seed % 8 {
+            0 | 1 => Reset::set_single_turn_zero_and_shift_commutation_angle(),
+            _ => Reset::clear_turns_and_lose_multi_turn_reference(),
+        };
+        for _ in 0..2 {
+            let before = bench.device.effects();
+            let end = bench.run(&mut reset);
+            let effects = bench.device.effects() - before;
+            if bench.forged_requests > 0 {
+                return bench;
+            }
+            ends.count(&end);
+            if end.is_err() || bench.misheard == 0 && bench.seen.forged + bench.seen.undetected == 0 {
+                done_once_at_most(&end, effects, seed);
+            }
+            assert!(effects <= 1, "seed {seed}");
+        }
+        bench
+    });
+    ends.print("resets");
+}
+
+/// Errors may be cleared as often as one likes: they are gone when it is done, position and turns are not.
+#[test]
+fn hostile_error_resets() {
+    runs("error resets", |seed| {
+        let mut bench = bench(seed, MILD);
+        bench.moves = false;
+        bench.device.set_position(Abs::truncate(5), Abm::truncate(7));
+        bench.device.raise_alarms(Almc::CE);
+        bench.device.end_alarms(Almc::CE);
+        let mut reset = Reset::clear_errors();
+        let end = bench.run(&mut reset);
+        if end.is_ok() && bench.misheard == 0 && bench.seen.forged + bench.seen.undetected == 0 {
+            assert!(bench.device.almc().is_empty() && bench.device.effects() > 0, "seed {seed}");
+        }
+        assert!(bench.forged_requests > 0 || (bench.device.abs().get(), bench.device.abm().get()) == (5, 7));
+        bench
+    });
+}
+
+/// An access of which each repetition is looked at.
+struct Watched {
+    access: EepromAccess,
+    /// What each cell was said to hold since it was last written to; `None` if nothing was said.
+    held: BTreeMap<u8, Option<u8>>,
+    seed: u64,
+}
+
+impl Watched {
+    /// A write, to the page register too, is sent again only after the cell was read, was not busy, and held something else.
+    fn send(&mut self, request: Request) {
+        let [0x32, address, data, _] = *request.emit().as_bytes() else { return };
+        let held = self.held.insert(address, None);
+        let evidence = held.is_none_or(|held| held.is_some_and(|held| held != data));
+        assert!(evidence, "seed {}: {request} is sent again", self.seed);
+    }
+
+    fn heard(&mut self, response: Response) {
+        // With the busy flag the address is another one.
+        if let [0xea, address, holds, _] = *response.emit().as_bytes() {
+            self.held.entry(address).and_modify(|held| *held = Some(holds));
+        }
+    }
+}
+
+impl Procedure for Watched {
+    type Request = Request;
+    type Response = Response;
+    type Value = u8;
+    type Error = Error;
+
+    fn start(&mut self, now_ns: u64) -> Step<u8> {
+        let step = self.access.start(now_ns);
+        assert!(matches!(step, Step::Send { .. }), "an access begins with a request");
+        step
+    }
+
+    fn receive(&mut self, outcome: Result<Response, Error>, ready_ns: u64) -> Step<u8> {
+        if let Ok(response) = outcome {
+            self.heard(response);
+        }
+        let step = self.access.receive(outcome, ready_ns);
+        if let Step::Send { request, .. } = step {
+            self.send(request);
+        }
+        step
+    }
+}
+
+/// Law 5 for the EEPROM: a byte is written once at the most, to the page that was named and to no other, and the end says
+/// what is there.
+#[test]
+fn hostile_eeprom_writes() {
+    let mut ends = Ends::default();
+    runs("EEPROM writes", |seed| {
+        let mut bench = bench(seed, MILD);
+        let (page, cell, data) = (seed as usize % 8, seed as usize % 127, 0x40 + seed as u8 % 64);
+        let address = Address::truncate(cell as u8);
+        if seed % 3 == 0 {
+            // The memory is busy: a byte that stays as it is was written before.
+            let at_ns = bench.ready_ns;
+            let _ = bench.exchange(Request::write_eeprom(Address::truncate(126 - cell as u8), 0xff), at_ns);
+        }
+        let access = EepromAccess::write(Page::truncate(page as u8), address, data, EEPROM_POLLING);
+        let end = bench.run(&mut Watched { access, held: BTreeMap::new(), seed });
+        if bench.forged_requests > 0 {
+            return bench;
+        }
+        let written: Vec<_> = bench
+            .device
+            .eeprom_mut()
+            .iter()
+            .enumerate()
+            .flat_map(|(page, cells)| cells.iter().enumerate().map(move |(at, byte)| (page, at, *byte)))
+            .filter(|(.., byte)| *byte != 0xff)
+            .collect();
+        match end {
+            Ok(value) => assert_eq!((value, written), (data, vec![(page, cell, data)]), "seed {seed}"),
+            Err(Error::EffectUnknown { .. }) => assert!(written.len() <= 1, "seed {seed}: {written:?}"),
+            Err(error) => assert_eq!(written, [], "seed {seed}: {error}"),
+        }
+        ends.count(&end);
+        bench
+    });
+    assert!(ends.not_done > 0, "{ends:?}");
+    ends.print("EEPROM writes");
+}
+
+proptest! {
+    /// Few faults at any places: what fails is cut down to the fewest.
+    #[test]
+    fn few_faults(scenario in scenarios(12, 4), behaviour in 0..Behaviour::NUMBERED, fast: bool, hint: bool) {
+        let rate = if fast { BitRate::Mbit5 } else { BitRate::Mbit2_5 };
+        let mut bench = Bench::new(scenario, rate, Behaviour::numbered(behaviour), hint);
+        for k in 0..6 {
+            let at_ns = bench.ready_ns;
+            let _ = bench.exchange(READS[k % 4], at_ns);
+        }
+    }
+}
