@@ -49,7 +49,7 @@ struct Rates {
 ///
 /// Pr7.29 to Pr7.31 of the drive must be 0: otherwise it sends other values in these places.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct Sample {
     position: i32,
     rates: Option<Rates>,
@@ -104,7 +104,7 @@ servowire_core::one_line!(Sample {
 /// # Ok::<(), rtex_block::Error>(())
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct Evidence {
     sample: Option<Sample>,
     status: StatusFlags,

@@ -31,6 +31,7 @@ pub(crate) struct Sent {
 
 impl<'a, D: Direction, C: Clock> Sending<'a, D, C> {
     /// Switches the driver on.
+    #[inline]
     pub(crate) fn begin(
         switch: &'a mut Switch<D>,
         clock: &'a mut C,
@@ -46,6 +47,7 @@ impl<'a, D: Direction, C: Clock> Sending<'a, D, C> {
     }
 
     /// When the first field may be handed over; at once if the hardware switches.
+    #[inline]
     pub(crate) fn lead_until_ns(&mut self, lead_ns: u32) -> Result<Option<u64>, ClockError> {
         let Some(Worst { clock_ns, .. }) = self.switch.worst() else { return Ok(None) };
         let now_ns = self.line.now_ns(self.clock)?;
@@ -61,6 +63,7 @@ impl<'a, D: Direction, C: Clock> Sending<'a, D, C> {
     }
 
     /// A `write` is about to take them; now.
+    #[inline]
     pub(crate) fn ask(&mut self, fields: &[u8]) -> Result<u64, ClockError> {
         let now_ns = self.line.now_ns(self.clock)?;
         self.asked = fields.len();
@@ -68,6 +71,7 @@ impl<'a, D: Direction, C: Clock> Sending<'a, D, C> {
     }
 
     /// It was asked at `before_ns` and has taken so many.
+    #[inline]
     pub(crate) fn taken(&mut self, fields: usize, before_ns: u64) -> Result<(), ClockError> {
         let after_ns = self.line.now_ns(self.clock)?;
         self.asked = 0;
@@ -84,16 +88,19 @@ impl<'a, D: Direction, C: Clock> Sending<'a, D, C> {
     }
 
     /// When the driver is to go off.
+    #[inline]
     pub(crate) fn off_ns(&self) -> Option<u64> {
         self.leaving.and_then(|leaving| leaving.off_ns())
     }
 
     /// The request has left: switches the driver off, and tells whether that went well; if not, it is tried once more.
+    #[inline]
     pub(crate) fn end(mut self) -> Result<Result<Sent, ClockError>, D::Error> {
         self.switch.off()?;
         Ok(self.sent())
     }
 
+    #[inline]
     fn sent(&mut self) -> Result<Sent, ClockError> {
         let now_ns = self.line.now_ns(self.clock)?;
         self.line.sent(now_ns);
@@ -103,6 +110,7 @@ impl<'a, D: Direction, C: Clock> Sending<'a, D, C> {
 }
 
 impl<D: Direction, C: Clock> Drop for Sending<'_, D, C> {
+    #[inline]
     fn drop(&mut self) {
         if !self.switch.is_on() {
             return;

@@ -46,7 +46,7 @@ servowire_core::errors! {
             /// Steps, as asked for.
             steps: u32,
             /// The least that is enough.
-            needed: u32,
+            needed: u64,
         },
     }
 }

@@ -67,9 +67,10 @@ impl Clock {
         moment.saturating_add(1 << shift.saturating_sub(1)) >> shift
     }
 
-    /// The moment at which a tick begins.
+    /// The moment at which a tick begins; the last one there is for a tick beyond it.
     pub(super) const fn moment(self, tick: u64) -> u64 {
-        tick << self.shift()
+        let shift = self.shift();
+        if tick > u64::MAX >> shift { u64::MAX } else { tick << shift }
     }
 }
 
@@ -119,8 +120,8 @@ pub struct Limits {
 impl Limits {
     /// The greatest acceleration, in steps/s²: 2^31 - 1.
     pub const MAX_ACCELERATION: u32 = (1 << 31) - 1;
-    /// The greatest jerk, in steps/s³: 2^34 - 1.
-    pub const MAX_JERK: u64 = (1 << 34) - 1;
+    /// The greatest jerk, in steps/s³: 2^44 - 1.
+    pub const MAX_JERK: u64 = (1 << 44) - 1;
 
     /// `speed` in steps/s, `acceleration` in steps/s², each at least 1. Without a jerk limit a move is a trapezoid.
     ///
@@ -259,6 +260,12 @@ impl Bounds {
         self
     }
 
+    /// The higher of both in each; no limit is the highest.
+    pub(super) fn or_higher(self, other: &Self) -> Self {
+        let jerk = self.jerk.zip(other.jerk).map(|(own, other)| own.j.max(other.j));
+        Self::new(self.v.max(other.v), self.a.max(other.a), jerk)
+    }
+
     /// With a lower speed.
     pub(super) fn slower(self, v: Real) -> Self {
         Self { v: self.v.min(v), ..self }
@@ -277,8 +284,8 @@ mod tests {
         assert_eq!(Limits::new(1, 1 << 31), Err(OutOfRange { got: 1 << 31, max: (1 << 31) - 1 }));
         let limits = Limits::new(u32::MAX, (1 << 31) - 1).unwrap();
         assert_eq!(limits.with_jerk(0), Err(OutOfRange { got: 0, max: 1 }));
-        assert_eq!(limits.with_jerk(1 << 34), Err(OutOfRange { got: 1 << 34, max: (1 << 34) - 1 }));
-        let jerky = limits.with_jerk((1 << 34) - 1).unwrap();
+        assert_eq!(limits.with_jerk(1 << 44), Err(OutOfRange { got: 1 << 44, max: (1 << 44) - 1 }));
+        let jerky = limits.with_jerk((1 << 44) - 1).unwrap();
         assert_eq!(jerky.without_jerk(), limits);
         assert!(limits.with_speed(0).is_err());
         assert_eq!(limits.with_speed(7).unwrap().speed(), 7);

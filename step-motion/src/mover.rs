@@ -1,8 +1,9 @@
 //! An axis that can be told something else at any time.
 
+use crate::cutter::{Cutter, Demand, Stretch};
 use crate::error::Error;
 use crate::limits::{Bounds, Clock, Limits};
-use crate::phases::{Frame, P, Phases};
+use crate::phases::{Frame, P, Phases, steps};
 use crate::plan::{Setpoint, checked};
 use crate::planner::{Goal, Motion, plan};
 use crate::real::Real;
@@ -61,6 +62,7 @@ pub struct Mover {
     bounds: Bounds,
     phases: Phases,
     stepper: Stepper,
+    cutter: Cutter,
     direction: Direction,
     /// Position of the motor where the position of the plan is 0.
     origin: i64,
@@ -75,8 +77,15 @@ pub struct Mover {
     soft: Option<(i64, i64)>,
     /// Ticks of rest before the direction changes.
     pause: u32,
-    /// A stop with limits of its own is under way.
-    quick: bool,
+    /// Tick at which DIR changes for the next step, and from which on it may.
+    turn: Option<u64>,
+    idle: u64,
+    /// DIR of the last step; `None` if DIR may have changed since.
+    dir: Option<Direction>,
+    /// What is under way is a stop.
+    braking: bool,
+    /// What a quick stop that is under way may use, until the axis is at rest.
+    quick: Option<Bounds>,
     halted: bool,
 }
 
@@ -92,6 +101,7 @@ impl Mover {
             bounds: checked(clock, limits)?,
             phases: Phases::rest(clock.shift(), 0, 0),
             stepper: Stepper::new(),
+            cutter: Cutter::new(),
             direction: Direction::Forward,
             origin: 0,
             commanded: 0,
@@ -102,13 +112,17 @@ impl Mover {
             percent: 100,
             soft: None,
             pause: 0,
-            quick: false,
+            turn: None,
+            idle: 0,
+            dir: Some(Direction::Forward),
+            braking: false,
+            quick: None,
             halted: false,
         })
     }
 
-    /// With a rest before each change of direction, in ticks: what the driver and the mechanics need between DIR and
-    /// STEP.
+    /// With a rest before each change of direction, in ticks: what the driver and the mechanics need between a step and DIR, and
+    /// between DIR and the next step. It is kept after a [`halt`](Self::halt) too.
     pub const fn with_reversal_pause(self, ticks: u32) -> Self {
         Self { pause: ticks, ..self }
     }
@@ -130,6 +144,7 @@ impl Mover {
         let pulse = Pulse { tick, direction: self.direction };
         self.commanded = self.direction.advance(self.commanded);
         self.free = tick.saturating_add(1);
+        (self.turn, self.dir) = (None, Some(self.direction));
         let Phases { curve, frame } = &self.phases;
         self.due = self.stepper.next(curve, frame).map(|due| due.max(self.free));
         if self.due.is_none() {
@@ -148,6 +163,13 @@ impl Mover {
     /// DIR of the next step, or of the last one at rest.
     pub const fn direction(&self) -> Direction {
         self.direction
+    }
+
+    /// The tick at which DIR is to be switched to [`direction`](Self::direction) for the next step: in the middle of the rest
+    /// between the steps on either side, so that the driver has half of it before the edge and half of it after. `None` if DIR
+    /// does not change before the next step.
+    pub const fn turn(&self) -> Option<u64> {
+        self.turn
     }
 
     /// Position, speed, acceleration and jerk at a tick that is not before the last step.
@@ -199,50 +221,47 @@ impl Mover {
     /// Feed override, in percent of the greatest speed (or of that of [`run`](Self::run)); more than 100 is 100. 0 holds.
     pub fn set_override(&mut self, percent: u16, now: u64) {
         self.percent = percent.min(100);
-        if !self.quick {
-            self.replan(self.clock.moment(now));
-        }
+        self.change(now);
     }
 
     /// Feed hold: slows down to rest and keeps the aim.
     pub fn hold(&mut self, now: u64) {
         self.held = true;
-        if !self.quick {
-            self.replan(self.clock.moment(now));
-        }
+        self.change(now);
     }
 
     /// Goes on after a [`hold`](Self::hold), also while it still slows down.
     pub fn resume(&mut self, now: u64) {
         self.held = false;
-        if !self.quick {
-            self.replan(self.clock.moment(now));
-        }
+        self.change(now);
     }
 
     /// Slows down to rest and forgets the aim.
     pub fn stop(&mut self, now: u64) {
         self.aim = Aim::Rest;
-        if !self.quick {
-            self.replan(self.clock.moment(now));
-        }
+        self.change(now);
     }
 
     /// Slows down to rest within other limits, higher ones for a limit switch, and forgets the aim. Until it is at rest, moves
-    /// are refused. An acceleration that it has already is kept where the limits are below that, and so is the jerk that it takes
-    /// to end it at rest.
+    /// are refused. Where its own limits, or those of a quick stop under way, are higher, those are used: no stop is longer for
+    /// being a quick one.
     pub fn quick_stop(&mut self, limits: Limits, now: u64) {
         self.aim = Aim::Rest;
-        let bounds = limits.bounds(self.clock);
-        self.replan_within(self.clock.moment(now), &bounds);
-        self.quick = true;
+        let moment = self.moment(now);
+        if self.is_moving(moment) {
+            let bounds = limits.bounds(self.clock).or_higher(self.quick.as_ref().unwrap_or(&self.bounds));
+            self.quick = Some(bounds);
+            self.replan_within(moment, &bounds);
+        } else {
+            self.change(now);
+        }
     }
 
     /// No further step. The position is that of the steps made; a motor at speed runs on and loses it.
     pub fn halt(&mut self, now: u64) {
         let moment = self.clock.moment(now.max(self.free));
         self.halted = !self.is_at_rest(now);
-        (self.aim, self.held, self.quick, self.due) = (Aim::Rest, false, false, None);
+        (self.aim, self.held, self.quick, self.due, self.turn) = (Aim::Rest, false, None, None, None);
         self.rest(moment);
     }
 
@@ -278,30 +297,105 @@ impl Mover {
         self.limits
     }
 
+    /// The next steps as a stretch, if they begin before a tick; in place of [`pulse`](Self::pulse).
+    pub(super) fn cut(&mut self, demand: &Demand, until: u64) -> Cut {
+        if self.due.is_none() {
+            return Cut::Rest;
+        }
+        let (Phases { curve, frame }, mut cutter) = (&self.phases, self.cutter);
+        let Some(stretch) = cutter.next(curve, frame, demand) else {
+            self.due = None;
+            self.go_on();
+            return Cut::Rest;
+        };
+        let first = tick(stretch.first);
+        if first >= until {
+            self.due = Some(first.max(self.free));
+            return Cut::Later;
+        }
+        let (endless, all) = (frame.endless, steps(frame.last(curve)));
+        let (direction, count) = (self.direction, i64::from(stretch.count));
+        self.commanded = self.commanded.saturating_add(if direction.dir() { count.wrapping_neg() } else { count });
+        self.cutter = cutter;
+        let last = tick(stretch.last()).max(self.free);
+        self.free = last.saturating_add(1);
+        (self.turn, self.dir) = (None, Some(direction));
+        self.due = Some(self.free);
+        if !endless && cutter.count() >= all {
+            self.due = None;
+            self.go_on();
+        } else if endless && cutter.count() >= 1 << 30 {
+            self.replan(self.clock.moment(last));
+        }
+        Cut::Steps(stretch, direction)
+    }
+
+    /// The tick at which the plan under way ends; the greatest for one without end.
+    pub(super) fn over(&self) -> u64 {
+        if self.phases.frame.endless { u64::MAX } else { self.phases.end().div_ceil(self.clock.moment(1)) }
+    }
+
+    /// At rest at a position since a tick, after a stop that nobody asked for: it goes on from there.
+    pub(super) fn rest_at(&mut self, position: i64, now: u64) {
+        (self.commanded, self.due, self.quick) = (position, None, None);
+        self.free = now.saturating_add(1);
+        self.rest(self.clock.moment(now));
+        if self.has_work() {
+            self.replan(self.clock.moment(now));
+        }
+    }
+
+    /// Halted at a position, DIR not known.
+    pub(super) fn halt_at(&mut self, position: i64, now: u64, was_moving: bool) {
+        self.halt(now);
+        (self.commanded, self.halted, self.dir) = (position, was_moving, None);
+        self.rest(self.phases.end());
+    }
+
     fn ready(&mut self, now: u64) -> Result<(), Error> {
-        if self.quick && !self.is_at_rest(now) {
+        if self.quick.is_some() && !self.is_at_rest(now) {
             return Err(Error::Moving);
         }
-        self.quick = false;
+        self.quick = None;
         Ok(())
+    }
+
+    /// The moment of a request. An axis that moves is somewhere between its last step and the next one, whatever the caller's
+    /// clock says: an earlier or later time would plan steps that are over, or make those that are missing in a burst.
+    fn moment(&self, now: u64) -> u64 {
+        let now = now.max(self.free.saturating_sub(1));
+        self.clock.moment(self.due.map_or(now, |due| now.min(due)))
+    }
+
+    /// A request that changes what is under way, unless that is a quick stop.
+    fn change(&mut self, now: u64) {
+        let moment = self.moment(now);
+        // A stop that is under way is the same one whoever asks for it.
+        let same = self.braking && self.goal(self.direction, &self.bounds).is_none();
+        if !self.is_moving(moment) || self.quick.is_none() && !same {
+            self.replan(moment);
+        }
+    }
+
+    fn is_moving(&self, moment: u64) -> bool {
+        self.phases.frame.endless || moment < self.phases.end()
     }
 
     fn aim_at(&mut self, aim: Aim, now: u64) {
         (self.aim, self.halted) = (aim, false);
-        self.replan(self.clock.moment(now));
+        self.replan(self.moment(now));
     }
 
     /// At rest, the position of the plan is 0 where the motor is.
     fn rest(&mut self, moment: u64) {
         self.origin = self.commanded;
         self.phases = Phases::rest(self.clock.shift(), moment, 0);
-        self.stepper = Stepper::new();
+        (self.stepper, self.cutter) = (Stepper::new(), Cutter::new());
     }
 
     /// A plan is over: on to the aim if that is somewhere else.
     fn go_on(&mut self) {
         let end = self.phases.end();
-        self.quick = false;
         if self.has_work() {
             self.replan(end);
         }
@@ -325,8 +419,7 @@ impl Mover {
     /// From the state at a moment to the aim.
     fn replan_within(&mut self, moment: u64, bounds: &Bounds) {
         let moment = moment.max(self.phases.frame.begin);
-        let moving = self.phases.frame.endless || moment < self.phases.end();
-        let next = if moving { self.onward(moment, bounds) } else { self.anew(moment, bounds) };
+        let next = if self.is_moving(moment) { self.onward(moment, bounds) } else { self.anew(moment, bounds) };
         self.adopt(next);
         if self.due.is_none() && self.has_work() {
             // No step on the way to rest: what follows begins there.
@@ -336,18 +429,22 @@ impl Mover {
     }
 
     fn adopt(&mut self, next: Option<Phases>) {
-        self.due = None;
+        (self.due, self.turn) = (None, None);
         if let Some(phases) = next {
             self.origin = self.commanded;
-            self.stepper = Stepper::new();
+            (self.stepper, self.cutter) = (Stepper::new(), Cutter::new());
             let begin = phases.frame.begin.div_ceil(self.clock.moment(1));
             self.due = self.stepper.next(&phases.curve, &phases.frame).map(|due| due.max(self.free).max(begin));
+            if self.dir != Some(self.direction) {
+                self.turn = self.due.map(|due| self.idle.max(self.free.saturating_sub(1)).midpoint(due));
+                self.dir = None;
+            }
             self.phases = phases;
         }
     }
 
     /// The plan of an axis in motion. Its positions count from the steps made.
-    fn onward(&self, moment: u64, bounds: &Bounds) -> Option<Phases> {
+    fn onward(&mut self, moment: u64, bounds: &Bounds) -> Option<Phases> {
         let state = self.phases.at(moment);
         let made = self.commanded.abs_diff(self.origin);
         let p = state.p.wrapping_sub(i64::try_from(made).unwrap_or(0) << 32);
@@ -367,11 +464,17 @@ impl Mover {
                 plan(start, Goal::Speed(v), &bounds).ok()
             }
         });
+        let again = core::mem::replace(&mut self.braking, curve.is_none());
         if let Some(curve) = curve {
             return Some(Phases { curve, frame });
         }
         (frame.to, frame.endless) = (None, false);
         let curve = plan(start, Goal::Speed(Real::ZERO), bounds).ok()?;
+        if again {
+            // Rounding makes no step more of a stop within higher limits.
+            let made = i64::try_from(made).unwrap_or(0) << 32;
+            frame.to = Some(frame.last(&curve).min(self.phases.last().saturating_sub(made)));
+        }
         Some(Phases { curve, frame })
     }
 
@@ -380,18 +483,25 @@ impl Mover {
         let end = self.phases.end();
         self.rest(end);
         let mut begin = moment.max(end);
+        if let Some(last) = self.free.checked_sub(1) {
+            // The axis has come to rest up to half a step behind that step, and begins at it.
+            let half = (Real::ONE.half() / bounds.v).to_fixed(0);
+            begin = begin.max(self.clock.moment(last).saturating_add(half));
+        }
+        self.braking = false;
         if !self.has_work() {
             return None;
         }
+        self.idle = begin.div_ceil(self.clock.moment(1));
         let direction = match self.aim {
             Aim::At(target) if target < self.commanded => Direction::Reverse,
             Aim::Run(direction, _) => direction,
             _ => Direction::Forward,
         };
-        if direction != self.direction {
+        if self.dir != Some(direction) {
             begin = begin.saturating_add(self.clock.moment(self.pause.into()));
-            self.direction = direction;
         }
+        self.direction = direction;
         let mut frame = Frame { to: None, ..Frame::rest(self.clock.shift(), self.clock.aligned(begin), 0) };
         let start = Motion::steady(Real::ZERO);
         let curve = self.goal(direction, bounds).and_then(|(goal, bounds)| match goal {
@@ -428,6 +538,21 @@ impl Mover {
             }
         }
     }
+}
+
+/// What [`Mover::cut`] gives.
+pub(super) enum Cut {
+    /// Steps, and which way.
+    Steps(Stretch, Direction),
+    /// The next step is later.
+    Later,
+    /// There is no step to come.
+    Rest,
+}
+
+/// The tick into which a time in 2^-32 ticks falls.
+pub(super) fn tick(time: i128) -> u64 {
+    u64::try_from(time.saturating_add(1 << 31) >> 32).unwrap_or(0)
 }
 
 /// Where a plan leads.

@@ -287,11 +287,15 @@ impl<const N: usize, const M: usize> Path<N, M> {
     }
 
     /// The position in whole steps at a place on line `at`, if the first line begins at `from`.
-    pub(super) fn place(&self, (at, place): (usize, Real), from: [i64; N]) -> [i64; N] {
+    /// `made`: the steps made on the first line; there is no way back to before them.
+    pub(super) fn place(&self, (at, place): (usize, Real), from: [i64; N], made: [u32; N]) -> [i64; N] {
         let mut to = from;
         for i in 0..=at {
             let Some(line) = self.line(i) else { break };
-            let ends = if i == at { line.steps_at(place) } else { line.ends };
+            let mut ends = if i == at { line.steps_at(place) } else { line.ends };
+            if i == 0 {
+                ends = at_least(ends, made);
+            }
             for ((to, end), steps) in to.iter_mut().zip(ends).zip(line.steps) {
                 let way = i64::from(end);
                 *to = to.saturating_add(if steps < 0 { way.wrapping_neg() } else { way });
@@ -301,8 +305,8 @@ impl<const N: usize, const M: usize> Path<N, M> {
     }
 
     /// The queue as far as a place on line `at`, if the first line begins at `from` and a stop leaves it at `exit`.
-    pub(super) fn cut(&mut self, (at, place): (usize, Real), from: [i64; N], exit: Real) {
-        self.target = self.place((at, place), from);
+    pub(super) fn cut(&mut self, (at, place): (usize, Real), from: [i64; N], made: [u32; N], exit: Real) {
+        self.target = self.place((at, place), from, made);
         let mut speed = exit;
         for i in 0..self.len {
             let exit =
@@ -312,6 +316,9 @@ impl<const N: usize, const M: usize> Path<N, M> {
                 Some(Some(line)) if i < at => line.leave = line.leave.or(Some(exit)),
                 Some(Some(line)) if i == at => {
                     line.ends = line.steps_at(place);
+                    if i == 0 {
+                        line.ends = at_least(line.ends, made);
+                    }
                     (line.length, line.cut) = (place.min(line.length), true);
                 }
                 Some(entry) => *entry = None,
@@ -421,4 +428,12 @@ impl<const N: usize, const M: usize> Path<N, M> {
         let s = open.half().sqrt();
         (a * self.deviation * s * (one + s) / shut.half()).sqrt()
     }
+}
+
+/// A step falls into the nearest tick, so it may have been made before the place where it belongs.
+fn at_least<const N: usize>(mut ends: [u32; N], made: [u32; N]) -> [u32; N] {
+    for (end, made) in ends.iter_mut().zip(made) {
+        *end = made.max(*end);
+    }
+    ends
 }

@@ -208,7 +208,7 @@ impl<const N: usize, const M: usize> PathMover<N, M> {
     /// from there. Both leave the path as it was.
     pub fn move_to(&mut self, target: [i64; N], feed: u32, now: u64) -> Result<(), Error> {
         let end = self.end_of_stop(now);
-        let from = end.map_or(self.commanded, |(end, _)| self.path.place(end, self.begun()));
+        let from = end.map_or(self.commanded, |(end, _)| self.path.place(end, self.begun(), self.made));
         Path::<N, M>::steps(from, target)?;
         if end.is_some_and(|((at, _), _)| at.saturating_add(1) >= M) || M == 0 {
             return Err(Error::QueueFull);
@@ -236,6 +236,14 @@ impl<const N: usize, const M: usize> PathMover<N, M> {
         (!brakes).then(|| Real::new(self.percent.into()) / Real::new(100))
     }
 
+    /// The tick of a request. Machines that move are somewhere between their last step and the next one, whatever the caller's
+    /// clock says.
+    fn tick(&self, now: u64) -> u64 {
+        let last = self.free.iter().copied().max().unwrap_or(0).saturating_sub(1);
+        let now = now.max(last);
+        self.due().map_or(now, |due| now.min(due))
+    }
+
     /// Where the first line begins, in steps.
     fn begun(&self) -> [i64; N] {
         let mut from = self.commanded;
@@ -258,7 +266,7 @@ impl<const N: usize, const M: usize> PathMover<N, M> {
     /// The motion from which a new plan starts; `None` if the plan that there is ends before it, at the end of the line.
     fn here(&self, now: u64) -> Option<(Motion, Start<N>)> {
         let line = self.line.as_ref()?;
-        let moment = self.clock().moment(now);
+        let moment = self.clock().moment(self.tick(now));
         let start = Start { made: self.made, ..line.start };
         if moment >= line.over() {
             let place = start.place + line.curve.way();
@@ -292,7 +300,7 @@ impl<const N: usize, const M: usize> PathMover<N, M> {
 
     /// Leaves the path at a place, and the first line at a speed.
     fn cut(&mut self, (end, exit): ((usize, Real), Real), now: u64) {
-        self.path.cut(end, self.begun(), exit);
+        self.path.cut(end, self.begun(), self.made, exit);
         if !self.stopping {
             self.stopping = true;
             self.plan(now);

@@ -218,5 +218,5 @@ pub(super) fn position(steps: u32) -> Result<i64, Error> {
 
 pub(super) fn too_short(steps: u32, need: Real) -> Error {
     let whole = (need - Real::fixed(1, 16)).to_fixed(0).saturating_add(1);
-    Error::TooShort { steps, needed: u32::try_from(whole).unwrap_or(u32::MAX) }
+    Error::TooShort { steps, needed: whole }
 }

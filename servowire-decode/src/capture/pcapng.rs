@@ -11,6 +11,7 @@ use pcap_file::{DataLink, PcapError};
 
 use super::input::Input;
 use crate::fault::{At, Fault};
+use crate::time::Time;
 
 /// What a pcapng file begins with.
 pub(super) const MAGIC: &[u8] = b"\x0a\x0d\x0d\x0a";
@@ -39,7 +40,7 @@ enum Reader {
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Packet {
     /// When, in picoseconds.
-    pub time: i64,
+    pub time: Time,
     /// Link type of its interface.
     pub link: DataLink,
     /// To the capturing side (`Some(true)`) or from it, where the file says so.
@@ -110,7 +111,8 @@ impl Pcapng {
             Some(Ok(packet)) => packet.into_owned(),
         };
         self.packets += 1;
-        let time = packet.timestamp.as_nanos().checked_mul(1000).and_then(|time| i64::try_from(time).ok());
+        let time =
+            packet.timestamp.as_nanos().checked_mul(1000).and_then(|time| i128::try_from(time).ok().map(Time::from_ps));
         let time = time.ok_or_else(|| self.fault("its time cannot be"))?;
         Ok(Some(Packet { time, link, inbound: None, bytes: packet.data.into_owned() }))
     }
@@ -120,7 +122,7 @@ impl Pcapng {
     }
 }
 
-fn picoseconds(units: u128, interface: &InterfaceDescriptionBlock<'_>) -> Option<i64> {
+fn picoseconds(units: u128, interface: &InterfaceDescriptionBlock<'_>) -> Option<Time> {
     let resolution = interface.options.iter().find_map(|option| match option {
         InterfaceDescriptionOption::IfTsResol(resolution) => Some(*resolution),
         _ => None,
@@ -130,7 +132,7 @@ fn picoseconds(units: u128, interface: &InterfaceDescriptionBlock<'_>) -> Option
     let second = 1_000_000_000_000u128;
     let per_second =
         if resolution & 0x80 == 0 { 10u128.checked_pow(exponent)? } else { 1u128.checked_shl(exponent)? };
-    i64::try_from(units.checked_mul(second)?.checked_div(per_second)?).ok()
+    i128::try_from(units.checked_mul(second)?.checked_div(per_second)?).ok().map(Time::from_ps)
 }
 
 fn say(error: &PcapError) -> String {

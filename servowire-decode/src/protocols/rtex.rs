@@ -11,36 +11,32 @@ use rtex_block::inspect::{self, Cause, LogAnalysis, LogShape, Report, Trouble, i
 use rtex_block::{Error, Header};
 
 use crate::capture::hexlog::Burst;
-use crate::codec::{Codec, LogDecoder, Names};
-use crate::event::{Direction, Event, Field, Place, Position, Refusal, Value, Verdict};
+use crate::codec::{Codec, Facts, LogDecoder};
+use crate::event::{Direction, Event, Field, Place, Position, Refusal, Span, Value, Verdict};
 use crate::settings::{self, Settings};
 use crate::sink::Sink;
+use crate::time::Time;
 
 /// RTEX in the table.
 pub(super) struct Rtex;
 
 impl Codec for Rtex {
-    fn names(&self) -> &'static Names {
-        &Names {
-            name: "rtex",
-            title: "RTEX",
-            about: "Panasonic RTEX data blocks, from logs of bytes",
-            needs: "RTEX blocks are read from logs of bytes: hex digits with --bytes, binary with --record-size",
+    fn facts(&self) -> &'static Facts {
+        const {
+            &Facts {
+                name: "rtex",
+                title: "RTEX",
+                about: "Panasonic RTEX data blocks, from logs of bytes",
+                needs: "RTEX blocks are read from logs of bytes: hex digits with --bytes, binary with --record-size",
+                // A block has no check sum, and a log no levels for a VCD of fields.
+                checked: false,
+                ..Facts::NONE
+            }
         }
-    }
-
-    /// A log of blocks has no levels, so there is no VCD to hold its fields.
-    fn fields(&self) -> &'static [&'static str] {
-        &[]
     }
 
     fn log(&self, settings: &Settings, sample: &[Burst]) -> Option<Box<dyn LogDecoder>> {
         Some(Box::new(Decoder::new(settings.rtex, sample)))
-    }
-
-    /// A block has no check sum.
-    fn is_checked(&self) -> bool {
-        false
     }
 }
 
@@ -151,7 +147,7 @@ impl Decoder {
         *last = counter;
         match self.settings.period_ns {
             Some(period_ns) => {
-                let start = *updates * i64::from(period_ns) * 1_000;
+                let start = Time::from_ps(i128::from(*updates) * i128::from(period_ns) * 1_000);
                 Place::Time { start, end: start }
             }
             None => Place::Line(burst.line),
@@ -181,7 +177,13 @@ impl Decoder {
         let (direction, word) = if header.response { (Direction::Answer, "rsp") } else { (Direction::Request, "cmd") };
         let kind = format!("{word} {}", header.mac_id);
         let position = self.position(&report);
-        Some(Event { position, ..Event::new(place, Some(direction), kind, fields, verdict(&report)) })
+        let event = Event::new(place, Some(direction), kind, fields, verdict(&report)).locate(|name| {
+            let flags = matches!(name, "Status_Flags" | "Control_Bits").then_some((2, 3));
+            let known = || report.fields().find(|field| field.name == name).map(|field| (field.first, field.last));
+            let (first, last) = flags.or_else(known)?;
+            Some(Span::even(place, 8 * block.len() as u32, 8 * u32::from(first), 8 * u32::from(last) + 7))
+        });
+        Some(Event { position, ..event })
     }
 
     /// The actual position, where only one drive is looked at: the figures are made for one axis.
@@ -341,7 +343,7 @@ fn is_flag(field: &inspect::Field) -> bool {
 fn flag_field(flags: &[inspect::Field], block: &[u8], name: &'static str) -> Field {
     let raw = block.get(2..4).map_or(0, |bytes| bytes.iter().rev().fold(0, |raw, &byte| raw << 8 | u64::from(byte)));
     let set = flags.iter().filter(|f| f.value == inspect::Value::Bit(true)).map(|f| f.name).collect();
-    Field { name, value: Value::Flags { raw, digits: 4, set } }
+    Field::new(name, Value::Flags { raw, digits: 4, set })
 }
 
 fn field(field: &inspect::Field) -> Field {

@@ -10,8 +10,8 @@ use sorte_proto::inspect::{During, Frame, inspect};
 use sorte_proto::{FrameType, Param, Status};
 
 use crate::capture::pcapng::Packet;
-use crate::codec::{Codec, Names};
-use crate::event::{Direction, Event, Field, Place, Refusal, Verdict};
+use crate::codec::{Codec, Facts};
+use crate::event::{Direction, Event, Field, Place, Refusal, Span, Verdict};
 
 /// The names of all fields.
 const FIELDS: &[&str] = &[
@@ -41,17 +41,17 @@ const BYTE: i64 = 80_000;
 pub(super) struct Sorte;
 
 impl Codec for Sorte {
-    fn names(&self) -> &'static Names {
-        &Names {
-            name: "sorte",
-            title: "SORTE",
-            about: "TI SORTE, from a network capture",
-            needs: "SORTE is decoded from a pcapng file",
+    fn facts(&self) -> &'static Facts {
+        const {
+            &Facts {
+                name: "sorte",
+                title: "SORTE",
+                about: "TI SORTE, from a network capture",
+                needs: "SORTE is decoded from a pcapng file",
+                fields: FIELDS,
+                ..Facts::NONE
+            }
         }
-    }
-
-    fn fields(&self) -> &'static [&'static str] {
-        FIELDS
     }
 
     fn packet(&self, packet: &Packet) -> Option<Event> {
@@ -73,9 +73,39 @@ fn event(packet: &Packet) -> Event {
         (DataLink::ETHERNET, Some(false)) => Some(Direction::Request),
         _ => None,
     };
-    let end = packet.time.saturating_add(BYTE.saturating_mul(packet.bytes.len() as i64));
+    let end = packet.time + BYTE.saturating_mul(packet.bytes.len() as i64);
     let place = Place::Time { start: packet.time, end };
-    Event::new(place, direction, kind, fields, verdict)
+    let event = Event::new(place, direction, kind, fields, verdict);
+    event.locate(|name| {
+        let (first, last) = bytes(report.frame()?, packet.bytes.len(), name)?;
+        Some(Span::even(place, 8 * packet.bytes.len() as u32, 8 * first as u32, 8 * last as u32 + 7))
+    })
+}
+
+/// The first and the last byte of a field, of `len` in all.
+fn bytes(frame: Frame<'_>, len: usize, name: &str) -> Option<(usize, usize)> {
+    Some(match (frame, name) {
+        (Frame::Master(_) | Frame::Device(_), "STATUS") => (1, 1),
+        (_, "STATUS") => (3, 3),
+        (Frame::Discovery(_), "devices") => (4, 5),
+        (Frame::Discovery(_), "in") => (6, 7),
+        (Frame::Discovery(_), "out") => (8, 9),
+        (Frame::Param(_), "cycle_time") | (Frame::Sync(_), "time stamp") => (4, 7),
+        (Frame::Param(_), "delay_burst") => (14, 14),
+        (Frame::Param(_), "ipg") => (20, 23),
+        (Frame::Param(_), "crc_mode") => (35, 35),
+        (Frame::Sync(_), "delay") => (8, 9),
+        // Behind the output data come CRC and time stamp, behind a payload its check.
+        (Frame::Master(_), "time stamp") => (len.checked_sub(2)?, len - 1),
+        (Frame::Master(_), "data") => (2, len.checked_sub(4)?),
+        (Frame::Device(_), "data") => (2, len.checked_sub(2)?),
+        (_, "data") => (4, len.checked_sub(5)?),
+        (Frame::Device(_), "SA") => (0, 0),
+        (_, name) => {
+            let at = 2 + 4 * PTO.iter().position(|pto| *pto == name)?;
+            (at, at + 1)
+        }
+    })
 }
 
 fn fields(frame: &Frame<'_>) -> Vec<Field> {

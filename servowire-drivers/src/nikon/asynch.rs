@@ -6,7 +6,7 @@ use servowire_core::run_async as run;
 
 use super::Frame;
 use crate::Timer;
-use crate::race::race;
+use crate::race::{self, race};
 
 /// What sends and receives frames.
 #[allow(async_fn_in_trait, reason = "drivers are used by one executor; Send is left to the implementation")]
@@ -33,13 +33,14 @@ driver!(awaited, Timer, async);
 /// The frame that comes until a time, or an error of the port.
 async fn take<F: FramePort>(
     port: &mut F,
-    _: &mut quiet::Line,
+    line: &mut quiet::Line,
     timer: &mut impl Timer,
     until_ns: u64,
-) -> Result<Option<Result<Frame, F::Error>>, ClockError> {
-    race(port.take(), timer.wait_until(until_ns)).await
+) -> Result<Heard<Result<Frame, F::Error>>, ClockError> {
+    let what = race(port.take(), sleep(line, timer, until_ns)).await?;
+    Ok(Heard { what, now_ns: line.now_ns(timer)? })
 }
 
-async fn sleep(_: &mut quiet::Line, timer: &mut impl Timer, until_ns: u64) -> Result<(), ClockError> {
-    timer.wait_until(until_ns).await
+async fn sleep(line: &mut quiet::Line, timer: &mut impl Timer, until_ns: u64) -> Result<(), ClockError> {
+    race::sleep(timer, |timer| line.now_ns(timer), until_ns).await
 }

@@ -27,12 +27,13 @@ pub trait FramePort {
 driver!(spun, Clock);
 
 /// The frame that comes until a time, or an error of the port.
+#[inline(always)]
 fn take<F: FramePort>(
     port: &mut F,
     line: &mut quiet::Line,
     clock: &mut impl Clock,
     until_ns: u64,
-) -> Result<Option<Result<Frame, F::Error>>, ClockError> {
+) -> Result<Heard<Result<Frame, F::Error>>, ClockError> {
     spin(line, clock, until_ns, || port.take().transpose())
 }
 

@@ -9,7 +9,7 @@ use embedded_io_async::{ErrorType, Read, Write};
 use servowire_core::run_async as run;
 
 use crate::Timer;
-use crate::race::race;
+use crate::race::{self, race};
 
 driver!(awaited, [Read, Write], Timer, async);
 
@@ -17,13 +17,14 @@ driver!(awaited, [Read, Write], Timer, async);
 async fn read<U: Read>(
     uart: &mut U,
     bytes: &mut [u8],
-    _: &mut quiet::Line,
+    line: &mut quiet::Line,
     timer: &mut impl Timer,
     until_ns: u64,
-) -> Result<Option<Result<usize, U::Error>>, ClockError> {
-    race(uart.read(bytes), timer.wait_until(until_ns)).await
+) -> Result<Heard<Result<usize, U::Error>>, ClockError> {
+    let what = race(uart.read(bytes), sleep(line, timer, until_ns)).await?;
+    Ok(Heard { what, now_ns: line.now_ns(timer)? })
 }
 
-async fn sleep(_: &mut quiet::Line, timer: &mut impl Timer, until_ns: u64) -> Result<(), ClockError> {
-    timer.wait_until(until_ns).await
+async fn sleep(line: &mut quiet::Line, timer: &mut impl Timer, until_ns: u64) -> Result<(), ClockError> {
+    race::sleep(timer, |timer| line.now_ns(timer), until_ns).await
 }

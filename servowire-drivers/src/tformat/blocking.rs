@@ -9,13 +9,14 @@ use crate::quiet::spin;
 driver!(spun, [Read, ReadReady, Write], Clock);
 
 /// What comes until a time, or an error of the UART.
+#[inline(always)]
 fn read<U: Read + ReadReady>(
     uart: &mut U,
     bytes: &mut [u8],
     line: &mut quiet::Line,
     clock: &mut impl Clock,
     until_ns: u64,
-) -> Result<Option<Result<usize, U::Error>>, ClockError> {
+) -> Result<Heard<Result<usize, U::Error>>, ClockError> {
     spin(line, clock, until_ns, || match uart.read_ready() {
         Ok(true) => Some(uart.read(bytes)),
         Ok(false) => None,

@@ -2,10 +2,8 @@
 
 macro_rules! driver {
     ($wait:ident, [$($uart:path),+], $clock:path $(, $asynch:tt)?) => {
-        use core::ops::ControlFlow;
-
         use servowire_core::{ClockError, Procedure};
-        use tformat::master::{Detection, EEPROM_POLLING, EepromAccess, Exchange, Line, Reset, Transaction};
+        use tformat::master::{Detection, EEPROM_POLLING, EepromAccess, Exchange, Line, Progress, Reset, Transaction};
         use tformat::{
             Address, AllData, BitRate, Doubt, Evidence, Page, Policy, Request, Resolution, Response, Sample, SingleTurn,
         };
@@ -13,7 +11,7 @@ macro_rules! driver {
         use super::tuning::{Tuned, Tuning};
         use super::{LOST, MAX_BYTES, Released, all_data, longest_ns, refused, silence_ns};
         use crate::direction::Switch;
-        use crate::quiet::{self, Settle};
+        use crate::quiet::{self, Heard, Settle};
         use crate::sending::Sending;
         use crate::{Direction, Error, PinTooSlow, exchange};
 
@@ -181,17 +179,23 @@ macro_rules! driver {
                 $wait!(self.settle())?;
                 let start_ns = $wait!(self.send(request))?;
                 let mut transaction = Transaction::start(request, self.line, start_ns);
-                let mut progress = transaction.progress();
-                let mut bytes = [0; MAX_BYTES];
+                let (mut progress, mut bytes) = (transaction.progress(), [0; MAX_BYTES]);
                 loop {
-                    let until_ns = match exchange::next(progress, &mut self.state, &mut self.clock)? {
-                        ControlFlow::Continue(until_ns) => until_ns,
-                        ControlFlow::Break(outcome) => return outcome.map_err(|error| refused(error, self.late_ns)),
+                    let until_ns = match progress {
+                        Progress::Pending { until_ns } => until_ns,
+                        Progress::Done { value, ready_ns } => {
+                            self.state.clean(ready_ns);
+                            return Ok(value);
+                        }
+                        Progress::Failed { error, ready_ns } => {
+                            let now_ns = self.state.now_ns(&mut self.clock)?;
+                            self.state.failed(ready_ns, now_ns);
+                            return Err(refused(error, self.late_ns));
+                        }
                     };
-                    let read =
-                        $wait!(read(&mut self.uart, &mut bytes, &mut self.state, &mut self.clock, until_ns))?;
-                    let now_ns = self.state.now_ns(&mut self.clock)?;
-                    progress = match read {
+                    let (uart, state, clock) = (&mut self.uart, &mut self.state, &mut self.clock);
+                    let Heard { what, now_ns } = $wait!(read(uart, &mut bytes, state, clock, until_ns))?;
+                    progress = match what {
                         Some(count) => {
                             let heard = bytes.get(..count.map_err(Error::Io)?).filter(|heard| !heard.is_empty());
                             transaction.hear(heard.ok_or(Error::Closed)?, now_ns)
@@ -207,12 +211,12 @@ macro_rules! driver {
                 let mut settling = self.state.settle(until_ns);
                 loop {
                     let (uart, state, clock) = (&mut self.uart, &mut self.state, &mut self.clock);
-                    let heard = $wait!(read(uart, &mut [0; MAX_BYTES], state, clock, until_ns))?;
-                    if matches!(heard, Some(Ok(0))) {
+                    let Heard { what, now_ns } =
+                        $wait!(read(uart, &mut [0; MAX_BYTES], state, clock, until_ns))?;
+                    if matches!(what, Some(Ok(0))) {
                         return Err(Error::Closed);
                     }
-                    let now_ns = state.now_ns(clock)?;
-                    match settling.next(heard.is_some(), now_ns) {
+                    match settling.next(what.is_some(), now_ns) {
                         Settle::Quiet => return Ok(()),
                         Settle::Never => return Err(Error::NeverQuiet),
                         Settle::Until(ns) => until_ns = ns,
@@ -229,7 +233,7 @@ macro_rules! driver {
                 if let Some(ns) = sending.lead_until_ns(line.driver_lead_ns)? {
                     $wait!(sleep(sending.line, sending.clock, ns))?;
                 }
-                sending.line.begin(longest_ns(&line, request));
+                sending.line.begin(longest_ns(&line, &frame));
                 let mut fields = frame.as_bytes();
                 while !fields.is_empty() {
                     let piece = sending.piece(fields);

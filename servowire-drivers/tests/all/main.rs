@@ -28,9 +28,11 @@ mod polls;
 mod refusals;
 #[cfg(all(feature = "tformat", feature = "nikon"))]
 mod sampler;
+mod second;
 
 #[cfg(all(feature = "tformat", feature = "nikon", feature = "rtex"))]
 mod clock;
+mod contract;
 #[cfg(feature = "tformat")]
 mod direction;
 #[cfg(all(feature = "nikon", feature = "async"))]

@@ -3,8 +3,10 @@
 #![allow(clippy::cast_sign_loss, clippy::indexing_slicing, clippy::panic, clippy::unwrap_used)]
 
 mod changes;
+mod laws;
 mod lines;
 mod paths;
 mod plans;
+mod queue;
 #[cfg(feature = "serde")]
 mod serde;

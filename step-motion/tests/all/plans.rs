@@ -152,7 +152,7 @@ proptest! {
         n in prop_oneof![0..300_u32, 0..20_000_u32],
         v in spread(1.0, 400_000.0),
         a in spread(1.0, 1e8),
-        j in prop_oneof![Just(0.0), spread(100.0, 1e10)],
+        j in prop_oneof![Just(0.0), spread(100.0, 1.7e13)],
         entry in prop_oneof![Just(0.0), 0.0..=1.0],
         exit in prop_oneof![Just(0.0), 0.0..=1.0],
         hz in prop_oneof![Just(1_000_000), Just(1_000_000_000), 1_000_000..(1_u32 << 30)],
@@ -223,6 +223,12 @@ fn what_cannot_be_done_is_refused_with_what_would_do() {
     assert_eq!(
         Plan::between(Clock::MICROSECONDS, jerky, 100, 0, 500).unwrap_err(),
         Error::TooShort { steps: 100, needed: 150 }
+    );
+    // 5·10^8 steps/s at 1 step/s²: (5·10^8)² / 2 steps to rest.
+    let slow = Limits::new(500_000_000, 1).unwrap();
+    assert_eq!(
+        Plan::between(Clock::NANOSECONDS, slow, 7, 500_000_000, 0).unwrap_err(),
+        Error::TooShort { steps: 7, needed: 125_000_000_000_000_000 }
     );
     let fast = limits.with_speed(500_001).unwrap();
     assert_eq!(
