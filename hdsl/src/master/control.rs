@@ -15,7 +15,7 @@ impl Master {
         if self.linked().is_none() {
             return Evidence::doubtful(Doubt::NoLink);
         }
-        let mut evidence = self.link.fast(self.number, self.sampled_ns());
+        let mut evidence = self.link.fast(self.number(), self.sampled_ns());
         evidence.sample.steps_per_turn = self.steps_per_turn;
         evidence
     }
@@ -31,6 +31,12 @@ impl Master {
             (State::Running, None) => self.encoder,
             _ => None,
         }
+    }
+
+    /// Number of the last H-frame.
+    #[expect(clippy::cast_possible_truncation, reason = "modulo 2^32")]
+    const fn number(&self) -> u32 {
+        self.counters.frames.wrapping_sub(1) as u32
     }
 
     /// Steps of a turn, RESOLUTN (resource 081h) of a rotary encoder: for [`Sample::angle`](crate::Sample::angle). 0 for none.
@@ -58,7 +64,7 @@ impl Master {
     /// A frame of which nobody tells is known by its time, if its end is told half a frame too late; then no fast position is given until
     /// three safe positions have come.
     pub fn skip(&mut self, frames: u8) {
-        self.number = self.number.wrapping_add(frames.into());
+        self.counters.frames = self.counters.frames.wrapping_add(frames.into());
         self.end_ns = self.end_ns.saturating_add(u64::from(frames).wrapping_mul(FREE_RUNNING_NS.into()));
         if self.state == State::Running {
             (0..frames.min(16)).for_each(|_| self.link.skip());

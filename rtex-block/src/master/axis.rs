@@ -59,8 +59,8 @@ pub struct Axis {
     travel: i32,
     watch: EchoWatch,
     arrival: Arrival,
-    /// The end of the last update period, ns.
-    heard_ns: u64,
+    /// The low half of the end of the last update period, ns.
+    heard_ns: u32,
     control: ControlBits,
     /// Command_Data3, Sub_Command_Data2 and 3.
     feed_forward: [i32; 3],
@@ -209,6 +209,7 @@ impl Axis {
         let Turn::Valid(sent) = sent else {
             if let Some(response) = response {
                 // The counter stands still in invalid data, so nothing says when this is from.
+                self.watch.note(response.update_counter_echo);
                 self.evidence = Evidence::of(response, 0);
             }
             return self.rest();
@@ -254,12 +255,14 @@ impl Axis {
         Command32 { main, sub: self.sub_command([sub2, sub3]) }
     }
 
-    /// Update periods since the last one in which nothing was exchanged, by the clock; more than a counter has values do not matter.
+    /// Update periods since the last one in which nothing was exchanged, by the clock; three at the most, for the counter has no more.
+    /// Whether it was more than four seconds does not matter: no block is on time then, or it has been for long.
+    #[expect(clippy::cast_possible_truncation, reason = "the difference counts")]
     fn missed(&mut self, end_ns: u64) -> u8 {
-        let (gap_ns, update_ns) = (end_ns.saturating_sub(self.heard_ns), u64::from(self.config.update_ns));
-        self.heard_ns = end_ns;
-        let over = |periods: u64| gap_ns > update_ns.saturating_mul(periods).saturating_add(update_ns / 2);
-        if over(1) { 1_u8.saturating_add(over(2).into()).saturating_add(over(3).into()) } else { 0 }
+        let gap_ns = (end_ns as u32).wrapping_sub(self.heard_ns);
+        self.heard_ns = end_ns as u32;
+        let most_ns = self.config.update_ns.saturating_add(self.config.update_ns >> 1);
+        if gap_ns <= most_ns { 0 } else { periods(gap_ns.wrapping_sub(most_ns), self.config.update_ns) }
     }
 
     /// The response, if it is sound and the drive's own; every block is counted.
@@ -274,4 +277,11 @@ impl Axis {
         self.last_refusal = outcome.err();
         outcome.ok()
     }
+}
+
+/// Whole and begun update periods in this time, three at the most.
+#[cold]
+fn periods(over_ns: u32, update_ns: u32) -> u8 {
+    let more = over_ns.saturating_sub(1).checked_div(update_ns).unwrap_or(2).min(2);
+    u8::try_from(more).unwrap_or(2).saturating_add(1)
 }

@@ -10,7 +10,7 @@ use sorte_proto::inspect::{During, Frame, inspect};
 use sorte_proto::{FrameType, Param, Status};
 
 use crate::capture::pcapng::Packet;
-use crate::codec::{Codec, Names};
+use crate::codec::{Codec, Facts};
 use crate::event::{Direction, Event, Field, Place, Refusal, Span, Verdict};
 
 /// The names of all fields.
@@ -41,17 +41,17 @@ const BYTE: i64 = 80_000;
 pub(super) struct Sorte;
 
 impl Codec for Sorte {
-    fn names(&self) -> &'static Names {
-        &Names {
-            name: "sorte",
-            title: "SORTE",
-            about: "TI SORTE, from a network capture",
-            needs: "SORTE is decoded from a pcapng file",
+    fn facts(&self) -> &'static Facts {
+        const {
+            &Facts {
+                name: "sorte",
+                title: "SORTE",
+                about: "TI SORTE, from a network capture",
+                needs: "SORTE is decoded from a pcapng file",
+                fields: FIELDS,
+                ..Facts::NONE
+            }
         }
-    }
-
-    fn fields(&self) -> &'static [&'static str] {
-        FIELDS
     }
 
     fn packet(&self, packet: &Packet) -> Option<Event> {

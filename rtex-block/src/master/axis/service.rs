@@ -34,7 +34,7 @@ const fn needs_servo_off(request: &NonCyclicCommand, unknown: bool) -> bool {
 /// The drive goes on with the block before, so this is no answer: the request is in the next block again, and may be under way
 /// already.
 fn is_thrown_away(response: &Response) -> bool {
-    matches!(response.noncyclic(), NonCyclicResponse::CommandError(code) if code.discards_block())
+    response.cmd_error && matches!(response.noncyclic(), NonCyclicResponse::CommandError(code) if code.discards_block())
 }
 
 impl Axis {

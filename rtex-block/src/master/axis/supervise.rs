@@ -86,11 +86,12 @@ impl Axis {
 
     /// The limit of the present state.
     fn wait(&mut self, on_time: Option<&Response>) {
-        let alarm = on_time.map_or(self.status(), |response| response.status).contains(StatusFlags::ALARM);
         let reason = match self.state {
             AxisState::Starting if self.config.limits.ready.is_none() => return,
-            AxisState::Starting if alarm => StopReason::Alarm,
-            AxisState::Starting => StopReason::ReadyTimeout,
+            AxisState::Starting => {
+                let status = on_time.map_or(self.status(), |response| response.status);
+                if status.contains(StatusFlags::ALARM) { StopReason::Alarm } else { StopReason::ReadyTimeout }
+            }
             AxisState::SwitchingOn => StopReason::ActiveTimeout,
             AxisState::SwitchingOff => StopReason::InactiveTimeout,
             AxisState::Stopping(reason) => reason,
