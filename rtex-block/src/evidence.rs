@@ -141,6 +141,11 @@ impl Evidence {
         }
     }
 
+    /// With the alarm of a block that was not on time, if it reports one.
+    pub(crate) const fn alarmed(self, status: StatusFlags) -> Self {
+        Self { status: self.status.union(status.intersection(StatusFlags::ALARM)), ..self }
+    }
+
     /// With the reason why the last block was refused.
     pub(crate) const fn refused(self, refused: Option<ErrorClass>) -> Self {
         Self { refused, ..self }

@@ -60,10 +60,14 @@ impl Line {
     /// A look at the clock: every one goes through here, so that no wait is for ever.
     #[inline]
     pub(crate) fn now_ns(&mut self, clock: &mut impl Clock) -> Result<u64, ClockError> {
-        let last_ns = self.check.last_ns();
-        match clock.now_ns().and_then(|now_ns| self.check.check(now_ns)) {
+        let now_ns = match clock.now_ns() {
+            Ok(now_ns) => now_ns,
+            Err(error) => return Err(self.lost(error, self.check.last_ns())),
+        };
+        match self.check.check(now_ns) {
             Ok(now_ns) => Ok(now_ns),
-            Err(error) => Err(self.lost(error, last_ns)),
+            Err(error @ ClockError::Backwards { by_ns }) => Err(self.lost(error, now_ns.saturating_add(by_ns))),
+            Err(error) => Err(error),
         }
     }
 

@@ -12,7 +12,7 @@ pub mod asynch;
 pub mod blocking;
 
 use tformat::master::Line;
-use tformat::{AllData, Error, Request, Response};
+use tformat::{AllData, Error, Frame, Request, Response};
 
 /// What a `Driver` was made of.
 #[derive(Debug, Clone, Copy)]
@@ -32,8 +32,8 @@ const LOST: Error = Error::NoResponse { echo: false };
 const MAX_BYTES: usize = 16;
 
 /// How long this request and the longest answer to it take.
-fn longest_ns(line: &Line, request: Request) -> u64 {
-    let fields = request.emit().fields().saturating_add(12);
+fn longest_ns(line: &Line, request: &Frame) -> u64 {
+    let fields = request.fields().saturating_add(12);
     u64::from(line.response_timeout_ns).saturating_add(line.rate.fields_ns(fields).into())
 }
 

@@ -7,9 +7,11 @@
 extern crate std;
 
 mod arc;
+mod axis;
 mod batch;
 mod cubic;
 mod curve;
+mod cutter;
 mod cycle;
 mod error;
 mod guess;
@@ -23,12 +25,15 @@ mod peak;
 mod phases;
 mod plan;
 mod planner;
+mod queue;
 mod real;
 mod run;
 mod slope;
+mod step_timer;
 mod stepper;
 
 pub use arc::{Arc, Turning};
+pub use axis::{Axis, Work};
 pub use cycle::{PtoMover, Reload, Reloads};
 pub use error::{Error, ErrorClass};
 pub use homing::{Homing, HomingConfig, HomingState, Switch};
@@ -38,4 +43,6 @@ pub use mover::{Mover, Pulse};
 pub use path::{AxisSetup, Path};
 pub use path_mover::PathMover;
 pub use plan::{Plan, Pulses, Setpoint};
+pub use queue::Queue;
 pub use servowire_core::{Command, Direction, OutOfRange};
+pub use step_timer::{Fired, StepTimer};

@@ -1,8 +1,9 @@
 //! An axis that can be told something else at any time.
 
+use crate::cutter::{Cutter, Demand, Stretch};
 use crate::error::Error;
 use crate::limits::{Bounds, Clock, Limits};
-use crate::phases::{Frame, P, Phases};
+use crate::phases::{Frame, P, Phases, steps};
 use crate::plan::{Setpoint, checked};
 use crate::planner::{Goal, Motion, plan};
 use crate::real::Real;
@@ -61,6 +62,7 @@ pub struct Mover {
     bounds: Bounds,
     phases: Phases,
     stepper: Stepper,
+    cutter: Cutter,
     direction: Direction,
     /// Position of the motor where the position of the plan is 0.
     origin: i64,
@@ -99,6 +101,7 @@ impl Mover {
             bounds: checked(clock, limits)?,
             phases: Phases::rest(clock.shift(), 0, 0),
             stepper: Stepper::new(),
+            cutter: Cutter::new(),
             direction: Direction::Forward,
             origin: 0,
             commanded: 0,
@@ -294,6 +297,61 @@ impl Mover {
         self.limits
     }
 
+    /// The next steps as a stretch, if they begin before a tick; in place of [`pulse`](Self::pulse).
+    pub(super) fn cut(&mut self, demand: &Demand, until: u64) -> Cut {
+        if self.due.is_none() {
+            return Cut::Rest;
+        }
+        let (Phases { curve, frame }, mut cutter) = (&self.phases, self.cutter);
+        let Some(stretch) = cutter.next(curve, frame, demand) else {
+            self.due = None;
+            self.go_on();
+            return Cut::Rest;
+        };
+        let first = tick(stretch.first);
+        if first >= until {
+            self.due = Some(first.max(self.free));
+            return Cut::Later;
+        }
+        let (endless, all) = (frame.endless, steps(frame.last(curve)));
+        let (direction, count) = (self.direction, i64::from(stretch.count));
+        self.commanded = self.commanded.saturating_add(if direction.dir() { count.wrapping_neg() } else { count });
+        self.cutter = cutter;
+        let last = tick(stretch.last()).max(self.free);
+        self.free = last.saturating_add(1);
+        (self.turn, self.dir) = (None, Some(direction));
+        self.due = Some(self.free);
+        if !endless && cutter.count() >= all {
+            self.due = None;
+            self.go_on();
+        } else if endless && cutter.count() >= 1 << 30 {
+            self.replan(self.clock.moment(last));
+        }
+        Cut::Steps(stretch, direction)
+    }
+
+    /// The tick at which the plan under way ends; the greatest for one without end.
+    pub(super) fn over(&self) -> u64 {
+        if self.phases.frame.endless { u64::MAX } else { self.phases.end().div_ceil(self.clock.moment(1)) }
+    }
+
+    /// At rest at a position since a tick, after a stop that nobody asked for: it goes on from there.
+    pub(super) fn rest_at(&mut self, position: i64, now: u64) {
+        (self.commanded, self.due, self.quick) = (position, None, None);
+        self.free = now.saturating_add(1);
+        self.rest(self.clock.moment(now));
+        if self.has_work() {
+            self.replan(self.clock.moment(now));
+        }
+    }
+
+    /// Halted at a position, DIR not known.
+    pub(super) fn halt_at(&mut self, position: i64, now: u64, was_moving: bool) {
+        self.halt(now);
+        (self.commanded, self.halted, self.dir) = (position, was_moving, None);
+        self.rest(self.phases.end());
+    }
+
     fn ready(&mut self, now: u64) -> Result<(), Error> {
         if self.quick.is_some() && !self.is_at_rest(now) {
             return Err(Error::Moving);
@@ -332,7 +390,7 @@ impl Mover {
     fn rest(&mut self, moment: u64) {
         self.origin = self.commanded;
         self.phases = Phases::rest(self.clock.shift(), moment, 0);
-        self.stepper = Stepper::new();
+        (self.stepper, self.cutter) = (Stepper::new(), Cutter::new());
     }
 
     /// A plan is over: on to the aim if that is somewhere else.
@@ -374,7 +432,7 @@ impl Mover {
         (self.due, self.turn) = (None, None);
         if let Some(phases) = next {
             self.origin = self.commanded;
-            self.stepper = Stepper::new();
+            (self.stepper, self.cutter) = (Stepper::new(), Cutter::new());
             let begin = phases.frame.begin.div_ceil(self.clock.moment(1));
             self.due = self.stepper.next(&phases.curve, &phases.frame).map(|due| due.max(self.free).max(begin));
             if self.dir != Some(self.direction) {
@@ -480,6 +538,21 @@ impl Mover {
             }
         }
     }
+}
+
+/// What [`Mover::cut`] gives.
+pub(super) enum Cut {
+    /// Steps, and which way.
+    Steps(Stretch, Direction),
+    /// The next step is later.
+    Later,
+    /// There is no step to come.
+    Rest,
+}
+
+/// The tick into which a time in 2^-32 ticks falls.
+pub(super) fn tick(time: i128) -> u64 {
+    u64::try_from(time.saturating_add(1 << 31) >> 32).unwrap_or(0)
 }
 
 /// Where a plan leads.

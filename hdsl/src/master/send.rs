@@ -22,7 +22,7 @@ pub struct Transmission {
 impl Master {
     /// The next head before the answer of the present frame is taken in, for a processor that is not done with an answer when the
     /// next head has to begin: call it while the answer comes in, send the head, and give the samples to
-    /// [`hear`](Self::hear) while it is on the line. The frame has no stuffing then.
+    /// [`hear`](Self::hear) while it is on the line.
     ///
     /// What an answer changes comes a frame later on the line. If it is the end of the link, the frame that is out already is
     /// sent to its end; [`fast`](Self::fast) and [`safe`](Self::safe) give nothing from the loss on, and what [`hear`](Self::hear) gives for that

@@ -18,6 +18,7 @@ mod message_rules;
 mod position_laws;
 mod receiver;
 mod register_map;
+mod remote;
 #[cfg(feature = "serde")]
 mod serde;
 mod small_print;

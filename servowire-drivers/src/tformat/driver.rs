@@ -233,7 +233,7 @@ macro_rules! driver {
                 if let Some(ns) = sending.lead_until_ns(line.driver_lead_ns)? {
                     $wait!(sleep(sending.line, sending.clock, ns))?;
                 }
-                sending.line.begin(longest_ns(&line, request));
+                sending.line.begin(longest_ns(&line, &frame));
                 let mut fields = frame.as_bytes();
                 while !fields.is_empty() {
                     let piece = sending.piece(fields);

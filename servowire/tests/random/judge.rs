@@ -118,7 +118,7 @@ pub fn judge(capture: &Capture, inside: bool) -> Outcome {
     for due in &capture.due {
         let name = due.channels.join(" + ");
         let Some((_, events)) =
-            lanes.iter().find(|(lane, _)| lane.channel == name && lane.protocol.title() == due.kind.name())
+            lanes.iter().find(|(lane, _)| lane.channel == name && lane.protocol.title == due.kind.name())
         else {
             blame(format!("{name} is not found as {}", due.kind.name()), &mut outcome);
             continue;

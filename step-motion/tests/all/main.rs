@@ -7,5 +7,6 @@ mod laws;
 mod lines;
 mod paths;
 mod plans;
+mod queue;
 #[cfg(feature = "serde")]
 mod serde;

@@ -20,7 +20,7 @@ use hdsl::{
 use super::bits::Bits;
 use super::refused::{event, refusal};
 use super::said::Said;
-use crate::event::{Direction, Field, NO_RESPONSE, Place};
+use crate::event::{Direction, Field, NO_RESPONSE, Place, Span};
 use crate::sink::Sink;
 
 /// Bits that have to be there before a frame is looked for: longest head, direction switch, delay, answer.
@@ -183,13 +183,13 @@ impl Decoder {
         }
         self.lone = (talks && !self.talks).then(|| self.said.next());
         self.talks = talks;
-        let mut event = event(
-            place,
-            Direction::Request,
-            "H-frame",
-            master(found.head, symbol),
-            wrong.map_or(Ok(()), |rule| Err((rule.name(), rule.to_string()))),
-        );
+        let wrong = wrong.map_or(Ok(()), |rule| Err((rule.name(), rule.to_string())));
+        let event = event(place, Direction::Request, "H-frame", master(found.head, symbol), wrong);
+        // All of it is in the last word, PARA.
+        let mut event = event.locate(|name| {
+            let coded = matches!(name, "SYMBOL" | "FIRST" | "MSYNC") && found.len >= 10;
+            coded.then(|| Span::even(place, found.len, found.len - 10, found.len - 1))
+        });
         event.fields.extend(trailer.then(|| Field::text("note", TRAILER)));
         self.said.push(event);
         self.message_out(symbol, place);

@@ -75,6 +75,11 @@ impl Encoder {
         self.request.clear();
     }
 
+    /// It is not there.
+    pub fn silent(&mut self) {
+        self.silent_until_ns = u64::MAX;
+    }
+
     /// A byte ended at `end_ns`; what it answers, if the request is complete.
     pub fn hear(&mut self, byte: u8, framed: bool, end_ns: u64) -> Option<Answer> {
         if end_ns < self.silent_until_ns {

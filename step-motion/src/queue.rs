@@ -1,0 +1,179 @@
+//! What the background hands to the step interrupt: segments in linked slots, one writer and one reader, by loads and stores of
+//! words alone.
+//!
+//! Two blocks of slots take turns. A block is a chain of segments that are to be run, and behind it the chain of a stop from where
+//! they end. The last segment is linked to that stop at first; when the next block is ready, one store links it to that block
+//! instead. So whichever of the two the reader finds there, it is whole: more motion, or a stop. A block is written anew only
+//! after the reader has entered the other one.
+
+use core::sync::atomic::{AtomicU32, Ordering};
+
+/// Some steps with intervals that change by second and third differences. Times are in 2^-32 ticks.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct Segment {
+    /// Events, 1 to 65535.
+    pub(crate) count: u16,
+    /// What each of them is.
+    pub(crate) kind: Kind,
+    /// From the event before to the first one.
+    pub(crate) first: i64,
+    /// At each event after it `interval` grows by `add`, and that by `bend`.
+    pub(crate) interval: i64,
+    pub(crate) add: i64,
+    pub(crate) bend: i64,
+}
+
+/// What happens at an event.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct Kind {
+    /// A step, or nothing but DIR and time.
+    pub(crate) step: bool,
+    /// DIR is high: backwards.
+    pub(crate) reverse: bool,
+}
+
+/// The upper half of a segment's head: a step forward or backwards as the number +1 or -1 in the top two bits, then DIR.
+pub(crate) const DELTA: u32 = 30;
+pub(crate) const DIR: u32 = 1 << 29;
+pub(crate) const COUNT: u32 = 0xffff;
+
+impl Segment {
+    pub(crate) const fn head(&self) -> u32 {
+        let delta = match self.kind {
+            Kind { step: false, .. } => 0,
+            Kind { reverse: false, .. } => 1 << DELTA,
+            Kind { reverse: true, .. } => 3 << DELTA,
+        };
+        delta | if self.kind.reverse { DIR } else { 0 } | self.count as u32
+    }
+}
+
+/// No slot follows.
+pub(crate) const NONE: u32 = u32::MAX;
+/// In what the reader tells: it stands at the end of that slot.
+pub(crate) const IDLE: u32 = 1 << 31;
+/// Above so many bits, and below [`IDLE`]: the ticket of the halt that put it there.
+pub(crate) const TICKET: u32 = 16;
+
+/// A segment in words.
+#[derive(Debug)]
+pub(crate) struct Slot {
+    pub(crate) head: AtomicU32,
+    pub(crate) next: AtomicU32,
+    first: [AtomicU32; 2],
+    interval: [AtomicU32; 2],
+    add: [AtomicU32; 2],
+    bend: [AtomicU32; 2],
+}
+
+impl Slot {
+    const fn new() -> Self {
+        const fn word(n: u32) -> AtomicU32 {
+            AtomicU32::new(n)
+        }
+        const fn pair() -> [AtomicU32; 2] {
+            [word(0), word(0)]
+        }
+        Self { head: word(1), next: word(NONE), first: pair(), interval: pair(), add: pair(), bend: pair() }
+    }
+
+    #[inline(always)]
+    fn wide([low, high]: &[AtomicU32; 2]) -> u64 {
+        u64::from(low.load(Ordering::Relaxed)) | u64::from(high.load(Ordering::Relaxed)) << 32
+    }
+
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "halves of a wider number")]
+    fn set([low, high]: &[AtomicU32; 2], value: i64) {
+        low.store(value as u32, Ordering::Relaxed);
+        high.store((value >> 32) as u32, Ordering::Relaxed);
+    }
+
+    #[inline(always)]
+    pub(crate) fn first(&self) -> u64 {
+        Self::wide(&self.first)
+    }
+
+    #[inline(always)]
+    pub(crate) fn interval(&self) -> u64 {
+        Self::wide(&self.interval)
+    }
+
+    #[inline(always)]
+    pub(crate) fn add(&self) -> u64 {
+        Self::wide(&self.add)
+    }
+
+    #[inline(always)]
+    pub(crate) fn bend(&self) -> u64 {
+        Self::wide(&self.bend)
+    }
+
+    /// Writes a segment that nothing follows yet; no reader may be here.
+    fn put(&self, segment: &Segment) {
+        self.head.store(segment.head(), Ordering::Relaxed);
+        self.next.store(NONE, Ordering::Relaxed);
+        Self::set(&self.first, segment.first);
+        Self::set(&self.interval, segment.interval);
+        Self::set(&self.add, segment.add);
+        Self::set(&self.bend, segment.bend);
+    }
+}
+
+/// Segments between an [`Axis`](crate::Axis) in the background and a [`StepTimer`](crate::StepTimer) in an interrupt: `N` slots
+/// of 40 bytes, 9 at least. Half of them are a block, half of a block is for the stop behind it.
+///
+/// It lies in a `static`; [`Axis::new`](crate::Axis::new) gives both ends.
+#[derive(Debug)]
+pub struct Queue<const N: usize> {
+    pub(crate) slots: [Slot; N],
+    /// Where the reader is.
+    pub(crate) current: AtomicU32,
+    /// Steps made, forward less reverse ones, modulo 2^32.
+    pub(crate) made: AtomicU32,
+    /// Not 0, the ticket of a halt: no further step.
+    pub(crate) halt: AtomicU32,
+}
+
+impl<const N: usize> Queue<N> {
+    /// Slots of a block; slot 0 belongs to none, the reader is parked there.
+    pub(crate) const BLOCK: usize = N.saturating_sub(1) / 2;
+
+    /// Empty.
+    pub const fn new() -> Self {
+        const { assert!(N >= 9 && N < 1 << 16, "9 to 65535 slots") };
+        Self {
+            slots: [const { Slot::new() }; N],
+            current: AtomicU32::new(IDLE),
+            made: AtomicU32::new(0),
+            halt: AtomicU32::new(0),
+        }
+    }
+
+    /// The slot of a block, by its place there.
+    pub(crate) const fn slot(block: usize, at: usize) -> usize {
+        1_usize.saturating_add(block.saturating_mul(Self::BLOCK)).saturating_add(at)
+    }
+
+    /// Writes a segment into a slot, and links it to the one before it if that is of the same block.
+    pub(crate) fn put(&self, slot: usize, segment: &Segment, after: Option<usize>) {
+        if let Some(place) = self.slots.get(slot) {
+            place.put(segment);
+        }
+        if let Some(after) = after {
+            self.link(after, slot);
+        }
+    }
+
+    /// From now on `slot` follows `after`.
+    pub(crate) fn link(&self, after: usize, slot: usize) {
+        if let (Some(place), Ok(slot)) = (self.slots.get(after), u32::try_from(slot)) {
+            place.next.store(slot, Ordering::Release);
+        }
+    }
+}
+
+impl<const N: usize> Default for Queue<N> {
+    fn default() -> Self {
+        Self::new()
+    }
+}

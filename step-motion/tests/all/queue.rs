@@ -1,0 +1,307 @@
+//! A background and an interrupt: every step at its tick, a stop behind whatever is out, no step after a halt.
+
+use proptest::prelude::*;
+use step_motion::{Axis, Clock, Direction, Limits, Mover, Queue, StepTimer, Work};
+
+const SLOTS: usize = 129;
+
+fn limits(speed: u32, acceleration: u32, jerk: u64) -> Limits {
+    let limits = Limits::new(speed, acceleration).unwrap();
+    if jerk == 0 { limits } else { limits.with_jerk(jerk).unwrap() }
+}
+
+fn queue() -> &'static Queue<SLOTS> {
+    Box::leak(Box::default())
+}
+
+/// A timer, and what its handler does.
+struct Machine {
+    timer: StepTimer<'static, SLOTS>,
+    now: u64,
+    /// When the compare register is reached.
+    compare: Option<u64>,
+    dir: Direction,
+    /// When DIR changed, and the steps: when and which way.
+    turned: u64,
+    steps: Vec<(u64, Direction)>,
+    position: i64,
+}
+
+impl Machine {
+    fn new(timer: StepTimer<'static, SLOTS>) -> Self {
+        let steps = Vec::new();
+        Self { timer, now: 0, compare: None, dir: Direction::Forward, turned: 0, steps, position: 0 }
+    }
+
+    fn fire(&mut self) {
+        let fired = self.timer.fire();
+        if fired.direction() != self.dir {
+            assert!(!fired.is_step(), "DIR changes with a step");
+            assert!(self.steps.last().is_none_or(|(last, _)| *last < self.now));
+            (self.dir, self.turned) = (fired.direction(), self.now);
+        }
+        if fired.is_step() {
+            assert!(self.steps.last().is_none_or(|(last, _)| *last < self.now), "two steps in a tick");
+            assert!(self.turned < self.now || self.now == 0, "a step in the tick of DIR");
+            self.steps.push((self.now, self.dir));
+            self.position += if self.dir.dir() { -1 } else { 1 };
+        }
+        self.compare = Some(fired.wait()).filter(|wait| *wait > 0).map(|wait| self.now + u64::from(wait));
+    }
+
+    /// Time goes on.
+    fn until(&mut self, time: u64) {
+        while let Some(compare) = self.compare.filter(|compare| *compare <= time) {
+            self.now = compare;
+            self.fire();
+        }
+        self.now = self.now.max(time);
+    }
+
+    /// All that is out.
+    fn drain(&mut self) {
+        while let Some(compare) = self.compare {
+            self.until(compare);
+        }
+    }
+}
+
+/// The background in time: called every so many ticks, until the axis is at rest or a time comes.
+fn run(axis: &mut Axis<'static, SLOTS>, machine: &mut Machine, every: u64, until: u64) -> Work {
+    loop {
+        let mut calls = 0;
+        let work = loop {
+            match axis.poll() {
+                Work::More => calls += 1,
+                Work::Start if machine.compare.is_none() => machine.fire(),
+                other => break other,
+            }
+            assert!(calls < 1000, "the background does not end");
+        };
+        if machine.now >= until || work == Work::Rest {
+            return work;
+        }
+        machine.until((machine.now + every).min(until));
+    }
+}
+
+/// The steps of one move beside the exact times, which an axis with a finer clock has.
+fn compare(hz: u32, limits: Limits, target: i64, reach: u32) -> Result<(), TestCaseError> {
+    let finer = (1_u32 << 29).checked_div(hz).map_or(1, |by| 1 << by.max(1).ilog2());
+    let mut exact = Mover::new(Clock::new(hz * finer).unwrap(), limits).unwrap();
+    exact.move_to(target, 0).unwrap();
+    let (mut axis, timer) = Axis::new(queue(), Clock::new(hz).unwrap(), limits).unwrap();
+    axis = axis.with_reach(reach);
+    let mut machine = Machine::new(timer);
+    axis.move_to(target).unwrap();
+    prop_assert_eq!(run(&mut axis, &mut machine, u64::from(reach) / 3 + 1, u64::MAX), Work::Rest);
+    prop_assert_eq!((machine.position, axis.commanded()), (target, target));
+    prop_assert!(axis.is_at_rest());
+    let most = (0.75 + 1.5 / f64::from(finer)).max(25e-9 * f64::from(hz));
+    for (step, (tick, _)) in machine.steps.iter().enumerate() {
+        let want = exact.pulse().unwrap().tick as f64 / f64::from(finer);
+        prop_assert!((*tick as f64 - want).abs() <= most, "step {step} at {tick}, {want} is right");
+    }
+    Ok(())
+}
+
+fn spread(low: f64, high: f64) -> impl Strategy<Value = u64> {
+    (low.ln()..high.ln()).prop_map(|x| x.exp() as u64)
+}
+
+#[test]
+fn a_turn_at_1_mhz_and_at_200() {
+    for hz in [1_000_000, 8_000_000, 168_000_000, 200_000_000] {
+        for jerk in [0, 40_000_000] {
+            compare(hz, limits(250_000, 2_000_000, jerk), 51_200, hz / 200).unwrap();
+            compare(hz, limits(20_000, 100_000, jerk), -64, hz / 200).unwrap();
+            compare(hz, limits(50_000, 100_000, jerk / 40), 5000, hz / 200).unwrap();
+        }
+    }
+}
+
+#[derive(Debug, Clone, Copy)]
+enum Request {
+    MoveTo(i64),
+    Run(bool, u32),
+    Override(u16),
+    Hold,
+    Resume,
+    Stop,
+    Quick(u32),
+    Halt,
+}
+
+fn request() -> impl Strategy<Value = Request> {
+    prop_oneof![
+        4 => (-2000..2000_i64).prop_map(Request::MoveTo),
+        2 => (any::<bool>(), 0..60_000_u32).prop_map(|(back, speed)| Request::Run(back, speed)),
+        2 => (0..=100_u16).prop_map(Request::Override),
+        1 => Just(Request::Hold),
+        2 => Just(Request::Resume),
+        1 => Just(Request::Stop),
+        1 => (1000..10_000_000_u32).prop_map(Request::Quick),
+        1 => Just(Request::Halt),
+    ]
+}
+
+fn clocks() -> impl Strategy<Value = u32> {
+    prop_oneof![Just(25_000_u32), Just(1_000_000), Just(72_000_000), Just(200_000_000)]
+}
+
+fn cases() -> u32 {
+    std::env::var("MOTION_CASES").ok().and_then(|n| n.parse().ok()).unwrap_or(300)
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: cases(), ..ProptestConfig::default() })]
+
+    #[test]
+    fn every_step_is_at_its_tick(
+        hz in clocks(), speed in spread(10.0, 3e5), a in spread(1e3, 1e8), j in prop_oneof![Just(0), spread(1e4, 1e12)],
+        target in prop_oneof![-30..30_i64, -3000..3000_i64], part in 20..2000_u32,
+    ) {
+        let limits = limits((speed as u32).min(hz / 2), a as u32, j);
+        compare(hz, limits, target, (hz / part).max(2))?;
+    }
+
+    /// In time, late, or not at all for a while: what is out ends in a stop, nothing is faster than the limits, and it goes on.
+    #[test]
+    fn requests_and_a_background_that_stalls(
+        hz in clocks(), speed in spread(200.0, 3e4), a in spread(1e4, 1e7), j in prop_oneof![Just(0), spread(1e6, 1e10)],
+        requests in prop::collection::vec((request(), 0..300_000_u64, 0..40_u32), 1..12), target in -2000..2000_i64,
+    ) {
+        let limits = limits((speed as u32).min(hz / 2), a as u32, j);
+        let (axis, timer) = Axis::new(queue(), Clock::new(hz).unwrap(), limits).unwrap();
+        let (mut axis, mut machine) = (axis.with_soft_limits(-3000, 3000), Machine::new(timer));
+        let reach = u64::from(hz / 200);
+        for (request, wait_us, polls) in requests {
+            let mut halted = None;
+            match request {
+                Request::MoveTo(target) => _ = axis.move_to(target),
+                Request::Run(back, speed) => {
+                    let direction = if back { Direction::Reverse } else { Direction::Forward };
+                    _ = axis.run(direction, speed);
+                }
+                Request::Override(percent) => axis.set_override(percent),
+                Request::Hold => axis.hold(),
+                Request::Resume => axis.resume(),
+                Request::Stop => axis.stop(),
+                Request::Quick(acceleration) => axis.quick_stop(Limits::new(1, acceleration).unwrap()),
+                Request::Halt => {
+                    axis.halt();
+                    halted = Some(machine.position);
+                }
+            }
+            // A background that is cut off after some slices.
+            for _ in 0..polls {
+                if axis.poll() == Work::Start && machine.compare.is_none() {
+                    machine.fire();
+                }
+            }
+            let until = machine.now + wait_us * u64::from(hz) / 1_000_000;
+            if wait_us % 3 == 0 {
+                machine.until(until);
+            } else {
+                run(&mut axis, &mut machine, reach / 2, until);
+            }
+            if let Some(position) = halted {
+                prop_assert_eq!(machine.position, position, "a step after a halt");
+            }
+            prop_assert_eq!(axis.commanded(), machine.position);
+            prop_assert!((-3000..=3000).contains(&machine.position));
+        }
+        axis.stop();
+        machine.drain();
+        let until = machine.now + 20 * u64::from(hz);
+        prop_assert_ne!(run(&mut axis, &mut machine, reach / 2, until), Work::TooFewSlots);
+        axis.set_override(100);
+        axis.resume();
+        axis.move_to(target).unwrap();
+        prop_assert_eq!(run(&mut axis, &mut machine, reach / 2, u64::MAX), Work::Rest);
+        prop_assert_eq!((machine.position, axis.commanded()), (target, target));
+        let least = u64::from(hz) / u64::from(limits.speed());
+        for pair in machine.steps.windows(2) {
+            if pair[0].1 == pair[1].1 {
+                // A stop that nobody asked for is as exact as there are slots for it.
+                prop_assert!(pair[1].0 - pair[0].0 + 2 + least / 32 >= least, "{pair:?}, {least} ticks are the fastest");
+            }
+        }
+    }
+}
+
+/// The background is cut off after each slice of a move; the axis comes to rest within its limits, and goes on to its target.
+#[test]
+fn a_background_that_starves_ends_in_a_stop_at_every_segment() {
+    let limits = limits(20_000, 200_000, 4_000_000);
+    let mut stalls = 0;
+    for slices in 1..400 {
+        let (mut axis, timer) = Axis::new(queue(), Clock::MICROSECONDS, limits).unwrap();
+        let mut machine = Machine::new(timer);
+        axis.move_to(6000).unwrap();
+        for _ in 0..slices {
+            match axis.poll() {
+                Work::Start if machine.compare.is_none() => machine.fire(),
+                Work::Later => machine.until(machine.now + 1000),
+                _ => {}
+            }
+        }
+        machine.drain();
+        stalls += u32::from(machine.position < 6000 && machine.position > 0);
+        // From 20,000 steps/s rest takes 1500 steps; the last interval of a stop is longer than that at 1000 steps/s.
+        if let [.., before, last] = machine.steps[..] {
+            assert!(last.0 - before.0 > 1000, "{slices}: {} ticks before rest", last.0 - before.0);
+        }
+        for pair in machine.steps.windows(3) {
+            let [first, second] = [pair[1].0 - pair[0].0, pair[2].0 - pair[1].0].map(|ticks| 1e6 / ticks as f64);
+            let time = (pair[2].0 - pair[0].0) as f64 / 2e6;
+            // A tick of rounding at either end of an interval.
+            let noise = (first.powi(2) + second.powi(2)) * 1.5e-6;
+            assert!((second - first).abs() <= 210_000.0 * time + noise, "{slices}: {first} to {second} steps/s");
+        }
+        assert_eq!(run(&mut axis, &mut machine, 2000, u64::MAX), Work::Rest);
+        assert_eq!((machine.position, axis.commanded()), (6000, 6000));
+    }
+    assert!(stalls > 200, "{stalls}");
+}
+
+#[test]
+fn a_halt_acts_in_the_interrupt() {
+    for at in (3000..400_000).step_by(1777) {
+        let (mut axis, timer) = Axis::new(queue(), Clock::MICROSECONDS, limits(20_000, 200_000, 0)).unwrap();
+        let mut machine = Machine::new(timer);
+        axis.move_to(5000).unwrap();
+        run(&mut axis, &mut machine, 1000, at);
+        let position = machine.position;
+        axis.halt();
+        assert!(axis.move_to(0).is_err(), "not before the interrupt has seen it");
+        machine.drain();
+        assert_eq!((machine.position, axis.commanded()), (position, position));
+        let until = machine.now + 10_000;
+        run(&mut axis, &mut machine, 1000, until);
+        assert_eq!((machine.position, axis.is_at_rest()), (position, true));
+        assert_eq!(axis.is_halted(), position < 5000, "{at}");
+        axis.move_to(-20).unwrap();
+        run(&mut axis, &mut machine, 1000, u64::MAX);
+        assert_eq!((machine.position, axis.commanded(), axis.is_halted()), (-20, -20, false));
+    }
+}
+
+/// A step a second, told to be fast: it is so after twice the reach, not after the step.
+#[test]
+fn a_request_acts_within_twice_the_reach() {
+    let (axis, timer) = Axis::new(queue(), Clock::MICROSECONDS, limits(20_000, 2_000_000, 0)).unwrap();
+    let (mut axis, mut machine) = (axis.with_reach(5000), Machine::new(timer));
+    axis.run(Direction::Forward, 1).unwrap();
+    run(&mut axis, &mut machine, 1000, 3_200_000);
+    assert_eq!(machine.position, 3);
+    axis.run(Direction::Forward, 20_000).unwrap();
+    run(&mut axis, &mut machine, 1000, 3_300_000);
+    // 10 ms of reaction, 10 ms of ramp with 100 steps, and 80 ms.
+    assert!((1650..1850).contains(&machine.position), "{}", machine.position);
+    axis.stop();
+    let before = machine.position;
+    run(&mut axis, &mut machine, 1000, u64::MAX);
+    // 200 steps in 10 ms, twice 5 ms, and the 100 of the stop.
+    assert!(machine.position - before <= 310, "{}", machine.position - before);
+}
