@@ -55,8 +55,6 @@ pub struct Axis {
     /// What the last block said.
     wire: Wire,
     evidence: Evidence,
-    /// From the position before to that of the evidence.
-    travel: i32,
     watch: EchoWatch,
     arrival: Arrival,
     /// The low half of the end of the last update period, ns.
@@ -84,7 +82,7 @@ struct Wire {
     mode: ActiveCode,
     /// Command_Data1.
     value: i32,
-    /// In CP with the servo on, from the value before to this one.
+    /// In CP with the servo on, from the value before to this one; in another mode what the motor has moved since the last block.
     step: i32,
 }
 
@@ -112,7 +110,6 @@ impl Axis {
             setpoint: 0,
             wire: Wire { mode: config.mode, value: 0, step: 0 },
             evidence: Evidence::NEVER,
-            travel: 0,
             watch: EchoWatch::new(config.limits.echo),
             arrival: Arrival::Missing,
             heard_ns: 0,
@@ -185,7 +182,7 @@ impl Axis {
             Err(SwitchOnError::Alarm)
         } else if !status.contains(StatusFlags::SERVO_READY) {
             Err(SwitchOnError::NotReady)
-        } else if self.main.asking.is_some() && self.main.needs_servo_off {
+        } else if self.main.slot.asking().is_some() && self.main.needs_servo_off {
             Err(SwitchOnError::Busy)
         } else {
             Ok(())
@@ -222,7 +219,9 @@ impl Axis {
         self.serve(on_time);
         self.serve_sub(on_time.and(heard.sub()));
         if let Some(response) = on_time {
-            self.travel = step(self.evidence.last().position(), response.response_data1);
+            if self.wire.mode != ActiveCode::CyclicPosition {
+                self.wire.step = step(self.evidence.last().position(), response.response_data1);
+            }
             self.evidence = Evidence::of(response, end_ns);
         } else if let Some(response) = response {
             self.evidence = self.evidence.alarmed(response.status);
@@ -245,8 +244,12 @@ impl Axis {
             Some(profile) if profile.progress().is_pending() => profile.target_position(),
             _ => self.setpoint,
         };
-        let follows = self.wire.mode == ActiveCode::CyclicPosition && self.is_energised();
-        let step = if follows { step(self.wire.value, value) } else { 0 };
+        let step = match self.wire.mode {
+            ActiveCode::CyclicPosition if self.is_energised() => step(self.wire.value, value),
+            ActiveCode::CyclicPosition => 0,
+            _ if self.mode == ActiveCode::CyclicPosition => 0,
+            _ => self.wire.step,
+        };
         self.wire = Wire { mode: self.mode, value, step };
         let off = *ServoOff::new(mac_id, counter, self.mode).command();
         let [data3, sub2, sub3] = self.feed_forward;

@@ -49,7 +49,7 @@ impl Axis {
         }
         let NonCyclicResponse::CommandError(code) = response.noncyclic() else { return };
         let starts = self.profile.is_some_and(|profile| profile.stage() == MoveStage::Starting);
-        let asked = self.main.asking.is_some() || starts || !self.main.quiet.is_kept();
+        let asked = self.main.slot.asking().is_some() || starts || !self.main.quiet.is_kept();
         if response.code.noncyclic_bits() == 0 || !asked || code.discards_block() {
             self.refused = self.refused.saturating_add(1);
             if self.refused >= self.config.limits.command_errors.get() {
