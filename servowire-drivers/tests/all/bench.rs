@@ -55,6 +55,8 @@ pub struct Bench {
     pub off_at_ns: u64,
     /// How often the host had been preempted when the last call was judged.
     preempts: u64,
+    /// Bytes that the UART had lost then.
+    overruns: u64,
     /// The port is an SPI, which sends and samples by one clock. The line may delay its request all the same; nothing is asked of
     /// such a call.
     pub sampled: bool,
@@ -93,6 +95,7 @@ impl Bench {
             on_at_ns: 0,
             off_at_ns: 0,
             preempts: 0,
+            overruns: 0,
             sampled: false,
         }))
     }
@@ -198,8 +201,9 @@ impl Bench {
 
     /// The truth of the last call, which gave this position if any.
     pub fn verdict(&mut self, shaft: Option<u32>) -> Heard {
-        let preempted = self.was_preempted();
-        self.preempts = self.tally().of(Kind::Preempt);
+        // Bytes that a UART loses without a word are not counted back over in a block.
+        let preempted = self.was_preempted() || self.tally().overrun > self.overruns;
+        (self.preempts, self.overruns) = (self.tally().of(Kind::Preempt), self.tally().overrun);
         let truth = self.world.truth();
         let request = self.request.and_then(|id| truth.transmission(id));
         let verdict = shaft.zip(request).map(|(shaft, request)| truth.verdict(request.id, shaft.into()));

@@ -194,6 +194,9 @@ mod asynch {
     use super::*;
     use crate::polls::{pause, run};
 
+    type Encoder<C> = tformat_asynch::Driver<Silence, Automatic, C>;
+    type Master<C> = nikon_asynch::Driver<Silence, C>;
+
     struct Delay;
 
     impl embedded_hal_async::delay::DelayNs for Delay {
@@ -243,7 +246,6 @@ mod asynch {
                 });
             };
         }
-        type Encoder<C> = tformat_asynch::Driver<Silence, Automatic, C>;
         holds!("read_data", async |e: &mut Encoder<_>| e.read_data().await);
         holds!("clear_errors", async |e: &mut Encoder<_>| e.clear_errors().await);
         holds!("read_eeprom", async |e: &mut Encoder<_>| e.read_eeprom(::tformat::Page::truncate(1), address).await);
@@ -262,7 +264,6 @@ mod asynch {
                 });
             };
         }
-        type Master<C> = nikon_asynch::Driver<Silence, C>;
         holds!("read_abs40", async |m: &mut Master<_>| m.read_abs40(ea).await);
         holds!("read_bus", async |m: &mut Master<_>| m.read_bus(Operation::Abs40Mt, Addresses::first(8)).await);
         holds!("clear_status", async |m: &mut Master<_>| m.clear_status(ea).await);

@@ -311,7 +311,7 @@ mod of_all {
             let all = driver.read_bus(Operation::Abs40Mt, asked).unwrap();
             for ea in asked.iter() {
                 let abs = all.exchange(ea).unwrap().response.abs40().unwrap().get();
-                assert_eq!(abs, 3 << 20 | 0x100 + u64::from(ea.get()));
+                assert_eq!(abs, (3 << 20) + 0x100 + u64::from(ea.get()));
             }
         }
     }
