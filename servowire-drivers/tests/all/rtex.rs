@@ -548,7 +548,7 @@ mod asynch {
                 ring.pass(until_ns);
                 if ring.now_ns >= ns { Poll::Ready(()) } else { Poll::Pending }
             })
-            .await
+            .await;
         }
     }
 
