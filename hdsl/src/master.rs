@@ -65,8 +65,9 @@ use send::{trailer, transmission};
 /// Bits from the sampling edge of a frame without an EXTRA window to the end of the window of its answer: those of the head
 /// after it, the direction switch, the answer and its reserve.
 const SINCE_EDGE_BITS: u64 = 18 + 1 + WINDOW as u64;
-/// A free-running frame and a half, in ns.
-const FREE_RUNNING_NS: u32 = 17_280;
+/// Half a free-running frame in ns, and one and a half.
+const HALF_FRAME_NS: u32 = 5_760;
+const FREE_RUNNING_NS: u32 = 3 * HALF_FRAME_NS;
 /// The same time in ns, rounded up.
 const SINCE_EDGE_NS: u64 = (SINCE_EDGE_BITS * 1_000_000_000).div_ceil(BIT_RATE as u64);
 

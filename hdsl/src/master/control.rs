@@ -1,6 +1,6 @@
 //! The application's side of the receiver: positions to use, messages, settings.
 
-use super::{FREE_RUNNING_NS, Master, State};
+use super::{FREE_RUNNING_NS, HALF_FRAME_NS, Master, State};
 use crate::doubt::Doubt;
 use crate::encoder_id::EncoderId;
 use crate::error::Error;
@@ -65,7 +65,8 @@ impl Master {
     /// three safe positions have come.
     pub fn skip(&mut self, frames: u8) {
         self.counters.frames = self.counters.frames.wrapping_add(frames.into());
-        self.end_ns = self.end_ns.saturating_add(u64::from(frames).wrapping_mul(FREE_RUNNING_NS.into()));
+        let frame_ns = self.longest_ns.saturating_sub(HALF_FRAME_NS);
+        self.end_ns = self.end_ns.saturating_add(u64::from(frames).wrapping_mul(frame_ns.into()));
         if self.state == State::Running {
             (0..frames.min(16)).for_each(|_| self.link.skip());
         }
