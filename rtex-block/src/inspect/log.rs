@@ -16,6 +16,7 @@ use crate::status::StatusFlags;
 /// Something that a log shows between its blocks.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]
 pub enum LogFinding {
     /// The echo of the counter stands still for more than the two communications that an update period can have.
@@ -104,6 +105,7 @@ servowire_core::codes! {
 /// What goes on at the end of a log.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]
 pub enum Unfinished {
     /// The echo of the counter stands still.
@@ -423,6 +425,7 @@ impl LogAnalysis {
 /// What the whole of a log looks like.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct LogShape {
     /// The size of the blocks.
     pub size: BlockSize,

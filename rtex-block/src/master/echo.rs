@@ -161,7 +161,7 @@ impl ReceiveWatchdog {
     }
 
     /// Whether the limit was reached.
-    pub(super) const fn is_tripped(&self) -> bool {
+    pub(super) const fn is_tripped(self) -> bool {
         self.ticks >= self.limit.get()
     }
 }

@@ -42,7 +42,7 @@ impl SubHandshake {
     }
 
     /// `None` while the answer is due.
-    fn read(&self, response: &SubResponse) -> Option<Progress<SubResponse>> {
+    fn read(self, response: &SubResponse) -> Option<Progress<SubResponse>> {
         if let Some(code) = response.error_code() {
             return Some(Progress::Failed { error: Failure::CommandError(code) });
         }

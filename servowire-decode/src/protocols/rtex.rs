@@ -45,6 +45,9 @@ const SAMPLE: usize = 1 << 14;
 /// Lines or records that are held back where the beginning says nothing of the shape: seconds of NOPs after power-up.
 const MOST_HELD: usize = 1 << 16;
 
+/// Lines or records behind the NOPs that are enough to tell the shape.
+const TELLING: usize = 16;
+
 /// Follows the blocks of a log.
 struct Decoder {
     settings: settings::Rtex,
@@ -52,6 +55,8 @@ struct Decoder {
     shape: Option<LogShape>,
     /// What was read before the shape was known.
     held: Vec<Burst>,
+    /// Blocks are decoded, in whichever shape.
+    began: bool,
     /// Each line holds half a block of 32 bytes; the main half, while the other is still to come.
     halves: bool,
     half: Option<Vec<u8>>,
@@ -72,6 +77,7 @@ impl Decoder {
             block_size: 0,
             shape: None,
             held: Vec::new(),
+            began: false,
             halves: false,
             half: None,
             analysis: LogAnalysis::new(settings.period_ns, settings.gear),
@@ -105,6 +111,7 @@ impl Decoder {
     /// Decodes what was held back.
     fn let_go(&mut self, out: &mut dyn Sink) -> io::Result<()> {
         let held = std::mem::take(&mut self.held);
+        self.began = true;
         self.look_at(&held);
         if let Some(note) = self.note() {
             out.event(&Event::remark(Place::Line(1), "log", note))?;
@@ -237,24 +244,17 @@ impl LogDecoder for Decoder {
         }
     }
 
-    /// A line or record of the log.
+    /// A line or record of the log. NOPs from before the start are held back until something tells the shape.
     fn burst(&mut self, burst: &Burst, out: &mut dyn Sink) -> io::Result<()> {
-        if self.shape.is_some() || self.settings.block_size.is_some() || self.held.len() >= MOST_HELD {
+        if self.shape.is_some() || self.settings.block_size.is_some() || self.began {
             return self.decode(burst, out);
         }
         self.held.push(burst.clone());
-        // A second of frames: nothing was said before, and the first blocks that tell something are at the end.
-        if self.held.len() % 1024 == 0 {
-            let last = self.held.len().saturating_sub(1024);
-            let tells = self.held.get(last..).is_some_and(|bursts| {
-                LogShape::guess(&bursts.iter().flat_map(|burst| burst.bytes.iter().copied()).collect::<Vec<_>>())
-                    .is_some()
-            });
-            if tells || self.held.len() >= MOST_HELD {
-                self.let_go(out)?;
-            }
-        }
-        Ok(())
+        let nops = |burst: &Burst| burst.bytes.chunks(rtex_block::LEN).all(is_empty);
+        let told = self.held.iter().rev().take_while(|burst| !nops(burst)).count();
+        // Nothing but NOPs, or too few blocks behind them to tell by.
+        let waits = self.held.len() > told && told < TELLING && self.held.len() < MOST_HELD;
+        if waits { Ok(()) } else { self.let_go(out) }
     }
 
     /// A line that is not bytes: of a block in two lines the other half is lost with it.
@@ -283,6 +283,11 @@ impl LogDecoder for Decoder {
         }
         out.event(&Event::remark(self.place, "log", notes.join("; ")))
     }
+}
+
+/// A NOP from before the start, in any order of its bytes: there is nothing but an address, or Sub_Chk.
+fn is_empty(block: &[u8]) -> bool {
+    matches!(block, [_, code, control, ..] if code & 0x7f == 0 && *control == 0)
 }
 
 /// The length that most lines have; of several the longest.

@@ -38,8 +38,9 @@ impl Axis {
     /// back and during a stop, [`SetpointError::NotStanding`]; the mode is kept then.
     pub fn set_mode(&mut self, mode: ActiveCode) -> Result<(), SetpointError> {
         let is_on = match self.state {
-            AxisState::SwitchingOn | AxisState::SwitchingOff => return Err(SetpointError::NotOn),
-            AxisState::Stopping(_) | AxisState::Held(_) => return Err(SetpointError::NotOn),
+            AxisState::SwitchingOn | AxisState::SwitchingOff | AxisState::Stopping(_) | AxisState::Held(_) => {
+                return Err(SetpointError::NotOn);
+            }
             AxisState::On => true,
             AxisState::Starting | AxisState::Off | AxisState::Stopped(_) => false,
         };
