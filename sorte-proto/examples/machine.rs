@@ -170,7 +170,9 @@ fn run(master: &mut Master, axes: &mut [Axis], nodes: &mut [Node], mut cycles: u
                 if let Some((answer, sof_ns)) = carry(nodes, &buffer[..len], at_ns, capture_ns) {
                     master.hear(&answer, sof_ns)?;
                 }
-                nodes.iter_mut().for_each(|node| node.due_ns = at_ns + 5000);
+                for node in nodes.iter_mut() {
+                    node.due_ns = at_ns + 5000;
+                }
             }
             Action::Exchange { at_ns, time_stamp, .. } => {
                 exchange(master, axes, nodes, at_ns, time_stamp)?;

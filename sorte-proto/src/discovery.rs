@@ -381,6 +381,11 @@ impl Network {
         Ok(())
     }
 
+    /// Whether an answer tells this line.
+    pub(crate) fn is_told_by(&self, answer: DiscoveryView<'_>) -> bool {
+        answer.count() == u16::from(self.devices) && self.entries().iter().copied().eq(answer.entries())
+    }
+
     /// Devices in the line, 0..=254.
     pub const fn devices(&self) -> u8 {
         self.devices

@@ -143,7 +143,7 @@ impl Sync {
     }
 
     /// When the master triggered the frame, in its time, as a device sees it that is `delay_ns` away.
-    pub(crate) const fn trigger_ns(&self, delay_ns: u32) -> u32 {
+    pub(crate) const fn trigger_ns(self, delay_ns: u32) -> u32 {
         self.time_stamp_ns.wrapping_sub(TRIGGER_TO_CAPTURE_NS).wrapping_sub(delay_ns)
     }
 

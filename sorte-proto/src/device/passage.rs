@@ -83,6 +83,15 @@ impl Passage {
     /// The byte to send for the byte received.
     #[inline]
     pub fn byte(&mut self, byte: u8) -> u8 {
+        // The longest of all frames.
+        match &mut self.kind {
+            Kind::Discovery(rewriter) => rewriter.byte(byte),
+            _ => self.short(byte),
+        }
+    }
+
+    #[inline(never)]
+    fn short(&mut self, byte: u8) -> u8 {
         match &mut self.kind {
             Kind::Discovery(rewriter) => rewriter.byte(byte),
             Kind::Sync(rewriter) => rewriter.byte(byte),

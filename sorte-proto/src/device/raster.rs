@@ -60,6 +60,7 @@ pub(super) struct Raster {
 }
 
 /// What a raster is made of.
+#[expect(clippy::struct_field_names, reason = "times, all of them")]
 pub(super) struct Plan {
     /// Common time at the start of cycle 0.
     pub(super) first_ns: u32,
@@ -163,8 +164,10 @@ impl Raster {
             let passed = self.passed(now_ns.wrapping_sub(1), self.sends.ns.wrapping_add(sends_ns));
             self.sends = self.sends.after(passed, self.cycle_ns);
         }
-        let hands_out =
-            speaks.map(|sends_ns| self.sends.ns.wrapping_add(sends_ns).wrapping_sub(self.lead_ns)).unwrap_or(closes);
+        let hands_out = match speaks {
+            Some(sends_ns) => self.sends.ns.wrapping_add(sends_ns).wrapping_sub(self.lead_ns),
+            None => closes,
+        };
         let [close, begin, send] = [closes, self.begins.ns, hands_out].map(|at| since(at, now_ns));
         let first = close.min(begin).min(send);
         if first > 0 {

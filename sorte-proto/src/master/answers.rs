@@ -132,7 +132,7 @@ impl Master {
         if !answer.status().contains(Status::LAST) {
             return Ok(());
         }
-        let before = self.network;
+        let same = self.network.is_told_by(answer);
         self.network.take(answer)?;
         if !self.config.patient_discovery {
             self.answered = true;
@@ -140,9 +140,9 @@ impl Master {
         }
         if self.agreed >= AGREED {
             // Whoever was counted before must be in the answer to the last one too.
-            self.answered = answer.status().contains(Status::STATE_CHANGE) && before == self.network;
+            self.answered = answer.status().contains(Status::STATE_CHANGE) && same;
         } else {
-            self.agreed = if before == self.network { self.agreed.saturating_add(1) } else { 1 };
+            self.agreed = if same { self.agreed.saturating_add(1) } else { 1 };
         }
         Ok(())
     }

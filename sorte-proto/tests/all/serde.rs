@@ -40,8 +40,8 @@ fn words_and_bytes_of_which_all_are_legal() {
     only::<Reserved>(|n| matches!(n & 0x7fff, 3991..=0x7ffe) && n <= 0xffff || n == 0xffff);
 }
 
-fn round<T: Serialize + DeserializeOwned + Debug + PartialEq>(value: T) {
-    assert_eq!(serde_json::from_value::<T>(serde_json::to_value(&value).unwrap()).unwrap(), value);
+fn round<T: Serialize + DeserializeOwned + Debug + PartialEq + Copy>(value: T) {
+    assert_eq!(serde_json::from_value::<T>(serde_json::to_value(value).unwrap()).unwrap(), value);
 }
 
 /// A line of two devices, as a frame and as the master knows it; a table without room for itself, and totals that are no sums.
