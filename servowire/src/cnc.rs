@@ -29,8 +29,8 @@ use sorte_proto::sync0::Variant;
 use step_motion::{Limits, PtoMover};
 use step_profile::{Frequency, Motors, Parameters, Profile, Speed};
 
-use servowire_decode::time;
 use crate::gcode::{AXES, Part};
+use servowire_decode::time;
 
 use axis::Build;
 use driver::Fault;
